@@ -1,0 +1,1 @@
+"""Comparison of a study with Persson theory, tables and figures."""

@@ -1,0 +1,1 @@
+"""The physics: wavenumbers, stiffness, surfaces, the contact problem, theory."""

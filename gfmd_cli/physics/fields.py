@@ -1,0 +1,15 @@
+"""Array types shared by the whole package."""
+
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+Field: TypeAlias = NDArray[np.float64]
+"""Real values on the grid (or over wavenumbers, bins, pressures)."""
+
+Modes: TypeAlias = NDArray[np.complex128]
+"""Fourier coefficients in the half-spectrum layout of a real transform."""
+
+Mask: TypeAlias = NDArray[np.bool_]
+"""A choice of grid points."""

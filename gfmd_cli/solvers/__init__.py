@@ -1,0 +1,1 @@
+"""Solvers of the contact problem and the one loop that drives them."""

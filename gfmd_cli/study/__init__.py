@@ -1,0 +1,1 @@
+"""Studies: the run spec, its tasks, the store, checkpoints and the runner."""
