@@ -1,0 +1,262 @@
+"""Persson's contact theory for a linear elastomer of any stiffness k(q).
+
+Equation numbers are those of the paper: Mueser, "Elastic contacts of randomly rough surfaces across
+the spatial dimensions", Sect. 4.1 and 5.2. Sums over q never contain q = 0.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import PchipInterpolator
+from scipy.special import erf, erfc, erfcx
+
+from gfmd_cli.physics.fields import Field
+
+_GAMMA = {0.0: 0.5, 0.5: 0.45, 1.0: 0.35, 2.0: 0.2, 3.0: 0.1, 4.0: 0.02}  # Eq. (39)
+_SAME_SHELL = 1e-9  # relative difference of |q| within one shell: far above rounding
+_CHUNK = 1 << 18  # elements of one temporary array, 2 MiB: fits a cache and bounds the memory
+_NARROW = 1e-5  # bin width / variance where the mid point errs as little as the difference, ~1e-10
+_UNDERFLOW = 40.0  # exp(-x^2) is zero in double precision well before this x
+
+
+def ierfc(x: Field) -> Field:
+    """Integral of erfc from x to infinity: exp(-x^2)/sqrt(pi) - x erfc(x), to 2 x^2 roundings."""
+    y = np.minimum(np.abs(x), _UNDERFLOW)
+    tail: Field = np.exp(-y * y) * (1 / np.sqrt(np.pi) - y * erfcx(y))
+    value: Field = tail + 2 * np.maximum(-x, 0.0)  # ierfc(-y) = ierfc(y) + 2 y
+    return value
+
+
+def gamma_n(n: Field | float) -> Field:
+    """Weight gamma_n of the elastic energy for k ~ q^n, 0 <= n <= 4.
+
+    Paper Eq. (39), which tabulates n = 0, 1/2, 1, 2, 3, 4 (fitted to simulations of one surface).
+    In between, a monotone cubic (PCHIP) passes through the table.
+
+    Raises ValueError for n outside [0, 4].
+    """
+    exponent = np.asarray(n, dtype=np.float64)
+    nodes = np.array(list(_GAMMA))
+    if np.any((exponent < nodes[0]) | (exponent > nodes[-1])):
+        raise ValueError(f"gamma_n is known for 0 <= n <= 4, got n = {n}")
+    value: Field = PchipInterpolator(nodes, np.array(list(_GAMMA.values())))(exponent)
+    return value
+
+
+def gamma_slab(qt: Field) -> Field:
+    """Weight gamma_4 + (gamma_1 - gamma_4) tanh(q t / 6) of a slab of thickness t.
+
+    Paper Eq. (42): gamma_4 for q t -> 0 (thin sheet), gamma_1 for q t -> infinity (half-space); the
+    paper's conclusions name the two limits the wrong way round.
+    """
+    value: Field = _GAMMA[4.0] + (_GAMMA[1.0] - _GAMMA[4.0]) * np.tanh(np.asarray(qt) / 6)
+    return value
+
+
+@dataclass(frozen=True, eq=False)
+class Shells:
+    """Spectrum of a surface in bins of rising wavenumber, all arrays of shape (bins,)."""
+
+    q: Field  # mean wavenumber, weighted with C(q) [1/m]
+    height: Field  # sum of C(q) [m^2]
+    energy: Field  # sum of k C: twice the energy of full contact [Pa m]
+    variance: Field  # sum of k^2 C: variance of the full-contact stress, Eq. (23) [Pa^2]
+    gamma: Field  # mean gamma of Eq. (30), weighted with k C
+
+
+def shells(
+    q: Field, power: Field, k: Field, gamma: Field, *, exact: int = 64, bins: int = 500
+) -> Shells:
+    """Bin the modes of a surface: exact shells at long wavelengths, then logarithmic bins.
+
+    Paper Sect. 4.1.1 (with 500 bins). Empty bins are dropped; a flat surface has no bins at all.
+
+    Parameters
+    ----------
+    q : |q| > 0 of every mode [1/m], shape (modes,)
+    power : |h(q)|^2 times the multiplicity of the mode [m^2], shape (modes,)
+    k : stiffness k(q) [Pa/m], shape (modes,)
+    gamma : weight gamma(q) of Eq. (30), shape (modes,)
+    exact : number of smallest |q| with power that get a bin each
+    bins : number of logarithmic bins between the last of these and the largest |q| with power
+    """
+    carries_power = power > 0
+    if not np.any(carries_power):
+        return Shells(*np.empty((5, 0)))
+    edges = _bin_edges(q[carries_power], exact, bins)
+    sums = np.zeros((5, edges.size + 1))
+    for start in range(0, q.size, _CHUNK):
+        part = slice(start, start + _CHUNK)
+        where = np.searchsorted(edges, q[part])
+        height, energy = power[part], k[part] * power[part]
+        weights = (q[part] * height, height, energy, k[part] * energy, gamma[part] * energy)
+        for total, weight in zip(sums, weights, strict=True):
+            total += np.bincount(where, weight, minlength=total.size)
+    moment, height, energy, variance, weighted = sums[:, sums[3] > 0]
+    return Shells(moment / height, height, energy, variance, weighted / energy)
+
+
+def _bin_edges(q: Field, exact: int, bins: int) -> Field:
+    """Inner edges: half-way between the smallest |q|, then in geometric progression."""
+    low = _smallest_distinct(q, exact + 1)
+    between = 0.5 * (low[1:] + low[:-1])
+    if low.size <= exact:
+        return between
+    start = between[-1] if exact else low[0]
+    return np.concatenate([between, np.geomspace(start, q.max(), bins + 1)[1:-1]])
+
+
+def _smallest_distinct(q: Field, count: int) -> Field:
+    """The `count` smallest different values in rising order, or all; reorders q in place."""
+    size = 4 * count  # a first guess of how many modes these shells hold
+    while True:
+        whole = size >= q.size
+        if not whole:
+            q.partition(size)
+        low = np.sort(q[:size])
+        distinct: Field = low[np.append(True, np.diff(low) > _SAME_SHELL * low[1:])]
+        if whole or distinct.size >= count:
+            return distinct[:count]
+        size *= 4
+
+
+@dataclass(frozen=True, eq=False)
+class Persson:
+    """Persson theory of one surface and elastomer; pressures in the unit of sqrt(variance)."""
+
+    shells: Shells
+
+    @property
+    def delta_sigma(self) -> float:
+        """Standard deviation Delta_sigma of the stress in full contact. Paper Eq. (23)."""
+        return float(np.sqrt(np.sum(self.shells.variance)))
+
+    def contact_area(self, p: Field | float) -> Field:
+        """Relative contact area a_r = erf(p / sqrt(2) Delta_sigma). Paper Eq. (25)."""
+        area: Field = erf(self._reduced(p))
+        return area
+
+    def non_contact_weight(self, p: Field | float) -> Field:
+        """Weight 1 - a_r of the delta function at sigma = 0 in Pr(sigma). Paper Eq. (24)."""
+        weight: Field = erfc(self._reduced(p))
+        return weight
+
+    def stress_density(self, sigma: Field | float, p: Field | float) -> Field:
+        """Continuous part of the stress distribution Pr(sigma); zero for sigma <= 0.
+
+        Paper Eq. (24), corrected: [exp{-(sigma-p)^2/2s} - exp{-(sigma+p)^2/2s}] / sqrt(2 pi s) with
+        s = Delta_sigma^2 (printed: the same exponential twice and Delta_sigma^2 below the line).
+
+        Parameters
+        ----------
+        sigma, p : stress and pressure, shapes that broadcast; the surface must not be flat
+        """
+        width = self.delta_sigma
+        x, y = np.maximum(sigma, 0.0) / width, np.asarray(p) / width
+        density: Field = -np.expm1(-2 * x * y) * np.exp(-0.5 * (x - y) ** 2)
+        density /= np.sqrt(2 * np.pi) * width
+        return density
+
+    def stress_deviation(self, p: Field | float) -> Field:
+        """Standard deviation sigma_p of the stress under pressure p, in the unit of p.
+
+        Paper Eq. (26) times Delta_sigma^2, which is the integral of a_r over the variance.
+        """
+        p = np.asarray(p, dtype=np.float64)
+        if not self.shells.variance.size:
+            return np.zeros_like(p)
+        deviation: Field = np.sqrt(_resolved_variance(p, self.delta_sigma**2))
+        return deviation
+
+    def elastic_energy(self, p: Field | float) -> Field:
+        """Elastic energy per area v = sum_q W k C / 2 at pressure p, without q = 0.
+
+        Paper Eqs. (29)-(32) with W = gamma a_r + (1 - gamma) a_r^3.
+        """
+        return self._energy_and_slope(np.asarray(p, dtype=np.float64))[0]
+
+    def mean_gap(self, p: Field | float) -> Field:
+        """Mean gap u_g = int_p^infinity dp' v'(p') / p'; infinite at p = 0.
+
+        Paper Eq. (28), by Gauss-Legendre panels in ln p' shared by all pressures and summed from
+        the top, where the integrand has vanished: all terms are positive, so that u_g keeps its
+        relative accuracy (about 1e-14) while it falls by orders of magnitude.
+
+        Parameters
+        ----------
+        p : pressure >= 0, any shape
+        """
+        p = np.asarray(p, dtype=np.float64)
+        if not self.shells.variance.size:
+            return np.zeros_like(p)
+        edges = _panel_edges(p[p > 0], self.delta_sigma)
+        ends = np.log(edges)[:, None]
+        centre, half = 0.5 * (ends[1:] + ends[:-1]), 0.5 * (ends[1:] - ends[:-1])
+        node, weight = np.polynomial.legendre.leggauss(16)  # 40 nodes change u_g by < 1e-14
+        slope = self._energy_and_slope(np.exp(centre + half * node))[1]
+        panels = np.sum(half * weight * slope, axis=1)
+        gap = np.append(np.cumsum(panels[::-1])[::-1], 0.0)
+        at = np.minimum(np.searchsorted(edges, p), gap.size - 1)
+        return np.where(p > 0, gap[at], np.inf)
+
+    def _reduced(self, p: Field | float) -> Field:
+        """p / sqrt(2) Delta_sigma; a flat surface is in full contact under any pressure."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.where(np.asarray(p) > 0, p / np.float64(np.sqrt(2) * self.delta_sigma), 0.0)
+
+    def _energy_and_slope(self, p: Field) -> tuple[Field, Field]:
+        """v and dv/dp, both of the shape of p. Paper Eqs. (29) and (30)."""
+        energy, gamma = self.shells.energy, self.shells.gamma
+        v, slope = np.empty(p.size), np.empty(p.size)
+        for part in self._chunks(p.size):
+            a, da = _bin_area(p.ravel()[part], self.shells.variance)
+            v[part] = 0.5 * (a * (gamma + (1 - gamma) * a * a)) @ energy
+            slope[part] = 0.5 * (da * (gamma + 3 * (1 - gamma) * a * a)) @ energy
+        return v.reshape(p.shape), slope.reshape(p.shape)
+
+    def _chunks(self, size: int) -> Iterator[slice]:
+        rows = max(1, _CHUNK // max(1, self.shells.variance.size))
+        return (slice(start, start + rows) for start in range(0, size, rows))
+
+
+def _bin_area(p: Field, variance: Field) -> tuple[Field, Field]:
+    """Mean contact area of every bin and its slope in p, both of shape (pressures, bins).
+
+    Paper Eq. (31) and Eq. (32), corrected: I = F(s+) - F(s-) with
+    F = (p^2 + s) erf(p/sqrt(2s)) + p sqrt(2s/pi) exp(-p^2/2s) (printed: -I/2).
+    """
+    s, p = np.cumsum(variance), p[:, None]
+    narrow = variance < _NARROW * s
+    width = np.where(narrow, 1.0, variance)
+    area = np.diff(_resolved_variance(p, s), prepend=0.0) / width
+    slope = np.diff(2 * np.sqrt(2 * s) * ierfc(p / np.sqrt(2 * s)), prepend=0.0) / width
+    if np.any(narrow):  # the mid point instead of a difference that cancels
+        scale = np.sqrt(2 * s - variance)[narrow]
+        x = np.minimum(p / scale, _UNDERFLOW)
+        area[:, narrow] = erf(x)
+        slope[:, narrow] = 2 / np.sqrt(np.pi) * np.exp(-x * x) / scale
+    return area, slope
+
+
+def _resolved_variance(p: Field, s: Field | float) -> Field:
+    """int_0^s ds' erf(p/sqrt(2s')) = F(s) - F(0) in Eq. (32), as a sum of positive terms."""
+    x = p / np.sqrt(2 * s)
+    value: Field = s * erf(x) + p * np.sqrt(2 * s) * ierfc(x)
+    return value
+
+
+def _panel_edges(p: Field, delta_sigma: float) -> Field:
+    """Rising pressures from the lowest asked to the end of the Gaussian tail, every p among them.
+
+    A panel spans at most a factor sqrt(e), and at most a factor e^4 of exp(-p^2 / 2 Delta_sigma^2).
+    """
+    if not p.size:
+        return np.array([1.0, 1.0])
+    y_end = min(0.5 * (p.max() / delta_sigma) ** 2 + 40, 745)  # exp(-40) < eps; exp(-745) is 0
+    end = delta_sigma * np.sqrt(2 * y_end)
+    start = min(p.min(), end)
+    tail = delta_sigma * np.sqrt(2 * np.arange(4, y_end, 4))
+    steps = 2 + int(2 * np.log(end / start))
+    edges = np.concatenate([p[p < end], tail[tail > start], np.geomspace(start, end, steps)])
+    return np.unique(edges)
