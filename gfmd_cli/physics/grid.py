@@ -1,0 +1,148 @@
+"""The periodic grid: its wavenumbers, its one Fourier convention, its transforms.
+
+h(x) = sum_q h(q) exp(i q x): the forward transform carries 1/size, so that h(q = 0) is the mean.
+Coefficients are kept for non-negative wavenumbers of the last axis only (real transforms).
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import pyfftw
+
+from gfmd_cli.physics import wisdom
+from gfmd_cli.physics.fields import Field, Modes
+
+
+@dataclass(frozen=True)
+class Grid:
+    """`points` per side of a periodic cell, in one dimension (line scenes) or two."""
+
+    points: int
+    """Even number of points per side."""
+    dimension: int = 2
+    length: float = 1.0
+    """Side of the cell [m]."""
+    threads: int = 1
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Shape of a real field, indexed [y, x]."""
+        return (self.points,) * self.dimension
+
+    @property
+    def spectral_shape(self) -> tuple[int, ...]:
+        """Shape of its Fourier coefficients."""
+        return (*self.shape[:-1], self.points // 2 + 1)
+
+    @property
+    def size(self) -> int:
+        """Number of grid points."""
+        return int(self.points**self.dimension)
+
+    @property
+    def spacing(self) -> float:
+        """Distance of neighbouring points [m]."""
+        return self.length / self.points
+
+    def empty(self) -> Field:
+        """A real field, aligned for the transforms, values undefined."""
+        array: Field = pyfftw.empty_aligned(self.shape, dtype=np.float64)
+        return array
+
+    def empty_modes(self) -> Modes:
+        """Fourier coefficients, aligned for the transforms, values undefined."""
+        array: Modes = pyfftw.empty_aligned(self.spectral_shape, dtype=np.complex128)
+        return array
+
+    def mode_number(self) -> Field:
+        """|q| L / 2 pi of every coefficient, shape `spectral_shape`."""
+        along = np.arange(self.points // 2 + 1, dtype=np.float64)
+        if self.dimension == 1:
+            return along
+        across = np.fft.fftfreq(self.points, 1 / self.points)
+        return np.sqrt(across[:, None] ** 2 + along**2)
+
+    def wavenumber(self) -> Field:
+        """|q| of every coefficient [1/m], shape `spectral_shape`."""
+        return self.mode_number() * (2 * np.pi / self.length)
+
+    def multiplicity(self) -> Field:
+        """How often a coefficient counts in a sum over all q, shape (points/2 + 1,)."""
+        count = np.full(self.points // 2 + 1, 2.0)
+        count[0] = count[-1] = 1.0
+        return count
+
+    @cached_property
+    def _plans(self) -> tuple[Callable[..., None], Callable[..., None], Modes]:
+        """Forward and backward transform and their shared array of coefficients."""
+        field, modes = self.empty(), self.empty_modes()
+        axes = tuple(range(self.dimension))
+        with wisdom.kept():
+            forward = pyfftw.FFTW(field, modes, axes, "FFTW_FORWARD", threads=self.threads)
+            backward = pyfftw.FFTW(modes, field, axes, "FFTW_BACKWARD", threads=self.threads)
+        return forward, backward, modes
+
+    def forward(self, field: Field) -> Modes:
+        """Fourier coefficients of a field."""
+        forward, _, _ = self._plans
+        modes = self.empty_modes()
+        forward(field, modes)
+        modes *= 1.0 / self.size
+        return modes
+
+    def backward(self, modes: Modes) -> Field:
+        """The field of these Fourier coefficients."""
+        _, backward, work = self._plans
+        field = self.empty()
+        work[...] = modes  # the transform destroys its input
+        backward(work, field, normalise_idft=False)
+        return field
+
+    def operator(self, symbol: Field) -> "Operator":
+        """The linear map F^-1 symbol F."""
+        return Operator(self, symbol * (1.0 / self.size))
+
+    def resample(self, field: Field, target: "Grid") -> Field:
+        """The same trigonometric polynomial on another grid of the same cell.
+
+        A finer grid interpolates; a coarser one loses what it does not resolve, its own highest
+        mode included.
+        """
+        modes = self.forward(field)
+        half = min(self.points, target.points) // 2
+        rows = (
+            np.r_[0 : half + 1, -half:0]
+            if target.points > self.points
+            else np.r_[0:half, 1 - half : 0]
+        )
+        out = target.empty_modes()
+        out[...] = 0.0
+        if target.points > self.points:
+            modes[..., -1] *= 0.5  # the highest mode stands for +q and -q alike
+            if self.dimension == 2:
+                modes[half] *= 0.5
+        columns = slice(0, half + (target.points > self.points))
+        if self.dimension == 1:
+            out[columns] = modes[columns]
+        else:
+            out[rows, columns] = modes[rows, columns]
+        return target.backward(out)
+
+
+@dataclass(frozen=True)
+class Operator:
+    """F^-1 symbol F on one grid: one pair of transforms a call."""
+
+    grid: Grid
+    symbol: Field
+    """Symbol / size, shape `grid.spectral_shape`."""
+
+    def __call__(self, field: Field, out: Field) -> Field:
+        """Apply to `field`, write to `out` (both aligned), return `out`."""
+        forward, backward, work = self.grid._plans
+        forward(field, work)
+        np.multiply(work, self.symbol, out=work)
+        backward(work, out, normalise_idft=False)
+        return out

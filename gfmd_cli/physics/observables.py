@@ -1,0 +1,102 @@
+"""What is measured on a solved contact, in reduced units."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gfmd_cli.physics.contact import Contact
+from gfmd_cli.physics.fields import Field, Mask
+
+
+def contact_points(contact: Contact, u: Field, sigma: Field) -> Mask:
+    """Points that carry load: on the indenter and pressed against it."""
+    points: Mask = (u == contact.height) & (sigma > 0)
+    return points
+
+
+def switches(mask: Mask) -> int:
+    """Changes between contact and non-contact of neighbours along all axes, periodic."""
+    count = 0
+    for axis in range(mask.ndim):
+        lines = np.moveaxis(mask, axis, 0)
+        count += int(np.count_nonzero(lines[1:] != lines[:-1]))
+        count += int(np.count_nonzero(lines[0] != lines[-1]))
+    return count
+
+
+@dataclass(frozen=True)
+class Observables:
+    """Scalars of one contact."""
+
+    a_r: float
+    """Relative contact area: share of the grid points that carry load."""
+    sigma_p: float
+    """Standard deviation of the stress over the whole interface [Delta_sigma]."""
+    u_g: float
+    """Mean gap [h_std]."""
+    perimeter: float
+    """Contact line per area times L: spacing times the switches along rows and columns / L; for
+    a line scene the number of contact edges."""
+    energy: float
+    """Elastic energy per area v = <u K u> / 2 [h_std Delta_sigma]."""
+    work: float
+    """<sigma h> - p <u> [h_std Delta_sigma], equal to 2 v at the solution."""
+
+
+def observe(contact: Contact, u: Field, sigma: Field) -> Observables:
+    """Measure the scalars on a displacement and its stress sigma = K u + p."""
+    touching = contact_points(contact, u, sigma)
+    grid = contact.grid
+    elastic = sigma - contact.pressure
+    mean_u = float(u.mean())
+    return Observables(
+        a_r=np.count_nonzero(touching) / grid.size,
+        sigma_p=float(np.sqrt(np.mean(np.square(elastic)))),
+        u_g=float(np.mean(u - contact.height)),
+        perimeter=switches(touching) / grid.points ** (grid.dimension - 1),
+        energy=0.5 * float(np.vdot(u, elastic)) / grid.size,
+        work=float(np.vdot(sigma, contact.height)) / grid.size - contact.pressure * mean_u,
+    )
+
+
+@dataclass(frozen=True)
+class StressDistribution:
+    """Pr(sigma) in units of Delta_sigma: zero weight + sum of density times width + beyond = 1."""
+
+    linear: Field
+    """Density in the linear bins."""
+    logarithmic: Field
+    """Density in the logarithmic bins."""
+    zero: float
+    """Weight of the delta function at zero: share of points without load."""
+    beyond: float
+    """Share of points above the last linear bin."""
+
+
+def linear_edges() -> Field:
+    """Edges of the linear bins [Delta_sigma]: width 0.05 up to 10, where a Gauss tail has ended."""
+    return np.linspace(0.0, 10.0, 201)
+
+
+def logarithmic_edges() -> Field:
+    """Edges of the logarithmic bins [Delta_sigma]: ten a decade from 1e-6 to 1e4."""
+    return np.logspace(-6.0, 4.0, 101)
+
+
+def stress_distribution(contact: Contact, u: Field, sigma: Field) -> StressDistribution:
+    """Histogram of the stress over the points that carry load, as densities over sigma."""
+    loaded = sigma[contact_points(contact, u, sigma)]
+    size = contact.grid.size
+    linear, _ = np.histogram(loaded, linear_edges())
+    logarithmic, _ = np.histogram(loaded, logarithmic_edges())
+    return StressDistribution(
+        linear=linear / (size * np.diff(linear_edges())),
+        logarithmic=logarithmic / (size * np.diff(logarithmic_edges())),
+        zero=1.0 - loaded.size / size,
+        beyond=float(loaded.size - linear.sum()) / size,
+    )
+
+
+def cross_section(field: Field) -> Field:
+    """Values along the diagonal [i, i] of the cell; of a line scene, the whole line."""
+    return field.copy() if field.ndim == 1 else np.diagonal(field).copy()

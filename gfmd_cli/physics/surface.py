@@ -1,0 +1,200 @@
+"""Rigid indenters: the height h on a grid, pointing towards the elastic body.
+
+Each class is one `kind` of the run spec's [surface]. `heights(points)` samples the surface on the
+grid [y, x] (line scenes: [x]); `smallest_grid()` says which grid resolves it. Equation numbers
+are those of Mueser, "Elastic contacts of randomly rough surfaces across the spatial dimensions".
+"""
+
+from functools import cache
+from pathlib import Path
+from typing import Annotated, ClassVar, Literal
+
+import numpy as np
+from pydantic import Field as Key
+
+from gfmd_cli.errors import InputError
+from gfmd_cli.physics.bodies import (
+    SMALLEST_GRID,
+    Cone,
+    LineParabola,
+    Parabola,
+    PowerLawBody,
+    Punch,
+    Ridge,
+    Wave,
+)
+from gfmd_cli.physics.choice import Choice, FilePath, Positive, Seed
+from gfmd_cli.physics.fields import Field, Modes
+from gfmd_cli.physics.grid import Grid
+from gfmd_cli.physics.topography import (
+    Edges,
+    Levelling,
+    Topography,
+    level,
+    make_periodic,
+    read_topography,
+)
+
+
+class SelfAffine(Choice):
+    """Random self-affine surface: |h(q)| = sqrt(C(q)), each phase drawn evenly from (0, 2 pi).
+
+    Paper Eqs. (3) and (40). The phase of a mode depends on the seed and on the mode alone, so one
+    seed is one continuous surface, whatever the grid; a smaller cut-off only adds modes to it.
+    """
+
+    dimension: ClassVar[int] = 2
+    kind: Literal["self-affine"] = "self-affine"
+    hurst: Annotated[float, Key(gt=0, le=1)] = 0.8
+    """Hurst exponent H, above 0 and up to 1."""
+    rolloff: Positive = 0.5
+    """Roll-off (or cut-off) wavelength lambda_r / L."""
+    cutoff: Annotated[float, Key(gt=0, le=1)] = 0.005
+    """Short-wavelength cut-off lambda_s / L."""
+    spectrum: Literal["rolloff", "cutoff"] = "rolloff"
+    """"rolloff": C = [1 + (q/q_r)^2]^(-1-H), Eq. (3); "cutoff": C = (q/q_r)^(-2-2H) from q_r
+    on, zero below, Eq. (40)."""
+    seed: Seed = 0
+    """Seed of the random phases."""
+    h_std: Positive | None = None
+    """Root-mean-square height [m] to scale to; by default C = 1 m^2 at long wavelengths."""
+    length: Positive = 1.0
+    """Side of the cell L [m]."""
+
+    @property
+    def highest_mode(self) -> int:
+        """Largest |q| L / 2 pi along an axis: L / lambda_s."""
+        return int(np.floor(1 / self.cutoff * (1 + 1e-12)))  # 1/0.01 must be 100, not 99
+
+    def smallest_grid(self) -> int:
+        """Two points per lambda_s."""
+        return max(SMALLEST_GRID, 2 * self.highest_mode)
+
+    def heights(self, points: int) -> Field:
+        """Heights [m] on the grid [y, x]."""
+        grid = Grid(points)
+        return grid.backward(self._modes(grid))
+
+    def _amplitude(self, m: Field) -> Field:
+        """sqrt(C(q)) at |q| = 2 pi m / L, zero beyond the cut-off. Paper Eqs. (3), (40)."""
+        reduced = m * self.rolloff  # q / q_r
+        known = (m > 0) & (m * self.cutoff <= 1 + 1e-12)
+        if self.spectrum == "rolloff":
+            return np.where(known, (1 + reduced**2) ** (-0.5 - 0.5 * self.hurst), 0.0)
+        known &= reduced >= 1 - 1e-12
+        return np.where(known, np.where(known, reduced, 1.0) ** (-1 - self.hurst), 0.0)
+
+    def _modes(self, grid: Grid) -> Modes:
+        """Fourier coefficients on a grid that resolves the surface.
+
+        Phases are drawn in square rings |m|_max = 1, 2, ...; of q and -q one is drawn. The modes
+        with a component at the highest wavenumber of the grid stand for +q and -q alike.
+        """
+        modes = grid.empty_modes()
+        modes[...] = 0.0
+        draw = np.random.Generator(np.random.PCG64(self.seed))
+        variance = 0.0
+        for ring in range(1, self.highest_mode + 1):
+            side = np.arange(-ring, ring + 1)
+            y = np.concatenate([side, np.full(ring, ring), np.full(ring - 1, -ring)])
+            x = np.concatenate([np.full(2 * ring + 1, ring), np.arange(ring), np.arange(1, ring)])
+            value = self._amplitude(np.hypot(y, x)) * np.exp(2j * np.pi * draw.random(4 * ring))
+            variance += 2 * float(np.sum(np.abs(value) ** 2))
+            modes[y, x] = value
+            modes[-ring, 0] = value[
+                2 * ring + 1
+            ].conj()  # of the mode (ring, 0), the only one on x = 0
+        if 2 * self.highest_mode == grid.points:  # (0, highest) and (highest, 0) and their mirrors
+            modes[0, -1] = 2 * modes[0, -1].real
+            modes[self.highest_mode, 0] = 2 * modes[self.highest_mode, 0].real
+        if self.h_std is not None and variance > 0:
+            modes *= self.h_std / np.sqrt(variance)
+        return modes
+
+
+class FileSurface(Choice):
+    """A height map from a file: .npy, HDF5, netCDF, or what microscopes write (SurfaceTopography).
+
+    A `.npy` or HDF5 array is periodic and used as it is. A scan is not: it is levelled, and its
+    edges are made to meet. Both can be asked for or left off.
+    """
+
+    dimension: ClassVar[int] = 2
+    kind: Literal["file"] = "file"
+    path: FilePath
+    """The file, relative to the run spec."""
+    dataset: str | None = None
+    """HDF5 dataset or microscope channel; by default the only map, or the default channel."""
+    periodic: bool | None = None
+    """Whether the map repeats as it is; by default true for arrays, false for scans."""
+    level: Levelling | None = None
+    """What to take off first: "none", "mean", "plane" or "curvature"; by default "plane" where
+    the map is not periodic, else "none"."""
+    edges: Edges | None = None
+    """How to make the edges meet: "window" fades the outer `taper` of each side to the mean height,
+    "mirror" doubles the cell by reflection, "none"; by default "window" where not periodic."""
+    taper: Annotated[float, Key(gt=0, le=0.5)] = 0.1
+    """Width of the frame that a window fades, as a share of the side."""
+    scale: Positive = 1.0
+    """Factor from the heights of the file to metres."""
+    length: Positive | None = None
+    """Side of the map [m], as it stands in the file; by default what the file says, else 1."""
+
+    def smallest_grid(self) -> int:
+        """The map's own points."""
+        return len(self._periodic_heights())
+
+    def heights(self, points: int) -> Field:
+        """Heights [m] on the grid [y, x]: the map's own, or Fourier-interpolated between them."""
+        own = self._periodic_heights()
+        return own if len(own) == points else Grid(len(own)).resample(own, Grid(points))
+
+    @property
+    def cell(self) -> float:
+        """Side of the periodic cell [m]: twice that of the map where it is mirrored."""
+        stated = self.length or _topography(self.path, self.dataset).length or 1.0
+        return 2 * stated if self._treatment()[1] == "mirror" else stated
+
+    def _treatment(self) -> tuple[Levelling, Edges]:
+        """What is done to the map: levelling, edges."""
+        says = _topography(self.path, self.dataset).periodic
+        periodic = self.periodic if self.periodic is not None else says in (True, None)
+        return (
+            self.level or ("none" if periodic else "plane"),
+            self.edges or ("none" if periodic else "window"),
+        )
+
+    def _periodic_heights(self) -> Field:
+        levelling, edges = self._treatment()
+        heights = self.scale * _topography(self.path, self.dataset).heights
+        return make_periodic(level(heights, levelling), edges, self.taper)
+
+
+@cache
+def _topography(path: Path, dataset: str | None) -> Topography:
+    """The file, read once a process."""
+    return read_topography(path, dataset)
+
+
+Surface = Annotated[
+    SelfAffine | Parabola | PowerLawBody | Cone | Punch | Ridge | LineParabola | Wave | FileSurface,
+    Key(discriminator="kind"),
+]
+
+
+def sample(surface: Surface, points: int) -> tuple[Grid, Field]:
+    """The surface on `points` per side of its cell: the grid and the heights [m].
+
+    Raises InputError where the grid does not resolve the surface, or the surface is flat.
+    """
+    needed = surface.smallest_grid()
+    if points < needed:
+        raise InputError(
+            f"grid.points: {points} points per side do not resolve this surface "
+            f"(kind {surface.kind!r}); {needed} or more do"
+        )
+    heights = surface.heights(points)
+    if np.ptp(heights) == 0:
+        raise InputError(f"surface: flat (kind {surface.kind!r}); reduced units need roughness")
+    length = surface.cell if isinstance(surface, FileSurface) else surface.length
+    return Grid(points, surface.dimension, length), heights

@@ -1,0 +1,50 @@
+"""FFTW's wisdom, kept as text in the user's cache directory, so that plans are measured once."""
+
+import hashlib
+import os
+import platform
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from functools import cache
+from pathlib import Path
+
+import pyfftw
+
+
+def _cpu() -> str:
+    """The processor's model name: a plan measured on one model is a bad one on another."""
+    with suppress(OSError):
+        for line in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
+            if line.startswith("model name"):
+                return line
+    return platform.processor()
+
+
+def _path() -> Path:
+    cache_home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    key = hashlib.sha256(f"{_cpu()} {pyfftw.__version__}".encode()).hexdigest()[:12]
+    return cache_home / "gfmd" / f"fftw-{key}.txt"
+
+
+@cache
+def _load() -> None:
+    """Take in what earlier processes measured; a file that FFTW refuses is as good as none."""
+    with suppress(OSError):
+        pyfftw.import_wisdom((_path().read_bytes(), b"", b""))
+
+
+@contextmanager
+def kept() -> Iterator[None]:
+    """Plan inside with the wisdom known, and keep what was learnt."""
+    _load()
+    before = pyfftw.export_wisdom()[0]
+    yield
+    learnt = pyfftw.export_wisdom()[0]
+    if learnt == before:
+        return
+    path = _path()
+    fresh = path.with_suffix(f".{os.getpid()}")
+    with suppress(OSError):  # a cache that cannot be written costs time only
+        path.parent.mkdir(parents=True, exist_ok=True)
+        fresh.write_bytes(learnt)
+        fresh.replace(path)

@@ -1,0 +1,137 @@
+"""From coarse to fine: each grid starts from the solution of the one before."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+from pydantic import Field as Key
+
+from gfmd_cli.physics.choice import Choice
+from gfmd_cli.physics.contact import Contact
+from gfmd_cli.physics.fields import Field
+from gfmd_cli.solvers.loop import State, Watch, solve
+from gfmd_cli.solvers.pcg import ProjectedCG
+from gfmd_cli.solvers.sort import Sort, is_flat
+
+COARSEST = 64  # points per side; a solve there costs next to nothing
+COARSE_TOLERANCE = 1e-3  # of the start that a coarse grid gives; measured: tighter does not pay
+
+
+class SolverChoice(Choice):
+    """How to solve, and how well."""
+
+    kind: Literal["auto", "pcg", "sort"] = "auto"
+    """"auto" sorts where the stiffness is flat (n = 0) and takes "pcg" elsewhere."""
+    tolerance: Annotated[float, Key(gt=0, lt=1)] = 1e-6
+    """Natural residual to reach."""
+    max_steps: Annotated[int, Key(gt=0)] = 20000
+    """Steps on one grid after which the solve is given up."""
+
+    def method(self, contact: Contact) -> ProjectedCG | Sort:
+        """The solver of this contact."""
+        if self.kind == "sort" or (self.kind == "auto" and is_flat(contact)):
+            return Sort()
+        return ProjectedCG()
+
+
+@dataclass
+class Solution:
+    """A solved contact, its score measured afresh."""
+
+    u: Field
+    sigma: Field
+    residual: float
+    status: str
+    """"converged", "max_steps" or "diverged"."""
+    solver: str
+    steps: int
+    transforms: float
+    """Real transforms of the solved size; those of coarser grids count by their share of points."""
+
+
+def levels(points: int, coarsest: int = COARSEST) -> list[int]:
+    """Grids from coarse to fine, each half as fine (rounded up to even) as the next."""
+    chain = [points]
+    while chain[-1] > coarsest:
+        half = (chain[-1] + 1) // 2
+        chain.append(half + half % 2)
+    return chain[::-1]
+
+
+@dataclass
+class Resume:
+    """Where a checkpoint left off."""
+
+    points: int
+    state: State
+    transforms: float
+    """Of the coarser grids, in units of the finest."""
+
+
+def solve_contact(
+    contact: Contact,
+    choice: SolverChoice,
+    watch: Watch,
+    resume: Resume | None = None,
+    enter_level: Callable[[int, float], None] = lambda points, spent: None,
+) -> Solution:
+    """Solve one contact by the chosen method, nested over grids.
+
+    Parameters
+    ----------
+    watch : sees every state of every grid
+    resume : continue from here instead of from the coarsest grid
+    enter_level : told the points of each grid and the transforms spent before it
+    """
+    method = choice.method(contact)
+    if isinstance(method, Sort):
+        chain = [contact.grid.points]
+    else:
+        full = full_contact(contact)
+        if full is not None:
+            return full
+        chain = levels(contact.grid.points)
+    spent = 0.0 if isinstance(method, Sort) else 2.0  # the look at full contact
+    state: State | None = None
+    coarse = contact
+    if resume is not None:
+        chain = chain[chain.index(resume.points) :]
+        spent = resume.transforms
+    for points in chain:
+        fine = contact if points == contact.grid.points else contact.coarsen(points)
+        if resume is not None and points == resume.points:
+            state = resume.state
+        else:
+            state = method.begin(fine, _start(fine, coarse, state))
+        enter_level(points, spent)
+        last = fine is contact
+        status = solve(
+            fine,
+            method,
+            state,
+            tolerance=choice.tolerance if last else max(choice.tolerance, COARSE_TOLERANCE),
+            max_steps=choice.max_steps,
+            watch=watch,
+        )
+        spent += state.transforms * fine.grid.size / contact.grid.size
+        coarse = fine
+    assert state is not None
+    return Solution(state.u, state.sigma, state.residual, status, method.kind, state.step, spent)
+
+
+def _start(fine: Contact, coarse: Contact, state: State | None) -> Field:
+    """The coarse solution on the finer grid, or a flat body that touches the highest point."""
+    if state is None:
+        u = fine.grid.empty()
+        u[...] = fine.height.max()
+        return u
+    return coarse.grid.resample(state.u, fine.grid)
+
+
+def full_contact(contact: Contact) -> Solution | None:
+    """The solution u = h, where the stress is nowhere tensile; else None. Costs two transforms."""
+    u = contact.height.copy()
+    sigma = contact.stress(u, out=contact.grid.empty())
+    if float(sigma.min()) < 0:
+        return None
+    return Solution(u, sigma, contact.residual(u, sigma), "converged", "pcg", 0, 2.0)
