@@ -11,18 +11,18 @@ from pathlib import Path
 import pyfftw
 
 
-def _cpu() -> str:
-    """The processor's model name: a plan measured on one model is a bad one on another."""
+def processor() -> str:
+    """The model name of the processor: a plan measured on one is a bad one on another."""
     with suppress(OSError):
         for line in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
             if line.startswith("model name"):
-                return line
+                return line.partition(":")[2].strip()
     return platform.processor()
 
 
 def _path() -> Path:
     cache_home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    key = hashlib.sha256(f"{_cpu()} {pyfftw.__version__}".encode()).hexdigest()[:12]
+    key = hashlib.sha256(f"{processor()} {pyfftw.__version__}".encode()).hexdigest()[:12]
     return cache_home / "gfmd" / f"fftw-{key}.txt"
 
 

@@ -1,0 +1,134 @@
+"""The state of an unfinished solve on disk: two slots, the newer one named by a pointer.
+
+A slot holds the fields as they lie in memory (mapped, space reserved first); the pointer holds
+their checksums and all scalars, and is replaced as a whole once the slot is on the disk. So
+whatever happens while one slot is written, the other still stands.
+"""
+
+import json
+import mmap
+import os
+import shutil
+import zlib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gfmd_cli.errors import SpaceError
+from gfmd_cli.physics.contact import Contact
+from gfmd_cli.physics.fields import Field
+from gfmd_cli.physics.grid import Grid
+from gfmd_cli.solvers.cascade import Resume
+from gfmd_cli.solvers.loop import State
+
+
+class Checkpoint:
+    """The checkpoint of one task, a folder of its own."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.pointer = folder / "pointer.json"
+
+    def save(self, contact: Contact, state: State, spent: float) -> None:
+        """Write the state; `spent` are the transforms of coarser grids. Raises SpaceError."""
+        fields = {"u": state.u, "sigma": state.sigma, **state.fields}
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+            slot = "a" if self._pointer().get("slot") == "b" else "b"
+            sums = _write_slot(self.folder / slot, list(fields.values()))
+            pointer = {
+                "slot": slot,
+                "points": contact.grid.points,
+                "spent": spent,
+                "exact": state.exact,
+                "residual": state.residual,
+                "step": state.step,
+                "transforms": state.transforms,
+                "scalars": state.scalars,
+                "fields": dict(zip(fields, sums, strict=True)),
+            }
+            write_whole(self.pointer, json.dumps(pointer).encode())
+        except OSError as error:
+            raise SpaceError(
+                f"{self.folder}: the checkpoint cannot be written: {error.strerror}"
+            ) from error
+
+    def load(self, grid: Grid) -> Resume | None:
+        """The saved state of a solve on `grid`, or None where there is none that is whole."""
+        pointer = self._pointer()
+        try:
+            level = Grid(pointer["points"], grid.dimension, grid.length, grid.threads)
+            fields = _read_slot(self.folder / pointer["slot"], level, pointer["fields"])
+            state = State(
+                u=fields.pop("u"),
+                sigma=fields.pop("sigma"),
+                exact=pointer["exact"],
+                residual=pointer["residual"],
+                step=pointer["step"],
+                transforms=pointer["transforms"],
+                scalars=pointer["scalars"],
+                fields=fields,
+            )
+        except (KeyError, TypeError, ValueError, OSError):
+            return None
+        return Resume(pointer["points"], state, pointer["spent"])
+
+    def remove(self) -> None:
+        """Forget the state: the task is done."""
+        shutil.rmtree(self.folder, ignore_errors=True)
+
+    def _pointer(self) -> dict[str, Any]:
+        try:
+            data = json.loads(self.pointer.read_bytes())
+        except (OSError, ValueError):
+            return {}
+        return data if isinstance(data, dict) else {}
+
+
+def write_whole(path: Path, content: bytes) -> None:
+    """Write a file so that it appears whole or not at all, even where the power fails."""
+    fresh = path.with_name(f".{path.name}.{os.getpid()}")
+    try:
+        with fresh.open("wb") as file:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
+        fresh.replace(path)
+    except OSError:
+        fresh.unlink(missing_ok=True)
+        raise
+    folder = os.open(path.parent, os.O_RDONLY)
+    try:
+        os.fsync(folder)
+    finally:
+        os.close(folder)
+
+
+def _write_slot(path: Path, fields: list[Field]) -> list[int]:
+    """Lay the fields one after the other into a mapped file; return their checksums."""
+    with path.open("w+b") as file:
+        os.posix_fallocate(file.fileno(), 0, sum(field.nbytes for field in fields))
+        with mmap.mmap(file.fileno(), 0) as memory:
+            offset, sums = 0, []
+            for field in fields:
+                content = np.ascontiguousarray(field).data.cast("B")
+                memory[offset : offset + field.nbytes] = content
+                offset += field.nbytes
+                sums.append(zlib.crc32(content))
+            memory.flush()
+        os.fsync(file.fileno())
+    return sums
+
+
+def _read_slot(path: Path, grid: Grid, sums: dict[str, int]) -> dict[str, Field]:
+    """The fields of a slot. Raises ValueError where one is not what was written."""
+    stored = np.memmap(path, np.float64, "r", shape=(len(sums), *grid.shape))
+    fields = {}
+    for (name, expected), mapped in zip(sums.items(), stored, strict=True):
+        field = grid.empty()
+        field[...] = mapped
+        if zlib.crc32(field.data.cast("B")) != expected:
+            raise ValueError(f"{path}: field {name} is damaged")
+        fields[name] = field
+    return fields

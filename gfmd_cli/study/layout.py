@@ -1,0 +1,71 @@
+"""The layout of a study file: its columns, and which of them `export` prints."""
+
+from typing import NamedTuple
+
+LAYOUT = 1
+"""Raised whenever a reader of the old layout would misread the new one."""
+
+
+class Column(NamedTuple):
+    """One value a task."""
+
+    name: str
+    kind: type
+    units: str
+    meaning: str
+
+
+CONTRACT = (
+    Column("surface", str, "", "surface, with what differs from its defaults"),
+    Column("seed", int, "1", "seed of the random phases, -1 where there is none"),
+    Column("elastomer", str, "", "elastic body, with what differs from its defaults"),
+    Column("n", float, "1", "exponent of the stiffness k ~ q^n, NaN where it is no single power"),
+    Column("thickness", float, "1", "thickness of a slab, t / L"),
+    Column("points", int, "1", "grid points per side"),
+    Column("p_star", float, "1", "reduced pressure p / Delta_sigma"),
+    Column("a_r", float, "1", "relative contact area"),
+    Column("a_r_error", float, "1", "estimated distance to the continuum value"),
+    Column("sigma_p", float, "1", "standard deviation of the stress / Delta_sigma"),
+    Column("sigma_p_error", float, "1", "estimated distance to the continuum value"),
+    Column("u_g", float, "1", "mean gap / h_std"),
+    Column("u_g_error", float, "1", "estimated distance to the continuum value"),
+    Column("residual", float, "1", "natural residual of the stored solution"),
+    Column("solver", str, "", "solver"),
+    Column("transforms", float, "1", "real Fourier transforms of the solved size"),
+    Column("seconds", float, "s", "wall time"),
+    Column("status", str, "", "converged, or why not"),
+)
+"""The columns that every `export` begins with, in this order."""
+
+FURTHER = (
+    Column("pressure", float, "Pa", "nominal pressure"),
+    Column("delta_sigma", float, "Pa", "unit of pressure: rms stress in full contact"),
+    Column("h_std", float, "m", "root-mean-square height"),
+    Column("mean_height", float, "m", "mean height of the indenter"),
+    Column("length", float, "m", "side of the cell"),
+    Column("mean_gap", float, "m", "mean gap"),
+    Column("perimeter", float, "1", "contact line per area times L; for a line scene the edges"),
+    Column("energy", float, "1", "elastic energy per area / (h_std Delta_sigma)"),
+    Column("work", float, "1", "(<sigma h> - p <u>) / (h_std Delta_sigma): twice the energy"),
+    Column("steps", int, "1", "steps on the finest grid"),
+    Column("tolerance", float, "1", "natural residual asked for"),
+)
+COLUMNS = (*CONTRACT, *FURTHER)
+
+DISTRIBUTION = (
+    Column("pr_zero", float, "1", "weight of the delta function of Pr(sigma) at zero"),
+    Column("pr_beyond", float, "1", "share of points above the last linear bin of Pr(sigma)"),
+)
+PR_LINEAR, PR_LOGARITHMIC = "pr_sigma", "pr_sigma_log"
+SHELLS = (
+    Column("q", float, "m-1", "mean wavenumber of the shell"),
+    Column("height", float, "m2", "sum of C(q) over the shell"),
+    Column("energy", float, "Pa m", "sum of k(q) C(q)"),
+    Column("variance", float, "Pa2", "sum of k(q)^2 C(q)"),
+    Column("gamma", float, "1", "weight gamma of the elastic energy in Persson theory"),
+)
+FIELDS = (
+    Column("u", float, "m", "displacement"),
+    Column("sigma", float, "Pa", "compressive stress"),
+    Column("height", float, "m", "height of the indenter"),
+)

@@ -1,0 +1,227 @@
+"""From TOML text to a Spec, or to one message that says what is wrong and where."""
+
+import re
+import tomllib
+from difflib import get_close_matches
+from math import prod
+from pathlib import Path
+from typing import Any, get_args
+
+from pydantic import ValidationError
+
+from gfmd_cli.errors import InputError
+from gfmd_cli.physics.choice import Choice
+from gfmd_cli.physics.elastomer import Elastomer
+from gfmd_cli.physics.surface import Surface
+from gfmd_cli.solvers.cascade import SolverChoice
+from gfmd_cli.study.spec import (
+    SHAPES,
+    SWEPT,
+    GridTable,
+    Ladder,
+    LoadTable,
+    OutputTable,
+    Spec,
+    StudyTable,
+    expand,
+)
+
+MAX_BYTES = 256 * 1024  # of a spec; a few kB are usual
+MAX_DEPTH = 16  # of tables and lists; tomllib takes memory with the square of it
+MAX_SWEEP = 100_000  # combinations of one table
+
+
+def _kinds(union: Any) -> dict[str, type[Choice]]:
+    """The classes of a discriminated union by their `kind`."""
+    return {model.model_fields["kind"].default: model for model in get_args(get_args(union)[0])}
+
+
+MODELS: dict[str, type[Choice] | dict[str, type[Choice]]] = {
+    "study": StudyTable,
+    "surface": _kinds(Surface),
+    "elastomer": _kinds(Elastomer),
+    "grid": GridTable,
+    "load": LoadTable,
+    "solver": SolverChoice,
+    "output": OutputTable,
+}
+REQUIRED = ("surface", "elastomer", "grid", "load")
+
+
+def read_spec(path: Path, overrides: tuple[str, ...] = ()) -> tuple[Spec, str]:
+    """Read and check a run spec.
+
+    Parameters
+    ----------
+    path : the TOML file
+    overrides : "key.name=value", the value in TOML or a bare word
+
+    Returns the spec and the text of the file. Raises InputError with all that is wrong.
+    """
+    try:
+        raw = path.read_bytes()
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror}") from error
+    if len(raw) > MAX_BYTES:
+        raise InputError(f"{path}: {len(raw)} bytes; a run spec has at most {MAX_BYTES}")
+    try:
+        text = raw.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path}: not UTF-8 text (byte {error.start})") from error
+    data = _toml(text, str(path))
+    origin: dict[str, str] = {}
+    for override in overrides:
+        _override(data, override, origin)
+    return build_spec(data, path.parent, _Where(str(path), text, origin)), text
+
+
+class _Where:
+    """Names the place of a key: file and line, or the --set that gave it."""
+
+    def __init__(self, name: str, text: str, overridden: dict[str, str]) -> None:
+        self.name, self.overridden = name, overridden
+        self.lines: dict[str, int] = {}
+        table = ""
+        for number, line in enumerate(text.splitlines(), 1):
+            if header := re.match(r"\s*\[+\s*([\w.\-]+)\s*\]+", line):
+                table = header[1]
+                self.lines.setdefault(table, number)
+            elif key := re.match(r"\s*([\w.\-]+)\s*=", line):
+                self.lines.setdefault(f"{table}.{key[1]}" if table else key[1], number)
+
+    def __call__(self, key: str) -> str:
+        plain = re.sub(r"\[\d+\]", "", key)
+        while plain:
+            if plain in self.overridden:
+                return self.overridden[plain]
+            if plain in self.lines:
+                return f"{self.name}:{self.lines[plain]}"
+            plain = plain.rpartition(".")[0]
+        return self.name
+
+
+def _toml(text: str, name: str) -> dict[str, Any]:
+    """Parse TOML that is neither deep nor long."""
+    for number, line in enumerate(text.splitlines(), 1):
+        keys = line.split("=", 1)[0]
+        if keys.count(".") > MAX_DEPTH or line.count("[") > 10 * MAX_DEPTH:
+            raise InputError(f"{name}:{number}: nested deeper than {MAX_DEPTH}")
+    try:
+        return tomllib.loads(text)
+    except (ValueError, RecursionError) as error:  # TOMLDecodeError is a ValueError
+        raise InputError(f"{name}: TOML syntax: {error or 'nested too deep'}") from error
+
+
+def _override(data: dict[str, Any], override: str, origin: dict[str, str]) -> None:
+    """Set one key from "key.name=value"."""
+    key, equals, value = override.partition("=")
+    parts = key.strip().split(".")
+    if not equals or not all(re.fullmatch(r"[\w\-]+", part) for part in parts):
+        raise InputError(f"--set {override}: write key.name=value, such as load.p_star=0.1")
+    if len(parts) > MAX_DEPTH or len(value) > MAX_BYTES:
+        raise InputError(f"--set {key[:40]}...: nested too deep or too long")
+    try:
+        parsed = tomllib.loads(f"value = {value.strip()}")["value"]
+    except (ValueError, RecursionError):
+        if not re.fullmatch(r"[\w./~+\-]+", value.strip()):
+            raise InputError(f"--set {override}: {value!r} is no TOML value") from None
+        parsed = value.strip()  # a bare word is a string
+    table = data
+    for part in parts[:-1]:
+        inner = table.setdefault(part, {})
+        if not isinstance(inner, dict):
+            raise InputError(f"--set {override}: {part!r} is no table")
+        table = inner
+    table[parts[-1]] = parsed
+    origin[key.strip()] = f"--set {override}"
+
+
+def build_spec(data: dict[str, Any], folder: Path, where: _Where) -> Spec:
+    """Check plain data against the models; paths are relative to `folder`."""
+    problems = [
+        f"{where(name)}: {_unknown(name, list(MODELS), 'table')}"
+        for name in data
+        if name not in MODELS
+    ]
+    tables: dict[str, Any] = {}
+    for name in MODELS:
+        if name in REQUIRED and name not in data:
+            problems.append(f"{where.name}: table [{name}] is missing")
+            continue
+        given = data.get(name, {})
+        alternatives = given if name in SWEPT and isinstance(given, list) and given else [given]
+        built: list[Choice] = []
+        for table in alternatives:
+            if isinstance(table, dict):
+                built += _build(name, table, folder, where, problems)
+            else:
+                problems.append(f"{where(name)}: {name}: must be a table, got {table!r}")
+        distinct = list(dict.fromkeys(built)) if name in SWEPT else built
+        tables[name] = distinct if name in SWEPT else next(iter(distinct), None)
+    if problems:
+        raise InputError("\n".join(dict.fromkeys(problems)))
+    return Spec(**tables)
+
+
+def _build(
+    name: str, table: dict[str, Any], folder: Path, where: _Where, problems: list[str]
+) -> list[Choice]:
+    """The choices of one table; what is wrong with it goes to `problems`."""
+    lists = [v for v in table.values() if isinstance(v, list)] if name in SWEPT else []
+    if not 0 < prod(map(len, lists)) <= MAX_SWEEP:
+        problems.append(
+            f"{where(name)}: {name}: its lists have {prod(map(len, lists))} combinations; "
+            f"1 to {MAX_SWEEP} are allowed"
+        )
+        return []
+    built = []
+    for values, places in expand(table) if name in SWEPT else [(table, {})]:
+        model = MODELS[name]
+        if isinstance(model, dict):
+            kind = values.get("kind")
+            if not isinstance(kind, str) or kind not in model:
+                problems.append(
+                    f"{where(f'{name}.kind')}: {name}.kind: "
+                    + ("is missing" if kind is None else _unknown(str(kind), list(model), "kind"))
+                    + (f" (known: {', '.join(model)})" if kind is None else "")
+                )
+                continue
+            model = model[kind]
+        if isinstance(values.get("path"), str):
+            values = values | {"path": str((folder / values["path"]).resolve())}
+        try:
+            built.append(model.model_validate(values))
+        except ValidationError as error:
+            details = error.errors(include_url=False)
+            problems.extend(_problem(name, model, places, detail, where) for detail in details)
+    return built
+
+
+def _problem(
+    name: str, model: type[Choice], places: dict[str, int], detail: Any, where: _Where
+) -> str:
+    """One line: place, key, what was given, what is allowed."""
+    path = [part for part in detail["loc"] if part not in SHAPES]
+    key = name
+    for part in path:
+        key += f"[{part}]" if isinstance(part, int) else f".{part}"
+        key += f"[{places[part]}]" if part in places else ""
+    if detail["type"] == "extra_forbidden":
+        within = Ladder if len(path) > 1 else model
+        known = [field.alias or field_name for field_name, field in within.model_fields.items()]
+        text = _unknown(str(path[-1]), known, "key")
+    elif detail["type"] == "missing":
+        text = "is missing"
+    else:
+        message = detail["msg"].removeprefix("Value error, ")
+        message = message[:1].lower() + message[1:]
+        given = detail["input"]
+        text = message if isinstance(given, dict) else f"{message}, got {given!r}"
+    return f"{where(key)}: {key}: {text}"
+
+
+def _unknown(given: str, known: list[str], what: str) -> str:
+    """Message for a name that is not known, with the nearest known one."""
+    near = get_close_matches(given, known, 1, 0.5)
+    hint = f" - did you mean {near[0]!r}?" if near else ""
+    return f"unknown {what} {given!r}{hint} (known: {', '.join(known)})"

@@ -1,0 +1,57 @@
+"""Where and with what a study was made."""
+
+import json
+import os
+import platform
+import subprocess
+from contextlib import suppress
+from datetime import UTC, datetime
+from functools import cache
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+import gfmd_cli
+from gfmd_cli.physics.wisdom import processor
+
+PACKAGES = ("numpy", "scipy", "pyFFTW", "h5py", "pydantic", "SurfaceTopography")
+
+
+def provenance() -> dict[str, str]:
+    """Attributes of a study: software, versions, commit, machine, date."""
+    return {
+        "software": "gfmd",
+        "software_version": gfmd_cli.__version__,
+        "git_commit": git_commit(),
+        "packages": json.dumps({name: _version(name) for name in PACKAGES}),
+        "machine": json.dumps(
+            {
+                "node": platform.node(),
+                "system": platform.platform(),
+                "processor": processor(),
+                "cores": len(os.sched_getaffinity(0)),
+                "python": platform.python_version(),
+                "slurm_job": os.environ.get("SLURM_JOB_ID", ""),
+            }
+        ),
+        "date": datetime.now(UTC).isoformat(timespec="seconds"),
+    }
+
+
+@cache
+def git_commit() -> str:
+    """The commit of the source tree this package runs from, empty outside of one."""
+    source = Path(gfmd_cli.__file__).resolve().parents[1]
+    if not (source / ".git").exists():
+        return ""
+    with suppress(OSError, subprocess.SubprocessError):
+        command = ["git", "-C", str(source), "describe", "--always", "--dirty", "--abbrev=40"]
+        done = subprocess.run(command, capture_output=True, text=True, timeout=5, check=True)
+        return done.stdout.strip()
+    return ""
+
+
+def _version(package: str) -> str:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return ""

@@ -1,0 +1,73 @@
+"""What this machine lends to a run: cores and memory."""
+
+import os
+from contextlib import suppress
+from pathlib import Path
+
+from gfmd_cli.errors import InputError
+from gfmd_cli.study.tasks import Task
+
+THREADED_POINTS = 1024  # per side; below it a second thread costs more than it brings (measured)
+HEADROOM = 0.9  # share of the available memory that a run may plan with
+POOL_SECONDS = 3.0  # below this much work, starting worker processes costs more than it brings
+
+
+def available_cores() -> int:
+    """Cores that this process may use: Slurm's grant, else the affinity mask."""
+    granted = os.environ.get("SLURM_CPUS_PER_TASK", "")
+    if granted.isdigit() and int(granted) > 0:
+        return int(granted)
+    return len(os.sched_getaffinity(0))
+
+
+def available_memory() -> float:
+    """Bytes that this process may take: the least of the kernel's, cgroup's and Slurm's word."""
+    limits = []
+    with suppress(OSError, ValueError, IndexError):
+        _, _, rest = Path("/proc/meminfo").read_text(encoding="ascii").partition("MemAvailable:")
+        limits.append(1024.0 * int(rest.split()[0]))
+    for limit, used in (
+        ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory.current"),
+        (
+            "/sys/fs/cgroup/memory/memory.limit_in_bytes",
+            "/sys/fs/cgroup/memory/memory.usage_in_bytes",
+        ),
+    ):
+        with suppress(OSError, ValueError):  # "max" is no number: no limit
+            limits.append(float(int(Path(limit).read_text())) - int(Path(used).read_text()))
+    per_node = os.environ.get("SLURM_MEM_PER_NODE", "")
+    if per_node.isdigit() and int(per_node) > 0:
+        limits.append(2.0**20 * int(per_node))
+    return min(limits, default=float("inf"))
+
+
+def check_memory(tasks: list[Task]) -> None:
+    """Raise InputError, before anything is allocated, where one task alone does not fit."""
+    memory = available_memory()
+    largest = max(tasks, key=lambda task: task.bytes)
+    if largest.bytes > HEADROOM * memory:
+        raise InputError(
+            f"grid.points: {largest.points} points per side take {_gib(largest.bytes)} of memory, "
+            f"{_gib(HEADROOM * memory)} are available; take a smaller grid or a larger machine"
+        )
+
+
+def share_out(tasks: list[Task], jobs: int | None) -> tuple[int, int]:
+    """Worker processes and threads of each, for these tasks.
+
+    One process for each core as long as tasks and memory last, one thread each; where the tasks
+    are fewer than the cores, large grids use the cores left over in their transforms.
+    """
+    cores = available_cores()
+    largest = max(task.bytes for task in tasks)
+    if jobs is None:
+        fitting = max(1, int(HEADROOM * available_memory() // largest))
+        jobs = min(cores, len(tasks), fitting)
+        if sum(task.seconds for task in tasks) < POOL_SECONDS:
+            jobs = 1
+    points = max(task.points for task in tasks)
+    return jobs, max(1, cores // jobs) if points >= THREADED_POINTS else 1
+
+
+def _gib(count: float) -> str:
+    return f"{count / 2**30:.3g} GiB"

@@ -1,0 +1,192 @@
+"""One task from its scene to its committed record."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from threading import Event
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+
+from gfmd_cli.errors import Interrupted
+from gfmd_cli.physics.contact import Contact, Scene, build_scene
+from gfmd_cli.physics.observables import cross_section, observe, stress_distribution
+from gfmd_cli.physics.persson import Shells
+from gfmd_cli.solvers.cascade import Solution, solve_contact
+from gfmd_cli.solvers.loop import State
+from gfmd_cli.study.checkpoint import Checkpoint
+from gfmd_cli.study.layout import PR_LINEAR, PR_LOGARITHMIC
+from gfmd_cli.study.record import Record, empty_row, write_record
+from gfmd_cli.study.tasks import Task, describe, exponent, thickness
+
+REPORT_EVERY = 0.2  # seconds between two reports of one task
+stop = Event()
+"""Set by a signal: unfinished solves save their state and end."""
+
+
+class Progress(NamedTuple):
+    """A word on one task."""
+
+    task: int
+    event: Literal["start", "step", "done", "failed", "interrupted"]
+    label: str
+    points: int = 0
+    step: int = 0
+    residual: float = float("nan")
+    a_r: float = float("nan")
+    note: str = ""
+    """Status of a task that is done, the reason of one that failed."""
+
+
+Report = Callable[[Progress], None]
+
+
+@dataclass
+class _Watcher:
+    """Reports, saves the state by wall time, and stops when asked to."""
+
+    task: Task
+    checkpoint: Checkpoint
+    report: Report
+    every: float
+    last_report: float = 0.0
+    last_save: float = 0.0
+    spent: float = 0.0
+
+    def enter_level(self, points: int, spent: float) -> None:
+        self.spent = spent
+
+    def __call__(self, contact: Contact, state: State) -> None:
+        now = time.monotonic()
+        if now - self.last_report > REPORT_EVERY:
+            self.last_report = now
+            area = np.count_nonzero(state.u == contact.height) / contact.grid.size
+            points, step = contact.grid.points, state.step
+            self.report(
+                Progress(
+                    self.task.index, "step", self.task.label, points, step, state.residual, area
+                )
+            )
+        if stop.is_set() or now - self.last_save > self.every:
+            self.checkpoint.save(contact, state, self.spent)
+            self.last_save = now
+        if stop.is_set():
+            raise Interrupted(f"{self.task.label}: stopped, state saved")
+
+
+@lru_cache(maxsize=1)
+def _scene(surface: Any, elastomer: Any, points: int, threads: int) -> tuple[Scene, Shells]:
+    """The scene of the task before is that of the next, as a rule."""
+    scene = build_scene(surface, elastomer, points, threads)
+    return scene, scene.shells()
+
+
+def solve_task(
+    task: Task, parts: Path, threads: int, report: Report, checkpoint_every: float
+) -> str:
+    """Solve one task and commit its record; return its status.
+
+    Raises Interrupted after its state was saved, InputError, SpaceError.
+    """
+    report(Progress(task.index, "start", task.label))
+    begun = time.perf_counter()
+    scene, shells = _scene(task.surface, task.elastomer, task.points, threads)
+    contact = scene.contact(task.load if task.reduced else task.load / scene.delta_sigma)
+    checkpoint = Checkpoint(parts / task.id)
+    watcher = _Watcher(task, checkpoint, report, checkpoint_every, last_save=time.monotonic())
+    solution = solve_contact(
+        contact,
+        task.solver,
+        watcher,
+        resume=checkpoint.load(scene.grid),
+        enter_level=watcher.enter_level,
+    )
+    contact.stress(solution.u, out=solution.sigma)  # what is stored is measured afresh
+    solution.residual = contact.residual(solution.u, solution.sigma)
+    record = _record(task, scene, shells, contact, solution, time.perf_counter() - begun)
+    write_record(parts, record)
+    checkpoint.remove()
+    row = record.row
+    report(
+        Progress(
+            task.index,
+            "done",
+            task.label,
+            task.points,
+            solution.steps,
+            solution.residual,
+            row["a_r"],
+            solution.status,
+        )
+    )
+    return solution.status
+
+
+def _record(
+    task: Task,
+    scene: Scene,
+    shells: Shells,
+    contact: Contact,
+    solution: Solution,
+    seconds: float,
+) -> Record:
+    """All that is kept of one solution."""
+    u, sigma = solution.u, solution.sigma
+    seen = observe(contact, u, sigma)
+    n, t = exponent(task.elastomer), thickness(task.elastomer)
+    row = empty_row() | {
+        "surface": describe(task.surface),
+        "seed": getattr(task.surface, "seed", -1),
+        "elastomer": describe(task.elastomer),
+        "n": np.nan if n is None else n,
+        "thickness": np.nan if t is None else t,
+        "points": task.points,
+        "p_star": contact.pressure,
+        "a_r": seen.a_r,
+        "sigma_p": seen.sigma_p,
+        "u_g": seen.u_g,
+        "residual": solution.residual,
+        "solver": solution.solver,
+        "transforms": solution.transforms,
+        "seconds": seconds,
+        "status": solution.status,
+        "pressure": contact.pressure * scene.delta_sigma,
+        "delta_sigma": scene.delta_sigma,
+        "h_std": scene.h_std,
+        "mean_height": scene.mean_height,
+        "length": scene.grid.length,
+        "mean_gap": seen.u_g * scene.h_std,
+        "perimeter": seen.perimeter,
+        "energy": seen.energy,
+        "work": seen.work,
+        "steps": solution.steps,
+        "tolerance": task.solver.tolerance,
+    }
+    distribution = {}
+    if task.output.histogram:
+        pr = stress_distribution(contact, u, sigma)
+        distribution = {
+            PR_LINEAR: pr.linear,
+            PR_LOGARITHMIC: pr.logarithmic,
+            "pr_zero": pr.zero,
+            "pr_beyond": pr.beyond,
+        }
+    physical = {}
+    if task.output.fields or task.output.cross_section:
+        physical = {
+            "u": u * scene.h_std + scene.mean_height,
+            "sigma": sigma * scene.delta_sigma,
+            "height": contact.height * scene.h_std + scene.mean_height,
+        }
+    return Record(
+        task_id=task.id,
+        row=row,
+        shells=shells,
+        distribution=distribution,
+        fields={name: physical[name] for name in task.output.fields},
+        cross_section={name: cross_section(values) for name, values in physical.items()}
+        if task.output.cross_section
+        else {},
+    )

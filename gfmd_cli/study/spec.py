@@ -1,0 +1,182 @@
+"""The run spec: its models, and the sweeps that a list in the place of a scalar makes."""
+
+import hashlib
+import json
+from itertools import product
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+import numpy as np
+from pydantic import Discriminator, StrictStr, Tag, model_validator
+from pydantic import Field as Key
+
+from gfmd_cli.physics.bodies import SMALLEST_GRID
+from gfmd_cli.physics.choice import Choice, Positive
+from gfmd_cli.physics.elastomer import Elastomer
+from gfmd_cli.physics.surface import Surface
+from gfmd_cli.solvers.cascade import SolverChoice
+
+MAX_LADDER = 100_000  # pressures of one ladder; more are a slip of the pen
+SWEPT = ("surface", "elastomer", "grid", "solver")
+
+
+class StudyTable(Choice):
+    """Table [study]."""
+
+    name: Annotated[StrictStr, Key(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,99}$")] = "study"
+    """Name of the study; its file is NAME.h5 in the working directory."""
+
+
+class GridTable(Choice):
+    """Table [grid]."""
+
+    points: Annotated[int, Key(ge=SMALLEST_GRID, le=2**17, multiple_of=2)]
+    """Points per side, even."""
+
+
+class Ladder(Choice):
+    """Pressures in geometric progression."""
+
+    from_: Annotated[float, Key(gt=0, alias="from")]
+    """First pressure."""
+    to: Positive
+    """Last pressure, included."""
+    per_decade: Annotated[float, Key(gt=0, le=1000)] = 4
+    """Pressures per decade; the step is stretched a little so that the last one is hit."""
+
+    @model_validator(mode="after")
+    def _rises(self) -> Self:
+        if self.to < self.from_:
+            raise ValueError(f"to = {self.to:g} lies below from = {self.from_:g}")
+        return self
+
+    def pressures(self) -> list[float]:
+        """The pressures, rising."""
+        decades = np.log10(self.to / self.from_)
+        steps = max(1, round(decades * self.per_decade)) if decades > 0 else 0
+        return [float(p) for p in np.geomspace(self.from_, self.to, steps + 1)]
+
+
+def _shape(given: Any) -> str:
+    """In which of the three ways pressures are given."""
+    if isinstance(given, dict | Ladder):
+        return "ladder"
+    return "list" if isinstance(given, list) else "number"
+
+
+Pressures = Annotated[
+    Annotated[Positive, Tag("number")]
+    | Annotated[list[Positive], Key(min_length=1, max_length=MAX_LADDER), Tag("list")]
+    | Annotated[Ladder, Tag("ladder")],
+    Discriminator(_shape),
+]
+SHAPES = ("number", "list", "ladder")
+
+
+class LoadTable(Choice):
+    """Table [load]: either `p_star` or `pressure`, each a number, a list or a ladder."""
+
+    p_star: Pressures | None = None
+    """Reduced pressures p / Delta_sigma."""
+    pressure: Pressures | None = None
+    """Pressures [Pa]."""
+
+    @model_validator(mode="after")
+    def _one_of_both(self) -> Self:
+        if (self.p_star is None) == (self.pressure is None):
+            raise ValueError("give either p_star or pressure")
+        return self
+
+    @property
+    def reduced(self) -> bool:
+        """Whether the pressures are reduced ones."""
+        return self.p_star is not None
+
+    def pressures(self) -> list[float]:
+        """The pressures, in the order given, each once."""
+        given = self.p_star if self.p_star is not None else self.pressure
+        if isinstance(given, Ladder):
+            return given.pressures()
+        return list(dict.fromkeys(given if isinstance(given, list) else [given or 0.0]))
+
+
+class OutputTable(Choice):
+    """Table [output]: what is kept beside the scalars."""
+
+    histogram: bool = True
+    """Pr(sigma) in linear and logarithmic bins."""
+    fields: Annotated[list[Literal["u", "sigma", "height"]], Key(max_length=3)] = Key(
+        default_factory=list
+    )
+    """Fields on the grid: displacement, stress, indenter."""
+    cross_section: bool = False
+    """Height, displacement and stress along the diagonal (of a line scene: all of it)."""
+
+
+class Spec(Choice):
+    """A resolved run spec: every sweep expanded, every default filled in."""
+
+    study: StudyTable
+    surface: list[Surface]
+    elastomer: list[Elastomer]
+    grid: list[GridTable]
+    load: LoadTable
+    solver: list[SolverChoice]
+    output: OutputTable
+
+    def resolved(self) -> dict[str, Any]:
+        """What determines the results, as plain data: files stand for their content."""
+        data: dict[str, Any] = self.model_dump(
+            mode="json", exclude={"study", "load"}, by_alias=True
+        )
+        for table in ("surface", "elastomer"):
+            for dumped, choice in zip(data[table], getattr(self, table), strict=True):
+                if "path" in dumped:
+                    dumped["path"] = Path(dumped["path"]).name
+                    dumped["sha256"] = file_digest(choice.path)
+        data["load"] = {"p_star" if self.load.reduced else "pressure": self.load.pressures()}
+        return data
+
+
+def file_digest(path: Path) -> str:
+    """SHA-256 of a file's content."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def digest(data: Any) -> str:
+    """Short name of plain data by its content."""
+    text = json.dumps(data, sort_keys=True, separators=(",", ":"))
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+def differences(old: Any, new: Any, where: str = "") -> list[str]:
+    """What changed between two pieces of plain data, a line for each key."""
+    if isinstance(old, dict) and isinstance(new, dict):
+        lines = []
+        for key in [*old, *(key for key in new if key not in old)]:
+            inner = f"{where}.{key}" if where else str(key)
+            lines += differences(old.get(key), new.get(key), inner)
+        return lines
+    if isinstance(old, list) and isinstance(new, list) and len(old) == len(new):
+        return [
+            line
+            for i, (a, b) in enumerate(zip(old, new, strict=True))
+            for line in differences(a, b, f"{where}[{i}]" if len(old) > 1 else where)
+        ]
+    return [] if old == new else [f"{where}: {_short(old)} -> {_short(new)}"]
+
+
+def _short(value: Any) -> str:
+    text = json.dumps(value)
+    return text if len(text) <= 80 else text[:77] + "..."
+
+
+def expand(table: dict[str, Any]) -> list[tuple[dict[str, Any], dict[str, int]]]:
+    """All combinations of the lists in a table, with the place that each value has in its list."""
+    swept = [key for key, value in table.items() if isinstance(value, list)]
+    combinations = []
+    for places in product(*(range(len(table[key])) for key in swept)):
+        where = dict(zip(swept, places, strict=True))
+        combinations.append((table | {key: table[key][i] for key, i in where.items()}, where))
+    return combinations

@@ -1,0 +1,135 @@
+"""A spec as a list of tasks, one for each pressure, with what each will take."""
+
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from gfmd_cli.errors import InputError
+from gfmd_cli.physics.choice import Choice
+from gfmd_cli.physics.elastomer import Elastomer, HalfSpace, Membrane, Plate, Power, Slab
+from gfmd_cli.physics.surface import FileSurface, Surface
+from gfmd_cli.solvers.cascade import SolverChoice
+from gfmd_cli.study.spec import OutputTable, Spec, digest
+
+FIELDS_IN_MEMORY = 11.0
+"""Fields of double precision that a solve holds at its peak: height, u, sigma; direction and two
+forces; three to work in; two real symbols and one set of coefficients on half-spectra."""
+BASE_BYTES = 150e6
+"""What a process holds besides: the interpreter and its libraries."""
+SECONDS_PER_PAIR = 8e-9
+"""Per grid point and pair of transforms, with all work between two of them, on one thread."""
+
+
+@dataclass(frozen=True)
+class Task:
+    """One contact to solve."""
+
+    index: int
+    surface: Surface
+    elastomer: Elastomer
+    points: int
+    load: float
+    """Reduced pressure, or pressure [Pa] where `reduced` is false."""
+    reduced: bool
+    solver: SolverChoice
+    output: OutputTable
+    id: str
+    """Name of the task by its content."""
+
+    @property
+    def label(self) -> str:
+        """What sets the task apart, for people."""
+        unit = "p*" if self.reduced else "p"
+        return f"{describe(self.elastomer)} {self.points} {unit}={self.load:.4g}"
+
+    @property
+    def size(self) -> int:
+        """Number of grid points."""
+        return int(self.points**self.surface.dimension)
+
+    @property
+    def bytes(self) -> float:
+        """Memory that the solve takes, with its process."""
+        return FIELDS_IN_MEMORY * 8 * self.size + BASE_BYTES
+
+    @property
+    def seconds(self) -> float:
+        """Time that the solve is expected to take on one thread, within a factor of about three."""
+        return 0.01 + SECONDS_PER_PAIR * self.size * self._pairs()
+
+    def _pairs(self) -> float:
+        """Pairs of transforms, fitted to the default surface at 512^2, tolerance 1e-6."""
+        n = exponent(self.elastomer)
+        n = 2.0 if n is None else n
+        if n == 0:
+            return 1.0
+        p = min(max(self.load if self.reduced else 0.05, 1e-5), 3.0)
+        pairs = float(np.interp(n, [0, 0.5, 1, 2, 3, 4], [38, 40, 75, 130, 160, 235]))
+        slope = float(np.interp(n, [0, 1, 2, 3, 4], [0.0, 0.1, 0.36, 0.45, 0.48]))
+        tightness = 1 - 0.1 * float(np.log10(max(self.solver.tolerance, 1e-14) / 1e-6))
+        return float(pairs * (p / 0.1) ** -slope * tightness)
+
+
+def exponent(elastomer: Elastomer) -> float | None:
+    """Exponent n where the stiffness is one power of q, else None."""
+    if isinstance(elastomer, Power):
+        return elastomer.n
+    return {HalfSpace: 1.0, Membrane: 2.0, Plate: 4.0}.get(type(elastomer))
+
+
+def thickness(elastomer: Elastomer) -> float | None:
+    """Thickness t / L of a slab, else None."""
+    return elastomer.thickness if isinstance(elastomer, Slab) else None
+
+
+def describe(choice: Choice) -> str:
+    """The kind with all that differs from its defaults, in one line."""
+    told = [
+        f"{name}={value.name if hasattr(value, 'name') else value}"
+        for name, value in choice
+        if name != "kind" and value != type(choice).model_fields[name].default
+    ]
+    return " ".join([str(getattr(choice, "kind", "")), *told])
+
+
+def plan(spec: Spec) -> list[Task]:
+    """The tasks of a spec, in a fixed order: surface, elastomer, grid, solver, pressure.
+
+    Raises InputError where a grid does not resolve its surface or a file is unfit.
+    """
+    for surface, grid in product(spec.surface, spec.grid):
+        needed = surface.smallest_grid()
+        if grid.points < needed:
+            of = f"a map of {needed} points" if isinstance(surface, FileSurface) else surface.kind
+            raise InputError(
+                f"grid.points: {grid.points} points per side do not resolve the surface "
+                f"({of}{_cutoff(surface)}); take {needed} or more"
+            )
+    resolved = spec.resolved()
+    tables = ("surface", "elastomer", "grid", "solver")
+    tasks: list[Task] = []
+    for places in product(*(range(len(resolved[name])) for name in tables)):
+        parts = {name: resolved[name][i] for name, i in zip(tables, places, strict=True)}
+        s, e, g, m = places
+        for load in spec.load.pressures():
+            content = [parts, spec.load.reduced, load, resolved["output"]]
+            tasks.append(
+                Task(
+                    index=len(tasks),
+                    surface=spec.surface[s],
+                    elastomer=spec.elastomer[e],
+                    points=spec.grid[g].points,
+                    load=load,
+                    reduced=spec.load.reduced,
+                    solver=spec.solver[m],
+                    output=spec.output,
+                    id=digest(content),
+                )
+            )
+    return tasks
+
+
+def _cutoff(surface: Surface) -> str:
+    cutoff = getattr(surface, "cutoff", None)
+    return "" if cutoff is None else f", cutoff = {cutoff:g}: two points per lambda_s"
