@@ -21,6 +21,7 @@ from gfmd_cli.physics.fields import Field
 from gfmd_cli.physics.grid import Grid
 from gfmd_cli.solvers.cascade import Resume
 from gfmd_cli.solvers.loop import State
+from gfmd_cli.study.files import write_whole
 
 
 class Checkpoint:
@@ -50,9 +51,7 @@ class Checkpoint:
             }
             write_whole(self.pointer, json.dumps(pointer).encode())
         except OSError as error:
-            raise SpaceError(
-                f"{self.folder}: the checkpoint cannot be written: {error.strerror}"
-            ) from error
+            raise SpaceError(f"{self.folder}: cannot be written: {error.strerror}") from error
 
     def load(self, grid: Grid) -> Resume | None:
         """The saved state of a solve on `grid`, or None where there is none that is whole."""
@@ -84,25 +83,6 @@ class Checkpoint:
         except (OSError, ValueError):
             return {}
         return data if isinstance(data, dict) else {}
-
-
-def write_whole(path: Path, content: bytes) -> None:
-    """Write a file so that it appears whole or not at all, even where the power fails."""
-    fresh = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        with fresh.open("wb") as file:
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
-        fresh.replace(path)
-    except OSError:
-        fresh.unlink(missing_ok=True)
-        raise
-    folder = os.open(path.parent, os.O_RDONLY)
-    try:
-        os.fsync(folder)
-    finally:
-        os.close(folder)
 
 
 def _write_slot(path: Path, fields: list[Field]) -> list[int]:

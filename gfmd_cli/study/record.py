@@ -8,10 +8,10 @@ from typing import Any
 import h5py
 import numpy as np
 
-from gfmd_cli.errors import SpaceError, StudyError
+from gfmd_cli.errors import StudyError
 from gfmd_cli.physics.fields import Field
 from gfmd_cli.physics.persson import Shells
-from gfmd_cli.study.checkpoint import write_whole
+from gfmd_cli.study.files import write_whole
 from gfmd_cli.study.layout import COLUMNS, DISTRIBUTION, LAYOUT, SHELLS
 
 SUFFIX = ".record"
@@ -49,11 +49,7 @@ def write_record(folder: Path, record: Record) -> Path:
         file.flush()
         image = file.id.get_file_image()
     path = folder / f"{record.task_id}{SUFFIX}"
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        write_whole(path, image)
-    except OSError as error:
-        raise SpaceError(f"{path}: cannot be written: {error.strerror}") from error
+    write_whole(path, image)
     return path
 
 

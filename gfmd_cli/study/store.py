@@ -20,6 +20,7 @@ import numpy as np
 from gfmd_cli.errors import InputError, SpaceError, StudyError
 from gfmd_cli.physics.observables import linear_edges, logarithmic_edges
 from gfmd_cli.physics.persson import Shells
+from gfmd_cli.study.files import write_whole
 from gfmd_cli.study.layout import (
     COLUMNS,
     DISTRIBUTION,
@@ -61,13 +62,7 @@ class Study:
 
     def begin(self, spec: Spec) -> None:
         """Make the folder of unfinished work, bound to this spec. Raises SpaceError."""
-        from gfmd_cli.study.checkpoint import write_whole
-
-        try:
-            self.parts.mkdir(parents=True, exist_ok=True)
-            write_whole(self.parts / "spec.json", json.dumps(spec.resolved()).encode())
-        except OSError as error:
-            raise SpaceError(f"{self.parts}: cannot be made: {error.strerror}") from error
+        write_whole(self.parts / "spec.json", json.dumps(spec.resolved()).encode())
 
     def held(self) -> dict[str, str]:
         """Status by task id of all that is solved, collected or not."""

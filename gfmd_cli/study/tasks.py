@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from itertools import product
+from pathlib import Path
 
 import numpy as np
 
@@ -86,11 +87,17 @@ def thickness(elastomer: Elastomer) -> float | None:
 def describe(choice: Choice) -> str:
     """The kind with all that differs from its defaults, in one line."""
     told = [
-        f"{name}={value.name if hasattr(value, 'name') else value}"
+        f"{name}={_in_short(value)}"
         for name, value in choice
         if name != "kind" and value != type(choice).model_fields[name].default
     ]
     return " ".join([str(getattr(choice, "kind", "")), *told])
+
+
+def _in_short(value: object) -> str:
+    if isinstance(value, Path):
+        return value.name
+    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def plan(spec: Spec) -> list[Task]:

@@ -1,0 +1,121 @@
+"""A study beside Persson theory."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gfmd_cli.errors import InputError
+from gfmd_cli.physics import einstein
+from gfmd_cli.physics.fields import Field
+from gfmd_cli.physics.persson import Persson
+from gfmd_cli.study.store import MISSING, read_rows, read_shells
+
+Row = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """What a theory says at some pressures, in reduced units."""
+
+    a_r: Field
+    sigma_p: Field
+    u_g: Field
+
+
+@dataclass(frozen=True)
+class Curve:
+    """All pressures of one surface, body, grid and solver, and the theory of the same spectrum."""
+
+    rows: list[Row]
+    """Rows of the study, pressure rising."""
+    persson: Persson
+
+    @property
+    def elastomer(self) -> str:
+        """The body, in words."""
+        return str(self.rows[0]["elastomer"])
+
+    @property
+    def surface(self) -> str:
+        """The surface, in words."""
+        return str(self.rows[0]["surface"])
+
+    @property
+    def points(self) -> int:
+        """Grid points per side."""
+        return int(self.rows[0]["points"])
+
+    @property
+    def n(self) -> float:
+        """Exponent of the stiffness, NaN where it is no single power."""
+        return float(self.rows[0]["n"])
+
+    def column(self, name: str) -> Field:
+        """A column of the study over the pressures."""
+        return np.array([row[name] for row in self.rows], dtype=np.float64)
+
+    def predict(self, p_star: Field) -> Prediction:
+        """Persson theory at reduced pressures. Paper Eqs. (25), (26), (28)."""
+        unit, height = self.rows[0]["delta_sigma"], self.rows[0]["h_std"]
+        pressure = np.asarray(p_star) * unit
+        return Prediction(
+            a_r=self.persson.contact_area(pressure),
+            sigma_p=self.persson.stress_deviation(pressure) / unit,
+            u_g=self.persson.mean_gap(pressure) / height,
+        )
+
+    @cached_property
+    def prediction(self) -> Prediction:
+        """Persson theory at the pressures of the study."""
+        return self.predict(self.column("p_star"))
+
+    def pressure_at_gap(self, u_g: Field) -> Field:
+        """Reduced pressure at which Persson theory has this mean gap; NaN for no gap."""
+        p_star = np.geomspace(1e-6, 20.0, 2000)
+        gap = self.predict(p_star).u_g
+        known = gap > 0
+        wanted = np.log(np.where(u_g > 0, u_g, np.nan))
+        return np.exp(np.interp(-wanted, -np.log(gap[known]), np.log(p_star[known])))
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """A study, curve by curve."""
+
+    path: Path
+    curves: list[Curve]
+    missing: int
+    """Tasks that the study does not hold yet."""
+
+
+def compare(path: Path) -> Comparison:
+    """Set a study beside Persson theory.
+
+    Raises InputError where there is no such study or it holds no result, StudyError where it
+    is unreadable.
+    """
+    rows = read_rows(path)
+    solved = [row for row in rows if row["status"] != MISSING]
+    if not solved:
+        raise InputError(f"{path}: holds no result yet; run it first")
+    groups: dict[tuple[Any, ...], list[Row]] = {}
+    for row in solved:
+        groups.setdefault((row["scene"], row["solver"], row["tolerance"]), []).append(row)
+    curves = [
+        Curve(sorted(group, key=lambda row: row["p_star"]), Persson(read_shells(path, scene)))
+        for (scene, *_), group in groups.items()
+    ]
+    return Comparison(path, curves, len(rows) - len(solved))
+
+
+def einstein_prediction(p_star: Field) -> Prediction:
+    """The Einstein solid (n = 0) under Gaussian heights, in closed form. Paper Eqs. (34)-(38)."""
+    height = einstein.non_contact_height(p_star)
+    return Prediction(
+        a_r=einstein.contact_area(height),
+        sigma_p=einstein.stress_deviation(height),
+        u_g=einstein.mean_gap(height),
+    )

@@ -1,0 +1,108 @@
+"""Tables of a study: for people, as records, as CSV."""
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gfmd_cli.analysis.compare import Comparison, Curve, einstein_prediction
+from gfmd_cli.study.layout import COLUMNS
+from gfmd_cli.study.store import MISSING, read_rows
+
+HEADER = (
+    "      p*        a_r  Persson  ratio    sigma_p  Persson  ratio        u_g    Persson  ratio"
+    "  p ratio  status"
+)
+
+
+def tables(comparison: Comparison) -> str:
+    """One table per curve: simulation, Persson theory, their ratio.
+
+    `p ratio` is the pressure of the theory at the simulated mean gap over the simulated one.
+    """
+    blocks = [_table(curve) for curve in comparison.curves]
+    if comparison.missing:
+        blocks.append(f"{comparison.missing} tasks are not solved yet: run the spec again.")
+    return "\n\n".join(blocks)
+
+
+def _table(curve: Curve) -> str:
+    row = curve.rows[0]
+    theory = curve.prediction
+    lines = [
+        f"{curve.elastomer} on {curve.surface}, {curve.points} points a side",
+        f"Delta_sigma = {row['delta_sigma']:.6g} Pa, h_std = {row['h_std']:.6g} m, "
+        f"L = {row['length']:.6g} m",
+        HEADER,
+    ]
+    at_gap = curve.pressure_at_gap(curve.column("u_g"))
+    for i, row in enumerate(curve.rows):
+        a_r, sigma_p, u_g = theory.a_r[i], theory.sigma_p[i], theory.u_g[i]
+        lines.append(
+            f"{row['p_star']:8.4g} {row['a_r']:10.5f} {a_r:8.5f} {_ratio(row['a_r'], a_r)} "
+            f"{row['sigma_p']:10.5f} {sigma_p:8.5f} {_ratio(row['sigma_p'], sigma_p)} "
+            f"{row['u_g']:10.4g} {u_g:10.4g} {_ratio(row['u_g'], u_g)} "
+            f"{_ratio(at_gap[i], row['p_star'])}   {row['status']}"
+        )
+    if curve.n == 0:
+        exact = einstein_prediction(curve.column("p_star"))
+        lines.append("  Gaussian heights in closed form (ratio: simulation / closed form):")
+        lines += [
+            f"{row['p_star']:8.4g} {'':10} {exact.a_r[i]:8.5f} {_ratio(row['a_r'], exact.a_r[i])} "
+            f"{'':10} {exact.sigma_p[i]:8.5f} {_ratio(row['sigma_p'], exact.sigma_p[i])} "
+            f"{'':10} {exact.u_g[i]:10.4g} {_ratio(row['u_g'], exact.u_g[i])}"
+            for i, row in enumerate(curve.rows)
+        ]
+    return "\n".join(lines)
+
+
+def _ratio(value: float, reference: float) -> str:
+    ratio = value / reference if reference else math.nan
+    return f"{ratio:6.3f}" if math.isfinite(ratio) else "     -"
+
+
+def as_records(comparison: Comparison) -> list[dict[str, Any]]:
+    """One record per solved pressure; what does not apply is None."""
+    records = []
+    for curve in comparison.curves:
+        theory = curve.prediction
+        at_gap = curve.pressure_at_gap(curve.column("u_g"))
+        records += [
+            {
+                **{key: _plain(row[key]) for key in ("n", "thickness", "points", "seed", "p_star")},
+                "a_r": row["a_r"],
+                "a_r_persson": float(theory.a_r[i]),
+                "sigma_p": row["sigma_p"],
+                "sigma_p_persson": float(theory.sigma_p[i]),
+                "u_g": row["u_g"],
+                "u_g_persson": float(theory.u_g[i]),
+                "p_star_persson_at_u_g": _plain(float(at_gap[i])),
+                "surface": curve.surface,
+                "elastomer": curve.elastomer,
+                "pressure": row["pressure"],
+                "residual": row["residual"],
+                "status": row["status"],
+            }
+            for i, row in enumerate(curve.rows)
+        ]
+    return records
+
+
+def export_rows(path: Path) -> tuple[list[str], list[list[str]]]:
+    """Header and rows of the CSV of a study: one row per solved pressure."""
+    names = [column.name for column in COLUMNS]
+    rows = [row for row in read_rows(path) if row["status"] != MISSING]
+    return names, [[_cell(row[name]) for name in names] for row in rows]
+
+
+def _cell(value: Any) -> str:
+    plain = _plain(value)
+    return "" if plain is None else repr(plain) if isinstance(plain, float) else str(plain)
+
+
+def _plain(value: Any) -> Any:
+    """None for what does not apply: NaN, the seed -1."""
+    if isinstance(value, float) and np.isnan(value):
+        return None
+    return None if isinstance(value, int) and value == -1 else value
