@@ -55,7 +55,9 @@ def slab_samples():
 def test_the_slab_factor_has_all_digits_of_the_printed_formula():
     t = slab_samples()
     exact = [printed_slab_factor(x) for x in t]
-    error = [float(abs(mp.mpf(float(s)) / e - 1)) for s, e in zip(slab_factor(t), exact, strict=True)]
+    error = [
+        float(abs(mp.mpf(float(s)) / e - 1)) for s, e in zip(slab_factor(t), exact, strict=True)
+    ]
     assert max(error) < 1e-15  # a few roundings of 1.1e-16
 
 
@@ -64,7 +66,9 @@ def test_the_slab_factor_ends_in_zero_and_one():
 
 
 def test_the_slab_factor_rises():
-    assert np.all(np.diff(slab_factor(np.logspace(-8, 1, 2001))) > 0)  # beyond, in steps of rounding
+    assert np.all(
+        np.diff(slab_factor(np.logspace(-8, 1, 2001))) > 0
+    )  # beyond, in steps of rounding
 
 
 @pytest.mark.parametrize("body", BODIES, ids=name)

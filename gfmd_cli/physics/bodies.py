@@ -4,10 +4,11 @@ Each class is one `kind` of the run spec's [surface]; equation numbers are those
 contacts of randomly rough surfaces across the spatial dimensions".
 """
 
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import Field as Key
+from pydantic import model_validator
 
 from gfmd_cli.physics.choice import Choice, Positive
 from gfmd_cli.physics.fields import Field
@@ -78,6 +79,12 @@ class Punch(_Body):
     """Radius of the face [m]."""
     depth: Positive = 1.0
     """How far the surface lies back around the face [m]; deep enough, it is never touched."""
+
+    @model_validator(mode="after")
+    def _has_a_rim(self) -> Self:
+        if self.radius >= self.length / 2:
+            raise ValueError(f"radius = {self.radius:g} leaves no rim in a cell of {self.length:g}")
+        return self
 
     def heights(self, points: int) -> Field:
         """Heights [m] on the grid [y, x]."""

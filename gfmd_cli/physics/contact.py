@@ -120,7 +120,8 @@ def build_scene(surface: Surface, elastomer: Elastomer, points: int, threads: in
     )  # squares of metres of 1e-200 would vanish
     height /= h_std
     q = grid.wavenumber()
-    stiffness = elastomer.stiffness(q, grid.length)
+    with np.errstate(over="ignore"):  # refused below
+        stiffness = elastomer.stiffness(q, grid.length)
     largest = float(stiffness.max())
     if not (np.isfinite(largest) and largest > 0):
         raise InputError(f"elastomer: stiffness {largest} at the shortest wave is out of range")

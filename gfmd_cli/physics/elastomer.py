@@ -6,6 +6,7 @@ given as a share of it. Equation numbers are those of Mueser, "Elastic
 contacts of randomly rough surfaces across the spatial dimensions".
 """
 
+import warnings
 from typing import Annotated, Literal
 
 import numpy as np
@@ -148,7 +149,9 @@ class Tabulated(Choice):
     def _table(self) -> Field:
         """The rows (q, k). Raises InputError for anything but two rising positive columns."""
         try:
-            table = np.loadtxt(self.path, ndmin=2)
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", UserWarning)  # of no rows, which is refused below
+                table = np.loadtxt(self.path, ndmin=2)
         except (OSError, ValueError) as error:
             raise InputError(f"{self.path}: elastomer.path: cannot be read: {error}") from error
         if table.shape[0] < 2 or table.shape[1] != 2:

@@ -7,10 +7,11 @@ are those of Mueser, "Elastic contacts of randomly rough surfaces across the spa
 
 from functools import cache
 from pathlib import Path
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import Field as Key
+from pydantic import model_validator
 
 from gfmd_cli.errors import InputError
 from gfmd_cli.physics.bodies import (
@@ -60,6 +61,14 @@ class SelfAffine(Choice):
     """Root-mean-square height [m] to scale to; by default C = 1 m^2 at long wavelengths."""
     length: Positive = 1.0
     """Side of the cell L [m]."""
+
+    @model_validator(mode="after")
+    def _has_modes(self) -> Self:
+        if self.spectrum == "cutoff" and self.cutoff > self.rolloff:
+            raise ValueError(
+                f"cutoff = {self.cutoff:g} above rolloff = {self.rolloff:g} leaves no roughness"
+            )
+        return self
 
     @property
     def highest_mode(self) -> int:
@@ -141,8 +150,11 @@ class FileSurface(Choice):
     """Side of the map [m], as it stands in the file; by default what the file says, else 1."""
 
     def smallest_grid(self) -> int:
-        """The map's own points."""
-        return len(self._periodic_heights())
+        """The map's own points. Raises InputError for a flat map."""
+        heights = self._periodic_heights()
+        if np.ptp(heights) == 0:
+            raise InputError(f"{self.path}: surface.path: the map is flat; roughness is needed")
+        return len(heights)
 
     def heights(self, points: int) -> Field:
         """Heights [m] on the grid [y, x]: the map's own, or Fourier-interpolated between them."""

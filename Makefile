@@ -1,0 +1,44 @@
+# Two commands on a fresh machine: `make demo` and `make test`.
+VENV := .venv
+BIN := $(VENV)/bin
+RESULTS := results
+
+.PHONY: demo test check validate smoke memory clean
+
+$(VENV)/.core: pyproject.toml
+	python3 -m venv $(VENV)
+	$(BIN)/pip install --quiet --disable-pip-version-check -e ".[plot]"
+	touch $@
+
+$(VENV)/.test: $(VENV)/.core
+	$(BIN)/pip install --quiet --disable-pip-version-check -e ".[test]"
+	touch $@
+
+demo: $(VENV)/.core ## the paper's default surface on six bodies: study, table, figures
+	mkdir -p $(RESULTS)
+	$(BIN)/gfmd run configs/demo.toml -o $(RESULTS)/demo.h5
+	$(BIN)/gfmd analyze $(RESULTS)/demo.h5 --figures $(RESULTS)/figures > $(RESULTS)/demo.txt
+	cat $(RESULTS)/demo.txt
+
+smoke: $(VENV)/.core ## the smallest complete study
+	mkdir -p $(RESULTS)
+	$(BIN)/gfmd run configs/smoke.toml -o $(RESULTS)/smoke.h5
+	$(BIN)/gfmd analyze $(RESULTS)/smoke.h5
+
+test: $(VENV)/.test ## the whole suite
+	$(BIN)/pytest -n 2 --dist loadfile
+
+check: $(VENV)/.test ## the one gate: lint, format, types, import order
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+validate: $(VENV)/.test ## slow physics: large grids, dense ladders
+	$(BIN)/pytest -m validation
+
+memory: $(VENV)/.core ## measured peak memory against what --dry-run says
+	$(BIN)/python scripts/memory.py
+
+clean:
+	rm -rf $(RESULTS)

@@ -1,0 +1,54 @@
+"""How well the exact identities of the contact problem hold on the default surface.
+
+2 v = <sigma h> - p <u>;  -dv/du_g = p;  integral of u_g dp = v + p u_g between two pressures, which
+becomes v_full over all pressures. Prints one line for each body.
+"""
+
+import sys
+
+import numpy as np
+
+from gfmd_cli.physics.contact import build_scene
+from gfmd_cli.physics.elastomer import Power
+from gfmd_cli.physics.observables import observe
+from gfmd_cli.physics.surface import SelfAffine
+from gfmd_cli.solvers.cascade import SolverChoice, solve_contact
+
+EXPONENTS = (0.0, 0.5, 1.0, 2.0, 3.0, 4.0)
+PANELS = 12  # in ln p, four Gauss points each
+STEP = 0.01  # relative, of the central difference in p
+
+
+def main(points: int = 512, tolerance: float = 1e-8) -> None:
+    print(f"default surface, {points}^2, tolerance {tolerance:g}, p* from 0.01 to 3")
+    print("   n  |2v/(<sigma h> - p<u>) - 1|  |-dv/du_g / p - 1|  |int u_g dp / [v + p u_g] - 1|")
+    for n in EXPONENTS:
+        scene = build_scene(SelfAffine(), Power(n=n), points)
+        choice = SolverChoice(tolerance=tolerance)
+
+        def seen(p, scene=scene, choice=choice):
+            contact = scene.contact(float(p))
+            solution = solve_contact(contact, choice, lambda contact, state: None)
+            assert solution.status == "converged"
+            return observe(contact, solution.u, solution.sigma)
+
+        work, slope = 0.0, 0.0
+        for p in (0.01, 0.1, 0.5, 1.0, 3.0):
+            middle, low, high = seen(p), seen(p * (1 - STEP)), seen(p * (1 + STEP))
+            work = max(work, abs(2 * middle.energy / middle.work - 1))
+            slope = max(slope, abs((low.energy - high.energy) / (high.u_g - low.u_g) / p - 1))
+        nodes, weights = np.polynomial.legendre.leggauss(4)
+        edges = np.linspace(np.log(0.01), np.log(3.0), PANELS + 1)
+        half = 0.5 * (edges[1] - edges[0])
+        integral = 0.0
+        for left in edges[:-1]:
+            for node, weight in zip(nodes, weights, strict=True):
+                p = np.exp(left + half * (1 + node))
+                integral += half * weight * p * seen(p).u_g
+        first, last = seen(0.01), seen(3.0)
+        exact = last.energy + 3.0 * last.u_g - first.energy - 0.01 * first.u_g
+        print(f"{n:4g} {work:28.1e} {slope:19.1e} {abs(integral / exact - 1):30.1e}", flush=True)
+
+
+if __name__ == "__main__":
+    main(*map(int, sys.argv[1:2]))

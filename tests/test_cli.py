@@ -1,0 +1,245 @@
+import csv
+import io
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from gfmd_cli.cli import main
+from gfmd_cli.study import resources
+
+CONFIGS = Path(__file__).parents[1] / "configs"
+CONTRACT = (
+    "surface,seed,elastomer,n,thickness,points,p_star,a_r,a_r_error,sigma_p,sigma_p_error,"
+    "u_g,u_g_error,residual,solver,transforms,seconds,status"
+)
+SPEC = """\
+[study]
+name = "small"
+[surface]
+kind = "self-affine"
+cutoff = 0.05
+[elastomer]
+kind = "power"
+n = [0, 1]
+[grid]
+points = 64
+[load]
+p_star = [0.1, 1.0]
+"""
+
+
+@pytest.fixture
+def gfmd(tmp_path, monkeypatch):
+    """Calls the command in tmp_path, where spec.toml is SPEC."""
+    monkeypatch.chdir(tmp_path)
+    Path("spec.toml").write_text(SPEC)
+    return lambda *words: CliRunner().invoke(main, [str(word) for word in words])
+
+
+def test_run_then_analyze_then_export(gfmd):
+    done = gfmd("run", "spec.toml")
+    assert done.exit_code == 0, done.output
+    assert "4 converged" in done.output
+    assert "gfmd analyze small.h5" in done.output
+    told = gfmd("analyze", "small.h5")
+    assert told.exit_code == 0
+    assert "Persson" in told.output
+    rows = list(csv.DictReader(io.StringIO(gfmd("export", "small.h5").output)))
+    assert ",".join(rows[0]).startswith(CONTRACT)
+    assert len(rows) == 4
+    assert rows[0]["a_r_error"] == ""
+    assert rows[0]["thickness"] == ""
+    assert float(rows[3]["residual"]) < 1e-6
+
+
+def test_a_second_run_says_that_all_is_done(gfmd):
+    gfmd("run", "spec.toml")
+    again = gfmd("run", "spec.toml")
+    assert again.exit_code == 0
+    assert "4 converged" in again.output
+
+
+def test_export_writes_a_file(gfmd):
+    gfmd("run", "spec.toml", "-o", "a.h5")
+    assert gfmd("export", "a.h5", "-o", "a.csv").exit_code == 0
+    assert Path("a.csv").read_text().startswith(CONTRACT)
+
+
+def test_analyze_prints_records_with_the_promised_keys(gfmd):
+    gfmd("run", "spec.toml")
+    records = json.loads(gfmd("analyze", "small.h5", "--json").output)
+    assert len(records) == 4
+    assert list(records[0])[:11] == [
+        "n", "thickness", "points", "seed", "p_star", "a_r", "a_r_persson", "sigma_p",
+        "sigma_p_persson", "u_g", "u_g_persson",
+    ]  # fmt: skip
+    assert records[0]["thickness"] is None
+    assert records[0]["a_r_persson"] == pytest.approx(0.07965567455405798, rel=1e-12)  # erf
+
+
+def test_a_dry_run_lists_the_tasks_and_writes_nothing(gfmd):
+    before = set(Path().iterdir())
+    told = gfmd("run", "spec.toml", "--dry-run")
+    assert told.exit_code == 0
+    assert "4 tasks, 4 to do" in told.output
+    assert "MiB" in told.output
+    assert set(Path().iterdir()) == before
+    assert "2 tasks" in gfmd("run", "spec.toml", "--dry-run", "--shard", "1/2").output
+
+
+def test_a_shard_takes_its_share(gfmd):
+    assert gfmd("run", "spec.toml", "--shard", "0/2").exit_code == 0
+    assert "2 tasks are not solved yet" in gfmd("analyze", "small.h5").output
+    assert len(gfmd("export", "small.h5").output.splitlines()) == 3
+    assert gfmd("run", "spec.toml", "--shard", "1/2").exit_code == 0
+    assert len(gfmd("export", "small.h5").output.splitlines()) == 5
+    assert gfmd("run", "spec.toml", "--shard", "5/9").exit_code == 0
+
+
+@pytest.mark.parametrize("shard", ["2/2", "-1/2", "a/b", "1", "0/0", "1/2/3"])
+def test_a_bad_shard_is_refused(gfmd, shard):
+    told = gfmd("run", "spec.toml", f"--shard={shard}")
+    assert told.exit_code == 2
+    assert "0 <= I < N" in told.output
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("run", "none.toml"),
+        ("run", "spec.toml", "--set", "elastomer.n=9"),
+        ("run", "spec.toml", "--set", "surface.cutoff=0.001"),
+        ("run", "spec.toml", "--jobs", "0"),
+        ("analyze", "none.h5"),
+        ("export", "none.h5"),
+        ("run",),
+        ("walk",),
+    ],
+)
+def test_bad_usage_ends_in_status_2_without_traceback_or_file(gfmd, words):
+    before = set(Path().iterdir())
+    told = gfmd(*words)
+    assert told.exit_code == 2
+    assert "Traceback" not in told.output
+    assert told.output.strip()
+    assert set(Path().iterdir()) == before
+
+
+def test_a_missed_tolerance_is_status_1_and_the_others_are_kept(gfmd):
+    told = gfmd("run", "spec.toml", "--set", "solver.max_steps=1")
+    assert told.exit_code == 1
+    assert "2 converged, 2 max_steps" in told.output
+    assert gfmd("run", "spec.toml", "--set", "solver.max_steps=1").exit_code == 1
+    assert len(gfmd("export", "small.h5").output.splitlines()) == 5
+
+
+def test_an_unreadable_study_is_status_74(gfmd):
+    Path("bad.h5").write_bytes(b"nothing")
+    for words in (
+        ("analyze", "bad.h5"),
+        ("export", "bad.h5"),
+        ("run", "spec.toml", "-o", "bad.h5"),
+    ):
+        told = gfmd(*words)
+        assert told.exit_code == 74
+        assert "bad.h5" in told.output
+
+
+def test_a_place_that_cannot_be_written_is_status_73(gfmd):
+    Path("file").write_text("")
+    told = gfmd("run", "spec.toml", "-o", "file/study.h5")
+    assert told.exit_code == 73
+    assert "cannot be written" in told.output
+
+
+def test_a_grid_beyond_the_memory_is_refused_before_it_is_allocated(gfmd, monkeypatch):
+    monkeypatch.setattr(resources, "available_memory", lambda: 2.0**30)
+    told = gfmd("run", "spec.toml", "--set", "grid.points=8192")
+    assert told.exit_code == 2
+    assert "8192 points" in told.output
+    assert "GiB" in told.output
+
+
+@pytest.mark.parametrize(
+    ("array", "words"),
+    [
+        (np.full((16, 16), np.nan), "NaN"),
+        (np.zeros((16, 18)), "16 x 18"),
+        (np.zeros((16, 16)), "flat"),
+        (np.array([{}]), "cannot be read"),
+    ],
+)
+def test_a_height_file_that_will_not_do_is_refused(gfmd, array, words):
+    np.save("h.npy", array, allow_pickle=True)
+    told = gfmd(
+        "run", "spec.toml", "--set", "surface={kind='file', path='h.npy'}", "--set",
+        "grid.points=16",
+    )  # fmt: skip
+    assert told.exit_code == 2
+    assert words in told.output
+    assert not Path("small.h5").exists()
+
+
+def test_a_height_array_is_used_as_it_is(gfmd):
+    heights = np.random.default_rng(5).normal(size=(32, 32))
+    np.save("h.npy", heights)
+    surface = ("--set", "surface={kind='file', path='h.npy', length=2.0}", "--set", "load.p_star=9")
+    told = gfmd("run", "spec.toml", *surface, "--set", "grid.points=32")
+    assert told.exit_code == 0, told.output
+    row = next(csv.DictReader(io.StringIO(gfmd("export", "small.h5").output)))
+    assert float(row["h_std"]) == pytest.approx(heights.std(), rel=1e-14)
+    assert float(row["length"]) == 2.0
+    changed = np.array(heights)
+    changed[0, 0] += 1
+    np.save("h.npy", changed)
+    again = gfmd("run", "spec.toml", *surface, "--set", "grid.points=32")
+    assert again.exit_code == 2
+    assert "sha256" in again.output
+
+
+def test_pressures_may_be_given_in_pascal(gfmd):
+    told = gfmd(
+        "run", "spec.toml", "--set", "load={pressure=[1e3, 1e5]}", "--set",
+        "elastomer={kind='half-space', E_star=1e6}",
+    )  # fmt: skip
+    assert told.exit_code == 0, told.output
+    rows = list(csv.DictReader(io.StringIO(gfmd("export", "small.h5").output)))
+    for row, pressure in zip(rows, (1e3, 1e5), strict=True):
+        assert float(row["pressure"]) == pytest.approx(pressure, rel=1e-14)
+        assert float(row["p_star"]) * float(row["delta_sigma"]) == pytest.approx(pressure)
+
+
+def test_the_schema_is_json(gfmd):
+    assert json.loads(gfmd("schema").output)["required"]
+
+
+def test_help_is_quick_to_load():
+    heavy = ("numpy", "h5py", "pyfftw", "pydantic", "tqdm")
+    code = f"import sys, gfmd_cli.cli; print([m for m in {heavy} if m in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+SMALL_SETTINGS = {
+    "smoke": (),
+    "demo": ("surface.cutoff=0.05", "grid.points=64", "load.p_star=[0.1,1.0]"),
+    "slab": ("surface.cutoff=0.05", "grid.points=64", "load.p_star=[0.01,0.1]"),
+    "ridge": ("grid.points=128",),
+    "hertz": ("grid.points=64", "load.p_star=1e-3"),
+    "afm-scan": ("grid.points=256", "load.pressure=1e6"),
+}
+
+
+@pytest.mark.parametrize("config", sorted(CONFIGS.glob("*.toml")), ids=lambda path: path.stem)
+def test_every_config_runs_on_a_small_grid(gfmd, config):
+    if config.stem == "afm-scan":
+        pytest.importorskip("SurfaceTopography")
+    settings = [word for s in SMALL_SETTINGS[config.stem] for word in ("--set", s)]
+    told = gfmd("run", config, "-o", "study.h5", *settings)
+    assert told.exit_code == 0, told.output
+    assert gfmd("analyze", "study.h5").exit_code == 0

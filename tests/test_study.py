@@ -1,0 +1,316 @@
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+
+import h5py
+import numpy as np
+import pytest
+import xarray
+
+from gfmd_cli.errors import InputError, StudyError
+from gfmd_cli.physics.grid import Grid
+from gfmd_cli.solvers.loop import State
+from gfmd_cli.study.checkpoint import Checkpoint
+from gfmd_cli.study.layout import COLUMNS
+from gfmd_cli.study.parse import read_spec
+from gfmd_cli.study.record import read_record
+from gfmd_cli.study.run import run_study
+from gfmd_cli.study.store import MISSING, read_rows, read_shells
+
+SMALL = """\
+[surface]
+kind = "self-affine"
+cutoff = 0.05
+[elastomer]
+kind = "power"
+n = [0, 1]
+[grid]
+points = 64
+[load]
+p_star = [0.1, 1.0]
+[output]
+fields = ["u", "sigma", "height"]
+cross_section = true
+"""
+LONG = """\
+[surface]
+kind = "self-affine"
+cutoff = 0.01
+[elastomer]
+kind = "power"
+n = 4
+[grid]
+points = 256
+[load]
+p_star = [1e-3, 2e-3]
+[solver]
+tolerance = 1e-8
+[output]
+fields = ["u"]
+"""
+NUMBERS = [c.name for c in COLUMNS if c.kind is not str and c.name != "seconds"]
+
+
+@pytest.fixture
+def run(tmp_path):
+    """Runs a spec into tmp_path/study.h5; returns (path, events, outcome)."""
+
+    def run(text=SMALL, name="study.h5", overrides=(), **options):
+        spec_path = tmp_path / "spec.toml"
+        spec_path.write_text(text)
+        spec, _ = read_spec(spec_path, overrides)
+        events = []
+        outcome = run_study(spec, text, tmp_path / name, events.append, **options)
+        return tmp_path / name, events, outcome
+
+    return run
+
+
+def results(path):
+    return [[row[name] for name in NUMBERS] for row in read_rows(path)]
+
+
+def test_a_study_holds_one_row_a_task(run):
+    path, events, outcome = run()
+    rows = read_rows(path)
+    assert outcome == {"converged": 4}
+    assert [(row["n"], row["p_star"]) for row in rows] == [(0, 0.1), (0, 1), (1, 0.1), (1, 1)]
+    assert all(row["status"] == "converged" and row["residual"] < 1e-6 for row in rows)
+    assert {event.event for event in events} >= {"start", "done"}
+    assert not path.with_suffix(".parts").exists()
+
+
+def test_a_second_call_finds_everything_done(run):
+    path, _, _ = run()
+    before = path.read_bytes()
+    _, events, outcome = run()
+    assert events == []
+    assert outcome == {"converged": 4}
+    assert path.read_bytes() == before
+
+
+def test_shards_make_up_the_whole(run):
+    whole, _, _ = run(name="whole.h5")
+    path, _, first = run(shard=(0, 3))
+    states = [row["status"] for row in read_rows(path)]
+    assert states == ["converged", MISSING, MISSING, "converged"]
+    assert first == {"converged": 2}
+    run(shard=(1, 3))
+    run(shard=(2, 3))
+    np.testing.assert_array_equal(results(path), results(whole))
+    with h5py.File(path) as a, h5py.File(whole) as b:
+        np.testing.assert_array_equal(a["fields/2/sigma"], b["fields/2/sigma"])
+
+
+def test_worker_processes_change_nothing(run):
+    alone, _, _ = run(name="alone.h5", jobs=1)
+    path, events, outcome = run(jobs=2)
+    assert outcome == {"converged": 4}
+    assert sum(event.event == "done" for event in events) == 4
+    np.testing.assert_array_equal(results(path), results(alone))
+
+
+def test_a_study_of_another_spec_is_refused_and_kept(run):
+    path, _, _ = run()
+    before = path.read_bytes()
+    with pytest.raises(InputError, match=r"another spec[\s\S]*surface\.hurst: 0\.8 -> 0\.5"):
+        run(overrides=("surface.hurst=0.5",))
+    assert path.read_bytes() == before
+
+
+def test_unfinished_work_of_another_spec_is_refused(run, tmp_path):
+    path, _, _ = run(shard=(0, 2))
+    path.unlink()
+    (tmp_path / "study.parts").mkdir(exist_ok=True)
+    (tmp_path / "study.parts" / "spec.json").write_text(json.dumps({"load": {"p_star": [1.0]}}))
+    with pytest.raises(InputError, match=r"load\.p_star"):
+        run(overrides=("load.p_star=0.1",))
+
+
+def test_the_study_opens_labelled_in_xarray(run):
+    path, _, _ = run()
+    with xarray.open_dataset(path, engine="h5netcdf") as data:
+        assert data.a_r.dims == ("task",)
+        assert data.pr_sigma.dims == ("task", "sigma")
+        assert data.pr_sigma_log.dims == ("task", "sigma_log")
+        assert data.u_g.attrs["long_name"] == "mean gap / h_std"
+        assert data.pressure.attrs["units"] == "Pa"
+        assert data.attrs["Conventions"] == "CF-1.11"
+    with xarray.open_dataset(path, engine="h5netcdf", group="fields/2") as fields:
+        assert fields.u.dims == ("y", "x")
+        assert fields.x.attrs["units"] == "m"
+    with xarray.open_dataset(path, engine="h5netcdf", group="scenes/1") as scene:
+        assert scene.variance.dims == ("shell",)
+
+
+def test_a_study_says_where_it_comes_from(run):
+    path, _, _ = run()
+    with h5py.File(path) as file:
+        attrs = dict(file.attrs)
+    assert json.loads(attrs["spec"])["elastomer"][1]["n"] == 1
+    assert attrs["spec_text"] == SMALL
+    assert json.loads(attrs["packages"])["numpy"] == np.__version__
+    assert json.loads(attrs["machine"])["cores"] >= 1
+    assert attrs["date"]
+    assert "git_commit" in attrs
+
+
+def test_stored_fields_reproduce_the_row(run):
+    path, _, _ = run()
+    row = read_rows(path)[2]
+    with h5py.File(path) as file:
+        u, sigma, height = (file[f"fields/2/{name}"][()] for name in ("u", "sigma", "height"))
+        diagonal = file["cross_sections/2/u"][()]
+    assert np.mean(u - height) / row["h_std"] == pytest.approx(row["u_g"], rel=1e-12)
+    assert np.std(sigma) / row["delta_sigma"] == pytest.approx(row["sigma_p"], rel=1e-12)
+    assert np.mean(sigma) == pytest.approx(row["pressure"], rel=1e-12)
+    assert np.mean(sigma > 1e-3 * row["delta_sigma"]) == pytest.approx(row["a_r"], abs=0.02)
+    np.testing.assert_array_equal(diagonal, np.diagonal(u))
+
+
+def test_the_stress_distribution_is_normalised_and_has_its_first_moment(run):
+    path, _, _ = run(overrides=("load.p_star=[0.3]",))
+    row = read_rows(path)[1]
+    with h5py.File(path) as file:
+        middle, edges = file["sigma"][()], file["sigma"].attrs["edges"]
+    weight = row["pr_sigma"] * np.diff(edges)
+    assert row["pr_zero"] + weight.sum() + row["pr_beyond"] == pytest.approx(1, rel=1e-12)
+    assert row["pr_zero"] == pytest.approx(1 - row["a_r"], rel=1e-12)
+    assert weight @ middle == pytest.approx(0.3, rel=0.01)  # bins of 0.05
+
+
+def test_the_stored_spectrum_has_the_variances_of_the_scene(run):
+    path, _, _ = run()
+    row = read_rows(path)[2]
+    shells = read_shells(path, row["scene"])
+    assert np.sqrt(shells.height.sum()) == pytest.approx(row["h_std"], rel=1e-12)
+    assert np.sqrt(shells.variance.sum()) == pytest.approx(row["delta_sigma"], rel=1e-12)
+
+
+def test_without_output_nothing_more_is_stored(run):
+    path, _, _ = run(
+        overrides=("output.fields=[]", "output.cross_section=false", "output.histogram=false")
+    )
+    with h5py.File(path) as file:
+        assert not {"fields", "cross_sections", "pr_sigma", "pr_zero"} & set(file)
+
+
+def test_a_damaged_record_is_set_aside_and_solved_again(run, tmp_path):
+    whole, _, _ = run(name="whole.h5")
+    path, _, _ = run(shard=(0, 2))
+    parts = tmp_path / "study.parts"
+    parts.mkdir(exist_ok=True)
+    bad = parts / f"{'0' * 16}.record"
+    bad.write_bytes(b"\x89HDF\r\n\x1a\n" + bytes(500))
+    with pytest.raises(StudyError, match="damaged record"):
+        read_record(bad)
+    _, _, outcome = run()
+    assert outcome == {"converged": 4}
+    assert bad.with_suffix(".bad").exists()
+    np.testing.assert_array_equal(results(path), results(whole))
+
+
+def test_a_file_that_is_no_study_is_refused_and_kept(run, tmp_path):
+    path = tmp_path / "study.h5"
+    path.write_bytes(b"not HDF5")
+    with pytest.raises(StudyError, match="no readable HDF5"):
+        run()
+    assert path.read_bytes() == b"not HDF5"
+    path.unlink()
+    with h5py.File(path, "w") as file:
+        file["x"] = 1
+    with pytest.raises(StudyError, match="no study"):
+        run()
+
+
+def test_a_missed_tolerance_is_said_and_kept(run):
+    path, _, outcome = run(overrides=("elastomer.n=3", "solver.max_steps=2", "load.p_star=0.1"))
+    assert outcome == {"max_steps": 1}
+    row = read_rows(path)[0]
+    assert row["status"] == "max_steps"
+    assert row["residual"] > 1e-6
+
+
+def test_checkpoints_come_back_as_they_were(tmp_path):
+    grid = Grid(16)
+    rng = np.random.default_rng(0)
+
+    class Contact:
+        pass
+
+    contact = Contact()
+    contact.grid = grid
+    state = State(rng.random((16, 16)), rng.random((16, 16)), False, 0.1, 7, 9, {"slope": 1 / 3})
+    state.fields["direction"] = rng.random((16, 16))
+    checkpoint = Checkpoint(tmp_path / "c")
+    assert checkpoint.load(grid) is None
+    checkpoint.save(contact, state, 12.5)
+    state.u += 1
+    state.step = 8
+    checkpoint.save(contact, state, 12.5)
+    resume = checkpoint.load(Grid(32))
+    assert (resume.points, resume.transforms, resume.state.step) == (16, 12.5, 8)
+    assert resume.state.scalars == {"slope": 1 / 3}
+    np.testing.assert_array_equal(resume.state.u, state.u)
+    np.testing.assert_array_equal(resume.state.fields["direction"], state.fields["direction"])
+    slot = json.loads(checkpoint.pointer.read_text())["slot"]
+    with (tmp_path / "c" / slot).open("r+b") as file:
+        file.seek(100)
+        file.write(b"\xff")
+    assert checkpoint.load(grid) is None
+    checkpoint.remove()
+    assert not (tmp_path / "c").exists()
+
+
+def gfmd(folder, *words):
+    return subprocess.Popen(
+        [sys.executable, "-m", "gfmd_cli", *words],
+        cwd=folder,
+        stderr=subprocess.PIPE,
+        stdout=subprocess.DEVNULL,
+        text=True,
+        start_new_session=True,
+    )
+
+
+@pytest.mark.parametrize("jobs", ["1", "2"])
+def test_a_stopped_run_goes_on_bit_for_bit(run, tmp_path, jobs):
+    unbroken, _, _ = run(LONG, name="unbroken.h5", jobs=1)
+    words = ["run", "spec.toml", "-o", "broken.h5", "-j", jobs]
+    stops = 0
+    for _ in range(20):
+        process = gfmd(tmp_path, *words)
+        time.sleep(2.5)
+        process.send_signal(signal.SIGTERM)
+        status = process.wait(60)
+        process.stderr.close()
+        if status == 0:
+            break
+        assert status == 75
+        stops += 1
+    else:
+        pytest.fail("never finished")
+    assert stops > 0
+    np.testing.assert_array_equal(results(tmp_path / "broken.h5"), results(unbroken))
+    with h5py.File(tmp_path / "broken.h5") as a, h5py.File(unbroken) as b:
+        np.testing.assert_array_equal(a["fields/0/u"], b["fields/0/u"])
+
+
+def test_a_killed_run_loses_no_finished_pressure(run, tmp_path):
+    unbroken, _, _ = run(name="unbroken.h5")
+    shutil.copy(tmp_path / "spec.toml", tmp_path / "again.toml")
+    words = ["run", "again.toml", "-o", "killed.h5", "-j", "1"]
+    for _ in range(6):
+        process = gfmd(tmp_path, *words)
+        time.sleep(0.8)
+        os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+        process.stderr.close()
+    process = gfmd(tmp_path, *words)
+    assert process.wait(60) == 0
+    process.stderr.close()
+    np.testing.assert_array_equal(results(tmp_path / "killed.h5"), results(unbroken))
