@@ -16,7 +16,7 @@ from gfmd_cli.solvers.cascade import SolverChoice, solve_contact
 
 EXPONENTS = (0.0, 0.5, 1.0, 2.0, 3.0, 4.0)
 PANELS = 12  # in ln p, four Gauss points each
-STEP = 0.01  # relative, of the central difference in p
+STEP = 0.002  # relative, of the central difference in p
 
 
 def main(points: int = 512, tolerance: float = 1e-8) -> None:

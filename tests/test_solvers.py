@@ -285,11 +285,14 @@ def test_the_beam_touches_the_crest_only_below_its_line_pressure(points, p_over_
     assert it.seen.u_g * made.h_std == pytest.approx(gap, rel=(2 / points) ** 2)
 
 
-@pytest.mark.parametrize(("points", "p_over_pc"), [(64, 3.0), (64, 30.0), (256, 30.0)])
+@pytest.mark.parametrize(("points", "p_over_pc"), [(64, 3.0), (64, 30.0), (256, 3.0), (256, 30.0)])
 def test_the_beam_lies_on_the_crest_above_its_line_pressure(points, p_over_pc):
     p = p_over_pc * reference.beam_line_pressure(1.0, 2.0, 1.0)
     made, it = on_line(LineParabola(radius=2.0), Power(n=4), points, p, 1e-5)
-    assert it.seen.a_r == pytest.approx(float(reference.beam_area(p, 1, 2.0, 1)), abs=2 / points)
+    # the line force at the edge falls between two points; it may lift some just inside of it a
+    # little (gaps of 1e-6), so the place of the outermost ones is what is known to a point an edge
+    reach = np.ptp(np.flatnonzero(it.gap == 0)) / points
+    assert reach == pytest.approx(float(reference.beam_area(p, 1.0, 2.0, 1.0)), abs=2 / points)
     span = float(reference.beam_free_half_length(p, 1.0, 2.0, 1.0))
     gap = float(reference.beam_gap(p, 1.0, 2.0, 1.0))
     # relative change of l^5 and l^4 with the line force spread over a point: 5/4 (dx/l)^2 measured

@@ -197,9 +197,14 @@ def test_a_grid_too_coarse_is_refused_and_told_which_one_does(surface):
     assert np.all(np.isfinite(scene.height))
 
 
+def test_a_surface_without_modes_is_refused():
+    with pytest.raises(ValidationError, match="roughness"):
+        SelfAffine(spectrum="cutoff", rolloff=0.2, cutoff=0.4)
+
+
 @pytest.mark.parametrize("h_std", [None, 1.0])
-def test_a_surface_without_modes_is_refused(h_std):
-    surface = SelfAffine(spectrum="cutoff", rolloff=0.2, cutoff=0.4, h_std=h_std)
+def test_a_surface_with_no_mode_between_its_wavelengths_is_refused(h_std):
+    surface = SelfAffine(spectrum="cutoff", rolloff=0.85, cutoff=0.8, h_std=h_std)  # 1 < m < 1.25
     with pytest.raises(InputError, match="flat"):
         sample(surface, 64)
 

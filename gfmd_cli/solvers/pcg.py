@@ -3,10 +3,11 @@
 Polak-Ribiere+ directions on the points that are free, preconditioned by the screened Green's
 function 1 / (k(q) + k(q_c)), an exact step, and a projection onto u >= h. Contact pins the
 displacement every few patches, so waves longer than that are no softer than k(q_c): with plain
-1/k the method degrades at n = 2 and fails from n = 3 on. The energy never rises: a projected step
-that would raise it is halved, which rules out cycles (Bertsekas, SIAM J. Control Optim. 20, 221,
-1982: a scaled gradient projected on the feasible set descends for a short enough step as long as
-the binding constraints are kept out of the scaling).
+1/k the method degrades at n = 2 and fails from n = 3 on. The energy never rises, which rules
+out cycles: of a projected step that would raise it, only the part down to the lowest point is gone
+(all of that way is feasible), and a step that only leads up is halved (Bertsekas, SIAM J. Control
+Optim. 20, 221, 1982: a scaled gradient projected on the feasible set descends for a short enough
+step as long as the binding constraints are kept out of the scaling).
 """
 
 from collections.abc import Iterator
@@ -21,7 +22,7 @@ from gfmd_cli.physics.observables import switches
 from gfmd_cli.solvers.loop import State
 
 PROPORTION = 0.3  # of rms tension to rms free force; from 0.1 to 1 within 20 % at n = 1 to 4
-HALVINGS = 8  # of a step that raises the energy; beyond, only rounding decides its sign
+HALVINGS = 30  # of a step that only leads up; beyond, rounding alone decides
 RESCREEN_AFTER = 4  # steps at least between two looks at the screening length ...
 RESCREEN_GROWTH = 1.5  # ... and this factor in the step count
 RESCREEN_CHANGE = 1.25  # relative change of q_c below which the old one stays
@@ -122,21 +123,29 @@ class ProjectedCG(Choice):
             u[...] = trial
             state.exact = False
             return
-        for halving in range(HALVINGS + 1):
+        for _ in range(HALVINGS):
             np.maximum(trial, h, out=trial)
             contact.stress(trial, out=other)
             state.transforms += 2
             np.subtract(trial, u, out=move)
-            change = float(np.vdot(move, sigma) + np.vdot(move, other))  # of energy, x 2 size
-            if change <= 0 or halving == HALVINGS:
-                break
+            if float(np.vdot(move, sigma) + np.vdot(move, other)) <= 0:  # change of energy, doubled
+                u[...] = trial
+                sigma[...] = other
+                state.exact = True
+                return
             state.scalars["slope"] = 0.0  # start the conjugation anew
+            other -= sigma
+            fall, rise = -float(np.vdot(move, sigma)), float(np.vdot(move, other))
+            if fall > 0:  # the move itself leads down: go to the lowest point on it
+                move *= fall / rise
+                other *= fall / rise
+                u += move
+                sigma += other
+                state.exact = False
+                return
             length *= 0.5
             np.multiply(direction, length, out=trial)
             trial += u
-        u[...] = trial
-        sigma[...] = other
-        state.exact = True
 
 
 def _screened(contact: Contact, screening: float) -> Field:

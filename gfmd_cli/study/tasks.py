@@ -14,8 +14,8 @@ from gfmd_cli.solvers.cascade import SolverChoice
 from gfmd_cli.study.spec import OutputTable, Spec, digest
 
 FIELDS_IN_MEMORY = 14.3
-"""Fields of double precision that a solve holds at its peak: nine of the solver, two symbols and the
-coefficients on half-spectra, the coarser grids; measured by scripts/memory.py, within 10 %."""
+"""Fields of double precision that a solve holds at its peak: nine of the solver, two symbols and
+the coefficients on half-spectra, the coarser grids; measured by scripts/memory.py to 10 %."""
 BASE_BYTES = 110e6
 """What a process holds besides: the interpreter and its libraries."""
 SECONDS_PER_PAIR = 8e-9

@@ -47,8 +47,8 @@ def mean_gap(n, p_star):
     return solve(scene(n), p_star)[2].u_g
 
 
-# Three standard deviations of u_g over the seeds 0 to 9, measured; below 4 % for n >= 2, where short
-# waves count. For small n a few long waves carry most of the height, and realisations differ more.
+# Three standard deviations of u_g over the seeds 0 to 9, measured; below 4 % for n >= 2, where
+# many waves count. For small n a few long ones carry most of the height: realisations differ more.
 SPREAD = {0.5: (0.28, 0.14, 0.064, 0.24), 1: (0.13, 0.083, 0.054, 0.089)}
 
 
