@@ -1,6 +1,6 @@
-"""Figures of a comparison, each one printed column wide: symbols simulation, lines theory."""
+"""Figures of a comparison, each as wide as a printed column: symbols simulation, lines theory."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from fractions import Fraction
 from io import BytesIO
 from pathlib import Path
@@ -8,31 +8,31 @@ from typing import Any
 
 import numpy as np
 
-from gfmd_cli.analysis.compare import Comparison, Curve, Row, einstein_prediction
+from gfmd_cli.analysis.compare import Comparison, Curve, Prediction, Row, einstein_prediction
 from gfmd_cli.errors import InputError
-from gfmd_cli.physics.fields import Field
+from gfmd_cli.physics.fields import Field, Mask
 from gfmd_cli.physics.observables import linear_edges, logarithmic_edges
 from gfmd_cli.study.files import write_whole
 from gfmd_cli.study.layout import PR_LINEAR, PR_LOGARITHMIC
 
 try:
-    from matplotlib import colormaps, rc_context
+    from matplotlib import rc_context, ticker
+    from matplotlib.colors import to_rgb
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
-    from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullFormatter
 except ImportError as error:
     raise InputError(f"figures need matplotlib: pip install gfmd-cli[plot] ({error})") from error
 
-WIDTH, HEIGHT = 3.39, 2.35  # inches: 86 mm, one column; the legend adds to the height
-ROW = 0.145  # inches that a row of the legend adds
-DPI = 300
+WIDTH, HEIGHT, ROW = 3.39, 2.35, 0.145  # inches: a column of 86 mm; a row of the legend adds ROW
+COLUMN = 54  # characters and symbols that a row of the legend holds
+LONGEST = 46  # characters of a label
 SCRIPTED = 9.3  # points: sub- and superscripts are printed at 0.7 of it, 6.5 points
 STYLE = {
     "font.family": "DejaVu Sans",
     "font.size": 8.0,
     "axes.labelsize": SCRIPTED,
     "axes.linewidth": 0.6,
-    "lines.linewidth": 1.0,
+    "lines.linewidth": 0.9,
     "lines.markersize": 4.2,
     "lines.markeredgewidth": 0.9,
     "legend.fontsize": 8.0,
@@ -43,13 +43,18 @@ STYLE = {
     "ytick.right": True,
     "pdf.fonttype": 42,  # TrueType: publishers refuse Type 3
 }
+LADDER = ("#332288", "#0077bb", "#009988", "#999933", "#ee7733", "#cc3311")
+"""Told apart by the colour-blind too (P. Tol, Colour schemes, 2021), ordered by hue."""
 MARKERS = "os^Dv<p>h"
-MANY = 8  # curves that a legend can tell apart one by one
-TYPICAL_AREA = 0.1  # relative contact area of the paper's Fig. 7
+MANY = 8  # curves; more cannot be told apart one by one
 PRESSURES = 5  # that the distribution of one body is drawn at
+TYPICAL_AREA = 0.1  # relative contact area of the paper's Fig. 7
+WIDE = 20  # a ratio that varies by more is drawn on a log scale
+NEAR = 1.5  # pressures that differ by a smaller factor are drawn side by side
+FEW = 10  # grid points; a bin with fewer is noise of 30 % and more
 P_STAR = r"reduced pressure  $p^* = p\,/\,\Delta\sigma$"
-DENSITY, STRESS = r"$\mathrm{Pr}(\sigma)\;\Delta\sigma$", r"stress  $\sigma\,/\,\Delta\sigma$"
-Span = tuple[float, float]
+STRESS, DENSITY = r"stress  $\sigma\,/\,\Delta\sigma$", r"$\mathrm{Pr}(\sigma)\;\Delta\sigma$"
+THEORY = "Persson theory"
 
 
 @dataclass(frozen=True)
@@ -83,38 +88,62 @@ class Look:
     label: str
 
 
+@dataclass(frozen=True)
+class Item:
+    """A curve with its look, and its theory over pressures close enough for a line."""
+
+    curve: Curve
+    look: Look
+    p_star: Field
+    theory: Prediction
+
+
 class Sheet:
     """A figure in the making; its legend stands above the axes, off the data."""
 
     def __init__(self, x_label: str, y_label: str) -> None:
         self.figure = Figure(figsize=(WIDTH, HEIGHT), layout="constrained")
         self.axes = self.figure.add_subplot(xlabel=x_label, ylabel=y_label)
-        self.legend: dict[str, Line2D] = {}
+        self.legend: dict[str, Any] = {}
 
     def line(self, label: str, x: Field, y: Field, **style: Any) -> None:
-        """A line; the first of a label stands in the legend."""
-        self.axes.plot(x, y, **style)
-        self.legend.setdefault(label, Line2D([], [], **style))
+        """A line where y > 0."""
+        self.axes.plot(x, np.where(y > 0, y, np.nan), **style)
+        self.legend[label] = Line2D([], [], **style)
 
-    def points(self, look: Look, x: Field, y: Field, error: Field, converged: Any) -> None:
-        """Open symbols with error bars where there are errors; crosses where not converged."""
-        open_symbol = {"ls": "none", "mfc": "none", "color": look.colour, "zorder": 3}
-        known = np.isfinite(error)
-        if np.any(known):
-            bars = {"fmt": "none", "ecolor": look.colour, "elinewidth": 0.7, "capsize": 2}
-            self.axes.errorbar(x[known], y[known], np.abs(error[known]), **bars)
+    def points(self, look: Look, x: Field, y: Field, converged: Mask, every: Any = 1) -> None:
+        """Open symbols, crosses where not converged."""
+        style = {"ls": "none", "mfc": "none", "color": look.colour, "zorder": 3}
         for chosen, marker in ((converged, look.marker), (~converged, "x")):
-            self.axes.plot(x[chosen], y[chosen], marker=marker, **open_symbol)
-        self.legend[look.label] = Line2D([], [], marker=look.marker, **open_symbol)
+            self.axes.plot(x[chosen], y[chosen], marker=marker, markevery=every, **style)
+        self.legend[look.label] = Line2D([], [], marker=look.marker, **style)
         if not np.all(converged):
-            cross = open_symbol | {"color": "0.4"}
-            self.legend["not converged"] = Line2D([], [], marker="x", **cross)
+            self.legend["not converged"] = Line2D([], [], marker="x", ls="none", color="0.4")
+
+    def theory(self, lines: list[tuple[Look, Field, Field]]) -> None:
+        """One black line where theory is the same for all curves, else one in each colour."""
+        one = all(np.allclose(y, lines[0][2], rtol=1e-9, atol=0) for *_, y in lines)
+        for look, x, y in lines[:1] if one else lines:
+            self.line(THEORY, x, y, color="black" if one else look.colour, zorder=2)
+        self.legend[THEORY] = Line2D([], [], color="black" if one else "0.4")
+
+    def scale(self, name: str, scale: str, values: Any, *, zero: bool = True) -> None:
+        """Scale and limits of the axis `name` around the values; `zero` belongs to a linear one."""
+        low, high = float(np.min(values)), float(np.max(values))
+        if scale == "log":
+            pad = max(1.4, float(np.sqrt(8 * low / high)))  # 8: holds two of the ticks 1, 2, 5, 10
+            span = (low / pad, high * pad)
+        else:
+            low = 0.0 if zero else low
+            pad = (high - low) or abs(high) or 1.0
+            span = (low - (0.03 if zero else 0.1) * pad, high + 0.1 * pad)
+        self.axes.set(**{f"{name}scale": scale, f"{name}lim": span})
+        if scale == "log":
+            _tick(getattr(self.axes, f"{name}axis"), *span)
 
     def write(self, path: Path) -> list[Path]:
         """Write a PDF and a PNG, each whole or not at all. Raises SpaceError."""
-        longest = max(map(len, self.legend), default=1)
-        columns = max(1, min(4, len(self.legend), 56 // (longest + 7)))
-        rows = -(-len(self.legend) // columns)
+        columns, rows = _legend_shape(list(self.legend))
         self.figure.set_size_inches(WIDTH, HEIGHT + ROW * rows)
         self.figure.legend(
             self.legend.values(),
@@ -123,14 +152,16 @@ class Sheet:
             ncols=columns,
             borderpad=0,
             labelspacing=0.25,
-            columnspacing=1.4,
+            columnspacing=1.2,
             handlelength=1.6,
             handletextpad=0.5,
         )
+        self.figure.draw_without_rendering()
+        self.figure.set_layout_engine("none")  # laid out once for both files
         files = [path.with_name(f"{path.name}.{kind}") for kind in ("pdf", "png")]
         for file, metadata in zip(files, ({"CreationDate": None}, {}), strict=True):
             image = BytesIO()
-            self.figure.savefig(image, format=file.suffix[1:], dpi=DPI, metadata=metadata)
+            self.figure.savefig(image, format=file.suffix[1:], dpi=300, metadata=metadata)
             write_whole(file, image.getvalue())
         return files
 
@@ -140,261 +171,229 @@ def draw_all(comparison: Comparison, folder: Path) -> list[Path]:
 
     Raises SpaceError where the folder cannot be written.
     """
-    curves = comparison.curves
-    looks = _looks(curves)
+    curves = sorted(comparison.curves, key=_order)
+    pressures = np.concatenate([curve.column("p_star") for curve in curves])
+    low, high = pressures.min() / 3, pressures.max() * 3
+    low = min(low, high / 1000)  # near the left end of a linear axis
+    p_star = np.union1d(np.geomspace(low, high, 200), np.linspace(low, high, 100))
+    items = [
+        Item(curve, look, p_star, curve.predict(p_star))
+        for curve, look in zip(curves, _looks(curves), strict=True)
+    ]
     with rc_context(STYLE):
-        sheets = {view.name: _over_pressure(view, curves, looks) for view in VIEWS}
-        sheets["stress_distribution"] = _distribution(curves, looks)
-        sheets["stress_distribution_pressures"] = _distribution_pressures(curves)
-        return [
-            path
-            for name, sheet in sheets.items()
-            if sheet is not None
-            for path in sheet.write(folder / name)
-        ]
+        sheets = {view.name: _over_pressure(view, items) for view in VIEWS}
+        sheets["stress_distribution"] = _distribution(items)
+        sheets["stress_distribution_pressures"] = _distribution_pressures(items)
+        return [path for name, s in sheets.items() if s for path in s.write(folder / name)]
 
 
-def _over_pressure(view: View, curves: list[Curve], looks: list[Look]) -> Sheet | None:
+def _over_pressure(view: View, items: list[Item]) -> Sheet | None:
     """One quantity of all curves over the pressure, beside theory; None without data."""
     sheet = Sheet(P_STAR, view.label)
-    drawn = []
-    for curve, look in zip(curves, looks, strict=True):
+    drawn, xs, ys = [], [], []
+    for item in items:
+        curve, look = item.curve, item.look
         x, y, error = (curve.column(c) for c in ("p_star", view.column, f"{view.column}_error"))
-        if view.ratio:
-            scale = getattr(curve.prediction, view.column)
-            y, error = y / scale, error / scale
-        kept = np.isfinite(x) & np.isfinite(y) & ((y > 0) | (view.y_scale == "linear"))
+        unit = getattr(curve.prediction, view.column) if view.ratio else np.ones_like(y)
+        y, error = y / unit, np.abs(error) / unit
+        kept = np.isfinite(y) & ((y > 0) | (view.y_scale == "linear"))
+        if not np.any(kept):
+            continue
         converged = np.array([row["status"] == "converged" for row in curve.rows])
-        if np.any(kept):
-            x, y = x[kept], y[kept]
-            sheet.points(look, x, y, error[kept], converged[kept])
-            drawn.append((curve, look, x, y))
+        if view.ratio:
+            sheet.axes.plot(x[kept], y[kept], color=look.colour, lw=0.6)
+        barred = kept & np.isfinite(error)
+        if np.any(barred):
+            bars = {"fmt": "none", "ecolor": look.colour, "elinewidth": 0.7, "capsize": 2}
+            sheet.axes.errorbar(x[barred], y[barred], error[barred], **bars)
+        sheet.points(look, x[kept], y[kept], converged[kept])
+        drawn.append(item)
+        xs.append(x[kept])
+        ys.append(y[kept])
     if not drawn:
         return None
-    x, y = (np.concatenate([item[i] for item in drawn]) for i in (2, 3))
-    span = _span(x, view.x_scale)
+    p_star = drawn[0].p_star
+    lines = [(item.look, p_star, getattr(item.theory, view.column)) for item in drawn]
     if view.ratio:
-        for _, look, *guide in drawn:
-            sheet.axes.plot(*guide, color=look.colour, lw=0.6)
-        sheet.line("Persson theory", np.array(span), np.ones(2), color="black", zorder=1)
-        y = np.append(y, 1.0)
-    else:
-        p_star = _dense(span)
-        lines = [(k, p_star, getattr(c.predict(p_star), view.column)) for c, k, *_ in drawn]
-        _draw_theory(sheet, lines)
-        if view.column == "u_g" and any(curve.n == 0 for curve, *_ in drawn):
-            exact, style = einstein_prediction(p_star).u_g, {"color": "0.4", "ls": (0, (4, 2))}
-            sheet.line("Gaussian heights, n = 0", p_star, exact, zorder=1.5, **style)
-        if view.y_scale == "linear":
-            y = np.concatenate([y, *(theory for *_, theory in lines)])
-    _scale_axis(sheet.axes, "x", view.x_scale, span)
-    _scale_axis(sheet.axes, "y", view.y_scale, _span(y, view.y_scale, zero=not view.ratio))
+        lines = [(drawn[0].look, p_star, np.ones_like(p_star))]
+    sheet.theory(lines)
+    if view.column == "u_g" and any(item.curve.n == 0 for item in drawn):
+        exact, dashes = einstein_prediction(p_star).u_g, (0, (4, 2))
+        sheet.line("n = 0, Gaussian", p_star, exact, color="black", ls=dashes, lw=0.8, zorder=2.5)
+    sheet.scale("x", view.x_scale, np.concatenate(xs))
+    if view.y_scale == "linear":
+        low, high = sheet.axes.get_xlim()
+        ys += [y[(p_star >= low) & (p_star <= high)] for *_, y in lines]
+    y = np.concatenate(ys)
+    wide = view.ratio and y.max() > WIDE * y.min() > 0
+    sheet.scale("y", "log" if wide else view.y_scale, y, zero=not view.ratio)
     return sheet
 
 
-def _distribution(curves: list[Curve], looks: list[Look]) -> Sheet | None:
-    """Pr(sigma) of all curves at the common pressure where a_r is nearest TYPICAL_AREA."""
-    pairs = [
-        (curve, look, [row for row in curve.rows if np.any(_density(row, PR_LOGARITHMIC) > 0)])
-        for curve, look in zip(curves, looks, strict=True)
-    ]
-    pairs = [(curve, look, rows) for curve, look, rows in pairs if rows]
-    if not pairs:
-        return None
-    candidates = sorted({row["p_star"] for *_, rows in pairs for row in rows})
-
-    def chosen(p_star: float) -> list[Row]:
-        return [min(rows, key=lambda r: abs(np.log(r["p_star"] / p_star))) for *_, rows in pairs]
-
-    def distance(p_star: float) -> float:
-        return sum(abs(float(np.log(row["a_r"] / TYPICAL_AREA))) for row in chosen(p_star))
-
-    best = chosen(min(candidates, key=distance))
-    sheet = Sheet(STRESS, DENSITY)
-    edges = logarithmic_edges()
-    middle = np.sqrt(edges[1:] * edges[:-1])
-    drawn = []
-    for (_, look, _), row in zip(pairs, best, strict=True):
-        density = _density(row, PR_LOGARITHMIC)
-        x, y = middle[density > 0], density[density > 0]
-        converged = np.full(x.size, row["status"] == "converged")
-        sheet.points(look, x, y, np.full(x.size, np.nan), converged)
-        drawn.append((x, y))
-    x, y = (np.concatenate(parts) for parts in zip(*drawn, strict=True))
-    span = _span(x, "log")
-    sigma = _dense(span)
-    _draw_theory(
-        sheet,
-        [
-            (look, sigma, _theory_density(curve, sigma, row["p_star"]))
-            for (curve, look, _), row in zip(pairs, best, strict=True)
-        ],
-    )
-    _scale_axis(sheet.axes, "x", "log", span)
-    _scale_axis(sheet.axes, "y", "log", _span(y, "log"))
-    low, high = min(r["p_star"] for r in best), max(r["p_star"] for r in best)
-    between = f"{low:.3g}" if high < 1.001 * low else f"{low:.3g} ... {high:.3g}"
-    sheet.axes.text(
-        0.04, 0.94, f"$p^* = {between}$", transform=sheet.axes.transAxes, va="top", size=SCRIPTED
-    )
-    return sheet
-
-
-def _distribution_pressures(curves: list[Curve]) -> Sheet | None:
-    """Pr(sigma) in linear bins of the curve nearest n = 1 at up to five pressures."""
-    held = [
-        (curve, [row for row in curve.rows if np.any(_density(row, PR_LINEAR) > 0)])
-        for curve in curves
-    ]
-    held = [(curve, rows) for curve, rows in held if len(rows) > 1]
+def _distribution(items: list[Item]) -> Sheet | None:
+    """Pr(sigma) of the curves at one pressure: that of most curves, then of a_r = TYPICAL_AREA."""
+    held = [(item, _with_density(item.curve, PR_LOGARITHMIC)) for item in items]
+    held = [(item, rows) for item, rows in held if rows]
     if not held:
         return None
-    curve, rows = min(held, key=lambda pair: abs(np.nan_to_num(pair[0].n, nan=9.0) - 1))
-    places = np.unique(np.linspace(0, len(rows) - 1, PRESSURES).round().astype(int))
-    edges = linear_edges()
-    middle = 0.5 * (edges[1:] + edges[:-1])
-    sheet = Sheet(STRESS, DENSITY)
-    drawn = []
-    for place, colour in zip(places, _colours(places.size), strict=True):
-        row = rows[place]
-        density = _density(row, PR_LINEAR)
-        x, y = middle[density > 0], density[density > 0]
-        label = f"p* = {row['p_star']:.3g}"
-        theory = _theory_density(curve, middle, row["p_star"])
-        sheet.line("Persson theory", middle, theory, color="black", lw=0.6, zorder=3)
-        sheet.line(label, x, y, color=colour, lw=1.4)
-        drawn.append((x, y))
-    x, y = (np.concatenate(parts) for parts in zip(*drawn, strict=True))
-    _scale_axis(sheet.axes, "x", "linear", (0.0, 1.03 * float(x.max())))
-    _scale_axis(sheet.axes, "y", "log", _span(y, "log"))
+
+    def chosen(p_star: float) -> list[tuple[Item, Row]]:
+        pairs = [
+            (item, min(rows, key=lambda row: abs(np.log(row["p_star"] / p_star))))
+            for item, rows in held
+        ]
+        return [(i, row) for i, row in pairs if 1 / NEAR < row["p_star"] / p_star < NEAR]
+
+    def distance(p_star: float) -> tuple[int, float]:
+        areas = np.array([row["a_r"] for _, row in chosen(p_star)])
+        return -areas.size, float(np.sum(np.abs(np.log(areas / TYPICAL_AREA))))
+
+    best = chosen(min(sorted({row["p_star"] for _, rows in held for row in rows}), key=distance))
+    low, high = (end(row["p_star"] for _, row in best) for end in (min, max))
+    between = f"{low:.3g}" if high < 1.001 * low else rf"{low:.3g}\;\mathrm{{to}}\;{high:.3g}"
+    sheet = Sheet(rf"{STRESS}  at  $p^* = {between}$", DENSITY)
+    xs, ys = [], []
+    for place, (item, row) in enumerate(best):
+        x, y = _bins(row, PR_LOGARITHMIC)
+        sheet.axes.plot(x, y, color=item.look.colour, lw=0.7)
+        converged = np.full(x.size, row["status"] == "converged")
+        sheet.points(item.look, x, y, converged, every=(place % 3, 3) if len(best) > 1 else 1)
+        xs.append(x)
+        ys.append(y)
+    sheet.scale("x", "log", np.concatenate(xs))
+    sheet.scale("y", "log", np.concatenate(ys))
+    sigma = np.geomspace(*sheet.axes.get_xlim(), 400)
+    sheet.theory([(i.look, sigma, _theory_density(i.curve, row, sigma)) for i, row in best])
     return sheet
 
 
-def _density(row: Row, name: str) -> Field:
-    """Pr(sigma) Delta_sigma of a row in its bins, zero where it is not stored."""
-    return np.nan_to_num(np.asarray(row.get(name, 0.0), dtype=np.float64))
+def _distribution_pressures(items: list[Item]) -> Sheet | None:
+    """Pr(sigma) of the curve nearest to n = 1 at a few pressures, over the stress itself."""
+    held = [(item, _with_density(item.curve, PR_LINEAR)) for item in items]
+    held = [(item, rows) for item, rows in held if len(rows) > 1]
+    if not held:
+        return None
+    item, rows = min(held, key=lambda pair: np.nan_to_num(abs(pair[0].curve.n - 1), nan=9.0))
+    places = np.unique(np.linspace(0, len(rows) - 1, PRESSURES).round().astype(int))
+    rows = [rows[place] for place in places]
+    sheet = Sheet(f"{STRESS}  for  {item.look.label[:24]}", DENSITY)
+    xs, ys = [], []
+    for row, colour in zip(rows, _colours(len(rows)), strict=True):
+        x, y = _bins(row, PR_LINEAR)
+        sheet.line(f"p* = {row['p_star']:.3g}", x, y, color=colour, lw=1.6)
+        xs.append(x)
+        ys.append(y)
+    sheet.scale("x", "linear", np.concatenate(xs))
+    sheet.scale("y", "log", np.concatenate(ys))
+    sigma = np.linspace(0.0, sheet.axes.get_xlim()[1], 400)
+    for row in rows:
+        density = _theory_density(item.curve, row, sigma)
+        sheet.line(THEORY, sigma, density, color="black", lw=0.6, zorder=3)
+    return sheet
 
 
-def _theory_density(curve: Curve, sigma: Field, p_star: float) -> Field:
+def _with_density(curve: Curve, name: str) -> list[Row]:
+    """The rows that have enough of Pr(sigma) for a line."""
+    return [row for row in curve.rows if name in row and _bins(row, name)[0].size > 2]
+
+
+def _bins(row: Row, name: str) -> tuple[Field, Field]:
+    """Pr(sigma) Delta_sigma over sigma / Delta_sigma, bins with fewer than FEW points left out."""
+    edges = linear_edges() if name == PR_LINEAR else logarithmic_edges()
+    density = np.nan_to_num(row[name])
+    counts = density * np.diff(edges) * row["points"]
+    if not np.allclose(counts, np.rint(counts), rtol=0, atol=1e-6):  # no line scene
+        counts *= row["points"]
+    kept = counts > FEW - 0.5
+    lower, upper = edges[:-1][kept], edges[1:][kept]
+    middle = 0.5 * (lower + upper) if name == PR_LINEAR else np.sqrt(lower * upper)
+    return middle, density[kept]
+
+
+def _theory_density(curve: Curve, row: Row, sigma: Field) -> Field:
     """Pr(sigma) Delta_sigma of Persson theory over sigma / Delta_sigma. Paper Eq. (24)."""
-    unit = curve.rows[0]["delta_sigma"]
-    return unit * curve.persson.stress_density(sigma * unit, p_star * unit)
+    unit: float = row["delta_sigma"]
+    return np.asarray(unit * curve.persson.stress_density(sigma * unit, row["p_star"] * unit))
 
 
-def _draw_theory(sheet: Sheet, lines: list[tuple[Look, Field, Field]]) -> None:
-    """One black line where theory is the same for all curves, else one in each colour."""
-    first = lines[0][2]
-    if all(np.allclose(y, first, rtol=1e-9, atol=0) for *_, y in lines):
-        lines = [(replace(lines[0][0], colour="black"), *lines[0][1:])]
-    for look, x, y in lines:
-        sheet.axes.plot(x, np.where(y > 0, y, np.nan), color=look.colour, zorder=2)
-    colour = "black" if len(lines) == 1 else "0.4"
-    sheet.legend["Persson theory"] = Line2D([], [], color=colour)
+def _order(curve: Curve) -> tuple[float, float]:
+    """Slabs by rising thickness, then bodies by rising exponent, then the others."""
+    thickness, n = (float(np.nan_to_num(curve.rows[0][c], nan=np.inf)) for c in ("thickness", "n"))
+    return thickness, n
 
 
 def _looks(curves: list[Curve]) -> list[Look]:
-    """Colours ordered by the stiffness, one a body; markers tell bodies or variants apart."""
-
-    def order(curve: Curve) -> tuple[float, float]:
-        n, thickness = curve.n, float(curve.rows[0]["thickness"])
-        return (np.nan_to_num(n, nan=9.0), np.nan_to_num(thickness, nan=0.0))
-
-    bodies = list(dict.fromkeys(curve.elastomer for curve in sorted(curves, key=order)))
+    """Colours along the ordered curves, one a body; symbols tell bodies, or else curves, apart."""
+    bodies = list(dict.fromkeys(curve.elastomer for curve in curves))
     names = _names({curve.elastomer: curve for curve in curves})
-    variants = _variants(curves)
-    single = len(curves) <= MANY
-    one_body = len(bodies) == 1 and single
-    colours = _colours(len(curves) if one_body else len(bodies))
+    variants = _variants(curves) if len(curves) <= MANY else [""] * len(curves)
+    singly = len(bodies) == 1 and any(variants)
+    colours = _colours(len(curves) if singly else len(bodies))
     looks = []
-    for index, (curve, variant) in enumerate(zip(curves, variants, strict=True)):
+    for i, (curve, variant) in enumerate(zip(curves, variants, strict=True)):
         body = bodies.index(curve.elastomer)
-        mark = index if single and any(variants) else body
-        label = ", ".join(filter(None, [names[curve.elastomer], variant if single else ""]))
-        colour = colours[index if one_body else body]
-        looks.append(Look(colour, MARKERS[mark % len(MARKERS)], label.replace("$", r"\$")))
+        marker = MARKERS[(i if any(variants) else body) % len(MARKERS)]
+        label = ", ".join(filter(None, (names[curve.elastomer], variant)))
+        looks.append(
+            Look(colours[i if singly else body], marker, label[:LONGEST].replace("$", r"\$"))
+        )
     return looks
 
 
 def _colours(count: int) -> list[Any]:
-    """Ordered colours that keep their contrast on white and in grey."""
-    return list(colormaps["plasma"](np.linspace(0.0, 0.8, count)))
+    """Colours evenly along the ladder."""
+    steps = np.array([to_rgb(colour) for colour in LADDER]).T
+    at = np.linspace(0, len(LADDER) - 1, count)
+    return list(np.stack([np.interp(at, range(len(LADDER)), step) for step in steps], axis=1))
 
 
 def _names(bodies: dict[str, Curve]) -> dict[str, str]:
     """A short name for each elastomer; its full text where short ones would coincide."""
     short = {}
     for text, curve in bodies.items():
-        thickness = float(curve.rows[0]["thickness"])
+        thickness = curve.rows[0]["thickness"]
+        short[text] = f"t/L = {thickness:g}" if np.isfinite(thickness) else text
         if np.isfinite(curve.n):
             exact = Fraction(curve.n).limit_denominator(4)
             short[text] = f"n = {exact}" if exact == curve.n else f"n = {curve.n:g}"
-        else:
-            short[text] = f"t/L = {thickness:g}" if np.isfinite(thickness) else text
     return short if len(set(short.values())) == len(short) else {text: text for text in short}
 
 
 def _variants(curves: list[Curve]) -> list[str]:
-    """What sets curves apart besides the elastomer: surface, grid, solver; empty if nothing."""
+    """What sets curves of one elastomer apart: surface, seed, grid, solver; empty if nothing."""
     told = []
     for curve in curves:
         row = curve.rows[0]
-        told.append(
-            [
-                *(word for word in curve.surface.split() if not word.startswith("seed=")),
-                f"seed={row['seed']}",
-                f"{curve.points} points",
-                f"{row['solver']}",
-                f"tolerance={row['tolerance']:g}",
-            ]
-        )
-    common = set(told[0]).intersection(*told)
-    return [" ".join(word for word in words if word not in common) for words in told]
+        words = [word for word in curve.surface.split() if not word.startswith("seed=")]
+        words += [f"seed={row['seed']}", f"{row['points']} points"]
+        told.append([*words, row["solver"], f"tolerance={row['tolerance']:g}"])
+    variants = []
+    for curve, words in zip(curves, told, strict=True):
+        peers = [w for c, w in zip(curves, told, strict=True) if c.elastomer == curve.elastomer]
+        common = set(words).intersection(*peers)
+        variants.append(" ".join(word for word in words if word not in common))
+    return variants
 
 
-def _dense(span: Span) -> Field:
-    """Abscissae close enough for a line on either scale."""
-    low, high = (span[0] if span[0] > 0 else 1e-3 * span[1]), span[1]
-    return np.union1d(np.geomspace(low, high, 200), np.linspace(low, high, 200))
+def _legend_shape(labels: list[str]) -> tuple[int, int]:
+    """Columns and rows of a legend that is filled column by column."""
+    for columns in range(min(4, len(labels)), 0, -1):
+        split = np.array_split([len(label) for label in labels], columns)
+        if sum(max(lengths) + 6 for lengths in split) <= COLUMN:  # 6: symbol and space around it
+            break
+    return columns, len(split[0])
 
 
-def _span(values: Field, scale: str, *, zero: bool = True) -> Span:
-    """Limits of an axis around the values: on a log scale about a decade at least."""
-    low, high = float(values.min()), float(values.max())
-    if scale == "log":
-        pad = max(1.4, float(np.sqrt(8 * low / high)))  # 8: holds two of the ticks 1, 2, 5, 10
-        return low / pad, high * pad
-    if zero:
-        top = high if high > 0 else 1.0
-        return -0.03 * top, 1.06 * top
-    pad = 0.08 * (high - low) or 0.1 * abs(high)
-    return low - pad, high + pad
-
-
-def _scale_axis(axes: Any, name: str, scale: str, span: Span) -> None:
-    """Scale, limits and ticks; on a log scale whole decades, or 1, 2, 5 where these are few."""
-    axes.set(**{f"{name}scale": scale, f"{name}lim": span})
-    if scale == "linear":
-        return
-    axis = getattr(axes, f"{name}axis")
-    first, last = (int(np.floor(np.log10(end))) for end in span)
-    step = 1 + (last - first) // 7
-    ticks = [10.0**k for k in range(first, last + 1, step) if 10.0**k >= span[0]]
-    if len(ticks) < 2:
-        ticks = [m * 10.0**k for k in range(first, last + 1) for m in (1, 2, 5)]
-    plain = span[0] > 5e-4 and span[1] < 5e4
-    axis.set_major_locator(FixedLocator([tick for tick in ticks if span[0] <= tick <= span[1]]))
-    axis.set_major_formatter(FuncFormatter(_plain if plain else _power))
-    axis.set_minor_locator(LogLocator(subs=range(2, 10), numticks=99))
-    axis.set_minor_formatter(NullFormatter())
+def _tick(axis: Any, low: float, high: float) -> None:
+    """Ticks of a log axis: at whole decades, or at 1, 2, 5 where these are few."""
+    decades = np.floor(np.log10(high)) - np.ceil(np.log10(low)) + 1
+    plain = low > 5e-4 and high < 5e4
+    axis.set_major_locator(ticker.LogLocator(subs=(1, 2, 5) if decades < 2 else (1,), numticks=8))
+    axis.set_major_formatter(
+        ticker.StrMethodFormatter("{x:g}")
+        if plain
+        else ticker.LogFormatterSciNotation(minor_thresholds=(np.inf, np.inf))
+    )
+    axis.set_minor_locator(ticker.LogLocator(subs=range(2, 10), numticks=99))
+    axis.set_minor_formatter(ticker.NullFormatter())
     axis.set_tick_params(labelsize=8.0 if plain else SCRIPTED)
-
-
-def _plain(value: float, _place: int) -> str:
-    return f"{value:g}"
-
-
-def _power(value: float, _place: int) -> str:
-    """The tick label m x 10^k."""
-    k = int(np.floor(np.log10(value) + 1e-9))
-    m = round(value / 10.0**k)
-    return f"$10^{{{k}}}$" if m == 1 else rf"${m}\times10^{{{k}}}$"

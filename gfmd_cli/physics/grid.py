@@ -75,18 +75,39 @@ class Grid:
         return count
 
     @cached_property
-    def _plans(self) -> tuple[Callable[..., None], Callable[..., None], Modes]:
-        """Forward and backward transform and their shared array of coefficients."""
-        field, modes = self.empty(), self.empty_modes()
-        axes = tuple(range(self.dimension))
+    def work(self) -> Modes:
+        """Coefficients that every transform of this grid works in."""
+        return self.empty_modes()
+
+    @property
+    def padded(self) -> Field:
+        """The same memory as rows of real values, two more than the grid has points a row."""
+        return self.work.view(np.float64)
+
+    @cached_property
+    def _plans(self) -> tuple[Callable[..., None], Callable[..., None]]:
+        """Forward and backward transform between fields and `work`."""
+        field, axes = self.empty(), tuple(range(self.dimension))
         with wisdom.kept():
-            forward = pyfftw.FFTW(field, modes, axes, "FFTW_FORWARD", threads=self.threads)
-            backward = pyfftw.FFTW(modes, field, axes, "FFTW_BACKWARD", threads=self.threads)
-        return forward, backward, modes
+            forward = pyfftw.FFTW(field, self.work, axes, "FFTW_FORWARD", threads=self.threads)
+            backward = pyfftw.FFTW(self.work, field, axes, "FFTW_BACKWARD", threads=self.threads)
+        return forward, backward
+
+    @cached_property
+    def in_place(self) -> tuple[Callable[[], None], Callable[[], None]]:
+        """Forward and backward transform of `padded` within `work`, without the factor 1/size.
+
+        They spare a field and a third of the time of the transforms between two arrays.
+        """
+        real, axes = self.padded[..., : self.points], tuple(range(self.dimension))
+        with wisdom.kept():
+            forward = pyfftw.FFTW(real, self.work, axes, "FFTW_FORWARD", threads=self.threads)
+            backward = pyfftw.FFTW(self.work, real, axes, "FFTW_BACKWARD", threads=self.threads)
+        return forward.execute, backward.execute
 
     def forward(self, field: Field) -> Modes:
         """Fourier coefficients of a field."""
-        forward, _, _ = self._plans
+        forward, _ = self._plans
         modes = self.empty_modes()
         forward(field, modes)
         modes *= 1.0 / self.size
@@ -94,10 +115,10 @@ class Grid:
 
     def backward(self, modes: Modes) -> Field:
         """The field of these Fourier coefficients."""
-        _, backward, work = self._plans
+        _, backward = self._plans
         field = self.empty()
-        work[...] = modes  # the transform destroys its input
-        backward(work, field, normalise_idft=False)
+        self.work[...] = modes  # the transform destroys its input
+        backward(self.work, field, normalise_idft=False)
         return field
 
     def operator(self, symbol: Field) -> "Operator":
@@ -141,7 +162,7 @@ class Operator:
 
     def __call__(self, field: Field, out: Field) -> Field:
         """Apply to `field`, write to `out` (both aligned), return `out`."""
-        forward, backward, work = self.grid._plans
+        (forward, backward), work = self.grid._plans, self.grid.work
         forward(field, work)
         np.multiply(work, self.symbol, out=work)
         backward(work, out, normalise_idft=False)

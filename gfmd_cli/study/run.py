@@ -59,8 +59,8 @@ def run_study(
     uncollected = any(study.parts.glob(f"*{SUFFIX}"))
     if pending:
         check_memory(pending)
-        study.begin(spec)
         with _signals_noted():
+            study.begin(spec)
             try:
                 outcome += _solve_all(pending, study.parts, report, jobs, checkpoint_every)
             finally:

@@ -1,0 +1,197 @@
+import importlib
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gfmd_cli.analysis import figures
+from gfmd_cli.analysis.compare import Curve, compare
+from gfmd_cli.analysis.figures import VIEWS, draw_all
+from gfmd_cli.errors import InputError, SpaceError
+from gfmd_cli.study.parse import read_spec
+from gfmd_cli.study.run import run_study
+
+ROUGH = """\
+[surface]
+kind = "self-affine"
+cutoff = 0.05
+[elastomer]
+kind = "power"
+n = [0, 1]
+[grid]
+points = 64
+[load]
+p_star = [0.05, 0.3, 1.5]
+"""
+LINE = """\
+[surface]
+kind = "ridge"
+slope = 1.0
+[elastomer]
+kind = "power"
+n = [1, 3]
+[grid]
+points = 256
+[load]
+p_star = [0.01, 0.1]
+"""
+OVER_PRESSURE = {view.name for view in VIEWS}
+DISTRIBUTIONS = {"stress_distribution", "stress_distribution_pressures"}
+
+
+@pytest.fixture
+def study(tmp_path):
+    """Runs a spec and sets it beside theory."""
+
+    def study(text=ROUGH, *overrides):
+        path = tmp_path / "spec.toml"
+        path.write_text(text)
+        spec, _ = read_spec(path, overrides)
+        run_study(spec, text, tmp_path / "study.h5", lambda _: None, jobs=1)
+        return compare(tmp_path / "study.h5")
+
+    return study
+
+
+def drawn(comparison, folder):
+    """Names of the figures, each checked to be a PDF and a PNG of the width of a column."""
+    paths = draw_all(comparison, folder)
+    assert sorted(paths) == sorted(folder.iterdir())
+    names = {path.stem for path in paths}
+    assert len(paths) == 2 * len(names)
+    for name in names:
+        pdf, png = ((folder / f"{name}.{kind}").read_bytes() for kind in ("pdf", "png"))
+        assert pdf.startswith(b"%PDF")
+        assert b"/Type3" not in pdf
+        width = int.from_bytes(png[16:20], "big")
+        assert 85 < width / 300 * 25.4 < 87  # mm
+    return names
+
+
+def marked(comparison, rows):
+    """The comparison with other values in the rows of its first curve."""
+    first, *others = comparison.curves
+    changed = [row | new for row, new in zip(first.rows, rows, strict=True)]
+    return replace(comparison, curves=[Curve(changed, first.persson), *others])
+
+
+def view(name):
+    return next(view for view in VIEWS if view.name == name)
+
+
+def sheet_of(name, comparison):
+    curves = comparison.curves
+    p_star = np.geomspace(0.01, 3, 50)
+    looks = figures._looks(curves)
+    items = [
+        figures.Item(curve, look, p_star, curve.predict(p_star))
+        for curve, look in zip(curves, looks, strict=True)
+    ]
+    if name == "stress_distribution":
+        return figures._distribution(items)
+    if name == "stress_distribution_pressures":
+        return figures._distribution_pressures(items)
+    return figures._over_pressure(view(name), items)
+
+
+def test_every_figure_is_a_pdf_and_a_png(study, tmp_path):
+    assert drawn(study(), tmp_path / "new" / "folder") == OVER_PRESSURE | DISTRIBUTIONS
+
+
+def test_a_single_point_is_drawn(study, tmp_path):
+    comparison = study(ROUGH, "elastomer.n=1", "load.p_star=0.3")
+    assert drawn(comparison, tmp_path / "out") == OVER_PRESSURE | {"stress_distribution"}
+
+
+def test_a_line_scene_is_drawn(study):
+    comparison = study(LINE)
+    for name in OVER_PRESSURE | {"stress_distribution"}:
+        sheet_of(name, comparison).figure.draw_without_rendering()
+
+
+def test_slabs_each_have_a_theory_of_their_own_and_need_no_histogram(study):
+    text = ROUGH.replace('"power"', '"slab"').replace("n = [0, 1]", "thickness = [0.01, 0.1]")
+    slabs = study(text, "output.histogram=false")
+    sheet = sheet_of("contact_area", slabs)
+    assert list(sheet.legend) == ["t/L = 0.01", "t/L = 0.1", "Persson theory"]
+    assert sheet.legend["Persson theory"].get_color() != "black"
+    for name in OVER_PRESSURE:
+        sheet_of(name, slabs).figure.draw_without_rendering()
+    for name in DISTRIBUTIONS:
+        assert sheet_of(name, slabs) is None
+    sheet = sheet_of("contact_area_ratio", slabs)
+    assert sheet.legend["Persson theory"].get_color() == "black"
+
+
+def test_theory_that_is_the_same_for_all_curves_is_one_black_line(study):
+    comparison = study()
+    assert sheet_of("contact_area", comparison).legend["Persson theory"].get_color() == "black"
+    assert sheet_of("mean_gap_log", comparison).legend["Persson theory"].get_color() != "black"
+
+
+def test_the_closed_form_belongs_to_n_0_alone(study):
+    comparison = study()
+    assert "n = 0, Gaussian" in sheet_of("mean_gap_tail", comparison).legend
+    without = replace(comparison, curves=[c for c in comparison.curves if c.n != 0])
+    assert "n = 0, Gaussian" not in sheet_of("mean_gap_tail", without).legend
+
+
+def test_what_is_not_converged_is_a_cross_and_known_errors_are_bars(study):
+    comparison = study()
+    assert "not converged" not in sheet_of("mean_gap_log", comparison).legend
+    assert not sheet_of("mean_gap_log", comparison).axes.containers
+    states = [{"status": "max_steps"}, {"u_g_error": 0.1}, {}]
+    sheet = sheet_of("mean_gap_log", marked(comparison, states))
+    assert "not converged" in sheet.legend
+    assert len(sheet.axes.containers) == 1
+
+
+def test_no_gap_is_left_out_of_the_logarithmic_figure(study):
+    comparison = study()
+    closed = [{"u_g": 0.0}] * 3
+    one = replace(comparison, curves=comparison.curves[:1])
+    assert sheet_of("mean_gap_tail", marked(one, closed)) is None
+    assert sheet_of("mean_gap_tail", marked(comparison, closed)) is not None
+    assert sheet_of("mean_gap_log", marked(one, closed)) is not None
+
+
+def test_values_that_are_not_finite_are_left_out(study):
+    nothing = dict.fromkeys(("a_r", "sigma_p", "u_g"), np.nan) | {"status": "diverged"}
+    comparison = marked(study(), [nothing, {}, {}])
+    for name in OVER_PRESSURE:
+        assert "not converged" not in sheet_of(name, comparison).legend
+
+
+def test_seeds_stand_in_the_legend_while_they_can_be_told_apart(study):
+    few = study(ROUGH, "surface.seed=[0, 1]", "load.p_star=0.3", "output.histogram=false")
+    labels = [look.label for look in figures._looks(few.curves)]
+    assert labels == ["n = 0, seed=0", "n = 1, seed=0", "n = 0, seed=1", "n = 1, seed=1"]
+    many = figures._looks(few.curves * 3)
+    assert {look.label for look in many} == {"n = 0", "n = 1"}
+    assert len({tuple(look.colour) for look in many}) == 2
+
+
+def test_names_of_elastomers_are_short_where_they_can_be(study):
+    curves = study(ROUGH, "elastomer.n=[0.5, 1.0, 0.77]", "load.p_star=1").curves
+    names = [look.label for look in figures._looks(curves)]
+    assert names == ["n = 1/2", "n = 1", "n = 0.77"]
+
+
+def test_elastomers_of_one_exponent_keep_their_full_names(study):
+    curves = study(ROUGH.replace("n = [0, 1]", "n = 1\nk_n = [1.0, 2.0]")).curves
+    assert [look.label for look in figures._looks(curves)] == ["power n=1", "power n=1 k_n=2"]
+
+
+def test_a_folder_that_cannot_be_written_is_told(study, tmp_path):
+    comparison = study(ROUGH, "elastomer.n=1", "load.p_star=0.3")
+    (tmp_path / "taken").write_text("a file")
+    with pytest.raises(SpaceError):
+        draw_all(comparison, tmp_path / "taken")
+
+
+def test_missing_matplotlib_is_told(monkeypatch):
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    monkeypatch.delitem(sys.modules, "gfmd_cli.analysis.figures")
+    with pytest.raises(InputError, match=r"pip install gfmd-cli\[plot\]"):
+        importlib.import_module("gfmd_cli.analysis.figures")
