@@ -9,10 +9,21 @@ from pydantic import Field as Key
 from gfmd_cli.physics.choice import Choice
 from gfmd_cli.physics.contact import Contact
 from gfmd_cli.physics.fields import Field
+from gfmd_cli.solvers.ccg import ConstrainedCG
+from gfmd_cli.solvers.fire import Fire
 from gfmd_cli.solvers.loop import State, Watch, solve
 from gfmd_cli.solvers.pcg import ProjectedCG
+from gfmd_cli.solvers.polonsky import PolonskyKeer
 from gfmd_cli.solvers.sort import Sort, is_flat
 
+Method = ProjectedCG | Sort | Fire | ConstrainedCG | PolonskyKeer
+METHODS: dict[str, type[Method]] = {
+    "pcg": ProjectedCG,
+    "sort": Sort,
+    "fire": Fire,
+    "ccg": ConstrainedCG,
+    "polonsky-keer": PolonskyKeer,
+}
 COARSEST = 64  # points per side; a solve there costs next to nothing
 COARSE_TOLERANCE = 1e-3  # of the start that a coarse grid gives; measured: tighter does not pay
 
@@ -20,18 +31,22 @@ COARSE_TOLERANCE = 1e-3  # of the start that a coarse grid gives; measured: tigh
 class SolverChoice(Choice):
     """How to solve, and how well."""
 
-    kind: Literal["auto", "pcg", "sort"] = "auto"
-    """"auto" sorts where the stiffness is flat (n = 0) and takes "pcg" elsewhere."""
+    kind: Literal["auto", "pcg", "sort", "fire", "ccg", "polonsky-keer"] = "auto"
+    """"auto" sorts where the stiffness is flat (n = 0) and takes "pcg" elsewhere; "fire" (GFMD),
+    "ccg" and "polonsky-keer" (n <= 1.5) are methods of others, for comparison."""
     tolerance: Annotated[float, Key(gt=0, lt=1)] = 1e-6
     """Natural residual to reach."""
     max_steps: Annotated[int, Key(gt=0)] = 20000
     """Steps on one grid after which the solve is given up."""
+    nested: bool = True
+    """Start from the solution on coarser grids."""
 
-    def method(self, contact: Contact) -> ProjectedCG | Sort:
+    def method(self, contact: Contact) -> Method:
         """The solver of this contact."""
-        if self.kind == "sort" or (self.kind == "auto" and is_flat(contact)):
-            return Sort()
-        return ProjectedCG()
+        kind = self.kind
+        if kind == "auto":
+            kind = "sort" if is_flat(contact) else "pcg"
+        return METHODS[kind]()
 
 
 @dataclass
@@ -87,10 +102,10 @@ def solve_contact(
     if isinstance(method, Sort):
         chain = [contact.grid.points]
     else:
-        full = full_contact(contact)
+        full = full_contact(contact, method.kind)
         if full is not None:
             return full
-        chain = levels(contact.grid.points)
+        chain = levels(contact.grid.points) if choice.nested else [contact.grid.points]
     spent = 0.0 if isinstance(method, Sort) else 2.0  # the look at full contact
     state: State | None = None
     coarse = contact
@@ -128,10 +143,10 @@ def _start(fine: Contact, coarse: Contact, state: State | None) -> Field:
     return coarse.grid.resample(state.u, fine.grid)
 
 
-def full_contact(contact: Contact) -> Solution | None:
+def full_contact(contact: Contact, solver: str) -> Solution | None:
     """The solution u = h, where the stress is nowhere tensile; else None. Costs two transforms."""
     u = contact.height.copy()
     sigma = contact.stress(u, out=contact.grid.empty())
     if float(sigma.min()) < 0:
         return None
-    return Solution(u, sigma, contact.residual(u, sigma), "converged", "pcg", 0, 2.0)
+    return Solution(u, sigma, contact.residual(u, sigma), "converged", solver, 0, 2.0)
