@@ -1,4 +1,4 @@
-"""The command line: `gfmd run`, `analyze`, `export`, `schema`. Only this module prints."""
+"""The command line: `gfmd run`, `analyze`, `export`, `bench`, `schema`. Only this module prints."""
 
 import csv
 import io
@@ -249,6 +249,40 @@ def export(study: Path, output: Path | None) -> None:
     from gfmd_cli.study.files import write_whole
 
     write_whole(output, text.getvalue().encode())
+
+
+@main.command()
+@click.argument("spec", type=READABLE)
+@click.option("-o", "--output", type=READABLE, help="Bench file; by default NAME-bench.h5 here.")
+@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Override a key.")
+@click.option("--figures", type=READABLE, metavar="DIR", help="By default beside the bench file.")
+@click.option("-q", "--quiet", is_flag=True, help="Print the table and errors only.")
+def bench(
+    spec: Path, output: Path | None, overrides: tuple[str, ...], figures: Path | None, quiet: bool
+) -> None:
+    """Measure speed against error: each solver, each grid, each pressure.
+
+    A spec whose one solver is "auto" compares it with ccg, fire and polonsky-keer. A second call
+    measures again and replaces the file. Example:
+
+        gfmd bench configs/bench.toml --figures figures
+    """
+    from gfmd_cli.analysis.benchmark import bench_table
+    from gfmd_cli.analysis.work_precision import draw_bench
+    from gfmd_cli.study.bench import run_bench
+    from gfmd_cli.study.parse import read_spec
+    from gfmd_cli.study.traces import check_target, write_bench
+
+    resolved, text = read_spec(spec, overrides)
+    path = output or Path(f"{resolved.study.name}-bench.h5")
+    check_target(path, resolved)
+    with _Reporter(quiet) as report:
+        traces = run_bench(resolved, report)
+    write_bench(path, resolved, text, traces)
+    click.echo(bench_table(traces))
+    for file in (path, *draw_bench(traces, figures or path.parent)):
+        click.echo(str(file), err=True)
+    sys.exit(0 if all(trace.row["status"] == "converged" for trace in traces) else 1)
 
 
 @main.command()

@@ -8,6 +8,7 @@ import pytest
 from gfmd_cli.analysis import figures
 from gfmd_cli.analysis.compare import Curve, compare
 from gfmd_cli.analysis.figures import VIEWS, draw_all
+from gfmd_cli.analysis.looks import looks
 from gfmd_cli.errors import InputError, SpaceError
 from gfmd_cli.study.parse import read_spec
 from gfmd_cli.study.run import run_study
@@ -83,10 +84,9 @@ def view(name):
 def sheet_of(name, comparison):
     curves = comparison.curves
     p_star = np.geomspace(0.01, 3, 50)
-    looks = figures._looks(curves)
     items = [
         figures.Item(curve, look, p_star, curve.predict(p_star))
-        for curve, look in zip(curves, looks, strict=True)
+        for curve, look in zip(curves, looks(curves), strict=True)
     ]
     if name == "stress_distribution":
         return figures._distribution(items)
@@ -165,22 +165,22 @@ def test_values_that_are_not_finite_are_left_out(study):
 
 def test_seeds_stand_in_the_legend_while_they_can_be_told_apart(study):
     few = study(ROUGH, "surface.seed=[0, 1]", "load.p_star=0.3", "output.histogram=false")
-    labels = [look.label for look in figures._looks(few.curves)]
+    labels = [look.label for look in looks(few.curves)]
     assert labels == ["n = 0, seed=0", "n = 1, seed=0", "n = 0, seed=1", "n = 1, seed=1"]
-    many = figures._looks(few.curves * 3)
+    many = looks(few.curves * 3)
     assert {look.label for look in many} == {"n = 0", "n = 1"}
     assert len({tuple(look.colour) for look in many}) == 2
 
 
 def test_names_of_elastomers_are_short_where_they_can_be(study):
     curves = study(ROUGH, "elastomer.n=[0.5, 1.0, 0.77]", "load.p_star=1").curves
-    names = [look.label for look in figures._looks(curves)]
+    names = [look.label for look in looks(curves)]
     assert names == ["n = 1/2", "n = 1", "n = 0.77"]
 
 
 def test_elastomers_of_one_exponent_keep_their_full_names(study):
     curves = study(ROUGH.replace("n = [0, 1]", "n = 1\nk_n = [1.0, 2.0]")).curves
-    assert [look.label for look in figures._looks(curves)] == ["power n=1", "power n=1 k_n=2"]
+    assert [look.label for look in looks(curves)] == ["power n=1", "power n=1 k_n=2"]
 
 
 def test_a_folder_that_cannot_be_written_is_told(study, tmp_path):
@@ -192,6 +192,6 @@ def test_a_folder_that_cannot_be_written_is_told(study, tmp_path):
 
 def test_missing_matplotlib_is_told(monkeypatch):
     monkeypatch.setitem(sys.modules, "matplotlib", None)
-    monkeypatch.delitem(sys.modules, "gfmd_cli.analysis.figures")
+    monkeypatch.delitem(sys.modules, "gfmd_cli.analysis.sheet")
     with pytest.raises(InputError, match=r"pip install gfmd-cli\[plot\]"):
-        importlib.import_module("gfmd_cli.analysis.figures")
+        importlib.import_module("gfmd_cli.analysis.sheet")

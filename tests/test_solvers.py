@@ -607,7 +607,7 @@ def test_a_coarser_contact_is_the_same_surface_on_fewer_points():
 
 
 def test_partial_contact_is_not_taken_for_full():
-    assert full_contact(scene(ROUGH, Power(n=1), 256).contact(0.1)) is None
+    assert full_contact(scene(ROUGH, Power(n=1), 256).contact(0.1), "pcg") is None
 
 
 def test_giving_up_says_so():

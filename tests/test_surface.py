@@ -153,7 +153,7 @@ def test_a_stiffness_that_overflows_is_refused():
 def test_scenes_know_their_spectrum():
     body = Plate(thickness=0.1, E_star=12.0)
     scene = build_scene(SelfAffine(cutoff=0.02, length=2.0), body, 128)
-    shells = scene.shells()
+    shells = scene.shells
     assert shells.height.sum() == pytest.approx(scene.h_std**2, rel=1e-12)
     assert shells.variance.sum() == pytest.approx(scene.delta_sigma**2, rel=1e-12)
     assert shells.q[0] == pytest.approx(np.pi, rel=1e-12)

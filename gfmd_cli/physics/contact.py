@@ -9,15 +9,19 @@ see one scale, whatever the units of a scene; the stiffness is then in Delta_sig
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from math import sqrt
 
 import numpy as np
 
 from gfmd_cli.errors import InputError
+from gfmd_cli.physics import sweeps
 from gfmd_cli.physics.elastomer import Elastomer, Slab
 from gfmd_cli.physics.fields import Field
-from gfmd_cli.physics.grid import Grid, Operator
+from gfmd_cli.physics.grid import BLOCK, Grid, Operator, row_blocks
 from gfmd_cli.physics.persson import Shells, shells
 from gfmd_cli.physics.surface import Surface, sample
+
+ROUNDING = 1e-28  # |h(q)|^2 of a mode that only rounding has excited, relative to the largest
 
 
 @dataclass(frozen=True)
@@ -48,11 +52,16 @@ class Contact:
 
         Zero exactly at the solution. The one score by which all solvers are judged.
         """
-        total = 0.0
-        for rows in _row_blocks(u):
-            violation = np.minimum(u[rows] - self.height[rows], sigma[rows]).ravel()
-            total += float(violation @ violation)
-        return float(np.sqrt(total / u.size)) / min(self.pressure, 1.0)
+        return self.score(u, sigma)[0]
+
+    def score(self, u: Field, sigma: Field) -> tuple[float, float, float]:
+        """Natural residual, and the sums of the squares of two of its parts.
+
+        These are the force -sigma on the points off the indenter, and the tension of those on it.
+        """
+        bodies = map(self.grid.as_rows, (self.height, u, sigma))
+        total, free, tension = self.grid.rows.sums(3, sweeps.score, *bodies)
+        return sqrt(total / u.size) / min(self.pressure, 1.0), float(free), float(tension)
 
     def coarsen(self, points: int) -> "Contact":
         """The same contact, low-passed to a coarser grid."""
@@ -62,12 +71,6 @@ class Contact:
         if self.grid.dimension == 2:
             k = np.concatenate([k[:half], k[-half:]])
         return Contact(grid, self.grid.resample(self.height, grid), k, self.pressure)
-
-
-def _row_blocks(field: Field) -> list[slice]:
-    """Slices of about 2^15 points: they and their temporaries stay in the cache."""
-    step = max(1, 2**15 * len(field) // field.size)
-    return [slice(start, start + step) for start in range(0, len(field), step)]
 
 
 @dataclass(frozen=True)
@@ -85,24 +88,12 @@ class Scene:
     """Root-mean-square height [m]."""
     delta_sigma: float
     """Unit of pressure [Pa]: the rms stress in full contact (of the half-space, for a slab)."""
-    surface: Surface
-    elastomer: Elastomer
+    shells: Shells
+    """The spectrum of the resolved surface with its stiffness, in physical units."""
 
     def contact(self, p_star: float) -> Contact:
         """The contact at reduced pressure p*."""
         return Contact(self.grid, self.height, self.stiffness, p_star)
-
-    def shells(self) -> Shells:
-        """The spectrum of the resolved surface with its stiffness, in physical units."""
-        grid = self.grid
-        q = grid.wavenumber()
-        power = np.abs(grid.forward(self.height)) ** 2 * grid.multiplicity() * self.h_std**2
-        k, gamma = self.elastomer.stiffness(q, grid.length), self.elastomer.gamma(q, grid.length)
-        keep = (q > 0) & (power > _FLAT * power.max())
-        return shells(q[keep], power[keep], k[keep], gamma[keep])
-
-
-_FLAT = 1e-28  # |h(q)|^2 of a mode that only rounding has excited, relative to the largest
 
 
 def build_scene(surface: Surface, elastomer: Elastomer, points: int, threads: int = 1) -> Scene:
@@ -115,21 +106,55 @@ def build_scene(surface: Surface, elastomer: Elastomer, points: int, threads: in
     grid = replace(grid, threads=threads)
     mean = float(height.mean())
     height -= mean
-    h_std = float(np.sqrt(np.mean(np.square(height / np.abs(height).max())))) * float(
-        np.abs(height).max()
-    )  # squares of metres of 1e-200 would vanish
-    height /= h_std
-    q = grid.wavenumber()
-    with np.errstate(over="ignore"):  # refused below
-        stiffness = elastomer.stiffness(q, grid.length)
-    largest = float(stiffness.max())
-    if not (np.isfinite(largest) and largest > 0):
-        raise InputError(f"elastomer: stiffness {largest} at the shortest wave is out of range")
-    stiffness /= largest
-    unit = elastomer.half_space(q) / largest if isinstance(elastomer, Slab) else stiffness
-    power = np.abs(grid.forward(height)) ** 2 * grid.multiplicity()
-    reduced = float(np.sqrt(np.sum(power * unit**2)))  # Delta_sigma / (largest h_std), Eq. (23)
+    largest = max(float(height.max()), -float(height.min()))
+    height /= largest  # squares of heights of 1e-200 m would vanish
+    rms = float(np.sqrt(np.mean(np.square(height))))
+    height /= rms
+    stiffness, stiffest = _stiffness(grid, elastomer)
+    m, power = radial_power(grid, height)
+    q = m * (2 * np.pi / grid.length)
+    k = elastomer.stiffness(q, grid.length)
+    unit = elastomer.half_space(q) if isinstance(elastomer, Slab) else k
+    reduced = float(np.sqrt(np.sum(power * (unit / stiffest) ** 2)))  # Eq. (23)
     stiffness /= reduced
+    h_std = largest * rms
     return Scene(
-        grid, height, stiffness, mean, h_std, reduced * largest * h_std, surface, elastomer
+        grid=grid,
+        height=height,
+        stiffness=stiffness,
+        mean_height=mean,
+        h_std=h_std,
+        delta_sigma=reduced * stiffest * h_std,
+        shells=shells(q, power * h_std**2, k, elastomer.gamma(q, grid.length)),
     )
+
+
+def _stiffness(grid: Grid, elastomer: Elastomer) -> tuple[Field, float]:
+    """k(q) over the half-spectrum in units of its largest value, and that value."""
+    k = np.empty(grid.spectral_shape)
+    with np.errstate(over="ignore"):  # refused below
+        for rows in row_blocks(k):
+            k[rows] = elastomer.stiffness(grid.wavenumber(rows), grid.length)
+    stiffest = float(k.max())
+    if not (np.isfinite(stiffest) and stiffest > 0):
+        raise InputError(f"elastomer: stiffness {stiffest} at the shortest wave is out of range")
+    k /= stiffest
+    return k, stiffest
+
+
+def radial_power(grid: Grid, height: Field) -> tuple[Field, Field]:
+    """Sum of |h(q)|^2 over the modes of equal |q|, where it is more than rounding.
+
+    Returns |q| L / 2 pi, rising, and the sums, both of shape (shells,).
+    """
+    coefficients = grid.forward_into_work(height)
+    half = grid.points // 2
+    total = np.zeros(grid.dimension * half**2 + 1)
+    for rows in row_blocks(coefficients, max(coefficients.size // 16, BLOCK)):
+        square = np.rint(grid.mode_number(rows) ** 2).astype(np.int64)  # a whole number
+        weight = grid.multiplicity() if grid.dimension == 2 else grid.multiplicity()[rows]
+        power = np.abs(coefficients[rows]) ** 2 * weight
+        total += np.bincount(square.ravel(), power.ravel(), minlength=total.size)
+    total[0] = 0.0
+    (square,) = np.nonzero(total > ROUNDING * total.max())
+    return np.sqrt(square.astype(np.float64)), total[square] / float(grid.size) ** 2

@@ -11,8 +11,18 @@ from functools import cached_property
 import numpy as np
 import pyfftw
 
-from gfmd_cli.physics import wisdom
+from gfmd_cli.physics import sweeps, wisdom
 from gfmd_cli.physics.fields import Field, Modes
+from gfmd_cli.physics.sweeps import Rows
+
+ALL = slice(None)
+BLOCK = 2**15  # points of a block of rows: it and its temporaries stay in the cache
+
+
+def row_blocks(field: Field | Modes, block: int = BLOCK) -> list[slice]:
+    """Slices of whole rows of about `block` values each."""
+    step = max(1, block * len(field) // field.size)
+    return [slice(start, start + step) for start in range(0, len(field), step)]
 
 
 @dataclass(frozen=True)
@@ -56,17 +66,17 @@ class Grid:
         array: Modes = pyfftw.empty_aligned(self.spectral_shape, dtype=np.complex128)
         return array
 
-    def mode_number(self) -> Field:
-        """|q| L / 2 pi of every coefficient, shape `spectral_shape`."""
+    def mode_number(self, rows: slice = ALL) -> Field:
+        """|q| L / 2 pi of every coefficient, shape `spectral_shape` (or of some of its rows)."""
         along = np.arange(self.points // 2 + 1, dtype=np.float64)
         if self.dimension == 1:
-            return along
-        across = np.fft.fftfreq(self.points, 1 / self.points)
+            return along[rows]
+        across = np.fft.fftfreq(self.points, 1 / self.points)[rows]
         return np.sqrt(across[:, None] ** 2 + along**2)
 
-    def wavenumber(self) -> Field:
-        """|q| of every coefficient [1/m], shape `spectral_shape`."""
-        return self.mode_number() * (2 * np.pi / self.length)
+    def wavenumber(self, rows: slice = ALL) -> Field:
+        """|q| of every coefficient [1/m], shape `spectral_shape` (or of some of its rows)."""
+        return self.mode_number(rows) * (2 * np.pi / self.length)
 
     def multiplicity(self) -> Field:
         """How often a coefficient counts in a sum over all q, shape (points/2 + 1,)."""
@@ -105,25 +115,42 @@ class Grid:
             backward = pyfftw.FFTW(self.work, real, axes, "FFTW_BACKWARD", threads=self.threads)
         return forward.execute, backward.execute
 
+    def forward_into_work(self, field: Field) -> Modes:
+        """`work` <- Fourier coefficients of a field, without 1/size."""
+        forward, _ = self._plans
+        forward(field, self.work)
+        return self.work
+
     def forward(self, field: Field) -> Modes:
         """Fourier coefficients of a field."""
-        forward, _ = self._plans
         modes = self.empty_modes()
-        forward(field, modes)
-        modes *= 1.0 / self.size
+        np.multiply(self.forward_into_work(field), 1.0 / self.size, out=modes)
         return modes
 
     def backward(self, modes: Modes) -> Field:
         """The field of these Fourier coefficients."""
-        _, backward = self._plans
         field = self.empty()
-        self.work[...] = modes  # the transform destroys its input
-        backward(self.work, field, normalise_idft=False)
+        self.work[...] = modes
+        self.backward_into(field)
         return field
+
+    def backward_into(self, field: Field) -> None:
+        """field <- the field of the coefficients in `work`, which are lost; without 1/size."""
+        _, backward = self._plans
+        backward(self.work, field, normalise_idft=False)
 
     def operator(self, symbol: Field) -> "Operator":
         """The linear map F^-1 symbol F."""
-        return Operator(self, symbol * (1.0 / self.size))
+        return Operator(self, symbol)
+
+    @cached_property
+    def rows(self) -> Rows:
+        """Shares the work of a sweep out over the threads."""
+        return Rows(self.points, self.threads) if self.dimension == 2 else Rows(1, 1)
+
+    def as_rows(self, field: Field) -> Field:
+        """A field, a symbol or `padded` with two axes, in one dimension too."""
+        return field.reshape(self.rows.rows, -1)
 
     def resample(self, field: Field, target: "Grid") -> Field:
         """The same trigonometric polynomial on another grid of the same cell.
@@ -131,25 +158,25 @@ class Grid:
         A finer grid interpolates; a coarser one loses what it does not resolve, its own highest
         mode included.
         """
-        modes = self.forward(field)
+        modes, out = self.forward_into_work(field), target.work
+        finer = target.points > self.points
         half = min(self.points, target.points) // 2
-        rows = (
-            np.r_[0 : half + 1, -half:0]
-            if target.points > self.points
-            else np.r_[0:half, 1 - half : 0]
-        )
-        out = target.empty_modes()
-        out[...] = 0.0
-        if target.points > self.points:
+        if finer:
             modes[..., -1] *= 0.5  # the highest mode stands for +q and -q alike
             if self.dimension == 2:
                 modes[half] *= 0.5
-        columns = slice(0, half + (target.points > self.points))
+        out[...] = 0.0
+        kept = half + finer
         if self.dimension == 1:
-            out[columns] = modes[columns]
+            out[:kept] = modes[:kept]
         else:
-            out[rows, columns] = modes[rows, columns]
-        return target.backward(out)
+            out[:kept, :kept] = modes[:kept, :kept]
+            negative = slice(-half, None) if finer else slice(1 - half, None)
+            out[negative, :kept] = modes[negative, :kept]
+        resampled = target.empty()
+        target.backward_into(resampled)
+        resampled *= 1.0 / self.size
+        return resampled
 
 
 @dataclass(frozen=True)
@@ -158,12 +185,13 @@ class Operator:
 
     grid: Grid
     symbol: Field
-    """Symbol / size, shape `grid.spectral_shape`."""
+    """Shape `grid.spectral_shape`."""
 
     def __call__(self, field: Field, out: Field) -> Field:
         """Apply to `field`, write to `out` (both aligned), return `out`."""
-        (forward, backward), work = self.grid._plans, self.grid.work
-        forward(field, work)
-        np.multiply(work, self.symbol, out=work)
-        backward(work, out, normalise_idft=False)
+        grid = self.grid
+        grid.forward_into_work(field)
+        padded, symbol = grid.as_rows(grid.padded), grid.as_rows(self.symbol)
+        grid.rows(sweeps.stiffen, padded, symbol, 1.0 / grid.size)
+        grid.backward_into(out)
         return out

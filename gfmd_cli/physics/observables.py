@@ -6,11 +6,13 @@ import numpy as np
 
 from gfmd_cli.physics.contact import Contact
 from gfmd_cli.physics.fields import Field, Mask
+from gfmd_cli.physics.grid import row_blocks
 
 
 def contact_points(contact: Contact, u: Field, sigma: Field) -> Mask:
     """Points that carry load: on the indenter and pressed against it."""
-    points: Mask = (u == contact.height) & (sigma > 0)
+    points: Mask = u == contact.height
+    points &= sigma > 0
     return points
 
 
@@ -45,17 +47,21 @@ class Observables:
 
 def observe(contact: Contact, u: Field, sigma: Field) -> Observables:
     """Measure the scalars on a displacement and its stress sigma = K u + p."""
-    touching = contact_points(contact, u, sigma)
-    grid = contact.grid
-    elastic = sigma - contact.pressure
-    mean_u = float(u.mean())
+    grid, touching = contact.grid, contact_points(contact, u, sigma)
+    sums = np.zeros(5)
+    for rows in row_blocks(u):
+        v, h = u[rows], contact.height[rows]
+        elastic = sigma[rows] - contact.pressure
+        terms = (v - h, elastic * elastic, v * elastic, sigma[rows] * h, v)
+        sums += [float(term.sum()) for term in terms]
+    gap, variance, twice_energy, lifted, mean = sums / grid.size
     return Observables(
         a_r=np.count_nonzero(touching) / grid.size,
-        sigma_p=float(np.sqrt(np.mean(np.square(elastic)))),
-        u_g=float(np.mean(u - contact.height)),
+        sigma_p=float(np.sqrt(variance)),
+        u_g=float(gap),
         perimeter=switches(touching) / grid.points ** (grid.dimension - 1),
-        energy=0.5 * float(np.vdot(u, elastic)) / grid.size,
-        work=float(np.vdot(sigma, contact.height)) / grid.size - contact.pressure * mean_u,
+        energy=0.5 * float(twice_energy),
+        work=float(lifted - contact.pressure * mean),
     )
 
 

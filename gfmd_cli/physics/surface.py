@@ -82,7 +82,10 @@ class SelfAffine(Choice):
     def heights(self, points: int) -> Field:
         """Heights [m] on the grid [y, x]."""
         grid = Grid(points)
-        return grid.backward(self._modes(grid))
+        self._write_modes(grid.work)
+        height = grid.empty()
+        grid.backward_into(height)
+        return height
 
     def _amplitude(self, m: Field) -> Field:
         """sqrt(C(q)) at |q| = 2 pi m / L, zero beyond the cut-off. Paper Eqs. (3), (40)."""
@@ -93,13 +96,12 @@ class SelfAffine(Choice):
         known &= reduced >= 1 - 1e-12
         return np.where(known, np.where(known, reduced, 1.0) ** (-1 - self.hurst), 0.0)
 
-    def _modes(self, grid: Grid) -> Modes:
-        """Fourier coefficients on a grid that resolves the surface.
+    def _write_modes(self, modes: Modes) -> None:
+        """modes <- Fourier coefficients on a grid that resolves the surface.
 
         Phases are drawn in square rings |m|_max = 1, 2, ...; of q and -q one is drawn. The modes
         with a component at the highest wavenumber of the grid stand for +q and -q alike.
         """
-        modes = grid.empty_modes()
         modes[...] = 0.0
         draw = np.random.Generator(np.random.PCG64(self.seed))
         variance = 0.0
@@ -110,15 +112,12 @@ class SelfAffine(Choice):
             value = self._amplitude(np.hypot(y, x)) * np.exp(2j * np.pi * draw.random(4 * ring))
             variance += 2 * float(np.sum(np.abs(value) ** 2))
             modes[y, x] = value
-            modes[-ring, 0] = value[
-                2 * ring + 1
-            ].conj()  # of the mode (ring, 0), the only one on x = 0
-        if 2 * self.highest_mode == grid.points:  # (0, highest) and (highest, 0) and their mirrors
+            modes[-ring, 0] = value[2 * ring + 1].conj()  # of (ring, 0), the only one on x = 0
+        if 2 * self.highest_mode == len(modes):  # (0, highest) and (highest, 0) and their mirrors
             modes[0, -1] = 2 * modes[0, -1].real
             modes[self.highest_mode, 0] = 2 * modes[self.highest_mode, 0].real
         if self.h_std is not None and variance > 0:
             modes *= self.h_std / np.sqrt(variance)
-        return modes
 
 
 class FileSurface(Choice):

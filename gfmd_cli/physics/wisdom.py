@@ -3,12 +3,15 @@
 import hashlib
 import os
 import platform
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
 
 import pyfftw
+
+KNOWN = 0.01  # seconds; a plan made faster was known already, or is not worth keeping
 
 
 def processor() -> str:
@@ -37,11 +40,11 @@ def _load() -> None:
 def kept() -> Iterator[None]:
     """Plan inside with the wisdom known, and keep what was learnt."""
     _load()
-    before = pyfftw.export_wisdom()[0]
+    begun = time.perf_counter()
     yield
-    learnt = pyfftw.export_wisdom()[0]
-    if learnt == before:
+    if time.perf_counter() - begun < KNOWN:
         return
+    learnt = pyfftw.export_wisdom()[0]
     path = _path()
     fresh = path.with_suffix(f".{os.getpid()}")
     with suppress(OSError):  # a cache that cannot be written costs time only

@@ -4,11 +4,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
+import numpy as np
 from pydantic import Field as Key
 
 from gfmd_cli.physics.choice import Choice
 from gfmd_cli.physics.contact import Contact
 from gfmd_cli.physics.fields import Field
+from gfmd_cli.physics.sweeps import stiffen
 from gfmd_cli.solvers.ccg import ConstrainedCG
 from gfmd_cli.solvers.fire import Fire
 from gfmd_cli.solvers.loop import State, Watch, solve
@@ -108,7 +110,7 @@ def solve_contact(
         chain = levels(contact.grid.points) if choice.nested else [contact.grid.points]
     spent = 0.0 if isinstance(method, Sort) else 2.0  # the look at full contact
     state: State | None = None
-    coarse = contact
+    coarse: Contact | None = None
     if resume is not None:
         chain = chain[chain.index(resume.points) :]
         spent = resume.transforms
@@ -117,7 +119,9 @@ def solve_contact(
         if resume is not None and points == resume.points:
             state = resume.state
         else:
-            state = method.begin(fine, _start(fine, coarse, state))
+            u = _start(fine, coarse, state)
+            coarse = state = None  # their memory is needed now
+            state = method.begin(fine, u)
         enter_level(points, spent)
         last = fine is contact
         status = solve(
@@ -134,9 +138,9 @@ def solve_contact(
     return Solution(state.u, state.sigma, state.residual, status, method.kind, state.step, spent)
 
 
-def _start(fine: Contact, coarse: Contact, state: State | None) -> Field:
+def _start(fine: Contact, coarse: Contact | None, state: State | None) -> Field:
     """The coarse solution on the finer grid, or a flat body that touches the highest point."""
-    if state is None:
+    if coarse is None or state is None:
         u = fine.grid.empty()
         u[...] = fine.height.max()
         return u
@@ -145,8 +149,16 @@ def _start(fine: Contact, coarse: Contact, state: State | None) -> Field:
 
 def full_contact(contact: Contact, solver: str) -> Solution | None:
     """The solution u = h, where the stress is nowhere tensile; else None. Costs two transforms."""
-    u = contact.height.copy()
-    sigma = contact.stress(u, out=contact.grid.empty())
-    if float(sigma.min()) < 0:
+    grid, h = contact.grid, contact.height
+    forward, backward = grid.in_place
+    stress = grid.padded[..., : grid.points]
+    stress[...] = h
+    forward()
+    padded, k = grid.as_rows(grid.padded), grid.as_rows(contact.stiffness)
+    grid.rows(stiffen, padded, k, 1.0 / grid.size)
+    backward()
+    if float(stress.min()) + contact.pressure < 0:
         return None
+    u, sigma = h.copy(), contact.grid.empty()
+    np.add(stress, contact.pressure, out=sigma)
     return Solution(u, sigma, contact.residual(u, sigma), "converged", solver, 0, 2.0)

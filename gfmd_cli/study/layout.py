@@ -4,6 +4,8 @@ from typing import NamedTuple
 
 LAYOUT = 1
 """Raised whenever a reader of the old layout would misread the new one."""
+BENCH = "bench_layout"
+"""Attribute that a bench has in the place of a study's `layout`."""
 
 
 class Column(NamedTuple):

@@ -37,7 +37,7 @@ def _table(
     shared.update(schema.pop("$defs", {}))
     if swept:
         for name, key in schema["properties"].items():
-            if name != "kind":
+            if name != "kind" or not needs_kind:
                 schema["properties"][name] = _one_or_many(key)
     if needs_kind:
         schema["required"] = ["kind", *schema.get("required", [])]

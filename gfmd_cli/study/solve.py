@@ -13,7 +13,6 @@ import numpy as np
 from gfmd_cli.errors import Interrupted
 from gfmd_cli.physics.contact import Contact, Scene, build_scene
 from gfmd_cli.physics.observables import cross_section, observe, stress_distribution
-from gfmd_cli.physics.persson import Shells
 from gfmd_cli.solvers.cascade import Solution, solve_contact
 from gfmd_cli.solvers.loop import State
 from gfmd_cli.study.checkpoint import Checkpoint
@@ -77,10 +76,9 @@ class _Watcher:
 
 
 @lru_cache(maxsize=1)
-def _scene(surface: Any, elastomer: Any, points: int, threads: int) -> tuple[Scene, Shells]:
+def _scene(surface: Any, elastomer: Any, points: int, threads: int) -> Scene:
     """The scene of the task before is that of the next, as a rule."""
-    scene = build_scene(surface, elastomer, points, threads)
-    return scene, scene.shells()
+    return build_scene(surface, elastomer, points, threads)
 
 
 def solve_task(
@@ -92,7 +90,7 @@ def solve_task(
     """
     report(Progress(task.index, "start", task.label))
     begun = time.perf_counter()
-    scene, shells = _scene(task.surface, task.elastomer, task.points, threads)
+    scene = _scene(task.surface, task.elastomer, task.points, threads)
     contact = scene.contact(task.load if task.reduced else task.load / scene.delta_sigma)
     checkpoint = Checkpoint(parts / task.id)
     watcher = _Watcher(task, checkpoint, report, checkpoint_every, last_save=time.monotonic())
@@ -105,7 +103,7 @@ def solve_task(
     )
     contact.stress(solution.u, out=solution.sigma)  # what is stored is measured afresh
     solution.residual = contact.residual(solution.u, solution.sigma)
-    record = _record(task, scene, shells, contact, solution, time.perf_counter() - begun)
+    record = _record(task, scene, contact, solution, time.perf_counter() - begun)
     write_record(parts, record)
     checkpoint.remove()
     row = record.row
@@ -127,7 +125,6 @@ def solve_task(
 def _record(
     task: Task,
     scene: Scene,
-    shells: Shells,
     contact: Contact,
     solution: Solution,
     seconds: float,
@@ -183,7 +180,7 @@ def _record(
     return Record(
         task_id=task.id,
         row=row,
-        shells=shells,
+        shells=scene.shells,
         distribution=distribution,
         fields={name: physical[name] for name in task.output.fields},
         cross_section={name: cross_section(values) for name, values in physical.items()}

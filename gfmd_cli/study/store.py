@@ -21,7 +21,9 @@ from gfmd_cli.errors import InputError, SpaceError, StudyError
 from gfmd_cli.physics.observables import linear_edges, logarithmic_edges
 from gfmd_cli.physics.persson import Shells
 from gfmd_cli.study.files import write_whole
+from gfmd_cli.study.labelled import dataset, scale
 from gfmd_cli.study.layout import (
+    BENCH,
     COLUMNS,
     DISTRIBUTION,
     FIELDS,
@@ -156,6 +158,8 @@ def open_study(path: Path) -> Iterator[Any]:
     with file:
         layout = file.attrs.get("layout")
         if layout != LAYOUT:
+            if BENCH in file.attrs:
+                raise StudyError(f"{path}: a bench, no study; `gfmd bench` prints its table")
             what = "no study" if layout is None else f"a study of layout {layout}"
             raise StudyError(f"{path}: {what}; this version reads layout {LAYOUT}")
         try:
@@ -188,32 +192,34 @@ def read_shells(path: Path, scene: int) -> Shells:
         return Shells(*(group[column.name][()] for column in SHELLS))
 
 
+def origin(spec: Spec, text: str) -> dict[str, str]:
+    """Attributes of a file: the spec that it was made from, and by what, where and when."""
+    resolved = spec.resolved()
+    return {
+        "Conventions": "CF-1.11",
+        "title": spec.study.name,
+        "spec": json.dumps(resolved),
+        "spec_digest": digest(resolved),
+        "spec_text": text,
+        **provenance(),
+    }
+
+
 def _write_study(
     file: Any, spec: Spec, tasks: list[Task], text: str, found: dict[str, Record], old: Any
 ) -> None:
     """Lay out the whole study: attributes, columns, distributions, scenes, fields."""
-    resolved = spec.resolved()
-    file.attrs.update(
-        {
-            "Conventions": "CF-1.11",
-            "title": spec.study.name,
-            "layout": LAYOUT,
-            "spec": json.dumps(resolved),
-            "spec_digest": digest(resolved),
-            "spec_text": text,
-            **provenance(),
-        }
-    )
+    file.attrs.update({"layout": LAYOUT, **origin(spec, text)})
     kept = _old_rows(old, {task.id for task in tasks} - set(found))
     rows = [_row(task, found, kept) for task in tasks]
     scenes = _scene_numbers(tasks)
-    task = _scale(file, "task", np.arange(len(tasks)), "1", "index of the task")
+    task = scale(file, "task", np.arange(len(tasks)), "1", "index of the task")
     for column in (*COLUMNS, *(DISTRIBUTION if spec.output.histogram else ())):
         values = [row[column.name] for row in rows]
         kind = h5py.string_dtype() if column.kind is str else column.kind
-        _dataset(file, column, np.array(values, dtype=kind), [task])
-    _dataset(file, Column("task_id", str, "", "task by its content"), [t.id for t in tasks], [task])
-    _dataset(file, Column("scene", int, "1", "group of /scenes"), scenes, [task])
+        dataset(file, column, np.array(values, dtype=kind), [task])
+    dataset(file, Column("task_id", str, "", "task by its content"), [t.id for t in tasks], [task])
+    dataset(file, Column("scene", int, "1", "group of /scenes"), scenes, [task])
     if spec.output.histogram:
         _write_distributions(file, task, rows)
     for row_task, scene in zip(tasks, scenes, strict=True):
@@ -251,11 +257,11 @@ def _write_distributions(file: Any, task: Any, rows: list[dict[str, Any]]) -> No
         (PR_LINEAR, "sigma", linear, 0.5 * (linear[1:] + linear[:-1])),
         (PR_LOGARITHMIC, "sigma_log", logarithmic, np.sqrt(logarithmic[1:] * logarithmic[:-1])),
     ):
-        scale = _scale(file, axis, middle, "1", "middle of the stress bin / Delta_sigma")
-        scale.attrs["edges"] = edges
+        labels = scale(file, axis, middle, "1", "middle of the stress bin / Delta_sigma")
+        labels.attrs["edges"] = edges
         blank = np.full(edges.size - 1, np.nan)
         density = np.array([row.get(name, blank) for row in rows])
-        _dataset(file, Column(name, float, "1", "Pr(sigma) Delta_sigma"), density, [task, scale])
+        dataset(file, Column(name, float, "1", "Pr(sigma) Delta_sigma"), density, [task, labels])
 
 
 def _write_extras(file: Any, task: Task, scene: int, record: Record | None, old: Any) -> None:
@@ -273,9 +279,9 @@ def _write_extras(file: Any, task: Task, scene: int, record: Record | None, old:
         return
     if places["shells"] not in file:
         group = file.create_group(places["shells"])
-        shell = _scale(group, "shell", np.arange(record.shells.q.size), "1", "shell")
+        shell = scale(group, "shell", np.arange(record.shells.q.size), "1", "shell")
         for column in SHELLS:
-            _dataset(group, column, getattr(record.shells, column.name), [shell])
+            dataset(group, column, getattr(record.shells, column.name), [shell])
     for kind in ("fields", "cross_section"):
         values = getattr(record, kind)
         if values:
@@ -285,29 +291,9 @@ def _write_extras(file: Any, task: Task, scene: int, record: Record | None, old:
 def _write_fields(group: Any, fields: dict[str, Any], length: float) -> None:
     first = next(iter(fields.values()))
     axes = [
-        _scale(group, name, np.arange(size) * (length / size), "m", f"position along {name}")
+        scale(group, name, np.arange(size) * (length / size), "m", f"position along {name}")
         for name, size in zip(("y", "x")[-first.ndim :], first.shape, strict=True)
     ]
     for column in FIELDS:
         if column.name in fields:
-            _dataset(group, column, fields[column.name], axes)
-
-
-def _scale(group: Any, name: str, values: Any, units: str, meaning: str) -> Any:
-    scale = group.create_dataset(name, data=values)
-    scale.make_scale(name)
-    scale.attrs.update({"units": units, "long_name": meaning})
-    return scale
-
-
-def _dataset(group: Any, column: Column, values: Any, scales: list[Any]) -> None:
-    """A labelled dataset; every chunk of numbers carries a checksum."""
-    strings = column.kind is str
-    dtype = h5py.string_dtype() if strings else None
-    checked = not strings and np.size(values) > 0
-    dataset = group.create_dataset(column.name, data=values, dtype=dtype, fletcher32=checked)
-    if column.units:
-        dataset.attrs["units"] = column.units
-    dataset.attrs["long_name"] = column.meaning
-    for axis, scale in enumerate(scales):
-        dataset.dims[axis].attach_scale(scale)
+            dataset(group, column, fields[column.name], axes)

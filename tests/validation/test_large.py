@@ -64,7 +64,7 @@ def test_the_mean_gap_is_that_of_another_realisation(n, p_star):
 @pytest.mark.parametrize("n", [0.5, 1, 2, 3])
 def test_the_mean_gap_is_near_persson_theory(n, p_star):
     made = scene(n)
-    theory = Persson(made.shells())
+    theory = Persson(made.shells)
     expected = float(theory.mean_gap(np.array([p_star * made.delta_sigma]))[0]) / made.h_std
     assert mean_gap(n, p_star) == pytest.approx(expected, rel=0.2)
 

@@ -1,0 +1,271 @@
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+import xarray
+from click.testing import CliRunner
+
+from gfmd_cli.analysis.benchmark import bench_table, solver_names
+from gfmd_cli.analysis.work_precision import draw_bench
+from gfmd_cli.cli import main
+from gfmd_cli.physics.contact import build_scene
+from gfmd_cli.study import bench
+from gfmd_cli.study.bench import GROWTH, REFERENCE, choices, run_bench, solve_reference
+from gfmd_cli.study.parse import read_spec
+from gfmd_cli.study.tasks import plan
+from gfmd_cli.study.traces import ERRORS, Trace, read_bench, write_bench
+
+SPEC = """\
+[study]
+name = "tiny"
+[surface]
+kind = "self-affine"
+cutoff = 0.05
+[elastomer]
+kind = "power"
+n = 1
+[grid]
+points = 128
+[load]
+p_star = 0.1
+[solver]
+kind = ["auto", "ccg", "fire"]
+"""
+
+
+@pytest.fixture
+def spec_of(tmp_path):
+    """SPEC with overrides."""
+
+    def spec_of(*overrides):
+        path = tmp_path / "spec.toml"
+        path.write_text(SPEC)
+        return read_spec(path, overrides)[0]
+
+    return spec_of
+
+
+@pytest.fixture
+def gfmd(tmp_path, monkeypatch):
+    """Calls the command in tmp_path, where spec.toml is SPEC on a smaller grid."""
+    monkeypatch.chdir(tmp_path)
+    Path("spec.toml").write_text(SPEC.replace("128", "64"))
+    return lambda *words: CliRunner().invoke(main, [str(word) for word in words])
+
+
+def ignore(_):
+    pass
+
+
+def kinds(spec):
+    """Solvers that are compared on each contact, one contact a body."""
+    found = []
+    for task in plan(spec):
+        contact = build_scene(task.surface, task.elastomer, task.points).contact(task.load)
+        found.append([choice.kind for choice in choices(spec, task, contact)])
+    return found
+
+
+def made_up(errors, points=64, **row):
+    """A trace with these errors, one transform and a millisecond each."""
+    known = {
+        "surface": "s", "seed": 0, "elastomer": "e", "points": points, "p_star": 0.1, "solver": "a",
+        "tolerance": 1e-6, "nested": True, "residual": 0.0, "status": "converged",
+        "reference_residual": 1e-10,
+    }  # fmt: skip
+    samples = [(i + 1.0, 1e-3 * (i + 1), points, 1.0, e, e, e) for i, e in enumerate(errors)]
+    return Trace.of(known | row, samples)
+
+
+def test_errors_fall_to_the_tolerance_while_costs_rise(spec_of):
+    traces = run_bench(spec_of("elastomer.n=[1, 3]"), ignore)
+    assert [trace.row["solver"] for trace in traces] == ["pcg", "ccg", "fire"] * 2
+    for trace in traces:
+        samples = trace.samples
+        assert trace.row["status"] == "converged"
+        assert trace.row["reference_residual"] < 1e-9
+        assert samples["residual"][-1] == trace.row["residual"] < 1e-6
+        assert np.all(np.diff(samples["transforms"]) > 0)
+        assert np.all(np.diff(samples["seconds"]) > 0)
+        assert samples["transforms"].size > 10
+        for name in ("sigma_p", "u_g"):
+            lasting = trace.lasting_error(name)
+            assert lasting[-1] < 1e-5
+            assert np.nanmax(samples[f"{name}_error"]) > 1e-3
+            assert np.all(np.diff(lasting[np.isfinite(lasting)]) <= 0)
+        assert samples["a_r_error"][-1] < 1e-3
+
+
+def test_coarser_grids_cost_but_have_no_error(spec_of):
+    trace = run_bench(spec_of("solver.kind='pcg'"), ignore)[0]
+    coarse = trace.samples["points"] < 128
+    assert np.any(coarse)
+    assert np.all(np.isnan(trace.samples["u_g_error"]) == coarse)
+    assert trace.samples["transforms"][~coarse][0] > trace.samples["transforms"][coarse][-1] > 0
+    assert np.all(np.isinf(trace.lasting_error("u_g")) == coarse)
+
+
+def test_samples_are_taken_as_the_transforms_grow(spec_of):
+    trace = run_bench(spec_of("solver.kind='fire'", "solver.nested=false"), ignore)[0]
+    transforms = trace.samples["transforms"]
+    assert np.all(transforms[1:-1] >= GROWTH * transforms[:-2])
+
+
+def test_the_recording_is_not_timed(spec_of, monkeypatch):
+    clock = [0.0]
+    observe = bench.observe
+
+    def slow(*words):
+        clock[0] += 100.0
+        return observe(*words)
+
+    monkeypatch.setattr(bench, "observe", slow)
+    monkeypatch.setattr(bench.time, "process_time", lambda: clock[0])
+    for trace in run_bench(spec_of(), ignore):
+        assert np.all(trace.samples["seconds"] == 0)
+
+
+def test_an_open_choice_of_solver_compares_all_that_fit_the_body(spec_of):
+    spec = spec_of("solver.kind='auto'", "elastomer.n=[0, 1, 3]", "grid.points=64")
+    assert kinds(spec) == [
+        ["sort", "ccg", "fire", "polonsky-keer"],
+        ["pcg", "ccg", "fire", "polonsky-keer"],
+        ["pcg", "ccg", "fire"],
+    ]
+    spec = spec_of("solver.kind=['sort', 'pcg', 'polonsky-keer']", "elastomer.n=[0, 3]")
+    assert kinds(spec)[0] == ["sort", "pcg", "polonsky-keer"]
+    assert kinds(spec)[-1] == ["pcg"]
+
+
+def test_a_reference_that_rounding_stops_is_as_good_as_it_gets(spec_of, monkeypatch):
+    hopeless = REFERENCE.model_copy(update={"tolerance": 1e-25})
+    monkeypatch.setattr(bench, "REFERENCE", hopeless)
+    task = plan(spec_of("grid.points=64"))[0]
+    contact = build_scene(task.surface, task.elastomer, task.points).contact(task.load)
+    seen, residual = solve_reference(contact)
+    assert 1e-25 < residual < 1e-10
+    assert seen.u_g > 0
+
+
+def test_an_error_counts_as_reached_where_it_lasts():
+    trace = made_up([np.nan, 1.0, 1e-5, 1e-3, 1e-5, 1e-7])
+    assert trace.reached("u_g", 1e-4) == (5.0, 5e-3)
+    assert trace.reached("u_g", 1e-2) == (3.0, 3e-3)
+    assert trace.reached("u_g", 1e-8) is None
+    assert trace.reached("u_g", 10.0) == (2.0, 2e-3)
+
+
+def test_the_table_has_a_dash_where_an_error_is_never_reached():
+    table = bench_table([made_up([1.0, 1e-3], status="max_steps"), made_up([1e-7], points=32)])
+    row = next(line for line in table.splitlines() if "max_steps" in line).split()
+    assert row[:10] == ["e", "64", "0.1", "a", "2", "-", "-", "0.002", "-", "-"]
+    assert "surface" not in table
+    several = bench_table([made_up([1.0]), made_up([1.0], surface="other")])
+    assert "surface" in several
+    assert "other" in several
+
+
+def test_names_tell_runs_of_one_solver_apart():
+    traces = [made_up([1.0], tolerance=1e-3), made_up([1.0]), made_up([1.0], nested=False)]
+    assert solver_names(traces) == ["a 0.001", "a 1e-06", "a 1e-06 not nested"]
+    assert solver_names(traces[1:2]) == ["a"]
+
+
+def test_a_bench_is_stored_with_labels_and_read_back(spec_of, tmp_path):
+    spec, path = spec_of("solver.kind=['auto', 'ccg']"), tmp_path / "b.h5"
+    traces = run_bench(spec, ignore)
+    write_bench(path, spec, SPEC, traces)
+    assert [p.name for p in tmp_path.glob("*b.h5*")] == ["b.h5"]
+    for old, new in zip(traces, read_bench(path), strict=True):
+        assert {k: v for k, v in old.row.items() if v == v} == {
+            k: v for k, v in new.row.items() if v == v
+        }
+        for name, values in old.samples.items():
+            np.testing.assert_array_equal(new.samples[name], values)
+    with xarray.open_dataset(path, engine="h5netcdf", group="runs/1") as data:
+        assert data["u_g_error"].dims == ("sample",)
+        assert data["seconds"].attrs["units"] == "s"
+        assert all(data[name].attrs["long_name"] for name in data.variables)
+        assert data.attrs["solver"] == "ccg"
+        assert {f"{name}_reference" for name in ERRORS} < set(data.attrs)
+    with h5py.File(path) as file:
+        assert file.attrs["spec_text"] == SPEC
+        assert {"software_version", "machine", "date", "spec_digest"} < set(file.attrs)
+
+
+def test_few_scenes_share_a_figure_and_many_have_one_each(tmp_path):
+    flat = [made_up([0.0], elastomer="flat"), made_up([0.1, 0.0], status="max_steps")]
+    lost = made_up([np.nan, np.nan], elastomer="lost", status="diverged")
+    few = draw_bench([*flat, lost], tmp_path / "few")
+    assert sorted(path.name for path in few) == ["work_precision.pdf", "work_precision.png"]
+    assert all(path.stat().st_size > 1000 for path in few)
+    assert len(draw_bench([lost], tmp_path / "lost")) == 2
+    many = draw_bench([made_up([1.0, 0.1], points=2**i) for i in range(3, 8)], tmp_path / "many")
+    names = [path.name for path in many]
+    assert len(set(names)) == 10
+    assert names[0] == "work_precision_0_e-on-s-8-points-p=0.1.pdf"
+
+
+def test_bench_prints_a_table_and_keeps_file_and_figure(gfmd):
+    told = gfmd("bench", "spec.toml", "--figures", "out")
+    assert told.exit_code == 0, told.output
+    for solver in ("pcg", "ccg", "fire"):
+        assert any(
+            f" {solver} " in line and line.endswith("converged")
+            for line in told.stdout.splitlines()
+        )
+    assert Path("out/work_precision.png").read_bytes().startswith(b"\x89PNG")
+    assert Path("out/work_precision.pdf").exists()
+    assert len(read_bench(Path("tiny-bench.h5"))) == 3
+    told = gfmd("analyze", "tiny-bench.h5")
+    assert told.exit_code == 74
+    assert "a bench, no study" in told.output
+    again = gfmd("bench", "spec.toml", "-q")  # measures again
+    assert again.exit_code == 0
+    other = gfmd("bench", "spec.toml", "--set", "load.p_star=0.2")
+    assert other.exit_code == 2
+    assert "load.p_star" in other.output
+
+
+def test_what_is_no_bench_is_not_replaced(gfmd):
+    Path("notes.h5").write_text("dear diary")
+    with h5py.File("study.h5", "w") as file:
+        file.attrs["layout"] = 1
+    for name in ("notes.h5", "study.h5"):
+        before = Path(name).read_bytes()
+        told = gfmd("bench", "spec.toml", "-o", name)
+        assert told.exit_code == 2
+        assert "is no bench" in told.output
+        assert Path(name).read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("none.toml",),
+        ("spec.toml", "--set", "elastomer.n=9"),
+        ("spec.toml", "--set", "surface.cutoff=0.001"),
+        ("spec.toml", "--set", "solver.kind='sort'"),
+    ],
+)
+def test_a_bad_spec_ends_in_status_2_and_leaves_nothing(gfmd, words):
+    before = set(Path().iterdir())
+    told = gfmd("bench", *words)
+    assert told.exit_code == 2
+    assert told.output.strip()
+    assert set(Path().iterdir()) == before
+
+
+def test_a_place_that_cannot_be_written_is_told_before_anything_is_solved(gfmd):
+    Path("file").write_text("")
+    told = gfmd("bench", "spec.toml", "-o", "file/b.h5")
+    assert told.exit_code == 73
+    assert "task" not in told.output
+
+
+def test_a_missed_tolerance_is_status_1(gfmd):
+    told = gfmd("bench", "spec.toml", "--set", "solver.max_steps=3")
+    assert told.exit_code == 1
+    assert "max_steps" in told.output
+    assert Path("tiny-bench.h5").exists()
