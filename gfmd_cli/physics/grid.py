@@ -16,6 +16,7 @@ from gfmd_cli.physics.fields import Field, Modes
 from gfmd_cli.physics.sweeps import Rows
 
 ALL = slice(None)
+PLANNING = 30.0  # seconds at most to look for a plan; matters above 4096^2
 BLOCK = 2**15  # points of a block of rows: it and its temporaries stay in the cache
 
 
@@ -99,8 +100,22 @@ class Grid:
         """Forward and backward transform between fields and `work`."""
         field, axes = self.empty(), tuple(range(self.dimension))
         with wisdom.kept():
-            forward = pyfftw.FFTW(field, self.work, axes, "FFTW_FORWARD", threads=self.threads)
-            backward = pyfftw.FFTW(self.work, field, axes, "FFTW_BACKWARD", threads=self.threads)
+            forward = pyfftw.FFTW(
+                field,
+                self.work,
+                axes,
+                "FFTW_FORWARD",
+                threads=self.threads,
+                planning_timelimit=PLANNING,
+            )
+            backward = pyfftw.FFTW(
+                self.work,
+                field,
+                axes,
+                "FFTW_BACKWARD",
+                threads=self.threads,
+                planning_timelimit=PLANNING,
+            )
         return forward, backward
 
     @cached_property
@@ -111,8 +126,22 @@ class Grid:
         """
         real, axes = self.padded[..., : self.points], tuple(range(self.dimension))
         with wisdom.kept():
-            forward = pyfftw.FFTW(real, self.work, axes, "FFTW_FORWARD", threads=self.threads)
-            backward = pyfftw.FFTW(self.work, real, axes, "FFTW_BACKWARD", threads=self.threads)
+            forward = pyfftw.FFTW(
+                real,
+                self.work,
+                axes,
+                "FFTW_FORWARD",
+                threads=self.threads,
+                planning_timelimit=PLANNING,
+            )
+            backward = pyfftw.FFTW(
+                self.work,
+                real,
+                axes,
+                "FFTW_BACKWARD",
+                threads=self.threads,
+                planning_timelimit=PLANNING,
+            )
         return forward.execute, backward.execute
 
     def forward_into_work(self, field: Field) -> Modes:

@@ -13,10 +13,10 @@ from gfmd_cli.physics.surface import FileSurface, Surface
 from gfmd_cli.solvers.cascade import SolverChoice
 from gfmd_cli.study.spec import OutputTable, Spec, digest
 
-FIELDS_IN_MEMORY = 14.3
-"""Fields of double precision that a solve holds at its peak: nine of the solver, two symbols and
-the coefficients on half-spectra, the coarser grids; measured by scripts/memory.py to 10 %."""
-BASE_BYTES = 110e6
+FIELDS_IN_MEMORY = 7.35
+"""Fields of double precision that a solve holds at its peak: h, u, sigma, direction, change, work;
+k(q) on the half-spectrum, contact marks, coarse levels. scripts/memory.py measures it."""
+BASE_BYTES = 215e6
 """What a process holds besides: the interpreter and its libraries."""
 SECONDS_PER_PAIR = 8e-9
 """Per grid point and pair of transforms, with all work between two of them, on one thread."""
