@@ -1,9 +1,11 @@
 """The grid: one Fourier convention, operators diagonal in q, trigonometric interpolation."""
 
 import numpy as np
+import pyfftw
 import pytest
 
 from gfmd_cli.physics.grid import Grid
+from gfmd_cli.physics.surface import SelfAffine
 
 ROUNDING = 1e-14  # a few units in the last place, times log2 of the size, for fields of order one
 GRIDS = [(points, dimension) for points in (8, 10, 16, 50) for dimension in (1, 2)]
@@ -152,3 +154,14 @@ def test_two_threads_change_nothing():
     field = noise(Grid(64))
     one, two = Grid(64).forward(field), Grid(64, threads=2).forward(field)
     assert two == pytest.approx(one, abs=ROUNDING)
+
+
+def test_a_plan_measured_for_the_first_time_destroys_nothing(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    known = SelfAffine(cutoff=0.05).heights(96)
+    pyfftw.forget_wisdom()
+    np.testing.assert_allclose(SelfAffine(cutoff=0.05).heights(96), known, atol=1e-14)
+    field = np.random.default_rng(3).normal(size=(54, 54))
+    pyfftw.forget_wisdom()
+    fresh = Grid(54)
+    np.testing.assert_allclose(fresh.backward(fresh.forward(field)), field, atol=1e-14)

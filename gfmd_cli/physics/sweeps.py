@@ -128,41 +128,30 @@ def crossing(h, u, direction, length, out, a, b):  # type: ignore[no-untyped-def
 
 
 @kernel
-def along_move(h, u, sigma, direction, length, change, out, a, b):  # type: ignore[no-untyped-def]
-    """Of the move that K was applied to (`change` = K move): sums -move sigma and move change."""
+def along_move(h, u, sigma, direction, length, padded, out, a, b):  # type: ignore[no-untyped-def]
+    """Of the move that K was applied to (`padded` = K move): sums -move sigma, move K move."""
     for i in range(a, b):
         fall = curvature = 0.0
         for j in range(h.shape[1]):
             move = max(length * direction[i, j], h[i, j] - u[i, j])
             fall -= move * sigma[i, j]
-            curvature += move * change[i, j]
+            curvature += move * padded[i, j]
         out[i, 0], out[i, 1] = fall, curvature
 
 
 @kernel
-def advance(h, u, sigma, direction, length, share, change, out, a, b):  # type: ignore[no-untyped-def]
-    """u += share move, sigma += share change; `change` <- share change; then as `score`."""
+def advance(h, u, sigma, direction, length, share, padded, change, a, b):  # type: ignore[no-untyped-def]
+    """u += share move, and sigma += change with change = share K move (`padded` = K move)."""
     for i in range(a, b):
-        violation = free = tension = 0.0
         for j in range(h.shape[1]):
             floor, old = h[i, j], u[i, j]
             if share == 1.0:
-                new = max(old + length * direction[i, j], floor)
+                u[i, j] = max(old + length * direction[i, j], floor)
             else:
-                new = max(old + share * max(length * direction[i, j], floor - old), floor)
-            u[i, j] = new
-            moved = share * change[i, j]
+                u[i, j] = max(old + share * max(length * direction[i, j], floor - old), floor)
+            moved = share * padded[i, j]
             change[i, j] = moved
-            s = sigma[i, j] + moved
-            sigma[i, j] = s
-            least = min(new - floor, s)
-            violation += least * least
-            square = s * s
-            if new != floor:
-                free += square
-            elif s < 0.0:
-                tension += square
-        out[i, 0], out[i, 1], out[i, 2] = violation, free, tension
+            sigma[i, j] += moved
 
 
 @kernel

@@ -150,13 +150,11 @@ def _start(fine: Contact, coarse: Contact | None, state: State | None) -> Field:
 def full_contact(contact: Contact, solver: str) -> Solution | None:
     """The solution u = h, where the stress is nowhere tensile; else None. Costs two transforms."""
     grid, h = contact.grid, contact.height
-    forward, backward = grid.in_place
     stress = grid.padded[..., : grid.points]
-    stress[...] = h
-    forward()
+    grid.forward_into_work(h)
     padded, k = grid.as_rows(grid.padded), grid.as_rows(contact.stiffness)
     grid.rows(stiffen, padded, k, 1.0 / grid.size)
-    backward()
+    grid.transform_back()
     if float(stress.min()) + contact.pressure < 0:
         return None
     u, sigma = h.copy(), contact.grid.empty()

@@ -125,12 +125,11 @@ class _Run:
             self.multilevel = self.multilevel or Multilevel(self.contact, self.rows)
             self.multilevel.apply(self.sigma, self.held, self.padded)
             return
-        forward, backward = self.grid.in_place
         self.rows(sweeps.free_force, self.sigma, self.held, self.padded)
-        forward()
+        self.grid.transform()
         screening = self.memory["screening"]
         self.rows(sweeps.soften, self.padded, self.k, screening, 1.0 / self.grid.size)
-        backward()
+        self.grid.transform_back()
         self.state.transforms += 2
 
     def turn(self) -> None:
@@ -150,11 +149,10 @@ class _Run:
                 break
 
     def stiffness(self) -> None:
-        """change <- K padded."""
-        forward, _ = self.grid.in_place
-        forward()
+        """padded <- K padded."""
+        self.grid.transform()
         self.rows(sweeps.stiffen, self.padded, self.k, 1.0 / self.grid.size)
-        self.grid.backward_into(self.state.fields["change"])
+        self.grid.transform_back()
         self.state.transforms += 2
 
     def advance(self) -> None:
@@ -170,7 +168,7 @@ class _Run:
             )
             self.stiffness()
             fall, curvature = rows.sums(
-                2, sweeps.along_move, *bodies, self.sigma, self.direction, length, self.change
+                2, sweeps.along_move, *bodies, self.sigma, self.direction, length, self.padded
             )
             if fall > 0:
                 best = fall / curvature if curvature > 0 else inf
@@ -178,9 +176,8 @@ class _Run:
                 break
             memory["length"] *= 0.5
             memory["slope"] = 0.0
-        rows.sums(
-            3, sweeps.advance, *bodies, self.sigma, self.direction, length, share, self.change
-        )
+        moved = (self.sigma, self.direction, length, share, self.padded, self.change)
+        rows(sweeps.advance, *bodies, *moved)
         self.state.exact = False
 
     def share_of_move(self, best: float, stopped: bool) -> float:
@@ -206,7 +203,7 @@ class _Run:
         columns = self.h.shape[1]
         self.padded[:, :columns] = self.direction
         self.stiffness()
-        curvature = float(np.vdot(self.direction, self.change))
+        curvature = float(np.vdot(self.direction, self.padded[:, :columns]))
         descent = -float(np.vdot(self.direction, self.sigma))
         if curvature > SOFTEST * descent:
             return descent / curvature
