@@ -16,6 +16,7 @@ import gfmd_cli
 from gfmd_cli.errors import GfmdError, InputError
 
 LOG_EVERY = 60.0  # seconds between two lines on one task where stderr is no terminal
+BAR = "{desc}: {n_fmt} steps, {elapsed}{postfix}"
 READABLE = click.Path(path_type=Path)
 
 
@@ -176,7 +177,7 @@ class _Reporter:
         bar = self.bars.get(progress.task)
         if bar is None:
             place = min(set(range(len(self.bars) + 1)) - {b.pos for b in self.bars.values()})
-            bar = tqdm(desc=progress.label, unit="step", position=place, leave=False, delay=0.3)
+            bar = tqdm(desc=progress.label, position=place, leave=False, bar_format=BAR)
             self.bars[progress.task] = bar
         if progress.event == "step":
             bar.n = progress.step

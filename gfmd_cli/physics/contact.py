@@ -47,6 +47,12 @@ class Contact:
         out += self.pressure
         return out
 
+    def settle(self, u: Field) -> Field:
+        """Lift `u` above the indenter and lower it until it touches, in place; return it."""
+        np.maximum(u, self.height, out=u)
+        u -= np.min(u - self.height)
+        return np.maximum(u, self.height, out=u)
+
     def residual(self, u: Field, sigma: Field) -> float:
         """Natural residual: rms of min(g, sigma), divided by min(p*, 1).
 

@@ -25,9 +25,7 @@ class ConstrainedCG(Choice):
 
     def begin(self, contact: Contact, u: Field) -> State:
         """Start from `u`, lifted above the indenter and lowered until it touches."""
-        np.maximum(u, contact.height, out=u)
-        u -= np.min(u - contact.height)
-        np.maximum(u, contact.height, out=u)
+        contact.settle(u)
         sigma = contact.stress(u, out=contact.grid.empty())
         fields = {"direction": np.zeros_like(u), "force": np.zeros_like(u)}
         return State(u, sigma, transforms=2, fields=fields, scalars={"descent": 0.0})

@@ -47,9 +47,7 @@ class ProjectedCG(Choice):
 
     def begin(self, contact: Contact, u: Field) -> State:
         """Start from `u`, lifted above the indenter and lowered until it touches."""
-        np.maximum(u, contact.height, out=u)
-        u -= np.min(u - contact.height)
-        np.maximum(u, contact.height, out=u)
+        contact.settle(u)
         sigma = contact.stress(u, out=contact.grid.empty())
         fields = {"direction": np.zeros_like(u), "change": np.zeros_like(u)}
         names = ("slope", "length", "screening", "multilevel", "rescreen_at")

@@ -1,0 +1,76 @@
+from pathlib import Path
+
+import pytest
+
+from gfmd_cli.errors import InputError
+from gfmd_cli.study import resources
+from gfmd_cli.study.parse import read_spec
+from gfmd_cli.study.tasks import plan
+
+CONFIGS = Path(__file__).parents[1] / "configs"
+
+
+@pytest.fixture
+def tasks():
+    """The tasks of the demo on another grid."""
+    return lambda *settings: plan(read_spec(CONFIGS / "demo.toml", settings)[0])
+
+
+@pytest.fixture
+def machine(monkeypatch):
+    """A machine of so many cores and bytes."""
+
+    def machine(cores, memory=2.0**40):
+        monkeypatch.setattr(resources, "available_cores", lambda: cores)
+        monkeypatch.setattr(resources, "available_memory", lambda: memory)
+
+    return machine
+
+
+def test_cores_are_those_that_slurm_grants(monkeypatch):
+    monkeypatch.setenv("SLURM_CPUS_PER_TASK", "7")
+    assert resources.available_cores() == 7
+
+
+def test_cores_are_otherwise_those_of_the_affinity_mask(monkeypatch):
+    monkeypatch.delenv("SLURM_CPUS_PER_TASK", raising=False)
+    monkeypatch.setattr(resources.os, "sched_getaffinity", lambda _: {0, 3, 5})
+    assert resources.available_cores() == 3
+
+
+def test_slurm_may_grant_less_memory_than_there_is(monkeypatch):
+    monkeypatch.setenv("SLURM_MEM_PER_NODE", "100")
+    assert resources.available_memory() == 100 * 2**20
+
+
+def test_many_tasks_run_side_by_side_on_one_thread_each(tasks, machine):
+    machine(8)
+    assert resources.share_out(tasks(), None) == (8, 1)
+
+
+def test_one_large_grid_takes_all_threads(tasks, machine):
+    machine(8)
+    one = tasks("grid.points=4096", "elastomer.n=1", "load.p_star=0.1")
+    assert resources.share_out(one, None) == (1, 8)
+
+
+def test_as_many_run_side_by_side_as_the_memory_holds(tasks, machine):
+    many = tasks("grid.points=4096")
+    machine(8, 2.5 * many[0].bytes / resources.HEADROOM)
+    assert resources.share_out(many, None) == (2, 4)
+
+
+def test_a_little_work_is_done_in_this_process(tasks, machine):
+    machine(8)
+    assert resources.share_out(tasks("elastomer.n=0"), None) == (1, 1)
+
+
+def test_the_asked_number_of_jobs_is_kept(tasks, machine):
+    machine(8)
+    assert resources.share_out(tasks(), 3) == (3, 1)
+
+
+def test_a_task_beyond_the_memory_is_refused_with_both_numbers(tasks, machine):
+    machine(8, 2.0**30)
+    with pytest.raises(InputError, match=r"8192 points .* GiB .* 0.9 GiB"):
+        resources.check_memory(tasks("grid.points=8192"))
