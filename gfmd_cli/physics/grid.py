@@ -16,6 +16,7 @@ from gfmd_cli.physics.fields import Field, Modes
 from gfmd_cli.physics.sweeps import Rows
 
 ALL = slice(None)
+THREADED = 512  # points per side from which a second thread pays
 PLANNING = 30.0  # seconds at most to look for a plan; matters above 4096^2
 BLOCK = 2**15  # points of a block of rows: it and its temporaries stay in the cache
 
@@ -94,7 +95,7 @@ class Grid:
         """
         work = self.empty_modes()
         real = work.view(np.float64)[..., : self.points]
-        axes, options = tuple(range(self.dimension)), {"threads": self.threads}
+        axes, options = tuple(range(self.dimension)), {"threads": self._threads}
         with wisdom.kept():
             forward = pyfftw.FFTW(
                 real, work, axes, "FFTW_FORWARD", planning_timelimit=PLANNING, **options
@@ -153,7 +154,12 @@ class Grid:
     @cached_property
     def rows(self) -> Rows:
         """Shares the work of a sweep out over the threads."""
-        return Rows(self.points, self.threads) if self.dimension == 2 else Rows(1, 1)
+        return Rows(self.points, self._threads) if self.dimension == 2 else Rows(1, 1)
+
+    @property
+    def _threads(self) -> int:
+        """Threads that pay: on a small grid, coarse ones of a cascade too, a second only costs."""
+        return self.threads if self.points >= THREADED and self.dimension == 2 else 1
 
     def as_rows(self, field: Field) -> Field:
         """A field, a symbol or `padded` with two axes, in one dimension too."""

@@ -17,7 +17,6 @@ constraints are kept out of the scaling).
 """
 
 from collections.abc import Iterator
-from math import inf
 from typing import Literal
 
 import numpy as np
@@ -169,7 +168,7 @@ class _Run:
                 2, sweeps.along_move, *bodies, self.sigma, self.direction, length, self.padded
             )
             if fall > 0:
-                best = fall / curvature if curvature > 0 else inf
+                best = fall / curvature if curvature > 0 else 1.0  # 1: a rigid shift
                 share = self.share_of_move(best, stopped > 0)
                 break
             memory["length"] *= 0.5
