@@ -246,7 +246,7 @@ def test_checkpoints_come_back_as_they_were(tmp_path):
 
     contact = Contact()
     contact.grid = grid
-    state = State(rng.random((16, 16)), rng.random((16, 16)), False, 0.1, 7, 9, {"slope": 1 / 3})
+    state = State(rng.random((16, 16)), rng.random((16, 16)), False, 0.1, 7, 2, 9, {"slope": 1 / 3})
     state.fields["direction"] = rng.random((16, 16))
     checkpoint = Checkpoint(tmp_path / "c")
     assert checkpoint.load(grid) is None

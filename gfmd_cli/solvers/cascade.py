@@ -59,7 +59,7 @@ class Solution:
     sigma: Field
     residual: float
     status: str
-    """"converged", "max_steps" or "diverged"."""
+    """"converged", "max_steps", "rounding" or "diverged"."""
     solver: str
     steps: int
     transforms: float

@@ -8,6 +8,8 @@ from typing import Protocol
 from gfmd_cli.physics.contact import Contact
 from gfmd_cli.physics.fields import Field
 
+MISSES = 20  # one or two happen when sigma has drifted; so many mean that rounding is the limit
+
 
 @dataclass
 class State:
@@ -21,6 +23,8 @@ class State:
     """Whether sigma was computed from u, not updated."""
     residual: float = float("inf")
     step: int = 0
+    misses: int = 0
+    """How often the residual was found too large when sigma was computed afresh."""
     transforms: int = 0
     """Transforms on this grid so far."""
     scalars: dict[str, float] = field(default_factory=dict)
@@ -55,16 +59,20 @@ def solve(
     """Drive `solver` until the natural residual is below `tolerance`; say how it ended.
 
     The residual that ends it is measured on sigma computed afresh from u. Returns "converged",
-    "max_steps" or "diverged"; the solution stays in `state`.
+    "max_steps", "diverged", or "rounding" where the tolerance lies below what double precision
+    can tell; the solution stays in `state`.
     """
     for current in solver.iterate(contact, state):
         if current.residual < tolerance and not current.exact:
             refresh(contact, current)
+            current.misses += current.residual >= tolerance
         watch(contact, current)
         if not isfinite(current.residual):
             return "diverged"
         if current.residual < tolerance:
             return "converged"
+        if current.misses >= MISSES:
+            return "rounding"
         if current.step >= max_steps:
             refresh(contact, current)
             return "max_steps"

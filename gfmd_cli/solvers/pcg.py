@@ -200,8 +200,8 @@ class _Run:
         columns = self.h.shape[1]
         self.padded[:, :columns] = self.direction
         self.stiffness()
-        curvature = float(np.vdot(self.direction, self.padded[:, :columns]))
-        descent = -float(np.vdot(self.direction, self.sigma))
+        curvature = float(np.einsum("ij,ij", self.direction, self.padded[:, :columns]))
+        descent = -float(np.einsum("ij,ij", self.direction, self.sigma))
         if curvature > SOFTEST * descent:
             return descent / curvature
         return float(np.ptp(self.h) / np.abs(self.direction).max())  # of a rigid shift, at most
