@@ -22,7 +22,7 @@ from gfmd_cli.solvers.loop import State
 from gfmd_cli.study.resources import check_memory
 from gfmd_cli.study.solve import Progress, Report
 from gfmd_cli.study.spec import Spec
-from gfmd_cli.study.tasks import Task, describe, exponent, plan, thickness
+from gfmd_cli.study.tasks import Task, exponent, plan
 from gfmd_cli.study.traces import ERRORS, Trace
 
 GROWTH = 1.05  # of the transforms between two samples
@@ -157,7 +157,7 @@ def run_bench(spec: Spec, report: Report) -> list[Trace]:
     traces: list[Trace] = []
     for task, contact in _contacts(tasks):
         reference, residual = solve_reference(contact)
-        row = _row(task, contact) | {"reference_residual": residual}
+        row = task.columns() | {"p_star": contact.pressure} | {"reference_residual": residual}
         row |= {f"{name}_reference": getattr(reference, name) for name in ERRORS}
         for choice in choices(spec, task, contact):
             traces.append(_trace(contact, choice, reference, row, report, len(traces)))
@@ -208,17 +208,3 @@ def _trace(
         },
         recorder.samples,
     )
-
-
-def _row(task: Task, contact: Contact) -> dict[str, Any]:
-    """What was solved."""
-    n, t = exponent(task.elastomer), thickness(task.elastomer)
-    return {
-        "surface": describe(task.surface),
-        "seed": getattr(task.surface, "seed", -1),
-        "elastomer": describe(task.elastomer),
-        "n": np.nan if n is None else n,
-        "thickness": np.nan if t is None else t,
-        "points": task.points,
-        "p_star": contact.pressure,
-    }

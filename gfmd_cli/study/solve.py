@@ -18,7 +18,7 @@ from gfmd_cli.solvers.loop import State
 from gfmd_cli.study.checkpoint import Checkpoint
 from gfmd_cli.study.layout import PR_LINEAR, PR_LOGARITHMIC
 from gfmd_cli.study.record import Record, empty_row, write_record
-from gfmd_cli.study.tasks import Task, describe, exponent, thickness
+from gfmd_cli.study.tasks import Task
 
 REPORT_EVERY = 0.2  # seconds between two reports of one task
 stop = Event()
@@ -132,35 +132,32 @@ def _record(
     """All that is kept of one solution."""
     u, sigma = solution.u, solution.sigma
     seen = observe(contact, u, sigma)
-    n, t = exponent(task.elastomer), thickness(task.elastomer)
-    row = empty_row() | {
-        "surface": describe(task.surface),
-        "seed": getattr(task.surface, "seed", -1),
-        "elastomer": describe(task.elastomer),
-        "n": np.nan if n is None else n,
-        "thickness": np.nan if t is None else t,
-        "points": task.points,
-        "p_star": contact.pressure,
-        "a_r": seen.a_r,
-        "sigma_p": seen.sigma_p,
-        "u_g": seen.u_g,
-        "residual": solution.residual,
-        "solver": solution.solver,
-        "transforms": solution.transforms,
-        "seconds": seconds,
-        "status": solution.status,
-        "pressure": contact.pressure * scene.delta_sigma,
-        "delta_sigma": scene.delta_sigma,
-        "h_std": scene.h_std,
-        "mean_height": scene.mean_height,
-        "length": scene.grid.length,
-        "mean_gap": seen.u_g * scene.h_std,
-        "perimeter": seen.perimeter,
-        "energy": seen.energy,
-        "work": seen.work,
-        "steps": solution.steps,
-        "tolerance": task.solver.tolerance,
-    }
+    row = (
+        empty_row()
+        | task.columns()
+        | {
+            "p_star": contact.pressure,
+            "a_r": seen.a_r,
+            "sigma_p": seen.sigma_p,
+            "u_g": seen.u_g,
+            "residual": solution.residual,
+            "solver": solution.solver,
+            "transforms": solution.transforms,
+            "seconds": seconds,
+            "status": solution.status,
+            "pressure": contact.pressure * scene.delta_sigma,
+            "delta_sigma": scene.delta_sigma,
+            "h_std": scene.h_std,
+            "mean_height": scene.mean_height,
+            "length": scene.grid.length,
+            "mean_gap": seen.u_g * scene.h_std,
+            "perimeter": seen.perimeter,
+            "energy": seen.energy,
+            "work": seen.work,
+            "steps": solution.steps,
+            "tolerance": task.solver.tolerance,
+        }
+    )
     distribution = {}
     if task.output.histogram:
         pr = stress_distribution(contact, u, sigma)

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -58,6 +59,18 @@ class Task:
     def seconds(self) -> float:
         """Time that the solve is expected to take on one thread, within a factor of about three."""
         return 0.01 + SECONDS_PER_PAIR * self.size * self._pairs()
+
+    def columns(self) -> dict[str, Any]:
+        """What is to be solved, as columns of a study."""
+        n, t = exponent(self.elastomer), thickness(self.elastomer)
+        return {
+            "surface": describe(self.surface),
+            "seed": getattr(self.surface, "seed", -1),
+            "elastomer": describe(self.elastomer),
+            "n": np.nan if n is None else n,
+            "thickness": np.nan if t is None else t,
+            "points": self.points,
+        }
 
     def _pairs(self) -> float:
         """Pairs of transforms, fitted to the default surface at 512^2, tolerance 1e-6."""
