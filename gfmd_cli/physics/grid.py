@@ -53,11 +53,6 @@ class Grid:
         """Number of grid points."""
         return int(self.points**self.dimension)
 
-    @property
-    def spacing(self) -> float:
-        """Distance of neighbouring points [m]."""
-        return self.length / self.points
-
     def empty(self) -> Field:
         """A real field, aligned for the transforms, values undefined."""
         array: Field = pyfftw.empty_aligned(self.shape, dtype=np.float64)
@@ -147,6 +142,12 @@ class Grid:
         self.transform_back()
         field[...] = self.padded[..., : self.points]
 
+    def filter_padded(self, symbol: Field) -> None:
+        """`padded` <- F^-1 symbol F of the values in it: one pair of transforms, no copy."""
+        self.transform()
+        self.rows(sweeps.stiffen, self.as_rows(self.padded), self.as_rows(symbol), 1.0 / self.size)
+        self.transform_back()
+
     def operator(self, symbol: Field) -> "Operator":
         """The linear map F^-1 symbol F."""
         return Operator(self, symbol)
@@ -201,10 +202,9 @@ class Operator:
     """Shape `grid.spectral_shape`."""
 
     def __call__(self, field: Field, out: Field) -> Field:
-        """Apply to `field`, write to `out` (both aligned), return `out`."""
-        grid = self.grid
-        grid.forward_into_work(field)
-        padded, symbol = grid.as_rows(grid.padded), grid.as_rows(self.symbol)
-        grid.rows(sweeps.stiffen, padded, symbol, 1.0 / grid.size)
-        grid.backward_into(out)
+        """Apply to `field`, write to `out`, return `out`."""
+        values = self.grid.padded[..., : self.grid.points]
+        values[...] = field
+        self.grid.filter_padded(self.symbol)
+        out[...] = values
         return out

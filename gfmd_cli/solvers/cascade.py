@@ -10,7 +10,6 @@ from pydantic import Field as Key
 from gfmd_cli.physics.choice import Choice
 from gfmd_cli.physics.contact import Contact
 from gfmd_cli.physics.fields import Field
-from gfmd_cli.physics.sweeps import stiffen
 from gfmd_cli.solvers.ccg import ConstrainedCG
 from gfmd_cli.solvers.fire import Fire
 from gfmd_cli.solvers.loop import State, Watch, solve
@@ -151,10 +150,8 @@ def full_contact(contact: Contact, solver: str) -> Solution | None:
     """The solution u = h, where the stress is nowhere tensile; else None. Costs two transforms."""
     grid, h = contact.grid, contact.height
     stress = grid.padded[..., : grid.points]
-    grid.forward_into_work(h)
-    padded, k = grid.as_rows(grid.padded), grid.as_rows(contact.stiffness)
-    grid.rows(stiffen, padded, k, 1.0 / grid.size)
-    grid.transform_back()
+    stress[...] = h
+    grid.filter_padded(contact.stiffness)
     if float(stress.min()) + contact.pressure < 0:
         return None
     u, sigma = h.copy(), contact.grid.empty()

@@ -147,9 +147,7 @@ class _Run:
 
     def stiffness(self) -> None:
         """padded <- K padded."""
-        self.grid.transform()
-        self.rows(sweeps.stiffen, self.padded, self.k, 1.0 / self.grid.size)
-        self.grid.transform_back()
+        self.grid.filter_padded(self.contact.stiffness)
         self.state.transforms += 2
 
     def advance(self) -> None:

@@ -10,6 +10,7 @@ import numpy as np
 from pydantic import Discriminator, StrictStr, Tag, model_validator
 from pydantic import Field as Key
 
+from gfmd_cli.errors import InputError
 from gfmd_cli.physics.bodies import SMALLEST_GRID
 from gfmd_cli.physics.choice import Choice, Positive
 from gfmd_cli.physics.elastomer import Elastomer
@@ -165,6 +166,14 @@ def differences(old: Any, new: Any, where: str = "") -> list[str]:
             for line in differences(a, b, f"{where}[{i}]" if len(old) > 1 else where)
         ]
     return [] if old == new else [f"{where}: {_short(old)} -> {_short(new)}"]
+
+
+def refuse_other(stored: Any, spec: "Spec", message: str) -> None:
+    """Raise InputError, with the difference, where a file was made from another spec."""
+    changed = differences(stored, spec.resolved())
+    if changed:
+        shown = "\n".join(f"  {line}" for line in changed[:20])
+        raise InputError(f"{message}\nStored -> asked for:\n{shown}")
 
 
 def _short(value: Any) -> str:

@@ -35,7 +35,7 @@ from gfmd_cli.study.layout import (
 )
 from gfmd_cli.study.provenance import provenance
 from gfmd_cli.study.record import SUFFIX, Record, empty_row, read_record
-from gfmd_cli.study.spec import Spec, differences, digest
+from gfmd_cli.study.spec import Spec, digest, refuse_other
 from gfmd_cli.study.tasks import Task
 
 MISSING = "missing"
@@ -52,15 +52,9 @@ class Study:
     def check_spec(self, spec: Spec) -> None:
         """Refuse, with the difference, a study that was made from another spec."""
         stored = self._stored_spec()
-        if stored is None:
-            return
-        changed = differences(stored, spec.resolved())
-        if changed:
-            shown = "\n".join(f"  {line}" for line in changed[:20])
-            raise InputError(
-                f"{self.path}: made from another spec; take another name (-o) or the old spec.\n"
-                f"Stored -> asked for:\n{shown}"
-            )
+        message = "made from another spec; take another name (-o) or the old spec."
+        if stored is not None:
+            refuse_other(stored, spec, f"{self.path}: {message}")
 
     def begin(self, spec: Spec) -> None:
         """Make the folder of unfinished work, bound to this spec. Raises SpaceError."""

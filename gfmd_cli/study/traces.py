@@ -14,7 +14,7 @@ from gfmd_cli.physics.fields import Field
 from gfmd_cli.study.files import write_whole
 from gfmd_cli.study.labelled import dataset, scale
 from gfmd_cli.study.layout import BENCH, Column
-from gfmd_cli.study.spec import Spec, differences
+from gfmd_cli.study.spec import Spec, refuse_other
 from gfmd_cli.study.store import origin
 
 BENCH_LAYOUT = 1
@@ -80,13 +80,7 @@ def check_target(path: Path, spec: Spec) -> None:
         stored = None
     if stored is None:
         raise InputError(f"{path}: exists and is no bench; take another name (-o)")
-    changed = differences(stored, spec.resolved())
-    if changed:
-        shown = "\n".join(f"  {line}" for line in changed[:20])
-        raise InputError(
-            f"{path}: a bench of another spec; take another name (-o).\n"
-            f"Stored -> asked for:\n{shown}"
-        )
+    refuse_other(stored, spec, f"{path}: a bench of another spec; take another name (-o).")
 
 
 def write_bench(path: Path, spec: Spec, text: str, traces: list[Trace]) -> None:
