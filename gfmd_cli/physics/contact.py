@@ -58,16 +58,13 @@ class Contact:
 
         Zero exactly at the solution. The one score by which all solvers are judged.
         """
-        return self.score(u, sigma)[0]
-
-    def score(self, u: Field, sigma: Field) -> tuple[float, float, float]:
-        """Natural residual, and the sums of the squares of two of its parts.
-
-        These are the force -sigma on the points off the indenter, and the tension of those on it.
-        """
         bodies = map(self.grid.as_rows, (self.height, u, sigma))
-        total, free, tension = self.grid.rows.sums(3, sweeps.score, *bodies)
-        return sqrt(total / u.size) / min(self.pressure, 1.0), float(free), float(tension)
+        (total,) = self.grid.rows.sums(1, sweeps.score, *bodies)
+        return self.as_residual(total)
+
+    def as_residual(self, violation: float) -> float:
+        """Natural residual from the sum of the squares of min(g, sigma)."""
+        return sqrt(violation / self.grid.size) / min(self.pressure, 1.0)
 
     def coarsen(self, points: int) -> "Contact":
         """The same contact, low-passed to a coarser grid."""

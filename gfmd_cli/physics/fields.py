@@ -11,5 +11,8 @@ Field: TypeAlias = NDArray[np.float64]
 Modes: TypeAlias = NDArray[np.complex128]
 """Fourier coefficients in the half-spectrum layout of a real transform."""
 
+Marks: TypeAlias = NDArray[np.int8]
+"""How each grid point stands to the indenter, see `sweeps`."""
+
 Mask: TypeAlias = NDArray[np.bool_]
 """A choice of grid points."""

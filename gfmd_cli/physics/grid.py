@@ -142,11 +142,16 @@ class Grid:
         self.transform_back()
         field[...] = self.padded[..., : self.points]
 
-    def filter_padded(self, symbol: Field) -> None:
-        """`padded` <- F^-1 symbol F of the values in it: one pair of transforms, no copy."""
+    def filter_padded(self, symbol: Field) -> float:
+        """`padded` <- F^-1 symbol F of the values in it: one pair of transforms, no copy.
+
+        Returns the sum over the grid of these values times what becomes of them.
+        """
         self.transform()
-        self.rows(sweeps.stiffen, self.as_rows(self.padded), self.as_rows(symbol), 1.0 / self.size)
+        bodies = (self.as_rows(self.padded), self.as_rows(symbol))
+        (total,) = self.rows.sums(1, sweeps.stiffen, *bodies, 1.0 / self.size)
         self.transform_back()
+        return float(total) / self.size
 
     def operator(self, symbol: Field) -> "Operator":
         """The linear map F^-1 symbol F."""

@@ -43,78 +43,122 @@ class Rows:
         return totals
 
 
+FREE, TENSE, PRESSED = 0, 1, 2
+"""Marks of a point: off the indenter; on it, but under tension; pressed against it.
+
+A kernel holds the points whose mark is at least its `least`: PRESSED or, where tension is not let
+go, TENSE.
+"""
+
+
 @kernel
 def score(h, u, sigma, out, a, b):  # type: ignore[no-untyped-def]
-    """Squares of the violation min(g, sigma), of the force on free points, of the tension."""
+    """Squares of the violation min(g, sigma)."""
+    for i in range(a, b):
+        violation = 0.0
+        for j in range(h.shape[1]):
+            worst = min(u[i, j] - h[i, j], sigma[i, j])
+            violation += worst * worst
+        out[i, 0] = violation
+
+
+@kernel
+def _judge(gap, s):  # type: ignore[no-untyped-def]
+    """Squares of violation, free force and tension of a point, and its mark."""
+    worst, square = min(gap, s), s * s
+    off, drawn = gap != 0.0, s < 0.0
+    return (
+        worst * worst,
+        square if off else 0.0,
+        square if drawn and not off else 0.0,
+        0 if off else (1 if drawn else 2),
+    )
+
+
+@kernel
+def mark(h, u, sigma, marks, out, a, b):  # type: ignore[no-untyped-def]
+    """Mark the points; squares of the violation, of the force on free points, of the tension."""
     for i in range(a, b):
         violation = free = tension = 0.0
         for j in range(h.shape[1]):
-            gap, s = u[i, j] - h[i, j], sigma[i, j]
-            least = min(gap, s)
-            violation += least * least
-            square = s * s
-            if gap != 0.0:
-                free += square
-            elif s < 0.0:
-                tension += square
+            v, f, t, marks[i, j] = _judge(u[i, j] - h[i, j], sigma[i, j])
+            violation, free, tension = violation + v, free + f, tension + t
         out[i, 0], out[i, 1], out[i, 2] = violation, free, tension
 
 
 @kernel
-def hold(h, u, sigma, release, held, out, a, b):  # type: ignore[no-untyped-def]
-    """Mark the points held in contact: on the indenter and, if `release`, not under tension."""
+def pattern(marks, least, out, a, b):  # type: ignore[no-untyped-def]
+    """Count of the points held, and of the changes to the next point along row and column."""
+    rows, columns = marks.shape
     for i in range(a, b):
-        count = 0
-        for j in range(h.shape[1]):
-            on = u[i, j] == h[i, j] and not (release and sigma[i, j] < 0.0)
-            held[i, j] = on
-            count += on
-        out[i, 0] = count
+        below = i + 1 if i + 1 < rows else 0
+        held = changes = 0
+        for j in range(columns):
+            here = marks[i, j] >= least
+            held += here
+            changes += here != (marks[below, j] >= least)
+        for j in range(columns - 1):
+            changes += (marks[i, j] >= least) != (marks[i, j + 1] >= least)
+        changes += (marks[i, columns - 1] >= least) != (marks[i, 0] >= least)
+        out[i, 0], out[i, 1] = held, changes
 
 
 @kernel
-def free_force(sigma, held, padded, a, b):  # type: ignore[no-untyped-def]
+def free_force(sigma, marks, least, padded, a, b):  # type: ignore[no-untyped-def]
     """padded <- force -sigma on the free points, 0 on those held."""
     for i in range(a, b):
         for j in range(sigma.shape[1]):
-            padded[i, j] = 0.0 if held[i, j] else -sigma[i, j]
+            padded[i, j] = 0.0 if marks[i, j] >= least else -sigma[i, j]
 
 
 @kernel
-def slopes(sigma, held, change, padded, out, a, b):  # type: ignore[no-untyped-def]
-    """padded <- z, zero where held; sums of z force and of z change."""
+def slopes(sigma, marks, least, change, padded, out, a, b):  # type: ignore[no-untyped-def]
+    """Of z (`padded`) on the free points: sums of z force and of z change."""
     for i in range(a, b):
         descent = turned = 0.0
         for j in range(sigma.shape[1]):
-            z = 0.0 if held[i, j] else padded[i, j]
-            padded[i, j] = z
+            z = 0.0 if marks[i, j] >= least else padded[i, j]
             descent -= z * sigma[i, j]
             turned += z * change[i, j]
         out[i, 0], out[i, 1] = descent, turned
 
 
 @kernel
-def turn(padded, sigma, held, beta, direction, out, a, b):  # type: ignore[no-untyped-def]
-    """direction <- z + beta direction on the free points; sum of direction times force."""
+def turn(h, u, sigma, marks, least, beta, direction, length, padded, out, a, b):  # type: ignore[no-untyped-def]
+    """direction <- z + beta direction on the free points, and the projected move along it.
+
+    `padded` holds z, and then the move max(u + length d, h) - u. Sums of direction times force and
+    of move times force; count of the points that were stopped at h.
+    """
     for i in range(a, b):
-        descent = 0.0
-        for j in range(sigma.shape[1]):
-            d = 0.0 if held[i, j] else padded[i, j] + beta * direction[i, j]
+        descent = fall = 0.0
+        stopped = 0
+        for j in range(h.shape[1]):
+            d = 0.0 if marks[i, j] >= least else padded[i, j] + beta * direction[i, j]
             direction[i, j] = d
+            d = direction[i, j]  # as rounded
+            step, room = length * d, h[i, j] - u[i, j]
+            move = max(step, room)
+            stopped += step < room
             descent -= d * sigma[i, j]
-        out[i, 0] = descent
+            fall -= move * sigma[i, j]
+            padded[i, j] = move
+        out[i, 0], out[i, 1], out[i, 2] = descent, fall, stopped
 
 
 @kernel
-def projected_move(h, u, direction, length, padded, out, a, b):  # type: ignore[no-untyped-def]
-    """padded <- max(u + length d, h) - u; count of the points that were stopped at h."""
+def move(h, u, sigma, direction, length, padded, out, a, b):  # type: ignore[no-untyped-def]
+    """padded <- max(u + length d, h) - u; sum of move times force, count of points stopped at h."""
     for i in range(a, b):
+        fall = 0.0
         stopped = 0
         for j in range(h.shape[1]):
             step, room = length * direction[i, j], h[i, j] - u[i, j]
+            way = max(step, room)
             stopped += step < room
-            padded[i, j] = max(step, room)
-        out[i, 0] = stopped
+            fall -= way * sigma[i, j]
+            padded[i, j] = way
+        out[i, 0], out[i, 1] = fall, stopped
 
 
 @kernel
@@ -128,40 +172,37 @@ def crossing(h, u, direction, length, out, a, b):  # type: ignore[no-untyped-def
 
 
 @kernel
-def along_move(h, u, sigma, direction, length, padded, out, a, b):  # type: ignore[no-untyped-def]
-    """Of the move that K was applied to (`padded` = K move): sums -move sigma, move K move."""
+def advance(h, u, sigma, direction, length, share, padded, change, marks, out, a, b):  # type: ignore[no-untyped-def]
+    """u += share move; sigma += change, change = share K move (`padded` = K move); and `mark`."""
     for i in range(a, b):
-        fall = curvature = 0.0
-        for j in range(h.shape[1]):
-            move = max(length * direction[i, j], h[i, j] - u[i, j])
-            fall -= move * sigma[i, j]
-            curvature += move * padded[i, j]
-        out[i, 0], out[i, 1] = fall, curvature
-
-
-@kernel
-def advance(h, u, sigma, direction, length, share, padded, change, a, b):  # type: ignore[no-untyped-def]
-    """u += share move, and sigma += change with change = share K move (`padded` = K move)."""
-    for i in range(a, b):
+        violation = free = tension = 0.0
         for j in range(h.shape[1]):
             floor, old = h[i, j], u[i, j]
+            way = max(length * direction[i, j], floor - old)
+            new = max(old + share * way, floor)
             if share == 1.0:
-                u[i, j] = max(old + length * direction[i, j], floor)
-            else:
-                u[i, j] = max(old + share * max(length * direction[i, j], floor - old), floor)
+                new = max(old + length * direction[i, j], floor)
             moved = share * padded[i, j]
-            change[i, j] = moved
-            sigma[i, j] += moved
+            u[i, j], sigma[i, j], change[i, j] = new, sigma[i, j] + moved, moved
+            v, f, t, marks[i, j] = _judge(u[i, j] - floor, sigma[i, j])  # as rounded
+            violation, free, tension = violation + v, free + f, tension + t
+        out[i, 0], out[i, 1], out[i, 2] = violation, free, tension
 
 
 @kernel
-def stiffen(padded, k, factor, a, b):  # type: ignore[no-untyped-def]
-    """Coefficients times factor k(q)."""
+def stiffen(padded, k, factor, out, a, b):  # type: ignore[no-untyped-def]
+    """Coefficients times factor k(q); sum over all q of k(q) |coefficient|^2."""
+    last = k.shape[1] - 1
     for i in range(a, b):
+        total = 0.0
+        ends = k[i, 0] * (padded[i, 0] ** 2 + padded[i, 1] ** 2)
+        ends += k[i, last] * (padded[i, 2 * last] ** 2 + padded[i, 2 * last + 1] ** 2)
         for j in range(k.shape[1]):
-            weight = factor * k[i, j]
-            padded[i, 2 * j] *= weight
-            padded[i, 2 * j + 1] *= weight
+            weight, re, im = k[i, j], padded[i, 2 * j], padded[i, 2 * j + 1]
+            total += weight * (re * re + im * im)
+            padded[i, 2 * j] = factor * weight * re
+            padded[i, 2 * j + 1] = factor * weight * im
+        out[i, 0] = 2 * total - ends  # a coefficient stands for q and -q, but at both ends
 
 
 @kernel

@@ -113,8 +113,12 @@ def solve_contact(
     if resume is not None:
         chain = chain[chain.index(resume.points) :]
         spent = resume.transforms
-    for points in chain:
-        fine = contact if points == contact.grid.points else contact.coarsen(points)
+    grids = [contact]
+    for points in chain[-2::-1]:
+        grids.append(grids[-1].coarsen(points))
+    while grids:
+        fine = grids.pop()
+        points = fine.grid.points
         if resume is not None and points == resume.points:
             state = resume.state
         else:

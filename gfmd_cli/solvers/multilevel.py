@@ -9,7 +9,7 @@ so any k(q) will do. One application costs a few sweeps over the array and no tr
 import numpy as np
 
 from gfmd_cli.physics.contact import Contact
-from gfmd_cli.physics.fields import Field, Mask
+from gfmd_cli.physics.fields import Field, Marks
 from gfmd_cli.physics.sweeps import Rows, kernel
 
 COARSEST = 4  # hats a side on the last level: the next would overlap themselves
@@ -23,16 +23,22 @@ class Multilevel:
         self.energies = hat_energies(contact)
         side = contact.grid.points
         sides = [side >> level for level in range(1, len(self.energies))]
-        self.fields = [np.empty((n, n)) for n in sides]
+        self.fields = [np.empty((n, n), dtype=np.float32) for n in sides]
         self.held = [np.empty((n, n), dtype=np.bool_) for n in sides]
         self.shares = [Rows(n, len(rows.parts)) if n >= 256 else Rows(n, 1) for n in sides]
 
-    def apply(self, sigma: Field, held: Mask, padded: Field) -> None:
-        """padded <- preconditioned force -sigma of the free points; `held` as of `sweeps.hold`."""
+    def apply(
+        self, sigma: Field, marks: Marks, least: int, change: Field, padded: Field
+    ) -> tuple[float, float]:
+        """padded <- z, the preconditioned force -sigma of the free points.
+
+        Returns the sums of z times force and of z times `change`.
+        """
+        bodies = (sigma, marks, least)
         depth = 0
         for depth, (field, mask) in enumerate(zip(self.fields, self.held, strict=True)):
             if depth == 0:
-                self.shares[0](first_restriction, sigma, held, field, mask)
+                self.shares[0](first_restriction, *bodies, field, mask)
             else:
                 self.shares[depth](
                     restriction, self.fields[depth - 1], self.held[depth - 1], field, mask
@@ -42,8 +48,8 @@ class Multilevel:
         else:
             depth = len(self.fields)
         if depth == 0:
-            self.rows(only_level, sigma, held, self.energies[0], padded)
-            return
+            slope, turned = self.rows.sums(2, only_level, *bodies, self.energies[0], change, padded)
+            return float(slope), float(turned)
         top = depth - 1
         self.fields[top] *= np.where(self.held[top], 0.0, 1.0 / self.energies[depth])
         for level in range(top - 1, -1, -1):
@@ -54,25 +60,23 @@ class Multilevel:
                 self.energies[level + 1],
                 self.fields[level],
             )
-        self.rows(last_prolongation, self.fields[0], sigma, held, self.energies[0], padded)
+        slope, turned = self.rows.sums(
+            2, last_prolongation, self.fields[0], *bodies, self.energies[0], change, padded
+        )
+        return float(slope), float(turned)
 
 
 def hat_energies(contact: Contact) -> list[float]:
     """<phi K phi> of a hat of each level; its Fourier transform is prod_j (1 + cos 2^j q dx)."""
     grid = contact.grid
-    weighted = contact.stiffness * grid.multiplicity()
-    across = 2 * np.pi * np.fft.fftfreq(grid.points)
-    along = 2 * np.pi * np.arange(grid.points // 2 + 1) / grid.points
-    energies = []
-    rows, columns = np.ones(grid.points), np.ones(grid.points // 2 + 1)
-    width, side = 1, grid.points
-    while True:
-        energies.append(float(rows**2 @ weighted @ columns**2) / grid.size)
-        if side % 2 or side // 2 < COARSEST:
-            return energies
-        rows = rows * (1 + np.cos(width * across))
-        columns = columns * (1 + np.cos(width * along))
-        width, side = 2 * width, side // 2
+    phase = 2 * np.pi * np.arange(grid.points // 2 + 1) / grid.points
+    hats, side = [np.ones(phase.size)], grid.points
+    while side % 2 == 0 and side // 2 >= COARSEST:
+        hats.append(hats[-1] * (1 + np.cos((grid.points // side) * phase)))
+        side //= 2
+    weighted = np.array(hats) ** 2 * grid.multiplicity()
+    k = contact.stiffness[: phase.size]  # the other rows mirror these
+    return [float(energy) / grid.size for energy in np.einsum("li,li->l", weighted @ k, weighted)]
 
 
 @kernel
@@ -87,18 +91,21 @@ def _gather(column, column_held, coarse, coarse_held):  # type: ignore[no-untype
 
 
 @kernel
-def first_restriction(sigma, held, coarse, coarse_held, a, b):  # type: ignore[no-untyped-def]
+def first_restriction(sigma, marks, least, coarse, coarse_held, a, b):  # type: ignore[no-untyped-def]
     """Restriction of the force -sigma of the free points."""
     n, m = sigma.shape[0], coarse.shape[1]
-    column, column_held = np.empty(2 * m), np.empty(2 * m, dtype=np.bool_)
+    column, column_held = np.empty(2 * m, dtype=coarse.dtype), np.empty(2 * m, dtype=np.bool_)
     for i in range(a, b):
         up, mid, down = (2 * i - 1) % n, 2 * i, 2 * i + 1
         for j in range(2 * m):
-            outer = (0.0 if held[up, j] else sigma[up, j]) + (
-                0.0 if held[down, j] else sigma[down, j]
+            above, here, below = (
+                marks[up, j] >= least,
+                marks[mid, j] >= least,
+                marks[down, j] >= least,
             )
-            column[j] = -0.5 * outer - (0.0 if held[mid, j] else sigma[mid, j])
-            column_held[j] = held[up, j] | held[mid, j] | held[down, j]
+            outer = (0.0 if above else sigma[up, j]) + (0.0 if below else sigma[down, j])
+            column[j] = -0.5 * outer - (0.0 if here else sigma[mid, j])
+            column_held[j] = above | here | below
         _gather(column, column_held, coarse[i], coarse_held[i])
 
 
@@ -106,7 +113,7 @@ def first_restriction(sigma, held, coarse, coarse_held, a, b):  # type: ignore[n
 def restriction(fine, held, coarse, coarse_held, a, b):  # type: ignore[no-untyped-def]
     """coarse <- P^T fine; a coarse hat is held where one of the hats it is made of is."""
     n, m = fine.shape[0], coarse.shape[1]
-    column, column_held = np.empty(2 * m), np.empty(2 * m, dtype=np.bool_)
+    column, column_held = np.empty(2 * m, dtype=coarse.dtype), np.empty(2 * m, dtype=np.bool_)
     for i in range(a, b):
         up, mid, down = (2 * i - 1) % n, 2 * i, 2 * i + 1
         for j in range(2 * m):
@@ -131,23 +138,36 @@ def prolongation(coarse, held, energy, fine, a, b):  # type: ignore[no-untyped-d
 
 
 @kernel
-def last_prolongation(coarse, sigma, held, energy, padded, a, b):  # type: ignore[no-untyped-def]
-    """padded <- -sigma / energy plus P coarse on the free points."""
+def last_prolongation(coarse, sigma, marks, least, energy, change, padded, out, a, b):  # type: ignore[no-untyped-def]
+    """padded <- z = -sigma / energy plus P coarse on the free points; sums as of `apply`."""
     m = coarse.shape[0]
+    row = np.empty(2 * m, dtype=coarse.dtype)
     for i in range(a, b):
         one, other = i // 2, ((i + 1) // 2) % m
         for j in range(m):
-            here = 0.5 * (coarse[one, j] + coarse[other, j])
-            nxt = j + 1 if j + 1 < m else 0
-            there = 0.5 * (coarse[one, nxt] + coarse[other, nxt])
-            e, o = 2 * j, 2 * j + 1
-            padded[i, e] = 0.0 if held[i, e] else here - sigma[i, e] / energy
-            padded[i, o] = 0.0 if held[i, o] else 0.5 * (here + there) - sigma[i, o] / energy
+            row[2 * j] = 0.5 * (coarse[one, j] + coarse[other, j])
+        for j in range(m - 1):
+            row[2 * j + 1] = 0.5 * (row[2 * j] + row[2 * j + 2])
+        row[2 * m - 1] = 0.5 * (row[2 * m - 2] + row[0])
+        slope = turned = 0.0
+        for j in range(2 * m):
+            s = sigma[i, j]
+            z = 0.0 if marks[i, j] >= least else row[j] - s / energy
+            padded[i, j] = z
+            slope -= z * s
+            turned += z * change[i, j]
+        out[i, 0], out[i, 1] = slope, turned
 
 
 @kernel
-def only_level(sigma, held, energy, padded, a, b):  # type: ignore[no-untyped-def]
-    """padded <- -sigma / energy on the free points: no hat wider than a point fits in."""
+def only_level(sigma, marks, least, energy, change, padded, out, a, b):  # type: ignore[no-untyped-def]
+    """padded <- z = -sigma / energy on the free points: no hat wider than a point fits in."""
     for i in range(a, b):
+        slope = turned = 0.0
         for j in range(sigma.shape[1]):
-            padded[i, j] = 0.0 if held[i, j] else -sigma[i, j] / energy
+            s = sigma[i, j]
+            z = 0.0 if marks[i, j] >= least else -s / energy
+            padded[i, j] = z
+            slope -= z * s
+            turned += z * change[i, j]
+        out[i, 0], out[i, 1] = slope, turned

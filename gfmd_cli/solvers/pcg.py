@@ -24,8 +24,7 @@ import numpy as np
 from gfmd_cli.physics import sweeps
 from gfmd_cli.physics.choice import Choice
 from gfmd_cli.physics.contact import Contact
-from gfmd_cli.physics.fields import Field, Mask
-from gfmd_cli.physics.observables import switches
+from gfmd_cli.physics.fields import Field
 from gfmd_cli.solvers.loop import State
 from gfmd_cli.solvers.multilevel import Multilevel
 
@@ -37,6 +36,7 @@ SOFTEST = 1e-12  # curvature over descent below which a direction is a shift of 
 RESCREEN_AFTER = 4  # steps at least between two looks at the screening length ...
 RESCREEN_GROWTH = 1.5  # ... and this factor in the step count
 RESCREEN_CHANGE = 1.25  # relative change of q_c below which the old one stays
+MEMORY = ("slope", "beta", "length", "screening", "multilevel", "rescreen_at", "free", "tension")
 
 
 class ProjectedCG(Choice):
@@ -48,20 +48,20 @@ class ProjectedCG(Choice):
         """Start from `u`, lifted above the indenter and lowered until it touches."""
         contact.settle(u)
         sigma = contact.stress(u, out=contact.grid.empty())
-        fields = {"direction": np.zeros_like(u), "change": np.zeros_like(u)}
-        names = ("slope", "length", "screening", "multilevel", "rescreen_at")
-        return State(u, sigma, transforms=2, fields=fields, scalars=dict.fromkeys(names, 0.0))
+        # single precision: they only choose where to go next; what was gone is known exactly
+        fields = {name: np.zeros(u.shape, dtype=np.float32) for name in ("direction", "change")}
+        return State(u, sigma, transforms=2, fields=fields, scalars=dict.fromkeys(MEMORY, 0.0))
 
     def iterate(self, contact: Contact, state: State) -> Iterator[State]:
         """Advance `state` in place by conjugate-gradient steps."""
         run = _Run(contact, state)
         while True:
-            free, tension = run.score()
             yield state
-            run.hold(free, tension)  # [1] which points are held in contact
-            run.precondition()  # [2] z from the force on the others
-            run.turn()  # [3] the new direction
-            run.advance()  # [4] the projected move
+            if state.exact:
+                run.judge(run.mark())
+            run.screen()  # [1] which points are held, and how to precondition the others
+            run.precondition()  # [2] z from the force on the free points
+            run.advance()  # [3] a new direction, and the projected move along it
             state.step += 1
 
 
@@ -84,30 +84,38 @@ class _Run:
                 grid.padded,
             ),
         )
-        self.held = np.empty(self.h.shape, dtype=np.bool_)
+        self.marks = np.empty(self.h.shape, dtype=np.int8)
+        self.least = sweeps.PRESSED
         self.multilevel: Multilevel | None = None
+        sums = self.mark()
+        if state.residual == np.inf:  # else it comes from a checkpoint, judged already
+            self.judge(sums)
 
-    def score(self) -> tuple[float, float]:
-        """Set the natural residual; return the squares of free force and tension."""
-        state = self.state
-        state.residual, free, tension = self.contact.score(state.u, state.sigma)
-        return free, tension
+    def mark(self) -> Field:
+        """Mark the points; what there is to judge the state by."""
+        return self.rows.sums(3, sweeps.mark, self.h, self.u, self.sigma, self.marks)
 
-    def hold(self, free: float, tension: float) -> None:
+    def judge(self, sums: Field) -> None:
+        """Note the squares of the violation, of the force on free points and of the tension."""
+        violation, free, tension = map(float, sums)
+        self.state.residual = self.contact.as_residual(violation)
+        self.memory |= {"free": free, "tension": tension}
+
+    def screen(self) -> None:
         """Choose the points that are held in contact, and from their pattern the preconditioner.
 
         Points of contact under tension are let go once that tension outweighs the force left on
         the points that are free already (proportioning, Dostal, SIAM J. Optim. 7, 871, 1997): let
         go too early, they are pressed back, and the set of contacts wanders.
         """
-        release = tension > PROPORTION**2 * free
-        self.rows.sums(1, sweeps.hold, self.h, self.u, self.sigma, release, self.held)
         memory, step = self.memory, self.state.step
+        release = memory["tension"] > PROPORTION**2 * memory["free"]
+        self.least = sweeps.PRESSED if release else sweeps.TENSE
         if step < memory["rescreen_at"]:
             return
         memory["rescreen_at"] = max(step + RESCREEN_AFTER, int(RESCREEN_GROWTH * step))
-        held = self.held.reshape(self.grid.shape)
-        stiffness, chord, exponent = pattern(self.contact, held)
+        held, changes = self.rows.sums(2, sweeps.pattern, self.marks, self.least)
+        stiffness, chord, exponent = screening(self.contact, float(held), float(changes))
         multilevel = self.grid.dimension == 2 and prefers_multilevel(chord, exponent)
         change = memory["screening"] / stiffness
         if multilevel != bool(memory["multilevel"]) or (
@@ -117,63 +125,62 @@ class _Run:
             memory |= {"slope": 0.0, "length": 0.0}
 
     def precondition(self) -> None:
-        """Write the preconditioned force to `padded`."""
-        if self.memory["multilevel"]:
+        """Write the preconditioned force z to `padded`; set the slope and the conjugation beta."""
+        memory, bodies = self.memory, (self.sigma, self.marks, self.least)
+        if memory["multilevel"]:
             self.multilevel = self.multilevel or Multilevel(self.contact, self.rows)
-            self.multilevel.apply(self.sigma, self.held, self.padded)
-            return
-        self.rows(sweeps.free_force, self.sigma, self.held, self.padded)
-        self.grid.transform()
-        screening = self.memory["screening"]
-        self.rows(sweeps.soften, self.padded, self.k, screening, 1.0 / self.grid.size)
-        self.grid.transform_back()
-        self.state.transforms += 2
-
-    def turn(self) -> None:
-        """direction <- z + beta direction, beta of Polak and Ribiere, cut off at zero."""
-        memory = self.memory
-        slope, turned = self.rows.sums(
-            2, sweeps.slopes, self.sigma, self.held, self.change, self.padded
-        )
-        # the force has changed by -change since the last direction: z (f - f_old) = -z change
+            slope, turned = self.multilevel.apply(*bodies, self.change, self.padded)
+        else:
+            self.rows(sweeps.free_force, *bodies, self.padded)
+            self.grid.transform()
+            screened = (memory["screening"], 1.0 / self.grid.size)
+            self.rows(sweeps.soften, self.padded, self.k, *screened)
+            self.grid.transform_back()
+            self.state.transforms += 2
+            slope, turned = self.rows.sums(2, sweeps.slopes, *bodies, self.change, self.padded)
+        # Polak and Ribiere, cut off at zero. The force has changed by -change since the last
+        # direction: z (f - f_old) = -z change
         beta = max(0.0, -turned / memory["slope"]) if memory["slope"] > 0 else 0.0
-        memory["slope"] = slope
-        for factor in (beta, 0.0):
-            (descent,) = self.rows.sums(
-                1, sweeps.turn, self.padded, self.sigma, self.held, factor, self.direction
-            )
-            if descent > 0:
-                break
+        memory |= {"slope": float(slope), "beta": float(beta)}
 
-    def stiffness(self) -> None:
-        """padded <- K padded."""
-        self.grid.filter_padded(self.contact.stiffness)
+    def stiffness(self) -> float:
+        """padded <- K padded; the sum of their products."""
         self.state.transforms += 2
+        return self.grid.filter_padded(self.contact.stiffness)
 
     def advance(self) -> None:
-        """Move along the direction, projected on u >= h; never let the energy rise."""
-        memory, rows, bodies = self.memory, self.rows, (self.h, self.u)
-        if memory["length"] == 0.0:
-            memory["length"] = self.exact_length()
-        share = 0.0
+        """Turn, and move along the direction, projected on u >= h; never let the energy rise."""
+        memory, rows, bodies = self.memory, self.rows, (self.h, self.u, self.sigma)
+        descent, fall, stopped = self.turn()
+        if descent <= 0:
+            self.precondition()
+            memory["beta"] = 0.0
+            descent, fall, stopped = self.turn()
+        share, moved = 0.0, memory["length"] > 0
+        if not moved:
+            memory["length"] = self.exact_length(descent)
         for _ in range(HALVINGS):
             length = memory["length"]
-            (stopped,) = rows.sums(
-                1, sweeps.projected_move, *bodies, self.direction, length, self.padded
-            )
-            self.stiffness()
-            fall, curvature = rows.sums(
-                2, sweeps.along_move, *bodies, self.sigma, self.direction, length, self.padded
-            )
+            if not moved:
+                fall, stopped = rows.sums(
+                    2, sweeps.move, *bodies, self.direction, length, self.padded
+                )
+            curvature = self.stiffness()
             if fall > 0:
-                best = fall / curvature if curvature > 0 else 1.0  # 1: a rigid shift
+                best = float(fall) / curvature if curvature > 0 else 1.0  # 1: a rigid shift
                 share = self.share_of_move(best, stopped > 0)
                 break
-            memory["length"] *= 0.5
-            memory["slope"] = 0.0
-        moved = (self.sigma, self.direction, length, share, self.padded, self.change)
-        rows(sweeps.advance, *bodies, *moved)
+            memory |= {"length": 0.5 * length, "slope": 0.0}
+            moved = False
+        way = (self.direction, length, share, self.padded, self.change)
+        self.judge(rows.sums(3, sweeps.advance, *bodies, *way, self.marks))
         self.state.exact = False
+
+    def turn(self) -> Field:
+        """The new direction, and the move along it; see `sweeps.turn`."""
+        memory, bodies = self.memory, (self.h, self.u, self.sigma, self.marks, self.least)
+        way = (memory["beta"], self.direction, memory["length"])
+        return self.rows.sums(3, sweeps.turn, *bodies, *way, self.padded)
 
     def share_of_move(self, best: float, stopped: bool) -> float:
         """How much of a move to go, where the energy is least at the share `best` of it."""
@@ -193,15 +200,12 @@ class _Run:
         moved = (self.h, self.u, self.direction, length)
         return bool(self.rows.sums(1, sweeps.crossing, *moved)[0] > 0)
 
-    def exact_length(self) -> float:
+    def exact_length(self, descent: float) -> float:
         """The length that minimises the energy along the direction, were there no indenter."""
-        columns = self.h.shape[1]
-        self.padded[:, :columns] = self.direction
-        self.stiffness()
-        curvature = float(np.einsum("ij,ij", self.direction, self.padded[:, :columns]))
-        descent = -float(np.einsum("ij,ij", self.direction, self.sigma))
+        self.padded[:, : self.h.shape[1]] = self.direction
+        curvature = self.stiffness()
         if curvature > SOFTEST * descent:
-            return descent / curvature
+            return float(descent) / curvature
         return float(np.ptp(self.h) / np.abs(self.direction).max())  # of a rigid shift, at most
 
 
@@ -214,19 +218,21 @@ def prefers_multilevel(chord: float, exponent: float) -> bool:
     return exponent > 0.75 and chord > 8 * (exponent - 1)
 
 
-def pattern(contact: Contact, held: Mask) -> tuple[float, float, float]:
+def screening(contact: Contact, held: float, changes: float) -> tuple[float, float, float]:
     """Screening stiffness k(q_c), mean free chord l in grid spacings, local exponent n of k.
+
+    Taken from how many points are held, and how many changes there are along rows and columns.
 
     q_c = c pi / l with c = 2^((n - 2)(1 - a_r)). Measured on the default surface of the paper at
     512^2, p* = 0.01, 0.1, 1: the fewest transforms, within some 20 %, were at c = 1/2 for n = 1,
     1 for n = 2, 2 for n = 3, 3 to 4 for n = 4 while a_r is small, 1 for n >= 2 near full contact.
     """
-    points = contact.grid.points
-    line = contact.stiffness if contact.grid.dimension == 1 else contact.stiffness[0]
+    grid = contact.grid
+    line = contact.stiffness if grid.dimension == 1 else contact.stiffness[0]
     log_k = np.log(line[1:])
     log_m = np.log(np.arange(1, line.size))
-    area = np.count_nonzero(held) / held.size
-    crossings = switches(held) * points / (held.ndim * held.size)  # of one line across the cell
+    area = held / grid.size
+    crossings = changes * grid.points / (grid.dimension * grid.size)  # of one line across the cell
     chord = 2 * (1 - area) / crossings if crossings > 0 else 1.0  # in units of L
     at = min(float(np.log(0.5 / max(chord, 1e-9))), log_m[-1])
     step = 0.1  # of log q, for the local exponent
@@ -234,4 +240,4 @@ def pattern(contact: Contact, held: Mask) -> tuple[float, float, float]:
     n = float(np.diff(np.interp([inside - step, inside + step], log_m, log_k))[0]) / (2 * step)
     at = min(at + float(np.log(2)) * (n - 2) * (1 - area), log_m[-1])
     below = n * min(at, 0.0)  # patches further apart than L / 2: the power law goes on
-    return float(np.exp(np.interp(at, log_m, log_k) + below)), chord * points, n
+    return float(np.exp(np.interp(at, log_m, log_k) + below)), chord * grid.points, n

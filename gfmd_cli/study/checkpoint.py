@@ -48,7 +48,10 @@ class Checkpoint:
                 "misses": state.misses,
                 "transforms": state.transforms,
                 "scalars": state.scalars,
-                "fields": dict(zip(fields, sums, strict=True)),
+                "fields": {
+                    name: [sum_, field.dtype.str]
+                    for (name, field), sum_ in zip(fields.items(), sums, strict=True)
+                },
             }
             write_whole(self.pointer, json.dumps(pointer).encode())
         except OSError as error:
@@ -103,13 +106,13 @@ def _write_slot(path: Path, fields: list[Field]) -> list[int]:
     return sums
 
 
-def _read_slot(path: Path, grid: Grid, sums: dict[str, int]) -> dict[str, Field]:
+def _read_slot(path: Path, grid: Grid, stored: dict[str, Any]) -> dict[str, Field]:
     """The fields of a slot. Raises ValueError where one is not what was written."""
-    stored = np.memmap(path, np.float64, "r", shape=(len(sums), *grid.shape))
-    fields = {}
-    for (name, expected), mapped in zip(sums.items(), stored, strict=True):
-        field = grid.empty()
-        field[...] = mapped
+    fields, offset = {}, 0
+    for name, (expected, kind) in stored.items():
+        field: Field = np.empty(grid.shape, kind)
+        field[...] = np.memmap(path, kind, "r", offset, grid.shape)
+        offset += field.nbytes
         if zlib.crc32(field.data.cast("B")) != expected:
             raise ValueError(f"{path}: field {name} is damaged")
         fields[name] = field
