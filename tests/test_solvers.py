@@ -640,6 +640,31 @@ def test_a_stopped_solve_goes_on_bit_by_bit(elastomer, tolerance):
         assert (resumed.steps, resumed.residual) == (straight.steps, straight.residual)
 
 
+@pytest.mark.parametrize("elastomer", [Power(n=0), Power(n=0.5), Power(n=1), SLABS[1]], ids=name)
+def test_single_precision_says_its_residual_in_double(elastomer):
+    contact = scene(ROUGH, elastomer, 256).contact(0.1)
+    found = solve_contact(contact, SolverChoice(tolerance=1e-4, precision="single"), ignore)
+    assert (found.status, found.u.dtype) == ("converged", np.float64)
+    violation = np.minimum(found.u - contact.height, found.sigma)
+    stress = np.fft.irfft2(np.fft.rfft2(found.u) * contact.stiffness, found.u.shape)
+    assert found.sigma == pytest.approx(stress + contact.pressure, abs=1e-11)
+    assert found.residual == pytest.approx(np.sqrt(np.mean(violation**2)) / 0.1)
+    assert found.residual < 1e-4
+    exact, seen = solved(elastomer, 0.1).seen, observe(contact, found.u, found.sigma)
+    assert (seen.u_g, seen.sigma_p) == pytest.approx((exact.u_g, exact.sigma_p), rel=1e-4)
+    assert seen.a_r == pytest.approx(exact.a_r, rel=2e-3)
+
+
+@pytest.mark.parametrize("n", [1, 3])
+def test_single_precision_says_where_it_is_not_enough(n):
+    contact = scene(ROUGH, Power(n=n), 256).contact(0.02)
+    found = solve_contact(contact, SolverChoice(tolerance=1e-9, precision="single"), ignore)
+    assert found.status == "rounding"
+    assert 1e-9 < found.residual < 1e-2
+    seen, exact = observe(contact, found.u, found.sigma), solved(Power(n=n), 0.02).seen
+    assert (seen.u_g, seen.a_r) == pytest.approx((exact.u_g, exact.a_r), rel=1e-4)
+
+
 def test_sorting_is_one_state():
     contact = scene(ROUGH, Power(n=0), 256).contact(0.1)
     state = Sort().begin(contact, contact.grid.empty())

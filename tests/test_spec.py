@@ -129,6 +129,10 @@ def test_task_ids_depend_on_content_not_on_place(read):
         (("[study]", "[study"), ["TOML syntax"]),
         (('"base"', '"../x"'), ["study.name", "pattern"]),
         (("[study]", "[solver]\ntolerance = 0\n[study]"), ["solver.tolerance", "greater than 0"]),
+        (
+            ("[study]", '[solver]\nkind = "fire"\nprecision = "single"\n[study]'),
+            ["solver", "precision", "fire"],
+        ),
         (("[study]", "surface = 3\n[study]"), ["TOML syntax"]),
         (("[study]", "x" + ".x" * 5000 + " = 1\n[study]"), ["nested deeper"]),
         (("[study]", "x = " + "[" * 5000 + "\n[study]"), ["nested deeper"]),

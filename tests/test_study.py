@@ -246,8 +246,9 @@ def test_checkpoints_come_back_as_they_were(tmp_path):
 
     contact = Contact()
     contact.grid = grid
-    state = State(rng.random((16, 16)), rng.random((16, 16)), False, 0.1, 7, 2, 9, {"slope": 1 / 3})
-    state.fields["direction"] = rng.random((16, 16))
+    state = State(rng.random((16, 16)), rng.random((16, 16)), exact=False, residual=0.1, step=7)
+    state.misses, state.least, state.transforms, state.scalars = 2, 0.3, 9, {"slope": 1 / 3}
+    state.fields["direction"] = rng.random((16, 16)).astype(np.float32)
     checkpoint = Checkpoint(tmp_path / "c")
     assert checkpoint.load(grid) is None
     checkpoint.save(contact, state, 12.5)
@@ -256,7 +257,10 @@ def test_checkpoints_come_back_as_they_were(tmp_path):
     checkpoint.save(contact, state, 12.5)
     resume = checkpoint.load(Grid(32))
     assert (resume.points, resume.transforms, resume.state.step) == (16, 12.5, 8)
-    assert resume.state.scalars == {"slope": 1 / 3}
+    told = resume.state
+    assert (told.exact, told.residual, told.misses, told.least) == (False, 0.1, 2, 0.3)
+    assert (told.transforms, told.scalars) == (9, {"slope": 1 / 3})
+    assert told.fields["direction"].dtype == np.float32
     np.testing.assert_array_equal(resume.state.u, state.u)
     np.testing.assert_array_equal(resume.state.fields["direction"], state.fields["direction"])
     slot = json.loads(checkpoint.pointer.read_text())["slot"]

@@ -66,6 +66,12 @@ class Contact:
         """Natural residual from the sum of the squares of min(g, sigma)."""
         return sqrt(violation / self.grid.size) / min(self.pressure, 1.0)
 
+    def in_single(self) -> "Contact":
+        """The same contact, rounded to single precision."""
+        grid = replace(self.grid, precision="single")
+        height, stiffness = self.height.astype(grid.real), self.stiffness.astype(grid.real)
+        return Contact(grid, height, stiffness, self.pressure)
+
     def coarsen(self, points: int) -> "Contact":
         """The same contact, low-passed to a coarser grid."""
         grid = replace(self.grid, points=points)

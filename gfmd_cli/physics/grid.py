@@ -7,6 +7,7 @@ Coefficients are kept for non-negative wavenumbers of the last axis only (real t
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any, Literal
 
 import numpy as np
 import pyfftw
@@ -37,6 +38,13 @@ class Grid:
     length: float = 1.0
     """Side of the cell [m]."""
     threads: int = 1
+    precision: Literal["double", "single"] = "double"
+    """Of fields and transforms."""
+
+    @property
+    def real(self) -> "np.dtype[np.floating[Any]]":
+        """Type of the values of a field."""
+        return np.dtype(np.float64 if self.precision == "double" else np.float32)
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -55,12 +63,13 @@ class Grid:
 
     def empty(self) -> Field:
         """A real field, aligned for the transforms, values undefined."""
-        array: Field = pyfftw.empty_aligned(self.shape, dtype=np.float64)
+        array: Field = pyfftw.empty_aligned(self.shape, dtype=self.real)
         return array
 
     def empty_modes(self) -> Modes:
         """Fourier coefficients, aligned for the transforms, values undefined."""
-        array: Modes = pyfftw.empty_aligned(self.spectral_shape, dtype=np.complex128)
+        kind = np.result_type(self.real, np.complex64)
+        array: Modes = pyfftw.empty_aligned(self.spectral_shape, dtype=kind)
         return array
 
     def mode_number(self, rows: slice = ALL) -> Field:
@@ -89,7 +98,7 @@ class Grid:
         Array and plans come together: measuring a plan overwrites the array.
         """
         work = self.empty_modes()
-        real = work.view(np.float64)[..., : self.points]
+        real = work.view(self.real)[..., : self.points]
         axes, options = tuple(range(self.dimension)), {"threads": self._threads}
         with wisdom.kept():
             forward = pyfftw.FFTW(
@@ -108,7 +117,7 @@ class Grid:
     @property
     def padded(self) -> Field:
         """The same memory as rows of real values, two more than the grid has points a row."""
-        return self.work.view(np.float64)
+        return self.work.view(self.real)
 
     def transform(self) -> None:
         """`work` <- coefficients of the values in `padded`, without the factor 1/size."""

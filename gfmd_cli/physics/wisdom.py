@@ -23,17 +23,21 @@ def processor() -> str:
     return platform.processor()
 
 
-def _path() -> Path:
+def _paths() -> list[Path]:
+    """Files of the wisdom in double and in single precision."""
     cache_home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
     key = hashlib.sha256(f"{processor()} {pyfftw.__version__}".encode()).hexdigest()[:12]
-    return cache_home / "gfmd" / f"fftw-{key}.txt"
+    return [cache_home / "gfmd" / f"{name}-{key}.txt" for name in ("fftw", "fftwf")]
 
 
 @cache
 def _load() -> None:
     """Take in what earlier processes measured; a file that FFTW refuses is as good as none."""
-    with suppress(OSError):
-        pyfftw.import_wisdom((_path().read_bytes(), b"", b""))
+    known = [b"", b"", b""]  # the third: of long double
+    for i, path in enumerate(_paths()):
+        with suppress(OSError):
+            known[i] = path.read_bytes()
+    pyfftw.import_wisdom(tuple(known))
 
 
 @contextmanager
@@ -44,10 +48,9 @@ def kept() -> Iterator[None]:
     yield
     if time.perf_counter() - begun < KNOWN:
         return
-    learnt = pyfftw.export_wisdom()[0]
-    path = _path()
-    fresh = path.with_suffix(f".{os.getpid()}")
-    with suppress(OSError):  # a cache that cannot be written costs time only
-        path.parent.mkdir(parents=True, exist_ok=True)
-        fresh.write_bytes(learnt)
-        fresh.replace(path)
+    for path, learnt in zip(_paths(), pyfftw.export_wisdom(), strict=False):
+        fresh = path.with_suffix(f".{os.getpid()}")
+        with suppress(OSError):  # a cache that cannot be written costs time only
+            path.parent.mkdir(parents=True, exist_ok=True)
+            fresh.write_bytes(learnt)
+            fresh.replace(path)

@@ -8,7 +8,8 @@ from typing import Protocol
 from gfmd_cli.physics.contact import Contact
 from gfmd_cli.physics.fields import Field
 
-MISSES = 20  # one or two happen when sigma has drifted; so many mean that rounding is the limit
+MISSES = 5  # one or two happen when sigma has drifted; so many in a row mean that rounding ...
+PROGRESS = 0.7  # ... is the limit, where none brings the true residual down by this factor
 
 
 @dataclass
@@ -24,7 +25,10 @@ class State:
     residual: float = float("inf")
     step: int = 0
     misses: int = 0
-    """How often the residual was found too large when sigma was computed afresh."""
+    """How often in a row the residual was too large, and hardly less than before, when sigma was
+    computed afresh."""
+    least: float = float("inf")
+    """The least residual found so."""
     transforms: int = 0
     """Transforms on this grid so far."""
     scalars: dict[str, float] = field(default_factory=dict)
@@ -65,7 +69,10 @@ def solve(
     for current in solver.iterate(contact, state):
         if current.residual < tolerance and not current.exact:
             refresh(contact, current)
-            current.misses += current.residual >= tolerance
+            if current.residual >= tolerance:
+                progress = current.residual < PROGRESS * current.least
+                current.misses = 0 if progress else current.misses + 1
+                current.least = min(current.least, current.residual)
         watch(contact, current)
         if not isfinite(current.residual):
             return "diverged"

@@ -23,7 +23,8 @@ class Sort(Choice):
         """The solution; `u` is overwritten. Raises ValueError where k(q) is not flat."""
         if not is_flat(contact):
             raise ValueError("sort solves bodies of flat stiffness (n = 0) only")
-        level = non_contact_height(contact.height, contact.pressure / contact.stiffness.flat[-1])
+        displaced = contact.pressure / float(contact.stiffness.flat[-1])
+        level = non_contact_height(contact.height, displaced)
         np.maximum(contact.height, level, out=u)
         return State(u, contact.stress(u, out=contact.grid.empty()), transforms=2)
 

@@ -46,6 +46,7 @@ class Checkpoint:
                 "residual": state.residual,
                 "step": state.step,
                 "misses": state.misses,
+                "least": state.least,
                 "transforms": state.transforms,
                 "scalars": state.scalars,
                 "fields": {
@@ -70,6 +71,7 @@ class Checkpoint:
                 residual=pointer["residual"],
                 step=pointer["step"],
                 misses=pointer["misses"],
+                least=pointer["least"],
                 transforms=pointer["transforms"],
                 scalars=pointer["scalars"],
                 fields=fields,

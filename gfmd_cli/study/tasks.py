@@ -14,9 +14,9 @@ from gfmd_cli.physics.surface import FileSurface, Surface
 from gfmd_cli.solvers.cascade import SolverChoice
 from gfmd_cli.study.spec import OutputTable, Spec, digest
 
-FIELDS_IN_MEMORY = 7.35
-"""Fields of double precision that a solve holds at its peak: h, u, sigma, direction, change, work;
-k(q) on the half-spectrum, contact marks, coarse levels. scripts/memory.py measures it."""
+FIELDS_IN_MEMORY = 6.15
+"""Fields of double precision that a solve holds at its peak: h, u, sigma, work; at half the
+size direction, change, k(q); contact marks, coarse levels. scripts/memory.py measures it."""
 BASE_BYTES = 215e6
 """What a process holds besides: the interpreter and its libraries."""
 SECONDS_PER_PAIR = 8e-9
