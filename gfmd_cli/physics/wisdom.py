@@ -1,18 +1,18 @@
-"""FFTW's wisdom, kept as text in the user's cache directory, so that plans are measured once."""
+"""FFTW's wisdom, kept as text in the user's cache directory, so that plans are measured once.
 
+One process plans at a time and then tells the others: all processes of a machine compute with the
+same plans, and so to the same bits.
+"""
+
+import fcntl
 import hashlib
 import os
 import platform
-import time
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
-from functools import cache
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 import pyfftw
-
-KNOWN = 0.01  # seconds; a plan made faster was known already, or is not worth keeping
-
 
 def processor() -> str:
     """The model name of the processor: a plan measured on one is a bad one on another."""
@@ -30,27 +30,38 @@ def _paths() -> list[Path]:
     return [cache_home / "gfmd" / f"{name}-{key}.txt" for name in ("fftw", "fftwf")]
 
 
-@cache
-def _load() -> None:
-    """Take in what earlier processes measured; a file that FFTW refuses is as good as none."""
+def _take_in(paths: list[Path]) -> None:
+    """Know what others measured; a file that FFTW refuses is as good as none."""
     known = [b"", b"", b""]  # the third: of long double
-    for i, path in enumerate(_paths()):
+    for i, path in enumerate(paths):
         with suppress(OSError):
             known[i] = path.read_bytes()
     pyfftw.import_wisdom(tuple(known))
 
 
 @contextmanager
+def _alone(folder: Path) -> Iterator[None]:
+    """Inside, no other process plans; where the folder cannot be written, that is not assured."""
+    with ExitStack() as stack:
+        with suppress(OSError):
+            folder.mkdir(parents=True, exist_ok=True)
+            lock = stack.enter_context((folder / "lock").open("w"))
+            fcntl.flock(lock, fcntl.LOCK_EX)
+        yield
+
+
+@contextmanager
 def kept() -> Iterator[None]:
     """Plan inside with the wisdom known, and keep what was learnt."""
-    _load()
-    begun = time.perf_counter()
-    yield
-    if time.perf_counter() - begun < KNOWN:
-        return
-    for path, learnt in zip(_paths(), pyfftw.export_wisdom(), strict=False):
-        fresh = path.with_suffix(f".{os.getpid()}")
-        with suppress(OSError):  # a cache that cannot be written costs time only
-            path.parent.mkdir(parents=True, exist_ok=True)
-            fresh.write_bytes(learnt)
-            fresh.replace(path)
+    paths = _paths()
+    with _alone(paths[0].parent):
+        _take_in(paths)
+        before = pyfftw.export_wisdom()
+        yield
+        for path, old, new in zip(paths, before, pyfftw.export_wisdom(), strict=False):
+            if new == old:
+                continue
+            fresh = path.with_suffix(f".{os.getpid()}")
+            with suppress(OSError):  # a cache that cannot be written costs time only
+                fresh.write_bytes(new)
+                fresh.replace(path)

@@ -28,7 +28,7 @@ METHODS: dict[str, type[Method]] = {
 }
 COARSEST = 64  # points per side; a solve there costs next to nothing
 IN_SINGLE = 0.5  # of the tolerance: what is measured in single precision is a little off
-COARSE_TOLERANCE = 1e-3  # of the start that a coarse grid gives; measured: tighter does not pay
+COARSE_TOLERANCE = 1e-2  # of the start that a coarse grid gives; measured: tighter does not pay
 
 
 class SolverChoice(Choice):
@@ -100,6 +100,7 @@ def solve_contact(
     choice: SolverChoice,
     watch: Watch,
     resume: Resume | None = None,
+    start: Field | None = None,
     enter_level: Callable[[int, float], None] = lambda points, spent: None,
 ) -> Solution:
     """Solve one contact by the chosen method, nested over grids.
@@ -108,6 +109,8 @@ def solve_contact(
     ----------
     watch : sees every state of every grid
     resume : continue from here instead of from the coarsest grid
+    start : displacement to begin with, on the grid of the contact, instead of coarser grids; taken
+        over
     enter_level : told the points of each grid and the transforms spent before it
     """
     method = choice.method(contact)
@@ -120,7 +123,8 @@ def solve_contact(
         full = full_contact(exact, method.kind)
         if full is not None:
             return full
-        chain = levels(contact.grid.points) if choice.nested else [contact.grid.points]
+        nested = choice.nested and start is None
+        chain = levels(contact.grid.points) if nested else [contact.grid.points]
     spent = 0.0 if isinstance(method, Sort) else 2.0  # the look at full contact
     state: State | None = None
     coarse: Contact | None = None
@@ -136,7 +140,7 @@ def solve_contact(
         if resume is not None and points == resume.points:
             state = resume.state
         else:
-            u = _start(fine, coarse, state)
+            u = _start(fine, coarse, state) if start is None else start.astype(fine.grid.real)
             coarse = state = None  # their memory is needed now
             state = method.begin(fine, u)
         enter_level(points, spent)

@@ -31,8 +31,11 @@ class Checkpoint:
         self.folder = folder
         self.pointer = folder / "pointer.json"
 
-    def save(self, contact: Contact, state: State, spent: float) -> None:
-        """Write the state; `spent` are the transforms of coarser grids. Raises SpaceError."""
+    def save(self, contact: Contact, state: State, spent: float, notes: Any = None) -> None:
+        """Write the state; `spent` are the transforms of coarser grids.
+
+        `notes` are plain data that go with it. Raises SpaceError.
+        """
         fields = {"u": state.u, "sigma": state.sigma, **state.fields}
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
@@ -42,6 +45,7 @@ class Checkpoint:
                 "slot": slot,
                 "points": contact.grid.points,
                 "spent": spent,
+                "notes": notes,
                 "exact": state.exact,
                 "residual": state.residual,
                 "step": state.step,
@@ -79,6 +83,10 @@ class Checkpoint:
         except (KeyError, TypeError, ValueError, OSError):
             return None
         return Resume(pointer["points"], state, pointer["spent"])
+
+    def notes(self) -> Any:
+        """The notes of the saved state, None where there are none."""
+        return self._pointer().get("notes")
 
     def remove(self) -> None:
         """Forget the state: the task is done."""

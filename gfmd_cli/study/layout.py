@@ -51,6 +51,18 @@ FURTHER = (
     Column("work", float, "1", "(<sigma h> - p <u>) / (h_std Delta_sigma): twice the energy"),
     Column("steps", int, "1", "steps on the finest grid"),
     Column("tolerance", float, "1", "natural residual asked for"),
+    *(
+        column
+        for name in ("a_r", "sigma_p", "u_g")
+        for column in (
+            Column(f"{name}_continuum", float, "1", "estimate of the continuum value"),
+            Column(f"{name}_continuum_error", float, "1", "its estimated error"),
+            Column(f"{name}_verdict", str, "", "how the value behaves as grids get finer"),
+            Column(f"{name}_algebraic", float, "1", "error of the solution on its grid, estimated"),
+        )
+    ),
+    Column("sigma_p_bound", float, "1", "proven bound of the error of sigma_p on its grid"),
+    Column("u_g_bound", float, "1", "proven bound of the error of u_g on its grid"),
 )
 COLUMNS = (*CONTRACT, *FURTHER)
 

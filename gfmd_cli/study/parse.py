@@ -17,6 +17,7 @@ from gfmd_cli.solvers.cascade import SolverChoice
 from gfmd_cli.study.spec import (
     SHAPES,
     SWEPT,
+    AccuracyTable,
     GridTable,
     Ladder,
     LoadTable,
@@ -44,6 +45,7 @@ MODELS: dict[str, type[Choice] | dict[str, type[Choice]]] = {
     "load": LoadTable,
     "solver": SolverChoice,
     "output": OutputTable,
+    "accuracy": AccuracyTable,
 }
 REQUIRED = ("surface", "elastomer", "grid", "load")
 
@@ -158,6 +160,17 @@ def build_spec(data: dict[str, Any], folder: Path, where: _Where) -> Spec:
                 problems.append(f"{where(name)}: {name}: must be a table, got {table!r}")
         distinct = list(dict.fromkeys(built)) if name in SWEPT else built
         tables[name] = distinct if name in SWEPT else next(iter(distinct), None)
+    if "accuracy" not in data:
+        tables["accuracy"] = None
+        if any(grid.points == "auto" for grid in tables.get("grid", [])):
+            problems.append(
+                f'{where("grid.points")}: grid.points: "auto" takes a table [accuracy] that says '
+                "what is good enough, such as mean_gap = 0.01"
+            )
+    elif tables["accuracy"] is not None and not tables["accuracy"].asked():
+        problems.append(
+            f"{where('accuracy')}: accuracy: give mean_gap, contact_area or stress_deviation"
+        )
     if problems:
         raise InputError("\n".join(dict.fromkeys(problems)))
     return Spec(**tables)

@@ -15,7 +15,7 @@ from typing import Any
 from gfmd_cli.errors import GfmdError, Interrupted
 from gfmd_cli.study import solve
 from gfmd_cli.study.record import SUFFIX
-from gfmd_cli.study.resources import check_memory, share_out
+from gfmd_cli.study.resources import HEADROOM, available_memory, check_memory, share_out
 from gfmd_cli.study.solve import Progress, Report, solve_task
 from gfmd_cli.study.spec import Spec
 from gfmd_cli.study.store import Study
@@ -77,22 +77,28 @@ def _solve_all(
     pending: list[Task], parts: Path, report: Report, jobs: int | None, every: float
 ) -> Counter[str]:
     jobs, threads = share_out(pending, jobs)
+    memory = HEADROOM * available_memory() / jobs
     if jobs > 1:
-        return _solve_in_pool(pending, parts, report, jobs, threads, every)
+        return _solve_in_pool(pending, parts, report, jobs, (threads, every, memory))
     outcome: Counter[str] = Counter()
     for task in pending:
         if solve.stop.is_set():
             break
-        status = _attempt(task, parts, threads, every, report)
+        status = _attempt(task, parts, report, (threads, every, memory))
         if status != "interrupted":
             outcome[status] += 1
     return outcome
 
 
-def _attempt(task: Task, parts: Path, threads: int, every: float, report: Report) -> str:
+Means = tuple[int, float, float]
+"""Of one task: threads, seconds between checkpoints, memory [bytes]."""
+
+
+def _attempt(task: Task, parts: Path, report: Report, means: Means) -> str:
     """Solve one task; an error ends this task only."""
+    threads, every, memory = means
     try:
-        return solve_task(task, parts, threads, report, every)
+        return solve_task(task, parts, threads, report, every, memory)
     except Interrupted:
         report(Progress(task.index, "interrupted", task.label))
         return "interrupted"
@@ -103,7 +109,7 @@ def _attempt(task: Task, parts: Path, threads: int, every: float, report: Report
 
 
 def _solve_in_pool(
-    pending: list[Task], parts: Path, report: Report, jobs: int, threads: int, every: float
+    pending: list[Task], parts: Path, report: Report, jobs: int, means: Means
 ) -> Counter[str]:
     """Tasks side by side, the longest first, so that none is left over at the end."""
     context = multiprocessing.get_context("spawn")  # forked FFTW threads would hang
@@ -113,7 +119,7 @@ def _solve_in_pool(
     outcome: Counter[str] = Counter()
     with ProcessPoolExecutor(jobs, context, _begin_worker, (reports,)) as pool:
         futures = {
-            pool.submit(_work, task, parts, threads, every): task
+            pool.submit(_work, task, parts, means): task
             for task in sorted(pending, key=lambda task: -task.seconds)
         }
         for task, status in _as_they_end(futures, pool):
@@ -162,8 +168,8 @@ def _begin_worker(reports: Any) -> None:
         signal.signal(number, lambda *_: solve.stop.set())
 
 
-def _work(task: Task, parts: Path, threads: int, every: float) -> str:
-    return _attempt(task, parts, threads, every, _reports.put)
+def _work(task: Task, parts: Path, means: Means) -> str:
+    return _attempt(task, parts, _reports.put, means)
 
 
 @contextmanager

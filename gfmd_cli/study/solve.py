@@ -2,8 +2,7 @@
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
-from functools import lru_cache
+from dataclasses import dataclass, field
 from pathlib import Path
 from threading import Event
 from typing import Any, Literal, NamedTuple
@@ -11,11 +10,11 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from gfmd_cli.errors import Interrupted
-from gfmd_cli.physics.contact import Contact, Scene, build_scene
-from gfmd_cli.physics.observables import cross_section, observe, stress_distribution
-from gfmd_cli.solvers.cascade import Solution, solve_contact
+from gfmd_cli.physics.contact import Contact
+from gfmd_cli.physics.observables import cross_section, stress_distribution
 from gfmd_cli.solvers.loop import State
 from gfmd_cli.study.checkpoint import Checkpoint
+from gfmd_cli.study.grids import Solved, solve_on_grids
 from gfmd_cli.study.layout import PR_LINEAR, PR_LOGARITHMIC
 from gfmd_cli.study.record import Record, empty_row, write_record
 from gfmd_cli.study.tasks import Task
@@ -53,6 +52,10 @@ class _Watcher:
     last_report: float = 0.0
     last_save: float = 0.0
     spent: float = 0.0
+    notes: list[dict[str, Any]] = field(default_factory=list)
+
+    def note(self, notes: list[dict[str, Any]]) -> None:
+        self.notes = notes
 
     def enter_level(self, points: int, spent: float) -> None:
         self.spent = spent
@@ -69,41 +72,41 @@ class _Watcher:
                 )
             )
         if stop.is_set() or now - self.last_save > self.every:
-            self.checkpoint.save(contact, state, self.spent)
+            self.checkpoint.save(contact, state, self.spent, self.notes)
             self.last_save = now
         if stop.is_set():
             raise Interrupted(f"{self.task.label}: stopped, state saved")
 
 
-@lru_cache(maxsize=1)
-def _scene(surface: Any, elastomer: Any, points: int, threads: int) -> Scene:
-    """The scene of the task before is that of the next, as a rule."""
-    return build_scene(surface, elastomer, points, threads)
-
-
 def solve_task(
-    task: Task, parts: Path, threads: int, report: Report, checkpoint_every: float
+    task: Task,
+    parts: Path,
+    threads: int,
+    report: Report,
+    checkpoint_every: float,
+    memory: float = np.inf,
 ) -> str:
     """Solve one task and commit its record; return its status.
 
-    Raises Interrupted after its state was saved, InputError, SpaceError.
+    `memory` [bytes] limits how far an "auto" grid may grow. Raises Interrupted after the state was
+    saved, InputError, SpaceError.
     """
     report(Progress(task.index, "start", task.label))
     begun = time.perf_counter()
-    scene = _scene(task.surface, task.elastomer, task.points, threads)
-    contact = scene.contact(task.load if task.reduced else task.load / scene.delta_sigma)
     checkpoint = Checkpoint(parts / task.id)
     watcher = _Watcher(task, checkpoint, report, checkpoint_every, last_save=time.monotonic())
-    solution = solve_contact(
-        contact,
-        task.solver,
-        watcher,
-        resume=checkpoint.load(scene.grid),
+    solved = solve_on_grids(
+        task,
+        threads,
+        memory,
+        checkpoint.load,
+        checkpoint.notes(),
+        watcher.note,
+        watch=watcher,
         enter_level=watcher.enter_level,
     )
-    contact.stress(solution.u, out=solution.sigma)  # what is stored is measured afresh
-    solution.residual = contact.residual(solution.u, solution.sigma)
-    record = _record(task, scene, contact, solution, time.perf_counter() - begun)
+    solution = solved.solution
+    record = _record(task, solved, time.perf_counter() - begun)
     write_record(parts, record)
     checkpoint.remove()
     row = record.row
@@ -112,7 +115,7 @@ def solve_task(
             task.index,
             "done",
             task.label,
-            task.points,
+            row["points"],
             solution.steps,
             solution.residual,
             row["a_r"],
@@ -122,20 +125,15 @@ def solve_task(
     return solution.status
 
 
-def _record(
-    task: Task,
-    scene: Scene,
-    contact: Contact,
-    solution: Solution,
-    seconds: float,
-) -> Record:
+def _record(task: Task, solved: Solved, seconds: float) -> Record:
     """All that is kept of one solution."""
+    scene, contact, solution, seen = solved.scene, solved.contact, solved.solution, solved.seen
     u, sigma = solution.u, solution.sigma
-    seen = observe(contact, u, sigma)
     row = (
         empty_row()
         | task.columns()
         | {
+            "points": scene.grid.points,
             "p_star": contact.pressure,
             "a_r": seen.a_r,
             "sigma_p": seen.sigma_p,
@@ -157,6 +155,7 @@ def _record(
             "steps": solution.steps,
             "tolerance": task.solver.tolerance,
         }
+        | solved.columns()
     )
     distribution = {}
     if task.output.histogram:

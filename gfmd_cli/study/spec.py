@@ -28,11 +28,20 @@ class StudyTable(Choice):
     """Name of the study; its file is NAME.h5 in the working directory."""
 
 
+MOST_POINTS = 2**17
+
+Points = Annotated[
+    Annotated[int, Key(ge=SMALLEST_GRID, le=MOST_POINTS, multiple_of=2), Tag("count")]
+    | Annotated[Literal["auto"], Tag("word")],
+    Discriminator(lambda given: "word" if isinstance(given, str) else "count"),
+]
+
+
 class GridTable(Choice):
     """Table [grid]."""
 
-    points: Annotated[int, Key(ge=SMALLEST_GRID, le=2**17, multiple_of=2)]
-    """Points per side, even."""
+    points: Points
+    """Points per side, even; or "auto", with [accuracy]: the coarsest grid that is good enough."""
 
 
 class Ladder(Choice):
@@ -71,7 +80,8 @@ Pressures = Annotated[
     | Annotated[Ladder, Tag("ladder")],
     Discriminator(_shape),
 ]
-SHAPES = ("number", "list", "ladder")
+SHAPES = ("number", "list", "ladder", "count", "word")
+"""Tags of the unions above, which no message should name."""
 
 
 class LoadTable(Choice):
@@ -101,6 +111,31 @@ class LoadTable(Choice):
         return list(dict.fromkeys(given if isinstance(given, list) else [given or 0.0]))
 
 
+Share = Annotated[float, Key(gt=0, lt=1)]
+
+
+class AccuracyTable(Choice):
+    """Table [accuracy]: errors that are accepted, relative to the continuum value."""
+
+    mean_gap: Share | None = None
+    """Of u_g."""
+    contact_area: Share | None = None
+    """Of a_r."""
+    stress_deviation: Share | None = None
+    """Of sigma_p."""
+    max_points: Annotated[int, Key(ge=SMALLEST_GRID, le=MOST_POINTS)] = MOST_POINTS
+    """Points per side that grid.points = "auto" may grow to; memory may end it before."""
+
+    def asked(self) -> dict[str, float]:
+        """Accepted relative errors by the name of the column."""
+        given = {
+            "u_g": self.mean_gap,
+            "a_r": self.contact_area,
+            "sigma_p": self.stress_deviation,
+        }
+        return {name: share for name, share in given.items() if share is not None}
+
+
 class OutputTable(Choice):
     """Table [output]: what is kept beside the scalars."""
 
@@ -124,12 +159,15 @@ class Spec(Choice):
     load: LoadTable
     solver: list[SolverChoice]
     output: OutputTable
+    accuracy: AccuracyTable | None = None
 
     def resolved(self) -> dict[str, Any]:
         """What determines the results, as plain data: files stand for their content."""
         data: dict[str, Any] = self.model_dump(
             mode="json", exclude={"study", "load"}, by_alias=True
         )
+        if self.accuracy is None:
+            del data["accuracy"]
         for table in ("surface", "elastomer"):
             for dumped, choice in zip(data[table], getattr(self, table), strict=True):
                 if "path" in dumped:

@@ -240,7 +240,9 @@ def _scene_numbers(tasks: list[Task]) -> list[int]:
     """Tasks that share surface, elastomer and grid share a scene."""
     numbers: dict[Any, int] = {}
     return [
-        numbers.setdefault((task.surface, task.elastomer, task.points), len(numbers))
+        numbers.setdefault(
+            (task.surface, task.elastomer, "auto" if task.auto else task.points), len(numbers)
+        )
         for task in tasks
     ]
 

@@ -12,7 +12,7 @@ from gfmd_cli.physics.choice import Choice
 from gfmd_cli.physics.elastomer import Elastomer, HalfSpace, Membrane, Plate, Power, Slab
 from gfmd_cli.physics.surface import FileSurface, Surface
 from gfmd_cli.solvers.cascade import SolverChoice
-from gfmd_cli.study.spec import OutputTable, Spec, digest
+from gfmd_cli.study.spec import AccuracyTable, OutputTable, Spec, digest
 
 FIELDS_IN_MEMORY = 6.15
 """Fields of double precision that a solve holds at its peak: h, u, sigma, work; at half the
@@ -36,6 +36,9 @@ class Task:
     reduced: bool
     solver: SolverChoice
     output: OutputTable
+    accuracy: AccuracyTable | None
+    auto: bool
+    """Whether the grid is chosen by the accuracy asked for; `points` is then a forecast."""
     id: str
     """Name of the task by its content."""
 
@@ -43,7 +46,8 @@ class Task:
     def label(self) -> str:
         """What sets the task apart, for people."""
         unit = "p*" if self.reduced else "p"
-        return f"{describe(self.elastomer)} {self.points} {unit}={self.load:.4g}"
+        points = "auto" if self.auto else self.points
+        return f"{describe(self.elastomer)} {points} {unit}={self.load:.4g}"
 
     @property
     def size(self) -> int:
@@ -113,6 +117,11 @@ def _in_short(value: object) -> str:
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
+def forecast(surface: Surface) -> int:
+    """Points per side that an "auto" grid is expected to end with."""
+    return 2 * max(surface.smallest_grid(), 64)
+
+
 def plan(spec: Spec) -> list[Task]:
     """The tasks of a spec, in a fixed order: surface, elastomer, grid, solver, pressure.
 
@@ -120,7 +129,7 @@ def plan(spec: Spec) -> list[Task]:
     """
     for surface, grid in product(spec.surface, spec.grid):
         needed = surface.smallest_grid()
-        if grid.points < needed:
+        if grid.points != "auto" and grid.points < needed:
             of = f"a map of {needed} points" if isinstance(surface, FileSurface) else surface.kind
             raise InputError(
                 f"grid.points: {grid.points} points per side do not resolve the surface "
@@ -134,16 +143,22 @@ def plan(spec: Spec) -> list[Task]:
         s, e, g, m = places
         for load in spec.load.pressures():
             content = [parts, spec.load.reduced, load, resolved["output"]]
+            if spec.accuracy is not None:
+                content.append(resolved["accuracy"])
+            points = spec.grid[g].points
+            expected = points if points != "auto" else forecast(spec.surface[s])
             tasks.append(
                 Task(
                     index=len(tasks),
                     surface=spec.surface[s],
                     elastomer=spec.elastomer[e],
-                    points=spec.grid[g].points,
+                    points=expected,
                     load=load,
                     reduced=spec.load.reduced,
                     solver=spec.solver[m],
                     output=spec.output,
+                    accuracy=spec.accuracy,
+                    auto=points == "auto",
                     id=digest(content),
                 )
             )

@@ -1,0 +1,359 @@
+"""How honest the bars of gfmd_cli/physics/continuum.py are: contacts solved on nested grids.
+
+Each case is one continuous contact at one pressure, solved on grids N0, 2 N0, 4 N0, ... The finest
+of them give the value of the continuum, one to three of the coarse ones an estimate of it; the
+table counts how often the estimate's bar holds. The constants of continuum.py were fitted to the
+cases of the half "fit" only.
+"""
+
+import argparse
+import json
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from gfmd_cli.physics.bodies import Parabola, Wave
+from gfmd_cli.physics.contact import Scene, build_scene
+from gfmd_cli.physics.continuum import (
+    LAST_LINE,
+    QUANTITIES,
+    Level,
+    Texture,
+    estimate,
+    local_exponent,
+    texture,
+)
+from gfmd_cli.physics.elastomer import Elastomer, Power, Slab
+from gfmd_cli.physics.observables import observe
+from gfmd_cli.physics.surface import FileSurface, SelfAffine, Surface
+from gfmd_cli.solvers.cascade import SolverChoice, solve_contact
+
+EXPONENTS = (0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0)
+THICKNESSES = (0.01, 0.03, 0.1)
+PRESSURES = np.geomspace(0.003, 3.0, 9)
+WIDE = (0.0, 0.5, 1.0, 1.0, 1.5, 2.0, 2.5, 3.0)
+BETWEEN = (0.25, 1.25, 1.75, 2.25, 2.75, 3.25, 3.75)
+FINER = 4  # the grid that truth comes from is at least so much finer than those of an estimate
+KEYS = ("points", "a_r", "sigma_p", "u_g", "perimeter")
+FULL = 1e-9  # mean gap [h_std]: below, the contact is full on all grids and there is no error
+
+
+@dataclass(frozen=True)
+class Case:
+    """One contact, on `base` points and `doublings` finer grids."""
+
+    number: int
+    name: str
+    surface: Surface
+    elastomer: Elastomer
+    p_star: float
+    base: int
+    doublings: int
+    fit: bool
+    """Whether the constants of continuum.py were fitted to it, among others."""
+
+    @property
+    def body(self) -> bool:
+        return isinstance(self.surface, Parabola | Wave)
+
+
+def cases(folder: Path, seed: int = 20) -> list[Case]:
+    """A calibration set; height maps are written to `folder`. Seed 20 is that of the constants."""
+    draw = np.random.default_rng(seed)
+    out: list[Case] = []
+
+    def add(name: str, surface: Surface, body: Elastomer, p: float, base: int) -> None:
+        steep = isinstance(body, Power) and body.n > 3
+        doublings = 3 if base > 72 else 4 if steep or base > 32 else 5
+        fit = replicate == 0
+        out.append(Case(len(out), name, surface, body, float(p), base, doublings, fit))
+
+    for replicate in range(2):
+        for body in [Power(n=n) for n in EXPONENTS] + [Slab(thickness=t) for t in THICKNESSES]:
+            pressures = PRESSURES if isinstance(body, Power) else PRESSURES[1:6]
+            for p in pressures:
+                modes = int(draw.choice([10, 12, 16, 20, 24]))
+                spectrum = str(draw.choice(["rolloff", "cutoff"]))
+                surface = SelfAffine(
+                    hurst=float(draw.choice([0.1, 0.3, 0.5, 0.8, 1.0])),
+                    rolloff=float(draw.choice([0.25, 0.5, 1.0])),
+                    cutoff=1 / modes,
+                    spectrum="rolloff" if spectrum == "rolloff" else "cutoff",
+                    seed=int(draw.integers(1, 10**6)),
+                )
+                base = 2 * round(modes * float(draw.choice([1.0, 1.25, 1.5])))
+                add(_name(body) + f" H={surface.hurst:g} {spectrum}", surface, body, p, base)
+        for kind in ("peaks", "pits", "ridges", "white"):
+            for n in (0.5, 1.0, 2.0, 3.0):
+                path = folder / f"{kind}-{replicate}-{n:g}.npy"
+                np.save(path, height_map(kind, draw))
+                p = draw.choice(PRESSURES[1:7])
+                add(f"n={n:g} file {kind}", FileSurface(path=path), Power(n=n), p, 32)
+        for n in (0.5, 1.0, 1.5, 2.0):
+            p = draw.choice(PRESSURES[2:6])
+            add(f"n={n:g} wave", Wave(), Power(n=n), 0.5 * p, 32)
+            add(f"n={n:g} parabola", Parabola(), Power(n=n), p / 3, 32)
+    draw = np.random.default_rng(seed + 1)
+    for replicate in range(2):  # noqa: B007, `add` reads it; many waves between roll-off and cut-off
+        for n in WIDE:
+            surface = SelfAffine(cutoff=1 / 64, seed=int(draw.integers(1, 10**6)))
+            add(f"n={n:g} wide", surface, Power(n=n), draw.choice(PRESSURES[1:8]), 128)
+    for n in BETWEEN:  # exponents that nothing was fitted to; replicate is still 1
+        for p in draw.choice(PRESSURES[1:8], 3, replace=False):
+            seed, hurst = int(draw.integers(1, 10**6)), float(draw.choice([0.3, 0.8]))
+            surface = SelfAffine(cutoff=1 / 16, hurst=hurst, seed=seed)
+            add(f"n={n:g} between", surface, Power(n=n), p, 32)
+    return out
+
+
+def _name(body: Elastomer) -> str:
+    return f"n={body.n:g}" if isinstance(body, Power) else f"slab t={body.thickness:g}"
+
+
+def height_map(kind: str, draw: np.random.Generator, points: int = 32) -> np.ndarray:
+    """A periodic map whose heights are not Gaussian, with no wave shorter than the grid's."""
+    m = np.fft.fftfreq(points, 1 / points)
+    radius = np.hypot(m[:, None], m)
+    if kind == "white":  # every wave of the grid alike
+        return draw.normal(size=(points, points))
+    amplitude = (1 + (radius / 3) ** 2) ** -0.9
+    h = np.fft.ifft2(np.fft.fft2(draw.normal(size=(points, points))) * amplitude).real
+    h = (h - h.mean()) / h.std()
+    h = {"peaks": np.exp(h), "pits": -np.exp(h), "ridges": -np.abs(h)}[kind]
+    return np.fft.ifft2(np.fft.fft2(h) * (radius < 15)).real
+
+
+def scene_of(case: Case, points: int) -> Scene:
+    return build_scene(case.surface, case.elastomer, points)
+
+
+def measure(case: Case, tolerance: float = 1e-6) -> dict:
+    """Solve one case on all its grids, at one pressure in Pa, in the units of the first grid."""
+    levels = []
+    first = None
+    for step in range(case.doublings + 1):
+        points = case.base * 2**step
+        scene = scene_of(case, points)
+        first = first or scene
+        # a parabola has a kink between two cells: its Delta_sigma is one of the grid
+        stress = scene.delta_sigma / first.delta_sigma if case.body else 1.0
+        height = scene.h_std / first.h_std if case.body else 1.0
+        contact, length = scene.contact(case.p_star / stress), scene.grid.length
+        begun = time.perf_counter()
+        solution = solve_contact(contact, SolverChoice(tolerance=tolerance), lambda *_: None)
+        seen = observe(contact, solution.u, solution.sigma)
+        levels.append(
+            {
+                "points": points,
+                "exponent": local_exponent(case.elastomer.stiffness, points, length),
+                "a_r": seen.a_r,
+                "sigma_p": seen.sigma_p * stress,
+                "u_g": seen.u_g * height,
+                "perimeter": seen.perimeter,
+                "energy": seen.energy * stress * height,
+                "texture": None if case.body else asdict(texture(scene.shells, length)),
+                "status": solution.status,
+                "seconds": round(time.perf_counter() - begun, 3),
+            }
+        )
+    return {
+        "name": case.name,
+        "fit": case.fit,
+        "p_star": case.p_star,
+        "body": case.body,
+        "levels": levels,
+    }
+
+
+def truth(levels: list[dict]) -> dict[str, float]:
+    """The continuum values, from the finest grids alone; no constant of continuum.py."""
+    third, second, first = levels[-3:]
+    n = first["exponent"]
+    x_second, x_first = (level["perimeter"] / level["points"] for level in (second, first))
+    area = first["a_r"]
+    if n > LAST_LINE:  # geometric, where it is; half a line's width less where not
+        steps = (second["a_r"] - third["a_r"], area - second["a_r"])
+        ratio = steps[1] / steps[0] if steps[0] else 1.0
+        area += steps[1] * ratio / (1 - ratio) if 0 < ratio < 0.8 else -0.5 * x_first
+    elif n >= 0.25 and x_second > x_first:  # first order in the contact line
+        area -= (second["a_r"] - area) * x_first / (x_second - x_first)
+    stress = first["sigma_p"]
+    if 0.75 <= n < 2.8:
+        stress += (stress - second["sigma_p"]) / (2 ** min(2.0, 3 - n) - 1)
+    return {"a_r": min(1.0, max(0.0, area)), "sigma_p": stress, "u_g": first["u_g"]}
+
+
+@dataclass(frozen=True)
+class Score:
+    """One estimate of one number beside the truth."""
+
+    name: str
+    fit: bool
+    exponent: float
+    grids: int
+    quantity: str
+    error: float
+    bar: float
+    continuum_error: float
+    continuum_bar: float
+
+    @property
+    def holds(self) -> bool:
+        return self.error <= self.bar * (1 + 1e-9) + 1e-12
+
+    @property
+    def continuum_holds(self) -> bool:
+        return self.continuum_error <= self.continuum_bar * (1 + 1e-9) + 1e-12
+
+
+def scores(records: list[dict]) -> Iterator[Score]:
+    """Every estimate from one, two or three neighbouring grids, FINER times coarser than truth."""
+    for record in records:
+        exact = truth(record["levels"])
+        seen = [Level(*(level[key] for key in KEYS)) for level in record["levels"]]
+        for last in range(len(seen) - int(np.log2(FINER))):
+            fine, found = seen[last], record["levels"][last]
+            rough = None if record["body"] else Texture(**found["texture"])
+            if fine.u_g < FULL:
+                continue
+            for grids in range(1, min(last + 1, 3) + 1):
+                given = seen[last + 1 - grids : last + 1]
+                by_name = estimate(given, found["exponent"], rough)
+                for quantity, made in by_name.items():
+                    if np.isnan(made.error):
+                        continue
+                    error = abs(getattr(fine, quantity) - exact[quantity])
+                    yield Score(
+                        record["name"],
+                        record["fit"],
+                        found["exponent"],
+                        grids,
+                        quantity,
+                        error,
+                        made.error,
+                        abs(made.continuum - exact[quantity]),
+                        made.continuum_error,
+                    )
+
+
+def summary(chosen: list[Score]) -> tuple[int, float, float, int, float, float]:
+    """Number, coverage, median of bar over error; the same of the continuum value."""
+    second = [score for score in chosen if not np.isnan(score.continuum_bar)]
+    return (
+        len(chosen),
+        float(np.mean([score.holds for score in chosen])),
+        float(np.median([score.bar / max(score.error, 1e-12) for score in chosen])),
+        len(second),
+        float(np.mean([s.continuum_holds for s in second])) if second else np.nan,
+        float(np.median([s.continuum_bar / max(s.continuum_error, 1e-12) for s in second]))
+        if second
+        else np.nan,
+    )
+
+
+def table(found: list[Score]) -> None:
+    """Print coverage and medians."""
+
+    def line(label: str, which: Callable[[Score], bool]) -> None:
+        chosen = [score for score in found if which(score)]
+        if chosen:
+            n, held, ratio, m, held_too, ratio_too = summary(chosen)
+            print(
+                f"{label:28s} {n:5d} {100 * held:6.1f} % {ratio:6.2f}"
+                f"   {m:5d} {100 * held_too:6.1f} % {ratio_too:6.2f}"
+            )
+
+    print("                                 value +- error            continuum +- its error")
+    print("                             cases coverage bar/error  cases coverage bar/error")
+    for half in (True, False):
+        for quantity in QUANTITIES:
+            for grids in (1, 2, 3):
+                label = f"{'fit' if half else 'verify'} {quantity} {grids} grid{'s'[: grids - 1]}"
+                line(label, lambda s: (s.fit, s.quantity, s.grids) == (half, quantity, grids))  # noqa: B023
+    for quantity in QUANTITIES:
+        for n in EXPONENTS:
+            line(
+                f"verify {quantity} n={n:g}",
+                lambda s: (
+                    not s.fit and s.quantity == quantity and s.name.startswith(f"n={n:g} ")  # noqa: B023
+                ),
+            )
+        for kind in ("slab", "file", "wide", "between"):
+            line(
+                f"verify {quantity} {kind}",
+                lambda s: not s.fit and s.quantity == quantity and kind in s.name,  # noqa: B023
+            )
+        line(
+            f"verify {quantity} single body",
+            lambda s: (
+                not s.fit
+                and s.quantity == quantity  # noqa: B023
+                and s.name.endswith(("wave", "parabola"))
+            ),
+        )
+
+
+def figure(found: list[Score], path: Path) -> None:
+    """Bar over true error of the cases that nothing was fitted to."""
+    from gfmd_cli.analysis.sheet import Line2D, Sheet, styled
+
+    with styled():
+        sheet = Sheet("true error", "bar")
+        span = (1e-6, 1.0)
+        looks = {
+            "a_r": ("o", "tab:blue"),
+            "sigma_p": ("s", "tab:orange"),
+            "u_g": ("^", "tab:green"),
+        }
+        labels = {"a_r": "$a_r$", "sigma_p": "$\\sigma_p/\\Delta\\sigma$", "u_g": "$u_g/h_{std}$"}
+        for quantity, (marker, colour) in looks.items():
+            chosen = [s for s in found if not s.fit and s.quantity == quantity]
+            x, y = ([getattr(s, name) for s in chosen] for name in ("error", "bar"))
+            style = {"marker": marker, "ls": "none", "mfc": "none", "color": colour}
+            sheet.axes.plot(*np.clip((x, y), *span), ms=2.2, mew=0.4, **style)
+            sheet.legend[labels[quantity]] = Line2D([], [], **style)
+        sheet.line(sheet.axes, "bar = error", np.array(span), np.array(span), color="black")
+        for axis in "xy":
+            sheet.scale(axis, "log", span)
+        sheet.write(path)
+
+
+def collect(chosen: list[Case], cache: Path | None = None) -> list[dict]:
+    """Measure the cases that the cache does not hold yet, and keep them there."""
+    records = json.loads(cache.read_text()) if cache and cache.exists() else []
+    begun = time.perf_counter()
+    for case in chosen[len(records) :]:
+        records.append(measure(case))
+        print(f"{time.perf_counter() - begun:6.0f} s  {case.name}, p* = {case.p_star:.3g}")
+        if cache:
+            cache.write_text(json.dumps(records))
+    return records
+
+
+def quick(chosen: list[Case]) -> list[Case]:
+    """Every second case, a grid less where that leaves truth fine enough."""
+    return [replace(case, doublings=min(case.doublings, 4)) for case in chosen[::2]]
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--cache", type=Path, help="JSON file of what is measured already")
+    parser.add_argument("--quick", action="store_true", help="half the cases, smaller grids")
+    parser.add_argument("--seed", type=int, default=20, help="20 is the set of the constants")
+    parser.add_argument("--figure", type=Path, help="path of a figure, without suffix")
+    chosen = parser.parse_args()
+    with tempfile.TemporaryDirectory() as folder:
+        wanted = cases(Path(folder), chosen.seed)
+        records = collect(quick(wanted) if chosen.quick else wanted, chosen.cache)
+    found = list(scores(records))
+    table(found)
+    if chosen.figure:
+        figure(found, chosen.figure)
+
+
+if __name__ == "__main__":
+    main()
