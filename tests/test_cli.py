@@ -232,6 +232,7 @@ SMALL_SETTINGS = {
     "slab": ("surface.cutoff=0.05", "grid.points=64", "load.p_star=[0.01,0.1]"),
     "ridge": ("grid.points=128",),
     "hertz": ("grid.points=64", "load.p_star=1e-3"),
+    "accuracy": ("surface.seed=[0,1]", "load.p_star=0.3"),
     "afm-scan": ("grid.points=256", "load.pressure=1e6"),
 }
 

@@ -7,9 +7,16 @@ from typing import Any
 import numpy as np
 
 from gfmd_cli.analysis.compare import Comparison, Curve, einstein_prediction
+from gfmd_cli.analysis.ensemble import QUANTITIES, Ensemble, ensembles
 from gfmd_cli.study.layout import COLUMNS
 from gfmd_cli.study.store import MISSING, read_rows
 
+ERRORS = [
+    f"{name}_{what}"
+    for name in QUANTITIES
+    for what in ("error", "continuum", "continuum_error", "verdict")
+]
+"""Columns of records where an accuracy was asked for."""
 HEADER = (
     "      p*        a_r  Persson  ratio    sigma_p  Persson  ratio        u_g    Persson  ratio"
     "  p ratio  status"
@@ -22,6 +29,7 @@ def tables(comparison: Comparison) -> str:
     `p ratio` is the pressure of the theory at the simulated mean gap over the simulated one.
     """
     blocks = [_table(curve) for curve in comparison.curves]
+    blocks += _spreads(ensembles(comparison))
     if comparison.missing:
         blocks.append(f"{comparison.missing} tasks are not solved yet: run the spec again.")
     return "\n\n".join(blocks)
@@ -31,7 +39,7 @@ def _table(curve: Curve) -> str:
     row = curve.rows[0]
     theory = curve.prediction
     lines = [
-        f"{curve.elastomer} on {curve.surface}, {curve.points} points a side",
+        f"{curve.elastomer} on {curve.surface}, {_points(curve)} points a side",
         f"Delta_sigma = {row['delta_sigma']:.6g} Pa, h_std = {row['h_std']:.6g} m, "
         f"L = {row['length']:.6g} m",
         HEADER,
@@ -54,7 +62,51 @@ def _table(curve: Curve) -> str:
             f"{'':10} {exact.u_g[i]:10.4g} {_ratio(row['u_g'], exact.u_g[i])}"
             for i, row in enumerate(curve.rows)
         ]
+    if any(row.get(f"{name}_verdict") for row in curve.rows for name in QUANTITIES):
+        lines += _continuum(curve)
     return "\n".join(lines)
+
+
+def _points(curve: Curve) -> str:
+    sizes = sorted({int(row["points"]) for row in curve.rows})
+    return str(sizes[0]) if len(sizes) == 1 else f"{sizes[0]} to {sizes[-1]}"
+
+
+def _continuum(curve: Curve) -> list[str]:
+    """Continuum values with their errors, or what keeps them from having one."""
+    lines = ["  in the continuum:", "      p*  points" + _centred("a_r", "sigma_p", "u_g")]
+    for row in curve.rows:
+        cells = []
+        for name in QUANTITIES:
+            value, error = row[f"{name}_continuum"], row[f"{name}_continuum_error"]
+            known = math.isfinite(value) and math.isfinite(error)
+            cells.append(plus_minus(value, error) if known else row[f"{name}_verdict"])
+        lines.append(f"{row['p_star']:8.4g} {row['points']:7d}" + _centred(*cells))
+    return lines
+
+
+def _spreads(found: list[Ensemble]) -> list[str]:
+    """One table per body: means over seeds, with the half-width of the 95 % interval."""
+    blocks: dict[str, list[str]] = {}
+    for ensemble in found:
+        head = f"{ensemble.label}: mean of {len(ensemble.rows)} seeds +- 95 % confidence"
+        lines = blocks.setdefault(head, [head, "      p*" + _centred(*QUANTITIES)])
+        spreads = [ensemble.spread(name) for name in QUANTITIES]
+        cells = [plus_minus(spread.mean, spread.half_width) for spread in spreads]
+        lines.append(f"{ensemble.rows[0]['p_star']:8.4g}" + _centred(*cells))
+    return ["\n".join(lines) for lines in blocks.values()]
+
+
+def _centred(*cells: str) -> str:
+    return "".join(f"{cell:>24}" for cell in cells)
+
+
+def plus_minus(value: float, error: float) -> str:
+    """A value and its error, as many digits as the error has meaning."""
+    if not error > 0:
+        return f"{value:.6g}"
+    digits = max(0, 1 - math.floor(math.log10(error)))
+    return f"{value:.{min(digits, 12)}f} +- {error:.2g}"
 
 
 def _ratio(value: float, reference: float) -> str:
@@ -65,6 +117,11 @@ def _ratio(value: float, reference: float) -> str:
 def as_records(comparison: Comparison) -> list[dict[str, Any]]:
     """One record per solved pressure; what does not apply is None."""
     records = []
+    spreads = {
+        row["task"]: _as_record(ensemble)
+        for ensemble in ensembles(comparison)
+        for row in ensemble.rows
+    }
     for curve in comparison.curves:
         theory = curve.prediction
         at_gap = curve.pressure_at_gap(curve.column("u_g"))
@@ -83,10 +140,25 @@ def as_records(comparison: Comparison) -> list[dict[str, Any]]:
                 "pressure": row["pressure"],
                 "residual": row["residual"],
                 "status": row["status"],
+                **{name: _plain(row[name]) for name in ERRORS if name in row},
+                **spreads.get(row["task"], {}),
             }
             for i, row in enumerate(curve.rows)
         ]
     return records
+
+
+def _as_record(ensemble: Ensemble) -> dict[str, Any]:
+    """What all rows of an ensemble share."""
+    record: dict[str, Any] = {"seeds": len(ensemble.rows)}
+    for name in QUANTITIES:
+        spread = ensemble.spread(name)
+        record |= {
+            f"{name}_mean": spread.mean,
+            f"{name}_standard_error": spread.standard_error,
+            f"{name}_confidence": spread.half_width,
+        }
+    return record
 
 
 def export_rows(path: Path) -> tuple[list[str], list[list[str]]]:

@@ -14,6 +14,7 @@ from pathlib import Path
 
 import pyfftw
 
+
 def processor() -> str:
     """The model name of the processor: a plan measured on one is a bad one on another."""
     with suppress(OSError):

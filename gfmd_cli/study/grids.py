@@ -3,9 +3,8 @@
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
+from math import sqrt
 from typing import Any
-
-import pyfftw
 
 from gfmd_cli.errors import InputError
 from gfmd_cli.physics.bodies import Wave
@@ -25,12 +24,13 @@ from gfmd_cli.physics.grid import Grid
 from gfmd_cli.physics.observables import Observables, observe
 from gfmd_cli.physics.surface import FileSurface, SelfAffine, Surface
 from gfmd_cli.solvers.cascade import Resume, Solution, solve_contact
-from gfmd_cli.study.tasks import Task
+from gfmd_cli.study.tasks import FIRST, Task, first_grid
 
-FIRST = 64  # points per side that "auto" begins with at the least; such a solve costs nothing
 FINAL = ("bound", "slow", "diverges")  # verdicts that no finer grid changes
 NOT_REACHED = "accuracy_not_reached"
-ALGEBRAIC = 2.0  # relative errors of u_g and sigma_p on their grid, in natural residuals (measured)
+ALGEBRAIC = 2.0
+"""Largest errors of u_g and sigma_p on their grid that were met, in natural residuals times the
+value x, or its root where that is less than 1: n = 0.5 to 4, slabs, p* = 0.003 to 1."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,8 @@ class Solved:
         assert self.certificate is not None
         if name == "a_r":
             return self.certificate.a_r
-        return ALGEBRAIC * self.solution.residual * float(getattr(self.seen, name))
+        value = float(getattr(self.seen, name))
+        return ALGEBRAIC * self.solution.residual * max(value, sqrt(value))
 
     def columns(self) -> dict[str, Any]:
         """The errors as columns of a study."""
@@ -171,14 +172,11 @@ def _is_band_limited(surface: Surface) -> bool:
 
 def _first(task: Task) -> int:
     """The coarsest grid that is solved to the end."""
-    needed = task.surface.smallest_grid()
-    if not task.auto:
-        half = task.points // 2
-        fit = task.accuracy is not None and half % 2 == 0 and half >= max(needed, FIRST)
-        return half if fit else task.points
-    if isinstance(task.surface, FileSurface):
-        return needed
-    return 2 * int(pyfftw.next_fast_len((max(needed, FIRST) + 1) // 2))
+    if task.auto:
+        return first_grid(task.surface)
+    half, needed = task.points // 2, task.surface.smallest_grid()
+    fit = task.accuracy is not None and half % 2 == 0 and half >= max(needed, FIRST)
+    return half if fit else task.points
 
 
 def _after(task: Task, points: int) -> int:

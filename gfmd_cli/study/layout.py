@@ -51,6 +51,7 @@ FURTHER = (
     Column("work", float, "1", "(<sigma h> - p <u>) / (h_std Delta_sigma): twice the energy"),
     Column("steps", int, "1", "steps on the finest grid"),
     Column("tolerance", float, "1", "natural residual asked for"),
+    Column("grid", str, "", "auto where the grid was chosen by the accuracy asked for"),
     *(
         column
         for name in ("a_r", "sigma_p", "u_g")

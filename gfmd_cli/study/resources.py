@@ -44,10 +44,11 @@ def available_memory() -> float:
 def check_memory(tasks: list[Task]) -> None:
     """Raise InputError, before anything is allocated, where one task alone does not fit."""
     memory = available_memory()
-    largest = max(tasks, key=lambda task: task.bytes)
-    if largest.bytes > HEADROOM * memory:
+    largest = max(tasks, key=lambda task: task.least_bytes)
+    if largest.least_bytes > HEADROOM * memory:
+        taken = _gib(largest.least_bytes)
         raise InputError(
-            f"grid.points: {largest.points} points per side take {_gib(largest.bytes)} of memory, "
+            f"grid.points: {largest.points} points per side take {taken} of memory, "
             f"{_gib(HEADROOM * memory)} are available; take a smaller grid or a larger machine"
         )
 

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyfftw
 
 from gfmd_cli.errors import InputError
 from gfmd_cli.physics.choice import Choice
@@ -19,6 +20,9 @@ FIELDS_IN_MEMORY = 6.15
 size direction, change, k(q); contact marks, coarse levels. scripts/memory.py measures it."""
 BASE_BYTES = 215e6
 """What a process holds besides: the interpreter and its libraries."""
+FIRST = 64  # points per side that "auto" begins with at the least; such a solve costs nothing
+LAST = {"a_r": 3.5, "u_g": 4.0, "sigma_p": 2.5}
+"""Exponents n up to which a quantity has a continuum value to come near to."""
 SECONDS_PER_PAIR = 8e-9
 """Per grid point and pair of transforms, with all work between two of them, on one thread."""
 
@@ -60,6 +64,12 @@ class Task:
         return FIELDS_IN_MEMORY * 8 * self.size + BASE_BYTES
 
     @property
+    def least_bytes(self) -> float:
+        """Memory without which the task cannot begin."""
+        points = first_grid(self.surface) if self.auto else self.points
+        return FIELDS_IN_MEMORY * 8 * float(points**self.surface.dimension) + BASE_BYTES
+
+    @property
     def seconds(self) -> float:
         """Time that the solve is expected to take on one thread, within a factor of about three."""
         return 0.01 + SECONDS_PER_PAIR * self.size * self._pairs()
@@ -74,6 +84,7 @@ class Task:
             "n": np.nan if n is None else n,
             "thickness": np.nan if t is None else t,
             "points": self.points,
+            "grid": "auto" if self.auto else "given",
         }
 
     def _pairs(self) -> float:
@@ -117,9 +128,39 @@ def _in_short(value: object) -> str:
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
-def forecast(surface: Surface) -> int:
-    """Points per side that an "auto" grid is expected to end with."""
-    return 2 * max(surface.smallest_grid(), 64)
+def first_grid(surface: Surface) -> int:
+    """Points per side that an "auto" grid begins with: the fewest that resolve the surface."""
+    needed = surface.smallest_grid()
+    if isinstance(surface, FileSurface):
+        return needed
+    return 2 * int(pyfftw.next_fast_len((max(needed, FIRST) + 1) // 2))
+
+
+def forecast(
+    surface: Surface, elastomer: Elastomer, p_star: float | None, accuracy: AccuracyTable | None
+) -> int:
+    """Points per side that an "auto" grid will end with, right within a factor of two as a rule.
+
+    Relative errors on the first grid, and the order at which they fall: read off the default
+    surface with cutoff = 0.03, n = 0 to 4, p* = 0.01 to 1.
+    """
+    n, p = exponent(elastomer), p_star or 0.1
+    n = 1.0 if n is None else n
+    steep = float(np.interp(n, [0, 2, 3], [0.4, 0.48, 0.96]))
+    area = float(np.interp(n, [0, 1, 2, 3], [0.05, 0.09, 0.26, 0.8])) * min(p / 0.1, 1.0) ** -steep
+    gap = float(np.interp(n, [0, 1, 2, 3, 4], [0.007, 0.012, 0.035, 0.09, 0.27]))
+    typical = {
+        "a_r": (area, 1.6),
+        "u_g": (3 * gap if p > 0.3 else gap, 2.5),
+        "sigma_p": (0.03 * 3**n, max(0.5, min(2.0, 3.0 - n))),
+    }
+    doublings = [0]
+    for name, share in (accuracy.asked() if accuracy is not None else {}).items():
+        error, order = typical[name]
+        if n <= LAST[name]:
+            doublings.append(int(np.ceil(np.log2(error / share) / order)))
+    points = first_grid(surface) * int(2 ** min(max(doublings), 20))
+    return points if accuracy is None else min(points, accuracy.max_points)
 
 
 def plan(spec: Spec) -> list[Task]:
@@ -146,7 +187,16 @@ def plan(spec: Spec) -> list[Task]:
             if spec.accuracy is not None:
                 content.append(resolved["accuracy"])
             points = spec.grid[g].points
-            expected = points if points != "auto" else forecast(spec.surface[s])
+            expected = (
+                points
+                if points != "auto"
+                else forecast(
+                    spec.surface[s],
+                    spec.elastomer[e],
+                    load if spec.load.reduced else None,
+                    spec.accuracy,
+                )
+            )
             tasks.append(
                 Task(
                     index=len(tasks),

@@ -1,0 +1,289 @@
+"""Errors of a study: "auto" grids, certificates, spreads over seeds."""
+
+import json
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from scipy import stats
+
+from gfmd_cli.analysis.compare import compare
+from gfmd_cli.analysis.ensemble import Ensemble, ensembles
+from gfmd_cli.analysis.tables import plus_minus, tables
+from gfmd_cli.cli import main
+from gfmd_cli.errors import InputError, Interrupted
+from gfmd_cli.physics.certificate import certify
+from gfmd_cli.physics.contact import build_scene
+from gfmd_cli.physics.elastomer import Power, Slab
+from gfmd_cli.physics.observables import observe
+from gfmd_cli.physics.surface import SelfAffine
+from gfmd_cli.solvers.cascade import SolverChoice, solve_contact
+from gfmd_cli.study import solve
+from gfmd_cli.study.grids import ALGEBRAIC, NOT_REACHED
+from gfmd_cli.study.layout import COLUMNS
+from gfmd_cli.study.parse import read_spec
+from gfmd_cli.study.run import run_study
+from gfmd_cli.study.store import read_rows
+from gfmd_cli.study.tasks import plan
+
+SPEC = """\
+[surface]
+kind = "self-affine"
+cutoff = 0.06
+[elastomer]
+kind = "power"
+n = 1
+[grid]
+points = "auto"
+[load]
+p_star = 0.1
+[accuracy]
+mean_gap = 0.01
+contact_area = 0.05
+"""
+QUANTITIES = ("a_r", "sigma_p", "u_g")
+
+
+@pytest.fixture
+def spec_of(tmp_path):
+    def spec_of(*overrides, text=SPEC):
+        path = tmp_path / "spec.toml"
+        path.write_text(text)
+        return read_spec(path, overrides)[0]
+
+    return spec_of
+
+
+@pytest.fixture
+def rows_of(tmp_path, spec_of):
+    def rows_of(*overrides, text=SPEC, name="study.h5", report=lambda progress: None):
+        path = tmp_path / name
+        run_study(spec_of(*overrides, text=text), text, path, report, jobs=1)
+        return read_rows(path)
+
+    return rows_of
+
+
+# --- grids chosen by accuracy ---------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("n", [0, 0.5, 1, 2, 3])
+def test_an_auto_grid_is_as_good_as_asked(rows_of, n):
+    (row,) = rows_of(f"elastomer.n={n}")
+    (fine,) = rows_of(f"elastomer.n={n}", f"grid.points={4 * row['points']}", name="fine.h5")
+    assert (row["status"], row["grid"]) == ("converged", "auto")
+    for name, share in (("u_g", 0.01), ("a_r", 0.05)):
+        best, error = row[f"{name}_continuum"], row[f"{name}_continuum_error"]
+        assert 0 < error <= share * best
+        assert abs(fine[f"{name}_continuum"] - best) <= error + fine[f"{name}_continuum_error"]
+        assert abs(fine[f"{name}_continuum"] - row[name]) <= 1.1 * row[f"{name}_error"]
+
+
+def test_less_is_asked_of_a_coarser_grid(rows_of):
+    loose = rows_of("accuracy.mean_gap=0.1", "accuracy.contact_area=0.3")[0]
+    tight = rows_of("accuracy.mean_gap=0.001", "accuracy.contact_area=0.02", name="tight.h5")[0]
+    assert loose["points"] < tight["points"]
+    assert loose["u_g_error"] > tight["u_g_error"]
+
+
+def test_an_auto_grid_ends_where_it_may_not_grow(rows_of):
+    (row,) = rows_of("accuracy.mean_gap=1e-6", "accuracy.max_points=100")
+    assert (row["status"], row["points"]) == (NOT_REACHED, 64)
+    assert row["u_g_error"] > 1e-6 * row["u_g"]
+
+
+def test_an_auto_grid_ends_where_memory_ends(rows_of, monkeypatch, spec_of):
+    (task,) = plan(spec_of())
+    enough = 1.2 * max(task.bytes, 2.2e8) / 0.9
+    monkeypatch.setattr("gfmd_cli.study.run.available_memory", lambda: enough)
+    (row,) = rows_of("accuracy.mean_gap=1e-9")
+    assert row["status"] == NOT_REACHED
+    assert row["points"] < 1200
+
+
+def test_no_grid_is_spent_on_what_has_no_limit(rows_of):
+    """The contacts of a plate are lines and points."""
+    (row,) = rows_of("elastomer.n=4", "accuracy.mean_gap=0.2")
+    assert (row["status"], row["a_r_verdict"]) == (NOT_REACHED, "bound")
+    assert row["points"] <= 144
+    assert np.isnan(row["a_r_continuum"])
+    assert row["sigma_p_verdict"] == "diverges"
+    assert np.isnan(row["sigma_p_error"])
+
+
+@pytest.mark.parametrize("a_r", [0.2, 0.7])
+def test_the_membrane_on_a_paraboloid_has_its_exact_area_within_the_bar(rows_of, a_r):
+    """a_r = p / (p + 2 tau / R) in any periodic cell."""
+    text = SPEC.replace('kind = "self-affine"\ncutoff = 0.06', 'kind = "parabola"\nradius = 1.0')
+    text = text.replace('kind = "power"\nn = 1', 'kind = "membrane"\ntension = 1.0')
+    text = text.replace("p_star = 0.1", f"pressure = {2 * a_r / (1 - a_r)}")
+    (row,) = rows_of(text=text)
+    assert row["status"] == "converged"
+    assert abs(row["a_r_continuum"] - a_r) <= row["a_r_continuum_error"] <= 0.05 * a_r
+    assert abs(row["a_r"] - a_r) <= row["a_r_error"]
+
+
+def test_a_given_grid_gets_errors_where_they_are_asked_for(rows_of):
+    (row,) = rows_of("grid.points=128", "accuracy.mean_gap=1e-9")
+    assert (row["status"], row["points"], row["grid"]) == ("converged", 128, "given")
+    assert all(row[f"{name}_error"] > 0 for name in QUANTITIES)
+    plain = SPEC.partition("[accuracy]")[0]
+    (other,) = rows_of("grid.points=128", text=plain, name="plain.h5")
+    assert all(np.isnan(other[f"{name}_error"]) for name in QUANTITIES)
+    assert [other[name] for name in QUANTITIES] == pytest.approx(
+        [row[name] for name in QUANTITIES], rel=1e-5
+    )
+
+
+def test_full_contact_is_exact(rows_of):
+    (row,) = rows_of("load.p_star=30")
+    assert (row["a_r"], row["a_r_error"], row["u_g_error"]) == (1, 0, 0)
+    assert row["status"] == "converged"
+
+
+def test_an_interrupted_auto_grid_goes_on_bit_for_bit(rows_of, tmp_path, monkeypatch):
+    monkeypatch.setattr(solve, "REPORT_EVERY", 0.0)
+    asked = ("accuracy.mean_gap=1e-3", "elastomer.n=2")
+    (straight,) = rows_of(*asked)
+    seen = []
+
+    def interrupt(progress):
+        seen.append(progress)
+        if len(seen) % 11 == 0:
+            solve.stop.set()
+
+    for _ in range(1000):
+        try:
+            (stopped,) = rows_of(*asked, name="stopped.h5", report=interrupt)
+            break
+        except Interrupted:
+            assert list((tmp_path / "stopped.parts").glob("*/pointer.json"))
+    assert len(seen) > 50
+    assert stopped["points"] > 100
+    for column in COLUMNS:
+        if column.name != "seconds":
+            same = stopped[column.name], straight[column.name]
+            assert same[0] == same[1] or np.all(np.isnan(same))
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (("[accuracy]\nmean_gap = 0.01\ncontact_area = 0.05\n", ""), ["auto", "[accuracy]"]),
+        (("mean_gap = 0.01\ncontact_area = 0.05\n", ""), ["accuracy", "mean_gap"]),
+        (("mean_gap = 0.01", "mean_gap = 0"), ["accuracy.mean_gap", "greater than 0"]),
+        (("mean_gap = 0.01", "meangap = 0.1"), ["accuracy.meangap", "did you mean 'mean_gap'"]),
+        (('"auto"', '"automatic"'), ["grid.points", "'auto'", "automatic"]),
+    ],
+)
+def test_a_wrong_accuracy_is_refused(spec_of, change, words):
+    with pytest.raises(InputError) as error:
+        spec_of(text=SPEC.replace(*change))
+    for word in words:
+        assert word in str(error.value)
+
+
+def test_reduced_pressures_of_a_kinked_cell_are_refused(rows_of):
+    text = SPEC.replace('kind = "self-affine"\ncutoff = 0.06', 'kind = "parabola"\nradius = 1.0')
+    told = []
+    rows_of(text=text, report=told.append)
+    assert any("load.pressure" in progress.note for progress in told)
+
+
+def test_the_forecast_of_grids_is_right_within_a_factor_of_four(spec_of, rows_of):
+    spec = spec_of("elastomer.n=[0.5, 1, 2]", "load.p_star=[0.03, 0.3]")
+    expected = [task.points for task in plan(spec)]
+    rows = rows_of("elastomer.n=[0.5, 1, 2]", "load.p_star=[0.03, 0.3]")
+    for points, row in zip(expected, rows, strict=True):
+        assert 0.25 <= points / row["points"] <= 4
+
+
+# --- certificates ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-4, 1e-6])
+@pytest.mark.parametrize("p_star", [0.003, 0.1, 1.0])
+@pytest.mark.parametrize(
+    "body", [Power(n=0.5), Power(n=1), Power(n=2), Power(n=4), Slab(thickness=0.02)]
+)
+def test_the_certificate_bounds_the_distance_to_the_solution(body, p_star, tolerance):
+    contact = build_scene(SelfAffine(cutoff=0.04), body, 128).contact(p_star)
+
+    def solved(tolerance):
+        found = solve_contact(contact, SolverChoice(tolerance=tolerance), lambda *_: None)
+        return found, observe(contact, found.u, found.sigma)
+
+    (_, exact), (found, seen) = solved(1e-11), solved(tolerance)
+    contact.stress(found.u, out=found.sigma)
+    proof = certify(contact, found.u, found.sigma)
+    assert abs(seen.u_g - exact.u_g) <= proof.u_g
+    assert abs(seen.sigma_p - exact.sigma_p) <= proof.sigma_p
+    assert seen.energy + p_star * seen.u_g - exact.energy - p_star * exact.u_g + 1e-12 >= 0
+    assert seen.energy + p_star * seen.u_g - exact.energy - p_star * exact.u_g <= proof.gap + 1e-12
+    for name in ("u_g", "sigma_p"):
+        value = getattr(exact, name)
+        error = ALGEBRAIC * found.residual * max(value, value**0.5)
+        assert abs(getattr(seen, name) - value) <= error + 1e-13
+    assert abs(seen.a_r - exact.a_r) <= proof.a_r + 3 / contact.grid.size
+
+
+def test_a_bad_solution_gets_no_good_certificate():
+    contact = build_scene(SelfAffine(cutoff=0.04), Power(n=1), 128).contact(0.1)
+    u = contact.settle(np.full(contact.grid.shape, 5.0))
+    proof = certify(contact, u, contact.stress(u, out=contact.grid.empty()))
+    exact = solve_contact(contact, SolverChoice(tolerance=1e-9), lambda *_: None)
+    assert proof.u_g >= float(np.mean(u - exact.u)) > 0.5
+
+
+# --- seeds ----------------------------------------------------------------------------------------
+
+
+def test_seeds_have_a_mean_and_a_confidence_interval(rows_of, tmp_path):
+    plain = SPEC.partition("[accuracy]")[0].replace('points = "auto"', "points = 64")
+    rows = rows_of("surface.seed=[0, 1, 2, 3]", "load.p_star=[0.1, 1.0]", text=plain)
+    comparison = compare(tmp_path / "study.h5")
+    found = ensembles(comparison)
+    assert [len(ensemble.rows) for ensemble in found] == [4, 4]
+    values = [row["u_g"] for row in rows if row["p_star"] == 0.1]
+    spread = found[0].spread("u_g")
+    low, high = stats.t.interval(0.95, 3, np.mean(values), stats.sem(values))
+    assert (spread.count, spread.mean) == (4, pytest.approx(np.mean(values)))
+    assert spread.standard_error == pytest.approx(stats.sem(values))
+    assert (spread.mean - spread.half_width, spread.mean + spread.half_width) == pytest.approx(
+        (low, high)
+    )
+    assert "mean of 4 seeds" in tables(comparison)
+    told = CliRunner().invoke(main, ["analyze", str(tmp_path / "study.h5"), "--json"])
+    records = json.loads(told.output)
+    assert len(records) == 8
+    assert records[0]["u_g_mean"] == pytest.approx(np.mean(values))
+
+
+def test_the_interval_holds_the_truth_as_often_as_it_says():
+    rng = np.random.default_rng(1)
+    held = 0
+    for _ in range(2000):
+        values = rng.normal(3.0, 0.5, size=5)
+        spread = Ensemble([{"u_g": value} for value in values]).spread("u_g")
+        held += abs(spread.mean - 3.0) <= spread.half_width
+    assert held / 2000 == pytest.approx(0.95, abs=0.015)
+
+
+def test_continuum_values_are_averaged_where_all_have_one():
+    rows = [{"a_r": 0.2, "a_r_continuum": 0.1}, {"a_r": 0.4, "a_r_continuum": 0.3}]
+    assert Ensemble(rows).spread("a_r").mean == pytest.approx(0.2)
+    rows[0]["a_r_continuum"] = np.nan
+    assert Ensemble(rows).spread("a_r").mean == pytest.approx(0.3)
+
+
+@pytest.mark.parametrize(
+    ("value", "error", "text"),
+    [
+        (0.123456, 0.0123, "0.123 +- 0.012"),
+        (1.5, 0.0, "1.5"),
+        (12.3456, 3.0, "12.3 +- 3"),
+        (0.5, np.nan, "0.5"),
+    ],
+)
+def test_values_have_the_digits_that_their_errors_leave(value, error, text):
+    assert plus_minus(value, error) == text
