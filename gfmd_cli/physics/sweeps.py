@@ -16,7 +16,9 @@ from numba import njit
 
 from gfmd_cli.physics.fields import Field
 
-kernel: Any = njit(cache=True, nogil=True, fastmath={"reassoc", "contract", "nsz"})
+kernel: Any = njit(
+    cache=True, nogil=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz"}
+)
 
 
 class Rows:

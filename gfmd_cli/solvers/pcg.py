@@ -1,12 +1,13 @@
 """Projected preconditioned conjugate gradients, for every stiffness k(q) that is not flat.
 
 Polak-Ribiere+ directions on the points that are free, a projected move u -> max(u + s d, h), and
-the lowest point on the way there. One of two preconditioners, chosen from the contact pattern:
+the lowest point on the way there. One of three preconditioners:
 
 - the screened Green's function 1 / (k(q) + k(q_c)), two transforms. Contact pins the displacement
   every few patches, so waves longer than that are no softer than k(q_c); with plain 1/k the method
   degrades at n = 2 and fails from n = 3 on;
-- the multilevel one of `multilevel`, which sees the contacts themselves and needs no transform.
+- the V-cycle of `multigrid`, which sees the contacts themselves and needs no transform;
+- the sum over levels of `multilevel`, which does so too, for stiffnesses that grow in leaps.
 
 A step applies K once, to the projected move: the length s is that of the step before, corrected by
 what the move was found to be worth. The energy never rises, which rules out cycles: of a move that
@@ -26,6 +27,7 @@ from gfmd_cli.physics.choice import Choice
 from gfmd_cli.physics.contact import Contact
 from gfmd_cli.physics.fields import Field
 from gfmd_cli.solvers.loop import State
+from gfmd_cli.solvers.multigrid import Multigrid, suits
 from gfmd_cli.solvers.multilevel import Multilevel
 
 PROPORTION = 0.3  # of rms tension to rms free force; from 0.1 to 1 within 20 % at n = 1 to 4
@@ -33,6 +35,7 @@ HALVINGS = 60  # of a move that leads up; beyond, rounding alone decides
 WORTH = 0.5  # a projected move is taken whole where the energy falls: its best share is over 1/2
 TRUST = (0.6, 1.6)  # how far one clipped move may change the length of the next
 SOFTEST = 1e-12  # curvature over descent below which a direction is a shift of the whole body
+STEEP = 0.9  # local exponent of k(q) from which the V-cycle pays
 RESCREEN_AFTER = 4  # steps at least between two looks at the screening length ...
 RESCREEN_GROWTH = 1.5  # ... and this factor in the step count
 RESCREEN_CHANGE = 1.25  # relative change of q_c below which the old one stays
@@ -86,7 +89,8 @@ class _Run:
         )
         self.marks = np.empty(self.h.shape, dtype=np.int8)
         self.least = sweeps.PRESSED
-        self.multilevel: Multilevel | None = None
+        self.multilevel: Multigrid | Multilevel | None = None
+        self.even = self.grid.dimension == 2 and suits(contact)
         sums = self.mark()
         if state.residual == np.inf:  # else it comes from a checkpoint, judged already
             self.judge(sums)
@@ -116,7 +120,10 @@ class _Run:
         memory["rescreen_at"] = max(step + RESCREEN_AFTER, int(RESCREEN_GROWTH * step))
         held, changes = self.rows.sums(2, sweeps.pattern, self.marks, self.least)
         stiffness, chord, exponent = screening(self.contact, float(held), float(changes))
-        multilevel = self.grid.dimension == 2 and prefers_multilevel(chord, exponent)
+        if self.even:
+            multilevel = exponent > STEEP
+        else:
+            multilevel = self.grid.dimension == 2 and prefers_multilevel(chord, exponent)
         change = memory["screening"] / stiffness
         if multilevel != bool(memory["multilevel"]) or (
             not multilevel and not 1 / RESCREEN_CHANGE < change < RESCREEN_CHANGE
@@ -128,7 +135,9 @@ class _Run:
         """Write the preconditioned force z to `padded`; set the slope and the conjugation beta."""
         memory, bodies = self.memory, (self.sigma, self.marks, self.least)
         if memory["multilevel"]:
-            self.multilevel = self.multilevel or Multilevel(self.contact, self.rows)
+            if self.multilevel is None:
+                kind = Multigrid if self.even else Multilevel
+                self.multilevel = kind(self.contact, self.rows)
             slope, turned = self.multilevel.apply(*bodies, self.change, self.padded)
         else:
             self.rows(sweeps.free_force, *bodies, self.padded)
@@ -210,7 +219,7 @@ class _Run:
 
 
 def prefers_multilevel(chord: float, exponent: float) -> bool:
-    """Whether the multilevel preconditioner is the faster one; `chord` in grid spacings.
+    """Whether the sum over levels is faster than the Green's function; `chord` in grid spacings.
 
     Measured on the default surface, p* = 0.001 to 1, and a paraboloid, 512^2, CPU seconds: equal
     at n = 1; for n = 2, 3, 4 it wins from chords of about 10, 20, 30 on; 5 times at n = 3, 250.

@@ -15,7 +15,7 @@ from gfmd_cli.physics.surface import FileSurface, Surface
 from gfmd_cli.solvers.cascade import SolverChoice
 from gfmd_cli.study.spec import AccuracyTable, OutputTable, Spec, digest
 
-FIELDS_IN_MEMORY = 6.15
+FIELDS_IN_MEMORY = 6.65
 """Fields of double precision that a solve holds at its peak: h, u, sigma, work; at half the
 size direction, change, k(q); contact marks, coarse levels. scripts/memory.py measures it."""
 BASE_BYTES = 215e6
@@ -158,7 +158,7 @@ def forecast(
     for name, share in (accuracy.asked() if accuracy is not None else {}).items():
         error, order = typical[name]
         if n <= LAST[name]:
-            doublings.append(int(np.ceil(np.log2(error / share) / order)))
+            doublings.append(int(np.ceil((np.log2(error) - np.log2(share)) / order)))
     points = first_grid(surface) * int(2 ** min(max(doublings), 20))
     return points if accuracy is None else min(points, accuracy.max_points)
 

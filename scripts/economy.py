@@ -1,0 +1,89 @@
+"""What it saves to model only what a scene needs: processor seconds with and without.
+
+    python scripts/economy.py --points 1024
+"""
+
+import argparse
+import tempfile
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from gfmd_cli.physics.bodies import LineParabola
+from gfmd_cli.physics.contact import Contact, build_scene
+from gfmd_cli.physics.elastomer import HalfSpace, Power
+from gfmd_cli.physics.observables import observe, stress_distribution
+from gfmd_cli.physics.surface import FileSurface, SelfAffine
+from gfmd_cli.solvers.cascade import SolverChoice, solve_contact
+
+REPEATS = 3  # the least counts
+
+
+def least(action):
+    """Processor seconds of the fastest of some calls, and what the last one returned."""
+    seconds, result = [], None
+    for _ in range(REPEATS):
+        begun = time.process_time()
+        result = action()
+        seconds.append(time.process_time() - begun)
+    return min(seconds), result
+
+
+def solved(contact: Contact, **choice):
+    """Seconds of a solve, and what was measured on it."""
+    found = lambda: solve_contact(contact, SolverChoice(**choice), lambda *_: None)  # noqa: E731
+    seconds, solution = least(found)
+    return seconds, observe(contact, solution.u, solution.sigma), solution
+
+
+def show(what, slow, fast, difference):
+    print(f"{what:58} {slow:9.3f} {fast:9.3f} {slow / fast:8.1f}  {difference:.0e}", flush=True)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("--points", type=int, default=1024)
+    points = parser.parse_args().points
+    print(f"{points}^2, p* = 0.1{'':42} without s    with s    ratio  |change of u_g|, relative")
+
+    springs = build_scene(SelfAffine(), Power(n=0), points).contact(0.1)
+    slow, a, _ = solved(springs, kind="pcg", tolerance=1e-6)
+    fast, b, _ = solved(springs, kind="sort")
+    show("n = 0: one root instead of iterations", slow, fast, abs(a.u_g / b.u_g - 1))
+
+    line = build_scene(LineParabola(radius=1.0), HalfSpace(), points)
+    p_star = 0.5 / line.delta_sigma
+    with tempfile.TemporaryDirectory() as name:
+        path = Path(name) / "line.npy"
+        np.save(path, np.tile(line.height * line.h_std, (points, 1)))
+        plane = build_scene(FileSurface(path=path), HalfSpace(), points)
+        slow, a, _ = solved(plane.contact(0.5 / plane.delta_sigma), tolerance=1e-6)
+    fast, b, _ = solved(line.contact(p_star), tolerance=1e-6)
+    show("a line scene on a line", slow, fast, abs(a.u_g / b.u_g - 1))
+
+    half_space = build_scene(SelfAffine(), Power(n=1), points).contact(0.1)
+    slow, a, _ = solved(half_space, tolerance=1e-4)
+    fast, b, _ = solved(half_space, tolerance=1e-4, precision="single")
+    show("single precision, n = 1, residual 1e-4", slow, fast, abs(a.u_g / b.u_g - 1))
+    slow, a, _ = solved(half_space, tolerance=1e-4, nested=False)
+    fast, b, _ = solved(half_space, tolerance=1e-4)
+    show("coarse grids first, n = 1", slow, fast, abs(a.u_g / b.u_g - 1))
+    plate = build_scene(SelfAffine(), Power(n=3), points).contact(0.1)
+    slow, a, _ = solved(plate, tolerance=1e-4, nested=False)
+    fast, b, _ = solved(plate, tolerance=1e-4)
+    show("coarse grids first, n = 3", slow, fast, abs(a.u_g / b.u_g - 1))
+
+    full = replace(half_space, pressure=30.0)
+    slow, a, _ = solved(replace(half_space, pressure=3.0), tolerance=1e-6)
+    fast, b, _ = solved(full, tolerance=1e-6)
+    show("full contact seen at once (against p* = 3)", slow, fast, 0.0)
+
+    solve, _, solution = solved(half_space, tolerance=1e-4)
+    extra, _ = least(lambda: stress_distribution(half_space, solution.u, solution.sigma))
+    show("no histogram", solve + extra, solve, 0.0)
+
+
+if __name__ == "__main__":
+    main()
