@@ -233,6 +233,7 @@ SMALL_SETTINGS = {
     "ridge": ("grid.points=128",),
     "hertz": ("grid.points=64", "load.p_star=1e-3"),
     "accuracy": ("surface.seed=[0,1]", "load.p_star=0.3"),
+    "stress-distribution": ("grid.points=[32,64]", "elastomer.n=[1,3]", "surface.seed=[0,1]"),
     "afm-scan": ("grid.points=256", "load.pressure=1e6"),
 }
 

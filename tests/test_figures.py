@@ -104,6 +104,14 @@ def test_a_single_point_is_drawn(study, tmp_path):
     assert drawn(comparison, tmp_path / "out") == OVER_PRESSURE | {"stress_distribution"}
 
 
+def test_two_grids_of_one_contact_give_the_continuum_too(study, tmp_path):
+    comparison = study(ROUGH, "elastomer.n=1", "grid.points=[64, 128]", "load.p_star=0.3")
+    continuum = {"stress_distribution_continuum"}
+    assert (
+        drawn(comparison, tmp_path / "out") == OVER_PRESSURE | {"stress_distribution"} | continuum
+    )
+
+
 def test_a_line_scene_is_drawn(study):
     comparison = study(LINE)
     for name in OVER_PRESSURE | {"stress_distribution"}:

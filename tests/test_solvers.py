@@ -12,6 +12,7 @@ import pytest
 from scipy.optimize import brentq
 from scipy.special import gamma, hyp2f1, zeta
 
+from gfmd_cli.errors import InputError
 from gfmd_cli.physics import reference
 from gfmd_cli.physics.bodies import LineParabola, Parabola, Wave
 from gfmd_cli.physics.contact import Contact, build_scene
@@ -228,7 +229,7 @@ def test_springs_are_solved_without_iteration_and_by_iteration_alike():
 def test_sorting_refuses_what_is_not_flat():
     contact = scene(ROUGH, Power(n=0.5), 256).contact(0.1)
     assert not is_flat(contact)
-    with pytest.raises(ValueError, match="flat"):
+    with pytest.raises(InputError, match="flat"):
         solve_contact(contact, SolverChoice(kind="sort"), ignore)
 
 

@@ -22,6 +22,11 @@ from gfmd_cli.physics.persson import Shells, shells
 from gfmd_cli.physics.surface import Surface, sample
 
 ROUNDING = 1e-28  # |h(q)|^2 of a mode that only rounding has excited, relative to the largest
+SCALES = (1e-100, 1e100)  # [m, Pa]: squared, over all of the spectrum, still normal numbers
+PRESSURES = (1e-30, 1e6)
+"""Reduced pressures that are solved. Above 2^17, full contact on every grid, as no peak of a field
+is above its rms times the points per side; sigma - p then only loses digits. Below, squares of p*
+vanish sooner or later, and rounding of sigma has long been larger than p*."""
 
 
 @dataclass(frozen=True)
@@ -101,15 +106,18 @@ class Scene:
     """The spectrum of the resolved surface with its stiffness, in physical units."""
 
     def contact(self, p_star: float) -> Contact:
-        """The contact at reduced pressure p*."""
+        """The contact at reduced pressure p*. Raises InputError where that is out of range."""
+        low, high = PRESSURES
+        if not low <= p_star <= high:
+            raise InputError(f"load: p* = {p_star:g} is out of range, {low:g} to {high:g}")
         return Contact(self.grid, self.height, self.stiffness, p_star)
 
 
 def build_scene(surface: Surface, elastomer: Elastomer, points: int, threads: int = 1) -> Scene:
     """Sample the surface and reduce heights and stiffness to the scales of the resolved surface.
 
-    Raises InputError where the grid does not resolve the surface, the surface is flat, or the
-    numbers overflow.
+    Raises InputError where the grid does not resolve the surface, the surface is flat, or a scale
+    is out of range.
     """
     grid, height = sample(surface, points)
     grid = replace(grid, threads=threads)
@@ -124,9 +132,18 @@ def build_scene(surface: Surface, elastomer: Elastomer, points: int, threads: in
     q = m * (2 * np.pi / grid.length)
     k = elastomer.stiffness(q, grid.length)
     unit = elastomer.half_space(q) if isinstance(elastomer, Slab) else k
-    reduced = float(np.sqrt(np.sum(power * (unit / stiffest) ** 2)))  # Eq. (23)
-    stiffness /= reduced
+    with np.errstate(over="ignore"):  # refused below
+        reduced = float(np.sqrt(np.sum(power * (unit / stiffest) ** 2)))  # Eq. (23)
     h_std = largest * rms
+    _check_scales(
+        {
+            "L": grid.length,
+            "h_std": h_std,
+            "h_std times the largest k(q)": stiffest * h_std,
+            "Delta_sigma": reduced * stiffest * h_std,
+        }
+    )
+    stiffness /= reduced
     return Scene(
         grid=grid,
         height=height,
@@ -136,6 +153,17 @@ def build_scene(surface: Surface, elastomer: Elastomer, points: int, threads: in
         delta_sigma=reduced * stiffest * h_std,
         shells=shells(q, power * h_std**2, k, elastomer.gamma(q, grid.length)),
     )
+
+
+def _check_scales(scales: dict[str, float]) -> None:
+    """Refuse what is too large or too small to compute with; [m] and [Pa]."""
+    low, high = SCALES
+    for name, scale in scales.items():
+        if not low <= scale <= high:
+            raise InputError(
+                f"surface, elastomer: {name} = {scale:g} is out of range, "
+                f"{low:g} to {high:g}: choose other units"
+            )
 
 
 def _stiffness(grid: Grid, elastomer: Elastomer) -> tuple[Field, float]:
@@ -148,6 +176,9 @@ def _stiffness(grid: Grid, elastomer: Elastomer) -> tuple[Field, float]:
     if not (np.isfinite(stiffest) and stiffest > 0):
         raise InputError(f"elastomer: stiffness {stiffest} at the shortest wave is out of range")
     k /= stiffest
+    softest = float(k.ravel()[1:].min())  # the first is q = 0
+    if not softest >= SCALES[0]:
+        raise InputError(f"elastomer: stiffness falls to {softest:g} of its largest value")
     return k, stiffest
 
 

@@ -84,7 +84,7 @@ class Plate(Choice):
 
     def stiffness(self, q: Field, length: float = 1.0) -> Field:
         """k(q) [Pa/m]."""
-        return self.E_star * self.thickness**3 / 12 * q**4
+        return self.E_star / 12 * (self.thickness * q) ** 3 * q
 
     def gamma(self, q: Field, length: float = 1.0) -> Field:
         """Weight of the elastic energy in Persson theory. Paper Eq. (39)."""
@@ -189,7 +189,7 @@ def slab_factor(t: Field) -> Field:
     for divisor in (272.0, 210.0, 156.0, 110.0, 72.0, 42.0, 20.0):  # 17*16, 15*14, ..., 5*4
         tail = 1.0 + square / divisor * tail
     difference = np.where(thin, square * np.where(thin, t, 0.0) / 6 * tail, sinh - middle)
-    factor = difference * (sinh + middle) / (sinh * cosh + middle)
+    factor = difference * ((sinh + middle) / (sinh * cosh + middle))  # t^4 would underflow first
     large = np.clip(t, 20.0, 400.0)
     bulk = 1.0 - (4 * large**2 + 4 * large + 2) * np.exp(-2 * large)
     return np.where(thick, bulk, factor)

@@ -99,15 +99,24 @@ class Grid:
         """
         work = self.empty_modes()
         real = work.view(self.real)[..., : self.points]
-        axes, options = tuple(range(self.dimension)), {"threads": self._threads}
-        with wisdom.kept():
-            forward = pyfftw.FFTW(
-                real, work, axes, "FFTW_FORWARD", planning_timelimit=PLANNING, **options
-            )
-            backward = pyfftw.FFTW(
-                work, real, axes, "FFTW_BACKWARD", planning_timelimit=PLANNING, **options
-            )
-        return work, forward.execute, backward.execute
+
+        def plan(flags: tuple[str, ...]) -> list[Callable[[], None]]:
+            ways = ((real, work, "FFTW_FORWARD"), (work, real, "FFTW_BACKWARD"))
+            return [
+                pyfftw.FFTW(
+                    source,
+                    target,
+                    tuple(range(self.dimension)),
+                    way,
+                    flags,
+                    threads=self._threads,
+                    planning_timelimit=PLANNING,
+                ).execute
+                for source, target, way in ways
+            ]
+
+        forward, backward = wisdom.planned(plan)
+        return work, forward, backward
 
     @property
     def work(self) -> Modes:

@@ -154,7 +154,8 @@ class Persson:
         """
         width = self.delta_sigma
         x, y = np.maximum(sigma, 0.0) / width, np.asarray(p) / width
-        density: Field = -np.expm1(-2 * x * y) * np.exp(-0.5 * (x - y) ** 2)
+        apart = np.minimum(np.abs(x - y), _UNDERFLOW)
+        density: Field = -np.expm1(-2 * x * y) * np.exp(-0.5 * apart**2)
         density /= np.sqrt(2 * np.pi) * width
         return density
 
@@ -253,10 +254,11 @@ def _panel_edges(p: Field, delta_sigma: float) -> Field:
     """
     if not p.size:
         return np.array([1.0, 1.0])
-    y_end = min(0.5 * (p.max() / delta_sigma) ** 2 + 40, 745)  # exp(-40) < eps; exp(-745) is 0
+    highest = min(p.max() / delta_sigma, _UNDERFLOW)
+    y_end = min(0.5 * highest**2 + 40, 745)  # exp(-40) < eps; exp(-745) is 0
     end = delta_sigma * np.sqrt(2 * y_end)
     start = min(p.min(), end)
     tail = delta_sigma * np.sqrt(2 * np.arange(4, y_end, 4))
-    steps = 2 + int(2 * np.log(end / start))
+    steps = 2 + int(2 * (np.log(end) - np.log(start)))
     edges = np.concatenate([p[p < end], tail[tail > start], np.geomspace(start, end, steps)])
     return np.unique(edges)

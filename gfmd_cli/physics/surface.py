@@ -73,7 +73,7 @@ class SelfAffine(Choice):
     @property
     def highest_mode(self) -> int:
         """Largest |q| L / 2 pi along an axis: L / lambda_s."""
-        return int(np.floor(1 / self.cutoff * (1 + 1e-12)))  # 1/0.01 must be 100, not 99
+        return int(np.floor(1 / max(self.cutoff, 1e-300) * (1 + 1e-12)))  # 1/0.01: 100, not 99
 
     def smallest_grid(self) -> int:
         """Two points per lambda_s."""
@@ -196,7 +196,8 @@ Surface = Annotated[
 def sample(surface: Surface, points: int) -> tuple[Grid, Field]:
     """The surface on `points` per side of its cell: the grid and the heights [m].
 
-    Raises InputError where the grid does not resolve the surface, or the surface is flat.
+    Raises InputError where the grid does not resolve the surface, or the surface is flat, or its
+    heights overflow.
     """
     needed = surface.smallest_grid()
     if points < needed:
@@ -204,8 +205,12 @@ def sample(surface: Surface, points: int) -> tuple[Grid, Field]:
             f"grid.points: {points} points per side do not resolve this surface "
             f"(kind {surface.kind!r}); {needed} or more do"
         )
-    heights = surface.heights(points)
-    if np.ptp(heights) == 0:
+    with np.errstate(over="ignore", invalid="ignore"):  # refused below
+        heights = surface.heights(points)
+        range_of_heights = float(np.ptp(heights))
+    if not np.isfinite(range_of_heights):
+        raise InputError(f"surface: heights overflow (kind {surface.kind!r}); choose other units")
+    if range_of_heights == 0:
         raise InputError(f"surface: flat (kind {surface.kind!r}); reduced units need roughness")
     length = surface.cell if isinstance(surface, FileSurface) else surface.length
     return Grid(points, surface.dimension, length), heights

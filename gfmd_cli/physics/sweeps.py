@@ -126,17 +126,17 @@ def slopes(sigma, marks, least, change, padded, out, a, b):  # type: ignore[no-u
 
 
 @kernel
-def turn(h, u, sigma, marks, least, beta, direction, length, padded, out, a, b):  # type: ignore[no-untyped-def]
+def turn(h, u, sigma, marks, least, z, beta, direction, length, padded, out, a, b):  # type: ignore[no-untyped-def]
     """direction <- z + beta direction on the free points, and the projected move along it.
 
-    `padded` holds z, and then the move max(u + length d, h) - u. Sums of direction times force and
-    of move times force; count of the points that were stopped at h.
+    padded <- move max(u + length d, h) - u; z may lie there. Sums of direction times force and of
+    move times force; count of the points that were stopped at h.
     """
     for i in range(a, b):
         descent = fall = 0.0
         stopped = 0
         for j in range(h.shape[1]):
-            d = 0.0 if marks[i, j] >= least else padded[i, j] + beta * direction[i, j]
+            d = 0.0 if marks[i, j] >= least else z[i, j] + beta * direction[i, j]
             direction[i, j] = d
             d = direction[i, j]  # as rounded
             step, room = length * d, h[i, j] - u[i, j]

@@ -8,11 +8,14 @@ import fcntl
 import hashlib
 import os
 import platform
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
+from typing import TypeVar
 
 import pyfftw
+
+T = TypeVar("T")
 
 
 def processor() -> str:
@@ -51,14 +54,15 @@ def _alone(folder: Path) -> Iterator[None]:
         yield
 
 
-@contextmanager
-def kept() -> Iterator[None]:
-    """Plan inside with the wisdom known, and keep what was learnt."""
+def planned(plan: Callable[[tuple[str, ...]], T]) -> T:
+    """`plan` with the flags of a planner: of what is known, else measured, and kept for all."""
+    with suppress(RuntimeError):  # not known
+        return plan(("FFTW_MEASURE", "FFTW_WISDOM_ONLY"))
     paths = _paths()
     with _alone(paths[0].parent):
         _take_in(paths)
         before = pyfftw.export_wisdom()
-        yield
+        found = plan(("FFTW_MEASURE",))
         for path, old, new in zip(paths, before, pyfftw.export_wisdom(), strict=False):
             if new == old:
                 continue
@@ -66,3 +70,4 @@ def kept() -> Iterator[None]:
             with suppress(OSError):  # a cache that cannot be written costs time only
                 fresh.write_bytes(new)
                 fresh.replace(path)
+    return found

@@ -83,7 +83,7 @@ def solve(
         if current.step >= max_steps:
             refresh(contact, current)
             return "max_steps"
-    return "converged"
+    return "converged" if state.residual < tolerance else "rounding"  # of an exact method
 
 
 def refresh(contact: Contact, state: State) -> None:

@@ -3,9 +3,9 @@
 Polak-Ribiere+ directions on the points that are free, a projected move u -> max(u + s d, h), and
 the lowest point on the way there. One of three preconditioners:
 
-- the screened Green's function 1 / (k(q) + k(q_c)), two transforms. Contact pins the displacement
-  every few patches, so waves longer than that are no softer than k(q_c); with plain 1/k the method
-  degrades at n = 2 and fails from n = 3 on;
+- the screened Green's function 1 / (k(q) + k(q_c)), two transforms in single precision, which is
+  enough and costs half. Contact pins the displacement every few patches, so waves longer than that
+  are no softer than k(q_c); with plain 1/k the method degrades at n = 2 and fails from n = 3 on;
 - the V-cycle of `multigrid`, which sees the contacts themselves and needs no transform;
 - the sum over levels of `multilevel`, which does so too, for stiffnesses that grow in leaps.
 
@@ -18,6 +18,7 @@ constraints are kept out of the scaling).
 """
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -35,6 +36,7 @@ HALVINGS = 60  # of a move that leads up; beyond, rounding alone decides
 WORTH = 0.5  # a projected move is taken whole where the energy falls: its best share is over 1/2
 TRUST = (0.6, 1.6)  # how far one clipped move may change the length of the next
 SOFTEST = 1e-12  # curvature over descent below which a direction is a shift of the whole body
+SINGLE_PAIR = 1  # transforms that a pair in single precision counts for: it takes half the time
 STEEP = 0.9  # local exponent of k(q) from which the V-cycle pays
 RESCREEN_AFTER = 4  # steps at least between two looks at the screening length ...
 RESCREEN_GROWTH = 1.5  # ... and this factor in the step count
@@ -89,6 +91,8 @@ class _Run:
         )
         self.marks = np.empty(self.h.shape, dtype=np.int8)
         self.least = sweeps.PRESSED
+        self.screened = replace(grid, precision="single")
+        self.z = self.padded
         self.multilevel: Multigrid | Multilevel | None = None
         self.even = self.grid.dimension == 2 and suits(contact)
         sums = self.mark()
@@ -132,21 +136,23 @@ class _Run:
             memory |= {"slope": 0.0, "length": 0.0}
 
     def precondition(self) -> None:
-        """Write the preconditioned force z to `padded`; set the slope and the conjugation beta."""
+        """Write the preconditioned force z to `z`; set the slope and the conjugation beta."""
         memory, bodies = self.memory, (self.sigma, self.marks, self.least)
         if memory["multilevel"]:
+            self.z = self.padded
             if self.multilevel is None:
                 kind = Multigrid if self.even else Multilevel
                 self.multilevel = kind(self.contact, self.rows)
             slope, turned = self.multilevel.apply(*bodies, self.change, self.padded)
         else:
-            self.rows(sweeps.free_force, *bodies, self.padded)
-            self.grid.transform()
+            self.z = self.grid.as_rows(self.screened.padded)
+            self.rows(sweeps.free_force, *bodies, self.z)
+            self.screened.transform()
             screened = (memory["screening"], 1.0 / self.grid.size)
-            self.rows(sweeps.soften, self.padded, self.k, *screened)
-            self.grid.transform_back()
-            self.state.transforms += 2
-            slope, turned = self.rows.sums(2, sweeps.slopes, *bodies, self.change, self.padded)
+            self.rows(sweeps.soften, self.z, self.k, *screened)
+            self.screened.transform_back()
+            self.state.transforms += SINGLE_PAIR
+            slope, turned = self.rows.sums(2, sweeps.slopes, *bodies, self.change, self.z)
         # Polak and Ribiere, cut off at zero. The force has changed by -change since the last
         # direction: z (f - f_old) = -z change
         beta = max(0.0, -turned / memory["slope"]) if memory["slope"] > 0 else 0.0
@@ -189,7 +195,7 @@ class _Run:
         """The new direction, and the move along it; see `sweeps.turn`."""
         memory, bodies = self.memory, (self.h, self.u, self.sigma, self.marks, self.least)
         way = (memory["beta"], self.direction, memory["length"])
-        return self.rows.sums(3, sweeps.turn, *bodies, *way, self.padded)
+        return self.rows.sums(3, sweeps.turn, *bodies, self.z, *way, self.padded)
 
     def share_of_move(self, best: float, stopped: bool) -> float:
         """How much of a move to go, where the energy is least at the share `best` of it."""

@@ -5,6 +5,7 @@ from typing import Literal
 
 import numpy as np
 
+from gfmd_cli.errors import InputError
 from gfmd_cli.physics.choice import Choice
 from gfmd_cli.physics.contact import Contact
 from gfmd_cli.physics.fields import Field
@@ -20,9 +21,9 @@ class Sort(Choice):
     kind: Literal["sort"] = "sort"
 
     def begin(self, contact: Contact, u: Field) -> State:
-        """The solution; `u` is overwritten. Raises ValueError where k(q) is not flat."""
+        """The solution; `u` is overwritten. Raises InputError where k(q) is not flat."""
         if not is_flat(contact):
-            raise ValueError("sort solves bodies of flat stiffness (n = 0) only")
+            raise InputError('solver.kind: "sort" solves bodies of flat stiffness (n = 0) only')
         displaced = contact.pressure / float(contact.stiffness.flat[-1])
         level = non_contact_height(contact.height, displaced)
         np.maximum(contact.height, level, out=u)

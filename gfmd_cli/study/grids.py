@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
-from math import sqrt
+from math import nan, sqrt
 from typing import Any
 
 from gfmd_cli.errors import InputError
@@ -28,6 +28,7 @@ from gfmd_cli.study.tasks import FIRST, Task, first_grid
 
 FINAL = ("bound", "slow", "diverges")  # verdicts that no finer grid changes
 NOT_REACHED = "accuracy_not_reached"
+UNSOLVED = 0.1  # natural residual from which nothing is said of the continuum
 ALGEBRAIC = 2.0
 """Largest errors of u_g and sigma_p on their grid that were met, in natural residuals times the
 value x, or its root where that is less than 1: n = 0.5 to 4, slabs, p* = 0.003 to 1."""
@@ -223,6 +224,8 @@ def _rung(solved: Solved) -> Rung:
 def _estimate(task: Task, solved: Solved, rungs: list[Rung]) -> dict[str, Estimate]:
     """Distance of the last rung to the continuum, in the units of its scene."""
     scene = solved.scene
+    if not solved.solution.residual < UNSOLVED:
+        return dict.fromkeys(QUANTITIES, Estimate(nan, nan, nan, "unknown"))
     levels = [
         Level(
             rung.points,

@@ -62,7 +62,7 @@ class Ladder(Choice):
 
     def pressures(self) -> list[float]:
         """The pressures, rising."""
-        decades = np.log10(self.to / self.from_)
+        decades = np.log10(self.to) - np.log10(self.from_)  # the ratio can overflow
         steps = max(1, round(decades * self.per_decade)) if decades > 0 else 0
         return [float(p) for p in np.geomspace(self.from_, self.to, steps + 1)]
 

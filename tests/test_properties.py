@@ -1,0 +1,476 @@
+"""Properties of every run: random specs, scales and units, and the ends of the number range.
+
+`hypothesis` draws the specs, always the same ones; `make validate` draws ten times as many.
+"""
+
+import json
+import tempfile
+from math import isfinite, sqrt
+from pathlib import Path
+
+import mpmath as mp
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, note, settings
+from hypothesis import strategies as st
+
+from gfmd_cli.errors import GfmdError, InputError
+from gfmd_cli.physics import einstein
+from gfmd_cli.physics.bodies import Parabola, PowerLawBody, Punch, Ridge
+from gfmd_cli.physics.certificate import certify
+from gfmd_cli.physics.contact import PRESSURES, build_scene
+from gfmd_cli.physics.continuum import QUANTITIES
+from gfmd_cli.physics.elastomer import Plate, Power, Slab, Tabulated, slab_factor
+from gfmd_cli.physics.observables import observe
+from gfmd_cli.physics.persson import Persson, Shells
+from gfmd_cli.physics.surface import SelfAffine
+from gfmd_cli.solvers.cascade import SolverChoice, solve_contact
+from gfmd_cli.study.grids import solve_on_grids
+from gfmd_cli.study.parse import read_spec
+from gfmd_cli.study.tasks import plan
+
+EPS = np.finfo(float).eps
+STATUS = {"converged", "max_steps", "rounding", "accuracy_not_reached"}
+EXAMPLES = 120
+
+
+def ignore(*_):
+    """A watch, or a note taker, that looks away."""
+
+
+def spec_of(tables):
+    """The spec of plain tables, by way of a TOML file."""
+    lines = []
+    for name, table in tables.items():
+        lines += [f"[{name}]", *(f"{key} = {json.dumps(value)}" for key, value in table.items())]
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "spec.toml"
+        path.write_text("\n".join(lines))
+        return read_spec(path)[0]
+
+
+def solve(tables):
+    """The only task of a spec, solved."""
+    (task,) = plan(spec_of(tables))
+    return solve_on_grids(task, 1, np.inf, ignore, None, ignore, watch=ignore)
+
+
+def elastic(contact, u):
+    """K u by NumPy's transforms."""
+    return np.fft.irfftn(np.fft.rfftn(u) * contact.stiffness, u.shape, axes=range(u.ndim))
+
+
+# --- random specs ---------------------------------------------------------------------------------
+
+
+def power_of_ten(low, high):
+    return st.floats(low, high).map(lambda x: float(f"{10**x:.6g}"))
+
+
+UNIT = power_of_ten(-9, 3)
+
+
+@st.composite
+def surfaces(draw, points):
+    kind = draw(st.sampled_from(["self-affine"] * 4 + ["line", "body"]))
+    length = draw(UNIT)
+    if kind == "self-affine":
+        mode = draw(st.integers(1, points // 2))
+        surface = {
+            "kind": kind,
+            "hurst": draw(st.floats(0.05, 1)),
+            "cutoff": 1 / mode,
+            "rolloff": draw(st.floats(1 / mode, 2)),
+            "spectrum": draw(st.sampled_from(["rolloff", "cutoff"])),
+            "seed": draw(st.integers(0, 2**63 - 1)),
+        }
+        if draw(st.booleans()):
+            surface["h_std"] = draw(UNIT)
+        return surface | {"length": length}
+    share = draw(st.floats(0.05, 0.45))
+    bodies = {
+        "line": [
+            {"kind": "ridge", "slope": draw(UNIT), "width": draw(st.floats(0.2, 1))},
+            {"kind": "line-parabola", "radius": draw(UNIT)},
+            {"kind": "wave", "amplitude": draw(UNIT)},
+        ],
+        "body": [
+            {"kind": "parabola", "radius": draw(UNIT)},
+            {"kind": "power-law", "exponent": draw(st.floats(0.5, 8)), "radius": draw(UNIT)},
+            {"kind": "cone", "slope": draw(UNIT)},
+            {"kind": "punch", "radius": share * length, "depth": draw(UNIT)},
+        ],
+    }
+    return draw(st.sampled_from(bodies[kind])) | {"length": length}
+
+
+ELASTOMERS = st.one_of(
+    st.fixed_dictionaries(
+        {
+            "kind": st.just("power"),
+            "n": st.one_of(st.sampled_from([0, 0.5, 1, 2, 3, 4]), st.floats(0, 4)),
+            "k_n": UNIT,
+        }
+    ),
+    st.fixed_dictionaries(
+        {"kind": st.just("slab"), "thickness": power_of_ten(-3, 1), "E_star": UNIT}
+    ),
+    st.fixed_dictionaries({"kind": st.just("half-space"), "E_star": UNIT}),
+    st.fixed_dictionaries({"kind": st.just("membrane"), "tension": UNIT}),
+    st.fixed_dictionaries({"kind": st.just("plate"), "thickness": UNIT, "E_star": UNIT}),
+)
+
+
+@st.composite
+def specs(draw):
+    points = 2 * draw(st.integers(8, 64))
+    kind = draw(st.sampled_from(["auto"] * 5 + ["pcg", "ccg", "polonsky-keer", "fire"]))
+    solver = {
+        "kind": kind,
+        "tolerance": draw(power_of_ten(-9, -1)),
+        "max_steps": 3000 if kind in ("auto", "pcg") else 300,
+        "nested": draw(st.booleans()),
+    }
+    if kind in ("auto", "pcg"):
+        solver["precision"] = draw(st.sampled_from(["double", "double", "single"]))
+    tables = {
+        "surface": draw(surfaces(points)),
+        "elastomer": draw(ELASTOMERS),
+        "grid": {"points": points},
+        "load": {"p_star": draw(power_of_ten(-6, 2))},
+        "solver": solver,
+    }
+    if draw(st.booleans()):
+        tables["accuracy"] = {"mean_gap": draw(power_of_ten(-3, -0.1))}
+    return tables
+
+
+def check(tables):
+    """What holds for every run, whatever its spec and however it ended."""
+    note(json.dumps(tables))
+    try:
+        solved = solve(tables)
+    except GfmdError as error:
+        note(f"refused: {error}")
+        return
+    contact, solution, seen = solved.contact, solved.solution, solved.seen
+    u, sigma, h, p = solution.u, solution.sigma, contact.height, contact.pressure
+    assert solution.status in STATUS
+    assert solution.steps <= tables["solver"]["max_steps"]
+    assert np.all(np.isfinite(u))
+    assert np.all(np.isfinite(sigma))
+    check_conditions(contact, solution, tables["solver"]["tolerance"])
+    gap = u - h
+    size = sqrt(np.mean(u**2)) * max(sqrt(np.mean(sigma**2)), p)
+    assert abs(2 * seen.energy - seen.work - np.mean(sigma * gap)) <= 64 * EPS * size
+    assert seen.u_g == pytest.approx(gap.mean(), rel=1e-12)
+    assert seen.sigma_p == pytest.approx(sigma.std(), rel=1e-9, abs=64 * EPS * p)
+    assert 0 <= seen.a_r <= 1
+    columns = solved.columns()
+    assert bool(columns) == ("accuracy" in tables)
+    for name in QUANTITIES if columns else ():
+        error, verdict = columns[f"{name}_error"], columns[f"{name}_verdict"]
+        if verdict in ("regular", "exact"):
+            assert isfinite(error)
+            assert error >= 0
+            assert isfinite(columns[f"{name}_continuum"])
+            assert columns[f"{name}_continuum_error"] >= 0
+    check_certificate(contact, solution, seen)
+
+
+def check_conditions(contact, solution, tolerance):
+    """u >= h, sigma >= 0, complementarity and the mean, by a stress computed with NumPy."""
+    u, p, points = solution.u, contact.pressure, contact.grid.points
+    stress, gap = elastic(contact, u) + p, u - contact.height
+    rounding = 64 * EPS * (np.abs(u).max() * contact.stiffness.max() + p)
+    assert solution.sigma == pytest.approx(stress, abs=rounding, rel=0)
+    assert np.all(gap >= 0)
+    assert abs(solution.sigma.mean() - p) <= rounding
+    unit = min(p, 1)
+    residual = np.sqrt(np.mean(np.minimum(gap, stress) ** 2)) / unit
+    assert solution.residual == pytest.approx(residual, rel=1e-6, abs=rounding / unit)
+    if solution.status in ("max_steps", "rounding"):
+        assert residual >= tolerance - rounding / unit
+        return
+    assert residual < tolerance + rounding / unit
+    most = residual * unit * points ** (contact.grid.dimension / 2)
+    assert stress.min() >= -most - rounding
+    partner = np.sqrt(np.mean(np.maximum(gap, stress) ** 2))
+    assert abs(np.mean(gap * stress)) <= residual * unit * partner * (1 + 1e-6)
+
+
+def check_certificate(contact, solution, seen):
+    """The bounds hold the distance to a solution at 1e-10, which has bounds of its own."""
+    bounds = certify(contact, solution.u, solution.sigma)
+    assert bounds.gap >= 0
+    close = solve_contact(contact, SolverChoice(tolerance=1e-10, max_steps=3000), ignore)
+    contact.stress(close.u, out=close.sigma)
+    best, truth = certify(contact, close.u, close.sigma), observe(contact, close.u, close.sigma)
+    rounding = 64 * EPS * (1 + contact.pressure)
+    assert abs(seen.u_g - truth.u_g) <= bounds.u_g + best.u_g + rounding
+    assert abs(seen.sigma_p - truth.sigma_p) <= bounds.sigma_p + best.sigma_p + rounding
+
+
+PLAIN = settings(
+    derandomize=True,
+    deadline=None,
+    max_examples=EXAMPLES,
+    suppress_health_check=list(HealthCheck),
+)
+
+
+@PLAIN
+@given(specs())
+def test_every_spec_is_solved_or_says_why_not(tables):
+    check(tables)
+
+
+@pytest.mark.validation
+@settings(PLAIN, max_examples=10 * EXAMPLES)
+@given(specs())
+def test_many_more_specs_are_solved_or_say_why_not(tables):
+    check(tables)
+
+
+@pytest.mark.parametrize("n", [0.5, 1, 3])
+def test_sorting_a_body_that_is_not_flat_is_bad_input(n):
+    with pytest.raises(InputError, match="flat"):
+        solve(plain_tables(elastomer={"kind": "power", "n": n}, solver={"kind": "sort"}))
+
+
+# --- scales and units -----------------------------------------------------------------------------
+
+SCALED = SelfAffine(cutoff=0.06, h_std=1.0)
+EXPONENTS = (0, 0.5, 1, 2, 3, 4)
+TWO = 2.0**40  # 1.1e12
+
+
+def plain_tables(**changes):
+    """A small spec with error bars; `changes` replace whole tables."""
+    return {
+        "surface": {"kind": "self-affine", "cutoff": 0.06, "h_std": 1.0},
+        "elastomer": {"kind": "power", "n": 1},
+        "grid": {"points": 128},
+        "load": {"p_star": 0.1},
+        "solver": {"tolerance": 1e-12},
+        "accuracy": {"mean_gap": 0.5},
+    } | changes
+
+
+def body(n, modulus=1.0):
+    """A power law, or a slab where `n` says so."""
+    if n == "slab":
+        return {"kind": "slab", "thickness": 0.03, "E_star": modulus}
+    return {"kind": "power", "n": n, "k_n": modulus}
+
+
+def numbers(n, modulus=1.0, h_std=1.0, length=1.0):
+    """Reduced results and error bars of one contact in some units."""
+    surface = {"kind": "self-affine", "cutoff": 0.06, "h_std": h_std, "length": length}
+    solved = solve(plain_tables(surface=surface, elastomer=body(n, modulus)))
+    assert solved.solution.residual < 1e-11  # for n = 3 and 4 rounding ends the solve above 1e-12
+    seen, columns = solved.seen, solved.columns()
+    values = [seen.u_g, seen.a_r, seen.sigma_p, seen.perimeter, seen.energy]
+    # NaN where a quantity has no continuum value
+    bars = [columns[f"{name}_{what}"] for name in QUANTITIES for what in ("error", "continuum")]
+    exact = [solved.solution.residual, columns["u_g_bound"], columns["sigma_p_bound"]]
+    return np.array(values), np.array(bars), np.array(exact)
+
+
+@pytest.mark.parametrize("n", [*EXPONENTS, "slab"])
+def test_units_that_are_powers_of_two_change_no_bit(n):
+    expected = numbers(n)
+    for scales in (
+        {"modulus": TWO},
+        {"modulus": 1 / TWO},
+        {"h_std": TWO},
+        {"h_std": 1 / TWO, "modulus": TWO},
+    ):
+        for ours, theirs in zip(expected, numbers(n, **scales), strict=True):
+            assert np.array_equal(ours, theirs, equal_nan=True)
+
+
+@pytest.mark.parametrize("length", [TWO, 1 / TWO, 3e12, 1e-12])
+@pytest.mark.parametrize("n", [*EXPONENTS, "slab"])
+def test_the_length_of_the_cell_drops_out(n, length):
+    """k(q) changes by a rounding, so the bars, which take differences of grids, by some 1e-10."""
+    values, bars, _ = numbers(n)
+    other, other_bars, _ = numbers(n, length=length)
+    assert other == pytest.approx(values, rel=1e-12)
+    assert other_bars == pytest.approx(bars, rel=1e-8, nan_ok=True)
+
+
+@pytest.mark.parametrize("scale", [1e-12, 3e12])
+@pytest.mark.parametrize("n", [*EXPONENTS, "slab"])
+def test_units_of_all_kinds_at_once_drop_out(n, scale):
+    values, bars, _ = numbers(n)
+    other, other_bars, _ = numbers(n, modulus=1 / scale, h_std=scale / 7, length=5 * scale)
+    assert other == pytest.approx(values, rel=1e-12)
+    assert other_bars == pytest.approx(bars, rel=1e-8, nan_ok=True)
+
+
+# --- the ends of the number range -----------------------------------------------------------------
+
+
+@pytest.mark.parametrize("n", [0, 1, 4])
+@pytest.mark.parametrize("p_star", [1e-30, 1e-20, 1e-12, 40.0, 1e6])
+def test_pressures_at_both_ends_say_what_was_reached(n, p_star):
+    tables = plain_tables(elastomer=body(n), load={"p_star": p_star}, grid={"points": 64})
+    tables["solver"] = {"tolerance": 1e-6, "max_steps": 3000}
+    solved = solve(tables)
+    reached = solved.solution.residual < 1e-6
+    assert reached == (solved.solution.status == "converged")
+    assert reached == (p_star > 1)
+    if p_star < 1e-15:  # the stress of a single point is below the rounding of sigma
+        assert {e.verdict for e in solved.estimates.values()} == {"unknown"}
+    if p_star > 1:
+        assert solved.seen.a_r == 1
+        assert solved.seen.sigma_p == pytest.approx(1, rel=64 * EPS * p_star)
+
+
+@pytest.mark.parametrize("factor", [0.99, 1 / 0.99])
+def test_pressures_beyond_the_ends_are_refused(factor):
+    scene = build_scene(SCALED, Power(n=1), 64)
+    end = PRESSURES[0] if factor < 1 else PRESSURES[1]
+    scene.contact(end)
+    with pytest.raises(InputError, match="out of range"):
+        scene.contact(end * factor)
+
+
+def test_a_pressure_that_is_nothing_in_reduced_units_is_refused():
+    tables = plain_tables(load={"pressure": 1e-300}, elastomer=body(1, modulus=1e60))
+    with pytest.raises(InputError, match=r"p\* = 0 is out of range"):
+        solve(tables)
+
+
+@pytest.mark.parametrize(
+    ("surface", "elastomer"),
+    [
+        (SelfAffine(cutoff=0.05, h_std=1e-200), Power(n=1)),
+        (SelfAffine(cutoff=0.05, h_std=1e160), Power(n=1)),
+        (SelfAffine(cutoff=0.05, h_std=1.7e308), Power(n=1)),
+        (SelfAffine(cutoff=0.05, rolloff=1e300), Power(n=1)),
+        (SelfAffine(cutoff=0.05, length=1e-40), Power(n=4)),
+        (SelfAffine(cutoff=0.05, length=1e77), Power(n=4)),
+        (SelfAffine(cutoff=0.05, length=1e300), Power(n=0)),
+        (SelfAffine(cutoff=0.05), Power(n=1, k_n=1e160)),
+        (SelfAffine(cutoff=0.05), Power(n=1, k_n=1e-310)),
+        (SelfAffine(cutoff=0.05), Plate(thickness=1e110)),
+        (SelfAffine(cutoff=0.05), Slab(thickness=1e-80)),
+        (Parabola(radius=1e-300, length=1e12), Power(n=1)),
+        (PowerLawBody(exponent=100, radius=1e-12), Power(n=1)),
+        (Punch(depth=1e300), Power(n=1)),
+        (Ridge(slope=1e300, length=1e100), Power(n=1)),
+    ],
+)
+def test_scales_out_of_range_are_refused(surface, elastomer):
+    with pytest.raises(InputError, match=r"out of range|overflow|flat"):
+        build_scene(surface, elastomer, 64)
+
+
+def test_a_stiffness_that_falls_to_nothing_is_refused(tmp_path):
+    path = tmp_path / "k.txt"
+    np.savetxt(path, [[1.0, 1e-300], [100.0, 1.0]])
+    with pytest.raises(InputError, match="falls to"):
+        build_scene(SCALED, Tabulated(path=path), 64)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"surface": {"kind": "self-affine", "cutoff": 1e-320}},
+        {"surface": {"kind": "self-affine", "cutoff": 1e-300}},
+    ],
+)
+def test_no_grid_resolves_a_tiny_cut_off(changes):
+    with pytest.raises(InputError, match="do not resolve"):
+        solve(plain_tables(**changes))
+
+
+def test_an_accuracy_of_the_smallest_number_is_not_reached():
+    changes = {"grid": {"points": "auto"}, "accuracy": {"mean_gap": 5e-324, "max_points": 64}}
+    solved = solve(plain_tables(**changes))
+    assert solved.solution.status == "accuracy_not_reached"
+
+
+def test_a_ladder_spans_all_numbers():
+    path = {"from": 1e-300, "to": 1e300, "per_decade": 0.1}
+    load = "{ " + ", ".join(f"{key} = {value}" for key, value in path.items()) + " }"
+    with tempfile.TemporaryDirectory() as folder:
+        spec = Path(folder) / "spec.toml"
+        spec.write_text(
+            '[surface]\nkind = "self-affine"\ncutoff = 0.05\n[elastomer]\nkind = "power"\nn = 1\n'
+            f"[grid]\npoints = 64\n[load]\np_star = {load}\n"
+        )
+        pressures = read_spec(spec)[0].load.pressures()
+    assert len(pressures) == 61
+    assert pressures == pytest.approx(10.0 ** np.arange(-300, 301, 10), rel=1e-12)
+
+
+def test_the_slab_factor_keeps_its_digits_as_long_as_it_is_a_number():
+    """S = t^3/6 (1 - 3 t^2/10 ...) for thin slabs: q t from 1e-100 on."""
+    t = np.concatenate([10.0 ** np.arange(-100, -8, 4), [1e12]])
+    with mp.workdps(40):
+        exact = [float(mp.mpf(x) ** 3 / 6) if x < 1 else 1.0 for x in map(float, t)]
+    assert slab_factor(t) == pytest.approx(exact, rel=4 * EPS, abs=0)
+
+
+@pytest.mark.parametrize("n", [0, 0.5, 1, 2, 3, 3.7, 4])
+def test_stiffness_keeps_its_digits_over_forty_decades(n):
+    q = 10.0 ** np.linspace(-20, 20, 81)
+    with mp.workdps(40):
+        exact = [float(mp.mpf(x) ** mp.mpf(n)) for x in map(float, q)]
+    assert Power(n=n).stiffness(q) == pytest.approx(exact, rel=2 * EPS, abs=0)
+
+
+def test_a_table_keeps_its_digits_over_forty_decades(tmp_path):
+    """log k of 90 is rounded to 1e-14, so k is."""
+    q = np.logspace(-20, 20, 41)
+    path = tmp_path / "k.txt"
+    np.savetxt(path, np.column_stack([q, 1e-30 * q**4]), fmt="%.17g")
+    got = Tabulated(path=path).stiffness(1.07 * q)
+    assert got == pytest.approx(1e-30 * (1.07 * q) ** 4, rel=2e-13, abs=0)
+
+
+SHELL = Persson(Shells(*(np.array([x]) for x in (1.0, 1.0, 1.0, 2.0, 0.3))))
+
+
+@pytest.mark.parametrize("p_star", [1e-30, 1e-3, 1.0, 6.0, 15.0, 20.0, 30.0, 37.0])
+def test_the_tail_of_persson_theory_keeps_its_digits(p_star):
+    """u_g falls to 1e-304; a rounding of p*^2 / 2 is then one of 1e-13."""
+    width = sqrt(2.0)
+    p = p_star * width
+    with mp.workdps(50):
+        s, start = mp.mpf(2), mp.mpf(p)
+
+        def slope(x):
+            y = x / mp.sqrt(2 * s)
+            rest = mp.exp(-y * y) / mp.sqrt(mp.pi) - y * mp.erfc(y)  # ierfc
+            area = mp.erf(y) + 2 * y * rest
+            return (mp.mpf(0.3) + 3 * (1 - mp.mpf(0.3)) * area**2) * mp.sqrt(2 * s) * rest / s
+
+        ends = [mp.log(start)]
+        if p_star < 1:
+            ends += [mp.log(x) for x in 10.0 ** np.arange(-28, 1, 2) if x > p]
+        ends += [mp.log(mp.sqrt(start**2 + 2 * s * y)) for y in (*range(1, 20), 30, 50, 90)]
+        ends = sorted(set(ends))
+        gap = mp.quad(lambda t: slope(mp.exp(t)), ends, method="gauss-legendre", maxdegree=4)
+        rest = mp.erfc(start / mp.sqrt(2 * s))
+    assert SHELL.mean_gap(p) == pytest.approx(float(gap), rel=2e-15 * (1 + p_star**2), abs=0)
+    assert SHELL.non_contact_weight(p) == pytest.approx(
+        float(rest), rel=1e-15 * (1 + p_star**2), abs=0
+    )
+
+
+@pytest.mark.filterwarnings("error")
+def test_the_theories_have_limits_at_the_ends_of_all_numbers():
+    p = np.array([1e-320, 1e-300, 40.0, 1e200, 1e300])
+    for each in p:
+        assert SHELL.mean_gap(each) >= 0
+        assert np.isfinite(SHELL.mean_gap(each))
+    assert np.all(np.diff(SHELL.mean_gap(p)) <= 0)
+    assert SHELL.stress_density(np.array([1.0, 1e150]), 1e150)[0] == 0
+    assert SHELL.stress_deviation(p[2:]) == pytest.approx([sqrt(2.0)] * 3)
+    z = einstein.non_contact_height(p[1:])
+    assert einstein.pressure(z) == pytest.approx(p[1:], rel=1e-12, abs=0)
+    assert np.all(np.isfinite(einstein.stress_deviation(z)))
