@@ -216,10 +216,15 @@ def analyze(study: Path, as_json: bool, figures: Path | None) -> None:
         gfmd analyze demo.h5 --figures figures
     """
     from gfmd_cli.analysis.compare import compare
+    from gfmd_cli.analysis.distribution_tables import distribution_table
     from gfmd_cli.analysis.tables import as_records, tables
 
     comparison = compare(study)
-    click.echo(json.dumps(as_records(comparison), indent=1) if as_json else tables(comparison))
+    if as_json:
+        click.echo(json.dumps(as_records(comparison), indent=1))
+    else:
+        told = [tables(comparison), distribution_table(comparison)]
+        click.echo("\n\n".join(text for text in told if text))
     if figures is not None:
         from gfmd_cli.analysis.figures import draw_all
 

@@ -287,7 +287,7 @@ def compare(points, p_star, pythons, options):
         table = {
             label: sweep(label, pythons[package], job, judge, folder, options)
             for label, (_, _, package) in CODES.items()
-            if package in pythons
+            if package in pythons and any(label.startswith(word) for word in options.codes)
         }
 
     for target in TARGETS:
@@ -356,6 +356,7 @@ def main():
     parser.add_argument("--p-star", type=float, nargs="+", default=[0.1, 0.01])
     parser.add_argument("--repeats", type=int, default=3, help="of each solve; the minimum counts")
     parser.add_argument("--limit", type=float, default=600.0, help="seconds for one solve")
+    parser.add_argument("--codes", nargs="+", default=[""], help="beginnings of their labels")
     parser.add_argument("--venv", type=Path, default=Path(".venv-peers"), help="of the peers")
     parser.add_argument("--work", help=argparse.SUPPRESS)
     options = parser.parse_args()

@@ -1,6 +1,6 @@
 """What it saves to model only what a scene needs: processor seconds with and without.
 
-    python scripts/economy.py --points 1024
+python scripts/economy.py --points 1024
 """
 
 import argparse

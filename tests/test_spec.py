@@ -128,7 +128,10 @@ def test_task_ids_depend_on_content_not_on_place(read):
         (("[0.1, 1.0]", "0.1\npressure = 1"), ["load", "either p_star or pressure"]),
         (("[study]", "[study"), ["TOML syntax"]),
         (('"base"', '"../x"'), ["study.name", "pattern"]),
-        (("[study]", "[solver]\ntolerance = 0\n[study]"), ["solver.tolerance", "greater than or equal to 1e-16"]),
+        (
+            ("[study]", "[solver]\ntolerance = 0\n[study]"),
+            ["solver.tolerance", "greater than or equal to 0.00000"],
+        ),
         (
             ("[study]", '[solver]\nkind = "fire"\nprecision = "single"\n[study]'),
             ["solver", "precision", "fire"],

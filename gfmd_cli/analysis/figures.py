@@ -6,6 +6,14 @@ from pathlib import Path
 import numpy as np
 
 from gfmd_cli.analysis.compare import Comparison, Curve, Prediction, Row, einstein_prediction
+from gfmd_cli.analysis.distribution import bin_counts
+from gfmd_cli.analysis.distribution_figure import (
+    DENSITY,
+    NEAR,
+    STRESS,
+    TYPICAL_AREA,
+    continuum_sheet,
+)
 from gfmd_cli.analysis.looks import Look, colours, looks, order
 from gfmd_cli.analysis.sheet import THEORY, Sheet, styled
 from gfmd_cli.physics.fields import Field
@@ -13,12 +21,9 @@ from gfmd_cli.physics.observables import linear_edges, logarithmic_edges
 from gfmd_cli.study.layout import PR_LINEAR, PR_LOGARITHMIC
 
 PRESSURES = 5  # that the distribution of one body is drawn at
-TYPICAL_AREA = 0.1  # relative contact area of the paper's Fig. 7
 WIDE = 20  # a ratio that varies by more is drawn on a log scale
-NEAR = 1.5  # pressures that differ by a smaller factor are drawn side by side
 FEW = 10  # grid points; a bin with fewer is noise of 30 % and more
 P_STAR = r"reduced pressure  $p^* = p\,/\,\Delta\sigma$"
-STRESS, DENSITY = r"stress  $\sigma\,/\,\Delta\sigma$", r"$\mathrm{Pr}(\sigma)\;\Delta\sigma$"
 
 
 @dataclass(frozen=True)
@@ -71,6 +76,7 @@ def draw_all(comparison: Comparison, folder: Path) -> list[Path]:
         sheets = {view.name: _over_pressure(view, items) for view in VIEWS}
         sheets["stress_distribution"] = _distribution(items)
         sheets["stress_distribution_pressures"] = _distribution_pressures(items)
+        sheets["stress_distribution_continuum"] = continuum_sheet(comparison)
         return [path for name, s in sheets.items() if s for path in s.write(folder / name)]
 
 
@@ -204,10 +210,7 @@ def _bins(row: Row, name: str) -> tuple[Field, Field]:
     """Pr(sigma) Delta_sigma over sigma / Delta_sigma, bins with fewer than FEW points left out."""
     edges = linear_edges() if name == PR_LINEAR else logarithmic_edges()
     density = np.nan_to_num(row[name])
-    counts = density * np.diff(edges) * row["points"]
-    if not np.allclose(counts, np.rint(counts), rtol=0, atol=1e-6):  # no line scene
-        counts *= row["points"]
-    kept = counts > FEW - 0.5
+    kept = bin_counts(row, name) > FEW - 0.5
     lower, upper = edges[:-1][kept], edges[1:][kept]
     middle = 0.5 * (lower + upper) if name == PR_LINEAR else np.sqrt(lower * upper)
     return middle, density[kept]

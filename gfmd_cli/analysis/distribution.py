@@ -1,0 +1,247 @@
+"""Pr(sigma) in the continuum, extrapolated over grids bin by bin, as for the paper's Fig. 7.
+
+A grid puts the edge of a contact wrong by a share of its spacing. What that does to the stress dies
+out with the distance from the edge over the spacing, about at first order. Stresses as next to the
+edge never converge: there, Pr falls as spacing^(n/2) for n < 2, to nothing. Since the share of the
+points below a stress is contact line times distance from the edge (above it, for n > 2), counts
+tell which bins these are.
+
+Stresses are in units of Delta_sigma and densities in 1 / Delta_sigma, in the logarithmic bins of
+`observables`. A relative error is one of ln Pr.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from gfmd_cli.analysis.compare import Comparison, Curve, Row
+from gfmd_cli.analysis.ensemble import without_seed
+from gfmd_cli.physics.fields import Field
+from gfmd_cli.physics.observables import linear_edges, logarithmic_edges
+from gfmd_cli.study.layout import PR_LINEAR, PR_LOGARITHMIC
+
+MOST_CHANGE = 0.35  # of ln Pr from one grid to the next; beyond, a bin is not resolved
+NEIGHBOURS = 2  # bins to each side that the change between grids is averaged over
+PRIOR_SEEDS = 4.0  # seeds that the expected spread stands for beside the one that is seen
+SHALLOWEST = 0.75  # distance from the edge, in spacings, below which a bin is not resolved
+
+
+def bin_counts(row: Row, name: str = PR_LOGARITHMIC) -> Field:
+    """Grid points in each bin of Pr(sigma): density times width times the points of the cell."""
+    edges = linear_edges() if name == PR_LINEAR else logarithmic_edges()
+    counts: Field = np.nan_to_num(row[name]) * np.diff(edges) * row["points"]
+    return counts if _is_line(counts) else counts * row["points"]
+
+
+def _is_line(counts: Field) -> bool:
+    """Whether densities times widths times the points of a side are whole: a line scene."""
+    return bool(np.allclose(counts, np.rint(counts), rtol=0, atol=1e-6))
+
+
+@dataclass(frozen=True)
+class Extrapolated:
+    """Pr(sigma) in the continuum, arrays over the bins, NaN where the grids do not resolve it."""
+
+    log_density: Field
+    """ln Pr."""
+    discretisation: Field
+    """What extrapolation has added to ln Pr, or the change it could not be based on: taken as a
+    standard error that all bins share, with its sign."""
+    counting: Field
+    """Standard error of ln Pr by the number of points in the bins, each drawn by itself."""
+
+
+def extrapolate(counts: Field, cells: Sequence[int]) -> Extrapolated:
+    """Richardson extrapolation of ln Pr on grids N/2 and N to zero spacing, at first order.
+
+    Bins that change by more than MOST_CHANGE are not resolved. A third grid tells where the change
+    is irregular, growing or turning: there, the finest grid is the best guess.
+
+    Parameters
+    ----------
+    counts : points in the bins of `logarithmic_edges`, shape (grids, bins), grids rising by twos
+    cells : points of each grid's cell, or of all cells that were counted together
+    """
+    widths = np.diff(logarithmic_edges())
+    with np.errstate(divide="ignore", invalid="ignore"):
+        log = np.log(counts / (widths * np.asarray(cells, dtype=np.float64)[:, None]))
+        noise = 1 / counts
+        steps = [
+            _averaged(fine - coarse, a + b)
+            for (coarse, fine), (b, a) in zip(pairwise(log), pairwise(noise), strict=True)
+        ]
+    change, error = steps[-1]
+    change = np.where(np.abs(change) < MOST_CHANGE, change, np.nan)
+    added, left = change, change
+    if len(steps) > 1:
+        before, unsure = (np.nan_to_num(part) for part in steps[-2])
+        larger = np.maximum(np.abs(change), np.abs(before))
+        turns = (change * before < 0) & (np.abs(change) > 2 * np.hypot(error, unsure))
+        grows = np.abs(change) > np.abs(before) + 2 * np.hypot(error, unsure)
+        added = np.where(turns | grows, 0.0, change)
+        left = np.where(turns | grows, np.copysign(larger, change), change)
+    return Extrapolated(log[-1] + added, left, np.sqrt(noise[-1] + error**2))
+
+
+def _averaged(values: Field, variance: Field) -> tuple[Field, Field]:
+    """Mean over neighbouring bins, weighted by 1 / variance, and its standard error."""
+    known = np.isfinite(values) & np.isfinite(variance)
+    weight = np.where(known, 1 / np.where(known, variance, 1.0), 0.0)
+    window = np.ones(2 * NEIGHBOURS + 1)
+    total = np.convolve(weight, window, "same")
+    mean = np.convolve(weight * np.where(known, values, 0.0), window, "same")
+    total = np.where(known, total, np.nan)
+    return mean / total, 1 / np.sqrt(total)
+
+
+@dataclass(frozen=True)
+class Distribution:
+    """One contact at one pressure on several grids, for one seed or more."""
+
+    curve: Curve
+    """Of the finest grid of the first seed."""
+    seeds: list[list[Row]]
+    """Rows of each seed, grids rising."""
+
+    @cached_property
+    def counts(self) -> Field:
+        """Points in the bins, shape (seeds, grids, bins)."""
+        return np.array([[bin_counts(row) for row in rows] for rows in self.seeds])
+
+    @property
+    def finest(self) -> Row:
+        """The row of the first seed's finest grid."""
+        return self.seeds[0][-1]
+
+    @property
+    def points(self) -> list[int]:
+        """Points per side of the grids, rising."""
+        return [int(row["points"]) for row in self.seeds[0]]
+
+    @property
+    def a_r(self) -> float:
+        """Relative contact area on the finest grid, mean over the seeds."""
+        return float(np.mean([rows[-1]["a_r"] for rows in self.seeds]))
+
+    @property
+    def surface(self) -> str:
+        """The surface in words, without the seed where there are several."""
+        return without_seed(self.finest) if len(self.seeds) > 1 else str(self.finest["surface"])
+
+    @property
+    def scene(self) -> str:
+        """Body and surface, in words."""
+        return f"{self.finest['elastomer']} on {self.surface}"
+
+    @cached_property
+    def cells(self) -> list[int]:
+        """Points of the cells of all seeds, on each grid."""
+        return [len(self.seeds) * points**self._dimension for points in self.points]
+
+    @cached_property
+    def grids(self) -> Field:
+        """Density on each grid, mean over the seeds, shape (grids, bins)."""
+        widths = np.diff(logarithmic_edges())
+        density: Field = self.counts.sum(axis=0) / (np.array(self.cells)[:, None] * widths)
+        return density
+
+    @cached_property
+    def extrapolated(self) -> Extrapolated:
+        """In the continuum, the points of all seeds together."""
+        found = extrapolate(self.counts.sum(axis=0), self.cells)
+        known = self.depth > SHALLOWEST
+        return replace(found, log_density=np.where(known, found.log_density, np.nan))
+
+    @cached_property
+    def depth(self) -> Field:
+        """Distance of each bin's stress from the edge of a contact, in spacings of the finest grid.
+
+        Share of the points up to the middle of the bin over contact line times spacing; for n > 2
+        the share of the points above it, if less. The line is pi / 4 of its switches along rows and
+        columns, which is right for the mean over all directions.
+        """
+        counts = self.counts[:, -1].sum(axis=0)
+        line = float(np.mean([rows[-1]["perimeter"] for rows in self.seeds]))
+        line *= self.cells[-1] / self.points[-1] * (np.pi / 4 if self._dimension == 2 else 1.0)
+        below = np.cumsum(counts) - 0.5 * counts
+        above = counts.sum() - below
+        nearest: Field = np.minimum(below, above) if self.curve.n > 2 else below
+        return nearest / line if line else np.full(counts.size, np.inf)
+
+    @property
+    def _dimension(self) -> int:
+        widths = np.diff(logarithmic_edges())
+        counts = np.nan_to_num(self.finest[PR_LOGARITHMIC]) * widths * self.finest["points"]
+        return 1 if _is_line(counts) else 2
+
+    @cached_property
+    def sampling(self) -> Field:
+        """Relative standard error of the mean over surfaces, for the few contacts that one holds.
+
+        All points of a bin in one contact are one draw. The number of contacts is that of discs of
+        the same area and line: with the switches of rows and columns 8 a a disc, pi P^2 / 64 a_r.
+        The spread over seeds is weighed against it as PRIOR_SEEDS further seeds would be.
+        """
+        count, fine = len(self.seeds), self.counts[:, -1]
+        if self.finest["seed"] < 0:  # nothing random
+            return np.zeros(fine.shape[-1])
+        contacts = sum(_contacts(rows[-1], self._dimension) for rows in self.seeds)
+        expected = 1 / np.maximum(np.minimum(contacts, fine.sum(axis=0)), 1.0)
+        if count == 1:
+            return np.asarray(np.sqrt(expected))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            seen = np.var(fine, axis=0, ddof=1) / np.mean(fine, axis=0) ** 2 / count
+        weighed = (count - 1) * seen + PRIOR_SEEDS * expected
+        return np.asarray(np.sqrt(weighed / (count - 1 + PRIOR_SEEDS)))
+
+    @property
+    def density(self) -> Field:
+        """Pr(sigma) in the continuum, mean over the seeds."""
+        return np.exp(self.extrapolated.log_density)
+
+    @property
+    def error(self) -> Field:
+        """Relative standard error of `density`: discretisation, counting, sampling."""
+        parts = (self.extrapolated.discretisation, self.extrapolated.counting, self.sampling)
+        return np.sqrt(sum((np.square(part) for part in parts), np.zeros(1)))
+
+
+def _contacts(row: Row, dimension: int) -> float:
+    """Number of contacts in the cell, estimated."""
+    line, area = float(row["perimeter"]), float(row["a_r"])
+    return line / 2 if dimension == 1 else np.pi * line**2 / (64 * area)
+
+
+def distributions(comparison: Comparison) -> list[Distribution]:
+    """The contacts of a study that were solved on two nested grids or more.
+
+    Rows are one contact where surface, body, solver, tolerance and pressure are the same and so
+    is the unit of stress; surfaces that differ in their seed only are averaged.
+    """
+    found: dict[tuple[Any, ...], dict[int, dict[int, tuple[Curve, Row]]]] = {}
+    for curve in comparison.curves:
+        for row in curve.rows:
+            if PR_LOGARITHMIC not in row or not row["a_r"] > 0 or row["status"] != "converged":
+                continue
+            units = (f"{row['pressure']:.6g}", f"{row['delta_sigma']:.6g}")
+            key = (row["elastomer"], without_seed(row), row["solver"], row["tolerance"], *units)
+            found.setdefault(key, {}).setdefault(row["seed"], {})[row["points"]] = (curve, row)
+    told = []
+    for seeds in found.values():
+        grids = _nested(sorted(set.intersection(*(set(grids) for grids in seeds.values()))))
+        if len(grids) > 1:
+            rows = [[held[points][1] for points in grids] for held in seeds.values()]
+            told.append(Distribution(next(iter(seeds.values()))[grids[-1]][0], rows))
+    return told
+
+
+def _nested(points: list[int]) -> list[int]:
+    """The finest grids of which each has twice the points of the one before."""
+    kept = points[-1:]
+    while kept and kept[0] % 2 == 0 and kept[0] // 2 in points:
+        kept.insert(0, kept[0] // 2)
+    return kept

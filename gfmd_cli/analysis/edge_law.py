@@ -1,0 +1,198 @@
+"""Power laws of Pr(sigma): what the edge of a contact demands, and what is found.
+
+At a distance s inside the edge of a contact the stress is sigma = A s^(1 - n/2) (paper Eqs. (5) and
+(6), corrected), on rough surfaces too (paper Sect. 5.1). A contact line of length l per area then
+holds the share l ds of points between sigma and sigma + dsigma, so that for every n but 2
+
+    Pr(sigma) = l <A^(-2/(2-n))> 2 / |2 - n| sigma^(n/(2-n)),
+
+for n < 2 at small stress (n = 1/2: 1/3; n = 1: 1), for 2 < n < 4 at large stress (n = 3: -3, so
+that the variance diverges with the logarithm of the spacing). A paraboloid has this law at all its
+stresses; other contacts depart from it in proportion to s over their size, that is to
+sigma^(2/(2-n)). At n = 2 the stress at the edge is finite and differs from edge to edge: no law
+follows; at n = 4 the edge carries a line force. Persson theory is linear at small stress for all n.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from gfmd_cli.analysis.distribution import PRIOR_SEEDS, Distribution
+from gfmd_cli.physics.fields import Field
+from gfmd_cli.physics.observables import logarithmic_edges
+
+USABLE = 0.3  # largest relative error of a bin in a fit
+NEAREST = 3  # bins next to the limit of resolution that the law of the edge is drawn through
+FEWEST, BASE, LONGEST = 4, 6, 9  # bins of the windows of a fit; ten are a decade
+SHIFTS = 3  # places that the end of a window near the limit of resolution is tried at
+SMALL, LARGE = 0.5, 0.75  # small and large stresses, in mean stresses of the contact p / a_r
+
+
+def edge_exponent(n: float) -> float:
+    """Exponent n / (2 - n) of Pr(sigma) by the stress near the edge; NaN where there is none."""
+    return n / (2 - n) if 0 <= n < 4 and n != 2 else np.nan
+
+
+def hertz_density(n: float, sigma: Field, peak: float, a_r: float) -> Field:
+    """Pr(sigma) of paraboloids with one peak stress: the edge law at all stresses of the contact.
+
+    From sigma = peak (1 - r^2/a^2)^(1 - n/2), paper Eqs. (5) and (6), corrected:
+    Pr = a_r 2 / (|2 - n| peak) (sigma / peak)^(n/(2-n)), below the peak for n < 2 and above it for
+    n > 2. `sigma` and `peak` share a unit; a_r is the relative contact area.
+    """
+    reached = sigma < peak if n < 2 else sigma > peak
+    density = 2 * a_r / (abs(2 - n) * peak) * (sigma / peak) ** edge_exponent(n)
+    return np.where(reached, density, 0.0)
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Pr = prefactor sigma^exponent in a window, and the exponent at the edge itself."""
+
+    law: str
+    """"small" or "large" stress."""
+    window: tuple[float, float]
+    """Stresses [Delta_sigma] from the lower edge of the first bin to the upper one of the last."""
+    exponent: float
+    """Of a straight line through ln Pr(ln sigma): that of the window, not of the limit."""
+    error: float
+    """Its standard error: of the bins, of discretisation, of the choice of window."""
+    prefactor: float
+    prefactor_error: float
+    """Relative, at the middle of the window."""
+    limit: float
+    """Exponent beside a term b sigma^(2/(2-n)), the first departure from the edge law, in all bins
+    that may be used; NaN at n = 2 or with fewer than FEWEST + 1 bins."""
+    limit_error: float
+    theory: float
+    """n / (2 - n) where the edge has this law at such stresses, else NaN."""
+    edge_prefactor: float
+    """Prefactor at the theoretical exponent in the NEAREST bins, NaN where there is none."""
+
+
+@dataclass(frozen=True)
+class Line:
+    """Straight line, or with one more term, through ln Pr."""
+
+    slope: float
+    error: float
+    """Standard error of the slope."""
+    shared: float
+    """The part of it that is shared between the bins."""
+    level: float
+    """ln Pr at sigma = 1 without the further term."""
+    level_error: float
+    """Standard error of ln Pr in the middle of the window."""
+
+
+def power_law(x: Field, y: Field, own: Field, shared: Field, further: Field | None = None) -> Line:
+    """Least squares of y = level + slope x (+ b further).
+
+    Parameters
+    ----------
+    x, y : ln sigma and ln Pr
+    own : standard errors of y that bins have each for themselves
+    shared : standard error that all have together, with its sign: y + t shared, t normal
+    further : one more term
+    """
+    weight = 1 / (own**2 + shared**2)
+    centre = float(weight @ x / weight.sum())
+    columns = [np.ones_like(x), x - centre, *([] if further is None else [further])]
+    design = np.array(columns)
+    levers = np.linalg.pinv((design * weight) @ design.T) @ (design * weight)
+    found = levers @ y
+    rest = (y - found @ design) / own
+    freedom = max(x.size - len(columns), 1)
+    misfit = np.sqrt(max(1.0, float(rest @ rest) / freedom))
+    errors: Field = np.hypot(np.sqrt(levers**2 @ own**2) * misfit, levers @ shared)
+    return Line(
+        slope=float(found[1]),
+        error=float(errors[1]),
+        shared=float(abs(levers[1] @ shared)),
+        level=float(found[0] - found[1] * centre),
+        level_error=float(errors[0]),
+    )
+
+
+def fit(found: Distribution, law: str) -> Fit | None:
+    """Power law nearest to the limit of resolution; None where too few bins are resolved.
+
+    "small": the lowest BASE usable bins below SMALL p / a_r. "large" (n > 2 alone): the highest
+    above LARGE p / a_r. The window is then moved and stretched; half the range of exponents that
+    this gives is an error of its own.
+    """
+    n, small = found.curve.n, law == "small"
+    if not (small or n > 2):
+        return None
+    edges = logarithmic_edges()
+    middle, mean = np.sqrt(edges[1:] * edges[:-1]), found.finest["p_star"] / found.a_r
+    usable = np.isfinite(found.density) & (found.error < USABLE)
+    usable &= middle < SMALL * mean if small else middle > LARGE * mean
+    places = np.flatnonzero(usable)
+    runs = np.split(places, np.flatnonzero(np.diff(places) > 1) + 1)
+    places = runs[0] if small else runs[-1][::-1]  # from the limit of resolution inwards
+    if places.size < FEWEST:
+        return None
+    windows = [
+        places[start : start + length]
+        for start in range(SHIFTS)
+        for length in range(FEWEST, LONGEST + 1)
+        if start + length <= places.size
+    ]
+    base = places[:BASE]
+    line = _line(found, base, middle)
+    slopes = [_line(found, window, middle).slope for window in windows]
+    theory = edge_exponent(n) if (n < 2) == small else np.nan  # n > 2, small: patch centres
+    limit, limit_error = np.nan, np.nan
+    if np.isfinite(theory) and places.size > FEWEST:
+        further = (middle / mean) ** (2 / (2 - n))
+        longest = _line(found, places[:LONGEST], middle, further)
+        shorter = _line(found, places[: min(LONGEST, places.size) - 1], middle, further)
+        limit = longest.slope
+        limit_error = float(np.hypot(longest.error, longest.slope - shorter.slope))
+    nearest = base[:NEAREST]
+    fixed = found.extrapolated.log_density[nearest] - theory * np.log(middle[nearest])
+    weight = 1 / found.error[nearest] ** 2
+    return Fit(
+        law=law,
+        window=(float(edges[base.min()]), float(edges[base.max() + 1])),
+        exponent=line.slope,
+        error=float(np.hypot(line.error, 0.5 * (max(slopes) - min(slopes)))),
+        prefactor=float(np.exp(line.level - _bending(line.slope))),
+        prefactor_error=line.level_error,
+        limit=limit,
+        limit_error=limit_error,
+        theory=float(theory),
+        edge_prefactor=float(np.exp(weight @ fixed / weight.sum() - _bending(theory))),
+    )
+
+
+def _line(found: Distribution, chosen: Any, middle: Field, further: Field | None = None) -> Line:
+    """The law in some bins.
+
+    What surfaces differ by is counted as each bin's own, at first. With the law found anew without
+    each seed in turn (jackknife) the error is that of whole curves, weighed as in `sampling`.
+    """
+    part, fine = found.extrapolated, found.counts[:, -1][:, chosen]
+    x, y = np.log(middle[chosen]), part.log_density[chosen]
+    own, shared = np.hypot(part.counting, found.sampling)[chosen], part.discretisation[chosen]
+    more = None if further is None else further[chosen]
+    line, count = power_law(x, y, own, shared, more), len(fine)
+    without = fine.sum(axis=0) - fine
+    if count == 1 or not np.all(without > 0):
+        return line
+    shifts = np.log(without / (count - 1)) - np.log(fine.mean(axis=0))
+    slopes = [power_law(x, y + shift, own, shared, more).slope for shift in shifts]
+    seen = (count - 1) * float(np.var(slopes)) + line.shared**2
+    known = count - 1
+    error = np.sqrt((known * seen + PRIOR_SEEDS * line.error**2) / (known + PRIOR_SEEDS))
+    return replace(line, error=float(error))
+
+
+def _bending(exponent: float) -> float:
+    """ln of the mean of sigma^exponent over a bin over its value in the (geometric) middle."""
+    node, weight = np.polynomial.legendre.leggauss(5)
+    ratio = np.sqrt(logarithmic_edges()[1] / logarithmic_edges()[0])
+    sigma = 0.5 * (ratio + 1 / ratio) + 0.5 * (ratio - 1 / ratio) * node
+    return float(np.log(0.5 * weight @ sigma**exponent))

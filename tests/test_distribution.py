@@ -1,0 +1,240 @@
+"""Pr(sigma) in the continuum and its power laws, against distributions that are known."""
+
+import json
+
+import numpy as np
+import pytest
+
+from gfmd_cli.analysis.compare import Curve, compare
+from gfmd_cli.analysis.distribution import Distribution, distributions, extrapolate
+from gfmd_cli.analysis.distribution_figure import continuum_sheet
+from gfmd_cli.analysis.distribution_tables import distribution_records, distribution_table
+from gfmd_cli.analysis.edge_law import edge_exponent, fit, hertz_density, power_law
+from gfmd_cli.physics.bodies import Parabola
+from gfmd_cli.physics.contact import build_scene
+from gfmd_cli.physics.elastomer import Power
+from gfmd_cli.physics.observables import contact_points, logarithmic_edges, observe
+from gfmd_cli.physics.reference import hertz_force, hertz_profile
+from gfmd_cli.solvers.cascade import SolverChoice, solve_contact
+from gfmd_cli.study.parse import read_spec
+from gfmd_cli.study.run import run_study
+
+EDGES = logarithmic_edges()
+MIDDLE, WIDTH = np.sqrt(EDGES[1:] * EDGES[:-1]), np.diff(EDGES)
+SPEC = """\
+[surface]
+kind = "self-affine"
+cutoff = 0.1
+[elastomer]
+kind = "power"
+n = 1
+[grid]
+points = [64, 128, 256]
+[load]
+p_star = 0.1
+"""
+
+
+@pytest.fixture
+def study(tmp_path):
+    def study(*overrides):
+        path = tmp_path / "spec.toml"
+        path.write_text(SPEC)
+        spec, _ = read_spec(path, overrides)
+        run_study(spec, SPEC, tmp_path / "study.h5", lambda _: None, jobs=1)
+        return tmp_path / "study.h5"
+
+    return study
+
+
+def hertz_row(n, points, radius, shift=(0.0, 0.0), contacts=1):
+    """Exact stress of a Hertz contact, read on a grid; mean stress of the contact 1."""
+    along = np.arange(points) / points - 0.5
+    r = np.hypot(*np.meshgrid(along - shift[0], along - shift[1]))
+    inside = r < radius
+    peak = 2 - n / 2
+    counts, _ = np.histogram(peak * hertz_profile(n, r, radius)[inside], EDGES)
+    return row(
+        n, points, contacts * counts, contacts * inside.mean(), 8 * radius * contacts, seed=-1
+    )
+
+
+def row(n, points, counts, a_r, perimeter, seed=0):
+    return {
+        "elastomer": f"power n={n:g}", "surface": "made", "n": n, "points": points, "seed": seed,
+        "p_star": a_r, "delta_sigma": 1.0, "a_r": a_r, "perimeter": perimeter,
+        "pr_sigma_log": counts / (WIDTH * points**2), "thickness": np.nan,
+    }  # fmt: skip
+
+
+def distribution(*seeds):
+    return Distribution(Curve(list(seeds[0]), None), [list(rows) for rows in seeds])
+
+
+@pytest.mark.parametrize(("n", "exponent"), [(0, 0), (0.5, 1 / 3), (1, 1), (1.5, 3), (3, -3)])
+def test_the_edge_has_the_law_of_hertz(n, exponent):
+    assert edge_exponent(n) == pytest.approx(exponent)
+    assert np.isnan(edge_exponent(2))
+    s = np.array([1e-4, 1e-6])  # distance from the edge in radii
+    sigma = (1 - (1 - s) ** 2) ** (1 - n / 2)
+    if n:
+        local = np.diff(np.log(hertz_density(n, sigma, 1.0, 0.1))) / np.diff(np.log(sigma))
+        assert local == pytest.approx(exponent, abs=1e-9)
+
+
+@pytest.mark.parametrize("n", [0.0, 0.5, 1.0, 1.5, 2.5, 3.0])
+def test_the_density_of_hertz_is_that_of_the_points_of_its_profile(n):
+    found = hertz_row(n, 2048, 0.3)["pr_sigma_log"]
+    fine = np.geomspace(EDGES[:-1], EDGES[1:], 41)
+    exact = hertz_density(n, fine, 2 - n / 2, np.pi * 0.09)
+    mean = np.trapezoid(exact, fine, axis=0) / WIDTH
+    whole = np.all(exact > 0, axis=0) & (mean * WIDTH * 2048**2 > 5000)
+    assert whole.sum() > 4
+    np.testing.assert_allclose(found[whole], mean[whole], rtol=0.04)
+
+
+@pytest.mark.parametrize(
+    ("n", "law"), [(0.5, "small"), (1.0, "small"), (2.5, "large"), (3.0, "large")]
+)
+def test_the_exponent_of_hertz_is_found_within_its_error(n, law):
+    rows = [hertz_row(n, points, 0.3) for points in (512, 1024, 2048)]
+    found = fit(distribution(rows), law)
+    assert found.theory == edge_exponent(n)
+    assert abs(found.exponent - found.theory) < 2 * found.error
+    exact = hertz_density(n, 1.0, 2 - n / 2, np.pi * 0.09) if n < 2 else None
+    if exact:
+        assert found.edge_prefactor == pytest.approx(float(exact), rel=0.1)
+
+
+def test_first_order_errors_of_a_grid_are_taken_off():
+    exact = 1e-3 * MIDDLE**0.5
+    cells = [256**2, 512**2, 1024**2]
+    factors = np.array([1.2, 1.1, 1.05])[:, None]
+    counts = 1e6 * exact * WIDTH * np.array(cells)[:, None] * factors
+    found = extrapolate(counts, [1e6 * cell for cell in cells])
+    inner = slice(5, 95)
+    error = np.exp(found.log_density - np.log(exact))[inner] - 1
+    assert np.all(np.abs(error) < 0.003)
+    assert np.all(np.abs(error) < np.abs(found.discretisation[inner]))
+
+
+def test_irregular_changes_are_not_extrapolated():
+    cells = [64**2, 128**2, 256**2]
+    counts = 1e9 * np.ones(100) * np.array([1.0, 0.9, 1.0])[:, None] * np.array(cells)[:, None]
+    found = extrapolate(counts, cells)
+    np.testing.assert_allclose(found.log_density, np.log(1e9 / WIDTH))
+    assert np.all(np.abs(found.discretisation) > 0.1)
+
+
+def test_a_bin_that_changes_too_much_is_not_resolved():
+    found = extrapolate(np.array([100 * np.ones(100), 200 * np.ones(100)]), [64**2, 128**2])
+    assert np.all(np.isnan(found.log_density))  # by ln 2
+
+
+def test_errors_of_a_slope_hold_as_often_as_they_say():
+    draw = np.random.default_rng(4)
+    x, own, shared = np.log(MIDDLE[40:47]), np.linspace(0.2, 0.02, 7), np.linspace(0.1, 0, 7)
+    hits = 0
+    for _ in range(1000):
+        y = 1.5 * x - 2 + own * draw.normal(size=7) + shared * draw.normal()
+        line = power_law(x, y, own, shared)
+        hits += abs(line.slope - 1.5) < line.error
+    assert 640 < hits < 840  # 683, and more where the misfit widens it
+
+
+def test_errors_of_an_exponent_hold_over_noisy_samples():
+    draw = np.random.default_rng(7)
+    points, hits, tries = (256, 512, 1024), [], 150
+    for _ in range(tries):
+        seeds = []
+        for seed in range(3):
+            strength, tilt = np.exp(0.1 * draw.normal()), 0.15 * draw.normal()
+            rows = []
+            for size in points:
+                density = np.where(MIDDLE < 1, 0.5 * strength * MIDDLE ** (1 + tilt), 0)
+                counts = draw.poisson(density * WIDTH * size**2)
+                rows.append(row(1.0, size, counts, 0.1, 12.0, seed))
+            seeds.append(rows)
+        found = fit(distribution(*seeds), "small")
+        hits.append(
+            (abs(found.exponent - 1) < found.error, abs(found.limit - 1) < found.limit_error)
+        )
+    narrow, limit = np.mean(hits, axis=0)
+    assert 0.6 < narrow < 0.99
+    assert 0.6 < limit < 0.99
+
+
+def test_bins_next_to_the_edge_are_not_resolved():
+    found = distribution([hertz_row(1.0, points, 0.3) for points in (128, 256)])
+    lowest = MIDDLE[np.flatnonzero(np.isfinite(found.density))[0]]
+    distance = 0.3 * (1 - np.sqrt(1 - (lowest / 1.5) ** 2))
+    assert 0.7 < distance * 256 < 1.5
+
+
+def test_a_study_of_two_grids_has_a_distribution_and_of_one_grid_none(study):
+    found = distributions(compare(study()))
+    assert [part.points for part in found] == [[64, 128, 256]]
+    assert len(found[0].seeds) == 1
+    assert found[0].counts[0, -1].sum() == pytest.approx(found[0].a_r * 256**2, abs=30)
+
+
+def test_one_grid_has_no_distribution_table_nor_figure(study):
+    path = study("grid.points=64")
+    assert distribution_table(path) == ""
+    assert distribution_records(path) == []
+    assert continuum_sheet(compare(path)) is None
+
+
+def test_grids_that_are_not_nested_are_not_compared(study):
+    assert distributions(compare(study("grid.points=[64, 96]"))) == []
+
+
+def test_without_a_histogram_there_is_nothing_to_extrapolate(study):
+    assert distributions(compare(study("output.histogram=false"))) == []
+
+
+def test_bodies_whose_unit_of_stress_depends_on_the_grid_are_not_compared(study):
+    path = study('surface={kind="parabola"}', "load={p_star=1e-2}")
+    assert distributions(compare(path)) == []
+
+
+def test_seeds_are_averaged_with_their_spread(study):
+    path = study("surface.seed=[0, 1, 2]")
+    (found,) = distributions(compare(path))
+    assert len(found.seeds) == 3
+    assert "seed" not in found.surface
+    table = distribution_table(path)
+    assert "power n=1 on self-affine cutoff=0.1" in table
+    (record,) = json.loads(json.dumps(distribution_records(path), allow_nan=False))
+    assert record["seeds"] == 3
+    assert record["points"] == [64, 128, 256]
+    assert len(record["bins"]["density"]) == len(record["bins"]["relative_error"]) > 3
+    sheet = continuum_sheet(compare(path))
+    assert "Persson theory" in sheet.legend
+    sheet.figure.draw_without_rendering()
+
+
+def test_line_scenes_and_slabs_are_taken(study):
+    path = study('surface={kind="wave"}', "elastomer={kind='slab', thickness=0.1}")
+    (found,) = distributions(compare(path))
+    assert found.cells == [64, 128, 256]
+    assert isinstance(distribution_table(path), str)
+
+
+def test_a_solved_paraboloid_has_the_exponent_and_the_amplitude_of_hertz():
+    n, radius, rows = 1.0, 0.15, []
+    force = float(hertz_force(n, 1.0, 1.0, radius))
+    for points in (256, 512, 1024):
+        scene = build_scene(Parabola(), Power(n=n), points)
+        contact = scene.contact(force / scene.delta_sigma)
+        solution = solve_contact(contact, SolverChoice(), lambda *_: None)
+        sigma = contact.stress(solution.u, solution.sigma)
+        seen = observe(contact, solution.u, sigma)
+        loaded = sigma[contact_points(contact, solution.u, sigma)] * scene.delta_sigma
+        counts, _ = np.histogram(loaded * np.pi * radius**2 / force, EDGES)  # mean stress 1
+        rows.append(row(n, points, counts, seen.a_r, seen.perimeter, seed=-1))
+    found = fit(distribution(rows), "small")
+    assert found.error < 0.2
+    assert abs(found.exponent - found.theory) < 2 * found.error
+    exact = float(hertz_density(n, 1.0, 1.5, np.pi * radius**2))
+    assert found.edge_prefactor == pytest.approx(exact, rel=0.1)
