@@ -19,6 +19,7 @@ from gfmd_cli.physics.observables import observe
 from gfmd_cli.physics.surface import SelfAffine
 from gfmd_cli.solvers.cascade import SolverChoice, solve_contact
 from gfmd_cli.study import solve
+from gfmd_cli.study.bench import run_bench
 from gfmd_cli.study.grids import ALGEBRAIC, NOT_REACHED
 from gfmd_cli.study.layout import COLUMNS
 from gfmd_cli.study.parse import read_spec
@@ -181,6 +182,11 @@ def test_a_wrong_accuracy_is_refused(spec_of, change, words):
         spec_of(text=SPEC.replace(*change))
     for word in words:
         assert word in str(error.value)
+
+
+def test_a_bench_takes_no_auto_grid(spec_of):
+    with pytest.raises(InputError, match="auto"):
+        run_bench(spec_of(), lambda progress: None)
 
 
 def test_reduced_pressures_of_a_kinked_cell_are_refused(rows_of):

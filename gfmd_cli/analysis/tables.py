@@ -89,7 +89,9 @@ def _spreads(found: list[Ensemble]) -> list[str]:
     """One table per body: means over seeds, with the half-width of the 95 % interval."""
     blocks: dict[str, list[str]] = {}
     for ensemble in found:
-        head = f"{ensemble.label}: mean of {len(ensemble.rows)} seeds +- 95 % confidence"
+        sizes = {row["points"] for row in ensemble.rows}
+        grid = f", {sizes.pop()} points a side" if len(sizes) == 1 else ""
+        head = f"{ensemble.label}{grid}: mean of {len(ensemble.rows)} seeds +- 95 % confidence"
         lines = blocks.setdefault(head, [head, "      p*" + _centred(*QUANTITIES)])
         spreads = [ensemble.spread(name) for name in QUANTITIES]
         cells = [plus_minus(spread.mean, spread.half_width) for spread in spreads]

@@ -150,9 +150,12 @@ def choices(spec: Spec, task: Task, contact: Contact) -> list[SolverChoice]:
 def run_bench(spec: Spec, report: Report) -> list[Trace]:
     """Measure every solver on every contact of the spec.
 
-    Raises InputError where the spec does not fit the machine or no solver fits a body.
+    Raises InputError where the spec does not fit the machine or names no grid, or no solver fits a
+    body.
     """
     tasks = plan(spec)
+    if any(task.auto for task in tasks):
+        raise InputError('grid.points: "auto" is no grid to compare solvers on; give a number')
     check_memory(tasks)
     traces: list[Trace] = []
     for task, contact in _contacts(tasks):

@@ -23,7 +23,7 @@ BASE_BYTES = 215e6
 FIRST = 64  # points per side that "auto" begins with at the least; such a solve costs nothing
 LAST = {"a_r": 3.5, "u_g": 4.0, "sigma_p": 2.5}
 """Exponents n up to which a quantity has a continuum value to come near to."""
-SECONDS_PER_PAIR = 8e-9
+SECONDS_PER_PAIR = 1.7e-8
 """Per grid point and pair of transforms, with all work between two of them, on one thread."""
 
 
@@ -94,8 +94,8 @@ class Task:
         if n == 0:
             return 1.0
         p = min(max(self.load if self.reduced else 0.05, 1e-5), 3.0)
-        pairs = float(np.interp(n, [0, 0.5, 1, 2, 3, 4], [38, 40, 75, 130, 160, 235]))
-        slope = float(np.interp(n, [0, 1, 2, 3, 4], [0.0, 0.1, 0.36, 0.45, 0.48]))
+        pairs = float(np.interp(n, [0, 0.5, 1, 2, 3, 4], [30, 35, 30, 22, 30, 44]))
+        slope = float(np.interp(n, [0, 1, 2, 3, 4], [0.0, 0.1, 0.08, 0.07, 0.15]))
         tightness = 1 - 0.1 * float(np.log10(max(self.solver.tolerance, 1e-14) / 1e-6))
         return float(pairs * (p / 0.1) ** -slope * tightness)
 
