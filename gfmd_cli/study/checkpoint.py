@@ -23,6 +23,8 @@ from gfmd_cli.solvers.cascade import Resume
 from gfmd_cli.solvers.loop import State
 from gfmd_cli.study.files import write_whole
 
+CHUNK = 2**26  # bytes that a checkpoint maps at a time
+
 
 class Checkpoint:
     """The checkpoint of one task, a folder of its own."""
@@ -108,8 +110,11 @@ def _write_slot(path: Path, fields: list[Field]) -> list[int]:
             offset, sums = 0, []
             for field in fields:
                 content = np.ascontiguousarray(field).data.cast("B")
-                memory[offset : offset + field.nbytes] = content
-                offset += field.nbytes
+                for start in range(0, field.nbytes, CHUNK):
+                    chunk = content[start : start + CHUNK]
+                    memory[offset : offset + len(chunk)] = chunk
+                    offset += len(chunk)
+                    memory.madvise(mmap.MADV_DONTNEED)  # the file has it: memory need not
                 sums.append(zlib.crc32(content))
             memory.flush()
         os.fsync(file.fileno())
