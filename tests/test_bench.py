@@ -10,11 +10,12 @@ from gfmd_cli.analysis.benchmark import bench_table, solver_names
 from gfmd_cli.analysis.work_precision import draw_bench
 from gfmd_cli.cli import main
 from gfmd_cli.physics.contact import build_scene
+from gfmd_cli.physics.observables import QUANTITIES
 from gfmd_cli.study import bench
 from gfmd_cli.study.bench import GROWTH, REFERENCE, choices, run_bench, solve_reference
 from gfmd_cli.study.parse import read_spec
 from gfmd_cli.study.tasks import plan
-from gfmd_cli.study.traces import ERRORS, Trace, read_bench, write_bench
+from gfmd_cli.study.traces import Trace, read_bench, write_bench
 
 SPEC = """\
 [study]
@@ -188,7 +189,7 @@ def test_a_bench_is_stored_with_labels_and_read_back(spec_of, tmp_path):
         assert data["seconds"].attrs["units"] == "s"
         assert all(data[name].attrs["long_name"] for name in data.variables)
         assert data.attrs["solver"] == "ccg"
-        assert {f"{name}_reference" for name in ERRORS} < set(data.attrs)
+        assert {f"{name}_reference" for name in QUANTITIES} < set(data.attrs)
     with h5py.File(path) as file:
         assert file.attrs["spec_text"] == SPEC
         assert {"software_version", "machine", "date", "spec_digest"} < set(file.attrs)

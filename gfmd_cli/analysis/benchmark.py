@@ -2,13 +2,14 @@
 
 from typing import Any
 
-from gfmd_cli.study.traces import ERRORS, Trace
+from gfmd_cli.physics.observables import QUANTITIES
+from gfmd_cli.study.traces import Trace
 
 LEVELS = (1e-2, 1e-4, 1e-6)
 """Relative errors of the mean gap."""
 TEXTS = ("elastomer", "solver", "status", "surface")
 COSTS = [f"{level:.0e}".replace("e-0", "e-") for level in LEVELS]
-HEADER = ["elastomer", "points", "p*", "solver", *COSTS, *COSTS, *ERRORS, "residual", "status"]
+HEADER = ["elastomer", "points", "p*", "solver", *COSTS, *COSTS, *QUANTITIES, "residual", "status"]
 
 
 def bench_table(traces: list[Trace]) -> str:
@@ -59,7 +60,7 @@ def _row(trace: Trace, name: str) -> list[str]:
         name,
         *("-" if found is None else f"{found[0]:.0f}" for found in reached),
         *("-" if found is None else f"{found[1]:.3g}" for found in reached),
-        *(f"{trace.samples[f'{error}_error'][-1]:.1e}" for error in ERRORS),
+        *(f"{trace.samples[f'{error}_error'][-1]:.1e}" for error in QUANTITIES),
         f"{row['residual']:.1e}",
         row["status"],
     ]

@@ -11,7 +11,6 @@ from scipy.stats import t as student
 from gfmd_cli.analysis.compare import Comparison, Row
 
 CONFIDENCE = 0.95
-QUANTITIES = ("a_r", "sigma_p", "u_g")
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 
 from gfmd_cli.analysis.compare import Comparison, Curve, einstein_prediction
-from gfmd_cli.analysis.ensemble import QUANTITIES, Ensemble, ensembles
+from gfmd_cli.analysis.ensemble import Ensemble, ensembles
+from gfmd_cli.physics.observables import QUANTITIES
 from gfmd_cli.study.layout import COLUMNS
 from gfmd_cli.study.store import MISSING, read_rows
 

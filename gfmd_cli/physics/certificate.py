@@ -52,7 +52,7 @@ def certify(contact: Contact, u: Field, sigma: Field) -> Certificate:
     loaded = sum(float(np.maximum(sigma[rows], 0.0).sum()) for rows in row_blocks(u)) / grid.size
     scale = p / loaded
     rest = grid.padded[..., : grid.points]
-    sums = np.zeros(5)
+    sums = np.zeros(6)
     for rows in row_blocks(u):
         v, h = u[rows], contact.height[rows]
         s = scale * np.maximum(sigma[rows], 0.0)
@@ -60,14 +60,13 @@ def certify(contact: Contact, u: Field, sigma: Field) -> Certificate:
         rest[rows] = e
         g = v - h
         violation = np.minimum(g, sigma[rows])
-        terms = (s * g, s * h, v * (sigma[rows] - p), v * e, violation * violation)
+        terms = (s * g, s * h, v * (sigma[rows] - p), v * e, violation * violation, v)
         sums += [float(term.sum()) for term in terms]
-    product, lifted, twice_energy, mixed, violated = sums / grid.size
+    product, lifted, twice_energy, mixed, violated, mean = sums / grid.size
     remainder = _compliance(contact)
     duality_gap = max(product + 0.5 * remainder, 0.0)
     reaction = max(twice_energy - 2 * mixed + remainder, 0.0)  # B, as s - p = K u - e
     centre = (lifted - reaction) / p
-    mean = sum(float(u[rows].sum()) for rows in row_blocks(u)) / grid.size
     share = min(sqrt(2 * duality_gap / reaction), 1.0) if reaction > 0 else 1.0
     spread = duality_gap / share if share > 0 else 0.0
     doubt = DOUBT * sqrt(violated)

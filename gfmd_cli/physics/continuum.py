@@ -15,9 +15,8 @@ from math import exp, hypot, isnan, log2, nan, pi, sqrt
 import numpy as np
 
 from gfmd_cli.physics.fields import Field
+from gfmd_cli.physics.observables import QUANTITIES
 from gfmd_cli.physics.persson import Shells
-
-QUANTITIES = ("a_r", "sigma_p", "u_g")
 
 # Counted area: too large by LINE n x. Measured: the share of x is 0.00, 0.05, 0.10, 0.15, 0.21,
 # 0.26, 0.31, 0.36 at n = 0, 0.5, ... 3.5, the same on all grids that resolve the surface. Yastrebov

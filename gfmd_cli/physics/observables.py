@@ -26,6 +26,10 @@ def switches(mask: Mask) -> int:
     return count
 
 
+QUANTITIES = ("a_r", "sigma_p", "u_g")
+"""The observables that errors are told of, by name."""
+
+
 @dataclass(frozen=True)
 class Observables:
     """Scalars of one contact."""

@@ -73,7 +73,7 @@ def _judge(gap, s):  # type: ignore[no-untyped-def]
         worst * worst,
         square if off else 0.0,
         square if drawn and not off else 0.0,
-        0 if off else (1 if drawn else 2),
+        FREE if off else (TENSE if drawn else PRESSED),
     )
 
 

@@ -204,6 +204,17 @@ def _relax(i, x, own, spring, rest, out):  # type: ignore[no-untyped-def]
 
 
 @kernel
+def _sweep(i, a, x, bent, ties, spring, right, rest, y):  # type: ignore[no-untyped-def]
+    """Row i of y, from a on, by one sweep on x, of which row i + 2 has just come into the ring."""
+    new = x[(i + 2) % 5]
+    _wrap(new)
+    _laplacian(x[i % 5], x[(i + 1) % 5], new, bent[(i + 1) % 3])
+    if i >= a:
+        _rest(i, x, bent, ties, spring, right, rest)
+        _relax(i, x, ties[0, i], spring, rest, y[i])
+
+
+@kernel
 def smooth_first(right, ties, spring, y, a, b):  # type: ignore[no-untyped-def]
     """y <- two sweeps from zero."""
     n = right.shape[0]
@@ -215,11 +226,7 @@ def smooth_first(right, ties, spring, y, a, b):  # type: ignore[no-untyped-def]
         new, force, own = x[(i + 2) % 5], right[k], ties[0, k]
         for j in range(n):
             new[j + 2] = force[j] / (plate + unit * np.float32(own[j + 1]))
-        _wrap(new)
-        _laplacian(x[i % 5], x[(i + 1) % 5], new, bent[(i + 1) % 3])
-        if i >= a:
-            _rest(i, x, bent, ties, spring, right, rest)
-            _relax(i, x, ties[0, i], spring, rest, y[i])
+        _sweep(i, a, x, bent, ties, spring, right, rest, y)
 
 
 @kernel
@@ -229,13 +236,8 @@ def smooth(right, old, ties, spring, y, a, b):  # type: ignore[no-untyped-def]
     x, bent = np.empty((5, n + 4), np.float32), np.empty((3, n + 4), np.float32)
     rest = np.empty(n + 1, np.float32)
     for i in range(a - 4, b):
-        new = x[(i + 2) % 5]
-        new[2 : n + 2] = old[(i + 2) % n]
-        _wrap(new)
-        _laplacian(x[i % 5], x[(i + 1) % 5], new, bent[(i + 1) % 3])
-        if i >= a:
-            _rest(i, x, bent, ties, spring, right, rest)
-            _relax(i, x, ties[0, i], spring, rest, y[i])
+        x[(i + 2) % 5, 2 : n + 2] = old[(i + 2) % n]
+        _sweep(i, a, x, bent, ties, spring, right, rest, y)
 
 
 @kernel
@@ -251,11 +253,7 @@ def smooth_corrected(right, old, ties, spring, coarse, ratio, y, a, b):  # type:
         _interpolate(coarse[k // 2], coarse[((k + 1) // 2) % m], ratio, new)
         for j in range(n):
             new[j + 2] += source[j]
-        _wrap(new)
-        _laplacian(x[i % 5], x[(i + 1) % 5], new, bent[(i + 1) % 3])
-        if i >= a:
-            _rest(i, x, bent, ties, spring, right, rest)
-            _relax(i, x, ties[0, i], spring, rest, y[i])
+        _sweep(i, a, x, bent, ties, spring, right, rest, y)
 
 
 @kernel

@@ -16,14 +16,14 @@ import numpy as np
 
 from gfmd_cli.errors import InputError
 from gfmd_cli.physics.contact import Contact, build_scene
-from gfmd_cli.physics.observables import Observables, observe
+from gfmd_cli.physics.observables import QUANTITIES, Observables, observe
 from gfmd_cli.solvers.cascade import Solution, SolverChoice, solve_contact
 from gfmd_cli.solvers.loop import State
 from gfmd_cli.study.resources import check_memory
 from gfmd_cli.study.solve import Progress, Report
 from gfmd_cli.study.spec import Spec
 from gfmd_cli.study.tasks import Task, exponent, plan
-from gfmd_cli.study.traces import ERRORS, Trace
+from gfmd_cli.study.traces import Trace
 
 GROWTH = 1.05  # of the transforms between two samples
 REFERENCE = SolverChoice(tolerance=1e-10)
@@ -74,12 +74,12 @@ class Recorder:
     def _sample(
         self, contact: Contact, state: State | Solution, transforms: float, now: float
     ) -> None:
-        errors = (np.nan,) * len(ERRORS)
+        errors = (np.nan,) * len(QUANTITIES)
         if contact is self.contact:
             with np.errstate(invalid="ignore", over="ignore"):  # of a solve that diverges
                 seen = observe(contact, state.u, state.sigma)
             self.a_r = seen.a_r
-            errors = tuple(_distance(seen, self.reference, name) for name in ERRORS)
+            errors = tuple(_distance(seen, self.reference, name) for name in QUANTITIES)
         points, seconds = contact.grid.points, now - self.begun - self.own
         self.samples.append((transforms, seconds, points, state.residual, *errors))
         step = state.step if isinstance(state, State) else state.steps
@@ -161,7 +161,7 @@ def run_bench(spec: Spec, report: Report) -> list[Trace]:
     for task, contact in _contacts(tasks):
         reference, residual = solve_reference(contact)
         row = task.columns() | {"p_star": contact.pressure} | {"reference_residual": residual}
-        row |= {f"{name}_reference": getattr(reference, name) for name in ERRORS}
+        row |= {f"{name}_reference": getattr(reference, name) for name in QUANTITIES}
         for choice in choices(spec, task, contact):
             traces.append(_trace(contact, choice, reference, row, report, len(traces)))
     if not traces:

@@ -1,7 +1,7 @@
 """From grid to grid: one contact on as many grids as its accuracy asks for."""
 
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from functools import lru_cache
 from math import nan, sqrt
 from typing import Any
@@ -11,7 +11,6 @@ from gfmd_cli.physics.bodies import Wave
 from gfmd_cli.physics.certificate import Certificate, certify
 from gfmd_cli.physics.contact import Contact, Scene, build_scene
 from gfmd_cli.physics.continuum import (
-    QUANTITIES,
     Estimate,
     Level,
     Texture,
@@ -21,10 +20,10 @@ from gfmd_cli.physics.continuum import (
 )
 from gfmd_cli.physics.fields import Field
 from gfmd_cli.physics.grid import Grid
-from gfmd_cli.physics.observables import Observables, observe
+from gfmd_cli.physics.observables import QUANTITIES, Observables, observe
 from gfmd_cli.physics.surface import FileSurface, SelfAffine, Surface
 from gfmd_cli.solvers.cascade import Resume, Solution, solve_contact
-from gfmd_cli.study.tasks import FIRST, Task, first_grid
+from gfmd_cli.study.tasks import FIRST, Task
 
 FINAL = ("bound", "slow", "diverges")  # verdicts that no finer grid changes
 NOT_REACHED = "accuracy_not_reached"
@@ -144,7 +143,7 @@ def solve_on_grids(
         if task.accuracy is not None:
             solved.certificate = certify(contact, solution.u, solution.sigma)
             solved.estimates = _estimate(task, solved, rungs)
-        if points == _last(task, solved, memory):
+        if not _goes_on(task, solved, memory):
             solution.transforms = sum(rung.work for rung in rungs) / scene.grid.size
             if task.auto and solution.status == "converged" and _short(task, solved):
                 solution.status = NOT_REACHED
@@ -174,7 +173,7 @@ def _is_band_limited(surface: Surface) -> bool:
 def _first(task: Task) -> int:
     """The coarsest grid that is solved to the end."""
     if task.auto:
-        return first_grid(task.surface)
+        return task.least_points
     half, needed = task.points // 2, task.surface.smallest_grid()
     fit = task.accuracy is not None and half % 2 == 0 and half >= max(needed, FIRST)
     return half if fit else task.points
@@ -184,16 +183,15 @@ def _after(task: Task, points: int) -> int:
     return 2 * points if task.auto else task.points
 
 
-def _last(task: Task, solved: Solved, memory: float) -> int:
-    """The grid that is the last one, as far as can be told after the present one."""
+def _goes_on(task: Task, solved: Solved, memory: float) -> bool:
+    """Whether a finer grid is to be solved after the present one."""
     points = solved.contact.grid.points
     if not task.auto or task.accuracy is None:
-        return task.points
-    finer = replace(task, points=2 * points)
-    ends = finer.points > task.accuracy.max_points or finer.bytes > memory
+        return points != task.points
+    finer = _after(task, points)
+    fits = finer <= task.accuracy.max_points and task.bytes_on(finer) <= memory
     mendable = any(solved.estimates[name].verdict not in FINAL for name in _short(task, solved))
-    goes_on = mendable and solved.solution.status == "converged" and not ends
-    return finer.points if goes_on else points
+    return mendable and fits and solved.solution.status == "converged"
 
 
 def _short(task: Task, solved: Solved) -> list[str]:
@@ -241,5 +239,4 @@ def _estimate(task: Task, solved: Solved, rungs: list[Rung]) -> dict[str, Estima
     rough: Texture | None = None
     if isinstance(task.surface, SelfAffine | FileSurface):
         rough = texture(scene.shells, length)
-    found = estimate(levels, exponent, rough)
-    return {name: found[name] for name in QUANTITIES}
+    return estimate(levels, exponent, rough)

@@ -2,6 +2,8 @@
 
 from typing import NamedTuple
 
+from gfmd_cli.physics.observables import QUANTITIES
+
 LAYOUT = 1
 """Raised whenever a reader of the old layout would misread the new one."""
 BENCH = "bench_layout"
@@ -54,7 +56,7 @@ FURTHER = (
     Column("grid", str, "", "auto where the grid was chosen by the accuracy asked for"),
     *(
         column
-        for name in ("a_r", "sigma_p", "u_g")
+        for name in QUANTITIES
         for column in (
             Column(f"{name}_continuum", float, "1", "estimate of the continuum value"),
             Column(f"{name}_continuum_error", float, "1", "its estimated error"),

@@ -44,11 +44,10 @@ def available_memory() -> float:
 def check_memory(tasks: list[Task]) -> None:
     """Raise InputError, before anything is allocated, where one task alone does not fit."""
     memory = available_memory()
-    largest = max(tasks, key=lambda task: task.least_bytes)
-    if largest.least_bytes > HEADROOM * memory:
-        taken = _gib(largest.least_bytes)
+    taken, points = max((task.bytes_on(task.least_points), task.least_points) for task in tasks)
+    if taken > HEADROOM * memory:
         raise InputError(
-            f"grid.points: {largest.points} points per side take {taken} of memory, "
+            f"grid.points: {points} points per side take {_gib(taken)} of memory, "
             f"{_gib(HEADROOM * memory)} are available; take a smaller grid or a larger machine"
         )
 

@@ -10,6 +10,7 @@ import pyfftw
 
 from gfmd_cli.errors import InputError
 from gfmd_cli.physics.choice import Choice
+from gfmd_cli.physics.continuum import LAST_LINE, LAST_STRESS
 from gfmd_cli.physics.elastomer import Elastomer, HalfSpace, Membrane, Plate, Power, Slab
 from gfmd_cli.physics.surface import FileSurface, Surface
 from gfmd_cli.solvers.cascade import SolverChoice
@@ -21,7 +22,7 @@ size direction, change, k(q); contact marks, coarse levels. scripts/memory.py me
 BASE_BYTES = 215e6
 """What a process holds besides: the interpreter and its libraries."""
 FIRST = 64  # points per side that "auto" begins with at the least; such a solve costs nothing
-LAST = {"a_r": 3.5, "u_g": 4.0, "sigma_p": 2.5}
+LAST = {"a_r": LAST_LINE, "u_g": 4.0, "sigma_p": LAST_STRESS}
 """Exponents n up to which a quantity has a continuum value to come near to."""
 SECONDS_PER_PAIR = 1.7e-8
 """Per grid point and pair of transforms, with all work between two of them, on one thread."""
@@ -61,13 +62,16 @@ class Task:
     @property
     def bytes(self) -> float:
         """Memory that the solve takes, with its process."""
-        return FIELDS_IN_MEMORY * 8 * self.size + BASE_BYTES
+        return self.bytes_on(self.points)
+
+    def bytes_on(self, points: int) -> float:
+        """Memory that a solve on this many points per side takes, with its process."""
+        return FIELDS_IN_MEMORY * 8 * float(points**self.surface.dimension) + BASE_BYTES
 
     @property
-    def least_bytes(self) -> float:
-        """Memory without which the task cannot begin."""
-        points = first_grid(self.surface) if self.auto else self.points
-        return FIELDS_IN_MEMORY * 8 * float(points**self.surface.dimension) + BASE_BYTES
+    def least_points(self) -> int:
+        """Points per side without which the task cannot begin."""
+        return first_grid(self.surface) if self.auto else self.points
 
     @property
     def seconds(self) -> float:

@@ -18,7 +18,6 @@ from gfmd_cli.study.spec import Spec, refuse_other
 from gfmd_cli.study.store import origin
 
 BENCH_LAYOUT = 1
-ERRORS = ("a_r", "sigma_p", "u_g")
 SAMPLES = (
     Column("transforms", float, "1", "real Fourier transforms so far, in units of the solved grid"),
     Column(
