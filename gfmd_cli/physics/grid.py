@@ -18,7 +18,7 @@ from gfmd_cli.physics.sweeps import Rows
 
 ALL = slice(None)
 THREADED = 512  # points per side from which a second thread pays
-PLANNING = 30.0  # seconds at most to look for a plan; matters above 4096^2
+PLANNING = (30.0, 1e-6)  # seconds at most to look for a plan, at all and per grid point
 BLOCK = 2**15  # points of a block of rows: it and its temporaries stay in the cache
 
 
@@ -110,7 +110,7 @@ class Grid:
                     way,
                     flags,
                     threads=self._threads,
-                    planning_timelimit=PLANNING,
+                    planning_timelimit=PLANNING[0] + PLANNING[1] * self.size,
                 ).execute
                 for source, target, way in ways
             ]
