@@ -1,0 +1,40 @@
+"""The command line, a module a command. Only this package prints and knows click."""
+
+import os
+from typing import Any
+
+import click
+
+import gfmd_cli
+from gfmd_cli.cli.bench import bench
+from gfmd_cli.cli.results import analyze, export
+from gfmd_cli.cli.run import run
+from gfmd_cli.cli.schema import schema
+from gfmd_cli.errors import GfmdError
+
+
+class Commands(click.Group):
+    """Ends every known error in one message and its exit status."""
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run the command."""
+        try:
+            return super().invoke(ctx)
+        except GfmdError as error:
+            for line in str(error).splitlines():
+                click.echo(f"gfmd: {line}" if line == str(error) else line, err=True)
+            ctx.exit(error.exit_status)
+
+
+@click.group(cls=Commands)
+@click.version_option(gfmd_cli.__version__, prog_name="gfmd")
+def main() -> None:
+    """Elastic contact of rough surfaces, from springs (n = 0) to plates (n = 4)."""
+    # Dot products are all that is asked of BLAS: its threads bring nothing and, side by side
+    # with other processes, spin for tens of times the work.
+    for library in ("OPENBLAS", "OMP", "MKL"):
+        os.environ.setdefault(f"{library}_NUM_THREADS", "1")
+
+
+for command in (run, analyze, export, bench, schema):
+    main.add_command(command)
