@@ -402,7 +402,7 @@ def test_a_ladder_spans_all_numbers():
             '[surface]\nkind = "self-affine"\ncutoff = 0.05\n[elastomer]\nkind = "power"\nn = 1\n'
             f"[grid]\npoints = 64\n[load]\np_star = {load}\n"
         )
-        pressures = read_spec(spec)[0].load.pressures()
+        pressures = read_spec(spec)[0].load.values()
     assert len(pressures) == 61
     assert pressures == pytest.approx(10.0 ** np.arange(-300, 301, 10), rel=1e-12)
 

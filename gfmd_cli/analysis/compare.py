@@ -74,11 +74,9 @@ class Curve:
 
     def pressure_at_gap(self, u_g: Field) -> Field:
         """Reduced pressure at which Persson theory has this mean gap; NaN for no gap."""
-        p_star = np.geomspace(1e-6, 20.0, 2000)
-        gap = self.predict(p_star).u_g
-        known = gap > 0
-        wanted = np.log(np.where(u_g > 0, u_g, np.nan))
-        return np.exp(np.interp(-wanted, -np.log(gap[known]), np.log(p_star[known])))
+        unit, height = self.rows[0]["delta_sigma"], self.rows[0]["h_std"]
+        pressure: Field = self.persson.pressure_at_gap(np.asarray(u_g) * height) / unit
+        return pressure
 
 
 @dataclass(frozen=True)

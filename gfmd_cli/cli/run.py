@@ -95,10 +95,9 @@ def _print_tasks(spec: Any, path: Path, shard: tuple[int, int]) -> None:
     click.echo(f"{'task':>6} {'points':>6} {'load':>10} {'MiB':>8} {'s':>8}  scene")
     for task in tasks:
         done = f"  [{held[task.id]}]" if task.id in held else ""
-        load = f"p*={task.load:.4g}" if task.reduced else f"{task.load:.4g} Pa"
         points = f"~{task.points}" if task.auto else str(task.points)
         click.echo(
-            f"{task.index:6d} {points:>6} {load:>10} {task.bytes / 2**20:8.0f} "
+            f"{task.index:6d} {points:>6} {task.asked:>10} {task.bytes / 2**20:8.0f} "
             f"{task.seconds:8.2g}  {describe(task.surface)} | {describe(task.elastomer)}{done}"
         )
     missing = [task for task in tasks if task.id not in held]

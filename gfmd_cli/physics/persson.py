@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
-from scipy.special import erf, erfc, erfcx
+from scipy.special import erf, erfc, erfcx, erfinv
 
 from gfmd_cli.physics.fields import Field
 
@@ -200,6 +200,18 @@ class Persson:
         gap = np.append(np.cumsum(panels[::-1])[::-1], 0.0)
         at = np.minimum(np.searchsorted(edges, p), gap.size - 1)
         return np.where(p > 0, gap[at], np.inf)
+
+    def pressure_at_area(self, a_r: Field | float) -> Field:
+        """Pressure at a relative contact area, sqrt(2) Delta_sigma erfinv(a_r). Eq. (25)."""
+        return np.asarray(np.sqrt(2) * self.delta_sigma * erfinv(a_r))
+
+    def pressure_at_gap(self, u_g: Field | float) -> Field:
+        """Pressure at a mean gap, Eq. (28) inverted on a table: good to 1e-5; NaN for no gap."""
+        p = self.delta_sigma * np.geomspace(1e-6, 20.0, 2000)
+        gap = self.mean_gap(p)
+        known = gap > 0
+        wanted = np.log(np.where(np.asarray(u_g) > 0, u_g, np.nan))
+        return np.asarray(np.exp(np.interp(-wanted, -np.log(gap[known]), np.log(p[known]))))
 
     def _reduced(self, p: Field | float) -> Field:
         """p / sqrt(2) Delta_sigma; a flat surface is in full contact under any pressure."""

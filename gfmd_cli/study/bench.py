@@ -21,7 +21,7 @@ from gfmd_cli.solvers.cascade import Solution, SolverChoice, solve_contact
 from gfmd_cli.solvers.loop import State
 from gfmd_cli.study.resources import check_memory
 from gfmd_cli.study.solve import Progress, Report
-from gfmd_cli.study.spec import Spec
+from gfmd_cli.study.spec import SOUGHT, Spec
 from gfmd_cli.study.tasks import Task, exponent, plan
 from gfmd_cli.study.traces import Trace
 
@@ -154,6 +154,8 @@ def run_bench(spec: Spec, report: Report) -> list[Trace]:
     body.
     """
     tasks = plan(spec)
+    if spec.load.quantity in SOUGHT:
+        raise InputError(f"load.{spec.load.quantity}: a bench takes load.p_star or load.pressure")
     if any(task.auto for task in tasks):
         raise InputError('grid.points: "auto" is no grid to compare solvers on; give a number')
     check_memory(tasks)
@@ -178,7 +180,7 @@ def _contacts(tasks: list[Task]) -> Iterator[tuple[Task, Contact]]:
         if key not in seen:
             seen.add(key)
             scene = scene_of(task.surface, task.elastomer, task.points)
-            yield task, scene.contact(task.load if task.reduced else task.load / scene.delta_sigma)
+            yield task, scene.contact(task.p_star(scene.delta_sigma))
 
 
 def _trace(

@@ -129,7 +129,7 @@ def solve_on_grids(
     before: tuple[Scene, Solution] | None = None
     while True:
         scene = scene_of(task.surface, task.elastomer, points, threads)
-        contact = scene.contact(task.load if task.reduced else task.load / scene.delta_sigma)
+        contact = scene.contact(task.p_star(scene.delta_sigma))
         note([asdict(rung) for rung in rungs])
         resume = load(scene.grid)
         start = _carry(before, scene) if before is not None and resume is None else None
@@ -149,16 +149,16 @@ def solve_on_grids(
                 solution.status = NOT_REACHED
             return solved
         before, points = (scene, solution), _after(task, points)
-        load = _nothing
+        load = no_state
 
 
-def _nothing(grid: Grid) -> Resume | None:
+def no_state(grid: Grid) -> Resume | None:
     """No state of this grid was saved."""
 
 
 def _check_unit(task: Task) -> None:
     """The unit of p_star must not change from grid to grid where several are compared."""
-    if task.accuracy is None or not task.reduced or _is_band_limited(task.surface):
+    if task.accuracy is None or task.quantity != "p_star" or _is_band_limited(task.surface):
         return
     raise InputError(
         f"load.p_star: Delta_sigma of a {task.surface.kind} depends on the grid; with [accuracy] "

@@ -53,6 +53,8 @@ FURTHER = (
     Column("work", float, "1", "(<sigma h> - p <u>) / (h_std Delta_sigma): twice the energy"),
     Column("steps", int, "1", "steps on the finest grid"),
     Column("tolerance", float, "1", "natural residual asked for"),
+    Column("load", str, "", "what was given: p_star, pressure, contact_area or mean_gap"),
+    Column("asked", float, "", "its value, [Pa] for a pressure"),
     Column("grid", str, "", "auto where the grid was chosen by the accuracy asked for"),
     *(
         column

@@ -16,6 +16,7 @@ from gfmd_cli.physics.surface import Surface
 from gfmd_cli.solvers.cascade import SolverChoice
 from gfmd_cli.study.spec import (
     SHAPES,
+    SOUGHT,
     SWEPT,
     AccuracyTable,
     GridTable,
@@ -162,18 +163,32 @@ def build_spec(data: dict[str, Any], folder: Path, where: _Where) -> Spec:
         tables[name] = distinct if name in SWEPT else next(iter(distinct), None)
     if "accuracy" not in data:
         tables["accuracy"] = None
-        if any(grid.points == "auto" for grid in tables.get("grid", [])):
-            problems.append(
-                f'{where("grid.points")}: grid.points: "auto" takes a table [accuracy] that says '
-                "what is good enough, such as mean_gap = 0.01"
-            )
-    elif tables["accuracy"] is not None and not tables["accuracy"].asked():
-        problems.append(
-            f"{where('accuracy')}: accuracy: give mean_gap, contact_area or stress_deviation"
-        )
+    problems += _discord(tables, where)
     if problems:
         raise InputError("\n".join(dict.fromkeys(problems)))
     return Spec(**tables)
+
+
+def _discord(tables: dict[str, Any], where: _Where) -> list[str]:
+    """What is wrong with tables that are each right by itself."""
+    problems = []
+    accuracy, load = tables["accuracy"], tables.get("load")
+    auto = any(grid.points == "auto" for grid in tables.get("grid", []))
+    if auto and accuracy is None:
+        problems.append(
+            f'{where("grid.points")}: grid.points: "auto" takes a table [accuracy] that says '
+            "what is good enough, such as mean_gap = 0.01"
+        )
+    if auto and load is not None and load.quantity in SOUGHT:
+        problems.append(
+            f'{where("grid.points")}: grid.points: "auto" takes load.p_star or load.pressure; '
+            f"load.{load.quantity} is that of a given grid"
+        )
+    if accuracy is not None and not accuracy.asked():
+        problems.append(
+            f"{where('accuracy')}: accuracy: give mean_gap, contact_area or stress_deviation"
+        )
+    return problems
 
 
 def _build(

@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from threading import Event
 from typing import Any, Literal, NamedTuple
@@ -14,9 +14,10 @@ from gfmd_cli.physics.contact import Contact
 from gfmd_cli.physics.observables import cross_section, stress_distribution
 from gfmd_cli.solvers.loop import State
 from gfmd_cli.study.checkpoint import Checkpoint
-from gfmd_cli.study.grids import Solved, solve_on_grids
+from gfmd_cli.study.grids import Solved
 from gfmd_cli.study.layout import PR_LINEAR, PR_LOGARITHMIC
 from gfmd_cli.study.record import Record, empty_row, write_record
+from gfmd_cli.study.search import solve_task_on_grids
 from gfmd_cli.study.tasks import Task
 
 REPORT_EVERY = 0.2  # seconds between two reports of one task
@@ -52,9 +53,9 @@ class _Watcher:
     last_report: float = 0.0
     last_save: float = 0.0
     spent: float = 0.0
-    notes: list[dict[str, Any]] = field(default_factory=list)
+    notes: Any = None
 
-    def note(self, notes: list[dict[str, Any]]) -> None:
+    def note(self, notes: Any) -> None:
         self.notes = notes
 
     def enter_level(self, points: int, spent: float) -> None:
@@ -95,7 +96,7 @@ def solve_task(
     begun = time.perf_counter()
     checkpoint = Checkpoint(parts / task.id)
     watcher = _Watcher(task, checkpoint, report, checkpoint_every, last_save=time.monotonic())
-    solved = solve_on_grids(
+    solved = solve_task_on_grids(
         task,
         threads,
         memory,

@@ -84,34 +84,52 @@ SHAPES = ("number", "list", "ladder", "count", "word")
 """Tags of the unions above, which no message should name."""
 
 
+Share = Annotated[float, Key(gt=0, lt=1)]
+Areas = Annotated[
+    Annotated[Share, Tag("number")]
+    | Annotated[list[Share], Key(min_length=1, max_length=MAX_LADDER), Tag("list")],
+    Discriminator(_shape),
+]
+LOADS = ("p_star", "pressure", "contact_area", "mean_gap")
+"""Ways to say how hard the bodies are pressed together."""
+SOUGHT = {"contact_area": "a_r", "mean_gap": "u_g"}
+"""Those whose pressure is searched, with the column that is to take the value asked for."""
+
+
 class LoadTable(Choice):
-    """Table [load]: either `p_star` or `pressure`, each a number, a list or a ladder."""
+    """Table [load]: one of the four ways, as a number, a list or a ladder."""
 
     p_star: Pressures | None = None
     """Reduced pressures p / Delta_sigma."""
     pressure: Pressures | None = None
     """Pressures [Pa]."""
+    contact_area: Areas | None = None
+    """Relative contact areas a_r of the solved grid; their pressures are searched."""
+    mean_gap: Pressures | None = None
+    """Mean gaps u_g / h_std of the solved grid; their pressures are searched."""
+    within: Share = 1e-3
+    """Relative distance to contact_area or mean_gap at which the search ends."""
 
     @model_validator(mode="after")
-    def _one_of_both(self) -> Self:
-        if (self.p_star is None) == (self.pressure is None):
-            raise ValueError("give either p_star or pressure")
+    def _one_of_all(self) -> Self:
+        given = [name for name in LOADS if getattr(self, name) is not None]
+        if len(given) != 1:
+            raise ValueError(f"give one of {', '.join(LOADS)}")
+        if "within" in self.model_fields_set and given[0] not in SOUGHT:
+            raise ValueError(f"within belongs to {' or '.join(SOUGHT)}")
         return self
 
     @property
-    def reduced(self) -> bool:
-        """Whether the pressures are reduced ones."""
-        return self.p_star is not None
+    def quantity(self) -> str:
+        """Which of the ways is taken."""
+        return next(name for name in LOADS if getattr(self, name) is not None)
 
-    def pressures(self) -> list[float]:
-        """The pressures, in the order given, each once."""
-        given = self.p_star if self.p_star is not None else self.pressure
+    def values(self) -> list[float]:
+        """The values asked for, in the order given, each once."""
+        given = getattr(self, self.quantity)
         if isinstance(given, Ladder):
             return given.pressures()
-        return list(dict.fromkeys(given if isinstance(given, list) else [given or 0.0]))
-
-
-Share = Annotated[float, Key(gt=0, lt=1)]
+        return list(dict.fromkeys(given if isinstance(given, list) else [given]))
 
 
 class AccuracyTable(Choice):
@@ -173,7 +191,9 @@ class Spec(Choice):
                 if "path" in dumped:
                     dumped["path"] = Path(dumped["path"]).name
                     dumped["sha256"] = file_digest(choice.path)
-        data["load"] = {"p_star" if self.load.reduced else "pressure": self.load.pressures()}
+        data["load"] = {self.load.quantity: self.load.values()}
+        if self.load.quantity in SOUGHT:
+            data["load"]["within"] = self.load.within
         return data
 
 

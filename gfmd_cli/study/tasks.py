@@ -14,7 +14,7 @@ from gfmd_cli.physics.continuum import LAST_LINE, LAST_STRESS
 from gfmd_cli.physics.elastomer import Elastomer, HalfSpace, Membrane, Plate, Power, Slab
 from gfmd_cli.physics.surface import FileSurface, Surface
 from gfmd_cli.solvers.cascade import SolverChoice
-from gfmd_cli.study.spec import AccuracyTable, OutputTable, Spec, digest
+from gfmd_cli.study.spec import SOUGHT, AccuracyTable, OutputTable, Spec, digest
 
 FIELDS_IN_MEMORY = 6.65
 """Fields of double precision that a solve holds at its peak: h, u, sigma, work; at half the
@@ -24,6 +24,8 @@ BASE_BYTES = 215e6
 FIRST = 64  # points per side that "auto" begins with at the least; such a solve costs nothing
 LAST = {"a_r": LAST_LINE, "u_g": 4.0, "sigma_p": LAST_STRESS}
 """Exponents n up to which a quantity has a continuum value to come near to."""
+SYMBOLS = {"p_star": "p*", "pressure": "p", "contact_area": "a_r", "mean_gap": "u_g"}
+SEARCH = 4.5  # solves that a search of the pressure takes, those on coarser grids included
 SECONDS_PER_PAIR = 1.7e-8
 """Per grid point and pair of transforms, with all work between two of them, on one thread."""
 
@@ -36,9 +38,12 @@ class Task:
     surface: Surface
     elastomer: Elastomer
     points: int
+    quantity: str
+    """What the load is given as: one of LOADS."""
     load: float
-    """Reduced pressure, or pressure [Pa] where `reduced` is false."""
-    reduced: bool
+    """Its value."""
+    within: float
+    """Relative distance to it at which a search ends."""
     solver: SolverChoice
     output: OutputTable
     accuracy: AccuracyTable | None
@@ -50,9 +55,17 @@ class Task:
     @property
     def label(self) -> str:
         """What sets the task apart, for people."""
-        unit = "p*" if self.reduced else "p"
         points = "auto" if self.auto else self.points
-        return f"{describe(self.elastomer)} {points} {unit}={self.load:.4g}"
+        return f"{describe(self.elastomer)} {points} {self.asked}"
+
+    @property
+    def asked(self) -> str:
+        """The load, for people."""
+        return f"{SYMBOLS[self.quantity]}={self.load:.4g}"
+
+    def p_star(self, delta_sigma: float) -> float:
+        """The reduced pressure, where it is known, on a scene with this Delta_sigma [Pa]."""
+        return self.load if self.quantity == "p_star" else self.load / delta_sigma
 
     @property
     def size(self) -> int:
@@ -76,7 +89,8 @@ class Task:
     @property
     def seconds(self) -> float:
         """Time that the solve is expected to take on one thread, within a factor of about three."""
-        return 0.01 + SECONDS_PER_PAIR * self.size * self._pairs()
+        solves = SEARCH if self.quantity in SOUGHT else 1.0
+        return 0.01 + solves * SECONDS_PER_PAIR * self.size * self._pairs()
 
     def columns(self) -> dict[str, Any]:
         """What is to be solved, as columns of a study."""
@@ -89,6 +103,8 @@ class Task:
             "thickness": np.nan if t is None else t,
             "points": self.points,
             "grid": "auto" if self.auto else "given",
+            "load": self.quantity,
+            "asked": self.load,
         }
 
     def _pairs(self) -> float:
@@ -97,7 +113,7 @@ class Task:
         n = 2.0 if n is None else n
         if n == 0:
             return 1.0
-        p = min(max(self.load if self.reduced else 0.05, 1e-5), 3.0)
+        p = min(max(self.load if self.quantity == "p_star" else 0.05, 1e-5), 3.0)
         pairs = float(np.interp(n, [0, 0.5, 1, 2, 3, 4], [30, 35, 30, 22, 30, 44]))
         slope = float(np.interp(n, [0, 1, 2, 3, 4], [0.0, 0.1, 0.08, 0.07, 0.15]))
         tightness = 1 - 0.1 * float(np.log10(max(self.solver.tolerance, 1e-14) / 1e-6))
@@ -182,12 +198,13 @@ def plan(spec: Spec) -> list[Task]:
             )
     resolved = spec.resolved()
     tables = ("surface", "elastomer", "grid", "solver")
+    quantity = spec.load.quantity
     tasks: list[Task] = []
     for places in product(*(range(len(resolved[name])) for name in tables)):
         parts = {name: resolved[name][i] for name, i in zip(tables, places, strict=True)}
         s, e, g, m = places
-        for load in spec.load.pressures():
-            content = [parts, spec.load.reduced, load, resolved["output"]]
+        for load in spec.load.values():
+            content = [parts, resolved["load"] | {quantity: load}, resolved["output"]]
             if spec.accuracy is not None:
                 content.append(resolved["accuracy"])
             points = spec.grid[g].points
@@ -197,7 +214,7 @@ def plan(spec: Spec) -> list[Task]:
                 else forecast(
                     spec.surface[s],
                     spec.elastomer[e],
-                    load if spec.load.reduced else None,
+                    load if quantity == "p_star" else None,
                     spec.accuracy,
                 )
             )
@@ -207,8 +224,9 @@ def plan(spec: Spec) -> list[Task]:
                     surface=spec.surface[s],
                     elastomer=spec.elastomer[e],
                     points=expected,
+                    quantity=quantity,
                     load=load,
-                    reduced=spec.load.reduced,
+                    within=spec.load.within,
                     solver=spec.solver[m],
                     output=spec.output,
                     accuracy=spec.accuracy,
