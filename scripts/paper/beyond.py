@@ -1,0 +1,3 @@
+"""What the paper leaves open: plates, and what theory makes of the true contact."""
+
+FIGURES = ()

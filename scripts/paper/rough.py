@@ -1,0 +1,3 @@
+"""Figs. 4 to 13: random roughness."""
+
+FIGURES = ()

@@ -1,0 +1,48 @@
+"""Every figure of the paper from a shipped config, and every claim beside what is found.
+
+    python scripts/paper_figures.py -o results/paper            # an hour on two cores
+    python scripts/paper_figures.py -o results/paper --quick    # minutes, small grids
+
+Studies are resumed where they were stopped. Figures are written as PDF and PNG, the claims as
+claims.md.
+"""
+
+import argparse
+import time
+from pathlib import Path
+
+from paper import beyond, hertz, rough
+from paper.claims import Claim, count, table
+from paper.studies import LARGE, STUDIES, Held, run
+
+from gfmd_cli.analysis.sheet import styled
+
+FIGURES = (*hertz.FIGURES, *rough.FIGURES, *beyond.FIGURES)
+"""Functions that draw a figure and return the claims it decides, in the order of the paper."""
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("-o", "--output", type=Path, default=Path("results/paper"))
+    parser.add_argument("--quick", action="store_true", help="small grids, minutes")
+    parser.add_argument("--only", nargs="*", metavar="STUDY", help="run these studies only")
+    parser.add_argument("--no-run", action="store_true", help="draw what is there")
+    given = parser.parse_args()
+    given.output.mkdir(parents=True, exist_ok=True)
+    names = given.only or [name for name in STUDIES if not (given.quick and name in LARGE)]
+    for name in () if given.no_run else names:
+        begun = time.perf_counter()
+        run(name, given.output, given.quick)
+        print(f"{name}: {time.perf_counter() - begun:.0f} s", flush=True)
+    held = Held(given.output, given.quick)
+    claims: list[Claim] = []
+    with styled():
+        for draw in FIGURES:
+            if all(held.has(name) for name in draw.needs):
+                claims += draw(held, given.output / "figures")
+    (given.output / "claims.md").write_text(table(claims) + "\n", encoding="utf-8")
+    print(count(claims))
+
+
+if __name__ == "__main__":
+    main()
