@@ -216,6 +216,17 @@ def test_a_damaged_record_is_set_aside_and_solved_again(run, tmp_path):
     np.testing.assert_array_equal(results(path), results(whole))
 
 
+def test_a_study_without_newer_columns_opens(run):
+    path, _, _ = run(overrides=("load.p_star=0.1",))
+    before = results(path)
+    with h5py.File(path, "r+") as file:
+        del file["asked"], file["load"]
+    rows = read_rows(path)
+    assert [row["load"] for row in rows] == ["", ""]
+    without = [i for i, name in enumerate(NUMBERS) if name != "asked"]
+    np.testing.assert_array_equal(np.array(results(path))[:, without], np.array(before)[:, without])
+
+
 def test_a_file_that_is_no_study_is_refused_and_kept(run, tmp_path):
     path = tmp_path / "study.h5"
     path.write_bytes(b"not HDF5")

@@ -163,7 +163,10 @@ def open_study(path: Path) -> Iterator[Any]:
 
 
 def read_rows(path: Path) -> list[dict[str, Any]]:
-    """The rows of a study, one a task, with `task`, `scene` and Pr(sigma) where it is stored."""
+    """The rows of a study, one a task, with `task`, `scene` and Pr(sigma) where it is stored.
+
+    A column that the version which wrote the study did not have yet is blank.
+    """
     with open_study(path) as file:
         size = len(file["task"])
         names = [c.name for c in (*COLUMNS, *DISTRIBUTION) if c.name in file]
@@ -172,7 +175,10 @@ def read_rows(path: Path) -> list[dict[str, Any]]:
             name: file[name].asstr()[()] if file[name].dtype.kind == "O" else file[name][()]
             for name in (*names, "task", "scene")
         }
-    return [{name: _plain(values[i]) for name, values in columns.items()} for i in range(size)]
+    blank = empty_row()
+    return [
+        blank | {name: _plain(values[i]) for name, values in columns.items()} for i in range(size)
+    ]
 
 
 def _plain(value: Any) -> Any:
@@ -233,7 +239,7 @@ def _old_rows(old: Any, wanted: set[str]) -> dict[str, dict[str, Any]]:
         return {}
     rows = read_rows(Path(old.filename))
     ids = old["task_id"].asstr()[()]
-    return {i: empty_row() | row for i, row in zip(ids, rows, strict=True) if i in wanted}
+    return {i: row for i, row in zip(ids, rows, strict=True) if i in wanted}
 
 
 def _scene_numbers(tasks: list[Task]) -> list[int]:
