@@ -3,7 +3,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 RESULTS := results
 
-.PHONY: demo test check validate smoke memory clean
+.PHONY: demo test check validate smoke memory paper paper-quick clean
 
 $(VENV)/.core: pyproject.toml
 	python3 -m venv $(VENV)
@@ -39,6 +39,12 @@ validate: $(VENV)/.test ## slow physics: large grids, dense ladders
 
 memory: $(VENV)/.core ## measured peak memory against what --dry-run says
 	$(BIN)/python scripts/memory.py
+
+paper: $(VENV)/.core ## every figure and claim of the paper, at full size: an hour
+	$(BIN)/python scripts/paper_figures.py -o $(RESULTS)/paper --page docs/paper.md
+
+paper-quick: $(VENV)/.core ## the same on small grids: minutes
+	$(BIN)/python scripts/paper_figures.py -o $(RESULTS)/paper-quick --quick
 
 clean:
 	rm -rf $(RESULTS)

@@ -3,21 +3,21 @@
     python scripts/paper_figures.py -o results/paper            # an hour on two cores
     python scripts/paper_figures.py -o results/paper --quick    # minutes, small grids
 
-Studies are resumed where they were stopped. Figures are written as PDF and PNG, the claims as
-claims.md.
+Studies are resumed where they were stopped. Figures are written as PDF and PNG, the claims as a
+page of Markdown.
 """
 
 import argparse
 import time
 from pathlib import Path
 
-from paper import beyond, hertz, rough
-from paper.claims import Claim, count, table
+from paper import beyond, gaps, hertz, page, rough
+from paper.claims import Claim, count
 from paper.studies import LARGE, STUDIES, Held, run
 
 from gfmd_cli.analysis.sheet import styled
 
-FIGURES = (*hertz.FIGURES, *rough.FIGURES, *beyond.FIGURES)
+FIGURES = (*hertz.FIGURES, *rough.FIGURES, *gaps.FIGURES, *beyond.FIGURES)
 """Functions that draw a figure and return the claims it decides, in the order of the paper."""
 
 
@@ -27,6 +27,7 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="small grids, minutes")
     parser.add_argument("--only", nargs="*", metavar="STUDY", help="run these studies only")
     parser.add_argument("--no-run", action="store_true", help="draw what is there")
+    parser.add_argument("--page", type=Path, help="where the page goes, by default with the rest")
     given = parser.parse_args()
     given.output.mkdir(parents=True, exist_ok=True)
     names = given.only or [name for name in STUDIES if not (given.quick and name in LARGE)]
@@ -40,7 +41,7 @@ def main() -> None:
         for draw in FIGURES:
             if all(held.has(name) for name in draw.needs):
                 claims += draw(held, given.output / "figures")
-    (given.output / "claims.md").write_text(table(claims) + "\n", encoding="utf-8")
+    page.write(claims, given.output / "figures", given.page or given.output / "paper.md")
     print(count(claims))
 
 

@@ -238,11 +238,38 @@ SMALL_SETTINGS = {
 }
 
 
-@pytest.mark.parametrize("config", sorted(CONFIGS.glob("*.toml")), ids=lambda path: path.stem)
+ROUGH = ("grid.points=64", "surface.cutoff=0.05", "solver.tolerance=1e-4")
+TWO = "load.p_star=[0.1, 1.0]"
+PAPER_SETTINGS = {
+    "fig01": ("grid.points=128",),
+    "fig02": ("grid.points=64",),
+    "kappa": ("grid.points=64", "load.contact_area=0.05"),
+    "fig04": ROUGH,
+    "fig05": ROUGH,
+    "fig06": (*ROUGH, TWO),
+    "fig07": ROUGH,
+    "fig08": (*ROUGH, TWO),
+    "fig10": (*ROUGH, TWO),
+    "fig11": (*ROUGH, TWO),
+    "fig12": ("grid.points=2048", TWO),
+    "fig13": ROUGH,
+    "large_cell": (*ROUGH, "surface.seed=0"),
+    "plate": (*ROUGH, TWO),
+    "plate_map": ROUGH,
+    "spacing": ROUGH,
+}
+
+
+@pytest.mark.parametrize(
+    "config",
+    sorted([*CONFIGS.glob("*.toml"), *CONFIGS.glob("paper/*.toml")]),
+    ids=lambda path: path.stem,
+)
 def test_every_config_runs_on_a_small_grid(gfmd, config):
     if config.stem == "afm-scan":
         pytest.importorskip("SurfaceTopography")
-    settings = [word for s in SMALL_SETTINGS[config.stem] for word in ("--set", s)]
+    small = (SMALL_SETTINGS | PAPER_SETTINGS)[config.stem]
+    settings = [word for s in small for word in ("--set", s)]
     told = gfmd("run", config, "-o", "study.h5", *settings)
     assert told.exit_code == 0, told.output
     assert gfmd("analyze", "study.h5").exit_code == 0

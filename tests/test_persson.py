@@ -253,3 +253,12 @@ def test_the_integral_of_erfc_keeps_its_digits():
     with mp.workdps(400):
         exact = [float(mp.exp(-(mp.mpf(t) ** 2)) / mp.sqrt(mp.pi) - t * mp.erfc(t)) for t in x]
     assert ierfc(x) == pytest.approx(exact, rel=1e-12, abs=0)
+
+
+@pytest.mark.parametrize("n", [0, 1, 4])
+def test_area_and_gap_give_their_pressure_back(default, n):
+    persson = theory(default, n)
+    p = np.array([1e-3, 0.02, 0.3, 2.5]) * persson.delta_sigma
+    np.testing.assert_allclose(persson.pressure_at_area(persson.contact_area(p)), p, rtol=1e-12)
+    np.testing.assert_allclose(persson.pressure_at_gap(persson.mean_gap(p)), p, rtol=1e-4)
+    assert np.isnan(persson.pressure_at_gap(0.0))
