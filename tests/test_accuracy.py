@@ -23,8 +23,8 @@ from gfmd_cli.study.bench import run_bench
 from gfmd_cli.study.grids import ALGEBRAIC, NOT_REACHED
 from gfmd_cli.study.layout import COLUMNS
 from gfmd_cli.study.parse import read_spec
+from gfmd_cli.study.reading import read_rows
 from gfmd_cli.study.run import run_study
-from gfmd_cli.study.store import read_rows
 from gfmd_cli.study.tasks import plan
 
 SPEC = """\

@@ -16,11 +16,11 @@ from gfmd_cli.physics.grid import Grid
 from gfmd_cli.solvers.loop import State
 from gfmd_cli.study import solve
 from gfmd_cli.study.checkpoint import Checkpoint
-from gfmd_cli.study.layout import COLUMNS
+from gfmd_cli.study.layout import COLUMNS, MISSING
 from gfmd_cli.study.parse import read_spec
+from gfmd_cli.study.reading import read_rows, read_shells
 from gfmd_cli.study.record import read_record
 from gfmd_cli.study.run import run_study
-from gfmd_cli.study.store import MISSING, read_rows, read_shells
 
 SMALL = """\
 [surface]

@@ -4,8 +4,12 @@ from typing import NamedTuple
 
 from gfmd_cli.physics.observables import QUANTITIES
 
-LAYOUT = 1
+LAYOUT = 2
 """Raised whenever a reader of the old layout would misread the new one."""
+LAYOUTS = (1, 2)
+"""Layouts that can be read. In 1 text was of variable length, without a checksum."""
+MISSING = "missing"
+"""Status of a task that is not solved yet."""
 BENCH = "bench_layout"
 """Attribute that a bench has in the place of a study's `layout`."""
 
