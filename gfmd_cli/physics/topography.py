@@ -14,7 +14,6 @@ import numpy as np
 
 from gfmd_cli.errors import InputError
 from gfmd_cli.physics.fields import Field
-from gfmd_cli.physics.hdf5 import take
 
 Levelling = Literal["none", "mean", "plane", "curvature"]
 Edges = Literal["none", "window", "mirror"]
@@ -140,6 +139,8 @@ def _read_npy(path: Path, dataset: str | None, max_bytes: int) -> Topography:
 def _read_hdf5(path: Path, dataset: str | None, max_bytes: int) -> Topography:
     """One dataset of an HDF5 file, reached by hard links and stored in the file itself."""
     import h5py
+
+    from gfmd_cli.physics.hdf5 import take
 
     found: dict[str, Any] = {}
 

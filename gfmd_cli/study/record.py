@@ -1,5 +1,6 @@
 """Records: what one task found, as a small sealed HDF5 file that appears whole or not at all."""
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -43,8 +44,8 @@ def write_record(folder: Path, record: Record) -> Path:
         with new_hdf5(fresh) as file:
             file.attrs["layout"] = LAYOUT
             file.attrs["task_id"] = record.task_id
-            for column in COLUMNS:
-                file.attrs[column.name] = column.kind(record.row[column.name])
+            row = {column.name: column.kind(record.row[column.name]) for column in COLUMNS}
+            file.attrs["row"] = json.dumps(row)
             for group in ("distribution", "fields", "cross_section"):
                 for name, values in getattr(record, group).items():
                     file[f"{group}/{name}"] = values
@@ -71,7 +72,7 @@ def read_record(path: Path, *, with_fields: bool = True) -> Record:
             }
             return Record(
                 task_id=file.attrs["task_id"],
-                row={c.name: c.kind(file.attrs[c.name]) for c in COLUMNS},
+                row=json.loads(file.attrs["row"]),
                 shells=Shells(*(file[f"shells/{c.name}"][()] for c in SHELLS)),
                 **read,
             )

@@ -8,7 +8,7 @@ stops a run.
 import json
 import shutil
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, nullcontext, suppress
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +16,7 @@ from gfmd_cli.errors import StudyError
 from gfmd_cli.study.files import locked, new_file, new_hdf5, write_whole
 from gfmd_cli.study.layout import MISSING
 from gfmd_cli.study.reading import open_study, texts_of
-from gfmd_cli.study.record import SUFFIX, read_record
+from gfmd_cli.study.record import SUFFIX, Record, read_record, record_path
 from gfmd_cli.study.spec import Spec, refuse_other
 from gfmd_cli.study.tasks import Task
 from gfmd_cli.study.writing import write_study
@@ -80,25 +80,23 @@ class Study:
         with self._collecting():
             found, damaged = self._records()
             with new_file(self.path, aside=self.parts) as fresh, new_hdf5(fresh) as file:
-                if self.path.exists():
-                    with open_study(self.path) as old:
-                        write_study(file, spec, tasks, text, found, old)
-                else:
-                    write_study(file, spec, tasks, text, found, None)
-            for path in found.values():
-                path.unlink(missing_ok=True)
+                old = open_study(self.path) if self.path.exists() else nullcontext()
+                with old as former:
+                    write_study(file, spec, tasks, text, found, self.parts, former)
+            for name in found:
+                record_path(self.parts, name).unlink(missing_ok=True)
         return damaged
 
     def uncollected(self) -> bool:
         """Whether records wait to be collected."""
         return bool(self._record_paths())
 
-    def _records(self) -> tuple[dict[str, Path], list[str]]:
-        """Whole records by task id; a damaged one is set aside as NAME.bad, and said."""
+    def _records(self) -> tuple[dict[str, Record], list[str]]:
+        """Whole records by task id, without fields; a damaged one is set aside, and said."""
         found, damaged = {}, []
         for path in self._record_paths():
             try:
-                found[read_record(path, with_fields=False).task_id] = path
+                found[path.stem] = read_record(path, with_fields=False)
             except StudyError as error:
                 bad = path.with_suffix(".bad")
                 while bad.exists():

@@ -27,13 +27,19 @@ from gfmd_cli.study.reading import (
     shells_of,
     texts_of,
 )
-from gfmd_cli.study.record import Record, empty_row, read_record
+from gfmd_cli.study.record import Record, empty_row, read_record, record_path
 from gfmd_cli.study.spec import Spec
 from gfmd_cli.study.tasks import Task
 
 
 def write_study(
-    file: Any, spec: Spec, tasks: list[Task], text: str, found: dict[str, Path], old: Any
+    file: Any,
+    spec: Spec,
+    tasks: list[Task],
+    text: str,
+    found: dict[str, Record],
+    parts: Path,
+    old: Any,
 ) -> None:
     """Lay out the whole study: attributes, columns, distributions, scenes, fields.
 
@@ -41,16 +47,15 @@ def write_study(
     ----------
     file : the new file
     text : the spec as it was given
-    found : records by task id
+    found, parts : records by task id, without fields, and the folder that has them whole
     old : the study so far, open, or None; it gives what no record does
 
     Fields are read and written one task at a time. Raises SpaceError, StudyError.
     """
     file.attrs.update({"layout": LAYOUT, **origin(spec, text)})
     file.attrs[ATTRIBUTES_SUM] = attributes_sum(file)
-    records = {name: read_record(path, with_fields=False) for name, path in found.items()}
     kept = _old_rows(old, {task.id for task in tasks} - set(found))
-    rows = [_row(task, records, kept) for task in tasks]
+    rows = [_row(task, found, kept) for task in tasks]
     scenes = _scene_numbers(tasks)
     task = scale(file, "task", np.arange(len(tasks)), "1", "index of the task")
     for column in (*COLUMNS, *(DISTRIBUTION if spec.output.histogram else ())):
@@ -61,7 +66,9 @@ def write_study(
         _write_distributions(file, task, rows)
     for solved, scene, row in zip(tasks, scenes, rows, strict=True):
         if solved.id in found:
-            record = read_record(found[solved.id], with_fields=bool(spec.output.fields))
+            record = found[solved.id]
+            if spec.output.fields:
+                record = read_record(record_path(parts, solved.id))
             _write_extras(file, solved.index, scene, record)
         elif old is not None and row["status"] != MISSING:
             _write_extras(file, solved.index, scene, _old_record(old, solved, scene, row))
