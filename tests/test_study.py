@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import h5py
 import numpy as np
@@ -12,6 +13,7 @@ import pytest
 import xarray
 
 from gfmd_cli.errors import InputError, Interrupted, StudyError
+from gfmd_cli.physics import wisdom
 from gfmd_cli.physics.grid import Grid
 from gfmd_cli.solvers.loop import State
 from gfmd_cli.study import solve
@@ -22,6 +24,7 @@ from gfmd_cli.study.reading import read_rows, read_shells
 from gfmd_cli.study.record import read_record
 from gfmd_cli.study.run import run_study
 
+OLD = Path(__file__).parent / "data" / "layout-1.h5"
 SMALL = """\
 [surface]
 kind = "self-affine"
@@ -290,6 +293,92 @@ def flip(path, bit):
     content = bytearray(path.read_bytes())
     content[bit // 8] ^= 1 << bit % 8
     path.write_bytes(content)
+
+
+def test_fields_keep_their_labels_when_a_study_is_collected_again(run):
+    path, _, _ = run(shard=(0, 2))
+    run()
+    with xarray.open_dataset(path, engine="h5netcdf", group="fields/0") as fields:
+        assert fields.u.dims == ("y", "x")
+    with xarray.open_dataset(path, engine="h5netcdf", group="scenes/0") as scene:
+        assert scene.variance.dims == ("shell",)
+
+
+def test_a_study_of_the_older_layout_is_read_and_gone_on_with(run, tmp_path):
+    shutil.copy(OLD, tmp_path / "study.h5")
+    with h5py.File(OLD) as file:
+        text = file.attrs["spec_text"]
+    before = [row for row in read_rows(OLD) if row["status"] != MISSING]
+    assert len(before) == 2
+    path, _, outcome = run(text)
+    assert outcome == {"converged": 4}
+    rows = {row["task"]: row for row in read_rows(path)}
+    assert all(rows[row["task"]] == pytest.approx(row, nan_ok=True, abs=0, rel=0) for row in before)
+
+
+def test_a_study_of_a_newer_layout_says_which_version_reads_it(run):
+    path, _, _ = run()
+    with h5py.File(path, "r+") as file:
+        file.attrs.update({"layout": 9, "software_version": "7.0"})
+    with pytest.raises(StudyError, match=r"layout 9, which gfmd 7\.0 reads; .* layouts 1 to 2"):
+        read_rows(path)
+
+
+def test_a_changed_attribute_of_a_study_is_found_out(run):
+    path, _, _ = run()
+    with h5py.File(path, "r+") as file:
+        file.attrs["spec_text"] = file.attrs["spec_text"].replace("0.05", "0.06")
+    with pytest.raises(StudyError, match="attributes"):
+        read_rows(path)
+
+
+def test_a_damaged_record_is_said_in_one_line(run, tmp_path):
+    (tmp_path / "study.parts").mkdir()
+    (tmp_path / "study.parts" / "0000.record").write_bytes(b"nothing")
+    _, events, _ = run()
+    (note,) = [event.note for event in events if event.event == "warning"]
+    assert "0000.record: damaged record" in note
+    assert "set aside as 0000.bad" in note
+
+
+def test_max_hours_stop_a_run_as_a_signal_does(run, tmp_path):
+    with pytest.raises(Interrupted, match="call again"):
+        run(LONG, max_seconds=0.2, jobs=1)
+    assert list((tmp_path / "study.parts").glob("*/pointer"))
+
+
+def test_a_reproducible_run_has_the_same_bits_on_any_number_of_processes(run, monkeypatch):
+    paths = [
+        run(LONG, f"{jobs}.h5", ("solver.max_steps=20",), jobs=jobs, reproducible=True)[0]
+        for jobs in (1, 2)
+    ]
+    assert_equal_studies(*paths)
+    with h5py.File(paths[0]) as file:
+        assert json.loads(file.attrs["machine"])["plans"] == "estimated"
+
+
+def test_plans_are_kept_beside_an_unfinished_study(run, tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    run(shard=(0, 4))
+    kept = wisdom.read_wisdom(tmp_path / "study.parts")
+    assert kept == wisdom.read_wisdom(tmp_path / "cache" / "gfmd")
+    shutil.rmtree(tmp_path / "cache")
+    seen = []
+    monkeypatch.setattr(wisdom, "_take_in", lambda known: seen.append(known))
+    run(shard=(1, 4))
+    assert seen[0] == kept
+    (file,) = (tmp_path / "study.parts").glob("wisdom-*.json")
+    flip(file, 8 * 300)
+    _, events, _ = run(shard=(2, 4))
+    assert any("planned anew" in event.note for event in events)
+
+
+def test_a_seed_does_not_depend_on_how_many_run(run):
+    some = ("load.p_star=0.1", "elastomer.n=1", "output.fields=['height']")
+    alone, _, _ = run(name="alone.h5", overrides=(*some, "surface.seed=7"))
+    among, _, _ = run(name="among.h5", overrides=(*some, "surface.seed=[3,5,7]"))
+    with h5py.File(alone) as a, h5py.File(among) as b:
+        np.testing.assert_array_equal(a["fields/0/height"], b["fields/2/height"])
 
 
 def gfmd(folder, *words):

@@ -5,7 +5,6 @@ import multiprocessing
 import os
 import signal
 import sys
-import threading
 from collections import Counter
 from collections.abc import Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
@@ -250,7 +249,10 @@ def _time_to_work(max_seconds: float | None, pending: list[Task], jobs: int) -> 
 @contextmanager
 def _timer(seconds: float | None) -> Iterator[None]:
     """Inside, an orderly stop is asked for after so much time, whatever the clock says."""
-    timer = Timer(threading.TIMEOUT_MAX if seconds is None else seconds, solve.stop.set)
+    if seconds is None:
+        yield
+        return
+    timer = Timer(seconds, solve.stop.set)
     timer.daemon = True
     timer.start()
     try:

@@ -48,8 +48,10 @@ WORDS = [
     "nan", "inf", "-1", "0", "1e999", "-0.0", "9" * 400, "true", '""', '"auto"', "[]", "{}", "[[]]",
     "1979-05-27", '"\\u0000"', "[1, 2", "}", "=", ".", "[", "#", "'", '"""', "1e-320", "131072",
     "{ from = 1e-300, to = 1e300, per_decade = 1000 }", "[" + "0.5," * 3000 + "]", "\x00", "é",
-    "=1\n", '"/dev/zero"', '"file"\npath = "/dev/zero"', '"file"\npath = "."', '"table"\npath = "/dev/zero"',
-    '"slab"', '"ridge"', '"parabola"', "9" * 20, "0x7fffffffffffffff", "[surface]",
+    "=1\n", '"/dev/zero"', '"file"\npath = "/dev/zero"', '"file"\npath = "."',
+    '"table"\npath = "/dev/zero"',
+    '"slab"', '"ridge"', '"parabola"', "9" * 20, "0x7fffffffffffffff",
+    "[surface]",
 
     "[[surface]]", "surface.hurst = 1", "a" + ".b" * 100, '"' + "x" * 10000 + '"', "[1, 'x']",
 ]  # fmt: skip
@@ -176,10 +178,12 @@ def height_files(folder):
 
 @pytest.mark.parametrize("kind", ["h.npy", "old.h5", "new.h5"])
 def test_mutated_height_files(folder, kind):
-    content, rng = height_files(folder)[kind], random.Random(kind)
-    name = f"bad-{kind}"
-    words = ["run", "spec.toml", "--dry-run", "--set", f"surface={{kind='file', path='{name}'}}"]
-    cases = ((name, mutated_bytes(content, rng), words, None) for _ in range(500))
+    content, rng, cases = height_files(folder)[kind], random.Random(kind), []
+    for i in range(500):
+        name = f"{i}-{kind}"  # its own: a file is read once a process
+        surface = f"surface={{kind='file', path='{name}'}}"
+        words = ["run", "spec.toml", "--dry-run", "--set", surface]
+        cases.append((name, mutated_bytes(content, rng), words, None))
     met = survey(folder, cases)
     assert met[2] > 0
 
