@@ -175,8 +175,8 @@ def plan(spec: Spec) -> list[Task]:
     Raises InputError where a grid does not resolve its surface or a file is unfit.
     """
     pressures = spec.load.pressures()
-    swept = (spec.surface, spec.elastomer, spec.grid, spec.solver, pressures)
-    if (count := prod(map(len, swept))) > MAX_TASKS:
+    swept: tuple[list[Any], ...] = (spec.surface, spec.elastomer, spec.grid, spec.solver, pressures)
+    if (count := prod(len(values) for values in swept)) > MAX_TASKS:
         raise InputError(f"the sweeps make {count} tasks; at most {MAX_TASKS} fit into a study")
     for surface, grid in product(spec.surface, spec.grid):
         needed = surface.smallest_grid()
