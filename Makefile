@@ -3,7 +3,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 RESULTS := results
 
-.PHONY: demo test check validate smoke memory paper paper-quick clean
+.PHONY: demo test test-faults check validate smoke memory paper paper-quick clean
 
 $(VENV)/.core: pyproject.toml
 	python3 -m venv $(VENV)
@@ -36,6 +36,9 @@ check: $(VENV)/.test ## the one gate: lint, format, types, import order
 
 validate: $(VENV)/.test ## slow physics: large grids, dense ladders
 	$(BIN)/pytest -m validation
+
+test-faults: $(VENV)/.test ## kills, full disks, damaged files, hostile input; root, for its small disks
+	$(BIN)/pytest -m faults -n 2 --dist load
 
 memory: $(VENV)/.core ## measured peak memory against what --dry-run says
 	$(BIN)/python scripts/memory.py

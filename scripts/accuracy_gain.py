@@ -11,8 +11,8 @@ import tempfile
 from pathlib import Path
 
 from gfmd_cli.study.parse import read_spec
+from gfmd_cli.study.reading import read_rows
 from gfmd_cli.study.run import run_study
-from gfmd_cli.study.store import read_rows
 
 SPEC = """\
 [surface]

@@ -140,7 +140,9 @@ def test_task_ids_depend_on_content_not_on_place(read):
             ["solver", "precision", "fire"],
         ),
         (("[study]", "surface = 3\n[study]"), ["TOML syntax"]),
-        (("[study]", "x" + ".x" * 5000 + " = 1\n[study]"), ["nested deeper"]),
+        (("[study]", "x" + ".x" * 5000 + " = 1\n[study]"), ["5000 dots in a line"]),
+        (("[study]", "x = {x" + ".x" * 5000 + " = 1}\n[study]"), ["5000 dots in a line"]),
+        (("[study]", "x" + ".x" * 20 + " = 1\n[study]"), ["nested deeper"]),
         (("[study]", "x = " + "[" * 5000 + "\n[study]"), ["nested deeper"]),
     ],
 )

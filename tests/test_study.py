@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import h5py
 import numpy as np
@@ -12,16 +13,18 @@ import pytest
 import xarray
 
 from gfmd_cli.errors import InputError, Interrupted, StudyError
+from gfmd_cli.physics import wisdom
 from gfmd_cli.physics.grid import Grid
 from gfmd_cli.solvers.loop import State
 from gfmd_cli.study import solve
 from gfmd_cli.study.checkpoint import Checkpoint
-from gfmd_cli.study.layout import COLUMNS
+from gfmd_cli.study.layout import COLUMNS, MISSING
 from gfmd_cli.study.parse import read_spec
+from gfmd_cli.study.reading import read_rows, read_shells
 from gfmd_cli.study.record import read_record
 from gfmd_cli.study.run import run_study
-from gfmd_cli.study.store import MISSING, read_rows, read_shells
 
+OLD = Path(__file__).parent / "data" / "layout-1.h5"
 SMALL = """\
 [surface]
 kind = "self-affine"
@@ -61,12 +64,12 @@ NUMBERS = [c.name for c in COLUMNS if c.kind is not str and c.name != "seconds"]
 def run(tmp_path):
     """Runs a spec into tmp_path/study.h5; returns (path, events, outcome)."""
 
-    def run(text=SMALL, name="study.h5", overrides=(), **options):
+    def run(text=SMALL, name="study.h5", overrides=(), report=None, **options):
         spec_path = tmp_path / "spec.toml"
         spec_path.write_text(text)
         spec, _ = read_spec(spec_path, overrides)
         events = []
-        outcome = run_study(spec, text, tmp_path / name, events.append, **options)
+        outcome = run_study(spec, text, tmp_path / name, report or events.append, **options)
         return tmp_path / name, events, outcome
 
     return run
@@ -260,12 +263,20 @@ def test_checkpoints_come_back_as_they_were(tmp_path):
     state = State(rng.random((16, 16)), rng.random((16, 16)), exact=False, residual=0.1, step=7)
     state.misses, state.least, state.transforms, state.scalars = 2, 0.3, 9, {"slope": 1 / 3}
     state.fields["direction"] = rng.random((16, 16)).astype(np.float32)
+    with Checkpoint.held(tmp_path / "c") as checkpoint:
+        assert checkpoint.restore() is None
+        assert checkpoint.load(grid) is None
+        checkpoint.save(contact, state, 12.5)
+        older = state.u.copy()
+        state.u += 1
+        state.step = 8
+        checkpoint.save(contact, state, 12.5, ["note"])
+        with Checkpoint.held(tmp_path / "c") as second:
+            assert second.restore() is None
+            assert second.load(grid) is None  # another process has it
     checkpoint = Checkpoint(tmp_path / "c")
-    assert checkpoint.load(grid) is None
-    checkpoint.save(contact, state, 12.5)
-    state.u += 1
-    state.step = 8
-    checkpoint.save(contact, state, 12.5)
+    assert checkpoint.restore() is None
+    assert checkpoint.notes() == ["note"]
     resume = checkpoint.load(Grid(32))
     assert (resume.points, resume.transforms, resume.state.step) == (16, 12.5, 8)
     told = resume.state
@@ -274,13 +285,112 @@ def test_checkpoints_come_back_as_they_were(tmp_path):
     assert told.fields["direction"].dtype == np.float32
     np.testing.assert_array_equal(resume.state.u, state.u)
     np.testing.assert_array_equal(resume.state.fields["direction"], state.fields["direction"])
-    slot = json.loads(checkpoint.pointer.read_text())["slot"]
-    with (tmp_path / "c" / slot).open("r+b") as file:
-        file.seek(100)
-        file.write(b"\xff")
+    flip(tmp_path / "c" / checkpoint.slots[0]["name"], 800)
+    checkpoint = Checkpoint(tmp_path / "c")
+    assert "going on from the one before" in checkpoint.restore()
+    np.testing.assert_array_equal(checkpoint.load(grid).state.u, older)
+    assert checkpoint.notes() is None
+    flip(tmp_path / "c" / "pointer", 80)
+    checkpoint = Checkpoint(tmp_path / "c")
+    assert "set aside as .bad" in checkpoint.restore()
     assert checkpoint.load(grid) is None
+    assert (tmp_path / "c.pointer.bad").exists()
     checkpoint.remove()
     assert not (tmp_path / "c").exists()
+
+
+def flip(path, bit):
+    """Change one bit of a file."""
+    content = bytearray(path.read_bytes())
+    content[bit // 8] ^= 1 << bit % 8
+    path.write_bytes(content)
+
+
+def test_fields_keep_their_labels_when_a_study_is_collected_again(run):
+    path, _, _ = run(shard=(0, 2))
+    run()
+    with xarray.open_dataset(path, engine="h5netcdf", group="fields/0") as fields:
+        assert fields.u.dims == ("y", "x")
+    with xarray.open_dataset(path, engine="h5netcdf", group="scenes/0") as scene:
+        assert scene.variance.dims == ("shell",)
+
+
+def test_a_study_of_the_older_layout_is_read_and_gone_on_with(run, tmp_path):
+    shutil.copy(OLD, tmp_path / "study.h5")
+    with h5py.File(OLD) as file:
+        text = file.attrs["spec_text"]
+    before = [row for row in read_rows(OLD) if row["status"] != MISSING]
+    assert len(before) == 2
+    path, _, outcome = run(text)
+    assert outcome == {"converged": 4}
+    rows = {row["task"]: row for row in read_rows(path)}
+    for row in before:
+        np.testing.assert_equal(rows[row["task"]], row)
+
+
+def test_a_study_of_a_newer_layout_says_which_version_reads_it(run):
+    path, _, _ = run()
+    with h5py.File(path, "r+") as file:
+        file.attrs.update({"layout": 9, "software_version": "7.0"})
+    with pytest.raises(StudyError, match=r"layout 9, which gfmd 7\.0 reads; .* layouts 1 to 2"):
+        read_rows(path)
+
+
+def test_a_changed_attribute_of_a_study_is_found_out(run):
+    path, _, _ = run()
+    with h5py.File(path, "r+") as file:
+        file.attrs["spec_text"] = file.attrs["spec_text"].replace("0.05", "0.06")
+    with pytest.raises(StudyError, match="attributes"):
+        read_rows(path)
+
+
+def test_a_damaged_record_is_said_in_one_line(run, tmp_path):
+    (tmp_path / "study.parts").mkdir()
+    (tmp_path / "study.parts" / "0000.record").write_bytes(b"nothing")
+    _, events, _ = run()
+    (note,) = [event.note for event in events if event.event == "warning"]
+    assert "0000.record: damaged record" in note
+    assert "set aside as 0000.bad" in note
+
+
+def test_max_hours_stop_a_run_as_a_signal_does(run, tmp_path):
+    with pytest.raises(Interrupted, match="call again"):
+        run(LONG, max_seconds=0.2, jobs=1)
+    assert list((tmp_path / "study.parts").glob("*/pointer"))
+
+
+def test_a_reproducible_run_has_the_same_bits_on_any_number_of_processes(run, monkeypatch):
+    paths = [
+        run(LONG, f"{jobs}.h5", ("solver.max_steps=20",), jobs=jobs, reproducible=True)[0]
+        for jobs in (1, 2)
+    ]
+    assert_equal_studies(*paths)
+    with h5py.File(paths[0]) as file:
+        assert json.loads(file.attrs["machine"])["plans"] == "estimated"
+
+
+def test_plans_are_kept_beside_an_unfinished_study(run, tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    run(shard=(0, 4))
+    kept = wisdom.read_wisdom(tmp_path / "study.parts")
+    assert kept == wisdom.read_wisdom(tmp_path / "cache" / "gfmd")
+    shutil.rmtree(tmp_path / "cache")
+    seen = []
+    monkeypatch.setattr(wisdom, "_take_in", lambda known: seen.append(known))
+    run(shard=(1, 4))
+    assert seen[0] == kept
+    (file,) = (tmp_path / "study.parts").glob("wisdom-*.json")
+    flip(file, 8 * 300)
+    _, events, _ = run(shard=(2, 4))
+    assert any("planned anew" in event.note for event in events)
+
+
+def test_a_seed_does_not_depend_on_how_many_run(run):
+    some = ("load.p_star=0.1", "elastomer.n=1", "output.fields=['height']")
+    alone, _, _ = run(name="alone.h5", overrides=(*some, "surface.seed=7"))
+    among, _, _ = run(name="among.h5", overrides=(*some, "surface.seed=[3,5,7]"))
+    with h5py.File(alone) as a, h5py.File(among) as b:
+        np.testing.assert_array_equal(a["fields/0/height"], b["fields/2/height"])
 
 
 def gfmd(folder, *words):
@@ -294,28 +404,56 @@ def gfmd(folder, *words):
     )
 
 
-def test_a_run_stopped_again_and_again_ends_bit_for_bit(run, tmp_path):
-    unbroken, _, _ = run(LONG, name="unbroken.h5")
-    path, text = tmp_path / "broken.h5", (tmp_path / "spec.toml").read_text()
-    spec, _ = read_spec(tmp_path / "spec.toml")
-    stops = 0
+STOPPED = {
+    "multigrid": ("elastomer.n=2",),
+    "multilevel": ("elastomer={kind='slab', thickness=0.02}",),
+    "green": ("elastomer.n=0.5",),
+    "steep": ("elastomer.n=4",),
+    "line": ("surface={kind='ridge'}", "elastomer.n=1", "output.cross_section=false"),
+    "single": ("elastomer.n=2", "solver.precision='single'"),
+    "fire": ("elastomer.n=1", "solver.kind='fire'", "solver.max_steps=60"),
+    "ccg": ("elastomer.n=1", "solver.kind='ccg'", "solver.max_steps=60"),
+    "polonsky-keer": ("elastomer.n=1", "solver.kind='polonsky-keer'", "solver.max_steps=60"),
+    "sort": ("elastomer.n=0",),
+    "accuracy": ("elastomer.n=2", "accuracy.mean_gap=0.01", "grid.points=128"),
+    "auto": ("elastomer.n=2", "accuracy.mean_gap=1e-3", "grid.points='auto'"),
+}
 
-    def stop_at_the_second_word(progress):
-        words.append(progress)
-        if sum(word.event == "step" for word in words) == 2:
+
+@pytest.mark.parametrize("case", STOPPED)
+def test_a_run_stopped_again_and_again_ends_bit_for_bit(run, case, monkeypatch):
+    monkeypatch.setattr(solve, "REPORT_EVERY", 0.0)
+    overrides = ("load.p_star=[0.1]", *STOPPED[case])
+    unbroken, _, _ = run(name="unbroken.h5", overrides=overrides, jobs=1)
+    seen, stops, resumed = [], 0, 0
+
+    def stop_at_every_seventh_word(progress):
+        nonlocal resumed
+        seen.append(progress)
+        resumed += progress.event == "step" and progress.step > 0 and seen[-2].event == "start"
+        if len(seen) % 7 == 0:
             solve.stop.set()
 
     while stops < 200:
-        words = []
         try:
-            run_study(spec, text, path, stop_at_the_second_word, jobs=1)
+            path, _, _ = run(overrides=overrides, jobs=1, report=stop_at_every_seventh_word)
             break
         except Interrupted:
             stops += 1
-    assert 2 < stops < 200
-    np.testing.assert_array_equal(results(path), results(unbroken))
-    with h5py.File(path) as a, h5py.File(unbroken) as b:
-        np.testing.assert_array_equal(a["fields/0/u"], b["fields/0/u"])
+    assert 0 < stops < 200 or case == "sort"  # that has one step
+    assert resumed > 0 or case == "sort"
+    assert_equal_studies(path, unbroken)
+
+
+def assert_equal_studies(path, other):
+    """All numbers and fields of two studies are the same bits."""
+    np.testing.assert_array_equal(results(path), results(other))
+    with h5py.File(path) as a, h5py.File(other) as b:
+        names = []
+        b.visit(names.append)
+        for name in names:
+            if isinstance(b[name], h5py.Dataset) and name != "seconds":
+                np.testing.assert_array_equal(a[name][()], b[name][()], name)
 
 
 @pytest.mark.parametrize("jobs", ["1", "2"])

@@ -11,7 +11,8 @@ from gfmd_cli.errors import InputError
 from gfmd_cli.physics import einstein
 from gfmd_cli.physics.fields import Field
 from gfmd_cli.physics.persson import Persson
-from gfmd_cli.study.store import MISSING, read_rows, read_shells
+from gfmd_cli.study.layout import MISSING
+from gfmd_cli.study.reading import read_rows, read_shells
 
 Row = dict[str, Any]
 

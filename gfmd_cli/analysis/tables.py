@@ -9,8 +9,8 @@ import numpy as np
 from gfmd_cli.analysis.compare import Comparison, Curve, einstein_prediction
 from gfmd_cli.analysis.ensemble import Ensemble, ensembles
 from gfmd_cli.physics.observables import QUANTITIES
-from gfmd_cli.study.layout import COLUMNS
-from gfmd_cli.study.store import MISSING, read_rows
+from gfmd_cli.study.layout import COLUMNS, MISSING
+from gfmd_cli.study.reading import read_rows
 
 ERRORS = [
     f"{name}_{what}"

@@ -1,6 +1,8 @@
 """The command line, a module a command. Only this package prints and knows click."""
 
+import faulthandler
 import os
+import sys
 from typing import Any
 
 import click
@@ -30,6 +32,7 @@ class Commands(click.Group):
 @click.version_option(gfmd_cli.__version__, prog_name="gfmd")
 def main() -> None:
     """Elastic contact of rough surfaces, from springs (n = 0) to plates (n = 4)."""
+    faulthandler.enable(sys.__stderr__ or 2)  # a crash leaves its place in the log
     # Dot products are all that is asked of BLAS: its threads bring nothing and, side by side
     # with other processes, spin for tens of times the work.
     for library in ("OPENBLAS", "OMP", "MKL"):

@@ -32,6 +32,8 @@ class Reporter:
         if progress.event == "failed":
             self._close(progress.task)
             click.echo(f"gfmd: task {progress.task} ({progress.label}): {progress.note}", err=True)
+        elif progress.event == "warning":
+            click.echo(f"gfmd: {progress.note}", err=True)
         elif self.quiet:
             return
         elif self.terminal:

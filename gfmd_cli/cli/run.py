@@ -25,6 +25,17 @@ from gfmd_cli.errors import InputError
     show_default=True,
     help="Seconds between two saves of an unfinished solve.",
 )
+@click.option(
+    "--max-hours",
+    type=click.FloatRange(min=0, min_open=True),
+    help="End within this wall time, states saved, as a signal ends it: exit status 75.",
+)
+@click.option(
+    "--reproducible",
+    is_flag=True,
+    help="The same bits on every run of one machine: transforms planned without measuring, one "
+    "thread a task. Slower.",
+)
 @click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
 def run(
     spec: Path,
@@ -34,6 +45,8 @@ def run(
     jobs: int | None,
     dry_run: bool,
     checkpoint_every: float,
+    max_hours: float | None,
+    reproducible: bool,
     quiet: bool,
 ) -> None:
     """Solve what the study does not hold yet.
@@ -61,6 +74,8 @@ def run(
             shard=share,
             jobs=jobs,
             checkpoint_every=checkpoint_every,
+            max_seconds=None if max_hours is None else 3600 * max_hours,
+            reproducible=reproducible,
         )
     missed = sum(outcome.values()) - outcome["converged"]
     if not quiet:

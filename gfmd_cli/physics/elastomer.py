@@ -17,6 +17,8 @@ from gfmd_cli.physics.choice import Choice, FilePath, Positive
 from gfmd_cli.physics.fields import Field
 from gfmd_cli.physics.persson import gamma_n, gamma_slab
 
+MAX_TABLE = 2**20  # bytes of a tabulated stiffness
+
 
 def _power(q: Field, n: float) -> Field:
     """q^n, and zero at q = 0 for every n, n = 0 too."""
@@ -149,6 +151,8 @@ class Tabulated(Choice):
     def _table(self) -> Field:
         """The rows (q, k). Raises InputError for anything but two rising positive columns."""
         try:
+            if not self.path.is_file() or self.path.stat().st_size > MAX_TABLE:
+                raise ValueError(f"no regular file of at most {MAX_TABLE} bytes")
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", UserWarning)  # of no rows, which is refused below
                 table = np.loadtxt(self.path, ndmin=2)

@@ -1,23 +1,31 @@
-"""FFTW's wisdom, kept as text in the user's cache directory, so that plans are measured once.
+"""How transforms are planned: measured once and kept, or estimated, which is the same every time.
 
-One process plans at a time and then tells the others: all processes of a machine compute with the
-same plans, and so to the same bits.
+What FFTW measured, its wisdom, is kept as text: of a run beside its study, so that it goes on with
+the plans that it began with, and of all runs in the user's cache. One process plans at a time and
+then tells the others: all processes of a machine compute with the same plans, and so to the same
+bits.
 """
 
 import fcntl
 import hashlib
+import json
 import os
 import platform
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
+from functools import cache
 from pathlib import Path
 from typing import TypeVar
+from uuid import uuid4
 
 import pyfftw
 
 T = TypeVar("T")
+Wisdom = list[str]
+"""Text in double and in single precision."""
 
 
+@cache
 def processor() -> str:
     """The model name of the processor: a plan measured on one is a bad one on another."""
     with suppress(OSError):
@@ -27,20 +35,118 @@ def processor() -> str:
     return platform.processor()
 
 
-def _paths() -> list[Path]:
-    """Files of the wisdom in double and in single precision."""
+def _here() -> dict[str, str]:
+    """What plans depend on."""
+    return {
+        "processor": processor(),
+        "fftw": pyfftw.fftw_version,
+        "pyfftw": pyfftw.__version__,
+    }
+
+
+def _cache() -> Path:
     cache_home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    key = hashlib.sha256(f"{processor()} {pyfftw.__version__}".encode()).hexdigest()[:12]
-    return [cache_home / "gfmd" / f"{name}-{key}.txt" for name in ("fftw", "fftwf")]
+    return cache_home / "gfmd"
 
 
-def _take_in(paths: list[Path]) -> None:
-    """Know what others measured; a file that FFTW refuses is as good as none."""
-    known = [b"", b"", b""]  # the third: of long double
-    for i, path in enumerate(paths):
-        with suppress(OSError):
-            known[i] = path.read_bytes()
-    pyfftw.import_wisdom(tuple(known))
+_folder: Path | None = None  # where wisdom is kept; None for the cache
+_estimated = False
+
+
+def plan_with(folder: Path | None, *, estimated: bool = False) -> str | None:
+    """From now on keep wisdom in `folder`, which begins with that of the cache, or only estimate.
+
+    All that this process knew is forgotten. Says so where the folder's wisdom is damaged.
+    """
+    global _folder, _estimated
+    _folder, _estimated = folder, estimated
+    pyfftw.forget_wisdom()
+    if folder is None or estimated:
+        return None
+    with _alone(folder):
+        damaged = _path(folder).exists() and read_wisdom(folder) is None
+        if read_wisdom(folder) is None and (known := read_wisdom(_cache())) is not None:
+            _write(folder, known)
+    if not damaged:
+        return None
+    return f"{_path(folder)}: damaged; transforms are planned anew, last bits may differ"
+
+
+def plans() -> str:
+    """How this run plans: "estimated", or "measured" with the digest of its wisdom."""
+    known = None if _estimated else read_wisdom(_folder or _cache())
+    return "estimated" if _estimated else f"measured {_digest(known) if known else ''}".strip()
+
+
+def planned(plan: Callable[[tuple[str, ...]], T]) -> T:
+    """`plan` with the flags of a planner: of what is known, else measured, and kept for all."""
+    if _estimated:
+        return plan(("FFTW_ESTIMATE",))
+    with suppress(RuntimeError):  # not known
+        return plan(("FFTW_MEASURE", "FFTW_WISDOM_ONLY"))
+    folder = _folder or _cache()
+    with _alone(folder):
+        _take_in(read_wisdom(folder))
+        before = _export()
+        found = plan(("FFTW_MEASURE",))
+        if _export() != before:
+            _write(folder, _export())
+    if _folder is not None:
+        with _alone(_cache()):
+            _write(_cache(), _joined(read_wisdom(_cache()), _export()))
+    return found
+
+
+def read_wisdom(folder: Path) -> Wisdom | None:
+    """The wisdom of a folder; None where there is none of this machine that is whole."""
+    try:
+        data = json.loads(_path(folder).read_bytes())
+        if data["for"] == _here() and data["sha256"] == _digest(data["wisdom"]):
+            return list(data["wisdom"])
+    except (OSError, ValueError, KeyError, TypeError):
+        pass
+    return None
+
+
+def _path(folder: Path) -> Path:
+    key = hashlib.sha256(json.dumps(_here()).encode()).hexdigest()[:12]
+    return folder / f"wisdom-{key}.json"
+
+
+def _digest(wisdom: Wisdom) -> str:
+    return hashlib.sha256("\n".join(wisdom).encode()).hexdigest()
+
+
+def _export() -> Wisdom:
+    return [text.decode("ascii") for text in pyfftw.export_wisdom()[:2]]
+
+
+def _joined(kept: Wisdom | None, more: Wisdom) -> Wisdom:
+    """Both, the first where both know a plan: a line each, flags and problem after two words."""
+    if kept is None:
+        return more
+    joined = []
+    for old, new in zip(kept, more, strict=True):
+        known = {tuple(line.split()[2:]) for line in old.splitlines()[1:-1]}
+        added = [line for line in new.splitlines()[1:-1] if tuple(line.split()[2:]) not in known]
+        joined.append("\n".join([*old.splitlines()[:-1], *added, ")"]) + "\n")
+    return joined
+
+
+def _take_in(wisdom: Wisdom | None) -> None:
+    """Know what others measured."""
+    if wisdom is not None:
+        double, single = wisdom
+        pyfftw.import_wisdom((double.encode(), single.encode(), b""))  # third: of long double
+
+
+def _write(folder: Path, wisdom: Wisdom) -> None:
+    """Keep it; where the folder cannot be written, that costs time only."""
+    data = {"for": _here(), "sha256": _digest(wisdom), "wisdom": wisdom}
+    fresh = folder / f".wisdom.{uuid4().hex}"
+    with suppress(OSError):
+        fresh.write_text(json.dumps(data, indent=1), encoding="ascii")
+        fresh.replace(_path(folder))
 
 
 @contextmanager
@@ -49,25 +155,6 @@ def _alone(folder: Path) -> Iterator[None]:
     with ExitStack() as stack:
         with suppress(OSError):
             folder.mkdir(parents=True, exist_ok=True)
-            lock = stack.enter_context((folder / "lock").open("w"))
+            lock = stack.enter_context((folder / "planning").open("w"))
             fcntl.flock(lock, fcntl.LOCK_EX)
         yield
-
-
-def planned(plan: Callable[[tuple[str, ...]], T]) -> T:
-    """`plan` with the flags of a planner: of what is known, else measured, and kept for all."""
-    with suppress(RuntimeError):  # not known
-        return plan(("FFTW_MEASURE", "FFTW_WISDOM_ONLY"))
-    paths = _paths()
-    with _alone(paths[0].parent):
-        _take_in(paths)
-        before = pyfftw.export_wisdom()
-        found = plan(("FFTW_MEASURE",))
-        for path, old, new in zip(paths, before, pyfftw.export_wisdom(), strict=False):
-            if new == old:
-                continue
-            fresh = path.with_suffix(f".{os.getpid()}")
-            with suppress(OSError):  # a cache that cannot be written costs time only
-                fresh.write_bytes(new)
-                fresh.replace(path)
-    return found

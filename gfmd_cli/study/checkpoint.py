@@ -1,8 +1,8 @@
-"""The state of an unfinished solve on disk: two slots, the newer one named by a pointer.
+"""The state of an unfinished solve on disk: two slots and a pointer that names the newer one first.
 
-A slot holds the fields as they lie in memory (mapped, space reserved first); the pointer holds
-their checksums and all scalars, and is replaced as a whole once the slot is on the disk. So
-whatever happens while one slot is written, the other still stands.
+A slot holds the fields as they lie in memory (mapped, space reserved first). The pointer holds the
+checksums of both and all scalars, is sealed itself, and is replaced as a whole once a slot is on
+the disk. So whatever happens while one slot is written, the other still stands.
 """
 
 import json
@@ -10,8 +10,10 @@ import mmap
 import os
 import shutil
 import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -21,9 +23,11 @@ from gfmd_cli.physics.fields import Field
 from gfmd_cli.physics.grid import Grid
 from gfmd_cli.solvers.cascade import Resume
 from gfmd_cli.solvers.loop import State
-from gfmd_cli.study.files import write_whole
+from gfmd_cli.study.files import check_seal, locked, sealed, write_whole
 
 CHUNK = 2**26  # bytes that a checkpoint maps at a time
+LAYOUT = 2  # raised whenever an older state must not be gone on with
+SCALARS = ("exact", "residual", "step", "misses", "least", "transforms", "scalars")
 
 
 class Checkpoint:
@@ -31,104 +35,124 @@ class Checkpoint:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        self.pointer = folder / "pointer.json"
+        self.pointer = folder / "pointer"
+        self.mine = True
+        self.slots: list[dict[str, Any]] = []
+        """What the pointer says of the slots that are whole, the newer one first."""
+
+    @classmethod
+    @contextmanager
+    def held(cls, folder: Path) -> Iterator[Self]:
+        """The checkpoint for one process alone: a second one neither reads nor writes it."""
+        checkpoint = cls(folder)
+        with locked(folder / "lock", wait=False) as checkpoint.mine:
+            yield checkpoint
+
+    def restore(self) -> str | None:
+        """Take up what is saved and whole; say what is not, and set aside what cannot be used."""
+        if not (self.mine and self.pointer.exists()):
+            return None
+        said: list[dict[str, Any]] = []
+        try:
+            size = check_seal(self.pointer)
+            data = json.loads(self.pointer.read_bytes()[:size])
+            said = data["slots"] if data["layout"] == LAYOUT else []
+        except (OSError, ValueError, KeyError):
+            pass
+        self.slots = [slot for slot in said if self._is_whole(slot)]
+        if self.slots and self.slots[0] is said[0]:
+            return None
+        if self.slots:
+            return f"{self.folder}: the newest state is damaged; going on from the one before"
+        for path in (self.pointer, self.folder / "a", self.folder / "b"):
+            if path.exists():
+                path.replace(f"{self.folder}.{path.name}.bad")
+        return f"{self.folder}: no whole state; set aside as .bad, the task starts anew"
 
     def save(self, contact: Contact, state: State, spent: float, notes: Any = None) -> None:
         """Write the state; `spent` are the transforms of coarser grids.
 
         `notes` are plain data that go with it. Raises SpaceError.
         """
+        if not self.mine:
+            return
         fields = {"u": state.u, "sigma": state.sigma, **state.fields}
+        name = "a" if self.slots and self.slots[0]["name"] == "b" else "b"
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
-            slot = "a" if self._pointer().get("slot") == "b" else "b"
-            sums = _write_slot(self.folder / slot, list(fields.values()))
-            pointer = {
-                "slot": slot,
-                "points": contact.grid.points,
-                "spent": spent,
-                "notes": notes,
-                "exact": state.exact,
-                "residual": state.residual,
-                "step": state.step,
-                "misses": state.misses,
-                "least": state.least,
-                "transforms": state.transforms,
-                "scalars": state.scalars,
-                "fields": {
-                    name: [sum_, field.dtype.str]
-                    for (name, field), sum_ in zip(fields.items(), sums, strict=True)
-                },
-            }
-            write_whole(self.pointer, json.dumps(pointer).encode())
+            crc = _write_slot(self.folder / name, list(fields.values()))
         except OSError as error:
             raise SpaceError(f"{self.folder}: cannot be written: {error.strerror}") from error
+        slot = {
+            "name": name,
+            "crc": crc,
+            "bytes": sum(field.nbytes for field in fields.values()),
+            "points": contact.grid.points,
+            "spent": spent,
+            "notes": notes,
+            "state": {name: getattr(state, name) for name in SCALARS},
+            "fields": {name: field.dtype.str for name, field in fields.items()},
+        }
+        slots = [slot, *(old for old in self.slots[:1] if old["name"] != name)]
+        text = json.dumps({"layout": LAYOUT, "slots": slots})
+        write_whole(self.pointer, sealed(text.encode()))
+        self.slots = slots
 
     def load(self, grid: Grid) -> Resume | None:
-        """The saved state of a solve on `grid`, or None where there is none that is whole."""
-        pointer = self._pointer()
-        try:
-            level = Grid(pointer["points"], grid.dimension, grid.length, grid.threads)
-            fields = _read_slot(self.folder / pointer["slot"], level, pointer["fields"])
-            state = State(
-                u=fields.pop("u"),
-                sigma=fields.pop("sigma"),
-                exact=pointer["exact"],
-                residual=pointer["residual"],
-                step=pointer["step"],
-                misses=pointer["misses"],
-                least=pointer["least"],
-                transforms=pointer["transforms"],
-                scalars=pointer["scalars"],
-                fields=fields,
-            )
-        except (KeyError, TypeError, ValueError, OSError):
+        """The saved state of a solve on `grid`, or None where there is none."""
+        if not self.slots:
             return None
-        return Resume(pointer["points"], state, pointer["spent"])
+        slot = self.slots[0]
+        level = Grid(slot["points"], grid.dimension, grid.length, grid.threads)
+        fields = _read_slot(self.folder / slot["name"], level, slot["fields"])
+        state = State(fields.pop("u"), fields.pop("sigma"), fields=fields, **slot["state"])
+        return Resume(slot["points"], state, slot["spent"])
 
     def notes(self) -> Any:
         """The notes of the saved state, None where there are none."""
-        return self._pointer().get("notes")
+        return self.slots[0]["notes"] if self.slots else None
 
     def remove(self) -> None:
         """Forget the state: the task is done."""
-        shutil.rmtree(self.folder, ignore_errors=True)
+        if self.mine:
+            shutil.rmtree(self.folder, ignore_errors=True)
 
-    def _pointer(self) -> dict[str, Any]:
+    def _is_whole(self, slot: dict[str, Any]) -> bool:
+        total, size = 0, 0
         try:
-            data = json.loads(self.pointer.read_bytes())
-        except (OSError, ValueError):
-            return {}
-        return data if isinstance(data, dict) else {}
+            with (self.folder / slot["name"]).open("rb") as file:
+                while chunk := file.read(CHUNK):
+                    total, size = zlib.crc32(chunk, total), size + len(chunk)
+        except OSError:
+            return False
+        return bool(total == slot["crc"] and size == slot["bytes"])
 
 
-def _write_slot(path: Path, fields: list[Field]) -> list[int]:
-    """Lay the fields one after the other into a mapped file; return their checksums."""
+def _write_slot(path: Path, fields: list[Field]) -> int:
+    """Lay the fields one after the other into a mapped file; return the checksum of it."""
+    total = offset = 0
     with path.open("w+b") as file:
         os.posix_fallocate(file.fileno(), 0, sum(field.nbytes for field in fields))
         with mmap.mmap(file.fileno(), 0) as memory:
-            offset, sums = 0, []
             for field in fields:
                 content = np.ascontiguousarray(field).data.cast("B")
                 for start in range(0, field.nbytes, CHUNK):
                     chunk = content[start : start + CHUNK]
                     memory[offset : offset + len(chunk)] = chunk
                     offset += len(chunk)
+                    total = zlib.crc32(chunk, total)
                     memory.madvise(mmap.MADV_DONTNEED)  # the file has it: memory need not
-                sums.append(zlib.crc32(content))
             memory.flush()
         os.fsync(file.fileno())
-    return sums
+    return total
 
 
-def _read_slot(path: Path, grid: Grid, stored: dict[str, Any]) -> dict[str, Field]:
-    """The fields of a slot. Raises ValueError where one is not what was written."""
+def _read_slot(path: Path, grid: Grid, kinds: dict[str, str]) -> dict[str, Field]:
+    """The fields of a slot."""
     fields, offset = {}, 0
-    for name, (expected, kind) in stored.items():
+    for name, kind in kinds.items():
         field: Field = np.empty(grid.shape, kind)
         field[...] = np.memmap(path, kind, "r", offset, grid.shape)
         offset += field.nbytes
-        if zlib.crc32(field.data.cast("B")) != expected:
-            raise ValueError(f"{path}: field {name} is damaged")
         fields[name] = field
     return fields

@@ -106,7 +106,7 @@ def scene_of(surface: Any, elastomer: Any, points: int, threads: int) -> Scene:
 def solve_on_grids(
     task: Task,
     threads: int,
-    memory: float,
+    memory: tuple[float, bool],
     load: Callable[[Grid], Resume | None],
     notes: Any,
     note: Callable[[list[dict[str, Any]]], None],
@@ -116,7 +116,8 @@ def solve_on_grids(
 
     Parameters
     ----------
-    threads, memory : what may be used; memory [bytes] ends the growth of an "auto" grid
+    threads, memory : what may be used; memory [bytes] ends the growth of an "auto" grid, as an
+        error where its second part says so
     load, notes : reads the state of an unfinished solve, and what was noted with it
     note : told of the grids done before each solve
     watchers : `watch` and `enter_level` of `solve_contact`
@@ -183,15 +184,21 @@ def _after(task: Task, points: int) -> int:
     return 2 * points if task.auto else task.points
 
 
-def _goes_on(task: Task, solved: Solved, memory: float) -> bool:
-    """Whether a finer grid is to be solved after the present one."""
+def _goes_on(task: Task, solved: Solved, memory: tuple[float, bool]) -> bool:
+    """Whether a finer grid is to be solved after the present one. Raises InputError."""
     points = solved.contact.grid.points
     if not task.auto or task.accuracy is None:
         return points != task.points
     finer = _after(task, points)
-    fits = finer <= task.accuracy.max_points and task.bytes_on(finer) <= memory
     mendable = any(solved.estimates[name].verdict not in FINAL for name in _short(task, solved))
-    return mendable and fits and solved.solution.status == "converged"
+    wanted = mendable and finer <= task.accuracy.max_points
+    fits = task.bytes_on(finer) <= memory[0]
+    if wanted and not fits and memory[1]:
+        raise InputError(
+            f"accuracy: needs {finer} points per side, more than memory holds now; with "
+            f"--reproducible give accuracy.max_points = {points}"
+        )
+    return wanted and fits and solved.solution.status == "converged"
 
 
 def _short(task: Task, solved: Solved) -> list[str]:

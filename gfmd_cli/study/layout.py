@@ -1,11 +1,16 @@
 """The layout of a study file: its columns, and which of them `export` prints."""
 
-from typing import NamedTuple
+from math import nan
+from typing import Any, NamedTuple
 
 from gfmd_cli.physics.observables import QUANTITIES
 
-LAYOUT = 1
+LAYOUT = 2
 """Raised whenever a reader of the old layout would misread the new one."""
+LAYOUTS = (1, 2)
+"""Layouts that can be read. In 1 text was of variable length, without a checksum."""
+MISSING = "missing"
+"""Status of a task that is not solved yet."""
 BENCH = "bench_layout"
 """Attribute that a bench has in the place of a study's `layout`."""
 
@@ -88,3 +93,9 @@ FIELDS = (
     Column("sigma", float, "Pa", "compressive stress"),
     Column("height", float, "m", "height of the indenter"),
 )
+
+
+def empty_row() -> dict[str, Any]:
+    """A row that says nothing yet."""
+    blank: dict[type, Any] = {str: "", int: -1, float: nan}
+    return {column.name: blank[column.kind] for column in (*COLUMNS, *DISTRIBUTION)}

@@ -29,7 +29,10 @@ from gfmd_cli.study.spec import (
 )
 
 MAX_BYTES = 256 * 1024  # of a spec; a few kB are usual
-MAX_DEPTH = 16  # of tables and lists; tomllib takes memory with the square of it
+MAX_DEPTH = 16  # of tables and lists
+MAX_DOTS = 2000  # in a line; of a dotted key tomllib takes memory with their square
+MAX_SHOWN = 200  # characters of what was given, in a message
+MAX_PROBLEMS = 20  # of a spec that are told
 MAX_SWEEP = 100_000  # combinations of one table
 
 
@@ -104,15 +107,41 @@ class _Where:
 
 
 def _toml(text: str, name: str) -> dict[str, Any]:
-    """Parse TOML that is neither deep nor long."""
+    """Parse TOML that is neither deep nor long. Raises InputError."""
+    if len(text) > MAX_BYTES:
+        raise InputError(f"{name}: {len(text)} characters; at most {MAX_BYTES}")
     for number, line in enumerate(text.splitlines(), 1):
-        keys = line.split("=", 1)[0]
-        if keys.count(".") > MAX_DEPTH or line.count("[") > 10 * MAX_DEPTH:
-            raise InputError(f"{name}:{number}: nested deeper than {MAX_DEPTH}")
+        if line.count(".") > MAX_DOTS:
+            raise InputError(
+                f"{name}:{number}: {line.count('.')} dots in a line; at most {MAX_DOTS}: break it"
+            )
     try:
-        return tomllib.loads(text)
-    except (ValueError, RecursionError) as error:  # TOMLDecodeError is a ValueError
-        raise InputError(f"{name}: TOML syntax: {error or 'nested too deep'}") from error
+        data = tomllib.loads(text)
+    except RecursionError:
+        raise InputError(f"{name}: nested deeper than {MAX_DEPTH}") from None
+    except ValueError as error:  # TOMLDecodeError is one
+        raise InputError(f"{name}: TOML syntax: {_cut(str(error))}") from error
+    if _is_deep(data):
+        raise InputError(f"{name}: nested deeper than {MAX_DEPTH}")
+    return data
+
+
+def _is_deep(data: Any) -> bool:
+    """Whether tables and lists lie more than MAX_DEPTH within each other."""
+    level = [data]
+    for _ in range(MAX_DEPTH):
+        level = [
+            inner
+            for outer in level
+            for inner in (outer.values() if isinstance(outer, dict) else outer)
+            if isinstance(inner, dict | list)
+        ]
+    return bool(level)
+
+
+def _cut(text: str) -> str:
+    """A text short enough for a message."""
+    return text if len(text) <= MAX_SHOWN else text[:MAX_SHOWN] + "..."
 
 
 def _override(data: dict[str, Any], override: str, origin: dict[str, str]) -> None:
@@ -121,11 +150,11 @@ def _override(data: dict[str, Any], override: str, origin: dict[str, str]) -> No
     parts = key.strip().split(".")
     if not equals or not all(re.fullmatch(r"[\w\-]+", part) for part in parts):
         raise InputError(f"--set {override}: write key.name=value, such as load.p_star=0.1")
-    if len(parts) > MAX_DEPTH or len(value) > MAX_BYTES:
-        raise InputError(f"--set {key[:40]}...: nested too deep or too long")
+    if len(parts) > MAX_DEPTH:
+        raise InputError(f"--set {_cut(key)}: nested deeper than {MAX_DEPTH}")
     try:
-        parsed = tomllib.loads(f"value = {value.strip()}")["value"]
-    except (ValueError, RecursionError):
+        parsed = _toml(f"value = {value.strip()}", f"--set {key}")["value"]
+    except InputError:
         if not re.fullmatch(r"[\w./~+\-]+", value.strip()):
             raise InputError(f"--set {override}: {value!r} is no TOML value") from None
         parsed = value.strip()  # a bare word is a string
@@ -158,14 +187,16 @@ def build_spec(data: dict[str, Any], folder: Path, where: _Where) -> Spec:
             if isinstance(table, dict):
                 built += _build(name, table, folder, where, problems)
             else:
-                problems.append(f"{where(name)}: {name}: must be a table, got {table!r}")
+                problems.append(f"{where(name)}: {name}: must be a table, got {_cut(repr(table))}")
         distinct = list(dict.fromkeys(built)) if name in SWEPT else built
         tables[name] = distinct if name in SWEPT else next(iter(distinct), None)
     if "accuracy" not in data:
         tables["accuracy"] = None
     problems += _discord(tables, where)
     if problems:
-        raise InputError("\n".join(dict.fromkeys(problems)))
+        told = list(dict.fromkeys(problems))
+        more = [f"and {len(told) - MAX_PROBLEMS} more"] if len(told) > MAX_PROBLEMS else []
+        raise InputError("\n".join([*told[:MAX_PROBLEMS], *more]))
     return Spec(**tables)
 
 
@@ -244,12 +275,12 @@ def _problem(
         message = detail["msg"].removeprefix("Value error, ")
         message = message[:1].lower() + message[1:]
         given = detail["input"]
-        text = message if isinstance(given, dict) else f"{message}, got {given!r}"
+        text = message if isinstance(given, dict) else f"{message}, got {_cut(repr(given))}"
     return f"{where(key)}: {key}: {text}"
 
 
 def _unknown(given: str, known: list[str], what: str) -> str:
     """Message for a name that is not known, with the nearest known one."""
-    near = get_close_matches(given, known, 1, 0.5)
+    near = get_close_matches(given[:MAX_SHOWN], known, 1, 0.5)
     hint = f" - did you mean {near[0]!r}?" if near else ""
-    return f"unknown {what} {given!r}{hint} (known: {', '.join(known)})"
+    return f"unknown {what} {_cut(given)!r}{hint} (known: {', '.join(known)})"

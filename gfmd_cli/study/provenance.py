@@ -11,9 +11,23 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 import gfmd_cli
-from gfmd_cli.physics.wisdom import processor
+from gfmd_cli.physics.wisdom import plans, processor
+from gfmd_cli.study.spec import Spec, digest
 
 PACKAGES = ("numpy", "scipy", "pyFFTW", "h5py", "pydantic", "SurfaceTopography")
+
+
+def origin(spec: Spec, text: str) -> dict[str, str]:
+    """Attributes of a file: the spec that it was made from, and by what, where and when."""
+    resolved = spec.resolved()
+    return {
+        "Conventions": "CF-1.11",
+        "title": spec.study.name,
+        "spec": json.dumps(resolved),
+        "spec_digest": digest(resolved),
+        "spec_text": text,
+        **provenance(),
+    }
 
 
 def provenance() -> dict[str, str]:
@@ -28,6 +42,7 @@ def provenance() -> dict[str, str]:
                 "node": platform.node(),
                 "system": platform.platform(),
                 "processor": processor(),
+                "plans": plans(),
                 "cores": len(os.sched_getaffinity(0)),
                 "python": platform.python_version(),
                 "slurm_job": os.environ.get("SLURM_JOB_ID", ""),

@@ -1,18 +1,18 @@
-"""Records: what one task found, as a small HDF5 file that appears whole or not at all."""
+"""Records: what one task found, as a small sealed HDF5 file that appears whole or not at all."""
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import h5py
-import numpy as np
 
 from gfmd_cli.errors import StudyError
 from gfmd_cli.physics.fields import Field
 from gfmd_cli.physics.persson import Shells
-from gfmd_cli.study.files import write_whole
-from gfmd_cli.study.layout import COLUMNS, DISTRIBUTION, LAYOUT, SHELLS
+from gfmd_cli.study.files import check_seal, new_file, new_hdf5, seal
+from gfmd_cli.study.layout import COLUMNS, LAYOUT, SHELLS
 
 SUFFIX = ".record"
 
@@ -31,54 +31,49 @@ class Record:
     cross_section: Mapping[str, Field] = field(default_factory=dict)
 
 
+def record_path(folder: Path, task_id: str) -> Path:
+    """Where the record of a task lies."""
+    return folder / f"{task_id}{SUFFIX}"
+
+
 def write_record(folder: Path, record: Record) -> Path:
     """Commit a record to the folder of unfinished work. Raises SpaceError."""
-    with h5py.File("record", "w", driver="core", backing_store=False) as file:
-        file.attrs["layout"] = LAYOUT
-        file.attrs["task_id"] = record.task_id
-        for column in COLUMNS:
-            file.attrs[column.name] = column.kind(record.row[column.name])
-        for name, value in record.distribution.items():
-            file[f"distribution/{name}"] = value
-        for column in SHELLS:
-            _put(file, f"shells/{column.name}", getattr(record.shells, column.name))
-        for group in ("fields", "cross_section"):
-            for name, values in getattr(record, group).items():
-                _put(file, f"{group}/{name}", values)
-        file.attrs["complete"] = True
-        file.flush()
-        image = file.id.get_file_image()
-    path = folder / f"{record.task_id}{SUFFIX}"
-    write_whole(path, image)
+    path = record_path(folder, record.task_id)
+    with new_file(path) as fresh:
+        with new_hdf5(fresh) as file:
+            file.attrs["layout"] = LAYOUT
+            file.attrs["task_id"] = record.task_id
+            row = {column.name: column.kind(record.row[column.name]) for column in COLUMNS}
+            file.attrs["row"] = json.dumps(row)
+            for group in ("distribution", "fields", "cross_section"):
+                for name, values in getattr(record, group).items():
+                    file[f"{group}/{name}"] = values
+            for column in SHELLS:
+                file[f"shells/{column.name}"] = getattr(record.shells, column.name)
+        seal(fresh)
     return path
 
 
-def _put(file: Any, name: str, values: Field) -> None:
-    """A dataset whose every chunk carries a checksum."""
-    file.create_dataset(name, data=values, fletcher32=values.size > 0)
+def read_record(path: Path, *, with_fields: bool = True) -> Record:
+    """Read one record, or all of it but its fields.
 
-
-def read_record(path: Path) -> Record:
-    """Read one record. Raises StudyError where it is damaged or of another layout."""
+    Raises StudyError where a bit of it has changed or it is of another layout.
+    """
+    groups = ("distribution", "cross_section", *(("fields",) if with_fields else ()))
     try:
+        check_seal(path)
         with h5py.File(path, "r", locking=False) as file:
-            if file.attrs["layout"] != LAYOUT or not file.attrs["complete"]:
-                raise StudyError(f"{path}: written with layout {file.attrs['layout']}")
-            groups = {
+            if file.attrs["layout"] != LAYOUT:
+                raise StudyError(f"{path}: a record of layout {file.attrs['layout']}, not {LAYOUT}")
+            read = {
                 group: {name: data[()] for name, data in file.get(group, {}).items()}
-                for group in ("distribution", "fields", "cross_section")
+                for group in groups
             }
             return Record(
                 task_id=file.attrs["task_id"],
-                row={c.name: c.kind(file.attrs[c.name]) for c in COLUMNS},
+                row=json.loads(file.attrs["row"]),
                 shells=Shells(*(file[f"shells/{c.name}"][()] for c in SHELLS)),
-                **groups,
+                **read,
             )
     except (OSError, KeyError, RuntimeError, ValueError) as error:
         raise StudyError(f"{path}: damaged record: {error}") from error
-
-
-def empty_row() -> dict[str, Any]:
-    """A row that says nothing yet."""
-    blank: dict[type, Any] = {str: "", int: -1, float: np.nan}
-    return {column.name: blank[column.kind] for column in (*COLUMNS, *DISTRIBUTION)}

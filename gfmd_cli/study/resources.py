@@ -10,6 +10,10 @@ from gfmd_cli.study.tasks import Task
 THREADED_POINTS = 1024  # per side; below it a second thread costs more than it brings (measured)
 HEADROOM = 0.9  # share of the available memory that a run may plan with
 POOL_SECONDS = 3.0  # below this much work, starting worker processes costs more than it brings
+DISK_SPEED = 1e8  # bytes a second; slower than most
+STATE_FIELDS = 4  # u, sigma and what solvers remember beside them
+STEP = 1e-7  # seconds per grid point that a step takes at the most, on one thread
+SECONDS_TO_END = 2.0  # of worker processes and small files
 
 
 def available_cores() -> int:
@@ -44,7 +48,8 @@ def available_memory() -> float:
 def check_memory(tasks: list[Task]) -> None:
     """Raise InputError, before anything is allocated, where one task alone does not fit."""
     memory = available_memory()
-    taken, points = max((task.bytes_on(task.least_points), task.least_points) for task in tasks)
+    needs = ((task.bytes_on(task.least_points), task.least_points) for task in tasks)
+    taken, points = max(needs, default=(0.0, 0))
     if taken > HEADROOM * memory:
         raise InputError(
             f"grid.points: {points} points per side take {_gib(taken)} of memory, "
@@ -52,12 +57,15 @@ def check_memory(tasks: list[Task]) -> None:
         )
 
 
-def share_out(tasks: list[Task], jobs: int | None) -> tuple[int, int]:
+def share_out(tasks: list[Task], jobs: int | None, reproducible: bool = False) -> tuple[int, int]:
     """Worker processes and threads of each, for these tasks.
 
     One process for each core as long as tasks and memory last, one thread each; where the tasks
-    are fewer than the cores, large grids use the cores left over in their transforms.
+    are fewer than the cores, large grids use the cores left over in their transforms; not where
+    the run is to be `reproducible`, as that may change the last bits.
     """
+    if not tasks:
+        return 1, 1
     cores = available_cores()
     largest = max(task.bytes for task in tasks)
     if jobs is None:
@@ -66,7 +74,16 @@ def share_out(tasks: list[Task], jobs: int | None) -> tuple[int, int]:
         if sum(task.seconds for task in tasks) < POOL_SECONDS:
             jobs = 1
     points = max(task.points for task in tasks)
-    return jobs, max(1, cores // jobs) if points >= THREADED_POINTS else 1
+    threaded = points >= THREADED_POINTS and not reproducible
+    return jobs, max(1, cores // jobs) if threaded else 1
+
+
+def seconds_to_stop(tasks: list[Task], jobs: int) -> float:
+    """Time that it takes, at the most, to end a step, save every state and collect."""
+    largest = max(tasks, key=lambda task: task.size)
+    state = 8.0 * largest.size * STATE_FIELDS * jobs
+    collected = 8.0 * sum(task.size * len(task.output.fields) for task in tasks)
+    return SECONDS_TO_END + STEP * largest.size + (state + collected) / DISK_SPEED
 
 
 def _gib(count: float) -> str:

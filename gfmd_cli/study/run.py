@@ -1,21 +1,32 @@
 """Run a spec: what is missing is solved, task by task, on one or more processes."""
 
+import faulthandler
 import multiprocessing
 import os
 import signal
+import sys
 from collections import Counter
 from collections.abc import Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from itertools import chain
 from pathlib import Path
-from threading import Thread
-from typing import Any
+from threading import Thread, Timer
+from typing import Any, NamedTuple
 
-from gfmd_cli.errors import GfmdError, Interrupted
+from gfmd_cli.errors import GfmdError, Interrupted, SpaceError, StudyError
+from gfmd_cli.physics import wisdom
 from gfmd_cli.study import solve
-from gfmd_cli.study.record import SUFFIX
-from gfmd_cli.study.resources import HEADROOM, available_memory, check_memory, share_out
+from gfmd_cli.study.grids import scene_of
+from gfmd_cli.study.record import read_record, record_path
+from gfmd_cli.study.resources import (
+    HEADROOM,
+    available_memory,
+    check_memory,
+    seconds_to_stop,
+    share_out,
+)
 from gfmd_cli.study.solve import Progress, Report, solve_task
 from gfmd_cli.study.spec import Spec
 from gfmd_cli.study.store import Study
@@ -23,6 +34,17 @@ from gfmd_cli.study.tasks import Task, plan
 
 CHECKPOINT_EVERY = 600.0  # seconds
 SIGNALS = (signal.SIGTERM, signal.SIGINT, signal.SIGUSR1, signal.SIGUSR2)
+
+
+class Means(NamedTuple):
+    """How to solve a task."""
+
+    threads: int
+    checkpoint_every: float
+    """Seconds."""
+    memory: float
+    """Bytes that it may take."""
+    reproducible: bool
 
 
 def run_study(
@@ -34,6 +56,8 @@ def run_study(
     shard: tuple[int, int] = (0, 1),
     jobs: int | None = None,
     checkpoint_every: float = CHECKPOINT_EVERY,
+    max_seconds: float | None = None,
+    reproducible: bool = False,
 ) -> Counter[str]:
     """Solve the tasks of this shard that the study does not hold yet, and collect all records.
 
@@ -44,10 +68,12 @@ def run_study(
     report : told of every start, step and end of a task
     shard : (i, n) takes the tasks with index i modulo n
     jobs : worker processes, by default as many as cores, memory and tasks suggest
+    max_seconds : wall time after which it has ended as a signal ends it
+    reproducible : plan transforms without measuring, one thread a task
 
     Returns how many tasks of this shard ended in which status ("failed": raised an error).
     Raises InputError for a spec that does not fit the study or the machine, SpaceError, and
-    Interrupted after a signal, when all states are saved.
+    Interrupted after a signal or the time given, when all states are saved.
     """
     study = Study(path)
     study.check_spec(spec)
@@ -56,56 +82,81 @@ def run_study(
     share = [task for task in tasks if task.index % shard[1] == shard[0]]
     pending = [task for task in share if task.id not in held]
     outcome = Counter(held[task.id] for task in share if task.id in held)
-    uncollected = any(study.parts.glob(f"*{SUFFIX}"))
-    if pending:
-        check_memory(pending)
-        with _signals_noted():
-            study.begin(spec)
-            try:
-                outcome += _solve_all(pending, study.parts, report, jobs, checkpoint_every)
-            finally:
-                study.collect(spec, tasks, text)
-            if solve.stop.is_set():
-                left = len(share) - sum(outcome.values())
-                raise Interrupted(f"stopped by a signal; {left} tasks left, call again to go on")
-    elif uncollected:
-        study.collect(spec, tasks, text)
-    return outcome
+    if not pending and not study.uncollected():
+        return outcome
+    check_memory(pending)
+    jobs, threads = share_out(pending, jobs, reproducible)
+    memory = HEADROOM * available_memory() / jobs
+    means = Means(threads, checkpoint_every, memory, reproducible)
+    seconds = _time_to_work(max_seconds, pending, jobs)
+    with _signals_noted(), _timer(seconds), study.work(spec) as damaged:
+        _warn(report, damaged, _plan_afresh(study.parts, means))
+        try:
+            solved = _solve_all(pending, study.parts, report, jobs, means)
+        finally:
+            _warn(report, study.collect(spec, tasks, text))
+            wisdom.plan_with(None)
+        _check_ended(solved, len(pending))
+    return outcome + solved
+
+
+def _check_ended(solved: Counter[str], asked: int) -> None:
+    """Raise SpaceError or Interrupted where that ended the run."""
+    if lacking := solved["no space"]:
+        raise SpaceError(f"no space for the results of {lacking} tasks; make some, call again")
+    left = asked - sum(solved.values())
+    if solve.stop.is_set() and left:
+        raise Interrupted(f"stopped, states saved; {left} tasks left, call again to go on")
+
+
+def _plan_afresh(parts: Path, means: Means) -> list[str]:
+    """Plan as this run is to, whatever this process did before; what is wrong with old plans."""
+    scene_of.cache_clear()
+    note = wisdom.plan_with(parts, estimated=means.reproducible)
+    return [note] if note else []
+
+
+def _warn(report: Report, *notes: list[str]) -> None:
+    for note in chain.from_iterable(notes):
+        report(Progress(-1, "warning", "", note=note))
 
 
 def _solve_all(
-    pending: list[Task], parts: Path, report: Report, jobs: int | None, every: float
+    pending: list[Task], parts: Path, report: Report, jobs: int, means: Means
 ) -> Counter[str]:
-    jobs, threads = share_out(pending, jobs)
-    memory = HEADROOM * available_memory() / jobs
     if jobs > 1:
-        return _solve_in_pool(pending, parts, report, jobs, (threads, every, memory))
+        return _solve_in_pool(pending, parts, report, jobs, means)
     outcome: Counter[str] = Counter()
     for task in pending:
-        if solve.stop.is_set():
-            break
-        status = _attempt(task, parts, report, (threads, every, memory))
-        if status != "interrupted":
-            outcome[status] += 1
+        outcome[_attempt(task, parts, report, means)] += 1
+    del outcome["interrupted"]
     return outcome
 
 
-Means = tuple[int, float, float]
-"""Of one task: threads, seconds between checkpoints, memory [bytes]."""
-
-
 def _attempt(task: Task, parts: Path, report: Report, means: Means) -> str:
-    """Solve one task; an error ends this task only."""
-    threads, every, memory = means
+    """Solve one task, unless another process has just done so; an error ends this task only."""
+    if solve.stop.is_set():
+        return "interrupted"
+    with suppress(StudyError):
+        found = read_record(record_path(parts, task.id), with_fields=False)
+        return str(found.row["status"])
     try:
-        return solve_task(task, parts, threads, report, every, memory)
+        return solve_task(
+            task,
+            parts,
+            means.threads,
+            report,
+            means.checkpoint_every,
+            means.memory,
+            fixed=means.reproducible,
+        )
     except Interrupted:
         report(Progress(task.index, "interrupted", task.label))
         return "interrupted"
     except (GfmdError, MemoryError, ArithmeticError, OSError) as error:
         reason = str(error) or type(error).__name__
         report(Progress(task.index, "failed", task.label, note=reason))
-        return "failed"
+        return "no space" if isinstance(error, SpaceError) else "failed"
 
 
 def _solve_in_pool(
@@ -117,11 +168,15 @@ def _solve_in_pool(
     listener = Thread(target=_listen, args=(reports, report), daemon=True)
     listener.start()
     outcome: Counter[str] = Counter()
-    with ProcessPoolExecutor(jobs, context, _begin_worker, (reports,)) as pool:
+    begin = (_begin_worker, (reports, parts, means))
+    with ProcessPoolExecutor(jobs, context, *begin) as pool:
+        # a worker that begins keeps a signal for when it can note it
+        signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
         futures = {
             pool.submit(_work, task, parts, means): task
             for task in sorted(pending, key=lambda task: -task.seconds)
         }
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
         for task, status in _as_they_end(futures, pool):
             if status == "killed":
                 reason = "its worker process was killed (out of memory?)"
@@ -161,15 +216,49 @@ def _listen(reports: Any, report: Report) -> None:
 _reports: Any = None  # of a worker process, to the one that prints
 
 
-def _begin_worker(reports: Any) -> None:
+def _begin_worker(reports: Any, parts: Path, means: Means) -> None:
     global _reports
     _reports = reports
+    faulthandler.enable(sys.__stderr__ or 2)
+    wisdom.plan_with(parts, estimated=means.reproducible)
+    Thread(target=_end_with_parent, daemon=True).start()
     for number in SIGNALS:
         signal.signal(number, lambda *_: solve.stop.set())
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
+
+
+def _end_with_parent() -> None:
+    """No worker outlives a run that was killed."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
 
 
 def _work(task: Task, parts: Path, means: Means) -> str:
     return _attempt(task, parts, _reports.put, means)
+
+
+def _time_to_work(max_seconds: float | None, pending: list[Task], jobs: int) -> float | None:
+    """Seconds after which to stop, so that all is saved and collected within `max_seconds`."""
+    if max_seconds is None or not pending:
+        return None
+    return max(max_seconds / 2, max_seconds - seconds_to_stop(pending, jobs))
+
+
+@contextmanager
+def _timer(seconds: float | None) -> Iterator[None]:
+    """Inside, an orderly stop is asked for after so much time, whatever the clock says."""
+    if seconds is None:
+        yield
+        return
+    timer = Timer(seconds, solve.stop.set)
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
 
 
 @contextmanager

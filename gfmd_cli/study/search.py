@@ -42,7 +42,7 @@ class Trial(NamedTuple):
 def solve_task_on_grids(
     task: Task,
     threads: int,
-    memory: float,
+    memory: tuple[float, bool],
     load: Callable[[Grid], Resume | None],
     notes: Any,
     note: Callable[[Any], None],

@@ -9,14 +9,15 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from gfmd_cli.errors import Interrupted
+from gfmd_cli.errors import Interrupted, SpaceError
 from gfmd_cli.physics.contact import Contact
 from gfmd_cli.physics.observables import cross_section, stress_distribution
+from gfmd_cli.solvers.cascade import Solution
 from gfmd_cli.solvers.loop import State
 from gfmd_cli.study.checkpoint import Checkpoint
 from gfmd_cli.study.grids import Solved
-from gfmd_cli.study.layout import PR_LINEAR, PR_LOGARITHMIC
-from gfmd_cli.study.record import Record, empty_row, write_record
+from gfmd_cli.study.layout import PR_LINEAR, PR_LOGARITHMIC, empty_row
+from gfmd_cli.study.record import Record, write_record
 from gfmd_cli.study.search import solve_task_on_grids
 from gfmd_cli.study.tasks import Task
 
@@ -29,14 +30,14 @@ class Progress(NamedTuple):
     """A word on one task."""
 
     task: int
-    event: Literal["start", "step", "done", "failed", "interrupted"]
+    event: Literal["start", "step", "done", "failed", "interrupted", "warning"]
     label: str
     points: int = 0
     step: int = 0
     residual: float = float("nan")
     a_r: float = float("nan")
     note: str = ""
-    """Status of a task that is done, the reason of one that failed."""
+    """Status of a task that is done, the reason of one that failed, what there is to warn of."""
 
 
 Report = Callable[[Progress], None]
@@ -72,11 +73,20 @@ class _Watcher:
                     self.task.index, "step", self.task.label, points, step, state.residual, area
                 )
             )
-        if stop.is_set() or now - self.last_save > self.every:
-            self.checkpoint.save(contact, state, self.spent, self.notes)
-            self.last_save = now
         if stop.is_set():
+            self.checkpoint.save(contact, state, self.spent, self.notes)
             raise Interrupted(f"{self.task.label}: stopped, state saved")
+        if now - self.last_save > self.every:
+            try:
+                self.checkpoint.save(contact, state, self.spent, self.notes)
+            except SpaceError as error:  # the solve can do without
+                self.warn(str(error))
+            self.last_save = time.monotonic()
+
+    def warn(self, note: str | None) -> None:
+        """Say what went wrong with the checkpoint, if anything did."""
+        if note is not None:
+            self.report(Progress(self.task.index, "warning", self.task.label, note=note))
 
 
 def solve_task(
@@ -86,44 +96,46 @@ def solve_task(
     report: Report,
     checkpoint_every: float,
     memory: float = np.inf,
+    fixed: bool = False,
 ) -> str:
     """Solve one task and commit its record; return its status.
 
-    `memory` [bytes] limits how far an "auto" grid may grow. Raises Interrupted after the state was
-    saved, InputError, SpaceError.
+    `memory` [bytes] limits how far an "auto" grid may grow; where `fixed`, to reach that limit is
+    an error instead. Raises Interrupted after the state was saved, InputError, SpaceError.
     """
     report(Progress(task.index, "start", task.label))
     begun = time.perf_counter()
-    checkpoint = Checkpoint(parts / task.id)
-    watcher = _Watcher(task, checkpoint, report, checkpoint_every, last_save=time.monotonic())
-    solved = solve_task_on_grids(
-        task,
-        threads,
-        memory,
-        checkpoint.load,
-        checkpoint.notes(),
-        watcher.note,
-        watch=watcher,
-        enter_level=watcher.enter_level,
-    )
-    solution = solved.solution
-    record = _record(task, solved, time.perf_counter() - begun)
-    write_record(parts, record)
-    checkpoint.remove()
-    row = record.row
-    report(
-        Progress(
-            task.index,
-            "done",
-            task.label,
-            row["points"],
-            solution.steps,
-            solution.residual,
-            row["a_r"],
-            solution.status,
+    with Checkpoint.held(parts / task.id) as checkpoint:
+        watcher = _Watcher(task, checkpoint, report, checkpoint_every, last_save=time.monotonic())
+        watcher.warn(checkpoint.restore())
+        solved = solve_task_on_grids(
+            task,
+            threads,
+            (memory, fixed),
+            checkpoint.load,
+            checkpoint.notes(),
+            watcher.note,
+            watch=watcher,
+            enter_level=watcher.enter_level,
         )
+        record = _record(task, solved, time.perf_counter() - begun)
+        write_record(parts, record)
+        checkpoint.remove()
+    report(_done(task, record, solved.solution))
+    return solved.solution.status
+
+
+def _done(task: Task, record: Record, solution: Solution) -> Progress:
+    return Progress(
+        task.index,
+        "done",
+        task.label,
+        record.row["points"],
+        solution.steps,
+        solution.residual,
+        record.row["a_r"],
+        solution.status,
     )
-    return solution.status
 
 
 def _record(task: Task, solved: Solved, seconds: float) -> Record:

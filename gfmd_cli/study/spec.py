@@ -198,9 +198,14 @@ class Spec(Choice):
 
 
 def file_digest(path: Path) -> str:
-    """SHA-256 of a file's content."""
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
+    """SHA-256 of a file's content. Raises InputError where it cannot be read."""
+    if not path.is_file():
+        raise InputError(f"{path}: no such file, or not a regular one")
+    try:
+        with path.open("rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror}") from error
 
 
 def digest(data: Any) -> str:

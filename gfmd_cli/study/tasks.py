@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from itertools import product
+from math import prod
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +27,7 @@ LAST = {"a_r": LAST_LINE, "u_g": 4.0, "sigma_p": LAST_STRESS}
 """Exponents n up to which a quantity has a continuum value to come near to."""
 SYMBOLS = {"p_star": "p*", "pressure": "p", "contact_area": "a_r", "mean_gap": "u_g"}
 SEARCH = 4.5  # solves that a search of the pressure takes, those on coarser grids included
+MAX_TASKS = 100_000  # of a study; more are a slip of the pen
 SECONDS_PER_PAIR = 1.7e-8
 """Per grid point and pair of transforms, with all work between two of them, on one thread."""
 
@@ -188,6 +190,10 @@ def plan(spec: Spec) -> list[Task]:
 
     Raises InputError where a grid does not resolve its surface or a file is unfit.
     """
+    loads = spec.load.values()
+    swept: tuple[list[Any], ...] = (spec.surface, spec.elastomer, spec.grid, spec.solver, loads)
+    if (count := prod(len(values) for values in swept)) > MAX_TASKS:
+        raise InputError(f"the sweeps make {count} tasks; at most {MAX_TASKS} fit into a study")
     for surface, grid in product(spec.surface, spec.grid):
         needed = surface.smallest_grid()
         if grid.points != "auto" and grid.points < needed:
@@ -203,7 +209,7 @@ def plan(spec: Spec) -> list[Task]:
     for places in product(*(range(len(resolved[name])) for name in tables)):
         parts = {name: resolved[name][i] for name, i in zip(tables, places, strict=True)}
         s, e, g, m = places
-        for load in spec.load.values():
+        for load in loads:
             content = [parts, resolved["load"] | {quantity: load}, resolved["output"]]
             if spec.accuracy is not None:
                 content.append(resolved["accuracy"])

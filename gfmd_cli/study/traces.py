@@ -11,11 +11,12 @@ import numpy as np
 
 from gfmd_cli.errors import InputError, SpaceError, StudyError
 from gfmd_cli.physics.fields import Field
-from gfmd_cli.study.files import write_whole
+from gfmd_cli.physics.hdf5 import take
+from gfmd_cli.study.files import new_file, new_hdf5
 from gfmd_cli.study.labelled import dataset, scale
 from gfmd_cli.study.layout import BENCH, Column
+from gfmd_cli.study.provenance import origin
 from gfmd_cli.study.spec import Spec, refuse_other
-from gfmd_cli.study.store import origin
 
 BENCH_LAYOUT = 1
 SAMPLES = (
@@ -84,9 +85,7 @@ def check_target(path: Path, spec: Spec) -> None:
 
 def write_bench(path: Path, spec: Spec, text: str, traces: list[Trace]) -> None:
     """Write a bench file, a group for each trace, whole or not at all. Raises SpaceError."""
-    with h5py.File(
-        "bench", "w", driver="core", backing_store=False, libver=("earliest", "v110")
-    ) as file:
+    with new_file(path) as fresh, new_hdf5(fresh) as file:
         file.attrs.update({BENCH: BENCH_LAYOUT, **origin(spec, text)})
         for number, trace in enumerate(traces):
             group = file.create_group(f"runs/{number}")
@@ -95,9 +94,6 @@ def write_bench(path: Path, spec: Spec, text: str, traces: list[Trace]) -> None:
             sample = scale(group, "sample", np.arange(size), "1", "index of the sample")
             for column in SAMPLES:
                 dataset(group, column, trace.samples[column.name], [sample])
-        file.flush()
-        image = file.id.get_file_image()
-    write_whole(path, image)
 
 
 def read_bench(path: Path) -> list[Trace]:
@@ -110,7 +106,7 @@ def read_bench(path: Path) -> list[Trace]:
             return [
                 Trace(
                     {name: _plain(value) for name, value in group.attrs.items()},
-                    {column.name: group[column.name][()] for column in SAMPLES},
+                    {column.name: take(group, column.name)[()] for column in SAMPLES},
                 )
                 for group in groups
             ]

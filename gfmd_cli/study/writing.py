@@ -1,0 +1,148 @@
+"""Laying out a study file: attributes, columns, distributions, scenes, fields."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gfmd_cli.physics.observables import linear_edges, logarithmic_edges
+from gfmd_cli.study.labelled import dataset, scale
+from gfmd_cli.study.layout import (
+    COLUMNS,
+    DISTRIBUTION,
+    FIELDS,
+    LAYOUT,
+    MISSING,
+    PR_LINEAR,
+    PR_LOGARITHMIC,
+    SHELLS,
+    Column,
+    empty_row,
+)
+from gfmd_cli.study.provenance import origin
+from gfmd_cli.study.reading import (
+    ATTRIBUTES_SUM,
+    attributes_sum,
+    fields_of,
+    rows_of,
+    shells_of,
+    texts_of,
+)
+from gfmd_cli.study.record import Record, read_record, record_path
+from gfmd_cli.study.spec import Spec
+from gfmd_cli.study.tasks import Task
+
+
+def write_study(
+    file: Any,
+    spec: Spec,
+    tasks: list[Task],
+    text: str,
+    found: dict[str, Record],
+    parts: Path,
+    old: Any,
+) -> None:
+    """Lay out the whole study: attributes, columns, distributions, scenes, fields.
+
+    Parameters
+    ----------
+    file : the new file
+    text : the spec as it was given
+    found, parts : records by task id, without fields, and the folder that has them whole
+    old : the study so far, open, or None; it gives what no record does
+
+    Fields are read and written one task at a time. Raises SpaceError, StudyError.
+    """
+    file.attrs.update({"layout": LAYOUT, **origin(spec, text)})
+    file.attrs[ATTRIBUTES_SUM] = attributes_sum(file)
+    kept = _old_rows(old, {task.id for task in tasks} - set(found))
+    rows = [_row(task, found, kept) for task in tasks]
+    scenes = _scene_numbers(tasks)
+    task = scale(file, "task", np.arange(len(tasks)), "1", "index of the task")
+    for column in (*COLUMNS, *(DISTRIBUTION if spec.output.histogram else ())):
+        dataset(file, column, [row[column.name] for row in rows], [task])
+    dataset(file, Column("task_id", str, "", "task by its content"), [t.id for t in tasks], [task])
+    dataset(file, Column("scene", int, "1", "group of /scenes"), scenes, [task])
+    if spec.output.histogram:
+        _write_distributions(file, task, rows)
+    for solved, scene, row in zip(tasks, scenes, rows, strict=True):
+        if solved.id in found:
+            record = found[solved.id]
+            if spec.output.fields:
+                record = read_record(record_path(parts, solved.id))
+            _write_extras(file, solved.index, scene, record)
+        elif old is not None and row["status"] != MISSING:
+            _write_extras(file, solved.index, scene, _old_record(old, solved, scene, row))
+
+
+def _row(task: Task, records: dict[str, Record], kept: dict[str, dict[str, Any]]) -> dict[str, Any]:
+    if task.id in records:
+        return empty_row() | dict(records[task.id].row) | dict(records[task.id].distribution)
+    return kept.get(task.id) or empty_row() | {"status": MISSING}
+
+
+def _old_rows(old: Any, wanted: set[str]) -> dict[str, dict[str, Any]]:
+    """Rows of the former study file by task id."""
+    if old is None:
+        return {}
+    rows = zip(texts_of(old, "task_id"), rows_of(old), strict=True)
+    return {i: row for i, row in rows if i in wanted}
+
+
+def _old_record(old: Any, task: Task, scene: int, row: dict[str, Any]) -> Record:
+    """What the former study file holds of a task."""
+    return Record(
+        task_id=task.id,
+        row=row,
+        shells=shells_of(old, scene),
+        fields=fields_of(old, f"fields/{task.index}"),
+        cross_section=fields_of(old, f"cross_sections/{task.index}"),
+    )
+
+
+def _scene_numbers(tasks: list[Task]) -> list[int]:
+    """Tasks that share surface, elastomer and grid share a scene."""
+    numbers: dict[Any, int] = {}
+    return [
+        numbers.setdefault(
+            (task.surface, task.elastomer, "auto" if task.auto else task.points), len(numbers)
+        )
+        for task in tasks
+    ]
+
+
+def _write_distributions(file: Any, task: Any, rows: list[dict[str, Any]]) -> None:
+    linear, logarithmic = linear_edges(), logarithmic_edges()
+    for name, axis, edges, middle in (
+        (PR_LINEAR, "sigma", linear, 0.5 * (linear[1:] + linear[:-1])),
+        (PR_LOGARITHMIC, "sigma_log", logarithmic, np.sqrt(logarithmic[1:] * logarithmic[:-1])),
+    ):
+        labels = scale(file, axis, middle, "1", "middle of the stress bin / Delta_sigma")
+        labels.attrs["edges"] = edges
+        blank = np.full(edges.size - 1, np.nan)
+        density = np.array([row.get(name, blank) for row in rows])
+        dataset(file, Column(name, float, "1", "Pr(sigma) Delta_sigma"), density, [task, labels])
+
+
+def _write_extras(file: Any, index: int, scene: int, record: Record) -> None:
+    """The scene's spectrum, the fields and the cross-section of one task."""
+    if f"scenes/{scene}" not in file:
+        group = file.create_group(f"scenes/{scene}")
+        shell = scale(group, "shell", np.arange(record.shells.q.size), "1", "shell")
+        for column in SHELLS:
+            dataset(group, column, getattr(record.shells, column.name), [shell])
+    for place, values in (("fields", record.fields), ("cross_sections", record.cross_section)):
+        if values:
+            group = file.create_group(f"{place}/{index}")
+            _write_fields(group, dict(values), record.row["length"])
+
+
+def _write_fields(group: Any, fields: dict[str, Any], length: float) -> None:
+    first = next(iter(fields.values()))
+    axes = [
+        scale(group, name, np.arange(size) * (length / size), "m", f"position along {name}")
+        for name, size in zip(("y", "x")[-first.ndim :], first.shape, strict=True)
+    ]
+    for column in FIELDS:
+        if column.name in fields:
+            dataset(group, column, fields[column.name], axes)

@@ -1,0 +1,111 @@
+"""Cut off or with a bit flipped: found out, or without effect; never a wrong number."""
+
+import random
+import shutil
+from collections import Counter
+
+import numpy as np
+
+from gfmd_cli.errors import GfmdError
+from gfmd_cli.physics.grid import Grid
+from gfmd_cli.solvers.loop import State
+from gfmd_cli.study.checkpoint import Checkpoint
+from gfmd_cli.study.reading import fields_of, open_study, read_rows, read_shells
+from gfmd_cli.study.record import Record, read_record, write_record
+
+CUTS, FLIPS = 200, 500
+
+
+def damaged(content, seed):
+    """Copies that are cut off, and copies with one bit changed."""
+    rng = random.Random(seed)
+    for _ in range(CUTS):
+        yield content[: rng.randrange(len(content))]
+    for _ in range(FLIPS):
+        changed = bytearray(content)
+        changed[rng.randrange(len(content))] ^= 1 << rng.randrange(8)
+        yield bytes(changed)
+
+
+def count(path, copy, read, seed=0):
+    """How many damaged copies are refused, and how many read as before; no other outcome."""
+    content, met = path.read_bytes(), Counter()
+    before = read(path)
+    for bad in damaged(content, seed):
+        copy.write_bytes(bad)
+        try:
+            found = read(copy)
+        except GfmdError as error:
+            met["refused" if str(copy) in str(error) else "without its name"] += 1
+            continue
+        np.testing.assert_equal(found, before)
+        met["harmless"] += 1
+    print(path.name, dict(met))
+    return met
+
+
+def test_damaged_records_are_refused(folder, gfmd):
+    gfmd(folder, "run", "spec.toml", "-j", "1", "-q", "-o", "study.h5")
+    row = read_rows(folder / "study.h5")[2]
+    shells = read_shells(folder / "study.h5", row["scene"])
+    names = ("pr_sigma", "pr_sigma_log", "pr_zero", "pr_beyond")
+    distribution = {name: row[name] for name in names}
+    u = np.random.default_rng(0).normal(size=(64, 64))
+    record = Record("0" * 16, row, shells, distribution, {"u": u}, {"u": u[0]})
+    path = write_record(folder, record)
+    met = count(path, folder / "copy.record", lambda path: vars(read_record(path)))
+    assert met == {"refused": CUTS + FLIPS}
+
+
+def test_damaged_studies_are_refused_or_read_as_before(folder, gfmd):
+    gfmd(folder, "run", "spec.toml", "-j", "1", "-q", "-o", "study.h5")
+
+    def read(path):
+        rows = read_rows(path)
+        with open_study(path) as file:
+            fields = [fields_of(file, f"fields/{row['task']}") for row in rows]
+            attributes = {name: str(value) for name, value in file.attrs.items()}
+        return rows, fields, attributes, [vars(read_shells(path, i)) for i in range(2)]
+
+    met = count(folder / "study.h5", folder / "copy.h5", read)
+    assert met["refused"] > FLIPS
+    assert met["refused"] + met["harmless"] == CUTS + FLIPS
+
+
+def test_a_damaged_checkpoint_gives_an_older_state_or_none(tmp_path):
+    grid, rng = Grid(16), np.random.default_rng(0)
+
+    class Contact:
+        pass
+
+    contact = Contact()
+    contact.grid = grid
+    states = []
+    with Checkpoint.held(tmp_path / "c") as checkpoint:
+        for step in (1, 2):
+            state = State(rng.random((16, 16)), rng.random((16, 16)), step=step)
+            checkpoint.save(contact, state, 0.0, [step])
+            states.append(state.u)
+    met = Counter()
+    for name in ("a", "b", "pointer"):
+        content = (tmp_path / "c" / name).read_bytes()
+        for bad in damaged(content, 1):
+            shutil.copytree(tmp_path / "c", tmp_path / "d")
+            (tmp_path / "d" / name).write_bytes(bad)
+            found = Checkpoint(tmp_path / "d")
+            said, resume = found.restore(), found.load(grid)
+            if resume is None:
+                met["anew"] += 1
+                assert ".bad" in said
+            else:
+                step = resume.state.step
+                met[f"from step {step}"] += 1
+                assert found.notes() == [step]
+                assert (said is None) == (step == 2)
+                np.testing.assert_array_equal(resume.state.u, states[step - 1])
+            shutil.rmtree(tmp_path / "d")
+            for bad_file in tmp_path.glob("*.bad"):
+                bad_file.unlink()
+    print(dict(met))
+    assert met["anew"] == CUTS + FLIPS  # the pointer
+    assert met["from step 1"] == CUTS + FLIPS  # the newer slot

@@ -1,0 +1,72 @@
+"""Full disks and folders that cannot be written: one message, and nothing lost."""
+
+import shutil
+
+import pytest
+
+from .conftest import SPEC
+from .equal import assert_same_bits
+
+RUN = ("run", "spec.toml", "-j", "1", "-q", "--checkpoint-every", "1e-3", "-o", "study.h5")
+SIZES = [*range(16, 400, 48), *range(400, 1600, 200)]  # KiB
+
+
+def test_a_full_disk_is_one_message_and_the_run_goes_on_when_there_is_space(
+    folder, gfmd, disk, monkeypatch
+):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(folder / "cache"))
+    assert gfmd(folder, *RUN[:-1], "unbroken.h5")[0] == 0
+    place, statuses = disk("size=64m"), []
+    for size in SIZES:
+        for path in place.iterdir():
+            shutil.rmtree(path) if path.is_dir() else path.unlink()
+        disk(f"size={size}k")
+        words = ("run", folder / "spec.toml", *RUN[2:])
+        status, said = gfmd(place, *words)
+        statuses.append(status)
+        assert status in (0, 73), (size, said)
+        assert "Traceback" not in said
+        assert ("cannot be written" in said) or status == 0
+        disk("size=64m")
+        status, said = gfmd(place, *words)
+        assert (status, said) == (0, ""), size
+        assert_same_bits(place / "study.h5", folder / "unbroken.h5")
+    print(dict(zip(SIZES, statuses, strict=True)))
+    assert 73 in statuses
+    assert 0 in statuses
+
+
+def test_a_read_only_folder_is_status_73_and_can_be_read(folder, gfmd, disk):
+    place = disk("size=64m")
+    (place / "spec.toml").write_text(SPEC)
+    assert gfmd(place, *RUN, "--shard", "0/2")[0] == 0
+    disk("ro")
+    status, said = gfmd(place, *RUN)
+    assert status == 73
+    assert "cannot be written" in said
+    assert "Traceback" not in said
+    assert gfmd(place, "export", "study.h5")[0] == 0
+    assert gfmd(place, "analyze", "study.h5")[0] == 0
+    assert gfmd(place, "run", "spec.toml", "-o", "study.h5", "--dry-run")[0] == 0
+    for words in (
+        ("export", "study.h5", "-o", "a.csv"),
+        ("analyze", "study.h5", "--figures", "figures"),
+        ("run", "spec.toml", "-o", "new.h5"),
+        ("bench", "spec.toml"),
+    ):
+        status, said = gfmd(place, *words)
+        assert status == 73, (words, said)
+        assert "Traceback" not in said
+    disk("rw")
+    assert gfmd(place, *RUN)[0] == 0
+
+
+@pytest.mark.parametrize("name", ["study.h5", "study.parts"])
+def test_a_directory_or_file_in_the_way_is_one_message(folder, gfmd, name):
+    if name == "study.h5":
+        (folder / name).mkdir()
+    else:
+        (folder / name).write_text("")
+    status, said = gfmd(folder, *RUN)
+    assert status in (73, 74)
+    assert len(said.strip().splitlines()) == 1

@@ -1,0 +1,126 @@
+"""Killed, stopped, out of time: nothing is lost, and no bit differs in the end."""
+
+import os
+import random
+import shutil
+import signal
+import time
+from collections import Counter
+
+import h5py
+import pytest
+
+from .conftest import SIGNALS
+from .equal import assert_same_bits
+
+KILLS = 100
+RUN = ("run", "spec.toml", "-j", "1", "-q", "--checkpoint-every", "1e-3", "-o")
+
+
+def test_killed_at_random_moments_it_ends_bit_for_bit(folder, start, gfmd):
+    assert gfmd(folder, *RUN, "warm.h5")[0] == 0
+    begun = time.monotonic()
+    assert gfmd(folder, *RUN, "unbroken.h5")[0] == 0
+    takes = time.monotonic() - begun
+    rng, met = random.Random(1), Counter()
+    for _ in range(KILLS):
+        child = start(folder, (*RUN, "killed.h5"))
+        time.sleep(rng.uniform(0, takes))
+        child.signal(signal.SIGKILL)
+        ended = child.wait()
+        parts = folder / "killed.parts"
+        met["before"] += not parts.exists() and ended != 0
+        met["during"] += ended == -signal.SIGKILL and parts.exists()
+        met["after"] += ended == 0
+        met["with checkpoints"] += any(parts.glob("*/pointer"))
+        met["with half-written files"] += any(parts.rglob(".*"))
+        met["with records"] += any(parts.glob("*.record"))
+        assert gfmd(folder, *RUN, "killed.h5")[0] == 0
+        assert_same_bits(folder / "killed.h5", folder / "unbroken.h5")
+        assert not parts.exists()
+        (folder / "killed.h5").unlink()
+    print(dict(met))
+    assert met["during"] > KILLS / 3
+    assert met["with checkpoints"] > 5
+    assert met["with records"] > 5
+
+
+@pytest.mark.parametrize("name", SIGNALS)
+@pytest.mark.parametrize("jobs", ["1", "2"])
+def test_a_signal_saves_all_and_the_same_call_goes_on(folder, start, gfmd, name, jobs):
+    long = (*RUN[:3], jobs, "-q", "--set", "solver.tolerance=1e-15", "-o")
+    big = ("--set", "grid.points=128", "--set", "elastomer.n=[2,3]")
+    assert gfmd(folder, *long, "unbroken.h5", *big)[0] == 1  # out of reach
+    child = start(folder, (*long, "stopped.h5", *big))
+    while not any((folder / "stopped.parts").glob("*/lock")):
+        time.sleep(0.01)
+    child.signal(SIGNALS[name])
+    assert child.wait() == 75, child.said
+    assert "call again" in child.said
+    assert any((folder / "stopped.parts").glob("*/pointer"))
+    assert gfmd(folder, *long, "stopped.h5", *big)[0] == 1
+    assert_same_bits(folder / "stopped.h5", folder / "unbroken.h5")
+
+
+def test_a_second_interrupt_leaves_at_once(folder, start):
+    child = start(folder, ("run", "spec.toml", "-j", "1", "--set", "grid.points=1024"))
+    while not any((folder / "study.parts").glob("*/lock")):
+        time.sleep(0.01)
+    child.signal(signal.SIGINT)
+    child.signal(signal.SIGINT)
+    time.sleep(0.05)
+    child.signal(signal.SIGINT)
+    assert child.wait() in (130, 75)
+
+
+def test_max_hours_ends_in_time_with_all_saved(folder, gfmd):
+    long = (*RUN[:4], "-q", "--set", "solver.tolerance=1e-15", "--set", "grid.points=256")
+    begun = time.monotonic()
+    status, said = gfmd(folder, *long, "--max-hours", str(6 / 3600))
+    assert status == 75, said
+    assert time.monotonic() - begun < 6
+    assert any((folder / "study.parts").glob("*/pointer"))
+    while status == 75:
+        status, said = gfmd(folder, *long, "--max-hours", str(6 / 3600))
+    assert status == 1
+    assert gfmd(folder, *long, "-o", "unbroken.h5")[0] == 1
+    assert_same_bits(folder / "study.h5", folder / "unbroken.h5")
+
+
+def test_a_clock_that_is_set_back_changes_nothing(folder, gfmd, start):
+    def set_back():
+        real, begun = time.time, time.time()
+        time.time = lambda: begun - 3600 * (real() - begun)
+
+    assert gfmd(folder, *RUN, "unbroken.h5")[0] == 0
+    child = start(folder, (*RUN, "study.h5"), set_back)
+    time.sleep(0.3)
+    child.signal(signal.SIGTERM)
+    assert child.wait() in (75, 0)
+    for path in (folder / "study.parts").rglob("*"):
+        os.utime(path, (4e9, 4e9))  # the year 2096
+    status, said = gfmd(folder, *RUN, "study.h5", before=set_back)
+    assert status == 0, said
+    assert_same_bits(folder / "study.h5", folder / "unbroken.h5")
+
+
+@pytest.mark.parametrize("count", [2, 8])
+def test_several_writers_of_one_study_do_not_harm_each_other(folder, start, gfmd, count):
+    assert gfmd(folder, *RUN, "unbroken.h5")[0] == 0
+    for turn in range(4):
+        shards = [("--shard", f"{i}/{count}") if turn % 2 else () for i in range(count)]
+        children = [start(folder, (*RUN, "study.h5", *shard)) for shard in shards]
+        assert [child.wait() for child in children] == [0] * count
+        assert [child.said for child in children] == [""] * count
+        assert_same_bits(folder / "study.h5", folder / "unbroken.h5")
+        assert not (folder / "study.parts").exists()
+        (folder / "study.h5").unlink()
+
+
+def test_a_reader_never_stops_a_writer(folder, gfmd):
+    assert gfmd(folder, *RUN, "study.h5", "--shard", "0/2")[0] == 0
+    shutil.copy(folder / "study.h5", folder / "before.h5")
+    with h5py.File(folder / "study.h5", "r") as reader:  # with HDF5's own lock
+        assert gfmd(folder, *RUN, "study.h5")[0] == 0
+        assert "missing" in set(reader["status"].asstr()[()])  # the file that it opened
+    assert gfmd(folder, "export", "study.h5")[0] == 0
