@@ -13,9 +13,9 @@ from gfmd_cli.physics import reference
 from gfmd_cli.physics.contact import build_scene
 from gfmd_cli.study import solve
 from gfmd_cli.study.parse import read_spec
+from gfmd_cli.study.reading import read_rows
 from gfmd_cli.study.run import run_study
 from gfmd_cli.study.search import TRIALS, Trial, _Search
-from gfmd_cli.study.store import read_rows
 from gfmd_cli.study.tasks import plan
 
 ROUGH = """\

@@ -10,7 +10,7 @@ import h5py
 import numpy as np
 
 from gfmd_cli.analysis.compare import Comparison, compare
-from gfmd_cli.study.store import open_study, read_rows
+from gfmd_cli.study.reading import open_study, read_rows
 
 CONFIGS = Path(__file__).parents[2] / "configs" / "paper"
 
