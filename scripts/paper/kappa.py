@@ -118,7 +118,7 @@ def _half(groups: dict[float, list[Tip]], primes: dict[float, Value]) -> list[Cl
     found, exact = primes[0.5], reference.kappa_prime(0.5)
     off = abs(CONJECTURE - found.value) / max(found.error, 1e-12)
     raw = min(
-        _kappa_primes(groups[0.5], cell=False), key=lambda pair: (pair[0].force, -pair[0].points)
+        _kappa_primes(groups[0.5], cell=False), key=lambda pair: (-pair[0].points, pair[0].force)
     )
     told = off > 2.5 and abs(found.value - exact) < 2 * found.error
     return [
@@ -127,8 +127,8 @@ def _half(groups: dict[float, list[Tip]], primes: dict[float, Value]) -> list[Cl
             "κ′ = 0.665(5) for n = 1/2 numerically; (2/3)² (8π/5)^(1/4) = 0.665480 is "
             "believed exact.",
             f"By the same procedure {raw[1]:.5f} at the smallest force on the finest grid, "
-            f"and {found} on the best resolved contact, the cell corrected for. Exact is {exact:.6f}; "
-            "the conjecture lies 9.6e-5 above it and "
+            f"and {found} on the best resolved contact, the cell taken off. Exact: {exact:.6f}; "
+            "the conjecture lies 9.6e-5 above and "
             f"{off:.1f} errors from what is found"
             + (": not exact." if told else ", which the numbers alone do not settle."),
             "disagrees" if told else "agrees in part",
@@ -180,7 +180,7 @@ def _far(groups: dict[float, list[Tip]]) -> list[Claim]:
 def _far_fit(tip: Tip, free: bool) -> tuple[float, float]:
     """Amplitude and exponent n' of a point force with second moment in the far field of a tip."""
     a = _radius(tip)
-    m = tip.r > 3 * a
+    m = tip.r > 6 * a  # the fourth moment adds (a / r)^4 / 12 or less
     part = Tip(tip.n, tip.points, tip.force, tip.area, tip.r[m], tip.sigma, tip.u[m], tip.gap)
 
     def off(t):
@@ -193,8 +193,13 @@ def _far_fit(tip: Tip, free: bool) -> tuple[float, float]:
     return found[0], found[1]
 
 
+def _far_enough(tip: Tip) -> bool:
+    """Whether the contact is small against the cell and holds 20 points across."""
+    return tip.area < 0.01 and tip.points**2 * tip.area > 400
+
+
 def _exponent(groups: dict[float, list[Tip]]) -> list[Claim]:
-    found = [tip for tip in groups.get(0.25, []) if tip.points >= 512]
+    found = [tip for tip in groups.get(0.25, []) if _far_enough(tip)]
     if not found:
         return []
     power = spread([_far_fit(tip, free=True)[1] - 2 for tip in found])
@@ -202,7 +207,7 @@ def _exponent(groups: dict[float, list[Tip]]) -> list[Claim]:
         Claim(
             "Sect. 3.2 (ii)",
             "n = 1/4: u ∝ r^(−2.25) far away; u ∝ r^(n−2) only for n ≥ 1/2.",
-            f"Beyond 3 a the solved field is that of r^({power}) and its images: the power is "
+            f"Beyond 6 a the solved field is that of r^({power}) and its images: the power is "
             "n − 2 for every 0 < n < 2. n = 0 is the limit of a vanishing prefactor.",
             "disagrees",
         )
