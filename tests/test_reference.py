@@ -1,5 +1,6 @@
 """The exact solutions against quadrature of their stress, energy balances and known limits."""
 
+import mpmath
 import numpy as np
 import pytest
 from scipy.integrate import quad
@@ -84,6 +85,105 @@ def test_the_hertz_coefficients_are_the_tabulated_ones():
     assert reference.kappa(1) == pytest.approx(3 * np.pi / (8 * np.sqrt(2)))
 
 
+@pytest.mark.parametrize("n", [0.25, 1, 1.5, 2, 3, 3.5])
+def test_the_surface_leaves_the_tip_with_the_power_of_the_gap(n):
+    outside = A * (1 + np.array([1e-3, 2e-3]))
+    gap = outside**2 / (2 * R) - reference.hertz_sag(n, R, A, outside)
+    assert np.log2(gap[1] / gap[0]) == pytest.approx(1 + n / 2, abs=4e-3)
+    assert reference.hertz_sag(n, R, A, 0.5 * A) == A**2 / (8 * R)
+
+
+def test_the_surface_around_the_contact_has_its_known_special_cases():
+    r = np.array([1.1, 2.0, 5.0])
+    boussinesq = (2 - r**2) * np.arcsin(1 / r) + np.sqrt(r**2 - 1)  # Johnson 1985, Eq. (3.42a)
+    assert 1 - reference.hertz_sag(1, 1.0, 1.0, r) == pytest.approx(boussinesq / np.pi)
+    assert reference.hertz_sag(0, R, A, r) == pytest.approx(A**2 / (2 * R))
+    near = [reference.hertz_sag(n, R, A, r) for n in (2 - 1e-6, 2, 2 + 1e-6)]
+    assert near[0] + near[2] == pytest.approx(2 * near[1], rel=1e-7)
+
+
+X = np.array([0.07, 0.31, 0.5])
+
+
+def test_a_periodic_line_force_has_its_closed_forms():
+    def line(n):
+        return reference.periodic_point_force(n, 3 * X, L=3.0) / 3 ** (n - 1)
+
+    assert line(1) == pytest.approx(-np.log(2 * np.sin(np.pi * X)) / np.pi, abs=1e-14)
+    assert line(2) == pytest.approx((X**2 - X + 1 / 6) / 2, abs=1e-14)
+    assert line(4) == pytest.approx(-(X**4 - 2 * X**3 + X**2 - 1 / 30) / 24, abs=1e-14)
+    for n in (0.25, 2.5, 3):
+        series = [mpmath.polylog(n, mpmath.expjpi(2 * x)).real for x in X]
+        expected = 2 * (2 * np.pi) ** -n * np.array([float(s) for s in series])
+        assert line(n) == pytest.approx(expected, abs=1e-12)
+
+
+@pytest.mark.parametrize("n", [3.5, 4])
+def test_a_periodic_point_force_is_the_sum_over_wave_vectors(n):
+    m = np.arange(-300, 301)
+    q = 2 * np.pi * np.hypot(m[:, None], m)
+    q[300, 300] = np.inf
+    wave = np.exp(2j * np.pi * m * 0.3)
+    expected = (wave @ q**-n @ np.exp(2j * np.pi * m * 0.1)).real
+    assert reference.periodic_point_force(n, 0.3, 0.1) == pytest.approx(expected, abs=2e-12)
+
+
+@pytest.mark.parametrize("n", [0.25, 0.5, 1, 1.5, 2, 3])
+def test_a_periodic_point_force_is_an_integral_over_heat_kernels(n):
+    m, x, t = np.arange(-9, 10), (0.3, 0.1), 0.05  # waves serve from t on, images before
+
+    def spread(time):
+        waves = [np.exp(-4 * np.pi**2 * m**2 * time) @ np.cos(2 * np.pi * m * y) for y in x]
+        return time ** (n / 2 - 1) * (waves[0] * waves[1] - 1)
+
+    def imaged(time):
+        images = [np.exp(-((y - m) ** 2) / (4 * time)).sum() for y in x]
+        return time ** (n / 2 - 1) * images[0] * images[1] / (4 * np.pi * time)
+
+    total = quad(spread, t, 1, epsabs=1e-13)[0] + quad(imaged, 1e-5, t, epsabs=1e-13)[0]
+    expected = (total - t ** (n / 2) / (n / 2)) / gamma(n / 2)
+    assert reference.periodic_point_force(n, *x) == pytest.approx(expected, abs=1e-10)
+
+
+@pytest.mark.parametrize("n", [0.5, 1, 2, 3, 4])
+def test_the_laplacian_of_a_periodic_point_force_is_that_of_two_less(n):
+    h = 1e-2
+    step = h * np.array([0, 1, -1, 2, -2])
+    weight = np.array([-30, 16, 16, -1, -1]) / (12 * h**2)  # fourth order
+    along = weight @ reference.periodic_point_force(n, 0.3 + step, 0.4)
+    across = weight @ reference.periodic_point_force(n, 0.3, 0.4 + step)
+    assert along + across == pytest.approx(
+        -float(reference.periodic_point_force(n - 2, 0.3, 0.4)), abs=1e-4
+    )
+
+
+@pytest.mark.parametrize("n", [0.25, 0.5, 1, 1.5, 2, 2.5, 3])
+def test_near_the_force_the_images_add_a_parabola(n):
+    r, L = 0.02, 2.0
+    periodic = reference.periodic_point_force(n, r, 0.0, L=L)
+    laplacian = -reference.point_force_of_images(n - 2, L)
+    images = reference.point_force_of_images(n, L) + laplacian * r**2 / 4
+    assert periodic - reference.point_force(n, r) == pytest.approx(images, abs=1e-7)
+
+
+def test_the_images_of_a_boussinesq_force_have_the_madelung_constant_of_the_square():
+    # of a charge in its neutralising background: -3.90026492 / L (Borwein et al. 2013)
+    assert reference.point_force_of_images(1) == pytest.approx(-3.90026492 / (2 * np.pi), rel=1e-9)
+
+
+def test_a_force_far_away_is_that_of_its_infinite_plane():
+    assert reference.point_force(1, 0.4) == pytest.approx(1 / (2 * np.pi * 0.4))
+    assert 2 * np.pi * reference.point_force(0.5, 1.0) == pytest.approx(0.477989, rel=1e-6)
+
+
+def test_the_cell_flattens_the_membrane_as_it_does_exactly():
+    p = 0.02
+    curvature = 1 / R + reference.hertz_cell_curvature(2, K, p)
+    radius = reference.hertz_radius(2, K, 1 / curvature, p)
+    assert np.pi * radius**2 == pytest.approx(reference.membrane_area(p, K, R))
+    assert reference.hertz_cell_curvature(0, K, p) == 0
+
+
 @pytest.mark.parametrize("n", [0.5, 1, 1.5, 2, 2.5])
 def test_the_line_stress_integrates_to_the_load(n):
     nu, peak = 1 - n / 2, float(reference.line_peak_stress(n, K, R, A))
@@ -127,6 +227,8 @@ def test_exponents_without_a_solution_are_refused():
         lambda: reference.kappa_prime(4),
         lambda: reference.hertz_depth(2, R, A),
         lambda: reference.line_load(3, K, R, A),
+        lambda: reference.hertz_cell_curvature(4, K, 1.0),
+        lambda: reference.periodic_point_force(4.5, 0.1, 0.1),
     ):
         with pytest.raises(ValueError, match="got n"):
             call()

@@ -6,7 +6,7 @@ dimensions". Scalars or arrays that broadcast go in and arrays come out; an expo
 """
 
 import numpy as np
-from scipy.special import gamma, xlogy
+from scipy.special import exp1, gamma, gammaincc, hyp2f1, rgamma, xlogy
 
 from gfmd_cli.physics.fields import Field
 
@@ -55,6 +55,34 @@ def hertz_depth(n: float, R: float, a: Field | float) -> Field:
     return np.asarray(np.square(a) / ((2 - n) * R))
 
 
+def hertz_sag(n: float, R: float, a: float, r: Field | float) -> Field:
+    """How far the surface at r lies below the top of the indenter, 0 <= n < 4, a << L.
+
+    r^2 / 2R inside. Outside a^2 / [(2-n) R] less the displacement of the force times
+    2F1(1 - n/2, 1 - n/2; 3 - n/2; a^2/r^2) (Weber-Schafheitlin); for n = 2 (a^2/R) [ln(r/a) + 1/2],
+    which is paper Eq. (14) with r_2 = a / sqrt(e) (printed: sqrt(e) a).
+    """
+    r = np.abs(np.asarray(r, dtype=float))
+    far = np.maximum(r, a)
+    if n == 2:
+        outside = a**2 / R * (np.log(far / a) + 0.5)
+    else:
+        spread = hyp2f1(1 - n / 2, 1 - n / 2, 3 - n / 2, np.square(a / far))
+        pushed = hertz_force(n, 1.0, R, a) * point_force(n, far) * spread
+        outside = a**2 / ((2 - n) * R) - pushed
+    return np.where(r > a, outside, np.square(r) / (2 * R))
+
+
+def hertz_cell_curvature(n: float, k: float, force: float, L: float = 1.0) -> float:
+    """What the periodic images add to the curvature 1/R of the tip, 0 <= n < 4.
+
+    Half the Laplacian of their displacement at the contact; with 1/R + this for 1/R the formulas
+    here hold in a square cell up to relative terms of (a/L)^(6-n).
+    """
+    _require(0 <= n < 4, f"a paraboloid makes a Hertz contact for 0 <= n < 4, got n = {n}")
+    return -0.5 * force / k * point_force_of_images(n - 2, L) if n else 0.0
+
+
 def hertz_profile(n: float, r: Field, a: float) -> Field:
     """Stress in units of its peak, (1 - r^2/a^2)^(1 - n/2) for r < a, else 0; points and lines.
 
@@ -62,6 +90,94 @@ def hertz_profile(n: float, r: Field, a: float) -> Field:
     """
     inside = np.abs(r) < a
     return np.where(inside, np.where(inside, 1 - np.square(r / a), 1.0) ** (1 - n / 2), 0.0)
+
+
+# --- Point forces: K u = F delta - p with k(0) = 0; displacements are in units of F / k ----------
+#
+# Ewald's splitting: q^-n is the integral of t^(n/2-1) exp(-q^2 t) / Gamma(n/2) over t > 0. Beyond
+# t = L^2 / 4 pi it is summed over wave vectors, before over images, and both fall as exp(-pi m^2).
+
+IMAGES = 4  # on each side; the first that is left out has exp(-pi 3.5^2) = 2e-17
+
+
+def point_force(n: float, r: Field | float) -> Field:
+    """Displacement I_n / (2 pi r^(2-n)) in an infinite plane. Paper Eqs. (10) to (14).
+
+    I_n = 2^(1-n) Gamma(1 - n/2) / Gamma(n/2) for 0 < n < 2 (printed: n < 1/2), and up to a constant
+    for 2 < n < 4; for n = 2 it is -ln(r) / 2 pi.
+    """
+    if n == 2:
+        return np.asarray(-np.log(r) / (2 * np.pi))
+    return gamma(1 - n / 2) * rgamma(n / 2) / (2**n * np.pi) * np.asarray(r) ** (n - 2)
+
+
+def periodic_point_force(n: float, *place: Field | float, L: float = 1.0) -> Field:
+    """Displacement of one force a cell, sum of e^(iqx) / (q^n L^d) over q != 0, -2 < n <= 4.
+
+    In d = 1 (line force, place = x) or d = 2 (x, y) dimensions; its mean is zero; infinite at the
+    force for n <= d. Paper Eq. (10a) as the sum that it is in a cell. 1e-13 is lost where n is
+    within 0.01 of d, 0 or 2 without being it. The Laplacian of n is that of n - 2 with minus.
+    """
+    own, others = _image_terms(n, place, L)
+    return _ewald(n, place, L, own + others)
+
+
+def point_force_of_images(n: float, L: float = 1.0) -> float:
+    """What the images of a point force displace the place of the force, -2 < n < 4, square cell.
+
+    The periodic displacement less that in an infinite plane, `point_force`.
+    """
+    place = (np.zeros(()), np.zeros(()))
+    _, others = _image_terms(n, place, L)
+    regular = np.log(L**2 / np.pi) - np.euler_gamma if n == 2 else 2 / (n - 2)
+    return float(_ewald(n, place, L, others + regular))
+
+
+def _image_terms(n: float, place: tuple[Field | float, ...], L: float) -> tuple[Field, Field]:
+    """E_p(pi |x - R|^2 / L^2) of the nearest image R and the sum of those of the others."""
+    d = len(place)
+    shape = np.broadcast_shapes(*(np.shape(x) for x in place))
+    own: Field = np.zeros(shape)
+    others: Field = np.zeros(shape)
+    for image in np.ndindex(*(2 * IMAGES + 1,) * d):
+        distance = sum(
+            np.square(np.asarray(x) / L - np.round(np.asarray(x) / L) - m + IMAGES)
+            for x, m in zip(place, image, strict=True)
+        )
+        term = _exponential_integral(1 + (n - d) / 2, np.pi * np.asarray(distance))
+        if image == (IMAGES,) * d:
+            own = term
+        else:
+            others = others + term
+    return own, others
+
+
+def _ewald(n: float, place: tuple[Field | float, ...], L: float, images: Field) -> Field:
+    """The sum over wave vectors and that over images, each of its share of q^-n."""
+    d, eta = len(place), L**2 / (4 * np.pi)
+    _require(-2 < n <= 4, f"sums of q^-n are at hand for -2 < n <= 4, got n = {n}")
+    waves = np.zeros(np.shape(images))
+    for wave in np.ndindex(*(2 * IMAGES + 1,) * d):
+        m = np.array(wave) - IMAGES
+        if np.any(m):
+            share = _exponential_integral(1 - n / 2, np.pi * (m @ m))
+            phase = sum(2 * np.pi * i * np.asarray(x) / L for i, x in zip(m, place, strict=True))
+            waves = waves + share * np.cos(phase)
+    # in units of eta^(n/2) / L^d, for (4 pi eta)^(d/2) = L^d
+    summed = rgamma(n / 2) * (images + waves) - rgamma(n / 2 + 1)
+    return np.asarray(eta ** (n / 2) / L**d * summed)
+
+
+def _exponential_integral(p: float, x: Field | float) -> Field:
+    """E_p(x), the integral of exp(-x t) / t^p over t > 1, for real p and x >= 0."""
+    x = np.asarray(x, dtype=float)
+    if p > 1:  # [8.19.12] of the Digital Library of Mathematical Functions
+        inner = _exponential_integral(p - 1, np.where(x > 0, x, 1.0))
+        return np.asarray((np.exp(-x) - x * inner) / (p - 1))
+    if p == 1:
+        return np.asarray(exp1(x))
+    with np.errstate(divide="ignore"):  # infinite at x = 0
+        return np.asarray(gamma(1 - p) * gammaincc(1 - p, x) * x ** (p - 1))
 
 
 # --- Line contact: a ridge of radius R, contact half-width a -------------------------------------

@@ -39,7 +39,7 @@ FEW = "load.p_star={from=0.01, to=3.0, per_decade=2}"
 STUDIES = {
     "fig01": Study("fig01"),
     "fig02": Study("fig02", quick=(SMALL,)),
-    "kappa": Study("kappa", quick=("grid.points=[256,512]",)),
+    "kappa": Study("kappa", quick=("grid.points=[256,512,1024]",)),
     "fig04": Study("fig04", quick=(SMALL,)),
     "fig05": Study("fig05", quick=("grid.points=1024",)),
     "fig06": Study("fig06", quick=(SMALL, FEW)),

@@ -1,0 +1,130 @@
+"""Single paraboloids in contact: what was solved along the diagonal of the cell, and fits to it."""
+
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from scipy.optimize import curve_fit
+
+from gfmd_cli.analysis.looks import MARKERS, Look, colours
+from gfmd_cli.physics import reference
+from paper.studies import Held
+
+INSIDE = (0.8, 0.9, 0.95)  # shares of the contact radius up to which stress is fitted
+BEGINS, ENDS = (3, 4, 6), (0.3, 0.4, 0.5)  # gap: from so many points to so many radii off the edge
+
+
+@dataclass(frozen=True)
+class Value:
+    """A number with its error."""
+
+    value: float
+    error: float
+
+    def __str__(self) -> str:
+        digits = max(0, 1 - int(np.floor(np.log10(max(self.error, 1e-7)))))
+        return f"{self.value:.{digits}f} ± {self.error:.{digits}f}"
+
+
+def spread(values: list[float]) -> Value:
+    """Median, and half of the distance between the extremes."""
+    return Value(float(np.median(values)), float(np.ptp(values) / 2))
+
+
+@dataclass(frozen=True)
+class Tip:
+    """A contact from its axis to the corner of the cell, in units of k, R and L."""
+
+    n: float
+    points: int
+    force: float
+    area: float
+    r: np.ndarray
+    sigma: np.ndarray
+    u: np.ndarray
+    """Displacement less its mean over the cell."""
+    gap: np.ndarray
+
+    @property
+    def spacing(self) -> float:
+        """Distance of points along the diagonal."""
+        return float(np.sqrt(2) / self.points)
+
+    @property
+    def curvature(self) -> float:
+        """1 / R of the tip and what the images of the contact add to it."""
+        return 1 + reference.hertz_cell_curvature(self.n, 1.0, self.force)
+
+    def point(self, n: float | None = None) -> np.ndarray:
+        """Displacement by a point force in the same cell, of another exponent if given."""
+        along = self.r / np.sqrt(2)
+        with np.errstate(invalid="ignore"):
+            return self.force * reference.periodic_point_force(
+                self.n if n is None else n, along, along
+            )
+
+    def far(self, a: float) -> np.ndarray:
+        """As `point`, with the second moment a^2 / (3 - n/2) of the stress besides; 0 < n < 4."""
+        moment = a**2 / (3 - self.n / 2)
+        return self.point() - moment / 4 * self.point(self.n - 2)
+
+
+def tips(held: Held, name: str) -> list[Tip]:
+    """The contacts of a study, by n, force and grid."""
+    found = []
+    for row in held.rows(name):
+        section = held.section(name, row)
+        half = slice(row["points"] // 2, None)
+        u, height = section["u"][half], section["height"][half]
+        place = np.arange(u.size) / row["points"] * np.sqrt(2)
+        mean = row["mean_height"] + row["mean_gap"]
+        sigma, gap = section["sigma"][half], np.maximum(u - height, 0.0)
+        about = (row["n"], row["points"], row["pressure"], row["a_r"])
+        found.append(Tip(*about, place, sigma, u - mean, gap))
+    return sorted(found, key=lambda tip: (tip.n, tip.force, tip.points))
+
+
+def look_of(n: float, exponents: list[float]) -> Look:
+    """The colour and symbol of an exponent among others."""
+    place = exponents.index(n)
+    return Look(colours(len(exponents))[place], MARKERS[place % len(MARKERS)], f"n = {n:g}")
+
+
+def stress_fit(tip: Tip, exponent: float | None = None) -> tuple[Value, Value]:
+    """Contact radius and exponent nu of (1 - r^2/a^2)^nu, which may be given."""
+    start = np.sqrt(tip.area / np.pi)
+    fits = []
+    for inside in INSIDE:
+        m = tip.r < inside * start
+        m[0] = True
+
+        def shape(r, peak, a, nu=exponent):
+            return peak * np.maximum(1 - (r / a) ** 2, 1e-9) ** nu
+
+        first = [tip.sigma[0], 1.005 * start] + [1 - tip.n / 2] * (exponent is None)
+        found, _ = curve_fit(shape, tip.r[m], tip.sigma[m], p0=first, maxfev=20000)
+        fits.append((found[1], found[2] if exponent is None else exponent))
+    radii, exponents = np.transpose(fits).tolist()
+    return spread(radii), spread(exponents)
+
+
+def gap_fit(tip: Tip) -> tuple[Value, Value]:
+    """Contact radius a and exponent of the gap: (r - a)^beta times exp of a parabola in r - a."""
+    start = np.sqrt(tip.area / np.pi)
+    if tip.n == 4:  # the line force is carried by a ragged ring; where the gap opens counts
+        start = tip.r[np.flatnonzero(tip.gap < 1e-5 * tip.gap[-1])[-1]]
+    fits = []
+    for begin, end in product(BEGINS, ENDS):
+        m = (tip.r - start > begin * tip.spacing) & (tip.r - start < end * start)
+        if m.sum() < 8:
+            continue
+
+        def shape(r, scale, beta, first, second, a):
+            d = np.maximum(r - a, 1e-6)
+            return scale + beta * np.log(d) + first * d + second * d**2
+
+        p0 = (0.0, 1 + tip.n / 2, 0.0, 0.0, start)
+        found, _ = curve_fit(shape, tip.r[m], np.log(tip.gap[m]), p0=p0, maxfev=20000)
+        fits.append((found[4], found[1]))
+    radii, exponents = np.transpose(fits).tolist()
+    return spread(radii), spread(exponents)
