@@ -243,7 +243,7 @@ TWO = "load.p_star=[0.1, 1.0]"
 PAPER_SETTINGS = {
     "fig01": ("grid.points=128",),
     "fig02": ("grid.points=64",),
-    "kappa": ("grid.points=64", "load.contact_area=0.05"),
+    "kappa": ("grid.points=64", "load.contact_area=0.05", "solver.tolerance=1e-6"),
     "fig04": ROUGH,
     "fig05": ROUGH,
     "fig06": (*ROUGH, TWO),

@@ -31,6 +31,8 @@ def _cell(ratio: int) -> Study:
     settings += [f"grid.points={256 * ratio}"]
     if ratio > 4:
         settings.append("surface.seed=[0]")
+    if ratio > 16:
+        settings.append("load.p_star=[0.01, 0.1]")
     return Study("large_cell", tuple(settings), ("surface.seed=[0,1]", "load.p_star=[0.01,0.1]"))
 
 
@@ -39,11 +41,11 @@ FEW = "load.p_star={from=0.01, to=3.0, per_decade=2}"
 STUDIES = {
     "fig01": Study("fig01"),
     "fig02": Study("fig02", quick=(SMALL,)),
-    "kappa": Study("kappa", quick=("grid.points=[256,512,1024]",)),
+    "kappa": Study("kappa", quick=("grid.points=[128,256,512]",)),
     "fig04": Study("fig04", quick=(SMALL,)),
     "fig05": Study("fig05", quick=("grid.points=1024",)),
     "fig06": Study("fig06", quick=(SMALL, FEW)),
-    "fig07": Study("fig07", quick=("grid.points=[400,800]",)),
+    "fig07": Study("fig07", quick=("grid.points=[512,1024]",)),
     "fig08": Study("fig08", quick=(NO_BARS, "load.p_star=[0.1, 1.0]")),
     "spacing": Study("spacing"),
     "fig10": Study("fig10", quick=(SMALL, FEW)),
