@@ -11,7 +11,7 @@ import numpy as np
 
 from gfmd_cli.errors import Interrupted
 from gfmd_cli.physics.contact import Contact
-from gfmd_cli.physics.observables import cross_section, stress_distribution
+from gfmd_cli.physics.observables import stress_distribution
 from gfmd_cli.solvers.loop import State
 from gfmd_cli.study.checkpoint import Checkpoint
 from gfmd_cli.study.grids import Solved, solve_on_grids
@@ -64,7 +64,7 @@ class _Watcher:
         now = time.monotonic()
         if now - self.last_report > REPORT_EVERY:
             self.last_report = now
-            area = np.count_nonzero(state.u == contact.height) / contact.grid.size
+            area = np.count_nonzero(state.u == contact.height) / state.u.size
             points, step = contact.grid.points, state.step
             self.report(
                 Progress(
@@ -179,7 +179,7 @@ def _record(task: Task, solved: Solved, seconds: float) -> Record:
         shells=scene.shells,
         distribution=distribution,
         fields={name: physical[name] for name in task.output.fields},
-        cross_section={name: cross_section(values) for name, values in physical.items()}
+        cross_section={name: scene.grid.diagonal(values) for name, values in physical.items()}
         if task.output.cross_section
         else {},
     )
