@@ -250,6 +250,10 @@ class Grid:
         """The row of a field that follows those which this process holds."""
         return lines[0]
 
+    def collect(self, field: Field) -> Field | None:
+        """All of a field, on the first process; None on the others."""
+        return field
+
     def diagonal(self, field: Field) -> Field:
         """Values along the diagonal [i, i] of the cell; of a line scene, the whole line."""
         return field.copy() if self.dimension == 1 else np.diagonal(field).copy()

@@ -6,7 +6,9 @@ there is more than one process.
 
 import os
 import time
-from contextlib import suppress
+import traceback
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any, TypeVar
 
 import numpy as np
@@ -17,6 +19,7 @@ from gfmd_cli.physics.fields import Field
 T = TypeVar("T")
 SIZES = ("PMI_SIZE", "OMPI_COMM_WORLD_SIZE", "MV2_COMM_WORLD_SIZE", "PMIX_SIZE")
 NUMBERS = ("PMI_RANK", "OMPI_COMM_WORLD_RANK", "MV2_COMM_WORLD_RANK", "PMIX_RANK")
+EXPECTED = (GfmdError, MemoryError, ArithmeticError, OSError)
 PATIENCE = 10.0  # seconds that a process with an error waits for the others, then ends them all
 
 
@@ -28,11 +31,6 @@ class Ranks:
         self.last_words = comm.Dup()  # errors are told where no other message can be mistaken
         self.rank: int = comm.Get_rank()
         self.size: int = comm.Get_size()
-
-    @property
-    def leads(self) -> bool:
-        """Whether this process is the one that prints and writes the study."""
-        return self.rank == 0
 
     def gather(self, values: Any) -> Field:
         """The numbers of all ranks, in rank order, on every rank."""
@@ -62,6 +60,8 @@ class Ranks:
         Where the others do not come to be told, as they wait for data that will not be sent, all
         processes are ended.
         """
+        if error is not None and not isinstance(error, EXPECTED):
+            traceback.print_exception(error)
         own = np.array([_status(error)])
         found = np.zeros(self.size, own.dtype)
         request = self.last_words.Iallgather(own, found)
@@ -78,6 +78,25 @@ class Ranks:
         """End all processes, with the exit status of this error."""
         print(f"gfmd: rank {self.rank}: {_portable(error, self.rank)}", flush=True)
         self.comm.Abort(_status(error))
+
+
+@contextmanager
+def together(ranks: Ranks | None) -> Iterator[None]:
+    """What fails inside on one process fails on all; see `Ranks.settle`."""
+    if ranks is None:
+        yield
+        return
+    failed: Exception | None = None
+    try:
+        yield
+    except Exception as error:
+        failed = error
+    ranks.settle(failed)
+
+
+def leads(ranks: Ranks | None) -> bool:
+    """Whether this process is the one that prints and writes the study."""
+    return ranks is None or ranks.rank == 0
 
 
 def _status(error: BaseException | None) -> int:
@@ -128,19 +147,14 @@ def launched() -> Ranks | None:
     return Ranks(MPI.COMM_WORLD)
 
 
-def on_this_node(ranks: Ranks | None) -> int:
-    """How many processes of the run share this machine's memory and cores."""
-    if ranks is None:
-        return 1
-    with suppress(AttributeError):
-        node = ranks.comm.Split_type(_shared())
-        count = int(node.Get_size())
-        node.Free()
-        return count
-    return ranks.size
+def cores_and_company(ranks: Ranks, cores: set[int]) -> tuple[int, int]:
+    """Cores for this process, and how many processes of the run share this machine.
 
-
-def _shared() -> Any:
+    `cores` are those that this process may use; what is shared is shared out.
+    """
     from mpi4py import MPI
 
-    return MPI.COMM_TYPE_SHARED
+    node = ranks.comm.Split_type(MPI.COMM_TYPE_SHARED)
+    count, together = int(node.Get_size()), set().union(*node.allgather(cores))
+    node.Free()
+    return max(1, len(together) // count), count

@@ -17,7 +17,7 @@ import pyfftw
 from gfmd_cli.physics import wisdom
 from gfmd_cli.physics.fields import Field, Modes
 from gfmd_cli.physics.grid import PLANNING, Grid, Span
-from gfmd_cli.physics.ranks import Ranks
+from gfmd_cli.physics.ranks import Ranks, leads
 from gfmd_cli.physics.slab_rows import FRAME, SlabRows, SummedRows, suits
 from gfmd_cli.physics.sweeps import Rows
 
@@ -250,6 +250,15 @@ class SlabGrid(Grid):
         found = np.empty_like(lines[0])
         first = np.ascontiguousarray(lines[0])
         self.team.comm.Sendrecv(first, (rank - 1) % count, 3, found, (rank + 1) % count, 3)
+        return found
+
+    def collect(self, field: Field) -> Field | None:
+        """All of a field, on the first process; None on the others."""
+        found = np.empty((self.points, self.points), field.dtype) if leads(self.team) else None
+        counts = np.diff(self.rows.edges) * self.points
+        self.team.comm.Gatherv(
+            np.ascontiguousarray(field), None if found is None else [found, counts]
+        )
         return found
 
     def diagonal(self, field: Field) -> Field:

@@ -19,6 +19,7 @@ from gfmd_cli.errors import SpaceError
 from gfmd_cli.physics.contact import Contact
 from gfmd_cli.physics.fields import Field
 from gfmd_cli.physics.grid import Grid
+from gfmd_cli.physics.ranks import Ranks, leads, together
 from gfmd_cli.solvers.cascade import Resume
 from gfmd_cli.solvers.loop import State
 from gfmd_cli.study.files import write_whole
@@ -27,10 +28,15 @@ CHUNK = 2**26  # bytes that a checkpoint maps at a time
 
 
 class Checkpoint:
-    """The checkpoint of one task, a folder of its own."""
+    """The checkpoint of one task, a folder of its own.
 
-    def __init__(self, folder: Path) -> None:
+    Where processes share the task, each writes its rows into a slot of its own, and the first
+    writes the pointer to all of them. Any number of processes can go on from there.
+    """
+
+    def __init__(self, folder: Path, ranks: Ranks | None = None) -> None:
         self.folder = folder
+        self.ranks = ranks
         self.pointer = folder / "pointer.json"
 
     def save(self, contact: Contact, state: State, spent: float, notes: Any = None) -> None:
@@ -39,12 +45,39 @@ class Checkpoint:
         `notes` are plain data that go with it. Raises SpaceError.
         """
         fields = {"u": state.u, "sigma": state.sigma, **state.fields}
+        slot = "a" if self._read_pointer().get("slot") == "b" else "b"
+        with together(self.ranks):
+            part = self._write_part(slot, contact.grid, fields)
+        parts = [part] if self.ranks is None else self.ranks.comm.gather(part)
+        with together(self.ranks):
+            if parts is not None:
+                self._point_to(slot, parts, contact, state, fields, spent, notes)
+
+    def _write_part(self, slot: str, grid: Grid, fields: dict[str, Field]) -> dict[str, Any]:
+        """Write the rows that this process holds; what the pointer says of them."""
+        first = grid.own.start or 0
+        name = f"{slot}{first}"
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
-            slot = "a" if self._pointer().get("slot") == "b" else "b"
-            sums = _write_slot(self.folder / slot, list(fields.values()))
+            sums = _write_slot(self.folder / name, list(fields.values()))
+        except OSError as error:
+            raise SpaceError(f"{self.folder}: cannot be written: {error.strerror}") from error
+        return {"file": name, "first": first, "rows": len(fields["u"]), "sums": sums}
+
+    def _point_to(
+        self,
+        slot: str,
+        parts: list[dict[str, Any]],
+        contact: Contact,
+        state: State,
+        fields: dict[str, Field],
+        spent: float,
+        notes: Any,
+    ) -> None:
+        try:
             pointer = {
                 "slot": slot,
+                "parts": parts,
                 "points": contact.grid.points,
                 "spent": spent,
                 "notes": notes,
@@ -55,10 +88,7 @@ class Checkpoint:
                 "least": state.least,
                 "transforms": state.transforms,
                 "scalars": state.scalars,
-                "fields": {
-                    name: [sum_, field.dtype.str]
-                    for (name, field), sum_ in zip(fields.items(), sums, strict=True)
-                },
+                "fields": {name: field.dtype.str for name, field in fields.items()},
             }
             write_whole(self.pointer, json.dumps(pointer).encode())
         except OSError as error:
@@ -66,10 +96,23 @@ class Checkpoint:
 
     def load(self, grid: Grid) -> Resume | None:
         """The saved state of a solve on `grid`, or None where there is none that is whole."""
-        pointer = self._pointer()
+        pointer = self._read_pointer()
+        if pointer.get("points") == grid.points:
+            level = grid
+        elif isinstance(pointer.get("points"), int):
+            level = grid.coarser(pointer["points"])
+        else:
+            return None
+        resume = self._resume(pointer, level)
+        if self.ranks is not None and self.ranks.total(int(resume is None)):
+            return None
+        return resume
+
+    def _resume(self, pointer: dict[str, Any], level: Grid) -> Resume | None:
+        if self.ranks is not None and level.whole:
+            return None
         try:
-            level = Grid(pointer["points"], grid.dimension, grid.length, grid.threads)
-            fields = _read_slot(self.folder / pointer["slot"], level, pointer["fields"])
+            fields = _read_parts(self.folder, pointer["parts"], level, pointer["fields"])
             state = State(
                 u=fields.pop("u"),
                 sigma=fields.pop("sigma"),
@@ -88,11 +131,17 @@ class Checkpoint:
 
     def notes(self) -> Any:
         """The notes of the saved state, None where there are none."""
-        return self._pointer().get("notes")
+        return self._read_pointer().get("notes")
 
     def remove(self) -> None:
         """Forget the state: the task is done."""
         shutil.rmtree(self.folder, ignore_errors=True)
+
+    def _read_pointer(self) -> dict[str, Any]:
+        """What the pointer says; the first process reads it for all."""
+        if self.ranks is None:
+            return self._pointer()
+        return self.ranks.agree(self._pointer() if leads(self.ranks) else {})
 
     def _pointer(self) -> dict[str, Any]:
         try:
@@ -121,14 +170,29 @@ def _write_slot(path: Path, fields: list[Field]) -> list[int]:
     return sums
 
 
-def _read_slot(path: Path, grid: Grid, stored: dict[str, Any]) -> dict[str, Field]:
-    """The fields of a slot. Raises ValueError where one is not what was written."""
-    fields, offset = {}, 0
-    for name, (expected, kind) in stored.items():
-        field: Field = np.empty(grid.shape, kind)
-        field[...] = np.memmap(path, kind, "r", offset, grid.shape)
-        offset += field.nbytes
-        if zlib.crc32(field.data.cast("B")) != expected:
-            raise ValueError(f"{path}: field {name} is damaged")
-        fields[name] = field
+def _read_parts(
+    folder: Path, parts: list[dict[str, Any]], grid: Grid, kinds: dict[str, str]
+) -> dict[str, Field]:
+    """The rows of a grid that this process holds, from the slots where they lie.
+
+    Raises ValueError where a field is not what was written.
+    """
+    first, last, _ = grid.own.indices(grid.points)
+    fields = {name: np.empty(grid.shape, kind) for name, kind in kinds.items()}
+    missing = last - first
+    for part in parts:
+        begin, rows = part["first"], part["rows"]
+        low, high = max(first, begin), min(last, begin + rows)
+        if low >= high:
+            continue
+        missing -= high - low
+        offset, shape = 0, (rows, *grid.shape[1:])
+        for (name, field), expected in zip(fields.items(), part["sums"], strict=True):
+            stored = np.memmap(folder / part["file"], field.dtype, "r", offset, shape)
+            if zlib.crc32(stored.data.cast("B")) != expected:
+                raise ValueError(f"{part['file']}: field {name} is damaged")
+            field[low - first : high - first] = stored[low - begin : high - begin]
+            offset += stored.nbytes
+    if missing:
+        raise ValueError(f"{folder}: rows are missing")
     return fields

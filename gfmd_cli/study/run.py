@@ -13,9 +13,10 @@ from threading import Thread
 from typing import Any
 
 from gfmd_cli.errors import GfmdError, Interrupted
+from gfmd_cli.physics.ranks import Ranks, leads, together
 from gfmd_cli.study import solve
 from gfmd_cli.study.record import SUFFIX
-from gfmd_cli.study.resources import HEADROOM, available_memory, check_memory, share_out
+from gfmd_cli.study.resources import check_memory, room, share_out
 from gfmd_cli.study.solve import Progress, Report, solve_task
 from gfmd_cli.study.spec import Spec
 from gfmd_cli.study.store import Study
@@ -34,6 +35,7 @@ def run_study(
     shard: tuple[int, int] = (0, 1),
     jobs: int | None = None,
     checkpoint_every: float = CHECKPOINT_EVERY,
+    ranks: Ranks | None = None,
 ) -> Counter[str]:
     """Solve the tasks of this shard that the study does not hold yet, and collect all records.
 
@@ -44,6 +46,7 @@ def run_study(
     report : told of every start, step and end of a task
     shard : (i, n) takes the tasks with index i modulo n
     jobs : worker processes, by default as many as cores, memory and tasks suggest
+    ranks : the processes of an MPI run, which share every task; all of them call this
 
     Returns how many tasks of this shard ended in which status ("failed": raised an error).
     Raises InputError for a spec that does not fit the study or the machine, SpaceError, and
@@ -52,53 +55,72 @@ def run_study(
     study = Study(path)
     study.check_spec(spec)
     tasks = plan(spec)
-    held = study.held()
+    held = study.held() if ranks is None else ranks.agree(study.held())
     share = [task for task in tasks if task.index % shard[1] == shard[0]]
     pending = [task for task in share if task.id not in held]
     outcome = Counter(held[task.id] for task in share if task.id in held)
     uncollected = any(study.parts.glob(f"*{SUFFIX}"))
     if pending:
-        check_memory(pending)
+        check_memory(pending, ranks)
         with _signals_noted():
-            study.begin(spec)
+            with together(ranks):
+                if leads(ranks):
+                    study.begin(spec)
             try:
-                outcome += _solve_all(pending, study.parts, report, jobs, checkpoint_every)
+                outcome += _solve_all(pending, study.parts, report, jobs, checkpoint_every, ranks)
             finally:
-                study.collect(spec, tasks, text)
+                with together(ranks):
+                    if leads(ranks):
+                        study.collect(spec, tasks, text)
             if solve.stop.is_set():
                 left = len(share) - sum(outcome.values())
                 raise Interrupted(f"stopped by a signal; {left} tasks left, call again to go on")
-    elif uncollected:
+    elif uncollected and leads(ranks):
         study.collect(spec, tasks, text)
     return outcome
 
 
 def _solve_all(
-    pending: list[Task], parts: Path, report: Report, jobs: int | None, every: float
+    pending: list[Task],
+    parts: Path,
+    report: Report,
+    jobs: int | None,
+    every: float,
+    ranks: Ranks | None,
 ) -> Counter[str]:
-    jobs, threads = share_out(pending, jobs)
-    memory = HEADROOM * available_memory() / jobs
+    jobs, threads = share_out(pending, jobs, ranks)
+    memory = room(ranks) / jobs
     if jobs > 1:
         return _solve_in_pool(pending, parts, report, jobs, (threads, every, memory))
     outcome: Counter[str] = Counter()
     for task in pending:
-        if solve.stop.is_set():
+        if _is_stopped(ranks):
             break
-        status = _attempt(task, parts, report, (threads, every, memory))
+        status = _attempt(task, parts, report, (threads, every, memory), ranks)
         if status != "interrupted":
             outcome[status] += 1
     return outcome
+
+
+def _is_stopped(ranks: Ranks | None) -> bool:
+    """Whether a signal has come, to any process."""
+    if ranks is not None and ranks.total(int(solve.stop.is_set())):
+        solve.stop.set()
+    return solve.stop.is_set()
 
 
 Means = tuple[int, float, float]
 """Of one task: threads, seconds between checkpoints, memory [bytes]."""
 
 
-def _attempt(task: Task, parts: Path, report: Report, means: Means) -> str:
+def _attempt(
+    task: Task, parts: Path, report: Report, means: Means, ranks: Ranks | None = None
+) -> str:
     """Solve one task; an error ends this task only."""
     threads, every, memory = means
     try:
-        return solve_task(task, parts, threads, report, every, memory)
+        with together(ranks):
+            return solve_task(task, parts, threads, report, every, memory, ranks)
     except Interrupted:
         report(Progress(task.index, "interrupted", task.label))
         return "interrupted"

@@ -12,6 +12,7 @@ import numpy as np
 from gfmd_cli.errors import Interrupted
 from gfmd_cli.physics.contact import Contact
 from gfmd_cli.physics.observables import stress_distribution
+from gfmd_cli.physics.ranks import Ranks, leads
 from gfmd_cli.solvers.loop import State
 from gfmd_cli.study.checkpoint import Checkpoint
 from gfmd_cli.study.grids import Solved, solve_on_grids
@@ -49,6 +50,7 @@ class _Watcher:
     checkpoint: Checkpoint
     report: Report
     every: float
+    ranks: Ranks | None = None
     last_report: float = 0.0
     last_save: float = 0.0
     spent: float = 0.0
@@ -71,10 +73,15 @@ class _Watcher:
                     self.task.index, "step", self.task.label, points, step, state.residual, area
                 )
             )
-        if stop.is_set() or now - self.last_save > self.every:
+        if self.ranks is not None and contact.grid.whole:
+            return  # a small grid, which each process solves on its own
+        asked = 2.0 if stop.is_set() else float(now - self.last_save > self.every)
+        asked = contact.grid.most(asked)  # of any process
+        if asked:
             self.checkpoint.save(contact, state, self.spent, self.notes)
             self.last_save = now
-        if stop.is_set():
+        if asked > 1:
+            stop.set()
             raise Interrupted(f"{self.task.label}: stopped, state saved")
 
 
@@ -85,16 +92,20 @@ def solve_task(
     report: Report,
     checkpoint_every: float,
     memory: float = np.inf,
+    ranks: Ranks | None = None,
 ) -> str:
     """Solve one task and commit its record; return its status.
 
-    `memory` [bytes] limits how far an "auto" grid may grow. Raises Interrupted after the state was
+    `memory` [bytes] limits how far an "auto" grid may grow, `ranks` are the processes that share
+    the task. Raises Interrupted after the state was
     saved, InputError, SpaceError.
     """
     report(Progress(task.index, "start", task.label))
     begun = time.perf_counter()
-    checkpoint = Checkpoint(parts / task.id)
-    watcher = _Watcher(task, checkpoint, report, checkpoint_every, last_save=time.monotonic())
+    checkpoint = Checkpoint(parts / task.id, ranks)
+    watcher = _Watcher(
+        task, checkpoint, report, checkpoint_every, ranks, last_save=time.monotonic()
+    )
     solved = solve_on_grids(
         task,
         threads,
@@ -102,13 +113,15 @@ def solve_task(
         checkpoint.load,
         checkpoint.notes(),
         watcher.note,
+        ranks,
         watch=watcher,
         enter_level=watcher.enter_level,
     )
     solution = solved.solution
     record = _record(task, solved, time.perf_counter() - begun)
-    write_record(parts, record)
-    checkpoint.remove()
+    if leads(ranks):
+        write_record(parts, record)
+        checkpoint.remove()
     row = record.row
     report(
         Progress(
@@ -178,7 +191,11 @@ def _record(task: Task, solved: Solved, seconds: float) -> Record:
         row=row,
         shells=scene.shells,
         distribution=distribution,
-        fields={name: physical[name] for name in task.output.fields},
+        fields={
+            name: whole
+            for name in task.output.fields
+            if (whole := scene.grid.collect(physical[name])) is not None
+        },
         cross_section={name: scene.grid.diagonal(values) for name, values in physical.items()}
         if task.output.cross_section
         else {},
