@@ -69,12 +69,20 @@ class SlabRows(Rows):
         self.meet(framed)
         return framed
 
-    def meet(self, framed: Any) -> None:
-        """Fill the frame with rows of the neighbours."""
+    def meet(self, *framed: Any) -> None:
+        """Fill the frames with rows of the neighbours."""
         comm, rank, end = self.ranks.comm, self.ranks.rank, FRAME + self.rows
         above, below = (rank - 1) % self.ranks.size, (rank + 1) % self.ranks.size
-        comm.Sendrecv(framed[FRAME : FRAME + REACH], above, 1, framed[end : end + REACH], below, 1)
-        comm.Sendrecv(framed[end - REACH : end], below, 2, framed[FRAME - REACH : FRAME], above, 2)
+        under_way = []
+        for tag, array in enumerate(framed):
+            under_way += [
+                comm.Irecv(array[end : end + REACH], below, 2 * tag),
+                comm.Irecv(array[FRAME - REACH : FRAME], above, 2 * tag + 1),
+                comm.Isend(array[FRAME : FRAME + REACH], above, 2 * tag),
+                comm.Isend(array[end - REACH : end], below, 2 * tag + 1),
+            ]
+        for request in under_way:
+            request.Wait()
 
     def over(self, sweep: Callable[..., None], *arguments: Any) -> None:
         """Run a kernel over arrays with frames."""
@@ -96,8 +104,7 @@ class SlabRows(Rows):
     def from_finer(self, sweep: Callable[..., None], sources: Any, targets: Any) -> None:
         """Run the kernel and fill the frames of what it wrote."""
         self(sweep, *sources, *map(self.for_finer, targets), first=REACH)
-        for target in targets:
-            self.meet(target)
+        self.meet(*targets)
 
     def for_finer(self, framed: Any) -> Any:
         """The frame cut by half."""

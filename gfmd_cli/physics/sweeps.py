@@ -62,8 +62,8 @@ class Rows:
         """A field with a frame; good until the next transform."""
         return field
 
-    def meet(self, framed: Any) -> None:
-        """Fill the frame with what lies there."""
+    def meet(self, *framed: Any) -> None:
+        """Fill the frames with what lies there."""
 
     def over(self, sweep: Callable[..., None], *arguments: Any) -> None:
         """Run a kernel over arrays with frames."""
