@@ -22,8 +22,7 @@ from math import sqrt
 import numpy as np
 
 from gfmd_cli.physics.contact import Contact
-from gfmd_cli.physics.fields import Field
-from gfmd_cli.physics.grid import row_blocks
+from gfmd_cli.physics.fields import Field, row_blocks
 
 DOUBT = 1.0
 """Points whose stress and gap both lie below this many rms violations may be on either side."""

@@ -16,14 +16,16 @@ import numpy as np
 from gfmd_cli.errors import InputError
 from gfmd_cli.physics import sweeps
 from gfmd_cli.physics.elastomer import Elastomer, Slab
-from gfmd_cli.physics.fields import Field
-from gfmd_cli.physics.grid import BLOCK, Grid, Operator, row_blocks
+from gfmd_cli.physics.fields import BLOCK, Field, row_blocks
+from gfmd_cli.physics.grid import Grid, Operator
 from gfmd_cli.physics.persson import Shells, shells
 from gfmd_cli.physics.ranks import Ranks
 from gfmd_cli.physics.surface import Surface, sample
 
 ROUNDING = 1e-28  # |h(q)|^2 of a mode that only rounding has excited, relative to the largest
 SCALES = (1e-100, 1e100)  # [m, Pa]: squared, over all of the spectrum, still normal numbers
+EXACT_SQUARES = 2**20  # |q|^2 L^2 / 4 pi^2 up to which each has its own shell on any grid
+MOST_SQUARES = 28  # bits of that on a grid on which each has
 PRESSURES = (1e-30, 1e6)
 """Reduced pressures that are solved. Above 2^17, full contact on every grid, as no peak of a field
 is above its rms times the points per side; sigma - p then only loses digits. Below, squares of p*
@@ -197,17 +199,27 @@ def _stiffness(grid: Grid, elastomer: Elastomer) -> tuple[Field, float]:
 def radial_power(grid: Grid, height: Field) -> tuple[Field, Field]:
     """Sum of |h(q)|^2 over the modes of equal |q|, where it is more than rounding.
 
+    On grids beyond 16384 points a side, large |q| that differ by less than 1e-5 are one.
+
     Returns |q| L / 2 pi, rising, and the sums, both of shape (shells,).
     """
     coefficients = grid.forward_into_work(height)
     half = grid.points // 2
-    total = np.zeros(grid.dimension * half**2 + 1)
+    highest = grid.dimension * half**2
+    merged = max(0, highest.bit_length() - MOST_SQUARES)  # 2^merged squares are one
+    exact = EXACT_SQUARES if merged else highest + 1
+    total = np.zeros(exact + (max(highest - exact, 0) >> merged) + 1)
     for rows in row_blocks(coefficients, max(coefficients.size // 16, BLOCK)):
         square = np.rint(grid.mode_number(rows) ** 2).astype(np.int64)  # a whole number
+        if merged:
+            np.copyto(square, exact + (square - exact >> merged), where=square >= exact)
         weight = grid.multiplicity() if grid.dimension == 2 else grid.multiplicity()[rows]
         power = np.abs(coefficients[rows]) ** 2 * weight
         total += np.bincount(square.ravel(), power.ravel(), minlength=total.size)
     total = grid.total(total)
     total[0] = 0.0
     (square,) = np.nonzero(total > ROUNDING * total.max())
-    return np.sqrt(square.astype(np.float64)), total[square] / float(grid.size) ** 2
+    squares = square.astype(np.float64)
+    beyond = squares[square >= exact]
+    squares[square >= exact] = exact + (beyond - exact + 0.5) * 2**merged - 0.5  # their middle
+    return np.sqrt(squares), total[square] / float(grid.size) ** 2

@@ -21,13 +21,6 @@ ALL = slice(None)
 THREADED = 512  # points per side from which a second thread pays
 PLANNING = (30.0, 1e-6)  # seconds at most to look for a plan, at all and per grid point
 Span = tuple[int, int]
-BLOCK = 2**15  # points of a block of rows: it and its temporaries stay in the cache
-
-
-def row_blocks(field: Field | Modes, block: int = BLOCK) -> list[slice]:
-    """Slices of whole rows of about `block` values each."""
-    step = max(1, block * len(field) // field.size)
-    return [slice(start, start + step) for start in range(0, len(field), step)]
 
 
 @dataclass(frozen=True)

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from gfmd_cli.physics.contact import Contact
-from gfmd_cli.physics.fields import Field, Mask
-from gfmd_cli.physics.grid import Grid, row_blocks
+from gfmd_cli.physics.fields import Field, Mask, row_blocks
+from gfmd_cli.physics.grid import Grid
 
 
 def contact_points(contact: Contact, u: Field, sigma: Field) -> Mask:
