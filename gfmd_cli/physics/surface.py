@@ -7,7 +7,7 @@ are those of Mueser, "Elastic contacts of randomly rough surfaces across the spa
 
 from functools import cache
 from pathlib import Path
-from typing import Annotated, ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import Field as Key
@@ -109,13 +109,7 @@ class SelfAffine(Indenter):
         draw = np.random.Generator(np.random.PCG64(self.seed))
         variance = 0.0
         for ring in range(1, self.highest_mode + 1):
-            side = np.arange(-ring, ring + 1)
-            y = np.concatenate([side, np.full(ring, ring), np.full(ring - 1, -ring)])
-            x = np.concatenate([np.full(2 * ring + 1, ring), np.arange(ring), np.arange(1, ring)])
-            phase = draw.random(4 * ring)
-            if not grid.whole:
-                mine = (x >= first) & (x < last)
-                y, x, phase = y[mine], x[mine], phase[mine]
+            y, x, phase = _ring(draw, ring, first, last)
             value = self._amplitude(np.hypot(y, x)) * np.exp(2j * np.pi * phase)
             variance += 2 * float(np.sum(np.abs(value) ** 2))
             modes[y, x - first] = value
@@ -128,6 +122,31 @@ class SelfAffine(Indenter):
                 modes[self.highest_mode, 0] = 2 * modes[self.highest_mode, 0].real
         if self.h_std is not None:
             modes *= self.h_std / np.sqrt(grid.total(variance) or 1.0)
+
+
+def _ring(draw: np.random.Generator, ring: int, first: int, last: int) -> tuple[Any, Any, Field]:
+    """The modes of a square ring with first <= m_x < last, and the phases drawn for them / 2 pi.
+
+    In the order of the draw: m_x = ring from m_y = -ring on; m_y = ring; m_y = -ring. The draws for
+    the others are skipped.
+    """
+    side = (0, 2 * ring + 1) if first <= ring < last else (0, 0)
+    above = tuple(2 * ring + 1 + min(x, ring) for x in (first, last))
+    below = tuple(3 * ring + max(min(x, ring), 1) for x in (first, last))
+    drawn, phases, places = 0, [], []
+    for begin, end in (side, above, below):
+        if begin > drawn:
+            draw.bit_generator.advance(begin - drawn)  # type: ignore[attr-defined]
+        phases.append(draw.random(end - begin))
+        places.append(np.arange(begin, end))
+        drawn = max(drawn, end)
+    if drawn < 4 * ring:
+        draw.bit_generator.advance(4 * ring - drawn)  # type: ignore[attr-defined]
+    place = np.concatenate(places)
+    on_side, is_above = place <= 2 * ring, place <= 3 * ring
+    y = np.where(on_side, place - ring, np.where(is_above, ring, -ring))
+    x = np.where(on_side, ring, place - np.where(is_above, 2 * ring + 1, 3 * ring))
+    return y, x, np.concatenate(phases)
 
 
 class FileSurface(Indenter):

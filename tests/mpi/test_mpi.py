@@ -1,6 +1,7 @@
 """Runs on several processes give what one process gives."""
 
 import json
+import re
 
 import h5py
 import numpy as np
@@ -31,8 +32,8 @@ tolerance = 1e-11
 fields = ["u", "sigma", "height"]
 cross_section = true
 """
-OF_THE_RUN = {"seconds", "residual", "transforms", "steps", "status"}
-"""Columns that may differ: rounding decides about the last step."""
+OF_THE_RUN = re.compile("residual|transforms|steps|status|algebraic|bound")
+"""Columns that may differ: rounding decides which step is the last."""
 
 
 def spec(folder, n, points, kind="auto", **more):
@@ -66,7 +67,7 @@ def assert_same(one, other, exact=False):
     assert attributes == other_attributes
     assert values.keys() == others.keys()
     for name, expected in values.items():
-        if name == "seconds" or (name in OF_THE_RUN and not exact):
+        if name == "seconds" or (not exact and OF_THE_RUN.search(name)):
             continue
         found = others[name]
         assert found.shape == expected.shape, name
@@ -74,6 +75,7 @@ def assert_same(one, other, exact=False):
             assert np.array_equal(found, expected, equal_nan=expected.dtype.kind == "f"), name
         else:
             of = values.get(name.replace("cross_sections", "fields"), expected)
+            of = values["h_std"] if name == "mean_height" else of
             size = np.nanmax(np.abs(of), initial=1e-300)
             np.testing.assert_allclose(found, expected, rtol=0, atol=SAME * size, err_msg=name)
     assert set(others["status"]) <= {"converged", "rounding"}
@@ -104,7 +106,7 @@ def test_other_methods_are_shared_out_too(mpiexec, tmp_path, kind):
 
 
 def test_a_grid_that_grows_to_its_accuracy(mpiexec, tmp_path):
-    """Small grids are solved by each process, large ones shared, and leaping stiffness too."""
+    """Small grids are solved by each process, large ones shared."""
     path = tmp_path / "spec.toml"
     path.write_text(
         '[study]\nname = "auto"\n[surface]\nkind = "self-affine"\ncutoff = 0.1\n'
@@ -119,22 +121,19 @@ def test_a_grid_that_grows_to_its_accuracy(mpiexec, tmp_path):
 @pytest.mark.parametrize(("more", "exact"), [(2, True), (3, False), (1, False)])
 def test_a_stopped_run_goes_on(mpiexec, tmp_path, more, exact):
     """A signal to one process stops all; as many go on bit for bit, others with the same state."""
-    path = spec(tmp_path, [1], 128)
-    mpiexec(2, "gfmd_cli", "run", path, "-o", tmp_path / "whole.h5", "-q")
-    cut = tmp_path / "cut.h5"
-    looks, rank = 30, 1
-    mpiexec(2, "interrupted.py", looks, rank, "run", path, "-o", cut, "-q", status=75)
+    path, cut, whole = spec(tmp_path, [1], 128), tmp_path / "cut.h5", tmp_path / "whole.h5"
+    run = ("run", path, "-q", "--set", "load.p_star=0.3", "-o")
+    mpiexec(2, "gfmd_cli", *run, whole)
+    mpiexec(2, "interrupted.py", 25, 1, *run, cut, status=75)
     (pointer,) = (tmp_path / "cut.parts").glob("*/pointer.json")
     saved = json.loads(pointer.read_bytes())
     assert [part["rows"] for part in saved["parts"]] == [64, 64]
     assert saved["points"] == 128
-    if more == 1:
-        on_one(path, cut)
-    else:
-        mpiexec(more, "gfmd_cli", "run", path, "-o", cut, "-q")
-    assert_same(tmp_path / "whole.h5", cut, exact=exact)
-    with h5py.File(cut) as file:  # it went on: a fresh start would not have come out so
-        assert file["steps"][0] > saved["step"]
+    left = contents(whole)[0]["steps"][0] - saved["step"]
+    few = left + 5  # looks that are enough to go on, but not to begin anew
+    assert saved["step"] > 5
+    mpiexec(more, "interrupted.py", few, 0, *run, cut)
+    assert_same(whole, cut, exact=exact)
 
 
 @pytest.mark.parametrize("kind", ["known", "unknown"])

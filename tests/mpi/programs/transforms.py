@@ -5,13 +5,16 @@ import sys
 import numpy as np
 from mpi4py import MPI
 
-from gfmd_cli.physics.contact import build_scene
+from gfmd_cli.physics.contact import Contact, build_scene
 from gfmd_cli.physics.elastomer import Power
 from gfmd_cli.physics.grid import Grid
 from gfmd_cli.physics.ranks import Ranks
 from gfmd_cli.physics.slab_rows import SlabRows
 from gfmd_cli.physics.slabs import SlabGrid
 from gfmd_cli.physics.surface import Cone, SelfAffine
+from gfmd_cli.physics.sweeps import PRESSED
+from gfmd_cli.solvers.multigrid import Multigrid
+from gfmd_cli.solvers.multilevel import Multilevel
 
 ranks = Ranks(MPI.COMM_WORLD)
 COLUMNS = 7
@@ -93,6 +96,31 @@ def check_surfaces(points):
         np.testing.assert_allclose(many, one, rtol=1e-10)
 
 
+def check_preconditioners(points, n):
+    """Both are the same on slabs as on one process, for any pattern of contacts."""
+    draw = np.random.default_rng(4)
+    force = draw.standard_normal((points, points))
+    y, x = np.mgrid[:points, :points]
+    for held in (draw.random((points, points)) < 0.02, (x - 9) ** 2 + (y - points + 2) ** 2 < 300):
+        marks = np.where(held, PRESSED, 0).astype(np.int8)
+        for kind in (Multigrid, Multilevel):
+            found = []
+            for grid in (Grid(points), SlabGrid(points, ranks=ranks)):
+                k = Power(n=n).stiffness(grid.wavenumber()) / points**n
+                contact = Contact(grid, force[grid.own], k, 1.0)
+                framed = grid.rows.empty(points, dtype=np.int8)
+                grid.rows.inside(framed)[...] = marks[grid.own]
+                change = np.ones(grid.shape, np.float32)
+                cycle, padded = kind(contact, grid.rows), np.zeros((grid.shape[0], points + 2))
+                sums = cycle.apply(-force[grid.own], framed, PRESSED, change, padded)
+                found.append((padded[:, :points], sums))
+            (whole, sums), (mine, others) = found
+            size = np.abs(whole).max()
+            own = grid.own
+            np.testing.assert_allclose(mine, whole[own], rtol=0, atol=2e-6 * size)
+            np.testing.assert_allclose(others, sums, rtol=1e-5, atol=1e-5 * size * points)
+
+
 def check_against_mpi4py_fft(points):
     """Another library's distributed transform, where it could be built."""
     try:
@@ -120,5 +148,7 @@ for pair in ((64, 128), (128, 64), (100, 150), (96, 66)):
     check_other_grids(*pair)
 for size in (64, 96, 100, 512):
     check_levels(size)
+for size, exponent in ((64, 1), (96, 2), (128, 3), (160, 4)):
+    check_preconditioners(size, exponent)
 check_against_mpi4py_fft(64)
 sys.exit(0)
