@@ -20,6 +20,7 @@ T = TypeVar("T")
 SIZES = ("PMI_SIZE", "OMPI_COMM_WORLD_SIZE", "MV2_COMM_WORLD_SIZE", "PMIX_SIZE")
 NUMBERS = ("PMI_RANK", "OMPI_COMM_WORLD_RANK", "MV2_COMM_WORLD_RANK", "PMIX_RANK")
 EXPECTED = (GfmdError, MemoryError, ArithmeticError, OSError)
+AWAKE, NAP = 2e-4, 2e-5  # seconds
 PATIENCE = 10.0  # seconds that a process with an error waits for the others, then ends them all
 
 
@@ -32,11 +33,23 @@ class Ranks:
         self.rank: int = comm.Get_rank()
         self.size: int = comm.Get_size()
 
+    def wait(self, *requests: Any) -> None:
+        """Until these are done: watching out at first, then asleep in between.
+
+        MPI's own waiting never sleeps; where cores are shared it takes them from the very process
+        that is waited for.
+        """
+        awake = time.perf_counter() + AWAKE
+        for request in requests:
+            while not request.Test():
+                if time.perf_counter() > awake:
+                    time.sleep(NAP)
+
     def gather(self, values: Any) -> Field:
         """The numbers of all ranks, in rank order, on every rank."""
         own = np.array(values, order="C")
         found = np.empty((self.size, *own.shape), own.dtype)
-        self.comm.Allgather(own, found)
+        self.wait(self.comm.Iallgather(own, found))
         return found
 
     def total(self, values: Any) -> Any:
@@ -45,8 +58,8 @@ class Ranks:
         if own.nbytes < 2**16:
             return self.gather(own).sum(axis=0)
         found = np.empty_like(own)
-        self.comm.Reduce(own, found)
-        self.comm.Bcast(found)
+        self.wait(self.comm.Ireduce(own, found))
+        self.wait(self.comm.Ibcast(found))
         return found
 
     def agree(self, value: T) -> T:

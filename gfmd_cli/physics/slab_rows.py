@@ -81,8 +81,7 @@ class SlabRows(Rows):
                 comm.Isend(array[FRAME : FRAME + REACH], above, 2 * tag),
                 comm.Isend(array[end - REACH : end], below, 2 * tag + 1),
             ]
-        for request in under_way:
-            request.Wait()
+        self.ranks.wait(*under_way)
 
     def over(self, sweep: Callable[..., None], *arguments: Any) -> None:
         """Run a kernel over arrays with frames."""
@@ -132,7 +131,7 @@ class GatheredRows(Rows):
         for part, target in zip(parts, targets, strict=True):
             width = target[0].size
             own = part[REACH : REACH + count]
-            self.ranks.comm.Allgatherv(own, [target, self.counts * width])
+            self.ranks.wait(self.ranks.comm.Iallgatherv(own, [target, self.counts * width]))
 
     def for_finer(self, framed: Any) -> Any:
         """The rows beside a slab, and their neighbours."""

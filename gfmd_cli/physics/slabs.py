@@ -99,7 +99,7 @@ class SlabGrid(Grid):
     def _joined(self, values: Field, counts: Any) -> Field:
         """One array of the values of all processes."""
         found = np.empty(sum(counts), values.dtype)
-        self.team.comm.Allgatherv(np.ascontiguousarray(values), [found, counts])
+        self.team.wait(self.team.comm.Iallgatherv(np.ascontiguousarray(values), [found, counts]))
         return found
 
     @cached_property
@@ -175,9 +175,9 @@ class SlabGrid(Grid):
         if to_columns:
             for (a, b), block in zip(self.spans, blocks, strict=True):
                 block[...] = lines[:, a:b]
-            self.team.comm.Alltoallv(in_lines, in_columns)
+            self.team.wait(self.team.comm.Ialltoallv(in_lines, in_columns))
         else:
-            self.team.comm.Alltoallv(in_columns, in_lines)
+            self.team.wait(self.team.comm.Ialltoallv(in_columns, in_lines))
             for (a, b), block in zip(self.spans, blocks, strict=True):
                 lines[:, a:b] = block
 
@@ -232,10 +232,9 @@ class SlabGrid(Grid):
         sent = np.concatenate([rows[:, slice(*_from(s, have[rank]))].ravel() for s in away])
         height = len(rows)
         got = np.empty(height * sum(b - a for a, b in come), rows.dtype)
-        self.team.comm.Alltoallv(
-            [sent, [height * (b - a) for a, b in away]],
-            [got, [height * (b - a) for a, b in come]],
-        )
+        outgoing = [sent, [height * (b - a) for a, b in away]]
+        incoming = [got, [height * (b - a) for a, b in come]]
+        self.team.wait(self.team.comm.Ialltoallv(outgoing, incoming))
         first, last = want[rank]
         found, at = np.empty((height, last - first), rows.dtype), 0
         for a, b in come:
@@ -249,16 +248,16 @@ class SlabGrid(Grid):
         rank, count = self.team.rank, self.team.size
         found = np.empty_like(lines[0])
         first = np.ascontiguousarray(lines[0])
-        self.team.comm.Sendrecv(first, (rank - 1) % count, 3, found, (rank + 1) % count, 3)
+        comm = self.team.comm
+        self.team.wait(comm.Irecv(found, (rank + 1) % count), comm.Isend(first, (rank - 1) % count))
         return found
 
     def collect(self, field: Field) -> Field | None:
         """All of a field, on the first process; None on the others."""
         found = np.empty((self.points, self.points), field.dtype) if leads(self.team) else None
         counts = np.diff(self.rows.edges) * self.points
-        self.team.comm.Gatherv(
-            np.ascontiguousarray(field), None if found is None else [found, counts]
-        )
+        target = None if found is None else [found, counts]
+        self.team.wait(self.team.comm.Igatherv(np.ascontiguousarray(field), target))
         return found
 
     def diagonal(self, field: Field) -> Field:
