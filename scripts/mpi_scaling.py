@@ -23,7 +23,7 @@ from gfmd_cli.solvers.multigrid import Multigrid
 
 STRONG = [(count, points) for points in (512, 1024, 2048) for count in (1, 2)]
 WEAK = [(1, 512), (2, 720), (4, 1024)]
-SECONDS = 8.0  # of repeats of each action, at most
+SECONDS = 4.0  # of repeats of each action, at most
 REPEATS = 200
 
 
