@@ -20,7 +20,7 @@ T = TypeVar("T")
 SIZES = ("PMI_SIZE", "OMPI_COMM_WORLD_SIZE", "MV2_COMM_WORLD_SIZE", "PMIX_SIZE")
 NUMBERS = ("PMI_RANK", "OMPI_COMM_WORLD_RANK", "MV2_COMM_WORLD_RANK", "PMIX_RANK")
 EXPECTED = (GfmdError, MemoryError, ArithmeticError, OSError)
-AWAKE, NAP = 2e-4, 2e-5  # seconds
+AWAKE, LONG_AWAKE, NAP = 2e-4, 2e-2, 2e-5  # seconds
 PATIENCE = 10.0  # seconds that a process with an error waits for the others, then ends them all
 
 
@@ -33,16 +33,16 @@ class Ranks:
         self.rank: int = comm.Get_rank()
         self.size: int = comm.Get_size()
 
-    def wait(self, *requests: Any) -> None:
+    def wait(self, *requests: Any, awake: float = AWAKE) -> None:
         """Until these are done: watching out at first, then asleep in between.
 
-        MPI's own waiting never sleeps; where cores are shared it takes them from the very process
-        that is waited for.
+        Large data need someone awake to move them on, piece by piece. But MPI's own waiting never
+        sleeps: where cores are shared it takes them from the very process that is waited for.
         """
-        awake = time.perf_counter() + AWAKE
+        tired = time.perf_counter() + awake
         for request in requests:
             while not request.Test():
-                if time.perf_counter() > awake:
+                if time.perf_counter() > tired:
                     time.sleep(NAP)
 
     def gather(self, values: Any) -> Field:

@@ -17,7 +17,7 @@ import pyfftw
 from gfmd_cli.physics import wisdom
 from gfmd_cli.physics.fields import Field, Modes
 from gfmd_cli.physics.grid import PLANNING, Grid, Span
-from gfmd_cli.physics.ranks import Ranks, leads
+from gfmd_cli.physics.ranks import LONG_AWAKE, Ranks, leads
 from gfmd_cli.physics.slab_rows import FRAME, SlabRows, SummedRows, suits
 from gfmd_cli.physics.sweeps import Rows
 
@@ -175,11 +175,14 @@ class SlabGrid(Grid):
         if to_columns:
             for (a, b), block in zip(self.spans, blocks, strict=True):
                 block[...] = lines[:, a:b]
-            self.team.wait(self.team.comm.Ialltoallv(in_lines, in_columns))
+            self._finish(self.team.comm.Ialltoallv(in_lines, in_columns))
         else:
-            self.team.wait(self.team.comm.Ialltoallv(in_columns, in_lines))
+            self._finish(self.team.comm.Ialltoallv(in_columns, in_lines))
             for (a, b), block in zip(self.spans, blocks, strict=True):
                 lines[:, a:b] = block
+
+    def _finish(self, exchange: Any) -> None:
+        self.team.wait(exchange, awake=LONG_AWAKE)
 
     def coarser(self, points: int) -> Grid:
         """A grid of fewer points on the same cell; whole where it is too small to share out."""
