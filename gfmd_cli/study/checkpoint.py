@@ -56,7 +56,7 @@ class Checkpoint:
     def _write_part(self, slot: str, grid: Grid, fields: dict[str, Field]) -> dict[str, Any]:
         """Write the rows that this process holds; what the pointer says of them."""
         first = grid.own.start or 0
-        name = f"{slot}{first}"
+        name = slot if grid.whole else f"{slot}{first}"
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
             sums = _write_slot(self.folder / name, list(fields.values()))
