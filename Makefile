@@ -3,7 +3,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 RESULTS := results
 
-.PHONY: demo test test-faults check validate smoke memory paper paper-quick clean
+.PHONY: demo test test-faults test-mpi check validate smoke memory paper paper-quick clean
 
 $(VENV)/.core: pyproject.toml
 	python3 -m venv $(VENV)
@@ -27,6 +27,13 @@ smoke: $(VENV)/.core ## the smallest complete study
 
 test: $(VENV)/.test ## the whole suite
 	$(BIN)/pytest -n 2 --dist loadfile
+
+$(VENV)/.mpi: $(VENV)/.test
+	$(BIN)/pip install --quiet --disable-pip-version-check -e ".[mpi]"
+	touch $@
+
+test-mpi: $(VENV)/.mpi ## runs shared by several processes, with PyPI's MPICH
+	$(BIN)/pytest -m mpi tests/mpi
 
 check: $(VENV)/.test ## the one gate: lint, format, types, import order
 	$(BIN)/ruff check .

@@ -23,7 +23,9 @@ class Commands(click.Group):
         try:
             return super().invoke(ctx)
         except GfmdError as error:
-            for line in str(error).splitlines():
+            from gfmd_cli.physics.ranks import is_first
+
+            for line in str(error).splitlines() if is_first() else ():
                 click.echo(f"gfmd: {line}" if line == str(error) else line, err=True)
             ctx.exit(error.exit_status)
 

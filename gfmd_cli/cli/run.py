@@ -55,34 +55,51 @@ def run(
 
         gfmd run configs/demo.toml --set load.p_star=0.1
     """
+    from gfmd_cli.physics.ranks import launched, together
+
+    ranks = launched()
+    how = {
+        "jobs": jobs,
+        "checkpoint_every": checkpoint_every,
+        "max_seconds": None if max_hours is None else 3600 * max_hours,
+        "reproducible": reproducible,
+        "ranks": ranks,
+    }
+    with together(ranks):
+        missed = _run(spec, output, overrides, _shard(shard), dry_run, quiet, how)
+    sys.exit(1 if missed else 0)
+
+
+def _run(
+    spec: Path,
+    output: Path | None,
+    overrides: tuple[str, ...],
+    shard: tuple[int, int],
+    dry_run: bool,
+    quiet: bool,
+    how: dict[str, Any],
+) -> int:
+    """Run, or list, the tasks of a spec; how many ended other than converged."""
+    from gfmd_cli.physics.ranks import leads
     from gfmd_cli.study.parse import read_spec
 
     resolved, text = read_spec(spec, overrides)
     path = output or Path(f"{resolved.study.name}.h5")
-    share = _shard(shard)
+    ranks = how["ranks"]
     if dry_run:
-        _print_tasks(resolved, path, share)
-        return
+        _print_tasks(resolved, path, shard, ranks)
+        return 0
     from gfmd_cli.study.run import run_study
 
     with Reporter(quiet) as report:
-        outcome = run_study(
-            resolved,
-            text,
-            path,
-            report,
-            shard=share,
-            jobs=jobs,
-            checkpoint_every=checkpoint_every,
-            max_seconds=None if max_hours is None else 3600 * max_hours,
-            reproducible=reproducible,
-        )
+        tell = report if leads(ranks) else lambda progress: None
+        outcome = run_study(resolved, text, path, tell, shard=shard, **how)
     missed = sum(outcome.values()) - outcome["converged"]
-    if not quiet:
+    if leads(ranks) and not quiet:
         told = ", ".join(f"{count} {status}" for status, count in sorted(outcome.items()))
         click.echo(f"{path}: {told or 'no tasks in this shard'}")
         click.echo(f"next: gfmd analyze {path}")
-    sys.exit(1 if missed else 0)
+    return missed
 
 
 def _shard(text: str | None) -> tuple[int, int]:
@@ -95,8 +112,9 @@ def _shard(text: str | None) -> tuple[int, int]:
     return int(index), int(count)
 
 
-def _print_tasks(spec: Any, path: Path, shard: tuple[int, int]) -> None:
+def _print_tasks(spec: Any, path: Path, shard: tuple[int, int], ranks: Any) -> None:
     """The tasks of a shard with what they will take, and whether the study has them."""
+    from gfmd_cli.physics.ranks import leads
     from gfmd_cli.study.resources import check_memory
     from gfmd_cli.study.store import Study
     from gfmd_cli.study.tasks import describe, plan
@@ -106,7 +124,9 @@ def _print_tasks(spec: Any, path: Path, shard: tuple[int, int]) -> None:
     tasks = [task for task in plan(spec) if task.index % shard[1] == shard[0]]
     held = study.held()
     if tasks:
-        check_memory(tasks)
+        check_memory(tasks, ranks)
+    if not leads(ranks):
+        return
     click.echo(f"{'task':>6} {'points':>6} {'load':>10} {'MiB':>8} {'s':>8}  scene")
     for task in tasks:
         done = f"  [{held[task.id]}]" if task.id in held else ""

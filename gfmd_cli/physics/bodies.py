@@ -12,14 +12,28 @@ from pydantic import model_validator
 
 from gfmd_cli.physics.choice import Choice, Positive
 from gfmd_cli.physics.fields import Field
+from gfmd_cli.physics.grid import Grid
 
 SMALLEST_GRID = 8  # points per side; below it no contact is resolved
 
 
-class _Body(Choice):
-    """A single body in the middle of the cell, repeated periodically."""
+class Indenter(Choice):
+    """A rigid surface that any grid can sample."""
 
     dimension: ClassVar[int] = 2
+
+    def heights(self, points: int) -> Field:
+        """Heights [m] on the grid [y, x]; of a line scene, on [x]."""
+        return self.on(Grid(points, self.dimension))
+
+    def on(self, grid: Grid) -> Field:
+        """Heights [m] at the points of a grid that this process holds."""
+        raise NotImplementedError
+
+
+class _Body(Indenter):
+    """A single body in the middle of the cell, repeated periodically."""
+
     length: Positive = 1.0
     """Side of the cell L [m]."""
 
@@ -27,10 +41,14 @@ class _Body(Choice):
         """Any grid: the body is what the grid makes of it."""
         return SMALLEST_GRID
 
-    def _radius(self, points: int) -> Field:
+    def _along(self, grid: Grid) -> Field:
+        """Distance from the middle of the cell along one side [m]."""
+        return (np.arange(grid.points) / grid.points - 0.5) * self.length
+
+    def _radius(self, grid: Grid) -> Field:
         """Distance from the middle of the cell [m]."""
-        along = (np.arange(points) / points - 0.5) * self.length
-        return np.hypot(along[:, None], along)
+        along = self._along(grid)
+        return np.hypot(along[grid.own, None], along)
 
 
 class Parabola(_Body):
@@ -40,9 +58,9 @@ class Parabola(_Body):
     radius: Positive = 1.0
     """Radius of curvature R [m]."""
 
-    def heights(self, points: int) -> Field:
-        """Heights [m] on the grid [y, x]."""
-        return -(self._radius(points) ** 2) / (2 * self.radius)
+    def on(self, grid: Grid) -> Field:
+        """Heights [m] at the points of a grid that this process holds."""
+        return -(self._radius(grid) ** 2) / (2 * self.radius)
 
 
 class PowerLawBody(_Body):
@@ -54,9 +72,9 @@ class PowerLawBody(_Body):
     radius: Positive = 1.0
     """Length R [m]; the radius of curvature for m = 2."""
 
-    def heights(self, points: int) -> Field:
-        """Heights [m] on the grid [y, x]."""
-        return -self.radius * (self._radius(points) / self.radius) ** self.exponent / self.exponent
+    def on(self, grid: Grid) -> Field:
+        """Heights [m] at the points of a grid that this process holds."""
+        return -self.radius * (self._radius(grid) / self.radius) ** self.exponent / self.exponent
 
 
 class Cone(_Body):
@@ -66,9 +84,9 @@ class Cone(_Body):
     slope: Positive = 1.0
     """Slope of the flank."""
 
-    def heights(self, points: int) -> Field:
-        """Heights [m] on the grid [y, x]."""
-        return -self.slope * self._radius(points)
+    def on(self, grid: Grid) -> Field:
+        """Heights [m] at the points of a grid that this process holds."""
+        return -self.slope * self._radius(grid)
 
 
 class Punch(_Body):
@@ -86,9 +104,9 @@ class Punch(_Body):
             raise ValueError(f"radius = {self.radius:g} leaves no rim in a cell of {self.length:g}")
         return self
 
-    def heights(self, points: int) -> Field:
-        """Heights [m] on the grid [y, x]."""
-        face = self._radius(points) <= self.radius * (1 + 1e-12)  # points on the rim belong to it
+    def on(self, grid: Grid) -> Field:
+        """Heights [m] at the points of a grid that this process holds."""
+        face = self._radius(grid) <= self.radius * (1 + 1e-12)  # points on the rim belong to it
         return np.where(face, 0.0, -self.depth)
 
 
@@ -102,9 +120,9 @@ class Ridge(_Body):
     width: Annotated[float, Key(gt=0, le=1)] = 1.0
     """Width at the foot as a share of the cell; the rest is flat."""
 
-    def heights(self, points: int) -> Field:
-        """Heights [m] on the grid [x]."""
-        across = np.abs(np.arange(points) / points - 0.5)
+    def on(self, grid: Grid) -> Field:
+        """Heights [m] at the points of a grid that this process holds."""
+        across = np.abs(np.arange(grid.points) / grid.points - 0.5)
         return -self.slope * self.length * np.minimum(across, 0.5 * self.width)
 
 
@@ -116,10 +134,9 @@ class LineParabola(_Body):
     radius: Positive = 1.0
     """Radius of curvature R [m]."""
 
-    def heights(self, points: int) -> Field:
-        """Heights [m] on the grid [x]."""
-        along = (np.arange(points) / points - 0.5) * self.length
-        return -(along**2) / (2 * self.radius)
+    def on(self, grid: Grid) -> Field:
+        """Heights [m] at the points of a grid that this process holds."""
+        return -(self._along(grid) ** 2) / (2 * self.radius)
 
 
 class Wave(_Body):
@@ -130,6 +147,6 @@ class Wave(_Body):
     amplitude: Positive = 1.0
     """Amplitude [m]."""
 
-    def heights(self, points: int) -> Field:
-        """Heights [m] on the grid [x]."""
-        return self.amplitude * np.cos(2 * np.pi * (np.arange(points) / points - 0.5))
+    def on(self, grid: Grid) -> Field:
+        """Heights [m] at the points of a grid that this process holds."""
+        return self.amplitude * np.cos(2 * np.pi * (np.arange(grid.points) / grid.points - 0.5))

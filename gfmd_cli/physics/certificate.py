@@ -22,8 +22,7 @@ from math import sqrt
 import numpy as np
 
 from gfmd_cli.physics.contact import Contact
-from gfmd_cli.physics.fields import Field
-from gfmd_cli.physics.grid import row_blocks
+from gfmd_cli.physics.fields import Field, row_blocks
 
 DOUBT = 1.0
 """Points whose stress and gap both lie below this many rms violations may be on either side."""
@@ -49,8 +48,8 @@ def certify(contact: Contact, u: Field, sigma: Field) -> Certificate:
     Costs one transform.
     """
     grid, p = contact.grid, contact.pressure
-    loaded = sum(float(np.maximum(sigma[rows], 0.0).sum()) for rows in row_blocks(u)) / grid.size
-    scale = p / loaded
+    loaded = grid.total(sum(float(np.maximum(sigma[r], 0.0).sum()) for r in row_blocks(u)))
+    scale = p * grid.size / loaded
     rest = grid.padded[..., : grid.points]
     sums = np.zeros(6)
     for rows in row_blocks(u):
@@ -62,7 +61,7 @@ def certify(contact: Contact, u: Field, sigma: Field) -> Certificate:
         violation = np.minimum(g, sigma[rows])
         terms = (s * g, s * h, v * (sigma[rows] - p), v * e, violation * violation, v)
         sums += [float(term.sum()) for term in terms]
-    product, lifted, twice_energy, mixed, violated, mean = sums / grid.size
+    product, lifted, twice_energy, mixed, violated, mean = grid.total(sums) / grid.size
     remainder = _compliance(contact)
     duality_gap = max(product + 0.5 * remainder, 0.0)
     reaction = max(twice_energy - 2 * mixed + remainder, 0.0)  # B, as s - p = K u - e
@@ -77,8 +76,8 @@ def certify(contact: Contact, u: Field, sigma: Field) -> Certificate:
     return Certificate(
         gap=duality_gap,
         u_g=abs(mean - centre) + (0.5 * share * reaction + spread) / p,
-        sigma_p=sqrt(2 * duality_gap * float(contact.stiffness.max())),
-        a_r=doubtful / grid.size,
+        sigma_p=sqrt(2 * duality_gap * grid.most(float(contact.stiffness.max()))),
+        a_r=grid.total(doubtful) / grid.size,
     )
 
 
@@ -92,4 +91,4 @@ def _compliance(contact: Contact) -> float:
         stiffness[stiffness == 0.0] = np.inf  # q = 0
         weight = count if grid.dimension == 2 else count[rows]
         total += float(np.sum(weight * np.abs(grid.work[rows]) ** 2 / stiffness))
-    return total / float(grid.size) ** 2
+    return grid.total(total) / float(grid.size) ** 2

@@ -16,13 +16,16 @@ import numpy as np
 from gfmd_cli.errors import InputError
 from gfmd_cli.physics import sweeps
 from gfmd_cli.physics.elastomer import Elastomer, Slab
-from gfmd_cli.physics.fields import Field
-from gfmd_cli.physics.grid import BLOCK, Grid, Operator, row_blocks
+from gfmd_cli.physics.fields import BLOCK, Field, row_blocks
+from gfmd_cli.physics.grid import Grid, Operator
 from gfmd_cli.physics.persson import Shells, shells
+from gfmd_cli.physics.ranks import Ranks
 from gfmd_cli.physics.surface import Surface, sample
 
 ROUNDING = 1e-28  # |h(q)|^2 of a mode that only rounding has excited, relative to the largest
 SCALES = (1e-100, 1e100)  # [m, Pa]: squared, over all of the spectrum, still normal numbers
+EXACT_SQUARES = 2**20  # |q|^2 L^2 / 4 pi^2 up to which each has its own shell on any grid
+MOST_SQUARES = 28  # bits of that on a grid on which each has
 PRESSURES = (1e-30, 1e6)
 """Reduced pressures that are solved. Above 2^17, full contact on every grid, as no peak of a field
 is above its rms times the points per side; sigma - p then only loses digits. Below, squares of p*
@@ -42,6 +45,11 @@ class Contact:
     """Nominal pressure p* = p / Delta_sigma."""
 
     @cached_property
+    def line(self) -> Field:
+        """k(q) of the waves along x, from q = 0 on, shape (points/2 + 1,)."""
+        return self.grid.line(self.stiffness)
+
+    @cached_property
     def elasticity(self) -> Operator:
         """The map K."""
         return self.grid.operator(self.stiffness)
@@ -55,7 +63,7 @@ class Contact:
     def settle(self, u: Field) -> Field:
         """Lift `u` above the indenter and lower it until it touches, in place; return it."""
         np.maximum(u, self.height, out=u)
-        u -= np.min(u - self.height)
+        u += self.grid.most(float(np.max(self.height - u)))
         return np.maximum(u, self.height, out=u)
 
     def residual(self, u: Field, sigma: Field) -> float:
@@ -79,11 +87,8 @@ class Contact:
 
     def coarsen(self, points: int) -> "Contact":
         """The same contact, low-passed to a coarser grid."""
-        grid = replace(self.grid, points=points)
-        half = points // 2
-        k = self.stiffness[..., : half + 1]
-        if self.grid.dimension == 2:
-            k = np.concatenate([k[:half], k[-half:]])
+        grid = self.grid.coarser(points)
+        k = self.grid.cut(self.stiffness, grid)
         return Contact(grid, self.grid.resample(self.height, grid), k, self.pressure)
 
 
@@ -113,19 +118,27 @@ class Scene:
         return Contact(self.grid, self.height, self.stiffness, p_star)
 
 
-def build_scene(surface: Surface, elastomer: Elastomer, points: int, threads: int = 1) -> Scene:
+def build_scene(
+    surface: Surface,
+    elastomer: Elastomer,
+    points: int,
+    threads: int = 1,
+    ranks: Ranks | None = None,
+) -> Scene:
     """Sample the surface and reduce heights and stiffness to the scales of the resolved surface.
+
+    `ranks` are the processes that share large grids.
 
     Raises InputError where the grid does not resolve the surface, the surface is flat, or a scale
     is out of range.
     """
-    grid, height = sample(surface, points)
+    grid, height = sample(surface, points, ranks)
     grid = replace(grid, threads=threads)
-    mean = float(height.mean())
+    mean = grid.total(float(height.sum())) / grid.size
     height -= mean
-    largest = max(float(height.max()), -float(height.min()))
+    largest = grid.most(max(float(height.max()), -float(height.min())))
     height /= largest  # squares of heights of 1e-200 m would vanish
-    rms = float(np.sqrt(np.mean(np.square(height))))
+    rms = sqrt(grid.total(float(np.square(height).sum())) / grid.size)
     height /= rms
     stiffness, stiffest = _stiffness(grid, elastomer)
     m, power = radial_power(grid, height)
@@ -172,11 +185,12 @@ def _stiffness(grid: Grid, elastomer: Elastomer) -> tuple[Field, float]:
     with np.errstate(over="ignore"):  # refused below
         for rows in row_blocks(k):
             k[rows] = elastomer.stiffness(grid.wavenumber(rows), grid.length)
-    stiffest = float(k.max())
+    stiffest = grid.most(float(k.max()))
     if not (np.isfinite(stiffest) and stiffest > 0):
         raise InputError(f"elastomer: stiffness {stiffest} at the shortest wave is out of range")
     k /= stiffest
-    softest = float(k.ravel()[1:].min())  # the first is q = 0
+    waves = k.ravel()[1:] if grid.ends[0] else k  # the first is q = 0
+    softest = -grid.most(-float(waves.min()))
     if not softest >= SCALES[0]:
         raise InputError(f"elastomer: stiffness falls to {softest:g} of its largest value")
     return k, stiffest
@@ -185,16 +199,27 @@ def _stiffness(grid: Grid, elastomer: Elastomer) -> tuple[Field, float]:
 def radial_power(grid: Grid, height: Field) -> tuple[Field, Field]:
     """Sum of |h(q)|^2 over the modes of equal |q|, where it is more than rounding.
 
+    On grids beyond 16384 points a side, large |q| that differ by less than 1e-5 are one.
+
     Returns |q| L / 2 pi, rising, and the sums, both of shape (shells,).
     """
     coefficients = grid.forward_into_work(height)
     half = grid.points // 2
-    total = np.zeros(grid.dimension * half**2 + 1)
+    highest = grid.dimension * half**2
+    merged = max(0, highest.bit_length() - MOST_SQUARES)  # 2^merged squares are one
+    exact = EXACT_SQUARES if merged else highest + 1
+    total = np.zeros(exact + (max(highest - exact, 0) >> merged) + 1)
     for rows in row_blocks(coefficients, max(coefficients.size // 16, BLOCK)):
         square = np.rint(grid.mode_number(rows) ** 2).astype(np.int64)  # a whole number
+        if merged:
+            np.copyto(square, exact + (square - exact >> merged), where=square >= exact)
         weight = grid.multiplicity() if grid.dimension == 2 else grid.multiplicity()[rows]
         power = np.abs(coefficients[rows]) ** 2 * weight
         total += np.bincount(square.ravel(), power.ravel(), minlength=total.size)
+    total = grid.total(total)
     total[0] = 0.0
     (square,) = np.nonzero(total > ROUNDING * total.max())
-    return np.sqrt(square.astype(np.float64)), total[square] / float(grid.size) ** 2
+    squares = square.astype(np.float64)
+    beyond = squares[square >= exact]
+    squares[square >= exact] = exact + (beyond - exact + 0.5) * 2**merged - 0.5  # their middle
+    return np.sqrt(squares), total[square] / float(grid.size) ** 2

@@ -1,4 +1,4 @@
-"""Array types shared by the whole package."""
+"""Array types shared by the whole package, and how to walk over an array."""
 
 from typing import Any, TypeAlias
 
@@ -16,3 +16,11 @@ Marks: TypeAlias = NDArray[np.int8]
 
 Mask: TypeAlias = NDArray[np.bool_]
 """A choice of grid points."""
+
+BLOCK = 2**15  # points of a block of rows: it and its temporaries stay in the cache
+
+
+def row_blocks(field: Field | Modes, block: int = BLOCK) -> list[slice]:
+    """Slices of whole rows of about `block` values each."""
+    step = max(1, block * len(field) // field.size)
+    return [slice(start, start + step) for start in range(0, len(field), step)]

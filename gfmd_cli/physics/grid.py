@@ -5,9 +5,9 @@ Coefficients are kept for non-negative wavenumbers of the last axis only (real t
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 import pyfftw
@@ -16,16 +16,11 @@ from gfmd_cli.physics import sweeps, wisdom
 from gfmd_cli.physics.fields import Field, Modes
 from gfmd_cli.physics.sweeps import Rows
 
+T = TypeVar("T")
 ALL = slice(None)
 THREADED = 512  # points per side from which a second thread pays
 PLANNING = (30.0, 1e-6)  # seconds at most to look for a plan, at all and per grid point
-BLOCK = 2**15  # points of a block of rows: it and its temporaries stay in the cache
-
-
-def row_blocks(field: Field | Modes, block: int = BLOCK) -> list[slice]:
-    """Slices of whole rows of about `block` values each."""
-    step = max(1, block * len(field) // field.size)
-    return [slice(start, start + step) for start in range(0, len(field), step)]
+Span = tuple[int, int]
 
 
 @dataclass(frozen=True)
@@ -61,6 +56,24 @@ class Grid:
         """Number of grid points."""
         return int(self.points**self.dimension)
 
+    def total(self, values: T) -> T:
+        """Sum over the grid, of what was summed over the rows that this process holds."""
+        return values
+
+    def most(self, value: float) -> float:
+        """Largest over the grid, of what is largest over the rows that this process holds."""
+        return value
+
+    @property
+    def own(self) -> slice:
+        """The rows of the grid that a field of this process holds."""
+        return ALL
+
+    @property
+    def whole(self) -> bool:
+        """Whether that is all of them."""
+        return True
+
     def empty(self) -> Field:
         """A real field, aligned for the transforms, values undefined."""
         array: Field = pyfftw.empty_aligned(self.shape, dtype=self.real)
@@ -74,7 +87,7 @@ class Grid:
 
     def mode_number(self, rows: slice = ALL) -> Field:
         """|q| L / 2 pi of every coefficient, shape `spectral_shape` (or of some of its rows)."""
-        along = np.arange(self.points // 2 + 1, dtype=np.float64)
+        along = np.arange(*self.span, dtype=np.float64)
         if self.dimension == 1:
             return along[rows]
         across = np.fft.fftfreq(self.points, 1 / self.points)[rows]
@@ -84,11 +97,16 @@ class Grid:
         """|q| of every coefficient [1/m], shape `spectral_shape` (or of some of its rows)."""
         return self.mode_number(rows) * (2 * np.pi / self.length)
 
+    def line(self, symbol: Field) -> Field:
+        """The values of a symbol along x, from q = 0 to the highest wavenumber."""
+        line: Field = symbol.reshape(-1, symbol.shape[-1])[0]
+        return line
+
     def multiplicity(self) -> Field:
-        """How often a coefficient counts in a sum over all q, shape (points/2 + 1,)."""
+        """How often a coefficient counts in a sum over all q, a row of them."""
         count = np.full(self.points // 2 + 1, 2.0)
         count[0] = count[-1] = 1.0
-        return count
+        return count[slice(*self.span)]
 
     @cached_property
     def _workspace(self) -> tuple[Modes, Callable[[], None], Callable[[], None]]:
@@ -124,9 +142,14 @@ class Grid:
         return self._workspace[0]
 
     @property
+    def spectrum(self) -> Field:
+        """The same as pairs of real values."""
+        return self.work.view(self.real)
+
+    @property
     def padded(self) -> Field:
         """The same memory as rows of real values, two more than the grid has points a row."""
-        return self.work.view(self.real)
+        return self.spectrum
 
     def transform(self) -> None:
         """`work` <- coefficients of the values in `padded`, without the factor 1/size."""
@@ -166,8 +189,9 @@ class Grid:
         Returns the sum over the grid of these values times what becomes of them.
         """
         self.transform()
-        bodies = (self.as_rows(self.padded), self.as_rows(symbol))
-        (total,) = self.rows.sums(1, sweeps.stiffen, *bodies, 1.0 / self.size)
+        bodies = (self.as_rows(self.spectrum), self.as_rows(symbol))
+        sums = self.spectral_rows.sums(1, sweeps.stiffen, *bodies, 1.0 / self.size, *self.ends)
+        (total,) = sums
         self.transform_back()
         return float(total) / self.size
 
@@ -181,13 +205,51 @@ class Grid:
         return Rows(self.points, self._threads) if self.dimension == 2 else Rows(1, 1)
 
     @property
+    def spectral_rows(self) -> Rows:
+        """Likewise, of a sweep over the coefficients."""
+        return self.rows
+
+    @property
+    def span(self) -> Span:
+        """First and last but one wavenumber along x of the coefficients that this process holds."""
+        return 0, self.points // 2 + 1
+
+    @property
+    def ends(self) -> tuple[bool, bool]:
+        """Whether the first and the last of all wavenumbers along x are among these."""
+        first, last = self.span
+        return first == 0, last == self.points // 2 + 1
+
+    @property
     def _threads(self) -> int:
         """Threads that pay: on a small grid, coarse ones of a cascade too, a second only costs."""
         return self.threads if self.points >= THREADED and self.dimension == 2 else 1
 
     def as_rows(self, field: Field) -> Field:
         """A field, a symbol or `padded` with two axes, in one dimension too."""
-        return field.reshape(self.rows.rows, -1)
+        return field if self.dimension == 2 else field.reshape(1, -1)
+
+    def coarser(self, points: int) -> "Grid":
+        """A grid of fewer points on the same cell."""
+        return replace(self, points=points)
+
+    def cut(self, symbol: Field, target: "Grid") -> Field:
+        """The values of a symbol at the wavenumbers of a coarser grid."""
+        half = target.points // 2
+        symbol = symbol[..., : half + 1]
+        return symbol if self.dimension == 1 else np.concatenate([symbol[:half], symbol[-half:]])
+
+    def below(self, lines: Any) -> Any:
+        """The row of a field that follows those which this process holds."""
+        return lines[0]
+
+    def collect(self, field: Field) -> Field | None:
+        """All of a field, on the first process; None on the others."""
+        return field
+
+    def diagonal(self, field: Field) -> Field:
+        """Values along the diagonal [i, i] of the cell; of a line scene, the whole line."""
+        return field.copy() if self.dimension == 1 else np.diagonal(field).copy()
 
     def resample(self, field: Field, target: "Grid") -> Field:
         """The same trigonometric polynomial on another grid of the same cell.
@@ -195,6 +257,13 @@ class Grid:
         A finer grid interpolates; a coarser one loses what it does not resolve, its own highest
         mode included.
         """
+        return target.take(self, field)
+
+    def take(self, source: "Grid", field: Field) -> Field:
+        """A field of another grid, see `resample`."""
+        return source._resample(field, self)
+
+    def _resample(self, field: Field, target: "Grid") -> Field:
         modes, out = self.forward_into_work(field), target.work
         finer = target.points > self.points
         half = min(self.points, target.points) // 2

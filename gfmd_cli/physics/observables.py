@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from gfmd_cli.physics.contact import Contact
-from gfmd_cli.physics.fields import Field, Mask
-from gfmd_cli.physics.grid import row_blocks
+from gfmd_cli.physics.fields import Field, Mask, row_blocks
+from gfmd_cli.physics.grid import Grid
 
 
 def contact_points(contact: Contact, u: Field, sigma: Field) -> Mask:
@@ -16,14 +16,15 @@ def contact_points(contact: Contact, u: Field, sigma: Field) -> Mask:
     return points
 
 
-def switches(mask: Mask) -> int:
+def switches(grid: Grid, mask: Mask) -> int:
     """Changes between contact and non-contact of neighbours along all axes, periodic."""
     count = 0
     for axis in range(mask.ndim):
         lines = np.moveaxis(mask, axis, 0)
+        below = grid.below(lines) if axis == 0 else lines[0]
         count += int(np.count_nonzero(lines[1:] != lines[:-1]))
-        count += int(np.count_nonzero(lines[0] != lines[-1]))
-    return count
+        count += int(np.count_nonzero(lines[-1] != below))
+    return int(grid.total(count))
 
 
 QUANTITIES = ("a_r", "sigma_p", "u_g")
@@ -58,12 +59,12 @@ def observe(contact: Contact, u: Field, sigma: Field) -> Observables:
         elastic = sigma[rows] - contact.pressure
         terms = (v - h, elastic * elastic, v * elastic, sigma[rows] * h, v)
         sums += [float(term.sum()) for term in terms]
-    gap, variance, twice_energy, lifted, mean = sums / grid.size
+    gap, variance, twice_energy, lifted, mean = grid.total(sums) / grid.size
     return Observables(
-        a_r=np.count_nonzero(touching) / grid.size,
+        a_r=int(grid.total(np.count_nonzero(touching))) / grid.size,
         sigma_p=float(np.sqrt(variance)),
         u_g=float(gap),
-        perimeter=switches(touching) / grid.points ** (grid.dimension - 1),
+        perimeter=switches(grid, touching) / grid.points ** (grid.dimension - 1),
         energy=0.5 * float(twice_energy),
         work=float(lifted - contact.pressure * mean),
     )
@@ -96,17 +97,14 @@ def logarithmic_edges() -> Field:
 def stress_distribution(contact: Contact, u: Field, sigma: Field) -> StressDistribution:
     """Histogram of the stress over the points that carry load, as densities over sigma."""
     loaded = sigma[contact_points(contact, u, sigma)]
-    size = contact.grid.size
-    linear, _ = np.histogram(loaded, linear_edges())
-    logarithmic, _ = np.histogram(loaded, logarithmic_edges())
+    grid, size = contact.grid, contact.grid.size
+    linear, logarithmic = (
+        grid.total(np.histogram(loaded, edges())[0]) for edges in (linear_edges, logarithmic_edges)
+    )
+    count = int(grid.total(loaded.size))
     return StressDistribution(
         linear=linear / (size * np.diff(linear_edges())),
         logarithmic=logarithmic / (size * np.diff(logarithmic_edges())),
-        zero=1.0 - loaded.size / size,
-        beyond=float(loaded.size - linear.sum()) / size,
+        zero=1.0 - count / size,
+        beyond=float(count - linear.sum()) / size,
     )
-
-
-def cross_section(field: Field) -> Field:
-    """Values along the diagonal [i, i] of the cell; of a line scene, the whole line."""
-    return field.copy() if field.ndim == 1 else np.diagonal(field).copy()

@@ -1,13 +1,13 @@
 """Rigid indenters: the height h on a grid, pointing towards the elastic body.
 
-Each class is one `kind` of the run spec's [surface]. `heights(points)` samples the surface on the
+Each class is one `kind` of the run spec's [surface]. `on(grid)` samples the surface on the
 grid [y, x] (line scenes: [x]); `smallest_grid()` says which grid resolves it. Equation numbers
 are those of Mueser, "Elastic contacts of randomly rough surfaces across the spatial dimensions".
 """
 
 from functools import cache
 from pathlib import Path
-from typing import Annotated, ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import Field as Key
@@ -17,6 +17,7 @@ from gfmd_cli.errors import InputError
 from gfmd_cli.physics.bodies import (
     SMALLEST_GRID,
     Cone,
+    Indenter,
     LineParabola,
     Parabola,
     PowerLawBody,
@@ -24,9 +25,11 @@ from gfmd_cli.physics.bodies import (
     Ridge,
     Wave,
 )
-from gfmd_cli.physics.choice import Choice, FilePath, Positive, Seed
-from gfmd_cli.physics.fields import Field, Modes
+from gfmd_cli.physics.choice import FilePath, Positive, Seed
+from gfmd_cli.physics.fields import Field
 from gfmd_cli.physics.grid import Grid
+from gfmd_cli.physics.ranks import Ranks
+from gfmd_cli.physics.slabs import lay_out
 from gfmd_cli.physics.topography import (
     Edges,
     Levelling,
@@ -37,7 +40,7 @@ from gfmd_cli.physics.topography import (
 )
 
 
-class SelfAffine(Choice):
+class SelfAffine(Indenter):
     """Random self-affine surface: |h(q)| = sqrt(C(q)), each phase drawn evenly from (0, 2 pi).
 
     Paper Eqs. (3) and (40). The phase of a mode depends on the seed and on the mode alone, so one
@@ -79,10 +82,9 @@ class SelfAffine(Choice):
         """Two points per lambda_s."""
         return max(SMALLEST_GRID, 2 * self.highest_mode)
 
-    def heights(self, points: int) -> Field:
-        """Heights [m] on the grid [y, x]."""
-        grid = Grid(points)
-        self._write_modes(grid.work)
+    def on(self, grid: Grid) -> Field:
+        """Heights [m] at the points of a grid that this process holds."""
+        self._write_modes(grid)
         height = grid.empty()
         grid.backward_into(height)
         return height
@@ -96,31 +98,58 @@ class SelfAffine(Choice):
         known &= reduced >= 1 - 1e-12
         return np.where(known, np.where(known, reduced, 1.0) ** (-1 - self.hurst), 0.0)
 
-    def _write_modes(self, modes: Modes) -> None:
-        """modes <- Fourier coefficients on a grid that resolves the surface.
+    def _write_modes(self, grid: Grid) -> None:
+        """Set `grid.work` to the Fourier coefficients on a grid that resolves the surface.
 
         Phases are drawn in square rings |m|_max = 1, 2, ...; of q and -q one is drawn. The modes
         with a component at the highest wavenumber of the grid stand for +q and -q alike.
         """
+        modes, (first, last) = grid.work, grid.span
         modes[...] = 0.0
         draw = np.random.Generator(np.random.PCG64(self.seed))
         variance = 0.0
         for ring in range(1, self.highest_mode + 1):
-            side = np.arange(-ring, ring + 1)
-            y = np.concatenate([side, np.full(ring, ring), np.full(ring - 1, -ring)])
-            x = np.concatenate([np.full(2 * ring + 1, ring), np.arange(ring), np.arange(1, ring)])
-            value = self._amplitude(np.hypot(y, x)) * np.exp(2j * np.pi * draw.random(4 * ring))
+            y, x, phase = _ring(draw, ring, first, last)
+            value = self._amplitude(np.hypot(y, x)) * np.exp(2j * np.pi * phase)
             variance += 2 * float(np.sum(np.abs(value) ** 2))
-            modes[y, x] = value
-            modes[-ring, 0] = value[2 * ring + 1].conj()  # of (ring, 0), the only one on x = 0
+            modes[y, x - first] = value
+            if first == 0:
+                modes[-ring, 0] = modes[ring, 0].conj()
         if 2 * self.highest_mode == len(modes):  # (0, highest) and (highest, 0) and their mirrors
-            modes[0, -1] = 2 * modes[0, -1].real
-            modes[self.highest_mode, 0] = 2 * modes[self.highest_mode, 0].real
-        if self.h_std is not None and variance > 0:
-            modes *= self.h_std / np.sqrt(variance)
+            if grid.ends[1]:
+                modes[0, -1] = 2 * modes[0, -1].real
+            if grid.ends[0]:
+                modes[self.highest_mode, 0] = 2 * modes[self.highest_mode, 0].real
+        if self.h_std is not None:
+            modes *= self.h_std / np.sqrt(grid.total(variance) or 1.0)
 
 
-class FileSurface(Choice):
+def _ring(draw: np.random.Generator, ring: int, first: int, last: int) -> tuple[Any, Any, Field]:
+    """The modes of a square ring with first <= m_x < last, and the phases drawn for them / 2 pi.
+
+    In the order of the draw: m_x = ring from m_y = -ring on; m_y = ring; m_y = -ring. The draws for
+    the others are skipped.
+    """
+    side = (0, 2 * ring + 1) if first <= ring < last else (0, 0)
+    above = tuple(2 * ring + 1 + min(x, ring) for x in (first, last))
+    below = tuple(3 * ring + max(min(x, ring), 1) for x in (first, last))
+    drawn, phases, places = 0, [], []
+    for begin, end in (side, above, below):
+        if begin > drawn:
+            draw.bit_generator.advance(begin - drawn)  # type: ignore[attr-defined]
+        phases.append(draw.random(end - begin))
+        places.append(np.arange(begin, end))
+        drawn = max(drawn, end)
+    if drawn < 4 * ring:
+        draw.bit_generator.advance(4 * ring - drawn)  # type: ignore[attr-defined]
+    place = np.concatenate(places)
+    on_side, is_above = place <= 2 * ring, place <= 3 * ring
+    y = np.where(on_side, place - ring, np.where(is_above, ring, -ring))
+    x = np.where(on_side, ring, place - np.where(is_above, 2 * ring + 1, 3 * ring))
+    return y, x, np.concatenate(phases)
+
+
+class FileSurface(Indenter):
     """A height map from a file: .npy, HDF5, netCDF, or what microscopes write (SurfaceTopography).
 
     A `.npy` or HDF5 array is periodic and used as it is. A scan is not: it is levelled, and its
@@ -155,10 +184,12 @@ class FileSurface(Choice):
             raise InputError(f"{self.path}: surface.path: the map is flat; roughness is needed")
         return len(heights)
 
-    def heights(self, points: int) -> Field:
-        """Heights [m] on the grid [y, x]: the map's own, or Fourier-interpolated between them."""
-        own = self._periodic_heights()
-        return own if len(own) == points else Grid(len(own)).resample(own, Grid(points))
+    def on(self, grid: Grid) -> Field:
+        """Heights [m] at the points of a grid: the map's own, or Fourier-interpolated."""
+        heights = self._periodic_heights()
+        if len(heights) != grid.points:
+            return Grid(len(heights)).resample(heights, grid)
+        return heights if grid.whole else heights[grid.own].copy()
 
     @property
     def cell(self) -> float:
@@ -193,8 +224,10 @@ Surface = Annotated[
 ]
 
 
-def sample(surface: Surface, points: int) -> tuple[Grid, Field]:
+def sample(surface: Surface, points: int, ranks: Ranks | None = None) -> tuple[Grid, Field]:
     """The surface on `points` per side of its cell: the grid and the heights [m].
+
+    `ranks` are the processes that share large grids.
 
     Raises InputError where the grid does not resolve the surface, or the surface is flat, or its
     heights overflow.
@@ -205,12 +238,13 @@ def sample(surface: Surface, points: int) -> tuple[Grid, Field]:
             f"grid.points: {points} points per side do not resolve this surface "
             f"(kind {surface.kind!r}); {needed} or more do"
         )
+    length = surface.cell if isinstance(surface, FileSurface) else surface.length
+    grid = lay_out(points, surface.dimension, length, ranks)
     with np.errstate(over="ignore", invalid="ignore"):  # refused below
-        heights = surface.heights(points)
-        range_of_heights = float(np.ptp(heights))
+        heights = surface.on(grid)
+        range_of_heights = grid.most(float(heights.max())) + grid.most(-float(heights.min()))
     if not np.isfinite(range_of_heights):
         raise InputError(f"surface: heights overflow (kind {surface.kind!r}); choose other units")
     if range_of_heights == 0:
         raise InputError(f"surface: flat (kind {surface.kind!r}); reduced units need roughness")
-    length = surface.cell if isinstance(surface, FileSurface) else surface.length
-    return Grid(points, surface.dimension, length), heights
+    return grid, heights

@@ -14,15 +14,20 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from gfmd_cli.physics.fields import Field
+from gfmd_cli.physics.fields import Field, Mask
 
+THREADED = 256  # rows of a coarse level from which a second thread pays
 kernel: Any = njit(
     cache=True, nogil=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz"}
 )
 
 
 class Rows:
-    """Shares the rows of a grid out over threads."""
+    """Shares the rows of a grid out over threads.
+
+    Where a process holds some of the rows only, the arrays of sweeps that reach over to other rows
+    have a frame, a few rows of the neighbours above and below; see `slab_rows`. Here there is none.
+    """
 
     def __init__(self, rows: int, threads: int) -> None:
         self.rows = rows
@@ -30,12 +35,13 @@ class Rows:
         edges = np.linspace(0, rows, threads + 1).astype(int)
         self.parts = [(int(a), int(b)) for a, b in pairwise(edges) if a < b]
 
-    def __call__(self, sweep: Callable[..., None], *arguments: Any) -> None:
-        """Run a kernel over all rows."""
+    def __call__(self, sweep: Callable[..., None], *arguments: Any, first: int = 0) -> None:
+        """Run a kernel over all rows, which are those from `first` on in its arrays."""
         if self.pool is None or len(self.parts) == 1:
-            sweep(*arguments, 0, self.rows)
+            sweep(*arguments, first, first + self.rows)
         else:
-            list(self.pool.map(lambda part: sweep(*arguments, *part), self.parts))
+            parts = [(first + a, first + b) for a, b in self.parts]
+            list(self.pool.map(lambda part: sweep(*arguments, *part), parts))
 
     def sums(self, count: int, sweep: Callable[..., None], *arguments: Any) -> Field:
         """Run a kernel whose last array takes `count` sums a row; return their totals."""
@@ -43,6 +49,46 @@ class Rows:
         self(sweep, *arguments, out)
         totals: Field = out.sum(axis=0)
         return totals
+
+    def empty(self, *shape: int, dtype: Any) -> Any:
+        """An array of rows of this shape, with a frame."""
+        return np.empty((self.rows, *shape), dtype)
+
+    def inside(self, framed: Any) -> Any:
+        """The rows without the frame."""
+        return framed
+
+    def framed(self, field: Field) -> Field:
+        """A field with a frame; good until the next transform."""
+        return field
+
+    def meet(self, *framed: Any) -> None:
+        """Fill the frames with what lies there."""
+
+    def over(self, sweep: Callable[..., None], *arguments: Any) -> None:
+        """Run a kernel over arrays with frames."""
+        self(sweep, *arguments)
+
+    def framed_sums(self, count: int, sweep: Callable[..., None], *arguments: Any) -> Field:
+        """Likewise, with sums; see `sums`."""
+        return self.sums(count, sweep, *arguments)
+
+    def coarser(self) -> "Rows":
+        """Every other row."""
+        rows = self.rows // 2
+        return Rows(rows, len(self.parts) if rows >= THREADED else 1)
+
+    def from_finer(self, sweep: Callable[..., None], sources: Any, targets: Any) -> None:
+        """Run a kernel from framed arrays of rows twice as dense into framed arrays of these."""
+        self(sweep, *sources, *targets)
+
+    def for_finer(self, framed: Any) -> Any:
+        """Framed rows as a kernel over framed rows twice as dense takes them."""
+        return framed
+
+    def every(self, mask: Mask) -> bool:
+        """Whether all of a framed mask is true."""
+        return bool(mask.all())
 
 
 FREE, TENSE, PRESSED = 0, 1, 2
@@ -192,13 +238,16 @@ def advance(h, u, sigma, direction, length, share, padded, change, marks, out, a
 
 
 @kernel
-def stiffen(padded, k, factor, out, a, b):  # type: ignore[no-untyped-def]
-    """Coefficients times factor k(q); sum over all q of k(q) |coefficient|^2."""
+def stiffen(padded, k, factor, first, final, out, a, b):  # type: ignore[no-untyped-def]
+    """Coefficients times factor k(q); sum over all q of k(q) |coefficient|^2.
+
+    `first` and `final`: whether a row begins at q_x = 0, and ends at the highest q_x.
+    """
     last = k.shape[1] - 1
     for i in range(a, b):
         total = 0.0
-        ends = k[i, 0] * (padded[i, 0] ** 2 + padded[i, 1] ** 2)
-        ends += k[i, last] * (padded[i, 2 * last] ** 2 + padded[i, 2 * last + 1] ** 2)
+        ends = first * k[i, 0] * (padded[i, 0] ** 2 + padded[i, 1] ** 2)
+        ends += final * k[i, last] * (padded[i, 2 * last] ** 2 + padded[i, 2 * last + 1] ** 2)
         for j in range(k.shape[1]):
             weight, re, im = k[i, j], padded[i, 2 * j], padded[i, 2 * j + 1]
             total += weight * (re * re + im * im)

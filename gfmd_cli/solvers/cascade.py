@@ -185,7 +185,7 @@ def _start(fine: Contact, coarse: Contact | None, state: State | None) -> Field:
     """The coarse solution on the finer grid, or a flat body that touches the highest point."""
     if coarse is None or state is None:
         u = fine.grid.empty()
-        u[...] = fine.height.max()
+        u[...] = fine.grid.most(float(fine.height.max()))
         return u
     return coarse.grid.resample(state.u, fine.grid)
 
@@ -196,7 +196,7 @@ def full_contact(contact: Contact, solver: str) -> Solution | None:
     stress = grid.padded[..., : grid.points]
     stress[...] = h
     grid.filter_padded(contact.stiffness)
-    if float(stress.min()) + contact.pressure < 0:
+    if contact.pressure < grid.most(-float(stress.min())):
         return None
     u, sigma = h.copy(), contact.grid.empty()
     np.add(stress, contact.pressure, out=sigma)

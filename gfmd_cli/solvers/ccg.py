@@ -15,6 +15,7 @@ import numpy as np
 from gfmd_cli.physics.choice import Choice
 from gfmd_cli.physics.contact import Contact
 from gfmd_cli.physics.fields import Field, Mask
+from gfmd_cli.physics.grid import Grid
 from gfmd_cli.solvers.loop import State
 
 
@@ -38,7 +39,7 @@ class ConstrainedCG(Choice):
             state.residual = contact.residual(u, sigma)
             yield state
             pressed = self._force(contact, state, force)  # [1] admissible residual
-            self._turn(state, force, pressed)  # [2] the new direction
+            self._turn(contact.grid, state, force, pressed)  # [2] the new direction
             state.fields["force"], force = force, state.fields["force"]
             direction = state.fields["direction"]
             contact.elasticity(direction, out=answer)
@@ -47,7 +48,7 @@ class ConstrainedCG(Choice):
             np.multiply(direction, length, out=force)
             u += force
             below = u < h
-            if np.any(below):
+            if contact.grid.total(np.count_nonzero(below)):
                 u[below] = h[below]  # [4] admissible displacement
                 contact.stress(u, out=sigma)
                 state.transforms += 2
@@ -65,17 +66,17 @@ class ConstrainedCG(Choice):
         force[pressed] = 0.0
         return pressed
 
-    def _turn(self, state: State, force: Field, pressed: Mask) -> None:
+    def _turn(self, grid: Grid, state: State, force: Field, pressed: Mask) -> None:
         """d <- f + beta d, beta = f (f - f_old) / (length d K d), where length d K d = f_old d."""
         direction, descent = state.fields["direction"], state.scalars["descent"]
         beta = 0.0
         if descent > 0:
-            change = float(np.vdot(force, force) - np.vdot(force, state.fields["force"]))
-            beta = change / descent
+            change = np.vdot(force, force) - np.vdot(force, state.fields["force"])
+            beta = grid.total(float(change)) / descent
         direction *= beta
         direction += force
         direction[pressed] = 0.0
-        state.scalars["descent"] = float(np.vdot(force, direction))
+        state.scalars["descent"] = grid.total(float(np.vdot(force, direction)))
 
     def _length(self, contact: Contact, state: State, answer: Field) -> float:
         """The length that minimises the energy along the direction d; `answer` is K d.
@@ -83,7 +84,9 @@ class ConstrainedCG(Choice):
         Along a direction that costs no energy, as when nothing touches, the height of the
         indenter limits it.
         """
+        grid, h = contact.grid, contact.height
         direction, descent = state.fields["direction"], state.scalars["descent"]
-        curvature = float(np.vdot(direction, answer))
-        reach = float(np.ptp(contact.height)) / max(float(np.abs(direction).max()), 1e-300)
+        curvature = grid.total(float(np.vdot(direction, answer)))
+        reach = grid.most(float(h.max())) + grid.most(-float(h.min()))
+        reach /= max(grid.most(float(np.abs(direction).max())), 1e-300)
         return descent / curvature if curvature * reach > abs(descent) else reach

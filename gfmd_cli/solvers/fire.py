@@ -46,8 +46,8 @@ class Fire(Choice):
         """Advance `state` in place by Verlet steps, one pair of transforms each."""
         h, u, sigma, memory = contact.height, state.u, state.sigma, state.scalars
         velocity = state.fields["velocity"]  # (u - u_old) / dt: the time step changes
-        k_max = float(contact.stiffness.max())
-        trial, stress, move = (contact.grid.empty() for _ in range(3))
+        grid, k_max = contact.grid, contact.grid.most(float(contact.stiffness.max()))
+        trial, stress, move = (grid.empty() for _ in range(3))
         while True:
             state.residual = contact.residual(u, sigma)
             yield state
@@ -61,8 +61,8 @@ class Fire(Choice):
             contact.stress(trial, out=stress)
             state.transforms += 2
             np.subtract(trial, u, out=move)
-            change = float(np.vdot(move, sigma) + np.vdot(move, stress))  # of energy, x 2 size
-            kinetic = float(np.vdot(velocity, velocity))
+            change = np.vdot(move, sigma) + np.vdot(move, stress)  # of energy, x 2 size
+            change, kinetic = grid.total(np.array([change, np.vdot(velocity, velocity)]))
             if change <= 0:  # [3] else stay
                 u[...] = trial
                 sigma[...] = stress
@@ -71,5 +71,5 @@ class Fire(Choice):
                 memory["time_step"], memory["kinetic"] = SHRINKAGE * dt, 0.0
             else:
                 memory["time_step"] = min(GROWTH * dt, self.time_step)
-                memory["kinetic"] = kinetic
+                memory["kinetic"] = float(kinetic)
             state.step += 1

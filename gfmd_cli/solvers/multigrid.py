@@ -42,7 +42,7 @@ def _levels(contact: Contact) -> list[tuple[int, float, float]]:
 
     Scaled at the wave of four points a period; energies are sums over the points of the finest.
     """
-    line, side = contact.stiffness[0], contact.grid.points
+    line, side = contact.line, contact.grid.points
     sides = [side]
     while sides[-1] % 2 == 0 and sides[-1] // 2 >= COARSEST:
         sides.append(sides[-1] // 2)
@@ -63,44 +63,56 @@ class Multigrid:
         self.scale = 1.0 / scales[0]
         self.ratios = [finer / coarser for finer, coarser in pairwise(scales)]
         self.springs = [np.float32(UNIT * SPRING * growth) for growth in growths[1:]]
-        sides = sides[1:]
+        self.shares = [rows.coarser()]
+        while len(self.shares) < len(sides) - 1:
+            self.shares.append(self.shares[-1].coarser())
+        levels = list(zip(self.shares, sides[1:], strict=True))
         self.right, self.x, self.y = (
-            [np.empty((n, n), dtype=np.float32) for n in sides] for _ in range(3)
+            [share.empty(n, dtype=np.float32) for share, n in levels] for _ in range(3)
         )
-        self.weights = [np.empty((n, n), dtype=np.int8) for n in sides]
-        self.ties = [np.zeros((4, n, n + 1), dtype=np.uint8) for n in sides]
-        self.shares = [Rows(n, len(rows.parts)) if n >= 256 else Rows(n, 1) for n in sides]
+        self.weights = [share.empty(n, dtype=np.int8) for share, n in levels]
+        self.ties = [share.empty(4, n + 1, dtype=np.uint8) for share, n in levels]
 
     def apply(
         self, sigma: Field, marks: Marks, least: int, change: Field, padded: Field
     ) -> tuple[float, float]:
         """padded <- z, the preconditioned force -sigma of the free points.
 
-        Returns the sums of z times force and of z times `change`.
+        `marks` have a frame. Returns the sums of z times force and of z times `change`.
         """
+        self.rows.meet(marks)
         self.tie(marks, least)
-        bodies = (sigma, marks, least)
-        self.shares[0](sweeps.first_residual, *bodies, self.right[0])
-        last = len(self.x) - 1
-        for level, share in enumerate(self.shares):
+        bodies = (self.rows.framed(sigma), marks, least)
+        self.shares[0].from_finer(sweeps.first_residual, bodies, self.right[:1])
+        self.descend()
+        for level in range(len(self.shares) - 2, -1, -1):
             right, x, y, ties, spring = self.level(level)
-            share(sweeps.smooth_first, right, ties, spring, y)
-            if level < last:
-                share = self.shares[level + 1]
-                share(sweeps.residual, right, y, ties, spring, self.right[level + 1])
-        for _ in range(LAST_SWEEPS):
-            share(sweeps.smooth, right, y, ties, spring, x)
-            share(sweeps.smooth, right, x, ties, spring, y)
-        for level in range(last - 1, -1, -1):
-            right, x, y, ties, spring = self.level(level)
-            share = self.shares[level]
-            coarse = (self.y[level + 1], self.ratios[level + 1])
-            share(sweeps.smooth_corrected, right, y, ties, spring, *coarse, x)
-            share(sweeps.smooth, right, x, ties, spring, y)
-        slope, turned = self.rows.sums(
-            2, sweeps.last_smooth, *bodies, self.y[0], self.ratios[0], self.scale, change, padded
+            coarse = (self.shares[level + 1].for_finer(self.y[level + 1]), self.ratios[level + 1])
+            self.smooth(level, sweeps.smooth_corrected, right, y, ties, spring, *coarse, x)
+            self.smooth(level, sweeps.smooth, right, x, ties, spring, y)
+        coarse = (self.shares[0].for_finer(self.y[0]), self.ratios[0])
+        slope, turned = self.rows.framed_sums(
+            2, sweeps.last_smooth, *bodies, *coarse, self.scale, change, padded
         )
         return float(slope), float(turned)
+
+    def descend(self) -> None:
+        """From the finest of the coarse levels to the last, smoothing on each."""
+        last = len(self.shares) - 1
+        for level in range(last + 1):
+            right, x, y, ties, spring = self.level(level)
+            self.smooth(level, sweeps.smooth_first, right, ties, spring, y)
+            if level < last:
+                finer, coarser = (right, y, ties, spring), self.right[level + 1 : level + 2]
+                self.shares[level + 1].from_finer(sweeps.residual, finer, coarser)
+        for _ in range(LAST_SWEEPS):
+            self.smooth(last, sweeps.smooth, right, y, ties, spring, x)
+            self.smooth(last, sweeps.smooth, right, x, ties, spring, y)
+
+    def smooth(self, level: int, sweep: Any, *arguments: Any) -> None:
+        """Run a sweep that writes to the last of its arguments."""
+        self.shares[level].over(sweep, *arguments)
+        self.shares[level].meet(arguments[-1])
 
     def level(self, level: int) -> tuple[Any, ...]:
         """Right-hand side, two fields to work in, ties and the stiffness of springs of a level."""
@@ -110,12 +122,8 @@ class Multigrid:
     def tie(self, marks: Marks, least: int) -> None:
         """Tie the coarse levels to the points held."""
         for level, share in enumerate(self.shares):
+            targets = (self.ties[level], self.weights[level])
             if level == 0:
-                share(sweeps.first_ties, marks, least, self.ties[0], self.weights[0])
+                share.from_finer(sweeps.first_ties, (marks, least), targets)
             else:
-                share(
-                    sweeps.further_ties,
-                    self.weights[level - 1],
-                    self.ties[level],
-                    self.weights[level],
-                )
+                share.from_finer(sweeps.further_ties, self.weights[level - 1 : level], targets)

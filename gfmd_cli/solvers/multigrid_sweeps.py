@@ -1,7 +1,8 @@
 """The sweeps of the multigrid cycle, compiled; see `multigrid`.
 
 Rows in rings: each sweep walks down a level and holds the few rows that its stencils reach over,
-with two values more at either end, so that no wide field is written between two stencils.
+with two values more at either end, so that no wide field is written between two stencils. What lies
+above the first and below the last row is found at the other end, or in the frame of a slab.
 """
 
 import numpy as np
@@ -16,7 +17,7 @@ DAMPING = 0.55  # of the Jacobi sweeps
 def _tie(up, mid, down, ties, weights, i):  # type: ignore[no-untyped-def]
     """Row i of ties and weights, from the weights of three fine rows; see `first_ties`."""
     m = weights.shape[1]
-    own, east, south, cross, row = ties[0, i], ties[1, i], ties[2, i], ties[3, i], weights[i]
+    own, east, south, cross, row = ties[i, 0], ties[i, 1], ties[i, 2], ties[i, 3], weights[i]
     for j in range(m):
         e, o = 2 * j, 2 * j + 1
         w = o - 2 if j > 0 else 2 * m - 1
@@ -37,11 +38,11 @@ def first_ties(marks, least, ties, weights, a, b):  # type: ignore[no-untyped-de
     ties: P^T w P in 1/64, for a point, its neighbours to the right, below, and across; w is the
     weight of the finer points in quarters, and that of a hat P^T w, at most 1.
     """
-    n = marks.shape[0]
+    height, n = marks.shape
     rows = np.empty((3, n), dtype=np.int32)
     for i in range(a, b):
         for k in range(3):
-            source, row = marks[(2 * i - 1 + k) % n], rows[k]
+            source, row = marks[(2 * i - 1 + k) % height], rows[k]
             for j in range(n):
                 row[j] = 4 if source[j] >= least else 0
         _tie(rows[0], rows[1], rows[2], ties, weights, i)
@@ -50,11 +51,11 @@ def first_ties(marks, least, ties, weights, a, b):  # type: ignore[no-untyped-de
 @kernel
 def further_ties(fine, ties, weights, a, b):  # type: ignore[no-untyped-def]
     """Likewise, from the weights of the level below."""
-    n = fine.shape[0]
+    height, n = fine.shape
     rows = np.empty((3, n), dtype=np.int32)
     for i in range(a, b):
         for k in range(3):
-            source, row = fine[(2 * i - 1 + k) % n], rows[k]
+            source, row = fine[(2 * i - 1 + k) % height], rows[k]
             for j in range(n):
                 row[j] = source[j]
         _tie(rows[0], rows[1], rows[2], ties, weights, i)
@@ -112,18 +113,19 @@ def _interpolate(one, other, ratio, out):  # type: ignore[no-untyped-def]
 @kernel
 def first_residual(sigma, marks, least, coarse, a, b):  # type: ignore[no-untyped-def]
     """coarse <- restricted residual of the force after one sweep from zero."""
-    n = sigma.shape[0]
+    height, n = sigma.shape
     share = np.float32(DAMPING / PLATE)
     force, bent = np.empty((5, n + 4), np.float32), np.empty((3, n + 4), np.float32)
     rest = np.zeros((3, n + 1), np.float32)
     for i in range(2 * a - 5, 2 * b):
         # row i + 2 of the force, i + 1 of its Laplacian, i of the residual
-        _force(sigma[(i + 2) % n], marks[(i + 2) % n], least, force[(i + 2) % 5])
+        k = (i + 2) % height
+        _force(sigma[k], marks[k], least, force[(i + 2) % 5])
         _laplacian(force[i % 5], force[(i + 1) % 5], force[(i + 2) % 5], bent[(i + 1) % 3])
         if i < 2 * a - 1:
             continue
         up, mid, down = bent[(i - 1) % 3], bent[i % 3], bent[(i + 1) % 3]
-        source, row, held = force[i % 5], rest[i % 3], marks[i % n]
+        source, row, held = force[i % 5], rest[i % 3], marks[i % height]
         for j in range(n):
             c = j + 2
             plate = np.float32(4.0) * mid[c] - (up[c] + down[c] + mid[c - 1] + mid[c + 1])
@@ -135,12 +137,16 @@ def first_residual(sigma, marks, least, coarse, a, b):  # type: ignore[no-untype
 
 @kernel
 def last_smooth(sigma, marks, least, coarse, ratio, scale, change, padded, out, a, b):  # type: ignore[no-untyped-def]
-    """padded <- z: one sweep on the sum of the first sweep and P coarse; sums as of `apply`."""
-    n, m = sigma.shape[0], coarse.shape[0]
+    """padded <- z: one sweep on the sum of the first sweep and P coarse; sums as of `apply`.
+
+    `change` and `padded` have no frame.
+    """
+    (height, n), m = sigma.shape, coarse.shape[0]
+    frame = (height - change.shape[0]) // 2
     share, ratio = np.float32(DAMPING / PLATE), np.float32(ratio)
     x, bent = np.empty((5, n + 4), np.float32), np.empty((3, n + 4), np.float32)
     for i in range(a - 4, b):
-        k = (i + 2) % n
+        k = (i + 2) % height
         new, held, stress = x[(i + 2) % 5], marks[k], sigma[k]
         _interpolate(coarse[k // 2], coarse[((k + 1) // 2) % m], ratio, new)
         for j in range(n):
@@ -151,7 +157,8 @@ def last_smooth(sigma, marks, least, coarse, ratio, scale, change, padded, out, 
         if i < a:
             continue
         up, mid, down = bent[(i - 1) % 3], bent[i % 3], bent[(i + 1) % 3]
-        source, held, stress, row, changed = x[i % 5], marks[i], sigma[i], padded[i], change[i]
+        source, held, stress = x[i % 5], marks[i], sigma[i]
+        row, changed = padded[i - frame], change[i - frame]
         slope = turned = 0.0
         for j in range(n):
             c = j + 2
@@ -168,13 +175,13 @@ def last_smooth(sigma, marks, least, coarse, ratio, scale, change, padded, out, 
 @kernel
 def _rest(i, x, bent, ties, spring, right, out):  # type: ignore[no-untyped-def]
     """out <- row i of right - A x; `x` and `bent` are rings of rows."""
-    n = right.shape[1]
+    height, n = right.shape
     xu, xm, xd = x[(i - 1) % 5], x[i % 5], x[(i + 1) % 5]
     up, mid, down = bent[(i - 1) % 3], bent[i % 3], bent[(i + 1) % 3]
-    k = i % n
-    above = k - 1 if k > 0 else n - 1
-    own, east, south, cross = ties[0, k], ties[1, k], ties[2, k], ties[3, k]
-    north, past, b = ties[2, above], ties[3, above], right[k]
+    k = i % height
+    above = k - 1 if k > 0 else height - 1
+    own, east, south, cross = ties[k, 0], ties[k, 1], ties[k, 2], ties[k, 3]
+    north, past, b = ties[above, 2], ties[above, 3], right[k]
     for j in range(n):  # four loops: with more arrays in one the compiler gives up on vectors
         c = j + 2
         plate = np.float32(4.0) * mid[c] - (up[c] + down[c] + mid[c - 1] + mid[c + 1])
@@ -211,19 +218,19 @@ def _sweep(i, a, x, bent, ties, spring, right, rest, y):  # type: ignore[no-unty
     _laplacian(x[i % 5], x[(i + 1) % 5], new, bent[(i + 1) % 3])
     if i >= a:
         _rest(i, x, bent, ties, spring, right, rest)
-        _relax(i, x, ties[0, i], spring, rest, y[i])
+        _relax(i, x, ties[i, 0], spring, rest, y[i])
 
 
 @kernel
 def smooth_first(right, ties, spring, y, a, b):  # type: ignore[no-untyped-def]
     """y <- two sweeps from zero."""
-    n = right.shape[0]
+    height, n = right.shape
     unit, plate = spring * np.float32(1 / DAMPING), np.float32(PLATE / DAMPING)
     x, bent = np.empty((5, n + 4), np.float32), np.empty((3, n + 4), np.float32)
     rest = np.empty(n + 1, np.float32)
     for i in range(a - 4, b):
-        k = (i + 2) % n
-        new, force, own = x[(i + 2) % 5], right[k], ties[0, k]
+        k = (i + 2) % height
+        new, force, own = x[(i + 2) % 5], right[k], ties[k, 0]
         for j in range(n):
             new[j + 2] = force[j] / (plate + unit * np.float32(own[j + 1]))
         _sweep(i, a, x, bent, ties, spring, right, rest, y)
@@ -232,23 +239,23 @@ def smooth_first(right, ties, spring, y, a, b):  # type: ignore[no-untyped-def]
 @kernel
 def smooth(right, old, ties, spring, y, a, b):  # type: ignore[no-untyped-def]
     """y <- one sweep on `old`."""
-    n = right.shape[0]
+    height, n = right.shape
     x, bent = np.empty((5, n + 4), np.float32), np.empty((3, n + 4), np.float32)
     rest = np.empty(n + 1, np.float32)
     for i in range(a - 4, b):
-        x[(i + 2) % 5, 2 : n + 2] = old[(i + 2) % n]
+        x[(i + 2) % 5, 2 : n + 2] = old[(i + 2) % height]
         _sweep(i, a, x, bent, ties, spring, right, rest, y)
 
 
 @kernel
 def smooth_corrected(right, old, ties, spring, coarse, ratio, y, a, b):  # type: ignore[no-untyped-def]
     """y <- one sweep on `old` plus P coarse."""
-    n, m = right.shape[0], coarse.shape[0]
+    (height, n), m = right.shape, coarse.shape[0]
     ratio = np.float32(ratio)
     x, bent = np.empty((5, n + 4), np.float32), np.empty((3, n + 4), np.float32)
     rest = np.empty(n + 1, np.float32)
     for i in range(a - 4, b):
-        k = (i + 2) % n
+        k = (i + 2) % height
         new, source = x[(i + 2) % 5], old[k]
         _interpolate(coarse[k // 2], coarse[((k + 1) // 2) % m], ratio, new)
         for j in range(n):
@@ -259,12 +266,12 @@ def smooth_corrected(right, old, ties, spring, coarse, ratio, y, a, b):  # type:
 @kernel
 def residual(right, y, ties, spring, coarse, a, b):  # type: ignore[no-untyped-def]
     """coarse <- restricted residual of y."""
-    n = right.shape[0]
+    height, n = right.shape
     x, bent = np.empty((5, n + 4), np.float32), np.empty((3, n + 4), np.float32)
     rest = np.zeros((3, n + 1), np.float32)
     for i in range(2 * a - 5, 2 * b):
         new = x[(i + 2) % 5]
-        new[2 : n + 2] = y[(i + 2) % n]
+        new[2 : n + 2] = y[(i + 2) % height]
         _wrap(new)
         _laplacian(x[i % 5], x[(i + 1) % 5], new, bent[(i + 1) % 3])
         if i < 2 * a - 1:

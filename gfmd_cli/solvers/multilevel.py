@@ -9,7 +9,7 @@ so any k(q) will do. One application costs a few sweeps over the array and no tr
 import numpy as np
 
 from gfmd_cli.physics.contact import Contact
-from gfmd_cli.physics.fields import Field, Marks
+from gfmd_cli.physics.fields import Field, Marks, Mask
 from gfmd_cli.physics.sweeps import Rows, kernel
 
 COARSEST = 4  # hats a side on the last level: the next would overlap themselves
@@ -21,49 +21,55 @@ class Multilevel:
     def __init__(self, contact: Contact, rows: Rows) -> None:
         self.rows = rows
         self.energies = hat_energies(contact)
-        side = contact.grid.points
-        sides = [side >> level for level in range(1, len(self.energies))]
-        self.fields = [np.empty((n, n), dtype=np.float32) for n in sides]
-        self.held = [np.empty((n, n), dtype=np.bool_) for n in sides]
-        self.shares = [Rows(n, len(rows.parts)) if n >= 256 else Rows(n, 1) for n in sides]
+        side, share = contact.grid.points, rows
+        self.shares: list[Rows] = []
+        self.fields: list[Field] = []
+        self.held: list[Mask] = []
+        for level in range(1, len(self.energies)):
+            share = share.coarser()
+            self.shares.append(share)
+            self.fields.append(share.empty(side >> level, dtype=np.float32))
+            self.held.append(share.empty(side >> level, dtype=np.bool_))
 
     def apply(
         self, sigma: Field, marks: Marks, least: int, change: Field, padded: Field
     ) -> tuple[float, float]:
         """padded <- z, the preconditioned force -sigma of the free points.
 
-        Returns the sums of z times force and of z times `change`.
+        `marks` have a frame. Returns the sums of z times force and of z times `change`.
         """
-        bodies = (sigma, marks, least)
+        self.rows.meet(marks)
+        bodies = (self.rows.framed(sigma), marks, least)
         depth = 0
-        for depth, (field, mask) in enumerate(zip(self.fields, self.held, strict=True)):
+        for depth, share in enumerate(self.shares):
+            targets = (self.fields[depth], self.held[depth])
             if depth == 0:
-                self.shares[0](first_restriction, *bodies, field, mask)
+                share.from_finer(first_restriction, bodies, targets)
             else:
-                self.shares[depth](
-                    restriction, self.fields[depth - 1], self.held[depth - 1], field, mask
-                )
-            if mask.all():
+                finer = (self.fields[depth - 1], self.held[depth - 1])
+                share.from_finer(restriction, finer, targets)
+            if share.every(self.held[depth]):
                 break
         else:
             depth = len(self.fields)
+        way = (self.energies[0], change, padded)
         if depth == 0:
-            slope, turned = self.rows.sums(2, only_level, *bodies, self.energies[0], change, padded)
+            slope, turned = self.rows.framed_sums(2, only_level, *bodies, *way)
             return float(slope), float(turned)
         top = depth - 1
         self.fields[top] *= np.where(self.held[top], 0.0, 1.0 / self.energies[depth])
         for level in range(top - 1, -1, -1):
-            self.shares[level](
-                prolongation,
-                self.fields[level + 1],
-                self.held[level],
-                self.energies[level + 1],
-                self.fields[level],
-            )
-        slope, turned = self.rows.sums(
-            2, last_prolongation, self.fields[0], *bodies, self.energies[0], change, padded
-        )
-        return float(slope), float(turned)
+            coarse, fine = self.coarse(level + 1), self.fields[level]
+            energy = self.energies[level + 1]
+            self.shares[level].over(prolongation, coarse, self.held[level], energy, fine)
+            self.shares[level].meet(fine)
+        sums = self.rows.framed_sums(2, last_prolongation, self.coarse(0), *bodies, *way)
+        return float(sums[0]), float(sums[1])
+
+    def coarse(self, level: int) -> Field:
+        """The field of a level as the next finer one takes it."""
+        framed: Field = self.shares[level].for_finer(self.fields[level])
+        return framed
 
 
 def hat_energies(contact: Contact) -> list[float]:
@@ -74,9 +80,13 @@ def hat_energies(contact: Contact) -> list[float]:
     while side % 2 == 0 and side // 2 >= COARSEST:
         hats.append(hats[-1] * (1 + np.cos((grid.points // side) * phase)))
         side //= 2
-    weighted = np.array(hats) ** 2 * grid.multiplicity()
+    count = np.full(phase.size, 2.0)
+    count[0] = count[-1] = 1.0
+    weighted = np.array(hats) ** 2 * count
+    columns = weighted[:, slice(*grid.span)]
     k = contact.stiffness[: phase.size]  # the other rows mirror these
-    return [float(energy) / grid.size for energy in np.einsum("li,li->l", weighted @ k, weighted)]
+    energies = grid.total(np.einsum("li,li->l", weighted @ k, columns))
+    return [float(energy) / grid.size for energy in energies]
 
 
 @kernel
@@ -93,10 +103,10 @@ def _gather(column, column_held, coarse, coarse_held):  # type: ignore[no-untype
 @kernel
 def first_restriction(sigma, marks, least, coarse, coarse_held, a, b):  # type: ignore[no-untyped-def]
     """Restriction of the force -sigma of the free points."""
-    n, m = sigma.shape[0], coarse.shape[1]
+    height, m = sigma.shape[0], coarse.shape[1]
     column, column_held = np.empty(2 * m, dtype=coarse.dtype), np.empty(2 * m, dtype=np.bool_)
     for i in range(a, b):
-        up, mid, down = (2 * i - 1) % n, 2 * i, 2 * i + 1
+        up, mid, down = (2 * i - 1) % height, 2 * i, 2 * i + 1
         for j in range(2 * m):
             above, here, below = (
                 marks[up, j] >= least,
@@ -112,10 +122,10 @@ def first_restriction(sigma, marks, least, coarse, coarse_held, a, b):  # type: 
 @kernel
 def restriction(fine, held, coarse, coarse_held, a, b):  # type: ignore[no-untyped-def]
     """coarse <- P^T fine; a coarse hat is held where one of the hats it is made of is."""
-    n, m = fine.shape[0], coarse.shape[1]
+    height, m = fine.shape[0], coarse.shape[1]
     column, column_held = np.empty(2 * m, dtype=coarse.dtype), np.empty(2 * m, dtype=np.bool_)
     for i in range(a, b):
-        up, mid, down = (2 * i - 1) % n, 2 * i, 2 * i + 1
+        up, mid, down = (2 * i - 1) % height, 2 * i, 2 * i + 1
         for j in range(2 * m):
             column[j] = 0.5 * (fine[up, j] + fine[down, j]) + fine[mid, j]
             column_held[j] = held[up, j] | held[mid, j] | held[down, j]
@@ -125,9 +135,9 @@ def restriction(fine, held, coarse, coarse_held, a, b):  # type: ignore[no-untyp
 @kernel
 def prolongation(coarse, held, energy, fine, a, b):  # type: ignore[no-untyped-def]
     """fine <- fine / energy where not held, plus P coarse."""
-    m = coarse.shape[0]
+    rows, m = coarse.shape
     for i in range(a, b):
-        one, other = i // 2, ((i + 1) // 2) % m
+        one, other = i // 2, ((i + 1) // 2) % rows
         for j in range(m):
             here = 0.5 * (coarse[one, j] + coarse[other, j])
             nxt = j + 1 if j + 1 < m else 0
@@ -140,10 +150,11 @@ def prolongation(coarse, held, energy, fine, a, b):  # type: ignore[no-untyped-d
 @kernel
 def last_prolongation(coarse, sigma, marks, least, energy, change, padded, out, a, b):  # type: ignore[no-untyped-def]
     """padded <- z = -sigma / energy plus P coarse on the free points; sums as of `apply`."""
-    m = coarse.shape[0]
+    rows, m = coarse.shape
+    frame = (sigma.shape[0] - change.shape[0]) // 2
     row = np.empty(2 * m, dtype=coarse.dtype)
     for i in range(a, b):
-        one, other = i // 2, ((i + 1) // 2) % m
+        one, other = i // 2, ((i + 1) // 2) % rows
         for j in range(m):
             row[2 * j] = 0.5 * (coarse[one, j] + coarse[other, j])
         for j in range(m - 1):
@@ -153,21 +164,22 @@ def last_prolongation(coarse, sigma, marks, least, energy, change, padded, out, 
         for j in range(2 * m):
             s = sigma[i, j]
             z = 0.0 if marks[i, j] >= least else row[j] - s / energy
-            padded[i, j] = z
+            padded[i - frame, j] = z
             slope -= z * s
-            turned += z * change[i, j]
+            turned += z * change[i - frame, j]
         out[i, 0], out[i, 1] = slope, turned
 
 
 @kernel
 def only_level(sigma, marks, least, energy, change, padded, out, a, b):  # type: ignore[no-untyped-def]
     """padded <- z = -sigma / energy on the free points: no hat wider than a point fits in."""
+    frame = (sigma.shape[0] - change.shape[0]) // 2
     for i in range(a, b):
         slope = turned = 0.0
         for j in range(sigma.shape[1]):
             s = sigma[i, j]
             z = 0.0 if marks[i, j] >= least else -s / energy
-            padded[i, j] = z
+            padded[i - frame, j] = z
             slope -= z * s
-            turned += z * change[i, j]
+            turned += z * change[i - frame, j]
         out[i, 0], out[i, 1] = slope, turned

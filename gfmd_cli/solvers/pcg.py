@@ -89,7 +89,8 @@ class _Run:
                 grid.padded,
             ),
         )
-        self.marks = np.empty(self.h.shape, dtype=np.int8)
+        self.framed_marks = self.rows.empty(self.h.shape[1], dtype=np.int8)
+        self.marks = self.rows.inside(self.framed_marks)
         self.least = sweeps.PRESSED
         self.screened = replace(grid, precision="single")
         self.z = self.padded
@@ -122,7 +123,8 @@ class _Run:
         if step < memory["rescreen_at"]:
             return
         memory["rescreen_at"] = max(step + RESCREEN_AFTER, int(RESCREEN_GROWTH * step))
-        held, changes = self.rows.sums(2, sweeps.pattern, self.marks, self.least)
+        self.rows.meet(self.framed_marks)
+        held, changes = self.rows.framed_sums(2, sweeps.pattern, self.framed_marks, self.least)
         stiffness, chord, exponent = screening(self.contact, float(held), float(changes))
         if self.even:
             multilevel = exponent > STEEP
@@ -143,13 +145,15 @@ class _Run:
             if self.multilevel is None:
                 kind = Multigrid if self.even else Multilevel
                 self.multilevel = kind(self.contact, self.rows)
+            bodies = (self.sigma, self.framed_marks, self.least)
             slope, turned = self.multilevel.apply(*bodies, self.change, self.padded)
         else:
             self.z = self.grid.as_rows(self.screened.padded)
             self.rows(sweeps.free_force, *bodies, self.z)
             self.screened.transform()
+            modes = self.grid.as_rows(self.screened.spectrum)
             screened = (memory["screening"], 1.0 / self.grid.size)
-            self.rows(sweeps.soften, self.z, self.k, *screened)
+            self.screened.spectral_rows(sweeps.soften, modes, self.k, *screened)
             self.screened.transform_back()
             self.state.transforms += SINGLE_PAIR
             slope, turned = self.rows.sums(2, sweeps.slopes, *bodies, self.change, self.z)
@@ -221,7 +225,9 @@ class _Run:
         curvature = self.stiffness()
         if curvature > SOFTEST * descent:
             return float(descent) / curvature
-        return float(np.ptp(self.h) / np.abs(self.direction).max())  # of a rigid shift, at most
+        most = self.grid.most
+        height = most(float(self.h.max())) + most(-float(self.h.min()))
+        return height / most(float(np.abs(self.direction).max()))  # of a rigid shift, at most
 
 
 def prefers_multilevel(chord: float, exponent: float) -> bool:
@@ -242,8 +248,7 @@ def screening(contact: Contact, held: float, changes: float) -> tuple[float, flo
     512^2, p* = 0.01, 0.1, 1: the fewest transforms, within some 20 %, were at c = 1/2 for n = 1,
     1 for n = 2, 2 for n = 3, 3 to 4 for n = 4 while a_r is small, 1 for n >= 2 near full contact.
     """
-    grid = contact.grid
-    line = contact.stiffness if grid.dimension == 1 else contact.stiffness[0]
+    grid, line = contact.grid, contact.line
     log_k = np.log(line[1:])
     log_m = np.log(np.arange(1, line.size))
     area = held / grid.size

@@ -18,6 +18,7 @@ import numpy as np
 from gfmd_cli.physics.choice import Choice
 from gfmd_cli.physics.contact import Contact
 from gfmd_cli.physics.fields import Field, Mask
+from gfmd_cli.physics.grid import Grid
 from gfmd_cli.solvers.loop import State
 
 
@@ -30,7 +31,7 @@ class PolonskyKeer(Choice):
         """Start from the compressive part of the stress that belongs to `u`."""
         sigma = contact.stress(u, out=contact.grid.empty())
         pressure = np.maximum(sigma, 0.0)
-        pressure *= contact.pressure / float(pressure.mean())
+        pressure *= contact.pressure / _mean(contact.grid, pressure)
         soften = contact.grid.operator(compliance(contact))
         response = soften(pressure, out=contact.grid.empty())
         fields = {"pressure": pressure, "response": response, "direction": np.zeros_like(u)}
@@ -44,32 +45,34 @@ class PolonskyKeer(Choice):
         not the method, and is not counted.
         """
         s, w, t = (state.fields[name] for name in ("pressure", "response", "direction"))
-        memory = state.scalars
-        soften = contact.grid.operator(compliance(contact))
-        gap, answer = contact.grid.empty(), contact.grid.empty()
+        grid, memory = contact.grid, state.scalars
+        soften = grid.operator(compliance(contact))
+        gap, answer = grid.empty(), grid.empty()
         while True:
             touching: Mask = s > 0
             np.subtract(w, contact.height, out=gap)
-            gap -= float(gap[touching].mean())  # [1] the gap, on average zero in contact
+            gap -= _mean(grid, gap, touching)  # [1] the gap, on average zero in contact
             _read_off(contact, state, gap, touching)
             yield state
             inside = gap[touching]
-            norm = float(inside @ inside)  # [2] G
+            norm = grid.total(float(inside @ inside))  # [2] G
             t *= memory["conjugate"] * norm / memory["norm"]
             t += gap
             t[~touching] = 0.0  # [3] the new direction
             memory["norm"] = max(norm, 1e-300)
             soften(t, out=answer)
-            answer -= float(answer[touching].mean())  # [4] its displacement
-            curvature = float(np.vdot(answer, t))
-            length = float(np.vdot(gap, t)) / curvature if curvature > 0 else 0.0  # [5] the step
+            answer -= _mean(grid, answer, touching)  # [4] its displacement
+            curvature = grid.total(float(np.vdot(answer, t)))
+            descent = grid.total(float(np.vdot(gap, t)))
+            length = descent / curvature if curvature > 0 else 0.0  # [5] the step
             s -= length * t
-            cut = bool(np.any(s < 0))
+            cut = grid.total(np.count_nonzero(s < 0)) > 0
             np.maximum(s, 0.0, out=s)  # [6] no tension
             overlap = (s == 0) & (gap < 0)
             s[overlap] -= length * gap[overlap]  # [7] pressure where the bodies overlap ...
-            memory["conjugate"] = 0.0 if np.any(overlap) else 1.0  # ... and a restart
-            scale = contact.pressure / float(s.mean())
+            anew = grid.total(np.count_nonzero(overlap)) > 0  # ... and a restart
+            memory["conjugate"] = 0.0 if anew else 1.0
+            scale = contact.pressure / _mean(grid, s)
             s *= scale  # [8] the mean pressure
             state.transforms += 2
             if cut or memory["conjugate"] == 0:
@@ -80,6 +83,13 @@ class PolonskyKeer(Choice):
                 w -= answer
                 w *= scale
             state.step += 1
+
+
+def _mean(grid: Grid, field: Field, where: Mask | None = None) -> float:
+    """Mean of a field, or of some of its points."""
+    chosen = field if where is None else field[where]
+    total, count = grid.total(np.array([chosen.sum(), chosen.size]))
+    return float(total / count)
 
 
 def compliance(contact: Contact) -> Field:

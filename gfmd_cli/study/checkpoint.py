@@ -11,7 +11,7 @@ import os
 import shutil
 import zlib
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any, Self
 
@@ -21,20 +21,25 @@ from gfmd_cli.errors import SpaceError
 from gfmd_cli.physics.contact import Contact
 from gfmd_cli.physics.fields import Field
 from gfmd_cli.physics.grid import Grid
+from gfmd_cli.physics.ranks import Ranks, agree, leads, together
 from gfmd_cli.solvers.cascade import Resume
 from gfmd_cli.solvers.loop import State
 from gfmd_cli.study.files import check_seal, locked, sealed, write_whole
 
 CHUNK = 2**26  # bytes that a checkpoint maps at a time
-LAYOUT = 2  # raised whenever an older state must not be gone on with
+LAYOUT = 3  # raised whenever an older state must not be gone on with
 SCALARS = ("exact", "residual", "step", "misses", "least", "transforms", "scalars")
 
 
 class Checkpoint:
-    """The checkpoint of one task, a folder of its own."""
+    """The checkpoint of one task, a folder of its own.
 
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
+    Where processes share the task, each writes its rows into a file of its own, and the first
+    writes the pointer to all of them. Any number of processes can go on from there.
+    """
+
+    def __init__(self, folder: Path, ranks: Ranks | None = None) -> None:
+        self.folder, self.ranks = folder, ranks
         self.pointer = folder / "pointer"
         self.mine = True
         self.slots: list[dict[str, Any]] = []
@@ -42,15 +47,27 @@ class Checkpoint:
 
     @classmethod
     @contextmanager
-    def held(cls, folder: Path) -> Iterator[Self]:
-        """The checkpoint for one process alone: a second one neither reads nor writes it."""
-        checkpoint = cls(folder)
-        with locked(folder / "lock", wait=False) as checkpoint.mine:
+    def held(cls, folder: Path, ranks: Ranks | None = None) -> Iterator[Self]:
+        """The checkpoint for one run alone: a second one neither reads nor writes it."""
+        checkpoint = cls(folder, ranks)
+        with ExitStack() as stack:
+            with together(ranks):
+                if leads(ranks):
+                    checkpoint.mine = stack.enter_context(locked(folder / "lock", wait=False))
+            checkpoint.mine = agree(ranks, checkpoint.mine)
             yield checkpoint
 
     def restore(self) -> str | None:
         """Take up what is saved and whole; say what is not, and set aside what cannot be used."""
-        if not (self.mine and self.pointer.exists()):
+        note = None
+        with together(self.ranks):
+            if self.mine and leads(self.ranks):
+                note = self._restore()
+        self.slots = agree(self.ranks, self.slots)
+        return note
+
+    def _restore(self) -> str | None:
+        if not self.pointer.exists():
             return None
         said: list[dict[str, Any]] = []
         try:
@@ -59,14 +76,13 @@ class Checkpoint:
             said = data["slots"] if data["layout"] == LAYOUT else []
         except (OSError, ValueError, KeyError):
             pass
-        self.slots = [slot for slot in said if self._is_whole(slot)]
+        self.slots = [slot for slot in said if all(map(self._is_whole, slot["parts"]))]
         if self.slots and self.slots[0] is said[0]:
             return None
         if self.slots:
             return f"{self.folder}: the newest state is damaged; going on from the one before"
-        for path in (self.pointer, self.folder / "a", self.folder / "b"):
-            if path.exists():
-                path.replace(f"{self.folder}.{path.name}.bad")
+        for path in (self.pointer, *self.folder.glob("[ab]*")):
+            path.replace(f"{self.folder}.{path.name}.bad")
         return f"{self.folder}: no whole state; set aside as .bad, the task starts anew"
 
     def save(self, contact: Contact, state: State, spent: float, notes: Any = None) -> None:
@@ -78,15 +94,12 @@ class Checkpoint:
             return
         fields = {"u": state.u, "sigma": state.sigma, **state.fields}
         name = "a" if self.slots and self.slots[0]["name"] == "b" else "b"
-        try:
-            self.folder.mkdir(parents=True, exist_ok=True)
-            crc = _write_slot(self.folder / name, list(fields.values()))
-        except OSError as error:
-            raise SpaceError(f"{self.folder}: cannot be written: {error.strerror}") from error
+        with together(self.ranks):
+            part = self._write_part(name, contact.grid, fields)
+        parts = [part] if self.ranks is None else self.ranks.comm.allgather(part)
         slot = {
             "name": name,
-            "crc": crc,
-            "bytes": sum(field.nbytes for field in fields.values()),
+            "parts": parts,
             "points": contact.grid.points,
             "spent": spent,
             "notes": notes,
@@ -94,17 +107,33 @@ class Checkpoint:
             "fields": {name: field.dtype.str for name, field in fields.items()},
         }
         slots = [slot, *(old for old in self.slots[:1] if old["name"] != name)]
-        text = json.dumps({"layout": LAYOUT, "slots": slots})
-        write_whole(self.pointer, sealed(text.encode()))
+        with together(self.ranks):
+            if leads(self.ranks):
+                text = json.dumps({"layout": LAYOUT, "slots": slots})
+                write_whole(self.pointer, sealed(text.encode()))
         self.slots = slots
+
+    def _write_part(self, name: str, grid: Grid, fields: dict[str, Field]) -> dict[str, Any]:
+        """Write the rows that this process holds; what the pointer says of them."""
+        first = grid.own.start or 0
+        file = name if grid.whole else f"{name}{first}"
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+            crc = _write_slot(self.folder / file, list(fields.values()))
+        except OSError as error:
+            raise SpaceError(f"{self.folder}: cannot be written: {error.strerror}") from error
+        size = sum(field.nbytes for field in fields.values())
+        return {"file": file, "first": first, "rows": len(fields["u"]), "crc": crc, "bytes": size}
 
     def load(self, grid: Grid) -> Resume | None:
         """The saved state of a solve on `grid`, or None where there is none."""
         if not self.slots:
             return None
         slot = self.slots[0]
-        level = Grid(slot["points"], grid.dimension, grid.length, grid.threads)
-        fields = _read_slot(self.folder / slot["name"], level, slot["fields"])
+        level = grid if slot["points"] == grid.points else grid.coarser(slot["points"])
+        if self.ranks is not None and level.whole:
+            return None
+        fields = _read_parts(self.folder, slot["parts"], level, slot["fields"])
         state = State(fields.pop("u"), fields.pop("sigma"), fields=fields, **slot["state"])
         return Resume(slot["points"], state, slot["spent"])
 
@@ -114,18 +143,19 @@ class Checkpoint:
 
     def remove(self) -> None:
         """Forget the state: the task is done."""
-        if self.mine:
+        if self.mine and leads(self.ranks):
             shutil.rmtree(self.folder, ignore_errors=True)
 
-    def _is_whole(self, slot: dict[str, Any]) -> bool:
+    def _is_whole(self, part: dict[str, Any]) -> bool:
+        """Whether a file of a slot is as it was written."""
         total, size = 0, 0
         try:
-            with (self.folder / slot["name"]).open("rb") as file:
+            with (self.folder / part["file"]).open("rb") as file:
                 while chunk := file.read(CHUNK):
                     total, size = zlib.crc32(chunk, total), size + len(chunk)
         except OSError:
             return False
-        return bool(total == slot["crc"] and size == slot["bytes"])
+        return bool(total == part["crc"] and size == part["bytes"])
 
 
 def _write_slot(path: Path, fields: list[Field]) -> int:
@@ -147,12 +177,20 @@ def _write_slot(path: Path, fields: list[Field]) -> int:
     return total
 
 
-def _read_slot(path: Path, grid: Grid, kinds: dict[str, str]) -> dict[str, Field]:
-    """The fields of a slot."""
-    fields, offset = {}, 0
-    for name, kind in kinds.items():
-        field: Field = np.empty(grid.shape, kind)
-        field[...] = np.memmap(path, kind, "r", offset, grid.shape)
-        offset += field.nbytes
-        fields[name] = field
+def _read_parts(
+    folder: Path, parts: list[dict[str, Any]], grid: Grid, kinds: dict[str, str]
+) -> dict[str, Field]:
+    """The rows of a grid that this process holds, from the files where they lie."""
+    first, last, _ = grid.own.indices(grid.points)
+    fields = {name: np.empty(grid.shape, kind) for name, kind in kinds.items()}
+    for part in parts:
+        begin, rows = part["first"], part["rows"]
+        low, high = max(first, begin), min(last, begin + rows)
+        if low >= high:
+            continue
+        offset, shape = 0, (rows, *grid.shape[1:])
+        for field in fields.values():
+            stored = np.memmap(folder / part["file"], field.dtype, "r", offset, shape)
+            field[low - first : high - first] = stored[low - begin : high - begin]
+            offset += stored.nbytes
     return fields

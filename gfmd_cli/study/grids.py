@@ -21,6 +21,7 @@ from gfmd_cli.physics.continuum import (
 from gfmd_cli.physics.fields import Field
 from gfmd_cli.physics.grid import Grid
 from gfmd_cli.physics.observables import QUANTITIES, Observables, observe
+from gfmd_cli.physics.ranks import Ranks
 from gfmd_cli.physics.surface import FileSurface, SelfAffine, Surface
 from gfmd_cli.solvers.cascade import Resume, Solution, solve_contact
 from gfmd_cli.study.tasks import FIRST, Task
@@ -98,9 +99,9 @@ class Solved:
 
 
 @lru_cache(maxsize=1)
-def scene_of(surface: Any, elastomer: Any, points: int, threads: int) -> Scene:
+def scene_of(surface: Any, elastomer: Any, points: int, threads: int, ranks: Ranks | None) -> Scene:
     """The scene of the task before is that of the next, as a rule."""
-    return build_scene(surface, elastomer, points, threads)
+    return build_scene(surface, elastomer, points, threads, ranks)
 
 
 def solve_on_grids(
@@ -110,6 +111,7 @@ def solve_on_grids(
     load: Callable[[Grid], Resume | None],
     notes: Any,
     note: Callable[[list[dict[str, Any]]], None],
+    ranks: Ranks | None = None,
     **watchers: Any,
 ) -> Solved:
     """Solve a task on its grid, or on finer and finer ones until the errors are as asked.
@@ -120,6 +122,7 @@ def solve_on_grids(
         error where its second part says so
     load, notes : reads the state of an unfinished solve, and what was noted with it
     note : told of the grids done before each solve
+    ranks : the processes that share large grids
     watchers : `watch` and `enter_level` of `solve_contact`
 
     Raises InputError, and what the watchers raise.
@@ -129,7 +132,7 @@ def solve_on_grids(
     points = _after(task, rungs[-1].points) if rungs else _first(task)
     before: tuple[Scene, Solution] | None = None
     while True:
-        scene = scene_of(task.surface, task.elastomer, points, threads)
+        scene = scene_of(task.surface, task.elastomer, points, threads, ranks)
         contact = scene.contact(task.p_star(scene.delta_sigma))
         note([asdict(rung) for rung in rungs])
         resume = load(scene.grid)
@@ -144,7 +147,8 @@ def solve_on_grids(
         if task.accuracy is not None:
             solved.certificate = certify(contact, solution.u, solution.sigma)
             solved.estimates = _estimate(task, solved, rungs)
-        if not _goes_on(task, solved, memory):
+        goes_on = _goes_on(task, solved, memory)
+        if not (goes_on if ranks is None else ranks.agree(goes_on)):
             solution.transforms = sum(rung.work for rung in rungs) / scene.grid.size
             if task.auto and solution.status == "converged" and _short(task, solved):
                 solution.status = NOT_REACHED

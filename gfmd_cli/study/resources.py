@@ -5,7 +5,8 @@ from contextlib import suppress
 from pathlib import Path
 
 from gfmd_cli.errors import InputError
-from gfmd_cli.study.tasks import Task
+from gfmd_cli.physics.ranks import Ranks, cores_and_company
+from gfmd_cli.study.tasks import BASE_BYTES, FIELDS_IN_MEMORY, Task
 
 THREADED_POINTS = 1024  # per side; below it a second thread costs more than it brings (measured)
 HEADROOM = 0.9  # share of the available memory that a run may plan with
@@ -45,19 +46,34 @@ def available_memory() -> float:
     return min(limits, default=float("inf"))
 
 
-def check_memory(tasks: list[Task]) -> None:
+def room(ranks: Ranks | None = None) -> float:
+    """Bytes that one solve may take; of all `ranks` that share it, their overhead taken off."""
+    memory = HEADROOM * available_memory()
+    if ranks is None:
+        return memory
+    _, company = cores_and_company(ranks, set())
+    own = min(ranks.gather(memory / company - BASE_BYTES))
+    return ranks.size * float(own) * FIELDS_IN_MEMORY / (FIELDS_IN_MEMORY + 1) + BASE_BYTES
+
+
+def check_memory(tasks: list[Task], ranks: Ranks | None = None) -> None:
     """Raise InputError, before anything is allocated, where one task alone does not fit."""
-    memory = available_memory()
+    memory = room(ranks)
     needs = ((task.bytes_on(task.least_points), task.least_points) for task in tasks)
     taken, points = max(needs, default=(0.0, 0))
-    if taken > HEADROOM * memory:
+    if taken > memory:
         raise InputError(
             f"grid.points: {points} points per side take {_gib(taken)} of memory, "
-            f"{_gib(HEADROOM * memory)} are available; take a smaller grid or a larger machine"
+            f"{_gib(memory)} are available; take a smaller grid or a larger machine"
         )
 
 
-def share_out(tasks: list[Task], jobs: int | None, reproducible: bool = False) -> tuple[int, int]:
+def share_out(
+    tasks: list[Task],
+    jobs: int | None,
+    reproducible: bool = False,
+    ranks: Ranks | None = None,
+) -> tuple[int, int]:
     """Worker processes and threads of each, for these tasks.
 
     One process for each core as long as tasks and memory last, one thread each; where the tasks
@@ -66,6 +82,13 @@ def share_out(tasks: list[Task], jobs: int | None, reproducible: bool = False) -
     """
     if not tasks:
         return 1, 1
+    points = max(task.points for task in tasks)
+    threaded = points >= THREADED_POINTS and not reproducible
+    if ranks is not None:
+        if jobs not in (None, 1):
+            raise InputError(f"--jobs {jobs}: under mpiexec its processes share each task")
+        cores, _ = cores_and_company(ranks, os.sched_getaffinity(0))
+        return 1, min(cores, available_cores()) if threaded else 1
     cores = available_cores()
     largest = max(task.bytes for task in tasks)
     if jobs is None:
@@ -73,8 +96,6 @@ def share_out(tasks: list[Task], jobs: int | None, reproducible: bool = False) -
         jobs = min(cores, len(tasks), fitting)
         if sum(task.seconds for task in tasks) < POOL_SECONDS:
             jobs = 1
-    points = max(task.points for task in tasks)
-    threaded = points >= THREADED_POINTS and not reproducible
     return jobs, max(1, cores // jobs) if threaded else 1
 
 

@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from itertools import chain
 from pathlib import Path
 from threading import Thread, Timer
@@ -17,16 +17,11 @@ from typing import Any, NamedTuple
 
 from gfmd_cli.errors import GfmdError, Interrupted, SpaceError, StudyError
 from gfmd_cli.physics import wisdom
+from gfmd_cli.physics.ranks import Ranks, agree, leads, together
 from gfmd_cli.study import solve
 from gfmd_cli.study.grids import scene_of
 from gfmd_cli.study.record import read_record, record_path
-from gfmd_cli.study.resources import (
-    HEADROOM,
-    available_memory,
-    check_memory,
-    seconds_to_stop,
-    share_out,
-)
+from gfmd_cli.study.resources import check_memory, room, seconds_to_stop, share_out
 from gfmd_cli.study.solve import Progress, Report, solve_task
 from gfmd_cli.study.spec import Spec
 from gfmd_cli.study.store import Study
@@ -58,6 +53,7 @@ def run_study(
     checkpoint_every: float = CHECKPOINT_EVERY,
     max_seconds: float | None = None,
     reproducible: bool = False,
+    ranks: Ranks | None = None,
 ) -> Counter[str]:
     """Solve the tasks of this shard that the study does not hold yet, and collect all records.
 
@@ -70,6 +66,7 @@ def run_study(
     jobs : worker processes, by default as many as cores, memory and tasks suggest
     max_seconds : wall time after which it has ended as a signal ends it
     reproducible : plan transforms without measuring, one thread a task
+    ranks : the processes of an MPI run, which share every task; all of them call this
 
     Returns how many tasks of this shard ended in which status ("failed": raised an error).
     Raises InputError for a spec that does not fit the study or the machine, SpaceError, and
@@ -78,26 +75,39 @@ def run_study(
     study = Study(path)
     study.check_spec(spec)
     tasks = plan(spec)
-    held = study.held()
+    held = agree(ranks, study.held())
     share = [task for task in tasks if task.index % shard[1] == shard[0]]
     pending = [task for task in share if task.id not in held]
     outcome = Counter(held[task.id] for task in share if task.id in held)
-    if not pending and not study.uncollected():
+    waiting = agree(ranks, study.uncollected())
+    if not pending and not waiting:
         return outcome
-    check_memory(pending)
-    jobs, threads = share_out(pending, jobs, reproducible)
-    memory = HEADROOM * available_memory() / jobs
-    means = Means(threads, checkpoint_every, memory, reproducible)
+    check_memory(pending, ranks)
+    jobs, threads = share_out(pending, jobs, reproducible, ranks)
+    means = Means(threads, checkpoint_every, room(ranks) / jobs, reproducible)
     seconds = _time_to_work(max_seconds, pending, jobs)
-    with _signals_noted(), _timer(seconds), study.work(spec) as damaged:
+    with _signals_noted(), _timer(seconds), _folder(study, spec, ranks) as damaged:
         _warn(report, damaged, _plan_afresh(study.parts, means))
         try:
-            solved = _solve_all(pending, study.parts, report, jobs, means)
+            solved = _solve_all(pending, study.parts, report, jobs, means, ranks)
         finally:
-            _warn(report, study.collect(spec, tasks, text))
+            with together(ranks):
+                if leads(ranks):
+                    _warn(report, study.collect(spec, tasks, text))
             wisdom.plan_with(None)
         _check_ended(solved, len(pending))
     return outcome + solved
+
+
+@contextmanager
+def _folder(study: Study, spec: Spec, ranks: Ranks | None) -> Iterator[list[str]]:
+    """The folder of unfinished work; where processes share the tasks, the first one holds it."""
+    damaged: list[str] = []
+    with ExitStack() as stack:
+        with together(ranks):
+            if leads(ranks):
+                damaged = stack.enter_context(study.work(spec))
+        yield damaged
 
 
 def _check_ended(solved: Counter[str], asked: int) -> None:
@@ -122,34 +132,56 @@ def _warn(report: Report, *notes: list[str]) -> None:
 
 
 def _solve_all(
-    pending: list[Task], parts: Path, report: Report, jobs: int, means: Means
+    pending: list[Task],
+    parts: Path,
+    report: Report,
+    jobs: int,
+    means: Means,
+    ranks: Ranks | None,
 ) -> Counter[str]:
     if jobs > 1:
         return _solve_in_pool(pending, parts, report, jobs, means)
     outcome: Counter[str] = Counter()
     for task in pending:
-        outcome[_attempt(task, parts, report, means)] += 1
+        outcome[_attempt(task, parts, report, means, ranks)] += 1
     del outcome["interrupted"]
     return outcome
 
 
-def _attempt(task: Task, parts: Path, report: Report, means: Means) -> str:
-    """Solve one task, unless another process has just done so; an error ends this task only."""
-    if solve.stop.is_set():
-        return "interrupted"
+def _is_stopped(ranks: Ranks | None) -> bool:
+    """Whether a signal has come, to any process."""
+    if ranks is not None and ranks.total(int(solve.stop.is_set())):
+        solve.stop.set()
+    return solve.stop.is_set()
+
+
+def _status_of(path: Path) -> str | None:
+    """Status of a record that is whole, None where there is none."""
     with suppress(StudyError):
-        found = read_record(record_path(parts, task.id), with_fields=False)
-        return str(found.row["status"])
+        return str(read_record(path, with_fields=False).row["status"])
+    return None
+
+
+def _attempt(
+    task: Task, parts: Path, report: Report, means: Means, ranks: Ranks | None = None
+) -> str:
+    """Solve one task, unless another process has just done so; an error ends this task only."""
+    if _is_stopped(ranks):
+        return "interrupted"
+    if found := agree(ranks, _status_of(record_path(parts, task.id))):
+        return found
     try:
-        return solve_task(
-            task,
-            parts,
-            means.threads,
-            report,
-            means.checkpoint_every,
-            means.memory,
-            fixed=means.reproducible,
-        )
+        with together(ranks):
+            return solve_task(
+                task,
+                parts,
+                means.threads,
+                report,
+                means.checkpoint_every,
+                means.memory,
+                fixed=means.reproducible,
+                ranks=ranks,
+            )
     except Interrupted:
         report(Progress(task.index, "interrupted", task.label))
         return "interrupted"

@@ -13,6 +13,7 @@ from gfmd_cli.errors import InputError
 from gfmd_cli.physics.contact import PRESSURES, Scene
 from gfmd_cli.physics.grid import Grid
 from gfmd_cli.physics.persson import Persson
+from gfmd_cli.physics.ranks import Ranks
 from gfmd_cli.solvers.cascade import Resume
 from gfmd_cli.study.grids import Solved, no_state, scene_of, solve_on_grids
 from gfmd_cli.study.spec import SOUGHT
@@ -46,6 +47,7 @@ def solve_task_on_grids(
     load: Callable[[Grid], Resume | None],
     notes: Any,
     note: Callable[[Any], None],
+    ranks: Ranks | None = None,
     **watchers: Any,
 ) -> Solved:
     """Solve a task, searching its pressure where that is not given; else as `solve_on_grids`.
@@ -60,7 +62,7 @@ def solve_task_on_grids(
     def solve(trial: Task, tell: Callable[[Any], None]) -> Solved:
         nonlocal load, noted
         rungs, noted = noted.get("rungs"), {}
-        solved = solve_on_grids(trial, threads, memory, load, rungs, tell, **watchers)
+        solved = solve_on_grids(trial, threads, memory, load, rungs, tell, ranks, **watchers)
         load = no_state
         return solved
 
@@ -69,7 +71,7 @@ def solve_task_on_grids(
     found = [Trial(*trial) for trial in noted.get("found", [])]
     solved, first, slope = None, 0.0, 1.0
     for points in _grids(task):
-        scene = scene_of(task.surface, task.elastomer, points, threads)
+        scene = scene_of(task.surface, task.elastomer, points, threads, ranks)
         search = _Search(task, scene, first or _guess(task, scene), slope)
         for trial in found:
             if trial.points == points:
@@ -109,7 +111,7 @@ def _guess(task: Task, scene: Scene) -> float:
     """The pressure [Pa] of Persson theory."""
     if task.quantity == "contact_area":
         return float(Persson(scene.shells).pressure_at_area(task.load))
-    highest = float(scene.height.max())
+    highest = scene.grid.most(float(scene.height.max()))
     if task.load >= highest:
         raise InputError(
             f"load.mean_gap: {task.load:g} h_std are never reached: without load it is {highest:g}"

@@ -11,7 +11,8 @@ import numpy as np
 
 from gfmd_cli.errors import Interrupted, SpaceError
 from gfmd_cli.physics.contact import Contact
-from gfmd_cli.physics.observables import cross_section, stress_distribution
+from gfmd_cli.physics.observables import stress_distribution
+from gfmd_cli.physics.ranks import Ranks, leads
 from gfmd_cli.solvers.cascade import Solution
 from gfmd_cli.solvers.loop import State
 from gfmd_cli.study.checkpoint import Checkpoint
@@ -51,6 +52,7 @@ class _Watcher:
     checkpoint: Checkpoint
     report: Report
     every: float
+    ranks: Ranks | None = None
     last_report: float = 0.0
     last_save: float = 0.0
     spent: float = 0.0
@@ -66,17 +68,22 @@ class _Watcher:
         now = time.monotonic()
         if now - self.last_report > REPORT_EVERY:
             self.last_report = now
-            area = np.count_nonzero(state.u == contact.height) / contact.grid.size
+            area = np.count_nonzero(state.u == contact.height) / state.u.size
             points, step = contact.grid.points, state.step
             self.report(
                 Progress(
                     self.task.index, "step", self.task.label, points, step, state.residual, area
                 )
             )
-        if stop.is_set():
+        if self.ranks is not None and contact.grid.whole:
+            return  # a small grid, which each process solves on its own
+        asked = 2.0 if stop.is_set() else float(now - self.last_save > self.every)
+        asked = contact.grid.most(asked)  # of any process
+        if asked > 1:
+            stop.set()
             self.checkpoint.save(contact, state, self.spent, self.notes)
             raise Interrupted(f"{self.task.label}: stopped, state saved")
-        if now - self.last_save > self.every:
+        if asked:
             try:
                 self.checkpoint.save(contact, state, self.spent, self.notes)
             except SpaceError as error:  # the solve can do without
@@ -97,16 +104,20 @@ def solve_task(
     checkpoint_every: float,
     memory: float = np.inf,
     fixed: bool = False,
+    ranks: Ranks | None = None,
 ) -> str:
     """Solve one task and commit its record; return its status.
 
     `memory` [bytes] limits how far an "auto" grid may grow; where `fixed`, to reach that limit is
-    an error instead. Raises Interrupted after the state was saved, InputError, SpaceError.
+    an error instead. `ranks` are the processes that share the task. Raises Interrupted after the
+    state was saved, InputError, SpaceError.
     """
     report(Progress(task.index, "start", task.label))
     begun = time.perf_counter()
-    with Checkpoint.held(parts / task.id) as checkpoint:
-        watcher = _Watcher(task, checkpoint, report, checkpoint_every, last_save=time.monotonic())
+    with Checkpoint.held(parts / task.id, ranks) as checkpoint:
+        watcher = _Watcher(
+            task, checkpoint, report, checkpoint_every, ranks, last_save=time.monotonic()
+        )
         watcher.warn(checkpoint.restore())
         solved = solve_task_on_grids(
             task,
@@ -115,11 +126,13 @@ def solve_task(
             checkpoint.load,
             checkpoint.notes(),
             watcher.note,
+            ranks,
             watch=watcher,
             enter_level=watcher.enter_level,
         )
         record = _record(task, solved, time.perf_counter() - begun)
-        write_record(parts, record)
+        if leads(ranks):
+            write_record(parts, record)
         checkpoint.remove()
     report(_done(task, record, solved.solution))
     return solved.solution.status
@@ -191,8 +204,12 @@ def _record(task: Task, solved: Solved, seconds: float) -> Record:
         row=row,
         shells=scene.shells,
         distribution=distribution,
-        fields={name: physical[name] for name in task.output.fields},
-        cross_section={name: cross_section(values) for name, values in physical.items()}
+        fields={
+            name: whole
+            for name in task.output.fields
+            if (whole := scene.grid.collect(physical[name])) is not None
+        },
+        cross_section={name: scene.grid.diagonal(values) for name, values in physical.items()}
         if task.output.cross_section
         else {},
     )

@@ -1,0 +1,109 @@
+"""Strong and weak scaling of runs under MPI: a pair of transforms, a V-cycle, a solve.
+
+python scripts/mpi_scaling.py starts mpiexec for each count of processes; the least of many repeats
+counts, as the machine may be shared. All times are wall times on the slowest process.
+"""
+
+import json
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+
+from gfmd_cli.physics.contact import build_scene
+from gfmd_cli.physics.elastomer import Power
+from gfmd_cli.physics.grid import Grid
+from gfmd_cli.physics.ranks import launched
+from gfmd_cli.physics.surface import SelfAffine
+from gfmd_cli.solvers.cascade import SolverChoice, solve_contact
+from gfmd_cli.solvers.multigrid import Multigrid
+
+STRONG = [(count, points) for points in (512, 1024, 2048) for count in (1, 2)]
+WEAK = [(1, 512), (2, 720), (4, 1024)]
+SECONDS = 4.0  # of repeats of each action, at most
+REPEATS = 200
+
+
+def main() -> None:
+    for title, cases in (("strong", STRONG), ("weak", WEAK)):
+        print(f"{title}: n = 1, p* = 0.1, tolerance 1e-6; load {os.getloadavg()[0]:.1f}")
+        print(" processes points  pair [ms]  exchange  V-cycle [ms]  solve [s]  transforms")
+        for count, points in cases:
+            found = json.loads(_launch(count, points))
+            print(
+                f"{count:10d} {points:6d} {1e3 * found['pair']:10.2f} {found['share']:9.0%} "
+                f"{1e3 * found['cycle']:13.2f} {found['solve']:10.3f} {found['transforms']:11.1f}",
+                flush=True,
+            )
+
+
+def _launch(count: int, points: int) -> str:
+    launcher = [str(Path(sys.executable).with_name("mpiexec")), "-n", str(count)]
+    command = [*launcher, sys.executable, __file__, "measure", str(points)]
+    environment = os.environ | {"OPENBLAS_NUM_THREADS": "1"}
+    done = subprocess.run(command, capture_output=True, text=True, check=True, env=environment)
+    return done.stdout.strip().splitlines()[-1]
+
+
+def measure(points: int) -> None:
+    """On each process: time the parts; the first prints them."""
+    ranks = launched()
+    contact = build_scene(SelfAffine(cutoff=2.56 / points), Power(n=1), points, 1, ranks).contact(
+        0.1
+    )
+    grid, exchange = contact.grid, [0.0]
+    if not grid.whole:
+        _clock_exchange(grid, exchange)
+    pair, share = least(grid, lambda: (grid.transform(), grid.transform_back()), exchange)
+    marks = grid.rows.empty(points, dtype=np.int8)
+    u = contact.settle(np.zeros(grid.shape))
+    marks[...] = 0
+    grid.rows.inside(marks)[...] = 2 * (u == contact.height)
+    cycle, change = Multigrid(contact, grid.rows), np.zeros(grid.shape, np.float32)
+    sigma = contact.stress(u, out=grid.empty())
+    once, _ = least(grid, lambda: cycle.apply(sigma, marks, 2, change, grid.padded), exchange)
+    found: list[float] = []
+
+    def solve() -> None:
+        solution = solve_contact(contact, SolverChoice(), lambda contact, state: None)
+        found.append(solution.transforms)
+
+    whole, _ = least(grid, solve, exchange, repeats=5)
+    said = {"pair": pair, "share": share, "cycle": once, "solve": whole, "transforms": found[-1]}
+    if ranks is None or ranks.rank == 0:
+        print(json.dumps(said))
+
+
+def _clock_exchange(grid: Grid, spent: list[float]) -> None:
+    turn = type(grid)._turn
+
+    def clocked(self: Grid, to_columns: bool) -> None:
+        begun = time.perf_counter()
+        turn(self, to_columns)
+        spent[0] += time.perf_counter() - begun
+
+    type(grid)._turn = clocked
+
+
+def least(grid, action, exchange, repeats=REPEATS) -> tuple[float, float]:
+    """Least wall time of an action on the slowest process, and the share of exchange in it."""
+    action()
+    best, share, begun = np.inf, 0.0, time.perf_counter()
+    for _ in range(repeats):
+        grid.most(0.0)  # begin together
+        exchange[0], start = 0.0, time.perf_counter()
+        action()
+        seconds = time.perf_counter() - start
+        slowest = grid.most(seconds)
+        if slowest < best:
+            best, share = slowest, grid.most(exchange[0] / seconds)
+        if grid.most(time.perf_counter() - begun) > SECONDS:
+            break
+    return best, share
+
+
+if __name__ == "__main__":
+    measure(int(sys.argv[2])) if sys.argv[1:2] == ["measure"] else main()

@@ -1,0 +1,154 @@
+"""Runs on several processes give what one process gives."""
+
+import json
+import re
+
+import h5py
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from gfmd_cli.cli import main
+
+pytestmark = pytest.mark.mpi
+SAME = 1e-10
+SPEC = """\
+[study]
+name = "study"
+[surface]
+kind = "self-affine"
+cutoff = {cutoff}
+[[elastomer]]
+kind = "power"
+n = {n}
+[grid]
+points = {points}
+[load]
+p_star = [0.03, 0.3]
+[solver]
+kind = "{kind}"
+tolerance = 1e-11
+[output]
+fields = ["u", "sigma", "height"]
+cross_section = true
+"""
+OF_THE_RUN = re.compile("residual|transforms|steps|status|algebraic|bound")
+"""Columns that may differ: rounding decides which step is the last."""
+
+
+def spec(folder, n, points, kind="auto", **more):
+    path = folder / "spec.toml"
+    text = SPEC.format(n=n, points=points, kind=kind, cutoff=2.56 / points)
+    path.write_text(text + "".join(f"[{table}]\n{body}\n" for table, body in more.items()))
+    return path
+
+
+def on_one(path, output):
+    done = CliRunner().invoke(main, ["run", str(path), "-o", str(output), "-q"])
+    assert done.exit_code == 0, done.output
+
+
+def contents(path):
+    """Every dataset and every attribute of a study file, by name."""
+    found = {}
+
+    def note(name, item):
+        if isinstance(item, h5py.Dataset):
+            found[name] = item.asstr()[()] if item.dtype.kind == "O" else item[()]
+
+    with h5py.File(path) as file:
+        file.visititems(note)
+        return found, {name: file.attrs[name] for name in ("spec", "layout", "title")}
+
+
+def assert_same(one, other, exact=False):
+    """Two study files hold the same, to 1e-10 of the largest value of each column or field."""
+    (values, attributes), (others, other_attributes) = contents(one), contents(other)
+    assert attributes == other_attributes
+    assert values.keys() == others.keys()
+    for name, expected in values.items():
+        if name == "seconds" or (not exact and OF_THE_RUN.search(name)):
+            continue
+        found = others[name]
+        assert found.shape == expected.shape, name
+        if expected.dtype.kind in "OUSi" or exact:
+            assert np.array_equal(found, expected, equal_nan=expected.dtype.kind == "f"), name
+        else:
+            of = values.get(name.replace("cross_sections", "fields"), expected)
+            of = values["h_std"] if name == "mean_height" else of
+            size = np.nanmax(np.abs(of), initial=1e-300)
+            np.testing.assert_allclose(found, expected, rtol=0, atol=SAME * size, err_msg=name)
+    assert set(others["status"]) <= {"converged", "rounding"}
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 4])
+def test_every_process_holds_its_share_of_the_whole(mpiexec, count):
+    mpiexec(count, "transforms.py")
+
+
+@pytest.mark.parametrize(("count", "points"), [(2, 256), (4, 64), (3, 100)])
+def test_the_study_is_that_of_one_process(mpiexec, tmp_path, count, points):
+    n = {64: [0, 0.5, 1, 2, 3, 4], 100: [1, 3], 256: [2]}[points]
+    path = spec(tmp_path, n, points)
+    on_one(path, tmp_path / "one.h5")
+    done = mpiexec(count, "gfmd_cli", "run", path, "-o", tmp_path / "many.h5")
+    assert done.stdout.count("next: gfmd analyze") == 1
+    assert_same(tmp_path / "one.h5", tmp_path / "many.h5")
+    assert not (tmp_path / "many.parts").exists()
+
+
+@pytest.mark.parametrize("kind", ["ccg", "fire", "polonsky-keer"])
+def test_other_methods_are_shared_out_too(mpiexec, tmp_path, kind):
+    path = spec(tmp_path, [1], 64, kind)
+    on_one(path, tmp_path / "one.h5")
+    mpiexec(2, "gfmd_cli", "run", path, "-o", tmp_path / "many.h5", "-q")
+    assert_same(tmp_path / "one.h5", tmp_path / "many.h5")
+
+
+def test_a_grid_that_grows_to_its_accuracy(mpiexec, tmp_path):
+    """Small grids are solved by each process, large ones shared."""
+    path = tmp_path / "spec.toml"
+    path.write_text(
+        '[study]\nname = "auto"\n[surface]\nkind = "self-affine"\ncutoff = 0.1\n'
+        '[elastomer]\nkind = "power"\nn = 1\n[grid]\npoints = "auto"\n[load]\np_star = 0.1\n'
+        "[accuracy]\nmean_gap = 3e-3\nmax_points = 256\n[solver]\ntolerance = 1e-11\n"
+    )
+    on_one(path, tmp_path / "one.h5")
+    mpiexec(4, "gfmd_cli", "run", path, "-o", tmp_path / "many.h5", "-q")
+    assert_same(tmp_path / "one.h5", tmp_path / "many.h5")
+
+
+@pytest.mark.parametrize(("more", "exact"), [(2, True), (3, False), (1, False)])
+def test_a_stopped_run_goes_on(mpiexec, tmp_path, more, exact):
+    """A signal to one process stops all; as many go on bit for bit, others with the same state."""
+    path, cut, whole = spec(tmp_path, [1], 128), tmp_path / "cut.h5", tmp_path / "whole.h5"
+    run = ("run", path, "-q", "--set", "load.p_star=0.3", "-o")
+    mpiexec(2, "gfmd_cli", *run, whole)
+    mpiexec(2, "interrupted.py", 25, 1, *run, cut, status=75)
+    (pointer,) = (tmp_path / "cut.parts").glob("*/pointer.json")
+    saved = json.loads(pointer.read_bytes())
+    assert [part["rows"] for part in saved["parts"]] == [64, 64]
+    assert saved["points"] == 128
+    left = contents(whole)[0]["steps"][0] - saved["step"]
+    few = left + 5  # looks that are enough to go on, but not to begin anew
+    assert saved["step"] > 5
+    mpiexec(more, "interrupted.py", few, 0, *run, cut)
+    assert_same(whole, cut, exact=exact)
+
+
+@pytest.mark.parametrize("kind", ["known", "unknown"])
+@pytest.mark.parametrize("others", ["done", "waiting"])
+def test_an_error_of_one_process_ends_all(mpiexec, kind, others):
+    done = mpiexec(3, "failing.py", kind, others, status=73 if kind == "known" else 1)
+    said = "no space on one of them" if kind == "known" else "rank 1: KeyError: 'x'"
+    assert done.stdout.count(said) == (3 if others == "done" else 1)
+
+
+def test_bad_input_gives_one_message(mpiexec, tmp_path):
+    path = spec(tmp_path, [1], 10)
+    done = mpiexec(2, "gfmd_cli", "run", path, "-o", tmp_path / "s.h5", status=2)
+    assert done.stderr.count("grid.points") == 1
+    path = spec(tmp_path, [1], 128)
+    done = mpiexec(2, "gfmd_cli", "run", path, "-j", 2, "-o", tmp_path / "s.h5", status=2)
+    assert done.stderr.count("--jobs 2") == 1
+    assert not (tmp_path / "s.h5").exists()
