@@ -1,7 +1,9 @@
-"""Files that appear whole or not at all."""
+"""Files that appear whole or not at all, and folders that one process at a time may change."""
 
+import fcntl
 import os
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 from gfmd_cli.errors import SpaceError
@@ -29,3 +31,29 @@ def write_whole(path: Path, content: bytes) -> None:
         with suppress(OSError):
             fresh.unlink(missing_ok=True)
         raise SpaceError(f"{path}: cannot be written: {error.strerror}") from error
+
+
+@contextmanager
+def alone(folder: Path) -> Iterator[None]:
+    """Keep others out of a folder; the kernel drops the lock of a process that dies.
+
+    Who holds it may remove the folder: who waited for it then makes it anew. Raises SpaceError.
+    """
+    with ExitStack() as stack:
+        while not _locked(folder, stack):
+            pass
+        yield
+
+
+def _locked(folder: Path, stack: ExitStack) -> bool:
+    """Wait for the lock; false where the folder was removed in the meantime."""
+    path = folder / "lock"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        lock = stack.enter_context(path.open("w"))
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        return os.path.samestat(os.fstat(lock.fileno()), path.stat())
+    except FileNotFoundError:
+        return False
+    except OSError as error:
+        raise SpaceError(f"{folder}: cannot be locked: {error.strerror}") from error

@@ -64,7 +64,8 @@ def run_study(
             try:
                 outcome += _solve_all(pending, study.parts, report, jobs, checkpoint_every)
             finally:
-                study.collect(spec, tasks, text)
+                if shard[1] == 1 or not solve.stop.is_set():  # a stopped shard ends soon: its
+                    study.collect(spec, tasks, text)  # records stand, others collect them
             if solve.stop.is_set():
                 left = len(share) - sum(outcome.values())
                 raise Interrupted(f"stopped by a signal; {left} tasks left, call again to go on")

@@ -5,7 +5,6 @@ rewrites the study file under another name and renames it. A reader never meets 
 study and never stops a run.
 """
 
-import fcntl
 import json
 import os
 import shutil
@@ -20,7 +19,7 @@ import numpy as np
 from gfmd_cli.errors import InputError, SpaceError, StudyError
 from gfmd_cli.physics.observables import linear_edges, logarithmic_edges
 from gfmd_cli.physics.persson import Shells
-from gfmd_cli.study.files import write_whole
+from gfmd_cli.study.files import alone, write_whole
 from gfmd_cli.study.labelled import dataset, scale
 from gfmd_cli.study.layout import (
     BENCH,
@@ -62,23 +61,27 @@ class Study:
 
     def held(self) -> dict[str, str]:
         """Status by task id of all that is solved, collected or not."""
-        found = {}
-        if self.path.exists():
-            with open_study(self.path) as file:
-                ids, states = file["task_id"].asstr()[()], file["status"].asstr()[()]
-                found = {i: s for i, s in zip(ids, states, strict=True) if s != MISSING}
-        for path in self._record_paths():
+        states = {}
+        for path in self._record_paths():  # before the study, which may take them in meanwhile
             with suppress(StudyError):
                 record = read_record(path)
-                found[record.task_id] = str(record.row["status"])
-        return found
+                states[record.task_id] = str(record.row["status"])
+        return self.collected() | states
+
+    def collected(self) -> dict[str, str]:
+        """Status by task id of all that the study file holds."""
+        if not self.path.exists():
+            return {}
+        with open_study(self.path) as file:
+            ids, states = file["task_id"].asstr()[()], file["status"].asstr()[()]
+        return {i: s for i, s in zip(ids, states, strict=True) if s != MISSING}
 
     def collect(self, spec: Spec, tasks: list[Task], text: str) -> None:
         """Write all records into the study file, then drop them. Raises SpaceError.
 
         A damaged record is set aside as NAME.bad and its task is solved again by the next run.
         """
-        with self._alone():
+        with alone(self.parts):
             records = {}
             for path in self._record_paths():
                 try:
@@ -90,9 +93,10 @@ class Study:
             for path in records:
                 path.unlink(missing_ok=True)
             complete = all(status != MISSING for status in self._statuses())
-            leftover = list(self.parts.glob("*.bad"))
-        if complete and not leftover:
-            shutil.rmtree(self.parts, ignore_errors=True)
+            if complete and not any(self.parts.glob("*.bad")):
+                shutil.rmtree(self.parts, ignore_errors=True)
+        with suppress(OSError):
+            self.parts.rmdir()  # on NFS the folder keeps an open lock
 
     def _write(self, spec: Spec, tasks: list[Task], text: str, found: dict[str, Record]) -> None:
         fresh = self.path.with_name(f".{self.path.name}.{os.getpid()}")
@@ -130,14 +134,6 @@ class Study:
         with suppress(OSError, ValueError):
             return json.loads((self.parts / "spec.json").read_bytes())
         return None
-
-    @contextmanager
-    def _alone(self) -> Iterator[None]:
-        """Keep other collectors out; the kernel drops the lock of a process that dies."""
-        self.parts.mkdir(parents=True, exist_ok=True)
-        with (self.parts / "lock").open("w") as lock:
-            fcntl.flock(lock, fcntl.LOCK_EX)
-            yield
 
 
 @contextmanager
