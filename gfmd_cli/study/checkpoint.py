@@ -11,7 +11,7 @@ import os
 import shutil
 import zlib
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -24,6 +24,16 @@ from gfmd_cli.solvers.loop import State
 from gfmd_cli.study.files import write_whole
 
 CHUNK = 2**26  # bytes that a checkpoint maps at a time
+
+
+class Saved(NamedTuple):
+    """Where a saved state stands."""
+
+    points: int
+    step: int
+    residual: float
+    time: float
+    """When it was saved, in seconds since 1970."""
 
 
 class Checkpoint:
@@ -85,6 +95,15 @@ class Checkpoint:
         except (KeyError, TypeError, ValueError, OSError):
             return None
         return Resume(pointer["points"], state, pointer["spent"])
+
+    def saved(self) -> Saved | None:
+        """Where the saved state stands, without loading it; None where there is none."""
+        pointer = self._pointer()
+        try:
+            when = self.pointer.stat().st_mtime
+            return Saved(pointer["points"], pointer["step"], pointer["residual"], when)
+        except (KeyError, OSError):
+            return None
 
     def notes(self) -> Any:
         """The notes of the saved state, None where there are none."""

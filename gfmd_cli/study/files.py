@@ -33,6 +33,14 @@ def write_whole(path: Path, content: bytes) -> None:
         raise SpaceError(f"{path}: cannot be written: {error.strerror}") from error
 
 
+def make_folder(path: Path) -> None:
+    """Make a folder where it is missing. Raises SpaceError."""
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise SpaceError(f"{path}: cannot be made: {error.strerror}") from error
+
+
 @contextmanager
 def alone(folder: Path) -> Iterator[None]:
     """Keep others out of a folder; the kernel drops the lock of a process that dies.

@@ -1,6 +1,7 @@
 """Records: what one task found, as a small HDF5 file that appears whole or not at all."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -60,20 +61,32 @@ def _put(file: Any, name: str, values: Field) -> None:
 
 def read_record(path: Path) -> Record:
     """Read one record. Raises StudyError where it is damaged or of another layout."""
+    with _opened(path) as file:
+        groups = {
+            group: {name: data[()] for name, data in file.get(group, {}).items()}
+            for group in ("distribution", "fields", "cross_section")
+        }
+        return Record(
+            task_id=file.attrs["task_id"],
+            row={c.name: c.kind(file.attrs[c.name]) for c in COLUMNS},
+            shells=Shells(*(file[f"shells/{c.name}"][()] for c in SHELLS)),
+            **groups,
+        )
+
+
+def read_status(path: Path) -> tuple[str, str]:
+    """Task and status of a record, without its arrays. Raises StudyError as `read_record` does."""
+    with _opened(path) as file:
+        return str(file.attrs["task_id"]), str(file.attrs["status"])
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[Any]:
     try:
         with h5py.File(path, "r", locking=False) as file:
             if file.attrs["layout"] != LAYOUT or not file.attrs["complete"]:
                 raise StudyError(f"{path}: written with layout {file.attrs['layout']}")
-            groups = {
-                group: {name: data[()] for name, data in file.get(group, {}).items()}
-                for group in ("distribution", "fields", "cross_section")
-            }
-            return Record(
-                task_id=file.attrs["task_id"],
-                row={c.name: c.kind(file.attrs[c.name]) for c in COLUMNS},
-                shells=Shells(*(file[f"shells/{c.name}"][()] for c in SHELLS)),
-                **groups,
-            )
+            yield file
     except (OSError, KeyError, RuntimeError, ValueError) as error:
         raise StudyError(f"{path}: damaged record: {error}") from error
 
