@@ -3,7 +3,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 RESULTS := results
 
-.PHONY: demo test check validate smoke memory clean
+.PHONY: demo test test-slurm check validate smoke memory clean
 
 $(VENV)/.core: pyproject.toml
 	python3 -m venv $(VENV)
@@ -27,6 +27,10 @@ smoke: $(VENV)/.core ## the smallest complete study
 
 test: $(VENV)/.test ## the whole suite
 	$(BIN)/pytest -n 2 --dist loadfile
+
+test-slurm: $(VENV)/.test ## array jobs on a private Slurm: preempted, killed, completed, compared
+	tests/slurm/install.sh
+	$(BIN)/pytest -m slurm tests/slurm
 
 check: $(VENV)/.test ## the one gate: lint, format, types, import order
 	$(BIN)/ruff check .
