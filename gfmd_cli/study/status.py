@@ -1,7 +1,6 @@
 """How far a study is, from its files alone: nothing is written, no lock is taken."""
 
 from collections import Counter
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -81,9 +80,13 @@ def state_of_study(path: Path) -> StudyState:
 
 def is_study(path: Path) -> bool:
     """Whether a path is meant as a study rather than as a spec."""
-    with suppress(OSError), path.open("rb") as file:
-        return file.read(len(MAGIC)) == MAGIC
-    return path.suffix == ".h5"
+    if path.suffix == ".h5":
+        return True
+    try:
+        with path.open("rb") as file:
+            return file.read(len(MAGIC)) == MAGIC
+    except OSError:
+        return False
 
 
 def check_shards(count: int, tasks: int) -> None:
