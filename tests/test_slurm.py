@@ -123,22 +123,37 @@ def test_the_script_runs_a_shard_and_queues_it_again_after_75(gfmd, calls, tmp_p
     study = Path("$(touch harm) `touch harm`; 'x\".h5").resolve()
     override = "load.p_star=[0.1,\n0.2]"
     gfmd("submit", "spec.toml", "--shards", 2, "-o", study, "--set", override)
+    (tmp_path / "queue").write_text("RUNNING\n")
     before = len(calls())
     call = played(tmp_path, ending(75), study.with_suffix(".sbatch"))
     assert subprocess.run(call, env=os.environ | MEMBER, check=False).returncode == 75
     spec = str(Path("spec.toml").resolve())
     words = ["run", spec, "-o", str(study), "--set", *override.split("\n"), "--shard", "2/2"]
-    assert calls()[before:] == [*words, "scontrol requeue 7_2"]
+    asked = "squeue --noheader --jobs=7_2 --format=%T"
+    assert calls()[before:] == [*words, asked, "scontrol requeue 7_2"]
     assert not list(tmp_path.rglob("harm"))
 
 
-@pytest.mark.parametrize(("status", "restarts"), [(75, str(slurm.MAX_REQUEUES)), (1, "0")])
-def test_the_script_queues_nothing_else_again(gfmd, calls, tmp_path, status, restarts):
+@pytest.mark.parametrize(
+    ("status", "restarts", "state", "again"),
+    [
+        (75, str(slurm.MAX_REQUEUES - 1), "RUNNING", True),
+        (143, "", "RUNNING", True),  # told to stop while it was being loaded
+        (75, str(slurm.MAX_REQUEUES), "RUNNING", False),
+        (75, "0", "COMPLETING", False),  # cancelled by its owner
+        (1, "0", "RUNNING", False),
+        (137, "0", "RUNNING", False),
+    ],
+)
+def test_the_script_queues_again_what_was_told_to_stop_and_nothing_else(
+    gfmd, calls, tmp_path, status, restarts, state, again
+):
     gfmd("submit", "spec.toml", "--shards", 3)
+    (tmp_path / "queue").write_text(f"{state}\n")
     environment = os.environ | MEMBER | {"SLURM_RESTART_COUNT": restarts}
     call = played(tmp_path, ending(status))
     assert subprocess.run(call, env=environment, check=False).returncode == status
-    assert not any("scontrol" in call for call in calls())
+    assert ("scontrol requeue 7_2" in calls()) is again
 
 
 def test_the_script_outside_of_an_array_collects(gfmd, calls, tmp_path):

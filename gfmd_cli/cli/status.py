@@ -4,6 +4,7 @@ import json
 import shlex
 import sys
 import time
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -122,6 +123,11 @@ def _next(state: Any, spec: str, output: Path | None, overrides: tuple[str, ...]
     return shlex.join(["gfmd", "run", *words])
 
 
+def _saved(task: Any) -> dict[str, Any]:
+    data = {"task": task.task, **task.saved._asdict()}
+    return data | ({} if isfinite(task.saved.residual) else {"residual": None})  # JSON has no NaN
+
+
 def _as_data(state: Any, shards: int | None, following: str) -> dict[str, Any]:
     """The same as plain data."""
     counts = state.counts
@@ -132,7 +138,7 @@ def _as_data(state: Any, shards: int | None, following: str) -> dict[str, Any]:
         "missing": counts["missing"],
         "statuses": dict(counts),
         "missing_tasks": state.missing,
-        "saved": [{"task": t.task, **t.saved._asdict()} for t in state.tasks if t.saved],
+        "saved": [_saved(task) for task in state.tasks if task.saved is not None],
         "records": state.records,
         "damaged": state.damaged,
         "next": following,

@@ -40,10 +40,15 @@ trap 'told=1; kill -TERM $run 2>/dev/null' TERM   # preempted
 told=1
 while [ $told = 1 ]; do told=0; wait $run; status=$?; done   # a signal ends `wait` early
 
-if [ $status = 75 ] && [ "${{SLURM_RESTART_COUNT:-0}}" -lt {most} ]; then
-  # of this shard only: the plain job number would stand for the whole array
-  scontrol requeue "${{SLURM_ARRAY_JOB_ID}}_${{SLURM_ARRAY_TASK_ID}}" && sleep 60
-fi
+shard=${{SLURM_ARRAY_JOB_ID}}_${{SLURM_ARRAY_TASK_ID}}   # the job number would be the whole array
+requeue() {{   # unless this was tried often enough, or the shard was cancelled
+  [ "${{SLURM_RESTART_COUNT:-0}}" -lt {most} ] &&
+    [ "$(squeue --noheader --jobs="$shard" --format=%T)" = RUNNING ] &&
+    scontrol requeue "$shard" && sleep 60
+}}
+case $status in
+  75 | 138 | 143) requeue ;;   # saved, or met by a signal before there was anything to save
+esac
 exit $status
 """
 STUDY = re.compile(r"^study=\((.*?)\)\n\nif ", re.MULTILINE | re.DOTALL)
