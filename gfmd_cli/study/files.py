@@ -5,8 +5,14 @@ import os
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
+from secrets import token_hex
 
 from gfmd_cli.errors import SpaceError
+
+
+def beside(path: Path) -> Path:
+    """A name to write a file under before it is renamed, used by no other process or machine."""
+    return path.with_name(f".{path.name}.{token_hex(4)}")
 
 
 def write_whole(path: Path, content: bytes) -> None:
@@ -14,7 +20,7 @@ def write_whole(path: Path, content: bytes) -> None:
 
     Raises SpaceError where it cannot be written.
     """
-    fresh = path.with_name(f".{path.name}.{os.getpid()}")
+    fresh = beside(path)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with fresh.open("wb") as file:

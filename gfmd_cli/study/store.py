@@ -19,7 +19,7 @@ import numpy as np
 from gfmd_cli.errors import InputError, SpaceError, StudyError
 from gfmd_cli.physics.observables import linear_edges, logarithmic_edges
 from gfmd_cli.physics.persson import Shells
-from gfmd_cli.study.files import alone, write_whole
+from gfmd_cli.study.files import alone, beside, write_whole
 from gfmd_cli.study.labelled import dataset, scale
 from gfmd_cli.study.layout import (
     BENCH,
@@ -99,7 +99,7 @@ class Study:
             self.parts.rmdir()  # on NFS the folder keeps an open lock
 
     def _write(self, spec: Spec, tasks: list[Task], text: str, found: dict[str, Record]) -> None:
-        fresh = self.path.with_name(f".{self.path.name}.{os.getpid()}")
+        fresh = beside(self.path)
         sources = [self.path, *self._record_paths()]
         size = sum(path.stat().st_size for path in sources if path.exists())
         size += SLACK + 2000 * len(tasks)
