@@ -3,6 +3,7 @@
 import getpass
 import os
 import shutil
+import signal
 import socket
 import subprocess
 import tempfile
@@ -56,13 +57,14 @@ class Cluster:
         outside = {k: v for k, v in os.environ.items() if not k.startswith(("SLURM_", "SBATCH_"))}
         path = f"{os.environ['PATH']}:/usr/sbin"
         conf = str(folder / "slurm.conf")
-        self.environment = outside | {"SLURM_CONF": conf, "PATH": path, "OPENBLAS_NUM_THREADS": "1"}
+        cache = str(folder / "cache")  # plans of its own, not waiting for those of other processes
+        self.environment = outside | {"SLURM_CONF": conf, "PATH": path, "XDG_CACHE_HOME": cache}
 
     def __call__(self, *words, status=0):
         """What a command prints; it has to end with this status."""
         words = [str(word) for word in words]
         done = subprocess.run(
-            words, cwd=self.work, env=self.environment, capture_output=True, text=True, timeout=300
+            words, cwd=self.work, env=self.environment, capture_output=True, text=True, timeout=600
         )
         told = done.stdout + done.stderr
         assert done.returncode == status, f"{' '.join(words)}: {done.returncode}: {told}"
@@ -73,7 +75,7 @@ class Cluster:
         lines = self("squeue", "--array", "--noheader", "--format=%i %T %r").splitlines()
         return {number: rest for number, _, rest in (line.partition(" ") for line in lines)}
 
-    def wait(self, met, what, seconds=300):
+    def wait(self, met, what, seconds=600):
         """Wait until a condition is met; return what it gave."""
         end = time.monotonic() + seconds
         while not (found := met()):
@@ -134,6 +136,7 @@ def configure(cluster):
 def cluster(tmp_path):
     folder = Path(tempfile.mkdtemp(prefix="gfmd-slurm-"))  # a socket's path has to be short
     cluster = Cluster(folder, tmp_path)
+    signal.signal(signal.SIGTERM, lambda *_: pytest.exit("terminated", 1))  # not without an end
     with ExitStack() as stack:
         stack.callback(shutil.rmtree, folder, ignore_errors=True)
         configure(cluster)
