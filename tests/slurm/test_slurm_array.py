@@ -1,4 +1,5 @@
 import json
+import re
 import sys
 import time
 
@@ -38,7 +39,7 @@ def test_an_array_with_a_preempted_and_a_killed_shard_equals_a_serial_run(cluste
     cluster(*gfmd, "run", "spec.toml", "-o", "serial.h5", "-j", "1")
 
     told = cluster(*gfmd, "submit", *STUDY, "--shards", "4", "--time", "10")
-    job = told.split()[1].rstrip(":")
+    job, collection = re.findall(r"^job (\d+):", told, re.MULTILINE)
     cluster.wait((work / "array.parts" / "spec.json").exists, "a shard at work")
     time.sleep(1)
     refused = cluster(*gfmd, "submit", *STUDY, "--missing", status=2)
@@ -59,7 +60,7 @@ def test_an_array_with_a_preempted_and_a_killed_shard_equals_a_serial_run(cluste
     assert {task % 4 for task in state["missing_tasks"]} == {int(killed[-1])}
     assert state["records"] == 0
     assert state["next"].startswith("gfmd submit spec.toml -o array.h5 --missing")
-    collected = (work / "logs" / f"gfmd-array-{int(job) + 1}.out").read_text()
+    collected = (work / "logs" / f"gfmd-array-{collection}.out").read_text()
     assert f"{len(state['missing_tasks'])} missing" in collected
 
     told = cluster(*gfmd, "submit", *STUDY, "--missing")
