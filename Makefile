@@ -3,7 +3,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 RESULTS := results
 
-.PHONY: demo test test-faults test-mpi check validate smoke memory paper paper-quick clean
+.PHONY: demo test test-faults test-mpi test-slurm check validate smoke memory paper paper-quick clean
 
 $(VENV)/.core: pyproject.toml
 	python3 -m venv $(VENV)
@@ -34,6 +34,9 @@ $(VENV)/.mpi: $(VENV)/.test
 
 test-mpi: $(VENV)/.mpi ## runs shared by several processes, with PyPI's MPICH
 	$(BIN)/pytest -m mpi tests/mpi
+test-slurm: $(VENV)/.test ## array jobs on a private Slurm: preempted, killed, completed, compared
+	tests/slurm/install.sh
+	$(BIN)/pytest -m slurm tests/slurm
 
 check: $(VENV)/.test ## the one gate: lint, format, types, import order
 	$(BIN)/ruff check .

@@ -12,6 +12,8 @@ from gfmd_cli.cli.bench import bench
 from gfmd_cli.cli.results import analyze, export
 from gfmd_cli.cli.run import run
 from gfmd_cli.cli.schema import schema
+from gfmd_cli.cli.status import collect, status
+from gfmd_cli.cli.submit import submit
 from gfmd_cli.errors import GfmdError
 
 
@@ -41,5 +43,5 @@ def main() -> None:
         os.environ.setdefault(f"{library}_NUM_THREADS", "1")
 
 
-for command in (run, analyze, export, bench, schema):
+for command in (run, submit, status, collect, analyze, export, bench, schema):
     main.add_command(command)

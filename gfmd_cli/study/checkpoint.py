@@ -11,9 +11,9 @@ import os
 import shutil
 import zlib
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -29,6 +29,16 @@ from gfmd_cli.study.files import check_seal, locked, sealed, write_whole
 CHUNK = 2**26  # bytes that a checkpoint maps at a time
 LAYOUT = 3  # raised whenever an older state must not be gone on with
 SCALARS = ("exact", "residual", "step", "misses", "least", "transforms", "scalars")
+
+
+class Saved(NamedTuple):
+    """Where a saved state stands."""
+
+    points: int
+    step: int
+    residual: float
+    time: float
+    """When it was saved, in seconds since 1970."""
 
 
 class Checkpoint:
@@ -69,13 +79,7 @@ class Checkpoint:
     def _restore(self) -> str | None:
         if not self.pointer.exists():
             return None
-        said: list[dict[str, Any]] = []
-        try:
-            size = check_seal(self.pointer)
-            data = json.loads(self.pointer.read_bytes()[:size])
-            said = data["slots"] if data["layout"] == LAYOUT else []
-        except (OSError, ValueError, KeyError):
-            pass
+        said = self._said()
         self.slots = [slot for slot in said if all(map(self._is_whole, slot["parts"]))]
         if self.slots and self.slots[0] is said[0]:
             return None
@@ -84,6 +88,23 @@ class Checkpoint:
         for path in (self.pointer, *self.folder.glob("[ab]*")):
             path.replace(f"{self.folder}.{path.name}.bad")
         return f"{self.folder}: no whole state; set aside as .bad, the task starts anew"
+
+    def _said(self) -> list[dict[str, Any]]:
+        """What the pointer says of the slots; nothing where it is missing or damaged."""
+        with suppress(OSError, ValueError, KeyError):
+            size = check_seal(self.pointer)
+            data = json.loads(self.pointer.read_bytes()[:size])
+            return list(data["slots"]) if data["layout"] == LAYOUT else []
+        return []
+
+    def saved(self) -> Saved | None:
+        """Where the newest state stands, without loading it; None where there is none."""
+        with suppress(OSError):
+            when = self.pointer.stat().st_mtime
+            for slot in self._said():
+                state = slot["state"]
+                return Saved(slot["points"], state["step"], state["residual"], when)
+        return None
 
     def save(self, contact: Contact, state: State, spent: float, notes: Any = None) -> None:
         """Write the state; `spent` are the transforms of coarser grids.

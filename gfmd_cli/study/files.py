@@ -73,6 +73,14 @@ def write_whole(path: Path, content: bytes) -> None:
         file.write(content)
 
 
+def make_folder(path: Path) -> None:
+    """Make a folder where it is missing. Raises SpaceError."""
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise SpaceError(f"{path}: cannot be made: {error.strerror}") from error
+
+
 @contextmanager
 def new_hdf5(file: Fresh) -> Iterator[Any]:
     """HDF5 written into a new file, of any size, without a copy of it in memory."""

@@ -92,7 +92,8 @@ def run_study(
             solved = _solve_all(pending, study.parts, report, jobs, means, ranks)
         finally:
             with together(ranks):
-                if leads(ranks):
+                # a stopped shard ends soon: its records stand, others collect them
+                if leads(ranks) and (shard[1] == 1 or not solve.stop.is_set()):
                     _warn(report, study.collect(spec, tasks, text))
             wisdom.plan_with(None)
         _check_ended(solved, len(pending))

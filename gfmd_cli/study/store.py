@@ -60,16 +60,20 @@ class Study:
 
     def held(self) -> dict[str, str]:
         """Status by task id of all that is solved, collected or not."""
-        found = {}
-        if self.path.exists():
-            with open_study(self.path) as file:
-                ids, states = texts_of(file, "task_id"), texts_of(file, "status")
-                found = {i: s for i, s in zip(ids, states, strict=True) if s != MISSING}
-        for path in self._record_paths():
+        states = {}
+        for path in self.record_paths():  # before the study, which may take them in meanwhile
             with suppress(StudyError):
                 record = read_record(path, with_fields=False)
-                found[record.task_id] = str(record.row["status"])
-        return found
+                states[record.task_id] = str(record.row["status"])
+        return self.collected() | states
+
+    def collected(self) -> dict[str, str]:
+        """Status by task id of all that the study file holds."""
+        if not self.path.exists():
+            return {}
+        with open_study(self.path) as file:
+            ids, states = texts_of(file, "task_id"), texts_of(file, "status")
+        return {i: s for i, s in zip(ids, states, strict=True) if s != MISSING}
 
     def collect(self, spec: Spec, tasks: list[Task], text: str) -> list[str]:
         """Write all records into the study file, then drop them; inside `work`.
@@ -89,12 +93,12 @@ class Study:
 
     def uncollected(self) -> bool:
         """Whether records wait to be collected."""
-        return bool(self._record_paths())
+        return bool(self.record_paths())
 
     def _records(self) -> tuple[dict[str, Record], list[str]]:
         """Whole records by task id, without fields; a damaged one is set aside, and said."""
         found, damaged = {}, []
-        for path in self._record_paths():
+        for path in self.record_paths():
             try:
                 found[path.stem] = read_record(path, with_fields=False)
             except StudyError as error:
@@ -107,12 +111,13 @@ class Study:
 
     def _is_complete(self) -> bool:
         """Whether nothing is left to do, and nothing to look at."""
-        if any(self.parts.glob("*.bad")) or self._record_paths() or not self.path.exists():
+        if any(self.parts.glob("*.bad")) or self.record_paths() or not self.path.exists():
             return False
         with open_study(self.path) as file:
             return MISSING not in texts_of(file, "status")
 
-    def _record_paths(self) -> list[Path]:
+    def record_paths(self) -> list[Path]:
+        """The records that are not collected yet."""
         return sorted(self.parts.glob(f"*{SUFFIX}"))
 
     def _stored_spec(self) -> Any:

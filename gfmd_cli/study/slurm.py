@@ -1,0 +1,258 @@
+"""A study as a Slurm array: the batch script, and the calls that submit it."""
+
+import re
+import shlex
+import subprocess
+import sys
+from dataclasses import dataclass
+from math import ceil
+from pathlib import Path
+
+from gfmd_cli.errors import GfmdError, InputError
+from gfmd_cli.study.resources import HEADROOM, THREADED_POINTS
+from gfmd_cli.study.status import StudyState, check_shards
+from gfmd_cli.study.tasks import BASE_BYTES, SECONDS_PER_PAIR, Task
+
+SUFFIX = ".sbatch"
+SBATCH = ("sbatch", "--parsable")
+OURS = ("array", "parsable", "wait", "wrap")  # options of sbatch that --sbatch may not take
+MAX_REQUEUES = 100  # of one shard; whoever needs more has a time limit that lets nothing happen
+NOTICE = 120  # seconds before the time limit at which a small run is told to save its state
+SAVE_RATE = 1e8  # bytes per second that a saved state is written at, at the least
+
+SCRIPT = """\
+#!/bin/bash
+# A gfmd study in {shards} shards, written by `gfmd submit`. By hand:
+#   sbatch --array=0-{last} {name}    the shards
+#   sbatch --dependency=afterany:JOB {name}    then, to collect what they found
+{options}
+
+study=({study})
+
+if [ -z "$SLURM_ARRAY_TASK_ID" ]; then
+  exec {gfmd} collect "${{study[@]}}"
+fi
+
+{gfmd} run "${{study[@]}}" --shard "${{SLURM_ARRAY_TASK_ID}}/{shards}" &
+run=$!
+trap 'told=1; kill -USR1 $run 2>/dev/null' USR1   # the time limit is near
+trap 'told=1; kill -TERM $run 2>/dev/null' TERM   # preempted
+told=1
+while [ $told = 1 ]; do told=0; wait $run; status=$?; done   # a signal ends `wait` early
+
+shard=${{SLURM_ARRAY_JOB_ID}}_${{SLURM_ARRAY_TASK_ID}}   # the job number would be the whole array
+requeue() {{   # unless this was tried often enough, or the shard was cancelled
+  [ "${{SLURM_RESTART_COUNT:-0}}" -lt {most} ] &&
+    [ "$(squeue --noheader --jobs="$shard" --format=%T)" = RUNNING ] &&
+    scontrol requeue "$shard" && sleep 60
+}}
+case $status in
+  75 | 138 | 143) requeue ;;   # saved, or met by a signal before there was anything to save
+esac
+exit $status
+"""
+STUDY = re.compile(r"^study=\((.*?)\)\n\nif ", re.MULTILINE | re.DOTALL)
+SHARDS = re.compile(r'--shard "\$\{SLURM_ARRAY_TASK_ID\}/(\d+)" &$', re.MULTILINE)
+
+
+@dataclass(frozen=True)
+class Batch:
+    """What is to be submitted."""
+
+    path: Path
+    """The script, beside its study."""
+    text: str
+    fresh: bool
+    """Whether the script is to be written."""
+    shards: int
+    """Into how many the tasks are dealt."""
+    members: list[int]
+    """Those of them that are to run."""
+    options: list[str]
+    """Of sbatch, besides those in the script."""
+
+    @property
+    def logs(self) -> Path:
+        """The folder of the logs; Slurm does not make it."""
+        return self.path.parent / "logs"
+
+    def array_call(self) -> list[str]:
+        """The command that submits the shards."""
+        return [*SBATCH, f"--array={array(self.members)}", *self.options, str(self.path)]
+
+    def collect_call(self, job: str) -> list[str]:
+        """The command that submits the collection of what a job found, however it ended."""
+        output = f"--output={_pattern(self.logs)}/%x-%j.out"
+        own = [f"--dependency=afterany:{job}", "--cpus-per-task=1", output]
+        return [*SBATCH, *self.options, *own, str(self.path)]
+
+
+def batch(
+    state: StudyState,
+    tasks: list[Task],
+    words: list[str],
+    *,
+    shards: int | None,
+    missing: bool,
+    asked: dict[str, str],
+    further: tuple[str, ...],
+) -> Batch:
+    """The batch of a study. Raises InputError.
+
+    Parameters
+    ----------
+    state, tasks : of the study; its path is absolute
+    words : spec and options that `gfmd run` and `gfmd collect` take alike, with absolute paths
+    shards : into how many the tasks are dealt; None takes the script of the last submission
+    missing : take only the shards with tasks that are not solved yet
+    asked, further : options of sbatch, by name and as they are
+    """
+    path = state.study.with_suffix(SUFFIX)
+    limit = time_limit(asked["time"]) if "time" in asked else None
+    options = [option(f"{name}={value}") for name, value in asked.items()]
+    options += [option(word) for word in further]
+    fresh = shards is not None
+    if shards is None:
+        text = _stored(path, words)
+        shards = int(SHARDS.findall(text)[0])
+    else:
+        check_shards(shards, len(tasks))
+        own = resources(tasks, shards, int(asked.get("cpus-per-task", 1)), limit)
+        named = [f"--{name}={value}" for name, value in own.items() if name not in asked]
+        text, options = script(state.study, words, shards, [*named, *options]), []
+    members = sorted({task % shards for task in state.missing}) if missing else list(range(shards))
+    return Batch(path, text, fresh, shards, members, options)
+
+
+def script(study: Path, words: list[str], shards: int, options: list[str]) -> str:
+    """The batch script of a study: a shard as a member of an array, else the collection.
+
+    `study` is absolute, `options` are sbatch's, such as "--time=60"; the others as for `batch`.
+    """
+    job_name = re.sub(r"[^\w.-]", "_", study.stem, flags=re.ASCII)
+    lines = [
+        f"--job-name=gfmd-{job_name}",
+        f"--output={_pattern(study.parent)}/logs/%x-%A_%a.out",
+        "--open-mode=append",
+        "--requeue",
+        *options,
+    ]
+    return SCRIPT.format(
+        shards=shards,
+        last=shards - 1,
+        name=shlex.quote(_one_line(study.stem) + SUFFIX),
+        options="\n".join(f"#SBATCH {_directive(line)}" for line in lines),
+        study=shlex.join(words),
+        gfmd=shlex.join([sys.executable, "-m", "gfmd_cli"]),
+        most=MAX_REQUEUES,
+    )
+
+
+def _stored(path: Path, words: list[str]) -> str:
+    """The script of the last submission. Raises InputError where it is none, or of another call."""
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: no script of an earlier submission; give --shards N") from error
+    study = STUDY.search(text)
+    if study is None or len(SHARDS.findall(text)) != 1:
+        raise InputError(f"{path}: not as `gfmd submit` wrote it; give --shards N for a new one")
+    if study[1] != shlex.join(words):
+        raise InputError(
+            f"{path}: runs {study[1]}\nasked for: {shlex.join(words)}\n"
+            "Repeat -o and --set as they were, or give --shards N for a new script."
+        )
+    return text
+
+
+def resources(tasks: list[Task], shards: int, cpus: int, limit: float | None) -> dict[str, str]:
+    """What one shard needs, as options of sbatch by name.
+
+    The memory is that of the largest task, as often as tasks will run side by side; the notice
+    before the time limit (`limit` [s], where it is known) grows with the state to save.
+    """
+    largest = max(tasks, key=lambda task: task.bytes)
+    side_by_side = 1 if largest.points >= THREADED_POINTS else min(cpus, ceil(len(tasks) / shards))
+    memory = side_by_side * largest.bytes / HEADROOM + BASE_BYTES
+    notice = NOTICE + largest.bytes / SAVE_RATE + 4 * SECONDS_PER_PAIR * largest.size
+    if limit is not None:
+        notice = min(notice, limit / 4)
+    return {
+        "cpus-per-task": str(cpus),
+        "mem": f"{ceil(memory / 2**20)}M",
+        "signal": f"B:USR1@{ceil(notice)}",
+    }
+
+
+def time_limit(text: str) -> float | None:
+    """Seconds of a time limit as Slurm writes it, None for no limit. Raises InputError."""
+    form = re.fullmatch(r"(?:(\d+)-)?(\d+)(?::(\d+))?(?::(\d+))?", text, re.ASCII)
+    if form is None:
+        raise InputError(
+            f"--time {text}: write minutes, hours:minutes:seconds or days-hours, such as 12:00:00"
+        )
+    days, *rest = form.groups()
+    given = [int(part) for part in rest if part is not None]
+    if days is None and len(given) < 3:  # minutes, minutes:seconds
+        given = [0, *given]
+    seconds = 86400 * int(days or 0)
+    seconds += sum(n * unit for n, unit in zip(given, (3600, 60, 1), strict=False))
+    return float(seconds) or None
+
+
+def option(text: str) -> str:
+    """An option of sbatch, with or without its dashes, in one piece. Raises InputError."""
+    bare = text.removeprefix("--")
+    name = bare.partition("=")[0]
+    if not re.fullmatch(r"[a-z][a-z-]*", name):
+        raise InputError(f"--sbatch {text!r}: write an option of sbatch, such as --sbatch qos=long")
+    if name in OURS:
+        raise InputError(f"--sbatch {text!r}: --{name} is for gfmd submit to set")
+    return _one_line(f"--{bare}")
+
+
+def array(shards: list[int]) -> str:
+    """Shard numbers as --array takes them."""
+    if len(shards) > 1 and shards == list(range(shards[0], shards[-1] + 1)):
+        return f"{shards[0]}-{shards[-1]}"
+    return ",".join(map(str, shards))
+
+
+def queued(path: Path) -> list[str]:
+    """Numbers of the jobs that run a script or wait to run it, shards and all."""
+    told = call(["squeue", "--me", "--noheader", "--format=%i %o"])
+    jobs = (line.strip().partition(" ") for line in told.splitlines())
+    return [number for number, _, command in jobs if command == str(path)]
+
+
+def call(words: list[str]) -> str:
+    """What a command of Slurm prints. Raises GfmdError with what it complains of."""
+    try:
+        done = subprocess.run(words, capture_output=True, text=True, check=True)
+    except FileNotFoundError as error:
+        raise GfmdError(
+            f"{words[0]}: no such command here; submit where Slurm is, or look with --dry-run"
+        ) from error
+    except subprocess.CalledProcessError as error:
+        raise GfmdError(
+            f"{words[0]} ended with status {error.returncode}: {error.stderr.strip()}"
+        ) from error
+    return done.stdout.strip()
+
+
+def _pattern(path: Path) -> str:
+    """A path as Slurm's file names take it."""
+    return str(path).replace("%", "%%")
+
+
+def _directive(text: str) -> str:
+    """An option as a line of the script."""
+    name, equals, value = _one_line(text).partition("=")
+    return f"{name}{equals}{shlex.quote(value) if equals else ''}"
+
+
+def _one_line(text: str) -> str:
+    """The text, where it is one line. Raises InputError."""
+    if not text.isprintable() or "\\" in text:
+        raise InputError(f"{text!r}: Slurm takes printable characters only, and no backslash")
+    return text

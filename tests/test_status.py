@@ -1,0 +1,203 @@
+import json
+import time
+from pathlib import Path
+from threading import Thread
+
+import pytest
+from click.testing import CliRunner
+
+from gfmd_cli.cli import main
+from gfmd_cli.study import solve
+from gfmd_cli.study.files import alone
+from gfmd_cli.study.parse import read_spec
+from gfmd_cli.study.run import run_study
+from gfmd_cli.study.store import Study
+from gfmd_cli.study.tasks import plan
+
+SPEC = """\
+[study]
+name = "small"
+[surface]
+kind = "self-affine"
+cutoff = 0.05
+[elastomer]
+kind = "power"
+n = [0, 1]
+[grid]
+points = 64
+[load]
+p_star = [0.1, 1.0]
+"""
+
+
+@pytest.fixture
+def gfmd(tmp_path, monkeypatch):
+    """Calls the command in tmp_path, where spec.toml is SPEC."""
+    monkeypatch.chdir(tmp_path)
+    Path("spec.toml").write_text(SPEC)
+    return lambda *words: CliRunner().invoke(main, [str(word) for word in words])
+
+
+def told(done):
+    assert done.exit_code == 0, done.output
+    return json.loads(done.output)
+
+
+def everything():
+    """Names, contents and times of all files."""
+    paths = sorted(Path().rglob("*"))
+    return {p: (p.stat().st_mtime_ns, p.read_bytes() if p.is_file() else b"") for p in paths}
+
+
+def uncollected(spec="spec.toml", shard=(0, 2), stop_at=None):
+    """Run a shard that leaves its records, and the state of the task `stop_at`, lying."""
+    resolved, text = read_spec(Path(spec), ())
+
+    def report(progress):
+        if stop_at is None or (progress.task == stop_at and progress.event == "step"):
+            solve.stop.set()
+
+    with pytest.raises(solve.Interrupted):
+        run_study(resolved, text, Path("small.h5"), report, shard=shard, jobs=1)
+
+
+def test_of_nothing_all_is_missing_and_nothing_is_written(gfmd):
+    before = everything()
+    state = told(gfmd("status", "spec.toml", "--json"))
+    assert (state["tasks"], state["missing"], state["missing_tasks"]) == (4, 4, [0, 1, 2, 3])
+    assert state["next"] == "gfmd run spec.toml"
+    assert everything() == before
+
+
+def test_a_finished_study_is_to_be_analyzed(gfmd):
+    gfmd("run", "spec.toml", "-o", "a b.h5")
+    for words in (("spec.toml", "-o", "a b.h5"), ("a b.h5",)):
+        done = gfmd("status", *words)
+        assert done.exit_code == 0
+        assert done.output == "a b.h5: 4 tasks: 4 converged\nnext: gfmd analyze 'a b.h5'\n"
+
+
+def test_what_did_not_converge_is_counted_apart(gfmd):
+    gfmd("run", "spec.toml", "--set", "solver.max_steps=1")
+    state = told(gfmd("status", "small.h5", "--json"))
+    assert state["statuses"] == {"converged": 2, "max_steps": 2}
+    assert (state["converged"], state["missing"]) == (2, 0)
+
+
+def test_each_shard_is_told_where_asked_for(gfmd):
+    gfmd("run", "spec.toml", "--shard", "1/3")
+    state = told(gfmd("status", "spec.toml", "--shards", "3", "--json"))
+    assert state["shards"] == [{"missing": 2}, {"converged": 1}, {"missing": 1}]
+    lines = gfmd("status", "small.h5", "--shards", "3").output.splitlines()
+    assert lines[1:4] == [
+        "  shard 0/3: 2 missing", "  shard 1/3: 1 converged", "  shard 2/3: 1 missing",
+    ]  # fmt: skip
+    assert lines[4] == "next: gfmd run SPEC -o small.h5"
+
+
+def test_records_and_saved_states_are_seen_before_they_are_collected(gfmd):
+    uncollected(stop_at=2)  # task 0 has its record, task 2 a state
+    before = everything()
+    state = told(gfmd("status", "spec.toml", "--json"))
+    assert (state["records"], state["missing_tasks"]) == (1, [1, 2, 3])
+    (saved,) = state["saved"]
+    assert (saved["task"], saved["points"]) == (2, 64)
+    assert saved["residual"] > 0
+    lines = gfmd("status", "spec.toml").output
+    assert "  task 2 power n=1 64 p*=0.1: state of step " in lines
+    assert "1 records are not collected yet" in lines
+    assert everything() == before
+
+
+def test_collecting_brings_the_records_in_and_solves_nothing(gfmd):
+    uncollected(stop_at=2)
+    assert not Path("small.h5").exists()
+    done = gfmd("collect", "spec.toml")
+    assert done.exit_code == 1
+    assert "1 converged, 3 missing" in done.output
+    assert len(gfmd("export", "small.h5").output.splitlines()) == 2
+    assert told(gfmd("status", "spec.toml", "--json"))["saved"]  # to go on from
+    gfmd("run", "spec.toml")
+    done = gfmd("collect", "spec.toml")
+    assert done.exit_code == 0
+    assert "next: gfmd analyze small.h5" in done.output
+
+
+def test_collecting_nothing_writes_nothing(gfmd):
+    before = everything()
+    assert gfmd("collect", "spec.toml").exit_code == 1
+    assert everything() == before
+
+
+def test_damaged_records_are_told_and_left_alone(gfmd):
+    gfmd("run", "spec.toml", "--shard", "0/2")
+    parts = Path("small.parts")
+    (parts / f"{'0' * 16}.record").write_bytes(b"\x89HDF\r\n\x1a\n" + bytes(500))
+    (parts / f"{'1' * 16}.bad").write_bytes(b"")
+    before = everything()
+    state = told(gfmd("status", "spec.toml", "--json"))
+    assert state["damaged"] == [f"{'1' * 16}.bad", f"{'0' * 16}.record"]
+    assert "damaged, to be solved again: 1111" in gfmd("status", "small.h5").output
+    assert everything() == before
+
+
+def test_status_neither_waits_for_a_collector_nor_stops_it(gfmd):
+    gfmd("run", "spec.toml", "--shard", "0/2")
+    with alone(Path("small.parts")):
+        assert told(gfmd("status", "spec.toml", "--json"))["missing"] == 2
+
+
+@pytest.mark.parametrize(
+    ("words", "status", "message"),
+    [
+        (("none.toml",), 2, "cannot be read"),
+        (("none.h5",), 2, "no such study"),
+        (("bad.h5",), 74, "no readable HDF5"),
+        (("small.h5", "--set", "grid.points=32"), 2, "go with a spec"),
+        (("spec.toml", "--shards", "5"), 2, "take 1 to 4"),
+        (("spec.toml", "--set", "grid.points=32"), 2, "another spec"),
+    ],
+)
+def test_bad_usage_is_one_message(gfmd, words, status, message):
+    gfmd("run", "spec.toml", "--shard", "0/2")
+    Path("bad.h5").write_bytes(b"nothing")
+    done = gfmd("status", *words)
+    assert done.exit_code == status
+    assert message in done.output
+    assert "Traceback" not in done.output
+
+
+def test_a_stopped_shard_leaves_its_records_to_others(gfmd):
+    uncollected(stop_at=2)
+    assert len(list(Path("small.parts").glob("*.record"))) == 1
+    assert gfmd("run", "spec.toml", "--shard", "1/2").exit_code == 0
+    assert told(gfmd("status", "spec.toml", "--json"))["records"] == 0
+    assert len(gfmd("export", "small.h5").output.splitlines()) == 4
+
+
+def test_a_lock_holds_though_its_folder_is_removed_and_made_again(tmp_path):
+    folder, found = tmp_path / "parts", []
+
+    def wait_for_it():
+        with alone(folder):
+            found.append((folder / "lock").exists())
+
+    waiting = Thread(target=wait_for_it)
+    with alone(folder):
+        waiting.start()
+        time.sleep(0.2)  # it waits for the lock of a file that will be gone
+        assert found == []
+        (folder / "lock").unlink()
+        folder.rmdir()
+    waiting.join(20)
+    assert found == [True]
+
+
+def test_a_record_that_is_collected_meanwhile_is_not_missed(gfmd, monkeypatch):
+    uncollected(stop_at=2)
+    spec, text = read_spec(Path("spec.toml"), ())
+    study = Study(Path("small.h5"))
+    listed = study._record_paths()
+    study.collect(spec, plan(spec), text)
+    monkeypatch.setattr(study, "_record_paths", lambda: listed)  # as seen before
+    assert study.held() == {plan(spec)[0].id: "converged"}
