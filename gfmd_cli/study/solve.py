@@ -11,7 +11,8 @@ import numpy as np
 
 from gfmd_cli.errors import Interrupted
 from gfmd_cli.physics.contact import Contact
-from gfmd_cli.physics.observables import cross_section, stress_distribution
+from gfmd_cli.physics.observables import contact_points, cross_section, stress_distribution
+from gfmd_cli.physics.true_contact import bearing, contact_stress
 from gfmd_cli.solvers.loop import State
 from gfmd_cli.study.checkpoint import Checkpoint
 from gfmd_cli.study.grids import Solved
@@ -158,6 +159,8 @@ def _record(task: Task, solved: Solved, seconds: float) -> Record:
         }
         | solved.columns()
     )
+    if task.output.true_contact:
+        row |= _true_contact(solved)
     distribution = {}
     if task.output.histogram:
         pr = stress_distribution(contact, u, sigma)
@@ -184,3 +187,14 @@ def _record(task: Task, solved: Solved, seconds: float) -> Record:
         if task.output.cross_section
         else {},
     )
+
+
+def _true_contact(solved: Solved) -> dict[str, float]:
+    """Delta_sigma over the true contact and over the highest points, as columns."""
+    contact, solution = solved.contact, solved.solution
+    found = contact_stress(contact, contact_points(contact, solution.u, solution.sigma))
+    return {
+        "deviation_c": found.deviation,
+        "quadrature_c": found.quadrature,
+        "deviation_bearing": float(bearing(contact).delta_sigma_c(contact.pressure)),
+    }
