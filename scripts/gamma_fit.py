@@ -18,23 +18,24 @@ from theory_studies import STUDIES, TRAINING
 
 from gfmd_cli.analysis.compare import Curve, compare
 from gfmd_cli.analysis.ensemble import without_seed
-from gfmd_cli.analysis.looks import Look, colours
+from gfmd_cli.analysis.looks import MARKERS, Look, colours
 from gfmd_cli.analysis.sheet import Sheet, styled
 from gfmd_cli.physics.elastomer import Slab, exponent_at
 from gfmd_cli.physics.persson import Persson, gamma_n
 
 Gamma = Callable[[np.ndarray], np.ndarray]
+PAPER = "Eqs. (39), (42)"
 FORMS: dict[str, tuple[Callable, list[float]]] = {
     "a (1 - n/4)^b": (lambda n, a, b: a * np.clip(1 - n / 4, 0, 1) ** b, [0.5, 1.2]),
     "a exp(-n/b)": (lambda n, a, b: a * np.exp(-n / b), [0.5, 2.0]),
-    "a / [1 + (n/b)^c]": (lambda n, a, b, c: a / (1 + (n / b) ** c), [0.5, 2.0, 2.0]),
+    "a / [1 + (n/b)^2]": (lambda n, a, b: a / (1 + (n / b) ** 2), [0.5, 2.0]),
+    "a exp(-n/b) + c": (lambda n, a, b, c: a * np.exp(-n / b) + c, [0.5, 2.0, 0.0]),
 }
 """Forms of gamma(n) with where their fit begins."""
-LIGHT = 1.0  # p*: up to here errors are those of ln u_g, from here on those of ln p
+LIGHT = 1.0  # p*: below, errors are those of ln u_g, from here on those of ln p
 TABLE = np.array([0.003, 0.01, 0.03, 0.1, 0.3, *np.geomspace(1.0, 5.0, 33)])
-"""Reduced pressures that theory is tabulated at: all of the studies up to LIGHT."""
+"""Reduced pressures that theory is tabulated at: below LIGHT those of the studies."""
 ENDS: dict[tuple[str, str], tuple[np.ndarray, np.ndarray]] = {}
-MARKERS = "os^Dv<p>h"
 
 
 @dataclass(frozen=True)
@@ -88,8 +89,8 @@ class Case:
         return weight * self.ends[0] + (1 - weight) * self.ends[1]
 
     def errors(self, gamma: Gamma | None) -> np.ndarray:
-        """ln(u_g of theory / u_g) over p* <= LIGHT."""
-        kept = (self.p_star <= LIGHT) & (self.u_g > 0)
+        """ln(u_g of theory / u_g) over p* < LIGHT."""
+        kept = (self.p_star < LIGHT) & (self.u_g > 0)
         gap = np.interp(np.log(self.p_star[kept]), np.log(TABLE), np.log(self.theory(gamma)))
         return gap - np.log(self.u_g[kept])
 
@@ -117,7 +118,7 @@ def cases(folder: Path, name: str) -> list[Case]:
 
 
 def fit(training: list[Case], form: Callable, start: list[float]) -> np.ndarray:
-    """The parameters of least squares over all pressures p* <= LIGHT and seeds."""
+    """The parameters of least squares over all pressures p* < LIGHT and seeds."""
     residuals = lambda x: np.concatenate([c.errors(lambda n: form(n, *x)) for c in training])  # noqa: E731
     return least_squares(residuals, start).x
 
@@ -149,7 +150,9 @@ def print_best(best: dict[str, dict[float, tuple[float, float]]], smooth: Gamma)
     print("| study | " + " | ".join(f"n = {n:g}" for n in exponents) + " |")
     print("| --- |" + " --- |" * len(exponents))
     for name, values in best.items():
-        cells = [f"{values[n][0]:.3f} ± {values[n][1]:.3f}" if n in values else "" for n in exponents]
+        cells = [
+            f"{values[n][0]:.3f} ± {values[n][1]:.3f}" if n in values else "" for n in exponents
+        ]
         print(f"| {name} | " + " | ".join(cells) + " |")
     for name, gamma in (("Eq. (39)", gamma_n), ("gamma(n) fitted", smooth)):
         told = [f"{float(gamma(np.array([n]))[0]):.3f}" for n in exponents]
@@ -157,12 +160,11 @@ def print_best(best: dict[str, dict[float, tuple[float, float]]], smooth: Gamma)
 
 
 def print_rms(studies: dict[str, list[Case]], gammas: dict[str, Gamma | None]) -> None:
-    print("\nRms of ln u_g over p* <= 1 / rms of ln p at equal u_g over p* >= 1, in per cent")
+    print("\nRms of ln u_g over p* < 1 / rms of ln p at equal u_g over p* >= 1, in per cent")
     print("| study | curves | " + " | ".join(gammas) + " |")
     print("| --- | --- |" + " --- |" * len(gammas))
-    groups = {name: [(name, found)] for name, found in studies.items()}
-    for name, found in groups.items():
-        (_, held), cells = found[0], []
+    for name, held in studies.items():
+        cells = []
         for gamma in gammas.values():
             light = rms([case.errors(gamma) for case in held])
             heavy = rms([case.pressure_errors(gamma) for case in held])
@@ -175,7 +177,7 @@ def print_by_exponent(found: list[Case], gammas: dict[str, Gamma | None], title:
     groups: dict[str, list[Case]] = {}
     for case in sorted(found, key=lambda c: (np.nan_to_num(c.curve.n), c.curve.elastomer)):
         groups.setdefault(case.curve.elastomer, []).append(case)
-    print(f"\n{title}: rms of ln u_g over p* <= 1, in per cent")
+    print(f"\n{title}: rms of ln u_g over p* < 1, in per cent")
     print("| body | " + " | ".join(gammas) + " |\n| --- |" + " --- |" * len(gammas))
     for body, held in groups.items():
         told = [f"{100 * rms([case.errors(g) for case in held]):.1f}" for g in gammas.values()]
@@ -208,7 +210,10 @@ def main() -> None:
     parser.add_argument("--figure", type=Path, default=Path("docs/figures/gamma"))
     given = parser.parse_args()
     studies = {name: found for name in STUDIES if (found := cases(given.folder, name))}
-    gammas: dict[str, Gamma | None] = {"Eqs. (39), (42)": None, "Eq. (39) at d ln k/d ln q": gamma_n}
+    gammas: dict[str, Gamma | None] = {
+        "Eqs. (39), (42)": None,
+        "Eq. (39) at d ln k/d ln q": gamma_n,
+    }
     for name, (form, start) in FORMS.items():
         x = fit(studies[TRAINING], form, start)
         print(f"gamma = {name}: " + ", ".join(f"{value:.4f}" for value in x), flush=True)

@@ -13,6 +13,7 @@ from gfmd_cli.study.run import run_study
 FINE = [0, 0.5, 1, 1.5, 2, 2.5, 3, 4]
 EXPONENTS = [0, 0.5, 1, 2, 3, 4]
 BETWEEN = [0.25, 0.75, 1.75, 2.75, 3.5]
+LADDER = [0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0]
 FOUR = [0, 1, 2, 3]
 TRAINING = "training"
 
@@ -22,7 +23,11 @@ def power(exponents: list[float]) -> str:
 
 
 def spec(
-    body: str = "", points: int | None = None, most: int = 400, **surface: object
+    body: str = "",
+    points: int | None = None,
+    most: int = 400,
+    p_star: list[float] = LADDER,
+    **surface: object,
 ) -> str:
     """A run spec; `surface` tells what differs from the training surface.
 
@@ -48,7 +53,7 @@ def spec(
 points = {points or '"auto"'}
 
 [load]
-p_star = [0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0]
+p_star = {p_star}
 
 [accuracy]
 mean_gap = 0.01
@@ -60,20 +65,19 @@ histogram = false
 """
 
 
-SLABS = 'kind = "slab"\nthickness = [0.002, 0.005, 0.02, 0.05, 0.2, 1.0]'
+SLABS = 'kind = "slab"\nthickness = [0.005, 0.02, 0.05, 0.2]'
 STUDIES = {
     TRAINING: spec(power(FINE), most=800),
     "hurst-0.3": spec(hurst=0.3),
     "cut-off": spec(spectrum="cutoff"),
-    "slab": spec(SLABS, spectrum="cutoff", rolloff=0.2, cutoff=0.01, seed=[0, 1]),
+    "slab": spec(SLABS, spectrum="cutoff", rolloff=0.2, cutoff=0.02, seed=[0, 1]),
     "narrow": spec(cutoff=0.0625),
     "between": spec(power(BETWEEN)),
     "other-seeds": spec(seed=[4, 5, 6, 7]),
     "hurst-0.5": spec(hurst=0.5),
     "large-cell": spec(rolloff=0.125, cutoff=0.01, seed=[0, 1]),
     "broad": spec(power(FINE[:-2]), most=800, cutoff=0.005, seed=[0, 1]),
-    "true-contact": spec(power(FINE[:-1]), points=512),
-    "true-contact-broad": spec(power(FINE[:-1]), points=1024, cutoff=0.005, seed=[0, 1]),
+    "true-contact": spec(power(FINE[:-1]), points=400, p_star=[0.003, 0.03, 0.3], seed=[0, 1, 2]),
 }
 """Which surfaces and bodies each study holds; only the first is fitted to."""
 

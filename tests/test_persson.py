@@ -6,7 +6,16 @@ import pytest
 from scipy.integrate import trapezoid
 from scipy.special import erf, exp1
 
-from gfmd_cli.physics.persson import Persson, Shells, gamma_n, gamma_slab, ierfc, shells
+from gfmd_cli.physics.elastomer import Slab, exponent_at
+from gfmd_cli.physics.persson import (
+    Persson,
+    Shells,
+    gamma_fitted,
+    gamma_n,
+    gamma_slab,
+    ierfc,
+    shells,
+)
 
 P_STAR = np.array([0.001, 0.01, 0.1, 0.3, 1, 2, 3])
 # default surface: Delta_sigma / (k_n h_std), then u_g / h_std at P_STAR, as rounded in the table
@@ -253,3 +262,28 @@ def test_the_integral_of_erfc_keeps_its_digits():
     with mp.workdps(400):
         exact = [float(mp.exp(-(mp.mpf(t) ** 2)) / mp.sqrt(mp.pi) - t * mp.erfc(t)) for t in x]
     assert ierfc(x) == pytest.approx(exact, rel=1e-12, abs=0)
+
+
+@pytest.mark.parametrize("n", [0, 0.5, 2, 3.7])
+def test_the_exponent_of_the_stiffness_is_read_off_the_shells(default, n):
+    assert theory(default, n).shells.exponents() == pytest.approx(n, abs=5e-3)
+
+
+def test_the_exponent_of_a_slab_is_read_off_the_shells(default):
+    q, power = default
+    slab = Slab(thickness=0.03)
+    binned = shells(q, power, slab.stiffness(q), np.full(q.size, 0.35))
+    found, exact = binned.exponents(), exponent_at(slab.stiffness, binned.q)
+    assert exact[0] > 3.5
+    assert exact[-1] < 1.01
+    assert np.abs(found - exact)[1:-1].max() < 0.05
+
+
+def test_the_fitted_gamma_falls_from_more_than_half_to_a_floor():
+    n = np.linspace(0, 4, 81)
+    fitted = gamma_fitted(n)
+    assert np.all(np.diff(fitted) < 0)
+    assert fitted[0] == pytest.approx(0.5693, abs=1e-4)
+    assert fitted[-1] == pytest.approx(0.4826 * np.exp(-4 / 1.7939) + 0.0867, rel=1e-12)
+    assert gamma_fitted(5.0) == fitted[-1]
+    assert np.abs(fitted - gamma_n(n))[n <= 2].max() < 0.08  # close to the paper's up to n = 2

@@ -125,7 +125,10 @@ def test_task_ids_depend_on_content_not_on_place(read):
         (("[0.1, 1.0]", "[]"), ["load.p_star", "at least 1 item"]),
         (("[0.1, 1.0]", "{from=1, to=0.1}"), ["load.p_star", "lies below"]),
         (("[0.1, 1.0]", "{from=1, too=2}"), ["load.p_star.too", "did you mean 'to'"]),
-        (("[0.1, 1.0]", "0.1\npressure = 1"), ["load", "give one of p_star, pressure, contact_area, mean_gap"]),
+        (
+            ("[0.1, 1.0]", "0.1\npressure = 1"),
+            ["load", "give one of p_star, pressure, contact_area, mean_gap"],
+        ),
         (("[study]", "[study"), ["TOML syntax"]),
         (('"base"', '"../x"'), ["study.name", "pattern"]),
         (

@@ -7,9 +7,7 @@ from gfmd_cli.analysis.compare import Comparison, Curve
 from gfmd_cli.physics.fields import Field
 
 VARIANTS = {
-    "deviation_bearing": "a_r_persson_bearing",
-    "deviation_c": "a_r_persson_deviation_c",
-    "quadrature_c": "a_r_persson_quadrature_c",
+    name: f"a_r_persson_{name}" for name in ("deviation_bearing", "deviation_c", "quadrature_c")
 }
 """Columns of a study with the names that their contact areas have in records."""
 PERSSON = "whole surface"
