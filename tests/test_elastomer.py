@@ -186,8 +186,8 @@ def test_persson_theory_of_a_tabulated_slab_has_its_stiffness_and_gamma_between(
     body = table(tmp_path / "k.txt", q, slab.stiffness(q))
     surface = SelfAffine(cutoff=0.02)
     exact, tabulated = (build_scene(surface, e, 128).shells for e in (slab, body))
-    assert tabulated.variance == pytest.approx(exact.variance, rel=1e-6)
-    assert tabulated.energy == pytest.approx(exact.energy, rel=1e-6)
+    assert tabulated.variance == pytest.approx(exact.variance, rel=1e-5)
+    assert tabulated.energy == pytest.approx(exact.energy, rel=1e-5)
     # the exponent from the slope of Eq. (41) itself, in closed steps of 1e-5
     step = 1e-5
     slope = np.log(slab.stiffness(exact.q * (1 + step)) / slab.stiffness(exact.q * (1 - step)))

@@ -266,7 +266,7 @@ def test_the_integral_of_erfc_keeps_its_digits():
 
 @pytest.mark.parametrize("n", [0, 0.5, 2, 3.7])
 def test_the_exponent_of_the_stiffness_is_read_off_the_shells(default, n):
-    assert theory(default, n).shells.exponents() == pytest.approx(n, abs=5e-3)
+    assert theory(default, n).shells.exponents() == pytest.approx(n, abs=0.02)
 
 
 def test_the_exponent_of_a_slab_is_read_off_the_shells(default):
@@ -279,11 +279,11 @@ def test_the_exponent_of_a_slab_is_read_off_the_shells(default):
     assert np.abs(found - exact)[1:-1].max() < 0.05
 
 
-def test_the_fitted_gamma_falls_from_more_than_half_to_a_floor():
+def test_the_fitted_gamma_falls_from_that_of_springs_to_a_floor():
     n = np.linspace(0, 4, 81)
     fitted = gamma_fitted(n)
     assert np.all(np.diff(fitted) < 0)
-    assert fitted[0] == pytest.approx(0.5693, abs=1e-4)
-    assert fitted[-1] == pytest.approx(0.4826 * np.exp(-4 / 1.7939) + 0.0867, rel=1e-12)
+    assert fitted[0] == pytest.approx(0.5132, abs=2e-3)  # of the closed form of n = 0
+    assert fitted[-1] == pytest.approx(0.155, abs=0.008)  # best for the plates it was fitted to
     assert gamma_fitted(5.0) == fitted[-1]
     assert np.abs(fitted - gamma_n(n))[n <= 2].max() < 0.08  # close to the paper's up to n = 2
