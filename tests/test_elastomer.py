@@ -6,6 +6,7 @@ import pytest
 from pydantic import TypeAdapter, ValidationError
 
 from gfmd_cli.errors import InputError
+from gfmd_cli.physics.contact import build_scene
 from gfmd_cli.physics.elastomer import (
     Elastomer,
     HalfSpace,
@@ -14,9 +15,11 @@ from gfmd_cli.physics.elastomer import (
     Power,
     Slab,
     Tabulated,
+    exponent_at,
     slab_factor,
 )
-from gfmd_cli.physics.persson import gamma_n, gamma_slab
+from gfmd_cli.physics.persson import Persson, gamma_n, gamma_slab
+from gfmd_cli.physics.surface import SelfAffine
 
 Q = np.concatenate([[0.0], np.logspace(-6, 6, 61)])
 BODIES = [
@@ -166,6 +169,41 @@ def test_gamma_of_a_table_follows_its_local_exponent(tmp_path):
     q = np.array([1e-3, 1e-2, 1e2, 1e3])
     body = table(tmp_path / "k.txt", q, [1e-12, 1e-8, 1e-2, 1e-1])  # n = 4 below, 1 above
     assert body.gamma(np.array([1e-5, 1e5])) == pytest.approx([0.02, 0.35], rel=1e-9)
+
+
+@pytest.mark.parametrize("n", [0.5, 1, 3.3])
+def test_persson_theory_of_a_tabulated_power_law_is_that_of_the_power_law(tmp_path, n):
+    surface, p = SelfAffine(cutoff=0.05), np.array([1e-3, 0.1, 2.0])
+    body = table(tmp_path / "k.txt", np.geomspace(1.0, 300.0, 7), np.geomspace(1.0, 300.0, 7) ** n)
+    power, tabulated = (build_scene(surface, e, 64) for e in (Power(n=n), body))
+    assert tabulated.delta_sigma == pytest.approx(power.delta_sigma, rel=1e-12)
+    gaps = [Persson(s.shells).mean_gap(p * s.delta_sigma) for s in (power, tabulated)]
+    assert gaps[1] == pytest.approx(gaps[0], rel=1e-9)
+
+
+def test_persson_theory_of_a_tabulated_slab_has_its_stiffness_and_gamma_between(tmp_path):
+    slab, q = Slab(thickness=0.05), np.logspace(0, 3, 301)  # 100 rows a decade
+    body = table(tmp_path / "k.txt", q, slab.stiffness(q))
+    surface = SelfAffine(cutoff=0.02)
+    exact, tabulated = (build_scene(surface, e, 128).shells for e in (slab, body))
+    assert tabulated.variance == pytest.approx(exact.variance, rel=1e-5)
+    assert tabulated.energy == pytest.approx(exact.energy, rel=1e-5)
+    # the exponent from the slope of Eq. (41) itself, in closed steps of 1e-5
+    step = 1e-5
+    slope = np.log(slab.stiffness(exact.q * (1 + step)) / slab.stiffness(exact.q * (1 - step)))
+    expected = gamma_n(slope / (2 * step))
+    lone = 64  # shells of one |q|; a bin of several has the mean of theirs
+    assert tabulated.gamma[:lone] == pytest.approx(expected[:lone], rel=2e-3)
+    assert 0.02 < tabulated.gamma[0] < tabulated.gamma[-1] <= 0.36
+
+
+def test_the_local_exponent_of_a_slab_goes_from_four_to_one():
+    """Small t: k ~ q^4 (1 - t^2/5), exponent 4 - 2 t^2/5; large t: 1."""
+    slab = Slab(thickness=1.0)
+    t = np.array([1e-3, 0.05, 50.0])
+    found = exponent_at(slab.stiffness, t)
+    assert found[:2] == pytest.approx(4 - 0.4 * t[:2] ** 2, rel=1e-6)
+    assert found[2] == pytest.approx(1.0, rel=1e-12)
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,16 @@ import pytest
 from scipy.integrate import trapezoid
 from scipy.special import erf, exp1
 
-from gfmd_cli.physics.persson import Persson, Shells, gamma_n, gamma_slab, ierfc, shells
+from gfmd_cli.physics.elastomer import Slab, exponent_at
+from gfmd_cli.physics.persson import (
+    Persson,
+    Shells,
+    gamma_fitted,
+    gamma_n,
+    gamma_slab,
+    ierfc,
+    shells,
+)
 
 P_STAR = np.array([0.001, 0.01, 0.1, 0.3, 1, 2, 3])
 # default surface: Delta_sigma / (k_n h_std), then u_g / h_std at P_STAR, as rounded in the table
@@ -262,3 +271,28 @@ def test_area_and_gap_give_their_pressure_back(default, n):
     np.testing.assert_allclose(persson.pressure_at_area(persson.contact_area(p)), p, rtol=1e-12)
     np.testing.assert_allclose(persson.pressure_at_gap(persson.mean_gap(p)), p, rtol=1e-4)
     assert np.isnan(persson.pressure_at_gap(0.0))
+
+
+@pytest.mark.parametrize("n", [0, 0.5, 2, 3.7])
+def test_the_exponent_of_the_stiffness_is_read_off_the_shells(default, n):
+    assert theory(default, n).shells.exponents() == pytest.approx(n, abs=0.02)
+
+
+def test_the_exponent_of_a_slab_is_read_off_the_shells(default):
+    q, power = default
+    slab = Slab(thickness=0.03)
+    binned = shells(q, power, slab.stiffness(q), np.full(q.size, 0.35))
+    found, exact = binned.exponents(), exponent_at(slab.stiffness, binned.q)
+    assert exact[0] > 3.5
+    assert exact[-1] < 1.01
+    assert np.abs(found - exact)[1:-1].max() < 0.05
+
+
+def test_the_fitted_gamma_falls_from_that_of_springs_to_a_floor():
+    n = np.linspace(0, 4, 81)
+    fitted = gamma_fitted(n)
+    assert np.all(np.diff(fitted) < 0)
+    assert fitted[0] == pytest.approx(0.5132, abs=2e-3)  # of the closed form of n = 0
+    assert fitted[-1] == pytest.approx(0.155, abs=0.008)  # best for the plates it was fitted to
+    assert gamma_fitted(5.0) == fitted[-1]
+    assert np.abs(fitted - gamma_n(n))[n <= 2].max() < 0.08  # close to the paper's up to n = 2

@@ -1,20 +1,22 @@
 """A study beside Persson theory."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from gfmd_cli.errors import InputError
 from gfmd_cli.physics import einstein
 from gfmd_cli.physics.fields import Field
-from gfmd_cli.physics.persson import Persson
+from gfmd_cli.physics.persson import Persson, Shells, gamma_fitted
 from gfmd_cli.study.layout import MISSING
 from gfmd_cli.study.reading import read_rows, read_shells
 
 Row = dict[str, Any]
+Weights = Literal["paper", "fitted"]
+"""gamma of Eq. (30): as the paper has it, Eqs. (39) and (42), or as fitted in docs/theory.md."""
 
 
 @dataclass(frozen=True)
@@ -90,7 +92,7 @@ class Comparison:
     """Tasks that the study does not hold yet."""
 
 
-def compare(path: Path) -> Comparison:
+def compare(path: Path, gamma: Weights = "paper") -> Comparison:
     """Set a study beside Persson theory.
 
     Raises InputError where there is no such study or it holds no result, StudyError where it
@@ -103,11 +105,19 @@ def compare(path: Path) -> Comparison:
     groups: dict[tuple[Any, ...], list[Row]] = {}
     for row in solved:
         groups.setdefault((row["scene"], row["solver"], row["tolerance"]), []).append(row)
-    curves = [
-        Curve(sorted(group, key=lambda row: row["p_star"]), Persson(read_shells(path, scene)))
-        for (scene, *_), group in groups.items()
-    ]
+    curves = []
+    for (scene, *_), group in groups.items():
+        spectrum = read_shells(path, scene)
+        if gamma == "fitted":
+            spectrum = with_fitted_gamma(spectrum, float(group[0]["n"]))
+        curves.append(Curve(sorted(group, key=lambda row: row["p_star"]), Persson(spectrum)))
     return Comparison(path, curves, len(rows) - len(solved))
+
+
+def with_fitted_gamma(spectrum: Shells, n: float) -> Shells:
+    """A spectrum with gamma as fitted, at the exponent n or, where n is NaN, the local one."""
+    exponents = spectrum.exponents() if np.isnan(n) else np.full(spectrum.q.size, n)
+    return replace(spectrum, gamma=gamma_fitted(exponents))
 
 
 def einstein_prediction(p_star: Field) -> Prediction:

@@ -8,6 +8,7 @@ import numpy as np
 
 from gfmd_cli.analysis.compare import Comparison, Curve, einstein_prediction
 from gfmd_cli.analysis.ensemble import Ensemble, ensembles
+from gfmd_cli.analysis.true_contact import VARIANTS, true_contact_areas, true_contact_tables
 from gfmd_cli.physics.observables import QUANTITIES
 from gfmd_cli.study.layout import COLUMNS, MISSING
 from gfmd_cli.study.reading import read_rows
@@ -30,6 +31,7 @@ def tables(comparison: Comparison) -> str:
     `p ratio` is the pressure of the theory at the simulated mean gap over the simulated one.
     """
     blocks = [_table(curve) for curve in comparison.curves]
+    blocks += true_contact_tables(comparison)
     blocks += _spreads(ensembles(comparison))
     if comparison.missing:
         blocks.append(f"{comparison.missing} tasks are not solved yet: run the spec again.")
@@ -128,6 +130,7 @@ def as_records(comparison: Comparison) -> list[dict[str, Any]]:
     for curve in comparison.curves:
         theory = curve.prediction
         at_gap = curve.pressure_at_gap(curve.column("u_g"))
+        areas = true_contact_areas(curve)
         records += [
             {
                 **{key: _plain(row[key]) for key in ("n", "thickness", "points", "seed", "p_star")},
@@ -144,6 +147,8 @@ def as_records(comparison: Comparison) -> list[dict[str, Any]]:
                 "residual": row["residual"],
                 "status": row["status"],
                 **{name: _plain(row[name]) for name in ERRORS if name in row},
+                **{name: _plain(row[name]) for name in VARIANTS if areas},
+                **{name: _plain(float(area[i])) for name, area in areas.items()},
                 **spreads.get(row["task"], {}),
             }
             for i, row in enumerate(curve.rows)

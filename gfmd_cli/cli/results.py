@@ -4,6 +4,7 @@ import csv
 import io
 import json
 from pathlib import Path
+from typing import Literal
 
 import click
 
@@ -14,7 +15,16 @@ from gfmd_cli.cli.options import FILE
 @click.argument("study", type=FILE)
 @click.option("--json", "as_json", is_flag=True, help="Print a list of records instead of tables.")
 @click.option("--figures", type=FILE, metavar="DIR", help="Draw figures into this folder.")
-def analyze(study: Path, as_json: bool, figures: Path | None) -> None:
+@click.option(
+    "--gamma",
+    type=click.Choice(["paper", "fitted"]),
+    default="paper",
+    show_default=True,
+    help="Weight of the elastic energy in the mean gap of theory; see docs/theory.md.",
+)
+def analyze(
+    study: Path, as_json: bool, figures: Path | None, gamma: Literal["paper", "fitted"]
+) -> None:
     """Compare a study with Persson theory.
 
     Example:
@@ -25,7 +35,7 @@ def analyze(study: Path, as_json: bool, figures: Path | None) -> None:
     from gfmd_cli.analysis.distribution_tables import distribution_table
     from gfmd_cli.analysis.tables import as_records, tables
 
-    comparison = compare(study)
+    comparison = compare(study, gamma)
     if as_json:
         click.echo(json.dumps(as_records(comparison), indent=1))
     else:

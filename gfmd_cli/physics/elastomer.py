@@ -7,6 +7,7 @@ contacts of randomly rough surfaces across the spatial dimensions".
 """
 
 import warnings
+from collections.abc import Callable
 from typing import Annotated, Literal
 
 import numpy as np
@@ -18,6 +19,21 @@ from gfmd_cli.physics.fields import Field
 from gfmd_cli.physics.persson import gamma_n, gamma_slab
 
 MAX_TABLE = 2**20  # bytes of a tabulated stiffness
+Stiffness = Callable[[Field, float], Field]
+STEP = 1e-3  # of log q: fine against any table, coarse against rounding
+
+
+def exponent_at(stiffness: Stiffness, q: Field, length: float = 1.0) -> Field:
+    """d ln k / d ln q at wavenumbers q [1/m], by central differences; zero where k is zero.
+
+    Parameters
+    ----------
+    stiffness : k(q, length) [Pa/m]
+    """
+    above, below = (stiffness(q * np.exp(step), length) for step in (STEP, -STEP))
+    safe = (above > 0) & (below > 0)
+    ratio = np.where(safe, above, 1.0) / np.where(safe, below, 1.0)
+    return np.asarray(np.log(ratio) / (2 * STEP))
 
 
 def _power(q: Field, n: float) -> Field:
@@ -142,11 +158,7 @@ class Tabulated(Choice):
 
     def gamma(self, q: Field, length: float = 1.0) -> Field:
         """Weight of the elastic energy in Persson theory: Eq. (39) at the local exponent of k."""
-        step = 1e-3  # of log q: fine against any table, coarse against rounding
-        k_above, k_below = self.stiffness(q * np.exp(step)), self.stiffness(q * np.exp(-step))
-        safe = (k_above > 0) & (k_below > 0)
-        slope = np.log(np.where(safe, k_above, 1.0) / np.where(safe, k_below, 1.0)) / (2 * step)
-        return gamma_n(np.clip(slope, 0.0, 4.0))
+        return gamma_n(np.clip(exponent_at(self.stiffness, q, length), 0.0, 4.0))
 
     def _table(self) -> Field:
         """The rows (q, k). Raises InputError for anything but two rising positive columns."""

@@ -14,6 +14,7 @@ from scipy.special import erf, erfc, erfcx, erfinv
 from gfmd_cli.physics.fields import Field
 
 _GAMMA = {0.0: 0.5, 0.5: 0.45, 1.0: 0.35, 2.0: 0.2, 3.0: 0.1, 4.0: 0.02}  # Eq. (39)
+_FITTED = (0.3867, 1.4779, 0.1273)  # of `gamma_fitted`, from scripts/gamma_fit.py
 _SAME_SHELL = 1e-9  # relative difference of |q| within one shell: far above rounding
 _CHUNK = 1 << 18  # elements of one temporary array, 2 MiB: fits a cache and bounds the memory
 _NARROW = 1e-5  # bin width / variance where the mid point errs as little as the difference, ~1e-10
@@ -45,6 +46,16 @@ def gamma_n(n: Field | float) -> Field:
     return value
 
 
+def gamma_fitted(n: Field | float) -> Field:
+    """Weight 0.3867 exp(-n / 1.4779) + 0.1273 of the elastic energy for an exponent n of k.
+
+    No equation of the paper: fitted to mean gaps of the continuum below p* = 1, see docs/theory.md.
+    Exponents beyond [0, 4], the range of the fit, count as its ends.
+    """
+    height, width, floor = _FITTED
+    return np.asarray(height * np.exp(-np.clip(n, 0.0, 4.0) / width) + floor)
+
+
 def gamma_slab(qt: Field) -> Field:
     """Weight gamma_4 + (gamma_1 - gamma_4) tanh(q t / 6) of a slab of thickness t.
 
@@ -64,6 +75,12 @@ class Shells:
     energy: Field  # sum of k C: twice the energy of full contact [Pa m]
     variance: Field  # sum of k^2 C: variance of the full-contact stress, Eq. (23) [Pa^2]
     gamma: Field  # mean gamma of Eq. (30), weighted with k C
+
+    def exponents(self) -> Field:
+        """d ln k / d ln q, of k = sum of k^2 C / sum of k C in every shell."""
+        if self.q.size < 2:
+            return np.zeros_like(self.q)
+        return np.asarray(np.gradient(np.log(self.variance / self.energy), np.log(self.q)))
 
 
 def shells(

@@ -73,6 +73,14 @@ FURTHER = (
     ),
     Column("sigma_p_bound", float, "1", "proven bound of the error of sigma_p on its grid"),
     Column("u_g_bound", float, "1", "proven bound of the error of u_g on its grid"),
+    *(
+        Column(name, float, "1", f"{what} / Delta_sigma")
+        for name, what in (
+            ("deviation_c", "standard deviation of the full-contact stress over the true contact"),
+            ("quadrature_c", "rms of its quadrature over the true contact"),
+            ("deviation_bearing", "the same deviation over the highest points, as many as carry p"),
+        )
+    ),
 )
 COLUMNS = (*CONTRACT, *FURTHER)
 

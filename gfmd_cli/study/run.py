@@ -15,7 +15,7 @@ from pathlib import Path
 from threading import Thread, Timer
 from typing import Any, NamedTuple
 
-from gfmd_cli.errors import GfmdError, Interrupted, SpaceError, StudyError
+from gfmd_cli.errors import GfmdError, InputError, Interrupted, SpaceError, StudyError
 from gfmd_cli.physics import wisdom
 from gfmd_cli.physics.ranks import Ranks, agree, leads, together
 from gfmd_cli.study import solve
@@ -72,6 +72,8 @@ def run_study(
     Raises InputError for a spec that does not fit the study or the machine, SpaceError, and
     Interrupted after a signal or the time given, when all states are saved.
     """
+    if ranks is not None and spec.output.true_contact:
+        raise InputError("output.true_contact: takes whole grids; run it without mpiexec")
     study = Study(path)
     study.check_spec(spec)
     tasks = plan(spec)

@@ -11,8 +11,9 @@ import numpy as np
 
 from gfmd_cli.errors import Interrupted, SpaceError
 from gfmd_cli.physics.contact import Contact
-from gfmd_cli.physics.observables import stress_distribution
+from gfmd_cli.physics.observables import contact_points, stress_distribution
 from gfmd_cli.physics.ranks import Ranks, leads
+from gfmd_cli.physics.true_contact import bearing, contact_stress
 from gfmd_cli.solvers.cascade import Solution
 from gfmd_cli.solvers.loop import State
 from gfmd_cli.study.checkpoint import Checkpoint
@@ -183,6 +184,8 @@ def _record(task: Task, solved: Solved, seconds: float) -> Record:
         }
         | solved.columns()
     )
+    if task.output.true_contact:
+        row |= _true_contact(solved)
     distribution = {}
     if task.output.histogram:
         pr = stress_distribution(contact, u, sigma)
@@ -213,3 +216,14 @@ def _record(task: Task, solved: Solved, seconds: float) -> Record:
         if task.output.cross_section
         else {},
     )
+
+
+def _true_contact(solved: Solved) -> dict[str, float]:
+    """Delta_sigma over the true contact and over the highest points, as columns."""
+    contact, solution = solved.contact, solved.solution
+    found = contact_stress(contact, contact_points(contact, solution.u, solution.sigma))
+    return {
+        "deviation_c": found.deviation,
+        "quadrature_c": found.quadrature,
+        "deviation_bearing": float(bearing(contact).delta_sigma_c(contact.pressure)),
+    }

@@ -165,6 +165,9 @@ class OutputTable(Choice):
     """Fields on the grid: displacement, stress, indenter."""
     cross_section: bool = False
     """Height, displacement and stress along the diagonal (of a line scene: all of it)."""
+    true_contact: bool = False
+    """Delta_sigma over the true contact, as columns deviation_c, quadrature_c and
+    deviation_bearing."""
 
 
 class Spec(Choice):
@@ -186,6 +189,8 @@ class Spec(Choice):
         )
         if self.accuracy is None:
             del data["accuracy"]
+        if not self.output.true_contact:
+            del data["output"]["true_contact"]
         for table in ("surface", "elastomer"):
             for dumped, choice in zip(data[table], getattr(self, table), strict=True):
                 if "path" in dumped:

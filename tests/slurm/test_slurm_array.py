@@ -7,7 +7,7 @@ import h5py
 import numpy as np
 import pytest
 
-from gfmd_cli.study.store import read_rows
+from gfmd_cli.study.reading import read_rows
 
 pytestmark = pytest.mark.slurm
 

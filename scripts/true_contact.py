@@ -1,0 +1,113 @@
+"""Persson theory with Delta_sigma over the contact: tables and figure of docs/theory.md.
+
+Reads the study `true-contact` of scripts/theory_studies.py.
+
+python scripts/true_contact.py --folder results/theory --figure docs/figures/true_contact
+"""
+
+import argparse
+from pathlib import Path
+
+import numpy as np
+from gamma_fit import spread
+from scipy.special import erfinv
+
+from gfmd_cli.analysis.compare import Curve, compare
+from gfmd_cli.analysis.figures import P_STAR
+from gfmd_cli.analysis.looks import MARKERS, Look, colours
+from gfmd_cli.analysis.sheet import Sheet, styled
+from gfmd_cli.analysis.true_contact import VARIANTS, area
+
+PERSSON = "whole"
+SHOWN = (0, 0.5, 1, 1.5, 2)
+HIGHEST = 1.0  # p*; above, every theory is right
+
+
+def simulated(curve: Curve) -> np.ndarray:
+    """Contact area of the continuum where it is known."""
+    best = curve.column("a_r_continuum")
+    return np.where(np.isfinite(best), best, curve.column("a_r"))
+
+
+def measured(curve: Curve, name: str) -> np.ndarray:
+    """Delta_sigma_c / Delta_sigma of one kind."""
+    return np.ones(len(curve.rows)) if name == PERSSON else curve.column(name)
+
+
+def needed(curve: Curve) -> np.ndarray:
+    """The Delta_sigma_c / Delta_sigma that makes Persson theory exact."""
+    with np.errstate(divide="ignore"):
+        return curve.column("p_star") / (np.sqrt(2) * erfinv(np.minimum(simulated(curve), 1)))
+
+
+def by_exponent(path: Path) -> dict[float, list[Curve]]:
+    groups: dict[float, list[Curve]] = {}
+    for curve in compare(path).curves:
+        groups.setdefault(curve.n, []).append(curve)
+    return dict(sorted(groups.items()))
+
+
+def over_seeds(columns: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """Mean and standard error, pressure by pressure."""
+    return tuple(np.array([spread(list(values)) for values in np.transpose(columns)]).T)
+
+
+def print_tables(groups: dict[float, list[Curve]]) -> None:
+    p_star = next(iter(groups.values()))[0].column("p_star")
+    kept = p_star <= HIGHEST
+    for n, curves in groups.items():
+        print(
+            f"\nn = {n:g}: Delta_sigma_c / Delta_sigma; a_r of theory / simulated ± standard error"
+        )
+        names = ["p*", "a_r", "needed", *VARIANTS, PERSSON, *VARIANTS]
+        print("| " + " | ".join(names) + " |")
+        print("| --- " * len(names) + "|")
+        means = [over_seeds([f(c) for c in curves])[0] for f in (simulated, needed)]
+        widths = [over_seeds([measured(c, name) for c in curves])[0] for name in VARIANTS]
+        ratios = [
+            over_seeds([area(measured(c, name), p_star) / simulated(c) for c in curves])
+            for name in (PERSSON, *VARIANTS)
+        ]
+        for i in np.flatnonzero(kept):
+            told = [f"{p_star[i]:g}", f"{means[0][i]:.4f}", f"{means[1][i]:.3f}"]
+            told += [f"{width[i]:.3f}" for width in widths]
+            told += [f"{mean[i]:.3f} ± {error[i]:.3f}" for mean, error in ratios]
+            print("| " + " | ".join(told) + " |")
+
+
+def draw(groups: dict[float, list[Curve]], path: Path) -> None:
+    """Symbols: what would make Persson theory exact; lines: what the highest points have."""
+    shown = {n: groups[n] for n in SHOWN if n in groups}
+    with styled():
+        sheet = Sheet(P_STAR, r"$\Delta\sigma_c\,/\,\Delta\sigma$")
+        for place, (n, curves) in enumerate(shown.items()):
+            look = Look(colours(len(shown))[place], MARKERS[place], f"n = {n:g}")
+            p_star = curves[0].column("p_star")
+            kept = p_star <= HIGHEST
+            value, error = (part[kept] for part in over_seeds([needed(c) for c in curves]))
+            style = {"fmt": "none", "ecolor": look.colour, "elinewidth": 0.7, "capsize": 2}
+            sheet.axes.errorbar(p_star[kept], value, 2 * error, **style)
+            sheet.points(look, p_star[kept], value, np.full(value.size, True))
+            line = over_seeds([measured(c, "deviation_bearing") for c in curves])[0][kept]
+            sheet.axes.plot(p_star[kept], line, color=look.colour)
+        sheet.line(sheet.axes, "highest points", p_star[:0], p_star[:0], color="0.4")
+        style = {"color": "black", "ls": (0, (4, 2)), "lw": 0.9}
+        sheet.line(sheet.axes, "whole surface", p_star[kept], np.ones(value.size), **style)
+        sheet.scale("x", "log", p_star[kept])
+        sheet.axes.set(ylim=(0, 1.7))
+        files = sheet.write(path)
+    files[0].unlink()  # docs show the PNG
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("--folder", type=Path, default=Path("results/theory"))
+    parser.add_argument("--figure", type=Path, default=Path("docs/figures/true_contact"))
+    given = parser.parse_args()
+    groups = by_exponent(given.folder / "true-contact.h5")
+    print_tables(groups)
+    draw(groups, given.figure)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,197 @@
+"""Delta_sigma over the contact against derivatives, sorted heights and paraboloids."""
+
+import json
+from itertools import product
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from gfmd_cli.analysis.true_contact import area
+from gfmd_cli.cli import main
+from gfmd_cli.physics.bodies import LineParabola, Parabola
+from gfmd_cli.physics.contact import Contact, build_scene
+from gfmd_cli.physics.elastomer import Power
+from gfmd_cli.physics.grid import Grid
+from gfmd_cli.physics.reference import kappa
+from gfmd_cli.physics.surface import SelfAffine
+from gfmd_cli.physics.true_contact import Bearing, bearing, contact_stress
+
+POINTS, R = 128, 1.0
+KAPPA = np.sqrt(2 / np.pi)  # a_r Delta_sigma / p of Persson theory at small p
+
+
+def rough(n, seed=0):
+    return build_scene(SelfAffine(cutoff=0.05, seed=seed), Power(n=n), 64).contact(0.1)
+
+
+def radius(points=POINTS):
+    """Distance from the summit of a parabola."""
+    x = (np.arange(points) - points // 2) / points
+    return np.hypot(x[:, None], x)
+
+
+@pytest.mark.parametrize("n", [0, 0.5, 1, 2.5, 4])
+def test_over_the_whole_surface_both_measures_are_delta_sigma(n):
+    contact = rough(n)
+    found = contact_stress(contact, np.full(contact.grid.shape, True))
+    assert found.deviation == pytest.approx(1, rel=1e-12)
+    assert found.quadrature == pytest.approx(1, rel=1e-12)
+
+
+def test_on_a_line_they_are_delta_sigma_but_for_the_highest_wave():
+    contact = build_scene(LineParabola(radius=R), Power(n=0.5), 256).contact(0.1)
+    found = contact_stress(contact, np.full(contact.grid.shape, True))
+    assert found.deviation == pytest.approx(1, rel=1e-12)
+    assert found.quadrature == pytest.approx(1, rel=1e-4)
+
+
+def test_for_a_half_space_the_quadrature_is_the_slope():
+    grid = Grid(32)
+    x, y = (2 * np.pi * np.arange(32) / 32)[None, :], (2 * np.pi * np.arange(32) / 32)[:, None]
+    height = np.cos(3 * x + 0.3) + 0.5 * np.sin(2 * y - x) + np.cos(5 * y) * np.ones_like(x)
+    slope = (
+        -3 * np.sin(3 * x + 0.3) - 0.5 * np.cos(2 * y - x),
+        np.cos(2 * y - x) - 5 * np.sin(5 * y),
+    )
+    square = (2 * np.pi) ** 2 * (slope[0] ** 2 + slope[1] ** 2)
+    touching = np.random.default_rng(0).random(grid.shape) < 0.1
+    found = contact_stress(Contact(grid, height, grid.wavenumber(), 1.0), touching)
+    assert found.quadrature == pytest.approx(np.sqrt(square[touching].mean()), rel=1e-12)
+
+
+def test_for_springs_the_deviation_is_that_of_the_heights():
+    contact = rough(0)
+    touching = contact.height > 1.0
+    found = contact_stress(contact, touching)
+    assert found.deviation == pytest.approx(contact.height[touching].std(), rel=1e-12)
+
+
+def test_without_contact_there_is_none():
+    contact = rough(1)
+    found = contact_stress(contact, np.full(contact.grid.shape, False))
+    assert np.isnan(found.deviation)
+    assert np.isnan(found.quadrature)
+
+
+def test_a_paraboloid_on_a_half_space_has_the_quadrature_of_the_paper():
+    """Eq. (21) at n = 1: k a / (sqrt(2) R); 0.833 against Persson's 0.798 by Eq. (19)."""
+    scene = build_scene(Parabola(radius=R), Power(n=1), POINTS)
+    a, r = 0.2, radius()
+    found = contact_stress(scene.contact(0.1), r < a)
+    disc = np.sqrt(np.mean(r[r < a] ** 2)) / R
+    assert disc == pytest.approx(a / np.sqrt(2) / R, rel=0.01)
+    assert found.quadrature * scene.delta_sigma == pytest.approx(disc, rel=0.02)
+    assert kappa(1) / KAPPA == pytest.approx(1.044, abs=1e-3)
+
+
+def test_a_paraboloid_on_a_membrane_has_no_deviation_at_all():
+    """K h = 2 tension / R everywhere on it: no theory of a variance can work there."""
+    scene = build_scene(Parabola(radius=R), Power(n=2), POINTS)
+    found = contact_stress(scene.contact(0.1), radius() < 0.2)
+    assert found.deviation * scene.delta_sigma < 0.05 * 2 / R
+
+
+def test_the_deviation_over_the_highest_points_is_that_of_a_sort():
+    contact = rough(1)
+    order = np.argsort(-contact.height.ravel())
+    stress = contact.elasticity(contact.height, contact.grid.empty()).ravel()[order]
+    found = bearing(contact)
+    assert np.all(np.diff(found.area) > 0)
+    for share, deviation in list(zip(found.area, found.deviation, strict=True))[::100]:
+        count = round(share * stress.size)
+        assert share == pytest.approx(count / stress.size, rel=1e-12)
+        assert deviation == pytest.approx(stress[:count].std(), rel=1e-9)
+
+
+def test_springs_on_a_paraboloid_carry_what_the_closed_form_says():
+    """Exactly p = k a_r^2 / (4 pi R); over the disc s has k a^2 / (2 R sqrt(12)).
+
+    With a_r = sqrt(2/pi) p / Delta_sigma_c the area is (sqrt(2/pi) sqrt(12) / 2)^(1/2) too large.
+    """
+    scene = build_scene(Parabola(radius=R), Power(n=0), 256)
+    exact = 0.02
+    p_star = exact**2 / (4 * np.pi * R) / scene.delta_sigma
+    predicted = float(bearing(scene.contact(p_star)).contact_area(p_star))
+    assert predicted / exact == pytest.approx(np.sqrt(np.sqrt(2 / np.pi) * np.sqrt(3)), rel=0.01)
+
+
+def test_a_deviation_that_is_delta_sigma_gives_back_persson_theory():
+    whole = Bearing(np.linspace(0.01, 0.99, 50), np.ones(50))
+    p_star = np.geomspace(1e-4, 4.0, 20)
+    assert whole.contact_area(p_star) == pytest.approx(area(1.0, p_star), rel=1e-14)
+
+
+def test_the_area_obeys_its_own_equation():
+    contact = rough(0.5)
+    found = bearing(contact)
+    for p_star in (0.03, 0.1, 0.5, 1.0):
+        a_r = float(found.contact_area(p_star))
+        assert a_r == pytest.approx(
+            float(area(np.interp(a_r, found.area, found.deviation), p_star)), rel=1e-3
+        )
+
+
+def test_where_the_load_falls_with_the_area_the_least_area_counts():
+    falls = Bearing(np.array([0.1, 0.2, 0.3, 0.4]), np.array([1.0, 0.1, 0.1, 1.0]))
+    p = np.sqrt(2) * 0.12566134685507402  # erfinv(0.1)
+    assert float(falls.delta_sigma_c(p)) == pytest.approx(1.0)
+
+
+SPEC = """
+[surface]
+kind = "self-affine"
+cutoff = 0.1
+[elastomer]
+kind = "power"
+n = [0, 1]
+[grid]
+points = 32
+[load]
+p_star = [0.1, 1.0]
+[output]
+histogram = false
+"""
+
+
+def records(tmp_path, *overrides):
+    spec, study = tmp_path / "spec.toml", tmp_path / "s.h5"
+    spec.write_text(SPEC)
+    options = [word for override in overrides for word in ("--set", override)]
+    run = CliRunner().invoke(main, ["run", str(spec), "-o", str(study), "-q", "-j", "1", *options])
+    assert run.exit_code == 0, run.output
+    told = CliRunner().invoke(main, ["analyze", str(study), "--json"])
+    words = CliRunner().invoke(main, ["analyze", str(study)])
+    assert told.exit_code == words.exit_code == 0
+    return json.loads(told.output), words.output
+
+
+def test_analyze_tells_of_it_where_it_was_asked_for(tmp_path):
+    found, text = records(tmp_path, "output.true_contact=true")
+    assert text.count("Delta_sigma over the contact") == 2
+    for n, p_star in product((0, 1), (0.1, 1.0)):
+        (record,) = [r for r in found if r["n"] == n and r["p_star"] == p_star]
+        for name in ("deviation_c", "quadrature_c", "deviation_bearing"):
+            predicted = record[f"a_r_persson_{name}"]
+            assert predicted == pytest.approx(float(area(record[name], p_star)), rel=1e-12)
+            assert f"{predicted:8.5f}" in text
+        if n == 0 and p_star == 1.0:  # springs touch the highest points
+            assert record["deviation_bearing"] == pytest.approx(record["deviation_c"], rel=0.1)
+
+
+def test_analyze_says_nothing_of_it_where_it_was_not(tmp_path):
+    found, text = records(tmp_path)
+    assert "over the contact" not in text
+    assert not any("a_r_persson_deviation_c" in record for record in found)
+
+
+def test_analyze_takes_the_fitted_gamma_for_the_mean_gap_alone(tmp_path):
+    paper, _ = records(tmp_path)
+    told = CliRunner().invoke(
+        main, ["analyze", str(tmp_path / "s.h5"), "--json", "--gamma", "fitted"]
+    )
+    for before, after in zip(paper, json.loads(told.output), strict=True):
+        assert after["a_r_persson"] == before["a_r_persson"]
+        if before["p_star"] < 1:  # n = 0: 0.514 for 0.5, n = 1: 0.324 for 0.35
+            assert (after["u_g_persson"] > before["u_g_persson"]) == (before["n"] == 0)
+        assert after["u_g_persson"] != before["u_g_persson"]
