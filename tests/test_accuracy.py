@@ -96,7 +96,7 @@ def test_an_auto_grid_ends_where_it_may_not_grow(rows_of):
 def test_an_auto_grid_ends_where_memory_ends(rows_of, monkeypatch, spec_of):
     (task,) = plan(spec_of())
     enough = 1.2 * max(task.bytes, 2.2e8) / 0.9
-    monkeypatch.setattr("gfmd_cli.study.run.available_memory", lambda: enough)
+    monkeypatch.setattr("gfmd_cli.study.resources.available_memory", lambda: enough)
     (row,) = rows_of("accuracy.mean_gap=1e-9")
     assert row["status"] == NOT_REACHED
     assert row["points"] < 1200

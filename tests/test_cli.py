@@ -241,9 +241,9 @@ SMALL_SETTINGS = {
 ROUGH = ("grid.points=64", "surface.cutoff=0.05", "solver.tolerance=1e-4")
 TWO = "load.p_star=[0.1, 1.0]"
 PAPER_SETTINGS = {
-    "fig01": ("grid.points=128",),
+    "fig01": ("grid.points=128", "load.within=0.8"),
     "fig02": ("grid.points=64",),
-    "kappa": ("grid.points=64", "load.contact_area=0.05", "solver.tolerance=1e-6"),
+    "kappa": ("grid.points=64", "load={contact_area=0.05, within=0.1}", "solver.tolerance=1e-6"),
     "fig04": ROUGH,
     "fig05": ROUGH,
     "fig06": (*ROUGH, TWO),

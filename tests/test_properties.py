@@ -52,7 +52,7 @@ def spec_of(tables):
 def solve(tables):
     """The only task of a spec, solved."""
     (task,) = plan(spec_of(tables))
-    return solve_on_grids(task, 1, np.inf, ignore, None, ignore, watch=ignore)
+    return solve_on_grids(task, 1, (np.inf, False), ignore, None, ignore, watch=ignore)
 
 
 def elastic(contact, u):

@@ -8,7 +8,7 @@ from click.testing import CliRunner
 
 from gfmd_cli.cli import main
 from gfmd_cli.study import solve
-from gfmd_cli.study.files import alone
+from gfmd_cli.study.files import locked
 from gfmd_cli.study.parse import read_spec
 from gfmd_cli.study.run import run_study
 from gfmd_cli.study.store import Study
@@ -143,7 +143,7 @@ def test_damaged_records_are_told_and_left_alone(gfmd):
 
 def test_status_neither_waits_for_a_collector_nor_stops_it(gfmd):
     gfmd("run", "spec.toml", "--shard", "0/2")
-    with alone(Path("small.parts")):
+    with locked(Path("small.parts/collecting")):
         assert told(gfmd("status", "spec.toml", "--json"))["missing"] == 2
 
 
@@ -179,11 +179,11 @@ def test_a_lock_holds_though_its_folder_is_removed_and_made_again(tmp_path):
     folder, found = tmp_path / "parts", []
 
     def wait_for_it():
-        with alone(folder):
+        with locked(folder / "lock"):
             found.append((folder / "lock").exists())
 
     waiting = Thread(target=wait_for_it)
-    with alone(folder):
+    with locked(folder / "lock"):
         waiting.start()
         time.sleep(0.2)  # it waits for the lock of a file that will be gone
         assert found == []
@@ -197,7 +197,7 @@ def test_a_record_that_is_collected_meanwhile_is_not_missed(gfmd, monkeypatch):
     uncollected(stop_at=2)
     spec, text = read_spec(Path("spec.toml"), ())
     study = Study(Path("small.h5"))
-    listed = study._record_paths()
+    listed = study.record_paths()
     study.collect(spec, plan(spec), text)
-    monkeypatch.setattr(study, "_record_paths", lambda: listed)  # as seen before
+    monkeypatch.setattr(study, "record_paths", lambda: listed)  # as seen before
     assert study.held() == {plan(spec)[0].id: "converged"}

@@ -210,7 +210,9 @@ def plan(spec: Spec) -> list[Task]:
         parts = {name: resolved[name][i] for name, i in zip(tables, places, strict=True)}
         s, e, g, m = places
         for load in loads:
-            content = [parts, resolved["load"] | {quantity: load}, resolved["output"]]
+            content = [parts, quantity == "p_star", load, resolved["output"]]
+            if quantity in SOUGHT:
+                content += [quantity, spec.load.within]
             if spec.accuracy is not None:
                 content.append(resolved["accuracy"])
             points = spec.grid[g].points
