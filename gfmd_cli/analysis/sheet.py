@@ -61,8 +61,8 @@ class Page:
         axes.plot(x, np.where(y > 0, y, np.nan), **style)
         self.legend[label] = Line2D([], [], **style)
 
-    def write(self, path: Path) -> list[Path]:
-        """Write a PDF and a PNG, each whole or not at all. Raises SpaceError."""
+    def _write_legend(self) -> None:
+        """Above the axes, on as many rows as it takes."""
         columns, rows = _legend_shape(list(self.legend), self.width / WIDTH)
         self.figure.set_size_inches(self.width, self.height + ROW * rows)
         self.figure.legend(
@@ -76,6 +76,11 @@ class Page:
             handlelength=1.6,
             handletextpad=0.5,
         )
+
+    def write(self, path: Path) -> list[Path]:
+        """Write a PDF and a PNG, each whole or not at all. Raises SpaceError."""
+        if self.legend:
+            self._write_legend()
         self.figure.draw_without_rendering()
         self.figure.set_layout_engine("none")  # laid out once for both files
         files = [path.with_name(f"{path.name}.{kind}") for kind in ("pdf", "png")]

@@ -83,6 +83,9 @@ def run_study(
     outcome = Counter(held[task.id] for task in share if task.id in held)
     waiting = agree(ranks, study.uncollected())
     if not pending and not waiting:
+        if leads(ranks) and study.parts.exists():  # of a run that was killed as it ended
+            with study.work(spec):
+                pass
         return outcome
     check_memory(pending, ranks)
     jobs, threads = share_out(pending, jobs, reproducible, ranks)

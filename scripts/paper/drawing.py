@@ -86,7 +86,7 @@ def percent(share: float) -> str:
 
 def plus_minus(found: float, error: float) -> str:
     """A value with its error in plain digits: 0.123 ± 0.004."""
-    if not (np.isfinite(error) and error > 0):
+    if not (np.isfinite(error) and error > 1e-8):
         return f"{found:.3g}"
     digits = max(
         0,

@@ -18,6 +18,11 @@ Random phases differ from the paper's, whose seed is not known, so that single n
 ratios and exact results can. Values are of the continuum where it is known well, with the error that `[accuracy]` estimates.
 """
 
+THEORY = """\
+Whether one smooth γ(n) does (Eq. 39), and what Δσ over the true contact predicts (Sects. 6, 7), is examined in
+[Theory beyond the paper](theory.md).
+"""
+
 MISPRINTS = """\
 ## Misprints met on the way
 
@@ -25,7 +30,7 @@ The program is built from the corrected equations. Each was checked against an i
 
 | where | printed | should be |
 | --- | --- | --- |
-| Eqs. 5, 6 | σ = σ(0) √(1 − ρ²)^{2μ}, μ = 2 − n | (1 − ρ²)^{μ/2}: Hertz's law at n = 1, and what is measured (below) |
+| Eqs. 5, 6 | σ = σ(0) √(1 − ρ²)^{2μ}, μ = 2 − n | (1 − ρ²)^{μ/2}: Hertz's law at n = 1, and what is measured (above) |
 | Eq. 10b | "for n < 1/2" | for 1/2 < n < 2; I_n = 2^{1−n} Γ(1 − n/2)/Γ(n/2) holds for 0 < n < 2 in the sense of Abel |
 | text to Eq. 14 | r₂ = √e a_c, same slope | r₂ = a_c/√e, same height |
 | Eq. 15 | u_g²/R_c | a_c²/R_c |
@@ -51,5 +56,13 @@ def write(claims: list[Claim], figures: Path, target: Path) -> None:
     for path in shown:
         copyfile(path, folder / path.name)
     gallery = "\n".join(f"![{path.stem}](figures/paper/{path.name})" for path in shown)
-    parts = (INTRODUCTION, f"{count(claims)}.", table(claims), MISPRINTS, "## Figures", gallery)
+    parts = (
+        INTRODUCTION,
+        f"{count(claims)}.",
+        table(claims),
+        THEORY,
+        MISPRINTS,
+        "## Figures",
+        gallery,
+    )
     target.write_text("\n\n".join(part.strip() for part in parts) + "\n", encoding="utf-8")
