@@ -45,7 +45,7 @@ class Checkpoint:
     """The checkpoint of one task, a folder of its own.
 
     Where processes share the task, each writes its rows into a file of its own, and the first
-    writes the pointer to all of them. Any number of processes can go on from there.
+    writes the pointer to all of them. As many processes can go on from there; others begin anew.
     """
 
     def __init__(self, folder: Path, ranks: Ranks | None = None) -> None:
@@ -147,8 +147,9 @@ class Checkpoint:
         return {"file": file, "first": first, "rows": len(fields["u"]), "crc": crc, "bytes": size}
 
     def load(self, grid: Grid) -> Resume | None:
-        """The saved state of a solve on `grid`, or None where there is none."""
-        if not self.slots:
+        """The saved state of a solve on `grid`, or None where there is none for it."""
+        size = 1 if self.ranks is None else self.ranks.size
+        if not self.slots or len(self.slots[0]["parts"]) != size:
             return None
         slot = self.slots[0]
         level = grid if slot["points"] == grid.points else grid.coarser(slot["points"])
