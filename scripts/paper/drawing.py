@@ -81,7 +81,7 @@ def finish(
 
 def percent(share: float) -> str:
     """A share in per cent, two digits."""
-    return f"{100 * share:.2g} %"
+    return f"{100 * share:.0f} %" if share >= 0.1 else f"{100 * share:.2g} %"
 
 
 def plus_minus(found: float, error: float) -> str:

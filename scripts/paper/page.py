@@ -14,6 +14,7 @@ config in `configs/paper/`, and each statement that can be checked stands below 
     make paper          # all of it: about an hour on two quiet cores
     make paper-quick    # small grids, a few minutes; the numbers are then rough
 
+Grids are of up to 8192² points (Fig. 5: 4096², the default surface otherwise 1024² to 2048²), where the paper went to 32768².
 Random phases differ from the paper's, whose seed is not known, so that single numbers of its one realisation cannot be repeated; trends, exponents,
 ratios and exact results can. Values are of the continuum where it is known well, with the error that `[accuracy]` estimates.
 """

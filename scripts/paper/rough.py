@@ -30,7 +30,7 @@ from paper.studies import Held, needs
 
 LIGHT = 0.035  # p* up to which a contact is called light
 LOWEST = 0.02  # stress [Delta_sigma] that is drawn
-WINDOW = 0.02  # half-width of the asperity of Fig. 5 along the diagonal, in cells
+WINDOW = 0.006  # half-width of the asperity of Fig. 5 along the diagonal, in cells
 
 
 @needs("fig04")
