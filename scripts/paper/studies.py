@@ -47,7 +47,7 @@ STUDIES = {
     "fig06": Study("fig06", quick=(SMALL, FEW)),
     "fig07": Study("fig07", quick=("grid.points=[512,1024]",)),
     "edges": Study("../stress-distribution", quick=("grid.points=[128,256,512]",)),
-    "fig08": Study("fig08", quick=(NO_BARS, "load.p_star=[0.1, 1.0]")),
+    "fig08": Study("fig08", quick=(NO_BARS, "load.p_star=[0.01, 0.03, 0.1, 1.0]")),
     "spacing": Study("spacing"),
     "fig10": Study("fig10", quick=(SMALL, FEW)),
     "fig11": Study("fig11", quick=(FEW,)),
