@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from gfmd_cli.errors import InputError, Interrupted
@@ -165,6 +165,9 @@ def test_a_search_stopped_again_and_again_ends_bit_for_bit(rows_of, spec_of, tmp
         assert broken[name] == unbroken[name], name
 
 
+@example(power=5.0, first=10.0, steps=0, quantity="contact_area")  # a start on the plateau
+@example(power=5.0, first=-10.0, steps=100, quantity="contact_area")
+@settings(derandomize=True, max_examples=2000, deadline=None)
 @given(
     power=st.floats(0.05, 6.0),
     first=st.floats(-12.0, 12.0),

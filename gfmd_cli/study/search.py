@@ -130,14 +130,14 @@ class _Search:
         self.task, self.scene, self.first, self._slope = task, scene, first, slope
         self.within = task.within if scene.grid.points == task.points else COARSE
         self.known: list[tuple[float, float]] = []
-        """Nearest to the root first."""
+        """Nearest to the root first; on a plateau (full contact) the innermost."""
 
     def take_in(self, trial: Trial) -> None:
         """Note ln(value / aim) with the sign of a pressure that is too high."""
         rises = self.task.quantity == "contact_area"
         excess = log(trial.value / self.task.load) if trial.value > 0 else -inf
         self.known.append((log(trial.pressure), excess if rises else -excess))
-        self.known.sort(key=lambda point: abs(point[1]))
+        self.known.sort(key=lambda point: (abs(point[1]), point[0] if point[1] > 0 else -point[0]))
 
     @property
     def best(self) -> float:
