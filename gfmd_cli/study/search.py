@@ -128,15 +128,15 @@ class _Search:
 
     def __init__(self, task: Task, scene: Scene, first: float, slope: float) -> None:
         self.task, self.scene, self.first, self._slope = task, scene, first, slope
+        self.sign = 1 if task.quantity == "contact_area" else -1
         self.within = task.within if scene.grid.points == task.points else COARSE
         self.known: list[tuple[float, float]] = []
         """Nearest to the root first; on a plateau (full contact) the innermost."""
 
     def take_in(self, trial: Trial) -> None:
         """Note ln(value / aim) with the sign of a pressure that is too high."""
-        rises = self.task.quantity == "contact_area"
         excess = log(trial.value / self.task.load) if trial.value > 0 else -inf
-        self.known.append((log(trial.pressure), excess if rises else -excess))
+        self.known.append((log(trial.pressure), self.sign * excess))
         self.known.sort(key=lambda point: (abs(point[1]), point[0] if point[1] > 0 else -point[0]))
 
     @property
@@ -160,7 +160,7 @@ class _Search:
         high = min((x for x, y in self.known if y > 0), default=inf)
         x, y = self.known[0]
         tries = len(self.known)
-        if abs(expm1(y)) <= self.within or tries >= TRIALS or high - low < SAME:
+        if abs(expm1(self.sign * y)) <= self.within or tries >= TRIALS or high - low < SAME:
             return None
         x -= max(-STEP, min(y / self.slope, STEP))
         if high - low < inf and (not low < x < high or tries % 5 == 4):
