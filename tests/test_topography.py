@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from gfmd_cli.errors import InputError
-from gfmd_cli.physics.topography import level, make_periodic, read_topography
+from gfmd_cli.physics.topography import fill_missing, level, make_periodic, read_topography
 
 SCAN = Path(__file__).parents[1] / "configs" / "data" / "di-3.di"
 
@@ -295,7 +295,7 @@ def test_a_map_without_size_and_unit_has_no_length(tmp_path):
 def test_a_scan_of_an_oblong_area_is_refused(tmp_path):
     pytest.importorskip("SurfaceTopography")
     path = write_text_map(tmp_path / "h.txt", height="2.5 um")
-    with pytest.raises(InputError, match=r"2e-06 x 2.5e-06 m .relative difference 2.0e-01"):
+    with pytest.raises(InputError, match=r"3.125e-07 x 2.5e-07 wide .relative difference 2.0e-01"):
         read_topography(path)
 
 
@@ -314,11 +314,17 @@ def test_an_unknown_format_is_refused(tmp_path, content):
         read_topography(tmp_path / "h.dat")
 
 
-def test_an_array_under_another_name_is_refused(npy, heights):
-    pytest.importorskip("SurfaceTopography")
+def test_an_array_is_known_by_its_content(npy, heights):
     path = npy()
-    with pytest.raises(InputError, match=r"save it as a \.npy file"):
-        read_topography(path.rename(path.with_suffix(".dat")))
+    read = read_topography(path.rename(path.with_suffix(".dat")))
+    np.testing.assert_array_equal(read.heights, heights)
+
+
+def test_an_archive_of_arrays_is_refused(tmp_path, heights):
+    pytest.importorskip("SurfaceTopography")
+    np.savez(tmp_path / "h.npz", heights)
+    with pytest.raises(InputError, match=r"save the map as a \.npy file"):
+        read_topography(tmp_path / "h.npz")
 
 
 def test_a_truncated_scan_is_refused(tmp_path):
@@ -408,3 +414,61 @@ def test_the_mirror_keeps_every_height_four_times(heights):
 
 def test_no_edge_treatment_leaves_the_heights(heights):
     assert make_periodic(heights, "none") is heights
+
+
+# maps that are not square, or have holes
+
+
+def test_the_middle_of_an_oblong_map_is_taken_as_asked(npy):
+    heights = np.arange(9.0 * 13).reshape(9, 13)
+    with pytest.raises(InputError, match=r"9 x 13 points.*surface.crop = true takes 8 x 8"):
+        read_topography(npy(heights))
+    read = read_topography(npy(heights), crop=True)
+    np.testing.assert_array_equal(read.heights, heights[:8, 2:10])
+    assert read.shape == (9, 13)
+
+
+def test_a_cropped_scan_keeps_the_size_of_its_points(tmp_path):
+    pytest.importorskip("SurfaceTopography")
+    (tmp_path / "h.txt").write_text(
+        "# Width: 3 um\n# Height: 2 um\n# Value units: nm\n"
+        + "\n".join(" ".join(str(i * j % 7) for j in range(12)) for i in range(8))
+    )
+    read = read_topography(tmp_path / "h.txt", crop=True)
+    assert read.heights.shape == (8, 8)
+    assert read.length == pytest.approx(2e-6)
+
+
+def test_holes_are_refused_with_the_remedy_or_filled(npy, heights):
+    heights[3, 4:7] = np.nan
+    with pytest.raises(InputError, match=r'3 of 256 heights .* surface.missing = "fill"'):
+        read_topography(npy(heights))
+    read = read_topography(npy(heights), fill=True)
+    assert read.filled == 3
+    known = np.isfinite(heights)
+    np.testing.assert_array_equal(read.heights[known], heights[known])
+
+
+def test_too_many_holes_are_not_filled(npy, heights):
+    heights[:8] = np.nan
+    with pytest.raises(InputError, match="at most 20% can be filled in"):
+        read_topography(npy(heights), fill=True)
+
+
+def test_a_hole_in_a_harmonic_surface_is_filled_exactly():
+    """x y and x^2 - y^2 solve the discrete Laplace equation."""
+    y, x = np.mgrid[:20, :20].astype(float)
+    for exact in (x * y, x**2 - y**2, 3 + x - 2 * y):
+        missing = np.zeros(exact.shape, dtype=bool)
+        missing[5:12, 3:15] = missing[16, 16] = True
+        holed = np.where(missing, np.nan, exact)
+        np.testing.assert_allclose(fill_missing(holed, missing), exact, atol=1e-10)
+
+
+def test_a_filled_hole_lies_between_its_rim(heights):
+    """The maximum principle, at the border of the map, too."""
+    missing = np.random.default_rng(3).random(heights.shape) < 0.15
+    missing[0, 0] = missing[-1, 5:8] = True
+    filled = fill_missing(np.where(missing, np.nan, heights), missing)
+    assert filled.min() == heights[~missing].min()
+    assert filled.max() == heights[~missing].max()

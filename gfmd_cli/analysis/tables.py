@@ -45,6 +45,7 @@ def _table(curve: Curve) -> str:
         f"{curve.elastomer} on {curve.surface}, {_points(curve)} points a side",
         f"Delta_sigma = {row['delta_sigma']:.6g} Pa, h_std = {row['h_std']:.6g} m, "
         f"L = {row['length']:.6g} m",
+        *([row["preparation"]] if row.get("preparation") else []),
         HEADER,
     ]
     at_gap = curve.pressure_at_gap(curve.column("u_g"))

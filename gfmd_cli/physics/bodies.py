@@ -30,6 +30,10 @@ class Indenter(Choice):
         """Heights [m] at the points of a grid that this process holds."""
         raise NotImplementedError
 
+    def preparation(self) -> str:
+        """What was read from a file and what was done to it, for people."""
+        return ""
+
 
 class _Body(Indenter):
     """A single body in the middle of the cell, repeated periodically."""

@@ -141,7 +141,7 @@ def build_scene(
     rms = sqrt(grid.total(float(np.square(height).sum())) / grid.size)
     height /= rms
     stiffness, stiffest = _stiffness(grid, elastomer)
-    m, power = radial_power(grid, height)
+    m, power, modes = radial_power(grid, height)
     q = m * (2 * np.pi / grid.length)
     k = elastomer.stiffness(q, grid.length)
     unit = elastomer.half_space(q) if isinstance(elastomer, Slab) else k
@@ -164,7 +164,7 @@ def build_scene(
         mean_height=mean,
         h_std=h_std,
         delta_sigma=reduced * stiffest * h_std,
-        shells=shells(q, power * h_std**2, k, elastomer.gamma(q, grid.length)),
+        shells=shells(q, power * h_std**2, k, elastomer.gamma(q, grid.length), modes),
     )
 
 
@@ -196,30 +196,32 @@ def _stiffness(grid: Grid, elastomer: Elastomer) -> tuple[Field, float]:
     return k, stiffest
 
 
-def radial_power(grid: Grid, height: Field) -> tuple[Field, Field]:
+def radial_power(grid: Grid, height: Field) -> tuple[Field, Field, Field]:
     """Sum of |h(q)|^2 over the modes of equal |q|, where it is more than rounding.
 
     On grids beyond 16384 points a side, large |q| that differ by less than 1e-5 are one.
 
-    Returns |q| L / 2 pi, rising, and the sums, both of shape (shells,).
+    Returns |q| L / 2 pi, rising, the sums, and how many modes they are of, each (shells,).
     """
     coefficients = grid.forward_into_work(height)
     half = grid.points // 2
     highest = grid.dimension * half**2
     merged = max(0, highest.bit_length() - MOST_SQUARES)  # 2^merged squares are one
     exact = EXACT_SQUARES if merged else highest + 1
-    total = np.zeros(exact + (max(highest - exact, 0) >> merged) + 1)
+    total, count = np.zeros((2, exact + (max(highest - exact, 0) >> merged) + 1))
     for rows in row_blocks(coefficients, max(coefficients.size // 16, BLOCK)):
         square = np.rint(grid.mode_number(rows) ** 2).astype(np.int64)  # a whole number
         if merged:
             np.copyto(square, exact + (square - exact >> merged), where=square >= exact)
         weight = grid.multiplicity() if grid.dimension == 2 else grid.multiplicity()[rows]
         power = np.abs(coefficients[rows]) ** 2 * weight
+        weight = np.broadcast_to(weight, square.shape)
         total += np.bincount(square.ravel(), power.ravel(), minlength=total.size)
-    total = grid.total(total)
+        count += np.bincount(square.ravel(), weight.ravel(), minlength=total.size)
+    total, count = grid.total(total), grid.total(count)
     total[0] = 0.0
     (square,) = np.nonzero(total > ROUNDING * total.max())
     squares = square.astype(np.float64)
     beyond = squares[square >= exact]
     squares[square >= exact] = exact + (beyond - exact + 0.5) * 2**merged - 0.5  # their middle
-    return np.sqrt(squares), total[square] / float(grid.size) ** 2
+    return np.sqrt(squares), total[square] / float(grid.size) ** 2, count[square]

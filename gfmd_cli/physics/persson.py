@@ -75,6 +75,7 @@ class Shells:
     energy: Field  # sum of k C: twice the energy of full contact [Pa m]
     variance: Field  # sum of k^2 C: variance of the full-contact stress, Eq. (23) [Pa^2]
     gamma: Field  # mean gamma of Eq. (30), weighted with k C
+    modes: Field | None = None  # how many carry power; None in studies of older versions
 
     def exponents(self) -> Field:
         """d ln k / d ln q, of k = sum of k^2 C / sum of k C in every shell."""
@@ -84,7 +85,14 @@ class Shells:
 
 
 def shells(
-    q: Field, power: Field, k: Field, gamma: Field, *, exact: int = 64, bins: int = 500
+    q: Field,
+    power: Field,
+    k: Field,
+    gamma: Field,
+    modes: Field | None = None,
+    *,
+    exact: int = 64,
+    bins: int = 500,
 ) -> Shells:
     """Bin the modes of a surface: exact shells at long wavelengths, then logarithmic bins.
 
@@ -96,23 +104,26 @@ def shells(
     power : |h(q)|^2 times the multiplicity of the mode [m^2], shape (modes,)
     k : stiffness k(q) [Pa/m], shape (modes,)
     gamma : weight gamma(q) of Eq. (30), shape (modes,)
+    modes : how many modes an entry stands for, by default one each, shape (modes,)
     exact : number of smallest |q| with power that get a bin each
     bins : number of logarithmic bins between the last of these and the largest |q| with power
     """
     carries_power = power > 0
     if not np.any(carries_power):
-        return Shells(*np.empty((5, 0)))
+        return Shells(*np.empty((6, 0)))
+    counts = np.ones_like(q) if modes is None else modes
     edges = _bin_edges(q[carries_power], exact, bins)
-    sums = np.zeros((5, edges.size + 1))
+    sums = np.zeros((6, edges.size + 1))
     for start in range(0, q.size, _CHUNK):
         part = slice(start, start + _CHUNK)
         where = np.searchsorted(edges, q[part])
         height, energy = power[part], k[part] * power[part]
-        weights = (q[part] * height, height, energy, k[part] * energy, gamma[part] * energy)
+        products = (q[part] * height, height, energy, k[part] * energy, gamma[part] * energy)
+        weights = (*products, counts[part] * (height > 0))
         for total, weight in zip(sums, weights, strict=True):
             total += np.bincount(where, weight, minlength=total.size)
-    moment, height, energy, variance, weighted = sums[:, sums[3] > 0]
-    return Shells(moment / height, height, energy, variance, weighted / energy)
+    moment, height, energy, variance, weighted, held = sums[:, sums[3] > 0]
+    return Shells(moment / height, height, energy, variance, weighted / energy, held)
 
 
 def _bin_edges(q: Field, exact: int, bins: int) -> Field:

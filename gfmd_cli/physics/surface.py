@@ -162,6 +162,10 @@ class FileSurface(Indenter):
     """The file, relative to the run spec."""
     dataset: str | None = None
     """HDF5 dataset or microscope channel; by default the only map, or the default channel."""
+    crop: bool = False
+    """Take the largest square of even side from the middle of a map that is none."""
+    missing: Literal["refuse", "fill"] = "refuse"
+    """What to do about missing heights: "fill" spans each hole as smoothly as can be."""
     periodic: bool | None = None
     """Whether the map repeats as it is; by default true for arrays, false for scans."""
     level: Levelling | None = None
@@ -175,7 +179,7 @@ class FileSurface(Indenter):
     scale: Positive = 1.0
     """Factor from the heights of the file to metres."""
     length: Positive | None = None
-    """Side of the map [m], as it stands in the file; by default what the file says, else 1."""
+    """Side of the (cropped) map [m]; by default what the file says, else 1."""
 
     def smallest_grid(self) -> int:
         """The map's own points. Raises InputError for a flat map."""
@@ -194,12 +198,12 @@ class FileSurface(Indenter):
     @property
     def cell(self) -> float:
         """Side of the periodic cell [m]: twice that of the map where it is mirrored."""
-        stated = self.length or _topography(self.path, self.dataset).length or 1.0
+        stated = self.length or self._topography().length or 1.0
         return 2 * stated if self._treatment()[1] == "mirror" else stated
 
     def _treatment(self) -> tuple[Levelling, Edges]:
         """What is done to the map: levelling, edges."""
-        says = _topography(self.path, self.dataset).periodic
+        says = self._topography().periodic
         periodic = self.periodic if self.periodic is not None else says in (True, None)
         return (
             self.level or ("none" if periodic else "plane"),
@@ -208,14 +212,36 @@ class FileSurface(Indenter):
 
     def _periodic_heights(self) -> Field:
         levelling, edges = self._treatment()
-        heights = self.scale * _topography(self.path, self.dataset).heights
+        heights = self.scale * self._topography().heights
         return make_periodic(level(heights, levelling), edges, self.taper)
+
+    def _topography(self) -> Topography:
+        return _topography(self.path, self.dataset, self.crop, self.missing == "fill")
+
+    def preparation(self) -> str:
+        """What was read and what was done to it, for people."""
+        read, (levelling, edges) = self._topography(), self._treatment()
+        rows, columns = read.shape
+        steps = [f"{self.path.name} ({read.source}): {rows} x {columns} points"]
+        if read.heights.shape != read.shape:
+            steps.append("cropped to {} x {}".format(*read.heights.shape))
+        if read.filled:
+            steps.append(f"{read.filled} missing heights filled in")
+        if levelling != "none":
+            steps.append(f"{levelling} taken off")
+        if edges == "window":
+            steps.append(f"edges faded to the mean height over {self.taper:g} of the side")
+        elif edges == "mirror":
+            steps.append("mirrored to twice the side")
+        else:
+            steps.append("taken as periodic")
+        return ", ".join(steps)
 
 
 @cache
-def _topography(path: Path, dataset: str | None) -> Topography:
+def _topography(path: Path, dataset: str | None, crop: bool, fill: bool) -> Topography:
     """The file, read once a process."""
-    return read_topography(path, dataset)
+    return read_topography(path, dataset, crop=crop, fill=fill)
 
 
 Surface = Annotated[

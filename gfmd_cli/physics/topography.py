@@ -8,12 +8,14 @@ import math
 import warnings
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.linalg import spsolve
 
 from gfmd_cli.errors import InputError
-from gfmd_cli.physics.fields import Field
+from gfmd_cli.physics.fields import Field, Mask
 
 Levelling = Literal["none", "mean", "plane", "curvature"]
 Edges = Literal["none", "window", "mirror"]
@@ -23,6 +25,7 @@ LARGEST_HEIGHT = 1e30  # in any unit; the usual marks of no data are 9.97e36 (ne
 MAX_BYTES = 2**33  # 32768 x 32768 heights in double precision
 MAX_COMPRESSION = 1032  # the limit of deflate, https://zlib.net/zlib_tech.html
 SQUARENESS = 1e-6  # relative: sides are stored in single precision or with some six digits
+MOST_MISSING = 0.2  # share of the points; beyond it the filling would be the surface
 
 DEGREES: dict[Levelling, int] = {"mean": 0, "plane": 1, "curvature": 2}
 
@@ -39,10 +42,32 @@ class Topography:
     """None for a bare array, which does not say; a scan is not, unless its file says otherwise."""
     source: str
     """Format and dataset or channel."""
+    shape: tuple[int, int]
+    """Rows and columns in the file, before it was cropped."""
+    filled: int = 0
+    """Missing heights that were filled in."""
+
+
+class _Map(NamedTuple):
+    """A height map as a reader gives it."""
+
+    heights: np.ndarray[Any, Any]
+    """(rows, columns), masked where the file says that a height is missing."""
+    sides: tuple[float, float] | None
+    """Extent along y and x."""
+    metres: bool
+    """Whether the sides are in metres, not in a unit that the file does not say."""
+    periodic: bool | None
+    source: str
 
 
 def read_topography(
-    path: Path, dataset: str | None = None, max_bytes: int = MAX_BYTES
+    path: Path,
+    dataset: str | None = None,
+    max_bytes: int = MAX_BYTES,
+    *,
+    crop: bool = False,
+    fill: bool = False,
 ) -> Topography:
     """Read a height map from a .npy, HDF5, netCDF or microscope file.
 
@@ -56,9 +81,28 @@ def read_topography(
     dataset : name of the HDF5 dataset or microscope channel, by default the only 2-D dataset
         or the default height channel
     max_bytes : largest map to read, counted in double precision
+    crop : cut the largest square of even side out of the middle of a map that is none
+    fill : fill missing heights in, see `fill_missing`
 
     Raises InputError, which names the file, what was found and what is needed.
     """
+    read = _read(path, dataset, max_bytes)
+    shape = read.heights.shape[0], read.heights.shape[1]
+    side = min(shape) // 2 * 2
+    if shape != (side, side) and not crop:
+        raise InputError(
+            f"{path}: {shape[0]} x {shape[1]} points; a square map of even side is needed: "
+            f"surface.crop = true takes {side} x {side} from its middle"
+        )
+    length = _length(path, read, side)
+    rows, columns = ((size - side) // 2 for size in shape)
+    part = read.heights[rows : rows + side, columns : columns + side]
+    heights, missing = _checked(path, part, fill)
+    return Topography(heights, length, read.periodic, read.source, shape, missing)
+
+
+def _read(path: Path, dataset: str | None, max_bytes: int) -> _Map:
+    """The map of a file. Raises InputError."""
     if not path.exists():
         raise InputError(f"{path}: no such file")
     if not path.is_file():
@@ -67,7 +111,7 @@ def read_topography(
     if path.stat().st_size == 0:
         raise InputError(f"{path}: the file is empty")
     try:
-        if path.suffix.lower() == ".npy":
+        if path.suffix.lower() == ".npy" or _begins_with(path, np.lib.format.MAGIC_PREFIX):
             return _read_npy(path, dataset, max_bytes)
         if path.suffix.lower() in (".h5", ".hdf5") or _is_hdf5(path):
             return _read_hdf5(path, dataset, max_bytes)
@@ -127,16 +171,16 @@ def make_periodic(heights: Field, how: Edges, taper: float = 0.1) -> Field:
     return tapered
 
 
-def _read_npy(path: Path, dataset: str | None, max_bytes: int) -> Topography:
+def _read_npy(path: Path, dataset: str | None, max_bytes: int) -> _Map:
     """A mapped `.npy` array: the map fails where the header claims more than the file holds."""
     if dataset is not None:
         raise InputError(f"{path}: a .npy file holds one array; leave out dataset {dataset!r}")
     mapped = np.lib.format.open_memmap(path, mode="r")  # knows neither pickles nor archives
     _check_layout(path, mapped.shape, mapped.dtype, max_bytes)
-    return Topography(_checked(path, mapped), None, None, f"npy, {mapped.dtype}")
+    return _Map(mapped, None, False, None, f"npy, {mapped.dtype}")
 
 
-def _read_hdf5(path: Path, dataset: str | None, max_bytes: int) -> Topography:
+def _read_hdf5(path: Path, dataset: str | None, max_bytes: int) -> _Map:
     """One dataset of an HDF5 file, reached by hard links and stored in the file itself."""
     import h5py
 
@@ -162,7 +206,7 @@ def _read_hdf5(path: Path, dataset: str | None, max_bytes: int) -> Topography:
         values = np.ma.asarray(data[()])
         for mark in {"_FillValue", "missing_value"} & set(data.attrs):
             values = np.ma.masked_where(values == data.attrs[mark], values)
-        return Topography(_checked(path, values), None, None, f"HDF5, {name}, {data.dtype}")
+        return _Map(values, None, False, None, f"HDF5, {name}, {data.dtype}")
 
 
 def _choose_dataset(path: Path, found: dict[str, Any], dataset: str | None) -> str:
@@ -178,7 +222,7 @@ def _choose_dataset(path: Path, found: dict[str, Any], dataset: str | None) -> s
     raise InputError(f"{path}: {asked}; its 2-D numeric datasets: {', '.join(maps) or 'none'}")
 
 
-def _read_scan(path: Path, dataset: str | None, max_bytes: int) -> Topography:
+def _read_scan(path: Path, dataset: str | None, max_bytes: int) -> _Map:
     """A microscope file, read by SurfaceTopography."""
     if path.stat().st_size > max_bytes:
         raise InputError(f"{path}: {path.stat().st_size} bytes; at most {max_bytes} are read")
@@ -203,12 +247,12 @@ def _read_scan(path: Path, dataset: str | None, max_bytes: int) -> Topography:
             return _read_channel(path, reader, dataset, max_bytes)
 
 
-def _read_channel(path: Path, reader: Any, dataset: str | None, max_bytes: int) -> Topography:
+def _read_channel(path: Path, reader: Any, dataset: str | None, max_bytes: int) -> _Map:
     """One height channel of an open microscope file, in metres."""
     if reader.format() == "hgt" and path.suffix.lower() != ".hgt":  # any 2 n^2 bytes would pass
         raise InputError(f"{path}: no known topography format")
-    if reader.format() in ("npy", "npz"):
-        raise InputError(f"{path}: a NumPy array; save it as a .npy file")
+    if reader.format() == "npz":
+        raise InputError(f"{path}: an archive of NumPy arrays; save the map as a .npy file")
     heights = {
         channel.channel_id: channel  # the name, and "name#2" where a scan goes there and back
         for channel in reader.channels
@@ -225,17 +269,31 @@ def _read_channel(path: Path, reader: Any, dataset: str | None, max_bytes: int) 
     if scan.unit is not None:
         scan = scan.to_unit("m")
     width, height = map(float, scan.physical_sizes)
-    if not math.isclose(width, height, rel_tol=SQUARENESS) or not width > 0:
-        raise InputError(
-            f"{path}: the scan is {width:g} x {height:g} {scan.unit or ''} (relative difference "
-            f"{abs(width - height) / max(width, height):.1e}); a square one is needed: crop it"
-        )
-    return Topography(
-        heights=_checked(path, scan.heights().T),
-        length=None if unsized or scan.unit is None else width,
+    return _Map(
+        heights=scan.heights().T,
+        sides=None if unsized else (height, width),
+        metres=scan.unit is not None,
         periodic=bool(scan.is_periodic),
         source=f"{reader.format()}, {name}",
     )
+
+
+def _length(path: Path, read: _Map, side: int) -> float | None:
+    """Side [m] of a square of `side` points. Raises InputError where pixels are no squares."""
+    if read.sides is None:
+        return None
+    y, x = (extent / size for extent, size in zip(read.sides, read.heights.shape, strict=True))
+    if not math.isclose(y, x, rel_tol=SQUARENESS) or not x > 0:
+        raise InputError(
+            f"{path}: a point of the scan is {y:g} x {x:g} wide (relative difference "
+            f"{abs(x - y) / max(x, y):.1e}); square ones are needed: resample it"
+        )
+    return side * x if read.metres else None
+
+
+def _begins_with(path: Path, mark: bytes) -> bool:
+    with path.open("rb") as file:
+        return file.read(len(mark)) == mark
 
 
 def _is_hdf5(path: Path) -> bool:
@@ -246,16 +304,15 @@ def _is_hdf5(path: Path) -> bool:
 
 
 def _check_layout(path: Path, shape: tuple[int, ...], dtype: np.dtype[Any], max_bytes: int) -> None:
-    """Refuse what is no square map of real numbers, or too large, before it is read."""
+    """Refuse what is no map of real numbers, or too small or large, before it is read."""
     if dtype.kind not in "iuf":
         raise InputError(f"{path}: data of type {dtype}; heights are real numbers (int or float)")
     if len(shape) != 2:
         raise InputError(f"{path}: data of shape {shape}; a height map has two dimensions")
     rows, columns = shape
-    if rows != columns or rows % 2 or rows < SMALLEST_SIDE:
+    if min(rows, columns) < SMALLEST_SIDE:
         raise InputError(
-            f"{path}: {rows} x {columns} points; a square map is needed, its side even and at "
-            f"least {SMALLEST_SIDE}: crop or resample it"
+            f"{path}: {rows} x {columns} points; at least {SMALLEST_SIDE} a side are needed"
         )
     needed = rows * columns * np.dtype(np.float64).itemsize
     if needed > max_bytes:
@@ -265,14 +322,60 @@ def _check_layout(path: Path, shape: tuple[int, ...], dtype: np.dtype[Any], max_
         )
 
 
-def _checked(path: Path, values: np.ndarray[Any, Any]) -> Field:
-    """The heights in double precision, each of them known."""
+def _checked(path: Path, values: np.ndarray[Any, Any], fill: bool) -> tuple[Field, int]:
+    """The heights in double precision, each of them known, and how many were filled in."""
     heights = np.ma.filled(np.ma.asarray(values).astype(np.float64), np.nan)
     bad = ~(np.abs(heights) < LARGEST_HEIGHT)
-    if bad.any():
+    missing = int(np.count_nonzero(bad))
+    if missing and fill and missing <= MOST_MISSING * bad.size:
+        return fill_missing(heights, bad), missing
+    if missing:
         row, column = np.unravel_index(np.argmax(bad), bad.shape)
+        remedy = 'surface.missing = "fill" fills them in'
+        if missing > MOST_MISSING * bad.size:
+            remedy = f"at most {MOST_MISSING:.0%} can be filled in"
         raise InputError(
-            f"{path}: {np.count_nonzero(bad)} of {bad.size} heights are NaN, infinite or marked "
-            f"as missing, the first at row {row}, column {column}; fill them in first"
+            f"{path}: {missing} of {bad.size} heights are NaN, infinite or marked as missing, the "
+            f"first at row {row}, column {column}; {remedy}"
         )
-    return np.ascontiguousarray(heights)
+    return np.ascontiguousarray(heights), 0
+
+
+def fill_missing(heights: Field, missing: Mask) -> Field:
+    """Heights with the missing ones filled in so that each is the mean of its neighbours.
+
+    The discrete Laplace equation with the known heights as boundary values: the smoothest surface
+    across every hole, without a new peak or valley. At the edge of the map fewer neighbours count.
+
+    Parameters
+    ----------
+    heights : (N, N), anything where missing
+    missing : (N, N)
+    """
+    number = np.full(missing.shape, -1)
+    number[missing] = np.arange(np.count_nonzero(missing))
+    known = np.where(missing, 0.0, heights)
+    neighbours, right = np.zeros((2, np.count_nonzero(missing)))
+    pairs = []
+    for axis, step in ((0, 1), (0, -1), (1, 1), (1, -1)):
+        inside = [slice(None)] * 2
+        beside = [slice(None)] * 2
+        inside[axis] = slice(None, -1) if step > 0 else slice(1, None)
+        beside[axis] = slice(1, None) if step > 0 else slice(None, -1)
+        here, there = number[tuple(inside)], number[tuple(beside)]
+        chosen = here >= 0
+        np.add.at(neighbours, here[chosen], 1.0)
+        np.add.at(right, here[chosen], known[tuple(beside)][chosen])
+        chosen &= there >= 0
+        pairs.append((here[chosen], there[chosen]))
+    row, column = np.hstack(pairs)
+    diagonal = np.arange(neighbours.size)
+    matrix = coo_array(
+        (
+            np.concatenate([neighbours, -np.ones(row.size)]),
+            (np.concatenate([diagonal, row]), np.concatenate([diagonal, column])),
+        )
+    )
+    filled = known
+    filled[missing] = spsolve(matrix.tocsc(), right)
+    return filled

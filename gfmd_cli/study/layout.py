@@ -60,6 +60,7 @@ FURTHER = (
     Column("tolerance", float, "1", "natural residual asked for"),
     Column("load", str, "", "what was given: p_star, pressure, contact_area or mean_gap"),
     Column("asked", float, "", "its value, [Pa] for a pressure"),
+    Column("preparation", str, "", "what was read from a file and what was done to it"),
     Column("grid", str, "", "auto where the grid was chosen by the accuracy asked for"),
     *(
         column
@@ -95,6 +96,7 @@ SHELLS = (
     Column("energy", float, "Pa m", "sum of k(q) C(q)"),
     Column("variance", float, "Pa2", "sum of k(q)^2 C(q)"),
     Column("gamma", float, "1", "weight gamma of the elastic energy in Persson theory"),
+    Column("modes", float, "1", "how many modes the shell holds"),
 )
 FIELDS = (
     Column("u", float, "m", "displacement"),

@@ -131,7 +131,8 @@ def read_shells(path: Path, scene: int) -> Shells:
 
 def shells_of(file: Any, scene: int) -> Shells:
     """The same of an open study."""
-    return Shells(*(take(file, f"scenes/{scene}/{column.name}")[()] for column in SHELLS))
+    names = [column.name for column in SHELLS if has(file[f"scenes/{scene}"], column.name)]
+    return Shells(**{name: take(file, f"scenes/{scene}/{name}")[()] for name in names})
 
 
 def fields_of(file: Any, place: str) -> dict[str, Field]:

@@ -49,7 +49,8 @@ def write_record(folder: Path, record: Record) -> Path:
                 for name, values in getattr(record, group).items():
                     file[f"{group}/{name}"] = values
             for column in SHELLS:
-                file[f"shells/{column.name}"] = getattr(record.shells, column.name)
+                if (values := getattr(record.shells, column.name)) is not None:
+                    file[f"shells/{column.name}"] = values
         seal(fresh)
     return path
 
@@ -72,7 +73,9 @@ def read_record(path: Path, *, with_fields: bool = True) -> Record:
             return Record(
                 task_id=file.attrs["task_id"],
                 row=json.loads(file.attrs["row"]),
-                shells=Shells(*(file[f"shells/{c.name}"][()] for c in SHELLS)),
+                shells=Shells(
+                    **{c.name: data[()] for c in SHELLS if (data := file["shells"].get(c.name))}
+                ),
                 **read,
             )
     except (OSError, KeyError, RuntimeError, ValueError) as error:

@@ -193,6 +193,9 @@ class Spec(Choice):
             del data["output"]["true_contact"]
         for table in ("surface", "elastomer"):
             for dumped, choice in zip(data[table], getattr(self, table), strict=True):
+                for later, default in (("crop", False), ("missing", "refuse")):
+                    if dumped.get(later) == default:  # as in specs of older versions
+                        del dumped[later]
                 if "path" in dumped:
                     dumped["path"] = Path(dumped["path"]).name
                     dumped["sha256"] = file_digest(choice.path)

@@ -99,6 +99,7 @@ class Task:
         n, t = exponent(self.elastomer), thickness(self.elastomer)
         return {
             "surface": describe(self.surface),
+            "preparation": self.surface.preparation(),
             "seed": getattr(self.surface, "seed", -1),
             "elastomer": describe(self.elastomer),
             "n": np.nan if n is None else n,

@@ -130,7 +130,8 @@ def _write_extras(file: Any, index: int, scene: int, record: Record) -> None:
         group = file.create_group(f"scenes/{scene}")
         shell = scale(group, "shell", np.arange(record.shells.q.size), "1", "shell")
         for column in SHELLS:
-            dataset(group, column, getattr(record.shells, column.name), [shell])
+            if (values := getattr(record.shells, column.name)) is not None:
+                dataset(group, column, values, [shell])
     for place, values in (("fields", record.fields), ("cross_sections", record.cross_section)):
         if values:
             group = file.create_group(f"{place}/{index}")
