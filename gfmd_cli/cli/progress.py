@@ -3,33 +3,40 @@
 import sys
 import time
 from collections.abc import Callable
+from math import isfinite
 from typing import Any
 
 import click
 
-LOG_EVERY = 60.0  # seconds between two lines on one task where stderr is no terminal
-BAR = "{desc}: {n_fmt} steps, {elapsed}{postfix}"
+LOG_EVERY = 60.0  # seconds between two lines where stderr is no terminal
+TASK = "{desc}: {n_fmt} steps, {elapsed}{postfix}"
+RUN = "{desc}, {elapsed} so far"
 
 
 class Reporter:
-    """Progress: a bar a task on a terminal, else a line a minute and one at each task's end."""
+    """Progress: on a terminal a bar for the run and one a task at work, else a line a minute."""
 
     def __init__(self, quiet: bool) -> None:
         self.bars: dict[int, Any] = {}
-        self.told: dict[int, float] = {}
+        self.whole: Any = None
+        self.told = time.monotonic()
         self.quiet = quiet
         self.terminal = sys.stderr.isatty()
+        self.failed: dict[int, str] = {}
+        """Why tasks failed, by task."""
 
     def __enter__(self) -> Callable[[Any], None]:
         return self.show
 
     def __exit__(self, *_: object) -> None:
-        for bar in self.bars.values():
-            bar.close()
+        for bar in [*self.bars.values(), self.whole]:
+            if bar is not None:
+                bar.close()
 
     def show(self, progress: Any) -> None:
         """One event of one task."""
         if progress.event == "failed":
+            self.failed[progress.task] = progress.note
             self._close(progress.task)
             click.echo(f"gfmd: task {progress.task} ({progress.label}): {progress.note}", err=True)
         elif progress.event == "warning":
@@ -44,13 +51,17 @@ class Reporter:
     def _bar(self, progress: Any) -> None:
         from tqdm import tqdm
 
+        if progress.tasks_left is not None:
+            self.whole = self.whole or tqdm(position=0, leave=False, bar_format=RUN)
+            self.whole.set_description_str(_left(progress))
         if progress.event in ("done", "interrupted"):
             self._close(progress.task)
             return
         bar = self.bars.get(progress.task)
         if bar is None:
-            place = min(set(range(len(self.bars) + 1)) - {b.pos for b in self.bars.values()})
-            bar = tqdm(desc=progress.label, position=place, leave=False, bar_format=BAR)
+            taken = {0, *(-bar.pos for bar in self.bars.values())}
+            place = min(set(range(len(taken) + 1)) - taken)
+            bar = tqdm(desc=progress.label, position=place, leave=False, bar_format=TASK)
             self.bars[progress.task] = bar
         if progress.event == "step":
             bar.n = progress.step
@@ -66,12 +77,27 @@ class Reporter:
 
     def _line(self, progress: Any) -> None:
         now = time.monotonic()
-        since = self.told.setdefault(progress.task, now)
-        if progress.event == "done" or (progress.event == "step" and now - since > LOG_EVERY):
-            self.told[progress.task] = now
-            click.echo(
-                f"task {progress.task} {progress.label}: step {progress.step} "
-                f"({progress.points} points) residual {progress.residual:.1e} "
-                f"a_r {progress.a_r:.4g} {progress.note}".rstrip(),
-                err=True,
-            )
+        if progress.event not in ("done", "step") or now - self.told < LOG_EVERY:
+            return
+        self.told = now
+        click.echo(
+            f"{_left(progress)}; task {progress.task} {progress.label}: "
+            f"step {progress.step} ({progress.points} points), residual "
+            f"{progress.residual:.1e}, a_r {progress.a_r:.4g} {progress.note}".strip("; "),
+            err=True,
+        )
+
+
+def _left(progress: Any) -> str:
+    """Tasks and time left, for people."""
+    if progress.tasks_left is None:
+        return ""
+    told = f"{progress.tasks_left} tasks left"
+    seconds = progress.seconds_left
+    if not isfinite(seconds):
+        return told
+    for unit, size in (("d", 86400), ("h", 3600), ("min", 60), ("s", 1)):
+        if seconds >= 2 * size or size == 1:
+            told += f", about {seconds / size:.0f} {unit}"
+            break
+    return told

@@ -91,15 +91,29 @@ def _run(
         return 0
     from gfmd_cli.study.run import run_study
 
-    with Reporter(quiet) as report:
+    reporter = Reporter(quiet)
+    with reporter as report:
         tell = report if leads(ranks) else lambda progress: None
         outcome = run_study(resolved, text, path, tell, shard=shard, **how)
-    missed = sum(outcome.values()) - outcome["converged"]
     if leads(ranks) and not quiet:
-        told = ", ".join(f"{count} {status}" for status, count in sorted(outcome.items()))
-        click.echo(f"{path}: {told or 'no tasks in this shard'}")
-        click.echo(f"next: gfmd analyze {path}")
-    return missed
+        _print_results(path, shard, outcome, reporter.failed)
+    return sum(outcome.values()) - outcome["converged"]
+
+
+def _print_results(path: Path, shard: tuple[int, int], outcome: Any, failed: Any) -> None:
+    """What was found, what was not and why, and what to type next."""
+    from gfmd_cli.analysis.summary import missed, results
+    from gfmd_cli.study.reading import read_rows
+
+    rows = read_rows(path) if outcome and path.exists() else []
+    rows = [row for row in rows if row["task"] % shard[1] == shard[0]]
+    if table := results(rows):
+        click.echo(f"{table}\n")
+    told = ", ".join(f"{count} {status}" for status, count in sorted(outcome.items()))
+    click.echo(f"{path}: {told or 'no tasks in this shard'}")
+    for line in missed(rows, failed):
+        click.echo(f"  {line}")
+    click.echo(f"next: gfmd analyze {path}")
 
 
 def _shard(text: str | None) -> tuple[int, int]:

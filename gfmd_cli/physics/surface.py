@@ -199,9 +199,13 @@ class FileSurface(Indenter):
     def cell(self) -> float:
         """Side of the periodic cell [m]: twice that of the map where it is mirrored."""
         stated = self.length or self._topography().length or 1.0
-        return 2 * stated if self._treatment()[1] == "mirror" else stated
+        return 2 * stated if self.treatment()[1] == "mirror" else stated
 
-    def _treatment(self) -> tuple[Levelling, Edges]:
+    def states_no_length(self) -> bool:
+        """Whether the side of the map is 1 m for want of anything else."""
+        return self.length is None and self._topography().length is None
+
+    def treatment(self) -> tuple[Levelling, Edges]:
         """What is done to the map: levelling, edges."""
         says = self._topography().periodic
         periodic = self.periodic if self.periodic is not None else says in (True, None)
@@ -211,7 +215,7 @@ class FileSurface(Indenter):
         )
 
     def _periodic_heights(self) -> Field:
-        levelling, edges = self._treatment()
+        levelling, edges = self.treatment()
         heights = self.scale * self._topography().heights
         return make_periodic(level(heights, levelling), edges, self.taper)
 
@@ -220,7 +224,7 @@ class FileSurface(Indenter):
 
     def preparation(self) -> str:
         """What was read and what was done to it, for people."""
-        read, (levelling, edges) = self._topography(), self._treatment()
+        read, (levelling, edges) = self._topography(), self.treatment()
         rows, columns = read.shape
         steps = [f"{self.path.name} ({read.source}): {rows} x {columns} points"]
         if read.heights.shape != read.shape:

@@ -19,6 +19,7 @@ from gfmd_cli.errors import GfmdError, InputError, Interrupted, SpaceError, Stud
 from gfmd_cli.physics import wisdom
 from gfmd_cli.physics.ranks import Ranks, agree, leads, together
 from gfmd_cli.study import solve
+from gfmd_cli.study.clock import Clock
 from gfmd_cli.study.grids import scene_of
 from gfmd_cli.study.record import read_record, record_path
 from gfmd_cli.study.resources import check_memory, room, seconds_to_stop, share_out
@@ -91,6 +92,7 @@ def run_study(
     jobs, threads = share_out(pending, jobs, reproducible, ranks)
     means = Means(threads, checkpoint_every, room(ranks) / jobs, reproducible)
     seconds = _time_to_work(max_seconds, pending, jobs)
+    report = Clock(pending, jobs).watched(report)
     with _signals_noted(), _timer(seconds), _folder(study, spec, ranks) as damaged:
         _warn(report, damaged, _plan_afresh(study.parts, means))
         try:

@@ -40,6 +40,9 @@ class Progress(NamedTuple):
     a_r: float = float("nan")
     note: str = ""
     """Status of a task that is done, the reason of one that failed, what there is to warn of."""
+    tasks_left: int | None = None
+    """Of the whole run, where that is counted."""
+    seconds_left: float = float("nan")
 
 
 Report = Callable[[Progress], None]

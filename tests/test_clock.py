@@ -1,0 +1,85 @@
+from types import SimpleNamespace
+
+import pytest
+
+from gfmd_cli.study.clock import Clock
+from gfmd_cli.study.solve import Progress
+
+
+def task(index, seconds, body="a"):
+    return SimpleNamespace(
+        index=index,
+        seconds=seconds,
+        elastomer=body,
+        points=64,
+        solver=SimpleNamespace(tolerance=1e-6),
+    )
+
+
+@pytest.fixture
+def time():
+    return SimpleNamespace(now=0.0)
+
+
+def clock(time, *tasks, jobs=1):
+    return Clock(tasks, jobs, lambda: time.now)
+
+
+def word(index, event, residual=float("nan"), points=64):
+    return Progress(index, event, "", points=points, residual=residual)
+
+
+def test_before_any_task_the_forecast_is_told(time):
+    assert clock(time, task(0, 3.0), task(1, 5.0)).left() == 8.0
+    assert clock(time, task(0, 3.0), task(1, 5.0), jobs=2).left() == 4.0
+
+
+def test_forecasts_are_corrected_by_what_ended_of_the_same_body(time):
+    told = clock(time, task(0, 1.0), task(1, 1.0), task(2, 1.0, "b"), task(3, 1.0, "b"))
+    for index, seconds in ((0, 10.0), (2, 2.0)):
+        told.take_in(word(index, "start"))
+        time.now += seconds
+        told.take_in(word(index, "done"))
+    assert told.left() == pytest.approx(10 + 2)
+
+
+def test_a_body_not_met_yet_is_taken_as_the_others(time):
+    told = clock(time, task(0, 1.0), task(1, 2.0, "b"))
+    told.take_in(word(0, "start"))
+    time.now = 3.0
+    told.take_in(word(0, "done"))
+    assert told.left() == pytest.approx(6.0)
+
+
+def test_near_its_end_a_task_is_told_by_its_residual(time):
+    """1e-1 to 1e-5.9 in 10 s: 0.1 of 5 decades are left, 0.2 s at that rate."""
+    told = clock(time, task(0, 100.0))
+    told.take_in(word(0, "start"))
+    told.take_in(word(0, "step", 1e-1))
+    time.now = 10.0
+    told.take_in(word(0, "step", 10**-5.9))
+    assert 0.2 < told.left() < 0.25
+
+
+def test_the_longest_task_bounds_the_end_of_the_run(time):
+    told = clock(time, task(0, 100.0), task(1, 1.0), jobs=2)
+    told.take_in(word(0, "start"))
+    assert told.left() == 100.0
+
+
+def test_words_are_passed_on_with_what_is_left(time):
+    words = []
+    tell = clock(time, task(0, 2.0), task(1, 2.0)).watched(words.append)
+    tell(word(0, "start"))
+    time.now = 1.0
+    tell(word(0, "done"))
+    tell(word(-1, "warning"))
+    assert [(w.tasks_left, w.seconds_left) for w in words] == [(2, 4.0), (1, 1.0), (1, 1.0)]
+
+
+def test_failed_tasks_do_not_correct_forecasts(time):
+    told = clock(time, task(0, 1.0), task(1, 1.0))
+    told.take_in(word(0, "start"))
+    time.now = 50.0
+    told.take_in(word(0, "failed"))
+    assert told.left() == 1.0
