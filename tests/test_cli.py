@@ -11,6 +11,7 @@ from click.testing import CliRunner
 
 from gfmd_cli.cli import main
 from gfmd_cli.study import resources
+from gfmd_cli.study.starter import SCHEMA
 
 CONFIGS = Path(__file__).parents[1] / "configs"
 CONTRACT = (
@@ -216,6 +217,21 @@ def test_pressures_may_be_given_in_pascal(gfmd):
 
 def test_the_schema_is_json(gfmd):
     assert json.loads(gfmd("schema").output)["required"]
+
+
+def test_the_shipped_schema_is_that_of_the_models(gfmd):
+    """Else: gfmd schema > gfmd_cli/run-spec.schema.json."""
+    assert json.loads(SCHEMA.read_text()) == json.loads(gfmd("schema").output)
+
+
+@pytest.mark.parametrize("name", sorted(main.commands))
+def test_the_help_of_each_command_has_an_example(gfmd, name):
+    assert f"gfmd {name}" in gfmd(name, "--help").output.partition("Example")[2]
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_shells_are_told_how_to_complete(gfmd, shell):
+    assert "_GFMD_COMPLETE" in gfmd("completion", shell).output
 
 
 def test_help_is_quick_to_load():

@@ -9,6 +9,7 @@ import click
 
 import gfmd_cli
 from gfmd_cli.cli.bench import bench
+from gfmd_cli.cli.completion import completion
 from gfmd_cli.cli.init import init, surface
 from gfmd_cli.cli.results import analyze, export
 from gfmd_cli.cli.run import run
@@ -20,6 +21,10 @@ from gfmd_cli.errors import GfmdError
 
 class Commands(click.Group):
     """Ends every known error in one message and its exit status."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """The commands in the order in which they are used."""
+        return list(self.commands)
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run the command."""
@@ -33,10 +38,18 @@ class Commands(click.Group):
             ctx.exit(error.exit_status)
 
 
-@click.group(cls=Commands)
+@click.group(cls=Commands, context_settings={"max_content_width": 100})
 @click.version_option(gfmd_cli.__version__, prog_name="gfmd")
 def main() -> None:
-    """Elastic contact of rough surfaces, from springs (n = 0) to plates (n = 4)."""
+    """Elastic contact of rough surfaces, from springs (n = 0) to plates (n = 4).
+
+    To begin with:
+
+    \b
+        gfmd init                       writes study.toml; --from SCAN presses a measured surface
+        gfmd run study.toml             solves it
+        gfmd analyze study.h5           sets it beside Persson theory
+    """
     faulthandler.enable(sys.__stderr__ or 2)  # a crash leaves its place in the log
     # Dot products are all that is asked of BLAS: its threads bring nothing and, side by side
     # with other processes, spin for tens of times the work.
@@ -44,5 +57,17 @@ def main() -> None:
         os.environ.setdefault(f"{library}_NUM_THREADS", "1")
 
 
-for command in (init, surface, run, submit, status, collect, analyze, export, bench, schema):
+for command in (
+    init,
+    surface,
+    run,
+    submit,
+    status,
+    collect,
+    analyze,
+    export,
+    bench,
+    schema,
+    completion,
+):
     main.add_command(command)

@@ -81,6 +81,16 @@ def read_spec(path: Path, overrides: tuple[str, ...] = ()) -> tuple[Spec, str]:
     return build_spec(data, path.parent, _Where(str(path), text, origin)), text
 
 
+def read_tables(data: dict[str, Any]) -> Spec:
+    """Check the tables of a run spec; paths are relative to the working directory.
+
+    Raises InputError with all that is wrong.
+    """
+    if _is_deep(data):
+        raise InputError(f"spec: nested deeper than {MAX_DEPTH}")
+    return build_spec(data, Path(), _Where("spec", "", {}))
+
+
 class _Where:
     """Names the place of a key: file and line, or the --set that gave it."""
 
