@@ -55,6 +55,11 @@ def write_record(folder: Path, record: Record) -> Path:
     return path
 
 
+def read_status(path: Path) -> str:
+    """Status of the task that a record is of. Raises StudyError."""
+    return str(read_record(path, with_fields=False).row["status"])
+
+
 def read_record(path: Path, *, with_fields: bool = True) -> Record:
     """Read one record, or all of it but its fields.
 

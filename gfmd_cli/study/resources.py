@@ -92,7 +92,7 @@ def share_out(
     cores = available_cores()
     largest = max(task.bytes for task in tasks)
     if jobs is None:
-        fitting = max(1, int(HEADROOM * available_memory() // largest))
+        fitting = max(1, int(room() // largest))
         jobs = min(cores, len(tasks), fitting)
         if sum(task.seconds for task in tasks) < POOL_SECONDS:
             jobs = 1

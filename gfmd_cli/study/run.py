@@ -21,7 +21,7 @@ from gfmd_cli.physics.ranks import Ranks, agree, leads, together
 from gfmd_cli.study import solve
 from gfmd_cli.study.clock import Clock
 from gfmd_cli.study.grids import scene_of
-from gfmd_cli.study.record import read_record, record_path
+from gfmd_cli.study.record import read_status, record_path
 from gfmd_cli.study.resources import check_memory, room, seconds_to_stop, share_out
 from gfmd_cli.study.solve import Progress, Report, solve_task
 from gfmd_cli.study.spec import Spec
@@ -166,7 +166,7 @@ def _is_stopped(ranks: Ranks | None) -> bool:
 def _status_of(path: Path) -> str | None:
     """Status of a record that is whole, None where there is none."""
     with suppress(StudyError):
-        return str(read_record(path, with_fields=False).row["status"])
+        return read_status(path)
     return None
 
 

@@ -8,8 +8,8 @@ from gfmd_cli.errors import InputError, StudyError
 from gfmd_cli.study.checkpoint import Checkpoint, Saved
 from gfmd_cli.study.layout import MISSING
 from gfmd_cli.study.reading import open_study, rows_of, texts_of
-from gfmd_cli.study.record import read_record
 from gfmd_cli.study.spec import Spec
+from gfmd_cli.study.record import read_status
 from gfmd_cli.study.store import Study
 from gfmd_cli.study.tasks import plan
 
@@ -102,8 +102,7 @@ def _state(study: Study, tasks: list[tuple[str, str]]) -> StudyState:
     damaged = sorted(path.name for path in study.parts.glob("*.bad"))
     for path in study.record_paths():
         try:
-            record = read_record(path, with_fields=False)
-            recorded[record.task_id] = str(record.row["status"])
+            recorded[path.stem] = read_status(path)
         except StudyError:
             if path.exists():  # else it has just been collected
                 damaged.append(path.name)

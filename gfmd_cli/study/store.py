@@ -16,7 +16,7 @@ from gfmd_cli.errors import StudyError
 from gfmd_cli.study.files import locked, new_file, new_hdf5, write_whole
 from gfmd_cli.study.layout import MISSING
 from gfmd_cli.study.reading import open_study, texts_of
-from gfmd_cli.study.record import SUFFIX, Record, read_record, record_path
+from gfmd_cli.study.record import SUFFIX, Record, read_record, read_status, record_path
 from gfmd_cli.study.spec import Spec, refuse_other
 from gfmd_cli.study.tasks import Task
 from gfmd_cli.study.writing import write_study
@@ -63,8 +63,7 @@ class Study:
         states = {}
         for path in self.record_paths():  # before the study, which may take them in meanwhile
             with suppress(StudyError):
-                record = read_record(path, with_fields=False)
-                states[record.task_id] = str(record.row["status"])
+                states[path.stem] = read_status(path)
         return self.collected() | states
 
     def collected(self) -> dict[str, str]:
