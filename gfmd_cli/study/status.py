@@ -8,8 +8,8 @@ from gfmd_cli.errors import InputError, StudyError
 from gfmd_cli.study.checkpoint import Checkpoint, Saved
 from gfmd_cli.study.layout import MISSING
 from gfmd_cli.study.reading import open_study, rows_of, texts_of
-from gfmd_cli.study.spec import Spec
 from gfmd_cli.study.record import read_status
+from gfmd_cli.study.spec import Spec
 from gfmd_cli.study.store import Study
 from gfmd_cli.study.tasks import plan
 
