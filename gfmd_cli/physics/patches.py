@@ -13,6 +13,7 @@ regions each keeps its displacement to the root, and two that meet again with an
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,15 +21,15 @@ from scipy import ndimage
 
 from gfmd_cli.physics.fields import Field, Mask
 
-Cells = NDArray[np.int64]
-"""A displacement in whole cells, one number an axis."""
+Whole = NDArray[np.signedinteger[Any]]
+"""Whole numbers: labels, counts, displacements in cells with one number an axis."""
 
 
 @dataclass(frozen=True)
 class Regions:
     """The connected regions of a mask."""
 
-    sizes: Cells
+    sizes: Whole
     """Points of each region."""
     winds: Mask
     """Whether some region percolates, by axis of the mask."""
@@ -59,7 +60,7 @@ def regions(mask: Mask, *, corners: bool) -> Regions:
     return Regions(sizes[sizes > 0], winds)
 
 
-def _bonds(labels: Cells, structure: Mask) -> Iterator[list[int]]:
+def _bonds(labels: Whole, structure: Mask) -> Iterator[list[int]]:
     """Labels that meet across the edges of the cell: of both sides, and the cells between them."""
     frame = np.zeros(labels.shape, dtype=bool)
     for axis in range(labels.ndim):
@@ -79,10 +80,10 @@ class _Tree:
     """Regions that were joined, each with its displacement to the one it hangs on."""
 
     parent: list[int]
-    shift: Cells
+    shift: Whole
     """Shape (regions, axes)."""
 
-    def find(self, region: int) -> tuple[int, Cells]:
+    def find(self, region: int) -> tuple[int, Whole]:
         """The root of a region, and the displacement from it to the region."""
         path = []
         while self.parent[region] != region:
@@ -94,10 +95,10 @@ class _Tree:
             self.parent[below], self.shift[below] = region, total
         return region, total
 
-    def join(self, one: int, other: int, cells: Cells) -> Cells:
+    def join(self, one: int, other: int, cells: Whole) -> Whole:
         """Join two regions, `other` lying some cells further; the winding where they were one."""
         (root, before), (other_root, after) = self.find(one), self.find(other)
-        loop: Cells = before + cells - after
+        loop: Whole = before + cells - after
         if root != other_root:
             self.parent[other_root], self.shift[other_root] = root, loop
             return np.zeros_like(loop)

@@ -39,7 +39,7 @@ def spectra(grid: Grid, fields: Mapping[str, Field]) -> Spectra:
     edges = bin_edges(m.copy(), EXACT, BINS)
 
     def binned(at: Field, values: Field) -> Field:
-        return np.bincount(np.searchsorted(edges, at), values, minlength=edges.size + 1)
+        return np.asarray(np.bincount(np.searchsorted(edges, at), values, edges.size + 1), float)
 
     waves = binned(m, count)
     held = waves > 0

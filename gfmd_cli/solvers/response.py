@@ -1,4 +1,4 @@
-"""Contact stiffness by the linear response of a solved contact: one linear solve, no second contact.
+"""Contact stiffness by the linear response of a solved contact: one linear solve, no other contact.
 
 On the free points sigma = K u + p = 0, on the contact u = h. Let p grow by dp while the contact
 stays as it is, which it does at first order but for points at which u = h and sigma = 0: then
@@ -8,9 +8,9 @@ contact, and du_g = <du> = -<w> dp. The contact stiffness is -dp/du_g = 1 / <w>.
 K is positive definite on the free points as long as one point is held. Conjugate gradients minimise
 Q(w) = <w K w> / 2 - <w>, which is -<w> / 2 at the solution; a step along d to its lowest point
 brings Q down by (d f)^2 / (2 d K d), f = 1 - K w. Their sum is <w> from below, with the square of
-the error of w itself (Hestenes & Stiefel, J. Res. Natl. Bur. Stand. 49, 409, 1952, Theorem 6:1), and
-what the last few steps have brought bounds what is missing well (Strakos & Tichy, Electron. Trans.
-Numer. Anal. 13, 56, 2002). w is never needed.
+the error of w itself (Hestenes & Stiefel, J. Res. Natl. Bur. Stand. 49, 409, 1952, Theorem 6:1),
+and what the last few steps have brought estimates what is missing (Strakos & Tichy, Electron.
+Trans. Numer. Anal. 13, 56, 2002). w is never needed.
 """
 
 from collections import deque
@@ -47,7 +47,7 @@ class _Response:
     def __init__(self, contact: Contact, touching: Mask) -> None:
         self.contact, self.grid, self.rows = contact, contact.grid, contact.grid.rows
         self.stiffness = self.grid.as_rows(contact.stiffness)
-        held = self.grid.as_rows(touching)
+        held = np.atleast_2d(touching)
         self.marks = np.where(held, sweeps.PRESSED, sweeps.FREE).astype(np.int8)
         self.padded = self.grid.as_rows(self.grid.padded)
         self.values = self.padded[:, : self.grid.points]
