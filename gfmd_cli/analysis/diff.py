@@ -12,7 +12,7 @@ from gfmd_cli.analysis.compare import Row
 from gfmd_cli.analysis.export import plain
 from gfmd_cli.physics.observables import QUANTITIES
 from gfmd_cli.study.layout import MISSING
-from gfmd_cli.study.reading import read_rows, read_spec
+from gfmd_cli.study.reading import read_rows, stored_spec
 from gfmd_cli.study.spec import differences
 from gfmd_cli.study.tasks import SYMBOLS
 
@@ -70,7 +70,7 @@ def diff(one: Path, other: Path) -> Difference:
     for alike in (("points", "solver", "tolerance"), ("points",), ()):
         pairs += _match(*only, alike)
     pairs.sort(key=lambda pair: int(pair.one["task"]))
-    return Difference(differences(read_spec(one), read_spec(other)), pairs, only)
+    return Difference(differences(stored_spec(one), stored_spec(other)), pairs, only)
 
 
 def _solved(path: Path) -> list[Row]:

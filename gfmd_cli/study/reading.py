@@ -122,7 +122,7 @@ def _plain(value: Any) -> Any:
     return value.item() if isinstance(value, np.generic) else value
 
 
-def read_spec(path: Path) -> Any:
+def stored_spec(path: Path) -> Any:
     """The resolved spec of a study, as plain data. Raises InputError, StudyError."""
     with open_study(path) as file:
         return spec_of(file)
