@@ -162,7 +162,7 @@ def test_line_scenes_have_them_but_for_a_second_axis(tmp_path):
     study = made(
         tmp_path, *ALL, 'surface={kind="ridge"}', "grid.points=128", "load.p_star=[0.01,0.1]"
     )
-    with h5py.File(study) as file:
+    with open_study(study) as file:
         for row in read_rows(study):
             u, sigma, h = (file[f"fields/{row['task']}/{name}"][()] for name in FIELDS)
             touching = (u == h) & (sigma > 0)
