@@ -195,6 +195,13 @@ def test_what_cannot_be_written_is_refused_in_one_message(study, tmp_path, words
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.parametrize("words", [("a.csv",), ("a.nc",), ("a.vti", "--task", "0")])
+def test_a_place_that_cannot_be_written_is_status_73(study, tmp_path, words):
+    (tmp_path / "file").write_text("")
+    told = gfmd("export", study, "-o", tmp_path / "file" / words[0], *words[1:], status=73)
+    assert "cannot be written" in told
+
+
 def test_a_study_without_fields_makes_no_image(tmp_path):
     (tmp_path / "spec.toml").write_text(SPEC)
     gfmd(

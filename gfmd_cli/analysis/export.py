@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -10,7 +9,7 @@ import numpy as np
 from gfmd_cli.errors import InputError
 from gfmd_cli.physics.fields import Field
 from gfmd_cli.physics.hdf5 import has
-from gfmd_cli.study.files import write_whole
+from gfmd_cli.study.files import new_file
 from gfmd_cli.study.layout import (
     COLUMNS,
     CURVES,
@@ -63,25 +62,22 @@ def as_dataset(path: Path) -> Any:
         held = [c for c in (*COLUMNS, *DISTRIBUTION) if has(file, c.name)]
         variables = {c.name: _labelled(("task",), _values(rows, c), c) for c in (*held, SCENE)}
         variables |= _distributions(rows)
-        scenes = sorted({row["scene"] for row in rows if row["status"] != MISSING})
-        places = [f"scenes/{scene}" for scene in range(max(scenes, default=-1) + 1)]
+        places = [f"scenes/{scene}" for scene in sorted({row["scene"] for row in rows})]
         variables |= _curves(file, "scenes", places, ("scenes", "shell"), SHELLS)
         for name, (axis, columns) in CURVES.items():
             places = [f"{name}/{row['task']}" for row in rows]
             variables |= _curves(file, name, places, ("task", axis), columns)
         attributes = {k: v for k, v in file.attrs.items() if k != ATTRIBUTES_SUM}
-    coordinates = {"task": _values(rows, Column("task", int, "", ""))}
-    coordinates |= {d.axis: _bins(d) for d in DISTRIBUTIONS if d.name in variables}
-    return xarray.Dataset(variables, coordinates, attributes)
+        coordinates = {"task": _values(rows, Column("task", int, "", ""))}
+        coordinates |= {d.axis: _bins(d) for d in DISTRIBUTIONS if d.name in variables}
+        return xarray.Dataset(variables, coordinates, attributes)
 
 
 def write_netcdf(path: Path, target: Path) -> None:
     """Write a study as netCDF 4. Raises InputError, StudyError, SpaceError."""
     made = as_dataset(path)
-    with TemporaryDirectory() as folder:
-        file = Path(folder) / "study.nc"
+    with new_file(target) as file:
         made.to_netcdf(file, engine="h5netcdf")
-        write_whole(target, file.read_bytes())
 
 
 def _values(rows: Rows, column: Column) -> Any:

@@ -27,13 +27,14 @@ def write_image(study: Path, task: int | None, target: Path) -> None:
     with open_study(study) as file:
         held = sorted(map(int, file["fields"])) if has(file, "fields") else []
         chosen = _choose(study, held, task)
-        fields = fields_of(file, f"fields/{chosen}")
+        stored = fields_of(file, f"fields/{chosen}")
+        fields = {name: np.ascontiguousarray(values, "<f8") for name, values in stored.items()}
         length = float(rows_of(file)[chosen]["length"])
     with new_file(target) as made:
         made.write(_head(fields, length).encode())
         for values in fields.values():
             made.write(np.uint64(values.nbytes).astype("<u8").tobytes())
-            made.write(np.ascontiguousarray(values, "<f8"))
+            made.write(values)
         made.write(b"\n</AppendedData>\n</VTKFile>\n")
 
 

@@ -19,6 +19,7 @@ def diff(
     """Compare contact area, stress deviation and mean gap of two studies.
 
     Rows belong together by surface, seed, elastomer and load; grids and solvers may differ.
+    Rows that one study alone has are listed, and count for nothing.
 
     Example:
 

@@ -53,7 +53,7 @@ def regions(mask: Mask, *, corners: bool) -> Regions:
     winds = np.zeros(mask.ndim, dtype=bool)
     for one, other, *cells in _bonds(labels, structure):
         winds |= tree.join(one, other, np.array(cells)) != 0
-    roots = [tree.find(label)[0] for label in range(count + 1)]
+    roots = [up if up == label else tree.find(label)[0] for label, up in enumerate(tree.parent)]
     points = np.zeros(count + 1, dtype=np.int64)
     np.add.at(points, roots, np.bincount(labels.ravel(), minlength=count + 1))
     sizes = points[1:]  # the first are the points outside
