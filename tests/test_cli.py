@@ -243,6 +243,7 @@ def test_help_is_quick_to_load():
 
 SMALL_SETTINGS = {
     "smoke": (),
+    "observables": ("surface.cutoff=0.05", "grid.points=64"),
     "bench": ("surface.cutoff=0.05", "grid.points=64"),
     "demo": ("surface.cutoff=0.05", "grid.points=64", "load.p_star=[0.1,1.0]"),
     "slab": ("surface.cutoff=0.05", "grid.points=64", "load.p_star=[0.01,0.1]"),

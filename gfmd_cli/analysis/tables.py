@@ -1,17 +1,14 @@
-"""Tables of a study: for people, as records, as CSV."""
+"""Tables of a study: for people, as records."""
 
 import math
-from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from gfmd_cli.analysis.compare import Comparison, Curve, einstein_prediction
 from gfmd_cli.analysis.ensemble import Ensemble, ensembles
+from gfmd_cli.analysis.export import plain
+from gfmd_cli.analysis.further import further_records, further_tables
 from gfmd_cli.analysis.true_contact import VARIANTS, true_contact_areas, true_contact_tables
 from gfmd_cli.physics.observables import QUANTITIES
-from gfmd_cli.study.layout import COLUMNS, MISSING
-from gfmd_cli.study.reading import read_rows
 
 ERRORS = [
     f"{name}_{what}"
@@ -32,6 +29,7 @@ def tables(comparison: Comparison) -> str:
     """
     blocks = [_table(curve) for curve in comparison.curves]
     blocks += true_contact_tables(comparison)
+    blocks += further_tables(comparison)
     blocks += _spreads(ensembles(comparison))
     if comparison.missing:
         blocks.append(f"{comparison.missing} tasks are not solved yet: run the spec again.")
@@ -132,24 +130,26 @@ def as_records(comparison: Comparison) -> list[dict[str, Any]]:
         theory = curve.prediction
         at_gap = curve.pressure_at_gap(curve.column("u_g"))
         areas = true_contact_areas(curve)
+        further = further_records(curve)
         records += [
             {
-                **{key: _plain(row[key]) for key in ("n", "thickness", "points", "seed", "p_star")},
+                **{key: plain(row[key]) for key in ("n", "thickness", "points", "seed", "p_star")},
                 "a_r": row["a_r"],
                 "a_r_persson": float(theory.a_r[i]),
                 "sigma_p": row["sigma_p"],
                 "sigma_p_persson": float(theory.sigma_p[i]),
                 "u_g": row["u_g"],
                 "u_g_persson": float(theory.u_g[i]),
-                "p_star_persson_at_u_g": _plain(float(at_gap[i])),
+                "p_star_persson_at_u_g": plain(float(at_gap[i])),
                 "surface": curve.surface,
                 "elastomer": curve.elastomer,
                 "pressure": row["pressure"],
                 "residual": row["residual"],
                 "status": row["status"],
-                **{name: _plain(row[name]) for name in ERRORS if name in row},
-                **{name: _plain(row[name]) for name in VARIANTS if areas},
-                **{name: _plain(float(area[i])) for name, area in areas.items()},
+                **{name: plain(row[name]) for name in ERRORS if name in row},
+                **{name: plain(row[name]) for name in VARIANTS if areas},
+                **{name: plain(float(area[i])) for name, area in areas.items()},
+                **further[i],
                 **spreads.get(row["task"], {}),
             }
             for i, row in enumerate(curve.rows)
@@ -168,22 +168,3 @@ def _as_record(ensemble: Ensemble) -> dict[str, Any]:
             f"{name}_confidence": spread.half_width,
         }
     return record
-
-
-def export_rows(path: Path) -> tuple[list[str], list[list[str]]]:
-    """Header and rows of the CSV of a study: one row per solved pressure."""
-    names = [column.name for column in COLUMNS]
-    rows = [row for row in read_rows(path) if row["status"] != MISSING]
-    return names, [[_cell(row[name]) for name in names] for row in rows]
-
-
-def _cell(value: Any) -> str:
-    plain = _plain(value)
-    return "" if plain is None else repr(plain) if isinstance(plain, float) else str(plain)
-
-
-def _plain(value: Any) -> Any:
-    """None for what does not apply: NaN, the seed -1."""
-    if isinstance(value, float) and np.isnan(value):
-        return None
-    return None if isinstance(value, int) and value == -1 else value

@@ -10,6 +10,7 @@ import click
 import gfmd_cli
 from gfmd_cli.cli.bench import bench
 from gfmd_cli.cli.completion import completion
+from gfmd_cli.cli.diff import diff
 from gfmd_cli.cli.init import init, surface
 from gfmd_cli.cli.results import analyze, export
 from gfmd_cli.cli.run import run
@@ -66,6 +67,7 @@ for command in (
     collect,
     analyze,
     export,
+    diff,
     bench,
     schema,
     completion,

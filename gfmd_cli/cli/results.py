@@ -9,6 +9,7 @@ from typing import Literal
 import click
 
 from gfmd_cli.cli.options import FILE
+from gfmd_cli.errors import InputError
 
 
 @click.command()
@@ -50,24 +51,46 @@ def analyze(
 
 @click.command()
 @click.argument("study", type=FILE)
-@click.option("-o", "--output", type=FILE, help="CSV file; by default standard output.")
-def export(study: Path, output: Path | None) -> None:
-    """Write one row per solved pressure as CSV.
+@click.option(
+    "-o", "--output", type=FILE, help="FILE.csv, .nc or .vti; by default CSV to standard output."
+)
+@click.option("--task", type=int, help="Task whose fields a .vti file is to hold.")
+def export(study: Path, output: Path | None, task: int | None) -> None:
+    """Write a study as CSV, netCDF 4 (.nc) or, the fields of one task, as VTK image (.vti).
+
+    CSV has one row per solved pressure; netCDF has all but the fields.
 
     Example:
 
         gfmd export demo.h5 -o demo.csv
     """
-    from gfmd_cli.analysis.tables import export_rows
+    suffix = ".csv" if output is None else output.suffix
+    if suffix not in (".csv", ".nc", ".vti"):
+        raise InputError(f"{output}: unknown suffix {suffix!r}; allowed: .csv, .nc, .vti")
+    if task is not None and suffix != ".vti":
+        raise InputError("--task: chooses fields, for a .vti file")
+    if output is None:
+        click.echo(_csv(study), nl=False)
+    elif suffix == ".csv":
+        from gfmd_cli.study.files import write_whole
+
+        write_whole(output, _csv(study).encode())
+    elif suffix == ".nc":
+        from gfmd_cli.analysis.export import write_netcdf
+
+        write_netcdf(study, output)
+    else:
+        from gfmd_cli.analysis.image import write_image
+
+        write_image(study, task, output)
+
+
+def _csv(study: Path) -> str:
+    from gfmd_cli.analysis.export import export_rows
 
     header, rows = export_rows(study)
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(header)
     writer.writerows(rows)
-    if output is None:
-        click.echo(text.getvalue(), nl=False)
-        return
-    from gfmd_cli.study.files import write_whole
-
-    write_whole(output, text.getvalue().encode())
+    return text.getvalue()

@@ -71,40 +71,60 @@ def observe(contact: Contact, u: Field, sigma: Field) -> Observables:
 
 
 @dataclass(frozen=True)
-class StressDistribution:
-    """Pr(sigma) in units of Delta_sigma: zero weight + sum of density times width + beyond = 1."""
+class Distribution:
+    """Pr(x) of x >= 0 in its unit: zero weight + sum of density times width + beyond = 1.
+
+    In logarithmic bins the share `below` them adds to that.
+    """
 
     linear: Field
     """Density in the linear bins."""
     logarithmic: Field
     """Density in the logarithmic bins."""
     zero: float
-    """Weight of the delta function at zero: share of points without load."""
+    """Weight of the delta function at zero."""
     beyond: float
     """Share of points above the last linear bin."""
+    below: float
+    """Share of points above zero and below the first logarithmic bin."""
 
 
 def linear_edges() -> Field:
-    """Edges of the linear bins [Delta_sigma]: width 0.05 up to 10, where a Gauss tail has ended."""
+    """Edges of the linear bins of stresses [Delta_sigma] and gaps [h_std].
+
+    Of width 0.05 up to 10, where a Gauss tail has ended.
+    """
     return np.linspace(0.0, 10.0, 201)
 
 
 def logarithmic_edges() -> Field:
-    """Edges of the logarithmic bins [Delta_sigma]: ten a decade from 1e-6 to 1e4."""
+    """Edges of the logarithmic bins [Delta_sigma, h_std]: ten a decade from 1e-6 to 1e4."""
     return np.logspace(-6.0, 4.0, 101)
 
 
-def stress_distribution(contact: Contact, u: Field, sigma: Field) -> StressDistribution:
+def stress_distribution(contact: Contact, u: Field, sigma: Field) -> Distribution:
     """Histogram of the stress over the points that carry load, as densities over sigma."""
-    loaded = sigma[contact_points(contact, u, sigma)]
-    grid, size = contact.grid, contact.grid.size
+    return _distribution(contact.grid, sigma[contact_points(contact, u, sigma)])
+
+
+def gap_distribution(contact: Contact, u: Field) -> Distribution:
+    """Histogram of the gap over the points off the indenter, as densities over g."""
+    gap = u - contact.height
+    return _distribution(contact.grid, gap[gap > 0])
+
+
+def _distribution(grid: Grid, positive: Field) -> Distribution:
+    """Densities over the values of the points where they are positive; elsewhere they are zero."""
+    size, count = grid.size, int(grid.total(positive.size))
     linear, logarithmic = (
-        grid.total(np.histogram(loaded, edges())[0]) for edges in (linear_edges, logarithmic_edges)
+        grid.total(np.histogram(positive, edges())[0])
+        for edges in (linear_edges, logarithmic_edges)
     )
-    count = int(grid.total(loaded.size))
-    return StressDistribution(
+    below = grid.total(np.count_nonzero(positive < logarithmic_edges()[0]))
+    return Distribution(
         linear=linear / (size * np.diff(linear_edges())),
         logarithmic=logarithmic / (size * np.diff(logarithmic_edges())),
         zero=1.0 - count / size,
         beyond=float(count - linear.sum()) / size,
+        below=int(below) / size,
     )

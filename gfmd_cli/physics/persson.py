@@ -112,7 +112,7 @@ def shells(
     if not np.any(carries_power):
         return Shells(*np.empty((6, 0)))
     counts = np.ones_like(q) if modes is None else modes
-    edges = _bin_edges(q[carries_power], exact, bins)
+    edges = bin_edges(q[carries_power], exact, bins)
     sums = np.zeros((6, edges.size + 1))
     for start in range(0, q.size, _CHUNK):
         part = slice(start, start + _CHUNK)
@@ -126,7 +126,7 @@ def shells(
     return Shells(moment / height, height, energy, variance, weighted / energy, held)
 
 
-def _bin_edges(q: Field, exact: int, bins: int) -> Field:
+def bin_edges(q: Field, exact: int, bins: int) -> Field:
     """Inner edges: half-way between the smallest |q|, then in geometric progression."""
     low = _smallest_distinct(q, exact + 1)
     between = 0.5 * (low[1:] + low[:-1])

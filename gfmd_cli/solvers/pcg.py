@@ -27,6 +27,7 @@ from gfmd_cli.physics import sweeps
 from gfmd_cli.physics.choice import Choice
 from gfmd_cli.physics.contact import Contact
 from gfmd_cli.physics.fields import Field
+from gfmd_cli.physics.grid import Grid
 from gfmd_cli.solvers.loop import State
 from gfmd_cli.solvers.multigrid import Multigrid, suits
 from gfmd_cli.solvers.multilevel import Multilevel
@@ -126,10 +127,7 @@ class _Run:
         self.rows.meet(self.framed_marks)
         held, changes = self.rows.framed_sums(2, sweeps.pattern, self.framed_marks, self.least)
         stiffness, chord, exponent = screening(self.contact, float(held), float(changes))
-        if self.even:
-            multilevel = exponent > STEEP
-        else:
-            multilevel = self.grid.dimension == 2 and prefers_multilevel(chord, exponent)
+        multilevel = prefers_levels(self.grid, self.even, chord, exponent)
         change = memory["screening"] / stiffness
         if multilevel != bool(memory["multilevel"]) or (
             not multilevel and not 1 / RESCREEN_CHANGE < change < RESCREEN_CHANGE
@@ -228,6 +226,13 @@ class _Run:
         most = self.grid.most
         height = most(float(self.h.max())) + most(-float(self.h.min()))
         return height / most(float(np.abs(self.direction).max()))  # of a rigid shift, at most
+
+
+def prefers_levels(grid: Grid, even: bool, chord: float, exponent: float) -> bool:
+    """Whether a preconditioner over levels pays; `even`: where the V-cycle suits k(q)."""
+    if even:
+        return exponent > STEEP
+    return grid.dimension == 2 and prefers_multilevel(chord, exponent)
 
 
 def prefers_multilevel(chord: float, exponent: float) -> bool:

@@ -1,9 +1,14 @@
 """The layout of a study file: its columns, and which of them `export` prints."""
 
+from collections.abc import Callable
 from math import nan
 from typing import Any, NamedTuple
 
-from gfmd_cli.physics.observables import QUANTITIES
+import numpy as np
+
+from gfmd_cli.physics.fields import Field
+from gfmd_cli.physics.observables import QUANTITIES, linear_edges, logarithmic_edges
+from gfmd_cli.physics.patches import area_edges
 
 LAYOUT = 2
 """Raised whenever a reader of the old layout would misread the new one."""
@@ -82,14 +87,60 @@ FURTHER = (
             ("deviation_bearing", "the same deviation over the highest points, as many as carry p"),
         )
     ),
+    Column("patches", int, "1", "number of contact patches"),
+    Column("patch_area_mean", float, "1", "mean area of a patch / L^2; of a line scene, / L"),
+    Column("patch_area_largest", float, "1", "area of the largest patch, likewise"),
+    Column("stiffness", float, "1", "contact stiffness -dp/du_g / (Delta_sigma / h_std)"),
+    Column("leaks_x", int, "1", "1 where the gap percolates along x, 0 where it does not"),
+    Column("leaks_y", int, "1", "likewise along y; -1 on a line scene"),
 )
 COLUMNS = (*CONTRACT, *FURTHER)
 
-DISTRIBUTION = (
-    Column("pr_zero", float, "1", "weight of the delta function of Pr(sigma) at zero"),
-    Column("pr_beyond", float, "1", "share of points above the last linear bin of Pr(sigma)"),
-)
+
+class Distribution(NamedTuple):
+    """Densities in bins that all tasks share, one row of them a task."""
+
+    option: str
+    """Key of [output] that asks for it."""
+    name: str
+    axis: str
+    """Name of its bins."""
+    labels: str
+    """What the middles of the bins are."""
+    meaning: str
+    edges: Callable[[], Field]
+    logarithmic: bool = True
+
+    def middles(self) -> Field:
+        """Middles of the bins, geometric in logarithmic ones."""
+        low, high = self.edges()[:-1], self.edges()[1:]
+        return np.sqrt(low * high) if self.logarithmic else 0.5 * (low + high)
+
+
 PR_LINEAR, PR_LOGARITHMIC = "pr_sigma", "pr_sigma_log"
+_STRESS = ("middle of the stress bin / Delta_sigma", "Pr(sigma) Delta_sigma")
+_GAP = ("middle of the gap bin / h_std", "Pr(g) h_std")
+_AREA = ("middle of the area bin / L^2; of a line scene, / L", "Pr(A) L^2, by number of patches")
+DISTRIBUTIONS = (
+    Distribution("histogram", PR_LINEAR, "sigma", *_STRESS, linear_edges, logarithmic=False),
+    Distribution("histogram", PR_LOGARITHMIC, "sigma_log", *_STRESS, logarithmic_edges),
+    Distribution("gap_distribution", "pr_gap", "gap", *_GAP, linear_edges, logarithmic=False),
+    Distribution("gap_distribution", "pr_gap_log", "gap_log", *_GAP, logarithmic_edges),
+    Distribution("patches", "pr_patch_area", "patch_area", *_AREA, area_edges),
+)
+WEIGHTS = {
+    "histogram": (
+        Column("pr_zero", float, "1", "weight of the delta function of Pr(sigma) at zero"),
+        Column("pr_beyond", float, "1", "share of points above the last linear bin of Pr(sigma)"),
+    ),
+    "gap_distribution": (
+        Column("pr_gap_zero", float, "1", "weight of the delta function of Pr(g) at zero"),
+        Column("pr_gap_beyond", float, "1", "share of points above the last linear bin of Pr(g)"),
+        Column("pr_gap_below", float, "1", "share of points below the first logarithmic bin"),
+    ),
+}
+"""What of a distribution is in no bin, by the key of [output] that asks for it."""
+DISTRIBUTION = tuple(column for columns in WEIGHTS.values() for column in columns)
 SHELLS = (
     Column("q", float, "m-1", "mean wavenumber of the shell"),
     Column("height", float, "m2", "sum of C(q) over the shell"),
@@ -103,6 +154,21 @@ FIELDS = (
     Column("sigma", float, "Pa", "compressive stress"),
     Column("height", float, "m", "height of the indenter"),
 )
+SPECTRA = (
+    Column("q", float, "m-1", "mean wavenumber of the shell"),
+    Column("waves", float, "1", "number of waves q in the shell"),
+    Column("height", float, "m2", "sum of |h(q)|^2 over the shell"),
+    Column("u", float, "m2", "sum of |u(q)|^2 over the shell"),
+    Column("sigma", float, "Pa2", "sum of |sigma(q)|^2 over the shell"),
+)
+AUTOCORRELATIONS = (
+    Column("r", float, "m", "mean distance in the ring"),
+    Column("height", float, "1", "mean of C(r) / C(0) of the height over the ring"),
+    Column("u", float, "1", "the same of the displacement"),
+    Column("sigma", float, "1", "the same of the stress"),
+)
+CURVES = {"spectra": ("shell", SPECTRA), "autocorrelations": ("ring", AUTOCORRELATIONS)}
+"""Groups with one group of curves a task: their axis and their columns."""
 
 
 def empty_row() -> dict[str, Any]:

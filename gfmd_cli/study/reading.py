@@ -18,10 +18,9 @@ from gfmd_cli.study.layout import (
     BENCH,
     COLUMNS,
     DISTRIBUTION,
+    DISTRIBUTIONS,
     FIELDS,
     LAYOUTS,
-    PR_LINEAR,
-    PR_LOGARITHMIC,
     SHELLS,
     Column,
     empty_row,
@@ -77,7 +76,7 @@ def attributes_sum(file: Any) -> str:
 
 
 def read_rows(path: Path) -> list[dict[str, Any]]:
-    """The rows of a study, one a task, with `task`, `scene` and Pr(sigma) where it is stored.
+    """The rows of a study, one a task, with `task`, `scene` and the distributions stored.
 
     A column that the version which wrote the study did not have yet is blank. Raises
     InputError, StudyError.
@@ -92,9 +91,9 @@ def rows_of(file: Any) -> list[dict[str, Any]]:
     known = [c for c in (*COLUMNS, *DISTRIBUTION) if has(file, c.name)]
     known += [Column(name, int, "", "") for name in ("task", "scene")]
     columns = {column.name: column_of(file, column) for column in known}
-    for name in (PR_LINEAR, PR_LOGARITHMIC):
-        if has(file, name):
-            columns[name] = take(file, name)[()]
+    for distribution in DISTRIBUTIONS:
+        if has(file, distribution.name):
+            columns[distribution.name] = take(file, distribution.name)[()]
     for name, values in columns.items():
         if len(values) != size:
             raise ValueError(f"{name} has {len(values)} rows, not {size}")
@@ -123,6 +122,17 @@ def _plain(value: Any) -> Any:
     return value.item() if isinstance(value, np.generic) else value
 
 
+def stored_spec(path: Path) -> Any:
+    """The resolved spec of a study, as plain data. Raises InputError, StudyError."""
+    with open_study(path) as file:
+        return spec_of(file)
+
+
+def spec_of(file: Any) -> Any:
+    """The same of an open study."""
+    return json.loads(file.attrs["spec"])
+
+
 def read_shells(path: Path, scene: int) -> Shells:
     """The binned spectrum of one scene. Raises InputError, StudyError."""
     with open_study(path) as file:
@@ -135,10 +145,10 @@ def shells_of(file: Any, scene: int) -> Shells:
     return Shells(**{name: take(file, f"scenes/{scene}/{name}")[()] for name in names})
 
 
-def fields_of(file: Any, place: str) -> dict[str, Field]:
+def fields_of(file: Any, place: str, columns: tuple[Column, ...] = FIELDS) -> dict[str, Field]:
     """The fields of a group of an open study, none where there is no such group."""
     folder, _, task = place.partition("/")
     if not (has(file, folder) and has(file[folder], task)):
         return {}
-    names = [column.name for column in FIELDS if has(file[place], column.name)]
+    names = [column.name for column in columns if has(file[place], column.name)]
     return {name: take(file, f"{place}/{name}")[()] for name in names}

@@ -15,6 +15,7 @@ from gfmd_cli.study.files import check_seal, new_file, new_hdf5, seal
 from gfmd_cli.study.layout import COLUMNS, LAYOUT, SHELLS
 
 SUFFIX = ".record"
+GROUPS = ("distribution", "cross_section", "spectra", "autocorrelations", "fields")
 
 
 @dataclass(frozen=True)
@@ -26,9 +27,11 @@ class Record:
     """One value for each column of the layout."""
     shells: Shells
     distribution: Mapping[str, Any] = field(default_factory=dict)
-    """Pr(sigma): densities and weights, empty where none was asked for."""
+    """Densities of the distributions asked for, and their weights."""
     fields: Mapping[str, Field] = field(default_factory=dict)
     cross_section: Mapping[str, Field] = field(default_factory=dict)
+    spectra: Mapping[str, Field] = field(default_factory=dict)
+    autocorrelations: Mapping[str, Field] = field(default_factory=dict)
 
 
 def record_path(folder: Path, task_id: str) -> Path:
@@ -45,7 +48,7 @@ def write_record(folder: Path, record: Record) -> Path:
             file.attrs["task_id"] = record.task_id
             row = {column.name: column.kind(record.row[column.name]) for column in COLUMNS}
             file.attrs["row"] = json.dumps(row)
-            for group in ("distribution", "fields", "cross_section"):
+            for group in GROUPS:
                 for name, values in getattr(record, group).items():
                     file[f"{group}/{name}"] = values
             for column in SHELLS:
@@ -65,7 +68,7 @@ def read_record(path: Path, *, with_fields: bool = True) -> Record:
 
     Raises StudyError where a bit of it has changed or it is of another layout.
     """
-    groups = ("distribution", "cross_section", *(("fields",) if with_fields else ()))
+    groups = GROUPS if with_fields else GROUPS[:-1]
     try:
         check_seal(path)
         with h5py.File(path, "r", locking=False) as file:

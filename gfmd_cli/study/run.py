@@ -73,8 +73,8 @@ def run_study(
     Raises InputError for a spec that does not fit the study or the machine, SpaceError, and
     Interrupted after a signal or the time given, when all states are saved.
     """
-    if ranks is not None and spec.output.true_contact:
-        raise InputError("output.true_contact: takes whole grids; run it without mpiexec")
+    if ranks is not None and (asked := spec.output.on_request()):
+        raise InputError(f"output.{asked[0]}: takes whole grids; run it without mpiexec")
     study = Study(path)
     study.check_spec(spec)
     tasks = plan(spec)

@@ -11,14 +11,13 @@ import numpy as np
 
 from gfmd_cli.errors import Interrupted, SpaceError
 from gfmd_cli.physics.contact import Contact
-from gfmd_cli.physics.observables import contact_points, stress_distribution
 from gfmd_cli.physics.ranks import Ranks, leads
-from gfmd_cli.physics.true_contact import bearing, contact_stress
 from gfmd_cli.solvers.cascade import Solution
 from gfmd_cli.solvers.loop import State
 from gfmd_cli.study.checkpoint import Checkpoint
+from gfmd_cli.study.further import observe_further
 from gfmd_cli.study.grids import Solved
-from gfmd_cli.study.layout import PR_LINEAR, PR_LOGARITHMIC, empty_row
+from gfmd_cli.study.layout import empty_row
 from gfmd_cli.study.record import Record, write_record
 from gfmd_cli.study.search import solve_task_on_grids
 from gfmd_cli.study.tasks import Task
@@ -187,17 +186,7 @@ def _record(task: Task, solved: Solved, seconds: float) -> Record:
         }
         | solved.columns()
     )
-    if task.output.true_contact:
-        row |= _true_contact(solved)
-    distribution = {}
-    if task.output.histogram:
-        pr = stress_distribution(contact, u, sigma)
-        distribution = {
-            PR_LINEAR: pr.linear,
-            PR_LOGARITHMIC: pr.logarithmic,
-            "pr_zero": pr.zero,
-            "pr_beyond": pr.beyond,
-        }
+    further = observe_further(task.output, solved)
     physical = {}
     if task.output.fields or task.output.cross_section:
         physical = {
@@ -207,9 +196,11 @@ def _record(task: Task, solved: Solved, seconds: float) -> Record:
         }
     return Record(
         task_id=task.id,
-        row=row,
+        row=row | further.columns,
         shells=scene.shells,
-        distribution=distribution,
+        distribution=further.distribution,
+        spectra=further.spectra,
+        autocorrelations=further.autocorrelations,
         fields={
             name: whole
             for name in task.output.fields
@@ -219,14 +210,3 @@ def _record(task: Task, solved: Solved, seconds: float) -> Record:
         if task.output.cross_section
         else {},
     )
-
-
-def _true_contact(solved: Solved) -> dict[str, float]:
-    """Delta_sigma over the true contact and over the highest points, as columns."""
-    contact, solution = solved.contact, solved.solution
-    found = contact_stress(contact, contact_points(contact, solution.u, solution.sigma))
-    return {
-        "deviation_c": found.deviation,
-        "quadrature_c": found.quadrature,
-        "deviation_bearing": float(bearing(contact).delta_sigma_c(contact.pressure)),
-    }

@@ -154,6 +154,12 @@ class AccuracyTable(Choice):
         return {name: share for name, share in given.items() if share is not None}
 
 
+ON_REQUEST = (
+    "true_contact", "patches", "gap_distribution", "stiffness", "spectra", "percolation",
+)  # fmt: skip
+"""Keys of [output] that are off unless asked for, and take whole grids."""
+
+
 class OutputTable(Choice):
     """Table [output]: what is kept beside the scalars."""
 
@@ -168,6 +174,20 @@ class OutputTable(Choice):
     true_contact: bool = False
     """Delta_sigma over the true contact, as columns deviation_c, quadrature_c and
     deviation_bearing."""
+    patches: bool = False
+    """Number and areas of the contact patches, with the distribution of the areas."""
+    gap_distribution: bool = False
+    """Pr(g) in linear and logarithmic bins."""
+    stiffness: bool = False
+    """Contact stiffness -dp/du_g, by linear response."""
+    spectra: bool = False
+    """Power spectra and autocorrelations of height, displacement and stress."""
+    percolation: bool = False
+    """Whether the gap percolates through the periodic cell, as columns leaks_x and leaks_y."""
+
+    def on_request(self) -> list[str]:
+        """The keys of `ON_REQUEST` that are asked for."""
+        return [name for name in ON_REQUEST if getattr(self, name)]
 
 
 class Spec(Choice):
@@ -189,8 +209,8 @@ class Spec(Choice):
         )
         if self.accuracy is None:
             del data["accuracy"]
-        if not self.output.true_contact:
-            del data["output"]["true_contact"]
+        for name in set(ON_REQUEST) - set(self.output.on_request()):
+            del data["output"][name]  # studies older than the key go on
         for table in ("surface", "elastomer"):
             for dumped, choice in zip(data[table], getattr(self, table), strict=True):
                 for later, default in (("crop", False), ("missing", "refuse")):

@@ -15,7 +15,7 @@ from typing import Any
 from gfmd_cli.errors import StudyError
 from gfmd_cli.study.files import locked, new_file, new_hdf5, write_whole
 from gfmd_cli.study.layout import MISSING
-from gfmd_cli.study.reading import open_study, texts_of
+from gfmd_cli.study.reading import open_study, spec_of, texts_of
 from gfmd_cli.study.record import SUFFIX, Record, read_record, read_status, record_path
 from gfmd_cli.study.spec import Spec, refuse_other
 from gfmd_cli.study.tasks import Task
@@ -123,7 +123,7 @@ class Study:
         """The resolved spec of the study file, else of the unfinished work, else None."""
         if self.path.exists():
             with open_study(self.path) as file:
-                return json.loads(file.attrs["spec"])
+                return spec_of(file)
         with suppress(OSError, ValueError):
             return json.loads((self.parts / "spec.json").read_bytes())
         return None

@@ -20,6 +20,8 @@ from gfmd_cli.study.spec import SOUGHT, AccuracyTable, OutputTable, Spec, digest
 FIELDS_IN_MEMORY = 6.65
 """Fields of double precision that a solve holds at its peak: h, u, sigma, work; at half the
 size direction, change, k(q); contact marks, coarse levels. scripts/memory.py measures it."""
+FURTHER_FIELDS = 3.0
+"""What [output] stiffness and spectra add to that, measured likewise."""
 BASE_BYTES = 215e6
 """What a process holds besides: the interpreter and its libraries."""
 FIRST = 64  # points per side that "auto" begins with at the least; such a solve costs nothing
@@ -81,7 +83,9 @@ class Task:
 
     def bytes_on(self, points: int) -> float:
         """Memory that a solve on this many points per side takes, with its process."""
-        return FIELDS_IN_MEMORY * 8 * float(points**self.surface.dimension) + BASE_BYTES
+        further = FURTHER_FIELDS if self.output.stiffness or self.output.spectra else 0.0
+        fields = FIELDS_IN_MEMORY + further
+        return fields * 8 * float(points**self.surface.dimension) + BASE_BYTES
 
     @property
     def least_points(self) -> int:

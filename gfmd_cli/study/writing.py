@@ -5,17 +5,16 @@ from typing import Any
 
 import numpy as np
 
-from gfmd_cli.physics.observables import linear_edges, logarithmic_edges
 from gfmd_cli.study.labelled import dataset, scale
 from gfmd_cli.study.layout import (
     COLUMNS,
-    DISTRIBUTION,
+    CURVES,
+    DISTRIBUTIONS,
     FIELDS,
     LAYOUT,
     MISSING,
-    PR_LINEAR,
-    PR_LOGARITHMIC,
     SHELLS,
+    WEIGHTS,
     Column,
     empty_row,
 )
@@ -59,12 +58,13 @@ def write_study(
     rows = [_row(task, found, kept) for task in tasks]
     scenes = _scene_numbers(tasks)
     task = scale(file, "task", np.arange(len(tasks)), "1", "index of the task")
-    for column in (*COLUMNS, *(DISTRIBUTION if spec.output.histogram else ())):
+    asked = {name for name, value in spec.output if value}
+    weights = [column for name in WEIGHTS if name in asked for column in WEIGHTS[name]]
+    for column in (*COLUMNS, *weights):
         dataset(file, column, [row[column.name] for row in rows], [task])
     dataset(file, Column("task_id", str, "", "task by its content"), [t.id for t in tasks], [task])
     dataset(file, Column("scene", int, "1", "group of /scenes"), scenes, [task])
-    if spec.output.histogram:
-        _write_distributions(file, task, rows)
+    _write_distributions(file, asked, task, rows)
     for solved, scene, row in zip(tasks, scenes, rows, strict=True):
         if solved.id in found:
             record = found[solved.id]
@@ -97,6 +97,10 @@ def _old_record(old: Any, task: Task, scene: int, row: dict[str, Any]) -> Record
         shells=shells_of(old, scene),
         fields=fields_of(old, f"fields/{task.index}"),
         cross_section=fields_of(old, f"cross_sections/{task.index}"),
+        **{
+            place: fields_of(old, f"{place}/{task.index}", columns)
+            for place, (_, columns) in CURVES.items()
+        },
     )
 
 
@@ -111,21 +115,19 @@ def _scene_numbers(tasks: list[Task]) -> list[int]:
     ]
 
 
-def _write_distributions(file: Any, task: Any, rows: list[dict[str, Any]]) -> None:
-    linear, logarithmic = linear_edges(), logarithmic_edges()
-    for name, axis, edges, middle in (
-        (PR_LINEAR, "sigma", linear, 0.5 * (linear[1:] + linear[:-1])),
-        (PR_LOGARITHMIC, "sigma_log", logarithmic, np.sqrt(logarithmic[1:] * logarithmic[:-1])),
-    ):
-        labels = scale(file, axis, middle, "1", "middle of the stress bin / Delta_sigma")
-        labels.attrs["edges"] = edges
-        blank = np.full(edges.size - 1, np.nan)
-        density = np.array([row.get(name, blank) for row in rows])
-        dataset(file, Column(name, float, "1", "Pr(sigma) Delta_sigma"), density, [task, labels])
+def _write_distributions(file: Any, asked: set[str], task: Any, rows: list[dict[str, Any]]) -> None:
+    for made in DISTRIBUTIONS:
+        if made.option in asked:
+            edges = made.edges()
+            labels = scale(file, made.axis, made.middles(), "1", made.labels)
+            labels.attrs["edges"] = edges
+            blank = np.full(edges.size - 1, np.nan)
+            density = np.array([row.get(made.name, blank) for row in rows])
+            dataset(file, Column(made.name, float, "1", made.meaning), density, [task, labels])
 
 
 def _write_extras(file: Any, index: int, scene: int, record: Record) -> None:
-    """The scene's spectrum, the fields and the cross-section of one task."""
+    """The scene's spectrum, the fields, the cross-section and the curves of one task."""
     if f"scenes/{scene}" not in file:
         group = file.create_group(f"scenes/{scene}")
         shell = scale(group, "shell", np.arange(record.shells.q.size), "1", "shell")
@@ -136,6 +138,12 @@ def _write_extras(file: Any, index: int, scene: int, record: Record) -> None:
         if values:
             group = file.create_group(f"{place}/{index}")
             _write_fields(group, dict(values), record.row["length"])
+    for place, (axis, columns) in CURVES.items():
+        if values := getattr(record, place):
+            group = file.create_group(f"{place}/{index}")
+            number = scale(group, axis, np.arange(values[columns[0].name].size), "1", axis)
+            for column in columns:
+                dataset(group, column, values[column.name], [number])
 
 
 def _write_fields(group: Any, fields: dict[str, Any], length: float) -> None:

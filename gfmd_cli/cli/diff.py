@@ -1,0 +1,34 @@
+"""`gfmd diff`: two studies compared."""
+
+from pathlib import Path
+
+import click
+
+from gfmd_cli.cli.options import FILE
+
+
+@click.command()
+@click.argument("one", type=FILE, metavar="A.h5")
+@click.argument("other", type=FILE, metavar="B.h5")
+@click.option("--tolerance", type=click.FloatRange(min=0), help="Status 1 beyond this difference.")
+@click.option("--json", "as_json", is_flag=True, help="Print records instead of tables.")
+@click.pass_context
+def diff(
+    context: click.Context, one: Path, other: Path, tolerance: float | None, as_json: bool
+) -> None:
+    """Compare contact area, stress deviation and mean gap of two studies.
+
+    Rows belong together by surface, seed, elastomer and load; grids and solvers may differ.
+    Rows that one study alone has are listed, and count for nothing.
+
+    Example:
+
+        gfmd diff coarse.h5 fine.h5 --tolerance 0.01
+    """
+    from gfmd_cli.analysis.diff import diff as diff_studies
+    from gfmd_cli.analysis.diff import diff_json, diff_text
+
+    found = diff_studies(one, other)
+    click.echo(diff_json(found) if as_json else diff_text(found))
+    if tolerance is not None and found.exceeds(tolerance):
+        context.exit(1)

@@ -1,0 +1,150 @@
+"""Two studies compared: which rows belong together, and how far they lie apart."""
+
+import json
+from math import hypot, inf, isnan, nan
+
+import pytest
+from click.testing import CliRunner
+
+from gfmd_cli.analysis.diff import Deviation, Pair, diff
+from gfmd_cli.cli import main
+from gfmd_cli.study.reading import read_rows
+
+SPEC = """
+[surface]
+kind = "self-affine"
+cutoff = 0.1
+[elastomer]
+kind = "power"
+n = [0, 2]
+[grid]
+points = 32
+[load]
+p_star = [0.1, 1.0]
+[output]
+histogram = false
+"""
+
+
+def gfmd(*words, status=0):
+    done = CliRunner().invoke(main, [str(word) for word in words])
+    assert done.exit_code == status, done.output
+    return done.output
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """Runs SPEC with overrides; the same ones give the same study."""
+    folder = tmp_path_factory.mktemp("diff")
+    (folder / "spec.toml").write_text(SPEC)
+    held = {}
+
+    def study(*overrides):
+        if overrides not in held:
+            held[overrides] = folder / f"{len(held)}.h5"
+            options = [word for override in overrides for word in ("--set", override)]
+            gfmd("run", folder / "spec.toml", "-o", held[overrides], "-q", "-j", "1", *options)
+        return held[overrides]
+
+    return study
+
+
+def test_a_study_does_not_differ_from_itself(made):
+    found = diff(made(), made())
+    assert len(found.pairs) == 4
+    assert found.only == ([], [])
+    assert found.spec == []
+    assert all(pair.deviation("u_g") == (0.0, pytest.approx(nan, nan_ok=True))
+               for pair in found.pairs)  # fmt: skip
+    assert not found.exceeds(0)
+    assert "+0.00e+00" in gfmd("diff", made(), made(), "--tolerance", 0)
+
+
+def test_other_grids_are_compared_and_the_keys_that_differ_are_told(made):
+    fine = made("grid.points=64")
+    found = diff(made(), fine)
+    assert [(p.one["points"], p.other["points"]) for p in found.pairs] == [(32, 64)] * 4
+    assert found.spec == ["grid.points: 32 -> 64"]
+    for pair, a, b in zip(found.pairs, read_rows(made()), read_rows(fine), strict=True):
+        expected = (b["u_g"] - a["u_g"]) / max(a["u_g"], b["u_g"])
+        assert pair.deviation("u_g").relative == pytest.approx(expected, rel=1e-12)
+    text = gfmd("diff", made(), fine)
+    assert "32 -> 64" in text
+    assert "grid.points: 32 -> 64" in text
+
+
+def test_the_tolerance_decides_the_exit_status(made):
+    fine = made("grid.points=64")
+    largest = max(
+        abs(pair.deviation(name).relative)
+        for pair in diff(made(), fine).pairs
+        for name in ("a_r", "sigma_p", "u_g")
+    )
+    gfmd("diff", made(), fine, "--tolerance", 1.001 * largest)
+    gfmd("diff", made(), fine, "--tolerance", 0.999 * largest, status=1)
+    gfmd("diff", made(), fine)
+
+
+def test_rows_of_one_study_alone_are_listed(made):
+    more = made("load.p_star=[0.3, 1.0]")
+    found = diff(made(), more)
+    assert len(found.pairs) == 2
+    assert [row["p_star"] for row in found.only[0]] == [0.1, 0.1]
+    assert [row["p_star"] for row in found.only[1]] == [0.3, 0.3]
+    text = gfmd("diff", made(), more)
+    assert "only in A:" in text
+    assert "power n=2 on self-affine cutoff=0.1, 32, p*=0.3" in text
+
+
+def test_another_seed_is_another_contact_and_nothing_to_compare_is_no_agreement(made):
+    other = made("surface.seed=1")
+    assert diff(made(), other).pairs == []
+    assert "no contact in common" in gfmd("diff", made(), other, "--tolerance", 1, status=1)
+
+
+def test_of_several_grids_the_same_ones_belong_together(made):
+    both, one = made("grid.points=[32, 64]"), made("grid.points=64")
+    found = diff(both, one)
+    assert [(p.one["points"], p.other["points"]) for p in found.pairs] == [(64, 64)] * 4
+    assert {row["points"] for row in found.only[0]} == {32}
+    assert not found.exceeds(0)
+
+
+def test_differences_are_told_in_units_of_the_error_bars(made):
+    bars = ("accuracy.mean_gap=0.5", "elastomer.n=1")
+    one, other = made(*bars), made(*bars, "grid.points=48")
+    found = diff(one, other)
+    for pair in found.pairs:
+        error = hypot(pair.one["u_g_error"], pair.other["u_g_error"])
+        expected = (pair.other["u_g"] - pair.one["u_g"]) / error
+        assert pair.deviation("u_g").in_errors == pytest.approx(expected, rel=1e-12)
+    text = gfmd("diff", one, other)
+    assert f"({found.pairs[0].deviation('u_g').in_errors:+.1f})" in text
+
+
+def test_json_holds_rows_and_keys(made):
+    told = json.loads(gfmd("diff", made(), made("grid.points=64"), "--json"))
+    assert told["spec"] == ["grid.points: 32 -> 64"]
+    assert (told["only_a"], told["only_b"]) == ([], [])
+    row = told["rows"][0]
+    assert (row["points_a"], row["points_b"]) == (32, 64)
+    expected = (row["a_r_b"] - row["a_r_a"]) / max(row["a_r_a"], row["a_r_b"])
+    assert row["a_r_relative"] == pytest.approx(expected)
+    assert row["a_r_in_errors"] is None
+
+
+def test_values_that_are_missing_or_zero_do_not_agree_by_chance():
+    def apart(a, b):
+        blank = {"u_g_error": nan}
+        return Pair(blank | {"u_g": a}, blank | {"u_g": b}).deviation("u_g")
+
+    assert apart(0.0, 0.0).relative == 0
+    assert apart(0.0, 1e-9).relative == 1
+    assert apart(nan, 1.0).relative == inf
+    assert isnan(apart(nan, nan).relative)
+    assert isinstance(apart(1.0, 2.0), Deviation)
+
+
+def test_a_study_that_is_not_there_is_bad_input(made, tmp_path):
+    assert "no such study" in gfmd("diff", made(), tmp_path / "none.h5", status=2)
+    gfmd("diff", made(), made(), "--tolerance", "-1", status=2)

@@ -1,0 +1,222 @@
+"""What `gfmd export` writes, read back by other programs' libraries."""
+
+import csv
+import io
+import re
+import xml.etree.ElementTree as ElementTree
+
+import h5py
+import numpy as np
+import pytest
+import xarray
+from click.testing import CliRunner
+
+from gfmd_cli.analysis.export import as_dataset
+from gfmd_cli.cli import main
+from gfmd_cli.study.layout import COLUMNS
+from gfmd_cli.study.reading import read_rows, read_shells
+
+SPEC = """
+[surface]
+kind = "self-affine"
+cutoff = 0.1
+length = 2.0
+h_std = 1e-3
+[elastomer]
+kind = "half-space"
+E_star = 1e6
+[grid]
+points = [32, 48]
+[load]
+p_star = [0.1, 0.5]
+[output]
+patches = true
+percolation = true
+stiffness = true
+gap_distribution = true
+spectra = true
+fields = ["u", "sigma", "height"]
+"""
+ARRAYS = {"height": "height", "displacement": "u", "stress": "sigma"}
+
+
+def gfmd(*words, status=0):
+    done = CliRunner().invoke(main, [str(word) for word in words])
+    assert done.exit_code == status, done.output
+    return done.output
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("export")
+    (folder / "spec.toml").write_text(SPEC)
+    gfmd("run", folder / "spec.toml", "-o", folder / "s.h5", "-q", "-j", "1")
+    return folder / "s.h5"
+
+
+@pytest.fixture(scope="module")
+def line_study(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("line")
+    text = SPEC[: SPEC.index("[surface]")] + '[surface]\nkind = "ridge"\n'
+    (folder / "spec.toml").write_text(
+        text + SPEC[SPEC.index("[elastomer]") :].replace("[32, 48]", "64").replace(", 0.5]", "]")
+    )
+    gfmd("run", folder / "spec.toml", "-o", folder / "s.h5", "-q", "-j", "1")
+    return folder / "s.h5"
+
+
+def test_csv_has_the_columns_of_the_layout(study, tmp_path):
+    gfmd("export", study, "-o", tmp_path / "s.csv")
+    text = (tmp_path / "s.csv").read_text()
+    assert text == gfmd("export", study)
+    rows = list(csv.DictReader(io.StringIO(text)))
+    assert list(rows[0]) == [column.name for column in COLUMNS]
+    for row, stored in zip(rows, read_rows(study), strict=True):
+        assert int(row["patches"]) == stored["patches"]
+        assert float(row["stiffness"]) == stored["stiffness"]
+
+
+def test_a_dataset_has_columns_distributions_scenes_and_curves(study):
+    found, rows = as_dataset(study), read_rows(study)
+    for column in COLUMNS:
+        told = found[column.name]
+        np.testing.assert_array_equal(told.values, [row[column.name] for row in rows])
+        assert told.dims == ("task",)
+        assert told.attrs["long_name"] == column.meaning
+    assert found.pr_sigma.dims == ("task", "sigma")
+    assert found.pr_gap_log.dims == ("task", "gap_log")
+    assert found.gap.attrs["edges"].size == found.gap.size + 1
+    total = found.pr_gap_zero + found.pr_gap_beyond + found.pr_gap.sum("gap") * 0.05
+    np.testing.assert_allclose(total, 1, rtol=1e-12)
+    assert set(found.scene.values) == {0, 1}
+    for scene in range(2):
+        expected = read_shells(study, scene).q
+        q = found.scenes_q[scene].values
+        np.testing.assert_array_equal(q[: expected.size], expected)
+        assert np.all(np.isnan(q[expected.size :]))
+    with h5py.File(study) as file:
+        for name in ("u", "sigma"):
+            variance = [file[f"fields/{task}/{name}"][()].var() for task in range(4)]
+            power = found[f"spectra_{name}"].sum("spectra_shell")
+            np.testing.assert_allclose(power, variance, rtol=1e-10)
+    assert found.spectra_q.attrs["units"] == "m-1"
+
+
+def test_netcdf_opens_labelled_in_xarray_as_the_dataset_was(study, tmp_path):
+    gfmd("export", study, "-o", tmp_path / "s.nc")
+    with xarray.open_dataset(tmp_path / "s.nc", engine="h5netcdf") as found:
+        made = as_dataset(study)
+        xarray.testing.assert_equal(found.load(), made)
+        assert found.attrs["Conventions"] == made.attrs["Conventions"]
+        assert found.a_r.attrs == made.a_r.attrs
+
+
+def test_netcdf_opens_in_the_netcdf_library(study, tmp_path):
+    netcdf = pytest.importorskip("netCDF4")
+    gfmd("export", study, "-o", tmp_path / "s.nc")
+    with netcdf.Dataset(tmp_path / "s.nc") as found:
+        assert found.data_model == "NETCDF4"
+        assert found["pr_gap"].dimensions == ("task", "gap")
+        assert found["sigma_p"].long_name == "standard deviation of the stress / Delta_sigma"
+        expected = [row["a_r"] for row in read_rows(study)]
+        np.testing.assert_array_equal(found["a_r"][:], expected)
+        assert list(found["status"][:]) == ["converged"] * 4
+
+
+def parsed(path):
+    """Attributes of an image and its arrays, by the format's description."""
+    content = path.read_bytes()
+    head, appended = content.split(b'<AppendedData encoding="raw">\n_', 1)
+    tree = ElementTree.fromstring(head + b"</VTKFile>")
+    image = tree.find("ImageData")
+    arrays = {}
+    for array in image.iter("DataArray"):
+        assert array.get("type") == "Float64"
+        start = int(array.get("offset"))
+        size = int.from_bytes(appended[start : start + 8], "little")
+        arrays[array.get("Name")] = np.frombuffer(appended[start + 8 : start + 8 + size], "<f8")
+    return image.attrib, arrays
+
+
+def test_an_image_holds_the_fields_of_a_task(study, tmp_path):
+    gfmd("export", study, "-o", tmp_path / "s.vti", "--task", 2)
+    image, arrays = parsed(tmp_path / "s.vti")
+    assert image["WholeExtent"] == "0 47 0 47 0 0"
+    assert float(image["Spacing"].split()[0]) == pytest.approx(2 / 48, rel=1e-15)
+    with h5py.File(study) as file:
+        for name, field in ARRAYS.items():
+            stored = file[f"fields/2/{field}"][()]
+            np.testing.assert_array_equal(arrays[name].reshape(stored.shape), stored)
+
+
+def test_an_image_of_a_line_scene_takes_the_only_task(line_study, tmp_path):
+    gfmd("export", line_study, "-o", tmp_path / "s.vti")
+    image, arrays = parsed(tmp_path / "s.vti")
+    assert image["WholeExtent"] == "0 63 0 0 0 0"
+    assert arrays["stress"].size == 64
+
+
+def test_an_image_opens_in_vtk(study, tmp_path):
+    xml = pytest.importorskip("vtkmodules.vtkIOXML")
+    numpy_support = pytest.importorskip("vtkmodules.util.numpy_support")
+    gfmd("export", study, "-o", tmp_path / "s.vti", "--task", 1)
+    reader = xml.vtkXMLImageDataReader()
+    reader.SetFileName(str(tmp_path / "s.vti"))
+    reader.Update()
+    image = reader.GetOutput()
+    assert image.GetDimensions() == (32, 32, 1)
+    with h5py.File(study) as file:
+        for name, field in ARRAYS.items():
+            array = image.GetPointData().GetArray(name)
+            stored = file[f"fields/1/{field}"][()]
+            np.testing.assert_array_equal(numpy_support.vtk_to_numpy(array), stored.ravel())
+            unit = array.GetInformation().Get(array.UNITS_LABEL())
+            assert unit == ("Pa" if name == "stress" else "m")
+            x, y, _ = image.GetPoint(image.ComputePointId((3, 5, 0)))
+            assert (x, y) == pytest.approx((3 * 2 / 32, 5 * 2 / 32))
+            assert array.GetValue(image.ComputePointId((3, 5, 0))) == stored[5, 3]
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("-o", "a.xyz"), r"unknown suffix '\.xyz'; allowed: \.csv, \.nc, \.vti"),
+        (("-o", "a"), "unknown suffix ''"),
+        (("-o", "a.vti"), "4 tasks have fields; choose --task, one of 0, 1, 2, 3"),
+        (("-o", "a.vti", "--task", "9"), "--task: 9 has no fields in .*allowed: 0, 1, 2, 3"),
+        (("-o", "a.nc", "--task", "1"), "--task: chooses fields"),
+    ],
+)
+def test_what_cannot_be_written_is_refused_in_one_message(study, tmp_path, words, message):
+    place = [str(tmp_path / word) if word.startswith("a") else word for word in words]
+    told = gfmd("export", study, *place, status=2)
+    assert re.search(message, told)
+    assert len(told.splitlines()) == 1
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("words", [("a.csv",), ("a.nc",), ("a.vti", "--task", "0")])
+def test_a_place_that_cannot_be_written_is_status_73(study, tmp_path, words):
+    (tmp_path / "file").write_text("")
+    told = gfmd("export", study, "-o", tmp_path / "file" / words[0], *words[1:], status=73)
+    assert "cannot be written" in told
+
+
+def test_a_study_without_fields_makes_no_image(tmp_path):
+    (tmp_path / "spec.toml").write_text(SPEC)
+    gfmd(
+        "run", tmp_path / "spec.toml", "-o", tmp_path / "s.h5", "-q", "--set", "output={}",
+        "--set", "load.p_star=0.5", "--set", "grid.points=32",
+    )  # fmt: skip
+    told = gfmd("export", tmp_path / "s.h5", "-o", tmp_path / "s.vti", status=2)
+    assert "holds no fields" in told
+    assert "spectra_q" not in as_dataset(tmp_path / "s.h5")
+
+
+def test_a_study_that_is_not_finished_is_exported_as_far_as_it_goes(study, tmp_path):
+    spec = study.parent / "spec.toml"
+    gfmd("run", spec, "-o", tmp_path / "s.h5", "-q", "-j", "1", "--shard", "1/4")
+    found = as_dataset(tmp_path / "s.h5")
+    assert list(found.status.values) == ["missing", "converged", "missing", "missing"]
+    assert np.isnan(found.spectra_u[0]).all()
+    assert found.spectra_u[1].notnull().any()
