@@ -10,7 +10,7 @@ from pydantic import model_validator
 
 from gfmd_cli.physics.choice import Choice
 from gfmd_cli.physics.contact import Contact
-from gfmd_cli.physics.fields import Field, Mask
+from gfmd_cli.physics.fields import Field, Mask, row_blocks
 from gfmd_cli.solvers.ccg import ConstrainedCG
 from gfmd_cli.solvers.fire import Fire
 from gfmd_cli.solvers.loop import State, Watch, solve
@@ -28,6 +28,7 @@ METHODS: dict[str, type[Method]] = {
 }
 COARSEST = 64  # points per side; a solve there costs next to nothing
 IN_SINGLE = 0.5  # of the tolerance: what is measured in single precision is a little off
+SAME = 1000  # roundings of 1: how far indenters of two numbers of processes may differ
 COARSE_TOLERANCE = 1e-2  # of the start that a coarse grid gives; measured: tighter does not pay
 
 
@@ -93,6 +94,8 @@ class Resume:
     state: State
     transforms: float
     """Of the coarser grids, in units of the finest."""
+    moved: bool = False
+    """Whether it was saved by another number of processes, whose indenter differs by rounding."""
 
 
 def solve_contact(
@@ -139,6 +142,8 @@ def solve_contact(
         points = fine.grid.points
         if resume is not None and points == resume.points:
             state = resume.state
+            if resume.moved:
+                _touch(fine, state)
         else:
             u = _start(fine, coarse, state) if start is None else start.astype(fine.grid.real)
             coarse = state = None  # their memory is needed now
@@ -188,6 +193,18 @@ def _start(fine: Contact, coarse: Contact | None, state: State | None) -> Field:
         u[...] = fine.grid.most(float(fine.height.max()))
         return u
     return coarse.grid.resample(state.u, fine.grid)
+
+
+def _touch(contact: Contact, state: State) -> None:
+    """Lay points of contact on the indenter again, where its last bits have changed.
+
+    Contact is u = h, to the last bit: a point that is off by rounding would be free, pressed on
+    the indenter, and stop every move.
+    """
+    near = SAME * np.finfo(state.u.dtype).eps
+    for rows in row_blocks(state.u):
+        u, h = state.u[rows], contact.height[rows]
+        np.copyto(u, h, where=np.abs(u - h) < near)
 
 
 def full_contact(contact: Contact, solver: str) -> Solution | None:

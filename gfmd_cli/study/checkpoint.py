@@ -45,7 +45,7 @@ class Checkpoint:
     """The checkpoint of one task, a folder of its own.
 
     Where processes share the task, each writes its rows into a file of its own, and the first
-    writes the pointer to all of them. As many processes can go on from there; others begin anew.
+    writes the pointer to all of them. Any number of processes can go on from there.
     """
 
     def __init__(self, folder: Path, ranks: Ranks | None = None) -> None:
@@ -148,16 +148,15 @@ class Checkpoint:
 
     def load(self, grid: Grid) -> Resume | None:
         """The saved state of a solve on `grid`, or None where there is none for it."""
-        size = 1 if self.ranks is None else self.ranks.size
-        if not self.slots or len(self.slots[0]["parts"]) != size:
+        if not self.slots:
             return None
-        slot = self.slots[0]
+        slot, size = self.slots[0], 1 if self.ranks is None else self.ranks.size
         level = grid if slot["points"] == grid.points else grid.coarser(slot["points"])
         if self.ranks is not None and level.whole:
             return None
         fields = _read_parts(self.folder, slot["parts"], level, slot["fields"])
         state = State(fields.pop("u"), fields.pop("sigma"), fields=fields, **slot["state"])
-        return Resume(slot["points"], state, slot["spent"])
+        return Resume(slot["points"], state, slot["spent"], moved=len(slot["parts"]) != size)
 
     def notes(self) -> Any:
         """The notes of the saved state, None where there are none."""
