@@ -16,7 +16,8 @@ from gfmd_cli.analysis.compare import Curve, compare
 from gfmd_cli.analysis.figures import P_STAR
 from gfmd_cli.analysis.looks import MARKERS, Look, colours
 from gfmd_cli.analysis.sheet import Sheet, styled
-from gfmd_cli.analysis.true_contact import VARIANTS, area
+from gfmd_cli.analysis.true_contact import VARIANTS
+from gfmd_cli.physics.true_contact import contact_area
 
 PERSSON = "whole"
 SHOWN = (0, 0.5, 1, 1.5, 2)
@@ -65,7 +66,7 @@ def print_tables(groups: dict[float, list[Curve]]) -> None:
         means = [over_seeds([f(c) for c in curves])[0] for f in (simulated, needed)]
         widths = [over_seeds([measured(c, name) for c in curves])[0] for name in VARIANTS]
         ratios = [
-            over_seeds([area(measured(c, name), p_star) / simulated(c) for c in curves])
+            over_seeds([contact_area(measured(c, name), p_star) / simulated(c) for c in curves])
             for name in (PERSSON, *VARIANTS)
         ]
         for i in np.flatnonzero(kept):

@@ -22,9 +22,6 @@ from gfmd_cli.study import solve
 from gfmd_cli.study.bench import run_bench
 from gfmd_cli.study.grids import ALGEBRAIC, NOT_REACHED
 from gfmd_cli.study.layout import COLUMNS
-from gfmd_cli.study.parse import read_spec
-from gfmd_cli.study.reading import read_rows
-from gfmd_cli.study.run import run_study
 from gfmd_cli.study.tasks import plan
 
 SPEC = """\
@@ -43,26 +40,6 @@ mean_gap = 0.01
 contact_area = 0.05
 """
 QUANTITIES = ("a_r", "sigma_p", "u_g")
-
-
-@pytest.fixture
-def spec_of(tmp_path):
-    def spec_of(*overrides, text=SPEC):
-        path = tmp_path / "spec.toml"
-        path.write_text(text)
-        return read_spec(path, overrides)[0]
-
-    return spec_of
-
-
-@pytest.fixture
-def rows_of(tmp_path, spec_of):
-    def rows_of(*overrides, text=SPEC, name="study.h5", report=lambda progress: None):
-        path = tmp_path / name
-        run_study(spec_of(*overrides, text=text), text, path, report, jobs=1)
-        return read_rows(path)
-
-    return rows_of
 
 
 # --- grids chosen by accuracy ---------------------------------------------------------------------

@@ -13,7 +13,6 @@ from gfmd_cli.physics.contact import build_scene
 from gfmd_cli.physics.observables import QUANTITIES
 from gfmd_cli.study import bench
 from gfmd_cli.study.bench import GROWTH, REFERENCE, choices, run_bench, solve_reference
-from gfmd_cli.study.parse import read_spec
 from gfmd_cli.study.tasks import plan
 from gfmd_cli.study.traces import Trace, read_bench, write_bench
 
@@ -33,18 +32,6 @@ p_star = 0.1
 [solver]
 kind = ["auto", "ccg", "fire"]
 """
-
-
-@pytest.fixture
-def spec_of(tmp_path):
-    """SPEC with overrides."""
-
-    def spec_of(*overrides):
-        path = tmp_path / "spec.toml"
-        path.write_text(SPEC)
-        return read_spec(path, overrides)[0]
-
-    return spec_of
 
 
 @pytest.fixture

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
 from gfmd_cli.cli import main
 from gfmd_cli.study import resources
@@ -32,14 +31,6 @@ points = 64
 [load]
 p_star = [0.1, 1.0]
 """
-
-
-@pytest.fixture
-def gfmd(tmp_path, monkeypatch):
-    """Calls the command in tmp_path, where spec.toml is SPEC."""
-    monkeypatch.chdir(tmp_path)
-    Path("spec.toml").write_text(SPEC)
-    return lambda *words: CliRunner().invoke(main, [str(word) for word in words])
 
 
 def test_run_then_analyze_then_export(gfmd):

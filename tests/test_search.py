@@ -12,13 +12,10 @@ from gfmd_cli.errors import InputError, Interrupted
 from gfmd_cli.physics import reference
 from gfmd_cli.physics.contact import build_scene
 from gfmd_cli.study import solve
-from gfmd_cli.study.parse import read_spec
-from gfmd_cli.study.reading import read_rows
-from gfmd_cli.study.run import run_study
 from gfmd_cli.study.search import TRIALS, Trial, _Search
 from gfmd_cli.study.tasks import plan
 
-ROUGH = """\
+SPEC = """\
 [surface]
 kind = "self-affine"
 cutoff = 0.05
@@ -30,25 +27,6 @@ points = 128
 [load]
 contact_area = 0.1
 """
-
-
-@pytest.fixture
-def spec_of(tmp_path):
-    def spec_of(*overrides, text=ROUGH):
-        path = tmp_path / "spec.toml"
-        path.write_text(text)
-        return read_spec(path, overrides)[0]
-
-    return spec_of
-
-
-@pytest.fixture
-def rows_of(tmp_path, spec_of):
-    def rows_of(*overrides, text=ROUGH, name="study.h5", report=lambda progress: None):
-        run_study(spec_of(*overrides, text=text), text, tmp_path / name, report, jobs=1)
-        return read_rows(tmp_path / name)
-
-    return rows_of
 
 
 def test_springs_press_as_hard_as_sorting_says(rows_of, spec_of):

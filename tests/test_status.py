@@ -4,9 +4,7 @@ from pathlib import Path
 from threading import Thread
 
 import pytest
-from click.testing import CliRunner
 
-from gfmd_cli.cli import main
 from gfmd_cli.study import solve
 from gfmd_cli.study.files import locked
 from gfmd_cli.study.parse import read_spec
@@ -28,14 +26,6 @@ points = 64
 [load]
 p_star = [0.1, 1.0]
 """
-
-
-@pytest.fixture
-def gfmd(tmp_path, monkeypatch):
-    """Calls the command in tmp_path, where spec.toml is SPEC."""
-    monkeypatch.chdir(tmp_path)
-    Path("spec.toml").write_text(SPEC)
-    return lambda *words: CliRunner().invoke(main, [str(word) for word in words])
 
 
 def told(done):

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from gfmd_cli.analysis.true_contact import area
 from gfmd_cli.cli import main
 from gfmd_cli.physics.bodies import LineParabola, Parabola
 from gfmd_cli.physics.contact import Contact, build_scene
@@ -15,7 +14,7 @@ from gfmd_cli.physics.elastomer import Power
 from gfmd_cli.physics.grid import Grid
 from gfmd_cli.physics.reference import kappa
 from gfmd_cli.physics.surface import SelfAffine
-from gfmd_cli.physics.true_contact import Bearing, bearing, contact_stress
+from gfmd_cli.physics.true_contact import Bearing, bearing, contact_area, contact_stress
 
 POINTS, R = 128, 1.0
 KAPPA = np.sqrt(2 / np.pi)  # a_r Delta_sigma / p of Persson theory at small p
@@ -119,7 +118,7 @@ def test_springs_on_a_paraboloid_carry_what_the_closed_form_says():
 def test_a_deviation_that_is_delta_sigma_gives_back_persson_theory():
     whole = Bearing(np.linspace(0.01, 0.99, 50), np.ones(50))
     p_star = np.geomspace(1e-4, 4.0, 20)
-    assert whole.contact_area(p_star) == pytest.approx(area(1.0, p_star), rel=1e-14)
+    assert whole.contact_area(p_star) == pytest.approx(contact_area(1.0, p_star), rel=1e-14)
 
 
 def test_the_area_obeys_its_own_equation():
@@ -128,7 +127,7 @@ def test_the_area_obeys_its_own_equation():
     for p_star in (0.03, 0.1, 0.5, 1.0):
         a_r = float(found.contact_area(p_star))
         assert a_r == pytest.approx(
-            float(area(np.interp(a_r, found.area, found.deviation), p_star)), rel=1e-3
+            float(contact_area(np.interp(a_r, found.area, found.deviation), p_star)), rel=1e-3
         )
 
 
@@ -173,7 +172,7 @@ def test_analyze_tells_of_it_where_it_was_asked_for(tmp_path):
         (record,) = [r for r in found if r["n"] == n and r["p_star"] == p_star]
         for name in ("deviation_c", "quadrature_c", "deviation_bearing"):
             predicted = record[f"a_r_persson_{name}"]
-            assert predicted == pytest.approx(float(area(record[name], p_star)), rel=1e-12)
+            assert predicted == pytest.approx(float(contact_area(record[name], p_star)), rel=1e-12)
             assert f"{predicted:8.5f}" in text
         if n == 0 and p_star == 1.0:  # springs touch the highest points
             assert record["deviation_bearing"] == pytest.approx(record["deviation_c"], rel=0.1)

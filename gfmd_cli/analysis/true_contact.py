@@ -1,25 +1,16 @@
 """Persson theory with Delta_sigma over the contact in the place of the whole surface."""
 
 import numpy as np
-from scipy.special import erf
 
 from gfmd_cli.analysis.compare import Comparison, Curve
 from gfmd_cli.physics.fields import Field
+from gfmd_cli.physics.true_contact import contact_area
 
 VARIANTS = {
     name: f"a_r_persson_{name}" for name in ("deviation_bearing", "deviation_c", "quadrature_c")
 }
 """Columns of a study with the names that their contact areas have in records."""
 PERSSON = "whole surface"
-
-
-def area(delta_sigma_c: Field | float, p_star: Field | float) -> Field:
-    """Relative contact area erf(p / sqrt(2) Delta_sigma_c).
-
-    Paper Sect. 6 (printed without sqrt(2)); both arguments in units of Delta_sigma.
-    """
-    with np.errstate(divide="ignore"):
-        return np.asarray(erf(np.divide(p_star, np.sqrt(2) * np.asarray(delta_sigma_c))))
 
 
 def true_contact_areas(curve: Curve) -> dict[str, Field]:
@@ -29,7 +20,7 @@ def true_contact_areas(curve: Curve) -> dict[str, Field]:
     if not any(np.any(np.isfinite(value)) for value in values.values()):
         return {}
     p_star = curve.column("p_star")
-    return {VARIANTS[name]: area(value, p_star) for name, value in values.items()}
+    return {VARIANTS[name]: contact_area(value, p_star) for name, value in values.items()}
 
 
 def true_contact_tables(comparison: Comparison) -> list[str]:

@@ -1,6 +1,8 @@
 """What the options of several commands share."""
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -8,6 +10,20 @@ FILE = click.Path(path_type=Path)
 overrides_option = click.option(
     "--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Override a key."
 )
+
+output_option = click.option(
+    "-o", "--output", type=FILE, help="Study file; by default NAME.h5 here."
+)
+
+
+def study_path(spec: Any, output: Path | None) -> Path:
+    """The study file of a spec."""
+    return output or Path(f"{spec.study.name}.h5")
+
+
+def counted(counts: Mapping[str, int]) -> str:
+    """How many of each, for people."""
+    return ", ".join(f"{count} {what}" for what, count in sorted(counts.items()))
 
 
 def repeated(output: Path | None, overrides: tuple[str, ...]) -> list[str]:

@@ -6,14 +6,14 @@ from typing import Any
 
 import click
 
-from gfmd_cli.cli.options import FILE, overrides_option
+from gfmd_cli.cli.options import FILE, counted, output_option, overrides_option, study_path
 from gfmd_cli.cli.progress import Reporter
 from gfmd_cli.errors import InputError
 
 
 @click.command()
 @click.argument("spec", type=FILE)
-@click.option("-o", "--output", type=FILE, help="Study file; by default NAME.h5 here.")
+@output_option
 @overrides_option
 @click.option("--shard", metavar="I/N", help="Only the tasks with index I modulo N.")
 @click.option("-j", "--jobs", type=click.IntRange(1, 1024), help="Worker processes.")
@@ -84,7 +84,7 @@ def _run(
     from gfmd_cli.study.parse import read_spec
 
     resolved, text = read_spec(spec, overrides)
-    path = output or Path(f"{resolved.study.name}.h5")
+    path = study_path(resolved, output)
     ranks = how["ranks"]
     if dry_run:
         _print_tasks(resolved, path, shard, ranks)
@@ -109,7 +109,7 @@ def _print_results(path: Path, shard: tuple[int, int], outcome: Any, failed: Any
     rows = [row for row in rows if row["task"] % shard[1] == shard[0]]
     if table := results(rows):
         click.echo(f"{table}\n")
-    told = ", ".join(f"{count} {status}" for status, count in sorted(outcome.items()))
+    told = counted(outcome)
     click.echo(f"{path}: {told or 'no tasks in this shard'}")
     for line in missed(rows, failed):
         click.echo(f"  {line}")

@@ -10,13 +10,20 @@ from typing import Any
 
 import click
 
-from gfmd_cli.cli.options import FILE, overrides_option, repeated
+from gfmd_cli.cli.options import (
+    FILE,
+    counted,
+    output_option,
+    overrides_option,
+    repeated,
+    study_path,
+)
 from gfmd_cli.errors import InputError
 
 
 @click.command()
 @click.argument("path", metavar="SPEC|STUDY", type=FILE)
-@click.option("-o", "--output", type=FILE, help="Study file; by default NAME.h5 here.")
+@output_option
 @overrides_option
 @click.option("--shards", type=int, metavar="N", help="Say it for each of N shards, too.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
@@ -50,7 +57,7 @@ def status(
 
 @click.command()
 @click.argument("spec", type=FILE)
-@click.option("-o", "--output", type=FILE, help="Study file; by default NAME.h5 here.")
+@output_option
 @overrides_option
 def collect(spec: Path, output: Path | None, overrides: tuple[str, ...]) -> None:
     """Take the records of all shards into the study; solve nothing.
@@ -82,16 +89,12 @@ def _of_spec(spec: Path, output: Path | None, overrides: tuple[str, ...]) -> tup
     from gfmd_cli.study.status import state_of_spec
 
     resolved, text = read_spec(spec, overrides)
-    return state_of_spec(resolved, output or Path(f"{resolved.study.name}.h5")), resolved, text
-
-
-def _told(counts: Any) -> str:
-    return ", ".join(f"{count} {what}" for what, count in sorted(counts.items()))
+    return state_of_spec(resolved, study_path(resolved, output)), resolved, text
 
 
 def _lines(state: Any, shards: int | None) -> list[str]:
     """What a person wants to know."""
-    lines = [f"{state.study}: {len(state.tasks)} tasks: {_told(state.counts)}"]
+    lines = [f"{state.study}: {len(state.tasks)} tasks: {counted(state.counts)}"]
     for task in state.tasks:
         if task.saved is not None:
             name = f"task {task.task} {task.label}".rstrip()
@@ -103,7 +106,7 @@ def _lines(state: Any, shards: int | None) -> list[str]:
         lines.append(f"  {state.records} records are not collected yet")
     lines += [f"  damaged, to be solved again: {name}" for name in state.damaged]
     for index in range(shards or 0):
-        lines.append(f"  shard {index}/{shards}: {_told(state.shard(index, shards or 1))}")
+        lines.append(f"  shard {index}/{shards}: {counted(state.shard(index, shards or 1))}")
     return lines
 
 

@@ -6,13 +6,13 @@ from typing import Any
 
 import click
 
-from gfmd_cli.cli.options import FILE, overrides_option, repeated
+from gfmd_cli.cli.options import FILE, output_option, overrides_option, repeated, study_path
 from gfmd_cli.errors import InputError
 
 
 @click.command()
 @click.argument("spec", type=FILE)
-@click.option("-o", "--output", type=FILE, help="Study file; by default NAME.h5 here.")
+@output_option
 @overrides_option
 @click.option("--shards", type=int, metavar="N", help="Deal the tasks into N shards.")
 @click.option("--missing", is_flag=True, help="Only shards with tasks that are not solved yet.")
@@ -51,7 +51,7 @@ def submit(
     if shards is None and not missing:
         raise InputError("submit: give --shards N, the number of array members, or --missing")
     resolved, _ = read_spec(spec, overrides)
-    study = (output or Path(f"{resolved.study.name}.h5")).resolve()
+    study = study_path(resolved, output).resolve()
     job = batch(
         state_of_spec(resolved, study),
         plan(resolved),

@@ -92,8 +92,17 @@ class Bearing:
         return np.asarray(np.interp(np.log(p_star), np.log(p[rises]), self.deviation[rises]))
 
     def contact_area(self, p_star: Field | float) -> Field:
-        """Relative contact area a_r = erf(p* / sqrt(2) Delta_sigma_c). Paper Sect. 7."""
-        return np.asarray(erf(p_star / (np.sqrt(2) * self.delta_sigma_c(p_star))))
+        """Relative contact area with its own Delta_sigma_c. Paper Sect. 7."""
+        return contact_area(self.delta_sigma_c(p_star), p_star)
+
+
+def contact_area(delta_sigma_c: Field | float, p_star: Field | float) -> Field:
+    """Relative contact area erf(p / sqrt(2) Delta_sigma_c).
+
+    Paper Sect. 6 (printed without sqrt(2)); both arguments in units of Delta_sigma.
+    """
+    with np.errstate(divide="ignore"):
+        return np.asarray(erf(np.divide(p_star, np.sqrt(2) * np.asarray(delta_sigma_c))))
 
 
 def bearing(contact: Contact) -> Bearing:
