@@ -1,14 +1,18 @@
 """What a surface is, for people: size, moments, spectrum, the self-affine surface nearest to it."""
 
+import json
 from math import pi
+from typing import Any
 
 from gfmd_cli.errors import InputError
 from gfmd_cli.physics.contact import build_scene
 from gfmd_cli.physics.elastomer import HalfSpace
+from gfmd_cli.physics.persson import Persson
 from gfmd_cli.physics.spectrum import Moments, SelfAffineFit, fit, moments
-from gfmd_cli.physics.surface import FileSurface, Surface
+from gfmd_cli.physics.surface import FileSurface, SelfAffine, Surface
 from gfmd_cli.study.tasks import describe
 
+PRESSURES = (0.003, 0.03, 0.3)  # p* that theory is told at
 STRANGE = 3.0  # scatter per shell, beyond which the surface is not of this kind
 
 
@@ -26,39 +30,61 @@ def roughness(surface: Surface) -> str:
         f"rms curvature {seen.curvature:.5g} 1/m",
         f"  half-space: p* = 1 is p = {0.5 * seen.gradient:.5g} E_star",
     ]
+    theories = {"its spectrum": Persson(scene.shells)}
     try:
-        return "\n".join([*lines, *_told(fit(scene.shells), seen, length)])
+        found = fit(scene.shells)
     except InputError as error:
-        return "\n".join([*lines, f"  no fit: {error}"])
+        return "\n".join([*lines, f"  no fit: {error}", *_predicted(theories)])
+    table = _table(found, seen, length)
+    like = SelfAffine.model_validate(table)
+    theories["the fit"] = Persson(build_scene(like, HalfSpace(), 2 * like.smallest_grid()).shells)
+    lines += [*_told(found), *_predicted(theories), "  as random roughness:", "", "  [surface]"]
+    return "\n".join([*lines, *(f"  {key} = {json.dumps(value)}" for key, value in table.items())])
 
 
-def _told(found: SelfAffineFit, seen: Moments, length: float) -> list[str]:
-    """The fit, and as a table of a run spec."""
+def _predicted(theories: dict[str, Persson]) -> list[str]:
+    """Persson theory of a half-space, Eqs. (25) and (28), on one spectrum or two."""
+    unit = next(iter(theories.values())).delta_sigma
+    heads = "".join(f"{f'gap [m], {name}':>24}" for name in theories)
+    lines = ["  Persson theory, half-space:", f"    p / E_star       a_r{heads}"]
+    for p_star in PRESSURES:
+        p = p_star * unit
+        gaps = "".join(f"{float(theory.mean_gap(p)):24.4g}" for theory in theories.values())
+        area = float(next(iter(theories.values())).contact_area(p))
+        lines.append(f"    {p:10.3g}  {area:8.4f}{gaps}")
+    return lines
+
+
+def _told(found: SelfAffineFit) -> list[str]:
+    """The fit, and how far it is to be trusted."""
     short = 2 * pi / found.q_s
     lines = [f"  spectrum: H = {found.hurst:.3f} +- {found.hurst_error:.3f}"]
     if found.q_r:
         long = 2 * pi / found.q_r
         error = long * found.q_r_error / found.q_r
         lines[0] += f", lambda_r = {long:.3g} +- {error:.1g} m"
-        keys: dict[str, str | float] = {"rolloff": long / length, "cutoff": short / length}
     else:
         lines[0] += ", no roll-off within the cell"
-        keys = {"spectrum": "cutoff", "rolloff": 1.0, "cutoff": short / length}
     lines[0] += f", lambda_s = {short:.3g} m (scatter {found.scatter:.3g})"
     if found.scatter > STRANGE:
         lines.append(
             "  A scatter far above 1: the spectrum is not that of a self-affine surface; what "
             "follows has the same rms height and gradient only."
         )
-    table = {
-        "kind": "self-affine",
+    return lines
+
+
+def _table(found: SelfAffineFit, seen: Moments, length: float) -> dict[str, Any]:
+    """The fit as a table [surface] of a run spec."""
+    if found.q_r:
+        keys: dict[str, Any] = {"rolloff": 2 * pi / found.q_r / length}
+    else:
+        keys = {"spectrum": "cutoff", "rolloff": 1.0}
+    keys |= {
         "hurst": min(max(found.hurst, 0.01), 1.0),
-        **keys,
+        "cutoff": 2 * pi / found.q_s / length,
         "h_std": seen.height,
         "length": length,
     }
-    lines += ["  as random roughness:", "", "  [surface]"]
-    return lines + [
-        f'  {key} = "{value}"' if isinstance(value, str) else f"  {key} = {value:.4g}"
-        for key, value in table.items()
-    ]
+    rounded = {k: v if isinstance(v, str) else float(f"{v:.4g}") for k, v in keys.items()}
+    return {"kind": "self-affine", **rounded}
