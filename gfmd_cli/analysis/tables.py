@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from gfmd_cli.analysis.compare import Comparison, Curve, einstein_prediction
+from gfmd_cli.analysis.compare import Comparison, Curve, Row, einstein_prediction
 from gfmd_cli.analysis.ensemble import Ensemble, ensembles
 from gfmd_cli.analysis.true_contact import VARIANTS, true_contact_areas, true_contact_tables
 from gfmd_cli.physics.observables import QUANTITIES
@@ -79,13 +79,16 @@ def _continuum(curve: Curve) -> list[str]:
     """Continuum values with their errors, or what keeps them from having one."""
     lines = ["  in the continuum:", "      p*  points" + _centred("a_r", "sigma_p", "u_g")]
     for row in curve.rows:
-        cells = []
-        for name in QUANTITIES:
-            value, error = row[f"{name}_continuum"], row[f"{name}_continuum_error"]
-            known = math.isfinite(value) and math.isfinite(error)
-            cells.append(plus_minus(value, error) if known else row[f"{name}_verdict"])
+        cells = [continuum_cell(row, name) for name in QUANTITIES]
         lines.append(f"{row['p_star']:8.4g} {row['points']:7d}" + _centred(*cells))
     return lines
+
+
+def continuum_cell(row: Row, name: str) -> str:
+    """The continuum value of a quantity with its error, or what keeps it from having one."""
+    value, error = row[f"{name}_continuum"], row[f"{name}_continuum_error"]
+    known = math.isfinite(value) and math.isfinite(error)
+    return plus_minus(value, error) if known else str(row[f"{name}_verdict"])
 
 
 def _spreads(found: list[Ensemble]) -> list[str]:

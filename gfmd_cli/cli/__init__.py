@@ -9,6 +9,7 @@ import click
 
 import gfmd_cli
 from gfmd_cli.cli.bench import bench
+from gfmd_cli.cli.report import report
 from gfmd_cli.cli.results import analyze, export
 from gfmd_cli.cli.run import run
 from gfmd_cli.cli.schema import schema
@@ -43,5 +44,5 @@ def main() -> None:
         os.environ.setdefault(f"{library}_NUM_THREADS", "1")
 
 
-for command in (run, submit, status, collect, analyze, export, bench, schema):
+for command in (run, submit, status, collect, analyze, export, report, bench, schema):
     main.add_command(command)

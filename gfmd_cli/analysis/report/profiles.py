@@ -1,0 +1,70 @@
+"""Cross-sections: heights of the indenter and of the body above it, and the stress."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from gfmd_cli.analysis.compare import Row
+from gfmd_cli.analysis.report.units import scaled
+from gfmd_cli.analysis.sheet import HEIGHT, WIDTH, Page
+from gfmd_cli.physics.fields import Field
+from gfmd_cli.physics.surface import dimension_of
+from gfmd_cli.study.reading import fields_of
+
+LINES = {
+    "height": ("indenter h", {"color": "black", "lw": 1.2}),
+    "u": ("surface of the body u", {"color": "#0077bb", "lw": 0.9}),
+}
+STRESS = "#cc3311"
+
+
+@dataclass(frozen=True)
+class Profile:
+    """Values along a line through the cell."""
+
+    values: dict[str, Field]
+    """Of u and height [m], sigma [Pa]; not all need be there."""
+    position: Field
+    """[m]"""
+    along: str
+
+
+def read_profile(file: Any, row: Row) -> Profile | None:
+    """The cross-section of a contact; a line scene may have stored it as its fields."""
+    line = dimension_of(str(row["surface"]).partition(" ")[0]) == 1
+    values = fields_of(file, f"cross_sections/{row['task']}")
+    if line and not values:
+        values = fields_of(file, f"fields/{row['task']}")
+    if not values:
+        return None
+    size = next(iter(values.values())).size
+    step = float(row["length"]) / size * (1.0 if line else np.sqrt(2))
+    return Profile(values, np.arange(size) * step, "the line" if line else "the diagonal")
+
+
+def profile_sheet(profile: Profile) -> Page:
+    """Heights above, stress below, over one position."""
+    page = Page(WIDTH, 1.5 * HEIGHT)
+    divisor, unit = scaled(float(profile.position[-1]), "m")
+    x = profile.position / divisor
+    upper, lower = page.figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
+    heights = {name: profile.values[name] for name in LINES if name in profile.values}
+    largest = max((float(np.max(np.abs(y))) for y in heights.values()), default=0.0)
+    height_divisor, height_unit = scaled(largest, "m")
+    for name, y in heights.items():
+        label, style = LINES[name]
+        _line(page, upper, label, x, y / height_divisor, **style)
+    upper.set_ylabel(f"height ({height_unit})")
+    if "sigma" in profile.values:
+        sigma = profile.values["sigma"]
+        stress_divisor, stress_unit = scaled(float(np.max(sigma)), "Pa")
+        lower.plot(x, sigma / stress_divisor, color=STRESS, lw=0.9)
+        lower.set_ylabel(rf"$\sigma$ ({stress_unit})")
+    lower.set(xlabel=f"position along {profile.along} ({unit})", xlim=(x[0], x[-1]))
+    return page
+
+
+def _line(page: Page, axes: Any, label: str, x: Field, y: Field, **style: Any) -> None:
+    """Of either sign, in the legend of the page."""
+    page.legend[label] = axes.plot(x, y, **style)[0]

@@ -1,0 +1,59 @@
+"""Symbols as they are set, and values in SI units."""
+
+import math
+from collections.abc import Iterable
+
+from gfmd_cli.analysis.report.markup import Html, number
+from gfmd_cli.analysis.tables import plus_minus
+
+P_STAR = Html("<var>p</var>*")
+PRESSURE = Html("<var>p</var> [Pa]")
+AREA = Html("<var>a</var><sub>r</sub>")
+DELTA_SIGMA = Html("Δ<var>σ</var>")
+DEVIATION = Html("<var>σ</var><sub>p</sub>")
+GAP = Html("<var>u</var><sub>g</sub>")
+H_STD = Html("<var>h</var><sub>std</sub>")
+PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G", 12: "T"}
+
+
+def scaled(largest: float, unit: str) -> tuple[float, str]:
+    """What to divide by so that a largest value reads well, and the unit then."""
+    if not (math.isfinite(largest) and largest > 0):
+        return 1.0, unit
+    power = 3 * math.floor(math.log10(largest) / 3 + 1e-9)
+    power = min(max(power, min(PREFIXES)), max(PREFIXES))
+    return 10.0**power, PREFIXES[power] + unit
+
+
+def quantity(value: float, unit: str) -> str:
+    """A value with its unit."""
+    divisor, prefixed = scaled(abs(value), unit)
+    return f"{number(value / divisor)} {prefixed}"
+
+
+def with_error(value: float, error: float) -> str:
+    """A value with its error, where that is known."""
+    known = math.isfinite(value) and math.isfinite(error)
+    return plus_minus(value, abs(error)).replace("+-", "±") if known else number(value)
+
+
+def span(values: Iterable[float], unit: str = "") -> str:
+    """From the least to the largest of the finite values."""
+    known = [value for value in values if math.isfinite(value)]
+    if not known:
+        return "unknown"
+    low, high = min(known), max(known)
+    tell = (lambda value: quantity(value, unit)) if unit else number
+    return tell(low) if math.isclose(low, high, rel_tol=1e-4) else f"{tell(low)} to {tell(high)}"
+
+
+def count(number_of: int, what: str) -> str:
+    """So many things."""
+    if number_of == 1:
+        return f"1 {what}"
+    return f"{number_of} {what[:-1] + 'ies' if what.endswith('dy') else what + 's'}"
+
+
+def told(words: list[str]) -> str:
+    """Words as a sentence lists them."""
+    return words[0] if len(words) == 1 else ", ".join(words[:-1]) + " and " + words[-1]
