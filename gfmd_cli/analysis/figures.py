@@ -64,13 +64,12 @@ def draw_all(comparison: Comparison, folder: Path) -> list[Path]:
     Raises SpaceError where the folder cannot be written.
     """
     with styled():
-        drawn = sheets(comparison)
+        drawn = sheets(comparison, items_of(comparison))
         return [path for name, sheet in drawn.items() for path in sheet.write(folder / name)]
 
 
-def sheets(comparison: Comparison) -> dict[str, Sheet]:
+def sheets(comparison: Comparison, items: list[Item]) -> dict[str, Sheet]:
     """Every figure that the study has data for, by name; to be called inside `styled`."""
-    items = _items(comparison)
     drawn = {view.name: _over_pressure(view, items) for view in VIEWS}
     drawn["stress_distribution"] = _distribution(items)
     drawn["stress_distribution_pressures"] = _distribution_pressures(items)
@@ -78,7 +77,8 @@ def sheets(comparison: Comparison) -> dict[str, Sheet]:
     return {name: sheet for name, sheet in drawn.items() if sheet is not None}
 
 
-def _items(comparison: Comparison) -> list[Item]:
+def items_of(comparison: Comparison) -> list[Item]:
+    """The curves of a study in the order and look of its figures."""
     curves = sorted(comparison.curves, key=order)
     pressures = np.concatenate([curve.column("p_star") for curve in curves])
     low, high = pressures.min() / 3, pressures.max() * 3
@@ -166,9 +166,8 @@ class Density:
         return np.asarray(unit * self.item.curve.persson.stress_density(sigma * unit, pressure))
 
 
-def densities(comparison: Comparison) -> dict[str, list[Density]]:
+def densities(items: list[Item]) -> dict[str, list[Density]]:
     """What the figures of Pr(sigma) show, by their names."""
-    items = _items(comparison)
     return {
         "stress_distribution": _side_by_side(items),
         "stress_distribution_pressures": _at_pressures(items),

@@ -97,7 +97,9 @@ def write_bench(path: Path, spec: Spec, text: str, traces: list[Trace]) -> None:
 
 
 def read_bench(path: Path) -> list[Trace]:
-    """The traces of a bench file. Raises StudyError where it is none."""
+    """The traces of a bench file. Raises InputError, StudyError where it is none."""
+    if not path.exists():
+        raise InputError(f"{path}: no such bench")
     try:
         with h5py.File(path, "r", locking=False) as file:
             if file.attrs.get(BENCH) != BENCH_LAYOUT:

@@ -8,8 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from gfmd_cli.analysis.compare import Comparison, Curve, Row, compare
-from gfmd_cli.analysis.figures import sheets
-from gfmd_cli.analysis.looks import looks, order
+from gfmd_cli.analysis.figures import Item, items_of, sheets
 from gfmd_cli.analysis.report.markup import Html
 from gfmd_cli.analysis.sheet import Sheet
 from gfmd_cli.study.layout import MISSING
@@ -45,14 +44,17 @@ class Contents:
     @cached_property
     def sheets(self) -> dict[str, Sheet]:
         """The figures of the study by name."""
-        return sheets(self.comparison)
+        return sheets(self.comparison, self.items)
 
     @cached_property
+    def items(self) -> list[Item]:
+        """The curves as figures have them."""
+        return items_of(self.comparison)
+
+    @property
     def curves(self) -> list[tuple[str, Curve]]:
-        """The curves as figures have them, each with its name there and in full."""
-        ordered = sorted(self.comparison.curves, key=order)
-        short = [look.label.replace(r"\$", "$") for look in looks(ordered)]
-        return [(_title(name, c), c) for name, c in zip(short, ordered, strict=True)]
+        """The curves, each with its name in figures and in full."""
+        return [(_title(unmasked(item.look.label), item.curve), item.curve) for item in self.items]
 
     @property
     def solved(self) -> list[Row]:
@@ -84,6 +86,11 @@ def read_contents(study: Path, bench: Path | None) -> Contents:
         attributes = {name: str(value) for name, value in file.attrs.items()}
     traces = [] if bench is None else read_bench(bench)
     return Contents(comparison, read_rows(study), attributes, traces)
+
+
+def unmasked(label: str) -> str:
+    """A label of a figure as plain text."""
+    return label.replace(r"\$", "$")
 
 
 def _title(short: str, curve: Curve) -> str:

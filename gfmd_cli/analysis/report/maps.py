@@ -8,7 +8,7 @@ from gfmd_cli.analysis.compare import Row
 from gfmd_cli.analysis.report.contents import Contents, Section
 from gfmd_cli.analysis.report.figure import figure
 from gfmd_cli.analysis.report.markup import Group, Html, code, details, join, table, tag
-from gfmd_cli.analysis.report.profiles import Profile, profile_sheet, read_profile
+from gfmd_cli.analysis.report.profiles import profile_sheet, read_profile
 from gfmd_cli.analysis.report.units import AREA, P_STAR, PRESSURE, quantity, scaled
 from gfmd_cli.analysis.sheet import WIDTH, Sheet
 from gfmd_cli.physics.fields import Field
@@ -30,13 +30,15 @@ def maps(contents: Contents) -> Section:
     with open_study(contents.comparison.path) as file:
         held = [row for row in contents.rows if row["status"] != MISSING and _holds(file, row)]
         shown = _chosen(held)
-        drawn = [join(*_drawn(file, row)) for row in shown]
+        drawn = [_drawn(file, row) for row in shown]
     title = "Maps and cross-sections"
     if not shown:
         return Section(title, _how())
-    note = tag("p", f"{len(shown)} of {len(held)} contacts with stored fields are shown.", " ")
+    note = (
+        f"{len(shown)} of {len(held)} contacts with stored fields are shown, {SHOWN} at the most."
+    )
     below = details("Table: the contacts shown", _table(shown))
-    return Section(title, join(note, tag("div", *drawn, class_="figures"), below))
+    return Section(title, join(tag("p", note), *drawn, below))
 
 
 def _how() -> Html:
@@ -75,20 +77,19 @@ def _evenly(things: list[Any], most: int) -> list[Any]:
     return [things[place] for place in places]
 
 
-def _drawn(file: Any, row: Row) -> list[Html]:
-    """The figures of one contact."""
-    task, told = row["task"], _told(row)
-    figures = []
-    for name, sheet, what in _map_sheets(file, row):
-        label = f"{what} of task {task}"
-        figures.append(figure(sheet, f"{name}-{task}", label, join(what, ": ", told, _pixels(row))))
-    profile: Profile | None = read_profile(file, row)
+def _drawn(file: Any, row: Row) -> Html:
+    """The figures of one contact under its heading."""
+    task = row["task"]
+    figures = [
+        figure(sheet, f"{name}-{task}", f"{what}, task {task}", f"{what}.")
+        for name, sheet, what in _map_sheets(file, row)
+    ]
+    profile = read_profile(file, row)
     if profile is not None:
-        what = f"Cross-section along {profile.along}: heights above, stress below"
-        label = f"{what}, of task {task}"
-        name = f"cross-section-{task}"
-        figures.append(figure(profile_sheet(profile), name, label, join(what, ": ", told, ".")))
-    return figures
+        what = f"Cross-section along {profile.along} of the cell: heights above, stress below"
+        sheet = profile_sheet(profile)
+        figures.append(figure(sheet, f"section-{task}", f"{what}, task {task}", f"{what}."))
+    return join(tag("h3", _told(row)), tag("div", *figures, class_="figures trio"))
 
 
 def _told(row: Row) -> Html:
@@ -101,11 +102,6 @@ def _told(row: Row) -> Html:
     )
 
 
-def _pixels(row: Row) -> str:
-    step = -(-int(row["points"]) // SIDE)
-    return f"; a pixel is the mean of {step} × {step} points." if step > 1 else "."
-
-
 def _map_sheets(file: Any, row: Row) -> list[tuple[str, Sheet, str]]:
     """Maps of contact and stress, as far as the fields for them are stored."""
     place = f"fields/{row['task']}"
@@ -116,9 +112,9 @@ def _map_sheets(file: Any, row: Row) -> list[tuple[str, Sheet, str]]:
     if "sigma" not in names or take(group, "sigma").ndim != 2:
         return []
     touching, stress = _thumbnails({name: take(group, name) for name in names})
-    told = [("stress", _stress_sheet(stress, row), "Map of the stress")]
+    told = [("stress", _stress_sheet(stress, row), "Stress; black: none")]
     if touching is not None:
-        told.insert(0, ("contact", _contact_sheet(touching, row), "Map of the contact"))
+        told.insert(0, ("contact", _contact_sheet(touching, row), "Contact"))
     return told
 
 
@@ -163,9 +159,13 @@ def _stress_sheet(stress: Field, row: Row) -> Sheet:
     sheet, extent = _square(row)
     top = float(np.max(stress))
     divisor, unit = scaled(top, "Pa")
-    shown = np.ma.masked_less_equal(stress / divisor, top / divisor * 1e-3)
     image = sheet.axes.imshow(
-        shown, origin="lower", extent=extent, interpolation="none", cmap="viridis", vmin=0
+        stress / divisor,
+        origin="lower",
+        extent=extent,
+        interpolation="none",
+        cmap="inferno",
+        vmin=0,
     )
     bar = sheet.figure.colorbar(image, ax=sheet.axes, shrink=0.92, pad=0.02)
     bar.set_label(rf"stress  $\sigma$ ({unit})")

@@ -4,7 +4,7 @@ import math
 
 from gfmd_cli.analysis.compare import Row
 from gfmd_cli.analysis.report.contents import Contents, Section
-from gfmd_cli.analysis.report.markup import Group, Html, code, details, join, number, table, tag
+from gfmd_cli.analysis.report.markup import Group, Html, code, details, join, table, tag
 from gfmd_cli.analysis.report.units import (
     AREA,
     DELTA_SIGMA,
@@ -13,6 +13,7 @@ from gfmd_cli.analysis.report.units import (
     H_STD,
     P_STAR,
     count,
+    pretty,
     quantity,
     span,
     told,
@@ -20,34 +21,35 @@ from gfmd_cli.analysis.report.units import (
 from gfmd_cli.study.layout import MISSING
 
 CONVERGED = "converged"
+SWEPT = ("surface", "elastomer")
 LISTED = 3  # bodies and surfaces that the sentence names
 SHOWN = 100  # contacts that the table of failures lists
 
 
 def sentence(contents: Contents) -> Html:
     """What was run, in one sentence."""
-    rows = contents.solved
+    rows, curves = contents.solved, contents.comparison.curves
     surfaces, bodies = (list(dict.fromkeys(str(r[key]) for r in rows)) for key in SWEPT)
-    pressures = {row["p_star"] for row in rows}
     parts: list[object] = [
-        count(len(contents.rows), "contact"),
-        f": {_some(bodies, 'elastic body')} on {_some(surfaces, 'surface')}, ",
-        f"{count(len(pressures), 'pressure')} " if len(pressures) <= len(rows) // 2 else "",
-        "from ",
+        f"{count(len(contents.rows), 'contact')}: {_some(bodies, 'elastic body')} on "
+        f"{_some(surfaces, 'surface')}, ",
+        count(max(len(curve.rows) for curve in curves), "pressure"),
+        " from ",
         P_STAR,
-        f" = {span(pressures).replace(' to ', ' to ')} ({span(_column(rows, 'pressure'), 'Pa')}), ",
-        f"on grids of {span(row['points'] for row in rows)} points a side.",
+        f" = {span(_column(rows, 'p_star'))} ({span(_column(rows, 'pressure'), 'Pa')}), ",
+        f"{_whole({row['points'] for row in rows})} grid points a side.",
     ]
     return tag("p", *parts, class_="lead")
 
 
-SWEPT = ("surface", "elastomer")
-
-
 def _some(names: list[str], what: str) -> str:
-    if len(names) > LISTED:
-        return count(len(names), what)
-    return f"{count(len(names), what)} ({told(names)})"
+    if len(names) == 1:
+        return f"the {what} {names[0]}"
+    return count(len(names), what) + (f" ({told(names)})" if len(names) <= LISTED else "")
+
+
+def _whole(sizes: set[int]) -> str:
+    return str(*sizes) if len(sizes) == 1 else f"{min(sizes)} to {max(sizes)}"
 
 
 def verdict(contents: Contents) -> Html:
@@ -86,7 +88,7 @@ def key_numbers(contents: Contents) -> Html:
         ("Roughness", span(_column(rows, "h_std"), "m"), _side(rows)),
         ("Area / Persson theory", theory[0], AREA),
         ("Gap / Persson theory", theory[1], GAP),
-        ("Largest residual", number(max(_column(rows, "residual")), 2), _asked(rows)),
+        ("Largest residual", pretty(max(_column(rows, "residual"))), _asked(rows)),
         ("Time", _time(rows), "solving, summed over contacts"),
     ]
     return tag("dl", *(_card(*pair) for pair in pairs), class_="numbers")

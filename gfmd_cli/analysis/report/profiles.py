@@ -28,6 +28,8 @@ class Profile:
     position: Field
     """[m]"""
     along: str
+    pressure: float
+    """Nominal, [Pa]: stresses far below are rounding."""
 
 
 def read_profile(file: Any, row: Row) -> Profile | None:
@@ -40,7 +42,9 @@ def read_profile(file: Any, row: Row) -> Profile | None:
         return None
     size = next(iter(values.values())).size
     step = float(row["length"]) / size * (1.0 if line else np.sqrt(2))
-    return Profile(values, np.arange(size) * step, "the line" if line else "the diagonal")
+    return Profile(
+        values, np.arange(size) * step, "the line" if line else "the diagonal", row["pressure"]
+    )
 
 
 def profile_sheet(profile: Profile) -> Page:
@@ -58,9 +62,11 @@ def profile_sheet(profile: Profile) -> Page:
     upper.set_ylabel(f"height ({height_unit})")
     if "sigma" in profile.values:
         sigma = profile.values["sigma"]
-        stress_divisor, stress_unit = scaled(float(np.max(sigma)), "Pa")
+        top = max(float(np.max(sigma)), profile.pressure)
+        stress_divisor, stress_unit = scaled(top, "Pa")
         lower.plot(x, sigma / stress_divisor, color=STRESS, lw=0.9)
         lower.set_ylabel(rf"$\sigma$ ({stress_unit})")
+        lower.set_ylim(-0.05 * top / stress_divisor, 1.1 * top / stress_divisor)
     lower.set(xlabel=f"position along {profile.along} ({unit})", xlim=(x[0], x[-1]))
     return page
 

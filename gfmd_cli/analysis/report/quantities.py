@@ -22,9 +22,9 @@ from gfmd_cli.analysis.tables import continuum_cell
 from gfmd_cli.analysis.true_contact import VARIANTS, true_contact_areas
 from gfmd_cli.physics.observables import QUANTITIES
 
-DRAWN = Html(
-    " Symbols: simulation, with its estimated distance to the continuum as error bar where an "
-    "accuracy was asked for; crosses: not converged; lines: Persson theory of the same spectrum."
+DRAWN = (
+    " Symbols: simulation (bars: estimated distance to the continuum, where an accuracy was asked "
+    "for; crosses: not converged). Lines: Persson theory of the same spectrum."
 )
 THEORY, RATIO = "Persson", "ratio"
 
@@ -131,7 +131,7 @@ def _drawn(contents: Contents, name: str, what: str) -> Html | None:
     if sheet is None:
         return None
     label = f"{what}: {', '.join(sheet.legend)}"
-    return figure(sheet, name, label, join(what, ".", DRAWN))
+    return figure(sheet, name, label, f"{what}.{DRAWN}")
 
 
 def _section(title: str, drawn: list[Html | None], below: list[Html]) -> Section:

@@ -2,7 +2,7 @@
 
 from gfmd_cli.analysis.distribution_tables import distribution_records
 from gfmd_cli.analysis.figures import Density, densities
-from gfmd_cli.analysis.report.contents import Contents, Section
+from gfmd_cli.analysis.report.contents import Contents, Section, unmasked
 from gfmd_cli.analysis.report.figure import figure
 from gfmd_cli.analysis.report.markup import Group, Html, details, join, table, tag
 from gfmd_cli.analysis.report.units import AREA, DELTA_SIGMA, P_STAR, with_error
@@ -38,7 +38,7 @@ def stress_distribution(contents: Contents) -> Section | None:
         return None
     below = [
         details(summary, _bins(shown))
-        for summary, shown in zip(TABLES, densities(contents.comparison).values(), strict=True)
+        for summary, shown in zip(TABLES, densities(contents.items).values(), strict=True)
         if shown
     ]
     return Section(
@@ -62,7 +62,7 @@ def _bins(shown: list[Density]) -> Html:
     for found in shown:
         unit = float(found.row["delta_sigma"])
         theory = found.theory(found.sigma)
-        title = f"{found.item.look.label}, p* = {found.row['p_star']:.4g}"
+        title = f"{unmasked(found.item.look.label)}, p* = {found.row['p_star']:.4g}"
         columns = zip(found.sigma.tolist(), found.density.tolist(), theory.tolist(), strict=True)
         groups.append(Group(title, [[s, s * unit, d, d / unit, t] for s, d, t in columns]))
     return table(join("Middle of each bin, density and theory."), header, groups)

@@ -51,12 +51,14 @@ def surface_spectrum(contents: Contents) -> Section | None:
     return Section("Surface spectrum", join(tag("div", drawn, class_="figures"), below))
 
 
-CAPTION = Html(
-    "Power spectral density of the surface, <var>C</var>(<var>q</var>) = <var>A</var> ⟨|h̃|²⟩: "
-    "the variance of the heights in a band of wavenumber over the number of its modes, times the "
-    "area of the cell (of a line its length), so that ⟨<var>h</var>²⟩ = ∫ "
-    "<var>C</var> d²<var>q</var> / (2π)². Waves shorter than two grid points along a side are left "
-    "out."
+H = Html("<var>h</var>")
+CAPTION = join(
+    "Power spectral density of the surface, ",
+    *(C_OF_Q, " = ", Html("<var>A</var>"), " ⟨|", H, Html("(<var>q</var>)|²⟩")),
+    ": the variance of the heights in a band of wavenumber over the number of its modes, times the "
+    "area of the cell (of a line its length), so that ⟨",
+    *(H, "²⟩ = ∫ ", Html("<var>C</var> d²<var>q</var>"), " / (2π)²"),
+    ". Waves shorter than two grid points along a side are left out.",
 )
 
 

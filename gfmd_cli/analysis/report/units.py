@@ -14,6 +14,9 @@ DEVIATION = Html("<var>σ</var><sub>p</sub>")
 GAP = Html("<var>u</var><sub>g</sub>")
 H_STD = Html("<var>h</var><sub>std</sub>")
 PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G", 12: "T"}
+SPACE = "\u00a0"
+"""No line breaks here."""
+RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def scaled(largest: float, unit: str) -> tuple[float, str]:
@@ -28,7 +31,15 @@ def scaled(largest: float, unit: str) -> tuple[float, str]:
 def quantity(value: float, unit: str) -> str:
     """A value with its unit."""
     divisor, prefixed = scaled(abs(value), unit)
-    return f"{number(value / divisor)} {prefixed}"
+    return f"{pretty(value / divisor)}{SPACE}{prefixed}"
+
+
+def pretty(value: float) -> str:
+    """Three digits, as they are printed."""
+    mantissa, _, power = number(value, 3).partition("e")
+    if not power:
+        return mantissa
+    return f"{mantissa}{SPACE}×{SPACE}10{str(int(power)).translate(RAISED)}"
 
 
 def with_error(value: float, error: float) -> str:
@@ -42,9 +53,11 @@ def span(values: Iterable[float], unit: str = "") -> str:
     known = [value for value in values if math.isfinite(value)]
     if not known:
         return "unknown"
-    low, high = min(known), max(known)
-    tell = (lambda value: quantity(value, unit)) if unit else number
-    return tell(low) if math.isclose(low, high, rel_tol=1e-4) else f"{tell(low)} to {tell(high)}"
+    low, high = (quantity(end, unit) if unit else pretty(end) for end in (min(known), max(known)))
+    if low == high:
+        return low
+    bare, _, low_unit = low.rpartition(SPACE)
+    return f"{bare if unit and high.endswith(SPACE + low_unit) else low} to {high}"
 
 
 def count(number_of: int, what: str) -> str:
