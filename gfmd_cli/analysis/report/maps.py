@@ -38,7 +38,7 @@ def maps(contents: Contents) -> Section:
         f"{len(shown)} of {len(held)} contacts with stored fields are shown, {SHOWN} at the most."
     )
     below = details("Table: the contacts shown", _table(shown))
-    return Section(title, join(tag("p", note), *drawn, below))
+    return Section(title, join(tag("p", note), tag("div", *drawn, class_="figures trio"), below))
 
 
 def _how() -> Html:
@@ -86,10 +86,12 @@ def _drawn(file: Any, row: Row) -> Html:
     ]
     profile = read_profile(file, row)
     if profile is not None:
-        what = f"Cross-section along {profile.along} of the cell: heights above, stress below"
+        what = f"Cross-section along {profile.along}: heights above, stress below"
         sheet = profile_sheet(profile)
         figures.append(figure(sheet, f"section-{task}", f"{what}, task {task}", f"{what}."))
-    return join(tag("h3", _told(row)), tag("div", *figures, class_="figures trio"))
+    return tag(
+        "div", tag("h3", _told(row)), tag("div", *figures, class_="figures trio"), class_="contact"
+    )
 
 
 def _told(row: Row) -> Html:

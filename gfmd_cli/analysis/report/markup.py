@@ -8,6 +8,7 @@ from html import escape
 
 CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\ufffe\uffff]")
 """What neither HTML nor XML may hold, and carriage returns."""
+NUMERIC = re.compile(r"[-–]?(\d|$)")
 NONE = "–"
 
 
@@ -60,27 +61,30 @@ class Group:
     rows: Sequence[Sequence[object]]
 
 
-def table(caption: object, header: Sequence[object], groups: list[Group]) -> Html:
+def table(caption: object, header: Sequence[object], groups: Sequence[Group]) -> Html:
     """A table that scrolls in its own box; the first cell of a row is its head."""
-    head = tag("tr", *(tag("th", title, scope="col") for title in header))
+    first = next((row for group in groups for row in group.rows), [])
+    told = zip(header, map(_side, first), strict=True) if first else ((h, {}) for h in header)
+    head = tag("tr", *(tag("th", title, scope="col", **side) for title, side in told))
     bodies = []
     for group in groups:
-        title = tag("th", group.title, scope="rowgroup", colspan=len(header))
+        title = tag("th", tag("span", group.title), scope="rowgroup", colspan=len(header))
         above = tag("tr", title, class_="group") if group.title else None
         bodies.append(tag("tbody", above, *(_row(row) for row in group.rows)))
-    whole = tag("table", tag("caption", caption), tag("thead", head), *bodies)
+    above = tag("caption", tag("span", caption))
+    whole = tag("table", above, tag("thead", head), *bodies)
     return tag("div", whole, class_="scroll", tabindex=0, role="group", aria_label="Table")
 
 
 def _row(cells: Sequence[object]) -> Html:
     first, *others = cells
-    return tag("tr", tag("th", _cell(first), scope="row"), *(_data(cell) for cell in others))
+    head = tag("th", _cell(first), scope="row", **_side(first))
+    return tag("tr", head, *(tag("td", _cell(cell), **_side(cell)) for cell in others))
 
 
-def _data(cell: object) -> Html:
-    """Numbers and values with errors stand to the right, words to the left."""
-    words = isinstance(cell, str) and cell != NONE and "±" not in cell
-    return tag("td", _cell(cell), **({"class_": "t"} if words else {}))
+def _side(cell: object) -> dict[str, str]:
+    """Numbers stand to the right, words to the left."""
+    return {"class_": "t"} if isinstance(cell, str) and not NUMERIC.match(cell) else {}
 
 
 def _cell(cell: object) -> object:

@@ -3,6 +3,7 @@
 import math
 
 from gfmd_cli.analysis.compare import Row
+from gfmd_cli.analysis.ensemble import without_seed
 from gfmd_cli.analysis.report.contents import Contents, Section
 from gfmd_cli.analysis.report.markup import Group, Html, code, details, join, table, tag
 from gfmd_cli.analysis.report.units import (
@@ -21,7 +22,7 @@ from gfmd_cli.analysis.report.units import (
 from gfmd_cli.study.layout import MISSING
 
 CONVERGED = "converged"
-SWEPT = ("surface", "elastomer")
+NEARLY_FULL = 0.5  # p*; above, the gap falls by decades, and a ratio of gaps tells little
 LISTED = 3  # bodies and surfaces that the sentence names
 SHOWN = 100  # contacts that the table of failures lists
 
@@ -29,10 +30,12 @@ SHOWN = 100  # contacts that the table of failures lists
 def sentence(contents: Contents) -> Html:
     """What was run, in one sentence."""
     rows, curves = contents.solved, contents.comparison.curves
-    surfaces, bodies = (list(dict.fromkeys(str(r[key]) for r in rows)) for key in SWEPT)
+    surfaces = list(dict.fromkeys(without_seed(row) for row in rows))
+    bodies = list(dict.fromkeys(str(row["elastomer"]) for row in rows))
+    seeds = len({row["seed"] for row in rows})
     parts: list[object] = [
         f"{count(len(contents.rows), 'contact')}: {_some(bodies, 'elastic body')} on "
-        f"{_some(surfaces, 'surface')}, ",
+        f"{_some(surfaces, 'surface')}, {count(seeds, 'seed') + ', ' if seeds > 1 else ''}",
         count(max(len(curve.rows) for curve in curves), "pressure"),
         " from ",
         P_STAR,
@@ -74,7 +77,6 @@ def _told(kind: str, text: str) -> Html:
 def key_numbers(contents: Contents) -> Html:
     """The numbers to take home, reduced and in SI units."""
     rows = contents.solved
-    theory = [_ratios(contents, name) for name in ("a_r", "u_g")]
     pairs: list[tuple[object, object, object]] = [
         ("Pressure", span(_column(rows, "pressure"), "Pa"), _reduced(P_STAR, rows, "p_star")),
         ("Contact area", span(_column(rows, "a_r")), join(AREA, ", share of the nominal area")),
@@ -86,8 +88,12 @@ def key_numbers(contents: Contents) -> Html:
             join("rms ", DELTA_SIGMA),
         ),
         ("Roughness", span(_column(rows, "h_std"), "m"), _side(rows)),
-        ("Area / Persson theory", theory[0], AREA),
-        ("Gap / Persson theory", theory[1], GAP),
+        ("Area / Persson theory", _ratios(contents, "a_r", math.inf), AREA),
+        (
+            "Gap / Persson theory",
+            _ratios(contents, "u_g", NEARLY_FULL),
+            join(GAP, " up to ", P_STAR, f" = {NEARLY_FULL}"),
+        ),
         ("Largest residual", pretty(max(_column(rows, "residual"))), _asked(rows)),
         ("Time", _time(rows), "solving, summed over contacts"),
     ]
@@ -124,15 +130,18 @@ def _time(rows: list[Row]) -> str:
     return f"{seconds / 60:.0f} min" if seconds < 7200 else f"{seconds / 3600:.1f} h"
 
 
-def _ratios(contents: Contents, name: str) -> str:
-    """Simulation over theory, where theory is not yet beyond what doubles hold."""
+def _ratios(contents: Contents, name: str, most: float) -> str:
+    """Simulation over theory at reduced pressures up to `most`."""
     return span(
-        number_of / reference
-        for _, curve in contents.curves
-        for number_of, reference in zip(
-            curve.column(name), getattr(curve.prediction, name), strict=True
+        simulated / theory
+        for curve in contents.comparison.curves
+        for p_star, simulated, theory in zip(
+            curve.column("p_star"),
+            curve.column(name),
+            getattr(curve.prediction, name),
+            strict=True,
         )
-        if number_of > 0 and reference > 1e-12
+        if theory > 0 and p_star <= most
     )
 
 

@@ -34,7 +34,7 @@ class Profile:
 
 def read_profile(file: Any, row: Row) -> Profile | None:
     """The cross-section of a contact; a line scene may have stored it as its fields."""
-    line = dimension_of(str(row["surface"]).partition(" ")[0]) == 1
+    line = not plane(row)
     values = fields_of(file, f"cross_sections/{row['task']}")
     if line and not values:
         values = fields_of(file, f"fields/{row['task']}")
@@ -43,8 +43,13 @@ def read_profile(file: Any, row: Row) -> Profile | None:
     size = next(iter(values.values())).size
     step = float(row["length"]) / size * (1.0 if line else np.sqrt(2))
     return Profile(
-        values, np.arange(size) * step, "the line" if line else "the diagonal", row["pressure"]
+        values, np.arange(size) * step, "the cell" if line else "the diagonal", row["pressure"]
     )
+
+
+def plane(row: Row) -> bool:
+    """Whether a contact has maps, or is a line scene."""
+    return dimension_of(str(row["surface"]).partition(" ")[0]) == 2
 
 
 def profile_sheet(profile: Profile) -> Page:

@@ -7,7 +7,7 @@ from gfmd_cli.analysis.compare import Curve, Row
 from gfmd_cli.analysis.ensemble import ensembles
 from gfmd_cli.analysis.report.contents import Contents, Section
 from gfmd_cli.analysis.report.figure import figure
-from gfmd_cli.analysis.report.markup import Group, Html, details, join, table, tag
+from gfmd_cli.analysis.report.markup import NONE, Group, Html, details, join, table, tag
 from gfmd_cli.analysis.report.units import (
     AREA,
     DELTA_SIGMA,
@@ -160,8 +160,9 @@ def _reduced_and_not(curve: Curve, name: str, unit: float) -> list[list[object]]
     ]
 
 
-def _ratio(value: float, reference: float) -> float:
-    return float(value / reference) if reference else math.nan
+def _ratio(value: float, reference: float) -> str:
+    ratio = value / reference if reference else math.nan
+    return f"{ratio:.3f}" if math.isfinite(ratio) else NONE
 
 
 def _true(contents: Contents) -> list[Html]:

@@ -25,14 +25,15 @@ def speed(contents: Contents) -> Section | None:
         figure(page, f"speed-{place}", label, caption)
         for place, page in enumerate(list(drawn.values())[:SHOWN])
     ]
-    note = f"{SHOWN} of {len(drawn)} scenes are shown." if len(drawn) > SHOWN else ""
+    many = len(drawn) > SHOWN
+    note = tag("p", f"{SHOWN} of {len(drawn)} scenes are shown.") if many else None
     header, rows = bench_cells(traces)
     told = table(
         join(*(f"{line} " for line in footnotes(traces))),
         [*header[:4], *_titles(), *header[4 + len(_titles()) :]],
         [Group("", [list(row) for row in rows])],
     )
-    body = join(tag("p", note), *figures, details("Table behind the figures", told))
+    body = join(note, *figures, details("Table behind the figures", told))
     return Section("Speed against error", tag("div", body, class_="wide"))
 
 

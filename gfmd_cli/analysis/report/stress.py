@@ -4,7 +4,7 @@ from gfmd_cli.analysis.distribution_tables import distribution_records
 from gfmd_cli.analysis.figures import Density, densities
 from gfmd_cli.analysis.report.contents import Contents, Section, unmasked
 from gfmd_cli.analysis.report.figure import figure
-from gfmd_cli.analysis.report.markup import Group, Html, details, join, table, tag
+from gfmd_cli.analysis.report.markup import NONE, Group, Html, details, join, table, tag
 from gfmd_cli.analysis.report.units import AREA, DELTA_SIGMA, P_STAR, with_error
 
 PR = Html("Pr(<var>σ</var>)")
@@ -85,7 +85,7 @@ def _power_laws(contents: Contents) -> Html | None:
         rows = groups.setdefault(f"{record['elastomer']} on {record['surface']}", [])
         for name, law in record["fits"].items():
             limit, theory = law["edge_exponent"], law["edge_exponent_theory"]
-            edge = "–" if limit is None else with_error(limit, law["edge_exponent_error"])
+            edge = NONE if limit is None else with_error(limit, law["edge_exponent_error"])
             rows.append(
                 [
                     record["p_star"],
@@ -95,7 +95,7 @@ def _power_laws(contents: Contents) -> Html | None:
                     law["sigma_to"],
                     with_error(law["exponent"], law["exponent_error"]),
                     edge,
-                    "–" if theory is None else theory,
+                    NONE if theory is None else theory,
                 ]
             )
     told = [Group(title, rows) for title, rows in groups.items() if rows]

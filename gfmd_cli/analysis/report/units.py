@@ -23,7 +23,7 @@ def scaled(largest: float, unit: str) -> tuple[float, str]:
     """What to divide by so that a largest value reads well, and the unit then."""
     if not (math.isfinite(largest) and largest > 0):
         return 1.0, unit
-    power = 3 * math.floor(math.log10(largest) / 3 + 1e-9)
+    power = 3 * math.floor(math.log10(1.1 * largest) / 3)
     power = min(max(power, min(PREFIXES)), max(PREFIXES))
     return 10.0**power, PREFIXES[power] + unit
 
@@ -42,10 +42,10 @@ def pretty(value: float) -> str:
     return f"{mantissa}{SPACE}×{SPACE}10{str(int(power)).translate(RAISED)}"
 
 
-def with_error(value: float, error: float) -> str:
+def with_error(value: float, error: float) -> object:
     """A value with its error, where that is known."""
     known = math.isfinite(value) and math.isfinite(error)
-    return plus_minus(value, abs(error)).replace("+-", "±") if known else number(value)
+    return plus_minus(value, abs(error)).replace("+-", "±") if known else float(value)
 
 
 def span(values: Iterable[float], unit: str = "") -> str:
