@@ -20,11 +20,12 @@ def report(study: Path, output: Path | None, bench: Path | None) -> None:
         gfmd report demo.h5
     """
     from gfmd_cli.analysis.report.page import report as page
-    from gfmd_cli.study.files import write_whole
+    from gfmd_cli.study.files import check_place, write_whole
 
     path = output or study.with_suffix(".html")
     for source in (study, bench):
         if source is not None and path.resolve() == source.resolve():
             raise InputError(f"{path}: the report would replace what it is made from; use -o")
+    check_place(path)
     write_whole(path, page(study, bench).encode())
     click.echo(str(path))

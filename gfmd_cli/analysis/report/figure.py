@@ -14,13 +14,18 @@ DROPPED = ("metadata", "style")  # of an SVG; what the style says stands in that
 PLACES = {"points", "x", "y", "d"}  # attributes in points, of which a hundredth is enough
 
 
-def figure(sheet: Page, name: str, label: str, caption: object) -> Html:
-    """A figure; `name` sets its parts apart in the page, `label` says it to who cannot see."""
-    return tag(
-        "figure",
-        tag("div", inline(sheet.svg(), name, label), class_="drawing"),
-        tag("figcaption", caption),
-    )
+def figure(sheet: Page, name: str, label: str, caption: object, *, scrolls: bool = False) -> Html:
+    """A figure.
+
+    Parameters
+    ----------
+    name : sets its parts apart in the page
+    label : says it to who cannot see
+    scrolls : whether it is wider than a phone, and then moved by fingers and keys
+    """
+    box = {"tabindex": 0, "role": "group", "aria_label": "Figure"} if scrolls else {}
+    drawing = tag("div", inline(sheet.svg(), name, label), class_="drawing", **box)
+    return tag("figure", drawing, tag("figcaption", caption))
 
 
 def inline(svg: str, name: str, label: str) -> Html:

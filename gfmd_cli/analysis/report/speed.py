@@ -22,7 +22,7 @@ def speed(contents: Contents) -> Section | None:
         "Thick: what is reached for good; thin: the error itself; crosses: not converged."
     )
     figures = [
-        figure(page, f"speed-{place}", label, caption)
+        figure(page, f"speed-{place}", label, caption, scrolls=True)
         for place, page in enumerate(list(drawn.values())[:SHOWN])
     ]
     many = len(drawn) > SHOWN

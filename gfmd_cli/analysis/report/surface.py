@@ -92,10 +92,13 @@ def _edges(radius: Field, nyquist: float) -> Field:
     """Edges of bands half-way between shells, about PER_DECADE in a decade [2 pi / L]."""
     between = np.sqrt(radius[1:] * radius[:-1])
     ends = np.concatenate([[0.5 * radius[0]], between, [radius[-1] * (1 + 1e-6)]])
+    within = ends[ends <= nyquist * (1 + 1e-6)]
     chosen = [ends[0]]
-    for edge in ends[1:]:
-        if edge >= chosen[-1] * 10 ** (1 / PER_DECADE) and edge <= nyquist * (1 + 1e-6):
+    for edge in within[1:]:
+        if edge >= chosen[-1] * 10 ** (1 / PER_DECADE):
             chosen.append(edge)
+    if len(chosen) > 1:
+        chosen[-1] = within[-1]  # the last band is wider rather than that a shell is lost
     return np.array(chosen)
 
 
