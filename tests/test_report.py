@@ -340,3 +340,11 @@ def test_values_are_told_with_units():
 def test_the_style_sheet_is_installed_with_the_package():
     folder = Path(importlib.util.find_spec("gfmd_cli.analysis.report").origin).parent
     assert (folder / "style.css").is_file()
+
+
+@pytest.mark.parametrize("value", [0.0, np.nan])
+def test_fields_without_a_finite_stress_are_drawn(copied, value):
+    with h5py.File(copied, "r+") as file:
+        for place in ("fields/0", "cross_sections/0"):
+            file[place]["sigma"][...] = value
+    assert "Stress; black: none" in report(copied)

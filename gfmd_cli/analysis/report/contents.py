@@ -70,7 +70,7 @@ class Contents:
         """An attribute that holds JSON; empty where it holds none."""
         try:
             told = json.loads(self.attributes.get(attribute, ""))
-        except ValueError:
+        except (ValueError, RecursionError):
             return {}
         return told if isinstance(told, dict) else {}
 

@@ -9,7 +9,7 @@ from gfmd_cli.analysis.report.contents import Contents, Section
 from gfmd_cli.analysis.report.figure import figure
 from gfmd_cli.analysis.report.markup import Group, Html, code, details, join, table, tag
 from gfmd_cli.analysis.report.profiles import profile_sheet, read_profile
-from gfmd_cli.analysis.report.units import AREA, P_STAR, PRESSURE, quantity, scaled
+from gfmd_cli.analysis.report.units import AREA, P_STAR, PRESSURE, largest, quantity, scaled
 from gfmd_cli.analysis.sheet import WIDTH, Sheet
 from gfmd_cli.physics.fields import Field
 from gfmd_cli.physics.hdf5 import has, take
@@ -159,8 +159,7 @@ def _contact_sheet(touching: Field, row: Row) -> Sheet:
 
 def _stress_sheet(stress: Field, row: Row) -> Sheet:
     sheet, extent = _square(row)
-    top = float(np.max(stress))
-    divisor, unit = scaled(top, "Pa")
+    divisor, unit = scaled(largest(stress), "Pa")
     image = sheet.axes.imshow(
         stress / divisor,
         origin="lower",

@@ -43,11 +43,6 @@ def tag(name: str, *children: object, **attributes: object) -> Html:
     return Html(f"<{name}{told}>{join(*children)}</{name}>")
 
 
-def items(*texts: object) -> Html:
-    """A list."""
-    return tag("ul", *(tag("li", text) for text in texts))
-
-
 def number(value: float, digits: int = 4) -> str:
     """A number of so many digits, for people."""
     return f"{value:.{digits}g}" if math.isfinite(value) else NONE

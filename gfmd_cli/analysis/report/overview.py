@@ -160,16 +160,15 @@ def failures(contents: Contents) -> Section | None:
         parts += [_failed(failed[:SHOWN]), _left_out(len(failed))]
     if missing:
         listed = ", ".join(map(str, missing[:SHOWN])) + (" ..." if len(missing) > SHOWN else "")
-        parts.append(
+        parts += [
             tag(
                 "p",
-                f"{count(len(missing), 'contact')} not solved yet, neither failed nor tried to "
-                "the end: ",
+                f"Not solved yet: {count(len(missing), 'contact')}; ",
                 code("gfmd run"),
-                " with the same spec goes on. ",
-            )
-        )
-        parts.append(details("Indices of these contacts", tag("p", listed)))
+                " with the same spec goes on.",
+            ),
+            details("Tasks not solved yet", tag("p", listed)),
+        ]
     return Section("What failed or is missing", join(*parts))
 
 

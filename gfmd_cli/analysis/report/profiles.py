@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from gfmd_cli.analysis.compare import Row
-from gfmd_cli.analysis.report.units import scaled
+from gfmd_cli.analysis.report.units import largest, scaled
 from gfmd_cli.analysis.sheet import HEIGHT, WIDTH, Page
 from gfmd_cli.physics.fields import Field
 from gfmd_cli.physics.surface import dimension_of
@@ -59,15 +59,15 @@ def profile_sheet(profile: Profile) -> Page:
     x = profile.position / divisor
     upper, lower = page.figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
     heights = {name: profile.values[name] for name in LINES if name in profile.values}
-    largest = max((float(np.max(np.abs(y))) for y in heights.values()), default=0.0)
-    height_divisor, height_unit = scaled(largest, "m")
+    most = max((largest(np.abs(y)) for y in heights.values()), default=0.0)
+    height_divisor, height_unit = scaled(most, "m")
     for name, y in heights.items():
         label, style = LINES[name]
         _line(page, upper, label, x, y / height_divisor, **style)
     upper.set_ylabel(f"height ({height_unit})")
     if "sigma" in profile.values:
         sigma = profile.values["sigma"]
-        top = max(float(np.max(sigma)), profile.pressure)
+        top = max(largest(sigma), profile.pressure)
         stress_divisor, stress_unit = scaled(top, "Pa")
         lower.plot(x, sigma / stress_divisor, color=STRESS, lw=0.9)
         lower.set_ylabel(rf"$\sigma$ ({stress_unit})")

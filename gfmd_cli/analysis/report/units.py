@@ -3,8 +3,11 @@
 import math
 from collections.abc import Iterable
 
+import numpy as np
+
 from gfmd_cli.analysis.report.markup import Html, number
 from gfmd_cli.analysis.tables import plus_minus
+from gfmd_cli.physics.fields import Field
 
 P_STAR = Html("<var>p</var>*")
 PRESSURE = Html("<var>p</var> [Pa]")
@@ -19,11 +22,16 @@ SPACE = "\u00a0"
 RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
-def scaled(largest: float, unit: str) -> tuple[float, str]:
+def largest(values: Field) -> float:
+    """The largest finite value, at least zero."""
+    return float(np.max(values, initial=0.0, where=np.isfinite(values)))
+
+
+def scaled(most: float, unit: str) -> tuple[float, str]:
     """What to divide by so that a largest value reads well, and the unit then."""
-    if not (math.isfinite(largest) and largest > 0):
+    if not (math.isfinite(most) and most > 0):
         return 1.0, unit
-    power = 3 * math.floor(math.log10(1.1 * largest) / 3)
+    power = 3 * math.floor(math.log10(1.1 * most) / 3)
     power = min(max(power, min(PREFIXES)), max(PREFIXES))
     return 10.0**power, PREFIXES[power] + unit
 
