@@ -168,7 +168,7 @@ def test_every_figure_and_table_is_there(whole):
         "maps-and-cross-sections", "surface-spectrum", "speed-against-error", "origin",
     ]  # fmt: skip
     assert len(page.all("figure")) == 5 + 2 + 3 * 6 + 1 + 1  # 6: three curves, two pressures
-    assert len(page.all("details")) == 3 + 2 + 1 + 1 + 1 + 1 + 1
+    assert len(page.all("details")) == 3 + 2 + 1 + 1 + 1 + 1
     text = " ".join(page.words)
     assert "All 8 contacts converged." in text
     assert "8 contacts: 2 elastic bodies (power n=0 and power n=1) on the surface" in text

@@ -8,7 +8,7 @@ from gfmd_cli.analysis.compare import Row
 from gfmd_cli.analysis.report.contents import Contents, Section
 from gfmd_cli.analysis.report.figure import figure
 from gfmd_cli.analysis.report.markup import Group, Html, code, details, join, table, tag
-from gfmd_cli.analysis.report.profiles import profile_sheet, read_profile
+from gfmd_cli.analysis.report.profiles import plane, profile_sheet, read_profile
 from gfmd_cli.analysis.report.units import AREA, P_STAR, PRESSURE, largest, quantity, scaled
 from gfmd_cli.analysis.sheet import WIDTH, Sheet
 from gfmd_cli.physics.fields import Field
@@ -34,11 +34,13 @@ def maps(contents: Contents) -> Section:
     title = "Maps and cross-sections"
     if not shown:
         return Section(title, _how())
-    note = (
-        f"{len(shown)} of {len(held)} contacts with stored fields are shown, {SHOWN} at the most."
-    )
+    note = [f"{len(shown)} of {len(held)} contacts with stored fields are shown, {SHOWN} at most."]
+    if any(plane(row) and row["points"] > SIDE for row in shown):
+        note.append(f"Maps have up to {SIDE} pixels a side, each the mean of some grid points.")
     below = details("Table: the contacts shown", _table(shown))
-    return Section(title, join(tag("p", note), tag("div", *drawn, class_="figures trio"), below))
+    return Section(
+        title, join(tag("p", " ".join(note)), tag("div", *drawn, class_="figures trio"), below)
+    )
 
 
 def _how() -> Html:
@@ -183,17 +185,7 @@ def _square(row: Row) -> tuple[Sheet, tuple[float, float, float, float]]:
 
 
 def _table(rows: list[Row]) -> Html:
-    header = ["Task", "Body", P_STAR, PRESSURE, AREA, "points", "In the study file"]
-    cells = [
-        [
-            row["task"],
-            row["elastomer"],
-            row["p_star"],
-            row["pressure"],
-            row["a_r"],
-            row["points"],
-            f"/fields/{row['task']}, /cross_sections/{row['task']}",
-        ]
-        for row in rows
-    ]
-    return table("The fields themselves are kept in the study file.", header, [Group("", cells)])
+    header = ["Task", "Body", P_STAR, PRESSURE, AREA, "points"]
+    names = ("task", "elastomer", "p_star", "pressure", "a_r", "points")
+    caption = "The values lie in /fields/TASK and /cross_sections/TASK of the study file."
+    return table(caption, header, [Group("", [[row[name] for name in names] for row in rows])])

@@ -174,21 +174,13 @@ def failures(contents: Contents) -> Section | None:
 
 def _failed(rows: list[Row]) -> Html:
     header = ["Task", "Body", "Surface", P_STAR, "Status", "Residual", "Asked", "Steps"]
-    cells = [
-        [
-            row["task"],
-            row["elastomer"],
-            row["surface"],
-            row["p_star"],
-            row["status"],
-            row["residual"],
-            row["tolerance"],
-            row["steps"],
-        ]
-        for row in rows
-    ]
-    caption = "Contacts that ended above the tolerance asked for. Their values are kept; figures "
-    return table(caption + "show them as crosses.", header, [Group("", cells)])
+    names = ("task", "elastomer", "surface", "p_star", "status", "residual", "tolerance", "steps")
+    cells = [[row[name] for name in names] for row in rows]
+    caption = (
+        "Contacts that ended above the tolerance asked for. Their values are kept; figures show "
+        "them as crosses."
+    )
+    return table(caption, header, [Group("", cells)])
 
 
 def _left_out(total: int) -> Html | None:

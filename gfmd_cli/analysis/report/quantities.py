@@ -90,32 +90,33 @@ def mean_gap(contents: Contents) -> Section | None:
 
 def continuum(contents: Contents) -> Section | None:
     """Continuum values with error bars, and means over seeds."""
-    parts = []
-    header = [P_STAR, "points", AREA, join(DEVIATION, " / ", DELTA_SIGMA), join(GAP, " / ", H_STD)]
-    known = [(title, curve) for title, curve in contents.curves if _has_continuum(curve)]
-    if known:
-        groups = [
-            Group(
-                title,
-                [[row["p_star"], row["points"], *_continuum(row)] for row in curve.rows],
-            )
-            for title, curve in known
-        ]
-        caption = "Continuum values with their estimated errors, or why there is none."
-        parts.append(details("Table: continuum values", table(caption, header, groups)))
+    told = [part for part in (_values(contents), _seeds(contents)) if part is not None]
+    return Section("Error bars", join(*told)) if told else None
+
+
+SCALARS = (AREA, join(DEVIATION, " / ", DELTA_SIGMA), join(GAP, " / ", H_STD))
+
+
+def _values(contents: Contents) -> Html | None:
+    groups = [
+        Group(title, [[row["p_star"], row["points"], *_continuum(row)] for row in curve.rows])
+        for title, curve in contents.curves
+        if _has_continuum(curve)
+    ]
+    caption = "Continuum values with their estimated errors, or why there is none."
+    return table(caption, [P_STAR, "points", *SCALARS], groups) if groups else None
+
+
+def _seeds(contents: Contents) -> Html | None:
     spreads: dict[str, list[list[object]]] = {}
     for found in ensembles(contents.comparison):
         told = [found.spread(name) for name in QUANTITIES]
         cells = [with_error(spread.mean, spread.half_width) for spread in told]
         title = f"{found.label}: {len(found.rows)} seeds"
         spreads.setdefault(title, []).append([found.rows[0]["p_star"], *cells])
-    if spreads:
-        groups = [Group(title, rows) for title, rows in spreads.items()]
-        caption = "Means over seeds, ± half the width of the 95 % confidence interval (Student)."
-        parts.append(
-            details("Table: means over seeds", table(caption, [header[0], *header[2:]], groups))
-        )
-    return Section("Error bars", join(*parts)) if parts else None
+    groups = [Group(title, rows) for title, rows in spreads.items()]
+    caption = "Means over seeds, ± half the width of the 95 % confidence interval (Student)."
+    return table(caption, [P_STAR, *SCALARS], groups) if groups else None
 
 
 def _continuum(row: Row) -> list[str]:

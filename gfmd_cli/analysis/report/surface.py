@@ -40,7 +40,8 @@ def surface_spectrum(contents: Contents) -> Section | None:
     scenes: dict[str, tuple[Row, Shells]] = {}
     for _, curve in contents.curves:
         scenes.setdefault(curve.surface, (curve.rows[0], curve.persson.shells))
-    known = [spectrum(row, shells) for row, shells in scenes.values() if shells.q.size]
+    found = [spectrum(row, shells) for row, shells in scenes.values() if shells.q.size]
+    known = [one for one in found if one.q.size]
     shown = known[:SHOWN]
     if not shown:
         return None
@@ -92,7 +93,7 @@ def _edges(radius: Field, nyquist: float) -> Field:
     """Edges of bands half-way between shells, about PER_DECADE in a decade [2 pi / L]."""
     between = np.sqrt(radius[1:] * radius[:-1])
     ends = np.concatenate([[0.5 * radius[0]], between, [radius[-1] * (1 + 1e-6)]])
-    within = ends[ends <= nyquist * (1 + 1e-6)]
+    within = ends[ends < nyquist]  # on it, opposite modes are one
     chosen = [ends[0]]
     for edge in within[1:]:
         if edge >= chosen[-1] * 10 ** (1 / PER_DECADE):
