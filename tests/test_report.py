@@ -348,3 +348,11 @@ def test_fields_without_a_finite_stress_are_drawn(copied, value):
         for place in ("fields/0", "cross_sections/0"):
             file[place]["sigma"][...] = value
     assert "Stress; black: none" in report(copied)
+
+
+def test_two_grids_of_one_contact_add_the_continuum(tmp_path):
+    text = SPEC.replace("[0, 1]\n[grid]\npoints = 64", "1\n[grid]\npoints = [64, 128]")
+    text = text.replace("seed = [0, 1]", "").replace("[0.1, 1.0]", "0.3")
+    page = Page(report(solved(tmp_path, text)))
+    labels = [drawing["aria-label"] for drawing in page.all("svg")]
+    assert "Distribution of the stress in the continuum, with error bars and edge laws" in labels

@@ -58,24 +58,28 @@ def profile_sheet(profile: Profile) -> Page:
     divisor, unit = scaled(float(profile.position[-1]), "m")
     x = profile.position / divisor
     upper, lower = page.figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
-    heights = {name: profile.values[name] for name in LINES if name in profile.values}
-    most = max((largest(np.abs(y)) for y in heights.values()), default=0.0)
-    height_divisor, height_unit = scaled(most, "m")
-    for name, y in heights.items():
-        label, style = LINES[name]
-        _line(page, upper, label, x, y / height_divisor, **style)
-    upper.set_ylabel(f"height ({height_unit})")
-    if "sigma" in profile.values:
-        sigma = profile.values["sigma"]
-        top = max(largest(sigma), profile.pressure)
-        stress_divisor, stress_unit = scaled(top, "Pa")
-        lower.plot(x, sigma / stress_divisor, color=STRESS, lw=0.9)
-        lower.set_ylabel(rf"$\sigma$ ({stress_unit})")
-        lower.set_ylim(-0.05 * top / stress_divisor, 1.1 * top / stress_divisor)
+    _draw_heights(page, upper, x, profile)
+    _draw_stress(lower, x, profile)
     lower.set(xlabel=f"position along {profile.along} ({unit})", xlim=(x[0], x[-1]))
     return page
 
 
-def _line(page: Page, axes: Any, label: str, x: Field, y: Field, **style: Any) -> None:
-    """Of either sign, in the legend of the page."""
-    page.legend[label] = axes.plot(x, y, **style)[0]
+def _draw_heights(page: Page, axes: Any, x: Field, profile: Profile) -> None:
+    heights = {name: profile.values[name] for name in LINES if name in profile.values}
+    most = max((largest(np.abs(y)) for y in heights.values()), default=0.0)
+    divisor, unit = scaled(most, "m")
+    for name, y in heights.items():
+        label, style = LINES[name]
+        page.legend[label] = axes.plot(x, y / divisor, **style)[0]  # of either sign
+    axes.set_ylabel(f"height ({unit})")
+
+
+def _draw_stress(axes: Any, x: Field, profile: Profile) -> None:
+    if "sigma" not in profile.values:
+        return
+    sigma = profile.values["sigma"]
+    top = max(largest(sigma), profile.pressure)
+    divisor, unit = scaled(top, "Pa")
+    axes.plot(x, sigma / divisor, color=STRESS, lw=0.9)
+    axes.set_ylabel(rf"$\sigma$ ({unit})")
+    axes.set_ylim(-0.05 * top / divisor, 1.1 * top / divisor)

@@ -1,5 +1,7 @@
 """Pr(sigma) beside theory, on the grids and in the continuum."""
 
+from typing import Any
+
 from gfmd_cli.analysis.distribution_tables import distribution_records
 from gfmd_cli.analysis.figures import Density, densities
 from gfmd_cli.analysis.report.contents import Contents, Section, unmasked
@@ -65,41 +67,31 @@ def _bins(shown: list[Density]) -> Html:
         title = f"{unmasked(found.item.look.label)}, p* = {found.row['p_star']:.4g}"
         columns = zip(found.sigma.tolist(), found.density.tolist(), theory.tolist(), strict=True)
         groups.append(Group(title, [[s, s * unit, d, d / unit, t] for s, d, t in columns]))
-    return table(join("Middle of each bin, density and theory."), header, groups)
+    return table("Middle of each bin, density and theory.", header, groups)
 
 
 def _power_laws(contents: Contents) -> Html | None:
     """Exponents at small and large stress, where two grids gave a continuum."""
-    header = [
-        P_STAR,
-        AREA,
-        "stress",
-        join(SIGMA, " / ", DELTA_SIGMA, " from"),
-        "to",
-        "exponent",
-        "at the edge",
-        "theory",
-    ]
+    reach = join(SIGMA, " / ", DELTA_SIGMA, " from")
+    header = [P_STAR, AREA, "stress", reach, "to", "exponent", "at the edge", "theory"]
     groups: dict[str, list[list[object]]] = {}
     for record in distribution_records(contents.comparison):
         rows = groups.setdefault(f"{record['elastomer']} on {record['surface']}", [])
-        for name, law in record["fits"].items():
-            limit, theory = law["edge_exponent"], law["edge_exponent_theory"]
-            edge = NONE if limit is None else with_error(limit, law["edge_exponent_error"])
-            rows.append(
-                [
-                    record["p_star"],
-                    record["a_r"],
-                    name,
-                    law["sigma_from"],
-                    law["sigma_to"],
-                    with_error(law["exponent"], law["exponent_error"]),
-                    edge,
-                    NONE if theory is None else theory,
-                ]
-            )
+        at = [record["p_star"], record["a_r"]]
+        rows += [[*at, name, *_law(law)] for name, law in record["fits"].items()]
     told = [Group(title, rows) for title, rows in groups.items() if rows]
     if not told:
         return None
     caption = join("Power laws of ", PR, " in the continuum; theory: the edge of a contact.")
     return details("Table: power laws", table(caption, header, told))
+
+
+def _law(law: dict[str, Any]) -> list[object]:
+    limit, theory = law["edge_exponent"], law["edge_exponent_theory"]
+    return [
+        law["sigma_from"],
+        law["sigma_to"],
+        with_error(law["exponent"], law["exponent_error"]),
+        NONE if limit is None else with_error(limit, law["edge_exponent_error"]),
+        NONE if theory is None else theory,
+    ]
