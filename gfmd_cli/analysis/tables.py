@@ -95,9 +95,7 @@ def _spreads(found: list[Ensemble]) -> list[str]:
     """One table per body: means over seeds, with the half-width of the 95 % interval."""
     blocks: dict[str, list[str]] = {}
     for ensemble in found:
-        first = ensemble.rows[0]
-        grid = "" if first.get("grid") == "auto" else f", {first['points']} points a side"
-        head = f"{ensemble.label}{grid}: mean of {len(ensemble.rows)} seeds +- 95 % confidence"
+        head = f"{ensemble.title}: mean of {len(ensemble.rows)} seeds +- 95 % confidence"
         lines = blocks.setdefault(head, [head, "      p*" + _centred(*QUANTITIES)])
         spreads = [ensemble.spread(name) for name in QUANTITIES]
         cells = [plus_minus(spread.mean, spread.half_width) for spread in spreads]

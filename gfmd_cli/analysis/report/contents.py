@@ -54,7 +54,7 @@ class Contents:
     @property
     def curves(self) -> list[tuple[str, Curve]]:
         """The curves, each with its name in figures and in full."""
-        return [(_title(unmasked(item.look.label), item.curve), item.curve) for item in self.items]
+        return [(title_of(item), item.curve) for item in self.items]
 
     @property
     def solved(self) -> list[Row]:
@@ -88,12 +88,9 @@ def read_contents(study: Path, bench: Path | None) -> Contents:
     return Contents(comparison, read_rows(study), attributes, traces)
 
 
-def unmasked(label: str) -> str:
-    """A label of a figure as plain text."""
-    return label.replace(r"\$", "$")
-
-
-def _title(short: str, curve: Curve) -> str:
+def title_of(item: Item) -> str:
+    """A curve by its name in figures and in full."""
+    curve, short = item.curve, item.look.label.replace(r"\$", "$")
     whole = f"{curve.elastomer} on {curve.surface}"
     sizes = sorted({int(row["points"]) for row in curve.rows})
     grid = str(sizes[0]) if len(sizes) == 1 else f"{sizes[0]} to {sizes[-1]}"

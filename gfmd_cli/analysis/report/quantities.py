@@ -112,7 +112,7 @@ def _seeds(contents: Contents) -> Html | None:
     for found in ensembles(contents.comparison):
         told = [found.spread(name) for name in QUANTITIES]
         cells = [with_error(spread.mean, spread.half_width) for spread in told]
-        title = f"{found.label}: {len(found.rows)} seeds"
+        title = f"{found.title}: {len(found.rows)} seeds"
         spreads.setdefault(title, []).append([found.rows[0]["p_star"], *cells])
     groups = [Group(title, rows) for title, rows in spreads.items()]
     caption = "Means over seeds, ± half the width of the 95 % confidence interval (Student)."

@@ -4,7 +4,7 @@ from typing import Any
 
 from gfmd_cli.analysis.distribution_tables import distribution_records
 from gfmd_cli.analysis.figures import Density, densities
-from gfmd_cli.analysis.report.contents import Contents, Section, unmasked
+from gfmd_cli.analysis.report.contents import Contents, Section, title_of
 from gfmd_cli.analysis.report.figure import figure
 from gfmd_cli.analysis.report.markup import NONE, Group, Html, details, join, table, tag
 from gfmd_cli.analysis.report.units import AREA, DELTA_SIGMA, P_STAR, with_error
@@ -64,7 +64,7 @@ def _bins(shown: list[Density]) -> Html:
     for found in shown:
         unit = float(found.row["delta_sigma"])
         theory = found.theory(found.sigma)
-        title = f"{unmasked(found.item.look.label)}, p* = {found.row['p_star']:.4g}"
+        title = f"{title_of(found.item)}, p* = {found.row['p_star']:.4g}"
         columns = zip(found.sigma.tolist(), found.density.tolist(), theory.tolist(), strict=True)
         groups.append(Group(title, [[s, s * unit, d, d / unit, t] for s, d, t in columns]))
     return table("Middle of each bin, density and theory.", header, groups)
