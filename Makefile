@@ -3,7 +3,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 RESULTS := results
 
-.PHONY: demo test test-faults test-mpi test-slurm check validate smoke memory paper paper-quick clean
+.PHONY: demo test test-faults test-mpi test-slurm test-browser check validate smoke memory paper paper-quick clean
 
 $(VENV)/.core: pyproject.toml
 	python3 -m venv $(VENV)
@@ -37,6 +37,14 @@ test-mpi: $(VENV)/.mpi ## runs shared by several processes, with PyPI's MPICH
 test-slurm: $(VENV)/.test ## array jobs on a private Slurm: preempted, killed, completed, compared
 	tests/slurm/install.sh
 	$(BIN)/pytest -m slurm tests/slurm
+
+$(VENV)/.browser: $(VENV)/.test
+	$(BIN)/pip install --quiet --disable-pip-version-check -e ".[browser]"
+	touch $@
+
+test-browser: $(VENV)/.browser ## the report in a headless Chromium: widths, colours, keys, accessibility
+	tests/browser/install.sh
+	$(BIN)/pytest -m browser tests/browser
 
 check: $(VENV)/.test ## the one gate: lint, format, types, import order
 	$(BIN)/ruff check .

@@ -19,11 +19,7 @@ def bench_table(traces: list[Trace]) -> str:
     and the residual at the end.
     """
     surfaces = sorted({trace.row["surface"] for trace in traces})
-    names = solver_names(traces)
-    rows = [_row(trace, name) for trace, name in zip(traces, names, strict=True)]
-    if len(surfaces) > 1:
-        rows = [[*row, trace.row["surface"]] for row, trace in zip(rows, traces, strict=True)]
-    header = [*HEADER, "surface"][: len(rows[0])]
+    header, rows = bench_cells(traces)
     widths = [max(map(len, column)) for column in zip(header, *rows, strict=True)]
     lines = [
         "  ".join(
@@ -34,7 +30,16 @@ def bench_table(traces: list[Trace]) -> str:
     ]
     above = _heading(widths)
     told = f"{surfaces[0]}\n\n" if len(surfaces) == 1 else ""
-    return told + "\n".join([above, *lines]) + _footnotes(traces)
+    return told + "\n".join([above, *lines]) + "\n\n" + "\n".join(footnotes(traces))
+
+
+def bench_cells(traces: list[Trace]) -> tuple[list[str], list[list[str]]]:
+    """Titles and rows of the table; the surface is told where there are several."""
+    names = solver_names(traces)
+    rows = [_row(trace, name) for trace, name in zip(traces, names, strict=True)]
+    if len({trace.row["surface"] for trace in traces}) > 1:
+        rows = [[*row, trace.row["surface"]] for row, trace in zip(rows, traces, strict=True)]
+    return [*HEADER, "surface"][: len(rows[0])], rows
 
 
 def _heading(widths: list[int]) -> str:
@@ -66,12 +71,14 @@ def _row(trace: Trace, name: str) -> list[str]:
     ]
 
 
-def _footnotes(traces: list[Trace]) -> str:
+def footnotes(traces: list[Trace]) -> tuple[str, str]:
+    """What the columns mean."""
     worst = max(trace.row["reference_residual"] for trace in traces)
     return (
-        "\n\nTransforms of the solved size and seconds until the error of the mean gap falls below "
-        "a level for good.\nErrors are relative to a reference of residual "
-        f"{worst:.0e} or less; seconds are processor time on one thread, without the record."
+        "Transforms of the solved size and seconds until the error of the mean gap falls below "
+        "a level for good.",
+        f"Errors are relative to a reference of residual {worst:.0e} or less; seconds are "
+        "processor time on one thread, without the record.",
     )
 
 

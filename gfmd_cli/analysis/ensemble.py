@@ -37,6 +37,12 @@ class Ensemble:
         """Body and surface, in words."""
         return f"{self.rows[0]['elastomer']} on {without_seed(self.rows[0])}"
 
+    @property
+    def title(self) -> str:
+        """The same with the grid, where that was given."""
+        auto = self.rows[0].get("grid") == "auto"
+        return self.label + ("" if auto else f", {self.rows[0]['points']} points a side")
+
     def spread(self, name: str) -> Spread:
         """Of "a_r", "sigma_p" or "u_g": of the continuum values where all rows have one."""
         best = [row.get(f"{name}_continuum", np.nan) for row in self.rows]

@@ -63,21 +63,31 @@ def draw_all(comparison: Comparison, folder: Path) -> list[Path]:
 
     Raises SpaceError where the folder cannot be written.
     """
+    with styled():
+        drawn = sheets(comparison, items_of(comparison))
+        return [path for name, sheet in drawn.items() for path in sheet.write(folder / name)]
+
+
+def sheets(comparison: Comparison, items: list[Item]) -> dict[str, Sheet]:
+    """Every figure that the study has data for, by name; to be called inside `styled`."""
+    drawn = {view.name: _over_pressure(view, items) for view in VIEWS}
+    drawn["stress_distribution"] = _distribution(items)
+    drawn["stress_distribution_pressures"] = _distribution_pressures(items)
+    drawn["stress_distribution_continuum"] = continuum_sheet(comparison)
+    return {name: sheet for name, sheet in drawn.items() if sheet is not None}
+
+
+def items_of(comparison: Comparison) -> list[Item]:
+    """The curves of a study in the order and look of its figures."""
     curves = sorted(comparison.curves, key=order)
     pressures = np.concatenate([curve.column("p_star") for curve in curves])
     low, high = pressures.min() / 3, pressures.max() * 3
     low = min(low, high / 1000)  # near the left end of a linear axis
     p_star = np.union1d(np.geomspace(low, high, 200), np.linspace(low, high, 100))
-    items = [
+    return [
         Item(curve, look, p_star, curve.predict(p_star))
         for curve, look in zip(curves, looks(curves), strict=True)
     ]
-    with styled():
-        sheets = {view.name: _over_pressure(view, items) for view in VIEWS}
-        sheets["stress_distribution"] = _distribution(items)
-        sheets["stress_distribution_pressures"] = _distribution_pressures(items)
-        sheets["stress_distribution_continuum"] = continuum_sheet(comparison)
-        return [path for name, s in sheets.items() if s for path in s.write(folder / name)]
 
 
 def _over_pressure(view: View, items: list[Item]) -> Sheet | None:
@@ -139,12 +149,37 @@ def _over_pressure(view: View, items: list[Item]) -> Sheet | None:
     return sheet
 
 
-def _distribution(items: list[Item]) -> Sheet | None:
-    """Pr(sigma) of the curves at one pressure: that of most curves, then of a_r = TYPICAL_AREA."""
+@dataclass(frozen=True)
+class Density:
+    """Pr(sigma) of one contact as it is drawn, all in units of Delta_sigma."""
+
+    item: Item
+    row: Row
+    sigma: Field
+    density: Field
+    """Of bins with enough points."""
+
+    def theory(self, sigma: Field) -> Field:
+        """Persson theory. Paper Eq. (24)."""
+        unit: float = self.row["delta_sigma"]
+        pressure = self.row["p_star"] * unit
+        return np.asarray(unit * self.item.curve.persson.stress_density(sigma * unit, pressure))
+
+
+def densities(items: list[Item]) -> dict[str, list[Density]]:
+    """What the figures of Pr(sigma) show, by their names."""
+    return {
+        "stress_distribution": _side_by_side(items),
+        "stress_distribution_pressures": _at_pressures(items),
+    }
+
+
+def _side_by_side(items: list[Item]) -> list[Density]:
+    """The curves at one pressure: that of most curves, then of a_r = TYPICAL_AREA."""
     held = [(item, _with_density(item.curve, PR_LOGARITHMIC)) for item in items]
     held = [(item, rows) for item, rows in held if rows]
     if not held:
-        return None
+        return []
 
     def chosen(p_star: float) -> list[tuple[Item, Row]]:
         pairs = [
@@ -158,46 +193,54 @@ def _distribution(items: list[Item]) -> Sheet | None:
         return -areas.size, float(np.sum(np.abs(np.log(areas / TYPICAL_AREA))))
 
     best = chosen(min(sorted({row["p_star"] for _, rows in held for row in rows}), key=distance))
-    low, high = (end(row["p_star"] for _, row in best) for end in (min, max))
+    return [Density(item, row, *_bins(row, PR_LOGARITHMIC)) for item, row in best]
+
+
+def _distribution(items: list[Item]) -> Sheet | None:
+    """Pr(sigma) of the curves at one pressure."""
+    best = _side_by_side(items)
+    if not best:
+        return None
+    low, high = (end(found.row["p_star"] for found in best) for end in (min, max))
     between = f"{low:.3g}" if high < 1.001 * low else rf"{low:.3g}\;\mathrm{{to}}\;{high:.3g}"
     sheet = Sheet(rf"{STRESS}  at  $p^* = {between}$", DENSITY)
-    xs, ys = [], []
-    for place, (item, row) in enumerate(best):
-        x, y = _bins(row, PR_LOGARITHMIC)
-        sheet.axes.plot(x, y, color=item.look.colour, lw=0.7)
-        converged = np.full(x.size, row["status"] == "converged")
-        sheet.points(item.look, x, y, converged, every=(place % 3, 3) if len(best) > 1 else 1)
-        xs.append(x)
-        ys.append(y)
-    sheet.scale("x", "log", np.concatenate(xs))
-    sheet.scale("y", "log", np.concatenate(ys))
+    for place, found in enumerate(best):
+        look, x, y = found.item.look, found.sigma, found.density
+        sheet.axes.plot(x, y, color=look.colour, lw=0.7)
+        converged = np.full(x.size, found.row["status"] == "converged")
+        sheet.points(look, x, y, converged, every=(place % 3, 3) if len(best) > 1 else 1)
+    sheet.scale("x", "log", np.concatenate([found.sigma for found in best]))
+    sheet.scale("y", "log", np.concatenate([found.density for found in best]))
     sigma = np.geomspace(*sheet.axes.get_xlim(), 400)
-    sheet.theory([(i.look, sigma, _theory_density(i.curve, row, sigma)) for i, row in best])
+    sheet.theory([(found.item.look, sigma, found.theory(sigma)) for found in best])
     return sheet
 
 
-def _distribution_pressures(items: list[Item]) -> Sheet | None:
-    """Pr(sigma) of the curve nearest to n = 1 at a few pressures, over the stress itself."""
+def _at_pressures(items: list[Item]) -> list[Density]:
+    """The curve nearest to n = 1 at a few pressures."""
     held = [(item, _with_density(item.curve, PR_LINEAR)) for item in items]
     held = [(item, rows) for item, rows in held if len(rows) > 1]
     if not held:
-        return None
+        return []
     item, rows = min(held, key=lambda pair: np.nan_to_num(abs(pair[0].curve.n - 1), nan=9.0))
     places = np.unique(np.linspace(0, len(rows) - 1, PRESSURES).round().astype(int))
-    rows = [rows[place] for place in places]
-    sheet = Sheet(f"{STRESS}  for  {item.look.label[:24]}", DENSITY)
-    xs, ys = [], []
-    for row, colour in zip(rows, colours(len(rows)), strict=True):
-        x, y = _bins(row, PR_LINEAR)
-        sheet.line(sheet.axes, f"p* = {row['p_star']:.3g}", x, y, color=colour, lw=1.6)
-        xs.append(x)
-        ys.append(y)
-    sheet.scale("x", "linear", np.concatenate(xs))
-    sheet.scale("y", "log", np.concatenate(ys))
+    return [Density(item, rows[place], *_bins(rows[place], PR_LINEAR)) for place in places]
+
+
+def _distribution_pressures(items: list[Item]) -> Sheet | None:
+    """Pr(sigma) of one curve at a few pressures, over the stress itself."""
+    shown = _at_pressures(items)
+    if not shown:
+        return None
+    sheet = Sheet(f"{STRESS}  for  {shown[0].item.look.label[:24]}", DENSITY)
+    for found, colour in zip(shown, colours(len(shown)), strict=True):
+        label = f"p* = {found.row['p_star']:.3g}"
+        sheet.line(sheet.axes, label, found.sigma, found.density, color=colour, lw=1.6)
+    sheet.scale("x", "linear", np.concatenate([found.sigma for found in shown]))
+    sheet.scale("y", "log", np.concatenate([found.density for found in shown]))
     sigma = np.linspace(0.0, sheet.axes.get_xlim()[1], 400)
-    for row in rows:
-        density = _theory_density(item.curve, row, sigma)
-        sheet.line(sheet.axes, THEORY, sigma, density, color="black", lw=0.6, zorder=3)
+    for found in shown:
+        sheet.line(sheet.axes, THEORY, sigma, found.theory(sigma), color="black", lw=0.6, zorder=3)
     return sheet
 
 
@@ -214,9 +257,3 @@ def _bins(row: Row, name: str) -> tuple[Field, Field]:
     lower, upper = edges[:-1][kept], edges[1:][kept]
     middle = 0.5 * (lower + upper) if name == PR_LINEAR else np.sqrt(lower * upper)
     return middle, density[kept]
-
-
-def _theory_density(curve: Curve, row: Row, sigma: Field) -> Field:
-    """Pr(sigma) Delta_sigma of Persson theory over sigma / Delta_sigma. Paper Eq. (24)."""
-    unit: float = row["delta_sigma"]
-    return np.asarray(unit * curve.persson.stress_density(sigma * unit, row["p_star"] * unit))

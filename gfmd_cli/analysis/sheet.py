@@ -77,12 +77,24 @@ class Page:
             handletextpad=0.5,
         )
 
-    def write(self, path: Path) -> list[Path]:
-        """Write a PDF and a PNG, each whole or not at all. Raises SpaceError."""
+    def _lay_out(self) -> None:
+        """Once for all files."""
         if self.legend:
             self._write_legend()
         self.figure.draw_without_rendering()
-        self.figure.set_layout_engine("none")  # laid out once for both files
+        self.figure.set_layout_engine("none")
+
+    def svg(self) -> str:
+        """An SVG on no ground, text as outlines; the same figure gives the same text."""
+        self._lay_out()
+        image = BytesIO()
+        with rc_context({"svg.hashsalt": "gfmd", "svg.fonttype": "path"}):
+            self.figure.savefig(image, format="svg", transparent=True, metadata={"Date": None})
+        return image.getvalue().decode()
+
+    def write(self, path: Path) -> list[Path]:
+        """Write a PDF and a PNG, each whole or not at all. Raises SpaceError."""
+        self._lay_out()
         files = [path.with_name(f"{path.name}.{kind}") for kind in ("pdf", "png")]
         for file, metadata in zip(files, ({"CreationDate": None}, {}), strict=True):
             image = BytesIO()

@@ -3,7 +3,7 @@
 import math
 from typing import Any
 
-from gfmd_cli.analysis.compare import Comparison, Curve, einstein_prediction
+from gfmd_cli.analysis.compare import Comparison, Curve, Row, einstein_prediction
 from gfmd_cli.analysis.ensemble import Ensemble, ensembles
 from gfmd_cli.analysis.export import plain
 from gfmd_cli.analysis.further import further_records, further_tables
@@ -78,22 +78,23 @@ def _continuum(curve: Curve) -> list[str]:
     """Continuum values with their errors, or what keeps them from having one."""
     lines = ["  in the continuum:", "      p*  points" + _centred("a_r", "sigma_p", "u_g")]
     for row in curve.rows:
-        cells = []
-        for name in QUANTITIES:
-            value, error = row[f"{name}_continuum"], row[f"{name}_continuum_error"]
-            known = math.isfinite(value) and math.isfinite(error)
-            cells.append(plus_minus(value, error) if known else row[f"{name}_verdict"])
+        cells = [continuum_cell(row, name) for name in QUANTITIES]
         lines.append(f"{row['p_star']:8.4g} {row['points']:7d}" + _centred(*cells))
     return lines
+
+
+def continuum_cell(row: Row, name: str) -> str:
+    """The continuum value of a quantity with its error, or what keeps it from having one."""
+    value, error = row[f"{name}_continuum"], row[f"{name}_continuum_error"]
+    known = math.isfinite(value) and math.isfinite(error)
+    return plus_minus(value, error) if known else str(row[f"{name}_verdict"])
 
 
 def _spreads(found: list[Ensemble]) -> list[str]:
     """One table per body: means over seeds, with the half-width of the 95 % interval."""
     blocks: dict[str, list[str]] = {}
     for ensemble in found:
-        first = ensemble.rows[0]
-        grid = "" if first.get("grid") == "auto" else f", {first['points']} points a side"
-        head = f"{ensemble.label}{grid}: mean of {len(ensemble.rows)} seeds +- 95 % confidence"
+        head = f"{ensemble.title}: mean of {len(ensemble.rows)} seeds +- 95 % confidence"
         lines = blocks.setdefault(head, [head, "      p*" + _centred(*QUANTITIES)])
         spreads = [ensemble.spread(name) for name in QUANTITIES]
         cells = [plus_minus(spread.mean, spread.half_width) for spread in spreads]

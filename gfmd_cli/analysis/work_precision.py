@@ -29,6 +29,12 @@ def draw_bench(traces: list[Trace], folder: Path) -> list[Path]:
 
     Raises SpaceError where the folder cannot be written.
     """
+    with styled():
+        return [path for name, page in pages(traces).items() for path in page.write(folder / name)]
+
+
+def pages(traces: list[Trace]) -> dict[str, Page]:
+    """The figures by name; to be called inside `styled`."""
     scenes: dict[Any, list[tuple[Trace, Look]]] = {}
     for trace, look in zip(traces, _looks(traces), strict=True):
         scenes.setdefault(scene_of(trace), []).append((trace, look))
@@ -39,8 +45,7 @@ def draw_bench(traces: list[Trace], folder: Path) -> list[Path]:
         figures = {
             f"work_precision_{i}_{_slug(_title(row[0][0]))}": [row] for i, row in enumerate(rows)
         }
-    with styled():
-        return [p for name, rows in figures.items() for p in _draw(rows).write(folder / name)]
+    return {name: _draw(rows) for name, rows in figures.items()}
 
 
 def _draw(scenes: list[list[tuple[Trace, Look]]]) -> Page:

@@ -12,6 +12,7 @@ from gfmd_cli.cli.bench import bench
 from gfmd_cli.cli.completion import completion
 from gfmd_cli.cli.diff import diff
 from gfmd_cli.cli.init import init, surface
+from gfmd_cli.cli.report import report
 from gfmd_cli.cli.results import analyze, export
 from gfmd_cli.cli.run import run
 from gfmd_cli.cli.schema import schema
@@ -66,6 +67,7 @@ for command in (
     status,
     collect,
     analyze,
+    report,
     export,
     diff,
     bench,

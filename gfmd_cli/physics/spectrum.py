@@ -52,6 +52,15 @@ class SelfAffineFit:
     scatter: float
     """Deviance per shell: 1 where |h(q)|^2 is as random as that of Gaussian roughness, 0 where
     the phases alone are random, more where the surface has another spectrum."""
+    c_0: float
+    """C at long wavelengths; without a roll-off, C of the longest wave [m^2]."""
+    q_1: float
+    """Wavenumber of the longest wave [1/m]."""
+
+    def density(self, q: Field) -> Field:
+        """C(q) of one mode [m^2], zero beyond q_s. Paper Eq. (3)."""
+        ratio = (q / self.q_r) ** 2 + 1 if self.q_r else (q / self.q_1) ** 2
+        return np.where(q <= self.q_s, self.c_0 * ratio ** (-1 - self.hurst), 0.0)
 
 
 def density(shells: Shells) -> Field:
@@ -89,7 +98,16 @@ def fit(shells: Shells) -> SelfAffineFit:
     errors, scatter = _errors(*range_, best)
     q_r = float(np.exp(best[1])) if best.size == 2 else 0.0
     q_r_error = q_r * errors[-1] if q_r else 0.0
-    return SelfAffineFit(float(best[0]), errors[0], q_r, q_r_error, float(q[used - 1]), scatter)
+    return SelfAffineFit(
+        hurst=float(best[0]),
+        hurst_error=errors[0],
+        q_r=q_r,
+        q_r_error=q_r_error,
+        q_s=float(q[used - 1]),
+        scatter=scatter,
+        c_0=_scale(best, *range_),
+        q_1=float(q[0]),
+    )
 
 
 def _modes(shells: Shells) -> Field:
@@ -109,9 +127,13 @@ def _misfit(x: Field, q: Field, count: Field, power: Field) -> float:
 
     sum m [C_i / C + ln C], which for C = C_0 c is sum m [ln(sum m C_i/c / sum m) + ln c].
     """
-    shape, total = _shape(q, x), float(np.sum(count))
-    scale = np.sum(count * power / shape) / total
-    return float(total * np.log(scale) + np.sum(count * np.log(shape)))
+    total, shape = float(np.sum(count)), _shape(q, x)
+    return float(total * np.log(_scale(x, q, count, power)) + np.sum(count * np.log(shape)))
+
+
+def _scale(x: Field, q: Field, count: Field, power: Field) -> float:
+    """The most likely C_0."""
+    return float(np.sum(count * power / _shape(q, x)) / np.sum(count))
 
 
 def _most_likely(q: Field, count: Field, power: Field, start: Field) -> Field:
@@ -146,8 +168,7 @@ def _errors(q: Field, count: Field, power: Field, best: Field) -> tuple[list[flo
             for a in steps
         ]
     )
-    ratio = power / _shape(q, best)
-    ratio /= np.sum(count * ratio) / np.sum(count)
+    ratio = power / (_scale(best, q, count, power) * _shape(q, best))
     # of q and -q one is free: m / 2 draws a shell
     deviance = float(np.sum(count * (ratio - 1 - np.log(ratio)))) / (q.size - best.size - 1)
     try:

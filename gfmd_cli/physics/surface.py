@@ -7,7 +7,7 @@ are those of Mueser, "Elastic contacts of randomly rough surfaces across the spa
 
 from functools import cache
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self, get_args
 
 import numpy as np
 from pydantic import Field as Key
@@ -252,6 +252,12 @@ Surface = Annotated[
     SelfAffine | Parabola | PowerLawBody | Cone | Punch | Ridge | LineParabola | Wave | FileSurface,
     Key(discriminator="kind"),
 ]
+
+
+def dimension_of(kind: str) -> int:
+    """Dimension of the scenes of a kind of surface; 2 where the kind is not known."""
+    known = get_args(get_args(Surface)[0])
+    return next((c.dimension for c in known if c.model_fields["kind"].default == kind), 2)
 
 
 def sample(surface: Surface, points: int, ranks: Ranks | None = None) -> tuple[Grid, Field]:

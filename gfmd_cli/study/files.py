@@ -73,6 +73,13 @@ def write_whole(path: Path, content: bytes) -> None:
         file.write(content)
 
 
+def check_place(path: Path) -> None:
+    """Raise SpaceError where no file can be written at `path`, before the work for it begins."""
+    folder = next(folder for folder in path.absolute().parents if folder.exists())
+    if not (folder.is_dir() and os.access(folder, os.W_OK)):
+        raise SpaceError(f"{path}: cannot be written")
+
+
 def make_folder(path: Path) -> None:
     """Make a folder where it is missing. Raises SpaceError."""
     try:

@@ -1,7 +1,6 @@
 """Traces: what a bench recorded, one solve each, and the HDF5 file that they are kept in."""
 
 import json
-import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
@@ -9,10 +8,10 @@ from typing import Any, Self
 import h5py
 import numpy as np
 
-from gfmd_cli.errors import InputError, SpaceError, StudyError
+from gfmd_cli.errors import InputError, StudyError
 from gfmd_cli.physics.fields import Field
 from gfmd_cli.physics.hdf5 import take
-from gfmd_cli.study.files import new_file, new_hdf5
+from gfmd_cli.study.files import check_place, new_file, new_hdf5
 from gfmd_cli.study.labelled import dataset, scale
 from gfmd_cli.study.layout import BENCH, Column
 from gfmd_cli.study.provenance import origin
@@ -68,9 +67,7 @@ class Trace:
 
 def check_target(path: Path, spec: Spec) -> None:
     """Refuse to replace what is no bench of this spec. Raises InputError, SpaceError."""
-    folder = next(folder for folder in path.absolute().parents if folder.exists())
-    if not (folder.is_dir() and os.access(folder, os.W_OK)):
-        raise SpaceError(f"{path}: cannot be written")
+    check_place(path)
     if not path.exists():
         return
     try:
@@ -97,7 +94,9 @@ def write_bench(path: Path, spec: Spec, text: str, traces: list[Trace]) -> None:
 
 
 def read_bench(path: Path) -> list[Trace]:
-    """The traces of a bench file. Raises StudyError where it is none."""
+    """The traces of a bench file. Raises InputError, StudyError where it is none."""
+    if not path.exists():
+        raise InputError(f"{path}: no such bench")
     try:
         with h5py.File(path, "r", locking=False) as file:
             if file.attrs.get(BENCH) != BENCH_LAYOUT:
