@@ -75,6 +75,11 @@ class Curve:
         """Persson theory at the pressures of the study."""
         return self.predict(self.column("p_star"))
 
+    def stress_density(self, sigma: Field, p_star: float) -> Field:
+        """Pr(sigma) Delta_sigma of Persson theory over sigma / Delta_sigma. Paper Eq. (24)."""
+        unit = self.rows[0]["delta_sigma"]
+        return np.asarray(unit * self.persson.stress_density(sigma * unit, p_star * unit))
+
     def pressure_at_gap(self, u_g: Field) -> Field:
         """Reduced pressure at which Persson theory has this mean gap; NaN for no gap."""
         unit, height = self.rows[0]["delta_sigma"], self.rows[0]["h_std"]

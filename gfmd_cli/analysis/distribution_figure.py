@@ -9,8 +9,7 @@ from gfmd_cli.analysis.distribution import Distribution, distributions
 from gfmd_cli.analysis.edge_law import fit
 from gfmd_cli.analysis.looks import Look, looks, order
 from gfmd_cli.analysis.sheet import Sheet
-from gfmd_cli.physics.fields import Field
-from gfmd_cli.physics.observables import logarithmic_edges
+from gfmd_cli.physics.observables import logarithmic_middles
 
 TYPICAL_AREA = 0.1  # relative contact area of the paper's Fig. 7
 NEAR = 1.5  # pressures that differ by a smaller factor are drawn side by side
@@ -40,7 +39,10 @@ def continuum_sheet(comparison: Comparison) -> Sheet | None:
     sheet.scale("y", "log", ends[:, 2:])
     sigma = np.geomspace(*sheet.axes.get_xlim(), 400)
     sheet.theory(
-        [(look, sigma, _theory(f, sigma)) for f, look in zip(chosen, told, strict=True)],
+        [
+            (look, sigma, f.curve.stress_density(sigma, f.finest["p_star"]))
+            for f, look in zip(chosen, told, strict=True)
+        ],
     )
     for found, look in zip(chosen, told, strict=True):
         _edge_law(sheet, found, look)
@@ -70,23 +72,14 @@ def _chosen(held: list[Distribution]) -> list[Distribution]:
 
 def _draw(sheet: Sheet, found: Distribution, look: Look) -> tuple[float, float, float, float]:
     """Symbols with error bars over the faint lines of the grids; return the span of the symbols."""
-    edges = logarithmic_edges()
-    sigma = np.sqrt(edges[1:] * edges[:-1])
+    sigma = logarithmic_middles()
     for density in found.grids:
         sheet.axes.plot(
             sigma, np.where(density > 0, density, np.nan), color=look.colour, lw=0.4, alpha=0.45
         )
     known = np.isfinite(found.density) & np.isfinite(found.error)
     x, y, error = sigma[known], found.density[known], found.error[known]
-    sheet.axes.errorbar(
-        x,
-        y,
-        [y * -np.expm1(-error), y * np.expm1(error)],  # of ln Pr
-        fmt="none",
-        ecolor=look.colour,
-        elinewidth=0.7,
-        capsize=1.5,
-    )
+    sheet.bars(look, x, y, np.array([y * -np.expm1(-error), y * np.expm1(error)]))  # of ln Pr
     sheet.points(look, x, y, np.full(x.size, True))
     seen = y > LOWEST * y.max()
     return float(x[seen].min()), float(x[seen].max()), float(y[seen].min()), float(y.max())
@@ -105,10 +98,3 @@ def _edge_law(sheet: Sheet, found: Distribution, look: Look) -> None:
         density = law.edge_prefactor * sigma**law.theory
         sheet.axes.plot(sigma, density, color=look.colour, **style)
         sheet.line(sheet.axes, "edge law", sigma[:0], density[:0], color="0.4", **style)
-
-
-def _theory(found: Distribution, sigma: Field) -> Field:
-    """Pr(sigma) Delta_sigma of Persson theory over sigma / Delta_sigma. Paper Eq. (24)."""
-    unit = float(found.finest["delta_sigma"])
-    pressure = found.finest["p_star"] * unit
-    return np.asarray(unit * found.curve.persson.stress_density(sigma * unit, pressure))

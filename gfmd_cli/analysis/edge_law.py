@@ -20,7 +20,7 @@ import numpy as np
 
 from gfmd_cli.analysis.distribution import PRIOR_SEEDS, Distribution
 from gfmd_cli.physics.fields import Field
-from gfmd_cli.physics.observables import logarithmic_edges
+from gfmd_cli.physics.observables import logarithmic_edges, logarithmic_middles
 
 USABLE = 0.3  # largest relative error of a bin in a fit
 NEAREST = 3  # bins next to the limit of resolution that the law of the edge is drawn through
@@ -125,8 +125,8 @@ def fit(found: Distribution, law: str) -> Fit | None:
     n, small = found.curve.n, law == "small"
     if not (small or n > 2):
         return None
-    edges = logarithmic_edges()
-    middle, mean = np.sqrt(edges[1:] * edges[:-1]), found.finest["p_star"] / found.a_r
+    edges, middle = logarithmic_edges(), logarithmic_middles()
+    mean = found.finest["p_star"] / found.a_r
     usable = np.isfinite(found.density) & (found.error < USABLE)
     usable &= middle < SMALL * mean if small else middle > LARGE * mean
     places = np.flatnonzero(usable)

@@ -107,15 +107,7 @@ def _over_pressure(view: View, items: list[Item]) -> Sheet | None:
             sheet.axes.plot(x[kept], y[kept], color=look.colour, lw=0.6)
         barred = kept & np.isfinite(error)
         if np.any(barred):
-            sheet.axes.errorbar(
-                x[barred],
-                y[barred],
-                error[barred],
-                fmt="none",
-                ecolor=look.colour,
-                elinewidth=0.7,
-                capsize=2,
-            )
+            sheet.bars(look, x[barred], y[barred], error[barred])
         sheet.points(look, x[kept], y[kept], converged[kept])
         drawn.append(item)
         xs.append(x[kept])
@@ -161,9 +153,7 @@ class Density:
 
     def theory(self, sigma: Field) -> Field:
         """Persson theory. Paper Eq. (24)."""
-        unit: float = self.row["delta_sigma"]
-        pressure = self.row["p_star"] * unit
-        return np.asarray(unit * self.item.curve.persson.stress_density(sigma * unit, pressure))
+        return self.item.curve.stress_density(sigma, self.row["p_star"])
 
 
 def densities(items: list[Item]) -> dict[str, list[Density]]:

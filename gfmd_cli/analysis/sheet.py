@@ -39,6 +39,7 @@ STYLE = {
     "ytick.right": True,
     "pdf.fonttype": 42,  # TrueType: publishers refuse Type 3
 }
+CAP = 2.0  # points, to either side of an error bar
 THEORY = "Persson theory"
 
 
@@ -118,6 +119,10 @@ class Sheet(Page):
         self.legend[look.label] = Line2D([], [], marker=look.marker, **style)
         if not np.all(converged):
             self.legend["not converged"] = Line2D([], [], marker="x", ls="none", color="0.4")
+
+    def bars(self, look: Look, x: Field, y: Field, error: Field) -> None:
+        """Error bars, of shape (points,) or (2, points) for down and up."""
+        self.axes.errorbar(x, y, error, fmt="none", ecolor=look.colour, elinewidth=0.7, capsize=CAP)
 
     def theory(self, lines: list[tuple[Look, Field, Field]]) -> None:
         """One black line where theory is the same for all curves, else one in each colour."""

@@ -102,6 +102,12 @@ def logarithmic_edges() -> Field:
     return np.logspace(-6.0, 4.0, 101)
 
 
+def logarithmic_middles() -> Field:
+    """Geometric middles of the logarithmic bins."""
+    edges = logarithmic_edges()
+    return np.asarray(np.sqrt(edges[1:] * edges[:-1]))
+
+
 def stress_distribution(contact: Contact, u: Field, sigma: Field) -> Distribution:
     """Histogram of the stress over the points that carry load, as densities over sigma."""
     return _distribution(contact.grid, sigma[contact_points(contact, u, sigma)])

@@ -5,13 +5,12 @@ from typing import Any
 
 import numpy as np
 
+from gfmd_cli.analysis.figures import GAP, P_STAR
 from gfmd_cli.analysis.looks import MARKERS, Look, colours
 from gfmd_cli.analysis.sheet import WIDTH, Page, Sheet
 from paper.claims import Claim
 from paper.drawing import (
-    GAP,
     LOOKS,
-    P_STAR,
     column,
     curves,
     dense,

@@ -11,8 +11,6 @@ from gfmd_cli.analysis.sheet import Sheet
 
 WELL = 0.3  # relative error of a continuum value that is preferred to the value of the grid
 BODIES = (0.0, 0.5, 1.0, 2.0, 3.0, 4.0)
-P_STAR = r"reduced pressure  $p^* = p\,/\,\Delta\sigma$"
-GAP = r"mean gap  $u_g\,/\,h_\mathrm{std}$"
 LOOKS = {
     n: Look(colour, MARKERS[i], f"n = {'1/2' if n == 0.5 else f'{n:g}'}")
     for i, (n, colour) in enumerate(zip(BODIES, colours(len(BODIES)), strict=True))
@@ -49,15 +47,7 @@ def draw_points(sheet: Sheet, look: Look, x: Any, y: Any, error: Any = None) -> 
     x, y = np.asarray(x), np.asarray(y)
     if error is not None:
         known = np.isfinite(error)
-        sheet.axes.errorbar(
-            x[known],
-            y[known],
-            error[known],
-            fmt="none",
-            ecolor=look.colour,
-            elinewidth=0.7,
-            capsize=2,
-        )
+        sheet.bars(look, x[known], y[known], error[known])
     sheet.points(look, x, y, np.full(x.size, True))
 
 

@@ -6,14 +6,13 @@ from typing import Any
 import numpy as np
 
 from gfmd_cli.analysis.compare import Curve, einstein_prediction
+from gfmd_cli.analysis.figures import GAP, P_STAR
 from gfmd_cli.analysis.looks import MARKERS, Look, colours
 from gfmd_cli.analysis.sheet import Sheet
 from gfmd_cli.physics.surface import SelfAffine, sample
 from paper.claims import Claim
 from paper.drawing import (
-    GAP,
     LOOKS,
-    P_STAR,
     column,
     curves,
     dense,

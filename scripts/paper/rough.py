@@ -9,13 +9,13 @@ import numpy as np
 from gfmd_cli.analysis.distribution import distributions
 from gfmd_cli.analysis.distribution_figure import DENSITY, STRESS
 from gfmd_cli.analysis.edge_law import fit
+from gfmd_cli.analysis.figures import P_STAR
 from gfmd_cli.analysis.looks import MARKERS, Look, colours
 from gfmd_cli.analysis.sheet import Sheet
-from gfmd_cli.physics.observables import logarithmic_edges
+from gfmd_cli.physics.observables import logarithmic_middles
 from paper.claims import Claim
 from paper.drawing import (
     LOOKS,
-    P_STAR,
     column,
     curves,
     dense,
@@ -186,8 +186,7 @@ def fig07(held: Held, folder: Path) -> list[Claim]:
     """Pr(sigma) at 10 % contact on the finest grid; extrapolated where the grids allow."""
     sheet, ys = Sheet(STRESS, DENSITY), []
     found = [_nearest(group) for group in _by_body(held, "fig07").values()]
-    edges = logarithmic_edges()
-    middle = np.sqrt(edges[1:] * edges[:-1])
+    middle = logarithmic_middles()
     for one in found:
         look, fine = LOOKS[one.curve.n], one.grids[-1]
         sheet.axes.plot(middle, np.where(fine > 0, fine, np.nan), color=look.colour, lw=0.7)
@@ -196,8 +195,7 @@ def fig07(held: Held, folder: Path) -> list[Claim]:
         ys.append(fine[seen])
     sigma = np.geomspace(LOWEST, 6, 300)
     mean = float(np.mean([one.finest["p_star"] for one in found]))
-    unit = found[0].finest["delta_sigma"]
-    theory = unit * found[0].curve.persson.stress_density(sigma * unit, mean * unit)
+    theory = found[0].curve.stress_density(sigma, mean)
     sheet.theory([(LOOKS[1.0], sigma, theory)])
     finish(sheet, folder, "fig07", "log", "log", [LOWEST, 6.0], np.concatenate(ys))
     return [_small_stress(held)]
@@ -286,16 +284,14 @@ def fig13(held: Held, folder: Path) -> list[Claim]:
     """Pr(sigma) at n = 3 from grid to grid, and its tail."""
     sheet = Sheet(STRESS, DENSITY)
     (found,) = [one for group in _by_body(held, "fig13").values() for one in group]
-    edges = logarithmic_edges()
-    middle = np.sqrt(edges[1:] * edges[:-1])
+    middle = logarithmic_middles()
     tones = colours(len(found.points))
     for i, (points, density) in enumerate(zip(found.points, found.grids, strict=True)):
         label = f"λₛ/Δa = {points * 0.005:.3g}"
         kept = (density > 0) & (middle > 1e-2)
         draw_points(sheet, Look(tones[i], MARKERS[i], label), middle[kept], density[kept])
     sigma = np.geomspace(1e-2, 100, 300)
-    unit, p = found.finest["delta_sigma"], found.finest["p_star"]
-    theory = unit * found.curve.persson.stress_density(sigma * unit, p * unit)
+    theory = found.curve.stress_density(sigma, found.finest["p_star"])
     sheet.theory([(LOOKS[1.0], sigma, theory)])
     law = fit(found, "large")
     finish(sheet, folder, "fig13", "log", "log", [0.02, 60], [1e-6, 1.0])
@@ -340,10 +336,8 @@ def _nearest(group: list[Any]) -> Any:
 
 def _known(found: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Bins whose density is known: stress, density, its error."""
-    edges = logarithmic_edges()
     kept = np.isfinite(found.density) & (found.error < 0.5)
-    middle = np.sqrt(edges[1:] * edges[:-1])[kept]
-    return middle, found.density[kept], (found.density * found.error)[kept]
+    return logarithmic_middles()[kept], found.density[kept], (found.density * found.error)[kept]
 
 
 FIGURES = (fig04, fig05, fig06, fig07, fig08, fig13)
