@@ -71,7 +71,8 @@ def export(study: Path, output: Path | None, task: int | None) -> None:
         raise InputError("--task: chooses fields, for a .vti file")
     if output is None:
         click.echo(_csv(study), nl=False)
-    elif suffix == ".csv":
+        return
+    if suffix == ".csv":
         from gfmd_cli.study.files import write_whole
 
         write_whole(output, _csv(study).encode())
@@ -83,6 +84,7 @@ def export(study: Path, output: Path | None, task: int | None) -> None:
         from gfmd_cli.analysis.image import write_image
 
         write_image(study, task, output)
+    click.echo(str(output))
 
 
 def _csv(study: Path) -> str:

@@ -113,7 +113,7 @@ def _print_results(path: Path, shard: tuple[int, int], outcome: Any, failed: Any
     click.echo(f"{path}: {told or 'no tasks in this shard'}")
     for line in missed(rows, failed):
         click.echo(f"  {line}")
-    click.echo(f"next: gfmd analyze {path}")
+    click.echo(f"next: gfmd analyze {path}\n      gfmd report {path}")
 
 
 def _shard(text: str | None) -> tuple[int, int]:

@@ -47,6 +47,10 @@ def _warm(tmp_path_factory):
         ["run", str(folder / "spec.toml"), "-j", "1", "-q", "-o", study],
         ["export", study],
         ["analyze", study],
+        ["report", study],
+        ["export", study, "-o", str(folder / "study.nc")],
+        ["export", study, "-o", str(folder / "study.vti"), "--task", "0"],
+        ["diff", study, study],
     ):
         assert CliRunner().invoke(main, words).exit_code == 0
 

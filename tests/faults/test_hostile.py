@@ -183,6 +183,8 @@ def test_mutated_height_files(folder, kind):
         name = f"{i}-{kind}"  # its own: a file is read once a process
         surface = f"surface={{kind='file', path='{name}'}}"
         words = ["run", "spec.toml", "--dry-run", "--set", surface]
+        if i % 5 == 4:
+            words = [["surface", name], ["init", f"{i}.toml", "--from", name]][i % 2]
         cases.append((name, mutated_bytes(content, rng), words, None))
     met = survey(folder, cases)
     assert met[2] > 0
@@ -196,6 +198,14 @@ def test_mutated_studies(folder, gfmd):
     cases = [("bad.h5", mutated_bytes(content, rng), export, sound) for _ in range(500)]
     analyze = ["analyze", "bad.h5", "--json"]
     cases += [("bad.h5", mutated_bytes(content, rng), analyze, None) for _ in range(100)]
+    for words in (
+        ["diff", "bad.h5", "study.h5", "--json"],
+        ["report", "bad.h5", "-o", "bad.html"],
+        ["export", "bad.h5", "-o", "bad.nc"],
+        ["export", "bad.h5", "-o", "bad.vti", "--task", "0"],
+        ["status", "bad.h5", "--json"],
+    ):
+        cases += [("bad.h5", mutated_bytes(content, rng), words, None) for _ in range(50)]
     met = survey(folder, cases)
     assert met[74] > 250
 
