@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from gfmd_cli.errors import InputError
-from gfmd_cli.physics.topography import fill_missing, level, make_periodic, read_topography
+from gfmd_cli.physics.preparation import fill_missing, level, make_periodic
+from gfmd_cli.physics.topography import read_topography
 
 SCAN = Path(__file__).parents[1] / "configs" / "data" / "di-3.di"
 

@@ -28,16 +28,10 @@ from gfmd_cli.physics.bodies import (
 from gfmd_cli.physics.choice import FilePath, Positive, Seed
 from gfmd_cli.physics.fields import Field
 from gfmd_cli.physics.grid import Grid
+from gfmd_cli.physics.preparation import Edges, Levelling, level, make_periodic
 from gfmd_cli.physics.ranks import Ranks
 from gfmd_cli.physics.slabs import lay_out
-from gfmd_cli.physics.topography import (
-    Edges,
-    Levelling,
-    Topography,
-    level,
-    make_periodic,
-    read_topography,
-)
+from gfmd_cli.physics.topography import Topography, read_topography
 
 
 class SelfAffine(Indenter):
