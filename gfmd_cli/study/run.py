@@ -1,46 +1,29 @@
 """Run a spec: what is missing is solved, task by task, on one or more processes."""
 
-import faulthandler
-import multiprocessing
 import os
 import signal
-import sys
 from collections import Counter
 from collections.abc import Iterator
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from concurrent.futures.process import BrokenProcessPool
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import ExitStack, contextmanager
 from itertools import chain
 from pathlib import Path
-from threading import Thread, Timer
-from typing import Any, NamedTuple
+from threading import Timer
+from typing import Any
 
-from gfmd_cli.errors import GfmdError, InputError, Interrupted, SpaceError, StudyError
+from gfmd_cli.errors import InputError, Interrupted, SpaceError
 from gfmd_cli.physics import wisdom
 from gfmd_cli.physics.ranks import Ranks, agree, leads, together
 from gfmd_cli.study import solve
 from gfmd_cli.study.clock import Clock
 from gfmd_cli.study.grids import scene_of
-from gfmd_cli.study.record import read_status, record_path
 from gfmd_cli.study.resources import check_memory, room, seconds_to_stop, share_out
-from gfmd_cli.study.solve import Progress, Report, solve_task
+from gfmd_cli.study.solve import Progress, Report
 from gfmd_cli.study.spec import Spec
 from gfmd_cli.study.store import Study
 from gfmd_cli.study.tasks import Task, plan
+from gfmd_cli.study.workers import SIGNALS, Means, attempt, solve_in_pool
 
 CHECKPOINT_EVERY = 600.0  # seconds
-SIGNALS = (signal.SIGTERM, signal.SIGINT, signal.SIGUSR1, signal.SIGUSR2)
-
-
-class Means(NamedTuple):
-    """How to solve a task."""
-
-    threads: int
-    checkpoint_every: float
-    """Seconds."""
-    memory: float
-    """Bytes that it may take."""
-    reproducible: bool
 
 
 def run_study(
@@ -148,135 +131,12 @@ def _solve_all(
     ranks: Ranks | None,
 ) -> Counter[str]:
     if jobs > 1:
-        return _solve_in_pool(pending, parts, report, jobs, means)
+        return solve_in_pool(pending, parts, report, jobs, means)
     outcome: Counter[str] = Counter()
     for task in pending:
-        outcome[_attempt(task, parts, report, means, ranks)] += 1
+        outcome[attempt(task, parts, report, means, ranks)] += 1
     del outcome["interrupted"]
     return outcome
-
-
-def _is_stopped(ranks: Ranks | None) -> bool:
-    """Whether a signal has come, to any process."""
-    if ranks is not None and ranks.total(int(solve.stop.is_set())):
-        solve.stop.set()
-    return solve.stop.is_set()
-
-
-def _status_of(path: Path) -> str | None:
-    """Status of a record that is whole, None where there is none."""
-    with suppress(StudyError):
-        return read_status(path)
-    return None
-
-
-def _attempt(
-    task: Task, parts: Path, report: Report, means: Means, ranks: Ranks | None = None
-) -> str:
-    """Solve one task, unless another process has just done so; an error ends this task only."""
-    if _is_stopped(ranks):
-        return "interrupted"
-    if found := agree(ranks, _status_of(record_path(parts, task.id))):
-        return found
-    try:
-        with together(ranks):
-            return solve_task(
-                task,
-                parts,
-                means.threads,
-                report,
-                means.checkpoint_every,
-                means.memory,
-                fixed=means.reproducible,
-                ranks=ranks,
-            )
-    except Interrupted:
-        report(Progress(task.index, "interrupted", task.label))
-        return "interrupted"
-    except (GfmdError, MemoryError, ArithmeticError, OSError) as error:
-        reason = str(error) or type(error).__name__
-        report(Progress(task.index, "failed", task.label, note=reason))
-        return "no space" if isinstance(error, SpaceError) else "failed"
-
-
-def _solve_in_pool(
-    pending: list[Task], parts: Path, report: Report, jobs: int, means: Means
-) -> Counter[str]:
-    """Tasks side by side, the longest first, so that none is left over at the end."""
-    context = multiprocessing.get_context("spawn")  # forked FFTW threads would hang
-    reports = context.SimpleQueue()
-    listener = Thread(target=_listen, args=(reports, report), daemon=True)
-    listener.start()
-    outcome: Counter[str] = Counter()
-    begin = (_begin_worker, (reports, parts, means))
-    with ProcessPoolExecutor(jobs, context, *begin) as pool:
-        # a worker that begins keeps a signal for when it can note it
-        signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
-        futures = {
-            pool.submit(_work, task, parts, means): task
-            for task in sorted(pending, key=lambda task: -task.seconds)
-        }
-        signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
-        for task, status in _as_they_end(futures, pool):
-            if status == "killed":
-                reason = "its worker process was killed (out of memory?)"
-                report(Progress(task.index, "failed", task.label, note=reason))
-            outcome["failed" if status == "killed" else status] += 1
-    reports.put(None)
-    listener.join()
-    del outcome["interrupted"]
-    return outcome
-
-
-def _as_they_end(
-    futures: dict[Future[str], Task], pool: ProcessPoolExecutor
-) -> Iterator[tuple[Task, str]]:
-    """Each task with its status; a signal is handed on to the workers, once."""
-    told = False
-    left = set(futures)
-    while left:
-        done, left = wait(left, timeout=0.1, return_when=FIRST_COMPLETED)
-        for future in done:
-            if not future.cancelled():
-                killed = isinstance(future.exception(), BrokenProcessPool)
-                yield futures[future], "killed" if killed else future.result()
-        if solve.stop.is_set() and not told:
-            told = True
-            for future in left:
-                future.cancel()
-            for process in multiprocessing.active_children():
-                os.kill(process.pid or 0, signal.SIGTERM)
-
-
-def _listen(reports: Any, report: Report) -> None:
-    for progress in iter(reports.get, None):
-        report(progress)
-
-
-_reports: Any = None  # of a worker process, to the one that prints
-
-
-def _begin_worker(reports: Any, parts: Path, means: Means) -> None:
-    global _reports
-    _reports = reports
-    faulthandler.enable(sys.__stderr__ or 2)
-    wisdom.plan_with(parts, estimated=means.reproducible)
-    Thread(target=_end_with_parent, daemon=True).start()
-    for number in SIGNALS:
-        signal.signal(number, lambda *_: solve.stop.set())
-    signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
-
-
-def _end_with_parent() -> None:
-    """No worker outlives a run that was killed."""
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(1)
-
-
-def _work(task: Task, parts: Path, means: Means) -> str:
-    return _attempt(task, parts, _reports.put, means)
 
 
 def _time_to_work(max_seconds: float | None, pending: list[Task], jobs: int) -> float | None:
