@@ -11,6 +11,7 @@ def task(index, seconds, body="a"):
         index=index,
         seconds=seconds,
         elastomer=body,
+        surface=SimpleNamespace(dimension=2),
         points=64,
         solver=SimpleNamespace(tolerance=1e-6),
     )

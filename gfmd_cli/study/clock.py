@@ -6,9 +6,10 @@ from math import isfinite, log
 from typing import Any, NamedTuple
 
 from gfmd_cli.study.solve import Progress, Report
-from gfmd_cli.study.tasks import Task
+from gfmd_cli.study.tasks import SECONDS_PER_PAIR, Task
 
 AGAIN = 0.5  # of the time spent is left at the least, where only the forecast tells
+KNOWN = 0.1  # of the forecast work, from which on its speed is told by that
 FOUND = 0.05  # of the way to the tolerance, from which on the way that is left is told by it
 
 
@@ -23,14 +24,20 @@ class _Running(NamedTuple):
     first: float = float("nan")
     """Residual there at first."""
     last: float = float("nan")
+    work: float = 0.0
+    """Steps times grid points, on the grids before."""
+    step: int = 0
+    stepped: float = 0.0
+    """When it took its first step."""
 
 
 class Clock:
     """The time left of a run, as its tasks start, step and end.
 
     A task that has not begun is taken to need what was forecast, times what the ended ones of the
-    same body took over their forecasts. One at work on its finest grid is taken to bring down
-    the logarithm of its residual as fast as so far, the more the further it has come.
+    same body took over their forecasts; one at work, to go on as fast as so far. On its finest
+    grid it is taken to bring down the logarithm of its residual as fast as so far, the more the
+    further it has come.
     """
 
     def __init__(
@@ -62,8 +69,11 @@ class Clock:
         elif progress.event == "step" and index in self.running:
             was = self.running[index]
             if progress.points != was.points:
-                was = _Running(was.since, progress.points, now, progress.residual)
-            self.running[index] = was._replace(last=progress.residual)
+                work, stepped = self._work(index), was.stepped or now
+                was = _Running(
+                    was.since, progress.points, now, progress.residual, work=work, stepped=stepped
+                )
+            self.running[index] = was._replace(last=progress.residual, step=progress.step)
         elif progress.event in ("done", "failed", "interrupted"):
             self.waiting.discard(index)
             was = self.running.pop(index, _Running(now))
@@ -85,11 +95,20 @@ class Clock:
         measured, forecast = self.taken.get(task.elastomer) or self.taken.get(None, (1.0, 1.0))
         return task.seconds * measured / forecast
 
+    def _work(self, index: int) -> float:
+        """Steps times grid points that a task has done."""
+        task, was = self.tasks[index], self.running[index]
+        return was.work + was.step * float(was.points**task.surface.dimension)
+
     def _left_of(self, index: int) -> float:
         """Seconds that a task at work will still take."""
         task, was, now = self.tasks[index], self.running[index], self.now()
-        spent = now - was.since
-        left = max(self._forecast(index) - spent, AGAIN * spent)
+        spent, forecast = now - was.since, self._forecast(index)
+        alone = SECONDS_PER_PAIR * self._work(index)
+        if alone > KNOWN * task.seconds:  # how fast this machine is just now
+            prepared = was.stepped - was.since
+            forecast = prepared + task.seconds * (spent - prepared) / alone
+        left = max(forecast - spent, AGAIN * spent)
         if was.points == task.points and isfinite(was.first) and was.last > 0:
             way = log(max(was.first / task.solver.tolerance, 1.0))
             gone = log(max(was.first / was.last, 1.0))

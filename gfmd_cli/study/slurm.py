@@ -33,11 +33,13 @@ if [ -z "$SLURM_ARRAY_TASK_ID" ]; then
   exec {gfmd} collect "${{study[@]}}"
 fi
 
+run= signal= told=1
+hand_on() {{ told=1 signal=$1; [ -z "$run" ] || kill -"$1" "$run" 2>/dev/null; }}
+trap 'hand_on USR1' USR1   # the time limit is near
+trap 'hand_on TERM' TERM   # preempted
 {gfmd} run "${{study[@]}}" --shard "${{SLURM_ARRAY_TASK_ID}}/{shards}" &
 run=$!
-trap 'told=1; kill -USR1 $run 2>/dev/null' USR1   # the time limit is near
-trap 'told=1; kill -TERM $run 2>/dev/null' TERM   # preempted
-told=1
+[ -z "$signal" ] || kill -"$signal" "$run"   # it came before there was one to hand it to
 while [ $told = 1 ]; do told=0; wait $run; status=$?; done   # a signal ends `wait` early
 
 shard=${{SLURM_ARRAY_JOB_ID}}_${{SLURM_ARRAY_TASK_ID}}   # the job number would be the whole array

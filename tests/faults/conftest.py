@@ -33,7 +33,7 @@ fields = ["u"]
 
 def pytest_collection_modifyitems(items):
     for item in items:
-        if "faults" in Path(item.fspath).parts:
+        if Path(__file__).parent in item.path.parents:
             item.add_marker(pytest.mark.faults)
 
 
