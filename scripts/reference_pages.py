@@ -31,10 +31,16 @@ from gfmd_cli.study.parse import MODELS, REQUIRED
 from gfmd_cli.study.spec import SWEPT, Ladder
 
 DOCS = Path(__file__).parents[1] / "docs"
+CONFIGS = DOCS.parent / "configs"
 PAGES = ("configuration.md", "commands.md", "study-file.md")
 WIDTH = "100"  # columns of a help text
 PART = re.compile(r"(<!-- generated: (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
-NAMES = {"number": "number", "integer": "whole number", "string": "text", "boolean": "true or false"}
+NAMES = {
+    "number": "number",
+    "integer": "whole number",
+    "string": "text",
+    "boolean": "true or false",
+}
 LIMITS = (
     ("exclusiveMinimum", "> {}"),
     ("minimum", "≥ {}"),
@@ -48,7 +54,7 @@ def escaped(text: str) -> str:
     """Text that Markdown prints as it is, on one line and in a table."""
     plain = " ".join(text.split()).replace("&", "&amp;").replace("<", "&lt;")
     parts = re.split(r"(`[^`]*`)", plain)
-    shown = [part if part[:1] == "`" else re.sub(r"([*_\[\]~])", r"\\\1", part) for part in parts]
+    shown = [part if part[:1] == "`" else re.sub(r"([*_\[\]])", r"\\\1", part) for part in parts]
     return "".join(shown).replace("|", "\\|")
 
 
@@ -89,10 +95,16 @@ def allowed(schema: dict[str, Any], shared: dict[str, Any]) -> str:
     if schema.get("format") == "path":
         return "path"
     kind = NAMES[schema["type"]]
-    limits = [told.format(f"{schema[key]:.10g}") for key, told in LIMITS if key in schema]
     if "pattern" in schema:
-        limits.append("letters, digits, `.`, `_`, `-`")
+        return f"{kind}: letters, digits, `.`, `_`, `-`"
+    limits = [told.format(amount(schema[key])) for key, told in LIMITS if key in schema]
     return escaped(", ".join([kind, *limits]))
+
+
+def amount(limit: float) -> str:
+    """A limit, large powers of two as such."""
+    power = int(limit).bit_length() - 1
+    return f"2^{power}" if power > 16 and limit == 2**power else f"{limit:.10g}"
 
 
 def keys(model: Any) -> str:
@@ -136,10 +148,20 @@ def commands() -> str:
     """The help of every command."""
     parts = []
     for words in ([], *([name] for name in main.list_commands(click.Context(main)))):
-        done = CliRunner().invoke(main, [*words, "--help"], "", {"COLUMNS": WIDTH}, prog_name="gfmd")
-        title = " ".join(["gfmd", *words])
+        title, asked = " ".join(["gfmd", *words]), [*words, "--help"]
+        done = CliRunner().invoke(main, asked, env={"COLUMNS": WIDTH}, prog_name="gfmd")
         parts.append(f"## {title}\n\n```console\n$ {title} --help\n{done.output.rstrip()}\n```")
     return "\n\n".join(parts)
+
+
+def examples() -> str:
+    """The specs of configs/ and what their first lines say of them."""
+    rows = []
+    for path in sorted(CONFIGS.glob("*.toml")):
+        text = path.read_text(encoding="utf-8").partition("[study]")[0]
+        said = " ".join(line.lstrip("# ") for line in text.splitlines())
+        rows.append((f"`configs/{path.name}`", escaped(said)))
+    return table(("spec", "what"), rows)
 
 
 def columns(listed: Iterable[Column]) -> str:
@@ -163,6 +185,7 @@ def distributions() -> str:
 
 MAKERS = {
     "configuration": configuration,
+    "examples": examples,
     "commands": commands,
     "contract": lambda: columns(CONTRACT),
     "further": lambda: columns(FURTHER),
