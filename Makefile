@@ -56,7 +56,6 @@ $(VENV)/.docs: $(VENV)/.test
 
 docs: $(VENV)/.docs ## the documentation as a site, in site/index.html
 	$(BIN)/python scripts/reference_pages.py --check
-	$(BIN)/cffconvert --validate
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
 
 wheel: $(VENV)/.docs ## the package built, checked and tried in an empty environment
