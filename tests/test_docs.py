@@ -25,6 +25,7 @@ from typing import NamedTuple
 import pytest
 from click.testing import CliRunner
 
+import gfmd_cli
 from gfmd_cli.cli import main
 from gfmd_cli.study.parse import read_spec, read_tables
 
@@ -114,7 +115,7 @@ def matches(shown: list[str], found: list[str]) -> bool:
 def run_console(block: Block) -> None:
     """Run the commands of a block one by one and compare what they print."""
     commands: list[tuple[str, list[str]]] = []
-    for line in block.text.splitlines():
+    for line in block.text.replace(" \\\n    ", " ").splitlines():
         if line.startswith("$ "):
             commands.append((line[2:], []))
         else:
@@ -247,3 +248,9 @@ def test_dots_stand_for_any_lines():
     assert matches(["a", "...", "d"], ["a", "b", "c", "d"])
     assert not matches(["a", "...", "e"], ["a", "b", "c", "d"])
     assert not matches(["a"], ["a", "b"])
+
+
+def test_the_citation_names_this_version():
+    told = re.search(r"^version: (\S+)$", (ROOT / "CITATION.cff").read_text(), re.MULTILINE)
+    assert told is not None
+    assert told[1] == gfmd_cli.__version__
