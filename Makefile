@@ -3,7 +3,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 RESULTS := results
 
-.PHONY: demo test test-faults test-mpi test-slurm test-browser check validate smoke memory paper paper-quick clean
+.PHONY: demo test test-faults test-mpi test-slurm test-browser check validate docs wheel smoke memory paper paper-quick clean
 
 $(VENV)/.core: pyproject.toml
 	python3 -m venv $(VENV)
@@ -52,11 +52,22 @@ check: $(VENV)/.test ## the one gate: lint, format, types, import order
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-validate: $(VENV)/.test ## slow physics: large grids, dense ladders
+validate: $(VENV)/.test ## slow physics: large grids, dense ladders; slow blocks of the documentation
 	$(BIN)/pytest -m validation
 
 test-faults: $(VENV)/.test ## kills, full disks, damaged files, hostile input; root, for its small disks
 	$(BIN)/pytest -m faults -n 2 --dist load
+
+$(VENV)/.docs: $(VENV)/.test
+	$(BIN)/pip install --quiet --disable-pip-version-check -e ".[docs]"
+	touch $@
+
+docs: $(VENV)/.docs ## the documentation as a site, in site/index.html
+	$(BIN)/python scripts/reference_pages.py --check
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
+
+wheel: $(VENV)/.docs ## the package built, checked and tried in an empty environment
+	$(BIN)/python scripts/try_wheel.py
 
 memory: $(VENV)/.core ## measured peak memory against what --dry-run says
 	$(BIN)/python scripts/memory.py
@@ -68,4 +79,4 @@ paper-quick: $(VENV)/.core ## the same on small grids: minutes
 	$(BIN)/python scripts/paper_figures.py -o $(RESULTS)/paper-quick --quick
 
 clean:
-	rm -rf $(RESULTS)
+	rm -rf $(RESULTS) site dist

@@ -11,8 +11,11 @@ INTRODUCTION = """\
 M. H. Müser, *Elastic contacts of randomly rough surfaces across the spatial dimensions*, studied again: each of its figures has a
 config in `configs/paper/`, and each statement that can be checked stands below with what is found here. Made by
 
-    make paper          # all of it: about an hour on two quiet cores
-    make paper-quick    # small grids, a few minutes; the numbers are then rough
+<!-- not run: takes an hour, and minutes -->
+```bash
+make paper          # all of it: about an hour on two quiet cores
+make paper-quick    # small grids, a few minutes; the numbers are then rough
+```
 
 Grids are of up to 8192² points (Fig. 5: 4096², the default surface otherwise 1024² to 2048²), where the paper went to 32768².
 Random phases differ from the paper's, whose seed is not known, so that single numbers of its one realisation cannot be repeated; trends, exponents,

@@ -1,0 +1,225 @@
+"""The generated parts of the reference: keys of the run spec, commands, columns of a study.
+
+A page keeps what is written by hand; between `<!-- generated: NAME -->` and `<!-- end -->` stands
+what NAME makes. Without options the pages are written, with --check they are compared.
+"""
+
+import argparse
+import inspect
+import re
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import click
+from click.testing import CliRunner
+
+from gfmd_cli.cli import main
+from gfmd_cli.study.layout import (
+    AUTOCORRELATIONS,
+    CONTRACT,
+    DISTRIBUTIONS,
+    FIELDS,
+    FURTHER,
+    SHELLS,
+    SPECTRA,
+    WEIGHTS,
+    Column,
+)
+from gfmd_cli.study.parse import MODELS, REQUIRED
+from gfmd_cli.study.spec import SWEPT, Ladder
+
+DOCS = Path(__file__).parents[1] / "docs"
+CONFIGS = DOCS.parent / "configs"
+PAGES = ("configuration.md", "commands.md", "study-file.md")
+WIDTH = "100"  # columns of a help text
+PART = re.compile(r"(<!-- generated: (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
+NAMES = {
+    "number": "number",
+    "integer": "whole number",
+    "string": "text",
+    "boolean": "true or false",
+}
+LIMITS = (
+    ("exclusiveMinimum", "> {}"),
+    ("minimum", "≥ {}"),
+    ("exclusiveMaximum", "< {}"),
+    ("maximum", "≤ {}"),
+    ("multipleOf", "a multiple of {}"),
+)
+
+
+def escaped(text: str) -> str:
+    """Text that Markdown prints as it is, on one line and in a table."""
+    plain = " ".join(text.split()).replace("&", "&amp;").replace("<", "&lt;")
+    parts = re.split(r"(`[^`]*`)", plain)
+    shown = [part if part[:1] == "`" else re.sub(r"([*_\[\]])", r"\\\1", part) for part in parts]
+    return "".join(shown).replace("|", "\\|")
+
+
+def table(head: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
+    """A table of cells that are Markdown already."""
+    lines = [list(head), *map(list, rows)]
+    lines.insert(1, ["---"] * len(lines[0]))
+    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
+
+
+def toml(value: Any) -> str:
+    """A default as it is written in TOML."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        return f'"{value}"'
+    if isinstance(value, float):
+        return f"{value:g}"
+    return str(value)
+
+
+def allowed(schema: dict[str, Any], shared: dict[str, Any]) -> str:
+    """What a key takes, in words."""
+    if "$ref" in schema:
+        return allowed(shared[schema["$ref"].rpartition("/")[2]], shared)
+    if "anyOf" in schema or "oneOf" in schema:
+        forms = schema.get("anyOf", schema.get("oneOf", []))
+        told = [allowed(form, shared) for form in forms if form.get("type") != "null"]
+        return "; or ".join(dict.fromkeys(told))
+    if "const" in schema:
+        return f"`{toml(schema['const'])}`"
+    if "enum" in schema:
+        return ", ".join(f"`{toml(value)}`" for value in schema["enum"])
+    if schema.get("type") == "array":
+        return f"list of: {allowed(schema['items'], shared)}"
+    if schema.get("type") == "object":
+        return "`{ from, to, per_decade }`"
+    if schema.get("format") == "path":
+        return "path"
+    kind = NAMES[schema["type"]]
+    if "pattern" in schema:
+        return f"{kind}: letters, digits, `.`, `_`, `-`"
+    limits = [told.format(amount(schema[key])) for key, told in LIMITS if key in schema]
+    return escaped(", ".join([kind, *limits]))
+
+
+def amount(limit: float) -> str:
+    """A limit, large powers of two as such."""
+    power = int(limit).bit_length() - 1
+    return f"2^{power}" if power > 16 and limit == 2**power else f"{limit:.10g}"
+
+
+def keys(model: Any) -> str:
+    """The keys of one model."""
+    schema = model.model_json_schema()
+    shared, rows = schema.get("$defs", {}), []
+    for name, key in schema["properties"].items():
+        if name == "kind" and "const" in key:
+            continue
+        field = next(f for n, f in model.model_fields.items() if name in (n, f.alias))
+        given = field.get_default(call_default_factory=True)
+        default = "needed" if field.is_required() else "" if given is None else f"`{toml(given)}`"
+        meaning = escaped(key.get("description", ""))
+        rows.append((f"`{name}`", allowed(key, shared), default, meaning))
+    return table(("key", "takes", "default", "meaning"), rows) if rows else "No keys but `kind`."
+
+
+def about(model: Any) -> str:
+    """The docstring of a class, as paragraphs."""
+    return "\n\n".join(escaped(part) for part in inspect.cleandoc(model.__doc__).split("\n\n"))
+
+
+def configuration() -> str:
+    """Every table of the run spec."""
+    parts = []
+    for name, models in MODELS.items():
+        needed = "Needed." if name in REQUIRED else "Optional."
+        swept = " Takes sweeps." if name in SWEPT else ""
+        parts.append(f"## [{name}]\n\n{needed}{swept}")
+        if isinstance(models, dict):
+            for kind, model in models.items():
+                parts += [f'### {name}: "{kind}"', about(model), keys(model)]
+        else:
+            parts += [re.sub(r"^Table \\\[\w+\\\](: |\.)", "", about(models)), keys(models)]
+        if name == "load":
+            parts += ["### load: a ladder of pressures", about(Ladder), keys(Ladder)]
+    return "\n\n".join(part for part in parts if part)
+
+
+def commands() -> str:
+    """The help of every command."""
+    parts = []
+    for words in ([], *([name] for name in main.list_commands(click.Context(main)))):
+        title, asked = " ".join(["gfmd", *words]), [*words, "--help"]
+        done = CliRunner().invoke(main, asked, env={"COLUMNS": WIDTH}, prog_name="gfmd")
+        parts.append(f"## {title}\n\n```console\n$ {title} --help\n{done.output.rstrip()}\n```")
+    return "\n\n".join(parts)
+
+
+def examples() -> str:
+    """The specs of configs/ and what their first lines say of them."""
+    rows = []
+    for path in sorted(CONFIGS.glob("*.toml")):
+        text = path.read_text(encoding="utf-8").partition("[study]")[0]
+        said = " ".join(line.lstrip("# ") for line in text.splitlines())
+        rows.append((f"`configs/{path.name}`", escaped(said)))
+    return table(("spec", "what"), rows)
+
+
+def columns(listed: Iterable[Column]) -> str:
+    """Columns with their units."""
+    kinds = {str: "text", int: "whole number", float: "number"}
+    rows = [
+        (f"`{c.name}`", kinds[c.kind], escaped(c.units or "-"), escaped(c.meaning)) for c in listed
+    ]
+    return table(("name", "kind", "units", "meaning"), rows)
+
+
+def distributions() -> str:
+    """Densities in bins, and what is in no bin."""
+    rows = [
+        (f"`{d.name}`", f"`{d.axis}`", f"`{d.option}`", escaped(d.meaning), escaped(d.labels))
+        for d in DISTRIBUTIONS
+    ]
+    told = table(("name", "bins", "asked for by", "meaning", "middles of the bins"), rows)
+    return f"{told}\n\n{columns(c for found in WEIGHTS.values() for c in found)}"
+
+
+MAKERS = {
+    "configuration": configuration,
+    "examples": examples,
+    "commands": commands,
+    "contract": lambda: columns(CONTRACT),
+    "further": lambda: columns(FURTHER),
+    "distributions": distributions,
+    "scenes": lambda: columns(SHELLS),
+    "fields": lambda: columns(FIELDS),
+    "spectra": lambda: columns(SPECTRA),
+    "autocorrelations": lambda: columns(AUTOCORRELATIONS),
+}
+
+
+def renewed(text: str) -> str:
+    """A page with its generated parts made anew."""
+    return PART.sub(lambda part: f"{part[1]}\n{MAKERS[part[2]]()}\n\n{part[3]}", text)
+
+
+def run(check: bool) -> int:
+    """Write the pages, or say which are out of date; the exit status."""
+    stale = 0
+    for name in PAGES:
+        page = DOCS / name
+        text = page.read_text(encoding="utf-8")
+        if text == (new := renewed(text)):
+            continue
+        if check:
+            print(f"docs/{name}: out of date; python scripts/reference_pages.py writes it")
+            stale = 1
+        else:
+            page.write_text(new, encoding="utf-8")
+            print(f"docs/{name}: written")
+    return stale
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--check", action="store_true")
+    sys.exit(run(parser.parse_args().check))

@@ -1,0 +1,256 @@
+"""Every code block of the documentation does what the page says.
+
+Blocks of a page run in their order, in one folder that has `configs/`: `python` in one namespace,
+`toml` through the reader of run specs, `console` through the command line, its output compared with
+the page. A comment right before a block says what is special about it:
+
+    <!-- not run: REASON -->   left alone, and counted
+    <!-- slow -->              in `make validate` only, with what needs it
+    <!-- status: N -->         the exit status that the last command ends with
+    <!-- file: NAME -->        the file NAME has, or gets, these contents
+
+In output a line of `...` stands for any lines, and numbers may differ in their last digits.
+"""
+
+import importlib.util
+import io
+import re
+import shlex
+import shutil
+import tomllib
+from contextlib import redirect_stdout
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+from click.testing import CliRunner
+
+import gfmd_cli
+from gfmd_cli.cli import main
+from gfmd_cli.study.parse import read_spec, read_tables
+
+ROOT = Path(__file__).parents[1]
+PAGES = [
+    *(ROOT / name for name in ("README.md", "CONTRIBUTING.md", "SECURITY.md", "CHANGELOG.md")),
+    *sorted((ROOT / "docs").glob("*.md")),
+]
+INDENTED = re.compile(r"^(?![ ]|[-*] |\d+\. |\|).*\n\n {4}(?![-*] )\S", re.MULTILINE)
+FENCE = re.compile(r"^( *)```(\S*)\n(.*?)^\1```$", re.MULTILINE | re.DOTALL)
+COMMENT = re.compile(r"<!-- ([a-z ]+)(?:: (.*?))? -->\s*$")
+NUMBER = re.compile(r"[+-]?\d+\.?\d*(?:e[+-]?\d+)?")
+LAST_DIGITS = 3  # in units of the last one that the page has
+RELATIVE = 2e-3  # or this, where rounding sends two solves different ways
+SMALL = 1e-5  # below it, numbers of two digits are residuals: as large as they happen to be
+BASE = {
+    "surface": {"kind": "self-affine", "cutoff": 0.05},
+    "elastomer": {"kind": "half-space"},
+    "grid": {"points": 64},
+    "load": {"p_star": 0.1},
+}
+
+
+class Block(NamedTuple):
+    """A fenced block of a page."""
+
+    page: Path
+    line: int
+    language: str
+    text: str
+    said: dict[str, str]
+    """The comments before it."""
+
+    @property
+    def place(self) -> str:
+        return f"{self.page.relative_to(ROOT)}:{self.line}"
+
+
+def blocks(page: Path) -> list[Block]:
+    text = page.read_text(encoding="utf-8")
+    found = []
+    for fence in FENCE.finditer(text):
+        said, before = {}, text[: fence.start()].rstrip(" ").removesuffix("\n")
+        while comment := COMMENT.search(before.rpartition("\n")[2]):
+            said[comment[1]] = comment[2] or ""
+            before = before.rpartition("\n")[0]
+        line = text[: fence.start()].count("\n") + 1
+        inner = re.sub(rf"^{fence[1]}", "", fence[3], flags=re.MULTILINE)
+        found.append(Block(page, line, fence[2], inner, said))
+    return found
+
+
+def same_token(shown: str, found: str) -> bool:
+    """Whether two words agree, numbers in them up to their last digits."""
+    if shown == found:
+        return True
+    if NUMBER.sub("#", shown) != NUMBER.sub("#", found):
+        return False
+    return all(map(same_number, NUMBER.findall(shown), NUMBER.findall(found)))
+
+
+def same_number(shown: str, found: str) -> bool:
+    if shown.lstrip("+-").isdigit():
+        return shown == found
+    a, b = float(shown), float(found)
+    mantissa, _, exponent = shown.partition("e")
+    digit = 10.0 ** (int(exponent or 0) - len(mantissa.partition(".")[2]))
+    if "e" in shown and len(mantissa.strip("+-")) <= 3 and max(abs(a), abs(b)) < SMALL:
+        return True
+    return abs(a - b) <= max(LAST_DIGITS * digit * 1.001, RELATIVE * abs(a))
+
+
+def same_line(shown: str, found: str) -> bool:
+    one, other = shown.split(), found.split()
+    return len(one) == len(other) and all(map(same_token, one, other))
+
+
+def matches(shown: list[str], found: list[str]) -> bool:
+    """Whether the lines of a page are what was printed, `...` standing for any lines."""
+    if not shown:
+        return not found
+    if shown[0].strip() == "...":
+        return any(matches(shown[1:], found[skip:]) for skip in range(len(found) + 1))
+    return bool(found) and same_line(shown[0], found[0]) and matches(shown[1:], found[1:])
+
+
+def run_console(block: Block) -> None:
+    """Run the commands of a block one by one and compare what they print."""
+    commands: list[tuple[str, list[str]]] = []
+    for line in block.text.replace(" \\\n    ", " ").splitlines():
+        if line.startswith("$ "):
+            commands.append((line[2:], []))
+        else:
+            assert commands, f"{block.place}: begins without a command"
+            commands[-1][1].append(line)
+    for number, (command, shown) in enumerate(commands):
+        words = shlex.split(command, comments=True)
+        assert words[0] == "gfmd", f"{block.place}: cannot run {command!r}; say why: not run"
+        done = CliRunner().invoke(main, words[1:], prog_name="gfmd", env={"COLUMNS": "100"})
+        if done.exception is not None and not isinstance(done.exception, SystemExit):
+            raise done.exception
+        wanted = int(block.said.get("status", 0)) if number == len(commands) - 1 else 0
+        lines = [line.rstrip() for line in done.output.strip("\n").splitlines()]
+        while shown and not shown[-1].strip():
+            shown.pop()
+        told = f"{block.place}: $ {command}\n{done.output}"
+        assert done.exit_code == wanted, told
+        assert matches(shown, lines), told
+
+
+def run_toml(block: Block) -> None:
+    """Read a spec, or a part of one laid over a small one."""
+    data = tomllib.loads(block.text)
+    if name := block.said.get("file"):
+        file = Path(name)
+        if not file.exists():
+            file.write_text(block.text)
+        there = file.read_text()
+        assert tomllib.loads(there) == data, f"{block.place}: not what {file} has"
+        if there.startswith("#:schema"):  # by gfmd init: the comments are a part of it
+            assert there.partition("\n")[2] == block.text, f"{block.place}: not what {file} has"
+        read_spec(file)
+        return
+    whole = dict(BASE)
+    for table, keys in data.items():
+        laid_over = isinstance(keys, dict) and "kind" not in keys and table != "load"
+        whole[table] = BASE.get(table, {}) | keys if laid_over else keys
+    read_tables(whole)
+
+
+def run_block(block: Block, namespace: dict) -> None:
+    if block.language == "console":
+        run_console(block)
+    elif block.language == "toml":
+        run_toml(block)
+    elif block.language == "python":
+        code = compile("\n" * block.line + block.text, str(block.page), "exec")
+        with redirect_stdout(io.StringIO()):
+            exec(code, namespace)
+    else:
+        pytest.fail(f"{block.place}: {block.language or 'no language'}: cannot be run; say why")
+
+
+def run_page(page: Path, folder: Path, *, slow: bool) -> None:
+    shutil.copytree(ROOT / "configs", folder / "configs")
+    namespace: dict = {"__name__": page.stem}
+    for block in blocks(page):
+        if "not run" not in block.said and (slow or "slow" not in block.said):
+            run_block(block, namespace)
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.setenv("MPLBACKEND", "agg")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def name(page: Path) -> str:
+    return page.stem
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name)
+def test_blocks_of_the_page_run(page, folder):
+    if any("docs" in str(page) and b.language == "python" for b in blocks(page)):
+        pytest.importorskip("xarray")
+    run_page(page, folder, slow=False)
+
+
+@pytest.mark.validation
+@pytest.mark.parametrize(
+    "page", [p for p in PAGES if any("slow" in b.said for b in blocks(p))], ids=name
+)
+def test_slow_blocks_of_the_page_run(page, folder):
+    run_page(page, folder, slow=True)
+
+
+def test_blocks_that_are_not_run_say_why(capsys):
+    every = [block for page in PAGES for block in blocks(page)]
+    left = [block for block in every if "not run" in block.said]
+    slow = [block for block in every if "slow" in block.said and "not run" not in block.said]
+    with capsys.disabled():
+        print(f"\n{len(every)} blocks in the documentation, {len(left)} not run:")
+        for block in left:
+            print(f"  {block.place} ({block.language}): {block.said['not run']}")
+        print(f"{len(slow)} run in `make validate` only")
+    for block in every:
+        assert block.language, f"{block.place}: no language"
+        assert block.said.get("not run", "because") != "", f"{block.place}: no reason"
+    for page in PAGES:  # an indented block has no language to be run by
+        found = INDENTED.search(FENCE.sub("", page.read_text(encoding="utf-8")))
+        assert found is None, f"{page.name}: {found}"
+    assert len(every) == sum(len(re.findall(r"^ *```\S", p.read_text(), re.M)) for p in PAGES)
+
+
+def test_the_generated_pages_are_up_to_date(capsys):
+    spec = importlib.util.spec_from_file_location("pages", ROOT / "scripts" / "reference_pages.py")
+    pages = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(pages)
+    assert pages.run(check=True) == 0, capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("shown", "found", "same"),
+    [
+        ("0.1234", "0.1236", True),
+        ("0.1234", "0.1244", False),
+        ("7.2e-07", "4.0e-06", True),
+        ("6.1035e-05", "9.1035e-05", False),
+        ("p*=0.1", "p*=0.1", True),
+        ("n=1", "n=3", False),
+        ("converged", "missing", False),
+    ],
+)
+def test_numbers_are_compared_to_their_last_digits(shown, found, same):
+    assert same_token(shown, found) is same
+
+
+def test_dots_stand_for_any_lines():
+    assert matches(["a", "...", "d"], ["a", "b", "c", "d"])
+    assert not matches(["a", "...", "e"], ["a", "b", "c", "d"])
+    assert not matches(["a"], ["a", "b"])
+
+
+def test_the_citation_names_this_version():
+    told = re.search(r"^version: (\S+)$", (ROOT / "CITATION.cff").read_text(), re.MULTILINE)
+    assert told is not None
+    assert told[1] == gfmd_cli.__version__
