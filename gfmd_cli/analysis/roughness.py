@@ -14,6 +14,7 @@ from gfmd_cli.study.tasks import describe
 
 PRESSURES = (0.003, 0.03, 0.3)  # p* that theory is told at
 STRANGE = 3.0  # scatter per shell, beyond which the surface is not of this kind
+MIRRORED = 4.0  # times the scatter, where waves come in equal fours
 
 
 def roughness(surface: Surface) -> str:
@@ -38,7 +39,15 @@ def roughness(surface: Surface) -> str:
     table = _table(found, seen, length)
     like = SelfAffine.model_validate(table)
     theories["the fit"] = Persson(build_scene(like, HalfSpace(), 2 * like.smallest_grid()).shells)
-    lines += [*_told(found), *_predicted(theories), "  as random roughness:", "", "  [surface]"]
+    mirrored = isinstance(surface, FileSurface) and surface.treatment()[1] == "mirror"
+    usual = MIRRORED if mirrored else 1.0
+    lines += [
+        *_told(found, usual),
+        *_predicted(theories),
+        "  as random roughness:",
+        "",
+        "  [surface]",
+    ]
     return "\n".join([*lines, *(f"  {key} = {json.dumps(value)}" for key, value in table.items())])
 
 
@@ -55,8 +64,8 @@ def _predicted(theories: dict[str, Persson]) -> list[str]:
     return lines
 
 
-def _told(found: SelfAffineFit) -> list[str]:
-    """The fit, and how far it is to be trusted."""
+def _told(found: SelfAffineFit, usual: float) -> list[str]:
+    """The fit, and how far it is to be trusted; `usual` is the scatter of Gaussian roughness."""
     short = 2 * pi / found.q_s
     lines = [f"  spectrum: H = {found.hurst:.3f} +- {found.hurst_error:.3f}"]
     if found.q_r:
@@ -66,10 +75,10 @@ def _told(found: SelfAffineFit) -> list[str]:
     else:
         lines[0] += ", no roll-off within the cell"
     lines[0] += f", lambda_s = {short:.3g} m (scatter {found.scatter:.3g})"
-    if found.scatter > STRANGE:
+    if found.scatter > STRANGE * usual:
         lines.append(
-            "  A scatter far above 1: the spectrum is not that of a self-affine surface; what "
-            "follows has the same rms height and gradient only."
+            f"  A scatter far above {usual:g}: the spectrum is not that of a self-affine surface; "
+            "what follows has the same rms height and gradient only."
         )
     return lines
 

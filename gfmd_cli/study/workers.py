@@ -93,11 +93,13 @@ def solve_in_pool(
     with ProcessPoolExecutor(jobs, context, *begin) as pool:
         # a worker that begins keeps a signal for when it can note it
         signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
-        futures = {
-            pool.submit(_work, task, parts, means): task
-            for task in sorted(pending, key=lambda task: -task.seconds)
-        }
-        signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
+        try:
+            futures = {
+                pool.submit(_work, task, parts, means): task
+                for task in sorted(pending, key=lambda task: -task.seconds)
+            }
+        finally:
+            signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
         for task, status in _as_they_end(futures, pool):
             if status == "killed":
                 reason = "its worker process was killed (out of memory?)"
