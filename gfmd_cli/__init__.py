@@ -4,9 +4,9 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from gfmd_cli.api import Result, compare, rows, run, solve
+    from gfmd_cli.api import Result, compare, dataset, rows, run, solve
 
-__all__ = ["Result", "compare", "rows", "run", "solve"]
+__all__ = ["Result", "compare", "dataset", "rows", "run", "solve"]
 __version__ = "0.1.0"
 
 

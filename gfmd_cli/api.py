@@ -13,6 +13,7 @@ from typing import Any
 
 from gfmd_cli.analysis.compare import Comparison
 from gfmd_cli.analysis.compare import compare as compare_study
+from gfmd_cli.analysis.export import as_dataset
 from gfmd_cli.errors import InputError
 from gfmd_cli.physics.fields import Field
 from gfmd_cli.study.grids import no_state
@@ -141,6 +142,14 @@ def compare(study: Path | str) -> Comparison:
     Raises InputError, StudyError.
     """
     return compare_study(Path(study))
+
+
+def dataset(study: Path | str) -> Any:
+    """A study as an `xarray.Dataset`, all of it but the fields on the grid.
+
+    Raises InputError where xarray is missing or there is no such study, StudyError.
+    """
+    return as_dataset(Path(study))
 
 
 def _read(spec: Path | str | Tables, overrides: tuple[str, ...] = ()) -> tuple[Spec, str]:

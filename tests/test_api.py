@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 import gfmd_cli
-from gfmd_cli import compare, rows, run, solve
+from gfmd_cli import compare, dataset, rows, run, solve
 from gfmd_cli.errors import InputError
 
 TABLES = {
@@ -20,6 +20,7 @@ def test_a_notebook_gets_the_numbers_of_the_command(tmp_path):
     for name in ("a_r", "sigma_p", "u_g", "residual", "status"):
         assert getattr(alone, name) == first[name], name
     assert second["pressure"] == pytest.approx(3e6)
+    assert dataset(study).a_r.values.tolist() == [first["a_r"], second["a_r"]]
 
 
 def test_fields_are_those_of_the_contact_problem():
