@@ -9,7 +9,10 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
+
+import numpy as np
 
 from gfmd_cli.analysis.compare import Comparison
 from gfmd_cli.analysis.compare import compare as compare_study
@@ -69,16 +72,30 @@ class Result:
         return self.displacement - self.height
 
 
-def solve(spec: Path | str | Tables, *, threads: int = 1) -> Result:
-    """Solve one contact in memory; nothing is written.
+def solve(spec: Path | str | Tables, *, heights: Field | None = None, threads: int = 1) -> Result:
+    """Solve one contact in memory; nothing is kept on disk.
 
     Parameters
     ----------
     spec : describes one pressure on one scene
+    heights : (N, N), pressed in the place of the surface of a dictionary, whose table "surface" may
+        say more: length, periodic, level, edges, scale, crop, missing
     threads : of the transforms and of what lies between them
 
     Raises InputError for a bad spec, or one of several tasks.
     """
+    if heights is None:
+        return _solve(spec, threads)
+    if not isinstance(spec, Mapping):
+        raise InputError("heights go with a dictionary; a spec in a file has a surface")
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "heights.npy"
+        np.save(path, heights)
+        surface = {**spec.get("surface", {}), "kind": "file", "path": str(path)}
+        return _solve({**spec, "surface": surface}, threads)
+
+
+def _solve(spec: Path | str | Tables, threads: int) -> Result:
     tasks = plan(_read(spec)[0])
     if len(tasks) != 1:
         raise InputError(f"solve takes one contact, the spec has {len(tasks)}; run() takes them")

@@ -36,6 +36,17 @@ def test_fields_are_those_of_the_contact_problem():
     assert found.gap.mean() == pytest.approx(found.u_g * found.h_std, rel=1e-6)
 
 
+def test_an_array_may_be_pressed():
+    """The same heights as those of the surface."""
+    alone = solve(TABLES)
+    tables = {name: TABLES[name] for name in ("elastomer", "grid", "load")}
+    again = solve(tables | {"surface": {"length": 1e-3}}, heights=alone.height)
+    assert again.a_r == alone.a_r
+    np.testing.assert_allclose(again.stress, alone.stress, atol=1e-5 * alone.delta_sigma)
+    with pytest.raises(InputError, match="heights go with a dictionary"):
+        solve("a.toml", heights=alone.height)
+
+
 def test_theory_stands_beside_a_study(tmp_path):
     (curve,) = compare(run(TABLES, tmp_path / "a.h5")).curves
     assert curve.prediction.a_r == pytest.approx(curve.persson.contact_area(1e6))

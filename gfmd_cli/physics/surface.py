@@ -5,7 +5,7 @@ grid [y, x] (line scenes: [x]); `smallest_grid()` says which grid resolves it. E
 are those of Mueser, "Elastic contacts of randomly rough surfaces across the spatial dimensions".
 """
 
-from functools import cache
+from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, Self, get_args
 
@@ -236,9 +236,9 @@ class FileSurface(Indenter):
         return ", ".join(steps)
 
 
-@cache
+@lru_cache(maxsize=4)
 def _topography(path: Path, dataset: str | None, crop: bool, fill: bool) -> Topography:
-    """The file, read once a process."""
+    """The file, read once as a rule."""
     return read_topography(path, dataset, crop=crop, fill=fill)
 
 
