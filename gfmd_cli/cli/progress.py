@@ -52,7 +52,8 @@ class Reporter:
         from tqdm import tqdm
 
         if progress.tasks_left is not None:
-            self.whole = self.whole or tqdm(position=0, leave=False, bar_format=RUN)
+            if self.whole is None:  # a bar without a total has no truth value
+                self.whole = tqdm(position=0, leave=False, bar_format=RUN)
             self.whole.set_description_str(_left(progress))
         if progress.event in ("done", "interrupted"):
             self._close(progress.task)

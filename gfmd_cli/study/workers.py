@@ -5,6 +5,7 @@ import multiprocessing
 import os
 import signal
 import sys
+import traceback
 from collections import Counter
 from collections.abc import Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
@@ -132,8 +133,12 @@ def _as_they_end(
 
 
 def _listen(reports: Any, report: Report) -> None:
+    """Tell what the workers say; were nobody to listen, they would wait for ever."""
     for progress in iter(reports.get, None):
-        report(progress)
+        try:
+            report(progress)
+        except Exception:  # a display that fails is no reason to lose a run
+            traceback.print_exc()
 
 
 _reports: Any = None  # of a worker process, to the one that prints

@@ -1,0 +1,64 @@
+import fcntl
+import os
+import pty
+import struct
+import subprocess
+import sys
+import termios
+
+import pytest
+
+from gfmd_cli.study.reading import read_rows
+
+SPEC = """\
+[surface]
+kind = "self-affine"
+cutoff = 0.05
+[elastomer]
+kind = "power"
+n = [0, 1, 3]
+[grid]
+points = 64
+[load]
+p_star = { from = 0.01, to = 1, per_decade = 4 }
+"""
+
+
+def on_a_terminal(folder, *words):
+    """What a command shows on a terminal, and its exit status."""
+    ours, theirs = pty.openpty()
+    fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 100, 0, 0))
+    process = subprocess.Popen(
+        [sys.executable, "-m", "gfmd_cli", *words], cwd=folder, stdout=theirs, stderr=theirs
+    )
+    os.close(theirs)
+    shown = b""
+    while True:
+        try:
+            read = os.read(ours, 65536)
+        except OSError:  # EIO: the other side has ended
+            break
+        if not read:
+            break
+        shown += read
+    os.close(ours)
+    return process.wait(60), shown.decode()
+
+
+@pytest.mark.parametrize("jobs", ["1", "2"])
+def test_a_run_shows_its_progress_on_a_terminal(tmp_path, jobs):
+    (tmp_path / "spec.toml").write_text(SPEC)
+    status, shown = on_a_terminal(tmp_path, "run", "spec.toml", "-j", jobs)
+    assert status == 0, shown
+    assert "Traceback" not in shown
+    assert "tasks left" in shown
+    assert "next: gfmd analyze study.h5" in shown
+    assert len(read_rows(tmp_path / "study.h5")) == 27
+
+
+def test_a_bench_shows_its_progress_on_a_terminal(tmp_path):
+    (tmp_path / "spec.toml").write_text(SPEC)
+    short = ("--set", "load.p_star=0.1", "--set", "elastomer.n=1")
+    status, shown = on_a_terminal(tmp_path, "bench", "spec.toml", *short)
+    assert status == 0, shown
+    assert "Traceback" not in shown
