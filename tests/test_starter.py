@@ -104,3 +104,42 @@ def test_surface_refuses_a_line(gfmd, tmp_path):
         "[grid]\npoints = 64\n[load]\np_star = 1\n"
     )
     assert "is a line" in gfmd("surface", "wave.toml", status=2)
+
+
+def test_a_scan_in_nanometres_that_does_not_repeat_is_remarked_on_and_mended(gfmd, tmp_path):
+    """Tilted by 300 nm, 2 nm rough, 1 um wide."""
+    rough = np.random.default_rng(0).normal(size=(32, 32)) * 2
+    np.save(tmp_path / "nm.npy", rough + np.linspace(0, 300, 32))
+    told = gfmd("surface", "nm.npy")
+    for remark in ("names no side", "are heights and side in metres", "step across the border"):
+        assert remark in told
+    mended = [f"surface.{key}" for key in ("scale=1e-9", "length=1e-6", "periodic=false")]
+    words = [word for key in mended for word in ("--set", key)]
+    told = gfmd("surface", "nm.npy", *words)
+    assert "note:" not in told
+    assert "L = 1e-06 m" in told
+    gfmd("init", "first.toml", "--from", "nm.npy", *words)
+    (surface,) = read_spec(tmp_path / "first.toml")[0].surface
+    assert (surface.scale, surface.length, surface.periodic) == (1e-9, 1e-6, False)
+    assert "NOTE" not in (tmp_path / "first.toml").read_text()
+
+
+@pytest.mark.parametrize(
+    ("pair", "told"),
+    [
+        ("surface.scael=1", "unknown key 'scael' - did you mean 'scale'"),
+        ("surface.scale=[1,2]", "with one value"),
+        ("grid.points=64", "takes surface.key=value"),
+    ],
+)
+def test_a_wrong_word_on_a_scan_is_refused(gfmd, tmp_path, pair, told):
+    np.save(tmp_path / "h.npy", np.random.default_rng(0).normal(size=(16, 16)))
+    assert told in gfmd("surface", "h.npy", "--set", pair, status=2)
+
+
+def test_an_exponent_that_is_no_roughness_is_said_to_be_changed(gfmd, tmp_path):
+    y, x = np.mgrid[:64, :64] * (2 * np.pi / 64)
+    height = sum(np.cos(m * x) * np.cos(m * y) * m**-4.0 for m in range(1, 20))
+    height += 1e-9 * np.random.default_rng(0).normal(size=height.shape)
+    np.save(tmp_path / "h.npy", height)
+    assert "is no roughness" in gfmd("surface", "h.npy")

@@ -8,6 +8,7 @@ import pytest
 
 from gfmd_cli.errors import InputError
 from gfmd_cli.physics.preparation import fill_missing, level, make_periodic
+from gfmd_cli.physics.surface import FileSurface
 from gfmd_cli.physics.topography import read_topography
 
 SCAN = Path(__file__).parents[1] / "configs" / "data" / "di-3.di"
@@ -473,3 +474,16 @@ def test_a_filled_hole_lies_between_its_rim(heights):
     filled = fill_missing(np.where(missing, np.nan, heights), missing)
     assert filled.min() == heights[~missing].min()
     assert filled.max() == heights[~missing].max()
+
+
+def test_a_side_without_a_unit_is_in_that_of_the_heights(tmp_path):
+    pytest.importorskip("SurfaceTopography")
+    rows = (f"{x}e-8 {y}e-8 {(x * y) % 5}e-9" for y in range(16) for x in range(16))
+    (tmp_path / "h.xyz").write_text("\n".join(rows))
+    read = read_topography(tmp_path / "h.xyz")
+    assert not read.metres
+    assert read.length == pytest.approx(16e-8)
+    plain = FileSurface(path=tmp_path / "h.xyz")
+    assert plain.cell == pytest.approx(16e-8)
+    assert FileSurface(path=tmp_path / "h.xyz", scale=1e-3).cell == pytest.approx(16e-11)
+    assert FileSurface(path=tmp_path / "h.xyz", length=2.0).cell == 2.0

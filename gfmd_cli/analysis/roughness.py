@@ -13,6 +13,7 @@ from gfmd_cli.physics.surface import FileSurface, SelfAffine, Surface
 from gfmd_cli.study.tasks import describe
 
 PRESSURES = (0.003, 0.03, 0.3)  # p* that theory is told at
+LEAST = 0.01  # Hurst exponent of a table
 STRANGE = 3.0  # scatter per shell, beyond which the surface is not of this kind
 MIRRORED = 4.0  # times the scatter, where waves come in equal fours
 
@@ -31,6 +32,8 @@ def roughness(surface: Surface) -> str:
         f"rms curvature {seen.curvature:.5g} 1/m",
         f"  half-space: p* = 1 is p = {0.5 * seen.gradient:.5g} E_star",
     ]
+    if isinstance(surface, FileSurface):
+        lines += [f"  note: {remark}" for remark in surface.remarks()]
     theories = {"its spectrum": Persson(scene.shells)}
     try:
         found = fit(scene.shells)
@@ -80,6 +83,11 @@ def _told(found: SelfAffineFit, usual: float) -> list[str]:
             f"  A scatter far above {usual:g}: the spectrum is not that of a self-affine surface; "
             "what follows has the same rms height and gradient only."
         )
+    if not LEAST <= found.hurst <= 1:
+        lines.append(
+            f"  An exponent outside {LEAST:g} to 1 is no roughness: what follows has the nearest "
+            "one, and another gradient."
+        )
     return lines
 
 
@@ -90,7 +98,7 @@ def _table(found: SelfAffineFit, seen: Moments, length: float) -> dict[str, Any]
     else:
         keys = {"spectrum": "cutoff", "rolloff": 1.0}
     keys |= {
-        "hurst": min(max(found.hurst, 0.01), 1.0),
+        "hurst": min(max(found.hurst, LEAST), 1.0),
         "cutoff": 2 * pi / found.q_s / length,
         "h_std": seen.height,
         "length": length,

@@ -23,6 +23,8 @@ def report(study: Path, output: Path | None, bench: Path | None) -> None:
     from gfmd_cli.study.files import check_place, write_whole
 
     path = output or study.with_suffix(".html")
+    if path.suffix not in (".html", ".htm"):
+        raise InputError(f"{path}: unknown suffix {path.suffix!r}; allowed: .html, .htm")
     for source in (study, bench):
         if source is not None and path.resolve() == source.resolve():
             raise InputError(f"{path}: the report would replace what it is made from; use -o")

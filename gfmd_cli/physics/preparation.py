@@ -62,6 +62,13 @@ def make_periodic(heights: Field, how: Edges, taper: float = 0.1) -> Field:
     return tapered
 
 
+def border_step(heights: Field) -> float:
+    """The rms step across the border over that between neighbours inside: 1 for a periodic map."""
+    across = np.concatenate([heights[0] - heights[-1], heights[:, 0] - heights[:, -1]])
+    inside = np.mean([np.mean(np.diff(heights, axis=axis) ** 2) for axis in (0, 1)])
+    return float(np.sqrt(np.mean(across**2) / inside)) if inside > 0 else 1.0
+
+
 def fill_missing(heights: Field, missing: Mask) -> Field:
     """Heights with the missing ones filled in so that each is the mean of its neighbours.
 

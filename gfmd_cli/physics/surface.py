@@ -28,7 +28,7 @@ from gfmd_cli.physics.bodies import (
 from gfmd_cli.physics.choice import FilePath, Positive, Seed
 from gfmd_cli.physics.fields import Field
 from gfmd_cli.physics.grid import Grid
-from gfmd_cli.physics.preparation import Edges, Levelling, level, make_periodic
+from gfmd_cli.physics.preparation import Edges, Levelling, border_step, level, make_periodic
 from gfmd_cli.physics.ranks import Ranks
 from gfmd_cli.physics.slabs import lay_out
 from gfmd_cli.physics.topography import Topography, read_topography
@@ -143,6 +143,10 @@ def _ring(draw: np.random.Generator, ring: int, first: int, last: int) -> tuple[
     return y, x, np.concatenate(phases)
 
 
+STEEP = 3.0  # rms gradient that no machined or worn surface has
+CLIFF = 5.0  # step across the border of a map over those inside, which is no roughness
+
+
 class FileSurface(Indenter):
     """A height map from a file: .npy, HDF5, netCDF, or what microscopes write (SurfaceTopography).
 
@@ -171,7 +175,7 @@ class FileSurface(Indenter):
     taper: Annotated[float, Key(gt=0, le=0.5)] = 0.1
     """Width of the frame that a window fades, as a share of the side."""
     scale: Positive = 1.0
-    """Factor from the heights of the file to metres."""
+    """Factor from the heights of the file to metres; on its side, too, where it names no unit."""
     length: Positive | None = None
     """Side of the (cropped) map [m]; by default what the file says, else 1."""
 
@@ -192,12 +196,19 @@ class FileSurface(Indenter):
     @property
     def cell(self) -> float:
         """Side of the periodic cell [m]: twice that of the map where it is mirrored."""
-        stated = self.length or self._topography().length or 1.0
+        stated = self._stated() or 1.0
         return 2 * stated if self.treatment()[1] == "mirror" else stated
 
     def states_no_length(self) -> bool:
         """Whether the side of the map is 1 m for want of anything else."""
-        return self.length is None and self._topography().length is None
+        return self._stated() is None
+
+    def _stated(self) -> float | None:
+        """Side of the map [m]; without a unit it is in that of the heights, and scaled as they."""
+        read = self._topography()
+        if self.length is not None or read.length is None:
+            return self.length
+        return read.length if read.metres else self.scale * read.length
 
     def treatment(self) -> tuple[Levelling, Edges]:
         """What is done to the map: levelling, edges."""
@@ -215,6 +226,26 @@ class FileSurface(Indenter):
 
     def _topography(self) -> Topography:
         return _topography(self.path, self.dataset, self.crop, self.missing == "fill")
+
+    def remarks(self) -> list[str]:
+        """What looks like a mistake, for people."""
+        heights, notes = self._periodic_heights(), []
+        if self.states_no_length():
+            notes.append("the file names no side, so L = 1 m: surface.length")
+        step = np.sqrt(2 * np.mean(np.diff(heights, axis=0) ** 2))
+        gradient = float(step) * len(heights) / self.cell
+        if gradient > STEEP:
+            notes.append(
+                f"rms gradient {gradient:.3g}: are heights and side in metres? surface.scale is "
+                "the factor from the heights of the file to metres, surface.length the side"
+            )
+        cliff = border_step(heights)
+        if cliff > CLIFF:
+            notes.append(
+                f"the step across the border is {cliff:.3g} times those inside: if the map does "
+                "not repeat, surface.periodic = false levels it and makes its edges meet"
+            )
+        return notes
 
     def preparation(self) -> str:
         """What was read and what was done to it, for people."""

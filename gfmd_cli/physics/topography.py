@@ -31,7 +31,9 @@ class Topography:
     heights: Field
     """(N, N) in metres where the file states its unit, else in the unit of the file."""
     length: float | None
-    """Side of the square cell [m], None where the file does not say."""
+    """Side of the square cell, None where the file does not say."""
+    metres: bool
+    """Whether the side is in metres; else in the unknown unit of the heights."""
     periodic: bool | None
     """None for a bare array, which does not say; a scan is not, unless its file says otherwise."""
     source: str
@@ -92,7 +94,7 @@ def read_topography(
     rows, columns = ((size - side) // 2 for size in shape)
     part = read.heights[rows : rows + side, columns : columns + side]
     heights, missing = _checked(path, part, fill)
-    return Topography(heights, length, read.periodic, read.source, shape, missing)
+    return Topography(heights, length, read.metres, read.periodic, read.source, shape, missing)
 
 
 def _read(path: Path, dataset: str | None, max_bytes: int) -> _Map:
@@ -225,7 +227,7 @@ def _read_channel(path: Path, reader: Any, dataset: str | None, max_bytes: int) 
 
 
 def _length(path: Path, read: _Map, side: int) -> float | None:
-    """Side [m] of a square of `side` points. Raises InputError where pixels are no squares."""
+    """Extent of a square of `side` points. Raises InputError where pixels are no squares."""
     if read.sides is None:
         return None
     y, x = (extent / size for extent, size in zip(read.sides, read.heights.shape, strict=True))
@@ -234,7 +236,7 @@ def _length(path: Path, read: _Map, side: int) -> float | None:
             f"{path}: a point of the scan is {y:g} x {x:g} wide (relative difference "
             f"{abs(x - y) / max(x, y):.1e}); square ones are needed: resample it"
         )
-    return side * x if read.metres else None
+    return float(side * x)
 
 
 def _begins_with(path: Path, mark: bytes) -> bool:

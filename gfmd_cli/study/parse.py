@@ -12,7 +12,7 @@ from pydantic import ValidationError
 from gfmd_cli.errors import InputError
 from gfmd_cli.physics.choice import Choice
 from gfmd_cli.physics.elastomer import Elastomer
-from gfmd_cli.physics.surface import Surface
+from gfmd_cli.physics.surface import FileSurface, Surface
 from gfmd_cli.solvers.cascade import SolverChoice
 from gfmd_cli.study.spec import (
     SHAPES,
@@ -89,6 +89,24 @@ def read_tables(data: dict[str, Any]) -> Spec:
     if _is_deep(data):
         raise InputError(f"spec: nested deeper than {MAX_DEPTH}")
     return build_spec(data, Path(), _Where("spec", "", {}))
+
+
+def read_scan(path: Path, overrides: tuple[str, ...] = ()) -> FileSurface:
+    """A height map as a surface, "surface.key=value" each. Raises InputError."""
+    data: dict[str, Any] = {"surface": {"kind": "file", "path": str(path)}}
+    origin: dict[str, str] = {}
+    for override in overrides:
+        _override(data, override, origin)
+    problems: list[str] = []
+    built = _build("surface", data["surface"], Path(), _Where(str(path), "", origin), problems)
+    if set(data) != {"surface"} or (not problems and len(built) != 1):
+        problems.append(f"{path}: --set takes surface.key=value with one value, for a height map")
+    if problems:
+        raise InputError("\n".join(problems))
+    (surface,) = built
+    if not isinstance(surface, FileSurface):
+        raise InputError(f"{path}: surface.kind is that of a file")
+    return surface.model_copy(update={"path": path})  # as it was given, for messages
 
 
 class _Where:

@@ -1,6 +1,7 @@
 """A first run spec: complete, commented, and small enough to run in seconds."""
 
 import json
+from collections.abc import Sequence
 from math import log10
 from os.path import relpath
 from pathlib import Path
@@ -38,6 +39,14 @@ LOADS: list[Line] = [
     ("#pressure", [1e5, 1e6], "[Pa], in its place"),
     ("#contact_area", 0.1, "a_r, or mean_gap (u_g / h_std): their pressure is searched"),
 ]
+SAID = {"dataset", "periodic", "taper", "scale", "length"}
+"""Keys of a scan that are written as they were given."""
+FURTHER: list[Line] = [
+    ("#scale", 1e-9, "from the heights of the file to metres; here nm"),
+    ("#length", 1e-5, "side [m]"),
+    ("#periodic", False, "false: levelled, its edges made to meet"),
+    ("#taper", 0.1, "of the side, that a window fades"),
+]
 OPTIONS: dict[str, list[Line]] = {
     "#accuracy": [
         ("#mean_gap", 0.01, "errors that you accept, relative to the continuum value:"),
@@ -65,13 +74,14 @@ def starter(name: str) -> str:
     )
 
 
-def starter_of_scan(path: Path, scan: Path) -> str:
-    """A spec that presses a measured surface, to be written as the file `path`.
+def starter_of_scan(path: Path, given: FileSurface) -> tuple[str, list[str]]:
+    """A spec that presses a measured surface, to be written as `path`, and what looks wrong.
 
     A map that is not square is cropped and holes are filled, both said in the spec; the pressures
     run from p* = 0.003 to 0.3. Raises InputError where the scan is unfit.
     """
-    surface = _fitting(scan)
+    surface = _fitting(given)
+    scan, remarks = surface.path, surface.remarks()
     points = surface.smallest_grid()
     scene = build_scene(surface, HalfSpace(E_star=E_STAR), points)
     levelling, edges = surface.treatment()
@@ -82,7 +92,8 @@ def starter_of_scan(path: Path, scan: Path) -> str:
         needed.append(("missing", "fill", "the map has holes"))
     unit = scene.delta_sigma
     low, high = (10.0 ** round(log10(p_star * unit)) for p_star in (0.003, 0.3))
-    return _spec(
+    said = surface.model_dump(include=SAID, exclude_unset=True)
+    text = _spec(
         path.name,
         f"{scan.name} pressed on an elastic half-space: L = {scene.grid.length:.4g} m, "
         f"rms height {scene.h_std:.3g} m.",
@@ -90,11 +101,11 @@ def starter_of_scan(path: Path, scan: Path) -> str:
             "surface": [
                 ("kind", "file", "a measured map: .npy, HDF5, or what microscopes write"),
                 ("path", relpath(scan, path.parent), "relative to this file"),
+                *((key, value, "as asked for") for key, value in said.items()),
                 *needed,
                 ("level", levelling, "to take off: none, mean, plane, curvature"),
                 ("edges", edges, "made to meet by: window, mirror, none"),
-                *([("#taper", 0.1, "of the side, that a window fades")] if edges != "none" else []),
-                *([("#length", 1e-5, "side [m]")] if surface.states_no_length() else []),
+                *((key, value, why) for key, value, why in FURTHER if key[1:] not in said),
             ],
             "elastomer": [
                 ("kind", "half-space", "also membrane, plate, slab, power, table"),
@@ -110,25 +121,33 @@ def starter_of_scan(path: Path, scan: Path) -> str:
                 ("#p_star", [0.01, 0.1], "p / Delta_sigma, in its place"),
             ],
         },
-        ["sigma", "height"],
+        ["u", "sigma", "height"],
+        remarks,
     )
+    return text, remarks
 
 
-def _fitting(scan: Path) -> FileSurface:
-    """The surface of a scan, cropped and filled only where it has to be. Raises InputError."""
+def _fitting(given: FileSurface) -> FileSurface:
+    """The surface, cropped and filled only where it has to be. Raises InputError."""
     refused = []
-    for crop in (False, True):
-        for fill in (False, True):
+    for crop in (given.crop, True):
+        for missing in (given.missing, "fill"):
             try:
-                read_topography(scan, crop=crop, fill=fill)
+                read_topography(given.path, given.dataset, crop=crop, fill=missing == "fill")
             except InputError as error:
                 refused.append(error)
                 continue
-            return FileSurface(path=scan, crop=crop, missing="fill" if fill else "refuse")
+            return given.model_copy(update={"crop": crop, "missing": missing})
     raise refused[0]
 
 
-def _spec(name: str, title: str, tables: dict[str, list[Line]], fields: list[str]) -> str:
+def _spec(
+    name: str,
+    title: str,
+    tables: dict[str, list[Line]],
+    fields: list[str],
+    remarks: Sequence[str] = (),
+) -> str:
     """The text of a spec from its tables."""
     output: list[Line] = [
         ("fields", fields, 'any of "u", "sigma", "height": maps, for report and export'),
@@ -144,6 +163,7 @@ def _spec(name: str, title: str, tables: dict[str, list[Line]], fields: list[str
         f"#:schema {SCHEMA}",
         f"# {title}",
         f"# Keys that are commented out show an example. Run it: gfmd run {name}",
+        *(f"# NOTE: {remark}" for remark in remarks),
     ]
     for table, keys in whole.items():
         lines += ["", f"#[{table[1:]}]" if table.startswith("#") else f"[{table}]"]
