@@ -18,7 +18,7 @@ from gfmd_cli.analysis.compare import Comparison
 from gfmd_cli.analysis.compare import compare as compare_study
 from gfmd_cli.analysis.export import as_dataset
 from gfmd_cli.errors import InputError
-from gfmd_cli.physics.fields import Field
+from gfmd_cli.physics.fields import Field, Mask
 from gfmd_cli.study.grids import no_state
 from gfmd_cli.study.layout import MISSING
 from gfmd_cli.study.parse import read_spec, read_tables
@@ -65,6 +65,11 @@ class Result:
     def p_star(self) -> float:
         """Reduced pressure."""
         return self.pressure / self.delta_sigma
+
+    @property
+    def contact(self) -> Mask:
+        """Points in contact, whose share is a_r: no gap, and pressed (stress alone rounds)."""
+        return np.asarray((self.displacement == self.height) & (self.stress > 0))
 
     @property
     def gap(self) -> Field:
@@ -136,8 +141,8 @@ def run(
     jobs : worker processes; more than one takes a script with `if __name__ == "__main__":`
     report : told of every start, step and end of a task
 
-    Call it from the main thread: it takes signals while it runs. Raises InputError, SpaceError,
-    Interrupted.
+    In the main thread it takes signals while it runs, and ends in order on them. Raises
+    InputError, SpaceError, Interrupted.
     """
     resolved, text = _read(spec, overrides)
     path = Path(study if study is not None else f"{resolved.study.name}.h5")

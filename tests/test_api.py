@@ -1,3 +1,5 @@
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 import pytest
 
@@ -33,6 +35,7 @@ def test_fields_are_those_of_the_contact_problem():
     elastic = np.fft.ifft2(1e9 * np.hypot(q[:, None], q) * np.fft.fft2(found.displacement)).real
     np.testing.assert_allclose(found.stress, elastic + 1e6, atol=1e-6 * found.delta_sigma)
     assert found.p_star == pytest.approx(1e6 / found.delta_sigma)
+    assert found.contact.mean() == found.a_r
     assert found.gap.mean() == pytest.approx(found.u_g * found.h_std, rel=1e-6)
 
 
@@ -70,3 +73,9 @@ def test_what_makes_no_sense_is_refused(tmp_path):
         run(TABLES, tmp_path / "a.h5", overrides=("load.p_star=0.5",))
     with pytest.raises(AttributeError, match="no attribute 'walk'"):
         _ = gfmd_cli.walk
+
+
+def test_a_study_may_be_run_in_a_thread(tmp_path):
+    with ThreadPoolExecutor(1) as pool:
+        study = pool.submit(run, TABLES, tmp_path / "a.h5").result()
+    assert rows(study)[0]["status"] == "converged"

@@ -218,3 +218,22 @@ def test_the_schema_refuses_what_the_models_refuse(change):
     data = tomllib.loads(BASE.replace(*change))
     with pytest.raises(jsonschema.ValidationError):
         jsonschema.validate(data, spec_schema())
+
+
+def test_two_sweeps_differ_in_the_values_of_their_keys():
+    old = [{"kind": "a", "hurst": h, "seed": s} for h in (0.3, 0.8) for s in range(5)]
+    new = [{"kind": "a", "hurst": h, "seed": s} for h in (0.3, 0.8) for s in range(7)]
+    told = differences({"surface": old}, {"surface": new})
+    assert told == ["surface.seed: [0, 1, 2, 3, 4] -> [0, 1, 2, 3, 4, 5, 6]"]
+    assert differences([{"n": 1}], [{"n": 1}, {"n": 2}], "elastomer") == [
+        "elastomer.n: 1 -> [1, 2]"
+    ]
+
+
+def test_an_override_of_the_load_takes_the_place_of_what_the_file_says(tmp_path):
+    (tmp_path / "spec.toml").write_text(
+        '[surface]\nkind = "wave"\n[elastomer]\nkind = "half-space"\n'
+        "[grid]\npoints = 64\n[load]\npressure = 1e6\n"
+    )
+    load = read_spec(tmp_path / "spec.toml", ("load.p_star=0.5",))[0].load
+    assert (load.quantity, load.values()) == ("p_star", [0.5])

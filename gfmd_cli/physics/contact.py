@@ -114,7 +114,10 @@ class Scene:
         """The contact at reduced pressure p*. Raises InputError where that is out of range."""
         low, high = PRESSURES
         if not low <= p_star <= high:
-            raise InputError(f"load: p* = {p_star:g} is out of range, {low:g} to {high:g}")
+            raise InputError(
+                f"load: p* = {p_star:g} is out of range, {low:g} to {high:g}: p* = 1 is "
+                f"{self.delta_sigma:.3g} Pa here; are moduli, heights and lengths in Pa and m?"
+            )
         return Contact(self.grid, self.height, self.stiffness, p_star)
 
 

@@ -15,6 +15,7 @@ from gfmd_cli.physics.elastomer import Elastomer
 from gfmd_cli.physics.surface import FileSurface, Surface
 from gfmd_cli.solvers.cascade import SolverChoice
 from gfmd_cli.study.spec import (
+    LOADS,
     SHAPES,
     SOUGHT,
     SWEPT,
@@ -192,6 +193,9 @@ def _override(data: dict[str, Any], override: str, origin: dict[str, str]) -> No
         if not isinstance(inner, dict):
             raise InputError(f"--set {override}: {part!r} is no table")
         table = inner
+    if parts[0] == "load" and len(parts) == 2 and parts[1] in LOADS:
+        for other in set(LOADS) & set(table):  # one way to say it takes the place of another
+            del table[other]
     table[parts[-1]] = parsed
     origin[key.strip()] = f"--set {override}"
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from itertools import chain
 from pathlib import Path
-from threading import Timer
+from threading import Timer, current_thread, main_thread
 from typing import Any
 
 from gfmd_cli.errors import InputError, Interrupted, SpaceError
@@ -163,8 +163,14 @@ def _timer(seconds: float | None) -> Iterator[None]:
 
 @contextmanager
 def _signals_noted() -> Iterator[None]:
-    """Inside, a signal asks for an orderly stop; a second SIGINT leaves at once."""
+    """Inside, a signal asks for an orderly stop; a second SIGINT leaves at once.
+
+    Only the main thread of a program can take signals; in another they stay what they are.
+    """
     solve.stop.clear()
+    if current_thread() is not main_thread():
+        yield
+        return
 
     def note(number: int, _frame: Any) -> None:
         if number == signal.SIGINT and solve.stop.is_set():

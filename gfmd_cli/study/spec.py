@@ -256,7 +256,23 @@ def differences(old: Any, new: Any, where: str = "") -> list[str]:
             for i, (a, b) in enumerate(zip(old, new, strict=True))
             for line in differences(a, b, f"{where}[{i}]" if len(old) > 1 else where)
         ]
+    if all(_is_sweep(value) for value in (old, new)) and (
+        lines := differences(_swept(old), _swept(new), where)
+    ):
+        return lines  # else the combinations differ
     return [] if old == new else [f"{where}: {_short(old)} -> {_short(new)}"]
+
+
+def _is_sweep(value: Any) -> bool:
+    return isinstance(value, list) and bool(value) and all(isinstance(v, dict) for v in value)
+
+
+def _swept(tables: list[dict[str, Any]]) -> dict[str, Any]:
+    """Values that each key of a sweep takes, one by itself."""
+    keys = dict.fromkeys(key for table in tables for key in table)
+    taken = {key: [t[key] for t in tables if key in t] for key in keys}
+    distinct = {key: [v for i, v in enumerate(vs) if v not in vs[:i]] for key, vs in taken.items()}
+    return {key: vs[0] if len(vs) == 1 else vs for key, vs in distinct.items()}
 
 
 def refuse_other(stored: Any, spec: "Spec", message: str) -> None:
