@@ -237,3 +237,9 @@ def test_an_override_of_the_load_takes_the_place_of_what_the_file_says(tmp_path)
     )
     load = read_spec(tmp_path / "spec.toml", ("load.p_star=0.5",))[0].load
     assert (load.quantity, load.values()) == ("p_star", [0.5])
+
+
+def test_other_combinations_of_the_same_values_are_another_sweep():
+    few = [{"hurst": 0.3, "seed": 0}, {"hurst": 0.8, "seed": 1}]
+    every = [{"hurst": h, "seed": s} for h in (0.3, 0.8) for s in (0, 1)]
+    assert differences({"surface": few}, {"surface": every})
