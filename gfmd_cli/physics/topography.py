@@ -21,6 +21,7 @@ LARGEST_HEIGHT = 1e30  # in any unit; the usual marks of no data are 9.97e36 (ne
 MAX_BYTES = 2**33  # 32768 x 32768 heights in double precision
 MAX_COMPRESSION = 1032  # the limit of deflate, https://zlib.net/zlib_tech.html
 SQUARENESS = 1e-6  # relative: sides are stored in single precision or with some six digits
+REMEDY = "Heights that other programs read can be saved by numpy.save as a .npy file."
 MOST_MISSING = 0.2  # share of the points; beyond it the filling would be the surface
 
 
@@ -115,8 +116,12 @@ def _read(path: Path, dataset: str | None, max_bytes: int) -> _Map:
     except InputError:
         raise
     except Exception as error:  # a damaged file can raise anything in its reader
-        reason = str(error).strip().partition("\n")[0] or type(error).__name__
-        raise InputError(f"{path}: cannot be read: {reason}") from error
+        reason = str(error).strip().partition("\n")[0]
+        if not isinstance(error, OSError):
+            reason = f"{type(error).__name__}: {reason}".rstrip(": ")
+        raise InputError(
+            f"{path}: cannot be read ({reason}): damaged, or no height map? {REMEDY}"
+        ) from error
 
 
 def _read_npy(path: Path, dataset: str | None, max_bytes: int) -> _Map:
@@ -189,7 +194,7 @@ def _read_scan(path: Path, dataset: str | None, max_bytes: int) -> _Map:
         except CannotDetectFileFormat as error:
             raise InputError(
                 f"{path}: no known topography format; .npy, HDF5 and the formats of "
-                "SurfaceTopography can be read"
+                f"SurfaceTopography can be read. {REMEDY}"
             ) from error
         with reader:
             return _read_channel(path, reader, dataset, max_bytes)
