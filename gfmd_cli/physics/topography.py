@@ -115,10 +115,10 @@ def _read(path: Path, dataset: str | None, max_bytes: int) -> _Map:
         return _read_scan(path, dataset, max_bytes)
     except InputError:
         raise
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error}") from error
     except Exception as error:  # a damaged file can raise anything in its reader
-        reason = str(error).strip().partition("\n")[0]
-        if not isinstance(error, OSError):
-            reason = f"{type(error).__name__}: {reason}".rstrip(": ")
+        reason = f"{type(error).__name__}: {error}".partition("\n")[0].rstrip(": ")
         raise InputError(
             f"{path}: cannot be read ({reason}): damaged, or no height map? {REMEDY}"
         ) from error
