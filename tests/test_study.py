@@ -490,3 +490,46 @@ def test_a_killed_run_loses_no_finished_pressure(run, tmp_path):
     assert process.wait(60) == 0
     process.stderr.close()
     np.testing.assert_array_equal(results(tmp_path / "killed.h5"), results(unbroken))
+
+
+GROWN = ("surface.seed=[2,0,1]", "load.p_star=[1.0,0.3,0.1]")
+
+
+def test_a_spec_with_more_tasks_makes_a_study_grow(run):
+    """Those that are there keep their numbers and fields, at their new places."""
+    more = "output={fields=['u'],cross_section=true,spectra=true,patches=true}"
+    path, _, _ = run(overrides=(more, "surface.seed=[0,1]"))
+    before = {row["seed"]: row["seconds"] for row in read_rows(path) if row["p_star"] == 0.1}
+    _, events, outcome = run(overrides=(more, *GROWN))
+    assert outcome == {"converged": 18}
+    assert sum(event.event == "done" for event in events) == 18 - 8
+    after = {row["seed"]: row["seconds"] for row in read_rows(path) if row["p_star"] == 0.1}
+    assert {seed: after[seed] for seed in before} == before
+    whole, _, _ = run(overrides=(more, *GROWN), name="whole.h5")
+    np.testing.assert_array_equal(results(path), results(whole))
+    with h5py.File(path) as grown, h5py.File(whole) as fresh:
+        names = []
+        fresh.visititems(lambda name, item: names.append(name))
+        for name in names:
+            if isinstance(fresh[name], h5py.Dataset) and name != "seconds":
+                np.testing.assert_array_equal(grown[name][()], fresh[name][()], err_msg=name)
+
+
+def test_a_study_does_not_shrink(run):
+    path, _, _ = run(overrides=("surface.seed=[0,1]",))
+    before = path.read_bytes()
+    with pytest.raises(InputError, match=r"another spec[\s\S]*surface\.seed: \[0, 1\] -> 0"):
+        run(overrides=("surface.seed=0",))
+    assert path.read_bytes() == before
+
+
+def test_a_study_with_unfinished_work_does_not_grow(run, tmp_path):
+    path, _, _ = run(shard=(0, 2))
+    before = path.read_bytes()
+    assert (tmp_path / "study.parts" / "spec.json").exists()
+    with pytest.raises(InputError, match=r"another spec[\s\S]*surface\.seed: 0 -> \[0, 1\]"):
+        run(overrides=("surface.seed=[0,1]",))
+    assert path.read_bytes() == before
+    run()
+    _, _, outcome = run(overrides=("surface.seed=[0,1]",))
+    assert outcome == {"converged": 8}

@@ -18,7 +18,7 @@ from gfmd_cli.study.layout import MISSING
 from gfmd_cli.study.reading import open_study, spec_of, texts_of
 from gfmd_cli.study.record import SUFFIX, Record, read_record, read_status, record_path
 from gfmd_cli.study.spec import Spec, refuse_other
-from gfmd_cli.study.tasks import Task
+from gfmd_cli.study.tasks import Task, plan
 from gfmd_cli.study.writing import write_study
 
 
@@ -30,10 +30,20 @@ class Study:
         self.parts = path.with_suffix(".parts")
 
     def check_spec(self, spec: Spec) -> None:
-        """Refuse, with the difference, a study that was made from another spec."""
-        stored = self._stored_spec()
+        """Refuse, with the difference, a study that was made from another spec.
+
+        A spec that has more than all tasks of a study makes it grow, unless there is unfinished
+        work of the old one.
+        """
         message = "made from another spec; take another name (-o) or the old spec."
-        if stored is not None:
+        with suppress(OSError, ValueError):
+            begun = json.loads((self.parts / "spec.json").read_bytes())
+            refuse_other(begun, spec, f"{self.parts}: {message}")
+        if not self.path.exists():
+            return
+        with open_study(self.path) as file:
+            stored, known = spec_of(file), set(texts_of(file, "task_id"))
+        if stored != spec.resolved() and not known <= {task.id for task in plan(spec)}:
             refuse_other(stored, spec, f"{self.path}: {message}")
 
     @contextmanager
@@ -118,15 +128,6 @@ class Study:
     def record_paths(self) -> list[Path]:
         """The records that are not collected yet."""
         return sorted(self.parts.glob(f"*{SUFFIX}"))
-
-    def _stored_spec(self) -> Any:
-        """The resolved spec of the study file, else of the unfinished work, else None."""
-        if self.path.exists():
-            with open_study(self.path) as file:
-                return spec_of(file)
-        with suppress(OSError, ValueError):
-            return json.loads((self.parts / "spec.json").read_bytes())
-        return None
 
     def _collecting(self) -> Any:
         """Keep other collectors out."""

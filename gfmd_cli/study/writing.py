@@ -72,7 +72,7 @@ def write_study(
                 record = read_record(record_path(parts, solved.id))
             _write_extras(file, solved.index, scene, record)
         elif old is not None and row["status"] != MISSING:
-            _write_extras(file, solved.index, scene, _old_record(old, solved, scene, row))
+            _write_extras(file, solved.index, scene, _old_record(old, solved.id, row))
 
 
 def _row(task: Task, records: dict[str, Record], kept: dict[str, dict[str, Any]]) -> dict[str, Any]:
@@ -89,16 +89,17 @@ def _old_rows(old: Any, wanted: set[str]) -> dict[str, dict[str, Any]]:
     return {i: row for i, row in rows if i in wanted}
 
 
-def _old_record(old: Any, task: Task, scene: int, row: dict[str, Any]) -> Record:
-    """What the former study file holds of a task."""
+def _old_record(old: Any, task_id: str, row: dict[str, Any]) -> Record:
+    """What the former study file holds of a task, at its place there."""
+    index, scene = row["task"], row["scene"]
     return Record(
-        task_id=task.id,
+        task_id=task_id,
         row=row,
         shells=shells_of(old, scene),
-        fields=fields_of(old, f"fields/{task.index}"),
-        cross_section=fields_of(old, f"cross_sections/{task.index}"),
+        fields=fields_of(old, f"fields/{index}"),
+        cross_section=fields_of(old, f"cross_sections/{index}"),
         **{
-            place: fields_of(old, f"{place}/{task.index}", columns)
+            place: fields_of(old, f"{place}/{index}", columns)
             for place, (_, columns) in CURVES.items()
         },
     )
