@@ -331,6 +331,22 @@ def test_a_map_keeps_the_area_and_the_mean_stress(study):
         assert stress.mean() == pytest.approx(pressure, rel=1e-6)
 
 
+def test_a_peak_of_stress_leaves_the_rest_of_the_contact_visible(study):
+    row = read_rows(study)[0]
+    stress = np.where(np.arange(64 * 64).reshape(64, 64) % 3, np.linspace(0.01, 1, 64), 0.0)
+    stress[5, 5] = 1e3
+    sheet = maps._stress_sheet(stress, stress > 0, row)
+    (image,) = sheet.axes.images
+    assert image.norm.vmax == pytest.approx(1.0, rel=0.02)
+    drawn = image.to_rgba(image.get_array(), bytes=True)[..., :3]
+    colours = {kind: {f"#{bytes(pixel).hex()}" for pixel in drawn[chosen]}
+               for kind, chosen in (("none", stress == 0), ("contact", stress > 0))}  # fmt: skip
+    assert colours["none"] == {"#000000"}
+    assert all(contrast(colour, "#000000") >= LEGIBLE for colour in colours["contact"])
+    assert maps.BEYOND in colours["contact"]
+    assert toned(maps.BEYOND, LIGHT) == toned(maps.BEYOND, DARK) == maps.BEYOND
+
+
 @pytest.mark.parametrize("step", [1, 2, 3])
 def test_pixels_are_means_over_squares(step):
     block = np.arange(35.0).reshape(5, 7)
