@@ -155,6 +155,20 @@ def test_what_is_not_converged_is_a_cross_and_known_errors_are_bars(study):
     assert len(sheet.axes.containers) == 1
 
 
+def test_symbols_stand_at_the_continuum_value_where_it_is_known(study):
+    known = {"a_r_continuum": 0.04, "a_r_continuum_error": 0.01, "a_r_error": 0.02}
+    unknown = {"a_r_continuum": np.nan, "a_r_continuum_error": np.nan, "a_r_error": 0.03}
+    comparison = marked(study(ROUGH, "elastomer.n=1"), [known, unknown, {}])
+    (curve,) = comparison.curves
+    grid = curve.column("a_r")
+    sheet = sheet_of("contact_area", comparison)
+    (bars,) = sheet.axes.containers
+    ends = np.array([segment[:, 1] for segment in bars.lines[2][0].get_segments()])
+    assert ends == pytest.approx(np.array([[0.03, 0.05], [grid[1] - 0.03, grid[1] + 0.03]]))
+    symbols = next(line for line in sheet.axes.lines if line.get_marker() == "o")
+    assert symbols.get_ydata() == pytest.approx([0.04, *grid[1:]])
+
+
 def test_no_gap_is_left_out_of_the_logarithmic_figure(study):
     comparison = study()
     closed = [{"u_g": 0.0}] * 3

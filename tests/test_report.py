@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from gfmd_cli.analysis.compare import compare
 from gfmd_cli.analysis.report import maps, surface
 from gfmd_cli.analysis.report.markup import Group, Html, join, table, tag
 from gfmd_cli.analysis.report.page import report
@@ -404,6 +405,26 @@ def test_fields_without_a_finite_stress_are_drawn(copied, value):
         for place in ("fields/0", "cross_sections/0"):
             file[place]["sigma"][...] = value
     assert "Stress; black: none" in report(copied)
+
+
+def test_key_numbers_and_tables_are_of_the_continuum_where_that_is_known(tmp_path):
+    text = SPEC.replace("[0, 1]\n[grid]", "1\n[grid]").replace("seed = [0, 1]", "")
+    path = solved(tmp_path, text + "[accuracy]\ncontact_area = 0.2\n")
+    rows = read_rows(path)
+    page = Page(report(path))
+    words = page.words
+    start = words.index("Contact area", words.index("Pressure"))
+    assert words[start + 1] == span(row["a_r_continuum"] for row in rows)
+    assert words[start + 1] != span(row["a_r"] for row in rows)
+    told = " ".join("".join(words).split())
+    assert "share of the nominal area, in the continuum" in told
+    (curve,) = compare(path).curves
+    ratios = span(curve.column("a_r_continuum") / curve.prediction.a_r)
+    assert words[words.index("Area / Persson theory") + 1] == ratios
+
+
+def test_values_on_the_grid_are_not_said_to_be_of_the_continuum(whole):
+    assert "in the continuum" not in whole.partition("</dl>")[0]
 
 
 def test_two_grids_of_one_contact_add_the_continuum(tmp_path):
