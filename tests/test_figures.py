@@ -185,13 +185,35 @@ def test_values_that_are_not_finite_are_left_out(study):
         assert "not converged" not in sheet_of(name, comparison).legend
 
 
-def test_seeds_stand_in_the_legend_while_they_can_be_told_apart(study):
-    few = study(ROUGH, "surface.seed=[0, 1]", "load.p_star=0.3", "output.histogram=false")
-    labels = [look.label for look in looks(few.curves)]
-    assert labels == ["n = 0, seed=0", "n = 1, seed=0", "n = 0, seed=1", "n = 1, seed=1"]
-    many = looks(few.curves * 3)
-    assert {look.label for look in many} == {"n = 0", "n = 1"}
-    assert len({tuple(look.colour) for look in many}) == 2
+def test_curves_that_differ_by_their_seed_alone_share_a_look(study):
+    curves = study(ROUGH, "surface.seed=[0, 1]", "load.p_star=0.3", "output.histogram=false").curves
+    told = looks(curves)
+    assert [look.label for look in told] == ["n = 0", "n = 1", "n = 0", "n = 1"]
+    assert told[:2] == told[2:]
+    assert len({look.colour for look in told}) == len({look.marker for look in told}) == 2
+
+
+def test_surfaces_of_one_body_are_named_by_what_differs_and_told_apart(study):
+    some = ("surface.hurst=[0.3, 0.8]", "surface.seed=[0, 1]", "elastomer.n=1")
+    comparison = study(ROUGH, *some, "load.p_star=0.3", "output.histogram=false")
+    told = looks(comparison.curves)
+    labels = {look.label for look in told}
+    assert labels == {"n = 1, hurst=0.3", "n = 1, hurst=0.8"}
+    assert len(set(told)) == len({look.colour for look in told}) == 2
+    assert len({look.marker for look in told}) == 2
+    assert set(sheet_of("contact_area", comparison).legend) == {*labels, "Persson theory"}
+
+
+def test_more_variants_than_can_be_told_apart_are_named_by_their_body(study):
+    (first, second) = study(ROUGH, "load.p_star=0.3", "output.histogram=false").curves
+    many = [
+        Curve([row | {"surface": f"{row['surface']} hurst=0.{place}"} for row in curve.rows],
+              curve.persson)
+        for curve in (first, second) for place in range(1, 6)
+    ]  # fmt: skip
+    assert {look.label for look in looks(many[:8])} >= {"n = 0, hurst=0.1", "n = 1, hurst=0.3"}
+    assert {look.label for look in looks(many)} == {"n = 0", "n = 1"}
+    assert len({look.colour for look in looks(many)}) == 2
 
 
 def test_names_of_elastomers_are_short_where_they_can_be(study):
