@@ -218,6 +218,18 @@ def test_a_bad_solution_gets_no_good_certificate():
     assert proof.u_g >= float(np.mean(u - exact.u)) > 0.5
 
 
+def test_the_table_says_that_its_values_are_counted_where_those_of_the_continuum_follow(
+    rows_of, tmp_path
+):
+    rows_of()
+    text = tables(compare(tmp_path / "study.h5"))
+    counted, _, extrapolated = text.partition("  in the continuum:")
+    assert "  counted on the grid:\n      p*        a_r" in counted
+    assert extrapolated
+    rows_of(text=SPEC.partition("[accuracy]")[0].replace('"auto"', "64"), name="plain.h5")
+    assert "counted on" not in tables(compare(tmp_path / "plain.h5"))
+
+
 # --- seeds ----------------------------------------------------------------------------------------
 
 

@@ -93,7 +93,53 @@ def test_rows_of_one_study_alone_are_listed(made):
     assert [row["p_star"] for row in found.only[1]] == [0.3, 0.3]
     text = gfmd("diff", made(), more)
     assert "only in A:" in text
-    assert "power n=2 on self-affine cutoff=0.1, 32, p*=0.3" in text
+    assert "  power n=2 on self-affine cutoff=0.1\n    32: p*=0.3\n" in text
+
+
+def test_many_rows_of_one_study_alone_are_one_line(made):
+    text = gfmd("diff", made(), made("load.p_star=[0.01, 0.02, 0.03]"))
+    assert "  power n=2 on self-affine cutoff=0.1\n    32: p*=0.01, p*=0.02, p*=0.03\n" in text
+
+
+IN_PASCAL = (
+    'elastomer={kind="half-space", E_star=2e9}',
+    "load={pressure=[1e8, 5e8]}",
+    "surface.h_std=0.01",
+)
+
+
+def test_another_body_is_paired_by_pressure_and_compared_in_pascal_and_metres(made):
+    stiff = (IN_PASCAL[0].replace("2e9", "4e9"), *IN_PASCAL[1:])
+    found = diff(made(*IN_PASCAL), made(*stiff))
+    assert [(p.one["pressure"], p.other["pressure"]) for p in found.pairs] == [
+        (1e8, 1e8),
+        (5e8, 5e8),
+    ]
+    for pair in found.pairs:
+        for name, unit in (("a_r", None), ("sigma_p", "delta_sigma"), ("u_g", "h_std")):
+            a, b = (row[name] * (row[unit] if unit else 1) for row in (pair.one, pair.other))
+            expected = pytest.approx((b - a) / max(a, b), rel=1e-12)
+            assert pair.deviation(name).relative == expected
+        assert pair.deviation("a_r").relative < 0 < pair.deviation("u_g").relative
+    text = gfmd("diff", made(*IN_PASCAL), made(*stiff))
+    assert text.startswith("bodies differ: paired by pressure, sigma_p in Pa, u_g in m\n")
+    told = json.loads(gfmd("diff", made(*IN_PASCAL), made(*stiff), "--json"))
+    assert told["paired"] == found.paired
+
+
+def test_another_surface_of_one_body_is_paired_by_load(made):
+    one, other = made("elastomer.n=1"), made("elastomer.n=1", "surface.hurst=0.5")
+    found = diff(one, other)
+    assert [pair.one["p_star"] for pair in found.pairs] == [0.1, 1.0]
+    text = gfmd("diff", one, other)
+    assert text.startswith("surfaces differ: paired by reduced pressure, values in reduced units")
+    assert "A: power n=1 on self-affine cutoff=0.1\nB: power n=1 on self-affine hurst=0.5" in text
+    assert "only in" not in text
+
+
+def test_rows_of_one_body_and_surface_that_share_no_load_stay_apart(made):
+    found = diff(made("elastomer.n=1"), made("elastomer.n=1", "load.p_star=0.3"))
+    assert (found.pairs, found.paired) == ([], "")
 
 
 def test_another_seed_is_another_contact_and_nothing_to_compare_is_no_agreement(made):

@@ -155,6 +155,20 @@ def test_what_is_not_converged_is_a_cross_and_known_errors_are_bars(study):
     assert len(sheet.axes.containers) == 1
 
 
+def test_symbols_stand_at_the_continuum_value_where_it_is_known(study):
+    known = {"a_r_continuum": 0.04, "a_r_continuum_error": 0.01, "a_r_error": 0.02}
+    unknown = {"a_r_continuum": np.nan, "a_r_continuum_error": np.nan, "a_r_error": 0.03}
+    comparison = marked(study(ROUGH, "elastomer.n=1"), [known, unknown, {}])
+    (curve,) = comparison.curves
+    grid = curve.column("a_r")
+    sheet = sheet_of("contact_area", comparison)
+    (bars,) = sheet.axes.containers
+    ends = np.array([segment[:, 1] for segment in bars.lines[2][0].get_segments()])
+    assert ends == pytest.approx(np.array([[0.03, 0.05], [grid[1] - 0.03, grid[1] + 0.03]]))
+    symbols = next(line for line in sheet.axes.lines if line.get_marker() == "o")
+    assert symbols.get_ydata() == pytest.approx([0.04, *grid[1:]])
+
+
 def test_no_gap_is_left_out_of_the_logarithmic_figure(study):
     comparison = study()
     closed = [{"u_g": 0.0}] * 3
@@ -171,13 +185,35 @@ def test_values_that_are_not_finite_are_left_out(study):
         assert "not converged" not in sheet_of(name, comparison).legend
 
 
-def test_seeds_stand_in_the_legend_while_they_can_be_told_apart(study):
-    few = study(ROUGH, "surface.seed=[0, 1]", "load.p_star=0.3", "output.histogram=false")
-    labels = [look.label for look in looks(few.curves)]
-    assert labels == ["n = 0, seed=0", "n = 1, seed=0", "n = 0, seed=1", "n = 1, seed=1"]
-    many = looks(few.curves * 3)
-    assert {look.label for look in many} == {"n = 0", "n = 1"}
-    assert len({tuple(look.colour) for look in many}) == 2
+def test_curves_that_differ_by_their_seed_alone_share_a_look(study):
+    curves = study(ROUGH, "surface.seed=[0, 1]", "load.p_star=0.3", "output.histogram=false").curves
+    told = looks(curves)
+    assert [look.label for look in told] == ["n = 0", "n = 1", "n = 0", "n = 1"]
+    assert told[:2] == told[2:]
+    assert len({look.colour for look in told}) == len({look.marker for look in told}) == 2
+
+
+def test_surfaces_of_one_body_are_named_by_what_differs_and_told_apart(study):
+    some = ("surface.hurst=[0.3, 0.8]", "surface.seed=[0, 1]", "elastomer.n=1")
+    comparison = study(ROUGH, *some, "load.p_star=0.3", "output.histogram=false")
+    told = looks(comparison.curves)
+    labels = {look.label for look in told}
+    assert labels == {"n = 1, hurst=0.3", "n = 1, hurst=0.8"}
+    assert len(set(told)) == len({look.colour for look in told}) == 2
+    assert len({look.marker for look in told}) == 2
+    assert set(sheet_of("contact_area", comparison).legend) == {*labels, "Persson theory"}
+
+
+def test_more_variants_than_can_be_told_apart_are_named_by_their_body(study):
+    (first, second) = study(ROUGH, "load.p_star=0.3", "output.histogram=false").curves
+    many = [
+        Curve([row | {"surface": f"{row['surface']} hurst=0.{place}"} for row in curve.rows],
+              curve.persson)
+        for curve in (first, second) for place in range(1, 6)
+    ]  # fmt: skip
+    assert {look.label for look in looks(many[:8])} >= {"n = 0, hurst=0.1", "n = 1, hurst=0.3"}
+    assert {look.label for look in looks(many)} == {"n = 0", "n = 1"}
+    assert len({look.colour for look in looks(many)}) == 2
 
 
 def test_names_of_elastomers_are_short_where_they_can_be(study):

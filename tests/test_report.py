@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from gfmd_cli.analysis.compare import compare
 from gfmd_cli.analysis.report import maps, surface
 from gfmd_cli.analysis.report.markup import Group, Html, join, table, tag
 from gfmd_cli.analysis.report.page import report
@@ -331,6 +332,22 @@ def test_a_map_keeps_the_area_and_the_mean_stress(study):
         assert stress.mean() == pytest.approx(pressure, rel=1e-6)
 
 
+def test_a_peak_of_stress_leaves_the_rest_of_the_contact_visible(study):
+    row = read_rows(study)[0]
+    stress = np.where(np.arange(64 * 64).reshape(64, 64) % 3, np.linspace(0.01, 1, 64), 0.0)
+    stress[5, 5] = 1e3
+    sheet = maps._stress_sheet(stress, stress > 0, row)
+    (image,) = sheet.axes.images
+    assert image.norm.vmax == pytest.approx(1.0, rel=0.02)
+    drawn = image.to_rgba(image.get_array(), bytes=True)[..., :3]
+    colours = {kind: {f"#{bytes(pixel).hex()}" for pixel in drawn[chosen]}
+               for kind, chosen in (("none", stress == 0), ("contact", stress > 0))}  # fmt: skip
+    assert colours["none"] == {"#000000"}
+    assert all(contrast(colour, "#000000") >= LEGIBLE for colour in colours["contact"])
+    assert maps.BEYOND in colours["contact"]
+    assert toned(maps.BEYOND, LIGHT) == toned(maps.BEYOND, DARK) == maps.BEYOND
+
+
 @pytest.mark.parametrize("step", [1, 2, 3])
 def test_pixels_are_means_over_squares(step):
     block = np.arange(35.0).reshape(5, 7)
@@ -388,6 +405,26 @@ def test_fields_without_a_finite_stress_are_drawn(copied, value):
         for place in ("fields/0", "cross_sections/0"):
             file[place]["sigma"][...] = value
     assert "Stress; black: none" in report(copied)
+
+
+def test_key_numbers_and_tables_are_of_the_continuum_where_that_is_known(tmp_path):
+    text = SPEC.replace("[0, 1]\n[grid]", "1\n[grid]").replace("seed = [0, 1]", "")
+    path = solved(tmp_path, text + "[accuracy]\ncontact_area = 0.2\n")
+    rows = read_rows(path)
+    page = Page(report(path))
+    words = page.words
+    start = words.index("Contact area", words.index("Pressure"))
+    assert words[start + 1] == span(row["a_r_continuum"] for row in rows)
+    assert words[start + 1] != span(row["a_r"] for row in rows)
+    told = " ".join("".join(words).split())
+    assert "share of the nominal area, in the continuum" in told
+    (curve,) = compare(path).curves
+    ratios = span(curve.column("a_r_continuum") / curve.prediction.a_r)
+    assert words[words.index("Area / Persson theory") + 1] == ratios
+
+
+def test_values_on_the_grid_are_not_said_to_be_of_the_continuum(whole):
+    assert "in the continuum" not in whole.partition("</dl>")[0]
 
 
 def test_two_grids_of_one_contact_add_the_continuum(tmp_path):

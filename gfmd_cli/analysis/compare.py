@@ -19,6 +19,18 @@ Weights = Literal["paper", "fitted"]
 """gamma of Eq. (30): as the paper has it, Eqs. (39) and (42), or as fitted in docs/theory.md."""
 
 
+def in_continuum(row: Row, name: str) -> bool:
+    """Whether a quantity has a value in the continuum, with its error."""
+    told = (row.get(f"{name}_continuum", np.nan), row.get(f"{name}_continuum_error", np.nan))
+    return bool(np.all(np.isfinite(told)))
+
+
+def best(row: Row, name: str) -> tuple[float, float]:
+    """A quantity with its error: of the continuum where that is known, else of the grid."""
+    value = f"{name}_continuum" if in_continuum(row, name) else name
+    return float(row[value]), float(row[f"{value}_error"])
+
+
 @dataclass(frozen=True)
 class Prediction:
     """What a theory says at some pressures, in reduced units."""
@@ -59,6 +71,11 @@ class Curve:
     def column(self, name: str) -> Field:
         """A column of the study over the pressures."""
         return np.array([row[name] for row in self.rows], dtype=np.float64)
+
+    def best(self, name: str) -> tuple[Field, Field]:
+        """A quantity over the pressures with its errors: of the continuum where that is known."""
+        values, errors = zip(*(best(row, name) for row in self.rows), strict=True)
+        return np.array(values), np.array(errors)
 
     def predict(self, p_star: Field) -> Prediction:
         """Persson theory at reduced pressures. Paper Eqs. (25), (26), (28)."""

@@ -3,7 +3,7 @@
 import json
 import math
 from collections import defaultdict
-from collections.abc import Hashable
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -15,6 +15,14 @@ from gfmd_cli.study.layout import MISSING
 from gfmd_cli.study.reading import read_rows, stored_spec
 from gfmd_cli.study.spec import differences
 from gfmd_cli.study.tasks import SYMBOLS
+
+UNITS = {"sigma_p": "delta_sigma", "u_g": "h_std"}
+"""Columns that reduced quantities are in units of."""
+LOADS = {"p_star": "reduced pressure", "contact_area": "contact area", "mean_gap": "mean gap"}
+
+
+Key = Callable[[Row], tuple[Hashable, ...]]
+"""What rows that belong together have in common."""
 
 
 class Deviation(NamedTuple):
@@ -32,13 +40,18 @@ class Pair:
 
     one: Row
     other: Row
+    physical: bool = False
+    """Whether stress and gap are compared in Pa and m, as of two bodies at one pressure in Pa."""
 
     def deviation(self, name: str) -> Deviation:
         """How far a column of the second study lies from that of the first."""
-        a, b = self.one[name], self.other[name]
+        physical = self.physical and name in UNITS
+        units = [row[UNITS[name]] if physical else 1.0 for row in (self.one, self.other)]
+        a, b = self.one[name] * units[0], self.other[name] * units[1]
         if math.isnan(a) or math.isnan(b):
             return Deviation(math.nan if math.isnan(a) and math.isnan(b) else math.inf, math.nan)
-        error = math.hypot(self.one[f"{name}_error"], self.other[f"{name}_error"])
+        errors = self.one[f"{name}_error"] * units[0], self.other[f"{name}_error"] * units[1]
+        error = math.hypot(*errors)
         in_errors = (b - a) / error if error > 0 else math.nan
         return Deviation((b - a) / max(abs(a), abs(b)) if a != b else 0.0, in_errors)
 
@@ -52,6 +65,8 @@ class Difference:
     pairs: list[Pair]
     only: tuple[list[Row], list[Row]]
     """Rows that one of them alone has: of the first, of the second."""
+    paired: str = ""
+    """By what rows of different surfaces or bodies are paired; empty where contacts match."""
 
     def exceeds(self, tolerance: float) -> bool:
         """Whether some relative difference is larger; also where nothing can be compared."""
@@ -63,59 +78,108 @@ def diff(one: Path, other: Path) -> Difference:
     """Match the rows of two studies by surface, seed, elastomer and load.
 
     Grids and solvers may differ; of several rows, those of the same grid and solver belong
-    together, then those of the same grid. Raises InputError, StudyError.
+    together, then those of the same grid. Where nothing matches and each study presses one body
+    on one surface, rows belong together by their load alone. Raises InputError, StudyError.
     """
     only = _solved(one), _solved(other)
-    pairs: list[Pair] = []
-    for alike in (("points", "solver", "tolerance"), ("points",), ()):
-        pairs += _match(*only, alike)
-    pairs.sort(key=lambda pair: int(pair.one["task"]))
-    return Difference(differences(stored_spec(one), stored_spec(other)), pairs, only)
+    pairs, paired = _matches(*only, _contact), ""
+    if not pairs and all(len({_pressed(row) for row in rows}) == 1 for rows in only):
+        pairs = _matches(*only, _load_of)
+        paired = _paired(pairs[0]) if pairs else ""
+    return Difference(differences(stored_spec(one), stored_spec(other)), pairs, only, paired)
 
 
 def _solved(path: Path) -> list[Row]:
     return [row for row in read_rows(path) if row["status"] != MISSING]
 
 
+def _pressed(row: Row) -> tuple[Hashable, ...]:
+    """What is pressed together."""
+    return row["surface"], row["seed"], row["elastomer"]
+
+
+def _load_of(row: Row) -> tuple[Hashable, ...]:
+    """How hard."""
+    load, asked = (row["load"], row["asked"]) if row["load"] else ("p_star", row["p_star"])
+    return load, f"{asked:.12g}"
+
+
 def _contact(row: Row) -> tuple[Hashable, ...]:
-    """What is pressed together, and how hard."""
-    asked = (row["load"], row["asked"]) if row["load"] else ("p_star", row["p_star"])
-    return row["surface"], row["seed"], row["elastomer"], asked[0], f"{asked[1]:.12g}"
+    return *_pressed(row), *_load_of(row)
 
 
-def _match(one: list[Row], other: list[Row], alike: tuple[str, ...]) -> list[Pair]:
-    """Pairs of the same contact with these columns alike, in order; taken from both lists."""
+def _matches(one: list[Row], other: list[Row], key: Key) -> list[Pair]:
+    """Pairs of the same key, alike in grid and solver if they can be; taken from both lists."""
+    pairs: list[Pair] = []
+    for alike in (("points", "solver", "tolerance"), ("points",), ()):
+        pairs += _match(one, other, key, alike)
+    return sorted(pairs, key=lambda pair: int(pair.one["task"]))
+
+
+def _match(one: list[Row], other: list[Row], key: Key, alike: tuple[str, ...]) -> list[Pair]:
+    """Pairs of the same key with these columns alike, in order; taken from both lists."""
     waiting: dict[Hashable, list[Row]] = defaultdict(list)
 
     def waiting_for(row: Row) -> list[Row]:
-        return waiting[(*_contact(row), *(row[name] for name in alike))]
+        return waiting[(*key(row), *(row[name] for name in alike))]
 
     for row in other:
         waiting_for(row).append(row)
-    pairs = [Pair(row, waiting_for(row).pop(0)) for row in one if waiting_for(row)]
-    taken = {id(row) for pair in pairs for row in (pair.one, pair.other)}
+    found = [(row, waiting_for(row).pop(0)) for row in one if waiting_for(row)]
+    taken = {id(row) for pair in found for row in pair}
     for rows in (one, other):
         rows[:] = [row for row in rows if id(row) not in taken]
-    return pairs
+    # another surface or body has other units: what is equal then is the pressure in Pa
+    return [Pair(a, b, a["load"] == "pressure" and _pressed(a) != _pressed(b)) for a, b in found]
+
+
+def _paired(pair: Pair) -> str:
+    """What sets the studies apart, and by what their rows are paired."""
+    apart = [
+        what
+        for what, names in {"surfaces": ("surface", "seed"), "bodies": ("elastomer",)}.items()
+        if any(pair.one[name] != pair.other[name] for name in names)
+    ]
+    load = str(_load_of(pair.one)[0])
+    units = "sigma_p in Pa, u_g in m" if pair.physical else "values in reduced units"
+    return f"{' and '.join(apart)} differ: paired by {LOADS.get(load, load)}, {units}"
 
 
 def diff_text(found: Difference) -> str:
     """The comparison for people."""
     blocks: dict[str, list[str]] = {}
     for pair in found.pairs:
-        head = f"{pair.one['elastomer']} on {pair.one['surface']}"
+        names = [_name(pair.one), _name(pair.other)]
+        same = names[0] == names[1]
+        head = names[0] if same else f"A: {names[0]}\nB: {names[1]}"
         title = f"{'':28}" + "".join(f"{name:>20}" for name in QUANTITIES)
         cells = "".join(f"{_cell(pair.deviation(name)):>20}" for name in QUANTITIES)
         sizes = f"{pair.one['points']} -> {pair.other['points']}"
         blocks.setdefault(head, [head, title]).append(f"{_load(pair.one):>14}{sizes:>14}{cells}")
     told = ["\n".join(lines) for lines in blocks.values()]
-    for name, rows in zip("AB", found.only, strict=True):
-        lines = [f"  {r['elastomer']} on {r['surface']}, {r['points']}, {_load(r)}" for r in rows]
-        told += ["\n".join([f"only in {name}:", *lines])] if lines else []
+    for which, rows in zip("AB", found.only, strict=True):
+        told += ["\n".join([f"only in {which}:", *_listed(rows)])] if rows else []
     if found.spec:
         told.append("\n".join(["specs, A -> B:", *(f"  {line}" for line in found.spec)]))
     legend = "relative: (B - A) / max(|A|, |B|); in brackets in units of the combined error bar"
-    return "\n\n".join([legend, *told] if found.pairs else ["no contact in common", *told])
+    heads = [*filter(None, [found.paired]), legend] if found.pairs else ["no contact in common"]
+    return "\n\n".join(["\n".join(heads), *told])
+
+
+def _name(row: Row) -> str:
+    return f"{row['elastomer']} on {row['surface']}"
+
+
+def _listed(rows: list[Row]) -> list[str]:
+    """Rows under what they share, a line for each grid."""
+    loads: dict[str, dict[int, list[str]]] = {}
+    for row in rows:
+        loads.setdefault(_name(row), {}).setdefault(row["points"], []).append(_load(row))
+    return [
+        line
+        for name, grids in loads.items()
+        for line in (f"  {name}", *(f"    {n}: {', '.join(told)}" for n, told in grids.items()))
+    ]
 
 
 def _cell(found: Deviation) -> str:
@@ -142,4 +206,5 @@ def diff_json(found: Difference) -> str:
     ]  # fmt: skip
     only = [[{key: plain(row[key]) for key in keys} for row in rows] for rows in found.only]
     told: dict[str, Any] = {"rows": rows, "only_a": only[0], "only_b": only[1], "spec": found.spec}
+    told["paired"] = found.paired
     return json.dumps(told, indent=1)

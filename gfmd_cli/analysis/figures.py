@@ -96,7 +96,7 @@ def _over_pressure(view: View, items: list[Item]) -> Sheet | None:
     drawn, xs, ys = [], [], []
     for item in items:
         curve, look = item.curve, item.look
-        x, y, error = (curve.column(c) for c in ("p_star", view.column, f"{view.column}_error"))
+        x, (y, error) = curve.column("p_star"), curve.best(view.column)
         unit = getattr(curve.prediction, view.column) if view.ratio else np.ones_like(y)
         y, error = y / unit, np.abs(error) / unit
         kept = np.isfinite(y) & ((y > 0) | (view.y_scale == "linear"))

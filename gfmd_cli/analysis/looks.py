@@ -6,6 +6,7 @@ from fractions import Fraction
 import numpy as np
 
 from gfmd_cli.analysis.compare import Curve
+from gfmd_cli.physics.surface import default_of
 
 LADDER = ("#332288", "#0077bb", "#009988", "#999933", "#ee7733", "#cc3311")
 """Told apart by the colour-blind too (P. Tol, Colour schemes, 2021), ordered by hue."""
@@ -32,20 +33,26 @@ def order(curve: Curve) -> tuple[float, float]:
 
 
 def looks(curves: list[Curve]) -> list[Look]:
-    """Colours along the ordered curves, one a body; symbols tell bodies, or else curves, apart."""
+    """Colours along the ordered curves, one a body; symbols tell bodies, or else curves, apart.
+
+    Curves that differ by their seed alone look the same.
+    """
     bodies = list(dict.fromkeys(curve.elastomer for curve in curves))
     names = _names({curve.elastomer: curve for curve in curves})
-    variants = _variants(curves) if len(curves) <= MANY else [""] * len(curves)
-    singly = len(bodies) == 1 and any(variants)
-    chosen = colours(len(curves) if singly else len(bodies))
+    variants = _variants(curves)
+    pairs = [(curve.elastomer, variant) for curve, variant in zip(curves, variants, strict=True)]
+    if len(set(pairs)) > MANY:
+        variants = [""] * len(curves)
+        pairs = [(curve.elastomer, "") for curve in curves]
+    apart = list(dict.fromkeys(pairs))
+    singly = len(bodies) == 1
+    chosen = colours(len(apart) if singly else len(bodies))
     told = []
-    for i, (curve, variant) in enumerate(zip(curves, variants, strict=True)):
-        body = bodies.index(curve.elastomer)
-        marker = MARKERS[(i if any(variants) else body) % len(MARKERS)]
-        label = ", ".join(filter(None, (names[curve.elastomer], variant)))
-        told.append(
-            Look(chosen[i if singly else body], marker, label[:LONGEST].replace("$", r"\$"))
-        )
+    for body, variant in pairs:
+        place = apart.index((body, variant))
+        tone = chosen[place if singly else bodies.index(body)]
+        label = ", ".join(filter(None, (names[body], variant)))[:LONGEST]
+        told.append(Look(tone, MARKERS[place % len(MARKERS)], label.replace("$", r"\$")))
     return told
 
 
@@ -70,16 +77,35 @@ def _names(bodies: dict[str, Curve]) -> dict[str, str]:
 
 
 def _variants(curves: list[Curve]) -> list[str]:
-    """What sets curves of one elastomer apart: surface, seed, grid, solver; empty if nothing."""
-    told = []
-    for curve in curves:
-        row = curve.rows[0]
-        words = [word for word in curve.surface.split() if not word.startswith("seed=")]
-        words += [f"seed={row['seed']}", f"{row['points']} points"]
-        told.append([*words, row["solver"], f"tolerance={row['tolerance']:g}"])
+    """What sets curves of one body apart but the seed: surface, grid, solver; empty if nothing."""
+    told = [_words(curve) for curve in curves]
     variants = []
     for curve, words in zip(curves, told, strict=True):
         peers = [w for c, w in zip(curves, told, strict=True) if c.elastomer == curve.elastomer]
-        common = set(words).intersection(*peers)
-        variants.append(" ".join(word for word in words if word not in common))
+        keys = dict.fromkeys(key for peer in peers for key in peer)
+        pieces = [
+            words.get(key) or _default(words["kind"], key)
+            for key in keys
+            if len({peer.get(key) for peer in peers}) > 1
+        ]
+        variants.append(" ".join(filter(None, pieces)))
     return variants
+
+
+def _words(curve: Curve) -> dict[str, str]:
+    """What a curve is besides its body, by key; a grid that was chosen by accuracy is none."""
+    row = curve.rows[0]
+    kind, _, words = curve.surface.partition(" ")
+    told = {"kind": kind} | {word.partition("=")[0]: word for word in words.split()}
+    told.pop("seed", None)
+    if row.get("grid") != "auto":
+        told["points"] = f"{row['points']} points"
+    return told | {"solver": row["solver"], "tolerance": f"tolerance={row['tolerance']:g}"}
+
+
+def _default(kind: str, key: str) -> str:
+    """A key that a surface leaves out because it has its default; empty where it has none."""
+    value = default_of(kind, key)
+    if value is None:
+        return ""
+    return f"{key}={value:g}" if isinstance(value, float) else f"{key}={value}"

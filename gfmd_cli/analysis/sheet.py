@@ -13,7 +13,8 @@ from gfmd_cli.physics.fields import Field, Mask
 from gfmd_cli.study.files import write_whole
 
 try:
-    from matplotlib import rc_context, ticker
+    from matplotlib import colormaps, rc_context, ticker
+    from matplotlib.colors import LinearSegmentedColormap
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 except ImportError as error:
@@ -149,6 +150,12 @@ def log_scale(axes: Any, name: str, low: float, high: float) -> None:
     span = (low / pad, high * pad)
     axes.set(**{f"{name}scale": "log", f"{name}lim": span})
     _tick(getattr(axes, f"{name}axis"), *span)
+
+
+def shades(name: str, start: float, none: str, beyond: str) -> Any:
+    """Colours of a map from `start` of the way along those named; of no value and of too large."""
+    kept = colormaps[name](np.linspace(start, 1.0, 256))
+    return LinearSegmentedColormap.from_list(name, kept).with_extremes(bad=none, over=beyond)
 
 
 def _legend_shape(labels: list[str], wide: float) -> tuple[int, int]:

@@ -3,7 +3,14 @@
 import math
 from typing import Any
 
-from gfmd_cli.analysis.compare import Comparison, Curve, Row, einstein_prediction
+from gfmd_cli.analysis.compare import (
+    Comparison,
+    Curve,
+    Row,
+    best,
+    einstein_prediction,
+    in_continuum,
+)
 from gfmd_cli.analysis.ensemble import Ensemble, ensembles
 from gfmd_cli.analysis.export import plain
 from gfmd_cli.analysis.further import further_records, further_tables
@@ -39,11 +46,13 @@ def tables(comparison: Comparison) -> str:
 def _table(curve: Curve) -> str:
     row = curve.rows[0]
     theory = curve.prediction
+    extrapolated = any(row.get(f"{name}_verdict") for row in curve.rows for name in QUANTITIES)
     lines = [
         f"{curve.elastomer} on {curve.surface}, {_points(curve)} points a side",
         f"Delta_sigma = {row['delta_sigma']:.6g} Pa, h_std = {row['h_std']:.6g} m, "
         f"L = {row['length']:.6g} m",
         *([row["preparation"]] if row.get("preparation") else []),
+        *(["  counted on the grid:"] if extrapolated else []),
         HEADER,
     ]
     at_gap = curve.pressure_at_gap(curve.column("u_g"))
@@ -64,7 +73,7 @@ def _table(curve: Curve) -> str:
             f"{'':10} {exact.u_g[i]:10.4g} {_ratio(row['u_g'], exact.u_g[i])}"
             for i, row in enumerate(curve.rows)
         ]
-    if any(row.get(f"{name}_verdict") for row in curve.rows for name in QUANTITIES):
+    if extrapolated:
         lines += _continuum(curve)
     return "\n".join(lines)
 
@@ -85,9 +94,7 @@ def _continuum(curve: Curve) -> list[str]:
 
 def continuum_cell(row: Row, name: str) -> str:
     """The continuum value of a quantity with its error, or what keeps it from having one."""
-    value, error = row[f"{name}_continuum"], row[f"{name}_continuum_error"]
-    known = math.isfinite(value) and math.isfinite(error)
-    return plus_minus(value, error) if known else str(row[f"{name}_verdict"])
+    return plus_minus(*best(row, name)) if in_continuum(row, name) else str(row[f"{name}_verdict"])
 
 
 def _spreads(found: list[Ensemble]) -> list[str]:

@@ -19,7 +19,8 @@ def diff(
     """Compare contact area, stress deviation and mean gap of two studies.
 
     Rows belong together by surface, seed, elastomer and load; grids and solvers may differ.
-    Rows that one study alone has are listed, and count for nothing.
+    Rows that one study alone has are listed, and count for nothing. Where no row
+    matches and each study has one surface and one body, rows are paired by load.
 
     Example:
 

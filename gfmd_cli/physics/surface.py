@@ -281,8 +281,19 @@ Surface = Annotated[
 
 def dimension_of(kind: str) -> int:
     """Dimension of the scenes of a kind of surface; 2 where the kind is not known."""
+    surface = _of_kind(kind)
+    return 2 if surface is None else surface.dimension
+
+
+def default_of(kind: str, key: str) -> object:
+    """Value of a key of a kind of surface where none is given; None where there is no such."""
+    field = surface.model_fields.get(key) if (surface := _of_kind(kind)) else None
+    return None if field is None or field.is_required() else field.default
+
+
+def _of_kind(kind: str) -> type[Indenter] | None:
     known = get_args(get_args(Surface)[0])
-    return next((c.dimension for c in known if c.model_fields["kind"].default == kind), 2)
+    return next((c for c in known if c.model_fields["kind"].default == kind), None)
 
 
 def sample(surface: Surface, points: int, ranks: Ranks | None = None) -> tuple[Grid, Field]:

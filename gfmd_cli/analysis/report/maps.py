@@ -9,9 +9,9 @@ from gfmd_cli.analysis.report.contents import Contents, Section
 from gfmd_cli.analysis.report.figure import figure
 from gfmd_cli.analysis.report.markup import Group, Html, code, details, join, table, tag
 from gfmd_cli.analysis.report.profiles import plane, profile_sheet, read_profile
-from gfmd_cli.analysis.report.units import AREA, P_STAR, PRESSURE, largest, quantity, scaled
-from gfmd_cli.analysis.sheet import WIDTH, Sheet
-from gfmd_cli.physics.fields import Field
+from gfmd_cli.analysis.report.units import AREA, P_STAR, PRESSURE, quantity, scaled
+from gfmd_cli.analysis.sheet import WIDTH, Sheet, shades
+from gfmd_cli.physics.fields import Field, Mask
 from gfmd_cli.physics.hdf5 import has, take
 from gfmd_cli.study.layout import MISSING
 from gfmd_cli.study.reading import open_study
@@ -19,8 +19,13 @@ from gfmd_cli.study.reading import open_study
 SHOWN = 9  # contacts that are shown
 CURVES = 3  # of at most so many curves
 SIDE = 256  # pixels of a map at the most
+NOISE = 1e-3  # of the nominal pressure; where contact is not known, less stress is none
 ROWS = 256  # pixels' worth of rows that are held at a time
 TOUCHING = "#0077bb"
+STRESSES, FAINTEST = "viridis", 0.3
+"""Colours of the stress, and how far along them the least stress is: told from none by LEGIBLE."""
+NONE, BEYOND = "black", "#cc3311"
+MOST = 99  # percentile of the stress in contact that the colours reach to
 HOW = 'fields = ["u", "sigma", "height"]', "cross_section = true"
 STORED = ("fields", "cross_sections")
 
@@ -116,7 +121,9 @@ def _map_sheets(file: Any, row: Row) -> list[tuple[str, Sheet, str]]:
     if "sigma" not in names or take(group, "sigma").ndim != 2:
         return []
     touching, stress = _thumbnails({name: take(group, name) for name in names})
-    told = [("stress", _stress_sheet(stress, row), "Stress; black: none")]
+    what = f"Stress; black: none, red: the {100 - MOST} % of the contact above the scale"
+    loaded = stress > NOISE * row["pressure"] if touching is None else touching > 0
+    told = [("stress", _stress_sheet(stress, loaded, row), what)]
     if touching is not None:
         told.insert(0, ("contact", _contact_sheet(touching, row), "Contact"))
     return told
@@ -159,18 +166,21 @@ def _contact_sheet(touching: Field, row: Row) -> Sheet:
     return sheet
 
 
-def _stress_sheet(stress: Field, row: Row) -> Sheet:
+def _stress_sheet(stress: Field, loaded: Mask, row: Row) -> Sheet:
+    """Colours up to what but a few points of the contact exceed, else peaks leave all dark."""
     sheet, extent = _square(row)
-    divisor, unit = scaled(largest(stress), "Pa")
+    top = float(np.percentile(stress[loaded], MOST)) if np.any(loaded) else 0.0
+    divisor, unit = scaled(top, "Pa")
     image = sheet.axes.imshow(
-        stress / divisor,
+        np.where(loaded, stress / divisor, np.nan),
         origin="lower",
         extent=extent,
         interpolation="none",
-        cmap="inferno",
+        cmap=shades(STRESSES, FAINTEST, NONE, BEYOND),
         vmin=0,
+        vmax=top / divisor or 1.0,
     )
-    bar = sheet.figure.colorbar(image, ax=sheet.axes, shrink=0.92, pad=0.02)
+    bar = sheet.figure.colorbar(image, ax=sheet.axes, shrink=0.92, pad=0.02, extend="max")
     bar.set_label(rf"stress  $\sigma$ ({unit})")
     return sheet
 

@@ -2,7 +2,7 @@
 
 import math
 
-from gfmd_cli.analysis.compare import Row
+from gfmd_cli.analysis.compare import Row, best, in_continuum
 from gfmd_cli.analysis.ensemble import without_seed
 from gfmd_cli.analysis.report.contents import Contents, Section
 from gfmd_cli.analysis.report.markup import Group, Html, code, details, join, table, tag
@@ -78,21 +78,41 @@ def key_numbers(contents: Contents) -> Html:
     """The numbers to take home, reduced and in SI units."""
     rows = contents.solved
     pairs: list[tuple[object, object, object]] = [
-        ("Pressure", span(_column(rows, "pressure"), "Pa"), _reduced(P_STAR, rows, "p_star")),
-        ("Contact area", span(_column(rows, "a_r")), join(AREA, ", share of the nominal area")),
-        ("Mean gap", span(_column(rows, "mean_gap"), "m"), _reduced(GAP, rows, "u_g", H_STD)),
-        ("Stress deviation", _deviation(rows), _reduced(DEVIATION, rows, "sigma_p", DELTA_SIGMA)),
+        (
+            "Pressure",
+            span(_column(rows, "pressure"), "Pa"),
+            join(P_STAR, " = ", span(_column(rows, "p_star"))),
+        ),
+        (
+            "Contact area",
+            span(_best(rows, "a_r")),
+            join(AREA, ", share of the nominal area", _where(rows, "a_r")),
+        ),
+        (
+            "Mean gap",
+            span(_best(rows, "u_g", "h_std"), "m"),
+            _measured(GAP, rows, "u_g", H_STD),
+        ),
+        (
+            "Stress deviation",
+            span(_best(rows, "sigma_p", "delta_sigma"), "Pa"),
+            _measured(DEVIATION, rows, "sigma_p", DELTA_SIGMA),
+        ),
         (
             "Stress in full contact",
             span(_column(rows, "delta_sigma"), "Pa"),
             join("rms ", DELTA_SIGMA),
         ),
         ("Roughness", span(_column(rows, "h_std"), "m"), _side(rows)),
-        ("Area / Persson theory", _ratios(contents, "a_r", math.inf), AREA),
+        (
+            "Area / Persson theory",
+            _ratios(contents, "a_r", math.inf),
+            join(AREA, _where(rows, "a_r")),
+        ),
         (
             "Gap / Persson theory",
             _ratios(contents, "u_g", NEARLY_FULL),
-            join(GAP, " up to ", P_STAR, f" = {NEARLY_FULL}"),
+            join(GAP, " up to ", P_STAR, f" = {NEARLY_FULL}", _where(rows, "u_g")),
         ),
         ("Largest residual", pretty(max(_column(rows, "residual"))), _asked(rows)),
         ("Time", _time(rows), "solving, summed over contacts"),
@@ -106,13 +126,21 @@ def _card(name: object, value: object, note: object) -> Html:
     )
 
 
-def _reduced(symbol: Html, rows: list[Row], name: str, unit: Html | None = None) -> Html:
-    over = None if unit is None else join(" / ", unit)
-    return join(symbol, over, " = ", span(_column(rows, name)))
+def _measured(symbol: Html, rows: list[Row], name: str, unit: Html) -> Html:
+    return join(symbol, " / ", unit, " = ", span(_best(rows, name)), _where(rows, name))
 
 
-def _deviation(rows: list[Row]) -> str:
-    return span((row["sigma_p"] * row["delta_sigma"] for row in rows), "Pa")
+def _best(rows: list[Row], name: str, unit: str = "") -> list[float]:
+    """A quantity in the continuum where that is known, in its unit or times that column."""
+    return [best(row, name)[0] * (row[unit] if unit else 1.0) for row in rows]
+
+
+def _where(rows: list[Row], name: str) -> str:
+    """Whether values are those of the continuum; "" where none is."""
+    known = [in_continuum(row, name) for row in rows]
+    if not any(known):
+        return ""
+    return ", in the continuum" + ("" if all(known) else " where known")
 
 
 def _side(rows: list[Row]) -> Html:
@@ -137,7 +165,7 @@ def _ratios(contents: Contents, name: str, most: float) -> str:
         for curve in contents.comparison.curves
         for p_star, simulated, theory in zip(
             curve.column("p_star"),
-            curve.column(name),
+            curve.best(name)[0],
             getattr(curve.prediction, name),
             strict=True,
         )

@@ -23,8 +23,9 @@ from gfmd_cli.analysis.true_contact import VARIANTS, true_contact_areas
 from gfmd_cli.physics.observables import QUANTITIES
 
 DRAWN = (
-    " Symbols: simulation (bars: estimated distance to the continuum, where an accuracy was asked "
-    "for; crosses: not converged). Lines: Persson theory of the same spectrum."
+    " Symbols: simulation, in the continuum with its error where that is known, else on the grid "
+    "(bars: estimated distance to the continuum; crosses: not converged). Lines: Persson theory of "
+    "the same spectrum."
 )
 THEORY, RATIO = "Persson", "ratio"
 
@@ -43,12 +44,14 @@ def contact_area(contents: Contents) -> Section | None:
                 [
                     row["p_star"],
                     row["pressure"],
-                    with_error(row["a_r"], row["a_r_error"]),
+                    with_error(value, error),
                     float(theory),
-                    _ratio(row["a_r"], theory),
+                    _ratio(value, theory),
                     row["status"],
                 ]
-                for row, theory in zip(curve.rows, curve.prediction.a_r, strict=True)
+                for row, theory, value, error in zip(
+                    curve.rows, curve.prediction.a_r, *curve.best("a_r"), strict=True
+                )
             ],
         )
         for title, curve in contents.curves
@@ -145,16 +148,16 @@ def _table(caption: Html, header: Sequence[object], groups: list[Group]) -> list
 
 def _reduced_and_not(curve: Curve, name: str, unit: float) -> list[list[object]]:
     """Rows of a quantity over pressure, in its reduced unit and times that."""
-    theory = getattr(curve.prediction, name)
+    theory, (values, errors) = getattr(curve.prediction, name), curve.best(name)
     return [
         [
             row["p_star"],
             row["pressure"],
-            with_error(row[name], row[f"{name}_error"]),
-            float(row[name] * unit),
+            with_error(values[i], errors[i]),
+            float(values[i] * unit),
             float(theory[i]),
             float(theory[i] * unit),
-            _ratio(row[name], theory[i]),
+            _ratio(values[i], theory[i]),
             row["status"],
         ]
         for i, row in enumerate(curve.rows)
