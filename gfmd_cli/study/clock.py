@@ -45,7 +45,12 @@ class Clock:
     ) -> None:
         self.tasks = {task.index: task for task in tasks}
         self.jobs, self.now = jobs, now
+        self.seconds = {task.index: task.seconds for task in tasks}
         self.waiting = set(self.tasks)
+        self.ahead: dict[Any, float] = {}
+        """Seconds forecast of the tasks that wait, by body."""
+        for task in tasks:
+            self.ahead[task.elastomer] = self.ahead.get(task.elastomer, 0.0) + task.seconds
         self.running: dict[int, _Running] = {}
         self.taken: dict[Any, tuple[float, float]] = {}
         """Seconds measured and forecast of ended tasks, by body, and of all under None."""
@@ -64,7 +69,7 @@ class Clock:
         """Note one word on a task."""
         index, now = progress.task, self.now()
         if progress.event == "start":
-            self.waiting.discard(index)
+            self._leave(index)
             self.running[index] = _Running(now)
         elif progress.event == "step" and index in self.running:
             was = self.running[index]
@@ -75,25 +80,29 @@ class Clock:
                 )
             self.running[index] = was._replace(last=progress.residual, step=progress.step)
         elif progress.event in ("done", "failed", "interrupted"):
-            self.waiting.discard(index)
+            self._leave(index)
             was = self.running.pop(index, _Running(now))
             if progress.event == "done":
-                task = self.tasks[index]
-                for body in (task.elastomer, None):
+                for body in (self.tasks[index].elastomer, None):
                     measured, forecast = self.taken.get(body, (0.0, 0.0))
-                    self.taken[body] = (measured + now - was.since, forecast + task.seconds)
+                    self.taken[body] = (measured + now - was.since, forecast + self.seconds[index])
+
+    def _leave(self, index: int) -> None:
+        """A task waits no longer."""
+        if index in self.waiting:
+            self.waiting.remove(index)
+            self.ahead[self.tasks[index].elastomer] -= self.seconds[index]
 
     def left(self) -> float:
         """Seconds until all tasks have ended."""
         at_work = [self._left_of(index) for index in self.running]
-        waiting = sum(self._forecast(index) for index in self.waiting)
+        waiting = sum(seconds * self._pace(body) for body, seconds in self.ahead.items())
         return max([*at_work, (sum(at_work) + waiting) / self.jobs])
 
-    def _forecast(self, index: int) -> float:
-        """Seconds that a task takes."""
-        task = self.tasks[index]
-        measured, forecast = self.taken.get(task.elastomer) or self.taken.get(None, (1.0, 1.0))
-        return task.seconds * measured / forecast
+    def _pace(self, body: Any) -> float:
+        """Seconds that tasks of a body take, over those forecast."""
+        measured, forecast = self.taken.get(body) or self.taken.get(None, (1.0, 1.0))
+        return measured / forecast
 
     def _work(self, index: int) -> float:
         """Steps times grid points that a task has done."""
@@ -103,11 +112,12 @@ class Clock:
     def _left_of(self, index: int) -> float:
         """Seconds that a task at work will still take."""
         task, was, now = self.tasks[index], self.running[index], self.now()
-        spent, forecast = now - was.since, self._forecast(index)
+        seconds, spent = self.seconds[index], now - was.since
+        forecast = seconds * self._pace(task.elastomer)
         alone = SECONDS_PER_PAIR * self._work(index)
-        if alone > KNOWN * task.seconds:  # how fast this machine is just now
+        if alone > KNOWN * seconds:  # how fast this machine is just now
             prepared = was.stepped - was.since
-            forecast = prepared + task.seconds * (spent - prepared) / alone
+            forecast = prepared + seconds * (spent - prepared) / alone
         left = max(forecast - spent, AGAIN * spent)
         if was.points == task.points and isfinite(was.first) and was.last > 0:
             way = log(max(was.first / task.solver.tolerance, 1.0))
