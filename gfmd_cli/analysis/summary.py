@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
+from gfmd_cli.analysis.compare import Row, best, in_continuum
 from gfmd_cli.analysis.tables import plus_minus
 from gfmd_cli.physics.observables import QUANTITIES
 from gfmd_cli.study.layout import MISSING
@@ -58,12 +59,10 @@ def _aligned(rows: list[tuple[str, ...]]) -> list[str]:
     ]
 
 
-def _measured(row: Mapping[str, Any], name: str) -> str:
+def _measured(row: Row, name: str) -> str:
     """A value on its grid, or with its error bar in the continuum."""
-    error = row[f"{name}_continuum_error"]
-    if error == error:  # is known
-        return plus_minus(row[f"{name}_continuum"], error)
-    return f"{row[name]:.5g}"
+    value, error = best(row, name)
+    return plus_minus(value, error) if in_continuum(row, name) else f"{value:.5g}"
 
 
 def missed(rows: list[dict[str, Any]], failed: Mapping[int, str]) -> list[str]:

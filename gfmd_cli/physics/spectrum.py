@@ -59,8 +59,8 @@ class SelfAffineFit:
 
     def density(self, q: Field) -> Field:
         """C(q) of one mode [m^2], zero beyond q_s. Paper Eq. (3)."""
-        ratio = (q / self.q_r) ** 2 + 1 if self.q_r else (q / self.q_1) ** 2
-        return np.where(q <= self.q_s, self.c_0 * ratio ** (-1 - self.hurst), 0.0)
+        x = (self.hurst, np.log(self.q_r)) if self.q_r else (self.hurst,)
+        return np.where(q <= self.q_s, self.c_0 * _shape(q, np.array(x), self.q_1), 0.0)
 
 
 def density(shells: Shells) -> Field:
@@ -116,9 +116,9 @@ def _modes(shells: Shells) -> Field:
     return shells.modes
 
 
-def _shape(q: Field, x: Field) -> Field:
+def _shape(q: Field, x: Field, q_1: float) -> Field:
     """C(q) / C_0 below the cut-off, for x = (H, ln q_r) paper Eq. (3), for x = (H,) a power."""
-    ratio = (q / np.exp(x[1])) ** 2 + 1 if x.size == 2 else (q / q[0]) ** 2
+    ratio = (q / np.exp(x[1])) ** 2 + 1 if x.size == 2 else (q / q_1) ** 2
     return np.asarray(ratio ** (-1 - x[0]))
 
 
@@ -127,13 +127,13 @@ def _misfit(x: Field, q: Field, count: Field, power: Field) -> float:
 
     sum m [C_i / C + ln C], which for C = C_0 c is sum m [ln(sum m C_i/c / sum m) + ln c].
     """
-    total, shape = float(np.sum(count)), _shape(q, x)
+    total, shape = float(np.sum(count)), _shape(q, x, q[0])
     return float(total * np.log(_scale(x, q, count, power)) + np.sum(count * np.log(shape)))
 
 
 def _scale(x: Field, q: Field, count: Field, power: Field) -> float:
     """The most likely C_0."""
-    return float(np.sum(count * power / _shape(q, x)) / np.sum(count))
+    return float(np.sum(count * power / _shape(q, x, q[0])) / np.sum(count))
 
 
 def _most_likely(q: Field, count: Field, power: Field, start: Field) -> Field:
@@ -168,7 +168,7 @@ def _errors(q: Field, count: Field, power: Field, best: Field) -> tuple[list[flo
             for a in steps
         ]
     )
-    ratio = power / (_scale(best, q, count, power) * _shape(q, best))
+    ratio = power / (_scale(best, q, count, power) * _shape(q, best, q[0]))
     # of q and -q one is free: m / 2 draws a shell
     deviance = float(np.sum(count * (ratio - 1 - np.log(ratio)))) / (q.size - best.size - 1)
     try:
@@ -180,7 +180,7 @@ def _errors(q: Field, count: Field, power: Field, best: Field) -> tuple[list[flo
 
 def _cut_off(shells: Shells, best: Field) -> int:
     """How many shells of the fit have the ratio of rms gradient to rms height that was seen."""
-    q, modes = shells.q, _modes(shells) * _shape(shells.q, best)
+    q, modes = shells.q, _modes(shells) * _shape(shells.q, best, shells.q[0])
     ratio = np.sqrt(np.cumsum(q**2 * modes) / np.cumsum(modes))
     seen = moments(shells)
     return int(np.clip(np.searchsorted(ratio, seen.gradient / seen.height * ALIKE) + 1, 1, q.size))
