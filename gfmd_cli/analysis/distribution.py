@@ -21,8 +21,8 @@ import numpy as np
 from gfmd_cli.analysis.compare import Comparison, Curve, Row
 from gfmd_cli.analysis.ensemble import without_seed
 from gfmd_cli.physics.fields import Field
-from gfmd_cli.physics.observables import linear_edges, logarithmic_edges
-from gfmd_cli.study.layout import PR_LINEAR, PR_LOGARITHMIC
+from gfmd_cli.physics.observables import logarithmic_edges
+from gfmd_cli.study.layout import BINS, PR_LOGARITHMIC
 
 MOST_CHANGE = 0.35  # of ln Pr from one grid to the next; beyond, a bin is not resolved
 NEIGHBOURS = 2  # bins to each side that the change between grids is averaged over
@@ -32,8 +32,7 @@ SHALLOWEST = 0.75  # distance from the edge, in spacings, below which a bin is n
 
 def bin_counts(row: Row, name: str = PR_LOGARITHMIC) -> Field:
     """Grid points in each bin of Pr(sigma): density times width times the points of the cell."""
-    edges = linear_edges() if name == PR_LINEAR else logarithmic_edges()
-    counts: Field = np.nan_to_num(row[name]) * np.diff(edges) * row["points"]
+    counts: Field = np.nan_to_num(row[name]) * np.diff(BINS[name].edges()) * row["points"]
     return counts if _is_line(counts) else counts * row["points"]
 
 

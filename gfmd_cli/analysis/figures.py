@@ -17,8 +17,7 @@ from gfmd_cli.analysis.distribution_figure import (
 from gfmd_cli.analysis.looks import Look, colours, looks, order
 from gfmd_cli.analysis.sheet import THEORY, Sheet, styled
 from gfmd_cli.physics.fields import Field
-from gfmd_cli.physics.observables import linear_edges, logarithmic_edges
-from gfmd_cli.study.layout import PR_LINEAR, PR_LOGARITHMIC
+from gfmd_cli.study.layout import BINS, PR_LINEAR, PR_LOGARITHMIC
 
 PRESSURES = 5  # that the distribution of one body is drawn at
 WIDE = 20  # a ratio that varies by more is drawn on a log scale
@@ -241,9 +240,5 @@ def _with_density(curve: Curve, name: str) -> list[Row]:
 
 def _bins(row: Row, name: str) -> tuple[Field, Field]:
     """Pr(sigma) Delta_sigma over sigma / Delta_sigma, bins with fewer than FEW points left out."""
-    edges = linear_edges() if name == PR_LINEAR else logarithmic_edges()
-    density = np.nan_to_num(row[name])
     kept = bin_counts(row, name) > FEW - 0.5
-    lower, upper = edges[:-1][kept], edges[1:][kept]
-    middle = 0.5 * (lower + upper) if name == PR_LINEAR else np.sqrt(lower * upper)
-    return middle, density[kept]
+    return BINS[name].middles()[kept], np.nan_to_num(row[name])[kept]

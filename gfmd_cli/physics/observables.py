@@ -104,7 +104,11 @@ def logarithmic_edges() -> Field:
 
 def logarithmic_middles() -> Field:
     """Geometric middles of the logarithmic bins."""
-    edges = logarithmic_edges()
+    return geometric_middles(logarithmic_edges())
+
+
+def geometric_middles(edges: Field) -> Field:
+    """Geometric middles of bins, one fewer than edges."""
     return np.asarray(np.sqrt(edges[1:] * edges[:-1]))
 
 

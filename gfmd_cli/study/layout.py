@@ -4,10 +4,13 @@ from collections.abc import Callable
 from math import nan
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from gfmd_cli.physics.fields import Field
-from gfmd_cli.physics.observables import QUANTITIES, linear_edges, logarithmic_edges
+from gfmd_cli.physics.observables import (
+    QUANTITIES,
+    geometric_middles,
+    linear_edges,
+    logarithmic_edges,
+)
 from gfmd_cli.physics.patches import area_edges
 
 LAYOUT = 2
@@ -113,8 +116,8 @@ class Distribution(NamedTuple):
 
     def middles(self) -> Field:
         """Middles of the bins, geometric in logarithmic ones."""
-        low, high = self.edges()[:-1], self.edges()[1:]
-        return np.sqrt(low * high) if self.logarithmic else 0.5 * (low + high)
+        edges = self.edges()
+        return geometric_middles(edges) if self.logarithmic else 0.5 * (edges[:-1] + edges[1:])
 
 
 PR_LINEAR, PR_LOGARITHMIC = "pr_sigma", "pr_sigma_log"
@@ -128,6 +131,7 @@ DISTRIBUTIONS = (
     Distribution("gap_distribution", "pr_gap_log", "gap_log", *_GAP, logarithmic_edges),
     Distribution("patches", "pr_patch_area", "patch_area", *_AREA, area_edges),
 )
+BINS = {made.name: made for made in DISTRIBUTIONS}
 WEIGHTS = {
     "histogram": (
         Column("pr_zero", float, "1", "weight of the delta function of Pr(sigma) at zero"),
