@@ -1,9 +1,11 @@
 # Two commands on a fresh machine: `make demo` and `make test`.
 VENV := .venv
+LOWEST := .venv-lowest
 BIN := $(VENV)/bin
 RESULTS := results
+export PYTHONDONTWRITEBYTECODE := # empty: without bytecode every process of the tests compiles its imports
 
-.PHONY: demo test test-faults test-mpi test-slurm test-browser check validate docs wheel smoke memory paper paper-quick clean
+.PHONY: demo test test-portable test-lowest test-faults test-kills test-mpi test-slurm test-browser check validate docs wheel smoke memory paper paper-quick clean
 
 $(VENV)/.core: pyproject.toml
 	python3 -m venv $(VENV)
@@ -25,8 +27,32 @@ smoke: $(VENV)/.core ## the smallest complete study
 	$(BIN)/gfmd run configs/smoke.toml -o $(RESULTS)/smoke.h5
 	$(BIN)/gfmd analyze $(RESULTS)/smoke.h5
 
-test: $(VENV)/.test ## the whole suite
-	$(BIN)/pytest -n 2 --dist loadfile
+PYTEST := pytest -n 2 --dist loadfile
+# Files whose tests solve contacts on grids: threads change only their last bits.
+SOLVING := accuracy bench grid local_start multigrid properties reference_solvers search solvers study \
+	true_contact
+# Files whose tests compute: the others check texts, files and processes, with the same bits anywhere.
+COMPUTING := $(SOLVING) anisotropy contact_stiffness convolution discretisation_error distribution \
+	einstein_solid elastomers exact_solutions free_boundary free_compliance interpolation map_preparation \
+	observables_on_request patches persson power_spectra rectangular_cells roughness_parameters spectrum_fit \
+	surfaces topography
+
+test: $(VENV)/.test ## the whole suite, with the newest versions that pip found for a new .venv
+	$(BIN)/$(PYTEST)
+
+test-portable: $(VENV)/.test ## what computes, with the last bits of other machines: a plain processor, three threads
+	env $$($(BIN)/python scripts/plain_processor.py) NUMBA_CACHE_DIR=$(CURDIR)/$(VENV)/plain-kernels \
+		GFMD_PLANS=estimated $(BIN)/$(PYTEST) $(COMPUTING:%=tests/test_%.py)
+	GFMD_PLANS=estimated GFMD_TEST_THREADS=3 $(BIN)/$(PYTEST) $(SOLVING:%=tests/test_%.py)
+
+$(LOWEST)/.test: pyproject.toml $(VENV)/.test
+	$(BIN)/uv venv --quiet --clear --python $(BIN)/python $(LOWEST)
+	$(BIN)/uv pip install --quiet --python $(LOWEST) --compile-bytecode \
+		--resolution lowest-direct -e ".[test]"
+	touch $@
+
+test-lowest: $(LOWEST)/.test ## the suite with the lowest versions that pyproject.toml allows
+	NUMBA_CACHE_DIR=$(CURDIR)/$(LOWEST)/kernels $(LOWEST)/bin/$(PYTEST)
 
 $(VENV)/.mpi: $(VENV)/.test
 	$(BIN)/pip install --quiet --disable-pip-version-check -e ".[mpi]"
@@ -55,6 +81,11 @@ check: $(VENV)/.test ## the one gate: lint, format, types, import order
 validate: $(VENV)/.test ## slow physics: large grids, dense ladders; slow blocks of the documentation
 	$(BIN)/pytest -m validation
 
+test-kills: $(VENV)/.test ## 500 runs whose parent or workers are killed, 200 forged states: an hour
+	GFMD_KILLS=500 $(BIN)/pytest -m faults -rP -n 2 --dist load tests/faults/test_kills.py
+	GFMD_FORGERIES=200 $(BIN)/pytest tests/test_forged_states.py tests/test_forged_records.py \
+		tests/test_forged_benches.py tests/test_forged_wisdom.py
+
 test-faults: $(VENV)/.test ## kills, full disks, damaged files, hostile input; root, for its small disks
 	$(BIN)/pytest -m faults -n 2 --dist load
 
@@ -72,7 +103,7 @@ wheel: $(VENV)/.docs ## the package built, checked and tried in an empty environ
 memory: $(VENV)/.core ## measured peak memory against what --dry-run says
 	$(BIN)/python scripts/memory.py
 
-paper: $(VENV)/.core ## every figure and claim of the paper, at full size: an hour
+paper: $(VENV)/.core ## every figure and statement of the paper, at full size: hours
 	$(BIN)/python scripts/paper_figures.py -o $(RESULTS)/paper --page docs/paper.md
 
 paper-quick: $(VENV)/.core ## the same on small grids: minutes

@@ -1,4 +1,4 @@
-"""gfmd: elastic contact of rough surfaces, for bodies of any stiffness k(q)."""
+"""gfmd: elastic contact of rough surfaces, for elastomers of any stiffness k(q)."""
 
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
@@ -11,7 +11,12 @@ __version__ = "0.1.0"
 
 
 def __getattr__(name: str) -> Any:
-    """The calls of the Python API, loaded when first asked for: the command line starts quickly."""
+    """A name of the Python API, imported at its first use so that the command line starts fast."""
     if name in __all__:
         return getattr(import_module("gfmd_cli.api"), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    """The names of the Python API, also those that are not imported yet."""
+    return sorted([*__all__, "__doc__", "__version__"])

@@ -1,5 +1,28 @@
-"""`python -m gfmd_cli`."""
+"""`gfmd` and `python -m gfmd_cli`: signals are heeded before the slow imports begin."""
 
-from gfmd_cli.cli import main
+import signal
+import sys
+import warnings
+from typing import Any
 
-main()
+ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGUSR1, signal.SIGUSR2)
+
+
+def _leave(number: int, _frame: Any) -> None:
+    """End quietly, as a shell reports a signal; what is open is cleaned up on the way."""
+    sys.exit(128 + number)
+
+
+def main() -> None:
+    """Call the command line. While `gfmd run` solves, it takes signals itself."""
+    for number in ENDING:
+        if signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, _leave)
+    warnings.formatwarning = lambda message, *_, **__: f"gfmd: {message}\n"
+    from gfmd_cli.cli import main as commands
+
+    commands()
+
+
+if __name__ == "__main__":
+    main()

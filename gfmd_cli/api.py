@@ -1,4 +1,4 @@
-"""A study from Python: what the commands do, as a few functions.
+"""The Python API: functions that do the same as the commands.
 
     from gfmd_cli import compare, dataset, rows, run, solve
 
@@ -6,6 +6,7 @@ A spec is the path of a TOML file, or its tables as a dictionary.
 """
 
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,17 +18,22 @@ import numpy as np
 from gfmd_cli.analysis.compare import Comparison
 from gfmd_cli.analysis.compare import compare as compare_study
 from gfmd_cli.analysis.export import as_dataset
+from gfmd_cli.analysis.summary import Summary, summary_html, summary_text
 from gfmd_cli.errors import InputError
-from gfmd_cli.physics.fields import Field, Mask
-from gfmd_cli.study.grids import no_state
-from gfmd_cli.study.layout import MISSING
-from gfmd_cli.study.parse import read_spec, read_tables
+from gfmd_cli.grid.arrays import Field, Mask
+from gfmd_cli.physics.file_surface import FileSurface
+from gfmd_cli.physics.given_heights import given_heights
+from gfmd_cli.physics.indenters import SMALLEST_GRID
+from gfmd_cli.physics.observables import contact_pressure
+from gfmd_cli.spec.models import Spec
+from gfmd_cli.spec.parse import read_spec, read_tables
+from gfmd_cli.status import Status
+from gfmd_cli.study.context import SolveContext, Watcher, WorkerOptions
+from gfmd_cli.study.load_search import solve_at_load
+from gfmd_cli.study.progress import Report, ignore
 from gfmd_cli.study.reading import read_rows
 from gfmd_cli.study.resources import room
 from gfmd_cli.study.run import run_study
-from gfmd_cli.study.search import solve_task_on_grids
-from gfmd_cli.study.solve import Report
-from gfmd_cli.study.spec import Spec
 from gfmd_cli.study.tasks import plan
 
 Tables = Mapping[str, Any]
@@ -38,89 +44,159 @@ class Result:
     """One solved contact, in physical units [m, Pa]; fields are indexed [y, x]."""
 
     height: Field
-    """Indenter, shape (points, points), of a line scene (points,)."""
+    """Height of the indenter, filled in where it is masked; shape (points_y, points), for a line
+    contact (points,)."""
     displacement: Field
+    """Displacement of the elastomer."""
     stress: Field
-    """Compressive and positive."""
-    pressure: float
-    """Nominal pressure."""
+    """Stress K u + p, compressive and positive; off contact zero up to the residual."""
+    pressure: Field
+    """Contact pressure: the stress in contact, exactly zero off contact."""
+    x: Field
+    """Positions of the grid points along x; for indenters counted from the crest."""
+    nominal_pressure: float
+    """Nominal pressure: load per area of the cell."""
     length: float
-    """Side of the cell."""
+    """Side of the cell along x."""
+    length_y: float
+    """Side of the cell along y; NaN for a line contact."""
     h_std: float
-    """rms height."""
+    """Root-mean-square height."""
     delta_sigma: float
-    """rms stress in full contact: the unit of reduced pressures."""
+    """Root-mean-square stress in full contact, the unit of reduced pressures."""
     a_r: float
-    """Relative contact area."""
+    """Relative contact area: (pressure > 0).mean()."""
     sigma_p: float
-    """Standard deviation of the stress / delta_sigma."""
+    """Standard deviation of the contact pressure, divided by delta_sigma."""
     u_g: float
-    """Mean gap / h_std."""
+    """Mean gap, divided by h_std."""
     residual: float
-    """Natural residual."""
-    status: str
-    """"converged", or why not."""
+    """Natural residual of the solution."""
+    status: Status
+    """"converged", or the reason why the tolerance was missed."""
+    warnings: tuple[str, ...] = ()
+    """What makes the numbers doubtful."""
 
     @property
     def p_star(self) -> float:
         """Reduced pressure."""
-        return self.pressure / self.delta_sigma
+        return self.nominal_pressure / self.delta_sigma
 
     @property
     def contact(self) -> Mask:
-        """Points in contact, whose share is a_r: no gap, and pressed (stress alone rounds)."""
-        return np.asarray((self.displacement == self.height) & (self.stress > 0))
+        """Points in contact: no gap and positive stress. Their share is a_r."""
+        mask: Mask = self.pressure > 0
+        return mask
 
     @property
     def gap(self) -> Field:
-        """Distance of the bodies."""
+        """Gap between indenter and elastomer; where the height is masked, to that filled in."""
         return self.displacement - self.height
 
+    def summary(self) -> Summary:
+        """The numbers, with symbol and unit."""
+        mean_gap, deviation = self.u_g * self.h_std, self.sigma_p * self.delta_sigma
+        numbers = {
+            "status": f"{self.status}, natural residual {self.residual:.1e}",
+            "grid": f"{' x '.join(map(str, self.height.shape))} points, L = {self.length:.6g} m",
+            "nominal pressure": f"{self.nominal_pressure:.6g} Pa, p* = {self.p_star:.4g}",
+            "contact area": f"a_r = {self.a_r:.5g}",
+            "stress deviation": f"{deviation:.4g} Pa, sigma_p = {self.sigma_p:.5g} Delta_sigma",
+            "mean gap": f"{mean_gap:.4g} m, u_g = {self.u_g:.5g} h_std",
+            "largest pressure": f"{self.pressure.max():.4g} Pa",
+            "scales": f"h_std = {self.h_std:.4g} m, Delta_sigma = {self.delta_sigma:.4g} Pa",
+        }
+        return numbers | ({"warnings": "; ".join(self.warnings)} if self.warnings else {})
 
-def solve(spec: Path | str | Tables, *, heights: Field | None = None, threads: int = 1) -> Result:
-    """Solve one contact in memory; nothing is kept on disk.
+    def __str__(self) -> str:
+        """The summary as a text table."""
+        return summary_text(self.summary())
+
+    __repr__ = __str__
+
+    def _repr_html_(self) -> str:
+        """The summary as HTML, for notebooks."""
+        return summary_html(self.summary())
+
+
+def solve(spec: Path | str | Tables, *, heights: Any = None, threads: int = 1) -> Result:
+    """Solve one contact in memory; no file is written.
 
     Parameters
     ----------
-    spec : describes one pressure on one scene
-    heights : (N, N), pressed in the place of the surface of a dictionary, whose table "surface" may
-        say more: length, periodic, level, edges, scale, crop, missing
-    threads : of the transforms and of what lies between them
+    spec
+        The spec of one task.
+    heights
+        Height map that replaces the surface: an array or nested list of shape (N, N), a masked
+        array, or a topography of SurfaceTopography, which states its side, unit and periodicity.
+        The spec is then a dictionary, whose table "surface" may contain length, periodic, level,
+        edges, interpolation, scale, crop and missing. Without a table "grid" the points of the map
+        are those of the grid.
+    threads
+        Number of threads.
 
-    Raises InputError for a bad spec, or one of several tasks.
+    Raises
+    ------
+    InputError
+        If the spec or the heights are invalid, contradict each other, or the spec has several
+        tasks.
     """
+    if threads < 1:
+        raise InputError(f"threads = {threads}: one or more are needed")
     if heights is None:
         return _solve(spec, threads)
     if not isinstance(spec, Mapping):
         raise InputError("heights go with a dictionary; a spec in a file has a surface")
+    given = given_heights(heights)
     with TemporaryDirectory() as folder:
         path = Path(folder) / "heights.npy"
-        np.save(path, heights)
-        surface = {**spec.get("surface", {}), "kind": "file", "path": str(path)}
-        return _solve({**spec, "surface": surface}, threads)
+        np.save(path, given.values)
+        try:
+            surface = given.surface(_plain(spec.get("surface", {}))) | {"path": str(path)}
+            return _solve(_with_points({**spec, "surface": surface}), threads)
+        except InputError as error:  # the file is not the caller's
+            raise InputError(str(error).replace(str(path), "heights")) from None
+
+
+def _with_points(tables: dict[str, Any]) -> dict[str, Any]:
+    """The tables with the points of the map, unless the table grid has them."""
+    grid = tables.get("grid", {})
+    if "points" in grid:
+        return tables
+    spec = read_tables(_plain(tables | {"grid": {**grid, "points": SMALLEST_GRID}}))
+    surface = spec.surface[0]
+    assert isinstance(surface, FileSurface)
+    return tables | {"grid": {**grid, "points": surface.own_points()}}
 
 
 def _solve(spec: Path | str | Tables, threads: int) -> Result:
     tasks = plan(_read(spec)[0])
     if len(tasks) != 1:
         raise InputError(f"solve takes one contact, the spec has {len(tasks)}; run() takes them")
-    found = solve_task_on_grids(
-        tasks[0], threads, (room(None), False), no_state, None, lambda notes: None, watch=_ignore
-    )
-    scene, solution, seen = found.scene, found.solution, found.seen
+    context = SolveContext(WorkerOptions(threads, room()))
+    solved = solve_at_load(tasks[0], context, Watcher())
+    scene, solution, measured = solved.scene, solved.solution, solved.observables
+    height = solved.contact.height
+    points = scene.grid.points
     return Result(
-        height=found.contact.height * scene.h_std + scene.mean_height,
-        displacement=solution.u * scene.h_std + scene.mean_height,
-        stress=solution.sigma * scene.delta_sigma,
-        pressure=found.contact.pressure * scene.delta_sigma,
+        height=scene.in_metres(height),
+        displacement=scene.in_metres(solution.u),
+        stress=scene.in_pascals(solution.sigma),
+        pressure=scene.in_pascals(
+            contact_pressure(solved.contact.obstacle, solution.u, solution.sigma)
+        ),
+        x=(np.arange(points) / points + tasks[0].surface.x_first) * scene.grid.length,
+        nominal_pressure=solved.contact.pressure * scene.delta_sigma,
         length=scene.grid.length,
+        length_y=scene.grid.length_y if scene.grid.dimension == 2 else math.nan,
         h_std=scene.h_std,
         delta_sigma=scene.delta_sigma,
-        a_r=seen.a_r,
-        sigma_p=seen.sigma_p,
-        u_g=seen.u_g,
+        a_r=measured.a_r,
+        sigma_p=measured.sigma_p,
+        u_g=measured.u_g,
         residual=solution.residual,
         status=solution.status,
+        warnings=tuple(solved.warnings(tasks[0])),
     )
 
 
@@ -130,19 +206,33 @@ def run(
     *,
     overrides: tuple[str, ...] = (),
     jobs: int = 1,
-    report: Report = lambda progress: None,
+    report: Report = ignore,
 ) -> Path:
-    """Solve what a study does not hold yet, as `gfmd run` does; return the path of its file.
+    """Run all tasks that a study does not contain yet, as `gfmd run`; return the study's path.
+
+    In the main thread the function handles signals: it saves all states before it ends.
 
     Parameters
     ----------
-    study : the file, by default NAME.h5 in the working directory
-    overrides : "key.name=value" each, for a spec in a file
-    jobs : worker processes; more than one takes a script with `if __name__ == "__main__":`
-    report : told of every start, step and end of a task
+    spec
+        Path of a TOML file, or its tables as a dictionary.
+    study
+        Study file; by default NAME.h5 in the working directory.
+    overrides
+        Strings "table.key=value" that override keys of a spec in a file.
+    jobs
+        Number of worker processes; above one the script needs `if __name__ == "__main__":`.
+    report
+        Function that is called at every start, step and end of a task.
 
-    In the main thread it takes signals while it runs, and ends in order on them. Raises
-    InputError, SpaceError, Interrupted.
+    Raises
+    ------
+    InputError
+        If the spec is invalid or does not fit the study.
+    SpaceError
+        If the disk is full or a file cannot be created.
+    Interrupted
+        If a signal stopped the run.
     """
     resolved, text = _read(spec, overrides)
     path = Path(study if study is not None else f"{resolved.study.name}.h5")
@@ -151,25 +241,40 @@ def run(
 
 
 def rows(study: Path | str) -> list[dict[str, Any]]:
-    """One dictionary a solved pressure: the columns of `gfmd export`, Pr(sigma) where stored.
+    """Read a study: one dictionary per solved task, with the columns of `gfmd export`.
 
-    Raises InputError, StudyError.
+    Raises
+    ------
+    InputError
+        If there is no such study.
+    StudyError
+        If the study is damaged.
     """
-    return [row for row in read_rows(Path(study)) if row["status"] != MISSING]
+    return [row for row in read_rows(Path(study)) if row["status"] != Status.MISSING]
 
 
 def compare(study: Path | str) -> Comparison:
-    """A study beside Persson theory, curve by curve: `gfmd analyze`.
+    """Compare a study with Persson theory, as `gfmd analyze`.
 
-    Raises InputError, StudyError.
+    Raises
+    ------
+    InputError
+        If there is no such study.
+    StudyError
+        If the study is damaged.
     """
     return compare_study(Path(study))
 
 
 def dataset(study: Path | str) -> Any:
-    """A study as an `xarray.Dataset`, all of it but the fields on the grid.
+    """Read a study as an `xarray.Dataset`, without the fields on the grid.
 
-    Raises InputError where xarray is missing or there is no such study, StudyError.
+    Raises
+    ------
+    InputError
+        If xarray is not installed or there is no such study.
+    StudyError
+        If the study is damaged.
     """
     return as_dataset(Path(study))
 
@@ -178,9 +283,15 @@ def _read(spec: Path | str | Tables, overrides: tuple[str, ...] = ()) -> tuple[S
     if isinstance(spec, Mapping):
         if overrides:
             raise InputError("overrides go with a spec in a file; change the dictionary")
-        return read_tables(dict(spec)), json.dumps(spec, indent=1, default=str)
+        tables = _plain(spec)
+        return read_tables(tables), json.dumps(tables, indent=1, default=str)
     return read_spec(Path(spec), overrides)
 
 
-def _ignore(*_: Any) -> None:
-    """Watch nothing."""
+def _plain(given: Any) -> Any:
+    """A copy of the tables of a spec, with numbers and lists in the place of those of NumPy."""
+    if isinstance(given, Mapping):
+        return {key: _plain(value) for key, value in given.items()}
+    if isinstance(given, list | tuple):
+        return [_plain(value) for value in given]
+    return given.tolist() if isinstance(given, np.ndarray | np.generic) else given

@@ -1,8 +1,11 @@
 """The errors that end a command, each with its exit status."""
 
+INSTALL = 'pip install ".[{}]" in the source folder of gfmd'
+"""How to install the packages of an extra."""
+
 
 class GfmdError(Exception):
-    """An error that is told to the user in one message, without a traceback."""
+    """An error that is printed as one message, without a traceback."""
 
     exit_status = 1
 

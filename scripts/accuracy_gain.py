@@ -10,7 +10,7 @@ import argparse
 import tempfile
 from pathlib import Path
 
-from gfmd_cli.study.parse import read_spec
+from gfmd_cli.spec.parse import read_spec
 from gfmd_cli.study.reading import read_rows
 from gfmd_cli.study.run import run_study
 

@@ -39,9 +39,10 @@ ONE_THREAD = {f"{name}_NUM_THREADS": "1" for name in ("OMP", "OPENBLAS", "MKL")}
 
 def gfmd(job, height):
     from gfmd_cli.physics.contact import build_scene
-    from gfmd_cli.physics.elastomer import HalfSpace
-    from gfmd_cli.physics.surface import FileSurface
-    from gfmd_cli.solvers.cascade import SolverChoice, solve_contact
+    from gfmd_cli.physics.elastomers import HalfSpace
+    from gfmd_cli.physics.file_surface import FileSurface
+    from gfmd_cli.solvers.auto import Auto
+    from gfmd_cli.solvers.nested_grids import solve_contact
 
     surface = FileSurface(path=Path(job["height"]))
     surface.smallest_grid()  # reads the file
@@ -49,8 +50,8 @@ def gfmd(job, height):
     def solve():
         scene = build_scene(surface, HalfSpace(), len(height))
         contact = scene.contact(job["pressure"] / scene.delta_sigma)
-        choice = SolverChoice(tolerance=job["tolerance"])
-        found = solve_contact(contact, choice, lambda contact, state: None)
+        solver = Auto(tolerance=job["tolerance"])
+        found = solve_contact(contact, solver)
         gap = found.u - contact.height
         loaded = np.where(gap == 0, np.maximum(found.sigma, 0), 0)
         done = found.status == "converged"
@@ -244,14 +245,15 @@ def reach(rows, target):
 def compare(points, p_star, pythons, options):
     """All codes at one size and pressure: every run, then seconds at equal error."""
     from gfmd_cli.physics.contact import build_scene
-    from gfmd_cli.physics.elastomer import HalfSpace
+    from gfmd_cli.physics.elastomers import HalfSpace
     from gfmd_cli.physics.observables import observe
-    from gfmd_cli.physics.surface import SelfAffine
-    from gfmd_cli.solvers.cascade import SolverChoice, solve_contact
+    from gfmd_cli.physics.self_affine import SelfAffine
+    from gfmd_cli.solvers.auto import Auto
+    from gfmd_cli.solvers.nested_grids import solve_contact
 
     scene = build_scene(SelfAffine(), HalfSpace(), points)
     contact = scene.contact(p_star)
-    exact = solve_contact(contact, SolverChoice(tolerance=1e-9), lambda contact, state: None)
+    exact = solve_contact(contact, Auto(tolerance=1e-9))
     reference = observe(contact, exact.u, exact.sigma)
     print(
         f"\n{points}^2, p* = {p_star:g}, load {os.getloadavg()[0]:.1f}; reference: {exact.status}, "
@@ -313,13 +315,13 @@ def version(python, package):
     return done.stdout.strip() if done.returncode == 0 else None
 
 
-def install(venv):
+def install(venv, packages=PEERS):
     """Make the environment of the peers and say what is in it; package -> its Python."""
     python = venv.absolute() / "bin" / "python"
     if not python.exists():
         subprocess.run([sys.executable, "-m", "venv", str(venv)], check=True)
     pythons = {"gfmd-cli": sys.executable}
-    for package in PEERS:
+    for package in packages:
         if version(python, package) is None and not pip(python, package) and package == "aspher":
             fetch_eigen(venv)  # its build looks for Eigen 3.4 on the system, then on gitlab.com
             pip(python, package, CMAKE_PREFIX_PATH=str(venv.absolute() / "eigen" / "usr"))

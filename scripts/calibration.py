@@ -1,8 +1,8 @@
-"""How honest the bars of gfmd_cli/physics/continuum.py are: contacts solved on nested grids.
+"""How honest the bars of `physics.discretisation_error` are: contacts on nested grids.
 
 Each case is one continuous contact at one pressure, solved on grids N0, 2 N0, 4 N0, ... The finest
 of them give the value of the continuum, one to three of the coarse ones an estimate of it; the
-table counts how often the estimate's bar holds. The constants of continuum.py were fitted to the
+table counts how often the estimate's bar holds. The constants of the estimates were fitted to the
 cases of the half "fit" only.
 """
 
@@ -16,26 +16,34 @@ from pathlib import Path
 
 import numpy as np
 
-from gfmd_cli.physics.bodies import Parabola, Wave
+from gfmd_cli.physics.anisotropy import anisotropy
 from gfmd_cli.physics.contact import Scene, build_scene
-from gfmd_cli.physics.continuum import (
-    LAST_LINE,
-    QUANTITIES,
-    Level,
-    Texture,
+from gfmd_cli.physics.discretisation_error import (
+    MAX_AREA_EXPONENT,
+    RoughnessScales,
     estimate,
+    exponent_spread,
     local_exponent,
-    texture,
+    roughness_scales,
 )
-from gfmd_cli.physics.elastomer import Elastomer, Power, Slab
-from gfmd_cli.physics.observables import observe
-from gfmd_cli.physics.surface import FileSurface, SelfAffine, Surface
-from gfmd_cli.solvers.cascade import SolverChoice, solve_contact
+from gfmd_cli.physics.elastomers import Elastomer, Power, Slab
+from gfmd_cli.physics.error_estimates import Level
+from gfmd_cli.physics.file_surface import FileSurface
+from gfmd_cli.physics.indenters import Parabola, Wave
+from gfmd_cli.physics.observables import QUANTITIES, observe
+from gfmd_cli.physics.self_affine import SelfAffine
+from gfmd_cli.physics.surfaces import Surface
+from gfmd_cli.solvers.auto import Auto
+from gfmd_cli.solvers.nested_grids import solve_contact
 
 EXPONENTS = (0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0)
 THICKNESSES = (0.01, 0.03, 0.1)
 PRESSURES = np.geomspace(0.003, 3.0, 9)
 WIDE = (0.0, 0.5, 1.0, 1.0, 1.5, 2.0, 2.5, 3.0)
+MAP_EXPONENTS = (0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0)
+IRREGULAR = ("clipped", "worn", "steps", "stripes", "stretched", "turned")
+"""Kinds of maps; in docs/accuracy.md worn ones are "polished", stripes "two levels", turned ones
+"stretched at an angle"."""
 BETWEEN = (0.25, 1.25, 1.75, 2.25, 2.75, 3.25, 3.75)
 FINER = 4  # the grid that truth comes from is at least so much finer than those of an estimate
 KEYS = ("points", "a_r", "sigma_p", "u_g", "perimeter")
@@ -54,11 +62,66 @@ class Case:
     base: int
     doublings: int
     fit: bool
-    """Whether the constants of continuum.py were fitted to it, among others."""
+    """Whether the constants of the estimates were fitted to it, among others."""
 
     @property
     def body(self) -> bool:
         return isinstance(self.surface, Parabola | Wave)
+
+
+def map_cases(folder: Path, seed: int, scans: Path | None) -> list[Case]:
+    """Maps that are no isotropic random surfaces: clipped, stepped, anisotropic, measured.
+
+    `scans` is a folder of levelled square maps of 64 points in .npy files.
+    """
+    draw, out = np.random.default_rng(seed + 2), []
+
+    def add(kind: str, heights: np.ndarray, n: float, fit: bool, **keys: object) -> None:
+        path = folder / f"{kind}-{seed}-{len(out)}.npy"
+        np.save(path, heights)
+        p, surface = float(draw.choice(PRESSURES[1:7])), FileSurface(path=path, **keys)
+        points = surface.smallest_grid()
+        doublings = {32: 4, 64: 3}.get(points, 2)
+        name = f"n={n:g} {kind} {surface.applied_interpolation()}"
+        out.append(Case(len(out), name, surface, Power(n=n), p, points, doublings, fit))
+
+    for fit in (True, False):
+        for kind in IRREGULAR:
+            for n in MAP_EXPONENTS:
+                for points in (32, 64):
+                    add(kind, irregular_map(kind, draw, points), n, fit)
+    for i, path in enumerate(sorted(scans.glob("*.npy")) if scans else []):
+        for n in draw.choice(MAP_EXPONENTS, 3, replace=False):
+            edges = str(draw.choice(["window", "mirror", "none"]))
+            add("scan", np.load(path), float(n), i % 2 == 0, edges=edges)
+    return out
+
+
+def irregular_map(kind: str, draw: np.random.Generator, points: int) -> np.ndarray:
+    """A periodic map: random roughness, clipped, in steps, or stretched along one direction."""
+    m_y, m_x = np.meshgrid(*[np.fft.fftfreq(points, 1 / points)] * 2, indexing="ij")
+    if kind in ("stretched", "turned"):
+        stretch, angle = draw.choice([3.0, 8.0]), draw.uniform(0.3, 1.2) * (kind == "turned")
+        m_y, m_x = (
+            m_y * np.cos(angle) + m_x * np.sin(angle),
+            m_x * np.cos(angle) - m_y * np.sin(angle),
+        )
+        m_y = m_y * stretch
+    radius = np.hypot(m_y, m_x)
+    amplitude = (1 + (radius / 3) ** 2) ** (-0.5 - 0.5 * draw.choice([0.3, 0.8]))
+    amplitude[(radius == 0) | (radius > points / draw.choice([2.0, 3.0, 4.0]))] = 0.0
+    h = np.fft.ifft2(np.fft.fft2(draw.normal(size=(points, points))) * amplitude).real
+    h = (h - h.mean()) / h.std()
+    level = draw.uniform(0.0, 1.2)
+    if kind == "clipped":
+        return np.minimum(h, level)
+    if kind == "worn":  # peaks polished, not cut off
+        return np.where(h > level, level + 0.05 * (h - level), h)
+    if kind == "steps":
+        return np.rint(h * draw.choice([0.4, 1.0]))
+    if kind == "stripes":
+        return np.where(h > level - 0.6, 1.0, 0.0) + 0.02 * h
+    return h
 
 
 def cases(folder: Path, seed: int = 20) -> list[Case]:
@@ -139,23 +202,25 @@ def measure(case: Case, tolerance: float = 1e-6) -> dict:
         points = case.base * 2**step
         scene = scene_of(case, points)
         first = first or scene
-        # a parabola has a kink between two cells: its Delta_sigma is one of the grid
-        stress = scene.delta_sigma / first.delta_sigma if case.body else 1.0
-        height = scene.h_std / first.h_std if case.body else 1.0
+        # Delta_sigma of a kink, or of a map interpolated by monotone cubics, is one of the grid
+        changes = case.body or not case.surface.band_limited
+        stress = scene.delta_sigma / first.delta_sigma if changes else 1.0
+        height = scene.h_std / first.h_std if changes else 1.0
         contact, length = scene.contact(case.p_star / stress), scene.grid.length
         begun = time.perf_counter()
-        solution = solve_contact(contact, SolverChoice(tolerance=tolerance), lambda *_: None)
+        solution = solve_contact(contact, Auto(tolerance=tolerance))
         seen = observe(contact, solution.u, solution.sigma)
         levels.append(
             {
                 "points": points,
-                "exponent": local_exponent(case.elastomer.stiffness, points, length),
+                "exponent": local_exponent(case.elastomer, points, length),
+                "spread": exponent_spread(case.elastomer, points, length),
                 "a_r": seen.a_r,
                 "sigma_p": seen.sigma_p * stress,
                 "u_g": seen.u_g * height,
                 "perimeter": seen.perimeter,
                 "energy": seen.energy * stress * height,
-                "texture": None if case.body else asdict(texture(scene.shells, length)),
+                "texture": None if case.body else _texture(case, scene),
                 "status": solution.status,
                 "seconds": round(time.perf_counter() - begun, 3),
             }
@@ -169,13 +234,20 @@ def measure(case: Case, tolerance: float = 1e-6) -> dict:
     }
 
 
+def _texture(case: Case, scene: Scene) -> dict:
+    """The scales of a rough surface, as `estimate` needs them."""
+    ratio = anisotropy(scene.grid, scene.height)
+    limited = case.surface.band_limited
+    return asdict(roughness_scales(scene.shells, scene.grid.length, ratio, band_limited=limited))
+
+
 def truth(levels: list[dict]) -> dict[str, float]:
-    """The continuum values, from the finest grids alone; no constant of continuum.py."""
+    """The continuum values, from the finest grids alone; no constant of discretisation_error.py."""
     third, second, first = levels[-3:]
     n = first["exponent"]
     x_second, x_first = (level["perimeter"] / level["points"] for level in (second, first))
     area = first["a_r"]
-    if n > LAST_LINE:  # geometric, where it is; half a line's width less where not
+    if n > MAX_AREA_EXPONENT:  # geometric, where it is; half a line's width less where not
         steps = (second["a_r"] - third["a_r"], area - second["a_r"])
         ratio = steps[1] / steps[0] if steps[0] else 1.0
         area += steps[1] * ratio / (1 - ratio) if 0 < ratio < 0.8 else -0.5 * x_first
@@ -217,12 +289,12 @@ def scores(records: list[dict]) -> Iterator[Score]:
         seen = [Level(*(level[key] for key in KEYS)) for level in record["levels"]]
         for last in range(len(seen) - int(np.log2(FINER))):
             fine, found = seen[last], record["levels"][last]
-            rough = None if record["body"] else Texture(**found["texture"])
+            rough = None if record["body"] else RoughnessScales(**found["texture"])
             if fine.u_g < FULL:
                 continue
             for grids in range(1, min(last + 1, 3) + 1):
                 given = seen[last + 1 - grids : last + 1]
-                by_name = estimate(given, found["exponent"], rough)
+                by_name = estimate(given, found["exponent"], rough, found["spread"])
                 for quantity, made in by_name.items():
                     if np.isnan(made.error):
                         continue
@@ -282,7 +354,7 @@ def table(found: list[Score]) -> None:
                     not s.fit and s.quantity == quantity and s.name.startswith(f"n={n:g} ")  # noqa: B023
                 ),
             )
-        for kind in ("slab", "file", "wide", "between"):
+        for kind in ("slab", "file", "wide", "between", *IRREGULAR, "scan"):
             line(
                 f"verify {quantity} {kind}",
                 lambda s: not s.fit and s.quantity == quantity and kind in s.name,  # noqa: B023
@@ -299,10 +371,10 @@ def table(found: list[Score]) -> None:
 
 def figure(found: list[Score], path: Path) -> None:
     """Bar over true error of the cases that nothing was fitted to."""
-    from gfmd_cli.analysis.sheet import Line2D, Sheet, styled
+    from gfmd_cli.analysis.plotting import ColumnFigure, Line2D, styled
 
     with styled():
-        sheet = Sheet("true error", "bar")
+        plot = ColumnFigure("true error", "bar")
         span = (1e-6, 1.0)
         looks = {
             "a_r": ("o", "tab:blue"),
@@ -314,12 +386,12 @@ def figure(found: list[Score], path: Path) -> None:
             chosen = [s for s in found if not s.fit and s.quantity == quantity]
             x, y = ([getattr(s, name) for s in chosen] for name in ("error", "bar"))
             style = {"marker": marker, "ls": "none", "mfc": "none", "color": colour}
-            sheet.axes.plot(*np.clip((x, y), *span), ms=2.2, mew=0.4, **style)
-            sheet.legend[labels[quantity]] = Line2D([], [], **style)
-        sheet.line(sheet.axes, "bar = error", np.array(span), np.array(span), color="black")
+            plot.axes.plot(*np.clip((x, y), *span), ms=2.2, mew=0.4, **style)
+            plot.legend[labels[quantity]] = Line2D([], [], **style)
+        plot.line(plot.axes, "bar = error", np.array(span), np.array(span), color="black")
         for axis in "xy":
-            sheet.scale(axis, "log", span)
-        sheet.write(path)
+            plot.scale(axis, "log", span)
+        plot.write(path)
 
 
 def collect(chosen: list[Case], cache: Path | None = None) -> list[dict]:
@@ -345,9 +417,15 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="half the cases, smaller grids")
     parser.add_argument("--seed", type=int, default=20, help="20 is the set of the constants")
     parser.add_argument("--figure", type=Path, help="path of a figure, without suffix")
+    parser.add_argument("--maps", action="store_true", help="irregular maps instead")
+    parser.add_argument("--scans", type=Path, help="with --maps: folder of maps of 64 x 64 points")
     chosen = parser.parse_args()
-    with tempfile.TemporaryDirectory() as folder:
-        wanted = cases(Path(folder), chosen.seed)
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        if chosen.maps:
+            wanted = map_cases(folder, chosen.seed, chosen.scans)
+        else:
+            wanted = cases(folder, chosen.seed)
         records = collect(quick(wanted) if chosen.quick else wanted, chosen.cache)
     found = list(scores(records))
     table(found)

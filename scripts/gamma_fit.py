@@ -17,10 +17,9 @@ from scipy.optimize import curve_fit, minimize_scalar
 from theory_studies import STUDIES, TRAINING
 
 from gfmd_cli.analysis.compare import Curve, compare, einstein_prediction
-from gfmd_cli.analysis.ensemble import without_seed
-from gfmd_cli.analysis.looks import MARKERS, Look, colours
-from gfmd_cli.analysis.sheet import Sheet, styled
-from gfmd_cli.physics.elastomer import Slab, exponent_at
+from gfmd_cli.analysis.curve_styles import MARKERS, CurveStyle, colours
+from gfmd_cli.analysis.plotting import ColumnFigure, styled
+from gfmd_cli.physics.elastomers import Slab
 from gfmd_cli.physics.persson import Persson, gamma_n
 
 Gamma = Callable[[np.ndarray], np.ndarray]
@@ -61,7 +60,7 @@ class Case:
         q, row = self.curve.persson.shells.q, self.curve.rows[0]
         if np.isfinite(self.curve.n):
             return np.full(q.size, self.curve.n)
-        return exponent_at(Slab(thickness=row["thickness"]).stiffness, q, row["length"])
+        return Slab(thickness=row["thickness"]).local_exponent(q, row["length"])
 
     @property
     def ends(self) -> tuple[np.ndarray, np.ndarray]:
@@ -70,7 +69,7 @@ class Case:
         Surfaces that differ in their seed have one spectrum.
         """
         row = self.curve.rows[0]
-        key = (without_seed(row), row["elastomer"])
+        key = (row["ensemble"], row["elastomer"])
         if key not in ENDS:
             ENDS[key] = self.gap(lambda n: np.ones(n.size)), self.gap(lambda n: np.zeros(n.size))
         return ENDS[key]
@@ -200,19 +199,19 @@ def draw(best: dict[str, dict[float, tuple[float, float]]], smooth: Gamma, path:
     """Best gamma over n: symbols the fits with their error bars, lines the two functions."""
     n = np.linspace(0, 4, 200)
     with styled():
-        sheet = Sheet(r"exponent  $n$", r"weight  $\gamma$ of the elastic energy")
+        plot = ColumnFigure(r"exponent  $n$", r"weight  $\gamma$ of the elastic energy")
         shown = {name: values for name, values in best.items() if values}
         for place, (name, values) in enumerate(shown.items()):
-            look = Look(colours(len(shown))[place], MARKERS[place], LABELS.get(name, name))
+            style = CurveStyle(colours(len(shown))[place], MARKERS[place], LABELS.get(name, name))
             x = np.array(list(values)) + 0.03 * (place - len(shown) / 2)
             y, error = np.array(list(values.values())).T
-            style = {"fmt": "none", "ecolor": look.colour, "elinewidth": 0.7, "capsize": 1.5}
-            sheet.axes.errorbar(x, y, 2 * error, **style)
-            sheet.points(look, x, y, np.full(x.size, True))
-        sheet.line(sheet.axes, "Eq. (39)", n, gamma_n(n), color="0.4", ls=(0, (4, 2)), lw=0.9)
-        sheet.line(sheet.axes, "fitted here", n, smooth(n), color="black", lw=1.1)
-        sheet.axes.set(xlim=(-0.2, 4.2), ylim=(0, None))
-        files = sheet.write(path)
+            bars = {"fmt": "none", "ecolor": style.colour, "elinewidth": 0.7, "capsize": 1.5}
+            plot.axes.errorbar(x, y, 2 * error, **bars)
+            plot.points(style, x, y, np.full(x.size, True))
+        plot.line(plot.axes, "Eq. (39)", n, gamma_n(n), color="0.4", ls=(0, (4, 2)), lw=0.9)
+        plot.line(plot.axes, "fitted here", n, smooth(n), color="black", lw=1.1)
+        plot.axes.set(xlim=(-0.2, 4.2), ylim=(0, None))
+        files = plot.write(path)
     files[0].unlink()  # docs show the PNG
 
 

@@ -26,14 +26,16 @@ from pathlib import Path
 
 import numpy as np
 
-from gfmd_cli.physics import reference
-from gfmd_cli.physics.bodies import LineParabola, Parabola, Punch
+from gfmd_cli.physics import exact_solutions as reference
 from gfmd_cli.physics.contact import Contact, build_scene
-from gfmd_cli.physics.elastomer import Elastomer, Power, Slab, Tabulated
+from gfmd_cli.physics.elastomers import Elastomer, Power, Slab, Tabulated
+from gfmd_cli.physics.file_surface import FileSurface
+from gfmd_cli.physics.indenters import LineParabola, Parabola, Punch
 from gfmd_cli.physics.observables import Observables, observe
-from gfmd_cli.physics.surface import FileSurface, SelfAffine, Surface
-from gfmd_cli.solvers.cascade import Solution, SolverChoice, solve_contact
-from gfmd_cli.solvers.loop import refresh
+from gfmd_cli.physics.self_affine import SelfAffine
+from gfmd_cli.physics.surfaces import Surface
+from gfmd_cli.solvers.auto import Auto
+from gfmd_cli.solvers.nested_grids import Solution, solve_contact
 
 TOLERANCE = 1e-6  # the default of [solver]
 TIGHTER = 1e-8  # a hundredth of it; no number where rounding or time does not allow it
@@ -210,14 +212,13 @@ def solve(
         if time.process_time() - start > seconds:
             raise OutOfTimeError
 
+    solver = Auto(tolerance=tolerance, max_steps=max_steps)
     try:
-        solution = solve_contact(
-            contact, SolverChoice(tolerance=tolerance, max_steps=max_steps), watch
-        )
+        solution = solve_contact(contact, solver, watch)
         status = solution.status
     except OutOfTimeError:
         contact, state = latest
-        refresh(contact, state)
+        solver.refresh(contact, state)
         status = f"given up at step {state.step}, {contact.grid.points} points a side"
         solution = Solution(
             state.u, state.sigma, state.residual, status, "pcg", state.step, state.transforms

@@ -9,10 +9,11 @@ import sys
 import numpy as np
 
 from gfmd_cli.physics.contact import build_scene
-from gfmd_cli.physics.elastomer import Power
+from gfmd_cli.physics.elastomers import Power
 from gfmd_cli.physics.observables import observe
-from gfmd_cli.physics.surface import SelfAffine
-from gfmd_cli.solvers.cascade import SolverChoice, solve_contact
+from gfmd_cli.physics.self_affine import SelfAffine
+from gfmd_cli.solvers.auto import Auto
+from gfmd_cli.solvers.nested_grids import solve_contact
 
 EXPONENTS = (0.0, 0.5, 1.0, 2.0, 3.0, 4.0)
 PANELS = 12  # in ln p, four Gauss points each
@@ -24,11 +25,11 @@ def main(points: int = 512, tolerance: float = 1e-8) -> None:
     print("   n  |2v/(<sigma h> - p<u>) - 1|  |-dv/du_g / p - 1|  |int u_g dp / [v + p u_g] - 1|")
     for n in EXPONENTS:
         scene = build_scene(SelfAffine(), Power(n=n), points)
-        choice = SolverChoice(tolerance=tolerance)
+        solver = Auto(tolerance=tolerance)
 
-        def seen(p, scene=scene, choice=choice):
+        def seen(p, scene=scene, solver=solver):
             contact = scene.contact(float(p))
-            solution = solve_contact(contact, choice, lambda contact, state: None)
+            solution = solve_contact(contact, solver)
             assert solution.status == "converged"
             return observe(contact, solution.u, solution.sigma)
 

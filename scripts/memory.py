@@ -1,4 +1,4 @@
-"""Peak memory of a solve, measured, against what `gfmd run --dry-run` says."""
+"""Peak memory of a task, measured, against what `gfmd run --dry-run` predicts, as a table."""
 
 import resource
 import subprocess
@@ -6,7 +6,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from gfmd_cli.study.parse import read_spec
+from gfmd_cli.spec.parse import read_spec
 from gfmd_cli.study.tasks import plan
 
 SPEC = """\
@@ -14,36 +14,69 @@ SPEC = """\
 kind = "self-affine"
 [elastomer]
 kind = "power"
-n = 2
-[grid]
-points = {points}
+n = 1
 [load]
-p_star = 1.0
+p_star = 0.1
+[solver]
+max_steps = 6
 """
+CASES = {
+    '`solver.kind = "pcg"`': ["solver.kind=pcg"],
+    '`"pcg"`, n = 2': ["elastomer.n=2"],
+    '`"pcg"`, n = 0.25': ["elastomer.n=0.25"],
+    '`"sort"` (n = 0)': ["elastomer.n=0"],
+    '`"fire"`': ["solver.kind=fire"],
+    '`"ccg"`': ["solver.kind=ccg"],
+    '`"polonsky-keer"`': ["solver.kind=polonsky-keer"],
+    "`[accuracy]`": ["accuracy.mean_gap=0.1"],
+    "a free boundary": ["grid.boundary=free"],
+    "a slab": ["elastomer={kind='slab', thickness=0.05}"],
+    "`load.contact_area`": ["load={contact_area=0.1}"],
+    "one stored field": ["output.fields=['u']"],
+    "three stored fields": ["output.fields=['u','sigma','height']"],
+    "`output.stiffness`": ["output.stiffness=true"],
+    "`output.spectra`": ["output.spectra=true"],
+    "`output.patches`, `percolation`": ["output.patches=true", "output.percolation=true"],
+    "`output.gap_distribution`, `true_contact`": [
+        "output.gap_distribution=true",
+        "output.true_contact=true",
+    ],
+}
+RATIO = 0.9  # predicted over measured, from which a row is marked
 
 
-def main() -> None:
-    print(f"{'points':>7} {'predicted':>10} {'measured':>10}  ratio")
-    for points in (512, 1024, 2048, 4096):
-        with tempfile.TemporaryDirectory() as folder:
-            spec = Path(folder) / "spec.toml"
-            spec.write_text(SPEC.format(points=points))
-            predicted = plan(read_spec(spec)[0])[0].bytes
-            command = [sys.executable, __file__, "measure", str(spec)]
-            done = subprocess.run(command, capture_output=True, text=True, check=True, cwd=folder)
-        measured = 1024.0 * int(done.stdout)
-        print(
-            f"{points:7d} {predicted / 2**20:7.0f} MiB {measured / 2**20:7.0f} MiB "
-            f"{measured / predicted:6.3f}"
-        )
+def main(*sizes: str) -> None:
+    points = [int(size) for size in sizes] or [1024, 2048, 4096]
+    print("| |" + "".join(f" {n}²: measured [MiB] | predicted | ratio |" for n in points))
+    print("| --- |" + " --- | --- | --- |" * len(points))
+    for name, overrides in CASES.items():
+        print(f"| {name} |", *(row(overrides, n) for n in points), flush=True)
 
 
-def measure(spec: str) -> None:
+def row(overrides: list[str], points: int) -> str:
+    """Measured and predicted memory of one case on one grid, and their ratio."""
+    with tempfile.TemporaryDirectory() as folder:
+        spec = Path(folder) / "spec.toml"
+        spec.write_text(SPEC)
+        every = [f"grid.points={points}", *overrides]
+        predicted = plan(read_spec(spec, every)[0])[0].bytes
+        command = [sys.executable, __file__, "measure", str(spec), *every]
+        done = subprocess.run(command, capture_output=True, text=True, check=True, cwd=folder)
+    measured = 1024.0 * int(done.stdout)
+    ratio = predicted / measured
+    mark = "" if ratio >= RATIO else " low"
+    return f"{measured / 2**20:.0f} | {predicted / 2**20:.0f} | {ratio:.2f}{mark} |"
+
+
+def measure(spec: str, *overrides: str) -> None:
     """In a process of its own: run the spec, print the largest resident size in KiB."""
-    command = [sys.executable, "-m", "gfmd_cli", "run", spec, "-o", "s.h5", "-q"]
-    subprocess.run(command, check=True)
+    command = [sys.executable, "-P", "-m", "gfmd_cli", "run", spec, "-o", "s.h5", "-q", "-j", "1"]
+    command += [word for override in overrides for word in ("--set", override)]
+    done = subprocess.run(command, check=False, capture_output=True, text=True)
+    if done.returncode not in (0, 1) or done.stderr:  # 1: six steps do not converge
+        sys.exit(done.stderr)
     print(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss)
 
 
 if __name__ == "__main__":
-    measure(sys.argv[2]) if sys.argv[1:2] == ["measure"] else main()
+    measure(*sys.argv[2:]) if sys.argv[1:2] == ["measure"] else main(*sys.argv[1:])

@@ -13,13 +13,15 @@ from pathlib import Path
 
 import numpy as np
 
+from gfmd_cli.grid.fft_grid import Grid
+from gfmd_cli.grid.ranks import launched
 from gfmd_cli.physics.contact import build_scene
-from gfmd_cli.physics.elastomer import Power
-from gfmd_cli.physics.grid import Grid
-from gfmd_cli.physics.ranks import launched
-from gfmd_cli.physics.surface import SelfAffine
-from gfmd_cli.solvers.cascade import SolverChoice, solve_contact
+from gfmd_cli.physics.elastomers import Power
+from gfmd_cli.physics.self_affine import SelfAffine
+from gfmd_cli.solvers.auto import Auto
+from gfmd_cli.solvers.contact_state import PRESSED
 from gfmd_cli.solvers.multigrid import Multigrid
+from gfmd_cli.solvers.nested_grids import solve_contact
 
 STRONG = [(count, points) for points in (512, 1024, 2048) for count in (1, 2)]
 WEAK = [(1, 512), (2, 720), (4, 1024)]
@@ -58,17 +60,17 @@ def measure(points: int) -> None:
     if not grid.whole:
         _clock_exchange(grid, exchange)
     pair, share = least(grid, lambda: (grid.transform(), grid.transform_back()), exchange)
-    marks = grid.rows.empty(points, dtype=np.int8)
+    state = grid.rows.empty_with_halo(points, dtype=np.int8)
     u = contact.settle(np.zeros(grid.shape))
-    marks[...] = 0
-    grid.rows.inside(marks)[...] = 2 * (u == contact.height)
-    cycle, change = Multigrid(contact, grid.rows), np.zeros(grid.shape, np.float32)
+    state[...] = 0
+    grid.rows.interior(state)[...] = PRESSED * (u == contact.height)
+    cycle, change = Multigrid(contact), np.zeros(grid.shape, np.float32)
     sigma = contact.stress(u, out=grid.empty())
-    once, _ = least(grid, lambda: cycle.apply(sigma, marks, 2, change, grid.padded), exchange)
+    once, _ = least(grid, lambda: cycle.apply(sigma, state, PRESSED, change), exchange)
     found: list[float] = []
 
     def solve() -> None:
-        solution = solve_contact(contact, SolverChoice(), lambda contact, state: None)
+        solution = solve_contact(contact, Auto())
         found.append(solution.transforms)
 
     whole, _ = least(grid, solve, exchange, repeats=5)
@@ -78,14 +80,14 @@ def measure(points: int) -> None:
 
 
 def _clock_exchange(grid: Grid, spent: list[float]) -> None:
-    turn = type(grid)._turn
+    turn = type(grid)._transpose
 
     def clocked(self: Grid, to_columns: bool) -> None:
         begun = time.perf_counter()
         turn(self, to_columns)
         spent[0] += time.perf_counter() - begun
 
-    type(grid)._turn = clocked
+    type(grid)._transpose = clocked
 
 
 def least(grid, action, exchange, repeats=REPEATS) -> tuple[float, float]:
@@ -93,14 +95,14 @@ def least(grid, action, exchange, repeats=REPEATS) -> tuple[float, float]:
     action()
     best, share, begun = np.inf, 0.0, time.perf_counter()
     for _ in range(repeats):
-        grid.most(0.0)  # begin together
+        grid.max(0.0)  # begin together
         exchange[0], start = 0.0, time.perf_counter()
         action()
         seconds = time.perf_counter() - start
-        slowest = grid.most(seconds)
+        slowest = grid.max(seconds)
         if slowest < best:
-            best, share = slowest, grid.most(exchange[0] / seconds)
-        if grid.most(time.perf_counter() - begun) > SECONDS:
+            best, share = slowest, grid.max(exchange[0] / seconds)
+        if grid.max(time.perf_counter() - begun) > SECONDS:
             break
     return best, share
 

@@ -3,11 +3,12 @@
 import sys
 import time
 
+from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.physics.contact import build_scene
-from gfmd_cli.physics.elastomer import Power
-from gfmd_cli.physics.grid import Grid
-from gfmd_cli.physics.surface import SelfAffine
-from gfmd_cli.solvers.cascade import SolverChoice, solve_contact
+from gfmd_cli.physics.elastomers import Power
+from gfmd_cli.physics.self_affine import SelfAffine
+from gfmd_cli.solvers.auto import Auto
+from gfmd_cli.solvers.nested_grids import solve_contact
 
 REPEATS = 3  # the least counts
 
@@ -30,10 +31,10 @@ def main(points: int = 2048) -> None:
     print("   n   pairs  transforms alone    solve  ratio")
     for n in (0.5, 1.0, 2.0, 3.0):
         contact = build_scene(SelfAffine(), Power(n=n), points).contact(0.1)
-        choice, found = SolverChoice(tolerance=1e-4), []
+        solver, found = Auto(tolerance=1e-4), []
 
-        def solve(contact=contact, choice=choice, found=found):
-            found.append(solve_contact(contact, choice, lambda contact, state: None))
+        def solve(contact=contact, solver=solver, found=found):
+            found.append(solve_contact(contact, solver))
 
         seconds, pairs = least(solve), found[-1].transforms / 2
         alone = pairs * pair

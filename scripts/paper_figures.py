@@ -1,24 +1,25 @@
-"""Every figure of the paper from a shipped config, and every claim beside what is found.
+"""Every figure of the paper from a shipped config, and every statement beside what is found.
 
-    python scripts/paper_figures.py -o results/paper            # an hour on two cores
+    python scripts/paper_figures.py -o results/paper            # hours on two cores
     python scripts/paper_figures.py -o results/paper --quick    # minutes, small grids
 
-Studies are resumed where they were stopped. Figures are written as PDF and PNG, the claims as a
-page of Markdown.
+Studies are resumed where they were stopped. Figures are written as PDF and PNG, the statements as
+a page of Markdown.
 """
 
 import argparse
 import time
 from pathlib import Path
 
-from paper import beyond, gaps, hertz, page, rough
-from paper.claims import Claim, count
+from paper import beyond, gaps, hertz, light, page, rough, sizes, stress, weights
+from paper.claims import Finding
 from paper.studies import LARGE, STUDIES, Held, run
 
-from gfmd_cli.analysis.sheet import styled
+from gfmd_cli.analysis.plotting import styled
 
-FIGURES = (*hertz.FIGURES, *rough.FIGURES, *gaps.FIGURES, *beyond.FIGURES)
-"""Functions that draw a figure and return the claims it decides, in the order of the paper."""
+MODULES = (hertz, rough, light, stress, gaps, sizes, weights, beyond)
+FIGURES = [draw for module in MODULES for draw in module.FIGURES]
+"""Functions that draw a figure and measure the statements that it shows."""
 
 
 def main() -> None:
@@ -36,13 +37,14 @@ def main() -> None:
         run(name, given.output, given.quick)
         print(f"{name}: {time.perf_counter() - begun:.0f} s", flush=True)
     held = Held(given.output, given.quick)
-    claims: list[Claim] = []
+    findings: list[Finding] = []
     with styled():
         for draw in FIGURES:
             if all(held.has(name) for name in draw.needs):
-                claims += draw(held, given.output / "figures")
-    page.write(claims, given.output / "figures", given.page or given.output / "paper.md")
-    print(count(claims))
+                findings += draw(held, given.output / "figures")
+    findings.sort(key=lambda finding: list(page.STATEMENTS).index(finding.key))
+    page.write(findings, held, given.output / "figures", given.page or given.output / "paper.md")
+    print(page.count(findings))
 
 
 if __name__ == "__main__":

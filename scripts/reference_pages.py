@@ -1,11 +1,13 @@
 """The generated parts of the reference: keys of the run spec, commands, columns of a study.
 
 A page keeps what is written by hand; between `<!-- generated: NAME -->` and `<!-- end -->` stands
-what NAME makes. Without options the pages are written, with --check they are compared.
+what NAME makes. The JSON Schema of the run spec is written too. With --check the files are
+compared instead.
 """
 
 import argparse
 import inspect
+import json
 import re
 import sys
 from collections.abc import Iterable
@@ -16,22 +18,25 @@ import click
 from click.testing import CliRunner
 
 from gfmd_cli.cli import main
-from gfmd_cli.study.layout import (
+from gfmd_cli.spec.models import SWEPT, Ladder
+from gfmd_cli.spec.parse import DEFAULT_KINDS, MODELS, REQUIRED, kinds_of
+from gfmd_cli.spec.schema import spec_schema
+from gfmd_cli.study.column import Column
+from gfmd_cli.study.columns import (
     AUTOCORRELATIONS,
     CONTRACT,
-    DISTRIBUTIONS,
+    DETAILS,
     FIELDS,
-    FURTHER,
+    HISTOGRAMS,
+    PARAMETER_COLUMNS,
     SHELLS,
     SPECTRA,
     WEIGHTS,
-    Column,
 )
-from gfmd_cli.study.parse import MODELS, REQUIRED
-from gfmd_cli.study.spec import SWEPT, Ladder
 
 DOCS = Path(__file__).parents[1] / "docs"
 CONFIGS = DOCS.parent / "configs"
+SCHEMA = DOCS.parent / "gfmd_cli" / "run-spec.schema.json"
 PAGES = ("configuration.md", "commands.md", "study-file.md")
 WIDTH = "100"  # columns of a help text
 PART = re.compile(r"(<!-- generated: (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
@@ -91,7 +96,7 @@ def allowed(schema: dict[str, Any], shared: dict[str, Any]) -> str:
     if schema.get("type") == "array":
         return f"list of: {allowed(schema['items'], shared)}"
     if schema.get("type") == "object":
-        return "`{ from, to, per_decade }`"
+        return f"`{{ {', '.join(schema['properties'])} }}`"
     if schema.get("format") == "path":
         return "path"
     kind = NAMES[schema["type"]]
@@ -107,18 +112,23 @@ def amount(limit: float) -> str:
     return f"2^{power}" if power > 16 and limit == 2**power else f"{limit:.10g}"
 
 
-def keys(model: Any) -> str:
-    """The keys of one model."""
+def keys(model: Any, shared_by: Any = None) -> str:
+    """The keys of one model, without those of a kind whose keys all other kinds have."""
     schema = model.model_json_schema()
     shared, rows = schema.get("$defs", {}), []
     for name, key in schema["properties"].items():
-        if name == "kind" and "const" in key:
+        if name == "kind" or (shared_by and name in shared_by.model_fields):
             continue
         field = next(f for n, f in model.model_fields.items() if name in (n, f.alias))
         given = field.get_default(call_default_factory=True)
         default = "needed" if field.is_required() else "" if given is None else f"`{toml(given)}`"
         meaning = escaped(key.get("description", ""))
         rows.append((f"`{name}`", allowed(key, shared), default, meaning))
+    if shared_by:
+        known = f"The keys of `{shared_by.model_fields['kind'].default}`"
+        if not rows:
+            return f"{known}."
+        return f"{known}, and:\n\n" + table(("key", "takes", "default", "meaning"), rows)
     return table(("key", "takes", "default", "meaning"), rows) if rows else "No keys but `kind`."
 
 
@@ -130,15 +140,17 @@ def about(model: Any) -> str:
 def configuration() -> str:
     """Every table of the run spec."""
     parts = []
-    for name, models in MODELS.items():
+    for name, model in MODELS.items():
         needed = "Needed." if name in REQUIRED else "Optional."
         swept = " Takes sweeps." if name in SWEPT else ""
-        parts.append(f"## [{name}]\n\n{needed}{swept}")
-        if isinstance(models, dict):
-            for kind, model in models.items():
-                parts += [f'### {name}: "{kind}"', about(model), keys(model)]
-        else:
-            parts += [re.sub(r"^Table \\\[\w+\\\](: |\.)", "", about(models)), keys(models)]
+        default = f' Without `kind`: "{kind}".' if (kind := DEFAULT_KINDS.get(name)) else ""
+        parts.append(f"## [{name}]\n\n{needed}{swept}{default}")
+        shared = kinds_of(name).get(DEFAULT_KINDS.get(name, ""))
+        for kind, choice in kinds_of(name).items():
+            listed = keys(choice) if choice is shared else keys(choice, shared)
+            parts += [f'### {name}: "{kind}"', about(choice), listed]
+        if not kinds_of(name):
+            parts += [re.sub(r"^Table \\\[\w+\\\](: |\.)", "", about(model)), keys(model)]
         if name == "load":
             parts += ["### load: a ladder of pressures", about(Ladder), keys(Ladder)]
     return "\n\n".join(part for part in parts if part)
@@ -176,8 +188,8 @@ def columns(listed: Iterable[Column]) -> str:
 def distributions() -> str:
     """Densities in bins, and what is in no bin."""
     rows = [
-        (f"`{d.name}`", f"`{d.axis}`", f"`{d.option}`", escaped(d.meaning), escaped(d.labels))
-        for d in DISTRIBUTIONS
+        (f"`{h.name}`", f"`{h.axis}`", f"`{h.option}`", escaped(h.meaning), escaped(h.axis_meaning))
+        for h in HISTOGRAMS
     ]
     told = table(("name", "bins", "asked for by", "meaning", "middles of the bins"), rows)
     return f"{told}\n\n{columns(c for found in WEIGHTS.values() for c in found)}"
@@ -188,7 +200,8 @@ MAKERS = {
     "examples": examples,
     "commands": commands,
     "contract": lambda: columns(CONTRACT),
-    "further": lambda: columns(FURTHER),
+    "details": lambda: columns(DETAILS),
+    "parameters": lambda: columns(PARAMETER_COLUMNS),
     "distributions": distributions,
     "scenes": lambda: columns(SHELLS),
     "fields": lambda: columns(FIELDS),
@@ -202,20 +215,25 @@ def renewed(text: str) -> str:
     return PART.sub(lambda part: f"{part[1]}\n{MAKERS[part[2]]()}\n\n{part[3]}", text)
 
 
+def generated() -> dict[Path, str]:
+    """What each generated file is to hold: the pages, and the JSON Schema of the run spec."""
+    pages = {DOCS / name: renewed((DOCS / name).read_text(encoding="utf-8")) for name in PAGES}
+    return pages | {SCHEMA: json.dumps(spec_schema(), indent=2) + "\n"}
+
+
 def run(check: bool) -> int:
-    """Write the pages, or say which are out of date; the exit status."""
+    """Write the files, or name those that are out of date; the exit status."""
     stale = 0
-    for name in PAGES:
-        page = DOCS / name
-        text = page.read_text(encoding="utf-8")
-        if text == (new := renewed(text)):
+    for path, text in generated().items():
+        name = path.relative_to(DOCS.parent)
+        if path.read_text(encoding="utf-8") == text:
             continue
         if check:
-            print(f"docs/{name}: out of date; python scripts/reference_pages.py writes it")
+            print(f"{name}: out of date; python scripts/reference_pages.py writes it")
             stale = 1
         else:
-            page.write_text(new, encoding="utf-8")
-            print(f"docs/{name}: written")
+            path.write_text(text, encoding="utf-8")
+            print(f"{name}: written")
     return stale
 
 

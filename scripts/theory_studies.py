@@ -7,7 +7,7 @@ import argparse
 from pathlib import Path
 
 from gfmd_cli.cli.progress import Reporter
-from gfmd_cli.study.parse import read_spec
+from gfmd_cli.spec.parse import read_spec
 from gfmd_cli.study.run import run_study
 
 FINE = [0, 0.5, 1, 1.5, 2, 2.5, 3, 4]

@@ -10,7 +10,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from gfmd_cli.study.parse import read_spec
+from gfmd_cli.spec.parse import read_spec
 from gfmd_cli.study.run import run_study
 
 

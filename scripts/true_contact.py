@@ -13,9 +13,9 @@ from gamma_fit import spread
 from scipy.special import erfinv
 
 from gfmd_cli.analysis.compare import Curve, compare
+from gfmd_cli.analysis.curve_styles import MARKERS, CurveStyle, colours
 from gfmd_cli.analysis.figures import P_STAR
-from gfmd_cli.analysis.looks import MARKERS, Look, colours
-from gfmd_cli.analysis.sheet import Sheet, styled
+from gfmd_cli.analysis.plotting import ColumnFigure, styled
 from gfmd_cli.analysis.true_contact import VARIANTS
 from gfmd_cli.physics.true_contact import contact_area
 
@@ -80,23 +80,23 @@ def draw(groups: dict[float, list[Curve]], path: Path) -> None:
     """Symbols: what would make Persson theory exact; lines: what the highest points have."""
     shown = {n: groups[n] for n in SHOWN if n in groups}
     with styled():
-        sheet = Sheet(P_STAR, r"$\Delta\sigma_c\,/\,\Delta\sigma$")
+        plot = ColumnFigure(P_STAR, r"$\Delta\sigma_c\,/\,\Delta\sigma$")
         for place, (n, curves) in enumerate(shown.items()):
-            look = Look(colours(len(shown))[place], MARKERS[place], f"n = {n:g}")
+            style = CurveStyle(colours(len(shown))[place], MARKERS[place], f"n = {n:g}")
             p_star = curves[0].column("p_star")
             kept = p_star <= HIGHEST
             value, error = (part[kept] for part in over_seeds([needed(c) for c in curves]))
-            style = {"fmt": "none", "ecolor": look.colour, "elinewidth": 0.7, "capsize": 2}
-            sheet.axes.errorbar(p_star[kept], value, 2 * error, **style)
-            sheet.points(look, p_star[kept], value, np.full(value.size, True))
+            bars = {"fmt": "none", "ecolor": style.colour, "elinewidth": 0.7, "capsize": 2}
+            plot.axes.errorbar(p_star[kept], value, 2 * error, **bars)
+            plot.points(style, p_star[kept], value, np.full(value.size, True))
             line = over_seeds([measured(c, "deviation_bearing") for c in curves])[0][kept]
-            sheet.axes.plot(p_star[kept], line, color=look.colour)
-        sheet.line(sheet.axes, "highest points", p_star[:0], p_star[:0], color="0.4")
-        style = {"color": "black", "ls": (0, (4, 2)), "lw": 0.9}
-        sheet.line(sheet.axes, "whole surface", p_star[kept], np.ones(value.size), **style)
-        sheet.scale("x", "log", p_star[kept])
-        sheet.axes.set(ylim=(0, 1.7))
-        files = sheet.write(path)
+            plot.axes.plot(p_star[kept], line, color=style.colour)
+        plot.line(plot.axes, "highest points", p_star[:0], p_star[:0], color="0.4")
+        dashed = {"color": "black", "ls": (0, (4, 2)), "lw": 0.9}
+        plot.line(plot.axes, "whole surface", p_star[kept], np.ones(value.size), **dashed)
+        plot.scale("x", "log", p_star[kept])
+        plot.axes.set(ylim=(0, 1.7))
+        files = plot.write(path)
     files[0].unlink()  # docs show the PNG
 
 

@@ -13,7 +13,8 @@ import zipfile
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
-SCHEMA = "gfmd_cli/run-spec.schema.json"
+DATA = ("run-spec.schema.json", "report/templates/page.html", "report/templates/style.css",
+        "spec/templates/scan.toml", "spec/templates/study.toml")  # fmt: skip
 
 
 def call(*words: object, where: Path) -> str:
@@ -37,7 +38,8 @@ def main() -> None:
     (wheel,) = (ROOT / "dist").glob("*.whl")
     call(sys.executable, "-m", "twine", "check", "--strict", *(ROOT / "dist").iterdir(), where=ROOT)
     names = zipfile.ZipFile(wheel).namelist()
-    assert SCHEMA in names, f"{wheel.name} lacks {SCHEMA}"
+    for name in DATA:
+        assert f"gfmd_cli/{name}" in names, f"{wheel.name} lacks {name}"
     assert all(name.startswith("gfmd_cli") for name in names), "more than the package"
     with tempfile.TemporaryDirectory() as folder:
         there = Path(folder)
@@ -54,6 +56,8 @@ def main() -> None:
         told = call(gfmd, "analyze", "study.h5", "--figures", "figures", where=there)
         assert "Persson" in told, told
         assert (there / "figures" / "contact_area.png").exists()
+        call(gfmd, "report", "study.h5", where=there)
+        assert "Persson" in (there / "study.html").read_text("utf-8")
 
 
 if __name__ == "__main__":

@@ -1,4 +1,5 @@
 import os
+import sys
 
 # One thread for BLAS: side by side with other workers its threads spin for longer than they work.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -7,11 +8,43 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
+from hypothesis import HealthCheck, settings
+from specs import power_spec
 
 from gfmd_cli.cli import main
-from gfmd_cli.study.parse import read_spec
+from gfmd_cli.grid.fft_grid import Grid
+from gfmd_cli.spec.parse import read_spec
 from gfmd_cli.study.reading import read_rows
 from gfmd_cli.study.run import run_study
+
+if "GFMD_TEST_THREADS" in os.environ:  # `make test-portable`: on small grids too
+    every_grid = int(os.environ["GFMD_TEST_THREADS"])
+    Grid._threads = property(lambda grid: every_grid if grid.dimension == 2 else 1)
+
+
+# Drawn examples are the same in every run, and may share a folder or a study.
+settings.register_profile(
+    "same",
+    derandomize=True,
+    deadline=None,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
+)
+settings.load_profile("same")
+
+
+SPRINGS = power_spec(n=0, points=32, p_star=[0.1, 0.3])
+
+
+@pytest.fixture
+def springs(tmp_path):
+    """spec.toml in tmp_path, of two contacts that take no time to solve."""
+    (tmp_path / "spec.toml").write_text(SPRINGS)
+
+
+@pytest.fixture(scope="session")
+def command():
+    """The words that start a process of the command, which imports nothing from its folder."""
+    return (sys.executable, "-P", "-m", "gfmd_cli")
 
 
 @pytest.fixture
@@ -38,9 +71,27 @@ def rows_of(tmp_path, spec_of, request):
     return rows_of
 
 
+@pytest.fixture(scope="session")
+def invoke():
+    """Calls the command; returns its result."""
+    return lambda *words: CliRunner().invoke(main, [str(word) for word in words])
+
+
+@pytest.fixture(scope="session")
+def output_of(invoke):
+    """Calls the command; returns what it printed, where the exit status is as expected."""
+
+    def output_of(*words, status=0):
+        done = invoke(*words)
+        assert done.exit_code == status, done.output
+        return done.output
+
+    return output_of
+
+
 @pytest.fixture
-def gfmd(tmp_path, monkeypatch, request):
-    """Calls the command in tmp_path, where spec.toml is SPEC of the test's module."""
+def gfmd(tmp_path, monkeypatch, request, invoke):
+    """`invoke` in tmp_path, where spec.toml is SPEC of the test's module."""
     monkeypatch.chdir(tmp_path)
     Path("spec.toml").write_text(request.module.SPEC)
-    return lambda *words: CliRunner().invoke(main, [str(word) for word in words])
+    return invoke

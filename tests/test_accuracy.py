@@ -1,44 +1,43 @@
 """Errors of a study: "auto" grids, certificates, spreads over seeds."""
 
 import json
+import signal
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 from scipy import stats
+from specs import power_spec
 
 from gfmd_cli.analysis.compare import compare
 from gfmd_cli.analysis.ensemble import Ensemble, ensembles
-from gfmd_cli.analysis.tables import plus_minus, tables
-from gfmd_cli.cli import main
+from gfmd_cli.analysis.table import plus_minus
+from gfmd_cli.analysis.tables import seeds_table, study_tables
+from gfmd_cli.bench.run import run_bench
 from gfmd_cli.errors import InputError, Interrupted
-from gfmd_cli.physics.certificate import certify
 from gfmd_cli.physics.contact import build_scene
-from gfmd_cli.physics.elastomer import Power, Slab
+from gfmd_cli.physics.elastomers import Power, Slab
+from gfmd_cli.physics.error_bounds import certify
 from gfmd_cli.physics.observables import observe
-from gfmd_cli.physics.surface import SelfAffine
-from gfmd_cli.solvers.cascade import SolverChoice, solve_contact
-from gfmd_cli.study import solve
-from gfmd_cli.study.bench import run_bench
-from gfmd_cli.study.grids import ALGEBRAIC, NOT_REACHED
-from gfmd_cli.study.layout import COLUMNS
+from gfmd_cli.physics.self_affine import SelfAffine
+from gfmd_cli.solvers.auto import Auto
+from gfmd_cli.solvers.nested_grids import solve_contact
+from gfmd_cli.status import Status
+from gfmd_cli.study import run_task
+from gfmd_cli.study.columns import COLUMNS
+from gfmd_cli.study.refinement import ALGEBRAIC
 from gfmd_cli.study.tasks import plan
 
-SPEC = """\
-[surface]
-kind = "self-affine"
-cutoff = 0.06
-[elastomer]
-kind = "power"
-n = 1
-[grid]
-points = "auto"
-[load]
-p_star = 0.1
+SPEC = power_spec(
+    n=1,
+    points='"auto"',
+    p_star=0.1,
+    cutoff=0.06,
+    more="""\
 [accuracy]
 mean_gap = 0.01
 contact_area = 0.05
-"""
+""",
+)
 QUANTITIES = ("a_r", "sigma_p", "u_g")
 
 
@@ -66,7 +65,8 @@ def test_less_is_asked_of_a_coarser_grid(rows_of):
 
 def test_an_auto_grid_ends_where_it_may_not_grow(rows_of):
     (row,) = rows_of("accuracy.mean_gap=1e-6", "accuracy.max_points=100")
-    assert (row["status"], row["points"]) == (NOT_REACHED, 64)
+    assert (row["status"], row["points"]) == (Status.ACCURACY_NOT_REACHED, 64)
+    assert row["points_y"] == 64  # not those of the forecast, 100
     assert row["u_g_error"] > 1e-6 * row["u_g"]
 
 
@@ -75,18 +75,22 @@ def test_an_auto_grid_ends_where_memory_ends(rows_of, monkeypatch, spec_of):
     enough = 1.2 * max(task.bytes, 2.2e8) / 0.9
     monkeypatch.setattr("gfmd_cli.study.resources.available_memory", lambda: enough)
     (row,) = rows_of("accuracy.mean_gap=1e-9")
-    assert row["status"] == NOT_REACHED
+    assert row["status"] == Status.ACCURACY_NOT_REACHED
     assert row["points"] < 1200
 
 
 def test_no_grid_is_spent_on_what_has_no_limit(rows_of):
-    """The contacts of a plate are lines and points."""
-    (row,) = rows_of("elastomer.n=4", "accuracy.mean_gap=0.2")
-    assert (row["status"], row["a_r_verdict"]) == (NOT_REACHED, "bound")
-    assert row["points"] <= 144
-    assert np.isnan(row["a_r_continuum"])
-    assert row["sigma_p_verdict"] == "diverges"
+    (row,) = rows_of("elastomer.n=4", "accuracy={stress_deviation=0.1}")
+    assert (row["status"], row["sigma_p_verdict"]) == (Status.ACCURACY_NOT_REACHED, "diverges")
+    assert row["points"] <= 72
     assert np.isnan(row["sigma_p_error"])
+
+
+def test_the_area_of_a_plate_needs_a_second_grid(rows_of):
+    (row,) = rows_of("elastomer.n=4", "load.p_star=1.0", "accuracy={contact_area=0.3}")
+    assert (row["status"], row["a_r_verdict"]) == (Status.CONVERGED, "regular")
+    assert row["a_r_continuum"] < row["a_r"]
+    assert row["a_r_continuum_error"] <= 0.3 * row["a_r_continuum"]
 
 
 @pytest.mark.parametrize("a_r", [0.2, 0.7])
@@ -120,7 +124,7 @@ def test_full_contact_is_exact(rows_of):
 
 
 def test_an_interrupted_auto_grid_goes_on_bit_for_bit(rows_of, tmp_path, monkeypatch):
-    monkeypatch.setattr(solve, "REPORT_EVERY", 0.0)
+    monkeypatch.setattr(run_task, "REPORT_EVERY", 0.0)
     asked = ("accuracy.mean_gap=1e-3", "elastomer.n=2")
     (straight,) = rows_of(*asked)
     seen = []
@@ -128,7 +132,7 @@ def test_an_interrupted_auto_grid_goes_on_bit_for_bit(rows_of, tmp_path, monkeyp
     def interrupt(progress):
         seen.append(progress)
         if len(seen) % 11 == 0:
-            solve.stop.set()
+            signal.raise_signal(signal.SIGTERM)
 
     for _ in range(1000):
         try:
@@ -151,7 +155,7 @@ def test_an_interrupted_auto_grid_goes_on_bit_for_bit(rows_of, tmp_path, monkeyp
         (("mean_gap = 0.01\ncontact_area = 0.05\n", ""), ["accuracy", "mean_gap"]),
         (("mean_gap = 0.01", "mean_gap = 0"), ["accuracy.mean_gap", "greater than 0"]),
         (("mean_gap = 0.01", "meangap = 0.1"), ["accuracy.meangap", "did you mean 'mean_gap'"]),
-        (('"auto"', '"automatic"'), ["grid.points", "'auto'", "automatic"]),
+        (('"auto"', '"automatic"'), ["grid.points", '"auto"', "automatic"]),
     ],
 )
 def test_a_wrong_accuracy_is_refused(spec_of, change, words):
@@ -170,7 +174,7 @@ def test_reduced_pressures_of_a_kinked_cell_are_refused(rows_of):
     text = SPEC.replace('kind = "self-affine"\ncutoff = 0.06', 'kind = "parabola"\nradius = 1.0')
     told = []
     rows_of(text=text, report=told.append)
-    assert any("load.pressure" in progress.note for progress in told)
+    assert any("load.pressure" in progress.message for progress in told)
 
 
 def test_the_forecast_of_grids_is_right_within_a_factor_of_four(spec_of, rows_of):
@@ -193,7 +197,7 @@ def test_the_certificate_bounds_the_distance_to_the_solution(body, p_star, toler
     contact = build_scene(SelfAffine(cutoff=0.04), body, 128).contact(p_star)
 
     def solved(tolerance):
-        found = solve_contact(contact, SolverChoice(tolerance=tolerance), lambda *_: None)
+        found = solve_contact(contact, Auto(tolerance=tolerance))
         return found, observe(contact, found.u, found.sigma)
 
     (_, exact), (found, seen) = solved(1e-11), solved(tolerance)
@@ -214,7 +218,7 @@ def test_a_bad_solution_gets_no_good_certificate():
     contact = build_scene(SelfAffine(cutoff=0.04), Power(n=1), 128).contact(0.1)
     u = contact.settle(np.full(contact.grid.shape, 5.0))
     proof = certify(contact, u, contact.stress(u, out=contact.grid.empty()))
-    exact = solve_contact(contact, SolverChoice(tolerance=1e-9), lambda *_: None)
+    exact = solve_contact(contact, Auto(tolerance=1e-9))
     assert proof.u_g >= float(np.mean(u - exact.u)) > 0.5
 
 
@@ -222,18 +226,18 @@ def test_the_table_says_that_its_values_are_counted_where_those_of_the_continuum
     rows_of, tmp_path
 ):
     rows_of()
-    text = tables(compare(tmp_path / "study.h5"))
-    counted, _, extrapolated = text.partition("  in the continuum:")
-    assert "  counted on the grid:\n      p*        a_r" in counted
-    assert extrapolated
+    counted, *others = study_tables(compare(tmp_path / "study.h5"))
+    assert "values as counted on the grid" in counted.as_text()
+    assert any(table.as_text().startswith("Continuum values") for table in others)
     rows_of(text=SPEC.partition("[accuracy]")[0].replace('"auto"', "64"), name="plain.h5")
-    assert "counted on" not in tables(compare(tmp_path / "plain.h5"))
+    plain = study_tables(compare(tmp_path / "plain.h5"))
+    assert not any("Continuum values" in table.as_text() for table in plain)
 
 
 # --- seeds ----------------------------------------------------------------------------------------
 
 
-def test_seeds_have_a_mean_and_a_confidence_interval(rows_of, tmp_path):
+def test_seeds_have_a_mean_and_a_confidence_interval(rows_of, tmp_path, output_of):
     plain = SPEC.partition("[accuracy]")[0].replace('points = "auto"', "points = 64")
     rows = rows_of("surface.seed=[0, 1, 2, 3]", "load.p_star=[0.1, 1.0]", text=plain)
     comparison = compare(tmp_path / "study.h5")
@@ -247,9 +251,8 @@ def test_seeds_have_a_mean_and_a_confidence_interval(rows_of, tmp_path):
     assert (spread.mean - spread.half_width, spread.mean + spread.half_width) == pytest.approx(
         (low, high)
     )
-    assert "mean of 4 seeds" in tables(comparison)
-    told = CliRunner().invoke(main, ["analyze", str(tmp_path / "study.h5"), "--json"])
-    records = json.loads(told.output)
+    assert "mean of 4 seeds" in seeds_table(comparison).as_text()
+    records = json.loads(output_of("analyze", tmp_path / "study.h5", "--json"))
     assert len(records) == 8
     assert records[0]["u_g_mean"] == pytest.approx(np.mean(values))
 

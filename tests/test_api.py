@@ -1,5 +1,8 @@
+import runpy
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 
@@ -79,3 +82,137 @@ def test_a_study_may_be_run_in_a_thread(tmp_path):
     with ThreadPoolExecutor(1) as pool:
         study = pool.submit(run, TABLES, tmp_path / "a.h5").result()
     assert rows(study)[0]["status"] == "converged"
+
+
+def rough_map(points=32, seed=1):
+    surface = {"kind": "self-affine", "cutoff": 0.125, "seed": seed, "h_std": 1e-8, "length": 1e-5}
+    return solve({**MATERIAL, "surface": surface, "grid": {"points": points}}).height
+
+
+MATERIAL = {"elastomer": {"kind": "half-space", "E_star": 2e9}, "load": {"pressure": 1e6}}
+
+
+class Topography:
+    """What `solve` uses of a topography of SurfaceTopography: arrays [x, y], sides, unit."""
+
+    unit = "nm"
+    is_periodic = True
+
+    def __init__(self, heights, side):
+        self._heights, self.physical_sizes = heights, (side, side)
+
+    def heights(self):
+        return self._heights
+
+    def to_unit(self, unit):
+        assert unit == "m"
+        made = Topography(1e-9 * self._heights, 1e-9 * self.physical_sizes[0])
+        made.unit = unit
+        return made
+
+
+def test_the_contact_pressure_is_zero_off_contact_and_gives_the_area():
+    found = solve(TABLES)
+    assert (found.pressure > 0).mean() == found.a_r
+    assert (found.pressure[found.gap > 0] == 0).all()
+    np.testing.assert_array_equal(found.pressure[found.contact], found.stress[found.contact])
+    assert found.pressure.mean() == pytest.approx(found.nominal_pressure, rel=1e-5)
+    assert found.sigma_p * found.delta_sigma == pytest.approx(found.pressure.std(), rel=1e-12)
+
+
+def test_points_and_sides_come_from_the_heights():
+    heights = rough_map()
+    found = solve({**MATERIAL, "surface": {"length": 1e-5}}, heights=heights)
+    assert found.height.shape == (32, 32)
+    twice = solve({**MATERIAL, "grid": {}, "surface": {"length": 1e-5}}, heights=heights.tolist())
+    assert twice.a_r == found.a_r
+    topography = Topography(1e9 * heights.T, 1e4)
+    measured = solve(MATERIAL, heights=topography)
+    assert measured.length == pytest.approx(1e-5, rel=1e-12)
+    assert measured.a_r == found.a_r
+    np.testing.assert_allclose(measured.height, found.height, rtol=1e-12)
+
+
+def test_numbers_of_numpy_are_numbers():
+    one = solve(TABLES)
+    same = {
+        "surface": TABLES["surface"] | {"cutoff": np.float32(0.05).astype(np.float64)},
+        "grid": {"points": np.int64(64)},
+        "load": {"pressure": np.array([1e6])},
+    }
+    same["surface"]["cutoff"] = np.float64(0.05)
+    assert solve(TABLES | same).a_r == one.a_r
+
+
+@pytest.mark.parametrize(
+    ("heights", "surface", "message"),
+    [
+        ([[1.0, 2.0], [1.0]], {}, "^heights: rows of different lengths"),
+        (np.array([["a"]]), {}, "^heights: data of type"),
+        (np.ones((8, 8, 2)), {}, r"^heights: data of shape \(8, 8, 2\)"),
+        (np.zeros((16, 16)), {}, "^heights: .*flat"),
+        (np.full((16, 16), np.nan), {}, "^heights: "),
+        (
+            np.ma.masked_less(np.eye(16), 0.5),
+            {"missing": "refuse"},
+            "^heights: 240 of 256 .*missing = .fill. fills",
+        ),
+        (np.eye(16), {"kind": "wave"}, "surface.kind = 'wave' and the argument heights"),
+        (np.eye(16), {"path": "a.npy"}, "surface.path = 'a.npy' and the argument heights"),
+        (Topography(np.eye(16), 1e3), {"length": 2e-6}, "surface.length = 2e-06: .* 1e-06 m wide"),
+        (np.eye(16), {"lenght": 1.0}, "surface.lenght: unknown key"),
+    ],
+)
+def test_messages_name_the_argument(heights, surface, message):
+    with pytest.raises(InputError, match=message) as caught:
+        solve({**MATERIAL, "surface": surface}, heights=heights)
+    assert ".npy" not in str(caught.value).replace("'a.npy'", "")
+
+
+def test_no_thread_is_refused():
+    with pytest.raises(InputError, match="threads = 0"):
+        solve(TABLES, threads=0)
+
+
+@pytest.mark.parametrize("kind", ["wave", "ridge", "line-parabola"])
+def test_x_counts_from_the_crest(kind, tmp_path):
+    tables = {
+        "surface": {"kind": kind, "length": 2.0},
+        "elastomer": {"kind": "power", "n": 1},
+        "grid": {"points": 16},
+        "load": {"p_star": 0.1},
+        "output": {"cross_section": True},
+    }
+    found = solve(tables)
+    shape = {"wave": np.cos(np.pi * found.x), "ridge": -abs(found.x)}
+    wanted = shape.get(kind, -(found.x**2) / 2)
+    np.testing.assert_allclose(found.height, wanted, atol=1e-15)
+    with h5py.File(run(tables, tmp_path / "a.h5")) as file:
+        stored = file["cross_sections/0"]
+        np.testing.assert_array_equal(stored["x"][()], found.x)
+        np.testing.assert_array_equal(stored["contact_pressure"][()] > 0, found.contact)
+
+
+def test_a_result_shows_itself():
+    found = solve(TABLES)
+    for shown in (str(found), repr(found), found._repr_html_()):
+        assert "converged" in shown
+        assert f"{found.a_r:.5g}" in shown
+    assert len(str(found).splitlines()) < 12
+    assert found._repr_html_().startswith("<table>")
+
+
+def test_a_comparison_shows_its_tables(tmp_path):
+    comparison = compare(run(TABLES, tmp_path / "a.h5"))
+    assert "Comparison with Persson theory" in str(comparison)
+    assert comparison._repr_html_().count("<table>") == str(comparison).count("points a side")
+
+
+def test_the_package_lists_its_names():
+    assert {"Result", "compare", "dataset", "rows", "run", "solve"} <= set(dir(gfmd_cli))
+    assert "import_module" not in dir(gfmd_cli)
+
+
+def test_the_script_whose_types_are_checked_runs(tmp_path):
+    script = runpy.run_path(str(Path(__file__).with_name("user_script.py")))
+    assert script["main"](tmp_path) == pytest.approx(1)

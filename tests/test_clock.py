@@ -2,8 +2,9 @@ from types import SimpleNamespace
 
 import pytest
 
-from gfmd_cli.study.clock import Clock
-from gfmd_cli.study.solve import Progress
+from gfmd_cli.status import Status
+from gfmd_cli.study.progress import Progress
+from gfmd_cli.study.time_left import Clock
 
 
 def task(index, seconds, body="a"):
@@ -12,7 +13,7 @@ def task(index, seconds, body="a"):
         seconds=seconds,
         elastomer=body,
         surface=SimpleNamespace(dimension=2),
-        points=64,
+        size=64**2,
         solver=SimpleNamespace(tolerance=1e-6),
     )
 
@@ -26,8 +27,10 @@ def clock(time, *tasks, jobs=1):
     return Clock(tasks, jobs, lambda: time.now)
 
 
-def word(index, event, residual=float("nan"), points=64):
-    return Progress(index, event, "", points=points, residual=residual)
+def word(index, event, residual=float("nan"), points=64, status=None):
+    return Progress(
+        index, event, "", points=points, residual=residual, status=status, size=points**2
+    )
 
 
 def test_before_any_task_the_forecast_is_told(time):
@@ -40,7 +43,7 @@ def test_forecasts_are_corrected_by_what_ended_of_the_same_body(time):
     for index, seconds in ((0, 10.0), (2, 2.0)):
         told.take_in(word(index, "start"))
         time.now += seconds
-        told.take_in(word(index, "done"))
+        told.take_in(word(index, "end", status=Status.CONVERGED))
     assert told.left() == pytest.approx(10 + 2)
 
 
@@ -48,7 +51,7 @@ def test_a_body_not_met_yet_is_taken_as_the_others(time):
     told = clock(time, task(0, 1.0), task(1, 2.0, "b"))
     told.take_in(word(0, "start"))
     time.now = 3.0
-    told.take_in(word(0, "done"))
+    told.take_in(word(0, "end", status=Status.CONVERGED))
     assert told.left() == pytest.approx(6.0)
 
 
@@ -73,7 +76,7 @@ def test_words_are_passed_on_with_what_is_left(time):
     tell = clock(time, task(0, 2.0), task(1, 2.0)).watched(words.append)
     tell(word(0, "start"))
     time.now = 1.0
-    tell(word(0, "done"))
+    tell(word(0, "end", status=Status.CONVERGED))
     tell(word(-1, "warning"))
     assert [(w.tasks_left, w.seconds_left) for w in words] == [(2, 4.0), (1, 1.0), (1, 1.0)]
 
@@ -82,5 +85,5 @@ def test_failed_tasks_do_not_correct_forecasts(time):
     told = clock(time, task(0, 1.0), task(1, 1.0))
     told.take_in(word(0, "start"))
     time.now = 50.0
-    told.take_in(word(0, "failed"))
+    told.take_in(word(0, "end", status=Status.FAILED))
     assert told.left() == 1.0

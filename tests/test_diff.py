@@ -4,36 +4,24 @@ import json
 from math import hypot, inf, isnan, nan
 
 import pytest
-from click.testing import CliRunner
+from specs import power_spec
 
 from gfmd_cli.analysis.diff import Deviation, Pair, diff
-from gfmd_cli.cli import main
 from gfmd_cli.study.reading import read_rows
 
-SPEC = """
-[surface]
-kind = "self-affine"
-cutoff = 0.1
-[elastomer]
-kind = "power"
-n = [0, 2]
-[grid]
-points = 32
-[load]
-p_star = [0.1, 1.0]
+SPEC = power_spec(
+    n=[0, 2],
+    points=32,
+    p_star=[0.1, 1.0],
+    more="""\
 [output]
 histogram = false
-"""
-
-
-def gfmd(*words, status=0):
-    done = CliRunner().invoke(main, [str(word) for word in words])
-    assert done.exit_code == status, done.output
-    return done.output
+""",
+)
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory):
+def made(output_of, tmp_path_factory):
     """Runs SPEC with overrides; the same ones give the same study."""
     folder = tmp_path_factory.mktemp("diff")
     (folder / "spec.toml").write_text(SPEC)
@@ -43,13 +31,13 @@ def made(tmp_path_factory):
         if overrides not in held:
             held[overrides] = folder / f"{len(held)}.h5"
             options = [word for override in overrides for word in ("--set", override)]
-            gfmd("run", folder / "spec.toml", "-o", held[overrides], "-q", "-j", "1", *options)
+            output_of("run", folder / "spec.toml", "-o", held[overrides], "-q", "-j", "1", *options)
         return held[overrides]
 
     return study
 
 
-def test_a_study_does_not_differ_from_itself(made):
+def test_a_study_does_not_differ_from_itself(output_of, made):
     found = diff(made(), made())
     assert len(found.pairs) == 4
     assert found.only == ([], [])
@@ -57,10 +45,10 @@ def test_a_study_does_not_differ_from_itself(made):
     assert all(pair.deviation("u_g") == (0.0, pytest.approx(nan, nan_ok=True))
                for pair in found.pairs)  # fmt: skip
     assert not found.exceeds(0)
-    assert "+0.00e+00" in gfmd("diff", made(), made(), "--tolerance", 0)
+    assert "+0.00e+00" in output_of("diff", made(), made(), "--tolerance", 0)
 
 
-def test_other_grids_are_compared_and_the_keys_that_differ_are_told(made):
+def test_other_grids_are_compared_and_the_keys_that_differ_are_told(output_of, made):
     fine = made("grid.points=64")
     found = diff(made(), fine)
     assert [(p.one["points"], p.other["points"]) for p in found.pairs] == [(32, 64)] * 4
@@ -68,36 +56,36 @@ def test_other_grids_are_compared_and_the_keys_that_differ_are_told(made):
     for pair, a, b in zip(found.pairs, read_rows(made()), read_rows(fine), strict=True):
         expected = (b["u_g"] - a["u_g"]) / max(a["u_g"], b["u_g"])
         assert pair.deviation("u_g").relative == pytest.approx(expected, rel=1e-12)
-    text = gfmd("diff", made(), fine)
+    text = output_of("diff", made(), fine)
     assert "32 -> 64" in text
     assert "grid.points: 32 -> 64" in text
 
 
-def test_the_tolerance_decides_the_exit_status(made):
+def test_the_tolerance_decides_the_exit_status(output_of, made):
     fine = made("grid.points=64")
     largest = max(
         abs(pair.deviation(name).relative)
         for pair in diff(made(), fine).pairs
         for name in ("a_r", "sigma_p", "u_g")
     )
-    gfmd("diff", made(), fine, "--tolerance", 1.001 * largest)
-    gfmd("diff", made(), fine, "--tolerance", 0.999 * largest, status=1)
-    gfmd("diff", made(), fine)
+    output_of("diff", made(), fine, "--tolerance", 1.001 * largest)
+    output_of("diff", made(), fine, "--tolerance", 0.999 * largest, status=1)
+    output_of("diff", made(), fine)
 
 
-def test_rows_of_one_study_alone_are_listed(made):
+def test_rows_of_one_study_alone_are_listed(output_of, made):
     more = made("load.p_star=[0.3, 1.0]")
     found = diff(made(), more)
     assert len(found.pairs) == 2
     assert [row["p_star"] for row in found.only[0]] == [0.1, 0.1]
     assert [row["p_star"] for row in found.only[1]] == [0.3, 0.3]
-    text = gfmd("diff", made(), more)
+    text = output_of("diff", made(), more)
     assert "only in A:" in text
     assert "  power n=2 on self-affine cutoff=0.1\n    32: p*=0.3\n" in text
 
 
-def test_many_rows_of_one_study_alone_are_one_line(made):
-    text = gfmd("diff", made(), made("load.p_star=[0.01, 0.02, 0.03]"))
+def test_many_rows_of_one_study_alone_are_one_line(output_of, made):
+    text = output_of("diff", made(), made("load.p_star=[0.01, 0.02, 0.03]"))
     assert "  power n=2 on self-affine cutoff=0.1\n    32: p*=0.01, p*=0.02, p*=0.03\n" in text
 
 
@@ -108,7 +96,7 @@ IN_PASCAL = (
 )
 
 
-def test_another_body_is_paired_by_pressure_and_compared_in_pascal_and_metres(made):
+def test_another_body_is_paired_by_pressure_and_compared_in_pascal_and_metres(output_of, made):
     stiff = (IN_PASCAL[0].replace("2e9", "4e9"), *IN_PASCAL[1:])
     found = diff(made(*IN_PASCAL), made(*stiff))
     assert [(p.one["pressure"], p.other["pressure"]) for p in found.pairs] == [
@@ -121,17 +109,17 @@ def test_another_body_is_paired_by_pressure_and_compared_in_pascal_and_metres(ma
             expected = pytest.approx((b - a) / max(a, b), rel=1e-12)
             assert pair.deviation(name).relative == expected
         assert pair.deviation("a_r").relative < 0 < pair.deviation("u_g").relative
-    text = gfmd("diff", made(*IN_PASCAL), made(*stiff))
-    assert text.startswith("bodies differ: paired by pressure, sigma_p in Pa, u_g in m\n")
-    told = json.loads(gfmd("diff", made(*IN_PASCAL), made(*stiff), "--json"))
+    text = output_of("diff", made(*IN_PASCAL), made(*stiff))
+    assert text.startswith("bodies differ: paired by pressure, sigma_p in Pa, u_g in m. ")
+    told = json.loads(output_of("diff", made(*IN_PASCAL), made(*stiff), "--json"))
     assert told["paired"] == found.paired
 
 
-def test_another_surface_of_one_body_is_paired_by_load(made):
+def test_another_surface_of_one_body_is_paired_by_load(output_of, made):
     one, other = made("elastomer.n=1"), made("elastomer.n=1", "surface.hurst=0.5")
     found = diff(one, other)
     assert [pair.one["p_star"] for pair in found.pairs] == [0.1, 1.0]
-    text = gfmd("diff", one, other)
+    text = output_of("diff", one, other)
     assert text.startswith("surfaces differ: paired by reduced pressure, values in reduced units")
     assert "A: power n=1 on self-affine cutoff=0.1\nB: power n=1 on self-affine hurst=0.5" in text
     assert "only in" not in text
@@ -142,10 +130,10 @@ def test_rows_of_one_body_and_surface_that_share_no_load_stay_apart(made):
     assert (found.pairs, found.paired) == ([], "")
 
 
-def test_another_seed_is_another_contact_and_nothing_to_compare_is_no_agreement(made):
+def test_another_seed_is_another_contact_and_nothing_to_compare_is_no_agreement(output_of, made):
     other = made("surface.seed=1")
     assert diff(made(), other).pairs == []
-    assert "no contact in common" in gfmd("diff", made(), other, "--tolerance", 1, status=1)
+    assert "no contact in common" in output_of("diff", made(), other, "--tolerance", 1, status=1)
 
 
 def test_of_several_grids_the_same_ones_belong_together(made):
@@ -156,20 +144,20 @@ def test_of_several_grids_the_same_ones_belong_together(made):
     assert not found.exceeds(0)
 
 
-def test_differences_are_told_in_units_of_the_error_bars(made):
-    bars = ("accuracy.mean_gap=0.5", "elastomer.n=1")
+def test_differences_are_told_in_units_of_the_error_bars(output_of, made):
+    bars = ("accuracy.mean_gap=0.5", "elastomer.n=1", "load.p_star=0.1")
     one, other = made(*bars), made(*bars, "grid.points=48")
     found = diff(one, other)
     for pair in found.pairs:
         error = hypot(pair.one["u_g_error"], pair.other["u_g_error"])
         expected = (pair.other["u_g"] - pair.one["u_g"]) / error
         assert pair.deviation("u_g").in_errors == pytest.approx(expected, rel=1e-12)
-    text = gfmd("diff", one, other)
+    text = output_of("diff", one, other)
     assert f"({found.pairs[0].deviation('u_g').in_errors:+.1f})" in text
 
 
-def test_json_holds_rows_and_keys(made):
-    told = json.loads(gfmd("diff", made(), made("grid.points=64"), "--json"))
+def test_json_holds_rows_and_keys(output_of, made):
+    told = json.loads(output_of("diff", made(), made("grid.points=64"), "--json"))
     assert told["spec"] == ["grid.points: 32 -> 64"]
     assert (told["only_a"], told["only_b"]) == ([], [])
     row = told["rows"][0]
@@ -191,6 +179,6 @@ def test_values_that_are_missing_or_zero_do_not_agree_by_chance():
     assert isinstance(apart(1.0, 2.0), Deviation)
 
 
-def test_a_study_that_is_not_there_is_bad_input(made, tmp_path):
-    assert "no such study" in gfmd("diff", made(), tmp_path / "none.h5", status=2)
-    gfmd("diff", made(), made(), "--tolerance", "-1", status=2)
+def test_a_study_that_is_not_there_is_bad_input(output_of, made, tmp_path):
+    assert "no such study" in output_of("diff", made(), tmp_path / "none.h5", status=2)
+    output_of("diff", made(), made(), "--tolerance", "-1", status=2)

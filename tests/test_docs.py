@@ -6,14 +6,17 @@ the page. A comment right before a block says what is special about it:
 
     <!-- not run: REASON -->   left alone, and counted
     <!-- slow -->              in `make validate` only, with what needs it
+    <!-- needs: PACKAGE -->    run where this package is installed
     <!-- status: N -->         the exit status that the last command ends with
     <!-- file: NAME -->        the file NAME has, or gets, these contents
 
 In output a line of `...` stands for any lines, and numbers may differ in their last digits.
 """
 
+import ast
 import importlib.util
 import io
+import json
 import re
 import shlex
 import shutil
@@ -27,17 +30,24 @@ from click.testing import CliRunner
 
 import gfmd_cli
 from gfmd_cli.cli import main
-from gfmd_cli.study.parse import read_spec, read_tables
+from gfmd_cli.spec.parse import read_spec, read_tables
 
 ROOT = Path(__file__).parents[1]
 PAGES = [
     *(ROOT / name for name in ("README.md", "CONTRIBUTING.md", "SECURITY.md", "CHANGELOG.md")),
     *sorted((ROOT / "docs").glob("*.md")),
 ]
+SCRIPTS = sorted((ROOT / "scripts").rglob("*.py"))
 INDENTED = re.compile(r"^(?![ ]|[-*] |\d+\. |\|).*\n\n {4}(?![-*] )\S", re.MULTILINE)
 FENCE = re.compile(r"^( *)```(\S*)\n(.*?)^\1```$", re.MULTILINE | re.DOTALL)
 COMMENT = re.compile(r"<!-- ([a-z ]+)(?:: (.*?))? -->\s*$")
 NUMBER = re.compile(r"[+-]?\d+\.?\d*(?:e[+-]?\d+)?")
+MAX_LINE = 125
+PATHS = re.compile(
+    r"(?<![\w./$-])((?:gfmd_cli|docs|scripts|tests|configs|solvers|physics|study|spec|analysis|report"
+    r"|bench|grid|files|cli)/[\w./-]*[\w/])"
+)
+"""Names of files and folders in the running text of a page."""
 LAST_DIGITS = 3  # in units of the last one that the page has
 RELATIVE = 2e-3  # or this, where rounding sends two solves different ways
 SMALL = 1e-5  # below it, numbers of two digits are residuals: as large as they happen to be
@@ -169,11 +179,17 @@ def run_block(block: Block, namespace: dict) -> None:
         pytest.fail(f"{block.place}: {block.language or 'no language'}: cannot be run; say why")
 
 
+def can_run(block: Block, *, slow: bool) -> bool:
+    needs = block.said.get("needs")
+    installed = needs is None or importlib.util.find_spec(needs) is not None
+    return "not run" not in block.said and (slow or "slow" not in block.said) and installed
+
+
 def run_page(page: Path, folder: Path, *, slow: bool) -> None:
     shutil.copytree(ROOT / "configs", folder / "configs")
     namespace: dict = {"__name__": page.stem}
     for block in blocks(page):
-        if "not run" not in block.said and (slow or "slow" not in block.said):
+        if can_run(block, slow=slow):
             run_block(block, namespace)
 
 
@@ -182,6 +198,19 @@ def folder(tmp_path, monkeypatch):
     monkeypatch.setenv("MPLBACKEND", "agg")
     monkeypatch.chdir(tmp_path)
     return tmp_path
+
+
+@pytest.mark.parametrize("notebook", sorted((ROOT / "docs").glob("*.ipynb")), ids=lambda p: p.stem)
+def test_cells_of_the_notebook_run(notebook, folder):
+    pytest.importorskip("matplotlib")
+    cells = json.loads(notebook.read_text(encoding="utf-8"))["cells"]
+    namespace: dict = {"__name__": notebook.stem}
+    for cell in cells:
+        assert cell.get("outputs", []) == [], f"{cell['id']}: output that may be outdated"
+        if cell["cell_type"] == "code":
+            exec(
+                compile("".join(cell["source"]), f"{notebook.name}:{cell['id']}", "exec"), namespace
+            )
 
 
 def name(page: Path) -> str:
@@ -212,6 +241,9 @@ def test_blocks_that_are_not_run_say_why(capsys):
         for block in left:
             print(f"  {block.place} ({block.language}): {block.said['not run']}")
         print(f"{len(slow)} run in `make validate` only")
+        for block in every:
+            if "needs" in block.said:
+                print(f"  {block.place}: run where {block.said['needs']} is installed")
     for block in every:
         assert block.language, f"{block.place}: no language"
         assert block.said.get("not run", "because") != "", f"{block.place}: no reason"
@@ -226,6 +258,59 @@ def test_the_generated_pages_are_up_to_date(capsys):
     pages = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(pages)
     assert pages.run(check=True) == 0, capsys.readouterr().out
+
+
+def written_by_hand(page: Path) -> list[str]:
+    """The lines of a page without blocks, tables, formulas and generated parts."""
+    text = FENCE.sub("", page.read_text(encoding="utf-8"))
+    for part in (r"<!-- generated.*?<!-- end -->", r"^\$\$$.*?^\$\$$"):
+        text = re.sub(part, "", text, flags=re.DOTALL | re.MULTILINE)
+    return [line for line in text.splitlines() if not line.startswith(("|", "<!--"))]
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name)
+def test_lines_of_the_page_are_short_enough_to_compare_versions(page):
+    assert [line for line in written_by_hand(page) if len(line) > MAX_LINE] == []
+
+
+@pytest.mark.parametrize(
+    ("text", "loads"),
+    [
+        ('<script src="https://example.org/a.js">', True),
+        ("<link rel=stylesheet href=//example.org/a.css>", True),
+        ('@import "https://example.org/a.css";', True),
+        ('<a href="https://example.org">', False),
+        ('<img src="figures/a.png">', False),
+        ("url(data:image/svg+xml;utf8,<svg xmlns='http://www.w3.org/2000/svg'/>)", False),
+    ],
+)
+def test_the_site_build_finds_what_is_loaded_from_another_host(text, loads, monkeypatch):
+    pytest.importorskip("mkdocs")
+    monkeypatch.syspath_prepend(ROOT / "scripts")
+    site_hooks = importlib.import_module("site_hooks")
+    assert bool(site_hooks.outside(text)) is loads
+
+
+@pytest.mark.parametrize("script", SCRIPTS, ids=name)
+def test_every_name_that_a_script_imports_exists(script):
+    for node in ast.walk(ast.parse(script.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("gfmd_cli"):
+            module = importlib.import_module(node.module)
+            for alias in node.names:
+                if not hasattr(module, alias.name):
+                    importlib.import_module(f"{node.module}.{alias.name}")
+        elif isinstance(node, ast.ImportFrom) and (node.module or "").startswith("paper."):
+            there = ROOT / "scripts" / f"{node.module.replace('.', '/')}.py"
+            for alias in node.names:
+                assert re.search(rf"\b{alias.name}\b", there.read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name)
+def test_every_file_that_the_page_names_exists(page):
+    quoted = re.findall(r"`([^`\n]+)`", FENCE.sub("", page.read_text(encoding="utf-8")))
+    named = {path for text in quoted for path in PATHS.findall(text)}
+    folders = (ROOT, ROOT / "gfmd_cli")
+    assert {path for path in named if not any((f / path).exists() for f in folders)} == set()
 
 
 @pytest.mark.parametrize(

@@ -9,11 +9,9 @@ import h5py
 import numpy as np
 import pytest
 import xarray
-from click.testing import CliRunner
 
-from gfmd_cli.analysis.export import as_dataset
-from gfmd_cli.cli import main
-from gfmd_cli.study.layout import COLUMNS
+from gfmd_cli.analysis.export import _cell, as_dataset
+from gfmd_cli.study.columns import COLUMNS, CONTRACT, DETAILS
 from gfmd_cli.study.reading import read_rows, read_shells
 
 SPEC = """
@@ -40,37 +38,33 @@ fields = ["u", "sigma", "height"]
 ARRAYS = {"height": "height", "displacement": "u", "stress": "sigma"}
 
 
-def gfmd(*words, status=0):
-    done = CliRunner().invoke(main, [str(word) for word in words])
-    assert done.exit_code == status, done.output
-    return done.output
-
-
 @pytest.fixture(scope="module")
-def study(tmp_path_factory):
+def study(output_of, tmp_path_factory):
     folder = tmp_path_factory.mktemp("export")
     (folder / "spec.toml").write_text(SPEC)
-    gfmd("run", folder / "spec.toml", "-o", folder / "s.h5", "-q", "-j", "1")
+    output_of("run", folder / "spec.toml", "-o", folder / "s.h5", "-q", "-j", "1")
     return folder / "s.h5"
 
 
 @pytest.fixture(scope="module")
-def line_study(tmp_path_factory):
+def line_study(output_of, tmp_path_factory):
     folder = tmp_path_factory.mktemp("line")
     text = SPEC[: SPEC.index("[surface]")] + '[surface]\nkind = "ridge"\n'
     (folder / "spec.toml").write_text(
         text + SPEC[SPEC.index("[elastomer]") :].replace("[32, 48]", "64").replace(", 0.5]", "]")
     )
-    gfmd("run", folder / "spec.toml", "-o", folder / "s.h5", "-q", "-j", "1")
+    output_of("run", folder / "spec.toml", "-o", folder / "s.h5", "-q", "-j", "1")
     return folder / "s.h5"
 
 
-def test_csv_has_the_columns_of_the_layout(study, tmp_path):
-    gfmd("export", study, "-o", tmp_path / "s.csv")
+def test_csv_has_the_columns_of_the_layout(output_of, study, tmp_path):
+    output_of("export", study, "-o", tmp_path / "s.csv")
     text = (tmp_path / "s.csv").read_text()
-    assert text == gfmd("export", study)
+    assert text == output_of("export", study)
     rows = list(csv.DictReader(io.StringIO(text)))
-    assert list(rows[0]) == [column.name for column in COLUMNS]
+    by_hand = [column.name for column in (*CONTRACT, *DETAILS)]
+    assert list(rows[0])[: len(by_hand)] == by_hand
+    assert {"cutoff", "hurst", "E_star"} < set(rows[0]) - set(by_hand)
     for row, stored in zip(rows, read_rows(study), strict=True):
         assert int(row["patches"]) == stored["patches"]
         assert float(row["stiffness"]) == stored["stiffness"]
@@ -78,7 +72,8 @@ def test_csv_has_the_columns_of_the_layout(study, tmp_path):
 
 def test_a_dataset_has_columns_distributions_scenes_and_curves(study):
     found, rows = as_dataset(study), read_rows(study)
-    for column in COLUMNS:
+    assert {c.name for c in (*CONTRACT, *DETAILS)} <= {*found.variables}
+    for column in (c for c in COLUMNS if c.name in found.variables):
         told = found[column.name]
         np.testing.assert_array_equal(told.values, [row[column.name] for row in rows])
         assert told.dims == ("task",)
@@ -102,8 +97,8 @@ def test_a_dataset_has_columns_distributions_scenes_and_curves(study):
     assert found.spectra_q.attrs["units"] == "m-1"
 
 
-def test_netcdf_opens_labelled_in_xarray_as_the_dataset_was(study, tmp_path):
-    gfmd("export", study, "-o", tmp_path / "s.nc")
+def test_netcdf_opens_labelled_in_xarray_as_the_dataset_was(output_of, study, tmp_path):
+    output_of("export", study, "-o", tmp_path / "s.nc")
     with xarray.open_dataset(tmp_path / "s.nc", engine="h5netcdf") as found:
         made = as_dataset(study)
         xarray.testing.assert_equal(found.load(), made)
@@ -111,13 +106,15 @@ def test_netcdf_opens_labelled_in_xarray_as_the_dataset_was(study, tmp_path):
         assert found.a_r.attrs == made.a_r.attrs
 
 
-def test_netcdf_opens_in_the_netcdf_library(study, tmp_path):
+def test_netcdf_opens_in_the_netcdf_library(output_of, study, tmp_path):
     netcdf = pytest.importorskip("netCDF4")
-    gfmd("export", study, "-o", tmp_path / "s.nc")
+    output_of("export", study, "-o", tmp_path / "s.nc")
     with netcdf.Dataset(tmp_path / "s.nc") as found:
         assert found.data_model == "NETCDF4"
         assert found["pr_gap"].dimensions == ("task", "gap")
-        assert found["sigma_p"].long_name == "standard deviation of the stress / Delta_sigma"
+        assert (
+            found["sigma_p"].long_name == "standard deviation of the contact pressure / Delta_sigma"
+        )
         expected = [row["a_r"] for row in read_rows(study)]
         np.testing.assert_array_equal(found["a_r"][:], expected)
         assert list(found["status"][:]) == ["converged"] * 4
@@ -138,8 +135,8 @@ def parsed(path):
     return image.attrib, arrays
 
 
-def test_an_image_holds_the_fields_of_a_task(study, tmp_path):
-    gfmd("export", study, "-o", tmp_path / "s.vti", "--task", 2)
+def test_an_image_holds_the_fields_of_a_task(output_of, study, tmp_path):
+    output_of("export", study, "-o", tmp_path / "s.vti", "--task", 2)
     image, arrays = parsed(tmp_path / "s.vti")
     assert image["WholeExtent"] == "0 47 0 47 0 0"
     assert float(image["Spacing"].split()[0]) == pytest.approx(2 / 48, rel=1e-15)
@@ -149,17 +146,17 @@ def test_an_image_holds_the_fields_of_a_task(study, tmp_path):
             np.testing.assert_array_equal(arrays[name].reshape(stored.shape), stored)
 
 
-def test_an_image_of_a_line_scene_takes_the_only_task(line_study, tmp_path):
-    gfmd("export", line_study, "-o", tmp_path / "s.vti")
+def test_an_image_of_a_line_scene_takes_the_only_task(output_of, line_study, tmp_path):
+    output_of("export", line_study, "-o", tmp_path / "s.vti")
     image, arrays = parsed(tmp_path / "s.vti")
     assert image["WholeExtent"] == "0 63 0 0 0 0"
     assert arrays["stress"].size == 64
 
 
-def test_an_image_opens_in_vtk(study, tmp_path):
+def test_an_image_opens_in_vtk(output_of, study, tmp_path):
     xml = pytest.importorskip("vtkmodules.vtkIOXML")
     numpy_support = pytest.importorskip("vtkmodules.util.numpy_support")
-    gfmd("export", study, "-o", tmp_path / "s.vti", "--task", 1)
+    output_of("export", study, "-o", tmp_path / "s.vti", "--task", 1)
     reader = xml.vtkXMLImageDataReader()
     reader.SetFileName(str(tmp_path / "s.vti"))
     reader.Update()
@@ -187,36 +184,45 @@ def test_an_image_opens_in_vtk(study, tmp_path):
         (("-o", "a.nc", "--task", "1"), "--task: chooses fields"),
     ],
 )
-def test_what_cannot_be_written_is_refused_in_one_message(study, tmp_path, words, message):
+def test_what_cannot_be_written_is_refused_in_one_message(
+    output_of, study, tmp_path, words, message
+):
     place = [str(tmp_path / word) if word.startswith("a") else word for word in words]
-    told = gfmd("export", study, *place, status=2)
+    told = output_of("export", study, *place, status=2)
     assert re.search(message, told)
     assert len(told.splitlines()) == 1
     assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("words", [("a.csv",), ("a.nc",), ("a.vti", "--task", "0")])
-def test_a_place_that_cannot_be_written_is_status_73(study, tmp_path, words):
+def test_a_place_that_cannot_be_written_is_status_73(output_of, study, tmp_path, words):
     (tmp_path / "file").write_text("")
-    told = gfmd("export", study, "-o", tmp_path / "file" / words[0], *words[1:], status=73)
+    told = output_of("export", study, "-o", tmp_path / "file" / words[0], *words[1:], status=73)
     assert "cannot be written" in told
 
 
-def test_a_study_without_fields_makes_no_image(tmp_path):
+def test_a_study_without_fields_makes_no_image(output_of, tmp_path):
     (tmp_path / "spec.toml").write_text(SPEC)
-    gfmd(
+    output_of(
         "run", tmp_path / "spec.toml", "-o", tmp_path / "s.h5", "-q", "--set", "output={}",
         "--set", "load.p_star=0.5", "--set", "grid.points=32",
     )  # fmt: skip
-    told = gfmd("export", tmp_path / "s.h5", "-o", tmp_path / "s.vti", status=2)
+    told = output_of("export", tmp_path / "s.h5", "-o", tmp_path / "s.vti", status=2)
     assert "holds no fields" in told
     assert "spectra_q" not in as_dataset(tmp_path / "s.h5")
 
 
-def test_a_study_that_is_not_finished_is_exported_as_far_as_it_goes(study, tmp_path):
+def test_a_study_that_is_not_finished_is_exported_as_far_as_it_goes(output_of, study, tmp_path):
     spec = study.parent / "spec.toml"
-    gfmd("run", spec, "-o", tmp_path / "s.h5", "-q", "-j", "1", "--shard", "1/4")
+    output_of("run", spec, "-o", tmp_path / "s.h5", "-q", "-j", "1", "--shard", "1/4")
     found = as_dataset(tmp_path / "s.h5")
     assert list(found.status.values) == ["missing", "converged", "missing", "missing"]
     assert np.isnan(found.spectra_u[0]).all()
     assert found.spectra_u[1].notnull().any()
+
+
+@pytest.mark.parametrize("text", ["=1+1", "+1", "-1", "@sum(a1)", "\tx", "\rx"])
+def test_text_that_looks_like_a_formula_is_quoted_in_csv(text):
+    assert _cell(text) == f"'{text}"
+    assert _cell("half-space") == "half-space"
+    assert _cell(-1.5) == "-1.5"

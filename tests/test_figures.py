@@ -4,27 +4,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from specs import power_spec
 
 from gfmd_cli.analysis import figures
 from gfmd_cli.analysis.compare import Curve, compare
-from gfmd_cli.analysis.figures import VIEWS, draw_all
-from gfmd_cli.analysis.looks import looks
+from gfmd_cli.analysis.curve_styles import curve_styles
+from gfmd_cli.analysis.figures import VIEWS, draw_all, items_of, study_figures
+from gfmd_cli.analysis.plotting import styled
 from gfmd_cli.errors import InputError, SpaceError
-from gfmd_cli.study.parse import read_spec
+from gfmd_cli.spec.parse import read_spec
 from gfmd_cli.study.run import run_study
 
-ROUGH = """\
-[surface]
-kind = "self-affine"
-cutoff = 0.05
-[elastomer]
-kind = "power"
-n = [0, 1]
-[grid]
-points = 64
-[load]
-p_star = [0.05, 0.3, 1.5]
-"""
+ROUGH = power_spec(n=[0, 1], points=64, p_star=[0.05, 0.3, 1.5], cutoff=0.05)
 LINE = """\
 [surface]
 kind = "ridge"
@@ -81,12 +72,12 @@ def view(name):
     return next(view for view in VIEWS if view.name == name)
 
 
-def sheet_of(name, comparison):
+def figure_of(name, comparison):
     curves = comparison.curves
     p_star = np.geomspace(0.01, 3, 50)
     items = [
-        figures.Item(curve, look, p_star, curve.predict(p_star))
-        for curve, look in zip(curves, looks(curves), strict=True)
+        figures.Item(curve, style, p_star, curve.predict(p_star))
+        for curve, style in zip(curves, curve_styles(curves), strict=True)
     ]
     if name == "stress_distribution":
         return figures._distribution(items)
@@ -113,46 +104,50 @@ def test_two_grids_of_one_contact_give_the_continuum_too(study, tmp_path):
 
 
 def test_a_line_scene_is_drawn(study):
+    """Without theory, which does not apply to a single indenter."""
     comparison = study(LINE)
-    for name in OVER_PRESSURE | {"stress_distribution"}:
-        sheet_of(name, comparison).figure.draw_without_rendering()
+    for name in (OVER_PRESSURE | {"stress_distribution"}) - {"contact_area_ratio"}:
+        plot = figure_of(name, comparison)
+        plot.figure.draw_without_rendering()
+        assert "Persson theory" not in plot.legend
+    assert figure_of("contact_area_ratio", comparison) is None
 
 
 def test_slabs_each_have_a_theory_of_their_own_and_need_no_histogram(study):
     text = ROUGH.replace('"power"', '"slab"').replace("n = [0, 1]", "thickness = [0.01, 0.1]")
     slabs = study(text, "output.histogram=false")
-    sheet = sheet_of("contact_area", slabs)
-    assert list(sheet.legend) == ["t/L = 0.01", "t/L = 0.1", "Persson theory"]
-    assert sheet.legend["Persson theory"].get_color() != "black"
+    plot = figure_of("contact_area", slabs)
+    assert list(plot.legend) == ["t/L = 0.01", "t/L = 0.1", "Persson theory"]
+    assert plot.legend["Persson theory"].get_color() != "black"
     for name in OVER_PRESSURE:
-        sheet_of(name, slabs).figure.draw_without_rendering()
+        figure_of(name, slabs).figure.draw_without_rendering()
     for name in DISTRIBUTIONS:
-        assert sheet_of(name, slabs) is None
-    sheet = sheet_of("contact_area_ratio", slabs)
-    assert sheet.legend["Persson theory"].get_color() == "black"
+        assert figure_of(name, slabs) is None
+    plot = figure_of("contact_area_ratio", slabs)
+    assert plot.legend["Persson theory"].get_color() == "black"
 
 
 def test_theory_that_is_the_same_for_all_curves_is_one_black_line(study):
     comparison = study()
-    assert sheet_of("contact_area", comparison).legend["Persson theory"].get_color() == "black"
-    assert sheet_of("mean_gap_log", comparison).legend["Persson theory"].get_color() != "black"
+    assert figure_of("contact_area", comparison).legend["Persson theory"].get_color() == "black"
+    assert figure_of("mean_gap_log", comparison).legend["Persson theory"].get_color() != "black"
 
 
 def test_the_closed_form_belongs_to_n_0_alone(study):
     comparison = study()
-    assert "n = 0, Gaussian" in sheet_of("mean_gap_tail", comparison).legend
+    assert "n = 0, Gaussian" in figure_of("mean_gap_tail", comparison).legend
     without = replace(comparison, curves=[c for c in comparison.curves if c.n != 0])
-    assert "n = 0, Gaussian" not in sheet_of("mean_gap_tail", without).legend
+    assert "n = 0, Gaussian" not in figure_of("mean_gap_tail", without).legend
 
 
 def test_what_is_not_converged_is_a_cross_and_known_errors_are_bars(study):
     comparison = study()
-    assert "not converged" not in sheet_of("mean_gap_log", comparison).legend
-    assert not sheet_of("mean_gap_log", comparison).axes.containers
+    assert "not converged" not in figure_of("mean_gap_log", comparison).legend
+    assert not figure_of("mean_gap_log", comparison).axes.containers
     states = [{"status": "max_steps"}, {"u_g_error": 0.1}, {}]
-    sheet = sheet_of("mean_gap_log", marked(comparison, states))
-    assert "not converged" in sheet.legend
-    assert len(sheet.axes.containers) == 1
+    plot = figure_of("mean_gap_log", marked(comparison, states))
+    assert "not converged" in plot.legend
+    assert len(plot.axes.containers) == 1
 
 
 def test_symbols_stand_at_the_continuum_value_where_it_is_known(study):
@@ -161,11 +156,11 @@ def test_symbols_stand_at_the_continuum_value_where_it_is_known(study):
     comparison = marked(study(ROUGH, "elastomer.n=1"), [known, unknown, {}])
     (curve,) = comparison.curves
     grid = curve.column("a_r")
-    sheet = sheet_of("contact_area", comparison)
-    (bars,) = sheet.axes.containers
+    plot = figure_of("contact_area", comparison)
+    (bars,) = plot.axes.containers
     ends = np.array([segment[:, 1] for segment in bars.lines[2][0].get_segments()])
     assert ends == pytest.approx(np.array([[0.03, 0.05], [grid[1] - 0.03, grid[1] + 0.03]]))
-    symbols = next(line for line in sheet.axes.lines if line.get_marker() == "o")
+    symbols = next(line for line in plot.axes.lines if line.get_marker() == "o")
     assert symbols.get_ydata() == pytest.approx([0.04, *grid[1:]])
 
 
@@ -173,58 +168,86 @@ def test_no_gap_is_left_out_of_the_logarithmic_figure(study):
     comparison = study()
     closed = [{"u_g": 0.0}] * 3
     one = replace(comparison, curves=comparison.curves[:1])
-    assert sheet_of("mean_gap_tail", marked(one, closed)) is None
-    assert sheet_of("mean_gap_tail", marked(comparison, closed)) is not None
-    assert sheet_of("mean_gap_log", marked(one, closed)) is not None
+    assert figure_of("mean_gap_tail", marked(one, closed)) is None
+    assert figure_of("mean_gap_tail", marked(comparison, closed)) is not None
+    assert figure_of("mean_gap_log", marked(one, closed)) is not None
 
 
 def test_values_that_are_not_finite_are_left_out(study):
     nothing = dict.fromkeys(("a_r", "sigma_p", "u_g"), np.nan) | {"status": "diverged"}
     comparison = marked(study(), [nothing, {}, {}])
     for name in OVER_PRESSURE:
-        assert "not converged" not in sheet_of(name, comparison).legend
+        assert "not converged" not in figure_of(name, comparison).legend
 
 
-def test_curves_that_differ_by_their_seed_alone_share_a_look(study):
+def test_curves_that_differ_by_their_seed_alone_share_a_style(study):
     curves = study(ROUGH, "surface.seed=[0, 1]", "load.p_star=0.3", "output.histogram=false").curves
-    told = looks(curves)
-    assert [look.label for look in told] == ["n = 0", "n = 1", "n = 0", "n = 1"]
-    assert told[:2] == told[2:]
-    assert len({look.colour for look in told}) == len({look.marker for look in told}) == 2
+    styles = curve_styles(curves)
+    assert [style.label for style in styles] == ["n = 0", "n = 1", "n = 0", "n = 1"]
+    assert styles[:2] == styles[2:]
+    assert len({style.colour for style in styles}) == len({style.marker for style in styles}) == 2
 
 
-def test_surfaces_of_one_body_are_named_by_what_differs_and_told_apart(study):
+def test_surfaces_under_one_elastomer_are_named_by_what_differs_and_told_apart(study):
     some = ("surface.hurst=[0.3, 0.8]", "surface.seed=[0, 1]", "elastomer.n=1")
     comparison = study(ROUGH, *some, "load.p_star=0.3", "output.histogram=false")
-    told = looks(comparison.curves)
-    labels = {look.label for look in told}
+    styles = curve_styles(comparison.curves)
+    labels = {style.label for style in styles}
     assert labels == {"n = 1, hurst=0.3", "n = 1, hurst=0.8"}
-    assert len(set(told)) == len({look.colour for look in told}) == 2
-    assert len({look.marker for look in told}) == 2
-    assert set(sheet_of("contact_area", comparison).legend) == {*labels, "Persson theory"}
+    assert len(set(styles)) == len({style.colour for style in styles}) == 2
+    assert len({style.marker for style in styles}) == 2
+    shown = {f"{label}, 2 seeds" for label in labels} | {"Persson theory", "95 % confidence"}
+    assert set(figure_of("contact_area", comparison).legend) == shown
 
 
-def test_more_variants_than_can_be_told_apart_are_named_by_their_body(study):
+def test_more_variants_than_can_be_told_apart_are_named_by_their_elastomer(study):
     (first, second) = study(ROUGH, "load.p_star=0.3", "output.histogram=false").curves
     many = [
-        Curve([row | {"surface": f"{row['surface']} hurst=0.{place}"} for row in curve.rows],
+        Curve([row | {"hurst": 0.1 * place} for row in curve.rows],
               curve.persson)
         for curve in (first, second) for place in range(1, 6)
     ]  # fmt: skip
-    assert {look.label for look in looks(many[:8])} >= {"n = 0, hurst=0.1", "n = 1, hurst=0.3"}
-    assert {look.label for look in looks(many)} == {"n = 0", "n = 1"}
-    assert len({look.colour for look in looks(many)}) == 2
+    labels = {style.label for style in curve_styles(many[:8])}
+    assert labels >= {"n = 0, hurst=0.1", "n = 1, hurst=0.3"}
+    assert {style.label for style in curve_styles(many)} == {"n = 0", "n = 1"}
+    assert len({style.colour for style in curve_styles(many)}) == 2
 
 
 def test_names_of_elastomers_are_short_where_they_can_be(study):
     curves = study(ROUGH, "elastomer.n=[0.5, 1.0, 0.77]", "load.p_star=1").curves
-    names = [look.label for look in looks(curves)]
+    names = [style.label for style in curve_styles(curves)]
     assert names == ["n = 1/2", "n = 1", "n = 0.77"]
+
+
+def test_a_half_space_is_called_so(study):
+    (curve,) = study(ROUGH, 'elastomer={kind="half-space", E_star=2e9}').curves
+    assert [style.label for style in curve_styles([curve])] == ["half-space"]
+
+
+def test_a_study_in_pascals_has_them_on_a_second_axis(study):
+    pressures = "load={pressure=[1e6, 1e7, 1e8]}"
+    comparison = study(ROUGH, 'elastomer={kind="half-space", E_star=2e9}', pressures)
+    with styled():
+        plot = study_figures(comparison, items_of(comparison))["contact_area"]
+        plot.svg()
+    (second,) = plot.axes.child_axes
+    delta_sigma = comparison.curves[0].rows[0]["delta_sigma"]
+    low, high = plot.axes.get_xlim()
+    divisor = {"(MPa)": 1e6, "(GPa)": 1e9}[second.get_xlabel().split()[-1]]
+    scale = delta_sigma / divisor
+    assert second.get_xlim() == pytest.approx((low * scale, high * scale))
+
+
+def test_a_study_in_reduced_units_has_no_second_axis(study):
+    comparison = study(ROUGH)
+    with styled():
+        plot = study_figures(comparison, items_of(comparison))["contact_area"]
+    assert plot.axes.child_axes == []
 
 
 def test_elastomers_of_one_exponent_keep_their_full_names(study):
     curves = study(ROUGH.replace("n = [0, 1]", "n = 1\nk_n = [1.0, 2.0]")).curves
-    assert [look.label for look in looks(curves)] == ["power n=1", "power n=1 k_n=2"]
+    assert [style.label for style in curve_styles(curves)] == ["power n=1 k_n=1", "power n=1 k_n=2"]
 
 
 def test_a_folder_that_cannot_be_written_is_told(study, tmp_path):
@@ -236,6 +259,6 @@ def test_a_folder_that_cannot_be_written_is_told(study, tmp_path):
 
 def test_missing_matplotlib_is_told(monkeypatch):
     monkeypatch.setitem(sys.modules, "matplotlib", None)
-    monkeypatch.delitem(sys.modules, "gfmd_cli.analysis.sheet")
-    with pytest.raises(InputError, match=r"pip install gfmd-cli\[plot\]"):
-        importlib.import_module("gfmd_cli.analysis.sheet")
+    monkeypatch.delitem(sys.modules, "gfmd_cli.analysis.plotting")
+    with pytest.raises(InputError, match=r'pip install "\.\[plot\]"'):
+        importlib.import_module("gfmd_cli.analysis.plotting")

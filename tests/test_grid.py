@@ -4,49 +4,61 @@ import numpy as np
 import pyfftw
 import pytest
 
-from gfmd_cli.physics.grid import Grid
-from gfmd_cli.physics.surface import SelfAffine
+from gfmd_cli.grid.fft_grid import Grid
+from gfmd_cli.physics.self_affine import SelfAffine
 
 ROUNDING = 1e-14  # a few units in the last place, times log2 of the size, for fields of order one
-GRIDS = [(points, dimension) for points in (8, 10, 16, 50) for dimension in (1, 2)]
+GRIDS = [
+    *(Grid(points, dimension) for points in (8, 9, 10, 50) for dimension in (1, 2)),
+    Grid(16, points_y=10),
+    Grid(10, length=2.0, points_y=16, length_y=3.2),
+    Grid(9, length=0.1, points_y=12, length_y=0.7),
+    Grid(8, points_y=15),
+]
 
 
 def noise(grid, seed=0):
     return np.random.default_rng(seed).standard_normal(grid.shape)
 
 
-def polynomial(points, dimension, highest, seed=1):
+def waves(points, highest, sign=1):
+    """exp(+-2 pi i m x) for -highest <= m <= highest at the points of one axis."""
+    m, x = np.arange(-highest, highest + 1), np.arange(points) / points
+    return np.exp(2j * np.pi * sign * np.outer(m, x))
+
+
+def polynomial(shape, highest, seed=1):
     """A random trigonometric polynomial of modes |m| <= highest along each axis, from its sum."""
     draw = np.random.default_rng(seed)
-    x = np.arange(points) / points
-    m = np.arange(-highest, highest + 1)
-    waves = np.exp(2j * np.pi * np.outer(m, x))
-    shape = (m.size,) * dimension
-    amplitude = draw.standard_normal(shape) + 1j * draw.standard_normal(shape)
-    if dimension == 1:
-        return (amplitude @ waves).real
-    return (waves.T @ amplitude @ waves).real
+    number = tuple(2 * m + 1 for m in highest)
+    amplitude = draw.standard_normal(number) + 1j * draw.standard_normal(number)
+    field = amplitude @ waves(shape[-1], highest[-1])
+    return field.real if len(shape) == 1 else (waves(shape[0], highest[0]).T @ field).real
 
 
-@pytest.mark.parametrize(("points", "dimension"), GRIDS)
-def test_the_coefficient_at_zero_is_the_mean(points, dimension):
-    grid = Grid(points, dimension)
+@pytest.mark.parametrize("grid", GRIDS, ids=str)
+def test_the_coefficient_at_zero_is_the_mean(grid):
     field = 3.0 + noise(grid)
     assert grid.forward(field).flat[0] == pytest.approx(field.mean(), rel=ROUNDING)
 
 
-@pytest.mark.parametrize(("points", "dimension"), GRIDS)
-def test_the_coefficients_are_those_of_the_fourier_sum(points, dimension):
-    grid = Grid(points, dimension)
+def dense_transform(points):
+    """The matrix of the Fourier sum along one axis."""
+    number = np.arange(points)
+    return np.exp(-2j * np.pi * np.outer(number, number) / points) / points
+
+
+@pytest.mark.parametrize("grid", GRIDS, ids=str)
+def test_the_coefficients_are_those_of_the_fourier_sum(grid):
     field = noise(grid)
-    wave = np.exp(-2j * np.pi * np.outer(np.arange(points), np.arange(points)) / points) / points
-    expected = wave @ field if dimension == 1 else wave @ field @ wave.T
-    assert grid.forward(field) == pytest.approx(expected[..., : points // 2 + 1], abs=ROUNDING)
+    expected = field @ dense_transform(grid.points)
+    if grid.dimension == 2:
+        expected = dense_transform(grid.points_y) @ expected
+    assert grid.forward(field) == pytest.approx(expected[..., : grid.points // 2 + 1], abs=ROUNDING)
 
 
-@pytest.mark.parametrize(("points", "dimension"), GRIDS)
-def test_backward_undoes_forward_and_leaves_its_input_alone(points, dimension):
-    grid = Grid(points, dimension)
+@pytest.mark.parametrize("grid", GRIDS, ids=str)
+def test_backward_undoes_forward_and_leaves_its_input_alone(grid):
     field = noise(grid)
     modes = grid.forward(field)
     kept = modes.copy()
@@ -54,17 +66,15 @@ def test_backward_undoes_forward_and_leaves_its_input_alone(points, dimension):
     assert np.array_equal(modes, kept)
 
 
-@pytest.mark.parametrize(("points", "dimension"), GRIDS)
-def test_the_squares_of_all_modes_sum_to_the_mean_square(points, dimension):
-    grid = Grid(points, dimension)
+@pytest.mark.parametrize("grid", GRIDS, ids=str)
+def test_the_squares_of_all_modes_sum_to_the_mean_square(grid):
     field = noise(grid)
     total = np.sum(np.abs(grid.forward(field)) ** 2 * grid.multiplicity())
     assert total == pytest.approx(np.mean(field**2), rel=ROUNDING)
 
 
 def test_every_mode_is_counted_once():
-    for points, dimension in GRIDS:
-        grid = Grid(points, dimension)
+    for grid in GRIDS:
         count = np.broadcast_to(grid.multiplicity(), grid.spectral_shape)
         assert count.sum() == grid.size
 
@@ -79,6 +89,39 @@ def test_a_plane_wave_has_the_wavenumber_of_its_only_mode():
     assert power[row, column] == pytest.approx(0.25)
     assert grid.mode_number()[row, column] == 5
     assert grid.wavenumber()[row, column] == pytest.approx(5 * 2 * np.pi / 3.0, rel=ROUNDING)
+
+
+def test_a_wave_on_an_oblong_cell_has_the_wavenumber_of_its_periods():
+    grid = Grid(15, length=3.0, points_y=20, length_y=0.5)
+    x, y = np.arange(15) / 15 * 3.0, np.arange(20) / 20 * 0.5
+    q_x, q_y = 2 * np.pi * 6 / 3.0, -2 * np.pi * 4 / 0.5
+    power = np.abs(grid.forward(np.cos(q_x * x + q_y * y[:, None]))) ** 2
+    row, column = np.unravel_index(np.argmax(power), power.shape)
+    assert (row, column) == (20 - 4, 6)
+    assert power[row, column] == pytest.approx(0.25)
+    assert grid.wavenumber()[row, column] == pytest.approx(np.hypot(q_x, q_y), rel=ROUNDING)
+    assert grid.wavenumber(slice(16, 17))[0, 6] == grid.wavenumber()[16, 6]
+
+
+def test_sides_follow_from_the_points_and_one_spacing():
+    assert Grid(8).sides == (1.0, 1.0)
+    assert Grid(8, 1, length=3.0).sides == (3.0,)
+    assert Grid(8, points_y=12, length=2.0).sides == (3.0, 2.0)
+    assert Grid(8, points_y=12, length=2.0, length_y=0.6).spacings == pytest.approx((0.05, 0.25))
+    assert Grid(8, points_y=12, length=2.0, length_y=0.6).area == pytest.approx(1.2)
+    assert Grid(64, points_y=48, length_y=0.5).coarser((12, 32)).sides == (0.5, 1.0)
+
+
+@pytest.mark.parametrize("shape", [(8, 8), (8, 12), (9, 27), (40, 15)])
+def test_the_diagonal_passes_from_corner_to_corner(shape):
+    grid = Grid(shape[1], points_y=shape[0])
+    rows, columns = grid.diagonal_points()
+    steps = max(shape)
+    for index, points in ((rows, shape[0]), (columns, shape[1])):
+        away = index / points - np.arange(steps) / steps
+        assert np.abs(away - np.rint(away)).max() <= 0.5 / points
+    field = noise(grid)
+    assert np.array_equal(grid.diagonal(field), field[rows, columns])
 
 
 def test_the_operator_is_the_product_of_dense_matrices():
@@ -118,14 +161,33 @@ def test_interpolation_passes_through_the_coarse_points(coarse, fine, dimension)
     assert finer[shared] == pytest.approx(field, abs=10 * ROUNDING)
 
 
-@pytest.mark.parametrize("dimension", [1, 2])
-@pytest.mark.parametrize(("source", "target"), [(16, 50), (50, 16), (18, 20), (20, 18), (16, 16)])
-def test_resampling_a_band_limited_field_is_exact(source, target, dimension):
-    highest = min(source, target) // 2 - 1  # what both grids resolve
-    grid = Grid(source, dimension)
-    resampled = grid.resample(polynomial(source, dimension, highest), Grid(target, dimension))
-    expected = polynomial(target, dimension, highest)
+SHAPES = [
+    *((n,) * dimension for n in (16, 17, 18, 50) for dimension in (1, 2)),
+    (16, 9),
+    (9, 50),
+    (17, 16),
+]
+
+
+@pytest.mark.parametrize("source", SHAPES)
+@pytest.mark.parametrize("target", SHAPES)
+def test_resampling_a_band_limited_field_is_exact(source, target):
+    if len(source) != len(target):
+        return
+    highest = tuple((min(pair) - 1) // 2 for pair in zip(source, target, strict=True))
+    grid, other = (Grid(s[-1], len(s), points_y=s[0], length_y=2.0) for s in (source, target))
+    resampled = grid.resample(polynomial(source, highest), other)
+    expected = polynomial(target, highest)
     assert resampled == pytest.approx(expected, abs=10 * ROUNDING * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("grid", GRIDS, ids=str)
+@pytest.mark.parametrize("shape", [(8, 8), (8, 7), (7, 8), (9, 8)])
+def test_a_symbol_cut_to_a_coarser_grid_is_that_of_the_coarser_grid(grid, shape):
+    if any(n < m for n, m in zip(grid.whole_shape, shape[-grid.dimension :], strict=True)):
+        return
+    coarser = grid.coarser(shape[-grid.dimension :])
+    assert np.array_equal(grid.cut(grid.wavenumber(), coarser), coarser.wavenumber())
 
 
 @pytest.mark.parametrize("dimension", [1, 2])

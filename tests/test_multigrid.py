@@ -3,17 +3,17 @@
 import numpy as np
 import pytest
 
+from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.physics.contact import Contact
-from gfmd_cli.physics.elastomer import Power
-from gfmd_cli.physics.grid import Grid
-from gfmd_cli.physics.sweeps import PRESSED, TENSE, Rows
+from gfmd_cli.physics.elastomers import Power
+from gfmd_cli.solvers.contact_state import PRESSED, TENSE
 from gfmd_cli.solvers.multigrid import GROWTH, Multigrid, suits
 
 PATTERNS = ("none", "points", "sparse", "dense", "disc", "grooves", "all but one", "corner")
 
 
-def contact(n, points=64):
-    grid = Grid(points)
+def contact(n, points=64, threads=1):
+    grid = Grid(points, threads=threads)
     k = Power(n=n).stiffness(grid.wavenumber(), grid.length)
     return Contact(grid, np.zeros(grid.shape), k / k.max(), 1.0)
 
@@ -34,15 +34,15 @@ def pattern(kind, points=64):
     return np.where(held, PRESSED, 0).astype(np.int8)
 
 
-def applied(n, marks, force, threads=1, least=PRESSED):
+def applied(n, state, force, threads=1, threshold=PRESSED):
     """z, and the two sums, for a force on the points."""
-    points = len(marks)
-    cycle = Multigrid(contact(n, points), Rows(points, threads))
-    padded = np.full((points, points + 2), np.nan)
-    change = np.cos(np.arange(points**2)).reshape(marks.shape).astype(np.float32)
-    slope, turned = cycle.apply(-force, marks, least, change, padded)
-    z = padded[:, :points]
-    free = np.where(marks < least, force, 0.0)
+    points = len(state)
+    cycle = Multigrid(contact(n, points, threads))
+    cycle.z[...] = np.nan
+    change = np.cos(np.arange(points**2)).reshape(state.shape).astype(np.float32)
+    slope, turned = cycle.apply(-force, state, threshold, change)
+    z = cycle.z[:, :points]
+    free = np.where(state < threshold, force, 0.0)
     assert slope == pytest.approx(np.vdot(z, free), rel=1e-5)
     assert turned == pytest.approx(np.vdot(z, change), rel=1e-5, abs=1e-5 * np.abs(z).sum())
     return z.copy()
@@ -51,17 +51,17 @@ def applied(n, marks, force, threads=1, least=PRESSED):
 @pytest.mark.parametrize("n", [1, 2, 3, 4])
 @pytest.mark.parametrize("kind", PATTERNS)
 def test_symmetric_positive_and_zero_where_held(n, kind):
-    marks = pattern(kind)
-    a, b = np.random.default_rng(2).normal(size=(2, *marks.shape))
-    za, zb = applied(n, marks, a), applied(n, marks, b)
-    assert not za[marks == PRESSED].any()
+    state = pattern(kind)
+    a, b = np.random.default_rng(2).normal(size=(2, *state.shape))
+    za, zb = applied(n, state, a), applied(n, state, b)
+    assert not za[state == PRESSED].any()
     size = np.sqrt(np.vdot(a, za) * np.vdot(b, zb))
     assert np.vdot(a, zb) == pytest.approx(np.vdot(b, za), abs=1e-5 * size)
     smooth = np.sin(2 * np.pi * np.arange(64) / 64)[:, None] * np.ones(64)
-    checks = (-1.0) ** np.indices(marks.shape).sum(axis=0)
-    for force in (a, smooth, checks, np.ones(marks.shape)):
-        free = np.where(marks == PRESSED, 0.0, force)
-        assert np.vdot(free, applied(n, marks, force)) > 0
+    checks = (-1.0) ** np.indices(state.shape).sum(axis=0)
+    for force in (a, smooth, checks, np.ones(state.shape)):
+        free = np.where(state == PRESSED, 0.0, force)
+        assert np.vdot(free, applied(n, state, force)) > 0
 
 
 @pytest.mark.parametrize("n", [2, 4])
@@ -69,13 +69,13 @@ def test_symmetric_positive_and_zero_where_held(n, kind):
 def test_positive_in_its_least_direction(n, kind):
     """The whole matrix of the cycle on a small grid."""
     points = 16
-    marks = pattern(kind, points)
-    free = np.flatnonzero(marks.ravel() < PRESSED)
+    state = pattern(kind, points)
+    free = np.flatnonzero(state.ravel() < PRESSED)
     columns = []
     for i in free:
         force = np.zeros(points**2)
         force[i] = 1.0
-        columns.append(applied(n, marks, force.reshape(marks.shape)).ravel()[free])
+        columns.append(applied(n, state, force.reshape(state.shape)).ravel()[free])
     matrix = np.array(columns)
     assert np.allclose(matrix, matrix.T, rtol=0, atol=1e-5 * np.abs(matrix).max())
     values = np.linalg.eigvalsh((matrix + matrix.T) / 2)
@@ -83,11 +83,11 @@ def test_positive_in_its_least_direction(n, kind):
 
 
 def test_points_under_tension_are_held_where_asked():
-    marks = pattern("disc")
-    marks[10:20, 10:20] = TENSE
-    force = np.random.default_rng(3).normal(size=marks.shape)
-    assert applied(3, marks, force)[15, 15] != 0
-    assert not applied(3, marks, force, least=TENSE)[marks >= TENSE].any()
+    state = pattern("disc")
+    state[10:20, 10:20] = TENSE
+    force = np.random.default_rng(3).normal(size=state.shape)
+    assert applied(3, state, force)[15, 15] != 0
+    assert not applied(3, state, force, threshold=TENSE)[state >= TENSE].any()
 
 
 @pytest.mark.parametrize(
@@ -97,13 +97,13 @@ def test_points_under_tension_are_held_where_asked():
 def test_conjugate_gradients_take_few_steps_on_any_grid(n, kind, most):
     """For K on the free points, to 1e-8 of the energy, with the contacts refined."""
     for points in (64, 128):
-        marks = np.kron(pattern(kind), np.ones((points // 64,) * 2, dtype=np.int8))
-        held, k = marks == PRESSED, contact(n, points).stiffness
+        state = np.kron(pattern(kind), np.ones((points // 64,) * 2, dtype=np.int8))
+        held, k = state == PRESSED, contact(n, points).stiffness
         force = np.where(held, 0.0, np.random.default_rng(4).normal(size=held.shape))
         steps, start = 0, None
         direction, old = np.zeros_like(force), 1.0
         while True:
-            z = applied(n, marks, force)
+            z = applied(n, state, force)
             new = float(np.vdot(z, force))
             start = start or new
             if new < 1e-8 * start:
@@ -117,11 +117,11 @@ def test_conjugate_gradients_take_few_steps_on_any_grid(n, kind, most):
 
 def test_same_on_any_number_of_threads():
     points = 512
-    marks = (2 * (np.random.default_rng(5).random((points, points)) < 0.05)).astype(np.int8)
-    force = np.random.default_rng(6).normal(size=marks.shape)
-    one = applied(3, marks, force)
+    state = (2 * (np.random.default_rng(5).random((points, points)) < 0.05)).astype(np.int8)
+    force = np.random.default_rng(6).normal(size=state.shape)
+    one = applied(3, state, force)
     for threads in (2, 3):
-        assert np.array_equal(applied(3, marks, force, threads), one)
+        assert np.array_equal(applied(3, state, force, threads), one)
 
 
 def test_knows_what_it_does_not_suit():

@@ -130,7 +130,7 @@ def test_random_masks_percolate_as_their_tiled_copies_do(corners):
 
 
 @given(arrays(bool, st.tuples(st.integers(3, 9), st.integers(3, 9))))
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 def test_contact_percolates_where_the_gap_leaves_it_a_way(touching):
     """Duality on a torus: one of both alone winds, in all directions, or both do in one."""
     gap, contact = open_gap(touching).winds, contact_patches(touching).winds
@@ -143,7 +143,7 @@ def test_contact_percolates_where_the_gap_leaves_it_a_way(touching):
 
 
 @given(arrays(bool, (7, 7)), st.integers(0, 6), st.integers(0, 6))
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 def test_regions_do_not_depend_on_where_the_cell_is_cut(mask, i, j):
     for corners in (False, True):
         one = regions(mask, corners=corners)

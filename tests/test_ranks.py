@@ -6,11 +6,9 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner
 
-from gfmd_cli.cli import main
-from gfmd_cli.physics.ranks import NUMBERS, SIZES, announced, is_first
-from gfmd_cli.physics.slab_rows import LEAST_ROWS, slab_edges, suits
+from gfmd_cli.grid.halo import MIN_ROWS, block_edges, is_distributable
+from gfmd_cli.grid.ranks import NUMBERS, SIZES, announced, is_first
 
 SMOKE = Path(__file__).parents[1] / "configs" / "smoke.toml"
 RUN = ["run", str(SMOKE), "--set", "elastomer.n=0"]
@@ -47,12 +45,12 @@ def test_launchers_are_recognised(launcher, variables, count, first):
 
 
 @pytest.mark.parametrize(("rank", "messages"), [("0", 1), ("1", 0)])
-def test_missing_mpi4py_is_told_once(launcher, monkeypatch, tmp_path, rank, messages):
+def test_missing_mpi4py_is_told_once(launcher, invoke, monkeypatch, tmp_path, rank, messages):
     launcher(PMI_SIZE="2", PMI_RANK=rank)
     monkeypatch.setitem(sys.modules, "mpi4py", None)
-    done = CliRunner().invoke(main, [*RUN, "-o", str(tmp_path / "s.h5")])
+    done = invoke(*RUN, "-o", tmp_path / "s.h5")
     assert done.exit_code == 2
-    assert done.output.count('pip install "gfmd-cli[mpi]"') == messages
+    assert done.output.count('pip install ".[mpi]"') == messages
     assert not list(tmp_path.iterdir())
 
 
@@ -69,14 +67,14 @@ def test_one_process_never_imports_mpi4py(tmp_path):
 
 @pytest.mark.parametrize("count", [1, 2, 3, 4, 7, 64])
 @pytest.mark.parametrize("points", [64, 98, 100, 1024, 1536, 65536])
-def test_slabs_cover_the_grid_and_lie_side_by_side_on_all_levels(points, count):
-    if not suits(points, count):
-        assert points < LEAST_ROWS * count
+def test_row_blocks_cover_the_grid_and_lie_side_by_side_on_all_levels(points, count):
+    if not is_distributable(points, count):
+        assert points < MIN_ROWS * count
         return
-    edges = slab_edges(points, count)
+    edges = block_edges(points, count)
     assert (edges[0], edges[-1]) == (0, points)
-    assert min(b - a for a, b in pairwise(edges)) >= LEAST_ROWS
-    if points % 2 == 0 and suits(points // 2, count):
-        assert [2 * edge for edge in slab_edges(points // 2, count)] == edges
+    assert min(b - a for a, b in pairwise(edges)) >= MIN_ROWS
+    if points % 2 == 0 and is_distributable(points // 2, count):
+        assert [2 * edge for edge in block_edges(points // 2, count)] == edges
     else:  # the next level is whole
         assert points % 2 or all(edge % 2 == 0 for edge in edges)

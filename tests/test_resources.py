@@ -3,8 +3,8 @@ from pathlib import Path
 import pytest
 
 from gfmd_cli.errors import InputError
+from gfmd_cli.spec.parse import read_spec
 from gfmd_cli.study import resources
-from gfmd_cli.study.parse import read_spec
 from gfmd_cli.study.tasks import plan
 
 CONFIGS = Path(__file__).parents[1] / "configs"

@@ -6,13 +6,11 @@ import sys
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner
 
-from gfmd_cli.cli import main
 from gfmd_cli.errors import InputError
+from gfmd_cli.spec.parse import read_spec
 from gfmd_cli.study import slurm
-from gfmd_cli.study.parse import read_spec
-from gfmd_cli.study.tasks import plan
+from gfmd_cli.study.tasks import BASE_BYTES, plan
 
 SPEC = """\
 [study]
@@ -40,7 +38,7 @@ esac
 
 
 @pytest.fixture
-def gfmd(tmp_path, monkeypatch):
+def gfmd(tmp_path, monkeypatch, invoke):
     """Calls the command in tmp_path, where spec.toml is SPEC and Slurm is played by scripts."""
     work, programs = tmp_path / "it's work", tmp_path / "bin"
     for folder in (work, programs):
@@ -55,7 +53,7 @@ def gfmd(tmp_path, monkeypatch):
         monkeypatch.setenv(name.upper(), str(tmp_path / name))
     monkeypatch.setenv("REFUSAL", "")
     Path("spec.toml").write_text(SPEC)
-    return lambda *words: CliRunner().invoke(main, [str(word) for word in words])
+    return invoke
 
 
 @pytest.fixture
@@ -108,7 +106,7 @@ def played(tmp_path, program, script="small.sbatch"):
     scontrol.write_text('#!/bin/sh\necho scontrol "$@" >> "$CALLS"\nexit 1\n')
     for path in (gfmd, scontrol):
         path.chmod(0o755)
-    called = shlex.join([sys.executable, "-m", "gfmd_cli"])
+    called = shlex.join([sys.executable, "-P", "-m", "gfmd_cli"])
     return ["bash", "-c", Path(script).read_text().replace(called, str(gfmd))]
 
 
@@ -281,14 +279,15 @@ def test_shards_are_numbered_as_slurm_numbers_them(shards, told):
 
 def test_what_a_shard_asks_for_grows_with_its_tasks(gfmd):
     def asked(points, cpus=1, limit=None):
-        tasks = plan(read_spec(Path("spec.toml"), (f"grid.points={points}",))[0])
+        overrides = (f"grid.points={points}", "elastomer.n=1")
+        tasks = plan(read_spec(Path("spec.toml"), overrides)[0])
         told = slurm.resources(tasks, 2, cpus, limit)
         return int(told["mem"][:-1]), int(told["signal"].partition("@")[2])
 
     memory, notice = asked(64)
     assert 2 * 205 < memory < 500
     assert 120 <= notice < 130
-    assert asked(64, cpus=8)[0] == pytest.approx(memory + 215e6 / 0.9 / 2**20, abs=3)
+    assert asked(64, cpus=8)[0] == pytest.approx(memory + BASE_BYTES / 0.9 / 2**20, abs=3)
     memory, notice = asked(16384)
     assert 6.65 * 2**31 / 2**20 < memory < 1.3 * 6.65 * 2**31 / 2**20
     assert notice > 250

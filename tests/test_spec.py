@@ -1,15 +1,17 @@
 import json
 import tomllib
-from itertools import pairwise
+from contextlib import nullcontext
 from pathlib import Path
 
 import jsonschema
 import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
 
 from gfmd_cli.errors import InputError
-from gfmd_cli.study.parse import read_spec
-from gfmd_cli.study.schema import spec_schema
-from gfmd_cli.study.spec import differences
+from gfmd_cli.spec.models import differences
+from gfmd_cli.spec.parse import read_spec, read_tables
+from gfmd_cli.spec.schema import spec_schema
 from gfmd_cli.study.tasks import plan
 
 CONFIGS = sorted((Path(__file__).parents[1] / "configs").glob("*.toml"))
@@ -76,13 +78,44 @@ def test_several_tables_of_one_kind_are_a_sweep_too(read):
     assert [e.kind for e in spec.elastomer] == ["power", "power", "slab"]
 
 
-def test_a_ladder_hits_both_ends_with_even_steps(read):
-    pressures = read(("[0.1, 1.0]", "{ from = 1e-3, to = 3.0, per_decade = 4 }")).load.values()
-    assert pressures[0] == pytest.approx(1e-3, rel=1e-15)
-    assert pressures[-1] == pytest.approx(3.0, rel=1e-15)
-    ratios = {round(b / a, 10) for a, b in pairwise(pressures)}
-    assert len(ratios) == 1
-    assert 10**0.23 < ratios.pop() < 10**0.27
+def ladder(read, **keys):
+    given = ", ".join(f"{key.strip('_')} = {value!r}" for key, value in keys.items())
+    return read(("[0.1, 1.0]", f"{{ {given} }}"))
+
+
+def test_a_ladder_has_a_fixed_step_and_stays_below_its_end(read):
+    pressures = ladder(read, from_=1e-3, to=3.0, per_decade=4).load.values()
+    assert pressures == pytest.approx([1e-3 * 10 ** (i / 4) for i in range(14)], rel=1e-14)
+    assert pressures[-1] <= 3.0 < pressures[-1] * 10**0.25
+
+
+@pytest.mark.parametrize(("first", "to"), [(1e-3, 1.0), (0.003, 0.3), (7e4, 7e7), (1e-300, 1e300)])
+@pytest.mark.parametrize("per_decade", [1, 3])
+def test_the_end_of_a_ladder_is_a_value_if_it_is_one_of_the_ladder(read, first, to, per_decade):
+    pressures = ladder(read, from_=first, to=to, per_decade=per_decade).load.values()
+    assert pressures[-1] == pytest.approx(to, rel=1e-12)
+    assert max(pressures) <= to * (1 + 1e-12)
+
+
+@given(
+    first=st.floats(1e-6, 1e6), decades=st.floats(0, 4), more=st.floats(0, 4), per=st.floats(0.5, 9)
+)
+@settings(max_examples=200)
+@example(first=1.0, decades=1.0, more=1.0, per=1.9999999998840412)
+@example(first=100000.701171875, decades=1.9999999999999996, more=1.0, per=1.0)
+def test_a_longer_ladder_moves_no_task(first, decades, more, per):
+    short, long = (
+        {task.id for task in plan(read_tables(tomllib.loads(BASE) | {"load": {"p_star": ends}}))}
+        for ends in (
+            {"from": first, "to": first * 10**d, "per_decade": per}
+            for d in (decades, decades + more)
+        )
+    )
+    assert short <= long
+
+
+def test_a_ladder_that_ends_below_its_second_value_has_one(read):
+    assert ladder(read, from_=0.1, to=0.2, per_decade=2).load.values() == [0.1]
 
 
 def test_an_override_replaces_a_key(read):
@@ -96,6 +129,14 @@ def test_task_ids_depend_on_content_not_on_place(read):
     wide = plan(read(("n = 1", "n = [0, 1]")))
     narrow = plan(read())
     assert {t.id for t in narrow} < {t.id for t in wide}
+    assert {t.scene_id for t in narrow} < {t.scene_id for t in wide}
+
+
+def test_task_ids_do_not_depend_on_the_output(read):
+    more = read(("[study]", '[output]\nfields = ["u"]\nstiffness = true\n[study]'))
+    assert [t.id for t in plan(more)] == [t.id for t in plan(read())]
+    assert more.output.names() == {"histogram", "fields.u", "stiffness"}
+    assert read().output.with_names(more.output.names()).names() == more.output.names()
 
 
 @pytest.mark.parametrize(
@@ -117,8 +158,16 @@ def test_task_ids_depend_on_content_not_on_place(read):
         (("n = 1", ""), ["elastomer.n", "is missing"]),
         (("cutoff = 0.05", "hurst = 0"), ["surface.hurst", "greater than 0", "got 0"]),
         (("cutoff = 0.05", "hurst = 1.1"), ["surface.hurst", "less than or equal to 1", "1.1"]),
-        (("points = 64", "points = 65"), ["grid.points", "multiple of 2", "65"]),
+        (("points = 64", "points = 64\npoints_y = 7"), ["grid.points_y", "equal to 8", "7"]),
         (("points = 64", "points = 4"), ["grid.points", "greater than or equal to 8", "4"]),
+        (
+            ("points = 64", 'points = "64"'),
+            ["grid.points", 'a whole number of points, or "auto"', "without quotation marks"],
+        ),
+        (
+            ("points = 64", 'points = "many"'),
+            ["grid.points", 'or "auto"', "'many'"],
+        ),
         (("points = 64", "points = 64.5"), ["grid.points", "integer", "64.5"]),
         (("[0.1, 1.0]", "[0.1, 0.0]"), ["load.p_star[1]", "greater than 0", "0.0"]),
         (("[0.1, 1.0]", "-1"), ["load.p_star", "greater than 0", "-1"]),
@@ -130,14 +179,22 @@ def test_task_ids_depend_on_content_not_on_place(read):
             ["load", "give one of p_star, pressure, contact_area, mean_gap"],
         ),
         (("[study]", "[study"), ["TOML syntax"]),
-        (('"base"', '"../x"'), ["study.name", "pattern"]),
+        (('"base"', '"../x"'), ["study.name", "only letters, digits"]),
         (
             ("[study]", "[solver]\ntolerance = 0\n[study]"),
             ["solver.tolerance", "greater than or equal to 0.00000"],
         ),
         (
-            ("[study]", '[solver]\nkind = "fire"\nprecision = "single"\n[study]'),
-            ["solver", "precision", "fire"],
+            ("[study]", '[solver]\nkind = "fire"\ntime_step = 2.0\n[study]'),
+            ["solver.time_step", "less than 2", "got 2.0", ":3"],
+        ),
+        (
+            ("[study]", "[solver]\ntime_step = 1.0\n[study]"),
+            ["unknown key 'time_step'", "known: kind, tolerance", "kind fire has it"],
+        ),
+        (
+            ("[study]", '[solver]\nkind = "frie"\n[study]'),
+            ["solver.kind", "'frie'", "did you mean 'fire'", "polonsky-keer"],
         ),
         (("[study]", "surface = 3\n[study]"), ["TOML syntax"]),
         (("[study]", "x" + ".x" * 5000 + " = 1\n[study]"), ["5000 dots in a line"]),
@@ -171,7 +228,7 @@ def test_a_bad_override_is_named(read, override, words):
 
 def test_all_that_is_wrong_is_said_at_once(read):
     with pytest.raises(InputError) as error:
-        read(("points = 64", "points = 65"), ("n = 1", "n = 5"), ("cutoff", "cutof"))
+        read(("points = 64", "points = 6"), ("n = 1", "n = 5"), ("cutoff", "cutof"))
     assert len(str(error.value).splitlines()) == 3
 
 
@@ -205,15 +262,21 @@ def test_differences_name_the_keys_that_changed():
     ]
 
 
-@pytest.mark.parametrize("path", CONFIGS, ids=lambda p: p.stem)
-def test_every_config_is_valid_under_the_schema_and_the_models(path):
+@pytest.fixture(scope="module")
+def validator():
+    """Checks data by the schema, which is checked to be one."""
     schema = json.loads(json.dumps(spec_schema()))
     jsonschema.Draft202012Validator.check_schema(schema)
-    jsonschema.validate(tomllib.loads(path.read_text()), schema)
+    return jsonschema.Draft202012Validator(schema)
+
+
+@pytest.mark.parametrize("path", CONFIGS, ids=lambda p: p.stem)
+def test_every_config_is_valid_under_the_schema_and_the_models(validator, path):
+    validator.validate(tomllib.loads(path.read_text()))
     assert plan(read_spec(path)[0])
 
 
-@pytest.mark.parametrize("change", [("n = 1", 'n = "1"'), ("points = 64", "points = 65")])
+@pytest.mark.parametrize("change", [("n = 1", 'n = "1"'), ("points = 64", "points = 6")])
 def test_the_schema_refuses_what_the_models_refuse(change):
     data = tomllib.loads(BASE.replace(*change))
     with pytest.raises(jsonschema.ValidationError):
@@ -243,3 +306,67 @@ def test_other_combinations_of_the_same_values_are_another_sweep():
     few = [{"hurst": 0.3, "seed": 0}, {"hurst": 0.8, "seed": 1}]
     every = [{"hurst": h, "seed": s} for h in (0.3, 0.8) for s in (0, 1)]
     assert differences({"surface": few}, {"surface": every})
+
+
+def test_a_table_without_a_kind_is_of_the_kind_that_chooses(read):
+    (solver,) = read(("[study]", "[solver]\ntolerance = 1e-3\n[study]")).solver
+    assert (solver.kind, solver.tolerance) == ("auto", 1e-3)
+
+
+def test_a_parameter_of_one_solver_is_a_key_that_can_be_swept(read):
+    solvers = read(("[study]", '[solver]\nkind = "fire"\ntime_step = [0.5, 1.0]\n[study]')).solver
+    assert [solver.time_step for solver in solvers] == [0.5, 1.0]
+
+
+@pytest.mark.parametrize(
+    ("change", "place", "words"),
+    [
+        (("cutoff = 0.05", "cutof = 0.05"), ["surface", "cutof"], "unknown key"),
+        (("[study]", "[studdy]"), ["studdy"], "unknown key"),
+        (("[study]", "[output]\npatch = true\n[study]"), ["output", "patch"], "unknown key"),
+        (("cutoff = 0.05", "hurst = 1.5"), ["surface", "hurst"], "1.5"),
+        (("n = 1", 'n = "1"'), ["elastomer", "n"], "'1'"),
+        (('"power"', '"powr"'), ["elastomer", "kind"], "'powr' is not one of"),
+        (('kind = "power"\n', ""), ["elastomer"], "'kind' is a required property"),
+        (("points = 64", "points = 65.5"), ["grid", "points"], "65.5"),
+        (
+            ("[study]", '[solver]\nkind = "fire"\ntime_step = 3\n[study]'),
+            ["solver", "time_step"],
+            "3",
+        ),
+        (("[study]", "[solver]\ntolerance = 2\n[study]"), ["solver", "tolerance"], "2"),
+    ],
+)  # fmt: skip
+def test_the_schema_names_the_key_that_is_wrong(validator, change, place, words):
+    error = jsonschema.exceptions.best_match(
+        validator.iter_errors(tomllib.loads(BASE.replace(*change)))
+    )
+    assert list(error.absolute_path) == place
+    assert words in error.message
+
+
+def test_the_schema_names_the_table_of_several_that_is_wrong(validator):
+    data = tomllib.loads(BASE) | {"elastomer": [{"kind": "half-space"}, {"kind": "power", "n": 5}]}
+    (error,) = validator.iter_errors(data)
+    assert list(error.absolute_path) == ["elastomer", 1, "n"]
+
+
+@pytest.mark.parametrize(
+    ("solver", "valid"),
+    [
+        ({"tolerance": 1e-3}, True),
+        ({"kind": "fire", "time_step": [0.5, 1.0]}, True),
+        ({"kind": ["pcg", "fire"], "tolerance": [1e-3, 1e-4]}, True),
+        ([{"kind": "pcg"}, {"kind": "fire", "time_step": 1.0}], True),
+        ({"time_step": 1.0}, False),
+        ({"kind": "fire", "time_step": 2.0}, False),
+        ({"kind": ["pcg", "fire"], "time_step": 1.0}, False),
+        ({"kind": "frie"}, False),
+        ({"kind": []}, False),
+    ],
+)
+def test_the_schema_accepts_the_same_solvers_as_the_models(solver, valid):
+    data = tomllib.loads(BASE) | {"solver": solver}
+    assert jsonschema.Draft202012Validator(spec_schema()).is_valid(data) == valid
+    with nullcontext() if valid else pytest.raises(InputError):
+        read_tables(data)

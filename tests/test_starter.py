@@ -1,29 +1,25 @@
+import json
 import re
+import tomllib
 
+import h5py
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
-from gfmd_cli.cli import main
-from gfmd_cli.study.parse import read_spec
+from gfmd_cli.spec.parse import read_spec
 from gfmd_cli.study.reading import read_rows
+from gfmd_cli.study.tasks import plan
 
 SCAN = "configs/data/di-3.di"
 
 
 @pytest.fixture
-def gfmd(tmp_path, monkeypatch, pytestconfig):
+def gfmd(tmp_path, monkeypatch, pytestconfig, output_of):
     """Runs a command in an empty folder that has the scan."""
     scan = (pytestconfig.rootpath / SCAN).read_bytes()
     monkeypatch.chdir(tmp_path)
     (tmp_path / "scan.di").write_bytes(scan)
-
-    def call(*words, status=0):
-        done = CliRunner().invoke(main, [str(word) for word in words])
-        assert done.exit_code == status, done.output
-        return done.output
-
-    return call
+    return output_of
 
 
 def holed(path, shape=(20, 16)):
@@ -44,15 +40,48 @@ def test_what_init_writes_runs(gfmd, tmp_path, words):
     assert all(row["status"] == "converged" for row in read_rows(tmp_path / "first.h5"))
 
 
-def test_a_scan_with_holes_is_said_to_be_filled_and_cropped(gfmd, tmp_path):
-    holed(tmp_path / "holed.npy")
-    gfmd("init", "first.toml", "--from", "holed.npy")
-    (surface,) = read_spec(tmp_path / "first.toml")[0].surface
-    assert surface.crop
-    assert surface.missing == "fill"
-    assert "20 x 16 points, cropped to 16 x 16, 2 missing heights filled in" in (
-        surface.preparation()
+def test_an_oblong_scan_with_holes_is_solved_as_it_is(gfmd, tmp_path):
+    holed(tmp_path / "holed.npy", (21, 16))
+    told = gfmd("init", "first.toml", "--from", "holed.npy", "--set", "surface.periodic=false")
+    done = "21 x 16 points, 2 missing heights filled in, plane subtracted, free boundary"
+    assert done in told
+    gfmd("run", "first.toml", "--set", "load.p_star=0.1")
+    (row,) = read_rows(tmp_path / "first.h5")
+    assert (row["points"], row["points_y"], row["boundary"]) == (16, 21, "free")
+    assert (row["length"], row["length_y"]) == pytest.approx((1.0, 21 / 16))
+    assert done in row["preparation"]
+
+
+@pytest.mark.parametrize(
+    ("overrides", "boundary", "edges", "points"),
+    [
+        ((), "free", "none", 16),
+        (("elastomer={kind='plate', E_star=1, thickness=1}",), "periodic", "mirror", 32),
+        (("elastomer={kind='power', n=[1, 3]}",), None, None, None),
+        (("grid.boundary=periodic",), "periodic", "mirror", 32),
+        (("surface.edges=window",), "periodic", "window", 16),
+        (("surface.periodic=true",), "periodic", "none", 16),
+        (("solver.kind=fire",), "periodic", "mirror", 32),
+        (("output.stiffness=true",), "periodic", "mirror", 32),
+        (("accuracy.mean_gap=0.5",), "periodic", "mirror", 32),
+    ],
+)
+def test_a_scan_is_free_where_that_is_available_and_else_mirrored(
+    tmp_path, overrides, boundary, edges, points
+):
+    holed(tmp_path / "h.npy", (16, 16))
+    path = tmp_path / "spec.toml"
+    path.write_text(
+        '[surface]\nkind = "file"\npath = "h.npy"\nperiodic = false\n[elastomer]\n'
+        'kind = "half-space"\nE_star = 1\n[grid]\npoints = 16\n[load]\npressure = 0.1\n'
     )
+    tasks = plan(read_spec(path, overrides)[0])
+    found = [(task.boundary, task.surface.treatment()[1], task.points) for task in tasks]
+    if boundary is None:  # n = 1 and n = 3
+        assert found == [("free", "none", 16), ("periodic", "mirror", 32)]
+        assert len({task.id for task in tasks}) == 2
+    else:
+        assert found == [(boundary, edges, points)]
 
 
 @pytest.mark.parametrize("words", [(), ("--from", "scan.di")])
@@ -71,6 +100,42 @@ def test_each_key_that_is_commented_out_is_valid(gfmd, tmp_path, words):
     assert keys >= 5
 
 
+MATRIX = """\
+# Channel: Height
+# Width: 12 µm
+# Height: 16 µm
+# Value units: nm
+1 1.5 3
+-2 -3 -6
+0 0 0
+9 9 92
+"""
+
+
+def test_a_map_of_few_points_is_interpolated(gfmd, tmp_path):
+    """Three columns with a header, as Gwyddion writes them, are a matrix."""
+    pytest.importorskip("SurfaceTopography")
+    (tmp_path / "small.txt").write_text(MATRIX, encoding="utf-8")
+    gfmd("init", "first.toml", "--from", "small.txt")
+    assert "interpolated: 8 are needed" in (tmp_path / "first.toml").read_text()
+    gfmd("run", "first.toml", "--set", "load.p_star=0.1")
+    (row,) = read_rows(tmp_path / "first.h5")
+    assert (row["points"], row["points_y"], row["boundary"]) == (9, 12, "free")
+    assert (row["length"], row["length_y"]) == pytest.approx((12e-6, 16e-6))
+    assert row["status"] == "converged"
+
+
+def test_the_first_map_of_several_is_taken_and_named(gfmd, tmp_path):
+    first, second = np.random.default_rng(0).normal(size=(2, 16, 16))
+    with h5py.File(tmp_path / "two.h5", "w") as file:
+        file["first"], file["second"] = first, second
+    assert "HDF5, first" in gfmd("init", "spec.toml", "--from", "two.h5")
+    (surface,) = read_spec(tmp_path / "spec.toml")[0].surface
+    assert surface.dataset == "first"
+    assert "HDF5, first" in gfmd("surface", "two.h5")
+    assert "HDF5, second" in gfmd("surface", "two.h5", "--set", "surface.dataset=second")
+
+
 def test_init_replaces_nothing(gfmd, tmp_path):
     (tmp_path / "study.toml").write_text("mine")
     assert "exists already" in gfmd("init", status=2)
@@ -79,14 +144,14 @@ def test_init_replaces_nothing(gfmd, tmp_path):
 
 def test_a_scan_that_will_not_do_is_refused_as_it_is(gfmd, tmp_path):
     np.save(tmp_path / "h.npy", np.full((16, 16), np.nan))
-    assert "at most 20% can be filled in" in gfmd("init", "a.toml", "--from", "h.npy", status=2)
+    assert "all of the 256 heights" in gfmd("init", "a.toml", "--from", "h.npy", status=2)
     assert not (tmp_path / "a.toml").exists()
 
 
 def test_the_fit_that_surface_prints_can_be_run(gfmd, tmp_path):
     """A random surface from it has the rms height and gradient of the scan."""
     pytest.importorskip("SurfaceTopography")
-    told = gfmd("surface", "scan.di")
+    told = gfmd("surface", "scan.di", "--set", "surface.edges=window")
     table = told[told.index("  [surface]") :].replace("\n  ", "\n").strip()
     (tmp_path / "fit.toml").write_text(
         f'{table}\n[elastomer]\nkind = "half-space"\n[grid]\npoints = 512\n[load]\np_star = 1\n'
@@ -98,12 +163,31 @@ def test_the_fit_that_surface_prints_can_be_run(gfmd, tmp_path):
     np.testing.assert_allclose(found, seen, rtol=0.02)
 
 
-def test_surface_refuses_a_line(gfmd, tmp_path):
+def test_surface_summarises_a_line(gfmd, tmp_path):
+    """A cosine wave of amplitude 1: Pq = 1 / sqrt(2), Pt = 2, Pku = 3 / 2."""
     (tmp_path / "wave.toml").write_text(
         '[surface]\nkind = "wave"\n[elastomer]\nkind = "half-space"\n'
         "[grid]\npoints = 64\n[load]\np_star = 1\n"
     )
-    assert "is a line" in gfmd("surface", "wave.toml", status=2)
+    (record,) = json.loads(gfmd("surface", "wave.toml", "--json"))
+    assert (record["Pq"], record["Pt"], record["Pku"]) == pytest.approx((0.5**0.5, 2, 1.5))
+    assert "Pq 0.70711 m" in gfmd("surface", "wave.toml")
+
+
+def test_several_surfaces_give_one_table_and_one_figure(gfmd, tmp_path):
+    pytest.importorskip("matplotlib")
+    holed(tmp_path / "holed.npy", (16, 16))
+    np.save(tmp_path / "line.npy", np.random.default_rng(1).normal(size=64))
+    told = gfmd("surface", "holed.npy", "line.npy", "--figure", "both.svg")
+    header, first, second = [line.split() for line in told.splitlines()][:3]
+    records = json.loads(gfmd("surface", "holed.npy", "line.npy", "--json"))
+    assert float(first[1]) == pytest.approx(records[0]["Sq"], rel=1e-3)
+    assert second[1:9] == ["-"] * 8
+    assert {"Sq", "Pq"} <= set(header)
+    assert (tmp_path / "both.svg").read_text().count("clipPath") > 3
+    assert "allowed: .png, .pdf, .svg" in gfmd(
+        "surface", "holed.npy", "--figure", "a.jpg", status=2
+    )
 
 
 def test_a_scan_in_nanometres_that_does_not_repeat_is_remarked_on_and_mended(gfmd, tmp_path):
@@ -111,7 +195,8 @@ def test_a_scan_in_nanometres_that_does_not_repeat_is_remarked_on_and_mended(gfm
     rough = np.random.default_rng(0).normal(size=(32, 32)) * 2
     np.save(tmp_path / "nm.npy", rough + np.linspace(0, 300, 32))
     told = gfmd("surface", "nm.npy")
-    for remark in ("names no side", "are heights and side in metres", "step across the border"):
+    remarks = ("does not state its side", "heights and side are in metres", "across the border")
+    for remark in remarks:
         assert remark in told
     mended = [f"surface.{key}" for key in ("scale=1e-9", "length=1e-6", "periodic=false")]
     words = [word for key in mended for word in ("--set", key)]
@@ -142,4 +227,15 @@ def test_an_exponent_that_is_no_roughness_is_said_to_be_changed(gfmd, tmp_path):
     height = sum(np.cos(m * x) * np.cos(m * y) * m**-4.0 for m in range(1, 20))
     height += 1e-9 * np.random.default_rng(0).normal(size=height.shape)
     np.save(tmp_path / "h.npy", height)
-    assert "is no roughness" in gfmd("surface", "h.npy")
+    assert "The Hurst exponent is outside 0.01 to 1" in gfmd("surface", "h.npy")
+
+
+def test_the_name_of_a_scan_adds_no_line_to_the_spec(gfmd, tmp_path):
+    name = 'a\n[solver]\nkind = "fire"\n.npy'
+    y, x = np.mgrid[:16, :16] * (2 * np.pi / 16)
+    np.save(tmp_path / "h.npy", np.cos(x) * np.cos(y))
+    (tmp_path / "h.npy").rename(tmp_path / name)
+    gfmd("init", "spec.toml", "--from", name)
+    spec = tomllib.loads((tmp_path / "spec.toml").read_text(encoding="utf-8"))
+    assert "solver" not in spec
+    assert spec["surface"]["path"] == name

@@ -1,13 +1,16 @@
 import json
+import signal
 import time
 from pathlib import Path
 from threading import Thread
 
 import pytest
 
-from gfmd_cli.study import solve
-from gfmd_cli.study.files import locked
-from gfmd_cli.study.parse import read_spec
+from gfmd_cli.errors import Interrupted
+from gfmd_cli.files.locks import locked
+from gfmd_cli.spec.parse import read_spec
+from gfmd_cli.status import Status
+from gfmd_cli.study.columns import empty_row
 from gfmd_cli.study.run import run_study
 from gfmd_cli.study.store import Study
 from gfmd_cli.study.tasks import plan
@@ -45,9 +48,9 @@ def uncollected(spec="spec.toml", shard=(0, 2), stop_at=None):
 
     def report(progress):
         if stop_at is None or (progress.task == stop_at and progress.event == "step"):
-            solve.stop.set()
+            signal.raise_signal(signal.SIGTERM)
 
-    with pytest.raises(solve.Interrupted):
+    with pytest.raises(Interrupted):
         run_study(resolved, text, Path("small.h5"), report, shard=shard, jobs=1)
 
 
@@ -142,10 +145,10 @@ def test_status_neither_waits_for_a_collector_nor_stops_it(gfmd):
     [
         (("none.toml",), 2, "cannot be read"),
         (("none.h5",), 2, "no such study"),
-        (("bad.h5",), 74, "no readable HDF5"),
+        (("bad.h5",), 74, "no readable study"),
         (("small.h5", "--set", "grid.points=32"), 2, "go with a spec"),
         (("spec.toml", "--shards", "5"), 2, "take 1 to 4"),
-        (("spec.toml", "--set", "grid.points=32"), 2, "another spec"),
+        (("spec.toml", "--set", "grid.points=33"), 2, "use 40 or more"),
     ],
 )
 def test_bad_usage_is_one_message(gfmd, words, status, message):
@@ -190,4 +193,9 @@ def test_a_record_that_is_collected_meanwhile_is_not_missed(gfmd, monkeypatch):
     listed = study.record_paths()
     study.collect(spec, plan(spec), text)
     monkeypatch.setattr(study, "record_paths", lambda: listed)  # as seen before
-    assert study.held() == {plan(spec)[0].id: "converged"}
+    assert study.held() == {plan(spec)[0].id: ("converged", spec.output.names())}
+
+
+@pytest.mark.parametrize("status", Status)
+def test_every_status_is_explained_by_the_columns_of_a_row(status):
+    assert status.explain(empty_row())

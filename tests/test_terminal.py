@@ -7,21 +7,13 @@ import sys
 import termios
 
 import pytest
+from specs import power_spec
 
 from gfmd_cli.study.reading import read_rows
 
-SPEC = """\
-[surface]
-kind = "self-affine"
-cutoff = 0.05
-[elastomer]
-kind = "power"
-n = [0, 1, 3]
-[grid]
-points = 64
-[load]
-p_star = { from = 0.01, to = 1, per_decade = 4 }
-"""
+SPEC = power_spec(
+    n=[0, 1, 3], points=64, p_star="{ from = 0.01, to = 1, per_decade = 4 }", cutoff=0.05
+)
 
 
 def on_a_terminal(folder, *words):
@@ -29,7 +21,7 @@ def on_a_terminal(folder, *words):
     ours, theirs = pty.openpty()
     fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 100, 0, 0))
     process = subprocess.Popen(
-        [sys.executable, "-m", "gfmd_cli", *words], cwd=folder, stdout=theirs, stderr=theirs
+        [sys.executable, "-P", "-m", "gfmd_cli", *words], cwd=folder, stdout=theirs, stderr=theirs
     )
     os.close(theirs)
     shown = b""

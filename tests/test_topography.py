@@ -1,3 +1,5 @@
+"""Height maps read from files, and what is refused before it is read."""
+
 import subprocess
 import sys
 from pathlib import Path
@@ -7,9 +9,9 @@ import numpy as np
 import pytest
 
 from gfmd_cli.errors import InputError
-from gfmd_cli.physics.preparation import fill_missing, level, make_periodic
-from gfmd_cli.physics.surface import FileSurface
-from gfmd_cli.physics.topography import read_topography
+from gfmd_cli.physics.file_surface import FileSurface
+from gfmd_cli.physics.map_preparation import level
+from gfmd_cli.physics.topography import Region, read_topography
 
 SCAN = Path(__file__).parents[1] / "configs" / "data" / "di-3.di"
 
@@ -44,21 +46,13 @@ def hdf5(tmp_path):
     return write
 
 
-def border_jump(heights):
-    return max(abs(heights[0] - heights[-1]).max(), abs(heights[:, 0] - heights[:, -1]).max())
-
-
-def inner_step(heights):
-    return max(abs(np.diff(heights, axis=axis)).max() for axis in (0, 1))
-
-
 # reading arrays
 
 
 def test_a_saved_array_is_read_back_unchanged(npy, heights):
     read = read_topography(npy())
     np.testing.assert_array_equal(read.heights, heights)
-    assert (read.length, read.periodic, read.source) == (None, None, "npy, float64")
+    assert (read.spacing, read.periodic, read.source) == (None, None, "npy, float64")
 
 
 @pytest.mark.parametrize("dtype", ["int16", "uint8", "float32", ">f8"])
@@ -74,7 +68,7 @@ def test_every_real_type_becomes_double_precision(npy, heights, dtype):
 def test_the_only_map_of_an_hdf5_file_needs_no_name(hdf5, heights):
     read = read_topography(hdf5(x=np.arange(16.0), h=heights.astype("f4")))
     np.testing.assert_array_equal(read.heights, heights.astype("f4"))
-    assert (read.length, read.periodic, read.source) == (None, None, "HDF5, h, float32")
+    assert (read.spacing, read.periodic, read.source) == (None, None, "HDF5, h, float32")
 
 
 def test_a_dataset_is_read_by_its_name(hdf5, heights):
@@ -95,19 +89,18 @@ def test_hdf5_is_known_by_its_content(hdf5, heights):
 @pytest.mark.parametrize(
     ("array", "told"),
     [
-        (np.zeros((4, 16, 16)), "two dimensions"),
-        (np.zeros(16), "two dimensions"),
-        (np.zeros((16, 18)), "16 x 18 points"),
-        (np.zeros((17, 17)), "17 x 17 points"),
-        (np.zeros((6, 6)), "at least 8"),
+        (np.zeros((4, 16, 16)), "two dimensions, a line profile one"),
+        (np.zeros(()), "two dimensions, a line profile one"),
+        (np.zeros((16, 1)), "at least 2 along each axis"),
         (np.zeros((0, 0)), "0 x 0 points"),
+        (np.zeros(1), "1 points; at least 2"),
         (np.zeros((16, 16), complex), "complex128"),
         (np.zeros((16, 16), bool), "bool"),
         (np.full((16, 16), "1.0"), "<U3"),
         (np.zeros((16, 16), [("h", "f8")]), "real numbers"),
     ],
 )
-def test_what_is_no_square_map_of_real_numbers_is_refused(npy, array, told):
+def test_what_is_no_map_of_real_numbers_is_refused(npy, array, told):
     with pytest.raises(InputError, match=f"h.npy: .*{told}"):
         read_topography(npy(array))
 
@@ -125,8 +118,10 @@ def test_pickled_objects_are_refused_unread(npy):
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, 9.97e36])
 def test_missing_heights_are_counted_and_located(npy, heights, value):
     heights[3, 5] = heights[9, 0] = value
-    with pytest.raises(InputError, match=r"2 of 256 heights .* row 3, column 5"):
-        read_topography(npy(heights))
+    read = read_topography(npy(heights))
+    assert list(zip(*np.nonzero(read.missing), strict=True)) == [(3, 5), (9, 0)]
+    with pytest.raises(InputError, match=r"2 of 256 heights .* first at x = 5, y = 3; .*fill"):
+        FileSurface(path=npy(heights), missing="refuse").smallest_grid()
 
 
 def test_heights_marked_as_missing_in_hdf5_are_located(hdf5):
@@ -135,8 +130,9 @@ def test_heights_marked_as_missing_in_hdf5_are_located(hdf5):
     def mark(file):
         file["h"].attrs["_FillValue"] = np.array([18])
 
-    with pytest.raises(InputError, match=r"1 of 256 heights .* row 1, column 2"):
-        read_topography(hdf5(mark, h=stored))
+    read = read_topography(hdf5(mark, h=stored))
+    assert list(zip(*np.nonzero(read.missing), strict=True)) == [(1, 2)]
+    np.testing.assert_array_equal(read.masked().mask, stored == 18)
 
 
 def test_packed_netcdf_heights_are_refused(hdf5, heights):
@@ -191,7 +187,7 @@ def test_an_array_file_takes_no_dataset_name(npy):
 
 def test_two_maps_and_an_unknown_name_list_the_candidates(hdf5, heights):
     path = hdf5(a=heights, b=heights, x=np.arange(16.0))
-    for dataset, told in ((None, "name one dataset"), ("c", "no dataset 'c'")):
+    for dataset, told in ((None, "several datasets"), ("c", "no dataset 'c'")):
         with pytest.raises(InputError, match=f"{told}.*: a, b$"):
             read_topography(path, dataset)
 
@@ -236,9 +232,9 @@ def test_a_microscope_scan_is_read_in_metres():
     pytest.importorskip("SurfaceTopography")
     scan = read_topography(SCAN)
     assert scan.heights.shape == (256, 256)
-    assert scan.length == pytest.approx(10e-6)
+    assert scan.spacing == pytest.approx((10e-6 / 256,) * 2)
     assert scan.periodic is False
-    assert scan.source == "di, ZSensor"
+    assert (scan.source, scan.others) == ("di, ZSensor", ("Height",))
     assert level(scan.heights, "mean").std() == pytest.approx(226.4e-9, rel=1e-3)
     assert level(scan.heights, "plane").std() == pytest.approx(35.22e-9, rel=1e-3)
 
@@ -282,7 +278,7 @@ def test_a_text_map_is_read_in_metres(tmp_path):
     expected = np.add.outer(10 * np.arange(8), np.arange(8))
     expected[0, 0] = 1
     np.testing.assert_allclose(read.heights, 1e-9 * expected, rtol=1e-12)
-    assert read.length == pytest.approx(2e-6)
+    assert read.spacing == pytest.approx((2e-6 / 8,) * 2)
 
 
 def test_a_map_without_size_and_unit_has_no_length(tmp_path):
@@ -291,21 +287,19 @@ def test_a_map_without_size_and_unit_has_no_length(tmp_path):
     np.savetxt(path, np.arange(64.0).reshape(8, 8))
     read = read_topography(path)
     np.testing.assert_array_equal(read.heights, np.arange(64.0).reshape(8, 8))
-    assert read.length is None
+    assert read.spacing is None
 
 
-def test_a_scan_of_an_oblong_area_is_refused(tmp_path):
+def test_a_point_of_a_scan_may_have_two_sides(tmp_path):
     pytest.importorskip("SurfaceTopography")
-    path = write_text_map(tmp_path / "h.txt", height="2.5 um")
-    with pytest.raises(InputError, match=r"3.125e-07 x 2.5e-07 wide .relative difference 2.0e-01"):
-        read_topography(path)
+    read = read_topography(write_text_map(tmp_path / "h.txt", height="2.5 um"))
+    assert read.spacing == pytest.approx((3.125e-7, 2.5e-7))
 
 
 def test_missing_points_of_a_scan_are_located(tmp_path):
     pytest.importorskip("SurfaceTopography")
-    path = write_text_map(tmp_path / "h.txt", first="nan")
-    with pytest.raises(InputError, match=r"1 of 64 heights .* row 0, column 0"):
-        read_topography(path)
+    read = read_topography(write_text_map(tmp_path / "h.txt", first="nan"))
+    assert np.argwhere(read.missing).tolist() == [[0, 0]]
 
 
 @pytest.mark.parametrize("content", [b"no heights here\n", bytes(2 * 8 * 8), b"\x00\xff" * 999])
@@ -336,10 +330,18 @@ def test_a_truncated_scan_is_refused(tmp_path):
         read_topography(tmp_path / "h.di")
 
 
+def test_the_reason_of_a_reader_that_fails_is_told(tmp_path):
+    """A .top file by its name, whose header says nothing."""
+    pytest.importorskip("SurfaceTopography")
+    (tmp_path / "h.x3p").write_bytes(b"PK\x03\x04" + bytes(400))
+    with pytest.raises(InputError, match=r"recognises the format .*x3p: .*damaged, or a variant"):
+        read_topography(tmp_path / "h.x3p")
+
+
 def test_without_surfacetopography_the_message_names_the_extra(monkeypatch):
     monkeypatch.setitem(sys.modules, "SurfaceTopography", None)
     monkeypatch.delitem(sys.modules, "SurfaceTopography.IO", raising=False)
-    with pytest.raises(InputError, match=r"pip install gfmd-cli\[topography\]"):
+    with pytest.raises(InputError, match=r'pip install "\.\[topography\]"'):
         read_topography(SCAN)
 
 
@@ -353,127 +355,98 @@ def test_arrays_are_read_without_loading_surfacetopography(npy):
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
-# levelling and edges
+# regions, holes and lines
 
 
-@pytest.mark.parametrize(("degree", "removed"), [("mean", 1), ("plane", 3), ("curvature", 6)])
-def test_levelling_removes_its_polynomial_to_rounding(degree, removed):
-    y, x = np.mgrid[:32, :32] / 32
-    terms = [np.ones_like(x), x, y, x * x, x * y, y * y, x**3]
-    trend = sum(c * t for c, t in zip((5, -2, 1, 3, -1, 2), terms[:removed], strict=False))
-    assert abs(level(trend, degree)).max() < 1e-13
-    assert level(terms[removed], degree).std() > 1e-3
-
-
-def test_levelling_is_least_squares(heights):
-    y, x = np.mgrid[:16, :16]
-    design = np.stack([np.ones(256), x.ravel(), y.ravel()], axis=1)
-    fit, *_ = np.linalg.lstsq(design, heights.ravel(), rcond=None)
-    np.testing.assert_allclose(
-        level(heights, "plane"), heights - (design @ fit).reshape(16, 16), atol=1e-13
-    )
-
-
-def test_levelling_keeps_its_input(heights):
-    before = heights.copy()
-    level(heights, "curvature")
-    np.testing.assert_array_equal(heights, before)
-    np.testing.assert_array_equal(level(heights, "none"), before)
-
-
-def test_the_window_takes_the_border_to_the_mean():
-    y, x = np.mgrid[:64, :64] / 64
-    slope = 3 + x + 2 * y
-    windowed = make_periodic(slope, "window")
-    np.testing.assert_allclose(windowed[0], slope.mean())
-    np.testing.assert_allclose(windowed[:, 0], slope.mean())
-    assert border_jump(slope) > 10 * inner_step(slope)
-    assert border_jump(windowed) <= inner_step(windowed)
-
-
-def test_the_window_keeps_the_inner_heights_and_lowers_h_std(heights):
-    windowed = make_periodic(heights, "window", taper=0.25)
-    np.testing.assert_allclose(windowed[4:13, 4:13], heights[4:13, 4:13], atol=1e-14)
-    assert windowed.std() < heights.std()
-
-
-@pytest.mark.parametrize("taper", [0.0, 0.6, np.nan])
-def test_a_taper_outside_its_range_is_refused(heights, taper):
-    with pytest.raises(ValueError, match="taper"):
-        make_periodic(heights, "window", taper)
-
-
-def test_the_mirror_keeps_every_height_four_times(heights):
-    mirrored = make_periodic(heights, "mirror")
-    assert mirrored.shape == (32, 32)
-    np.testing.assert_array_equal(mirrored[:16, :16], heights)
-    np.testing.assert_array_equal(
-        np.sort(mirrored, axis=None), np.repeat(np.sort(heights, None), 4)
-    )
-    np.testing.assert_array_equal(mirrored, mirrored[::-1, ::-1])
-    assert border_jump(mirrored) == 0
-
-
-def test_no_edge_treatment_leaves_the_heights(heights):
-    assert make_periodic(heights, "none") is heights
-
-
-# maps that are not square, or have holes
-
-
-def test_the_middle_of_an_oblong_map_is_taken_as_asked(npy):
+@pytest.mark.parametrize(
+    ("region", "rows", "columns"),
+    [
+        ({"x": [2, 10], "y": [1, 9]}, slice(1, 9), slice(2, 10)),
+        ({"x": [2, 10]}, slice(None), slice(2, 10)),
+        ({"y": [0, 2]}, slice(0, 2), slice(None)),
+        ({}, slice(None), slice(None)),
+    ],
+)
+def test_a_region_is_cut_out_of_the_map(npy, region, rows, columns):
     heights = np.arange(9.0 * 13).reshape(9, 13)
-    with pytest.raises(InputError, match=r"9 x 13 points.*surface.crop = true takes 8 x 8"):
-        read_topography(npy(heights))
-    read = read_topography(npy(heights), crop=True)
-    np.testing.assert_array_equal(read.heights, heights[:8, 2:10])
+    read = read_topography(npy(heights), region=Region.model_validate(region))
+    np.testing.assert_array_equal(read.heights, heights[rows, columns])
     assert read.shape == (9, 13)
 
 
-def test_a_cropped_scan_keeps_the_size_of_its_points(tmp_path):
+def test_a_region_in_metres_uses_the_spacing_of_each_axis(tmp_path):
     pytest.importorskip("SurfaceTopography")
-    (tmp_path / "h.txt").write_text(
-        "# Width: 3 um\n# Height: 2 um\n# Value units: nm\n"
-        + "\n".join(" ".join(str(i * j % 7) for j in range(12)) for i in range(8))
-    )
-    read = read_topography(tmp_path / "h.txt", crop=True)
-    assert read.heights.shape == (8, 8)
-    assert read.length == pytest.approx(2e-6)
+    path = write_text_map(tmp_path / "h.txt", height="4 um")  # points 0.5 um along y, 0.25 along x
+    region = Region.model_validate({"x": [0.5e-6, 2e-6], "y": [1e-6, 4e-6], "unit": "m"})
+    read = read_topography(path, region=region)
+    np.testing.assert_array_equal(read.heights, read_topography(path).heights[2:, 2:])
 
 
-def test_holes_are_refused_with_the_remedy_or_filled(npy, heights):
-    heights[3, 4:7] = np.nan
-    with pytest.raises(InputError, match=r'3 of 256 heights .* surface.missing = "fill"'):
-        read_topography(npy(heights))
-    read = read_topography(npy(heights), fill=True)
-    assert read.filled == 3
-    known = np.isfinite(heights)
-    np.testing.assert_array_equal(read.heights[known], heights[known])
+@pytest.mark.parametrize(
+    ("region", "told"),
+    [
+        ({"x": [0, 14]}, r"the map has x = 0 to 13 pixels, 13 points"),
+        ({"y": [3, 4]}, r"a region has at least 2"),
+        ({"x": [0, 1e-6], "unit": "m"}, "does not state its sides: give the region in pixels"),
+    ],
+)
+def test_a_region_beyond_the_map_is_refused(npy, region, told):
+    path = npy(np.zeros((9, 13)))
+    with pytest.raises(InputError, match=f"h.npy: surface.region: .*{told}"):
+        read_topography(path, region=Region.model_validate(region))
 
 
-def test_too_many_holes_are_not_filled(npy, heights):
-    heights[:8] = np.nan
-    with pytest.raises(InputError, match="at most 20% can be filled in"):
-        read_topography(npy(heights), fill=True)
+def test_a_map_upside_down_has_the_opposite_heights(npy, heights):
+    heights[2, 3] = np.nan
+    upright, turned = read_topography(npy(heights)), read_topography(npy(heights), flip=True)
+    np.testing.assert_array_equal(turned.heights, -upright.heights)
+    np.testing.assert_array_equal(turned.missing, upright.missing)
 
 
-def test_a_hole_in_a_harmonic_surface_is_filled_exactly():
-    """x y and x^2 - y^2 solve the discrete Laplace equation."""
-    y, x = np.mgrid[:20, :20].astype(float)
-    for exact in (x * y, x**2 - y**2, 3 + x - 2 * y):
-        missing = np.zeros(exact.shape, dtype=bool)
-        missing[5:12, 3:15] = missing[16, 16] = True
-        holed = np.where(missing, np.nan, exact)
-        np.testing.assert_allclose(fill_missing(holed, missing), exact, atol=1e-10)
+def test_a_map_without_any_height_is_refused(npy):
+    with pytest.raises(InputError, match="all of the 256 heights"):
+        read_topography(npy(np.full((16, 16), np.nan)))
 
 
-def test_a_filled_hole_lies_between_its_rim(heights):
-    """The maximum principle, at the border of the map, too."""
-    missing = np.random.default_rng(3).random(heights.shape) < 0.15
-    missing[0, 0] = missing[-1, 5:8] = True
-    filled = fill_missing(np.where(missing, np.nan, heights), missing)
-    assert filled.min() == heights[~missing].min()
-    assert filled.max() == heights[~missing].max()
+def test_holes_are_filled_and_do_not_tilt_the_map(npy):
+    """Levelling uses the known heights, so that a plane with holes becomes zero."""
+    y, x = np.mgrid[:16, :16].astype(float)
+    plane = 3 + x - 2 * y
+    plane[:9, :12] = np.nan
+    surface = FileSurface(path=npy(plane), periodic=False, edges="none")
+    np.testing.assert_allclose(surface.heights(16), 0, atol=1e-12)
+
+
+def test_an_oblong_map_is_used_as_it_is_and_its_middle_as_asked(npy):
+    heights = np.arange(9.0 * 13).reshape(9, 13)
+    whole = FileSurface(path=npy(heights), length=2.6)
+    assert whole.sides == pytest.approx((1.8, 2.6))
+    np.testing.assert_array_equal(whole.heights(13), heights)
+    middle = FileSurface(path=npy(heights), crop=True).heights(8)
+    np.testing.assert_array_equal(middle, heights[:8, 2:10])
+
+
+def test_an_array_of_one_dimension_is_a_line_profile(npy):
+    line = np.random.default_rng(2).normal(size=20)
+    surface = FileSurface(path=npy(line), length=2e-6)
+    assert (surface.dimension, surface.smallest_grid(), surface.sides) == (1, 20, (2e-6,))
+    np.testing.assert_array_equal(surface.heights(20), line)
+
+
+def test_the_only_line_of_an_hdf5_file_needs_no_name(hdf5):
+    line = np.arange(16.0)
+    np.testing.assert_array_equal(read_topography(hdf5(h=line)).heights, line)
+
+
+def test_two_columns_are_positions_and_heights(tmp_path):
+    """Positions at unequal distances: heights are interpolated linearly at equal ones."""
+    pytest.importorskip("SurfaceTopography")
+    x = np.array([0.0, 1.0, 1.5, 3.0, 4.0, 6.0, 7.0, 8.0])
+    np.savetxt(tmp_path / "line.txt", np.stack([x, 2 * x + 1], axis=1))
+    read = read_topography(tmp_path / "line.txt")
+    assert read.spacing == pytest.approx((8 / 7,))
+    np.testing.assert_allclose(np.diff(read.heights), 16 / 7, rtol=1e-12)
+    assert "equal distances" in read.source
 
 
 def test_a_side_without_a_unit_is_in_that_of_the_heights(tmp_path):
@@ -482,8 +455,23 @@ def test_a_side_without_a_unit_is_in_that_of_the_heights(tmp_path):
     (tmp_path / "h.xyz").write_text("\n".join(rows))
     read = read_topography(tmp_path / "h.xyz")
     assert not read.metres
-    assert read.length == pytest.approx(16e-8)
+    assert read.spacing == pytest.approx((1e-8, 1e-8))
     plain = FileSurface(path=tmp_path / "h.xyz")
-    assert plain.cell == pytest.approx(16e-8)
-    assert FileSurface(path=tmp_path / "h.xyz", scale=1e-3).cell == pytest.approx(16e-11)
-    assert FileSurface(path=tmp_path / "h.xyz", length=2.0).cell == 2.0
+    assert plain.sides[1] == pytest.approx(16e-8)
+    assert FileSurface(path=tmp_path / "h.xyz", scale=1e-3).sides[1] == pytest.approx(16e-11)
+    assert FileSurface(path=tmp_path / "h.xyz", length=2.0).sides == (2.0, 2.0)
+
+
+@pytest.mark.parametrize(("depth", "width"), [(2000, 0), (0, 11000)])
+def test_the_search_for_a_map_in_many_groups_is_bounded(tmp_path, depth, width):
+    path = tmp_path / "groups.h5"
+    with h5py.File(path, "w") as file:
+        file["map"] = np.cos(np.arange(256.0).reshape(16, 16))
+        group = file
+        for _ in range(depth):
+            group = group.create_group("g")
+        for i in range(width):
+            file.create_group(f"g{i}")
+    with pytest.raises(InputError, match=r"choose one by surface\.dataset"):
+        read_topography(path)
+    assert read_topography(path, "map").heights.shape == (16, 16)

@@ -5,15 +5,14 @@ from itertools import product
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
+from specs import power_spec
 
-from gfmd_cli.cli import main
-from gfmd_cli.physics.bodies import LineParabola, Parabola
+from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.physics.contact import Contact, build_scene
-from gfmd_cli.physics.elastomer import Power
-from gfmd_cli.physics.grid import Grid
-from gfmd_cli.physics.reference import kappa
-from gfmd_cli.physics.surface import SelfAffine
+from gfmd_cli.physics.elastomers import Power
+from gfmd_cli.physics.exact_solutions import kappa
+from gfmd_cli.physics.indenters import LineParabola, Parabola
+from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.physics.true_contact import Bearing, bearing, contact_area, contact_stress
 
 POINTS, R = 128, 1.0
@@ -137,59 +136,55 @@ def test_where_the_load_falls_with_the_area_the_least_area_counts():
     assert float(falls.delta_sigma_c(p)) == pytest.approx(1.0)
 
 
-SPEC = """
-[surface]
-kind = "self-affine"
-cutoff = 0.1
-[elastomer]
-kind = "power"
-n = [0, 1]
-[grid]
-points = 32
-[load]
-p_star = [0.1, 1.0]
+SPEC = power_spec(
+    n=[0, 1],
+    points=32,
+    p_star=[0.1, 1.0],
+    more="""\
 [output]
 histogram = false
-"""
+""",
+)
 
 
-def records(tmp_path, *overrides):
-    spec, study = tmp_path / "spec.toml", tmp_path / "s.h5"
-    spec.write_text(SPEC)
-    options = [word for override in overrides for word in ("--set", override)]
-    run = CliRunner().invoke(main, ["run", str(spec), "-o", str(study), "-q", "-j", "1", *options])
-    assert run.exit_code == 0, run.output
-    told = CliRunner().invoke(main, ["analyze", str(study), "--json"])
-    words = CliRunner().invoke(main, ["analyze", str(study)])
-    assert told.exit_code == words.exit_code == 0
-    return json.loads(told.output), words.output
+@pytest.fixture
+def records(output_of, tmp_path):
+    """Records and text that `analyze` prints of SPEC with overrides."""
+
+    def records(*overrides):
+        spec, study = tmp_path / "spec.toml", tmp_path / "s.h5"
+        spec.write_text(SPEC)
+        options = [word for override in overrides for word in ("--set", override)]
+        output_of("run", spec, "-o", study, "-q", "-j", "1", *options)
+        return json.loads(output_of("analyze", study, "--json")), output_of("analyze", study)
+
+    return records
 
 
-def test_analyze_tells_of_it_where_it_was_asked_for(tmp_path):
-    found, text = records(tmp_path, "output.true_contact=true")
-    assert text.count("Delta_sigma over the contact") == 2
+def test_analyze_tells_of_it_where_it_was_asked_for(records):
+    found, text = records("output.true_contact=true")
+    assert "Delta_sigma over the contact" in text
+    assert text.count("deviation_bearing") == 2
     for n, p_star in product((0, 1), (0.1, 1.0)):
         (record,) = [r for r in found if r["n"] == n and r["p_star"] == p_star]
         for name in ("deviation_c", "quadrature_c", "deviation_bearing"):
             predicted = record[f"a_r_persson_{name}"]
             assert predicted == pytest.approx(float(contact_area(record[name], p_star)), rel=1e-12)
-            assert f"{predicted:8.5f}" in text
+            assert f" {predicted:#.4g} " in text
         if n == 0 and p_star == 1.0:  # springs touch the highest points
             assert record["deviation_bearing"] == pytest.approx(record["deviation_c"], rel=0.1)
 
 
-def test_analyze_says_nothing_of_it_where_it_was_not(tmp_path):
-    found, text = records(tmp_path)
+def test_analyze_says_nothing_of_it_where_it_was_not(records):
+    found, text = records()
     assert "over the contact" not in text
     assert not any("a_r_persson_deviation_c" in record for record in found)
 
 
-def test_analyze_takes_the_fitted_gamma_for_the_mean_gap_alone(tmp_path):
-    paper, _ = records(tmp_path)
-    told = CliRunner().invoke(
-        main, ["analyze", str(tmp_path / "s.h5"), "--json", "--gamma", "fitted"]
-    )
-    for before, after in zip(paper, json.loads(told.output), strict=True):
+def test_analyze_takes_the_fitted_gamma_for_the_mean_gap_alone(records, output_of, tmp_path):
+    paper, _ = records()
+    told = output_of("analyze", tmp_path / "s.h5", "--json", "--gamma", "fitted")
+    for before, after in zip(paper, json.loads(told), strict=True):
         assert after["a_r_persson"] == before["a_r_persson"]
         if before["p_star"] < 1:  # n = 0: 0.514 for 0.5, n = 1: 0.324 for 0.35
             assert (after["u_g_persson"] > before["u_g_persson"]) == (before["n"] == 0)

@@ -8,11 +8,12 @@ from typing import Any, Literal
 import numpy as np
 
 from gfmd_cli.errors import InputError
-from gfmd_cli.physics import einstein
-from gfmd_cli.physics.fields import Field
+from gfmd_cli.grid.arrays import Field
+from gfmd_cli.physics import einstein_solid
 from gfmd_cli.physics.persson import Persson, Shells, gamma_fitted
-from gfmd_cli.study.layout import MISSING
-from gfmd_cli.study.reading import read_rows, read_shells
+from gfmd_cli.status import Status
+from gfmd_cli.study.columns import PARAMETERS
+from gfmd_cli.study.reading import StudyFile, open_study
 
 Row = dict[str, Any]
 Weights = Literal["paper", "fitted"]
@@ -21,14 +22,19 @@ Weights = Literal["paper", "fitted"]
 
 def in_continuum(row: Row, name: str) -> bool:
     """Whether a quantity has a value in the continuum, with its error."""
-    told = (row.get(f"{name}_continuum", np.nan), row.get(f"{name}_continuum_error", np.nan))
-    return bool(np.all(np.isfinite(told)))
+    values = (row.get(f"{name}_continuum", np.nan), row.get(f"{name}_continuum_error", np.nan))
+    return bool(np.all(np.isfinite(values)))
 
 
 def best(row: Row, name: str) -> tuple[float, float]:
     """A quantity with its error: of the continuum where that is known, else of the grid."""
     value = f"{name}_continuum" if in_continuum(row, name) else name
     return float(row[value]), float(row[f"{value}_error"])
+
+
+def of_study(study: str, text: str) -> str:
+    """A text with the name of its study, where two are shown side by side."""
+    return f"{study}: {text}" if study else text
 
 
 @dataclass(frozen=True)
@@ -42,20 +48,22 @@ class Prediction:
 
 @dataclass(frozen=True)
 class Curve:
-    """All pressures of one surface, body, grid and solver, and the theory of the same spectrum."""
+    """All pressures of one surface, elastomer, grid and solver, with theory of the spectrum."""
 
     rows: list[Row]
     """Rows of the study, pressure rising."""
     persson: Persson
+    study: str = ""
+    """Name of the study where several are shown side by side."""
 
     @property
     def elastomer(self) -> str:
-        """The body, in words."""
+        """Label of the elastomer."""
         return str(self.rows[0]["elastomer"])
 
     @property
     def surface(self) -> str:
-        """The surface, in words."""
+        """Label of the surface."""
         return str(self.rows[0]["surface"])
 
     @property
@@ -77,8 +85,18 @@ class Curve:
         values, errors = zip(*(best(row, name) for row in self.rows), strict=True)
         return np.array(values), np.array(errors)
 
+    @property
+    def has_theory(self) -> bool:
+        """Whether Persson theory applies: it describes rough surfaces, not single indenters."""
+        return bool(self.rows[0]["rough"])
+
     def predict(self, p_star: Field) -> Prediction:
-        """Persson theory at reduced pressures. Paper Eqs. (25), (26), (28)."""
+        """Persson theory at reduced pressures, NaN where it does not apply.
+
+        Paper Eqs. (25), (26), (28).
+        """
+        if not self.has_theory:
+            return Prediction(*(np.full(np.shape(p_star), np.nan) for _ in range(3)))
         unit, height = self.rows[0]["delta_sigma"], self.rows[0]["h_std"]
         pressure = np.asarray(p_star) * unit
         return Prediction(
@@ -94,11 +112,15 @@ class Curve:
 
     def stress_density(self, sigma: Field, p_star: float) -> Field:
         """Pr(sigma) Delta_sigma of Persson theory over sigma / Delta_sigma. Paper Eq. (24)."""
+        if not self.has_theory:
+            return np.full(np.shape(sigma), np.nan)
         unit = self.rows[0]["delta_sigma"]
         return np.asarray(unit * self.persson.stress_density(sigma * unit, p_star * unit))
 
     def pressure_at_gap(self, u_g: Field) -> Field:
         """Reduced pressure at which Persson theory has this mean gap; NaN for no gap."""
+        if not self.has_theory:
+            return np.full(np.shape(u_g), np.nan)
         unit, height = self.rows[0]["delta_sigma"], self.rows[0]["h_std"]
         pressure: Field = self.persson.pressure_at_gap(np.asarray(u_g) * height) / unit
         return pressure
@@ -113,6 +135,24 @@ class Comparison:
     missing: int
     """Tasks that the study does not hold yet."""
 
+    @property
+    def has_theory(self) -> bool:
+        """Whether Persson theory applies to any curve."""
+        return any(curve.has_theory for curve in self.curves)
+
+    def __str__(self) -> str:
+        """The tables of `gfmd analyze`."""
+        return "\n\n\n".join(table.as_text() for table in self._tables())
+
+    def _repr_html_(self) -> str:
+        """The same as HTML, for notebooks."""
+        return "".join(table.as_html() for table in self._tables())
+
+    def _tables(self) -> list[Any]:
+        from gfmd_cli.analysis.tables import study_tables  # which needs this module
+
+        return study_tables(self)
+
 
 def compare(path: Path, gamma: Weights = "paper") -> Comparison:
     """Set a study beside Persson theory.
@@ -120,20 +160,32 @@ def compare(path: Path, gamma: Weights = "paper") -> Comparison:
     Raises InputError where there is no such study or it holds no result, StudyError where it
     is unreadable.
     """
-    rows = read_rows(path)
-    solved = [row for row in rows if row["status"] != MISSING]
+    with open_study(path) as study:
+        return compare_open(study, path, gamma)
+
+
+def compare_open(study: StudyFile, path: Path, gamma: Weights = "paper") -> Comparison:
+    """As `compare`, of a study that is open already."""
+    rows = study.rows
+    solved = [row for row in rows if row["status"] != Status.MISSING]
+    spectra = {scene: study.shells(scene) for scene in {row["scene"] for row in solved}}
     if not solved:
         raise InputError(f"{path}: holds no result yet; run it first")
     groups: dict[tuple[Any, ...], list[Row]] = {}
     for row in solved:
-        groups.setdefault((row["scene"], row["solver"], row["tolerance"]), []).append(row)
+        groups.setdefault((row["scene"], *solver_of(row)), []).append(row)
     curves = []
     for (scene, *_), group in groups.items():
-        spectrum = read_shells(path, scene)
+        spectrum = spectra[scene]
         if gamma == "fitted":
             spectrum = with_fitted_gamma(spectrum, float(group[0]["n"]))
         curves.append(Curve(sorted(group, key=lambda row: row["p_star"]), Persson(spectrum)))
     return Comparison(path, curves, len(rows) - len(solved))
+
+
+def solver_of(row: Row) -> tuple[Any, ...]:
+    """All parameters of the solver of a row."""
+    return tuple(row[each.column.name] for each in PARAMETERS if each.table == "solver")
 
 
 def with_fitted_gamma(spectrum: Shells, n: float) -> Shells:
@@ -144,9 +196,9 @@ def with_fitted_gamma(spectrum: Shells, n: float) -> Shells:
 
 def einstein_prediction(p_star: Field) -> Prediction:
     """The Einstein solid (n = 0) under Gaussian heights, in closed form. Paper Eqs. (34)-(38)."""
-    height = einstein.non_contact_height(p_star)
+    height = einstein_solid.non_contact_height(p_star)
     return Prediction(
-        a_r=einstein.contact_area(height),
-        sigma_p=einstein.stress_deviation(height),
-        u_g=einstein.mean_gap(height),
+        a_r=einstein_solid.contact_area(height),
+        sigma_p=einstein_solid.stress_deviation(height),
+        u_g=einstein_solid.mean_gap(height),
     )

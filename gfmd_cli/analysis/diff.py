@@ -1,24 +1,26 @@
 """Two studies side by side: what differs in their specs, and by how much their results do."""
 
-import json
 import math
 from collections import defaultdict
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from gfmd_cli.analysis.compare import Row
-from gfmd_cli.analysis.export import plain
 from gfmd_cli.physics.observables import QUANTITIES
-from gfmd_cli.study.layout import MISSING
+from gfmd_cli.spec.models import differences
+from gfmd_cli.status import Status
 from gfmd_cli.study.reading import read_rows, stored_spec
-from gfmd_cli.study.spec import differences
-from gfmd_cli.study.tasks import SYMBOLS
 
 UNITS = {"sigma_p": "delta_sigma", "u_g": "h_std"}
 """Columns that reduced quantities are in units of."""
-LOADS = {"p_star": "reduced pressure", "contact_area": "contact area", "mean_gap": "mean gap"}
+LOADS = {
+    "p_star": "reduced pressure",
+    "contact_area": "contact area",
+    "mean_gap": "mean gap",
+    "displacement": "displacement",
+}
 
 
 Key = Callable[[Row], tuple[Hashable, ...]]
@@ -41,7 +43,7 @@ class Pair:
     one: Row
     other: Row
     physical: bool = False
-    """Whether stress and gap are compared in Pa and m, as of two bodies at one pressure in Pa."""
+    """Whether stress and gap are compared in Pa and m, as for two elastomers at one pressure."""
 
     def deviation(self, name: str) -> Deviation:
         """How far a column of the second study lies from that of the first."""
@@ -66,7 +68,7 @@ class Difference:
     only: tuple[list[Row], list[Row]]
     """Rows that one of them alone has: of the first, of the second."""
     paired: str = ""
-    """By what rows of different surfaces or bodies are paired; empty where contacts match."""
+    """By what rows of different surfaces or elastomers are paired; empty where contacts match."""
 
     def exceeds(self, tolerance: float) -> bool:
         """Whether some relative difference is larger; also where nothing can be compared."""
@@ -78,8 +80,9 @@ def diff(one: Path, other: Path) -> Difference:
     """Match the rows of two studies by surface, seed, elastomer and load.
 
     Grids and solvers may differ; of several rows, those of the same grid and solver belong
-    together, then those of the same grid. Where nothing matches and each study presses one body
-    on one surface, rows belong together by their load alone. Raises InputError, StudyError.
+    together, then those of the same grid. Where nothing matches and each study presses one
+    elastomer on one surface, rows belong together by their load alone. Raises InputError,
+    StudyError.
     """
     only = _solved(one), _solved(other)
     pairs, paired = _matches(*only, _contact), ""
@@ -90,7 +93,7 @@ def diff(one: Path, other: Path) -> Difference:
 
 
 def _solved(path: Path) -> list[Row]:
-    return [row for row in read_rows(path) if row["status"] != MISSING]
+    return [row for row in read_rows(path) if row["status"] != Status.MISSING]
 
 
 def _pressed(row: Row) -> tuple[Hashable, ...]:
@@ -100,8 +103,8 @@ def _pressed(row: Row) -> tuple[Hashable, ...]:
 
 def _load_of(row: Row) -> tuple[Hashable, ...]:
     """How hard."""
-    load, asked = (row["load"], row["asked"]) if row["load"] else ("p_star", row["p_star"])
-    return load, f"{asked:.12g}"
+    load, value = (row["load"], row["load_value"]) if row["load"] else ("p_star", row["p_star"])
+    return load, f"{value:.12g}"
 
 
 def _contact(row: Row) -> tuple[Hashable, ...]:
@@ -129,7 +132,7 @@ def _match(one: list[Row], other: list[Row], key: Key, alike: tuple[str, ...]) -
     taken = {id(row) for pair in found for row in pair}
     for rows in (one, other):
         rows[:] = [row for row in rows if id(row) not in taken]
-    # another surface or body has other units: what is equal then is the pressure in Pa
+    # another surface or elastomer has other units: what is equal then is the pressure in Pa
     return [Pair(a, b, a["load"] == "pressure" and _pressed(a) != _pressed(b)) for a, b in found]
 
 
@@ -143,68 +146,3 @@ def _paired(pair: Pair) -> str:
     load = str(_load_of(pair.one)[0])
     units = "sigma_p in Pa, u_g in m" if pair.physical else "values in reduced units"
     return f"{' and '.join(apart)} differ: paired by {LOADS.get(load, load)}, {units}"
-
-
-def diff_text(found: Difference) -> str:
-    """The comparison for people."""
-    blocks: dict[str, list[str]] = {}
-    for pair in found.pairs:
-        names = [_name(pair.one), _name(pair.other)]
-        same = names[0] == names[1]
-        head = names[0] if same else f"A: {names[0]}\nB: {names[1]}"
-        title = f"{'':28}" + "".join(f"{name:>20}" for name in QUANTITIES)
-        cells = "".join(f"{_cell(pair.deviation(name)):>20}" for name in QUANTITIES)
-        sizes = f"{pair.one['points']} -> {pair.other['points']}"
-        blocks.setdefault(head, [head, title]).append(f"{_load(pair.one):>14}{sizes:>14}{cells}")
-    told = ["\n".join(lines) for lines in blocks.values()]
-    for which, rows in zip("AB", found.only, strict=True):
-        told += ["\n".join([f"only in {which}:", *_listed(rows)])] if rows else []
-    if found.spec:
-        told.append("\n".join(["specs, A -> B:", *(f"  {line}" for line in found.spec)]))
-    legend = "relative: (B - A) / max(|A|, |B|); in brackets in units of the combined error bar"
-    heads = [*filter(None, [found.paired]), legend] if found.pairs else ["no contact in common"]
-    return "\n\n".join(["\n".join(heads), *told])
-
-
-def _name(row: Row) -> str:
-    return f"{row['elastomer']} on {row['surface']}"
-
-
-def _listed(rows: list[Row]) -> list[str]:
-    """Rows under what they share, a line for each grid."""
-    loads: dict[str, dict[int, list[str]]] = {}
-    for row in rows:
-        loads.setdefault(_name(row), {}).setdefault(row["points"], []).append(_load(row))
-    return [
-        line
-        for name, grids in loads.items()
-        for line in (f"  {name}", *(f"    {n}: {', '.join(told)}" for n, told in grids.items()))
-    ]
-
-
-def _cell(found: Deviation) -> str:
-    bars = "" if math.isnan(found.in_errors) else f" ({found.in_errors:+.1f})"
-    return ("-" if math.isnan(found.relative) else f"{found.relative:+.2e}") + bars
-
-
-def _load(row: Row) -> str:
-    if not row["load"]:
-        return f"p*={row['p_star']:.4g}"
-    return f"{SYMBOLS.get(row['load'], row['load'])}={row['asked']:.4g}"
-
-
-def diff_json(found: Difference) -> str:
-    """The same as JSON; what does not apply is null."""
-    keys = ("surface", "seed", "elastomer", "load", "asked", "points", "p_star")
-    rows = [
-        {key: plain(pair.one[key]) for key in keys[:5]}
-        | {f"{key}_{which}": plain(row[key]) for key in (*keys[5:], *QUANTITIES)
-           for which, row in (("a", pair.one), ("b", pair.other))}
-        | {f"{name}_{what}": value if math.isfinite(value) else None for name in QUANTITIES
-           for what, value in pair.deviation(name)._asdict().items()}
-        for pair in found.pairs
-    ]  # fmt: skip
-    only = [[{key: plain(row[key]) for key in keys} for row in rows] for rows in found.only]
-    told: dict[str, Any] = {"rows": rows, "only_a": only[0], "only_b": only[1], "spec": found.spec}
-    told["paired"] = found.paired
-    return json.dumps(told, indent=1)

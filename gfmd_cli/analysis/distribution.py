@@ -18,11 +18,11 @@ from typing import Any
 
 import numpy as np
 
-from gfmd_cli.analysis.compare import Comparison, Curve, Row
-from gfmd_cli.analysis.ensemble import without_seed
-from gfmd_cli.physics.fields import Field
+from gfmd_cli.analysis.compare import Comparison, Curve, Row, of_study, solver_of
+from gfmd_cli.grid.arrays import Field
 from gfmd_cli.physics.observables import logarithmic_edges
-from gfmd_cli.study.layout import BINS, PR_LOGARITHMIC
+from gfmd_cli.status import Status
+from gfmd_cli.study.columns import BINS, PR_LOGARITHMIC
 
 MOST_CHANGE = 0.35  # of ln Pr from one grid to the next; beyond, a bin is not resolved
 NEIGHBOURS = 2  # bins to each side that the change between grids is averaged over
@@ -32,13 +32,9 @@ SHALLOWEST = 0.75  # distance from the edge, in spacings, below which a bin is n
 
 def bin_counts(row: Row, name: str = PR_LOGARITHMIC) -> Field:
     """Grid points in each bin of Pr(sigma): density times width times the points of the cell."""
-    counts: Field = np.nan_to_num(row[name]) * np.diff(BINS[name].edges()) * row["points"]
-    return counts if _is_line(counts) else counts * row["points"]
-
-
-def _is_line(counts: Field) -> bool:
-    """Whether densities times widths times the points of a side are whole: a line scene."""
-    return bool(np.allclose(counts, np.rint(counts), rtol=0, atol=1e-6))
+    widths = np.diff(BINS[name].edges())
+    counts: Field = np.nan_to_num(row[name]) * widths * row["points"] * row["points_y"]
+    return counts
 
 
 @dataclass(frozen=True)
@@ -98,7 +94,7 @@ def _averaged(values: Field, variance: Field) -> tuple[Field, Field]:
 
 
 @dataclass(frozen=True)
-class Distribution:
+class StressDistribution:
     """One contact at one pressure on several grids, for one seed or more."""
 
     curve: Curve
@@ -118,7 +114,7 @@ class Distribution:
 
     @property
     def points(self) -> list[int]:
-        """Points per side of the grids, rising."""
+        """Points along x of the grids, rising."""
         return [int(row["points"]) for row in self.seeds[0]]
 
     @property
@@ -128,18 +124,19 @@ class Distribution:
 
     @property
     def surface(self) -> str:
-        """The surface in words, without the seed where there are several."""
-        return without_seed(self.finest) if len(self.seeds) > 1 else str(self.finest["surface"])
+        """The surface, without its seed where there are several."""
+        return str(self.finest["ensemble" if len(self.seeds) > 1 else "surface"])
 
     @property
     def scene(self) -> str:
-        """Body and surface, in words."""
-        return f"{self.finest['elastomer']} on {self.surface}"
+        """Elastomer and surface."""
+        return of_study(self.curve.study, f"{self.finest['elastomer']} on {self.surface}")
 
     @cached_property
     def cells(self) -> list[int]:
         """Points of the cells of all seeds, on each grid."""
-        return [len(self.seeds) * points**self._dimension for points in self.points]
+        sizes = (int(row["points"]) * int(row["points_y"]) for row in self.seeds[0])
+        return [len(self.seeds) * size for size in sizes]
 
     @cached_property
     def grids(self) -> Field:
@@ -173,9 +170,7 @@ class Distribution:
 
     @property
     def _dimension(self) -> int:
-        widths = np.diff(logarithmic_edges())
-        counts = np.nan_to_num(self.finest[PR_LOGARITHMIC]) * widths * self.finest["points"]
-        return 1 if _is_line(counts) else 2
+        return int(self.finest["dimension"])
 
     @cached_property
     def sampling(self) -> Field:
@@ -188,7 +183,7 @@ class Distribution:
         count, fine = len(self.seeds), self.counts[:, -1]
         if self.finest["seed"] < 0:  # nothing random
             return np.zeros(fine.shape[-1])
-        contacts = sum(_contacts(rows[-1], self._dimension) for rows in self.seeds)
+        contacts = sum(_contacts(rows[-1]) for rows in self.seeds)
         expected = 1 / np.maximum(np.minimum(contacts, fine.sum(axis=0)), 1.0)
         if count == 1:
             return np.asarray(np.sqrt(expected))
@@ -209,33 +204,35 @@ class Distribution:
         return np.sqrt(sum((np.square(part) for part in parts), np.zeros(1)))
 
 
-def _contacts(row: Row, dimension: int) -> float:
+def _contacts(row: Row) -> float:
     """Number of contacts in the cell, estimated."""
     line, area = float(row["perimeter"]), float(row["a_r"])
-    return line / 2 if dimension == 1 else np.pi * line**2 / (64 * area)
+    if row["dimension"] == 1:
+        return line / 2
+    return np.pi * line**2 / (64 * area) * float(row["length_y"] / row["length"])
 
 
-def distributions(comparison: Comparison) -> list[Distribution]:
+def distributions(comparison: Comparison) -> list[StressDistribution]:
     """The contacts of a study that were solved on two nested grids or more.
 
-    Rows are one contact where surface, body, solver, tolerance and pressure are the same and so
-    is the unit of stress; surfaces that differ in their seed only are averaged.
+    Rows are one contact where surface, elastomer, solver, tolerance and pressure are the same and
+    so is the unit of stress; surfaces that differ in their seed only are averaged.
     """
     found: dict[tuple[Any, ...], dict[int, dict[int, tuple[Curve, Row]]]] = {}
     for curve in comparison.curves:
         for row in curve.rows:
-            if PR_LOGARITHMIC not in row or not row["a_r"] > 0 or row["status"] != "converged":
+            if PR_LOGARITHMIC not in row or not row["a_r"] > 0 or row["status"] != Status.CONVERGED:
                 continue
             units = (f"{row['pressure']:.6g}", f"{row['delta_sigma']:.6g}")
-            key = (row["elastomer"], without_seed(row), row["solver"], row["tolerance"], *units)
+            key = (curve.study, row["elastomer"], row["ensemble"], *solver_of(row), *units)
             found.setdefault(key, {}).setdefault(row["seed"], {})[row["points"]] = (curve, row)
-    told = []
+    merged = []
     for seeds in found.values():
         grids = _nested(sorted(set.intersection(*(set(grids) for grids in seeds.values()))))
         if len(grids) > 1:
             rows = [[held[points][1] for points in grids] for held in seeds.values()]
-            told.append(Distribution(next(iter(seeds.values()))[grids[-1]][0], rows))
-    return told
+            merged.append(StressDistribution(next(iter(seeds.values()))[grids[-1]][0], rows))
+    return merged
 
 
 def _nested(points: list[int]) -> list[int]:

@@ -1,4 +1,4 @@
-"""Power laws of Pr(sigma): what the edge of a contact demands, and what is found.
+"""Power laws of Pr(sigma): theory at the edge of a contact, and fits to a study.
 
 At a distance s inside the edge of a contact the stress is sigma = A s^(1 - n/2) (paper Eqs. (5) and
 (6), corrected), on rough surfaces too (paper Sect. 5.1). A contact line of length l per area then
@@ -18,8 +18,8 @@ from typing import Any
 
 import numpy as np
 
-from gfmd_cli.analysis.distribution import PRIOR_SEEDS, Distribution
-from gfmd_cli.physics.fields import Field
+from gfmd_cli.analysis.distribution import PRIOR_SEEDS, StressDistribution
+from gfmd_cli.grid.arrays import Field
 from gfmd_cli.physics.observables import logarithmic_edges, logarithmic_middles
 
 USABLE = 0.3  # largest relative error of a bin in a fit
@@ -81,24 +81,26 @@ class Line:
     shared: float
     """The part of it that is shared between the bins."""
     level: float
-    """ln Pr at sigma = 1 without the further term."""
+    """ln Pr at sigma = 1 without the correction."""
     level_error: float
     """Standard error of ln Pr in the middle of the window."""
 
 
-def power_law(x: Field, y: Field, own: Field, shared: Field, further: Field | None = None) -> Line:
-    """Least squares of y = level + slope x (+ b further).
+def power_law(
+    x: Field, y: Field, own: Field, shared: Field, correction: Field | None = None
+) -> Line:
+    """Least squares of y = level + slope x (+ b correction).
 
     Parameters
     ----------
     x, y : ln sigma and ln Pr
     own : standard errors of y that bins have each for themselves
     shared : standard error that all have together, with its sign: y + t shared, t normal
-    further : one more term
+    correction : the first departure from a power law
     """
     weight = 1 / (own**2 + shared**2)
     centre = float(weight @ x / weight.sum())
-    columns = [np.ones_like(x), x - centre, *([] if further is None else [further])]
+    columns = [np.ones_like(x), x - centre, *([] if correction is None else [correction])]
     design = np.array(columns)
     levers = np.linalg.pinv((design * weight) @ design.T) @ (design * weight)
     found = levers @ y
@@ -115,7 +117,7 @@ def power_law(x: Field, y: Field, own: Field, shared: Field, further: Field | No
     )
 
 
-def fit(found: Distribution, law: str) -> Fit | None:
+def fit(found: StressDistribution, law: str) -> Fit | None:
     """Power law nearest to the limit of resolution; None where too few bins are resolved.
 
     "small": the lowest BASE usable bins below SMALL p / a_r. "large" (n > 2 alone): the highest
@@ -146,9 +148,9 @@ def fit(found: Distribution, law: str) -> Fit | None:
     theory = edge_exponent(n) if (n < 2) == small else np.nan  # n > 2, small: patch centres
     limit, limit_error = np.nan, np.nan
     if np.isfinite(theory) and places.size > FEWEST:
-        further = (middle / mean) ** (2 / (2 - n))
-        longest = _line(found, places[:LONGEST], middle, further)
-        shorter = _line(found, places[: min(LONGEST, places.size) - 1], middle, further)
+        correction = (middle / mean) ** (2 / (2 - n))
+        longest = _line(found, places[:LONGEST], middle, correction)
+        shorter = _line(found, places[: min(LONGEST, places.size) - 1], middle, correction)
         limit = longest.slope
         limit_error = float(np.hypot(longest.error, longest.slope - shorter.slope))
     nearest = base[:NEAREST]
@@ -168,7 +170,9 @@ def fit(found: Distribution, law: str) -> Fit | None:
     )
 
 
-def _line(found: Distribution, chosen: Any, middle: Field, further: Field | None = None) -> Line:
+def _line(
+    found: StressDistribution, chosen: Any, middle: Field, correction: Field | None = None
+) -> Line:
     """The law in some bins.
 
     What surfaces differ by is counted as each bin's own, at first. With the law found anew without
@@ -177,7 +181,7 @@ def _line(found: Distribution, chosen: Any, middle: Field, further: Field | None
     part, fine = found.extrapolated, found.counts[:, -1][:, chosen]
     x, y = np.log(middle[chosen]), part.log_density[chosen]
     own, shared = np.hypot(part.counting, found.sampling)[chosen], part.discretisation[chosen]
-    more = None if further is None else further[chosen]
+    more = None if correction is None else correction[chosen]
     line, count = power_law(x, y, own, shared, more), len(fine)
     without = fine.sum(axis=0) - fine
     if count == 1 or not np.all(without > 0):

@@ -1,14 +1,16 @@
 """The spread of a quantity over seeds: mean, standard error, confidence interval."""
 
-import re
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from math import sqrt
 from typing import Any
 
 import numpy as np
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
-from gfmd_cli.analysis.compare import Comparison, Row
+from gfmd_cli.analysis.compare import Comparison, Row, of_study
+from gfmd_cli.analysis.grid_size import grid_size
+from gfmd_cli.study.columns import PARAMETERS
 
 CONFIDENCE = 0.95
 
@@ -31,43 +33,64 @@ class Ensemble:
 
     rows: list[Row]
     """Rows of the study, one a seed."""
+    study: str = ""
+    """Name of the study where several are shown side by side."""
 
     @property
     def label(self) -> str:
-        """Body and surface, in words."""
-        return f"{self.rows[0]['elastomer']} on {without_seed(self.rows[0])}"
+        """Elastomer and surface without its seed."""
+        return f"{self.rows[0]['elastomer']} on {self.rows[0]['ensemble']}"
 
     @property
     def title(self) -> str:
         """The same with the grid, where that was given."""
         auto = self.rows[0].get("grid") == "auto"
-        return self.label + ("" if auto else f", {self.rows[0]['points']} points a side")
+        text = self.label + ("" if auto else f", {grid_size(self.rows[:1])}")
+        return of_study(self.study, text)
 
     def spread(self, name: str) -> Spread:
         """Of "a_r", "sigma_p" or "u_g": of the continuum values where all rows have one."""
         best = [row.get(f"{name}_continuum", np.nan) for row in self.rows]
-        values = np.array(best if np.all(np.isfinite(best)) else [row[name] for row in self.rows])
-        error = float(np.std(values, ddof=1)) / sqrt(values.size)
-        wide = float(student.ppf(0.5 + 0.5 * CONFIDENCE, values.size - 1))
-        return Spread(values.size, float(values.mean()), error, wide * error)
+        return spread_of(best if np.all(np.isfinite(best)) else [row[name] for row in self.rows])
 
 
-def without_seed(row: Row) -> str:
-    """The surface of a row in words, without its seed."""
-    return re.sub(r" seed=\d+", "", str(row["surface"]))
+def spread_of(values: Sequence[float]) -> Spread:
+    """Statistics of two values or more."""
+    numbers = np.asarray(values, np.float64)
+    error = float(np.std(numbers, ddof=1)) / sqrt(numbers.size)
+    wide = float(stdtrit(numbers.size - 1, 0.5 + 0.5 * CONFIDENCE))
+    return Spread(numbers.size, float(numbers.mean()), error, wide * error)
+
+
+def without_seed(row: Row) -> tuple[Any, ...]:
+    """What contacts have in common that differ in seed and load only."""
+    points = "auto" if row.get("grid") == "auto" else str(row["points"])
+    words = [
+        each.word(row) for each in PARAMETERS if each.key != "seed" and each.column.name != "points"
+    ]
+    return (points, row["surface_sha256"], *words)
+
+
+def by_load(rows: Iterable[Row]) -> list[list[Row]]:
+    """The rows of each load, one a seed."""
+    groups: dict[tuple[Any, ...], dict[int, Row]] = {}
+    for row in rows:
+        groups.setdefault((row["load"], f"{row['load_value']:.12g}"), {})[row["seed"]] = row
+    return [[*seeds.values()] for seeds in groups.values()]
 
 
 def ensembles(comparison: Comparison) -> list[Ensemble]:
-    """The contacts of a study that were solved for two seeds or more."""
-    groups: dict[tuple[Any, ...], dict[int, list[Row]]] = {}
+    """The contacts of a study that were solved for two seeds or more, pressure rising."""
+    groups: dict[tuple[str, tuple[Any, ...]], list[Row]] = {}
     for curve in comparison.curves:
-        row = curve.rows[0]
-        points = None if row.get("grid") == "auto" else row["points"]
-        key = (without_seed(row), row["elastomer"], points, row["solver"], row["tolerance"])
-        groups.setdefault(key, {})[row["seed"]] = curve.rows
-    found = []
-    for seeds in groups.values():
-        lengths = {len(rows) for rows in seeds.values()}
-        if len(seeds) > 1 and len(lengths) == 1:
-            found += [Ensemble(list(rows)) for rows in zip(*seeds.values(), strict=True)]
-    return found
+        groups.setdefault((curve.study, without_seed(curve.rows[0])), []).extend(curve.rows)
+    return [
+        Ensemble(rows, study)
+        for (study, _), group in groups.items()
+        for rows in _rising(group)
+        if len(rows) > 1
+    ]
+
+
+def _rising(rows: list[Row]) -> list[list[Row]]:
+    return sorted(by_load(rows), key=lambda seeds: float(seeds[0]["p_star"]))

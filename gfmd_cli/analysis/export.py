@@ -1,81 +1,125 @@
 """A study in other shapes: rows of a CSV file, an xarray data set, a netCDF file."""
 
-from collections.abc import Iterable
+import csv
+import io
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from gfmd_cli.errors import InputError
-from gfmd_cli.physics.fields import Field
-from gfmd_cli.physics.hdf5 import has
-from gfmd_cli.study.files import new_file
-from gfmd_cli.study.layout import (
-    COLUMNS,
-    CURVES,
-    DISTRIBUTION,
-    DISTRIBUTIONS,
-    MISSING,
+from gfmd_cli.analysis.table import known
+from gfmd_cli.errors import INSTALL, InputError
+from gfmd_cli.files.atomic import new_file
+from gfmd_cli.grid.arrays import Field
+from gfmd_cli.status import Status
+from gfmd_cli.study.column import Column
+from gfmd_cli.study.columns import (
+    CONTRACT,
+    DETAILS,
+    HISTOGRAMS,
+    PARAMETER_COLUMNS,
+    PARAMETERS,
+    SCENE,
     SHELLS,
-    Column,
+    TASK,
+    TASK_GROUPS,
+    HistogramColumn,
 )
-from gfmd_cli.study.reading import ATTRIBUTES_SUM, fields_of, open_study, read_rows, rows_of
+from gfmd_cli.study.reading import StudyFile, open_study, read_rows
 
-SCENE = Column("scene", int, "1", "index of the scene")
 Rows = list[dict[str, Any]]
+FORMULA = ("=", "+", "-", "@", "\t", "\r")
+"""Characters with which a formula of a spreadsheet begins."""
+COORDINATES = tuple(
+    dict.fromkeys(("surface", "elastomer", *(each.column.name for each in PARAMETERS), "p_star"))
+)
+"""Columns that are coordinates of the data set: labels, parameters and the reduced pressure."""
 
 
-def export_rows(path: Path) -> tuple[list[str], list[list[str]]]:
-    """Header and rows of the CSV of a study: one row per solved pressure."""
-    names = [column.name for column in COLUMNS]
-    rows = [row for row in read_rows(path) if row["status"] != MISSING]
-    return names, [[_cell(row[name]) for name in names] for row in rows]
+def export_csv(path: Path) -> str:
+    """A study as CSV: a header, and one row per solved pressure."""
+    return csv_text([row for row in read_rows(path) if row["status"] != Status.MISSING])
+
+
+def csv_text(rows: Rows) -> str:
+    """The solved rows of a study as CSV, below a header."""
+    names = [*(c.name for c in (*CONTRACT, *DETAILS)), *parameter_names(rows)]
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(names)
+    writer.writerows([_cell(row[name]) for name in names] for row in rows)
+    return text.getvalue()
+
+
+def parameter_names(rows: Rows) -> list[str]:
+    """Columns of parameters that some row has, without those of the contract."""
+    return [
+        column.name
+        for column in PARAMETER_COLUMNS
+        if not all(column.is_blank(row[column.name]) for row in rows)
+    ]
 
 
 def _cell(value: Any) -> str:
-    told = plain(value)
-    return "" if told is None else repr(told) if isinstance(told, float) else str(told)
-
-
-def plain(value: Any) -> Any:
-    """None for what does not apply: NaN, the seed -1."""
-    if isinstance(value, float) and np.isnan(value):
-        return None
-    return None if isinstance(value, int) and value == -1 else value
+    """A value in CSV; text that a spreadsheet would take for a formula begins with '."""
+    if not known(value):
+        return ""
+    if isinstance(value, str) and value.startswith(FORMULA):
+        return f"'{value}"
+    return repr(value) if isinstance(value, float) else str(value)
 
 
 def as_dataset(path: Path) -> Any:
     """A study as an `xarray.Dataset`, all of it but the fields on the grid.
 
-    Columns and distributions go over `task`; the spectra of surface and body, `scenes_q` and so on,
-    over (scenes, scenes_shell), where `scene` says which is that of a task; power spectra and
-    autocorrelations, `spectra_u` and so on, over (task, shell or ring). Where one has fewer
-    shells than another NaN follows. Raises InputError where xarray is missing or there is no such
-    study, StudyError.
+    Columns and histograms have the dimension `task`. The spectra of surface and elastomer
+    (`scenes_q` and so on) have (scenes, scenes_shell); `scene` is the index of the scene of a task.
+    Power spectra and autocorrelations (`spectra_u` and so on) have (task, shell or ring). Missing
+    shells are NaN. Tasks are selected by their parameters: `data.sel(hurst=0.8, n=1)`.
+
+    The path may be that of an exported netCDF file. Raises InputError where xarray is missing or
+    there is no such study, StudyError.
     """
+    data = _opened(path) if path.suffix == ".nc" else _labelled_study(path)
+    from gfmd_cli.analysis.parameter_index import ParameterIndex
+
+    return data.set_xindex([name for name in COORDINATES if name in data.coords], ParameterIndex)
+
+
+def _opened(path: Path) -> Any:
+    """An exported netCDF file. Raises InputError."""
+    try:
+        return _xarray().open_dataset(path, engine="h5netcdf")
+    except (OSError, ValueError) as error:
+        raise InputError(f"{path}: no readable netCDF file: {error}") from error
+
+
+def _xarray() -> Any:
+    """The module xarray. Raises InputError where it is missing."""
     try:
         import xarray
     except ImportError as error:
-        raise InputError(f"this needs xarray: pip install gfmd-cli[export] ({error})") from error
-    with open_study(path) as file:
-        rows = rows_of(file)
-        held = [c for c in (*COLUMNS, *DISTRIBUTION) if has(file, c.name)]
-        variables = {c.name: _labelled(("task",), _values(rows, c), c) for c in (*held, SCENE)}
-        variables |= _distributions(rows)
-        places = [f"scenes/{scene}" for scene in sorted({row["scene"] for row in rows})]
-        variables |= _curves(file, "scenes", places, ("scenes", "shell"), SHELLS)
-        for name, (axis, columns) in CURVES.items():
-            places = [f"{name}/{row['task']}" for row in rows]
-            variables |= _curves(file, name, places, ("task", axis), columns)
-        attributes = {k: v for k, v in file.attrs.items() if k != ATTRIBUTES_SUM}
-        coordinates = {"task": _values(rows, Column("task", int, "", ""))}
-        coordinates |= {d.axis: _bins(d) for d in DISTRIBUTIONS if d.name in variables}
-        return xarray.Dataset(variables, coordinates, attributes)
+        raise InputError(f"this needs xarray: {INSTALL.format('export')} ({error})") from error
+    return xarray
+
+
+def _labelled_study(path: Path) -> Any:
+    """A study as a data set without an index over parameters."""
+    with open_study(path) as study:
+        rows = study.rows
+        columns = (*study.columns, SCENE)
+        variables = {c.name: _labelled(("task",), _values(rows, c), c) for c in columns}
+        variables |= _histograms(rows) | _curves(study)
+        coordinates = {"task": _values(rows, TASK)}
+        coordinates |= {name: variables.pop(name) for name in COORDINATES if name in variables}
+        coordinates |= {h.axis: _bins(h) for h in HISTOGRAMS if h.name in variables}
+        return _xarray().Dataset(variables, coordinates, study.attributes)
 
 
 def write_netcdf(path: Path, target: Path) -> None:
     """Write a study as netCDF 4. Raises InputError, StudyError, SpaceError."""
-    made = as_dataset(path)
+    made = _labelled_study(path)
     with new_file(target) as file:
         made.to_netcdf(file, engine="h5netcdf")
 
@@ -89,35 +133,50 @@ def _labelled(axes: Iterable[str], values: Any, column: Column) -> Any:
     return tuple(axes), values, units | {"long_name": column.meaning}
 
 
-def _distributions(rows: Rows) -> dict[str, Any]:
-    """The distributions that are stored."""
+def _histograms(rows: Rows) -> dict[str, Any]:
+    """The histograms that are stored."""
     return {
-        made.name: _labelled(
-            ("task", made.axis),
-            np.array([row[made.name] for row in rows]),
-            Column(made.name, float, "1", made.meaning),
+        histogram.name: _labelled(
+            ("task", histogram.axis),
+            np.array([row[histogram.name] for row in rows]),
+            histogram.column,
         )
-        for made in DISTRIBUTIONS
-        if rows and made.name in rows[0]
+        for histogram in HISTOGRAMS
+        if rows and histogram.name in rows[0]
     }
 
 
-def _bins(made: Any) -> Any:
-    attributes = {"units": "1", "long_name": made.labels, "edges": made.edges()}
-    return (made.axis,), made.middles(), attributes
+def _bins(histogram: HistogramColumn) -> Any:
+    attributes = {"units": "1", "long_name": histogram.axis_meaning, "edges": histogram.edges()}
+    return (histogram.axis,), histogram.middles(), attributes
 
 
-def _curves(
-    file: Any, name: str, places: list[str], axes: tuple[str, str], columns: tuple[Column, ...]
+def _curves(study: StudyFile) -> dict[str, Any]:
+    """The spectra of the scenes and the curves of the tasks."""
+    solved = {row["scene"] for row in study.rows if row["status"] != Status.MISSING}
+    count = 1 + max((row["scene"] for row in study.rows), default=-1)
+    scenes = [vars(study.shells(i)) if i in solved else {} for i in range(count)]
+    variables = _padded("scenes", ("scenes", "shell"), SHELLS, scenes)
+    for group in TASK_GROUPS:
+        if group.axis:
+            arrays = [study.arrays(group.name, row["task"]) for row in study.rows]
+            variables |= _padded(group.name, ("task", group.axis), group.columns, arrays)
+    return variables
+
+
+def _padded(
+    name: str,
+    axes: tuple[str, str],
+    columns: tuple[Column, ...],
+    arrays: Sequence[Mapping[str, Field]],
 ) -> dict[str, Any]:
-    """Curves of many groups side by side, NaN where one is shorter; none where there is none."""
-    found = [fields_of(file, place, columns) for place in places]
-    if not any(found):
+    """Curves side by side, NaN where one is shorter than another; none where there is none."""
+    if not any(arrays):
         return {}
     over = (axes[0], f"{name}_{axes[1]}")
     return {
         f"{name}_{column.name}": _labelled(
-            over, _side_by_side([group.get(column.name, np.empty(0)) for group in found]), column
+            over, _side_by_side([curves.get(column.name, np.empty(0)) for curves in arrays]), column
         )
         for column in columns
     }

@@ -1,178 +1,240 @@
-"""Tables of a study: for people, as records."""
+"""The tables of a study: their columns, and the records that fill them."""
 
-import math
-from typing import Any
+from collections import Counter
+from collections.abc import Callable, Sequence
 
-from gfmd_cli.analysis.compare import (
-    Comparison,
-    Curve,
-    Row,
-    best,
-    einstein_prediction,
-    in_continuum,
-)
-from gfmd_cli.analysis.ensemble import Ensemble, ensembles
-from gfmd_cli.analysis.export import plain
-from gfmd_cli.analysis.further import further_records, further_tables
-from gfmd_cli.analysis.true_contact import VARIANTS, true_contact_areas, true_contact_tables
+from gfmd_cli.analysis.compare import Comparison, Curve, in_continuum, of_study
+from gfmd_cli.analysis.distribution_tables import power_laws
+from gfmd_cli.analysis.ensemble import ensembles
+from gfmd_cli.analysis.grid_size import grid_size
+from gfmd_cli.analysis.records import means_of, records_of
+from gfmd_cli.analysis.table import Column, Group, Record, Table, known, product, ratio
+from gfmd_cli.analysis.true_contact import VARIANTS, true_contact_areas
 from gfmd_cli.physics.observables import QUANTITIES
+from gfmd_cli.study.observables import OBSERVABLES, Observable
+from gfmd_cli.study.plausibility import SEPARATOR
 
-ERRORS = [
-    f"{name}_{what}"
-    for name in QUANTITIES
-    for what in ("error", "continuum", "continuum_error", "verdict")
-]
-"""Columns of records where an accuracy was asked for."""
-HEADER = (
-    "      p*        a_r  Persson  ratio    sigma_p  Persson  ratio        u_g    Persson  ratio"
-    "  p ratio  status"
+TitledCurves = list[tuple[str, Curve]]
+"""Curves with the titles that tables give them."""
+P_STAR = Column("p*", "p_star", ".4g")
+PRESSURE = Column("p", "pressure", ".4g", "Pa")
+AREA = Column("a_r", "a_r")
+POINTS = Column("points", "points", "d")
+STATUS = Column("status", "status")
+RESIDUAL = Column("residual", "residual", ".1e")
+REDUCED = {"a_r": "a_r", "sigma_p": "sigma_p / Delta_sigma", "u_g": "u_g / h_std"}
+"""Headings of the three quantities in reduced units."""
+BEST = {name: Column(heading, f"{name}_best", error=f"{name}_best_error")
+        for name, heading in REDUCED.items()}  # fmt: skip
+"""Continuum values where they are known, else values on the grid."""
+
+
+def _beside_theory(name: str, theory: str) -> tuple[Column, Column, Column]:
+    """A quantity on the grid, its prediction, and their ratio."""
+    predicted = f"{name}_{theory}"
+    heading = "closed form" if theory == "einstein" else "Persson"
+    return (
+        Column(name, name),
+        Column(heading, predicted, optional=True),
+        Column("ratio", ratio(name, predicted), ".3f", optional=True),
+    )
+
+
+COMPARISON = (
+    P_STAR,
+    *(column for name in QUANTITIES for column in _beside_theory(name, "persson")),
+    Column("p ratio", ratio("p_star_persson_at_u_g", "p_star"), ".3f", optional=True),
+    STATUS,
+)
+EINSTEIN = (
+    P_STAR,
+    *(column for name in QUANTITIES for column in _beside_theory(name, "einstein")),
+)
+CONTINUUM = (
+    P_STAR,
+    POINTS,
+    *(
+        Column(heading, f"{name}_shown", error=f"{name}_continuum_error",
+               otherwise=f"{name}_verdict")
+        for name, heading in REDUCED.items()
+    ),
+)  # fmt: skip
+SEEDS = (
+    P_STAR,
+    *(
+        Column(heading, f"{name}_mean", error=f"{name}_confidence")
+        for name, heading in REDUCED.items()
+    ),
+)
+CONTACT_AREA = (
+    P_STAR,
+    PRESSURE,
+    BEST["a_r"],
+    Column("Persson", "a_r_persson", optional=True),
+    Column("ratio", ratio("a_r_best", "a_r_persson"), ".3f", optional=True),
+    STATUS,
 )
 
 
-def tables(comparison: Comparison) -> str:
-    """One table per curve: simulation, Persson theory, their ratio.
+def _with_units(name: str, unit: str, unit_name: str) -> tuple[Column, ...]:
+    """A quantity beside theory, in reduced and in physical units."""
+    return (
+        P_STAR,
+        PRESSURE,
+        BEST[name],
+        Column(name, product(f"{name}_best", unit), unit=unit_name),
+        Column("Persson", f"{name}_persson", optional=True),
+        Column("Persson", product(f"{name}_persson", unit), unit=unit_name, optional=True),
+        Column("ratio", ratio(f"{name}_best", f"{name}_persson"), ".3f", optional=True),
+        STATUS,
+    )
 
-    `p ratio` is the pressure of the theory at the simulated mean gap over the simulated one.
-    """
-    blocks = [_table(curve) for curve in comparison.curves]
-    blocks += true_contact_tables(comparison)
-    blocks += further_tables(comparison)
-    blocks += _spreads(ensembles(comparison))
-    if comparison.missing:
-        blocks.append(f"{comparison.missing} tasks are not solved yet: run the spec again.")
-    return "\n\n".join(blocks)
 
-
-def _table(curve: Curve) -> str:
-    row = curve.rows[0]
-    theory = curve.prediction
-    extrapolated = any(row.get(f"{name}_verdict") for row in curve.rows for name in QUANTITIES)
-    lines = [
-        f"{curve.elastomer} on {curve.surface}, {_points(curve)} points a side",
-        f"Delta_sigma = {row['delta_sigma']:.6g} Pa, h_std = {row['h_std']:.6g} m, "
-        f"L = {row['length']:.6g} m",
-        *([row["preparation"]] if row.get("preparation") else []),
-        *(["  counted on the grid:"] if extrapolated else []),
-        HEADER,
-    ]
-    at_gap = curve.pressure_at_gap(curve.column("u_g"))
-    for i, row in enumerate(curve.rows):
-        a_r, sigma_p, u_g = theory.a_r[i], theory.sigma_p[i], theory.u_g[i]
-        lines.append(
-            f"{row['p_star']:8.4g} {row['a_r']:10.5f} {a_r:8.5f} {_ratio(row['a_r'], a_r)} "
-            f"{row['sigma_p']:10.5f} {sigma_p:8.5f} {_ratio(row['sigma_p'], sigma_p)} "
-            f"{row['u_g']:10.4g} {u_g:10.4g} {_ratio(row['u_g'], u_g)} "
-            f"{_ratio(at_gap[i], row['p_star'])}   {row['status']}"
+STRESS_DEVIATION = _with_units("sigma_p", "delta_sigma", "Pa")
+MEAN_GAP = _with_units("u_g", "h_std", "m")
+TRUE_CONTACT = (
+    P_STAR,
+    AREA,
+    Column("whole surface\na_r", "a_r_persson"),
+    Column("\nratio", ratio("a_r", "a_r_persson"), ".3f"),
+    *(
+        column
+        for name, area in VARIANTS.items()
+        for column in (
+            Column(f"{name}\n/ Delta_sigma", name),
+            Column("\na_r", area),
+            Column("\nratio", ratio("a_r", area), ".3f"),
         )
-    if curve.n == 0:
-        exact = einstein_prediction(curve.column("p_star"))
-        lines.append("  Gaussian heights in closed form (ratio: simulation / closed form):")
-        lines += [
-            f"{row['p_star']:8.4g} {'':10} {exact.a_r[i]:8.5f} {_ratio(row['a_r'], exact.a_r[i])} "
-            f"{'':10} {exact.sigma_p[i]:8.5f} {_ratio(row['sigma_p'], exact.sigma_p[i])} "
-            f"{'':10} {exact.u_g[i]:10.4g} {_ratio(row['u_g'], exact.u_g[i])}"
-            for i, row in enumerate(curve.rows)
-        ]
-    if extrapolated:
-        lines += _continuum(curve)
-    return "\n".join(lines)
+    ),
+)
 
 
-def _points(curve: Curve) -> str:
-    sizes = sorted({int(row["points"]) for row in curve.rows})
-    return str(sizes[0]) if len(sizes) == 1 else f"{sizes[0]} to {sizes[-1]}"
+def _columns_of(observable: Observable) -> list[Column]:
+    """An observable in reduced and in SI units; the columns that no task has are left out."""
+    heading, name, unit = observable.heading, observable.column.name, observable.unit
+    if observable.is_flag:
+        return [Column(heading, _flag(name), optional=True)]
+    number_format = "d" if observable.column.kind is int else Column.format
+    if unit is None:
+        return [Column(heading, name, number_format, optional=True)]
+    return [
+        Column(f"{heading}\n/ {unit.symbol}", name, number_format, optional=True),
+        Column(f"{heading}\n[{unit.si}]", lambda r: r[name] * unit.value(r), optional=True),
+    ]
 
 
-def _continuum(curve: Curve) -> list[str]:
-    """Continuum values with their errors, or what keeps them from having one."""
-    lines = ["  in the continuum:", "      p*  points" + _centred("a_r", "sigma_p", "u_g")]
-    for row in curve.rows:
-        cells = [continuum_cell(row, name) for name in QUANTITIES]
-        lines.append(f"{row['p_star']:8.4g} {row['points']:7d}" + _centred(*cells))
-    return lines
+def _flag(name: str) -> Callable[[Record], bool | None]:
+    return lambda record: bool(record[name]) if known(record[name]) else None
 
 
-def continuum_cell(row: Row, name: str) -> str:
-    """The continuum value of a quantity with its error, or what keeps it from having one."""
-    return plus_minus(*best(row, name)) if in_continuum(row, name) else str(row[f"{name}_verdict"])
+IN_TABLE = tuple(observable for observable in OBSERVABLES if observable.heading)
+"""The observables that the table of optional observables shows."""
+OPTIONAL_OBSERVABLES = (P_STAR, AREA, *(c for each in IN_TABLE for c in _columns_of(each)))
 
 
-def _spreads(found: list[Ensemble]) -> list[str]:
-    """One table per body: means over seeds, with the half-width of the 95 % interval."""
-    blocks: dict[str, list[str]] = {}
-    for ensemble in found:
-        head = f"{ensemble.title}: mean of {len(ensemble.rows)} seeds +- 95 % confidence"
-        lines = blocks.setdefault(head, [head, "      p*" + _centred(*QUANTITIES)])
-        spreads = [ensemble.spread(name) for name in QUANTITIES]
-        cells = [plus_minus(spread.mean, spread.half_width) for spread in spreads]
-        lines.append(f"{ensemble.rows[0]['p_star']:8.4g}" + _centred(*cells))
-    return ["\n".join(lines) for lines in blocks.values()]
+def warnings_in(rows: Sequence[Record]) -> list[str]:
+    """The warnings of some contacts, each once, with the number of contacts that have it."""
+    counts = Counter(line for row in rows for line in row["warnings"].split(SEPARATOR) if line)
+    return [f"{line} ({n} of {len(rows)} contacts)" for line, n in counts.items()]
 
 
-def _centred(*cells: str) -> str:
-    return "".join(f"{cell:>24}" for cell in cells)
+def study_tables(comparison: Comparison) -> list[Table]:
+    """The tables of `gfmd analyze`, without those that have no record."""
+    curves = [(curve_title(curve), curve) for curve in comparison.curves]
+    tables = [
+        comparison_table(curves),
+        einstein_table(curves),
+        continuum_table(curves),
+        seeds_table(comparison),
+        true_contact_table(curves),
+        observables_table(curves),
+        power_laws(comparison),
+    ]
+    return [table for table in tables if table.records]
 
 
-def plus_minus(value: float, error: float) -> str:
-    """A value and its error, as many digits as the error has meaning."""
-    if not error > 0:
-        return f"{value:.6g}"
-    digits = max(0, 1 - math.floor(math.log10(error)))
-    return f"{value:.{min(digits, 12)}f} +- {error:.2g}"
+def comparison_table(curves: TitledCurves) -> Table:
+    """Simulation beside Persson theory, as counted on the grid."""
+    groups = [Group(title, records_of(curve), _scales(curve)) for title, curve in curves]
+    caption = "Values as counted on the grid."
+    if any(curve.has_theory for _, curve in curves):
+        caption = (
+            "Comparison with Persson theory; values as counted on the grid. p ratio: pressure of "
+            "the theory at the simulated mean gap over the simulated pressure."
+        )
+    return Table(caption, COMPARISON, groups)
 
 
-def _ratio(value: float, reference: float) -> str:
-    ratio = value / reference if reference else math.nan
-    return f"{ratio:6.3f}" if math.isfinite(ratio) else "     -"
+def over_pressure(columns: Sequence[Column], caption: str, curves: TitledCurves) -> Table:
+    """Columns of the records of some curves, curve by curve."""
+    return Table(caption, columns, [Group(title, records_of(curve)) for title, curve in curves])
 
 
-def as_records(comparison: Comparison) -> list[dict[str, Any]]:
-    """One record per solved pressure; what does not apply is None."""
-    records = []
-    spreads = {
-        row["task"]: _as_record(ensemble)
-        for ensemble in ensembles(comparison)
-        for row in ensemble.rows
-    }
-    for curve in comparison.curves:
-        theory = curve.prediction
-        at_gap = curve.pressure_at_gap(curve.column("u_g"))
-        areas = true_contact_areas(curve)
-        further = further_records(curve)
-        records += [
-            {
-                **{key: plain(row[key]) for key in ("n", "thickness", "points", "seed", "p_star")},
-                "a_r": row["a_r"],
-                "a_r_persson": float(theory.a_r[i]),
-                "sigma_p": row["sigma_p"],
-                "sigma_p_persson": float(theory.sigma_p[i]),
-                "u_g": row["u_g"],
-                "u_g_persson": float(theory.u_g[i]),
-                "p_star_persson_at_u_g": plain(float(at_gap[i])),
-                "surface": curve.surface,
-                "elastomer": curve.elastomer,
-                "pressure": row["pressure"],
-                "residual": row["residual"],
-                "status": row["status"],
-                **{name: plain(row[name]) for name in ERRORS if name in row},
-                **{name: plain(row[name]) for name in VARIANTS if areas},
-                **{name: plain(float(area[i])) for name, area in areas.items()},
-                **further[i],
-                **spreads.get(row["task"], {}),
-            }
-            for i, row in enumerate(curve.rows)
-        ]
-    return records
+def einstein_table(curves: TitledCurves) -> Table:
+    """Springs (n = 0) beside the closed form."""
+    springs = [(title, curve) for title, curve in curves if curve.n == 0 and curve.has_theory]
+    return over_pressure(EINSTEIN, "Closed form for n = 0 and Gaussian heights.", springs)
 
 
-def _as_record(ensemble: Ensemble) -> dict[str, Any]:
-    """What all rows of an ensemble share."""
-    record: dict[str, Any] = {"seeds": len(ensemble.rows)}
-    for name in QUANTITIES:
-        spread = ensemble.spread(name)
-        record |= {
-            f"{name}_mean": spread.mean,
-            f"{name}_standard_error": spread.standard_error,
-            f"{name}_confidence": spread.half_width,
-        }
-    return record
+def continuum_table(curves: TitledCurves) -> Table:
+    """Continuum values with their errors, or why there is none."""
+    groups = []
+    for title, curve in curves:
+        records = records_of(curve)
+        if any(record.get(f"{name}_verdict") for record in records for name in QUANTITIES):
+            for record in records:
+                shown = [name for name in QUANTITIES if in_continuum(record, name)]
+                record |= {f"{name}_shown": record[f"{name}_continuum"] for name in shown}
+            groups.append(Group(title, records))
+    caption = "Continuum values with their estimated errors, or why there is none."
+    return Table(caption, CONTINUUM, groups)
+
+
+def seeds_table(comparison: Comparison) -> Table:
+    """Means over seeds."""
+    groups: dict[str, list[Record]] = {}
+    for ensemble in ensembles(comparison):
+        title = f"{ensemble.title}: mean of {len(ensemble.rows)} seeds"
+        record = {"p_star": ensemble.rows[0]["p_star"], **means_of(ensemble)}
+        groups.setdefault(title, []).append(record)
+    caption = "Means over seeds, +- half the width of the 95 % confidence interval (Student)."
+    return Table(caption, SEEDS, [Group(title, records) for title, records in groups.items()])
+
+
+def true_contact_table(curves: TitledCurves) -> Table:
+    """Persson theory with Delta_sigma over the contact."""
+    stored = [pair for pair in curves if true_contact_areas(pair[1])]
+    caption = "Persson theory with Delta_sigma over the contact instead of the whole surface."
+    return over_pressure(TRUE_CONTACT, caption, stored)
+
+
+def observables_table(curves: TitledCurves) -> Table:
+    """The observables that keys of [output] have turned on, with their meaning."""
+    columns = [observable.column for observable in IN_TABLE]
+    stored = [
+        (title, curve)
+        for title, curve in curves
+        if any(known(row[column.name]) for column in columns for row in curve.rows)
+    ]
+    meanings = [
+        column.meaning
+        for column in columns
+        if any(known(row[column.name]) for _, curve in stored for row in curve.rows)
+    ]
+    return over_pressure(OPTIONAL_OBSERVABLES, f"Observables: {'; '.join(meanings)}.", stored)
+
+
+def curve_title(curve: Curve) -> str:
+    """Elastomer, surface and grid in words."""
+    text = f"{curve.elastomer} on {curve.surface}, {grid_size(curve.rows)}"
+    return of_study(curve.study, text)
+
+
+def _scales(curve: Curve) -> list[str]:
+    row = curve.rows[0]
+    scales = (
+        f"Delta_sigma = {row['delta_sigma']:.6g} Pa, h_std = {row['h_std']:.6g} m, "
+        f"L = {row['length']:.6g} m"
+    )
+    warnings = [f"warning: {line}" for line in warnings_in(curve.rows)]
+    return [scales, *filter(None, [row.get("preparation")]), *warnings]

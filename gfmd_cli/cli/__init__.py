@@ -1,5 +1,6 @@
-"""The command line, a module a command. Only this package prints and knows click."""
+"""The command line: one module per command. Only this package prints and imports click."""
 
+import errno
 import faulthandler
 import os
 import sys
@@ -12,20 +13,21 @@ from gfmd_cli.cli.bench import bench
 from gfmd_cli.cli.completion import completion
 from gfmd_cli.cli.diff import diff
 from gfmd_cli.cli.init import init, surface
+from gfmd_cli.cli.messages import tell
 from gfmd_cli.cli.report import report
 from gfmd_cli.cli.results import analyze, export
 from gfmd_cli.cli.run import run
 from gfmd_cli.cli.schema import schema
 from gfmd_cli.cli.status import collect, status
 from gfmd_cli.cli.submit import submit
-from gfmd_cli.errors import GfmdError
+from gfmd_cli.errors import GfmdError, SpaceError, StudyError
 
 
 class Commands(click.Group):
-    """Ends every known error in one message and its exit status."""
+    """The group of commands; prints a known error as one message and exits with its status."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        """The commands in the order in which they are used."""
+        """The commands in the order in which a user needs them."""
         return list(self.commands)
 
     def invoke(self, ctx: click.Context) -> Any:
@@ -33,11 +35,20 @@ class Commands(click.Group):
         try:
             return super().invoke(ctx)
         except GfmdError as error:
-            from gfmd_cli.physics.ranks import is_first
+            status, message = error.exit_status, str(error)
+        except MemoryError:
+            status, message = GfmdError.exit_status, "not enough memory"
+        except BrokenPipeError:  # click ends quietly
+            raise
+        except OSError as error:
+            no_space = error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EROFS)
+            status = (SpaceError if no_space else StudyError).exit_status
+            message = str(error)
+        from gfmd_cli.grid.ranks import is_first
 
-            for line in str(error).splitlines() if is_first() else ():
-                click.echo(f"gfmd: {line}" if line == str(error) else line, err=True)
-            ctx.exit(error.exit_status)
+        for line in message.splitlines() if is_first() else ():
+            tell(f"gfmd: {line}")
+        return ctx.exit(status)
 
 
 @click.group(cls=Commands, context_settings={"max_content_width": 100})
@@ -45,16 +56,16 @@ class Commands(click.Group):
 def main() -> None:
     """Elastic contact of rough surfaces, from springs (n = 0) to plates (n = 4).
 
-    To begin with:
+    First steps:
 
     \b
-        gfmd init                       writes study.toml; --from SCAN presses a measured surface
-        gfmd run study.toml             solves it
-        gfmd analyze study.h5           sets it beside Persson theory
+        gfmd init                       write study.toml (--from SCAN: for a measured surface)
+        gfmd run study.toml             solve all tasks of the spec
+        gfmd analyze study.h5           compare the results with Persson theory
     """
-    faulthandler.enable(sys.__stderr__ or 2)  # a crash leaves its place in the log
-    # Dot products are all that is asked of BLAS: its threads bring nothing and, side by side
-    # with other processes, spin for tens of times the work.
+    faulthandler.enable(sys.__stderr__ or 2)  # a crash prints a traceback
+    # BLAS computes only dot products here. Its threads give no speed-up, and they cost a
+    # multiple of the work when several processes run at the same time.
     for library in ("OPENBLAS", "OMP", "MKL"):
         os.environ.setdefault(f"{library}_NUM_THREADS", "1")
 

@@ -5,31 +5,35 @@ from pathlib import Path
 
 import click
 
+from gfmd_cli.cli.messages import show, tell
 from gfmd_cli.cli.options import FILE, overrides_option
 from gfmd_cli.cli.progress import Reporter
+from gfmd_cli.status import Status
 
 
 @click.command()
 @click.argument("spec", type=FILE)
-@click.option("-o", "--output", type=FILE, help="Bench file; by default NAME-bench.h5 here.")
+@click.option("-o", "--output", type=FILE, help="Bench file; by default NAME-bench.h5.")
 @overrides_option
-@click.option("--figures", type=FILE, metavar="DIR", help="By default beside the bench file.")
-@click.option("-q", "--quiet", is_flag=True, help="Print the table and errors only.")
+@click.option(
+    "--figures", type=FILE, metavar="DIR", help="By default the folder of the bench file."
+)
+@click.option("-q", "--quiet", is_flag=True, help="Print only the table and errors.")
 def bench(
     spec: Path, output: Path | None, overrides: tuple[str, ...], figures: Path | None, quiet: bool
 ) -> None:
-    """Measure speed against error: each solver, each grid, each pressure.
+    """Measure speed against error for each solver, grid and pressure.
 
-    A spec whose one solver is "auto" compares it with ccg, fire and polonsky-keer. A second call
-    measures again and replaces the file. Example:
+    If the only solver of the spec is "auto", it is compared with "ccg", "fire" and
+    "polonsky-keer". A second call measures again and replaces the file. Example:
 
         gfmd bench configs/bench.toml --figures figures
     """
-    from gfmd_cli.analysis.benchmark import bench_table
-    from gfmd_cli.analysis.work_precision import draw_bench
-    from gfmd_cli.study.bench import run_bench
-    from gfmd_cli.study.parse import read_spec
-    from gfmd_cli.study.traces import check_target, write_bench
+    from gfmd_cli.bench.figure import draw_bench
+    from gfmd_cli.bench.file import check_target, write_bench
+    from gfmd_cli.bench.run import run_bench
+    from gfmd_cli.bench.table import bench_table
+    from gfmd_cli.spec.parse import read_spec
 
     resolved, text = read_spec(spec, overrides)
     path = output or Path(f"{resolved.study.name}-bench.h5")
@@ -37,7 +41,7 @@ def bench(
     with Reporter(quiet) as report:
         traces = run_bench(resolved, report)
     write_bench(path, resolved, text, traces)
-    click.echo(bench_table(traces))
+    show(bench_table(traces).as_text())
     for file in (path, *draw_bench(traces, figures or path.parent)):
-        click.echo(str(file), err=True)
-    sys.exit(0 if all(trace.row["status"] == "converged" for trace in traces) else 1)
+        tell(str(file))
+    sys.exit(0 if all(trace.row["status"] == Status.CONVERGED for trace in traces) else 1)

@@ -10,7 +10,9 @@ from gfmd_cli.cli.options import FILE
 @click.command()
 @click.argument("one", type=FILE, metavar="A.h5")
 @click.argument("other", type=FILE, metavar="B.h5")
-@click.option("--tolerance", type=click.FloatRange(min=0), help="Status 1 beyond this difference.")
+@click.option(
+    "--tolerance", type=click.FloatRange(min=0), help="Exit status 1 if a difference is larger."
+)
 @click.option("--json", "as_json", is_flag=True, help="Print records instead of tables.")
 @click.pass_context
 def diff(
@@ -18,16 +20,16 @@ def diff(
 ) -> None:
     """Compare contact area, stress deviation and mean gap of two studies.
 
-    Rows belong together by surface, seed, elastomer and load; grids and solvers may differ.
-    Rows that one study alone has are listed, and count for nothing. Where no row
-    matches and each study has one surface and one body, rows are paired by load.
+    Rows are paired by surface, seed, elastomer and load; grids and solvers may differ. Rows that
+    only one study has are listed, but not compared. If no rows match and each study has one
+    surface and one elastomer, rows are paired by load alone.
 
     Example:
 
         gfmd diff coarse.h5 fine.h5 --tolerance 0.01
     """
     from gfmd_cli.analysis.diff import diff as diff_studies
-    from gfmd_cli.analysis.diff import diff_json, diff_text
+    from gfmd_cli.analysis.diff_table import diff_json, diff_text
 
     found = diff_studies(one, other)
     click.echo(diff_json(found) if as_json else diff_text(found))

@@ -1,65 +1,94 @@
 """`gfmd init` and `gfmd surface`: from a scan to a spec."""
 
+import json
 from pathlib import Path
 
 import click
 
+from gfmd_cli.cli.messages import show, tell
 from gfmd_cli.cli.options import FILE, overrides_option
 from gfmd_cli.errors import InputError
 
 
 @click.command()
 @click.argument("spec", type=FILE, default="study.toml")
-@click.option("--from", "scan", type=FILE, metavar="SCAN", help="A measured height map to press.")
+@click.option("--from", "scan", type=FILE, metavar="SCAN", help="Measured height map to use.")
 @overrides_option
 def init(spec: Path, scan: Path | None, overrides: tuple[str, ...]) -> None:
-    """Write a commented run spec that runs in seconds, to begin with.
+    """Write a commented run spec.
 
-    With --from, it presses a measured surface: a .npy or HDF5 array, or a microscope file; --set
-    says more about it. Examples:
+    Without options the spec describes a random surface and runs in seconds. With --from it
+    describes a measured surface: a .npy or HDF5 array, or a microscope file. --set gives any key
+    of the spec. Examples:
 
     \b
         gfmd init contact.toml --from scan.di
         gfmd init contact.toml --from nm.npy --set surface.scale=1e-9 --set surface.length=1e-5
+        gfmd init steel.toml --from scan.di --set elastomer.E_star=70e9 --set "load.pressure=[1e8]"
     """
-    from gfmd_cli.study.files import write_whole
-    from gfmd_cli.study.parse import read_scan
-    from gfmd_cli.study.starter import starter, starter_of_scan
+    from gfmd_cli.files.atomic import write_whole
+    from gfmd_cli.spec.parse import read_scan
+    from gfmd_cli.spec.starter import starter, starter_of_scan
 
     if spec.exists():
         raise InputError(f"{spec}: exists already; take another name, or remove it")
-    if scan is None and overrides:
-        raise InputError("--set goes with --from here; what is written can be changed")
     if scan is None:
-        text = starter(spec.name)
+        text = starter(spec, overrides)
     else:
-        given = read_scan(scan, overrides)
-        text, remarks = starter_of_scan(spec, given)
-        for remark in remarks:
-            click.echo(f"gfmd: {scan}: {remark}", err=True)
+        of_surface = tuple(word for word in overrides if word.startswith("surface."))
+        surface = read_scan(scan, of_surface)
+        text, preparation = starter_of_scan(spec, surface, overrides)
+        show(preparation)
+        for remark in surface.remarks():
+            tell(f"gfmd: {scan}: {remark}")
     write_whole(spec, text.encode())
-    click.echo(f"{spec}: written, look through it\nnext: gfmd run {spec}")
+    show(f"{spec}: written\nnext: gfmd run {spec}")
 
 
 @click.command()
-@click.argument("path", metavar="SPEC|SCAN", type=FILE)
+@click.argument("paths", metavar="SPEC|SCAN...", type=FILE, nargs=-1, required=True)
+@click.option("--json", "as_json", is_flag=True, help="Print a list of records in SI units.")
+@click.option("--figure", type=FILE, metavar="OUT", help="Draw them: OUT.png, .pdf or .svg.")
 @overrides_option
-def surface(path: Path, overrides: tuple[str, ...]) -> None:
-    """Say what a surface is: size, rms height, gradient, curvature, and its spectrum.
+def surface(
+    paths: tuple[Path, ...], as_json: bool, figure: Path | None, overrides: tuple[str, ...]
+) -> None:
+    """Print size, roughness parameters and power spectrum of surfaces.
 
-    The power spectrum is fitted by that of a self-affine surface, which is printed as a table
-    [surface] to run. A scan is levelled and made periodic as a spec with its defaults does it.
-    Examples:
+    The parameters are those of ISO 25178 (Sq, Sa, Ssk, Sku, Sz, Sdq, Sdr, Sal), for a line profile
+    those of ISO 21920. Several surfaces give one table. The self-affine spectrum that is fitted to
+    a single surface is printed as a table [surface] for a run spec. A scan is read and prepared as
+    by `gfmd init --from`. Examples:
 
     \b
-        gfmd surface scan.di
-        gfmd surface nm.npy --set surface.scale=1e-9 --set surface.periodic=false
+        gfmd surface scan.di --figure scan.png
+        gfmd surface worn.npy new.npy --set surface.scale=1e-9 --set surface.periodic=false
     """
-    from gfmd_cli.analysis.roughness import roughness
-    from gfmd_cli.study.parse import read_scan, read_spec
+    from gfmd_cli.analysis.surface_summary import as_text, summarise, summary_table
+    from gfmd_cli.physics.indenters import RigidSurface
+    from gfmd_cli.spec.parse import read_scan, read_spec
 
-    if path.suffix == ".toml":
-        surfaces = list(read_spec(path, overrides)[0].surface)
+    surfaces: list[tuple[str, RigidSurface]] = []
+    for path in paths:
+        if path.suffix == ".toml":
+            surfaces += [(each.label, each) for each in read_spec(path, overrides)[0].surface]
+        else:
+            surfaces.append((path.name, read_scan(path, overrides)))
+    names = [name for name, _ in surfaces]
+    summaries = [summarise(each) for _, each in surfaces]
+    if as_json:
+        click.echo(json.dumps([summary.record() for summary in summaries], indent=1))
+    elif len(summaries) == 1:
+        show(as_text(summaries[0]))
     else:
-        surfaces = [read_scan(path, overrides)]
-    click.echo("\n\n".join(map(roughness, surfaces)))
+        show(summary_table(summaries, names).as_text())
+        for summary, name in zip(summaries, names, strict=True):
+            for remark in summary.remarks:
+                tell(f"gfmd: {name}: {remark}")
+    if figure is not None:
+        from gfmd_cli.analysis.plotting import styled
+        from gfmd_cli.analysis.surface_figure import summary_figure
+
+        with styled():
+            summary_figure(summaries, names).write_file(figure)
+        tell(str(figure))

@@ -1,4 +1,4 @@
-"""What the options of several commands share."""
+"""Options that several commands share."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -8,11 +8,11 @@ import click
 
 FILE = click.Path(path_type=Path)
 overrides_option = click.option(
-    "--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Override a key."
+    "--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Override a key of the run spec."
 )
 
 output_option = click.option(
-    "-o", "--output", type=FILE, help="Study file; by default NAME.h5 here."
+    "-o", "--output", type=FILE, help="Study file; by default NAME.h5 in the working directory."
 )
 
 
@@ -22,11 +22,11 @@ def study_path(spec: Any, output: Path | None) -> Path:
 
 
 def counted(counts: Mapping[str, int]) -> str:
-    """How many of each, for people."""
+    """The counts as text, such as "2 converged, 1 missing"."""
     return ", ".join(f"{count} {what}" for what, count in sorted(counts.items()))
 
 
 def repeated(output: Path | None, overrides: tuple[str, ...]) -> list[str]:
-    """-o and --set as they were given, for a command to type next."""
+    """The options -o and --set as given, for the next command to type."""
     words = [] if output is None else ["-o", str(output)]
     return [*words, *(word for override in overrides for word in ("--set", override))]

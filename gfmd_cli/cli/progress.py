@@ -3,10 +3,12 @@
 import sys
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from math import isfinite
 from typing import Any
 
-import click
+from gfmd_cli.cli.messages import printable, tell
+from gfmd_cli.units import duration
 
 LOG_EVERY = 60.0  # seconds between two lines where stderr is no terminal
 TASK = "{desc}: {n_fmt} steps, {elapsed}{postfix}"
@@ -19,7 +21,7 @@ class Reporter:
     def __init__(self, quiet: bool) -> None:
         self.bars: dict[int, Any] = {}
         self.whole: Any = None
-        self.told = time.monotonic()
+        self.last_line = time.monotonic()
         self.quiet = quiet
         self.terminal = sys.stderr.isatty()
         self.failed: dict[int, str] = {}
@@ -31,20 +33,23 @@ class Reporter:
     def __exit__(self, *_: object) -> None:
         for bar in [*self.bars.values(), self.whole]:
             if bar is not None:
-                bar.close()
+                with suppress(OSError):
+                    bar.close()
 
     def show(self, progress: Any) -> None:
         """One event of one task."""
-        if progress.event == "failed":
-            self.failed[progress.task] = progress.note
+        if progress.event == "end" and progress.status.is_failure:
+            self.failed[progress.task] = progress.message
             self._close(progress.task)
-            click.echo(f"gfmd: task {progress.task} ({progress.label}): {progress.note}", err=True)
+            message = f"gfmd: task {progress.task} ({progress.label}): {progress.message}"
+            tell(message)
         elif progress.event == "warning":
-            click.echo(f"gfmd: {progress.note}", err=True)
+            tell(f"gfmd: {progress.message}")
         elif self.quiet:
             return
         elif self.terminal:
-            self._bar(progress)
+            with suppress(OSError):  # a terminal that was closed ends no run
+                self._bar(progress)
         else:
             self._line(progress)
 
@@ -55,14 +60,14 @@ class Reporter:
             if self.whole is None:  # a bar without a total has no truth value
                 self.whole = tqdm(position=0, leave=False, bar_format=RUN)
             self.whole.set_description_str(_left(progress))
-        if progress.event in ("done", "interrupted"):
+        if progress.event == "end":
             self._close(progress.task)
             return
         bar = self.bars.get(progress.task)
         if bar is None:
             taken = {0, *(-bar.pos for bar in self.bars.values())}
             place = min(set(range(len(taken) + 1)) - taken)
-            bar = tqdm(desc=progress.label, position=place, leave=False, bar_format=TASK)
+            bar = tqdm(desc=printable(progress.label), position=place, leave=False, bar_format=TASK)
             self.bars[progress.task] = bar
         if progress.event == "step":
             bar.n = progress.step
@@ -74,31 +79,25 @@ class Reporter:
     def _close(self, task: int) -> None:
         bar = self.bars.pop(task, None)
         if bar is not None:
-            bar.close()
+            with suppress(OSError):
+                bar.close()
 
     def _line(self, progress: Any) -> None:
         now = time.monotonic()
-        if progress.event not in ("done", "step") or now - self.told < LOG_EVERY:
+        if progress.event not in ("end", "step") or now - self.last_line < LOG_EVERY:
             return
-        self.told = now
-        click.echo(
+        self.last_line = now
+        tell(
             f"{_left(progress)}; task {progress.task} {progress.label}: "
             f"step {progress.step} ({progress.points} points), residual "
-            f"{progress.residual:.1e}, a_r {progress.a_r:.4g} {progress.note}".strip("; "),
-            err=True,
+            f"{progress.residual:.1e}, a_r {progress.a_r:.4g} {progress.status or ''}".strip("; ")
         )
 
 
 def _left(progress: Any) -> str:
-    """Tasks and time left, for people."""
+    """Number of tasks and time that are left."""
     if progress.tasks_left is None:
         return ""
-    told = f"{progress.tasks_left} tasks left"
+    text = f"{progress.tasks_left} tasks left"
     seconds = progress.seconds_left
-    if not isfinite(seconds):
-        return told
-    for unit, size in (("d", 86400), ("h", 3600), ("min", 60), ("s", 1)):
-        if seconds >= 2 * size or size == 1:
-            told += f", about {seconds / size:.0f} {unit}"
-            break
-    return told
+    return f"{text}, about {duration(seconds)}" if isfinite(seconds) else text

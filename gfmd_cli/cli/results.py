@@ -1,13 +1,12 @@
-"""`gfmd analyze` and `gfmd export`: what a study holds."""
+"""`gfmd analyze` and `gfmd export`: tables, figures and files of a study."""
 
-import csv
-import io
 import json
 from pathlib import Path
 from typing import Literal
 
 import click
 
+from gfmd_cli.cli.messages import show, tell
 from gfmd_cli.cli.options import FILE
 from gfmd_cli.errors import InputError
 
@@ -15,13 +14,13 @@ from gfmd_cli.errors import InputError
 @click.command()
 @click.argument("study", type=FILE)
 @click.option("--json", "as_json", is_flag=True, help="Print a list of records instead of tables.")
-@click.option("--figures", type=FILE, metavar="DIR", help="Draw figures into this folder.")
+@click.option("--figures", type=FILE, metavar="DIR", help="Write figures into this folder.")
 @click.option(
     "--gamma",
     type=click.Choice(["paper", "fitted"]),
     default="paper",
     show_default=True,
-    help="Weight of the elastic energy in the mean gap of theory; see docs/theory.md.",
+    help="Weight of the elastic energy in the theory of the mean gap; see docs/theory.md.",
 )
 def analyze(
     study: Path, as_json: bool, figures: Path | None, gamma: Literal["paper", "fitted"]
@@ -33,32 +32,35 @@ def analyze(
         gfmd analyze demo.h5 --figures figures
     """
     from gfmd_cli.analysis.compare import compare
-    from gfmd_cli.analysis.distribution_tables import distribution_table
-    from gfmd_cli.analysis.tables import as_records, tables
+    from gfmd_cli.analysis.records import as_records
+    from gfmd_cli.analysis.run_summary import edge_warnings
 
     comparison = compare(study, gamma)
     if as_json:
         click.echo(json.dumps(as_records(comparison), indent=1))
     else:
-        told = [tables(comparison), distribution_table(comparison)]
-        click.echo("\n\n".join(text for text in told if text))
+        show(str(comparison))
+        for line in edge_warnings([row for curve in comparison.curves for row in curve.rows]):
+            show(f"\n{line}")
+        if comparison.missing:
+            show(f"\n{comparison.missing} tasks are not solved yet: run the spec again.")
     if figures is not None:
         from gfmd_cli.analysis.figures import draw_all
 
         for path in draw_all(comparison, figures):
-            click.echo(str(path), err=True)
+            tell(str(path))
 
 
 @click.command()
 @click.argument("study", type=FILE)
 @click.option(
-    "-o", "--output", type=FILE, help="FILE.csv, .nc or .vti; by default CSV to standard output."
+    "-o", "--output", type=FILE, help="FILE.csv, .nc or .vti; by default CSV on standard output."
 )
-@click.option("--task", type=int, help="Task whose fields a .vti file is to hold.")
+@click.option("--task", type=int, help="Index of the task whose fields a .vti file contains.")
 def export(study: Path, output: Path | None, task: int | None) -> None:
-    """Write a study as CSV, netCDF 4 (.nc) or, the fields of one task, as VTK image (.vti).
+    """Export a study as CSV or netCDF 4 (.nc), or the fields of one task as a VTK image (.vti).
 
-    CSV has one row per solved pressure; netCDF has all but the fields.
+    A CSV file has one row per solved pressure. A netCDF file has everything except the fields.
 
     Example:
 
@@ -70,29 +72,21 @@ def export(study: Path, output: Path | None, task: int | None) -> None:
     if task is not None and suffix != ".vti":
         raise InputError("--task: chooses fields, for a .vti file")
     if output is None:
-        click.echo(_csv(study), nl=False)
+        from gfmd_cli.analysis.export import export_csv
+
+        click.echo(export_csv(study), nl=False)
         return
     if suffix == ".csv":
-        from gfmd_cli.study.files import write_whole
+        from gfmd_cli.analysis.export import export_csv
+        from gfmd_cli.files.atomic import write_whole
 
-        write_whole(output, _csv(study).encode())
+        write_whole(output, export_csv(study).encode())
     elif suffix == ".nc":
         from gfmd_cli.analysis.export import write_netcdf
 
         write_netcdf(study, output)
     else:
-        from gfmd_cli.analysis.image import write_image
+        from gfmd_cli.analysis.vtk import write_image
 
         write_image(study, task, output)
-    click.echo(str(output))
-
-
-def _csv(study: Path) -> str:
-    from gfmd_cli.analysis.export import export_rows
-
-    header, rows = export_rows(study)
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(header)
-    writer.writerows(rows)
-    return text.getvalue()
+    show(str(output))

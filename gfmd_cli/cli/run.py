@@ -6,56 +6,67 @@ from typing import Any
 
 import click
 
+from gfmd_cli.cli.messages import show
 from gfmd_cli.cli.options import FILE, counted, output_option, overrides_option, study_path
 from gfmd_cli.cli.progress import Reporter
 from gfmd_cli.errors import InputError
+from gfmd_cli.status import Status
 
 
 @click.command()
-@click.argument("spec", type=FILE)
+@click.argument("specs", metavar="SPEC...", type=FILE, nargs=-1, required=True)
 @output_option
 @overrides_option
-@click.option("--shard", metavar="I/N", help="Only the tasks with index I modulo N.")
-@click.option("-j", "--jobs", type=click.IntRange(1, 1024), help="Worker processes.")
+@click.option("--shard", metavar="I/N", help="Run only the tasks with index I modulo N.")
+@click.option("-j", "--jobs", type=click.IntRange(1, 1024), help="Number of worker processes.")
+@click.option(
+    "--overwrite",
+    is_flag=True,
+    help="Begin anew; an old study and its unfinished work are kept under other names.",
+)
 @click.option("--dry-run", is_flag=True, help="List the tasks, their memory and time; run none.")
 @click.option(
     "--checkpoint-every",
     type=click.FloatRange(min=0, min_open=True),
     default=600.0,
     show_default=True,
-    help="Seconds between two saves of an unfinished solve.",
+    help="Seconds between two checkpoints of an unfinished solve.",
 )
 @click.option(
     "--max-hours",
     type=click.FloatRange(min=0, min_open=True),
-    help="End within this wall time, states saved, as a signal ends it: exit status 75.",
+    help="Save all states and exit with status 75 before this wall time has passed.",
 )
 @click.option(
     "--reproducible",
     is_flag=True,
-    help="The same bits on every run of one machine: transforms planned without measuring, one "
-    "thread a task. Slower.",
+    help="Give the same bits in every run on one machine: FFT plans are not measured, and each "
+    "task uses one thread. Slower.",
 )
-@click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
+@click.option("-q", "--quiet", is_flag=True, help="Print only errors.")
 def run(
-    spec: Path,
+    specs: tuple[Path, ...],
     output: Path | None,
     overrides: tuple[str, ...],
     shard: str | None,
     jobs: int | None,
+    overwrite: bool,
     dry_run: bool,
     checkpoint_every: float,
     max_hours: float | None,
     reproducible: bool,
     quiet: bool,
 ) -> None:
-    """Solve what the study does not hold yet.
+    """Run all tasks that the study does not contain yet.
 
-    Called again, it goes on where it was stopped. Example:
+    A second call resumes a stopped run. A study can hold the tasks of several specs: what is there
+    stays, what is missing is added. Several specs are run one after the other. Examples:
 
+    \b
         gfmd run configs/demo.toml --set load.p_star=0.1
+        gfmd run one.toml two.toml -o both.h5
     """
-    from gfmd_cli.physics.ranks import launched, together
+    from gfmd_cli.grid.ranks import launched, together
 
     ranks = launched()
     how = {
@@ -64,56 +75,77 @@ def run(
         "max_seconds": None if max_hours is None else 3600 * max_hours,
         "reproducible": reproducible,
         "ranks": ranks,
+        "shard": _shard(shard),
+        "overwrite": overwrite,
     }
     with together(ranks):
-        missed = _run(spec, output, overrides, _shard(shard), dry_run, quiet, how)
+        from gfmd_cli.spec.parse import read_spec
+
+        if overwrite and output is not None and len(specs) > 1:
+            raise InputError("--overwrite: with -o, each of several specs would begin anew")
+        read = [read_spec(spec, overrides) for spec in specs]
+        missed = sum(_run(*each, output, dry_run, quiet, how) for each in read)
     sys.exit(1 if missed else 0)
 
 
 def _run(
-    spec: Path,
+    spec: Any,
+    text: str,
     output: Path | None,
-    overrides: tuple[str, ...],
-    shard: tuple[int, int],
     dry_run: bool,
     quiet: bool,
     how: dict[str, Any],
 ) -> int:
     """Run, or list, the tasks of a spec; how many ended other than converged."""
-    from gfmd_cli.physics.ranks import leads
-    from gfmd_cli.study.parse import read_spec
+    from gfmd_cli.grid.ranks import leads
 
-    resolved, text = read_spec(spec, overrides)
-    path = study_path(resolved, output)
+    path = study_path(spec, output)
     ranks = how["ranks"]
     if dry_run:
-        _print_tasks(resolved, path, shard, ranks)
+        _print_tasks(spec, path, how)
         return 0
     from gfmd_cli.study.run import run_study
 
     reporter = Reporter(quiet)
     with reporter as report:
         tell = report if leads(ranks) else lambda progress: None
-        outcome = run_study(resolved, text, path, tell, shard=shard, **how)
+        outcome = run_study(spec, text, path, tell, **how)
     if leads(ranks) and not quiet:
-        _print_results(path, shard, outcome, reporter.failed)
-    return sum(outcome.values()) - outcome["converged"]
+        _print_results(spec, path, how["shard"], outcome, reporter.failed)
+    return sum(outcome.values()) - outcome[Status.CONVERGED]
 
 
-def _print_results(path: Path, shard: tuple[int, int], outcome: Any, failed: Any) -> None:
-    """What was found, what was not and why, and what to type next."""
-    from gfmd_cli.analysis.summary import missed, results
+def _print_results(
+    spec: Any, path: Path, shard: tuple[int, int], outcome: Any, failed: Any
+) -> None:
+    """Print the results, the tasks that have not converged, and the next commands."""
+    from gfmd_cli.analysis.run_summary import (
+        edge_warnings,
+        loads_in_jumps,
+        other_tasks,
+        run_text,
+        unconverged,
+    )
     from gfmd_cli.study.reading import read_rows
+    from gfmd_cli.study.tasks import plan
 
-    rows = read_rows(path) if outcome and path.exists() else []
-    rows = [row for row in rows if row["task"] % shard[1] == shard[0]]
-    if table := results(rows):
-        click.echo(f"{table}\n")
-    told = counted(outcome)
-    click.echo(f"{path}: {told or 'no tasks in this shard'}")
-    for line in missed(rows, failed):
-        click.echo(f"  {line}")
-    click.echo(f"next: gfmd analyze {path}\n      gfmd report {path}")
+    stored = read_rows(path) if outcome and path.exists() else []
+    indices = {task.id: task.index for task in plan(spec)}
+    rows = [
+        row | {"task": indices[row["task_id"]]}
+        for row in stored
+        if indices.get(row["task_id"], -1) % shard[1] == shard[0] and row["task_id"] in indices
+    ]
+    if table := run_text(rows):
+        show(f"{table}\n")
+    counts = counted(outcome)
+    show(f"{path}: {counts or 'no tasks in this shard'}")
+    jumps = loads_in_jumps(rows, spec.load.tolerance)
+    for line in [*unconverged(rows, failed), *jumps, *edge_warnings(rows)]:
+        show(f"  {line}")
+    for line in other_tasks([row for row in stored if row["task_id"] not in indices]):
+        show(f"  {line}")
+    show(f"next: gfmd analyze {path}\n      gfmd report {path}")
 
 
 def _shard(text: str | None) -> tuple[int, int]:
@@ -126,31 +158,33 @@ def _shard(text: str | None) -> tuple[int, int]:
     return int(index), int(count)
 
 
-def _print_tasks(spec: Any, path: Path, shard: tuple[int, int], ranks: Any) -> None:
-    """The tasks of a shard with what they will take, and whether the study has them."""
-    from gfmd_cli.physics.ranks import leads
+def _print_tasks(spec: Any, path: Path, how: dict[str, Any]) -> None:
+    """Print the tasks of a shard with their load, memory and time, and those that are done."""
+    from gfmd_cli.grid.ranks import leads
     from gfmd_cli.study.resources import check_memory
-    from gfmd_cli.study.store import Study
-    from gfmd_cli.study.tasks import describe, plan
+    from gfmd_cli.study.store import Study, without_result
+    from gfmd_cli.study.tasks import plan
 
-    study = Study(path)
-    study.check_spec(spec)
-    tasks = [task for task in plan(spec) if task.index % shard[1] == shard[0]]
-    held = study.held()
+    (index, count), ranks = how["shard"], how["ranks"]
+    tasks = [task for task in plan(spec) if task.index % count == index]
+    held = {} if how["overwrite"] else Study(path).held()
+    missing = without_result(tasks, held)
+    to_do = {task.id for task in missing}
     if tasks:
         check_memory(tasks, ranks)
     if not leads(ranks):
         return
-    click.echo(f"{'task':>6} {'points':>6} {'load':>10} {'MiB':>8} {'s':>8}  scene")
+    show(f"{'task':>6} {'points':>6} {'load':>10} {'MiB':>8} {'s':>8}  scene")
     for task in tasks:
-        done = f"  [{held[task.id]}]" if task.id in held else ""
+        done = f"  [{held[task.id].status}]" if task.id in held else ""
+        if done and task.id in to_do:
+            done = "  [again, for more output]"
         points = f"~{task.points}" if task.auto else str(task.points)
-        click.echo(
+        show(
             f"{task.index:6d} {points:>6} {task.asked:>10} {task.bytes / 2**20:8.0f} "
-            f"{task.seconds:8.2g}  {describe(task.surface)} | {describe(task.elastomer)}{done}"
+            f"{task.seconds:8.2g}  {task.surface.label} | {task.elastomer.label}{done}"
         )
-    missing = [task for task in tasks if task.id not in held]
-    click.echo(
+    show(
         f"{len(tasks)} tasks, {len(missing)} to do, about {sum(t.seconds for t in missing):.3g} s "
         f"of one core, at most {max((t.bytes for t in tasks), default=0) / 2**20:.0f} MiB a task; "
         f"study {path}"

@@ -1,4 +1,4 @@
-"""`gfmd status` and `gfmd collect`: how far a study is, and its records in one file."""
+"""`gfmd status` and `gfmd collect`: progress of a study; collection of its records."""
 
 import json
 import shlex
@@ -10,6 +10,7 @@ from typing import Any
 
 import click
 
+from gfmd_cli.cli.messages import show, tell
 from gfmd_cli.cli.options import (
     FILE,
     counted,
@@ -19,32 +20,36 @@ from gfmd_cli.cli.options import (
     study_path,
 )
 from gfmd_cli.errors import InputError
+from gfmd_cli.status import Status
+from gfmd_cli.units import duration
 
 
 @click.command()
 @click.argument("path", metavar="SPEC|STUDY", type=FILE)
 @output_option
 @overrides_option
-@click.option("--shards", type=int, metavar="N", help="Say it for each of N shards, too.")
+@click.option("--shards", type=int, metavar="N", help="Show the progress of each of N shards, too.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def status(
     path: Path, output: Path | None, overrides: tuple[str, ...], shards: int | None, as_json: bool
 ) -> None:
-    """Say how far a study is: what is solved, saved, missing, damaged, and what to type next.
+    """Show the progress of a study: tasks by status, and the next command to type.
 
-    It reads the study and the work beside it, changes nothing and asks no batch system, so it may
-    be called at any time. Example:
+    The command reads the study and its folder of unfinished work and changes nothing, so it can
+    be called at any time. It does not query the batch system. Example:
 
         gfmd status configs/demo.toml --shards 4
     """
-    from gfmd_cli.study.status import check_shards, is_study, state_of_study
+    from gfmd_cli.spec.parse import read_spec
+    from gfmd_cli.study.state import check_shards, is_study, state_of_spec, state_of_study
 
     if is_study(path):
         if output is not None or overrides:
             raise InputError(f"-o and --set go with a spec; {path} is a study")
         state, spec = state_of_study(path), "SPEC"
     else:
-        state, _, _ = _of_spec(path, output, overrides)
+        resolved, _ = read_spec(path, overrides)
+        state = state_of_spec(resolved, study_path(resolved, output))
         spec = str(path)
     if shards is not None:
         check_shards(shards, len(state.tasks))
@@ -52,7 +57,7 @@ def status(
     if as_json:
         click.echo(json.dumps(_as_data(state, shards, following), indent=1))
     else:
-        click.echo("\n".join([*_lines(state, shards), f"next: {following}"]))
+        show("\n".join([*_lines(state, shards), f"next: {following}"]))
 
 
 @click.command()
@@ -60,40 +65,34 @@ def status(
 @output_option
 @overrides_option
 def collect(spec: Path, output: Path | None, overrides: tuple[str, ...]) -> None:
-    """Take the records of all shards into the study; solve nothing.
+    """Collect the records of all shards into the study; solve nothing.
 
-    Every shard does so at its end; this is for those that were stopped or killed. The exit status
-    is 1 where tasks are missing or not converged. Example:
+    Every shard collects when it ends; this command is for shards that were stopped or killed. The
+    exit status is 1 if any task is missing or has not converged. Example:
 
         gfmd collect configs/demo.toml
     """
+    from gfmd_cli.spec.parse import read_spec
+    from gfmd_cli.study.state import state_of_spec
     from gfmd_cli.study.store import Study
     from gfmd_cli.study.tasks import plan
 
-    state, resolved, text = _of_spec(spec, output, overrides)
-    if state.records or state.damaged:
-        study = Study(state.study)
-        with study.work(resolved) as damaged:
-            damaged += study.collect(resolved, plan(resolved), text)
+    resolved, text = read_spec(spec, overrides)
+    study = Study(study_path(resolved, output))
+    if study.uncollected() or study.set_aside():
+        tasks = plan(resolved)
+        with study.work(tasks) as damaged:
+            damaged += study.collect(resolved, tasks, text)
         for note in damaged:
-            click.echo(f"gfmd: {note}", err=True)
-        state, _, _ = _of_spec(spec, output, overrides)
+            tell(f"gfmd: {note}")
+    state = state_of_spec(resolved, study.path)
     following = _next(state, str(spec), output, overrides)
-    click.echo("\n".join([*_lines(state, None), f"next: {following}"]))
+    show("\n".join([*_lines(state, None), f"next: {following}"]))
     sys.exit(0 if state.converged else 1)
 
 
-def _of_spec(spec: Path, output: Path | None, overrides: tuple[str, ...]) -> tuple[Any, Any, str]:
-    """How far a spec is, the spec and its text."""
-    from gfmd_cli.study.parse import read_spec
-    from gfmd_cli.study.status import state_of_spec
-
-    resolved, text = read_spec(spec, overrides)
-    return state_of_spec(resolved, study_path(resolved, output)), resolved, text
-
-
 def _lines(state: Any, shards: int | None) -> list[str]:
-    """What a person wants to know."""
+    """The state of a study as lines of text."""
     lines = [f"{state.study}: {len(state.tasks)} tasks: {counted(state.counts)}"]
     for task in state.tasks:
         if task.saved is not None:
@@ -104,6 +103,8 @@ def _lines(state: Any, shards: int | None) -> list[str]:
             )
     if state.records:
         lines.append(f"  {state.records} records are not collected yet")
+    if state.others:
+        lines.append(f"  {state.others} more tasks are there, which this spec does not ask for")
     lines += [f"  damaged, to be solved again: {name}" for name in state.damaged]
     for index in range(shards or 0):
         lines.append(f"  shard {index}/{shards}: {counted(state.shard(index, shards or 1))}")
@@ -111,12 +112,11 @@ def _lines(state: Any, shards: int | None) -> list[str]:
 
 
 def _ago(when: float) -> str:
-    seconds = max(0.0, time.time() - when)
-    return f"{seconds:.0f} s ago" if seconds < 120 else f"{seconds / 60:.0f} min ago"
+    return f"{duration(max(0.0, time.time() - when))} ago"
 
 
 def _next(state: Any, spec: str, output: Path | None, overrides: tuple[str, ...]) -> str:
-    """The command that brings the study on."""
+    """The command to run next."""
     from gfmd_cli.study.slurm import SUFFIX
 
     words = [spec, *repeated(output, overrides)]
@@ -141,12 +141,13 @@ def _as_data(state: Any, shards: int | None, following: str) -> dict[str, Any]:
     data: dict[str, Any] = {
         "study": str(state.study),
         "tasks": len(state.tasks),
-        "converged": counts["converged"],
-        "missing": counts["missing"],
+        "converged": counts[Status.CONVERGED],
+        "missing": counts[Status.MISSING],
         "statuses": dict(counts),
         "missing_tasks": state.missing,
         "saved": [_saved(task) for task in state.tasks if task.saved is not None],
         "records": state.records,
+        "others": state.others,
         "damaged": state.damaged,
         "next": following,
     }

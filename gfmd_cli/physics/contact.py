@@ -7,47 +7,75 @@ Heights, displacements and gaps are in units of h_std, stresses in Delta_sigma, 
 see one scale, whatever the units of a scene; the stiffness is then in Delta_sigma / h_std.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import sqrt
+from typing import Any
 
 import numpy as np
 
 from gfmd_cli.errors import InputError
-from gfmd_cli.physics import sweeps
-from gfmd_cli.physics.elastomer import Elastomer, Slab
-from gfmd_cli.physics.fields import BLOCK, Field, row_blocks
-from gfmd_cli.physics.grid import Grid, Operator
+from gfmd_cli.grid.arrays import Field, Mask, Modes, row_blocks
+from gfmd_cli.grid.compilation import kernel
+from gfmd_cli.grid.fft_grid import Grid, Operator, Shape, multiplicity
+from gfmd_cli.grid.pixels import any_in_pixels
+from gfmd_cli.grid.ranks import Ranks
+from gfmd_cli.physics.elastomers import LinearElastomer
+from gfmd_cli.physics.indenters import RigidSurface
 from gfmd_cli.physics.persson import Shells, shells
-from gfmd_cli.physics.ranks import Ranks
-from gfmd_cli.physics.surface import Surface, sample
+from gfmd_cli.physics.surfaces import sample
 
 ROUNDING = 1e-28  # |h(q)|^2 of a mode that only rounding has excited, relative to the largest
 SCALES = (1e-100, 1e100)  # [m, Pa]: squared, over all of the spectrum, still normal numbers
-EXACT_SQUARES = 2**20  # |q|^2 L^2 / 4 pi^2 up to which each has its own shell on any grid
-MOST_SQUARES = 28  # bits of that on a grid on which each has
 PRESSURES = (1e-30, 1e6)
 """Reduced pressures that are solved. Above 2^17, full contact on every grid, as no peak of a field
 is above its rms times the points per side; sigma - p then only loses digits. Below, squares of p*
 vanish sooner or later, and rounding of sigma has long been larger than p*."""
+ALL_ROWS = slice(None)
+DEEP = -1e30
+"""Height where nothing can touch [h_std]: below all displacements, with a square in range."""
 
 
 @dataclass(frozen=True)
 class Contact:
-    """One pressure on one scene."""
+    """Contact problem of a scene at one pressure."""
 
     grid: Grid
     height: Field
-    """Indenter h, shape `grid.shape`, zero mean."""
+    """Indenter h, shape `grid.shape`, zero mean; filled in where it is unknown."""
     stiffness: Field
     """k(q), shape `grid.spectral_shape`, zero at q = 0."""
     pressure: float
     """Nominal pressure p* = p / Delta_sigma."""
+    may_touch: Mask | None = None
+    """Points where the height is known; the others never touch. None where all are known."""
+
+    @cached_property
+    def obstacle(self) -> Field:
+        """Lower limit of u: the height where it is known, `DEEP` elsewhere."""
+        if self.may_touch is None:
+            return self.height
+        return np.where(self.may_touch, self.height, DEEP)
 
     @cached_property
     def line(self) -> Field:
         """k(q) of the waves along x, from q = 0 on, shape (points/2 + 1,)."""
         return self.grid.line(self.stiffness)
+
+    @cached_property
+    def dispersion(self) -> tuple[Field, Field]:
+        """|q| L / 2 pi of the waves along the axes, rising from the longest wave, and their k(q).
+
+        L is the side along x. On a square grid the waves along x are all of them.
+        """
+        grid = self.grid
+        m, k = np.arange(1.0, self.line.size), self.line[1:]
+        if grid.dimension == 1 or grid.is_square:
+            return m, k
+        column = grid.column(self.stiffness)
+        m = np.concatenate([m, np.arange(1, column.size) * (grid.length / grid.length_y)])
+        order = np.argsort(m, kind="stable")
+        return m[order], np.concatenate([k, column[1:]])[order]
 
     @cached_property
     def elasticity(self) -> Operator:
@@ -60,41 +88,84 @@ class Contact:
         out += self.pressure
         return out
 
+    @property
+    def boundary(self) -> str:
+        """The boundary of the map: what `grid.boundary` is."""
+        return "periodic"
+
+    def recompute(self, u: Field, sigma: Field) -> float:
+        """Compute sigma from u, or u from sigma if that is the unknown; return the residual."""
+        self.stress(u, out=sigma)
+        return self.residual(u, sigma)
+
+    def reference_level(self, u: Field, sigma: Field) -> float:
+        """Level from which displacements enter the energy: their mean, as k(0) = 0."""
+        return self.grid.total(float(u.sum())) / self.grid.size
+
+    def clear_untouchable(self, values: Any, rows: slice = ALL_ROWS) -> Any:
+        """Set values on some rows to zero, or false, where nothing can touch, in place."""
+        if self.may_touch is not None:
+            values *= self.may_touch[rows]
+        return values
+
+    @cached_property
+    def height_range(self) -> float:
+        """Highest minus lowest height [h_std]."""
+        return self.grid.max(float(self.height.max())) + self.grid.max(-float(self.height.min()))
+
     def settle(self, u: Field) -> Field:
         """Lift `u` above the indenter and lower it until it touches, in place; return it."""
-        np.maximum(u, self.height, out=u)
-        u += self.grid.most(float(np.max(self.height - u)))
-        return np.maximum(u, self.height, out=u)
+        np.maximum(u, self.obstacle, out=u)
+        u += self.grid.max(float(np.max(self.obstacle - u)))
+        return np.maximum(u, self.obstacle, out=u)
+
+    def set_displacement(self, u: Field, gap: Field, touching: Mask) -> None:
+        """u <- h in contact, else h + gap, where a point that can touch has a gap >= 0."""
+        np.maximum(gap, 0.0, out=u)
+        if self.may_touch is not None:
+            np.copyto(u, gap, where=~self.may_touch)
+        u[touching] = 0.0
+        u += self.height
 
     def residual(self, u: Field, sigma: Field) -> float:
         """Natural residual: rms of min(g, sigma), divided by min(p*, 1).
 
-        Zero exactly at the solution. The one score by which all solvers are judged.
+        Zero exactly at the solution. All solvers stop by this residual.
         """
-        bodies = map(self.grid.as_rows, (self.height, u, sigma))
-        (total,) = self.grid.rows.sums(1, sweeps.score, *bodies)
+        fields = map(self.grid.as_rows, (self.obstacle, u, sigma))
+        (total,) = self.grid.rows.sums(1, _squared_violations, *fields)
         return self.as_residual(total)
 
     def as_residual(self, violation: float) -> float:
         """Natural residual from the sum of the squares of min(g, sigma)."""
         return sqrt(violation / self.grid.size) / min(self.pressure, 1.0)
 
-    def in_single(self) -> "Contact":
-        """The same contact, rounded to single precision."""
-        grid = replace(self.grid, precision="single")
-        height, stiffness = self.height.astype(grid.real), self.stiffness.astype(grid.real)
-        return Contact(grid, height, stiffness, self.pressure)
-
-    def coarsen(self, points: int) -> "Contact":
-        """The same contact, low-passed to a coarser grid."""
-        grid = self.grid.coarser(points)
+    def coarsen(self, shape: Shape) -> "Contact":
+        """The same contact, low-pass filtered on a coarser grid."""
+        grid = self.grid.coarser(shape)
         k = self.grid.cut(self.stiffness, grid)
-        return Contact(grid, self.grid.resample(self.height, grid), k, self.pressure)
+        height, mask = self.grid.resample(self.height, grid), self._coarse_mask(grid)
+        return Contact(grid, height, k, self.pressure, mask)
+
+    def _coarse_mask(self, grid: Grid) -> Mask | None:
+        """Points of a coarser grid with a known height on a part of their pixel."""
+        return None if self.may_touch is None else any_in_pixels(self.may_touch, grid.shape)
+
+
+@kernel
+def _squared_violations(h, u, sigma, out, a, b):  # type: ignore[no-untyped-def]
+    """Sums of the squares of min(g, sigma), by rows."""
+    for i in range(a, b):
+        violation = 0.0
+        for j in range(h.shape[1]):
+            worst = min(u[i, j] - h[i, j], sigma[i, j])
+            violation += worst * worst
+        out[i, 0] = violation
 
 
 @dataclass(frozen=True)
 class Scene:
-    """A surface and an elastomer on a grid: what all pressures share."""
+    """Surface and elastomer on a grid, independent of the pressure."""
 
     grid: Grid
     height: Field
@@ -109,37 +180,79 @@ class Scene:
     """Unit of pressure [Pa]: the rms stress in full contact (of the half-space, for a slab)."""
     shells: Shells
     """The spectrum of the resolved surface with its stiffness, in physical units."""
+    may_touch: Mask | None = field(default=None, kw_only=True)
+    """Points where the height is known; the others never touch. None where all are known."""
+
+    @property
+    def highest(self) -> float:
+        """Largest height that can touch [h_std]: the mean gap without load."""
+        known = self.height if self.may_touch is None else self.height[self.may_touch]
+        return self.grid.max(float(known.max()))
+
+    def in_metres(self, field: Field) -> Field:
+        """A height or displacement in metres, from the level of the given surface."""
+        return field * self.h_std + self.mean_height
+
+    def in_pascals(self, field: Field) -> Field:
+        """A stress in Pa."""
+        return field * self.delta_sigma
 
     def contact(self, p_star: float) -> Contact:
         """The contact at reduced pressure p*. Raises InputError where that is out of range."""
+        self.check_pressure(p_star)
+        return Contact(self.grid, self.height, self.stiffness, p_star, self.may_touch)
+
+    def check_pressure(self, p_star: float) -> None:
+        """Raise InputError where a reduced pressure is out of range."""
         low, high = PRESSURES
         if not low <= p_star <= high:
             raise InputError(
                 f"load: p* = {p_star:g} is out of range, {low:g} to {high:g}: p* = 1 is "
                 f"{self.delta_sigma:.3g} Pa here; are moduli, heights and lengths in Pa and m?"
             )
-        return Contact(self.grid, self.height, self.stiffness, p_star)
 
 
 def build_scene(
-    surface: Surface,
-    elastomer: Elastomer,
+    surface: RigidSurface,
+    elastomer: LinearElastomer,
     points: int,
     threads: int = 1,
     ranks: Ranks | None = None,
+    *,
+    points_y: int = 0,
 ) -> Scene:
     """Sample the surface and reduce heights and stiffness to the scales of the resolved surface.
 
-    `ranks` are the processes that share large grids.
+    `ranks` are the processes that share large grids. By default the number of points along y makes
+    the pixels square.
 
     Raises InputError where the grid does not resolve the surface, the surface is flat, or a scale
     is out of range.
     """
-    grid, height = sample(surface, points, ranks)
-    grid = replace(grid, threads=threads)
+    grid, height = sample(surface, points, points_y, ranks)
+    scene = reduce_scene(replace(grid, threads=threads), height, elastomer)
+    return replace(scene, may_touch=touchable(surface.void(scene.grid), scene.grid))
+
+
+def touchable(void: Mask | None, grid: Grid) -> Mask | None:
+    """The points of a grid that can touch, where some cannot; None where all can.
+
+    Raises InputError for a grid that several processes share, and where no point can.
+    """
+    if void is None:
+        return None
+    if not grid.whole:
+        raise InputError('surface.missing: "void" is solved by one process; run without mpiexec')
+    if void.all():
+        raise InputError('surface.missing: "void" leaves no point that can touch')
+    return ~void
+
+
+def reduce_scene(grid: Grid, height: Field, elastomer: LinearElastomer) -> Scene:
+    """Reduce heights [m], which are overwritten, and stiffness to the scales of the surface."""
     mean = grid.total(float(height.sum())) / grid.size
     height -= mean
-    largest = grid.most(max(float(height.max()), -float(height.min())))
+    largest = grid.max(max(float(height.max()), -float(height.min())))
     height /= largest  # squares of heights of 1e-200 m would vanish
     rms = sqrt(grid.total(float(np.square(height).sum())) / grid.size)
     height /= rms
@@ -147,13 +260,14 @@ def build_scene(
     m, power, modes = radial_power(grid, height)
     q = m * (2 * np.pi / grid.length)
     k = elastomer.stiffness(q, grid.length)
-    unit = elastomer.half_space(q) if isinstance(elastomer, Slab) else k
+    unit = elastomer.unit_stiffness(q, grid.length)
     with np.errstate(over="ignore"):  # refused below
         reduced = float(np.sqrt(np.sum(power * (unit / stiffest) ** 2)))  # Eq. (23)
     h_std = largest * rms
     _check_scales(
         {
-            "L": grid.length,
+            "L": max(grid.sides),
+            "the spacing of the grid": min(grid.spacings),
             "h_std": h_std,
             "h_std times the largest k(q)": stiffest * h_std,
             "Delta_sigma": reduced * stiffest * h_std,
@@ -172,7 +286,7 @@ def build_scene(
 
 
 def _check_scales(scales: dict[str, float]) -> None:
-    """Refuse what is too large or too small to compute with; [m] and [Pa]."""
+    """Raise InputError for scales [m] and [Pa] outside the range of SCALES."""
     low, high = SCALES
     for name, scale in scales.items():
         if not low <= scale <= high:
@@ -182,49 +296,49 @@ def _check_scales(scales: dict[str, float]) -> None:
             )
 
 
-def _stiffness(grid: Grid, elastomer: Elastomer) -> tuple[Field, float]:
+def _stiffness(grid: Grid, elastomer: LinearElastomer) -> tuple[Field, float]:
     """k(q) over the half-spectrum in units of its largest value, and that value."""
     k = np.empty(grid.spectral_shape)
     with np.errstate(over="ignore"):  # refused below
         for rows in row_blocks(k):
             k[rows] = elastomer.stiffness(grid.wavenumber(rows), grid.length)
-    stiffest = grid.most(float(k.max()))
+    stiffest = grid.max(float(k.max()))
     if not (np.isfinite(stiffest) and stiffest > 0):
         raise InputError(f"elastomer: stiffness {stiffest} at the shortest wave is out of range")
     k /= stiffest
     waves = k.ravel()[1:] if grid.ends[0] else k  # the first is q = 0
-    softest = -grid.most(-float(waves.min()))
+    softest = -grid.max(-float(waves.min()))
     if not softest >= SCALES[0]:
         raise InputError(f"elastomer: stiffness falls to {softest:g} of its largest value")
     return k, stiffest
 
 
 def radial_power(grid: Grid, height: Field) -> tuple[Field, Field, Field]:
-    """Sum of |h(q)|^2 over the modes of equal |q|, where it is more than rounding.
+    """Sums of |h(q)|^2 over the modes (+-q_x, +-q_y), where they exceed rounding errors.
 
-    On grids beyond 16384 points a side, large |q| that differ by less than 1e-5 are one.
-
-    Returns |q| L / 2 pi, rising, the sums, and how many modes they are of, each (shells,).
+    Returns |q| L / 2 pi, where L is the side along x, the sums, and their numbers of modes, each
+    of shape (sums,).
     """
-    coefficients = grid.forward_into_work(height)
-    half = grid.points // 2
-    highest = grid.dimension * half**2
-    merged = max(0, highest.bit_length() - MOST_SQUARES)  # 2^merged squares are one
-    exact = EXACT_SQUARES if merged else highest + 1
-    total, count = np.zeros((2, exact + (max(highest - exact, 0) >> merged) + 1))
-    for rows in row_blocks(coefficients, max(coefficients.size // 16, BLOCK)):
-        square = np.rint(grid.mode_number(rows) ** 2).astype(np.int64)  # a whole number
-        if merged:
-            np.copyto(square, exact + (square - exact >> merged), where=square >= exact)
-        weight = grid.multiplicity() if grid.dimension == 2 else grid.multiplicity()[rows]
-        power = np.abs(coefficients[rows]) ** 2 * weight
-        weight = np.broadcast_to(weight, square.shape)
-        total += np.bincount(square.ravel(), power.ravel(), minlength=total.size)
-        count += np.bincount(square.ravel(), weight.ravel(), minlength=total.size)
-    total, count = grid.total(total), grid.total(count)
-    total[0] = 0.0
-    (square,) = np.nonzero(total > ROUNDING * total.max())
-    squares = square.astype(np.float64)
-    beyond = squares[square >= exact]
-    squares[square >= exact] = exact + (beyond - exact + 0.5) * 2**merged - 0.5  # their middle
-    return np.sqrt(squares), total[square] / float(grid.size) ** 2, count[square]
+    modes = grid.forward_into_work(height).reshape(grid.points_y, -1)
+    power = grid.gather_columns(_opposite_rows_added(modes) * grid.multiplicity())
+    power[0, 0] = 0.0
+    row, column = np.nonzero(power > ROUNDING * power.max())
+    m_y = row * (grid.length / grid.length_y) if grid.dimension == 2 else row
+    count = multiplicity(grid.points_y)[row] * multiplicity(grid.points)[column]
+    return np.sqrt(m_y**2 + column**2), power[row, column] / float(grid.size) ** 2, count
+
+
+def _opposite_rows_added(modes: Modes) -> Field:
+    """Sums of |h|^2 over q_y and -q_y, for q_y >= 0."""
+    count = len(modes)
+    power = np.empty((count // 2 + 1, modes.shape[1]))
+    for rows in row_blocks(power):
+        y = np.arange(len(power))[rows]
+        has_opposite = (y > 0) & (2 * y < count)
+        power[rows] = _squared(modes[rows.start : y[-1] + 1])
+        power[y[has_opposite]] += _squared(modes[-y[has_opposite]])
+    return power
+
+
+def _squared(modes: Modes) -> Field:
+    return np.asarray(np.square(modes.real) + np.square(modes.imag))

@@ -1,34 +1,45 @@
-"""What is measured on a solved contact, in reduced units."""
+"""Observables of a solved contact, in reduced units."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
+from gfmd_cli.grid.arrays import Field, Mask, row_blocks
+from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.physics.contact import Contact
-from gfmd_cli.physics.fields import Field, Mask, row_blocks
-from gfmd_cli.physics.grid import Grid
 
 
-def contact_points(contact: Contact, u: Field, sigma: Field) -> Mask:
-    """Points that carry load: on the indenter and pressed against it."""
-    points: Mask = u == contact.height
+def contact_points(height: Field, u: Field, sigma: Field) -> Mask:
+    """Mask of the points in contact, where u = h and sigma > 0.
+
+    `height` and `u` are in the same unit. `Contact.obstacle` as the height leaves out points that
+    never touch. The stress alone is no criterion, because it is rounded.
+    """
+    points: Mask = u == height
     points &= sigma > 0
     return points
 
 
-def switches(grid: Grid, mask: Mask) -> int:
-    """Changes between contact and non-contact of neighbours along all axes, periodic."""
-    count = 0
+def contact_pressure(height: Field, u: Field, sigma: Field) -> Field:
+    """The stress at the points in contact, and exactly zero at all others."""
+    return np.where(contact_points(height, u, sigma), sigma, 0.0)
+
+
+def contact_line(grid: Grid, mask: Mask, *, periodic: bool = True) -> float:
+    """Contact line per area times the side along x; of a line contact, the number of edges."""
+    counts = np.zeros(mask.ndim)
     for axis in range(mask.ndim):
         lines = np.moveaxis(mask, axis, 0)
-        below = grid.below(lines) if axis == 0 else lines[0]
-        count += int(np.count_nonzero(lines[1:] != lines[:-1]))
-        count += int(np.count_nonzero(lines[-1] != below))
-    return int(grid.total(count))
+        counts[axis] += np.count_nonzero(lines[1:] != lines[:-1])
+        if periodic:
+            below = grid.next_row(lines) if axis == 0 else lines[0]
+            counts[axis] += np.count_nonzero(lines[-1] != below)
+    across = np.divide(1.0, grid.spacings)  # edge length over the area of a point
+    return float(grid.total(counts) @ across) * grid.length / grid.size
 
 
 QUANTITIES = ("a_r", "sigma_p", "u_g")
-"""The observables that errors are told of, by name."""
+"""Names of the observables that have error estimates."""
 
 
 @dataclass(frozen=True)
@@ -38,43 +49,47 @@ class Observables:
     a_r: float
     """Relative contact area: share of the grid points that carry load."""
     sigma_p: float
-    """Standard deviation of the stress over the whole interface [Delta_sigma]."""
+    """Standard deviation of the contact pressure over the whole interface [Delta_sigma]."""
     u_g: float
-    """Mean gap [h_std]."""
+    """Mean gap [h_std]; where heights are unknown, with those that are filled in."""
     perimeter: float
-    """Contact line per area times L: spacing times the switches along rows and columns / L; for
-    a line scene the number of contact edges."""
+    """Contact line per area times L, from the switches between neighbours, each as long as the
+    side that two points share; for a line contact the number of contact edges."""
     energy: float
     """Elastic energy per area v = <u K u> / 2 [h_std Delta_sigma]."""
     work: float
-    """<sigma h> - p <u> [h_std Delta_sigma], equal to 2 v at the solution."""
+    """<sigma h> - p <u> [h_std Delta_sigma], equal to 2 v at the solution; for a free boundary u
+    counts from the level of the undeformed surface."""
 
 
 def observe(contact: Contact, u: Field, sigma: Field) -> Observables:
-    """Measure the scalars on a displacement and its stress sigma = K u + p."""
-    grid, touching = contact.grid, contact_points(contact, u, sigma)
-    sums = np.zeros(5)
+    """Measure the scalars of a displacement and its stress."""
+    grid, touching = contact.grid, contact_points(contact.obstacle, u, sigma)
+    sums = np.zeros(6)
     for rows in row_blocks(u):
         v, h = u[rows], contact.height[rows]
-        elastic = sigma[rows] - contact.pressure
-        terms = (v - h, elastic * elastic, v * elastic, sigma[rows] * h, v)
+        elastic = sigma[rows] - contact.pressure  # first, as sigma - p cancels at large p
+        deviation = np.where(touching[rows], elastic, -contact.pressure)
+        terms = (v - h, deviation, deviation * deviation, v * elastic, sigma[rows] * h, v)
         sums += [float(term.sum()) for term in terms]
-    gap, variance, twice_energy, lifted, mean = grid.total(sums) / grid.size
+    gap, offset, square, twice_energy, lifted, mean = grid.total(sums) / grid.size
+    level = contact.reference_level(u, sigma)
+    twice_energy += contact.pressure * (mean - level)
     return Observables(
         a_r=int(grid.total(np.count_nonzero(touching))) / grid.size,
-        sigma_p=float(np.sqrt(variance)),
+        sigma_p=float(np.sqrt(max(square - offset * offset, 0.0))),
         u_g=float(gap),
-        perimeter=switches(grid, touching) / grid.points ** (grid.dimension - 1),
+        perimeter=contact_line(grid, touching, periodic=contact.boundary == "periodic"),
         energy=0.5 * float(twice_energy),
-        work=float(lifted - contact.pressure * mean),
+        work=float(lifted - contact.pressure * level),
     )
 
 
 @dataclass(frozen=True)
-class Distribution:
-    """Pr(x) of x >= 0 in its unit: zero weight + sum of density times width + beyond = 1.
+class Histogram:
+    """Distribution Pr(x) of x >= 0: zero + sum of density times width + beyond = 1.
 
-    In logarithmic bins the share `below` them adds to that.
+    For the logarithmic bins the sum includes the share `below` them.
     """
 
     linear: Field
@@ -92,46 +107,48 @@ class Distribution:
 def linear_edges() -> Field:
     """Edges of the linear bins of stresses [Delta_sigma] and gaps [h_std].
 
-    Of width 0.05 up to 10, where a Gauss tail has ended.
+    The width is 0.05 and the end is 10, where a Gaussian of unit width is below 1e-21.
     """
     return np.linspace(0.0, 10.0, 201)
 
 
 def logarithmic_edges() -> Field:
-    """Edges of the logarithmic bins [Delta_sigma, h_std]: ten a decade from 1e-6 to 1e4."""
+    """Edges of the logarithmic bins [Delta_sigma, h_std]: ten per decade from 1e-6 to 1e4."""
     return np.logspace(-6.0, 4.0, 101)
 
 
 def logarithmic_middles() -> Field:
-    """Geometric middles of the logarithmic bins."""
+    """Geometric means of the edges of the logarithmic bins."""
     return geometric_middles(logarithmic_edges())
 
 
 def geometric_middles(edges: Field) -> Field:
-    """Geometric middles of bins, one fewer than edges."""
+    """Geometric means of neighbouring edges, shape (edges - 1,)."""
     return np.asarray(np.sqrt(edges[1:] * edges[:-1]))
 
 
-def stress_distribution(contact: Contact, u: Field, sigma: Field) -> Distribution:
-    """Histogram of the stress over the points that carry load, as densities over sigma."""
-    return _distribution(contact.grid, sigma[contact_points(contact, u, sigma)])
+def stress_histogram(contact: Contact, u: Field, sigma: Field) -> Histogram:
+    """Histogram of the stress at the points in contact; zero elsewhere."""
+    return _histogram(contact.grid, sigma[contact_points(contact.obstacle, u, sigma)], u.size)
 
 
-def gap_distribution(contact: Contact, u: Field) -> Distribution:
-    """Histogram of the gap over the points off the indenter, as densities over g."""
+def gap_histogram(contact: Contact, u: Field) -> Histogram:
+    """Histogram of the gap where the height is known."""
     gap = u - contact.height
-    return _distribution(contact.grid, gap[gap > 0])
+    if contact.may_touch is not None:
+        gap = gap[contact.may_touch]
+    return _histogram(contact.grid, gap[gap > 0], gap.size)
 
 
-def _distribution(grid: Grid, positive: Field) -> Distribution:
-    """Densities over the values of the points where they are positive; elsewhere they are zero."""
-    size, count = grid.size, int(grid.total(positive.size))
+def _histogram(grid: Grid, positive: Field, points: int) -> Histogram:
+    """Histogram of a field with these positive values among so many points, zero at the others."""
+    size, count = int(grid.total(points)), int(grid.total(positive.size))
     linear, logarithmic = (
         grid.total(np.histogram(positive, edges())[0])
         for edges in (linear_edges, logarithmic_edges)
     )
     below = grid.total(np.count_nonzero(positive < logarithmic_edges()[0]))
-    return Distribution(
+    return Histogram(
         linear=linear / (size * np.diff(linear_edges())),
         logarithmic=logarithmic / (size * np.diff(logarithmic_edges())),
         zero=1.0 - count / size,

@@ -4,14 +4,14 @@ Equation numbers are those of the paper: Mueser, "Elastic contacts of randomly r
 the spatial dimensions", Sect. 4.1 and 5.2. Sums over q never contain q = 0.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
 from scipy.special import erf, erfc, erfcx, erfinv
 
-from gfmd_cli.physics.fields import Field
+from gfmd_cli.grid.arrays import Field
 
 _GAMMA = {0.0: 0.5, 0.5: 0.45, 1.0: 0.35, 2.0: 0.2, 3.0: 0.1, 4.0: 0.02}  # Eq. (39)
 _FITTED = (0.3867, 1.4779, 0.1273)  # of `gamma_fitted`, from scripts/gamma_fit.py
@@ -30,6 +30,14 @@ def ierfc(x: Field) -> Field:
     return value
 
 
+def monotone_cubic(x: Field, y: Field) -> Callable[[Field], Field]:
+    """Monotone cubic (PCHIP) through points of rising x."""
+    from scipy.interpolate import PchipInterpolator  # half a second that most processes save
+
+    curve: Callable[[Field], Field] = PchipInterpolator(x, y)
+    return curve
+
+
 def gamma_n(n: Field | float) -> Field:
     """Weight gamma_n of the elastic energy for k ~ q^n, 0 <= n <= 4.
 
@@ -42,8 +50,10 @@ def gamma_n(n: Field | float) -> Field:
     nodes = np.array(list(_GAMMA))
     if np.any((exponent < nodes[0]) | (exponent > nodes[-1])):
         raise ValueError(f"gamma_n is known for 0 <= n <= 4, got n = {n}")
-    value: Field = PchipInterpolator(nodes, np.array(list(_GAMMA.values())))(exponent)
-    return value
+    values = np.array(list(_GAMMA.values()))
+    if np.isin(exponent, nodes).all():
+        return np.asarray(values[np.searchsorted(nodes, exponent)])
+    return monotone_cubic(nodes, values)(exponent)
 
 
 def gamma_fitted(n: Field | float) -> Field:
@@ -75,7 +85,7 @@ class Shells:
     energy: Field  # sum of k C: twice the energy of full contact [Pa m]
     variance: Field  # sum of k^2 C: variance of the full-contact stress, Eq. (23) [Pa^2]
     gamma: Field  # mean gamma of Eq. (30), weighted with k C
-    modes: Field | None = None  # how many carry power; None in studies of older versions
+    modes: Field | None = None  # number of modes with power, for fits of the spectrum
 
     def exponents(self) -> Field:
         """d ln k / d ln q, of k = sum of k^2 C / sum of k C in every shell."""
@@ -104,7 +114,7 @@ def shells(
     power : |h(q)|^2 times the multiplicity of the mode [m^2], shape (modes,)
     k : stiffness k(q) [Pa/m], shape (modes,)
     gamma : weight gamma(q) of Eq. (30), shape (modes,)
-    modes : how many modes an entry stands for, by default one each, shape (modes,)
+    modes : number of modes that an entry represents, by default one each, shape (modes,)
     exact : number of smallest |q| with power that get a bin each
     bins : number of logarithmic bins between the last of these and the largest |q| with power
     """
@@ -239,13 +249,18 @@ class Persson:
 
         Good to 1e-4 for Delta_sigma / 1e6 <= p <= 6 Delta_sigma; NaN for no gap, the ends beyond.
         """
+        rising, table = self._pressures_over_gap
+        wanted = -np.log(np.where(np.asarray(u_g) > 0, u_g, np.nan))
+        return np.asarray(np.exp(table(np.clip(wanted, rising[0], rising[-1]))))
+
+    @cached_property
+    def _pressures_over_gap(self) -> tuple[Field, Callable[[Field], Field]]:
+        """Rising values of -ln u_g, and ln p as a function of them."""
         p = self.delta_sigma * np.geomspace(*_TABLE)
         gap = self.mean_gap(p)
         known = gap > 0
         rising = -np.log(gap[known])
-        wanted = -np.log(np.where(np.asarray(u_g) > 0, u_g, np.nan))
-        table = PchipInterpolator(rising, np.log(p[known]))
-        return np.asarray(np.exp(table(np.clip(wanted, rising[0], rising[-1]))))
+        return rising, monotone_cubic(rising, np.log(p[known]))
 
     def _reduced(self, p: Field | float) -> Field:
         """p / sqrt(2) Delta_sigma; a flat surface is in full contact under any pressure."""
@@ -294,7 +309,7 @@ def _resolved_variance(p: Field, s: Field | float) -> Field:
 
 
 def _panel_edges(p: Field, delta_sigma: float) -> Field:
-    """Rising pressures from the lowest asked to the end of the Gaussian tail, every p among them.
+    """Increasing pressures from the smallest p to the end of the Gaussian tail, including every p.
 
     A panel spans at most a factor sqrt(e), and at most a factor e^4 of exp(-p^2 / 2 Delta_sigma^2).
     """

@@ -1,13 +1,13 @@
-"""Delta_sigma taken over the contact, in the place of the whole surface, in Persson theory.
+"""Delta_sigma over the true contact instead of the whole surface, for Persson theory.
 
 Mueser, "Elastic contacts of randomly rough surfaces across the spatial dimensions", Eq. (20) and
 Sects. 4.1.2, 6, 7: a_r = erf(p / sqrt(2) Delta_sigma_c) (Sect. 6 prints no sqrt(2)). Two fields
-have Delta_sigma as their rms over the whole surface, and part ways over the contact:
+have the rms value Delta_sigma over the whole surface, but different values over the contact:
 
-- s = K h, the stress of full contact without p. Contact prefers its peaks, so that its mean over
-  the contact is no fluctuation: it is the standard deviation that counts.
-- w, the waves of s a quarter of their length on, along q: Eq. (22) with the factor i that it
-  prints. For n = 1, w = k_1 grad h, which is Eq. (20) to the letter.
+- s = K h, the stress of full contact without p. Contact is more likely at its maxima, so its mean
+  over the contact is not zero, and its standard deviation is used.
+- w(q) = i (q / |q|) s(q), a vector along q: Eq. (22) with its factor i. For n = 1, w = k_1 grad h,
+  as in Eq. (20).
 """
 
 from collections.abc import Iterator
@@ -16,17 +16,17 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import erf, erfinv
 
+from gfmd_cli.grid.arrays import Field, Mask, row_blocks
+from gfmd_cli.grid.fft_grid import ALL, Grid
 from gfmd_cli.physics.contact import Contact
-from gfmd_cli.physics.fields import Field, Mask, row_blocks
-from gfmd_cli.physics.grid import ALL, Grid
 
-BINS = 1 << 14  # of height: 1e-3 h_std and less
-FEW = 10  # points; fewer have no standard deviation worth the name
+BINS = 1 << 14  # of height, of width 1e-3 h_std or less for heights within +-8 h_std
+MIN_POINTS = 10  # for a standard deviation; a choice
 
 
 @dataclass(frozen=True)
 class ContactStress:
-    """What the stress of full contact is like over the true contact [Delta_sigma]."""
+    """Moments of the stress of full contact over the true contact [Delta_sigma]."""
 
     deviation: float
     """Standard deviation of s = K h; NaN without contact."""
@@ -35,7 +35,7 @@ class ContactStress:
 
 
 def contact_stress(contact: Contact, touching: Mask) -> ContactStress:
-    """Take both measures over the points of contact, shape of the grid."""
+    """Compute both moments over the points in contact, a mask of shape `grid.shape`."""
     if not np.any(touching):
         return ContactStress(np.nan, np.nan)
     field = contact.grid.empty()
@@ -46,7 +46,7 @@ def contact_stress(contact: Contact, touching: Mask) -> ContactStress:
 
 
 def _quadratures(contact: Contact, out: Field) -> Iterator[Field]:
-    """The components of w, one after another, each written to `out`."""
+    """Yield the components of w, each in `out`."""
     grid = contact.grid
     for axis in range(grid.dimension):
         modes = grid.forward_into_work(contact.height)
@@ -59,40 +59,39 @@ def _quadratures(contact: Contact, out: Field) -> Iterator[Field]:
 def direction(grid: Grid, axis: int, rows: slice = ALL) -> Field:
     """Component of q / |q| along an axis for rows of `grid.spectral_shape`; zero at q = 0.
 
-    Zero also where the component is that of the highest wave of the grid, whose sign is not known.
+    Also zero where the component is the highest wavenumber of the grid, which has no sign.
     """
-    half = grid.points // 2
-    along = np.arange(half + 1, dtype=np.float64)
-    if grid.dimension == 2:
-        across = np.fft.fftfreq(grid.points, 1 / grid.points)[rows, None]
-        component = np.broadcast_to((across, along)[axis], (len(across), half + 1))
-    else:
-        component = along[rows]
-    part = np.where(np.abs(component) < half, component, 0.0)
-    return np.asarray(part / np.maximum(grid.mode_number(rows), 1.0))
+    y = np.fft.fftfreq(grid.points_y, 1 / grid.points_y)[rows, None]
+    wave = (y, np.arange(*grid.span, dtype=np.float64))[axis + 2 - grid.dimension]
+    points, side = grid.whole_shape[axis], grid.sides[axis]
+    q = grid.wavenumber(rows)
+    component = np.where(2 * np.abs(wave) < points, wave * (2 * np.pi / side), 0.0)
+    if grid.dimension == 1:
+        component = component[rows]
+    return np.divide(component, q, out=np.zeros_like(q), where=q > 0)
 
 
 @dataclass(frozen=True)
 class Bearing:
-    """The deviation of s over the highest points of the indenter, over rising shares of them."""
+    """Standard deviation of s over the highest points, as a function of their share."""
 
     area: Field
-    """Share of the points that are high enough, rising."""
+    """Share of the points that are above a height, increasing."""
     deviation: Field
-    """Standard deviation of s over them [Delta_sigma]."""
+    """Standard deviation of s over these points [Delta_sigma]."""
 
     def delta_sigma_c(self, p_star: Field | float) -> Field:
-        """The Delta_sigma_c [Delta_sigma] that goes with its own a_r. Paper Sect. 7.
+        """Delta_sigma_c [Delta_sigma] that is consistent with its contact area. Paper Sect. 7.
 
-        A share a carries p = sqrt(2) Delta_sigma_c(a) erfinv(a). Where that is no rising function
-        the least share counts; beyond its ends Delta_sigma_c stays what it is there.
+        The pressure for a share a is p = sqrt(2) Delta_sigma_c(a) erfinv(a). Where p(a) does not
+        increase, the smallest share is used; beyond its ends, Delta_sigma_c is constant.
         """
         p = np.sqrt(2) * self.deviation * erfinv(self.area)
         rises = p > np.maximum.accumulate(np.append(0.0, p))[:-1]
         return np.asarray(np.interp(np.log(p_star), np.log(p[rises]), self.deviation[rises]))
 
     def contact_area(self, p_star: Field | float) -> Field:
-        """Relative contact area with its own Delta_sigma_c. Paper Sect. 7."""
+        """Relative contact area for the consistent Delta_sigma_c. Paper Sect. 7."""
         return contact_area(self.delta_sigma_c(p_star), p_star)
 
 
@@ -106,7 +105,7 @@ def contact_area(delta_sigma_c: Field | float, p_star: Field | float) -> Field:
 
 
 def bearing(contact: Contact) -> Bearing:
-    """Sort the points of the indenter by height, in fine bins."""
+    """Compute the bearing of an indenter from its points, sorted by height in fine bins."""
     height = contact.height
     stress = contact.elasticity(contact.height, contact.grid.empty())
     low, high = float(height.min()), float(height.max())
@@ -117,7 +116,7 @@ def bearing(contact: Contact) -> Bearing:
         for total, weight in zip(sums, (np.ones_like(values), values, values**2), strict=True):
             total += np.bincount(where, weight, minlength=BINS)
     count, total, square = np.cumsum(sums, axis=1)
-    kept = (count >= FEW) & (count < height.size) & (sums[0] > 0)
+    kept = (count >= MIN_POINTS) & (count < height.size) & (sums[0] > 0)
     mean = total[kept] / count[kept]
     variance = np.maximum(square[kept] / count[kept] - mean**2, 0.0)
     known = variance > 0

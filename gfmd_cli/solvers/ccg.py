@@ -1,92 +1,111 @@
 """Constrained conjugate gradients in the displacement, without a preconditioner.
 
 Bugnicourt, Sainsot, Dureisseix, Gauthier & Lubrecht, Tribol. Lett. 66, 29 (2018), without their
-adhesion: Polak-Ribiere directions on all points but those that are pressed onto the indenter, an
-exact step, and a projection onto u >= h after which the conjugation simply goes on. Nothing tames
-the range of k(q), from the distance of the contacts to the grid, so the steps grow as N^(n/2): by
-1.4, 2.1 and 2.9 from 256^2 to 512^2 at n = 1, 2 and 3 (p* = 0.1, residual 1e-4).
+adhesion. A step of the method, with the numbers beside the code lines:
+
+[1] Compute the force on all points but those that are pressed onto the indenter.
+[2] Compute the Polak-Ribiere direction.
+[3] Compute the step length that minimises the energy.
+[4] Project the displacement on u >= h; the conjugation is continued after the projection.
+
+The range of k(q) extends from the distance of the contacts to the grid spacing. The number of steps
+therefore grows as N^(n/2): by 1.4, 2.1 and 2.9 from 256^2 to 512^2 at n = 1, 2 and 3 (p* = 0.1,
+residual 1e-4).
 """
 
 from collections.abc import Iterator
-from typing import Literal
+from dataclasses import dataclass
+from typing import ClassVar, Literal
 
 import numpy as np
 
-from gfmd_cli.physics.choice import Choice
+from gfmd_cli.grid.arrays import Field, Mask
+from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.physics.contact import Contact
-from gfmd_cli.physics.fields import Field, Mask
-from gfmd_cli.physics.grid import Grid
-from gfmd_cli.solvers.loop import State
+from gfmd_cli.solvers.loop import Solver, State
 
 
-class ConstrainedCG(Choice):
+@dataclass(kw_only=True)
+class CCGState(State):
+    """State of constrained conjugate gradients."""
+
+    direction: Field
+    force: Field
+    """Admissible force of the last step."""
+    descent: float = 0.0
+    """Sum of force times direction; 0 where the conjugation restarts."""
+
+
+class ConstrainedCG(Solver):
     """Constrained conjugate gradients in the displacement."""
 
     kind: Literal["ccg"] = "ccg"
+    fields_in_memory: ClassVar[float] = 10.5
+    """Fields of double precision at the peak of a solve; scripts/memory.py measures it."""
 
-    def begin(self, contact: Contact, u: Field) -> State:
+    state_type: ClassVar[type[State]] = CCGState
+
+    def begin(self, contact: Contact, u: Field) -> CCGState:
         """Start from `u`, lifted above the indenter and lowered until it touches."""
         contact.settle(u)
         sigma = contact.stress(u, out=contact.grid.empty())
-        fields = {"direction": np.zeros_like(u), "force": np.zeros_like(u)}
-        return State(u, sigma, transforms=2, fields=fields, scalars={"descent": 0.0})
+        zeros = np.zeros_like(u)
+        return CCGState(u=u, sigma=sigma, transforms=2, direction=zeros, force=zeros.copy())
 
-    def iterate(self, contact: Contact, state: State) -> Iterator[State]:
-        """Advance `state` in place: one pair of transforms a step, two where points touch down."""
-        h, u, sigma = contact.height, state.u, state.sigma
-        answer, force = contact.grid.empty(), contact.grid.empty()
+    def iterate(self, contact: Contact, state: CCGState) -> Iterator[CCGState]:
+        """Advance `state` in place; a step takes one pair of transforms, two if it is projected."""
+        h, u, sigma = contact.obstacle, state.u, state.sigma
+        response, force = contact.grid.empty(), contact.grid.empty()
         while True:
             state.residual = contact.residual(u, sigma)
             yield state
-            pressed = self._force(contact, state, force)  # [1] admissible residual
-            self._turn(contact.grid, state, force, pressed)  # [2] the new direction
-            state.fields["force"], force = force, state.fields["force"]
-            direction = state.fields["direction"]
-            contact.elasticity(direction, out=answer)
+            pressed = self._force(contact, state, force)  # [1]
+            self._turn(contact.grid, state, force, pressed)  # [2]
+            state.force, force = force, state.force
+            contact.elasticity(state.direction, out=response)
             state.transforms += 2
-            length = self._length(contact, state, answer)  # [3] the exact step
-            np.multiply(direction, length, out=force)
+            length = self._length(contact, state, response)  # [3]
+            np.multiply(state.direction, length, out=force)
             u += force
             below = u < h
             if contact.grid.total(np.count_nonzero(below)):
-                u[below] = h[below]  # [4] admissible displacement
+                u[below] = h[below]  # [4]
                 contact.stress(u, out=sigma)
                 state.transforms += 2
                 state.exact = True
             else:
-                answer *= length
-                sigma += answer
+                response *= length
+                sigma += response
                 state.exact = False
             state.step += 1
 
-    def _force(self, contact: Contact, state: State, force: Field) -> Mask:
-        """Write -sigma to `force`, zero where the indenter carries it; return these points."""
-        pressed: Mask = (state.u == contact.height) & (state.sigma >= 0)
+    def _force(self, contact: Contact, state: CCGState, force: Field) -> Mask:
+        """Write -sigma to `force`, zero where the indenter presses; return these points."""
+        pressed: Mask = (state.u == contact.obstacle) & (state.sigma >= 0)
         np.multiply(state.sigma, -1.0, out=force)
         force[pressed] = 0.0
         return pressed
 
-    def _turn(self, grid: Grid, state: State, force: Field, pressed: Mask) -> None:
+    def _turn(self, grid: Grid, state: CCGState, force: Field, pressed: Mask) -> None:
         """d <- f + beta d, beta = f (f - f_old) / (length d K d), where length d K d = f_old d."""
-        direction, descent = state.fields["direction"], state.scalars["descent"]
-        beta = 0.0
-        if descent > 0:
-            change = np.vdot(force, force) - np.vdot(force, state.fields["force"])
-            beta = grid.total(float(change)) / descent
+        direction, beta = state.direction, 0.0
+        if state.descent > 0:
+            change = np.vdot(force, force) - np.vdot(force, state.force)
+            beta = grid.total(float(change)) / state.descent
         direction *= beta
         direction += force
         direction[pressed] = 0.0
-        state.scalars["descent"] = grid.total(float(np.vdot(force, direction)))
+        state.descent = grid.total(float(np.vdot(force, direction)))
 
-    def _length(self, contact: Contact, state: State, answer: Field) -> float:
-        """The length that minimises the energy along the direction d; `answer` is K d.
+    def _length(self, contact: Contact, state: CCGState, response: Field) -> float:
+        """Length that minimises the energy along the direction d; `response` is K d.
 
-        Along a direction that costs no energy, as when nothing touches, the height of the
-        indenter limits it.
+        Along a direction without elastic energy, which is a rigid shift, the height of the indenter
+        limits the length.
         """
-        grid, h = contact.grid, contact.height
-        direction, descent = state.fields["direction"], state.scalars["descent"]
-        curvature = grid.total(float(np.vdot(direction, answer)))
-        reach = grid.most(float(h.max())) + grid.most(-float(h.min()))
-        reach /= max(grid.most(float(np.abs(direction).max())), 1e-300)
+        grid = contact.grid
+        direction, descent = state.direction, state.descent
+        curvature = grid.total(float(np.vdot(direction, response)))
+        reach = contact.height_range
+        reach /= max(grid.max(float(np.abs(direction).max())), 1e-300)
         return descent / curvature if curvature * reach > abs(descent) else reach

@@ -1,75 +1,95 @@
 """Green's function molecular dynamics, relaxed by the fast inertial relaxation engine (FIRE).
 
 Zhou, Moseler & Muser, Phys. Rev. B 99, 144103 (2019), in the variant of the program contMech of
-Muser's group: Verlet steps u_new = 2 u - u_old + f dt^2 / m with f = -(K u + p), the indenter as a
-hard wall, a time step that grows while the kinetic energy does, and a halt once it no longer does.
-It has no mixing of force and velocity (contMech's default; FIRE's alpha = 0).
+Muser's group, which does not mix force and velocity (contMech's default; FIRE's alpha = 0). A step
+of the method, with the numbers beside the code lines:
 
-The inertia m is the same for all q, so that the step may be taken in real space, with one
-application of K; its q = 0 mode feels -p and, through the wall, the contacts. A fixed point is at
-rest and obeys u = max(u - sigma dt^2 / m, h), which are the conditions of contact. A step from rest
-is a projected gradient step, too short to raise the energy: no halt is final before that point.
+[1] Accelerate: v += dt f / m with f = -(K u + p).
+[2] Move: u -> max(u + dt v, h), with the indenter as a hard wall; the velocity is zero there.
+[3] Accept the move if the energy does not rise.
+[4] Stop (v = 0) and shorten the time step if the kinetic energy falls; otherwise lengthen it.
+
+The mass m is the same for all q, so that a step is taken in real space, with one application of K.
+The q = 0 mode is subject to -p and, through the wall, to the contacts. A fixed point is at rest and
+satisfies u = max(u - sigma dt^2 / m, h), which is equivalent to the conditions of contact. A step
+from rest is a projected gradient step that is too short to raise the energy. The method therefore
+continues after every stop until it reaches the fixed point.
 """
 
 from collections.abc import Iterator
-from typing import Annotated, Literal
+from dataclasses import dataclass
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field as Key
 
-from gfmd_cli.physics.choice import Choice
+from gfmd_cli.grid.arrays import Field
 from gfmd_cli.physics.contact import Contact
-from gfmd_cli.physics.fields import Field
-from gfmd_cli.solvers.loop import State
+from gfmd_cli.solvers.loop import Solver, State
 
 GROWTH = 1.2  # of the time step; fireIncrmt of contMech
-SHRINKAGE = 0.5  # at a halt; fireDecrmt of contMech
-FALLING = 0.999  # kinetic energy that grows by less counts as falling; contMech
+SHRINKAGE = 0.5  # at a stop; fireDecrmt of contMech
+FALLING = 0.999  # smaller growth of the kinetic energy counts as a decrease; contMech
 
 
-class Fire(Choice):
-    """GFMD with FIRE."""
+@dataclass(kw_only=True)
+class FireState(State):
+    """State of GFMD with FIRE."""
+
+    velocity: Field
+    """(u - u_old) / dt, as the time step changes."""
+    time_step: float
+    """In units of (m / k_max)^(1/2)."""
+    kinetic: float = 0.0
+    """Sum of the squares of the velocity at the last step; 0 after a stop."""
+
+
+class Fire(Solver):
+    """Green's function molecular dynamics (GFMD), relaxed by FIRE; for comparison."""
 
     kind: Literal["fire"] = "fire"
+    fields_in_memory: ClassVar[float] = 9.2
+    """Fields of double precision at the peak of a solve; scripts/memory.py measures it."""
     time_step: Annotated[float, Key(gt=0, lt=2)] = 1.9
     """Longest time step in units of (m / k_max)^(1/2). Verlet is stable below 2. contMech's own
     is 0.5, twice its initial one, and needs 2 to 4 times as many steps (256^2, n = 0.5 to 4)."""
 
-    def begin(self, contact: Contact, u: Field) -> State:
-        """Start at rest from `u`, lifted above the indenter."""
-        np.maximum(u, contact.height, out=u)
-        sigma = contact.stress(u, out=contact.grid.empty())
-        scalars = {"time_step": 0.5 * self.time_step, "kinetic": 0.0}  # half: as in contMech
-        return State(u, sigma, transforms=2, scalars=scalars, fields={"velocity": np.zeros_like(u)})
+    state_type: ClassVar[type[State]] = FireState
 
-    def iterate(self, contact: Contact, state: State) -> Iterator[State]:
+    def begin(self, contact: Contact, u: Field) -> FireState:
+        """Start at rest from `u`, lifted above the indenter."""
+        np.maximum(u, contact.obstacle, out=u)
+        sigma = contact.stress(u, out=contact.grid.empty())
+        dt = 0.5 * self.time_step  # half: as in contMech
+        return FireState(u=u, sigma=sigma, transforms=2, velocity=np.zeros_like(u), time_step=dt)
+
+    def iterate(self, contact: Contact, state: FireState) -> Iterator[FireState]:
         """Advance `state` in place by Verlet steps, one pair of transforms each."""
-        h, u, sigma, memory = contact.height, state.u, state.sigma, state.scalars
-        velocity = state.fields["velocity"]  # (u - u_old) / dt: the time step changes
-        grid, k_max = contact.grid, contact.grid.most(float(contact.stiffness.max()))
+        h, u, sigma, velocity = contact.obstacle, state.u, state.sigma, state.velocity
+        grid, k_max = contact.grid, contact.grid.max(float(contact.stiffness.max()))
         trial, stress, move = (grid.empty() for _ in range(3))
         while True:
             state.residual = contact.residual(u, sigma)
             yield state
-            dt = memory["time_step"]
+            dt = state.time_step
             np.multiply(sigma, -dt / k_max, out=move)
-            velocity += move  # [1] the kick
+            velocity += move  # [1]
             np.multiply(velocity, dt, out=trial)
             trial += u
-            np.maximum(trial, h, out=trial)  # [2] the move, with the wall
-            velocity[trial == h] = 0.0  # the wall takes the momentum
+            np.maximum(trial, h, out=trial)  # [2]
+            velocity[trial == h] = 0.0
             contact.stress(trial, out=stress)
             state.transforms += 2
             np.subtract(trial, u, out=move)
             change = np.vdot(move, sigma) + np.vdot(move, stress)  # of energy, x 2 size
             change, kinetic = grid.total(np.array([change, np.vdot(velocity, velocity)]))
-            if change <= 0:  # [3] else stay
+            if change <= 0:  # [3]
                 u[...] = trial
                 sigma[...] = stress
-            if change > 0 or FALLING * kinetic < memory["kinetic"]:  # [4] halt
+            if change > 0 or FALLING * kinetic < state.kinetic:  # [4]
                 velocity[...] = 0.0
-                memory["time_step"], memory["kinetic"] = SHRINKAGE * dt, 0.0
+                state.time_step, state.kinetic = SHRINKAGE * dt, 0.0
             else:
-                memory["time_step"] = min(GROWTH * dt, self.time_step)
-                memory["kinetic"] = float(kinetic)
+                state.time_step = min(GROWTH * dt, self.time_step)
+                state.kinetic = float(kinetic)
             state.step += 1

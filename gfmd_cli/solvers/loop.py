@@ -1,20 +1,28 @@
-"""State, the solver protocol, and the one loop that drives every solver."""
+"""The base class of all solvers, their state, and the one loop that drives them."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
-from math import isfinite
-from typing import Protocol
+from dataclasses import dataclass
+from math import inf, isfinite
+from typing import Annotated, Any, ClassVar
 
+from pydantic import Field as Key
+
+from gfmd_cli.choice import Choice
+from gfmd_cli.errors import InputError
+from gfmd_cli.grid.arrays import Field
 from gfmd_cli.physics.contact import Contact
-from gfmd_cli.physics.fields import Field
+from gfmd_cli.status import Status
 
-MISSES = 5  # one or two happen when sigma has drifted; so many in a row mean that rounding ...
-PROGRESS = 0.7  # ... is the limit, where none brings the true residual down by this factor
+MAX_MISSES = 5  # one or two occur when sigma has drifted; this many in a row mean that rounding
+PROGRESS = 0.7  # is the limit, if none of them reduces the true residual by this factor
 
 
-@dataclass
+@dataclass(kw_only=True)
 class State:
-    """All that the next step needs. A checkpoint is a state on disk."""
+    """All that the next step needs; a checkpoint stores exactly these attributes.
+
+    A solver that needs more has a subclass with further arrays and numbers (bool, int, float).
+    """
 
     u: Field
     """Displacement, u >= h."""
@@ -22,73 +30,116 @@ class State:
     """Stress K u + p, up to the rounding of its updates since `exact` was true."""
     exact: bool = True
     """Whether sigma was computed from u, not updated."""
-    residual: float = float("inf")
+    residual: float = inf
+    """Natural residual of u and sigma."""
     step: int = 0
-    misses: int = 0
-    """How often in a row the residual was too large, and hardly less than before, when sigma was
-    computed afresh."""
-    least: float = float("inf")
-    """The least residual found so."""
-    transforms: int = 0
+    """Steps on this grid so far."""
+    transforms: float = 0
     """Transforms on this grid so far."""
-    scalars: dict[str, float] = field(default_factory=dict)
-    """What else the solver remembers, by name."""
-    fields: dict[str, Field] = field(default_factory=dict)
-    """Likewise, shape `grid.shape`."""
+    coarser_transforms: float = 0.0
+    """Transforms before this grid was entered, in units of transforms on the finest grid."""
+    misses: int = 0
+    """How often in a row the residual missed the tolerance, with little progress, when sigma was
+    computed afresh."""
+    best_residual: float = inf
+    """Smallest residual measured on a sigma computed afresh."""
 
 
-class Solver(Protocol):
-    """A way to solve the contact problem."""
+class Solver(Choice):
+    """The keys that all kinds of solvers share."""
 
-    def begin(self, contact: Contact, u: Field) -> State:
-        """The state that starts from displacement `u`, which is taken over."""
+    kind: str
+    tolerance: Annotated[float, Key(ge=1e-16, lt=1)] = 1e-6
+    """Natural residual to reach."""
+    max_steps: Annotated[int, Key(gt=0)] = 20000
+    """Steps on one grid after which the solve is given up."""
+    nested: bool = True
+    """Start from the solution on coarser grids."""
 
-    def iterate(self, contact: Contact, state: State) -> Iterator[State]:
-        """Yield the state, with its residual, and advance it in place, again and again."""
+    state_type: ClassVar[type[State]] = State
+    """Class of the states of this solver."""
+    iterative: ClassVar[bool] = True
+    """Whether a start close to the solution saves work."""
+    starts_locally: ClassVar[bool] = False
+    """Whether a solve on tiles may replace the grids between a coarse one and the finest."""
+    fields_in_memory: ClassVar[float] = 6.65
+    """Fields of double precision at the peak of a solve: h, u, sigma, work; at half the size
+    direction, change, k(q); contact marks, coarse levels. scripts/memory.py measures it."""
+    boundary: ClassVar[str] = "periodic"
+    """The boundary of the contacts that the solver solves."""
+    max_exponent: ClassVar[float] = inf
+    """Largest exponent n of k(q) ~ q^n for which the solver is of use."""
+
+    def shared_keys(self) -> dict[str, Any]:
+        """The keys that all solvers have, without the kind."""
+        return {name: getattr(self, name) for name in ("tolerance", "max_steps", "nested")}
+
+    def fields_for(self, boundary: str, exponent: float | None) -> float:
+        """Fields at the peak of a solve with this boundary, for k(q) ~ q^n or any other k(q)."""
+        return self.fields_in_memory
+
+    def for_contact(self, contact: Contact) -> "Solver":
+        """The solver to use for this contact. Raises InputError for another boundary."""
+        self.check_boundary(contact.boundary)
+        return self
+
+    def check_boundary(self, boundary: str) -> None:
+        """Raise InputError for a boundary that the solver does not support."""
+        if boundary != self.boundary:
+            raise InputError(
+                f'solver.kind: "{self.kind}" solves contacts with grid.boundary = '
+                f'"{self.boundary}", not "{boundary}"; "auto" takes a solver that does'
+            )
+
+    def begin(self, contact: Any, u: Field) -> State:
+        """Return the state that starts from displacement `u`, which is overwritten."""
+        raise NotImplementedError
+
+    def continue_from(self, coarse: Contact, state: State, fine: Any) -> State:
+        """Return the state that starts from a solution on a coarser grid."""
+        return self.begin(fine, coarse.grid.resample(state.u, fine.grid))
+
+    def refresh(self, contact: Any, state: Any) -> None:
+        """Compute sigma and the residual from u."""
+        state.residual = contact.recompute(state.u, state.sigma)
+        state.exact = True
+        state.transforms += 2
+
+    def iterate(self, contact: Any, state: Any) -> Iterator[State]:
+        """Yield the state, with its residual, and advance it in place, repeatedly."""
+        raise NotImplementedError
 
 
 Watch = Callable[[Contact, State], None]
-"""Sees every state: progress, checkpoints and speed-against-error records are watchers."""
+"""Is called with every state: progress, checkpoints and work-precision records are watchers."""
 
 
-def solve(
-    contact: Contact,
-    solver: Solver,
-    state: State,
-    *,
-    tolerance: float,
-    max_steps: int,
-    watch: Watch,
-) -> str:
-    """Drive `solver` until the natural residual is below `tolerance`; say how it ended.
+def ignore(contact: Contact, state: State) -> None:
+    """A watcher that does nothing."""
 
-    The residual that ends it is measured on sigma computed afresh from u. Returns "converged",
-    "max_steps", "diverged", or "rounding" where the tolerance lies below what double precision
-    can tell; the solution stays in `state`.
+
+def solve(contact: Contact, solver: Solver, state: State, watch: Watch = ignore) -> Status:
+    """Drive `solver` until the natural residual is below its tolerance; return how it ended.
+
+    The residual that ends the solve is measured on sigma computed afresh from u; the solution is in
+    `state`. The status is `ROUNDING` if double precision does not allow the tolerance.
     """
     for current in solver.iterate(contact, state):
-        if current.residual < tolerance and not current.exact:
-            refresh(contact, current)
-            if current.residual >= tolerance:
-                progress = current.residual < PROGRESS * current.least
+        if current.residual < solver.tolerance and not current.exact:
+            solver.refresh(contact, current)
+            if current.residual >= solver.tolerance:
+                progress = current.residual < PROGRESS * current.best_residual
                 current.misses = 0 if progress else current.misses + 1
-                current.least = min(current.least, current.residual)
+                current.best_residual = min(current.best_residual, current.residual)
         watch(contact, current)
         if not isfinite(current.residual):
-            return "diverged"
-        if current.residual < tolerance:
-            return "converged"
-        if current.misses >= MISSES:
-            return "rounding"
-        if current.step >= max_steps:
-            refresh(contact, current)
-            return "max_steps"
-    return "converged" if state.residual < tolerance else "rounding"  # of an exact method
-
-
-def refresh(contact: Contact, state: State) -> None:
-    """Compute sigma and the residual from u."""
-    contact.stress(state.u, out=state.sigma)
-    state.exact = True
-    state.transforms += 2
-    state.residual = contact.residual(state.u, state.sigma)
+            return Status.DIVERGED
+        if current.residual < solver.tolerance:
+            return Status.CONVERGED
+        if current.misses >= MAX_MISSES:
+            return Status.ROUNDING
+        if current.step >= solver.max_steps:
+            solver.refresh(contact, current)
+            return Status.MAX_STEPS
+    # an exact method has ended
+    return Status.CONVERGED if state.residual < solver.tolerance else Status.ROUNDING

@@ -1,129 +1,151 @@
-"""A multigrid preconditioner that knows where the contacts are.
+"""A multigrid preconditioner that takes the contact points into account.
 
-One V-cycle for a local stand-in of K on the free points: the squared five-point Laplacian on every
-level, scaled there to k(q) of the waves which that level resolves, so that any k(q) will do. On the
+One V-cycle for a local approximation of K on the free points: on every level the squared five-point
+Laplacian, scaled to k(q) of the waves that the level resolves, so that any k(q) is possible. On the
 finest level the points of contact are held. As in truncated multigrid (Kornhuber, Numer. Math. 69,
-167, 1994) hats are cut off at them, and no coarse hat is lost because a contact lies under it; what
-cutting costs is not computed, but stood in for: springs tie the coarse hats to zero at the points
-held, as stiff as the coarse plate itself. Springs are cheaper to keep than Galerkin stencils, four
-bytes a coarse point, and the levels are not too stiff, as bilinear hats would be for a plate.
+167, 1994), the hat functions of coarser levels are truncated at these points, so that no hat is
+lost because a contact lies under it. The energy of the truncation is not computed, but approximated
+by a penalty: springs tie the coarse hats to zero at the points held, as stiff as the operator of
+the level itself. This takes four bytes per coarse point, less than Galerkin stencils, and the
+levels are not too stiff, as bilinear hats would be for a plate.
 
-The cycle is symmetric, and it is positive as long as no level is smoothed too far, that is while
-the eigenvalues of the sweeps, `DAMPING` times A over its diagonal, stay below 2: the plate alone
-has 1.76, and springs, which pull at waves that the plate hardly resists, do not add to that.
+The cycle is symmetric. It is positive as long as the eigenvalues of the damped Jacobi iteration,
+`DAMPING` times A over its diagonal, are below 2. They are at most 1.76 for the operator without
+springs, and springs do not increase them, because they act on waves for which the operator is soft.
 """
 
 from itertools import pairwise
 from math import inf
-from typing import Any
 
 import numpy as np
 
+from gfmd_cli.grid.arrays import Field, SingleField
+from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.physics.contact import Contact
-from gfmd_cli.physics.fields import Field, Marks
-from gfmd_cli.physics.sweeps import Rows
-from gfmd_cli.solvers import multigrid_sweeps as sweeps
+from gfmd_cli.solvers import multigrid_kernels as kernels
+from gfmd_cli.solvers.contact_state import ContactState
+from gfmd_cli.solvers.multigrid_kernels import WHOLE_WEIGHT, ZERO
 
-COARSEST = 4  # points a side on the last level
-SPRING = 5.0  # springs in these units, times k(2 q) / k(q); measured: best for n = 1.5 to 4
-GROWTH = 20.0  # of k(q) from one level to the next, 16 at n = 4, up to which the cycle will do
-LAST_SWEEPS = 4  # pairs of them on the last level
-UNIT = 1.0 / 64  # of the ties
+COARSEST = 4  # points along the shorter side on the coarsest level
+ASPECT = 1.5  # of pixels up to which the levels have the same Laplacian along x and y
+SPRING = 5.0  # penalty stiffness relative to k(2 q) / k(q); measured: best for n = 1.5 to 4
+GROWTH = 20.0  # largest growth of k(q) between levels that the cycle permits; 16 at n = 4
+COARSEST_SWEEPS = 4  # pairs of Jacobi sweeps on the coarsest level
+UNIT = 1.0 / 64  # of the integers in `ties`
 
 
 def suits(contact: Contact) -> bool:
-    """Whether k(q) of two-dimensional `contact` grows as evenly as the cycle needs."""
-    levels = _levels(contact)
-    return len(levels) > 1 and all(growth < GROWTH for _, _, growth in levels)
+    """Whether pixels are about square, and k(q) grows evenly enough between the levels."""
+    levels, (dy, dx) = _levels(contact), contact.grid.spacings
+    has_levels = len(levels) > 1 and max(dy, dx) <= ASPECT * min(dy, dx)
+    return has_levels and all(growth < GROWTH for _, _, growth in levels)
 
 
 def _levels(contact: Contact) -> list[tuple[int, float, float]]:
-    """Of each level: points a side, scale of its operator, k(2 q) / k(q).
+    """Points along x, scale of the operator and k(2 q) / k(q) of each level.
 
-    Scaled at the wave of four points a period; energies are sums over the points of the finest.
+    The operator equals k(q) at a period of four points. Energies are sums over the finest points.
     """
-    line, side = contact.line, contact.grid.points
-    sides = [side]
-    while sides[-1] % 2 == 0 and sides[-1] // 2 >= COARSEST:
-        sides.append(sides[-1] // 2)
-    found = []
-    for level, n in enumerate(sides):
+    line, levels = contact.line, []
+    for level in range(level_count(contact.grid, COARSEST)):
+        n = contact.grid.points >> level
         k = float(line[n // 4])
         growth = float(line[n // 2]) / k if k > 0 else inf
-        found.append((n, 4.0**level * k, growth))
-    return found
+        levels.append((n, 4.0**level * k, growth))
+    return levels
+
+
+def level_count(grid: Grid, coarsest: int) -> int:
+    """Number of levels, each with half the points of the last one along x and y.
+
+    The coarsest has at least `coarsest` points along either.
+    """
+    count, shape = 1, grid.whole_shape
+    while all(points % 2 == 0 and points // 2 >= coarsest for points in shape):
+        count, shape = count + 1, tuple(points // 2 for points in shape)
+    return count
 
 
 class Multigrid:
     """The preconditioner of one contact."""
 
-    def __init__(self, contact: Contact, rows: Rows) -> None:
-        self.rows = rows
+    transforms = 0
+
+    def __init__(self, contact: Contact) -> None:
+        self.rows = contact.grid.rows
+        self.z = contact.grid.as_rows(contact.grid.padded)
         sides, scales, growths = zip(*_levels(contact), strict=True)
-        self.scale = 1.0 / scales[0]
-        self.ratios = [finer / coarser for finer, coarser in pairwise(scales)]
+        self.scale = np.float32(1.0 / scales[0])
+        self.ratios = [np.float32(finer / coarser) for finer, coarser in pairwise(scales)]
         self.springs = [np.float32(UNIT * SPRING * growth) for growth in growths[1:]]
-        self.shares = [rows.coarser()]
-        while len(self.shares) < len(sides) - 1:
-            self.shares.append(self.shares[-1].coarser())
-        levels = list(zip(self.shares, sides[1:], strict=True))
-        self.right, self.x, self.y = (
-            [share.empty(n, dtype=np.float32) for share, n in levels] for _ in range(3)
+        self.coarse_rows = [self.rows.coarser()]
+        while len(self.coarse_rows) < len(sides) - 1:
+            self.coarse_rows.append(self.coarse_rows[-1].coarser())
+        shapes = list(zip(self.coarse_rows, sides[1:], strict=True))
+        self.rhs, self.x, self.y = (
+            [rows.empty_with_halo(n, dtype=np.float32) for rows, n in shapes] for _ in range(3)
         )
-        self.weights = [share.empty(n, dtype=np.int8) for share, n in levels]
-        self.ties = [share.empty(4, n + 1, dtype=np.uint8) for share, n in levels]
+        self.weights = [rows.empty_with_halo(n, dtype=np.int8) for rows, n in shapes]
+        self.ties = [rows.empty_with_halo(4, n + 1, dtype=np.uint8) for rows, n in shapes]
 
     def apply(
-        self, sigma: Field, marks: Marks, least: int, change: Field, padded: Field
+        self, sigma: Field, contact_state: ContactState, threshold: int, change: Field
     ) -> tuple[float, float]:
-        """padded <- z, the preconditioned force -sigma of the free points.
-
-        `marks` have a frame. Returns the sums of z times force and of z times `change`.
-        """
-        self.rows.meet(marks)
-        self.tie(marks, least)
-        bodies = (self.rows.framed(sigma), marks, least)
-        self.shares[0].from_finer(sweeps.first_residual, bodies, self.right[:1])
-        self.descend()
-        for level in range(len(self.shares) - 2, -1, -1):
-            right, x, y, ties, spring = self.level(level)
-            coarse = (self.shares[level + 1].for_finer(self.y[level + 1]), self.ratios[level + 1])
-            self.smooth(level, sweeps.smooth_corrected, right, y, ties, spring, *coarse, x)
-            self.smooth(level, sweeps.smooth, right, x, ties, spring, y)
-        coarse = (self.shares[0].for_finer(self.y[0]), self.ratios[0])
-        slope, turned = self.rows.framed_sums(
-            2, sweeps.last_smooth, *bodies, *coarse, self.scale, change, padded
+        """See `preconditioners.Preconditioner.apply`."""
+        self.rows.exchange_halo(contact_state)
+        self.set_ties(contact_state, threshold)  # [1] penalty terms
+        fields = (self.rows.with_halo(sigma), contact_state, threshold)
+        # [2] one Jacobi sweep from zero on the finest level, and the restriction of its residual
+        self.coarse_rows[0].run_from_finer(kernels.first_residual, fields, self.rhs[:1])
+        self.descend()  # [3] pre-smoothing
+        for level in range(len(self.coarse_rows) - 2, -1, -1):  # [4] correction, post-smoothing
+            y = self.coarse_rows[level + 1].aligned_with_finer(self.y[level + 1])
+            self.smooth(level, self.y[level], self.x[level], y, self.ratios[level + 1])
+            self.smooth(level, self.x[level], self.y[level])
+        coarse = (self.coarse_rows[0].aligned_with_finer(self.y[0]), self.ratios[0])
+        # [5] correction and one sweep on the finest level, and the sums
+        slope, turned = self.rows.sums_with_halo(
+            2, kernels.last_smooth, *fields, *coarse, self.scale, change, self.z
         )
         return float(slope), float(turned)
 
     def descend(self) -> None:
-        """From the finest of the coarse levels to the last, smoothing on each."""
-        last = len(self.shares) - 1
+        """Smooth and restrict, from the finest of the coarse levels to the coarsest."""
+        last = len(self.coarse_rows) - 1
         for level in range(last + 1):
-            right, x, y, ties, spring = self.level(level)
-            self.smooth(level, sweeps.smooth_first, right, ties, spring, y)
+            self.smooth(level, None, self.y[level])
             if level < last:
-                finer, coarser = (right, y, ties, spring), self.right[level + 1 : level + 2]
-                self.shares[level + 1].from_finer(sweeps.residual, finer, coarser)
-        for _ in range(LAST_SWEEPS):
-            self.smooth(last, sweeps.smooth, right, y, ties, spring, x)
-            self.smooth(last, sweeps.smooth, right, x, ties, spring, y)
+                finer = (self.rhs[level], self.y[level], self.ties[level], self.springs[level])
+                coarser = self.rhs[level + 1 : level + 2]
+                self.coarse_rows[level + 1].run_from_finer(kernels.residual, finer, coarser)
+        for _ in range(COARSEST_SWEEPS):
+            self.smooth(last, self.y[last], self.x[last])
+            self.smooth(last, self.x[last], self.y[last])
 
-    def smooth(self, level: int, sweep: Any, *arguments: Any) -> None:
-        """Run a sweep that writes to the last of its arguments."""
-        self.shares[level].over(sweep, *arguments)
-        self.shares[level].meet(arguments[-1])
+    def smooth(
+        self,
+        level: int,
+        old: SingleField | None,
+        new: SingleField,
+        coarse: SingleField | None = None,
+        ratio: np.float32 = ZERO,
+    ) -> None:
+        """Write the result of a Jacobi sweep on `old` plus P coarse to `new`.
 
-    def level(self, level: int) -> tuple[Any, ...]:
-        """Right-hand side, two fields to work in, ties and the stiffness of springs of a level."""
-        fields = (self.right, self.x, self.y, self.ties, self.springs)
-        return tuple(field[level] for field in fields)
+        Without `old` it is that of two sweeps from zero.
+        """
+        rhs, rows = self.rhs[level], self.coarse_rows[level]
+        matrix = (rhs, self.ties[level], self.springs[level])
+        start = (rhs if old is None else old, rhs if coarse is None else coarse, ratio, old is None)
+        rows.run_with_halo(kernels.smooth, *matrix, *start, new)
+        rows.exchange_halo(new)
 
-    def tie(self, marks: Marks, least: int) -> None:
-        """Tie the coarse levels to the points held."""
-        for level, share in enumerate(self.shares):
+    def set_ties(self, contact_state: ContactState, threshold: int) -> None:
+        """Compute the penalty terms of the coarse levels from the points held."""
+        for level, rows in enumerate(self.coarse_rows):
             targets = (self.ties[level], self.weights[level])
             if level == 0:
-                share.from_finer(sweeps.first_ties, (marks, least), targets)
+                source = (contact_state, threshold, 0)
             else:
-                share.from_finer(sweeps.further_ties, self.weights[level - 1 : level], targets)
+                source = (self.weights[level - 1], WHOLE_WEIGHT, 1)
+            rows.run_from_finer(kernels.compute_ties, source, targets)

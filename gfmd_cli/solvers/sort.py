@@ -1,34 +1,40 @@
-"""The Einstein solid, n = 0: no iteration, one root."""
+"""The Einstein solid, n = 0: one scalar equation instead of iterations."""
 
 from collections.abc import Iterator
-from typing import Literal
+from math import inf
+from typing import ClassVar, Literal
 
 import numpy as np
 
 from gfmd_cli.errors import InputError
-from gfmd_cli.physics.choice import Choice
+from gfmd_cli.grid.arrays import Field
+from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.physics.contact import Contact
-from gfmd_cli.physics.fields import Field
-from gfmd_cli.physics.grid import Grid
-from gfmd_cli.solvers.loop import State
+from gfmd_cli.solvers.loop import Solver, State
 
 
-class Sort(Choice):
+class Sort(Solver):
     """Exact solution for a flat stiffness: sigma = k0 max(h - c, 0), c such that <sigma> = p.
 
-    u = max(h, c): each point stands for itself. Paper Sect. 4.2.
+    u = max(h, c): the points do not interact. Paper Sect. 4.2.
     """
 
     kind: Literal["sort"] = "sort"
 
+    fields_in_memory: ClassVar[float] = 5.0
+    iterative: ClassVar[bool] = False
+    max_exponent: ClassVar[float] = 0.0
+
     def begin(self, contact: Contact, u: Field) -> State:
-        """The solution; `u` is overwritten. Raises InputError where k(q) is not flat."""
+        """The solution; `u` is overwritten. Raises InputError if k(q) depends on q."""
         if not is_flat(contact):
-            raise InputError('solver.kind: "sort" solves bodies of flat stiffness (n = 0) only')
+            raise InputError('solver.kind: "sort" requires a stiffness independent of q (n = 0)')
         displaced = contact.pressure / float(contact.line[-1])
-        level = non_contact_height(contact.grid, contact.height, displaced)
-        np.maximum(contact.height, level, out=u)
-        return State(u, contact.stress(u, out=contact.grid.empty()), transforms=2)
+        known = contact.height if contact.may_touch is None else contact.height[contact.may_touch]
+        level = non_contact_height(contact.grid, known, displaced)
+        np.maximum(contact.obstacle, level, out=u)
+        sigma = contact.stress(u, out=contact.grid.empty())
+        return State(u=u, sigma=sigma, transforms=2)
 
     def iterate(self, contact: Contact, state: State) -> Iterator[State]:
         """Yield the solution."""
@@ -37,21 +43,20 @@ class Sort(Choice):
 
 
 def is_flat(contact: Contact) -> bool:
-    """Whether k(q) is the same for all q > 0, up to rounding."""
+    """Whether k(q) is constant for all q > 0, up to rounding."""
     grid, k = contact.grid, contact.stiffness.ravel()
     waves = k[1:] if grid.ends[0] else k
-    highest, lowest = grid.most(float(waves.max())), -grid.most(-float(waves.min()))
+    highest, lowest = grid.max(float(waves.max())), -grid.max(-float(waves.min()))
     return bool(highest - lowest <= 8 * np.finfo(float).eps * lowest)
 
 
 def non_contact_height(grid: Grid, h: Field, displaced: float) -> float:
-    """The level c at which <max(h - c, 0)> = `displaced`.
+    """The level c at which <max(h - c, 0)> = `displaced`, for the heights that can touch.
 
-    Newton's method on this convex, piecewise linear function from below: it rises to the root
-    and ends in it as soon as no point changes sides.
+    Newton's method on a convex, piecewise linear function, started below the root: the iterates
+    increase and reach the root exactly in the step in which no point crosses the level.
     """
-    level = grid.total(float(h.sum())) / grid.size - displaced
-    above = h.ravel()
+    level, above = -inf, h.ravel()
     while True:
         above = above[above > level]
         count, height = grid.total(np.array([above.size, above.sum()]))

@@ -5,36 +5,40 @@ checksums of both and all scalars, is sealed itself, and is replaced as a whole 
 the disk. So whatever happens while one slot is written, the other still stands.
 """
 
-import json
 import mmap
 import os
-import shutil
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
+from copy import deepcopy
 from pathlib import Path
-from typing import Any, NamedTuple, Self
+from typing import Literal, NamedTuple, Self
 
 import numpy as np
 
-from gfmd_cli.errors import SpaceError
+from gfmd_cli.errors import SpaceError, StudyError
+from gfmd_cli.files.atomic import write_whole
+from gfmd_cli.files.checksums import check_stored, sealed
+from gfmd_cli.files.locks import locked
+from gfmd_cli.files.regular import open_regular
+from gfmd_cli.grid.arrays import Field, row_blocks
+from gfmd_cli.grid.fft_grid import Grid
+from gfmd_cli.grid.ranks import Ranks, agree, leads, together
 from gfmd_cli.physics.contact import Contact
-from gfmd_cli.physics.fields import Field
-from gfmd_cli.physics.grid import Grid
-from gfmd_cli.physics.ranks import Ranks, agree, leads, together
-from gfmd_cli.solvers.cascade import Resume
-from gfmd_cli.solvers.loop import State
-from gfmd_cli.study.files import check_seal, locked, sealed, write_whole
+from gfmd_cli.solvers.loop import Solver, State
+from gfmd_cli.solvers.nested_grids import Resume, grids_of
+from gfmd_cli.study.notes import Notes
+from gfmd_cli.study.parts import set_aside
+from gfmd_cli.study.pointer import Part, Scalars, Slot, pointer_text, read_pointer
 
 CHUNK = 2**26  # bytes that a checkpoint maps at a time
-LAYOUT = 3  # raised whenever an older state must not be gone on with
-SCALARS = ("exact", "residual", "step", "misses", "least", "transforms", "scalars")
 
 
 class Saved(NamedTuple):
     """Where a saved state stands."""
 
     points: int
+    """Along x."""
     step: int
     residual: float
     time: float
@@ -52,13 +56,15 @@ class Checkpoint:
         self.folder, self.ranks = folder, ranks
         self.pointer = folder / "pointer"
         self.mine = True
-        self.slots: list[dict[str, Any]] = []
+        self.slots: list[Slot] = []
         """What the pointer says of the slots that are whole, the newer one first."""
 
     @classmethod
     @contextmanager
     def held(cls, folder: Path, ranks: Ranks | None = None) -> Iterator[Self]:
         """The checkpoint for one run alone: a second one neither reads nor writes it."""
+        if folder.is_symlink():
+            raise StudyError(f"{folder}: a link in the place of a checkpoint; remove it")
         checkpoint = cls(folder, ranks)
         with ExitStack() as stack:
             with together(ranks):
@@ -77,64 +83,56 @@ class Checkpoint:
         return note
 
     def _restore(self) -> str | None:
-        if not self.pointer.exists():
+        if not (self.pointer.exists() or self.pointer.is_symlink()):
             return None
-        said = self._said()
-        self.slots = [slot for slot in said if all(map(self._is_whole, slot["parts"]))]
-        if self.slots and self.slots[0] is said[0]:
+        slots = read_pointer(self.pointer)
+        self.slots = [slot for slot in slots if all(map(self._is_whole, slot.parts))]
+        if self.slots and self.slots[0] is slots[0]:
             return None
         if self.slots:
-            return f"{self.folder}: the newest state is damaged; going on from the one before"
-        for path in (self.pointer, *self.folder.glob("[ab]*")):
-            path.replace(f"{self.folder}.{path.name}.bad")
-        return f"{self.folder}: no whole state; set aside as .bad, the task starts anew"
+            return f"{self.folder}: the newest state is damaged; the one before it is resumed"
+        return self.set_aside()
 
-    def _said(self) -> list[dict[str, Any]]:
-        """What the pointer says of the slots; nothing where it is missing or damaged."""
-        with suppress(OSError, ValueError, KeyError):
-            size = check_seal(self.pointer)
-            data = json.loads(self.pointer.read_bytes()[:size])
-            return list(data["slots"]) if data["layout"] == LAYOUT else []
-        return []
+    def set_aside(self) -> str:
+        """Rename all files of a state that cannot be resumed; return a message."""
+        self.slots = []
+        if self.mine and leads(self.ranks):
+            for path in (self.pointer, *self.folder.glob("[ab]*")):
+                set_aside(path, self.folder.with_name(f"{self.folder.name}.{path.name}.bad"))
+        return f"{self.folder}: no state to resume; set aside as .bad, the task starts anew"
 
     def saved(self) -> Saved | None:
         """Where the newest state stands, without loading it; None where there is none."""
         with suppress(OSError):
-            when = self.pointer.stat().st_mtime
-            for slot in self._said():
-                state = slot["state"]
-                return Saved(slot["points"], state["step"], state["residual"], when)
+            when = self.pointer.lstat().st_mtime
+            for slot in read_pointer(self.pointer):
+                return Saved(slot.shape[-1], slot.state.step, slot.state.residual, when)
         return None
 
-    def save(self, contact: Contact, state: State, spent: float, notes: Any = None) -> None:
-        """Write the state; `spent` are the transforms of coarser grids.
-
-        `notes` are plain data that go with it. Raises SpaceError.
-        """
+    def save(self, contact: Contact, state: State, notes: Notes) -> None:
+        """Write the state and the notes that go with it. Raises SpaceError."""
         if not self.mine:
             return
-        fields = {"u": state.u, "sigma": state.sigma, **state.fields}
-        name = "a" if self.slots and self.slots[0]["name"] == "b" else "b"
+        fields = {name: v for name, v in vars(state).items() if isinstance(v, np.ndarray)}
+        name: Literal["a", "b"] = "a" if self.slots and self.slots[0].name == "b" else "b"
         with together(self.ranks):
             part = self._write_part(name, contact.grid, fields)
         parts = [part] if self.ranks is None else self.ranks.comm.allgather(part)
-        slot = {
-            "name": name,
-            "parts": parts,
-            "points": contact.grid.points,
-            "spent": spent,
-            "notes": notes,
-            "state": {name: getattr(state, name) for name in SCALARS},
-            "fields": {name: field.dtype.str for name, field in fields.items()},
-        }
-        slots = [slot, *(old for old in self.slots[:1] if old["name"] != name)]
+        slot = Slot(
+            name=name,
+            parts=parts,
+            shape=contact.grid.whole_shape,
+            notes=deepcopy(notes),
+            state=Scalars(**{name: v for name, v in vars(state).items() if name not in fields}),
+            fields={name: field.dtype.str for name, field in fields.items()},
+        )
+        slots = [slot, *(old for old in self.slots[:1] if old.name != name)]
         with together(self.ranks):
             if leads(self.ranks):
-                text = json.dumps({"layout": LAYOUT, "slots": slots})
-                write_whole(self.pointer, sealed(text.encode()))
+                write_whole(self.pointer, sealed(pointer_text(slots)))
         self.slots = slots
 
-    def _write_part(self, name: str, grid: Grid, fields: dict[str, Field]) -> dict[str, Any]:
+    def _write_part(self, name: str, grid: Grid, fields: dict[str, Field]) -> Part:
         """Write the rows that this process holds; what the pointer says of them."""
         first = grid.own.start or 0
         file = name if grid.whole else f"{name}{first}"
@@ -144,45 +142,63 @@ class Checkpoint:
         except OSError as error:
             raise SpaceError(f"{self.folder}: cannot be written: {error.strerror}") from error
         size = sum(field.nbytes for field in fields.values())
-        return {"file": file, "first": first, "rows": len(fields["u"]), "crc": crc, "bytes": size}
+        return Part(file=file, first=first, rows=len(fields["u"]), crc=crc, bytes=size)
 
-    def load(self, grid: Grid) -> Resume | None:
-        """The saved state of a solve on `grid`, or None where there is none for it."""
+    def load(self, grid: Grid, solver: Solver) -> Resume | None:
+        """The saved state of a solve on `grid`, None without one.
+
+        Raises StudyError where it is not the state of such a solve.
+        """
         if not self.slots:
             return None
         slot, size = self.slots[0], 1 if self.ranks is None else self.ranks.size
-        level = grid if slot["points"] == grid.points else grid.coarser(slot["points"])
+        if slot.shape not in grids_of(solver, grid):
+            raise StudyError(f"{self.folder}: the saved state is of another grid")
+        level = grid if slot.shape == grid.whole_shape else grid.coarser(slot.shape)
+        if not slot.holds(solver.state_type, level.shape) or slot.state.step > solver.max_steps:
+            raise StudyError(f"{self.folder}: the saved state is of another solver")
         if self.ranks is not None and level.whole:
             return None
-        fields = _read_parts(self.folder, slot["parts"], level, slot["fields"])
-        state = State(fields.pop("u"), fields.pop("sigma"), fields=fields, **slot["state"])
-        return Resume(slot["points"], state, slot["spent"], moved=len(slot["parts"]) != size)
+        fields = _read_parts(self.folder, slot.parts, level, slot.fields)
+        if level.max(float(not all(map(_is_finite, fields.values())))):
+            raise StudyError(f"{self.folder}: the saved state holds numbers that are not finite")
+        return Resume(slot.shape, fields | slot.state.model_dump(), len(slot.parts) != size)
 
-    def notes(self) -> Any:
-        """The notes of the saved state, None where there are none."""
-        return self.slots[0]["notes"] if self.slots else None
+    @property
+    def notes(self) -> Notes:
+        """The notes of the saved state, empty ones without a state."""
+        return deepcopy(self.slots[0].notes) if self.slots else Notes()
 
     def remove(self) -> None:
         """Forget the state: the task is done."""
         if self.mine and leads(self.ranks):
-            shutil.rmtree(self.folder, ignore_errors=True)
+            for path in (self.pointer, self.folder / "lock", *self.folder.glob("[ab]*")):
+                with suppress(OSError):
+                    path.unlink()
+            with suppress(OSError):
+                self.folder.rmdir()
 
-    def _is_whole(self, part: dict[str, Any]) -> bool:
+    def _is_whole(self, part: Part) -> bool:
         """Whether a file of a slot is as it was written."""
-        total, size = 0, 0
+        total = 0
         try:
-            with (self.folder / part["file"]).open("rb") as file:
+            with open_regular(self.folder / part.file) as file:
+                status = os.fstat(file.fileno())
+                if status.st_size != part.bytes:
+                    return False
+                check_stored(status)
                 while chunk := file.read(CHUNK):
-                    total, size = zlib.crc32(chunk, total), size + len(chunk)
-        except OSError:
+                    total = zlib.crc32(chunk, total)
+        except (OSError, ValueError):
             return False
-        return bool(total == part["crc"] and size == part["bytes"])
+        return bool(total == part.crc)
 
 
 def _write_slot(path: Path, fields: list[Field]) -> int:
     """Lay the fields one after the other into a mapped file; return the checksum of it."""
     total = offset = 0
-    with path.open("w+b") as file:
+    with open_regular(path, os.O_RDWR | os.O_CREAT) as file:
+        file.truncate(sum(field.nbytes for field in fields))
         os.posix_fallocate(file.fileno(), 0, sum(field.nbytes for field in fields))
         with mmap.mmap(file.fileno(), 0) as memory:
             for field in fields:
@@ -198,20 +214,26 @@ def _write_slot(path: Path, fields: list[Field]) -> int:
     return total
 
 
+def _is_finite(field: Field) -> bool:
+    """Whether all numbers are finite; in blocks, as the memory is forecast."""
+    return all(bool(np.isfinite(field[rows]).all()) for rows in row_blocks(field))
+
+
 def _read_parts(
-    folder: Path, parts: list[dict[str, Any]], grid: Grid, kinds: dict[str, str]
+    folder: Path, parts: list[Part], grid: Grid, kinds: Mapping[str, str]
 ) -> dict[str, Field]:
     """The rows of a grid that this process holds, from the files where they lie."""
-    first, last, _ = grid.own.indices(grid.points)
+    first, last, _ = grid.own.indices(grid.whole_shape[0])
     fields = {name: np.empty(grid.shape, kind) for name, kind in kinds.items()}
     for part in parts:
-        begin, rows = part["first"], part["rows"]
+        begin, rows = part.first, part.rows
         low, high = max(first, begin), min(last, begin + rows)
         if low >= high:
             continue
         offset, shape = 0, (rows, *grid.shape[1:])
         for field in fields.values():
-            stored = np.memmap(folder / part["file"], field.dtype, "r", offset, shape)
+            with open_regular(folder / part.file) as file:
+                stored = np.memmap(file, field.dtype, "r", offset, shape)
             field[low - first : high - first] = stored[low - begin : high - begin]
             offset += stored.nbytes
     return fields

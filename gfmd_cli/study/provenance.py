@@ -11,8 +11,8 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 import gfmd_cli
-from gfmd_cli.physics.wisdom import plans, processor
-from gfmd_cli.study.spec import Spec, digest
+from gfmd_cli.grid.plans import plans, processor
+from gfmd_cli.spec.models import Spec, digest
 
 PACKAGES = ("numpy", "scipy", "pyFFTW", "h5py", "pydantic", "SurfaceTopography")
 

@@ -1,154 +1,310 @@
-"""Reading a study file: what it claims is checked before it is believed."""
+"""Reading a study file: everything that it claims is checked before it is used."""
 
 import hashlib
 import json
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
-import h5py
 import numpy as np
 
 from gfmd_cli.errors import InputError, StudyError
-from gfmd_cli.physics.fields import Field
-from gfmd_cli.physics.hdf5 import has, take
+from gfmd_cli.files.hdf5 import find, has, open_hdf5, read_dataset, take
+from gfmd_cli.grid.arrays import Field
 from gfmd_cli.physics.persson import Shells
-from gfmd_cli.study.layout import (
+from gfmd_cli.physics.pictures import Picture
+from gfmd_cli.status import Status
+from gfmd_cli.study.column import Column
+from gfmd_cli.study.columns import (
     BENCH,
-    COLUMNS,
-    DISTRIBUTION,
-    DISTRIBUTIONS,
-    FIELDS,
-    LAYOUTS,
+    HISTOGRAMS,
+    LAYOUT,
+    PICTURES,
+    ROW_COLUMNS,
+    SCENE,
+    SCENE_ID,
     SHELLS,
-    Column,
+    STATUS,
+    STORED,
+    TASK,
+    TASK_GROUPS,
+    TASK_ID,
+    TaskGroup,
     empty_row,
 )
+from gfmd_cli.study.result import TaskResult
 
 ATTRIBUTES_SUM = "attributes_sha256"
+KINDS = {str: "S", int: "i", float: "f"}
+"""NumPy's kinds of the values of a column, as they are stored."""
+PACKED = "columns"
+"""Group of the columns of a record, by kind."""
+MAX_DIMENSIONS = 2
 DAMAGE = (
     KeyError, IndexError, TypeError, AttributeError, ValueError, OverflowError,
     OSError, RuntimeError, MemoryError,
 )  # fmt: skip
-"""What HDF5 and NumPy raise of a damaged file."""
+"""What HDF5 and NumPy raise of a damaged file; RuntimeError includes RecursionError."""
+
+
+def check_column(column: Column, values: Any) -> None:
+    """Raise ValueError for anything but one value of the kind of the column in each row."""
+    if values.ndim != 1 or values.dtype.kind != KINDS[column.kind]:
+        raise ValueError(f"{column.name} is no column of {column.kind.__name__}")
+
+
+class StudyFile:
+    """An open study file: its attributes, rows and arrays.
+
+    Each read raises one of `DAMAGE` where the file is not what it should be; `open_study` makes a
+    StudyError of it.
+    """
+
+    def __init__(self, file: Any) -> None:
+        self._file = file
+
+    @cached_property
+    def attributes(self) -> dict[str, str]:
+        """All attributes but the checksum, as text."""
+        return {k: str(v) for k, v in self._file.attrs.items() if k != ATTRIBUTES_SUM}
+
+    @property
+    def spec(self) -> Any:
+        """The resolved spec, as plain data."""
+        return json.loads(self.attributes["spec"])
+
+    @cached_property
+    def columns(self) -> list[Column]:
+        """The columns with one value a task that are stored."""
+        stored = self._packed or set(self._file)
+        return [column for column in ROW_COLUMNS if column.name in stored]
+
+    @cached_property
+    def rows(self) -> list[dict[str, Any]]:
+        """The rows, one a task, with `task`, `task_id`, `scene` and the histograms that are stored.
+
+        A column that is not stored is blank.
+        """
+        size = len(self.task_ids)
+        columns = {column.name: self.values(column) for column in (*self.columns, SCENE)}
+        columns[TASK.name] = list(range(size))
+        columns[TASK_ID.name] = self.task_ids
+        for histogram in HISTOGRAMS:
+            if has(self._file, histogram.name):
+                densities = read_dataset(self._file, histogram.name)
+                if densities.shape[1:] != histogram.middles().shape or densities.dtype.kind != "f":
+                    raise ValueError(f"{histogram.name} is not of the shape of its bins")
+                columns[histogram.name] = list(densities)
+        for name, values in columns.items():
+            if len(values) != size:
+                raise ValueError(f"{name} has {len(values)} rows, not {size}")
+        blank = empty_row()
+        return [blank | {name: values[i] for name, values in columns.items()} for i in range(size)]
+
+    @cached_property
+    def task_ids(self) -> list[str]:
+        """The id of each task."""
+        return self.values(TASK_ID)
+
+    @cached_property
+    def scene_ids(self) -> list[str]:
+        """The id of the scene of each task."""
+        return self.values(SCENE_ID)
+
+    @cached_property
+    def stored(self) -> list[frozenset[str]]:
+        """What [output] stored of each task."""
+        if STORED.name not in (self._packed or self._file):  # blank, as in a record without output
+            return [frozenset()] * len(self.task_ids)
+        return [frozenset(text.split()) for text in self.values(STORED)]
+
+    @cached_property
+    def statuses(self) -> list[Status]:
+        """The status of each task."""
+        return [Status(text) for text in self.values(STATUS)]
+
+    def values(self, column: Column) -> list[Any]:
+        """The values of a column, of its kind."""
+        values = self._packed.get(column.name)
+        if values is None:
+            values = read_dataset(self._file, column.name)
+        check_column(column, values)
+        plain = values.tolist()
+        return [text.decode() for text in plain] if column.kind is str else plain
+
+    @cached_property
+    def _packed(self) -> dict[str, Field]:
+        """The columns of a record, where all of a kind share a dataset."""
+        packed: dict[str, Field] = {}
+        for kind in KINDS:
+            group = find(self._file, f"{PACKED}/{kind.__name__}")
+            if group is not None:
+                names, values = read_dataset(group, "names"), read_dataset(group, "values")
+                packed |= zip((name.decode() for name in names.tolist()), values, strict=True)
+        return packed
+
+    def shells(self, scene: int) -> Shells:
+        """The binned spectrum of one scene."""
+        place = f"scenes/{scene}"
+        group = find(self._file, place)
+        if group is None:
+            raise KeyError(f"no group {place!r}")
+        arrays = {column.name: read_dataset(group, column.name) for column in SHELLS}
+        _check_alike(place, arrays, 1)
+        return Shells(**arrays)
+
+    def pictures(self, scene: int) -> dict[str, Picture]:
+        """The pictures of a measured surface, none of any other."""
+        group = find(self._file, f"scenes/{scene}/{PICTURES}")
+        if group is None:
+            return {}
+        shown = {}
+        for name in ("measured", "prepared"):
+            heights, sides = read_dataset(group, name), read_dataset(group, f"{name}_sides")
+            if sides.shape != (heights.ndim,) or {heights.dtype.kind, sides.dtype.kind} != {"f"}:
+                raise ValueError(f"{PICTURES}/{name} is not of the shape of its sides")
+            shown[name] = Picture(heights.astype(np.float64), tuple(map(float, sides)))
+        return shown
+
+    def arrays(self, group: str, task: int) -> dict[str, Field]:
+        """The arrays of a task by name, none where it has no such group."""
+        return {name: data[()] for name, data in self._arrays(group, task).items()}
+
+    def shapes(self, group: str, task: int) -> dict[str, tuple[int, ...]]:
+        """The shapes of the arrays of a task, without reading them."""
+        return {name: data.shape for name, data in self._arrays(group, task).items()}
+
+    def blocks(
+        self, group: str, task: int, rows: int, names: Iterable[str]
+    ) -> Iterator[dict[str, Field]]:
+        """The named arrays of a task that are stored, at most `rows` of their rows at a time."""
+        stored = self._arrays(group, task)
+        datasets = {name: stored[name] for name in names if name in stored}
+        size = min((data.shape[0] for data in datasets.values()), default=0)
+        for start in range(0, size, rows):
+            yield {name: data[start : start + rows] for name, data in datasets.items()}
+
+    def row(self, group: str, task: int, place: int) -> dict[str, Field]:
+        """One row of each array of a task."""
+        return {name: data[place] for name, data in self._arrays(group, task).items()}
+
+    def tasks_with(self, group: str) -> list[int]:
+        """The indices of the tasks that have arrays in a group, rising."""
+        found = find(self._file, group)
+        return [] if found is None else sorted(map(int, found))
+
+    def result(self, task: int) -> TaskResult:
+        """All that is stored of one task."""
+        row = self.rows[task]
+        return TaskResult(
+            self.task_ids[task],
+            self.scene_ids[task],
+            self.stored[task],
+            row,
+            self.shells(row["scene"]),
+            {group.name: self.arrays(group.name, task) for group in TASK_GROUPS},
+            self.pictures(row["scene"]),
+        )
+
+    def check(self, task: int) -> None:
+        """Raise where `result` would, for all but the values of the arrays."""
+        self.shells(self.rows[task]["scene"])
+        self.pictures(self.rows[task]["scene"])
+        for group in TASK_GROUPS:
+            self._arrays(group.name, task)
+
+    def _arrays(self, group: str, task: int) -> dict[str, Any]:
+        declared = _group(group)
+        dimensions = 1 if declared.axis else MAX_DIMENSIONS
+        return self._datasets(f"{group}/{task}", declared.columns, dimensions)
+
+    def _datasets(self, place: str, columns: tuple[Column, ...], dimensions: int) -> dict[str, Any]:
+        """The datasets of a group that are stored: numbers, all of the same shape."""
+        group = find(self._file, place)
+        if group is None:
+            return {}
+        datasets = {c.name: take(group, c.name) for c in columns if has(group, c.name)}
+        _check_alike(place, datasets, dimensions)
+        return datasets
+
+
+def _check_alike(place: str, datasets: Mapping[str, Any], dimensions: int) -> None:
+    """Raise ValueError for anything but numbers, all of the same shape."""
+    shapes = {data.shape for data in datasets.values()}
+    if len(shapes) > 1 or not all(1 <= len(shape) <= dimensions for shape in shapes):
+        raise ValueError(f"{place} has arrays of shapes {sorted(map(str, shapes))}")
+    for name, data in datasets.items():
+        if data.dtype.kind not in "if":
+            raise ValueError(f"{place}/{name} has type {data.dtype}")
+
+
+def _group(name: str) -> TaskGroup:
+    return next(group for group in TASK_GROUPS if group.name == name)
 
 
 @contextmanager
-def open_study(path: Path) -> Iterator[Any]:
-    """The study file, for reading. Raises InputError or StudyError where it is none."""
-    if not path.exists():
-        raise InputError(f"{path}: no such study")
-    if not path.is_file():
-        raise StudyError(f"{path}: no study, but a directory or device")
+def open_study(source: Path, opened: BinaryIO | None = None) -> Iterator[StudyFile]:
+    """The study file at a path, for reading; of `opened`, where that is the file.
+
+    Raises InputError where there is none, StudyError where it is no study or damaged.
+    """
+    if source.suffix == ".toml":
+        raise InputError(
+            f"{source}: a run spec, where a study (NAME.h5) is expected; `gfmd run {source}` "
+            "makes the study"
+        )
+    if opened is None and not source.exists():
+        raise InputError(f"{source}: no such study")
+    with _damage_named(source), open_hdf5(opened or source) as file:
+        _check_layout(source, file)
+        yield StudyFile(file)
+
+
+@contextmanager
+def _damage_named(path: Path) -> Iterator[None]:
     try:
-        file = h5py.File(path, "r", locking=False)
-    except OSError as error:
-        raise StudyError(f"{path}: no readable HDF5 file: {error}") from error
-    with file:
-        try:
-            _check_layout(path, file)
-            yield file
-        except DAMAGE as error:
-            raise StudyError(f"{path}: damaged study: {error}") from error
+        yield
+    except DAMAGE as error:
+        raise StudyError(f"{path}: no readable study, or damaged: {error}") from error
 
 
 def _check_layout(path: Path, file: Any) -> None:
-    layout = file.attrs.get("layout")
     if BENCH in file.attrs:
         raise StudyError(f"{path}: a bench, no study; `gfmd bench` prints its table")
+    layout = file.attrs.get("layout")
     if layout is None:
         raise StudyError(f"{path}: no study")
-    if int(layout) not in LAYOUTS:
+    if int(layout) != LAYOUT:
         writer = file.attrs.get("software_version", "?")
         raise StudyError(
-            f"{path}: a study of layout {int(layout)}, which gfmd {writer} reads; this version "
-            f"reads layouts {LAYOUTS[0]} to {LAYOUTS[-1]}"
+            f"{path}: a study of layout {int(layout)}, written by gfmd {writer}; this version "
+            f"reads layout {LAYOUT}"
         )
-    if int(layout) >= 2 and file.attrs[ATTRIBUTES_SUM] != attributes_sum(file):
+    if file.attrs[ATTRIBUTES_SUM] != attributes_sum(file):
         raise StudyError(f"{path}: damaged study: its attributes are not those written")
 
 
 def attributes_sum(file: Any) -> str:
     """SHA-256 of all other attributes of a file, which HDF5 gives no checksum."""
-    told = {name: str(value) for name, value in file.attrs.items() if name != ATTRIBUTES_SUM}
-    return hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()
+    texts = {name: str(value) for name, value in file.attrs.items() if name != ATTRIBUTES_SUM}
+    return hashlib.sha256(json.dumps(texts, sort_keys=True).encode()).hexdigest()
 
 
 def read_rows(path: Path) -> list[dict[str, Any]]:
-    """The rows of a study, one a task, with `task`, `scene` and the distributions stored.
-
-    A column that the version which wrote the study did not have yet is blank. Raises
-    InputError, StudyError.
-    """
-    with open_study(path) as file:
-        return rows_of(file)
-
-
-def rows_of(file: Any) -> list[dict[str, Any]]:
-    """The same of an open study."""
-    size = take(file, "task").size
-    known = [c for c in (*COLUMNS, *DISTRIBUTION) if has(file, c.name)]
-    known += [Column(name, int, "", "") for name in ("task", "scene")]
-    columns = {column.name: column_of(file, column) for column in known}
-    for distribution in DISTRIBUTIONS:
-        if has(file, distribution.name):
-            columns[distribution.name] = take(file, distribution.name)[()]
-    for name, values in columns.items():
-        if len(values) != size:
-            raise ValueError(f"{name} has {len(values)} rows, not {size}")
-    blank = empty_row()
-    return [
-        blank | {name: _plain(values[i]) for name, values in columns.items()} for i in range(size)
-    ]
-
-
-def column_of(file: Any, column: Column) -> Field:
-    """The values of a column, of its kind."""
-    data = take(file, column.name)
-    values: Field = data.asstr()[()] if column.kind is str else data[()]
-    expected = {str: "O", int: "i", float: "f"}[column.kind]
-    if values.ndim != 1 or values.dtype.kind != expected:
-        raise ValueError(f"{column.name} is no column of {column.kind.__name__}")
-    return values
-
-
-def texts_of(file: Any, name: str) -> list[str]:
-    """The values of a column of text."""
-    return list(column_of(file, Column(name, str, "", "")))
-
-
-def _plain(value: Any) -> Any:
-    return value.item() if isinstance(value, np.generic) else value
+    """The rows of a study, as `StudyFile.rows`. Raises InputError, StudyError."""
+    with open_study(path) as study:
+        return study.rows
 
 
 def stored_spec(path: Path) -> Any:
     """The resolved spec of a study, as plain data. Raises InputError, StudyError."""
-    with open_study(path) as file:
-        return spec_of(file)
-
-
-def spec_of(file: Any) -> Any:
-    """The same of an open study."""
-    return json.loads(file.attrs["spec"])
+    with open_study(path) as study:
+        return study.spec
 
 
 def read_shells(path: Path, scene: int) -> Shells:
     """The binned spectrum of one scene. Raises InputError, StudyError."""
-    with open_study(path) as file:
-        return shells_of(file, scene)
-
-
-def shells_of(file: Any, scene: int) -> Shells:
-    """The same of an open study."""
-    names = [column.name for column in SHELLS if has(file[f"scenes/{scene}"], column.name)]
-    return Shells(**{name: take(file, f"scenes/{scene}/{name}")[()] for name in names})
-
-
-def fields_of(file: Any, place: str, columns: tuple[Column, ...] = FIELDS) -> dict[str, Field]:
-    """The fields of a group of an open study, none where there is no such group."""
-    folder, _, task = place.partition("/")
-    if not (has(file, folder) and has(file[folder], task)):
-        return {}
-    names = [column.name for column in columns if has(file[place], column.name)]
-    return {name: take(file, f"{place}/{name}")[()] for name in names}
+    with open_study(path) as study:
+        return study.shells(scene)

@@ -1,20 +1,21 @@
-"""What this machine lends to a run: cores and memory."""
+"""Cores and memory that a run may use on this machine."""
 
 import os
 from contextlib import suppress
 from pathlib import Path
 
 from gfmd_cli.errors import InputError
-from gfmd_cli.physics.ranks import Ranks, cores_and_company
-from gfmd_cli.study.tasks import BASE_BYTES, FIELDS_IN_MEMORY, Task
+from gfmd_cli.grid.ranks import Ranks, cores_and_company
+from gfmd_cli.solvers.loop import Solver
+from gfmd_cli.study.tasks import BASE_BYTES, Task
 
-THREADED_POINTS = 1024  # per side; below it a second thread costs more than it brings (measured)
+THREADED_POINTS = 1024  # per side of a square; a second thread does not pay below it (measured)
 HEADROOM = 0.9  # share of the available memory that a run may plan with
-POOL_SECONDS = 3.0  # below this much work, starting worker processes costs more than it brings
+POOL_SECONDS = 3.0  # with less work than this, worker processes do not pay
 DISK_SPEED = 1e8  # bytes a second; slower than most
-STATE_FIELDS = 4  # u, sigma and what solvers remember beside them
-STEP = 1e-7  # seconds per grid point that a step takes at the most, on one thread
-SECONDS_TO_END = 2.0  # of worker processes and small files
+STATE_FIELDS = 4  # u, sigma and the other fields of a solver's state
+STEP = 1e-7  # upper limit of the seconds per grid point of a step, on one thread
+SECONDS_TO_END = 2.0  # for worker processes and small files
 
 
 def available_cores() -> int:
@@ -26,7 +27,7 @@ def available_cores() -> int:
 
 
 def available_memory() -> float:
-    """Bytes that this process may take: the least of the kernel's, cgroup's and Slurm's word."""
+    """Bytes that this process may take: the smallest limit of kernel, cgroup and Slurm."""
     limits = []
     with suppress(OSError, ValueError, IndexError):
         _, _, rest = Path("/proc/meminfo").read_text(encoding="ascii").partition("MemAvailable:")
@@ -47,24 +48,25 @@ def available_memory() -> float:
 
 
 def room(ranks: Ranks | None = None) -> float:
-    """Bytes that one solve may take; of all `ranks` that share it, their overhead taken off."""
+    """Bytes that one solve may take; of all `ranks` that share it, less their overhead."""
     memory = HEADROOM * available_memory()
     if ranks is None:
         return memory
     _, company = cores_and_company(ranks, set())
     own = min(ranks.gather(memory / company - BASE_BYTES))
-    return ranks.size * float(own) * FIELDS_IN_MEMORY / (FIELDS_IN_MEMORY + 1) + BASE_BYTES
+    fields = Solver.fields_in_memory
+    return ranks.size * float(own) * fields / (fields + 1) + BASE_BYTES
 
 
 def check_memory(tasks: list[Task], ranks: Ranks | None = None) -> None:
-    """Raise InputError, before anything is allocated, where one task alone does not fit."""
+    """Raise InputError, before anything is allocated, if a single task does not fit."""
     memory = room(ranks)
     needs = ((task.bytes_on(task.least_points), task.least_points) for task in tasks)
     taken, points = max(needs, default=(0.0, 0))
     if taken > memory:
         raise InputError(
-            f"grid.points: {points} points per side take {_gib(taken)} of memory, "
-            f"{_gib(memory)} are available; take a smaller grid or a larger machine"
+            f"grid.points: {points} points along x take {gib(taken)} of memory, "
+            f"{gib(memory)} are available; take a smaller grid or a larger machine"
         )
 
 
@@ -76,14 +78,14 @@ def share_out(
 ) -> tuple[int, int]:
     """Worker processes and threads of each, for these tasks.
 
-    One process for each core as long as tasks and memory last, one thread each; where the tasks
-    are fewer than the cores, large grids use the cores left over in their transforms; not where
-    the run is to be `reproducible`, as that may change the last bits.
+    One process with one thread for each core, as far as the number of tasks and the memory allow.
+    If there are fewer tasks than cores, large grids use the remaining cores as threads, unless the
+    run is to be `reproducible`: the number of threads may change the last bits.
     """
     if not tasks:
         return 1, 1
-    points = max(task.points for task in tasks)
-    threaded = points >= THREADED_POINTS and not reproducible
+    size = max(task.size for task in tasks)
+    threaded = size >= THREADED_POINTS**2 and not reproducible
     if ranks is not None:
         if jobs not in (None, 1):
             raise InputError(f"--jobs {jobs}: under mpiexec its processes share each task")
@@ -100,12 +102,21 @@ def share_out(
 
 
 def seconds_to_stop(tasks: list[Task], jobs: int) -> float:
-    """Time that it takes, at the most, to end a step, save every state and collect."""
+    """Upper limit of the time to end a step, save every state and collect."""
     largest = max(tasks, key=lambda task: task.size)
     state = 8.0 * largest.size * STATE_FIELDS * jobs
     collected = 8.0 * sum(task.size * len(task.output.fields) for task in tasks)
     return SECONDS_TO_END + STEP * largest.size + (state + collected) / DISK_SPEED
 
 
-def _gib(count: float) -> str:
+def out_of_memory_kills() -> int | None:
+    """Number of processes that the kernel has killed to free memory; None if it does not tell."""
+    with suppress(OSError, ValueError, IndexError):
+        _, _, rest = Path("/proc/vmstat").read_text(encoding="ascii").partition("\noom_kill ")
+        return int(rest.split()[0])
+    return None
+
+
+def gib(count: float) -> str:
+    """A number of bytes in GiB."""
     return f"{count / 2**30:.3g} GiB"

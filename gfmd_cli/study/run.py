@@ -1,27 +1,28 @@
 """Run a spec: what is missing is solved, task by task, on one or more processes."""
 
-import os
-import signal
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
-from itertools import chain
 from pathlib import Path
-from threading import Timer, current_thread, main_thread
-from typing import Any
+from threading import Event, Timer
 
 from gfmd_cli.errors import InputError, Interrupted, SpaceError
-from gfmd_cli.physics import wisdom
-from gfmd_cli.physics.ranks import Ranks, agree, leads, together
-from gfmd_cli.study import solve
-from gfmd_cli.study.clock import Clock
-from gfmd_cli.study.grids import scene_of
+from gfmd_cli.grid import plans
+from gfmd_cli.grid.ranks import Ranks, agree, leads, together
+from gfmd_cli.physics.file_surface import forget_files
+from gfmd_cli.spec.models import Spec
+from gfmd_cli.status import Status
+from gfmd_cli.study.context import SolveContext, WorkerOptions
+from gfmd_cli.study.parts import Held
+from gfmd_cli.study.pool import solve_in_pool
+from gfmd_cli.study.progress import Report
+from gfmd_cli.study.refinement import forget_scene
 from gfmd_cli.study.resources import check_memory, room, seconds_to_stop, share_out
-from gfmd_cli.study.solve import Progress, Report
-from gfmd_cli.study.spec import Spec
-from gfmd_cli.study.store import Study
+from gfmd_cli.study.run_task import attempt
+from gfmd_cli.study.signals import noted
+from gfmd_cli.study.store import Study, without_result
 from gfmd_cli.study.tasks import Task, plan
-from gfmd_cli.study.workers import SIGNALS, Means, attempt, solve_in_pool
+from gfmd_cli.study.time_left import Clock
 
 CHECKPOINT_EVERY = 600.0  # seconds
 
@@ -33,109 +34,139 @@ def run_study(
     report: Report,
     *,
     shard: tuple[int, int] = (0, 1),
+    overwrite: bool = False,
     jobs: int | None = None,
     checkpoint_every: float = CHECKPOINT_EVERY,
     max_seconds: float | None = None,
     reproducible: bool = False,
     ranks: Ranks | None = None,
-) -> Counter[str]:
+) -> Counter[Status]:
     """Solve the tasks of this shard that the study does not hold yet, and collect all records.
+
+    What the study holds of other specs stays.
 
     Parameters
     ----------
     spec, text : the run spec and the text it was read from
     path : the study file
-    report : told of every start, step and end of a task
+    report : receives an event at every start, step and end of a task
     shard : (i, n) takes the tasks with index i modulo n
+    overwrite : rename the study and its unfinished work, and solve all tasks anew
     jobs : worker processes, by default as many as cores, memory and tasks suggest
-    max_seconds : wall time after which it has ended as a signal ends it
+    max_seconds : wall time before which the run saves all states and stops, as after a signal
     reproducible : plan transforms without measuring, one thread a task
     ranks : the processes of an MPI run, which share every task; all of them call this
 
-    Returns how many tasks of this shard ended in which status ("failed": raised an error).
-    Raises InputError for a spec that does not fit the study or the machine, SpaceError, and
-    Interrupted after a signal or the time given, when all states are saved.
+    Returns how many tasks of this shard ended in which status (`FAILED`: an error ended it).
+    Raises InputError for a spec that does not fit the machine, SpaceError, and Interrupted after a
+    signal or the time given, when all states are saved, and where tasks are left whose workers
+    were killed.
     """
-    if ranks is not None and (asked := spec.output.on_request()):
-        raise InputError(f"output.{asked[0]}: takes whole grids; run it without mpiexec")
+    forget_files()
     study = Study(path)
-    study.check_spec(spec)
     tasks = plan(spec)
+    if ranks is not None:
+        _check_shared(spec, tasks)
+    moved = _move_aside(study, shard, ranks) if overwrite else []
     held = agree(ranks, study.held())
     share = [task for task in tasks if task.index % shard[1] == shard[0]]
-    pending = [task for task in share if task.id not in held]
-    outcome = Counter(held[task.id] for task in share if task.id in held)
+    pending = without_result(share, held)
+    to_solve = {task.id for task in pending}
+    outcome = Counter(held[task.id].status for task in share if task.id not in to_solve)
     waiting = agree(ranks, study.uncollected())
     if not pending and not waiting:
         if leads(ranks) and study.parts.exists():  # of a run that was killed as it ended
-            with study.work(spec):
+            with study.work(tasks):
                 pass
         return outcome
     check_memory(pending, ranks)
     jobs, threads = share_out(pending, jobs, reproducible, ranks)
-    means = Means(threads, checkpoint_every, room(ranks) / jobs, reproducible)
-    seconds = _time_to_work(max_seconds, pending, jobs)
-    report = Clock(pending, jobs).watched(report)
-    with _signals_noted(), _timer(seconds), _folder(study, spec, ranks) as damaged:
-        _warn(report, damaged, _plan_afresh(study.parts, means))
+    options = WorkerOptions(threads, room(ranks) / jobs, reproducible, checkpoint_every)
+    context = SolveContext(options, Clock(pending, jobs).watched(report), ranks=ranks)
+    stop, seconds = context.stop, _time_to_work(max_seconds, pending, jobs)
+    with noted(stop), _timer(stop, seconds), _folder(study, tasks, ranks) as damaged:
+        context.warn(*moved, *damaged, *_plan_afresh(study.parts, options))
         try:
-            solved = _solve_all(pending, study.parts, report, jobs, means, ranks)
+            solved = _solve_all(pending, study.parts, jobs, context)
         finally:
             with together(ranks):
                 # a stopped shard ends soon: its records stand, others collect them
-                if leads(ranks) and (shard[1] == 1 or not solve.stop.is_set()):
-                    _warn(report, study.collect(spec, tasks, text))
-            wisdom.plan_with(None)
-        _check_ended(solved, len(pending))
+                if leads(ranks) and (shard[1] == 1 or not stop.is_set()):
+                    context.warn(*study.collect(spec, tasks, text))
+            plans.plan_with(None)
+        _check_ended(solved, len(pending), stop)
+        if not any(status.is_failure for status in solved):
+            _check_output(pending, agree(ranks, study.held()))
     return outcome + solved
 
 
+def _check_shared(spec: Spec, tasks: list[Task]) -> None:
+    """Raise InputError for a spec whose contacts several processes cannot share."""
+    problems = [f"output.{name}: takes whole grids" for name in spec.output.on_request()]
+    if any(task.boundary == "free" for task in tasks):
+        problems.append('grid.boundary: "free" is solved by one process')
+    if problems:
+        raise InputError(f"{problems[0]}; run it without mpiexec")
+
+
+def _move_aside(study: Study, shard: tuple[int, int], ranks: Ranks | None) -> list[str]:
+    """Rename a study that is to be solved anew; say where it is. Raises InputError."""
+    if shard[1] != 1:
+        raise InputError("--overwrite: not with --shard, of which each would begin anew")
+    moved: list[str] = []
+    with together(ranks):
+        if leads(ranks):
+            moved = [f"{study.path}: the old one is kept as {path}" for path in study.move_aside()]
+    return moved
+
+
 @contextmanager
-def _folder(study: Study, spec: Spec, ranks: Ranks | None) -> Iterator[list[str]]:
+def _folder(study: Study, tasks: list[Task], ranks: Ranks | None) -> Iterator[list[str]]:
     """The folder of unfinished work; where processes share the tasks, the first one holds it."""
     damaged: list[str] = []
     with ExitStack() as stack:
         with together(ranks):
             if leads(ranks):
-                damaged = stack.enter_context(study.work(spec))
+                damaged = stack.enter_context(study.work(tasks))
         yield damaged
 
 
-def _check_ended(solved: Counter[str], asked: int) -> None:
-    """Raise SpaceError or Interrupted where that ended the run."""
-    if lacking := solved["no space"]:
-        raise SpaceError(f"no space for the results of {lacking} tasks; make some, call again")
-    left = asked - sum(solved.values())
-    if solve.stop.is_set() and left:
+def _check_ended(solved: Counter[Status], pending: int, stop: Event) -> None:
+    """Raise SpaceError or Interrupted if that ended the run."""
+    if count := solved[Status.NO_SPACE]:
+        raise SpaceError(f"no space for the results of {count} tasks; make some, call again")
+    left = pending - sum(solved.values())
+    if stop.is_set() and left:
         raise Interrupted(f"stopped, states saved; {left} tasks left, call again to go on")
+    if left and not any(status.is_failure for status in solved):
+        raise Interrupted(f"{left} tasks left whose workers were killed; call again to go on")
 
 
-def _plan_afresh(parts: Path, means: Means) -> list[str]:
-    """Plan as this run is to, whatever this process did before; what is wrong with old plans."""
-    scene_of.cache_clear()
-    note = wisdom.plan_with(parts, estimated=means.reproducible)
-    return [note] if note else []
+def _check_output(solved: list[Task], held: dict[str, Held]) -> None:
+    """Raise Interrupted where another run of the same tasks, with other output, came first."""
+    lacking = [task for task in without_result(solved, held) if task.id in held]
+    if lacking:
+        raise Interrupted(
+            f"{len(lacking)} tasks were solved by another run at the same time, with other output; "
+            "call again to add the output of this one"
+        )
 
 
-def _warn(report: Report, *notes: list[str]) -> None:
-    for note in chain.from_iterable(notes):
-        report(Progress(-1, "warning", "", note=note))
+def _plan_afresh(parts: Path, options: WorkerOptions) -> list[str]:
+    """Forget plans and scenes of earlier runs in this process; return what is wrong with plans."""
+    forget_scene()
+    message = plans.plan_with(parts, estimated=options.reproducible)
+    return [message] if message else []
 
 
 def _solve_all(
-    pending: list[Task],
-    parts: Path,
-    report: Report,
-    jobs: int,
-    means: Means,
-    ranks: Ranks | None,
-) -> Counter[str]:
+    pending: list[Task], parts: Path, jobs: int, context: SolveContext
+) -> Counter[Status]:
+    """Solve tasks, on worker processes if there are several jobs; the statuses of those ended."""
     if jobs > 1:
-        return solve_in_pool(pending, parts, report, jobs, means)
-    outcome: Counter[str] = Counter()
-    for task in pending:
-        outcome[attempt(task, parts, report, means, ranks)] += 1
-    del outcome["interrupted"]
+        return solve_in_pool(pending, parts, jobs, context)
+    outcome = Counter(attempt(task, parts, context) for task in pending)
+    del outcome[Status.INTERRUPTED]
     return outcome
 
 
@@ -147,39 +178,15 @@ def _time_to_work(max_seconds: float | None, pending: list[Task], jobs: int) -> 
 
 
 @contextmanager
-def _timer(seconds: float | None) -> Iterator[None]:
+def _timer(stop: Event, seconds: float | None) -> Iterator[None]:
     """Inside, an orderly stop is asked for after so much time, whatever the clock says."""
     if seconds is None:
         yield
         return
-    timer = Timer(seconds, solve.stop.set)
+    timer = Timer(seconds, stop.set)
     timer.daemon = True
     timer.start()
     try:
         yield
     finally:
         timer.cancel()
-
-
-@contextmanager
-def _signals_noted() -> Iterator[None]:
-    """Inside, a signal asks for an orderly stop; a second SIGINT leaves at once.
-
-    Only the main thread of a program can take signals; in another they stay what they are.
-    """
-    solve.stop.clear()
-    if current_thread() is not main_thread():
-        yield
-        return
-
-    def note(number: int, _frame: Any) -> None:
-        if number == signal.SIGINT and solve.stop.is_set():
-            os._exit(130)
-        solve.stop.set()
-
-    before = {number: signal.signal(number, note) for number in SIGNALS}
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)

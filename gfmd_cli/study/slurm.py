@@ -9,22 +9,24 @@ from math import ceil
 from pathlib import Path
 
 from gfmd_cli.errors import GfmdError, InputError
+from gfmd_cli.files.regular import read_regular
 from gfmd_cli.study.resources import HEADROOM, THREADED_POINTS
-from gfmd_cli.study.status import StudyState, check_shards
+from gfmd_cli.study.state import StudyState, check_shards
 from gfmd_cli.study.tasks import BASE_BYTES, SECONDS_PER_PAIR, Task
 
 SUFFIX = ".sbatch"
+MAX_BYTES = 2**20  # of a script
 SBATCH = ("sbatch", "--parsable")
 OURS = ("array", "parsable", "wait", "wrap")  # options of sbatch that --sbatch may not take
-MAX_REQUEUES = 100  # of one shard; whoever needs more has a time limit that lets nothing happen
-NOTICE = 120  # seconds before the time limit at which a small run is told to save its state
-SAVE_RATE = 1e8  # bytes per second that a saved state is written at, at the least
+MAX_REQUEUES = 100  # of one shard; a study that needs more has too short a time limit
+NOTICE = 120  # seconds before the time limit at which a small run has to save its state
+SAVE_RATE = 1e8  # bytes per second, a low estimate of the rate at which a state is written
 
 SCRIPT = """\
 #!/bin/bash
 # A gfmd study in {shards} shards, written by `gfmd submit`. By hand:
 #   sbatch --array=0-{last} {name}    the shards
-#   sbatch --dependency=afterany:JOB {name}    then, to collect what they found
+#   sbatch --dependency=afterany:JOB {name}    then: collect the results of job JOB
 {options}
 
 study=({study})
@@ -39,17 +41,17 @@ trap 'hand_on USR1' USR1   # the time limit is near
 trap 'hand_on TERM' TERM   # preempted
 {gfmd} run "${{study[@]}}" --shard "${{SLURM_ARRAY_TASK_ID}}/{shards}" &
 run=$!
-[ -z "$signal" ] || kill -"$signal" "$run"   # it came before there was one to hand it to
+[ -z "$signal" ] || kill -"$signal" "$run"   # the signal came before the run had started
 while [ $told = 1 ]; do told=0; wait $run; status=$?; done   # a signal ends `wait` early
 
 shard=${{SLURM_ARRAY_JOB_ID}}_${{SLURM_ARRAY_TASK_ID}}   # the job number would be the whole array
-requeue() {{   # unless this was tried often enough, or the shard was cancelled
+requeue() {{   # unless the shard was requeued {most} times or was cancelled
   [ "${{SLURM_RESTART_COUNT:-0}}" -lt {most} ] &&
     [ "$(squeue --noheader --jobs="$shard" --format=%T)" = RUNNING ] &&
     scontrol requeue "$shard" && sleep 60
 }}
 case $status in
-  75 | 138 | 143) requeue ;;   # saved, or met by a signal before there was anything to save
+  75 | 138 | 143) requeue ;;   # state saved, or ended by a signal before there was a state
 esac
 exit $status
 """
@@ -59,19 +61,19 @@ SHARDS = re.compile(r'--shard "\$\{SLURM_ARRAY_TASK_ID\}/(\d+)" &$', re.MULTILIN
 
 @dataclass(frozen=True)
 class Batch:
-    """What is to be submitted."""
+    """A batch of shards to submit."""
 
     path: Path
     """The script, beside its study."""
     text: str
     fresh: bool
-    """Whether the script is to be written."""
+    """Whether the script is new and has to be written."""
     shards: int
-    """Into how many the tasks are dealt."""
+    """Number of shards over which the tasks are distributed."""
     members: list[int]
-    """Those of them that are to run."""
+    """Indices of the shards to run."""
     options: list[str]
-    """Of sbatch, besides those in the script."""
+    """Options of sbatch besides those in the script."""
 
     @property
     def logs(self) -> Path:
@@ -83,7 +85,7 @@ class Batch:
         return [*SBATCH, f"--array={array(self.members)}", *self.options, str(self.path)]
 
     def collect_call(self, job: str) -> list[str]:
-        """The command that submits the collection of what a job found, however it ended."""
+        """The command that submits the collection of the results of a job, whatever its status."""
         output = f"--output={_pattern(self.logs)}/%x-%j.out"
         own = [f"--dependency=afterany:{job}", "--cpus-per-task=1", output]
         return [*SBATCH, *self.options, *own, str(self.path)]
@@ -97,7 +99,7 @@ def batch(
     shards: int | None,
     missing: bool,
     asked: dict[str, str],
-    further: tuple[str, ...],
+    sbatch_options: tuple[str, ...],
 ) -> Batch:
     """The batch of a study. Raises InputError.
 
@@ -105,14 +107,14 @@ def batch(
     ----------
     state, tasks : of the study; its path is absolute
     words : spec and options that `gfmd run` and `gfmd collect` take alike, with absolute paths
-    shards : into how many the tasks are dealt; None takes the script of the last submission
+    shards : number of shards; None uses the script of the last submission
     missing : take only the shards with tasks that are not solved yet
-    asked, further : options of sbatch, by name and as they are
+    asked, sbatch_options : options of sbatch, by name and as they are
     """
     path = state.study.with_suffix(SUFFIX)
     limit = time_limit(asked["time"]) if "time" in asked else None
     options = [option(f"{name}={value}") for name, value in asked.items()]
-    options += [option(word) for word in further]
+    options += [option(word) for word in sbatch_options]
     fresh = shards is not None
     if shards is None:
         text = _stored(path, words)
@@ -145,15 +147,15 @@ def script(study: Path, words: list[str], shards: int, options: list[str]) -> st
         name=shlex.quote(_one_line(study.stem) + SUFFIX),
         options="\n".join(f"#SBATCH {_directive(line)}" for line in lines),
         study=shlex.join(words),
-        gfmd=shlex.join([sys.executable, "-m", "gfmd_cli"]),
+        gfmd=shlex.join([sys.executable, "-P", "-m", "gfmd_cli"]),
         most=MAX_REQUEUES,
     )
 
 
 def _stored(path: Path, words: list[str]) -> str:
-    """The script of the last submission. Raises InputError where it is none, or of another call."""
+    """The script of the last submission. Raises InputError if there is none for this call."""
     try:
-        text = path.read_text(encoding="utf-8")
+        text = read_regular(path, MAX_BYTES).decode()
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: no script of an earlier submission; give --shards N") from error
     study = STUDY.search(text)
@@ -170,11 +172,11 @@ def _stored(path: Path, words: list[str]) -> str:
 def resources(tasks: list[Task], shards: int, cpus: int, limit: float | None) -> dict[str, str]:
     """What one shard needs, as options of sbatch by name.
 
-    The memory is that of the largest task, as often as tasks will run side by side; the notice
-    before the time limit (`limit` [s], where it is known) grows with the state to save.
+    The memory is that of the largest task times the number of tasks that run at the same time. The
+    notice before the time limit (`limit` [s], None if unknown) increases with the size of a state.
     """
     largest = max(tasks, key=lambda task: task.bytes)
-    side_by_side = 1 if largest.points >= THREADED_POINTS else min(cpus, ceil(len(tasks) / shards))
+    side_by_side = 1 if largest.size >= THREADED_POINTS**2 else min(cpus, ceil(len(tasks) / shards))
     memory = side_by_side * largest.bytes / HEADROOM + BASE_BYTES
     notice = NOTICE + largest.bytes / SAVE_RATE + 4 * SECONDS_PER_PAIR * largest.size
     if limit is not None:
@@ -222,13 +224,13 @@ def array(shards: list[int]) -> str:
 
 def queued(path: Path) -> list[str]:
     """Numbers of the jobs that run a script or wait to run it, shards and all."""
-    told = call(["squeue", "--me", "--noheader", "--format=%i %o"])
-    jobs = (line.strip().partition(" ") for line in told.splitlines())
+    queue = call(["squeue", "--me", "--noheader", "--format=%i %o"])
+    jobs = (line.strip().partition(" ") for line in queue.splitlines())
     return [number for number, _, command in jobs if command == str(path)]
 
 
 def call(words: list[str]) -> str:
-    """What a command of Slurm prints. Raises GfmdError with what it complains of."""
+    """The output of a Slurm command. Raises GfmdError with its error message."""
     try:
         done = subprocess.run(words, capture_output=True, text=True, check=True)
     except FileNotFoundError as error:

@@ -1,134 +1,252 @@
-"""The study file: all records of a spec in one HDF5 file, labelled, replaced as a whole.
+"""The study file: the results of tasks in one HDF5 file, replaced as a whole.
 
-While tasks run, each commits a record beside the study (in NAME.parts); collecting them
-rewrites the study file aside and renames it. A reader never meets a half-written study and never
-stops a run.
+While tasks run, each writes a record, a study of one task, to the folder beside the study
+(NAME.parts). Collecting is concatenating: a new study is written from the old one and the records,
+aside, and renamed. So a reader never meets a half-written study and never stops a run.
+
+What belongs to a study is decided task by task: any number of specs can share one, also at the same
+time. A result leaves a study only for one of the same task with at least the same output.
 """
 
 import json
-import shutil
-from collections.abc import Iterator
-from contextlib import contextmanager, nullcontext, suppress
+import os
+from collections.abc import Iterable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from gfmd_cli.errors import StudyError
-from gfmd_cli.study.files import locked, new_file, new_hdf5, write_whole
-from gfmd_cli.study.layout import MISSING
-from gfmd_cli.study.reading import open_study, spec_of, texts_of
-from gfmd_cli.study.record import SUFFIX, Record, read_record, read_status, record_path
-from gfmd_cli.study.spec import Spec, refuse_other
-from gfmd_cli.study.tasks import Task, plan
-from gfmd_cli.study.writing import write_study
+from gfmd_cli.errors import InputError, StudyError
+from gfmd_cli.files.atomic import new_file
+from gfmd_cli.files.hdf5 import new_hdf5
+from gfmd_cli.files.locks import locked
+from gfmd_cli.spec.models import Spec
+from gfmd_cli.status import Status
+from gfmd_cli.study.columns import empty_row
+from gfmd_cli.study.parts import (
+    Held,
+    check_own,
+    checkpoint_folders,
+    held_by,
+    read_record,
+    read_record_entry,
+    record_paths,
+    remove_parts,
+    set_aside,
+    task_of_record,
+    version_of,
+)
+from gfmd_cli.study.provenance import origin
+from gfmd_cli.study.reading import StudyFile, open_study
+from gfmd_cli.study.result import TaskResult
+from gfmd_cli.study.tasks import Task
+from gfmd_cli.study.writing import Entry, write_study
+
+EARLIER = "earlier_specs"
+"""Attribute with the texts of the specs before the last one, as JSON."""
 
 
 class Study:
-    """A study file and the unfinished work beside it."""
+    """A study file and the unfinished work beside it. Raises InputError for a link to itself."""
 
     def __init__(self, path: Path) -> None:
-        self.path = path
-        self.parts = path.with_suffix(".parts")
-
-    def check_spec(self, spec: Spec) -> None:
-        """Refuse, with the difference, a study that was made from another spec.
-
-        A spec that has more than all tasks of a study makes it grow, unless there is unfinished
-        work of the old one.
-        """
-        message = "made from another spec; take another name (-o) or the old spec."
-        with suppress(OSError, ValueError):
-            begun = json.loads((self.parts / "spec.json").read_bytes())
-            refuse_other(begun, spec, f"{self.parts}: {message}")
-        if not self.path.exists():
-            return
-        with open_study(self.path) as file:
-            stored, known = spec_of(file), set(texts_of(file, "task_id"))
-        if stored != spec.resolved() and not known <= {task.id for task in plan(spec)}:
-            refuse_other(stored, spec, f"{self.path}: {message}")
+        self.path = Path(os.path.realpath(path)) if path.is_symlink() else path
+        if self.path.is_symlink():
+            raise InputError(f"{path}: a symbolic link that leads to itself")
+        self._entries: dict[Path, tuple[tuple[int, ...], Entry]] = {}
+        """What is known of records, and of which file."""
+        known = self.path.suffix == ".h5"
+        self.parts = self.path.with_suffix(".parts" if known else f"{self.path.suffix}.parts.d")
 
     @contextmanager
-    def work(self, spec: Spec) -> Iterator[list[str]]:
-        """The folder of unfinished work, bound to this spec; others may work in it as well.
+    def work(self, tasks: list[Task]) -> Iterator[list[str]]:
+        """The folder of unfinished work; others may work in it as well, also on other tasks.
 
-        Yields what was found damaged, and set aside. The last one to leave removes the folder of
-        a complete study. Raises InputError for another spec, SpaceError.
+        Yields what was found damaged, and set aside. The last one to leave removes the folder
+        unless something is left to do there. Raises InputError, SpaceError.
         """
+        check_own(self.parts)
         in_use = self.parts / "in-use"
         with locked(in_use, wait=False) as alone:
             if alone:  # what was being written by a process that was killed
                 for path in self.parts.glob(".*"):
-                    path.unlink(missing_ok=True)
+                    with suppress(OSError):
+                        path.unlink()
         with locked(in_use, shared=True):
             with self._collecting():
-                self.check_spec(spec)
-                write_whole(self.parts / "spec.json", json.dumps(spec.resolved()).encode())
                 _, damaged = self._records()
             yield damaged
         with self._collecting(), locked(in_use, wait=False) as alone:
-            if alone and self._is_complete():
-                shutil.rmtree(self.parts, ignore_errors=True)
+            if alone and self._is_complete(tasks):
+                remove_parts(self.parts)
 
-    def held(self) -> dict[str, str]:
-        """Status by task id of all that is solved, collected or not."""
-        states = {}
+    def held(self) -> dict[str, Held]:
+        """What is held of each task that is solved, collected or not, by its id."""
+        recorded = []
         for path in self.record_paths():  # before the study, which may take them in meanwhile
             with suppress(StudyError):
-                states[path.stem] = read_status(path)
-        return self.collected() | states
+                recorded.append((task_of_record(path), held_by(self._entry(path))))
+        held = self.collected()
+        for name, found in recorded:
+            if name not in held or found.stored >= held[name].stored:
+                held[name] = found
+        return held
 
-    def collected(self) -> dict[str, str]:
-        """Status by task id of all that the study file holds."""
+    def collected(self) -> dict[str, Held]:
+        """What the study file holds of each task that is solved, by its id."""
         if not self.path.exists():
             return {}
         with open_study(self.path) as file:
-            ids, states = texts_of(file, "task_id"), texts_of(file, "status")
-        return {i: s for i, s in zip(ids, states, strict=True) if s != MISSING}
+            tasks = zip(file.task_ids, file.statuses, file.stored, strict=True)
+            return {n: Held(status, out) for n, status, out in tasks if status != Status.MISSING}
 
     def collect(self, spec: Spec, tasks: list[Task], text: str) -> list[str]:
         """Write all records into the study file, then drop them; inside `work`.
+
+        The study begins with the tasks of the spec; solved tasks of other specs follow.
 
         Returns what was found damaged; its task is solved again by the next run. Raises
         SpaceError, StudyError where the study itself is damaged.
         """
         with self._collecting():
-            found, damaged = self._records()
-            with new_file(self.path, aside=self.parts) as fresh, new_hdf5(fresh) as file:
-                old = open_study(self.path) if self.path.exists() else nullcontext()
-                with old as former:
-                    write_study(file, spec, tasks, text, found, self.parts, former)
-            for name in found:
-                record_path(self.parts, name).unlink(missing_ok=True)
+            records, damaged = self._records()
+            with ExitStack() as stack:
+                old = stack.enter_context(open_study(self.path)) if self.path.exists() else None
+                fresh = stack.enter_context(new_file(self.path, aside=self.parts))
+                file = stack.enter_context(new_hdf5(fresh))
+                attributes = origin(spec, text)
+                attributes[EARLIER] = json.dumps(_earlier_specs(old, text))
+                source = _Sources(records, old)
+                entries = source.entries(tasks)
+                write_study(file, attributes, entries, lambda i: source.load(entries[i].task_id))
+            for path in records:
+                path.unlink(missing_ok=True)
+            self._entries.clear()
         return damaged
+
+    def move_aside(self) -> list[Path]:
+        """Rename the study and its folder of unfinished work; return their new paths.
+
+        Raises InputError where another run works there.
+        """
+        number, target = 1, self.path
+        while target.exists() or Study(target).parts.exists():
+            target = self.path.with_name(f"{self.path.stem}.{number}{self.path.suffix}")
+            number += 1
+        moved = []
+        if self.parts.exists():
+            check_own(self.parts)
+            with locked(self.parts / "in-use", wait=False) as alone:
+                if not alone:
+                    raise InputError(f"{self.path}: another run works on this study; wait for it")
+                moved.append(self.parts.rename(Study(target).parts))
+        if self.path.exists():
+            moved.append(self.path.rename(target))
+        return moved
 
     def uncollected(self) -> bool:
         """Whether records wait to be collected."""
         return bool(self.record_paths())
 
-    def _records(self) -> tuple[dict[str, Record], list[str]]:
-        """Whole records by task id, without fields; a damaged one is set aside, and said."""
-        found, damaged = {}, []
+    def _records(self) -> tuple[dict[Path, Entry], list[str]]:
+        """The records by path; a damaged one is set aside, with a message."""
+        entries, messages = {}, []
         for path in self.record_paths():
             try:
-                found[path.stem] = read_record(path, with_fields=False)
+                entries[path] = self._entry(path)
             except StudyError as error:
-                bad = path.with_suffix(".bad")
-                while bad.exists():
-                    bad = bad.with_suffix(".again.bad")
-                path.replace(bad)
-                damaged.append(f"{error}; set aside as {bad.name}, its task is solved again")
-        return found, damaged
+                bad = set_aside(path)
+                messages.append(f"{error}; set aside as {bad.name}, its task is solved again")
+        return entries, messages
 
-    def _is_complete(self) -> bool:
+    def _entry(self, path: Path) -> Entry:
+        """All of a record but its arrays; read once, as records are never changed but replaced.
+
+        Raises StudyError.
+        """
+        known = self._entries.get(path)
+        version = version_of(path)
+        if known is None or known[0] != version:
+            known = self._entries[path] = version, read_record_entry(path)
+        return known[1]
+
+    def _is_complete(self, tasks: list[Task]) -> bool:
         """Whether nothing is left to do, and nothing to look at."""
-        if any(self.parts.glob("*.bad")) or self.record_paths() or not self.path.exists():
+        if self.set_aside() or self.record_paths() or not self.path.exists():
             return False
         with open_study(self.path) as file:
-            return MISSING not in texts_of(file, "status")
+            if Status.MISSING in file.statuses:
+                return False
+        lacking = {task.id for task in without_result(tasks, self.collected())}
+        solved = {task.id for task in tasks} - lacking
+        return all(folder.name in solved for folder in checkpoint_folders(self.parts))
+
+    def set_aside(self) -> list[Path]:
+        """The damaged records that were set aside."""
+        return sorted(self.parts.glob("*.bad"))
 
     def record_paths(self) -> list[Path]:
         """The records that are not collected yet."""
-        return sorted(self.parts.glob(f"*{SUFFIX}"))
+        return record_paths(self.parts)
 
     def _collecting(self) -> Any:
         """Keep other collectors out."""
         return locked(self.parts / "collecting")
+
+
+def without_result(tasks: Iterable[Task], held: dict[str, Held]) -> list[Task]:
+    """The tasks to solve: those not held with all their output.
+
+    What is held of them with less output is kept: they store what is held as well.
+    """
+    nothing = Held(Status.MISSING, frozenset())
+    return [
+        task.storing(held.get(task.id, nothing).stored)
+        for task in tasks
+        if task.id not in held or not task.output.names() <= held[task.id].stored
+    ]
+
+
+def _earlier_specs(old: StudyFile | None, text: str) -> list[str]:
+    """The texts of all specs that a study was collected with, but for the present one."""
+    if old is None:
+        return []
+    texts = [*json.loads(old.attributes[EARLIER]), old.attributes["spec_text"]]
+    return [earlier for earlier in dict.fromkeys(texts) if earlier != text]
+
+
+class _Sources:
+    """Where the results of a new study come from: records, and the study so far."""
+
+    def __init__(self, records: dict[Path, Entry], old: StudyFile | None) -> None:
+        self.old = old
+        self.found: dict[str, tuple[Entry, Path | int]] = {}
+        """By task id: its entry, and the record or the index in the study so far."""
+        if old is not None:
+            parts = (old.task_ids, old.scene_ids, old.stored, old.rows)
+            for index, entry in enumerate(map(Entry, *parts)):
+                if entry.row["status"] != Status.MISSING:
+                    self.found[entry.task_id] = entry, index
+        for path, entry in records.items():
+            known = self.found.get(entry.task_id)
+            if known is None or entry.stored >= known[0].stored:
+                self.found[entry.task_id] = entry, path
+
+    def entries(self, tasks: list[Task]) -> list[Entry]:
+        """The tasks of a spec, solved or not, then all others that are solved."""
+        own = {task.id: self._entry(task) for task in tasks}
+        return [*own.values(), *(e for name, (e, _) in self.found.items() if name not in own)]
+
+    def _entry(self, task: Task) -> Entry:
+        """What the spec gives of a task, and what was measured if it is solved."""
+        missing = Entry(task.id, task.scene_id, frozenset(), {"status": Status.MISSING})
+        entry, _ = self.found.get(task.id, (missing, 0))
+        points = {name: entry.row.get(name, -1) for name in ("points", "points_y")}
+        return entry._replace(row=empty_row() | {**entry.row} | task.columns() | points)
+
+    def load(self, task_id: str) -> TaskResult:
+        """The whole result of a task."""
+        _, place = self.found[task_id]
+        if isinstance(place, Path):
+            return read_record(place)
+        assert self.old is not None
+        return self.old.result(place)

@@ -1,35 +1,52 @@
 """A spec as a list of tasks, one for each pressure, with what each will take."""
 
-from dataclasses import dataclass
-from itertools import product
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 from math import prod
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pyfftw
 
+from gfmd_cli.choice import Choice
 from gfmd_cli.errors import InputError
-from gfmd_cli.physics.choice import Choice
-from gfmd_cli.physics.continuum import LAST_LINE, LAST_STRESS
-from gfmd_cli.physics.elastomer import Elastomer, HalfSpace, Membrane, Plate, Power, Slab
-from gfmd_cli.physics.surface import FileSurface, Surface
-from gfmd_cli.solvers.cascade import SolverChoice
-from gfmd_cli.study.spec import SOUGHT, AccuracyTable, OutputTable, Spec, digest
+from gfmd_cli.physics.discretisation_error import MAX_AREA_EXPONENT, MAX_STRESS_EXPONENT
+from gfmd_cli.physics.elastomers import LinearElastomer
+from gfmd_cli.physics.indenters import RigidSurface
+from gfmd_cli.physics.surfaces import check_resolved
+from gfmd_cli.solvers.auto import AnySolver
+from gfmd_cli.spec.boundary import with_boundary
+from gfmd_cli.spec.models import (
+    SOUGHT,
+    SWEPT,
+    AccuracyTable,
+    GridTable,
+    OutputTable,
+    Spec,
+    digest,
+)
+from gfmd_cli.study.columns import PARAMETERS
 
-FIELDS_IN_MEMORY = 6.65
-"""Fields of double precision that a solve holds at its peak: h, u, sigma, work; at half the
-size direction, change, k(q); contact marks, coarse levels. scripts/memory.py measures it."""
-FURTHER_FIELDS = 3.0
-"""What [output] stiffness and spectra add to that, measured likewise."""
-BASE_BYTES = 215e6
-"""What a process holds besides: the interpreter and its libraries."""
-FIRST = 64  # points per side that "auto" begins with at the least; such a solve costs nothing
-LAST = {"a_r": LAST_LINE, "u_g": 4.0, "sigma_p": LAST_STRESS}
+STIFFNESS_FIELDS, SPECTRA_FIELDS = 3.0, 1.0
+"""Fields that output.stiffness and output.spectra add to those of the solver, by peak memory."""
+STORED_FIELDS, ACCURACY_FIELDS = 1.0, 0.5
+"""Fields that each name in output.fields, and [accuracy], add, by peak memory."""
+BASE_BYTES = 240e6
+"""Memory of the interpreter and its libraries."""
+FIRST = 64  # points along x that "auto" begins with at the least; such a solve costs nothing
+LAST = {"a_r": MAX_AREA_EXPONENT, "u_g": 4.0, "sigma_p": MAX_STRESS_EXPONENT}
 """Exponents n up to which a quantity has a continuum value to come near to."""
-SYMBOLS = {"p_star": "p*", "pressure": "p", "contact_area": "a_r", "mean_gap": "u_g"}
+SYMBOLS = {
+    "p_star": "p*",
+    "pressure": "p",
+    "contact_area": "a_r",
+    "mean_gap": "u_g",
+    "displacement": "d",
+}
 SEARCH = 4.5  # solves that a search of the pressure takes, those on coarser grids included
-MAX_TASKS = 100_000  # of a study; more are a slip of the pen
+LOAD_DIGITS = 14  # of a load that name its task: the last bit of a ladder depends on the machine
+MAX_TASKS = 100_000  # upper limit of a study, guards against typing errors
+MAX_COMBINATIONS = 2_000_000  # of all lists, of which paired lists choose a part
 SECONDS_PER_PAIR = 1.7e-8
 """Per grid point and pair of transforms, with all work between two of them, on one thread."""
 
@@ -39,32 +56,56 @@ class Task:
     """One contact to solve."""
 
     index: int
-    surface: Surface
-    elastomer: Elastomer
+    surface: RigidSurface
+    elastomer: LinearElastomer
+    grid: GridTable
     points: int
+    """Points along x; of an "auto" grid a forecast."""
+    points_y: int
+    """Points along y, likewise; 1 of a line."""
     quantity: str
-    """What the load is given as: one of LOADS."""
+    """Quantity that gives the load: one of LOADS."""
     load: float
     """Its value."""
-    within: float
+    load_tolerance: float
     """Relative distance to it at which a search ends."""
-    solver: SolverChoice
+    solver: AnySolver
     output: OutputTable
     accuracy: AccuracyTable | None
-    auto: bool
-    """Whether the grid is chosen by the accuracy asked for; `points` is then a forecast."""
     id: str
-    """Name of the task by its content."""
+    """Name of the task by its content, the output left out."""
+    scene_id: str
+    """Name of its surface, elastomer and grid by their content."""
+    surface_sha256: str
+    """Checksum of the file of the surface; "" without a file."""
+    swept: tuple[str, ...]
+    """Values of the swept keys of surface, grid and solver, as words of the label."""
+
+    def storing(self, names: Iterable[str]) -> "Task":
+        """The same task with more output (`OutputTable.names`)."""
+        return replace(self, output=self.output.with_names(names))
+
+    @property
+    def auto(self) -> bool:
+        """Whether the grid is chosen by the accuracy that the spec requires."""
+        return self.grid.points == "auto"
+
+    @property
+    def boundary(self) -> str:
+        """Boundary of the contact, "periodic" or "free"."""
+        return self.grid.boundary or "periodic"
 
     @property
     def label(self) -> str:
-        """What sets the task apart, for people."""
-        points = "auto" if self.auto else self.points
-        return f"{describe(self.elastomer)} {points} {self.asked}"
+        """The task in messages and progress: elastomer, swept keys, points and load."""
+        points = "auto" if self.auto else str(self.points)
+        if not self.auto and self.points_y not in (1, self.points):
+            points += f"x{self.points_y}"
+        return " ".join([self.elastomer.label, *self.swept, points, self.asked])
 
     @property
     def asked(self) -> str:
-        """The load, for people."""
+        """The load with its symbol."""
         return f"{SYMBOLS[self.quantity]}={self.load:.4g}"
 
     def p_star(self, delta_sigma: float) -> float:
@@ -74,7 +115,20 @@ class Task:
     @property
     def size(self) -> int:
         """Number of grid points."""
-        return int(self.points**self.surface.dimension)
+        return self.points * self.points_y
+
+    def points_y_on(self, points: int) -> int:
+        """Points along y of a finer or coarser grid of the same cell and aspect ratio."""
+        if self.surface.dimension == 1:
+            return 1
+        return max(1, round(points * self.points_y / self.points))
+
+    def resolves(self, points: int) -> bool:
+        """Whether the surface is resolved by a grid with so many points along x."""
+        return (
+            points >= self.surface.smallest_grid()
+            and self.points_y_on(points) >= self.surface.smallest_grid_y()
+        )
 
     @property
     def bytes(self) -> float:
@@ -82,14 +136,17 @@ class Task:
         return self.bytes_on(self.points)
 
     def bytes_on(self, points: int) -> float:
-        """Memory that a solve on this many points per side takes, with its process."""
-        further = FURTHER_FIELDS if self.output.stiffness or self.output.spectra else 0.0
-        fields = FIELDS_IN_MEMORY + further
-        return fields * 8 * float(points**self.surface.dimension) + BASE_BYTES
+        """Memory that a solve on this many points along x takes, with its process."""
+        fields = self.solver.fields_for(self.boundary, self.elastomer.exponent)
+        fields += STIFFNESS_FIELDS if self.output.stiffness else 0.0
+        fields += SPECTRA_FIELDS if self.output.spectra else 0.0
+        fields += STORED_FIELDS * len(self.output.fields)
+        fields += ACCURACY_FIELDS if self.accuracy is not None else 0.0
+        return fields * 8 * float(points * self.points_y_on(points)) + BASE_BYTES
 
     @property
     def least_points(self) -> int:
-        """Points per side without which the task cannot begin."""
+        """Points along x without which the task cannot begin."""
         return first_grid(self.surface) if self.auto else self.points
 
     @property
@@ -99,24 +156,29 @@ class Task:
         return 0.01 + solves * SECONDS_PER_PAIR * self.size * self._pairs()
 
     def columns(self) -> dict[str, Any]:
-        """What is to be solved, as columns of a study."""
-        n, t = exponent(self.elastomer), thickness(self.elastomer)
+        """The contact to solve, as columns of a study."""
+        values = {table: getattr(self, table).parameters() for table in SWEPT}
         return {
-            "surface": describe(self.surface),
-            "preparation": self.surface.preparation(),
-            "seed": getattr(self.surface, "seed", -1),
-            "elastomer": describe(self.elastomer),
-            "n": np.nan if n is None else n,
-            "thickness": np.nan if t is None else t,
-            "points": self.points,
+            **{each.column.name: each.cell(values[each.table]) for each in PARAMETERS},
+            "surface": self.surface.label,
+            "ensemble": self.surface.label_without({"seed"}),
+            "surface_sha256": self.surface_sha256,
+            "dimension": self.surface.dimension,
+            "x_first": self.surface.x_first,
+            "rough": int(self.surface.rough),
+            "preparation": self.surface.preparation(self.boundary),
+            "elastomer": self.elastomer.label,
+            "points_y": self.points_y,
+            "length_y": self.surface.sides[0] if self.surface.dimension == 2 else np.nan,
+            "n": np.nan if self.elastomer.exponent is None else self.elastomer.exponent,
             "grid": "auto" if self.auto else "given",
             "load": self.quantity,
-            "asked": self.load,
+            "load_value": self.load,
         }
 
     def _pairs(self) -> float:
         """Pairs of transforms, fitted to the default surface at 512^2, tolerance 1e-6."""
-        n = exponent(self.elastomer)
+        n = self.elastomer.exponent
         n = 2.0 if n is None else n
         if n == 0:
             return 1.0
@@ -127,51 +189,26 @@ class Task:
         return float(pairs * (p / 0.1) ** -slope * tightness)
 
 
-def exponent(elastomer: Elastomer) -> float | None:
-    """Exponent n where the stiffness is one power of q, else None."""
-    if isinstance(elastomer, Power):
-        return elastomer.n
-    return {HalfSpace: 1.0, Membrane: 2.0, Plate: 4.0}.get(type(elastomer))
-
-
-def thickness(elastomer: Elastomer) -> float | None:
-    """Thickness t / L of a slab, else None."""
-    return elastomer.thickness if isinstance(elastomer, Slab) else None
-
-
-def describe(choice: Choice) -> str:
-    """The kind with all that differs from its defaults, in one line."""
-    told = [
-        f"{name}={_in_short(value)}"
-        for name, value in choice
-        if name != "kind" and value != type(choice).model_fields[name].default
-    ]
-    return " ".join([str(getattr(choice, "kind", "")), *told])
-
-
-def _in_short(value: object) -> str:
-    if isinstance(value, Path):
-        return value.name
-    return f"{value:g}" if isinstance(value, float) else str(value)
-
-
-def first_grid(surface: Surface) -> int:
-    """Points per side that an "auto" grid begins with: the fewest that resolve the surface."""
+def first_grid(surface: RigidSurface) -> int:
+    """Points along x that an "auto" grid begins with: the fewest that resolve the surface."""
     needed = surface.smallest_grid()
-    if isinstance(surface, FileSurface):
+    if surface.is_map:
         return needed
     return 2 * int(pyfftw.next_fast_len((max(needed, FIRST) + 1) // 2))
 
 
 def forecast(
-    surface: Surface, elastomer: Elastomer, p_star: float | None, accuracy: AccuracyTable | None
+    surface: RigidSurface,
+    elastomer: LinearElastomer,
+    p_star: float | None,
+    accuracy: AccuracyTable | None,
 ) -> int:
-    """Points per side that an "auto" grid will end with, right within a factor of two as a rule.
+    """Points along x that an "auto" grid will end with, right within a factor of two as a rule.
 
     Relative errors on the first grid, and the order at which they fall: read off the default
     surface with cutoff = 0.03, n = 0 to 4, p* = 0.01 to 1.
     """
-    n, p = exponent(elastomer), p_star or 0.1
+    n, p = elastomer.exponent, p_star or 0.1
     n = 1.0 if n is None else n
     steep = float(np.interp(n, [0, 2, 3], [0.4, 0.48, 0.96]))
     area = float(np.interp(n, [0, 1, 2, 3], [0.05, 0.09, 0.26, 0.8])) * min(p / 0.1, 1.0) ** -steep
@@ -195,61 +232,133 @@ def plan(spec: Spec) -> list[Task]:
 
     Raises InputError where a grid does not resolve its surface or a file is unfit.
     """
-    loads = spec.load.values()
-    swept: tuple[list[Any], ...] = (spec.surface, spec.elastomer, spec.grid, spec.solver, loads)
-    if (count := prod(len(values) for values in swept)) > MAX_TASKS:
-        raise InputError(f"the sweeps make {count} tasks; at most {MAX_TASKS} fit into a study")
-    for surface, grid in product(spec.surface, spec.grid):
-        needed = surface.smallest_grid()
-        if grid.points != "auto" and grid.points < needed:
-            of = f"a map of {needed} points" if isinstance(surface, FileSurface) else surface.kind
-            raise InputError(
-                f"grid.points: {grid.points} points per side do not resolve the surface "
-                f"({of}{_cutoff(surface)}); take {needed} or more"
-            )
+    _check(spec)
     resolved = spec.resolved()
-    tables = ("surface", "elastomer", "grid", "solver")
-    quantity = spec.load.quantity
+    alternatives = {table: getattr(spec, table) for table in SWEPT}
+    swept_keys = {table: _swept_keys(alternatives[table]) for table in SWEPT}
     tasks: list[Task] = []
-    for places in product(*(range(len(resolved[name])) for name in tables)):
-        parts = {name: resolved[name][i] for name, i in zip(tables, places, strict=True)}
-        s, e, g, m = places
+    for at, loads in spec.combinations():
+        chosen = _chosen(spec, at)
+        tables = {table: resolved[table][i] for table, i in at.items()}
+        tables |= {
+            table: tables[table] | {key: getattr(chosen[table], key)}
+            for table, key in (("surface", "edges"), ("grid", "boundary"))
+            if key in tables[table]
+        }
         for load in loads:
-            content = [parts, quantity == "p_star", load, resolved["output"]]
-            if quantity in SOUGHT:
-                content += [quantity, spec.load.within]
-            if spec.accuracy is not None:
-                content.append(resolved["accuracy"])
-            points = spec.grid[g].points
-            expected = (
-                points
-                if points != "auto"
-                else forecast(
-                    spec.surface[s],
-                    spec.elastomer[e],
-                    load if quantity == "p_star" else None,
-                    spec.accuracy,
-                )
-            )
+            points = _points(spec, load=load, **chosen)
+            surface, points_y = chosen["grid"].on_cell(chosen["surface"], points)
             tasks.append(
                 Task(
                     index=len(tasks),
-                    surface=spec.surface[s],
-                    elastomer=spec.elastomer[e],
-                    points=expected,
-                    quantity=quantity,
+                    **chosen | {"surface": surface},
+                    points=points,
+                    points_y=points_y,
+                    quantity=spec.load.quantity,
                     load=load,
-                    within=spec.load.within,
-                    solver=spec.solver[m],
+                    load_tolerance=spec.load.tolerance,
                     output=spec.output,
                     accuracy=spec.accuracy,
-                    auto=points == "auto",
-                    id=digest(content),
+                    id=_task_id(spec, resolved, tables, load),
+                    surface_sha256=tables["surface"].get("sha256", ""),
+                    scene_id=digest([tables[name] for name in ("surface", "elastomer", "grid")]),
+                    swept=_swept_words(chosen, swept_keys),
                 )
             )
     return tasks
 
 
-def _cutoff(surface: Surface) -> str:
-    cutoff = getattr(surface, "cutoff", None)
-    return "" if cutoff is None else f", cutoff = {cutoff:g}: two points per lambda_s"
+def _check(spec: Spec) -> None:
+    """Raise InputError for too many tasks, an unfit file, or a grid too coarse for its surface."""
+    count = prod(len(getattr(spec, table)) for table in SWEPT) * len(spec.load.values())
+    if spec.sweep and count <= MAX_COMBINATIONS:
+        count = sum(len(loads) for _, loads in spec.combinations())
+    if count > MAX_TASKS:
+        raise InputError(f"the sweeps make {count} tasks; a study has at most {MAX_TASKS}")
+    for elastomer in spec.elastomer:
+        elastomer.stiffness(np.ones(1))  # raises where a table cannot be read
+    combinations = [at for at, _ in spec.combinations()]
+    for i, j in dict.fromkeys((at["surface"], at["grid"]) for at in combinations):
+        _check_grid(spec.surface[i], spec.grid[j])
+    for places in dict.fromkeys(tuple(at[table] for table in SWEPT) for at in combinations):
+        chosen = _chosen(spec, dict(zip(SWEPT, places, strict=True)))
+        _check_boundary(spec.load.quantity, **chosen)
+
+
+def _chosen(spec: Spec, at: dict[str, int]) -> dict[str, Any]:
+    """The entries of the swept tables at these places, with the boundary of the contact."""
+    chosen = {table: getattr(spec, table)[i] for table, i in at.items()}
+    surface, grid = with_boundary(spec, **chosen)
+    return chosen | {"surface": surface, "grid": grid}
+
+
+def _check_grid(surface: RigidSurface, grid: GridTable) -> None:
+    """Raise InputError for a grid that does not resolve or does not suit its surface."""
+    if surface.dimension == 1 and grid.points_y is not None:
+        raise InputError(
+            f"grid.points_y: {grid.points_y} given, but a surface of kind {surface.kind!r} is a "
+            "line; leave grid.points_y out"
+        )
+    if grid.points != "auto":
+        points = surface.copies * grid.points
+        on_cell, points_y = grid.on_cell(surface, points)
+        check_resolved(on_cell, points, points_y)
+
+
+def _check_boundary(
+    quantity: str,
+    surface: RigidSurface,
+    elastomer: LinearElastomer,
+    grid: GridTable,
+    solver: AnySolver,
+) -> None:
+    """Raise InputError for an elastomer, a solver or a load that does not suit the boundary."""
+    solver.check_boundary(grid.boundary or "periodic")
+    if grid.boundary == "free":
+        elastomer.check_free_boundary(surface.dimension)
+    if quantity == "displacement":
+        elastomer.check_displacement_load(grid.boundary or "periodic", surface.dimension)
+
+
+def _points(
+    spec: Spec,
+    surface: RigidSurface,
+    elastomer: LinearElastomer,
+    grid: GridTable,
+    solver: AnySolver,
+    load: float,
+) -> int:
+    """Points along x of the cell; of an "auto" grid the forecast."""
+    if grid.points != "auto":
+        return surface.copies * grid.points
+    p_star = load if spec.load.quantity == "p_star" else None
+    return forecast(surface, elastomer, p_star, spec.accuracy)
+
+
+def _task_id(spec: Spec, resolved: dict[str, Any], tables: dict[str, Any], load: float) -> str:
+    """Name of a task: the digest of everything that its solution depends on."""
+    quantity = spec.load.quantity
+    content = [tables, quantity == "p_star", f"{load:.{LOAD_DIGITS}g}"]
+    if quantity in SOUGHT:
+        content += [quantity, spec.load.tolerance]
+    if spec.accuracy is not None:
+        content.append(resolved["accuracy"])
+    return digest(content)
+
+
+def _swept_keys(alternatives: list[Choice]) -> set[str]:
+    """The keys whose values differ between the alternatives of a table."""
+    values: dict[str, set[Any]] = {}
+    for choice in alternatives:
+        for key, value in choice:
+            values.setdefault(key, set()).add(value)
+    return {key for key, different in values.items() if len(different) > 1}
+
+
+def _swept_words(chosen: dict[str, Choice], swept_keys: dict[str, set[str]]) -> tuple[str, ...]:
+    """The swept keys of surface, grid and solver, as words; the label has the others already."""
+    words: list[str] = []
+    for table in ("surface", "grid", "solver"):
+        given = {"kind", *chosen[table].model_fields_set} - {"points", "points_y"}
+        words += chosen[table].words(given & swept_keys[table])
+    return tuple(words)

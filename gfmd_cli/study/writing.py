@@ -1,158 +1,215 @@
-"""Laying out a study file: attributes, columns, distributions, scenes, fields."""
+"""Writing a study file: loops over what `columns` declares.
 
-from pathlib import Path
-from typing import Any
+Numbers have units, a long name and dimension scales, so that xarray and netCDF know the axes; every
+chunk has a checksum.
+"""
 
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple, Self
+
+import h5py
 import numpy as np
 
-from gfmd_cli.study.labelled import dataset, scale
-from gfmd_cli.study.layout import (
+from gfmd_cli.files.hdf5 import create_dataset
+from gfmd_cli.status import Status
+from gfmd_cli.study.column import Column
+from gfmd_cli.study.columns import (
     COLUMNS,
-    CURVES,
-    DISTRIBUTIONS,
-    FIELDS,
+    HISTOGRAMS,
     LAYOUT,
-    MISSING,
+    PARAMETER_COLUMNS,
+    PICTURES,
+    SCENE,
+    SCENE_ID,
     SHELLS,
+    STORED,
+    TASK,
+    TASK_GROUPS,
+    TASK_ID,
     WEIGHTS,
-    Column,
-    empty_row,
+    HistogramColumn,
+    TaskGroup,
 )
-from gfmd_cli.study.provenance import origin
-from gfmd_cli.study.reading import (
-    ATTRIBUTES_SUM,
-    attributes_sum,
-    fields_of,
-    rows_of,
-    shells_of,
-    texts_of,
-)
-from gfmd_cli.study.record import Record, read_record, record_path
-from gfmd_cli.study.spec import Spec
-from gfmd_cli.study.tasks import Task
+from gfmd_cli.study.reading import ATTRIBUTES_SUM, KINDS, PACKED, attributes_sum
+from gfmd_cli.study.result import TaskResult
+
+
+class Entry(NamedTuple):
+    """One task of a study that is to be written."""
+
+    task_id: str
+    scene_id: str
+    """Tasks of one scene share surface, elastomer and grid."""
+    stored: frozenset[str]
+    """What [output] stored of it; nothing of a task that is not solved yet."""
+    row: Mapping[str, Any]
+
+    @classmethod
+    def of(cls, result: TaskResult) -> Self:
+        """The entry of a solved task."""
+        return cls(result.task_id, result.scene_id, result.stored, result.row)
 
 
 def write_study(
     file: Any,
-    spec: Spec,
-    tasks: list[Task],
-    text: str,
-    found: dict[str, Record],
-    parts: Path,
-    old: Any,
+    attributes: Mapping[str, str],
+    entries: Sequence[Entry],
+    load: Callable[[int], TaskResult],
+    *,
+    labelled: bool = True,
 ) -> None:
-    """Lay out the whole study: attributes, columns, distributions, scenes, fields.
+    """Write a whole study: attributes, columns, histograms, scenes and the arrays of the tasks.
 
     Parameters
     ----------
-    file : the new file
-    text : the spec as it was given
-    found, parts : records by task id, without fields, and the folder that has them whole
-    old : the study so far, open, or None; it gives what no record does
-
-    Fields are read and written one task at a time. Raises SpaceError, StudyError.
+    file : the new HDF5 file
+    entries : the tasks in order
+    load : the result of a solved task by its index; one is held at a time
+    labelled : whether users open it; without, as in a record, the columns of a kind share a
+        dataset and there are no labels: a tenth of the time
     """
-    file.attrs.update({"layout": LAYOUT, **origin(spec, text)})
+    file.attrs.update({"layout": LAYOUT, **attributes})
     file.attrs[ATTRIBUTES_SUM] = attributes_sum(file)
-    kept = _old_rows(old, {task.id for task in tasks} - set(found))
-    rows = [_row(task, found, kept) for task in tasks]
-    scenes = _scene_numbers(tasks)
-    task = scale(file, "task", np.arange(len(tasks)), "1", "index of the task")
-    asked = {name for name, value in spec.output if value}
-    weights = [column for name in WEIGHTS if name in asked for column in WEIGHTS[name]]
-    for column in (*COLUMNS, *weights):
-        dataset(file, column, [row[column.name] for row in rows], [task])
-    dataset(file, Column("task_id", str, "", "task by its content"), [t.id for t in tasks], [task])
-    dataset(file, Column("scene", int, "1", "group of /scenes"), scenes, [task])
-    _write_distributions(file, asked, task, rows)
-    for solved, scene, row in zip(tasks, scenes, rows, strict=True):
-        if solved.id in found:
-            record = found[solved.id]
-            if spec.output.fields:
-                record = read_record(record_path(parts, solved.id))
-            _write_extras(file, solved.index, scene, record)
-        elif old is not None and row["status"] != MISSING:
-            _write_extras(file, solved.index, scene, _old_record(old, solved.id, row))
+    rows = [entry.row for entry in entries]
+    writer = _Writer(labelled)
+    task = writer.scale(file, TASK.name, np.arange(len(rows)), TASK.units, TASK.meaning)
+    options = {name.partition(".")[0] for entry in entries for name in entry.stored}
+    scenes = {name: i for i, name in enumerate(dict.fromkeys(e.scene_id for e in entries))}
+    weights = [column for name in WEIGHTS if name in options for column in WEIGHTS[name]]
+    values = {column: [row[column.name] for row in rows] for column in (*COLUMNS, *weights)}
+    values[TASK_ID] = [entry.task_id for entry in entries]
+    values[SCENE_ID] = [entry.scene_id for entry in entries]
+    values[STORED] = [" ".join(sorted(entry.stored)) for entry in entries]
+    values[SCENE] = [scenes[entry.scene_id] for entry in entries]
+    writer.columns(file, values, task)
+    for histogram in HISTOGRAMS:
+        if histogram.option in options:
+            writer.histogram(file, histogram, task, rows)
+    groups = [group for group in TASK_GROUPS if group.option in options]
+    with_arrays = {group.option for group in groups}
+    for index, entry in enumerate(entries):
+        scene = f"scenes/{scenes[entry.scene_id]}"
+        if any(name.partition(".")[0] in with_arrays for name in entry.stored) or (
+            scene not in file and entry.row["status"] != Status.MISSING
+        ):
+            writer.result(file, index, scene, groups, load(index))
 
 
-def _row(task: Task, records: dict[str, Record], kept: dict[str, dict[str, Any]]) -> dict[str, Any]:
-    if task.id in records:
-        return empty_row() | dict(records[task.id].row) | dict(records[task.id].distribution)
-    return kept.get(task.id) or empty_row() | {"status": MISSING}
+class _Writer(NamedTuple):
+    """Writes the parts of a study, labelled or plain."""
+
+    labelled: bool
+
+    def scale(self, group: Any, name: str, values: Any, units: str, meaning: str) -> Any:
+        """A dimension scale, in a labelled study."""
+        return write_scale(group, name, values, units, meaning) if self.labelled else None
+
+    def column(self, group: Any, column: Column, values: Any, scales: list[Any]) -> None:
+        """A dataset as a column declares it."""
+        if self.labelled:
+            write_column(group, column, values, scales)
+        else:
+            create_dataset(group, column.name, _array(column.kind, values))
+
+    def columns(self, file: Any, values: Mapping[Column, list[Any]], task: Any) -> None:
+        """The columns: a dataset each, or one for all of a kind that are not blank."""
+        if self.labelled:
+            for column, of_column in values.items():
+                if column not in PARAMETER_COLUMNS or not all(map(column.is_blank, of_column)):
+                    write_column(file, column, of_column, [task])
+            return
+        for kind in KINDS:
+            chosen = {
+                column: of_column
+                for column, of_column in values.items()
+                if column.kind is kind and not all(map(column.is_blank, of_column))
+            }
+            group = file.create_group(f"{PACKED}/{kind.__name__}")
+            create_dataset(group, "names", _array(str, [column.name for column in chosen]))
+            create_dataset(group, "values", _array(kind, list(chosen.values())))
+
+    def histogram(
+        self, file: Any, histogram: HistogramColumn, task: Any, rows: list[Mapping[str, Any]]
+    ) -> None:
+        """The densities of all tasks over the bins."""
+        edges, middles = histogram.edges(), histogram.middles()
+        bins = self.scale(file, histogram.axis, middles, "1", histogram.axis_meaning)
+        if bins is not None:
+            bins.attrs["edges"] = edges
+        blank = np.full(edges.size - 1, np.nan)
+        densities = np.array([row.get(histogram.name, blank) for row in rows])
+        self.column(file, histogram.column, densities, [task, bins])
+
+    def result(
+        self, file: Any, index: int, scene: str, groups: list[TaskGroup], result: TaskResult
+    ) -> None:
+        """Spectrum and pictures of the scene, unless they are there, and the arrays of one task."""
+        if scene not in file:
+            group = file.create_group(scene)
+            shell = self.scale(group, "shell", np.arange(result.shells.q.size), "1", "shell")
+            for column in SHELLS:
+                self.column(group, column, getattr(result.shells, column.name), [shell])
+            for name, picture in result.pictures.items():
+                shown = group.require_group(PICTURES)
+                _with_checksums(shown, name, picture.heights.astype(np.float32))
+                _with_checksums(shown, f"{name}_sides", np.array(picture.sides))
+        for declared in groups:
+            if arrays := result.arrays.get(declared.name):
+                group = file.create_group(f"{declared.name}/{index}")
+                shape = next(iter(arrays.values())).shape
+                scales = self._axes(group, declared, shape, result.row)
+                for column in declared.columns:
+                    if column.name in arrays:
+                        self.column(group, column, arrays[column.name], scales)
+
+    def _axes(
+        self, group: Any, declared: TaskGroup, shape: tuple[int, ...], row: Mapping[str, Any]
+    ) -> list[Any]:
+        """The axes of the arrays of a group: an index, or positions [m] on the grid."""
+        if declared.axis:
+            return [self.scale(group, declared.axis, np.arange(*shape), "1", declared.axis)]
+        return [
+            self.scale(
+                group,
+                name,
+                (np.arange(size) / size + row["x_first"]) * row[side],
+                "m",
+                f"position along {name}",
+            )
+            for name, side, size in zip(
+                ("y", "x")[-len(shape) :], ("length_y", "length")[-len(shape) :], shape, strict=True
+            )
+        ]
 
 
-def _old_rows(old: Any, wanted: set[str]) -> dict[str, dict[str, Any]]:
-    """Rows of the former study file by task id."""
-    if old is None:
-        return {}
-    rows = zip(texts_of(old, "task_id"), rows_of(old), strict=True)
-    return {i: row for i, row in rows if i in wanted}
+def write_scale(group: Any, name: str, values: Any, units: str, meaning: str) -> Any:
+    """A dimension scale: the labels along one axis of other datasets."""
+    scale = _with_checksums(group, name, np.asarray(values))
+    scale.make_scale(name)
+    scale.attrs.update({"units": units, "long_name": meaning})
+    return scale
 
 
-def _old_record(old: Any, task_id: str, row: dict[str, Any]) -> Record:
-    """What the former study file holds of a task, at its place there."""
-    index, scene = row["task"], row["scene"]
-    return Record(
-        task_id=task_id,
-        row=row,
-        shells=shells_of(old, scene),
-        fields=fields_of(old, f"fields/{index}"),
-        cross_section=fields_of(old, f"cross_sections/{index}"),
-        **{
-            place: fields_of(old, f"{place}/{index}", columns)
-            for place, (_, columns) in CURVES.items()
-        },
-    )
+def write_column(group: Any, column: Column, values: Any, scales: list[Any]) -> None:
+    """A labelled dataset."""
+    dataset = _with_checksums(group, column.name, _array(column.kind, values))
+    if column.kind is str:
+        dataset.attrs["_Encoding"] = "utf-8"
+    if column.units:
+        dataset.attrs["units"] = column.units
+    dataset.attrs["long_name"] = column.meaning
+    for axis, scale in enumerate(scales):
+        dataset.dims[axis].attach_scale(scale)
 
 
-def _scene_numbers(tasks: list[Task]) -> list[int]:
-    """Tasks that share surface, elastomer and grid share a scene."""
-    numbers: dict[Any, int] = {}
-    return [
-        numbers.setdefault(
-            (task.surface, task.elastomer, "auto" if task.auto else task.points), len(numbers)
-        )
-        for task in tasks
-    ]
+def _array(kind: type, values: Any) -> Any:
+    """The values as they are stored: numbers, or text in UTF-8 of a fixed length."""
+    if kind is not str:
+        return np.asarray(values, kind)
+    encoded = np.char.encode(np.asarray(values, str), "utf-8")
+    return encoded.astype(h5py.string_dtype("utf-8", max(encoded.itemsize, 1)))
 
 
-def _write_distributions(file: Any, asked: set[str], task: Any, rows: list[dict[str, Any]]) -> None:
-    for made in DISTRIBUTIONS:
-        if made.option in asked:
-            edges = made.edges()
-            labels = scale(file, made.axis, made.middles(), "1", made.labels)
-            labels.attrs["edges"] = edges
-            blank = np.full(edges.size - 1, np.nan)
-            density = np.array([row.get(made.name, blank) for row in rows])
-            dataset(file, Column(made.name, float, "1", made.meaning), density, [task, labels])
-
-
-def _write_extras(file: Any, index: int, scene: int, record: Record) -> None:
-    """The scene's spectrum, the fields, the cross-section and the curves of one task."""
-    if f"scenes/{scene}" not in file:
-        group = file.create_group(f"scenes/{scene}")
-        shell = scale(group, "shell", np.arange(record.shells.q.size), "1", "shell")
-        for column in SHELLS:
-            if (values := getattr(record.shells, column.name)) is not None:
-                dataset(group, column, values, [shell])
-    for place, values in (("fields", record.fields), ("cross_sections", record.cross_section)):
-        if values:
-            group = file.create_group(f"{place}/{index}")
-            _write_fields(group, dict(values), record.row["length"])
-    for place, (axis, columns) in CURVES.items():
-        if values := getattr(record, place):
-            group = file.create_group(f"{place}/{index}")
-            number = scale(group, axis, np.arange(values[columns[0].name].size), "1", axis)
-            for column in columns:
-                dataset(group, column, values[column.name], [number])
-
-
-def _write_fields(group: Any, fields: dict[str, Any], length: float) -> None:
-    first = next(iter(fields.values()))
-    axes = [
-        scale(group, name, np.arange(size) * (length / size), "m", f"position along {name}")
-        for name, size in zip(("y", "x")[-first.ndim :], first.shape, strict=True)
-    ]
-    for column in FIELDS:
-        if column.name in fields:
-            dataset(group, column, fields[column.name], axes)
+def _with_checksums(group: Any, name: str, values: Any) -> Any:
+    """A dataset whose every chunk has a checksum: a changed one cannot be read."""
+    return group.create_dataset(name, data=values, fletcher32=values.size > 0)

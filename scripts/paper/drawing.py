@@ -1,4 +1,4 @@
-"""What the figures share: the look of a body, values with their errors, a quantity over pressure."""
+"""What the figures share: the style of a body, values with their errors, a quantity over pressure."""
 
 from pathlib import Path
 from typing import Any
@@ -6,30 +6,24 @@ from typing import Any
 import numpy as np
 
 from gfmd_cli.analysis.compare import Curve
-from gfmd_cli.analysis.looks import MARKERS, Look, colours
-from gfmd_cli.analysis.sheet import Sheet
+from gfmd_cli.analysis.curve_styles import MARKERS, CurveStyle, colours
+from gfmd_cli.analysis.plotting import ColumnFigure
+from paper.claims import Value
 
-WELL = 0.3  # relative error of a continuum value that is preferred to the value of the grid
+KNOWN = 0.5  # relative error up to which a value is drawn with its bar, else its upper limit
 BODIES = (0.0, 0.5, 1.0, 2.0, 3.0, 4.0)
-LOOKS = {
-    n: Look(colour, MARKERS[i], f"n = {'1/2' if n == 0.5 else f'{n:g}'}")
+STYLES = {
+    n: CurveStyle(colour, MARKERS[i], f"n = {'1/2' if n == 0.5 else f'{n:g}'}")
     for i, (n, colour) in enumerate(zip(BODIES, colours(len(BODIES)), strict=True))
 }
 Row = dict[str, Any]
 
 
-def value(row: Row, name: str) -> tuple[float, float]:
-    """A quantity with its error: in the continuum where that is well known, else of the grid."""
-    found, error = row[f"{name}_continuum"], row[f"{name}_continuum_error"]
-    if np.isfinite(found) and error < WELL * found:
-        return float(found), float(error)
-    return float(row[name]), float(row[f"{name}_error"])
-
-
 def values(rows: list[Row], name: str) -> tuple[np.ndarray, np.ndarray]:
-    """The same of many rows."""
-    found = np.array([value(row, name) for row in rows]).reshape(-1, 2)
-    return found[:, 0], found[:, 1]
+    """A quantity in the continuum with its error, NaN where that is unknown."""
+    found = [(row[f"{name}_continuum"], row[f"{name}_continuum_error"]) for row in rows]
+    value, error = np.array(found, dtype=float).reshape(-1, 2).T
+    return np.where(np.isfinite(error), value, np.nan), error
 
 
 def column(rows: list[Row], name: str) -> np.ndarray:
@@ -42,13 +36,24 @@ def curves(held: Any, name: str) -> list[Curve]:
     return sorted(held.comparison(name).curves, key=lambda curve: np.nan_to_num(curve.n, nan=9.0))
 
 
-def draw_points(sheet: Sheet, look: Look, x: Any, y: Any, error: Any = None) -> None:
+def draw_points(plot: ColumnFigure, style: CurveStyle, x: Any, y: Any, error: Any = None) -> None:
     """Open symbols with error bars where the error is known."""
     x, y = np.asarray(x), np.asarray(y)
-    if error is not None:
-        known = np.isfinite(error)
-        sheet.bars(look, x[known], y[known], error[known])
-    sheet.points(look, x, y, np.full(x.size, True))
+    plot.points(
+        style, x, y, np.full(x.size, True), error=None if error is None else np.asarray(error)
+    )
+
+
+def draw_limits(plot: ColumnFigure, style: CurveStyle, x: Any, y: Any, error: Any) -> np.ndarray:
+    """Values with bars, and upper limits as arrows where the error is large; which are values."""
+    known = np.isfinite(y) & (error < KNOWN * y)
+    draw_points(plot, style, x[known], y[known], error[known])
+    limited = np.isfinite(y) & ~known
+    if np.any(limited):
+        arrows = {"marker": r"$\downarrow$", "ls": "none", "ms": 7, "color": style.colour}
+        plot.axes.plot(x[limited], (y + error)[limited], **arrows)
+        plot.legend["upper limit"] = plot.axes.lines[-1]
+    return known
 
 
 def dense(curve: Curve) -> np.ndarray:
@@ -58,35 +63,23 @@ def dense(curve: Curve) -> np.ndarray:
 
 
 def finish(
-    sheet: Sheet, folder: Path, name: str, x_scale: str, y_scale: str, x: Any, y: Any
+    plot: ColumnFigure, folder: Path, name: str, x_scale: str, y_scale: str, x: Any, y: Any
 ) -> None:
     """Scales around the values, and both files. A scale of "ratio" is linear and needs no zero."""
     folder.mkdir(parents=True, exist_ok=True)
     for axis, scale, span in (("x", x_scale, x), ("y", y_scale, y)):
         span = np.asarray(span, dtype=float)
         span = span[np.isfinite(span) & ((span > 0) | (scale != "log"))]
-        sheet.scale(axis, "linear" if scale == "ratio" else scale, span, zero=scale != "ratio")
-    sheet.write(folder / name)
+        plot.scale(axis, "linear" if scale == "ratio" else scale, span, zero=scale != "ratio")
+    plot.write(folder / name)
 
 
-def percent(share: float) -> str:
-    """A share in per cent, two digits."""
-    return f"{100 * share:.0f} %" if share >= 0.1 else f"{100 * share:.2g} %"
+def label(n: float) -> str:
+    """An exponent in words."""
+    return STYLES[n].label
 
 
-def plus_minus(found: float, error: float) -> str:
-    """A value with its error in plain digits: 0.123 ± 0.004."""
-    if not (np.isfinite(error) and error > 1e-8):
-        return f"{found:.3g}"
-    digits = max(
-        0,
-        -int(np.floor(np.log10(error)))
-        + (0 if error >= 2 * 10 ** np.floor(np.log10(error)) else 1),
-    )
-    return f"{found:.{digits}f} ± {error:.{digits}f}"
-
-
-def slope(x: Any, y: Any, error: Any) -> tuple[float, float]:
+def slope(x: Any, y: Any, error: Any) -> Value:
     """Slope of a straight line by weighted least squares, with its standard error.
 
     The scatter about the line widens the error where it is larger than the errors of the points.
@@ -97,4 +90,4 @@ def slope(x: Any, y: Any, error: Any) -> tuple[float, float]:
     found = float(weight @ ((x - centre) * y) / moment)
     rest = y - (weight @ y / weight.sum() + found * (x - centre))
     misfit = max(1.0, float(weight @ rest**2) / max(1, x.size - 2))
-    return found, float(np.sqrt(misfit / moment))
+    return Value(found, float(np.sqrt(misfit / moment)))

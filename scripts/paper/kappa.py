@@ -5,12 +5,14 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import least_squares
 
-from gfmd_cli.analysis.sheet import Sheet
-from gfmd_cli.physics import reference
-from paper.claims import Claim
+from gfmd_cli.analysis.plotting import ColumnFigure
+from gfmd_cli.physics import exact_solutions as reference
+from paper.claims import Finding, Value
 from paper.studies import Held, needs
-from paper.tips import Tip, Value, look_of, spread, stress_fit, tips
+from paper.tips import Tip, spread, stress_fit, style_of, tips
 
+GIVEN = {0.0: 2 * np.sqrt(3) * 2 / np.sqrt(3) / np.pi, 0.5: 0.6655, 1.0: 3 / 8}
+"""κ′ that follow from κ₀ = 2/√3 and κ₁ = 3π/(8√2) by the text below Eq. (21), and the printed κ′_1/2."""
 CONJECTURE = (2 / 3) ** 2 * (8 * np.pi / 5) ** 0.25
 PERSSON = np.sqrt(2 / np.pi)
 
@@ -31,7 +33,7 @@ def _kappa_primes(found: list[Tip], cell: bool) -> list[tuple[Tip, float]]:
 
 
 def kappa_prime(found: list[Tip]) -> Value:
-    """That of the best resolved contact, the cell taken off; error: what half the grid changes."""
+    """That of the best resolved contact, corrected for the images; error: change on half the grid."""
     finest = max(tip.points for tip in found)
     grids = ([t for t in found if t.points == points] for points in (finest, finest // 2))
     best = [max(grid, key=lambda tip: tip.force) for grid in grids if grid]
@@ -47,124 +49,140 @@ def _by_exponent(held: Held) -> dict[float, list[Tip]]:
 
 
 @needs("kappa")
-def kappa(held: Held, folder: Path) -> list[Claim]:
+def kappa(held: Held, folder: Path) -> list[Finding]:
     """kappa_n over n beside the closed form."""
-    sheet = Sheet(r"exponent  $n$", r"coefficient  $\kappa_n$")
+    plot = ColumnFigure(r"exponent  $n$", r"coefficient  $\kappa_n$")
     groups = _by_exponent(held)
     primes = {n: kappa_prime(found) for n, found in groups.items()}
     shown = [n for n in primes if n < 3]
     x = np.linspace(0, 2.95, 200)
     exact = np.array([reference.kappa(n) for n in x])
-    sheet.line(sheet.axes, "exact", x, exact, color="black", lw=0.8)
-    sheet.line(
-        sheet.axes, "Persson theory", x, np.full(x.size, PERSSON), color="0.5", ls=(0, (4, 2))
-    )
+    plot.line(plot.axes, "exact", x, exact, color="black", lw=0.8)
+    plot.line(plot.axes, "Persson theory", x, np.full(x.size, PERSSON), color="0.5", ls=(0, (4, 2)))
     values = np.array(
         [primes[n].value * reference.kappa(n) / reference.kappa_prime(n) for n in shown]
     )
-    look = look_of(0.0, [0.0])
-    sheet.axes.plot(shown, values, "o", mfc="none", color=look.colour, zorder=4)
-    sheet.legend["solved"] = sheet.axes.lines[-1]
-    sheet.axes.set(xlim=(-0.05, 3), ylim=(0, 1.25))
-    sheet.write(folder / "kappa")
+    style = style_of(0.0, [0.0])
+    plot.axes.plot(shown, values, "o", mfc="none", color=style.colour, zorder=4)
+    plot.legend["solved"] = plot.axes.lines[-1]
+    plot.axes.set(xlim=(-0.05, 3), ylim=(0, 1.25))
+    plot.write(folder / "kappa")
     return [*_coefficients(primes), *_half(groups, primes), *_radius_law(groups), *_far(groups)]
 
 
-def _coefficients(primes: dict[float, Value]) -> list[Claim]:
-    told = ", ".join(
-        f"{found} (n = {n:g}, exact {reference.kappa_prime(n):.6f})" for n, found in primes.items()
+def _coefficients(primes: dict[float, Value]) -> list[Finding]:
+    over = {n: _times(primes[n], 1 / given) for n, given in GIVEN.items() if n in primes}
+    exact = ", ".join(
+        f"{found} ({reference.kappa_prime(n):.6f}) at n = {n:g}" for n, found in primes.items()
     )
-    ratios = ", ".join(f"{reference.kappa(n) / PERSSON:.3f}" for n in (0.01, 0.25, 0.5, 0.75, 1))
+    solved = {
+        n: _times(primes[n], reference.kappa(n) / reference.kappa_prime(n)) for n in (0.0, 1.0)
+    }
     return [
-        Claim(
-            "Eq. (18)",
-            "a_r = κ′ p R / (k a^(2−n)).",
-            f"κ′ = k a^(4−n) / (F R) is {told}. These are the printed values only with "
-            "a_r = π κ′ p R / (k a^(2−n)): Eq. (18) lacks π.",
-            "disagrees",
-            "kappa",
+        Finding(
+            "eq18",
+            {
+                "k a^(4−n)/(F R) over the κ′ that the paper gives": _cases(over),
+                "a_r k a^(2−n)/(p R) over the κ′ that the paper gives": _cases(
+                    {n: _times(value, np.pi) for n, value in over.items()}
+                ),
+            },
+            f"κ′ = k a^(4−n)/(F R), in brackets the closed form: {exact}. A factor π is missing in Eq. (18).",
         ),
-        Claim(
-            "Sect. 3.3",
-            "κ₀ = 2/√3 and κ₁ = 3π/(8√2).",
-            "Both follow from κ_n = 2^(1−n) Γ(3−n/2) Γ(2−n/2) / [√(3−n) Γ(3−n)], which holds for "
-            "every n < 3 and which the solved contacts confirm (the row above).",
-            "agrees",
-            "kappa",
+        Finding(
+            "kappa_exact",
+            {
+                f"{name} from the solved contacts": solved[n]
+                for name, n in (("κ₀", 0.0), ("κ₁", 1.0))
+            },
+            "Both follow from κ_n = 2^(1−n) Γ(3−n/2) Γ(2−n/2)/[√(3−n) Γ(3−n)] (any n < 3).",
         ),
-        Claim(
-            "Eq. (17)",
-            "The coefficient of a³ = c F R / k₁ for n = 1 is 3/2.",
-            f"It is κ′₁ = 3/8 with k₁ = E*/2, or 3/4 with E*{_one(primes)}.",
-            "disagrees",
+        Finding(
+            "eq17",
+            {
+                "a³ E*/(F R) over 3/4": _times(primes[1.0], 2 / 0.75),  # E* = 2 k₁
+                "a³ k₁/(F R) over 3/2": _times(primes[1.0], 1 / 1.5),
+            },
+            "c = κ′₁ = 3/8 with k₁ = E*/2.",
         ),
-        Claim(
-            "Sect. 4.1.2",
-            "κ_P = √(2/π) = 0.798 is in reasonable agreement with κ_n for 0 < n < 1.",
-            f"κ_n/κ_P = {ratios} at n = 0.01, 0.25, 0.5, 0.75, 1: 4 % off at n = 1, 45 % at n → 0.",
-            "agrees in part",
-            "kappa",
+        Finding(
+            "kappa_persson",
+            {
+                "κ_n/κ_P (20 % is the error that Sect. 1 calls problematic)": {
+                    f"n = {n:g}": Value(reference.kappa(n) / PERSSON) for n in (0.25, 0.5, 0.75, 1)
+                }
+            },
+            "By the closed form, which the contacts confirm.",
         ),
     ]
 
 
-def _one(primes: dict[float, Value]) -> str:
-    return f"; found {primes[1.0]}" if 1.0 in primes else ""
+def _times(found: Value, factor: float) -> Value:
+    """A value in another unit."""
+    return Value(found.value * factor, found.error * abs(factor))
 
 
-def _half(groups: dict[float, list[Tip]], primes: dict[float, Value]) -> list[Claim]:
-    if 0.5 not in primes:
-        return []
-    found, exact = primes[0.5], reference.kappa_prime(0.5)
-    off = abs(CONJECTURE - found.value) / max(found.error, 1e-12)
+def _cases(values: dict[float, Value]) -> dict[str, Value]:
+    """Values by the exponent in words."""
+    return {f"n = {n:g}": value for n, value in values.items()}
+
+
+def _half(groups: dict[float, list[Tip]], primes: dict[float, Value]) -> list[Finding]:
+    exact = reference.kappa_prime(0.5)
     raw = min(
         _kappa_primes(groups[0.5], cell=False), key=lambda pair: (-pair[0].points, pair[0].force)
     )
-    told = off > 2.5 and abs(found.value - exact) < 2 * found.error
     return [
-        Claim(
-            "Sect. 3.3, κ₁/₂",
-            "κ′ = 0.665(5) for n = 1/2 numerically; (2/3)² (8π/5)^(1/4) = 0.665480 is "
-            "believed exact.",
-            f"By the same procedure {raw[1]:.5f} at the smallest force on the finest grid, "
-            f"and {found} on the best resolved contact, the cell taken off. Exact: {exact:.6f}; "
-            "the conjecture lies 9.6e-5 above and "
-            f"{off:.1f} errors from what is found"
-            + (": not exact." if told else ", which the numbers alone do not settle."),
-            "disagrees" if told else "agrees in part",
-            "kappa",
+        Finding(
+            "kappa_half",
+            {
+                "κ′ of the solved contacts": primes[0.5],
+                "(conjecture over exact integral − 1) · 10⁴": Value(1e4 * (CONJECTURE / exact - 1)),
+            },
+            f"By the procedure of the paper {raw[1]:.5f} at the smallest force on the finest grid; corrected "
+            f"for the images {primes[0.5]}; exact {exact:.6f}, conjectured {CONJECTURE:.6f}.",
         )
     ]
 
 
-def _radius_law(groups: dict[float, list[Tip]]) -> list[Claim]:
-    powers = []
+def _radius_law(groups: dict[float, list[Tip]]) -> list[Finding]:
+    powers = {}
     for n, found in groups.items():
         finest = [tip for tip in found if tip.points == max(t.points for t in found)]
         force = [tip.force / tip.curvature for tip in finest]
         if len(finest) > 2:
             slopes = np.diff(np.log(force)) / np.diff(np.log([_radius(tip) for tip in finest]))
-            powers.append(f"{spread(slopes.tolist())} (n = {n:g})")
-    ratios = [
-        1 / (1 + reference.hertz_cell_curvature(3, 1.0, 8 * share)) for share in (0.12, 0.06, 0.01)
-    ]
+            powers[n] = _times(spread(slopes.tolist()), 1 / (4 - n))
+    shares = {n: _size_power(n, 0.01) / _size_power(n, 0.1) for n in (1.0, 2.0, 3.0)}
     return [
-        Claim(
-            "Eq. (17)",
-            "a^(4−n) is proportional to F R / k.",
-            "d ln F / d ln a, the cell corrected for: " + ", ".join(powers) + ".",
-            "agrees",
+        Finding(
+            "radius_law", {"d ln F/d ln a over 4 − n, corrected for the images": _cases(powers)}
         ),
-        Claim(
-            "Sect. 3",
-            "At fixed load a_c has a limit for large L for n < 3, or even n ≤ 3; for n = 4 it "
-            "grows with L.",
-            "The cell changes a by O((a/L)^(4−n)), so there is a limit for every n < 4. For n = 3, "
-            "a/a(L→∞) = " + ", ".join(f"{r:.3f}" for r in ratios) + " at a(L→∞) = 0.12, 0.06, "
-            "0.01 L. For n = 4, F R/k has no length: a/L is fixed.",
-            "agrees in part",
+        Finding(
+            "radius_limit",
+            {
+                "d ln a/d ln L at a = 0.01 L over that at 0.1 L, n ≤ 3": _cases(
+                    {n: Value(share) for n, share in shares.items()}
+                ),
+                "d ln a/d ln L for n = 4": Value(1.0),
+            },
+            "By the exact lattice sums; the cell changes a by O((a/L)^(4−n)), so there is a limit for every "
+            f"n < 4 (n = 3: d ln a/d ln L = {_size_power(3.0, 0.01):.3f} at a = 0.01 L). For n = 4, F R/k "
+            "is dimensionless and fixes a/L.",
         ),
     ]
+
+
+def _size_power(n: float, radius: float) -> float:
+    """d ln a / d ln L at fixed force for a contact of this radius in an infinite cell, in L."""
+
+    def found(L: float) -> float:
+        force = float(reference.hertz_force(n, 1.0, 1.0, radius))
+        curvature = 1 + reference.hertz_cell_curvature(n, 1.0, force, L)
+        return float(reference.hertz_radius(n, 1.0, 1 / curvature, force))
+
+    step = 1.01
+    return float(np.log(found(step) / found(1 / step)) / (2 * np.log(step)))
 
 
 def _depths(found: list[Tip]) -> list[tuple[float, float]]:
@@ -173,8 +191,8 @@ def _depths(found: list[Tip]) -> list[tuple[float, float]]:
     return [(_radius(t), (t.u[0] - t.u[-1]) / _radius(t) ** 2) for t in reversed(finest)]
 
 
-def _far(groups: dict[float, list[Tip]]) -> list[Claim]:
-    return [*_exponent(groups), *_amplitude(groups), *_depth_claims(groups), *_volume(groups)]
+def _far(groups: dict[float, list[Tip]]) -> list[Finding]:
+    return [*_exponent(groups), *_amplitude(groups), *_depth_findings(groups), *_volume(groups)]
 
 
 def _far_fit(tip: Tip, free: bool) -> tuple[float, float]:
@@ -198,98 +216,109 @@ def _far_enough(tip: Tip) -> bool:
     return tip.area < 0.01 and tip.points**2 * tip.area > 400
 
 
-def _exponent(groups: dict[float, list[Tip]]) -> list[Claim]:
-    found = [tip for tip in groups.get(0.25, []) if _far_enough(tip)]
-    if not found:
-        return []
-    power = spread([_far_fit(tip, free=True)[1] - 2 for tip in found])
+def _exponent(groups: dict[float, list[Tip]]) -> list[Finding]:
+    powers = {}
+    for n in (0.25, 0.5, 1.0):
+        found = [tip for tip in groups.get(n, []) if _far_enough(tip)]
+        if found:
+            powers[n] = spread([_far_fit(tip, free=True)[1] - 2 for tip in found])
+    faster = {n: _times(power, 1 / (n - 2)) for n, power in powers.items() if n >= 0.5}
+    quarter = {"fitted power of r": powers[0.25]} if 0.25 in powers else {}
     return [
-        Claim(
-            "Sect. 3.2 (ii)",
-            "n = 1/4: u ∝ r^(−2.25) far away; u ∝ r^(n−2) only for n ≥ 1/2.",
-            f"Beyond 6 a the solved field is that of r^({power}) and its images: the power is "
-            "n − 2 for every 0 < n < 2. n = 0 is the limit of a vanishing prefactor.",
-            "disagrees",
-        )
+        Finding(
+            "far_field",
+            {"fitted power of r over n − 2": _cases(faster)},
+            "Beyond 6 a, with images.",
+        ),
+        Finding(
+            "far_field_quarter",
+            quarter,
+            "The power is n − 2 for every 0 < n < 2; at n = 0 the prefactor vanishes.",
+        ),
     ]
 
 
-def _amplitude(groups: dict[float, list[Tip]]) -> list[Claim]:
-    claims = []
-    if 0.5 in groups:
-        exact = 2 * np.pi * float(reference.point_force(0.5, 1.0))
-        values = [
-            exact * _far_fit(t, free=False)[0] for t in groups[0.5] if t.points * _radius(t) > 40
-        ]
-        claims.append(
-            Claim(
-                "Eqs. (10b), (11)",
-                "I(1/2) = 0.478(0); Eq. (10b) holds for n < 1/2.",
-                f"{spread(values)} from the far field of the solved contacts; exactly 2^(1−n) "
-                f"Γ(1−n/2)/Γ(n/2) = {exact:.6f}, for every 0 < n < 2; "
-                "the printed range is a slip.",
-                "agrees in part",
-            )
-        )
-    depths = []
+def _amplitude(groups: dict[float, list[Tip]]) -> list[Finding]:
+    exact = 2 * np.pi * float(reference.point_force(0.5, 1.0))
+    values = [exact * _far_fit(t, free=False)[0] for t in groups[0.5] if t.points * _radius(t) > 40]
+    depths = {}
     for n in (0.25, 0.5, 1.0, 1.5):
         for tip in groups.get(n, [])[-1:]:
             level = tip.u[0] + tip.force * -reference.point_force_of_images(n)
-            depths.append(f"{level * (2 - n) / _radius(tip) ** 2:.5f} (n = {n:g})")
-    claims.append(
-        Claim(
-            "Sects. 3.1.3, 3.3",
-            "n = 1: d = a²/R; for n < 2 the depth scales as a²/R.",
-            "d (2 − n) R/a², the images taken off: " + ", ".join(depths) + "; exactly 1.",
-            "agrees",
-        )
-    )
-    return claims
-
-
-def _depth_claims(groups: dict[float, list[Tip]]) -> list[Claim]:
-    told = []
-    for n, found in groups.items():
-        values = ", ".join(f"{depth:.3f}" for _, depth in _depths(found))
-        told.append(f"{values} (n = {n:g})")
-    at = "0.1, 0.05, 0.025"
-    bend = 2 * np.pi * abs(reference.point_force_of_images(1)) / 2
+            depths[n] = Value(level * (2 - n) / _radius(tip) ** 2)
     return [
-        Claim(
-            "Sect. 3.2 (i)",
-            "The depth at fixed force stays finite with L for n < 2, grows as ln L for n = 2 and "
-            "algebraically for n > 2.",
-            f"Top above corner in a²/R at a/L = {at}: "
-            + "; ".join(told)
-            + ". By the exact sums it is d − c (a/L)^(2−n): a limit, a logarithm, L^(n−2).",
-            "agrees",
+        Finding(
+            "amplitude",
+            {"amplitude of the far field": spread(values)} if values else {},
+            f"Exactly 2^(1−n) Γ(1−n/2)/Γ(n/2) = {exact:.6f}, for 0 < n < 2 (Eq. (10b) prints n < 1/2).",
         ),
-        Claim(
-            "Sect. 3.2 (iii)",
-            "For n > 2 the prefactor of the derivative of u depends on the period even for L ≫ a.",
-            f"For n = 3 the exact sum gives u′ = −(F/2πk)(1 − {bend:.2f} r/L + …): at fixed r the "
-            "period drops out, though slowly (2 % at r = L/100). It stays only at n = 4, as "
-            "u′ ∝ r ln(r/L).",
-            "agrees in part",
+        Finding("depth", {"d (2 − n) R/a², corrected for the images": _cases(depths)}),
+    ]
+
+
+def _depth_findings(groups: dict[float, list[Tip]]) -> list[Finding]:
+    growth = {}
+    for n, found in groups.items():
+        large, middle, small = (depth for _, depth in _depths(found))
+        growth[n] = Value((small - middle) / (middle - large)) if n else Value(0.0)
+    quantity = "growth of the depth from L to 2 L over that from L/2 to L, n < 2"
+    further = {n: Value(_growth(n, 0.025)) for n in (2.5, 3.0)}
+    periods = {
+        n: Value(_period_effect(n, 1e-3) / _period_effect(n, 1e-2)) for n in (2.5, 3.0, 3.5, 4.0)
+    }
+    effect = "change of u′(r) if L doubles, at L = 1000 r over that at L = 100 r (1 if the dependence stays)"
+    return [
+        Finding(
+            "depth_size",
+            {
+                quantity: _cases({n: value for n, value in growth.items() if n < 2}),
+                "the same for n = 2": growth[2.0],
+                "the same for n > 2 (point force)": _cases(further),
+            },
+            "Height of the top above the corner, a/L = 0.1, 0.05, 0.025; n = 0 does not change.",
+        ),
+        Finding(
+            "period",
+            {effect: _cases(periods)},
+            "By the exact sums. For 2 < n < 4 the dependence vanishes as (r/L)^(4−n); it remains at n = 4, "
+            "where u′ ∝ r ln(r/L).",
         ),
     ]
 
 
-def _volume(groups: dict[float, list[Tip]]) -> list[Claim]:
+def _growth(n: float, r: float) -> float:
+    """Growth of the depth of a point force, read at r, from L = 1 to 2 over that from 1/2 to 1."""
+
+    def depth(L: float) -> float:
+        near, far = (np.full(1, x) for x in (r / np.sqrt(2), 0.5 * L))
+        field = reference.periodic_point_force
+        return float(field(n, near, near, L=L)[0] - field(n, far, far, L=L)[0])
+
+    return (depth(2.0) - depth(1.0)) / (depth(1.0) - depth(0.5))
+
+
+def _period_effect(n: float, r: float) -> float:
+    """Relative change of u'(r) of a point force, r along the diagonal, if L = 1 is doubled."""
+
+    def slope(L: float) -> float:
+        along = np.array([0.999, 1.001]) * r / np.sqrt(2)
+        low, high = reference.periodic_point_force(n, along, along, L=L)
+        return float(high - low)
+
+    return slope(2.0) / slope(1.0) - 1
+
+
+def _volume(groups: dict[float, list[Tip]]) -> list[Finding]:
     found = groups.get(0.25, [])
     finest = [tip for tip in found if tip.points == max(t.points for t in found)]
-    if len(finest) < 2:
-        return []
     radii = [_radius(tip) for tip in finest]
     volume = [-tip.u[-1] / a**4 for tip, a in zip(finest, radii, strict=True)]
     power = spread((-np.diff(np.log(volume)) / np.diff(np.log(radii))).tolist())
     return [
-        Claim(
-            "Sect. 3.2 (iv)",
-            "The displaced volume stays finite for n below a critical 0.25 < n < 0.5.",
-            f"At n = 0.25 the volume above the level of the corner grows as (L/a)^({power}), "
-            "as L^n: it diverges for every n > 0.",
-            "disagrees",
+        Finding(
+            "volume",
+            {"power of L of the volume at n = 0.25": power},
+            "Above the level of the corner. It diverges as L^n for every n > 0.",
         )
     ]
 

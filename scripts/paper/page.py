@@ -1,70 +1,160 @@
-"""The page docs/paper.md: the claims, the figures, and where the paper is misprinted."""
+"""The page docs/paper.md: claims, figures, and corrections to the paper."""
 
+from collections.abc import Iterable
 from pathlib import Path
 from shutil import copyfile
+from textwrap import fill
 
-from paper.claims import Claim, count, table
+from gfmd_cli.spec.parse import read_spec
+from gfmd_cli.study.tasks import plan
+from paper.captions import CAPTIONS
+from paper.claims import Finding, Statement, result, verdict
+from paper.statements_hertz import HERTZ
+from paper.statements_rough import ROUGH
+from paper.studies import CONFIGS, STUDIES, Held
 
+WIDTH = 120  # characters of a line
+STATEMENTS: dict[str, Statement] = HERTZ | ROUGH
 INTRODUCTION = """\
 # The paper, claim by claim
 
-M. H. Müser, *Elastic contacts of randomly rough surfaces across the spatial dimensions*, studied again: each of its figures has a
-config in `configs/paper/`, and each statement that can be checked stands below with what is found here. Made by
+This page checks M. H. Müser, *Elastic contacts of randomly rough surfaces across the spatial dimensions*. Each figure
+of the paper has a spec in `configs/paper/`. The table lists each statement of the paper that can be checked, with the
+result of this program. These commands write such a page; the sizes of the studies behind the numbers of this one stand
+[below](#sizes-of-the-studies):
 
-<!-- not run: takes an hour, and minutes -->
+<!-- not run: takes hours, and minutes -->
 ```bash
-make paper          # all of it: about an hour on two quiet cores
-make paper-quick    # small grids, a few minutes; the numbers are then rough
+make paper          # all studies at full size, hours: docs/paper.md
+make paper-quick    # small grids and rough numbers, minutes: results/paper-quick/paper.md
 ```
 
-Grids are of up to 8192² points (Fig. 5: 4096², the default surface otherwise 1024² to 2048²), where the paper went to 32768².
-Random phases differ from the paper's, whose seed is not known, so that single numbers of its one realisation cannot be repeated; trends, exponents,
-ratios and exact results can. Values are of the continuum where it is known well, with the error that `[accuracy]` estimates.
+The random phases of the paper are not known, so single numbers of its one realisation cannot be reproduced. Trends,
+exponents, ratios and exact results can.
+
+Each statement has criteria: a quantity and the limits between which the statement holds. They are data, in
+`scripts/paper/statements_hertz.py` and `scripts/paper/statements_rough.py`, chosen from what the paper itself says where
+it gives a number, and the verdict follows from them:
+
+- A criterion holds (✓) or fails (✗) if the value with twice its error lies inside or outside of the limits; otherwise
+  it is open (?). A value without an error is exact, or that of the one contact or surface named with it.
+- **agrees**: all criteria hold. **disagrees**: all fail. **agrees in part**: some hold and some fail.
+- **misprint**: the content holds, the printed form does not.
+- **not decided here**: a criterion is open, or there is none.
+"""
+
+SIZES = """\
+## Sizes of the studies
+
+Those of the numbers above, and those of `make paper` where they differ. A study of another size is run with
+other keys, as in `gfmd run configs/paper/fig02.toml -o results/paper/fig02.h5 --set grid.points=2048`; then
+`python scripts/paper_figures.py -o results/paper --no-run --page docs/paper.md` writes the page.
+The paper has grids of up to 32768² points.
 """
 
 THEORY = """\
-Whether one smooth γ(n) does (Eq. 39), and what Δσ over the true contact predicts (Sects. 6, 7), is examined in
-[Theory beyond the paper](theory.md).
+[Theory beyond the paper](theory.md) examines whether one smooth $\\gamma(n)$ is sufficient (Eq. 39), and what
+$\\Delta\\sigma$ over the true contact predicts (Sects. 6, 7).
 """
 
-MISPRINTS = """\
-## Misprints met on the way
+MISPRINTS = r"""
+## Corrections to the paper
 
-The program is built from the corrected equations. Each was checked against an independent calculation.
+The program uses the corrected equations. Each correction was checked by an independent calculation.
 
 | where | printed | should be |
 | --- | --- | --- |
-| Eqs. 5, 6 | σ = σ(0) √(1 − ρ²)^{2μ}, μ = 2 − n | (1 − ρ²)^{μ/2}: Hertz's law at n = 1, and what is measured (above) |
-| Eq. 10b | "for n < 1/2" | for 1/2 < n < 2; I_n = 2^{1−n} Γ(1 − n/2)/Γ(n/2) holds for 0 < n < 2 in the sense of Abel |
-| text to Eq. 14 | r₂ = √e a_c, same slope | r₂ = a_c/√e, same height |
-| Eq. 15 | u_g²/R_c | a_c²/R_c |
-| text to Eq. 17 | coefficient 3/2 at n = 1 | 3/8 for F R/k₁, 3/4 for F R/E* |
-| Eq. 18 | a_r = κ′ p R/(k a^{2−n}) | π κ′ p R/(k a^{2−n}) with the printed κ′ |
-| text to Eq. 21 | κ_{1/2} "believed exact" | κ′_n = 2^{1−n} Γ(3 − n/2) Γ(2 − n/2)/π; the conjecture is 9.6e-5 off |
-| Eq. 24 | two equal exponentials, Δσ² below the line | the second has (σ + p)², below the line stands Δσ |
-| Eq. 32 | I | −2 I: F(s) = (p² + s) erf(p/√2s) + p √(2s/π) e^{−p²/2s}, I = F(s₊) − F(s₋) |
-| Eq. 33, 38 | δ(h − h_nc); p = k₀ u | δ(u − h_nc); p = k₀ ⟨u⟩ |
-| Eq. 40 | Θ(q_s − 1); L/λ_s = 5.12 | Θ(q_s − q); L/λ_r = 5.12 |
-| Sect. 2 | q_s/q_r = 1/100; 16k = 2¹⁵ | λ_s/λ_r = 1/100; 16k = 2¹⁴ |
-| conclusions | γ(q ≪ 1/t) = γ₁ | γ₄; Eq. 42 has it right |
-| Sect. 6 | a_r = erf(p/Δσ_c) | erf(p/√2 Δσ_c) |
-| Fig. 13 | λ_r/Δa = 2 … 64 | λ_s/Δa |
+| Eqs. 5, 6 | $\sigma = \sigma(0) \sqrt{1 - \rho^2}^{2\mu}$, $\mu = 2 - n$ | $(1 - \rho^2)^{\mu/2}$, which agrees with Hertz at $n = 1$ and with the computed contacts (row 5) |
+| Eq. 10b | "for $n < 1/2$" | for $1/2 < n < 2$; $I_n = 2^{1-n} \Gamma(1 - n/2)/\Gamma(n/2)$ holds for $0 < n < 2$ (Abel summation) |
+| text to Eq. 14 | $r_2 = \sqrt{e} a_c$, same slope | $r_2 = a_c/\sqrt{e}$, same height |
+| Eq. 15 | $u_g^2/R_c$ | $a_c^2/R_c$ |
+| text to Eq. 17 | coefficient 3/2 at $n = 1$ | 3/8 for $F R/k_1$, 3/4 for $F R/E^\ast$ |
+| Eq. 18 | $a_r = \kappa' p R/(k a^{2-n})$ | $\pi \kappa' p R/(k a^{2-n})$ with the printed $\kappa'$ |
+| text to Eq. 21 | $\kappa_{1/2}$ "believed exact" | $\kappa'_n = 2^{1-n} \Gamma(3 - n/2) \Gamma(2 - n/2)/\pi$; the conjecture is 9.6e-5 off |
+| Eq. 24 | two equal exponentials; denominator $\Delta\sigma^2$ | the second has $(\sigma + p)^2$; the denominator is $\Delta\sigma$ |
+| Eq. 32 | $I$ | $-2 I$: $F(s) = (p^2 + s) \mathrm{erf}(p/\sqrt{2s}) + p \sqrt{2s/\pi} e^{-p^2/2s}$, $I = F(s_+) - F(s_-)$ |
+| Eq. 33, 38 | $\delta(h - h_{nc})$; $p = k_0 u$ | $\delta(u - h_{nc})$; $p = k_0 \langle u \rangle$ |
+| Eq. 40 | $\Theta(q_s - 1)$; $L/\lambda_s = 5.12$ | $\Theta(q_s - q)$; $L/\lambda_r = 5.12$ |
+| Sect. 2 | $q_s/q_r = 1/100$; $16k = 2^{15}$ | $\lambda_s/\lambda_r = 1/100$; $16k = 2^{14}$ |
+| conclusions | $\gamma(q \ll 1/t) = \gamma_1$ | $\gamma_4$, as in Eq. 42 |
+| Sect. 6 | $a_r = \mathrm{erf}(p/\Delta\sigma_c)$ | $\mathrm{erf}(p/\sqrt{2} \Delta\sigma_c)$ |
+| Fig. 13 | $\lambda_r/\Delta a = 2 \ldots 64$ | $\lambda_s/\Delta a$ |
 """
 
 
-def write(claims: list[Claim], figures: Path, target: Path) -> None:
-    """The page and its figures (PNG) beside it, in figures/paper."""
+def table(findings: list[Finding]) -> str:
+    """The statements as a Markdown table, numbered."""
+    lines = [
+        "| | where | the paper says | criterion (limits): found here | verdict |",
+        "| --- | --- | --- | --- | --- |",
+    ]
+    for number, finding in enumerate(findings, 1):
+        one = STATEMENTS[finding.key]
+        shown = f" [Figure](figures/paper/{one.figure}.png)" if one.figure else ""
+        cells = (
+            str(number),
+            one.where,
+            one.says,
+            result(one, finding) + shown,
+            f"**{verdict(one, finding)}**",
+        )
+        lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
+    return "\n".join(lines)
+
+
+def count(findings: list[Finding]) -> str:
+    """Number of statements by verdict."""
+    verdicts = sorted(verdict(STATEMENTS[finding.key], finding) for finding in findings)
+    told = ", ".join(f"{verdicts.count(v)} {v}" for v in dict.fromkeys(verdicts))
+    return f"{len(findings)} statements: {told}"
+
+
+def _grids(points: Iterable[int]) -> str:
+    return ", ".join(map(str, sorted(set(points))))
+
+
+def planned(name: str) -> tuple[str, int]:
+    """The grids and the number of contacts of a study at full size."""
+    study = STUDIES[name]
+    tasks = plan(read_spec(CONFIGS / f"{study.config}.toml", study.settings)[0])
+    return _grids(task.points for task in tasks), len(tasks)
+
+
+def sizes(held: Held) -> str:
+    """The studies of the page, their grids, surfaces and contacts, as a Markdown table."""
+    lines = [
+        "| study | grids (points per side) | surfaces | contacts | missed their tolerance | `make paper` |",
+        "| --- | --- | --- | --- | --- | --- |",
+    ]
+    for name in (name for name in STUDIES if held.has(name)):
+        rows = held.rows(name)
+        grids = _grids(row["points"] for row in rows)
+        full = planned(name)
+        other = "" if full == (grids, len(rows)) else f"{full[0]}; {full[1]} contacts"
+        surfaces = len({row["surface"] for row in rows})
+        missed = sum(row["status"] != "converged" for row in rows)
+        lines.append(f"| `{name}` | {grids} | {surfaces} | {len(rows)} | {missed} | {other} |")
+    return "\n".join(lines)
+
+
+def write(findings: list[Finding], held: Held, figures: Path, target: Path) -> None:
+    """Write the page, and its figures (PNG) to figures/paper beside it."""
     folder = target.parent / "figures" / "paper"
     folder.mkdir(parents=True, exist_ok=True)
-    shown = sorted(figures.glob("*.png"))
-    for path in shown:
-        copyfile(path, folder / path.name)
-    gallery = "\n".join(f"![{path.stem}](figures/paper/{path.name})" for path in shown)
+    shown = [name for name in CAPTIONS if (figures / f"{name}.png").exists()]
+    for name in shown:
+        copyfile(figures / f"{name}.png", folder / f"{name}.png")
+    gallery = "\n\n".join(
+        f"![{name}](figures/paper/{name}.png)\n\n{fill(f'*{CAPTIONS[name]}*', WIDTH)}"
+        for name in shown
+    )
     parts = (
         INTRODUCTION,
-        f"{count(claims)}.",
-        table(claims),
+        f"{count(findings)}.",
+        table(findings),
         THEORY,
+        SIZES,
+        sizes(held),
         MISPRINTS,
         "## Figures",
         gallery,

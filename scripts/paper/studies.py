@@ -1,4 +1,4 @@
-"""The studies behind the figures: which config, what is changed, how small for a quick look."""
+"""The studies behind the figures: their configs, changed keys, and keys of a quick run."""
 
 import subprocess
 import sys
@@ -6,7 +6,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import h5py
 import numpy as np
 
 from gfmd_cli.analysis.compare import Comparison, compare
@@ -17,52 +16,65 @@ CONFIGS = Path(__file__).parents[2] / "configs" / "paper"
 
 @dataclass(frozen=True)
 class Study:
-    """A config with what is set from outside."""
+    """A config with overridden keys."""
 
     config: str
     settings: tuple[str, ...] = ()
     quick: tuple[str, ...] = ()
-    """What a quick look changes besides."""
+    """Further keys that a quick run overrides."""
+
+
+SEEDS = {2: 96, 4: 48, 8: 16, 16: 4, 32: 2}
+"""Surfaces in cells of so many roll-off wavelengths."""
 
 
 def _cell(ratio: int) -> Study:
     """The large-cell check in a cell of `ratio` roll-off wavelengths."""
-    settings = [f"surface.rolloff={1 / ratio}", f"surface.cutoff={1 / (128 * ratio)}"]
-    settings += [f"grid.points={256 * ratio}"]
-    if ratio > 4:
-        settings.append("surface.seed=[0]")
-    if ratio > 16:
-        settings.append("load.p_star=[0.01, 0.1]")
-    return Study("large_cell", tuple(settings), ("surface.seed=[0,1]", "load.p_star=[0.01,0.1]"))
+    settings = (
+        f"surface.rolloff={1 / ratio}",
+        f"surface.cutoff={1 / (32 * ratio)}",
+        f"surface.seed={list(range(SEEDS[ratio]))}",
+        f"grid.points={64 * ratio}",
+    )
+    few = f"surface.seed={list(range(8))}"
+    return Study("large_cell", settings, ("load.p_star=[0.001, 0.1]", few))
 
 
-SMALL, NO_BARS = "grid.points=512", "grid.points=[512,1024]"
-FEW = "load.p_star={from=0.01, to=3.0, per_decade=2}"
+SMALL = "grid.points=512"
+FEW = "load.p_star={from=0.01, to=3.2, per_decade=2}"
+ONE = "surface.seed=0"
 STUDIES = {
-    "fig01": Study("fig01"),
+    "fig01": Study("fig01", quick=("grid.points=1024",)),
     "fig02": Study("fig02", quick=(SMALL,)),
-    "kappa": Study("kappa", quick=("grid.points=[128,256,512]",)),
+    "kappa": Study("kappa", quick=("grid.points=[128,256,512]", "solver.tolerance=1e-8")),
     "fig04": Study("fig04", quick=(SMALL,)),
     "fig05": Study("fig05", quick=("grid.points=1024",)),
     "fig06": Study("fig06", quick=(SMALL, FEW)),
+    "light": Study(
+        "light", quick=("grid.points=[128,256,512]", "load.p_star=[0.04, 0.08, 0.16, 0.5]")
+    ),
     "fig07": Study("fig07", quick=("grid.points=[512,1024]",)),
     "edges": Study("../stress-distribution", quick=("grid.points=[128,256,512]",)),
-    "fig08": Study("fig08", quick=(NO_BARS, "load.p_star=[0.01, 0.03, 0.1, 1.0]")),
-    "spacing": Study("spacing"),
-    "fig10": Study("fig10", quick=(SMALL, FEW)),
-    "fig11": Study("fig11", quick=(FEW,)),
-    "fig12": Study("fig12"),
     "fig13": Study("fig13", quick=("grid.points=[512,1024,2048]",)),
-    "plate": Study("plate", quick=(NO_BARS, FEW)),
+    "fig09b": Study("fig09b", quick=("grid.points=256",)),
+    "small_pressure": Study(
+        "small_pressure", quick=(ONE, "load.p_star={from=1e-5, to=0.1, per_decade=1}")
+    ),
+    "fig10": Study("fig10", quick=(SMALL, FEW)),
+    "cut_off": Study("cut_off", quick=(SMALL, FEW)),
+    "spacing": Study("spacing"),
+    "fig11": Study("fig11", quick=(FEW,)),
+    "fig12": Study("fig12", quick=("load.p_star={from=1e-6, to=1.0, per_decade=1}",)),
+    "weights": Study("weights", quick=("surface.seed=[0,1]",)),
     "plate_map": Study("plate_map", quick=(SMALL,)),
-    **{f"large_cell_{ratio}": _cell(ratio) for ratio in (2, 4, 8, 16, 32)},
+    **{f"large_cell_{ratio}": _cell(ratio) for ratio in SEEDS},
 }
-LARGE = ("large_cell_8", "large_cell_16", "large_cell_32")  # left out of a quick look
+LARGE = ("large_cell_8", "large_cell_16", "large_cell_32")  # not in a quick run
 
 
 @dataclass
 class Held:
-    """The studies that have been run, read when asked for."""
+    """The studies that have been run; each is read at its first use."""
 
     folder: Path
     quick: bool
@@ -74,11 +86,11 @@ class Held:
         return self.folder / f"{name}.h5"
 
     def has(self, name: str) -> bool:
-        """Whether it was run."""
+        """Whether the study was run."""
         return self.path(name).exists()
 
     def rows(self, name: str, **wanted: Any) -> list[dict[str, Any]]:
-        """The solved rows of a study whose columns are as wanted."""
+        """The solved rows of a study with these values in these columns."""
         if name not in self._rows:
             found = read_rows(self.path(name))
             self._rows[name] = [row for row in found if row["status"] != "missing"]
@@ -89,30 +101,33 @@ class Held:
         ]
 
     def comparison(self, name: str) -> Comparison:
-        """The study beside Persson theory."""
+        """The study compared with Persson theory."""
         if name not in self._comparisons:
             self._comparisons[name] = compare(self.path(name))
         return self._comparisons[name]
 
     def section(self, name: str, row: dict[str, Any]) -> dict[str, np.ndarray]:
-        """Height, displacement and stress along the diagonal, and the position `s` [m]."""
-        return self._group(name, f"cross_sections/{row['task']}")
+        """Height, displacement and stress along the diagonal."""
+        return self._arrays(name, "cross_sections", row)
 
     def fields(self, name: str, row: dict[str, Any]) -> dict[str, np.ndarray]:
         """The stored fields [y, x]."""
-        return self._group(name, f"fields/{row['task']}")
+        return self._arrays(name, "fields", row)
 
-    def _group(self, name: str, place: str) -> dict[str, np.ndarray]:
-        with open_study(self.path(name)) as file:
-            group = file[place]
-            return {key: data[()] for key, data in group.items() if isinstance(data, h5py.Dataset)}
+    def spectra(self, name: str, row: dict[str, Any]) -> dict[str, np.ndarray]:
+        """Power spectra by shell."""
+        return self._arrays(name, "spectra", row)
+
+    def _arrays(self, name: str, group: str, row: dict[str, Any]) -> dict[str, np.ndarray]:
+        with open_study(self.path(name)) as study:
+            return study.arrays(group, row["task"])
 
 
 def run(name: str, folder: Path, quick: bool) -> None:
-    """Run one study, or what is missing of it, as a user would."""
+    """Run the missing tasks of one study by the command line."""
     study = STUDIES[name]
     settings = (*study.settings, *(study.quick if quick else ()))
-    command = [sys.executable, "-m", "gfmd_cli", "run", CONFIGS / f"{study.config}.toml"]
+    command = [sys.executable, "-P", "-m", "gfmd_cli", "run", CONFIGS / f"{study.config}.toml"]
     command += ["-o", folder / f"{name}.h5", "-q"]
     command += [word for setting in settings for word in ("--set", setting)]
     ended = subprocess.run([str(word) for word in command], check=False)
@@ -121,7 +136,7 @@ def run(name: str, folder: Path, quick: bool) -> None:
 
 
 def needs(*names: str) -> Any:
-    """Marks a figure with the studies that it is drawn from."""
+    """Mark a figure with the studies that it needs."""
 
     def mark(draw: Any) -> Any:
         draw.needs = names

@@ -1,4 +1,4 @@
-"""Single paraboloids in contact: what was solved along the diagonal of the cell, and fits to it."""
+"""Single paraboloids in contact: fields along the diagonal of the cell, and fits to them."""
 
 from dataclasses import dataclass
 from itertools import product
@@ -6,24 +6,13 @@ from itertools import product
 import numpy as np
 from scipy.optimize import curve_fit
 
-from gfmd_cli.analysis.looks import MARKERS, Look, colours
-from gfmd_cli.physics import reference
+from gfmd_cli.analysis.curve_styles import MARKERS, CurveStyle, colours
+from gfmd_cli.physics import exact_solutions as reference
+from paper.claims import Value
 from paper.studies import Held
 
 INSIDE = (0.8, 0.9, 0.95)  # shares of the contact radius up to which stress is fitted
 BEGINS, ENDS = (3, 4, 6), (0.3, 0.4, 0.5)  # gap: from so many points to so many radii off the edge
-
-
-@dataclass(frozen=True)
-class Value:
-    """A number with its error."""
-
-    value: float
-    error: float
-
-    def __str__(self) -> str:
-        digits = max(0, 1 - int(np.floor(np.log10(max(self.error, 1e-7)))))
-        return f"{self.value:.{digits}f} ± {self.error:.{digits}f}"
 
 
 def spread(values: list[float]) -> Value:
@@ -52,7 +41,7 @@ class Tip:
 
     @property
     def curvature(self) -> float:
-        """1 / R of the tip and what the images of the contact add to it."""
+        """1 / R of the tip plus the contribution of the periodic images."""
         return 1 + reference.hertz_cell_curvature(self.n, 1.0, self.force)
 
     def point(self, n: float | None = None) -> np.ndarray:
@@ -64,7 +53,7 @@ class Tip:
             )
 
     def far(self, a: float) -> np.ndarray:
-        """As `point`, with the second moment a^2 / (3 - n/2) of the stress besides; 0 < n < 4."""
+        """As `point`, plus the second moment a^2 / (3 - n/2) of the stress; 0 < n < 4."""
         moment = a**2 / (3 - self.n / 2)
         return self.point() - moment / 4 * self.point(self.n - 2)
 
@@ -84,10 +73,10 @@ def tips(held: Held, name: str) -> list[Tip]:
     return sorted(found, key=lambda tip: (tip.n, tip.force, tip.points))
 
 
-def look_of(n: float, exponents: list[float]) -> Look:
+def style_of(n: float, exponents: list[float]) -> CurveStyle:
     """The colour and symbol of an exponent among others."""
     place = exponents.index(n)
-    return Look(colours(len(exponents))[place], MARKERS[place % len(MARKERS)], f"n = {n:g}")
+    return CurveStyle(colours(len(exponents))[place], MARKERS[place % len(MARKERS)], f"n = {n:g}")
 
 
 def stress_fit(tip: Tip, exponent: float | None = None) -> tuple[Value, Value]:

@@ -23,6 +23,17 @@ class Browser:
         self.requests()
         self.driver.get(path.as_uri())
 
+    def wait(self, script, *values):
+        """What JavaScript returns, as soon as that is true."""
+        from selenium.webdriver.support.wait import WebDriverWait
+
+        return WebDriverWait(self.driver, 60).until(lambda _: self.run(script, *values))
+
+    def downloads(self, folder: Path):
+        """Have files that the page saves written to a folder."""
+        behaviour = {"behavior": "allow", "downloadPath": str(folder)}
+        self.driver.execute_cdp_cmd("Browser.setDownloadBehavior", behaviour)
+
     def run(self, script, *values):
         """Run JavaScript in the page."""
         return self.driver.execute_script(script, *values)

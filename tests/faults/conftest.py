@@ -10,25 +10,22 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
+from specs import power_spec
 
+from gfmd_cli.__main__ import main as entry
 from gfmd_cli.cli import main
 
-SPEC = """\
-[surface]
-kind = "self-affine"
-cutoff = 0.1
-[elastomer]
-kind = "power"
-n = [1, 2]
-[grid]
-points = 32
-[load]
-p_star = [0.1, 0.3]
+SPEC = power_spec(
+    n=[1, 2],
+    points=32,
+    p_star=[0.1, 0.3],
+    more="""\
 [solver]
 tolerance = 1e-8
 [output]
 fields = ["u"]
-"""
+""",
+)
 
 
 def pytest_collection_modifyitems(items):
@@ -80,7 +77,8 @@ class Child:
             os.chdir(folder)
             if before is not None:
                 before()
-            main([str(word) for word in words], prog_name="gfmd")
+            sys.argv = ["gfmd", *map(str, words)]
+            entry()
         except SystemExit as end:
             status = end.code or 0
         except BaseException:
@@ -138,4 +136,7 @@ def disk(tmp_path):
     subprocess.run(["umount", "-l", str(place)], capture_output=True)
 
 
-SIGNALS = {name: getattr(signal, name) for name in ("SIGTERM", "SIGINT", "SIGUSR1", "SIGUSR2")}
+SIGNALS = {
+    name: getattr(signal, name)
+    for name in ("SIGTERM", "SIGINT", "SIGUSR1", "SIGUSR2", "SIGHUP", "SIGXCPU")
+}

@@ -23,7 +23,7 @@ def mpiexec():
     environment = os.environ | dict.fromkeys(once, "1") | {"UCX_LOG_LEVEL": "error"}
 
     def run(count, program, *arguments, cwd=None, status=0):
-        script = [str(PROGRAMS / program)] if program.endswith(".py") else ["-m", program]
+        script = [str(PROGRAMS / program)] if program.endswith(".py") else ["-P", "-m", program]
         command = [launcher, "-n", str(count), sys.executable, "-W", "error", *script]
         done = subprocess.run(
             [*command, *map(str, arguments)],

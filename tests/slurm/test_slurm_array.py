@@ -20,7 +20,7 @@ n = 2
 [grid]
 points = 256
 [load]
-p_star = { from = 0.005, to = 0.08, per_decade = 18 }
+p_star = { from = 0.005, to = 0.085, per_decade = 18 }
 [solver]
 kind = "fire"         # slow enough to be met at work
 tolerance = 1e-8      # 23 tasks: a shard works for some seconds, Slurm's scheduler looks every two
@@ -32,14 +32,14 @@ STUDY = ("spec.toml", "-o", "array.h5")
 
 def test_an_array_with_a_preempted_and_a_killed_shard_equals_a_serial_run(cluster):
     """Two cores, four shards: one is preempted, another is killed."""
-    gfmd = (sys.executable, "-m", "gfmd_cli")
+    gfmd = (sys.executable, "-P", "-m", "gfmd_cli")
     work = cluster.work
     (work / "spec.toml").write_text(SPEC)
     cluster(*gfmd, "run", "spec.toml", "-o", "serial.h5", "-j", "1")
 
     told = cluster(*gfmd, "submit", *STUDY, "--shards", "4", "--time", "10")
     job, collection = re.findall(r"^job (\d+):", told, re.MULTILINE)
-    cluster.wait((work / "array.parts" / "spec.json").exists, "a shard at work")
+    cluster.wait((work / "array.parts" / "in-use").exists, "a shard at work")
     first = preempt(cluster, job)
     refused = cluster(*gfmd, "submit", *STUDY, "--missing", status=2)
     assert f"job {job}_" in refused

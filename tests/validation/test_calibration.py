@@ -1,4 +1,4 @@
-"""The bars of gfmd_cli/physics/continuum.py on contacts that none of its constants was fitted to.
+"""The bars of `physics.discretisation_error` on contacts to which no constant was fitted.
 
 A set of its own seed, half the cases and smaller grids than `scripts/calibration.py` by default.
 """

@@ -7,14 +7,15 @@ import pytest
 from scipy.integrate import simpson
 from scipy.special import gamma, zeta
 
-from gfmd_cli.physics import reference
-from gfmd_cli.physics.bodies import Parabola
+from gfmd_cli.physics import exact_solutions as reference
 from gfmd_cli.physics.contact import build_scene
-from gfmd_cli.physics.elastomer import Power
+from gfmd_cli.physics.elastomers import Power
+from gfmd_cli.physics.indenters import Parabola
 from gfmd_cli.physics.observables import observe
 from gfmd_cli.physics.persson import Persson
-from gfmd_cli.physics.surface import SelfAffine
-from gfmd_cli.solvers.cascade import SolverChoice, solve_contact
+from gfmd_cli.physics.self_affine import SelfAffine
+from gfmd_cli.solvers.auto import Auto
+from gfmd_cli.solvers.nested_grids import solve_contact
 
 pytestmark = pytest.mark.validation
 
@@ -36,8 +37,8 @@ def scene(n, points=512, surface=None):
 
 def solve(made, p_star, tolerance=1e-6):
     contact = made.contact(p_star)
-    choice = SolverChoice(tolerance=tolerance)
-    solution = solve_contact(contact, choice, lambda contact, state: None)
+    solver = Auto(tolerance=tolerance)
+    solution = solve_contact(contact, solver)
     assert solution.status == "converged"
     return contact, solution, observe(contact, solution.u, solution.sigma)
 

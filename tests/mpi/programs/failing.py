@@ -5,10 +5,10 @@ import sys
 from mpi4py import MPI
 
 from gfmd_cli.errors import GfmdError, SpaceError
-from gfmd_cli.physics import ranks as module
+from gfmd_cli.grid import ranks as module
 
 ranks = module.Ranks(MPI.COMM_WORLD)
-module.PATIENCE = 1.0
+module.ABORT_AFTER_SECONDS = 1.0
 try:
     with module.together(ranks):
         if ranks.rank == 1:

@@ -3,20 +3,20 @@
 import sys
 
 from gfmd_cli.cli import main
-from gfmd_cli.study import solve
+from gfmd_cli.study.run_task import TaskWatcher
 
 seen, looks, rank = 0, int(sys.argv.pop(1)), int(sys.argv.pop(1))
-look = solve._Watcher.__call__
+look = TaskWatcher.__call__
 
 
 def interrupted(self, contact, state):
     global seen
-    if self.ranks is None or not contact.grid.whole:
+    if self.context.ranks is None or not contact.grid.whole:
         seen += 1
-        if seen == looks and (0 if self.ranks is None else self.ranks.rank) == rank:
-            solve.stop.set()
+        if seen == looks and (0 if self.context.ranks is None else self.context.ranks.rank) == rank:
+            self.context.stop.set()
     look(self, contact, state)
 
 
-solve._Watcher.__call__ = interrupted
+TaskWatcher.__call__ = interrupted
 main(sys.argv[1:])

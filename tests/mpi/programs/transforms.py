@@ -5,14 +5,15 @@ import sys
 import numpy as np
 from mpi4py import MPI
 
+from gfmd_cli.grid.distributed import DistributedGrid, create_grid
+from gfmd_cli.grid.fft_grid import Grid
+from gfmd_cli.grid.halo import DistributedRows
+from gfmd_cli.grid.ranks import Ranks
 from gfmd_cli.physics.contact import Contact, build_scene
-from gfmd_cli.physics.elastomer import Power
-from gfmd_cli.physics.grid import Grid
-from gfmd_cli.physics.ranks import Ranks
-from gfmd_cli.physics.slab_rows import SlabRows
-from gfmd_cli.physics.slabs import SlabGrid
-from gfmd_cli.physics.surface import Cone, SelfAffine
-from gfmd_cli.physics.sweeps import PRESSED
+from gfmd_cli.physics.elastomers import Power
+from gfmd_cli.physics.self_affine import SelfAffine
+from gfmd_cli.physics.surfaces import Cone
+from gfmd_cli.solvers.contact_state import PRESSED
 from gfmd_cli.solvers.multigrid import Multigrid
 from gfmd_cli.solvers.multilevel import Multilevel
 
@@ -20,15 +21,16 @@ ranks = Ranks(MPI.COMM_WORLD)
 COLUMNS = 7
 
 
-def check_transforms(points):
-    whole, grid = Grid(points), SlabGrid(points, ranks=ranks)
-    field = np.random.default_rng(points).standard_normal((points, points))
+def check_transforms(points, points_y):
+    cell = {"points_y": points_y, "length_y": 0.7}
+    whole, grid = Grid(points, **cell), DistributedGrid(points, **cell, ranks=ranks)
+    field = np.random.default_rng(points).standard_normal((points_y, points))
     mine, columns = field[grid.own], slice(*grid.span)
-    modes = np.fft.rfft2(field) / points**2
+    modes = np.fft.rfft2(field) / field.size
     np.testing.assert_allclose(grid.forward(mine), modes[:, columns], atol=1e-16)
     np.testing.assert_allclose(grid.backward(modes[:, columns]), mine, atol=1e-14)
-    assert grid.total(mine.size) == grid.size == points**2
-    assert grid.total(mine.shape[0]) == points
+    assert grid.total(mine.size) == grid.size == field.size
+    assert grid.total(mine.shape[0]) == points_y
     assert grid.total(columns.stop - columns.start) == points // 2 + 1
     assert np.array_equal(grid.wavenumber(), whole.wavenumber()[:, columns])
     assert np.array_equal(grid.line(grid.wavenumber()), whole.wavenumber()[0])
@@ -39,20 +41,24 @@ def check_transforms(points):
     np.testing.assert_allclose(filtered, expected[grid.own], atol=1e-14)
     collected = grid.collect(mine)
     assert collected is None if ranks.rank else np.array_equal(collected, field)
-    assert np.array_equal(grid.diagonal(mine), field.diagonal())
-    assert np.array_equal(grid.below(mine), field[grid.own.stop % points])
+    assert np.array_equal(grid.diagonal(mine), whole.diagonal(field))
+    assert np.array_equal(grid.next_row(mine), field[grid.own.stop % points_y])
 
 
-def check_other_grids(points, other):
+def check_other_grids(shape, other):
     """Shared out to shared out, to whole and from whole."""
-    whole, grid = Grid(points), SlabGrid(points, ranks=ranks)
-    field = np.random.default_rng(1).standard_normal((points, points))
-    expected, target = whole.resample(field, Grid(other)), SlabGrid(other, ranks=ranks)
+    whole, coarse = (Grid(s[1], points_y=s[0], length_y=1.0) for s in (shape, other))
+    grid, target = create_grid(whole, ranks), create_grid(coarse, ranks)
+    assert not grid.whole
+    assert not target.whole
+    field = np.random.default_rng(1).standard_normal(shape)
+    expected = whole.resample(field, coarse)
     for made in (grid.resample(field[grid.own], target), whole.resample(field, target)):
         np.testing.assert_allclose(made, expected[target.own], atol=1e-14)
-    np.testing.assert_allclose(grid.resample(field[grid.own], Grid(other)), expected, atol=1e-14)
-    if other < points:
-        symbol, cut = whole.wavenumber(), whole.cut(whole.wavenumber(), Grid(other))
+    np.testing.assert_allclose(grid.resample(field[grid.own], coarse), expected, atol=1e-14)
+    if other[0] <= shape[0] and other[1] <= shape[1]:
+        assert grid.coarser(other) == target
+        symbol, cut = whole.wavenumber(), whole.cut(whole.wavenumber(), coarse)
         mine = grid.cut(symbol[:, slice(*grid.span)], target)
         assert np.array_equal(mine, cut[:, slice(*target.span)])
 
@@ -67,27 +73,27 @@ def number_three(fine, coarse, a, b):
 def check_levels(points):
     """Down to whole levels and up again, by stencils, as on one process."""
     field = np.random.default_rng(2).standard_normal((points, COLUMNS))
-    rows = SlabRows(ranks, points, 1, lambda: np.zeros(points * COLUMNS * 2))
-    framed, whole = rows.framed(field[rows.start : rows.stop]), field
+    rows = DistributedRows(ranks, points, 1, lambda: np.zeros(points * COLUMNS * 2))
+    with_halo, whole = rows.with_halo(field[rows.start : rows.stop]), field
     while points % 2 == 0 and points >= 8:
         points //= 2
         rows, coarse = rows.coarser(), np.empty((points, COLUMNS))
-        target = rows.empty(COLUMNS, dtype=np.float64)
-        rows.from_finer(number_three, (framed,), (target,))
+        target = rows.empty_with_halo(COLUMNS, dtype=np.float64)
+        rows.run_from_finer(number_three, (with_halo,), (target,))
         number_three(whole, coarse, 0, points)
-        start = getattr(rows, "start", 0) if isinstance(rows, SlabRows) else 0
-        inside = rows.inside(target)
+        start = getattr(rows, "start", 0) if isinstance(rows, DistributedRows) else 0
+        inside = rows.interior(target)
         assert np.array_equal(inside, coarse[start : start + len(inside)])
-        around = getattr(rows, "start", 4) - 4 + np.arange(len(rows.for_finer(target)))
-        assert np.array_equal(rows.for_finer(target), coarse[around % points])
-        framed, whole = target, coarse
+        around = getattr(rows, "start", 4) - 4 + np.arange(len(rows.aligned_with_finer(target)))
+        assert np.array_equal(rows.aligned_with_finer(target), coarse[around % points])
+        with_halo, whole = target, coarse
 
 
 def check_surfaces(points):
     for surface in (SelfAffine(cutoff=0.05), SelfAffine(cutoff=2 / points, h_std=2.0), Cone()):
-        grid = SlabGrid(points, ranks=ranks)
+        grid = DistributedGrid(points, ranks=ranks)
         expected = surface.heights(points)
-        np.testing.assert_allclose(surface.on(grid), expected[grid.own], atol=1e-13)
+        np.testing.assert_allclose(surface.heights_on(grid), expected[grid.own], atol=1e-13)
         scenes = [build_scene(surface, Power(n=1.5), points, 1, who) for who in (None, ranks)]
         for name in ("h_std", "delta_sigma", "mean_height"):
             one, many = (getattr(scene, name) for scene in scenes)
@@ -97,23 +103,23 @@ def check_surfaces(points):
 
 
 def check_preconditioners(points, n):
-    """Both are the same on slabs as on one process, for any pattern of contacts."""
+    """Both are the same on row blocks as on one process, for any pattern of contacts."""
     draw = np.random.default_rng(4)
     force = draw.standard_normal((points, points))
     y, x = np.mgrid[:points, :points]
     for held in (draw.random((points, points)) < 0.02, (x - 9) ** 2 + (y - points + 2) ** 2 < 300):
-        marks = np.where(held, PRESSED, 0).astype(np.int8)
+        state = np.where(held, PRESSED, 0).astype(np.int8)
         for kind in (Multigrid, Multilevel):
             found = []
-            for grid in (Grid(points), SlabGrid(points, ranks=ranks)):
+            for grid in (Grid(points), DistributedGrid(points, ranks=ranks)):
                 k = Power(n=n).stiffness(grid.wavenumber()) / points**n
                 contact = Contact(grid, force[grid.own], k, 1.0)
-                framed = grid.rows.empty(points, dtype=np.int8)
-                grid.rows.inside(framed)[...] = marks[grid.own]
+                with_halo = grid.rows.empty_with_halo(points, dtype=np.int8)
+                grid.rows.interior(with_halo)[...] = state[grid.own]
                 change = np.ones(grid.shape, np.float32)
-                cycle, padded = kind(contact, grid.rows), np.zeros((grid.shape[0], points + 2))
-                sums = cycle.apply(-force[grid.own], framed, PRESSED, change, padded)
-                found.append((padded[:, :points], sums))
+                preconditioner = kind(contact)
+                sums = preconditioner.apply(-force[grid.own], with_halo, PRESSED, change)
+                found.append((preconditioner.z[:, :points], sums))
             (whole, sums), (mine, others) = found
             size = np.abs(whole).max()
             own = grid.own
@@ -132,7 +138,7 @@ def check_against_mpi4py_fft(points):
     array = newDistArray(other, forward_output=False)
     array[...] = field[array.local_slice()]
     modes = other.forward(array)
-    grid = SlabGrid(points, ranks=ranks)
+    grid = DistributedGrid(points, ranks=ranks)
     found = grid.forward(field[grid.own])
     full = np.zeros((points, points // 2 + 1), complex)
     full[modes.local_slice()] = modes
@@ -142,10 +148,15 @@ def check_against_mpi4py_fft(points):
 
 
 for size in (64, 96, 100, 128):
-    check_transforms(size)
+    check_transforms(size, size)
     check_surfaces(size)
+for shape in ((65, 64), (64, 101), (20, 96), (129, 87)):
+    check_transforms(*shape)
 for pair in ((64, 128), (128, 64), (100, 150), (96, 66)):
-    check_other_grids(*pair)
+    check_other_grids(*((size, size) for size in pair))
+check_other_grids((96, 64), (72, 33))
+check_other_grids((72, 33), (97, 64))
+check_other_grids((67, 50), (67, 40))
 for size in (64, 96, 100, 512):
     check_levels(size)
 for size, exponent in ((64, 1), (96, 2), (128, 3), (160, 4)):

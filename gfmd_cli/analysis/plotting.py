@@ -1,0 +1,280 @@
+"""Figures with their style, scales, legend and files. Only this module imports matplotlib."""
+
+from collections.abc import Sequence
+from contextlib import AbstractContextManager
+from functools import partial
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gfmd_cli.analysis.curve_styles import CurveStyle
+from gfmd_cli.analysis.layers import Layer
+from gfmd_cli.errors import INSTALL, InputError
+from gfmd_cli.files.atomic import write_whole
+from gfmd_cli.grid.arrays import Field, Mask
+
+try:
+    from matplotlib import colormaps, rc_context, ticker
+    from matplotlib.colors import LinearSegmentedColormap, to_hex
+    from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
+except ImportError as error:
+    raise InputError(f"figures need matplotlib: {INSTALL.format('plot')} ({error})") from error
+
+WIDTH, HEIGHT, ROW = 3.39, 2.35, 0.145  # inches: a column of 86 mm; a row of the legend adds ROW
+SMALL = 8.0  # points
+COLUMN = 54  # characters and symbols that a row of the legend holds
+SCRIPTED = 9.3  # points: sub- and superscripts are printed at 0.7 of it, 6.5 points
+STYLE = {
+    "font.family": "DejaVu Sans",
+    "font.size": SMALL,
+    "axes.labelsize": SCRIPTED,
+    "axes.linewidth": 0.6,
+    "lines.linewidth": 0.9,
+    "lines.markersize": 4.2,
+    "lines.markeredgewidth": 0.9,
+    "legend.fontsize": SMALL,
+    "legend.frameon": False,
+    "xtick.direction": "in",
+    "ytick.direction": "in",
+    "xtick.top": True,
+    "ytick.right": True,
+    "pdf.fonttype": 42,  # TrueType: publishers refuse Type 3
+}
+CAP = 2.0  # points, to either side of an error bar
+METADATA: dict[str, dict[str, None]] = {
+    ".png": {},
+    ".pdf": {"CreationDate": None},
+    ".svg": {"Date": None},
+}
+"""Formats of a figure, with the entries that would make the same figure another file."""
+THEORY, UNCONVERGED, CONFIDENCE = "Persson theory", "not converged", "95 % confidence"
+"""Entries of a legend that several curves share."""
+BAND = 0.25  # opacity of a confidence band
+
+
+def styled() -> AbstractContextManager[None]:
+    """A context in which all figures are drawn in the same style."""
+    style: AbstractContextManager[None] = rc_context(STYLE)
+    return style
+
+
+class LegendFigure:
+    """A figure with a legend above its axes."""
+
+    def __init__(self, width: float, height: float) -> None:
+        self.width, self.height = width, height  # inches, without the legend
+        self.figure = Figure(figsize=(width, height), layout="constrained")
+        self.legend: dict[str, Any] = {}
+
+    def line(self, axes: Any, label: str, x: Field, y: Field, **style: Any) -> None:
+        """Draw a line where y > 0."""
+        axes.plot(x, np.where(y > 0, y, np.nan), **style)
+        self.legend[label] = Line2D([], [], **style)
+
+    def _write_legend(self) -> None:
+        """Write the legend above the axes, in as many rows as needed."""
+        columns, rows = _legend_shape(list(self.legend), self.width / WIDTH)
+        self.figure.set_size_inches(self.width, self.height + ROW * rows)
+        self.figure.legend(
+            self.legend.values(),
+            self.legend.keys(),
+            loc="outside upper center",
+            ncols=columns,
+            borderpad=0,
+            labelspacing=0.25,
+            columnspacing=1.2,
+            handlelength=1.6,
+            handletextpad=0.5,
+        )
+
+    def _lay_out(self) -> None:
+        """Fix the layout, which all files share."""
+        if self.legend:
+            self._write_legend()
+        self.figure.draw_without_rendering()
+        self.figure.set_layout_engine("none")
+
+    def svg(self) -> str:
+        """An SVG with outlined text and no background; the same figure gives the same bytes."""
+        self._lay_out()
+        image = BytesIO()
+        with rc_context({"svg.hashsalt": "gfmd", "svg.fonttype": "path"}):
+            self.figure.savefig(image, format="svg", transparent=True, metadata={"Date": None})
+        return image.getvalue().decode()
+
+    def write(self, path: Path) -> list[Path]:
+        """Write a PDF and a PNG, each whole or not at all. Raises SpaceError."""
+        self._lay_out()
+        files = [path.with_name(f"{path.name}.{kind}") for kind in ("pdf", "png")]
+        for file, metadata in zip(files, ({"CreationDate": None}, {}), strict=True):
+            image = BytesIO()
+            self.figure.savefig(image, format=file.suffix[1:], dpi=300, metadata=metadata)
+            write_whole(file, image.getvalue())
+        return files
+
+    def write_file(self, path: Path) -> None:
+        """Write one file, whole or not at all. Raises InputError for an unknown suffix."""
+        if path.suffix not in METADATA:
+            known = ", ".join(METADATA)
+            raise InputError(f"{path}: unknown suffix {path.suffix!r}; allowed: {known}")
+        self._lay_out()
+        image = BytesIO()
+        kind, metadata = path.suffix[1:], METADATA[path.suffix]
+        self.figure.savefig(image, format=kind, dpi=200, metadata=metadata)
+        write_whole(path, image.getvalue())
+
+
+class ColumnFigure(LegendFigure):
+    """A figure with one pair of axes, as wide as a printed column, and what it shows as data."""
+
+    def __init__(self, x_label: str, y_label: str) -> None:
+        super().__init__(WIDTH, HEIGHT)
+        self.axes = self.figure.add_subplot(xlabel=x_label, ylabel=y_label)
+        self.layers: list[Layer] = []
+        self.second: tuple[str, float] | None = None
+        """Label of an axis at the top, and its values over those of x."""
+
+    def points(
+        self,
+        style: CurveStyle,
+        x: Field,
+        y: Field,
+        converged: Mask,
+        every: Any = 1,
+        error: Field | None = None,
+        details: Sequence[str] = (),
+    ) -> None:
+        """Draw open symbols with error bars, and crosses where a contact has not converged.
+
+        `error` has shape (points,), or (2, points) for down and up, NaN for none. Of the symbols
+        of converged contacts only some are drawn, as `markevery` of matplotlib has it. `details`
+        are texts for the points.
+        """
+        if error is not None:
+            self._bars(style, x, y, error)
+        options: dict[str, Any] = {"ls": "none", "mfc": "none", "color": style.colour, "zorder": 3}
+        for chosen, marker in ((converged, style.marker), (~converged, "x")):
+            self.axes.plot(x[chosen], y[chosen], marker=marker, markevery=every, **options)
+            if np.any(chosen):
+                self.layers.append(
+                    Layer(
+                        "points",
+                        (style.label,) if marker == style.marker else (style.label, UNCONVERGED),
+                        x[chosen],
+                        y[chosen],
+                        to_hex(style.colour),
+                        marker=marker,
+                        error=None if error is None else error[..., chosen],
+                        details=[text for text, c in zip(details, chosen, strict=False) if c],
+                    )
+                )
+        self.legend[style.label] = Line2D([], [], marker=style.marker, **options)
+        if not np.all(converged):
+            self.legend[UNCONVERGED] = Line2D([], [], marker="x", ls="none", color="0.4")
+
+    def _bars(self, style: CurveStyle, x: Field, y: Field, error: Field) -> None:
+        known = np.isfinite(np.broadcast_to(error, (2, x.size))).all(axis=0)
+        if np.any(known):
+            options: dict[str, Any] = {"fmt": "none", "elinewidth": 0.7, "capsize": CAP}
+            bars = error[..., known]
+            self.axes.errorbar(x[known], y[known], bars, ecolor=style.colour, **options)
+
+    def band(self, style: CurveStyle, x: Field, low: Field, high: Field) -> None:
+        """Draw the confidence band of a mean."""
+        colour = style.colour
+        self.axes.fill_between(x, low, high, color=colour, alpha=BAND, lw=0, zorder=1)
+        self.legend[CONFIDENCE] = Line2D([], [], color="0.4", alpha=2 * BAND, lw=5)
+        names = (style.label, CONFIDENCE)
+        self.layers.append(Layer("band", names, x, low, to_hex(colour), high=high))
+
+    def line(self, axes: Any, label: str, x: Field, y: Field, **style: Any) -> None:
+        """Draw a line where y > 0, with an entry of the legend."""
+        super().line(axes, label, x, y, **style)
+        self._keep_line((label,), x, y, style)
+
+    def unnamed_line(self, names: tuple[str, ...], x: Field, y: Field, **style: Any) -> None:
+        """Draw a line where y > 0 that belongs to entries of the legend and adds none."""
+        self.axes.plot(x, np.where(y > 0, y, np.nan), **style)
+        self._keep_line(names, x, y, style)
+
+    def _keep_line(self, names: tuple[str, ...], x: Field, y: Field, style: dict[str, Any]) -> None:
+        if x.size:
+            colour, width = to_hex(style["color"]), style.get("lw", STYLE["lines.linewidth"])
+            y, dashed = np.where(y > 0, y, np.nan), "ls" in style
+            self.layers.append(Layer("line", names, x, y, colour, width=width, dashed=dashed))
+
+    def theory(self, lines: list[tuple[CurveStyle, Field, Field]]) -> None:
+        """Draw one black line if the theory is the same for all curves, else one in each colour."""
+        lines = [line for line in lines if np.any(np.isfinite(line[2]))]
+        if not lines:
+            return
+        one = all(np.allclose(y, lines[0][2], rtol=1e-9, atol=0) for *_, y in lines)
+        for style, x, y in lines[:1] if one else lines:
+            names = (THEORY,) if one else (style.label, THEORY)
+            self.unnamed_line(names, x, y, color="black" if one else style.colour, zorder=2)
+        self.legend[THEORY] = Line2D([], [], color="black" if one else "0.4")
+
+    def second_x(self, label: str, factor: float) -> None:
+        """Add an axis at the top for x times a factor; to be called after `scale`."""
+        self.second = label, factor
+        self.axes.tick_params(axis="x", which="both", top=False)
+        ways = (partial(np.multiply, factor), partial(np.multiply, 1 / factor))
+        second = self.axes.secondary_xaxis("top", ways)
+        second.set_xlabel(label)
+        if self.axes.get_xscale() == "log":
+            low, high = self.axes.get_xlim()
+            _tick(second.xaxis, low * factor, high * factor)
+
+    def scale(self, name: str, scale: str, values: Any, *, zero: bool = True) -> None:
+        """Set scale and limits of the axis `name`; `zero`: a linear axis begins at zero."""
+        low, high = float(np.min(values)), float(np.max(values))
+        if scale == "log":
+            log_scale(self.axes, name, low, high)
+            return
+        low = 0.0 if zero else low
+        pad = (high - low) or abs(high) or 1.0
+        span = (low - (0.03 if zero else 0.1) * pad, high + 0.1 * pad)
+        self.axes.set(**{f"{name}scale": scale, f"{name}lim": span})
+
+
+def log_scale(axes: Any, name: str, low: float, high: float) -> None:
+    """Set a logarithmic scale and limits of the axis `name` around two values."""
+    pad = max(1.4, float(np.sqrt(8 * low / high)))  # 8: holds two of the ticks 1, 2, 5, 10
+    span = (low / pad, high * pad)
+    axes.set(**{f"{name}scale": "log", f"{name}lim": span})
+    _tick(getattr(axes, f"{name}axis"), *span)
+
+
+def shades(name: str, start: float, none: str, beyond: str) -> Any:
+    """The colours of a named map from `start` to 1; those of NaN and of values above the scale."""
+    kept = colormaps[name](np.linspace(start, 1.0, 256))
+    return LinearSegmentedColormap.from_list(name, kept).with_extremes(bad=none, over=beyond)
+
+
+def _legend_shape(labels: list[str], wide: float) -> tuple[int, int]:
+    """Columns and rows of a legend; `wide`: its width over that of a printed column."""
+    for columns in range(min(int(4 * wide), len(labels)), 0, -1):
+        split = np.array_split([len(label) for label in labels], columns)
+        if (
+            sum(max(lengths) + 6 for lengths in split) <= COLUMN * wide
+        ):  # 6: symbol and space around it
+            break
+    return columns, len(split[0])
+
+
+def _tick(axis: Any, low: float, high: float) -> None:
+    """Set the ticks of a log axis: whole decades, or 1, 2, 5 if there are fewer than two."""
+    decades = np.floor(np.log10(high)) - np.ceil(np.log10(low)) + 1
+    plain = low > 5e-4 and high < 5e4
+    axis.set_major_locator(ticker.LogLocator(subs=(1, 2, 5) if decades < 2 else (1,), numticks=8))
+    axis.set_major_formatter(
+        ticker.StrMethodFormatter("{x:g}")
+        if plain
+        else ticker.LogFormatterSciNotation(minor_thresholds=(np.inf, np.inf))
+    )
+    axis.set_minor_locator(ticker.LogLocator(subs=range(2, 10), numticks=99))
+    axis.set_minor_formatter(ticker.NullFormatter())
+    axis.set_tick_params(labelsize=SMALL if plain else SCRIPTED)

@@ -1,0 +1,105 @@
+"""What a run has computed, as a short table, and why tasks are not converged."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from gfmd_cli.analysis.grid_size import grid_size
+from gfmd_cli.analysis.records import with_best
+from gfmd_cli.analysis.table import Column, Group, Record, Table
+from gfmd_cli.analysis.tables import P_STAR, PRESSURE, RESIDUAL, STATUS, warnings_in
+from gfmd_cli.physics.observables import QUANTITIES
+from gfmd_cli.status import Status
+from gfmd_cli.study.load_search import load_in_jump
+
+MAX_ROWS = 40
+MAX_EDGE_SHARE = 0.05  # of contact or load in the tapered zone, without a warning; a choice
+MAX_SCENES = 6  # of other specs that a run names
+RUN = (
+    P_STAR,
+    PRESSURE,
+    *(Column(name, f"{name}_best", ".5g", error=f"{name}_best_error") for name in QUANTITIES),
+    Column("gap", "mean_gap", ".3g", "m"),
+    RESIDUAL,
+    STATUS,
+)
+
+
+def run_table(rows: list[dict[str, Any]]) -> Table:
+    """The solved contacts, grouped by scene; the first MAX_ROWS of them."""
+    groups: dict[str, list[Record]] = {}
+    for row in [row for row in rows if row["status"] != Status.MISSING][:MAX_ROWS]:
+        groups.setdefault(_scene(row), []).append(with_best(row))
+    return Table("", RUN, [Group(title, records) for title, records in groups.items()])
+
+
+def run_text(rows: list[dict[str, Any]]) -> str:
+    """The table in plain text; an empty string where nothing was solved."""
+    left_out = sum(row["status"] != Status.MISSING for row in rows) - MAX_ROWS
+    more = [f"and {left_out} more contacts"] if left_out > 0 else []
+    solved = [row for row in rows if row["status"] != Status.MISSING]
+    warnings = [f"warning: {line}" for line in warnings_in(solved)]
+    return "\n\n".join([run_table(rows).as_text(), *more, *warnings])
+
+
+def edge_warnings(rows: Sequence[Mapping[str, Any]]) -> list[str]:
+    """A line for each scene that carries much of its load where a window changed the heights."""
+    scenes: dict[str, list[Record]] = {}
+    for row in rows:
+        if max(row["edge_contact"], row["edge_load"]) > MAX_EDGE_SHARE:  # false where unknown
+            scenes.setdefault(row["surface"], []).append(row)
+    return [
+        f"{surface}: up to {max(row['edge_contact'] for row in group):.0%} of the contact and "
+        f"{max(row['edge_load'] for row in group):.0%} of the load are at the edges, where the "
+        "window has changed the heights; without surface.edges they are kept"
+        for surface, group in scenes.items()
+    ]
+
+
+def loads_in_jumps(rows: list[dict[str, Any]], tolerance: float) -> list[str]:
+    """A line for each converged task whose load no pressure gives within the tolerance."""
+    messages = {
+        row["task"]: load_in_jump(row["load"], row["load_value"], row, tolerance)
+        for row in rows
+        if Status(row["status"]).is_converged
+    }
+    return [f"task {task}: {message}" for task, message in messages.items() if message][:MAX_ROWS]
+
+
+def other_tasks(rows: list[dict[str, Any]]) -> list[str]:
+    """Lines on the contacts of a study that the spec of a run does not ask for."""
+    scenes: dict[str, list[Record]] = {}
+    for row in rows:
+        scenes.setdefault(_scene(row), []).append(row)
+    if not scenes:
+        return []
+    lines = [f"{len(rows)} more contacts stay in the study, which this spec does not ask for:"]
+    for scene, group in list(scenes.items())[:MAX_SCENES]:
+        loads = sorted(row["p_star"] for row in group)
+        span = f"{loads[0]:.4g}" if len(loads) == 1 else f"{loads[0]:.4g} to {loads[-1]:.4g}"
+        lines.append(f"  {len(group)} with {scene}, p* = {span}")
+    left_out = len(scenes) - MAX_SCENES
+    return [*lines, f"  and {left_out} more scenes"] if left_out > 0 else lines
+
+
+def _scene(row: Record) -> str:
+    """Elastomer, surface and grid of a row in words."""
+    return f"{row['elastomer']} on {row['surface']}, {grid_size([row])}"
+
+
+def unconverged(rows: list[dict[str, Any]], errors: Mapping[int, str]) -> list[str]:
+    """A line for each task that is not converged, with the reason.
+
+    `errors` are the messages of the tasks that an error ended, by task.
+    """
+    lines = []
+    for row in rows:
+        status = Status(row["status"])
+        if status.is_converged:
+            continue
+        reason = errors.get(row["task"]) or status.explain(row)
+        name = f"task {row['task']}"
+        if status != Status.MISSING:
+            name += f" ({row['elastomer']}, p* = {row['p_star']:.4g}): {status}"
+        lines.append(f"{name}: {reason}")
+    more = len(lines) - MAX_ROWS
+    return [*lines[:MAX_ROWS], f"and {more} more tasks"] if more > 0 else lines

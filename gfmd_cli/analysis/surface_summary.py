@@ -1,0 +1,232 @@
+"""Summary of a surface: size, ISO 25178 parameters, spectrum, the nearest self-affine surface."""
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import pi
+from typing import Any
+
+import numpy as np
+
+from gfmd_cli.analysis.table import Column, Group, Table
+from gfmd_cli.errors import InputError
+from gfmd_cli.physics.contact import Scene, build_scene
+from gfmd_cli.physics.elastomers import HalfSpace
+from gfmd_cli.physics.height_map import extent
+from gfmd_cli.physics.indenters import RigidSurface
+from gfmd_cli.physics.persson import Persson
+from gfmd_cli.physics.roughness_parameters import RoughnessParameters, roughness_parameters
+from gfmd_cli.physics.self_affine import SelfAffine
+from gfmd_cli.physics.spectrum_fit import Moments, SelfAffineFit, fit, moments
+
+PRESSURES = (0.003, 0.03, 0.3)  # p* of the predictions
+MIN_HURST = 0.01  # of the table [surface] that is suggested
+MAX_SCATTER = 3.0  # per shell, relative to Gaussian roughness; a self-affine surface has less
+
+
+@dataclass(frozen=True)
+class SurfaceSummary:
+    """What `gfmd surface` prints of one surface."""
+
+    surface: RigidSurface
+    scene: Scene
+    """The surface on its smallest grid, mirrored if it has borders, under a half-space of unit
+    modulus."""
+    parameters: RoughnessParameters
+    """Of the measured part of a map, levelled, before its edges are treated; else of the cell."""
+    moments: Moments
+    """Of the cell that is solved."""
+    fit: SelfAffineFit | None
+    """The nearest self-affine surface; None where there is none."""
+    no_fit: str
+    """Why there is none."""
+
+    @property
+    def name(self) -> str:
+        """What was read and how it was prepared, or the label of the surface."""
+        return self.surface.preparation() or self.surface.label
+
+    @property
+    def copies(self) -> int:
+        """Copies of the surface along each side of the cell of the scene."""
+        return self.surface.within("periodic").copies
+
+    @property
+    def remarks(self) -> list[str]:
+        """Warnings about likely mistakes."""
+        return self.surface.remarks()
+
+    def record(self) -> dict[str, Any]:
+        """The summary as plain data in SI units."""
+        grid = self.scene.grid
+        record: dict[str, Any] = {
+            "surface": self.surface.label,
+            "preparation": self.surface.preparation(),
+            "sides": [side / self.copies for side in grid.sides[::-1]],
+            "points": [points // self.copies for points in grid.whole_shape[::-1]],
+            **self.parameters.named(),
+            "h_std": self.moments.height,
+            "gradient": self.moments.gradient,
+            "curvature": self.moments.curvature,
+            "remarks": self.remarks,
+        }
+        if self.fit is not None:
+            record |= {
+                "hurst": self.fit.hurst,
+                "hurst_error": self.fit.hurst_error,
+                "rolloff_wavelength": 2 * pi / self.fit.q_r if self.fit.q_r else None,
+                "cutoff_wavelength": 2 * pi / self.fit.q_s,
+                "scatter": self.fit.scatter,
+            }
+        return {key: None if _is_nan(value) else value for key, value in record.items()}
+
+
+def _is_nan(value: Any) -> bool:
+    return isinstance(value, float) and np.isnan(value)
+
+
+def summarise(surface: RigidSurface) -> SurfaceSummary:
+    """The summary of a surface. Raises InputError for an unfit surface."""
+    finer = 1 if surface.is_map else 2  # modes at the Nyquist wavenumber are counted twice
+    repeated = surface.within("periodic")
+    scene = build_scene(repeated, HalfSpace(), finer * repeated.smallest_grid())
+    measured = surface.measured_map()
+    if measured is None:
+        heights = np.ma.asarray(scene.in_metres(scene.height))
+        measured = heights, scene.grid.spacings
+    nearest, reason = None, "a line has no fit" if scene.grid.dimension == 1 else ""
+    if not reason:
+        try:
+            nearest = fit(scene.shells)
+        except InputError as error:
+            reason = str(error)
+    parameters = roughness_parameters(*measured)
+    return SurfaceSummary(surface, scene, parameters, moments(scene.shells), nearest, reason)
+
+
+COLUMNS = (
+    Column("surface", "surface"),
+    Column("Sq", "Sq", unit="m", optional=True),
+    Column("Sa", "Sa", unit="m", optional=True),
+    Column("Ssk", "Ssk", ".3f", optional=True),
+    Column("Sku", "Sku", ".3f", optional=True),
+    Column("Sz", "Sz", unit="m", optional=True),
+    Column("Sdq", "Sdq", optional=True),
+    Column("Sdr", "Sdr", optional=True),
+    Column("Sal", "Sal", unit="m", optional=True),
+    Column("Pq", "Pq", unit="m", optional=True),
+    Column("Pa", "Pa", unit="m", optional=True),
+    Column("Psk", "Psk", ".3f", optional=True),
+    Column("Pku", "Pku", ".3f", optional=True),
+    Column("Pt", "Pt", unit="m", optional=True),
+    Column("Pdq", "Pdq", optional=True),
+    Column("Pdr", "Pdr", optional=True),
+    Column("Pal", "Pal", unit="m", optional=True),
+    Column("H", "hurst", ".2f", optional=True),
+    Column("lambda_r", "rolloff_wavelength", ".3g", unit="m", optional=True),
+    Column("lambda_s", "cutoff_wavelength", ".3g", unit="m", optional=True),
+)
+
+
+def summary_table(summaries: Sequence[SurfaceSummary], names: Sequence[str]) -> Table:
+    """One row for each surface."""
+    records = [
+        summary.record() | {"surface": name} for summary, name in zip(summaries, names, strict=True)
+    ]
+    return Table("", COLUMNS, [Group("", records)])
+
+
+def as_text(summary: SurfaceSummary) -> str:
+    """The summary of one surface as text."""
+    grid, measured, record = summary.scene.grid, summary.moments, summary.record()
+    sides = " x ".join(dict.fromkeys(f"{side:.6g}" for side in record["sides"]))  # a square: one
+    points = extent(record["points"])
+    lines = [
+        summary.name,
+        f"  L = {sides} m on {points} points",
+        *_parameter_lines(summary.parameters),
+        f"  rms height {measured.height:.6g} m, rms gradient {measured.gradient:.5g}, "
+        f"rms curvature {measured.curvature:.5g} 1/m",
+    ]
+    if grid.dimension == 2:
+        lines.append(f"  half-space: p* = 1 is p = {0.5 * measured.gradient:.5g} E_star")
+    lines += [f"  note: {remark}" for remark in summary.remarks]
+    if grid.dimension == 1:
+        return "\n".join(lines)
+    theories = {"its spectrum": Persson(summary.scene.shells)}
+    if summary.fit is None:
+        return "\n".join([*lines, f"  no fit: {summary.no_fit}", *_predicted(theories)])
+    table = _table(summary.fit, measured, grid.length)
+    model = SelfAffine.model_validate(table)
+    theories["the fit"] = Persson(build_scene(model, HalfSpace(), 2 * model.smallest_grid()).shells)
+    lines += [
+        *_fit_lines(summary.fit, float(summary.copies**2)),  # modes (+-q_x, +-q_y) are alike
+        *_predicted(theories),
+        "  as random roughness:",
+        "",
+        "  [surface]",
+    ]
+    return "\n".join([*lines, *(f"  {key} = {json.dumps(value)}" for key, value in table.items())])
+
+
+def _parameter_lines(parameters: RoughnessParameters) -> list[str]:
+    """The parameters by their names in the standards, in two lines."""
+    metres = {"Sq", "Sa", "Sz", "Sal", "Pq", "Pa", "Pt", "Pal"}
+    words = [
+        f"{name} {'-' if value is None else f'{value:.5g}'}{' m' if name in metres else ''}"
+        for name, value in parameters.named().items()
+    ]
+    return [f"  {', '.join(words[:5])}", f"  {', '.join(words[5:])}"]
+
+
+def _predicted(theories: dict[str, Persson]) -> list[str]:
+    """Persson theory of a half-space, Eqs. (25) and (28), on one spectrum or two."""
+    unit = next(iter(theories.values())).delta_sigma
+    heads = "".join(f"{f'gap [m], {name}':>24}" for name in theories)
+    lines = ["  Persson theory, half-space:", f"    p / E_star       a_r{heads}"]
+    for p_star in PRESSURES:
+        p = p_star * unit
+        gaps = "".join(f"{float(theory.mean_gap(p)):24.4g}" for theory in theories.values())
+        area = float(next(iter(theories.values())).contact_area(p))
+        lines.append(f"    {p:10.3g}  {area:8.4f}{gaps}")
+    return lines
+
+
+def _fit_lines(nearest: SelfAffineFit, gaussian: float) -> list[str]:
+    """The fit with warnings; `gaussian` is the scatter that Gaussian roughness has."""
+    short = 2 * pi / nearest.q_s
+    lines = [f"  spectrum: H = {nearest.hurst:.3f} +- {nearest.hurst_error:.3f}"]
+    if nearest.q_r:
+        long = 2 * pi / nearest.q_r
+        error = long * nearest.q_r_error / nearest.q_r
+        lines[0] += f", lambda_r = {long:.3g} +- {error:.1g} m"
+    else:
+        lines[0] += ", no roll-off within the cell"
+    lines[0] += f", lambda_s = {short:.3g} m (scatter {nearest.scatter:.3g})"
+    if nearest.scatter > MAX_SCATTER * gaussian:
+        lines.append(
+            f"  The scatter is far above {gaussian:g}: the surface is not self-affine; the surface "
+            "below has the same rms height and gradient only."
+        )
+    if not MIN_HURST <= nearest.hurst <= 1:
+        lines.append(
+            f"  The Hurst exponent is outside {MIN_HURST:g} to 1: the surface below has "
+            "the nearest possible one, and another gradient."
+        )
+    return lines
+
+
+def _table(nearest: SelfAffineFit, measured: Moments, length: float) -> dict[str, Any]:
+    """The fit as a table [surface] of a run spec."""
+    if nearest.q_r:
+        keys: dict[str, Any] = {"rolloff": 2 * pi / nearest.q_r / length}
+    else:
+        keys = {"spectrum": "cutoff", "rolloff": 1.0}
+    keys |= {
+        "hurst": min(max(nearest.hurst, MIN_HURST), 1.0),
+        "cutoff": 2 * pi / nearest.q_s / length,
+        "h_std": measured.height,
+        "length": length,
+    }
+    rounded = {k: v if isinstance(v, str) else float(f"{v:.4g}") for k, v in keys.items()}
+    return {"kind": "self-affine", **rounded}

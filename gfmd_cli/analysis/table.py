@@ -1,0 +1,175 @@
+"""A table, declared once: its columns say where values are found and how they are printed."""
+
+import math
+import textwrap
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from html import escape
+from typing import Any
+
+import tabulate
+
+Record = Mapping[str, Any]
+Value = str | Callable[[Record], Any]
+"""A key of a record, or a function of the record."""
+BLANK = "-"
+tabulate.MIN_PADDING = 0  # a column is as wide as its content
+WIDTH = 98  # characters of a line of the caption
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column of a table."""
+
+    heading: str
+    """Plain text; symbols as the columns of `gfmd export` have them."""
+    value: Value
+    format: str = "#.4g"
+    unit: str = ""
+    error: Value = ""
+    """The error that is printed after the value, where it is known."""
+    otherwise: str = ""
+    """Key of the text that stands in the place of an unknown value."""
+    optional: bool = False
+    """Whether the column is left out of a table where no record has a value."""
+
+    @property
+    def title(self) -> str:
+        """Heading with unit."""
+        return f"{self.heading} [{self.unit}]" if self.unit else self.heading
+
+    def cell(self, record: Record) -> str:
+        """The value of a record as it is printed."""
+        value = _value(record, self.value)
+        if not known(value):
+            return str(record.get(self.otherwise) or BLANK)
+        if isinstance(value, bool):
+            return "yes" if value else "no"
+        if isinstance(value, str):
+            return value
+        error = _value(record, self.error)
+        return plus_minus(value, abs(error)) if known(error) else format(value, self.format)
+
+    def is_known(self, record: Record) -> bool:
+        """Whether a record has a value here."""
+        return known(_value(record, self.value))
+
+    def is_text(self, records: Sequence[Record]) -> bool:
+        """Whether the column holds words, which are aligned to the left."""
+        values = (_value(record, self.value) for record in records)
+        return any(isinstance(value, str | bool) for value in values)
+
+
+@dataclass(frozen=True)
+class Group:
+    """Records under a title of their own, which may be empty."""
+
+    title: str
+    records: Sequence[Record]
+    notes: Sequence[str] = ()
+    """Lines below the title, in the text only."""
+
+
+@dataclass(frozen=True)
+class Table:
+    """Groups of records with the same columns."""
+
+    caption: str
+    declared: Sequence[Column]
+    groups: Sequence[Group]
+
+    @property
+    def records(self) -> list[Record]:
+        """The records of all groups."""
+        return [record for group in self.groups for record in group.records]
+
+    @property
+    def columns(self) -> list[Column]:
+        """The columns without the optional ones that are blank."""
+        return [
+            column
+            for column in self.declared
+            if not column.optional or any(map(column.is_known, self.records))
+        ]
+
+    @property
+    def alignments(self) -> list[str]:
+        """The side of each column to which its cells are aligned: words left, numbers right."""
+        records = self.records
+        return ["left" if column.is_text(records) else "right" for column in self.columns]
+
+    def as_text(self) -> str:
+        """The table in plain text, group by group; an empty string where there is no record."""
+        blocks = [self._block(group) for group in self.groups if group.records]
+        caption = textwrap.fill(self.caption, WIDTH)
+        return "\n\n".join([caption, *blocks] if caption and blocks else blocks)
+
+    def as_html(self) -> str:
+        """The table in HTML without any style, group by group."""
+        blocks = []
+        for group in self.groups:
+            cells = [[column.cell(record) for column in self.columns] for record in group.records]
+            rows = [_html_row("td", row) for row in cells]
+            head = _html_row("th", [column.title for column in self.columns])
+            caption = f"<caption>{escape(group.title or self.caption)}</caption>"
+            blocks.append(f"<table>{caption}{head}{''.join(rows)}</table>")
+        return "".join(blocks)
+
+    def _block(self, group: Group) -> str:
+        columns = self.columns
+        lines = tabulate.tabulate(
+            [[column.cell(record) for column in columns] for record in group.records],
+            [column.title for column in columns],
+            tablefmt="plain",
+            disable_numparse=True,
+            colalign=self.alignments,
+        )
+        indented = [f"  {line}".rstrip() for line in lines.splitlines()]
+        return "\n".join([*filter(None, [group.title]), *group.notes, *indented])
+
+
+def _html_row(tag: str, cells: Sequence[str]) -> str:
+    return f"<tr>{''.join(f'<{tag}>{escape(cell)}</{tag}>' for cell in cells)}</tr>"
+
+
+def _value(record: Record, value: Value) -> Any:
+    return value(record) if callable(value) else record.get(value)
+
+
+def known(value: Any) -> bool:
+    """Whether a value applies: neither None nor NaN, nor the -1 of a seed or of a count."""
+    if isinstance(value, float):
+        return not math.isnan(value)
+    return value is not None and value != -1
+
+
+def plain(value: Any) -> Any:
+    """A value as JSON has it: None for what does not apply and for infinity."""
+    infinite = isinstance(value, float) and math.isinf(value)
+    return value if known(value) and not infinite else None
+
+
+def plus_minus(value: float, error: float) -> str:
+    """A value and its error, rounded to two digits of the error."""
+    if not error > 0:
+        return f"{value:.6g}"
+    digits = max(0, 1 - math.floor(math.log10(error))) if math.isfinite(error) else 3
+    return f"{value:.{min(digits, 12)}f} +- {error:.2g}"
+
+
+def ratio(value: str, reference: str) -> Callable[[Record], float]:
+    """One value over another; NaN where either is unknown or the other is zero."""
+
+    def of(record: Record) -> float:
+        return record[value] / record[reference] if record[reference] else math.nan
+
+    return of
+
+
+def product(value: str, unit: str) -> Callable[[Record], float]:
+    """A reduced value in its physical unit."""
+
+    def of(record: Record) -> float:
+        return float(record[value] * record[unit])
+
+    return of

@@ -1,0 +1,75 @@
+"""Values in SI units and numbers in sentences."""
+
+import math
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import numpy as np
+
+from gfmd_cli.grid.arrays import Field
+from gfmd_cli.study.plausibility import METRES
+from gfmd_cli.units import scaled
+
+SPACE = "\u00a0"
+"""No-break space."""
+RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+def largest(values: Field) -> float:
+    """The largest finite value, at least zero."""
+    return float(np.max(values, initial=0.0, where=np.isfinite(values)))
+
+
+def in_si(row: Mapping[str, Any]) -> bool:
+    """Whether metres and pascals of a contact mean something, and not reduced units alone.
+
+    They do where the load was given in Pa or the surface has heights of a real one.
+    """
+    return bool(row["load"] == "pressure" or row["h_std"] <= METRES)
+
+
+def pressure_text(row: Mapping[str, Any]) -> str:
+    """The pressure of a contact, reduced and, where that means something, in Pa."""
+    return f"p* = {row['p_star']:.4g}" + (
+        f" ({quantity(row['pressure'], 'Pa')})" if in_si(row) else ""
+    )
+
+
+def quantity(value: float, unit: str) -> str:
+    """A value with its unit."""
+    divisor, prefixed = scaled(abs(value), unit)
+    return f"{pretty(value / divisor)}{SPACE}{prefixed}"
+
+
+def pretty(value: float) -> str:
+    """A number with three digits and a power of ten."""
+    if not math.isfinite(value):
+        return "–"
+    mantissa, _, power = f"{value:.3g}".partition("e")
+    if not power:
+        return mantissa
+    return f"{mantissa}{SPACE}×{SPACE}10{str(int(power)).translate(RAISED)}"
+
+
+def span(values: Iterable[float], unit: str = "") -> str:
+    """From the least to the largest of the finite values."""
+    known = [value for value in values if math.isfinite(value)]
+    if not known:
+        return "unknown"
+    low, high = (quantity(end, unit) if unit else pretty(end) for end in (min(known), max(known)))
+    if low == high:
+        return low
+    bare, _, low_unit = low.rpartition(SPACE)
+    return f"{bare if unit and high.endswith(SPACE + low_unit) else low} to {high}"
+
+
+def count(number: int, what: str) -> str:
+    """A number of things, in the singular or the plural."""
+    if number == 1:
+        return f"1 {what}"
+    return f"{number} {what[:-1] + 'ies' if what.endswith('dy') else what + 's'}"
+
+
+def listed(words: list[str]) -> str:
+    """Words as a sentence lists them."""
+    return words[0] if len(words) == 1 else ", ".join(words[:-1]) + " and " + words[-1]

@@ -1,0 +1,92 @@
+"""The fields of one task as VTK ImageData, which ParaView and PyVista open.
+
+The XML file format of VTK, version 1.0, with appended raw data: after an underscore each array, its
+length in bytes before it (https://docs.vtk.org/en/latest/vtk_file_formats/vtkxml_file_format.html).
+"""
+
+from pathlib import Path
+
+import numpy as np
+
+from gfmd_cli.errors import InputError
+from gfmd_cli.files.atomic import new_file
+from gfmd_cli.grid.arrays import Field
+from gfmd_cli.study.columns import FIELDS
+from gfmd_cli.study.reading import open_study
+
+NAMES = {
+    "height": "height",
+    "u": "displacement",
+    "sigma": "stress",
+    "contact_pressure": "contact_pressure",
+}
+"""Fields of a study with the names that their arrays have here."""
+
+
+def write_image(study: Path, task: int | None, target: Path) -> None:
+    """Write heights, displacement and stress of a task [m, Pa], as far as they are stored.
+
+    Without `task` the only one that has fields. Raises InputError, StudyError, SpaceError.
+    """
+    with open_study(study) as stored:
+        chosen = _choose(study, stored.tasks_with("fields"), task)
+        arrays = stored.arrays("fields", chosen)
+        fields = {name: np.ascontiguousarray(values, "<f8") for name, values in arrays.items()}
+        sides = [float(stored.rows[chosen][name]) for name in ("length", "length_y")]
+        first = float(stored.rows[chosen]["x_first"])
+    with new_file(target) as made:
+        made.write(_head(fields, sides, first).encode())
+        for values in fields.values():
+            made.write(np.uint64(values.nbytes).astype("<u8").tobytes())
+            made.write(values)
+        made.write(b"\n</AppendedData>\n</VTKFile>\n")
+
+
+def _choose(study: Path, held: list[int], task: int | None) -> int:
+    """The task to write. Raises InputError where it has no fields, or many do and none is named."""
+    if not held:
+        raise InputError(f'{study}: holds no fields; ask for them: fields = ["u"] in [output]')
+    allowed = ", ".join(map(str, held))
+    if task is None and len(held) > 1:
+        raise InputError(f"{study}: {len(held)} tasks have fields; choose --task, one of {allowed}")
+    if task is not None and task not in held:
+        raise InputError(f"--task: {task} has no fields in {study}; allowed: {allowed}")
+    return held[0] if task is None else task
+
+
+def _head(fields: dict[str, Field], sides: list[float], first: float) -> str:
+    """All before the arrays. Values lie [y, x], x fastest, as VTK has them.
+
+    `sides` are those of the cell along x and y [m], `first` the position of its first point along
+    each of them, as a share of the side.
+    """
+    values = next(iter(fields.values()))
+    counts = [*values.shape[::-1], 1, 1][:3]
+    extent = " ".join(f"0 {count - 1}" for count in counts)
+    steps = [side / count for side, count in zip(sides, values.shape[::-1], strict=False)]
+    spacing = " ".join(map(repr, [*steps, *[steps[0]] * (3 - len(steps))]))
+    corner = " ".join([*(repr(first * side) for side in sides[: len(steps)]), "0", "0"][:3])
+    arrays, offset = [], 0
+    for name, values in fields.items():
+        arrays.append(_array(name, offset))
+        offset += values.nbytes + 8
+    return f"""\
+<?xml version="1.0"?>
+<VTKFile type="ImageData" version="1.0" byte_order="LittleEndian" header_type="UInt64">
+<ImageData WholeExtent="{extent}" Origin="{corner}" Spacing="{spacing}">
+<Piece Extent="{extent}">
+<PointData>
+{"".join(arrays)}</PointData>
+</Piece>
+</ImageData>
+<AppendedData encoding="raw">
+_"""
+
+
+def _array(name: str, offset: int) -> str:
+    (column,) = (column for column in FIELDS if column.name == name)
+    unit = f'<InformationKey name="UNITS_LABEL" location="vtkDataArray">{column.units}'
+    return (
+        f'<DataArray type="Float64" Name="{NAMES[name]}" format="appended" offset="{offset}">'
+        f"{unit}</InformationKey></DataArray>\n"
+    )

@@ -1,0 +1,1 @@
+"""Work-precision runs: speed against error of the solvers."""

@@ -1,0 +1,123 @@
+"""Work-precision diagrams of a bench: error of the mean gap over transforms and seconds."""
+
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gfmd_cli.analysis.curve_styles import MARKERS, CurveStyle, colours
+from gfmd_cli.analysis.plotting import SMALL, WIDTH, LegendFigure, log_scale, styled
+from gfmd_cli.bench.file import Trace
+from gfmd_cli.bench.run import REFERENCE
+from gfmd_cli.bench.table import scene_of, solver_names
+from gfmd_cli.grid.arrays import Field
+from gfmd_cli.status import Status
+
+FULL_WIDTH, ROW_HEIGHT = 2.09 * WIDTH, 2.0  # inches: a page of 180 mm; a row of panels
+SCENES = 4  # rows of panels that a page holds
+COSTS = (
+    ("transforms", "transforms of the solved size"),
+    ("seconds", "processor time on one thread (s)"),
+)
+ROOM = 2.0  # for the symbols at the ends of a curve
+MAX_LABEL = 100  # characters of a title and of a file name
+ERROR = r"relative error of $u_g$"
+
+
+def draw_bench(traces: list[Trace], folder: Path) -> list[Path]:
+    """Draw a bench as PDF and PNG: one figure, or one for each of many scenes; return the paths.
+
+    Raises SpaceError where the folder cannot be written.
+    """
+    with styled():
+        return [
+            path
+            for name, plot in bench_figures(traces).items()
+            for path in plot.write(folder / name)
+        ]
+
+
+def bench_figures(traces: list[Trace]) -> dict[str, LegendFigure]:
+    """The figures by name; to be called inside `styled`."""
+    scenes: dict[Any, list[tuple[Trace, CurveStyle]]] = {}
+    for trace, style in zip(traces, _styles(traces), strict=True):
+        scenes.setdefault(scene_of(trace), []).append((trace, style))
+    rows = list(scenes.values())
+    if len(rows) <= SCENES:
+        figures = {"work_precision": rows}
+    else:
+        figures = {
+            f"work_precision_{i}_{_slug(_title(row[0][0]))}": [row] for i, row in enumerate(rows)
+        }
+    return {name: _draw(rows) for name, rows in figures.items()}
+
+
+def _draw(scenes: list[list[tuple[Trace, CurveStyle]]]) -> LegendFigure:
+    """A row of two panels for each scene."""
+    plot = LegendFigure(FULL_WIDTH, ROW_HEIGHT * len(scenes))
+    grid = plot.figure.subplots(len(scenes), len(COSTS), sharey="row", squeeze=False)
+    for scene, panels in zip(scenes, grid, strict=True):
+        errors = np.concatenate([_errors(trace) for trace, _ in scene])
+        errors = errors[np.isfinite(errors)]
+        for axes, (cost, label) in zip(panels, COSTS, strict=True):
+            spans = [_curve(plot, axes, trace, style, cost) for trace, style in scene]
+            log_scale(axes, "x", min(s[0] for s in spans), max(s[1] for s in spans))
+            if errors.size:
+                log_scale(axes, "y", float(errors.min()) / ROOM, float(errors.max()) * ROOM)
+            if scene is scenes[-1]:
+                axes.set_xlabel(label)
+        panels[0].set_ylabel(ERROR)
+        panels[0].set_title(_title(scene[0][0]), loc="left", fontsize=SMALL)
+    return plot
+
+
+def _errors(trace: Trace) -> Field:
+    """What lasts of the error of the mean gap, no less than the reference can tell."""
+    floor = max(trace.row["reference_residual"], REFERENCE.tolerance)
+    errors: Field = np.maximum(trace.lasting_error("u_g"), floor)
+    return errors
+
+
+def _curve(
+    plot: LegendFigure, axes: Any, trace: Trace, style: CurveStyle, cost: str
+) -> tuple[float, float]:
+    """One solve, its end marked; thin, the error itself. Returns where it begins and ends."""
+    kept = np.isfinite(_errors(trace))
+    x = trace.samples[cost][kept]
+    options = {"color": style.colour, "mfc": "white", "lw": 1.3, "marker": style.marker}
+    if x.size == 0:
+        plot.line(axes, style.label, x, x, **options)
+        ends: Field = trace.samples[cost][[0, -1]]
+        return float(ends[0]), float(ends[1])
+    y = _errors(trace)[kept]
+    itself = np.maximum(trace.samples["u_g_error"][kept], y.min())
+    axes.plot(x, itself, color=style.colour, lw=0.4, alpha=0.6)
+    ended = trace.row["status"] == Status.CONVERGED
+    plot.line(axes, style.label, x, y, markevery=0.2, **options)
+    end = {"ls": "none", "marker": style.marker if ended else "x", "color": style.colour}
+    if ended:
+        axes.plot(x[-1:], y[-1:], zorder=4, **end)
+    else:
+        plot.line(axes, "not converged", x[-1:], y[-1:], zorder=4, **end | {"color": "0.3"})
+    return float(x[0]), float(x[-1])
+
+
+def _styles(traces: list[Trace]) -> list[CurveStyle]:
+    """A colour and a symbol for each solver, the same in all scenes."""
+    names = solver_names(traces)
+    known = list(dict.fromkeys(names))
+    chosen = dict(zip(known, colours(len(known)), strict=True))
+    return [CurveStyle(chosen[n], MARKERS[known.index(n) % len(MARKERS)], n) for n in names]
+
+
+def _title(trace: Trace) -> str:
+    row = trace.row
+    body = f"{row['elastomer']} on {row['surface']}"[:MAX_LABEL].replace("$", r"\$")
+    return f"{body}, {row['points']} points, p* = {row['p_star']:.4g}"
+
+
+def _slug(text: str) -> str:
+    """A file name that tells."""
+    plain = text.replace("*", "").replace(" = ", "=")
+    return re.sub(r"[^\w.=]+", "-", plain).strip("-")[:MAX_LABEL]

@@ -1,0 +1,215 @@
+"""Speed against error: every solver on every contact of a spec, recorded while one solve runs.
+
+The reference is a solution by the default solver, far below the tolerances that are compared.
+Seconds are processor time on one thread, that of the wall where nothing else runs; the time that
+a sample takes is not counted. Coarser grids cost transforms and seconds, but have no error: their
+states are no answer on the solved grid.
+"""
+
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from gfmd_cli.bench.file import Trace
+from gfmd_cli.errors import InputError
+from gfmd_cli.physics.contact import Contact, build_scene
+from gfmd_cli.physics.observables import QUANTITIES, Observables, observe
+from gfmd_cli.solvers.auto import Auto
+from gfmd_cli.solvers.ccg import ConstrainedCG
+from gfmd_cli.solvers.fire import Fire
+from gfmd_cli.solvers.loop import Solver, State
+from gfmd_cli.solvers.nested_grids import Solution, solve_contact
+from gfmd_cli.solvers.polonsky_keer import PolonskyKeer
+from gfmd_cli.spec.models import SOUGHT, Spec
+from gfmd_cli.study.progress import Progress, Report
+from gfmd_cli.study.resources import check_memory
+from gfmd_cli.study.tasks import Task, plan
+
+GROWTH = 1.05  # of the transforms between two samples
+REFERENCE = Auto(tolerance=1e-10)
+PATIENCE = 100  # steps, or half of those so far if more, without a new least residual
+COMPARED = (Auto, ConstrainedCG, Fire, PolonskyKeer)
+"""Solvers to compare if a spec leaves the choice of the solver open."""
+
+
+@dataclass
+class Recorder:
+    """A watcher that takes a sample whenever the transforms have grown by GROWTH."""
+
+    contact: Contact
+    reference: Observables
+    report: Report
+    run: int
+    label: str
+    samples: list[tuple[float, ...]] = field(default_factory=list)
+    begun: float = field(default_factory=lambda: time.process_time())
+    own: float = 0.0
+    """Seconds spent here, which are not the solver's."""
+    points: int = 0
+    """Of the grid of the last state."""
+    due: float = 0.0
+    """Transforms at which the next sample is taken."""
+    a_r: float = np.nan
+    """Of the last sample."""
+
+    def __call__(self, contact: Contact, state: State) -> None:
+        """Take a sample of the first state of each grid, and where one is due."""
+        now = time.process_time()
+        share = contact.grid.size / self.contact.grid.size
+        transforms = state.coarser_transforms + state.transforms * share
+        if transforms >= self.due or contact.grid.points != self.points:
+            self.points = contact.grid.points
+            self.due = GROWTH * transforms
+            self._sample(contact, state, transforms, now)
+        self.own += time.process_time() - now
+
+    def end(self, solution: Solution) -> None:
+        """Take the last sample, unless it is taken."""
+        now = time.process_time()
+        if not self.samples or self.samples[-1][0] < solution.transforms:
+            self._sample(self.contact, solution, solution.transforms, now)
+
+    def _sample(
+        self, contact: Contact, state: State | Solution, transforms: float, now: float
+    ) -> None:
+        errors = (np.nan,) * len(QUANTITIES)
+        if contact is self.contact:
+            with np.errstate(invalid="ignore", over="ignore"):  # of a solve that diverges
+                seen = observe(contact, state.u, state.sigma)
+            self.a_r = seen.a_r
+            errors = tuple(_distance(seen, self.reference, name) for name in QUANTITIES)
+        points, seconds = contact.grid.points, now - self.begun - self.own
+        self.samples.append((transforms, seconds, points, state.residual, *errors))
+        step = state.step if isinstance(state, State) else state.steps
+        event = Progress(self.run, "step", self.label, points, step, state.residual, self.a_r)
+        self.report(event)
+
+
+def _distance(seen: Observables, reference: Observables, name: str) -> float:
+    """Relative to the reference; absolute where that is zero."""
+    value, exact = getattr(seen, name), getattr(reference, name)
+    return float(abs(value - exact) / (abs(exact) or 1.0))
+
+
+class _Stalled(Exception):
+    """The residual has reached what rounding lets it reach."""
+
+
+@dataclass
+class _Patience:
+    """A watcher that ends a solve whose residual falls no more."""
+
+    contact: Contact
+    least: float = np.inf
+    since: int = 0
+    last: State | None = None
+
+    def __call__(self, contact: Contact, state: State) -> None:
+        if contact is not self.contact:
+            return
+        self.last = state
+        if state.residual < self.least:
+            self.least, self.since = state.residual, state.step
+        elif state.step > self.since + max(PATIENCE, self.since // 2):
+            raise _Stalled
+
+
+def solve_reference(contact: Contact) -> tuple[Observables, float]:
+    """What a solution as exact as it gets has to show, and its residual."""
+    patience = _Patience(contact)
+    found: Solution | State | None
+    try:
+        found = solve_contact(contact, REFERENCE, patience)
+    except _Stalled:
+        found = patience.last
+    assert found is not None
+    residual = contact.recompute(found.u, found.sigma)
+    return observe(contact, found.u, found.sigma), residual
+
+
+def solvers_to_compare(spec: Spec, task: Task, contact: Contact) -> list[Solver]:
+    """The solvers to compare on a contact: those of the spec that suit the elastomer.
+
+    A single "auto" stands for COMPARED; elsewhere it is the solver that it chooses.
+    """
+    given: list[Solver] = [*spec.solver]
+    if len(given) == 1 and isinstance(given[0], Auto):
+        given = [kind(**given[0].shared_keys()) for kind in COMPARED]
+    n = task.elastomer.exponent
+    steepness = np.inf if n is None else n  # unknown: only what suits all elastomers
+    chosen = [solver.for_contact(contact) for solver in given]
+    return list(dict.fromkeys(s for s in chosen if steepness <= s.max_exponent))
+
+
+def run_bench(spec: Spec, report: Report) -> list[Trace]:
+    """Measure every solver on every contact of the spec.
+
+    Raises InputError where the spec does not fit the machine or names no grid, or no solver suits
+    an elastomer.
+    """
+    tasks = plan(spec)
+    if spec.load.quantity in SOUGHT:
+        raise InputError(f"load.{spec.load.quantity}: a bench takes load.p_star or load.pressure")
+    if any(task.auto for task in tasks):
+        raise InputError('grid.points: "auto" is no grid to compare solvers on; give a number')
+    if any(task.boundary != "periodic" for task in tasks):
+        raise InputError('grid.boundary: a bench compares solvers of a "periodic" boundary')
+    check_memory(tasks)
+    traces: list[Trace] = []
+    for task, contact in _contacts(tasks):
+        reference, residual = solve_reference(contact)
+        row = task.columns() | {"p_star": contact.pressure} | {"reference_residual": residual}
+        row |= {f"{name}_reference": getattr(reference, name) for name in QUANTITIES}
+        for solver in solvers_to_compare(spec, task, contact):
+            traces.append(_trace(contact, solver, reference, row, report, len(traces)))
+    if not traces:
+        raise InputError("solver.kind: fit for none of the bodies; take auto, ccg, fire or pcg")
+    return traces
+
+
+def _contacts(tasks: list[Task]) -> Iterator[tuple[Task, Contact]]:
+    """Each contact of the spec once, with one of its tasks."""
+    seen: set[Any] = set()
+    scene_of = lru_cache(maxsize=1)(build_scene)  # pressures of one scene follow each other
+    for task in tasks:
+        key = (task.surface, task.elastomer, task.points, task.points_y, task.load)
+        if key not in seen:
+            seen.add(key)
+            scene = scene_of(task.surface, task.elastomer, task.points, points_y=task.points_y)
+            yield task, scene.contact(task.p_star(scene.delta_sigma))
+
+
+def _trace(
+    contact: Contact,
+    solver: Solver,
+    reference: Observables,
+    row: dict[str, Any],
+    report: Report,
+    run: int,
+) -> Trace:
+    """One solve under the eyes of a recorder."""
+    label = f"{solver.kind} {row['elastomer']} {row['points']} p*={row['p_star']:.4g}"
+    report(Progress(run, "start", label))
+    warm_up = solver.model_copy(update={"max_steps": 1})  # plans of all grids, pages of memory
+    solve_contact(contact, warm_up)
+    recorder = Recorder(contact, reference, report, run, label)
+    solution = solve_contact(contact, solver, recorder)
+    recorder.end(solution)
+    points, residual, status = contact.grid.points, solution.residual, solution.status
+    report(Progress(run, "end", label, points, solution.steps, residual, recorder.a_r, status))
+    return Trace.of(
+        row
+        | {
+            "solver": solver.kind,
+            "tolerance": solver.tolerance,
+            "nested": solver.nested,
+            "steps": solution.steps,
+            "residual": residual,
+            "status": str(status),
+        },
+        recorder.samples,
+    )

@@ -1,0 +1,31 @@
+"""Printing of text: control characters are escaped; a closed terminal does not stop a run."""
+
+import os
+import sys
+from contextlib import suppress
+
+import click
+
+
+def printable(text: str) -> str:
+    """Text in which control characters, as of terminal escapes in file names, are spelled out."""
+    return "".join(
+        letter if letter.isprintable() or letter in "\n\t" else ascii(letter)[1:-1]
+        for letter in text
+    )
+
+
+def tell(text: str) -> None:
+    """Print on stderr; an error of writing is ignored."""
+    with suppress(OSError):
+        click.echo(printable(text), err=True)
+
+
+def show(text: str) -> None:
+    """Print on stdout; if the reader has closed the pipe, the rest is discarded."""
+    try:
+        click.echo(printable(text))
+    except BrokenPipeError:
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, sys.stdout.fileno())
+        os.close(nowhere)

@@ -1,0 +1,91 @@
+"""Files that appear whole or not at all."""
+
+import io
+import os
+import stat
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+from uuid import uuid4
+
+from gfmd_cli.errors import SpaceError
+
+
+class Fresh(io.FileIO):
+    """A file being written whose first error waits: HDF5 crashes at exit if a write fails."""
+
+    error: OSError | None = None
+
+    def write(self, content: Any) -> int:
+        """Write all of it, or note why not and drop it and all that follows."""
+        view = memoryview(content).cast("B")
+        size = len(view)
+        try:
+            while view and self.error is None:
+                view = view[super().write(view) :]
+        except OSError as error:
+            self.error = error
+        return size
+
+
+@contextmanager
+def new_file(path: Path, aside: Path | None = None) -> Iterator[Fresh]:
+    """A file that is at `path` once the block has ended well: written aside, synced, renamed.
+
+    `aside` is the folder to write it in, on the same file system; by default that of `path`.
+    Raises SpaceError where it cannot be written.
+    """
+    fresh = (aside or path.parent) / f".{path.name}.{uuid4().hex}"
+    file: Fresh | None = None
+    try:
+        fresh.parent.mkdir(parents=True, exist_ok=True)
+        with Fresh(fresh, "w+b") as file:
+            yield file
+            if file.error is not None:
+                raise file.error
+            with suppress(FileNotFoundError):  # a file that is replaced keeps its mode
+                os.fchmod(file.fileno(), stat.S_IMODE(path.stat().st_mode))
+            os.fsync(file.fileno())
+        fresh.replace(path)
+        _sync_folder(path.parent)
+    except Exception as error:
+        reason = error if file is None or file.error is None else file.error
+        if isinstance(reason, OSError):
+            raise SpaceError(f"{path}: cannot be written: {reason.strerror or reason}") from error
+        raise
+    finally:
+        with suppress(OSError):
+            fresh.unlink(missing_ok=True)
+
+
+def write_whole(path: Path, content: bytes) -> None:
+    """Write a file so that it appears whole or not at all, even where the power fails.
+
+    Raises SpaceError where it cannot be written.
+    """
+    with new_file(path) as file:
+        file.write(content)
+
+
+def check_place(path: Path) -> None:
+    """Raise SpaceError where no file can be written at `path`, before the work for it begins."""
+    folder = next(folder for folder in path.absolute().parents if folder.exists())
+    if not (folder.is_dir() and os.access(folder, os.W_OK)):
+        raise SpaceError(f"{path}: cannot be written")
+
+
+def make_folder(path: Path) -> None:
+    """Make a folder where it is missing. Raises SpaceError."""
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise SpaceError(f"{path}: cannot be made: {error.strerror}") from error
+
+
+def _sync_folder(folder: Path) -> None:
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)

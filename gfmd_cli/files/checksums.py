@@ -1,0 +1,58 @@
+"""Checksums at the end of a file: they show whether the content has changed."""
+
+import os
+import zlib
+from typing import BinaryIO
+
+from gfmd_cli.files.atomic import Fresh
+
+SEAL = b"gfmd"  # followed by four bytes, the crc32 of all before
+CHUNK = 2**24  # bytes that are read at a time
+MAX_SPARSENESS = 1032  # bytes of a file per byte on the disk: what the best compression reaches
+MIN_BLOCK = 4096  # bytes that a file takes at least; small ones may be stored in its inode
+
+
+def seal(file: Fresh) -> None:
+    """End a new file with the checksum of its content."""
+    file.seek(0)
+    content_sum = _sum(file, os.fstat(file.fileno()).st_size)
+    file.seek(0, os.SEEK_END)
+    file.write(SEAL + content_sum)
+
+
+def sealed(content: bytes) -> bytes:
+    """Content with its checksum."""
+    return content + SEAL + zlib.crc32(content).to_bytes(4, "little")
+
+
+def check_seal(file: BinaryIO) -> int:
+    """Size of the content before the checksum; the file stands at its beginning afterwards.
+
+    Raises ValueError where the content has changed, or where the file claims far more than is
+    stored on the disk.
+    """
+    status = os.fstat(file.fileno())
+    size = status.st_size - len(SEAL) - 4
+    if size < 0:
+        raise ValueError("cut short")
+    check_stored(status)
+    content_sum = _sum(file, size)
+    if file.read(len(SEAL) + 5) != SEAL + content_sum:
+        raise ValueError("its checksum is wrong")
+    file.seek(0)
+    return size
+
+
+def check_stored(status: os.stat_result) -> None:
+    """Raise ValueError where a file claims far more bytes than the disk holds of it."""
+    if status.st_size > MAX_SPARSENESS * max(512 * status.st_blocks, MIN_BLOCK):
+        raise ValueError("a sparse file")
+
+
+def _sum(file: BinaryIO | Fresh, size: int) -> bytes:
+    """The crc32 of the next `size` bytes."""
+    total = 0
+    while size > 0 and (chunk := file.read(min(size, CHUNK))):
+        total = zlib.crc32(chunk, total)
+        size -= len(chunk)
+    return total.to_bytes(4, "little")

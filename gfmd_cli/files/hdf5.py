@@ -1,0 +1,157 @@
+"""HDF5 files: new ones, and those from elsewhere, whose datasets are checked before reading."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from math import prod
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import h5py
+import numpy as np
+
+from gfmd_cli.files.atomic import Fresh
+from gfmd_cli.files.regular import open_regular
+
+MAGIC = b"\x89HDF\r\n\x1a\n"  # first bytes of an HDF5 file
+PLAIN = "iufS"  # kinds of values that are read: numbers and text
+MAX_OBJECTS = 10_000  # in all groups that are searched for datasets; a scan has some tens
+MAX_DEPTH = 32  # of nested groups that are searched; paths of 20000 names take minutes
+VERSION = ("v110", "v110")  # of HDF5: the first whose metadata all carry checksums
+
+
+@contextmanager
+def new_hdf5(file: Fresh) -> Iterator[Any]:
+    """HDF5 written into a new file, of any size, without a copy of it in memory."""
+    with h5py.File(file, "w", libver=VERSION) as made:
+        yield made
+
+
+@contextmanager
+def open_hdf5(source: Path | BinaryIO) -> Iterator[Any]:
+    """An HDF5 file for reading, without locks. Raises OSError where it is none.
+
+    `source` is a path, which may be a link to a regular file, or a file that is open already.
+    """
+    if isinstance(source, Path):
+        with open_regular(source, follow=True) as raw, h5py.File(raw, "r") as file:
+            yield file
+    else:
+        with h5py.File(source, "r") as file:
+            yield file
+
+
+def has(group: Any, name: str) -> bool:
+    """Whether the group itself holds something of this name; a link to elsewhere is not followed.
+
+    Raises ValueError for such a link.
+    """
+    links, key = group.id.links, name.encode()
+    if not links.exists(key):
+        return False
+    if links.get_info(key).type != h5py.h5l.TYPE_HARD:
+        raise ValueError(f"{name!r} is a link to elsewhere; links do not count")
+    return True
+
+
+def datasets_below(group: Any) -> dict[str, Any]:
+    """All datasets below a group by their paths, reached by hard links only.
+
+    Raises ValueError where there are more than `MAX_OBJECTS` objects or deeper groups than
+    `MAX_DEPTH`.
+    """
+    datasets: dict[str, Any] = {}
+    level, groups, count = [("", group)], {h5py.h5o.get_info(group.id).addr}, 0
+    for _ in range(MAX_DEPTH):
+        deeper = []
+        for path, parent in level:
+            count += len(parent)
+            if count > MAX_OBJECTS:
+                raise ValueError(f"holds more than {MAX_OBJECTS} objects")
+            for name in parent:
+                if not isinstance(parent.get(name, getlink=True), h5py.HardLink):
+                    continue
+                item = parent[name]
+                if isinstance(item, h5py.Dataset):
+                    datasets[path + name] = item
+                elif (address := h5py.h5o.get_info(item.id).addr) not in groups:
+                    groups.add(address)
+                    if isinstance(item, h5py.Group):
+                        deeper.append((f"{path}{name}/", item))
+        if not deeper:
+            return datasets
+        level = deeper
+    raise ValueError(f"groups are nested deeper than {MAX_DEPTH}")
+
+
+def find(group: Any, path: str) -> Any:
+    """The group at a path below a group, reached by hard links only, or None.
+
+    Raises ValueError for other links.
+    """
+    for name in path.split("/"):
+        if not has(group, name):
+            return None
+        group = h5py.Group(h5py.h5g.open(group.id, name.encode()))
+    return group
+
+
+def take(group: Any, path: str, compression: float = 1.0) -> Any:
+    """The dataset at a path, reached by hard links, stored in the file, of numbers or text.
+
+    Parameters
+    ----------
+    path : below the group
+    compression : how many times larger than on the disk it may be
+
+    Text is of a fixed length. Raises KeyError where there is none, ValueError where it is not what
+    it seems.
+    """
+    return h5py.Dataset(_checked(group, path, compression))
+
+
+def read_dataset(group: Any, path: str) -> Any:
+    """The values of such a dataset, without the overhead of `h5py.Dataset`."""
+    dataset = _checked(group, path, 1.0)
+    values = np.empty(dataset.shape, dataset.dtype)
+    if values.size:
+        dataset.read(h5py.h5s.ALL, h5py.h5s.ALL, values, dataset.get_type())
+    return values
+
+
+def create_dataset(group: Any, name: str, values: Any) -> None:
+    """A dataset without checksums and labels, without the overhead of `h5py.Dataset`."""
+    kind = h5py.h5t.py_create(values.dtype, logical=True)
+    space = h5py.h5s.create_simple(values.shape)
+    dataset = h5py.h5d.create(group.id, name.encode(), kind, space)
+    if values.size:
+        dataset.write(h5py.h5s.ALL, h5py.h5s.ALL, np.ascontiguousarray(values))
+
+
+def _checked(group: Any, path: str, compression: float) -> Any:
+    folder, _, name = path.rpartition("/")
+    parent = find(group, folder) if folder else group
+    if parent is None or not has(parent, name):
+        raise KeyError(f"no dataset {path!r}")
+    dataset = h5py.h5o.open(parent.id, name.encode())
+    if not isinstance(dataset, h5py.h5d.DatasetID):
+        raise ValueError(f"{path!r} is no dataset")
+    if dataset.shape is None:
+        raise ValueError(f"dataset {path!r} is empty")
+    storage = dataset.get_create_plist()
+    if storage.get_external_count() or storage.get_layout() == h5py.h5d.VIRTUAL:
+        raise ValueError(f"dataset {path!r} is kept in other files; copy it into one")
+    kind = dataset.dtype
+    if kind.kind not in PLAIN:
+        raise ValueError(f"dataset {path!r} has type {kind}; numbers or text are read")
+    claimed = prod(dataset.shape) * kind.itemsize
+    stored = min(dataset.get_storage_size(), h5py.h5i.get_file_id(dataset).get_filesize())
+    if claimed > compression * stored:
+        raise ValueError(
+            f"dataset {path!r} claims {claimed} bytes, but hardly any are stored ({stored})"
+        )
+    return dataset
+
+
+def plain(value: Any) -> Any:
+    """A scalar of NumPy as one of Python; other values as they are."""
+    return value.item() if isinstance(value, np.generic) else value

@@ -1,0 +1,166 @@
+"""Locks between processes: of the kernel, or plain files where the file system has no locks."""
+
+import errno
+import fcntl
+import json
+import os
+import socket
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import BinaryIO
+from uuid import uuid4
+
+from gfmd_cli.errors import SpaceError
+from gfmd_cli.files.regular import open_regular, read_regular
+
+NO_LOCKS = {errno.ENOLCK, errno.ENOTSUP, errno.EOPNOTSUPP, errno.ENOSYS, errno.EINVAL, 524}
+"""What a file system without locks answers; 524 is the kernel's ENOTSUPP, of NFS and Lustre."""
+ATTEMPTS = 50  # at a file whose folder is removed again and again by other processes
+WAIT_SECONDS = 0.02  # between two attempts
+MAX_BYTES = 4096  # of the text in a plain lock
+UNREADABLE_SECONDS = 2.0  # that a plain lock may be without the name of its owner, who writes it
+OWNED_SECONDS = 600.0  # to wait for the owner of a plain lock, who may be dead on another machine
+
+
+@contextmanager
+def locked(path: Path, *, shared: bool = False, wait: bool = True) -> Iterator[bool]:
+    """Inside, this process has a lock file; the kernel takes it from a process that dies.
+
+    Its holder may delete the file: a process that waited for it then takes the one that is there
+    now. Yields whether it was got, always true where `wait` is. Raises SpaceError where the file
+    cannot be written.
+
+    On a file system without locks, the lock is a file beside it with the name of its owner, which
+    others respect. It cannot be shared: a second process is refused with a SpaceError, and so is
+    one that has waited for `OWNED_SECONDS`. That of a dead process of this machine is removed; two
+    that remove it at the same moment may both go on.
+    """
+    how = (fcntl.LOCK_SH if shared else fcntl.LOCK_EX) | (0 if wait else fcntl.LOCK_NB)
+    while True:
+        with _opened(path) as file:
+            try:
+                fcntl.flock(file, how)
+            except BlockingIOError:
+                yield False
+                return
+            except OSError as error:
+                if error.errno not in NO_LOCKS:
+                    raise SpaceError(f"{path}: cannot be locked: {error.strerror}") from error
+            else:
+                if _is_at(file.fileno(), path):
+                    yield True
+                    return
+                continue
+        with _owned(path.with_name(f"{path.name}.owner"), shared, wait) as got:
+            yield got
+        return
+
+
+def _opened(path: Path) -> BinaryIO:
+    """A lock file, made where it is missing. Raises SpaceError."""
+    for _ in range(ATTEMPTS):
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            return open_regular(path, os.O_RDWR | os.O_CREAT)  # NFS asks for both
+        except FileNotFoundError:  # the folder was deleted just now, or cannot be made at all
+            time.sleep(WAIT_SECONDS)
+        except OSError as error:
+            raise SpaceError(f"{path}: cannot be written: {error.strerror}") from error
+    raise SpaceError(f"{path}: cannot be written: its folder cannot be made")
+
+
+def _is_at(descriptor: int, path: Path) -> bool:
+    """Whether an open file is the one that has this name."""
+    try:
+        return os.path.samestat(os.fstat(descriptor), path.stat())
+    except FileNotFoundError:
+        return False
+
+
+@contextmanager
+def _owned(path: Path, shared: bool, wait: bool) -> Iterator[bool]:
+    """A lock by a plain file.
+
+    Raises SpaceError for a shared one that another process has, for one that another process has
+    for too long, and for a file that is no lock.
+    """
+    known, since = None, time.monotonic()
+    while not _claim(path):
+        owner, now = _owner(path), time.monotonic()
+        if owner != known:  # another process, or one that writes its name just now
+            known, since = owner, now
+        waited = now - since
+        if owner is not None and _is_dead(owner):
+            _remove_stale(path, owner)
+        elif not wait:
+            yield False
+            return
+        elif owner is None and waited > UNREADABLE_SECONDS:
+            raise SpaceError(f"{path}: not a lock file of gfmd; delete it")
+        elif owner is not None and (shared or waited > OWNED_SECONDS):
+            raise SpaceError(
+                f"{path}: in use by process {owner['pid']} on {owner['host']}; this file system "
+                "has no locks, so that one process at a time can work here (if that process is "
+                "dead, delete this file)"
+            )
+        else:
+            time.sleep(WAIT_SECONDS)
+    try:
+        yield True
+    finally:
+        with suppress(OSError):
+            path.unlink()
+
+
+def _claim(path: Path) -> bool:
+    """Make a lock file with this process as its owner; false where there is one."""
+    try:
+        descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW, 0o666)
+    except FileExistsError:
+        return False
+    except OSError as error:
+        raise SpaceError(f"{path}: cannot be written: {error.strerror}") from error
+    with os.fdopen(descriptor, "w") as file:
+        json.dump(_this_process(), file)
+    return True
+
+
+def _this_process() -> dict[str, str | int]:
+    pid = os.getpid()
+    return {"host": socket.gethostname(), "pid": pid, "started": _start_time(pid)}
+
+
+def _start_time(pid: int) -> str:
+    """When a process was started, in ticks of the kernel since the boot named; "" for none."""
+    with suppress(OSError, IndexError):
+        boot = Path("/proc/sys/kernel/random/boot_id").read_text(encoding="ascii").strip()
+        status = Path(f"/proc/{pid}/stat").read_text(encoding="utf-8", errors="replace")
+        return f"{boot} {status.rpartition(')')[2].split()[19]}"
+    return ""
+
+
+def _owner(path: Path) -> dict[str, str | int] | None:
+    """What a lock file says of its owner; None where it is gone or not written yet."""
+    with suppress(OSError, ValueError, KeyError, TypeError):
+        owner = json.loads(read_regular(path, MAX_BYTES))
+        return {"host": str(owner["host"]), "pid": int(owner["pid"]), "started": owner["started"]}
+    return None
+
+
+def _is_dead(owner: dict[str, str | int]) -> bool:
+    """Whether the owner was a process of this machine that has ended; of others nobody knows."""
+    if owner["host"] != socket.gethostname():
+        return False
+    return _start_time(int(owner["pid"])) != owner["started"]
+
+
+def _remove_stale(path: Path, owner: dict[str, str | int]) -> None:
+    """Remove the lock of a dead process, unless another one has just done so."""
+    aside = path.with_name(f".{path.name}.{uuid4().hex}")
+    with suppress(OSError):
+        path.rename(aside)
+        if _owner(aside) != owner:  # it is of a process that was faster
+            os.link(aside, path)
+        aside.unlink()

@@ -1,0 +1,1 @@
+"""The periodic grid: transforms, processes that share it, kernels. No contact mechanics."""

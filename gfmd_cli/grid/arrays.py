@@ -1,0 +1,26 @@
+"""Array types shared by the whole package, and how to walk over an array."""
+
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+Field: TypeAlias = NDArray[np.floating[Any]]
+"""Real values on the grid (or over wavenumbers, bins, pressures)."""
+
+SingleField: TypeAlias = NDArray[np.float32]
+"""Real values on the grid that are kept in single precision."""
+
+Modes: TypeAlias = NDArray[np.complexfloating[Any, Any]]
+"""Fourier coefficients in the half-spectrum layout of a real transform."""
+
+Mask: TypeAlias = NDArray[np.bool_]
+"""A choice of grid points."""
+
+BLOCK = 2**15  # points of a block of rows: it and its temporaries stay in the cache
+
+
+def row_blocks(field: Field | Modes, block: int = BLOCK) -> list[slice]:
+    """Slices of whole rows of about `block` values each."""
+    step = max(1, block * len(field) // field.size)
+    return [slice(start, start + step) for start in range(0, len(field), step)]

@@ -1,0 +1,81 @@
+"""Compilation of kernels, and the folder where their machine code is cached."""
+
+import os
+import warnings
+from collections.abc import Callable
+from contextlib import suppress
+from functools import cache
+from typing import Any
+
+import numba
+from numba import njit
+
+from gfmd_cli.files.cache import private_folder
+
+OPTIONS: dict[str, Any] = {
+    "nogil": True,
+    "no_cfunc_wrapper": True,
+    "error_model": "numpy",
+    "fastmath": {"reassoc", "contract", "nsz"},
+}
+
+
+def kernel(function: Callable[..., Any]) -> Any:
+    """Compile a function at its first call, and cache the machine code if a folder can be written.
+
+    Numba looks for a folder when a function is decorated: NUMBA_CACHE_DIR, the folder of the
+    source, the user's cache. If none can be written, a private temporary folder is used.
+    """
+    if not _is_cache_known():
+        _take_private_folder()
+    try:
+        compiled = njit(cache=True, **OPTIONS)(function)
+    except RuntimeError:  # no folder can be written
+        if not _take_private_folder():
+            return njit(**OPTIONS)(function)
+        compiled = njit(cache=True, **OPTIONS)(function)
+    _tolerate_faults(compiled._cache)
+    return compiled
+
+
+def part_of_kernel(function: Callable[..., Any]) -> Any:
+    """Compile a function that only kernels of the same file call, as a part of each of them."""
+    return njit(no_cpython_wrapper=True, **OPTIONS)(function)
+
+
+def _is_cache_known() -> bool:
+    """Whether there is a cache of the user; without a home, Numba would make a folder "~" here."""
+    named = "NUMBA_CACHE_DIR" in os.environ or "XDG_CACHE_HOME" in os.environ
+    return named or os.path.expanduser("~") != "~"
+
+
+@cache
+def _take_private_folder() -> bool:
+    """Let this process and its workers cache in a private folder; whether there is one."""
+    folder = private_folder()
+    place = "each run compiles anew" if folder is None else f"compiled code is kept in {folder}"
+    warnings.warn(f"no cache folder can be written: {place}", RuntimeWarning, stacklevel=3)
+    if folder is None:
+        os.environ["XDG_CACHE_HOME"] = os.devnull
+    else:
+        os.environ["NUMBA_CACHE_DIR"] = numba.config.CACHE_DIR = str(folder)
+    return folder is not None
+
+
+def _tolerate_faults(store: Any) -> None:
+    """A full disk or a damaged file of the cache costs a compilation, and no more."""
+    load, save = store.load_overload, store.save_overload
+
+    def load_or_forget(*arguments: Any) -> Any:
+        try:
+            return load(*arguments)
+        except Exception:  # files cut short raise anything
+            with suppress(OSError):
+                store.flush()
+            return None
+
+    def save_if_possible(*arguments: Any) -> None:
+        with suppress(OSError):
+            save(*arguments)
+
+    store.load_overload, store.save_overload = load_or_forget, save_if_possible

@@ -1,0 +1,312 @@
+"""A grid that several processes share, by a slab decomposition.
+
+Each process holds a block of rows of a field and, between the transforms along the two axes, some
+columns (wavenumbers along x) of the coefficients. An all-to-all exchange converts one into the
+other. Every process computes smaller grids as a whole, with identical results.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from functools import cached_property
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pyfftw
+
+from gfmd_cli.grid import plans
+from gfmd_cli.grid.arrays import Field, Modes
+from gfmd_cli.grid.fft_grid import PLANNING, Grid, Shape, Span, shared_modes
+from gfmd_cli.grid.halo import HALO_ROWS, DistributedColumns, DistributedRows, is_distributable
+from gfmd_cli.grid.ranks import LONG_SPIN_SECONDS, Ranks, leads
+from gfmd_cli.grid.rows import LocalRows
+
+
+def create_grid(grid: Grid, ranks: Ranks | None) -> Grid:
+    """The grid, distributed over the processes if it is large enough."""
+    if ranks is None or not _suits(grid.whole_shape, ranks):
+        return grid
+    return DistributedGrid(**_fields(grid), ranks=ranks)
+
+
+def _fields(grid: Grid) -> dict[str, Any]:
+    return {field.name: getattr(grid, field.name) for field in fields(Grid)}
+
+
+def _suits(shape: Shape, ranks: Ranks) -> bool:
+    """Whether every process gets enough rows of a grid, and columns of its coefficients."""
+    return (
+        len(shape) == 2
+        and is_distributable(shape[0], ranks.size)
+        and shape[1] // 2 + 1 >= ranks.size
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class DistributedGrid(Grid):
+    """The part of a two-dimensional grid that this process holds; `size` is that of the grid."""
+
+    ranks: Ranks
+    """The processes that share the grid."""
+
+    @cached_property
+    def rows(self) -> DistributedRows:
+        """The rows of this process."""
+        return DistributedRows(self.ranks, self.points_y, self._threads, lambda: self._memory[1])
+
+    @cached_property
+    def spectral_rows(self) -> LocalRows:
+        """All rows of the columns of coefficients that this process holds."""
+        return DistributedColumns(self.ranks, self.points_y, self._threads)
+
+    @cached_property
+    def spans(self) -> list[Span]:
+        """First column of each process, and the column after its last."""
+        columns, count = self.points // 2 + 1, self.ranks.size
+        edges = [columns * rank // count for rank in range(count + 1)]
+        return list(pairwise(edges))
+
+    @property
+    def span(self) -> Span:
+        """The columns of this process."""
+        return self.spans[self.ranks.rank]
+
+    @property
+    def shape(self) -> Shape:
+        """Shape of the rows of this process."""
+        return self.rows.count, self.points
+
+    @property
+    def spectral_shape(self) -> Shape:
+        """Shape of the coefficients of this process."""
+        first, last = self.span
+        return self.points_y, last - first
+
+    @property
+    def own(self) -> slice:
+        """The rows of this process."""
+        return slice(self.rows.start, self.rows.stop)
+
+    @property
+    def whole(self) -> bool:
+        """Whether this process holds all rows of the grid: it does not."""
+        return False
+
+    def total(self, values: Any) -> Any:
+        """Sum over all processes."""
+        return self.ranks.total(values)
+
+    def max(self, value: float) -> float:
+        """Maximum over all processes."""
+        return float(self.ranks.gather(value).max())
+
+    def line(self, symbol: Field) -> Field:
+        """The values of a symbol along x, of all processes."""
+        return self._gathered(symbol[0], [last - first for first, last in self.spans])
+
+    def column(self, symbol: Field) -> Field:
+        """The values of a symbol along y, which the first process holds."""
+        counts = [self.points_y // 2 + 1, *[0] * (self.ranks.size - 1)]
+        return self._gathered(symbol[: counts[self.ranks.rank], 0], counts)
+
+    def gather_columns(self, values: Field) -> Field:
+        """Values over rows and the columns of `span`, of all columns, on every process."""
+        counts = [len(values) * (last - first) for first, last in self.spans]
+        return self._gathered(values.T, counts).reshape(-1, len(values)).T
+
+    def _gathered(self, values: Field, counts: Any) -> Field:
+        """The concatenated values of all processes."""
+        gathered = np.empty(sum(counts), values.dtype)
+        self.ranks.wait(
+            self.ranks.comm.Iallgatherv(np.ascontiguousarray(values), [gathered, counts])
+        )
+        return gathered
+
+    @cached_property
+    def _memory(self) -> tuple[Any, Field]:
+        """Memory of the coefficients, and as much again, as real values, for the exchange."""
+        rows, columns = self.rows.count, self.points // 2 + 1
+        size = max(rows * columns, self.points_y * self.spectral_shape[1])
+        kind = np.result_type(self.real, np.complex64)
+        room = max(size, (rows + 2 * HALO_ROWS) * columns)
+        return pyfftw.empty_aligned(size, kind), pyfftw.empty_aligned(2 * room, self.real)
+
+    @cached_property
+    def _workspace(self) -> tuple[Modes, Callable[[], None], Callable[[], None]]:
+        shape = self.spectral_shape
+        work = self._memory[0][: shape[0] * shape[1]].reshape(shape)
+        lines = self._lines()
+        real = lines.view(self.real)[:, : self.points]
+
+        def plan(flags: tuple[str, ...]) -> list[Callable[[], None]]:
+            ways = (
+                (real, lines, 1, "FFTW_FORWARD"),
+                (work, work, 0, "FFTW_FORWARD"),
+                (work, work, 0, "FFTW_BACKWARD"),
+                (lines, real, 1, "FFTW_BACKWARD"),
+            )
+            return [
+                pyfftw.FFTW(
+                    source,
+                    target,
+                    (axis,),
+                    way,
+                    flags,
+                    threads=self._threads,
+                    planning_timelimit=PLANNING[0] + PLANNING[1] * real.size,
+                ).execute
+                for source, target, axis, way in ways
+            ]
+
+        along, across, back_across, back_along = plans.planned(plan)
+
+        def forward() -> None:
+            along()
+            self._transpose(to_columns=True)
+            across()
+
+        def backward() -> None:
+            back_across()
+            self._transpose(to_columns=False)
+            back_along()
+
+        return work, forward, backward
+
+    @property
+    def padded(self) -> Field:
+        """Real values in the same memory, one or two more a row than the grid has points."""
+        self.work  # noqa: B018 - planning overwrites the memory and has to be first
+        return self._lines().view(self.real)
+
+    def _lines(self) -> Modes:
+        """Memory of coefficients as rows, transformed along x."""
+        rows, columns = self.rows.count, self.points // 2 + 1
+        lines: Modes = self._memory[0][: rows * columns].reshape(rows, columns)
+        return lines
+
+    def _transpose(self, to_columns: bool) -> None:
+        """Exchange rows of coefficients for columns, or columns for rows, in the same memory."""
+        home, lines, rows = self._memory[0], self._lines(), self.rows.count
+        spare = self._memory[1].view(home.dtype)[: lines.size]
+        blocks = [spare[rows * a : rows * b].reshape(rows, b - a) for a, b in self.spans]
+        width = self.spectral_shape[1]
+        in_lines = [spare, [block.size for block in blocks]]
+        in_columns = [home[: self.points_y * width], np.diff(self.rows.edges) * width]
+        if to_columns:
+            for (a, b), block in zip(self.spans, blocks, strict=True):
+                block[...] = lines[:, a:b]
+            self._finish(self.ranks.comm.Ialltoallv(in_lines, in_columns))
+        else:
+            self._finish(self.ranks.comm.Ialltoallv(in_columns, in_lines))
+            for (a, b), block in zip(self.spans, blocks, strict=True):
+                lines[:, a:b] = block
+
+    def _finish(self, exchange: Any) -> None:
+        self.ranks.wait(exchange, spin=LONG_SPIN_SECONDS)
+
+    def coarser(self, shape: Shape) -> Grid:
+        """A grid of fewer points on the same cell; not distributed if it is too small."""
+        if _suits(shape, self.ranks):
+            return super().coarser(shape)
+        return Grid(**_fields(self)).coarser(shape)
+
+    def cut(self, symbol: Field, target: Grid) -> Field:
+        """The values of a symbol at the wavenumbers of a coarser grid."""
+        half = target.points_y // 2
+        rows = np.concatenate([symbol[: target.points_y - half], symbol[-half:]])
+        moved: Field = self._redistributed(rows, self, target, target.points // 2 + 1)
+        return moved
+
+    def resample(self, field: Field, target: Grid) -> Field:
+        """The same trigonometric polynomial on another grid; see `Grid.resample`."""
+        return self._resampled(self, field, target)
+
+    def take(self, source: Grid, field: Field) -> Field:
+        """Resample a field of a grid that is not distributed, as the first process holds it."""
+        return self._resampled(source, field, self)
+
+    def _resampled(self, source: Grid, field: Field, target: Grid) -> Field:
+        modes, out = source.forward_into_work(field), target.work
+        shared = shared_modes(source.points_y, target.points_y)
+        columns = shared_modes(source.points, target.points)
+        if shared.halved:
+            modes[shared.positive - 1] *= 0.5
+        if columns.halved and source.ends[1]:
+            modes[:, -1] *= 0.5
+        rows = np.concatenate([modes[part] for part in shared.slices])
+        rows = self._redistributed(rows, source, target, columns.positive)
+        out[...] = 0.0
+        width, (positive, negative) = rows.shape[1], shared.slices
+        out[positive, :width] = rows[: shared.positive]
+        out[negative, :width] = rows[shared.positive :]
+        resampled = target.empty()
+        target.backward_into(resampled)
+        resampled *= 1.0 / source.size
+        return resampled
+
+    def _redistributed(self, rows: Any, source: Grid, target: Grid, kept: int) -> Any:
+        """The columns below `kept`, redistributed from the processes of one grid to another's."""
+        rank, count = self.ranks.rank, self.ranks.size
+        have = _spans(source, [(0, kept), *[(0, 0)] * (count - 1)], kept)
+        want = _spans(target, [(0, kept)] * count, kept)
+        away = [_shared(have[rank], span) for span in want]
+        come = [_shared(span, want[rank]) for span in have]
+        sent = np.concatenate([rows[:, slice(*_from(s, have[rank]))].ravel() for s in away])
+        height = len(rows)
+        got = np.empty(height * sum(b - a for a, b in come), rows.dtype)
+        outgoing = [sent, [height * (b - a) for a, b in away]]
+        incoming = [got, [height * (b - a) for a, b in come]]
+        self.ranks.wait(self.ranks.comm.Ialltoallv(outgoing, incoming))
+        first, last = want[rank]
+        gathered, at = np.empty((height, last - first), rows.dtype), 0
+        for a, b in come:
+            end = at + height * (b - a)
+            gathered[:, a - first : b - first] = got[at:end].reshape(height, b - a)
+            at = end
+        return gathered
+
+    def next_row(self, lines: Any) -> Any:
+        """The first row of the next process."""
+        rank, count = self.ranks.rank, self.ranks.size
+        gathered = np.empty_like(lines[0])
+        first = np.ascontiguousarray(lines[0])
+        comm = self.ranks.comm
+        self.ranks.wait(
+            comm.Irecv(gathered, (rank + 1) % count), comm.Isend(first, (rank - 1) % count)
+        )
+        return gathered
+
+    def collect(self, field: Field) -> Field | None:
+        """All of a field, on the first process; None on the others."""
+        gathered = np.empty(self.whole_shape, field.dtype) if leads(self.ranks) else None
+        counts = np.diff(self.rows.edges) * self.points
+        target = None if gathered is None else [gathered, counts]
+        self.ranks.wait(self.ranks.comm.Igatherv(np.ascontiguousarray(field), target))
+        return gathered
+
+    def diagonal(self, field: Field) -> Field:
+        """Values along the diagonal of the cell, of all processes."""
+        rows, columns = self.diagonal_points()
+        owner = np.searchsorted(self.rows.edges, rows, side="right") - 1
+        mine = owner == self.ranks.rank
+        order = np.argsort(owner, kind="stable")
+        own = field[rows[mine] - self.rows.start, columns[mine]]
+        values = np.empty(rows.size)
+        values[order] = self._gathered(own, np.bincount(owner, minlength=self.ranks.size))
+        return values
+
+
+def _spans(grid: Grid, whole: list[Span], kept: int) -> list[Span]:
+    """The columns below `kept` of each process; `whole` if the grid is not distributed."""
+    if not isinstance(grid, DistributedGrid):
+        return whole
+    return [(min(a, kept), min(b, kept)) for a, b in grid.spans]
+
+
+def _shared(one: Span, other: Span) -> Span:
+    first, last = max(one[0], other[0]), min(one[1], other[1])
+    return first, max(first, last)
+
+
+def _from(span: Span, start: Span) -> Span:
+    return span[0] - start[0], span[1] - start[0]

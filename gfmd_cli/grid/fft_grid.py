@@ -1,0 +1,414 @@
+"""The periodic grid: its wavenumbers, its one Fourier convention, its transforms.
+
+h(x) = sum_q h(q) exp(i q x): the forward transform carries 1/size, so that h(q = 0) is the mean.
+Coefficients are kept for non-negative wavenumbers of the last axis only (real transforms).
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+from math import prod
+from typing import Any, Literal, TypeVar
+
+import numpy as np
+import pyfftw
+
+from gfmd_cli.grid import kernels, plans
+from gfmd_cli.grid.arrays import Field, Modes
+from gfmd_cli.grid.rows import LocalRows
+
+T = TypeVar("T")
+ALL = slice(None)
+THREADED = 512  # points per side from which a second thread pays
+PLANNING = (30.0, 1e-6)  # seconds at most to look for a plan, at all and per grid point
+Span = tuple[int, int]
+Shape = tuple[int, ...]
+"""Numbers of points along the axes of a field, (y, x), or (x,) of a line."""
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Points of a periodic cell, in one dimension (line scenes) or two: any sides, any numbers."""
+
+    points: int
+    """Number of points along x."""
+    dimension: int = 2
+    length: float = 1.0
+    """Side of the cell along x [m]."""
+    threads: int = 1
+    precision: Literal["double", "single"] = "double"
+    """Of fields and transforms."""
+    points_y: int = 0
+    """Number of points along y; 0 stands for as many as along x. A line has one."""
+    length_y: float = 0.0
+    """Side along y [m]; 0 stands for the points along y times the spacing along x."""
+
+    def __post_init__(self) -> None:
+        points_y = self.points_y or self.points if self.dimension == 2 else 1
+        length_y = self.length_y or self.length * points_y / self.points
+        object.__setattr__(self, "points_y", points_y)
+        object.__setattr__(self, "length_y", length_y if self.dimension == 2 else 0.0)
+
+    @property
+    def real(self) -> "np.dtype[np.floating[Any]]":
+        """Type of the values of a field."""
+        return np.dtype(np.float64 if self.precision == "double" else np.float32)
+
+    @property
+    def whole_shape(self) -> Shape:
+        """Shape of a real field of the whole grid, indexed [y, x]."""
+        return (self.points_y, self.points)[-self.dimension :]
+
+    @property
+    def shape(self) -> Shape:
+        """Shape of the part of a real field that this process holds, here all of it."""
+        return self.whole_shape
+
+    @property
+    def sides(self) -> tuple[float, ...]:
+        """Sides of the cell [m], in the order of the shape."""
+        return (self.length_y, self.length)[-self.dimension :]
+
+    @property
+    def spacings(self) -> tuple[float, ...]:
+        """Distances between neighbouring points [m], in the order of the shape."""
+        pairs = zip(self.sides, self.whole_shape, strict=True)
+        return tuple(side / points for side, points in pairs)
+
+    @property
+    def resolution(self) -> float:
+        """Points along the side along x if they had the wider of the spacings; of squares, all."""
+        if self.dimension == 1:
+            return float(self.points)
+        return min(float(self.points), self.points_y * (self.length / self.length_y))
+
+    @property
+    def is_square(self) -> bool:
+        """Whether x and y have the same side and the same number of points."""
+        return self.points == self.points_y and self.length == self.length_y
+
+    @property
+    def area(self) -> float:
+        """Area of the cell [m^2]; of a line, its length [m]."""
+        return prod(self.sides)
+
+    @property
+    def spectral_shape(self) -> Shape:
+        """Shape of its Fourier coefficients."""
+        return (*self.shape[:-1], self.points // 2 + 1)
+
+    @property
+    def size(self) -> int:
+        """Number of grid points."""
+        return prod(self.whole_shape)
+
+    def total(self, values: T) -> T:
+        """Sum over the grid from the sum over the rows of this process."""
+        return values
+
+    def max(self, value: float) -> float:
+        """Maximum over the grid from the maximum over the rows of this process."""
+        return value
+
+    @property
+    def own(self) -> slice:
+        """The rows of the grid that a field of this process holds."""
+        return ALL
+
+    @property
+    def whole(self) -> bool:
+        """Whether this process holds all rows of the grid."""
+        return True
+
+    def empty(self) -> Field:
+        """A real field, aligned for the transforms, values undefined."""
+        array: Field = pyfftw.empty_aligned(self.shape, dtype=self.real)
+        return array
+
+    def empty_modes(self) -> Modes:
+        """Fourier coefficients, aligned for the transforms, values undefined."""
+        kind = np.result_type(self.real, np.complex64)
+        array: Modes = pyfftw.empty_aligned(self.spectral_shape, dtype=kind)
+        return array
+
+    def mode_number(self, rows: slice = ALL) -> Field:
+        """|q| L / 2 pi of every coefficient, shape `spectral_shape` (or of some of its rows).
+
+        L is the side along x, so that the numbers are whole for waves along x only.
+        """
+        along = np.arange(*self.span, dtype=np.float64)
+        if self.dimension == 1:
+            return along[rows]
+        return np.sqrt(self.mode_number_y(rows)[:, None] ** 2 + along**2)
+
+    def mode_number_y(self, rows: slice = ALL) -> Field:
+        """q_y L / 2 pi of the rows of coefficients, where L is the side along x."""
+        across = np.fft.fftfreq(self.points_y, 1 / self.points_y)[rows]
+        return np.asarray(across * (self.length / self.length_y))
+
+    def wavenumber(self, rows: slice = ALL) -> Field:
+        """|q| of every coefficient [1/m], shape `spectral_shape` (or of some of its rows)."""
+        return self.mode_number(rows) * (2 * np.pi / self.length)
+
+    def line(self, symbol: Field) -> Field:
+        """The values of a symbol along x, from q = 0 to the highest wavenumber."""
+        line: Field = symbol.reshape(-1, symbol.shape[-1])[0]
+        return line
+
+    def column(self, symbol: Field) -> Field:
+        """The values of a symbol along y, from q = 0 to the highest wavenumber."""
+        column: Field = symbol[: self.points_y // 2 + 1, 0]
+        return column
+
+    def multiplicity(self) -> Field:
+        """How often a coefficient counts in a sum over all q, a row of them."""
+        return multiplicity(self.points)[slice(*self.span)]
+
+    def gather_columns(self, values: Field) -> Field:
+        """Values over rows and the columns of `span`, of all columns."""
+        return values
+
+    @cached_property
+    def _workspace(self) -> tuple[Modes, Callable[[], None], Callable[[], None]]:
+        """Memory that every transform of this grid works in, and the two plans, in place.
+
+        In place they spare a field, and a third of the time of transforms between two arrays.
+        Array and plans come together: measuring a plan overwrites the array.
+        """
+        work = self.empty_modes()
+        real = work.view(self.real)[..., : self.points]
+
+        def plan(flags: tuple[str, ...]) -> list[Callable[[], None]]:
+            ways = ((real, work, "FFTW_FORWARD"), (work, real, "FFTW_BACKWARD"))
+            return [
+                pyfftw.FFTW(
+                    source,
+                    target,
+                    tuple(range(self.dimension)),
+                    way,
+                    flags,
+                    threads=self._threads,
+                    planning_timelimit=PLANNING[0] + PLANNING[1] * self.size,
+                ).execute
+                for source, target, way in ways
+            ]
+
+        forward, backward = plans.planned(plan)
+        return work, forward, backward
+
+    @property
+    def work(self) -> Modes:
+        """Coefficients that every transform of this grid works in."""
+        return self._workspace[0]
+
+    @property
+    def spectrum(self) -> Field:
+        """The same as pairs of real values."""
+        return self.work.view(self.real)
+
+    @property
+    def padded(self) -> Field:
+        """The same memory as real values, one or two more a row than the grid has points."""
+        return self.spectrum
+
+    def transform(self) -> None:
+        """`work` <- coefficients of the values in `padded`, without the factor 1/size."""
+        self._workspace[1]()
+
+    def transform_back(self) -> None:
+        """`padded` <- values of the coefficients in `work`, without the factor 1/size."""
+        self._workspace[2]()
+
+    def forward_into_work(self, field: Field) -> Modes:
+        """`work` <- Fourier coefficients of a field, without 1/size."""
+        self.padded[..., : self.points] = field
+        self.transform()
+        return self.work
+
+    def forward(self, field: Field) -> Modes:
+        """Fourier coefficients of a field."""
+        modes = self.empty_modes()
+        np.multiply(self.forward_into_work(field), 1.0 / self.size, out=modes)
+        return modes
+
+    def backward(self, modes: Modes) -> Field:
+        """The field of these Fourier coefficients."""
+        field = self.empty()
+        self.work[...] = modes
+        self.backward_into(field)
+        return field
+
+    def backward_into(self, field: Field) -> None:
+        """field <- the field of the coefficients in `work`, which are lost; without 1/size."""
+        self.transform_back()
+        field[...] = self.padded[..., : self.points]
+
+    def filter_padded(self, symbol: Field) -> float:
+        """`padded` <- F^-1 symbol F of the values in it: one pair of transforms, no copy.
+
+        Returns the sum over the grid of these values times what becomes of them.
+        """
+        self.transform()
+        arguments = (self.as_rows(self.spectrum), self.as_rows(symbol), 1.0 / self.size, *self.ends)
+        (total,) = self.spectral_rows.sums(1, kernels.apply_symbol, *arguments)
+        self.transform_back()
+        return float(total) / self.size
+
+    def unfilter_padded(self, symbol: Field) -> None:
+        """`padded` <- F^-1 (1 / symbol) F of the values in it, without the modes of symbol zero."""
+        self.transform()
+        arguments = (self.as_rows(self.spectrum), self.as_rows(symbol), 1.0 / self.size)
+        self.spectral_rows.run(kernels.divide_by_symbol, *arguments)
+        self.transform_back()
+
+    def operator(self, symbol: Field) -> "Operator":
+        """The linear map F^-1 symbol F."""
+        return Operator(self, symbol)
+
+    @cached_property
+    def rows(self) -> LocalRows:
+        """The rows of a field that this process holds; runs kernels over them."""
+        return LocalRows(self.points_y, self._threads)
+
+    @property
+    def spectral_rows(self) -> LocalRows:
+        """The rows of coefficients that this process holds."""
+        return self.rows
+
+    @property
+    def span(self) -> Span:
+        """First and last but one wavenumber along x of the coefficients that this process holds."""
+        return 0, self.points // 2 + 1
+
+    @property
+    def ends(self) -> tuple[bool, bool]:
+        """Whether q_x = 0 and the Nyquist wavenumber along x are among the wavenumbers of `span`.
+
+        An odd number of points has no Nyquist wavenumber.
+        """
+        first, last = self.span
+        return first == 0, self.points % 2 == 0 and last == self.points // 2 + 1
+
+    @property
+    def _threads(self) -> int:
+        """Number of threads; 1 on small grids, for which a second thread is slower."""
+        return self.threads if self.size >= THREADED**2 and self.dimension == 2 else 1
+
+    def as_rows(self, field: Field) -> Field:
+        """A field, a symbol or `padded` with two axes, in one dimension too."""
+        return field if self.dimension == 2 else field.reshape(1, -1)
+
+    def coarser(self, shape: Shape) -> "Grid":
+        """A grid of fewer points on the same cell."""
+        return replace(self, points=shape[-1], points_y=shape[0])
+
+    def cut(self, symbol: Field, target: "Grid") -> Field:
+        """The values of a symbol at the wavenumbers of a coarser grid."""
+        symbol = symbol[..., : target.points // 2 + 1]
+        if self.dimension == 1:
+            return symbol
+        half = target.points_y // 2
+        return np.concatenate([symbol[: target.points_y - half], symbol[-half:]])
+
+    def next_row(self, lines: Any) -> Any:
+        """The row of a field that follows the rows of this process."""
+        return lines[0]
+
+    def collect(self, field: Field) -> Field | None:
+        """All of a field, on the first process; None on the others."""
+        return field
+
+    def diagonal(self, field: Field) -> Field:
+        """Values along the diagonal of the cell; of a line scene, the whole line.
+
+        On an oblong grid, the points of each row or column, whichever are more, next to it.
+        """
+        return field[self.diagonal_points()] if self.dimension == 2 else field.copy()
+
+    def diagonal_points(self) -> tuple[Any, Any]:
+        """Row and column of the points along the diagonal."""
+        step = np.arange(max(self.whole_shape))
+        rows, columns = ((2 * step * n + step.size) // (2 * step.size) for n in self.whole_shape)
+        return rows % self.points_y, columns % self.points
+
+    def resample(self, field: Field, target: "Grid") -> Field:
+        """The same trigonometric polynomial on another grid of the same cell.
+
+        A finer grid interpolates; a coarser one loses what it does not resolve, its own highest
+        mode included.
+        """
+        return target.take(self, field)
+
+    def take(self, source: "Grid", field: Field) -> Field:
+        """A field of another grid, see `resample`."""
+        return source._resample(field, self)
+
+    def _resample(self, field: Field, target: "Grid") -> Field:
+        modes, out = self.forward_into_work(field), target.work
+        columns = shared_modes(self.points, target.points)
+        if columns.halved:
+            modes[..., -1] *= 0.5
+        out[...] = 0.0
+        kept = columns.positive
+        if self.dimension == 1:
+            out[:kept] = modes[:kept]
+        else:
+            rows = shared_modes(self.points_y, target.points_y)
+            if rows.halved:
+                modes[rows.positive - 1] *= 0.5
+            for part in rows.slices:
+                out[part, :kept] = modes[part, :kept]
+        resampled = target.empty()
+        target.backward_into(resampled)
+        resampled *= 1.0 / self.size
+        return resampled
+
+
+def multiplicity(points: int) -> Field:
+    """How often each q >= 0 of a real field of so many points counts in a sum over all q."""
+    count = np.full(points // 2 + 1, 2.0)
+    count[0] = 1.0
+    if points % 2 == 0:  # the highest wavenumber stands for +q and -q alike
+        count[-1] = 1.0
+    return count
+
+
+@dataclass(frozen=True)
+class SharedModes:
+    """Wavenumbers along an axis that a field keeps on a grid of another number of points."""
+
+    positive: int
+    """How many from zero on."""
+    negative: int
+    """How many below zero."""
+    halved: bool
+    """Whether the last of both is the Nyquist wavenumber, which stands for +q and -q alike."""
+
+    @property
+    def slices(self) -> tuple[slice, slice]:
+        """Their places in the order of a transform."""
+        return slice(self.positive), slice(-self.negative, None)
+
+
+def shared_modes(source: int, target: int) -> SharedModes:
+    """All modes of a grid of `source` points; if `target` is less, what is below its Nyquist."""
+    if target < source:
+        return SharedModes((target + 1) // 2, (target - 1) // 2, False)
+    return SharedModes(source // 2 + 1, source // 2, target > source and source % 2 == 0)
+
+
+@dataclass(frozen=True)
+class Operator:
+    """F^-1 symbol F on one grid: one pair of transforms a call."""
+
+    grid: Grid
+    symbol: Field
+    """Shape `grid.spectral_shape`."""
+
+    def __call__(self, field: Field, out: Field) -> Field:
+        """Apply to `field`, write to `out`, return `out`."""
+        values = self.grid.padded[..., : self.grid.points]
+        values[...] = field
+        self.grid.filter_padded(self.symbol)
+        out[...] = values
+        return out

@@ -1,0 +1,170 @@
+"""How transforms are planned: measured once and kept, or estimated, which is the same every time.
+
+What FFTW measured, its wisdom, is kept as text: of a run beside its study, so that it goes on with
+the plans that it began with, and of all runs in the user's cache. One process plans at a time and
+then tells the others: all processes of a machine compute with the same plans, and so to the same
+bits.
+"""
+
+import hashlib
+import json
+import os
+import platform
+import re
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
+from functools import cache
+from pathlib import Path
+from typing import TypeVar
+
+import pyfftw
+
+from gfmd_cli.errors import SpaceError
+from gfmd_cli.files.atomic import write_whole
+from gfmd_cli.files.cache import cache_folder
+from gfmd_cli.files.locks import locked
+from gfmd_cli.files.regular import read_regular
+
+T = TypeVar("T")
+Wisdom = list[str]
+"""Text in double and in single precision."""
+MAX_BYTES = 2**24  # of a file of wisdom
+WISDOM = re.compile(
+    r"\([\w. -]+( #x[0-9a-f]{1,8}){4}\n"
+    r"(  \(\w+ \d{1,4}( #x[0-9a-f]{1,5}){2} #x1?[0-9a-f]{1,2}( #x[0-9a-f]{1,8}){4}\)\n)*"
+    r"\)\n"
+)
+"""Text that FFTW reads; flags of more than 20, 20 and 9 bits (its planner.h) abort the process."""
+
+
+@cache
+def processor() -> str:
+    """The model name of the processor: a plan measured on one is a bad one on another."""
+    with suppress(OSError):
+        for line in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
+            if line.startswith("model name"):
+                return line.partition(":")[2].strip()
+    return platform.processor()
+
+
+def _here() -> dict[str, str]:
+    """What plans depend on."""
+    return {
+        "processor": processor(),
+        "fftw": pyfftw.fftw_version,
+        "pyfftw": pyfftw.__version__,
+    }
+
+
+_without_lock: set[Path] = set()  # folders that this process could not lock
+_folder: Path | None = None  # where wisdom is kept; None for the cache
+_always_estimated = os.environ.get("GFMD_PLANS") == "estimated"
+_estimated = _always_estimated
+
+
+def plan_with(folder: Path | None, *, estimated: bool = False) -> str | None:
+    """From now on keep wisdom in `folder`, which begins with that of the cache, or only estimate.
+
+    All that this process knew is forgotten. Says so where the folder's wisdom is damaged.
+    """
+    global _folder, _estimated
+    _folder, _estimated = folder, estimated or _always_estimated
+    pyfftw.forget_wisdom()
+    _without_lock.clear()
+    if folder is None or _estimated:
+        return None
+    with _alone(folder):
+        kept = read_wisdom(folder)
+        damaged = kept is None and _path(folder).exists()
+        if kept is None and (known := read_wisdom(cache_folder())) is not None:
+            _write(folder, known)
+    if not damaged:
+        return None
+    return f"{_path(folder)}: damaged; transforms are planned anew, last bits may differ"
+
+
+def plans() -> str:
+    """How this run plans: "estimated", or "measured" with the digest of its wisdom."""
+    known = None if _estimated else read_wisdom(_folder or cache_folder())
+    return "estimated" if _estimated else f"measured {_digest(known) if known else ''}".strip()
+
+
+def planned(plan: Callable[[tuple[str, ...]], T]) -> T:
+    """`plan` with the flags of a planner: of what is known, else measured, and kept for all."""
+    if _estimated:
+        return plan(("FFTW_ESTIMATE",))
+    with suppress(RuntimeError):  # not known
+        return plan(("FFTW_MEASURE", "FFTW_WISDOM_ONLY"))
+    folder = _folder or cache_folder()
+    with _alone(folder):
+        _take_in(read_wisdom(folder))
+        before = _export()
+        found = plan(("FFTW_MEASURE",))
+        if _export() != before:
+            _write(folder, _export())
+    if _folder is not None:
+        with _alone(cache_folder()):
+            _write(cache_folder(), _joined(read_wisdom(cache_folder()), _export()))
+    return found
+
+
+def read_wisdom(folder: Path) -> Wisdom | None:
+    """The wisdom of a folder; None where there is none of this machine that is whole."""
+    with suppress(OSError, ValueError, KeyError, TypeError, RecursionError):
+        data = json.loads(read_regular(_path(folder), MAX_BYTES))
+        double, single = data["wisdom"]
+        known = data["for"] == _here() and data["sha256"] == _digest([double, single])
+        if known and WISDOM.fullmatch(double) and WISDOM.fullmatch(single):
+            return [double, single]
+    return None
+
+
+def _path(folder: Path) -> Path:
+    key = hashlib.sha256(json.dumps(_here()).encode()).hexdigest()[:12]
+    return folder / f"wisdom-{key}.json"
+
+
+def _digest(wisdom: Wisdom) -> str:
+    return hashlib.sha256("\n".join(wisdom).encode()).hexdigest()
+
+
+def _export() -> Wisdom:
+    return [text.decode("ascii") for text in pyfftw.export_wisdom()[:2]]
+
+
+def _joined(kept: Wisdom | None, more: Wisdom) -> Wisdom:
+    """Both, the first where both know a plan: a line each, flags and problem after two words."""
+    if kept is None:
+        return more
+    joined = []
+    for old, new in zip(kept, more, strict=True):
+        known = {tuple(line.split()[2:]) for line in old.splitlines()[1:-1]}
+        added = [line for line in new.splitlines()[1:-1] if tuple(line.split()[2:]) not in known]
+        joined.append("\n".join([*old.splitlines()[:-1], *added, ")"]) + "\n")
+    return joined
+
+
+def _take_in(wisdom: Wisdom | None) -> None:
+    """Know what others measured."""
+    if wisdom is not None:
+        double, single = wisdom
+        pyfftw.import_wisdom((double.encode(), single.encode(), b""))  # third: of long double
+
+
+def _write(folder: Path, wisdom: Wisdom) -> None:
+    """Keep it; where the folder cannot be written, that costs time only."""
+    data = {"for": _here(), "sha256": _digest(wisdom), "wisdom": wisdom}
+    with suppress(SpaceError):
+        write_whole(_path(folder), json.dumps(data, indent=1).encode("ascii"))
+
+
+@contextmanager
+def _alone(folder: Path) -> Iterator[None]:
+    """Inside, no other process plans; that is not assured where the folder cannot be locked."""
+    with ExitStack() as stack:
+        if folder not in _without_lock:
+            try:
+                stack.enter_context(locked(folder / "planning"))
+            except SpaceError:  # it may have taken minutes: not again
+                _without_lock.add(folder)
+        yield

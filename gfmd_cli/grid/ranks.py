@@ -1,0 +1,180 @@
+"""The processes (ranks) of one MPI run, and how an error of one ends all of them.
+
+mpi4py is imported only if the environment variables of a launcher announce more than one process.
+"""
+
+import logging
+import os
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any, TypeVar
+
+import numpy as np
+
+from gfmd_cli.errors import INSTALL, GfmdError, InputError
+from gfmd_cli.grid.arrays import Field
+
+T = TypeVar("T")
+SIZES = ("PMI_SIZE", "OMPI_COMM_WORLD_SIZE", "MV2_COMM_WORLD_SIZE", "PMIX_SIZE")
+NUMBERS = ("PMI_RANK", "OMPI_COMM_WORLD_RANK", "MV2_COMM_WORLD_RANK", "PMIX_RANK")
+EXPECTED = (GfmdError, MemoryError, ArithmeticError, OSError)
+SPIN_SECONDS, LONG_SPIN_SECONDS = 2e-4, 2e-2  # of testing a request without sleeping
+POLL_SECONDS = 2e-5  # of sleep between two tests after that
+ERROR_POLL_SECONDS = 1e-3
+ABORT_AFTER_SECONDS = 10.0  # that a rank with an error waits for the others before it ends them all
+log = logging.getLogger(__name__)
+
+
+class Ranks:
+    """All ranks of a run; every method but `abort` is collective: all ranks must call it."""
+
+    def __init__(self, comm: Any) -> None:
+        self.comm = comm
+        self.error_comm = comm.Dup()  # for errors, so that no other message can match
+        self.rank: int = comm.Get_rank()
+        self.size: int = comm.Get_size()
+
+    def wait(self, *requests: Any, spin: float = SPIN_SECONDS) -> None:
+        """Wait for requests: test them without sleeping for `spin` seconds, then sleep in between.
+
+        Large messages progress only while they are tested. MPI's own wait never sleeps, and takes
+        shared cores from the rank that is waited for.
+        """
+        end = time.perf_counter() + spin
+        for request in requests:
+            while not request.Test():
+                if time.perf_counter() > end:
+                    time.sleep(POLL_SECONDS)
+
+    def gather(self, values: Any) -> Field:
+        """The arrays of all ranks, stacked in rank order, on every rank."""
+        own = np.array(values, order="C")
+        gathered = np.empty((self.size, *own.shape), own.dtype)
+        self.wait(self.comm.Iallgather(own, gathered))
+        return gathered
+
+    def total(self, values: Any) -> Any:
+        """Sum over the ranks, added in one order: the same bits on every rank."""
+        own = np.asarray(values)
+        if own.nbytes < 2**16:
+            return self.gather(own).sum(axis=0)
+        total = np.empty_like(own)
+        self.wait(self.comm.Ireduce(own, total))
+        self.wait(self.comm.Ibcast(total))
+        return total
+
+    def agree(self, value: T) -> T:
+        """The value of the first rank, on every rank."""
+        first: T = self.comm.bcast(value)
+        return first
+
+    def settle(self, error: BaseException | None) -> None:
+        """Raise, on all ranks, the error of the first that has one.
+
+        If other ranks do not call this in time, because they wait for data from this one, all
+        ranks are aborted.
+        """
+        if error is not None and not isinstance(error, EXPECTED):
+            log.error("rank %d: unexpected error", self.rank, exc_info=error)
+        own = np.array([_status(error)])
+        statuses = np.zeros(self.size, own.dtype)
+        request = self.error_comm.Iallgather(own, statuses)
+        deadline = time.monotonic() + ABORT_AFTER_SECONDS
+        while not request.Test():
+            if error is not None and time.monotonic() > deadline:
+                self.abort(error)
+            time.sleep(ERROR_POLL_SECONDS)
+        failed = np.flatnonzero(statuses)
+        if failed.size:
+            raise self.error_comm.bcast(_portable(error, self.rank), root=int(failed[0]))
+
+    def abort(self, error: BaseException) -> None:
+        """End all ranks, with the exit status of this error."""
+        log.critical("gfmd: rank %d: %s", self.rank, _portable(error, self.rank))
+        self.comm.Abort(_status(error))
+
+
+@contextmanager
+def together(ranks: Ranks | None) -> Iterator[None]:
+    """An error inside on one rank is raised on all; see `Ranks.settle`."""
+    if ranks is None:
+        yield
+        return
+    failed: Exception | None = None
+    try:
+        yield
+    except Exception as error:
+        failed = error
+    ranks.settle(failed)
+
+
+def agree(ranks: Ranks | None, value: T) -> T:
+    """The value of the first rank, or the value itself without ranks."""
+    return value if ranks is None else ranks.agree(value)
+
+
+def leads(ranks: Ranks | None) -> bool:
+    """Whether this process is the only one or the first rank, which prints and writes files."""
+    return ranks is None or ranks.rank == 0
+
+
+def _status(error: BaseException | None) -> int:
+    return 0 if error is None else getattr(error, "exit_status", 1)
+
+
+def _portable(error: BaseException | None, rank: int) -> BaseException | None:
+    """The error, or one that can be sent to other ranks."""
+    if error is None or isinstance(error, GfmdError | MemoryError):
+        return error
+    return GfmdError(f"rank {rank}: {type(error).__name__}: {error}")
+
+
+def announced() -> int:
+    """Number of processes that the launcher announces; 1 without a launcher."""
+    counts = [os.environ.get(name, "") for name in SIZES]
+    if any(name in os.environ for name in NUMBERS):
+        counts.append(os.environ.get("SLURM_STEP_NUM_TASKS", ""))
+    return next((int(text) for text in counts if text.isdigit()), 1)
+
+
+def is_first() -> bool:
+    """Whether this is the only process or the first rank, from the variables of the launcher."""
+    numbers = [os.environ.get(name, "0") for name in NUMBERS]
+    return announced() == 1 or all(text in ("0", "") for text in numbers)
+
+
+def launched() -> Ranks | None:
+    """The ranks of this run, None for a single process.
+
+    Raises InputError if mpi4py is missing, or was built for another MPI than the launcher.
+    """
+    if announced() == 1:
+        return None
+    try:
+        from mpi4py import MPI
+    except (ImportError, RuntimeError) as error:  # RuntimeError: no MPI library
+        raise InputError(
+            f"started as {announced()} processes, but mpi4py cannot be used ({error}): "
+            f"{INSTALL.format('mpi')}, or run one process"
+        ) from error
+    size = MPI.COMM_WORLD.Get_size()
+    if size != announced():
+        raise InputError(
+            f"started as {announced()} processes, of which mpi4py's MPI sees {size}: "
+            "launch with the mpiexec of the MPI that mpi4py was built for"
+        )
+    return Ranks(MPI.COMM_WORLD)
+
+
+def cores_and_company(ranks: Ranks, cores: set[int]) -> tuple[int, int]:
+    """Cores for this process, and how many processes of the run share this machine.
+
+    `cores` are those that this process may use; what is shared is shared out.
+    """
+    from mpi4py import MPI
+
+    node = ranks.comm.Split_type(MPI.COMM_TYPE_SHARED)
+    count, together = int(node.Get_size()), set().union(*node.allgather(cores))
+    node.Free()
+    return max(1, len(together) // count), count

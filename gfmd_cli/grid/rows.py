@@ -1,0 +1,89 @@
+"""The rows of the grid that a process holds, and how compiled kernels run over them.
+
+A kernel takes its arrays and a range of rows [a, b), and releases the interpreter lock, so that
+threads can share the rows. A kernel that computes sums writes one set of sums for each row; these
+are added in a fixed order. The results therefore do not depend on the number of threads.
+"""
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from gfmd_cli.grid.arrays import Field, Mask
+
+THREADED = 256  # smallest number of rows of a coarser level for which a second thread pays
+
+Kernel = Callable[..., None]
+
+
+class LocalRows:
+    """The rows of a field that this process holds, here all of them.
+
+    In a slab decomposition (`halo.DistributedRows`) a process holds a block of consecutive rows.
+    An array of a kernel whose stencil needs rows of other processes then has a halo, which are some
+    rows above and below the block. On one process the halo is empty.
+    """
+
+    def __init__(self, count: int, threads: int) -> None:
+        self.count = count
+        self.pool = ThreadPoolExecutor(threads) if threads > 1 else None
+        edges = np.linspace(0, count, threads + 1).astype(int)
+        self.parts = [(int(a), int(b)) for a, b in pairwise(edges) if a < b]
+
+    def run(self, kernel: Kernel, *arguments: Any, first: int = 0) -> None:
+        """Run a kernel over the rows, which begin at index `first` of its arrays."""
+        if self.pool is None or len(self.parts) == 1:
+            kernel(*arguments, first, first + self.count)
+        else:
+            parts = [(first + a, first + b) for a, b in self.parts]
+            list(self.pool.map(lambda part: kernel(*arguments, *part), parts))
+
+    def sums(self, count: int, kernel: Kernel, *arguments: Any) -> Field:
+        """Run a kernel whose last array receives `count` sums for each row; return the totals."""
+        row_sums = np.zeros((self.count, count))
+        self.run(kernel, *arguments, row_sums)
+        totals: Field = row_sums.sum(axis=0)
+        return totals
+
+    def empty_with_halo(self, *shape: int, dtype: Any) -> Any:
+        """An array with a halo; `shape` is the shape of one row."""
+        return np.empty((self.count, *shape), dtype)
+
+    def interior(self, array: Any) -> Any:
+        """The rows of an array without its halo."""
+        return array
+
+    def with_halo(self, field: Field) -> Field:
+        """A field with its halo; the values are valid until the next transform."""
+        return field
+
+    def exchange_halo(self, *arrays: Any) -> None:
+        """Fill the halos of arrays with the rows of the neighbouring processes."""
+
+    def run_with_halo(self, kernel: Kernel, *arguments: Any) -> None:
+        """Run a kernel over arrays with halos."""
+        self.run(kernel, *arguments)
+
+    def sums_with_halo(self, count: int, kernel: Kernel, *arguments: Any) -> Field:
+        """Run a kernel over arrays with halos; return the totals of its sums, see `sums`."""
+        return self.sums(count, kernel, *arguments)
+
+    def coarser(self) -> "LocalRows":
+        """The rows of the next coarser level, which has every other row."""
+        count = self.count // 2
+        return LocalRows(count, len(self.parts) if count >= THREADED else 1)
+
+    def run_from_finer(self, kernel: Kernel, fine: Any, coarse: Any) -> None:
+        """Run a kernel that computes arrays of this level from arrays of the next finer level."""
+        self.run(kernel, *fine, *coarse)
+
+    def aligned_with_finer(self, array: Any) -> Any:
+        """An array of this level such that row i lies at row 2 i of the next finer level."""
+        return array
+
+    def all_true(self, mask: Mask) -> bool:
+        """Whether a mask with a halo is true at all points of the grid."""
+        return bool(mask.all())

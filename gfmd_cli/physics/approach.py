@@ -1,0 +1,50 @@
+"""The approach of the indenter: its displacement [m] from first touch without load.
+
+Where the undeformed surface of the elastomer has a level c, far from all loads or above its base,
+the highest point of the indenter has moved by d = max h - c since it touched. For a free boundary
+u = C sigma + c. For a periodic one the mean displacement under the mean pressure p is
+<u> - c = p / k(0), with the stiffness k(0) against a uniform displacement.
+"""
+
+import numpy as np
+
+from gfmd_cli.grid.arrays import Field
+from gfmd_cli.physics.contact import Contact, Scene
+from gfmd_cli.physics.elastomers import LinearElastomer
+from gfmd_cli.physics.free_contact import FreeContact
+from gfmd_cli.physics.persson import Persson
+
+TRIED = (1e-8, 1e4, 121)  # reduced pressures of the estimate: from, to, how many
+
+
+def approach(
+    scene: Scene, elastomer: LinearElastomer, contact: Contact, u: Field, sigma: Field
+) -> float:
+    """Displacement of the indenter from first touch [m]; NaN where c does not exist."""
+    grid = scene.grid
+    if not elastomer.has_level(contact.boundary, grid.dimension):
+        return np.nan
+    if isinstance(contact, FreeContact):
+        level = contact.undeformed_level(u, sigma)
+    else:
+        assert elastomer.uniform_stiffness is not None
+        uniform = elastomer.uniform_stiffness * scene.h_std / scene.delta_sigma
+        level = grid.total(float(u.sum())) / grid.size - contact.pressure / uniform
+    return (scene.highest - level) * scene.h_std
+
+
+def estimated_pressure(scene: Scene, elastomer: LinearElastomer, displacement: float) -> float:
+    """Pressure [Pa] of a displacement [m], from the mean gap of Persson theory.
+
+    d = max h - <u> + p / k(0). Without k(0), the stiffness at q = 2 / side takes its place: for a
+    half-space p / k is then within 6 % the mean displacement of a square under uniform pressure.
+    """
+    low, high, count = TRIED
+    pressure = scene.delta_sigma * np.geomspace(low, high, count)
+    softest = np.array([2.0 / min(scene.grid.sides)])
+    uniform = elastomer.uniform_stiffness or float(
+        elastomer.stiffness(softest, scene.grid.length)[0]
+    )
+    gap = Persson(scene.shells).mean_gap(pressure)
+    depth = scene.highest * scene.h_std - gap + pressure / uniform
+    return float(np.exp(np.interp(displacement, depth, np.log(pressure))))

@@ -1,0 +1,231 @@
+"""Discretisation errors of the observables on a grid, and estimates of their continuum values.
+
+All constants were fitted to one half of the calibration set of `scripts/calibration.py` and checked
+on the other (docs/accuracy.md): elastomers of n = 0 to 4 and slabs, random and simple surfaces,
+each on up to six nested grids. Contacts of few spots and surfaces that are not isotropic or not
+band-limited are left to `irregular_error`. Symbols: x = contact line times spacing, that is contact
+switches per point; n = exponent of the stiffness k(q); w = 2 pi waves / points, the phase of the
+short waves from one point to the next (pi at most); b = curvature / points^2, the height [h_std] by
+which the surface bends from one point to the next.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import exp, hypot, isnan, log, nan, pi, sqrt
+
+import numpy as np
+
+from gfmd_cli.physics.elastomers import LinearElastomer
+from gfmd_cli.physics.error_estimates import Estimate, Level, unknown
+from gfmd_cli.physics.irregular_error import estimate_by_change
+from gfmd_cli.physics.persson import Shells
+
+# Excess of the counted area: AREA_EXCESS n x. Measured: 0.00, 0.05, 0.10, 0.15, 0.21, 0.26, 0.31,
+# 0.36 of x at n = 0, 0.5, ... 3.5 on all grids that resolve the surface. Yastrebov et al. (2017)
+# derive (pi - 1 + ln 2)/24 = 0.118 for n = 1. At n = 4 the ratio is not constant: 0.3 to 0.9.
+AREA_EXCESS = 0.104
+MAX_AREA_EXPONENT = 3.5  # n up to which that holds; beyond, the error is below x and below a_r
+
+# For n > 3.5 the excess is a multiple c of the decrease D from the coarser of two grids. Measured
+# (`scripts/plate_areas.py`, n = 3.6, 3.75 and 4): 0.4 in light contacts, of lone points, whose area
+# falls with the square of the spacing (c = 1/3), 0.75 at p* = 0.2, and 1 to 1.6 in broad contacts,
+# whose edge is a ragged line (first order: c = 1). D / x tells them apart: c = 1.78 - 1.99 D / x
+# leaves a scatter of 0.1 to 0.16. The bar is 0.6 times the root of D^2 + (0.2 x)^2.
+PLATE_EXCESS, PLATE_EXCESS_SLOPE, LONE_POINTS = 1.78, 1.99, 1 / 3
+PLATE_BAR, PLATE_FLOOR = 0.6, 0.2
+MAX_STRESS_EXPONENT = 2.5  # sigma_p converges as spacing^(3 - n): too slow for larger n
+
+# Typical errors on one grid: power laws and medians by regression; of equally good ones, those that
+# change least when long waves are added to a surface (which only reduce the contact area):
+#   a_r, once corrected:  exp(-5.56 + 0.14 n) x^0.6 w
+#   sigma_p, relative:    exp(-7.08 + 2.18 n) (x / a_r)^(3/2) w^(5/4) / (1 - a_r)^(1/2)
+#   u_g [h_std]:          exp(-6.80 + 0.62 n) (x / a_r)^(1/4) w^(3/2) (b u_g)^(1/2)
+# where the last two use n >= MIN_EXPONENT.
+# Error bars on one grid: SINGLE_GRID times that. On two grids: TWO_GRIDS times the root of the sum
+# of the squares of FLOOR times the typical error and of the change D from the coarser grid, reduced
+# by the order of convergence. The factors are such that 95.5 to 98.8 of 100 bars hold in the fitted
+# half of the set.
+SINGLE_GRID = {"a_r": 4.2, "sigma_p": 4.1, "u_g": 4.2}
+TWO_GRIDS = {"a_r": 0.4, "sigma_p": 1.4, "u_g": 2.2}
+FLOOR = {"a_r": 8.0, "sigma_p": 1.2, "u_g": 1.2}
+ORDER = 3.0  # of u_g on a rough surface; sigma_p: 3 - n, at most 2; a_r: D as it is
+MIN_EXPONENT = 0.5  # n below which bars no longer decrease: the error at n = 0 is random
+SINGLE_CONTACT = 2.5  # times the change: bar of a single indenter, from the calibration set
+SINGLE_CONTACT_AREA = 0.2  # error of a corrected a_r in x, of a single or line contact, likewise
+SINGLE_CONTACT_STRESS = 0.07  # in n sigma_p x / a_r: waves at n = 2 have up to 0.07 where D = 0
+SINGLE_CONTACT_GAP = 5.0  # in u_g / points^2: waves and paraboloids have 2.7 to 3.5 at 32 points
+MIN_SPOTS = 10.0
+"""Contact spots from which errors average out: with 6 or less 70 to 90 of 100 bars held."""
+MAX_ANISOTROPY = 2.0
+"""Largest ratio of rms slopes of a calibrated surface; isotropic maps of 32 points have up to 1.3,
+maps stretched by 3, whose bars failed, 2.6 or more."""
+HALF_OCTAVE = 0.5 * log(2)  # in ln q: step of the local exponent that the calibration used
+EXTRAPOLATED = 0.8  # bar of the extrapolated sigma_p over that of the value, n >= 1, likewise
+
+
+@dataclass(frozen=True)
+class RoughnessScales:
+    """Properties of a rough surface that determine its discretisation error."""
+
+    waves: float
+    """Number of short waves per side of the cell: L rms(grad^2 h) / rms(grad h) / 2 pi."""
+    curvature: float
+    """Reduced curvature L^2 rms(grad^2 h) / h_std."""
+    anisotropy: float = 1.0
+    """Ratio of the rms slopes along the principal axes, at least 1."""
+    band_limited: bool = True
+    """Whether the coarsest grid contains all waves of the surface."""
+
+    @property
+    def calibrated(self) -> bool:
+        """Whether the errors are those of isotropic band-limited roughness."""
+        return self.band_limited and self.anisotropy <= MAX_ANISOTROPY
+
+
+def roughness_scales(
+    shells: Shells, length: float, anisotropy: float = 1.0, *, band_limited: bool = True
+) -> RoughnessScales:
+    """Scales of a rough surface from its spectrum, for a cell of side `length` [m]."""
+    height, q2 = shells.height, np.square(shells.q * length)
+    flat, steep, bent = (float(np.sum(height * q2**power)) for power in (0, 1, 2))
+    waves, curvature = sqrt(bent / steep) / (2 * pi), sqrt(bent / flat)
+    return RoughnessScales(waves, curvature, anisotropy, band_limited)
+
+
+def local_exponent(elastomer: LinearElastomer, points: float, length: float) -> float:
+    """Exponent of k(q) at the highest wave of a grid, over one octave around pi points / L.
+
+    It is rounded to 12 digits, because the estimates change at n = 1 and the last bits of k(q)
+    must not decide on which side a half-space lies.
+    """
+    highest = np.array(pi * points / length)
+    return round(float(elastomer.local_exponent(highest, length, HALF_OCTAVE)), 12)
+
+
+def exponent_spread(elastomer: LinearElastomer, points: float, length: float) -> float:
+    """Change of the local exponent from the highest wave of a grid to one of twice the length."""
+    finer, coarser = (local_exponent(elastomer, size, length) for size in (points, points // 2))
+    return abs(finer - coarser)
+
+
+def estimate(
+    levels: Sequence[Level],
+    exponent: float,
+    rough: RoughnessScales | None = None,
+    spread: float = 0.0,
+) -> dict[str, Estimate]:
+    """Estimate errors and continuum values of `a_r`, `sigma_p` and `u_g` on the finest grid.
+
+    Parameters
+    ----------
+    levels : one contact at one pressure on grids N, N/2, ... in any order, all of which resolve the
+        surface; the two finest are used
+    exponent : local exponent of the stiffness at the highest wavenumber of the finest grid
+    rough : scales of a rough surface. None for a single indenter or a line contact: errors of many
+        patches then do not average out, and one grid gives no error of sigma_p and u_g
+    spread : change of the local exponent over one octave, see `exponent_spread`
+    """
+    ordered = sorted(levels, key=lambda level: level.points)
+    fine, coarse = ordered[-1], ordered[-2] if len(ordered) > 1 else None
+    if fine.a_r == 1:
+        return {
+            "a_r": Estimate(0.0, 1.0, 0.0, "exact"),
+            "sigma_p": Estimate(0.0, fine.sigma_p, 0.0, "exact"),
+            "u_g": Estimate(0.0, 0.0, 0.0, "exact"),
+        }
+    if fine.a_r == 0:  # no contact
+        return unknown()
+    n, phase, bend = max(exponent, 0.0), nan, nan
+    if rough is not None:
+        if fine.spots < MIN_SPOTS or not rough.calibrated:
+            return estimate_by_change(fine, coarse, n)
+        phase, bend = 2 * pi * rough.waves / fine.points, rough.curvature / fine.points**2
+    return {
+        "a_r": _area(fine, coarse, n, phase, spread),
+        "sigma_p": _stress(fine, coarse, n, phase),
+        "u_g": _gap(fine, coarse, n, phase, bend),
+    }
+
+
+def _bar(name: str, typical: float, change: float) -> float:
+    """Error bar from the typical error on this grid and the change from a coarser grid, if any."""
+    if isnan(change):
+        return SINGLE_GRID[name] * typical
+    if isnan(typical):
+        return SINGLE_CONTACT * abs(change)
+    return TWO_GRIDS[name] * hypot(change, FLOOR[name] * typical)
+
+
+def _area(fine: Level, coarse: Level | None, n: float, phase: float, spread: float) -> Estimate:
+    """Relative contact area: the error is of first order in the spacing, as AREA_EXCESS n x.
+
+    Where the exponent n is not that of all short waves, the excess is uncertain by its change.
+    """
+    if n > MAX_AREA_EXPONENT:
+        return _plate_area(fine, coarse, rough=not isnan(phase))
+    best = max(0.0, fine.a_r - AREA_EXCESS * n * fine.line)
+    change = nan
+    if coarse is not None:
+        change = best - max(0.0, coarse.a_r - AREA_EXCESS * n * coarse.line)
+    typical = SINGLE_CONTACT_AREA * fine.line
+    if not isnan(phase):
+        typical = exp(-5.56 + 0.14 * n) * fine.line**0.6 * phase
+    error = hypot(_bar("a_r", typical, change), AREA_EXCESS * spread * fine.line)
+    error = min(error, max(best, 1 - best))
+    whole = min(fine.a_r - best + error, max(fine.a_r, 1 - fine.a_r))
+    return Estimate(whole, best, error, "regular")
+
+
+def _plate_area(fine: Level, coarse: Level | None, *, rough: bool) -> Estimate:
+    """Relative contact area of a plate: on a grid the line force at its edge is a row of points."""
+    if not rough:
+        return Estimate(min(fine.a_r, fine.line), nan, nan, "bound")
+    if coarse is None:
+        return Estimate(nan, nan, nan, "unknown")
+    step = coarse.a_r - fine.a_r
+    share = PLATE_EXCESS - PLATE_EXCESS_SLOPE * step / fine.line
+    best = min(1.0, max(0.0, fine.a_r - min(max(share, LONE_POINTS), PLATE_EXCESS) * step))
+    error = min(PLATE_BAR * hypot(step, PLATE_FLOOR * fine.line), max(best, 1 - best))
+    whole = min(abs(fine.a_r - best) + error, max(fine.a_r, 1 - fine.a_r))
+    return Estimate(whole, best, error, "regular")
+
+
+def _stress(fine: Level, coarse: Level | None, n: float, phase: float) -> Estimate:
+    """Stress deviation: at the edge of a patch the stress is as (1 - r^2/a^2)^(1 - n/2)."""
+    value = fine.sigma_p
+    if n > MAX_STRESS_EXPONENT:
+        return Estimate(nan, nan, nan, "diverges" if n >= 3 else "slow")
+    patch = fine.line / fine.a_r
+    typical = exp(-7.08 + 2.18 * max(n, MIN_EXPONENT)) * patch**1.5 * phase**1.25 * value
+    typical /= sqrt(1 - fine.a_r)
+    if coarse is None:
+        error = _bar("sigma_p", typical, nan)
+        return Estimate(error, nan if isnan(error) else value, error, _known(error))
+    single = isnan(phase)
+    rest = (value - coarse.sigma_p) / (2 ** min(1.0 if single else 2.0, 3 - n) - 1)
+    error = _bar("sigma_p", typical, rest)
+    if single:
+        error = hypot(error, SINGLE_CONTACT_STRESS * n * value * patch)
+    if n < 1 or single:
+        return Estimate(error, value, error, "regular")
+    return Estimate(error, max(0.0, value + rest), EXTRAPOLATED * error, "regular")
+
+
+def _gap(fine: Level, coarse: Level | None, n: float, phase: float, bend: float) -> Estimate:
+    """Mean gap: the error is small and of either sign, so the value is not extrapolated."""
+    value = fine.u_g
+    patch = fine.line / fine.a_r
+    typical = (
+        exp(-6.8 + 0.62 * max(n, MIN_EXPONENT)) * patch**0.25 * phase**1.5 * sqrt(bend * value)
+    )
+    order = 2.0 if isnan(phase) else ORDER
+    change = nan if coarse is None else (value - coarse.u_g) / (2**order - 1)
+    error = _bar("u_g", typical, change)
+    if isnan(phase) and coarse is not None:
+        error = max(error, SINGLE_CONTACT_GAP * value / fine.points**2)
+    return Estimate(error, nan if isnan(error) else value, error, _known(error))
+
+
+def _known(error: float) -> str:
+    """Verdict on a quantity whose error is this, or unknown if NaN."""
+    return "unknown" if isnan(error) else "regular"

@@ -1,0 +1,107 @@
+"""The Einstein solid (n = 0) on a surface with Gaussian heights, in closed form.
+
+Equation numbers are those of the paper: Mueser, "Elastic contacts of randomly rough surfaces across
+the spatial dimensions", Sect. 4.2. Every function but the first takes z = h_nc / h_std, the height
+of the non-contact zone above the mean height of the indenter, of any shape. Lengths are returned in
+units of h_std, stresses in k_0 h_std (which is Delta_sigma), energies per area in k_0 h_std^2.
+"""
+
+import numpy as np
+from scipy.special import erfc, erfcx, ndtr
+
+from gfmd_cli.grid.arrays import Field
+from gfmd_cli.physics.persson import ierfc
+
+_NEWTON_STEPS = 50  # a bound; at most 6 are taken for pressures from 1e-300 to 1e300
+_LAST_STEP = 1e-8  # relative; the error left behind it is of the order of its square
+_FAR = 3.0  # x from which the continued fraction is used; terms of the closed form cancel as x^4
+_LEVELS = 40  # of the continued fraction: all digits for x >= _FAR
+_UNDERFLOW = 40.0  # exp(-x^2) is zero in double precision well before this x
+
+
+def non_contact_height(p_star: Field | float) -> Field:
+    """Height z = h_nc / h_std of the non-contact zone at reduced pressure p / (k_0 h_std).
+
+    Paper Eq. (38), corrected: p = k_0 <u(h_nc)>, solved for h_nc by Newton steps on ln <u>. This is
+    concave in z, so the steps rise to the root from any start below it. Minus infinity at p = 0.
+
+    Raises ValueError for a negative pressure.
+    """
+    target = np.asarray(p_star, dtype=np.float64)
+    if np.any(target < 0):
+        raise ValueError(f"the pressure must not be negative, got {target.min()}")
+    p = np.where(target > 0, target, 1.0)
+    z: Field = np.where(p < 1, -np.sqrt(-2 * np.log(np.minimum(p, 1.0))), p)
+    for _ in range(_NEWTON_STEPS):
+        reached = pressure(z)
+        step = np.log(p / reached) * reached / contact_area(z)
+        z += step
+        if np.all(np.abs(step) < _LAST_STEP * (1 + np.abs(z))):
+            break
+    return np.where(target > 0, z, -np.inf)
+
+
+def contact_area(z: Field | float) -> Field:
+    """Relative contact area a_r = [1 + erf(z / sqrt 2)] / 2. Paper Eq. (36a)."""
+    area: Field = ndtr(np.asarray(z))
+    return area
+
+
+def pressure(z: Field | float) -> Field:
+    """Pressure p / (k_0 h_std) = <u> / h_std. Paper Eqs. (36b) and (38), corrected: p = k_0 <u>."""
+    displacement: Field = ierfc(-np.asarray(z) / np.sqrt(2)) / np.sqrt(2)
+    return displacement
+
+
+def mean_gap(z: Field | float) -> Field:
+    """Mean gap u_g(h_nc) / h_std = <u(-h_nc)> / h_std. Paper Eq. (37)."""
+    return pressure(-np.asarray(z))
+
+
+def stress_deviation(z: Field | float) -> Field:
+    """Standard deviation of the stress sigma_p / (k_0 h_std) = sqrt(<u^2> - <u>^2) / h_std."""
+    deviation: Field = np.sqrt(2 * elastic_energy(z))
+    return deviation
+
+
+def elastic_energy(z: Field | float) -> Field:
+    """Elastic energy v = k_0 (<u^2> - <u>^2) / 2, without q = 0: the one with dv = -p du_g.
+
+    Paper Eqs. (36b) and (36c). For z > 0 the variance is written in small terms,
+    a + z phi (1 - 2a) + z^2 a (1 - a) - phi^2 with phi the normal density and a = a_r.
+    """
+    z = np.asarray(z, dtype=np.float64)
+    above = np.clip(z, 0.0, _UNDERFLOW)
+    a, rest, phi = ndtr(above), ndtr(-above), np.exp(-0.5 * above**2) / np.sqrt(2 * np.pi)
+    pressed = a + above * phi * (rest - a) + above**2 * a * rest - phi**2
+    below = np.minimum(z, 0.0)
+    light = 2 * elastic_energy_with_mean(below) - pressure(below) ** 2
+    energy: Field = 0.5 * np.where(z > 0, pressed, light)
+    return energy
+
+
+def elastic_energy_with_mean(z: Field | float) -> Field:
+    """Elastic energy v = k_0 <u^2> / 2 including the uniform displacement q = 0: dv = p dh_nc.
+
+    Paper Eq. (36c).
+    """
+    x = -np.asarray(z, dtype=np.float64) / np.sqrt(2)
+    near, far = np.minimum(x, _FAR), np.clip(x, _FAR, _UNDERFLOW)
+    bounded = np.maximum(near, -_UNDERFLOW)
+    closed = (0.5 + near**2) * erfc(near) - bounded * np.exp(-(bounded**2)) / np.sqrt(np.pi)
+    energy: Field = 0.5 * np.where(x > _FAR, 2 * _i2erfc(far), closed)
+    return energy
+
+
+def _i2erfc(x: Field) -> Field:
+    """Integral of ierfc from x >= _FAR to infinity, without cancellation.
+
+    The recurrence 2m i^m erfc = i^(m-2) erfc - 2x i^(m-1) erfc makes the ratio of neighbours
+    r_m = i^m erfc / i^(m-1) erfc the continued fraction r_m = 1 / (2x + 2(m+1) r_(m+1)).
+    """
+    ratio = np.zeros_like(x)
+    for level in range(_LEVELS, 1, -1):
+        ratio = 1 / (2 * x + 2 * (level + 1) * ratio)
+    first = 1 / (2 * x + 4 * ratio)
+    value: Field = ratio * first * erfcx(x) * np.exp(-x * x)
+    return value

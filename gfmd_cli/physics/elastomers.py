@@ -1,0 +1,415 @@
+"""Elastomers: the stiffness k(q), the stress per displacement at wavenumber q.
+
+Each class is one `kind` of [elastomer] in the run spec. The elastic energy per area is
+sum_q k(q) |u(q)|^2 / 2, paper Eq. (1). Sums exclude q = 0, where k is zero for every
+elastomer (load control). Equation numbers are those of Mueser, "Elastic contacts of randomly rough
+surfaces across the spatial dimensions".
+"""
+
+import warnings
+from typing import Annotated, Literal, Self
+
+import numpy as np
+from pydantic import Field as Key
+from pydantic import model_validator
+
+from gfmd_cli.choice import Choice, FilePath, Positive
+from gfmd_cli.errors import InputError
+from gfmd_cli.grid.arrays import Field
+from gfmd_cli.physics import free_compliance
+from gfmd_cli.physics.free_compliance import Shape, Spacings
+from gfmd_cli.physics.persson import gamma_n, gamma_slab, monotone_cubic
+
+MAX_TABLE = 2**20  # bytes of a tabulated stiffness; a choice, some 40000 rows
+STEP = 1e-3  # of ln q: the truncation error is of order 1e-7, the rounding error 1e-13
+
+
+class LinearElastomer(Choice):
+    """Interface of all elastomers.
+
+    A subclass implements `stiffness`, and overrides the defaults that do not hold for it.
+    Wavenumbers q are arrays [1/m]; `length` is the side of the cell L [m], which scales the
+    thickness of a slab.
+    """
+
+    kind: str
+
+    def stiffness(self, q: Field, length: float = 1.0) -> Field:
+        """k(q) [Pa/m], zero at q = 0."""
+        raise NotImplementedError
+
+    def free_compliance(self, shape: Shape, spacings: Spacings) -> Field:
+        """Displacements [m/Pa] of an elastomer without borders, due to unit pressure on one pixel.
+
+        `spacings` are the sides of a pixel [m], in the order (y, x). The result of this shape is
+        indexed by the distance of the two pixels in points. See `free_compliance`.
+
+        Raises InputError where the displacement does not decay with the distance.
+        """
+        self.check_free_boundary(len(shape))
+        raise NotImplementedError
+
+    def decays(self, dimension: int) -> bool:
+        """Whether the displacement decays with the distance from the load."""
+        return False
+
+    def check_free_boundary(self, dimension: int) -> None:
+        """Raise InputError for an elastomer that a free boundary does not suit."""
+        if not self.decays(dimension):
+            raise InputError(
+                f'grid.boundary: "free" needs an elastomer whose displacement decays with the '
+                f"distance from the load; {self.label} in {dimension} "
+                f'dimension{"s"[: dimension - 1]} has none: use "periodic"'
+            )
+
+    @property
+    def uniform_stiffness(self) -> float | None:
+        """Limit of k(q) for q -> 0 [Pa/m], where it is finite and not zero, else None.
+
+        It determines the mean displacement, which the solution under a given load does not need.
+        """
+        return None
+
+    def has_level(self, boundary: str, dimension: int) -> bool:
+        """Whether displacements count from the level of the undeformed surface.
+
+        With a free boundary that is the level far from all loads, which does not exist under a line
+        load on a half-space (n = 1, a logarithm); with a periodic one it exists for an elastomer on
+        a base, which has a finite stiffness k(0).
+        """
+        if boundary == "free":
+            is_logarithm = dimension == 1 and self.exponent == 1
+            return self.decays(dimension) and not is_logarithm
+        return self.uniform_stiffness is not None
+
+    def check_displacement_load(self, boundary: str, dimension: int) -> None:
+        """Raise InputError where a displacement from first touch is not defined."""
+        if not self.has_level(boundary, dimension):
+            remedy = "" if boundary == "free" else "a free boundary or "
+            raise InputError(
+                f'load.displacement: {self.label} with grid.boundary = "{boundary}" in '
+                f"{dimension} dimension{'s'[: dimension - 1]} has no level of the undeformed "
+                f"surface to count from; it needs {remedy}an elastomer of finite k(0) "
+                "(layer, n = 0): use load.mean_gap"
+            )
+
+    def unit_stiffness(self, q: Field, length: float = 1.0) -> Field:
+        """k(q) [Pa/m] of the elastomer whose Delta_sigma is the unit of pressure."""
+        return self.stiffness(q, length)
+
+    @property
+    def modulus(self) -> float:
+        """Elastic modulus [Pa], 0 where the elastomer has none."""
+        return float(dict(self).get("E_star", 0.0))
+
+    @property
+    def exponent(self) -> float | None:
+        """Exponent n where the stiffness is a power law k = k_n q^n, else None."""
+        return None
+
+    def local_exponent(self, q: Field, length: float = 1.0, step: float = STEP) -> Field:
+        """n(q) = d ln k / d ln q, by central differences over +-step; zero where k is zero."""
+        above, below = (self.stiffness(q * np.exp(shift), length) for shift in (step, -step))
+        safe = (above > 0) & (below > 0)
+        ratio = np.where(safe, above, 1.0) / np.where(safe, below, 1.0)
+        return np.asarray(np.log(ratio) / (2 * step))
+
+    def gamma(self, q: Field, length: float = 1.0) -> Field:
+        """Weight of the elastic energy in Persson theory: paper Eq. (39) at the exponent n(q)."""
+        if self.exponent is not None:
+            return np.full_like(q, gamma_n(self.exponent))
+        return gamma_n(np.clip(self.local_exponent(q, length), 0.0, 4.0))
+
+
+class Power(LinearElastomer):
+    """Elastomer of stiffness k = k_n q^n. Paper Eq. (1)."""
+
+    kind: Literal["power"] = "power"
+    n: Annotated[float, Key(ge=0, le=4)]
+    """Exponent of the stiffness, 0 to 4."""
+    k_n: Positive = 1.0
+    """Prefactor of the stiffness [Pa m^(n-1)]."""
+
+    @property
+    def exponent(self) -> float:
+        """Exponent n of the stiffness."""
+        return self.n
+
+    def stiffness(self, q: Field, length: float = 1.0) -> Field:
+        """k(q) [Pa/m], zero at q = 0 for every n, including n = 0."""
+        return self.k_n * np.where(q > 0, np.power(np.where(q > 0, q, 1.0), self.n), 0.0)
+
+    @property
+    def uniform_stiffness(self) -> float | None:
+        """k_0 of springs, n = 0."""
+        return self.k_n if self.n == 0 else None
+
+    def decays(self, dimension: int) -> bool:
+        """For n < 2; in one dimension for n <= 1, the logarithm included."""
+        return self.n < 2 if dimension == 2 else self.n <= 1
+
+    def free_compliance(self, shape: Shape, spacings: Spacings) -> Field:
+        """Displacements [m/Pa] by the Riesz kernel, for n < 2; in one dimension for n <= 1."""
+        return _free_power_law(self, self.n, self.k_n, shape, spacings)
+
+
+class HalfSpace(LinearElastomer):
+    """Semi-infinite solid, k = E* q / 2. Paper Eq. (2), n = 1."""
+
+    kind: Literal["half-space"] = "half-space"
+    E_star: Positive = 1.0
+    """Contact modulus [Pa]."""
+
+    @property
+    def exponent(self) -> float:
+        """Exponent n = 1 of the stiffness."""
+        return 1.0
+
+    def stiffness(self, q: Field, length: float = 1.0) -> Field:
+        """k(q) [Pa/m]."""
+        return 0.5 * self.E_star * q
+
+    def decays(self, dimension: int) -> bool:
+        """Yes; in one dimension as a logarithm, up to a level of reference."""
+        return True
+
+    def free_compliance(self, shape: Shape, spacings: Spacings) -> Field:
+        """Displacements [m/Pa] by the Boussinesq kernel; of a line load, by its logarithm."""
+        return _free_power_law(self, 1.0, 0.5 * self.E_star, shape, spacings)
+
+
+class Membrane(LinearElastomer):
+    """Membrane under equibiaxial tension, k = tension q^2. Paper Eq. (2), n = 2."""
+
+    kind: Literal["membrane"] = "membrane"
+    tension: Positive = 1.0
+    """Tension [N/m]."""
+
+    @property
+    def exponent(self) -> float:
+        """Exponent n = 2 of the stiffness."""
+        return 2.0
+
+    def stiffness(self, q: Field, length: float = 1.0) -> Field:
+        """k(q) [Pa/m]."""
+        return self.tension * q**2
+
+
+class Plate(LinearElastomer):
+    """Thin plate, free to bend, k = E* t^3 q^4 / 12. Paper Eq. (2), n = 4."""
+
+    kind: Literal["plate"] = "plate"
+    E_star: Positive = 1.0
+    """Contact modulus [Pa]."""
+    thickness: Positive
+    """Thickness [m]."""
+
+    @property
+    def exponent(self) -> float:
+        """n = 4."""
+        return 4.0
+
+    def stiffness(self, q: Field, length: float = 1.0) -> Field:
+        """k(q) [Pa/m]."""
+        return self.E_star / 12 * (self.thickness * q) ** 3 * q
+
+
+class Slab(LinearElastomer):
+    """Layer of finite thickness t with constant stress on its back, k = E* q S(q t) / 2.
+
+    Paper Eq. (41): a thin plate for q t << 1, a half-space for q t >> 1. The thickness is a share
+    of the side of the cell. The unit of pressure is that of the half-space.
+    """
+
+    kind: Literal["slab"] = "slab"
+    thickness: Positive
+    """Thickness t / L."""
+    E_star: Positive = 1.0
+    """Contact modulus [Pa]."""
+
+    def stiffness(self, q: Field, length: float = 1.0) -> Field:
+        """k(q) [Pa/m]."""
+        return 0.5 * self.E_star * q * slab_factor(q * self.thickness * length)
+
+    def unit_stiffness(self, q: Field, length: float = 1.0) -> Field:
+        """k(q) [Pa/m] of the half-space with the same contact modulus."""
+        return 0.5 * self.E_star * q
+
+    def gamma(self, q: Field, length: float = 1.0) -> Field:
+        """Weight of the elastic energy in Persson theory. Paper Eq. (42)."""
+        return gamma_slab(q * self.thickness * length)
+
+
+class Layer(LinearElastomer):
+    """Elastic layer of finite thickness t on a rigid base, k = E* q / (2 c(q t)).
+
+    A half-space for q t >> 1; k is finite for q -> 0.
+    """
+
+    kind: Literal["layer"] = "layer"
+    thickness: Positive
+    """Thickness [m]."""
+    E_star: Positive = 1.0
+    """Contact modulus [Pa]."""
+    poisson: Annotated[float, Key(gt=-1, lt=0.5)] | None = None
+    """Poisson's ratio of a bonded layer; a sliding one depends on E_star alone."""
+    base: Literal["bonded", "sliding"] = "bonded"
+    """Whether the layer is bonded to the rigid base or slides on it without friction."""
+
+    @model_validator(mode="after")
+    def _has_poisson(self) -> Self:
+        if self.base == "bonded" and self.poisson is None:
+            raise ValueError('base = "bonded" needs poisson, Poisson\'s ratio')
+        return self
+
+    def stiffness(self, q: Field, length: float = 1.0) -> Field:
+        """k(q) [Pa/m], zero at q = 0."""
+        t = np.where(q > 0, q, 1.0) * self.thickness
+        return np.where(q > 0, 0.5 * self.E_star * q / self.softening(t), 0.0)
+
+    def softening(self, t: Field) -> Field:
+        """Compliance relative to the half-space, c(q t): zero for q t = 0, one for q t >> 1."""
+        return layer_softening(t, self.poisson if self.base == "bonded" else None)
+
+    @property
+    def uniform_stiffness(self) -> float:
+        """E* / t of a sliding layer, E (1 - nu) / (1 + nu) (1 - 2 nu) t of a bonded one [Pa/m]."""
+        if self.base == "sliding" or self.poisson is None:
+            return self.E_star / self.thickness
+        nu = self.poisson
+        return self.E_star * (1 - nu) ** 2 / ((1 - 2 * nu) * self.thickness)
+
+    def decays(self, dimension: int) -> bool:
+        """Exponentially."""
+        return True
+
+    def free_compliance(self, shape: Shape, spacings: Spacings) -> Field:
+        """Displacements [m/Pa] by the kernel of the half-space and a smooth rest."""
+        body = self.softening, self.thickness
+        try:
+            if len(shape) == 1:
+                kernel = free_compliance.layer_line(*body, *shape, *spacings)
+            else:
+                kernel = free_compliance.layer(*body, shape, spacings)
+        except ValueError as error:
+            raise InputError(f"elastomer.thickness, grid.points: {error}") from error
+        return kernel * (2 / self.E_star)
+
+
+class Tabulated(LinearElastomer):
+    """Elastomer with a tabulated stiffness, interpolated by a monotone cubic in ln k over ln q.
+
+    Beyond each end of the table, k is the power law through the two outermost rows.
+    """
+
+    kind: Literal["table"] = "table"
+    path: FilePath
+    """Text file with two columns, q [1/m] and k [Pa/m], both positive, q increasing."""
+
+    def stiffness(self, q: Field, length: float = 1.0) -> Field:
+        """k(q) [Pa/m]. Raises InputError for an invalid table."""
+        x, y = np.log(self._table()).T
+        log_q = np.log(np.where(q > 0, q, 1.0))
+        inside = monotone_cubic(x, y)(np.clip(log_q, x[0], x[-1]))
+        low, high = (y[1] - y[0]) / (x[1] - x[0]), (y[-1] - y[-2]) / (x[-1] - x[-2])
+        beyond = low * np.minimum(log_q - x[0], 0.0) + high * np.maximum(log_q - x[-1], 0.0)
+        return np.where(q > 0, np.exp(inside + beyond), 0.0)
+
+    def check_free_boundary(self, dimension: int) -> None:
+        """Raise InputError: a table has no compliance kernel in closed form."""
+        raise InputError(
+            'grid.boundary: "free" is not available for a tabulated k(q), which has no compliance '
+            'kernel in closed form: use "periodic"'
+        )
+
+    @property
+    def uniform_stiffness(self) -> float | None:
+        """k of the first rows of the table [Pa/m] if it is constant there, else None."""
+        first, second = self._table()[:2, 1]
+        return float(first) if first == second else None
+
+    def _table(self) -> Field:
+        """The columns q and k, shape (rows, 2). Raises InputError for an invalid table."""
+        try:
+            if not self.path.is_file() or self.path.stat().st_size > MAX_TABLE:
+                raise ValueError(f"no regular file of at most {MAX_TABLE} bytes")
+            with warnings.catch_warnings():
+                warnings.simplefilter(
+                    "ignore", UserWarning
+                )  # about an empty file, which is refused below
+                table = np.loadtxt(self.path, ndmin=2)
+        except (OSError, ValueError) as error:
+            raise InputError(f"{self.path}: elastomer.path: cannot be read: {error}") from error
+        if table.shape[0] < 2 or table.shape[1] != 2:
+            raise InputError(
+                f"{self.path}: elastomer.path: {table.shape[0]} rows, {table.shape[1]} columns; "
+                "at least two rows of two columns, q and k, are needed"
+            )
+        if not (
+            np.all(np.isfinite(table)) and np.all(table > 0) and np.all(np.diff(table[:, 0]) > 0)
+        ):
+            raise InputError(
+                f"{self.path}: elastomer.path: q and k must be finite and positive; q must increase"
+            )
+        return table
+
+
+Elastomer = Annotated[
+    Power | HalfSpace | Membrane | Plate | Slab | Layer | Tabulated,
+    Key(discriminator="kind"),
+]
+
+
+def _free_power_law(
+    elastomer: LinearElastomer, n: float, k_n: float, shape: Shape, spacings: Spacings
+) -> Field:
+    """Displacements [m/Pa] for k = k_n q^n. Raises InputError where they do not decay."""
+    elastomer.check_free_boundary(len(shape))
+    if len(shape) == 2:
+        return free_compliance.power_law(n, shape, spacings) / k_n
+    if n == 1:
+        return free_compliance.logarithmic_line(*shape, *spacings) / k_n
+    return free_compliance.power_law_line(n, *shape, *spacings) / k_n
+
+
+def layer_softening(t: Field, poisson: float | None) -> Field:
+    """Compliance c(t) of a layer on a rigid base relative to the half-space, at t = q thickness.
+
+    Sliding (`poisson` None): c = (cosh 2t - 1) / (sinh 2t + 2t), half of a layer of twice the
+    thickness that is loaded from both sides. Bonded, with kappa = 3 - 4 nu (Johnson, Contact
+    Mechanics, 1985, Sect. 5.8):
+
+        c = (kappa sinh 2t - 2t) / [kappa cosh 2t + 2t^2 + (1 + kappa^2) / 2].
+
+    Both are evaluated with exp(-2t), so that nothing overflows.
+    """
+    decay = np.exp(-2 * t)
+    if poisson is None:
+        return np.asarray(np.expm1(-2 * t) ** 2 / (4 * t * decay - np.expm1(-4 * t)))
+    kappa = 3 - 4 * poisson
+    above = -kappa * np.expm1(-4 * t) - 4 * t * decay
+    return np.asarray(above / (kappa * (1 + decay**2) + (4 * t**2 + 1 + kappa**2) * decay))
+
+
+def slab_factor(t: Field) -> Field:
+    """S(t) = (cosh 2t - 2t^2 - 1) / (sinh 2t + 2t) for t >= 0, accurate to a few roundings.
+
+    Paper Eq. (41), which as printed cancels at small t and overflows at t = 355. Here
+    S = (sinh t - t)(sinh t + t) / (sinh t cosh t + t), with the series of sinh t - t below t = 1,
+    and S = 1 - (4 t^2 + 4 t + 2) exp(-2 t) above t = 20, where the next term is below rounding.
+    """
+    t = np.asarray(t, dtype=np.float64)
+    thin, thick = t < 1, t > 20
+    middle = np.clip(t, 1e-300, 20.0)
+    sinh, cosh = np.sinh(middle), np.cosh(middle)
+    square = np.where(thin, t, 0.0) ** 2
+    tail = np.ones_like(square)  # sinh t - t = t^3/6 (1 + t^2/20 (1 + t^2/42 (...)))
+    for divisor in (272.0, 210.0, 156.0, 110.0, 72.0, 42.0, 20.0):  # 17*16, 15*14, ..., 5*4
+        tail = 1.0 + square / divisor * tail
+    difference = np.where(thin, square * np.where(thin, t, 0.0) / 6 * tail, sinh - middle)
+    factor = difference * (
+        (sinh + middle) / (sinh * cosh + middle)
+    )  # in this order, because t^4 would underflow
+    large = np.clip(t, 20.0, 400.0)
+    bulk = 1.0 - (4 * large**2 + 4 * large + 2) * np.exp(-2 * large)
+    return np.where(thick, bulk, factor)

@@ -1,0 +1,344 @@
+"""Height maps and line profiles from files as surfaces: reading, preparation, heights on grids."""
+
+from functools import lru_cache
+from pathlib import Path
+from typing import Annotated, Any, ClassVar, Literal, Self
+
+import numpy as np
+from pydantic import Field as Key
+
+from gfmd_cli.choice import FilePath, Positive
+from gfmd_cli.errors import InputError
+from gfmd_cli.grid.arrays import Field, Mask
+from gfmd_cli.grid.fft_grid import Grid
+from gfmd_cli.physics.height_map import extent
+from gfmd_cli.physics.indenters import SMALLEST_GRID, RigidSurface
+from gfmd_cli.physics.interpolation import Interpolation, monotone, nearest, suited_interpolation
+from gfmd_cli.physics.map_preparation import (
+    Edges,
+    Levelling,
+    fill_missing,
+    level,
+    make_periodic,
+    mirror,
+    window,
+)
+from gfmd_cli.physics.map_remarks import map_remarks
+from gfmd_cli.physics.pictures import Picture, picture
+from gfmd_cli.physics.topography import Region, Topography, read_topography, square_part
+
+
+class FileSurface(RigidSurface):
+    """Height map from a .npy, HDF5, netCDF or microscope file (SurfaceTopography).
+
+    A `.npy` or HDF5 array is used as it is, as a periodic map. A scan is not periodic: it is
+    levelled, and it ends at its borders, or it is mirrored. The keys `periodic`, `level` and
+    `edges` override this.
+    """
+
+    rough: ClassVar[bool] = True
+    is_map: ClassVar[bool] = True
+    kind: Literal["file"] = "file"
+    path: FilePath
+    """Path of the file, relative to the run spec."""
+    dataset: str | None = None
+    """HDF5 dataset or microscope channel; by default the only map, or the default channel."""
+    region: Region | None = None
+    """Part of the map to use, such as { x = [10, 110], y = [0, 90] } in pixels, or with
+    unit = "m" in metres; by default all of it."""
+    flip: bool = False
+    """Whether to turn the heights upside down, as for the replica of a surface."""
+    crop: bool = False
+    """Whether to cut the largest square of an even number of points out of the middle."""
+    missing: Literal["fill", "void", "refuse"] = "fill"
+    """Treatment of missing heights: "fill" them in by the solution of the Laplace equation; "void"
+    does the same for spectrum and mean gap, but these points never touch; or "refuse" the map."""
+    periodic: bool | None = None
+    """Whether the map is periodic; by default true for arrays, false for scans."""
+    level: Levelling | None = None
+    """Trend to subtract first: "none", "mean", "plane" or "curvature"; by default "none" for a
+    periodic map, else "plane"."""
+    edges: Edges | None = None
+    """How to make the map periodic: "window" tapers the heights near the border to their mean,
+    "mirror" doubles the cell by reflection, "none" does nothing. By default "none" for a periodic
+    map. Any other map has grid.boundary = "free" by default, and is mirrored where this is not
+    available."""
+    taper: Annotated[float, Key(gt=0, le=0.5)] = 0.1
+    """Width of the tapered zone of the window at each edge, as a share of the side."""
+    interpolation: Interpolation | None = None
+    """Heights between the points of the map, on a grid finer than the map: "fourier", exact for
+    band-limited maps, or "monotone", without ripples; by default chosen by the spectrum and the
+    plateaus of the map."""
+    scale: Positive = 1.0
+    """Factor from the heights of the file to metres; also for its side where it states no unit."""
+    length: Positive | None = None
+    """Side of the map along x [m], of its part where it is cropped; by default that of the file,
+    else 1."""
+    length_y: Positive | None = None
+    """Side of the map along y [m]; by default that of the file, else the points along y times the
+    spacing along x."""
+
+    @property
+    def dimension(self) -> int:  # type: ignore[override]
+        """1 for a line profile, 2 for a map."""
+        return self._topography().heights.ndim
+
+    def smallest_grid(self) -> int:
+        """Number of points of the map along x. Raises InputError for a flat map."""
+        heights = _prepared(self)
+        if np.ptp(heights) == 0:
+            raise InputError(f"{self.path}: surface.path: the map is flat; roughness is needed")
+        return int(heights.shape[-1])
+
+    def smallest_grid_y(self) -> int:
+        """Number of points of the map along y."""
+        return len(_prepared(self)) if self.dimension == 2 else 1
+
+    def own_points(self) -> int:
+        """Points of the map itself along x, or a multiple if one side has fewer than any grid."""
+        x, y = self.smallest_grid(), self.smallest_grid_y() if self.dimension == 2 else None
+        least = min(x, y or x) // self.copies
+        return -(-SMALLEST_GRID // least) * x // self.copies
+
+    def points_y(self, points: int) -> int:
+        """Points along y where a spec gives none: in the ratio of those of the map."""
+        if self.dimension == 1:
+            return 1
+        return round(points * self.smallest_grid_y() / self.smallest_grid())
+
+    def on_cell(self, points: int, points_y: int) -> Self:
+        """The map itself, whose cell does not depend on the grid."""
+        return self
+
+    def heights_on(self, grid: Grid) -> Field:
+        """Heights [m] at the points of a grid, between the points of the map by interpolation."""
+        heights = _prepared(self)
+        if heights.shape == grid.whole_shape:
+            return heights.copy() if grid.whole else heights[grid.own].copy()
+        if self.applied_interpolation() == "monotone":
+            return monotone(heights, grid.whole_shape, grid.own)
+        return grid_of_map(heights).resample(heights, grid)
+
+    def _is_reflected(self) -> bool:
+        """Whether the map has borders, beyond which it is reflected for the interpolation only."""
+        return self.treatment()[1] == "none" and not self._is_periodic()
+
+    @property
+    def band_limited(self) -> bool:
+        """Whether the map is interpolated by a Fourier series."""
+        return self.applied_interpolation() == "fourier"
+
+    def applied_interpolation(self) -> Interpolation:
+        """The interpolation that is used on grids finer than the map."""
+        return self.interpolation or _suited_interpolation(self)
+
+    def resolution(self) -> str:
+        """Reason for the smallest grid: the points of the map."""
+        return f"a map of {extent(self._topography().heights.shape)} points"
+
+    def parameters(self) -> dict[str, Any]:
+        """Value of every key, with the defaults that depend on the file as they are applied."""
+        level, edges = self.treatment()
+        applied: dict[str, Any] = {"level": level, "edges": edges}
+        applied["periodic"] = self._is_periodic()
+        applied["interpolation"] = self.applied_interpolation()
+        return super().parameters() | applied
+
+    @property
+    def sides(self) -> tuple[float, ...]:
+        """Sides of the periodic cell [m]: twice those of the map where it is mirrored."""
+        shape, spacing = self._topography().heights.shape, self._topography().spacing or (1.0, 1.0)
+        length = self._known_length() or 1.0
+        if len(shape) == 1:
+            return (self.copies * length,)
+        ratio = shape[0] * spacing[0] / (shape[1] * spacing[1])
+        return self.copies * (self.length_y or length * ratio), self.copies * length
+
+    def has_no_length(self) -> bool:
+        """Whether neither the spec nor the file gives the side, which is then 1 m."""
+        return self._known_length() is None
+
+    def _known_length(self) -> float | None:
+        """Side of the map [m]; a side without a unit is scaled as the heights are."""
+        topography = self._topography()
+        if self.length is not None or topography.spacing is None:
+            return self.length
+        side = float(topography.heights.shape[-1] * topography.spacing[-1])
+        return side if topography.metres else self.scale * side
+
+    def treatment(self) -> tuple[Levelling, Edges]:
+        """Levelling and treatment of the edges that are applied to the map."""
+        periodic = self._is_periodic()
+        return (
+            self.level or ("none" if periodic else "plane"),
+            self.edges or "none",
+        )
+
+    @property
+    def has_borders(self) -> bool:
+        """Whether the map is not periodic, and the spec does not say how to make it periodic."""
+        return self.edges is None and not self._is_periodic()
+
+    def within(self, boundary: str) -> Self:
+        """The map with the treatment of its edges that goes with a boundary by default."""
+        if not self.has_borders:
+            return self
+        return self.model_copy(update={"edges": "none" if boundary == "free" else "mirror"})
+
+    @property
+    def copies(self) -> int:
+        """Copies of the map along each side of its cell: two where it is mirrored."""
+        return 2 if self.treatment()[1] == "mirror" else 1
+
+    def _is_periodic(self) -> bool:
+        """Whether the map is periodic, by the spec or else by the file."""
+        if self.periodic is not None:
+            return self.periodic
+        return self._topography().periodic in (True, None)
+
+    def measured_map(self) -> "tuple[np.ma.MaskedArray[Any, Any], tuple[float, ...]]":
+        """Levelled heights [m] as measured, masked where missing, and their spacing [m].
+
+        Nothing is subtracted from a map that is taken as periodic, unless `level` says so.
+        """
+        topography = self._topography()
+        heights = self.scale * topography.heights
+        known = None if topography.missing is None else ~topography.missing
+        levelled = level(heights, self.treatment()[0], known)
+        mask = np.ma.nomask if topography.missing is None else topography.missing
+        return np.ma.masked_array(levelled, mask), self._map_spacing()
+
+    def tapered(self, grid: Grid) -> Mask | None:
+        """Points of a grid whose heights the window has changed."""
+        if self.treatment()[1] != "window":
+            return None
+        return np.asarray(window(grid.whole_shape, self.taper)[grid.own] < 1.0)
+
+    def mirrored(self) -> Self | None:
+        """The map mirrored to twice its sides; None if it is periodic or made so."""
+        if not self._is_reflected():
+            return None
+        same = {"interpolation": self.applied_interpolation()}
+        return self.model_copy(update=same | {"edges": "mirror"})
+
+    def void(self, grid: Grid) -> Mask | None:
+        """Points of a grid nearest to a missing height of the map, if these never touch."""
+        missing = self._topography().missing
+        if self.missing != "void" or missing is None:
+            return None
+        if self.treatment()[1] == "mirror":
+            missing = mirror(missing)
+        return np.asarray(nearest(missing, grid.whole_shape)[grid.own])
+
+    def holes(self) -> int:
+        """Number of missing heights of the map."""
+        return self._topography().holes
+
+    def pictures(self) -> dict[str, Picture]:
+        """The map as it is in the file, and as it is solved."""
+        topography, spacing = self._topography(), self._map_spacing()
+        shape, prepared = topography.heights.shape, _prepared(self)
+        sides = tuple(n * step for n, step in zip(shape, spacing, strict=True))
+        cell = tuple(n * step for n, step in zip(prepared.shape, spacing, strict=True))
+        measured = picture(self.scale * topography.heights, sides, topography.missing)
+        return {"measured": measured, "prepared": picture(prepared, cell)}
+
+    def _map_spacing(self) -> tuple[float, ...]:
+        """Distance of the points of the map along each axis [m]."""
+        shape = self._topography().heights.shape
+        return tuple(side / self.copies / n for side, n in zip(self.sides, shape, strict=True))
+
+    def _topography(self) -> Topography:
+        return _topography(self.path, self.dataset, self.region, self.flip, self.crop)
+
+    def remarks(self, boundary: str = "periodic") -> list[str]:
+        """Warnings about a missing side, a steep gradient and a step across the border."""
+        repeated = boundary == "periodic" and not self.has_borders
+        return map_remarks(
+            _prepared(self), self.sides, unsized=self.has_no_length(), repeated=repeated
+        )
+
+    def preparation(self, boundary: str = "") -> str:
+        """Description of how the map was read and prepared for a boundary."""
+        topography, (levelling, edges) = self._topography(), self.treatment()
+        steps = [f"{self.path.name} ({topography.source}): {extent(topography.shape)} points"]
+        if self.region is not None:
+            steps.append(f"region {self.region}")
+        if self.crop and topography.heights.shape != topography.shape:
+            steps.append(f"cropped to {extent(topography.heights.shape)}")
+        if self.flip:
+            steps.append("turned upside down")
+        if topography.holes:
+            treatment = " never touch" if self.missing == "void" else " filled in"
+            steps.append(f"{topography.holes} missing heights{treatment}")
+        if levelling != "none":
+            steps.append(f"{levelling} subtracted")
+        if boundary == "free":
+            steps.append("free boundary")
+        elif self.has_borders and not boundary:
+            steps.append("free boundary, or mirrored to twice the side")
+        if edges == "window":
+            steps.append(f"edges tapered to the mean height over {self.taper:g} of the side")
+        elif edges == "mirror":
+            steps.append("mirrored to twice the side")
+        elif boundary != "free" and not self.has_borders:
+            steps.append("taken as periodic")
+        steps.append(f"interpolation on finer grids: {self.applied_interpolation()}")
+        return ", ".join(steps)
+
+
+def grid_of_map(heights: Field) -> Grid:
+    """The grid whose points are those of a map."""
+    return Grid(heights.shape[-1], heights.ndim, points_y=heights.shape[0])
+
+
+@lru_cache(maxsize=16)
+def _suited_interpolation(surface: FileSurface) -> Interpolation:
+    """The interpolation that suits a map; cached, because it needs a transform."""
+    heights = _prepared(surface)
+    return suited_interpolation(mirror(heights) if surface._is_reflected() else heights)
+
+
+@lru_cache(maxsize=4)
+def _topography(
+    path: Path, dataset: str | None, region: Region | None, flip: bool, crop: bool
+) -> Topography:
+    """Read a file; cached, because the same surface is sampled on several grids."""
+    topography = read_topography(path, dataset, region=region, flip=flip)
+    return square_part(topography) if crop and topography.heights.ndim == 2 else topography
+
+
+@lru_cache(maxsize=4)
+def _prepared(surface: FileSurface) -> Field:
+    """The periodic heights [m], levelled and filled in; cached likewise."""
+    topography, (levelling, edges) = surface._topography(), surface.treatment()
+    missing = topography.missing
+    if missing is None:
+        heights = level(surface.scale * topography.heights, levelling)
+    else:
+        if surface.missing == "refuse":
+            raise InputError(_holes(surface.path, missing))
+        heights = level(surface.scale * topography.heights, levelling, ~missing)
+        heights = fill_missing(heights, missing)
+    return make_periodic(heights, edges, surface.taper)
+
+
+def _holes(path: Path, missing: Mask) -> str:
+    """Message for a map whose missing heights the spec refuses."""
+    first = ", ".join(
+        f"{axis} = {index}"
+        for axis, index in zip(
+            ("x", "y"), np.unravel_index(np.argmax(missing), missing.shape)[::-1], strict=False
+        )
+    )
+    return (
+        f"{path}: {np.count_nonzero(missing)} of {missing.size} heights are NaN, infinite or "
+        f'marked as missing, the first at {first}; surface.missing = "fill" fills them in, '
+        '"void" keeps them out of contact'
+    )
+
+
+def forget_files() -> None:
+    """Drop the maps that were read, so that a file that has changed is read again."""
+    for cached in (_topography, _prepared, _suited_interpolation):
+        cached.cache_clear()

@@ -1,0 +1,208 @@
+"""The contact of a map with an elastomer that goes on, unloaded, beyond the map.
+
+Only the points of the map can touch. The elastomer has no borders, so that its displacement is a
+convolution of the stress with the compliance kernel, u = C sigma + c, where c is the level of the
+undeformed surface. The stress is constant on each pixel. The contact minimises
+
+    <sigma C sigma> / 2 - <sigma h>  over  sigma >= 0  with  <sigma> = p,
+
+where means are taken over the map. At the solution, g = C sigma + c - h >= 0 and sigma g = 0.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+
+from gfmd_cli.grid.arrays import Field, Mask
+from gfmd_cli.grid.convolution import PaddedTransform, padded_shape
+from gfmd_cli.grid.fft_grid import Grid, Shape
+from gfmd_cli.grid.pixels import average_pixels
+from gfmd_cli.grid.ranks import Ranks
+from gfmd_cli.physics.contact import Contact, Scene, build_scene, reduce_scene, touchable
+from gfmd_cli.physics.elastomers import LinearElastomer
+from gfmd_cli.physics.indenters import RigidSurface
+from gfmd_cli.physics.surfaces import sample
+
+MARGIN = 1.25
+"""Padding for the stiffness that serves as preconditioner. Measured at 256^2, p* = 1: 46 steps
+without padding, 36 with this, 33 with twofold padding (n = 1); 302 and 157 (n = 1.5)."""
+
+
+@dataclass(frozen=True)
+class FreeElasticity:
+    """Compliance of an elastomer without borders on a grid, in reduced units."""
+
+    elastomer: LinearElastomer
+    grid: Grid
+    unit: float
+    """Delta_sigma / h_std [Pa/m]."""
+
+    @cached_property
+    def _convolution(self) -> tuple[PaddedTransform, Field]:
+        """The transform of twice the points, and the symbol of the compliance C."""
+        grid = self.grid
+        kernel = self.elastomer.free_compliance(grid.shape, grid.spacings) * self.unit
+        transform = PaddedTransform(grid.shape, padded_shape(grid.shape, 2.0), threads=grid.threads)
+        return transform, transform.symbol_of(kernel)
+
+    @cached_property
+    def _preconditioner(self) -> tuple[PaddedTransform, Field]:
+        """A transform of a few more points, and the stiffness k(q) there, in single precision."""
+        grid = self.grid
+        padded = padded_shape(grid.shape, MARGIN)
+        transform = PaddedTransform(grid.shape, padded, "single", grid.threads)
+        q = transform.wavenumber(grid.spacings)
+        return transform, (self.elastomer.stiffness(q, grid.length) / self.unit).astype(np.float32)
+
+    def displacement(self, stress: Field, out: Field) -> Field:
+        """C sigma, written to `out`: one pair of transforms of twice the points a side."""
+        transform, symbol = self._convolution
+        return transform.apply(symbol, stress, out)
+
+    def approximate_stress(self, displacement: Field, out: Field) -> Field:
+        """An approximation of the stress that causes a displacement, written to `out`."""
+        transform, symbol = self._preconditioner
+        return transform.apply(symbol, displacement, out)
+
+    @property
+    def transforms(self) -> float:
+        """Transforms of the size of the map that `displacement` counts as, by number of points."""
+        transform, _ = self._convolution
+        return 2.0 * transform.padded_rows * transform.padded_columns / self.grid.size
+
+    @property
+    def preconditioner_transforms(self) -> float:
+        """The same for `approximate_stress`, whose single precision takes half of the time."""
+        transform, _ = self._preconditioner
+        return 1.0 * transform.padded_rows * transform.padded_columns / self.grid.size
+
+
+@dataclass(frozen=True)
+class FreeContact(Contact):
+    """Contact problem of a map on an elastomer without borders, at one pressure.
+
+    `stiffness` is empty: the elastomer is described by `free`.
+    """
+
+    free: FreeElasticity = field(kw_only=True)
+
+    @property
+    def boundary(self) -> str:
+        """The boundary of the map."""
+        return "free"
+
+    def recompute(self, u: Field, sigma: Field) -> float:
+        """Compute u from sigma, u = h in contact and above it elsewhere; return the residual."""
+        gap = self.free.displacement(sigma, out=self.grid.empty())
+        gap -= self.height
+        gap -= mean_over(gap, sigma > 0)
+        residual = self.residual(gap + self.height, sigma)
+        self.set_displacement(u, gap, sigma > 0)
+        return residual
+
+    def undeformed_level(self, u: Field, sigma: Field) -> float:
+        """Level c of the undeformed surface: <sigma u> = <sigma C sigma> + c p."""
+        response = self.free.displacement(sigma, out=self.grid.empty())
+        np.subtract(u, response, out=response)
+        return float(np.vdot(sigma, response) / sigma.sum())
+
+    def reference_level(self, u: Field, sigma: Field) -> float:
+        """Level from which displacements enter the energy: that of the undeformed surface."""
+        return self.undeformed_level(u, sigma)
+
+    def coarsen(self, shape: Shape) -> "FreeContact":
+        """The same contact on larger pixels, with the means of the heights over them."""
+        grid = self.grid.coarser(shape)
+        return replace(
+            self,
+            grid=grid,
+            height=average_pixels(self.height, grid.shape),
+            may_touch=self._coarse_mask(grid),
+            free=replace(self.free, grid=grid),
+        )
+
+
+@dataclass(frozen=True)
+class FreeScene(Scene):
+    """Surface and elastomer without borders on a grid, independent of the pressure."""
+
+    free: FreeElasticity = field(kw_only=True)
+
+    def contact(self, p_star: float) -> FreeContact:
+        """The contact at reduced pressure p*. Raises InputError where that is out of range."""
+        self.check_pressure(p_star)
+        fields = (self.grid, self.height, self.stiffness)
+        return FreeContact(*fields, p_star, may_touch=self.may_touch, free=self.free)
+
+
+def build_free_scene(
+    surface: RigidSurface,
+    elastomer: LinearElastomer,
+    points: int,
+    threads: int = 1,
+    ranks: Ranks | None = None,
+    *,
+    points_y: int = 0,
+) -> FreeScene:
+    """As `build_scene`, for a free boundary.
+
+    A map that is not periodic has a step at its border. Delta_sigma and the spectrum are therefore
+    those of the map mirrored to twice its sides, which is continuous: for a half-space, Delta_sigma
+    is E*/2 times the rms gradient of the map.
+
+    Raises InputError as `build_scene`, and where the elastomer has no compliance that decays.
+    """
+    if ranks is not None:
+        raise ValueError("a free boundary is solved by one process")
+    grid = replace(surface.grid(points, points_y), threads=threads)
+    doubled, mirrored, void = _mirrored(surface, grid)
+    scene = reduce_scene(doubled, mirrored, elastomer)
+    free = FreeElasticity(elastomer, grid, scene.delta_sigma / scene.h_std)
+    own = tuple(slice(n) for n in grid.shape)
+    return FreeScene(
+        grid=grid,
+        height=np.ascontiguousarray(scene.height[own]),
+        stiffness=np.empty(0),
+        mean_height=scene.mean_height,
+        h_std=scene.h_std,
+        delta_sigma=scene.delta_sigma,
+        shells=scene.shells,
+        may_touch=touchable(void, grid),
+        free=free,
+    )
+
+
+def _mirrored(surface: RigidSurface, grid: Grid) -> tuple[Grid, Field, Mask | None]:
+    """Twice the grid of a map, the mirrored heights on it, and the points that never touch.
+
+    A measured map is mirrored before it is interpolated, so that no height on a finer grid lies
+    between those of opposite borders.
+    """
+    doubled = replace(
+        grid,
+        points=2 * grid.points,
+        points_y=2 * grid.points_y,
+        length=2 * grid.length,
+        length_y=2 * grid.length_y,
+    )
+    twin = surface.mirrored()
+    if twin is None:
+        _, height = sample(surface, grid.points, grid.points_y)
+        pads = [(0, n) for n in grid.shape]
+        return doubled, np.pad(height, pads, mode="symmetric"), surface.void(grid)
+    _, mirrored = sample(twin, doubled.points, doubled.points_y)
+    void = twin.void(doubled)
+    own = tuple(slice(n) for n in grid.shape)
+    return doubled, mirrored, None if void is None else void[own]
+
+
+SCENES: dict[str, Callable[..., Scene]] = {"periodic": build_scene, "free": build_free_scene}
+"""How a scene is built, by the boundary of the map."""
+
+
+def mean_over(values: Field, where: Mask) -> float:
+    """Mean of some values; zero without any."""
+    chosen = values[where]
+    return float(chosen.mean()) if chosen.size else 0.0

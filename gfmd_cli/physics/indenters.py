@@ -1,0 +1,287 @@
+"""Rigid surfaces: the interface of all surfaces, and single indenters of simple shape.
+
+Each class of a single indenter is one `kind` of [surface] in the run spec. The indenter is in the
+middle of the periodic cell. Equation numbers are those of Mueser, "Elastic contacts of randomly
+rough surfaces across the spatial dimensions".
+"""
+
+from math import ceil
+from typing import Annotated, Any, ClassVar, Literal, Self
+
+import numpy as np
+from pydantic import Field as Key
+from pydantic import model_validator
+
+from gfmd_cli.choice import Choice, Positive
+from gfmd_cli.grid.arrays import Field, Mask
+from gfmd_cli.grid.fft_grid import Grid
+from gfmd_cli.physics.pictures import Picture
+
+SMALLEST_GRID = 8  # points along an axis; a choice: smaller grids resolve no contact
+ROUNDING = 1e-9  # of a number of points that follows from a ratio of sides
+
+
+class RigidSurface(Choice):
+    """Interface of all surfaces; the defaults are those of a single indenter.
+
+    A subclass implements `smallest_grid` and `heights_on`, has the fields `length` and, unless it
+    is a line, `length_y`, or overrides `sides`, and overrides the defaults that do not hold for it.
+    """
+
+    dimension: ClassVar[int] = 2
+    """Dimension of the surface: 1 for a line contact, h(x), 2 for h(x, y)."""
+    rough: ClassVar[bool] = False
+    """Whether the surface is random or measured; error bars then use its spectrum."""
+    x_first: ClassVar[float] = 0.0
+    """Position of the first grid point along each axis / L."""
+    is_map: ClassVar[bool] = False
+    """Whether the surface is a map, whose points are those of the smallest grid."""
+    kind: str
+
+    def smallest_grid(self) -> int:
+        """Smallest number of points along x that resolves the surface."""
+        raise NotImplementedError
+
+    def smallest_grid_y(self) -> int:
+        """Smallest number of points along y, by default at the same spacing; 1 for a line."""
+        if self.dimension == 1:
+            return 1
+        length_y, length = self.sides
+        return max(SMALLEST_GRID, ceil(self.smallest_grid() * length_y / length - ROUNDING))
+
+    def points_y(self, points: int) -> int:
+        """Points along y where a spec gives none: the even number nearest to square pixels."""
+        if self.dimension == 1:
+            return 1
+        length_y, length = self.sides
+        return points if length_y == length else 2 * round(points * length_y / length / 2)
+
+    def on_cell(self, points: int, points_y: int) -> Self:
+        """The surface on the cell that it has on a grid of so many points.
+
+        Where the spec does not give the side along y, it is the points along y times the spacing
+        along x.
+        """
+        if self.dimension == 1 or points_y == points or dict(self).get("length_y") is not None:
+            return self
+        return self.model_copy(update={"length_y": self.sides[-1] * points_y / points})
+
+    def heights_on(self, grid: Grid) -> Field:
+        """Heights h [m] at the points of a grid that this process holds, shape `grid.shape`."""
+        raise NotImplementedError
+
+    def heights(self, points: int, points_y: int = 0) -> Field:
+        """Heights h [m] on a grid of so many points, indexed [y, x], for a line contact [x]."""
+        return self.heights_on(self.grid(points, points_y))
+
+    def grid(self, points: int, points_y: int = 0) -> Grid:
+        """The grid of so many points on the cell; by default with `points_y(points)` along y."""
+        length_y = self.sides[0]
+        points_y = points_y or self.points_y(points)
+        return Grid(points, self.dimension, self.sides[-1], points_y=points_y, length_y=length_y)
+
+    @property
+    def sides(self) -> tuple[float, ...]:
+        """Sides of the periodic cell [m], along y and x; of a line, its length."""
+        given = dict(self)
+        length = float(given["length"])
+        return (length,) if self.dimension == 1 else (given.get("length_y") or length, length)
+
+    @property
+    def band_limited(self) -> bool:
+        """Whether the smallest grid resolves all waves, so that all grids have one Delta_sigma."""
+        return False
+
+    @property
+    def has_borders(self) -> bool:
+        """Whether the surface ends at its borders, and the spec does not make it periodic."""
+        return False
+
+    def within(self, boundary: str) -> Self:
+        """The surface with the treatment of its edges that goes with a boundary by default."""
+        return self
+
+    @property
+    def copies(self) -> int:
+        """Copies of the surface along each side of its cell."""
+        return 1
+
+    def resolution(self) -> str:
+        """Reason for the smallest grid, as text for messages."""
+        return f"kind {self.kind!r}"
+
+    def preparation(self, boundary: str = "") -> str:
+        """Description of how a map was read and prepared for a boundary; "" for other surfaces."""
+        return ""
+
+    def measured_map(self) -> "tuple[np.ma.MaskedArray[Any, Any], tuple[float, ...]] | None":
+        """Levelled heights [m] as measured, and their spacing [m]; None where nothing was."""
+        return None
+
+    def tapered(self, grid: Grid) -> Mask | None:
+        """Points of a grid whose heights a window has changed; None where no window is used."""
+        return None
+
+    def mirrored(self) -> "RigidSurface | None":
+        """A map that is not periodic, mirrored to twice its sides; None for other surfaces."""
+        return None
+
+    def void(self, grid: Grid) -> Mask | None:
+        """Points of a grid that never touch, as their height is unknown; None where all can."""
+        return None
+
+    def pictures(self) -> dict[str, Picture]:
+        """Pictures of a map as it was "measured" and as it was "prepared"; none of others."""
+        return {}
+
+    def remarks(self, boundary: str = "periodic") -> list[str]:
+        """Warnings about values that are probably mistakes of the user, for `grid.boundary`."""
+        return []
+
+
+class SingleIndenter(RigidSurface):
+    """A single indenter in the middle of the cell, repeated periodically; x counts from there."""
+
+    x_first: ClassVar[float] = -0.5
+    length: Positive = 1.0
+    """Side of the cell along x, L [m]."""
+
+    def smallest_grid(self) -> int:
+        """Smallest number of points along x; any grid resolves a single indenter."""
+        return SMALLEST_GRID
+
+    def smallest_grid_y(self) -> int:
+        """Smallest number of points along y."""
+        return SMALLEST_GRID if self.dimension == 2 else 1
+
+    def _x(self, grid: Grid) -> Field:
+        """Signed distance from the middle of the cell along x [m]."""
+        return (np.arange(grid.points) / grid.points + self.x_first) * self.length
+
+
+class RoundIndenter(SingleIndenter):
+    """A single indenter of revolution in the middle of the cell."""
+
+    length_y: Positive | None = None
+    """Side of the cell along y [m]; by default the points along y times the spacing along x."""
+
+    def _radius(self, grid: Grid) -> Field:
+        """Distance r from the middle of the cell [m]."""
+        y = (np.arange(grid.points_y) / grid.points_y - 0.5) * grid.length_y
+        return np.hypot(y[grid.own, None], self._x(grid))
+
+
+class LineIndenter(SingleIndenter):
+    """A single indenter of a line contact, h(x)."""
+
+    dimension: ClassVar[int] = 1
+
+
+class Parabola(RoundIndenter):
+    """Paraboloid h = -r^2 / 2R. Paper Eq. (4)."""
+
+    kind: Literal["parabola"] = "parabola"
+    radius: Positive = 1.0
+    """Radius of curvature R [m]."""
+
+    def heights_on(self, grid: Grid) -> Field:
+        """Heights [m] at the points of a grid that this process holds."""
+        return -(self._radius(grid) ** 2) / (2 * self.radius)
+
+
+class PowerLawIndenter(RoundIndenter):
+    """Indenter of revolution h = -r^m / (m R^(m-1)). Paper Sect. 3.3."""
+
+    kind: Literal["power-law"] = "power-law"
+    exponent: Annotated[float, Key(gt=0, le=100)] = 2.0
+    """Exponent m."""
+    radius: Positive = 1.0
+    """Length R [m]; the radius of curvature for m = 2."""
+
+    def heights_on(self, grid: Grid) -> Field:
+        """Heights [m] at the points of a grid that this process holds."""
+        return -self.radius * (self._radius(grid) / self.radius) ** self.exponent / self.exponent
+
+
+class Cone(RoundIndenter):
+    """Cone h = -slope r."""
+
+    kind: Literal["cone"] = "cone"
+    slope: Positive = 1.0
+    """Slope of the flank."""
+
+    def heights_on(self, grid: Grid) -> Field:
+        """Heights [m] at the points of a grid that this process holds."""
+        return -self.slope * self._radius(grid)
+
+
+class Punch(RoundIndenter):
+    """Flat cylindrical punch: h = 0 for r <= radius, -depth beyond."""
+
+    kind: Literal["punch"] = "punch"
+    radius: Positive = 0.25
+    """Radius of the face [m]."""
+    depth: Positive = 1.0
+    """Depth of the surface around the face [m]; a large value keeps it out of contact."""
+
+    @model_validator(mode="after")
+    def _has_rim(self) -> Self:
+        side = min(self.sides)
+        if self.radius >= side / 2:
+            raise ValueError(f"radius = {self.radius:g} leaves no rim in a cell of {side:g}")
+        return self
+
+    def heights_on(self, grid: Grid) -> Field:
+        """Heights [m] at the points of a grid that this process holds."""
+        face = self._radius(grid) <= self.radius * (
+            1 + 1e-12
+        )  # including points on the rim, up to rounding
+        return np.where(face, 0.0, -self.depth)
+
+
+class Ridge(LineIndenter):
+    """Acute ridge h = -slope |x|, a line contact; x counts from the crest, in the middle of the
+    cell. Paper Fig. 1 (periodic ridges, one per cell)."""
+
+    kind: Literal["ridge"] = "ridge"
+    slope: Positive = 1.0
+    """Slope of the flanks."""
+    width: Annotated[float, Key(gt=0, le=1)] = 1.0
+    """Width at the foot as a share of the cell; the rest is flat."""
+
+    def heights_on(self, grid: Grid) -> Field:
+        """Heights [m] at the points of a grid that this process holds."""
+        across = np.minimum(np.abs(self._x(grid)), 0.5 * self.width * self.length)
+        return -self.slope * across
+
+
+class LineParabola(LineIndenter):
+    """Parabolic cylinder h = -x^2 / 2R, a line contact; x counts from the crest, in the middle of
+    the cell. Paper Eq. (4) in one dimension."""
+
+    kind: Literal["line-parabola"] = "line-parabola"
+    radius: Positive = 1.0
+    """Radius of curvature R [m]."""
+
+    def heights_on(self, grid: Grid) -> Field:
+        """Heights [m] at the points of a grid that this process holds."""
+        return -(self._x(grid) ** 2) / (2 * self.radius)
+
+
+class Wave(LineIndenter):
+    """Cosine wave h = amplitude cos(2 pi x / L), a line contact (Westergaard's problem); x counts
+    from the crest, in the middle of the cell."""
+
+    kind: Literal["wave"] = "wave"
+    amplitude: Positive = 1.0
+    """Amplitude [m]."""
+
+    def heights_on(self, grid: Grid) -> Field:
+        """Heights [m] at the points of a grid that this process holds."""
+        phase: Field = 2 * np.pi * self._x(grid) / self.length
+        return self.amplitude * np.cos(phase)
+
+    @property
+    def band_limited(self) -> bool:
+        """True: a single wave."""
+        return True

@@ -1,0 +1,178 @@
+"""Preparation of measured maps: levelling, periodic edges, and filling of missing heights.
+
+Maps have shape (rows, columns), any numbers of both; line profiles have shape (points,).
+"""
+
+from typing import Any, Literal
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.linalg import spsolve
+
+from gfmd_cli.grid.arrays import Field, Mask
+
+Levelling = Literal["none", "mean", "plane", "curvature"]
+Edges = Literal["none", "window", "mirror"]
+
+MAX_EXACT = 100_000  # missing heights; the sparse solution of more takes seconds
+SWEEPS = 30  # a choice: the filling is then smooth over several points
+DEGREES: dict[Levelling, int] = {"mean": 0, "plane": 1, "curvature": 2}
+
+
+def level(heights: Field, degree: Levelling, known: Mask | None = None) -> Field:
+    """Subtract the least-squares polynomial of total degree 0, 1 or 2 in x and y.
+
+    "mean" subtracts 1; "plane" 1, x, y; "curvature" 1, x, y, x^2, x y, y^2; "none" nothing. The
+    polynomial is fitted to the heights that are known, all of them by default, and subtracted
+    everywhere. The coordinates run from -1 to 1.
+    """
+    if degree == "none":
+        return heights
+    rows = np.atleast_2d(heights)
+    basis_y, basis_x = (_polynomials(points, DEGREES[degree]) for points in rows.shape)
+    order = np.add.outer(np.arange(basis_y.shape[1]), np.arange(basis_x.shape[1]))
+    chosen = order <= DEGREES[degree]
+    coefficients = np.zeros(chosen.shape)
+    if known is None:  # products of orthonormal polynomials are orthonormal: a projection
+        coefficients[chosen] = (basis_y.T @ rows @ basis_x)[chosen]
+    else:
+        weight = np.atleast_2d(known).astype(np.float64)
+        right = (basis_y.T @ np.where(weight > 0, rows, 0.0) @ basis_x)[chosen]
+        products = _products(basis_y).T @ weight @ _products(basis_x)  # over the known heights
+        sizes = (basis_y.shape[1],) * 2 + (basis_x.shape[1],) * 2
+        gram = products.reshape(sizes).transpose(0, 2, 1, 3)[chosen][:, chosen]
+        coefficients[chosen] = np.linalg.lstsq(gram, right, rcond=None)[0]
+    trend: Field = basis_y @ coefficients @ basis_x.T
+    return heights - trend.reshape(heights.shape)
+
+
+def _polynomials(points: int, degree: int) -> Field:
+    """Discrete orthonormal polynomials up to a degree, shape (points, degree + 1 at most)."""
+    order = min(degree, points - 1) + 1
+    basis, _ = np.linalg.qr(np.vander(np.linspace(-1.0, 1.0, points), order, increasing=True))
+    return np.asarray(basis)
+
+
+def _products(basis: Field) -> Field:
+    """Products of all pairs of polynomials, shape (points, pairs)."""
+    return (basis[:, :, None] * basis[:, None, :]).reshape(len(basis), -1)
+
+
+def make_periodic(heights: Field, how: Edges, taper: float = 0.1) -> Field:
+    """Make levelled heights periodic, without a jump across the border of the cell.
+
+    "window" : Tukey window, heights -> mean + w (heights - mean), see `window`. The cell keeps its
+        size; the heights near the border change, and `h_std` decreases (by 12 % for white noise
+        at taper = 0.1).
+    "mirror" : even extension to twice the points and sides. All heights and `h_std` are kept; the
+        copies are correlated, so they do not improve the statistics, and the slope is
+        discontinuous along the mirror lines.
+    "none" : unchanged.
+
+    Parameters
+    ----------
+    heights : shape (rows, columns), or (points,) of a line
+    taper : width of the tapered zone at each edge as a share of the side, 0 < taper <= 1/2
+
+    Raises ValueError for any other taper or treatment.
+    """
+    if how == "none":
+        return heights
+    if how == "mirror":
+        mirrored: Field = mirror(heights)
+        return mirrored
+    if how != "window" or not 0.0 < taper <= 0.5:
+        raise ValueError(f"how = {how!r}, taper = {taper}: window with 0 < taper <= 0.5, or mirror")
+    mean = heights.mean()
+    tapered: Field = mean + window(heights.shape, taper) * (heights - mean)
+    return tapered
+
+
+def mirror(values: np.ndarray[Any, Any]) -> Any:
+    """Even extension to twice the points along each axis."""
+    return np.pad(values, [(0, points) for points in values.shape], mode="symmetric")
+
+
+def window(shape: tuple[int, ...], taper: float) -> Field:
+    """Tukey window: rises as a cosine from 0 at the border to 1 at `taper` of each side."""
+    weight: Field = np.ones(())
+    for points in shape:
+        border = np.minimum(np.arange(points), points - np.arange(points)) / points
+        along = 0.5 - 0.5 * np.cos(np.pi * np.minimum(border / taper, 1.0))
+        weight = np.multiply.outer(weight, along)
+    return weight
+
+
+def border_step(heights: Field) -> float:
+    """Ratio of the rms step across the border to that inside; 1 for a periodic map."""
+    ends = (heights.take(0, axis) - heights.take(-1, axis) for axis in range(heights.ndim))
+    across = np.concatenate([np.ravel(step) for step in ends])
+    inside = np.mean([np.mean(np.diff(heights, axis=axis) ** 2) for axis in range(heights.ndim)])
+    return float(np.sqrt(np.mean(across**2) / inside)) if inside > 0 else 1.0
+
+
+def fill_missing(heights: Field, missing: Mask) -> Field:
+    """Fill missing heights in by the solution of the discrete Laplace equation.
+
+    Each missing height is the mean of its neighbours (fewer than four at the edge of the map), so
+    that the filling has no maximum or minimum of its own. Known heights are the boundary values.
+    Beyond `MAX_EXACT` missing heights the solution of a map of half the resolution is refined by
+    `SWEEPS` of Jacobi's iteration, which smooths it without solving the equation exactly.
+
+    Parameters
+    ----------
+    heights : shape (rows, columns) or (points,), any value where missing
+    missing : mask of the missing heights, of the same shape; at least one height is known
+    """
+    known = np.atleast_2d(np.where(missing, 0.0, heights))
+    holes = np.atleast_2d(missing)
+    exact = np.count_nonzero(holes) <= MAX_EXACT
+    filled = _harmonic(known, holes) if exact else _smooth(known, holes)
+    return filled.reshape(heights.shape)
+
+
+def _smooth(known: Field, missing: Mask) -> Field:
+    """Filling from a map of half the resolution; `known` is zero where missing."""
+    starts = [np.arange(0, size, 2) for size in known.shape]
+    count, total = (~missing).astype(np.float64), known
+    for axis, start in enumerate(starts):
+        count, total = np.add.reduceat(count, start, axis), np.add.reduceat(total, start, axis)
+    coarse = fill_missing(total / np.maximum(count, 1.0), count == 0)
+    for axis in (0, 1):
+        coarse = coarse.repeat(2, axis)
+    filled = np.where(missing, coarse[: known.shape[0], : known.shape[1]], known)
+    for _ in range(SWEEPS):
+        around = np.pad(filled, 1, mode="edge")
+        mean = around[:-2, 1:-1] + around[2:, 1:-1] + around[1:-1, :-2] + around[1:-1, 2:]
+        np.copyto(filled, 0.25 * mean, where=missing)
+    return filled
+
+
+def _harmonic(known: Field, missing: Mask) -> Field:
+    """Filling by the sparse linear system; `known` is zero where missing."""
+    number = np.full(missing.shape, -1)
+    number[missing] = np.arange(np.count_nonzero(missing))
+    neighbours, right = np.zeros((2, np.count_nonzero(missing)))
+    pairs = []
+    for axis, step in ((0, 1), (0, -1), (1, 1), (1, -1)):
+        inside = [slice(None)] * 2
+        beside = [slice(None)] * 2
+        inside[axis] = slice(None, -1) if step > 0 else slice(1, None)
+        beside[axis] = slice(1, None) if step > 0 else slice(None, -1)
+        here, there = number[tuple(inside)], number[tuple(beside)]
+        chosen = here >= 0
+        np.add.at(neighbours, here[chosen], 1.0)
+        np.add.at(right, here[chosen], known[tuple(beside)][chosen])
+        chosen &= there >= 0
+        pairs.append((here[chosen], there[chosen]))
+    row, column = np.hstack(pairs)
+    diagonal = np.arange(neighbours.size)
+    matrix = coo_array(
+        (
+            np.concatenate([neighbours, -np.ones(row.size)]),
+            (np.concatenate([diagonal, row]), np.concatenate([diagonal, column])),
+        )
+    )
+    filled = known.copy()
+    filled[missing] = spsolve(matrix.tocsc(), right, permc_spec="MMD_AT_PLUS_A")
+    return filled

@@ -1,0 +1,42 @@
+"""What a user is told about a measured map: warnings about probable mistakes."""
+
+import numpy as np
+
+from gfmd_cli.grid.arrays import Field
+from gfmd_cli.physics.map_preparation import border_step
+
+STEEP = 3.0  # rms gradient; a choice: surfaces of machined or worn solids have less
+CLIFF = 5.0  # ratio of the step across the border to that inside; a choice: 1 if periodic
+
+
+def map_remarks(
+    heights: Field, sides: tuple[float, ...], *, unsized: bool, repeated: bool
+) -> list[str]:
+    """Warnings about a missing side, a steep gradient and a step across the border.
+
+    Parameters
+    ----------
+    heights : the prepared heights [m]
+    sides : sides of their cell [m]
+    unsized : whether neither the spec nor the file gives the side
+    repeated : whether the map is taken as periodic
+    """
+    remarks = []
+    if unsized:
+        remarks.append("the file does not state its side; L = 1 m is assumed: set surface.length")
+    points_per_metre = (n / side for n, side in zip(heights.shape, sides, strict=True))
+    slopes = (np.diff(heights, axis=i) * each for i, each in enumerate(points_per_metre))
+    gradient = np.sqrt(sum(float(np.mean(slope**2)) for slope in slopes))
+    if gradient > STEEP:
+        remarks.append(
+            f"rms gradient {gradient:.3g}: check that heights and side are in metres; "
+            "surface.scale is the factor from the heights of the file to metres, "
+            "surface.length the side"
+        )
+    cliff = border_step(heights) if repeated else 1.0
+    if cliff > CLIFF:
+        remarks.append(
+            f"the step across the border is {cliff:.3g} times that inside: if the map is not "
+            "periodic, surface.periodic = false levels it and ends it at its borders"
+        )
+    return remarks

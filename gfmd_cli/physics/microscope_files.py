@@ -1,0 +1,124 @@
+"""Files of microscopes and tables of numbers, by the readers of SurfaceTopography."""
+
+import warnings
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+
+from gfmd_cli.errors import INSTALL, InputError
+from gfmd_cli.physics.height_map import REMEDY, HeightMap, check_layout, first_line
+from gfmd_cli.physics.text_tables import table_formats
+
+TABLES = {"xyz", "asc"}  # formats of SurfaceTopography that are tables of numbers
+SMALL_FILE = 2**14  # bytes, which the readers of tables parse in a second
+SIGNATURE_BYTES = 512  # at the beginning of a file, by which readers recognise their format
+
+
+def read_microscope_file(path: Path, dataset: str | None, max_bytes: int) -> HeightMap:
+    """Read a microscope file by SurfaceTopography."""
+    if path.stat().st_size > max_bytes:
+        raise InputError(f"{path}: {path.stat().st_size} bytes; at most {max_bytes} are read")
+    with path.open("rb") as file, warnings.catch_warnings():
+        for category in (DeprecationWarning, FutureWarning, ImportWarning):  # of other packages
+            warnings.simplefilter("ignore", category)
+        try:
+            from SurfaceTopography.IO import readers
+        except ImportError as error:
+            raise InputError(
+                f"{path}: not .npy or HDF5; other formats need SurfaceTopography: "
+                f"{INSTALL.format('topography')}"
+            ) from error
+        with _open_scan(path, file, readers) as reader:
+            return _read_channel(path, reader, dataset, max_bytes)
+
+
+def _open_scan(path: Path, file: BinaryIO, readers: list[Any]) -> Any:
+    """Open a file by the first reader that accepts it.
+
+    Readers of tables parse any file to its end, which can take minutes, so they get files that look
+    like tables, and small files.
+
+    Raises InputError where none does, with the reason of the reader that recognises the format.
+    """
+    start, is_small = file.read(SIGNATURE_BYTES), path.stat().st_size <= SMALL_FILE
+    tables = table_formats(file)
+    reasons = []
+    for reader in readers:
+        answer = reader.can_read(start).name
+        is_guess = reader.format() in TABLES - tables
+        if answer == "NO" or (is_guess and not is_small):
+            continue
+        file.seek(0)
+        try:
+            return reader(file)
+        except Exception as error:  # a reader can raise any exception at other formats
+            if is_guess:
+                continue
+            if answer == "YES" or path.suffix[1:].lower() in reader.file_extensions():
+                reasons.append(f"{reader.format()}: {first_line(error)}")
+    if reasons:
+        raise InputError(
+            f"{path}: SurfaceTopography recognises the format but cannot read the file "
+            f"({'; '.join(reasons)}): damaged, or a variant of the format? {REMEDY}"
+        )
+    raise InputError(
+        f"{path}: no known topography format; .npy, HDF5 and the formats of "
+        f"SurfaceTopography can be read. {REMEDY}"
+    )
+
+
+def _read_channel(path: Path, reader: Any, dataset: str | None, max_bytes: int) -> HeightMap:
+    """Read one height channel of an open microscope file, in metres."""
+    if reader.format() == "hgt" and path.suffix.lower() != ".hgt":  # accepts any 2 n^2 bytes
+        raise InputError(f"{path}: no known topography format")
+    if reader.format() == "npz":
+        raise InputError(f"{path}: an archive of NumPy arrays; save the map as a .npy file")
+    channel, others = _height_channel(path, reader, dataset)
+    shape = (channel.nb_grid_pts or ())[::-1]
+    check_layout(path, shape, np.dtype(float), max_bytes)
+    unsized = channel.physical_sizes is None
+    scan = channel.topography(physical_sizes=(1.0,) * len(shape) if unsized else None)
+    if scan.unit is not None:
+        scan = scan.to_unit("m")
+    source = f"{reader.format()}, {channel.channel_id}"
+    if scan.is_uniform:
+        heights, sides = scan.heights().T, tuple(map(float, scan.physical_sizes))[::-1]
+    else:
+        heights, sides = _at_equal_distances(*scan.positions_and_heights())
+        source += ", interpolated at equal distances"
+    return HeightMap(
+        heights=heights,
+        sides=None if unsized else sides,
+        metres=scan.unit is not None,
+        periodic=bool(scan.is_periodic),
+        source=source,
+        others=others,
+    )
+
+
+def _at_equal_distances(x: Any, heights: Any) -> tuple[Any, tuple[float]]:
+    """Linear interpolation of a line profile at as many points, and the length of their cell."""
+    points = len(x)
+    spacing = float(x[-1] - x[0]) / (points - 1)
+    return np.interp(x[0] + spacing * np.arange(points), x, heights), (points * spacing,)
+
+
+def _height_channel(path: Path, reader: Any, name: str | None) -> tuple[Any, tuple[str, ...]]:
+    """The named height channel of an open file, or its default one, and the names of the others.
+
+    Where the default channel holds no heights, the first one that does. Raises InputError.
+    """
+    channels = {
+        channel.channel_id: channel  # the name, and "name#2" for the second scan direction
+        for channel in reader.channels
+        if channel.data_kind.value == "height" and not isinstance(channel.unit, tuple)
+    }  # a channel with a pair of units holds phases or error signals over lengths
+    if name is None and channels:
+        default = reader.default_channel.channel_id
+        name = default if default in channels else next(iter(channels))
+    if name not in channels:
+        known = ", ".join(channels) or "none"
+        problem = "no height channel" if name is None else f"no height channel {name!r}"
+        raise InputError(f"{path}: {problem}; its height channels: {known}")
+    return channels[name], tuple(key for key in channels if key != name)

@@ -1,0 +1,33 @@
+"""Pictures of surfaces: heights on few pixels, for figures and reports."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gfmd_cli.grid.arrays import Field, Mask
+
+PIXELS = 192  # along the longer side of a picture: half a page wide, more cannot be seen
+LINE_PIXELS = 2048  # of a line profile
+
+
+@dataclass(frozen=True)
+class Picture:
+    """Heights of a map or a profile, with the extent that they cover."""
+
+    heights: Field
+    """Heights [m], shape (rows, columns) or (points,), NaN where missing."""
+    sides: tuple[float, ...]
+    """Extent along each axis [m]."""
+
+
+def picture(heights: Field, sides: tuple[float, ...], missing: Mask | None = None) -> Picture:
+    """A picture whose pixels are means over the known heights of some points."""
+    pixels = PIXELS if heights.ndim == 2 else LINE_PIXELS
+    step = -(-max(heights.shape) // pixels)
+    known = np.ones(heights.shape) if missing is None else (~missing).astype(np.float64)
+    total = heights if missing is None else np.where(missing, 0.0, heights)
+    for axis, points in enumerate(heights.shape):
+        starts = np.arange(0, points, step)
+        known, total = (np.add.reduceat(values, starts, axis) for values in (known, total))
+    with np.errstate(invalid="ignore"):
+        return Picture(np.where(known > 0, total / known, np.nan), sides)

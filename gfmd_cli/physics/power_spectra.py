@@ -1,0 +1,91 @@
+"""Power spectra and autocorrelations of fields, averaged over directions.
+
+The shells are those of Persson theory, Mueser, "Elastic contacts of randomly rough surfaces across
+the spatial dimensions", Sect. 4.1.1: exact shells at long waves, then logarithmic bins. They
+contain all waves of the grid, because displacement and stress have waves that the surface lacks.
+By Parseval's theorem the sum over the shells of a field is its variance.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from gfmd_cli.grid.arrays import Field, row_blocks
+from gfmd_cli.grid.fft_grid import Grid
+from gfmd_cli.physics.contact import radial_power
+from gfmd_cli.physics.persson import bin_edges
+
+EXACT, BINS = 64, 500  # shells of one |q|, and logarithmic bins; as in `persson.shells`
+
+
+@dataclass(frozen=True)
+class Spectra:
+    """Power spectra of fields in shells of increasing wavenumber, arrays of shape (shells,)."""
+
+    q: Field
+    """Mean wavenumber of the waves of the shell [1/m]."""
+    waves: Field
+    """Number of waves q in the shell."""
+    power: dict[str, Field]
+    """Sum of |f(q)|^2 over each shell [squared unit of the field], by name of the field."""
+
+
+def spectra(grid: Grid, fields: Mapping[str, Field]) -> Spectra:
+    """Sum |f(q)|^2 over the shells of all waves of the grid except q = 0."""
+    point = np.zeros(grid.shape)
+    point.flat[0] = grid.size  # every wave of a single point has |f(q)| = 1
+    m, count, _ = radial_power(grid, point)
+    edges = bin_edges(m.copy(), EXACT, BINS)
+
+    def binned(at: Field, values: Field) -> Field:
+        return np.asarray(np.bincount(np.searchsorted(edges, at), values, edges.size + 1), float)
+
+    waves = binned(m, count)
+    held = waves > 0
+    powers = {name: binned(*radial_power(grid, f)[:2])[held] for name, f in fields.items()}
+    q = binned(m, m * count)[held] / waves[held] * (2 * np.pi / grid.length)
+    return Spectra(q, waves[held], powers)
+
+
+def autocorrelations(grid: Grid, fields: Mapping[str, Field]) -> tuple[Field, dict[str, Field]]:
+    """Autocorrelation C(r) / C(0), C(r) = <(f(x) - <f>)(f(x + r) - <f>)>, averaged over rings.
+
+    The rings are one grid spacing wide, the wider of those along x and y, with radii of 0, 1, ...
+    spacings up to half the shorter side. Returns the mean distance r of each ring [m] and the mean
+    C(r) / C(0) by name of the field (NaN for a constant field), all of shape (rings,).
+    """
+    step = max(grid.spacings)
+    distance, rings = _distance(grid, step), int(0.5 * min(grid.sides) / step * (1 + 1e-12)) + 1
+    ring = np.rint(distance).astype(np.int64).ravel()
+    count = np.bincount(ring)
+
+    def mean(values: Field) -> Field:
+        return np.asarray(np.bincount(ring, values.ravel())[:rings] / count[:rings])
+
+    means = {name: mean(correlation(grid, values)) for name, values in fields.items()}
+    return mean(distance) * step, means
+
+
+def correlation(grid: Grid, field: Field) -> Field:
+    """C(r) / C(0) at every displacement r of the grid, shape `grid.shape`.
+
+    This is the transform of |f(q)|^2 without q = 0, by the Wiener-Khinchin theorem.
+    """
+    modes = grid.forward_into_work(field)
+    for rows in row_blocks(modes):
+        modes[rows] *= modes[rows].conj()
+    modes.flat[0] = 0.0
+    products = grid.empty()
+    grid.backward_into(products)
+    variance = float(products.flat[0])
+    return np.divide(products, variance if variance > 0 else np.nan, out=products)
+
+
+def _distance(grid: Grid, step: float) -> Field:
+    """Distance of every point from the nearest periodic image of the first [`step`]."""
+    square = np.zeros(())
+    for points, spacing in zip(grid.whole_shape, grid.spacings, strict=True):
+        along = np.minimum(np.arange(points), points - np.arange(points)) * (spacing / step)
+        square = np.add.outer(square, along**2)
+    return np.sqrt(square)

@@ -1,0 +1,139 @@
+"""Height and slope parameters of measured maps (ISO 25178-2) and profiles (ISO 21920-2).
+
+Heights are relative to their mean; missing heights are left out. Slopes are those of the
+triangles between neighbouring points: each square of four known points is divided along both
+diagonals, so that no direction is preferred.
+"""
+
+from dataclasses import asdict, dataclass
+from itertools import product
+from math import inf
+from typing import Any
+
+import numpy as np
+
+from gfmd_cli.grid.arrays import Field
+
+LEVEL = 0.2  # of the autocorrelation at the autocorrelation length: default of ISO 25178-2
+MAP_NAMES = ("Sq", "Sa", "Ssk", "Sku", "Sz", "Sdq", "Sdr", "Sal")
+PROFILE_NAMES = ("Pq", "Pa", "Psk", "Pku", "Pt", "Pdq", "Pdr", "Pal")
+MIN_OVERLAP = 0.25  # of the map and its shifted copy; a choice: fewer points give no average
+
+
+@dataclass(frozen=True)
+class RoughnessParameters:
+    """Parameters of a map, S..., or of a profile, P....; all of the heights as they are given."""
+
+    dimension: int
+    """2 for a map, 1 for a profile."""
+    rms_height: float
+    """Sq, Pq: root-mean-square height [m]."""
+    mean_height: float
+    """Sa, Pa: mean absolute height [m]."""
+    skewness: float
+    """Ssk, Psk: third moment of the heights / rms_height^3."""
+    kurtosis: float
+    """Sku, Pku: fourth moment of the heights / rms_height^4; 3 for Gaussian heights."""
+    total_height: float
+    """Sz, Pt: distance of highest peak and deepest pit [m]."""
+    rms_slope: float
+    """Sdq, Pdq: root-mean-square gradient."""
+    developed_area: float
+    """Sdr: additional area of the surface / its projected area; of a profile, additional length."""
+    correlation_length: float | None
+    """Sal, Pal: shortest distance at which the autocorrelation decays to 0.2 [m]; None where it
+    does not."""
+
+    def named(self) -> dict[str, float | None]:
+        """The parameters by their names in the standards."""
+        names = MAP_NAMES if self.dimension == 2 else PROFILE_NAMES
+        return dict(zip(names, list(asdict(self).values())[1:], strict=True))
+
+
+def roughness_parameters(
+    heights: "np.ma.MaskedArray[Any, Any]", spacing: tuple[float, ...]
+) -> RoughnessParameters:
+    """Parameters of a levelled map or profile.
+
+    Parameters
+    ----------
+    heights : levelled heights [m], shape (rows, columns) or (points,), masked where missing
+    spacing : distance of the points along each axis [m]
+    """
+    known = heights.compressed()
+    z = known - known.mean()
+    rms = float(np.sqrt(np.mean(z**2)))
+    slope, area = _slopes(heights, spacing)
+    return RoughnessParameters(
+        dimension=heights.ndim,
+        rms_height=rms,
+        mean_height=float(np.mean(np.abs(z))),
+        skewness=float(np.mean((z / rms) ** 3)) if rms else np.nan,
+        kurtosis=float(np.mean((z / rms) ** 4)) if rms else np.nan,
+        total_height=float(np.ptp(z)),
+        rms_slope=slope,
+        developed_area=area,
+        correlation_length=_correlation_length(heights, spacing),
+    )
+
+
+def _slopes(
+    heights: "np.ma.MaskedArray[Any, Any]", spacing: tuple[float, ...]
+) -> tuple[float, float]:
+    """Rms gradient and additional area of the triangles between neighbouring points.
+
+    NaN where no square of points is known.
+    """
+    z = np.ma.filled(heights, np.nan)
+    steps = [np.diff(z, axis=axis) / step for axis, step in enumerate(spacing)]
+    if z.ndim == 1:
+        squares = [steps[0] ** 2]
+    else:  # the triangle at each corner of a square has two of its edges
+        rows, columns = slice(None, -1), slice(1, None)
+        squares = [
+            steps[0][:, x] ** 2 + steps[1][y] ** 2 for y, x in product((rows, columns), repeat=2)
+        ]
+    known = np.isfinite(sum(squares))
+    if not known.any():
+        return np.nan, np.nan
+    chosen = [square[known] for square in squares]
+    slope = float(np.sqrt(np.mean([np.mean(square) for square in chosen])))
+    area = np.mean([np.mean(square / (np.sqrt(1 + square) + 1)) for square in chosen])
+    return slope, float(area)  # sqrt(1 + s) - 1 = s / (sqrt(1 + s) + 1) without cancellation
+
+
+def _correlation_length(
+    heights: "np.ma.MaskedArray[Any, Any]", spacing: tuple[float, ...]
+) -> float | None:
+    """Shortest distance at which the autocorrelation is at most `LEVEL`, right to one point."""
+    correlation = autocorrelation(heights)
+    squared: Any = 0.0
+    for axis, (points, step) in enumerate(zip(correlation.shape, spacing, strict=True)):
+        shift = np.fft.fftfreq(points, 1 / points) * step
+        along = [-1 if i == axis else 1 for i in range(correlation.ndim)]
+        squared = squared + shift.reshape(along) ** 2
+    low = correlation <= LEVEL  # false where unknown
+    return float(np.sqrt(np.min(squared, initial=inf, where=low))) if low.any() else None
+
+
+def autocorrelation(heights: "np.ma.MaskedArray[Any, Any]") -> Field:
+    """Autocorrelation over its value at zero shift, mean over the known pairs of points.
+
+    A map is not continued periodically: pairs exist where the map and its shifted copy overlap.
+    NaN where fewer than `MIN_OVERLAP` of the points do.
+
+    Returns an array of twice the shape, indexed by the shift as the output of an FFT.
+    """
+    known = ~np.ma.getmaskarray(heights)
+    z = np.where(known, np.ma.filled(heights, 0.0) - heights.mean(), 0.0)
+    shape, axes = [2 * points for points in z.shape], tuple(range(z.ndim))
+
+    def pairs(values: Field) -> Field:
+        power = np.abs(np.fft.rfftn(values, shape, axes)) ** 2
+        return np.asarray(np.fft.irfftn(power, shape, axes))
+
+    count = np.rint(pairs(known.astype(np.float64)))
+    enough = count >= MIN_OVERLAP * np.count_nonzero(known)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        means = np.where(enough, pairs(z) / count, np.nan)
+        return np.asarray(means / means.flat[0])

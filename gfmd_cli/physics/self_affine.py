@@ -1,0 +1,166 @@
+"""Random self-affine surfaces: the spectrum, and heights with the phases that a seed defines.
+
+Equation numbers are those of Mueser, "Elastic contacts of randomly rough surfaces across the
+spatial dimensions".
+"""
+
+from typing import Annotated, Any, ClassVar, Literal, Self
+
+import numpy as np
+from pydantic import Field as Key
+from pydantic import model_validator
+
+from gfmd_cli.choice import Positive, Seed
+from gfmd_cli.grid.arrays import Field, Modes
+from gfmd_cli.grid.fft_grid import Grid
+from gfmd_cli.physics.indenters import SMALLEST_GRID, RigidSurface
+
+
+class SelfAffine(RigidSurface):
+    """Random self-affine surface: |h(q)| = sqrt(C(q)), phases uniform in (0, 2 pi).
+
+    Paper Eqs. (3) and (40). The phase of a mode depends only on the seed and the mode, so a seed
+    defines one continuous surface for all grids; a smaller cut-off only adds modes to it.
+    """
+
+    rough: ClassVar[bool] = True
+    kind: Literal["self-affine"] = "self-affine"
+    hurst: Annotated[float, Key(gt=0, le=1)] = 0.8
+    """Hurst exponent H, 0 < H <= 1."""
+    rolloff: Positive = 0.5
+    """Roll-off (or cut-off) wavelength lambda_r / L."""
+    cutoff: Annotated[float, Key(gt=0, le=1)] = 0.005
+    """Short-wavelength cut-off lambda_s / L."""
+    spectrum: Literal["rolloff", "cutoff"] = "rolloff"
+    """"rolloff": C = [1 + (q/q_r)^2]^(-1-H), Eq. (3); "cutoff": C = (q/q_r)^(-2-2H) from q_r
+    on, zero below, Eq. (40)."""
+    seed: Seed = 0
+    """Seed of the random phases."""
+    h_std: Positive | None = None
+    """Root-mean-square height [m] to scale to; by default C = 1 m^2 at long wavelengths."""
+    length: Positive = 1.0
+    """Side of the cell along x, L [m]."""
+    length_y: Positive | None = None
+    """Side of the cell along y [m]; by default the points along y times the spacing along x."""
+
+    @model_validator(mode="after")
+    def _has_modes(self) -> Self:
+        if self.spectrum == "cutoff" and self.cutoff > self.rolloff:
+            raise ValueError(
+                f"cutoff = {self.cutoff:g} is above rolloff = {self.rolloff:g}: no mode is left"
+            )
+        return self
+
+    @property
+    def band_limited(self) -> bool:
+        """True: no wave is shorter than the cut-off."""
+        return True
+
+    @property
+    def highest_modes(self) -> tuple[int, int]:
+        """Largest numbers of waves along the sides y and x of the cell: side / lambda_s."""
+        length_y, length = self.sides
+        shortest = max(self.cutoff, 1e-300) / (1 + 1e-12)  # 1/0.01: 100, not 99
+        return int(np.floor(length_y / length / shortest)), int(np.floor(1 / shortest))
+
+    def smallest_grid(self) -> int:
+        """Smallest number of points along x, two per lambda_s."""
+        return max(SMALLEST_GRID, 2 * self.highest_modes[1])
+
+    def smallest_grid_y(self) -> int:
+        """Smallest number of points along y, likewise."""
+        return max(SMALLEST_GRID, 2 * self.highest_modes[0])
+
+    def resolution(self) -> str:
+        """Reason for the smallest grid: the cut-off needs two points per lambda_s."""
+        return f"kind {self.kind!r}, cutoff = {self.cutoff:g}: two points per lambda_s"
+
+    def remarks(self, boundary: str = "periodic") -> list[str]:
+        """A warning about a spectrum without a self-affine part."""
+        if self.cutoff <= self.rolloff:
+            return []
+        return [
+            f"surface.cutoff = {self.cutoff:g} is above surface.rolloff = {self.rolloff:g}: no "
+            "wave is self-affine"
+        ]
+
+    def heights_on(self, grid: Grid) -> Field:
+        """Heights [m] at the points of a grid that this process holds."""
+        self._write_modes(grid)
+        height = grid.empty()
+        grid.backward_into(height)
+        return height
+
+    def _amplitude(self, m: Field) -> Field:
+        """sqrt(C(q)) at |q| = 2 pi m / L, zero beyond the cut-off. Paper Eqs. (3), (40)."""
+        reduced = m * self.rolloff  # q / q_r
+        present = (m > 0) & (m * self.cutoff <= 1 + 1e-12)
+        if self.spectrum == "rolloff":
+            return np.where(present, (1 + reduced**2) ** (-0.5 - 0.5 * self.hurst), 0.0)
+        present &= reduced >= 1 - 1e-12
+        return np.where(present, np.where(present, reduced, 1.0) ** (-1 - self.hurst), 0.0)
+
+    def _write_modes(self, grid: Grid) -> None:
+        """Set `grid.work` to the Fourier coefficients on a grid that resolves the surface.
+
+        Phases are drawn in square rings |m|_max = 1, 2, ..., for one of q and -q. On a cell of
+        another aspect ratio |h(q)|^2 is C L / L_y, so that modes of any number per area give the
+        same density of height variance.
+        """
+        modes, (first, last) = grid.work, grid.span
+        modes[...] = 0.0
+        generator = np.random.Generator(np.random.PCG64(self.seed))
+        length_y, length = self.sides
+        highest_y, highest_x = self.highest_modes
+        ends, factor, variance = (first, min(last, highest_x + 1)), np.sqrt(length / length_y), 0.0
+        for ring in range(1, max(highest_y, highest_x) + 1):
+            y, x, phase = _ring(generator, ring, *ends, highest_y)
+            amplitude = factor * self._amplitude(np.hypot(y * (length / length_y), x))
+            coefficients = amplitude * np.exp(2j * np.pi * phase)
+            variance += 2 * float(np.sum(np.abs(coefficients) ** 2))
+            if 2 * ring == grid.points_y:  # m_y = +-ring are one row
+                np.add.at(modes, (y, x - first), coefficients)
+            else:
+                modes[y, x - first] = coefficients
+        _complete(modes, grid)
+        if self.h_std is not None:
+            modes *= self.h_std / np.sqrt(grid.total(variance) or 1.0)
+
+
+def _complete(modes: Modes, grid: Grid) -> None:
+    """Add the coefficients of -q where those of q and -q are both kept: q_x = 0 and Nyquist."""
+    opposite = -np.arange(grid.points_y)
+    for column, is_own in zip((0, -1), grid.ends, strict=True):
+        if is_own:
+            modes[:, column] += modes[opposite, column].conj()
+
+
+def _ring(
+    generator: np.random.Generator, ring: int, first: int, last: int, highest_y: int
+) -> tuple[Any, Any, Field]:
+    """Modes of a square ring with first <= m_x < last and |m_y| <= highest_y, and their phases.
+
+    The random numbers are assigned in this order: m_x = ring with m_y increasing from -ring;
+    m_y = ring; m_y = -ring. The generator skips the numbers of the modes that are left out.
+
+    Returns m_y, m_x and the phases / 2 pi, each of shape (modes,).
+    """
+    reach = min(ring, highest_y)
+    side = (ring - reach, ring + reach + 1) if first <= ring < last else (0, 0)
+    columns = [min(x, ring) if ring <= highest_y else 0 for x in (first, max(first, last))]
+    above = tuple(2 * ring + 1 + x for x in columns)
+    below = tuple(3 * ring + max(x, 1) for x in columns)
+    position, phases, indices = 0, [], []
+    for begin, end in (side, above, below):
+        if begin > position:
+            generator.bit_generator.advance(begin - position)  # type: ignore[attr-defined]
+        phases.append(generator.random(end - begin))
+        indices.append(np.arange(begin, end))
+        position = max(position, end)
+    if position < 4 * ring:
+        generator.bit_generator.advance(4 * ring - position)  # type: ignore[attr-defined]
+    index = np.concatenate(indices)
+    on_side, is_above = index <= 2 * ring, index <= 3 * ring
+    y = np.where(on_side, index - ring, np.where(is_above, ring, -ring))
+    x = np.where(on_side, ring, index - np.where(is_above, 2 * ring + 1, 3 * ring))
+    return y, x, np.concatenate(phases)

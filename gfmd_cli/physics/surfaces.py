@@ -1,0 +1,80 @@
+"""The union of all kinds of surface, and their heights on a grid.
+
+Each class is one `kind` of [surface] in the run spec. Heights h increase towards the elastomer.
+"""
+
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field as Key
+
+from gfmd_cli.errors import InputError
+from gfmd_cli.grid.arrays import Field
+from gfmd_cli.grid.distributed import create_grid
+from gfmd_cli.grid.fft_grid import Grid
+from gfmd_cli.grid.ranks import Ranks
+from gfmd_cli.physics.file_surface import FileSurface
+from gfmd_cli.physics.indenters import (
+    Cone,
+    LineParabola,
+    Parabola,
+    PowerLawIndenter,
+    Punch,
+    Ridge,
+    RigidSurface,
+    Wave,
+)
+from gfmd_cli.physics.self_affine import SelfAffine
+
+AXIS = {"points": "x", "points_y": "y"}
+
+Surface = Annotated[
+    SelfAffine
+    | Parabola
+    | PowerLawIndenter
+    | Cone
+    | Punch
+    | Ridge
+    | LineParabola
+    | Wave
+    | FileSurface,
+    Key(discriminator="kind"),
+]
+
+
+def check_resolved(surface: RigidSurface, points: int, points_y: int) -> None:
+    """Raise InputError where a grid of so many points along x and y does not resolve a surface."""
+    asked = {
+        "points": (points, surface.smallest_grid()),
+        "points_y": (points_y, surface.smallest_grid_y()),
+    }
+    for key, (given, needed) in asked.items():
+        if given < needed:
+            raise InputError(
+                f"grid.{key}: {given // surface.copies} points along {AXIS[key]} do not resolve "
+                f"the surface ({surface.resolution()}); use {needed // surface.copies} or more"
+            )
+
+
+def sample(
+    surface: RigidSurface, points: int, points_y: int = 0, ranks: Ranks | None = None
+) -> tuple[Grid, Field]:
+    """Make the grid of so many points on the cell of a surface, and the heights [m] on it.
+
+    `ranks` are the processes that share large grids. By default the number of points along y
+    makes the pixels square.
+
+    Raises InputError where the grid does not resolve the surface, the surface is flat, or its
+    heights overflow.
+    """
+    whole = surface.grid(points, points_y)
+    check_resolved(surface, points, whole.points_y)
+    grid = create_grid(whole, ranks)
+    with np.errstate(over="ignore", invalid="ignore"):  # refused below
+        heights = surface.heights_on(grid)
+        range_of_heights = grid.max(float(heights.max())) + grid.max(-float(heights.min()))
+    if not np.isfinite(range_of_heights):
+        raise InputError(f"surface: heights overflow (kind {surface.kind!r}); choose other units")
+    if range_of_heights == 0:
+        raise InputError(f"surface: flat (kind {surface.kind!r}); reduced units need roughness")
+    return grid, heights

@@ -1,0 +1,121 @@
+"""Tables of numbers in text files: what kind of height map a file can be.
+
+The readers of such files parse them to the end, and some try several hundred times, so that a large
+table that is no map would take hours. Here lines are counted in parts of the file, which takes at
+most some seconds.
+"""
+
+import os
+import re
+from collections.abc import Iterator
+from typing import Any, BinaryIO
+
+import numpy as np
+
+WINDOW = 2**21  # bytes read at a time: 32768 heights of 25 digits take less than half of it
+WINDOWS = 32  # of a file; those of a larger one leave gaps
+HEADER_LINES = 200  # that may differ from the table: as many as SurfaceTopography skips
+SAMPLE_BYTES = 2**16  # at the end of each window; a choice
+MIN_DIGITS = 0.2  # share of the characters of a table; a choice, as heights are mostly digits
+GRID_LINES = 20_000  # whose positions are compared; a choice
+MATRIX_COLUMNS = 4  # fewer are positions: the rule of SurfaceTopography
+END, BLANK, NUMBER, WORD = range(4)
+"""Kinds of characters."""
+NUMBERS = b"+-.,;0123456789eEdDinfaINFA"
+
+
+def table_formats(file: BinaryIO) -> set[str]:
+    """The formats of tables that a file can have.
+
+    "asc" is a matrix of heights between blanks; "xyz" are the positions and heights of a profile or
+    of points on a grid, between blanks, commas or semicolons.
+    """
+    formats = set()
+    if _columns(file, b" \t") >= MATRIX_COLUMNS:
+        formats.add("asc")
+    columns = _columns(file, b" \t,;")
+    if columns == 2 or (columns == 3 and _is_grid(file)):
+        formats.add("xyz")
+    return formats
+
+
+def _columns(file: BinaryIO, separators: bytes) -> int:
+    """Columns of a table of numbers, 0 where the lines do not have the same number of them.
+
+    Lines with words, which are headers, are left out, and so is a last line that is cut short.
+    """
+    kinds = _kinds(separators)
+    columns = 0
+    for position, lines in _windows(file):
+        sample = lines[len(lines) // 2 :][-SAMPLE_BYTES:]
+        digits = sum(sample.count(b"%d" % digit) for digit in range(10))
+        if b"\0" in lines or digits < MIN_DIGITS * len(sample):
+            return 0
+        counts = _counts(lines, kinds)
+        if not columns:
+            columns = int(counts[counts > 0][-1]) if counts.any() else 0
+        if position == 0:
+            counts = counts[HEADER_LINES:] if counts.size > HEADER_LINES else counts[-1:]
+        if ((counts != columns) & (counts != 0)).any():
+            return 0
+    return columns
+
+
+def _windows(file: BinaryIO) -> Iterator[tuple[int, bytes]]:
+    """Position and whole lines of parts of a file; a line of more than a window has no content."""
+    size = file.seek(0, os.SEEK_END)
+    gap = max(0, size // WINDOWS - WINDOW)
+    position = 0
+    while position < size:
+        file.seek(position)
+        window = file.read(WINDOW)
+        begin = _first_end(window) if position and gap else 0
+        end = max(window.rfind(b"\n"), window.rfind(b"\r")) + 1
+        if end <= begin and position + len(window) < size:
+            yield position, b"\0"
+            return
+        if end > begin:
+            yield position, window[begin:end]
+        position += (end or len(window)) + gap
+
+
+def _first_end(window: bytes) -> int:
+    """Where the second line begins."""
+    match = re.search(rb"[\r\n]", window)
+    return match.end() if match else len(window)
+
+
+def _kinds(separators: bytes) -> bytes:
+    """The kind of each character, for `bytes.translate`."""
+    kinds = bytearray([WORD]) * 256
+    for characters, kind in ((NUMBERS, NUMBER), (separators, BLANK), (b"\r\n", END)):
+        for character in characters:
+            kinds[character] = kind
+    return bytes(kinds)
+
+
+def _counts(lines: bytes, kinds: bytes) -> np.ndarray[Any, np.dtype[np.int64]]:
+    """Numbers in each line, 0 where there are words."""
+    kind = np.frombuffer(lines.translate(kinds), np.uint8)
+    inside = kind >= NUMBER
+    begins = inside.copy()
+    begins[1:] &= ~inside[:-1]
+    ends = kind == END
+    starts = np.concatenate([[0], np.flatnonzero(ends[:-1]) + 1])
+    counts = np.add.reduceat(begins, starts, dtype=np.int64)
+    counts[np.logical_or.reduceat(kind == WORD, starts)] = 0
+    return counts
+
+
+def _is_grid(file: BinaryIO) -> bool:
+    """Whether three columns can be points on a grid: few different positions, in some lines."""
+    size = file.seek(0, os.SEEK_END)
+    for position, lines in _windows(file):
+        rows = [re.split(rb"[\s,;]+", line.strip()) for line in lines.splitlines()[-GRID_LINES:]]
+        x, y = ({row[axis] for row in rows if len(row) == 3} for axis in (0, 1))
+        points = size / len(lines) * lines.count(b"\n" if b"\n" in lines else b"\r")
+        if position + len(lines) == size and len(rows) < GRID_LINES:
+            return True  # a small file, which is read soon
+        if len(x) * len(y) > 2 * points:
+            return False
+    return True

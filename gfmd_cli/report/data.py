@@ -1,0 +1,117 @@
+"""The data of a page: a study compared with theory, and a bench where one is given."""
+
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from gfmd_cli.analysis.compare import Comparison, Row, compare_open
+from gfmd_cli.analysis.figures import items_of, study_figures
+from gfmd_cli.analysis.plotting import ColumnFigure
+from gfmd_cli.analysis.series import Item
+from gfmd_cli.analysis.table import Column
+from gfmd_cli.analysis.tables import TitledCurves, curve_title
+from gfmd_cli.analysis.units import in_si
+from gfmd_cli.bench.file import Trace
+from gfmd_cli.report.section import Section
+from gfmd_cli.status import Status
+from gfmd_cli.study.reading import open_study
+
+
+@dataclass(frozen=True)
+class ReportData:
+    """What the sections are made from."""
+
+    comparison: Comparison
+    rows: list[Row]
+    """One for each task, missing ones too."""
+    attributes: dict[str, str]
+    """Attributes of the study file."""
+    traces: list[Trace] = field(default_factory=list)
+    """Traces of the bench; none where no bench is given."""
+    letter: str = ""
+    """A or B, of two studies side by side."""
+
+    @cached_property
+    def figures(self) -> dict[str, ColumnFigure]:
+        """The figures of the study by name."""
+        return study_figures(self.comparison, self.items)
+
+    @cached_property
+    def items(self) -> list[Item]:
+        """The curves in the order and style of the figures."""
+        return items_of(self.comparison)
+
+    @property
+    def curves(self) -> TitledCurves:
+        """The curves by their names in figures and in full."""
+        return [(item_title(item), item.curve) for item in self.items]
+
+    @property
+    def solved(self) -> list[Row]:
+        """The rows that hold a result."""
+        return [row for row in self.rows if row["status"] != Status.MISSING]
+
+    @property
+    def name(self) -> str:
+        """Name of the study; of two studies, which may share it, that of the file."""
+        return self.comparison.path.name if self.letter else self.attributes.get("title", "study")
+
+    @property
+    def title(self) -> str:
+        """Name of the study, with its letter where there are two."""
+        return f"{self.letter}: {self.name}" if self.letter else self.name
+
+    @property
+    def prefix(self) -> str:
+        """What the names of figures begin with that two studies have of their own."""
+        return f"{self.letter}-" if self.letter else ""
+
+    @property
+    def in_si(self) -> bool:
+        """Whether metres and pascals mean something in some contact."""
+        return any(map(in_si, self.solved))
+
+    def shown(self, columns: Sequence[Column]) -> list[Column]:
+        """The columns whose units mean something in this study."""
+        return [column for column in columns if self.in_si or not column.unit]
+
+    def json(self, attribute: str) -> dict[str, Any]:
+        """An attribute that holds JSON; empty where it holds none."""
+        try:
+            data = json.loads(self.attributes.get(attribute, ""))
+        except (ValueError, RecursionError):
+            return {}
+        return data if isinstance(data, dict) else {}
+
+
+SectionOf = Callable[[ReportData], Section | None]
+"""Makes a section, or none where the study has no data for it."""
+
+
+def read_report_data(study: Path, letter: str = "") -> ReportData:
+    """Read a study. Raises InputError, StudyError."""
+    with open_study(study) as file:
+        comparison, rows, attributes = compare_open(file, study), file.rows, file.attributes
+    curves = [replace(curve, study=letter) for curve in comparison.curves]
+    return ReportData(replace(comparison, curves=curves), rows, attributes, letter=letter)
+
+
+def side_by_side(studies: Sequence[ReportData], traces: list[Trace]) -> ReportData:
+    """The curves and rows of one study or of two together, and the traces of a bench."""
+    first = studies[0]
+    if len(studies) == 1:
+        return replace(first, traces=traces)
+    curves = [curve for data in studies for curve in data.comparison.curves]
+    missing = sum(data.comparison.missing for data in studies)
+    comparison = replace(first.comparison, curves=curves, missing=missing)
+    rows = [row for data in studies for row in data.rows]
+    return ReportData(comparison, rows, {}, traces)
+
+
+def item_title(item: Item) -> str:
+    """A curve by its name in figures and in full."""
+    short, full = item.style.label.replace(r"\$", "$"), curve_title(item.curve)
+    return full if short == item.curve.elastomer else f"{short}: {full}"

@@ -1,0 +1,143 @@
+"""Figures as plotly.js draws them: the layers of a figure as traces, its axes as a layout."""
+
+import math
+from collections.abc import Iterable
+from html import escape
+from typing import Any
+
+from gfmd_cli.analysis.layers import Layer
+from gfmd_cli.analysis.plotting import BAND, ColumnFigure
+from gfmd_cli.analysis.table import known, plus_minus
+from gfmd_cli.grid.arrays import Field
+from gfmd_cli.report.labels import html_label, plain_label
+from gfmd_cli.report.rendering import clean
+from gfmd_cli.report.theme import INK, hex_of
+
+SYMBOLS = {
+    "o": ("circle-open", "○"),
+    "s": ("square-open", "□"),
+    "^": ("triangle-up-open", "△"),
+    "D": ("diamond-open", "◇"),
+    "v": ("triangle-down-open", "▽"),
+    "<": ("triangle-left-open", "◁"),
+    "p": ("pentagon-open", "⬠"),
+    ">": ("triangle-right-open", "▷"),
+    "h": ("hexagon-open", "⬡"),
+    "x": ("x-thin-open", "×"),
+}
+"""Markers by their names in matplotlib: as plotly.js names them, and as a character."""
+LINE, DASHES, PATCH = "—", "┄", "■"
+Errors = tuple[Field, Field] | None
+"""Lengths of error bars down and up, if there are any."""
+PIXELS = 1.6  # of the page for a point of the figure
+DIGITS, LINE_DIGITS = 10, 5  # of the values of points, and of lines, which are only looked at
+DARKER = "#666666"  # of what all curves share
+
+
+def interactive(figure: ColumnFigure) -> dict[str, Any] | None:
+    """Traces, layout and legend of a figure, as plain data; None where it has no layer.
+
+    Colours are those of the figure; the page replaces them by those of its colour scheme.
+    """
+    if not figure.layers:
+        return None
+    x, y = figure.axes.get_xlabel(), figure.axes.get_ylabel()
+    names = plain_label(x), plain_label(y)
+    layout = {
+        "xaxis": _axis(html_label(x), figure.axes.get_xscale(), figure.axes.get_xlim()),
+        "yaxis": _axis(html_label(y), figure.axes.get_yscale(), figure.axes.get_ylim()),
+    }
+    if figure.second is not None:
+        label, factor = figure.second
+        low, high = figure.axes.get_xlim()
+        scaled = _axis(html_label(label), figure.axes.get_xscale(), (low * factor, high * factor))
+        layout["xaxis2"] = scaled | {"overlaying": "x", "side": "top"}
+    return {
+        "data": [_trace(layer, names) for layer in figure.layers],
+        "layout": layout,
+        "factor": None if figure.second is None else figure.second[1],
+        "legend": [_entry(label, handle) for label, handle in figure.legend.items()],
+        "names": names,
+    }
+
+
+def _trace(layer: Layer, names: tuple[str, str]) -> dict[str, Any]:
+    """A layer as plotly.js has it; `meta` names the entries of the legend it belongs to."""
+    meta = [_name(name) for name in layer.names]
+    digits = LINE_DIGITS if layer.kind == "line" else DIGITS
+    x, y = _numbers(layer.x, digits), _numbers(layer.y, digits)
+    if layer.kind == "points":
+        return {"meta": meta, "x": x, "y": y, **_points(layer, names)}
+    if layer.high is not None:
+        x, y = x + x[::-1], y + _numbers(layer.high, digits)[::-1]  # there and back around a band
+        filled = {"fill": "toself", "fillcolor": layer.colour, "opacity": BAND}
+        return {"meta": meta, "x": x, "y": y, "mode": "none", "hoverinfo": "skip", **filled}
+    line = {"color": layer.colour, "width": PIXELS * layer.width, "simplify": False}
+    line |= {"dash": "dash"} if layer.dashed else {}
+    return {"meta": meta, "x": x, "y": y, "mode": "lines", "line": line, "hoverinfo": "skip"}
+
+
+def _points(layer: Layer, names: tuple[str, str]) -> dict[str, Any]:
+    symbol, _ = SYMBOLS[layer.marker]
+    width = 0.9 * PIXELS
+    marker = {"symbol": symbol, "color": layer.colour, "size": 8, "line": {"width": width}}
+    trace: dict[str, Any] = {"mode": "markers", "marker": marker, "hoverinfo": "text"}
+    errors = layer.errors()
+    if errors is not None:
+        down, up = (_numbers(side, DIGITS) for side in errors)
+        bars = {"array": up, "color": layer.colour, "thickness": 1.2, "width": 3}
+        trace["error_y"] = bars | ({} if down == up else {"symmetric": False, "arrayminus": down})
+    trace["text"] = [_hover(layer, place, names, errors) for place in range(layer.x.size)]
+    return trace
+
+
+def _hover(layer: Layer, place: int, names: tuple[str, str], errors: Errors) -> str:
+    """What a point says when it is pointed at: curve, values, and what else is known of it."""
+    details = clean(layer.details[place]).split("\n") if layer.details else []
+    lines = [_name(layer.names[0]), *_values(layer, place, names, errors), *details]
+    return "<br>".join(escape(line, quote=False) for line in lines)
+
+
+def _values(layer: Layer, place: int, names: tuple[str, str], errors: Errors) -> list[str]:
+    """Both values of a point, with the error."""
+    x, y = float(layer.x[place]), float(layer.y[place])
+    error = math.nan if errors is None else float(max(side[place] for side in errors))
+    shown = plus_minus(y, error).replace("+-", "±") if known(error) else f"{y:.4g}"
+    return [f"{names[0]}: {x:.4g}", f"{names[1]}: {shown}"]
+
+
+def _axis(title: str, scale: str, limits: tuple[float, float]) -> dict[str, Any]:
+    ends = [math.log10(end) if scale == "log" else end for end in limits]
+    return {"title": {"text": title}, "type": scale, "range": _numbers(ends, DIGITS)}
+
+
+def _entry(label: str, handle: Any) -> dict[str, str]:
+    """An entry of the legend: its name, a character for its symbol, its colour."""
+    colour = handle.get_color()
+    shared = not isinstance(colour, tuple) and not str(colour).startswith("#")
+    return {
+        "name": _name(label),
+        "symbol": _symbol(handle),
+        "colour": (INK if colour == "black" else DARKER) if shared else _hex(colour),
+    }
+
+
+def _hex(colour: str | tuple[float, float, float]) -> str:
+    return colour if isinstance(colour, str) else hex_of(*colour)
+
+
+def _symbol(handle: Any) -> str:
+    if handle.get_marker() in SYMBOLS:
+        return SYMBOLS[handle.get_marker()][1]
+    if handle.get_linewidth() > 4:
+        return PATCH
+    return LINE if handle.get_linestyle() == "-" else DASHES
+
+
+def _name(label: str) -> str:
+    return str(clean(label)).replace(r"\$", "$")
+
+
+def _numbers(values: Iterable[float] | Field, digits: int) -> list[float | None]:
+    """Values rounded to some digits; None where there is none, which JSON has for NaN."""
+    return [float(f"{v:.{digits}g}") if math.isfinite(v) else None for v in values]

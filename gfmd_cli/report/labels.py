@@ -1,0 +1,45 @@
+"""Labels of figures, which matplotlib typesets, as HTML and as plain text."""
+
+import re
+from html import escape, unescape
+
+SYMBOLS = {"Delta": "Δ", "sigma": "σ", "lambda": "λ", "langle": "⟨", "rangle": "⟩"}
+PART = r"\\mathrm\{[^}]*\}|\{[^}]*\}|\\[A-Za-z]+|."
+"""What a sub- or superscript may be."""
+TOKEN = re.compile(
+    rf"(?P<script>[_^])(?P<part>{PART})|\\mathrm\{{(?P<upright>[^}}]*)\}}|\\(?P<name>[A-Za-z]+)"
+    r"|(?P<space>\\[,;]|\s+)|(?P<letter>[A-Za-z])|(?P<other>.)"
+)
+DOLLAR = "\0"
+
+
+def html_label(label: str) -> str:
+    """A label with its mathematics between dollar signs in the few elements that figures know."""
+    pieces = label.replace(r"\$", DOLLAR).split("$")
+    text = "".join(_math(p) if i % 2 else escape(p) for i, p in enumerate(pieces))
+    return re.sub(r"\s+", " ", text).replace(DOLLAR, "$").strip()
+
+
+def plain_label(label: str) -> str:
+    """A label without any markup; subscripts follow an underscore."""
+    text = re.sub("<sub>", "_", html_label(label))
+    return unescape(re.sub("<[^>]+>", "", text))
+
+
+def _math(text: str) -> str:
+    return "".join(_token(found) for found in TOKEN.finditer(text))
+
+
+def _token(found: re.Match[str]) -> str:
+    if found["script"]:
+        part = found["part"]
+        inside = _math(part[1:-1] if part.startswith("{") else part)
+        name = "sub" if found["script"] == "_" else "sup"
+        return inside if inside == "*" else f"<{name}>{inside}</{name}>"
+    if found["upright"] is not None:
+        return escape(found["upright"])
+    if found["name"]:
+        return SYMBOLS.get(found["name"], found["name"])
+    if found["letter"]:
+        return f"<i>{found['letter']}</i>"
+    return " " if found["space"] else escape(found["other"].replace("-", "−"))

@@ -1,0 +1,197 @@
+"""Section: maps of contact, stress and gap, and cross-sections, of some contacts."""
+
+from collections import defaultdict
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from gfmd_cli.analysis.compare import Row
+from gfmd_cli.analysis.plotting import WIDTH, ColumnFigure, shades
+from gfmd_cli.analysis.selection import evenly
+from gfmd_cli.analysis.table import Column, Group, Table
+from gfmd_cli.analysis.tables import AREA, P_STAR, POINTS, PRESSURE
+from gfmd_cli.analysis.units import pressure_text
+from gfmd_cli.grid.arrays import Field, Mask
+from gfmd_cli.physics.observables import contact_points
+from gfmd_cli.report.data import ReportData
+from gfmd_cli.report.profiles import plane, profile_figure, read_profile
+from gfmd_cli.report.scales import HEIGHT_SCALE, LENGTH_SCALE, STRESS_SCALE, Scale
+from gfmd_cli.report.section import Drawing, Section
+from gfmd_cli.report.svg import drawing
+from gfmd_cli.study.reading import StudyFile, open_study
+
+MAX_CONTACTS, MAX_CURVES = 12, 3  # contacts that are shown, of at most so many curves
+SIDE = 256  # pixels of a map at the most
+LOWEST, HIGHEST = 0.35, 1.2  # height of a figure over its width, for oblong cells; a choice
+NOISE = 1e-3  # of the nominal pressure; where contact is not known, less stress is none
+ROWS = 256  # pixels' worth of rows that are held at a time
+TOUCHING = "#0077bb"
+COLOURS, FAINTEST = "viridis", 0.3
+"""Colours of stress and gap, and how far along them the least is: told from none by LEGIBLE."""
+NONE, BEYOND = "black", "#cc3311"
+MOST = 99  # percentile of the stress in contact, of the gap beside it, that the colours reach to
+STORED = ("fields", "cross_sections")
+CAPTION = "The values are in /fields/TASK and /cross_sections/TASK of the study file."
+SHOWN = (
+    Column("task", "task", "d"),
+    Column("body", "elastomer"),
+    P_STAR,
+    PRESSURE,
+    AREA,
+    POINTS,
+)
+
+
+class ContactMaps(NamedTuple):
+    """The figures of one contact."""
+
+    title: str
+    drawings: list[Drawing]
+
+
+class PressureSeries(NamedTuple):
+    """The contacts of one curve, pressure rising."""
+
+    title: str
+    contacts: list[ContactMaps]
+
+
+def maps(data: ReportData) -> Section:
+    """Where the surfaces touch, and how hard."""
+    with open_study(data.comparison.path) as study:
+        tasks = {task for group in STORED for task in study.tasks_with(group)}
+        stored = [row for row in data.solved if row["task"] in tasks]
+        chosen = _chosen(stored)
+        shown = [row for rows in chosen for row in rows]
+        series = [_pressure_series(study, rows, data.prefix) for rows in chosen]
+    notes = [
+        f"{len(shown)} of {len(stored)} contacts with stored fields are shown, "
+        f"{MAX_CONTACTS} at most."
+    ]
+    if any(plane(row) and max(row["points"], row["points_y"]) > SIDE for row in shown):
+        notes.append(f"Maps have up to {SIDE} pixels a side, each the mean of some grid points.")
+    table = Table(CAPTION, data.shown(SHOWN), [Group("", shown)])
+    return Section(
+        "Maps and cross-sections",
+        notes=notes,
+        tables={"Table: the contacts shown": table},
+        template="maps.html",
+        content=series,
+    )
+
+
+def _chosen(stored: list[Row]) -> list[list[Row]]:
+    """At most MAX_CURVES curves, and pressures at equal distances of each."""
+    curves: dict[Any, list[Row]] = {}
+    for row in stored:
+        curves.setdefault((row["scene"], row["solver"], row["tolerance"]), []).append(row)
+    chosen = evenly(list(curves.values()), MAX_CURVES)
+    pressures = [sorted(rows, key=lambda row: float(row["p_star"])) for rows in chosen]
+    return [evenly(rows, MAX_CONTACTS // len(chosen)) for rows in pressures]
+
+
+def _pressure_series(study: StudyFile, rows: list[Row], prefix: str) -> PressureSeries:
+    """The contacts of one curve."""
+    title = f"{rows[0]['elastomer']} on {rows[0]['surface']}"
+    return PressureSeries(title, [_contact_maps(study, row, prefix) for row in rows])
+
+
+def _contact_maps(study: StudyFile, row: Row, prefix: str) -> ContactMaps:
+    """The maps and the cross-section of one contact."""
+    task = row["task"]
+    drawings = [
+        drawing(plot, f"{prefix}{name}-{task}", f"{what}, task {task}", f"{what}.")
+        for name, plot, what in _map_figures(study, row)
+    ]
+    profile = read_profile(study, row)
+    if profile is not None:
+        line = f"along {profile.along}{profile.place}"
+        what = f"Cross-section {line}: heights above, stress below"
+        plot = profile_figure(profile)
+        drawings.append(
+            drawing(plot, f"{prefix}section-{task}", f"{what}, task {task}", f"{what}.")
+        )
+    return ContactMaps(f"{pressure_text(row)}, a_r = {row['a_r']:.3g}", drawings)
+
+
+def _map_figures(study: StudyFile, row: Row) -> list[tuple[str, ColumnFigure, str]]:
+    """Maps of contact, stress and gap, as far as the fields for them are stored."""
+    shape = study.shapes("fields", row["task"]).get("sigma", ())
+    if len(shape) != 2:
+        return []
+    pixels = _thumbnails(study, row["task"], -(-max(shape) // SIDE))
+    stress, touching = pixels["stress"], pixels.get("contact")
+    red = f"red: the {100 - MOST} % of the {{}} above the scale"
+    what = f"Stress; black: none, {red.format('contact')}"
+    loaded = stress > NOISE * row["pressure"] if touching is None else touching > 0
+    label = r"stress $\sigma$"
+    figures = [("stress", _scaled_figure(stress, loaded, row, STRESS_SCALE, label), what)]
+    if touching is not None:
+        gap = pixels["gap"]
+        figures.insert(0, ("contact", _contact_figure(touching, row), "Contact"))
+        what = f"Gap; black: contact, {red.format('rest')}"
+        figures.append(("gap", _scaled_figure(gap, gap > 0, row, HEIGHT_SCALE, "gap"), what))
+    return figures
+
+
+def _thumbnails(study: StudyFile, task: int, step: int) -> dict[str, Field]:
+    """Means over pixels of step^2 points: the stress and, as far as known, contact and gap."""
+    rows: dict[str, list[Field]] = defaultdict(list)
+    for block in study.blocks("fields", task, ROWS * step, ("u", "sigma", "height")):
+        rows["stress"].append(_means(block["sigma"], step))
+        if {"u", "height"} <= block.keys():
+            mask = contact_points(block["height"], block["u"], block["sigma"])
+            rows["contact"].append(_means(mask.astype(np.float64), step))
+            rows["gap"].append(_means(block["u"] - block["height"], step))
+    return {name: np.concatenate(blocks) for name, blocks in rows.items()}
+
+
+def _means(block: Field, step: int) -> Field:
+    """Over squares of step x step points, smaller ones at the end."""
+    if step == 1:
+        return block
+    total = np.ones_like(block)
+    for axis in (0, 1):
+        starts = np.arange(0, block.shape[axis], step)
+        block = np.add.reduceat(block, starts, axis)
+        total = np.add.reduceat(total, starts, axis)
+    means: Field = block / total
+    return means
+
+
+def _contact_figure(touching: Field, row: Row) -> ColumnFigure:
+    plot, extent = _cell(row)
+    colour = np.array(list(bytes.fromhex(TOUCHING[1:]))) / 255
+    image = np.concatenate(
+        [np.broadcast_to(colour, (*touching.shape, 3)), touching[..., None]], axis=2
+    )
+    plot.axes.imshow(image, origin="lower", extent=extent, interpolation="none")
+    return plot
+
+
+def _scaled_figure(values: Field, shown: Mask, row: Row, scale: Scale, label: str) -> ColumnFigure:
+    """Colours up to what but a few of the values shown exceed, else peaks leave all dark."""
+    plot, extent = _cell(row)
+    top = float(np.percentile(values[shown], MOST)) if np.any(shown) else 0.0
+    divisor, label = scale.axis(row, top, label)
+    image = plot.axes.imshow(
+        np.where(shown, values / divisor, np.nan),
+        origin="lower",
+        extent=extent,
+        interpolation="none",
+        cmap=shades(COLOURS, FAINTEST, NONE, BEYOND),
+        vmin=0,
+        vmax=top / divisor or 1.0,
+    )
+    bar = plot.figure.colorbar(image, ax=plot.axes, shrink=0.92, pad=0.02, extend="max")
+    bar.set_label(label)
+    return plot
+
+
+def _cell(row: Row) -> tuple[ColumnFigure, tuple[float, float, float, float]]:
+    """Axes of the cell, and where it ends in their units."""
+    length, length_y = float(row["length"]), float(row["length_y"])
+    divisor, x = LENGTH_SCALE.axis(row, max(length, length_y), "x")
+    plot = ColumnFigure(x, f"y{x[1:]}")
+    plot.height = min(max(0.85 * length_y / length, LOWEST), HIGHEST) * WIDTH
+    return plot, (0.0, length / divisor, 0.0, length_y / divisor)

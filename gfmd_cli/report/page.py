@@ -1,0 +1,107 @@
+"""The page: one HTML file that needs nothing else."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+from gfmd_cli.analysis.export import csv_text
+from gfmd_cli.analysis.plotting import styled
+from gfmd_cli.bench.file import Trace, read_bench
+from gfmd_cli.report.data import ReportData, SectionOf, read_report_data, side_by_side
+from gfmd_cli.report.difference import difference
+from gfmd_cli.report.maps import maps
+from gfmd_cli.report.measured_surface import measured_surface
+from gfmd_cli.report.provenance import provenance
+from gfmd_cli.report.quantities import (
+    contact_area,
+    error_bars,
+    mean_gap,
+    optional_observables,
+    stress_deviation,
+)
+from gfmd_cli.report.rendering import render
+from gfmd_cli.report.scripts import policy, scripts
+from gfmd_cli.report.section import Section
+from gfmd_cli.report.stress_distribution import stress_distribution
+from gfmd_cli.report.summary import failures, headline, key_numbers, verdict, warnings
+from gfmd_cli.report.surface import surface_spectrum
+from gfmd_cli.report.theme import variables
+from gfmd_cli.report.work_precision import work_precision
+
+OWN, SHARED = True, False
+SECTIONS: tuple[tuple[SectionOf, bool], ...] = (
+    (failures, OWN),
+    (measured_surface, OWN),
+    (contact_area, SHARED),
+    (mean_gap, SHARED),
+    (stress_deviation, SHARED),
+    (stress_distribution, SHARED),
+    (error_bars, SHARED),
+    (optional_observables, SHARED),
+    (maps, OWN),
+    (surface_spectrum, SHARED),
+    (work_precision, SHARED),
+    (provenance, OWN),
+)
+"""In the order of the page; of two studies each has its own, or both share it."""
+
+
+MAX_CSV = 1_000_000  # bytes of the table of a study in its page; a larger one is for gfmd export
+UNQUOTED = " ,;:()*/=@+"
+
+
+def report(study: Path, bench: Path | None = None, other: Path | None = None) -> str:
+    """The page of a study or of two, the same text each time. Raises InputError, StudyError."""
+    paths = {"": study} if other is None else {"A": study, "B": other}
+    studies = [read_report_data(path, letter) for letter, path in paths.items()]
+    traces = [] if bench is None else read_bench(bench)
+    name = " and ".join(data.name for data in studies)
+    with styled():
+        sections = list(_sections(studies, traces))
+    body = render(
+        "body.html",
+        name=name,
+        studies=[_top(data) for data in studies],
+        sections=sections,
+    )
+    page = render(
+        "page.html",
+        name=name,
+        policy=policy(),
+        colours=variables(body),
+        body=body,
+        scripts=scripts(),
+    )
+    return f"{page}\n"
+
+
+def _top(data: ReportData) -> dict[str, Any]:
+    """What stands above the sections."""
+    return {
+        "title": data.title,
+        "headline": headline(data),
+        "warnings": warnings(data),
+        "verdict": verdict(data),
+        "key_numbers": key_numbers(data),
+        "csv_name": f"{data.comparison.path.stem}.csv",
+        "csv_address": _csv_address(data),
+    }
+
+
+def _csv_address(data: ReportData) -> str:
+    """The whole table of a study as the address of a link; empty for a large one."""
+    text = csv_text(data.solved)
+    return f"data:text/csv;charset=utf-8,{quote(text, UNQUOTED)}" if len(text) < MAX_CSV else ""
+
+
+def _sections(studies: list[ReportData], traces: list[Trace]) -> Iterator[Section]:
+    """The sections that the studies have data for."""
+    if len(studies) == 2:
+        yield difference(*studies)
+    shared = side_by_side(studies, traces)
+    for make, own in SECTIONS:
+        for data in studies if own else [shared]:
+            section = make(data)
+            if section is not None:
+                yield section.of(data.letter)

@@ -1,0 +1,110 @@
+"""Cross-sections: heights of indenter and elastomer, and the stress."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from gfmd_cli.analysis.compare import Row
+from gfmd_cli.analysis.plotting import HEIGHT, WIDTH, LegendFigure
+from gfmd_cli.analysis.units import largest
+from gfmd_cli.grid.arrays import Field
+from gfmd_cli.report.scales import HEIGHT_SCALE, LENGTH_SCALE, STRESS_SCALE
+from gfmd_cli.study.reading import StudyFile
+
+LINES = {
+    "height": ("indenter h", {"color": "black", "lw": 1.2}),
+    "u": ("elastomer u", {"color": "#0077bb", "lw": 0.9}),
+}
+STRESS = "#cc3311"
+ROWS = 256  # of the fields that are held at a time
+
+
+@dataclass(frozen=True)
+class Profile:
+    """Values along a line through the cell."""
+
+    values: dict[str, Field]
+    """Stored ones of u [m], height [m] and sigma [Pa], each of shape (points,)."""
+    position: Field
+    """Distance along the line [m], shape (points,)."""
+    along: str
+    """Name of the line."""
+    row: Row
+    """The contact; stresses far below its nominal pressure are rounding."""
+    place: str = ""
+    """Where the line lies in the cell, in words."""
+
+
+def read_profile(study: StudyFile, row: Row) -> Profile | None:
+    """The cross-section of a contact; a line scene may have stored it as its fields.
+
+    Where the fields of a cell are stored, the row of the grid that carries most load; the diagonal,
+    which can miss all contacts, only where that alone is stored.
+    """
+    line = not plane(row)
+    if not line and LINES.keys() | {"sigma"} <= study.shapes("fields", row["task"]).keys():
+        return _most_loaded(study, row)
+    values = study.arrays("cross_sections", row["task"])
+    if line and not values:
+        values = study.arrays("fields", row["task"])
+    if not values:
+        return None
+    size = next(iter(values.values())).size
+    length = float(row["length"])
+    step = (length if line else float(np.hypot(length, row["length_y"]))) / size
+    position = (np.arange(size) + size * row["x_first"]) * step
+    return Profile(values, position, "the cell" if line else "the diagonal", row)
+
+
+def _most_loaded(study: StudyFile, row: Row) -> Profile:
+    """The row of the grid that carries most load, of stored fields."""
+    blocks = study.blocks("fields", row["task"], ROWS, ["sigma"])
+    loads = np.concatenate(
+        [np.nan_to_num(np.maximum(block["sigma"], 0.0)).sum(axis=1) for block in blocks]
+    )
+    y = int(np.argmax(loads))
+    values = study.row("fields", row["task"], y)
+    size = values["sigma"].size
+    position = (np.arange(size) / size + row["x_first"]) * float(row["length"])
+    place = f" through the row that carries most load (y = {y / loads.size:.2f} of the side)"
+    return Profile(values, position, "x", row, place)
+
+
+def plane(row: Row) -> bool:
+    """Whether a contact has maps; a line scene has none."""
+    return int(row["dimension"]) == 2
+
+
+def profile_figure(profile: Profile) -> LegendFigure:
+    """Heights above, stress below, over one position."""
+    plot = LegendFigure(WIDTH, 1.5 * HEIGHT)
+    length = float(np.ptp(profile.position))
+    divisor, label = LENGTH_SCALE.axis(profile.row, length, f"position along {profile.along}")
+    x = profile.position / divisor
+    upper, lower = plot.figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
+    _draw_heights(plot, upper, x, profile)
+    _draw_stress(lower, x, profile)
+    lower.set(xlabel=label, xlim=(x[0], x[-1]))
+    return plot
+
+
+def _draw_heights(plot: LegendFigure, axes: Any, x: Field, profile: Profile) -> None:
+    heights = {name: profile.values[name] for name in LINES if name in profile.values}
+    highest = max((largest(np.abs(y)) for y in heights.values()), default=0.0)
+    divisor, axis = HEIGHT_SCALE.axis(profile.row, highest, "height")
+    for name, y in heights.items():
+        label, style = LINES[name]
+        plot.legend[label] = axes.plot(x, y / divisor, **style)[0]  # of either sign
+    axes.set_ylabel(axis)
+
+
+def _draw_stress(axes: Any, x: Field, profile: Profile) -> None:
+    if "sigma" not in profile.values:
+        return
+    sigma = profile.values["sigma"]
+    top = max(largest(sigma), profile.row["pressure"])
+    divisor, label = STRESS_SCALE.axis(profile.row, top, r"$\sigma$")
+    axes.plot(x, sigma / divisor, color=STRESS, lw=0.9)
+    axes.set_ylabel(label)
+    axes.set_ylim(-0.05 * top / divisor, 1.1 * top / divisor)

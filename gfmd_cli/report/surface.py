@@ -1,0 +1,195 @@
+"""Power spectral densities of the surfaces of a study."""
+
+from contextlib import suppress
+from dataclasses import dataclass
+
+import numpy as np
+
+from gfmd_cli.analysis.compare import Row
+from gfmd_cli.analysis.curve_styles import MARKERS, MAX_LABEL, CurveStyle, colours
+from gfmd_cli.analysis.plotting import ColumnFigure
+from gfmd_cli.analysis.table import Column, Group, Table
+from gfmd_cli.errors import InputError
+from gfmd_cli.grid.arrays import Field
+from gfmd_cli.physics.persson import Shells
+from gfmd_cli.physics.spectrum_fit import SelfAffineFit, fit
+from gfmd_cli.report.data import ReportData
+from gfmd_cli.report.section import Section
+from gfmd_cli.report.svg import drawing
+
+BANDS_PER_DECADE = 10
+MAX_SURFACES = 8  # of the figure; more cannot be told apart
+LABEL = r"$C(q)$"
+
+
+@dataclass(frozen=True)
+class Spectrum:
+    """Power spectral density of one surface in bands of wavenumber."""
+
+    name: str
+    dimension: int
+    q: Field
+    """Mean wavenumber of each band [1/m]."""
+    density: Field
+    """[m^4], of a line scene [m^3]."""
+    modes: Field
+    """Number of modes of each band."""
+    fit: SelfAffineFit | None
+    """None where there is no range to fit."""
+    fitted: Field
+    """The density of the fit in the bands, zero beyond its cut-off."""
+    preparation: str
+    """What was read from a file and how it was treated."""
+
+
+def surface_spectrum(data: ReportData) -> Section | None:
+    """C(q), double logarithmic."""
+    scenes: dict[tuple[str, str, float], tuple[Row, Shells]] = {}
+    for _, curve in data.curves:
+        row = curve.rows[0]
+        key = (curve.surface, row["preparation"], row["h_std"])  # of two studies the same once
+        scenes.setdefault(key, (row, curve.persson.shells))
+    counted = [(row, shells) for row, shells in scenes.values() if shells.modes is not None]
+    spectra = [spectrum(row, shells) for row, shells in counted if shells.q.size]
+    spectra = [each for each in spectra if each.q.size]
+    shown = spectra[:MAX_SURFACES]
+    if not shown:
+        return None
+    label = f"Power spectral density of the surface over the wavenumber: {_names(shown)}"
+    left_out = len(spectra) > len(shown)
+    more = f" The first {MAX_SURFACES} of {len(spectra)} are shown." if left_out else ""
+    tables = {"Self-affine fit": _fits(shown), "Table behind the figure": _bands(shown)}
+    return Section(
+        "Surface spectrum",
+        notes=[each.preparation for each in shown if each.preparation],
+        drawings=[drawing(_spectrum_figure(shown), "spectrum", label, CAPTION + more)],
+        tables={summary: table for summary, table in tables.items() if table.records},
+    )
+
+
+def _fits(shown: list[Spectrum]) -> Table:
+    """The self-affine surface nearest to each."""
+    records = [
+        {
+            "surface": found.name,
+            "hurst": fit.hurst,
+            "hurst_error": fit.hurst_error,
+            "rolloff": 2 * np.pi / fit.q_r if fit.q_r else None,
+            "rolloff_error": 2 * np.pi / fit.q_r**2 * fit.q_r_error if fit.q_r else None,
+            "no_rolloff": "none within the cell",
+            "cutoff": 2 * np.pi / fit.q_s,
+            "scatter": fit.scatter,
+        }
+        for found in shown
+        if (fit := found.fit)
+    ]
+    return Table(FIT, FITS, [Group("", records)])
+
+
+CAPTION = (
+    "Power spectral density of the surface, C(q) = A ⟨|h(q)|²⟩: the variance of the heights in a "
+    "band of wavenumber over the number of its modes, times the area A of the cell (of a line its "
+    "length), so that ⟨h²⟩ = ∫ C(q) d²q / (2π)². Waves shorter than two grid points along a side "
+    "are left out. Lines: the self-affine surface nearest to it."
+)
+FITS = (
+    Column("surface", "surface"),
+    Column("Hurst exponent", "hurst", error="hurst_error"),
+    Column("roll-off", "rolloff", unit="m", error="rolloff_error", otherwise="no_rolloff"),
+    Column("cut-off", "cutoff", unit="m"),
+    Column("scatter", "scatter"),
+)
+FIT = (
+    "C ~ [1 + (q/q_r)²]^(−1−H) up to q_s, most likely below q_s, with the rms height and gradient "
+    "of the surface. Scatter: 0 where phases alone are random, 1 as of Gaussian roughness, much "
+    "more where the surface is not of this kind."
+)
+
+
+def _names(shown: list[Spectrum]) -> str:
+    return "; ".join(found.name for found in shown)
+
+
+def spectrum(row: Row, shells: Shells) -> Spectrum:
+    """The density of a surface from the sums that its shells hold.
+
+    <h^2> = sum of C over the modes, each of which has (2 pi)^d over the area of the cell in the
+    plane of q: the density is this area times the mean over the modes of a band.
+    """
+    name, length, dimension = str(row["surface"]), float(row["length"]), int(row["dimension"])
+    radius = shells.q * length / (2 * np.pi)
+    ratio = 1.0 if dimension == 1 else length / float(row["length_y"])
+    points = int(row["points"]) if dimension == 1 else min(row["points"], row["points_y"] * ratio)
+    edges = _edges(radius, 0.5 * points)
+    place = np.searchsorted(edges, radius) - 1
+    inside = (place >= 0) & (place < edges.size - 1)
+    assert shells.modes is not None
+    nearest = None
+    if dimension == 2:
+        with suppress(InputError):  # too narrow
+            nearest = fit(shells)
+    fitted = nearest.density(shells.q) * shells.modes if nearest else np.zeros_like(shells.q)
+    total, moment, modes, fitted = (
+        np.bincount(place[inside], weight[inside], edges.size - 1).astype(float)
+        for weight in (shells.height, shells.height * shells.q, shells.modes, fitted)
+    )
+    kept, unit = total > 0, length**dimension / ratio
+    return Spectrum(
+        name,
+        dimension,
+        q=moment[kept] / total[kept],
+        density=total[kept] / modes[kept] * unit,
+        modes=modes[kept],
+        fit=nearest,
+        fitted=fitted[kept] / modes[kept] * unit,
+        preparation=str(row.get("preparation", "")),
+    )
+
+
+def _edges(radius: Field, nyquist: float) -> Field:
+    """Edges of bands half-way between shells, about BANDS_PER_DECADE in a decade [2 pi / L]."""
+    between = np.sqrt(radius[1:] * radius[:-1])
+    ends = np.concatenate([[0.5 * radius[0]], between, [radius[-1] * (1 + 1e-6)]])
+    within = ends[ends < nyquist]  # on it, opposite modes are one
+    chosen = [ends[0]]
+    for edge in within[1:]:
+        if edge >= chosen[-1] * 10 ** (1 / BANDS_PER_DECADE):
+            chosen.append(edge)
+    if len(chosen) > 1:
+        chosen[-1] = within[-1]  # the last band is wider rather than that a shell is lost
+    return np.array(chosen)
+
+
+def _spectrum_figure(shown: list[Spectrum]) -> ColumnFigure:
+    power = {1: "3", 2: "4"}.get(shown[0].dimension)
+    plot = ColumnFigure(r"wavenumber  $q$ (m$^{-1}$)", rf"{LABEL} (m$^{power}$)")
+    for place, (found, colour) in enumerate(zip(shown, colours(len(shown)), strict=True)):
+        name = found.name[:MAX_LABEL].replace("$", r"\$")
+        style = CurveStyle(colour, MARKERS[place % len(MARKERS)], name)
+        if found.fit is not None:
+            plot.unnamed_line((name,), found.q, found.fitted, color=colour, lw=0.7)
+        plot.points(style, found.q, found.density, np.full(found.q.size, True))
+    plot.scale("x", "log", np.concatenate([found.q for found in shown]))
+    plot.scale("y", "log", np.concatenate([found.density for found in shown]))
+    return plot
+
+
+def _bands(shown: list[Spectrum]) -> Table:
+    """The bands of wavenumber of each surface."""
+    columns = (
+        Column("q", "q", unit="1/m"),
+        Column("wavelength", lambda record: 2 * np.pi / record["q"], unit="m"),
+        Column("C(q)", "density", unit="m³" if shown[0].dimension == 1 else "m⁴"),
+        Column("modes", "modes", ".0f"),
+    )
+    groups = [
+        Group(
+            found.name,
+            [
+                {"q": float(q), "density": float(density), "modes": float(modes)}
+                for q, density, modes in zip(found.q, found.density, found.modes, strict=True)
+            ],
+        )
+        for found in shown
+    ]
+    return Table("Bands of wavenumber.", columns, groups)

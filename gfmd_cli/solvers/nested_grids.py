@@ -1,0 +1,191 @@
+"""Solve a contact on grids from coarse to fine; each starts from the solution of the last one."""
+
+from dataclasses import dataclass
+from functools import partial
+from math import prod
+from typing import Any
+
+import numpy as np
+
+from gfmd_cli.grid.arrays import Field, row_blocks
+from gfmd_cli.grid.fft_grid import Grid, Shape
+from gfmd_cli.physics.contact import Contact
+from gfmd_cli.physics.observables import contact_pressure
+from gfmd_cli.solvers.local_start import COARSE_TOLERANCE, start_from
+from gfmd_cli.solvers.loop import Solver, State, Watch, ignore, solve
+from gfmd_cli.status import Status
+
+COARSEST = 64  # points per side of a square; a solve on as many points costs next to nothing
+FEWEST = 8  # points along an axis that is not coarsened; a choice: fewer resolve no contact
+ASPECT = 1.5  # of pixels beyond which only the finer of their axes is coarsened; 1 / (2 / 1.5) then
+SAME_HEIGHT = 1000  # units of rounding by which indenters on other numbers of processes differ
+
+
+@dataclass
+class Solution:
+    """A solved contact with its residual."""
+
+    u: Field
+    sigma: Field
+    residual: float
+    status: Status
+    solver: str
+    steps: int
+    transforms: float
+    """Real transforms of the solved size; those of coarser grids count by their share of points."""
+
+
+@dataclass
+class Resume:
+    """The state of an unfinished solve, as a checkpoint stored it."""
+
+    shape: Shape
+    """Shape of the whole grid of the state."""
+    values: dict[str, Any]
+    """The attributes of the state by name."""
+    moved: bool = False
+    """Whether another number of processes saved it, whose indenter differs by rounding."""
+
+
+def solve_contact(
+    contact: Contact,
+    solver: Solver,
+    watch: Watch = ignore,
+    start: Resume | Field | None = None,
+) -> Solution:
+    """Solve one contact, nested over grids.
+
+    Parameters
+    ----------
+    watch : is called with every state on every grid, and with the last state of the coarse grid at
+        every step of a start on tiles
+    start : the state of an unfinished solve, or a displacement on the grid of the contact, which is
+        overwritten; without it the solve starts on the coarsest grid
+    """
+    solver = solver.for_contact(contact)
+    can_touch_everywhere = (
+        solver.iterative and contact.boundary == "periodic" and contact.may_touch is None
+    )
+    if can_touch_everywhere and (full := full_contact(contact, solver.kind)) is not None:
+        return full
+    grids = _grids(contact, solver, start)
+    spent = 2.0 if can_touch_everywhere else 0.0  # transforms; the check for full contact takes 2
+    coarse: Contact | None = None
+    state: State | None = None
+    while grids:
+        fine = grids.pop()
+        if isinstance(start, Resume):
+            state = _resumed(fine, solver, start)
+            spent, start = state.coarser_transforms, None
+        else:
+            state = _begin(solver, fine, coarse, state, start)
+            coarse = start = None  # frees their memory, which is needed now
+            state.coarser_transforms = spent
+        status = solve(fine, solver if fine is contact else _loose(solver), state, watch)
+        spent += state.transforms * fine.grid.size / contact.grid.size
+        coarse = fine
+        if grids and solver.starts_locally:
+            pressure = contact_pressure(fine.obstacle, state.u, state.sigma)
+            pause = partial(watch, fine, state)  # a solve that is stopped goes on from this grid
+            local = start_from(fine, pressure, grids[::-1], solver.tolerance, pause)
+            if local is not None:
+                start, grids, spent = local.u, [contact], spent + local.transforms
+    assert state is not None
+    return Solution(state.u, state.sigma, state.residual, status, solver.kind, state.step, spent)
+
+
+def levels(shape: Shape, sides: tuple[float, ...]) -> list[Shape]:
+    """Grids of a cell from coarse to fine, each half as fine (rounded up to even) as the next.
+
+    Pixels that are far from square are first coarsened along their shorter side only.
+    """
+    chain = [shape]
+    while (coarser := _coarser(chain[-1], sides)) != chain[-1]:
+        chain.append(coarser)
+    return chain[::-1]
+
+
+def _coarser(shape: Shape, sides: tuple[float, ...]) -> Shape:
+    """The next coarser grid, or the same."""
+    if prod(shape) <= COARSEST ** len(shape):
+        return shape
+    spacings = [side / points for side, points in zip(sides, shape, strict=True)]
+    widest = ASPECT * min(spacings)
+    return tuple(
+        points if points <= FEWEST or spacing > widest else 2 * ((points + 3) // 4)
+        for points, spacing in zip(shape, spacings, strict=True)
+    )
+
+
+def grids_of(solver: Solver, grid: Grid) -> list[Shape]:
+    """Shapes of the grids on which a solver solves, from coarse to fine."""
+    nested = solver.iterative and solver.nested
+    return levels(grid.whole_shape, grid.sides) if nested else [grid.whole_shape]
+
+
+def _grids(contact: Contact, solver: Solver, start: Resume | Field | None) -> list[Contact]:
+    """The contact on all grids that are to be solved, the finest first."""
+    given = isinstance(start, np.ndarray)
+    chain = [contact.grid.whole_shape] if given else grids_of(solver, contact.grid)
+    if isinstance(start, Resume):
+        chain = chain[chain.index(start.shape) :]
+    contacts = [contact]
+    for shape in chain[-2::-1]:
+        contacts.append(contacts[-1].coarsen(shape))
+    return contacts
+
+
+def _loose(solver: Solver) -> Solver:
+    """The solver with the tolerance of coarse grids."""
+    tolerance = max(solver.tolerance, COARSE_TOLERANCE)
+    return solver.model_copy(update={"tolerance": tolerance})
+
+
+def _begin(
+    solver: Solver,
+    fine: Contact,
+    coarse: Contact | None,
+    state: State | None,
+    start: Field | Resume | None,
+) -> State:
+    """The first state: from a displacement, a coarser grid, or u flat on the highest point."""
+    if isinstance(start, np.ndarray):
+        return solver.begin(fine, start)
+    if coarse is not None and state is not None:
+        return solver.continue_from(coarse, state, fine)
+    u = fine.grid.empty()
+    u[...] = fine.grid.max(float(fine.height.max()))
+    return solver.begin(fine, u)
+
+
+def _resumed(contact: Contact, solver: Solver, resume: Resume) -> State:
+    """The stored state; a stress that is claimed to be exact is computed afresh.
+
+    That gives the same bits again, and a forged state cannot end a solve.
+
+    Contact is u = h to the last bit: a point that is off by rounding would be free, pressed on the
+    indenter, and stop every move. So where the last bits of the indenter have changed, points of
+    contact are laid on it again.
+    """
+    state = solver.state_type(**resume.values)
+    if resume.moved:
+        near = SAME_HEIGHT * np.finfo(state.u.dtype).eps
+        for rows in row_blocks(state.u):
+            u, h = state.u[rows], contact.obstacle[rows]
+            np.copyto(u, h, where=np.abs(u - h) < near)
+    if state.exact:
+        state.residual = contact.recompute(state.u, state.sigma)
+    return state
+
+
+def full_contact(contact: Contact, solver: str) -> Solution | None:
+    """The solution u = h, where the stress is nowhere tensile; else None. Costs two transforms."""
+    grid, h = contact.grid, contact.height
+    stress = grid.padded[..., : grid.points]
+    stress[...] = h
+    grid.filter_padded(contact.stiffness)
+    if contact.pressure < grid.max(-float(stress.min())):
+        return None
+    u, sigma = h.copy(), contact.grid.empty()
+    np.add(stress, contact.pressure, out=sigma)
+    return Solution(u, sigma, contact.residual(u, sigma), Status.CONVERGED, solver, 0, 2.0)

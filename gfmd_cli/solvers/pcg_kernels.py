@@ -1,0 +1,87 @@
+"""Compiled kernels of projected conjugate gradients; see `pcg`.
+
+`padded` is the array `Grid.padded`: its rows have two values more than the grid has points.
+"""
+
+from gfmd_cli.grid.compilation import kernel, part_of_kernel
+from gfmd_cli.solvers.contact_state import FREE, PRESSED, TENSE
+
+
+@part_of_kernel
+def _assess_point(gap, s):  # type: ignore[no-untyped-def]
+    """Squares of violation, free force and tension of a point, and its contact state."""
+    smaller, square = min(gap, s), s * s
+    free, tense = gap != 0.0, s < 0.0
+    return (
+        smaller * smaller,
+        square if free else 0.0,
+        square if tense and not free else 0.0,
+        FREE if free else (TENSE if tense else PRESSED),
+    )
+
+
+@kernel
+def classify(h, u, sigma, contact_state, out, a, b):  # type: ignore[no-untyped-def]
+    """Compute the contact state; sums of squares of violation, free force and tension."""
+    for i in range(a, b):
+        violation = free = tension = 0.0
+        for j in range(h.shape[1]):
+            v, f, t, contact_state[i, j] = _assess_point(u[i, j] - h[i, j], sigma[i, j])
+            violation, free, tension = violation + v, free + f, tension + t
+        out[i, 0], out[i, 1], out[i, 2] = violation, free, tension
+
+
+@kernel
+def turn(h, u, sigma, state, threshold, z, beta, direction, is_kept, length, padded, out, a, b):  # type: ignore[no-untyped-def]
+    """Set the direction d to z + beta d on the free points, and compute the move along it.
+
+    The direction stays where it `is_kept`. The move max(u + length d, h) - u is written to
+    `padded`, which may be the memory of z. Returns the sums of direction times force and of move
+    times force, and the number of points stopped at h.
+    """
+    for i in range(a, b):
+        descent = fall = 0.0
+        stopped = 0
+        for j in range(h.shape[1]):
+            if not is_kept:
+                d = 0.0 if state[i, j] >= threshold else z[i, j] + beta * direction[i, j]
+                direction[i, j] = d
+            d = direction[i, j]  # as rounded
+            step, room = length * d, h[i, j] - u[i, j]
+            move = max(step, room)
+            stopped += step < room
+            descent -= d * sigma[i, j]
+            fall -= move * sigma[i, j]
+            padded[i, j] = move
+        out[i, 0], out[i, 1], out[i, 2] = descent, fall, stopped
+
+
+@kernel
+def crossing(h, u, direction, length, out, a, b):  # type: ignore[no-untyped-def]
+    """Number of points at which u + length d is below h."""
+    for i in range(a, b):
+        count = 0
+        for j in range(h.shape[1]):
+            count += length * direction[i, j] < h[i, j] - u[i, j]
+        out[i, 0] = count
+
+
+@kernel
+def advance(h, u, sigma, direction, length, fraction, padded, change, contact_state, out, a, b):  # type: ignore[no-untyped-def]
+    """Take a fraction of the move; `padded` is K times the move. Returns the sums of `classify`.
+
+    u += fraction move, sigma += change, change = fraction K move.
+    """
+    for i in range(a, b):
+        violation = free = tension = 0.0
+        for j in range(h.shape[1]):
+            floor, old = h[i, j], u[i, j]
+            move = max(length * direction[i, j], floor - old)
+            new = max(old + fraction * move, floor)
+            if fraction == 1.0:
+                new = max(old + length * direction[i, j], floor)
+            moved = fraction * padded[i, j]
+            u[i, j], sigma[i, j], change[i, j] = new, sigma[i, j] + moved, moved
+            v, f, t, contact_state[i, j] = _assess_point(u[i, j] - floor, sigma[i, j])  # as rounded
+            violation, free, tension = violation + v, free + f, tension + t
+        out[i, 0], out[i, 1], out[i, 2] = violation, free, tension

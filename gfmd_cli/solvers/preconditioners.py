@@ -1,0 +1,177 @@
+"""The preconditioners of conjugate gradients on the free points of a contact, and their selection.
+
+- The screened Green's function 1 / (k(q) + k(q_c)) takes two transforms. Contact holds the
+  displacement at distances of a few patches. Waves longer than that are therefore not softer than
+  k(q_c). With the plain Green's function 1 / k(q), the method degrades at n = 2 and fails from
+  n = 3 on.
+- The V-cycle of `multigrid` takes the contact points into account and needs no transform.
+- The sum over levels of `multilevel` does too, for k(q) whose growth per level is uneven.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Literal, Protocol
+
+import numpy as np
+
+from gfmd_cli.grid.arrays import Field
+from gfmd_cli.grid.compilation import kernel
+from gfmd_cli.physics.contact import Contact
+from gfmd_cli.solvers.contact_state import ContactState
+from gfmd_cli.solvers.multigrid import COARSEST, Multigrid, level_count, suits
+from gfmd_cli.solvers.multilevel import Multilevel
+
+STEEP = 0.9  # local exponent of k(q) above which the V-cycle is faster than the Green's function
+
+
+class Preconditioner(Protocol):
+    """A symmetric positive approximation of the inverse of K on the free points."""
+
+    z: Field
+    """The preconditioned force, which `apply` writes; rows as of `Grid.padded`."""
+    transforms: int
+    """Transforms in double precision that take as long as those of one application."""
+
+    def apply(
+        self, sigma: Field, contact_state: ContactState, threshold: int, change: Field
+    ) -> tuple[float, float]:
+        """Write the preconditioned force -sigma of the free points to `z`, zero on those held.
+
+        `contact_state` has a halo, which is filled here. Returns the sums of z times force and of
+        z times `change`.
+        """
+
+
+class GreensFunction:
+    """The screened Green's function, in double precision or, at half the cost, in single."""
+
+    def __init__(
+        self, contact: Contact, screening: float, precision: Literal["double", "single"]
+    ) -> None:
+        grid, self.rows = contact.grid, contact.grid.rows
+        self.grid = grid if precision == grid.precision else replace(grid, precision=precision)
+        self.stiffness, self.screening = grid.as_rows(contact.stiffness), screening
+        self.z = grid.as_rows(self.grid.padded)
+        self.transforms = 1 if precision == "single" else 2
+
+    def apply(
+        self, sigma: Field, contact_state: ContactState, threshold: int, change: Field
+    ) -> tuple[float, float]:
+        """See `Preconditioner.apply`."""
+        grid, rows = self.grid, self.rows
+        fields = (sigma, rows.interior(contact_state), threshold)
+        rows.run(_free_force, *fields, self.z)
+        grid.transform()
+        factors = (self.stiffness, self.screening, 1.0 / grid.size)
+        grid.spectral_rows.run(_apply_greens_function, grid.as_rows(grid.spectrum), *factors)
+        grid.transform_back()
+        slope, turned = rows.sums(2, _slopes, *fields, change, self.z)
+        return float(slope), float(turned)
+
+
+@dataclass(frozen=True)
+class Selection:
+    """The preconditioner that suits a contact pattern."""
+
+    screening: float
+    """k(q_c) of the screened Green's function."""
+    multilevel: bool
+    """Whether a preconditioner on levels of grids is faster than the Green's function."""
+
+
+def select(contact: Contact, contact_state: ContactState, threshold: int) -> Selection:
+    """Select a preconditioner for the points held; `contact_state` has a halo."""
+    grid = contact.grid
+    grid.rows.exchange_halo(contact_state)
+    held, changes = grid.rows.sums_with_halo(2, _pattern, contact_state, threshold)
+    screening, chord, exponent = _screening(contact, float(held), float(changes))
+    if grid.dimension == 1 or level_count(grid, COARSEST) == 1:
+        return Selection(screening, False)
+    if suits(contact):
+        return Selection(screening, exponent > STEEP)
+    # Measured on the default surface, p* = 0.001 to 1, and a paraboloid, 512^2, CPU seconds: the
+    # sum over levels and the Green's function are equal at n = 1; for n = 2, 3, 4 the sum is faster
+    # from chords of about 10, 20, 30 grid spacings on, 5 times at n = 3 and a chord of 250.
+    return Selection(screening, exponent > 0.75 and chord > 8 * (exponent - 1))
+
+
+def create(
+    contact: Contact, selection: Selection, precision: Literal["double", "single"] = "double"
+) -> Preconditioner:
+    """The selected preconditioner; `precision` is that of the Green's function."""
+    if not selection.multilevel:
+        return GreensFunction(contact, selection.screening, precision)
+    return Multigrid(contact) if suits(contact) else Multilevel(contact)
+
+
+def _screening(contact: Contact, held: float, changes: float) -> tuple[float, float, float]:
+    """Screening stiffness k(q_c), mean free chord l in grid spacings, local exponent n of k(q).
+
+    `held` is the number of points held, `changes` the number of changes along rows and columns.
+
+    q_c = c pi / l with c = 2^((n - 2)(1 - a_r)). Measured on the default surface of the paper at
+    512^2, p* = 0.01, 0.1, 1: the smallest number of transforms, within 20 %, was reached at c = 1/2
+    for n = 1, 1 for n = 2, 2 for n = 3, 3 to 4 for n = 4 at small a_r, and 1 for n >= 2 near full
+    contact.
+    """
+    grid, (log_m, log_k) = contact.grid, map(np.log, contact.dispersion)
+    area = held / grid.size
+    # Rows and columns that the changes are counted along have this length together, in units of L.
+    length = grid.points_y + grid.points * grid.length_y / grid.length
+    chord = 2 * (1 - area) * length / changes if changes > 0 else 1.0  # in units of L
+    log_mode = min(float(np.log(0.5 / max(chord, 1e-9))), log_m[-1])
+    step = 0.1  # of log q, for the local exponent
+    centre = min(max(log_mode, log_m[0] + step), log_m[-1] - step)
+    rise = np.diff(np.interp([centre - step, centre + step], log_m, log_k))
+    n = float(rise[0]) / (2 * step)
+    log_mode = min(log_mode + float(np.log(2)) * (n - 2) * (1 - area), log_m[-1])
+    extrapolation = n * min(log_mode - log_m[0], 0.0)  # power law beyond the longest wave
+    screening = float(np.exp(np.interp(log_mode, log_m, log_k) + extrapolation))
+    return screening, chord * grid.length / min(grid.spacings), n
+
+
+@kernel
+def _pattern(contact_state, threshold, out, a, b):  # type: ignore[no-untyped-def]
+    """Numbers of points held, and of changes between neighbours along rows and columns."""
+    rows, columns = contact_state.shape
+    for i in range(a, b):
+        next_row = i + 1 if i + 1 < rows else 0
+        held = changes = 0
+        for j in range(columns):
+            here = contact_state[i, j] >= threshold
+            held += here
+            changes += here != (contact_state[next_row, j] >= threshold)
+        row = contact_state[i]
+        for j in range(columns - 1):
+            changes += (row[j] >= threshold) != (row[j + 1] >= threshold)
+        changes += (row[columns - 1] >= threshold) != (row[0] >= threshold)
+        out[i, 0], out[i, 1] = held, changes
+
+
+@kernel
+def _free_force(sigma, contact_state, threshold, padded, a, b):  # type: ignore[no-untyped-def]
+    """Write the force -sigma on the free points to `padded`, zero on those held."""
+    for i in range(a, b):
+        for j in range(sigma.shape[1]):
+            padded[i, j] = 0.0 if contact_state[i, j] >= threshold else -sigma[i, j]
+
+
+@kernel
+def _slopes(sigma, contact_state, threshold, change, z, out, a, b):  # type: ignore[no-untyped-def]
+    """Sums of z times force and of z times change over the free points."""
+    for i in range(a, b):
+        slope = turned = 0.0
+        for j in range(sigma.shape[1]):
+            free_z = 0.0 if contact_state[i, j] >= threshold else z[i, j]
+            slope -= free_z * sigma[i, j]
+            turned += free_z * change[i, j]
+        out[i, 0], out[i, 1] = slope, turned
+
+
+@kernel
+def _apply_greens_function(modes, k, screening, factor, a, b):  # type: ignore[no-untyped-def]
+    """Multiply coefficients by factor / (k(q) + screening)."""
+    for i in range(a, b):
+        for j in range(k.shape[1]):
+            weight = factor / (k[i, j] + screening)
+            modes[i, 2 * j] *= weight
+            modes[i, 2 * j + 1] *= weight

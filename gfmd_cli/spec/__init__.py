@@ -1,0 +1,1 @@
+"""The run spec: TOML models, parsing, sweeps, JSON Schema."""

@@ -1,0 +1,429 @@
+"""The models of the run spec, and its sweeps: a list instead of a scalar makes a sweep."""
+
+import hashlib
+import json
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import product
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self, get_args
+
+import numpy as np
+from pydantic import Discriminator, StrictStr, Tag, model_validator
+from pydantic import Field as Key
+
+from gfmd_cli.choice import Choice, Positive
+from gfmd_cli.errors import InputError
+from gfmd_cli.physics.elastomers import Elastomer
+from gfmd_cli.physics.indenters import SMALLEST_GRID, RigidSurface
+from gfmd_cli.physics.surfaces import Surface
+from gfmd_cli.solvers.auto import AnySolver
+
+MAX_LADDER = 100_000  # pressures of one ladder; upper limit, guards against typing errors
+MAX_DECADES = 300.0  # of which a power of ten is no overflow
+LADDER_ROUNDINGS = 8  # of a power of ten, by which a value of the ladder may lie above `to`
+SWEPT = ("surface", "elastomer", "grid", "solver")
+REPEATED = (*SWEPT, "sweep")  # tables that may be given several times
+
+
+class StudyTable(Choice):
+    """Table [study]."""
+
+    name: Annotated[StrictStr, Key(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,99}$")] = "study"
+    """Name of the study; its file is NAME.h5 in the working directory."""
+
+
+MAX_POINTS = 2**17
+
+
+def _points_form(given: Any) -> str | None:
+    """The form in which points are given: a number or the word "auto"."""
+    if isinstance(given, str):
+        return "word" if given == "auto" else None
+    return "count"
+
+
+Points = Annotated[
+    Annotated[int, Key(ge=SMALLEST_GRID, le=MAX_POINTS), Tag("count")]
+    | Annotated[Literal["auto"], Tag("word")],
+    Discriminator(
+        _points_form,
+        custom_error_type="points",
+        custom_error_message='must be a whole number of points, or "auto"',
+    ),
+]
+
+
+class GridTable(Choice):
+    """Table [grid]."""
+
+    points: Points
+    """Number of points along x; or "auto": the coarsest grid that meets [accuracy]. Numbers with
+    many factors of 2 are fastest. A mirrored map has twice as many on its cell."""
+    points_y: Annotated[int, Key(ge=SMALLEST_GRID, le=MAX_POINTS)] | None = None
+    """Number of points along y; by default in the ratio of the sides, or of the points of a map."""
+    boundary: Literal["periodic", "free"] | None = None
+    """"periodic": the map is repeated. "free": the elastomer goes on, unloaded, beyond the map; for
+    elastomers whose displacement decays with the distance from the load. By default "free" for a
+    map that is not periodic, without surface.edges, where it is available; else "periodic"."""
+
+    def on_cell(self, surface: RigidSurface, points: int) -> tuple[RigidSurface, int]:
+        """A surface on its cell, and the points of the cell along y.
+
+        `points` are those of the cell along x; a mirrored map has twice `self.points` there.
+        """
+        given = self.points_y and surface.copies * self.points_y
+        points_y = given or surface.points_y(points)
+        return surface.on_cell(points, points_y), points_y
+
+
+class Ladder(Choice):
+    """Values in geometric progression: from * 10^(i / per_decade), i = 0, 1, ..., up to `to`.
+
+    The step is fixed, so that a larger `to` adds values and moves none.
+    """
+
+    from_: Annotated[float, Key(gt=0, alias="from")]
+    """First value."""
+    to: Positive
+    """Upper limit, up to rounding; a value of its own only if it is one of the ladder."""
+    per_decade: Annotated[float, Key(gt=0, le=1000)] = 4
+    """Values per decade."""
+
+    @model_validator(mode="after")
+    def _rises(self) -> Self:
+        if self.to < self.from_:
+            raise ValueError(f"to = {self.to:g} lies below from = {self.from_:g}")
+        return self
+
+    def pressures(self) -> list[float]:
+        """The pressures, rising."""
+        decades = float(np.log10(self.to) - np.log10(self.from_))  # the ratio can overflow
+        steps = int(decades * self.per_decade) + 1  # one may be missed by rounding
+        values = [self._value(step / self.per_decade) for step in range(steps + 1)]
+        rounding = LADDER_ROUNDINGS * np.finfo(float).eps * (1 + np.log(10) * decades)
+        return [value for value in values if value / self.to - 1 <= rounding]
+
+    def _value(self, decades: float) -> float:
+        """The value so many decades above the first one; infinite beyond the largest number."""
+        value = self.from_
+        while decades > MAX_DECADES:
+            value *= 10.0**MAX_DECADES
+            decades -= MAX_DECADES
+        return float(value * 10.0**decades)
+
+
+def _shape(given: Any) -> str:
+    """The form in which values are given: a number, a list or a ladder."""
+    if isinstance(given, dict | Ladder):
+        return "ladder"
+    return "list" if isinstance(given, list) else "number"
+
+
+Pressures = Annotated[
+    Annotated[Positive, Tag("number")]
+    | Annotated[list[Positive], Key(min_length=1, max_length=MAX_LADDER), Tag("list")]
+    | Annotated[Ladder, Tag("ladder")],
+    Discriminator(_shape),
+]
+SHAPES = ("number", "list", "ladder", "count", "word")
+"""Tags of the unions above, which no message should name."""
+
+
+Share = Annotated[float, Key(gt=0, lt=1)]
+Areas = Annotated[
+    Annotated[Share, Tag("number")]
+    | Annotated[list[Share], Key(min_length=1, max_length=MAX_LADDER), Tag("list")],
+    Discriminator(_shape),
+]
+LOADS = ("p_star", "pressure", "contact_area", "mean_gap", "displacement")
+"""Quantities that can be prescribed as the load."""
+SOUGHT = {"contact_area": "a_r", "mean_gap": "u_g", "displacement": "displacement"}
+"""Prescribed quantities whose pressure is searched, with the column that must match."""
+
+
+class LoadTable(Choice):
+    """Table [load]: one of the quantities below, as a number, a list or a ladder."""
+
+    p_star: Pressures | None = None
+    """Reduced pressures p / Delta_sigma."""
+    pressure: Pressures | None = None
+    """Pressures [Pa]."""
+    contact_area: Areas | None = None
+    """Relative contact areas a_r, in the continuum with a table [accuracy], else on the grid;
+    the pressures are searched."""
+    mean_gap: Pressures | None = None
+    """Mean gaps u_g / h_std on the solved grid; the pressures are searched."""
+    displacement: Pressures | None = None
+    """Displacements of the indenter from first touch [m] on the solved grid, for a free boundary or
+    an elastomer of finite k(0); the pressures are searched."""
+    tolerance: Share = 1e-3
+    """Relative deviation from contact_area, mean_gap or displacement at which the search ends;
+    where the contact area has a step there, the search ends with the nearest contact."""
+
+    @model_validator(mode="after")
+    def _one_of_all(self) -> Self:
+        given = [name for name in LOADS if getattr(self, name) is not None]
+        if len(given) != 1:
+            raise ValueError(f"give one of {', '.join(LOADS)}")
+        if "tolerance" in self.model_fields_set and given[0] not in SOUGHT:
+            raise ValueError(f"tolerance belongs to {' or '.join(SOUGHT)}")
+        return self
+
+    @property
+    def quantity(self) -> str:
+        """The quantity that is prescribed."""
+        return next(name for name in LOADS if getattr(self, name) is not None)
+
+    def listed(self) -> list[float]:
+        """The prescribed values in the given order."""
+        given = getattr(self, self.quantity)
+        if isinstance(given, Ladder):
+            return given.pressures()
+        return list(given) if isinstance(given, list) else [given]
+
+    def values(self) -> list[float]:
+        """The prescribed values, in the given order, without duplicates."""
+        return list(dict.fromkeys(self.listed()))
+
+
+class AccuracyTable(Choice):
+    """Table [accuracy]: requested errors, relative to the continuum value."""
+
+    mean_gap: Share | None = None
+    """Relative error of u_g."""
+    contact_area: Share | None = None
+    """Relative error of a_r."""
+    stress_deviation: Share | None = None
+    """Relative error of sigma_p."""
+    max_points: Annotated[int, Key(ge=SMALLEST_GRID, le=MAX_POINTS)] = MAX_POINTS
+    """Largest number of points along x for grid.points = "auto"; memory may set a lower limit."""
+
+    def asked(self) -> dict[str, float]:
+        """Requested relative errors, by the name of the column."""
+        given = {
+            "u_g": self.mean_gap,
+            "a_r": self.contact_area,
+            "sigma_p": self.stress_deviation,
+        }
+        return {name: share for name, share in given.items() if share is not None}
+
+
+ON_REQUEST = (
+    "true_contact", "patches", "gap_distribution", "stiffness", "spectra", "percolation",
+)  # fmt: skip
+"""Keys of [output] that are off by default and need whole fields."""
+
+
+FieldName = Literal["u", "sigma", "height", "contact_pressure"]
+
+
+class SweepTable(Choice):
+    """Table [sweep]: lists that go together, value by value; other lists multiply."""
+
+    paired: Annotated[list[StrictStr], Key(min_length=2)]
+    """Keys whose lists go together, such as ["surface.cutoff", "grid.points"]; all have the same
+    length. For several groups of lists repeat the table as [[sweep]]."""
+
+    @model_validator(mode="after")
+    def _names_keys(self) -> Self:
+        for address in self.paired:
+            table, _, key = address.partition(".")
+            if table not in (*SWEPT, "load") or not key:
+                tables = ", ".join((*SWEPT, "load"))
+                raise ValueError(f"paired takes TABLE.KEY, TABLE one of {tables}; got {address!r}")
+        return self
+
+
+class OutputTable(Choice):
+    """Table [output]: results that are stored in addition to the scalars."""
+
+    histogram: bool = True
+    """Stress distribution Pr(sigma) in linear and logarithmic bins."""
+    fields: Annotated[list[FieldName], Key(max_length=4)] = Key(default_factory=list)
+    """Fields on the grid: displacement u, stress sigma = K u + p, height of the indenter, and
+    contact_pressure, which is exactly zero off contact."""
+    cross_section: bool = False
+    """Height, displacement and stress along the diagonal; for a line contact, along the line."""
+    true_contact: bool = False
+    """Delta_sigma over the true contact: columns deviation_c, quadrature_c and
+    deviation_bearing."""
+    patches: bool = False
+    """Number and areas of the contact patches, with the distribution of the areas."""
+    gap_distribution: bool = False
+    """Gap distribution Pr(g) in linear and logarithmic bins."""
+    stiffness: bool = False
+    """Contact stiffness -dp/du_g from a linear-response calculation."""
+    spectra: bool = False
+    """Power spectra and autocorrelations of height, displacement and stress."""
+    percolation: bool = False
+    """Whether the gap percolates through the periodic cell along x and y: columns percolates_x and
+    percolates_y."""
+
+    def on_request(self) -> list[str]:
+        """The keys of `ON_REQUEST` that are switched on."""
+        return [name for name in ON_REQUEST if getattr(self, name)]
+
+    def names(self) -> frozenset[str]:
+        """Everything that is stored: the keys that are on, a field as "fields.u"."""
+        keys = {key for key, value in self if value is True}
+        return frozenset(keys | {f"fields.{name}" for name in self.fields})
+
+    def with_names(self, names: Iterable[str]) -> "OutputTable":
+        """The same with these things stored as well."""
+        every = self.names().union(names)
+        keys: dict[str, Any] = {key: key in every for key, value in self if key != "fields"}
+        fields = [name for name in get_args(FieldName) if f"fields.{name}" in every]
+        return OutputTable(fields=fields, **keys)
+
+
+class Spec(Choice):
+    """A resolved run spec: every sweep expanded, every default filled in."""
+
+    study: StudyTable
+    surface: list[Surface]
+    elastomer: list[Elastomer]
+    grid: list[GridTable]
+    load: LoadTable
+    solver: list[AnySolver]
+    output: OutputTable
+    accuracy: AccuracyTable | None = None
+    sweep: list[SweepTable] = Key(default_factory=list)
+    places: dict[str, list[tuple[int | None, ...]]] = Key(default_factory=dict)
+    """Where each entry of a swept table stands in the paired lists, one by one; None where the
+    table has no list of the pair."""
+
+    def combinations(self) -> Iterator[tuple[dict[str, int], list[float]]]:
+        """The entries of the swept tables that go together, by table, and their loads."""
+        for entries in product(*(range(len(getattr(self, table))) for table in SWEPT)):
+            at = dict(zip(SWEPT, entries, strict=True))
+            chosen = [self.places[table][i] for table, i in at.items() if self.places]
+            loads = [
+                load
+                for i, load in enumerate(self.load.listed())
+                if _fit([*chosen, *self.places.get("load", [])[i : i + 1]])
+            ]
+            if loads:
+                yield at, list(dict.fromkeys(loads))
+
+    def resolved(self) -> dict[str, Any]:
+        """What determines the results, as plain data: files stand for their content."""
+        data: dict[str, Any] = self.model_dump(
+            mode="json", exclude={"study", "load", "places"}, by_alias=True
+        )
+        if not self.sweep:
+            del data["sweep"]
+        if self.accuracy is None:
+            del data["accuracy"]
+        for name in set(ON_REQUEST) - set(self.output.on_request()):
+            del data["output"][name]  # a new key must not change the identity of other tasks
+        for table in ("surface", "elastomer"):
+            for dumped, choice in zip(data[table], getattr(self, table), strict=True):
+                if "path" in dumped:
+                    dumped["path"] = Path(dumped["path"]).name
+                    dumped["sha256"] = file_digest(choice.path)
+        data["load"] = {self.load.quantity: self.load.values()}
+        if self.load.quantity in SOUGHT:
+            data["load"]["tolerance"] = self.load.tolerance
+        return data
+
+
+PERIODIC_ONLY = ("true_contact", "stiffness", "spectra")
+"""Keys of [output] whose results are defined for a periodic boundary."""
+
+
+def periodic_only(accuracy: AccuracyTable | None, output: OutputTable | None) -> list[str]:
+    """The given keys that a free boundary does not allow."""
+    keys = [] if accuracy is None else ["accuracy"]
+    requested = [] if output is None else output.on_request()
+    return keys + [f"output.{name}" for name in requested if name in PERIODIC_ONLY]
+
+
+def file_digest(path: Path) -> str:
+    """SHA-256 of a file's content. Raises InputError where it cannot be read."""
+    if not path.is_file():
+        raise InputError(f"{path}: no such file, or not a regular one")
+    try:
+        with path.open("rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror}") from error
+
+
+def digest(data: Any) -> str:
+    """Short name of plain data by its content."""
+    text = json.dumps(data, sort_keys=True, separators=(",", ":"))
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+def differences(old: Any, new: Any, where: str = "") -> list[str]:
+    """What changed between two pieces of plain data, a line for each key."""
+    if isinstance(old, dict) and isinstance(new, dict):
+        lines = []
+        for key in [*old, *(key for key in new if key not in old)]:
+            inner = f"{where}.{key}" if where else str(key)
+            lines += differences(old.get(key), new.get(key), inner)
+        return lines
+    if isinstance(old, list) and isinstance(new, list) and len(old) == len(new):
+        return [
+            line
+            for i, (a, b) in enumerate(zip(old, new, strict=True))
+            for line in differences(a, b, f"{where}[{i}]" if len(old) > 1 else where)
+        ]
+    if all(_is_sweep(value) for value in (old, new)) and (
+        lines := differences(_swept(old), _swept(new), where)
+    ):
+        return lines  # else the combinations differ
+    return [] if old == new else [f"{where}: {_short(old)} -> {_short(new)}"]
+
+
+def _is_sweep(value: Any) -> bool:
+    return isinstance(value, list) and bool(value) and all(isinstance(v, dict) for v in value)
+
+
+def _swept(tables: list[dict[str, Any]]) -> dict[str, Any]:
+    """Values that each key of a sweep takes, one by itself."""
+    keys = dict.fromkeys(key for table in tables for key in table)
+    taken = {key: [t[key] for t in tables if key in t] for key in keys}
+    distinct = {key: [v for i, v in enumerate(vs) if v not in vs[:i]] for key, vs in taken.items()}
+    return {key: vs[0] if len(vs) == 1 else vs for key, vs in distinct.items()}
+
+
+def refuse_other(stored: Any, spec: "Spec", message: str) -> None:
+    """Raise InputError, with the difference, where a file was made from another spec."""
+    changed = differences(stored, spec.resolved())
+    if changed:
+        shown = "\n".join(f"  {line}" for line in changed[:20])
+        raise InputError(f"{message}\nStored -> asked for:\n{shown}")
+
+
+def _short(value: Any) -> str:
+    text = json.dumps(value)
+    return text if len(text) <= 80 else text[:77] + "..."
+
+
+def _fit(places: list[tuple[int | None, ...]]) -> bool:
+    """Whether entries stand at the same places of the paired lists."""
+    return all(len(set(pair) - {None}) <= 1 for pair in zip(*places, strict=True))
+
+
+def axes_of(table: dict[str, Any], paired: Sequence[list[str]]) -> list[list[str]]:
+    """The keys of a table that have a list, those of paired lists together."""
+    swept = [key for key, value in table.items() if isinstance(value, list)]
+    groups = [[key for key in swept if key in group] for group in paired]
+    single = [[key] for key in swept if not any(key in group for group in groups)]
+    return [*filter(None, groups), *single]
+
+
+def expand(
+    table: dict[str, Any], paired: Sequence[list[str]]
+) -> list[tuple[dict[str, Any], dict[str, int]]]:
+    """All combinations of the lists in a table, with the place that each value has in its list.
+
+    The lists of the keys in a group of `paired` go together, value by value.
+    """
+    axes = axes_of(table, paired)
+    combinations = []
+    for places in product(*(range(len(table[keys[0]])) for keys in axes)):
+        where = {key: place for keys, place in zip(axes, places, strict=True) for key in keys}
+        combinations.append((table | {key: table[key][i] for key, i in where.items()}, where))
+    return combinations

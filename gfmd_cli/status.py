@@ -1,0 +1,70 @@
+"""The statuses of a task, each with its explanation."""
+
+from collections.abc import Mapping
+from enum import StrEnum
+from typing import Any, Self
+
+
+class Status(StrEnum):
+    """How a task ended; the value is its text in files and tables.
+
+    The explanation of a member is a template for `explain`, over the columns of a row.
+    """
+
+    explanation: str
+
+    def __new__(cls, value: str, explanation: str = "") -> Self:
+        """A member from its text and its explanation."""
+        member = str.__new__(cls, value)
+        member._value_ = value
+        member.explanation = explanation
+        return member
+
+    CONVERGED = "converged", "the residual is below the tolerance"
+    MAX_STEPS = (
+        "max_steps",
+        "residual {residual:.1e} after {steps} steps, tolerance {tolerance:.1e}: raise "
+        'solver.max_steps, or take solver.kind = "auto"',
+    )
+    ROUNDING = (
+        "rounding",
+        "residual {residual:.1e}, tolerance {tolerance:.1e}: limited by double-precision "
+        "rounding; loosen solver.tolerance",
+    )
+    DIVERGED = "diverged", 'the solver diverged: take solver.kind = "auto"'
+    ACCURACY_NOT_REACHED = (
+        "accuracy_not_reached",
+        "the grid of {points} points is the finest that memory or accuracy.max_points allows, "
+        "and its estimated errors are larger than requested",
+    )
+    LOAD_NOT_REACHED = (
+        "load_not_reached",
+        "no pressure gives load.{load} = {load_value:g} on this grid; the table has the "
+        "nearest value",
+    )
+    MISSING = "missing", "not solved yet: run the same command again"
+
+    # of a run only; such a task has no record
+    FAILED = "failed", "an error ended the task"
+    NO_SPACE = "no space", "the results could not be written"
+    KILLED = "killed", "its worker processes died again and again (out of memory?)"
+    INTERRUPTED = "interrupted", "stopped by a signal; its state is saved"
+
+    def explain(self, row: Mapping[str, Any]) -> str:
+        """The explanation with the numbers of a row."""
+        return self.explanation.format(**row)
+
+    @property
+    def is_converged(self) -> bool:
+        """Whether the task met its tolerances."""
+        return self is Status.CONVERGED
+
+    @property
+    def is_solved(self) -> bool:
+        """Whether the task has a result, converged or not."""
+        return not (self.is_failure or self in (Status.MISSING, Status.INTERRUPTED))
+
+    @property
+    def is_failure(self) -> bool:
+        """Whether an error ended the task, so that it has no result."""
+        return self in (Status.FAILED, Status.NO_SPACE, Status.KILLED)

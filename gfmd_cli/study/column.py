@@ -1,0 +1,24 @@
+"""A column of a study: one value of each task."""
+
+from math import nan
+from typing import Any, NamedTuple
+
+
+class Column(NamedTuple):
+    """Name, type and meaning of a value that every task has."""
+
+    name: str
+    kind: type
+    """`str`, `int` or `float`."""
+    units: str
+    """As in CF conventions; "1" for a pure number, "" for text and mixed units."""
+    meaning: str
+
+    @property
+    def blank(self) -> Any:
+        """The value of a row to which the column does not apply: "", -1 or NaN."""
+        return {str: "", int: -1, float: nan}[self.kind]
+
+    def is_blank(self, value: Any) -> bool:
+        """Whether a value is the blank one."""
+        return bool(value != value if self.kind is float else value == self.blank)

@@ -1,0 +1,249 @@
+"""The pressure at which a contact has the contact area, mean gap or displacement asked for.
+
+Contact area and displacement rise and the mean gap falls with the pressure, so that one root is
+sought: on coarser grids first, where a trial costs little, then on the grid itself. Each trial is a
+solve of its own.
+
+With `[accuracy]` a contact area or mean gap is that in the continuum on the last grid, and that of
+the grid on the coarser ones, which only give a first pressure.
+
+The contact area of a grid has steps, so that the search also ends between two attainable areas,
+with the nearest; which pressures have them depends on the last bits, that it ends does not.
+"""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from math import exp, expm1, inf, isfinite, log
+from typing import Any, NamedTuple
+
+from gfmd_cli.errors import InputError
+from gfmd_cli.physics.approach import estimated_pressure
+from gfmd_cli.physics.contact import PRESSURES, Scene
+from gfmd_cli.physics.persson import Persson
+from gfmd_cli.spec.models import SOUGHT
+from gfmd_cli.status import Status
+from gfmd_cli.study.context import SolveContext, Watcher
+from gfmd_cli.study.notes import Trial
+from gfmd_cli.study.refinement import Solved, solve_on_grids, task_scene
+from gfmd_cli.study.tasks import FIRST, Task
+
+COARSER = 2  # grids, each of half the points, on which the search begins
+COARSE = 0.02  # relative distance to the load, or of two pressures, that is good enough on them
+STEP = log(8.0)  # of ln p at the most, until the root is enclosed
+FLATTEST = 1e-3  # slope of ln(value) over ln(p) that a step is made from
+ROUNDING = 1e-13  # width in ln p of an enclosure that holds no other pressure
+TRIALS = 60  # on one grid; three to five are usual
+
+
+def solve_at_load(task: Task, context: SolveContext, watcher: Watcher) -> Solved:
+    """Solve a task, searching its pressure if that is not given; else as `solve_on_grids`.
+
+    The search returns the nearest contact that it met. It succeeds where that is within
+    `task.load_tolerance` of the load, and also, with a warning, where the value jumps there:
+    contact area is a whole number of grid points, several of which may enter contact together. A
+    jump is a difference of one grid point, or two pressures that the solver cannot tell apart, as
+    they differ by less than its tolerance. Otherwise the status is "load_not_reached".
+
+    Raises InputError for a mean gap that no pressure has, and an area below one grid point.
+    """
+    if task.quantity not in SOUGHT:
+        return solve_on_grids(task, context, watcher)
+    trials = watcher.notes.trials
+
+    def attempt(points: int, pressure: float) -> Solved:
+        solved = solve_on_grids(_at(task, points, pressure), context, watcher)
+        value = loaded_value(task.quantity, _results(task, solved))
+        work = solved.solution.transforms * solved.contact.grid.size
+        trials.append(Trial(points, pressure, value, work))
+        return solved
+
+    solved: Solved | None = None
+    first, slope = 0.0, 1.0
+    for points in _grids(task):
+        scene = task_scene(task, points, context)
+        search = _Search(task, scene, first or _guess(task, scene), slope)
+        for trial in trials:
+            if trial.points == points:
+                search.add(trial)
+        while (pressure := search.next()) is not None:
+            solved = None  # frees its memory, which is needed now
+            solved = attempt(points, pressure)
+            search.add(trials[-1])
+        first, slope = search.nearest.pressure, search.slope
+    if solved is None or trials[-1].pressure != first:
+        solved = None
+        solved = attempt(task.points, first)
+    solved.solution.transforms = sum(trial.work for trial in trials) / solved.contact.grid.size
+    _check_known(task, solved)
+    solver_ended = solved.solution.status in (Status.CONVERGED, Status.ROUNDING)
+    if solver_ended and not search.succeeded:
+        solved.solution.status = Status.LOAD_NOT_REACHED
+    elif message := load_in_jump(
+        task.quantity, task.load, _results(task, solved), task.load_tolerance
+    ):
+        context.warn(f"{task.label}: {message}", task=task.index, label=task.label)
+    return solved
+
+
+def loaded_value(quantity: str, results: Mapping[str, Any]) -> float:
+    """The value that a load prescribes: in the continuum if it is known, else on the grid."""
+    name = SOUGHT[quantity]
+    continuum = float(results.get(f"{name}_continuum", inf))
+    return continuum if isfinite(continuum) else float(results[name])
+
+
+def _results(task: Task, solved: Solved) -> dict[str, Any]:
+    """The columns that `loaded_value` reads."""
+    continuum = {f"{name}_continuum": made.continuum for name, made in solved.estimates.items()}
+    if task.quantity == "displacement":
+        return {"displacement": solved.displacement(task.elastomer)}
+    return vars(solved.observables) | continuum
+
+
+def _check_known(task: Task, solved: Solved) -> None:
+    """Raise InputError where [accuracy] asks for a continuum value that cannot be given."""
+    name = SOUGHT[task.quantity]
+    if name in solved.estimates and not isfinite(solved.estimates[name].continuum):
+        raise InputError(
+            f"load.{task.quantity}: the continuum value is not known on a grid of {task.points} "
+            "points per side; give a finer grid, or leave out [accuracy] for the value on the grid"
+        )
+
+
+def load_in_jump(quantity: str, load: float, results: Mapping[str, Any], tolerance: float) -> str:
+    """A message where the solved value is farther than the tolerance from the load, else ""."""
+    if quantity not in SOUGHT:
+        return ""
+    value = loaded_value(quantity, results)
+    if abs(value - load) <= tolerance * load:
+        return ""
+    return f"load.{quantity} = {load:g} lies in a jump; the nearest value is {value:g}"
+
+
+def _grids(task: Task) -> list[int]:
+    """Points along x of the grids to search on, the task's own the last.
+
+    On the coarser ones the surface is resolved, and the contact area is one point or more.
+    """
+    grids = [task.points]
+    while len(grids) <= COARSER and grids[0] % 4 == 0:
+        half = grids[0] // 2
+        size = half * task.points_y_on(half)
+        if half < FIRST or not task.resolves(half):
+            break
+        if task.quantity == "contact_area" and task.load * size < 1:
+            break
+        grids.insert(0, half)
+    return grids
+
+
+def _at(task: Task, points: int, pressure: float) -> Task:
+    """The contact of one trial."""
+    accuracy = task.accuracy if points == task.points else None
+    return replace(
+        task,
+        quantity="pressure",
+        load=pressure,
+        points=points,
+        points_y=task.points_y_on(points),
+        accuracy=accuracy,
+    )
+
+
+def _guess(task: Task, scene: Scene) -> float:
+    """The pressure [Pa] of Persson theory. Raises InputError for a load that no pressure has."""
+    if task.quantity == "contact_area":
+        if task.load * scene.grid.size < 1:
+            raise InputError(
+                f"load.contact_area: {task.load:g} is less than one of the {scene.grid.size} "
+                "points of the grid"
+            )
+        return float(Persson(scene.shells).pressure_at_area(task.load))
+    if task.quantity == "displacement":
+        return estimated_pressure(scene, task.elastomer, task.load)
+    highest = scene.highest
+    if task.load >= highest:
+        raise InputError(
+            f"load.mean_gap: {task.load:g} h_std are never reached: without load it is {highest:g}"
+        )
+    return float(Persson(scene.shells).pressure_at_gap(task.load * scene.h_std))
+
+
+class _Point(NamedTuple):
+    """One trial as the search sees it."""
+
+    x: float
+    """ln p."""
+    y: float
+    """ln(value / load), with the sign of a pressure that is too high."""
+    trial: Trial
+
+
+class _Search:
+    """The search on one grid.
+
+    Secant steps from the two nearest trials, held within the enclosure of the root; the middle of
+    the enclosure where such a step leaves it or hardly shrinks it.
+    """
+
+    def __init__(self, task: Task, scene: Scene, first: float, slope: float) -> None:
+        self.task, self.scene, self.first, self._slope = task, scene, first, slope
+        is_area, is_last = task.quantity == "contact_area", scene.grid.points == task.points
+        self.sign = -1 if task.quantity == "mean_gap" else 1
+        self.tolerance = task.load_tolerance if is_last else COARSE
+        self.resolution = max(task.solver.tolerance, ROUNDING) if is_last else COARSE
+        self.quantum = 1 / scene.grid.size if is_area else 0.0
+        self.points: list[_Point] = []
+        """Nearest to the root first; on a plateau (full contact) the innermost."""
+
+    def add(self, trial: Trial) -> None:
+        """Take a trial into account."""
+        excess = log(trial.value / self.task.load) if trial.value > 0 else -inf
+        self.points.append(_Point(log(trial.pressure), self.sign * excess, trial))
+        self.points.sort(key=lambda point: (abs(point.y), point.x if point.y > 0 else -point.x))
+
+    @property
+    def nearest(self) -> Trial:
+        """The trial whose value is nearest to the load."""
+        return self.points[0].trial
+
+    @property
+    def slope(self) -> float:
+        """Of ln(value) over ln(p), as far as known."""
+        if len(self.points) < 2 or abs(self.points[1].y) == inf:
+            return self._slope
+        (x, y, _), (x_2, y_2, _) = self.points[:2]
+        return max((y_2 - y) / (x_2 - x), FLATTEST)
+
+    @property
+    def succeeded(self) -> bool:
+        """Whether the nearest trial is within the tolerance, or no pressure comes nearer."""
+        if abs(expm1(self.sign * self.points[0].y)) <= self.tolerance:
+            return True
+        low, high = self._enclosure()
+        if low is None or high is None:
+            return False
+        step = abs(high.trial.value - low.trial.value)
+        return high.x - low.x < self.resolution or step < 1.5 * self.quantum
+
+    def _enclosure(self) -> tuple[_Point | None, _Point | None]:
+        """The highest pressure known to be too low, and the lowest known to be too high."""
+        low = max((point for point in self.points if point.y < 0), default=None)
+        high = min((point for point in self.points if point.y > 0), default=None)
+        return low, high
+
+    def next(self) -> float | None:
+        """The pressure to try next, None where the search has ended."""
+        if not self.points:
+            return self.first
+        if self.succeeded or len(self.points) >= TRIALS:
+            return None
+        x, y, _ = self.points[0]
+        x -= max(-STEP, min(y / self.slope, STEP))
+        low, high = self._enclosure()
+        if low is not None and high is not None:
+            margin = 0.5 * self.resolution
+            if not low.x + margin < x < high.x - margin or len(self.points) % 5 == 4:
+                x = 0.5 * (low.x + high.x)
+        p = exp(x)
+        return p if PRESSURES[0] < p / self.scene.delta_sigma < PRESSURES[1] else None

@@ -1,0 +1,49 @@
+"""What a task has solved before its present grid; a checkpoint stores it beside the state."""
+
+from dataclasses import dataclass, field
+from typing import Annotated
+
+from pydantic import ConfigDict, with_config
+from pydantic import Field as Key
+
+from gfmd_cli.spec.models import MAX_POINTS
+
+_Points = Annotated[int, Key(ge=1, le=MAX_POINTS)]
+_Finite = Annotated[float, Key(allow_inf_nan=False)]
+
+
+@dataclass(frozen=True)
+class GridResult:
+    """Results on one grid, in units that all grids share."""
+
+    points: _Points
+    a_r: float
+    sigma_p: float
+    """[Pa]."""
+    u_g: float
+    """[m]."""
+    perimeter: float
+    work: float
+    """Transforms times grid points."""
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One solve of a load search."""
+
+    points: _Points
+    pressure: Annotated[_Finite, Key(gt=0)]
+    """[Pa]."""
+    value: Annotated[_Finite, Key(ge=0)]
+    """Contact area or mean gap of the solution."""
+    work: float
+    """Transforms times grid points."""
+
+
+@with_config(ConfigDict(strict=True, extra="forbid"))
+@dataclass
+class Notes:
+    """Results of the grids and of the trials that have ended."""
+
+    grids: list[GridResult] = field(default_factory=list)
+    trials: list[Trial] = field(default_factory=list)

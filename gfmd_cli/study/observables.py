@@ -1,0 +1,179 @@
+"""The scalar observables that [output] turns on, each declared once.
+
+The declaration of an observable gives its column in a study file, in CSV and xarray, its key in
+the records of `gfmd analyze --json`, its column in tables, and the function that measures it.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, NamedTuple
+
+from gfmd_cli.grid.arrays import Field, Mask
+from gfmd_cli.physics.contact import Contact
+from gfmd_cli.physics.observables import contact_points
+from gfmd_cli.physics.patches import contact_patches, open_gap
+from gfmd_cli.physics.true_contact import ContactStress, bearing, contact_stress
+from gfmd_cli.solvers.contact_stiffness import contact_stiffness
+from gfmd_cli.spec.models import OutputTable
+from gfmd_cli.study.column import Column
+
+
+@dataclass(frozen=True)
+class SolvedContact:
+    """A solved contact in reduced units, with what several observables share."""
+
+    contact: Contact
+    u: Field
+    sigma: Field
+
+    @cached_property
+    def touching(self) -> Mask:
+        """Points in contact."""
+        return contact_points(self.contact.obstacle, self.u, self.sigma)
+
+    @property
+    def is_periodic(self) -> bool:
+        """Whether patches go on across the border."""
+        return self.contact.boundary == "periodic"
+
+    @cached_property
+    def patch_areas(self) -> Field:
+        """Areas of the contact patches / L^2; of a line scene, lengths / L."""
+        grid = self.contact.grid
+        point = grid.area / grid.size / grid.length**grid.dimension
+        areas: Field = contact_patches(self.touching, periodic=self.is_periodic).sizes * point
+        return areas
+
+    @cached_property
+    def full_contact_stress(self) -> ContactStress:
+        """Statistics of the full-contact stress over the points in contact."""
+        return contact_stress(self.contact, self.touching)
+
+    @cached_property
+    def percolates(self) -> list[bool]:
+        """Whether the gap percolates along x and, if there is a second axis, along y."""
+        along: list[bool] = open_gap(self.touching, periodic=self.is_periodic).winds.tolist()[::-1]
+        return along
+
+
+class ReducedUnit(NamedTuple):
+    """The unit of an observable in reduced units."""
+
+    symbol: str
+    """In symbols, such as "L^2"."""
+    si: str
+    """The SI unit, such as "m^2"."""
+    value: Callable[[Mapping[str, Any]], float]
+    """Its value in SI units, from a row of a study."""
+
+
+class Observable(NamedTuple):
+    """One scalar of a solved contact."""
+
+    option: str
+    """The key of [output] that turns it on."""
+    column: Column
+    measure: Callable[[SolvedContact], float | None]
+    """Its value; None where it does not exist, so that the column is blank."""
+    heading: str = ""
+    """Short heading in tables; empty if a table of its own shows it."""
+    unit: ReducedUnit | None = None
+    """Its unit; None for a pure number. Tables then have a second column in SI units."""
+    is_flag: bool = False
+    """Whether the values 0 and 1 mean no and yes."""
+
+
+PATCH_AREA = ReducedUnit("L^2", "m^2", lambda row: float(row["length"] ** row["dimension"]))
+STIFFNESS = ReducedUnit(
+    "(Delta_sigma / h_std)", "Pa/m", lambda row: float(row["delta_sigma"] / row["h_std"])
+)
+
+OBSERVABLES = (
+    Observable(
+        "true_contact",
+        Column(
+            "deviation_c",
+            float,
+            "1",
+            "standard deviation of the full-contact stress over the true contact / Delta_sigma",
+        ),
+        lambda solved: solved.full_contact_stress.deviation,
+    ),
+    Observable(
+        "true_contact",
+        Column(
+            "quadrature_c", float, "1", "rms of its quadrature over the true contact / Delta_sigma"
+        ),
+        lambda solved: solved.full_contact_stress.quadrature,
+    ),
+    Observable(
+        "true_contact",
+        Column(
+            "deviation_bearing",
+            float,
+            "1",
+            "the same deviation over the highest points, as many as carry p / Delta_sigma",
+        ),
+        lambda solved: float(bearing(solved.contact).delta_sigma_c(solved.contact.pressure)),
+    ),
+    Observable(
+        "patches",
+        Column("patches", int, "1", "number of contact patches (8 neighbours)"),
+        lambda solved: solved.patch_areas.size,
+        "patches",
+    ),
+    Observable(
+        "patches",
+        Column("patch_area_mean", float, "1", "mean area of a patch / L^2; of a line scene, / L"),
+        lambda solved: solved.patch_areas.mean() if solved.patch_areas.size else None,
+        "mean patch",
+        PATCH_AREA,
+    ),
+    Observable(
+        "patches",
+        Column("patch_area_largest", float, "1", "area of the largest patch, likewise"),
+        lambda solved: solved.patch_areas.max() if solved.patch_areas.size else None,
+        "largest patch",
+        PATCH_AREA,
+    ),
+    Observable(
+        "stiffness",
+        Column("stiffness", float, "1", "contact stiffness -dp/du_g / (Delta_sigma / h_std)"),
+        lambda solved: contact_stiffness(solved.contact, solved.touching),
+        "-dp/du_g",
+        STIFFNESS,
+    ),
+    Observable(
+        "percolation",
+        Column(
+            "percolates_x",
+            int,
+            "1",
+            "1 where the gap (4 neighbours) percolates along x through the periodic cell, or from "
+            "border to border if they are free, else 0",
+        ),
+        lambda solved: solved.percolates[0],
+        "percolates\nalong x",
+        is_flag=True,
+    ),
+    Observable(
+        "percolation",
+        Column("percolates_y", int, "1", "likewise along y; -1 on a line scene"),
+        lambda solved: solved.percolates[1] if len(solved.percolates) > 1 else None,
+        "along y",
+        is_flag=True,
+    ),
+)
+
+
+def measure(output: OutputTable, solved: SolvedContact) -> dict[str, Any]:
+    """The observables that are turned on, by the name of the column."""
+    values = {
+        observable.column: observable.measure(solved)
+        for observable in OBSERVABLES
+        if getattr(output, observable.option)
+    }
+    return {
+        column.name: column.kind(value) for column, value in values.items() if value is not None
+    }

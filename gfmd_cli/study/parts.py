@@ -1,0 +1,164 @@
+"""The folder of unfinished work beside a study: records, checkpoints, plans, locks.
+
+A record is a study of one task, with a checksum of the whole file at its end. Others may be able to
+write to the folder, so that nothing in it is trusted: only regular files are opened, links are not
+followed, and a damaged file is set aside.
+"""
+
+import re
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import NamedTuple
+
+from gfmd_cli.errors import InputError, SpaceError, StudyError
+from gfmd_cli.files.atomic import new_file
+from gfmd_cli.files.checksums import check_seal, seal
+from gfmd_cli.files.hdf5 import new_hdf5
+from gfmd_cli.files.regular import open_regular
+from gfmd_cli.spec.models import digest
+from gfmd_cli.status import Status
+from gfmd_cli.study.reading import StudyFile, open_study
+from gfmd_cli.study.result import TaskResult
+from gfmd_cli.study.writing import Entry, write_study
+
+SUFFIX = ".record"
+OWN_FILES = re.compile(r"(in-use|collecting|planning)(\..*)?|wisdom-.*\.json|.*\.(record|bad)|\..*")
+"""Files that gfmd makes in the folder."""
+OWN_FOLDERS = re.compile(r"[0-9a-f]{16}")
+"""Checkpoints, by the id of the task."""
+IN_CHECKPOINT = re.compile(r"pointer|lock(\..*)?|[ab][0-9]*|\..*")
+
+
+def check_own(parts: Path) -> None:
+    """Refuse a folder that is not gfmd's. Raises InputError, SpaceError where none can be made."""
+    if parts.is_symlink() or (parts.exists() and not parts.is_dir()):
+        raise SpaceError(f"{parts}: not a folder; move it away or choose another name (-o)")
+    for path in parts.iterdir() if parts.exists() else ():
+        is_folder = path.is_dir() and not path.is_symlink()
+        if not (OWN_FOLDERS if is_folder else OWN_FILES).fullmatch(path.name) and not (
+            path.suffix == ".bad"  # a folder that was in the place of a file
+        ):
+            raise InputError(
+                f"{parts}: needed for unfinished work, but holds {path.name!r}, which is not "
+                "gfmd's; move it away or take another name (-o)"
+            )
+
+
+def remove_parts(parts: Path) -> None:
+    """Delete the folder with what gfmd made in it; whatever else is there stays."""
+    for path in parts.iterdir():
+        is_folder = path.is_dir() and not path.is_symlink()
+        if is_folder and OWN_FOLDERS.fullmatch(path.name):
+            _delete(IN_CHECKPOINT, path)
+        elif not is_folder and path.name != "in-use" and OWN_FILES.fullmatch(path.name):
+            path.unlink(missing_ok=True)
+    _delete(OWN_FILES, parts)  # the lock that is held, last
+
+
+def _delete(own: re.Pattern[str], folder: Path) -> None:
+    """Delete files by name, then the folder where it is empty."""
+    for path in folder.iterdir():
+        if own.fullmatch(path.name):
+            with suppress(OSError):
+                path.unlink()
+    with suppress(OSError):
+        folder.rmdir()
+
+
+class Held(NamedTuple):
+    """What a study or a record holds of a task."""
+
+    status: Status
+    stored: frozenset[str]
+    """What [output] stored of it."""
+
+
+def record_path(parts: Path, task_id: str, stored: Iterable[str]) -> Path:
+    """Path of the record of a task; its name tells apart what [output] stores of it."""
+    return parts / f"{task_id}-{digest(sorted(stored))[:8]}{SUFFIX}"
+
+
+def task_of_record(path: Path) -> str:
+    """Id of the task that a record claims to be of."""
+    return path.stem.partition("-")[0]
+
+
+def checkpoint_folders(parts: Path) -> list[Path]:
+    """The checkpoints in the folder, by the ids of their tasks."""
+    return [path for path in parts.glob("*") if OWN_FOLDERS.fullmatch(path.name) and path.is_dir()]
+
+
+def record_paths(parts: Path) -> list[Path]:
+    """The records in the folder."""
+    return sorted(parts.glob(f"*{SUFFIX}"))
+
+
+def write_record(parts: Path, result: TaskResult) -> Path:
+    """Write the record of a task, whole or not at all. Raises SpaceError."""
+    path = record_path(parts, result.task_id, result.stored)
+    with new_file(path) as fresh:
+        with new_hdf5(fresh) as file:
+            write_study(file, {}, [Entry.of(result)], lambda _: result, labelled=False)
+        seal(fresh)
+    return path
+
+
+@contextmanager
+def open_record(path: Path) -> Iterator[StudyFile]:
+    """An undamaged record, for reading. Raises StudyError."""
+    try:
+        with open_regular(path) as opened:
+            check_seal(opened)
+            with open_study(path, opened) as record:
+                if record.task_ids != [task_of_record(path)]:
+                    raise StudyError(f"{path}: damaged record: it is of another task")
+                yield record
+    except (OSError, ValueError) as error:
+        raise StudyError(f"{path}: damaged record: {error}") from error
+
+
+def read_record_entry(path: Path) -> Entry:
+    """All of a record but its arrays, which are checked. Raises StudyError."""
+    with open_record(path) as record:
+        (row,) = record.rows
+        if not record.statuses[0].is_solved:
+            raise ValueError(f"status {row['status']}")
+        record.check(0)
+        return Entry(record.task_ids[0], record.scene_ids[0], record.stored[0], row)
+
+
+def read_record(path: Path) -> TaskResult:
+    """The whole content of a record. Raises StudyError."""
+    with open_record(path) as record:
+        return record.result(0)
+
+
+def held_by(entry: Entry) -> Held:
+    """Status and output of the task of a record."""
+    return Held(Status(entry.row["status"]), entry.stored)
+
+
+def read_held(path: Path) -> Held:
+    """Status and output of the task that a record is of, checked as it is when it is collected.
+
+    Raises StudyError.
+    """
+    return held_by(read_record_entry(path))
+
+
+def version_of(path: Path) -> tuple[int, ...]:
+    """Numbers that tell a record from one that replaces it. Raises StudyError where it is gone."""
+    try:
+        status = path.lstat()
+    except OSError as error:
+        raise StudyError(f"{path}: damaged record: {error}") from error
+    return status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns
+
+
+def set_aside(path: Path, bad: Path | None = None) -> Path:
+    """Rename a damaged file to *.bad, which no earlier one has; return the new path."""
+    bad = bad or path.with_suffix(".bad")
+    while bad.exists() or bad.is_symlink():
+        bad = bad.with_suffix(".again.bad")
+    return path.replace(bad)

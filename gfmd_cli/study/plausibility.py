@@ -1,0 +1,35 @@
+"""Warnings where a number of a result cannot be meant as it stands."""
+
+from gfmd_cli.physics.contact import Scene
+from gfmd_cli.physics.elastomers import LinearElastomer
+from gfmd_cli.physics.indenters import RigidSurface
+from gfmd_cli.physics.observables import Observables
+
+FEW_POINTS = 30  # a choice: the area of a circle of 30 points has an error of its rim of a third
+PASCALS = 1e3  # modulus above which it is one in Pa; a choice: gels have 1e3 Pa, reduced units 1
+METRES = 1e-2  # rms height above which it is in reduced units; a choice: no rough solid has 1 cm
+SEPARATOR = " | "
+"""Between the warnings of one contact in a column of text."""
+
+
+def warnings_of(
+    surface: RigidSurface,
+    elastomer: LinearElastomer,
+    boundary: str,
+    scene: Scene,
+    observables: Observables,
+) -> list[str]:
+    """What makes the result of one contact doubtful, a sentence each; mostly nothing."""
+    warnings = surface.remarks(boundary)
+    if elastomer.modulus > PASCALS and scene.h_std > METRES:
+        warnings.append(
+            f"a modulus of {elastomer.modulus:.3g} Pa and an rms height of {scene.h_std:.3g} m: "
+            "are heights and lengths in metres? surface.h_std, length or scale set them"
+        )
+    points = round(observables.a_r * scene.grid.size)
+    if points < FEW_POINTS:
+        warnings.append(
+            f"only {points} grid points in contact: contact area and stress depend on the grid; "
+            "use more points"
+        )
+    return warnings

@@ -1,0 +1,295 @@
+"""One contact on one grid, or on finer and finer ones until its errors are as requested."""
+
+from dataclasses import dataclass, field
+from functools import lru_cache
+from math import sqrt
+from typing import Any
+
+from gfmd_cli.errors import InputError
+from gfmd_cli.grid.arrays import Field
+from gfmd_cli.grid.ranks import Ranks, agree
+from gfmd_cli.physics.anisotropy import anisotropy
+from gfmd_cli.physics.approach import approach
+from gfmd_cli.physics.contact import Contact, Scene
+from gfmd_cli.physics.discretisation_error import (
+    RoughnessScales,
+    estimate,
+    exponent_spread,
+    local_exponent,
+    roughness_scales,
+)
+from gfmd_cli.physics.elastomers import LinearElastomer
+from gfmd_cli.physics.error_bounds import Certificate, certify
+from gfmd_cli.physics.error_estimates import Estimate, Level, unknown
+from gfmd_cli.physics.free_contact import SCENES
+from gfmd_cli.physics.observables import Observables, observe
+from gfmd_cli.solvers.nested_grids import Resume, Solution, solve_contact
+from gfmd_cli.status import Status
+from gfmd_cli.study.context import SolveContext, Watcher, WorkerOptions
+from gfmd_cli.study.notes import GridResult
+from gfmd_cli.study.plausibility import warnings_of
+from gfmd_cli.study.tasks import FIRST, Task
+
+FINAL = ("bound", "slow", "diverges")  # verdicts that no finer grid changes
+ENOUGH = 3  # grids after which an unknown error stays unknown: two give all that is calibrated
+UNSOLVED = 0.1  # natural residual from which nothing is said of the continuum
+ALGEBRAIC = 2.0
+"""Largest errors of u_g and sigma_p on their grid that were met, in natural residuals times the
+value x, or its root where that is less than 1: n = 0.5 to 4, slabs, p* = 0.003 to 1."""
+
+
+@dataclass
+class Solved:
+    """A contact on the last of its grids."""
+
+    scene: Scene
+    contact: Contact
+    solution: Solution
+    observables: Observables
+    certificate: Certificate | None = None
+    estimates: dict[str, Estimate] = field(default_factory=dict)
+    """Errors and continuum values by column; empty unless an accuracy is requested."""
+
+    def displacement(self, elastomer: LinearElastomer) -> float:
+        """Displacement of the indenter from first touch [m]; NaN where it is not defined."""
+        solution = self.solution
+        return approach(self.scene, elastomer, self.contact, solution.u, solution.sigma)
+
+    def algebraic(self, name: str) -> float:
+        """Estimated error of a column on this grid, from stopping at this residual."""
+        assert self.certificate is not None
+        if name == "a_r":
+            return self.certificate.a_r
+        value = float(getattr(self.observables, name))
+        return ALGEBRAIC * self.solution.residual * max(value, sqrt(value))
+
+    def columns(self) -> dict[str, Any]:
+        """The errors as columns of a study."""
+        if self.certificate is None:
+            return {}
+        row: dict[str, Any] = {
+            "u_g_bound": self.certificate.u_g,
+            "sigma_p_bound": self.certificate.sigma_p,
+        }
+        for name, made in self.estimates.items():
+            algebraic = self.algebraic(name)
+            row |= {
+                f"{name}_error": made.error + algebraic,
+                f"{name}_continuum": made.continuum,
+                f"{name}_continuum_error": made.continuum_error + algebraic,
+                f"{name}_verdict": made.verdict,
+                f"{name}_algebraic": algebraic,
+            }
+        return row
+
+    def warnings(self, task: Task) -> list[str]:
+        """What makes the results doubtful."""
+        surface, boundary = task.surface, task.boundary
+        return warnings_of(surface, task.elastomer, boundary, self.scene, self.observables)
+
+    def less_accurate_than(self, errors: dict[str, float]) -> list[str]:
+        """The columns whose continuum values have larger relative errors than these."""
+        return [
+            name
+            for name, share in errors.items()
+            if not self.estimates[name].continuum_error + self.algebraic(name)
+            <= share * abs(self.estimates[name].continuum)
+        ]
+
+
+@lru_cache(maxsize=1)
+def _scene(
+    surface: Any,
+    elastomer: Any,
+    boundary: str,
+    points: int,
+    points_y: int,
+    threads: int,
+    ranks: Ranks | None,
+) -> Scene:
+    """The scene of a task; consecutive tasks mostly share it."""
+    return SCENES[boundary](surface, elastomer, points, threads, ranks, points_y=points_y)
+
+
+def task_scene(task: Task, points: int, context: SolveContext) -> Scene:
+    """The scene of a task on a grid of so many points along x."""
+    grid = task.boundary, points, task.points_y_on(points)
+    shared = context.options.threads, context.ranks
+    return _scene(task.surface, task.elastomer, *grid, *shared)
+
+
+def forget_scene() -> None:
+    """Free the memory of the last scene."""
+    _scene.cache_clear()
+
+
+def solve_on_grids(task: Task, context: SolveContext, watcher: Watcher) -> Solved:
+    """Solve a task on its grid, or on finer and finer grids until the errors are as requested.
+
+    The notes of the watcher name the grids that an earlier run solved. Raises InputError, and what
+    the watcher raises.
+    """
+    _check_unit(task)
+    grids = watcher.notes.grids = _ended_grids(task, watcher.notes.grids)
+    points = _next_points(task, grids[-1].points) if grids else _first_points(task)
+    solved: Solved | None = None
+    while True:
+        scene = task_scene(task, points, context)
+        contact = scene.contact(task.p_star(scene.delta_sigma))
+        start: Resume | Field | None = watcher.saved_state(contact)
+        if start is None and solved is not None:
+            start = _interpolate(solved, scene)
+        solved = None  # frees its memory, which is needed now
+        solved = _solve_on_grid(task, scene, contact, watcher, start)
+        start = None
+        grids.append(_grid_result(solved))
+        if task.accuracy is not None:
+            _estimate_errors(task, solved, grids)
+        if not agree(context.ranks, _continues(task, solved, len(grids), context.options)):
+            break
+        points = _next_points(task, points)
+    watcher.notes.grids = []
+    solution = solved.solution
+    solution.transforms = sum(grid.work for grid in grids) / scene.grid.size
+    if task.auto and solution.status.is_converged and _inaccurate(task, solved):
+        solution.status = Status.ACCURACY_NOT_REACHED
+    return solved
+
+
+def _solve_on_grid(
+    task: Task,
+    scene: Scene,
+    contact: Contact,
+    watcher: Watcher,
+    start: Resume | Field | None,
+) -> Solved:
+    """Solve a contact; its stress and residual are measured on the displacement that is stored."""
+    solution = solve_contact(contact, task.solver, watcher, start)
+    solution.residual = contact.recompute(solution.u, solution.sigma)
+    if solution.status.is_converged and not solution.residual < task.solver.tolerance:
+        solution.status = Status.ROUNDING
+    return Solved(scene, contact, solution, observe(contact, solution.u, solution.sigma))
+
+
+def _check_unit(task: Task) -> None:
+    """The unit of p_star must not change from grid to grid where several are compared."""
+    if task.accuracy is None or task.quantity != "p_star" or task.surface.band_limited:
+        return
+    raise InputError(
+        f"load.p_star: Delta_sigma of this surface ({task.surface.kind}) depends on the grid; with "
+        "[accuracy] give load.pressure"
+    )
+
+
+def _ended_grids(task: Task, grids: list[GridResult]) -> list[GridResult]:
+    """The grids of the notes; none where they are not the first grids of this task."""
+    finest = task.accuracy.max_points if task.auto and task.accuracy else task.points
+    points = _first_points(task)
+    for grid in grids:
+        if grid.points != points or points >= finest:
+            return []
+        points = _next_points(task, points)
+    return grids
+
+
+def _first_points(task: Task) -> int:
+    """Points along x of the coarsest grid that is solved to the end."""
+    if task.auto:
+        return task.least_points
+    half = task.points // 2
+    fits = task.accuracy is not None and half % 2 == 0 and half >= FIRST and task.resolves(half)
+    return half if fits else task.points
+
+
+def _next_points(task: Task, points: int) -> int:
+    return 2 * points if task.auto else task.points
+
+
+def _continues(task: Task, solved: Solved, grids: int, options: WorkerOptions) -> bool:
+    """Whether a finer grid follows the `grids` before it.
+
+    Raises InputError where a reproducible run lacks memory.
+    """
+    points = solved.contact.grid.points
+    if not task.auto or task.accuracy is None:
+        return points != task.points
+    finer = _next_points(task, points)
+    final = FINAL if grids < ENOUGH else (*FINAL, "unknown")
+    improvable = any(
+        solved.estimates[name].verdict not in final for name in _inaccurate(task, solved)
+    )
+    wanted = improvable and finer <= task.accuracy.max_points
+    fits = task.bytes_on(finer) <= options.memory
+    if wanted and not fits and options.reproducible:
+        raise InputError(
+            f"accuracy: needs {finer} points along x, more than memory holds now; with "
+            f"--reproducible give accuracy.max_points = {points}"
+        )
+    return wanted and fits and solved.solution.status.is_converged
+
+
+def _inaccurate(task: Task, solved: Solved) -> list[str]:
+    """The columns whose errors are larger than the task requests."""
+    return [] if task.accuracy is None else solved.less_accurate_than(task.accuracy.asked())
+
+
+def _interpolate(solved: Solved, scene: Scene) -> Field:
+    """The displacement on a coarser grid, on the grid and in the units of a finer scene."""
+    coarse = solved.scene
+    u = coarse.grid.resample(solved.solution.u, scene.grid)
+    u *= coarse.h_std / scene.h_std
+    u += (coarse.mean_height - scene.mean_height) / scene.h_std
+    return u
+
+
+def _grid_result(solved: Solved) -> GridResult:
+    measured, scene = solved.observables, solved.scene
+    return GridResult(
+        points=scene.grid.points,
+        a_r=measured.a_r,
+        sigma_p=measured.sigma_p * scene.delta_sigma,
+        u_g=measured.u_g * scene.h_std,
+        perimeter=measured.perimeter,
+        work=solved.solution.transforms * scene.grid.size,
+    )
+
+
+def _estimate_errors(task: Task, solved: Solved, grids: list[GridResult]) -> None:
+    """Add the bounds on this grid and the distances to the continuum to a solved contact."""
+    solution = solved.solution
+    solved.certificate = certify(solved.contact, solution.u, solution.sigma)
+    solved.estimates = _estimates(task, solved, grids)
+
+
+def _estimates(task: Task, solved: Solved, grids: list[GridResult]) -> dict[str, Estimate]:
+    """Distance of the finest grid to the continuum, in the units of its scene."""
+    scene = solved.scene
+    if not solved.solution.residual < UNSOLVED:
+        return unknown()
+    resolution, length = scene.grid.resolution, scene.grid.length
+    levels = [
+        Level(
+            grid.points * (resolution / scene.grid.points),
+            grid.a_r,
+            grid.sigma_p / scene.delta_sigma,
+            grid.u_g / scene.h_std,
+            grid.perimeter,
+            scene.grid.area / length**scene.grid.dimension,
+        )
+        for grid in grids
+    ]
+    exponent = local_exponent(task.elastomer, resolution, length)
+    spread = exponent_spread(task.elastomer, resolution, length)
+    return estimate(levels, exponent, _scales(task, scene), spread)
+
+
+def _scales(task: Task, scene: Scene) -> RoughnessScales | None:
+    """The scales of a rough surface; None for a single indenter."""
+    if not task.surface.rough:
+        return None
+    return roughness_scales(
+        scene.shells,
+        scene.grid.length,
+        anisotropy(scene.grid, scene.height),
+        band_limited=task.surface.band_limited,
+    )

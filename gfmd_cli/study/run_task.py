@@ -1,0 +1,201 @@
+"""One task from its scene to its committed record."""
+
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import asdict
+from pathlib import Path
+
+from gfmd_cli.errors import GfmdError, Interrupted, SpaceError, StudyError
+from gfmd_cli.grid.arrays import Field
+from gfmd_cli.grid.ranks import agree, leads, together
+from gfmd_cli.physics.contact import Contact
+from gfmd_cli.physics.edge_share import edge_shares
+from gfmd_cli.physics.observables import contact_points, contact_pressure
+from gfmd_cli.solvers.loop import State
+from gfmd_cli.solvers.nested_grids import Resume
+from gfmd_cli.status import Status
+from gfmd_cli.study.checkpoint import Checkpoint
+from gfmd_cli.study.columns import empty_row
+from gfmd_cli.study.context import SolveContext, Watcher
+from gfmd_cli.study.load_search import solve_at_load
+from gfmd_cli.study.measure import measure_optional
+from gfmd_cli.study.parts import read_held, record_path, write_record
+from gfmd_cli.study.plausibility import SEPARATOR
+from gfmd_cli.study.progress import Progress
+from gfmd_cli.study.refinement import Solved
+from gfmd_cli.study.result import TaskResult
+from gfmd_cli.study.tasks import Task
+
+REPORT_EVERY = 0.2  # seconds between two reports of one task
+SAVE, STOP = 1.0, 2.0  # requests to a solve; the largest one of all processes counts
+
+
+class TaskWatcher(Watcher):
+    """Reports the progress of a task, saves its state at intervals, and stops it on request."""
+
+    def __init__(self, task: Task, checkpoint: Checkpoint, context: SolveContext) -> None:
+        super().__init__()
+        self.task, self.checkpoint, self.context = task, checkpoint, context
+        self.last_report, self.last_save = 0.0, time.monotonic()
+        self.resumed = False
+        if (message := checkpoint.restore()) is not None:
+            self._warn(message)
+        self.notes = checkpoint.notes
+
+    def saved_state(self, contact: Contact) -> Resume | None:
+        """At the first call, the state of this contact that an earlier run saved."""
+        resumed, self.resumed = self.resumed, True
+        if resumed:
+            return None
+        try:
+            return self.checkpoint.load(contact.grid, self.task.solver.for_contact(contact))
+        except StudyError:
+            self._warn(self.checkpoint.set_aside())
+            return None
+
+    def __call__(self, contact: Contact, state: State) -> None:
+        """Report, save or stop, if it is time to."""
+        now = time.monotonic()
+        if now - self.last_report > REPORT_EVERY:
+            self.last_report = now
+            self._report_step(contact, state)
+        if self.context.ranks is not None and contact.grid.whole:
+            return  # a small grid, which each process solves on its own
+        request = SAVE if now - self.last_save > self.context.options.checkpoint_every else 0.0
+        if self.context.stop.is_set():
+            request = STOP
+        request = contact.grid.max(request)
+        if request == STOP:
+            self.context.stop.set()
+            self._save(contact, state)
+            raise Interrupted(f"{self.task.label}: stopped, state saved")
+        if request == SAVE:
+            try:
+                self._save(contact, state)
+            except SpaceError as error:  # the solve does not need the saved state
+                self._warn(str(error))
+            self.last_save = time.monotonic()
+
+    def _report_step(self, contact: Contact, state: State) -> None:
+        points, step = contact.grid.points, state.step
+        a_r = float(contact_points(contact.obstacle, state.u, state.sigma).mean())
+        label = self.task.label
+        reached = (points, step, state.residual, a_r)
+        event = Progress(self.task.index, "step", label, *reached, size=contact.grid.size)
+        self.context.report(event)
+
+    def _save(self, contact: Contact, state: State) -> None:
+        self.checkpoint.save(contact, state, self.notes)
+
+    def _warn(self, message: str) -> None:
+        self.context.warn(message, task=self.task.index, label=self.task.label)
+
+
+def attempt(task: Task, parts: Path, context: SolveContext) -> Status:
+    """Solve one task unless it has a record; an error ends this task only.
+
+    `parts` is the folder of unfinished work.
+    """
+    if context.should_stop():
+        return Status.INTERRUPTED
+    if status := agree(context.ranks, _recorded_status(parts, task)):
+        return status
+    try:
+        with together(context.ranks):
+            return solve_task(task, parts, context)
+    except Interrupted:
+        status, message = Status.INTERRUPTED, ""
+    except (GfmdError, MemoryError, ArithmeticError, OSError) as error:
+        status = Status.NO_SPACE if isinstance(error, SpaceError) else Status.FAILED
+        message = str(error) or type(error).__name__
+    context.report(Progress(task.index, "end", task.label, status=status, message=message))
+    return status
+
+
+def _recorded_status(parts: Path, task: Task) -> Status | None:
+    """The status in the record of a task, None without an intact record."""
+    with suppress(StudyError):
+        return read_held(record_path(parts, task.id, task.output.names())).status
+    return None
+
+
+def solve_task(task: Task, parts: Path, context: SolveContext) -> Status:
+    """Solve one task and commit its record; return its status.
+
+    Raises Interrupted after the state was saved, InputError, SpaceError.
+    """
+    context.report(Progress(task.index, "start", task.label))
+    start = time.perf_counter()
+    with Checkpoint.held(parts / task.id, context.ranks) as checkpoint:
+        solved = solve_at_load(task, context, TaskWatcher(task, checkpoint, context))
+        record = _record(task, solved, time.perf_counter() - start)
+        if leads(context.ranks):
+            write_record(parts, record)
+        checkpoint.remove()
+    context.report(_end(task, record))
+    return solved.solution.status
+
+
+def _end(task: Task, record: TaskResult) -> Progress:
+    row = record.row
+    numbers = (row[name] for name in ("points", "steps", "residual", "a_r", "status"))
+    return Progress(task.index, "end", task.label, *numbers)
+
+
+def _record(task: Task, solved: Solved, seconds: float) -> TaskResult:
+    """All that is kept of one solution."""
+    scene, contact, solution = solved.scene, solved.contact, solved.solution
+    u, sigma = solution.u, solution.sigma
+    row = (
+        empty_row()
+        | task.columns()
+        | asdict(solved.observables)
+        | {
+            "points": scene.grid.points,
+            "points_y": scene.grid.points_y,
+            "p_star": contact.pressure,
+            "residual": solution.residual,
+            "solver": solution.solver,
+            "transforms": solution.transforms,
+            "seconds": seconds,
+            "status": solution.status,
+            "pressure": contact.pressure * scene.delta_sigma,
+            "delta_sigma": scene.delta_sigma,
+            "h_std": scene.h_std,
+            "mean_height": scene.mean_height,
+            "length": scene.grid.length,
+            "mean_gap": solved.observables.u_g * scene.h_std,
+            "displacement": solved.displacement(task.elastomer),
+            "steps": solution.steps,
+            "tolerance": task.solver.tolerance,
+            "warnings": SEPARATOR.join(solved.warnings(task)),
+        }
+        | solved.columns()
+        | edge_shares(task.surface, scene.grid, contact.obstacle, u, sigma)
+    )
+    optional = measure_optional(task.output, solved)
+    physical: dict[str, Callable[[], Field]] = {  # of which one at a time takes memory
+        "u": lambda: scene.in_metres(u),
+        "sigma": lambda: scene.in_pascals(sigma),
+        "height": lambda: scene.in_metres(contact.height),
+        "contact_pressure": lambda: scene.in_pascals(contact_pressure(contact.obstacle, u, sigma)),
+    }
+    fields: dict[str, Field] = {
+        name: whole
+        for name in task.output.fields
+        if (whole := scene.grid.collect(physical[name]())) is not None
+    }
+    cross_section: dict[str, Field] = {}
+    if task.output.cross_section:
+        cross_section = {name: scene.grid.diagonal(field()) for name, field in physical.items()}
+    arrays = {"fields": fields, "cross_sections": cross_section, **optional.curves}
+    return TaskResult(
+        task.id,
+        task.scene_id,
+        task.output.names(),
+        row | optional.columns | optional.histograms,
+        scene.shells,
+        arrays,
+        task.surface.pictures(),
+    )

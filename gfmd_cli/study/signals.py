@@ -1,0 +1,63 @@
+"""Signals that ask a run for an orderly stop."""
+
+import os
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
+from threading import Event, current_thread, main_thread
+from typing import Any
+
+SIGNALS = (
+    signal.SIGTERM,
+    signal.SIGINT,
+    signal.SIGHUP,
+    signal.SIGUSR1,
+    signal.SIGUSR2,
+    signal.SIGXCPU,
+)
+"""SIGHUP: the terminal is closed; SIGXCPU: the soft limit of processor time is reached."""
+
+
+def _heeded() -> list[signal.Signals]:
+    """The signals that this process was not started to ignore, as under nohup."""
+    return [number for number in SIGNALS if signal.getsignal(number) is not signal.SIG_IGN]
+
+
+@contextmanager
+def noted(stop: Event) -> Iterator[None]:
+    """Inside, a signal sets `stop`; a second SIGINT leaves at once.
+
+    Only the main thread of a program can take signals; in another they stay what they are.
+    """
+    if current_thread() is not main_thread():
+        yield
+        return
+
+    def note(number: int, _frame: Any) -> None:
+        if number == signal.SIGINT and stop.is_set():
+            os._exit(130)
+        stop.set()
+
+    before = {number: signal.signal(number, note) for number in _heeded()}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+@contextmanager
+def blocked() -> Iterator[None]:
+    """Inside, signals wait; a process that is started inside begins with its signals blocked."""
+    signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
+
+
+def note_in_worker(stop: Event) -> None:
+    """From now on every signal sets `stop`; those that were blocked at the start come now."""
+    for number in _heeded():
+        signal.signal(number, lambda *_: stop.set())
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)

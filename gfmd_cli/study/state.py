@@ -1,0 +1,124 @@
+"""The progress of a study, read from its files; writes no file and takes no lock."""
+
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+
+from gfmd_cli.errors import InputError, StudyError
+from gfmd_cli.files.hdf5 import MAGIC
+from gfmd_cli.files.regular import open_regular
+from gfmd_cli.spec.models import Spec
+from gfmd_cli.status import Status
+from gfmd_cli.study.checkpoint import Checkpoint, Saved
+from gfmd_cli.study.parts import Held, read_held, task_of_record
+from gfmd_cli.study.reading import open_study
+from gfmd_cli.study.store import Study
+from gfmd_cli.study.tasks import plan
+
+
+@dataclass(frozen=True)
+class TaskState:
+    """The progress of one task."""
+
+    task: int
+    label: str
+    status: Status
+    saved: Saved | None = None
+    """The saved state from which the next run resumes."""
+
+
+@dataclass(frozen=True)
+class StudyState:
+    """The progress of all tasks of a study."""
+
+    study: Path
+    tasks: list[TaskState]
+    records: int
+    """Records that are not collected into the study file yet."""
+    damaged: list[str]
+    """Names of records that cannot be read; their tasks are solved again."""
+    others: int = 0
+    """Solved tasks of the study that the spec does not ask for."""
+
+    @property
+    def counts(self) -> Counter[Status]:
+        """How many tasks have which status."""
+        return Counter(task.status for task in self.tasks)
+
+    @property
+    def missing(self) -> list[int]:
+        """Indices of the tasks that are not solved yet."""
+        return [task.task for task in self.tasks if task.status == Status.MISSING]
+
+    @property
+    def converged(self) -> bool:
+        """Whether every task is solved to its tolerance."""
+        return all(task.status.is_converged for task in self.tasks)
+
+    def shard(self, index: int, count: int) -> Counter[Status]:
+        """How many tasks of one shard have which status."""
+        return Counter(task.status for task in self.tasks if task.task % count == index)
+
+
+def state_of_spec(spec: Spec, path: Path) -> StudyState:
+    """The progress of the tasks of a spec in the study file `path`."""
+    tasks = plan(spec)
+    output = frozenset(spec.output.names())
+    return _state(Study(path), [(task.id, task.label) for task in tasks], output)
+
+
+def state_of_study(path: Path) -> StudyState:
+    """The progress of a study file; it contains no labels of the tasks that are missing."""
+    with open_study(path) as file:
+        ids, rows = file.task_ids, file.rows
+    labels = [
+        f"{row['elastomer']} {row['points']} p*={row['p_star']:.4g}" if row["elastomer"] else ""
+        for row in rows
+    ]
+    return _state(Study(path), list(zip(ids, labels, strict=True)))
+
+
+def is_study(path: Path) -> bool:
+    """Whether a path is meant as a study rather than as a spec."""
+    if path.suffix == ".h5":
+        return True
+    try:
+        with open_regular(path, follow=True) as file:
+            return file.read(len(MAGIC)) == MAGIC
+    except OSError:
+        return False
+
+
+def check_shards(count: int, tasks: int) -> None:
+    """Raise InputError where some shard would have no task."""
+    if not 0 < count <= tasks:
+        raise InputError(f"--shards {count}: the spec has {tasks} tasks; take 1 to {tasks}")
+
+
+def _state(
+    study: Study, tasks: list[tuple[str, str]], output: frozenset[str] = frozenset()
+) -> StudyState:
+    """The progress of these tasks (id, label); a result that lacks some of `output` is missing.
+
+    Checkpoints are read before records, and these before the study, in the order in which a task
+    writes them, so that a task that ends meanwhile is not overlooked.
+    """
+    saved = {name: Checkpoint(study.parts / name).saved() for name, _ in tasks}
+    records: list[tuple[str, Held]] = []
+    damaged = [path.name for path in study.set_aside()]
+    for path in study.record_paths():
+        try:
+            records.append((task_of_record(path), read_held(path)))
+        except StudyError:
+            if path.exists():  # else it has just been collected
+                damaged.append(path.name)
+    held = [*study.collected().items(), *records]
+    known = {name: found.status for name, found in held if found.stored >= output}
+    others = {name for name, _ in held}.difference(name for name, _ in tasks)
+    states = [
+        TaskState(
+            index, label, known.get(name, Status.MISSING), None if name in known else saved[name]
+        )
+        for index, (name, label) in enumerate(tasks)
+    ]
+    return StudyState(study.path, states, len(records), damaged, len(others))

@@ -1,0 +1,50 @@
+"""A worker process: it solves the tasks that come through its pipe, one after the other."""
+
+import faulthandler
+import os
+import sys
+from multiprocessing.connection import Connection
+from queue import SimpleQueue
+from threading import Event, Thread
+
+from gfmd_cli.grid import plans
+from gfmd_cli.study.context import SolveContext
+from gfmd_cli.study.run_task import attempt
+from gfmd_cli.study.signals import note_in_worker
+from gfmd_cli.study.tasks import Task
+
+READY = "ready"
+
+
+def serve(pipe: Connection) -> None:
+    """Solve tasks until the other end of the pipe is closed.
+
+    What is sent: every progress event, and a text whenever a task may be given: READY at the start,
+    then the status of each task.
+    """
+    faulthandler.enable(sys.__stderr__ or 2)
+    parts, options = pipe.recv()
+    context = SolveContext(options, pipe.send)
+    note_in_worker(context.stop)
+    tasks: SimpleQueue[Task] = SimpleQueue()
+    Thread(target=_receive, args=(pipe, tasks, context.stop), daemon=True).start()
+    try:
+        plans.plan_with(parts, estimated=options.reproducible)
+        pipe.send(READY)
+        while True:
+            pipe.send(attempt(tasks.get(), parts, context))
+    except BrokenPipeError:  # the run has ended
+        os._exit(1)
+
+
+def _receive(pipe: Connection, tasks: SimpleQueue[Task], stop: Event) -> None:
+    """Take tasks in; None asks for a stop. No worker outlives its run: a closed pipe ends it."""
+    try:
+        while True:
+            task = pipe.recv()
+            if task is None:
+                stop.set()
+            else:
+                tasks.put(task)
+    except (EOFError, OSError):
+        os._exit(0)

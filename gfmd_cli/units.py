@@ -1,0 +1,34 @@
+"""Numbers as people read them: with the prefixes of SI units, and times."""
+
+import math
+
+PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G", 12: "T"}
+PREFIXED = ("m", "Pa", "N/m")
+"""Units that take a prefix."""
+DIGITS = 12  # of a number in a label, so that different parameters have different labels
+DURATIONS = (("d", 86400), ("h", 3600), ("min", 60), ("s", 1))
+
+
+def scaled(most: float, unit: str) -> tuple[float, str]:
+    """A divisor for values up to `most`, and the unit with its SI prefix."""
+    if not (math.isfinite(most) and most > 0):
+        return 1.0, unit
+    power = 3 * math.floor(math.log10(1.1 * most) / 3)
+    power = min(max(power, min(PREFIXES)), max(PREFIXES))
+    return 10.0**power, PREFIXES[power] + unit
+
+
+def labelled(value: float, unit: str) -> str:
+    """A number in a label with its unit, if that takes a prefix: "2 GPa"; else as "2e9"."""
+    if unit not in PREFIXED:
+        return f"{value:.{DIGITS}g}"
+    divisor, prefixed = scaled(abs(value), unit)
+    return f"{value / divisor:.{DIGITS}g} {prefixed}"
+
+
+def duration(seconds: float) -> str:
+    """A time in the largest unit of which it has two or more, such as "90 s" or "3 h"."""
+    unit, size = next(
+        ((unit, size) for unit, size in DURATIONS if seconds >= 2 * size), DURATIONS[-1]
+    )
+    return f"{seconds / size:.0f} {unit}"

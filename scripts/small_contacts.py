@@ -1,0 +1,79 @@
+"""Small contacts: transforms and processor time with the start on tiles, and on whole grids.
+
+    python scripts/small_contacts.py --points 512 1024 2048 --p-star 0.001 0.01
+
+Default surface, one thread. Both ways are timed side by side, `--repeats` times; the minimum
+counts. The numbers of transforms are means over the seeds, and the ratio of times is their median.
+"""
+
+import argparse
+import os
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+import time
+from typing import ClassVar
+
+import numpy as np
+
+from gfmd_cli.physics.contact import Contact, build_scene
+from gfmd_cli.physics.elastomers import Power
+from gfmd_cli.physics.self_affine import SelfAffine
+from gfmd_cli.solvers.nested_grids import Solution, solve_contact
+from gfmd_cli.solvers.pcg import ProjectedCG
+
+
+class WholeGrids(ProjectedCG):
+    """The solver without the start on tiles."""
+
+    starts_locally: ClassVar[bool] = False
+
+
+def timed(contact: Contact, solver: ProjectedCG) -> tuple[float, Solution]:
+    """Processor seconds and solution."""
+    start = time.process_time()
+    solution = solve_contact(contact, solver)
+    return time.process_time() - start, solution
+
+
+def compare(contact: Contact, tolerance: float, repeats: int) -> tuple[float, ...]:
+    """Transforms on tiles and on whole grids, ratio of times, relative difference of gaps."""
+    solvers = [kind(tolerance=tolerance) for kind in (ProjectedCG, WholeGrids)]
+    seconds = [np.inf, np.inf]
+    for _ in range(repeats):
+        pairs = [timed(contact, solver) for solver in solvers]
+        seconds = [min(best, pair[0]) for best, pair in zip(seconds, pairs, strict=True)]
+    tiles, whole = (solution for _, solution in pairs)
+    gaps = [float(np.mean(solution.u - contact.height)) for solution in (tiles, whole)]
+    difference = abs(gaps[0] / gaps[1] - 1)
+    return tiles.transforms, whole.transforms, seconds[1] / seconds[0], difference
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--points", type=int, nargs="+", default=[512, 1024, 2048])
+    parser.add_argument("--exponents", type=float, nargs="+", default=[1.0])
+    parser.add_argument("--p-star", type=float, nargs="+", default=[0.001, 0.01, 0.1])
+    parser.add_argument("--seeds", type=int, nargs="+", default=[0, 1, 2])
+    parser.add_argument("--tolerance", type=float, default=1e-4)
+    parser.add_argument("--repeats", type=int, default=2)
+    given = parser.parse_args()
+    print("points     n     p*  tiles (transforms)  whole grids  time ratio  difference of u_g")
+    for points in given.points:
+        for n in given.exponents:
+            scenes = [build_scene(SelfAffine(seed=s), Power(n=n), points) for s in given.seeds]
+            for p_star in given.p_star:
+                results = [
+                    compare(scene.contact(p_star), given.tolerance, given.repeats)
+                    for scene in scenes
+                ]
+                tiles, whole, ratio, difference = np.transpose(results)
+                print(
+                    f"{points:6} {n:5g} {p_star:6g} {tiles.mean():19.1f} {whole.mean():12.1f} "
+                    f"{np.median(ratio):11.1f} {difference.max():18.1e}",
+                    flush=True,
+                )
+
+
+if __name__ == "__main__":
+    main()

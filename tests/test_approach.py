@@ -1,0 +1,121 @@
+"""Loads given as the displacement of the indenter from first touch."""
+
+import numpy as np
+import pytest
+from scipy.special import gamma
+
+from gfmd_cli.physics.elastomers import Layer
+from gfmd_cli.physics.self_affine import SelfAffine
+
+SPEC = """\
+[surface]
+kind = "parabola"
+radius = 2.0
+[elastomer]
+kind = "half-space"
+E_star = 3.0
+[grid]
+points = 128
+boundary = "free"
+[load]
+displacement = 0.045
+"""
+
+
+def test_hertz_contact_has_the_radius_of_its_depth(rows_of):
+    """d = a^2 / R and F = 4 E* a^3 / 3 R, at a = 0.3 of the side."""
+    (row,) = rows_of("load.tolerance=1e-5")
+    assert row["status"] == "converged"
+    assert row["displacement"] == pytest.approx(0.045, rel=1e-5)
+    assert row["pressure"] == pytest.approx(4 * 3.0 * 0.3**3 / (3 * 2.0), rel=3e-4)
+
+
+@pytest.mark.parametrize("n", [0.5, 1.5])
+def test_generalised_hertz_contact_has_the_force_of_its_depth(rows_of, n):
+    """d = a^2 / (2 - n) R, F = pi k 2^(n-1) a^(4-n) / [R Gamma(3 - n/2) Gamma(2 - n/2)]."""
+    depth = 0.3**2 / ((2 - n) * 2.0)
+    (row,) = rows_of(f"elastomer={{kind='power', n={n}}}", f"load.displacement={depth}")
+    force = np.pi * 2 ** (n - 1) * 0.3 ** (4 - n) / (2 * gamma(3 - n / 2) * gamma(2 - n / 2))
+    assert row["status"] == "converged"
+    assert row["pressure"] == pytest.approx(force, rel=1e-2)
+
+
+@pytest.mark.parametrize("base", ["sliding", "bonded"])
+def test_layer_in_full_contact_moves_by_the_pressure_over_its_stiffness(rows_of, base):
+    """u = h: the mean displacement 0 lies p / k(0) above the level of the undeformed surface."""
+    thickness, modulus, nu = 0.05, 2e6, 0.3
+    stiffness = modulus / thickness  # of a sliding layer
+    if base == "bonded":
+        stiffness *= (1 - nu) ** 2 / (1 - 2 * nu)
+    (row,) = rows_of(
+        "surface={kind='self-affine', cutoff=0.1, h_std=1e-4}",
+        f"elastomer={{kind='layer', thickness={thickness}, E_star={modulus}, "
+        f"poisson={nu}, base='{base}'}}",
+        "grid={points=64}",
+        "load={displacement=3e-3, tolerance=1e-5}",
+    )
+    heights = SelfAffine(cutoff=0.1, h_std=1e-4).heights(64)
+    assert (row["a_r"], row["status"]) == (1.0, "converged")
+    assert row["displacement"] == pytest.approx(3e-3, rel=1e-5)
+    depth = heights.max() - heights.mean() + row["pressure"] / stiffness
+    assert row["displacement"] == pytest.approx(depth, rel=1e-10)
+
+
+def test_springs_have_one_displacement_with_every_boundary(rows_of):
+    """n = 0: each point stands for itself, sigma = k max(d - (max h - h), 0)."""
+    rough = ("surface={kind='self-affine', cutoff=0.1}", "elastomer={kind='power', n=0}")
+    periodic, free = (
+        rows_of(*rough, f"grid={{points=64, boundary='{name}'}}", "load={p_star=0.2}", name=name)[0]
+        for name in ("periodic", "free")
+    )
+    heights = SelfAffine(cutoff=0.1).heights(64)
+    for row in (periodic, free):
+        overlap = np.maximum(heights - heights.max() + row["displacement"], 0)
+        assert overlap.mean() == pytest.approx(row["pressure"], rel=1e-6)
+
+
+def test_displacement_vanishes_with_the_load(rows_of):
+    """As F^(2/3) for a paraboloid: by 100 where the load falls by 1000."""
+    rows = rows_of("load={pressure=[1e-3, 1e-6]}", "grid.points=512", "solver.tolerance=1e-9")
+    a = [(3 * row["pressure"] * 2.0 / (4 * 3.0)) ** (1 / 3) for row in rows]
+    assert rows[0]["displacement"] == pytest.approx(a[0] ** 2 / 2.0, rel=3e-2)
+    assert 0 < rows[1]["displacement"] < 2e-2 * rows[0]["displacement"]
+
+
+def test_table_that_begins_constant_has_a_level(rows_of, tmp_path):
+    """The stiffness of a sliding layer as a table, k(0) its first rows."""
+    layer = Layer(thickness=0.1, base="sliding")
+    q = np.geomspace(1e-3, 1e4, 2000)
+    k = np.append(np.full(2, layer.uniform_stiffness), layer.stiffness(q[2:]))
+    np.savetxt(tmp_path / "k.txt", np.column_stack([q, k]), fmt="%.17g")
+    rough = "surface={kind='self-affine', cutoff=0.1}"
+    rows = [
+        rows_of(rough, f"elastomer={body}", "grid={points=64}", "load={p_star=0.3}", name=name)[0]
+        for name, body in {
+            "layer": "{kind='layer', thickness=0.1, base='sliding'}",
+            "table": f"{{kind='table', path='{tmp_path / 'k.txt'}'}}",
+        }.items()
+    ]
+    assert rows[1]["displacement"] == pytest.approx(rows[0]["displacement"], rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    "overrides",
+    [
+        ("grid.boundary=periodic",),
+        ("grid.boundary=periodic", "elastomer={kind='slab', thickness=0.1}"),
+        ("surface={kind='line-parabola'}",),
+    ],
+)
+def test_displacement_without_a_level_is_refused(gfmd, overrides):
+    words = [word for override in overrides for word in ("--set", override)]
+    done = gfmd("run", "spec.toml", *words)
+    assert done.exit_code == 2
+    assert "load.displacement" in done.output
+    assert "use load.mean_gap" in done.output
+    assert "Traceback" not in done.output
+
+
+def test_other_tables_have_no_displacement(rows_of):
+    (row,) = rows_of("grid.boundary=periodic", "load={p_star=0.1}")
+    assert np.isnan(row["displacement"])

@@ -1,0 +1,70 @@
+"""Transforms of padded fields, against sums."""
+
+import numpy as np
+import pytest
+
+from gfmd_cli.grid.convolution import PaddedTransform, padded_shape
+
+SHAPES = [(16, 16), (15, 22), (9, 64), (1, 6), (33,), (64,)]
+
+
+def direct(kernel, field):
+    """sum_j G(|i - j|) s_j by a loop over all pairs of points."""
+    out = np.zeros(field.shape)
+    for load in np.ndindex(field.shape):
+        distance = [np.abs(np.arange(n) - j) for n, j in zip(field.shape, load, strict=True)]
+        out += field[load] * kernel[np.ix_(*distance)]
+    return out
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_a_convolution_is_the_sum_over_all_points(shape):
+    generator = np.random.default_rng(1)
+    kernel, field = generator.random(shape), generator.random(shape)
+    transform = PaddedTransform(shape, padded_shape(shape, 2))
+    out = transform.apply(transform.symbol_of(kernel), field, np.empty(shape))
+    assert np.allclose(out, direct(kernel, field), rtol=1e-12)
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_a_symbol_acts_on_the_field_padded_by_zeros(shape):
+    """Against numpy.fft on the whole padded field; also where padding is less than twofold."""
+    field, padded = np.random.default_rng(2).random(shape), padded_shape(shape, 1.25)
+    transform = PaddedTransform(shape, padded)
+    q = transform.wavenumber((0.3, 0.2)[-len(shape) :])
+    whole = np.zeros((1, *padded)[-2:])
+    whole[: transform.rows, : transform.columns] = field
+    rows = np.abs(np.fft.fftfreq(len(whole), 1 / len(whole))).astype(int)
+    expected = np.fft.irfft2(np.sqrt(q)[rows] * np.fft.rfft2(whole), whole.shape)
+    out = transform.apply(np.sqrt(q), field, np.empty(shape))
+    assert np.allclose(out.reshape(transform.rows, -1), expected[: transform.rows, : shape[-1]])
+
+
+def test_single_precision_is_as_good_as_that():
+    shape, generator = (40, 30), np.random.default_rng(3)
+    kernel, field = generator.random(shape), generator.random(shape)
+    double, single = (
+        PaddedTransform(shape, padded_shape(shape, 2), precision)
+        for precision in ("double", "single")
+    )
+    expected, computed = (
+        t.apply(t.symbol_of(kernel), field, np.empty(shape)) for t in (double, single)
+    )
+    assert single.symbol_of(kernel).dtype == np.float32
+    assert 0 < np.abs(computed / expected - 1).max() < 1e-5
+
+
+def test_the_map_can_be_applied_in_place():
+    shape = (12, 20)
+    field = np.random.default_rng(4).random(shape)
+    transform = PaddedTransform(shape, padded_shape(shape, 2))
+    kernel = np.zeros(shape)
+    kernel[0, 0] = 3.0
+    expected = 3 * field
+    assert transform.apply(transform.symbol_of(kernel), field, field) is field
+    assert np.allclose(field, expected)
+
+
+def test_a_convolution_on_too_few_points_is_an_error():
+    with pytest.raises(ValueError, match="twice the points"):
+        PaddedTransform((8, 8), (14, 16)).symbol_of(np.ones((8, 8)))

@@ -1,0 +1,91 @@
+"""A study as a labelled data set: tasks are selected by their parameters."""
+
+from pathlib import Path
+
+import pytest
+
+from gfmd_cli import dataset
+from gfmd_cli.errors import InputError
+from gfmd_cli.spec.parse import read_spec
+from gfmd_cli.study.reading import read_rows
+from gfmd_cli.study.run import run_study
+
+SPEC = """\
+[surface]
+kind = "self-affine"
+cutoff = 0.2
+hurst = [0.5, 0.8]
+seed = [0, 1]
+[[elastomer]]
+kind = "power"
+n = [0, 1]
+[[elastomer]]
+kind = "slab"
+thickness = 0.1
+[grid]
+points = 16
+[load]
+p_star = { from = 0.1, to = 1.0, per_decade = 2 }
+"""
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("data")
+    (folder / "spec.toml").write_text(SPEC)
+    spec, text = read_spec(folder / "spec.toml")
+    run_study(spec, text, folder / "study.h5", lambda event: None, jobs=1)
+    return folder / "study.h5"
+
+
+@pytest.fixture(scope="module", params=["study.h5", "study.nc"])
+def data(study, request, output_of):
+    """The data set of the study, and that of its netCDF file."""
+    path = study.with_name(request.param)
+    if path.suffix == ".nc":
+        output_of("export", study, "-o", path)
+    return dataset(path)
+
+
+def test_tasks_are_selected_by_their_parameters(data, study):
+    chosen = data.sel(hurst=0.8, n=1)
+    expected = [row for row in read_rows(study) if (row["hurst"], row["n"]) == (0.8, 1.0)]
+    assert chosen.a_r.dims == ("task",)
+    assert chosen.a_r.values.tolist() == [row["a_r"] for row in expected]
+    assert len(expected) == 2 * 3
+
+
+def test_selections_can_follow_each_other_and_combine_lists_and_ranges(data):
+    assert data.sel(hurst=0.8).sel(n=[0, 1]).sizes["task"] == 12
+    assert data.sel(n=[0, 1], seed=1, p_star=slice(0.2, None)).sizes["task"] == 2 * 2 * 2
+    assert data.sel(elastomer_kind="slab").thickness.values.tolist() == [0.1] * 12
+    assert data.isel(task=slice(0, 3)).sel(p_star=0.1).sizes["task"] == 1
+    assert set(data.sel(cutoff=0.2).cutoff.values) == {0.2}
+
+
+def test_the_nearest_value_is_taken_on_request(data):
+    near = data.sel(p_star=0.3, n=1, method="nearest").p_star.values
+    assert near == pytest.approx([0.1 * 10**0.5] * 4, rel=1e-12)
+    with pytest.raises(KeyError, match=r"p_star = 0\.3"):
+        data.sel(p_star=0.3)
+
+
+def test_a_selection_can_be_sorted_and_grouped(data):
+    curve = data.sel(hurst=0.8, n=1, seed=0).sortby("p_star").a_r
+    assert (curve.diff("task") > 0).all()
+    means = data.sel(n=[0, 1]).a_r.groupby("n").mean()
+    assert means.sel(n=1) < means.sel(n=0)
+
+
+def test_only_known_ways_of_selecting_are_accepted(data):
+    with pytest.raises(ValueError, match="only method='nearest'"):
+        data.sel(n=1, method="pad")
+    with pytest.raises(KeyError, match="hurts"):
+        data.sel(hurts=0.8)
+
+
+def test_a_file_that_is_no_netcdf_is_refused(tmp_path):
+    path = Path(tmp_path / "none.nc")
+    path.write_text("nothing")
+    with pytest.raises(InputError, match=r"none\.nc: no readable netCDF file"):
+        dataset(path)

@@ -1,0 +1,57 @@
+import errno
+import os
+import socket
+
+import pytest
+
+from gfmd_cli.files.regular import open_regular, read_regular
+
+READ, WRITE = os.O_RDONLY, os.O_RDWR | os.O_CREAT
+
+
+def not_regular(folder):
+    """One of each kind that must not be opened, by name."""
+    (folder / "target").write_bytes(b"content")
+    (folder / "link").symlink_to(folder / "target")
+    (folder / "dangling").symlink_to(folder / "nowhere")
+    (folder / "directory").mkdir()
+    os.mkfifo(folder / "pipe")
+    with socket.socket(socket.AF_UNIX) as made:
+        made.bind(str(folder / "socket"))
+    (folder / "device").symlink_to("/dev/zero")
+    return [path for path in sorted(folder.iterdir()) if path.name != "target"]
+
+
+@pytest.mark.parametrize("flags", [READ, WRITE])
+def test_what_is_no_regular_file_is_not_opened(tmp_path, flags):
+    paths = not_regular(tmp_path)
+    assert len(paths) == 6
+    for path in paths:
+        with pytest.raises(OSError, match=path.name):
+            open_regular(path, flags)
+    assert (tmp_path / "target").read_bytes() == b"content"
+    assert not (tmp_path / "nowhere").exists()
+
+
+def test_a_link_is_followed_only_to_a_regular_file(tmp_path):
+    not_regular(tmp_path)
+    with open_regular(tmp_path / "link", follow=True) as file:
+        assert file.read() == b"content"
+    with pytest.raises(OSError, match="not a regular file"):
+        open_regular(tmp_path / "device", follow=True)
+
+
+def test_a_file_of_several_names_is_read_but_not_written(tmp_path):
+    (tmp_path / "own").write_bytes(b"content")
+    os.link(tmp_path / "own", tmp_path / "other")
+    assert read_regular(tmp_path / "other", 7) == b"content"
+    with pytest.raises(OSError, match="several names"):
+        open_regular(tmp_path / "other", WRITE)
+
+
+def test_no_more_is_read_than_allowed(tmp_path):
+    (tmp_path / "sparse").touch()
+    os.truncate(tmp_path / "sparse", 2**36)
+    with pytest.raises(OSError, match="larger than 100 bytes") as caught:
+        read_regular(tmp_path / "sparse", 100)
+    assert caught.value.errno == errno.EFBIG

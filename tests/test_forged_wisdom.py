@@ -1,0 +1,96 @@
+"""Plans of transforms that were changed and given a valid checksum again."""
+
+import json
+import os
+import random
+import re
+
+import numpy as np
+import pyfftw
+import pytest
+
+from gfmd_cli.grid import plans
+from gfmd_cli.grid.fft_grid import Grid
+
+COUNT = 10 * int(os.environ.get("GFMD_FORGERIES", "10"))  # `make test-kills` takes 200
+POINTS = 60
+
+
+@pytest.fixture
+def wisdom(tmp_path):
+    """What FFTW measured for a grid; a folder to keep it in."""
+    plans.plan_with(tmp_path)
+    Grid(POINTS).transform()
+    if plans.plans() == "estimated":  # GFMD_PLANS
+        pytest.skip("transforms are not measured")
+    yield plans._export()
+    plans.plan_with(None)
+
+
+def keep(folder, texts):
+    """Keep these texts as the wisdom of a folder, with a valid checksum."""
+    plans._write(folder, texts)
+
+
+def test_wisdom_as_fftw_writes_it_is_read(wisdom, tmp_path):
+    keep(tmp_path, wisdom)
+    assert plans.read_wisdom(tmp_path) == wisdom
+    assert plans._joined(wisdom, wisdom) == wisdom
+
+
+@pytest.mark.parametrize("place", [0, 1, 2])
+def test_flags_of_too_many_bits_which_abort_fftw_are_not_read(wisdom, tmp_path, place):
+    numbers = ["#x11bdd", "#x11bdd", "#x0"]
+    numbers[place] = ["#x11bdd0", "#x11bdd0", "#x200"][place]
+    line = "  (fftw_rdft2_nop_register 0 {} #x1 #x2 #x3 #x4)\n)\n".format(" ".join(numbers))
+    keep(tmp_path, [wisdom[0][:-2] + line, wisdom[1]])
+    assert plans.read_wisdom(tmp_path) is None
+
+
+def forged(text, rng):
+    """The text with other solvers, other flags, exchanged problems, or other letters."""
+    lines = text.splitlines()
+    for _ in range(rng.randint(1, 4)):
+        one, other = (rng.randrange(1, len(lines) - 1) for _ in range(2))
+        words, others = lines[one].split(), lines[other].split()
+        how = rng.randrange(4)
+        if how == 0:
+            words[:2] = others[:2]
+        elif how == 1:
+            words[rng.randrange(2, 5)] = f"#x{rng.getrandbits(rng.choice([9, 20, 32])):x}"
+        elif how == 2:
+            words[5:] = others[5:]
+        else:
+            at = rng.randrange(len(words))
+            words[at] = re.sub("[0-9a-f]", rng.choice("0123456789abcdef-("), words[at], count=1)
+        lines[one] = "  " + " ".join(words)
+    return "\n".join(lines) + "\n"
+
+
+def transformed():
+    """Coefficients of a random field by FFTW and by NumPy."""
+    grid, field = Grid(POINTS), np.random.default_rng(0).normal(size=(POINTS, POINTS))
+    grid.padded[...] = 0.0
+    grid.padded[:, :POINTS] = field
+    grid.transform()
+    return grid.spectrum.view(complex)[:, : POINTS // 2 + 1], np.fft.rfft2(field)
+
+
+def test_forged_plans_change_no_number(wisdom, tmp_path):
+    rng, read = random.Random(0), 0
+    for _ in range(COUNT):
+        keep(tmp_path, [forged(wisdom[0], rng), wisdom[1]])
+        pyfftw.forget_wisdom()
+        read += plans.read_wisdom(tmp_path) is not None
+        found, exact = transformed()
+        assert np.abs(found - exact).max() < 1e-12 * np.abs(exact).max()
+    assert 0 < read < COUNT
+
+
+def test_the_checksum_of_wisdom_is_read(wisdom, tmp_path):
+    keep(tmp_path, wisdom)
+    (path,) = tmp_path.glob("wisdom-*.json")
+    data = json.loads(path.read_text())
+    data["wisdom"][0] = wisdom[1]
+    path.write_text(json.dumps(data))
+    assert plans.read_wisdom(tmp_path) is None

@@ -1,0 +1,280 @@
+"""Contacts of a map with an elastomer that goes on beyond it: exact results, other methods."""
+
+import copy
+
+import numpy as np
+import pytest
+from scipy.optimize import nnls
+
+from gfmd_cli.errors import InputError
+from gfmd_cli.grid.fft_grid import Grid
+from gfmd_cli.grid.pixels import average_pixels
+from gfmd_cli.physics.contact import build_scene
+from gfmd_cli.physics.elastomers import HalfSpace, Layer, Power
+from gfmd_cli.physics.file_surface import FileSurface
+from gfmd_cli.physics.free_contact import (
+    FreeContact,
+    FreeElasticity,
+    build_free_scene,
+)
+from gfmd_cli.physics.indenters import LineParabola, Parabola
+from gfmd_cli.physics.observables import contact_line, observe
+from gfmd_cli.physics.patches import contact_patches, open_gap
+from gfmd_cli.physics.self_affine import SelfAffine
+from gfmd_cli.solvers.auto import Auto
+from gfmd_cli.solvers.dual import Dual
+from gfmd_cli.solvers.loop import Solver, solve
+from gfmd_cli.solvers.nested_grids import Resume, solve_contact
+from gfmd_cli.solvers.pcg import ProjectedCG
+from gfmd_cli.study.run import run_study
+
+ROUGH = SelfAffine(cutoff=0.05)
+SPEC = """\
+[surface]
+kind = "self-affine"
+cutoff = 0.1
+[elastomer]
+kind = "half-space"
+[grid]
+points = 32
+boundary = "free"
+[load]
+p_star = 0.1
+"""
+
+
+def oblong_contact(elastomer, pressure):
+    """A random map of 11 x 14 points and pixels of 0.2 x 0.3 m."""
+    height = np.random.default_rng(5).standard_normal((11, 14))
+    grid = Grid(14, 2, 14 * 0.3, points_y=11, length_y=11 * 0.2)
+    free = FreeElasticity(elastomer, grid, 1.0)
+    return FreeContact(grid, height, np.empty(0), pressure, free=free)
+
+
+def matrix(contact):
+    """The compliance between all pairs of pixels."""
+    kernel = contact.free.elastomer.free_compliance(contact.grid.shape, contact.grid.spacings)
+    y, x = (i.ravel() for i in np.indices(contact.grid.shape))
+    return kernel[np.abs(y[:, None] - y), np.abs(x[:, None] - x)]
+
+
+@pytest.mark.parametrize("pressure", [1e-3, 0.1, 3.0])
+@pytest.mark.parametrize(
+    "elastomer",
+    [Power(n=0), Power(n=0.5), HalfSpace(), Power(n=1.5), Layer(thickness=0.5, poisson=0.4)],
+    ids=lambda elastomer: elastomer.label,
+)
+def test_solution_is_that_of_non_negative_least_squares(elastomer, pressure):
+    """At the level c of the undeformed surface, s >= 0 minimises <s C s>/2 - <s (h - c)>.
+
+    With C = R^T R this is |R s - R^-T (h - c)|^2, which the active-set method of Lawson and
+    Hanson solves.
+    """
+    contact = oblong_contact(elastomer, pressure)
+    solution = solve_contact(contact, Auto(tolerance=1e-11))
+    assert solution.status == "converged"
+    level = contact.undeformed_level(solution.u, solution.sigma)
+    root = np.linalg.cholesky(matrix(contact)).T
+    stress, _ = nnls(root, np.linalg.solve(root.T, contact.height.ravel() - level))
+    assert stress.mean() == pytest.approx(pressure, rel=1e-8)
+    assert solution.sigma.ravel() == pytest.approx(stress, abs=1e-8 * stress.max())
+    gap = matrix(contact) @ stress + level - contact.height.ravel()
+    assert (solution.u - contact.height).ravel() == pytest.approx(np.maximum(gap, 0), abs=1e-7)
+
+
+def test_hertz_contact_has_no_images():
+    """Hertz: a^3 = 3 F R / 4 E*, p_0 = 2 E* a / pi R, depth a^2 / R, at a = 0.3 of the side."""
+    radius, modulus, a = 2.0, 3.0, 0.3
+    scene = build_free_scene(Parabola(radius=radius), HalfSpace(E_star=modulus), 128)
+    contact = scene.contact(4 * modulus * a**3 / (3 * radius) / scene.delta_sigma)
+    found = solve_contact(contact, Auto())
+    highest = found.sigma.max() * scene.delta_sigma
+    assert highest == pytest.approx(2 * modulus * a / (np.pi * radius), rel=2e-4)
+    depth = contact.height.max() - contact.undeformed_level(found.u, found.sigma)
+    assert depth * scene.h_std == pytest.approx(a**2 / radius, rel=2e-4)
+    area = observe(contact, found.u, found.sigma).a_r
+    assert area == pytest.approx(np.pi * a**2, rel=2e-2)  # the perimeter times a spacing / 4
+
+
+def test_hertz_line_contact_has_no_images():
+    """a^2 = 4 P R / pi E*, p_0 = E* a / 2 R."""
+    radius, modulus, a = 2.0, 3.0, 0.3
+    scene = build_free_scene(LineParabola(radius=radius), HalfSpace(E_star=modulus), 512)
+    load = np.pi * modulus * a**2 / (4 * radius)
+    found = solve_contact(scene.contact(load / scene.delta_sigma), Auto())
+    highest = found.sigma.max() * scene.delta_sigma
+    assert highest == pytest.approx(modulus * a / (2 * radius), rel=1e-4)
+    assert np.mean(found.sigma > 0) == pytest.approx(2 * a, abs=2 / 512)
+
+
+@pytest.mark.parametrize("n", [0.5, 1.5])
+def test_generalised_hertz_contact_has_no_images(n):
+    """sigma_0 = 2^(n-1) k a^(2-n) / R Gamma(2-n/2)^2, depth a^2 / (2-n) R; errata of the paper."""
+    from scipy.special import gamma
+
+    a, points = 0.3, 128
+    scene = build_free_scene(Parabola(radius=1.0), Power(n=n), points)
+    force = np.pi * 2 ** (n - 1) * a ** (4 - n) / (gamma(3 - n / 2) * gamma(2 - n / 2))
+    contact = scene.contact(force / scene.delta_sigma)
+    found = solve_contact(contact, Auto())
+    highest = found.sigma.max() * scene.delta_sigma
+    assert highest == pytest.approx(2 ** (n - 1) * a ** (2 - n) / gamma(2 - n / 2) ** 2, rel=3e-3)
+    depth = contact.height.max() - contact.undeformed_level(found.u, found.sigma)
+    assert depth * scene.h_std == pytest.approx(a**2 / (2 - n), rel=3e-3)
+
+
+@pytest.mark.parametrize("p_star", [1e-3, 0.1, 2.0])
+def test_energy_is_half_of_the_work_and_stress_has_its_mean(p_star):
+    contact = build_free_scene(ROUGH, HalfSpace(), 64).contact(p_star)
+    found = solve_contact(contact, Auto(tolerance=1e-9))
+    seen = observe(contact, found.u, found.sigma)
+    assert seen.work == pytest.approx(2 * seen.energy, rel=1e-7)
+    assert found.sigma.mean() == pytest.approx(p_star, rel=1e-12)
+    assert np.all(found.u[found.sigma > 0] == contact.height[found.sigma > 0])
+
+
+def test_unit_of_pressure_is_that_of_the_mirrored_map():
+    """Of a half-space, E*/2 times the rms gradient: of a plane of slope 0.3, up to its kinks."""
+
+    class Plane(Parabola):
+        def heights_on(self, grid):
+            return 0.3 * (np.arange(grid.points) / grid.points) * np.ones(grid.shape)
+
+    scene = build_free_scene(Plane(), HalfSpace(E_star=2.0), 256)
+    assert scene.delta_sigma == pytest.approx(0.3, rel=1e-2)
+    assert scene.h_std == pytest.approx(0.3 / np.sqrt(12), rel=1e-4)
+
+
+@pytest.mark.parametrize("shape", [(24, 24), (24,)])
+def test_finer_grid_of_a_map_does_not_join_its_borders(tmp_path, shape):
+    """A staircase along x, whose heights between the points lie between those beside them."""
+    steps = np.floor(np.arange(24) / 4)
+    np.save(tmp_path / "stairs.npy", np.broadcast_to(steps, shape))
+    surface = FileSurface(path=tmp_path / "stairs.npy", periodic=False, level="none", edges="none")
+    fine = build_free_scene(surface, HalfSpace(), 96)
+    rows = fine.in_metres(fine.height)
+    assert np.diff(rows, axis=-1).min() >= -1e-12
+    assert rows[..., ::4] == pytest.approx(np.broadcast_to(steps, (*fine.grid.shape[:-1], 24)))
+    periodic = build_scene(surface, HalfSpace(), 96)
+    assert np.diff(periodic.height, axis=-1).min() < -0.1
+
+
+def test_points_beside_a_border_never_touch_because_of_the_other_border(tmp_path):
+    heights = SelfAffine(cutoff=0.1).heights(32)
+    heights[:, 0] = np.nan
+    np.save(tmp_path / "holed.npy", heights)
+    surface = FileSurface(path=tmp_path / "holed.npy", periodic=False, edges="none", missing="void")
+    known = build_free_scene(surface, HalfSpace(), 128).may_touch
+    assert np.all(known[:, 2:])
+    assert not np.any(known[:, :2])
+
+
+@pytest.mark.parametrize("stop_at", [0, 1, 5])
+def test_resumed_solve_is_bit_identical(stop_at):
+    contact, solver = build_free_scene(ROUGH, HalfSpace(), 128).contact(0.1), Dual()
+    saved = []
+
+    def watch(level, state):
+        if level is contact and state.step == stop_at:
+            saved.append(copy.deepcopy(state))
+
+    straight = solve_contact(contact, solver, watch)
+    resumed = solve_contact(contact, solver, start=Resume((128, 128), vars(saved[0])))
+    assert np.array_equal(resumed.sigma, straight.sigma)
+    assert np.array_equal(resumed.u, straight.u)
+    assert resumed.transforms == straight.transforms
+
+
+def test_energy_never_rises():
+    contact = build_free_scene(ROUGH, Power(n=1.5), 64).contact(0.3)
+    energies = []
+
+    def watch(contact, state):
+        stress = state.sigma
+        response = contact.free.displacement(stress, np.empty_like(stress))
+        energies.append(np.mean(stress * (0.5 * response - contact.height)))
+
+    state = Dual().begin(contact, contact.grid.empty())
+    solve(contact, Dual(tolerance=1e-8), state, watch)
+    assert np.all(np.diff(energies) <= 1e-13)
+    assert len(energies) > 10
+
+
+def test_averages_over_larger_pixels_keep_the_mean():
+    values = np.random.default_rng(0).random((12, 15))
+    halved = average_pixels(values, (6, 15))
+    assert halved == pytest.approx(0.5 * (values[::2] + values[1::2]))
+    for shape in ((5, 7), (12, 15), (24, 31)):
+        assert average_pixels(values, shape).mean() == pytest.approx(values.mean())
+    assert np.array_equal(average_pixels(values, values.shape), values)
+    lonely = np.zeros((8, 8))
+    lonely[3, 3] = 1.0
+    assert np.count_nonzero(average_pixels(lonely, (16, 16))) == 4
+
+
+def test_patches_end_at_a_free_border():
+    touching = np.zeros((6, 8), dtype=bool)
+    touching[2, [0, 7]] = True
+    assert contact_patches(touching).sizes.size == 1
+    assert contact_patches(touching, periodic=False).sizes.tolist() == [1, 1]
+    grid = Grid(8, points_y=6)
+    assert contact_line(grid, touching) == pytest.approx(6 * 8 / 48)
+    assert contact_line(grid, touching, periodic=False) == pytest.approx(6 * 8 / 48)
+    touching[:, 4] = True
+    assert open_gap(touching, periodic=False).winds.tolist() == [True, False]
+    assert open_gap(~touching, periodic=False).winds.tolist() == [True, False]
+
+
+def test_run_stores_the_boundary(rows_of):
+    (row,) = rows_of()
+    assert row["boundary"] == "free"
+    assert (row["solver"], row["status"]) == ("dual", "converged")
+
+
+@pytest.mark.parametrize(
+    ("override", "message"),
+    [
+        ("elastomer={kind='slab', thickness=0.1}", "decays with the distance"),
+        ("solver.kind=pcg", 'solver.kind: "pcg" solves contacts with grid.boundary = "periodic"'),
+        ("accuracy.mean_gap=0.1", 'accuracy: is not available for grid.boundary = "free"'),
+        ("output.stiffness=true", "output.stiffness: is not available"),
+    ],
+)
+def test_what_a_free_boundary_does_not_allow(gfmd, override, message):
+    done = gfmd("run", "spec.toml", "--set", override)
+    assert done.exit_code == 2
+    assert message in done.output
+    assert "Traceback" not in done.output
+
+
+def test_table_is_refused(gfmd, tmp_path):
+    np.savetxt(tmp_path / "k.txt", [[1.0, 1.0], [10.0, 10.0]])
+    done = gfmd("run", "spec.toml", "--set", "elastomer={kind='table', path='k.txt'}")
+    assert done.exit_code == 2
+    assert '"free" is not available for a tabulated k(q)' in done.output
+
+
+def test_several_processes_do_not_share_a_free_boundary(spec_of, tmp_path):
+    with pytest.raises(InputError, match='"free" is solved by one process; run it without mpiexec'):
+        run_study(spec_of(), SPEC, tmp_path / "s.h5", lambda progress: None, ranks=object())
+    assert not (tmp_path / "s.h5").exists()
+
+
+def test_dual_solver_is_for_a_free_boundary(gfmd):
+    done = gfmd("run", "spec.toml", "--set", "grid.boundary=periodic", "--set", "solver.kind=dual")
+    assert done.exit_code == 2
+    assert 'boundary = "free", not "periodic"' in done.output
+
+
+def test_solvers_name_their_boundary():
+    periodic: Solver = ProjectedCG()
+    periodic.check_boundary("periodic")
+    with pytest.raises(InputError, match="auto"):
+        periodic.check_boundary("free")
+    Auto().check_boundary("free")
+
+
+def test_thin_layer_is_planned_and_solved(rows_of):
+    """Much thinner than the side, but not than the spacing."""
+    (row,) = rows_of("elastomer={kind='layer', thickness=0.02, base='sliding'}")
+    assert row["status"] == "converged"

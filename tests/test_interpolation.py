@@ -1,0 +1,128 @@
+"""Heights between the points of a map, and which interpolation suits a map."""
+
+import numpy as np
+import pytest
+
+from gfmd_cli.physics.file_surface import FileSurface
+from gfmd_cli.physics.interpolation import monotone, suited_interpolation
+from gfmd_cli.physics.self_affine import SelfAffine
+
+POINTS = 64
+
+
+def rough(points_per_wave, seed=1, points=POINTS):
+    """A random surface with this many points per shortest wave, unit rms height."""
+    surface = SelfAffine(cutoff=points_per_wave / points, rolloff=0.25, seed=seed)
+    heights = surface.heights(points)
+    return heights / heights.std()
+
+
+def steps(heights):
+    return np.sign(heights)
+
+
+def stripes(heights):
+    return np.tile(np.sign(heights[0]), (len(heights), 1))
+
+
+@pytest.mark.parametrize("points_per_wave", [2, 2.5, 4, 8])
+@pytest.mark.parametrize("seed", [1, 2])
+def test_band_limited_maps_are_interpolated_by_a_fourier_series(points_per_wave, seed):
+    heights = rough(points_per_wave, seed)
+    assert suited_interpolation(heights) == "fourier"
+    assert suited_interpolation(heights.astype(np.float32).astype(float)) == "fourier"
+    assert suited_interpolation(np.rint(heights * 2**11)) == "fourier"
+
+
+@pytest.mark.parametrize("points_per_wave", [2, 4, 8])
+@pytest.mark.parametrize(
+    "worn", [steps, stripes, lambda h: np.minimum(h, 0.5), lambda h: np.maximum(h, -0.5)]
+)
+def test_plateaus_and_steps_are_not(points_per_wave, worn):
+    assert suited_interpolation(worn(rough(points_per_wave))) == "monotone"
+
+
+def test_white_noise_is_not():
+    assert suited_interpolation(np.random.default_rng(3).normal(size=(32, 48))) == "monotone"
+
+
+def test_waves_along_one_axis_are_band_limited_though_neighbours_along_the_other_are_equal():
+    wave = np.cos(2 * np.pi * np.arange(POINTS) / 16)
+    assert suited_interpolation(np.tile(wave, (POINTS, 1))) == "fourier"
+
+
+@pytest.mark.parametrize("shape", [(128, 128), (192, 64), (100, 90)])
+def test_monotone_heights_stay_between_the_points_around_them(shape):
+    """No overshoot: within the range of the four points around, up to nothing at all."""
+    heights = np.random.default_rng(5).normal(size=(64, 64))
+    fine = monotone(heights, shape)
+    y, x = (np.arange(size) * (64 / size) for size in shape)
+    corners = [
+        heights[np.ix_((y.astype(int) + i) % 64, (x.astype(int) + j) % 64)]
+        for i in (0, 1)
+        for j in (0, 1)
+    ]
+    low, high = np.min(corners, axis=0), np.max(corners, axis=0)
+    on_axis = np.ix_(y % 1 == 0, x % 1 == 0)
+    assert (fine >= low - 1e-14).all()
+    assert (fine <= high + 1e-14).all()
+    np.testing.assert_array_equal(fine[on_axis], corners[0][on_axis])
+
+
+def test_plateaus_remain_plateaus():
+    heights = np.minimum(rough(4), 0.25)
+    fine = monotone(heights, (256, 256))
+    assert fine.max() == 0.25
+    inside = heights == 0.25
+    for axis in (0, 1):
+        inside = inside & np.roll(inside, -1, axis)
+    pixels = np.kron(inside, np.ones((4, 4), dtype=bool))
+    assert np.all(fine[pixels] == 0.25)
+
+
+def test_no_axis_is_preferred():
+    heights = np.random.default_rng(6).normal(size=(32, 32))
+    np.testing.assert_array_equal(
+        monotone(heights.T.copy(), (96, 96)), monotone(heights, (96, 96)).T
+    )
+
+
+def test_the_monotone_surface_is_periodic_and_the_same_on_every_grid():
+    heights = np.random.default_rng(7).normal(size=(32, 32))
+    moved = monotone(np.roll(heights, (5, 9), (0, 1)), (96, 96))
+    np.testing.assert_allclose(moved, np.roll(monotone(heights, (96, 96)), (15, 27), (0, 1)))
+    finest = monotone(heights, (192, 192))
+    np.testing.assert_allclose(finest[::2, ::2], monotone(heights, (96, 96)), atol=1e-15)
+
+
+def test_a_smooth_map_converges():
+    """Second order or better between the extremes, first order of the square there."""
+    errors = []
+    for points in (32, 64, 128):
+        x = 2 * np.pi * np.arange(256) / 256
+        exact = np.add.outer(np.cos(x), np.sin(x))
+        step = 256 // points
+        error = monotone(exact[::step, ::step], exact.shape) - exact
+        errors.append(np.abs(error))
+    assert errors[1].max() < errors[0].max() / 3.5
+    assert errors[2].max() < errors[1].max() / 3.5
+
+
+def test_some_rows_are_those_of_the_whole():
+    heights = np.random.default_rng(8).normal(size=(32, 32))
+    whole = monotone(heights, (64, 64))
+    np.testing.assert_array_equal(monotone(heights, (64, 64), slice(10, 30)), whole[10:30])
+
+
+def test_the_choice_is_named_and_can_be_overridden(tmp_path):
+    path = tmp_path / "h.npy"
+    np.save(path, np.minimum(rough(4), 0.25))
+    surface = FileSurface(path=path)
+    assert surface.parameters()["interpolation"] == "monotone"
+    assert "finer grids: monotone" in surface.preparation()
+    assert not surface.band_limited
+    assert surface.heights(256).max() == 0.25
+    forced = FileSurface(path=path, interpolation="fourier")
+    assert forced.band_limited
+    assert forced.heights(256).max() > 0.26
+    np.testing.assert_array_equal(surface.heights(POINTS), forced.heights(POINTS))

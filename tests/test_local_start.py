@@ -1,0 +1,176 @@
+"""The start on tiles: its operators against transforms, its solutions against those without it."""
+
+import copy
+from typing import ClassVar
+
+import numpy as np
+import pytest
+
+from gfmd_cli.grid.fft_grid import Grid
+from gfmd_cli.physics.contact import Contact, build_scene
+from gfmd_cli.physics.elastomers import HalfSpace, Power, Slab
+from gfmd_cli.physics.self_affine import SelfAffine
+from gfmd_cli.solvers.local_start import start_from
+from gfmd_cli.solvers.nested_grids import Resume, solve_contact
+from gfmd_cli.solvers.pcg import ProjectedCG
+from gfmd_cli.solvers.tile_operators import TileOperators
+from gfmd_cli.solvers.tiles import Tiles, convolution_matrix
+
+SUITED = [Power(n=0.25), Power(n=0.5), Power(n=1), Power(n=1.25), HalfSpace(E_star=2e9)]
+
+
+def name(value):
+    return f"n={value.n:g}" if isinstance(value, Power) else None
+
+
+@pytest.fixture
+def some_tiles():
+    """A third of the tiles of a grid of 64 x 96 points, tiles at its edges among them."""
+    used = np.random.default_rng(0).random((8, 12)) < 0.3
+    used[0, 0] = used[-1, -1] = used[3, 0] = used[0, 7] = True
+    return Tiles(used)
+
+
+def test_a_field_on_tiles_is_that_of_the_grid(some_tiles):
+    field = np.arange(64 * 96.0).reshape(64, 96)
+    values = some_tiles.take(field)
+    again = np.empty_like(field)
+    some_tiles.put(values, again)
+    everywhere = np.kron(some_tiles.used, np.ones((8, 8), dtype=bool))
+    assert np.array_equal(again, np.where(everywhere, field, 0.0))
+
+
+def test_a_convolution_on_tiles_is_that_of_the_periodic_grid(some_tiles):
+    random = np.random.default_rng(1)
+    kernel = random.standard_normal((17, 17))
+    values = random.standard_normal((some_tiles.count, 64))
+    field = np.empty((64, 96))
+    some_tiles.put(values, field)
+    expected = sum(
+        kernel[8 + i, 8 + j] * np.roll(field, (i, j), axis=(0, 1))
+        for i in range(-8, 9)
+        for j in range(-8, 9)
+    )
+    convolved = some_tiles.convolve(convolution_matrix(kernel), values, None)
+    assert convolved == pytest.approx(some_tiles.take(expected), abs=2e-4)
+
+
+GRIDS = [Grid(256), Grid(320, points_y=128), Grid(192, points_y=128, length_y=0.8)]
+
+
+@pytest.mark.parametrize("grid", GRIDS, ids=["square", "oblong", "oblong pixels"])
+@pytest.mark.parametrize("elastomer", SUITED, ids=name)
+def test_the_compliance_on_tiles_is_that_of_transforms(elastomer, grid):
+    k = elastomer.stiffness(grid.wavenumber(), grid.length)
+    contact = Contact(grid, np.zeros(grid.shape), k, 0.01)
+    random = np.random.default_rng(2)
+    tiles = Tiles(random.random([points // 8 for points in grid.shape]) < 0.2)
+    s = random.random((tiles.count, 64))
+    field = np.empty(grid.shape)
+    tiles.put(s, field)
+    compliance = np.divide(1.0, k, out=np.zeros_like(k), where=k > 0)
+    expected = tiles.take(np.fft.irfft2(np.fft.rfft2(field) * compliance, s=grid.shape))
+    difference = TileOperators(contact).displacement(tiles)(s) - expected
+    assert np.std(difference) < 3e-3 * np.std(expected)  # a rigid displacement is free
+
+
+def test_the_stiffness_on_tiles_is_that_of_a_point_up_to_its_reach():
+    grid = Grid(256)
+    k = Power(n=1).stiffness(grid.wavenumber(), 1.0)
+    contact = Contact(grid, np.zeros(grid.shape), k, 0.01)
+    tiles = Tiles(np.ones((32, 32), dtype=bool))
+    u = np.zeros(grid.shape)
+    u[100, 100] = 1.0
+    stress = np.empty(grid.shape)
+    tiles.put(TileOperators(contact).stress(tiles)(tiles.take(u)), stress)
+    near = (slice(92, 109), slice(92, 109))
+    exact = np.fft.irfft2(np.fft.rfft2(u) * k)
+    assert stress[near] == pytest.approx(exact[near], abs=1e-3 * exact.max())
+    stress[near] = 0.0
+    assert not stress.any()
+
+
+def solve(contact, locally, tolerance=1e-8, watch=lambda contact, state: None):
+    """The solution with or without a start on tiles."""
+
+    class Solver(ProjectedCG):
+        starts_locally: ClassVar[bool] = locally
+
+    return solve_contact(contact, Solver(tolerance=tolerance), watch)
+
+
+@pytest.mark.parametrize("p_star", [1e-5, 1e-3, 0.01])
+@pytest.mark.parametrize("elastomer", [SUITED[1], SUITED[2], SUITED[4]], ids=name)
+def test_the_solution_is_that_of_the_whole_grid(elastomer, p_star):
+    contact = build_scene(SelfAffine(cutoff=0.02), elastomer, 512).contact(p_star)
+    local, whole = solve(contact, True), solve(contact, False)
+    assert local.status == whole.status == "converged"
+    assert local.transforms < 0.6 * whole.transforms
+    assert local.u == pytest.approx(whole.u, abs=1e-7)
+    touching = local.u == contact.height
+    assert np.count_nonzero(touching != (whole.u == contact.height)) <= 2
+    assert np.all(local.u >= contact.height)
+    assert local.sigma == pytest.approx(contact.stress(local.u, np.empty(local.u.shape)), abs=1e-9)
+
+
+def test_a_contact_that_the_coarse_grid_misses_is_entered():
+    """A spike of one point, between the points of the coarser grids."""
+    made = build_scene(SelfAffine(cutoff=0.1), Power(n=1), 512)
+    height = 0.01 * made.height
+    height[301, 77] += 10.0
+    contact = Contact(made.grid, height, made.stiffness, 1e-3)
+    coarse = contact.coarsen((256, 256))
+    pressure = np.zeros((256, 256))
+    pressure[10, 10] = contact.pressure * 256**2
+    start = start_from(coarse, pressure, [contact], 1e-3)
+    assert start is not None
+    touching = start.u == contact.height
+    assert touching[301, 77]
+    assert np.count_nonzero(touching) == np.count_nonzero(solve(contact, False).u == height)
+
+
+@pytest.mark.parametrize("elastomer", [Power(n=2), Slab(thickness=0.01)], ids=name)
+def test_other_elastomers_are_solved_on_the_whole_grid(elastomer):
+    contact = build_scene(SelfAffine(cutoff=0.1), elastomer, 512).contact(1e-3)
+    pressure = np.zeros((256, 256))
+    pressure[10, 10] = contact.pressure * 256**2
+    assert start_from(contact.coarsen((256, 256)), pressure, [contact], 1e-3) is None
+
+
+def test_a_large_contact_is_solved_on_the_whole_grid():
+    contact = build_scene(SelfAffine(cutoff=0.1), Power(n=1), 512).contact(1e-3)
+    assert start_from(contact.coarsen((256, 256)), np.ones((256, 256)), [contact], 1e-3) is None
+
+
+def test_a_solve_stopped_on_a_coarse_grid_goes_on_bit_by_bit():
+    contact = build_scene(SelfAffine(cutoff=0.02), Power(n=1), 512).contact(1e-3)
+    kept = []
+
+    def keep(current, state):
+        kept.append((current.grid.whole_shape, copy.deepcopy(state)))
+
+    straight = solve(contact, True, 1e-6, keep)
+    assert kept[-1][0] == (512, 512)
+    coarse = [at for at, (shape, _) in enumerate(kept) if shape[0] < 512]
+    for chosen in (coarse[1], coarse[len(coarse) // 2], coarse[-1], len(kept) - 1):
+        shape, state = kept[chosen]
+        resumed = solve_contact(
+            contact, ProjectedCG(tolerance=1e-6), start=Resume(shape, vars(state))
+        )
+        assert np.array_equal(resumed.u, straight.u)
+        assert np.array_equal(resumed.sigma, straight.sigma)
+        assert resumed.residual == straight.residual
+
+
+def test_a_solve_on_tiles_notices_a_request_to_stop():
+    contact = build_scene(SelfAffine(cutoff=0.02), Power(n=1), 512).contact(1e-3)
+    states = []
+
+    def stop_at_the_third(current, state):
+        states.append((current.grid.whole_shape, state.step))
+        if states.count(states[-1]) == 3:  # only a solve on tiles shows a state again
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        solve(contact, True, 1e-6, stop_at_the_third)
+    assert states[-1][0] == (256, 256)

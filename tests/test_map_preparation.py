@@ -1,0 +1,154 @@
+"""Levelling, edge treatment and filling of measured maps."""
+
+import numpy as np
+import pytest
+
+from gfmd_cli.physics import map_preparation
+from gfmd_cli.physics.map_preparation import fill_missing, level, make_periodic
+
+
+@pytest.fixture
+def heights():
+    return np.random.default_rng(1).normal(size=(16, 16))
+
+
+def border_jump(heights):
+    return max(abs(heights[0] - heights[-1]).max(), abs(heights[:, 0] - heights[:, -1]).max())
+
+
+def inner_step(heights):
+    return max(abs(np.diff(heights, axis=axis)).max() for axis in (0, 1))
+
+
+@pytest.mark.parametrize(("degree", "removed"), [("mean", 1), ("plane", 3), ("curvature", 6)])
+def test_levelling_removes_its_polynomial_to_rounding(degree, removed):
+    y, x = np.mgrid[:32, :32] / 32
+    terms = [np.ones_like(x), x, y, x * x, x * y, y * y, x**3]
+    trend = sum(c * t for c, t in zip((5, -2, 1, 3, -1, 2), terms[:removed], strict=False))
+    assert abs(level(trend, degree)).max() < 1e-13
+    assert level(terms[removed], degree).std() > 1e-3
+
+
+def test_levelling_is_least_squares(heights):
+    y, x = np.mgrid[:16, :16]
+    design = np.stack([np.ones(256), x.ravel(), y.ravel()], axis=1)
+    fit, *_ = np.linalg.lstsq(design, heights.ravel(), rcond=None)
+    np.testing.assert_allclose(
+        level(heights, "plane"), heights - (design @ fit).reshape(16, 16), atol=1e-13
+    )
+
+
+@pytest.mark.parametrize("degree", ["mean", "plane", "curvature"])
+@pytest.mark.parametrize("shape", [(16, 9), (5, 40), (30,), (2, 3)])
+def test_levelling_around_holes_is_least_squares_of_the_known_heights(degree, shape):
+    rng = np.random.default_rng(7)
+    heights, known = rng.normal(size=shape), rng.random(shape) > 0.3
+    axes = np.meshgrid(*(np.arange(n) for n in shape), indexing="ij")
+    orders = {"mean": 0, "plane": 1, "curvature": 2}[degree] + 1
+    terms = [
+        np.prod([axis**i for axis, i in zip(axes, powers, strict=True)], axis=0).astype(float)
+        for powers in np.ndindex(*(orders,) * len(shape))
+        if sum(powers) < orders
+    ]
+    design = np.stack([term[known] for term in terms], axis=1)
+    levelled = level(heights, degree, known)[known]
+    solution, *_ = np.linalg.lstsq(design, heights[known], rcond=None)
+    np.testing.assert_allclose(levelled, heights[known] - design @ solution, atol=1e-10)
+
+
+@pytest.mark.parametrize("shape", [(16, 9), (5, 40), (30,)])
+def test_levelling_with_nothing_missing_is_that_of_the_whole_map(shape):
+    heights = np.random.default_rng(8).normal(size=shape)
+    whole = level(heights, "curvature")
+    np.testing.assert_allclose(level(heights, "curvature", heights < 99), whole, atol=1e-13)
+
+
+def test_levelling_keeps_its_input(heights):
+    before = heights.copy()
+    level(heights, "curvature")
+    np.testing.assert_array_equal(heights, before)
+    np.testing.assert_array_equal(level(heights, "none"), before)
+
+
+def test_the_window_takes_the_border_to_the_mean():
+    y, x = np.mgrid[:64, :64] / 64
+    slope = 3 + x + 2 * y
+    windowed = make_periodic(slope, "window")
+    np.testing.assert_allclose(windowed[0], slope.mean())
+    np.testing.assert_allclose(windowed[:, 0], slope.mean())
+    assert border_jump(slope) > 10 * inner_step(slope)
+    assert border_jump(windowed) <= inner_step(windowed)
+
+
+def test_the_window_keeps_the_inner_heights_and_lowers_h_std(heights):
+    windowed = make_periodic(heights, "window", taper=0.25)
+    np.testing.assert_allclose(windowed[4:13, 4:13], heights[4:13, 4:13], atol=1e-14)
+    assert windowed.std() < heights.std()
+
+
+@pytest.mark.parametrize("taper", [0.0, 0.6, np.nan])
+def test_a_taper_outside_its_range_is_refused(heights, taper):
+    with pytest.raises(ValueError, match="taper"):
+        make_periodic(heights, "window", taper)
+
+
+def test_the_mirror_keeps_every_height_four_times(heights):
+    mirrored = make_periodic(heights, "mirror")
+    assert mirrored.shape == (32, 32)
+    np.testing.assert_array_equal(mirrored[:16, :16], heights)
+    np.testing.assert_array_equal(
+        np.sort(mirrored, axis=None), np.repeat(np.sort(heights, None), 4)
+    )
+    np.testing.assert_array_equal(mirrored, mirrored[::-1, ::-1])
+    assert border_jump(mirrored) == 0
+
+
+def test_no_edge_treatment_leaves_the_heights(heights):
+    assert make_periodic(heights, "none") is heights
+
+
+def test_a_hole_in_a_harmonic_surface_is_filled_exactly():
+    """x y and x^2 - y^2 solve the discrete Laplace equation."""
+    y, x = np.mgrid[:20, :20].astype(float)
+    for exact in (x * y, x**2 - y**2, 3 + x - 2 * y):
+        missing = np.zeros(exact.shape, dtype=bool)
+        missing[5:12, 3:15] = missing[16, 16] = True
+        holed = np.where(missing, np.nan, exact)
+        np.testing.assert_allclose(fill_missing(holed, missing), exact, atol=1e-10)
+
+
+def test_a_filled_hole_lies_between_its_rim(heights):
+    """The maximum principle, at the border of the map, too."""
+    missing = np.random.default_rng(3).random(heights.shape) < 0.15
+    missing[0, 0] = missing[-1, 5:8] = True
+    filled = fill_missing(np.where(missing, np.nan, heights), missing)
+    assert filled.min() == heights[~missing].min()
+    assert filled.max() == heights[~missing].max()
+
+
+def test_a_large_hole_is_filled_smoothly(monkeypatch, heights):
+    """The filling of many points approaches the exact one, and keeps between the known heights."""
+    y, x = np.mgrid[:60, :90] / 60
+    exact = 3 * x - y
+    missing = np.random.default_rng(4).random(exact.shape) < 0.5
+    missing[10:50, 20:80] = True
+    monkeypatch.setattr(map_preparation, "MAX_EXACT", 200)
+    filled = fill_missing(np.where(missing, np.nan, exact), missing)
+    np.testing.assert_array_equal(filled[~missing], exact[~missing])
+    assert abs(filled - exact).max() < 0.05 * np.ptp(exact)
+    assert exact[~missing].min() <= filled.min()
+    assert filled.max() <= exact[~missing].max()
+
+
+def test_a_line_is_filled_by_straight_segments():
+    heights = np.array([0.0, np.nan, np.nan, 3.0, 1.0, np.nan])
+    filled = fill_missing(heights, np.isnan(heights))
+    np.testing.assert_allclose(filled, [0, 1, 2, 3, 1, 1], atol=1e-14)
+
+
+def test_lines_are_made_periodic_along_their_axis():
+    line = np.arange(20.0)
+    np.testing.assert_array_equal(make_periodic(line, "mirror"), [*line, *line[::-1]])
+    windowed = make_periodic(line, "window")
+    assert windowed[0] == line.mean()
+    np.testing.assert_allclose(windowed[2:19], line[2:19])

@@ -1,0 +1,86 @@
+"""What a study keeps of a measured surface: pictures, and the share of its tapered edges."""
+
+import numpy as np
+import pytest
+
+from gfmd_cli.physics.pictures import PIXELS, picture
+from gfmd_cli.study.reading import open_study
+
+SPEC = """\
+[surface]
+kind = "file"
+path = "peak.npy"
+periodic = false
+level = "none"
+edges = "window"
+length = 2e-6
+[elastomer]
+kind = "half-space"
+[grid]
+points = 32
+[load]
+p_star = 1e-2
+"""
+
+
+def peak(place, size=32):
+    """A paraboloid around a point, 1 nm high, on a plane."""
+    y, x = np.mgrid[:size, :size]
+    return 1e-9 * np.maximum(0, 1 - np.hypot(y - place[0], x - place[1]) ** 2 / 9)
+
+
+@pytest.mark.parametrize(("place", "share"), [((16, 16), 0.0), ((16, 29), 1.0)])
+def test_the_share_of_the_tapered_edges_is_that_of_the_peak(rows_of, tmp_path, place, share):
+    heights = peak(place)
+    heights[:, 29:] *= 2  # less than half of it is left by the window
+    np.save(tmp_path / "peak.npy", heights)
+    (row,) = rows_of()
+    assert (row["edge_contact"], row["edge_load"]) == (share, share)
+
+
+def test_a_map_that_is_not_tapered_has_no_such_share(rows_of, tmp_path):
+    np.save(tmp_path / "peak.npy", peak((16, 16)))
+    (row,) = rows_of("surface.edges=none")
+    assert np.isnan(row["edge_contact"])
+
+
+def test_much_contact_at_the_edges_is_told(gfmd, tmp_path):
+    np.save(tmp_path / "peak.npy", peak((16, 29)))
+    said = "of the load are at the edges, where the window has changed the heights"
+    assert said in gfmd("run", "spec.toml").output
+    assert said in gfmd("analyze", "study.h5").output
+    assert "at the edges" not in gfmd("run", "spec.toml", "--set", "surface.edges=none").output
+
+
+def test_a_study_keeps_the_map_as_measured_and_as_prepared(rows_of, tmp_path):
+    heights = peak((16, 16))
+    heights[3, 4] = np.nan
+    np.save(tmp_path / "peak.npy", heights)
+    rows_of("surface.edges=mirror", "grid.points=64")
+    with open_study(tmp_path / "study.h5") as study:
+        pictures = study.pictures(0)
+    np.testing.assert_allclose(pictures["measured"].heights, heights, rtol=1e-6)
+    assert pictures["measured"].sides == pytest.approx((2e-6, 2e-6))
+    assert pictures["prepared"].heights.shape == (64, 64)
+    assert pictures["prepared"].sides == pytest.approx((4e-6, 4e-6))
+    assert np.isfinite(pictures["prepared"].heights).all()
+
+
+def test_a_picture_has_the_means_of_the_known_heights():
+    heights = np.arange(4.0 * PIXELS * 2).reshape(4, -1)
+    missing = np.zeros(heights.shape, dtype=bool)
+    missing[0, 0] = missing[2:, 2:4] = True
+    small = picture(heights, (1.0, 2.0), missing)
+    assert small.heights.shape == (2, PIXELS)
+    assert small.heights[0, 0] == pytest.approx(np.mean([1, 2 * PIXELS, 2 * PIXELS + 1]))
+    assert np.isnan(small.heights[1, 1])
+
+
+def test_the_report_begins_with_both_maps(gfmd, tmp_path):
+    pytest.importorskip("matplotlib")
+    np.save(tmp_path / "peak.npy", peak((16, 16)))
+    assert gfmd("run", "spec.toml").exit_code == 0
+    assert gfmd("report", "study.h5").exit_code == 0
+    page = (tmp_path / "study.html").read_text(encoding="utf-8")
+    assert page.index("Heights as measured") < page.index("Heights as prepared")
+    assert page.index("Heights as prepared") < page.index('id="contact-area"')

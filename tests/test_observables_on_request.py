@@ -1,0 +1,230 @@
+"""What [output] asks for beside the scalars, from the spec to the study, tables and records."""
+
+import json
+import shutil
+
+import h5py
+import numpy as np
+import pytest
+from specs import power_spec
+
+from gfmd_cli.errors import InputError
+from gfmd_cli.physics.contact import build_scene
+from gfmd_cli.physics.elastomers import Power
+from gfmd_cli.physics.observables import linear_edges, logarithmic_edges
+from gfmd_cli.physics.patches import area_edges
+from gfmd_cli.physics.self_affine import SelfAffine
+from gfmd_cli.spec.models import ON_REQUEST, OutputTable
+from gfmd_cli.spec.parse import read_spec
+from gfmd_cli.study.columns import COLUMNS as COLUMNS_OF_A_STUDY
+from gfmd_cli.study.columns import HISTOGRAMS, TASK_GROUPS
+from gfmd_cli.study.observables import OBSERVABLES, SolvedContact, measure
+from gfmd_cli.study.reading import open_study, read_rows
+from gfmd_cli.study.run import run_study
+
+SPEC = power_spec(
+    n=[0, 2],
+    points=48,
+    p_star=[0.1, 1.0, 50.0],
+    more="""\
+[output]
+fields = ["u", "sigma", "height"]
+""",
+)
+ALL = tuple(f"output.{name}=true" for name in ON_REQUEST)
+FIELDS = ("u", "sigma", "height")
+COLUMNS = (
+    "patches",
+    "patch_area_mean",
+    "patch_area_largest",
+    "stiffness",
+    "percolates_x",
+    "percolates_y",
+)
+
+
+def made(output_of, folder, *overrides, text=SPEC):
+    (folder / "spec.toml").write_text(text)
+    options = [word for override in overrides for word in ("--set", override)]
+    output_of("run", folder / "spec.toml", "-o", folder / "s.h5", "-q", "-j", "1", *options)
+    return folder / "s.h5"
+
+
+@pytest.fixture(scope="module")
+def study(output_of, tmp_path_factory):
+    return made(output_of, tmp_path_factory.mktemp("all"), *ALL)
+
+
+def test_patches_make_up_the_contact_area(study):
+    for row in read_rows(study):
+        assert row["patches"] * row["patch_area_mean"] == pytest.approx(row["a_r"], rel=1e-12)
+        assert row["patch_area_mean"] <= row["patch_area_largest"] <= row["a_r"] * (1 + 1e-12)
+        assert row["pr_patch_area"] @ np.diff(area_edges()) == pytest.approx(1, rel=1e-12)
+
+
+def test_full_contact_is_one_rigid_patch_that_seals(study):
+    for row in read_rows(study):
+        if row["p_star"] == 50:
+            assert row["a_r"] == 1
+            assert (row["patches"], row["patch_area_largest"]) == (1, 1.0)
+            assert (row["stiffness"], row["percolates_x"], row["percolates_y"]) == (np.inf, 0, 0)
+            assert row["pr_gap_zero"] == 1
+
+
+def test_under_small_loads_the_gap_leaks_and_yields(study):
+    for row in read_rows(study):
+        if row["p_star"] == 0.1:
+            assert (row["percolates_x"], row["percolates_y"]) == (1, 1)
+            assert 0 < row["stiffness"] < 2
+
+
+def test_the_gap_distribution_is_normalised_and_has_the_mean_gap(study):
+    linear, logarithmic = linear_edges(), logarithmic_edges()
+    for row in read_rows(study):
+        inside = row["pr_gap"] @ np.diff(linear)
+        assert row["pr_gap_zero"] + inside + row["pr_gap_beyond"] == pytest.approx(1, rel=1e-12)
+        share = row["pr_gap_log"] @ np.diff(logarithmic)
+        assert row["pr_gap_zero"] + share + row["pr_gap_below"] == pytest.approx(1, rel=1e-12)
+        assert row["pr_gap_zero"] == pytest.approx(row["a_r"], abs=2e-3)
+        moment = row["pr_gap"] @ (np.diff(linear) * 0.5 * (linear[1:] + linear[:-1]))
+        assert moment == pytest.approx(row["u_g"], abs=0.5 * (linear[1] - linear[0]))
+
+
+def test_spectra_sum_up_to_the_variance_of_the_stored_fields(study):
+    with h5py.File(study) as file:
+        for task in file["spectra"]:
+            for name in FIELDS:
+                power = file[f"spectra/{task}/{name}"][()].sum()
+                field = file[f"fields/{task}/{name}"][()]
+                assert power == pytest.approx(field.var(), rel=1e-10)
+            assert file[f"spectra/{task}/u"].dims[0][0].name.endswith("shell")
+            assert file[f"autocorrelations/{task}/u"][0] == 1.0
+            r = file[f"autocorrelations/{task}/r"][()]
+            assert r[1] == pytest.approx(1 / 48 * (1 + np.sqrt(2)) / 2, rel=1e-12)
+
+
+def test_analyze_tells_the_columns_in_a_table_and_in_records(output_of, study):
+    text = output_of("analyze", study)
+    assert text.count("[Pa/m]") == 2  # two elastomers
+    assert "yes" in text
+    records = json.loads(output_of("analyze", study, "--json"))
+    for record, row in zip(records, read_rows(study), strict=True):
+        expected = {name: row[name] if np.isfinite(row[name]) else None for name in COLUMNS}
+        assert {name: record[name] for name in COLUMNS} == expected
+
+
+def test_nothing_is_there_that_was_not_asked_for(output_of, tmp_path):
+    plain = made(output_of, tmp_path)
+    with h5py.File(plain) as file:
+        told = set(file)
+        assert not set(ON_REQUEST) & set(json.loads(file.attrs["spec"])["output"])
+    assert not {h.name for h in HISTOGRAMS if h.option != "histogram"} & told
+    assert (
+        not {*(group.name for group in TASK_GROUPS[2:]), "pr_gap_zero", "gap", "patch_area"} & told
+    )
+    row = read_rows(plain)[0]
+    assert (row["patches"], row["percolates_x"], row["percolates_y"]) == (-1, -1, -1)
+    assert np.isnan(row["stiffness"])
+    assert "patches" not in output_of("analyze", plain)
+    assert "patches" not in json.loads(output_of("analyze", plain, "--json"))[0]
+
+
+@pytest.mark.parametrize("name", ON_REQUEST[1:])
+def test_each_can_be_asked_for_alone(output_of, tmp_path, name):
+    found = made(output_of, tmp_path, f"output.{name}=true", "elastomer.n=1", "load.p_star=0.2")
+    (row,) = read_rows(found)
+    assert (row["patches"] > 0) == (name == "patches")
+    assert (row["percolates_x"] >= 0) == (name == "percolation")
+    assert np.isfinite(row["stiffness"]) == (name == "stiffness")
+    assert ("pr_gap" in row) == (name == "gap_distribution")
+    output_of("analyze", found)
+
+
+def test_what_was_collected_first_is_kept_when_more_is_added(output_of, tmp_path, study):
+    """Rows, distributions and curves pass from the old study file to the new one."""
+    spec, target = tmp_path / "spec.toml", tmp_path / "s.h5"
+    spec.write_text(SPEC)
+    options = [word for override in ALL for word in ("--set", override)]
+    for shard in ("0/3", "1/3", "2/3"):
+        output_of("run", spec, "-o", target, "-q", "-j", "1", "--shard", shard, *options)
+    for row, expected in zip(read_rows(target), read_rows(study), strict=True):
+        for name in set(row) - {"seconds"}:
+            np.testing.assert_array_equal(row[name], expected[name], err_msg=name)
+    with open_study(target) as file, open_study(study) as whole:
+        for group in TASK_GROUPS[2:]:
+            for task in range(6):
+                found = file.arrays(group.name, task)
+                expected = whole.arrays(group.name, task)
+                assert list(found) == [column.name for column in group.columns]
+                for name, values in expected.items():
+                    np.testing.assert_array_equal(found[name], values)
+
+
+def test_line_scenes_have_them_but_for_a_second_axis(output_of, tmp_path):
+    study = made(
+        output_of,
+        tmp_path,
+        *ALL,
+        'surface={kind="ridge"}',
+        "grid.points=128",
+        "load.p_star=[0.01,0.1]",
+    )
+    with open_study(study) as file:
+        for row in file.rows:
+            fields = file.arrays("fields", row["task"])
+            u, sigma, h = (fields[name] for name in FIELDS)
+            touching = (u == h) & (sigma > 0)
+            begins = np.count_nonzero(touching & ~np.roll(touching, 1))
+            assert (row["patches"], row["percolates_x"], row["percolates_y"]) == (begins, 0, -1)
+            assert row["stiffness"] > 0
+            assert file.arrays("spectra", row["task"])["u"].sum() == pytest.approx(u.var())
+            assert file.arrays("autocorrelations", row["task"])["r"].size == 65
+
+
+def test_grids_chosen_by_accuracy_have_spectra_of_their_own(output_of, tmp_path):
+    study = made(output_of,
+        tmp_path, "output.spectra=true", 'grid.points="auto"', "accuracy.mean_gap=0.03",
+        "load.p_star=[0.1,1.0]", "elastomer.n=2",
+    )  # fmt: skip
+    rows = read_rows(study)
+    with h5py.File(study) as file:
+        for row in rows:
+            waves = file[f"spectra/{row['task']}/waves"][()].sum()
+            assert waves == pytest.approx(row["points"] ** 2 - 1)
+
+
+@pytest.mark.parametrize("name", ON_REQUEST)
+def test_processes_that_share_a_grid_are_refused(tmp_path, name):
+    (tmp_path / "spec.toml").write_text(SPEC)
+    spec, text = read_spec(tmp_path / "spec.toml", (f"output.{name}=true",))
+    with pytest.raises(InputError, match=f"output.{name}: takes whole grids"):
+        run_study(spec, text, tmp_path / "s.h5", print, ranks=object())
+
+
+def test_an_older_study_without_the_keys_goes_on(output_of, tmp_path):
+    """Its stored spec and the names of its tasks are those that this version makes."""
+    first = made(output_of, tmp_path, "load.p_star=0.1")
+    shutil.copy(first, tmp_path / "copy.h5")
+    again = output_of(
+        "run", tmp_path / "spec.toml", "-o", tmp_path / "copy.h5", "--set", "load.p_star=0.1"
+    )
+    assert "2 converged" in again
+    with h5py.File(first) as file:
+        output = json.loads(file.attrs["spec"])["output"]
+    assert output == {
+        "histogram": True, "fields": ["u", "sigma", "height"], "cross_section": False,
+    }  # fmt: skip
+
+
+def test_every_observable_is_a_column_that_a_key_of_output_turns_on():
+    for observable in OBSERVABLES:
+        assert observable.option in ON_REQUEST
+        assert observable.option in OutputTable.model_fields
+        assert observable.column in COLUMNS_OF_A_STUDY
+
+
+def test_without_contact_there_is_no_area_of_a_patch():
+    contact = build_scene(SelfAffine(cutoff=0.1), Power(n=1), 48).contact(0.1)
+    u = np.full(contact.grid.shape, contact.height.max() + 1)
+    output = OutputTable(patches=True)
+    assert measure(output, SolvedContact(contact, u, np.zeros_like(u))) == {"patches": 0}

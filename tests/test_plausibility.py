@@ -1,0 +1,107 @@
+"""Warnings, and theory where it does not apply."""
+
+import json
+
+import numpy as np
+import pytest
+
+from gfmd_cli import compare, rows, run, solve
+from gfmd_cli.analysis.records import as_records
+from gfmd_cli.physics.file_surface import FileSurface
+from gfmd_cli.report.page import report
+
+SURFACE = {"kind": "self-affine", "cutoff": 0.125, "h_std": 1e-8, "length": 1e-5}
+HALF_SPACE = {"kind": "half-space", "E_star": 2e9}
+
+
+def tables(surface=SURFACE, elastomer=HALF_SPACE, **load):
+    return {
+        "surface": surface,
+        "elastomer": elastomer,
+        "grid": {"points": 32},
+        "load": load or {"p_star": 0.3},
+    }
+
+
+def only_warning(spec):
+    (warning,) = solve(spec).warnings
+    return warning
+
+
+def test_a_sound_contact_has_no_warning():
+    found = solve(tables())
+    assert found.warnings == ()
+    assert "warnings" not in str(found)
+
+
+def test_few_points_in_contact():
+    found = solve(tables(p_star=1e-3))
+    points = int(found.contact.sum())
+    assert points < 30
+    assert found.warnings == (
+        f"only {points} grid points in contact: contact area and stress depend on the grid; "
+        "use more points",
+    )
+    assert found.warnings[0] in str(found)
+
+
+def test_a_cutoff_above_the_rolloff():
+    surface = SURFACE | {"cutoff": 0.5, "rolloff": 0.2}
+    assert "cutoff = 0.5 is above surface.rolloff = 0.2" in only_warning(tables(surface))
+
+
+@pytest.mark.parametrize("elastomer", [HALF_SPACE, {"kind": "slab", "E_star": 1e6, "thickness": 1}])
+def test_a_modulus_in_pascals_on_a_surface_metres_rough(elastomer):
+    metres = {key: SURFACE[key] for key in ("kind", "cutoff")}
+    assert "are heights and lengths in metres?" in only_warning(tables(metres, elastomer))
+    reduced = tables(metres, {"kind": "half-space"})
+    assert solve(reduced).warnings == ()
+
+
+def test_a_map_that_is_too_steep(tmp_path):
+    np.save(tmp_path / "h.npy", solve(tables()).height * 1e6)
+    surface = {"kind": "file", "path": str(tmp_path / "h.npy"), "length": 1e-5}
+    warnings = solve(tables(surface, {"kind": "half-space"})).warnings
+    assert any("rms gradient" in warning for warning in warnings)
+    assert set(FileSurface(path=tmp_path / "h.npy", length=1e-5).remarks()) <= set(warnings)
+
+
+def test_a_step_across_the_border_matters_only_where_the_map_is_repeated():
+    ramp = np.linspace(0, 1e-8, 32) + np.random.default_rng(0).normal(0, 1e-11, (32, 32))
+    for boundary, warned in (("periodic", True), ("free", False)):
+        tables = {
+            "surface": {"length": 1e-5},
+            "elastomer": {"kind": "half-space", "E_star": 1e9},
+            "grid": {"boundary": boundary},
+            "load": {"p_star": 1.0},
+        }
+        warnings = solve(tables, heights=ramp).warnings
+        assert any("step across the border" in warning for warning in warnings) is warned
+
+
+def test_warnings_are_stored_and_shown(tmp_path):
+    study = run(tables(p_star=[1e-3, 2e-3, 0.3]), tmp_path / "a.h5")
+    stored = [row["warnings"] for row in rows(study)]
+    assert all("points in contact" in text for text in stored[:2])
+    assert stored[2] == ""
+    assert "warning: only" in str(compare(study))
+    page = report(study)
+    assert page.index("points in contact") < page.index('class="verdict')
+
+
+@pytest.mark.parametrize("kind", ["parabola", "wave"])
+def test_a_single_indenter_has_no_persson_theory(kind, tmp_path):
+    spec = tables({"kind": kind}, {"kind": "power", "n": 1}, p_star=[0.1, 0.3])
+    comparison = compare(run(spec, tmp_path / "a.h5"))
+    assert not comparison.has_theory
+    assert "Persson" not in str(comparison)
+    assert "persson" not in json.dumps(as_records(comparison))
+    assert np.isnan(comparison.curves[0].prediction.a_r).all()
+    assert "Persson" not in report(tmp_path / "a.h5")
+
+
+def test_a_rough_surface_has_it(tmp_path):
+    comparison = compare(run(tables(), tmp_path / "a.h5"))
+    assert comparison.has_theory
+    assert "Persson" in str(comparison)
+    assert as_records(comparison)[0]["a_r_persson"] > 0

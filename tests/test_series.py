@@ -1,0 +1,84 @@
+"""What figures show of several seeds: the mean with its confidence band."""
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from gfmd_cli.analysis.compare import compare
+from gfmd_cli.analysis.ensemble import ensembles
+from gfmd_cli.analysis.figures import VIEWS, items_of, study_figures
+from gfmd_cli.analysis.plotting import styled
+from gfmd_cli.analysis.series import Series, seed_groups
+
+SPEC = """\
+[surface]
+kind = "self-affine"
+cutoff = 0.2
+seed = [0, 1, 2, 3]
+[elastomer]
+kind = "power"
+n = [0, 1]
+[grid]
+points = 16
+[load]
+p_star = [0.1, 0.3, 1.0]
+"""
+AREA, RATIO = VIEWS[0], VIEWS[1]
+
+
+@pytest.fixture
+def comparison(tmp_path, rows_of):
+    rows_of()
+    return compare(tmp_path / "study.h5")
+
+
+def values(comparison, n, p_star, name="a_r"):
+    rows = [row for curve in comparison.curves if curve.n == n for row in curve.rows]
+    return np.array([row[name] for row in rows if row["p_star"] == pytest.approx(p_star)])
+
+
+def test_seeds_are_shown_by_their_mean_and_students_interval(comparison):
+    groups = seed_groups(items_of(comparison))
+    assert [len(group) for group in groups] == [4, 4]
+    series = Series.of(AREA, groups[1])
+    assert series.x == pytest.approx([0.1, 0.3, 1.0])
+    for x, y, half_width in zip(series.x, series.y, series.half_width, strict=True):
+        areas = values(comparison, 1, x)
+        low, high = stats.t.interval(0.95, len(areas) - 1, areas.mean(), stats.sem(areas))
+        assert (y - half_width, y + half_width) == pytest.approx((low, high), rel=1e-12)
+    assert series.style.label == "n = 1, 4 seeds"
+
+
+def test_a_ratio_is_that_of_each_seed_to_its_own_theory(comparison):
+    group = seed_groups(items_of(comparison))[0]
+    ratios = [item.curve.column("a_r") / item.curve.prediction.a_r for item in group]
+    assert Series.of(RATIO, group).y == pytest.approx(np.mean(ratios, axis=0), rel=1e-12)
+
+
+def test_one_seed_is_shown_as_it_is(comparison):
+    (item, *_), _ = seed_groups(items_of(comparison))
+    series = Series.of(AREA, [item])
+    np.testing.assert_array_equal(series.y, item.curve.column("a_r"))
+    assert np.isnan(series.half_width).all()
+    assert series.style == item.style
+
+
+def test_a_figure_has_one_curve_for_all_seeds(comparison):
+    with styled():
+        figures = study_figures(comparison, items_of(comparison))
+    drawn = figures["contact_area"]
+    assert {"n = 0, 4 seeds", "n = 1, 4 seeds", "95 % confidence"} <= set(drawn.legend)
+    assert len(drawn.axes.collections) == 2  # bands
+    assert [line.get_xydata().shape for line in drawn.axes.lines][:2] == [(3, 2), (0, 2)]
+
+
+def test_seeds_with_other_loads_are_averaged_where_they_agree(tmp_path, rows_of):
+    rows_of()
+    rows_of("surface.seed=[0, 1]", "load.p_star=[0.2]", "elastomer.n=1")
+    comparison = compare(tmp_path / "study.h5")
+    found = [
+        (each.rows[0]["n"], each.rows[0]["p_star"], len(each.rows))
+        for each in ensembles(comparison)
+    ]
+    assert (1.0, 0.2, 2) in [(n, round(p, 9), count) for n, p, count in found]
+    assert sum(count == 4 for *_, count in found) == 6

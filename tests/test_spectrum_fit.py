@@ -1,0 +1,102 @@
+import numpy as np
+import pytest
+
+from gfmd_cli.errors import InputError
+from gfmd_cli.grid.fft_grid import Grid
+from gfmd_cli.physics.contact import build_scene, radial_power
+from gfmd_cli.physics.elastomers import HalfSpace
+from gfmd_cli.physics.persson import Shells, shells
+from gfmd_cli.physics.self_affine import SelfAffine
+from gfmd_cli.physics.spectrum_fit import density, fit, moments
+
+
+def shells_of(surface, points):
+    return build_scene(surface, HalfSpace(), points).shells
+
+
+@pytest.mark.parametrize(
+    "keys",
+    [
+        {},
+        {"hurst": 0.3, "rolloff": 0.25, "cutoff": 0.01},
+        {"hurst": 0.6, "rolloff": 0.05, "cutoff": 0.01, "length": 1e-5, "h_std": 1e-8},
+    ],
+)
+def test_the_fit_of_a_self_affine_surface_gives_what_it_was_made_from(keys):
+    """The phases alone are random here: nothing scatters."""
+    surface = SelfAffine(**keys)
+    found = fit(shells_of(surface, surface.smallest_grid() + 20))
+    assert found.hurst == pytest.approx(surface.hurst, abs=1e-5)
+    assert 2 * np.pi / found.q_r == pytest.approx(surface.rolloff * surface.length, rel=1e-4)
+    assert 2 * np.pi / found.q_s == pytest.approx(surface.cutoff * surface.length, rel=5e-3)
+    assert found.scatter < 1e-8
+
+
+def test_a_power_law_shows_no_roll_off():
+    surface = SelfAffine(spectrum="cutoff", rolloff=1.0, cutoff=0.02, hurst=0.7)
+    found = fit(shells_of(surface, 128))
+    assert found.q_r == 0
+    assert found.hurst == pytest.approx(0.7, abs=1e-4)
+    assert 2 * np.pi / found.q_s == pytest.approx(0.02, rel=5e-3)
+
+
+def gaussian_roughness(draw, points, hurst, mode_r, mode_s):
+    """Amplitudes and phases random: white noise, filtered."""
+    noise = np.fft.rfft2(draw.standard_normal((points, points)))
+    m = np.hypot(np.fft.fftfreq(points, 1 / points)[:, None], np.arange(points // 2 + 1))
+    noise *= np.where(m <= mode_s, (1 + (m / mode_r) ** 2) ** (-0.5 * (1 + hurst)), 0)
+    noise[0, 0] = 0
+    return np.fft.irfft2(noise)
+
+
+def test_standard_errors_hold_on_gaussian_roughness():
+    """Forty surfaces: the distance to the truth, in standard errors, has mean 0 and width 1."""
+    draw = np.random.default_rng(7)
+    pulls, scatters, cut_offs = [], [], []
+    for _ in range(40):
+        m, power, modes = radial_power(Grid(256), gaussian_roughness(draw, 256, 0.7, 5.0, 64.0))
+        found = fit(shells(2 * np.pi * m, power, m, m, modes))
+        pulls.append(
+            (
+                (found.hurst - 0.7) / found.hurst_error,
+                (found.q_r - 10 * np.pi) / found.q_r_error,
+            )
+        )
+        scatters.append(found.scatter)
+        cut_offs.append(found.q_s / (2 * np.pi))
+    assert np.all(np.abs(np.mean(pulls, 0)) < 0.5)  # 3 / sqrt 40
+    assert np.all(np.abs(np.std(pulls, 0) - 1) < 0.35)  # 3 / sqrt 80
+    assert np.mean(scatters) == pytest.approx(1, abs=0.1)
+    assert np.mean(cut_offs) == pytest.approx(64, rel=0.03)
+
+
+def test_moments_are_those_of_the_heights():
+    """Against derivatives taken in Fourier space by NumPy."""
+    surface = SelfAffine(cutoff=0.05, length=3.0)
+    heights = surface.heights(64)
+    q = 2 * np.pi * np.fft.fftfreq(64, 3.0 / 64)
+    y, x = q[:, None], q[None, :]
+    modes = np.fft.fft2(heights)
+    slopes = [np.fft.ifft2(1j * k * modes).real for k in (y, x)]
+    laplacian = np.fft.ifft2(-(x**2 + y**2) * modes).real
+    found = moments(shells_of(surface, 64))
+    assert found.height == pytest.approx(heights.std(), rel=1e-12)
+    assert found.gradient == pytest.approx(np.sqrt(np.mean(slopes[0] ** 2 + slopes[1] ** 2)))
+    assert found.curvature == pytest.approx(0.5 * laplacian.std(), rel=1e-3)  # shells have width
+
+
+def test_the_density_is_that_of_single_modes():
+    """Paper Eq. (3) with C = 1 m^2 at long wavelengths."""
+    found = shells_of(SelfAffine(cutoff=0.05), 64)
+    expected = (1 + (found.q * 0.5 / (2 * np.pi)) ** 2) ** -1.8
+    np.testing.assert_allclose(density(found), expected, rtol=2e-4)
+    assert found.modes.sum() == np.count_nonzero(
+        (lambda m: (m > 0) & (m <= 20))(np.hypot(*np.mgrid[-31:33, -31:33]))
+    )
+
+
+def test_too_narrow_a_spectrum_and_one_without_counts_are_refused():
+    with pytest.raises(InputError, match="too narrow for a fit"):
+        fit(shells_of(SelfAffine(cutoff=0.4), 32))
+    with pytest.raises(InputError, match="number of modes"):
+        density(Shells(*np.ones((5, 3))))

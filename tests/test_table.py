@@ -1,0 +1,77 @@
+"""A table is declared once; text and cells follow from the declaration."""
+
+from math import inf, nan
+
+import pytest
+
+from gfmd_cli.analysis.table import Column, Group, Table, plain, plus_minus, ratio
+
+COLUMNS = (
+    Column("p*", "p_star", ".4g"),
+    Column("gap", "gap", unit="m", error="gap_error", otherwise="verdict"),
+    Column("ratio\nto theory", ratio("gap", "theory"), ".2f"),
+    Column("percolates", "percolates", optional=True),
+)
+
+
+def record(**values):
+    return {"p_star": 0.1, "gap": 2.0, "theory": 4.0} | values
+
+
+def cells(**values):
+    return [column.cell(record(**values)) for column in COLUMNS]
+
+
+def test_a_cell_has_the_format_of_its_column():
+    assert cells() == ["0.1", "2.000", "0.50", "-"]
+    assert cells(percolates=True)[-1] == "yes"
+
+
+def test_a_value_is_printed_with_its_error_where_that_is_known():
+    assert cells(gap_error=0.1)[1] == "2.00 +- 0.1"
+    assert cells(gap_error=nan)[1] == "2.000"
+
+
+def test_an_unknown_value_is_a_dash_or_the_reason():
+    assert cells(gap=nan)[1] == "-"
+    assert cells(gap=None, theory=0.0, verdict="irregular")[1] == "irregular"
+    assert cells(theory=0.0)[2] == "-"
+
+
+def test_an_optional_column_without_any_value_is_left_out():
+    blank = Table("", COLUMNS, [Group("", [record(), record(percolates=None)])])
+    assert [column.heading for column in blank.columns] == ["p*", "gap", "ratio\nto theory"]
+    filled = Table("", COLUMNS, [Group("", [record(), record(percolates=False)])])
+    assert len(filled.columns) == 4
+
+
+def test_the_text_has_caption_groups_and_aligned_columns():
+    groups = [Group("first", [record(), record(p_star=10.0)], ["a note"]), Group("empty", [])]
+    assert Table("About gaps.", COLUMNS, groups).as_text().splitlines() == [
+        "About gaps.",
+        "",
+        "first",
+        "a note",
+        "   p*  gap [m]      ratio",
+        "                to theory",
+        "  0.1    2.000       0.50",
+        "   10    2.000       0.50",
+    ]
+
+
+def test_a_table_without_records_is_no_text():
+    assert Table("About gaps.", COLUMNS, [Group("empty", [])]).as_text() == ""
+
+
+def test_json_has_none_for_what_does_not_apply():
+    assert [plain(value) for value in (nan, inf, -1, None, 0, 0.0, "")] == [
+        None, None, None, None, 0, 0.0, "",
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("value", "error", "text"),
+    [(1.0, inf, "1.000 +- inf"), (0.5, 0.0, "0.5"), (1e-9, 1e-15, "0.000000001000 +- 1e-15")],
+)
+def test_errors_of_any_size_can_be_printed(value, error, text):
+    assert plus_minus(value, error) == text

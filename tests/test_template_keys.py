@@ -1,0 +1,53 @@
+"""Keys set in the text of a commented spec: `gfmd init --set`."""
+
+import tomllib
+
+import pytest
+
+from gfmd_cli.errors import InputError
+from gfmd_cli.spec.template_keys import with_keys
+
+TEXT = """\
+[elastomer]
+kind = "power"              # a comment
+n = [1, 2]                  # another
+
+[load]
+p_star = 0.1                # p*
+#pressure = 1e5             # [Pa], instead
+
+#[accuracy]
+#mean_gap = 0.01            # requested
+#contact_area = 0.05        # likewise
+"""
+
+
+def test_a_key_takes_the_place_of_its_line():
+    changed = with_keys(TEXT, ("elastomer.n=3",))
+    assert changed.splitlines()[2] == "n = 3                       # as given on the command line"
+    assert len(changed.splitlines()) == len(TEXT.splitlines())
+
+
+@pytest.mark.parametrize(
+    ("overrides", "expected"),
+    [
+        (("load.pressure=[1e5, 2e5]",), {"load": {"pressure": [1e5, 2e5]}}),
+        (("accuracy.contact_area=0.1",), {"accuracy": {"contact_area": 0.1}}),
+        (("solver.tolerance=1e-8",), {"solver": {"tolerance": 1e-8}}),
+        (("elastomer.kind=half-space",), {"elastomer": {"kind": "half-space"}}),
+        (
+            ("elastomer.E_star=7e10", "elastomer.kind='half-space'"),
+            {"elastomer": {"kind": "half-space", "E_star": 7e10}},
+        ),
+        (("load.tolerance=0.1",), {"load": {"p_star": 0.1, "tolerance": 0.1}}),
+    ],
+)
+def test_a_key_changes_its_table_only(overrides, expected):
+    before = tomllib.loads(TEXT)
+    assert tomllib.loads(with_keys(TEXT, overrides)) == before | expected
+
+
+@pytest.mark.parametrize("override", ["n=3", "load.pressure.from=1", "load.p star=1", "load."])
+def test_anything_but_a_key_of_a_table_is_refused(override):
+    with pytest.raises(InputError, match=r"write table\.key=value"):
+        with_keys(TEXT, (override,))

@@ -1,0 +1,102 @@
+"""Which text files can be tables of heights, found out in a few seconds whatever their length."""
+
+import time
+from io import BytesIO
+
+import numpy as np
+import pytest
+
+from gfmd_cli.physics import text_tables
+from gfmd_cli.physics.text_tables import table_formats
+
+RNG = np.random.default_rng(0)
+
+
+def text(values, separator=" ", header=b"", end=b"\n"):
+    """A table in a file."""
+    lines = (separator.join(f"{value:.6g}" for value in row).encode() for row in values)
+    return header + b"".join(line + end for line in lines)
+
+
+def on_grid(n, m):
+    """Positions and heights of n x m points."""
+    x, y = np.meshgrid(np.arange(n) * 0.1, np.arange(m) * 0.2)
+    return np.column_stack([x.ravel(), y.ravel(), RNG.normal(size=n * m)])
+
+
+MATRIX, POINTS = RNG.normal(size=(300, 40)), on_grid(50, 40)
+MAPS = {
+    "a matrix": (text(MATRIX), {"asc"}),
+    "a matrix with a header": (text(MATRIX, header=b"# Width: 10 um\n# Units: m\n"), {"asc"}),
+    "two matrices": (2 * text(MATRIX, header=b"# Channel: a\n"), {"asc"}),
+    "old line ends": (text(MATRIX, end=b"\r"), {"asc"}),
+    "line ends of Windows": (text(MATRIX, end=b"\r\n"), {"asc"}),
+    "empty lines between": (text(MATRIX, end=b"\n\n"), {"asc"}),
+    "points": (text(POINTS), {"xyz"}),
+    "points in any order": (text(RNG.permutation(POINTS)), {"xyz"}),
+    "points between commas": (text(POINTS, ","), {"xyz"}),
+    "points after a line of numbers": (text(POINTS, header=b"50 40\n"), {"xyz"}),
+    "a profile": (text(POINTS[:, ::2]), {"xyz"}),
+    "a last line cut short": (text(MATRIX)[:-20], {"asc"}),
+}
+
+
+@pytest.mark.parametrize("case", MAPS)
+@pytest.mark.parametrize("window", [2**12, 2**21])
+def test_tables_of_heights_are_recognised(monkeypatch, case, window):
+    monkeypatch.setattr(text_tables, "WINDOW", window)
+    content, formats = MAPS[case]
+    assert table_formats(BytesIO(content)) == formats
+
+
+def ragged(at):
+    """A matrix with a number more in one line."""
+    lines = text(MATRIX).splitlines(keepends=True)
+    lines[at] = b"1.5 " + lines[at]
+    return b"".join(lines)
+
+
+OTHERS = {
+    "nothing": b"",
+    "one line": b"1.0 " * 10**6,
+    "one number": b"1" * 10**6,
+    "one column": b"1.0\n" * 10**6,
+    "words": b"some words here\n" * 10**5,
+    "zeros": bytes(10**6),
+    "a line with a number more": ragged(250),
+    "a last line with a number more": ragged(299),
+    "a table that ends in one line": text(MATRIX) + b"1 " * 10**6 + b"\n",
+    "as many columns as lines": b"".join(b"1 " * i + b"\n" for i in range(1, 1000)),
+    "points anywhere": text(RNG.random((30_000, 3))),
+}
+
+
+@pytest.mark.parametrize("case", OTHERS)
+@pytest.mark.parametrize("window", [2**14, 2**21])
+def test_other_texts_are_no_tables(monkeypatch, case, window):
+    monkeypatch.setattr(text_tables, "WINDOW", window)
+    assert table_formats(BytesIO(OTHERS[case])) == set()
+
+
+LONG = {
+    "a matrix that breaks off in the middle": (text(MATRIX), text(MATRIX[:, 1:])),
+    "points anywhere": (text(RNG.random((10_000, 3))),) * 2,
+    "four columns, then five": (text(MATRIX[:, :4]), text(MATRIX[:, :5])),
+}
+
+
+@pytest.mark.parametrize("case", LONG)
+def test_a_long_table_that_is_no_map_takes_no_longer_than_a_short_one(tmp_path, case):
+    first, second = LONG[case]
+    seconds = []
+    for size in (2**26, 2**28):
+        with (tmp_path / "table").open("wb") as file:
+            for block in (first, second):
+                for _ in range(size // 2 // 2**24):
+                    file.write(block * (2**24 // len(block)))
+        begun = time.process_time()
+        with (tmp_path / "table").open("rb") as file:
+            assert table_formats(file) == set()
+        seconds.append(time.process_time() - begun)
+    assert max(seconds) < 5
+    assert seconds[1] < 3 * seconds[0] + 0.5
