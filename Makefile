@@ -32,10 +32,10 @@ PYTEST := pytest -n 2 --dist loadfile
 SOLVING := accuracy bench grid local_start multigrid properties reference_solvers search solvers study \
 	true_contact
 # Files whose tests compute: the others check texts, files and processes, with the same bits anywhere.
-COMPUTING := $(SOLVING) anisotropy contact_stiffness convolution discretisation_error distribution \
+COMPUTING := $(SOLVING) anisotropy approach contact_stiffness convolution discretisation_error distribution \
 	einstein_solid elastomers exact_solutions free_boundary free_compliance interpolation map_preparation \
 	observables_on_request patches persson power_spectra rectangular_cells roughness_parameters spectrum_fit \
-	surfaces topography
+	surfaces topography void
 
 test: $(VENV)/.test ## the whole suite, with the newest versions that pip found for a new .venv
 	$(BIN)/$(PYTEST)

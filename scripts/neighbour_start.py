@@ -21,7 +21,7 @@ from gfmd_cli.grid.pixels import average_pixels
 from gfmd_cli.physics.contact import Contact, Scene, build_scene
 from gfmd_cli.physics.elastomers import Power
 from gfmd_cli.physics.observables import contact_pressure
-from gfmd_cli.physics.surfaces import SelfAffine
+from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.solvers.local_start import start_from
 from gfmd_cli.solvers.loop import solve
 from gfmd_cli.solvers.nested_grids import Solution, solve_contact

@@ -36,7 +36,7 @@ def main() -> None:
         begun = time.perf_counter()
         run(name, given.output, given.quick)
         print(f"{name}: {time.perf_counter() - begun:.0f} s", flush=True)
-    held = Held(given.output, given.quick)
+    held = Held(given.output)
     findings: list[Finding] = []
     with styled():
         for draw in FIGURES:

@@ -56,4 +56,3 @@ def pages_with(query: str, index) -> set[str]:
 def test_the_search_finds_pages_by_words_of_users(query, pages, search_index):
     first = re.split(search_index["config"]["separator"], query)[0]
     assert pages <= pages_with(first, search_index)
-    assert pages_with(first, search_index)

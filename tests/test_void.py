@@ -115,7 +115,7 @@ def test_free_solution_satisfies_the_conditions_of_contact(surface, elastomer, p
     around = kernel[
         np.ix_(
             *(
-                np.minimum(np.arange(m) % m, m - np.arange(m)).clip(0, n - 1)
+                np.minimum(np.arange(m), m - np.arange(m)).clip(0, n - 1)
                 for m, n in zip(sizes, SHAPE, strict=True)
             )
         )

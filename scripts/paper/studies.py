@@ -77,7 +77,6 @@ class Held:
     """The studies that have been run; each is read at its first use."""
 
     folder: Path
-    quick: bool
     _rows: dict[str, list[dict[str, Any]]] = field(default_factory=dict)
     _comparisons: dict[str, Comparison] = field(default_factory=dict)
 
