@@ -121,15 +121,15 @@ def keys(model: Any, shared_by: Any = None) -> str:
             continue
         field = next(f for n, f in model.model_fields.items() if name in (n, f.alias))
         given = field.get_default(call_default_factory=True)
-        default = "needed" if field.is_required() else "" if given is None else f"`{toml(given)}`"
+        default = "required" if field.is_required() else "" if given is None else f"`{toml(given)}`"
         meaning = escaped(key.get("description", ""))
         rows.append((f"`{name}`", allowed(key, shared), default, meaning))
     if shared_by:
-        known = f"The keys of `{shared_by.model_fields['kind'].default}`"
+        known = f"The keys of solver `{shared_by.model_fields['kind'].default}`"
         if not rows:
             return f"{known}."
-        return f"{known}, and:\n\n" + table(("key", "takes", "default", "meaning"), rows)
-    return table(("key", "takes", "default", "meaning"), rows) if rows else "No keys but `kind`."
+        return f"{known}, and:\n\n" + table(("key", "value", "default", "meaning"), rows)
+    return table(("key", "value", "default", "meaning"), rows) if rows else "No keys but `kind`."
 
 
 def about(model: Any) -> str:
@@ -141,18 +141,19 @@ def configuration() -> str:
     """Every table of the run spec."""
     parts = []
     for name, model in MODELS.items():
-        needed = "Needed." if name in REQUIRED else "Optional."
-        swept = " Takes sweeps." if name in SWEPT else ""
-        default = f' Without `kind`: "{kind}".' if (kind := DEFAULT_KINDS.get(name)) else ""
+        needed = "Required." if name in REQUIRED else "Optional."
+        swept = " A list in the place of a value makes a sweep." if name in SWEPT else ""
+        default = f' Default `kind`: "{kind}".' if (kind := DEFAULT_KINDS.get(name)) else ""
         parts.append(f"## [{name}]\n\n{needed}{swept}{default}")
         shared = kinds_of(name).get(DEFAULT_KINDS.get(name, ""))
         for kind, choice in kinds_of(name).items():
             listed = keys(choice) if choice is shared else keys(choice, shared)
             parts += [f'### {name}: "{kind}"', about(choice), listed]
         if not kinds_of(name):
-            parts += [re.sub(r"^Table \\\[\w+\\\](: |\.)", "", about(model)), keys(model)]
+            text = re.sub(r"^Table \\\[\w+\\\](: |\.)", "", about(model))
+            parts += [text[:1].upper() + text[1:], keys(model)]
         if name == "load":
-            parts += ["### load: a ladder of pressures", about(Ladder), keys(Ladder)]
+            parts += ["### load: a geometric sequence", about(Ladder), keys(Ladder)]
     return "\n\n".join(part for part in parts if part)
 
 
@@ -167,13 +168,13 @@ def commands() -> str:
 
 
 def examples() -> str:
-    """The specs of configs/ and what their first lines say of them."""
+    """The specs of configs/ and their descriptions, the comments in their first lines."""
     rows = []
     for path in sorted(CONFIGS.glob("*.toml")):
         text = path.read_text(encoding="utf-8").partition("[study]")[0]
         said = " ".join(line.lstrip("# ") for line in text.splitlines())
         rows.append((f"`configs/{path.name}`", escaped(said)))
-    return table(("spec", "what"), rows)
+    return table(("spec", "content"), rows)
 
 
 def columns(listed: Iterable[Column]) -> str:
@@ -182,16 +183,16 @@ def columns(listed: Iterable[Column]) -> str:
     rows = [
         (f"`{c.name}`", kinds[c.kind], escaped(c.units or "-"), escaped(c.meaning)) for c in listed
     ]
-    return table(("name", "kind", "units", "meaning"), rows)
+    return table(("name", "type", "unit", "meaning"), rows)
 
 
 def distributions() -> str:
-    """Densities in bins, and what is in no bin."""
+    """Densities in bins, and the fractions outside the bins."""
     rows = [
         (f"`{h.name}`", f"`{h.axis}`", f"`{h.option}`", escaped(h.meaning), escaped(h.axis_meaning))
         for h in HISTOGRAMS
     ]
-    told = table(("name", "bins", "asked for by", "meaning", "middles of the bins"), rows)
+    told = table(("name", "bins", "key of `[output]`", "meaning", "coordinate of the bins"), rows)
     return f"{told}\n\n{columns(c for found in WEIGHTS.values() for c in found)}"
 
 

@@ -13,10 +13,13 @@ from gfmd_cli.status import Status
 
 @click.command()
 @click.argument("spec", type=FILE)
-@click.option("-o", "--output", type=FILE, help="Bench file; by default NAME-bench.h5.")
+@click.option("-o", "--output", type=FILE, help="File of the results; by default NAME-bench.h5.")
 @overrides_option
 @click.option(
-    "--figures", type=FILE, metavar="DIR", help="By default the folder of the bench file."
+    "--figures",
+    type=FILE,
+    metavar="DIR",
+    help="Folder of the figures; by default that of the results.",
 )
 @click.option("-q", "--quiet", is_flag=True, help="Print only the table and errors.")
 def bench(

@@ -11,7 +11,9 @@ from gfmd_cli.cli.options import FILE
 @click.argument("one", type=FILE, metavar="A.h5")
 @click.argument("other", type=FILE, metavar="B.h5")
 @click.option(
-    "--tolerance", type=click.FloatRange(min=0), help="Exit status 1 if a difference is larger."
+    "--tolerance",
+    type=click.FloatRange(min=0),
+    help="Exit with status 1 if a difference is larger.",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print records instead of tables.")
 @click.pass_context
@@ -20,9 +22,9 @@ def diff(
 ) -> None:
     """Compare contact area, stress deviation and mean gap of two studies.
 
-    Rows are paired by surface, seed, elastomer and load; grids and solvers may differ. Rows that
-    only one study has are listed, but not compared. If no rows match and each study has one
-    surface and one elastomer, rows are paired by load alone.
+    Contacts are paired by surface, seed, elastomer and load; grids and solvers may differ. Contacts
+    of only one study are listed, but not compared. If no contacts match and each study has one
+    surface and one elastomer, contacts are paired by load alone. Differences are relative.
 
     Example:
 

@@ -15,11 +15,11 @@ from gfmd_cli.errors import InputError
 @click.option("--from", "scan", type=FILE, metavar="SCAN", help="Measured height map to use.")
 @overrides_option
 def init(spec: Path, scan: Path | None, overrides: tuple[str, ...]) -> None:
-    """Write a commented run spec.
+    """Write a commented run spec, by default study.toml.
 
-    Without options the spec describes a random surface and runs in seconds. With --from it
-    describes a measured surface: a .npy or HDF5 array, or a microscope file. --set gives any key
-    of the spec. Examples:
+    Without --from the spec describes a random surface and runs in seconds. With --from it
+    describes a measured surface: a .npy or HDF5 array, or a microscope file. --set sets any key of
+    the spec. Examples:
 
     \b
         gfmd init contact.toml --from scan.di
@@ -48,17 +48,17 @@ def init(spec: Path, scan: Path | None, overrides: tuple[str, ...]) -> None:
 @click.command()
 @click.argument("paths", metavar="SPEC|SCAN...", type=FILE, nargs=-1, required=True)
 @click.option("--json", "as_json", is_flag=True, help="Print a list of records in SI units.")
-@click.option("--figure", type=FILE, metavar="OUT", help="Draw them: OUT.png, .pdf or .svg.")
+@click.option("--figure", type=FILE, metavar="OUT", help="Write a figure: OUT.png, .pdf or .svg.")
 @overrides_option
 def surface(
     paths: tuple[Path, ...], as_json: bool, figure: Path | None, overrides: tuple[str, ...]
 ) -> None:
-    """Print size, roughness parameters and power spectrum of surfaces.
+    """Print size, roughness parameters and spectrum of surfaces.
 
     The parameters are those of ISO 25178 (Sq, Sa, Ssk, Sku, Sz, Sdq, Sdr, Sal), for a line profile
-    those of ISO 21920. Several surfaces give one table. The self-affine spectrum that is fitted to
-    a single surface is printed as a table [surface] for a run spec. A scan is read and prepared as
-    by `gfmd init --from`. Examples:
+    those of ISO 21920. For one surface, a self-affine spectrum is fitted and also printed as a
+    table [surface] for a run spec. For several surfaces, the results are one table. A scan is read
+    and prepared as by `gfmd init --from`. Examples:
 
     \b
         gfmd surface scan.di --figure scan.png

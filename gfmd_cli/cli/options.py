@@ -8,7 +8,11 @@ import click
 
 FILE = click.Path(path_type=Path)
 overrides_option = click.option(
-    "--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Override a key of the run spec."
+    "--set",
+    "overrides",
+    multiple=True,
+    metavar="KEY=VALUE",
+    help="Set a key of the run spec; repeatable.",
 )
 
 output_option = click.option(

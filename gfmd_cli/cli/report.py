@@ -14,13 +14,15 @@ from gfmd_cli.errors import InputError
 @click.argument("study", type=FILE)
 @click.argument("other", type=FILE, required=False)
 @click.option("-o", "--output", type=FILE, help="HTML file; default: STUDY[-OTHER].html.")
-@click.option("--bench", type=FILE, help="Bench file; adds a figure of speed against error.")
+@click.option(
+    "--bench", type=FILE, help="File of `gfmd bench`; adds a figure of speed against error."
+)
 def report(study: Path, other: Path | None, output: Path | None, bench: Path | None) -> None:
     """Write a report of a study as one HTML page with figures, tables and maps.
 
-    With two studies, such as two bodies or two treatments of a scan, each figure has the curves
+    With two studies, such as two materials or two treatments of a scan, each figure has the curves
     of both, and the table of `gfmd diff` comes first. The page needs no network and no other
-    file. The same study always gives the same bytes.
+    file. The same study always gives the same page.
 
     Examples:
 

@@ -27,6 +27,9 @@ def analyze(
 ) -> None:
     """Compare a study with Persson theory.
 
+    The tables contain the results beside the theory and, if there are any, continuum values, means
+    over seeds and optional results.
+
     Example:
 
         gfmd analyze demo.h5 --figures figures

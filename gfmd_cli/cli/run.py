@@ -17,31 +17,40 @@ from gfmd_cli.status import Status
 @click.argument("specs", metavar="SPEC...", type=FILE, nargs=-1, required=True)
 @output_option
 @overrides_option
-@click.option("--shard", metavar="I/N", help="Run only the tasks with index I modulo N.")
-@click.option("-j", "--jobs", type=click.IntRange(1, 1024), help="Number of worker processes.")
+@click.option(
+    "--shard", metavar="I/N", help="Run only shard I of N: the tasks with index I modulo N."
+)
+@click.option(
+    "-j",
+    "--jobs",
+    type=click.IntRange(1, 1024),
+    help="Number of worker processes; by default it follows from cores, memory and tasks.",
+)
 @click.option(
     "--overwrite",
     is_flag=True,
-    help="Begin anew; an old study and its unfinished work are kept under other names.",
+    help="Start a new study; the old one and its unfinished work are renamed.",
 )
-@click.option("--dry-run", is_flag=True, help="List the tasks, their memory and time; run none.")
+@click.option(
+    "--dry-run", is_flag=True, help="List the tasks with their memory and time; run none."
+)
 @click.option(
     "--checkpoint-every",
     type=click.FloatRange(min=0, min_open=True),
     default=600.0,
     show_default=True,
-    help="Seconds between two checkpoints of an unfinished solve.",
+    help="Seconds between two checkpoints of a task.",
 )
 @click.option(
     "--max-hours",
     type=click.FloatRange(min=0, min_open=True),
-    help="Save all states and exit with status 75 before this wall time has passed.",
+    help="Stop before this wall time has passed: save all states, exit with status 75.",
 )
 @click.option(
     "--reproducible",
     is_flag=True,
-    help="Give the same bits in every run on one machine: FFT plans are not measured, and each "
-    "task uses one thread. Slower.",
+    help="Give bit-identical results in every run on one machine, but slower: FFT plans are not "
+    "measured, and each task uses one thread.",
 )
 @click.option("-q", "--quiet", is_flag=True, help="Print only errors.")
 def run(
@@ -59,8 +68,9 @@ def run(
 ) -> None:
     """Run all tasks that the study does not contain yet.
 
-    A second call resumes a stopped run. A study can hold the tasks of several specs: what is there
-    stays, what is missing is added. Several specs are run one after the other. Examples:
+    A task is one contact: one load on one surface, elastomer and grid. A second call resumes a
+    stopped run. A study can contain the tasks of several specs: stored results are kept, and
+    missing tasks are added. Several specs are run one after the other. Examples:
 
     \b
         gfmd run configs/demo.toml --set load.p_star=0.1

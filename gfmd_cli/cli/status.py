@@ -28,7 +28,7 @@ from gfmd_cli.units import duration
 @click.argument("path", metavar="SPEC|STUDY", type=FILE)
 @output_option
 @overrides_option
-@click.option("--shards", type=int, metavar="N", help="Show the progress of each of N shards, too.")
+@click.option("--shards", type=int, metavar="N", help="Also show the progress of each of N shards.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def status(
     path: Path, output: Path | None, overrides: tuple[str, ...], shards: int | None, as_json: bool
@@ -65,10 +65,10 @@ def status(
 @output_option
 @overrides_option
 def collect(spec: Path, output: Path | None, overrides: tuple[str, ...]) -> None:
-    """Collect the records of all shards into the study; solve nothing.
+    """Collect the results of all shards into the study file; solve nothing.
 
-    Every shard collects when it ends; this command is for shards that were stopped or killed. The
-    exit status is 1 if any task is missing or has not converged. Example:
+    Every shard collects when it ends. Use this command if shards were stopped or killed. The exit
+    status is 1 if any task is missing or has not converged. Example:
 
         gfmd collect configs/demo.toml
     """

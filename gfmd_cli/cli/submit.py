@@ -21,11 +21,17 @@ from gfmd_cli.errors import InputError
 @click.option("--dry-run", is_flag=True, help="Print the script and the commands; submit nothing.")
 @click.option("--time", help="Time limit of a shard, such as 12:00:00.")
 @click.option("--mem", help="Memory of a shard; by default the prediction for its largest task.")
-@click.option("--cpus-per-task", type=click.IntRange(1, 1024), help="Cores; by default 1.")
+@click.option(
+    "--cpus-per-task", type=click.IntRange(1, 1024), help="Cores of a shard; by default 1."
+)
 @click.option("--partition", metavar="NAME", help="Partition of the cluster.")
 @click.option("--account", metavar="NAME", help="Account to charge.")
 @click.option(
-    "--sbatch", "sbatch_options", multiple=True, metavar="OPTION", help="Option for sbatch."
+    "--sbatch",
+    "sbatch_options",
+    multiple=True,
+    metavar="OPTION",
+    help="Other option of sbatch; repeatable.",
 )
 def submit(
     spec: Path,
@@ -39,9 +45,10 @@ def submit(
 ) -> None:
     """Run a study as an array job of Slurm; a second job collects the results.
 
-    A shard that is preempted or reaches its time limit saves its state and is queued again.
-    With --missing and without --shards, the script of the last submission is used unchanged;
-    options given now take precedence over those in the script. Examples:
+    Each member of the array runs a part of the tasks (a shard). A shard that is preempted or
+    reaches its time limit saves its state and is queued again. With --missing and without
+    --shards, the script of the last submission is used unchanged; options given now take
+    precedence over those in the script. Examples:
 
         gfmd submit configs/demo.toml --shards 4 --time 2:00:00 --sbatch qos=long
 

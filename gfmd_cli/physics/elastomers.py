@@ -158,7 +158,7 @@ class HalfSpace(LinearElastomer):
 
     kind: Literal["half-space"] = "half-space"
     E_star: Positive = 1.0
-    """Contact modulus [Pa]."""
+    """Contact modulus E / (1 - nu^2) [Pa]."""
 
     @property
     def exponent(self) -> float:
@@ -200,7 +200,7 @@ class Plate(LinearElastomer):
 
     kind: Literal["plate"] = "plate"
     E_star: Positive = 1.0
-    """Contact modulus [Pa]."""
+    """Contact modulus E / (1 - nu^2) [Pa]."""
     thickness: Positive
     """Thickness [m]."""
 
@@ -217,15 +217,15 @@ class Plate(LinearElastomer):
 class Slab(LinearElastomer):
     """Layer of finite thickness t with constant stress on its back, k = E* q S(q t) / 2.
 
-    Paper Eq. (41): a thin plate for q t << 1, a half-space for q t >> 1. The thickness is a share
-    of the side of the cell. The unit of pressure is that of the half-space.
+    Paper Eq. (41): a thin plate for q t << 1, a half-space for q t >> 1. The key `thickness` is
+    relative to the side of the cell. The unit of pressure is that of the half-space.
     """
 
     kind: Literal["slab"] = "slab"
     thickness: Positive
     """Thickness t / L."""
     E_star: Positive = 1.0
-    """Contact modulus [Pa]."""
+    """Contact modulus E / (1 - nu^2) [Pa]."""
 
     def stiffness(self, q: Field, length: float = 1.0) -> Field:
         """k(q) [Pa/m]."""
@@ -243,16 +243,17 @@ class Slab(LinearElastomer):
 class Layer(LinearElastomer):
     """Elastic layer of finite thickness t on a rigid base, k = E* q / (2 c(q t)).
 
-    A half-space for q t >> 1; k is finite for q -> 0.
+    c(q t) is the compliance relative to that of the half-space: c = 1 for q t >> 1, and k is finite
+    for q -> 0.
     """
 
     kind: Literal["layer"] = "layer"
     thickness: Positive
     """Thickness [m]."""
     E_star: Positive = 1.0
-    """Contact modulus [Pa]."""
+    """Contact modulus E / (1 - nu^2) [Pa]."""
     poisson: Annotated[float, Key(gt=-1, lt=0.5)] | None = None
-    """Poisson's ratio of a bonded layer; a sliding one depends on E_star alone."""
+    """Poisson's ratio, required for a bonded layer. A sliding layer depends on E_star alone."""
     base: Literal["bonded", "sliding"] = "bonded"
     """Whether the layer is bonded to the rigid base or slides on it without friction."""
 
@@ -304,7 +305,7 @@ class Tabulated(LinearElastomer):
 
     kind: Literal["table"] = "table"
     path: FilePath
-    """Text file with two columns, q [1/m] and k [Pa/m], both positive, q increasing."""
+    """Text file with two columns, q [1/m] and k [Pa/m]: positive numbers, q increasing."""
 
     def stiffness(self, q: Field, length: float = 1.0) -> Field:
         """k(q) [Pa/m]. Raises InputError for an invalid table."""

@@ -31,9 +31,9 @@ from gfmd_cli.physics.topography import Region, Topography, read_topography, squ
 class FileSurface(RigidSurface):
     """Height map from a .npy, HDF5, netCDF or microscope file (SurfaceTopography).
 
-    A `.npy` or HDF5 array is used as it is, as a periodic map. A scan is not periodic: it is
-    levelled, and it ends at its borders, or it is mirrored. The keys `periodic`, `level` and
-    `edges` override this.
+    A `.npy` or HDF5 array is used unchanged, as a periodic map. A microscope scan is not periodic:
+    a plane is subtracted, and the contact has a free boundary or, if this is not available, the
+    map is mirrored. The keys `periodic`, `level` and `edges` override this.
     """
 
     rough: ClassVar[bool] = True
@@ -49,31 +49,31 @@ class FileSurface(RigidSurface):
     flip: bool = False
     """Whether to turn the heights upside down, as for the replica of a surface."""
     crop: bool = False
-    """Whether to cut the largest square of an even number of points out of the middle."""
+    """Whether to use only the largest square of an even number of points in the middle."""
     missing: Literal["fill", "void", "refuse"] = "fill"
-    """Treatment of missing heights: "fill" them in by the solution of the Laplace equation; "void"
-    does the same for spectrum and mean gap, but these points never touch; or "refuse" the map."""
+    """Treatment of missing heights. "fill": they are interpolated by the solution of the Laplace
+    equation. "void": likewise for spectrum and mean gap, but these points never touch. "refuse":
+    a map with missing heights is an error."""
     periodic: bool | None = None
     """Whether the map is periodic; by default true for arrays, false for scans."""
     level: Levelling | None = None
-    """Trend to subtract first: "none", "mean", "plane" or "curvature"; by default "none" for a
-    periodic map, else "plane"."""
+    """Trend that is subtracted first: "none", "mean", "plane" or "curvature"; by default "none" for
+    a periodic map, otherwise "plane"."""
     edges: Edges | None = None
-    """How to make the map periodic: "window" tapers the heights near the border to their mean,
-    "mirror" doubles the cell by reflection, "none" does nothing. By default "none" for a periodic
-    map. Any other map has grid.boundary = "free" by default, and is mirrored where this is not
-    available."""
+    """How the map is made periodic: "window" tapers the heights near the border to their mean,
+    "mirror" reflects the map to twice its sides, "none" changes nothing. By default "none" for a
+    periodic map and for a free boundary (see grid.boundary), otherwise "mirror"."""
     taper: Annotated[float, Key(gt=0, le=0.5)] = 0.1
-    """Width of the tapered zone of the window at each edge, as a share of the side."""
+    """Width of the tapered zone of the window at each edge, as a fraction of the side."""
     interpolation: Interpolation | None = None
-    """Heights between the points of the map, on a grid finer than the map: "fourier", exact for
-    band-limited maps, or "monotone", without ripples; by default chosen by the spectrum and the
-    plateaus of the map."""
+    """Interpolation on grids finer than the map: "fourier", exact for band-limited maps, or
+    "monotone", without overshoot. The default depends on the spectrum and the plateaus of the
+    map."""
     scale: Positive = 1.0
-    """Factor from the heights of the file to metres; also for its side where it states no unit."""
+    """Factor from the heights of the file to metres; also for its side if it states no unit."""
     length: Positive | None = None
-    """Side of the map along x [m], of its part where it is cropped; by default that of the file,
-    else 1."""
+    """Side of the map along x [m]; if the map is cropped, of the part that is used. By default that
+    of the file, or 1 if the file states none."""
     length_y: Positive | None = None
     """Side of the map along y [m]; by default that of the file, else the points along y times the
     spacing along x."""

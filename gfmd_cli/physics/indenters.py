@@ -208,7 +208,7 @@ class Cone(RoundIndenter):
 
     kind: Literal["cone"] = "cone"
     slope: Positive = 1.0
-    """Slope of the flank."""
+    """Slope of the flanks."""
 
     def heights_on(self, grid: Grid) -> Field:
         """Heights [m] at the points of a grid that this process holds."""
@@ -240,14 +240,16 @@ class Punch(RoundIndenter):
 
 
 class Ridge(LineIndenter):
-    """Acute ridge h = -slope |x|, a line contact; x counts from the crest, in the middle of the
-    cell. Paper Fig. 1 (periodic ridges, one per cell)."""
+    """Acute ridge h = -slope |x|, a line contact; x = 0 at the crest, in the middle of the cell.
+
+    Paper Fig. 1 (periodic ridges, one per cell).
+    """
 
     kind: Literal["ridge"] = "ridge"
     slope: Positive = 1.0
     """Slope of the flanks."""
     width: Annotated[float, Key(gt=0, le=1)] = 1.0
-    """Width at the foot as a share of the cell; the rest is flat."""
+    """Width of the ridge at its foot / L; the rest of the cell is flat."""
 
     def heights_on(self, grid: Grid) -> Field:
         """Heights [m] at the points of a grid that this process holds."""
@@ -256,8 +258,10 @@ class Ridge(LineIndenter):
 
 
 class LineParabola(LineIndenter):
-    """Parabolic cylinder h = -x^2 / 2R, a line contact; x counts from the crest, in the middle of
-    the cell. Paper Eq. (4) in one dimension."""
+    """Parabolic cylinder h = -x^2 / 2R, a line contact. Paper Eq. (4) in one dimension.
+
+    x = 0 at the crest, in the middle of the cell.
+    """
 
     kind: Literal["line-parabola"] = "line-parabola"
     radius: Positive = 1.0
@@ -269,8 +273,10 @@ class LineParabola(LineIndenter):
 
 
 class Wave(LineIndenter):
-    """Cosine wave h = amplitude cos(2 pi x / L), a line contact (Westergaard's problem); x counts
-    from the crest, in the middle of the cell."""
+    """Cosine wave h = amplitude cos(2 pi x / L), a line contact (Westergaard's problem).
+
+    x = 0 at the crest, in the middle of the cell.
+    """
 
     kind: Literal["wave"] = "wave"
     amplitude: Positive = 1.0

@@ -20,7 +20,7 @@ class SelfAffine(RigidSurface):
     """Random self-affine surface: |h(q)| = sqrt(C(q)), phases uniform in (0, 2 pi).
 
     Paper Eqs. (3) and (40). The phase of a mode depends only on the seed and the mode, so a seed
-    defines one continuous surface for all grids; a smaller cut-off only adds modes to it.
+    defines one continuous surface for all grids. A smaller cut-off only adds modes to it.
     """
 
     rough: ClassVar[bool] = True
@@ -28,16 +28,16 @@ class SelfAffine(RigidSurface):
     hurst: Annotated[float, Key(gt=0, le=1)] = 0.8
     """Hurst exponent H, 0 < H <= 1."""
     rolloff: Positive = 0.5
-    """Roll-off (or cut-off) wavelength lambda_r / L."""
+    """Roll-off wavelength lambda_r / L; with spectrum = "cutoff", the longest wavelength."""
     cutoff: Annotated[float, Key(gt=0, le=1)] = 0.005
     """Short-wavelength cut-off lambda_s / L."""
     spectrum: Literal["rolloff", "cutoff"] = "rolloff"
-    """"rolloff": C = [1 + (q/q_r)^2]^(-1-H), Eq. (3); "cutoff": C = (q/q_r)^(-2-2H) from q_r
-    on, zero below, Eq. (40)."""
+    """"rolloff": C = [1 + (q/q_r)^2]^(-1-H), Eq. (3); "cutoff": C = (q/q_r)^(-2-2H) for
+    q >= q_r and zero below, Eq. (40)."""
     seed: Seed = 0
     """Seed of the random phases."""
     h_std: Positive | None = None
-    """Root-mean-square height [m] to scale to; by default C = 1 m^2 at long wavelengths."""
+    """Root-mean-square height [m]; by default the prefactor of C is 1 m^2."""
     length: Positive = 1.0
     """Side of the cell along x, L [m]."""
     length_y: Positive | None = None

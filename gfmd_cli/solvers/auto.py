@@ -15,8 +15,10 @@ from gfmd_cli.solvers.sort import Sort, is_flat
 
 
 class Auto(Solver):
-    """The fastest solver by measurement: "dual" for a free boundary; for a periodic one "sort" if
-    the stiffness is flat (n = 0), else "pcg".
+    """The fastest solver, by measurement.
+
+    "dual" for a free boundary. For a periodic boundary "sort" if k does not depend on q (n = 0),
+    otherwise "pcg".
     """
 
     kind: Literal["auto"] = "auto"

@@ -50,11 +50,11 @@ class Solver(Choice):
 
     kind: str
     tolerance: Annotated[float, Key(ge=1e-16, lt=1)] = 1e-6
-    """Natural residual to reach."""
+    """Natural residual at which a solution counts as converged."""
     max_steps: Annotated[int, Key(gt=0)] = 20000
-    """Steps on one grid after which the solve is given up."""
+    """Largest number of steps on one grid."""
     nested: bool = True
-    """Start from the solution on coarser grids."""
+    """Whether to start from the solution on coarser grids."""
 
     state_type: ClassVar[type[State]] = State
     """Class of the states of this solver."""

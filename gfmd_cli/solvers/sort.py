@@ -14,7 +14,7 @@ from gfmd_cli.solvers.loop import Solver, State
 
 
 class Sort(Solver):
-    """Exact solution for a flat stiffness: sigma = k0 max(h - c, 0), c such that <sigma> = p.
+    """Exact solution for constant k = k_0 (n = 0): sigma = k_0 max(h - c, 0), with <sigma> = p.
 
     u = max(h, c): the points do not interact. Paper Sect. 4.2.
     """

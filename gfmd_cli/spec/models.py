@@ -29,7 +29,7 @@ class StudyTable(Choice):
     """Table [study]."""
 
     name: Annotated[StrictStr, Key(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,99}$")] = "study"
-    """Name of the study; its file is NAME.h5 in the working directory."""
+    """Name of the study. The study file is NAME.h5 in the working directory."""
 
 
 MAX_POINTS = 2**17
@@ -57,14 +57,16 @@ class GridTable(Choice):
     """Table [grid]."""
 
     points: Points
-    """Number of points along x; or "auto": the coarsest grid that meets [accuracy]. Numbers with
-    many factors of 2 are fastest. A mirrored map has twice as many on its cell."""
+    """Number of grid points along x, or "auto": the coarsest grid that meets [accuracy]. Numbers
+    with many factors of 2 are fastest. The cell of a mirrored map has twice as many points."""
     points_y: Annotated[int, Key(ge=SMALLEST_GRID, le=MAX_POINTS)] | None = None
-    """Number of points along y; by default in the ratio of the sides, or of the points of a map."""
+    """Number of grid points along y. By default the pixels are square, or nearly so; for a map
+    the ratio points / points_y is that of the map."""
     boundary: Literal["periodic", "free"] | None = None
-    """"periodic": the map is repeated. "free": the elastomer goes on, unloaded, beyond the map; for
-    elastomers whose displacement decays with the distance from the load. By default "free" for a
-    map that is not periodic, without surface.edges, where it is available; else "periodic"."""
+    """"periodic": the cell is repeated periodically. "free": the elastomer extends beyond the map
+    and carries no load there; this requires an elastomer whose displacement decays with the
+    distance from the load. The default is "periodic". For a map that is not periodic, without
+    surface.edges, it is "free" if elastomer, solver, accuracy and output allow it."""
 
     def on_cell(self, surface: RigidSurface, points: int) -> tuple[RigidSurface, int]:
         """A surface on its cell, and the points of the cell along y.
@@ -77,15 +79,15 @@ class GridTable(Choice):
 
 
 class Ladder(Choice):
-    """Values in geometric progression: from * 10^(i / per_decade), i = 0, 1, ..., up to `to`.
+    """The values from * 10^(i / per_decade), i = 0, 1, ..., up to `to`.
 
-    The step is fixed, so that a larger `to` adds values and moves none.
+    The ratio of neighbouring values is fixed: a larger `to` adds values and changes no others.
     """
 
     from_: Annotated[float, Key(gt=0, alias="from")]
     """First value."""
     to: Positive
-    """Upper limit, up to rounding; a value of its own only if it is one of the ladder."""
+    """Upper limit; it is a value only if it belongs to the sequence, up to rounding."""
     per_decade: Annotated[float, Key(gt=0, le=1000)] = 4
     """Values per decade."""
 
@@ -142,23 +144,24 @@ SOUGHT = {"contact_area": "a_r", "mean_gap": "u_g", "displacement": "displacemen
 
 
 class LoadTable(Choice):
-    """Table [load]: one of the quantities below, as a number, a list or a ladder."""
+    """Table [load]: one of the quantities below, as a number, a list or a geometric sequence."""
 
     p_star: Pressures | None = None
     """Reduced pressures p / Delta_sigma."""
     pressure: Pressures | None = None
     """Pressures [Pa]."""
     contact_area: Areas | None = None
-    """Relative contact areas a_r, in the continuum with a table [accuracy], else on the grid;
-    the pressures are searched."""
+    """Relative contact areas a_r: in the continuum if the spec has a table [accuracy], otherwise
+    on the grid. The program searches the pressures."""
     mean_gap: Pressures | None = None
-    """Mean gaps u_g / h_std on the solved grid; the pressures are searched."""
+    """Mean gaps u_g / h_std: in the continuum if the spec has a table [accuracy], otherwise on the
+    grid. The program searches the pressures."""
     displacement: Pressures | None = None
-    """Displacements of the indenter from first touch [m] on the solved grid, for a free boundary or
-    an elastomer of finite k(0); the pressures are searched."""
+    """Displacements [m] of the indenter from first touch, on the grid; for a free boundary or an
+    elastomer of finite k(0). The program searches the pressures."""
     tolerance: Share = 1e-3
-    """Relative deviation from contact_area, mean_gap or displacement at which the search ends;
-    where the contact area has a step there, the search ends with the nearest contact."""
+    """Largest relative deviation from contact_area, mean_gap or displacement. If the value lies in
+    a jump of the contact area, the result is the nearest contact."""
 
     @model_validator(mode="after")
     def _one_of_all(self) -> Self:
@@ -187,16 +190,17 @@ class LoadTable(Choice):
 
 
 class AccuracyTable(Choice):
-    """Table [accuracy]: requested errors, relative to the continuum value."""
+    """Table [accuracy]: requested accuracy, as errors relative to the continuum value."""
 
     mean_gap: Share | None = None
-    """Relative error of u_g."""
+    """Relative error of the mean gap u_g."""
     contact_area: Share | None = None
-    """Relative error of a_r."""
+    """Relative error of the contact area a_r."""
     stress_deviation: Share | None = None
-    """Relative error of sigma_p."""
+    """Relative error of the standard deviation sigma_p of the stress."""
     max_points: Annotated[int, Key(ge=SMALLEST_GRID, le=MAX_POINTS)] = MAX_POINTS
-    """Largest number of points along x for grid.points = "auto"; memory may set a lower limit."""
+    """Largest number of points along x for grid.points = "auto". The available memory may set a
+    lower limit."""
 
     def asked(self) -> dict[str, float]:
         """Requested relative errors, by the name of the column."""
@@ -218,11 +222,11 @@ FieldName = Literal["u", "sigma", "height", "contact_pressure"]
 
 
 class SweepTable(Choice):
-    """Table [sweep]: lists that go together, value by value; other lists multiply."""
+    """Table [sweep]: lists that are combined value by value. All other lists multiply."""
 
     paired: Annotated[list[StrictStr], Key(min_length=2)]
-    """Keys whose lists go together, such as ["surface.cutoff", "grid.points"]; all have the same
-    length. For several groups of lists repeat the table as [[sweep]]."""
+    """Keys whose lists are combined value by value, such as ["surface.cutoff", "grid.points"]. The
+    lists have the same length. For several groups of lists, repeat the table as [[sweep]]."""
 
     @model_validator(mode="after")
     def _names_keys(self) -> Self:
@@ -235,7 +239,7 @@ class SweepTable(Choice):
 
 
 class OutputTable(Choice):
-    """Table [output]: results that are stored in addition to the scalars."""
+    """Table [output]: results that are stored in addition to the scalar results."""
 
     histogram: bool = True
     """Stress distribution Pr(sigma) in linear and logarithmic bins."""
@@ -243,12 +247,12 @@ class OutputTable(Choice):
     """Fields on the grid: displacement u, stress sigma = K u + p, height of the indenter, and
     contact_pressure, which is exactly zero off contact."""
     cross_section: bool = False
-    """Height, displacement and stress along the diagonal; for a line contact, along the line."""
+    """Height, displacement and stress along the diagonal; for a line contact, along x."""
     true_contact: bool = False
-    """Delta_sigma over the true contact: columns deviation_c, quadrature_c and
-    deviation_bearing."""
+    """Rms stress in full contact, taken over the true contact instead of the whole cell: columns
+    deviation_c, quadrature_c and deviation_bearing."""
     patches: bool = False
-    """Number and areas of the contact patches, with the distribution of the areas."""
+    """Number of the contact patches, their areas and the distribution of the areas."""
     gap_distribution: bool = False
     """Gap distribution Pr(g) in linear and logarithmic bins."""
     stiffness: bool = False
@@ -256,8 +260,7 @@ class OutputTable(Choice):
     spectra: bool = False
     """Power spectra and autocorrelations of height, displacement and stress."""
     percolation: bool = False
-    """Whether the gap percolates through the periodic cell along x and y: columns percolates_x and
-    percolates_y."""
+    """Whether the gap percolates along x and along y: columns percolates_x and percolates_y."""
 
     def on_request(self) -> list[str]:
         """The keys of `ON_REQUEST` that are switched on."""

@@ -34,12 +34,12 @@ class SolvedContact:
 
     @property
     def is_periodic(self) -> bool:
-        """Whether patches go on across the border."""
+        """Whether patches continue across the border."""
         return self.contact.boundary == "periodic"
 
     @cached_property
     def patch_areas(self) -> Field:
-        """Areas of the contact patches / L^2; of a line scene, lengths / L."""
+        """Areas of the contact patches / L^2; of a line contact, lengths / L."""
         grid = self.contact.grid
         point = grid.area / grid.size / grid.length**grid.dimension
         areas: Field = contact_patches(self.touching, periodic=self.is_periodic).sizes * point
@@ -96,14 +96,14 @@ OBSERVABLES = (
             "deviation_c",
             float,
             "1",
-            "standard deviation of the full-contact stress over the true contact / Delta_sigma",
+            "standard deviation of the full-contact stress K h over the true contact / Delta_sigma",
         ),
         lambda solved: solved.full_contact_stress.deviation,
     ),
     Observable(
         "true_contact",
         Column(
-            "quadrature_c", float, "1", "rms of its quadrature over the true contact / Delta_sigma"
+            "quadrature_c", float, "1", "rms of i (q / |q|) k h over the true contact / Delta_sigma"
         ),
         lambda solved: solved.full_contact_stress.quadrature,
     ),
@@ -113,26 +113,27 @@ OBSERVABLES = (
             "deviation_bearing",
             float,
             "1",
-            "the same deviation over the highest points, as many as carry p / Delta_sigma",
+            "standard deviation of K h over the highest points, as many as the predicted a_r, "
+            "/ Delta_sigma",
         ),
         lambda solved: float(bearing(solved.contact).delta_sigma_c(solved.contact.pressure)),
     ),
     Observable(
         "patches",
-        Column("patches", int, "1", "number of contact patches (8 neighbours)"),
+        Column("patches", int, "1", "number of contact patches (8-connected points)"),
         lambda solved: solved.patch_areas.size,
         "patches",
     ),
     Observable(
         "patches",
-        Column("patch_area_mean", float, "1", "mean area of a patch / L^2; of a line scene, / L"),
+        Column("patch_area_mean", float, "1", "mean area of a patch / L^2; in a line contact, / L"),
         lambda solved: solved.patch_areas.mean() if solved.patch_areas.size else None,
         "mean patch",
         PATCH_AREA,
     ),
     Observable(
         "patches",
-        Column("patch_area_largest", float, "1", "area of the largest patch, likewise"),
+        Column("patch_area_largest", float, "1", "area of the largest patch, in the same units"),
         lambda solved: solved.patch_areas.max() if solved.patch_areas.size else None,
         "largest patch",
         PATCH_AREA,
@@ -150,8 +151,8 @@ OBSERVABLES = (
             "percolates_x",
             int,
             "1",
-            "1 where the gap (4 neighbours) percolates along x through the periodic cell, or from "
-            "border to border if they are free, else 0",
+            "1 if the gap (4-connected points) percolates along x, 0 if not; through the periodic "
+            "cell or, with a free boundary, from border to border",
         ),
         lambda solved: solved.percolates[0],
         "percolates\nalong x",
@@ -159,7 +160,7 @@ OBSERVABLES = (
     ),
     Observable(
         "percolation",
-        Column("percolates_y", int, "1", "likewise along y; -1 on a line scene"),
+        Column("percolates_y", int, "1", "the same along y; -1 for a line contact"),
         lambda solved: solved.percolates[1] if len(solved.percolates) > 1 else None,
         "along y",
         is_flag=True,
