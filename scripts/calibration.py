@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from gfmd_cli.physics.anisotropy import anisotropy
-from gfmd_cli.physics.contact import Scene, build_scene
+from gfmd_cli.physics.contact import Contact, Scene
 from gfmd_cli.physics.discretisation_error import (
     MAX_AREA_EXPONENT,
     RoughnessScales,
@@ -26,15 +26,16 @@ from gfmd_cli.physics.discretisation_error import (
     local_exponent,
     roughness_scales,
 )
-from gfmd_cli.physics.elastomers import Elastomer, Power, Slab
+from gfmd_cli.physics.elastomers import Elastomer, Layer, Power, Slab
 from gfmd_cli.physics.error_estimates import Level
 from gfmd_cli.physics.file_surface import FileSurface
+from gfmd_cli.physics.free_contact import SCENES
 from gfmd_cli.physics.indenters import Parabola, Wave
-from gfmd_cli.physics.observables import QUANTITIES, observe
+from gfmd_cli.physics.observables import QUANTITIES, border_contact, contact_points, observe
 from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.physics.surfaces import Surface
 from gfmd_cli.solvers.auto import Auto
-from gfmd_cli.solvers.nested_grids import solve_contact
+from gfmd_cli.solvers.nested_grids import Solution, solve_contact
 
 EXPONENTS = (0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0)
 THICKNESSES = (0.01, 0.03, 0.1)
@@ -44,6 +45,10 @@ MAP_EXPONENTS = (0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0)
 IRREGULAR = ("clipped", "worn", "steps", "stripes", "stretched", "turned")
 """Kinds of maps; in docs/accuracy.md worn ones are "polished", stripes "two levels", turned ones
 "stretched at an angle"."""
+FREE_EXPONENTS = (0.0, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 1.75)
+"""Exponents of an elastomer with a free boundary."""
+FREE = ("part", "clipped", "steps", "stretched", "turned")
+"""Kinds of maps with a free boundary; parts are those of random roughness."""
 BETWEEN = (0.25, 1.25, 1.75, 2.25, 2.75, 3.25, 3.75)
 FINER = 4  # the grid that truth comes from is at least so much finer than those of an estimate
 KEYS = ("points", "a_r", "sigma_p", "u_g", "perimeter")
@@ -63,6 +68,8 @@ class Case:
     doublings: int
     fit: bool
     """Whether the constants of the estimates were fitted to it, among others."""
+    boundary: str = "periodic"
+    """The boundary of the map."""
 
     @property
     def body(self) -> bool:
@@ -94,6 +101,35 @@ def map_cases(folder: Path, seed: int, scans: Path | None) -> list[Case]:
         for n in draw.choice(MAP_EXPONENTS, 3, replace=False):
             edges = str(draw.choice(["window", "mirror", "none"]))
             add("scan", np.load(path), float(n), i % 2 == 0, edges=edges)
+    return out
+
+
+def free_cases(folder: Path, seed: int) -> list[Case]:
+    """Parts of random maps and profiles, and paraboloids, with a free boundary."""
+    draw, out = np.random.default_rng(seed + 3), []
+
+    def add(kind: str, body: Elastomer, surface: Surface | np.ndarray, doublings: int) -> None:
+        path = folder / f"{kind}-{seed}-{len(out)}.npy"
+        base = 32
+        if isinstance(surface, np.ndarray):
+            np.save(path, surface)
+            base = surface.shape[-1]
+            surface = FileSurface(path=path, periodic=False).within("free")
+        p, name = float(draw.choice(PRESSURES[1:8])), f"{_name(body)} {kind}"
+        case = Case(len(out), name, surface, body, p, base, doublings, False, "free")
+        out.append(case)
+
+    for _ in range(2):
+        for body in [*(Power(n=n) for n in FREE_EXPONENTS), Layer(thickness=0.1, base="sliding")]:
+            for kind in FREE:
+                sizes = [32, 64, 128] if (body.exponent or 0.0) <= 1 else [32, 64]  # 1024^2 is slow
+                points = int(draw.choice(sizes))
+                whole = irregular_map(kind.replace("part", "random"), draw, 2 * points)
+                add(kind, body, whole[: points - 5, :points], 4 if points == 32 else 3)
+            if isinstance(body, Power):
+                add("parabola", body, Parabola(), 4)
+            if body.decays(1):
+                add("line", body, irregular_map("random", draw, 128)[0, :64], 5)
     return out
 
 
@@ -174,7 +210,7 @@ def cases(folder: Path, seed: int = 20) -> list[Case]:
 
 
 def _name(body: Elastomer) -> str:
-    return f"n={body.n:g}" if isinstance(body, Power) else f"slab t={body.thickness:g}"
+    return f"n={body.n:g}" if isinstance(body, Power) else f"{body.kind} t={body.thickness:g}"
 
 
 def height_map(kind: str, draw: np.random.Generator, points: int = 32) -> np.ndarray:
@@ -191,7 +227,7 @@ def height_map(kind: str, draw: np.random.Generator, points: int = 32) -> np.nda
 
 
 def scene_of(case: Case, points: int) -> Scene:
-    return build_scene(case.surface, case.elastomer, points)
+    return SCENES[case.boundary](case.surface, case.elastomer, points)
 
 
 def measure(case: Case, tolerance: float = 1e-6) -> dict:
@@ -220,6 +256,7 @@ def measure(case: Case, tolerance: float = 1e-6) -> dict:
                 "u_g": seen.u_g * height,
                 "perimeter": seen.perimeter,
                 "energy": seen.energy * stress * height,
+                "border": _border(contact, solution),
                 "texture": None if case.body else _texture(case, scene),
                 "status": solution.status,
                 "seconds": round(time.perf_counter() - begun, 3),
@@ -232,6 +269,13 @@ def measure(case: Case, tolerance: float = 1e-6) -> dict:
         "body": case.body,
         "levels": levels,
     }
+
+
+def _border(contact: Contact, solution: Solution) -> float | None:
+    """Share of the border of the map in contact; None with a periodic boundary."""
+    if contact.boundary == "periodic":
+        return None
+    return border_contact(contact_points(contact.obstacle, solution.u, solution.sigma))
 
 
 def _texture(case: Case, scene: Scene) -> dict:
@@ -254,7 +298,11 @@ def truth(levels: list[dict]) -> dict[str, float]:
     elif n >= 0.25 and x_second > x_first:  # first order in the contact line
         area -= (second["a_r"] - area) * x_first / (x_second - x_first)
     stress = first["sigma_p"]
-    if 0.75 <= n < 2.8:
+    if first.get("border"):  # the variance converges as the spacing to the power 1 - n
+        if 0 < n < 1:
+            change = stress**2 - second["sigma_p"] ** 2
+            stress = (stress**2 + change / (2 ** (1 - n) - 1)) ** 0.5
+    elif 0.75 <= n < 2.8:
         stress += (stress - second["sigma_p"]) / (2 ** min(2.0, 3 - n) - 1)
     return {"a_r": min(1.0, max(0.0, area)), "sigma_p": stress, "u_g": first["u_g"]}
 
@@ -286,7 +334,10 @@ def scores(records: list[dict]) -> Iterator[Score]:
     """Every estimate from one, two or three neighbouring grids, FINER times coarser than truth."""
     for record in records:
         exact = truth(record["levels"])
-        seen = [Level(*(level[key] for key in KEYS)) for level in record["levels"]]
+        seen = [
+            Level(*(level[key] for key in KEYS), border=level.get("border"))
+            for level in record["levels"]
+        ]
         for last in range(len(seen) - int(np.log2(FINER))):
             fine, found = seen[last], record["levels"][last]
             rough = None if record["body"] else RoughnessScales(**found["texture"])
@@ -347,14 +398,24 @@ def table(found: list[Score]) -> None:
                 label = f"{'fit' if half else 'verify'} {quantity} {grids} grid{'s'[: grids - 1]}"
                 line(label, lambda s: (s.fit, s.quantity, s.grids) == (half, quantity, grids))  # noqa: B023
     for quantity in QUANTITIES:
-        for n in EXPONENTS:
+        for n in sorted({*EXPONENTS, *FREE_EXPONENTS}):
             line(
                 f"verify {quantity} n={n:g}",
                 lambda s: (
                     not s.fit and s.quantity == quantity and s.name.startswith(f"n={n:g} ")  # noqa: B023
                 ),
             )
-        for kind in ("slab", "file", "wide", "between", *IRREGULAR, "scan"):
+        for kind in (
+            "slab",
+            "file",
+            "wide",
+            "between",
+            *IRREGULAR,
+            "scan",
+            "layer",
+            "part",
+            "line",
+        ):
             line(
                 f"verify {quantity} {kind}",
                 lambda s: not s.fit and s.quantity == quantity and kind in s.name,  # noqa: B023
@@ -418,11 +479,14 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=20, help="20 is the set of the constants")
     parser.add_argument("--figure", type=Path, help="path of a figure, without suffix")
     parser.add_argument("--maps", action="store_true", help="irregular maps instead")
+    parser.add_argument("--free", action="store_true", help="maps with a free boundary instead")
     parser.add_argument("--scans", type=Path, help="with --maps: folder of maps of 64 x 64 points")
     chosen = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        if chosen.maps:
+        if chosen.free:
+            wanted = free_cases(folder, chosen.seed)
+        elif chosen.maps:
             wanted = map_cases(folder, chosen.seed, chosen.scans)
         else:
             wanted = cases(folder, chosen.seed)

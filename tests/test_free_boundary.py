@@ -236,7 +236,6 @@ def test_run_stores_the_boundary(rows_of):
     [
         ("elastomer={kind='slab', thickness=0.1}", "decays with the distance"),
         ("solver.kind=pcg", 'solver.kind: "pcg" solves contacts with grid.boundary = "periodic"'),
-        ("accuracy.mean_gap=0.1", 'accuracy: is not available for grid.boundary = "free"'),
         ("output.stiffness=true", "output.stiffness: is not available"),
     ],
 )

@@ -17,6 +17,7 @@ import numpy as np
 
 from gfmd_cli.physics.elastomers import LinearElastomer
 from gfmd_cli.physics.error_estimates import Estimate, Level, unknown
+from gfmd_cli.physics.free_error import estimate_free
 from gfmd_cli.physics.irregular_error import estimate_by_change
 from gfmd_cli.physics.persson import Shells
 
@@ -127,6 +128,8 @@ def estimate(
     """
     ordered = sorted(levels, key=lambda level: level.points)
     fine, coarse = ordered[-1], ordered[-2] if len(ordered) > 1 else None
+    if fine.border is not None:
+        return estimate_free(fine, coarse, exponent)
     if fine.a_r == 1:
         return {
             "a_r": Estimate(0.0, 1.0, 0.0, "exact"),

@@ -77,17 +77,25 @@ def certify(contact: Contact, u: Field, sigma: Field) -> Certificate:
     centre = (lifted - reaction) / p
     share = min(sqrt(2 * duality_gap / reaction), 1.0) if reaction > 0 else 1.0
     spread = duality_gap / share if share > 0 else 0.0
-    doubt = DOUBT * sqrt(violated)
-    doubtful = sum(
-        int(np.count_nonzero(np.maximum(u[r] - obstacle[r], np.abs(sigma[r])) < doubt))
-        for r in row_blocks(u)
-    )
     return Certificate(
         gap=duality_gap,
         u_g=abs(mean - centre) + (0.5 * share * reaction + spread) / p,
         sigma_p=sqrt(2 * duality_gap * grid.max(float(contact.stiffness.max()))) + sqrt(omitted),
-        a_r=grid.total(doubtful) / grid.size,
+        a_r=uncertain_share(contact, u, sigma, violated),
     )
+
+
+def uncertain_share(contact: Contact, u: Field, sigma: Field, violated: float) -> float:
+    """Share of the points whose gap and stress are both below the rms violation.
+
+    `violated` is its square, the mean of min(g, sigma)^2.
+    """
+    doubt, obstacle = DOUBT * sqrt(violated), contact.obstacle
+    doubtful = sum(
+        int(np.count_nonzero(np.maximum(u[r] - obstacle[r], np.abs(sigma[r])) < doubt))
+        for r in row_blocks(u)
+    )
+    return contact.grid.total(doubtful) / contact.grid.size
 
 
 def _compliance(contact: Contact) -> float:

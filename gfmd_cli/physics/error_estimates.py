@@ -22,6 +22,8 @@ class Level:
     """Contact line per area times L, as in `Observables.perimeter`."""
     area: float = 1.0
     """Area of the cell / L^2."""
+    border: float | None = None
+    """Share of the border of the map in contact, with a free boundary; None with a periodic one."""
 
     @property
     def line(self) -> float:

@@ -30,7 +30,7 @@ def estimate_by_change(fine: Level, coarse: Level | None, n: float) -> dict[str,
         estimates["sigma_p"] = replace(estimates["sigma_p"], verdict="diverges")
     if coarse is None:
         return estimates
-    makers = {"a_r": _area, "sigma_p": _stress, "u_g": _gap}
+    makers = {"a_r": area_by_change, "sigma_p": stress_by_change, "u_g": gap_by_change}
     return estimates | {
         name: make(fine, coarse) for name, make in makers.items() if n <= MAX_EXPONENT[name]
     }
@@ -40,7 +40,7 @@ def _scale(name: str, fine: Level, change: float, unit: float) -> float:
     return hypot(change, FLOOR[name] * unit * fine.line)
 
 
-def _area(fine: Level, coarse: Level) -> Estimate:
+def area_by_change(fine: Level, coarse: Level) -> Estimate:
     """Relative contact area: of first order in the spacing, as contact lines are a point wide."""
     change = fine.a_r - coarse.a_r
     scale = _scale("a_r", fine, change, 1.0)
@@ -50,14 +50,14 @@ def _area(fine: Level, coarse: Level) -> Estimate:
     return Estimate(min(error, whole), best, min(rest, part), "regular")
 
 
-def _stress(fine: Level, coarse: Level) -> Estimate:
+def stress_by_change(fine: Level, coarse: Level, factor: float = FACTOR["sigma_p"]) -> Estimate:
     """Standard deviation of the pressure; the value on the grid is the best estimate."""
     scale = _scale("sigma_p", fine, fine.sigma_p - coarse.sigma_p, fine.sigma_p / fine.a_r)
-    error = FACTOR["sigma_p"] * scale
+    error = factor * scale
     return Estimate(error, fine.sigma_p, error, "regular")
 
 
-def _gap(fine: Level, coarse: Level) -> Estimate:
+def gap_by_change(fine: Level, coarse: Level) -> Estimate:
     """Mean gap; the value on the grid is the best estimate."""
     scale = _scale("u_g", fine, fine.u_g - coarse.u_g, fine.u_g / fine.a_r)
     error = FACTOR["u_g"] * scale

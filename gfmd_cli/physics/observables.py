@@ -38,6 +38,13 @@ def contact_line(grid: Grid, mask: Mask, *, periodic: bool = True) -> float:
     return float(grid.total(counts) @ across) * grid.length / grid.size
 
 
+def border_contact(mask: Mask) -> float:
+    """Share of the outermost points of a map that a mask contains."""
+    inside = mask[(slice(1, -1),) * mask.ndim]
+    outermost = mask.size - inside.size
+    return (np.count_nonzero(mask) - np.count_nonzero(inside)) / outermost
+
+
 QUANTITIES = ("a_r", "sigma_p", "u_g")
 """Names of the observables that have error estimates."""
 

@@ -16,8 +16,8 @@ def with_boundary(
 ) -> tuple[RigidSurface, GridTable]:
     """The surface with the treatment of its edges, and the grid with its boundary.
 
-    A map that ends at its borders has a free boundary where elastomer, solver, accuracy and output
-    allow it, and is mirrored elsewhere. Every other surface is periodic.
+    A map that ends at its borders has a free boundary where elastomer, solver and output allow
+    it, and is mirrored elsewhere. Every other surface is periodic.
     """
     if grid.boundary is None:
         free = surface.has_borders and _allows_free(spec, surface.dimension, elastomer, solver)
@@ -27,7 +27,7 @@ def with_boundary(
 
 def _allows_free(spec: Spec, dimension: int, elastomer: LinearElastomer, solver: AnySolver) -> bool:
     """Whether contacts of the spec can have a free boundary."""
-    if periodic_only(spec.accuracy, spec.output):
+    if periodic_only(spec.output):
         return False
     try:
         solver.check_boundary("free")

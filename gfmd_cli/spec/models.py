@@ -334,11 +334,9 @@ PERIODIC_ONLY = ("true_contact", "stiffness", "spectra")
 """Keys of [output] whose results are defined for a periodic boundary."""
 
 
-def periodic_only(accuracy: AccuracyTable | None, output: OutputTable | None) -> list[str]:
+def periodic_only(output: OutputTable) -> list[str]:
     """The given keys that a free boundary does not allow."""
-    keys = [] if accuracy is None else ["accuracy"]
-    requested = [] if output is None else output.on_request()
-    return keys + [f"output.{name}" for name in requested if name in PERIODIC_ONLY]
+    return [f"output.{name}" for name in output.on_request() if name in PERIODIC_ONLY]
 
 
 def file_digest(path: Path) -> str:

@@ -46,9 +46,6 @@ MAX_SHOWN = 200  # characters of what was given, in a message
 MAX_PROBLEMS = 20  # of a spec that a message lists
 MAX_SWEEP = 100_000  # combinations of one table
 
-
-REMEDIES = {"accuracy": "; solve it on two grids, such as grid.points = [256, 512]"}
-"""What to do instead of a key that a free boundary does not allow."""
 NUMBER = re.compile(r"\s*[+-]?\d[\d_]*\.?\d*([eE][+-]?\d+)?\s*")
 WORDS = {
     "string_pattern_mismatch": "must begin with a letter or a digit and contain only letters, "
@@ -343,11 +340,11 @@ def _discord(tables: dict[str, Any], where: _Where) -> list[str]:
             f'{where("grid.points")}: grid.points: "auto" takes load.p_star or load.pressure; '
             f"load.{load.quantity} is that of a given grid"
         )
-    if any(grid.boundary == "free" for grid in tables.get("grid", [])):
+    free = any(grid.boundary == "free" for grid in tables.get("grid", []))
+    if free and (output := tables.get("output")) is not None:
         problems += [
             f'{where(key)}: {key}: is not available for grid.boundary = "free"'
-            + REMEDIES.get(key, "")
-            for key in periodic_only(accuracy, tables.get("output"))
+            for key in periodic_only(output)
         ]
     if accuracy is not None and not accuracy.asked():
         problems.append(

@@ -25,6 +25,8 @@ class GridResult:
     perimeter: float
     work: float
     """Transforms times grid points."""
+    border: float | None = None
+    """Share of the border in contact, with a free boundary."""
 
 
 @dataclass(frozen=True)

@@ -19,10 +19,11 @@ from gfmd_cli.physics.discretisation_error import (
     roughness_scales,
 )
 from gfmd_cli.physics.elastomers import LinearElastomer
-from gfmd_cli.physics.error_bounds import Certificate, certify
+from gfmd_cli.physics.error_bounds import Certificate
 from gfmd_cli.physics.error_estimates import Estimate, Level, unknown
 from gfmd_cli.physics.free_contact import SCENES
-from gfmd_cli.physics.observables import Observables, observe
+from gfmd_cli.physics.free_error_bounds import CERTIFY
+from gfmd_cli.physics.observables import Observables, border_contact, contact_points, observe
 from gfmd_cli.solvers.nested_grids import Resume, Solution, solve_contact
 from gfmd_cli.status import Status
 from gfmd_cli.study.context import SolveContext, Watcher, WorkerOptions
@@ -137,8 +138,8 @@ def solve_on_grids(task: Task, context: SolveContext, watcher: Watcher) -> Solve
         scene = task_scene(task, points, context)
         contact = scene.contact(task.p_star(scene.delta_sigma))
         start: Resume | Field | None = watcher.saved_state(contact)
-        if start is None and solved is not None:
-            start = _interpolate(solved, scene)
+        if start is None and solved is not None and task.boundary == "periodic":
+            start = _interpolate(solved, scene)  # a free boundary takes a stress, not u
         solved = None  # frees its memory, which is needed now
         solved = _solve_on_grid(task, scene, contact, watcher, start)
         start = None
@@ -173,10 +174,12 @@ def _solve_on_grid(
 
 def _check_unit(task: Task) -> None:
     """The unit of p_star must not change from grid to grid where several are compared."""
-    if task.accuracy is None or task.quantity != "p_star" or task.surface.band_limited:
+    surface = task.surface
+    fixed = surface.band_limited and (task.boundary == "periodic" or surface.mirrored() is not None)
+    if task.accuracy is None or task.quantity != "p_star" or fixed:
         return
     raise InputError(
-        f"load.p_star: Delta_sigma of this surface ({task.surface.kind}) depends on the grid; with "
+        f"load.p_star: Delta_sigma of this surface ({surface.kind}) depends on the grid; with "
         "[accuracy] give load.pressure"
     )
 
@@ -243,7 +246,11 @@ def _interpolate(solved: Solved, scene: Scene) -> Field:
 
 
 def _grid_result(solved: Solved) -> GridResult:
-    measured, scene = solved.observables, solved.scene
+    measured, scene, contact = solved.observables, solved.scene, solved.contact
+    border = None
+    if contact.boundary == "free":
+        u, sigma = solved.solution.u, solved.solution.sigma
+        border = border_contact(contact_points(contact.obstacle, u, sigma))
     return GridResult(
         points=scene.grid.points,
         a_r=measured.a_r,
@@ -251,12 +258,14 @@ def _grid_result(solved: Solved) -> GridResult:
         u_g=measured.u_g * scene.h_std,
         perimeter=measured.perimeter,
         work=solved.solution.transforms * scene.grid.size,
+        border=border,
     )
 
 
 def _estimate_errors(task: Task, solved: Solved, grids: list[GridResult]) -> None:
     """Add the bounds on this grid and the distances to the continuum to a solved contact."""
     solution = solved.solution
+    certify = CERTIFY[task.boundary]
     solved.certificate = certify(solved.contact, solution.u, solution.sigma)
     solved.estimates = _estimates(task, solved, grids)
 
@@ -275,6 +284,7 @@ def _estimates(task: Task, solved: Solved, grids: list[GridResult]) -> dict[str,
             grid.u_g / scene.h_std,
             grid.perimeter,
             scene.grid.area / length**scene.grid.dimension,
+            grid.border,
         )
         for grid in grids
     ]
@@ -284,8 +294,8 @@ def _estimates(task: Task, solved: Solved, grids: list[GridResult]) -> dict[str,
 
 
 def _scales(task: Task, scene: Scene) -> RoughnessScales | None:
-    """The scales of a rough surface; None for a single indenter."""
-    if not task.surface.rough:
+    """The scales of a rough surface; None for a single indenter, and with a free boundary."""
+    if not task.surface.rough or task.boundary == "free":
         return None
     return roughness_scales(
         scene.shells,

@@ -202,6 +202,7 @@ def forecast(
     elastomer: LinearElastomer,
     p_star: float | None,
     accuracy: AccuracyTable | None,
+    boundary: str = "periodic",
 ) -> int:
     """Points along x that an "auto" grid will end with, right within a factor of two as a rule.
 
@@ -218,7 +219,7 @@ def forecast(
         "u_g": (3 * gap if p > 0.3 else gap, 2.5),
         "sigma_p": (0.03 * 3**n, max(0.5, min(2.0, 3.0 - n))),
     }
-    doublings = [0]
+    doublings = [1 if boundary == "free" else 0]  # one grid gives no error there
     for name, share in (accuracy.asked() if accuracy is not None else {}).items():
         error, order = typical[name]
         if n <= LAST[name]:
@@ -332,7 +333,7 @@ def _points(
     if grid.points != "auto":
         return surface.copies * grid.points
     p_star = load if spec.load.quantity == "p_star" else None
-    return forecast(surface, elastomer, p_star, spec.accuracy)
+    return forecast(surface, elastomer, p_star, spec.accuracy, grid.boundary or "periodic")
 
 
 def _task_id(spec: Spec, resolved: dict[str, Any], tables: dict[str, Any], load: float) -> str:

@@ -1,0 +1,225 @@
+"""Errors of contacts with a free boundary: bounds on a grid, bars from two grids, auto grids."""
+
+import signal
+
+import numpy as np
+import pytest
+from scipy.special import beta
+
+from gfmd_cli.errors import Interrupted
+from gfmd_cli.grid.fft_grid import Grid
+from gfmd_cli.physics.discretisation_error import estimate
+from gfmd_cli.physics.elastomers import HalfSpace, Layer, Power
+from gfmd_cli.physics.error_estimates import Level
+from gfmd_cli.physics.free_contact import FreeContact, FreeElasticity
+from gfmd_cli.physics.free_error_bounds import certify_free
+from gfmd_cli.physics.observables import border_contact, observe
+from gfmd_cli.solvers.auto import Auto
+from gfmd_cli.solvers.nested_grids import solve_contact
+from gfmd_cli.study import run_task
+from gfmd_cli.study.columns import COLUMNS
+
+SPEC = """\
+[surface]
+kind = "parabola"
+radius = 2.0
+[elastomer]
+kind = "half-space"
+E_star = 3.0
+[grid]
+points = "auto"
+boundary = "free"
+[load]
+pressure = 0.02
+[accuracy]
+contact_area = 0.1
+"""
+ELASTOMERS = [
+    Power(n=0),
+    Power(n=0.5),
+    HalfSpace(),
+    Power(n=1.5),
+    Layer(thickness=0.3, poisson=0.4),
+]
+QUANTITIES = ("a_r", "sigma_p", "u_g")
+
+
+def oblong_contact(elastomer, pressure, *, void=False):
+    """A random map of 21 x 24 points and pixels of 0.2 x 0.3 m, rough on all scales."""
+    height = np.random.default_rng(7).standard_normal((21, 24))
+    grid = Grid(24, 2, 24 * 0.3, points_y=21, length_y=21 * 0.2)
+    may_touch = np.random.default_rng(8).random(grid.shape) < 0.7 if void else None
+    free = FreeElasticity(elastomer, grid, 1.0)
+    return FreeContact(grid, height, np.empty(0), pressure, may_touch=may_touch, free=free)
+
+
+def map_spec(tmp_path, heights, n, pressure):
+    """A spec of a map that ends at its borders, on two grids."""
+    np.save(tmp_path / "h.npy", heights)
+    points = 2 * heights.shape[-1]
+    return f"""\
+[surface]
+kind = "file"
+path = "h.npy"
+periodic = false
+[elastomer]
+kind = "power"
+n = {n}
+[grid]
+points = {points}
+[load]
+pressure = {pressure}
+[accuracy]
+mean_gap = 0.1
+"""
+
+
+# --- bounds on a grid -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-4])
+@pytest.mark.parametrize("pressure", [0.01, 0.3])
+@pytest.mark.parametrize("void", [False, True])
+@pytest.mark.parametrize("elastomer", ELASTOMERS, ids=lambda elastomer: elastomer.label)
+def test_the_certificate_bounds_the_distance_to_the_solution(elastomer, void, pressure, tolerance):
+    contact = oblong_contact(elastomer, pressure, void=void)
+
+    def solved(tolerance):
+        found = solve_contact(contact, Auto(tolerance=tolerance, nested=False))
+        return found, observe(contact, found.u, found.sigma)
+
+    (_, exact), (found, seen) = solved(1e-11), solved(tolerance)
+    proof = certify_free(contact, found.u, found.sigma)
+    rounding = 1e-9
+    assert abs(seen.u_g - exact.u_g) <= proof.u_g + rounding
+    assert abs(seen.sigma_p - exact.sigma_p) <= proof.sigma_p + rounding
+
+    def energy(observables):  # E(s) = <s C s>/2 - <s h>, with the work <s h> - <s C s>
+        return -observables.energy - (observables.work - 2 * observables.energy)
+
+    assert energy(seen) - energy(exact) <= proof.gap + rounding
+
+
+def test_a_bad_solution_gets_no_good_certificate():
+    contact = oblong_contact(HalfSpace(), 0.1)
+    exact = solve_contact(contact, Auto(tolerance=1e-9))
+    flat = np.full(contact.grid.shape, contact.pressure)
+    u = contact.grid.empty()
+    contact.recompute(u, flat)
+    proof = certify_free(contact, u, flat)
+    assert proof.sigma_p >= float(np.std(exact.sigma)) > 0.1
+    assert proof.u_g >= abs(float(np.mean(u - exact.u)))
+
+
+@pytest.mark.parametrize("elastomer", ELASTOMERS, ids=lambda elastomer: elastomer.label)
+def test_the_lower_limit_of_the_compliance_is_below_all_its_eigenvalues(elastomer):
+    free = oblong_contact(elastomer, 0.1).free
+    kernel = elastomer.free_compliance(free.grid.shape, free.grid.spacings)
+    y, x = (i.ravel() for i in np.indices(free.grid.shape))
+    eigenvalues = np.linalg.eigvalsh(kernel[np.abs(y[:, None] - y), np.abs(x[:, None] - x)])
+    assert 0 < free.smallest_compliance <= eigenvalues[0] * (1 + 1e-9)
+
+
+# --- the continuum --------------------------------------------------------------------------------
+
+
+def test_a_paraboloid_has_the_area_and_stress_of_hertz_within_the_bars(rows_of):
+    """a^3 = 3 F R / 4 E*; the stress p_0 sqrt(1 - r^2/a^2) has <sigma^2> = pi a^2 p_0^2 / 2."""
+    (row,) = rows_of()
+    load, radius, modulus = 0.02, 2.0, 3.0
+    a = (3 * load * radius / (4 * modulus)) ** (1 / 3)
+    highest = 2 * modulus * a / (np.pi * radius)
+    deviation = (np.pi * a**2 * highest**2 / 2 - load**2) ** 0.5 / row["delta_sigma"]
+    assert (row["status"], row["boundary"]) == ("converged", "free")
+    assert row["a_r_continuum_error"] <= 0.1 * row["a_r_continuum"]
+    for suffix, error in (("", "_error"), ("_continuum", "_continuum_error")):
+        assert abs(row[f"a_r{suffix}"] - np.pi * a**2) <= row[f"a_r{error}"]
+        assert abs(row[f"sigma_p{suffix}"] - deviation) <= row[f"sigma_p{error}"]
+    assert 0 < row["u_g_error"] < 0.1 * row["u_g"]
+    assert row["u_g_algebraic"] <= row["u_g_bound"] < 0.01
+
+
+@pytest.mark.parametrize("n", [0.25, 0.5, 0.75])
+def test_the_stress_of_a_punch_is_within_the_bar(rows_of, tmp_path, n):
+    """Under a high load a profile is a flat punch: sigma ~ (1 - x^2/a^2)^(-n/2)."""
+    heights = np.random.default_rng(3).standard_normal(64)
+    (row,) = rows_of(text=map_spec(tmp_path, heights, n, 1e6))
+    mean = beta(0.5, 1 - n / 2) / 2
+    deviation = (beta(0.5, 1 - n) / 2 / mean**2 - 1) ** 0.5 * row["p_star"]
+    assert (row["a_r"], row["a_r_verdict"], row["u_g_verdict"]) == (1, "exact", "exact")
+    assert abs(row["sigma_p"] - deviation) <= row["sigma_p_error"] < row["sigma_p"]
+    assert abs(row["sigma_p"] - deviation) > 10 * row["sigma_p_algebraic"]
+
+
+@pytest.mark.parametrize(("n", "verdict"), [(0.5, "regular"), (0.9, "slow"), (1, "diverges")])
+def test_contact_at_the_border_has_a_singular_stress(n, verdict):
+    fine, coarse = (
+        Level(points, 0.3, 1.0 - 1 / points, 0.5 + 1 / points, 8.0, border=0.1)
+        for points in (128, 64)
+    )
+    estimates = estimate([fine, coarse], n)
+    assert estimates["sigma_p"].verdict == verdict
+    assert {estimates[name].verdict for name in ("a_r", "u_g")} == {"regular"}
+
+
+def test_contact_away_from_the_border_has_bars_from_two_grids_only():
+    levels = [Level(points, 0.3, 1.0, 0.5, 8.0, border=0.0) for points in (64, 128)]
+    for name, made in estimate(levels, 1.5).items():
+        assert made.verdict == "regular", name
+        assert 0 < made.error < 0.3
+    assert {made.verdict for made in estimate(levels[:1], 1.5).values()} == {"unknown"}
+
+
+def test_the_border_is_the_outermost_points():
+    mask = np.zeros((4, 5), dtype=bool)
+    mask[1:3, 1:4] = True
+    assert border_contact(mask) == 0.0
+    mask[0] = True
+    assert border_contact(mask) == 5 / 14
+    assert border_contact(np.array([False, True, True])) == 0.5
+
+
+# --- runs -----------------------------------------------------------------------------------------
+
+
+def test_an_interrupted_auto_grid_goes_on_bit_for_bit(rows_of, tmp_path, monkeypatch):
+    monkeypatch.setattr(run_task, "REPORT_EVERY", 0.0)
+    asked = ("accuracy.contact_area=0.05",)
+    (straight,) = rows_of(*asked)
+    seen = []
+
+    def interrupt(progress):
+        seen.append(progress)
+        if len(seen) % 11 == 0:
+            signal.raise_signal(signal.SIGTERM)
+
+    for _ in range(1000):
+        try:
+            (stopped,) = rows_of(*asked, name="stopped.h5", report=interrupt)
+            break
+        except Interrupted:
+            assert list((tmp_path / "stopped.parts").glob("*/pointer"))
+    assert len(seen) > 30
+    assert stopped["points"] > 100
+    for column in COLUMNS:
+        if column.name != "seconds":
+            same = stopped[column.name], straight[column.name]
+            assert same[0] == same[1] or np.all(np.isnan(same))
+
+
+def test_a_map_gets_bars_on_its_second_grid(rows_of, tmp_path):
+    heights = np.random.default_rng(1).standard_normal((64, 64))
+    text = map_spec(tmp_path, heights, 0.5, 1.0)
+    (row,) = rows_of(text=text)
+    (one,) = rows_of("grid.points=64", text=text, name="one.h5")
+    assert (row["boundary"], row["points"]) == ("free", 128)
+    for name in QUANTITIES:
+        assert (row[f"{name}_verdict"], one[f"{name}_verdict"]) == ("regular", "unknown")
+        assert 0 < row[f"{name}_error"] < 1
+
+
+def test_reduced_pressures_of_a_cell_that_is_no_map_are_refused(rows_of):
+    told = []
+    text = SPEC.replace('kind = "parabola"\nradius = 2.0', 'kind = "self-affine"\ncutoff = 0.1')
+    rows_of(text=text.replace("pressure = 0.02", "p_star = 0.1"), report=told.append)
+    assert any("load.pressure" in progress.message for progress in told)
