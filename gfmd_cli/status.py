@@ -24,14 +24,14 @@ class Status(StrEnum):
     MAX_STEPS = (
         "max_steps",
         "residual {residual:.1e} after {steps} steps, tolerance {tolerance:.1e}: raise "
-        'solver.max_steps, or take solver.kind = "auto"',
+        'solver.max_steps, or use solver.kind = "auto"',
     )
     ROUNDING = (
         "rounding",
         "residual {residual:.1e}, tolerance {tolerance:.1e}: limited by double-precision "
         "rounding; loosen solver.tolerance",
     )
-    DIVERGED = "diverged", 'the solver diverged: take solver.kind = "auto"'
+    DIVERGED = "diverged", 'the solver diverged: use solver.kind = "auto"'
     ACCURACY_NOT_REACHED = (
         "accuracy_not_reached",
         "the grid of {points} points is the finest that memory or accuracy.max_points allows, "

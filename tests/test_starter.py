@@ -138,7 +138,7 @@ def test_the_first_map_of_several_is_taken_and_named(gfmd, tmp_path):
 
 def test_init_replaces_nothing(gfmd, tmp_path):
     (tmp_path / "study.toml").write_text("mine")
-    assert "exists already" in gfmd("init", status=2)
+    assert "the file exists" in gfmd("init", status=2)
     assert (tmp_path / "study.toml").read_text() == "mine"
 
 

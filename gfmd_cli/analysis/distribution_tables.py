@@ -43,9 +43,9 @@ def power_laws(study: Path | Comparison) -> Table:
             records or [record | {"law": "too few bins are resolved"}]
         )
     caption = (
-        "Power laws of Pr(sigma) in the continuum. exponent: over the range of the stress; at the "
-        "edge: with the first departure from a power law; theory: the edge of a contact, "
-        "n / (2 - n)."
+        "Power laws of Pr(sigma) in the continuum. exponent: fit between the two stresses; at the "
+        "edge: fit with the first correction to the power law; theory: exponent at the edge of a "
+        "contact, n / (2 - n)."
     )
     return Table(caption, POWER_LAWS, [Group(title, held) for title, held in groups.items()])
 

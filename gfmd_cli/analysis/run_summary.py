@@ -38,7 +38,7 @@ def run_text(rows: list[dict[str, Any]]) -> str:
     more = [f"and {left_out} more contacts"] if left_out > 0 else []
     solved = [row for row in rows if row["status"] != Status.MISSING]
     warnings = [f"warning: {line}" for line in warnings_in(solved)]
-    return "\n\n".join([run_table(rows).as_text(), *more, *warnings])
+    return "\n\n".join(filter(None, [run_table(rows).as_text(), *more, "\n".join(warnings)]))
 
 
 def edge_warnings(rows: Sequence[Mapping[str, Any]]) -> list[str]:
@@ -50,7 +50,7 @@ def edge_warnings(rows: Sequence[Mapping[str, Any]]) -> list[str]:
     return [
         f"{surface}: up to {max(row['edge_contact'] for row in group):.0%} of the contact and "
         f"{max(row['edge_load'] for row in group):.0%} of the load are at the edges, where the "
-        "window has changed the heights; without surface.edges they are kept"
+        "window has changed the heights; leave out surface.edges to keep them"
         for surface, group in scenes.items()
     ]
 
@@ -66,13 +66,13 @@ def loads_in_jumps(rows: list[dict[str, Any]], tolerance: float) -> list[str]:
 
 
 def other_tasks(rows: list[dict[str, Any]]) -> list[str]:
-    """Lines on the contacts of a study that the spec of a run does not ask for."""
+    """Lines on the contacts of a study that do not belong to the spec of a run."""
     scenes: dict[str, list[Record]] = {}
     for row in rows:
         scenes.setdefault(_scene(row), []).append(row)
     if not scenes:
         return []
-    lines = [f"{len(rows)} more contacts stay in the study, which this spec does not ask for:"]
+    lines = [f"{len(rows)} more contacts stay in the study; they do not belong to this spec:"]
     for scene, group in list(scenes.items())[:MAX_SCENES]:
         loads = sorted(row["p_star"] for row in group)
         span = f"{loads[0]:.4g}" if len(loads) == 1 else f"{loads[0]:.4g} to {loads[-1]:.4g}"

@@ -145,7 +145,7 @@ def as_text(summary: SurfaceSummary) -> str:
         summary.name,
         f"  L = {sides} m on {points} points",
         *_parameter_lines(summary.parameters),
-        f"  rms height {measured.height:.6g} m, rms gradient {measured.gradient:.5g}, "
+        f"  spectral: rms height {measured.height:.6g} m, rms gradient {measured.gradient:.5g}, "
         f"rms curvature {measured.curvature:.5g} 1/m",
     ]
     if grid.dimension == 2:
@@ -153,16 +153,16 @@ def as_text(summary: SurfaceSummary) -> str:
     lines += [f"  note: {remark}" for remark in summary.remarks]
     if grid.dimension == 1:
         return "\n".join(lines)
-    theories = {"its spectrum": Persson(summary.scene.shells)}
+    theories = {"spectrum": Persson(summary.scene.shells)}
     if summary.fit is None:
         return "\n".join([*lines, f"  no fit: {summary.no_fit}", *_predicted(theories)])
     table = _table(summary.fit, measured, grid.length)
     model = SelfAffine.model_validate(table)
-    theories["the fit"] = Persson(build_scene(model, HalfSpace(), 2 * model.smallest_grid()).shells)
+    theories["fit"] = Persson(build_scene(model, HalfSpace(), 2 * model.smallest_grid()).shells)
     lines += [
         *_fit_lines(summary.fit, float(summary.copies**2)),  # modes (+-q_x, +-q_y) are alike
         *_predicted(theories),
-        "  as random roughness:",
+        "  random surface with the fitted spectrum:",
         "",
         "  [surface]",
     ]
@@ -195,7 +195,7 @@ def _predicted(theories: dict[str, Persson]) -> list[str]:
 def _fit_lines(nearest: SelfAffineFit, gaussian: float) -> list[str]:
     """The fit with warnings; `gaussian` is the scatter that Gaussian roughness has."""
     short = 2 * pi / nearest.q_s
-    lines = [f"  spectrum: H = {nearest.hurst:.3f} +- {nearest.hurst_error:.3f}"]
+    lines = [f"  fitted spectrum: H = {nearest.hurst:.3f} +- {nearest.hurst_error:.3f}"]
     if nearest.q_r:
         long = 2 * pi / nearest.q_r
         error = long * nearest.q_r_error / nearest.q_r

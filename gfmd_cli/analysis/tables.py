@@ -154,13 +154,13 @@ def study_tables(comparison: Comparison) -> list[Table]:
 
 
 def comparison_table(curves: TitledCurves) -> Table:
-    """Simulation beside Persson theory, as counted on the grid."""
+    """Simulation beside Persson theory, with the values on the grid."""
     groups = [Group(title, records_of(curve), _scales(curve)) for title, curve in curves]
-    caption = "Values as counted on the grid."
+    caption = "Values on the grid, not extrapolated."
     if any(curve.has_theory for _, curve in curves):
         caption = (
-            "Comparison with Persson theory; values as counted on the grid. p ratio: pressure of "
-            "the theory at the simulated mean gap over the simulated pressure."
+            "Comparison with Persson theory. Values on the grid, not extrapolated. p ratio: "
+            "pressure at which the theory gives the simulated mean gap / simulated pressure."
         )
     return Table(caption, COMPARISON, groups)
 
@@ -173,11 +173,13 @@ def over_pressure(columns: Sequence[Column], caption: str, curves: TitledCurves)
 def einstein_table(curves: TitledCurves) -> Table:
     """Springs (n = 0) beside the closed form."""
     springs = [(title, curve) for title, curve in curves if curve.n == 0 and curve.has_theory]
-    return over_pressure(EINSTEIN, "Closed form for n = 0 and Gaussian heights.", springs)
+    return over_pressure(
+        EINSTEIN, "Comparison with the closed form for n = 0 and Gaussian heights.", springs
+    )
 
 
 def continuum_table(curves: TitledCurves) -> Table:
-    """Continuum values with their errors, or why there is none."""
+    """Continuum values with their errors, or the reason why there is none."""
     groups = []
     for title, curve in curves:
         records = records_of(curve)
@@ -186,7 +188,7 @@ def continuum_table(curves: TitledCurves) -> Table:
                 shown = [name for name in QUANTITIES if in_continuum(record, name)]
                 record |= {f"{name}_shown": record[f"{name}_continuum"] for name in shown}
             groups.append(Group(title, records))
-    caption = "Continuum values with their estimated errors, or why there is none."
+    caption = "Continuum values with their estimated errors, or the reason why there is none."
     return Table(caption, CONTINUUM, groups)
 
 
@@ -197,14 +199,14 @@ def seeds_table(comparison: Comparison) -> Table:
         title = f"{ensemble.title}: mean of {len(ensemble.rows)} seeds"
         record = {"p_star": ensemble.rows[0]["p_star"], **means_of(ensemble)}
         groups.setdefault(title, []).append(record)
-    caption = "Means over seeds, +- half the width of the 95 % confidence interval (Student)."
+    caption = "Means over seeds, +- half the width of the 95 % confidence interval (Student's t)."
     return Table(caption, SEEDS, [Group(title, records) for title, records in groups.items()])
 
 
 def true_contact_table(curves: TitledCurves) -> Table:
     """Persson theory with Delta_sigma over the contact."""
     stored = [pair for pair in curves if true_contact_areas(pair[1])]
-    caption = "Persson theory with Delta_sigma over the contact instead of the whole surface."
+    caption = "Persson theory with Delta_sigma of the true contact instead of the whole surface."
     return over_pressure(TRUE_CONTACT, caption, stored)
 
 
@@ -221,7 +223,7 @@ def observables_table(curves: TitledCurves) -> Table:
         for column in columns
         if any(known(row[column.name]) for _, curve in stored for row in curve.rows)
     ]
-    return over_pressure(OPTIONAL_OBSERVABLES, f"Observables: {'; '.join(meanings)}.", stored)
+    return over_pressure(OPTIONAL_OBSERVABLES, f"Observables: {'. '.join(meanings)}.", stored)
 
 
 def curve_title(curve: Curve) -> str:

@@ -58,9 +58,9 @@ def _record(trace: Trace, name: str) -> Record:
 def _caption(traces: list[Trace]) -> str:
     worst = max(trace.row["reference_residual"] for trace in traces)
     return (
-        "Transforms of the solved size and seconds until the error of the mean gap falls below a "
-        f"level for good. Errors are relative to a reference of residual {worst:.0e} or less; "
-        "seconds are processor time on one thread, without the recording."
+        "Cost until the error of the mean gap stays below a level: Fourier transforms, in units of "
+        "one on the final grid, and seconds of processor time on one thread, without the "
+        f"recording. Errors are relative to a reference with a residual of {worst:.0e} or less."
     )
 
 

@@ -31,7 +31,7 @@ def init(spec: Path, scan: Path | None, overrides: tuple[str, ...]) -> None:
     from gfmd_cli.spec.starter import starter, starter_of_scan
 
     if spec.exists():
-        raise InputError(f"{spec}: exists already; take another name, or remove it")
+        raise InputError(f"{spec}: the file exists; choose another name or remove it")
     if scan is None:
         text = starter(spec, overrides)
     else:

@@ -188,7 +188,7 @@ def _print_tasks(spec: Any, path: Path, how: dict[str, Any]) -> None:
     for task in tasks:
         done = f"  [{held[task.id].status}]" if task.id in held else ""
         if done and task.id in to_do:
-            done = "  [again, for more output]"
+            done = "  [again: more output is requested]"
         points = f"~{task.points}" if task.auto else str(task.points)
         show(
             f"{task.index:6d} {points:>6} {task.asked:>10} {task.bytes / 2**20:8.0f} "

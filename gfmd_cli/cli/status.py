@@ -104,7 +104,7 @@ def _lines(state: Any, shards: int | None) -> list[str]:
     if state.records:
         lines.append(f"  {state.records} records are not collected yet")
     if state.others:
-        lines.append(f"  {state.others} more tasks are there, which this spec does not ask for")
+        lines.append(f"  {state.others} more tasks of the study do not belong to this spec")
     lines += [f"  damaged, to be solved again: {name}" for name in state.damaged]
     for index in range(shards or 0):
         lines.append(f"  shard {index}/{shards}: {counted(state.shard(index, shards or 1))}")

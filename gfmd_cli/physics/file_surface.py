@@ -269,20 +269,21 @@ class FileSurface(RigidSurface):
         if self.flip:
             steps.append("turned upside down")
         if topography.holes:
-            treatment = " never touch" if self.missing == "void" else " filled in"
-            steps.append(f"{topography.holes} missing heights{treatment}")
+            heights = "height" if topography.holes == 1 else "heights"
+            treatment = "never touch" if self.missing == "void" else "filled in"
+            steps.append(f"{topography.holes} missing {heights} {treatment}")
         if levelling != "none":
             steps.append(f"{levelling} subtracted")
         if boundary == "free":
             steps.append("free boundary")
         elif self.has_borders and not boundary:
-            steps.append("free boundary, or mirrored to twice the side")
+            steps.append("not periodic: free boundary, or mirrored")
         if edges == "window":
             steps.append(f"edges tapered to the mean height over {self.taper:g} of the side")
         elif edges == "mirror":
             steps.append("mirrored to twice the side")
         elif boundary != "free" and not self.has_borders:
-            steps.append("taken as periodic")
+            steps.append("periodic")
         steps.append(f"interpolation on finer grids: {self.applied_interpolation()}")
         return ", ".join(steps)
 

@@ -1,4 +1,4 @@
-"""The contact of a map with an elastomer that goes on, unloaded, beyond the map.
+"""The contact of a map with an elastomer that extends beyond the map, unloaded there.
 
 Only the points of the map can touch. The elastomer has no borders, so that its displacement is a
 convolution of the stress with the compliance kernel, u = C sigma + c, where c is the level of the

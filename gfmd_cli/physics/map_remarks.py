@@ -1,4 +1,4 @@
-"""What a user is told about a measured map: warnings about probable mistakes."""
+"""Warnings about probable mistakes in the use of a measured map."""
 
 import numpy as np
 
@@ -36,7 +36,7 @@ def map_remarks(
     cliff = border_step(heights) if repeated else 1.0
     if cliff > CLIFF:
         remarks.append(
-            f"the step across the border is {cliff:.3g} times that inside: if the map is not "
-            "periodic, surface.periodic = false levels it and ends it at its borders"
+            f"the height step across the border is {cliff:.3g} times that inside the map: if the "
+            "map is not periodic, set surface.periodic = false"
         )
     return remarks

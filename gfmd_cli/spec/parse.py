@@ -131,7 +131,7 @@ def read_scan(path: Path, overrides: tuple[str, ...] = ()) -> FileSurface:
     if set(data) != {"surface"}:
         raise InputError(f"{path}: --set takes surface.key=value with one value, for a height map")
     if not isinstance(surface, FileSurface):
-        raise InputError(f"{path}: surface.kind is that of a file")
+        raise InputError(f'{path}: surface.kind must be "file" for a height map')
     names = map_names(path) if surface.dataset is None else []
     first = {"dataset": names[0]} if len(names) > 1 else {}
     return surface.model_copy(update={"path": path, **first})  # the path as given, for messages
@@ -244,13 +244,13 @@ def _override(data: dict[str, Any], override: str, origin: dict[str, str]) -> No
         parsed = _toml(f"value = {value.strip()}", f"--set {key}")["value"]
     except InputError:
         if not re.fullmatch(r"[\w./~+\-]+", value.strip()):
-            raise InputError(f"--set {override}: {value!r} is no TOML value") from None
+            raise InputError(f"--set {override}: {value!r} is not a TOML value") from None
         parsed = value.strip()  # a bare word is a string
     table = data
     for part in parts[:-1]:
         inner = table.setdefault(part, {})
         if not isinstance(inner, dict):
-            raise InputError(f"--set {override}: {part!r} is no table")
+            raise InputError(f"--set {override}: {part!r} is not a table")
         table = inner
     if parts[0] == "load" and len(parts) == 2 and parts[1] in LOADS:
         for other in set(LOADS) & set(table):  # one way to say it takes the place of another

@@ -1,4 +1,4 @@
-"""Warnings where a number of a result cannot be meant as it stands."""
+"""Warnings about results that are probably not what the user means."""
 
 from gfmd_cli.physics.contact import Scene
 from gfmd_cli.physics.elastomers import LinearElastomer
@@ -19,17 +19,17 @@ def warnings_of(
     scene: Scene,
     observables: Observables,
 ) -> list[str]:
-    """What makes the result of one contact doubtful, a sentence each; mostly nothing."""
+    """Reasons to doubt the result of one contact, a sentence each; mostly none."""
     warnings = surface.remarks(boundary)
     if elastomer.modulus > PASCALS and scene.h_std > METRES:
         warnings.append(
             f"a modulus of {elastomer.modulus:.3g} Pa and an rms height of {scene.h_std:.3g} m: "
-            "are heights and lengths in metres? surface.h_std, length or scale set them"
+            "are heights and lengths in metres? Set surface.h_std, surface.length or surface.scale"
         )
     points = round(observables.a_r * scene.grid.size)
     if points < FEW_POINTS:
         warnings.append(
-            f"only {points} grid points in contact: contact area and stress depend on the grid; "
-            "use more points"
+            f"fewer than {FEW_POINTS} grid points in contact: contact area and stress depend on "
+            "the grid; use more points"
         )
     return warnings
