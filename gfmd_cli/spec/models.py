@@ -66,7 +66,7 @@ class GridTable(Choice):
     """"periodic": the cell is repeated periodically. "free": the elastomer extends beyond the map
     and carries no load there; this requires an elastomer whose displacement decays with the
     distance from the load. The default is "periodic". For a map that is not periodic, without
-    surface.edges, it is "free" if elastomer, solver, accuracy and output allow it."""
+    surface.edges, it is "free" if elastomer, solver and output allow it."""
 
     def on_cell(self, surface: RigidSurface, points: int) -> tuple[RigidSurface, int]:
         """A surface on its cell, and the points of the cell along y.
@@ -292,7 +292,7 @@ class Spec(Choice):
     accuracy: AccuracyTable | None = None
     sweep: list[SweepTable] = Key(default_factory=list)
     places: dict[str, list[tuple[int | None, ...]]] = Key(default_factory=dict)
-    """Where each entry of a swept table stands in the paired lists, one by one; None where the
+    """Where each entry of a swept table stands in each group of paired lists; None where the
     table has no list of the pair."""
 
     def combinations(self) -> Iterator[tuple[dict[str, int], list[float]]]:
