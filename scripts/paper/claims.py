@@ -18,8 +18,6 @@ MARKS = {True: "✓", False: "✗", None: "?"}
 class Value:
     """A number with its error."""
 
-    """A number with its error."""
-
     value: float
     error: float = 0.0
 
@@ -30,9 +28,18 @@ class Value:
         digits = max(0, leading + (0 if self.error >= 2 * 10**-leading else 1))
         return f"{self.value:.{digits}f} ± {self.error:.{digits}f}"
 
+    def times(self, factor: float) -> "Value":
+        """The value and its error in another unit."""
+        return Value(self.value * factor, self.error * abs(factor))
+
 
 Cases = Mapping[str, Value]
 """Values by case, for example by exponent."""
+
+
+def by_exponent(values: Mapping[float, Value]) -> dict[str, Value]:
+    """Values of the exponents n as cases."""
+    return {f"n = {n:g}": value for n, value in values.items()}
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ import numpy as np
 from gfmd_cli.analysis.plotting import ColumnFigure, log_scale
 from gfmd_cli.physics import exact_solutions as reference
 from paper import kappa
-from paper.claims import Finding, Value
+from paper.claims import Finding, Value, by_exponent
 from paper.studies import Held, needs
 from paper.tips import Tip, gap_fit, spread, stress_fit, style_of, tips
 
@@ -114,8 +114,8 @@ def fig02(held: Held, folder: Path) -> list[Finding]:
 def _stress_law(held: Held) -> Finding:
     fits = {tip.n: stress_fit(tip)[1] for tip in tips(held, "fig02") if tip.n not in (2, 4)}
 
-    half = {f"n = {n:g}": _over(fit, 1 - n / 2) for n, fit in fits.items()}
-    whole = {f"n = {n:g}": _over(fit, 2 - n) for n, fit in fits.items()}
+    half = by_exponent({n: fit.times(1 / (1 - n / 2)) for n, fit in fits.items()})
+    whole = by_exponent({n: fit.times(1 / (2 - n)) for n, fit in fits.items()})
     return Finding(
         "profile",
         {"exponent of 1 − r²/a² over μ/2": half, "the same exponent over μ": whole},
@@ -210,7 +210,7 @@ def _membrane(tip: Tip) -> Finding:
         "membrane",
         {
             "variation of the fitted r₂ for r = 1.1 a to 2 a, in a": Value(2 * radius.error),
-            "r₂/a over √e": Value(radius.value / np.sqrt(np.e), radius.error / np.sqrt(np.e)),
+            "r₂/a over √e": radius.times(1 / np.sqrt(np.e)),
         },
         f"r₂ = ({radius}) a, that is a/√e = 0.6065 a. The height at a determines r₂ (printed: the slope, "
         "which does not depend on it).",
@@ -255,8 +255,8 @@ def fig03b(held: Held, folder: Path) -> list[Finding]:
     log_scale(plot.axes, "x", 0.014, 0.8)
     log_scale(plot.axes, "y", 1e-6, 1)
     plot.write(folder / "fig03b")
-    law = {f"n = {n:g}": _over(beta, 1 + n / 2) for n, beta in fits}
-    below = {f"n = {n:g}": beta for n, beta in fits if n < 1}
+    law = by_exponent({n: beta.times(1 / (1 + n / 2)) for n, beta in fits})
+    below = by_exponent({n: beta for n, beta in fits if n < 1})
     return [
         Finding(
             "gap_law", {"fitted exponent over 1 + n/2": law}, "With the radius fitted as well."
@@ -268,11 +268,6 @@ def fig03b(held: Held, folder: Path) -> list[Finding]:
             "n = 0.",
         ),
     ]
-
-
-def _over(found: Value, unit: float) -> Value:
-    """A value in another unit."""
-    return Value(found.value / unit, found.error / abs(unit))
 
 
 FIGURES = (fig01, fig02, fig03, fig03b, *kappa.FIGURES)

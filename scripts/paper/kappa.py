@@ -7,7 +7,7 @@ from scipy.optimize import least_squares
 
 from gfmd_cli.analysis.plotting import ColumnFigure
 from gfmd_cli.physics import exact_solutions as reference
-from paper.claims import Finding, Value
+from paper.claims import Finding, Value, by_exponent
 from paper.studies import Held, needs
 from paper.tips import Tip, spread, stress_fit, style_of, tips
 
@@ -71,20 +71,18 @@ def kappa(held: Held, folder: Path) -> list[Finding]:
 
 
 def _coefficients(primes: dict[float, Value]) -> list[Finding]:
-    over = {n: _times(primes[n], 1 / given) for n, given in GIVEN.items() if n in primes}
+    over = {n: primes[n].times(1 / given) for n, given in GIVEN.items() if n in primes}
     exact = ", ".join(
         f"{found} ({reference.kappa_prime(n):.6f}) at n = {n:g}" for n, found in primes.items()
     )
-    solved = {
-        n: _times(primes[n], reference.kappa(n) / reference.kappa_prime(n)) for n in (0.0, 1.0)
-    }
+    solved = {n: primes[n].times(reference.kappa(n) / reference.kappa_prime(n)) for n in (0.0, 1.0)}
     return [
         Finding(
             "eq18",
             {
-                "k a^(4−n)/(F R) over the κ′ that the paper gives": _cases(over),
-                "a_r k a^(2−n)/(p R) over the κ′ that the paper gives": _cases(
-                    {n: _times(value, np.pi) for n, value in over.items()}
+                "k a^(4−n)/(F R) over the κ′ that the paper gives": by_exponent(over),
+                "a_r k a^(2−n)/(p R) over the κ′ that the paper gives": by_exponent(
+                    {n: value.times(np.pi) for n, value in over.items()}
                 ),
             },
             f"κ′ = k a^(4−n)/(F R), in brackets the closed form: {exact}. A factor π is missing in Eq. (18).",
@@ -100,31 +98,21 @@ def _coefficients(primes: dict[float, Value]) -> list[Finding]:
         Finding(
             "eq17",
             {
-                "a³ E*/(F R) over 3/4": _times(primes[1.0], 2 / 0.75),  # E* = 2 k₁
-                "a³ k₁/(F R) over 3/2": _times(primes[1.0], 1 / 1.5),
+                "a³ E*/(F R) over 3/4": primes[1.0].times(2 / 0.75),  # E* = 2 k₁
+                "a³ k₁/(F R) over 3/2": primes[1.0].times(1 / 1.5),
             },
             "c = κ′₁ = 3/8 with k₁ = E*/2.",
         ),
         Finding(
             "kappa_persson",
             {
-                "κ_n/κ_P (20 % is the error that Sect. 1 calls problematic)": {
-                    f"n = {n:g}": Value(reference.kappa(n) / PERSSON) for n in (0.25, 0.5, 0.75, 1)
-                }
+                "κ_n/κ_P (20 % is the error that Sect. 1 calls problematic)": by_exponent(
+                    {n: Value(reference.kappa(n) / PERSSON) for n in (0.25, 0.5, 0.75, 1)}
+                )
             },
             "By the closed form, which the contacts confirm.",
         ),
     ]
-
-
-def _times(found: Value, factor: float) -> Value:
-    """A value in another unit."""
-    return Value(found.value * factor, found.error * abs(factor))
-
-
-def _cases(values: dict[float, Value]) -> dict[str, Value]:
-    """Values by the exponent in words."""
-    return {f"n = {n:g}": value for n, value in values.items()}
 
 
 def _half(groups: dict[float, list[Tip]], primes: dict[float, Value]) -> list[Finding]:
@@ -152,16 +140,17 @@ def _radius_law(groups: dict[float, list[Tip]]) -> list[Finding]:
         force = [tip.force / tip.curvature for tip in finest]
         if len(finest) > 2:
             slopes = np.diff(np.log(force)) / np.diff(np.log([_radius(tip) for tip in finest]))
-            powers[n] = _times(spread(slopes.tolist()), 1 / (4 - n))
+            powers[n] = spread(slopes.tolist()).times(1 / (4 - n))
     shares = {n: _size_power(n, 0.01) / _size_power(n, 0.1) for n in (1.0, 2.0, 3.0)}
     return [
         Finding(
-            "radius_law", {"d ln F/d ln a over 4 − n, corrected for the images": _cases(powers)}
+            "radius_law",
+            {"d ln F/d ln a over 4 − n, corrected for the images": by_exponent(powers)},
         ),
         Finding(
             "radius_limit",
             {
-                "d ln a/d ln L at a = 0.01 L over that at 0.1 L, n ≤ 3": _cases(
+                "d ln a/d ln L at a = 0.01 L over that at 0.1 L, n ≤ 3": by_exponent(
                     {n: Value(share) for n, share in shares.items()}
                 ),
                 "d ln a/d ln L for n = 4": Value(1.0),
@@ -222,12 +211,12 @@ def _exponent(groups: dict[float, list[Tip]]) -> list[Finding]:
         found = [tip for tip in groups.get(n, []) if _far_enough(tip)]
         if found:
             powers[n] = spread([_far_fit(tip, free=True)[1] - 2 for tip in found])
-    faster = {n: _times(power, 1 / (n - 2)) for n, power in powers.items() if n >= 0.5}
+    faster = {n: power.times(1 / (n - 2)) for n, power in powers.items() if n >= 0.5}
     quarter = {"fitted power of r": powers[0.25]} if 0.25 in powers else {}
     return [
         Finding(
             "far_field",
-            {"fitted power of r over n − 2": _cases(faster)},
+            {"fitted power of r over n − 2": by_exponent(faster)},
             "Beyond 6 a, with images.",
         ),
         Finding(
@@ -252,7 +241,7 @@ def _amplitude(groups: dict[float, list[Tip]]) -> list[Finding]:
             {"amplitude of the far field": spread(values)} if values else {},
             f"Exactly 2^(1−n) Γ(1−n/2)/Γ(n/2) = {exact:.6f}, for 0 < n < 2 (Eq. (10b) prints n < 1/2).",
         ),
-        Finding("depth", {"d (2 − n) R/a², corrected for the images": _cases(depths)}),
+        Finding("depth", {"d (2 − n) R/a², corrected for the images": by_exponent(depths)}),
     ]
 
 
@@ -271,15 +260,15 @@ def _depth_findings(groups: dict[float, list[Tip]]) -> list[Finding]:
         Finding(
             "depth_size",
             {
-                quantity: _cases({n: value for n, value in growth.items() if n < 2}),
+                quantity: by_exponent({n: value for n, value in growth.items() if n < 2}),
                 "the same for n = 2": growth[2.0],
-                "the same for n > 2 (point force)": _cases(further),
+                "the same for n > 2 (point force)": by_exponent(further),
             },
             "Height of the top above the corner, a/L = 0.1, 0.05, 0.025; n = 0 does not change.",
         ),
         Finding(
             "period",
-            {effect: _cases(periods)},
+            {effect: by_exponent(periods)},
             "By the exact sums. For 2 < n < 4 the dependence vanishes as (r/L)^(4−n); it remains at n = 4, "
             "where u′ ∝ r ln(r/L).",
         ),
