@@ -246,11 +246,28 @@ def test_what_a_free_boundary_does_not_allow(gfmd, override, message):
     assert "Traceback" not in done.output
 
 
-def test_table_is_refused(gfmd, tmp_path):
-    np.savetxt(tmp_path / "k.txt", [[1.0, 1.0], [10.0, 10.0]])
+@pytest.mark.parametrize(
+    ("rows", "message"),
+    [
+        ([[1.0, 1.0], [10.0, 100.0]], "decays with the distance"),
+        ([[1.0, 1.0], [10.0, 10.0], [100.0, 10.0]], "rises at its upper end"),
+    ],
+)
+def test_table_without_a_compliance_kernel_is_refused(gfmd, tmp_path, rows, message):
+    np.savetxt(tmp_path / "k.txt", rows)
     done = gfmd("run", "spec.toml", "--set", "elastomer={kind='table', path='k.txt'}")
     assert done.exit_code == 2
-    assert '"free" is not available for a tabulated k(q)' in done.output
+    assert message in done.output
+
+
+def test_table_of_a_half_space_is_solved_as_the_half_space(rows_of, tmp_path):
+    np.savetxt(tmp_path / "k.txt", [[1.0, 0.5], [10.0, 5.0]])  # E* = 1
+    (table,) = rows_of("elastomer={kind='table', path='k.txt'}", name="table.h5")
+    (body,) = rows_of("elastomer={kind='half-space', E_star=1}")
+    assert table["status"] == "converged"
+    assert table["a_r"] == pytest.approx(body["a_r"], abs=2 / 32**2)
+    for name in ("sigma_p", "u_g", "delta_sigma", "displacement"):
+        assert table[name] == pytest.approx(body[name], rel=1e-5)
 
 
 def test_several_processes_do_not_share_a_free_boundary(spec_of, tmp_path):

@@ -7,6 +7,8 @@ surfaces across the spatial dimensions".
 """
 
 import warnings
+from collections.abc import Callable
+from functools import lru_cache
 from typing import Annotated, Literal, Self
 
 import numpy as np
@@ -16,7 +18,7 @@ from pydantic import model_validator
 from gfmd_cli.choice import Choice, FilePath, Positive
 from gfmd_cli.errors import InputError
 from gfmd_cli.grid.arrays import Field
-from gfmd_cli.physics import free_compliance
+from gfmd_cli.physics import free_compliance, table_compliance
 from gfmd_cli.physics.free_compliance import Shape, Spacings
 from gfmd_cli.physics.persson import gamma_n, gamma_slab, monotone_cubic
 
@@ -309,19 +311,28 @@ class Tabulated(LinearElastomer):
 
     def stiffness(self, q: Field, length: float = 1.0) -> Field:
         """k(q) [Pa/m]. Raises InputError for an invalid table."""
-        x, y = np.log(self._table()).T
-        log_q = np.log(np.where(q > 0, q, 1.0))
-        inside = monotone_cubic(x, y)(np.clip(log_q, x[0], x[-1]))
-        low, high = (y[1] - y[0]) / (x[1] - x[0]), (y[-1] - y[-2]) / (x[-1] - x[-2])
-        beyond = low * np.minimum(log_q - x[0], 0.0) + high * np.maximum(log_q - x[-1], 0.0)
-        return np.where(q > 0, np.exp(inside + beyond), 0.0)
+        return np.where(q > 0, _interpolated(self._table())(np.where(q > 0, q, 1.0)), 0.0)
+
+    def decays(self, dimension: int) -> bool:
+        """Whether the power law below the table rises less than q^dimension."""
+        return 0 <= _end_exponents(self._table())[0] < dimension
 
     def check_free_boundary(self, dimension: int) -> None:
-        """Raise InputError: a table has no compliance kernel in closed form."""
-        raise InputError(
-            'grid.boundary: "free" is not available for a tabulated k(q), which has no compliance '
-            'kernel in closed form: use "periodic"'
-        )
+        """Raise InputError for exponents that have no compliance kernel."""
+        super().check_free_boundary(dimension)
+        if not _end_exponents(self._table())[1] > 0:
+            raise InputError(
+                'grid.boundary: "free" needs a table k(q) that rises at its upper end; the '
+                'compliance of this one has no kernel: use "periodic"'
+            )
+
+    def free_compliance(self, shape: Shape, spacings: Spacings) -> Field:
+        """Displacements [m/Pa] by quadrature of the compliance between the rows of the table."""
+        self.check_free_boundary(len(shape))
+        compliance = _compliance(tuple(map(tuple, self._table().tolist())))
+        if len(shape) == 1:
+            return table_compliance.line(compliance, *shape, *spacings)
+        return table_compliance.plane(compliance, shape, spacings)
 
     @property
     def uniform_stiffness(self) -> float | None:
@@ -353,6 +364,33 @@ class Tabulated(LinearElastomer):
                 f"{self.path}: elastomer.path: q and k must be finite and positive; q must increase"
             )
         return table
+
+
+def _interpolated(table: Field) -> Callable[[Field], Field]:
+    """k(q) [Pa/m] for q > 0 from the rows q, k of a table."""
+    (x, y), (low, high) = np.log(table).T, _end_exponents(table)
+    cubic = monotone_cubic(x, y)
+
+    def stiffness(q: Field) -> Field:
+        log_q = np.log(q)
+        beyond = low * np.minimum(log_q - x[0], 0.0) + high * np.maximum(log_q - x[-1], 0.0)
+        return np.asarray(np.exp(cubic(np.clip(log_q, x[0], x[-1])) + beyond))
+
+    return stiffness
+
+
+def _end_exponents(table: Field) -> tuple[float, float]:
+    """Exponents of the power laws below and above a table."""
+    slopes = np.diff(np.log(table[[0, 1, -2, -1]]), axis=0)
+    return float(slopes[0, 1] / slopes[0, 0]), float(slopes[2, 1] / slopes[2, 0])
+
+
+@lru_cache(maxsize=4)
+def _compliance(rows: tuple[tuple[float, ...], ...]) -> table_compliance.Compliance:
+    """The compliance of a table; cached, because its transforms serve all grids."""
+    table = np.array(rows)
+    knots = table_compliance.separated(table[:, 0])
+    return table_compliance.Compliance(_interpolated(table), knots, _end_exponents(table)[0])
 
 
 Elastomer = Annotated[

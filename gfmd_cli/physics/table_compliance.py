@@ -1,0 +1,155 @@
+"""Displacements of an elastomer without borders whose stiffness is a table.
+
+The compliance kernel in two dimensions, and its integral over a disc, are the Hankel transforms
+
+    G(r) = int_0^inf s J_0(s) / k(s / r) ds / (2 pi r^2),
+    H(r) = int_0^r G(t) t dt = int_0^inf J_1(s) / k(s / r) ds / (2 pi)
+
+of the compliance, with s = q r and d[t J_1(t)]/dt = t J_0(t). In one dimension
+
+    H(x) = int_0^x G(t) dt = int_0^inf sin(s) / [s k(s / x)] ds / pi.
+
+The integrals over s end at about CUT radians, where a smooth step turns the wave off (Abel's
+summation): a smooth compliance has no part in the rest. Each integral is Gauss's rule on intervals
+that end at the knots of the table, where its derivatives jump; below the first knot k is a power
+law. The integral of G over the triangle between the x-axis, the line x = X and the direction to the
+corner (X, Y) is that of H over the angle; with the distance X cosh(v) on this line it is
+
+    int_0^asinh(Y/X) H(X cosh v) / cosh v dv,
+
+and a second triangle makes the rectangle from the origin to the corner.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from math import hypot
+
+import numpy as np
+from scipy.special import erfc, j0, j1
+
+from gfmd_cli.grid.arrays import Field
+from gfmd_cli.physics import free_compliance
+from gfmd_cli.physics.free_compliance import Shape, Spacings, near_shape, pixel_averages
+
+CUT, STEP = 300.0, 20.0  # radians; the step leaves exp(-STEP^2 / 4) of a wave
+SMALLEST = 1e-4  # radians up to which the wave is the first term of its series
+ORDER = 12  # of Gauss's rule in an interval of at most
+WIDEST, RATIO = 2.0, 1.5  # radians, and ratio of its ends
+CLOSEST = 1.01  # ratio to the knot before, below which a knot needs no interval of its own
+PER_E_FOLD = 80  # distances at which the transforms are computed; a cubic spline joins them
+MARGIN = 3  # such distances beyond those that are needed
+NEAR = 5  # sides of a pixel within which the integral over it is taken in polar coordinates
+NODES = 8  # of Gauss's rule along each side beyond
+DIRECTIONS = 48  # of Gauss's rule within a triangle of a near pixel
+
+WAVES: dict[str, tuple[Callable[[Field], Field], int, int]] = {
+    "disc": (j1, 1, 0),
+    "point": (lambda s: s * j0(s), 1, -2),
+    "line": (lambda s: 2 * np.sinc(s / np.pi), 0, 0),
+}
+"""The wave of a transform, the power of s that it begins with, and the power of r in front."""
+
+
+@dataclass(frozen=True, eq=False)
+class Compliance:
+    """1/k(q) of a table, and its transforms."""
+
+    stiffness: Callable[[Field], Field]
+    """k(q) for q > 0."""
+    knots: Field
+    """Wavenumbers [1/m] at which derivatives of k jump, rising; below them k is a power law."""
+    lowest_exponent: float
+    """Exponent of this power law, less than the dimension."""
+    known: dict[tuple[str, int], float] = field(default_factory=dict)
+    """Transforms that were computed, by wave and PER_E_FOLD ln r."""
+
+    def spline(self, wave: str, low: float, high: float) -> Callable[[Field], Field]:
+        """A transform as a function of the distance, from `low` to `high` [m]."""
+        from scipy.interpolate import CubicSpline  # half a second that most processes save
+
+        first = int(np.floor(PER_E_FOLD * np.log(low))) - MARGIN
+        last = int(np.ceil(PER_E_FOLD * np.log(high))) + MARGIN
+        for i in range(first, last + 1):
+            if (wave, i) not in self.known:
+                self.known[wave, i] = self.transform(wave, float(np.exp(i / PER_E_FOLD)))
+        steps = range(first, last + 1)
+        values = [self.known[wave, i] for i in steps]
+        cubic = CubicSpline(np.array(steps) / PER_E_FOLD, values)
+        return lambda r: np.asarray(cubic(np.log(r)))
+
+    def transform(self, name: str, r: float) -> float:
+        """r^m int_0^inf wave(s) / k(s / r) ds / 2 pi for one of the waves."""
+        wave, power, in_front = WAVES[name]
+        knots, end = self.knots * r, CUT + 6 * STEP
+        begin = min(SMALLEST, knots[0])
+        ends = np.unique([*_intervals(begin, end), *knots[(knots > begin) & (knots < end)]])
+        nodes, weights = np.polynomial.legendre.leggauss(ORDER)
+        half = 0.5 * np.diff(ends)
+        s = (ends[:-1] + half)[:, None] + np.multiply.outer(half, nodes)
+        values = wave(s) * (0.5 * erfc((s - CUT) / STEP)) / self.stiffness(s / r)
+        first = np.array(begin)  # below, wave / k is s^(power - n)
+        series = wave(first) * first / self.stiffness(first / r)
+        total = half @ (values @ weights) + series / (1 + power - self.lowest_exponent)
+        return float(total * r**in_front / (2 * np.pi))
+
+
+def separated(knots: Field) -> Field:
+    """The first and last knot, and those that are not close to the one before.
+
+    The kinks of a table with close rows are small.
+    """
+    chosen = np.ones(knots.size, dtype=bool)
+    chosen[1:-1] = knots[1:-1] > CLOSEST * knots[:-2]
+    return np.asarray(knots[chosen])
+
+
+def _intervals(low: float, high: float) -> Field:
+    """Ends of intervals that are short against a wave and against the distance to zero."""
+    turn = WIDEST / (RATIO - 1)
+    count = int(np.ceil(np.log(turn / low) / np.log(RATIO)))
+    return np.concatenate([np.geomspace(low, turn, count), np.arange(turn, high, WIDEST)[1:]])
+
+
+def plane(compliance: Compliance, shape: Shape, spacings: Spacings) -> Field:
+    """Displacements in two dimensions, indexed by the distance of two pixels [y, x]."""
+    shortest, diagonal = 0.5 * min(spacings), hypot(*spacings)
+    reach = NEAR * max(spacings)
+    near = tuple(min(m, int(reach / side) + 1) for m, side in zip(shape, spacings, strict=True))
+    out = np.zeros(shape)
+    if near != shape:
+        least = max(shortest, reach - diagonal)
+        kernel = compliance.spline("point", least, _diagonal(shape, spacings))
+        parts = (shape, free_compliance.NODES), (near_shape(shape, spacings), NODES)
+        for part, nodes in parts:  # the nearer pixels of each part are overwritten
+            own = tuple(slice(m) for m in part)
+            out[own] = pixel_averages(lambda r: kernel(np.maximum(r, least)), part, spacings, nodes)
+        out *= spacings[0] * spacings[1]
+    disc = compliance.spline("disc", shortest, _diagonal(near, spacings))
+    y, x = ((np.arange(m + 1) - 0.5) * side for m, side in zip(near, spacings, strict=True))
+    corner = _corner(disc, y[:, None], x[None, :])
+    out[: near[0], : near[1]] = np.diff(np.diff(corner, axis=0), axis=1)
+    return out
+
+
+def _diagonal(shape: Shape, spacings: Spacings) -> float:
+    """Diagonal of a map of these points [m]."""
+    return hypot(*(m * side for m, side in zip(shape, spacings, strict=True)))
+
+
+def _corner(disc: Callable[[Field], Field], y: Field, x: Field) -> Field:
+    """Integral of the kernel over the rectangle from the origin to each corner, odd in x and y."""
+    nodes, weights = np.polynomial.legendre.leggauss(DIRECTIONS)
+    total = np.zeros(np.broadcast_shapes(y.shape, x.shape))
+    for across, along in ((np.abs(x), np.abs(y)), (np.abs(y), np.abs(x))):
+        half = 0.5 * np.arcsinh(along / across)
+        for node, weight in zip(nodes, weights, strict=True):
+            stretch = np.cosh(half * (1 + node))
+            total += weight * half * disc(across * stretch) / stretch
+    return np.asarray(np.sign(y) * np.sign(x) * total)
+
+
+def line(compliance: Compliance, points: int, spacing: float) -> Field:
+    """Displacements in one dimension, indexed by the distance of two points."""
+    edges = (np.arange(points + 1) - 0.5) * spacing
+    integral = compliance.spline("line", 0.5 * spacing, edges[-1])
+    return np.asarray(np.diff(np.sign(edges) * integral(np.abs(edges))))
