@@ -43,7 +43,7 @@ def test_what_init_writes_runs(gfmd, tmp_path, words):
 def test_an_oblong_scan_with_holes_is_solved_as_it_is(gfmd, tmp_path):
     holed(tmp_path / "holed.npy", (21, 16))
     told = gfmd("init", "first.toml", "--from", "holed.npy", "--set", "surface.periodic=false")
-    done = "21 x 16 points, 2 missing heights filled in, plane subtracted, free boundary"
+    done = "16 x 21 points, 2 missing heights filled in, plane subtracted, free boundary"
     assert done in told
     gfmd("run", "first.toml", "--set", "load.p_star=0.1")
     (row,) = read_rows(tmp_path / "first.h5")

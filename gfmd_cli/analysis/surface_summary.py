@@ -140,7 +140,7 @@ def as_text(summary: SurfaceSummary) -> str:
     """The summary of one surface as text."""
     grid, measured, record = summary.scene.grid, summary.moments, summary.record()
     sides = " x ".join(dict.fromkeys(f"{side:.6g}" for side in record["sides"]))  # a square: one
-    points = extent(record["points"])
+    points = extent(record["points"][::-1])
     lines = [
         summary.name,
         f"  L = {sides} m on {points} points",

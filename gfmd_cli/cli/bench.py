@@ -25,10 +25,10 @@ from gfmd_cli.status import Status
 def bench(
     spec: Path, output: Path | None, overrides: tuple[str, ...], figures: Path | None, quiet: bool
 ) -> None:
-    """Measure speed against error for each solver, grid and pressure.
+    """Measure the speed of solvers as a function of the error.
 
-    If the only solver of the spec is "auto", it is compared with "ccg", "fire" and
-    "polonsky-keer". A second call measures again and replaces the file. Example:
+    The spec defines solvers, grids and pressures. If its only solver is "auto", it is compared with
+    "ccg", "fire" and "polonsky-keer". A second call measures again and replaces the file. Example:
 
         gfmd bench configs/bench.toml --figures figures
     """

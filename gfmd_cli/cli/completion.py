@@ -9,7 +9,7 @@ SHELLS = ("bash", "zsh", "fish")
 @click.command()
 @click.argument("shell", type=click.Choice(SHELLS))
 def completion(shell: str) -> None:
-    """Print the shell code that completes commands, options and files.
+    """Print shell code that completes commands, options and files.
 
     Example, for bash (zsh: ~/.zshrc; fish: ~/.config/fish/completions/gfmd.fish):
 

@@ -20,11 +20,12 @@ from gfmd_cli.cli.options import FILE
 def diff(
     context: click.Context, one: Path, other: Path, tolerance: float | None, as_json: bool
 ) -> None:
-    """Compare contact area, stress deviation and mean gap of two studies.
+    """Compare the results of two studies.
 
-    Contacts are paired by surface, seed, elastomer and load; grids and solvers may differ. Contacts
-    of only one study are listed, but not compared. If no contacts match and each study has one
-    surface and one elastomer, contacts are paired by load alone. Differences are relative.
+    The command compares contact area, stress deviation and mean gap. Contacts are paired by
+    surface, seed, elastomer and load; grids and solvers may differ. Contacts of only one study are
+    listed, but not compared. If no contacts match and each study has one surface and one elastomer,
+    contacts are paired by load alone. Differences are relative.
 
     Example:
 

@@ -18,7 +18,7 @@ from gfmd_cli.errors import InputError
     "--bench", type=FILE, help="File of `gfmd bench`; adds a figure of speed against error."
 )
 def report(study: Path, other: Path | None, output: Path | None, bench: Path | None) -> None:
-    """Write a report of a study as one HTML page with figures, tables and maps.
+    """Write a report with figures, tables and maps as one HTML page.
 
     With two studies, such as two materials or two treatments of a scan, each figure has the curves
     of both, and the table of `gfmd diff` comes first. The page needs no network and no other

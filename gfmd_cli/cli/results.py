@@ -61,9 +61,10 @@ def analyze(
 )
 @click.option("--task", type=int, help="Index of the task whose fields a .vti file contains.")
 def export(study: Path, output: Path | None, task: int | None) -> None:
-    """Export a study as CSV or netCDF 4 (.nc), or the fields of one task as a VTK image (.vti).
+    """Export a study as CSV or netCDF, or fields as a VTK image.
 
-    A CSV file has one row per solved pressure. A netCDF file has everything except the fields.
+    A CSV file has one row per solved task. A netCDF 4 file (.nc) has everything except the fields.
+    A VTK image (.vti) has the fields of one task.
 
     Example:
 

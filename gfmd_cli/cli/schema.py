@@ -7,10 +7,10 @@ import click
 
 @click.command()
 def schema() -> None:
-    """Print the JSON Schema of the run spec, which editors use to complete and check a spec.
+    """Print the JSON Schema of the run spec, for editors.
 
-    Editors with Taplo (VS Code: Even Better TOML) find the schema by the line `#:schema FILE` at
-    the top of a spec. Example:
+    Editors use it to complete and check a spec. Editors with Taplo (VS Code: Even Better TOML) find
+    the schema by the line `#:schema FILE` at the top of a spec. Example:
 
         gfmd schema > run-spec.schema.json
     """

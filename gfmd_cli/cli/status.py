@@ -33,10 +33,11 @@ from gfmd_cli.units import duration
 def status(
     path: Path, output: Path | None, overrides: tuple[str, ...], shards: int | None, as_json: bool
 ) -> None:
-    """Show the progress of a study: tasks by status, and the next command to type.
+    """Show the progress of a study.
 
-    The command reads the study and its folder of unfinished work and changes nothing, so it can
-    be called at any time. It does not query the batch system. Example:
+    The output is the number of tasks by status, and the next command to type. The command reads the
+    study and its folder of unfinished work and changes nothing, so it can be called at any time. It
+    does not query the batch system. Example:
 
         gfmd status configs/demo.toml --shards 4
     """
@@ -65,10 +66,10 @@ def status(
 @output_option
 @overrides_option
 def collect(spec: Path, output: Path | None, overrides: tuple[str, ...]) -> None:
-    """Collect the results of all shards into the study file; solve nothing.
+    """Collect the results of all shards into the study file.
 
-    Every shard collects when it ends. Use this command if shards were stopped or killed. The exit
-    status is 1 if any task is missing or has not converged. Example:
+    No task is solved. Every shard collects when it ends; use this command if shards were stopped
+    or killed. The exit status is 1 if any task is missing or has not converged. Example:
 
         gfmd collect configs/demo.toml
     """

@@ -43,12 +43,12 @@ def submit(
     sbatch_options: tuple[str, ...],
     **given: Any,
 ) -> None:
-    """Run a study as an array job of Slurm; a second job collects the results.
+    """Run a study as an array job of Slurm.
 
-    Each member of the array runs a part of the tasks (a shard). A shard that is preempted or
-    reaches its time limit saves its state and is queued again. With --missing and without
-    --shards, the script of the last submission is used unchanged; options given now take
-    precedence over those in the script. Examples:
+    Each member of the array runs a part of the tasks (a shard), and a second job collects the
+    results. A shard that is preempted or reaches its time limit saves its state and is queued
+    again. With --missing and without --shards, the script of the last submission is used unchanged;
+    options given now take precedence over those in the script. Examples:
 
         gfmd submit configs/demo.toml --shards 4 --time 2:00:00 --sbatch qos=long
 

@@ -277,7 +277,7 @@ class FileSurface(RigidSurface):
         if boundary == "free":
             steps.append("free boundary")
         elif self.has_borders and not boundary:
-            steps.append("not periodic: free boundary, or mirrored")
+            steps.append("not periodic (free boundary or mirrored)")
         if edges == "window":
             steps.append(f"edges tapered to the mean height over {self.taper:g} of the side")
         elif edges == "mirror":

@@ -51,8 +51,8 @@ def check_layout(path: Path, shape: tuple[int, ...], dtype: np.dtype[Any], max_b
 
 
 def extent(shape: Sequence[int]) -> str:
-    """Numbers of points along each axis as text."""
-    return " x ".join(map(str, shape))
+    """Numbers of points along x and y as text, from the shape of an array [y, x]."""
+    return " x ".join(map(str, reversed(shape)))
 
 
 def first_line(error: Exception) -> str:
