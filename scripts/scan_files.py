@@ -1,10 +1,11 @@
 """Every measured surface in a folder: `gfmd init --from FILE`, then `gfmd run`, unedited.
 
-    python scripts/scan_files.py FOLDER [--only WORDS] > table.md
+    python scripts/scan_files.py FOLDER [--only WORDS] [--limit SECONDS] > table.md
 
 FOLDER can be `test/file_format_examples` of the repository of SurfaceTopography. The table has a
 row for each file of which SurfaceTopography itself reads a map or a line profile; names of all
-other files follow. Seconds are those of both commands, in a process that has all packages loaded.
+other files follow. Each file has a process of its own, in which most packages are loaded. Seconds
+are those of both commands, as elapsed and as processor time; --limit stops a file.
 """
 
 import argparse
@@ -12,15 +13,19 @@ import sys
 import tempfile
 import time
 import warnings
+from collections.abc import Sequence
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
 from click.testing import CliRunner
 
+import gfmd_cli.study.run  # noqa: F401  # loads the packages once
 from gfmd_cli.cli import main
 from gfmd_cli.study.reading import read_rows
 
 UNCHECKED = {".md", ".py"}  # suffixes of files that are no examples of a format
+HEADS = ("treatment", "contacts", "$a_r$", "residual", "status", "s", "CPU s")
 
 
 def shape_of(path: Path) -> tuple[int, ...] | None:
@@ -39,26 +44,48 @@ def shape_of(path: Path) -> tuple[int, ...] | None:
         return None
 
 
-def solved(path: Path, folder: Path) -> dict[str, Any]:
-    """Boundary, points, contacts, seconds and status of a file, by both commands."""
-    spec, study = folder / "scan.toml", folder / "scan.h5"
-    runner, start = CliRunner(), time.perf_counter()
-    for words in (["init", spec, "--from", path], ["run", spec, "-o", study, "-q"]):
+def solved(path: Path, folder: str) -> dict[str, str]:
+    """The cells of a file under their heads, by both commands."""
+    runner, start = CliRunner(), (time.monotonic(), time.process_time())
+    spec, study = Path(folder, "scan.toml"), Path(folder, "scan.h5")
+    for words in (["init", spec, "--from", path], ["run", spec, "-o", study, "-q", "-j", 1]):
         done = runner.invoke(main, [str(word) for word in words])
-        if done.exit_code:
+        if done.exit_code and not study.exists():
             return {"status": done.output.strip().splitlines()[0].replace(f"{path}", path.name)}
-    seconds, rows = time.perf_counter() - start, read_rows(study)
-    return {
-        "boundary": rows[0]["boundary"],
-        "grid": _extent((rows[0]["points"], rows[0]["points_y"])),
-        "contacts": str(len(rows)),
-        "s": f"{seconds:.1f}",
-        "status": ", ".join(sorted({row["status"] for row in rows})),
-    }
+    times = (time.monotonic() - start[0], time.process_time() - start[1])
+    results = _results(read_rows(study))
+    return dict(zip(HEADS, (*results, *(f"{t:.1f}" for t in times)), strict=True))
 
 
-def _extent(shape: tuple[int, ...]) -> str:
-    return " x ".join(str(n) for n in shape if n > 1)
+def solved_within(path: Path, folder: str, limit: float | None) -> dict[str, str]:
+    """The cells of a file, solved in a process that is ended after `limit` seconds."""
+    processes = get_context("fork")
+    receiver, sender = processes.Pipe(duplex=False)
+    process = processes.Process(target=lambda: sender.send(solved(path, folder)))
+    process.start()
+    sender.close()
+    try:
+        return (
+            receiver.recv() if receiver.poll(limit) else {"status": f"not finished in {limit:g} s"}
+        )
+    except EOFError:
+        return {"status": "the process has failed"}
+    finally:
+        process.kill()
+        process.join()
+
+
+def _results(rows: Sequence[dict[str, Any]]) -> tuple[str, ...]:
+    """Treatment, number of contacts, contact areas, largest residual and status of a study."""
+    treatment = rows[0]["preparation"].split(" points, ")[-1].split(", interpolation")[0]
+    areas = sorted(row["a_r"] for row in rows)
+    return (
+        treatment,
+        str(len(rows)),
+        f"{areas[0]:.2g} to {areas[-1]:.2g}",
+        f"{max(row['residual'] for row in rows):.0e}",
+        ", ".join(sorted({row["status"] for row in rows})),
+    )
 
 
 def run() -> None:
@@ -66,9 +93,9 @@ def run() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("folder", type=Path)
     parser.add_argument("--only", nargs="+", default=[""], help="parts of the names of files")
+    parser.add_argument("--limit", type=float, help="seconds after which a file is given up")
     arguments = parser.parse_args()
-    heads = ("boundary", "grid", "contacts", "s", "status")
-    print("| file | points | " + " | ".join(heads) + " |\n" + "| --- " * (len(heads) + 2) + "|")
+    print("| file | points | " + " | ".join(HEADS) + " |\n" + "| --- " * (len(HEADS) + 2) + "|")
     unread = []
     for path in sorted(arguments.folder.iterdir()):
         if path.suffix in UNCHECKED or not any(word in path.name for word in arguments.only):
@@ -78,9 +105,11 @@ def run() -> None:
             unread.append(path.name)
             continue
         with tempfile.TemporaryDirectory() as folder:
-            row = solved(path, Path(folder))
-        cells = [path.name, _extent(shape), *(row.get(head, "") for head in heads)]
-        print(f"| {' | '.join(cells)} |", flush=True)
+            row = solved_within(path, folder, arguments.limit)
+        points = " x ".join(str(n) for n in shape if n > 1)
+        print(
+            f"| {' | '.join([path.name, points, *(row.get(h, '') for h in HEADS)])} |", flush=True
+        )
     print(f"\nNot read by SurfaceTopography: {', '.join(unread) or 'none'}", file=sys.stderr)
 
 

@@ -17,6 +17,7 @@ from gfmd_cli.grid.arrays import Field, Mask
 
 try:
     from matplotlib import colormaps, rc_context, ticker
+    from matplotlib.backends.backend_svg import FigureCanvasSVG
     from matplotlib.colors import LinearSegmentedColormap, to_hex
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
@@ -99,10 +100,15 @@ class LegendFigure:
 
     def svg(self) -> str:
         """An SVG with outlined text and no background; the same figure gives the same bytes."""
-        self._lay_out()
+        if self.legend:
+            self._write_legend()
+        parts: list[Any] = [self.figure, *self.figure.axes]
+        for part in parts + [second for axes in parts[1:] for second in axes.child_axes]:
+            part.patch.set(facecolor="none", edgecolor="none")
         image = BytesIO()
         with rc_context({"svg.hashsalt": "gfmd", "svg.fonttype": "path"}):
-            self.figure.savefig(image, format="svg", transparent=True, metadata={"Date": None})
+            # draws once; `savefig` would draw twice more, to lay out the figure
+            FigureCanvasSVG(self.figure).print_svg(image, metadata={"Date": None})
         return image.getvalue().decode()
 
     def write(self, path: Path) -> list[Path]:
