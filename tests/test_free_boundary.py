@@ -236,7 +236,7 @@ def test_run_stores_the_boundary(rows_of):
     [
         ("elastomer={kind='slab', thickness=0.1}", "decays with the distance"),
         ("solver.kind=pcg", 'solver.kind: "pcg" solves contacts with grid.boundary = "periodic"'),
-        ("output.stiffness=true", "output.stiffness: is not available"),
+        ("output.spectra=true", "output.spectra: is not available"),
     ],
 )
 def test_what_a_free_boundary_does_not_allow(gfmd, override, message):

@@ -330,7 +330,7 @@ class Spec(Choice):
         return data
 
 
-PERIODIC_ONLY = ("true_contact", "stiffness", "spectra")
+PERIODIC_ONLY = ("true_contact", "spectra")
 """Keys of [output] whose results are defined for a periodic boundary."""
 
 

@@ -14,7 +14,7 @@ from gfmd_cli.physics.contact import Contact
 from gfmd_cli.physics.observables import contact_points
 from gfmd_cli.physics.patches import contact_patches, open_gap
 from gfmd_cli.physics.true_contact import ContactStress, bearing, contact_stress
-from gfmd_cli.solvers.contact_stiffness import contact_stiffness
+from gfmd_cli.solvers.free_contact_stiffness import STIFFNESS as CONTACT_STIFFNESS
 from gfmd_cli.spec.models import OutputTable
 from gfmd_cli.study.column import Column
 
@@ -141,7 +141,7 @@ OBSERVABLES = (
     Observable(
         "stiffness",
         Column("stiffness", float, "1", "contact stiffness -dp/du_g / (Delta_sigma / h_std)"),
-        lambda solved: contact_stiffness(solved.contact, solved.touching),
+        lambda solved: CONTACT_STIFFNESS[solved.contact.boundary](solved.contact, solved.touching),
         "-dp/du_g",
         STIFFNESS,
     ),

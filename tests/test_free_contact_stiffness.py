@@ -1,0 +1,97 @@
+"""Contact stiffness with a free boundary: a direct solution, differences, the circular punch."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.integrate import dblquad
+
+from gfmd_cli.grid.fft_grid import Grid
+from gfmd_cli.physics.elastomers import HalfSpace, Layer, Power
+from gfmd_cli.physics.free_contact import FreeContact, FreeElasticity
+from gfmd_cli.solvers.auto import Auto
+from gfmd_cli.solvers.free_contact_stiffness import free_contact_stiffness
+from gfmd_cli.solvers.nested_grids import solve_contact
+
+ELASTOMERS = [
+    Power(n=0),
+    Power(n=0.5),
+    HalfSpace(),
+    Power(n=1.5),
+    Layer(thickness=0.2, poisson=0.4),
+]
+SPEC = """\
+[surface]
+kind = "self-affine"
+cutoff = 0.1
+[elastomer]
+kind = "half-space"
+[grid]
+points = 32
+boundary = "free"
+[load]
+p_star = 0.1
+[output]
+stiffness = true
+"""
+
+
+def oblong_contact(elastomer):
+    """A random map of 17 x 20 points and pixels of 0.2 x 0.3 m."""
+    grid = Grid(20, 2, 20 * 0.3, points_y=17, length_y=17 * 0.2)
+    height = np.random.default_rng(4).standard_normal(grid.shape)
+    free = FreeElasticity(elastomer, grid, 1.0)
+    return FreeContact(grid, height, np.empty(0), 0.1, free=free)
+
+
+@pytest.mark.parametrize("elastomer", ELASTOMERS, ids=lambda elastomer: elastomer.label)
+def test_stiffness_is_that_of_a_direct_solution_and_of_two_contacts(elastomer):
+    contact = oblong_contact(elastomer)
+    touching = solve_contact(contact, Auto(tolerance=1e-10)).sigma > 0
+    found = free_contact_stiffness(contact, touching)
+
+    kernel = elastomer.free_compliance(contact.grid.shape, contact.grid.spacings)
+    y, x = (i.ravel() for i in np.indices(contact.grid.shape))
+    compliance = kernel[np.abs(y[:, None] - y), np.abs(x[:, None] - x)]
+    held = touching.ravel()
+    punch = np.zeros(held.size)
+    punch[held] = np.linalg.solve(compliance[np.ix_(held, held)], np.ones(held.sum()))
+    assert found == pytest.approx(punch.mean() / np.mean(1 - compliance @ punch), rel=1e-7)
+
+    step, gaps = 1e-3, []
+    for share in (1 - step, 1 + step):
+        pressed = replace(contact, pressure=contact.pressure * share)
+        gaps.append(float(np.mean(solve_contact(pressed, Auto(tolerance=1e-11)).u)))
+    assert found == pytest.approx(2 * step * contact.pressure / (gaps[0] - gaps[1]), rel=1e-2)
+
+
+def test_circular_contact_on_a_half_space_is_a_punch():
+    """<t> L^2 = 2 E* a, and a displacement of (2 / pi) arcsin(a / r) beside the punch."""
+    points, a, modulus = 128, 0.25, 3.0
+    grid = Grid(points, 2, 1.0)
+    free = FreeElasticity(HalfSpace(E_star=modulus), grid, 1.0)
+    contact = FreeContact(grid, np.zeros(grid.shape), np.empty(0), 0.1, free=free)
+    middles = (np.arange(points) + 0.5) / points - 0.5
+    touching = np.hypot(middles[:, None], middles) < a
+    inside = np.pi * a**2 / 4  # of a quarter of the map, where the displacement is 1
+    beside, _ = dblquad(
+        lambda y, x: 2 / np.pi * np.arcsin(a / np.hypot(x, y)),
+        *(0, 0.5),
+        lambda x: max(a**2 - x**2, 0.0) ** 0.5,
+        0.5,
+    )
+    exact = 2 * modulus * a / (1 - 4 * (inside + beside))
+    assert free_contact_stiffness(contact, touching) == pytest.approx(exact, rel=2e-2)
+
+
+def test_full_contact_is_rigid_and_no_contact_has_no_stiffness():
+    contact = oblong_contact(HalfSpace())
+    everywhere = np.ones(contact.grid.shape, dtype=bool)
+    assert free_contact_stiffness(contact, everywhere) == np.inf
+    assert np.isnan(free_contact_stiffness(contact, ~everywhere))
+
+
+def test_run_stores_the_stiffness(rows_of):
+    (row,) = rows_of()
+    assert row["boundary"] == "free"
+    assert 0 < row["stiffness"] < np.inf
