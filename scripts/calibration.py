@@ -275,7 +275,8 @@ def _border(contact: Contact, solution: Solution) -> float | None:
     """Share of the border of the map in contact; None with a periodic boundary."""
     if contact.boundary == "periodic":
         return None
-    return border_contact(contact_points(contact.obstacle, solution.u, solution.sigma))
+    touching = contact_points(contact.obstacle, solution.u, solution.sigma)
+    return border_contact(contact.grid, touching)
 
 
 def _texture(case: Case, scene: Scene) -> dict:

@@ -173,10 +173,11 @@ def test_contact_away_from_the_border_has_bars_from_two_grids_only():
 def test_the_border_is_the_outermost_points():
     mask = np.zeros((4, 5), dtype=bool)
     mask[1:3, 1:4] = True
-    assert border_contact(mask) == 0.0
+    grid = Grid(5, points_y=4)
+    assert border_contact(grid, mask) == 0.0
     mask[0] = True
-    assert border_contact(mask) == 5 / 14
-    assert border_contact(np.array([False, True, True])) == 0.5
+    assert border_contact(grid, mask) == 5 / 14
+    assert border_contact(Grid(3, 1), np.array([False, True, True])) == 0.5
 
 
 # --- runs -----------------------------------------------------------------------------------------

@@ -26,7 +26,6 @@ from gfmd_cli.solvers.dual import Dual
 from gfmd_cli.solvers.loop import Solver, solve
 from gfmd_cli.solvers.nested_grids import Resume, solve_contact
 from gfmd_cli.solvers.pcg import ProjectedCG
-from gfmd_cli.study.run import run_study
 
 ROUGH = SelfAffine(cutoff=0.05)
 SPEC = """\
@@ -268,12 +267,6 @@ def test_table_of_a_half_space_is_solved_as_the_half_space(rows_of, tmp_path):
     assert table["a_r"] == pytest.approx(body["a_r"], abs=2 / 32**2)
     for name in ("sigma_p", "u_g", "delta_sigma", "displacement"):
         assert table[name] == pytest.approx(body[name], rel=1e-5)
-
-
-def test_several_processes_do_not_share_a_free_boundary(spec_of, tmp_path):
-    with pytest.raises(InputError, match='"free" is solved by one process; run it without mpiexec'):
-        run_study(spec_of(), SPEC, tmp_path / "s.h5", lambda progress: None, ranks=object())
-    assert not (tmp_path / "s.h5").exists()
 
 
 def test_dual_solver_is_for_a_free_boundary(gfmd):

@@ -2,11 +2,13 @@
 
 The padded field has its first rows and columns from the field, the others are zero. The rows that
 are zero need no transform along x. The columns are transformed in blocks that stay in the cache and
-are never stored padded, so that the memory is that of a field padded along x alone.
+are never stored padded, so that the memory is that of a field padded along x alone. Processes that
+share a field exchange no zero rows either.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import cached_property
+from math import prod
 from typing import Any, Literal
 
 import numpy as np
@@ -14,6 +16,8 @@ import pyfftw
 
 from gfmd_cli.grid import plans
 from gfmd_cli.grid.arrays import Field, Modes
+from gfmd_cli.grid.ranks import Ranks
+from gfmd_cli.grid.transposition import Span, Transposition, column_spans
 
 BLOCK = 2**14  # coefficients of a block of columns: 256 KiB, in the cache of a core
 NARROWEST = 8  # columns of a block; four make a line of the cache
@@ -46,44 +50,65 @@ class PaddedTransform:
         self.width = min(self.modes, max(NARROWEST, BLOCK // self.padded_rows))
 
     @property
+    def own_rows(self) -> int:
+        """Number of rows of a field that this process holds."""
+        return self.rows
+
+    @property
+    def span(self) -> Span:
+        """First and last but one wavenumber along x that this process holds."""
+        return 0, self.modes
+
+    @property
     def symbol_shape(self) -> tuple[int, int]:
-        """Shape of a symbol: wavenumbers q_y >= 0 and q_x >= 0; the symbol is even in both."""
-        return self.padded_rows // 2 + 1, self.modes
+        """Shape of a symbol: q_y >= 0, and q_x >= 0 of `span`; the symbol is even in both."""
+        first, last = self.span
+        return self.padded_rows // 2 + 1, last - first
 
     def wavenumber(self, spacings: tuple[float, ...]) -> Field:
         """|q| [1/m] of the padded cell, of `symbol_shape`; `spacings` [m] in the order (y, x)."""
         sides = self.padded_rows * spacings[0], self.padded_columns * spacings[-1]
-        y, x = (
-            np.arange(n) * (2 * np.pi / side)
-            for n, side in zip(self.symbol_shape, sides, strict=True)
-        )
+        numbers = np.arange(self.symbol_shape[0]), np.arange(*self.span)
+        y, x = (m * (2 * np.pi / side) for m, side in zip(numbers, sides, strict=True))
         return np.asarray(np.hypot(y[:, None], x))
 
     def symbol_of(self, kernel: Field) -> Field:
-        """The symbol of a convolution with a kernel G(|y|, |x|), given at the points of a field."""
+        """The symbol of a convolution with a kernel G(|y|, |x|), given at the points of a field.
+
+        Raises ValueError where the padding is less than twofold.
+        """
         if self.padded_rows < 2 * self.rows - 1 or self.padded_columns < 2 * self.columns - 1:
             raise ValueError("a convolution needs twice the points")
-        kernel = kernel.reshape(self.rows, self.columns)
-        even = np.zeros((self.padded_rows, self.padded_columns))
-        even[: self.rows, : self.columns] = kernel
-        even[self.padded_rows - self.rows + 1 :, : self.columns] = kernel[:0:-1]
-        even[:, self.padded_columns - self.columns + 1 :] = even[:, self.columns - 1 : 0 : -1]
-        modes = np.fft.rfft2(even).real[: self.symbol_shape[0]]
-        return np.ascontiguousarray(modes, dtype=self.real)
+        kernel = kernel.reshape(self.own_rows, self.columns)
+        lines, values, forward, _ = self._row_plans
+        values[:, : self.columns] = kernel
+        values[:, self.columns :] = 0.0
+        values[:, self.padded_columns - self.columns + 1 :] = kernel[:, :0:-1]
+        forward()
+        work = self._to_columns(lines)
+        symbol = np.empty(self.symbol_shape, self.real)
+        block, forward, _ = self._column_plans
+        for part, here in self._blocks(work, block):
+            here[self.padded_rows - self.rows + 1 :] = work[:0:-1, part]
+            forward()
+            symbol[:, part] = here[: len(symbol)].real
+        return symbol
 
     def apply(self, symbol: Field, field: Field, out: Field) -> Field:
         """out <- F^-1 symbol F field; return it. `out` may be `field`."""
-        work, values, forward, backward = self._row_plans
-        values[:, : self.columns] = field.reshape(self.rows, self.columns)
+        lines, values, forward, backward = self._row_plans
+        values[:, : self.columns] = field.reshape(self.own_rows, self.columns)
         values[:, self.columns :] = 0.0
         forward()
         if self.padded_rows == 1:
-            work *= symbol
+            lines *= symbol
         else:
+            work = self._to_columns(lines)
             self._filter_columns(work, symbol)
+            self._to_lines(work, lines)
         backward()
         scale = 1.0 / (self.padded_rows * self.padded_columns)
-        target = out.reshape(self.rows, self.columns)
+        target = out.reshape(self.own_rows, self.columns)
         np.multiply(values[:, : self.columns], scale, out=target)
         return out
 
@@ -92,24 +117,41 @@ class PaddedTransform:
         block, forward, backward = self._column_plans
         upper, lower = slice(len(symbol)), slice(len(symbol), None)
         mirrored = symbol[(self.padded_rows - 1) // 2 : 0 : -1]
-        for start in range(0, self.modes, self.width):
-            part = slice(start, min(start + self.width, self.modes))
-            here = block[:, : part.stop - part.start]
-            here[: self.rows] = work[:, part]
-            here[self.rows :] = 0.0
+        for part, here in self._blocks(work, block):
             forward()
             here[upper] *= symbol[:, part]
             here[lower] *= mirrored[:, part]
             backward()
             work[:, part] = here[: self.rows]
 
+    def _blocks(self, work: Modes, block: Modes) -> Iterator[tuple[slice, Modes]]:
+        """Columns of `work`, and the part of `block` into which they are copied, padded."""
+        count = work.shape[1]
+        for start in range(0, count, self.width):
+            part = slice(start, min(start + self.width, count))
+            here = block[:, : part.stop - part.start]
+            here[: self.rows] = work[:, part]
+            here[self.rows :] = 0.0
+            yield part, here
+
+    def _to_columns(self, lines: Modes) -> Modes:
+        """All rows of the columns of `span`, from the coefficients of the rows."""
+        return lines
+
+    def _to_lines(self, work: Modes, lines: Modes) -> None:
+        """Undo `_to_columns`."""
+
     @cached_property
     def _row_plans(self) -> tuple[Modes, Field, Callable[[], None], Callable[[], None]]:
         """Coefficients of the rows, their values in the same memory, and both transforms."""
-        work = self._empty((self.rows, self.modes))
-        values = work.view(self.real)[:, : self.padded_columns]
-        forward, backward = self._planned((values, work), (work, values), axis=1)
-        return work, values, forward, backward
+        lines = self._empty_lines()
+        values = lines.view(self.real)[:, : self.padded_columns]
+        forward, backward = self._planned((values, lines), (lines, values), axis=1)
+        return lines, values, forward, backward
+
+    def _empty_lines(self) -> Modes:
+        """Memory of the coefficients of the rows."""
+        return self._empty((self.own_rows, self.modes))
 
     @cached_property
     def _column_plans(self) -> tuple[Modes, Callable[[], None], Callable[[], None]]:
@@ -119,7 +161,7 @@ class PaddedTransform:
         forward, backward = self._planned((block, block), (block, block), axis=0)
         return block, forward, backward
 
-    def _empty(self, shape: tuple[int, int]) -> Modes:
+    def _empty(self, shape: tuple[int, ...]) -> Modes:
         kind = np.result_type(self.real, np.complex64)
         array: Modes = pyfftw.empty_aligned(shape, dtype=kind)
         return array
@@ -142,3 +184,56 @@ class PaddedTransform:
             ]
 
         return plans.planned(plan)
+
+
+class DistributedPaddedTransform(PaddedTransform):
+    """The same for fields and symbols that processes share.
+
+    A process holds the rows between two `edges` of a field, and some columns of a symbol, and of
+    the coefficients between the transforms along the two axes.
+    """
+
+    def __init__(
+        self,
+        shape: tuple[int, ...],
+        padded: tuple[int, ...],
+        precision: Literal["double", "single"] = "double",
+        threads: int = 1,
+        *,
+        ranks: Ranks,
+        edges: list[int],
+    ) -> None:
+        super().__init__(shape, padded, precision, threads)
+        spans = column_spans(self.modes, ranks.size)
+        self.transposition = Transposition(ranks, edges, spans)
+
+    @property
+    def own_rows(self) -> int:
+        """Number of rows of a field that this process holds."""
+        edges, rank = self.transposition.edges, self.transposition.ranks.rank
+        return edges[rank + 1] - edges[rank]
+
+    @property
+    def span(self) -> Span:
+        """First and last but one wavenumber along x that this process holds."""
+        return self.transposition.spans[self.transposition.ranks.rank]
+
+    def _to_columns(self, lines: Modes) -> Modes:
+        _, columns, spare = self._memory
+        self.transposition.to_columns(lines, columns, spare)
+        return columns
+
+    def _to_lines(self, work: Modes, lines: Modes) -> None:
+        self.transposition.to_lines(work, lines, self._memory[2])
+
+    def _empty_lines(self) -> Modes:
+        return self._memory[0]
+
+    @cached_property
+    def _memory(self) -> tuple[Modes, Modes, Modes]:
+        """Coefficients as rows and, in the same memory, as columns; memory for the exchange."""
+        first, last = self.span
+        in_lines, in_columns = (self.own_rows, self.modes), (self.rows, last - first)
+        memory = self._empty((max(prod(in_lines), prod(in_columns)),))
+        lines, columns = (memory[: prod(s)].reshape(s) for s in (in_lines, in_columns))
+        return lines, columns, self._empty((lines.size,))

@@ -9,17 +9,19 @@ from collections.abc import Callable
 from dataclasses import dataclass, fields
 from functools import cached_property
 from itertools import pairwise
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pyfftw
 
 from gfmd_cli.grid import plans
 from gfmd_cli.grid.arrays import Field, Modes
-from gfmd_cli.grid.fft_grid import PLANNING, Grid, Shape, Span, shared_modes
+from gfmd_cli.grid.convolution import DistributedPaddedTransform, padded_shape
+from gfmd_cli.grid.fft_grid import PLANNING, Grid, Shape, shared_modes
 from gfmd_cli.grid.halo import HALO_ROWS, DistributedColumns, DistributedRows, is_distributable
-from gfmd_cli.grid.ranks import LONG_SPIN_SECONDS, Ranks, leads
+from gfmd_cli.grid.ranks import Ranks, leads
 from gfmd_cli.grid.rows import LocalRows
+from gfmd_cli.grid.transposition import Span, Transposition, column_spans
 
 
 def create_grid(grid: Grid, ranks: Ranks | None) -> Grid:
@@ -62,9 +64,7 @@ class DistributedGrid(Grid):
     @cached_property
     def spans(self) -> list[Span]:
         """First column of each process, and the column after its last."""
-        columns, count = self.points // 2 + 1, self.ranks.size
-        edges = [columns * rank // count for rank in range(count + 1)]
-        return list(pairwise(edges))
+        return column_spans(self.points // 2 + 1, self.ranks.size)
 
     @property
     def span(self) -> Span:
@@ -85,7 +85,12 @@ class DistributedGrid(Grid):
     @property
     def own(self) -> slice:
         """The rows of this process."""
-        return slice(self.rows.start, self.rows.stop)
+        return slice(*self.row_span)
+
+    @property
+    def row_span(self) -> Span:
+        """First row of this process, and the row after its last."""
+        return self.rows.start, self.rows.stop
 
     @property
     def whole(self) -> bool:
@@ -135,6 +140,7 @@ class DistributedGrid(Grid):
     def _workspace(self) -> tuple[Modes, Callable[[], None], Callable[[], None]]:
         shape = self.spectral_shape
         work = self._memory[0][: shape[0] * shape[1]].reshape(shape)
+        spare = self._memory[1].view(work.dtype)
         lines = self._lines()
         real = lines.view(self.real)[:, : self.points]
 
@@ -162,12 +168,12 @@ class DistributedGrid(Grid):
 
         def forward() -> None:
             along()
-            self._transpose(to_columns=True)
+            self._transposition.to_columns(lines, work, spare)
             across()
 
         def backward() -> None:
             back_across()
-            self._transpose(to_columns=False)
+            self._transposition.to_lines(work, lines, spare)
             back_along()
 
         return work, forward, backward
@@ -184,25 +190,19 @@ class DistributedGrid(Grid):
         lines: Modes = self._memory[0][: rows * columns].reshape(rows, columns)
         return lines
 
-    def _transpose(self, to_columns: bool) -> None:
-        """Exchange rows of coefficients for columns, or columns for rows, in the same memory."""
-        home, lines, rows = self._memory[0], self._lines(), self.rows.count
-        spare = self._memory[1].view(home.dtype)[: lines.size]
-        blocks = [spare[rows * a : rows * b].reshape(rows, b - a) for a, b in self.spans]
-        width = self.spectral_shape[1]
-        in_lines = [spare, [block.size for block in blocks]]
-        in_columns = [home[: self.points_y * width], np.diff(self.rows.edges) * width]
-        if to_columns:
-            for (a, b), block in zip(self.spans, blocks, strict=True):
-                block[...] = lines[:, a:b]
-            self._finish(self.ranks.comm.Ialltoallv(in_lines, in_columns))
-        else:
-            self._finish(self.ranks.comm.Ialltoallv(in_columns, in_lines))
-            for (a, b), block in zip(self.spans, blocks, strict=True):
-                lines[:, a:b] = block
+    @cached_property
+    def _transposition(self) -> Transposition:
+        return Transposition(self.ranks, self.rows.edges, self.spans)
 
-    def _finish(self, exchange: Any) -> None:
-        self.ranks.wait(exchange, spin=LONG_SPIN_SECONDS)
+    def padded_transform(
+        self, factor: float, precision: Literal["double", "single"] = "double"
+    ) -> DistributedPaddedTransform:
+        """Transforms of fields that are padded by zeros; see `Grid.padded_transform`."""
+        padded = padded_shape(self.whole_shape, factor)
+        edges = self.rows.edges
+        return DistributedPaddedTransform(
+            self.whole_shape, padded, precision, self.threads, ranks=self.ranks, edges=edges
+        )
 
     def coarser(self, shape: Shape) -> Grid:
         """A grid of fewer points on the same cell; not distributed if it is too small."""
@@ -264,6 +264,20 @@ class DistributedGrid(Grid):
             gathered[:, a - first : b - first] = got[at:end].reshape(height, b - a)
             at = end
         return gathered
+
+    def gather_rows(self, values: Any, span: Span) -> Any:
+        """The rows `span` of the grid, of all processes; each process may need others."""
+        own = self.row_span
+        away = [_shared(own, (int(a), int(b))) for a, b in self.ranks.gather(span)]
+        come = [_shared(other, span) for other in pairwise(self.rows.edges)]
+        sent = np.concatenate([values[slice(*_from(part, own))] for part in away])
+        rows = np.empty((span[1] - span[0], *values.shape[1:]), values.dtype)
+        outgoing, incoming = (
+            [array, [(b - a) * values[0].size for a, b in parts]]
+            for array, parts in ((sent, away), (rows, come))
+        )
+        self.ranks.wait(self.ranks.comm.Ialltoallv(outgoing, incoming))
+        return rows
 
     def next_row(self, lines: Any) -> Any:
         """The first row of the next process."""

@@ -15,13 +15,15 @@ import pyfftw
 
 from gfmd_cli.grid import kernels, plans
 from gfmd_cli.grid.arrays import Field, Modes
+from gfmd_cli.grid.convolution import PaddedTransform, padded_shape
+from gfmd_cli.grid.pixels import average_along_x, average_rows, covered_rows
 from gfmd_cli.grid.rows import LocalRows
+from gfmd_cli.grid.transposition import Span
 
 T = TypeVar("T")
 ALL = slice(None)
 THREADED = 512  # points per side from which a second thread pays
 PLANNING = (30.0, 1e-6)  # seconds at most to look for a plan, at all and per grid point
-Span = tuple[int, int]
 Shape = tuple[int, ...]
 """Numbers of points along the axes of a field, (y, x), or (x,) of a line."""
 
@@ -110,10 +112,19 @@ class Grid:
         """Maximum over the grid from the maximum over the rows of this process."""
         return value
 
+    def dot(self, one: Field, other: Field) -> float:
+        """Sum over the grid of the products of two fields."""
+        return self.total(float(np.vdot(one, other)))
+
     @property
     def own(self) -> slice:
         """The rows of the grid that a field of this process holds."""
         return ALL
+
+    @property
+    def row_span(self) -> Span:
+        """First row that this process holds, and the row after its last."""
+        return 0, self.points_y
 
     @property
     def whole(self) -> bool:
@@ -309,6 +320,27 @@ class Grid:
             return symbol
         half = target.points_y // 2
         return np.concatenate([symbol[: target.points_y - half], symbol[-half:]])
+
+    def gather_rows(self, values: Any, span: Span) -> Any:
+        """The rows `span` of the grid from the rows of all processes."""
+        return values[slice(*span)]
+
+    def average(self, values: Field, target: "Grid") -> Field:
+        """Means over the pixels of another grid of the same cell; values are constant on a pixel.
+
+        On a finer grid these are the values themselves where its pixels do not overlap several.
+        """
+        values = average_along_x(self.as_rows(values), target.points)
+        of = self.points_y, target.points_y
+        rows = self.gather_rows(values, covered_rows(target.row_span, *of))
+        return average_rows(rows, target.row_span, *of).reshape(target.shape)
+
+    def padded_transform(
+        self, factor: float, precision: Literal["double", "single"] = "double"
+    ) -> PaddedTransform:
+        """Transforms of fields that are padded by zeros to `factor` times the points a side."""
+        padded = padded_shape(self.whole_shape, factor)
+        return PaddedTransform(self.whole_shape, padded, precision, self.threads)
 
     def next_row(self, lines: Any) -> Any:
         """The row of a field that follows the rows of this process."""

@@ -18,7 +18,6 @@ from gfmd_cli.errors import InputError
 from gfmd_cli.grid.arrays import Field, Mask, Modes, row_blocks
 from gfmd_cli.grid.compilation import kernel
 from gfmd_cli.grid.fft_grid import Grid, Operator, Shape, multiplicity
-from gfmd_cli.grid.pixels import any_in_pixels
 from gfmd_cli.grid.ranks import Ranks
 from gfmd_cli.physics.elastomers import LinearElastomer
 from gfmd_cli.physics.indenters import RigidSurface
@@ -149,7 +148,10 @@ class Contact:
 
     def _coarse_mask(self, grid: Grid) -> Mask | None:
         """Points of a coarser grid with a known height on a part of their pixel."""
-        return None if self.may_touch is None else any_in_pixels(self.may_touch, grid.shape)
+        if self.may_touch is None:
+            return None
+        shared: Mask = self.grid.average(self.may_touch.astype(np.float64), grid) > 0
+        return shared
 
 
 @kernel
@@ -187,7 +189,7 @@ class Scene:
     def highest(self) -> float:
         """Largest height that can touch [h_std]: the mean gap without load."""
         known = self.height if self.may_touch is None else self.height[self.may_touch]
-        return self.grid.max(float(known.max()))
+        return self.grid.max(float(known.max(initial=-np.inf)))  # a process may have none
 
     def in_metres(self, field: Field) -> Field:
         """A height or displacement in metres, from the level of the given surface."""
@@ -237,13 +239,11 @@ def build_scene(
 def touchable(void: Mask | None, grid: Grid) -> Mask | None:
     """The points of a grid that can touch, where some cannot; None where all can.
 
-    Raises InputError for a grid that several processes share, and where no point can.
+    Raises InputError where no point can.
     """
     if void is None:
         return None
-    if not grid.whole:
-        raise InputError('surface.missing: "void" is solved by one process; run without mpiexec')
-    if void.all():
+    if not grid.total(int(np.count_nonzero(~void))):
         raise InputError('surface.missing: "void" leaves no point that can touch')
     return ~void
 

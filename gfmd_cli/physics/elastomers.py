@@ -19,7 +19,7 @@ from gfmd_cli.choice import Choice, FilePath, Positive
 from gfmd_cli.errors import InputError
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.physics import free_compliance, table_compliance
-from gfmd_cli.physics.free_compliance import Shape, Spacings
+from gfmd_cli.physics.free_compliance import ALL_ROWS, Shape, Spacings
 from gfmd_cli.physics.persson import gamma_n, gamma_slab, monotone_cubic
 
 MAX_TABLE = 2**20  # bytes of a tabulated stiffness; a choice, some 40000 rows
@@ -40,11 +40,12 @@ class LinearElastomer(Choice):
         """k(q) [Pa/m], zero at q = 0."""
         raise NotImplementedError
 
-    def free_compliance(self, shape: Shape, spacings: Spacings) -> Field:
+    def free_compliance(self, shape: Shape, spacings: Spacings, rows: slice = ALL_ROWS) -> Field:
         """Displacements [m/Pa] of an elastomer without borders, due to unit pressure on one pixel.
 
-        `spacings` are the sides of a pixel [m], in the order (y, x). The result of this shape is
-        indexed by the distance of the two pixels in points. See `free_compliance`.
+        `spacings` are the sides of a pixel [m], in the order (y, x). The result of this shape, or
+        in two dimensions some of its rows, is indexed by the distance of the two pixels in points.
+        See `free_compliance`.
 
         Raises InputError where the displacement does not decay with the distance.
         """
@@ -150,9 +151,9 @@ class Power(LinearElastomer):
         """For n < 2; in one dimension for n <= 1, the logarithm included."""
         return self.n < 2 if dimension == 2 else self.n <= 1
 
-    def free_compliance(self, shape: Shape, spacings: Spacings) -> Field:
+    def free_compliance(self, shape: Shape, spacings: Spacings, rows: slice = ALL_ROWS) -> Field:
         """Displacements [m/Pa] by the Riesz kernel, for n < 2; in one dimension for n <= 1."""
-        return _free_power_law(self, self.n, self.k_n, shape, spacings)
+        return _free_power_law(self, self.n, self.k_n, shape, spacings, rows)
 
 
 class HalfSpace(LinearElastomer):
@@ -175,9 +176,9 @@ class HalfSpace(LinearElastomer):
         """Yes; in one dimension as a logarithm, up to a level of reference."""
         return True
 
-    def free_compliance(self, shape: Shape, spacings: Spacings) -> Field:
+    def free_compliance(self, shape: Shape, spacings: Spacings, rows: slice = ALL_ROWS) -> Field:
         """Displacements [m/Pa] by the Boussinesq kernel; of a line load, by its logarithm."""
-        return _free_power_law(self, 1.0, 0.5 * self.E_star, shape, spacings)
+        return _free_power_law(self, 1.0, 0.5 * self.E_star, shape, spacings, rows)
 
 
 class Membrane(LinearElastomer):
@@ -286,14 +287,14 @@ class Layer(LinearElastomer):
         """Exponentially."""
         return True
 
-    def free_compliance(self, shape: Shape, spacings: Spacings) -> Field:
+    def free_compliance(self, shape: Shape, spacings: Spacings, rows: slice = ALL_ROWS) -> Field:
         """Displacements [m/Pa] by the kernel of the half-space and a smooth rest."""
         body = self.softening, self.thickness
         try:
             if len(shape) == 1:
                 kernel = free_compliance.layer_line(*body, *shape, *spacings)
             else:
-                kernel = free_compliance.layer(*body, shape, spacings)
+                kernel = free_compliance.layer(*body, shape, spacings, rows)
         except ValueError as error:
             raise InputError(f"elastomer.thickness, grid.points: {error}") from error
         return kernel * (2 / self.E_star)
@@ -326,13 +327,13 @@ class Tabulated(LinearElastomer):
                 'compliance of this one has no kernel: use "periodic"'
             )
 
-    def free_compliance(self, shape: Shape, spacings: Spacings) -> Field:
+    def free_compliance(self, shape: Shape, spacings: Spacings, rows: slice = ALL_ROWS) -> Field:
         """Displacements [m/Pa] by quadrature of the compliance between the rows of the table."""
         self.check_free_boundary(len(shape))
         compliance = _compliance(tuple(map(tuple, self._table().tolist())))
         if len(shape) == 1:
             return table_compliance.line(compliance, *shape, *spacings)
-        return table_compliance.plane(compliance, shape, spacings)
+        return table_compliance.plane(compliance, shape, spacings, rows)
 
     @property
     def uniform_stiffness(self) -> float | None:
@@ -400,12 +401,17 @@ Elastomer = Annotated[
 
 
 def _free_power_law(
-    elastomer: LinearElastomer, n: float, k_n: float, shape: Shape, spacings: Spacings
+    elastomer: LinearElastomer,
+    n: float,
+    k_n: float,
+    shape: Shape,
+    spacings: Spacings,
+    rows: slice,
 ) -> Field:
     """Displacements [m/Pa] for k = k_n q^n. Raises InputError where they do not decay."""
     elastomer.check_free_boundary(len(shape))
     if len(shape) == 2:
-        return free_compliance.power_law(n, shape, spacings) / k_n
+        return free_compliance.power_law(n, shape, spacings, rows) / k_n
     if n == 1:
         return free_compliance.logarithmic_line(*shape, *spacings) / k_n
     return free_compliance.power_law_line(n, *shape, *spacings) / k_n

@@ -12,7 +12,7 @@ two dimensions, from int_0^inf q^(1-n) J_0(q r) dq (errata of the paper, Eq. 10b
 and in one dimension c_n = Gamma(1 - n) sin(pi n / 2) / pi, from int_0^inf q^(-n) cos(q x) dq.
 
 Shapes and spacings are in the order (y, x). Arrays of displacements are indexed by the distance of
-the two pixels in points, [y, x].
+the two pixels in points, [y, x]. In two dimensions `rows` are the rows of such an array to compute.
 """
 
 from collections.abc import Callable
@@ -29,12 +29,13 @@ SMOOTH = 0.25  # thicknesses: relative error of all displacements below 1e-7 (te
 MAX_PARTS = 64  # of the side of a pixel; such a layer is 1/16 of it
 DECAYED = 25.0  # thicknesses from which the displacement of a layer is below rounding
 LONGEST = 20.0  # q t from which a layer is a half-space: exp(-2 q t) is below rounding
+ALL_ROWS = slice(None)
 
 Shape = tuple[int, ...]
 Spacings = tuple[float, ...]
 
 
-def power_law(n: float, shape: Shape, spacings: Spacings) -> Field:
+def power_law(n: float, shape: Shape, spacings: Spacings, rows: slice = ALL_ROWS) -> Field:
     """Displacements for k = q^n, 0 <= n < 2, in two dimensions.
 
     Near pixels: with div(x r^(n-2)) = n r^(n-2), the integral over a rectangle from the origin to
@@ -43,13 +44,14 @@ def power_law(n: float, shape: Shape, spacings: Spacings) -> Field:
     """
     prefactor = 2 ** (1 - n) * gamma(1 - n / 2) / (2 * np.pi)
     far = prefactor * rgamma(n / 2)
-    out = pixel_averages(lambda r: far * r ** (n - 2), shape, spacings)
+    out = pixel_averages(lambda r: far * r ** (n - 2), shape, spacings, rows)
     out *= spacings[0] * spacings[1]
     near = near_shape(shape, spacings)
     y, x = ((np.arange(m + 1) - 0.5) * side for m, side in zip(near, spacings, strict=True))
     corner = _side_integral(n, x[None, :], y[:, None]) + _side_integral(n, y[:, None], x[None, :])
     corner *= 0.5 * prefactor * rgamma(n / 2 + 1)  # 1 / (n Gamma(n/2)), also at n = 0
-    out[: near[0], : near[1]] = np.diff(np.diff(corner, axis=0), axis=1)
+    closed = np.diff(np.diff(corner, axis=0), axis=1)[rows]
+    out[: len(closed), : near[1]] = closed
     return out
 
 
@@ -72,6 +74,7 @@ def pixel_averages(
     kernel: Callable[[Field], Field],
     shape: Shape,
     spacings: Spacings,
+    rows: slice = ALL_ROWS,
     nodes_per_part: int = NODES,
     parts: int = 1,
 ) -> Field:
@@ -80,8 +83,9 @@ def pixel_averages(
     The average over the pixel itself is of use if G is smooth at r = 0.
     """
     nodes, weights = _gauss_rule(nodes_per_part, parts)
-    out = np.zeros(shape)
     y, x = (np.arange(m) * side for m, side in zip(shape, spacings, strict=True))
+    y = y[rows]
+    out = np.zeros((y.size, x.size))
     for shift_y, weight_y in zip(nodes * spacings[0], weights, strict=True):
         for shift_x, weight_x in zip(nodes * spacings[1], weights, strict=True):
             r = np.sqrt(np.add.outer((y + shift_y) ** 2, (x + shift_x) ** 2))
@@ -115,7 +119,11 @@ def logarithmic_line(points: int, spacing: float) -> Field:
 
 
 def layer(
-    softening: Callable[[Field], Field], thickness: float, shape: Shape, spacings: Spacings
+    softening: Callable[[Field], Field],
+    thickness: float,
+    shape: Shape,
+    spacings: Spacings,
+    rows: slice = ALL_ROWS,
 ) -> Field:
     """Displacements for k = q / c(q t) of a layer on a rigid base, in two dimensions.
 
@@ -138,15 +146,15 @@ def layer(
         beyond = -1 / (2 * np.pi * np.maximum(r, DECAYED))
         return np.where(r < DECAYED, smooth(np.minimum(r, DECAYED)), beyond)
 
-    out = np.zeros(shape)
-    inside = out[: near[0], : near[1]]
-    inside += pixel_averages(
-        lambda r: rest(r / thickness) / thickness, near, spacings, LAYER_NODES, parts
+    inside = pixel_averages(
+        lambda r: rest(r / thickness) / thickness, near, spacings, rows, LAYER_NODES, parts
     )
     inside *= spacings[0] * spacings[1]
-    inside += power_law(1.0, near, spacings)
+    inside += power_law(1.0, near, spacings, rows)
     y, x = (np.arange(m) * side for m, side in zip(near, spacings, strict=True))
-    inside[np.add.outer(y**2, x**2) > reach**2] = 0.0
+    inside[np.add.outer(y[rows] ** 2, x**2) > reach**2] = 0.0
+    out = np.zeros((len(range(*rows.indices(shape[0]))), shape[1]))
+    out[: len(inside), : near[1]] = inside
     return out
 
 

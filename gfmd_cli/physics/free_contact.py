@@ -12,13 +12,14 @@ where means are taken over the map. At the solution, g = C sigma + c - h >= 0 an
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from gfmd_cli.grid.arrays import Field, Mask
-from gfmd_cli.grid.convolution import PaddedTransform, padded_shape
+from gfmd_cli.grid.convolution import PaddedTransform
+from gfmd_cli.grid.distributed import create_grid
 from gfmd_cli.grid.fft_grid import Grid, Shape
-from gfmd_cli.grid.pixels import average_pixels
 from gfmd_cli.grid.ranks import Ranks
 from gfmd_cli.physics.contact import Contact, Scene, build_scene, reduce_scene, touchable
 from gfmd_cli.physics.elastomers import LinearElastomer
@@ -43,16 +44,15 @@ class FreeElasticity:
     def _convolution(self) -> tuple[PaddedTransform, Field]:
         """The transform of twice the points, and the symbol of the compliance C."""
         grid = self.grid
-        kernel = self.elastomer.free_compliance(grid.shape, grid.spacings) * self.unit
-        transform = PaddedTransform(grid.shape, padded_shape(grid.shape, 2.0), threads=grid.threads)
-        return transform, transform.symbol_of(kernel)
+        kernel = self.elastomer.free_compliance(grid.whole_shape, grid.spacings, grid.own)
+        transform = grid.padded_transform(2.0)
+        return transform, transform.symbol_of(kernel * self.unit)
 
     @cached_property
     def _preconditioner(self) -> tuple[PaddedTransform, Field]:
         """A transform of a few more points, and the stiffness k(q) there, in single precision."""
         grid = self.grid
-        padded = padded_shape(grid.shape, MARGIN)
-        transform = PaddedTransform(grid.shape, padded, "single", grid.threads)
+        transform = grid.padded_transform(MARGIN, "single")
         q = transform.wavenumber(grid.spacings)
         return transform, (self.elastomer.stiffness(q, grid.length) / self.unit).astype(np.float32)
 
@@ -71,11 +71,13 @@ class FreeElasticity:
         """Lower limit of the eigenvalues of C; of use if positive.
 
         The smallest eigenvalue of the circulant matrix of the kernel reflected about the borders of
-        its array, of which C is a principal submatrix: a discrete cosine transform of type I.
+        its array, of which C is a principal submatrix: a discrete cosine transform of type I. Every
+        process computes all of it.
         """
         from scipy.fft import dctn  # half a second that most processes save
 
-        kernel = self.elastomer.free_compliance(self.grid.shape, self.grid.spacings) * self.unit
+        shape, spacings = self.grid.whole_shape, self.grid.spacings
+        kernel = self.elastomer.free_compliance(shape, spacings) * self.unit
         return float(dctn(kernel, type=1).min())
 
     @property
@@ -109,7 +111,7 @@ class FreeContact(Contact):
         """Compute u from sigma, u = h in contact and above it elsewhere; return the residual."""
         gap = self.free.displacement(sigma, out=self.grid.empty())
         gap -= self.height
-        gap -= mean_over(gap, sigma > 0)
+        gap -= mean_over(self.grid, gap, sigma > 0)
         residual = self.residual(gap + self.height, sigma)
         self.set_displacement(u, gap, sigma > 0)
         return residual
@@ -118,7 +120,8 @@ class FreeContact(Contact):
         """Level c of the undeformed surface: <sigma u> = <sigma C sigma> + c p."""
         response = self.free.displacement(sigma, out=self.grid.empty())
         np.subtract(u, response, out=response)
-        return float(np.vdot(sigma, response) / sigma.sum())
+        work, load = self.grid.total(np.array([np.vdot(sigma, response), sigma.sum()]))
+        return float(work / load)
 
     def reference_level(self, u: Field, sigma: Field) -> float:
         """Level from which displacements enter the energy: that of the undeformed surface."""
@@ -130,7 +133,7 @@ class FreeContact(Contact):
         return replace(
             self,
             grid=grid,
-            height=average_pixels(self.height, grid.shape),
+            height=self.grid.average(self.height, grid),
             may_touch=self._coarse_mask(grid),
             free=replace(self.free, grid=grid),
         )
@@ -166,16 +169,13 @@ def build_free_scene(
 
     Raises InputError as `build_scene`, and where the elastomer has no compliance that decays.
     """
-    if ranks is not None:
-        raise ValueError("a free boundary is solved by one process")
-    grid = replace(surface.grid(points, points_y), threads=threads)
-    doubled, mirrored, void = _mirrored(surface, grid)
+    grid = create_grid(replace(surface.grid(points, points_y), threads=threads), ranks)
+    doubled, mirrored, void = _mirrored(surface, grid, ranks)
     scene = reduce_scene(doubled, mirrored, elastomer)
     free = FreeElasticity(elastomer, grid, scene.delta_sigma / scene.h_std)
-    own = tuple(slice(n) for n in grid.shape)
     return FreeScene(
         grid=grid,
-        height=np.ascontiguousarray(scene.height[own]),
+        height=_on_map(doubled, scene.height, grid),
         stiffness=np.empty(0),
         mean_height=scene.mean_height,
         h_std=scene.h_std,
@@ -186,35 +186,54 @@ def build_free_scene(
     )
 
 
-def _mirrored(surface: RigidSurface, grid: Grid) -> tuple[Grid, Field, Mask | None]:
+def _mirrored(
+    surface: RigidSurface, grid: Grid, ranks: Ranks | None
+) -> tuple[Grid, Field, Mask | None]:
     """Twice the grid of a map, the mirrored heights on it, and the points that never touch.
 
     A measured map is mirrored before it is interpolated, so that no height on a finer grid lies
-    between those of opposite borders.
+    between those of opposite borders. On its own points no process needs the whole mirrored map.
     """
-    doubled = replace(
-        grid,
+    whole = replace(
+        surface.grid(grid.points, grid.points_y),
         points=2 * grid.points,
         points_y=2 * grid.points_y,
         length=2 * grid.length,
         length_y=2 * grid.length_y,
+        threads=grid.threads,
     )
+    doubled = create_grid(whole, ranks)
+    own_points = (surface.smallest_grid_y(), surface.smallest_grid())
     twin = surface.mirrored()
-    if twin is None:
-        _, height = sample(surface, grid.points, grid.points_y)
-        pads = [(0, n) for n in grid.shape]
-        return doubled, np.pad(height, pads, mode="symmetric"), surface.void(grid)
-    _, mirrored = sample(twin, doubled.points, doubled.points_y)
+    if twin is None or own_points == (grid.points_y, grid.points):
+        own, height = sample(surface, grid.points, grid.points_y, ranks)
+        return doubled, _reflected(own, height, doubled), surface.void(grid)
+    _, mirrored = sample(twin, doubled.points, doubled.points_y, ranks)
     void = twin.void(doubled)
-    own = tuple(slice(n) for n in grid.shape)
-    return doubled, mirrored, None if void is None else void[own]
+    return doubled, mirrored, None if void is None else _on_map(doubled, void, grid)
+
+
+def _reflected(grid: Grid, values: Field, doubled: Grid) -> Field:
+    """Values at the points of a grid, reflected at its borders, on twice the grid."""
+    rows = np.arange(*doubled.row_span)
+    rows = np.minimum(rows, 2 * grid.points_y - 1 - rows)
+    first = int(rows.min())
+    values = grid.gather_rows(grid.as_rows(values), (first, int(rows.max()) + 1))[rows - first]
+    return np.concatenate([values, values[:, ::-1]], axis=1).reshape(doubled.shape)
+
+
+def _on_map(doubled: Grid, values: Any, grid: Grid) -> Any:
+    """The values at the points of the map itself, on twice its grid."""
+    part = doubled.as_rows(values)[:, : grid.points]
+    return np.ascontiguousarray(doubled.gather_rows(part, grid.row_span)).reshape(grid.shape)
 
 
 SCENES: dict[str, Callable[..., Scene]] = {"periodic": build_scene, "free": build_free_scene}
 """How a scene is built, by the boundary of the map."""
 
 
-def mean_over(values: Field, where: Mask) -> float:
-    """Mean of some values; zero without any."""
+def mean_over(grid: Grid, values: Field, where: Mask) -> float:
+    """Mean of some values of a field over the grid; zero without any."""
     chosen = values[where]
-    return float(chosen.mean()) if chosen.size else 0.0
+    total, count = grid.total(np.array([chosen.sum(), chosen.size]))
+    return float(total / count) if count else 0.0

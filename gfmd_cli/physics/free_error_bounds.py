@@ -35,28 +35,33 @@ def certify_free(contact: FreeContact, u: Field, sigma: Field) -> Certificate:
     The cost is three transforms of twice the points a side. The bound of sigma_p is NaN where no
     positive lower limit of the compliance is known.
     """
-    p, h, free = contact.pressure, contact.height, contact.free
+    grid, p, h, free = contact.grid, contact.pressure, contact.height, contact.free
+
+    def mean(values: Field) -> float:
+        return grid.total(float(values.sum())) / grid.size
+
     s = contact.clear_untouchable(np.maximum(sigma, 0.0))
-    s *= p / s.mean()
-    gap = free.displacement(s, out=contact.grid.empty())
-    energy, lifted, mean = float(np.mean(s * gap)), float(np.mean(s * h)), float(gap.mean())
+    s *= p / mean(s)
+    gap = free.displacement(s, out=grid.empty())
+    energy, lifted, deflection = mean(s * gap), mean(s * h), mean(gap)
     gap -= h
     touchable = gap if contact.may_touch is None else gap[contact.may_touch]
-    duality_gap = float(np.mean(s * (gap - touchable.min())))
-    centre = mean + (lifted - energy) / p - float(h.mean())
+    lowest = -grid.max(-float(touchable.min(initial=np.inf)))
+    duality_gap = mean(s * (gap - lowest))
+    centre = deflection + (lifted - energy) / p - mean(h)
     share = min(sqrt(2 * duality_gap / energy), 1.0) if energy > 0 else 1.0
     spread = duality_gap / share if share > 0 else 0.0
-    mean_compliance = float(free.displacement(np.ones_like(s), out=gap).mean())
+    mean_compliance = mean(free.displacement(np.ones_like(s), out=gap))
     smallest = free.smallest_compliance
-    omitted = sqrt(float(np.mean((contact_pressure(contact.obstacle, u, sigma) - s) ** 2)))
+    omitted = sqrt(mean((contact_pressure(contact.obstacle, u, sigma) - s) ** 2))
     violation = np.minimum(u - contact.obstacle, sigma)
     return Certificate(
         gap=duality_gap,
-        u_g=abs(float(np.mean(u - h)) - centre)
+        u_g=abs(mean(u - h) - centre)
         + sqrt(mean_compliance * duality_gap)
         + (0.5 * share * energy + spread) / p,
         sigma_p=sqrt(duality_gap / smallest) + omitted if smallest > 0 else nan,
-        a_r=uncertain_share(contact, u, sigma, float(np.sum(violation**2)) / u.size),
+        a_r=uncertain_share(contact, u, sigma, mean(violation**2)),
     )
 
 

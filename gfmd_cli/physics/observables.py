@@ -31,18 +31,24 @@ def contact_line(grid: Grid, mask: Mask, *, periodic: bool = True) -> float:
     for axis in range(mask.ndim):
         lines = np.moveaxis(mask, axis, 0)
         counts[axis] += np.count_nonzero(lines[1:] != lines[:-1])
-        if periodic:
-            below = grid.next_row(lines) if axis == 0 else lines[0]
+        below = grid.next_row(lines) if axis == 0 else lines[0]
+        goes_on = axis == 0 and grid.row_span[1] < grid.points_y
+        if periodic or goes_on:
             counts[axis] += np.count_nonzero(lines[-1] != below)
     across = np.divide(1.0, grid.spacings)  # edge length over the area of a point
     return float(grid.total(counts) @ across) * grid.length / grid.size
 
 
-def border_contact(mask: Mask) -> float:
+def border_contact(grid: Grid, mask: Mask) -> float:
     """Share of the outermost points of a map that a mask contains."""
-    inside = mask[(slice(1, -1),) * mask.ndim]
-    outermost = mask.size - inside.size
-    return (np.count_nonzero(mask) - np.count_nonzero(inside)) / outermost
+    inner = [slice(1, -1)] * mask.ndim
+    if grid.dimension == 2:  # of the rows of this process
+        first, last = grid.row_span
+        inner[0] = slice(int(first == 0), len(mask) - int(last == grid.points_y))
+    inside = mask[tuple(inner)]
+    counts = [np.count_nonzero(mask) - np.count_nonzero(inside), mask.size - inside.size]
+    touching, outermost = grid.total(np.array(counts))
+    return float(touching / outermost)
 
 
 QUANTITIES = ("a_r", "sigma_p", "u_g")

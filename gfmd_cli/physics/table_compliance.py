@@ -29,7 +29,13 @@ from scipy.special import erfc, j0, j1
 
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.physics import free_compliance
-from gfmd_cli.physics.free_compliance import Shape, Spacings, near_shape, pixel_averages
+from gfmd_cli.physics.free_compliance import (
+    ALL_ROWS,
+    Shape,
+    Spacings,
+    near_shape,
+    pixel_averages,
+)
 
 CUT, STEP = 300.0, 20.0  # radians; the step leaves exp(-STEP^2 / 4) of a wave
 SMALLEST = 1e-4  # radians up to which the wave is the first term of its series
@@ -110,24 +116,29 @@ def _intervals(low: float, high: float) -> Field:
     return np.concatenate([np.geomspace(low, turn, count), np.arange(turn, high, WIDEST)[1:]])
 
 
-def plane(compliance: Compliance, shape: Shape, spacings: Spacings) -> Field:
+def plane(
+    compliance: Compliance, shape: Shape, spacings: Spacings, rows: slice = ALL_ROWS
+) -> Field:
     """Displacements in two dimensions, indexed by the distance of two pixels [y, x]."""
     shortest, diagonal = 0.5 * min(spacings), hypot(*spacings)
     reach = NEAR * max(spacings)
     near = tuple(min(m, int(reach / side) + 1) for m, side in zip(shape, spacings, strict=True))
-    out = np.zeros(shape)
+    out = np.zeros((len(range(*rows.indices(shape[0]))), shape[1]))
     if near != shape:
         least = max(shortest, reach - diagonal)
         kernel = compliance.spline("point", least, _diagonal(shape, spacings))
         parts = (shape, free_compliance.NODES), (near_shape(shape, spacings), NODES)
         for part, nodes in parts:  # the nearer pixels of each part are overwritten
-            own = tuple(slice(m) for m in part)
-            out[own] = pixel_averages(lambda r: kernel(np.maximum(r, least)), part, spacings, nodes)
+            values = pixel_averages(
+                lambda r: kernel(np.maximum(r, least)), part, spacings, rows, nodes
+            )
+            out[: len(values), : part[1]] = values
         out *= spacings[0] * spacings[1]
     disc = compliance.spline("disc", shortest, _diagonal(near, spacings))
     y, x = ((np.arange(m + 1) - 0.5) * side for m, side in zip(near, spacings, strict=True))
     corner = _corner(disc, y[:, None], x[None, :])
-    out[: near[0], : near[1]] = np.diff(np.diff(corner, axis=0), axis=1)
+    closed = np.diff(np.diff(corner, axis=0), axis=1)[rows]
+    out[: len(closed), : near[1]] = closed
     return out
 
 

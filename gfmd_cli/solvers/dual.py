@@ -26,7 +26,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from gfmd_cli.grid.arrays import Field, Mask
-from gfmd_cli.grid.pixels import average_pixels
+from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.physics.contact import Contact
 from gfmd_cli.physics.free_contact import FreeContact, mean_over
 from gfmd_cli.solvers.loop import Solver, State
@@ -67,13 +67,13 @@ class Dual(Solver):
 
     def continue_from(self, coarse: Contact, state: State, fine: Any) -> DualState:
         """Start from the stress on larger pixels."""
-        stress = average_pixels(state.sigma, fine.grid.shape)
+        stress = coarse.grid.average(state.sigma, fine.grid)
         return self._begin_from(fine, fine.grid.empty(), stress)
 
     def _begin_from(self, contact: FreeContact, u: Field, stress: Field) -> DualState:
         """Start from a stress, where the surface can touch, scaled to the mean p."""
         contact.clear_untouchable(stress)
-        stress *= contact.pressure / stress.mean()
+        stress *= contact.pressure * contact.grid.size / contact.grid.total(stress.sum())
         zeros = np.zeros_like(stress)
         state = DualState(
             u=u, sigma=stress, gap=contact.grid.empty(), direction=zeros, change=zeros.copy()
@@ -91,7 +91,7 @@ class Dual(Solver):
 
     def _assess(self, contact: FreeContact, state: DualState) -> None:
         """Set the level of the gap [1], u and the residual."""
-        state.gap -= mean_over(state.gap, state.sigma > 0)
+        state.gap -= mean_over(contact.grid, state.gap, state.sigma > 0)
         state.residual = contact.residual(state.gap + contact.height, state.sigma)
         contact.set_displacement(state.u, state.gap, state.sigma > 0)
 
@@ -104,52 +104,53 @@ class Dual(Solver):
             force = np.where(chosen, state.gap, 0.0)
             contact.free.approximate_stress(force, out=z)  # [2]
             state.transforms += contact.free.preconditioner_transforms
-            z -= mean_over(z, chosen)
+            z -= mean_over(contact.grid, z, chosen)
             z[~chosen] = 0.0
-            self._turn(state, z, force, chosen)  # [3]
+            self._turn(contact.grid, state, z, force, chosen)  # [3]
             self._advance(contact, state, chosen)  # [4], [5]
             self._assess(contact, state)
             state.exact = False
             state.step += 1
 
-    def _turn(self, state: DualState, z: Field, force: Field, chosen: Mask) -> None:
+    def _turn(self, grid: Grid, state: DualState, z: Field, force: Field, chosen: Mask) -> None:
         """d <- -z + beta d on the chosen points, with the mean zero."""
-        beta = max(0.0, float(np.vdot(z, state.change)) / state.slope) if state.slope > 0 else 0.0
-        state.slope = float(np.vdot(z, force))
+        beta = max(0.0, grid.dot(z, state.change) / state.slope) if state.slope > 0 else 0.0
+        state.slope = grid.dot(z, force)
         direction = state.direction
         direction *= beta
         direction -= z
         direction[~chosen] = 0.0
-        direction[chosen] -= mean_over(direction, chosen)
-        if float(np.vdot(direction, force)) >= 0:
+        direction[chosen] -= mean_over(grid, direction, chosen)
+        if grid.dot(direction, force) >= 0:
             np.negative(z, out=direction)
 
     def _advance(self, contact: FreeContact, state: DualState, chosen: Mask) -> None:
         """Move along the direction such that the energy does not rise."""
-        free, stress, change = contact.free, state.sigma, state.change
+        free, grid, stress, change = contact.free, contact.grid, state.sigma, state.change
         if state.length == 0:
             free.displacement(state.direction, out=change)
             state.transforms += free.transforms
-            curvature = float(np.vdot(state.direction, change))
-            descent = -float(np.vdot(state.direction, state.gap))
+            curvature = grid.dot(state.direction, change)
+            descent = -grid.dot(state.direction, state.gap)
             state.length = descent / curvature if curvature > 0 else 1.0
         for _ in range(MAX_HALVINGS):
             target = np.where(chosen, stress + state.length * state.direction, 0.0)
-            clipped = bool(np.any(target < 0))
+            clipped = _any_negative(grid, target)
             np.maximum(target, 0.0, out=target)
-            target *= contact.pressure * target.size / target.sum()  # [4]
+            target *= contact.pressure * grid.size / grid.total(target.sum())  # [4]
             move = target - stress
             free.displacement(move, out=change)
             state.transforms += free.transforms
-            fall = -float(np.vdot(move, state.gap))
+            fall = -grid.dot(move, state.gap)
             if fall > 0:
                 break
             state.length, state.slope = 0.5 * state.length, 0.0
         else:
             change *= 0.0
             return
-        curvature = float(np.vdot(move, change))
-        fraction = self._fraction(state, fall / curvature if curvature > 0 else 1.0, clipped)
+        curvature = grid.dot(move, change)
+        best = fall / curvature if curvature > 0 else 1.0
+        fraction = self._fraction(grid, state, best, clipped)
         if fraction == 1.0:  # [5]
             stress[...] = target
         else:
@@ -157,10 +158,11 @@ class Dual(Solver):
         change *= fraction
         state.gap += change
 
-    def _fraction(self, state: DualState, best: float, clipped: bool) -> float:
+    def _fraction(self, grid: Grid, state: DualState, best: float, clipped: bool) -> float:
         """Fraction of a move to take if the energy is lowest at the fraction `best`."""
         exact = not clipped and (
-            best <= 1 or not np.any(state.sigma + best * state.length * state.direction < 0)
+            best <= 1
+            or not _any_negative(grid, state.sigma + best * state.length * state.direction)
         )
         choice = choose(best, exact)
         state.length *= choice.factor
@@ -174,6 +176,11 @@ def _chosen(contact: FreeContact, state: DualState) -> Mask:
     touching: Mask = state.sigma > 0
     overlapping: Mask = contact.clear_untouchable(~touching & (state.gap < 0))
     inside, outside = state.gap[touching], state.gap[overlapping]
-    if float(outside @ outside) > PROPORTION**2 * float(inside @ inside):
+    if contact.grid.dot(outside, outside) > PROPORTION**2 * contact.grid.dot(inside, inside):
         touching |= overlapping
     return touching
+
+
+def _any_negative(grid: Grid, values: Field) -> bool:
+    """Whether a field is negative at some point of the grid."""
+    return grid.max(float(np.any(values < 0))) > 0

@@ -250,7 +250,7 @@ def _grid_result(solved: Solved) -> GridResult:
     border = None
     if contact.boundary == "free":
         u, sigma = solved.solution.u, solved.solution.sigma
-        border = border_contact(contact_points(contact.obstacle, u, sigma))
+        border = border_contact(scene.grid, contact_points(contact.obstacle, u, sigma))
     return GridResult(
         points=scene.grid.points,
         a_r=measured.a_r,

@@ -66,7 +66,7 @@ def run_study(
     study = Study(path)
     tasks = plan(spec)
     if ranks is not None:
-        _check_shared(spec, tasks)
+        _check_shared(spec)
     moved = _move_aside(study, shard, ranks) if overwrite else []
     held = agree(ranks, study.held())
     share = [task for task in tasks if task.index % shard[1] == shard[0]]
@@ -100,11 +100,9 @@ def run_study(
     return outcome + solved
 
 
-def _check_shared(spec: Spec, tasks: list[Task]) -> None:
+def _check_shared(spec: Spec) -> None:
     """Raise InputError for a spec whose contacts several processes cannot share."""
     problems = [f"output.{name}: takes whole grids" for name in spec.output.on_request()]
-    if any(task.boundary == "free" for task in tasks):
-        problems.append('grid.boundary: "free" is solved by one process')
     if problems:
         raise InputError(f"{problems[0]}; run it without mpiexec")
 

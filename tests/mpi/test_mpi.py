@@ -32,6 +32,28 @@ tolerance = 1e-11
 fields = ["u", "sigma", "height"]
 cross_section = true
 """
+FREE = """\
+[study]
+name = "study"
+[surface]
+kind = "self-affine"
+cutoff = 0.1
+[elastomer]
+kind = "power"
+n = {n}
+[grid]
+points = {points}
+points_y = {points_y}
+boundary = "free"
+[load]
+p_star = [0.03, 0.3]
+[solver]
+tolerance = 1e-11
+[output]
+fields = ["u", "sigma", "height", "contact_pressure"]
+histogram = true
+cross_section = true
+"""
 OF_THE_RUN = re.compile("residual|transforms|steps|status|algebraic|bound")
 """Columns that may differ: rounding decides which step is the last."""
 
@@ -118,13 +140,22 @@ def test_a_grid_that_grows_to_its_accuracy(mpiexec, tmp_path):
     assert_same(tmp_path / "one.h5", tmp_path / "many.h5")
 
 
-@pytest.mark.parametrize(("before", "after"), [(2, 2), (2, 3), (4, 2), (2, 1), (1, 2)])
-def test_a_stopped_run_goes_on(mpiexec, tmp_path, before, after):
+@pytest.mark.parametrize(
+    ("before", "after", "boundary"),
+    [
+        *((2, 2, ""), (2, 3, ""), (4, 2, ""), (2, 1, ""), (1, 2, "")),
+        *((2, 2, "free"), (2, 3, "free"), (1, 2, "free")),
+    ],
+)
+def test_a_stopped_run_goes_on(mpiexec, tmp_path, before, after, boundary):
     """A signal to one process stops all; as many go on bit for bit, others to the tolerance."""
-    path, cut, whole = spec(tmp_path, [1], 128), tmp_path / "cut.h5", tmp_path / "whole.h5"
-    run = ("run", path, "-q", "--set", "load.p_star=0.3", "-o")
+    n, boundary = (1.5, boundary) if boundary else (1, "periodic")
+    path, cut, whole = spec(tmp_path, [n], 128), tmp_path / "cut.h5", tmp_path / "whole.h5"
+    run = ("run", path, "-q", "--set", "load.p_star=0.3", "--set", f"grid.boundary={boundary}")
+    run = (*run, "-o")
     mpiexec(before, "gfmd_cli", *run, whole)
-    looks = 25 if before > 1 else 45  # alone it looks on coarser grids, too
+    coarser = before == 1 or boundary == "free"  # grids on which it looks, too
+    looks = 45 if coarser else 25
     mpiexec(before, "interrupted.py", looks, before - 1, *run, cut, status=75)
     (pointer,) = (tmp_path / "cut.parts").glob("*/pointer")
     saved = read_pointer(pointer)[0]
@@ -135,6 +166,59 @@ def test_a_stopped_run_goes_on(mpiexec, tmp_path, before, after):
     assert saved.state.step > 5
     mpiexec(after, "interrupted.py", few, 0, *run, cut)
     assert_same(whole, cut, exact=before == after)
+
+
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_parts_of_a_free_boundary(mpiexec, count):
+    mpiexec(count, "free.py")
+
+
+@pytest.mark.parametrize(
+    ("count", "shape", "n"),
+    [(1, (64, 64), 1), (2, (128, 64), [0.5, 1.5]), (2, (77, 101), 1), (3, (65, 48), 1)],
+)
+def test_a_free_boundary_is_that_of_one_process(mpiexec, tmp_path, count, shape, n):
+    """Square, odd and oblong maps, with nested grids that are shared and others that are not."""
+    path = tmp_path / "spec.toml"
+    path.write_text(FREE.format(n=n, points_y=shape[0], points=shape[1]))
+    on_one(path, tmp_path / "one.h5")
+    mpiexec(count, "gfmd_cli", "run", path, "-o", tmp_path / "many.h5", "-q")
+    assert_same(tmp_path / "one.h5", tmp_path / "many.h5", exact=count == 1)
+
+
+def test_a_free_boundary_with_error_bars(mpiexec, tmp_path):
+    path = tmp_path / "spec.toml"
+    path.write_text(
+        '[surface]\nkind = "self-affine"\ncutoff = 0.1\n[elastomer]\nkind = "power"\nn = 0.5\n'
+        '[grid]\npoints = 128\nboundary = "free"\n[load]\npressure = 0.1\n'
+        "[accuracy]\nmean_gap = 0.5\n[solver]\ntolerance = 1e-11\n"
+    )
+    on_one(path, tmp_path / "one.h5")
+    mpiexec(2, "gfmd_cli", "run", path, "-o", tmp_path / "many.h5", "-q")
+    assert_same(tmp_path / "one.h5", tmp_path / "many.h5")
+
+
+@pytest.mark.parametrize(
+    ("points", "boundary"), [((90, 60), "free"), ((135, 90), "free"), ((90, 60), "periodic")]
+)
+def test_a_scan_with_holes(mpiexec, tmp_path, points, boundary):
+    """On its own points and between them, with points that never touch."""
+    y, x = np.mgrid[:90, :60] / 60
+    heights = np.sin(9 * x + 4 * y) * np.cos(7 * y - 2 * x**2) + 0.3 * x
+    heights[20:31, 41:48] = np.nan
+    heights[45 if points == (90, 60) else 80 :] = np.nan  # once all rows of the second process
+    np.save(tmp_path / "scan.npy", heights)
+    path = tmp_path / "spec.toml"
+    path.write_text(
+        '[surface]\nkind = "file"\npath = "scan.npy"\nperiodic = false\nmissing = "void"\n'
+        'length = 60\n[elastomer]\nkind = "half-space"\n[grid]\n'
+        f'boundary = "{boundary}"\npoints = {points[1]}\npoints_y = {points[0]}\n'
+        "[load]\ncontact_area = 0.1\n"
+        '[solver]\ntolerance = 1e-11\n[output]\nfields = ["u", "sigma"]\n'
+    )
+    on_one(path, tmp_path / "one.h5")
+    mpiexec(2, "gfmd_cli", "run", path, "-o", tmp_path / "many.h5", "-q")
+    assert_same(tmp_path / "one.h5", tmp_path / "many.h5")
 
 
 @pytest.mark.parametrize("kind", ["known", "unknown"])
