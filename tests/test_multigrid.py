@@ -6,80 +6,154 @@ import pytest
 from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.physics.contact import Contact
 from gfmd_cli.physics.elastomers import Power
+from gfmd_cli.solvers import multigrid_kernels as kernels
 from gfmd_cli.solvers.contact_state import PRESSED, TENSE
-from gfmd_cli.solvers.multigrid import GROWTH, Multigrid, suits
+from gfmd_cli.solvers.multigrid import GROWTH, Multigrid, level_rows, suits
 
 PATTERNS = ("none", "points", "sparse", "dense", "disc", "grooves", "all but one", "corner")
 
 
-def contact(n, points=64, threads=1):
-    grid = Grid(points, threads=threads)
+# Numbers of points along y and x, and the ratio of the sides of the cell
+SQUARE = ((64, 64), 1.0)
+OTHERS = [
+    ((33, 33), 1.0),
+    ((45, 60), 0.75),
+    ((50, 75), 0.5),
+    ((32, 64), 1.0),
+    ((96, 24), 1.0),
+    ((27, 85), 1.2),
+]
+
+
+def contact(n, shape=64, length_y=1.0, threads=1):
+    points_y, points = (shape, shape) if isinstance(shape, int) else shape
+    grid = Grid(points, points_y=points_y, length_y=length_y, threads=threads)
     k = Power(n=n).stiffness(grid.wavenumber(), grid.length)
     return Contact(grid, np.zeros(grid.shape), k / k.max(), 1.0)
 
 
-def pattern(kind, points=64):
+def pattern(kind, shape=64):
     rng = np.random.default_rng(1)
-    y, x = np.mgrid[:points, :points]
+    rows, columns = shape = (shape, shape) if isinstance(shape, int) else shape
+    y, x = np.mgrid[:rows, :columns]
     held = {
-        "none": np.zeros((points, points), dtype=bool),
+        "none": np.zeros(shape, dtype=bool),
         "points": (x % 16 == 7) & (y % 16 == 8),
-        "sparse": rng.random((points, points)) < 0.01,
-        "dense": rng.random((points, points)) < 0.5,
-        "disc": (x - points / 2) ** 2 + (y - points / 3) ** 2 < 150,
+        "sparse": rng.random(shape) < 0.01,
+        "dense": rng.random(shape) < 0.5,
+        "disc": (x / columns - 1 / 2) ** 2 + (y / rows - 1 / 3) ** 2 < 0.0366,
         "grooves": x % 10 < 3,
-        "all but one": (x != 5) | (y != 9),
+        "all but one": (x != 5) | (y != 6),
         "corner": (x % 2 == 1) & (y % 2 == 1),
     }[kind]
     return np.where(held, PRESSED, 0).astype(np.int8)
 
 
-def applied(n, state, force, threads=1, threshold=PRESSED):
+def applied(n, state, force, threads=1, threshold=PRESSED, length_y=1.0):
     """z, and the two sums, for a force on the points."""
-    points = len(state)
-    cycle = Multigrid(contact(n, points, threads))
+    cycle = Multigrid(contact(n, state.shape, length_y, threads))
     cycle.z[...] = np.nan
-    change = np.cos(np.arange(points**2)).reshape(state.shape).astype(np.float32)
+    change = np.cos(np.arange(state.size)).reshape(state.shape).astype(np.float32)
     slope, turned = cycle.apply(-force, state, threshold, change)
-    z = cycle.z[:, :points]
+    z = cycle.z[:, : state.shape[1]]
     free = np.where(state < threshold, force, 0.0)
     assert slope == pytest.approx(np.vdot(z, free), rel=1e-5)
     assert turned == pytest.approx(np.vdot(z, change), rel=1e-5, abs=1e-5 * np.abs(z).sum())
     return z.copy()
 
 
-@pytest.mark.parametrize("n", [1, 2, 3, 4])
+@pytest.mark.parametrize(
+    ("n", "shape", "length_y"),
+    [(n, *SQUARE) for n in (1, 2, 3, 4)] + [(n, *other) for n in (1, 4) for other in OTHERS],
+)
 @pytest.mark.parametrize("kind", PATTERNS)
-def test_symmetric_positive_and_zero_where_held(n, kind):
-    state = pattern(kind)
-    a, b = np.random.default_rng(2).normal(size=(2, *state.shape))
-    za, zb = applied(n, state, a), applied(n, state, b)
+def test_symmetric_positive_and_zero_where_held(n, kind, shape, length_y):
+    state = pattern(kind, shape)
+    a, b = np.random.default_rng(2).normal(size=(2, *shape))
+    za, zb = (applied(n, state, force, length_y=length_y) for force in (a, b))
     assert not za[state == PRESSED].any()
     size = np.sqrt(np.vdot(a, za) * np.vdot(b, zb))
     assert np.vdot(a, zb) == pytest.approx(np.vdot(b, za), abs=1e-5 * size)
-    smooth = np.sin(2 * np.pi * np.arange(64) / 64)[:, None] * np.ones(64)
-    checks = (-1.0) ** np.indices(state.shape).sum(axis=0)
-    for force in (a, smooth, checks, np.ones(state.shape)):
+    waves = [np.sin(2 * np.pi * np.arange(points) / points) for points in shape]
+    along_y, along_x = waves[0][:, None] * np.ones(shape), waves[1] * np.ones(shape)
+    checks = (-1.0) ** np.indices(shape).sum(axis=0)
+    for force in (a, along_y, along_x, checks, np.ones(shape)):
         free = np.where(state == PRESSED, 0.0, force)
-        assert np.vdot(free, applied(n, state, force)) > 0
+        assert np.vdot(free, applied(n, state, force, length_y=length_y)) > 0
 
 
 @pytest.mark.parametrize("n", [2, 4])
 @pytest.mark.parametrize("kind", PATTERNS)
-def test_positive_in_its_least_direction(n, kind):
+@pytest.mark.parametrize(
+    ("shape", "length_y"), [((16, 16), 1.0), ((15, 17), 1.0), ((9, 32), 1.0), ((36, 8), 1.0)]
+)
+def test_positive_in_its_least_direction(n, kind, shape, length_y):
     """The whole matrix of the cycle on a small grid."""
-    points = 16
-    state = pattern(kind, points)
+    state = pattern(kind, shape)
     free = np.flatnonzero(state.ravel() < PRESSED)
+    cycle, change = Multigrid(contact(n, shape, length_y)), np.zeros(shape, np.float32)
     columns = []
     for i in free:
-        force = np.zeros(points**2)
+        force = np.zeros(state.size)
         force[i] = 1.0
-        columns.append(applied(n, state, force.reshape(state.shape)).ravel()[free])
+        cycle.apply(-force.reshape(shape), state, PRESSED, change)
+        columns.append(cycle.z[:, : shape[1]].ravel()[free])
     matrix = np.array(columns)
     assert np.allclose(matrix, matrix.T, rtol=0, atol=1e-5 * np.abs(matrix).max())
     values = np.linalg.eigvalsh((matrix + matrix.T) / 2)
     assert values[0] > 1e-6 * values[-1]
+
+
+def hats(fine, coarse):
+    """Values of the hats of a coarse level at the points of the next finer one, along one axis."""
+    distance = np.arange(fine)[:, None] / fine - np.arange(coarse) / coarse
+    distance -= np.round(distance)  # periodic
+    return np.maximum(0.0, 1 - np.abs(distance) * coarse)
+
+
+TRANSFERS = [((33, 45), (18, 24)), ((30, 31), (30, 16)), ((9, 64), (6, 32)), ((32, 48), (16, 24))]
+
+
+@pytest.mark.parametrize(("fine", "coarse"), TRANSFERS)
+def test_hats_of_any_numbers_of_points(fine, coarse):
+    rng = np.random.default_rng(7)
+    along_y, along_x = (hats(*numbers) for numbers in zip(fine, coarse, strict=True))
+    residual, found = rng.normal(size=fine).astype(np.float32), np.empty(coarse, np.float32)
+    kernels.restrict(residual, found, 0, coarse[0])
+    assert found == pytest.approx(along_y.T @ residual @ along_x, abs=1e-5)
+    values, found = rng.normal(size=coarse).astype(np.float32), np.empty(fine, np.float32)
+    kernels.interpolate(values, found, 0, fine[0])
+    assert found == pytest.approx(along_y @ values @ along_x.T, abs=1e-5)
+
+
+@pytest.mark.parametrize(("fine", "coarse"), TRANSFERS)
+@pytest.mark.parametrize("weighted", [0, 1])
+def test_springs_between_hats_of_any_numbers_of_points(fine, coarse, weighted):
+    """P^T w P in units of 1/64, for the neighbours that `compute_ties` names."""
+    values = np.random.default_rng(8).integers(0, 4, size=fine).astype(np.int8)
+    threshold = 4 if weighted else PRESSED
+    w = values / 4 if weighted else 1.0 * (values >= PRESSED)
+    along_y, along_x = (hats(*numbers) for numbers in zip(fine, coarse, strict=True))
+    next_y, next_x = (np.roll(axis, -1, axis=1) for axis in (along_y, along_x))
+    ties, weights = np.zeros((coarse[0], 4, coarse[1] + 1), np.uint8), np.zeros(coarse, np.int8)
+    kernels.compute_any_ties(values, threshold, weighted, ties, weights, 0, coarse[0])
+    pairs = ((along_y, along_x), (along_y, next_x), (next_y, along_x), (next_y, next_x))
+    for kind, (other_y, other_x) in enumerate(pairs):
+        expected = 64 * (along_y * other_y).T @ w @ (along_x * other_x)
+        assert np.abs(ties[:, kind, 1:] - expected).max() <= 0.501
+    assert np.array_equal(ties[:, :, 0], ties[:, :, -1])
+    expected = np.minimum(4, 4 * along_y.T @ w @ along_x)
+    assert np.abs(weights - expected).max() <= 0.501
+
+
+def test_springs_of_exactly_half_the_points_are_the_same():
+    state = pattern("sparse")
+    results = []
+    for kernel in (kernels.compute_ties, kernels.compute_any_ties):
+        ties, weights = np.zeros((32, 4, 33), np.uint8), np.zeros((32, 32), np.int8)
+        kernel(state, PRESSED, 0, ties, weights, 0, 32)
+        results.append((ties, weights))
+    assert np.array_equal(results[0][0], results[1][0])
 
 
 def test_points_under_tension_are_held_where_asked():
@@ -90,29 +164,61 @@ def test_points_under_tension_are_held_where_asked():
     assert not applied(3, state, force, threshold=TENSE)[state >= TENSE].any()
 
 
+def steps_of_conjugate_gradients(n, state, length_y=1.0):
+    """For K on the free points, to 1e-8 of the energy."""
+    held, case = state == PRESSED, contact(n, state.shape, length_y)
+    force = np.where(held, 0.0, np.random.default_rng(4).normal(size=held.shape))
+    cycle, change = Multigrid(case), np.zeros(held.shape, np.float32)
+    steps, start = 0, None
+    direction, old = np.zeros_like(force), 1.0
+    while True:
+        cycle.apply(-force, state, PRESSED, change)
+        z = cycle.z[:, : held.shape[1]].copy()
+        new = float(np.vdot(z, force))
+        start = start or new
+        if new < 1e-8 * start or steps > 200:
+            return steps
+        direction = z + new / old * direction if steps else z
+        pull = np.fft.irfft2(case.stiffness * np.fft.rfft2(direction), held.shape)
+        pull[held] = 0.0
+        force -= new / np.vdot(direction, pull) * pull
+        old, steps = new, steps + 1
+
+
 @pytest.mark.parametrize(
     ("n", "kind", "most"),
     [(1, "disc", 17), (2, "disc", 12), (2, "sparse", 12), (3, "sparse", 16), (4, "disc", 36)],
 )
 def test_conjugate_gradients_take_few_steps_on_any_grid(n, kind, most):
-    """For K on the free points, to 1e-8 of the energy, with the contacts refined."""
+    """With the contacts refined."""
     for points in (64, 128):
         state = np.kron(pattern(kind), np.ones((points // 64,) * 2, dtype=np.int8))
-        held, k = state == PRESSED, contact(n, points).stiffness
-        force = np.where(held, 0.0, np.random.default_rng(4).normal(size=held.shape))
-        steps, start = 0, None
-        direction, old = np.zeros_like(force), 1.0
-        while True:
-            z = applied(n, state, force)
-            new = float(np.vdot(z, force))
-            start = start or new
-            if new < 1e-8 * start:
-                break
-            direction = z + new / old * direction if steps else z
-            pull = np.where(held, 0.0, np.fft.irfft2(k * np.fft.rfft2(direction), held.shape))
-            force -= new / np.vdot(direction, pull) * pull
-            old, steps = new, steps + 1
-            assert steps <= most
+        assert steps_of_conjugate_gradients(n, state) <= most
+
+
+@pytest.mark.parametrize("n", [1, 2, 3, 4])
+@pytest.mark.parametrize(
+    ("shape", "length_y"),
+    [((125, 125), 1.0), ((127, 127), 1.0), ((97, 130), 0.75), ((64, 128), 1.0), ((128, 32), 1.0)],
+)
+def test_odd_numbers_of_points_and_oblong_pixels_take_about_as_many_steps(n, shape, length_y):
+    square = steps_of_conjugate_gradients(n, pattern("disc", 128))
+    assert steps_of_conjugate_gradients(n, pattern("disc", shape), length_y) <= 2 * square
+
+
+@pytest.mark.parametrize(
+    ("shape", "length_y", "expected"),
+    [
+        ((64, 64), 1.0, [(64, 64), (32, 32), (16, 16), (8, 8), (4, 4)]),
+        ((96, 48), 2.0, [(96, 48), (48, 24), (24, 12), (12, 6)]),
+        ((33, 75), 0.44, [(33, 75), (18, 38), (9, 19), (6, 10)]),
+        ((16, 64), 1.0, [(16, 64), (16, 32), (16, 16), (8, 8), (4, 4)]),
+        ((64, 24), 1.0, [(64, 24), (32, 24), (16, 12), (8, 6)]),
+    ],
+)
+def test_shapes_of_the_levels(shape, length_y, expected):
+    grid = Grid(shape[1], points_y=shape[0], length_y=length_y)
+    assert [level for level, _ in level_rows(grid)] == expected
 
 
 def test_same_on_any_number_of_threads():
@@ -122,6 +228,15 @@ def test_same_on_any_number_of_threads():
     one = applied(3, state, force)
     for threads in (2, 3):
         assert np.array_equal(applied(3, state, force, threads), one)
+
+
+@pytest.mark.parametrize(("shape", "length_y"), [((513, 301), 1.7), ((600, 300), 1.0)])
+def test_other_grids_are_the_same_on_any_number_of_threads(shape, length_y):
+    state = (2 * (np.random.default_rng(5).random(shape) < 0.05)).astype(np.int8)
+    force = np.random.default_rng(6).normal(size=shape)
+    one = applied(3, state, force, length_y=length_y)
+    other = applied(3, state, force, threads=3, length_y=length_y)
+    assert np.array_equal(other, one)
 
 
 def test_knows_what_it_does_not_suit():

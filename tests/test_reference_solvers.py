@@ -17,6 +17,7 @@ from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.solvers.ccg import ConstrainedCG
 from gfmd_cli.solvers.fire import Fire
 from gfmd_cli.solvers.loop import solve
+from gfmd_cli.solvers.nested_grids import solve_contact
 from gfmd_cli.solvers.pcg import ProjectedCG
 from gfmd_cli.solvers.polonsky_keer import PolonskyKeer
 
@@ -63,8 +64,9 @@ def bound(contact, u, exact):
     k_1 |f|^2 <= |x| (|f| + |mean e| sqrt(size) + k_max |f|), and |e| <= 2 |f| everywhere.
     """
     assert np.any((u == contact.height) & (exact == contact.height))
-    x = TOLERANCE * min(contact.pressure, 1) * POINTS
-    return 2 * x * (1 + POINTS + contact.stiffness.max()) / contact.stiffness[0, 1]
+    root = np.sqrt(contact.grid.size)
+    x = TOLERANCE * min(contact.pressure, 1) * root
+    return 2 * x * (1 + root + contact.stiffness.max()) / contact.stiffness.ravel()[1:].min()
 
 
 @pytest.mark.parametrize("p_star", [0.02, 0.1, 1.0])
@@ -89,6 +91,22 @@ def test_every_solver_ends_in_the_same_solution(solver, n, p_star):
     theirs = observe(contact, expected.u, expected.sigma)
     assert ours.a_r == theirs.a_r
     assert 0 < ours.a_r < 1
+
+
+@pytest.mark.parametrize("n", [1, 2, 3])
+@pytest.mark.parametrize(
+    ("shape", "length_y"), [((45, 60), 0.75), ((63, 63), 1.0), ((48, 96), 1.0), ((160, 40), 1.0)]
+)
+def test_odd_grids_and_oblong_pixels_end_in_the_same_solution(n, shape, length_y):
+    surface = SelfAffine(cutoff=0.06, length_y=length_y)
+    contact = build_scene(surface, Power(n=n), shape[1], points_y=shape[0]).contact(0.05)
+    status, expected = solved(contact, ConstrainedCG())
+    assert status == "converged"
+    solution = solve_contact(contact, ProjectedCG(tolerance=REFERENCE))
+    assert solution.status == "converged"
+    difference = np.abs(solution.u - expected.u).max()
+    assert difference <= bound(contact, expected.u, solution.u)
+    assert difference < 1e-7  # the bound is loose for n > 1
 
 
 def test_plates_are_out_of_reach_of_the_pressure_only():

@@ -8,7 +8,7 @@ half. The same kernels therefore run on one process and on several.
 """
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -40,6 +40,8 @@ def is_distributable(points: int, count: int) -> bool:
 
 class DistributedRows(LocalRows):
     """The block of rows of this process; `spare` returns memory for one field with a halo."""
+
+    is_whole: ClassVar[bool] = False
 
     def __init__(
         self, ranks: Ranks, points: int, threads: int, spare: Callable[[], Field] | None = None

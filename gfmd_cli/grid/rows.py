@@ -8,7 +8,7 @@ are added in a fixed order. The results therefore do not depend on the number of
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -26,6 +26,9 @@ class LocalRows:
     An array of a kernel whose stencil needs rows of other processes then has a halo, which are some
     rows above and below the block. On one process the halo is empty.
     """
+
+    is_whole: ClassVar[bool] = True
+    """Whether this process holds all rows."""
 
     def __init__(self, count: int, threads: int) -> None:
         self.count = count
@@ -73,7 +76,10 @@ class LocalRows:
 
     def coarser(self) -> "LocalRows":
         """The rows of the next coarser level, which has every other row."""
-        count = self.count // 2
+        return self.with_count(self.count // 2)
+
+    def with_count(self, count: int) -> "LocalRows":
+        """The rows of a coarser level that has any number of rows."""
         return LocalRows(count, len(self.parts) if count >= THREADED else 1)
 
     def run_from_finer(self, kernel: Kernel, fine: Any, coarse: Any) -> None:

@@ -9,54 +9,118 @@ by a penalty: springs tie the coarse hats to zero at the points held, as stiff a
 the level itself. This takes four bytes per coarse point, less than Galerkin stencils, and the
 levels are not too stiff, as bilinear hats would be for a plate.
 
+The points of a level need not be half of those of the next finer one. An odd number is followed by
+the even number next to its half, and hats are evaluated at the points of the finer level. On pixels
+far from square, the second differences along y and x have the weights 1 / dy^2 and 1 / dx^2, and
+only the direction of strong coupling is coarsened until the pixels are about square
+(semi-coarsening; Trottenberg, Oosterlee & Schueller, Multigrid, 2001, section 5.1).
+
 The cycle is symmetric. It is positive as long as the eigenvalues of the damped Jacobi iteration,
 `DAMPING` times A over its diagonal, are below 2. They are at most 1.76 for the operator without
-springs, and springs do not increase them, because they act on waves for which the operator is soft.
+springs: for weights 1 and w the largest is 16 (1 + w)^2 / (4 (1 + w)^2 + 2 + 2 w^2), at most 3.2
+at w = 1. Springs do not increase them, because they act on waves for which the operator is soft.
 """
 
+from collections.abc import Iterator
+from dataclasses import dataclass
 from itertools import pairwise
-from math import inf
+from math import inf, isclose, prod
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from gfmd_cli.grid.arrays import Field, SingleField
-from gfmd_cli.grid.fft_grid import Grid
+from gfmd_cli.grid.fft_grid import Grid, Shape
+from gfmd_cli.grid.rows import Kernel, LocalRows
 from gfmd_cli.physics.contact import Contact
 from gfmd_cli.solvers import multigrid_kernels as kernels
 from gfmd_cli.solvers.contact_state import ContactState
 from gfmd_cli.solvers.multigrid_kernels import WHOLE_WEIGHT, ZERO
 
 COARSEST = 4  # points along the shorter side on the coarsest level
-ASPECT = 1.5  # of pixels up to which the levels have the same Laplacian along x and y
+ASPECT = 1.5  # of pixels beyond which only their shorter side is coarsened; 1 / (2 / 1.5) then
 SPRING = 5.0  # penalty stiffness relative to k(2 q) / k(q); measured: best for n = 1.5 to 4
 GROWTH = 20.0  # largest growth of k(q) between levels that the cycle permits; 16 at n = 4
 COARSEST_SWEEPS = 4  # pairs of Jacobi sweeps on the coarsest level
 UNIT = 1.0 / 64  # of the integers in `ties`
 
 
+Stencil: TypeAlias = tuple[np.float32, np.float32] | None
+
+
 def suits(contact: Contact) -> bool:
-    """Whether pixels are about square, and k(q) grows evenly enough between the levels."""
-    levels, (dy, dx) = _levels(contact), contact.grid.spacings
-    has_levels = len(levels) > 1 and max(dy, dx) <= ASPECT * min(dy, dx)
-    return has_levels and all(growth < GROWTH for _, _, growth in levels)
+    """Whether there is a coarser level, and k(q) grows evenly enough between the levels."""
+    levels = _levels(contact)
+    return len(levels) > 1 and all(level.growth < GROWTH for level in levels)
 
 
-def _levels(contact: Contact) -> list[tuple[int, float, float]]:
-    """Points along x, scale of the operator and k(2 q) / k(q) of each level.
+@dataclass(frozen=True)
+class Level:
+    """Points and operator of a level."""
 
-    The operator equals k(q) at a period of four points. Energies are sums over the finest points.
-    """
-    line, levels = contact.line, []
-    for level in range(level_count(contact.grid, COARSEST)):
-        n = contact.grid.points >> level
-        k = float(line[n // 4])
-        growth = float(line[n // 2]) / k if k > 0 else inf
-        levels.append((n, 4.0**level * k, growth))
+    shape: Shape
+    rows: LocalRows
+    stencil: Stencil
+    """Weights of the second differences along y and x, at most 1; None where both are 1."""
+    scale: float
+    """Scale of the operator, which equals k(q) at a period of four points; energies are sums over
+    the points of the finest level."""
+    growth: float
+    """k(2 q) / k(q)."""
+
+
+def _levels(contact: Contact) -> list[Level]:
+    """The levels from the finest to the coarsest."""
+    grid, levels = contact.grid, []
+    for shape, rows in level_rows(grid):
+        dy, dx = (side / points for side, points in zip(grid.sides, shape, strict=True))
+        line = contact.line if dx <= dy else grid.column(contact.stiffness)
+        points = shape[1] if dx <= dy else shape[0]
+        k, k_twice = np.interp([points / 4, points / 2], np.arange(line.size), line).tolist()
+        y, x = (np.float32((min(dy, dx) / spacing) ** 2) for spacing in (dy, dx))
+        stencil = None if isclose(y, x, rel_tol=1e-6) else (y, x)
+        scale = grid.size / prod(shape) * k
+        levels.append(Level(shape, rows, stencil, scale, k_twice / k if k > 0 else inf))
     return levels
 
 
+def level_rows(grid: Grid) -> Iterator[tuple[Shape, LocalRows]]:
+    """Numbers of points of the levels, and their rows, from the finest to the coarsest.
+
+    A level has half the points of the next finer one, or the next even number, along x and y; if
+    its pixels are far from square, only along their shorter side. A level that several processes
+    share is followed only by one of exactly half the points along both.
+    """
+    shape, rows = grid.whole_shape, grid.rows
+    while True:
+        yield shape, rows
+        spacings = [side / points for side, points in zip(grid.sides, shape, strict=True)]
+        widest = ASPECT * min(spacings)
+        axes = [(n, spacing <= widest) for n, spacing in zip(shape, spacings, strict=True)]
+        if any(n // 2 < COARSEST for n, halved in axes if halved):
+            return
+        coarser = tuple(_half(n) if halved else n for n, halved in axes)
+        if _is_half(coarser, shape):
+            rows = rows.coarser()
+        elif rows.is_whole:
+            rows = rows.with_count(coarser[0])
+        else:
+            return
+        shape = coarser
+
+
+def _half(points: int) -> int:
+    """Half of an even number, or the next even number."""
+    return points // 2 if points % 2 == 0 else 2 * ((points + 3) // 4)
+
+
+def _is_half(coarse: Shape, fine: Shape) -> bool:
+    """Whether a level has exactly half the points of the next finer one along both axes."""
+    return all(2 * few == many for few, many in zip(coarse, fine, strict=True))
+
+
 def level_count(grid: Grid, coarsest: int) -> int:
-    """Number of levels, each with half the points of the last one along x and y.
+    """Number of levels of exactly half the points of the last one along x and y.
 
     The coarsest has at least `coarsest` points along either.
     """
@@ -72,21 +136,28 @@ class Multigrid:
     transforms = 0
 
     def __init__(self, contact: Contact) -> None:
-        self.rows = contact.grid.rows
         self.z = contact.grid.as_rows(contact.grid.padded)
-        sides, scales, growths = zip(*_levels(contact), strict=True)
-        self.scale = np.float32(1.0 / scales[0])
-        self.ratios = [np.float32(finer / coarser) for finer, coarser in pairwise(scales)]
-        self.springs = [np.float32(UNIT * SPRING * growth) for growth in growths[1:]]
-        self.coarse_rows = [self.rows.coarser()]
-        while len(self.coarse_rows) < len(sides) - 1:
-            self.coarse_rows.append(self.coarse_rows[-1].coarser())
-        shapes = list(zip(self.coarse_rows, sides[1:], strict=True))
+        levels = _levels(contact)
+        self.stencils = [level.stencil for level in levels]
+        self.scale = np.float32(1.0 / levels[0].scale)
+        self.ratios = [np.float32(fine.scale / coarse.scale) for fine, coarse in pairwise(levels)]
+        self.springs = [
+            np.float32(UNIT * SPRING * coarse.growth * 4 * prod(coarse.shape) / prod(fine.shape))
+            for fine, coarse in pairwise(levels)
+        ]
+        self.rows, *self.coarse_rows = (level.rows for level in levels)
+        # Fields between two levels whose points are not exactly halved: the residual of the finer
+        # one, later P times the result on the coarser one. Elsewhere kernels do both on the way.
+        self.between = [
+            None if _is_half(coarse.shape, fine.shape) else np.empty(fine.shape, np.float32)
+            for fine, coarse in pairwise(levels)
+        ]
+        sizes = [(level.rows, level.shape[1]) for level in levels[1:]]
         self.rhs, self.x, self.y = (
-            [rows.empty_with_halo(n, dtype=np.float32) for rows, n in shapes] for _ in range(3)
+            [rows.empty_with_halo(n, dtype=np.float32) for rows, n in sizes] for _ in range(3)
         )
-        self.weights = [rows.empty_with_halo(n, dtype=np.int8) for rows, n in shapes]
-        self.ties = [rows.empty_with_halo(4, n + 1, dtype=np.uint8) for rows, n in shapes]
+        self.weights = [rows.empty_with_halo(n, dtype=np.int8) for rows, n in sizes]
+        self.ties = [rows.empty_with_halo(4, n + 1, dtype=np.uint8) for rows, n in sizes]
 
     def apply(
         self, sigma: Field, contact_state: ContactState, threshold: int, change: Field
@@ -94,18 +165,16 @@ class Multigrid:
         """See `preconditioners.Preconditioner.apply`."""
         self.rows.exchange_halo(contact_state)
         self.set_ties(contact_state, threshold)  # [1] penalty terms
-        fields = (self.rows.with_halo(sigma), contact_state, threshold)
+        fields = (self.rows.with_halo(sigma), contact_state, threshold, self.stencils[0])
         # [2] one Jacobi sweep from zero on the finest level, and the restriction of its residual
-        self.coarse_rows[0].run_from_finer(kernels.first_residual, fields, self.rhs[:1])
+        self.restrict(kernels.first_residual, fields, 0)
         self.descend()  # [3] pre-smoothing
         for level in range(len(self.coarse_rows) - 2, -1, -1):  # [4] correction, post-smoothing
-            y = self.coarse_rows[level + 1].aligned_with_finer(self.y[level + 1])
-            self.smooth(level, self.y[level], self.x[level], y, self.ratios[level + 1])
+            self.smooth(level, self.y[level], self.x[level], *self.correction(level + 1))
             self.smooth(level, self.x[level], self.y[level])
-        coarse = (self.coarse_rows[0].aligned_with_finer(self.y[0]), self.ratios[0])
         # [5] correction and one sweep on the finest level, and the sums
         slope, turned = self.rows.sums_with_halo(
-            2, kernels.last_smooth, *fields, *coarse, self.scale, change, self.z
+            2, kernels.last_smooth, *fields, *self.correction(0), self.scale, change, self.z
         )
         return float(slope), float(turned)
 
@@ -115,12 +184,33 @@ class Multigrid:
         for level in range(last + 1):
             self.smooth(level, None, self.y[level])
             if level < last:
-                finer = (self.rhs[level], self.y[level], self.ties[level], self.springs[level])
-                coarser = self.rhs[level + 1 : level + 2]
-                self.coarse_rows[level + 1].run_from_finer(kernels.residual, finer, coarser)
+                matrix = (self.stencils[level + 1], self.ties[level], self.springs[level])
+                fields = (self.rhs[level], self.y[level], *matrix)
+                self.restrict(kernels.residual, fields, level + 1)
         for _ in range(COARSEST_SWEEPS):
             self.smooth(last, self.y[last], self.x[last])
             self.smooth(last, self.x[last], self.y[last])
+
+    def restrict(self, kernel: Kernel, fields: tuple[Any, ...], level: int) -> None:
+        """Restrict the residual that a kernel computes on the next finer level to `level`."""
+        residual, rows = self.between[level], self.coarse_rows[level]
+        if residual is None:
+            rows.run_from_finer(kernel, fields, self.rhs[level : level + 1])
+        else:
+            self.finer_rows(level).run(kernel, *fields, residual)
+            rows.run(kernels.restrict, residual, self.rhs[level])
+
+    def correction(self, level: int) -> tuple[SingleField, np.float32]:
+        """The result on a level as `_interpolate` takes it, and the ratio of the scales."""
+        interpolated, y = self.between[level], self.y[level]
+        if interpolated is None:
+            return self.coarse_rows[level].aligned_with_finer(y), self.ratios[level]
+        self.finer_rows(level).run(kernels.interpolate, y, interpolated)
+        return interpolated, self.ratios[level]
+
+    def finer_rows(self, level: int) -> LocalRows:
+        """The rows of the next finer level."""
+        return self.coarse_rows[level - 1] if level > 0 else self.rows
 
     def smooth(
         self,
@@ -135,7 +225,7 @@ class Multigrid:
         Without `old` it is that of two sweeps from zero.
         """
         rhs, rows = self.rhs[level], self.coarse_rows[level]
-        matrix = (rhs, self.ties[level], self.springs[level])
+        matrix = (rhs, self.stencils[level + 1], self.ties[level], self.springs[level])
         start = (rhs if old is None else old, rhs if coarse is None else coarse, ratio, old is None)
         rows.run_with_halo(kernels.smooth, *matrix, *start, new)
         rows.exchange_halo(new)
@@ -148,4 +238,6 @@ class Multigrid:
                 source = (contact_state, threshold, 0)
             else:
                 source = (self.weights[level - 1], WHOLE_WEIGHT, 1)
-            rows.run_from_finer(kernels.compute_ties, source, targets)
+            halved = self.between[level] is None
+            kernel = kernels.compute_ties if halved else kernels.compute_any_ties
+            rows.run_from_finer(kernel, source, targets)

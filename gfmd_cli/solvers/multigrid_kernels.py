@@ -1,7 +1,8 @@
 """Compiled kernels of the multigrid cycle; see `multigrid`.
 
-Each kernel goes through the rows of a level and keeps the few rows that its stencils need in ring
-buffers, so that no field is written between two stencils. Rows in ring buffers have two more values
+Most kernels go through the rows of a level and keep the few rows that the stencils need in ring
+buffers, so that no field is written between two stencils. Those at the end of the file restrict and
+interpolate between levels of any numbers of points, which takes a pass over a field of its own. Rows in ring buffers have two more values
 at either end. The rows above the first and below the last row are those at the other end of the
 array, which are the halo in a slab decomposition.
 """
@@ -10,10 +11,11 @@ import numpy as np
 
 from gfmd_cli.grid.compilation import kernel, part_of_kernel
 
-PLATE = 20.0  # diagonal element of the squared five-point Laplacian (a plate)
+PLATE = 20.0  # diagonal element of the squared five-point Laplacian with weights of 1
 DAMPING = 0.55  # of the Jacobi iteration
 WHOLE_WEIGHT = 4  # weight of a point held, in quarters
-ZERO, HALF, FOUR = np.float32(0.0), np.float32(0.5), np.float32(4.0)
+TIES_PER_QUARTER = 16  # units of the ties per unit of the weights
+ZERO, HALF, ONE, TWO, FOUR = map(np.float32, (0.0, 0.5, 1.0, 2.0, 4.0))
 
 
 @part_of_kernel
@@ -63,10 +65,31 @@ def _wrap(row):  # type: ignore[no-untyped-def]
 
 
 @part_of_kernel
-def _laplacian(up, mid, down, out):  # type: ignore[no-untyped-def]
+def _at(up, mid, down, stencil, j):  # type: ignore[no-untyped-def]
+    """Negative five-point Laplacian at column j; the stencil has the weights along y and x.
+
+    It is None where both are 1: the compiler then leaves the products out.
+    """
+    if stencil is None:
+        return FOUR * mid[j] - (up[j] + down[j] + mid[j - 1] + mid[j + 1])
+    y, x = stencil
+    return TWO * (y + x) * mid[j] - (y * (up[j] + down[j]) + x * (mid[j - 1] + mid[j + 1]))
+
+
+@part_of_kernel
+def _laplacian(up, mid, down, stencil, out):  # type: ignore[no-untyped-def]
     """Negative five-point Laplacian of a row, in rows with two more values at either end."""
     for j in range(1, mid.size - 1):
-        out[j] = FOUR * mid[j] - (up[j] + down[j] + mid[j - 1] + mid[j + 1])
+        out[j] = _at(up, mid, down, stencil, j)
+
+
+@part_of_kernel
+def _diagonal(stencil):  # type: ignore[no-untyped-def]
+    """Diagonal element of the squared five-point Laplacian (a plate)."""
+    if stencil is None:
+        return PLATE
+    y, x = np.float64(stencil[0]), np.float64(stencil[1])
+    return 4 * (y + x) ** 2 + 2 * (y**2 + x**2)
 
 
 @part_of_kernel
@@ -80,8 +103,15 @@ def _restrict(up, mid, down, coarse):  # type: ignore[no-untyped-def]
 
 @part_of_kernel
 def _interpolate(coarse, k, ratio, out):  # type: ignore[no-untyped-def]
-    """Write ratio times row k of P coarse to a row of a ring buffer."""
+    """Write ratio times row k of P coarse to a row of a ring buffer.
+
+    A field that is as wide as the row is P coarse itself.
+    """
     rows, m = coarse.shape
+    if m == out.size - 4:
+        for j in range(m):
+            out[j + 2] = ratio * coarse[k, j]
+        return
     one, other = coarse[k // 2], coarse[((k + 1) // 2) % rows]
     half = HALF * ratio
     here = half * (one[0] + other[0])
@@ -96,42 +126,50 @@ def _interpolate(coarse, k, ratio, out):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def first_residual(sigma, contact_state, threshold, coarse, a, b):  # type: ignore[no-untyped-def]
-    """Restrict the residual of the force after one Jacobi sweep from zero to `coarse`."""
+def first_residual(sigma, contact_state, threshold, stencil, coarse, a, b):  # type: ignore[no-untyped-def]
+    """Restrict the residual of the force after one Jacobi sweep from zero to `coarse`.
+
+    The residual itself is written to a field that is as wide as `sigma`.
+    """
     height, n = sigma.shape
-    step = np.float32(DAMPING / PLATE)
+    step = np.float32(DAMPING / _diagonal(stencil))
     force, laplacian = np.empty((5, n + 4), np.float32), np.empty((3, n + 4), np.float32)
     defect = np.empty((3, n + 1), np.float32)
-    for i in range(2 * a - 5, 2 * b):
+    ratio = 1 if coarse.shape[1] == n else 2
+    for i in range(ratio * a - ratio - 3, ratio * b):
         # row i + 2 of the force, i + 1 of its Laplacian, i of the residual
         k = (i + 2) % height
         new, held, stress = force[(i + 2) % 5], contact_state[k], sigma[k]
         for j in range(n):
             new[j + 2] = ZERO if held[j] >= threshold else -np.float32(stress[j])
         _wrap(new)
-        _laplacian(force[i % 5], force[(i + 1) % 5], new, laplacian[(i + 1) % 3])
-        if i < 2 * a - 1:
+        _laplacian(force[i % 5], force[(i + 1) % 5], new, stencil, laplacian[(i + 1) % 3])
+        if i < ratio * (a - 1) + 1:
             continue
         up, mid, down = laplacian[(i - 1) % 3], laplacian[i % 3], laplacian[(i + 1) % 3]
         source, row, held = force[i % 5], defect[i % 3], contact_state[i % height]
         for j in range(n):
             c = j + 2
-            plate = FOUR * mid[c] - (up[c] + down[c] + mid[c - 1] + mid[c + 1])
+            plate = _at(up, mid, down, stencil, c)
             row[j + 1] = ZERO if held[j] >= threshold else source[c] - step * plate
         row[0] = row[n]
-        if i % 2 == 1 and i > 2 * a:
+        if ratio == 1:
+            coarse[i] = row[1:]
+        elif i % 2 == 1 and i > 2 * a:
             _restrict(defect[(i - 2) % 3], defect[(i - 1) % 3], defect[i % 3], coarse[i // 2])
 
 
 @kernel
-def last_smooth(sigma, contact_state, threshold, coarse, ratio, scale, change, padded, out, a, b):  # type: ignore[no-untyped-def]
+def last_smooth(  # type: ignore[no-untyped-def]
+    sigma, contact_state, threshold, stencil, coarse, ratio, scale, change, padded, out, a, b
+):
     """Write z, one Jacobi sweep on the sum of the first sweep and P coarse, to `padded`.
 
     Returns the sums of `Multigrid.apply`. `change` and `padded` have no halo.
     """
     height, n = sigma.shape
     halo = (height - change.shape[0]) // 2
-    step = np.float32(DAMPING / PLATE)
+    step = np.float32(DAMPING / _diagonal(stencil))
     x, laplacian = np.empty((5, n + 4), np.float32), np.empty((3, n + 4), np.float32)
     for i in range(a - 4, b):
         k = (i + 2) % height
@@ -141,7 +179,7 @@ def last_smooth(sigma, contact_state, threshold, coarse, ratio, scale, change, p
             moved = new[j + 2] - step * np.float32(stress[j])
             new[j + 2] = ZERO if held[j] >= threshold else moved
         _wrap(new)
-        _laplacian(x[i % 5], x[(i + 1) % 5], new, laplacian[(i + 1) % 3])
+        _laplacian(x[i % 5], x[(i + 1) % 5], new, stencil, laplacian[(i + 1) % 3])
         if i < a:
             continue
         up, mid, down = laplacian[(i - 1) % 3], laplacian[i % 3], laplacian[(i + 1) % 3]
@@ -150,7 +188,7 @@ def last_smooth(sigma, contact_state, threshold, coarse, ratio, scale, change, p
         slope = turned = 0.0
         for j in range(n):
             c = j + 2
-            plate = FOUR * mid[c] - (up[c] + down[c] + mid[c - 1] + mid[c + 1])
+            plate = _at(up, mid, down, stencil, c)
             s = np.float32(stress[j])
             z = source[c] - step * (s + plate)
             z = ZERO if held[j] >= threshold else z * scale
@@ -161,7 +199,7 @@ def last_smooth(sigma, contact_state, threshold, coarse, ratio, scale, change, p
 
 
 @part_of_kernel
-def _residual_row(i, x, laplacian, ties, spring, rhs, out):  # type: ignore[no-untyped-def]
+def _residual_row(i, x, laplacian, stencil, ties, spring, rhs, out):  # type: ignore[no-untyped-def]
     """Write row i of the residual rhs - A x to `out`; `x` and `laplacian` are ring buffers."""
     height, n = rhs.shape
     xu, xm, xd = x[(i - 1) % 5], x[i % 5], x[(i + 1) % 5]
@@ -173,7 +211,7 @@ def _residual_row(i, x, laplacian, ties, spring, rhs, out):  # type: ignore[no-u
     # Four loops, because the compiler does not vectorise one loop over as many arrays.
     for j in range(n):
         c = j + 2
-        plate = FOUR * mid[c] - (up[c] + down[c] + mid[c - 1] + mid[c + 1])
+        plate = _at(up, mid, down, stencil, c)
         out[j + 1] = b[j] - plate
     for j in range(n):
         c, t = j + 2, j + 1
@@ -191,14 +229,15 @@ def _residual_row(i, x, laplacian, ties, spring, rhs, out):  # type: ignore[no-u
 
 
 @kernel
-def smooth(rhs, ties, spring, old, coarse, ratio, is_zero, y, a, b):  # type: ignore[no-untyped-def]
+def smooth(rhs, stencil, ties, spring, old, coarse, ratio, is_zero, y, a, b):  # type: ignore[no-untyped-def]
     """Write the result of one Jacobi sweep on x to `y`.
 
     x is the result of a sweep from zero where `is_zero`, else `old`, plus P coarse where the ratio
     of the scales is positive.
     """
     height, n = rhs.shape
-    unit, plate = spring * np.float32(1 / DAMPING), np.float32(PLATE / DAMPING)
+    unit = spring * np.float32(1 / DAMPING)
+    plate = np.float32(_diagonal(stencil) / DAMPING)
     x, laplacian = np.empty((5, n + 4), np.float32), np.empty((3, n + 4), np.float32)
     defect = np.empty(n + 1, np.float32)
     for i in range(a - 4, b):
@@ -216,9 +255,9 @@ def smooth(rhs, ties, spring, old, coarse, ratio, is_zero, y, a, b):  # type: ig
             for j in range(n):
                 new[j + 2] = source[j]
         _wrap(new)
-        _laplacian(x[i % 5], x[(i + 1) % 5], new, laplacian[(i + 1) % 3])
+        _laplacian(x[i % 5], x[(i + 1) % 5], new, stencil, laplacian[(i + 1) % 3])
         if i >= a:
-            _residual_row(i, x, laplacian, ties, spring, rhs, defect)
+            _residual_row(i, x, laplacian, stencil, ties, spring, rhs, defect)
             own, source, target = ties[i, 0], x[i % 5], y[i]
             for j in range(n):
                 diagonal = plate + unit * np.float32(own[j + 1])
@@ -226,21 +265,116 @@ def smooth(rhs, ties, spring, old, coarse, ratio, is_zero, y, a, b):  # type: ig
 
 
 @kernel
-def residual(rhs, y, ties, spring, coarse, a, b):  # type: ignore[no-untyped-def]
-    """Restrict the residual of y to `coarse`."""
+def residual(rhs, y, stencil, ties, spring, coarse, a, b):  # type: ignore[no-untyped-def]
+    """Restrict the residual of y to `coarse`, or write it to a field as wide as `y`."""
     height, n = rhs.shape
     x, laplacian = np.empty((5, n + 4), np.float32), np.empty((3, n + 4), np.float32)
     defect = np.empty((3, n + 1), np.float32)
-    for i in range(2 * a - 5, 2 * b):
+    ratio = 1 if coarse.shape[1] == n else 2
+    for i in range(ratio * a - ratio - 3, ratio * b):
         new, source = x[(i + 2) % 5], y[(i + 2) % height]
         for j in range(n):
             new[j + 2] = source[j]
         _wrap(new)
-        _laplacian(x[i % 5], x[(i + 1) % 5], new, laplacian[(i + 1) % 3])
-        if i < 2 * a - 1:
+        _laplacian(x[i % 5], x[(i + 1) % 5], new, stencil, laplacian[(i + 1) % 3])
+        if i < ratio * (a - 1) + 1:
             continue
         row = defect[i % 3]
-        _residual_row(i, x, laplacian, ties, spring, rhs, row)
+        _residual_row(i, x, laplacian, stencil, ties, spring, rhs, row)
         row[0] = row[n]
-        if i % 2 == 1 and i > 2 * a:
+        if ratio == 1:
+            coarse[i] = row[1:]
+        elif i % 2 == 1 and i > 2 * a:
             _restrict(defect[(i - 2) % 3], defect[(i - 1) % 3], row, coarse[i // 2])
+
+
+@part_of_kernel
+def _hats(n, m):  # type: ignore[no-untyped-def]
+    """The two of m hats that reach each of n points, and the share of the second one."""
+    left, right, share = np.empty(n, np.int32), np.empty(n, np.int32), np.empty(n, np.float32)
+    for i in range(n):
+        left[i], right[i] = i * m // n, (i * m // n + 1) % m
+        share[i] = np.float32(i * m % n) / np.float32(n)
+    return left, right, share
+
+
+@part_of_kernel
+def _reach(k, n, m):  # type: ignore[no-untyped-def]
+    """First of n points that hat k of m reaches, and the one after the last."""
+    return -((1 - k) * n // m), -(-(k + 1) * n // m)
+
+
+@kernel
+def restrict(fine, coarse, a, b):  # type: ignore[no-untyped-def]
+    """Write P^T fine to `coarse`, for any numbers of points."""
+    (height, n), (rows, m) = fine.shape, coarse.shape
+    left, right, share = _hats(n, m)
+    column = np.empty(n, np.float32)
+    for k in range(a, b):
+        column[:] = ZERO
+        first, end = _reach(k, height, rows)
+        for i in range(first, end):
+            value = np.float32(1 - abs(i * rows - k * height) / height)
+            row = fine[i % height]
+            for j in range(n):
+                column[j] += value * row[j]
+        target = coarse[k]
+        target[:] = ZERO
+        for j in range(n):
+            target[left[j]] += (ONE - share[j]) * column[j]
+            target[right[j]] += share[j] * column[j]
+
+
+@kernel
+def interpolate(coarse, fine, a, b):  # type: ignore[no-untyped-def]
+    """Write P coarse to `fine`, for any numbers of points."""
+    (height, n), (rows, m) = fine.shape, coarse.shape
+    left, right, share = _hats(n, m)
+    row = np.empty(m, np.float32)
+    for i in range(a, b):
+        k = i * rows // height
+        one, other, value = coarse[k], coarse[(k + 1) % rows], np.float32(i * rows / height - k)
+        for j in range(m):
+            row[j] = one[j] + value * (other[j] - one[j])
+        for j in range(n):
+            here = row[left[j]]
+            fine[i, j] = here + share[j] * (row[right[j]] - here)
+
+
+@kernel
+def compute_any_ties(fine, threshold, weighted, ties, weights, a, b):  # type: ignore[no-untyped-def]
+    """The same as `compute_ties`, rounded, for any numbers of points."""
+    (height, n), (rows, m) = fine.shape, weights.shape
+    left, right, share = _hats(n, m)
+    columns, sums = np.empty((3, n), np.float32), np.empty((5, m), np.float32)
+    down, tied, loaded = columns[0], columns[1], columns[2]
+    own, east, south, cross, weight = sums[0], sums[1], sums[2], sums[3], sums[4]
+    for k in range(a, b):
+        columns[:] = ZERO
+        sums[:] = ZERO
+        first, end = _reach(k, height, rows)
+        for i in range(first, end):
+            value = np.float32(1 - abs(i * rows - k * height) / height)
+            below = ONE - value if i * rows > k * height else ZERO  # of the next hat
+            row = fine[i % height]
+            for j in range(n):
+                w = np.float32(_weight(row[j], threshold, weighted)) * value
+                loaded[j] += w
+                tied[j] += value * w
+                down[j] += below * w
+        for j in range(n):
+            e, o, t = left[j], right[j], share[j]
+            s = ONE - t
+            weight[e] += s * loaded[j]
+            weight[o] += t * loaded[j]
+            own[e] += s * s * tied[j]
+            own[o] += t * t * tied[j]
+            east[e] += s * t * tied[j]
+            south[e] += s * s * down[j]
+            south[o] += t * t * down[j]
+            cross[e] += s * t * down[j]
+        for j in range(m):
+            weights[k, j] = min(WHOLE_WEIGHT, int(weight[j] + HALF))
+            for kind in range(4):
+                ties[k, kind, j + 1] = int(np.float32(TIES_PER_QUARTER) * sums[kind, j] + HALF)
+        ties[k, :, 0] = ties[k, :, m]

@@ -13,11 +13,11 @@ from gfmd_cli.physics.contact import Contact
 from gfmd_cli.physics.observables import contact_pressure
 from gfmd_cli.solvers.local_start import COARSE_TOLERANCE, start_from
 from gfmd_cli.solvers.loop import Solver, State, Watch, ignore, solve
+from gfmd_cli.solvers.multigrid import ASPECT
 from gfmd_cli.status import Status
 
 COARSEST = 64  # points per side of a square; a solve on as many points costs next to nothing
 FEWEST = 8  # points along an axis that is not coarsened; a choice: fewer resolve no contact
-ASPECT = 1.5  # of pixels beyond which only the finer of their axes is coarsened; 1 / (2 / 1.5) then
 SAME_HEIGHT = 1000  # units of rounding by which indenters on other numbers of processes differ
 
 

@@ -84,10 +84,12 @@ def select(contact: Contact, contact_state: ContactState, threshold: int) -> Sel
     grid.rows.exchange_halo(contact_state)
     held, changes = grid.rows.sums_with_halo(2, _pattern, contact_state, threshold)
     screening, chord, exponent = _screening(contact, float(held), float(changes))
-    if grid.dimension == 1 or level_count(grid, COARSEST) == 1:
+    if grid.dimension == 1:
         return Selection(screening, False)
     if suits(contact):
         return Selection(screening, exponent > STEEP)
+    if level_count(grid, COARSEST) == 1:
+        return Selection(screening, False)
     # Measured on the default surface, p* = 0.001 to 1, and a paraboloid, 512^2, CPU seconds: the
     # sum over levels and the Green's function are equal at n = 1; for n = 2, 3, 4 the sum is faster
     # from chords of about 10, 20, 30 grid spacings on, 5 times at n = 3 and a chord of 250.

@@ -159,7 +159,7 @@ check_other_grids((72, 33), (97, 64))
 check_other_grids((67, 50), (67, 40))
 for size in (64, 96, 100, 512):
     check_levels(size)
-for size, exponent in ((64, 1), (96, 2), (128, 3), (160, 4)):
+for size, exponent in ((64, 1), (96, 2), (128, 3), (160, 4), (88, 2)):
     check_preconditioners(size, exponent)
 check_against_mpi4py_fft(64)
 sys.exit(0)
