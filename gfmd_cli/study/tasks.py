@@ -15,6 +15,7 @@ from gfmd_cli.physics.elastomers import LinearElastomer
 from gfmd_cli.physics.indenters import RigidSurface
 from gfmd_cli.physics.surfaces import check_resolved
 from gfmd_cli.solvers.auto import AnySolver
+from gfmd_cli.solvers.multigrid import ASPECT
 from gfmd_cli.spec.boundary import with_boundary
 from gfmd_cli.spec.models import (
     SOUGHT,
@@ -31,6 +32,9 @@ STIFFNESS_FIELDS, SPECTRA_FIELDS = 3.0, 1.0
 """Fields that output.stiffness and output.spectra add to those of the solver, by peak memory."""
 STORED_FIELDS, ACCURACY_FIELDS = 1.0, 0.5
 """Fields that each name in output.fields, and [accuracy], add, by peak memory."""
+OBLONG_FIELDS, ODD_FIELDS = 4.5, 0.5
+"""Fields that coarser grids and levels add where only the shorter side of the pixels is coarsened,
+and where an odd number of points is, by peak memory."""
 BASE_BYTES = 240e6
 """Memory of the interpreter and its libraries."""
 FIRST = 64  # points along x that "auto" begins with at the least; such a solve costs nothing
@@ -142,7 +146,18 @@ class Task:
         fields += SPECTRA_FIELDS if self.output.spectra else 0.0
         fields += STORED_FIELDS * len(self.output.fields)
         fields += ACCURACY_FIELDS if self.accuracy is not None else 0.0
+        fields += self._fields_of_levels(points)
         return fields * 8 * float(points * self.points_y_on(points)) + BASE_BYTES
+
+    def _fields_of_levels(self, points: int) -> float:
+        """Fields that coarser grids and levels add where the points are not halved."""
+        if self.surface.dimension == 1 or self.boundary != "periodic":
+            return 0.0
+        shape = (self.points_y_on(points), points)
+        dy, dx = (side / count for side, count in zip(self.surface.sides, shape, strict=True))
+        if max(dy, dx) > ASPECT * min(dy, dx):
+            return OBLONG_FIELDS
+        return ODD_FIELDS if any(count % 2 for count in shape) else 0.0
 
     @property
     def least_points(self) -> int:
