@@ -215,7 +215,7 @@ def test_bad_input_names_key_place_and_what_is_allowed(read, change, words):
     [
         ("load.p_star=-1", ["--set load.p_star=-1", "greater than 0"]),
         ("nonsense", ["key.name=value"]),
-        ("study.name.x=1", ["no table"]),
+        ("study.name.x=1", ["not a table"]),
         ("grid.points={", ["not a TOML value"]),
     ],
 )

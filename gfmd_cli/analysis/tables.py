@@ -219,7 +219,7 @@ def observables_table(curves: TitledCurves) -> Table:
         if any(known(row[column.name]) for column in columns for row in curve.rows)
     ]
     meanings = [
-        column.meaning
+        column.meaning[:1].upper() + column.meaning[1:]
         for column in columns
         if any(known(row[column.name]) for _, curve in stored for row in curve.rows)
     ]

@@ -92,7 +92,9 @@ def run(
         from gfmd_cli.spec.parse import read_spec
 
         if overwrite and output is not None and len(specs) > 1:
-            raise InputError("--overwrite: with -o, each of several specs would begin anew")
+            raise InputError(
+                "--overwrite: not with -o and several specs; each would start a new study"
+            )
         read = [read_spec(spec, overrides) for spec in specs]
         missed = sum(_run(*each, output, dry_run, quiet, how) for each in read)
     sys.exit(1 if missed else 0)

@@ -61,8 +61,8 @@ class LinearElastomer(Choice):
         if not self.decays(dimension):
             raise InputError(
                 f'grid.boundary: "free" needs an elastomer whose displacement decays with the '
-                f"distance from the load; {self.label} in {dimension} "
-                f'dimension{"s"[: dimension - 1]} has none: use "periodic"'
+                f"distance from the load; that of {self.label} in {dimension} "
+                f'dimension{"s"[: dimension - 1]} does not: use "periodic"'
             )
 
     @property

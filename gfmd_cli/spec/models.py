@@ -234,7 +234,9 @@ class SweepTable(Choice):
             table, _, key = address.partition(".")
             if table not in (*SWEPT, "load") or not key:
                 tables = ", ".join((*SWEPT, "load"))
-                raise ValueError(f"paired takes TABLE.KEY, TABLE one of {tables}; got {address!r}")
+                raise ValueError(
+                    f"paired needs TABLE.KEY, TABLE one of {tables}; got {address!r}"
+                )
         return self
 
 
@@ -394,7 +396,7 @@ def refuse_other(stored: Any, spec: "Spec", message: str) -> None:
     changed = differences(stored, spec.resolved())
     if changed:
         shown = "\n".join(f"  {line}" for line in changed[:20])
-        raise InputError(f"{message}\nStored -> asked for:\n{shown}")
+        raise InputError(f"{message}\nStored -> requested:\n{shown}")
 
 
 def _short(value: Any) -> str:

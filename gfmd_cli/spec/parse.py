@@ -327,8 +327,8 @@ def _discord(tables: dict[str, Any], where: _Where) -> list[str]:
     auto = any(grid.points == "auto" for grid in tables.get("grid", []))
     if auto and accuracy is None:
         problems.append(
-            f'{where("grid.points")}: grid.points: "auto" takes a table [accuracy] that says '
-            "what is good enough, such as mean_gap = 0.01"
+            f'{where("grid.points")}: grid.points: "auto" needs a table [accuracy] with '
+            "the accuracy to reach, such as mean_gap = 0.01"
         )
     if any(grid.points == "auto" and grid.points_y is not None for grid in tables.get("grid", [])):
         problems.append(
@@ -337,8 +337,8 @@ def _discord(tables: dict[str, Any], where: _Where) -> list[str]:
         )
     if auto and load is not None and load.quantity in SOUGHT:
         problems.append(
-            f'{where("grid.points")}: grid.points: "auto" takes load.p_star or load.pressure; '
-            f"load.{load.quantity} is that of a given grid"
+            f'{where("grid.points")}: grid.points: "auto" needs load.p_star or load.pressure; '
+            f"load.{load.quantity} is searched on a given grid"
         )
     free = any(grid.boundary == "free" for grid in tables.get("grid", []))
     if free and (output := tables.get("output")) is not None:

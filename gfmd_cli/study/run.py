@@ -110,7 +110,7 @@ def _check_shared(spec: Spec) -> None:
 def _move_aside(study: Study, shard: tuple[int, int], ranks: Ranks | None) -> list[str]:
     """Rename a study that is to be solved anew; say where it is. Raises InputError."""
     if shard[1] != 1:
-        raise InputError("--overwrite: not with --shard, of which each would begin anew")
+        raise InputError("--overwrite: not with --shard; each shard would start a new study")
     moved: list[str] = []
     with together(ranks):
         if leads(ranks):

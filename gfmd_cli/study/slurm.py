@@ -163,7 +163,7 @@ def _stored(path: Path, words: list[str]) -> str:
         raise InputError(f"{path}: not as `gfmd submit` wrote it; give --shards N for a new one")
     if study[1] != shlex.join(words):
         raise InputError(
-            f"{path}: runs {study[1]}\nasked for: {shlex.join(words)}\n"
+            f"{path}: runs {study[1]}\nrequested: {shlex.join(words)}\n"
             "Repeat -o and --set as they were, or give --shards N for a new script."
         )
     return text
@@ -211,7 +211,7 @@ def option(text: str) -> str:
     if not re.fullmatch(r"[a-z][a-z-]*", name):
         raise InputError(f"--sbatch {text!r}: write an option of sbatch, such as --sbatch qos=long")
     if name in OURS:
-        raise InputError(f"--sbatch {text!r}: --{name} is for gfmd submit to set")
+        raise InputError(f"--sbatch {text!r}: gfmd submit sets --{name} itself")
     return _one_line(f"--{bare}")
 
 
