@@ -74,3 +74,12 @@ def test_a_task_beyond_the_memory_is_refused_with_both_numbers(tasks, machine):
     machine(8, 2.0**30)
     with pytest.raises(InputError, match=r"8192 points .* GiB .* 0.9 GiB"):
         resources.check_memory(tasks("grid.points=8192"))
+
+
+def test_oblong_pixels_and_odd_numbers_of_points_take_more_memory(tasks):
+    """Of the same number of points: the next coarser grid has half the points, not a quarter."""
+    square = tasks("grid.points=1024", "surface.length_y=0.5")[0]
+    oblong = tasks("grid.points=1024", "grid.points_y=512", "surface.length_y=1.0")[0]
+    odd = tasks("grid.points=1024", "grid.points_y=511", "surface.length_y=0.5")[0]
+    assert square.size == oblong.size
+    assert square.bytes < odd.bytes < oblong.bytes

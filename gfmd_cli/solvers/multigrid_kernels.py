@@ -2,9 +2,9 @@
 
 Most kernels go through the rows of a level and keep the few rows that the stencils need in ring
 buffers, so that no field is written between two stencils. Those at the end of the file restrict and
-interpolate between levels of any numbers of points, which takes a pass over a field of its own. Rows in ring buffers have two more values
-at either end. The rows above the first and below the last row are those at the other end of the
-array, which are the halo in a slab decomposition.
+interpolate between levels of any numbers of points, which takes a pass over a field of its own.
+Rows in ring buffers have two more values at either end. The rows above the first and below the last
+row are those at the other end of the array, which are the halo in a slab decomposition.
 """
 
 import numpy as np
