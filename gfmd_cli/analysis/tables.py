@@ -206,7 +206,7 @@ def seeds_table(comparison: Comparison) -> Table:
 def true_contact_table(curves: TitledCurves) -> Table:
     """Persson theory with Delta_sigma over the contact."""
     stored = [pair for pair in curves if true_contact_areas(pair[1])]
-    caption = "Persson theory with Delta_sigma of the true contact instead of the whole surface."
+    caption = "Persson theory with Delta_sigma over the contact instead of over the whole surface."
     return over_pressure(TRUE_CONTACT, caption, stored)
 
 
