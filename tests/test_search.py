@@ -161,7 +161,7 @@ def test_a_load_in_a_jump_of_the_area_is_warned_of(gfmd):
         (("load={contact_area=1.0}",), "less than 1"),
         (("load={contact_area=0.1, p_star=1}",), "give one of p_star"),
         (("load={p_star=0.1, tolerance=0.01}",), "tolerance belongs to"),
-        (("grid.points='auto'", "accuracy={mean_gap=0.1}"), "that of a given grid"),
+        (("grid.points='auto'", "accuracy={mean_gap=0.1}"), "searched on a given grid"),
     ],
 )
 def test_what_makes_no_sense_is_refused(spec_of, overrides, told):

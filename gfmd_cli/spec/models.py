@@ -234,9 +234,7 @@ class SweepTable(Choice):
             table, _, key = address.partition(".")
             if table not in (*SWEPT, "load") or not key:
                 tables = ", ".join((*SWEPT, "load"))
-                raise ValueError(
-                    f"paired needs TABLE.KEY, TABLE one of {tables}; got {address!r}"
-                )
+                raise ValueError(f"paired needs TABLE.KEY, TABLE one of {tables}; got {address!r}")
         return self
 
 
