@@ -216,7 +216,7 @@ def test_a_study_in_the_queue_is_not_submitted_twice(gfmd, calls, tmp_path):
         (("--shards", "0"), "take 1 to 4"),
         (("--shards", "2", "--time", "soon"), "such as 12:00:00"),
         (("--shards", "2", "--account", "a\n#SBATCH --uid=0"), "printable"),
-        (("--shards", "2", "--sbatch", "array=0-99"), "for gfmd submit to set"),
+        (("--shards", "2", "--sbatch", "array=0-99"), "gfmd submit sets --"),
         (("--shards", "2", "--sbatch", "; rm"), "such as --sbatch qos=long"),
         (("--shards", "2", "-o", "a\nb.h5"), "printable"),
         (("--shards", "2", "--set", "grid.points=3"), "grid.points"),
