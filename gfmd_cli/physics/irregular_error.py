@@ -40,12 +40,14 @@ def _scale(name: str, fine: Level, change: float, unit: float) -> float:
     return hypot(change, FLOOR[name] * unit * fine.line)
 
 
-def area_by_change(fine: Level, coarse: Level) -> Estimate:
+def area_by_change(
+    fine: Level, coarse: Level, continuum_factor: float = CONTINUUM_FACTOR
+) -> Estimate:
     """Relative contact area: of first order in the spacing, as contact lines are a point wide."""
     change = fine.a_r - coarse.a_r
     scale = _scale("a_r", fine, change, 1.0)
     best = min(max(fine.a_r + change, 0.0), 1.0)
-    error, rest = (factor * scale for factor in (FACTOR["a_r"], CONTINUUM_FACTOR))
+    error, rest = (factor * scale for factor in (FACTOR["a_r"], continuum_factor))
     whole, part = max(fine.a_r, 1 - fine.a_r), max(best, 1 - best)
     return Estimate(min(error, whole), best, min(rest, part), "regular")
 
@@ -57,8 +59,8 @@ def stress_by_change(fine: Level, coarse: Level, factor: float = FACTOR["sigma_p
     return Estimate(error, fine.sigma_p, error, "regular")
 
 
-def gap_by_change(fine: Level, coarse: Level) -> Estimate:
+def gap_by_change(fine: Level, coarse: Level, factor: float = FACTOR["u_g"]) -> Estimate:
     """Mean gap; the value on the grid is the best estimate."""
     scale = _scale("u_g", fine, fine.u_g - coarse.u_g, fine.u_g / fine.a_r)
-    error = FACTOR["u_g"] * scale
+    error = factor * scale
     return Estimate(error, fine.u_g, error, "regular")
