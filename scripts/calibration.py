@@ -70,6 +70,8 @@ class Case:
     """Whether the constants of the estimates were fitted to it, among others."""
     boundary: str = "periodic"
     """The boundary of the map."""
+    aspect: int = 1
+    """Spacing along y over that along x; `base` counts the points along y."""
 
     @property
     def body(self) -> bool:
@@ -131,6 +133,41 @@ def free_cases(folder: Path, seed: int) -> list[Case]:
             if body.decays(1):
                 add("line", body, irregular_map("random", draw, 128)[0, :64], 5)
     return out
+
+
+def shape_cases(folder: Path, seed: int) -> list[Case]:
+    """Random surfaces on oblong pixels, and random maps with holes, filled in or void."""
+    draw, out = np.random.default_rng(seed + 4), []
+    for n in MAP_EXPONENTS:
+        for aspect in (2, 4):
+            for base in (32, 32, 48):
+                surface = SelfAffine(
+                    hurst=float(draw.choice([0.3, 0.8])),
+                    rolloff=float(draw.choice([0.25, 0.5])),
+                    cutoff=1 / int(draw.choice([10, 12, 16])),
+                    seed=int(draw.integers(1, 10**6)),
+                )
+                p, name = float(draw.choice(PRESSURES[1:7])), f"n={n:g} pixels {aspect}:1"
+                body = Power(n=n)
+                out.append(Case(len(out), name, surface, body, p, base, 3, False, aspect=aspect))
+        for missing in ("fill", "void"):
+            for points in (32, 32, 48):
+                path = folder / f"{missing}-{seed}-{len(out)}.npy"
+                np.save(path, with_holes(irregular_map("random", draw, points), draw))
+                p, name = float(draw.choice(PRESSURES[1:7])), f"n={n:g} {missing}"
+                holed = FileSurface(path=path, missing=missing)
+                out.append(Case(len(out), name, holed, Power(n=n), p, points, 3, False))
+    return out
+
+
+def with_holes(heights: np.ndarray, draw: np.random.Generator) -> np.ndarray:
+    """Three round holes with radii of a fiftieth to a tenth of the side."""
+    points = len(heights)
+    y, x = np.mgrid[:points, :points]
+    for _ in range(3):
+        centre, radius = draw.uniform(0, points, 2), points * draw.uniform(0.02, 0.1)
+        heights[np.hypot(y - centre[0], x - centre[1]) <= max(radius, 0.8)] = np.nan
+    return heights
 
 
 def irregular_map(kind: str, draw: np.random.Generator, points: int) -> np.ndarray:
@@ -227,7 +264,8 @@ def height_map(kind: str, draw: np.random.Generator, points: int = 32) -> np.nda
 
 
 def scene_of(case: Case, points: int) -> Scene:
-    return SCENES[case.boundary](case.surface, case.elastomer, points)
+    shape = {"points_y": points} if case.aspect > 1 else {}
+    return SCENES[case.boundary](case.surface, case.elastomer, case.aspect * points, **shape)
 
 
 def measure(case: Case, tolerance: float = 1e-6) -> dict:
@@ -283,7 +321,9 @@ def _texture(case: Case, scene: Scene) -> dict:
     """The scales of a rough surface, as `estimate` needs them."""
     ratio = anisotropy(scene.grid, scene.height)
     limited = case.surface.band_limited
-    return asdict(roughness_scales(scene.shells, scene.grid.length, ratio, band_limited=limited))
+    shells, length, spacings = scene.shells, scene.grid.length, scene.grid.spacings
+    aspect = max(spacings) / min(spacings)
+    return asdict(roughness_scales(shells, length, ratio, band_limited=limited, aspect=aspect))
 
 
 def truth(levels: list[dict]) -> dict[str, float]:
@@ -416,6 +456,10 @@ def table(found: list[Score]) -> None:
             "layer",
             "part",
             "line",
+            "pixels 2:1",
+            "pixels 4:1",
+            "fill",
+            "void",
         ):
             line(
                 f"verify {quantity} {kind}",
@@ -481,12 +525,15 @@ def main() -> None:
     parser.add_argument("--figure", type=Path, help="path of a figure, without suffix")
     parser.add_argument("--maps", action="store_true", help="irregular maps instead")
     parser.add_argument("--free", action="store_true", help="maps with a free boundary instead")
+    parser.add_argument("--shapes", action="store_true", help="oblong pixels and holes instead")
     parser.add_argument("--scans", type=Path, help="with --maps: folder of maps of 64 x 64 points")
     chosen = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         if chosen.free:
             wanted = free_cases(folder, chosen.seed)
+        elif chosen.shapes:
+            wanted = shape_cases(folder, chosen.seed)
         elif chosen.maps:
             wanted = map_cases(folder, chosen.seed, chosen.scans)
         else:

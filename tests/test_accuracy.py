@@ -41,6 +41,33 @@ contact_area = 0.05
 QUANTITIES = ("a_r", "sigma_p", "u_g")
 
 
+HOLED = """\
+[surface]
+kind = "file"
+path = "holed.npy"
+[elastomer]
+kind = "power"
+n = 1
+[load]
+p_star = 0.3
+[grid]
+points = 64
+[accuracy]
+mean_gap = 0.5
+"""
+
+
+@pytest.mark.parametrize(("missing", "verdict"), [("void", "unknown"), ("fill", "regular")])
+def test_a_map_with_voids_has_no_error_bars(rows_of, tmp_path, missing, verdict):
+    """A hole has an edge, which no law describes."""
+    heights = SelfAffine(cutoff=0.1).heights(64, 64)
+    heights[20, 20] = np.nan
+    np.save(tmp_path / "holed.npy", heights)
+    keys = (f'surface.missing="{missing}"', 'surface.interpolation="fourier"')
+    (row,) = rows_of(*keys, text=HOLED)
+    assert [row[f"{name}_verdict"] for name in QUANTITIES] == [verdict] * 3
+
+
 # --- grids chosen by accuracy ---------------------------------------------------------------------
 
 

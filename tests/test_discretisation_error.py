@@ -203,6 +203,17 @@ def test_an_irregular_surface_is_unknown_where_no_bars_were_calibrated(n, known)
     assert sum(each.verdict == "regular" for each in made.values()) == known
 
 
+def test_the_area_on_oblong_pixels_has_the_bars_of_an_irregular_surface():
+    """Its excess is that of square pixels only where they are nearly square."""
+    for aspect, verdict in ((1.05, "regular"), (2.0, "unknown")):
+        rough = replace(ROUGH, aspect=aspect)
+        made = estimate(sequence(1.0, (64,)), 1.0, rough)
+        assert made["a_r"].verdict == verdict
+        assert made["u_g"] == estimate(sequence(1.0, (64,)), 1.0, ROUGH)["u_g"]
+    made = estimate(sequence(1.0), 1.0, rough)["a_r"]
+    assert made == estimate(sequence(1.0), 1.0, IRREGULAR[0])["a_r"]
+
+
 def test_few_contact_spots_on_one_grid_are_unknown():
     """Nine circles of the same size against eleven: area pi r^2, perimeter 8 r each."""
     for spots, verdict in ((9, "unknown"), (11, "regular")):

@@ -273,7 +273,7 @@ def _estimate_errors(task: Task, solved: Solved, grids: list[GridResult]) -> Non
 def _estimates(task: Task, solved: Solved, grids: list[GridResult]) -> dict[str, Estimate]:
     """Distance of the finest grid to the continuum, in the units of its scene."""
     scene = solved.scene
-    if not solved.solution.residual < UNSOLVED:
+    if not solved.solution.residual < UNSOLVED or scene.may_touch is not None:  # voids have no law
         return unknown()
     resolution, length = scene.grid.resolution, scene.grid.length
     levels = [
@@ -302,4 +302,5 @@ def _scales(task: Task, scene: Scene) -> RoughnessScales | None:
         scene.grid.length,
         anisotropy(scene.grid, scene.height),
         band_limited=task.surface.band_limited,
+        aspect=max(scene.grid.spacings) / min(scene.grid.spacings),
     )
