@@ -1,4 +1,5 @@
 import os
+import signal
 import sys
 
 # One thread for BLAS: side by side with other workers its threads spin for longer than they work.
@@ -21,6 +22,14 @@ if "GFMD_TEST_THREADS" in os.environ:  # `make test-portable`: on small grids to
     every_grid = int(os.environ["GFMD_TEST_THREADS"])
     Grid._threads = property(lambda grid: every_grid if grid.dimension == 2 else 1)
 
+
+# A shell lets its background jobs ignore these signals, and they would let what tests start do so.
+for number, default in {
+    signal.SIGINT: signal.default_int_handler,
+    signal.SIGQUIT: signal.SIG_DFL,
+}.items():
+    if signal.getsignal(number) is signal.SIG_IGN:
+        signal.signal(number, default)
 
 # Drawn examples are the same in every run, and may share a folder or a study.
 settings.register_profile(

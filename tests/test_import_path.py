@@ -49,8 +49,6 @@ def test_the_batch_script_imports_nothing_from_the_working_directory(folder, com
 SIGNALLED = """
 import os, signal, sys
 number, module = int(sys.argv[1]), sys.argv[2]
-default = signal.default_int_handler if number == signal.SIGINT else signal.SIG_DFL
-signal.signal(number, default)  # ignored in background jobs of a shell, and under nohup
 
 class Finder:  # of no module: it sends the signal as one is looked for
     def find_spec(self, name, *_):

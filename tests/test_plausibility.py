@@ -65,6 +65,18 @@ def test_a_map_that_is_too_steep(tmp_path):
     assert set(FileSurface(path=tmp_path / "h.npy", length=1e-5).remarks()) <= set(warnings)
 
 
+@pytest.mark.parametrize(
+    ("missing", "share", "warned"),
+    [("fill", 0.04, False), ("fill", 0.2, True), ("void", 0.2, False)],
+)
+def test_heights_that_are_mostly_filled_in(tmp_path, missing, share, warned):
+    heights = np.random.default_rng(1).normal(0, 1e-9, (50, 50))
+    heights[: round(50 * share)] = np.nan
+    np.save(tmp_path / "h.npy", heights)
+    remarks = FileSurface(path=tmp_path / "h.npy", length=1e-5, missing=missing).remarks()
+    assert any(f"{share:.0%} of the heights are missing" in remark for remark in remarks) == warned
+
+
 def test_a_step_across_the_border_matters_only_where_the_map_is_repeated():
     ramp = np.linspace(0, 1e-8, 32) + np.random.default_rng(0).normal(0, 1e-11, (32, 32))
     for boundary, warned in (("periodic", True), ("free", False)):

@@ -252,10 +252,14 @@ class FileSurface(RigidSurface):
         return _topography(self.path, self.dataset, self.region, self.flip, self.crop)
 
     def remarks(self, boundary: str = "periodic") -> list[str]:
-        """Warnings about a missing side, a steep gradient and a step across the border."""
-        repeated = boundary == "periodic" and not self.has_borders
+        """Warnings about the map, for `grid.boundary`; see `map_remarks`."""
+        topography = self._topography()
         return map_remarks(
-            _prepared(self), self.sides, unsized=self.has_no_length(), repeated=repeated
+            _prepared(self),
+            self.sides,
+            unsized=self.has_no_length(),
+            repeated=boundary == "periodic" and not self.has_borders,
+            filled=topography.holes / topography.heights.size if self.missing == "fill" else 0.0,
         )
 
     def preparation(self, boundary: str = "") -> str:

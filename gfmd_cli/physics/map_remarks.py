@@ -7,12 +7,13 @@ from gfmd_cli.physics.map_preparation import border_step
 
 STEEP = 3.0  # rms gradient; a choice: surfaces of machined or worn solids have less
 CLIFF = 5.0  # ratio of the step across the border to that inside; a choice: 1 if periodic
+FILLED = 0.05  # share of filled heights; a choice, as for the frame of the window
 
 
 def map_remarks(
-    heights: Field, sides: tuple[float, ...], *, unsized: bool, repeated: bool
+    heights: Field, sides: tuple[float, ...], *, unsized: bool, repeated: bool, filled: float
 ) -> list[str]:
-    """Warnings about a missing side, a steep gradient and a step across the border.
+    """Warnings about a missing side, filled heights, a steep gradient and a step at the border.
 
     Parameters
     ----------
@@ -20,10 +21,16 @@ def map_remarks(
     sides : sides of their cell [m]
     unsized : whether neither the spec nor the file gives the side
     repeated : whether the map is taken as periodic
+    filled : share of the heights that are missing and were filled in
     """
     remarks = []
     if unsized:
         remarks.append("the file does not state its side; L = 1 m is assumed: set surface.length")
+    if filled > FILLED:
+        remarks.append(
+            f"{filled:.0%} of the heights are missing and were filled in: contact there was not "
+            'measured; set surface.region, or surface.missing = "void" where nothing can touch'
+        )
     points_per_metre = (n / side for n, side in zip(heights.shape, sides, strict=True))
     slopes = (np.diff(heights, axis=i) * each for i, each in enumerate(points_per_metre))
     gradient = np.sqrt(sum(float(np.mean(slope**2)) for slope in slopes))
