@@ -154,7 +154,8 @@ def first_residual(sigma, contact_state, threshold, stencil, coarse, a, b):  # t
             row[j + 1] = ZERO if held[j] >= threshold else source[c] - step * plate
         row[0] = row[n]
         if ratio == 1:
-            coarse[i] = row[1:]
+            for j in range(n):
+                coarse[i, j] = row[j + 1]
         elif i % 2 == 1 and i > 2 * a:
             _restrict(defect[(i - 2) % 3], defect[(i - 1) % 3], defect[i % 3], coarse[i // 2])
 
@@ -283,7 +284,8 @@ def residual(rhs, y, stencil, ties, spring, coarse, a, b):  # type: ignore[no-un
         _residual_row(i, x, laplacian, stencil, ties, spring, rhs, row)
         row[0] = row[n]
         if ratio == 1:
-            coarse[i] = row[1:]
+            for j in range(n):
+                coarse[i, j] = row[j + 1]
         elif i % 2 == 1 and i > 2 * a:
             _restrict(defect[(i - 2) % 3], defect[(i - 1) % 3], row, coarse[i // 2])
 
@@ -377,4 +379,5 @@ def compute_any_ties(fine, threshold, weighted, ties, weights, a, b):  # type: i
             weights[k, j] = min(WHOLE_WEIGHT, int(weight[j] + HALF))
             for kind in range(4):
                 ties[k, kind, j + 1] = int(np.float32(TIES_PER_QUARTER) * sums[kind, j] + HALF)
-        ties[k, :, 0] = ties[k, :, m]
+        for kind in range(4):
+            ties[k, kind, 0] = ties[k, kind, m]
