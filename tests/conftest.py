@@ -7,14 +7,18 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
 from hypothesis import HealthCheck, settings
 from specs import power_spec
 
 from gfmd_cli.cli import main
+from gfmd_cli.errors import Interrupted
 from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.spec.parse import read_spec
+from gfmd_cli.study import run_task
+from gfmd_cli.study.columns import COLUMNS
 from gfmd_cli.study.reading import read_rows
 from gfmd_cli.study.run import run_study
 
@@ -66,6 +70,38 @@ def spec_of(tmp_path, request):
         return read_spec(path, overrides)[0]
 
     return spec_of
+
+
+@pytest.fixture
+def goes_on_bit_for_bit(rows_of, tmp_path, monkeypatch):
+    """Run the module's SPEC with overrides, stopped at every eleventh report; compare with one run.
+
+    Returns the row and the number of reports.
+    """
+
+    def goes_on_bit_for_bit(*overrides):
+        monkeypatch.setattr(run_task, "REPORT_EVERY", 0.0)
+        (straight,) = rows_of(*overrides)
+        seen = []
+
+        def interrupt(progress):
+            seen.append(progress)
+            if len(seen) % 11 == 0:
+                signal.raise_signal(signal.SIGTERM)
+
+        for _ in range(1000):
+            try:
+                (stopped,) = rows_of(*overrides, name="stopped.h5", report=interrupt)
+                break
+            except Interrupted:
+                assert list((tmp_path / "stopped.parts").glob("*/pointer"))
+        for column in COLUMNS:
+            if column.name != "seconds":
+                same = stopped[column.name], straight[column.name]
+                assert same[0] == same[1] or np.all(np.isnan(same))
+        return stopped, len(seen)
+
+    return goes_on_bit_for_bit
 
 
 @pytest.fixture
