@@ -105,10 +105,10 @@ def read_spec(path: Path, overrides: tuple[str, ...] = ()) -> tuple[Spec, str]:
     except UnicodeDecodeError as error:
         raise InputError(f"{path}: not UTF-8 text (byte {error.start})") from error
     data = _toml(text, str(path))
-    origin: dict[str, str] = {}
     for override in overrides:
-        _override(data, override, origin)
-    return build_spec(data, path.parent, _Where(str(path), text, origin)), text
+        set_override(data, override)
+    where = _Where(str(path), text, _given_by(overrides))
+    return build_spec(data, path.parent, where), text
 
 
 def read_tables(data: dict[str, Any]) -> Spec:
@@ -151,11 +151,11 @@ def read_elastomer(default: dict[str, Any], overrides: tuple[str, ...]) -> Linea
 
 def _only_choice(name: str, data: dict[str, Any], path: Path, overrides: tuple[str, ...]) -> Choice:
     """The one choice of a table, with overrides applied to `data`; the first of a sweep."""
-    origin: dict[str, str] = {}
     for override in overrides:
-        _override(data, override, origin)
+        set_override(data, override)
     problems: list[str] = []
-    built = _build(name, data[name], Path(), _Where(str(path), "", origin), problems)
+    where = _Where(str(path), "", _given_by(overrides))
+    built = _build(name, data[name], Path(), where, problems)
     if name == "surface" and not problems and len(built) != 1:
         problems.append(f"{path}: --set takes surface.key=value with one value, for a height map")
     if problems:
@@ -165,8 +165,8 @@ def _only_choice(name: str, data: dict[str, Any], path: Path, overrides: tuple[s
 
 def read_text(text: str, path: Path, overrides: tuple[str, ...]) -> Spec:
     """The spec of a text, for the file `path`. Raises InputError where it is none."""
-    origin = {override.partition("=")[0].strip(): f"--set {override}" for override in overrides}
-    return build_spec(_toml(text, str(path)), path.parent, _Where(str(path), text, origin))
+    where = _Where(str(path), text, _given_by(overrides))
+    return build_spec(_toml(text, str(path)), path.parent, where)
 
 
 class _Where:
@@ -232,8 +232,8 @@ def _cut(text: str) -> str:
     return text if len(text) <= MAX_SHOWN else text[:MAX_SHOWN] + "..."
 
 
-def _override(data: dict[str, Any], override: str, origin: dict[str, str]) -> None:
-    """Set one key from "key.name=value"."""
+def split_override(override: str) -> tuple[list[str], Any]:
+    """The parts of the key and the value of "key.name=value". Raises InputError."""
     key, equals, value = override.partition("=")
     parts = key.strip().split(".")
     if not equals or not all(re.fullmatch(r"[\w\-]+", part) for part in parts):
@@ -241,11 +241,16 @@ def _override(data: dict[str, Any], override: str, origin: dict[str, str]) -> No
     if len(parts) > MAX_DEPTH:
         raise InputError(f"--set {_cut(key)}: nested deeper than {MAX_DEPTH}")
     try:
-        parsed = _toml(f"value = {value.strip()}", f"--set {key}")["value"]
+        return parts, _toml(f"value = {value.strip()}", f"--set {key}")["value"]
     except InputError:
         if not re.fullmatch(r"[\w./~+\-]+", value.strip()):
             raise InputError(f"--set {override}: {value!r} is not a TOML value") from None
-        parsed = value.strip()  # a bare word is a string
+        return parts, value.strip()  # a bare word is a string
+
+
+def set_override(data: dict[str, Any], override: str) -> None:
+    """Set one key of the tables of a spec from "key.name=value". Raises InputError."""
+    parts, parsed = split_override(override)
     table = data
     for part in parts[:-1]:
         inner = table.setdefault(part, {})
@@ -256,7 +261,11 @@ def _override(data: dict[str, Any], override: str, origin: dict[str, str]) -> No
         for other in set(LOADS) & set(table):  # one way to say it takes the place of another
             del table[other]
     table[parts[-1]] = parsed
-    origin[key.strip()] = f"--set {override}"
+
+
+def _given_by(overrides: tuple[str, ...]) -> dict[str, str]:
+    """The --set that gave each key."""
+    return {override.partition("=")[0].strip(): f"--set {override}" for override in overrides}
 
 
 def build_spec(data: dict[str, Any], folder: Path, where: _Where) -> Spec:

@@ -3,39 +3,49 @@
 import json
 import re
 import tomllib
+from typing import Any
 
 from gfmd_cli.errors import InputError
 from gfmd_cli.spec.models import LOADS
-from gfmd_cli.spec.parse import kinds_of
+from gfmd_cli.spec.parse import kinds_of, set_override, split_override
 
 COMMENT = "as given on the command line"
-OPTIONAL = ("accuracy",)  # tables that are commented out as a whole
 COLUMN = 27  # characters before a comment
 
 
 def with_keys(text: str, overrides: tuple[str, ...]) -> str:
-    """The text of a spec with "table.key=value" each, the value in TOML or a bare word.
+    """The text of a spec with "key.name=value" each, as `gfmd run --set` takes them.
 
     A key takes the place of the line that has it, or of the line where it is commented out; keys
-    that do not go with it are removed. Raises InputError for any other form.
+    that do not go with it are removed. A whole table takes the place of all its keys. Raises
+    InputError for any other form.
     """
     lines = text.splitlines()
     for override in overrides:
-        name, _, value = override.partition("=")
-        table, _, key = name.strip().partition(".")
-        if not re.fullmatch(r"\w+", table) or not re.fullmatch(r"\w+", key):
+        (table, *keys), _ = split_override(override)
+        data = tomllib.loads("\n".join(lines))
+        set_override(data, override)
+        values = data[table]
+        if not isinstance(values, dict):
             raise InputError(f"--set {override}: write table.key=value, such as grid.points=128")
-        _set_key(lines, table, key, _as_toml(value.strip()))
+        if not keys:
+            first, last = _span(lines, table)
+            lines[first:last] = [line for line in lines[first:last] if not _key(line)]
+        for key in keys[:1] or values:
+            _set_key(lines, table, key, _as_toml(values[key]))
     return "\n".join(lines) + "\n"
 
 
-def _as_toml(value: str) -> str:
-    """A value as it stands in TOML, a bare word in quotes."""
-    try:
-        tomllib.loads(f"value = {value}")
-    except tomllib.TOMLDecodeError:
-        return json.dumps(value, ensure_ascii=False)
-    return value
+def _as_toml(value: Any) -> str:
+    """A value as it stands in TOML."""
+    if isinstance(value, dict):
+        return f"{{ {', '.join(f'{key} = {_as_toml(inner)}' for key, inner in value.items())} }}"
+    if isinstance(value, list):
+        return f"[{', '.join(map(_as_toml, value))}]"
+    if isinstance(value, float):
+        short = f"{value:g}"
+        return short if float(short) == value else repr(value)
+    return json.dumps(value, ensure_ascii=False, default=str)
 
 
 def _set_key(lines: list[str], table: str, key: str, value: str) -> None:
