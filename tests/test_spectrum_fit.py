@@ -70,6 +70,21 @@ def test_standard_errors_hold_on_gaussian_roughness():
     assert np.mean(cut_offs) == pytest.approx(64, rel=0.03)
 
 
+@pytest.mark.parametrize("hurst", [0.3, 0.7])
+def test_the_fit_has_the_gradient_of_a_surface_whose_spectrum_fills_the_grid(hurst):
+    """The corners of the grid have modes of some directions only; the fitted surface has all."""
+    height = gaussian_roughness(np.random.default_rng(1), 128, hurst, 5.0, np.inf)
+    m, power, modes = radial_power(Grid(128), height)
+    measured = shells(2 * np.pi * m, power, m, m, modes)
+    found = fit(measured, complete=2 * np.pi * 64)
+    wavelengths = {"rolloff": 2 * np.pi / found.q_r, "cutoff": 2 * np.pi / found.q_s}
+    fitted = SelfAffine(hurst=found.hurst, h_std=height.std(), **wavelengths)
+    expected = moments(measured).gradient
+    assert found.q_s > 2 * np.pi * 64
+    gradient = moments(shells_of(fitted, 2 * fitted.smallest_grid())).gradient
+    assert gradient == pytest.approx(expected, rel=0.01)
+
+
 def test_moments_are_those_of_the_heights():
     """Against derivatives taken in Fourier space by NumPy."""
     surface = SelfAffine(cutoff=0.05, length=3.0)

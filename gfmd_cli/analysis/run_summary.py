@@ -7,6 +7,7 @@ from gfmd_cli.analysis.grid_size import grid_size
 from gfmd_cli.analysis.records import with_best
 from gfmd_cli.analysis.table import Column, Group, Record, Table
 from gfmd_cli.analysis.tables import P_STAR, PRESSURE, RESIDUAL, STATUS, warnings_in
+from gfmd_cli.analysis.units import shown
 from gfmd_cli.physics.observables import QUANTITIES
 from gfmd_cli.status import Status
 from gfmd_cli.study.load_search import load_in_jump
@@ -26,10 +27,11 @@ RUN = (
 
 def run_table(rows: list[dict[str, Any]]) -> Table:
     """The solved contacts, grouped by scene; the first MAX_ROWS of them."""
+    solved = [row for row in rows if row["status"] != Status.MISSING][:MAX_ROWS]
     groups: dict[str, list[Record]] = {}
-    for row in [row for row in rows if row["status"] != Status.MISSING][:MAX_ROWS]:
+    for row in solved:
         groups.setdefault(_scene(row), []).append(with_best(row))
-    return Table("", RUN, [Group(title, records) for title, records in groups.items()])
+    return Table("", shown(RUN, solved), [Group(title, records) for title, records in groups.items()])
 
 
 def run_text(rows: list[dict[str, Any]]) -> str:

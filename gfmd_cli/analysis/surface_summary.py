@@ -97,7 +97,7 @@ def summarise(surface: RigidSurface) -> SurfaceSummary:
     nearest, reason = None, "a line has no fit" if scene.grid.dimension == 1 else ""
     if not reason:
         try:
-            nearest = fit(scene.shells)
+            nearest = fit(scene.shells, pi / max(scene.grid.spacings))
         except InputError as error:
             reason = str(error)
     parameters = roughness_parameters(*measured)

@@ -36,7 +36,10 @@ class Column:
     @property
     def title(self) -> str:
         """Heading with unit."""
-        return f"{self.heading} [{self.unit}]" if self.unit else self.heading
+        if not self.unit:
+            return self.heading
+        gap = "" if self.heading.endswith("\n") else " "
+        return f"{self.heading}{gap}[{self.unit}]"
 
     def cell(self, record: Record) -> str:
         """The value of a record as it is printed."""

@@ -10,6 +10,7 @@ from gfmd_cli.analysis.grid_size import grid_size
 from gfmd_cli.analysis.records import means_of, records_of
 from gfmd_cli.analysis.table import Column, Group, Record, Table, known, product, ratio
 from gfmd_cli.analysis.true_contact import VARIANTS, true_contact_areas
+from gfmd_cli.analysis.units import in_si, shown
 from gfmd_cli.physics.observables import QUANTITIES
 from gfmd_cli.study.observables import OBSERVABLES, Observable
 from gfmd_cli.study.plausibility import SEPARATOR
@@ -21,6 +22,8 @@ PRESSURE = Column("p", "pressure", ".4g", "Pa")
 AREA = Column("a_r", "a_r")
 POINTS = Column("points", "points", "d")
 STATUS = Column("status", "status")
+SCALES = (("Delta_sigma", "delta_sigma", "Pa"), ("h_std", "h_std", "m"), ("L", "length", "m"))
+"""Symbol, column and SI unit of the scales of a contact."""
 RESIDUAL = Column("residual", "residual", ".1e")
 REDUCED = {"a_r": "a_r", "sigma_p": "sigma_p / Delta_sigma", "u_g": "u_g / h_std"}
 """Headings of the three quantities in reduced units."""
@@ -119,7 +122,7 @@ def _columns_of(observable: Observable) -> list[Column]:
         return [Column(heading, name, number_format, optional=True)]
     return [
         Column(f"{heading}\n/ {unit.symbol}", name, number_format, optional=True),
-        Column(f"{heading}\n[{unit.si}]", lambda r: r[name] * unit.value(r), optional=True),
+        Column(f"{heading}\n", lambda r: r[name] * unit.value(r), unit=unit.si, optional=True),
     ]
 
 
@@ -167,7 +170,9 @@ def comparison_table(curves: TitledCurves) -> Table:
 
 def over_pressure(columns: Sequence[Column], caption: str, curves: TitledCurves) -> Table:
     """Columns of the records of some curves, curve by curve."""
-    return Table(caption, columns, [Group(title, records_of(curve)) for title, curve in curves])
+    rows = [row for _, curve in curves for row in curve.rows]
+    groups = [Group(title, records_of(curve)) for title, curve in curves]
+    return Table(caption, shown(columns, rows), groups)
 
 
 def einstein_table(curves: TitledCurves) -> Table:
@@ -234,9 +239,11 @@ def curve_title(curve: Curve) -> str:
 
 def _scales(curve: Curve) -> list[str]:
     row = curve.rows[0]
-    scales = (
-        f"Delta_sigma = {row['delta_sigma']:.6g} Pa, h_std = {row['h_std']:.6g} m, "
-        f"L = {row['length']:.6g} m"
+    physical = in_si(row)
+    scales = ", ".join(
+        f"{symbol} = {row[name]:.6g}{f' {unit}' if physical else ''}"
+        for symbol, name, unit in SCALES
     )
     warnings = [f"warning: {line}" for line in warnings_in(curve.rows)]
+    scales += "" if physical else " (reduced units)"
     return [scales, *filter(None, [row.get("preparation")]), *warnings]

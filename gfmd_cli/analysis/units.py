@@ -1,11 +1,12 @@
 """Values in SI units and numbers in sentences."""
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
+from gfmd_cli.analysis.table import Column, Record
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.study.plausibility import METRES
 from gfmd_cli.units import scaled
@@ -26,6 +27,12 @@ def in_si(row: Mapping[str, Any]) -> bool:
     They do where the load was given in Pa or the surface has heights of a real one.
     """
     return bool(row["load"] == "pressure" or row["h_std"] <= METRES)
+
+
+def shown(columns: Sequence[Column], rows: Iterable[Record]) -> list[Column]:
+    """The columns without those in SI units where these mean nothing in any row."""
+    physical = any(map(in_si, rows))
+    return [column for column in columns if physical or not column.unit]
 
 
 def pressure_text(row: Mapping[str, Any]) -> str:

@@ -6,6 +6,7 @@ degrees of freedom), so the likelihood of a sum over m modes is that of a Gamma 
 """
 
 from dataclasses import dataclass
+from math import inf
 
 import numpy as np
 from scipy.optimize import minimize
@@ -80,13 +81,19 @@ def moments(shells: Shells) -> Moments:
     return Moments(sums[0] ** 0.5, sums[1] ** 0.5, 0.5 * sums[2] ** 0.5)
 
 
-def fit(shells: Shells) -> SelfAffineFit:
+def fit(shells: Shells, complete: float = inf) -> SelfAffineFit:
     """Fit a self-affine spectrum to that of a surface in two dimensions.
 
     The fit below q_s and the choice of q_s from the rms gradient alternate until q_s no longer
     changes. Raises InputError where the spectrum is too narrow for a fit.
+
+    Parameters
+    ----------
+    shells : the spectrum with its numbers of modes
+    complete : wavenumber up to which the grid has the modes of all directions [1/m]
     """
     q, count, power = shells.q, _modes(shells), density(shells)
+    isotropic = _isotropic(q, count, complete)
     best, used = np.array([0.8, np.log(2 * q[0])]), q.size
     for _ in range(MAX_ITERATIONS):
         if used < MIN_SHELLS or q[used - 1] < MIN_RANGE * q[0]:
@@ -95,7 +102,7 @@ def fit(shells: Shells) -> SelfAffineFit:
             )
         range_ = (q[:used], count[:used], power[:used])
         best = _maximise_likelihood(*range_, best)
-        before, used = used, _cut_off(shells, best)
+        before, used = used, _cut_off(shells, isotropic, best)
         if used == before:
             break
     errors, scatter = _errors(*range_, best)
@@ -182,10 +189,27 @@ def _errors(q: Field, count: Field, power: Field, best: Field) -> tuple[list[flo
     return [float(np.sqrt(v)) if v >= 0 else float("inf") for v in variances], deviance
 
 
-def _cut_off(shells: Shells, best: Field) -> int:
-    """Number of shells with which the fit has the measured ratio of rms gradient to height."""
-    q, modes = shells.q, _modes(shells) * _shape(shells.q, best, shells.q[0])
-    ratio = np.sqrt(np.cumsum(q**2 * modes) / np.cumsum(modes))
+def _isotropic(q: Field, count: Field, complete: float) -> Field:
+    """Number of modes of every shell, with those beyond the borders of the grid.
+
+    Modes have a constant number per area of the plane of q. Beyond `complete` a shell has this
+    number times the area of the ring up to the middles between it and its neighbours.
+    """
+    beyond = q > complete
+    if not beyond.any() or beyond[:2].any():
+        return count
+    edges = np.concatenate([[0.0], 0.5 * (q[1:] + q[:-1]), [q[-1]]])
+    rings, inside = np.diff(edges**2), ~beyond
+    return np.where(beyond, rings * (count[inside].sum() / rings[inside].sum()), count)
+
+
+def _cut_off(shells: Shells, count: Field, best: Field) -> int:
+    """Number of shells with which the fit has the measured ratio of rms gradient to height.
+
+    `count` are the numbers of modes of a surface whose spectrum depends on |q| alone.
+    """
+    q, power = shells.q, count * _shape(shells.q, best, shells.q[0])
+    ratio = np.sqrt(np.cumsum(q**2 * power) / np.cumsum(power))
     measured = moments(shells)
     return int(
         np.clip(

@@ -13,7 +13,7 @@ from gfmd_cli.analysis.plotting import ColumnFigure
 from gfmd_cli.analysis.series import Item
 from gfmd_cli.analysis.table import Column
 from gfmd_cli.analysis.tables import TitledCurves, curve_title
-from gfmd_cli.analysis.units import in_si
+from gfmd_cli.analysis.units import in_si, shown
 from gfmd_cli.bench.file import Trace
 from gfmd_cli.report.section import Section
 from gfmd_cli.status import Status
@@ -76,7 +76,7 @@ class ReportData:
 
     def shown(self, columns: Sequence[Column]) -> list[Column]:
         """The columns whose units mean something in this study."""
-        return [column for column in columns if self.in_si or not column.unit]
+        return shown(columns, self.solved)
 
     def json(self, attribute: str) -> dict[str, Any]:
         """An attribute that holds JSON; empty where it holds none."""

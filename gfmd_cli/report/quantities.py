@@ -77,7 +77,7 @@ def _visible(title: str, tables: list[Table]) -> Section | None:
 
 
 def _behind(data: ReportData, columns: tuple[Column, ...], caption: str) -> dict[str, Table]:
-    return {SUMMARY: over_pressure(data.shown(columns), caption, data.curves)}
+    return {SUMMARY: over_pressure(columns, caption, data.curves)}
 
 
 def _drawings(data: ReportData, *names: str) -> list[Drawing]:

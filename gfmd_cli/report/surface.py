@@ -127,7 +127,7 @@ def spectrum(row: Row, shells: Shells) -> Spectrum:
     nearest = None
     if dimension == 2:
         with suppress(InputError):  # too narrow
-            nearest = fit(shells)
+            nearest = fit(shells, np.pi * points / length)
     fitted = nearest.density(shells.q) * shells.modes if nearest else np.zeros_like(shells.q)
     total, moment, modes, fitted = (
         np.bincount(place[inside], weight[inside], edges.size - 1).astype(float)
