@@ -6,7 +6,6 @@ A spec is the path of a TOML file, or its tables as a dictionary.
 """
 
 import json
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -30,6 +29,7 @@ from gfmd_cli.spec.parse import read_spec, read_tables
 from gfmd_cli.status import Status
 from gfmd_cli.study.context import SolveContext, Watcher, WorkerOptions
 from gfmd_cli.study.load_search import solve_at_load
+from gfmd_cli.study.measure import measured, planned
 from gfmd_cli.study.progress import Report, ignore
 from gfmd_cli.study.reading import read_rows
 from gfmd_cli.study.resources import room
@@ -37,6 +37,10 @@ from gfmd_cli.study.run import run_study
 from gfmd_cli.study.tasks import plan
 
 Tables = Mapping[str, Any]
+NUMBERS = (
+    "length", "length_y", "h_std", "delta_sigma", "a_r", "sigma_p", "u_g", "residual", "status",
+)  # fmt: skip
+"""Attributes of a result that are columns of a study under the same name."""
 
 
 @dataclass(frozen=True)
@@ -175,28 +179,18 @@ def _solve(spec: Path | str | Tables, threads: int) -> Result:
         raise InputError(f"solve takes one contact, the spec has {len(tasks)}; run() takes them")
     context = SolveContext(WorkerOptions(threads, room()))
     solved = solve_at_load(tasks[0], context, Watcher())
-    scene, solution, measured = solved.scene, solved.solution, solved.observables
-    height = solved.contact.height
-    points = scene.grid.points
+    scene, solution, obstacle = solved.scene, solved.solution, solved.contact.obstacle
+    row = planned(tasks[0]) | measured(tasks[0], solved)
+    x = np.arange(row["points"]) / row["points"] + row["x_first"]
     return Result(
-        height=scene.in_metres(height),
+        height=scene.in_metres(solved.contact.height),
         displacement=scene.in_metres(solution.u),
         stress=scene.in_pascals(solution.sigma),
-        pressure=scene.in_pascals(
-            contact_pressure(solved.contact.obstacle, solution.u, solution.sigma)
-        ),
-        x=(np.arange(points) / points + tasks[0].surface.x_first) * scene.grid.length,
-        nominal_pressure=solved.contact.pressure * scene.delta_sigma,
-        length=scene.grid.length,
-        length_y=scene.grid.length_y if scene.grid.dimension == 2 else math.nan,
-        h_std=scene.h_std,
-        delta_sigma=scene.delta_sigma,
-        a_r=measured.a_r,
-        sigma_p=measured.sigma_p,
-        u_g=measured.u_g,
-        residual=solution.residual,
-        status=solution.status,
+        pressure=scene.in_pascals(contact_pressure(obstacle, solution.u, solution.sigma)),
+        x=x * row["length"],
+        nominal_pressure=row["pressure"],
         warnings=tuple(solved.warnings(tasks[0])),
+        **{name: row[name] for name in NUMBERS},
     )
 
 

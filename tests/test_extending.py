@@ -128,7 +128,6 @@ def package(tmp_path_factory):
     )
     replace(copy / "study/observables.py", "OBSERVABLES = (\n", OBSERVABLE)
     replace(copy / "spec/models.py", "    def on_request(", OPTION)
-    replace(copy / "spec/models.py", '"percolation",\n', '"percolation", "lowest",\n')
     return folder
 
 

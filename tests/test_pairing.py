@@ -9,6 +9,7 @@ import pytest
 from gfmd_cli.errors import InputError
 from gfmd_cli.spec.parse import read_tables
 from gfmd_cli.spec.schema import spec_schema
+from gfmd_cli.study.measure import planned
 from gfmd_cli.study.tasks import plan
 
 BASE = """\
@@ -32,7 +33,7 @@ def tasks_of(text):
 
 
 def values(tasks, *names):
-    rows = [task.columns() | {"load": task.load, "points": task.points} for task in tasks]
+    rows = [planned(task) | {"load": task.load, "points": task.points} for task in tasks]
     return [tuple(row[name] for name in names) for row in rows]
 
 

@@ -31,7 +31,9 @@ def run_table(rows: list[dict[str, Any]]) -> Table:
     groups: dict[str, list[Record]] = {}
     for row in solved:
         groups.setdefault(_scene(row), []).append(with_best(row))
-    return Table("", shown(RUN, solved), [Group(title, records) for title, records in groups.items()])
+    return Table(
+        "", shown(RUN, solved), [Group(title, records) for title, records in groups.items()]
+    )
 
 
 def run_text(rows: list[dict[str, Any]]) -> str:

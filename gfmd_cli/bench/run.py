@@ -25,6 +25,7 @@ from gfmd_cli.solvers.loop import Solver, State
 from gfmd_cli.solvers.nested_grids import Solution, solve_contact
 from gfmd_cli.solvers.polonsky_keer import PolonskyKeer
 from gfmd_cli.spec.models import SOUGHT, Spec
+from gfmd_cli.study.measure import planned
 from gfmd_cli.study.progress import Progress, Report
 from gfmd_cli.study.resources import check_memory
 from gfmd_cli.study.tasks import Task, plan
@@ -162,7 +163,7 @@ def run_bench(spec: Spec, report: Report) -> list[Trace]:
     traces: list[Trace] = []
     for task, contact in _contacts(tasks):
         reference, residual = solve_reference(contact)
-        row = task.columns() | {"p_star": contact.pressure} | {"reference_residual": residual}
+        row = planned(task) | {"p_star": contact.pressure} | {"reference_residual": residual}
         row |= {f"{name}_reference": getattr(reference, name) for name in QUANTITIES}
         for solver in solvers_to_compare(spec, task, contact):
             traces.append(_trace(contact, solver, reference, row, report, len(traces)))

@@ -212,12 +212,6 @@ class AccuracyTable(Choice):
         return {name: share for name, share in given.items() if share is not None}
 
 
-ON_REQUEST = (
-    "true_contact", "patches", "gap_distribution", "stiffness", "spectra", "percolation",
-)  # fmt: skip
-"""Keys of [output] that are off by default and need whole fields."""
-
-
 FieldName = Literal["u", "sigma", "height", "contact_pressure"]
 
 
@@ -277,6 +271,14 @@ class OutputTable(Choice):
         keys: dict[str, Any] = {key: key in every for key, value in self if key != "fields"}
         fields = [name for name in get_args(FieldName) if f"fields.{name}" in every]
         return OutputTable(fields=fields, **keys)
+
+
+ON_REQUEST = tuple(
+    name
+    for name, key in OutputTable.model_fields.items()
+    if key.default is False and name != "cross_section"
+)
+"""Keys of [output] that are off by default and need whole fields."""
 
 
 class Spec(Choice):

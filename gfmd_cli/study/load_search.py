@@ -23,6 +23,7 @@ from gfmd_cli.physics.persson import Persson
 from gfmd_cli.spec.models import SOUGHT
 from gfmd_cli.status import Status
 from gfmd_cli.study.context import SolveContext, Watcher
+from gfmd_cli.study.measure import measured
 from gfmd_cli.study.notes import Trial
 from gfmd_cli.study.refinement import Solved, solve_on_grids, task_scene
 from gfmd_cli.study.tasks import FIRST, Task
@@ -52,7 +53,7 @@ def solve_at_load(task: Task, context: SolveContext, watcher: Watcher) -> Solved
 
     def attempt(points: int, pressure: float) -> Solved:
         solved = solve_on_grids(_at(task, points, pressure), context, watcher)
-        value = loaded_value(task.quantity, _results(task, solved))
+        value = loaded_value(task.quantity, measured(task, solved))
         work = solved.solution.transforms * solved.contact.grid.size
         trials.append(Trial(points, pressure, value, work))
         return solved
@@ -79,7 +80,7 @@ def solve_at_load(task: Task, context: SolveContext, watcher: Watcher) -> Solved
     if solver_ended and not search.succeeded:
         solved.solution.status = Status.LOAD_NOT_REACHED
     elif message := load_in_jump(
-        task.quantity, task.load, _results(task, solved), task.load_tolerance
+        task.quantity, task.load, measured(task, solved), task.load_tolerance
     ):
         context.warn(f"{task.label}: {message}", task=task.index, label=task.label)
     return solved
@@ -90,14 +91,6 @@ def loaded_value(quantity: str, results: Mapping[str, Any]) -> float:
     name = SOUGHT[quantity]
     continuum = float(results.get(f"{name}_continuum", inf))
     return continuum if isfinite(continuum) else float(results[name])
-
-
-def _results(task: Task, solved: Solved) -> dict[str, Any]:
-    """The columns that `loaded_value` reads."""
-    continuum = {f"{name}_continuum": made.continuum for name, made in solved.estimates.items()}
-    if task.quantity == "displacement":
-        return {"displacement": solved.displacement(task.elastomer)}
-    return vars(solved.observables) | continuum
 
 
 def _check_known(task: Task, solved: Solved) -> None:

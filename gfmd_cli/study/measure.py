@@ -1,59 +1,154 @@
-"""The optional results of [output], measured on a solved contact."""
+"""What a study stores of one task: its row and its arrays.
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+The row is built here alone. `planned` gives the columns that follow from the spec, `measured` those
+of a solved contact, and `result` everything.
+"""
+
+from collections.abc import Callable
+from dataclasses import asdict
 from typing import Any
 
+import numpy as np
+
 from gfmd_cli.grid.arrays import Field
-from gfmd_cli.physics.observables import gap_histogram, stress_histogram
+from gfmd_cli.physics.approach import approach
+from gfmd_cli.physics.edge_share import edge_shares
+from gfmd_cli.physics.observables import contact_pressure, gap_histogram, stress_histogram
 from gfmd_cli.physics.patches import area_distribution
 from gfmd_cli.physics.power_spectra import autocorrelations, spectra
-from gfmd_cli.spec.models import OutputTable
-from gfmd_cli.study.columns import PR_LINEAR, PR_LOGARITHMIC
-from gfmd_cli.study.observables import SolvedContact, measure
+from gfmd_cli.spec.models import SWEPT, OutputTable
+from gfmd_cli.study.columns import PARAMETERS, PR_LINEAR, PR_LOGARITHMIC, empty_row
+from gfmd_cli.study.observables import OBSERVABLES, SolvedContact
+from gfmd_cli.study.plausibility import SEPARATOR
 from gfmd_cli.study.refinement import Solved
+from gfmd_cli.study.result import TaskResult
+from gfmd_cli.study.tasks import Task
+
+Row = dict[str, Any]
 
 
-@dataclass
-class OptionalResults:
-    """Columns, histograms and curves of one task; empty where none is turned on."""
-
-    columns: dict[str, Any] = field(default_factory=dict)
-    histograms: dict[str, Field] = field(default_factory=dict)
-    curves: Mapping[str, Mapping[str, Field]] = field(default_factory=dict)
-    """By group and name."""
-
-
-def measure_optional(output: OutputTable, solved: Solved) -> OptionalResults:
-    """Measure the optional results that [output] turns on."""
-    results, contact, solution = OptionalResults(), solved.contact, solved.solution
-    if output.histogram:
-        _add_stress_histogram(results, solved)
-    if output.gap_distribution:
-        _add_gap_histogram(results, solved)
-    it = SolvedContact(contact, solution.u, solution.sigma)
-    results.columns |= measure(output, it)
-    if output.patches:
-        results.histograms["pr_patch_area"] = area_distribution(it.patch_areas)
-    if output.spectra:
-        results.curves = _curves(solved)
-    return results
-
-
-def _add_stress_histogram(results: OptionalResults, solved: Solved) -> None:
-    pr = stress_histogram(solved.contact, solved.solution.u, solved.solution.sigma)
-    results.histograms |= {PR_LINEAR: pr.linear, PR_LOGARITHMIC: pr.logarithmic}
-    results.columns |= {"pr_zero": pr.zero, "pr_beyond": pr.beyond}
-
-
-def _add_gap_histogram(results: OptionalResults, solved: Solved) -> None:
-    pr = gap_histogram(solved.contact, solved.solution.u)
-    results.histograms |= {"pr_gap": pr.linear, "pr_gap_log": pr.logarithmic}
-    results.columns |= {
-        "pr_gap_zero": pr.zero,
-        "pr_gap_beyond": pr.beyond,
-        "pr_gap_below": pr.below,
+def planned(task: Task) -> Row:
+    """The columns that follow from the spec of a task."""
+    surface, elastomer = task.surface, task.elastomer
+    values = {table: getattr(task, table).parameters() for table in SWEPT}
+    return {
+        **{each.column.name: each.cell(values[each.table]) for each in PARAMETERS},
+        "surface": surface.label,
+        "ensemble": surface.label_without({"seed"}),
+        "surface_sha256": task.surface_sha256,
+        "dimension": surface.dimension,
+        "x_first": surface.x_first,
+        "rough": int(surface.rough),
+        "preparation": surface.preparation(task.boundary),
+        "elastomer": elastomer.label,
+        "points_y": task.points_y,
+        "length_y": surface.sides[0] if surface.dimension == 2 else np.nan,
+        "n": np.nan if elastomer.exponent is None else elastomer.exponent,
+        "grid": "auto" if task.auto else "given",
+        "load": task.quantity,
+        "load_value": task.load,
     }
+
+
+def measured(task: Task, solved: Solved) -> Row:
+    """The columns of a solved contact that need no key of [output], without the time."""
+    scene, contact, solution = solved.scene, solved.contact, solved.solution
+    u, sigma = solution.u, solution.sigma
+    return {
+        **asdict(solved.observables),
+        "points": scene.grid.points,
+        "points_y": scene.grid.points_y,
+        "p_star": contact.pressure,
+        "residual": solution.residual,
+        "solver": solution.solver,
+        "transforms": solution.transforms,
+        "status": solution.status,
+        "pressure": contact.pressure * scene.delta_sigma,
+        "delta_sigma": scene.delta_sigma,
+        "h_std": scene.h_std,
+        "mean_height": scene.mean_height,
+        "length": scene.grid.length,
+        "mean_gap": solved.observables.u_g * scene.h_std,
+        "displacement": approach(scene, task.elastomer, contact, u, sigma),
+        "steps": solution.steps,
+        "tolerance": task.solver.tolerance,
+        **error_columns(solved),
+    }
+
+
+def error_columns(solved: Solved) -> Row:
+    """The errors and continuum values; none unless an accuracy is requested."""
+    if solved.certificate is None:
+        return {}
+    row: Row = {"u_g_bound": solved.certificate.u_g, "sigma_p_bound": solved.certificate.sigma_p}
+    for name, made in solved.estimates.items():
+        algebraic = solved.algebraic(name)
+        row |= {
+            f"{name}_error": made.error + algebraic,
+            f"{name}_continuum": made.continuum,
+            f"{name}_continuum_error": made.continuum_error + algebraic,
+            f"{name}_verdict": made.verdict,
+            f"{name}_algebraic": algebraic,
+        }
+    return row
+
+
+def result(task: Task, solved: Solved, seconds: float) -> TaskResult:
+    """All that a study keeps of one solution, which took so many seconds."""
+    scene, contact, solution = solved.scene, solved.contact, solved.solution
+    u, sigma, output = solution.u, solution.sigma, task.output
+    row = (
+        empty_row()
+        | planned(task)
+        | measured(task, solved)
+        | {"seconds": seconds, "warnings": SEPARATOR.join(solved.warnings(task))}
+        | edge_shares(task.surface, scene.grid, contact.obstacle, u, sigma)
+        | _on_request(output, SolvedContact(contact, u, sigma))
+    )
+    physical: dict[str, Callable[[], Field]] = {  # of which one at a time takes memory
+        "u": lambda: scene.in_metres(u),
+        "sigma": lambda: scene.in_pascals(sigma),
+        "height": lambda: scene.in_metres(contact.height),
+        "contact_pressure": lambda: scene.in_pascals(contact_pressure(contact.obstacle, u, sigma)),
+    }
+    arrays: dict[str, dict[str, Field]] = _curves(solved) if output.spectra else {}
+    arrays["fields"] = {
+        name: whole
+        for name in output.fields
+        if (whole := scene.grid.collect(physical[name]())) is not None
+    }
+    if output.cross_section:
+        arrays["cross_sections"] = {
+            name: scene.grid.diagonal(field()) for name, field in physical.items()
+        }
+    return TaskResult(
+        task.id,
+        task.scene_id,
+        output.names(),
+        row,
+        scene.shells,
+        arrays,
+        task.surface.pictures(),
+    )
+
+
+def _on_request(output: OutputTable, solved: SolvedContact) -> Row:
+    """The histograms, with the share of points in no bin, and the observables of [output]."""
+    row: Row = {}
+    if output.histogram:
+        pr = stress_histogram(solved.contact, solved.u, solved.sigma)
+        row |= {PR_LINEAR: pr.linear, PR_LOGARITHMIC: pr.logarithmic}
+        row |= {"pr_zero": pr.zero, "pr_beyond": pr.beyond}
+    if output.gap_distribution:
+        pr = gap_histogram(solved.contact, solved.u)
+        row |= {"pr_gap": pr.linear, "pr_gap_log": pr.logarithmic}
+        row |= {"pr_gap_zero": pr.zero, "pr_gap_beyond": pr.beyond, "pr_gap_below": pr.below}
+    for option, column, measure, *_ in OBSERVABLES:
+        if getattr(output, option) and (value := measure(solved)) is not None:
+            row[column.name] = column.kind(value)
+    if output.patches:
+        row["pr_patch_area"] = area_distribution(solved.patch_areas)
+    return row
 
 
 def _curves(solved: Solved) -> dict[str, dict[str, Field]]:

@@ -15,7 +15,6 @@ from gfmd_cli.physics.observables import contact_points
 from gfmd_cli.physics.patches import contact_patches, open_gap
 from gfmd_cli.physics.true_contact import ContactStress, bearing, contact_stress
 from gfmd_cli.solvers.free_contact_stiffness import STIFFNESS as CONTACT_STIFFNESS
-from gfmd_cli.spec.models import OutputTable
 from gfmd_cli.study.column import Column
 
 
@@ -166,15 +165,3 @@ OBSERVABLES = (
         is_flag=True,
     ),
 )
-
-
-def measure(output: OutputTable, solved: SolvedContact) -> dict[str, Any]:
-    """The observables that are turned on, by the name of the column."""
-    values = {
-        observable.column: observable.measure(solved)
-        for observable in OBSERVABLES
-        if getattr(output, observable.option)
-    }
-    return {
-        column.name: column.kind(value) for column, value in values.items() if value is not None
-    }

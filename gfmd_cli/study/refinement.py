@@ -9,7 +9,6 @@ from gfmd_cli.errors import InputError
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.grid.ranks import Ranks, agree
 from gfmd_cli.physics.anisotropy import anisotropy
-from gfmd_cli.physics.approach import approach
 from gfmd_cli.physics.contact import Contact, Scene
 from gfmd_cli.physics.discretisation_error import (
     RoughnessScales,
@@ -18,7 +17,6 @@ from gfmd_cli.physics.discretisation_error import (
     local_exponent,
     roughness_scales,
 )
-from gfmd_cli.physics.elastomers import LinearElastomer
 from gfmd_cli.physics.error_bounds import Certificate
 from gfmd_cli.physics.error_estimates import Estimate, Level, unknown
 from gfmd_cli.physics.free_contact import SCENES
@@ -51,11 +49,6 @@ class Solved:
     estimates: dict[str, Estimate] = field(default_factory=dict)
     """Errors and continuum values by column; empty unless an accuracy is requested."""
 
-    def displacement(self, elastomer: LinearElastomer) -> float:
-        """Displacement of the indenter from first touch [m]; NaN where it is not defined."""
-        solution = self.solution
-        return approach(self.scene, elastomer, self.contact, solution.u, solution.sigma)
-
     def algebraic(self, name: str) -> float:
         """Estimated error of a column on this grid, from stopping at this residual."""
         assert self.certificate is not None
@@ -63,25 +56,6 @@ class Solved:
             return self.certificate.a_r
         value = float(getattr(self.observables, name))
         return ALGEBRAIC * self.solution.residual * max(value, sqrt(value))
-
-    def columns(self) -> dict[str, Any]:
-        """The errors as columns of a study."""
-        if self.certificate is None:
-            return {}
-        row: dict[str, Any] = {
-            "u_g_bound": self.certificate.u_g,
-            "sigma_p_bound": self.certificate.sigma_p,
-        }
-        for name, made in self.estimates.items():
-            algebraic = self.algebraic(name)
-            row |= {
-                f"{name}_error": made.error + algebraic,
-                f"{name}_continuum": made.continuum,
-                f"{name}_continuum_error": made.continuum_error + algebraic,
-                f"{name}_verdict": made.verdict,
-                f"{name}_algebraic": algebraic,
-            }
-        return row
 
     def warnings(self, task: Task) -> list[str]:
         """What makes the results doubtful."""

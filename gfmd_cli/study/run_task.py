@@ -1,29 +1,22 @@
 """One task from its scene to its committed record."""
 
 import time
-from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import asdict
 from pathlib import Path
 
 from gfmd_cli.errors import GfmdError, Interrupted, SpaceError, StudyError
-from gfmd_cli.grid.arrays import Field
 from gfmd_cli.grid.ranks import agree, leads, together
 from gfmd_cli.physics.contact import Contact
-from gfmd_cli.physics.edge_share import edge_shares
-from gfmd_cli.physics.observables import contact_points, contact_pressure
+from gfmd_cli.physics.observables import contact_points
 from gfmd_cli.solvers.loop import State
 from gfmd_cli.solvers.nested_grids import Resume
 from gfmd_cli.status import Status
 from gfmd_cli.study.checkpoint import Checkpoint
-from gfmd_cli.study.columns import empty_row
 from gfmd_cli.study.context import SolveContext, Watcher
 from gfmd_cli.study.load_search import solve_at_load
-from gfmd_cli.study.measure import measure_optional
+from gfmd_cli.study.measure import result
 from gfmd_cli.study.parts import read_held, record_path, write_record
-from gfmd_cli.study.plausibility import SEPARATOR
 from gfmd_cli.study.progress import Progress
-from gfmd_cli.study.refinement import Solved
 from gfmd_cli.study.result import TaskResult
 from gfmd_cli.study.tasks import Task
 
@@ -129,7 +122,7 @@ def solve_task(task: Task, parts: Path, context: SolveContext) -> Status:
     start = time.perf_counter()
     with Checkpoint.held(parts / task.id, context.ranks) as checkpoint:
         solved = solve_at_load(task, context, TaskWatcher(task, checkpoint, context))
-        record = _record(task, solved, time.perf_counter() - start)
+        record = result(task, solved, time.perf_counter() - start)
         if leads(context.ranks):
             write_record(parts, record)
         checkpoint.remove()
@@ -141,61 +134,3 @@ def _end(task: Task, record: TaskResult) -> Progress:
     row = record.row
     numbers = (row[name] for name in ("points", "steps", "residual", "a_r", "status"))
     return Progress(task.index, "end", task.label, *numbers)
-
-
-def _record(task: Task, solved: Solved, seconds: float) -> TaskResult:
-    """All that is kept of one solution."""
-    scene, contact, solution = solved.scene, solved.contact, solved.solution
-    u, sigma = solution.u, solution.sigma
-    row = (
-        empty_row()
-        | task.columns()
-        | asdict(solved.observables)
-        | {
-            "points": scene.grid.points,
-            "points_y": scene.grid.points_y,
-            "p_star": contact.pressure,
-            "residual": solution.residual,
-            "solver": solution.solver,
-            "transforms": solution.transforms,
-            "seconds": seconds,
-            "status": solution.status,
-            "pressure": contact.pressure * scene.delta_sigma,
-            "delta_sigma": scene.delta_sigma,
-            "h_std": scene.h_std,
-            "mean_height": scene.mean_height,
-            "length": scene.grid.length,
-            "mean_gap": solved.observables.u_g * scene.h_std,
-            "displacement": solved.displacement(task.elastomer),
-            "steps": solution.steps,
-            "tolerance": task.solver.tolerance,
-            "warnings": SEPARATOR.join(solved.warnings(task)),
-        }
-        | solved.columns()
-        | edge_shares(task.surface, scene.grid, contact.obstacle, u, sigma)
-    )
-    optional = measure_optional(task.output, solved)
-    physical: dict[str, Callable[[], Field]] = {  # of which one at a time takes memory
-        "u": lambda: scene.in_metres(u),
-        "sigma": lambda: scene.in_pascals(sigma),
-        "height": lambda: scene.in_metres(contact.height),
-        "contact_pressure": lambda: scene.in_pascals(contact_pressure(contact.obstacle, u, sigma)),
-    }
-    fields: dict[str, Field] = {
-        name: whole
-        for name in task.output.fields
-        if (whole := scene.grid.collect(physical[name]())) is not None
-    }
-    cross_section: dict[str, Field] = {}
-    if task.output.cross_section:
-        cross_section = {name: scene.grid.diagonal(field()) for name, field in physical.items()}
-    arrays = {"fields": fields, "cross_sections": cross_section, **optional.curves}
-    return TaskResult(
-        task.id,
-        task.scene_id,
-        task.output.names(),
-        row | optional.columns | optional.histograms,
-        scene.shells,
-        arrays,
-        task.surface.pictures(),
-    )

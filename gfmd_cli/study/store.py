@@ -22,6 +22,7 @@ from gfmd_cli.files.locks import locked
 from gfmd_cli.spec.models import Spec
 from gfmd_cli.status import Status
 from gfmd_cli.study.columns import empty_row
+from gfmd_cli.study.measure import planned
 from gfmd_cli.study.parts import (
     Held,
     check_own,
@@ -241,7 +242,7 @@ class _Sources:
         missing = Entry(task.id, task.scene_id, frozenset(), {"status": Status.MISSING})
         entry, _ = self.found.get(task.id, (missing, 0))
         points = {name: entry.row.get(name, -1) for name in ("points", "points_y")}
-        return entry._replace(row=empty_row() | {**entry.row} | task.columns() | points)
+        return entry._replace(row=empty_row() | {**entry.row} | planned(task) | points)
 
     def load(self, task_id: str) -> TaskResult:
         """The whole result of a task."""

@@ -26,7 +26,6 @@ from gfmd_cli.spec.models import (
     Spec,
     digest,
 )
-from gfmd_cli.study.columns import PARAMETERS
 
 STIFFNESS_FIELDS, SPECTRA_FIELDS = 3.0, 1.0
 """Fields that output.stiffness and output.spectra add to those of the solver, by peak memory."""
@@ -169,27 +168,6 @@ class Task:
         """Time that the solve is expected to take on one thread, within a factor of about three."""
         solves = SEARCH if self.quantity in SOUGHT else 1.0
         return 0.01 + solves * SECONDS_PER_PAIR * self.size * self._pairs()
-
-    def columns(self) -> dict[str, Any]:
-        """The contact to solve, as columns of a study."""
-        values = {table: getattr(self, table).parameters() for table in SWEPT}
-        return {
-            **{each.column.name: each.cell(values[each.table]) for each in PARAMETERS},
-            "surface": self.surface.label,
-            "ensemble": self.surface.label_without({"seed"}),
-            "surface_sha256": self.surface_sha256,
-            "dimension": self.surface.dimension,
-            "x_first": self.surface.x_first,
-            "rough": int(self.surface.rough),
-            "preparation": self.surface.preparation(self.boundary),
-            "elastomer": self.elastomer.label,
-            "points_y": self.points_y,
-            "length_y": self.surface.sides[0] if self.surface.dimension == 2 else np.nan,
-            "n": np.nan if self.elastomer.exponent is None else self.elastomer.exponent,
-            "grid": "auto" if self.auto else "given",
-            "load": self.quantity,
-            "load_value": self.load,
-        }
 
     def _pairs(self) -> float:
         """Pairs of transforms, fitted to the default surface at 512^2, tolerance 1e-6."""
