@@ -586,7 +586,7 @@ def test_the_watch_sees_every_grid_from_coarse_to_fine():
 
     def note(contact, state):
         seen.append((contact.grid.points, state.step))
-        assert spent.setdefault(contact.grid.points, state.coarser_transforms) >= 2
+        assert spent.setdefault(contact.grid.points, state.coarser_transforms) > 0
 
     contact = scene(ROUGH, Power(n=2), 256).contact(0.1)
     solution = solve_contact(contact, Auto(tolerance=1e-6), note)

@@ -114,9 +114,16 @@ class Contact:
 
     def settle(self, u: Field) -> Field:
         """Lift `u` above the indenter and lower it until it touches, in place; return it."""
-        np.maximum(u, self.obstacle, out=u)
-        u += self.grid.max(float(np.max(self.obstacle - u)))
-        return np.maximum(u, self.obstacle, out=u)
+        nearest = np.inf
+        for rows in row_blocks(u):
+            np.maximum(u[rows], self.obstacle[rows], out=u[rows])
+            nearest = min(nearest, float(np.min(u[rows] - self.obstacle[rows])))
+        nearest = -self.grid.max(-nearest)
+        if nearest > 0:
+            for rows in row_blocks(u):
+                u[rows] -= nearest
+                np.maximum(u[rows], self.obstacle[rows], out=u[rows])
+        return u
 
     def set_displacement(self, u: Field, gap: Field, touching: Mask) -> None:
         """u <- h in contact, else h + gap, where a point that can touch has a gap >= 0."""
