@@ -103,7 +103,7 @@ def result(task: Task, solved: Solved, seconds: float) -> TaskResult:
         | measured(task, solved)
         | {"seconds": seconds, "warnings": SEPARATOR.join(solved.warnings(task))}
         | edge_shares(task.surface, scene.grid, contact.obstacle, u, sigma)
-        | _on_request(output, SolvedContact(contact, u, sigma))
+        | on_request(output, SolvedContact(contact, u, sigma))
     )
     physical: dict[str, Callable[[], Field]] = {  # of which one at a time takes memory
         "u": lambda: scene.in_metres(u),
@@ -132,7 +132,7 @@ def result(task: Task, solved: Solved, seconds: float) -> TaskResult:
     )
 
 
-def _on_request(output: OutputTable, solved: SolvedContact) -> Row:
+def on_request(output: OutputTable, solved: SolvedContact) -> Row:
     """The histograms, with the share of points in no bin, and the observables of [output]."""
     row: Row = {}
     if output.histogram:
