@@ -4,6 +4,7 @@ import h5py
 import numpy as np
 import pytest
 import xarray
+from specs import power_spec
 
 from gfmd_cli.bench import run as bench
 from gfmd_cli.bench.figure import draw_bench
@@ -14,22 +15,14 @@ from gfmd_cli.physics.contact import build_scene
 from gfmd_cli.physics.observables import QUANTITIES
 from gfmd_cli.study.tasks import plan
 
-SPEC = """\
-[study]
-name = "tiny"
-[surface]
-kind = "self-affine"
-cutoff = 0.05
-[elastomer]
-kind = "power"
-n = 1
-[grid]
-points = 128
-[load]
-p_star = 0.1
-[solver]
-kind = ["auto", "ccg", "fire"]
-"""
+SPEC = power_spec(
+    n=1,
+    points=128,
+    p_star=0.1,
+    cutoff=0.05,
+    name="tiny",
+    more='[solver]\nkind = ["auto", "ccg", "fire"]\n',
+)
 
 
 @pytest.fixture

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from specs import power_spec
 
 import gfmd_cli
 from gfmd_cli.cli import main
@@ -17,20 +18,7 @@ CONTRACT = (
     "surface,seed,elastomer,n,thickness,points,p_star,a_r,a_r_error,sigma_p,sigma_p_error,"
     "u_g,u_g_error,residual,solver,transforms,seconds,status"
 )
-SPEC = """\
-[study]
-name = "small"
-[surface]
-kind = "self-affine"
-cutoff = 0.05
-[elastomer]
-kind = "power"
-n = [0, 1]
-[grid]
-points = 64
-[load]
-p_star = [0.1, 1.0]
-"""
+SPEC = power_spec(n=[0, 1], points=64, p_star=[0.1, 1.0], cutoff=0.05, name="small")
 
 
 def test_run_then_analyze_then_export(gfmd):

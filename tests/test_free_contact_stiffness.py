@@ -2,46 +2,20 @@
 
 from dataclasses import replace
 
+import free_contacts
 import numpy as np
 import pytest
+from free_contacts import ELASTOMERS, compliance_matrix, oblong_contact
 from scipy.integrate import dblquad
 
 from gfmd_cli.grid.fft_grid import Grid
-from gfmd_cli.physics.elastomers import HalfSpace, Layer, Power
+from gfmd_cli.physics.elastomers import HalfSpace
 from gfmd_cli.physics.free_contact import FreeContact, FreeElasticity
 from gfmd_cli.solvers.auto import Auto
 from gfmd_cli.solvers.free_contact_stiffness import free_contact_stiffness
 from gfmd_cli.solvers.nested_grids import solve_contact
 
-ELASTOMERS = [
-    Power(n=0),
-    Power(n=0.5),
-    HalfSpace(),
-    Power(n=1.5),
-    Layer(thickness=0.2, poisson=0.4),
-]
-SPEC = """\
-[surface]
-kind = "self-affine"
-cutoff = 0.1
-[elastomer]
-kind = "half-space"
-[grid]
-points = 32
-boundary = "free"
-[load]
-p_star = 0.1
-[output]
-stiffness = true
-"""
-
-
-def oblong_contact(elastomer):
-    """A random map of 17 x 20 points and pixels of 0.2 x 0.3 m."""
-    grid = Grid(20, 2, 20 * 0.3, points_y=17, length_y=17 * 0.2)
-    height = np.random.default_rng(4).standard_normal(grid.shape)
-    free = FreeElasticity(elastomer, grid, 1.0)
-    return FreeContact(grid, height, np.empty(0), 0.1, free=free)
+SPEC = f"{free_contacts.SPEC}[output]\nstiffness = true\n"
 
 
 @pytest.mark.parametrize("elastomer", ELASTOMERS, ids=lambda elastomer: elastomer.label)
@@ -50,9 +24,7 @@ def test_stiffness_is_that_of_a_direct_solution_and_of_two_contacts(elastomer):
     touching = solve_contact(contact, Auto(tolerance=1e-10)).sigma > 0
     found = free_contact_stiffness(contact, touching)
 
-    kernel = elastomer.free_compliance(contact.grid.shape, contact.grid.spacings)
-    y, x = (i.ravel() for i in np.indices(contact.grid.shape))
-    compliance = kernel[np.abs(y[:, None] - y), np.abs(x[:, None] - x)]
+    compliance = compliance_matrix(elastomer, contact.grid)
     held = touching.ravel()
     punch = np.zeros(held.size)
     punch[held] = np.linalg.solve(compliance[np.ix_(held, held)], np.ones(held.sum()))

@@ -6,26 +6,14 @@ import sys
 from pathlib import Path
 
 import pytest
+from specs import power_spec
 
 from gfmd_cli.errors import InputError
 from gfmd_cli.spec.parse import read_spec
 from gfmd_cli.study import slurm
 from gfmd_cli.study.tasks import BASE_BYTES, plan
 
-SPEC = """\
-[study]
-name = "small"
-[surface]
-kind = "self-affine"
-cutoff = 0.05
-[elastomer]
-kind = "power"
-n = 0
-[grid]
-points = 64
-[load]
-p_star = [0.1, 0.3, 1.0, 2.0]
-"""
+SPEC = power_spec(n=0, points=64, p_star=[0.1, 0.3, 1.0, 2.0], cutoff=0.05, name="small")
 FAKE = """\
 #!/bin/sh
 printf '%s\\n' "$(basename "$0") $*" >> "$CALLS"

@@ -7,6 +7,7 @@ import jsonschema
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
+from specs import power_spec
 
 from gfmd_cli.errors import InputError
 from gfmd_cli.spec.models import differences
@@ -15,20 +16,7 @@ from gfmd_cli.spec.schema import spec_schema
 from gfmd_cli.study.tasks import plan
 
 CONFIGS = sorted((Path(__file__).parents[1] / "configs").glob("*.toml"))
-BASE = """\
-[study]
-name = "base"
-[surface]
-kind = "self-affine"
-cutoff = 0.05
-[elastomer]
-kind = "power"
-n = 1
-[grid]
-points = 64
-[load]
-p_star = [0.1, 1.0]
-"""
+BASE = power_spec(n=1, points=64, p_star=[0.1, 1.0], cutoff=0.05, name="base")
 
 
 @pytest.fixture

@@ -5,6 +5,7 @@ from pathlib import Path
 from threading import Thread
 
 import pytest
+from specs import power_spec
 
 from gfmd_cli.errors import Interrupted
 from gfmd_cli.files.locks import locked
@@ -15,20 +16,7 @@ from gfmd_cli.study.run import run_study
 from gfmd_cli.study.store import Study
 from gfmd_cli.study.tasks import plan
 
-SPEC = """\
-[study]
-name = "small"
-[surface]
-kind = "self-affine"
-cutoff = 0.05
-[elastomer]
-kind = "power"
-n = [0, 1]
-[grid]
-points = 64
-[load]
-p_star = [0.1, 1.0]
-"""
+SPEC = power_spec(n=[0, 1], points=64, p_star=[0.1, 1.0], cutoff=0.05, name="small")
 
 
 def told(done):
