@@ -15,7 +15,12 @@ from gfmd_cli.physics.elastomers import HalfSpace
 from gfmd_cli.physics.height_map import extent
 from gfmd_cli.physics.indenters import RigidSurface
 from gfmd_cli.physics.persson import Persson
-from gfmd_cli.physics.roughness_parameters import RoughnessParameters, roughness_parameters
+from gfmd_cli.physics.roughness_parameters import (
+    MAP_NAMES,
+    PROFILE_NAMES,
+    RoughnessParameters,
+    roughness_parameters,
+)
 from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.physics.spectrum_fit import Moments, SelfAffineFit, fit, moments
 
@@ -104,24 +109,14 @@ def summarise(surface: RigidSurface) -> SurfaceSummary:
     return SurfaceSummary(surface, scene, parameters, moments(scene.shells), nearest, reason)
 
 
+UNITS = dict.fromkeys(("Sq", "Sa", "Sz", "Sal", "Pq", "Pa", "Pt", "Pal"), "m")
+FORMATS = dict.fromkeys(("Ssk", "Sku", "Psk", "Pku"), ".3f")
 COLUMNS = (
     Column("surface", "surface"),
-    Column("Sq", "Sq", unit="m", optional=True),
-    Column("Sa", "Sa", unit="m", optional=True),
-    Column("Ssk", "Ssk", ".3f", optional=True),
-    Column("Sku", "Sku", ".3f", optional=True),
-    Column("Sz", "Sz", unit="m", optional=True),
-    Column("Sdq", "Sdq", optional=True),
-    Column("Sdr", "Sdr", optional=True),
-    Column("Sal", "Sal", unit="m", optional=True),
-    Column("Pq", "Pq", unit="m", optional=True),
-    Column("Pa", "Pa", unit="m", optional=True),
-    Column("Psk", "Psk", ".3f", optional=True),
-    Column("Pku", "Pku", ".3f", optional=True),
-    Column("Pt", "Pt", unit="m", optional=True),
-    Column("Pdq", "Pdq", optional=True),
-    Column("Pdr", "Pdr", optional=True),
-    Column("Pal", "Pal", unit="m", optional=True),
+    *(
+        Column(name, name, FORMATS.get(name, Column.format), UNITS.get(name, ""), optional=True)
+        for name in (*MAP_NAMES, *PROFILE_NAMES)
+    ),
     Column("H", "hurst", ".2f", optional=True),
     Column("lambda_r", "rolloff_wavelength", ".3g", unit="m", optional=True),
     Column("lambda_s", "cutoff_wavelength", ".3g", unit="m", optional=True),
@@ -171,9 +166,8 @@ def as_text(summary: SurfaceSummary) -> str:
 
 def _parameter_lines(parameters: RoughnessParameters) -> list[str]:
     """The parameters by their names in the standards, in two lines."""
-    metres = {"Sq", "Sa", "Sz", "Sal", "Pq", "Pa", "Pt", "Pal"}
     words = [
-        f"{name} {'-' if value is None else f'{value:.5g}'}{' m' if name in metres else ''}"
+        f"{name} {'-' if value is None else f'{value:.5g}'}{' m' if name in UNITS else ''}"
         for name, value in parameters.named().items()
     ]
     return [f"  {', '.join(words[:5])}", f"  {', '.join(words[5:])}"]
