@@ -14,6 +14,7 @@ Phys. 103, 8577, 1995). For k ~ q, P = erf x and the kernel of P / k is erfc(alp
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -47,7 +48,8 @@ class TileOperators:
 
     def __init__(self, contact: Contact) -> None:
         self.grid = grid = contact.grid
-        self.coarse = grid.coarser(tuple(points // COARSENING for points in grid.shape))
+        coarse = grid.coarser(tuple(points // COARSENING for points in grid.shape))
+        self.coarse = replace(coarse, precision="single")
         alpha = np.pi / (2 * COARSENING * max(grid.spacings) * np.sqrt(DECAY))
         line = contact.line
         order = 0.5 * float(np.log2(line[2] / line[1]))  # a
@@ -68,8 +70,8 @@ class TileOperators:
 
     @property
     def transforms(self) -> float:
-        """Transforms that one displacement takes, by their share of points."""
-        return 2 * self.coarse.size / self.grid.size
+        """Transforms of one displacement, two in single precision, by their share of points."""
+        return self.coarse.size / self.grid.size
 
     def displacement(self, tiles: Tiles) -> TileMap:
         """The map s -> C s on these tiles, up to a rigid displacement."""
