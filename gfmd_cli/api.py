@@ -31,7 +31,7 @@ from gfmd_cli.study.context import SolveContext, Watcher, WorkerOptions
 from gfmd_cli.study.load_search import solve_at_load
 from gfmd_cli.study.measure import measured, planned
 from gfmd_cli.study.progress import Report, ignore
-from gfmd_cli.study.reading import read_rows
+from gfmd_cli.study.reading import read_rows, solved_rows
 from gfmd_cli.study.resources import room
 from gfmd_cli.study.run import run_study
 from gfmd_cli.study.tasks import plan
@@ -244,7 +244,7 @@ def rows(study: Path | str) -> list[dict[str, Any]]:
     StudyError
         If the study is damaged.
     """
-    return [row for row in read_rows(Path(study)) if row["status"] != Status.MISSING]
+    return solved_rows(read_rows(Path(study)))
 
 
 def compare(study: Path | str) -> Comparison:

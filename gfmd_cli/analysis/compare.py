@@ -7,13 +7,13 @@ from typing import Any, Literal
 
 import numpy as np
 
+from gfmd_cli.analysis.selection import grouped
 from gfmd_cli.errors import InputError
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.physics import einstein_solid
 from gfmd_cli.physics.persson import Persson, Shells, gamma_fitted
-from gfmd_cli.status import Status
 from gfmd_cli.study.columns import PARAMETERS
-from gfmd_cli.study.reading import StudyFile, open_study
+from gfmd_cli.study.reading import StudyFile, open_study, solved_rows
 
 Row = dict[str, Any]
 Weights = Literal["paper", "fitted"]
@@ -167,13 +167,11 @@ def compare(path: Path, gamma: Weights = "paper") -> Comparison:
 def compare_open(study: StudyFile, path: Path, gamma: Weights = "paper") -> Comparison:
     """As `compare`, of a study that is open already."""
     rows = study.rows
-    solved = [row for row in rows if row["status"] != Status.MISSING]
+    solved = solved_rows(rows)
     spectra = {scene: study.shells(scene) for scene in {row["scene"] for row in solved}}
     if not solved:
         raise InputError(f"{path}: holds no result yet; run it first")
-    groups: dict[tuple[Any, ...], list[Row]] = {}
-    for row in solved:
-        groups.setdefault((row["scene"], *solver_of(row)), []).append(row)
+    groups = grouped(solved, lambda row: (row["scene"], *solver_of(row)))
     curves = []
     for (scene, *_), group in groups.items():
         spectrum = spectra[scene]

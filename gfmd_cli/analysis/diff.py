@@ -10,8 +10,7 @@ from typing import NamedTuple
 from gfmd_cli.analysis.compare import Row
 from gfmd_cli.physics.observables import QUANTITIES
 from gfmd_cli.spec.models import differences
-from gfmd_cli.status import Status
-from gfmd_cli.study.reading import read_rows, stored_spec
+from gfmd_cli.study.reading import read_rows, solved_rows, stored_spec
 
 UNITS = {"sigma_p": "delta_sigma", "u_g": "h_std"}
 """Columns that reduced quantities are in units of."""
@@ -84,16 +83,12 @@ def diff(one: Path, other: Path) -> Difference:
     elastomer on one surface, rows belong together by their load alone. Raises InputError,
     StudyError.
     """
-    only = _solved(one), _solved(other)
+    only = solved_rows(read_rows(one)), solved_rows(read_rows(other))
     pairs, paired = _matches(*only, _contact), ""
     if not pairs and all(len({_pressed(row) for row in rows}) == 1 for rows in only):
         pairs = _matches(*only, _load_of)
         paired = _paired(pairs[0]) if pairs else ""
     return Difference(differences(stored_spec(one), stored_spec(other)), pairs, only, paired)
-
-
-def _solved(path: Path) -> list[Row]:
-    return [row for row in read_rows(path) if row["status"] != Status.MISSING]
 
 
 def _pressed(row: Row) -> tuple[Hashable, ...]:

@@ -5,7 +5,7 @@ from typing import Any
 
 from gfmd_cli.analysis.compare import Row
 from gfmd_cli.analysis.diff import Deviation, Difference, Pair
-from gfmd_cli.analysis.table import BLANK, Column, Group, Record, Table, known, plain
+from gfmd_cli.analysis.table import BLANK, Column, Record, Table, groups_of, known, plain
 from gfmd_cli.physics.observables import QUANTITIES
 from gfmd_cli.study.tasks import SYMBOLS
 
@@ -24,13 +24,9 @@ CONTACT = ("surface", "seed", "elastomer", "load", "load_value")
 
 def diff_table(found: Difference) -> Table:
     """The pairs of contacts, grouped by what is compared."""
-    groups: dict[str, list[Record]] = {}
-    for pair in found.pairs:
-        names = [_name(pair.one), _name(pair.other)]
-        title = names[0] if names[0] == names[1] else f"A: {names[0]}\nB: {names[1]}"
-        groups.setdefault(title, []).append(_record(pair))
+    groups = groups_of((_title(pair), _record(pair)) for pair in found.pairs)
     caption = f"{found.paired}. {LEGEND}" if found.paired else LEGEND
-    return Table(caption, DIFFERENCES, [Group(title, held) for title, held in groups.items()])
+    return Table(caption, DIFFERENCES, groups)
 
 
 def diff_text(found: Difference) -> str:
@@ -60,6 +56,11 @@ def diff_json(found: Difference) -> str:
         },
         indent=1,
     )
+
+
+def _title(pair: Pair) -> str:
+    one, other = _name(pair.one), _name(pair.other)
+    return one if one == other else f"A: {one}\nB: {other}"
 
 
 def _record(pair: Pair) -> Record:

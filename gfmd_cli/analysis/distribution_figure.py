@@ -9,7 +9,7 @@ from gfmd_cli.analysis.curve_styles import CurveStyle, curve_styles, order
 from gfmd_cli.analysis.distribution import StressDistribution, distributions
 from gfmd_cli.analysis.edge_law import fit
 from gfmd_cli.analysis.plotting import ColumnFigure
-from gfmd_cli.analysis.selection import at_one_pressure, pressure_label
+from gfmd_cli.analysis.selection import at_one_pressure, grouped, pressure_label
 from gfmd_cli.physics.observables import logarithmic_middles
 
 MOST = 8  # contacts; more cannot be told apart
@@ -48,11 +48,9 @@ def continuum_figure(comparison: Comparison) -> ColumnFigure | None:
 
 def _chosen(found: list[StressDistribution]) -> list[StressDistribution]:
     """One distribution of each scene, at about one pressure."""
-    scenes: dict[str, list[StressDistribution]] = {}
-    for distribution in sorted(found, key=lambda each: order(each.curve)):
-        scenes.setdefault(distribution.scene, []).append(distribution)
-    groups = list(scenes.values())
-    return at_one_pressure(groups, lambda each: (each.finest["p_star"], each.a_r))[:MOST]
+    ordered = sorted(found, key=lambda each: order(each.curve))
+    scenes = list(grouped(ordered, lambda each: each.scene).values())
+    return at_one_pressure(scenes, lambda each: (each.finest["p_star"], each.a_r))[:MOST]
 
 
 def _draw(

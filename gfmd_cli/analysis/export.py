@@ -12,7 +12,6 @@ from gfmd_cli.analysis.table import known
 from gfmd_cli.errors import INSTALL, InputError
 from gfmd_cli.files.atomic import new_file
 from gfmd_cli.grid.arrays import Field
-from gfmd_cli.status import Status
 from gfmd_cli.study.column import Column
 from gfmd_cli.study.columns import (
     CONTRACT,
@@ -26,7 +25,7 @@ from gfmd_cli.study.columns import (
     TASK_GROUPS,
     HistogramColumn,
 )
-from gfmd_cli.study.reading import StudyFile, open_study, read_rows
+from gfmd_cli.study.reading import StudyFile, open_study, read_rows, solved_rows
 
 Rows = list[dict[str, Any]]
 FORMULA = ("=", "+", "-", "@", "\t", "\r")
@@ -39,7 +38,7 @@ COORDINATES = tuple(
 
 def export_csv(path: Path) -> str:
     """A study as CSV: a header, and one row per solved pressure."""
-    return csv_text([row for row in read_rows(path) if row["status"] != Status.MISSING])
+    return csv_text(solved_rows(read_rows(path)))
 
 
 def csv_text(rows: Rows) -> str:
@@ -153,7 +152,7 @@ def _bins(histogram: HistogramColumn) -> Any:
 
 def _curves(study: StudyFile) -> dict[str, Any]:
     """The spectra of the scenes and the curves of the tasks."""
-    solved = {row["scene"] for row in study.rows if row["status"] != Status.MISSING}
+    solved = {row["scene"] for row in solved_rows(study.rows)}
     count = 1 + max((row["scene"] for row in study.rows), default=-1)
     scenes = [vars(study.shells(i)) if i in solved else {} for i in range(count)]
     variables = _padded("scenes", ("scenes", "shell"), SHELLS, scenes)

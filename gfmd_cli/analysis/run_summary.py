@@ -5,12 +5,14 @@ from typing import Any
 
 from gfmd_cli.analysis.grid_size import grid_size
 from gfmd_cli.analysis.records import with_best
-from gfmd_cli.analysis.table import Column, Group, Record, Table
+from gfmd_cli.analysis.selection import grouped
+from gfmd_cli.analysis.table import Column, Record, Table, groups_of
 from gfmd_cli.analysis.tables import P_STAR, PRESSURE, RESIDUAL, STATUS, warnings_in
 from gfmd_cli.analysis.units import shown
 from gfmd_cli.physics.observables import QUANTITIES
 from gfmd_cli.status import Status
 from gfmd_cli.study.load_search import load_in_jump
+from gfmd_cli.study.reading import solved_rows
 
 MAX_ROWS = 40
 MAX_EDGE_SHARE = 0.05  # of contact or load in the tapered zone, without a warning; a choice
@@ -27,35 +29,27 @@ RUN = (
 
 def run_table(rows: list[dict[str, Any]]) -> Table:
     """The solved contacts, grouped by scene; the first MAX_ROWS of them."""
-    solved = [row for row in rows if row["status"] != Status.MISSING][:MAX_ROWS]
-    groups: dict[str, list[Record]] = {}
-    for row in solved:
-        groups.setdefault(_scene(row), []).append(with_best(row))
-    return Table(
-        "", shown(RUN, solved), [Group(title, records) for title, records in groups.items()]
-    )
+    listed = solved_rows(rows)[:MAX_ROWS]
+    return Table("", shown(RUN, listed), groups_of((_scene(r), with_best(r)) for r in listed))
 
 
 def run_text(rows: list[dict[str, Any]]) -> str:
     """The table in plain text; an empty string where nothing was solved."""
-    left_out = sum(row["status"] != Status.MISSING for row in rows) - MAX_ROWS
+    solved = solved_rows(rows)
+    left_out = len(solved) - MAX_ROWS
     more = [f"and {left_out} more contacts"] if left_out > 0 else []
-    solved = [row for row in rows if row["status"] != Status.MISSING]
     warnings = [f"warning: {line}" for line in warnings_in(solved)]
     return "\n\n".join(filter(None, [run_table(rows).as_text(), *more, "\n".join(warnings)]))
 
 
 def edge_warnings(rows: Sequence[Mapping[str, Any]]) -> list[str]:
     """A line for each scene that carries much of its load where a window changed the heights."""
-    scenes: dict[str, list[Record]] = {}
-    for row in rows:
-        if max(row["edge_contact"], row["edge_load"]) > MAX_EDGE_SHARE:  # false where unknown
-            scenes.setdefault(row["surface"], []).append(row)
-    return [
+    much = [row for row in rows if max(row["edge_contact"], row["edge_load"]) > MAX_EDGE_SHARE]
+    return [  # nothing where the shares are unknown
         f"{surface}: up to {max(row['edge_contact'] for row in group):.0%} of the contact and "
         f"{max(row['edge_load'] for row in group):.0%} of the load are at the edges, where the "
         "window has changed the heights; leave out surface.edges to keep them"
-        for surface, group in scenes.items()
+        for surface, group in grouped(much, lambda row: row["surface"]).items()
     ]
 
 
@@ -71,9 +65,7 @@ def loads_in_jumps(rows: list[dict[str, Any]], tolerance: float) -> list[str]:
 
 def other_tasks(rows: list[dict[str, Any]]) -> list[str]:
     """Lines on the contacts of a study that do not belong to the spec of a run."""
-    scenes: dict[str, list[Record]] = {}
-    for row in rows:
-        scenes.setdefault(_scene(row), []).append(row)
+    scenes = grouped(rows, _scene)
     if not scenes:
         return []
     lines = [f"{len(rows)} more contacts stay in the study; they do not belong to this spec:"]

@@ -1,6 +1,6 @@
-"""Choice of the contacts that figures and maps show."""
+"""Groups of contacts, and the choice of those that figures and maps show."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Iterable, Sequence
 from typing import TypeVar
 
 import numpy as np
@@ -9,6 +9,15 @@ TYPICAL_AREA = 0.1  # relative contact area of the paper's Fig. 7
 NEAR = 1.5  # pressures that differ by a smaller factor are shown side by side
 
 T = TypeVar("T")
+K = TypeVar("K", bound=Hashable)
+
+
+def grouped(values: Iterable[T], key: Callable[[T], K]) -> dict[K, list[T]]:
+    """The values by their keys, in the order in which these occur."""
+    groups: dict[K, list[T]] = {}
+    for value in values:
+        groups.setdefault(key(value), []).append(value)
+    return groups
 
 
 def evenly(values: Sequence[T], most: int) -> list[T]:

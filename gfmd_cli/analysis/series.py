@@ -11,6 +11,7 @@ from gfmd_cli.analysis.curve_styles import CurveStyle
 from gfmd_cli.analysis.ensemble import by_load, spread_of, without_seed
 from gfmd_cli.analysis.grid_size import grid_size
 from gfmd_cli.analysis.plotting import ColumnFigure
+from gfmd_cli.analysis.selection import grouped
 from gfmd_cli.analysis.units import in_si, quantity
 from gfmd_cli.grid.arrays import Field, Mask
 from gfmd_cli.status import Status
@@ -40,10 +41,7 @@ class Item:
 
 def seed_groups(items: list[Item]) -> list[list[Item]]:
     """The curves that differ in their seed only, together."""
-    groups: dict[object, list[Item]] = {}
-    for item in items:
-        key = item.curve.study, without_seed(item.curve.rows[0])
-        groups.setdefault(key, []).append(item)
+    groups = grouped(items, lambda item: (item.curve.study, without_seed(item.curve.rows[0])))
     return list(groups.values())
 
 

@@ -2,12 +2,14 @@
 
 import math
 import textwrap
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
 from typing import Any
 
 import tabulate
+
+from gfmd_cli.analysis.selection import grouped
 
 Record = Mapping[str, Any]
 Value = str | Callable[[Record], Any]
@@ -71,6 +73,12 @@ class Group:
     records: Sequence[Record]
     notes: Sequence[str] = ()
     """Lines below the title, in the text only."""
+
+
+def groups_of(titled: Iterable[tuple[str, Record]]) -> list[Group]:
+    """Records by their titles, in the order in which these occur."""
+    groups = grouped(titled, lambda pair: pair[0])
+    return [Group(title, [record for _, record in pairs]) for title, pairs in groups.items()]
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from gfmd_cli.analysis.distribution_tables import power_laws
 from gfmd_cli.analysis.ensemble import ensembles
 from gfmd_cli.analysis.grid_size import grid_size
 from gfmd_cli.analysis.records import means_of, records_of
-from gfmd_cli.analysis.table import Column, Group, Record, Table, known, product, ratio
+from gfmd_cli.analysis.table import Column, Group, Record, Table, groups_of, known, product, ratio
 from gfmd_cli.analysis.true_contact import VARIANTS, true_contact_areas
 from gfmd_cli.analysis.units import in_si, shown
 from gfmd_cli.physics.observables import QUANTITIES
@@ -199,13 +199,15 @@ def continuum_table(curves: TitledCurves) -> Table:
 
 def seeds_table(comparison: Comparison) -> Table:
     """Means over seeds."""
-    groups: dict[str, list[Record]] = {}
-    for ensemble in ensembles(comparison):
-        title = f"{ensemble.title}: mean of {len(ensemble.rows)} seeds"
-        record = {"p_star": ensemble.rows[0]["p_star"], **means_of(ensemble)}
-        groups.setdefault(title, []).append(record)
+    groups = groups_of(
+        (
+            f"{ensemble.title}: mean of {len(ensemble.rows)} seeds",
+            {"p_star": ensemble.rows[0]["p_star"], **means_of(ensemble)},
+        )
+        for ensemble in ensembles(comparison)
+    )
     caption = "Means over seeds, +- half the width of the 95 % confidence interval (Student's t)."
-    return Table(caption, SEEDS, [Group(title, records) for title, records in groups.items()])
+    return Table(caption, SEEDS, groups)
 
 
 def true_contact_table(curves: TitledCurves) -> Table:

@@ -8,6 +8,7 @@ import numpy as np
 
 from gfmd_cli.analysis.curve_styles import MARKERS, CurveStyle, colours
 from gfmd_cli.analysis.plotting import SMALL, WIDTH, LegendFigure, log_scale, styled
+from gfmd_cli.analysis.selection import grouped
 from gfmd_cli.bench.file import Trace
 from gfmd_cli.bench.run import REFERENCE
 from gfmd_cli.bench.table import scene_of, solver_names
@@ -40,10 +41,8 @@ def draw_bench(traces: list[Trace], folder: Path) -> list[Path]:
 
 def bench_figures(traces: list[Trace]) -> dict[str, LegendFigure]:
     """The figures by name; to be called inside `styled`."""
-    scenes: dict[Any, list[tuple[Trace, CurveStyle]]] = {}
-    for trace, style in zip(traces, _styles(traces), strict=True):
-        scenes.setdefault(scene_of(trace), []).append((trace, style))
-    rows = list(scenes.values())
+    pairs = zip(traces, _styles(traces), strict=True)
+    rows = list(grouped(pairs, lambda pair: scene_of(pair[0])).values())
     if len(rows) <= SCENES:
         figures = {"work_precision": rows}
     else:

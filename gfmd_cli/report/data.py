@@ -16,8 +16,7 @@ from gfmd_cli.analysis.tables import TitledCurves, curve_title
 from gfmd_cli.analysis.units import in_si, shown
 from gfmd_cli.bench.file import Trace
 from gfmd_cli.report.section import Section
-from gfmd_cli.status import Status
-from gfmd_cli.study.reading import open_study
+from gfmd_cli.study.reading import open_study, solved_rows
 
 
 @dataclass(frozen=True)
@@ -52,7 +51,7 @@ class ReportData:
     @property
     def solved(self) -> list[Row]:
         """The rows that hold a result."""
-        return [row for row in self.rows if row["status"] != Status.MISSING]
+        return solved_rows(self.rows)
 
     @property
     def name(self) -> str:

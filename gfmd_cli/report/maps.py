@@ -1,13 +1,13 @@
 """Section: maps of contact, stress and gap, and cross-sections, of some contacts."""
 
 from collections import defaultdict
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from gfmd_cli.analysis.compare import Row
 from gfmd_cli.analysis.plotting import WIDTH, ColumnFigure, shades
-from gfmd_cli.analysis.selection import evenly
+from gfmd_cli.analysis.selection import evenly, grouped
 from gfmd_cli.analysis.table import Column, Group, Table
 from gfmd_cli.analysis.tables import AREA, P_STAR, POINTS, PRESSURE
 from gfmd_cli.analysis.units import pressure_text
@@ -82,9 +82,7 @@ def maps(data: ReportData) -> Section:
 
 def _chosen(stored: list[Row]) -> list[list[Row]]:
     """At most MAX_CURVES curves, and pressures at equal distances of each."""
-    curves: dict[Any, list[Row]] = {}
-    for row in stored:
-        curves.setdefault((row["scene"], row["solver"], row["tolerance"]), []).append(row)
+    curves = grouped(stored, lambda row: (row["scene"], row["solver"], row["tolerance"]))
     chosen = evenly(list(curves.values()), MAX_CURVES)
     pressures = [sorted(rows, key=lambda row: float(row["p_star"])) for rows in chosen]
     return [evenly(rows, MAX_CONTACTS // len(chosen)) for rows in pressures]

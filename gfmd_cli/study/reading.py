@@ -298,6 +298,11 @@ def read_rows(path: Path) -> list[dict[str, Any]]:
         return study.rows
 
 
+def solved_rows(rows: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
+    """The rows that have a result, converged or not."""
+    return [row for row in rows if row["status"] != Status.MISSING]
+
+
 def stored_spec(path: Path) -> Any:
     """The resolved spec of a study, as plain data. Raises InputError, StudyError."""
     with open_study(path) as study:
