@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import pi
 from typing import Any
 
@@ -23,6 +23,7 @@ from gfmd_cli.physics.roughness_parameters import (
 )
 from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.physics.spectrum_fit import Moments, SelfAffineFit, fit, moments
+from gfmd_cli.study.plausibility import METRES
 
 PRESSURES = (0.003, 0.03, 0.3)  # p* of the predictions
 MIN_HURST = 0.01  # of the table [surface] that is suggested
@@ -55,6 +56,11 @@ class SurfaceSummary:
     def copies(self) -> int:
         """Copies of the surface along each side of the cell of the scene."""
         return self.surface.within("periodic").copies
+
+    @property
+    def in_si(self) -> bool:
+        """Whether lengths are in metres: rms heights of real surfaces are small."""
+        return self.moments.height <= METRES
 
     @property
     def remarks(self) -> list[str]:
@@ -128,7 +134,9 @@ def summary_table(summaries: Sequence[SurfaceSummary], names: Sequence[str]) -> 
     records = [
         summary.record() | {"surface": name} for summary, name in zip(summaries, names, strict=True)
     ]
-    return Table("", COLUMNS, [Group("", records)])
+    in_si = any(summary.in_si for summary in summaries)
+    columns = COLUMNS if in_si else [replace(column, unit="") for column in COLUMNS]
+    return Table("", columns, [Group("", records)])
 
 
 def as_text(summary: SurfaceSummary) -> str:
@@ -136,12 +144,13 @@ def as_text(summary: SurfaceSummary) -> str:
     grid, measured, record = summary.scene.grid, summary.moments, summary.record()
     sides = " x ".join(dict.fromkeys(f"{side:.6g}" for side in record["sides"]))  # a square: one
     points = extent(record["points"][::-1])
+    metres, per_metre = (" m", " 1/m") if summary.in_si else ("", "")
     lines = [
         summary.name,
-        f"  L = {sides} m on {points} points",
-        *_parameter_lines(summary.parameters),
-        f"  spectral: rms height {measured.height:.6g} m, rms gradient {measured.gradient:.5g}, "
-        f"rms curvature {measured.curvature:.5g} 1/m",
+        f"  L = {sides}{metres} on {points} points",
+        *_parameter_lines(summary.parameters, metres),
+        f"  spectral: rms height {measured.height:.6g}{metres}, "
+        f"rms gradient {measured.gradient:.5g}, rms curvature {measured.curvature:.5g}{per_metre}",
     ]
     if grid.dimension == 2:
         lines.append(f"  half-space: p* = 1 is p = {0.5 * measured.gradient:.5g} E_star")
@@ -150,13 +159,15 @@ def as_text(summary: SurfaceSummary) -> str:
         return "\n".join(lines)
     theories = {"spectrum": Persson(summary.scene.shells)}
     if summary.fit is None:
-        return "\n".join([*lines, f"  no fit: {summary.no_fit}", *_predicted(theories)])
+        no_fit = f"  no fit: {summary.no_fit}"
+        return "\n".join([*lines, no_fit, *_predicted(theories, summary.in_si)])
     table = _table(summary.fit, measured, grid.length)
     model = SelfAffine.model_validate(table)
     theories["fit"] = Persson(build_scene(model, HalfSpace(), 2 * model.smallest_grid()).shells)
+    gaussian = float(summary.copies**2)  # modes (+-q_x, +-q_y) of a mirrored map are alike
     lines += [
-        *_fit_lines(summary.fit, float(summary.copies**2)),  # modes (+-q_x, +-q_y) are alike
-        *_predicted(theories),
+        *_fit_lines(summary.fit, gaussian, metres),
+        *_predicted(theories, summary.in_si),
         "  random surface with the fitted spectrum:",
         "",
         "  [surface]",
@@ -164,19 +175,20 @@ def as_text(summary: SurfaceSummary) -> str:
     return "\n".join([*lines, *(f"  {key} = {json.dumps(value)}" for key, value in table.items())])
 
 
-def _parameter_lines(parameters: RoughnessParameters) -> list[str]:
+def _parameter_lines(parameters: RoughnessParameters, metres: str) -> list[str]:
     """The parameters by their names in the standards, in two lines."""
     words = [
-        f"{name} {'-' if value is None else f'{value:.5g}'}{' m' if name in UNITS else ''}"
+        f"{name} {'-' if value is None else f'{value:.5g}'}{metres if name in UNITS else ''}"
         for name, value in parameters.named().items()
     ]
     return [f"  {', '.join(words[:5])}", f"  {', '.join(words[5:])}"]
 
 
-def _predicted(theories: dict[str, Persson]) -> list[str]:
+def _predicted(theories: dict[str, Persson], in_si: bool) -> list[str]:
     """Persson theory of a half-space, Eqs. (25) and (28), on one spectrum or two."""
     unit = next(iter(theories.values())).delta_sigma
-    heads = "".join(f"{f'gap [m], {name}':>24}" for name in theories)
+    gap = "gap [m]" if in_si else "gap"
+    heads = "".join(f"{f'{gap}, {name}':>24}" for name in theories)
     lines = ["  Persson theory, half-space:", f"    p / E_star       a_r{heads}"]
     for p_star in PRESSURES:
         p = p_star * unit
@@ -186,17 +198,17 @@ def _predicted(theories: dict[str, Persson]) -> list[str]:
     return lines
 
 
-def _fit_lines(nearest: SelfAffineFit, gaussian: float) -> list[str]:
+def _fit_lines(nearest: SelfAffineFit, gaussian: float, metres: str) -> list[str]:
     """The fit with warnings; `gaussian` is the scatter that Gaussian roughness has."""
     short = 2 * pi / nearest.q_s
     lines = [f"  fitted spectrum: H = {nearest.hurst:.3f} +- {nearest.hurst_error:.3f}"]
     if nearest.q_r:
         long = 2 * pi / nearest.q_r
         error = long * nearest.q_r_error / nearest.q_r
-        lines[0] += f", lambda_r = {long:.3g} +- {error:.1g} m"
+        lines[0] += f", lambda_r = {long:.3g} +- {error:.1g}{metres}"
     else:
         lines[0] += ", no roll-off within the cell"
-    lines[0] += f", lambda_s = {short:.3g} m (scatter {nearest.scatter:.3g})"
+    lines[0] += f", lambda_s = {short:.3g}{metres} (scatter {nearest.scatter:.3g})"
     if nearest.scatter > MAX_SCATTER * gaussian:
         lines.append(
             f"  The scatter is far above {gaussian:g}: the surface is not self-affine; the surface "
