@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import time
+from threading import Timer
 
 import h5py
 import numpy as np
@@ -17,6 +18,7 @@ from gfmd_cli.grid import plans
 from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.solvers.pcg import PCGState, ProjectedCG
 from gfmd_cli.spec.parse import read_spec
+from gfmd_cli.study import run as study_run
 from gfmd_cli.study import run_task
 from gfmd_cli.study.checkpoint import Checkpoint
 from gfmd_cli.study.columns import COLUMNS, LAYOUT
@@ -325,9 +327,22 @@ def test_a_damaged_record_is_said_in_one_line(run, tmp_path):
     assert "set aside as 0000.bad" in note
 
 
-def test_max_hours_stop_a_run_as_a_signal_does(run, tmp_path):
+def test_max_hours_stop_a_run_as_a_signal_does(run, tmp_path, monkeypatch):
+    """The timer rings at the first step, on slow machines too."""
+    timers = []
+
+    class AtFirstStep(Timer):
+        def start(self):
+            timers.append(self)
+
+    def report(event):
+        if event.event == "step":
+            timers[0].function()
+
+    monkeypatch.setattr(study_run, "Timer", AtFirstStep)
     with pytest.raises(Interrupted, match="call again"):
-        run(LONG, max_seconds=0.2, jobs=1)
+        run(LONG, report=report, max_seconds=20.0, jobs=1)
+    assert 10 <= timers[0].interval <= 20
     assert list((tmp_path / "study.parts").glob("*/pointer"))
 
 
