@@ -100,12 +100,6 @@ class Topography:
         """Number of missing heights."""
         return 0 if self.missing is None else int(np.count_nonzero(self.missing))
 
-    def masked(self) -> "np.ma.MaskedArray[Any, np.dtype[np.float64]]":
-        """The heights, masked where they are missing."""
-        return np.ma.masked_array(
-            self.heights, np.ma.nomask if self.missing is None else self.missing
-        )
-
 
 def read_topography(
     path: Path,
