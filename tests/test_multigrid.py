@@ -51,11 +51,11 @@ def pattern(kind, shape=64):
 
 def applied(n, state, force, threads=1, threshold=PRESSED, length_y=1.0):
     """z, and the two sums, for a force on the points."""
-    case = contact(n, state.shape, length_y, threads)
-    case.grid.padded[...] = np.nan
+    cycle = Multigrid(contact(n, state.shape, length_y, threads))
+    cycle.z[...] = np.nan
     change = np.cos(np.arange(state.size)).reshape(state.shape).astype(np.float32)
-    slope, turned = Multigrid(case).apply(-force, state, threshold, change, case.grid)
-    z = case.grid.padded[:, : state.shape[1]]
+    slope, turned = cycle.apply(-force, state, threshold, change)
+    z = cycle.z[:, : state.shape[1]]
     free = np.where(state < threshold, force, 0.0)
     assert slope == pytest.approx(np.vdot(z, free), rel=1e-5)
     assert turned == pytest.approx(np.vdot(z, change), rel=1e-5, abs=1e-5 * np.abs(z).sum())
@@ -91,14 +91,13 @@ def test_positive_in_its_least_direction(n, kind, shape, length_y):
     """The whole matrix of the cycle on a small grid."""
     state = pattern(kind, shape)
     free = np.flatnonzero(state.ravel() < PRESSED)
-    case, change = contact(n, shape, length_y), np.zeros(shape, np.float32)
-    cycle = Multigrid(case)
+    cycle, change = Multigrid(contact(n, shape, length_y)), np.zeros(shape, np.float32)
     columns = []
     for i in free:
         force = np.zeros(state.size)
         force[i] = 1.0
-        cycle.apply(-force.reshape(shape), state, PRESSED, change, case.grid)
-        columns.append(case.grid.padded[:, : shape[1]].ravel()[free])
+        cycle.apply(-force.reshape(shape), state, PRESSED, change)
+        columns.append(cycle.z[:, : shape[1]].ravel()[free])
     matrix = np.array(columns)
     assert np.allclose(matrix, matrix.T, rtol=0, atol=1e-5 * np.abs(matrix).max())
     values = np.linalg.eigvalsh((matrix + matrix.T) / 2)
@@ -173,8 +172,8 @@ def steps_of_conjugate_gradients(n, state, length_y=1.0):
     steps, start = 0, None
     direction, old = np.zeros_like(force), 1.0
     while True:
-        cycle.apply(-force, state, PRESSED, change, case.grid)
-        z = case.grid.padded[:, : held.shape[1]].copy()
+        cycle.apply(-force, state, PRESSED, change)
+        z = cycle.z[:, : held.shape[1]].copy()
         new = float(np.vdot(z, force))
         start = start or new
         if new < 1e-8 * start or steps > 200:

@@ -17,7 +17,7 @@ import pyfftw
 from gfmd_cli.grid import plans
 from gfmd_cli.grid.arrays import Field, Modes
 from gfmd_cli.grid.convolution import DistributedPaddedTransform, padded_shape
-from gfmd_cli.grid.fft_grid import PLANNING, Grid, Shape, in_single, shared_modes
+from gfmd_cli.grid.fft_grid import PLANNING, Grid, Shape, shared_modes
 from gfmd_cli.grid.halo import HALO_ROWS, DistributedColumns, DistributedRows, is_distributable
 from gfmd_cli.grid.ranks import Ranks, leads
 from gfmd_cli.grid.rows import LocalRows
@@ -130,10 +130,6 @@ class DistributedGrid(Grid):
     @cached_property
     def _memory(self) -> tuple[Any, Field]:
         """Memory of the coefficients, and as much again, as real values, for the exchange."""
-        if isinstance(self.within, DistributedGrid):
-            self.within.work  # noqa: B018 - planning overwrites the memory and has to be first
-            own, spare = self.within._memory
-            return in_single(own), in_single(spare)
         rows, columns = self.rows.count, self.points // 2 + 1
         size = max(rows * columns, self.points_y * self.spectral_shape[1])
         kind = np.result_type(self.real, np.complex64)

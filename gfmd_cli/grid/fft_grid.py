@@ -5,7 +5,7 @@ Coefficients are kept for non-negative wavenumbers of the last axis only (real t
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import prod
 from typing import Any, Literal, TypeVar
@@ -44,8 +44,6 @@ class Grid:
     """Number of points along y; 0 stands for as many as along x. A line has one."""
     length_y: float = 0.0
     """Side along y [m]; 0 stands for the points along y times the spacing along x."""
-    within: "Grid | None" = field(default=None, repr=False)
-    """The grid in double precision whose memory the transforms of this one work in."""
 
     def __post_init__(self) -> None:
         points_y = self.points_y or self.points if self.dimension == 2 else 1
@@ -188,7 +186,7 @@ class Grid:
         In place they spare a field, and a third of the time of transforms between two arrays.
         Array and plans come together: measuring a plan overwrites the array.
         """
-        work = self.empty_modes() if self.within is None else in_single(self.within.work)
+        work = self.empty_modes()
         real = work.view(self.real)[..., : self.points]
 
         def plan(flags: tuple[str, ...]) -> list[Callable[[], None]]:
@@ -208,11 +206,6 @@ class Grid:
 
         forward, backward = plans.planned(plan)
         return work, forward, backward
-
-    @cached_property
-    def single(self) -> "Grid":
-        """This grid in single precision; its transforms work in the memory of this one's."""
-        return replace(self, precision="single", within=self)
 
     @property
     def work(self) -> Modes:
@@ -401,12 +394,6 @@ class Grid:
         target.backward_into(resampled)
         resampled *= 1.0 / self.size
         return resampled
-
-
-def in_single(array: Any) -> Any:
-    """An array in single precision, of the same shape, in the memory of another one."""
-    kind = np.complex64 if np.iscomplexobj(array) else np.float32
-    return array.reshape(-1).view(kind)[: array.size].reshape(array.shape)
 
 
 def multiplicity(points: int) -> Field:

@@ -45,14 +45,14 @@ def _mean_response(contact: Contact, touching: Mask) -> float:
     free = ~np.atleast_2d(touching)
     contact_state = np.where(free, FREE, PRESSED).astype(np.int8)
     preconditioner = create(contact, select(contact, contact_state, PRESSED))
-    values = grid.as_rows(grid.padded)[:, : grid.points]
+    values, z = (field[:, : grid.points] for field in (grid.as_rows(grid.padded), preconditioner.z))
     stress = np.where(free, -1.0, 0.0)  # K w - 1 = -f
     direction, change = np.zeros_like(stress), np.zeros_like(stress)
     gains, total, old_slope = deque([np.inf], DELAY), 0.0, np.inf
     for _ in range(MAX_STEPS):
-        slope, turned = preconditioner.apply(stress, contact_state, PRESSED, change, grid)
+        slope, turned = preconditioner.apply(stress, contact_state, PRESSED, change)
         direction *= max(0.0, -turned / old_slope) if old_slope > 0 else 0.0  # as in `pcg`
-        np.add(direction, values, out=direction, where=free)
+        np.add(direction, z, out=direction, where=free)
         descent, old_slope = -float(np.vdot(direction, stress)), slope
         values[...] = direction
         curvature = grid.filter_padded(contact.stiffness)

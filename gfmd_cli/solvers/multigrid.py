@@ -136,6 +136,7 @@ class Multigrid:
     transforms = 0
 
     def __init__(self, contact: Contact) -> None:
+        self.z = contact.grid.as_rows(contact.grid.padded)
         levels = _levels(contact)
         self.stencils = [level.stencil for level in levels]
         self.scale = np.float32(1.0 / levels[0].scale)
@@ -159,7 +160,7 @@ class Multigrid:
         self.ties = [rows.empty_with_halo(4, n + 1, dtype=np.uint8) for rows, n in sizes]
 
     def apply(
-        self, sigma: Field, contact_state: ContactState, threshold: int, change: Field, out: Grid
+        self, sigma: Field, contact_state: ContactState, threshold: int, change: Field
     ) -> tuple[float, float]:
         """See `preconditioners.Preconditioner.apply`."""
         self.rows.exchange_halo(contact_state)
@@ -173,7 +174,7 @@ class Multigrid:
             self.smooth(level, self.x[level], self.y[level])
         # [5] correction and one sweep on the finest level, and the sums
         slope, turned = self.rows.sums_with_halo(
-            2, kernels.last_smooth, *fields, *self.correction(0), self.scale, change, out.padded
+            2, kernels.last_smooth, *fields, *self.correction(0), self.scale, change, self.z
         )
         return float(slope), float(turned)
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from gfmd_cli.grid.arrays import Field, Mask
 from gfmd_cli.grid.compilation import kernel, part_of_kernel
-from gfmd_cli.grid.fft_grid import Grid, multiplicity
+from gfmd_cli.grid.fft_grid import multiplicity
 from gfmd_cli.grid.rows import LocalRows
 from gfmd_cli.physics.contact import Contact
 from gfmd_cli.solvers.contact_state import ContactState
@@ -27,6 +27,7 @@ class Multilevel:
 
     def __init__(self, contact: Contact) -> None:
         self.rows = contact.grid.rows
+        self.z = contact.grid.as_rows(contact.grid.padded)
         self.energies = hat_energies(contact)
         side, rows = contact.grid.points, self.rows
         self.coarse_rows: list[LocalRows] = []
@@ -39,7 +40,7 @@ class Multilevel:
             self.held.append(rows.empty_with_halo(side >> level, dtype=np.bool_))
 
     def apply(
-        self, sigma: Field, contact_state: ContactState, threshold: int, change: Field, out: Grid
+        self, sigma: Field, contact_state: ContactState, threshold: int, change: Field
     ) -> tuple[float, float]:
         """See `preconditioners.Preconditioner.apply`."""
         self.rows.exchange_halo(contact_state)
@@ -56,7 +57,7 @@ class Multilevel:
                 break
         else:
             depth = len(self.fields)
-        arguments = (self.energies[0], change, out.padded)
+        arguments = (self.energies[0], change, self.z)
         if depth == 0:
             slope, turned = self.rows.sums_with_halo(2, only_level, *fields, *arguments)
             return float(slope), float(turned)

@@ -15,16 +15,10 @@ cycle: a move beyond the lowest point is shortened to it (all points on the way 
 a move along which the energy rises from the start is halved. A scaled gradient that is projected on
 the feasible set decreases the energy for a short enough step if the binding constraints are
 excluded from the scaling (Bertsekas, SIAM J. Control Optim. 20, 221, 1982).
-
-K is applied to moves in single precision, with a noise in proportion to the move. Whenever the
-residual has fallen by a factor of a hundred, sigma is computed afresh from u in double precision
-(residual replacement; van der Vorst & Ye, SIAM J. Sci. Comput. 22, 835, 2000), so that any residual
-can be reached that double precision permits.
 """
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from math import inf
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -40,7 +34,6 @@ from gfmd_cli.solvers.projected_move import choose
 PROPORTION = 0.3  # of rms tension to rms free force; from 0.1 to 1 within 20 % at n = 1 to 4
 MAX_HALVINGS = 60  # of a move along which the energy rises; beyond, it is rounding
 RIGID_CURVATURE = 1e-12  # curvature over descent below which a direction is a rigid shift
-DRIFT = 0.01  # fall of the residual after which sigma is computed afresh from u
 SELECT_AFTER = 4  # smallest number of steps between two selections of the preconditioner
 SELECT_GROWTH = 1.5  # growth of the number of steps from one selection to the next
 SCREENING_CHANGE = 1.25  # factor in k(q_c) up to which the old value is kept
@@ -67,8 +60,6 @@ class PCGState(State):
     """Whether the preconditioner works on levels of grids; else it is the Green's function."""
     select_at: int = 0
     """Step of the next selection of the preconditioner."""
-    exact_residual: float = inf
-    """Residual when sigma was last computed from u."""
     free: float = 0.0
     """Sum of the squares of the force on the free points."""
     tension: float = 0.0
@@ -102,10 +93,7 @@ class ProjectedCG(Solver):
         run = _Run(contact, state)
         while True:
             yield state
-            if not state.exact and state.residual < DRIFT * state.exact_residual:
-                self.refresh(contact, state)
             if state.exact:
-                state.exact_residual = state.residual
                 run.assess(run.classify())
             run.select()  # [1]
             beta = run.precondition()  # [2]
@@ -119,10 +107,18 @@ class _Run:
     def __init__(self, contact: Contact, state: PCGState) -> None:
         self.contact, self.state = contact, state
         self.grid = grid = contact.grid
-        self.rows, self.single = grid.rows, grid.single
-        self.padded = grid.as_rows(self.single.padded)
-        fields = (contact.obstacle, state.u, state.sigma, state.direction, state.change)
-        self.h, self.u, self.sigma, self.direction, self.change = map(grid.as_rows, fields)
+        self.rows = grid.rows
+        fields = (
+            contact.obstacle,
+            state.u,
+            state.sigma,
+            state.direction,
+            state.change,
+            grid.padded,
+        )
+        self.h, self.u, self.sigma, self.direction, self.change, self.padded = map(
+            grid.as_rows, fields
+        )
         self.contact_state = self.rows.empty_with_halo(self.h.shape[1], dtype=np.int8)
         self.own_state = self.rows.interior(self.contact_state)
         self.threshold = PRESSED
@@ -166,10 +162,10 @@ class _Run:
         state = self.state
         if self.preconditioner is None:
             selection = Selection(state.screening, state.multilevel)
-            self.preconditioner = create(self.contact, selection)
+            self.preconditioner = create(self.contact, selection, "single")
         fields = (self.sigma, self.contact_state, self.threshold)
-        slope, turned = self.preconditioner.apply(*fields, self.change, self.single)
-        state.transforms += self.preconditioner.transforms / 2
+        slope, turned = self.preconditioner.apply(*fields, self.change)
+        state.transforms += self.preconditioner.transforms
         # Polak-Ribiere+. The force has changed by -change since the last direction, so that
         # z (f - f_old) = -z change.
         beta = max(0.0, -turned / state.slope) if state.slope > 0 else 0.0
@@ -178,8 +174,8 @@ class _Run:
 
     def apply_stiffness(self) -> float:
         """Replace the values in `padded` by K times them; return the sum of their products."""
-        self.state.transforms += 1  # a pair, each at half the cost of one in double precision
-        return self.single.filter_padded(self.contact.stiffness)
+        self.state.transforms += 2
+        return self.grid.filter_padded(self.contact.stiffness)
 
     def advance(self, beta: float) -> None:
         """Compute the new direction, and move along it such that the energy does not rise."""
@@ -208,8 +204,9 @@ class _Run:
 
     def turn(self, beta: float, *, is_kept: bool = False) -> Field:
         """Compute the direction and the projected move along it; see `pcg_kernels.turn`."""
+        assert self.preconditioner is not None
         fields = (self.h, self.u, self.sigma, self.own_state, self.threshold)
-        direction = (self.padded, beta, self.direction, is_kept)
+        direction = (self.preconditioner.z, beta, self.direction, is_kept)
         return self.rows.sums(3, kernels.turn, *fields, *direction, self.state.length, self.padded)
 
     def fraction_of_move(self, best: float, stopped: bool) -> float:

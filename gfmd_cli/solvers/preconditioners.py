@@ -8,14 +8,13 @@
 - The sum over levels of `multilevel` does too, for k(q) whose growth per level is uneven.
 """
 
-from dataclasses import dataclass
-from typing import Protocol
+from dataclasses import dataclass, replace
+from typing import Literal, Protocol
 
 import numpy as np
 
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.grid.compilation import kernel
-from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.physics.contact import Contact
 from gfmd_cli.solvers.contact_state import ContactState
 from gfmd_cli.solvers.multigrid import COARSEST, Multigrid, level_count, suits
@@ -27,41 +26,45 @@ STEEP = 0.9  # local exponent of k(q) above which the V-cycle is faster than the
 class Preconditioner(Protocol):
     """A symmetric positive approximation of the inverse of K on the free points."""
 
+    z: Field
+    """The preconditioned force, which `apply` writes; rows as of `Grid.padded`."""
     transforms: int
-    """Transforms of one application."""
+    """Transforms in double precision that take as long as those of one application."""
 
     def apply(
-        self, sigma: Field, contact_state: ContactState, threshold: int, change: Field, out: Grid
+        self, sigma: Field, contact_state: ContactState, threshold: int, change: Field
     ) -> tuple[float, float]:
-        """Write the preconditioned force z to `out.padded`: from -sigma on the free points.
+        """Write the preconditioned force -sigma of the free points to `z`, zero on those held.
 
-        z is zero on the points held. `out` is the grid, in double or single precision.
         `contact_state` has a halo, which is filled here. Returns the sums of z times force and of
         z times `change`.
         """
 
 
 class GreensFunction:
-    """The screened Green's function."""
+    """The screened Green's function, in double precision or, at half the cost, in single."""
 
-    transforms = 2
-
-    def __init__(self, contact: Contact, screening: float) -> None:
-        self.rows, self.screening = contact.grid.rows, screening
-        self.stiffness = contact.grid.as_rows(contact.stiffness)
+    def __init__(
+        self, contact: Contact, screening: float, precision: Literal["double", "single"]
+    ) -> None:
+        grid, self.rows = contact.grid, contact.grid.rows
+        self.grid = grid if precision == grid.precision else replace(grid, precision=precision)
+        self.stiffness, self.screening = grid.as_rows(contact.stiffness), screening
+        self.z = grid.as_rows(self.grid.padded)
+        self.transforms = 1 if precision == "single" else 2
 
     def apply(
-        self, sigma: Field, contact_state: ContactState, threshold: int, change: Field, out: Grid
+        self, sigma: Field, contact_state: ContactState, threshold: int, change: Field
     ) -> tuple[float, float]:
         """See `Preconditioner.apply`."""
-        rows, z = self.rows, out.as_rows(out.padded)
+        grid, rows = self.grid, self.rows
         fields = (sigma, rows.interior(contact_state), threshold)
-        rows.run(_free_force, *fields, z)
-        out.transform()
-        factors = (self.stiffness, self.screening, 1.0 / out.size)
-        out.spectral_rows.run(_apply_greens_function, out.as_rows(out.spectrum), *factors)
-        out.transform_back()
-        slope, turned = rows.sums(2, _slopes, *fields, change, z)
+        rows.run(_free_force, *fields, self.z)
+        grid.transform()
+        factors = (self.stiffness, self.screening, 1.0 / grid.size)
+        grid.spectral_rows.run(_apply_greens_function, grid.as_rows(grid.spectrum), *factors)
+        grid.transform_back()
+        slope, turned = rows.sums(2, _slopes, *fields, change, self.z)
         return float(slope), float(turned)
 
 
@@ -93,10 +96,12 @@ def select(contact: Contact, contact_state: ContactState, threshold: int) -> Sel
     return Selection(screening, exponent > 0.75 and chord > 8 * (exponent - 1))
 
 
-def create(contact: Contact, selection: Selection) -> Preconditioner:
-    """The selected preconditioner."""
+def create(
+    contact: Contact, selection: Selection, precision: Literal["double", "single"] = "double"
+) -> Preconditioner:
+    """The selected preconditioner; `precision` is that of the Green's function."""
     if not selection.multilevel:
-        return GreensFunction(contact, selection.screening)
+        return GreensFunction(contact, selection.screening, precision)
     return Multigrid(contact) if suits(contact) else Multilevel(contact)
 
 
