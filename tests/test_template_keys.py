@@ -22,6 +22,14 @@ p_star = 0.1                # p*
 """
 
 
+@pytest.mark.parametrize("value", [1e-8, 7e10, 1.5, 1.234567890123e-8, 100000.0])
+def test_numbers_are_written_as_people_do_and_without_loss(value):
+    (line,) = with_keys("[solver]\n", (f"solver={{tolerance={value!r}}}",)).splitlines()[1:]
+    assert tomllib.loads(line)["tolerance"] == value
+    assert "+" not in line
+    assert "e0" not in line
+
+
 def test_a_key_takes_the_place_of_its_line():
     changed = with_keys(TEXT, ("elastomer.n=3",))
     assert changed.splitlines()[2] == "n = 3                       # as given on the command line"
@@ -49,6 +57,7 @@ def test_a_key_takes_the_place_of_its_line():
         (("output.fields=['u', 'sigma']",), {"output": {"fields": ["u", "sigma"]}}),
         (("solver.tolerance=1.234567890123e-8",), {"solver": {"tolerance": 1.234567890123e-8}}),
         (("study.name=first",), {"study": {"name": "first"}}),
+        (("sweep=[{paired=['a.b', 'c.d']}]",) * 2, {"sweep": [{"paired": ["a.b", "c.d"]}]}),
     ],
 )
 def test_a_key_changes_its_table_only(overrides, expected):

@@ -17,8 +17,8 @@ def with_keys(text: str, overrides: tuple[str, ...]) -> str:
     """The text of a spec with "key.name=value" each, as `gfmd run --set` takes them.
 
     A key takes the place of the line that has it, or of the line where it is commented out; keys
-    that do not go with it are removed. A whole table takes the place of all its keys. Raises
-    InputError for any other form.
+    that do not go with it are removed. A whole table takes the place of all its keys; the tables
+    [[sweep]] become a list before all others. Raises InputError for any other form.
     """
     lines = text.splitlines()
     for override in overrides:
@@ -26,6 +26,11 @@ def with_keys(text: str, overrides: tuple[str, ...]) -> str:
         data = tomllib.loads("\n".join(lines))
         set_override(data, override)
         values = data[table]
+        if table == "sweep" and not keys:
+            lines = [line for line in lines if not line.startswith("sweep = ")]
+            first = min(i for i, line in enumerate(lines) if _header(line))
+            lines[first:first] = [f"sweep = {_as_toml(values)} # {COMMENT}", ""]
+            continue
         if not isinstance(values, dict):
             raise InputError(f"--set {override}: write table.key=value, such as grid.points=128")
         if not keys:
@@ -44,7 +49,8 @@ def _as_toml(value: Any) -> str:
         return f"[{', '.join(map(_as_toml, value))}]"
     if isinstance(value, float):
         short = f"{value:g}"
-        return short if float(short) == value else repr(value)
+        text = short if float(short) == value else repr(value)
+        return re.sub(r"e\+?(-?)0*", r"e\1", text)  # 7e10 and not 7e+10
     return json.dumps(value, ensure_ascii=False, default=str)
 
 
