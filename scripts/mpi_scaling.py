@@ -64,7 +64,7 @@ def measure(points: int) -> None:
     u = contact.settle(np.zeros(grid.shape))
     state[...] = 0
     grid.rows.interior(state)[...] = PRESSED * (u == contact.height)
-    cycle, change = Multigrid(contact), np.zeros(grid.shape, np.float32)
+    cycle, change = Multigrid(contact, grid), np.zeros(grid.shape, np.float32)
     sigma = contact.stress(u, out=grid.empty())
     once, _ = least(grid, lambda: cycle.apply(sigma, state, PRESSED, change), exchange)
     found: list[float] = []

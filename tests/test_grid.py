@@ -139,6 +139,20 @@ def test_the_operator_is_the_product_of_dense_matrices():
     assert out == pytest.approx(expected, abs=10 * ROUNDING)
 
 
+@pytest.mark.parametrize("grid", GRIDS, ids=str)
+def test_transforms_in_single_precision_work_in_the_same_memory(grid):
+    symbol, field = np.exp(-grid.mode_number()), noise(grid)
+    expected = grid.operator(symbol)(field, out=grid.empty())
+    single = grid.in_single()
+    values = single.padded[..., : grid.points]
+    values[...] = field
+    single.filter_padded(symbol)
+    assert values == pytest.approx(expected, abs=1e-6)
+    assert values.dtype == np.float32
+    assert np.shares_memory(values, grid.padded)
+    assert np.array_equal(grid.operator(symbol)(field, out=grid.empty()), expected)
+
+
 def test_the_operator_on_a_line_is_the_convolution_with_its_kernel():
     grid = Grid(10, 1)
     symbol = np.random.default_rng(3).random(grid.spectral_shape)

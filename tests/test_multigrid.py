@@ -51,7 +51,8 @@ def pattern(kind, shape=64):
 
 def applied(n, state, force, threads=1, threshold=PRESSED, length_y=1.0):
     """z, and the two sums, for a force on the points."""
-    cycle = Multigrid(contact(n, state.shape, length_y, threads))
+    case = contact(n, state.shape, length_y, threads)
+    cycle = Multigrid(case, case.grid)
     cycle.z[...] = np.nan
     change = np.cos(np.arange(state.size)).reshape(state.shape).astype(np.float32)
     slope, turned = cycle.apply(-force, state, threshold, change)
@@ -91,7 +92,8 @@ def test_positive_in_its_least_direction(n, kind, shape, length_y):
     """The whole matrix of the cycle on a small grid."""
     state = pattern(kind, shape)
     free = np.flatnonzero(state.ravel() < PRESSED)
-    cycle, change = Multigrid(contact(n, shape, length_y)), np.zeros(shape, np.float32)
+    case = contact(n, shape, length_y)
+    cycle, change = Multigrid(case, case.grid), np.zeros(shape, np.float32)
     columns = []
     for i in free:
         force = np.zeros(state.size)
@@ -168,7 +170,7 @@ def steps_of_conjugate_gradients(n, state, length_y=1.0):
     """For K on the free points, to 1e-8 of the energy."""
     held, case = state == PRESSED, contact(n, state.shape, length_y)
     force = np.where(held, 0.0, np.random.default_rng(4).normal(size=held.shape))
-    cycle, change = Multigrid(case), np.zeros(held.shape, np.float32)
+    cycle, change = Multigrid(case, case.grid), np.zeros(held.shape, np.float32)
     steps, start = 0, None
     direction, old = np.zeros_like(force), 1.0
     while True:

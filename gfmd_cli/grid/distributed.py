@@ -132,9 +132,8 @@ class DistributedGrid(Grid):
         """Memory of the coefficients, and as much again, as real values, for the exchange."""
         rows, columns = self.rows.count, self.points // 2 + 1
         size = max(rows * columns, self.points_y * self.spectral_shape[1])
-        kind = np.result_type(self.real, np.complex64)
         room = max(size, (rows + 2 * HALO_ROWS) * columns)
-        return pyfftw.empty_aligned(size, kind), pyfftw.empty_aligned(2 * room, self.real)
+        return pyfftw.empty_aligned(size, self._complex), pyfftw.empty_aligned(2 * room, self.real)
 
     @cached_property
     def _workspace(self) -> tuple[Modes, Callable[[], None], Callable[[], None]]:

@@ -57,6 +57,11 @@ class Grid:
         return np.dtype(np.float64 if self.precision == "double" else np.float32)
 
     @property
+    def _complex(self) -> "np.dtype[np.complexfloating[Any, Any]]":
+        """Type of Fourier coefficients."""
+        return np.dtype(np.complex128 if self.precision == "double" else np.complex64)
+
+    @property
     def whole_shape(self) -> Shape:
         """Shape of a real field of the whole grid, indexed [y, x]."""
         return (self.points_y, self.points)[-self.dimension :]
@@ -138,8 +143,7 @@ class Grid:
 
     def empty_modes(self) -> Modes:
         """Fourier coefficients, aligned for the transforms, values undefined."""
-        kind = np.result_type(self.real, np.complex64)
-        array: Modes = pyfftw.empty_aligned(self.spectral_shape, dtype=kind)
+        array: Modes = pyfftw.empty_aligned(self.spectral_shape, dtype=self._complex)
         return array
 
     def mode_number(self, rows: slice = ALL) -> Field:
@@ -180,13 +184,25 @@ class Grid:
         return values
 
     @cached_property
+    def _memory(self) -> tuple[Any, ...]:
+        """Memory that transforms work in, of one axis."""
+        return (pyfftw.empty_aligned(prod(self.spectral_shape), self._complex),)
+
+    def in_single(self) -> "Grid":
+        """The same grid in single precision; its transforms work in the memory of this one's."""
+        grid = replace(self, precision="single")
+        kinds = {"f": grid.real, "c": grid._complex}
+        vars(grid)["_memory"] = tuple(part.view(kinds[part.dtype.kind]) for part in self._memory)
+        return grid
+
+    @cached_property
     def _workspace(self) -> tuple[Modes, Callable[[], None], Callable[[], None]]:
         """Memory that every transform of this grid works in, and the two plans, in place.
 
         In place they spare a field, and a third of the time of transforms between two arrays.
         Array and plans come together: measuring a plan overwrites the array.
         """
-        work = self.empty_modes()
+        work = self._memory[0][: prod(self.spectral_shape)].reshape(self.spectral_shape)
         real = work.view(self.real)[..., : self.points]
 
         def plan(flags: tuple[str, ...]) -> list[Callable[[], None]]:

@@ -34,6 +34,8 @@ class State:
     """Natural residual of u and sigma."""
     step: int = 0
     """Steps on this grid so far."""
+    rounding: float = 0.0
+    """Estimate of what the rounding of the updates of sigma adds to the residual."""
     transforms: float = 0
     """Transforms on this grid so far."""
     coarser_transforms: float = 0.0
@@ -121,11 +123,12 @@ def ignore(contact: Contact, state: State) -> None:
 def solve(contact: Contact, solver: Solver, state: State, watch: Watch = ignore) -> Status:
     """Drive `solver` until the natural residual is below its tolerance; return how it ended.
 
-    The residual that ends the solve is measured on sigma computed afresh from u; the solution is in
-    `state`. The status is `ROUNDING` if double precision does not allow the tolerance.
+    The residual that ends the solve is measured on sigma computed afresh from u; sigma is also
+    computed afresh where the residual is below its rounding. The solution is in `state`. The status
+    is `ROUNDING` if double precision does not allow the tolerance.
     """
     for current in solver.iterate(contact, state):
-        if current.residual < solver.tolerance and not current.exact:
+        if current.residual < max(solver.tolerance, current.rounding) and not current.exact:
             solver.refresh(contact, current)
             if current.residual >= solver.tolerance:
                 progress = current.residual < PROGRESS * current.best_residual

@@ -135,8 +135,8 @@ class Multigrid:
 
     transforms = 0
 
-    def __init__(self, contact: Contact) -> None:
-        self.z = contact.grid.as_rows(contact.grid.padded)
+    def __init__(self, contact: Contact, grid: Grid) -> None:
+        self.z = grid.as_rows(grid.padded)
         levels = _levels(contact)
         self.stencils = [level.stencil for level in levels]
         self.scale = np.float32(1.0 / levels[0].scale)

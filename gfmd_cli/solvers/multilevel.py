@@ -11,7 +11,7 @@ import numpy as np
 
 from gfmd_cli.grid.arrays import Field, Mask
 from gfmd_cli.grid.compilation import kernel, part_of_kernel
-from gfmd_cli.grid.fft_grid import multiplicity
+from gfmd_cli.grid.fft_grid import Grid, multiplicity
 from gfmd_cli.grid.rows import LocalRows
 from gfmd_cli.physics.contact import Contact
 from gfmd_cli.solvers.contact_state import ContactState
@@ -25,9 +25,9 @@ class Multilevel:
 
     transforms = 0
 
-    def __init__(self, contact: Contact) -> None:
+    def __init__(self, contact: Contact, grid: Grid) -> None:
         self.rows = contact.grid.rows
-        self.z = contact.grid.as_rows(contact.grid.padded)
+        self.z = grid.as_rows(grid.padded)
         self.energies = hat_energies(contact)
         side, rows = contact.grid.points, self.rows
         self.coarse_rows: list[LocalRows] = []

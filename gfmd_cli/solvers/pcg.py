@@ -9,16 +9,23 @@ A step of the method, with the numbers beside the code lines:
 [4] Project the move of length s on the constraint: u -> max(u + s d, h).
 [5] Go to the point of lowest energy on the straight way to the projected point.
 
-A step applies K once, to the projected move. The length s is that of the step before, corrected by
-the ratio of the best move to the projected one. The energy never rises, so that the method cannot
-cycle: a move beyond the lowest point is shortened to it (all points on the way are feasible), and
-a move along which the energy rises from the start is halved. A scaled gradient that is projected on
-the feasible set decreases the energy for a short enough step if the binding constraints are
-excluded from the scaling (Bertsekas, SIAM J. Control Optim. 20, 221, 1982).
+A step applies K once, to the projected move. This is done in single precision, which costs half:
+moves become smaller as the iteration converges, and so does their rounding. White noise of u has
+the stress k_max times as large, which gives an estimate of the rounding of sigma; sigma is computed
+afresh in double precision where the residual falls below it (residual replacement; van der Vorst &
+Ye, SIAM J. Sci. Comput. 22, 835, 2000).
+
+The length s is that of the step before, corrected by the ratio of the best move to the projected
+one. The energy never rises, so that the method cannot cycle: a move beyond the lowest point is
+shortened to it (all points on the way are feasible), and a move along which the energy rises from
+the start is halved. A scaled gradient that is projected on the feasible set decreases the energy
+for a short enough step if the binding constraints are excluded from the scaling (Bertsekas, SIAM J.
+Control Optim. 20, 221, 1982).
 """
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from math import hypot
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -31,6 +38,7 @@ from gfmd_cli.solvers.loop import Solver, State
 from gfmd_cli.solvers.preconditioners import Preconditioner, Selection, create, select
 from gfmd_cli.solvers.projected_move import choose
 
+SINGLE_ROUNDING = 2.0**-24  # unit roundoff; the rounding of sigma is 0.4 to 1.3 of the estimate
 PROPORTION = 0.3  # of rms tension to rms free force; from 0.1 to 1 within 20 % at n = 1 to 4
 MAX_HALVINGS = 60  # of a move along which the energy rises; beyond, it is rounding
 RIGID_CURVATURE = 1e-12  # curvature over descent below which a direction is a rigid shift
@@ -95,6 +103,7 @@ class ProjectedCG(Solver):
             yield state
             if state.exact:
                 run.assess(run.classify())
+                state.rounding = 0.0
             run.select()  # [1]
             beta = run.precondition()  # [2]
             run.advance(beta)  # [3] to [5]
@@ -108,13 +117,15 @@ class _Run:
         self.contact, self.state = contact, state
         self.grid = grid = contact.grid
         self.rows = grid.rows
+        self.single = grid.in_single()
+        self.stiffest = grid.max(float(contact.stiffness.max()))
         fields = (
             contact.obstacle,
             state.u,
             state.sigma,
             state.direction,
             state.change,
-            grid.padded,
+            self.single.padded,
         )
         self.h, self.u, self.sigma, self.direction, self.change, self.padded = map(
             grid.as_rows, fields
@@ -162,7 +173,7 @@ class _Run:
         state = self.state
         if self.preconditioner is None:
             selection = Selection(state.screening, state.multilevel)
-            self.preconditioner = create(self.contact, selection, "single")
+            self.preconditioner = create(self.contact, selection, self.single)
         fields = (self.sigma, self.contact_state, self.threshold)
         slope, turned = self.preconditioner.apply(*fields, self.change)
         state.transforms += self.preconditioner.transforms
@@ -173,24 +184,27 @@ class _Run:
         return beta
 
     def apply_stiffness(self) -> float:
-        """Replace the values in `padded` by K times them; return the sum of their products."""
-        self.state.transforms += 2
-        return self.grid.filter_padded(self.contact.stiffness)
+        """Replace the values in `padded` by K times them; return the sum of their products.
+
+        A pair of transforms in single precision counts as one.
+        """
+        self.state.transforms += 1
+        return self.single.filter_padded(self.contact.stiffness)
 
     def advance(self, beta: float) -> None:
         """Compute the new direction, and move along it such that the energy does not rise."""
         state, fields = self.state, (self.h, self.u, self.sigma)
-        descent, fall, stopped = self.turn(beta)  # [3]
+        descent, fall, square, stopped = self.turn(beta)  # [3]
         if descent <= 0:
             self.precondition()
-            descent, fall, stopped = self.turn(0.0)
+            descent, fall, square, stopped = self.turn(0.0)
         fraction, moved = 0.0, state.length > 0
         if not moved:
             state.length = self.exact_length(descent)
         for _ in range(MAX_HALVINGS):
             length = state.length
             if not moved:  # [4]
-                _, fall, stopped = self.turn(0.0, is_kept=True)
+                _, fall, square, stopped = self.turn(0.0, is_kept=True)
             curvature = self.apply_stiffness()
             if fall > 0:
                 best = float(fall) / curvature if curvature > 0 else 1.0  # 1: a rigid shift
@@ -201,13 +215,15 @@ class _Run:
         way = (self.direction, length, fraction, self.padded, self.change)
         self.assess(self.rows.sums(3, kernels.advance, *fields, *way, self.own_state))  # [5]
         state.exact = False
+        rounding = SINGLE_ROUNDING * self.stiffest * fraction * self.contact.as_residual(square)
+        state.rounding = hypot(state.rounding, rounding)  # of the moves so far
 
     def turn(self, beta: float, *, is_kept: bool = False) -> Field:
         """Compute the direction and the projected move along it; see `pcg_kernels.turn`."""
         assert self.preconditioner is not None
         fields = (self.h, self.u, self.sigma, self.own_state, self.threshold)
         direction = (self.preconditioner.z, beta, self.direction, is_kept)
-        return self.rows.sums(3, kernels.turn, *fields, *direction, self.state.length, self.padded)
+        return self.rows.sums(4, kernels.turn, *fields, *direction, self.state.length, self.padded)
 
     def fraction_of_move(self, best: float, stopped: bool) -> float:
         """Fraction of a move to take if the energy is lowest at the fraction `best`."""

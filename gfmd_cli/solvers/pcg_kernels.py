@@ -40,7 +40,7 @@ def turn(h, u, sigma, state, threshold, z, beta, direction, is_kept, length, pad
     times force, and the number of points stopped at h.
     """
     for i in range(a, b):
-        descent = fall = 0.0
+        descent = fall = square = 0.0
         stopped = 0
         for j in range(h.shape[1]):
             if not is_kept:
@@ -52,8 +52,9 @@ def turn(h, u, sigma, state, threshold, z, beta, direction, is_kept, length, pad
             stopped += step < room
             descent -= d * sigma[i, j]
             fall -= move * sigma[i, j]
+            square += move * move
             padded[i, j] = move
-        out[i, 0], out[i, 1], out[i, 2] = descent, fall, stopped
+        out[i, 0], out[i, 1], out[i, 2], out[i, 3] = descent, fall, square, stopped
 
 
 @kernel

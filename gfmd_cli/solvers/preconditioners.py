@@ -8,13 +8,14 @@
 - The sum over levels of `multilevel` does too, for k(q) whose growth per level is uneven.
 """
 
-from dataclasses import dataclass, replace
-from typing import Literal, Protocol
+from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.grid.compilation import kernel
+from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.physics.contact import Contact
 from gfmd_cli.solvers.contact_state import ContactState
 from gfmd_cli.solvers.multigrid import COARSEST, Multigrid, level_count, suits
@@ -42,16 +43,13 @@ class Preconditioner(Protocol):
 
 
 class GreensFunction:
-    """The screened Green's function, in double precision or, at half the cost, in single."""
+    """The screened Green's function, in the precision of the grid that `z` belongs to."""
 
-    def __init__(
-        self, contact: Contact, screening: float, precision: Literal["double", "single"]
-    ) -> None:
-        grid, self.rows = contact.grid, contact.grid.rows
-        self.grid = grid if precision == grid.precision else replace(grid, precision=precision)
+    def __init__(self, contact: Contact, screening: float, grid: Grid) -> None:
+        self.grid, self.rows = grid, contact.grid.rows
         self.stiffness, self.screening = grid.as_rows(contact.stiffness), screening
-        self.z = grid.as_rows(self.grid.padded)
-        self.transforms = 1 if precision == "single" else 2
+        self.z = grid.as_rows(grid.padded)
+        self.transforms = 1 if grid.precision == "single" else 2
 
     def apply(
         self, sigma: Field, contact_state: ContactState, threshold: int, change: Field
@@ -96,13 +94,11 @@ def select(contact: Contact, contact_state: ContactState, threshold: int) -> Sel
     return Selection(screening, exponent > 0.75 and chord > 8 * (exponent - 1))
 
 
-def create(
-    contact: Contact, selection: Selection, precision: Literal["double", "single"] = "double"
-) -> Preconditioner:
-    """The selected preconditioner; `precision` is that of the Green's function."""
+def create(contact: Contact, selection: Selection, grid: Grid) -> Preconditioner:
+    """The selected preconditioner; `z` is `padded` of `grid`, that of the contact or in single."""
     if not selection.multilevel:
-        return GreensFunction(contact, selection.screening, precision)
-    return Multigrid(contact) if suits(contact) else Multilevel(contact)
+        return GreensFunction(contact, selection.screening, grid)
+    return Multigrid(contact, grid) if suits(contact) else Multilevel(contact, grid)
 
 
 def _screening(contact: Contact, held: float, changes: float) -> tuple[float, float, float]:

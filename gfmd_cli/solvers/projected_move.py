@@ -7,10 +7,7 @@ the projected point, lowest at the fraction `best` of it; all points on the way 
 from typing import NamedTuple
 
 FULL_MOVE = 0.5  # a projected move lowers the energy if its best fraction is above 1/2
-LENGTH_CHANGE = (
-    0.6,
-    1.6,
-)  # range of the factor by which one projected move changes the next length
+LENGTH_CHANGE = (0.5, 2.0)  # range of the factor by which a projected move changes the next length
 
 
 class MoveChoice(NamedTuple):
@@ -28,7 +25,7 @@ def choose(best: float, exact: bool) -> MoveChoice:
     """The choice for a move; `exact` tells that no point is stopped on the way to `best`."""
     if exact:
         return MoveChoice(best, best, False)  # the exact step of conjugate gradients
-    if best >= FULL_MOVE:
-        low, high = LENGTH_CHANGE
-        return MoveChoice(1.0, min(max(best, low), high), False)
-    return MoveChoice(best, best, True) if best > 0 else MoveChoice(0.0, 0.5, True)
+    low, high = LENGTH_CHANGE
+    is_full = best >= FULL_MOVE
+    fraction = 1.0 if is_full else max(best, 0.0)
+    return MoveChoice(fraction, min(max(best, low), high), not is_full)

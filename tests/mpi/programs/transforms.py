@@ -39,6 +39,11 @@ def check_transforms(points, points_y):
     filtered = grid.operator(np.exp(-grid.wavenumber()))(mine, out=grid.empty())
     expected = whole.operator(np.exp(-whole.wavenumber()))(field, out=whole.empty())
     np.testing.assert_allclose(filtered, expected[grid.own], atol=1e-14)
+    single = grid.in_single()
+    single.padded[:, :points] = mine
+    single.filter_padded(np.exp(-grid.wavenumber()))
+    np.testing.assert_allclose(single.padded[:, :points], expected[grid.own], atol=1e-6)
+    assert np.shares_memory(single.padded, grid.padded)
     collected = grid.collect(mine)
     assert collected is None if ranks.rank else np.array_equal(collected, field)
     assert np.array_equal(grid.diagonal(mine), whole.diagonal(field))
@@ -117,7 +122,7 @@ def check_preconditioners(points, n):
                 with_halo = grid.rows.empty_with_halo(points, dtype=np.int8)
                 grid.rows.interior(with_halo)[...] = state[grid.own]
                 change = np.ones(grid.shape, np.float32)
-                preconditioner = kind(contact)
+                preconditioner = kind(contact, grid)
                 sums = preconditioner.apply(-force[grid.own], with_halo, PRESSED, change)
                 found.append((preconditioner.z[:, :points], sums))
             (whole, sums), (mine, others) = found
