@@ -34,8 +34,8 @@ REACH = 2  # points by which the contact may grow from a grid to the next
 COARSE_TOLERANCE = 1e-2  # on grids before the finest; measured: tighter does not pay
 FIRST_TOLERANCE = 3e-3  # before the operators on tiles are corrected
 GAIN = 1e-3  # of the residual by a solve on tiles: the relative error of their operators
-LAYING = 0.05  # residual of the pressure over that of the displacement laid on the indenter: one
-# that is 10 times larger, measured for n = 0.5 and 1 at 1e-2 to 1e-6
+MARGIN = 0.8  # of the tolerance, for the estimated residual of the displacement on the indenter
+AIM = 0.5  # of the tolerance, for that residual after the next solve on the tiles
 MAX_EVALUATIONS = 6  # of the displacement at all points
 MAX_STEPS = 60  # on the same tiles
 
@@ -74,7 +74,7 @@ def start_from(
             return None
         solve = _LocalSolve(contact, tiles, _refined(pressure, tiles), pause)
         if contact is last:
-            u = solve.displacement(LAYING * tolerance)
+            u = solve.displacement(tolerance)
         else:
             solve.run(COARSE_TOLERANCE)
             pressure = np.empty(contact.grid.shape)
@@ -148,23 +148,23 @@ class _LocalSolve:
 
     def displacement(self, tolerance: float) -> Field:
         """Solve, with the exact operator in the end; return the displacement on the indenter."""
-        u = self.grid.empty()
-        aim = max(tolerance, FIRST_TOLERANCE)
+        u, aim = self.grid.empty(), FIRST_TOLERANCE
         for _ in range(MAX_EVALUATIONS):
             self.run(aim)
-            residual, entered = self.evaluate(u)
-            if residual < 2 * tolerance:
+            residual, laid, entered = self.evaluate(u)
+            if laid < MARGIN * tolerance:
                 break
-            aim = max(tolerance, GAIN * residual)
+            aim = residual * max(AIM * tolerance / laid, GAIN)
             self.correct(entered)
         self.tiles.copy_where(self.s > 0, self.height, u)
         return u
 
-    def evaluate(self, u: Field) -> tuple[float, Mask]:
+    def evaluate(self, u: Field) -> tuple[float, float, Mask]:
         """u <- max(C s, h), at the level where C s is, in the mean, at the indenter in contact.
 
-        Returns the natural residual and the tiles, other than those here, where C s is below h. The
-        values of C s stay in `grid.padded`.
+        Returns the natural residual of s and C s; an estimate of that of the displacement that is
+        laid on the indenter, whose stress differs from s by K times the change; and the tiles,
+        other than those here, where C s is below h. The values of C s stay in `grid.padded`.
         """
         contact, grid = self.contact, self.grid
         self.tiles.put(self.s, self.values_everywhere)
@@ -172,11 +172,17 @@ class _LocalSolve:
         self.transforms += 2
         gap = self.tiles.take(self.values_everywhere) - self.height
         level = float(gap[self.s > 0].mean())
-        inside = np.minimum(gap - level, self.s)
+        gap -= level
+        laid = np.where(self.s > 0, 0.0, np.maximum(gap, 0.0))
+        stress = self.s + self.map_displacement(laid - gap)
+        inside = np.minimum(gap, self.s), np.minimum(laid, stress)
         entered = np.zeros(self.tiles.used.shape, dtype=np.bool_)
         sweep = (self.values_everywhere, level, contact.height, self.tiles.used, u, entered)
         (outside,) = grid.rows.sums(1, lay, *sweep)
-        return contact.as_residual(float(outside) + _dot(inside, inside)), entered
+        residual, estimate = (
+            contact.as_residual(float(outside) + _dot(worst, worst)) for worst in inside
+        )
+        return residual, estimate, entered
 
     def correct(self, entered: Mask) -> None:
         """Add tiles that were entered, and correct the operator on tiles by the exact C s."""
