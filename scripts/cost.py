@@ -108,7 +108,7 @@ def by_grid(sizes: list[int], path: Path, repeats: int) -> None:
     curves = {}
     for p in PRESSURES:
         costs = [cost(scene, p, pairs[points], repeats).taken for points, scene in scenes.items()]
-        curves[f"n = 1, $p^*$ = {p:g}"] = (np.array(sizes), np.array(costs))
+        curves[f"$p^*$ = {p:g}"] = (np.array(sizes), np.array(costs))
     limit = np.array([1 + preparation(points, pairs[points], repeats) for points in sizes])
     draw("points along a side", curves, np.array(sizes), limit, path)
 
