@@ -9,6 +9,7 @@ import pytest
 from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.physics.contact import Contact, build_scene
 from gfmd_cli.physics.elastomers import HalfSpace, Power, Slab
+from gfmd_cli.physics.observables import contact_pressure
 from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.solvers.local_start import start_from
 from gfmd_cli.solvers.nested_grids import Resume, solve_contact
@@ -111,6 +112,20 @@ def test_the_solution_is_that_of_the_whole_grid(elastomer, p_star):
     assert np.count_nonzero(touching != (whole.u == contact.height)) <= 2
     assert np.all(local.u >= contact.height)
     assert local.sigma == pytest.approx(contact.stress(local.u, np.empty(local.u.shape)), abs=1e-9)
+
+
+@pytest.mark.parametrize("elastomer", [Power(n=0.5), Power(n=1)], ids=name)
+def test_the_start_has_the_residual_that_the_solve_asks_for(elastomer):
+    """Measured with transforms: the steps on tiles end by their own estimate of it."""
+    contact = build_scene(SelfAffine(cutoff=0.02), elastomer, 512).contact(0.01)
+    coarse = contact.coarsen((256, 256))
+    solution = solve(coarse, False, 1e-2)
+    pressure = contact_pressure(coarse.obstacle, solution.u, solution.sigma)
+    for tolerance in (1e-2, 1e-4, 1e-6):
+        start = start_from(coarse, pressure, [contact], tolerance)
+        assert start is not None
+        sigma = contact.stress(start.u, np.empty(start.u.shape))
+        assert contact.residual(start.u, sigma) < tolerance
 
 
 def test_a_contact_that_the_coarse_grid_misses_is_entered():
