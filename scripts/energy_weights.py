@@ -1,15 +1,13 @@
-"""The weight W of the elastic energy, measured by shell, and gamma with its error, over seeds.
+"""The weight W of the elastic energy, measured by shell.
 
 W(p, q) = |u(q)|^2 / |h(q)|^2 is what Persson theory replaces by [gamma + (1 - gamma) a_r^2] a_r at
-the scale q (paper Eqs. (29), (30)). Seeds 0 to 3 choose gamma; seeds 4 to 7 test it.
+the scale q (paper Eqs. (29), (30)).
 
 python scripts/energy_weights.py results/energy_weights.jsonl     # ten minutes on one core
 """
 
 import argparse
 import json
-from dataclasses import replace
-from functools import cache
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -19,8 +17,7 @@ from scipy.special import erf
 
 from gfmd_cli.physics.contact import Scene, build_scene, radial_power
 from gfmd_cli.physics.elastomers import Power
-from gfmd_cli.physics.observables import observe
-from gfmd_cli.physics.persson import Persson, gamma_n
+from gfmd_cli.physics.persson import gamma_n
 from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.solvers.auto import Auto
 from gfmd_cli.solvers.nested_grids import solve_contact
@@ -30,7 +27,7 @@ KINDS = {"roll-off, H = 0.8": (0.8, "rolloff"), "roll-off, H = 0.3": (0.3, "roll
          "cut-off, H = 0.8": (0.8, "cutoff")}  # fmt: skip
 EXPONENTS = (0.5, 1.0, 2.0, 3.0)
 PRESSURES = (0.01, 0.03, 0.1, 0.3, 1.0)
-TRAINING, TEST = (0, 1, 2, 3), (4, 5, 6, 7)
+SEEDS = range(8)
 GROUPS = 6  # of shells, equally wide in ln q
 
 
@@ -51,13 +48,12 @@ def scene_of(kind: str, n: float, seed: int) -> Scene:
 
 
 def measure(kind: str, n: float, seed: int) -> Record:
-    """Mean gap, weights and energies of one surface over the pressures."""
+    """Weights and energies of one surface over the pressures."""
     scene = scene_of(kind, n, seed)
-    record: Record = {"kind": kind, "n": n, "seed": seed, "gap": [], "weight": [], "beyond": []}
+    record: Record = {"kind": kind, "n": n, "seed": seed, "weight": [], "beyond": []}
     for p in PRESSURES:
         contact = scene.contact(p)
         solution = solve_contact(contact, Auto(tolerance=1e-5))
-        record["gap"].append(observe(contact, solution.u, solution.sigma).u_g)
         weight, beyond = weights(scene, n, solution.u)
         record["weight"].append(weight)
         record["beyond"].append(beyond)
@@ -83,32 +79,6 @@ def weights(scene: Scene, n: float, u: np.ndarray) -> tuple[list[float], float]:
     return share.tolist(), float(beyond)
 
 
-@cache
-def theory_gap(kind: str, n: float, gamma: float) -> np.ndarray:
-    """u_g / h_std of Persson theory at the pressures; all seeds have one spectrum."""
-    scene = scene_of(kind, n, 0)
-    shells = replace(scene.shells, gamma=np.full_like(scene.shells.gamma, gamma))
-    return Persson(shells).mean_gap(np.array(PRESSURES) * scene.delta_sigma) / scene.h_std
-
-
-def gap(record: Record, gamma: float) -> np.ndarray:
-    """The same for any gamma, in which it is linear."""
-    key = record["kind"], record["n"]
-    return gamma * theory_gap(*key, 1.0) + (1 - gamma) * theory_gap(*key, 0.0)
-
-
-def best(record: Record) -> float:
-    """The gamma of least error of ln u_g below p* = 1."""
-    tried = np.linspace(0.0, 1.0, 1001)
-    off = [np.log(gap(record, g) / record["gap"])[:-1] for g in tried]
-    return float(tried[np.argmin(np.sum(np.square(off), axis=1))])
-
-
-def mean(values: list[float]) -> tuple[float, float]:
-    """Mean over seeds and its standard error."""
-    return float(np.mean(values)), float(np.std(values, ddof=1) / np.sqrt(len(values)))
-
-
 def theory_weights(kind: str, n: float, p: float, gamma: float) -> list[float]:
     """W of Eq. (30) in every group, weighted with k C."""
     scene = scene_of(kind, n, 0)
@@ -120,39 +90,6 @@ def theory_weights(kind: str, n: float, p: float, gamma: float) -> list[float]:
     full = np.bincount(group, shells.energy, GROUPS)
     held = np.bincount(group, w * shells.energy, GROUPS)
     return np.divide(held, full, out=np.full(GROUPS, np.nan), where=full > 0).tolist()
-
-
-def print_gammas(records: list[Record]) -> None:
-    """Best gamma of both sets of seeds, and errors of u_g on the test seeds."""
-    heads = (
-        "surface",
-        "n",
-        "gamma, seeds 0-3",
-        "seeds 4-7",
-        "Eq. (39)",
-        "error: Eq. (39)",
-        "fitted",
-    )
-    print("| " + " | ".join(heads) + " |")
-    print("| --- " * 7 + "|")
-    for kind, n in product(KINDS, EXPONENTS):
-        chosen = [r for r in records if (r["kind"], r["n"]) == (kind, n)]
-        sets = [[r for r in chosen if r["seed"] in seeds] for seeds in (TRAINING, TEST)]
-        if any(len(one) < 2 for one in sets):
-            continue
-        fitted, checked = (mean([best(r) for r in one]) for one in sets)
-        paper = float(gamma_n(n))
-        errors = []
-        for gamma in (paper, fitted[0]):
-            off = [np.log(gap(r, gamma) / r["gap"])[:-1] for r in sets[1]]
-            errors.append(f"{100 * np.sqrt(np.mean(np.square(off))):.1f} %")
-        cells = [
-            kind,
-            f"{n:g}",
-            *(f"{v:.3f} ± {e:.3f}" for v, e in (fitted, checked)),
-            f"{paper:g}",
-        ]
-        print("| " + " | ".join([*cells, *errors]) + " |")
 
 
 def print_weights(records: list[Record]) -> None:
@@ -171,8 +108,8 @@ def print_weights(records: list[Record]) -> None:
         seen = np.array([r["weight"][i] for r in chosen])
         said = theory_weights(kind, n, p, float(gamma_n(n)))
         cells = [f"{w:.3f} ({s:.3f})" for w, s in zip(seen.mean(axis=0), said, strict=True)]
-        beyond = mean([r["beyond"][i] for r in chosen])
-        print(f"| {kind} | {n:g} | {p:g} | " + " | ".join(cells) + f" | {100 * beyond[0]:.1f} % |")
+        beyond = np.mean([r["beyond"][i] for r in chosen])
+        print(f"| {kind} | {n:g} | {p:g} | " + " | ".join(cells) + f" | {100 * beyond:.1f} % |")
 
 
 def main() -> None:
@@ -181,12 +118,11 @@ def main() -> None:
     parser.add_argument("--no-run", action="store_true", help="use what is there")
     given = parser.parse_args()
     lines = given.cache.read_text().splitlines() if given.cache.exists() else []
-    wanted = list(product(TRAINING + TEST, KINDS, EXPONENTS))
+    wanted = list(product(SEEDS, KINDS, EXPONENTS))
     for seed, kind, n in [] if given.no_run else wanted[len(lines) :]:
         lines.append(json.dumps(measure(kind, n, seed)))
         given.cache.write_text("\n".join(lines) + "\n")
     records = [json.loads(line) for line in lines]
-    print_gammas(records)
     print_weights(records)
 
 

@@ -1,215 +1,265 @@
-"""gamma of Persson theory fitted to simulated mean gaps, and what the fit is worth elsewhere.
+"""The weight gamma of Persson theory, from simulated mean gaps, and what it predicts elsewhere.
 
-Reads the studies of scripts/theory_studies.py, prints the tables of docs/theory.md, and draws
-its figure. The fit sees the study `training` only.
+Reads the studies `gamma` and `slab` of scripts/theory_studies.py, prints the tables of
+docs/theory.md, and draws its figure. Constants are fitted to the training seeds, and errors are
+those on the test seeds.
 
 python scripts/gamma_fit.py --folder results/theory --figure docs/figures/gamma
 """
 
 import argparse
-from collections.abc import Callable
-from dataclasses import dataclass, replace
-from functools import cached_property
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
+from itertools import product
 from pathlib import Path
 
 import numpy as np
 from scipy.optimize import curve_fit, minimize_scalar
-from theory_studies import STUDIES, TRAINING
+from theory_studies import EXPONENTS, HURST, LIGHT, SPECTRA, TEST, TRAINING
 
-from gfmd_cli.analysis.compare import Curve, compare, einstein_prediction
+from gfmd_cli.analysis.compare import compare, einstein_prediction
 from gfmd_cli.analysis.curve_styles import MARKERS, CurveStyle, colours
 from gfmd_cli.analysis.plotting import ColumnFigure, styled
 from gfmd_cli.physics.elastomers import Slab
-from gfmd_cli.physics.persson import Persson, gamma_n
+from gfmd_cli.physics.persson import Persson, Shells, gamma_n
 
+P_STAR = np.array(LIGHT)
+SEEDS = [*TRAINING, *TEST]
+FITTED, HELD_OUT = slice(0, len(TRAINING)), slice(len(TRAINING), None)  # of SEEDS
+GRID, FINER = 512, 1024
 Gamma = Callable[[np.ndarray], np.ndarray]
-PAPER = "Eqs. (39), (42)"
-FORMS: dict[str, tuple[Callable, list[float]]] = {
-    "a exp(-n/b) + c": (lambda n, a, b, c: a * np.exp(-n / b) + c, [0.5, 2.0, 0.0]),
-    "a (1 - n/4)^b": (lambda n, a, b: a * np.clip(1 - n / 4, 0, 1) ** b, [0.5, 1.2]),
-    "a exp(-n/b)": (lambda n, a, b: a * np.exp(-n / b), [0.5, 2.0]),
-    "a / [1 + (n/b)^2]": (lambda n, a, b: a / (1 + (n / b) ** 2), [0.5, 2.0]),
-}
-"""Forms of gamma(n) with where their fit begins."""
-LABELS = {"hurst-0.3": "H = 0.3", "other-seeds": "other seeds", "narrow": "few waves"}
-LIGHT = 1.0  # p*: below, errors are those of ln u_g, from here on those of ln p
-TABLE = np.array([0.003, 0.01, 0.03, 0.1, 0.3, *np.geomspace(1.0, 5.0, 33)])
-"""Reduced pressures that theory is tabulated at: below LIGHT those of the studies."""
-ENDS: dict[tuple[str, str], tuple[np.ndarray, np.ndarray]] = {}
+Key = tuple[str, float, float]
+"""Name of the spectrum, Hurst exponent, n."""
 
 
-@dataclass(frozen=True)
-class Case:
-    """The pressures of one surface and body, with u_g of the continuum where it is known."""
+def smooth(n: np.ndarray, a: float, b: float, c: float) -> np.ndarray:
+    return np.asarray(a * np.exp(-np.asarray(n) / b) + c)
 
-    curve: Curve
 
-    @cached_property
-    def p_star(self) -> np.ndarray:
-        return self.curve.column("p_star")
+def mean_gap(shells: Shells, gamma: np.ndarray | float, p_star: np.ndarray) -> np.ndarray:
+    """u_g / h_std of the theory."""
+    theory = Persson(replace(shells, gamma=np.broadcast_to(gamma, shells.q.shape)))
+    return np.asarray(theory.mean_gap(p_star * theory.delta_sigma) / np.sqrt(shells.height.sum()))
 
-    @cached_property
-    def u_g(self) -> np.ndarray:
-        """In units of h_std."""
-        best = self.curve.column("u_g_continuum")
-        return np.where(np.isfinite(best), best, self.curve.column("u_g"))
 
-    @cached_property
-    def exponents(self) -> np.ndarray:
-        """d ln k / d ln q at every shell."""
-        q, row = self.curve.persson.shells.q, self.curve.rows[0]
-        if np.isfinite(self.curve.n):
-            return np.full(q.size, self.curve.n)
-        return Slab(thickness=row["thickness"]).local_exponent(q, row["length"])
+@dataclass
+class Surface:
+    """One spectrum and one n, with the mean gaps of all seeds and grids."""
+
+    shells: Shells
+    ends: tuple[np.ndarray, np.ndarray]
+    """u_g / h_std of the theory for gamma = 1 and 0, at P_STAR; u_g is linear in gamma."""
+    grids: dict[tuple[int, int], np.ndarray] = field(default_factory=dict)
+    """ln u_g / h_std at P_STAR, by seed and points a side."""
 
     @property
-    def ends(self) -> tuple[np.ndarray, np.ndarray]:
-        """u_g over TABLE for gamma = 1 and 0; u_g is linear in a gamma that is one for all q.
+    def refinement(self) -> np.ndarray:
+        """ln u_g in the continuum - ln u_g on GRID, at P_STAR.
 
-        Surfaces that differ in their seed have one spectrum.
+        The change of ln u_g between the two finest grids and a third of it, as for an error of
+        second order in the spacing; mean of the seeds that were solved on both.
         """
-        row = self.curve.rows[0]
-        key = (row["ensemble"], row["elastomer"])
-        if key not in ENDS:
-            ENDS[key] = self.gap(lambda n: np.ones(n.size)), self.gap(lambda n: np.zeros(n.size))
-        return ENDS[key]
+        seeds = [seed for seed, points in self.grids if points == FINER]
+        steps = [self.grids[seed, FINER] - self.grids[seed, GRID] for seed in seeds]
+        return np.asarray(4 / 3 * np.mean(steps, axis=0))
 
-    def gap(self, gamma: Gamma | None) -> np.ndarray:
-        """u_g of theory over TABLE [h_std]; gamma None: as the paper has it, Eqs. (39), (42)."""
-        row, shells = self.curve.rows[0], self.curve.persson.shells
-        if gamma is not None:
-            shells = replace(shells, gamma=gamma(self.exponents))
-        return Persson(shells).mean_gap(TABLE * row["delta_sigma"]) / row["h_std"]
+    @property
+    def log_gap(self) -> np.ndarray:
+        """ln u_g / h_std in the continuum: seeds, pressures."""
+        return np.array([self.grids[seed, GRID] for seed in SEEDS]) + self.refinement
 
-    def theory(self, gamma: Gamma | None) -> np.ndarray:
-        """u_g of theory over TABLE, the fast way where there is one."""
-        if not np.isfinite(self.curve.n):
-            return self.gap(gamma)
-        weight = float((gamma or gamma_n)(self.exponents[:1])[0])
-        return weight * self.ends[0] + (1 - weight) * self.ends[1]
+    def theory(self, gamma: float) -> np.ndarray:
+        return np.asarray(np.log(gamma * self.ends[0] + (1 - gamma) * self.ends[1]))
 
-    def errors(self, gamma: Gamma | None) -> np.ndarray:
-        """ln(u_g of theory / u_g) over p* < LIGHT."""
-        kept = (self.p_star < LIGHT) & (self.u_g > 0)
-        gap = np.interp(np.log(self.p_star[kept]), np.log(TABLE), np.log(self.theory(gamma)))
-        return gap - np.log(self.u_g[kept])
+    def best(self) -> np.ndarray:
+        """The gamma of least rms error of ln u_g, for every seed."""
+        return np.array([self._best(one) for one in self.log_gap])
 
-    def pressure_errors(self, gamma: Gamma | None) -> np.ndarray:
-        """ln(p of theory / p) at equal u_g over p* >= LIGHT."""
-        kept = (self.p_star >= LIGHT) & (self.u_g > 1e-9)
-        p = np.interp(-np.log(self.u_g[kept]), -np.log(self.theory(gamma)), np.log(TABLE))
-        return p - np.log(self.p_star[kept])
+    def _best(self, log_gap: np.ndarray) -> float:
+        return least(lambda gamma: self.theory(gamma) - log_gap)
 
-    def best(self) -> float:
-        """The gamma of least rms error, one for all q."""
-        found = minimize_scalar(
-            lambda g: np.sum(self.errors(lambda n: np.full(n.size, g)) ** 2),
-            bounds=(0.0, 1.0),
-            method="bounded",
-            options={"xatol": 1e-4},
-        )
-        return float(found.x)
+    def errors(self, gamma: float) -> np.ndarray:
+        """ln u_g of the theory - ln u_g on the test seeds: seeds, pressures."""
+        return self.theory(gamma) - self.log_gap[HELD_OUT]
 
 
-def cases(folder: Path, name: str) -> list[Case]:
-    """Of one study; none where it has not been run."""
-    path = folder / f"{name}.h5"
-    return [Case(curve) for curve in compare(path).curves] if path.exists() else []
+def least(errors: Callable[[float], np.ndarray]) -> float:
+    """The gamma of the least sum of squares."""
+    squares = lambda gamma: float(np.sum(errors(gamma) ** 2))  # noqa: E731
+    found = minimize_scalar(squares, bounds=(0.0, 1.0), method="bounded", options={"xatol": 1e-5})
+    return float(found.x)
 
 
-def fit(best: dict[float, tuple[float, float]], form: Callable, start: list[float]) -> np.ndarray:
-    """The parameters of least squares over the best gammas, weighted with their errors."""
-    mean, error = np.array(list(best.values())).T
-    return curve_fit(form, np.array(list(best)), mean, start, error, absolute_sigma=True)[0]
+def spectrum_of(row: dict) -> str:
+    kind = row["spectrum"], row["rolloff"]
+    return next(
+        name for name, (spectrum, rolloff) in SPECTRA.items() if kind == (spectrum, rolloff)
+    )
 
 
-def exact_springs(case: Case) -> tuple[float, float]:
-    """The best gamma of n = 0 against its closed form, Eqs. (34)-(38): no seed, no finite size.
-
-    The error is what other spectra differ by, 0.506 to 0.515.
-    """
-    p_star = TABLE[TABLE < LIGHT]
-    exact, (one, zero) = einstein_prediction(p_star).u_g, (end[: p_star.size] for end in case.ends)
-    error = lambda g: np.sum(np.log((g * one + (1 - g) * zero) / exact) ** 2)  # noqa: E731
-    return float(minimize_scalar(error, bounds=(0, 1), method="bounded").x), 0.005
-
-
-def rms(parts: list[np.ndarray]) -> float:
-    values = np.concatenate(parts)
-    values = values[np.isfinite(values)]
-    return float(np.sqrt(np.mean(values**2))) if values.size else float("nan")
+def read(path: Path) -> dict[Key, Surface]:
+    surfaces: dict[Key, Surface] = {}
+    for curve in compare(path).curves:
+        row = curve.rows[0]
+        key = spectrum_of(row), row["hurst"], row["n"]
+        if key not in surfaces:
+            shells = curve.persson.shells
+            ends = mean_gap(shells, 1.0, P_STAR), mean_gap(shells, 0.0, P_STAR)
+            surfaces[key] = Surface(shells, ends)
+        surfaces[key].grids[row["seed"], row["points"]] = np.log(curve.column("u_g"))
+    return surfaces
 
 
-def spread(values: list[float]) -> tuple[float, float]:
+def spread(values: np.ndarray | list[float]) -> tuple[float, float]:
     """Mean and its standard error over seeds."""
-    error = np.std(values, ddof=1) / np.sqrt(len(values)) if len(values) > 1 else np.nan
-    return float(np.mean(values)), float(error)
+    return float(np.mean(values)), float(np.std(values, ddof=1) / np.sqrt(len(values)))
 
 
-def best_gammas(found: list[Case]) -> dict[float, tuple[float, float]]:
-    """By exponent: best gamma, mean and standard error over seeds."""
-    by_n: dict[float, list[float]] = {}
-    for case in found:
-        if np.isfinite(case.curve.n):
-            by_n.setdefault(case.curve.n, []).append(case.best())
-    return {n: spread(values) for n, values in sorted(by_n.items())}
+def rms(values: np.ndarray | list[np.ndarray]) -> float:
+    return float(np.sqrt(np.mean(np.square(values))))
 
 
-def print_best(best: dict[str, dict[float, tuple[float, float]]], smooth: Gamma) -> None:
-    exponents = sorted({n for values in best.values() for n in values})
-    print("\nBest gamma +- standard error over seeds")
-    print("| study | " + " | ".join(f"n = {n:g}" for n in exponents) + " |")
-    print("| --- |" + " --- |" * len(exponents))
-    for name, values in best.items():
-        cells = [
-            f"{values[n][0]:.3f} ± {values[n][1]:.3f}" if n in values else "" for n in exponents
+def exact_springs(shells: Shells) -> float:
+    """The best gamma of n = 0 against its closed form, Eqs. (34)-(38): no seed, no finite size."""
+    springs = replace(shells, energy=shells.height, variance=shells.height)
+    one, none = mean_gap(springs, 1.0, P_STAR), mean_gap(springs, 0.0, P_STAR)
+    exact = einstein_prediction(P_STAR).u_g
+    return least(lambda gamma: np.log((gamma * one + (1 - gamma) * none) / exact))
+
+
+def fit(surfaces: dict[Key, Surface], springs: list[float], without: str = "") -> np.ndarray:
+    """a, b, c of `smooth`, from the training seeds of all spectra except `without`.
+
+    Least squares of the mean over the surfaces, weighted with the scatter between them.
+    """
+    mean, scatter = [np.mean(springs)], [np.std(springs, ddof=1)]
+    for n in EXPONENTS:
+        kept = [
+            surfaces[name, hurst, n].best()[FITTED].mean()
+            for name, hurst in product(SPECTRA, HURST)
+            if name != without
         ]
-        print(f"| {name} | " + " | ".join(cells) + " |")
-    for name, gamma in (("Eq. (39)", gamma_n), ("gamma(n) fitted", smooth)):
-        told = [f"{float(gamma(np.array([n]))[0]):.3f}" for n in exponents]
-        print(f"| {name} | " + " | ".join(told) + " |")
+        mean.append(np.mean(kept))
+        scatter.append(np.std(kept, ddof=1))
+    n = np.array([0, *EXPONENTS])
+    return np.asarray(curve_fit(smooth, n, mean, [0.4, 1.5, 0.1], scatter, absolute_sigma=True)[0])
 
 
-def print_rms(studies: dict[str, list[Case]], gammas: dict[str, Gamma | None]) -> None:
-    print("\nRms of ln u_g over p* < 1 / rms of ln p at equal u_g over p* >= 1, in per cent")
-    print("| study | curves | " + " | ".join(gammas) + " |")
-    print("| --- | --- |" + " --- |" * len(gammas))
-    for name, held in studies.items():
+def print_table(title: str, heads: list[str], rows: Iterator[list[str]] | list[list[str]]) -> None:
+    print(f"\n{title}\n")
+    print("| " + " | ".join(heads) + " |\n|" + " --- |" * len(heads))
+    for row in rows:
+        print("| " + " | ".join(row) + " |")
+
+
+def print_grids(surfaces: dict[Key, Surface]) -> None:
+    """ln u_g on each grid minus that on GRID, for the seed that has most grids."""
+    rows = []
+    for (name, hurst, n), surface in surfaces.items():
+        seed = TRAINING[0]
+        points = sorted(held for one, held in surface.grids if one == seed and held != GRID)
+        steps = [surface.grids[seed, one] - surface.grids[seed, GRID] for one in points]
+        cells = ["/".join(f"{100 * step[i]:.1f}" for step in steps) for i in range(P_STAR.size)]
+        last = [f"{100 * x:.2f}" for x in surface.refinement]
+        rows.append([f"{name}, H = {hurst}", f"{n:g}", "/".join(map(str, points)), *cells, *last])
+    heads = ["surface", "n", "grids", *(f"p* = {p:g}" for p in P_STAR)]
+    heads += [f"used, {p:g}" for p in P_STAR]
+    print_table("ln u_g - ln u_g on 512^2, in per cent", heads, rows)
+
+
+def print_best(surfaces: dict[Key, Surface]) -> None:
+    rows, scores = [], []
+    for name, hurst in product(SPECTRA, HURST):
         cells = []
-        for gamma in gammas.values():
-            light = rms([case.errors(gamma) for case in held])
-            heavy = rms([case.pressure_errors(gamma) for case in held])
-            cells.append(f"{100 * light:.1f} / {100 * heavy:.1f}")
-        print(f"| {name} | {len(held)} | " + " | ".join(cells) + " |", flush=True)
+        for n in EXPONENTS:
+            best = surfaces[name, hurst, n].best()
+            training, test = spread(best[FITTED]), spread(best[HELD_OUT])
+            scores.append((training[0] - test[0]) / np.hypot(training[1], test[1]))
+            cells.append("; ".join(f"{m:.3f} ± {e:.3f}" for m, e in (training, test)))
+        rows.append([f"{name}, H = {hurst}", *cells])
+    heads = ["surface", *(f"n = {n:g}" for n in EXPONENTS)]
+    print_table("Best gamma of the training seeds; of the test seeds", heads, rows)
+    largest = np.max(np.abs(scores))
+    print(f"\ntraining - test, in standard errors: rms {rms(scores):.2f}, largest {largest:.2f}")
 
 
-def print_by_exponent(found: list[Case], gammas: dict[str, Gamma | None], title: str) -> None:
-    """Rms of ln u_g exponent by exponent (or thickness by thickness)."""
-    groups: dict[str, list[Case]] = {}
-    for case in sorted(found, key=lambda c: (np.nan_to_num(c.curve.n), c.curve.elastomer)):
-        groups.setdefault(case.curve.elastomer, []).append(case)
-    print(f"\n{title}: rms of ln u_g over p* < 1, in per cent")
-    print("| body | " + " | ".join(gammas) + " |\n| --- |" + " --- |" * len(gammas))
-    for body, held in groups.items():
-        told = [f"{100 * rms([case.errors(g) for case in held]):.1f}" for g in gammas.values()]
-        print(f"| {body} | " + " | ".join(told) + " |", flush=True)
+def print_differences(surfaces: dict[Key, Surface]) -> None:
+    """Differences between surfaces that share their random phases, over all seeds."""
+    first, *others = SPECTRA
+    pairs = [((name, HURST[0]), (name, HURST[-1])) for name in SPECTRA]
+    pairs += [((name, hurst), (first, hurst)) for name, hurst in product(others, HURST)]
+    rows = []
+    for one, other in pairs:
+        cells = []
+        for n in EXPONENTS:
+            mean, error = spread(surfaces[*one, n].best() - surfaces[*other, n].best())
+            cells.append(f"{mean:+.3f} ± {error:.3f} ({mean / error:+.0f})")
+        rows.append([f"{one[0]}, H = {one[1]}, less {other[0]}, H = {other[1]}", *cells])
+    heads = ["surfaces", *(f"n = {n:g}" for n in EXPONENTS)]
+    print_table("Difference of gamma (in standard errors)", heads, rows)
 
 
-def draw(best: dict[str, dict[float, tuple[float, float]]], smooth: Gamma, path: Path) -> None:
-    """Best gamma over n: symbols the fits with their error bars, lines the two functions."""
+def print_errors(surfaces: dict[Key, Surface], fits: dict[str, np.ndarray]) -> None:
+    """Errors of ln u_g on the test seeds: of every seed, and of the mean over the seeds."""
+
+    def gammas(key: Key) -> list[float]:
+        name, _, n = key
+        own = surfaces[key].best()[FITTED].mean()
+        return [float(gamma_n(n)), float(smooth(n, *fits[""])), float(smooth(n, *fits[name])), own]
+
+    def cells(keys: list[Key]) -> list[str]:
+        told = []
+        for chosen in range(4):
+            errors = [surfaces[key].errors(gammas(key)[chosen]) for key in keys]
+            of_mean = rms([one.mean(axis=0) for one in errors])
+            told.append(f"{100 * rms(errors):.1f} / {100 * of_mean:.1f}")
+        scatter = rms([one - one.mean(axis=0) for one in errors])
+        of_mean = scatter / np.sqrt(len(TEST) - 1)
+        return [*told, f"{100 * scatter:.1f} / {100 * of_mean:.1f}"]
+
+    heads = ["Eq. (39)", "smooth", "smooth, other spectra", "same spectrum", "scatter of seeds"]
+    by_n = [[f"{n:g}", *cells([key for key in surfaces if key[2] == n])] for n in EXPONENTS]
+    title = "Error of ln u_g on the test seeds, in per cent: of a seed / of the mean over the seeds"
+    print_table(title, ["n", *heads], [*by_n, ["all", *cells(list(surfaces))]])
+    rows = [
+        [f"{name}, H = {hurst}", *cells([key for key in surfaces if key[:2] == (name, hurst)])]
+        for name, hurst in product(SPECTRA, HURST)
+    ]
+    print_table(title, ["surface", *heads], rows)
+
+
+def print_slabs(path: Path, fitted: np.ndarray) -> None:
+    """Errors of ln u_g of slabs, on test seeds, with gamma of Eq. (42) or at the local exponent."""
+    errors: dict[str, list[np.ndarray]] = {"Eq. (42)": [], "Eq. (39)": [], "smooth": []}
+    for curve in compare(path).curves:
+        row, shells = curve.rows[0], curve.persson.shells
+        pressure = curve.column("p_star") * row["delta_sigma"]  # that of the half-space
+        local = Slab(thickness=row["thickness"]).local_exponent(shells.q, row["length"])
+        gammas = shells.gamma, gamma_n(local), smooth(local, *fitted)
+        for name, gamma in zip(errors, gammas, strict=True):
+            theory = mean_gap(shells, gamma, pressure / curve.persson.delta_sigma)
+            errors[name].append(np.log(theory / curve.column("u_g_continuum")))
+    print("\nslabs, rms error of ln u_g on test seeds, in per cent")
+    for name, held in errors.items():
+        print(f"{name}: {100 * rms(held):.1f}")
+
+
+def draw(surfaces: dict[Key, Surface], fitted: np.ndarray, path: Path) -> None:
+    """Best gamma over n: symbols all seeds with two standard errors; lines the two functions."""
     n = np.linspace(0, 4, 200)
     with styled():
         plot = ColumnFigure(r"exponent  $n$", r"weight  $\gamma$ of the elastic energy")
-        shown = {name: values for name, values in best.items() if values}
-        for place, (name, values) in enumerate(shown.items()):
-            style = CurveStyle(colours(len(shown))[place], MARKERS[place], LABELS.get(name, name))
-            x = np.array(list(values)) + 0.03 * (place - len(shown) / 2)
-            y, error = np.array(list(values.values())).T
+        for place, (name, hurst) in enumerate(product(SPECTRA, (HURST[0], HURST[-1]))):
+            style = CurveStyle(colours(6)[place], MARKERS[place], f"{name}, H = {hurst}")
+            x = np.array(EXPONENTS) + 0.04 * (place - 2.5)
+            y, error = np.transpose(
+                [spread(surfaces[name, hurst, one].best()) for one in EXPONENTS]
+            )
             bars = {"fmt": "none", "ecolor": style.colour, "elinewidth": 0.7, "capsize": 1.5}
             plot.axes.errorbar(x, y, 2 * error, **bars)
             plot.points(style, x, y, np.full(x.size, True))
         plot.line(plot.axes, "Eq. (39)", n, gamma_n(n), color="0.4", ls=(0, (4, 2)), lw=0.9)
-        plot.line(plot.axes, "fitted here", n, smooth(n), color="black", lw=1.1)
+        plot.line(plot.axes, "fitted", n, smooth(n, *fitted), color="black", lw=1.1)
         plot.axes.set(xlim=(-0.2, 4.2), ylim=(0, None))
         files = plot.write(path)
     files[0].unlink()  # docs show the PNG
@@ -220,23 +270,19 @@ def main() -> None:
     parser.add_argument("--folder", type=Path, default=Path("results/theory"))
     parser.add_argument("--figure", type=Path, default=Path("docs/figures/gamma"))
     given = parser.parse_args()
-    names = [name for name in STUDIES if name != "true-contact"]  # the training surfaces again
-    studies = {name: found for name in names if (found := cases(given.folder, name))}
-    best = {name: best_gammas(found) for name, found in studies.items() if name != "slab"}
-    gammas: dict[str, Gamma | None] = {PAPER: None, "Eq. (39) at local n": gamma_n}
-    springs = exact_springs(next(case for case in studies[TRAINING] if case.curve.n == 0))
-    print(f"gamma at n = 0 from the closed form: {springs[0]:.4f}")
-    for name, (form, start) in FORMS.items():
-        x = fit(best[TRAINING] | {0.0: springs}, form, start)
-        print(f"gamma = {name}: " + ", ".join(f"{value:.4f}" for value in x), flush=True)
-        gammas[name] = lambda n, form=form, x=x: form(n, *x)
-    chosen = gammas[next(iter(FORMS))]
-    assert chosen is not None
-    print_best(best, chosen)
-    print_rms(studies, gammas)
-    for name, found in studies.items():
-        print_by_exponent(found, gammas, name)
-    draw(best, chosen, given.figure)
+    surfaces = read(given.folder / "gamma.h5")
+    chosen = [surfaces[name, hurst, EXPONENTS[0]] for name, hurst in product(SPECTRA, HURST)]
+    springs = [exact_springs(surface.shells) for surface in chosen]
+    print("gamma of n = 0 from the closed form:", *(f"{gamma:.4f}" for gamma in springs))
+    fits = {name: fit(surfaces, springs, name) for name in ("", *SPECTRA)}
+    for name, constants in fits.items():
+        print(f"a, b, c without {name or 'nothing'}:", *(f"{x:.4f}" for x in constants))
+    print_grids(surfaces)
+    print_best(surfaces)
+    print_differences(surfaces)
+    print_errors(surfaces, fits)
+    print_slabs(given.folder / "slab.h5", fits[""])
+    draw(surfaces, fits[""], given.figure)
 
 
 if __name__ == "__main__":

@@ -1,5 +1,8 @@
 """The studies that docs/theory.md is made from: written as specs and solved, one after another.
 
+Each study is one study file, and a second call resumes a stopped run. All together take about an
+hour on one core.
+
 python scripts/theory_studies.py --folder results/theory
 """
 
@@ -10,76 +13,90 @@ from gfmd_cli.cli.progress import Reporter
 from gfmd_cli.spec.parse import read_spec
 from gfmd_cli.study.run import run_study
 
-FINE = [0, 0.5, 1, 1.5, 2, 2.5, 3, 4]
-EXPONENTS = [0, 0.5, 1, 2, 3, 4]
-BETWEEN = [0.25, 0.75, 1.75, 2.75, 3.5]
-LADDER = [0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0]
-FOUR = [0, 1, 2, 3]
-TRAINING = "training"
+TRAINING, TEST = range(100, 108), range(200, 208)
+"""Disjoint sets of seeds: constants are fitted to the first and tested on the second."""
+HURST = [0.3, 0.5, 0.8]
+SPECTRA = {
+    "roll-off, L/8": ("rolloff", 1 / 8),
+    "cut-off, L/8": ("cutoff", 1 / 8),
+    "roll-off, L/4": ("rolloff", 1 / 4),
+}
+"""Kind of the spectrum and lambda_r / L; lambda_s = L/128."""
+EXPONENTS = [0.5, 1, 2, 3, 4]
+LIGHT = [0.01, 0.03, 0.1, 0.3]
+LADDER = [0.001, 0.003, 0.01, 0.03, 0.1, 0.2, *(0.01 * x for x in range(25, 65, 5)), 0.7, 0.8, 1.0]
+"""Reduced pressures up to the percolation of the contact, where the gap stops to percolate."""
+
+
+def table(heading: str, **keys: object) -> str:
+    lines = [f"{key} = {value!r}" for key, value in keys.items()]
+    return "\n".join([f"\n{heading}", *lines, ""])
+
+
+def surface(spectrum: str, rolloff: float, cutoff: float, **keys: object) -> str:
+    given = {"spectrum": spectrum, "rolloff": rolloff, "cutoff": cutoff} | keys
+    return table("[[surface]]", kind="self-affine", **given)
 
 
 def power(exponents: list[float]) -> str:
-    return f'kind = "power"\nn = {exponents}'
+    return table("[elastomer]", kind="power", n=exponents)
 
 
-def spec(
-    body: str = "",
-    points: int | None = None,
-    most: int = 400,
-    p_star: list[float] = LADDER,
-    **surface: object,
-) -> str:
-    """A run spec; `surface` tells what differs from the training surface.
-
-    Without `points` the grid is the coarsest that has u_g to 1 %, and `most` points a side at most;
-    with them, Delta_sigma over the true contact is kept, too.
-    """
-    chosen = {
-        "kind": "self-affine",
-        "hurst": 0.8,
-        "rolloff": 0.5,
-        "cutoff": 0.02,
-        "spectrum": "rolloff",
-        "seed": FOUR,
-    } | surface
-    table = "\n".join(f"{key} = {value!r}" for key, value in chosen.items())
-    return f"""[surface]
-{table}
-
-[elastomer]
-{body or power(EXPONENTS)}
-
-[grid]
-points = {points or '"auto"'}
-
-[load]
-p_star = {p_star}
-
-[accuracy]
-mean_gap = 0.01
-max_points = {most}
-
-[output]
-histogram = false
-{"true_contact = true" if points else ""}
-"""
+def grids(seeds: dict[int, list[int]]) -> tuple[list[int], str]:
+    """List of seeds, and the tables that pair it with the points a side, from points: seeds."""
+    pairs = [(seed, points) for points, held in seeds.items() for seed in held]
+    paired = table("[sweep]", paired=["surface.seed", "grid.points"])
+    return [seed for seed, _ in pairs], table("[grid]", points=[p for _, p in pairs]) + paired
 
 
-SLABS = 'kind = "slab"\nthickness = [0.005, 0.02, 0.05, 0.2]'
+def rest(p_star: list[float], **output: bool) -> str:
+    load = table("[load]", p_star=[round(p, 3) for p in p_star])
+    chosen = "\n".join(f"{key} = true" for key in output)
+    return f"{load}{table('[solver]', tolerance=1e-5)}\n[output]\nhistogram = false\n{chosen}\n"
+
+
+def gamma_specs() -> list[str]:
+    """Mean gaps of nine spectra on 512^2, and of the first seeds on coarser and finer grids."""
+    seeds, grid = grids({512: [*TRAINING, *TEST], 256: [100], 1024: [100, 101]})
+    surfaces = [surface(*which, 1 / 128, hurst=HURST, seed=seeds) for which in SPECTRA.values()]
+    one = surface(*SPECTRA["roll-off, L/8"], 1 / 128, hurst=[0.3, 0.8], seed=[100])
+    return [
+        one + power([2, 3, 4]) + table("[grid]", points=2048) + rest(LIGHT),
+        "".join(surfaces) + power(EXPONENTS) + grid + rest(LIGHT),
+    ]
+
+
+def stiffness_specs() -> list[str]:
+    """Contact stiffness and percolation of the gap, on three grids."""
+    seeds, grid = grids({512: [*TRAINING, *TEST], 256: [*TRAINING], 1024: [*TRAINING][:4]})
+    one = surface("rolloff", 1 / 4, 1 / 64, hurst=0.8, seed=seeds)
+    every = power([0, *EXPONENTS])
+    return [one + every + grid + rest(LADDER, stiffness=True, percolation=True)]
+
+
+def slab_specs() -> list[str]:
+    """Slabs from nearly a plate to nearly a half-space; u_g to 1 %."""
+    thickness = table("[elastomer]", kind="slab", thickness=[0.005, 0.02, 0.05, 0.2])
+    grid = table("[grid]", points="auto") + table("[accuracy]", mean_gap=0.01, max_points=800)
+    return [
+        surface("cutoff", 0.2, 0.02, seed=[200, 201, 202, 203]) + thickness + grid + rest(LIGHT)
+    ]
+
+
+def true_contact_specs() -> list[str]:
+    """Delta_sigma over the true contact, with areas in the continuum."""
+    grid = table("[grid]", points=400) + table("[accuracy]", mean_gap=0.01)
+    exponents = power([0, 0.5, 1, 1.5, 2, 2.5, 3])
+    one = surface("rolloff", 0.5, 0.02, seed=[0, 1, 2])
+    return [one + exponents + grid + rest([0.003, 0.03, 0.3], true_contact=True)]
+
+
 STUDIES = {
-    TRAINING: spec(power(FINE), most=800),
-    "hurst-0.3": spec(hurst=0.3),
-    "cut-off": spec(spectrum="cutoff"),
-    "slab": spec(SLABS, spectrum="cutoff", rolloff=0.2, cutoff=0.02, seed=[0, 1]),
-    "narrow": spec(cutoff=0.0625),
-    "between": spec(power(BETWEEN)),
-    "other-seeds": spec(seed=[4, 5, 6, 7]),
-    "hurst-0.5": spec(hurst=0.5),
-    "large-cell": spec(rolloff=0.125, cutoff=0.01, seed=[0, 1]),
-    "broad": spec(power(FINE[:-2]), most=800, cutoff=0.005, seed=[0, 1]),
-    "true-contact": spec(power(FINE[:-1]), points=400, p_star=[0.003, 0.03, 0.3], seed=[0, 1, 2]),
+    "gamma": gamma_specs,
+    "slab": slab_specs,
+    "stiffness": stiffness_specs,
+    "true-contact": true_contact_specs,
 }
-"""Which surfaces and bodies each study holds; only the first is fitted to."""
 
 
 def main() -> None:
@@ -89,12 +106,14 @@ def main() -> None:
     given = parser.parse_args()
     given.folder.mkdir(parents=True, exist_ok=True)
     for name in given.names or STUDIES:
-        path = given.folder / f"{name}.toml"
-        path.write_text(STUDIES[name])
-        resolved, text = read_spec(path, ())
-        with Reporter(True) as report:
-            outcome = run_study(resolved, text, path.with_suffix(".h5"), report, jobs=1)
-        print(f"{name}: {dict(outcome)}", flush=True)
+        for number, text in enumerate(STUDIES[name](), 1):
+            path = given.folder / f"{name}-{number}.toml"
+            path.write_text(text.lstrip())
+            resolved, text = read_spec(path, ())
+            with Reporter(True) as report:
+                store = given.folder / f"{name}.h5"
+                outcome = run_study(resolved, text, store, report, jobs=1)
+            print(f"{path.stem}: {dict(outcome)}", flush=True)
 
 
 if __name__ == "__main__":
