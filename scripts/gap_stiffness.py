@@ -124,7 +124,7 @@ def areas(curves: Curves, n: float, points: int) -> np.ndarray:
 
 
 def thresholds(curves: Curves, n: float, points: int, values: np.ndarray) -> np.ndarray:
-    """Values at which the gap stops to percolate: seeds, directions.
+    """Values at which the gap stops percolating: seeds, directions.
 
     The middle of the two pressures between which the last change occurs.
     """
@@ -151,7 +151,7 @@ def print_percolation(curves: Curves) -> None:
             cells.append("{:.3f} ± {:.3f}".format(*spread(ends.mean(axis=1))))
         rows.append(cells)
     heads = ["n", *(f"{points}^2" for points in GRIDS), "a_r, 512^2, 16 seeds", "u_g", "p*"]
-    print_table("Where the gap stops to percolate: a_r counted (corrected)", heads, rows)
+    print_table("Where the gap stops percolating: a_r counted (corrected)", heads, rows)
 
 
 def draw(curves: Curves, folder: Path) -> None:

@@ -25,7 +25,7 @@ SPECTRA = {
 EXPONENTS = [0.5, 1, 2, 3, 4]
 LIGHT = [0.01, 0.03, 0.1, 0.3]
 LADDER = [0.001, 0.003, 0.01, 0.03, 0.1, 0.2, *(0.01 * x for x in range(25, 65, 5)), 0.7, 0.8, 1.0]
-"""Reduced pressures up to the percolation of the contact, where the gap stops to percolate."""
+"""Reduced pressures up to the percolation of the contact, where the gap stops percolating."""
 
 
 def table(heading: str, **keys: object) -> str:

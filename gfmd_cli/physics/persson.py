@@ -60,7 +60,8 @@ def gamma_fitted(n: Field | float) -> Field:
     """Weight 0.2900 exp(-n / 0.7950) + 0.2219 of the elastic energy for an exponent n of k.
 
     No equation of the paper: fitted to mean gaps of the continuum at p* = 0.01 to 0.3 on nine
-    spectra, see docs/theory.md for its errors. Exponents beyond [0, 4], the range of the fit, count as its ends.
+    spectra, see docs/theory.md for its errors. Exponents beyond [0, 4], the range of the fit, count
+    as its ends.
     """
     height, width, floor = _FITTED
     return np.asarray(height * np.exp(-np.clip(n, 0.0, 4.0) / width) + floor)
