@@ -1,6 +1,6 @@
 """Every figure of the paper from a shipped config, and every statement beside what is found.
 
-    python scripts/paper_figures.py -o results/paper            # hours on two cores
+    python scripts/paper_figures.py -o results/paper            # half an hour on one core
     python scripts/paper_figures.py -o results/paper --quick    # minutes, small grids
 
 Studies are resumed where they were stopped. Figures are written as PDF and PNG, the statements as
@@ -27,6 +27,7 @@ def main() -> None:
     parser.add_argument("-o", "--output", type=Path, default=Path("results/paper"))
     parser.add_argument("--quick", action="store_true", help="small grids, minutes")
     parser.add_argument("--only", nargs="*", metavar="STUDY", help="run these studies only")
+    parser.add_argument("-j", "--jobs", type=int, help="worker processes, as in gfmd run")
     parser.add_argument("--no-run", action="store_true", help="draw what is there")
     parser.add_argument("--page", type=Path, help="where the page goes, by default with the rest")
     given = parser.parse_args()
@@ -34,7 +35,7 @@ def main() -> None:
     names = given.only or [name for name in STUDIES if not (given.quick and name in LARGE)]
     for name in () if given.no_run else names:
         begun = time.perf_counter()
-        run(name, given.output, given.quick)
+        run(name, given.output, given.quick, given.jobs)
         print(f"{name}: {time.perf_counter() - begun:.0f} s", flush=True)
     held = Held(given.output)
     findings: list[Finding] = []

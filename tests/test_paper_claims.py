@@ -3,6 +3,7 @@
 from math import inf, isfinite, nan
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 SCRIPTS = Path(__file__).parents[1] / "scripts"
@@ -13,9 +14,10 @@ def paper(monkeypatch):
     """The modules of the page."""
     pytest.importorskip("matplotlib")
     monkeypatch.syspath_prepend(SCRIPTS)
-    from paper import captions, claims, page
+    from paper import captions, claims, ensembles, page
 
-    return type("Modules", (), {"claims": claims, "page": page, "captions": captions})
+    modules = {"claims": claims, "page": page, "captions": captions, "ensembles": ensembles}
+    return type("Modules", (), modules)
 
 
 @pytest.mark.parametrize(
@@ -120,3 +122,49 @@ def test_every_statement_is_measured_somewhere(paper):
     )
     for key in paper.page.STATEMENTS:
         assert f'"{key}"' in sources, key
+
+
+SEEDS = np.array([[1.0, 8.0], [2.0, 9.0], [4.0, 6.0], [5.0, 5.0]])  # [seed, pressure]
+
+
+def test_the_jackknife_of_a_mean_is_its_standard_error(paper):
+    mean = paper.ensembles.Mean(SEEDS)
+    found = paper.ensembles.estimate(lambda y: y[0], mean)
+    assert found.value == pytest.approx(3.0)
+    assert found.error == pytest.approx(np.std([1, 2, 4, 5], ddof=1) / 2)
+    assert mean.error[0] == pytest.approx(found.error)
+
+
+def test_seeds_that_scatter_together_leave_no_error_in_a_ratio(paper):
+    numerator, denominator = (paper.ensembles.Mean(SEEDS[:, :1] * factor) for factor in (3, 1))
+    found = paper.ensembles.estimate(lambda a, b: a[0] / b[0], numerator, denominator)
+    assert found.value == pytest.approx(3.0)
+    assert found.error == pytest.approx(0.0, abs=1e-12)
+
+
+def test_errors_of_the_grid_add_in_quadrature_and_do_not_shrink_with_seeds(paper):
+    grid = np.array([0.3, 0.4])
+    mean = paper.ensembles.Mean(np.tile([1.0, 2.0], (16, 1)), grid)
+    found = paper.ensembles.estimate(np.sum, mean)
+    assert (found.value, found.error) == (pytest.approx(3.0), pytest.approx(0.5))
+    assert mean.error == pytest.approx(grid)
+
+
+def test_a_power_law_is_found_with_its_error(paper):
+    x = np.array([1.0, 2.0, 4.0])
+    mean = paper.ensembles.Mean(np.outer([1.0, 1.1, 0.9], 5 * x**1.5))
+    found = paper.ensembles.power(x, mean)
+    assert found.value == pytest.approx(1.5)
+    assert found.error == pytest.approx(0.0, abs=1e-9)
+
+
+def test_one_seed_decides_nothing(paper):
+    found = paper.ensembles.estimate(np.sum, paper.ensembles.Mean(SEEDS[:1]))
+    assert (found.value, isfinite(found.error)) == (9.0, False)
+    assert paper.claims.Criterion("x", low=0.0).holds(found) is None
+
+
+def test_means_over_different_seeds_are_refused(paper):
+    means = [paper.ensembles.Mean(SEEDS[:count]) for count in (3, 4)]
+    with pytest.raises(ValueError, match="seeds"):
+        paper.ensembles.estimate(lambda a, b: a[0] - b[0], *means)

@@ -8,9 +8,9 @@ import numpy as np
 from gfmd_cli.analysis.compare import Curve
 from gfmd_cli.analysis.curve_styles import MARKERS, CurveStyle, colours
 from gfmd_cli.analysis.plotting import ColumnFigure
-from paper.claims import Value
+from paper.claims import SIGMAS, Value
 
-KNOWN = 0.5  # relative error up to which a value is drawn with its bar, else its upper limit
+KNOWN = 0.5  # twice the relative error up to which a value is drawn, else its upper limit
 BODIES = (0.0, 0.5, 1.0, 2.0, 3.0, 4.0)
 STYLES = {
     n: CurveStyle(colour, MARKERS[i], f"n = {'1/2' if n == 0.5 else f'{n:g}'}")
@@ -19,21 +19,9 @@ STYLES = {
 Row = dict[str, Any]
 
 
-def values(rows: list[Row], name: str) -> tuple[np.ndarray, np.ndarray]:
-    """A quantity in the continuum with its error, NaN where that is unknown."""
-    found = [(row[f"{name}_continuum"], row[f"{name}_continuum_error"]) for row in rows]
-    value, error = np.array(found, dtype=float).reshape(-1, 2).T
-    return np.where(np.isfinite(error), value, np.nan), error
-
-
 def column(rows: list[Row], name: str) -> np.ndarray:
     """A column of the study."""
     return np.array([row[name] for row in rows], dtype=float)
-
-
-def curves(held: Any, name: str) -> list[Curve]:
-    """The curves of a study, exponents rising."""
-    return sorted(held.comparison(name).curves, key=lambda curve: np.nan_to_num(curve.n, nan=9.0))
 
 
 def draw_points(plot: ColumnFigure, style: CurveStyle, x: Any, y: Any, error: Any = None) -> None:
@@ -45,13 +33,13 @@ def draw_points(plot: ColumnFigure, style: CurveStyle, x: Any, y: Any, error: An
 
 
 def draw_limits(plot: ColumnFigure, style: CurveStyle, x: Any, y: Any, error: Any) -> np.ndarray:
-    """Values with bars, and upper limits as arrows where the error is large; which are values."""
-    known = np.isfinite(y) & (error < KNOWN * y)
+    """Values with standard errors; arrows, two errors above, where these are large; which are values."""
+    known = np.isfinite(y) & (SIGMAS * error < KNOWN * y)
     draw_points(plot, style, x[known], y[known], error[known])
     limited = np.isfinite(y) & ~known
     if np.any(limited):
         arrows = {"marker": r"$\downarrow$", "ls": "none", "ms": 7, "color": style.colour}
-        plot.axes.plot(x[limited], (y + error)[limited], **arrows)
+        plot.axes.plot(x[limited], (y + SIGMAS * error)[limited], **arrows)
         plot.legend["upper limit"] = plot.axes.lines[-1]
     return known
 

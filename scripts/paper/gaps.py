@@ -1,5 +1,7 @@
 """Figs. 9 to 11: the mean gap over pressure, and how well theory predicts it."""
 
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -8,8 +10,10 @@ from gfmd_cli.analysis.compare import Curve
 from gfmd_cli.analysis.curve_styles import MARKERS, CurveStyle, colours
 from gfmd_cli.analysis.figures import GAP, P_STAR
 from gfmd_cli.analysis.plotting import ColumnFigure
+from gfmd_cli.grid.arrays import Field
 from paper.claims import Finding, Value
-from paper.drawing import STYLES, curves, dense, draw_points, finish, label
+from paper.drawing import STYLES, dense, draw_points, finish, label
+from paper.ensembles import Group, Mean, estimate, groups, sample
 from paper.studies import Held, needs
 
 TAIL = 3e-4  # least gap of the logarithmic representation
@@ -20,45 +24,61 @@ DEFAULT_WIDTH = 0.1953125  # lambda_r / L of the slabs
 
 def _gap_over_pressure(
     held: Held, folder: Path, study: str, name: str, x_scale: str, y_scale: str
-) -> list[Curve]:
+) -> list[Group]:
     """u_g over p* with theory, all exponents but n = 0."""
-    found = [curve for curve in curves(held, study) if curve.n > 0]
+    found = [group for group in groups(held, study) if group.n > 0]
     plot, xs, ys, lines = ColumnFigure(P_STAR, GAP), [], [], []
-    for curve in found:
-        p, (u, error) = curve.column("p_star"), curve.best("u_g")
-        shown = (u > TAIL) | (y_scale == "linear")
-        draw_points(plot, STYLES[curve.n], p[shown], u[shown], error[shown])
-        line = np.union1d(dense(curve), np.linspace(p.min(), p.max(), 200))
-        lines.append((STYLES[curve.n], line, curve.predict(line).u_g))
-        xs, ys = [*xs, p[shown]], [*ys, u[shown]]
+    for group in found:
+        p, u = group.p, group.best("u_g")
+        shown = (u.value > TAIL) | (y_scale == "linear")
+        draw_points(plot, STYLES[group.n], p[shown], u.value[shown], u.error[shown])
+        line = np.union1d(dense(group.first), np.linspace(p.min(), p.max(), 200))
+        lines.append((STYLES[group.n], line, group.first.predict(line).u_g))
+        xs, ys = [*xs, p[shown]], [*ys, u.value[shown]]
     plot.theory(lines)
     finish(plot, folder, name, x_scale, y_scale, np.concatenate(xs), np.concatenate(ys))
     return found
 
 
-def _gap_errors(curve: Curve, highest: float) -> np.ndarray:
-    """Relative errors of the theoretical u_g up to a pressure."""
-    u, _ = curve.best("u_g")
-    kept = curve.column("p_star") <= highest * 1.0001
-    return np.abs(curve.prediction.u_g[kept] / u[kept] - 1)
+@dataclass(frozen=True)
+class Errors:
+    """Relative errors of theory, as a function of the mean u_g that it is compared with."""
+
+    u: Mean
+    of: Callable[[Field], Field]
+
+    def value(self, statistic: Callable[[Field], float]) -> Value:
+        """One number of them."""
+        return estimate(lambda u: statistic(self.of(u)), self.u)
 
 
-def _pressure_errors(curve: Curve) -> np.ndarray:
+def _gap_errors(group: Group, highest: float, least: float = 0.0) -> Errors:
+    """Relative errors of the theoretical u_g up to a pressure, where u_g is above a least value."""
+    u = group.best("u_g")
+    kept = (group.p <= highest * 1.0001) & (u.value > least)
+    theory = group.theory.u_g[kept]
+    return Errors(u.only(kept), lambda u: np.abs(theory / u - 1))
+
+
+def _pressure_errors(group: Group) -> Errors:
     """Relative errors of the theoretical p at equal u_g, p* >= 1, where u_g is known."""
-    p, (u, error) = curve.column("p_star"), curve.best("u_g")
-    heavy = (p >= 0.9999) & (u > TAIL) & (error < 0.1 * u)
-    return np.abs(curve.pressure_at_gap(u[heavy]) / p[heavy] - 1)
+    p, u = group.p, group.best("u_g")
+    heavy = (p >= 0.9999) & (u.value > TAIL) & (2 * u.error < 0.1 * u.value)
+    return Errors(u.only(heavy), lambda u: np.abs(group.first.pressure_at_gap(u) / p[heavy] - 1))
 
 
-@needs("fig06")
+@needs("fig06", "fig09b")
 def fig09a(held: Held, folder: Path) -> list[Finding]:
-    """H = 0.8 over the logarithm of the pressure."""
+    """H = 0.8 over the logarithm of the pressure; errors of theory, at large pressures of Fig. 9b."""
     found = _gap_over_pressure(held, folder, "fig06", "fig09a", "log", "linear")
-    gaps = {label(curve.n): _gap_errors(curve, 1.0) for curve in found}
-    light = {label(curve.n): _gap_errors(curve, 0.5) for curve in found if curve.n < 4}
-    pressures = {label(curve.n): _pressure_errors(curve) for curve in found}
-    pressures = {name: errors for name, errors in pressures.items() if errors.size}
-    largest = ", ".join(f"{100 * errors.max():.0f} % at {name}" for name, errors in gaps.items())
+    gaps = {label(group.n): _gap_errors(group, 1.0) for group in found}
+    light = {label(group.n): _gap_errors(group, 0.5) for group in found if group.n < 4}
+    linear = {label(group.n): group for group in groups(held, "fig09b") if group.n > 0}
+    pressures = {name: _pressure_errors(group) for name, group in linear.items()}
+    pressures = {name: errors for name, errors in pressures.items() if errors.u.value.size}
+    largest = ", ".join(
+        f"{100 * errors.value(np.max).value:.0f} % at {name}" for name, errors in gaps.items()
+    )
     return [
         Finding(
             "accuracy",
@@ -66,7 +86,7 @@ def fig09a(held: Held, folder: Path) -> list[Finding]:
                 "median error of u_g, p* ≤ 1": _cases(gaps, np.median),
                 "median error of p, p* ≥ 1": _cases(pressures, np.median),
             },
-            f"Continuum values of one realisation. Largest errors of u_g: {largest}.",
+            f"Continuum values. {sample(held, 'fig06')} Largest errors of u_g: {largest}.",
         ),
         Finding(
             "twenty_percent",
@@ -80,9 +100,9 @@ def fig09a(held: Held, folder: Path) -> list[Finding]:
     ]
 
 
-def _cases(errors: dict[str, np.ndarray], statistic) -> dict[str, Value]:
+def _cases(errors: dict[str, Errors], statistic: Callable[[Field], float]) -> dict[str, Value]:
     """One number of each set of errors."""
-    return {name: Value(float(statistic(found))) for name, found in errors.items()}
+    return {name: found.value(statistic) for name, found in errors.items()}
 
 
 @needs("fig09b")
@@ -90,11 +110,11 @@ def fig09b(held: Held, folder: Path) -> list[Finding]:
     """Large pressures on a linear axis."""
     found = _gap_over_pressure(held, folder, "fig09b", "fig09b", "linear", "log")
     first, second, third = ({}, {}, {})
-    for curve in found:
-        slopes = [_decay(curve, at) for at in LINEAR]
-        first[label(curve.n)] = Value(slopes[1] / slopes[0])
-        second[label(curve.n)] = Value(slopes[2] / slopes[0])
-        third[curve.n] = slopes
+    for group in found:
+        slopes = [_decay(group, at) for at in LINEAR]
+        first[label(group.n)] = _over(slopes[1], slopes[0], group)
+        second[label(group.n)] = _over(slopes[2], slopes[0], group)
+        third[group.n] = [slope(group.best("u_g").value) for slope in slopes]
     told = ", ".join(f"{slope:.2f}" for slope in third[1.0])
     at = ", ".join(f"{p:g}" for p in LINEAR)
     return [
@@ -104,38 +124,36 @@ def fig09b(held: Held, folder: Path) -> list[Finding]:
                 "d ln u_g/d p* at p* = 1.75 over that at 1.25": first,
                 "d ln u_g/d p* at p* = 2.75 over that at 1.25": second,
             },
-            f"n = 1: {told} at p* = {at}. λᵣ/λₛ = 25, one realisation. In theory the tail is Gaussian, "
+            f"n = 1: {told} at p* = {at}. {sample(held, 'fig09b')} In theory the tail is Gaussian, "
             "and a finite surface has no gap beyond a finite pressure.",
         )
     ]
 
 
-def _decay(curve: Curve, at: float) -> float:
-    """d ln u_g / d p* between the two pressures around one."""
-    p, u = curve.column("p_star"), curve.column("u_g")
-    low, high = (int(np.argmin(np.abs(p - at - side * STEP / 2))) for side in (-1, 1))
-    return float(np.log(u[high] / u[low]) / (p[high] - p[low]))
+def _decay(group: Group, at: float) -> Callable[[Field], float]:
+    """d ln u_g / d p* between the two pressures around one, as a function of u_g."""
+    low, high = (int(np.argmin(np.abs(group.p - at - side * STEP / 2))) for side in (-1, 1))
+    return lambda u: float(np.log(u[high] / u[low]) / (group.p[high] - group.p[low]))
+
+
+def _over(above: Callable[[Field], float], below: Callable[[Field], float], group: Group) -> Value:
+    """The ratio of two slopes."""
+    return estimate(lambda u: above(u) / below(u), group.best("u_g"))
 
 
 @needs("small_pressure")
 def small_pressure(held: Held, folder: Path) -> list[Finding]:
     """Small pressures: how much the gap falls from decade to decade."""
     plot, xs, ys, lines, ratios, limits = ColumnFigure(P_STAR, GAP), [], [], [], {}, {}
-    found = held.comparison("small_pressure").curves
-    for n in sorted({curve.n for curve in found}):
-        group = [curve for curve in found if curve.n == n]
-        p, u = group[0].column("p_star"), np.mean([curve.column("u_g") for curve in group], axis=0)
-        draw_points(plot, STYLES[n], p, u)
-        line = dense(group[0])
-        lines.append((STYLES[n], line, group[0].predict(line).u_g))
-        xs, ys = [*xs, p], [*ys, u]
-        limit = min(float(p.max()), _long_waves(group[0]))
-        high, middle, low = (
-            np.interp(np.log(limit) - k * np.log(10), np.log(p), u) for k in (0, 1, 2)
-        )
-        if limit >= 100 * p.min() * 0.999:
-            ratios[label(n)] = Value(float((low - middle) / (middle - high)))
-        limits[n] = limit
+    for group in groups(held, "small_pressure"):
+        n, p, u = group.n, group.p, group.column("u_g")
+        draw_points(plot, STYLES[n], p, u.value, u.error)
+        line = dense(group.first)
+        lines.append((STYLES[n], line, group.first.predict(line).u_g))
+        xs, ys = [*xs, p], [*ys, u.value]
+        limits[n] = min(float(p.max()), _long_waves(group.first))
+        if limits[n] >= 100 * p.min() * 0.999:
+            ratios[label(n)] = estimate(_falls(p, limits[n]), u)
     plot.theory(lines)
     finish(plot, folder, "small_pressure", "log", "linear", np.concatenate(xs), [0, 3.7])
     told = ", ".join(f"{limit:.2g} at {label(n)}" for n, limit in limits.items())
@@ -148,10 +166,21 @@ def small_pressure(held: Held, folder: Path) -> list[Finding]:
             "quasi_logarithmic",
             {quantity: ratios},
             f"1 means a logarithm. The pressures, at which p is the rms stress of the waves up to 2 qᵣ, are "
-            f"p* = {told}: the range shrinks as n rises. L = 4 λᵣ, λᵣ/λₛ = 16, "
-            f"{len(found) // len(limits)} seeds.",
+            f"p* = {told}: the range shrinks as n rises. {sample(held, 'small_pressure')}",
         )
     ]
+
+
+def _falls(p: Field, limit: float) -> Callable[[Field], float]:
+    """Fall of u_g over the second decade below a pressure over that of the first one."""
+
+    def of(u: Field) -> float:
+        high, middle, low = (
+            np.interp(np.log(limit) - k * np.log(10), np.log(p), u) for k in (0, 1, 2)
+        )
+        return float((low - middle) / (middle - high))
+
+    return of
 
 
 def _long_waves(curve: Curve) -> float:
@@ -161,10 +190,10 @@ def _long_waves(curve: Curve) -> float:
     return float(np.sqrt(share))
 
 
-@needs("fig06", "fig10")
+@needs("fig06", "fig10", "fig10b")
 def fig10(held: Held, folder: Path) -> list[Finding]:
     """H = 0.3."""
-    _gap_over_pressure(held, folder, "fig10", "fig10b", "linear", "log")
+    _gap_over_pressure(held, folder, "fig10b", "fig10b", "linear", "log")
     found = _gap_over_pressure(held, folder, "fig10", "fig10a", "log", "linear")
     return [_transfer(held, found, "hurst", "H = 0.3 over H = 0.8")]
 
@@ -176,45 +205,54 @@ def cut_off(held: Held, folder: Path) -> list[Finding]:
     return [_transfer(held, found, "cut_off", "cut-off over roll-off")]
 
 
-def _transfer(held: Held, found: list[Curve], key: str, ratio: str) -> Finding:
-    """Errors of theory on another surface over those on the default one."""
-    default = {curve.n: _gap_errors(curve, 1.0) for curve in curves(held, "fig06")}
-    pairs = [(_gap_errors(curve, 1.0), default[curve.n]) for curve in found]
-    each = ", ".join(f"{100 * _gap_errors(c, 1.0).max():.0f} % at {label(c.n)}" for c in found)
+def _transfer(held: Held, found: list[Group], key: str, ratio: str) -> Finding:
+    """Errors of theory on other surfaces over those on the default ones, all exponents together."""
+    default = {group.n: _gap_errors(group, 1.0) for group in groups(held, "fig06")}
+    first = [_gap_errors(group, 1.0) for group in found]
+    second = [default[group.n] for group in found]
+    means = [errors.u for errors in (*first, *second)]
+
+    def over(statistic: Callable[[Field], float]) -> Value:
+        def of(*u: Field) -> float:
+            parts = [errors.of(u) for errors, u in zip((*first, *second), u, strict=True)]
+            above, below = parts[: len(first)], parts[len(first) :]
+            return statistic(np.concatenate(above)) / statistic(np.concatenate(below))
+
+        return estimate(of, *means)
+
+    each = ", ".join(
+        f"{100 * errors.value(np.max).value:.0f} % at {label(group.n)}"
+        for group, errors in zip(found, first, strict=True)
+    )
     return Finding(
         key,
         {
-            f"{name} error of u_g over all n, {ratio}": _ratio(pairs, of)
+            f"{name} error of u_g over all n, {ratio}": over(of)
             for name, of in (("median", np.median), ("largest", np.max))
         },
-        f"p* ≤ 1, one realisation each; errors: jackknife over n. Largest errors: {each}.",
+        f"p* ≤ 1. {sample(held, 'fig06')} Largest errors: {each}.",
     )
-
-
-def _ratio(pairs: list[tuple[np.ndarray, np.ndarray]], of) -> Value:
-    """A statistic of all first errors over that of all second ones, jackknife over the pairs."""
-
-    def over(chosen: list[tuple[np.ndarray, np.ndarray]]) -> float:
-        first, second = (np.concatenate(part) for part in zip(*chosen, strict=True))
-        return float(of(first) / of(second))
-
-    without = [over(pairs[:i] + pairs[i + 1 :]) for i in range(len(pairs))]
-    return Value(over(pairs), float(np.sqrt((len(pairs) - 1) * np.var(without))))
 
 
 @needs("spacing")
 def spacing(held: Held, folder: Path) -> list[Finding]:
     """Is u_g at two points per lambda_s good to a per cent?"""
     off = {}
-    fine = {row["n"]: row for row in held.rows("spacing", points=1024)}
-    for row in held.rows("spacing", points=128):
-        found, bar = (fine[row["n"]][f"u_g_continuum{kind}"] for kind in ("", "_error"))
-        off[label(row["n"])] = Value(abs(row["u_g"] / found - 1), 0.5 * bar / found)
+    found = groups(held, "spacing")
+    coarse, fine = (
+        {group.n: group for group in found if group.first.points == points}
+        for points in (128, 1024)
+    )
+    for n, group in coarse.items():
+        off[label(n)] = estimate(
+            lambda u, limit: abs(u[0] / limit[0] - 1),
+            group.column("u_g"), fine[n].continuum("u_g"),
+        )  # fmt: skip
     return [
         Finding(
             "spacing",
             {"distance of u_g from the continuum": off},
-            "λₛ/Δa = 2.56, λᵣ/λₛ = 25, p* = 0.1; u_g is too small on the grid for n ≥ 1.",
+            f"p* = 0.1; u_g is too small on the grid for n ≥ 1. {sample(held, 'spacing')}",
         )
     ]
 
@@ -223,39 +261,48 @@ def spacing(held: Held, folder: Path) -> list[Finding]:
 def fig11(held: Held, folder: Path) -> list[Finding]:
     """Slabs of four thicknesses, and a half-space."""
     found = sorted(
-        held.comparison("fig11").curves,
-        key=lambda curve: np.nan_to_num(curve.rows[0]["thickness"], nan=np.inf),
+        groups(held, "fig11"),
+        key=lambda group: np.nan_to_num(group.first.rows[0]["thickness"], nan=np.inf),
     )
     x_label = P_STAR.replace("sigma", "sigma_\\mathrm{si}")
     plot, xs, ys, lines, off = ColumnFigure(x_label, GAP), [], [], [], {}
-    for i, (curve, colour) in enumerate(zip(found, colours(len(found)), strict=True)):
-        t = curve.rows[0]["thickness"] / DEFAULT_WIDTH
+    for i, (group, colour) in enumerate(zip(found, colours(len(found)), strict=True)):
+        t = group.first.rows[0]["thickness"] / DEFAULT_WIDTH
         name = f"t/λᵣ = {t:.2g}" if np.isfinite(t) else "half-space"
         style = CurveStyle(colour, MARKERS[i], name)
-        p, (u, error) = curve.column("p_star"), curve.best("u_g")
-        draw_points(plot, style, p, u, error)
-        line = dense(curve)
-        lines.append((style, line, curve.predict(line).u_g))
-        kept = (p <= 1.001) & (u > TAIL)
-        off[name] = Value(float(np.abs(curve.prediction.u_g[kept] / u[kept] - 1).max()))
-        xs, ys = [*xs, p], [*ys, u]
+        p, u = group.p, group.best("u_g")
+        draw_points(plot, style, p, u.value, u.error)
+        line = dense(group.first)
+        lines.append((style, line, group.first.predict(line).u_g))
+        off[name] = _gap_errors(group, 1.0, TAIL)
+        xs, ys = [*xs, p], [*ys, u.value]
     plot.theory(lines)
     highest = np.concatenate(ys).max()
     finish(plot, folder, "fig11", "log", "log", np.concatenate(xs), [2e-3, highest])
-    slabs = max(value.value for name, value in off.items() if name != "half-space")
     return [
         Finding(
             "slab",
             {
-                "largest error of u_g, p* ≤ 1 (semi-quantitative: 30 %)": off,
-                "largest error of the slabs over that of the half-space": Value(
-                    slabs / off["half-space"].value
+                "largest error of u_g, p* ≤ 1 (semi-quantitative: 30 %)": _cases(off, np.max),
+                "largest error of the slabs over that of the half-space": _largest_over(
+                    [errors for name, errors in off.items() if name != "half-space"],
+                    off["half-space"],
                 ),
             },
-            "One realisation. Eq. 42 as printed gives γ₄ for qt → 0 and γ₁ for qt → ∞, which is correct; "
-            "the conclusions interchange the two limits.",
+            f"{sample(held, 'fig11')} Eq. 42 as printed gives γ₄ for qt → 0 and γ₁ for qt → ∞, which is "
+            "correct; the conclusions interchange the two limits.",
         )
     ]
+
+
+def _largest_over(above: list[Errors], below: Errors) -> Value:
+    """The largest of some errors over that of others."""
+
+    def of(last: Field, *u: Field) -> float:
+        largest = max(errors.of(u).max() for errors, u in zip(above, u, strict=True))
+        return float(largest / below.of(last).max())
+
+    return estimate(of, below.u, *(errors.u for errors in above))
 
 
 FIGURES = (fig09a, fig09b, small_pressure, fig10, cut_off, spacing, fig11)

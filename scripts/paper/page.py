@@ -4,6 +4,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from shutil import copyfile
 from textwrap import fill
+from typing import Any
 
 from gfmd_cli.spec.parse import read_spec
 from gfmd_cli.study.tasks import plan
@@ -20,17 +21,19 @@ INTRODUCTION = """\
 
 This page checks M. H. Müser, *Elastic contacts of randomly rough surfaces across the spatial dimensions*. Each figure
 of the paper has a spec in `configs/paper/`. The table lists each statement of the paper that can be checked, with the
-result of this program. These commands write such a page; the sizes of the studies behind the numbers of this one stand
-[below](#sizes-of-the-studies):
+result of this program, from studies of [these sizes](#sizes-of-the-studies). The first command writes this page, the
+second one a page like it from smaller studies:
 
-<!-- not run: takes hours, and minutes -->
+<!-- not run: takes half an hour, and minutes -->
 ```bash
-make paper          # all studies at full size, hours: docs/paper.md
-make paper-quick    # small grids and rough numbers, minutes: results/paper-quick/paper.md
+make paper          # about half an hour on one core: docs/paper.md
+make paper-quick    # small grids, two seeds, minutes: results/paper-quick/paper.md
 ```
 
 The random phases of the paper are not known, so single numbers of its one realisation cannot be reproduced. Trends,
-exponents, ratios and exact results can.
+exponents, ratios and exact results can. Results on rough surfaces are means over at least eight seeds, apart from the
+cross-sections (Figs. 4 and 5) and the map. Their standard errors contain the scatter of the seeds (jackknife) and, for
+values in the continuum, the error of the grid.
 
 Each statement has criteria: a quantity and the limits between which the statement holds. They are data, in
 `scripts/paper/statements_hertz.py` and `scripts/paper/statements_rough.py`, chosen from what the paper itself says where
@@ -46,10 +49,9 @@ it gives a number, and the verdict follows from them:
 SIZES = """\
 ## Sizes of the studies
 
-Those of the numbers above, and those of `make paper` where they differ. A study of another size is run with
-other keys, as in `gfmd run configs/paper/fig02.toml -o results/paper/fig02.h5 --set grid.points=2048`; then
+The paper has λᵣ/λₛ = 100 in most studies and grids of up to 32768² points. A study of another size is run with other
+keys, as in `gfmd run configs/paper/fig13.toml -o results/paper/fig13.h5 --set grid.points='[2048, 4096, 8192]'`. Then
 `python scripts/paper_figures.py -o results/paper --no-run --page docs/paper.md` writes the page.
-The paper has grids of up to 32768² points.
 """
 
 THEORY = """\
@@ -120,12 +122,20 @@ def planned(name: str) -> tuple[str, int]:
     return _grids(task.points for task in tasks), len(tasks)
 
 
+def _wavelengths(rows: list[dict[str, Any]]) -> tuple[str, str]:
+    """L / lambda_r and lambda_r / lambda_s of the random surfaces of a study."""
+    rough = [row for row in rows if row["rough"]]
+    cells = {1 / row["rolloff"] for row in rough}
+    ranges = {row["rolloff"] / row["cutoff"] for row in rough}
+    long, short = (", ".join(f"{one:.3g}" for one in sorted(each)) for each in (cells, ranges))
+    return long, short
+
+
 def sizes(held: Held) -> str:
-    """The studies of the page, their grids, surfaces and contacts, as a Markdown table."""
-    lines = [
-        "| study | grids (points per side) | surfaces | contacts | missed their tolerance | `make paper` |",
-        "| --- | --- | --- | --- | --- | --- |",
-    ]
+    """The studies of the page as a Markdown table, beside their full size where one is smaller."""
+    heads = ["study", "L/λᵣ", "λᵣ/λₛ", "grids (points per side)", "surfaces", "contacts"]
+    heads += ["missed their tolerance", "`make paper`"]
+    lines = []
     for name in (name for name in STUDIES if held.has(name)):
         rows = held.rows(name)
         grids = _grids(row["points"] for row in rows)
@@ -133,8 +143,11 @@ def sizes(held: Held) -> str:
         other = "" if full == (grids, len(rows)) else f"{full[0]}; {full[1]} contacts"
         surfaces = len({row["surface"] for row in rows})
         missed = sum(row["status"] != "converged" for row in rows)
-        lines.append(f"| `{name}` | {grids} | {surfaces} | {len(rows)} | {missed} | {other} |")
-    return "\n".join(lines)
+        cells = (f"`{name}`", *_wavelengths(rows), grids, surfaces, len(rows), missed, other)
+        lines.append([str(cell) for cell in cells])
+    width = len(heads) if any(line[-1] for line in lines) else len(heads) - 1
+    table = [heads, ["---"] * len(heads), *lines]
+    return "\n".join(f"| {' | '.join(line[:width])} |" for line in table)
 
 
 def write(findings: list[Finding], held: Held, figures: Path, target: Path) -> None:

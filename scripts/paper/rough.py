@@ -7,7 +7,8 @@ import numpy as np
 from gfmd_cli.analysis.figures import P_STAR
 from gfmd_cli.analysis.plotting import ColumnFigure
 from paper.claims import Finding, Value
-from paper.drawing import STYLES, curves, dense, draw_limits, finish, label, slope, values
+from paper.drawing import STYLES, dense, draw_limits, finish, label
+from paper.ensembles import estimate, groups, power, sample
 from paper.studies import Held, needs
 
 LIGHT = 0.035  # p* up to which a contact is called light
@@ -112,37 +113,34 @@ def fig05(held: Held, folder: Path) -> list[Finding]:
     ]
 
 
-@needs("fig06")
+@needs("fig06", "fig09b")
 def fig06(held: Held, folder: Path) -> list[Finding]:
     """Contact area over pressure, and its ratio to theory, in the continuum."""
-    area, ratio = (
-        ColumnFigure(P_STAR, r"relative contact area  $a_r$"),
-        ColumnFigure(P_STAR, r"$a_r\,/\,a_r$(Persson)"),
-    )
-    xs, ys, rs, slopes, heavy = [], [], [], {}, {}
-    for curve in curves(held, "fig06"):
-        p, (a, error) = curve.column("p_star"), values(curve.rows, "a_r")
-        theory, style = curve.prediction.a_r, STYLES[curve.n]
-        known = draw_limits(area, style, p, a, error)
-        draw_limits(ratio, style, p, a / theory, error / theory)
+    area = ColumnFigure(P_STAR, r"relative contact area  $a_r$")
+    xs, ys, slopes = [], [], {}
+    for group in groups(held, "fig06"):
+        p, a, style = group.p, group.continuum("a_r"), STYLES[group.n]
+        known = draw_limits(area, style, p, a.value, a.error)
         light = known & (p <= LIGHT)
-        if light.sum() > 1 and 0.5 <= curve.n <= 2:
-            spread = np.maximum(0.5 * error[light] / a[light], 1e-3)  # bars are two errors
-            slopes[style.label] = slope(np.log(p[light]), np.log(a[light]), spread)
-        high = known & (p >= HEAVY)
-        if np.any(high) and curve.n <= 3:
-            off = np.abs(a / theory - 1)[high]
-            heavy[style.label] = Value(
-                float(off.max()), float((error / theory)[high][off.argmax()] / 2)
-            )
-        kept = known & (a > 0)
-        xs, ys, rs = [*xs, p], [*ys, a[kept]], [*rs, (a / theory)[kept]]
-    line = dense(curve)
-    area.theory([(STYLES[1.0], line, curve.predict(line).a_r)])
-    ratio.axes.axhline(1.0, color="black", lw=0.9)
+        if light.sum() > 1 and 0.5 <= group.n <= 2:
+            slopes[style.label] = power(p[light], a.only(light))
+        xs, ys = [*xs, p], [*ys, a.value[known]]
+    line = dense(group.first)
+    area.theory([(STYLES[1.0], line, group.first.predict(line).a_r)])
     finish(area, folder, "fig06a", "log", "log", np.concatenate(xs), np.concatenate(ys))
-    finish(ratio, folder, "fig06b", "log", "ratio", np.concatenate(xs), np.concatenate(rs))
-    remark = "Continuum values of one realisation; errors: half of the 95 % bars."
+    ratio = ColumnFigure(P_STAR, r"$a_r\,/\,a_r$(Persson)")
+    xs, ys, heavy = [], [], {}
+    for group in groups(held, "fig09b"):
+        p, style = group.p, STYLES[group.n]
+        a = group.continuum("a_r").over(group.theory.a_r)
+        known = draw_limits(ratio, style, p, a.value, a.error)
+        high = known & (p >= HEAVY)
+        if np.any(high) and group.n <= 3:
+            heavy[style.label] = estimate(lambda a: np.abs(a - 1).max(), a.only(high))
+        xs, ys = [*xs, p], [*ys, a.value[known]]
+    ratio.axes.axhline(1.0, color="black", lw=0.9)
+    finish(ratio, folder, "fig06b", "linear", "ratio", np.concatenate(xs), np.concatenate(ys))
+    remark = f"Continuum values. {sample(held, 'fig06')}"
     return [
         Finding("linear", {f"d ln a_r/d ln p* for p* ≤ {LIGHT:g}": slopes}, remark),
         Finding(

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gfmd_cli.analysis.compare import einstein_prediction
+from gfmd_cli.analysis.compare import Curve, einstein_prediction
 from gfmd_cli.analysis.curve_styles import MARKERS, CurveStyle, colours
 from gfmd_cli.analysis.figures import GAP, P_STAR
 from gfmd_cli.analysis.plotting import ColumnFigure
@@ -12,6 +12,7 @@ from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.physics.surfaces import sample
 from paper.claims import Finding, Value
 from paper.drawing import STYLES, column, dense, draw_points, finish, label
+from paper.ensembles import Mean, groups
 from paper.studies import SEEDS, Held, needs
 
 GIVEN = {2: 6.0, 8: 8.0}  # height difference of the paper by L / lambda_r, in h_std
@@ -23,18 +24,16 @@ PARTED = 0.05  # relative difference from the closed form that counts
 def fig12(held: Held, folder: Path) -> list[Finding]:
     """The Einstein foundation in two cells."""
     plot, xs, ys, ends = ColumnFigure(P_STAR, GAP), [], [], {}
-    for curve, colour, marker, ratio in zip(
-        sorted(held.comparison("fig12").curves, key=lambda curve: "0.125" in curve.surface),
-        colours(3), "so", GIVEN, strict=False,
-    ):  # fmt: skip
-        p, u = curve.column("p_star"), curve.column("u_g")
-        draw_points(plot, CurveStyle(colour, marker, f"L/λᵣ = {ratio}"), p, u)
-        off = (np.abs(u / einstein_prediction(p).u_g - 1) > PARTED) & (u > 1)
-        span = np.ptp(sample(_surface(ratio), 256 * ratio)[1]) / curve.rows[0]["h_std"]
-        ends[f"L/λᵣ = {ratio}"] = Value(float(u[off].min() / (span / 2)) if off.any() else np.nan)
-        xs, ys = [*xs, p], [*ys, u]
+    found = sorted(groups(held, "fig12"), key=lambda group: -group.first.rows[0]["rolloff"])
+    for group, colour, marker in zip(found, colours(3), "so", strict=False):
+        row = group.first.rows[0]
+        name = f"L/λᵣ = {1 / row['rolloff']:g}"
+        p, u = group.p, group.column("u_g")
+        draw_points(plot, CurveStyle(colour, marker, name), p, u.value, u.error)
+        ends[name] = _mean([_parts(curve) for curve in group.curves])
+        xs, ys = [*xs, p], [*ys, u.value]
     line = np.geomspace(min(map(np.min, xs)), max(map(np.max, xs)), 300)
-    theory, exact = curve.predict(line).u_g, einstein_prediction(line).u_g
+    theory, exact = group.first.predict(line).u_g, einstein_prediction(line).u_g
     plot.line(plot.axes, "exact, Gaussian", line, exact, color="black", ls=(0, (4, 2)), lw=0.9)
     plot.theory([(STYLES[1.0], line, theory)])
     finish(plot, folder, "fig12", "log", "linear", np.concatenate(xs), np.concatenate(ys))
@@ -54,7 +53,11 @@ def fig12(held: Held, folder: Path) -> list[Finding]:
                 for ratio, (mean, deviation, count) in spans.items()
             ),
         ),
-        Finding("size_effect", {"gap at which they differ by 5 %, over Δh/2": ends}),
+        Finding(
+            "size_effect",
+            {"gap at which they differ by 5 %, over Δh/2": ends},
+            f"Each surface with its own Δh. Mean of {len(found[0].curves)} seeds, λᵣ/λₛ = 16.",
+        ),
         Finding(
             "einstein",
             {
@@ -66,17 +69,31 @@ def fig12(held: Held, folder: Path) -> list[Finding]:
     ]
 
 
-def _surface(ratio: int, seed: int = 0) -> SelfAffine:
-    """The default surface in a cell of `ratio` roll-off wavelengths."""
-    return SelfAffine(
-        hurst=0.8, rolloff=1 / ratio, cutoff=0.01 / ratio, spectrum="rolloff", seed=seed
-    )
+def _parts(curve: Curve) -> float:
+    """Least gap at which a solution and the closed form differ, over half the span of the heights."""
+    p, u, row = curve.column("p_star"), curve.column("u_g"), curve.rows[0]
+    off = (np.abs(u / einstein_prediction(p).u_g - 1) > PARTED) & (u > 1)
+    height = sample(_surface(row["rolloff"], row["cutoff"], row["seed"]), row["points"])[1]
+    return float(u[off].min() * row["h_std"] / (np.ptp(height) / 2)) if off.any() else np.nan
+
+
+def _mean(each: list[float]) -> Value:
+    """Mean and standard error."""
+    mean = Mean(np.array(each))
+    return Value(float(mean.value), float(mean.error))
+
+
+def _surface(rolloff: float, cutoff: float, seed: int) -> SelfAffine:
+    """The default surface with other wavelengths, in units of the cell."""
+    return SelfAffine(hurst=0.8, rolloff=rolloff, cutoff=cutoff, spectrum="rolloff", seed=seed)
 
 
 def _spans(ratio: int) -> tuple[float, float, int]:
     """Highest minus lowest point in h_std: mean and standard deviation over seeds, their number."""
     count = 20 if ratio < 4 else 5
-    heights = [sample(_surface(ratio, seed), 256 * ratio)[1] for seed in range(count)]
+    heights = [
+        sample(_surface(1 / ratio, 0.01 / ratio, seed), 256 * ratio)[1] for seed in range(count)
+    ]
     found = [float(np.ptp(height) / height.std()) for height in heights]
     return float(np.mean(found)), float(np.std(found, ddof=1)), count
 

@@ -11,9 +11,11 @@ from gfmd_cli.analysis.distribution_figure import DENSITY, STRESS
 from gfmd_cli.analysis.edge_law import edge_exponent, fit
 from gfmd_cli.analysis.figures import P_STAR
 from gfmd_cli.analysis.plotting import ColumnFigure
+from gfmd_cli.grid.arrays import Field
 from gfmd_cli.physics.observables import logarithmic_middles
 from paper.claims import Finding, Value
-from paper.drawing import STYLES, curves, dense, draw_points, finish, label, slope
+from paper.drawing import STYLES, dense, draw_points, finish, label, slope
+from paper.ensembles import Mean, estimate, groups, sample
 from paper.studies import Held, needs
 
 LOWEST = 0.02  # stress [Delta_sigma] that is drawn
@@ -51,8 +53,7 @@ def _small_stress(held: Held) -> list[Finding]:
             f"{label(n)}: {exponents[n]} for σ = {law.window[0]:.2g} to {law.window[1]:.2g} Δσ, "
             f"{Value(law.limit, law.limit_error)} at the edge"
         )
-    seeds = len({row["seed"] for row in held.rows("edges")})
-    points = max(row["points"] for row in held.rows("edges"))
+    points = max(row["points"] * row["cutoff"] for row in held.rows("edges"))
     law = "n/(2 − n), law of the contact edge, less the μ of the paper"
     half = "exponent in the lowest resolved half decade"
     rises = {}
@@ -67,8 +68,8 @@ def _small_stress(held: Held) -> list[Finding]:
                 law: {label(n): Value(edge_exponent(n) - mu) for n, mu in paper.items()},
                 **({f"{half}, n = 1/2": exponents[0.5]} if 0.5 in exponents else {}),
             },
-            f"{'; '.join(told)}. {seeds} seeds, λᵣ/λₛ = 2.5, up to {points * 0.2:.0f} points per λₛ: the "
-            "default surface is too fine. σ ∝ d^(1−n/2) at an edge implies n/(2 − n) for n < 2; for n = 2 "
+            f"{'; '.join(told)}. {sample(held, 'edges')} Up to {points:.0f} points per λₛ: finer surfaces "
+            "are not resolved. σ ∝ d^(1−n/2) at an edge implies n/(2 − n) for n < 2; for n = 2 "
             "the stress at the edge is finite and no law follows.",
         ),
         Finding("small_stress_bulk", rises),
@@ -80,18 +81,18 @@ def fig08(held: Held, folder: Path) -> list[Finding]:
     """Stress deviation over pressure; at n = 3 a lower bound on this grid."""
     plot = ColumnFigure(P_STAR, r"stress deviation  $\sigma_p\,/\,\Delta\sigma$")
     xs, ys = [], []
-    for curve in curves(held, "fig06"):
-        if curve.n > 3:
+    for group in groups(held, "fig06"):
+        if group.n > 3:
             continue
-        y, error = curve.best("sigma_p")
-        style = STYLES[curve.n]
-        if curve.n == 3:
-            style = CurveStyle(style.colour, style.marker, f"n = 3, on {curve.points}²")
-            error = np.full(y.size, np.nan)
-        draw_points(plot, style, curve.column("p_star"), y, error)
-        xs, ys = [*xs, curve.column("p_star")], [*ys, y]
-    line = dense(curve)
-    plot.theory([(STYLES[1.0], line, curve.predict(line).sigma_p)])
+        deviation, style = group.best("sigma_p"), STYLES[group.n]
+        if group.n == 3:
+            name = f"n = 3, on {group.first.points}²"
+            style = CurveStyle(style.colour, style.marker, name)
+            deviation = group.column("sigma_p")
+        draw_points(plot, style, group.p, deviation.value, deviation.error)
+        xs, ys = [*xs, group.p], [*ys, deviation.value]
+    line = dense(group.first)
+    plot.theory([(STYLES[1.0], line, group.first.predict(line).sigma_p)])
     finish(plot, folder, "fig08", "log", "linear", np.concatenate(xs), np.concatenate(ys))
     return []
 
@@ -105,12 +106,11 @@ def fig13(held: Held, folder: Path) -> list[Finding]:
     tones = colours(len(found.points))
     tails = {}
     for i, (points, density) in enumerate(zip(found.points, found.grids, strict=True)):
-        name = f"λₛ/Δa = {points * 0.005:.3g}"
+        name = f"λₛ/Δa = {points * found.finest['cutoff']:.3g}"
         kept = (density > 0) & (middle > 1e-2)
         draw_points(plot, CurveStyle(tones[i], MARKERS[i], name), middle[kept], density[kept])
         kept &= (middle > TAIL[0]) & (middle < TAIL[1])
-        counts = found.counts[0, i][kept]
-        tails[name] = slope(np.log(middle[kept]), np.log(density[kept]), 1 / np.sqrt(counts))
+        tails[name] = _tail(middle[kept], found.counts[:, i][:, kept])
     sigma = np.geomspace(1e-2, 100, 300)
     theory = found.curve.stress_density(sigma, found.finest["p_star"])
     plot.theory([(STYLES[1.0], sigma, theory)])
@@ -127,10 +127,21 @@ def fig13(held: Held, folder: Path) -> list[Finding]:
                 ),
                 "exponent of the law of the contact edge": Value(edge_exponent(3.0)),
             },
-            f"Its error includes the change from the coarser grid: {told}; p* = {found.finest['p_star']:g}. The edge implies σ^−3, with which "
-            "σ_p diverges logarithmically, as it does on the grids; with σ^−2.6 it would diverge as a power.",
+            f"Its error includes the change from the coarser grid: {told}; p* = {found.finest['p_star']:g}. "
+            f"{sample(held, 'fig13')} The edge implies σ^−3, with which σ_p diverges logarithmically, as it "
+            "does on the grids; with σ^−2.6 it would diverge as a power.",
         )
     ]
+
+
+def _tail(sigma: Field, counts: Field) -> Value:
+    """Exponent of Pr(sigma) in bins of equal relative width, by the points of each seed in them."""
+    weights = 1 / np.sqrt(counts.sum(axis=0))
+
+    def of(seen: Field) -> float:
+        return slope(np.log(sigma), np.log(seen / sigma), weights).value
+
+    return estimate(of, Mean(counts))
 
 
 def _by_body(held: Held, name: str) -> dict[float, list[Any]]:

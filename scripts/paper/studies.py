@@ -24,7 +24,7 @@ class Study:
     """Further keys that a quick run overrides."""
 
 
-SEEDS = {2: 96, 4: 48, 8: 16, 16: 4, 32: 2}
+SEEDS = {2: 192, 4: 64, 8: 24, 16: 8}
 """Surfaces in cells of so many roll-off wavelengths."""
 
 
@@ -41,31 +41,35 @@ def _cell(ratio: int) -> Study:
 
 
 SMALL = "grid.points=512"
+COARSE = "grid.points=256"
+TWO = "surface.seed=[0, 1]"
 FEW = "load.p_star={from=0.01, to=3.2, per_decade=2}"
-ONE = "surface.seed=0"
+EDGES = ("surface.rolloff=0.25", "surface.cutoff=0.1", f"surface.seed={list(range(8))}")
+"""Of `edges`: four roll-off wavelengths in the cell, 102 points per lambda_s on the finest grid."""
 STUDIES = {
     "fig01": Study("fig01", quick=("grid.points=1024",)),
     "fig02": Study("fig02", quick=(SMALL,)),
-    "kappa": Study("kappa", quick=("grid.points=[128,256,512]", "solver.tolerance=1e-8")),
+    "kappa": Study("kappa", quick=("solver.tolerance=1e-8",)),
     "fig04": Study("fig04", quick=(SMALL,)),
     "fig05": Study("fig05", quick=("grid.points=1024",)),
-    "fig06": Study("fig06", quick=(SMALL, FEW)),
+    "fig06": Study("fig06", quick=(TWO, COARSE, FEW)),
     "light": Study(
-        "light", quick=("grid.points=[128,256,512]", "load.p_star=[0.04, 0.08, 0.16, 0.5]")
+        "light", quick=(TWO, "grid.points=[128,256,512]", "load.p_star=[0.04, 0.08, 0.16, 0.5]")
     ),
-    "fig07": Study("fig07", quick=("grid.points=[512,1024]",)),
-    "edges": Study("../stress-distribution", quick=("grid.points=[128,256,512]",)),
-    "fig13": Study("fig13", quick=("grid.points=[512,1024,2048]",)),
-    "fig09b": Study("fig09b", quick=("grid.points=256",)),
+    "fig07": Study("fig07", quick=(TWO, "grid.points=[256,512]")),
+    "edges": Study("../stress-distribution", EDGES, quick=("grid.points=[128,256,512]",)),
+    "fig13": Study("fig13", quick=(TWO, "grid.points=[256,512,1024]")),
+    "fig09b": Study("fig09b", quick=(TWO, COARSE)),
     "small_pressure": Study(
-        "small_pressure", quick=(ONE, "load.p_star={from=1e-5, to=0.1, per_decade=1}")
+        "small_pressure", quick=(TWO, "load.p_star={from=1e-5, to=0.1, per_decade=1}")
     ),
-    "fig10": Study("fig10", quick=(SMALL, FEW)),
-    "cut_off": Study("cut_off", quick=(SMALL, FEW)),
-    "spacing": Study("spacing"),
-    "fig11": Study("fig11", quick=(FEW,)),
+    "fig10": Study("fig10", quick=(TWO, COARSE, FEW)),
+    "fig10b": Study("fig10b", quick=(TWO, COARSE)),
+    "cut_off": Study("cut_off", quick=(TWO, COARSE, FEW)),
+    "spacing": Study("spacing", quick=(TWO,)),
+    "fig11": Study("fig11", quick=(TWO, FEW)),
     "fig12": Study("fig12", quick=("load.p_star={from=1e-6, to=1.0, per_decade=1}",)),
-    "weights": Study("weights", quick=("surface.seed=[0,1]",)),
+    "weights": Study("weights", quick=(TWO,)),
     "plate_map": Study("plate_map", quick=(SMALL,)),
     **{f"large_cell_{ratio}": _cell(ratio) for ratio in SEEDS},
 }
@@ -122,12 +126,13 @@ class Held:
             return study.arrays(group, row["task"])
 
 
-def run(name: str, folder: Path, quick: bool) -> None:
+def run(name: str, folder: Path, quick: bool, jobs: int | None = None) -> None:
     """Run the missing tasks of one study by the command line."""
     study = STUDIES[name]
     settings = (*study.settings, *(study.quick if quick else ()))
     command = [sys.executable, "-P", "-m", "gfmd_cli", "run", CONFIGS / f"{study.config}.toml"]
     command += ["-o", folder / f"{name}.h5", "-q"]
+    command += ["-j", jobs] if jobs else []
     command += [word for setting in settings for word in ("--set", setting)]
     ended = subprocess.run([str(word) for word in command], check=False)
     if ended.returncode not in (0, 1):  # 1: some contact missed its tolerance, which its row says

@@ -11,6 +11,7 @@ from gfmd_cli.analysis.true_contact import VARIANTS, true_contact_areas
 from gfmd_cli.physics.persson import gamma_n
 from paper.claims import Finding, Value
 from paper.drawing import STYLES, column, draw_points, finish, label
+from paper.ensembles import Mean, estimate, groups, sample
 from paper.studies import Held, needs
 
 SHOWN = 0.1  # p* of the figure and of the comparison
@@ -27,21 +28,21 @@ def weights(held: Held, folder: Path) -> list[Finding]:
         curves = [curve for curve in held.comparison("weights").curves if curve.n == n]
         pairs = [_weights(held, curve) for curve in curves]
         q, energy, theory = pairs[0][0], pairs[0][2], pairs[0][3]
-        seen = np.mean([pair[1] for pair in pairs], axis=0)
+        seen = np.array([pair[1] for pair in pairs])
         style = STYLES[n]
         bins = np.digitize(q, np.geomspace(0.9, 65, 14))
-        mean = [np.average(seen[bins == b], weights=energy[bins == b]) for b in np.unique(bins)]
-        at = [np.average(q[bins == b], weights=energy[bins == b]) for b in np.unique(bins)]
-        draw_points(plot, style, at, mean)
+        parts = [(bins == b, energy[bins == b]) for b in np.unique(bins)]
+        at = [np.average(q[part], weights=weight) for part, weight in parts]
+        mean = Mean(
+            np.transpose([np.average(seen[:, part], axis=1, weights=w) for part, w in parts])
+        )
+        draw_points(plot, style, at, mean.value, mean.error)
         plot.axes.plot(q, theory, color=style.colour)
         for octave, cases in octaves.items():
             inside = (q >= octave[0]) & (q < octave[1])
-            ratios = [
-                energy[inside] @ pair[1][inside] / (energy[inside] @ theory[inside])
-                for pair in pairs
-            ]
-            error = np.std(ratios, ddof=1) / np.sqrt(len(ratios)) if len(ratios) > 1 else np.nan
-            cases[label(n)] = Value(float(np.mean(ratios)), float(error))
+            whole = energy[inside] @ theory[inside]
+            ratio = Mean(seen[:, inside] @ energy[inside] / whole)
+            cases[label(n)] = Value(float(ratio.value), float(ratio.error))
     plot.legend["Eq. (30)"] = plot.axes.lines[-1]
     finish(plot, folder, "weights", "log", "log", [1, 64], [0.01, 1])
     return [
@@ -51,7 +52,7 @@ def weights(held: Held, folder: Path) -> list[Finding]:
                 "measured W over Eq. (30), longest octave of waves": octaves[LONGEST],
                 "measured W over Eq. (30), shortest octave of waves": octaves[SHORTEST],
             },
-            f"p* = {SHOWN:g}, {len(curves)} seeds, W = |u(q)|²/|h(q)|² weighted with k C. The errors of the "
+            f"p* = {SHOWN:g}. {sample(held, 'weights')} W = |u(q)|²/|h(q)|² weighted with k C. The errors of the "
             "energy cancel in u_g ([measured](theory.md#the-weight-w-measured)).",
         ),
         Finding("exact_order", {}, "The program solves hard-wall contact only."),
@@ -78,23 +79,22 @@ def _sampling(held: Held) -> list[Finding]:
     """Delta_sigma over the contact: how it depends on n, and the area that it predicts."""
     rows = [row for row in held.rows("weights") if abs(row["p_star"] - SHOWN) < 1e-6]
 
-    def mean(name: str, n: float) -> float:
-        return float(np.mean(column([row for row in rows if row["n"] == n], name)))
+    def mean(name: str, n: float) -> Mean:
+        return Mean(column([row for row in rows if row["n"] == n], name))
 
     def ratio(name: str) -> Value:
-        return Value(mean(name, 2.0) / mean(name, 0.5))
+        return estimate(lambda large, small: large / small, mean(name, 2.0), mean(name, 0.5))
 
-    light, exponents = {}, (0.0, 0.5, 1.0)
-    for n in exponents:
-        curves = [curve for curve in held.comparison("weights").curves if curve.n == n]
-        ratios = [
-            float(true_contact_areas(curve)[VARIANTS["deviation_bearing"]][0])
-            / curve.rows[0]["a_r_continuum"]
-            for curve in curves
-        ]
-        error = np.std(ratios, ddof=1) / np.sqrt(len(ratios))
-        light[label(n)] = Value(float(np.mean(ratios)), float(error))
-    told = ", ".join(f"{mean('a_r_continuum', n):.3f}" for n in (0.5, 2.0))
+    light = {}
+    for group in groups(held, "weights"):
+        if group.n > 1:
+            continue
+        key = VARIANTS["deviation_bearing"]
+        predicted = Mean(np.array([true_contact_areas(curve)[key][:1] for curve in group.curves]))
+        light[label(group.n)] = estimate(
+            lambda theory, a: theory[0] / a[0], predicted, group.continuum("a_r").only([0])
+        )
+    told = ", ".join(f"{mean('a_r_continuum', n).value:.3f}" for n in (0.5, 2.0))
     return [
         Finding(
             "sampling",
@@ -110,7 +110,7 @@ def _sampling(held: Held) -> list[Finding]:
         Finding(
             "percentile",
             {"predicted over computed a_r at p* = 0.01": light},
-            f"a_r in the continuum, {len(curves)} seeds.",
+            f"a_r in the continuum. {sample(held, 'weights')}",
         ),
     ]
 
