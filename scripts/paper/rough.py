@@ -69,14 +69,25 @@ def _longest_free(touching: np.ndarray) -> int:
     return int(np.diff(np.append(places, places[0] + touching.size)).max())
 
 
+def _mean_around(values: np.ndarray, at: int, half: int) -> float:
+    """Mean over so many points to either side."""
+    return float(np.mean(values.take(at + np.arange(-half, half + 1), mode="wrap")))
+
+
+def _highest(height: np.ndarray, half: int) -> int:
+    """The place where the mean height over so many points to either side is the largest."""
+    return int(np.argmax([_mean_around(height, at, half) for at in range(height.size)]))
+
+
 @needs("fig05")
 def fig05(held: Held, folder: Path) -> list[Finding]:
-    """Stress along the diagonal at its highest asperity."""
+    """Stress along the diagonal at its highest asperity: where the mean height is the largest."""
     rows = {row["n"]: row for row in held.rows("fig05")}
     sections = {n: held.section("fig05", row) for n, row in rows.items()}
     height = sections[0.5]["height"]
     half = round(WINDOW * 0.005 * height.size / np.sqrt(2))  # lambda_s = 0.005 L
-    drawn = int(height.argmax()) + np.arange(-3 * half, 3 * half + 1)
+    summits = {wide: _highest(height, wide * half) for wide in (1, 2)}  # in lambda_s
+    drawn = summits[1] + np.arange(-3 * half, 3 * half + 1)
     x = np.arange(-3 * half, 3 * half + 1) / half * WINDOW
     plot, highest, shares = (
         ColumnFigure(
@@ -89,7 +100,12 @@ def fig05(held: Held, folder: Path) -> list[Finding]:
         touching = contact_points(section)
         sigma = np.where(touching, section["sigma"], 0.0).take(drawn, mode="wrap")
         sigma = sigma / rows[n]["delta_sigma"] / (2 if n == 3 else 1)
-        shares[n] = float(np.mean(touching.take(drawn[np.abs(x) <= WINDOW], mode="wrap")))
+        shares[n] = {
+            f"within {'' if wide == 1 else f'{wide} '}λₛ": Value(
+                _mean_around(touching, at, wide * half)
+            )
+            for wide, at in summits.items()
+        }
         style = STYLES[n]
         name = style.label + (" (half the stress)" if n == 3 else "")
         plot.axes.plot(x, sigma, color=style.colour, lw=0.5, zorder=2)
@@ -102,13 +118,17 @@ def fig05(held: Held, folder: Path) -> list[Finding]:
         )
         highest = max(highest, float(sigma.max()))
     finish(plot, folder, "fig05", "ratio", "linear", x, [0, highest])
-    others = ", ".join(f"{100 * shares[n]:.0f} % at {label(n)}" for n in (1.0, 2.0))
+    others = ", ".join(
+        f"{' and '.join(f'{100 * value.value:.0f} %' for value in shares[n].values())} at {label(n)}"
+        for n in (1.0, 2.0)
+    )
     return [
         Finding(
             "asperity",
-            {f"share in contact at {label(n)}": Value(shares[n]) for n in (0.5, 3.0)},
-            f"Within λₛ of the highest point of the diagonal, a choice that no solution enters; {others}. "
-            f"{rows[0.5]['points']}² points, 10 % contact on the grid.",
+            {f"share in contact at {label(n)}": shares[n] for n in (0.5, 3.0)},
+            "Within this distance of the place of the diagonal with the largest mean height over it, a "
+            f"choice that no solution enters; {others}. {rows[0.5]['points']}² points, 10 % contact on the "
+            "grid.",
         )
     ]
 
