@@ -193,7 +193,7 @@ def print_differences(surfaces: dict[Key, Surface]) -> None:
         cells = []
         for n in EXPONENTS:
             mean, error = spread(surfaces[*one, n].best() - surfaces[*other, n].best())
-            cells.append(f"{mean:+.3f} ± {error:.3f} ({mean / error:+.0f})")
+            cells.append(f"{mean:+.4f} ± {error:.4f} ({mean / error:+.0f})")
         rows.append([f"{one[0]}, H = {one[1]}, less {other[0]}, H = {other[1]}", *cells])
     heads = ["surfaces", *(f"n = {n:g}" for n in EXPONENTS)]
     print_table("Difference of gamma (in standard errors)", heads, rows)

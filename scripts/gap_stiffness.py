@@ -78,8 +78,8 @@ def print_stiffness(curves: Curves) -> None:
                 [
                     f"{n:g}",
                     f"{P_STAR[i]:g}",
-                    "{:.3f} ± {:.3f}".format(*spread(u_g[:, i])),
-                    "{:.3f} ± {:.3f}".format(*spread(u_0[:, i])),
+                    "{:.4f} ± {:.4f}".format(*spread(u_g[:, i])),
+                    "{:.4f} ± {:.4f}".format(*spread(u_0[:, i])),
                     f"{P_STAR[i] / u_0[:, i].mean():.3f}",
                     " / ".join(f"{100 * change.mean():+.1f} %" for change in changes),
                     *(f"{theory[i]:.3f}" for theory in theories),

@@ -33,7 +33,7 @@ def table(heading: str, **keys: object) -> str:
     return "\n".join([f"\n{heading}", *lines, ""])
 
 
-def surface(spectrum: str, rolloff: float, cutoff: float, **keys: object) -> str:
+def surface(spectrum: str, rolloff: float, cutoff: float | list[float], **keys: object) -> str:
     given = {"spectrum": spectrum, "rolloff": rolloff, "cutoff": cutoff} | keys
     return table("[[surface]]", kind="self-affine", **given)
 
@@ -91,7 +91,16 @@ def true_contact_specs() -> list[str]:
     return [one + exponents + grid + rest([0.003, 0.03, 0.3], true_contact=True)]
 
 
+def depth_specs() -> list[str]:
+    """Spectra of lambda_r / lambda_s = 8 to 64, eight points per lambda_s."""
+    points, cutoffs = [256, 512, 1024, 2048], [1 / 32, 1 / 64, 1 / 128, 1 / 256]
+    paired = table("[sweep]", paired=["surface.cutoff", "grid.points"])
+    one = surface("rolloff", 1 / 4, cutoffs, hurst=0.8, seed=[*range(8)])
+    return [one + power([0.5, 1, 2, 3]) + table("[grid]", points=points) + paired + rest(LIGHT)]
+
+
 STUDIES = {
+    "depth": depth_specs,
     "gamma": gamma_specs,
     "slab": slab_specs,
     "stiffness": stiffness_specs,

@@ -49,8 +49,9 @@ it gives a number, and the verdict follows from them:
 SIZES = """\
 ## Sizes of the studies
 
-The paper has λᵣ/λₛ = 100 in most studies and grids of up to 32768² points. A study of another size is run with other
-keys, as in `gfmd run configs/paper/fig13.toml -o results/paper/fig13.h5 --set grid.points='[2048, 4096, 8192]'`. Then
+The paper has λᵣ/λₛ = 100 in most studies and grids of up to 32768² points. How the mean gap and the contact area depend
+on λᵣ/λₛ from 8 to 64 is [measured](theory.md#trend-with-the-range-of-the-spectrum). A study of another size is run with
+other keys, as in `gfmd run configs/paper/fig13.toml -o results/paper/fig13.h5 --set grid.points='[2048, 4096, 8192]'`. Then
 `python scripts/paper_figures.py -o results/paper --no-run --page docs/paper.md` writes the page.
 """
 
