@@ -249,6 +249,7 @@ PAPER_SETTINGS = {
     "fig07": ROUGH,
     "fig09b": ROUGH,
     "fig10": (*ROUGH, TWO),
+    "fig10b": ROUGH,
     "fig11": (*ROUGH, TWO),
     "fig12": ("grid.points=2048", TWO),
     "fig13": ROUGH,
