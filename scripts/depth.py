@@ -9,44 +9,47 @@ import argparse
 from pathlib import Path
 
 import numpy as np
+from gamma_fit import print_table, spread
 from theory_studies import LIGHT
 
 from gfmd_cli.analysis.compare import Curve, compare
+from gfmd_cli.analysis.selection import grouped
+
+Groups = dict[tuple[float, float], list[Curve]]
+"""The curves of all seeds by n and lambda_r / lambda_s."""
 
 
 def over_theory(curve: Curve, name: str) -> np.ndarray:
-    """Simulation over theory, at the pressures of LIGHT."""
+    """Simulation over theory with Eq. (39), at the pressures of LIGHT."""
     return curve.column(name) / getattr(curve.predict(curve.column("p_star")), name)
+
+
+def gap_error(curve: Curve) -> np.ndarray:
+    """ln u_g of the theory less that of the simulation, in per cent."""
+    return -100 * np.log(over_theory(curve, "u_g"))
+
+
+def print_trend(title: str, groups: Groups, measure, digits: int) -> None:  # type: ignore[no-untyped-def]
+    """One row for each n and pressure, one column for each lambda_r / lambda_s."""
+    exponents, depths = (sorted(set(keys)) for keys in zip(*groups, strict=True))
+    rows = []
+    for n in exponents:
+        for place, p in enumerate(LIGHT):
+            seen = [spread([measure(c)[place] for c in groups[n, depth]]) for depth in depths]
+            rows.append(
+                [f"{n:g}", f"{p:g}", *(f"{m:.{digits}f} ± {e:.{digits}f}" for m, e in seen)]
+            )
+    print_table(title, ["$n$", "$p^\\ast$", *(f"{depth:g}" for depth in depths)], rows)
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--folder", type=Path, default=Path("results/theory"))
-    given = parser.parse_args()
-    groups: dict[tuple[float, float], list[Curve]] = {}
-    for curve in compare(given.folder / "depth.h5").curves:
-        row = curve.rows[0]
-        groups.setdefault((row["n"], row["rolloff"] / row["cutoff"]), []).append(curve)
-    depths = sorted({depth for _, depth in groups})
-    heads = " | ".join(f"{depth:g}" for depth in depths)
-    for title, name, show in (
-        (
-            "ln u_g of the theory less that of the simulation, in per cent",
-            "u_g",
-            lambda x: -100 * np.log(x),
-        ),
-        ("a_r over that of the theory", "a_r", lambda x: x),
-    ):
-        print(f"\n{title}\n| $n$ | $p^\\ast$ | {heads} |\n| --- | --- |" + " --- |" * len(depths))
-        for n in sorted({n for n, _ in groups}):
-            for place, p in enumerate(LIGHT):
-                cells = []
-                for depth in depths:
-                    x = np.array([show(over_theory(c, name))[place] for c in groups[n, depth]])
-                    error = x.std(ddof=1) / np.sqrt(x.size)
-                    digits = 1 if name == "u_g" else 3
-                    cells.append(f"{x.mean():.{digits}f} ± {error:.{digits}f}")
-                print(f"| {n:g} | {p:g} | " + " | ".join(cells) + " |")
+    curves = compare(parser.parse_args().folder / "depth.h5").curves
+    groups = grouped(curves, lambda c: (c.rows[0]["n"], c.rows[0]["rolloff"] / c.rows[0]["cutoff"]))
+    title = "ln u_g of the theory less that of the simulation, in per cent"
+    print_trend(title, groups, gap_error, 1)
+    print_trend("a_r over that of the theory", groups, lambda c: over_theory(c, "a_r"), 3)
 
 
 if __name__ == "__main__":

@@ -183,6 +183,11 @@ class Grid:
         """Values over rows and the columns of `span`, of all columns."""
         return values
 
+    @property
+    def pair_count(self) -> int:
+        """What a pair of transforms of this grid counts as, in transforms in double precision."""
+        return 2 if self.precision == "double" else 1
+
     @cached_property
     def _memory(self) -> tuple[Any, ...]:
         """Memory that transforms work in, of one axis."""

@@ -186,11 +186,8 @@ class _Run:
         return beta
 
     def apply_stiffness(self) -> float:
-        """Replace the values in `padded` by K times them; return the sum of their products.
-
-        A pair of transforms in single precision counts as one.
-        """
-        self.state.transforms += 1 if self.moves.precision == "single" else 2
+        """Replace the values in `padded` by K times them; return the sum of their products."""
+        self.state.transforms += self.moves.pair_count
         return self.moves.filter_padded(self.contact.stiffness)
 
     def advance(self, beta: float) -> None:

@@ -49,7 +49,7 @@ class GreensFunction:
         self.grid, self.rows = grid, contact.grid.rows
         self.stiffness, self.screening = grid.as_rows(contact.stiffness), screening
         self.z = grid.as_rows(grid.padded)
-        self.transforms = 1 if grid.precision == "single" else 2
+        self.transforms = grid.pair_count
 
     def apply(
         self, sigma: Field, contact_state: ContactState, threshold: int, change: Field

@@ -70,8 +70,8 @@ class TileOperators:
 
     @property
     def transforms(self) -> float:
-        """Transforms of one displacement, two in single precision, by their share of points."""
-        return self.coarse.size / self.grid.size
+        """Transforms of one displacement, by their share of points."""
+        return self.coarse.pair_count * self.coarse.size / self.grid.size
 
     def displacement(self, tiles: Tiles) -> TileMap:
         """The map s -> C s on these tiles, up to a rigid displacement."""
