@@ -75,7 +75,7 @@ def _edge_law(plot: ColumnFigure, found: StressDistribution, style: CurveStyle) 
         law = fit(found, name)
         if law is None or not np.isfinite(law.theory):
             continue
-        low, high = law.window
+        low, high = law.lowest, law.highest
         span = (low / BEYOND, high) if name == "small" else (low, high * BEYOND)
         sigma = np.geomspace(*span, 50)
         dashed: dict[str, Any] = {"ls": (0, (4, 2)), "lw": 0.8, "zorder": 2.5}

@@ -34,33 +34,21 @@ def edge_exponent(n: float) -> float:
     return n / (2 - n) if 0 <= n < 4 and n != 2 else np.nan
 
 
-def hertz_density(n: float, sigma: Field, peak: float, a_r: float) -> Field:
-    """Pr(sigma) of paraboloids with one peak stress: the edge law at all stresses of the contact.
-
-    From sigma = peak (1 - r^2/a^2)^(1 - n/2), paper Eqs. (5) and (6), corrected:
-    Pr = a_r 2 / (|2 - n| peak) (sigma / peak)^(n/(2-n)), below the peak for n < 2 and above it for
-    n > 2. `sigma` and `peak` share a unit; a_r is the relative contact area.
-    """
-    reached = sigma < peak if n < 2 else sigma > peak
-    density = 2 * a_r / (abs(2 - n) * peak) * (sigma / peak) ** edge_exponent(n)
-    return np.where(reached, density, 0.0)
-
-
 @dataclass(frozen=True)
 class Fit:
     """Pr = prefactor sigma^exponent in a window, and the exponent at the edge itself."""
 
     law: str
     """"small" or "large" stress."""
-    window: tuple[float, float]
-    """Stresses [Delta_sigma] from the lower edge of the first bin to the upper one of the last."""
+    lowest: float
+    """Lower edge of the first bin of the window [Delta_sigma]."""
+    highest: float
+    """Upper edge of the last bin."""
     exponent: float
     """Of a straight line through ln Pr(ln sigma): that of the window, not of the limit."""
     error: float
     """Its standard error: of the bins, of discretisation, of the choice of window."""
     prefactor: float
-    prefactor_error: float
-    """Relative, at the middle of the window."""
     limit: float
     """Exponent beside a term b sigma^(2/(2-n)), the first departure from the edge law, in all bins
     that may be used; NaN at n = 2 or with fewer than FEWEST + 1 bins."""
@@ -82,8 +70,6 @@ class Line:
     """The part of it that is shared between the bins."""
     level: float
     """ln Pr at sigma = 1 without the correction."""
-    level_error: float
-    """Standard error of ln Pr in the middle of the window."""
 
 
 def power_law(
@@ -113,7 +99,6 @@ def power_law(
         error=float(errors[1]),
         shared=float(abs(levers[1] @ shared)),
         level=float(found[0] - found[1] * centre),
-        level_error=float(errors[0]),
     )
 
 
@@ -158,11 +143,11 @@ def fit(found: StressDistribution, law: str) -> Fit | None:
     weight = 1 / found.error[nearest] ** 2
     return Fit(
         law=law,
-        window=(float(edges[base.min()]), float(edges[base.max() + 1])),
+        lowest=float(edges[base.min()]),
+        highest=float(edges[base.max() + 1]),
         exponent=line.slope,
         error=float(np.hypot(line.error, 0.5 * (max(slopes) - min(slopes)))),
         prefactor=float(np.exp(line.level - _bending(line.slope))),
-        prefactor_error=line.level_error,
         limit=limit,
         limit_error=limit_error,
         theory=float(theory),

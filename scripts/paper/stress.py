@@ -50,7 +50,7 @@ def _small_stress(held: Held) -> list[Finding]:
             continue
         exponents[n] = Value(law.exponent, law.error)
         told.append(
-            f"{label(n)}: {exponents[n]} for σ = {law.window[0]:.2g} to {law.window[1]:.2g} Δσ, "
+            f"{label(n)}: {exponents[n]} for σ = {law.lowest:.2g} to {law.highest:.2g} Δσ, "
             f"{Value(law.limit, law.limit_error)} at the edge"
         )
     points = max(row["points"] * row["cutoff"] for row in held.rows("edges"))
