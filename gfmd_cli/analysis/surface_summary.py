@@ -15,12 +15,7 @@ from gfmd_cli.physics.elastomers import HalfSpace
 from gfmd_cli.physics.height_map import extent
 from gfmd_cli.physics.indenters import RigidSurface
 from gfmd_cli.physics.persson import Persson
-from gfmd_cli.physics.roughness_parameters import (
-    MAP_NAMES,
-    PROFILE_NAMES,
-    RoughnessParameters,
-    roughness_parameters,
-)
+from gfmd_cli.physics.roughness_parameters import MAP_NAMES, PROFILE_NAMES, roughness_parameters
 from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.physics.spectrum_fit import Moments, SelfAffineFit, fit, moments
 from gfmd_cli.study.plausibility import METRES
@@ -38,7 +33,7 @@ class SurfaceSummary:
     scene: Scene
     """The surface on its smallest grid, mirrored if it has borders, under a half-space of unit
     modulus."""
-    parameters: RoughnessParameters
+    parameters: dict[str, float | None]
     """Of the measured part of a map, levelled, before its edges are treated; else of the cell."""
     moments: Moments
     """Of the cell that is solved."""
@@ -75,7 +70,7 @@ class SurfaceSummary:
             "preparation": self.surface.preparation(),
             "sides": [side / self.copies for side in grid.sides[::-1]],
             "points": [points // self.copies for points in grid.whole_shape[::-1]],
-            **self.parameters.named(),
+            **self.parameters,
             "h_std": self.moments.height,
             "gradient": self.moments.gradient,
             "curvature": self.moments.curvature,
@@ -175,11 +170,11 @@ def as_text(summary: SurfaceSummary) -> str:
     return "\n".join([*lines, *(f"  {key} = {json.dumps(value)}" for key, value in table.items())])
 
 
-def _parameter_lines(parameters: RoughnessParameters, metres: str) -> list[str]:
+def _parameter_lines(parameters: dict[str, float | None], metres: str) -> list[str]:
     """The parameters by their names in the standards, in two lines."""
     words = [
         f"{name} {'-' if value is None else f'{value:.5g}'}{metres if name in UNITS else ''}"
-        for name, value in parameters.named().items()
+        for name, value in parameters.items()
     ]
     return [f"  {', '.join(words[:5])}", f"  {', '.join(words[5:])}"]
 

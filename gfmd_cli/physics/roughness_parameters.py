@@ -5,7 +5,6 @@ triangles between neighbouring points: each square of four known points is divid
 diagonals, so that no direction is preferred.
 """
 
-from dataclasses import asdict, dataclass
 from itertools import product
 from math import inf
 from typing import Any
@@ -20,40 +19,20 @@ PROFILE_NAMES = ("Pq", "Pa", "Psk", "Pku", "Pt", "Pdq", "Pdr", "Pal")
 MIN_OVERLAP = 0.25  # of the map and its shifted copy; a choice: fewer points give no average
 
 
-@dataclass(frozen=True)
-class RoughnessParameters:
-    """Parameters of a map, S..., or of a profile, P....; all of the heights as they are given."""
-
-    dimension: int
-    """2 for a map, 1 for a profile."""
-    rms_height: float
-    """Sq, Pq: root-mean-square height [m]."""
-    mean_height: float
-    """Sa, Pa: mean absolute height [m]."""
-    skewness: float
-    """Ssk, Psk: third moment of the heights / rms_height^3."""
-    kurtosis: float
-    """Sku, Pku: fourth moment of the heights / rms_height^4; 3 for Gaussian heights."""
-    total_height: float
-    """Sz, Pt: distance of highest peak and deepest pit [m]."""
-    rms_slope: float
-    """Sdq, Pdq: root-mean-square gradient."""
-    developed_area: float
-    """Sdr: additional area of the surface / its projected area; of a profile, additional length."""
-    correlation_length: float | None
-    """Sal, Pal: shortest distance at which the autocorrelation decays to 0.2 [m]; None where it
-    does not."""
-
-    def named(self) -> dict[str, float | None]:
-        """The parameters by their names in the standards."""
-        names = MAP_NAMES if self.dimension == 2 else PROFILE_NAMES
-        return dict(zip(names, list(asdict(self).values())[1:], strict=True))
-
-
 def roughness_parameters(
     heights: "np.ma.MaskedArray[Any, Any]", spacing: tuple[float, ...]
-) -> RoughnessParameters:
-    """Parameters of a levelled map or profile.
+) -> dict[str, float | None]:
+    """Parameters of a levelled map, S..., or of a profile, P..., by their names in the standards.
+
+    Sq, Pq : root-mean-square height [m]
+    Sa, Pa : mean absolute height [m]
+    Ssk, Psk : third moment of the heights / Sq^3
+    Sku, Pku : fourth moment of the heights / Sq^4; 3 for Gaussian heights
+    Sz, Pt : distance of highest peak and deepest pit [m]
+    Sdq, Pdq : root-mean-square gradient
+    Sdr, Pdr : additional area of the surface / its projected area; of a profile, additional length
+    Sal, Pal : shortest distance at which the autocorrelation decays to 0.2 [m]; None where it does
+        not
 
     Parameters
     ----------
@@ -63,18 +42,16 @@ def roughness_parameters(
     known = heights.compressed()
     z = known - known.mean()
     rms = float(np.sqrt(np.mean(z**2)))
-    slope, area = _slopes(heights, spacing)
-    return RoughnessParameters(
-        dimension=heights.ndim,
-        rms_height=rms,
-        mean_height=float(np.mean(np.abs(z))),
-        skewness=float(np.mean((z / rms) ** 3)) if rms else np.nan,
-        kurtosis=float(np.mean((z / rms) ** 4)) if rms else np.nan,
-        total_height=float(np.ptp(z)),
-        rms_slope=slope,
-        developed_area=area,
-        correlation_length=_correlation_length(heights, spacing),
+    values = (
+        rms,
+        float(np.mean(np.abs(z))),
+        float(np.mean((z / rms) ** 3)) if rms else np.nan,
+        float(np.mean((z / rms) ** 4)) if rms else np.nan,
+        float(np.ptp(z)),
+        *_slopes(heights, spacing),
+        _correlation_length(heights, spacing),
     )
+    return dict(zip(MAP_NAMES if heights.ndim == 2 else PROFILE_NAMES, values, strict=True))
 
 
 def _slopes(
