@@ -8,16 +8,17 @@ A spec is the path of a TOML file, or its tables as a dictionary.
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
+from html import escape
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
+import tabulate
 
 from gfmd_cli.analysis.compare import Comparison
 from gfmd_cli.analysis.compare import compare as compare_study
 from gfmd_cli.analysis.export import as_dataset
-from gfmd_cli.analysis.summary import Summary, summary_html, summary_text
 from gfmd_cli.errors import InputError
 from gfmd_cli.grid.arrays import Field, Mask
 from gfmd_cli.physics.file_surface import FileSurface
@@ -30,6 +31,7 @@ from gfmd_cli.status import Status
 from gfmd_cli.study.context import SolveContext, Watcher, WorkerOptions
 from gfmd_cli.study.load_search import solve_at_load
 from gfmd_cli.study.measure import measured, planned
+from gfmd_cli.study.plausibility import warnings_of
 from gfmd_cli.study.progress import Report, ignore
 from gfmd_cli.study.reading import read_rows, solved_rows
 from gfmd_cli.study.resources import room
@@ -97,7 +99,7 @@ class Result:
         """Gap between indenter and elastomer; where the height is masked, to that filled in."""
         return self.displacement - self.height
 
-    def summary(self) -> Summary:
+    def summary(self) -> dict[str, str]:
         """The numbers, with symbol and unit."""
         mean_gap, deviation = self.u_g * self.h_std, self.sigma_p * self.delta_sigma
         numbers = {
@@ -114,13 +116,15 @@ class Result:
 
     def __str__(self) -> str:
         """The summary as a text table."""
-        return summary_text(self.summary())
+        return tabulate.tabulate(self.summary().items(), tablefmt="plain", disable_numparse=True)
 
     __repr__ = __str__
 
     def _repr_html_(self) -> str:
         """The summary as HTML, for notebooks."""
-        return summary_html(self.summary())
+        items = self.summary().items()
+        rows = (f"<tr><th>{escape(k)}</th><td>{escape(v)}</td></tr>" for k, v in items)
+        return f"<table>{''.join(rows)}</table>"
 
 
 def solve(spec: Path | str | Tables, *, heights: Any = None, threads: int = 1) -> Result:
@@ -189,7 +193,7 @@ def _solve(spec: Path | str | Tables, threads: int) -> Result:
         pressure=scene.in_pascals(contact_pressure(obstacle, solution.u, solution.sigma)),
         x=x * row["length"],
         nominal_pressure=row["pressure"],
-        warnings=tuple(solved.warnings(tasks[0])),
+        warnings=tuple(warnings_of(tasks[0], solved)),
         **{name: row[name] for name in NUMBERS},
     )
 

@@ -51,13 +51,8 @@ class Choice(BaseModel):
     @classmethod
     def unit_of(cls, key: str) -> str:
         """The unit that the docstring of a key gives, "" without one."""
-        return unit_in(cls.model_fields[key].description or "")
-
-
-def unit_in(description: str) -> str:
-    """The unit in the docstring of a key: the text in brackets."""
-    unit = UNIT.search(description)
-    return unit[1] if unit else ""
+        unit = UNIT.search(cls.model_fields[key].description or "")
+        return unit[1] if unit else ""
 
 
 def as_text(value: object, unit: str = "") -> str:

@@ -16,7 +16,7 @@ from gfmd_cli.analysis.compare import Curve, compare
 from gfmd_cli.analysis.curve_styles import MARKERS, CurveStyle, colours
 from gfmd_cli.analysis.figures import P_STAR
 from gfmd_cli.analysis.plotting import ColumnFigure, styled
-from gfmd_cli.analysis.true_contact import VARIANTS
+from gfmd_cli.analysis.records import VARIANTS
 from gfmd_cli.physics.true_contact import contact_area
 
 PERSSON = "whole"

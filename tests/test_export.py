@@ -12,7 +12,7 @@ import xarray
 
 from gfmd_cli.analysis.export import _cell, as_dataset
 from gfmd_cli.study.columns import COLUMNS, CONTRACT, DETAILS
-from gfmd_cli.study.reading import read_rows, read_shells
+from gfmd_cli.study.reading import open_study, read_rows
 
 SPEC = """
 [surface]
@@ -84,8 +84,10 @@ def test_a_dataset_has_columns_distributions_scenes_and_curves(study):
     total = found.pr_gap_zero + found.pr_gap_beyond + found.pr_gap.sum("gap") * 0.05
     np.testing.assert_allclose(total, 1, rtol=1e-12)
     assert set(found.scene.values) == {0, 1}
+    with open_study(study) as file:
+        shells = [file.shells(scene) for scene in range(2)]
     for scene in range(2):
-        expected = read_shells(study, scene).q
+        expected = shells[scene].q
         q = found.scenes_q[scene].values
         np.testing.assert_array_equal(q[: expected.size], expected)
         assert np.all(np.isnan(q[expected.size :]))

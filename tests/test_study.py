@@ -24,7 +24,7 @@ from gfmd_cli.study.checkpoint import Checkpoint
 from gfmd_cli.study.columns import COLUMNS, LAYOUT
 from gfmd_cli.study.notes import Notes, Trial
 from gfmd_cli.study.parts import read_record
-from gfmd_cli.study.reading import read_rows, read_shells
+from gfmd_cli.study.reading import open_study, read_rows
 from gfmd_cli.study.run import run_study
 
 SMALL = power_spec(
@@ -173,7 +173,8 @@ def test_the_stress_distribution_is_normalised_and_has_its_first_moment(run):
 def test_the_stored_spectrum_has_the_variances_of_the_scene(run):
     path, _, _ = run()
     row = read_rows(path)[2]
-    shells = read_shells(path, row["scene"])
+    with open_study(path) as study:
+        shells = study.shells(row["scene"])
     assert np.sqrt(shells.height.sum()) == pytest.approx(row["h_std"], rel=1e-12)
     assert np.sqrt(shells.variance.sum()) == pytest.approx(row["delta_sigma"], rel=1e-12)
 

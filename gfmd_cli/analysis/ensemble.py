@@ -87,10 +87,6 @@ def ensembles(comparison: Comparison) -> list[Ensemble]:
     return [
         Ensemble(rows, study)
         for (study, _), group in groups.items()
-        for rows in _rising(group)
+        for rows in sorted(by_load(group), key=lambda seeds: float(seeds[0]["p_star"]))
         if len(rows) > 1
     ]
-
-
-def _rising(rows: list[Row]) -> list[list[Row]]:
-    return sorted(by_load(rows), key=lambda seeds: float(seeds[0]["p_star"]))

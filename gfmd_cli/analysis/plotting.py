@@ -115,10 +115,8 @@ class LegendFigure:
         """Write a PDF and a PNG, each whole or not at all. Raises SpaceError."""
         self._lay_out()
         files = [path.with_name(f"{path.name}.{kind}") for kind in ("pdf", "png")]
-        for file, metadata in zip(files, ({"CreationDate": None}, {}), strict=True):
-            image = BytesIO()
-            self.figure.savefig(image, format=file.suffix[1:], dpi=300, metadata=metadata)
-            write_whole(file, image.getvalue())
+        for file in files:
+            self._save(file, dpi=300)
         return files
 
     def write_file(self, path: Path) -> None:
@@ -127,9 +125,11 @@ class LegendFigure:
             known = ", ".join(METADATA)
             raise InputError(f"{path}: unknown suffix {path.suffix!r}; allowed: {known}")
         self._lay_out()
-        image = BytesIO()
-        kind, metadata = path.suffix[1:], METADATA[path.suffix]
-        self.figure.savefig(image, format=kind, dpi=200, metadata=metadata)
+        self._save(path, dpi=200)
+
+    def _save(self, path: Path, dpi: int) -> None:
+        image, metadata = BytesIO(), METADATA[path.suffix]
+        self.figure.savefig(image, format=path.suffix[1:], dpi=dpi, metadata=metadata)
         write_whole(path, image.getvalue())
 
 

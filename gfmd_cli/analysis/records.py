@@ -2,12 +2,15 @@
 
 from typing import Any
 
+import numpy as np
+
 from gfmd_cli.analysis.compare import Comparison, Curve, best, einstein_prediction
 from gfmd_cli.analysis.ensemble import Ensemble, ensembles
 from gfmd_cli.analysis.export import parameter_names
 from gfmd_cli.analysis.table import known, plain
-from gfmd_cli.analysis.true_contact import VARIANTS, true_contact_areas
+from gfmd_cli.grid.arrays import Field
 from gfmd_cli.physics.observables import QUANTITIES
+from gfmd_cli.physics.true_contact import contact_area
 from gfmd_cli.study.observables import OBSERVABLES
 
 KEYS = (
@@ -24,6 +27,10 @@ ERRORS = [
 """Keys of records where an accuracy was requested."""
 OPTIONAL = tuple(observable.column.name for observable in OBSERVABLES if observable.heading)
 """Keys of the observables that [output] turns on."""
+VARIANTS = {
+    name: f"a_r_persson_{name}" for name in ("deviation_bearing", "deviation_c", "quadrature_c")
+}
+"""Columns with Delta_sigma over the contact, and the keys of Persson's contact areas with it."""
 
 
 def records_of(curve: Curve) -> list[dict[str, Any]]:
@@ -42,6 +49,15 @@ def records_of(curve: Curve) -> list[dict[str, Any]]:
         row | with_best(row) | {name: float(values[i]) for name, values in columns.items()}
         for i, row in enumerate(curve.rows)
     ]
+
+
+def true_contact_areas(curve: Curve) -> dict[str, Field]:
+    """Contact areas over the pressures by the keys of `VARIANTS`; empty where nothing is known."""
+    values = {name: curve.column(name) for name in VARIANTS if name in curve.rows[0]}
+    if not any(np.any(np.isfinite(value)) for value in values.values()):
+        return {}
+    p_star = curve.column("p_star")
+    return {VARIANTS[name]: contact_area(value, p_star) for name, value in values.items()}
 
 
 def with_best(row: dict[str, Any]) -> dict[str, Any]:

@@ -7,9 +7,8 @@ from gfmd_cli.analysis.compare import Comparison, Curve, in_continuum, of_study
 from gfmd_cli.analysis.distribution_tables import power_laws
 from gfmd_cli.analysis.ensemble import ensembles
 from gfmd_cli.analysis.grid_size import grid_size
-from gfmd_cli.analysis.records import means_of, records_of
+from gfmd_cli.analysis.records import VARIANTS, means_of, records_of, true_contact_areas
 from gfmd_cli.analysis.table import Column, Group, Record, Table, groups_of, known, product, ratio
-from gfmd_cli.analysis.true_contact import VARIANTS, true_contact_areas
 from gfmd_cli.analysis.units import in_si, shown
 from gfmd_cli.physics.observables import QUANTITIES
 from gfmd_cli.study.observables import OBSERVABLES, Observable

@@ -9,9 +9,9 @@ import numpy as np
 
 from gfmd_cli.errors import InputError, StudyError
 from gfmd_cli.files.atomic import check_place, new_file
-from gfmd_cli.files.hdf5 import find, new_hdf5, open_hdf5, plain, read_dataset
+from gfmd_cli.files.hdf5 import find, new_hdf5, open_hdf5, read_dataset
 from gfmd_cli.grid.arrays import Field
-from gfmd_cli.spec.models import Spec, refuse_other
+from gfmd_cli.spec.models import Spec, differences
 from gfmd_cli.status import Status
 from gfmd_cli.study.column import Column
 from gfmd_cli.study.columns import BENCH
@@ -87,7 +87,12 @@ def check_target(path: Path, spec: Spec) -> None:
         stored = None
     if stored is None:
         raise InputError(f"{path}: exists and is no bench; take another name (-o)")
-    refuse_other(stored, spec, f"{path}: a bench of another spec; take another name (-o).")
+    if changed := differences(stored, spec.resolved()):
+        shown = "\n".join(f"  {line}" for line in changed[:20])
+        raise InputError(
+            f"{path}: a bench of another spec; take another name (-o).\n"
+            f"Stored -> requested:\n{shown}"
+        )
 
 
 def write_bench(path: Path, spec: Spec, text: str, traces: list[Trace]) -> None:
@@ -122,7 +127,10 @@ def read_bench(path: Path) -> list[Trace]:
 
 def _read_trace(group: Any) -> Trace:
     """One trace. Raises one of `DAMAGE` where it is not what it should be."""
-    row = {name: plain(value) for name, value in group.attrs.items()}
+    row = {
+        name: value.item() if isinstance(value, np.generic) else value
+        for name, value in group.attrs.items()
+    }
     for name, kind in ROW.items():
         if type(row[name]) is not kind:
             raise ValueError(f"{name} is {row[name]!r}, not of type {kind.__name__}")

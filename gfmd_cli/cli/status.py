@@ -80,7 +80,7 @@ def collect(spec: Path, output: Path | None, overrides: tuple[str, ...]) -> None
 
     resolved, text = read_spec(spec, overrides)
     study = Study(study_path(resolved, output))
-    if study.uncollected() or study.set_aside():
+    if study.record_paths() or study.set_aside():
         tasks = plan(resolved)
         with study.work(tasks) as damaged:
             damaged += study.collect(resolved, tasks, text)
@@ -98,9 +98,10 @@ def _lines(state: Any, shards: int | None) -> list[str]:
     for task in state.tasks:
         if task.saved is not None:
             name = f"task {task.task} {task.label}".rstrip()
+            age = max(0.0, time.time() - task.saved.time)
             lines.append(
                 f"  {name}: state of step {task.saved.step} ({task.saved.points} points), residual "
-                f"{task.saved.residual:.1e}, saved {_ago(task.saved.time)}"
+                f"{task.saved.residual:.1e}, saved {duration(age)} ago"
             )
     if state.records:
         lines.append(f"  {state.records} records are not collected yet")
@@ -110,10 +111,6 @@ def _lines(state: Any, shards: int | None) -> list[str]:
     for index in range(shards or 0):
         lines.append(f"  shard {index}/{shards}: {counted(state.shard(index, shards or 1))}")
     return lines
-
-
-def _ago(when: float) -> str:
-    return f"{duration(max(0.0, time.time() - when))} ago"
 
 
 def _next(state: Any, spec: str, output: Path | None, overrides: tuple[str, ...]) -> str:

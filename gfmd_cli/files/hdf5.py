@@ -150,8 +150,3 @@ def _checked(group: Any, path: str, compression: float) -> Any:
             f"dataset {path!r} claims {claimed} bytes, but hardly any are stored ({stored})"
         )
     return dataset
-
-
-def plain(value: Any) -> Any:
-    """A scalar of NumPy as one of Python; other values as they are."""
-    return value.item() if isinstance(value, np.generic) else value

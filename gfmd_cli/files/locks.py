@@ -123,13 +123,9 @@ def _claim(path: Path) -> bool:
     except OSError as error:
         raise SpaceError(f"{path}: cannot be written: {error.strerror}") from error
     with os.fdopen(descriptor, "w") as file:
-        json.dump(_this_process(), file)
+        pid = os.getpid()
+        json.dump({"host": socket.gethostname(), "pid": pid, "started": _start_time(pid)}, file)
     return True
-
-
-def _this_process() -> dict[str, str | int]:
-    pid = os.getpid()
-    return {"host": socket.gethostname(), "pid": pid, "started": _start_time(pid)}
 
 
 def _start_time(pid: int) -> str:

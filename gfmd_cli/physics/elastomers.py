@@ -9,7 +9,7 @@ surfaces across the spatial dimensions".
 import warnings
 from collections.abc import Callable
 from functools import lru_cache
-from typing import Annotated, Literal, Self
+from typing import Annotated, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import Field as Key
@@ -34,6 +34,8 @@ class LinearElastomer(Choice):
     thickness of a slab.
     """
 
+    exponent: ClassVar[float | None] = None
+    """Exponent n where the stiffness is a power law k = k_n q^n, else None."""
     kind: str
 
     def stiffness(self, q: Field, length: float = 1.0) -> Field:
@@ -105,11 +107,6 @@ class LinearElastomer(Choice):
         """Elastic modulus [Pa], 0 where the elastomer has none."""
         return float(dict(self).get("E_star", 0.0))
 
-    @property
-    def exponent(self) -> float | None:
-        """Exponent n where the stiffness is a power law k = k_n q^n, else None."""
-        return None
-
     def local_exponent(self, q: Field, length: float = 1.0, step: float = STEP) -> Field:
         """n(q) = d ln k / d ln q, by central differences over +-step; zero where k is zero."""
         above, below = (self.stiffness(q * np.exp(shift), length) for shift in (step, -step))
@@ -134,7 +131,7 @@ class Power(LinearElastomer):
     """Prefactor of the stiffness [Pa m^(n-1)]."""
 
     @property
-    def exponent(self) -> float:
+    def exponent(self) -> float:  # type: ignore[override]
         """Exponent n of the stiffness."""
         return self.n
 
@@ -159,14 +156,10 @@ class Power(LinearElastomer):
 class HalfSpace(LinearElastomer):
     """Semi-infinite solid, k = E* q / 2. Paper Eq. (2), n = 1."""
 
+    exponent: ClassVar[float | None] = 1.0
     kind: Literal["half-space"] = "half-space"
     E_star: Positive = 1.0
     """Contact modulus E / (1 - nu^2) [Pa]."""
-
-    @property
-    def exponent(self) -> float:
-        """Exponent n = 1 of the stiffness."""
-        return 1.0
 
     def stiffness(self, q: Field, length: float = 1.0) -> Field:
         """k(q) [Pa/m]."""
@@ -184,14 +177,10 @@ class HalfSpace(LinearElastomer):
 class Membrane(LinearElastomer):
     """Membrane under equibiaxial tension, k = tension q^2. Paper Eq. (2), n = 2."""
 
+    exponent: ClassVar[float | None] = 2.0
     kind: Literal["membrane"] = "membrane"
     tension: Positive = 1.0
     """Tension [N/m]."""
-
-    @property
-    def exponent(self) -> float:
-        """Exponent n = 2 of the stiffness."""
-        return 2.0
 
     def stiffness(self, q: Field, length: float = 1.0) -> Field:
         """k(q) [Pa/m]."""
@@ -201,16 +190,12 @@ class Membrane(LinearElastomer):
 class Plate(LinearElastomer):
     """Thin plate, free to bend, k = E* t^3 q^4 / 12. Paper Eq. (2), n = 4."""
 
+    exponent: ClassVar[float | None] = 4.0
     kind: Literal["plate"] = "plate"
     E_star: Positive = 1.0
     """Contact modulus E / (1 - nu^2) [Pa]."""
     thickness: Positive
     """Thickness [m]."""
-
-    @property
-    def exponent(self) -> float:
-        """n = 4."""
-        return 4.0
 
     def stiffness(self, q: Field, length: float = 1.0) -> Field:
         """k(q) [Pa/m]."""

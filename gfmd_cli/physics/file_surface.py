@@ -117,14 +117,15 @@ class FileSurface(RigidSurface):
             return heights.copy() if grid.whole else heights[grid.own].copy()
         if self.applied_interpolation() == "monotone":
             return monotone(heights, grid.whole_shape, grid.own)
-        return grid_of_map(heights).resample(heights, grid)
+        own_grid = Grid(heights.shape[-1], heights.ndim, points_y=heights.shape[0])
+        return own_grid.resample(heights, grid)
 
     def _is_reflected(self) -> bool:
         """Whether the map has borders, beyond which it is reflected for the interpolation only."""
         return self.treatment()[1] == "none" and not self._is_periodic()
 
     @property
-    def band_limited(self) -> bool:
+    def band_limited(self) -> bool:  # type: ignore[override]
         """Whether the map is interpolated by a Fourier series."""
         return self.applied_interpolation() == "fourier"
 
@@ -154,12 +155,8 @@ class FileSurface(RigidSurface):
         ratio = shape[0] * spacing[0] / (shape[1] * spacing[1])
         return self.copies * (self.length_y or length * ratio), self.copies * length
 
-    def has_no_length(self) -> bool:
-        """Whether neither the spec nor the file gives the side, which is then 1 m."""
-        return self._known_length() is None
-
     def _known_length(self) -> float | None:
-        """Side of the map [m]; a side without a unit is scaled as the heights are."""
+        """Side of the map [m], a side without a unit scaled as the heights; None if unknown."""
         topography = self._topography()
         if self.length is not None or topography.spacing is None:
             return self.length
@@ -175,7 +172,7 @@ class FileSurface(RigidSurface):
         )
 
     @property
-    def has_borders(self) -> bool:
+    def has_borders(self) -> bool:  # type: ignore[override]
         """Whether the map is not periodic, and the spec does not say how to make it periodic."""
         return self.edges is None and not self._is_periodic()
 
@@ -186,7 +183,7 @@ class FileSurface(RigidSurface):
         return self.model_copy(update={"edges": "none" if boundary == "free" else "mirror"})
 
     @property
-    def copies(self) -> int:
+    def copies(self) -> int:  # type: ignore[override]
         """Copies of the map along each side of its cell: two where it is mirrored."""
         return 2 if self.treatment()[1] == "mirror" else 1
 
@@ -257,7 +254,7 @@ class FileSurface(RigidSurface):
         return map_remarks(
             _prepared(self),
             self.sides,
-            unsized=self.has_no_length(),
+            unsized=self._known_length() is None,
             repeated=boundary == "periodic" and not self.has_borders,
             filled=topography.holes / topography.heights.size if self.missing == "fill" else 0.0,
         )
@@ -290,11 +287,6 @@ class FileSurface(RigidSurface):
             steps.append("periodic")
         steps.append(f"interpolation on finer grids: {self.applied_interpolation()}")
         return ", ".join(steps)
-
-
-def grid_of_map(heights: Field) -> Grid:
-    """The grid whose points are those of a map."""
-    return Grid(heights.shape[-1], heights.ndim, points_y=heights.shape[0])
 
 
 @lru_cache(maxsize=16)

@@ -26,8 +26,6 @@ class HeightMap(NamedTuple):
     """Whether the map is periodic, None where the file does not state it."""
     source: str
     """Format, and dataset or channel."""
-    others: tuple[str, ...] = ()
-    """Further height channels of the file."""
 
 
 def check_layout(path: Path, shape: tuple[int, ...], dtype: np.dtype[Any], max_bytes: int) -> None:

@@ -36,6 +36,12 @@ class RigidSurface(Choice):
     """Position of the first grid point along each axis / L."""
     is_map: ClassVar[bool] = False
     """Whether the surface is a map, whose points are those of the smallest grid."""
+    band_limited: ClassVar[bool] = False
+    """Whether the smallest grid resolves all waves, so that all grids have one Delta_sigma."""
+    has_borders: ClassVar[bool] = False
+    """Whether the surface ends at its borders, and the spec does not make it periodic."""
+    copies: ClassVar[int] = 1
+    """Copies of the surface along each side of its cell."""
     kind: str
 
     def smallest_grid(self) -> int:
@@ -87,24 +93,9 @@ class RigidSurface(Choice):
         length = float(given["length"])
         return (length,) if self.dimension == 1 else (given.get("length_y") or length, length)
 
-    @property
-    def band_limited(self) -> bool:
-        """Whether the smallest grid resolves all waves, so that all grids have one Delta_sigma."""
-        return False
-
-    @property
-    def has_borders(self) -> bool:
-        """Whether the surface ends at its borders, and the spec does not make it periodic."""
-        return False
-
     def within(self, boundary: str) -> Self:
         """The surface with the treatment of its edges that goes with a boundary by default."""
         return self
-
-    @property
-    def copies(self) -> int:
-        """Copies of the surface along each side of its cell."""
-        return 1
 
     def resolution(self) -> str:
         """Reason for the smallest grid, as text for messages."""
@@ -278,6 +269,7 @@ class Wave(LineIndenter):
     x = 0 at the crest, in the middle of the cell.
     """
 
+    band_limited: ClassVar[bool] = True
     kind: Literal["wave"] = "wave"
     amplitude: Positive = 1.0
     """Amplitude [m]."""
@@ -286,8 +278,3 @@ class Wave(LineIndenter):
         """Heights [m] at the points of a grid that this process holds."""
         phase: Field = 2 * np.pi * self._x(grid) / self.length
         return self.amplitude * np.cos(phase)
-
-    @property
-    def band_limited(self) -> bool:
-        """True: a single wave."""
-        return True

@@ -74,7 +74,7 @@ def _read_channel(path: Path, reader: Any, dataset: str | None, max_bytes: int) 
         raise InputError(f"{path}: no known topography format")
     if reader.format() == "npz":
         raise InputError(f"{path}: an archive of NumPy arrays; save the map as a .npy file")
-    channel, others = _height_channel(path, reader, dataset)
+    channel = _height_channel(path, reader, dataset)
     shape = (channel.nb_grid_pts or ())[::-1]
     check_layout(path, shape, np.dtype(float), max_bytes)
     unsized = channel.physical_sizes is None
@@ -93,7 +93,6 @@ def _read_channel(path: Path, reader: Any, dataset: str | None, max_bytes: int) 
         metres=scan.unit is not None,
         periodic=bool(scan.is_periodic),
         source=source,
-        others=others,
     )
 
 
@@ -104,8 +103,8 @@ def _at_equal_distances(x: Any, heights: Any) -> tuple[Any, tuple[float]]:
     return np.interp(x[0] + spacing * np.arange(points), x, heights), (points * spacing,)
 
 
-def _height_channel(path: Path, reader: Any, name: str | None) -> tuple[Any, tuple[str, ...]]:
-    """The named height channel of an open file, or its default one, and the names of the others.
+def _height_channel(path: Path, reader: Any, name: str | None) -> Any:
+    """The named height channel of an open file, or its default one.
 
     Where the default channel holds no heights, the first one that does. Raises InputError.
     """
@@ -121,4 +120,4 @@ def _height_channel(path: Path, reader: Any, name: str | None) -> tuple[Any, tup
         known = ", ".join(channels) or "none"
         problem = "no height channel" if name is None else f"no height channel {name!r}"
         raise InputError(f"{path}: {problem}; its height channels: {known}")
-    return channels[name], tuple(key for key in channels if key != name)
+    return channels[name]

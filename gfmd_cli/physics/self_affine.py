@@ -24,6 +24,7 @@ class SelfAffine(RigidSurface):
     """
 
     rough: ClassVar[bool] = True
+    band_limited: ClassVar[bool] = True
     kind: Literal["self-affine"] = "self-affine"
     hurst: Annotated[float, Key(gt=0, le=1)] = 0.8
     """Hurst exponent H, 0 < H <= 1."""
@@ -50,11 +51,6 @@ class SelfAffine(RigidSurface):
                 f"cutoff = {self.cutoff:g} is above rolloff = {self.rolloff:g}: no mode is left"
             )
         return self
-
-    @property
-    def band_limited(self) -> bool:
-        """True: no wave is shorter than the cut-off."""
-        return True
 
     @property
     def highest_modes(self) -> tuple[int, int]:

@@ -92,8 +92,6 @@ class Topography:
     """Format, and dataset or channel."""
     shape: tuple[int, ...]
     """Shape of the map in the file."""
-    others: tuple[str, ...] = ()
-    """Further height channels of the file."""
 
     @property
     def holes(self) -> int:
@@ -153,7 +151,6 @@ def _checked(path: Path, data: HeightMap, region: Region | None, flip: bool) -> 
         data.periodic,
         data.source,
         shape,
-        data.others,
     )
 
 

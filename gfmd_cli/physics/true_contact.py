@@ -90,10 +90,6 @@ class Bearing:
         rises = p > np.maximum.accumulate(np.append(0.0, p))[:-1]
         return np.asarray(np.interp(np.log(p_star), np.log(p[rises]), self.deviation[rises]))
 
-    def contact_area(self, p_star: Field | float) -> Field:
-        """Relative contact area for the consistent Delta_sigma_c. Paper Sect. 7."""
-        return contact_area(self.delta_sigma_c(p_star), p_star)
-
 
 def contact_area(delta_sigma_c: Field | float, p_star: Field | float) -> Field:
     """Relative contact area erf(p / sqrt(2) Delta_sigma_c).

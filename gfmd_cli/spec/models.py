@@ -391,14 +391,6 @@ def _swept(tables: list[dict[str, Any]]) -> dict[str, Any]:
     return {key: vs[0] if len(vs) == 1 else vs for key, vs in distinct.items()}
 
 
-def refuse_other(stored: Any, spec: "Spec", message: str) -> None:
-    """Raise InputError, with the difference, where a file was made from another spec."""
-    changed = differences(stored, spec.resolved())
-    if changed:
-        shown = "\n".join(f"  {line}" for line in changed[:20])
-        raise InputError(f"{message}\nStored -> requested:\n{shown}")
-
-
 def _short(value: Any) -> str:
     text = json.dumps(value)
     return text if len(text) <= 80 else text[:77] + "..."

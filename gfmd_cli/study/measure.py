@@ -19,9 +19,9 @@ from gfmd_cli.physics.power_spectra import autocorrelations, spectra
 from gfmd_cli.spec.models import SWEPT, OutputTable
 from gfmd_cli.study.columns import PARAMETERS, PR_LINEAR, PR_LOGARITHMIC, empty_row
 from gfmd_cli.study.observables import OBSERVABLES, SolvedContact
-from gfmd_cli.study.plausibility import SEPARATOR
+from gfmd_cli.study.plausibility import SEPARATOR, warnings_of
 from gfmd_cli.study.refinement import Solved
-from gfmd_cli.study.result import TaskResult
+from gfmd_cli.study.result import Entry, TaskResult
 from gfmd_cli.study.tasks import Task
 
 Row = dict[str, Any]
@@ -101,7 +101,7 @@ def result(task: Task, solved: Solved, seconds: float) -> TaskResult:
         empty_row()
         | planned(task)
         | measured(task, solved)
-        | {"seconds": seconds, "warnings": SEPARATOR.join(solved.warnings(task))}
+        | {"seconds": seconds, "warnings": SEPARATOR.join(warnings_of(task, solved))}
         | edge_shares(task.surface, scene.grid, contact.obstacle, u, sigma)
         | on_request(output, SolvedContact(contact, u, sigma))
     )
@@ -121,15 +121,8 @@ def result(task: Task, solved: Solved, seconds: float) -> TaskResult:
         arrays["cross_sections"] = {
             name: scene.grid.diagonal(field()) for name, field in physical.items()
         }
-    return TaskResult(
-        task.id,
-        task.scene_id,
-        output.names(),
-        row,
-        scene.shells,
-        arrays,
-        task.surface.pictures(),
-    )
+    entry = Entry(task.id, task.scene_id, output.names(), row)
+    return TaskResult(entry, scene.shells, arrays, task.surface.pictures())
 
 
 def on_request(output: OutputTable, solved: SolvedContact) -> Row:

@@ -9,7 +9,6 @@ import re
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import NamedTuple
 
 from gfmd_cli.errors import InputError, SpaceError, StudyError
 from gfmd_cli.files.atomic import new_file
@@ -17,10 +16,9 @@ from gfmd_cli.files.checksums import check_seal, seal
 from gfmd_cli.files.hdf5 import new_hdf5
 from gfmd_cli.files.regular import open_regular
 from gfmd_cli.spec.models import digest
-from gfmd_cli.status import Status
 from gfmd_cli.study.reading import StudyFile, open_study
-from gfmd_cli.study.result import TaskResult
-from gfmd_cli.study.writing import Entry, write_study
+from gfmd_cli.study.result import Entry, TaskResult
+from gfmd_cli.study.writing import write_study
 
 SUFFIX = ".record"
 OWN_FILES = re.compile(r"(in-use|collecting|planning)(\..*)?|wisdom-.*\.json|.*\.(record|bad)|\..*")
@@ -66,14 +64,6 @@ def _delete(own: re.Pattern[str], folder: Path) -> None:
         folder.rmdir()
 
 
-class Held(NamedTuple):
-    """What a study or a record holds of a task."""
-
-    status: Status
-    stored: frozenset[str]
-    """What [output] stored of it."""
-
-
 def record_path(parts: Path, task_id: str, stored: Iterable[str]) -> Path:
     """Path of the record of a task; its name tells apart what [output] stores of it."""
     return parts / f"{task_id}-{digest(sorted(stored))[:8]}{SUFFIX}"
@@ -89,17 +79,12 @@ def checkpoint_folders(parts: Path) -> list[Path]:
     return [path for path in parts.glob("*") if OWN_FOLDERS.fullmatch(path.name) and path.is_dir()]
 
 
-def record_paths(parts: Path) -> list[Path]:
-    """The records in the folder."""
-    return sorted(parts.glob(f"*{SUFFIX}"))
-
-
 def write_record(parts: Path, result: TaskResult) -> Path:
     """Write the record of a task, whole or not at all. Raises SpaceError."""
-    path = record_path(parts, result.task_id, result.stored)
+    path = record_path(parts, result.entry.task_id, result.entry.stored)
     with new_file(path) as fresh:
         with new_hdf5(fresh) as file:
-            write_study(file, {}, [Entry.of(result)], lambda _: result, labelled=False)
+            write_study(file, {}, [result.entry], lambda _: result, labelled=False)
         seal(fresh)
     return path
 
@@ -121,30 +106,17 @@ def open_record(path: Path) -> Iterator[StudyFile]:
 def read_record_entry(path: Path) -> Entry:
     """All of a record but its arrays, which are checked. Raises StudyError."""
     with open_record(path) as record:
-        (row,) = record.rows
-        if not record.statuses[0].is_solved:
-            raise ValueError(f"status {row['status']}")
+        status = record.statuses[0]
+        if not status.is_solved:
+            raise ValueError(f"status {status}")
         record.check(0)
-        return Entry(record.task_ids[0], record.scene_ids[0], record.stored[0], row)
+        return record.entry(0)
 
 
 def read_record(path: Path) -> TaskResult:
     """The whole content of a record. Raises StudyError."""
     with open_record(path) as record:
         return record.result(0)
-
-
-def held_by(entry: Entry) -> Held:
-    """Status and output of the task of a record."""
-    return Held(Status(entry.row["status"]), entry.stored)
-
-
-def read_held(path: Path) -> Held:
-    """Status and output of the task that a record is of, checked as it is when it is collected.
-
-    Raises StudyError.
-    """
-    return held_by(read_record_entry(path))
 
 
 def version_of(path: Path) -> tuple[int, ...]:

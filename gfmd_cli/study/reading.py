@@ -31,10 +31,9 @@ from gfmd_cli.study.columns import (
     TASK,
     TASK_GROUPS,
     TASK_ID,
-    TaskGroup,
     empty_row,
 )
-from gfmd_cli.study.result import TaskResult
+from gfmd_cli.study.result import Entry, TaskResult
 
 ATTRIBUTES_SUM = "attributes_sha256"
 KINDS = {str: "S", int: "i", float: "f"}
@@ -170,63 +169,48 @@ class StudyFile:
 
     def arrays(self, group: str, task: int) -> dict[str, Field]:
         """The arrays of a task by name, none where it has no such group."""
-        return {name: data[()] for name, data in self._arrays(group, task).items()}
-
-    def shapes(self, group: str, task: int) -> dict[str, tuple[int, ...]]:
-        """The shapes of the arrays of a task, without reading them."""
-        return {name: data.shape for name, data in self._arrays(group, task).items()}
+        return {name: data[()] for name, data in self.datasets(group, task).items()}
 
     def blocks(
         self, group: str, task: int, rows: int, names: Iterable[str]
     ) -> Iterator[dict[str, Field]]:
         """The named arrays of a task that are stored, at most `rows` of their rows at a time."""
-        stored = self._arrays(group, task)
+        stored = self.datasets(group, task)
         datasets = {name: stored[name] for name in names if name in stored}
         size = min((data.shape[0] for data in datasets.values()), default=0)
         for start in range(0, size, rows):
             yield {name: data[start : start + rows] for name, data in datasets.items()}
-
-    def row(self, group: str, task: int, place: int) -> dict[str, Field]:
-        """One row of each array of a task."""
-        return {name: data[place] for name, data in self._arrays(group, task).items()}
 
     def tasks_with(self, group: str) -> list[int]:
         """The indices of the tasks that have arrays in a group, rising."""
         found = find(self._file, group)
         return [] if found is None else sorted(map(int, found))
 
+    def entry(self, task: int) -> Entry:
+        """All that is stored of one task but its arrays."""
+        return Entry(self.task_ids[task], self.scene_ids[task], self.stored[task], self.rows[task])
+
     def result(self, task: int) -> TaskResult:
         """All that is stored of one task."""
-        row = self.rows[task]
-        return TaskResult(
-            self.task_ids[task],
-            self.scene_ids[task],
-            self.stored[task],
-            row,
-            self.shells(row["scene"]),
-            {group.name: self.arrays(group.name, task) for group in TASK_GROUPS},
-            self.pictures(row["scene"]),
-        )
+        scene = self.rows[task]["scene"]
+        arrays = {group.name: self.arrays(group.name, task) for group in TASK_GROUPS}
+        return TaskResult(self.entry(task), self.shells(scene), arrays, self.pictures(scene))
 
     def check(self, task: int) -> None:
         """Raise where `result` would, for all but the values of the arrays."""
         self.shells(self.rows[task]["scene"])
         self.pictures(self.rows[task]["scene"])
         for group in TASK_GROUPS:
-            self._arrays(group.name, task)
+            self.datasets(group.name, task)
 
-    def _arrays(self, group: str, task: int) -> dict[str, Any]:
-        declared = _group(group)
-        dimensions = 1 if declared.axis else MAX_DIMENSIONS
-        return self._datasets(f"{group}/{task}", declared.columns, dimensions)
-
-    def _datasets(self, place: str, columns: tuple[Column, ...], dimensions: int) -> dict[str, Any]:
-        """The datasets of a group that are stored: numbers, all of the same shape."""
-        group = find(self._file, place)
-        if group is None:
+    def datasets(self, group: str, task: int) -> dict[str, Any]:
+        """The arrays of a task in the file, by name: numbers, all of the same shape."""
+        place, (declared,) = f"{group}/{task}", (g for g in TASK_GROUPS if g.name == group)
+        stored = find(self._file, place)
+        if stored is None:
             return {}
-        datasets = {c.name: take(group, c.name) for c in columns if has(group, c.name)}
-        _check_alike(place, datasets, dimensions)
+        datasets = {c.name: take(stored, c.name) for c in declared.columns if has(stored, c.name)}
+        _check_alike(place, datasets, 1 if declared.axis else MAX_DIMENSIONS)
         return datasets
 
 
@@ -238,10 +222,6 @@ def _check_alike(place: str, datasets: Mapping[str, Any], dimensions: int) -> No
     for name, data in datasets.items():
         if data.dtype.kind not in "if":
             raise ValueError(f"{place}/{name} has type {data.dtype}")
-
-
-def _group(name: str) -> TaskGroup:
-    return next(group for group in TASK_GROUPS if group.name == name)
 
 
 @contextmanager
@@ -307,9 +287,3 @@ def stored_spec(path: Path) -> Any:
     """The resolved spec of a study, as plain data. Raises InputError, StudyError."""
     with open_study(path) as study:
         return study.spec
-
-
-def read_shells(path: Path, scene: int) -> Shells:
-    """The binned spectrum of one scene. Raises InputError, StudyError."""
-    with open_study(path) as study:
-        return study.shells(scene)

@@ -26,7 +26,6 @@ from gfmd_cli.solvers.nested_grids import Resume, Solution, solve_contact
 from gfmd_cli.status import Status
 from gfmd_cli.study.context import SolveContext, Watcher, WorkerOptions
 from gfmd_cli.study.notes import GridResult
-from gfmd_cli.study.plausibility import warnings_of
 from gfmd_cli.study.tasks import FIRST, Task
 
 FINAL = ("bound", "slow", "diverges")  # verdicts that no finer grid changes
@@ -56,20 +55,6 @@ class Solved:
             return self.certificate.a_r
         value = float(getattr(self.observables, name))
         return ALGEBRAIC * self.solution.residual * max(value, sqrt(value))
-
-    def warnings(self, task: Task) -> list[str]:
-        """What makes the results doubtful."""
-        surface, boundary = task.surface, task.boundary
-        return warnings_of(surface, task.elastomer, boundary, self.scene, self.observables)
-
-    def less_accurate_than(self, errors: dict[str, float]) -> list[str]:
-        """The columns whose continuum values have larger relative errors than these."""
-        return [
-            name
-            for name, share in errors.items()
-            if not self.estimates[name].continuum_error + self.algebraic(name)
-            <= share * abs(self.estimates[name].continuum)
-        ]
 
 
 @lru_cache(maxsize=1)
@@ -119,7 +104,9 @@ def solve_on_grids(task: Task, context: SolveContext, watcher: Watcher) -> Solve
         start = None
         grids.append(_grid_result(solved))
         if task.accuracy is not None:
-            _estimate_errors(task, solved, grids)
+            certify, solution = CERTIFY[task.boundary], solved.solution
+            solved.certificate = certify(contact, solution.u, solution.sigma)
+            solved.estimates = _estimates(task, solved, grids)
         if not agree(context.ranks, _continues(task, solved, len(grids), context.options)):
             break
         points = _next_points(task, points)
@@ -206,8 +193,15 @@ def _continues(task: Task, solved: Solved, grids: int, options: WorkerOptions) -
 
 
 def _inaccurate(task: Task, solved: Solved) -> list[str]:
-    """The columns whose errors are larger than the task requests."""
-    return [] if task.accuracy is None else solved.less_accurate_than(task.accuracy.asked())
+    """The columns whose continuum values have larger relative errors than the task requests."""
+    if task.accuracy is None:
+        return []
+    return [
+        name
+        for name, share in task.accuracy.asked().items()
+        if not solved.estimates[name].continuum_error + solved.algebraic(name)
+        <= share * abs(solved.estimates[name].continuum)
+    ]
 
 
 def _interpolate(solved: Solved, scene: Scene) -> Field:
@@ -234,14 +228,6 @@ def _grid_result(solved: Solved) -> GridResult:
         work=solved.solution.transforms * scene.grid.size,
         border=border,
     )
-
-
-def _estimate_errors(task: Task, solved: Solved, grids: list[GridResult]) -> None:
-    """Add the bounds on this grid and the distances to the continuum to a solved contact."""
-    solution = solved.solution
-    certify = CERTIFY[task.boundary]
-    solved.certificate = certify(solved.contact, solution.u, solution.sigma)
-    solved.estimates = _estimates(task, solved, grids)
 
 
 def _estimates(task: Task, solved: Solved, grids: list[GridResult]) -> dict[str, Estimate]:

@@ -2,23 +2,44 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.physics.persson import Shells
 from gfmd_cli.physics.pictures import Picture
+from gfmd_cli.status import Status
+
+
+class Held(NamedTuple):
+    """What a study or a record holds of a task."""
+
+    status: Status
+    stored: frozenset[str]
+    """What [output] stored of it (`OutputTable.names`)."""
+
+
+class Entry(NamedTuple):
+    """A task of a study without its arrays."""
+
+    task_id: str
+    scene_id: str
+    """Tasks of one scene share surface, elastomer and grid."""
+    stored: frozenset[str]
+    """As in `Held`; nothing of a task that is not solved yet."""
+    row: Mapping[str, Any]
+    """Columns and histograms by name."""
+
+    @property
+    def held(self) -> Held:
+        """Status and output."""
+        return Held(Status(self.row["status"]), self.stored)
 
 
 @dataclass(frozen=True)
 class TaskResult:
     """All that a study stores of one task."""
 
-    task_id: str
-    scene_id: str
-    stored: frozenset[str]
-    """What [output] stored of it (`OutputTable.names`)."""
-    row: Mapping[str, Any]
-    """Columns and histograms by name."""
+    entry: Entry
     shells: Shells
     arrays: Mapping[str, Mapping[str, Field]] = field(default_factory=dict)
     """Arrays by group (`TASK_GROUPS`) and name."""

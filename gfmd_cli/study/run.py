@@ -13,11 +13,11 @@ from gfmd_cli.physics.file_surface import forget_files
 from gfmd_cli.spec.models import Spec
 from gfmd_cli.status import Status
 from gfmd_cli.study.context import SolveContext, WorkerOptions
-from gfmd_cli.study.parts import Held
 from gfmd_cli.study.pool import solve_in_pool
 from gfmd_cli.study.progress import Report
 from gfmd_cli.study.refinement import forget_scene
 from gfmd_cli.study.resources import check_memory, room, seconds_to_stop, share_out
+from gfmd_cli.study.result import Held
 from gfmd_cli.study.run_task import attempt
 from gfmd_cli.study.signals import noted
 from gfmd_cli.study.store import Study, without_result
@@ -63,6 +63,7 @@ def run_study(
     were killed.
     """
     forget_files()
+    forget_scene()
     study = Study(path)
     tasks = plan(spec)
     if ranks is not None:
@@ -73,7 +74,7 @@ def run_study(
     pending = without_result(share, held)
     to_solve = {task.id for task in pending}
     outcome = Counter(held[task.id].status for task in share if task.id not in to_solve)
-    waiting = agree(ranks, study.uncollected())
+    waiting = agree(ranks, bool(study.record_paths()))
     if not pending and not waiting:
         if leads(ranks) and study.parts.exists():  # of a run that was killed as it ended
             with study.work(tasks):
@@ -85,7 +86,8 @@ def run_study(
     context = SolveContext(options, Clock(pending, jobs).watched(report), ranks=ranks)
     stop, seconds = context.stop, _time_to_work(max_seconds, pending, jobs)
     with noted(stop), _timer(stop, seconds), _folder(study, tasks, ranks) as damaged:
-        context.warn(*moved, *damaged, *_plan_afresh(study.parts, options))
+        unusable = plans.plan_with(study.parts, estimated=reproducible)
+        context.warn(*moved, *damaged, *filter(None, [unusable]))
         try:
             solved = _solve_all(pending, study.parts, jobs, context)
         finally:
@@ -148,13 +150,6 @@ def _check_output(solved: list[Task], held: dict[str, Held]) -> None:
             f"{len(lacking)} tasks were solved by another run at the same time, with other output; "
             "call again to add the output of this one"
         )
-
-
-def _plan_afresh(parts: Path, options: WorkerOptions) -> list[str]:
-    """Forget plans and scenes of earlier runs in this process; return what is wrong with plans."""
-    forget_scene()
-    message = plans.plan_with(parts, estimated=options.reproducible)
-    return [message] if message else []
 
 
 def _solve_all(

@@ -15,9 +15,8 @@ from gfmd_cli.study.checkpoint import Checkpoint
 from gfmd_cli.study.context import SolveContext, Watcher
 from gfmd_cli.study.load_search import solve_at_load
 from gfmd_cli.study.measure import result
-from gfmd_cli.study.parts import read_held, record_path, write_record
+from gfmd_cli.study.parts import read_record_entry, record_path, write_record
 from gfmd_cli.study.progress import Progress
-from gfmd_cli.study.result import TaskResult
 from gfmd_cli.study.tasks import Task
 
 REPORT_EVERY = 0.2  # seconds between two reports of one task
@@ -109,7 +108,7 @@ def attempt(task: Task, parts: Path, context: SolveContext) -> Status:
 def _recorded_status(parts: Path, task: Task) -> Status | None:
     """The status in the record of a task, None without an intact record."""
     with suppress(StudyError):
-        return read_held(record_path(parts, task.id, task.output.names())).status
+        return read_record_entry(record_path(parts, task.id, task.output.names())).held.status
     return None
 
 
@@ -126,11 +125,6 @@ def solve_task(task: Task, parts: Path, context: SolveContext) -> Status:
         if leads(context.ranks):
             write_record(parts, record)
         checkpoint.remove()
-    context.report(_end(task, record))
+    numbers = (record.entry.row[name] for name in ("points", "steps", "residual", "a_r", "status"))
+    context.report(Progress(task.index, "end", task.label, *numbers))
     return solved.solution.status
-
-
-def _end(task: Task, record: TaskResult) -> Progress:
-    row = record.row
-    numbers = (row[name] for name in ("points", "steps", "residual", "a_r", "status"))
-    return Progress(task.index, "end", task.label, *numbers)

@@ -10,8 +10,9 @@ from gfmd_cli.files.regular import open_regular
 from gfmd_cli.spec.models import Spec
 from gfmd_cli.status import Status
 from gfmd_cli.study.checkpoint import Checkpoint, Saved
-from gfmd_cli.study.parts import Held, read_held, task_of_record
+from gfmd_cli.study.parts import read_record_entry, task_of_record
 from gfmd_cli.study.reading import open_study
+from gfmd_cli.study.result import Held
 from gfmd_cli.study.store import Study
 from gfmd_cli.study.tasks import plan
 
@@ -108,7 +109,7 @@ def _state(
     damaged = [path.name for path in study.set_aside()]
     for path in study.record_paths():
         try:
-            records.append((task_of_record(path), read_held(path)))
+            records.append((task_of_record(path), read_record_entry(path).held))
         except StudyError:
             if path.exists():  # else it has just been collected
                 damaged.append(path.name)

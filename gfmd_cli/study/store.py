@@ -24,13 +24,11 @@ from gfmd_cli.status import Status
 from gfmd_cli.study.columns import empty_row
 from gfmd_cli.study.measure import planned
 from gfmd_cli.study.parts import (
-    Held,
+    SUFFIX,
     check_own,
     checkpoint_folders,
-    held_by,
     read_record,
     read_record_entry,
-    record_paths,
     remove_parts,
     set_aside,
     task_of_record,
@@ -38,9 +36,9 @@ from gfmd_cli.study.parts import (
 )
 from gfmd_cli.study.provenance import origin
 from gfmd_cli.study.reading import StudyFile, open_study
-from gfmd_cli.study.result import TaskResult
+from gfmd_cli.study.result import Entry, Held, TaskResult
 from gfmd_cli.study.tasks import Task
-from gfmd_cli.study.writing import Entry, write_study
+from gfmd_cli.study.writing import write_study
 
 EARLIER = "earlier_specs"
 """Attribute with the texts of the specs before the last one, as JSON."""
@@ -85,7 +83,7 @@ class Study:
         recorded = []
         for path in self.record_paths():  # before the study, which may take them in meanwhile
             with suppress(StudyError):
-                recorded.append((task_of_record(path), held_by(self._entry(path))))
+                recorded.append((task_of_record(path), self._entry(path).held))
         held = self.collected()
         for name, found in recorded:
             if name not in held or found.stored >= held[name].stored:
@@ -144,10 +142,6 @@ class Study:
             moved.append(self.path.rename(target))
         return moved
 
-    def uncollected(self) -> bool:
-        """Whether records wait to be collected."""
-        return bool(self.record_paths())
-
     def _records(self) -> tuple[dict[Path, Entry], list[str]]:
         """The records by path; a damaged one is set aside, with a message."""
         entries, messages = {}, []
@@ -187,7 +181,7 @@ class Study:
 
     def record_paths(self) -> list[Path]:
         """The records that are not collected yet."""
-        return record_paths(self.parts)
+        return sorted(self.parts.glob(f"*{SUFFIX}"))
 
     def _collecting(self) -> Any:
         """Keep other collectors out."""
@@ -223,10 +217,9 @@ class _Sources:
         self.found: dict[str, tuple[Entry, Path | int]] = {}
         """By task id: its entry, and the record or the index in the study so far."""
         if old is not None:
-            parts = (old.task_ids, old.scene_ids, old.stored, old.rows)
-            for index, entry in enumerate(map(Entry, *parts)):
-                if entry.row["status"] != Status.MISSING:
-                    self.found[entry.task_id] = entry, index
+            for index, status in enumerate(old.statuses):
+                if status != Status.MISSING:
+                    self.found[old.task_ids[index]] = old.entry(index), index
         for path, entry in records.items():
             known = self.found.get(entry.task_id)
             if known is None or entry.stored >= known[0].stored:

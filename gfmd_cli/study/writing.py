@@ -5,7 +5,7 @@ chunk has a checksum.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, NamedTuple, Self
+from typing import Any, NamedTuple
 
 import h5py
 import numpy as np
@@ -31,23 +31,7 @@ from gfmd_cli.study.columns import (
     TaskGroup,
 )
 from gfmd_cli.study.reading import ATTRIBUTES_SUM, KINDS, PACKED, attributes_sum
-from gfmd_cli.study.result import TaskResult
-
-
-class Entry(NamedTuple):
-    """One task of a study that is to be written."""
-
-    task_id: str
-    scene_id: str
-    """Tasks of one scene share surface, elastomer and grid."""
-    stored: frozenset[str]
-    """What [output] stored of it; nothing of a task that is not solved yet."""
-    row: Mapping[str, Any]
-
-    @classmethod
-    def of(cls, result: TaskResult) -> Self:
-        """The entry of a solved task."""
-        return cls(result.task_id, result.scene_id, result.stored, result.row)
+from gfmd_cli.study.result import Entry, TaskResult
 
 
 def write_study(
@@ -157,7 +141,7 @@ class _Writer(NamedTuple):
             if arrays := result.arrays.get(declared.name):
                 group = file.create_group(f"{declared.name}/{index}")
                 shape = next(iter(arrays.values())).shape
-                scales = self._axes(group, declared, shape, result.row)
+                scales = self._axes(group, declared, shape, result.entry.row)
                 for column in declared.columns:
                     if column.name in arrays:
                         self.column(group, column, arrays[column.name], scales)

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.special import erf
 
 from gfmd_cli.analysis.plotting import ColumnFigure
-from gfmd_cli.analysis.true_contact import VARIANTS, true_contact_areas
+from gfmd_cli.analysis.records import VARIANTS, true_contact_areas
 from gfmd_cli.physics.persson import gamma_n
 from paper.claims import Finding, Value
 from paper.drawing import STYLES, column, draw_points, finish, label

@@ -14,7 +14,7 @@ from gfmd_cli.spec.models import OutputTable
 from gfmd_cli.study.checkpoint import Checkpoint
 from gfmd_cli.study.notes import Notes, Trial
 from gfmd_cli.study.parts import read_record, write_record
-from gfmd_cli.study.reading import open_study, read_rows, read_shells
+from gfmd_cli.study.reading import open_study, read_rows
 
 CUTS, FLIPS = 200, 500
 
@@ -54,7 +54,8 @@ def test_damaged_records_are_refused(folder, gfmd):
     u = np.random.default_rng(0).normal(size=(64, 64))
     arrays = {"fields": {"u": u}, "cross_sections": {"u": u[0]}}
     stored = OutputTable(fields=["u"], cross_section=True).names()
-    result = replace(result, task_id="copy", arrays=arrays, stored=stored)
+    entry = result.entry._replace(task_id="copy", stored=stored)
+    result = replace(result, entry=entry, arrays=arrays)
     path = write_record(folder / "whole", result)
     met = count(path, folder / "copy.record", lambda path: vars(read_record(path)))
     assert met == {"refused": CUTS + FLIPS}
@@ -67,8 +68,8 @@ def test_damaged_studies_are_refused_or_read_as_before(folder, gfmd):
         rows = read_rows(path)
         with open_study(path) as file:
             fields = [file.arrays("fields", row["task"]) for row in rows]
-            attributes = file.attributes
-        return rows, fields, attributes, [vars(read_shells(path, i)) for i in range(2)]
+            shells = [vars(file.shells(scene)) for scene in range(2)]
+            return rows, fields, file.attributes, shells
 
     met = count(folder / "study.h5", folder / "copy.h5", read)
     assert met["refused"] >= CUTS + FLIPS / 2  # two fifths of so small a file are empty space
