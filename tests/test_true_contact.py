@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from specs import power_spec
 
+from gfmd_cli.analysis.compare import einstein_prediction
 from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.physics.contact import Contact, build_scene
 from gfmd_cli.physics.elastomers import Power
@@ -183,9 +184,15 @@ def test_analyze_says_nothing_of_it_where_it_was_not(records):
     assert not any("a_r_persson_deviation_c" in record for record in found)
 
 
-def test_analyze_takes_the_fitted_gamma_for_the_mean_gap_alone(records, output_of, tmp_path):
+def test_analyze_takes_another_theory_for_the_mean_gap_alone(records, output_of, tmp_path):
     paper, _ = records()
-    told = output_of("analyze", tmp_path / "s.h5", "--json", "--gamma", "fitted")
+    told = output_of("analyze", tmp_path / "s.h5", "--json", "--theory", "coarse-grained")
+    for before, after in zip(paper, json.loads(told), strict=True):
+        assert after["a_r_persson"] == before["a_r_persson"]
+        if before["n"] == 0 and before["p_star"] <= 1:
+            exact = float(einstein_prediction(before["p_star"]).u_g)
+            assert after["u_g_persson"] == pytest.approx(exact, rel=1e-3)
+    told = output_of("analyze", tmp_path / "s.h5", "--json", "--theory", "fitted")
     for before, after in zip(paper, json.loads(told), strict=True):
         assert after["a_r_persson"] == before["a_r_persson"]
         if before["p_star"] < 1:  # n = 0: 0.512 for 0.5, n = 1: 0.304 for 0.35

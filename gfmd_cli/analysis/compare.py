@@ -11,13 +11,15 @@ from gfmd_cli.analysis.selection import grouped
 from gfmd_cli.errors import InputError
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.physics import einstein_solid
+from gfmd_cli.physics.coarse_graining import CoarseGrained
 from gfmd_cli.physics.persson import Persson, Shells, gamma_fitted
 from gfmd_cli.study.columns import PARAMETERS
 from gfmd_cli.study.reading import StudyFile, open_study, solved_rows
 
 Row = dict[str, Any]
-Weights = Literal["paper", "fitted"]
-"""gamma of Eq. (30): as the paper has it, Eqs. (39) and (42), or as fitted in docs/theory.md."""
+Theory = Literal["paper", "fitted", "coarse-grained"]
+"""Of the mean gap: Eq. (30) with gamma of Eqs. (39) and (42), or with gamma as fitted in
+docs/theory.md, or coarse-graining without any gamma."""
 
 
 def in_continuum(row: Row, name: str) -> bool:
@@ -154,17 +156,17 @@ class Comparison:
         return study_tables(self)
 
 
-def compare(path: Path, gamma: Weights = "paper") -> Comparison:
+def compare(path: Path, theory: Theory = "paper") -> Comparison:
     """Set a study beside Persson theory.
 
     Raises InputError where there is no such study or it holds no result, StudyError where it
     is unreadable.
     """
     with open_study(path) as study:
-        return compare_open(study, path, gamma)
+        return compare_open(study, path, theory)
 
 
-def compare_open(study: StudyFile, path: Path, gamma: Weights = "paper") -> Comparison:
+def compare_open(study: StudyFile, path: Path, theory: Theory = "paper") -> Comparison:
     """As `compare`, of a study that is open already."""
     rows = study.rows
     solved = solved_rows(rows)
@@ -175,9 +177,10 @@ def compare_open(study: StudyFile, path: Path, gamma: Weights = "paper") -> Comp
     curves = []
     for (scene, *_), group in groups.items():
         spectrum = spectra[scene]
-        if gamma == "fitted":
+        if theory == "fitted":
             spectrum = with_fitted_gamma(spectrum, float(group[0]["n"]))
-        curves.append(Curve(sorted(group, key=lambda row: row["p_star"]), Persson(spectrum)))
+        persson = CoarseGrained(spectrum) if theory == "coarse-grained" else Persson(spectrum)
+        curves.append(Curve(sorted(group, key=lambda row: row["p_star"]), persson))
     return Comparison(path, curves, len(rows) - len(solved))
 
 

@@ -16,14 +16,17 @@ from gfmd_cli.errors import InputError
 @click.option("--json", "as_json", is_flag=True, help="Print a list of records instead of tables.")
 @click.option("--figures", type=FILE, metavar="DIR", help="Write figures into this folder.")
 @click.option(
-    "--gamma",
-    type=click.Choice(["paper", "fitted"]),
+    "--theory",
+    type=click.Choice(["paper", "fitted", "coarse-grained"]),
     default="paper",
     show_default=True,
-    help="Weight of the elastic energy in the theory of the mean gap; see docs/theory.md.",
+    help="Theory of the mean gap; see docs/theory.md.",
 )
 def analyze(
-    study: Path, as_json: bool, figures: Path | None, gamma: Literal["paper", "fitted"]
+    study: Path,
+    as_json: bool,
+    figures: Path | None,
+    theory: Literal["paper", "fitted", "coarse-grained"],
 ) -> None:
     """Compare a study with Persson theory.
 
@@ -38,7 +41,7 @@ def analyze(
     from gfmd_cli.analysis.records import as_records
     from gfmd_cli.analysis.run_summary import edge_warnings
 
-    comparison = compare(study, gamma)
+    comparison = compare(study, theory)
     if as_json:
         click.echo(json.dumps(as_records(comparison), indent=1))
     else:

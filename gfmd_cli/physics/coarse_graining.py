@@ -1,0 +1,111 @@
+"""The mean gap by coarse-graining: waves join the law of the interface, the shortest first.
+
+No equation of the paper, and no constant of its own: derived in docs/physics.md, compared with
+simulations in docs/theory.md. With all waves shorter than a wavelength the interface has a law
+u_g(p). Under a longer wave it acts as springs of stiffness kappa = -dp/du_g in series with the
+elastomer of stiffness k(q), which flatten the share T = kappa / (kappa + k) of the wave. The work
+F(p), the integral of u_g from 0 to p, increases by T k dC / 2 with waves of squared height dC.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.linalg import solve_banded
+
+from gfmd_cli.grid.arrays import Field
+from gfmd_cli.physics.persson import Persson, monotone_cubic
+
+_LOWEST, _HIGHEST = 1e-8, 8.0  # pressures of the law [Delta_sigma]
+_CELL, _BEND = 0.06, 0.5  # cells of 6 % of p well below _BEND, of 0.03 Delta_sigma above
+_SHARE = 1 / 64  # of the squared height that waves may add in one step
+_STAGE = 1 - np.sqrt(0.5)  # of SDIRK2, of second order and L-stable
+_NEWTON_STEPS = 50  # a bound; 2 to 3 are taken
+_CONVERGED = 1e-6  # last Newton step relative to the largest gap; it converges quadratically
+_VANISHED = 1e-12  # relative to the largest gap; rounding below
+
+
+@dataclass(frozen=True, eq=False)
+class CoarseGrained(Persson):
+    """Persson theory of area and stress, with the mean gap by coarse-graining.
+
+    The law is solved once, for 1e-8 to 8 Delta_sigma; u_g is good to 2e-4 for p <= Delta_sigma and
+    5e-3 at 3 Delta_sigma.
+    """
+
+    def elastic_energy(self, p: Field | float) -> Field:
+        """Elastic energy per area v, without q = 0: the integral of p over the loss of u_g.
+
+        Paper Eq. (28) as dv = -p du_g.
+        """
+        p = np.asarray(p, dtype=np.float64)
+        if not self.shells.variance.size:
+            return np.zeros_like(p)
+        faces, gap = self._law
+        x, lost = np.log(_centres(faces)), -np.diff(gap)
+        light = np.exp(x[0]) * lost[0] / (x[1] - x[0])  # v is linear in p for a gap linear in ln p
+        v = light + np.append(0.0, np.cumsum(faces[1:-1] * lost))
+        at = np.log(np.where(p > 0, p, 1.0))
+        inside = np.exp(monotone_cubic(x, np.log(v))(np.clip(at, x[0], x[-1])))
+        return np.where(p > 0, inside * np.exp(np.minimum(at - x[0], 0.0)), 0.0)
+
+    def mean_gap(self, p: Field | float) -> Field:
+        """Mean gap u_g; infinite at p = 0, linear in ln p below the law, zero beyond it.
+
+        Parameters
+        ----------
+        p : pressure >= 0, any shape
+        """
+        p = np.asarray(p, dtype=np.float64)
+        if not self.shells.variance.size:
+            return np.zeros_like(p)
+        faces, gap = self._law
+        known = gap > _VANISHED * gap[0]
+        x = np.log(_centres(faces)[known])
+        at = np.log(np.where(p > 0, p, 1.0))
+        inside = np.exp(monotone_cubic(x, np.log(gap[known]))(np.clip(at, x[0], x[-1])))
+        below = np.maximum(x[0] - at, 0.0) * (gap[0] - gap[1]) / (x[1] - x[0])
+        return np.where(p > 0, np.where(at <= x[-1], inside + below, 0.0), np.inf)
+
+    @cached_property
+    def _law(self) -> tuple[Field, Field]:
+        """Faces of cells of pressure, shape (cells + 1,), and u_g in the cells, shape (cells,)."""
+        x = np.arange(np.log(_LOWEST / _BEND), _HIGHEST / _BEND, _CELL)
+        faces = np.append(0.0, self.delta_sigma * _BEND * np.log1p(np.exp(x)))
+        gap: Field = np.zeros(x.size)
+        height = self.shells.height
+        steps = 1 + (height / (_SHARE * height.sum())).astype(int)
+        stiffness = np.repeat(self.shells.energy / height, steps)
+        for k, added in zip(stiffness[::-1], np.repeat(height / steps, steps)[::-1], strict=True):
+            middle = _implicit(faces, gap, gap, k, _STAGE * added)
+            start = gap + (1 - _STAGE) / _STAGE * (middle - gap)
+            gap = _implicit(faces, start, middle, k, _STAGE * added)
+        return faces, gap
+
+
+def _centres(faces: Field) -> Field:
+    """Pressures where ln p has its mean over the cells, to second order in their width."""
+    return np.append(faces[1] / np.e, np.sqrt(faces[1:-1] * faces[2:]))
+
+
+def _implicit(faces: Field, start: Field, guess: Field, k: float, added: float) -> Field:
+    """The u that solves u = start + added d(T k / 2)/dp at u, by Newton steps from a guess.
+
+    T is 0 at p = 0 and 1 at the largest pressure, so that the integral of u grows by k added / 2,
+    the energy of full contact. u never rises with p.
+    """
+    width, distance = np.diff(faces), np.diff(_centres(faces))
+    u = guess
+    for _ in range(_NEWTON_STEPS):
+        flattened = 1 / (1 - k * np.diff(u) / distance)
+        flow = 0.5 * k * np.concatenate([[0.0], flattened, [1.0]])
+        coupling = 0.5 * added * (k * flattened) ** 2 / distance
+        bands = np.zeros((3, u.size))
+        bands[0, 1:] = bands[2, :-1] = -coupling
+        bands[1] = width - bands[0] - bands[2]
+        missing = (start - u) * width + added * np.diff(flow)
+        step = solve_banded((1, 1), bands, missing, check_finite=False)
+        u = np.maximum.accumulate((u + step)[::-1])[::-1]
+        if np.abs(step).max() < _CONVERGED * u[0]:
+            break
+    return u

@@ -1,0 +1,266 @@
+"""Theories of the mean gap on surfaces that no constant was fitted to.
+
+Compares Eq. (39), the fitted gamma(n), weights W of two contact areas, and coarse-graining. Reads
+the studies `gamma`, `stiffness`, `depth` and `slab` of scripts/theory_studies.py, and the weights
+by shell of scripts/energy_weights.py.
+
+python scripts/gap_theories.py --folder results/theory --weights results/energy_weights.jsonl
+"""
+
+import argparse
+import json
+from collections import defaultdict
+from collections.abc import Callable, Iterator
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+from energy_weights import GROUPS, KINDS, PRESSURES, Record, groups, scene_of
+from gamma_fit import FITTED, HELD_OUT, P_STAR, Key, Surface, print_table, read, rms, smooth
+from scipy.interpolate import PchipInterpolator
+from scipy.optimize import least_squares
+from scipy.special import erf
+from theory_studies import EXPONENTS, HURST, SPECTRA
+
+from gfmd_cli.analysis.compare import Curve, compare
+from gfmd_cli.physics.coarse_graining import CoarseGrained
+from gfmd_cli.physics.elastomers import Slab
+from gfmd_cli.physics.persson import Persson, Shells, gamma_n
+
+NODES = np.geomspace(3e-4, 8, 300)
+"""Pressures [Delta_sigma] of the integral of Eq. (28)."""
+OTHER = (0.001, 0.003, 0.01, 0.1, 0.3, 0.6, 1.0)
+Weight = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
+"""W of the areas a at the scale q and s at q_s, and of constants."""
+FORMS: dict[str, tuple[Weight, list[float]]] = {
+    "a [c + (1 - c) a²]": (lambda a, s, c: a * (c[0] + (1 - c[0]) * a * a), [0.3]),
+    "a^α s^(1-α) [c + (1 - c) a²]": (
+        lambda a, s, c: a ** c[0] * s ** (1 - c[0]) * (c[1] + (1 - c[1]) * a * a),
+        [0.7, 0.4],
+    ),
+    "a^α s^β [c + (1 - c) a²]": (
+        lambda a, s, c: a ** c[0] * s ** c[1] * (c[2] + (1 - c[2]) * a * a),
+        [1.2, 0.1, 0.4],
+    ),
+}
+"""Weights that are 1 in full contact, and first guesses of their constants."""
+GENERAL = list(FORMS)[-1]
+
+
+class Areas:
+    """Contact areas of a spectrum at all scales, and the mean gap of a weight of them."""
+
+    def __init__(self, shells: Shells):
+        total = shells.variance.sum()
+        middle = np.cumsum(shells.variance) - 0.5 * shells.variance
+        self.energy = 0.5 * shells.energy
+        self.scale = erf(NODES[:, None] * np.sqrt(0.5 * total / middle))
+        self.all = erf(NODES[:, None] / np.sqrt(2))
+        self.unit = float(np.sqrt(shells.height.sum() * total))
+
+    def log_gap(self, weight: Weight, constants: np.ndarray, p_star: np.ndarray) -> np.ndarray:
+        """ln u_g / h_std of Eqs. (28) and (29); 0 < p* < 2."""
+        v = weight(self.scale, self.all, constants) @ self.energy
+        lost = np.diff(v) / np.sqrt(NODES[1:] * NODES[:-1])
+        gap = np.maximum(np.cumsum(lost[::-1])[::-1], 1e-300) / self.unit
+        return np.asarray(np.interp(np.log(p_star), np.log(NODES[:-1]), np.log(gap)))
+
+
+def coarse(shells: Shells, p_star: np.ndarray) -> np.ndarray:
+    """ln u_g / h_std by coarse-graining."""
+    theory = CoarseGrained(shells)
+    gap = theory.mean_gap(p_star * theory.delta_sigma)
+    return np.asarray(np.log(gap / np.sqrt(shells.height.sum())))
+
+
+def eq39(shells: Shells, p_star: np.ndarray) -> np.ndarray:
+    """ln u_g / h_std of the gamma that the shells have."""
+    theory = Persson(shells)
+    gap = theory.mean_gap(p_star * theory.delta_sigma)
+    return np.asarray(np.log(gap / np.sqrt(shells.height.sum())))
+
+
+class Fits:
+    """The constants of the forms, fitted to the mean ln u_g of the training seeds."""
+
+    def __init__(self, surfaces: dict[Key, Surface]):
+        self.surfaces = surfaces
+        self.areas = {key: Areas(surface.shells) for key, surface in surfaces.items()}
+        self.known: dict[tuple[str, float, str], np.ndarray] = {}
+
+    def errors(self, form: str, c: np.ndarray, key: Key, seeds: slice) -> np.ndarray:
+        """ln u_g less that of the seeds: seeds, pressures."""
+        theory = self.areas[key].log_gap(FORMS[form][0], c, P_STAR)
+        return np.asarray(theory - self.surfaces[key].log_gap[seeds])
+
+    def constants(self, form: str, n: float, without: str = "") -> np.ndarray:
+        """Of all spectra but those of one kind."""
+        if (form, n, without) not in self.known:
+            keys = [(name, h, n) for name, h in product(SPECTRA, HURST) if name != without]
+
+            def residuals(c: np.ndarray) -> np.ndarray:
+                found = [self.errors(form, c, key, FITTED).mean(axis=0) for key in keys]
+                return np.concatenate(found)
+
+            start = FORMS[form][1]
+            self.known[form, n, without] = least_squares(residuals, start, method="lm").x
+        return self.known[form, n, without]
+
+
+def cell(errors: list[np.ndarray]) -> str:
+    """Of single seeds / of the mean over the seeds, in per cent."""
+    return f"{100 * rms(errors):.1f} / {100 * rms([one.mean(axis=0) for one in errors]):.1f}"
+
+
+def signed(errors: np.ndarray) -> list[str]:
+    return [f"{100 * error:+.1f}" for error in errors]
+
+
+def print_errors(fits: Fits, smooth_fit: np.ndarray) -> None:
+    """Test seeds; of the forms also spectra that were left out."""
+    rows = []
+    for n in EXPONENTS:
+        keys = [(name, hurst, n) for name, hurst in product(SPECTRA, HURST)]
+        held = {key: fits.surfaces[key].log_gap[HELD_OUT] for key in keys}
+        gammas = float(gamma_n(n)), float(smooth(n, *smooth_fit))
+        cells = [
+            cell([fits.surfaces[key].theory(gamma) - held[key] for key in keys]) for gamma in gammas
+        ]
+        cells += [
+            cell(
+                [fits.errors(form, fits.constants(form, n, key[0]), key, HELD_OUT) for key in keys]
+            )
+            for form in list(FORMS)[1:]
+        ]
+        cells.append(cell([coarse(fits.surfaces[key].shells, P_STAR) - held[key] for key in keys]))
+        rows.append([f"{n:g}", *cells])
+    heads = ["n", "Eq. (39)", "fitted γ", *list(FORMS)[1:], "coarse-graining"]
+    print_table("ln u_g on the test seeds, per cent; forms on spectra left out", heads, rows)
+    rows = [
+        [f"{n:g}", *(" ".join(f"{x:.3f}" for x in fits.constants(form, n)) for form in FORMS)]
+        for n in EXPONENTS
+    ]
+    print_table("Constants, all spectra", ["n", *FORMS], rows)
+
+
+def print_spectra(fits: Fits) -> None:
+    """Error of coarse-graining of the mean over all seeds: least and largest of the spectra."""
+    rows = []
+    for n in EXPONENTS:
+        errors = [
+            coarse(surface.shells, P_STAR) - surface.log_gap.mean(axis=0)
+            for key, surface in fits.surfaces.items()
+            if key[2] == n
+        ]
+        low, high = np.min(errors, axis=0), np.max(errors, axis=0)
+        ends = zip(signed(low), signed(high), strict=True)
+        rows.append([f"{n:g}", *(f"{a} to {b}" for a, b in ends)])
+    heads = ["n", *(f"p* = {p:g}" for p in P_STAR)]
+    print_table("Coarse-graining, all seeds, range over the spectra, per cent", heads, rows)
+
+
+def means(path: Path, points: int | None = None) -> Iterator[tuple[list[Curve], np.ndarray]]:
+    """Curves of one surface and elastomer, and the mean of their ln u_g over the seeds."""
+    held = defaultdict(list)
+    for curve in compare(path).curves:
+        if points in (None, curve.points):
+            held[curve.n, curve.rows[0]["cutoff"]].append(curve)
+    for _, curves in sorted(held.items(), key=lambda item: (item[0][0], -item[0][1])):
+        yield curves, np.mean([np.log(curve.column("u_g")) for curve in curves], axis=0)
+
+
+def print_other(path: Path, fits: Fits) -> None:
+    """Other pressures, on the grid of 512^2."""
+    rows = []
+    for curves, log_gap in means(path, 512):
+        n, p, shells = curves[0].n, curves[0].column("p_star"), curves[0].persson.shells
+        chosen = np.array([np.argmin(np.abs(p - one)) for one in OTHER])
+        told = {"Eq. (39)": eq39(shells, p[chosen])}
+        if n:
+            told[GENERAL] = Areas(shells).log_gap(
+                FORMS[GENERAL][0], fits.constants(GENERAL, n), p[chosen]
+            )
+        told["coarse-graining"] = coarse(shells, p[chosen])
+        rows += [[f"{n:g}", name, *signed(x - log_gap[chosen])] for name, x in told.items()]
+    print_table("Other pressures, per cent", ["n", "", *(f"p* = {p:g}" for p in OTHER)], rows)
+
+
+def print_depth(path: Path, fits: Fits) -> None:
+    """The range of the spectrum at p* = 0.01 and 0.1."""
+    rows = []
+    for curves, log_gap in means(path):
+        n, p, shells = curves[0].n, curves[0].column("p_star"), curves[0].persson.shells
+        general = Areas(shells).log_gap(FORMS[GENERAL][0], fits.constants(GENERAL, n), p)
+        told = (eq39(shells, p), general, coarse(shells, p))
+        row = curves[0].rows[0]
+        cells = [" / ".join(signed((x - log_gap)[[0, 2]])) for x in told]
+        rows.append([f"{n:g}", f"{row['rolloff'] / row['cutoff']:.0f}", *cells])
+    heads = ["n", "λr/λs", "Eq. (39)", GENERAL, "coarse-graining"]
+    print_table("Range of the spectrum, p* = 0.01 / 0.1, per cent", heads, rows)
+
+
+def print_slabs(path: Path, fits: Fits) -> None:
+    """Slabs, in the continuum, with the constants at the local exponent."""
+    table = PchipInterpolator(EXPONENTS, [fits.constants(GENERAL, n) for n in EXPONENTS])
+    held = defaultdict(list)
+    for curve in compare(path).curves:
+        row, shells = curve.rows[0], curve.persson.shells
+        p = curve.column("p_star") * row["delta_sigma"] / curve.persson.delta_sigma
+        local = Slab(thickness=row["thickness"]).local_exponent(shells.q, row["length"])
+        c = np.moveaxis(table(np.clip(local, EXPONENTS[0], EXPONENTS[-1])), -1, 0)
+        general = Areas(shells).log_gap(FORMS[GENERAL][0], c, p)
+        log_gap = np.log(curve.column("u_g_continuum"))
+        told = (eq39(shells, p), general, coarse(shells, p))
+        held[row["thickness"]].append([x - log_gap for x in told])
+    names = "Eq. (42)", GENERAL, "coarse-graining"
+    rows = [
+        [f"{t:g}", name, *signed(np.mean(errors, axis=0)[i])]
+        for t, errors in held.items()
+        for i, name in enumerate(names)
+    ]
+    print_table("Slabs, per cent", ["t/L", "", *(f"p* = {p:g}" for p in P_STAR)], rows)
+    every = np.array([one for errors in held.values() for one in errors])
+    print("rms:", *(f"{name} {100 * rms(list(every[:, i])):.1f}" for i, name in enumerate(names)))
+
+
+def print_weights(records: list[Record], fits: Fits) -> None:
+    """rms of ln W of the theory less that measured, over pressures up to 0.3 and groups."""
+    rows = []
+    for n in sorted({record["n"] for record in records}):
+        errors: dict[str, list[np.ndarray]] = {form: [] for form in FORMS}
+        for kind in KINDS:
+            seen = np.mean([r["weight"] for r in records if (r["kind"], r["n"]) == (kind, n)], 0)
+            shells = scene_of(kind, n, 0).shells
+            areas = Areas(shells)
+            group = np.digitize(shells.q / (2 * np.pi), groups()) - 1
+            for form, (weight, _) in FORMS.items():
+                w = weight(areas.scale, areas.all, fits.constants(form, n))
+                for p, measured in zip(PRESSURES, seen, strict=True):
+                    at = w[np.argmin(np.abs(np.log(NODES / p)))] * shells.energy
+                    full = np.bincount(group, shells.energy, GROUPS)
+                    with np.errstate(invalid="ignore"):
+                        said = np.bincount(group, at, GROUPS) / full
+                    if p <= P_STAR[-1]:
+                        errors[form].append(np.log(said / measured)[full > 0])
+        rows.append([f"{n:g}", *(f"{rms([np.concatenate(e)]):.2f}" for e in errors.values())])
+    print_table("W by shell: rms of ln W - ln W measured", ["n", *FORMS], rows)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("--folder", type=Path, default=Path("results/theory"))
+    parser.add_argument("--depth", type=Path, help="study; by default depth.h5 in the folder")
+    parser.add_argument("--weights", type=Path, default=Path("results/energy_weights.jsonl"))
+    given = parser.parse_args()
+    fits = Fits(read(given.folder / "gamma.h5"))
+    print_errors(fits, np.array([0.2900, 0.7950, 0.2219]))
+    print_spectra(fits)
+    print_other(given.folder / "stiffness.h5", fits)
+    print_depth(given.depth or given.folder / "depth.h5", fits)
+    print_slabs(given.folder / "slab.h5", fits)
+    lines = given.weights.read_text().splitlines()
+    print_weights([json.loads(line) for line in lines], fits)
+
+
+if __name__ == "__main__":
+    main()
