@@ -501,3 +501,40 @@ def test_a_spec_with_more_tasks_makes_a_study_grow(run):
         for name in names:
             if isinstance(fresh[name], h5py.Dataset) and name != "seconds":
                 np.testing.assert_array_equal(grown[name][()], fresh[name][()], err_msg=name)
+
+
+SMALL_CONTACT = power_spec(n=1, points=512, p_star=0.002, cutoff=0.02)
+
+
+def test_calls_that_are_too_short_advance_all_the_same(run, tmp_path, monkeypatch):
+    """Also in the solve on tiles, which follows the grid of 256 points here."""
+    monkeypatch.setattr(run_task, "REPORT_EVERY", 0.0)
+    straight, seen, _ = run(SMALL_CONTACT, "straight.h5", jobs=1, reproducible=True)
+    steps = [(event.points, event.step) for event in seen if event.event == "step"]
+    assert steps.count((256, max(step for points, step in steps if points == 256))) > 20
+
+    def stop_at_256(event):
+        if event.points == 256:
+            signal.raise_signal(signal.SIGTERM)
+
+    reached, options = [], {"jobs": 1, "reproducible": True}
+    with pytest.raises(Interrupted):
+        run(SMALL_CONTACT, report=stop_at_256, **options)
+    for _ in range(len(steps)):
+        events = []
+        try:
+            path, *_ = run(SMALL_CONTACT, report=events.append, max_seconds=1e-9, **options)
+            break
+        except Interrupted:
+            reached += [(e.points, e.step) for e in events if e.event == "step"][-1:]
+            (warning,) = [e.message for e in events if e.event == "warning"]
+            assert "each call needs more time" in warning
+    assert reached == sorted(set(reached))
+    assert_equal_studies(straight, path)
+
+
+def test_max_hours_shorter_than_the_start_of_the_workers_solve_a_task(run):
+    with pytest.raises(Interrupted, match="tasks left"):
+        run(overrides=("elastomer.n=0",), max_seconds=1e-9, jobs=2)
+    _, _, outcome = run(overrides=("elastomer.n=0",), max_seconds=1e-9, jobs=2)
+    assert outcome.total() == 2

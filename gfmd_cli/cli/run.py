@@ -44,7 +44,8 @@ from gfmd_cli.status import Status
 @click.option(
     "--max-hours",
     type=click.FloatRange(min=0, min_open=True),
-    help="Stop before this wall time has passed: save all states, exit with status 75.",
+    help="Stop before this wall time has passed: save all states, exit with status 75. A task "
+    "that has begun takes at least one step.",
 )
 @click.option(
     "--reproducible",

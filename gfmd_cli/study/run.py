@@ -14,7 +14,7 @@ from gfmd_cli.spec.models import Spec
 from gfmd_cli.status import Status
 from gfmd_cli.study.context import SolveContext, WorkerOptions
 from gfmd_cli.study.pool import solve_in_pool
-from gfmd_cli.study.progress import Report
+from gfmd_cli.study.progress import Progress, Report
 from gfmd_cli.study.refinement import forget_scene
 from gfmd_cli.study.resources import check_memory, room, seconds_to_stop, share_out
 from gfmd_cli.study.result import Held
@@ -83,9 +83,16 @@ def run_study(
     check_memory(pending, ranks)
     jobs, threads = share_out(pending, jobs, reproducible, ranks)
     options = WorkerOptions(threads, room(ranks) / jobs, reproducible, checkpoint_every)
-    context = SolveContext(options, Clock(pending, jobs).watched(report), ranks=ranks)
-    stop, seconds = context.stop, _time_to_work(max_seconds, pending, jobs)
-    with noted(stop), _timer(stop, seconds), _folder(study, tasks, ranks) as damaged:
+    stop, begun, tell = Event(), Event(), Clock(pending, jobs).watched(report)
+
+    def watch(progress: Progress) -> None:
+        if progress.event == "start":
+            begun.set()
+        tell(progress)
+
+    context = SolveContext(options, watch, stop, ranks)
+    seconds = _time_to_work(max_seconds, pending, jobs)
+    with noted(stop), _timer(stop, seconds, begun), _folder(study, tasks, ranks) as damaged:
         unusable = plans.plan_with(study.parts, estimated=reproducible)
         context.warn(*moved, *damaged, *filter(None, [unusable]))
         try:
@@ -171,15 +178,21 @@ def _time_to_work(max_seconds: float | None, pending: list[Task], jobs: int) -> 
 
 
 @contextmanager
-def _timer(stop: Event, seconds: float | None) -> Iterator[None]:
-    """Inside, an orderly stop is asked for after so much time, whatever the clock says."""
+def _timer(stop: Event, seconds: float | None, begun: Event) -> Iterator[None]:
+    """Inside, an orderly stop is requested after so much time, but not before a task has begun."""
     if seconds is None:
         yield
         return
-    timer = Timer(seconds, stop.set)
+
+    def request_stop() -> None:
+        begun.wait()
+        stop.set()
+
+    timer = Timer(seconds, request_stop)
     timer.daemon = True
     timer.start()
     try:
         yield
     finally:
         timer.cancel()
+        begun.set()  # ends a timer that still waits

@@ -5,6 +5,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from gfmd_cli.errors import GfmdError, Interrupted, SpaceError, StudyError
+from gfmd_cli.grid.fft_grid import Shape
 from gfmd_cli.grid.ranks import agree, leads, together
 from gfmd_cli.physics.contact import Contact
 from gfmd_cli.physics.observables import contact_points
@@ -18,18 +19,27 @@ from gfmd_cli.study.measure import result
 from gfmd_cli.study.parts import read_record_entry, record_path, write_record
 from gfmd_cli.study.progress import Progress
 from gfmd_cli.study.tasks import Task
+from gfmd_cli.units import duration
 
 REPORT_EVERY = 0.2  # seconds between two reports of one task
 SAVE, STOP = 1.0, 2.0  # requests to a solve; the largest one of all processes counts
 
 
 class TaskWatcher(Watcher):
-    """Reports the progress of a task, saves its state at intervals, and stops it on request."""
+    """Reports the progress of a task, saves its state at intervals, and stops it on request.
+
+    A task is stopped when it has a state that no earlier call saved: every call advances.
+    """
 
     def __init__(self, task: Task, checkpoint: Checkpoint, context: SolveContext) -> None:
         super().__init__()
         self.task, self.checkpoint, self.context = task, checkpoint, context
-        self.last_report, self.last_save = 0.0, time.monotonic()
+        self.begun = self.last_save = time.monotonic()
+        self.last_report = 0.0
+        self.first: tuple[Shape, int] | None = None
+        """Grid and step of the first state of this call."""
+        self.short = False
+        """Whether the stop was requested before a new state was reached."""
         self.resumed = False
         if (message := checkpoint.restore()) is not None:
             self._warn(message)
@@ -54,13 +64,20 @@ class TaskWatcher(Watcher):
             self._report_step(contact, state)
         if self.context.ranks is not None and contact.grid.whole:
             return  # a small grid, which each process solves on its own
+        reached = contact.grid.whole_shape, state.step
+        self.first = self.first or reached
         request = SAVE if now - self.last_save > self.context.options.checkpoint_every else 0.0
         if self.context.stop.is_set():
             request = STOP
         request = contact.grid.max(request)
         if request == STOP:
             self.context.stop.set()
+            if reached == self.first:  # else calls with too little time would never get further
+                self.short = True
+                return
             self._save(contact, state)
+            if self.short:
+                self._warn_of_short_call()
             raise Interrupted(f"{self.task.label}: stopped, state saved")
         if request == SAVE:
             try:
@@ -76,6 +93,13 @@ class TaskWatcher(Watcher):
         reached = (points, step, state.residual, a_r)
         event = Progress(self.task.index, "step", label, *reached, size=contact.grid.size)
         self.context.report(event)
+
+    def _warn_of_short_call(self) -> None:
+        seconds = duration(max(1.0, time.monotonic() - self.begun))
+        self._warn(
+            f"{self.task.label}: the stop was requested before the first step, which ended "
+            f"{seconds} after the start of the task; each call needs more time than that"
+        )
 
     def _save(self, contact: Contact, state: State) -> None:
         self.checkpoint.save(contact, state, self.notes)
