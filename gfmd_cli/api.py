@@ -22,7 +22,7 @@ from gfmd_cli.analysis.export import as_dataset
 from gfmd_cli.errors import InputError
 from gfmd_cli.grid.arrays import Field, Mask
 from gfmd_cli.physics.file_surface import FileSurface
-from gfmd_cli.physics.given_heights import given_heights
+from gfmd_cli.physics.given_heights import given_heights, surface_table
 from gfmd_cli.physics.indenters import SMALLEST_GRID
 from gfmd_cli.physics.observables import contact_pressure
 from gfmd_cli.spec.models import Spec
@@ -155,12 +155,13 @@ def solve(spec: Path | str | Tables, *, heights: Any = None, threads: int = 1) -
         return _solve(spec, threads)
     if not isinstance(spec, Mapping):
         raise InputError("heights go with a dictionary; a spec in a file has a surface")
-    given = given_heights(heights)
+    values, stated = given_heights(heights)
     with TemporaryDirectory() as folder:
         path = Path(folder) / "heights.npy"
-        np.save(path, given.values)
+        np.save(path, values)
         try:
-            surface = given.surface(_plain(spec.get("surface", {}))) | {"path": str(path)}
+            surface = surface_table(stated, _plain(spec.get("surface", {})))
+            surface["path"] = str(path)
             return _solve(_with_points({**spec, "surface": surface}), threads)
         except InputError as error:  # the file is not the caller's
             raise InputError(str(error).replace(str(path), "heights")) from None

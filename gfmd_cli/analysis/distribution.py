@@ -162,15 +162,13 @@ class StressDistribution:
         """
         counts = self.counts[:, -1].sum(axis=0)
         line = float(np.mean([rows[-1]["perimeter"] for rows in self.seeds]))
-        line *= self.cells[-1] / self.points[-1] * (np.pi / 4 if self._dimension == 2 else 1.0)
+        line *= self.cells[-1] / self.points[-1]
+        if self.finest["dimension"] == 2:
+            line *= np.pi / 4
         below = np.cumsum(counts) - 0.5 * counts
         above = counts.sum() - below
         nearest: Field = np.minimum(below, above) if self.curve.n > 2 else below
         return nearest / line if line else np.full(counts.size, np.inf)
-
-    @property
-    def _dimension(self) -> int:
-        return int(self.finest["dimension"])
 
     @cached_property
     def sampling(self) -> Field:

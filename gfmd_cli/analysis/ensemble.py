@@ -19,7 +19,6 @@ CONFIDENCE = 0.95
 class Spread:
     """Statistics of one quantity over seeds."""
 
-    count: int
     mean: float
     standard_error: float
     """Of the mean: standard deviation (n - 1) over sqrt(n)."""
@@ -37,16 +36,11 @@ class Ensemble:
     """Name of the study where several are shown side by side."""
 
     @property
-    def label(self) -> str:
-        """Elastomer and surface without its seed."""
-        return f"{self.rows[0]['elastomer']} on {self.rows[0]['ensemble']}"
-
-    @property
     def title(self) -> str:
-        """The same with the grid, where that was given."""
-        auto = self.rows[0].get("grid") == "auto"
-        text = self.label + ("" if auto else f", {grid_size(self.rows[:1])}")
-        return of_study(self.study, text)
+        """Elastomer, surface without its seed, and the grid where that was given."""
+        row = self.rows[0]
+        grid = "" if row.get("grid") == "auto" else f", {grid_size([row])}"
+        return of_study(self.study, f"{row['elastomer']} on {row['ensemble']}{grid}")
 
     def spread(self, name: str) -> Spread:
         """Of "a_r", "sigma_p" or "u_g": of the continuum values where all rows have one."""
@@ -59,7 +53,7 @@ def spread_of(values: Sequence[float]) -> Spread:
     numbers = np.asarray(values, np.float64)
     error = float(np.std(numbers, ddof=1)) / sqrt(numbers.size)
     wide = float(stdtrit(numbers.size - 1, 0.5 + 0.5 * CONFIDENCE))
-    return Spread(numbers.size, float(numbers.mean()), error, wide * error)
+    return Spread(float(numbers.mean()), error, wide * error)
 
 
 def without_seed(row: Row) -> tuple[Any, ...]:

@@ -27,19 +27,15 @@ RUN = (
 )
 
 
-def run_table(rows: list[dict[str, Any]]) -> Table:
-    """The solved contacts, grouped by scene; the first MAX_ROWS of them."""
-    listed = solved_rows(rows)[:MAX_ROWS]
-    return Table("", shown(RUN, listed), groups_of((_scene(r), with_best(r)) for r in listed))
-
-
 def run_text(rows: list[dict[str, Any]]) -> str:
-    """The table in plain text; an empty string where nothing was solved."""
+    """The solved contacts by scene, MAX_ROWS at most; an empty string where nothing was solved."""
     solved = solved_rows(rows)
+    listed = solved[:MAX_ROWS]
+    table = Table("", shown(RUN, listed), groups_of((_scene(r), with_best(r)) for r in listed))
     left_out = len(solved) - MAX_ROWS
     more = [f"and {left_out} more contacts"] if left_out > 0 else []
     warnings = [f"warning: {line}" for line in warnings_in(solved)]
-    return "\n\n".join(filter(None, [run_table(rows).as_text(), *more, "\n".join(warnings)]))
+    return "\n\n".join(filter(None, [table.as_text(), *more, "\n".join(warnings)]))
 
 
 def edge_warnings(rows: Sequence[Mapping[str, Any]]) -> list[str]:

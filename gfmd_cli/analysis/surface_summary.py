@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from gfmd_cli.analysis.table import Column, Group, Table
+from gfmd_cli.analysis.table import Column, Group, Table, plain
 from gfmd_cli.errors import InputError
 from gfmd_cli.physics.contact import Scene, build_scene
 from gfmd_cli.physics.elastomers import HalfSpace
@@ -41,11 +41,6 @@ class SurfaceSummary:
     """The nearest self-affine surface; None where there is none."""
     no_fit: str
     """Why there is none."""
-
-    @property
-    def name(self) -> str:
-        """What was read and how it was prepared, or the label of the surface."""
-        return self.surface.preparation() or self.surface.label
 
     @property
     def copies(self) -> int:
@@ -84,11 +79,7 @@ class SurfaceSummary:
                 "cutoff_wavelength": 2 * pi / self.fit.q_s,
                 "scatter": self.fit.scatter,
             }
-        return {key: None if _is_nan(value) else value for key, value in record.items()}
-
-
-def _is_nan(value: Any) -> bool:
-    return isinstance(value, float) and np.isnan(value)
+        return {key: plain(value) for key, value in record.items()}
 
 
 def summarise(surface: RigidSurface) -> SurfaceSummary:
@@ -141,7 +132,7 @@ def as_text(summary: SurfaceSummary) -> str:
     points = extent(record["points"][::-1])
     metres, per_metre = (" m", " 1/m") if summary.in_si else ("", "")
     lines = [
-        summary.name,
+        summary.surface.preparation() or summary.surface.label,
         f"  L = {sides}{metres} on {points} points",
         *_parameter_lines(summary.parameters, metres),
         f"  spectral: rms height {measured.height:.6g}{metres}, "

@@ -16,7 +16,7 @@ from math import exp, hypot, isnan, log, nan, pi, sqrt
 import numpy as np
 
 from gfmd_cli.physics.elastomers import LinearElastomer
-from gfmd_cli.physics.error_estimates import Estimate, Level, unknown
+from gfmd_cli.physics.error_estimates import UNKNOWN, Estimate, Level, unknown
 from gfmd_cli.physics.free_error import estimate_free
 from gfmd_cli.physics.irregular_error import estimate_by_change
 from gfmd_cli.physics.persson import Shells
@@ -197,7 +197,7 @@ def _plate_area(fine: Level, coarse: Level | None, *, rough: bool) -> Estimate:
     if not rough:
         return Estimate(min(fine.a_r, fine.line), nan, nan, "bound")
     if coarse is None:
-        return Estimate(nan, nan, nan, "unknown")
+        return UNKNOWN
     step = coarse.a_r - fine.a_r
     share = PLATE_EXCESS - PLATE_EXCESS_SLOPE * step / fine.line
     best = min(1.0, max(0.0, fine.a_r - min(max(share, LONE_POINTS), PLATE_EXCESS) * step))
@@ -216,7 +216,7 @@ def _stress(fine: Level, coarse: Level | None, n: float, phase: float) -> Estima
     typical /= sqrt(1 - fine.a_r)
     if coarse is None:
         error = _bar("sigma_p", typical, nan)
-        return Estimate(error, nan if isnan(error) else value, error, _known(error))
+        return _on_grid(value, error)
     single = isnan(phase)
     rest = (value - coarse.sigma_p) / (2 ** min(1.0 if single else 2.0, 3 - n) - 1)
     error = _bar("sigma_p", typical, rest)
@@ -239,9 +239,9 @@ def _gap(fine: Level, coarse: Level | None, n: float, phase: float, bend: float)
     error = _bar("u_g", typical, change)
     if isnan(phase) and coarse is not None:
         error = max(error, SINGLE_CONTACT_GAP * value / fine.points**2)
-    return Estimate(error, nan if isnan(error) else value, error, _known(error))
+    return _on_grid(value, error)
 
 
-def _known(error: float) -> str:
-    """Verdict on a quantity whose error is this, or unknown if NaN."""
-    return "unknown" if isnan(error) else "regular"
+def _on_grid(value: float, error: float) -> Estimate:
+    """The value on the grid as the best one, unknown if its error is NaN."""
+    return UNKNOWN if isnan(error) else Estimate(error, value, error, "regular")

@@ -52,6 +52,9 @@ class Estimate:
     given from these grids."""
 
 
-def unknown(names: tuple[str, ...] = QUANTITIES) -> dict[str, Estimate]:
+UNKNOWN = Estimate(nan, nan, nan, "unknown")
+
+
+def unknown() -> dict[str, Estimate]:
     """Estimates that give no number."""
-    return dict.fromkeys(names, Estimate(nan, nan, nan, "unknown"))
+    return dict.fromkeys(QUANTITIES, UNKNOWN)

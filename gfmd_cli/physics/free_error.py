@@ -9,7 +9,7 @@ n >= 1. All factors were checked on the free contacts of `scripts/calibration.py
 
 from dataclasses import replace
 
-from gfmd_cli.physics.error_estimates import Estimate, Level, unknown
+from gfmd_cli.physics.error_estimates import UNKNOWN, Estimate, Level, unknown
 from gfmd_cli.physics.irregular_error import area_by_change, gap_by_change, stress_by_change
 
 CONTINUUM_FACTOR = 1.8  # of the extrapolated area: with 1.35, 91 of 100 bars of profiles held
@@ -40,9 +40,8 @@ def estimate_free(fine: Level, coarse: Level | None, n: float) -> dict[str, Esti
 
 def _border_stress(fine: Level, coarse: Level | None, n: float) -> Estimate:
     """Standard deviation of a pressure that is singular at the border of the map."""
-    estimate = unknown()["sigma_p"]
     if n > MAX_BORDER_EXPONENT:
-        return replace(estimate, verdict="diverges" if n >= 1 else "slow")
+        return replace(UNKNOWN, verdict="diverges" if n >= 1 else "slow")
     if coarse is None:
-        return estimate
+        return UNKNOWN
     return stress_by_change(fine, coarse, BORDER_FACTOR / (2 ** (1 - n) - 1))

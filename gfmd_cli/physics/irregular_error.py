@@ -10,7 +10,7 @@ of an observable from the coarser to the finer grid, x = contact line times spac
 from dataclasses import replace
 from math import hypot
 
-from gfmd_cli.physics.error_estimates import Estimate, Level, unknown
+from gfmd_cli.physics.error_estimates import UNKNOWN, Estimate, Level, unknown
 
 # Error bars: FACTOR times the root of the sum of the squares of D and FLOOR times
 #   a_r: x          sigma_p: sigma_p x / a_r          u_g: u_g x / a_r
@@ -27,7 +27,7 @@ def estimate_by_change(fine: Level, coarse: Level | None, n: float) -> dict[str,
     """Estimates from two nested grids; unknown from one grid or beyond `MAX_EXPONENT`."""
     estimates = unknown()
     if n >= DIVERGENT:
-        estimates["sigma_p"] = replace(estimates["sigma_p"], verdict="diverges")
+        estimates["sigma_p"] = replace(UNKNOWN, verdict="diverges")
     if coarse is None:
         return estimates
     makers = {"a_r": area_by_change, "sigma_p": stress_by_change, "u_g": gap_by_change}

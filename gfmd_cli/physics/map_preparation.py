@@ -10,6 +10,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.linalg import spsolve
 
 from gfmd_cli.grid.arrays import Field, Mask
+from gfmd_cli.physics.pictures import block_sums
 
 Levelling = Literal["none", "mean", "plane", "curvature"]
 Edges = Literal["none", "window", "mirror"]
@@ -133,10 +134,7 @@ def fill_missing(heights: Field, missing: Mask) -> Field:
 
 def _smooth(known: Field, missing: Mask) -> Field:
     """Filling from a map of half the resolution; `known` is zero where missing."""
-    starts = [np.arange(0, size, 2) for size in known.shape]
-    count, total = (~missing).astype(np.float64), known
-    for axis, start in enumerate(starts):
-        count, total = np.add.reduceat(count, start, axis), np.add.reduceat(total, start, axis)
+    count, total = block_sums((~missing).astype(np.float64), 2), block_sums(known, 2)
     coarse = fill_missing(total / np.maximum(count, 1.0), count == 0)
     for axis in (0, 1):
         coarse = coarse.repeat(2, axis)
@@ -150,23 +148,20 @@ def _smooth(known: Field, missing: Mask) -> Field:
 
 def _harmonic(known: Field, missing: Mask) -> Field:
     """Filling by the sparse linear system; `known` is zero where missing."""
+    points = np.argwhere(missing)
     number = np.full(missing.shape, -1)
-    number[missing] = np.arange(np.count_nonzero(missing))
-    neighbours, right = np.zeros((2, np.count_nonzero(missing)))
+    number[missing] = diagonal = np.arange(len(points))
+    neighbours, right = np.zeros((2, len(points)))
     pairs = []
-    for axis, step in ((0, 1), (0, -1), (1, 1), (1, -1)):
-        inside = [slice(None)] * 2
-        beside = [slice(None)] * 2
-        inside[axis] = slice(None, -1) if step > 0 else slice(1, None)
-        beside[axis] = slice(1, None) if step > 0 else slice(None, -1)
-        here, there = number[tuple(inside)], number[tuple(beside)]
-        chosen = here >= 0
-        np.add.at(neighbours, here[chosen], 1.0)
-        np.add.at(right, here[chosen], known[tuple(beside)][chosen])
-        chosen &= there >= 0
-        pairs.append((here[chosen], there[chosen]))
+    for step in ((1, 0), (-1, 0), (0, 1), (0, -1)):
+        there = points + step
+        inside = np.flatnonzero(np.all((there >= 0) & (there < missing.shape), axis=1))
+        beside = tuple(there[inside].T)
+        neighbours[inside] += 1.0
+        right[inside] += known[beside]
+        is_missing = missing[beside]
+        pairs.append((inside[is_missing], number[beside][is_missing]))
     row, column = np.hstack(pairs)
-    diagonal = np.arange(neighbours.size)
     matrix = coo_array(
         (
             np.concatenate([neighbours, -np.ones(row.size)]),

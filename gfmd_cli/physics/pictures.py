@@ -20,14 +20,19 @@ class Picture:
     """Extent along each axis [m]."""
 
 
+def block_sums(values: Field, step: int) -> Field:
+    """Sums over blocks of `step` points along every axis, smaller ones at the end."""
+    for axis, points in enumerate(values.shape):
+        values = np.add.reduceat(values, np.arange(0, points, step), axis)
+    return values
+
+
 def picture(heights: Field, sides: tuple[float, ...], missing: Mask | None = None) -> Picture:
     """A picture whose pixels are means over the known heights of some points."""
     pixels = PIXELS if heights.ndim == 2 else LINE_PIXELS
     step = -(-max(heights.shape) // pixels)
     known = np.ones(heights.shape) if missing is None else (~missing).astype(np.float64)
     total = heights if missing is None else np.where(missing, 0.0, heights)
-    for axis, points in enumerate(heights.shape):
-        starts = np.arange(0, points, step)
-        known, total = (np.add.reduceat(values, starts, axis) for values in (known, total))
+    count = block_sums(known, step)
     with np.errstate(invalid="ignore"):
-        return Picture(np.where(known > 0, total / known, np.nan), sides)
+        return Picture(np.where(count > 0, block_sums(total, step) / count, np.nan), sides)

@@ -7,7 +7,6 @@ By Parseval's theorem the sum over the shells of a field is its variance.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -19,20 +18,12 @@ from gfmd_cli.physics.persson import bin_edges
 EXACT, BINS = 64, 500  # shells of one |q|, and logarithmic bins; as in `persson.shells`
 
 
-@dataclass(frozen=True)
-class Spectra:
-    """Power spectra of fields in shells of increasing wavenumber, arrays of shape (shells,)."""
+def spectra(grid: Grid, fields: Mapping[str, Field]) -> tuple[Field, Field, dict[str, Field]]:
+    """Sum |f(q)|^2 over the shells of all waves of the grid except q = 0.
 
-    q: Field
-    """Mean wavenumber of the waves of the shell [1/m]."""
-    waves: Field
-    """Number of waves q in the shell."""
-    power: dict[str, Field]
-    """Sum of |f(q)|^2 over each shell [squared unit of the field], by name of the field."""
-
-
-def spectra(grid: Grid, fields: Mapping[str, Field]) -> Spectra:
-    """Sum |f(q)|^2 over the shells of all waves of the grid except q = 0."""
+    Returns the mean wavenumber q of each shell [1/m], rising, its number of waves, and the sums
+    [squared unit of the field] by name of the field, all of shape (shells,).
+    """
     point = np.zeros(grid.shape)
     point.flat[0] = grid.size  # every wave of a single point has |f(q)| = 1
     m, count, _ = radial_power(grid, point)
@@ -45,7 +36,7 @@ def spectra(grid: Grid, fields: Mapping[str, Field]) -> Spectra:
     held = waves > 0
     powers = {name: binned(*radial_power(grid, f)[:2])[held] for name, f in fields.items()}
     q = binned(m, m * count)[held] / waves[held] * (2 * np.pi / grid.length)
-    return Spectra(q, waves[held], powers)
+    return q, waves[held], powers
 
 
 def autocorrelations(grid: Grid, fields: Mapping[str, Field]) -> tuple[Field, dict[str, Field]]:

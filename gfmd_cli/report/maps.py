@@ -1,7 +1,7 @@
 """Section: maps of contact, stress and gap, and cross-sections, of some contacts."""
 
 from collections import defaultdict
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -13,10 +13,11 @@ from gfmd_cli.analysis.tables import AREA, P_STAR, POINTS, PRESSURE
 from gfmd_cli.analysis.units import pressure_text
 from gfmd_cli.grid.arrays import Field, Mask
 from gfmd_cli.physics.observables import contact_points
+from gfmd_cli.physics.pictures import block_sums
 from gfmd_cli.report.data import ReportData
 from gfmd_cli.report.profiles import plane, profile_figure, read_profile
 from gfmd_cli.report.scales import HEIGHT_SCALE, LENGTH_SCALE, STRESS_SCALE, Scale
-from gfmd_cli.report.section import Drawing, Section
+from gfmd_cli.report.section import Section
 from gfmd_cli.report.svg import drawing
 from gfmd_cli.study.reading import StudyFile, open_study
 
@@ -42,20 +43,6 @@ SHOWN = (
 )
 
 
-class ContactMaps(NamedTuple):
-    """The figures of one contact."""
-
-    title: str
-    drawings: list[Drawing]
-
-
-class PressureSeries(NamedTuple):
-    """The contacts of one curve, pressure rising."""
-
-    title: str
-    contacts: list[ContactMaps]
-
-
 def maps(data: ReportData) -> Section:
     """Where the surfaces touch, and how hard."""
     with open_study(data.comparison.path) as study:
@@ -63,7 +50,13 @@ def maps(data: ReportData) -> Section:
         stored = [row for row in data.solved if row["task"] in tasks]
         chosen = _chosen(stored)
         shown = [row for rows in chosen for row in rows]
-        series = [_pressure_series(study, rows, data.prefix) for rows in chosen]
+        series = [
+            {
+                "title": f"{rows[0]['elastomer']} on {rows[0]['surface']}",
+                "contacts": [_contact_maps(study, row, data.prefix) for row in rows],
+            }
+            for rows in chosen
+        ]
     notes = [
         f"{len(shown)} of {len(stored)} contacts with stored fields are shown, "
         f"{MAX_CONTACTS} at most."
@@ -88,14 +81,8 @@ def _chosen(stored: list[Row]) -> list[list[Row]]:
     return [evenly(rows, MAX_CONTACTS // len(chosen)) for rows in pressures]
 
 
-def _pressure_series(study: StudyFile, rows: list[Row], prefix: str) -> PressureSeries:
-    """The contacts of one curve."""
-    title = f"{rows[0]['elastomer']} on {rows[0]['surface']}"
-    return PressureSeries(title, [_contact_maps(study, row, prefix) for row in rows])
-
-
-def _contact_maps(study: StudyFile, row: Row, prefix: str) -> ContactMaps:
-    """The maps and the cross-section of one contact."""
+def _contact_maps(study: StudyFile, row: Row, prefix: str) -> dict[str, Any]:
+    """Title, maps and cross-section of one contact."""
     task = row["task"]
     drawings = [
         drawing(plot, f"{prefix}{name}-{task}", f"{what}, task {task}", f"{what}.")
@@ -109,7 +96,8 @@ def _contact_maps(study: StudyFile, row: Row, prefix: str) -> ContactMaps:
         drawings.append(
             drawing(plot, f"{prefix}section-{task}", f"{what}, task {task}", f"{what}.")
         )
-    return ContactMaps(f"{pressure_text(row)}, a_r = {row['a_r']:.3g}", drawings)
+    title = f"{pressure_text(row)}, a_r = {row['a_r']:.3g}"
+    return {"title": title, "drawings": drawings}
 
 
 def _map_figures(study: StudyFile, row: Row) -> list[tuple[str, ColumnFigure, str]]:
@@ -146,15 +134,7 @@ def _thumbnails(study: StudyFile, task: int, step: int) -> dict[str, Field]:
 
 def _means(block: Field, step: int) -> Field:
     """Over squares of step x step points, smaller ones at the end."""
-    if step == 1:
-        return block
-    total = np.ones_like(block)
-    for axis in (0, 1):
-        starts = np.arange(0, block.shape[axis], step)
-        block = np.add.reduceat(block, starts, axis)
-        total = np.add.reduceat(total, starts, axis)
-    means: Field = block / total
-    return means
+    return block_sums(block, step) / block_sums(np.ones_like(block), step)
 
 
 def _contact_figure(touching: Field, row: Row) -> ColumnFigure:

@@ -55,7 +55,8 @@ def surface_spectrum(data: ReportData) -> Section | None:
     shown = spectra[:MAX_SURFACES]
     if not shown:
         return None
-    label = f"Power spectral density of the surface over the wavenumber: {_names(shown)}"
+    names = "; ".join(each.name for each in shown)
+    label = f"Power spectral density of the surface over the wavenumber: {names}"
     left_out = len(spectra) > len(shown)
     more = f" The first {MAX_SURFACES} of {len(spectra)} are shown." if left_out else ""
     tables = {"Self-affine fit": _fits(shown), "Table behind the figure": _bands(shown)}
@@ -104,10 +105,6 @@ FIT = (
     "of the surface. Scatter: 0 where phases alone are random, 1 as of Gaussian roughness, much "
     "more where the surface is not of this kind."
 )
-
-
-def _names(shown: list[Spectrum]) -> str:
-    return "; ".join(found.name for found in shown)
 
 
 def spectrum(row: Row, shells: Shells) -> Spectrum:

@@ -104,11 +104,7 @@ def read_spec(path: Path, overrides: tuple[str, ...] = ()) -> tuple[Spec, str]:
         text = raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise InputError(f"{path}: not UTF-8 text (byte {error.start})") from error
-    data = _toml(text, str(path))
-    for override in overrides:
-        set_override(data, override)
-    where = _Where(str(path), text, _given_by(overrides))
-    return build_spec(data, path.parent, where), text
+    return read_text(text, path, overrides), text
 
 
 def read_tables(data: dict[str, Any]) -> Spec:
@@ -164,9 +160,11 @@ def _only_choice(name: str, data: dict[str, Any], path: Path, overrides: tuple[s
 
 
 def read_text(text: str, path: Path, overrides: tuple[str, ...]) -> Spec:
-    """The spec of a text, for the file `path`. Raises InputError where it is none."""
-    where = _Where(str(path), text, _given_by(overrides))
-    return build_spec(_toml(text, str(path)), path.parent, where)
+    """The spec of a text, for the file `path`, with overrides. Raises InputError for any other."""
+    data = _toml(text, str(path))
+    for override in overrides:
+        set_override(data, override)
+    return build_spec(data, path.parent, _Where(str(path), text, _given_by(overrides)))
 
 
 class _Where:

@@ -149,10 +149,10 @@ def _curves(solved: Solved) -> dict[str, dict[str, Field]]:
     scene, solution = solved.scene, solved.solution
     fields = {"height": solved.contact.height, "u": solution.u, "sigma": solution.sigma}
     units = {"height": scene.h_std, "u": scene.h_std, "sigma": scene.delta_sigma}
-    found = spectra(scene.grid, fields)
-    powers = {name: power * units[name] ** 2 for name, power in found.power.items()}
+    q, waves, powers = spectra(scene.grid, fields)
+    powers = {name: power * units[name] ** 2 for name, power in powers.items()}
     r, means = autocorrelations(scene.grid, fields)
     return {
-        "spectra": {"q": found.q, "waves": found.waves, **powers},
+        "spectra": {"q": q, "waves": waves, **powers},
         "autocorrelations": {"r": r, **means},
     }

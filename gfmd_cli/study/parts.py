@@ -69,11 +69,6 @@ def record_path(parts: Path, task_id: str, stored: Iterable[str]) -> Path:
     return parts / f"{task_id}-{digest(sorted(stored))[:8]}{SUFFIX}"
 
 
-def task_of_record(path: Path) -> str:
-    """Id of the task that a record claims to be of."""
-    return path.stem.partition("-")[0]
-
-
 def checkpoint_folders(parts: Path) -> list[Path]:
     """The checkpoints in the folder, by the ids of their tasks."""
     return [path for path in parts.glob("*") if OWN_FOLDERS.fullmatch(path.name) and path.is_dir()]
@@ -96,7 +91,7 @@ def open_record(path: Path) -> Iterator[StudyFile]:
         with open_regular(path) as opened:
             check_seal(opened)
             with open_study(path, opened) as record:
-                if record.task_ids != [task_of_record(path)]:
+                if record.task_ids != [path.stem.partition("-")[0]]:
                     raise StudyError(f"{path}: damaged record: it is of another task")
                 yield record
     except (OSError, ValueError) as error:

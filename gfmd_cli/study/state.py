@@ -4,15 +4,13 @@ from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
-from gfmd_cli.errors import InputError, StudyError
+from gfmd_cli.errors import InputError
 from gfmd_cli.files.hdf5 import MAGIC
 from gfmd_cli.files.regular import open_regular
 from gfmd_cli.spec.models import Spec
 from gfmd_cli.status import Status
 from gfmd_cli.study.checkpoint import Checkpoint, Saved
-from gfmd_cli.study.parts import read_record_entry, task_of_record
 from gfmd_cli.study.reading import open_study
-from gfmd_cli.study.result import Held
 from gfmd_cli.study.store import Study
 from gfmd_cli.study.tasks import plan
 
@@ -105,16 +103,11 @@ def _state(
     writes them, so that a task that ends meanwhile is not overlooked.
     """
     saved = {name: Checkpoint(study.parts / name).saved() for name, _ in tasks}
-    records: list[tuple[str, Held]] = []
-    damaged = [path.name for path in study.set_aside()]
-    for path in study.record_paths():
-        try:
-            records.append((task_of_record(path), read_record_entry(path).held))
-        except StudyError:
-            if path.exists():  # else it has just been collected
-                damaged.append(path.name)
-    held = [*study.collected().items(), *records]
+    set_aside = study.set_aside()
+    records, damaged = study.records()
+    held = [*study.collected().items(), *((e.task_id, e.held) for e in records.values())]
     known = {name: found.status for name, found in held if found.stored >= output}
+    names = [path.name for path in (*set_aside, *damaged)]
     others = {name for name, _ in held}.difference(name for name, _ in tasks)
     states = [
         TaskState(
@@ -122,4 +115,4 @@ def _state(
         )
         for index, (name, label) in enumerate(tasks)
     ]
-    return StudyState(study.path, states, len(records), damaged, len(others))
+    return StudyState(study.path, states, len(records), names, len(others))

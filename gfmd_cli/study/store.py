@@ -31,7 +31,6 @@ from gfmd_cli.study.parts import (
     read_record_entry,
     remove_parts,
     set_aside,
-    task_of_record,
     version_of,
 )
 from gfmd_cli.study.provenance import origin
@@ -72,7 +71,7 @@ class Study:
                         path.unlink()
         with locked(in_use, shared=True):
             with self._collecting():
-                _, damaged = self._records()
+                _, damaged = self._sound_records()
             yield damaged
         with self._collecting(), locked(in_use, wait=False) as alone:
             if alone and self._is_complete(tasks):
@@ -80,14 +79,11 @@ class Study:
 
     def held(self) -> dict[str, Held]:
         """What is held of each task that is solved, collected or not, by its id."""
-        recorded = []
-        for path in self.record_paths():  # before the study, which may take them in meanwhile
-            with suppress(StudyError):
-                recorded.append((task_of_record(path), self._entry(path).held))
+        records, _ = self.records()  # before the study, which may take them in meanwhile
         held = self.collected()
-        for name, found in recorded:
-            if name not in held or found.stored >= held[name].stored:
-                held[name] = found
+        for entry in records.values():
+            if entry.task_id not in held or entry.stored >= held[entry.task_id].stored:
+                held[entry.task_id] = entry.held
         return held
 
     def collected(self) -> dict[str, Held]:
@@ -107,7 +103,7 @@ class Study:
         SpaceError, StudyError where the study itself is damaged.
         """
         with self._collecting():
-            records, damaged = self._records()
+            records, damaged = self._sound_records()
             with ExitStack() as stack:
                 old = stack.enter_context(open_study(self.path)) if self.path.exists() else None
                 fresh = stack.enter_context(new_file(self.path, aside=self.parts))
@@ -142,16 +138,24 @@ class Study:
             moved.append(self.path.rename(target))
         return moved
 
-    def _records(self) -> tuple[dict[Path, Entry], list[str]]:
-        """The records by path; a damaged one is set aside, with a message."""
-        entries, messages = {}, []
+    def records(self) -> tuple[dict[Path, Entry], dict[Path, StudyError]]:
+        """The records that are not collected yet, and what is wrong with the damaged ones."""
+        entries, damaged = {}, {}
         for path in self.record_paths():
             try:
                 entries[path] = self._entry(path)
             except StudyError as error:
-                bad = set_aside(path)
-                messages.append(f"{error}; set aside as {bad.name}, its task is solved again")
-        return entries, messages
+                if path.exists():  # else it has just been collected
+                    damaged[path] = error
+        return entries, damaged
+
+    def _sound_records(self) -> tuple[dict[Path, Entry], list[str]]:
+        """The records by path; a damaged one is set aside, with a message."""
+        entries, damaged = self.records()
+        return entries, [
+            f"{error}; set aside as {set_aside(path).name}, its task is solved again"
+            for path, error in damaged.items()
+        ]
 
     def _entry(self, path: Path) -> Entry:
         """All of a record but its arrays; read once, as records are never changed but replaced.
