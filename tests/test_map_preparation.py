@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from gfmd_cli.physics import map_preparation
+from gfmd_cli.physics.file_surface import FileSurface
 from gfmd_cli.physics.map_preparation import fill_missing, level, make_periodic
 
 
@@ -87,9 +88,9 @@ def test_the_window_keeps_the_inner_heights_and_lowers_h_std(heights):
 
 
 @pytest.mark.parametrize("taper", [0.0, 0.6, np.nan])
-def test_a_taper_outside_its_range_is_refused(heights, taper):
+def test_a_taper_outside_its_range_is_refused(taper):
     with pytest.raises(ValueError, match="taper"):
-        make_periodic(heights, "window", taper)
+        FileSurface(path="map.npy", edges="window", taper=taper)
 
 
 def test_the_mirror_keeps_every_height_four_times(heights):
