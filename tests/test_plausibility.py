@@ -57,6 +57,38 @@ def test_a_modulus_in_pascals_on_a_surface_metres_rough(elastomer):
     assert solve(reduced).warnings == ()
 
 
+@pytest.mark.parametrize(
+    ("load", "elastomer", "words"),
+    [
+        ({"pressure": 1e3}, {"kind": "half-space"}, "load.pressure is far above full contact"),
+        ({"pressure": 1e3}, {"kind": "power", "n": 1}, "are moduli, heights and load in Pa and m?"),
+        ({"p_star": 1e5}, HALF_SPACE, "load.pressure takes Pa"),
+        ({"pressure": 0.1}, HALF_SPACE, "load.pressure is hardly a contact"),
+        ({"mean_gap": 1e-8}, HALF_SPACE, "is it a length in m?"),
+    ],
+)
+def test_a_load_in_another_unit(load, elastomer, words):
+    assert words in only_warning(tables(elastomer=elastomer, **load))
+
+
+@pytest.mark.parametrize("displacement", [1e-8, 1e-7])
+def test_a_displacement_in_metres_on_reduced_heights(displacement):
+    surface = {key: SURFACE[key] for key in ("kind", "cutoff")}
+    spec = tables(surface, {"kind": "half-space"}, displacement=displacement)
+    spec["grid"]["boundary"] = "free"
+    assert "are heights and lengths in m?" in only_warning(spec)
+
+
+def test_loads_as_they_are_meant_have_no_warning():
+    for load in ({"pressure": 1e7}, {"p_star": 50.0}, {"mean_gap": 0.1}, {"contact_area": 0.1}):
+        assert solve(tables(**load)).warnings == ()
+    spec = tables(displacement=2e-8)
+    spec["grid"]["boundary"] = "free"
+    assert solve(spec).warnings == ()
+    parabola = tables({"kind": "parabola", "radius": 1.0}, {"kind": "half-space"}, pressure=0.1)
+    assert solve(parabola).warnings == ()
+
+
 def test_a_map_that_is_too_steep(tmp_path):
     np.save(tmp_path / "h.npy", solve(tables()).height * 1e6)
     surface = {"kind": "file", "path": str(tmp_path / "h.npy"), "length": 1e-5}

@@ -6,6 +6,14 @@ from gfmd_cli.study.tasks import Task
 FEW_POINTS = 30  # a choice: the area of a circle of 30 points has an error of its rim of a third
 PASCALS = 1e3  # modulus above which it is one in Pa; a choice: gels have 1e3 Pa, reduced units 1
 METRES = 1e-2  # rms height above which it is in reduced units; a choice: no rough solid has 1 cm
+REDUCED_PRESSURES = (1e-6, 100.0)
+"""Reduced pressures outside of which a load has another unit than was meant; a choice. Rough
+surfaces are in full contact from about 6 on; below, the largest grids have few points in contact.
+"""
+SMALL_GAPS = (1e-5, 1e-3)
+"""Mean gaps [h_std]: below the first, or below the second if that is a possible gap in m, they are
+probably meant in m; a choice."""
+SMALL_DISPLACEMENT = 1e-4  # [h_std], below which heights have another unit; a choice
 SEPARATOR = " | "
 """Between the warnings of one contact in a column of text."""
 
@@ -19,6 +27,9 @@ def warnings_of(task: Task, solved: Solved) -> list[str]:
             f"a modulus of {elastomer.modulus:.3g} Pa and an rms height of {scene.h_std:.3g} m: "
             "are heights and lengths in metres? Set surface.h_std, surface.length or surface.scale"
         )
+    units = _doubtful_unit(task, solved)
+    if units:
+        return [*warnings, units]  # few points in contact follow from it
     points = round(solved.observables.a_r * scene.grid.size)
     if points < FEW_POINTS:
         warnings.append(
@@ -26,3 +37,30 @@ def warnings_of(task: Task, solved: Solved) -> list[str]:
             "the grid; use more points"
         )
     return warnings
+
+
+def _doubtful_unit(task: Task, solved: Solved) -> str:
+    """A warning about a load that has probably another unit than was meant, else ""."""
+    scene, key, load = solved.scene, f"load.{task.quantity}", task.load
+    low, high = REDUCED_PRESSURES
+    unit = f"p* = 1 is {scene.delta_sigma:.3g} Pa here"
+    if task.quantity == "mean_gap":
+        near_zero, small = SMALL_GAPS
+        is_possible = small <= load / scene.h_std <= scene.highest
+        if load < near_zero or (load < small and is_possible):
+            return (
+                f"{key} is relative to the rms height, {scene.h_std:.3g} m here, and {load:g} is "
+                "next to full contact: is it a length in m? Divide it by the rms height"
+            )
+    if task.quantity == "displacement" and load < SMALL_DISPLACEMENT * scene.h_std:
+        return (
+            f"{key} = {load:g} m is {load / scene.h_std:.1g} of the rms height, "
+            f"{scene.h_std:.3g} m: are heights and lengths in m?"
+        )
+    if solved.observables.a_r == 1 and solved.contact.pressure > high:
+        if task.quantity == "p_star":
+            return f"{key} is far above full contact; {unit}: load.pressure takes Pa"
+        return f"{key} is far above full contact; {unit}: are moduli, heights and load in Pa and m?"
+    if task.quantity == "pressure" and solved.contact.pressure < low:
+        return f"{key} is hardly a contact; {unit}: are moduli, heights and load in Pa and m?"
+    return ""
