@@ -27,6 +27,8 @@ P_STAR = np.array(LIGHT)
 SEEDS = [*TRAINING, *TEST]
 FITTED, HELD_OUT = slice(0, len(TRAINING)), slice(len(TRAINING), None)  # of SEEDS
 GRID, FINER = 512, 1024
+GAMMA = (0.2900, 0.7950, 0.2219)
+"""What `fit` finds for all spectra: the curve "fitted" of docs/theory.md."""
 Gamma = Callable[[np.ndarray], np.ndarray]
 Key = tuple[str, float, float]
 """Name of the spectrum, Hurst exponent, n."""

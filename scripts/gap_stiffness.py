@@ -9,7 +9,7 @@ import argparse
 from pathlib import Path
 
 import numpy as np
-from gamma_fit import mean_gap, print_table, spread
+from gamma_fit import GAMMA, mean_gap, print_table, smooth, spread
 from theory_studies import EXPONENTS, LADDER, TRAINING
 
 from gfmd_cli.analysis.compare import Curve, compare
@@ -17,7 +17,7 @@ from gfmd_cli.analysis.curve_styles import MARKERS, CurveStyle, colours
 from gfmd_cli.analysis.plotting import ColumnFigure, styled
 from gfmd_cli.physics import einstein_solid
 from gfmd_cli.physics.discretisation_error import AREA_EXCESS, MAX_AREA_EXPONENT
-from gfmd_cli.physics.persson import Shells, gamma_fitted, gamma_n
+from gfmd_cli.physics.persson import Shells, gamma_n
 
 GRIDS = (256, 512, 1024)
 GRID = 512
@@ -64,7 +64,7 @@ def print_stiffness(curves: Curves) -> None:
         shells = curves[n, GRID, TRAINING[0]].persson.shells
         theories = [
             theory_compliance(shells, float(np.squeeze(gamma(n))))
-            for gamma in (gamma_n, gamma_fitted)
+            for gamma in (gamma_n, lambda n: smooth(n, *GAMMA))
         ]
         if n == 0:
             theories.append(exact_springs_compliance(P_STAR))

@@ -1,8 +1,9 @@
 """Theories of the mean gap on surfaces that no constant was fitted to.
 
-Compares Eq. (39), the fitted gamma(n), weights W of two contact areas, and coarse-graining. Reads
-the studies `gamma`, `stiffness`, `depth` and `slab` of scripts/theory_studies.py, and the weights
-by shell of scripts/energy_weights.py.
+Compares Eq. (39), the fitted gamma(n), weights W of two contact areas, and coarse-graining. Prints
+the constants of gfmd_cli/physics/fitted_weight.py. Reads the studies `gamma`, `between`,
+`stiffness`, `depth` and `slab` of scripts/theory_studies.py, and the weights by shell of
+scripts/energy_weights.py.
 
 python scripts/gap_theories.py --folder results/theory --weights results/energy_weights.jsonl
 """
@@ -11,24 +12,41 @@ import argparse
 import json
 from collections import defaultdict
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from itertools import product
 from pathlib import Path
 
 import numpy as np
 from energy_weights import GROUPS, KINDS, PRESSURES, Record, groups, scene_of
-from gamma_fit import FITTED, HELD_OUT, P_STAR, Key, Surface, print_table, read, rms, smooth
-from scipy.interpolate import PchipInterpolator
+from gamma_fit import (
+    FINER,
+    FITTED,
+    GAMMA,
+    GRID,
+    HELD_OUT,
+    P_STAR,
+    Key,
+    Surface,
+    print_table,
+    read,
+    rms,
+    spectrum_of,
+)
+from gamma_fit import smooth as gamma
 from scipy.optimize import least_squares
 from scipy.special import erf
 from theory_studies import EXPONENTS, HURST, SPECTRA
 
-from gfmd_cli.analysis.compare import Curve, compare
-from gfmd_cli.physics.coarse_graining import CoarseGrained
-from gfmd_cli.physics.elastomers import Slab
-from gfmd_cli.physics.persson import Persson, Shells, gamma_n
+from gfmd_cli.analysis.compare import Curve, Theory, compare, einstein_prediction, theory_of
+from gfmd_cli.physics.persson import Shells, gamma_n
 
 NODES = np.geomspace(3e-4, 8, 300)
 """Pressures [Delta_sigma] of the integral of Eq. (28)."""
+THEORIES: dict[Theory, str] = {
+    "paper": "Eqs. (39), (42)",
+    "fitted": "fitted W",
+    "coarse-grained": "coarse-graining",
+}
 OTHER = (0.001, 0.003, 0.01, 0.1, 0.3, 0.6, 1.0)
 Weight = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
 """W of the areas a at the scale q and s at q_s, and of constants."""
@@ -45,6 +63,16 @@ FORMS: dict[str, tuple[Weight, list[float]]] = {
 }
 """Weights that are 1 in full contact, and first guesses of their constants."""
 GENERAL = list(FORMS)[-1]
+SMOOTH = [0.4, 0.6, 0.6, 0.9, 0.9, -0.3, 0.1]
+"""First guess of the constants of `of_n`."""
+FREE = list(FORMS)[1:]
+WEIGHT = "fitted W"
+
+
+def of_n(n: float, t: np.ndarray) -> np.ndarray:
+    """alpha, beta and c of the last form as functions of n."""
+    c = t[4] + t[5] * n + t[6] * n * n
+    return np.array([t[0] + t[1] * n, t[2] * np.exp(-n / t[3]), c])
 
 
 class Areas:
@@ -66,18 +94,16 @@ class Areas:
         return np.asarray(np.interp(np.log(p_star), np.log(NODES[:-1]), np.log(gap)))
 
 
-def coarse(shells: Shells, p_star: np.ndarray) -> np.ndarray:
-    """ln u_g / h_std by coarse-graining."""
-    theory = CoarseGrained(shells)
-    gap = theory.mean_gap(p_star * theory.delta_sigma)
+def log_gap(theory: Theory, shells: Shells, n: float, p_star: np.ndarray) -> np.ndarray:
+    """ln u_g / h_std of a theory of `gfmd analyze`."""
+    persson = theory_of(theory, shells, n)
+    gap = persson.mean_gap(p_star * persson.delta_sigma)
     return np.asarray(np.log(gap / np.sqrt(shells.height.sum())))
 
 
-def eq39(shells: Shells, p_star: np.ndarray) -> np.ndarray:
-    """ln u_g / h_std of the gamma that the shells have."""
-    theory = Persson(shells)
-    gap = theory.mean_gap(p_star * theory.delta_sigma)
-    return np.asarray(np.log(gap / np.sqrt(shells.height.sum())))
+def springs(shells: Shells) -> Shells:
+    """The same heights on springs, n = 0."""
+    return replace(shells, energy=shells.height, variance=shells.height)
 
 
 class Fits:
@@ -87,6 +113,10 @@ class Fits:
         self.surfaces = surfaces
         self.areas = {key: Areas(surface.shells) for key, surface in surfaces.items()}
         self.known: dict[tuple[str, float, str], np.ndarray] = {}
+        self.springs = {
+            (name, hurst): Areas(springs(surfaces[name, hurst, EXPONENTS[0]].shells))
+            for name, hurst in product(SPECTRA, HURST)
+        }
 
     def errors(self, form: str, c: np.ndarray, key: Key, seeds: slice) -> np.ndarray:
         """ln u_g less that of the seeds: seeds, pressures."""
@@ -106,6 +136,28 @@ class Fits:
             self.known[form, n, without] = least_squares(residuals, start, method="lm").x
         return self.known[form, n, without]
 
+    def smooth(self, without: str = "") -> np.ndarray:
+        """Constants of `of_n` of all spectra but those of one kind; n = 0 is its closed form."""
+        if (WEIGHT, 0.0, without) not in self.known:
+            exact = np.log(einstein_prediction(P_STAR).u_g)
+            weight = FORMS[GENERAL][0]
+
+            def residuals(t: np.ndarray) -> np.ndarray:
+                found = [
+                    areas.log_gap(weight, of_n(0.0, t), P_STAR) - exact
+                    for key, areas in self.springs.items()
+                    if key[0] != without
+                ]
+                found += [
+                    self.errors(GENERAL, of_n(key[2], t), key, FITTED).mean(axis=0)
+                    for key in self.surfaces
+                    if key[0] != without
+                ]
+                return np.concatenate(found)
+
+            self.known[WEIGHT, 0.0, without] = least_squares(residuals, SMOOTH, method="lm").x
+        return self.known[WEIGHT, 0.0, without]
+
 
 def cell(errors: list[np.ndarray]) -> str:
     """Of single seeds / of the mean over the seeds, in per cent."""
@@ -116,31 +168,37 @@ def signed(errors: np.ndarray) -> list[str]:
     return [f"{100 * error:+.1f}" for error in errors]
 
 
-def print_errors(fits: Fits, smooth_fit: np.ndarray) -> None:
+def print_errors(fits: Fits) -> None:
     """Test seeds; of the forms also spectra that were left out."""
     rows = []
     for n in EXPONENTS:
         keys = [(name, hurst, n) for name, hurst in product(SPECTRA, HURST)]
         held = {key: fits.surfaces[key].log_gap[HELD_OUT] for key in keys}
-        gammas = float(gamma_n(n)), float(smooth(n, *smooth_fit))
+        weights = float(gamma_n(n)), float(gamma(n, *GAMMA))
         cells = [
-            cell([fits.surfaces[key].theory(gamma) - held[key] for key in keys]) for gamma in gammas
+            cell([fits.surfaces[key].theory(one) - held[key] for key in keys]) for one in weights
         ]
         cells += [
             cell(
                 [fits.errors(form, fits.constants(form, n, key[0]), key, HELD_OUT) for key in keys]
             )
-            for form in list(FORMS)[1:]
+            for form in FREE
         ]
-        cells.append(cell([coarse(fits.surfaces[key].shells, P_STAR) - held[key] for key in keys]))
+        smooth = {key: of_n(n, fits.smooth(key[0])) for key in keys}
+        cells.append(cell([fits.errors(GENERAL, smooth[key], key, HELD_OUT) for key in keys]))
+        theory = {
+            key: log_gap("coarse-grained", fits.surfaces[key].shells, n, P_STAR) for key in keys
+        }
+        cells.append(cell([theory[key] - held[key] for key in keys]))
         rows.append([f"{n:g}", *cells])
-    heads = ["n", "Eq. (39)", "fitted γ", *list(FORMS)[1:], "coarse-graining"]
+    heads = ["n", "Eq. (39)", "fitted γ", *FREE, WEIGHT, "coarse-graining"]
     print_table("ln u_g on the test seeds, per cent; forms on spectra left out", heads, rows)
     rows = [
         [f"{n:g}", *(" ".join(f"{x:.3f}" for x in fits.constants(form, n)) for form in FORMS)]
         for n in EXPONENTS
     ]
     print_table("Constants, all spectra", ["n", *FORMS], rows)
+    print("\nConstants of fitted_weight.py:", *(f"{x:.3f}" for x in fits.smooth()))
 
 
 def print_spectra(fits: Fits) -> None:
@@ -148,7 +206,7 @@ def print_spectra(fits: Fits) -> None:
     rows = []
     for n in EXPONENTS:
         errors = [
-            coarse(surface.shells, P_STAR) - surface.log_gap.mean(axis=0)
+            log_gap("coarse-grained", surface.shells, n, P_STAR) - surface.log_gap.mean(axis=0)
             for key, surface in fits.surfaces.items()
             if key[2] == n
         ]
@@ -169,72 +227,82 @@ def means(path: Path, points: int | None = None) -> Iterator[tuple[list[Curve], 
         yield curves, np.mean([np.log(curve.column("u_g")) for curve in curves], axis=0)
 
 
-def print_other(path: Path, fits: Fits) -> None:
+def print_between(path: Path) -> None:
+    """Exponents that no constant was fitted to; mean of the seeds, in the continuum."""
+    rows = []
+    held: dict[tuple, dict[int, list[np.ndarray]]] = defaultdict(lambda: defaultdict(list))
+    shells = {}
+    for curve in sorted(compare(path).curves, key=lambda one: one.rows[0]["seed"]):
+        key = curve.n, spectrum_of(curve.rows[0]), curve.rows[0]["hurst"]
+        held[key][curve.points].append(np.log(curve.column("u_g")))
+        shells[key] = curve.persson.shells
+    for key, grids in sorted(held.items()):
+        finer = 4 / 3 * (grids[FINER][0] - grids[GRID][0])
+        seen = np.mean(grids[GRID], axis=0) + finer
+        errors = {name: log_gap(name, shells[key], key[0], P_STAR) - seen for name in THEORIES}
+        for name, error in errors.items():
+            rows.append([f"{key[0]:g}", f"{key[1]}, H = {key[2]}", THEORIES[name], *signed(error)])
+    heads = ["n", "surface", "", *(f"p* = {p:g}" for p in P_STAR)]
+    print_table("Exponents between those of the fit, test seeds, per cent", heads, rows)
+
+
+def print_other(path: Path) -> None:
     """Other pressures, on the grid of 512^2."""
     rows = []
-    for curves, log_gap in means(path, 512):
+    for curves, seen in means(path, GRID):
         n, p, shells = curves[0].n, curves[0].column("p_star"), curves[0].persson.shells
-        chosen = np.array([np.argmin(np.abs(p - one)) for one in OTHER])
-        told = {"Eq. (39)": eq39(shells, p[chosen])}
-        if n:
-            told[GENERAL] = Areas(shells).log_gap(
-                FORMS[GENERAL][0], fits.constants(GENERAL, n), p[chosen]
-            )
-        told["coarse-graining"] = coarse(shells, p[chosen])
-        rows += [[f"{n:g}", name, *signed(x - log_gap[chosen])] for name, x in told.items()]
+        at = np.array([np.argmin(np.abs(p - one)) for one in OTHER])
+        for name, head in THEORIES.items():
+            rows.append([f"{n:g}", head, *signed(log_gap(name, shells, n, p[at]) - seen[at])])
     print_table("Other pressures, per cent", ["n", "", *(f"p* = {p:g}" for p in OTHER)], rows)
 
 
-def print_depth(path: Path, fits: Fits) -> None:
+def print_depth(path: Path) -> None:
     """The range of the spectrum at p* = 0.01 and 0.1."""
     rows = []
-    for curves, log_gap in means(path):
-        n, p, shells = curves[0].n, curves[0].column("p_star"), curves[0].persson.shells
-        general = Areas(shells).log_gap(FORMS[GENERAL][0], fits.constants(GENERAL, n), p)
-        told = (eq39(shells, p), general, coarse(shells, p))
-        row = curves[0].rows[0]
-        cells = [" / ".join(signed((x - log_gap)[[0, 2]])) for x in told]
+    for curves, seen in means(path):
+        n, p, row = curves[0].n, curves[0].column("p_star"), curves[0].rows[0]
+        told = [log_gap(name, curves[0].persson.shells, n, p) - seen for name in THEORIES]
+        cells = [" / ".join(signed(error[[0, 2]])) for error in told]
         rows.append([f"{n:g}", f"{row['rolloff'] / row['cutoff']:.0f}", *cells])
-    heads = ["n", "λr/λs", "Eq. (39)", GENERAL, "coarse-graining"]
+    heads = ["n", "λr/λs", *THEORIES.values()]
     print_table("Range of the spectrum, p* = 0.01 / 0.1, per cent", heads, rows)
 
 
-def print_slabs(path: Path, fits: Fits) -> None:
+def print_slabs(path: Path) -> None:
     """Slabs, in the continuum, with the constants at the local exponent."""
-    table = PchipInterpolator(EXPONENTS, [fits.constants(GENERAL, n) for n in EXPONENTS])
     held = defaultdict(list)
     for curve in compare(path).curves:
         row, shells = curve.rows[0], curve.persson.shells
         p = curve.column("p_star") * row["delta_sigma"] / curve.persson.delta_sigma
-        local = Slab(thickness=row["thickness"]).local_exponent(shells.q, row["length"])
-        c = np.moveaxis(table(np.clip(local, EXPONENTS[0], EXPONENTS[-1])), -1, 0)
-        general = Areas(shells).log_gap(FORMS[GENERAL][0], c, p)
-        log_gap = np.log(curve.column("u_g_continuum"))
-        told = (eq39(shells, p), general, coarse(shells, p))
-        held[row["thickness"]].append([x - log_gap for x in told])
-    names = "Eq. (42)", GENERAL, "coarse-graining"
+        seen = np.log(curve.column("u_g_continuum"))
+        told = [log_gap(name, shells, np.nan, p) - seen for name in THEORIES]
+        held[row["thickness"]].append(told)
     rows = [
         [f"{t:g}", name, *signed(np.mean(errors, axis=0)[i])]
         for t, errors in held.items()
-        for i, name in enumerate(names)
+        for i, name in enumerate(THEORIES.values())
     ]
     print_table("Slabs, per cent", ["t/L", "", *(f"p* = {p:g}" for p in P_STAR)], rows)
     every = np.array([one for errors in held.values() for one in errors])
-    print("rms:", *(f"{name} {100 * rms(list(every[:, i])):.1f}" for i, name in enumerate(names)))
+    ends = zip(THEORIES.values(), np.moveaxis(every, 1, 0), strict=True)
+    print("\nrms:", *(f"{name} {100 * rms(list(errors)):.1f}" for name, errors in ends))
 
 
 def print_weights(records: list[Record], fits: Fits) -> None:
     """rms of ln W of the theory less that measured, over pressures up to 0.3 and groups."""
     rows = []
     for n in sorted({record["n"] for record in records}):
-        errors: dict[str, list[np.ndarray]] = {form: [] for form in FORMS}
+        forms = {form: (FORMS[form][0], fits.constants(form, n)) for form in FORMS}
+        forms[WEIGHT] = FORMS[GENERAL][0], of_n(n, fits.smooth())
+        errors: dict[str, list[np.ndarray]] = {form: [] for form in forms}
         for kind in KINDS:
             seen = np.mean([r["weight"] for r in records if (r["kind"], r["n"]) == (kind, n)], 0)
             shells = scene_of(kind, n, 0).shells
             areas = Areas(shells)
             group = np.digitize(shells.q / (2 * np.pi), groups()) - 1
-            for form, (weight, _) in FORMS.items():
-                w = weight(areas.scale, areas.all, fits.constants(form, n))
+            for form, (weight, c) in forms.items():
+                w = weight(areas.scale, areas.all, c)
                 for p, measured in zip(PRESSURES, seen, strict=True):
                     at = w[np.argmin(np.abs(np.log(NODES / p)))] * shells.energy
                     full = np.bincount(group, shells.energy, GROUPS)
@@ -243,21 +311,21 @@ def print_weights(records: list[Record], fits: Fits) -> None:
                     if p <= P_STAR[-1]:
                         errors[form].append(np.log(said / measured)[full > 0])
         rows.append([f"{n:g}", *(f"{rms([np.concatenate(e)]):.2f}" for e in errors.values())])
-    print_table("W by shell: rms of ln W - ln W measured", ["n", *FORMS], rows)
+    print_table("W by shell: rms of ln W - ln W measured", ["n", *FORMS, WEIGHT], rows)
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--folder", type=Path, default=Path("results/theory"))
-    parser.add_argument("--depth", type=Path, help="study; by default depth.h5 in the folder")
     parser.add_argument("--weights", type=Path, default=Path("results/energy_weights.jsonl"))
     given = parser.parse_args()
     fits = Fits(read(given.folder / "gamma.h5"))
-    print_errors(fits, np.array([0.2900, 0.7950, 0.2219]))
+    print_errors(fits)
     print_spectra(fits)
-    print_other(given.folder / "stiffness.h5", fits)
-    print_depth(given.depth or given.folder / "depth.h5", fits)
-    print_slabs(given.folder / "slab.h5", fits)
+    print_between(given.folder / "between.h5")
+    print_other(given.folder / "stiffness.h5")
+    print_depth(given.folder / "depth.h5")
+    print_slabs(given.folder / "slab.h5")
     lines = given.weights.read_text().splitlines()
     print_weights([json.loads(line) for line in lines], fits)
 

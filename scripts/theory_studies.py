@@ -66,6 +66,14 @@ def gamma_specs() -> list[str]:
     ]
 
 
+def between_specs() -> list[str]:
+    """Exponents between those of the fits, the test seeds on 512^2 and one on 1024^2."""
+    seeds, grid = grids({512: [*TEST], 1024: [TEST[0]]})
+    one = surface(*SPECTRA["roll-off, L/8"], 1 / 128, hurst=0.3, seed=seeds)
+    other = surface(*SPECTRA["roll-off, L/4"], 1 / 128, hurst=0.8, seed=seeds)
+    return [one + other + power([1.5, 2.5, 3.5]) + grid + rest(LIGHT)]
+
+
 def stiffness_specs() -> list[str]:
     """Contact stiffness and percolation of the gap, on three grids."""
     seeds, grid = grids({512: [*TRAINING, *TEST], 256: [*TRAINING], 1024: [*TRAINING][:4]})
@@ -100,6 +108,7 @@ def depth_specs() -> list[str]:
 
 
 STUDIES = {
+    "between": between_specs,
     "depth": depth_specs,
     "gamma": gamma_specs,
     "slab": slab_specs,

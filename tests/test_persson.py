@@ -10,7 +10,6 @@ from gfmd_cli.physics.elastomers import Slab
 from gfmd_cli.physics.persson import (
     Persson,
     Shells,
-    gamma_fitted,
     gamma_n,
     gamma_slab,
     ierfc,
@@ -286,12 +285,3 @@ def test_the_exponent_of_a_slab_is_read_off_the_shells(default):
     assert exact[0] > 3.5
     assert exact[-1] < 1.01
     assert np.abs(found - exact)[1:-1].max() < 0.05
-
-
-def test_the_fitted_gamma_falls_from_that_of_springs_to_a_floor():
-    n = np.linspace(0, 4, 81)
-    fitted = gamma_fitted(n)
-    assert np.all(np.diff(fitted) < 0)
-    assert fitted[0] == pytest.approx(0.5132, abs=3e-3)  # of the closed form of n = 0
-    assert gamma_fitted(5.0) == fitted[-1]
-    assert np.abs(fitted - gamma_n(n))[n <= 2].max() < 0.08  # close to the paper's up to n = 2

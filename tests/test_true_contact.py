@@ -195,6 +195,5 @@ def test_analyze_takes_another_theory_for_the_mean_gap_alone(records, output_of,
     told = output_of("analyze", tmp_path / "s.h5", "--json", "--theory", "fitted")
     for before, after in zip(paper, json.loads(told), strict=True):
         assert after["a_r_persson"] == before["a_r_persson"]
-        if before["p_star"] < 1:  # n = 0: 0.512 for 0.5, n = 1: 0.304 for 0.35
-            assert (after["u_g_persson"] > before["u_g_persson"]) == (before["n"] == 0)
+        assert after["u_g_persson"] == pytest.approx(before["u_g_persson"], rel=0.2)
         assert after["u_g_persson"] != before["u_g_persson"]

@@ -1,6 +1,6 @@
 """A study beside Persson theory."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
@@ -12,14 +12,15 @@ from gfmd_cli.errors import InputError
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.physics import einstein_solid
 from gfmd_cli.physics.coarse_graining import CoarseGrained
-from gfmd_cli.physics.persson import Persson, Shells, gamma_fitted
+from gfmd_cli.physics.fitted_weight import FittedWeight
+from gfmd_cli.physics.persson import Persson, Shells
 from gfmd_cli.study.columns import PARAMETERS
 from gfmd_cli.study.reading import StudyFile, open_study, solved_rows
 
 Row = dict[str, Any]
 Theory = Literal["paper", "fitted", "coarse-grained"]
-"""Of the mean gap: Eq. (30) with gamma of Eqs. (39) and (42), or with gamma as fitted in
-docs/theory.md, or coarse-graining without any gamma."""
+"""Of the mean gap: Eq. (30) with gamma of Eqs. (39) and (42), the weight that is fitted in
+docs/theory.md, or coarse-graining without any constant."""
 
 
 def in_continuum(row: Row, name: str) -> bool:
@@ -176,10 +177,7 @@ def compare_open(study: StudyFile, path: Path, theory: Theory = "paper") -> Comp
     groups = grouped(solved, lambda row: (row["scene"], *solver_of(row)))
     curves = []
     for (scene, *_), group in groups.items():
-        spectrum = spectra[scene]
-        if theory == "fitted":
-            spectrum = with_fitted_gamma(spectrum, float(group[0]["n"]))
-        persson = CoarseGrained(spectrum) if theory == "coarse-grained" else Persson(spectrum)
+        persson = theory_of(theory, spectra[scene], float(group[0]["n"]))
         curves.append(Curve(sorted(group, key=lambda row: row["p_star"]), persson))
     return Comparison(path, curves, len(rows) - len(solved))
 
@@ -189,10 +187,14 @@ def solver_of(row: Row) -> tuple[Any, ...]:
     return tuple(row[each.column.name] for each in PARAMETERS if each.table == "solver")
 
 
-def with_fitted_gamma(spectrum: Shells, n: float) -> Shells:
-    """A spectrum with gamma as fitted, at the exponent n or, where n is NaN, the local one."""
-    exponents = spectrum.exponents() if np.isnan(n) else np.full(spectrum.q.size, n)
-    return replace(spectrum, gamma=gamma_fitted(exponents))
+def theory_of(theory: Theory, spectrum: Shells, n: float) -> Persson:
+    """A theory of a spectrum and the exponent n of k(q); where n is NaN, the local exponent."""
+    if theory == "coarse-grained":
+        return CoarseGrained(spectrum)
+    if theory == "fitted":
+        exponents = spectrum.exponents() if np.isnan(n) else np.full(spectrum.q.size, n)
+        return FittedWeight(spectrum, exponents)
+    return Persson(spectrum)
 
 
 def einstein_prediction(p_star: Field) -> Prediction:

@@ -14,7 +14,6 @@ from scipy.special import erf, erfc, erfcx, erfinv
 from gfmd_cli.grid.arrays import Field
 
 _GAMMA = {0.0: 0.5, 0.5: 0.45, 1.0: 0.35, 2.0: 0.2, 3.0: 0.1, 4.0: 0.02}  # Eq. (39)
-_FITTED = (0.2900, 0.7950, 0.2219)  # of `gamma_fitted`, from scripts/gamma_fit.py
 _SAME_SHELL = 1e-9  # relative difference of |q| within one shell: far above rounding
 _CHUNK = 1 << 18  # elements of one temporary array, 2 MiB: fits a cache and bounds the memory
 _NARROW = 1e-5  # bin width / variance where the mid point errs as little as the difference, ~1e-10
@@ -54,17 +53,6 @@ def gamma_n(n: Field | float) -> Field:
     if np.isin(exponent, nodes).all():
         return np.asarray(values[np.searchsorted(nodes, exponent)])
     return monotone_cubic(nodes, values)(exponent)
-
-
-def gamma_fitted(n: Field | float) -> Field:
-    """Weight 0.2900 exp(-n / 0.7950) + 0.2219 of the elastic energy for an exponent n of k.
-
-    No equation of the paper: fitted to mean gaps of the continuum at p* = 0.01 to 0.3 on nine
-    spectra, see docs/theory.md for its errors. Exponents beyond [0, 4], the range of the fit, count
-    as its ends.
-    """
-    height, width, floor = _FITTED
-    return np.asarray(height * np.exp(-np.clip(n, 0.0, 4.0) / width) + floor)
 
 
 def gamma_slab(qt: Field) -> Field:
@@ -210,10 +198,24 @@ class Persson:
         deviation: Field = np.sqrt(_resolved_variance(p, self.delta_sigma**2))
         return deviation
 
+    def weight(self, a: Field, s: Field) -> tuple[Field, Field, Field]:
+        """Weight W = gamma a + (1 - gamma) a^3 of the elastic energy, dW/da and dW/ds.
+
+        Paper Eq. (30), which does not contain s. All of shape (pressures, bins).
+
+        Parameters
+        ----------
+        a : mean contact area of every bin, shape (pressures, bins)
+        s : contact area with all waves, shape (pressures, 1)
+        """
+        gamma, square = self.shells.gamma, a * a
+        rest = (1 - gamma) * square
+        return a * (gamma + rest), gamma + 3 * rest, np.zeros_like(a)
+
     def elastic_energy(self, p: Field | float) -> Field:
         """Elastic energy per area v = sum_q W k C / 2 at pressure p, without q = 0.
 
-        Paper Eqs. (29)-(32) with W = gamma a_r + (1 - gamma) a_r^3.
+        Paper Eqs. (29)-(32).
         """
         return self._energy_and_slope(np.asarray(p, dtype=np.float64))[0]
 
@@ -270,12 +272,18 @@ class Persson:
 
     def _energy_and_slope(self, p: Field) -> tuple[Field, Field]:
         """v and dv/dp, both of the shape of p. Paper Eqs. (29) and (30)."""
-        energy, gamma = self.shells.energy, self.shells.gamma
+        energy = 0.5 * self.shells.energy
+        if not energy.size:
+            return np.zeros_like(p), np.zeros_like(p)
         v, slope = np.empty(p.size), np.empty(p.size)
         for part in self._chunks(p.size):
-            a, da = _bin_area(p.ravel()[part], self.shells.variance)
-            v[part] = 0.5 * (a * (gamma + (1 - gamma) * a * a)) @ energy
-            slope[part] = 0.5 * (da * (gamma + 3 * (1 - gamma) * a * a)) @ energy
+            pressure = p.ravel()[part]
+            a, da = _bin_area(pressure, self.shells.variance)
+            x = np.minimum(self._reduced(pressure), _UNDERFLOW)[:, None]
+            ds = np.sqrt(2 / np.pi) / self.delta_sigma * np.exp(-x * x)
+            w, by_a, by_s = self.weight(a, erf(x))
+            v[part] = w @ energy
+            slope[part] = (by_a * da + by_s * ds) @ energy
         return v.reshape(p.shape), slope.reshape(p.shape)
 
     def _chunks(self, size: int) -> Iterator[slice]:
