@@ -12,7 +12,10 @@ from gfmd_cli.bench.file import Trace, read_bench, write_bench
 from gfmd_cli.bench.run import GROWTH, REFERENCE, run_bench, solve_reference, solvers_to_compare
 from gfmd_cli.bench.table import bench_table, solver_names
 from gfmd_cli.physics.contact import build_scene
-from gfmd_cli.physics.observables import QUANTITIES
+from gfmd_cli.physics.free_contact import build_free_scene
+from gfmd_cli.physics.observables import QUANTITIES, observe
+from gfmd_cli.solvers.dual import Dual
+from gfmd_cli.solvers.nested_grids import solve_contact
 from gfmd_cli.study.tasks import plan
 
 SPEC = power_spec(
@@ -250,3 +253,17 @@ def test_a_missed_tolerance_is_status_1(gfmd):
     assert told.exit_code == 1
     assert "max_steps" in told.output
     assert Path("tiny-bench.h5").exists()
+
+
+def test_a_bench_of_a_free_boundary_has_the_solver_that_suits_it(spec_of):
+    spec = spec_of("grid.boundary=free", "grid.points=64", "solver.kind=auto")
+    (trace,) = run_bench(spec, ignore)
+    assert trace.row["solver"] == "dual"
+    assert trace.row["boundary"] == "free"
+    assert trace.row["status"] == "converged"
+    (task,) = plan(spec)
+    contact = build_free_scene(task.surface, task.elastomer, 64).contact(0.1)
+    solution = solve_contact(contact, Dual(tolerance=1e-9))
+    seen = observe(contact, solution.u, solution.sigma)
+    assert trace.row["u_g_reference"] == pytest.approx(seen.u_g, rel=1e-6)
+    assert trace.samples["u_g_error"][-1] < 1e-4

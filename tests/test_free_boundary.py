@@ -1,10 +1,13 @@
 """Contacts of a map with an elastomer that goes on beyond it: exact results, other methods."""
 
 import copy
+from dataclasses import replace
 
 import free_contacts
+import h5py
 import numpy as np
 import pytest
+import scipy.fft
 from free_contacts import ELASTOMERS, compliance_matrix, oblong_contact
 from scipy.optimize import nnls
 
@@ -26,6 +29,7 @@ from gfmd_cli.solvers.dual import Dual
 from gfmd_cli.solvers.loop import Solver, solve
 from gfmd_cli.solvers.nested_grids import Resume, solve_contact
 from gfmd_cli.solvers.pcg import ProjectedCG
+from gfmd_cli.study.observables import SolvedContact
 
 ROUGH = SelfAffine(cutoff=0.05)
 SPEC = free_contacts.SPEC
@@ -206,7 +210,6 @@ def test_run_stores_the_boundary(rows_of):
     [
         ("elastomer={kind='slab', thickness=0.1}", "decays with the distance"),
         ("solver.kind=pcg", 'solver.kind: "pcg" solves contacts with grid.boundary = "periodic"'),
-        ("output.spectra=true", "output.spectra: is not available"),
     ],
 )
 def test_what_a_free_boundary_does_not_allow(gfmd, override, message):
@@ -258,3 +261,50 @@ def test_thin_layer_is_planned_and_solved(rows_of):
     """Much thinner than the side, but not than the spacing."""
     (row,) = rows_of("elastomer={kind='layer', thickness=0.02, base='sliding'}")
     assert row["status"] == "converged"
+
+
+def test_spectra_of_a_map_are_its_cosine_transform(gfmd):
+    """The mirrored map has the modes of a DCT of type II."""
+    words = ["output.spectra=true", 'output.fields=["height", "u", "sigma"]']
+    done = gfmd("run", "spec.toml", *(part for word in words for part in ("--set", word)))
+    assert done.exit_code == 0, done.output
+    with h5py.File("study.h5") as file:
+        (task,) = file["spectra"]
+        waves = file[f"spectra/{task}/waves"][()]
+        q = file[f"spectra/{task}/q"][()]
+        for name in ("height", "u", "sigma"):
+            field = file[f"fields/{task}/{name}"][()]
+            power = file[f"spectra/{task}/{name}"][()]
+            cosines = scipy.fft.dctn(field, type=2, norm="ortho") ** 2 / field.size
+            assert power.sum() == pytest.approx(field.var(), rel=1e-10)
+            assert power[0] == pytest.approx(cosines[0, 1] + cosines[1, 0], rel=1e-6)
+        assert waves.sum() == 4 * field.size - 1
+        assert q[0] == pytest.approx(np.pi)  # half a wave on the side L = 1
+
+
+def test_stress_of_full_contact_is_that_of_the_mirrored_map():
+    """On a half-space the quadrature is E*/2 times the rms gradient over the contact."""
+    surface = SelfAffine(cutoff=0.25, seed=3)
+    contact = build_free_scene(surface, Power(n=1), 64).contact(0.1)
+    whole = SolvedContact(contact, contact.height, np.ones(contact.grid.shape))
+    assert whole.full_contact_stress.deviation == pytest.approx(1, rel=1e-12)
+    assert whole.full_contact_stress.quadrature == pytest.approx(1, rel=1e-3)
+    x = np.cos(np.pi * (np.arange(64) + 0.5) / 64)
+    wave = replace(contact, height=np.tile(x, (64, 1)), pressure=1.0)
+    sigma = np.zeros((64, 64))
+    sigma[:, :16] = 1.0
+    solved = SolvedContact(wave, wave.height, sigma)
+    k = np.pi / contact.free.unit
+    s = k * x[:16]
+    assert solved.full_contact_stress.deviation == pytest.approx(s.std(), rel=1e-10)
+    slope = k * np.sin(np.pi * (np.arange(16) + 0.5) / 64)
+    expected = np.sqrt(np.mean(slope**2))
+    assert solved.full_contact_stress.quadrature == pytest.approx(expected, rel=1e-10)
+
+
+def test_true_contact_is_measured_with_a_free_boundary(rows_of):
+    (row,) = rows_of("output.true_contact=true")
+    assert row["boundary"] == "free"
+    assert 0 < row["deviation_c"] < 1
+    assert 0 < row["quadrature_c"] < 2
+    assert row["deviation_bearing"] > 0

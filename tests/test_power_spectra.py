@@ -6,7 +6,12 @@ import pytest
 from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.physics.contact import build_scene
 from gfmd_cli.physics.elastomers import Power
-from gfmd_cli.physics.power_spectra import autocorrelations, correlation, spectra
+from gfmd_cli.physics.power_spectra import (
+    autocorrelations,
+    correlation,
+    correlation_within,
+    spectra,
+)
 from gfmd_cli.physics.self_affine import SelfAffine
 
 
@@ -96,3 +101,23 @@ def test_a_constant_field_has_no_correlation():
     grid = Grid(16)
     _, found = autocorrelations(grid, {"f": np.zeros(grid.shape)})
     assert np.all(np.isnan(found["f"]))
+
+
+@pytest.mark.parametrize("grid", [Grid(9, points_y=6), Grid(10, dimension=1)], ids=str)
+def test_without_repetition_the_correlation_is_that_of_pairs_within_the_map(grid):
+    field = np.random.default_rng(2).standard_normal(grid.shape)
+    found = correlation_within(grid, field)
+    change = field - field.mean()
+    for shift in np.ndindex(*grid.shape):
+        first = tuple(slice(0, n - d) for n, d in zip(grid.shape, shift, strict=True))
+        second = tuple(slice(d, n) for n, d in zip(grid.shape, shift, strict=True))
+        expected = np.mean(change[first] * change[second]) / change.var()
+        assert found[shift] == pytest.approx(expected, abs=1e-12)
+
+
+def test_rings_of_a_map_without_repetition_end_at_half_of_its_side():
+    grid = Grid(16, length=2.0)
+    r, means = autocorrelations(grid, {"ramp": np.tile(np.arange(16.0), (16, 1))}, periodic=False)
+    assert r[-1] == pytest.approx(1.0, rel=0.1)
+    assert r.shape == autocorrelations(grid, {})[0].shape
+    assert means["ramp"][0] == 1.0

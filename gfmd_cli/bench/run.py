@@ -16,7 +16,10 @@ import numpy as np
 
 from gfmd_cli.bench.file import Trace
 from gfmd_cli.errors import InputError
-from gfmd_cli.physics.contact import Contact, build_scene
+from gfmd_cli.physics.contact import Contact, Scene
+from gfmd_cli.physics.elastomers import LinearElastomer
+from gfmd_cli.physics.free_contact import SCENES
+from gfmd_cli.physics.indenters import RigidSurface
 from gfmd_cli.physics.observables import QUANTITIES, Observables, observe
 from gfmd_cli.solvers.auto import Auto
 from gfmd_cli.solvers.ccg import ConstrainedCG
@@ -139,7 +142,8 @@ def solvers_to_compare(spec: Spec, task: Task, contact: Contact) -> list[Solver]
     """
     given: list[Solver] = [*spec.solver]
     if len(given) == 1 and isinstance(given[0], Auto):
-        given = [kind(**given[0].shared_keys()) for kind in COMPARED]
+        kinds = COMPARED if contact.boundary == "periodic" else (Auto,)
+        given = [kind(**given[0].shared_keys()) for kind in kinds]
     n = task.elastomer.exponent
     steepness = np.inf if n is None else n  # unknown: only what suits all elastomers
     chosen = [solver.for_contact(contact) for solver in given]
@@ -157,8 +161,6 @@ def run_bench(spec: Spec, report: Report) -> list[Trace]:
         raise InputError(f"load.{spec.load.quantity}: a bench takes load.p_star or load.pressure")
     if any(task.auto for task in tasks):
         raise InputError('grid.points: "auto" is no grid to compare solvers on; give a number')
-    if any(task.boundary != "periodic" for task in tasks):
-        raise InputError('grid.boundary: a bench compares solvers of a "periodic" boundary')
     check_memory(tasks)
     traces: list[Trace] = []
     for task, contact in _contacts(tasks):
@@ -175,13 +177,20 @@ def run_bench(spec: Spec, report: Report) -> list[Trace]:
 def _contacts(tasks: list[Task]) -> Iterator[tuple[Task, Contact]]:
     """Each contact of the spec once, with one of its tasks."""
     seen: set[Any] = set()
-    scene_of = lru_cache(maxsize=1)(build_scene)  # pressures of one scene follow each other
+    scene_of = lru_cache(maxsize=1)(_scene)  # pressures of one scene follow each other
     for task in tasks:
-        key = (task.surface, task.elastomer, task.points, task.points_y, task.load)
+        scene_key = (task.boundary, task.surface, task.elastomer, task.points, task.points_y)
+        key = (*scene_key, task.load)
         if key not in seen:
             seen.add(key)
-            scene = scene_of(task.surface, task.elastomer, task.points, points_y=task.points_y)
+            scene = scene_of(*scene_key)
             yield task, scene.contact(task.p_star(scene.delta_sigma))
+
+
+def _scene(
+    boundary: str, surface: RigidSurface, elastomer: LinearElastomer, points: int, points_y: int
+) -> Scene:
+    return SCENES[boundary](surface, elastomer, points, points_y=points_y)
 
 
 def _trace(

@@ -127,6 +127,16 @@ class FreeContact(Contact):
         """Level from which displacements enter the energy: that of the undeformed surface."""
         return self.undeformed_level(u, sigma)
 
+    def mirrored(self) -> Contact:
+        """The periodic contact of the map mirrored to twice its sides, whose Delta_sigma is 1.
+
+        Its stress K h is that of full contact, of which a map with borders has none of its own.
+        """
+        grid = twice(self.grid)
+        k = self.free.elastomer.stiffness(grid.wavenumber(), grid.length) / self.free.unit
+        mask = None if self.may_touch is None else mirrored(self.may_touch)
+        return Contact(grid, mirrored(self.height), k, self.pressure, mask)
+
     def coarsen(self, shape: Shape) -> "FreeContact":
         """The same contact on larger pixels, with the means of the heights over them."""
         grid = self.grid.coarser(shape)
@@ -194,14 +204,7 @@ def _mirrored(
     A measured map is mirrored before it is interpolated, so that no height on a finer grid lies
     between those of opposite borders. On its own points no process needs the whole mirrored map.
     """
-    whole = replace(
-        surface.grid(grid.points, grid.points_y),
-        points=2 * grid.points,
-        points_y=2 * grid.points_y,
-        length=2 * grid.length,
-        length_y=2 * grid.length_y,
-        threads=grid.threads,
-    )
+    whole = twice(replace(surface.grid(grid.points, grid.points_y), threads=grid.threads))
     doubled = create_grid(whole, ranks)
     own_points = (surface.smallest_grid_y(), surface.smallest_grid())
     twin = surface.mirrored()
@@ -230,6 +233,19 @@ def _on_map(doubled: Grid, values: Any, grid: Grid) -> Any:
 
 SCENES: dict[str, Callable[..., Scene]] = {"periodic": build_scene, "free": build_free_scene}
 """How a scene is built, by the boundary of the map."""
+
+
+def twice(grid: Grid) -> Grid:
+    """A grid of twice the points along each axis, on a cell of twice the sides."""
+    along_x = replace(grid, points=2 * grid.points, length=2 * grid.length)
+    if grid.dimension == 1:
+        return along_x
+    return replace(along_x, points_y=2 * grid.points_y, length_y=2 * grid.length_y)
+
+
+def mirrored(values: Any) -> Any:
+    """Values on a whole map, mirrored to twice the points along each axis."""
+    return np.pad(values, [(0, points) for points in values.shape], mode="symmetric")
 
 
 def mean_over(grid: Grid, values: Field, where: Mask) -> float:

@@ -13,6 +13,7 @@ import numpy as np
 from gfmd_cli.grid.arrays import Field, row_blocks
 from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.physics.contact import radial_power
+from gfmd_cli.physics.free_contact import twice
 from gfmd_cli.physics.persson import bin_edges
 
 EXACT, BINS = 64, 500  # shells of one |q|, and logarithmic bins; as in `persson.shells`
@@ -39,22 +40,27 @@ def spectra(grid: Grid, fields: Mapping[str, Field]) -> tuple[Field, Field, dict
     return q, waves[held], powers
 
 
-def autocorrelations(grid: Grid, fields: Mapping[str, Field]) -> tuple[Field, dict[str, Field]]:
+def autocorrelations(
+    grid: Grid, fields: Mapping[str, Field], *, periodic: bool = True
+) -> tuple[Field, dict[str, Field]]:
     """Autocorrelation C(r) / C(0), C(r) = <(f(x) - <f>)(f(x + r) - <f>)>, averaged over rings.
 
     The rings are one grid spacing wide, the wider of those along x and y, with radii of 0, 1, ...
     spacings up to half the shorter side. Returns the mean distance r of each ring [m] and the mean
-    C(r) / C(0) by name of the field (NaN for a constant field), all of shape (rings,).
+    C(r) / C(0) by name of the field (NaN for a constant field), all of shape (rings,). Fields that
+    are not periodic have the mean over the pairs of points of the grid at each displacement.
     """
     step = max(grid.spacings)
-    distance, rings = _distance(grid, step), int(0.5 * min(grid.sides) / step * (1 + 1e-12)) + 1
+    correlated = correlation if periodic else correlation_within
+    cell = grid if periodic else twice(grid)
+    distance, rings = _distance(cell, step), int(0.5 * min(grid.sides) / step * (1 + 1e-12)) + 1
     ring = np.rint(distance).astype(np.int64).ravel()
     count = np.bincount(ring)
 
     def mean(values: Field) -> Field:
         return np.asarray(np.bincount(ring, values.ravel())[:rings] / count[:rings])
 
-    means = {name: mean(correlation(grid, values)) for name, values in fields.items()}
+    means = {name: mean(correlated(grid, values)) for name, values in fields.items()}
     return mean(distance) * step, means
 
 
@@ -71,6 +77,22 @@ def correlation(grid: Grid, field: Field) -> Field:
     grid.backward_into(products)
     variance = float(products.flat[0])
     return np.divide(products, variance if variance > 0 else np.nan, out=products)
+
+
+def correlation_within(grid: Grid, field: Field) -> Field:
+    """C(r) / C(0) of a field that is not periodic, from the pairs of points at a displacement r.
+
+    The shape is twice that of the grid; displacements without pairs have zero. The products are
+    those of the field padded with zeros, and of N points along an axis N - |d| pairs are d apart.
+    """
+    padded = np.zeros([2 * points for points in grid.shape])
+    padded[tuple(map(slice, grid.shape))] = field - field.mean()
+    products = correlation(twice(grid), padded)
+    for axis, points in enumerate(grid.shape):
+        pairs = np.abs(points - np.arange(2.0 * points)) / points
+        pairs[points] = 1.0  # without pairs: the products are rounding
+        products /= pairs[:, None] if axis < products.ndim - 1 else pairs
+    return products
 
 
 def _distance(grid: Grid, step: float) -> Field:

@@ -4,11 +4,10 @@ from gfmd_cli.errors import InputError
 from gfmd_cli.physics.elastomers import LinearElastomer
 from gfmd_cli.physics.indenters import RigidSurface
 from gfmd_cli.solvers.auto import AnySolver
-from gfmd_cli.spec.models import GridTable, Spec, periodic_only
+from gfmd_cli.spec.models import GridTable
 
 
 def with_boundary(
-    spec: Spec,
     surface: RigidSurface,
     elastomer: LinearElastomer,
     grid: GridTable,
@@ -16,19 +15,17 @@ def with_boundary(
 ) -> tuple[RigidSurface, GridTable]:
     """The surface with the treatment of its edges, and the grid with its boundary.
 
-    A map that ends at its borders has a free boundary where elastomer, solver and output allow
-    it, and is mirrored elsewhere. Every other surface is periodic.
+    A map that ends at its borders has a free boundary where elastomer and solver allow it, and is
+    mirrored elsewhere. Every other surface is periodic.
     """
     if grid.boundary is None:
-        free = surface.has_borders and _allows_free(spec, surface.dimension, elastomer, solver)
+        free = surface.has_borders and _allows_free(surface.dimension, elastomer, solver)
         grid = grid.model_copy(update={"boundary": "free" if free else "periodic"})
     return surface.within(grid.boundary or "periodic"), grid
 
 
-def _allows_free(spec: Spec, dimension: int, elastomer: LinearElastomer, solver: AnySolver) -> bool:
-    """Whether contacts of the spec can have a free boundary."""
-    if periodic_only(spec.output):
-        return False
+def _allows_free(dimension: int, elastomer: LinearElastomer, solver: AnySolver) -> bool:
+    """Whether contacts of this elastomer and solver can have a free boundary."""
     try:
         solver.check_boundary("free")
         elastomer.check_free_boundary(dimension)

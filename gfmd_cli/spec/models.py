@@ -66,7 +66,7 @@ class GridTable(Choice):
     """"periodic": the cell is repeated periodically. "free": the elastomer extends beyond the map
     and carries no load there; this requires an elastomer whose displacement decays with the
     distance from the load. The default is "periodic". For a map that is not periodic, without
-    surface.edges, it is "free" if elastomer, solver and output allow it."""
+    surface.edges, it is "free" if elastomer and solver allow it."""
 
     def on_cell(self, surface: RigidSurface, points: int) -> tuple[RigidSurface, int]:
         """A surface on its cell, and the points of the cell along y.
@@ -330,15 +330,6 @@ class Spec(Choice):
         if self.load.quantity in SOUGHT:
             data["load"]["tolerance"] = self.load.tolerance
         return data
-
-
-PERIODIC_ONLY = ("true_contact", "spectra")
-"""Keys of [output] whose results are defined for a periodic boundary."""
-
-
-def periodic_only(output: OutputTable) -> list[str]:
-    """The given keys that a free boundary does not allow."""
-    return [f"output.{name}" for name in output.on_request() if name in PERIODIC_ONLY]
 
 
 def file_digest(path: Path) -> str:

@@ -35,7 +35,6 @@ from gfmd_cli.spec.models import (
     SweepTable,
     axes_of,
     expand,
-    periodic_only,
 )
 from gfmd_cli.spec.pairing import Places, alternatives, keys_of, places_of, problems_of
 
@@ -347,12 +346,6 @@ def _discord(tables: dict[str, Any], where: _Where) -> list[str]:
             f'{where("grid.points")}: grid.points: "auto" needs load.p_star or load.pressure; '
             f"load.{load.quantity} is searched on a given grid"
         )
-    free = any(grid.boundary == "free" for grid in tables.get("grid", []))
-    if free and (output := tables.get("output")) is not None:
-        problems += [
-            f'{where(key)}: {key}: is not available for grid.boundary = "free"'
-            for key in periodic_only(output)
-        ]
     if accuracy is not None and not accuracy.asked():
         problems.append(
             f"{where('accuracy')}: accuracy: give mean_gap, contact_area or stress_deviation"

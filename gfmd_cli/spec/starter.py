@@ -61,9 +61,7 @@ def starter_of_scan(
     )
     text = with_keys(text, overrides)
     spec = read_text(text, path, overrides)
-    used, grid = with_boundary(
-        spec, spec.surface[0], spec.elastomer[0], spec.grid[0], spec.solver[0]
-    )
+    used, grid = with_boundary(spec.surface[0], spec.elastomer[0], spec.grid[0], spec.solver[0])
     return text, used.preparation(grid.boundary or "")
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.physics.approach import approach
 from gfmd_cli.physics.edge_share import edge_shares
+from gfmd_cli.physics.free_contact import mirrored, twice
 from gfmd_cli.physics.observables import contact_pressure, gap_histogram, stress_histogram
 from gfmd_cli.physics.patches import area_distribution
 from gfmd_cli.physics.power_spectra import autocorrelations, spectra
@@ -145,13 +146,19 @@ def on_request(output: OutputTable, solved: SolvedContact) -> Row:
 
 
 def _curves(solved: Solved) -> dict[str, dict[str, Field]]:
-    """Power spectra and autocorrelations, in units of m and Pa."""
+    """Power spectra and autocorrelations, in units of m and Pa.
+
+    With a free boundary the spectra are those of the fields mirrored to twice the sides.
+    """
     scene, solution = solved.scene, solved.solution
+    grid, periodic = scene.grid, solved.contact.boundary == "periodic"
     fields = {"height": solved.contact.height, "u": solution.u, "sigma": solution.sigma}
     units = {"height": scene.h_std, "u": scene.h_std, "sigma": scene.delta_sigma}
-    q, waves, powers = spectra(scene.grid, fields)
+    r, means = autocorrelations(grid, fields, periodic=periodic)
+    if not periodic:
+        grid, fields = twice(grid), {name: mirrored(field) for name, field in fields.items()}
+    q, waves, powers = spectra(grid, fields)
     powers = {name: power * units[name] ** 2 for name, power in powers.items()}
-    r, means = autocorrelations(scene.grid, fields)
     return {
         "spectra": {"q": q, "waves": waves, **powers},
         "autocorrelations": {"r": r, **means},

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 from gfmd_cli.grid.arrays import Field, Mask
 from gfmd_cli.physics.contact import Contact
+from gfmd_cli.physics.free_contact import FreeContact, mirrored
 from gfmd_cli.physics.observables import contact_points
 from gfmd_cli.physics.patches import contact_patches, open_gap
 from gfmd_cli.physics.true_contact import ContactStress, bearing, contact_stress
@@ -45,9 +46,15 @@ class SolvedContact:
         return areas
 
     @cached_property
+    def mirrored(self) -> Contact:
+        """The contact in a periodic cell: of a map with a free boundary, its mirrored one."""
+        return self.contact.mirrored() if isinstance(self.contact, FreeContact) else self.contact
+
+    @cached_property
     def full_contact_stress(self) -> ContactStress:
         """Statistics of the full-contact stress over the points in contact."""
-        return contact_stress(self.contact, self.touching)
+        touching = self.touching if self.is_periodic else mirrored(self.touching)
+        return contact_stress(self.mirrored, touching)
 
     @cached_property
     def percolates(self) -> list[bool]:
@@ -115,7 +122,7 @@ OBSERVABLES = (
             "standard deviation of K h over the highest points, as many as the predicted a_r, "
             "/ Delta_sigma",
         ),
-        lambda solved: float(bearing(solved.contact).delta_sigma_c(solved.contact.pressure)),
+        lambda solved: float(bearing(solved.mirrored).delta_sigma_c(solved.contact.pressure)),
     ),
     Observable(
         "patches",

@@ -29,6 +29,8 @@ from gfmd_cli.spec.models import (
 
 STIFFNESS_FIELDS, SPECTRA_FIELDS = 3.0, 1.0
 """Fields that output.stiffness and output.spectra add to those of the solver, by peak memory."""
+MIRRORED_FIELDS = {"true_contact": 2.0, "spectra": 11.0}
+"""Fields that keys of [output] add with a free boundary, by peak memory at 1536^2."""
 STORED_FIELDS, ACCURACY_FIELDS = 1.0, 0.5
 """Fields that each name in output.fields, and [accuracy], add, by peak memory."""
 OBLONG_FIELDS, ODD_FIELDS = 4.5, 0.5
@@ -143,6 +145,8 @@ class Task:
         fields = self.solver.fields_for(self.boundary, self.elastomer.exponent)
         fields += STIFFNESS_FIELDS if self.output.stiffness else 0.0
         fields += SPECTRA_FIELDS if self.output.spectra else 0.0
+        if self.boundary == "free":
+            fields += sum(MIRRORED_FIELDS.get(key, 0.0) for key in self.output.names())
         fields += STORED_FIELDS * len(self.output.fields)
         fields += ACCURACY_FIELDS if self.accuracy is not None else 0.0
         fields += self._fields_of_levels(points)
@@ -282,7 +286,7 @@ def _check(spec: Spec) -> None:
 def _chosen(spec: Spec, at: dict[str, int]) -> dict[str, Any]:
     """The entries of the swept tables at these places, with the boundary of the contact."""
     chosen = {table: getattr(spec, table)[i] for table, i in at.items()}
-    surface, grid = with_boundary(spec, **chosen)
+    surface, grid = with_boundary(**chosen)
     return chosen | {"surface": surface, "grid": grid}
 
 
