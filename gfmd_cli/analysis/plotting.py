@@ -198,19 +198,17 @@ class ColumnFigure(LegendFigure):
 
     def line(self, axes: Any, label: str, x: Field, y: Field, **style: Any) -> None:
         """Draw a line where y > 0, with an entry of the legend."""
-        super().line(axes, label, x, y, **style)
-        self._keep_line((label,), x, y, style)
+        self.unnamed_line((label,), x, y, **style)
+        self.legend[label] = Line2D([], [], **style)
 
     def unnamed_line(self, names: tuple[str, ...], x: Field, y: Field, **style: Any) -> None:
         """Draw a line where y > 0 that belongs to entries of the legend and adds none."""
-        self.axes.plot(x, np.where(y > 0, y, np.nan), **style)
-        self._keep_line(names, x, y, style)
-
-    def _keep_line(self, names: tuple[str, ...], x: Field, y: Field, style: dict[str, Any]) -> None:
+        y = np.where(y > 0, y, np.nan)
+        self.axes.plot(x, y, **style)
         if x.size:
             colour, width = to_hex(style["color"]), style.get("lw", STYLE["lines.linewidth"])
-            y, dashed = np.where(y > 0, y, np.nan), "ls" in style
-            self.layers.append(Layer("line", names, x, y, colour, width=width, dashed=dashed))
+            layer = Layer("line", names, x, y, colour, width=width, dashed="ls" in style)
+            self.layers.append(layer)
 
     def theory(self, lines: list[tuple[CurveStyle, Field, Field]]) -> None:
         """Draw one black line if the theory is the same for all curves, else one in each colour."""

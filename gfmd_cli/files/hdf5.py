@@ -19,11 +19,9 @@ MAX_DEPTH = 32  # of nested groups that are searched; paths of 20000 names take 
 VERSION = ("v110", "v110")  # of HDF5: the first whose metadata all carry checksums
 
 
-@contextmanager
-def new_hdf5(file: Fresh) -> Iterator[Any]:
+def new_hdf5(file: Fresh) -> Any:
     """HDF5 written into a new file, of any size, without a copy of it in memory."""
-    with h5py.File(file, "w", libver=VERSION) as made:
-        yield made
+    return h5py.File(file, "w", libver=VERSION)
 
 
 @contextmanager

@@ -15,6 +15,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from scipy.fft import dctn
 
 from gfmd_cli.grid.arrays import Field, Mask
 from gfmd_cli.grid.convolution import PaddedTransform
@@ -74,8 +75,6 @@ class FreeElasticity:
         its array, of which C is a principal submatrix: a discrete cosine transform of type I. Every
         process computes all of it.
         """
-        from scipy.fft import dctn  # half a second that most processes save
-
         shape, spacings = self.grid.whole_shape, self.grid.spacings
         kernel = self.elastomer.free_compliance(shape, spacings) * self.unit
         return float(dctn(kernel, type=1).min())

@@ -114,16 +114,11 @@ def _axis(title: str, scale: str, limits: tuple[float, float]) -> dict[str, Any]
 def _entry(label: str, handle: Any) -> dict[str, str]:
     """An entry of the legend: its name, a character for its symbol, its colour."""
     colour = handle.get_color()
-    shared = not isinstance(colour, tuple) and not str(colour).startswith("#")
-    return {
-        "name": _name(label),
-        "symbol": _symbol(handle),
-        "colour": (INK if colour == "black" else DARKER) if shared else _hex(colour),
-    }
-
-
-def _hex(colour: str | tuple[float, float, float]) -> str:
-    return colour if isinstance(colour, str) else hex_of(*colour)
+    if isinstance(colour, tuple):
+        colour = hex_of(*colour)
+    elif not colour.startswith("#"):  # shared by several curves
+        colour = INK if colour == "black" else DARKER
+    return {"name": _name(label), "symbol": _symbol(handle), "colour": colour}
 
 
 def _symbol(handle: Any) -> str:

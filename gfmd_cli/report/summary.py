@@ -95,9 +95,8 @@ def key_numbers(data: ReportData) -> list[KeyNumber]:
     """The most important numbers, in SI units where those mean something, else reduced."""
     rows = data.solved
     tolerances = span(_column(rows, "tolerance"))
-    quantities = _si_numbers(data) if data.in_si else _reduced_numbers(data)
     return [
-        *quantities,
+        *_quantities(data),
         *_theory_numbers(data),
         KeyNumber(
             "Largest residual",
@@ -108,38 +107,31 @@ def key_numbers(data: ReportData) -> list[KeyNumber]:
     ]
 
 
-def _area(rows: list[Row]) -> KeyNumber:
+def _quantities(data: ReportData) -> list[KeyNumber]:
+    """Pressure, area, gap and stress; in SI units with the scales behind them, or reduced."""
+    rows = data.solved
+    p_star, full = span(_column(rows, "p_star")), span(_column(rows, "delta_sigma"), "Pa")
+    gap, deviation = (span(_best(rows, name)) for name in ("u_g", "sigma_p"))
+    gap_where, deviation_where = (_where(rows, name) for name in ("u_g", "sigma_p"))
     note = f"a_r, share of the nominal area{_where(rows, 'a_r')}"
-    return KeyNumber("Contact area", span(_best(rows, "a_r")), note)
-
-
-def _reduced_numbers(data: ReportData) -> list[KeyNumber]:
-    rows = data.solved
-    gap, deviation = (span(_best(rows, name)) for name in ("u_g", "sigma_p"))
+    area = KeyNumber("Contact area", span(_best(rows, "a_r")), note)
+    if not data.in_si:
+        return [
+            KeyNumber("Pressure", p_star, "p*, in units of Delta_sigma"),
+            area,
+            KeyNumber("Mean gap", gap, f"u_g / h_std{gap_where}"),
+            KeyNumber("Stress deviation", deviation, f"sigma_p / Delta_sigma{deviation_where}"),
+        ]
     return [
-        KeyNumber("Pressure", span(_column(rows, "p_star")), "p*, in units of Delta_sigma"),
-        _area(rows),
-        KeyNumber("Mean gap", gap, f"u_g / h_std{_where(rows, 'u_g')}"),
-        KeyNumber("Stress deviation", deviation, f"sigma_p / Delta_sigma{_where(rows, 'sigma_p')}"),
-    ]
-
-
-def _si_numbers(data: ReportData) -> list[KeyNumber]:
-    rows = data.solved
-    pressure, full = (span(_column(rows, name), "Pa") for name in ("pressure", "delta_sigma"))
-    gap, deviation = (span(_best(rows, name)) for name in ("u_g", "sigma_p"))
-    return [
-        KeyNumber("Pressure", pressure, f"p* = {span(_column(rows, 'p_star'))}"),
-        _area(rows),
+        KeyNumber("Pressure", span(_column(rows, "pressure"), "Pa"), f"p* = {p_star}"),
+        area,
         KeyNumber(
-            "Mean gap",
-            span(_best(rows, "u_g", "h_std"), "m"),
-            f"u_g / h_std = {gap}{_where(rows, 'u_g')}",
+            "Mean gap", span(_best(rows, "u_g", "h_std"), "m"), f"u_g / h_std = {gap}{gap_where}"
         ),
         KeyNumber(
             "Stress deviation",
             span(_best(rows, "sigma_p", "delta_sigma"), "Pa"),
-            f"sigma_p / Delta_sigma = {deviation}{_where(rows, 'sigma_p')}",
+            f"sigma_p / Delta_sigma = {deviation}{deviation_where}",
         ),
         KeyNumber("Stress in full contact", full, "rms Delta_sigma"),
         KeyNumber(

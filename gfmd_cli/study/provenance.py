@@ -18,7 +18,7 @@ PACKAGES = ("numpy", "scipy", "pyFFTW", "h5py", "pydantic", "SurfaceTopography")
 
 
 def origin(spec: Spec, text: str) -> dict[str, str]:
-    """Attributes of a file: the spec that it was made from, and by what, where and when."""
+    """Attributes of a file: the spec that it was made from, and software, machine and date."""
     resolved = spec.resolved()
     return {
         "Conventions": "CF-1.11",
@@ -26,13 +26,6 @@ def origin(spec: Spec, text: str) -> dict[str, str]:
         "spec": json.dumps(resolved),
         "spec_digest": digest(resolved),
         "spec_text": text,
-        **provenance(),
-    }
-
-
-def provenance() -> dict[str, str]:
-    """Attributes of a study: software, versions, commit, machine, date."""
-    return {
         "software": "gfmd",
         "software_version": gfmd_cli.__version__,
         "git_commit": git_commit(),

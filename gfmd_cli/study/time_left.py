@@ -2,8 +2,9 @@
 
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from math import isfinite, log
-from typing import Any, NamedTuple
+from typing import Any
 
 from gfmd_cli.study.progress import Progress, Report
 from gfmd_cli.study.tasks import SECONDS_PER_PAIR, Task
@@ -13,7 +14,8 @@ KNOWN = 0.1  # share of the forecast work after which the measured speed is used
 FOUND = 0.05  # share of the decrease of ln(residual) after which its rate predicts the rest
 
 
-class _Running(NamedTuple):
+@dataclass
+class _Running:
     """A running task."""
 
     since: float
@@ -29,6 +31,10 @@ class _Running(NamedTuple):
     step: int = 0
     stepped: float = 0.0
     """Time of the first step of the task."""
+
+    def done(self) -> float:
+        """Steps times grid points that the task has done."""
+        return self.work + self.step * float(self.size)
 
 
 class Clock:
@@ -74,11 +80,9 @@ class Clock:
         elif progress.event == "step" and index in self.running:
             was = self.running[index]
             if progress.size != was.size:
-                work, stepped = self._work(index), was.stepped or now
-                was = _Running(
-                    was.since, progress.size, now, progress.residual, work=work, stepped=stepped
-                )
-            self.running[index] = was._replace(last=progress.residual, step=progress.step)
+                was.work, was.stepped = was.done(), was.stepped or now
+                was.size, was.reached, was.first = progress.size, now, progress.residual
+            was.last, was.step = progress.residual, progress.step
         elif progress.event == "end":
             self._leave(index)
             was = self.running.pop(index, _Running(now))
@@ -107,17 +111,12 @@ class Clock:
         measured, forecast = self.taken.get(elastomer) or self.taken.get(None, (1.0, 1.0))
         return measured / forecast
 
-    def _work(self, index: int) -> float:
-        """Steps times grid points that a task has done."""
-        was = self.running[index]
-        return was.work + was.step * float(was.size)
-
     def _left_of(self, index: int) -> float:
         """Remaining seconds of a running task."""
         task, was, now = self.tasks[index], self.running[index], self.now()
         seconds, spent = self.seconds[index], now - was.since
         forecast = seconds * self._pace(task.elastomer)
-        alone = SECONDS_PER_PAIR * self._work(index)
+        alone = SECONDS_PER_PAIR * was.done()
         if alone > KNOWN * seconds:  # use the measured speed of this machine
             prepared = was.stepped - was.since
             forecast = prepared + seconds * (spent - prepared) / alone
