@@ -74,14 +74,14 @@ def test_a_dry_run_lists_the_tasks_and_writes_nothing(gfmd):
 
 def test_a_shard_takes_its_share(gfmd):
     assert gfmd("run", "spec.toml", "--shard", "0/2").exit_code == 0
-    assert "2 tasks are not solved yet" in gfmd("analyze", "small.h5").output
+    assert "2 tasks not solved yet" in gfmd("analyze", "small.h5").output
     assert len(gfmd("export", "small.h5").output.splitlines()) == 3
     assert gfmd("run", "spec.toml", "--shard", "1/2").exit_code == 0
     assert len(gfmd("export", "small.h5").output.splitlines()) == 5
     assert gfmd("run", "spec.toml", "--shard", "5/9").exit_code == 0
 
 
-@pytest.mark.parametrize("shard", ["2/2", "-1/2", "a/b", "1", "0/0", "1/2/3"])
+@pytest.mark.parametrize("shard", ["2/2", "-1/2", "a/b", "1", "0/0", "1/2/3", "²/3", "0/²"])
 def test_a_bad_shard_is_refused(gfmd, shard):
     told = gfmd("run", "spec.toml", f"--shard={shard}")
     assert told.exit_code == 2
@@ -95,6 +95,13 @@ def test_a_bad_shard_is_refused(gfmd, shard):
         ("run", "spec.toml", "--set", "elastomer.n=9"),
         ("run", "spec.toml", "--set", "surface.cutoff=0.001"),
         ("run", "spec.toml", "--jobs", "0"),
+        ("run", "spec.toml", "-o", "."),
+        ("run", "spec.toml", "-o", ""),
+        ("run", "spec.toml", "--dry-run", "-o", "/"),
+        ("status", "spec.toml", "-o", "."),
+        ("run", "spec.toml", "--max-hours", "nan"),
+        ("run", "spec.toml", "--checkpoint-every", "nan"),
+        ("run", "spec.toml", "--set", "load.p_star=1e7"),
         ("analyze", "none.h5"),
         ("export", "none.h5"),
         ("run",),
@@ -276,3 +283,14 @@ def test_every_config_runs_on_a_small_grid(gfmd, config):
     told = gfmd("run", config, "-o", "study.h5", *settings)
     assert told.exit_code == 0, told.output
     assert gfmd("analyze", "study.h5").exit_code == 0
+
+
+def test_a_study_is_no_height_map_unless_it_holds_heights(gfmd):
+    gfmd("run", "spec.toml", "--set", "elastomer.n=0")
+    told = gfmd("surface", "small.h5")
+    assert told.exit_code == 2
+    assert "choose one by surface.dataset" in told.output
+    gfmd("run", "spec.toml", "--set", "elastomer.n=0", "--set", 'output.fields=["u", "height"]')
+    told = gfmd("surface", "small.h5")
+    assert told.exit_code == 0, told.output
+    assert "64 x 64 points" in told.output

@@ -538,3 +538,9 @@ def test_max_hours_shorter_than_the_start_of_the_workers_solve_a_task(run):
         run(overrides=("elastomer.n=0",), max_seconds=1e-9, jobs=2)
     _, _, outcome = run(overrides=("elastomer.n=0",), max_seconds=1e-9, jobs=2)
     assert outcome.total() == 2
+
+
+def test_a_time_without_end_is_no_limit(run):
+    _, events, outcome = run(overrides=("elastomer.n=0",), max_seconds=float("inf"), jobs=1)
+    assert outcome.total() == 2
+    assert not [event for event in events if event.event == "warning"]

@@ -40,6 +40,7 @@ def analyze(
     from gfmd_cli.analysis.compare import compare
     from gfmd_cli.analysis.records import as_records
     from gfmd_cli.analysis.run_summary import edge_warnings
+    from gfmd_cli.analysis.units import count
 
     comparison = compare(study, theory)
     if as_json:
@@ -49,7 +50,7 @@ def analyze(
         for line in edge_warnings([row for curve in comparison.curves for row in curve.rows]):
             show(f"\n{line}")
         if comparison.missing:
-            show(f"\n{comparison.missing} tasks are not solved yet: run the spec again.")
+            show(f"\n{count(comparison.missing, 'task')} not solved yet: run the spec again.")
     if figures is not None:
         from gfmd_cli.analysis.figures import draw_all
 

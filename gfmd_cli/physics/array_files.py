@@ -81,11 +81,16 @@ def _maps(datasets: dict[str, Any]) -> list[str]:
 
 
 def map_names(path: Path) -> list[str]:
-    """The height maps of an HDF5 file, in its order; none for any other file, or a damaged one."""
+    """The height maps of an HDF5 file, in its order; none for any other file, or a damaged one.
+
+    Of a study these are its stored heights; its other arrays are no maps.
+    """
     from gfmd_cli.files.hdf5 import datasets_below, open_hdf5
 
     try:
         with open_hdf5(path) as file:
-            return _maps(datasets_below(file))
+            names = _maps(datasets_below(file))
+            is_study = "spec_text" in file.attrs
+            return [name for name in names if not is_study or name.endswith("/height")]
     except Exception:  # a damaged file can raise any; reading it will say what is wrong
         return []

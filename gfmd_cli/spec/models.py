@@ -13,6 +13,7 @@ from pydantic import Field as Key
 
 from gfmd_cli.choice import Choice, Positive
 from gfmd_cli.errors import InputError
+from gfmd_cli.physics.contact import PRESSURES
 from gfmd_cli.physics.elastomers import Elastomer
 from gfmd_cli.physics.indenters import SMALLEST_GRID, RigidSurface
 from gfmd_cli.physics.surfaces import Surface
@@ -168,6 +169,10 @@ class LoadTable(Choice):
         given = [name for name in LOADS if getattr(self, name) is not None]
         if len(given) != 1:
             raise ValueError(f"give one of {', '.join(LOADS)}")
+        low, high = PRESSURES
+        beyond = [p for p in self.listed() if not low <= p <= high]
+        if beyond and self.p_star is not None:
+            raise ValueError(f"p_star must be from {low:g} to {high:g}, got {beyond[0]:g}")
         if "tolerance" in self.model_fields_set and given[0] not in SOUGHT:
             raise ValueError(f"tolerance belongs to {' or '.join(SOUGHT)}")
         return self
@@ -293,6 +298,8 @@ class Spec(Choice):
     output: OutputTable
     accuracy: AccuracyTable | None = None
     sweep: list[SweepTable] = Key(default_factory=list)
+    source: str = ""
+    """The file of the spec, for messages."""
     places: dict[str, list[tuple[int | None, ...]]] = Key(default_factory=dict)
     """Where each entry of a swept table stands in each group of paired lists; None where the
     table has no list of the pair."""
@@ -313,7 +320,7 @@ class Spec(Choice):
     def resolved(self) -> dict[str, Any]:
         """What determines the results, as plain data: files stand for their content."""
         data: dict[str, Any] = self.model_dump(
-            mode="json", exclude={"study", "load", "places"}, by_alias=True
+            mode="json", exclude={"study", "load", "places", "source"}, by_alias=True
         )
         if not self.sweep:
             del data["sweep"]

@@ -273,7 +273,7 @@ def build_spec(data: dict[str, Any], folder: Path, where: _Where) -> Spec:
         if name not in MODELS
     ]
     sweeps = _sweeps(data, folder, where, problems)
-    tables: dict[str, Any] = {"sweep": sweeps, "places": {}}
+    tables: dict[str, Any] = {"sweep": sweeps, "places": {}, "source": where.name}
     for name in [name for name in MODELS if name != "sweep"]:
         if name in REQUIRED and name not in data:
             problems.append(f"{where.name}: table [{name}] is missing")

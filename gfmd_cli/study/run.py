@@ -4,7 +4,7 @@ from collections import Counter
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from threading import Event, Timer
+from threading import TIMEOUT_MAX, Event, Timer
 
 from gfmd_cli.errors import InputError, Interrupted, SpaceError
 from gfmd_cli.grid import plans
@@ -62,6 +62,9 @@ def run_study(
     signal or the time given, when all states are saved, and where tasks are left whose workers
     were killed.
     """
+    for name, seconds in (("checkpoint_every", checkpoint_every), ("max_seconds", max_seconds)):
+        if seconds is not None and not seconds >= 0:
+            raise InputError(f"{name}: must be a positive number, got {seconds:g}")
     forget_files()
     forget_scene()
     study = Study(path)
@@ -91,8 +94,8 @@ def run_study(
         tell(progress)
 
     context = SolveContext(options, watch, stop, ranks)
-    seconds = _time_to_work(max_seconds, pending, jobs)
-    with noted(stop), _timer(stop, seconds, begun), _folder(study, tasks, ranks) as damaged:
+    limit = _time_to_work(max_seconds, pending, jobs)
+    with noted(stop), _timer(stop, limit, begun), _folder(study, tasks, ranks) as damaged:
         unusable = plans.plan_with(study.parts, estimated=reproducible)
         context.warn(*moved, *damaged, *filter(None, [unusable]))
         try:
@@ -188,7 +191,7 @@ def _timer(stop: Event, seconds: float | None, begun: Event) -> Iterator[None]:
         begun.wait()
         stop.set()
 
-    timer = Timer(seconds, request_stop)
+    timer = Timer(min(seconds, TIMEOUT_MAX), request_stop)
     timer.daemon = True
     timer.start()
     try:

@@ -44,12 +44,17 @@ EARLIER = "earlier_specs"
 
 
 class Study:
-    """A study file and the unfinished work beside it. Raises InputError for a link to itself."""
+    """A study file and the unfinished work beside it.
+
+    Raises InputError for a link to itself and for a folder.
+    """
 
     def __init__(self, path: Path) -> None:
         self.path = Path(os.path.realpath(path)) if path.is_symlink() else path
         if self.path.is_symlink():
             raise InputError(f"{path}: a symbolic link that leads to itself")
+        if not self.path.name or self.path.is_dir():
+            raise InputError(f"{path}: a folder, where a study file (NAME.h5) is expected")
         self._entries: dict[Path, tuple[tuple[int, ...], Entry]] = {}
         """What is known of records, and of which file."""
         known = self.path.suffix == ".h5"

@@ -230,6 +230,13 @@ def plan(spec: Spec) -> list[Task]:
 
     Raises InputError where a grid does not resolve its surface or a file is unfit.
     """
+    try:
+        return _tasks(spec)
+    except InputError as error:
+        raise InputError(f"{spec.source}: {error}") from error
+
+
+def _tasks(spec: Spec) -> list[Task]:
     _check(spec)
     resolved = spec.resolved()
     alternatives = {table: getattr(spec, table) for table in SWEPT}
