@@ -216,3 +216,17 @@ def test_the_package_lists_its_names():
 def test_the_script_whose_types_are_checked_runs(tmp_path):
     script = runpy.run_path(str(Path(__file__).with_name("user_script.py")))
     assert script["main"](tmp_path) == pytest.approx(1)
+
+
+@pytest.mark.parametrize("jobs", [0, -1])
+def test_no_worker_at_all_is_refused(tmp_path, jobs):
+    spec = {
+        "surface": {"kind": "self-affine", "cutoff": 0.2},
+        "elastomer": {"kind": "half-space"},
+        "grid": {"points": 16},
+        "load": {"p_star": 0.1},
+    }
+    with pytest.raises(InputError, match="at least 1 worker"):
+        run(spec, tmp_path / "a.h5", jobs=jobs)
+    with pytest.raises(InputError, match="unknown table '3'"):
+        run(spec | {3: 4}, tmp_path / "a.h5")

@@ -97,6 +97,13 @@ def test_a_map_that_is_too_steep(tmp_path):
     assert set(FileSurface(path=tmp_path / "h.npy", length=1e-5).remarks()) <= set(warnings)
 
 
+def test_a_side_in_micrometres_makes_a_map_too_smooth(tmp_path):
+    np.save(tmp_path / "h.npy", solve(tables()).height)
+    right, wrong = (FileSurface(path=tmp_path / "h.npy", length=side) for side in (1e-5, 10.0))
+    assert right.remarks() == []
+    assert "check that heights and side are in metres" in wrong.remarks()[0]
+
+
 @pytest.mark.parametrize(
     ("missing", "share", "warned"),
     [("fill", 0.04, False), ("fill", 0.2, True), ("void", 0.2, False)],

@@ -6,6 +6,7 @@ from gfmd_cli.grid.arrays import Field
 from gfmd_cli.physics.map_preparation import border_step
 
 STEEP = 3.0  # rms gradient; a choice: surfaces of machined or worn solids have less
+SMOOTH = 1e-6  # rms gradient; a choice: polished mirrors have about that
 CLIFF = 5.0  # ratio of the step across the border to that inside; a choice: 1 if periodic
 FILLED = 0.05  # share of filled heights; a choice, as for the frame of the window
 
@@ -13,7 +14,7 @@ FILLED = 0.05  # share of filled heights; a choice, as for the frame of the wind
 def map_remarks(
     heights: Field, sides: tuple[float, ...], *, unsized: bool, repeated: bool, filled: float
 ) -> list[str]:
-    """Warnings about a missing side, filled heights, a steep gradient and a step at the border.
+    """Warnings about a missing side, filled heights, an unusual gradient and a step at the border.
 
     Parameters
     ----------
@@ -34,7 +35,7 @@ def map_remarks(
     points_per_metre = (n / side for n, side in zip(heights.shape, sides, strict=True))
     slopes = (np.diff(heights, axis=i) * each for i, each in enumerate(points_per_metre))
     gradient = np.sqrt(sum(float(np.mean(slope**2)) for slope in slopes))
-    if gradient > STEEP:
+    if gradient > STEEP or 0 < gradient < SMOOTH:
         remarks.append(
             f"rms gradient {gradient:.3g}: check that heights and side are in metres; "
             "surface.scale is the factor from the heights of the file to metres, "

@@ -20,7 +20,8 @@ def read_microscope_file(path: Path, dataset: str | None, max_bytes: int) -> Hei
     if path.stat().st_size > max_bytes:
         raise InputError(f"{path}: {path.stat().st_size} bytes; at most {max_bytes} are read")
     with path.open("rb") as file, warnings.catch_warnings():
-        for category in (DeprecationWarning, FutureWarning, ImportWarning):  # of other packages
+        ignored = (DeprecationWarning, FutureWarning, ImportWarning, RuntimeWarning)
+        for category in ignored:  # of other packages
             warnings.simplefilter("ignore", category)
         try:
             from SurfaceTopography.IO import readers
@@ -82,6 +83,8 @@ def _read_channel(path: Path, reader: Any, dataset: str | None, max_bytes: int) 
     if scan.unit is not None:
         scan = scan.to_unit("m")
     source = f"{reader.format()}, {channel.channel_id}"
+    if reader.format() == "asc" and len(shape) == 2:
+        _check_all_rows_read(path, *shape)
     if scan.is_uniform:
         heights, sides = scan.heights().T, tuple(map(float, scan.physical_sizes))[::-1]
     else:
@@ -94,6 +97,34 @@ def _read_channel(path: Path, reader: Any, dataset: str | None, max_bytes: int) 
         periodic=bool(scan.is_periodic),
         source=source,
     )
+
+
+def _check_all_rows_read(path: Path, rows: int, columns: int) -> None:
+    """Raise InputError where a table has more rows than were read.
+
+    The reader skips lines with words, also in the table, where they would shift all rows below.
+    """
+    with path.open("rb") as file:
+        lengths = [len(line.split()) for line in file]
+    if lengths.count(columns) <= rows:
+        return
+    with path.open("rb") as file:
+        for number, line in enumerate(file, 1):
+            words = [word for word in line.split() if not _is_number(word)]
+            if lengths[number - 1] == columns and 0 < len(words) <= columns / 2:
+                raise InputError(
+                    f"{path}:{number}: {words[0].decode(errors='replace')!r} in a row of the table "
+                    "is no number; write NaN for a missing height, and save text without a byte "
+                    "order mark"
+                )
+
+
+def _is_number(word: bytes) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True
 
 
 def _at_equal_distances(x: Any, heights: Any) -> tuple[Any, tuple[float]]:

@@ -269,7 +269,7 @@ def build_spec(data: dict[str, Any], folder: Path, where: _Where) -> Spec:
     """Check plain data against the models; paths are relative to `folder`."""
     problems = [
         f"{where(name)}: {_unknown(name, list(MODELS), 'table')}"
-        for name in data
+        for name in map(str, data)  # tables from Python may have other keys
         if name not in MODELS
     ]
     sweeps = _sweeps(data, folder, where, problems)

@@ -82,6 +82,8 @@ def share_out(
     If there are fewer tasks than cores, large grids use the remaining cores as threads, unless the
     run is to be `reproducible`: the number of threads may change the last bits.
     """
+    if jobs is not None and jobs < 1:
+        raise InputError(f"--jobs {jobs}: at least 1 worker process is needed")
     if not tasks:
         return 1, 1
     size = max(task.size for task in tasks)
