@@ -45,9 +45,11 @@ class Start:
     """A displacement to start from."""
 
     u: Field
-    """u >= h on the finest grid, u = h where the pressure is positive."""
+    """u >= h, and u = h where the pressure is positive."""
     transforms: float
     """Transforms by their share of points of the finest grid."""
+    contact: Contact
+    """The contact on the grid of this displacement."""
 
 
 def start_from(
@@ -66,7 +68,7 @@ def start_from(
     last, spent = finer[-1], 0.0
     shapes = [contact.grid.shape for contact in (coarse, *finer)]
     doubled = all(b == tuple(2 * n for n in a) for a, b in pairwise(shapes))
-    if not doubled or not pressure.any() or not all(map(_suits, finer)):
+    if not doubled or not pressure.any() or not all(map(suits, finer)):
         return None
     for contact in finer:
         tiles = Tiles(_reached(coarse.grid.shape, pressure > 0))
@@ -81,10 +83,10 @@ def start_from(
             solve.tiles.put(solve.s, pressure)
         spent += solve.transforms * contact.grid.size / last.grid.size
         coarse = contact
-    return Start(u, spent)
+    return Start(u, spent, last)
 
 
-def _suits(contact: Contact) -> bool:
+def suits(contact: Contact) -> bool:
     """Whether the operators on tiles apply, and a solve on tiles can be faster."""
     grid, (low, high) = contact.grid, EXPONENTS
     if contact.may_touch is not None or grid.dimension == 1 or not grid.whole:

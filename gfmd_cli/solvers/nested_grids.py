@@ -11,7 +11,8 @@ from gfmd_cli.grid.arrays import Field, row_blocks
 from gfmd_cli.grid.fft_grid import Grid, Shape
 from gfmd_cli.physics.contact import Contact
 from gfmd_cli.physics.observables import contact_pressure
-from gfmd_cli.solvers.local_start import COARSE_TOLERANCE, start_from
+from gfmd_cli.solvers.direct_start import direct_start
+from gfmd_cli.solvers.local_start import COARSE_TOLERANCE, start_from, suits
 from gfmd_cli.solvers.loop import Solver, State, Watch, ignore, solve
 from gfmd_cli.solvers.multigrid import ASPECT
 from gfmd_cli.status import Status
@@ -87,9 +88,15 @@ def solve_contact(
         if grids and solver.starts_locally:
             pressure = contact_pressure(fine.obstacle, state.u, state.sigma)
             pause = partial(watch, fine, state)  # a solve that is stopped goes on from this grid
-            local = start_from(fine, pressure, grids[::-1], solver.tolerance, pause)
+            finer = grids[::-1]
+            if suits(contact):
+                local = start_from(fine, pressure, finer, solver.tolerance, pause)
+            else:
+                local = direct_start(fine, pressure > 0, finer, pause)
             if local is not None:
-                start, grids, spent = local.u, [contact], spent + local.transforms
+                start, spent = local.u, spent + local.transforms
+                while grids[-1] is not local.contact:
+                    grids.pop()
     assert state is not None
     return Solution(state.u, state.sigma, state.residual, status, solver.kind, state.step, spent)
 

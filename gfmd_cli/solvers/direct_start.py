@@ -1,0 +1,183 @@
+"""A start for contacts of few points: the equations of the points in contact are solved directly.
+
+The stress is zero outside the contact, and the displacement is that of the indenter inside. With
+the compliance C = 1 / k(q) and the points A of contact this is a linear system for their stresses s
+and the level c of the displacement,
+
+    C_AA s + c = h_A,    sum of s = p times the number of grid points.
+
+A is found by the primal-dual active set method (Hintermueller, Ito & Kunisch, SIAM J. Optim. 13,
+865, 2002): after each solution the points with s < 0 leave A, and those that the displacement
+enters join it, the deepest first. Four to ten sets suffice on a grid that starts from the contact
+of the next coarser one, whatever k(q) is. If the number of wrong points does not decrease for some
+sets, as may occur for k(q) steeper than q^2, only the last of them changes, until it does
+(Portugal, Judice & Vicente, Math. Comput. 63, 625, 1994).
+
+A set costs one pair of transforms, which shows the displacement at all points, and n^3 / 3
+operations for n points. The solution is exact: its residual is the rounding.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from scipy.linalg import LinAlgError, cho_factor, cho_solve
+
+from gfmd_cli.grid.arrays import Field, Mask, row_blocks
+from gfmd_cli.physics.contact import Contact
+from gfmd_cli.solvers.local_start import COARSE_TOLERANCE, Start
+
+COST = 5000  # largest n^3 per point of a grid; measured: with more, the iteration is faster
+HEADROOM = 1.3  # largest number of points over that of the first set
+GROWTH = 0.4  # largest share of points that join a set at a time; measured: from 0.3 to 0.6 as good
+PATIENCE = 3  # sets without fewer wrong points
+MAX_SETS = 40
+
+Points = tuple[Any, ...]
+"""Rows and columns of points, as indices of a field."""
+
+
+def direct_start(
+    coarse: Contact, touching: Mask, finer: list[Contact], pause: Callable[[], None] = lambda: None
+) -> Start | None:
+    """The start on the finest of the `finer` grids that can be reached by direct solves.
+
+    `touching` are the points in contact on a coarser grid. `pause` is called for every set and may
+    end the solve by an exception. None where even the first of the grids has too many points in
+    contact.
+    """
+    last, touching = finer[-1], np.atleast_2d(touching)
+    solved: _DirectSolve | None = None
+    spent = 0.0
+    for contact in finer:
+        largest = int((COST * contact.grid.size) ** (1 / 3))
+        if not contact.grid.whole or np.count_nonzero(touching) > largest:
+            break
+        touching = _refined(touching, contact)
+        if HEADROOM * np.count_nonzero(touching) > largest:
+            break
+        solve = _DirectSolve(contact, touching)
+        is_solved = solve.run(largest, 0.0 if contact is last else COARSE_TOLERANCE, pause)
+        spent += solve.transforms * contact.grid.size / last.grid.size
+        if not is_solved:
+            break
+        solved, touching = solve, solve.touching
+    return Start(solved.displacement(), spent, solved.contact) if solved else None
+
+
+def _refined(touching: Mask, contact: Contact) -> Mask:
+    """The points of a finer grid that are nearest to points in contact, or between two of them.
+
+    A point is between two if they are the next ones along x, along y or along a diagonal.
+    """
+    near = np.zeros(contact.grid.as_rows(contact.height).shape, dtype=np.bool_)
+    sizes: list[tuple[int, int]] = list(zip(near.shape, touching.shape, strict=True))
+    places = np.nonzero(touching)
+    around = [
+        (i[:, None] * n // m + np.arange(-(n // m), n // m + 1)) % n
+        for i, (n, m) in zip(places, sizes, strict=True)
+    ]
+    near[around[0][:, :, None], around[1][:, None, :]] = True
+    points = np.nonzero(near)
+    top, left = (i * m // n for i, (n, m) in zip(points, sizes, strict=True))
+    bottom, right = (-(-i * m // n) % m for i, (n, m) in zip(points, sizes, strict=True))
+    near[points] = touching[top, left] & touching[bottom, right]
+    near[points] |= touching[top, right] & touching[bottom, left]
+    nearest = ((2 * i * n + m) // (2 * m) % n for i, (n, m) in zip(places, sizes, strict=True))
+    near[tuple(nearest)] = True
+    refined: Mask = contact.clear_untouchable(near)
+    return refined
+
+
+class _DirectSolve:
+    """The points in contact on one grid."""
+
+    def __init__(self, contact: Contact, touching: Mask) -> None:
+        self.contact, self.grid, self.touching = contact, contact.grid, touching
+        self.obstacle = self.grid.as_rows(contact.obstacle)
+        self.values = self.grid.as_rows(self.grid.padded)[:, : self.grid.points]
+        self.transforms = 0.0
+        self.evaluate((0, 0), 1.0)
+        self.compliance = self.values.copy()
+        """Displacement by a unit stress at the first point."""
+
+    def evaluate(self, points: Points, s: Field | float) -> None:
+        """`values` <- C s, without its mean."""
+        self.values[...] = 0.0
+        self.values[points] = s
+        self.grid.unfilter_padded(self.contact.stiffness)
+        self.transforms += 2
+
+    def run(self, largest: int, tolerance: float, pause: Callable[[], None]) -> bool:
+        """Find the points in contact, up to a residual; whether the sets had at most `largest`.
+
+        The displacement stays in `values`, its level above the indenter in `level`.
+        """
+        fewest, patience = self.grid.size, PATIENCE
+        for _ in range(MAX_SETS):
+            pause()
+            points = np.nonzero(self.touching)
+            if not 0 < points[0].size <= largest:
+                return False
+            try:
+                s = self.stress(points)
+            except LinAlgError:  # rounding, at very steep k(q)
+                return False
+            self.evaluate(points, s)
+            self.level = float((self.values[points] - self.obstacle[points]).mean())
+            wrong, violation = self.compare(points, s)
+            count = int(np.count_nonzero(wrong))
+            if count == 0 or violation < tolerance:
+                break
+            patience = PATIENCE if count < fewest else patience - 1
+            fewest = min(count, fewest)
+            if patience < 0:
+                wrong.ravel()[: np.flatnonzero(wrong)[-1]] = False
+            self.exchange(wrong, max(1, int(GROWTH * s.size)))
+        return True
+
+    def compare(self, points: Points, s: Field) -> tuple[Mask, float]:
+        """The points that are in contact or not by mistake, and the natural residual of that."""
+        wrong = np.empty(self.touching.shape, dtype=np.bool_)
+        violation = 0.0
+        for rows in row_blocks(self.values):
+            gap = self.values[rows] - self.obstacle[rows]
+            np.less(gap, self.level, out=wrong[rows])
+            wrong[rows] &= ~self.touching[rows]
+            violation += float(np.square(gap[wrong[rows]] - self.level).sum())
+        wrong[points] = s < 0
+        violation += float(np.square(s[s < 0]).sum())
+        return wrong, self.contact.as_residual(violation)
+
+    def exchange(self, wrong: Mask, most: int) -> None:
+        """Change whether these points are in contact; the `most` deepest of those entered join."""
+        entered = np.nonzero(wrong & ~self.touching)
+        if entered[0].size > most:
+            gap = self.values[entered] - self.obstacle[entered]
+            shallow = np.argpartition(gap, most)[most:]
+            wrong[tuple(places[shallow] for places in entered)] = False
+        self.touching ^= wrong
+
+    def stress(self, points: Points) -> Field:
+        """The stresses of these points. Raises LinAlgError if rounding makes C_AA indefinite."""
+        rows, columns = points
+        matrix = np.empty((rows.size, rows.size))
+        for a in range(rows.size):
+            b = slice(a + 1)
+            matrix[a, b] = self.compliance[rows[a] - rows[b], columns[a] - columns[b]]
+        # The lower triangle by rows is the upper one by columns, which LAPACK overwrites.
+        factor = cho_factor(matrix.T, overwrite_a=True, check_finite=False)
+        sides = np.stack([self.obstacle[points], np.ones(rows.size)], axis=1)
+        by_height, by_level = cho_solve(factor, sides, check_finite=False).T
+        missing = self.contact.pressure * self.grid.size - by_height.sum()
+        stress: Field = by_height + by_level * (missing / by_level.sum())
+        return stress
+
+    def displacement(self) -> Field:
+        """The displacement, laid on the indenter in contact."""
+        u = self.grid.empty()
+        rows = self.grid.as_rows(u)
+        np.subtract(self.values, self.level, out=rows)
+        np.maximum(rows, self.obstacle, out=rows)
+        np.copyto(rows, self.obstacle, where=self.touching)
+        return u

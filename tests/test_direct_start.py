@@ -1,0 +1,136 @@
+"""The direct start: its solutions against those without it, and when it is not used."""
+
+from typing import ClassVar
+
+import numpy as np
+import pytest
+
+from gfmd_cli.physics.contact import Contact, build_scene
+from gfmd_cli.physics.elastomers import Power, Slab
+from gfmd_cli.physics.indenters import LineParabola
+from gfmd_cli.physics.self_affine import SelfAffine
+from gfmd_cli.solvers import direct_start as module
+from gfmd_cli.solvers.direct_start import direct_start
+from gfmd_cli.solvers.nested_grids import solve_contact
+from gfmd_cli.solvers.pcg import ProjectedCG
+
+SURFACE = SelfAffine(cutoff=0.1)
+
+
+class WholeGrids(ProjectedCG):
+    starts_locally: ClassVar[bool] = False
+
+
+def square(elastomer, points=256, p_star=0.003):
+    return build_scene(SURFACE, elastomer, points).contact(p_star)
+
+
+def with_holes():
+    contact = square(Power(n=2))
+    known = np.random.default_rng(0).random(contact.grid.shape) > 0.1
+    known[:100, :80] = False
+    return Contact(contact.grid, contact.height, contact.stiffness, contact.pressure, known)
+
+
+def oblong():
+    """Half of the points along y, on pixels of 2 to 1."""
+    contact = square(Power(n=3))
+    return contact.coarsen((128, 256))
+
+
+CONTACTS = {
+    "n=0.5": lambda: square(Power(n=0.5)),
+    "n=2": lambda: square(Power(n=2)),
+    "n=3": lambda: square(Power(n=3)),
+    "n=4": lambda: square(Power(n=4)),
+    "slab": lambda: square(Slab(thickness=0.02), p_star=0.0005),
+    "odd": lambda: square(Power(n=2), points=181),
+    "holes": with_holes,
+    "oblong": oblong,
+}
+
+
+@pytest.mark.parametrize("contact", [make() for make in CONTACTS.values()], ids=CONTACTS)
+def test_the_solution_is_that_of_the_iteration_and_exact(contact):
+    """Without a step on the finest grid, at a residual far below the tolerance."""
+    direct = solve_contact(contact, ProjectedCG(tolerance=1e-3))
+    whole = solve_contact(contact, WholeGrids(tolerance=1e-7))
+    assert direct.status == whole.status == "converged"
+    assert direct.steps == 0
+    assert direct.residual < 1e-6
+    assert direct.u == pytest.approx(whole.u, abs=1e-7)
+    held = direct.u == contact.obstacle
+    assert np.array_equal(held, whole.u == contact.obstacle)
+    assert direct.sigma == pytest.approx(whole.sigma, abs=1e-5 * whole.sigma.max())
+
+
+def test_a_line_contact_is_that_of_the_iteration():
+    contact = build_scene(LineParabola(radius=1.0), Power(n=1), 1024).contact(0.003)
+    direct = solve_contact(contact, ProjectedCG(tolerance=1e-3))
+    assert direct.steps == 0
+    assert direct.u == pytest.approx(solve_contact(contact, WholeGrids()).u, abs=1e-6)
+
+
+def test_a_contact_that_the_coarse_grid_misses_is_entered():
+    """A spike of one point, between the points of the coarse grid."""
+    contact = square(Power(n=2))
+    coarse = contact.coarsen((128, 128))
+    touching = solve_contact(coarse, WholeGrids()).u == coarse.height
+    height = contact.height.copy()
+    height[101, 77] += 2.0 * height.max()
+    spiked = Contact(contact.grid, height, contact.stiffness, contact.pressure)
+    start = direct_start(coarse, touching, [spiked])
+    assert start is not None
+    assert start.u[101, 77] == height[101, 77]
+    assert start.u == pytest.approx(solve_contact(spiked, WholeGrids()).u, abs=1e-6)
+
+
+@pytest.mark.parametrize("n", [2, 3])
+def test_the_start_does_not_need_all_points_in_contact_on_the_coarse_grid(n):
+    contact = square(Power(n=n))
+    coarse = contact.coarsen((128, 128))
+    held = solve_contact(coarse, WholeGrids()).u == coarse.height
+    whole = solve_contact(contact, WholeGrids(tolerance=1e-7))
+    for seed in range(3):
+        kept = held & (np.random.default_rng(seed).random(held.shape) < 0.7)
+        start = direct_start(coarse, kept, [contact])
+        assert start is not None
+        assert start.u == pytest.approx(whole.u, abs=1e-7)
+
+
+def test_a_guess_far_from_the_contact_leads_to_the_solution():
+    """A point in a valley pulls the surface down, which then enters thousands of others."""
+    contact = square(Power(n=3))
+    coarse = contact.coarsen((128, 128))
+    start = direct_start(coarse, coarse.height == coarse.height.min(), [contact])
+    assert start is not None
+    assert start.u == pytest.approx(solve_contact(contact, WholeGrids()).u, abs=1e-6)
+
+
+def test_from_the_grid_on_that_has_too_many_points_the_iteration_goes_on(monkeypatch):
+    contact = square(Power(n=3))
+    whole = solve_contact(contact, WholeGrids(tolerance=1e-6))
+    held = np.count_nonzero(whole.u == contact.height)
+    for points in (0.3 * held, 0.9 * held, 1.5 * held):
+        monkeypatch.setattr(module, "COST", points**3 / contact.grid.size)
+        solution = solve_contact(contact, ProjectedCG(tolerance=1e-6))
+        assert solution.u == pytest.approx(whole.u, abs=1e-6)
+
+
+def test_a_large_contact_is_left_to_the_iteration():
+    contact = square(Power(n=2))
+    assert direct_start(contact.coarsen((128, 128)), np.ones((128, 128), bool), [contact]) is None
+    assert direct_start(contact.coarsen((128, 128)), np.zeros((128, 128), bool), [contact]) is None
+
+
+def test_a_direct_solve_notices_a_request_to_stop():
+    shown = []
+
+    def stop_at_the_third(current, state):
+        shown.append((current.grid.points, state.step))
+        if shown.count(shown[-1]) == 3:  # only a direct solve shows a state again
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        solve_contact(square(Power(n=3)), ProjectedCG(tolerance=1e-6), stop_at_the_third)
+    assert shown[-1][0] == 64
