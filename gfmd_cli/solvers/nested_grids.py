@@ -59,7 +59,7 @@ def solve_contact(
     Parameters
     ----------
     watch : is called with every state on every grid, and with the last state of the coarse grid at
-        every step of a start on tiles
+        every step of a start on tiles and for every set of points of a direct one
     start : the state of an unfinished solve, or a displacement on the grid of the contact, which is
         overwritten; without it the solve starts on the coarsest grid
     """
