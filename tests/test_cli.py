@@ -144,6 +144,12 @@ def test_a_place_that_cannot_be_written_is_status_73(gfmd):
     assert "cannot be written" in told.output
 
 
+def test_a_name_that_is_too_long_is_status_73(gfmd):
+    told = gfmd("run", "spec.toml", "-o", 300 * "x" + ".h5")
+    assert told.exit_code == 73
+    assert "File name too long" in told.output
+
+
 def test_a_grid_beyond_the_memory_is_refused_before_it_is_allocated(gfmd, monkeypatch):
     monkeypatch.setattr(resources, "available_memory", lambda: 2.0**30)
     told = gfmd("run", "spec.toml", "--set", "grid.points=8192")

@@ -66,7 +66,8 @@ def _caption(traces: list[Trace]) -> str:
 
 def scene_of(trace: Trace) -> tuple[Any, ...]:
     """What traces of one scene share."""
-    return tuple(trace.row[key] for key in ("surface", "seed", "elastomer", "points", "p_star"))
+    keys = ("surface", "seed", "elastomer", "boundary", "points", "p_star")
+    return tuple(trace.row.get(key) for key in keys)
 
 
 def solver_names(traces: list[Trace]) -> list[str]:

@@ -41,8 +41,8 @@ class Commands(click.Group):
         except BrokenPipeError:  # click ends quietly
             raise
         except OSError as error:
-            no_space = error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EROFS)
-            status = (SpaceError if no_space else StudyError).exit_status
+            unwritable = errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.ENAMETOOLONG
+            status = (SpaceError if error.errno in unwritable else StudyError).exit_status
             message = str(error)
         from gfmd_cli.grid.ranks import is_first
 
