@@ -1,8 +1,8 @@
 """Exponent of the tail of Pr(sigma) at n = 3, by window of stress and by grid.
 
-Reads the study `tail` of scripts/theory_studies.py and prints the table of docs/theory.md.
+Reads the study of configs/paper/fig13.toml and prints the table of docs/theory.md.
 
-python scripts/stress_tail.py --study results/theory/tail.h5
+python scripts/stress_tail.py --study results/paper/fig13.h5
 """
 
 import argparse
@@ -36,7 +36,7 @@ def estimate(sigma: Field, counts: Field) -> str:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("--study", type=Path, default=Path("results/theory/tail.h5"))
+    parser.add_argument("--study", type=Path, default=Path("results/paper/fig13.h5"))
     (found,) = distributions(compare(parser.parse_args().study))
     sigma, rows = logarithmic_middles(), []
     finest = found.finest["points"]

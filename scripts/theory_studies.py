@@ -91,13 +91,6 @@ def slab_specs() -> list[str]:
     ]
 
 
-def tail_specs() -> list[str]:
-    """The stress distribution at n = 3 up to 205 points per lambda_s."""
-    one = surface("rolloff", 1 / 4, 1 / 10, hurst=0.8, seed=[*range(8)])
-    grid = table("[grid]", points=[256, 512, 1024, 2048])
-    return [one + power([3]) + grid + table("[load]", p_star=0.15)]
-
-
 def true_contact_specs() -> list[str]:
     """Delta_sigma over the true contact, with areas in the continuum."""
     grid = table("[grid]", points=400) + table("[accuracy]", mean_gap=0.01)
@@ -120,7 +113,6 @@ STUDIES = {
     "gamma": gamma_specs,
     "slab": slab_specs,
     "stiffness": stiffness_specs,
-    "tail": tail_specs,
     "true-contact": true_contact_specs,
 }
 

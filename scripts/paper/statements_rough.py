@@ -63,7 +63,7 @@ ROUGH = {
         "n = 3: the tail of Pr(σ) falls as σ^−2.5 (Sect. 5.1), as σ^−2.6 ± 0.15 (Sect. 6), instead of a "
         "Gaussian.",
         (
-            Criterion("exponent for σ = 2 to 6 Δσ on the finest grid", -2.9, -2.3),
+            Criterion("exponent for σ = 4 to 12 Δσ on the finest grid", -2.9, -2.3),
             Criterion("exponent of the law of the contact edge", -2.9, -2.3),
         ),
         figure="fig13",
