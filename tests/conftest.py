@@ -27,10 +27,12 @@ if "GFMD_TEST_THREADS" in os.environ:  # `make test-portable`: on small grids to
     Grid._threads = property(lambda grid: every_grid if grid.dimension == 2 else 1)
 
 
-# A shell lets its background jobs ignore these signals, and they would let what tests start do so.
+# A shell lets its background jobs ignore these signals, and nohup the last one; they would let what
+# tests start do so. (A handler that does nothing is the default action in what is started.)
 for number, default in {
     signal.SIGINT: signal.default_int_handler,
     signal.SIGQUIT: signal.SIG_DFL,
+    signal.SIGHUP: lambda *_: None,
 }.items():
     if signal.getsignal(number) is signal.SIG_IGN:
         signal.signal(number, default)

@@ -197,3 +197,6 @@ def test_analyze_takes_another_theory_for_the_mean_gap_alone(records, output_of,
         assert after["a_r_persson"] == before["a_r_persson"]
         assert after["u_g_persson"] == pytest.approx(before["u_g_persson"], rel=0.2)
         assert after["u_g_persson"] != before["u_g_persson"]
+    assert ", mean gap by a fitted weight." in output_of(
+        "analyze", tmp_path / "s.h5", "--theory", "fitted"
+    )

@@ -160,9 +160,11 @@ def comparison_table(curves: TitledCurves) -> Table:
     groups = [Group(title, records_of(curve), _scales(curve)) for title, curve in curves]
     caption = "Values on the grid, not extrapolated."
     if any(curve.has_theory for _, curve in curves):
+        source = curves[0][1].persson.mean_gap_source
+        of_gap = f", mean gap by {source}" if source else ""
         caption = (
-            "Comparison with Persson theory. Values on the grid, not extrapolated. p ratio: "
-            "pressure at which the theory gives the simulated mean gap / simulated pressure."
+            f"Comparison with Persson theory{of_gap}. Values on the grid, not extrapolated. p "
+            "ratio: pressure at which the theory gives the simulated mean gap / simulated pressure."
         )
     return Table(caption, COMPARISON, groups)
 

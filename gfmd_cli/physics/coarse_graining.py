@@ -9,6 +9,7 @@ F(p), the integral of u_g from 0 to p, increases by T k dC / 2 with waves of squ
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 from scipy.linalg import solve_banded
@@ -32,6 +33,8 @@ class CoarseGrained(Persson):
     The law is solved once, for 1e-8 to 8 Delta_sigma; u_g is good to 2e-4 for p <= Delta_sigma and
     5e-3 at 3 Delta_sigma.
     """
+
+    mean_gap_source: ClassVar[str] = "coarse-graining"
 
     def elastic_energy(self, p: Field | float) -> Field:
         """Elastic energy per area v, without q = 0: the integral of p over the loss of u_g.

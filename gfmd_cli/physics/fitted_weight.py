@@ -4,6 +4,7 @@ No equation of the paper: constants from scripts/gap_theories.py, errors in docs
 """
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -26,6 +27,8 @@ class FittedWeight(Persson):
 
     n: Field
     """Exponent of k(q) of every shell; exponents beyond [0, 4] count as these ends."""
+
+    mean_gap_source: ClassVar[str] = "a fitted weight"
 
     def weight(self, a: Field, s: Field) -> tuple[Field, Field, Field]:
         """W, dW/da and dW/ds, all of shape (pressures, bins); 0 <= a, s <= 1.

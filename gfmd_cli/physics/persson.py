@@ -7,6 +7,7 @@ the spatial dimensions", Sect. 4.1 and 5.2. Sums over q never contain q = 0.
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 from scipy.special import erf, erfc, erfcx, erfinv
@@ -154,6 +155,9 @@ class Persson:
     """Persson theory of one surface and elastomer; pressures in the unit of sqrt(variance)."""
 
     shells: Shells
+
+    mean_gap_source: ClassVar[str] = ""
+    """Where the mean gap comes from, unless from the paper."""
 
     @property
     def delta_sigma(self) -> float:
