@@ -1,5 +1,6 @@
 """The direct start: its solutions against those without it, and when it is not used."""
 
+import copy
 from typing import ClassVar
 
 import numpy as np
@@ -11,7 +12,7 @@ from gfmd_cli.physics.indenters import LineParabola
 from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.solvers import direct_start as module
 from gfmd_cli.solvers.direct_start import direct_start
-from gfmd_cli.solvers.nested_grids import solve_contact
+from gfmd_cli.solvers.nested_grids import Resume, solve_contact
 from gfmd_cli.solvers.pcg import ProjectedCG
 
 SURFACE = SelfAffine(cutoff=0.1)
@@ -121,6 +122,21 @@ def test_a_large_contact_is_left_to_the_iteration():
     contact = square(Power(n=2))
     assert direct_start(contact.coarsen((128, 128)), np.ones((128, 128), bool), [contact]) is None
     assert direct_start(contact.coarsen((128, 128)), np.zeros((128, 128), bool), [contact]) is None
+
+
+def test_a_solve_stopped_on_a_coarse_grid_goes_on_bit_by_bit():
+    contact, kept = square(Power(n=3)), []
+
+    def keep(current, state):
+        kept.append((current.grid.whole_shape, copy.deepcopy(state)))
+
+    straight = solve_contact(contact, ProjectedCG(tolerance=1e-6), keep)
+    assert [shape for shape, _ in kept].count((256, 256)) == 1  # after a direct solve
+    for chosen in (1, len(kept) // 2, len(kept) - 1):
+        shape, state = kept[chosen]
+        rest = solve_contact(contact, ProjectedCG(tolerance=1e-6), start=Resume(shape, vars(state)))
+        assert np.array_equal(rest.u, straight.u)
+        assert np.array_equal(rest.sigma, straight.sigma)
 
 
 def test_a_direct_solve_notices_a_request_to_stop():
