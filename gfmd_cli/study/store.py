@@ -46,14 +46,14 @@ EARLIER = "earlier_specs"
 class Study:
     """A study file and the unfinished work beside it.
 
-    Raises InputError for a link to itself and for a folder.
+    Raises InputError for a link to itself and for a path without a name, such as "." or "/".
     """
 
     def __init__(self, path: Path) -> None:
         self.path = Path(os.path.realpath(path)) if path.is_symlink() else path
         if self.path.is_symlink():
             raise InputError(f"{path}: a symbolic link that leads to itself")
-        if not self.path.name or self.path.is_dir():
+        if not self.path.name:
             raise InputError(f"{path}: a folder, where a study file (NAME.h5) is expected")
         self._entries: dict[Path, tuple[tuple[int, ...], Entry]] = {}
         """What is known of records, and of which file."""
