@@ -10,28 +10,13 @@ from pathlib import Path
 
 import numpy as np
 from gamma_fit import print_table
+from paper.stress import tail_exponent
 
 from gfmd_cli.analysis.compare import compare
 from gfmd_cli.analysis.distribution import distributions
-from gfmd_cli.grid.arrays import Field
 from gfmd_cli.physics.observables import logarithmic_middles
 
 WINDOWS = ((2.0, 6.0), (4.0, 8.0), (4.0, 12.0), (6.0, 13.0), (8.0, 16.0), (10.0, 20.0))
-
-
-def exponent(sigma: Field, counts: Field) -> float:
-    """Slope of ln Pr over ln sigma in bins of equal relative width, by the points in them."""
-    held = counts > 0
-    x, y = np.log(sigma[held]), np.log(counts[held] / sigma[held])
-    return float(np.polyfit(x, y, 1, w=np.sqrt(counts[held]))[0])
-
-
-def estimate(sigma: Field, counts: Field) -> str:
-    """The exponent of all seeds and its standard error, leaving out one seed after another."""
-    whole = counts.sum(axis=0)
-    others = np.array([exponent(sigma, whole - one) for one in counts])
-    error = np.sqrt(len(counts) - 1) * others.std()
-    return f"{exponent(sigma, whole):.2f} ± {error:.2f}"
 
 
 def main() -> None:
@@ -48,7 +33,7 @@ def main() -> None:
             inside = (sigma > low) & (sigma < high)
             seen = counts[:, inside]
             enough = np.count_nonzero(seen.sum(axis=0)) > 2
-            cells.append(estimate(sigma[inside], seen) if enough else "")
+            cells.append(str(tail_exponent(sigma[inside], seen)) if enough else "")
         mean = (counts.sum(axis=0) * sigma).sum() / counts.sum()
         points = found.points[place] * found.finest["cutoff"]
         rows.append([f"{points:.0f}", f"{mean:.1f}", *cells])

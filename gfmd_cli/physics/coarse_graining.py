@@ -49,7 +49,7 @@ class CoarseGrained(Persson):
         light = np.exp(x[0]) * lost[0] / (x[1] - x[0])  # v is linear in p for a gap linear in ln p
         v = light + np.append(0.0, np.cumsum(faces[1:-1] * lost))
         at = np.log(np.where(p > 0, p, 1.0))
-        inside = np.exp(monotone_cubic(x, np.log(v))(np.clip(at, x[0], x[-1])))
+        inside = _interpolated(x, v, at)
         return np.where(p > 0, inside * np.exp(np.minimum(at - x[0], 0.0)), 0.0)
 
     def mean_gap(self, p: Field | float) -> Field:
@@ -66,7 +66,7 @@ class CoarseGrained(Persson):
         known = gap > _VANISHED * gap[0]
         x = np.log(_centres(faces)[known])
         at = np.log(np.where(p > 0, p, 1.0))
-        inside = np.exp(monotone_cubic(x, np.log(gap[known]))(np.clip(at, x[0], x[-1])))
+        inside = _interpolated(x, gap[known], at)
         below = np.maximum(x[0] - at, 0.0) * (gap[0] - gap[1]) / (x[1] - x[0])
         return np.where(p > 0, np.where(at <= x[-1], inside + below, 0.0), np.inf)
 
@@ -84,6 +84,11 @@ class CoarseGrained(Persson):
             start = gap + (1 - _STAGE) / _STAGE * (middle - gap)
             gap = _implicit(faces, start, middle, k, _STAGE * added)
         return faces, gap
+
+
+def _interpolated(x: Field, values: Field, at: Field) -> Field:
+    """Positive values over x by a monotone cubic of their logarithms, the ends beyond."""
+    return np.asarray(np.exp(monotone_cubic(x, np.log(values))(np.clip(at, x[0], x[-1]))))
 
 
 def _centres(faces: Field) -> Field:

@@ -25,6 +25,7 @@ from gfmd_cli.grid.ranks import Ranks
 from gfmd_cli.physics.contact import Contact, Scene, build_scene, reduce_scene, touchable
 from gfmd_cli.physics.elastomers import LinearElastomer
 from gfmd_cli.physics.indenters import RigidSurface
+from gfmd_cli.physics.map_preparation import mirror
 from gfmd_cli.physics.surfaces import sample
 
 MARGIN = 1.25
@@ -133,8 +134,8 @@ class FreeContact(Contact):
         """
         grid = twice(self.grid)
         k = self.free.elastomer.stiffness(grid.wavenumber(), grid.length) / self.free.unit
-        mask = None if self.may_touch is None else mirrored(self.may_touch)
-        return Contact(grid, mirrored(self.height), k, self.pressure, mask)
+        mask = None if self.may_touch is None else mirror(self.may_touch)
+        return Contact(grid, mirror(self.height), k, self.pressure, mask)
 
     def coarsen(self, shape: Shape) -> "FreeContact":
         """The same contact on larger pixels, with the means of the heights over them."""
@@ -240,11 +241,6 @@ def twice(grid: Grid) -> Grid:
     if grid.dimension == 1:
         return along_x
     return replace(along_x, points_y=2 * grid.points_y, length_y=2 * grid.length_y)
-
-
-def mirrored(values: Any) -> Any:
-    """Values on a whole map, mirrored to twice the points along each axis."""
-    return np.pad(values, [(0, points) for points in values.shape], mode="symmetric")
 
 
 def mean_over(grid: Grid, values: Field, where: Mask) -> float:

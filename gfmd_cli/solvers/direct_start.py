@@ -38,7 +38,7 @@ Points = tuple[Any, ...]
 
 
 def direct_start(
-    coarse: Contact, touching: Mask, finer: list[Contact], pause: Callable[[], None] = lambda: None
+    touching: Mask, finer: list[Contact], pause: Callable[[], None] = lambda: None
 ) -> Start | None:
     """The start on the finest of the `finer` grids that can be reached by direct solves.
 
@@ -71,6 +71,7 @@ def _refined(touching: Mask, contact: Contact) -> Mask:
     A point is between two if they are the next ones along x, along y or along a diagonal.
     """
     near = np.zeros(contact.grid.as_rows(contact.height).shape, dtype=np.bool_)
+    # n points of the finer grid for m of the coarser one, along each axis
     sizes: list[tuple[int, int]] = list(zip(near.shape, touching.shape, strict=True))
     places = np.nonzero(touching)
     around = [
@@ -176,8 +177,7 @@ class _DirectSolve:
     def displacement(self) -> Field:
         """The displacement, laid on the indenter in contact."""
         u = self.grid.empty()
-        rows = self.grid.as_rows(u)
-        np.subtract(self.values, self.level, out=rows)
-        np.maximum(rows, self.obstacle, out=rows)
-        np.copyto(rows, self.obstacle, where=self.touching)
+        gap = self.values.reshape(u.shape) - self.contact.height
+        gap -= self.level
+        self.contact.set_displacement(u, gap, self.touching.reshape(u.shape))
         return u

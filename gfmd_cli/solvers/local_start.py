@@ -68,7 +68,7 @@ def start_from(
     last, spent = finer[-1], 0.0
     shapes = [contact.grid.shape for contact in (coarse, *finer)]
     doubled = all(b == tuple(2 * n for n in a) for a, b in pairwise(shapes))
-    if not doubled or not pressure.any() or not all(map(suits, finer)):
+    if not doubled or not pressure.any() or not all(map(tiles_apply, finer)):
         return None
     for contact in finer:
         tiles = Tiles(_reached(coarse.grid.shape, pressure > 0))
@@ -86,7 +86,7 @@ def start_from(
     return Start(u, spent, last)
 
 
-def suits(contact: Contact) -> bool:
+def tiles_apply(contact: Contact) -> bool:
     """Whether the operators on tiles apply, and a solve on tiles can be faster."""
     grid, (low, high) = contact.grid, EXPONENTS
     if contact.may_touch is not None or grid.dimension == 1 or not grid.whole:

@@ -13,7 +13,8 @@ import numpy as np
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.physics.approach import approach
 from gfmd_cli.physics.edge_share import edge_shares
-from gfmd_cli.physics.free_contact import mirrored, twice
+from gfmd_cli.physics.free_contact import twice
+from gfmd_cli.physics.map_preparation import mirror
 from gfmd_cli.physics.observables import contact_pressure, gap_histogram, stress_histogram
 from gfmd_cli.physics.patches import area_distribution
 from gfmd_cli.physics.power_spectra import autocorrelations, spectra
@@ -156,7 +157,7 @@ def _curves(solved: Solved) -> dict[str, dict[str, Field]]:
     units = {"height": scene.h_std, "u": scene.h_std, "sigma": scene.delta_sigma}
     r, means = autocorrelations(grid, fields, periodic=periodic)
     if not periodic:
-        grid, fields = twice(grid), {name: mirrored(field) for name, field in fields.items()}
+        grid, fields = twice(grid), {name: mirror(field) for name, field in fields.items()}
     q, waves, powers = spectra(grid, fields)
     powers = {name: power * units[name] ** 2 for name, power in powers.items()}
     return {

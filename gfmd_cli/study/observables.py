@@ -11,7 +11,8 @@ from typing import Any, NamedTuple
 
 from gfmd_cli.grid.arrays import Field, Mask
 from gfmd_cli.physics.contact import Contact
-from gfmd_cli.physics.free_contact import FreeContact, mirrored
+from gfmd_cli.physics.free_contact import FreeContact
+from gfmd_cli.physics.map_preparation import mirror
 from gfmd_cli.physics.observables import contact_points
 from gfmd_cli.physics.patches import contact_patches, open_gap
 from gfmd_cli.physics.true_contact import ContactStress, bearing, contact_stress
@@ -53,7 +54,7 @@ class SolvedContact:
     @cached_property
     def full_contact_stress(self) -> ContactStress:
         """Statistics of the full-contact stress over the points in contact."""
-        touching = self.touching if self.is_periodic else mirrored(self.touching)
+        touching = self.touching if self.is_periodic else mirror(self.touching)
         return contact_stress(self.mirrored, touching)
 
     @cached_property

@@ -113,7 +113,7 @@ def fig13(held: Held, folder: Path) -> list[Finding]:
         kept = (density > 0) & (middle > 1e-2)
         draw_points(plot, CurveStyle(tones[i], MARKERS[i], name), middle[kept], density[kept])
         kept &= (middle > TAIL[0]) & (middle < TAIL[1])
-        tails[name] = _tail(middle[kept], found.counts[:, i][:, kept])
+        tails[name] = tail_exponent(middle[kept], found.counts[:, i][:, kept])
     sigma = np.geomspace(1e-2, 100, 300)
     theory = found.curve.stress_density(sigma, found.finest["p_star"])
     plot.theory([(STYLES[1.0], sigma, theory)])
@@ -138,12 +138,16 @@ def fig13(held: Held, folder: Path) -> list[Finding]:
     ]
 
 
-def _tail(sigma: Field, counts: Field) -> Value:
-    """Exponent of Pr(sigma) in bins of equal relative width, by the points of each seed in them."""
-    weights = 1 / np.sqrt(counts.sum(axis=0))
+def tail_exponent(sigma: Field, counts: Field) -> Value:
+    """Exponent of Pr(sigma) in bins of equal relative width, by the points of each seed in them.
+
+    sigma has the shape (bins,), counts (seeds, bins). Bins without points are left out.
+    """
 
     def of(seen: Field) -> float:
-        return slope(np.log(sigma), np.log(seen / sigma), weights).value
+        held = seen > 0
+        errors = 1 / np.sqrt(seen[held])  # relative, of the counted points
+        return slope(np.log(sigma[held]), np.log(seen[held] / sigma[held]), errors).value
 
     return estimate(of, Mean(counts))
 
