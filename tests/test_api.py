@@ -84,6 +84,18 @@ def test_a_study_may_be_run_in_a_thread(tmp_path):
     assert rows(study)[0]["status"] == "converged"
 
 
+def test_threads_solve_on_one_surface_at_the_same_time():
+    """The transforms of a grid work in one memory, which no two threads may share."""
+    tables = TABLES | {"grid": {"points": 256}}
+    pressures = np.geomspace(1e6, 1e7, 6)
+    solves = [tables | {"load": {"pressure": pressure}} for pressure in pressures]
+    alone = [solve(one).displacement for one in solves]
+    with ThreadPoolExecutor(3) as pool:
+        together = [result.displacement for result in pool.map(solve, solves)]
+    for one, other in zip(alone, together, strict=True):
+        assert other == pytest.approx(one, abs=1e-12 * np.ptp(one))
+
+
 def rough_map(points=32, seed=1):
     surface = {"kind": "self-affine", "cutoff": 0.125, "seed": seed, "h_std": 1e-8, "length": 1e-5}
     return solve({**MATERIAL, "surface": surface, "grid": {"points": points}}).height

@@ -15,6 +15,7 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from functools import cache
 from pathlib import Path
+from threading import Lock
 from typing import TypeVar
 
 import pyfftw
@@ -58,6 +59,7 @@ def _here() -> dict[str, str]:
 
 _without_lock: set[Path] = set()  # folders that this process could not lock
 _folder: Path | None = None  # where wisdom is kept; None for the cache
+_planner = Lock()  # FFTW's knowledge of plans is one for all threads, and not protected
 _always_estimated = os.environ.get("GFMD_PLANS") == "estimated"
 _estimated = _always_estimated
 
@@ -68,9 +70,10 @@ def plan_with(folder: Path | None, *, estimated: bool = False) -> str | None:
     All that this process knew is forgotten. Says so where the folder's wisdom is damaged.
     """
     global _folder, _estimated
-    _folder, _estimated = folder, estimated or _always_estimated
-    pyfftw.forget_wisdom()
-    _without_lock.clear()
+    with _planner:
+        _folder, _estimated = folder, estimated or _always_estimated
+        pyfftw.forget_wisdom()
+        _without_lock.clear()
     if folder is None or _estimated:
         return None
     with _alone(folder):
@@ -91,10 +94,16 @@ def plans() -> str:
 
 def planned(plan: Callable[[tuple[str, ...]], T]) -> T:
     """`plan` with the flags of a planner: of what is known, else measured, and kept for all."""
-    if _estimated:
-        return plan(("FFTW_ESTIMATE",))
-    with suppress(RuntimeError):  # not known
-        return plan(("FFTW_MEASURE", "FFTW_WISDOM_ONLY"))
+    with _planner:
+        if _estimated:
+            return plan(("FFTW_ESTIMATE",))
+        with suppress(RuntimeError):  # not known
+            return plan(("FFTW_MEASURE", "FFTW_WISDOM_ONLY"))
+        return _measured(plan)
+
+
+def _measured(plan: Callable[[tuple[str, ...]], T]) -> T:
+    """`plan`, measured unless another process did, and kept for all."""
     folder = _folder or cache_folder()
     with _alone(folder):
         _take_in(read_wisdom(folder))

@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field
 from functools import lru_cache
 from math import sqrt
+from threading import get_ident
 from typing import Any
 
 from gfmd_cli.errors import InputError
@@ -66,8 +67,12 @@ def _scene(
     points_y: int,
     threads: int,
     ranks: Ranks | None,
+    thread: int,
 ) -> Scene:
-    """The scene of a task; consecutive tasks mostly share it."""
+    """The scene of a task; consecutive tasks mostly share it.
+
+    It is kept for one thread only: the transforms of a scene work in one memory.
+    """
     return SCENES[boundary](surface, elastomer, points, threads, ranks, points_y=points_y)
 
 
@@ -75,7 +80,7 @@ def task_scene(task: Task, points: int, context: SolveContext) -> Scene:
     """The scene of a task on a grid of so many points along x."""
     grid = task.boundary, points, task.points_y_on(points)
     shared = context.options.threads, context.ranks
-    return _scene(task.surface, task.elastomer, *grid, *shared)
+    return _scene(task.surface, task.elastomer, *grid, *shared, get_ident())
 
 
 def forget_scene() -> None:
