@@ -25,6 +25,7 @@ from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
 from gfmd_cli.grid.arrays import Field, Mask, row_blocks
 from gfmd_cli.physics.contact import Contact
+from gfmd_cli.solvers.contact_state import refined
 from gfmd_cli.solvers.local_start import COARSE_TOLERANCE, Start
 
 COST = 5000  # largest n^3 per point of a grid; measured: with more, the iteration is faster
@@ -53,7 +54,7 @@ def direct_start(
         largest = int((COST * contact.grid.size) ** (1 / 3))
         if not contact.grid.whole or np.count_nonzero(touching) > largest:
             break
-        touching = _refined(touching, contact)
+        touching = refined(touching, contact)
         if HEADROOM * np.count_nonzero(touching) > largest:
             break
         solve = _DirectSolve(contact, touching)
@@ -63,31 +64,6 @@ def direct_start(
             break
         solved, touching = solve, solve.touching
     return Start(solved.displacement(), spent, solved.contact) if solved else None
-
-
-def _refined(touching: Mask, contact: Contact) -> Mask:
-    """The points of a finer grid that are nearest to points in contact, or between two of them.
-
-    A point is between two if they are the next ones along x, along y or along a diagonal.
-    """
-    near = np.zeros(contact.grid.as_rows(contact.height).shape, dtype=np.bool_)
-    # n points of the finer grid for m of the coarser one, along each axis
-    sizes: list[tuple[int, int]] = list(zip(near.shape, touching.shape, strict=True))
-    places = np.nonzero(touching)
-    around = [
-        (i[:, None] * n // m + np.arange(-(n // m), n // m + 1)) % n
-        for i, (n, m) in zip(places, sizes, strict=True)
-    ]
-    near[around[0][:, :, None], around[1][:, None, :]] = True
-    points = np.nonzero(near)
-    top, left = (i * m // n for i, (n, m) in zip(points, sizes, strict=True))
-    bottom, right = (-(-i * m // n) % m for i, (n, m) in zip(points, sizes, strict=True))
-    near[points] = touching[top, left] & touching[bottom, right]
-    near[points] |= touching[top, right] & touching[bottom, left]
-    nearest = ((2 * i * n + m) // (2 * m) % n for i, (n, m) in zip(places, sizes, strict=True))
-    near[tuple(nearest)] = True
-    refined: Mask = contact.clear_untouchable(near)
-    return refined
 
 
 class _DirectSolve:

@@ -16,7 +16,7 @@ ten solves with n = 0.5 to 4 the rounding was 0.4 to 1.3 times the estimate.) si
 afresh in double precision where the residual falls below it (residual replacement; van der Vorst &
 Ye, SIAM J. Sci. Comput. 22, 835, 2000).
 
-The length s is that of the step before (in the first one half of that of the coarser grid),
+The length s is that of the step before (in the first one that of the coarser grid),
 corrected by the ratio of the best move to the projected one. The energy never rises, so that the
 method cannot cycle: a move beyond the lowest point is shortened to it (all points on the way are
 feasible), and a move along which the energy rises from the start is halved. A scaled gradient that
@@ -33,14 +33,14 @@ import numpy as np
 
 from gfmd_cli.grid.arrays import Field, SingleField
 from gfmd_cli.physics.contact import Contact
+from gfmd_cli.physics.observables import contact_points
 from gfmd_cli.solvers import pcg_kernels as kernels
-from gfmd_cli.solvers.contact_state import PRESSED, TENSE
+from gfmd_cli.solvers.contact_state import PRESSED, TENSE, refined
 from gfmd_cli.solvers.loop import Solver, State
 from gfmd_cli.solvers.preconditioners import Preconditioner, Selection, create, select
 from gfmd_cli.solvers.projected_move import choose
 
 PROPORTION = 0.3  # of rms tension to rms free force; from 0.1 to 1 within 20 % at n = 1 to 4
-FIRST_LENGTH = 0.5  # of a move over the last one on the coarser grid; from 0.25 to 0.7 within 2 %
 MAX_HALVINGS = 60  # of a move along which the energy rises; beyond, it is rounding
 RIGID_CURVATURE = 1e-12  # curvature over descent below which a direction is a rigid shift
 SELECT_AFTER = 4  # smallest number of steps between two selections of the preconditioner
@@ -98,14 +98,19 @@ class ProjectedCG(Solver):
         )
 
     def continue_from(self, coarse: Contact, state: State, fine: Contact) -> PCGState:
-        """See `Solver.continue_from`; the step length depends little on the grid.
+        """See `Solver.continue_from`; the finer contact starts with the points of the coarser one.
 
-        On lines, where transforms cost nothing, the exact length saves steps at n >= 3.
+        The length of a move depends little on the grid. On lines, where transforms cost nothing,
+        the exact length saves steps at n >= 3.
         """
         assert isinstance(state, PCGState)
-        begun = self.begin(fine, coarse.grid.resample(state.u, fine.grid))
+        u = coarse.grid.resample(state.u, fine.grid)
+        if fine.grid.whole and fine.grid.dimension == 2:
+            pressed = contact_points(coarse.obstacle, state.u, state.sigma)
+            np.copyto(u, fine.obstacle, where=refined(pressed, fine))
+        begun = self.begin(fine, u)
         if fine.grid.dimension == 2:
-            begun.length = FIRST_LENGTH * state.length
+            begun.length = state.length
             begun.screening, begun.multilevel = state.screening, state.multilevel
         return begun
 
