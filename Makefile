@@ -104,7 +104,7 @@ wheel: $(VENV)/.docs ## the package built, checked and tried in an empty environ
 memory: $(VENV)/.core ## measured peak memory against what --dry-run says
 	$(BIN)/python scripts/memory.py
 
-paper: $(VENV)/.core ## every figure and statement of the paper: half an hour
+paper: $(VENV)/.core ## every figure and statement of the paper: two hours
 	$(BIN)/python scripts/paper_figures.py -o $(RESULTS)/paper --page docs/paper.md
 
 paper-quick: $(VENV)/.core ## the same on small grids: minutes

@@ -1,6 +1,6 @@
 """Every figure of the paper from a shipped config, and every statement beside what is found.
 
-    python scripts/paper_figures.py -o results/paper            # half an hour on one core
+    python scripts/paper_figures.py -o results/paper            # two hours on one core
     python scripts/paper_figures.py -o results/paper --quick    # minutes, small grids
 
 Studies are resumed where they were stopped. Figures are written as PDF and PNG, the statements as

@@ -100,8 +100,9 @@ def true_contact_specs() -> list[str]:
 
 
 def depth_specs() -> list[str]:
-    """Spectra of lambda_r / lambda_s = 8 to 64, eight points per lambda_s."""
-    points, cutoffs = [256, 512, 1024, 2048], [1 / 32, 1 / 64, 1 / 128, 1 / 256]
+    """Spectra of lambda_r / lambda_s = 8 to 128, eight points per lambda_s."""
+    points = [256, 512, 1024, 2048, 4096]
+    cutoffs = [8 / side for side in points]
     paired = table("[sweep]", paired=["surface.cutoff", "grid.points"])
     one = surface("rolloff", 1 / 4, cutoffs, hurst=0.8, seed=[*range(8)])
     return [one + power([0.5, 1, 2, 3]) + table("[grid]", points=points) + paired + rest(LIGHT)]

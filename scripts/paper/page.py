@@ -24,9 +24,9 @@ of the paper has a spec in `configs/paper/`. The table lists each statement of t
 result of this program, from studies of [these sizes](#sizes-of-the-studies). The first command writes this page, the
 second one a page like it from smaller studies:
 
-<!-- not run: takes half an hour, and minutes -->
+<!-- not run: takes two hours, and minutes -->
 ```bash
-make paper          # about half an hour on one core: docs/paper.md
+make paper          # about two hours on one core: docs/paper.md
 make paper-quick    # small grids, two seeds, minutes: results/paper-quick/paper.md
 ```
 

@@ -44,7 +44,9 @@ SMALL = "grid.points=512"
 COARSE = "grid.points=256"
 TWO = "surface.seed=[0, 1]"
 FEW = "load.p_star={from=0.01, to=3.2, per_decade=2}"
-EDGES = ("surface.rolloff=0.25", "surface.cutoff=0.1", f"surface.seed={list(range(8))}")
+MANY = f"surface.seed={list(range(32))}"
+"""For studies with a statement that eight surfaces left open, and those compared with them."""
+EDGES = ("surface.rolloff=0.25", "surface.cutoff=0.1", MANY)
 """Of `edges`: four roll-off wavelengths in the cell, 102 points per lambda_s on the finest grid."""
 STUDIES = {
     "fig01": Study("fig01", quick=("grid.points=1024",)),
@@ -52,22 +54,22 @@ STUDIES = {
     "kappa": Study("kappa", quick=("solver.tolerance=1e-8",)),
     "fig04": Study("fig04", quick=(SMALL,)),
     "fig05": Study("fig05", quick=("grid.points=1024",)),
-    "fig06": Study("fig06", quick=(TWO, COARSE, FEW)),
+    "fig06": Study("fig06", (MANY,), quick=(TWO, COARSE, FEW)),
     "light": Study(
         "light", quick=(TWO, "grid.points=[128,256,512]", "load.p_star=[0.04, 0.08, 0.16, 0.5]")
     ),
     "fig07": Study("fig07", quick=(TWO, "grid.points=[256,512]")),
-    "edges": Study("../stress-distribution", EDGES, quick=("grid.points=[128,256,512]",)),
+    "edges": Study("../stress-distribution", EDGES, quick=(TWO, "grid.points=[128,256,512]")),
     "fig13": Study("fig13", quick=(TWO, "grid.points=[256,512,1024]")),
-    "fig09b": Study("fig09b", quick=(TWO, COARSE)),
+    "fig09b": Study("fig09b", (MANY,), quick=(TWO, COARSE)),
     "small_pressure": Study(
         "small_pressure", quick=(TWO, "load.p_star={from=1e-5, to=0.1, per_decade=1}")
     ),
-    "fig10": Study("fig10", quick=(TWO, COARSE, FEW)),
-    "fig10b": Study("fig10b", quick=(TWO, COARSE)),
-    "cut_off": Study("cut_off", quick=(TWO, COARSE, FEW)),
+    "fig10": Study("fig10", (MANY,), quick=(TWO, COARSE, FEW)),
+    "fig10b": Study("fig10b", (MANY,), quick=(TWO, COARSE)),
+    "cut_off": Study("cut_off", (MANY,), quick=(TWO, COARSE, FEW)),
     "spacing": Study("spacing", quick=(TWO,)),
-    "fig11": Study("fig11", quick=(TWO, FEW)),
+    "fig11": Study("fig11", (MANY,), quick=(TWO, FEW)),
     "fig12": Study("fig12", quick=("load.p_star={from=1e-6, to=1.0, per_decade=1}",)),
     "weights": Study("weights", quick=(TWO,)),
     "plate_map": Study("plate_map", quick=(SMALL,)),
