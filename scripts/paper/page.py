@@ -32,8 +32,9 @@ make paper-quick    # small grids, two seeds, minutes: results/paper-quick/paper
 
 The random phases of the paper are not known, so single numbers of its one realisation cannot be reproduced. Trends,
 exponents, ratios and exact results can. Results on rough surfaces are means over at least eight seeds, apart from the
-cross-sections (Figs. 4 and 5) and the map. Their standard errors contain the scatter of the seeds (jackknife) and, for
-values in the continuum, the error of the grid.
+cross-sections (Figs. 4 and 5) and the map. Where eight seeds left a statement open (rows 31, 33, 40 and 44), its studies
+and those compared with them have 32. The standard errors contain the scatter of the seeds (jackknife) and, for values in
+the continuum, the error of the grid.
 
 Each statement has criteria: a quantity and the limits between which the statement holds. They are data, in
 `scripts/paper/statements_hertz.py` and `scripts/paper/statements_rough.py`, chosen from what the paper itself says where
@@ -50,7 +51,7 @@ SIZES = """\
 ## Sizes of the studies
 
 The paper has λᵣ/λₛ = 100 in most studies and grids of up to 32768² points. How the mean gap and the contact area depend
-on λᵣ/λₛ from 8 to 64 is [measured](theory.md#trend-with-the-range-of-the-spectrum). A study of another size is run with
+on λᵣ/λₛ from 8 to 128 is [measured](theory.md#trend-with-the-range-of-the-spectrum). A study of another size is run with
 other keys, as in `gfmd run configs/paper/fig13.toml -o results/paper/fig13.h5 --set grid.points='[2048, 4096, 8192]'`. Then
 `python scripts/paper_figures.py -o results/paper --no-run --page docs/paper.md` writes the page.
 """
