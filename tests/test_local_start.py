@@ -11,7 +11,7 @@ from gfmd_cli.physics.contact import Contact, build_scene
 from gfmd_cli.physics.elastomers import HalfSpace, Power, Slab
 from gfmd_cli.physics.observables import contact_pressure
 from gfmd_cli.physics.self_affine import SelfAffine
-from gfmd_cli.solvers.local_start import largest_share, start_from
+from gfmd_cli.solvers.local_start import start_from
 from gfmd_cli.solvers.nested_grids import Resume, solve_contact
 from gfmd_cli.solvers.pcg import ProjectedCG
 from gfmd_cli.solvers.tile_operators import TileOperators
@@ -155,16 +155,6 @@ def test_other_elastomers_are_solved_on_the_whole_grid(elastomer):
 def test_a_large_contact_is_solved_on_the_whole_grid():
     contact = build_scene(SelfAffine(cutoff=0.1), Power(n=1), 512).contact(1e-3)
     assert start_from(contact.coarsen((256, 256)), np.ones((256, 256)), [contact], 1e-3) is None
-
-
-def test_a_larger_contact_is_solved_on_tiles_where_k_grows_slowly():
-    """At n = 0.5 and p* = 0.06 about a fifth of the tiles are kept."""
-    contact = build_scene(SelfAffine(cutoff=0.02), Power(n=0.5), 512).contact(0.06)
-    local, whole = solve(contact, True), solve(contact, False)
-    assert local.transforms < 0.7 * whole.transforms
-    assert local.u == pytest.approx(whole.u, abs=1e-6)
-    stiffer = Contact(contact.grid, contact.height, contact.grid.wavenumber(), contact.pressure)
-    assert 0 < largest_share(stiffer) < largest_share(contact) < 1
 
 
 def test_a_solve_stopped_on_a_coarse_grid_goes_on_bit_by_bit():

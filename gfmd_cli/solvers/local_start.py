@@ -23,15 +23,13 @@ import numpy as np
 from gfmd_cli.grid.arrays import Field, Mask
 from gfmd_cli.physics.contact import Contact
 from gfmd_cli.solvers.local_kernels import lay
-from gfmd_cli.solvers.preconditioners import STEEP
 from gfmd_cli.solvers.projected_move import choose
 from gfmd_cli.solvers.tile_operators import TileOperators
 from gfmd_cli.solvers.tiles import SIDE, Tiles
 
 EXPONENTS = (0.2, 1.3)  # of k(q) for which the solve on tiles converges in about 20 steps
 SMALLEST = 512  # points per side from which on a solve on tiles is faster
-LARGEST_SHARE = 0.12  # of the tiles; with more a solve on the whole grid is faster: measured
-LARGEST_SHARE_OF_SOFT = 0.3  # the same where that solve takes the Green's function
+LARGEST_SHARE = 0.15  # of the tiles; with more a solve on the whole grid is faster: measured
 REACH = 2  # points by which the contact may grow from a grid to the next
 COARSE_TOLERANCE = 0.03  # on grids before the finest; measured: from 0.01 to 0.1 within 5 %
 FIRST_TOLERANCE = 3e-3  # before the operators on tiles are corrected
@@ -70,12 +68,11 @@ def start_from(
     last, spent = finer[-1], 0.0
     shapes = [contact.grid.shape for contact in (coarse, *finer)]
     doubled = all(b == tuple(2 * n for n in a) for a, b in pairwise(shapes))
-    shares = [largest_share(contact) for contact in finer]
-    if not doubled or not pressure.any() or not all(shares):
+    if not doubled or not pressure.any() or not all(map(tiles_apply, finer)):
         return None
-    for contact, share in zip(finer, shares, strict=True):
+    for contact in finer:
         tiles = Tiles(_reached(coarse.grid.shape, pressure > 0))
-        if tiles.count > share * tiles.used.size:
+        if tiles.count > LARGEST_SHARE * tiles.used.size:
             return None
         solve = _LocalSolve(contact, tiles, _refined(pressure, tiles), pause)
         if contact is last:
@@ -89,19 +86,17 @@ def start_from(
     return Start(u, spent, last)
 
 
-def largest_share(contact: Contact) -> float:
-    """Share of the tiles up to which a solve on them is faster; 0 where it does not apply."""
+def tiles_apply(contact: Contact) -> bool:
+    """Whether the operators on tiles apply, and a solve on tiles can be faster."""
     grid, (low, high) = contact.grid, EXPONENTS
     if contact.may_touch is not None or grid.dimension == 1 or not grid.whole:
-        return 0.0
+        return False
     if min(grid.shape) < SMALLEST:
-        return 0.0
+        return False
     if any(points % SIDE for points in grid.shape) or min(grid.spacings) < 0.5 * max(grid.spacings):
-        return 0.0
+        return False
     exponents = np.diff(np.log(contact.line[1:])) / np.diff(np.log(np.arange(1, contact.line.size)))
-    if exponents.min() < low or exponents.max() > high:
-        return 0.0
-    return LARGEST_SHARE_OF_SOFT if exponents.max() <= STEEP else LARGEST_SHARE
+    return bool(low <= exponents.min() and exponents.max() <= high)
 
 
 def _reached(shape: tuple[int, ...], touching: Mask) -> Mask:

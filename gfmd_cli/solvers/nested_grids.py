@@ -12,7 +12,7 @@ from gfmd_cli.grid.fft_grid import Grid, Shape
 from gfmd_cli.physics.contact import Contact
 from gfmd_cli.physics.observables import contact_pressure
 from gfmd_cli.solvers.direct_start import direct_start
-from gfmd_cli.solvers.local_start import COARSE_TOLERANCE, largest_share, start_from
+from gfmd_cli.solvers.local_start import COARSE_TOLERANCE, start_from, tiles_apply
 from gfmd_cli.solvers.loop import Solver, State, Watch, ignore, solve
 from gfmd_cli.solvers.multigrid import ASPECT
 from gfmd_cli.status import Status
@@ -89,7 +89,7 @@ def solve_contact(
             pressure = contact_pressure(fine.obstacle, state.u, state.sigma)
             pause = partial(watch, fine, state)  # a solve that is stopped goes on from this grid
             finer = grids[::-1]
-            if largest_share(contact):
+            if tiles_apply(contact):
                 local = start_from(fine, pressure, finer, solver.tolerance, pause)
             else:
                 local = direct_start(pressure > 0, finer, pause)
