@@ -11,6 +11,7 @@ from gfmd_cli.physics.elastomers import Power, Slab
 from gfmd_cli.physics.indenters import LineParabola
 from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.solvers import direct_start as module
+from gfmd_cli.solvers.contact_state import refined
 from gfmd_cli.solvers.direct_start import direct_start
 from gfmd_cli.solvers.nested_grids import Resume, solve_contact
 from gfmd_cli.solvers.pcg import ProjectedCG
@@ -70,6 +71,24 @@ def test_a_line_contact_is_that_of_the_iteration():
     direct = solve_contact(contact, ProjectedCG(tolerance=1e-3))
     assert direct.steps == 0
     assert direct.u == pytest.approx(solve_contact(contact, WholeGrids()).u, abs=1e-6)
+
+
+@pytest.mark.parametrize(("points", "coarse"), [(64, 32), (66, 34), (61, 32)])
+def test_points_in_contact_are_refined_to_those_nearest_and_between(points, coarse):
+    contact = square(Power(n=2), points)
+    for steps in ((0, 0), (0, 1), (1, 0), (1, 1), (1, -1)):
+        touching = np.zeros((coarse, coarse), dtype=bool)
+        ends = np.array([(5, 7), (5 + steps[0], 7 + steps[1])])
+        touching[ends[:, 0], ends[:, 1]] = True
+        places = ends * points / coarse
+        fine = np.argwhere(refined(touching, contact))
+        for place in places:
+            assert np.abs(fine - place).max(axis=1).min() <= 0.5  # the nearest
+        low, high = places.min(axis=0) - 0.5, places.max(axis=0) + 0.5
+        assert np.all((low <= fine) & (fine <= high))
+        if points == 2 * coarse:
+            assert len(fine) == (1 if steps == (0, 0) else 3)
+    assert refined(np.ones((coarse, coarse), dtype=bool), contact).all()
 
 
 def test_a_contact_that_the_coarse_grid_misses_is_entered():
