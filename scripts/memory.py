@@ -22,6 +22,7 @@ max_steps = 6
 """
 CASES = {
     '`solver.kind = "pcg"`': ["solver.kind=pcg"],
+    "a small contact": ["surface.cutoff=0.02", "load.p_star=0.01", "solver.max_steps=100"],
     '`"pcg"`, n = 2': ["elastomer.n=2"],
     '`"pcg"`, n = 0.25': ["elastomer.n=0.25"],
     '`"sort"` (n = 0)': ["elastomer.n=0"],

@@ -12,7 +12,7 @@ from gfmd_cli.grid.fft_grid import Grid, Shape
 from gfmd_cli.physics.contact import Contact
 from gfmd_cli.physics.observables import contact_pressure
 from gfmd_cli.solvers.direct_start import direct_start
-from gfmd_cli.solvers.local_start import COARSE_TOLERANCE, start_from, tiles_apply
+from gfmd_cli.solvers.local_start import COARSE_TOLERANCE, Start, start_from, tiles_apply
 from gfmd_cli.solvers.loop import Solver, State, Watch, ignore, solve
 from gfmd_cli.solvers.multigrid import ASPECT
 from gfmd_cli.status import Status
@@ -86,19 +86,27 @@ def solve_contact(
         spent += state.transforms * fine.grid.size / contact.grid.size
         coarse = fine
         if grids and solver.starts_locally:
-            pressure = contact_pressure(fine.obstacle, state.u, state.sigma)
-            pause = partial(watch, fine, state)  # a solve that is stopped goes on from this grid
-            finer = grids[::-1]
-            if tiles_apply(contact):
-                local = start_from(fine, pressure, finer, solver.tolerance, pause)
-            else:
-                local = direct_start(pressure > 0, finer, pause)
+            local = _local_start(fine, state, grids[::-1], solver.tolerance, watch)
             if local is not None:
                 start, spent = local.u, spent + local.transforms
                 while grids[-1] is not local.contact:
                     grids.pop()
     assert state is not None
     return Solution(state.u, state.sigma, state.residual, status, solver.kind, state.step, spent)
+
+
+def _local_start(
+    coarse: Contact, state: State, finer: list[Contact], tolerance: float, watch: Watch
+) -> Start | None:
+    """The start on tiles or by direct solves, where one of them applies.
+
+    `watch` is called with the coarse state, from which a solve that is stopped goes on.
+    """
+    pressure = contact_pressure(coarse.obstacle, state.u, state.sigma)
+    pause = partial(watch, coarse, state)
+    if tiles_apply(finer[-1]):
+        return start_from(coarse, pressure, finer, tolerance, pause)
+    return direct_start(pressure > 0, finer, pause)
 
 
 def levels(shape: Shape, sides: tuple[float, ...]) -> list[Shape]:
