@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 from gamma_fit import print_table
-from paper.stress import tail_exponent
+from paper.stress import mean_stress, tail_exponent
 
 from gfmd_cli.analysis.compare import compare
 from gfmd_cli.analysis.distribution import distributions
@@ -34,9 +34,8 @@ def main() -> None:
             seen = counts[:, inside]
             enough = np.count_nonzero(seen.sum(axis=0)) > 2
             cells.append(str(tail_exponent(sigma[inside], seen)) if enough else "")
-        mean = (counts.sum(axis=0) * sigma).sum() / counts.sum()
         points = found.points[place] * found.finest["cutoff"]
-        rows.append([f"{points:.0f}", f"{mean:.1f}", *cells])
+        rows.append([f"{points:.0f}", f"{mean_stress(sigma, counts):.1f}", *cells])
     heads = ["points per λs", "mean stress", *(f"{low:g} to {high:g}" for low, high in WINDOWS)]
     print_table(f"n = 3, exponents on grids up to {finest}², stress in Δσ", heads, rows)
 

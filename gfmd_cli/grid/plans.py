@@ -59,7 +59,7 @@ def _here() -> dict[str, str]:
 
 _without_lock: set[Path] = set()  # folders that this process could not lock
 _folder: Path | None = None  # where wisdom is kept; None for the cache
-_planner = Lock()  # FFTW's knowledge of plans is one for all threads, and not protected
+_planner = Lock()  # all threads share FFTW's wisdom, which FFTW does not protect
 _always_estimated = os.environ.get("GFMD_PLANS") == "estimated"
 _estimated = _always_estimated
 

@@ -87,7 +87,10 @@ class CoarseGrained(Persson):
 
 
 def _interpolated(x: Field, values: Field, at: Field) -> Field:
-    """Positive values over x by a monotone cubic of their logarithms, the ends beyond."""
+    """Positive values at `at` from those at x, by a monotone cubic of their logarithms.
+
+    Beyond the ends of x they are those at the ends.
+    """
     return np.asarray(np.exp(monotone_cubic(x, np.log(values))(np.clip(at, x[0], x[-1]))))
 
 

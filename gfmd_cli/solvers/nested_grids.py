@@ -100,7 +100,8 @@ def _local_start(
 ) -> Start | None:
     """The start on tiles or by direct solves, where one of them applies.
 
-    `watch` is called with the coarse state, from which a solve that is stopped goes on.
+    `watch` is called with the coarse state, from which a solve that is stopped goes on. After this
+    function nothing holds the coarse state: its memory is needed on the finest grid.
     """
     pressure = contact_pressure(coarse.obstacle, state.u, state.sigma)
     pause = partial(watch, coarse, state)

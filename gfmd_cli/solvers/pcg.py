@@ -16,9 +16,9 @@ ten solves with n = 0.5 to 4 the rounding was 0.4 to 1.3 times the estimate.) si
 afresh in double precision where the residual falls below it (residual replacement; van der Vorst &
 Ye, SIAM J. Sci. Comput. 22, 835, 2000).
 
-The length s is that of the step before (in the first one that of the coarser grid),
-corrected by the ratio of the best move to the projected one. The energy never rises, so that the
-method cannot cycle: a move beyond the lowest point is shortened to it (all points on the way are
+The length s is that of the step before (in the first step, that of the coarser grid), corrected
+by the ratio of the best move to the projected one. The energy never rises, so that the method
+cannot cycle: a move beyond the lowest point is shortened to it (all points on the way are
 feasible), and a move along which the energy rises from the start is halved. A scaled gradient that
 is projected on the feasible set decreases the energy for a short enough step if the binding
 constraints are excluded from the scaling (Bertsekas, SIAM J. Control Optim. 20, 221, 1982).
@@ -98,20 +98,21 @@ class ProjectedCG(Solver):
         )
 
     def continue_from(self, coarse: Contact, state: State, fine: Contact) -> PCGState:
-        """See `Solver.continue_from`; the finer contact starts with the points of the coarser one.
+        """Start from the interpolated displacement, laid on the indenter in the coarse contact.
 
-        The length of a move depends little on the grid. On lines, where transforms cost nothing,
-        the exact length saves steps at n >= 3.
+        The step length depends little on the grid. Lines start without it: their transforms cost
+        nothing, and the exact length saves steps at n >= 3.
         """
         assert isinstance(state, PCGState)
         u = coarse.grid.resample(state.u, fine.grid)
-        if fine.grid.whole and fine.grid.dimension == 2:
+        if fine.grid.dimension == 1:
+            return self.begin(fine, u)
+        if fine.grid.whole:
             pressed = contact_points(coarse.obstacle, state.u, state.sigma)
             np.copyto(u, fine.obstacle, where=refined(pressed, fine))
         begun = self.begin(fine, u)
-        if fine.grid.dimension == 2:
-            begun.length = state.length
-            begun.screening, begun.multilevel = state.screening, state.multilevel
+        begun.length = state.length
+        begun.screening, begun.multilevel = state.screening, state.multilevel
         return begun
 
     def iterate(self, contact: Contact, state: PCGState) -> Iterator[PCGState]:

@@ -32,9 +32,9 @@ make paper-quick    # small grids, two seeds, minutes: results/paper-quick/paper
 
 The random phases of the paper are not known, so single numbers of its one realisation cannot be reproduced. Trends,
 exponents, ratios and exact results can. Results on rough surfaces are means over at least eight seeds, apart from the
-cross-sections (Figs. 4 and 5) and the map. Where eight seeds left a statement open (rows 31, 33, 40 and 44), its studies
-and those compared with them have 32. The standard errors contain the scatter of the seeds (jackknife) and, for values in
-the continuum, the error of the grid.
+cross-sections (Figs. 4 and 5) and the map. Those of Figs. 6, 9, 10 and 11, of the cut-off spectrum and of the contact
+edges have 32 seeds, because statements on them were open with eight. The standard errors contain the scatter of the
+seeds (jackknife) and, for values in the continuum, the error of the grid.
 
 Each statement has criteria: a quantity and the limits between which the statement holds. They are data, in
 `scripts/paper/statements_hertz.py` and `scripts/paper/statements_rough.py`, chosen from what the paper itself says where

@@ -150,7 +150,7 @@ def fig06(held: Held, folder: Path) -> list[Finding]:
     area.theory([(STYLES[1.0], line, group.first.predict(line).a_r)])
     finish(area, folder, "fig06a", "log", "log", np.concatenate(xs), np.concatenate(ys))
     ratio = ColumnFigure(P_STAR, r"$a_r\,/\,a_r$(Persson)")
-    xs, ys, heavy = [], [], {}
+    xs, ys, heavy, gaussian = [], [], {}, ""
     for group in groups(held, "fig09b"):
         p, style = group.p, STYLES[group.n]
         a = group.continuum("a_r").over(group.theory.a_r)
@@ -161,11 +161,11 @@ def fig06(held: Held, folder: Path) -> list[Finding]:
         if group.n == 0:
             springs = einstein_solid.contact_area(einstein_solid.non_contact_height(p))
             exact = np.abs(springs / group.theory.a_r - 1)[p >= HEAVY].max()
+            gaussian = f" Gaussian heights have {exact:.3f} at n = 0 (Eqs. 36, 38)."
         xs, ys = [*xs, p], [*ys, a.value[known]]
     ratio.axes.axhline(1.0, color="black", lw=0.9)
     finish(ratio, folder, "fig06b", "linear", "ratio", np.concatenate(xs), np.concatenate(ys))
     remark = f"Continuum values. {sample(held, 'fig06')}"
-    gaussian = f" Gaussian heights have {exact:.3f} at n = 0 (Eqs. 36, 38)."
     return [
         Finding("linear", {f"d ln a_r/d ln p* for p* ≤ {LIGHT:g}": slopes}, remark),
         Finding(

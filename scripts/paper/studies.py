@@ -45,7 +45,7 @@ COARSE = "grid.points=256"
 TWO = "surface.seed=[0, 1]"
 FEW = "load.p_star={from=0.01, to=3.2, per_decade=2}"
 MANY = f"surface.seed={list(range(32))}"
-"""For studies with a statement that eight surfaces left open, and those compared with them."""
+"""For studies with statements that were open with eight surfaces, and those compared with them."""
 EDGES = ("surface.rolloff=0.25", "surface.cutoff=0.1", MANY)
 """Of `edges`: four roll-off wavelengths in the cell, 102 points per lambda_s on the finest grid."""
 STUDIES = {

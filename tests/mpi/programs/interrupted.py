@@ -1,4 +1,4 @@
-"""`gfmd run`, but one process gets a signal at its so-manieth look at the state on 128 x 128."""
+"""`gfmd run`, but one process gets a signal when it sees the state on 128 x 128 the n-th time."""
 
 import sys
 
