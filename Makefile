@@ -32,11 +32,11 @@ PYTEST := pytest -n 2 --dist loadfile
 SOLVING := accuracy bench grid local_start multigrid properties reference_solvers search solvers study \
 	true_contact
 # Files whose tests compute: the others check texts, files and processes, with the same bits anywhere.
-COMPUTING := $(SOLVING) anisotropy approach contact_stiffness convolution discretisation_error distribution \
-	einstein_solid elastomers exact_solutions free_accuracy free_boundary free_compliance \
-	free_contact_stiffness interpolation map_preparation \
+COMPUTING := $(SOLVING) anisotropy approach compliance_transforms contact_stiffness convolution direct_start \
+	discretisation_error distribution einstein_solid elastomers exact_solutions free_accuracy \
+	free_boundary free_compliance free_contact_stiffness gap_theories interpolation map_preparation \
 	observables_on_request patches persson power_spectra rectangular_cells roughness_parameters spectrum_fit \
-	surfaces table_compliance topography void
+	surfaces topography void
 
 test: $(VENV)/.test ## the whole suite, with the newest versions that pip found for a new .venv
 	$(BIN)/$(PYTEST)

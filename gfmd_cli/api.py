@@ -21,19 +21,20 @@ from gfmd_cli.analysis.compare import compare as compare_study
 from gfmd_cli.analysis.export import as_dataset
 from gfmd_cli.errors import InputError
 from gfmd_cli.grid.arrays import Field, Mask
-from gfmd_cli.physics.file_surface import FileSurface
+from gfmd_cli.physics.elastomers import Tabulated
+from gfmd_cli.physics.file_surface import FileSurface, forget_files
 from gfmd_cli.physics.given_heights import given_heights, surface_table
 from gfmd_cli.physics.indenters import SMALLEST_GRID
 from gfmd_cli.physics.observables import contact_pressure
 from gfmd_cli.spec.models import Spec
 from gfmd_cli.spec.parse import read_spec, read_tables
 from gfmd_cli.status import Status
-from gfmd_cli.study.context import SolveContext, Watcher, WorkerOptions
+from gfmd_cli.study.context import Report, SolveContext, Watcher, WorkerOptions, ignore
 from gfmd_cli.study.load_search import solve_at_load
 from gfmd_cli.study.measure import measured, planned
 from gfmd_cli.study.plausibility import warnings_of
-from gfmd_cli.study.progress import Report, ignore
 from gfmd_cli.study.reading import read_rows, solved_rows
+from gfmd_cli.study.refinement import forget_scene
 from gfmd_cli.study.resources import room
 from gfmd_cli.study.run import run_study
 from gfmd_cli.study.tasks import plan
@@ -179,7 +180,10 @@ def _with_points(tables: dict[str, Any]) -> dict[str, Any]:
 
 
 def _solve(spec: Path | str | Tables, threads: int) -> Result:
+    forget_files()  # they may have changed since the last call
     tasks = plan(_read(spec)[0])
+    if isinstance(tasks[0].surface, FileSurface) or isinstance(tasks[0].elastomer, Tabulated):
+        forget_scene()
     if len(tasks) != 1:
         raise InputError(f"solve takes one contact, the spec has {len(tasks)}; run() takes them")
     context = SolveContext(WorkerOptions(threads, room()))

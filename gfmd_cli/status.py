@@ -39,8 +39,8 @@ class Status(StrEnum):
     )
     LOAD_NOT_REACHED = (
         "load_not_reached",
-        "no pressure gives load.{load} = {load_value:g} on this grid; the table has the "
-        "nearest value",
+        "no pressure gives load.{load} = {load_value:g} on this grid with this solver.tolerance; "
+        "the table has the nearest value",
     )
     MISSING = "missing", "not solved yet: run the same command again"
 

@@ -16,7 +16,6 @@ from pathlib import Path
 
 import numpy as np
 
-from gfmd_cli.physics.anisotropy import anisotropy
 from gfmd_cli.physics.contact import Contact, Scene
 from gfmd_cli.physics.discretisation_error import (
     MAX_AREA_EXPONENT,
@@ -32,6 +31,7 @@ from gfmd_cli.physics.file_surface import FileSurface
 from gfmd_cli.physics.free_contact import SCENES
 from gfmd_cli.physics.indenters import Parabola, Wave
 from gfmd_cli.physics.observables import QUANTITIES, border_contact, contact_points, observe
+from gfmd_cli.physics.power_spectra import anisotropy
 from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.physics.surfaces import Surface
 from gfmd_cli.solvers.auto import Auto
@@ -494,7 +494,7 @@ def figure(found: list[Score], path: Path) -> None:
             style = {"marker": marker, "ls": "none", "mfc": "none", "color": colour}
             plot.axes.plot(*np.clip((x, y), *span), ms=2.2, mew=0.4, **style)
             plot.legend[labels[quantity]] = Line2D([], [], **style)
-        plot.line(plot.axes, "bar = error", np.array(span), np.array(span), color="black")
+        plot.line("bar = error", np.array(span), np.array(span), color="black")
         for axis in "xy":
             plot.scale(axis, "log", span)
         plot.write(path)

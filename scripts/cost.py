@@ -123,7 +123,7 @@ def draw(label, curves, x, limit, path: Path) -> None:  # type: ignore[no-untype
             plot.points(style, at, taken, np.full(at.size, True))
             print(f"{name}: " + ", ".join(f"{value:.1f}" for value in taken), flush=True)
         name = "preparation and one pair"
-        plot.line(plot.axes, name, x, limit, color="0.4", ls=(0, (4, 2)), lw=0.9)
+        plot.line(name, x, limit, color="0.4", ls=(0, (4, 2)), lw=0.9)
         print(f"{name}: " + ", ".join(f"{value:.1f}" for value in limit), flush=True)
         plot.axes.set(xscale="log", yscale="log")
         if path.name.endswith("grid"):

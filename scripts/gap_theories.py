@@ -1,7 +1,7 @@
 """Theories of the mean gap on surfaces that no constant was fitted to.
 
 Compares Eq. (39), the fitted gamma(n), weights W of two contact areas, and coarse-graining. Prints
-the constants of gfmd_cli/physics/fitted_weight.py. Reads the studies `gamma`, `between`,
+the constants of gfmd_cli/physics/gap_theories.py. Reads the studies `gamma`, `between`,
 `stiffness`, `depth` and `slab` of scripts/theory_studies.py, and the weights by shell of
 scripts/energy_weights.py.
 
@@ -198,7 +198,7 @@ def print_errors(fits: Fits) -> None:
         for n in EXPONENTS
     ]
     print_table("Constants, all spectra", ["n", *FORMS], rows)
-    print("\nConstants of fitted_weight.py:", *(f"{x:.3f}" for x in fits.smooth()))
+    print("\nConstants of physics/gap_theories.py:", *(f"{x:.3f}" for x in fits.smooth()))
 
 
 def print_spectra(fits: Fits) -> None:

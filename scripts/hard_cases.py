@@ -24,9 +24,9 @@ from dataclasses import dataclass
 from math import pi
 from pathlib import Path
 
+import exact_solutions as reference
 import numpy as np
 
-from gfmd_cli.physics import exact_solutions as reference
 from gfmd_cli.physics.contact import Contact, build_scene
 from gfmd_cli.physics.elastomers import Elastomer, Power, Slab, Tabulated
 from gfmd_cli.physics.file_surface import FileSurface

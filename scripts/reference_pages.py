@@ -18,8 +18,8 @@ import click
 from click.testing import CliRunner
 
 from gfmd_cli.cli import main
+from gfmd_cli.spec.check import DEFAULT_KINDS, MODELS, REQUIRED, kinds_of
 from gfmd_cli.spec.models import SWEPT, Ladder
-from gfmd_cli.spec.parse import DEFAULT_KINDS, MODELS, REQUIRED, kinds_of
 from gfmd_cli.spec.schema import spec_schema
 from gfmd_cli.study.column import Column
 from gfmd_cli.study.columns import (

@@ -12,11 +12,10 @@ import numpy as np
 from gamma_fit import spread
 from scipy.special import erfinv
 
-from gfmd_cli.analysis.compare import Curve, compare
+from gfmd_cli.analysis.compare import VARIANTS, Curve, compare
 from gfmd_cli.analysis.curve_styles import MARKERS, CurveStyle, colours
 from gfmd_cli.analysis.figures import P_STAR
 from gfmd_cli.analysis.plotting import ColumnFigure, styled
-from gfmd_cli.analysis.records import VARIANTS
 from gfmd_cli.physics.true_contact import contact_area
 
 PERSSON = "whole"
@@ -91,9 +90,9 @@ def draw(groups: dict[float, list[Curve]], path: Path) -> None:
             plot.points(style, p_star[kept], value, np.full(value.size, True))
             line = over_seeds([measured(c, "deviation_bearing") for c in curves])[0][kept]
             plot.axes.plot(p_star[kept], line, color=style.colour)
-        plot.line(plot.axes, "highest points", p_star[:0], p_star[:0], color="0.4")
+        plot.line("highest points", p_star[:0], p_star[:0], color="0.4")
         dashed = {"color": "black", "ls": (0, (4, 2)), "lw": 0.9}
-        plot.line(plot.axes, "whole surface", p_star[kept], np.ones(value.size), **dashed)
+        plot.line("whole surface", p_star[kept], np.ones(value.size), **dashed)
         plot.scale("x", "log", p_star[kept])
         plot.axes.set(ylim=(0, 1.7))
         files = plot.write(path)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from gfmd_cli.grid.fft_grid import Grid
-from gfmd_cli.physics.anisotropy import anisotropy
+from gfmd_cli.physics.power_spectra import anisotropy
 from gfmd_cli.physics.self_affine import SelfAffine
 
 

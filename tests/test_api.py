@@ -53,6 +53,23 @@ def test_an_array_may_be_pressed():
         solve("a.toml", heights=alone.height)
 
 
+def test_files_that_have_changed_are_read_again(tmp_path):
+    random, q = np.random.default_rng(0), np.geomspace(0.1, 1e4, 50)
+    spec = {
+        "surface": {"kind": "file", "path": str(tmp_path / "map.npy")},
+        "elastomer": {"kind": "table", "path": str(tmp_path / "table.txt")},
+        "grid": {"points": 32},
+        "load": {"p_star": 0.1},
+    }
+    for exponent in (1.0, 2.0, 0.5):
+        heights = random.normal(size=(32, 32))
+        np.save(tmp_path / "map.npy", heights)
+        np.savetxt(tmp_path / "table.txt", np.c_[q, q**exponent])
+        again = solve({**spec, "elastomer": {"kind": "power", "n": exponent}})
+        assert solve(spec).h_std == pytest.approx(heights.std())
+        assert solve(spec).a_r == pytest.approx(again.a_r, abs=1e-3)
+
+
 def test_theory_stands_beside_a_study(tmp_path):
     (curve,) = compare(run(TABLES, tmp_path / "a.h5")).curves
     assert curve.prediction.a_r == pytest.approx(curve.persson.contact_area(1e6))
@@ -238,6 +255,9 @@ def test_no_worker_at_all_is_refused(tmp_path, jobs):
         "grid": {"points": 16},
         "load": {"p_star": 0.1},
     }
+    with pytest.raises(InputError, match="at least 1 worker"):
+        run(spec, tmp_path / "a.h5", jobs=jobs)
+    run(spec, tmp_path / "a.h5")
     with pytest.raises(InputError, match="at least 1 worker"):
         run(spec, tmp_path / "a.h5", jobs=jobs)
     with pytest.raises(InputError, match="unknown table '3'"):

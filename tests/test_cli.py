@@ -1,6 +1,7 @@
 import csv
 import io
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -144,6 +145,28 @@ def test_a_place_that_cannot_be_written_is_status_73(gfmd):
     assert "cannot be written" in told.output
 
 
+def test_a_file_that_cannot_be_written_is_told_with_the_reason(gfmd):
+    assert gfmd("run", "spec.toml", "-o", "a.h5").exit_code == 0
+    Path("file").write_text("")
+    for folder, reason in (
+        ("/proc", "No such file or directory"),
+        ("file", "Not a directory|File exists"),
+    ):
+        for words in (
+            ("report", "a.h5", "-o", f"{folder}/x.html"),
+            ("analyze", "a.h5", "--figures", f"{folder}/x"),
+            ("export", "a.h5", "-o", f"{folder}/x.csv"),
+            ("surface", "spec.toml", "--figure", f"{folder}/x.png"),
+            ("run", "spec.toml", "-o", f"{folder}/x.h5"),
+            ("bench", "spec.toml", "-o", f"{folder}/x.h5"),
+            ("init", f"{folder}/x.toml"),
+        ):
+            told = gfmd(*words)
+            assert told.exit_code == 73, words
+            expected = rf"gfmd: {folder}/x\S*: cannot be written: .*({reason})"
+            assert re.fullmatch(expected, told.output.splitlines()[-1]), told.output
+
+
 def test_a_name_that_is_too_long_is_status_73(gfmd):
     told = gfmd("run", "spec.toml", "-o", 300 * "x" + ".h5")
     assert told.exit_code == 73
@@ -232,6 +255,13 @@ def test_shells_are_told_how_to_complete(gfmd, shell):
 def test_help_is_quick_to_load():
     heavy = ("numpy", "h5py", "pyfftw", "pydantic", "tqdm")
     code = f"import sys, gfmd_cli.cli; print([m for m in {heavy} if m in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+def test_a_run_loads_only_what_it_needs():
+    heavy = ("scipy.interpolate", "scipy.sparse.linalg", "matplotlib", "xarray")
+    code = f"import sys, gfmd_cli.study.run; print([m for m in {heavy} if m in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
 

@@ -3,7 +3,7 @@ from types import SimpleNamespace
 import pytest
 
 from gfmd_cli.status import Status
-from gfmd_cli.study.progress import Progress
+from gfmd_cli.study.context import Progress
 from gfmd_cli.study.time_left import Clock
 
 
@@ -63,6 +63,15 @@ def test_near_its_end_a_task_is_told_by_its_residual(time):
     time.now = 10.0
     told.take_in(word(0, "step", 10**-5.9))
     assert 0.2 < told.left() < 0.25
+
+
+def test_little_remains_after_the_last_step(time):
+    told = clock(time, task(0, 100.0))
+    told.take_in(word(0, "start"))
+    told.take_in(word(0, "step", 1e-1))
+    time.now = 10.0
+    told.take_in(word(0, "step", 1e-7))
+    assert 0.0 < told.left() < 0.1
 
 
 def test_the_longest_task_bounds_the_end_of_the_run(time):

@@ -52,6 +52,12 @@ CONTACTS = {
 }
 
 
+@pytest.fixture(autouse=True)
+def as_many_points_as_for_steep_elastomers(monkeypatch):
+    """Small grids have too many points in contact otherwise."""
+    monkeypatch.setattr(module, "COST_NOT_STEEP", module.COST)
+
+
 @pytest.mark.parametrize("contact", [make() for make in CONTACTS.values()], ids=CONTACTS)
 def test_the_solution_is_that_of_the_iteration_and_exact(contact):
     """Without a step on the finest grid, at a residual far below the tolerance."""

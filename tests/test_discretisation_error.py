@@ -3,10 +3,10 @@
 from dataclasses import replace
 from math import isnan
 
+import exact_solutions as reference
 import numpy as np
 import pytest
 
-from gfmd_cli.physics import exact_solutions as reference
 from gfmd_cli.physics.contact import build_scene
 from gfmd_cli.physics.discretisation_error import (
     AREA_EXCESS,

@@ -2,16 +2,16 @@
 
 import numpy as np
 import pytest
+from exact_solutions import hertz_force, hertz_profile
 from specs import power_spec
 
 from gfmd_cli.analysis.compare import Curve, compare
 from gfmd_cli.analysis.distribution import StressDistribution, distributions, extrapolate
 from gfmd_cli.analysis.distribution_figure import continuum_figure
-from gfmd_cli.analysis.distribution_tables import power_laws
 from gfmd_cli.analysis.edge_law import edge_exponent, fit, power_law
+from gfmd_cli.analysis.tables import power_laws
 from gfmd_cli.physics.contact import build_scene
 from gfmd_cli.physics.elastomers import Power
-from gfmd_cli.physics.exact_solutions import hertz_force, hertz_profile
 from gfmd_cli.physics.indenters import Parabola
 from gfmd_cli.physics.observables import contact_points, logarithmic_edges, observe
 from gfmd_cli.solvers.auto import Auto

@@ -313,6 +313,14 @@ def test_every_file_that_the_page_names_exists(page):
     assert {path for path in named if not any((f / path).exists() for f in folders)} == set()
 
 
+def test_every_test_file_that_the_makefile_names_exists():
+    text = (ROOT / "Makefile").read_text(encoding="utf-8").replace("\\\n", " ")
+    lists = re.findall(r"^(?:SOLVING|COMPUTING) := (.*)$", text, re.MULTILINE)
+    named = {word for words in lists for word in words.split() if not word.startswith("$")}
+    assert len(lists) == 2
+    assert {word for word in named if not (ROOT / f"tests/test_{word}.py").exists()} == set()
+
+
 @pytest.mark.parametrize(
     ("shown", "found", "same"),
     [

@@ -1,12 +1,11 @@
 """The exact solutions against quadrature of their stress, energy balances and known limits."""
 
+import exact_solutions as reference
 import mpmath
 import numpy as np
 import pytest
 from scipy.integrate import quad
 from scipy.special import gamma, hyp2f1
-
-from gfmd_cli.physics import exact_solutions as reference
 
 K, R, A = 1.3, 2.0, 0.7  # stiffness, radius and contact radius of the Hertz tests
 

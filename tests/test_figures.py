@@ -79,10 +79,8 @@ def figure_of(name, comparison):
         figures.Item(curve, style, p_star, curve.predict(p_star))
         for curve, style in zip(curves, curve_styles(curves), strict=True)
     ]
-    if name == "stress_distribution":
-        return figures._distribution(items)
-    if name == "stress_distribution_pressures":
-        return figures._distribution_pressures(items)
+    if name in DISTRIBUTIONS:
+        return figures.distribution_figures(items)[name]
     return figures._over_pressure(view(name), items)
 
 

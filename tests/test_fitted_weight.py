@@ -6,7 +6,7 @@ from scipy.integrate import quad
 from scipy.special import erf
 
 from gfmd_cli.analysis.compare import einstein_prediction, theory_of
-from gfmd_cli.physics.fitted_weight import FittedWeight
+from gfmd_cli.physics.gap_theories import FittedWeight
 from gfmd_cli.physics.persson import Persson, Shells
 
 VARIANCE, ENERGY = (1.0, 2.7), (1.0, 0.9)  # of two shells: heights 1 and 0.3, k = 1 and 3

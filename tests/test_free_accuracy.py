@@ -8,8 +8,8 @@ from scipy.special import beta
 from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.physics.discretisation_error import estimate
 from gfmd_cli.physics.elastomers import HalfSpace
+from gfmd_cli.physics.error_bounds import certify_free
 from gfmd_cli.physics.error_estimates import Level
-from gfmd_cli.physics.free_error_bounds import certify_free
 from gfmd_cli.physics.observables import border_contact, observe
 from gfmd_cli.solvers.auto import Auto
 from gfmd_cli.solvers.nested_grids import solve_contact

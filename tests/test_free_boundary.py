@@ -46,7 +46,7 @@ def test_solution_is_that_of_non_negative_least_squares(elastomer, pressure):
     contact = oblong_contact(elastomer, pressure)
     solution = solve_contact(contact, Auto(tolerance=1e-11))
     assert solution.status == "converged"
-    level = contact.undeformed_level(solution.u, solution.sigma)
+    level = contact.reference_level(solution.u, solution.sigma)
     compliance = compliance_matrix(elastomer, contact.grid)
     root = np.linalg.cholesky(compliance).T
     stress, _ = nnls(root, np.linalg.solve(root.T, contact.height.ravel() - level))
@@ -64,7 +64,7 @@ def test_hertz_contact_has_no_images():
     found = solve_contact(contact, Auto())
     highest = found.sigma.max() * scene.delta_sigma
     assert highest == pytest.approx(2 * modulus * a / (np.pi * radius), rel=2e-4)
-    depth = contact.height.max() - contact.undeformed_level(found.u, found.sigma)
+    depth = contact.height.max() - contact.reference_level(found.u, found.sigma)
     assert depth * scene.h_std == pytest.approx(a**2 / radius, rel=2e-4)
     area = observe(contact, found.u, found.sigma).a_r
     assert area == pytest.approx(np.pi * a**2, rel=2e-2)  # the perimeter times a spacing / 4
@@ -93,7 +93,7 @@ def test_generalised_hertz_contact_has_no_images(n):
     found = solve_contact(contact, Auto())
     highest = found.sigma.max() * scene.delta_sigma
     assert highest == pytest.approx(2 ** (n - 1) * a ** (2 - n) / gamma(2 - n / 2) ** 2, rel=3e-3)
-    depth = contact.height.max() - contact.undeformed_level(found.u, found.sigma)
+    depth = contact.height.max() - contact.reference_level(found.u, found.sigma)
     assert depth * scene.h_std == pytest.approx(a**2 / (2 - n), rel=3e-3)
 
 

@@ -226,10 +226,18 @@ def test_coarse_to_fine_and_back_loses_the_highest_mode_only(coarse, fine, dimen
     assert back == pytest.approx(small.backward(modes), abs=10 * ROUNDING)
 
 
-def test_two_threads_change_nothing():
-    field = noise(Grid(64))
-    one, two = Grid(64).forward(field), Grid(64, threads=2).forward(field)
-    assert two == pytest.approx(one, abs=ROUNDING)
+@pytest.mark.parametrize("shape", [(513, 512), (512, 777), (600, 600), (1, 300000)])
+@pytest.mark.parametrize("precision", ["single", "double"])
+def test_threads_change_nothing(shape, precision):
+    """Grids that are large enough for two threads; the shares of three are of different size."""
+    size = {"points": shape[1], "points_y": shape[0], "precision": precision}
+    one, *others = [Grid(**size, threads=threads) for threads in (1, 2, 3)]
+    field = np.random.default_rng(3).normal(size=one.shape).astype(one.real)
+    modes, eps = one.forward(field), np.finfo(one.real).eps
+    for other in others:
+        assert other._threads > 1
+        np.testing.assert_allclose(other.forward(field), modes, atol=8 * eps * abs(modes).max())
+        np.testing.assert_allclose(other.backward(modes), field, atol=50 * eps)
 
 
 def test_a_plan_measured_for_the_first_time_destroys_nothing(tmp_path, monkeypatch):

@@ -2,6 +2,7 @@
 
 import json
 import signal
+import sys
 import threading
 from pathlib import Path
 
@@ -259,6 +260,33 @@ def test_two_specs_at_the_same_time_lose_nothing(run):
     assert {row["status"] for row in rows} == {"converged"}
     assert len(rows) == len(asked)
     assert not Study(path).parts.exists()
+
+
+def test_the_last_of_many_to_leave_removes_the_folder(tmp_path, monkeypatch):
+    """Whatever is deleted, or made anew, between two steps of another one."""
+    monkeypatch.setattr(Study, "_is_complete", lambda study, tasks: True)
+    interval = sys.getswitchinterval()
+    errors = []
+
+    def work():
+        try:
+            with Study(tmp_path / "any.h5").work([]):
+                pass
+        except BaseException as error:
+            errors.append(error)
+
+    sys.setswitchinterval(1e-5)
+    try:
+        for _ in range(300):
+            threads = [threading.Thread(target=work) for _ in range(4)]
+            for thread in threads:
+                thread.start()
+            for thread in threads:
+                thread.join()
+            assert errors == []
+            assert not (tmp_path / "any.parts").exists()
+    finally:
+        sys.setswitchinterval(interval)
 
 
 def test_a_record_with_less_output_replaces_nothing(run):

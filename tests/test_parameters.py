@@ -14,8 +14,8 @@ from gfmd_cli.analysis.export import as_dataset
 from gfmd_cli.physics.elastomers import Plate, Slab
 from gfmd_cli.physics.file_surface import FileSurface
 from gfmd_cli.physics.self_affine import SelfAffine
+from gfmd_cli.spec.check import MODELS, kinds_of
 from gfmd_cli.spec.models import SWEPT
-from gfmd_cli.spec.parse import MODELS, kinds_of
 from gfmd_cli.study.columns import (
     COLUMNS,
     CONTRACT,

@@ -24,11 +24,10 @@ from gfmd_cli.analysis.table import Column as TableColumn
 from gfmd_cli.analysis.table import Group, Table
 from gfmd_cli.analysis.units import SPACE, count, quantity, span
 from gfmd_cli.physics.persson import Shells
-from gfmd_cli.report import maps, scripts, surface
+from gfmd_cli.report import maps, rendering, surface
 from gfmd_cli.report.page import report
-from gfmd_cli.report.profiles import read_profile
+from gfmd_cli.report.profiles import STRESS_SCALE, read_profile
 from gfmd_cli.report.rendering import environment, typeset
-from gfmd_cli.report.scales import STRESS_SCALE
 from gfmd_cli.report.theme import DARK, LEGIBLE, LIGHT, PALETTE, contrast, toned
 from gfmd_cli.study.column import Column
 from gfmd_cli.study.reading import ATTRIBUTES_SUM, attributes_sum, open_study, read_rows
@@ -307,7 +306,7 @@ def test_nothing_is_fetched_and_only_our_scripts_run(whole):
     texts = re.findall(r"<script>(.*?)</script>", whole, flags=re.DOTALL)
     hashes = [b64encode(sha256(text.encode()).digest()).decode() for text in texts]
     assert rules["script-src"].split() == [f"'sha256-{digest}'" for digest in hashes]
-    assert len(texts) == len(scripts.NAMES)
+    assert len(texts) == len(rendering.SCRIPTS)
 
 
 def test_the_library_is_the_one_that_was_released():
@@ -340,7 +339,7 @@ def test_hostile_texts_are_text(copied):
     text = report(copied)
     page = Page(text)
     kinds = [script.get("type") for script in page.all("script")]
-    assert kinds.count(None) == len(scripts.NAMES)
+    assert kinds.count(None) == len(rendering.SCRIPTS)
     assert set(kinds) == {None, "application/json"}
     assert page.words.count("alert(1)") == 0
     assert HOSTILE.replace("\0", "\ufffd") in "".join(page.words)

@@ -43,6 +43,40 @@ def test_slurm_may_grant_less_memory_than_there_is(monkeypatch):
     assert resources.available_memory() == 100 * 2**20
 
 
+def test_slurm_may_grant_memory_by_the_core(monkeypatch):
+    monkeypatch.setenv("SLURM_MEM_PER_CPU", "50")
+    monkeypatch.setenv("SLURM_CPUS_PER_TASK", "3")
+    assert resources.available_memory() == 150 * 2**20
+
+
+@pytest.mark.parametrize(
+    ("line", "top", "names"),
+    [
+        ("0::/slurm/job_7/step_0", "", ("memory.max", "memory.current")),
+        (
+            "4:cpu,memory:/slurm/job_7/step_0",
+            "memory",
+            ("memory.limit_in_bytes", "memory.usage_in_bytes"),
+        ),
+    ],
+)
+def test_each_cgroup_around_the_process_may_limit_its_memory(tmp_path, line, top, names):
+    """The step has no limit of its own, its job one of 1000 bytes, and the group above 5000."""
+    membership, root = tmp_path / "cgroup", tmp_path / "fs"
+    membership.write_text(f"9:pids:/elsewhere\n{line}\n")
+    for group, limit, used in (
+        ("slurm", "5000", "400"),
+        ("slurm/job_7", "1000", "300"),
+        ("slurm/job_7/step_0", "max", "200"),
+    ):
+        folder = root / top / group
+        folder.mkdir(parents=True, exist_ok=True)
+        for name, value in zip(names, (limit, used), strict=True):
+            (folder / name).write_text(value + "\n")
+    assert sorted(resources._cgroup_limits(membership, root)) == [700, 4600]
+    assert list(resources._cgroup_limits(tmp_path / "none", root)) == []
+
+
 def test_many_tasks_run_side_by_side_on_one_thread_each(tasks, machine):
     machine(8)
     assert resources.share_out(tasks(), None) == (8, 1)

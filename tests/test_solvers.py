@@ -7,6 +7,7 @@ import copy
 from functools import cache, cached_property
 from itertools import pairwise
 
+import exact_solutions as reference
 import numpy as np
 import pytest
 from scipy.optimize import brentq
@@ -14,7 +15,6 @@ from scipy.special import gamma, hyp2f1, zeta
 
 from gfmd_cli.errors import InputError
 from gfmd_cli.grid.fft_grid import Grid
-from gfmd_cli.physics import exact_solutions as reference
 from gfmd_cli.physics.contact import Contact, build_scene
 from gfmd_cli.physics.elastomers import HalfSpace, Power, Slab
 from gfmd_cli.physics.indenters import LineParabola, Parabola, Wave
@@ -275,6 +275,16 @@ def test_the_wave_is_westergaards(p_bar, points):
     assert it.seen.u_g * made.h_std == pytest.approx(gap, rel=allowed)
     energy = full * float(reference.westergaard_energy(p_bar))
     assert it.seen.energy * made.h_std * made.delta_sigma == pytest.approx(energy, rel=allowed)
+
+
+@pytest.mark.parametrize("points", [128, 512, 2048])
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-4, 1e-6])
+@pytest.mark.parametrize("p_bar", [0.9999, 0.99999])
+def test_a_start_that_is_good_enough_touches_where_it_is_pressed(p_bar, tolerance, points):
+    """The wave in nearly full contact, interpolated: pressed points have gaps of rounding."""
+    full = 2 * np.pi
+    _, it = on_line(Wave(), HalfSpace(E_star=2.0), points, p_bar * full, tolerance)
+    assert it.seen.a_r == pytest.approx(float(reference.westergaard_area(p_bar)), abs=5 / points)
 
 
 @pytest.mark.parametrize("points", [64, 250, 1024])

@@ -76,7 +76,7 @@ def test_a_scan_is_free_where_that_is_available_and_else_mirrored(
         'kind = "half-space"\nE_star = 1\n[grid]\npoints = 16\n[load]\npressure = 0.1\n'
     )
     tasks = plan(read_spec(path, overrides)[0])
-    found = [(task.boundary, task.surface.treatment()[1], task.points) for task in tasks]
+    found = [(task.boundary, task.surface.edges or "none", task.points) for task in tasks]
     if boundary is None:  # n = 1 and n = 3
         assert found == [("free", "none", 16), ("periodic", "mirror", 32)]
         assert len({task.id for task in tasks}) == 2

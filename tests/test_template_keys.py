@@ -5,7 +5,7 @@ import tomllib
 import pytest
 
 from gfmd_cli.errors import InputError
-from gfmd_cli.spec.template_keys import with_keys
+from gfmd_cli.spec.starter import with_keys
 
 TEXT = """\
 [elastomer]

@@ -5,13 +5,13 @@ from itertools import product
 
 import numpy as np
 import pytest
+from exact_solutions import kappa
 from specs import power_spec
 
 from gfmd_cli.analysis.compare import einstein_prediction
 from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.physics.contact import Contact, build_scene
 from gfmd_cli.physics.elastomers import Power
-from gfmd_cli.physics.exact_solutions import kappa
 from gfmd_cli.physics.indenters import LineParabola, Parabola
 from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.physics.true_contact import Bearing, bearing, contact_area, contact_stress

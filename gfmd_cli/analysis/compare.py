@@ -1,5 +1,6 @@
 """A study beside Persson theory."""
 
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -8,12 +9,14 @@ from typing import Any, Literal
 import numpy as np
 
 from gfmd_cli.analysis.selection import grouped
+from gfmd_cli.analysis.table import known
 from gfmd_cli.errors import InputError
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.physics import einstein_solid
-from gfmd_cli.physics.coarse_graining import CoarseGrained
-from gfmd_cli.physics.fitted_weight import FittedWeight
+from gfmd_cli.physics.gap_theories import CoarseGrained, FittedWeight
+from gfmd_cli.physics.observables import QUANTITIES
 from gfmd_cli.physics.persson import Persson, Shells
+from gfmd_cli.physics.true_contact import contact_area
 from gfmd_cli.study.columns import PARAMETERS
 from gfmd_cli.study.reading import StudyFile, open_study, solved_rows
 
@@ -21,9 +24,13 @@ Row = dict[str, Any]
 Theory = Literal["paper", "fitted", "coarse-grained"]
 """Of the mean gap: Eq. (30) with gamma of Eqs. (39) and (42), the weight that is fitted in
 docs/theory.md, or coarse-graining without any constant."""
+VARIANTS = {
+    name: f"a_r_persson_{name}" for name in ("deviation_bearing", "deviation_c", "quadrature_c")
+}
+"""Columns with Delta_sigma over the contact, and the keys of Persson's contact areas with it."""
 
 
-def in_continuum(row: Row, name: str) -> bool:
+def in_continuum(row: Mapping[str, Any], name: str) -> bool:
     """Whether a quantity has a value in the continuum, with its error."""
     values = (row.get(f"{name}_continuum", np.nan), row.get(f"{name}_continuum_error", np.nan))
     return bool(np.all(np.isfinite(values)))
@@ -33,6 +40,13 @@ def best(row: Row, name: str) -> tuple[float, float]:
     """A quantity with its error: of the continuum where that is known, else of the grid."""
     value = f"{name}_continuum" if in_continuum(row, name) else name
     return float(row[value]), float(row[f"{value}_error"])
+
+
+def with_best(row: Row) -> Row:
+    """A row with the best value of each quantity, as `NAME_best`, and `NAME_best_error`."""
+    pairs = {name: best(row, name) for name in QUANTITIES}
+    values = {f"{name}_best": value for name, (value, _) in pairs.items()}
+    return row | values | {f"{name}_best_error": error for name, (_, error) in pairs.items()}
 
 
 def of_study(study: str, text: str) -> str:
@@ -127,6 +141,28 @@ class Curve:
         unit, height = self.rows[0]["delta_sigma"], self.rows[0]["h_std"]
         pressure: Field = self.persson.pressure_at_gap(np.asarray(u_g) * height) / unit
         return pressure
+
+    @cached_property
+    def records(self) -> list[Row]:
+        """The rows with best values and with theory at each pressure, NaN where it is unknown."""
+        p_star = self.column("p_star")
+        columns = {f"{name}_persson": getattr(self.prediction, name) for name in QUANTITIES}
+        columns["p_star_persson_at_u_g"] = self.pressure_at_gap(self.column("u_g"))
+        for name, key in VARIANTS.items():
+            columns[key] = contact_area(self.column(name), p_star)
+        if self.n == 0 and self.has_theory:
+            exact = einstein_prediction(p_star)
+            columns |= {f"{name}_einstein": getattr(exact, name) for name in QUANTITIES}
+        return [
+            with_best(row) | {name: float(values[i]) for name, values in columns.items()}
+            for i, row in enumerate(self.rows)
+        ]
+
+    def stores(self, keys: Iterable[str]) -> bool:
+        """Whether some record has a value of one of these keys."""
+        return any(
+            known(record.get(key)) and record[key] != "" for record in self.records for key in keys
+        )
 
 
 @dataclass(frozen=True)

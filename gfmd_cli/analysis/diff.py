@@ -1,13 +1,13 @@
 """Two studies side by side: what differs in their specs, and by how much their results do."""
 
 import math
-from collections import defaultdict
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
 from gfmd_cli.analysis.compare import Row
+from gfmd_cli.analysis.selection import grouped
 from gfmd_cli.physics.observables import QUANTITIES
 from gfmd_cli.spec.models import differences
 from gfmd_cli.study.reading import read_rows, solved_rows, stored_spec
@@ -84,7 +84,7 @@ def diff(one: Path, other: Path) -> Difference:
     StudyError.
     """
     only = solved_rows(read_rows(one)), solved_rows(read_rows(other))
-    pairs, paired = _matches(*only, _contact), ""
+    pairs, paired = _matches(*only, _pressed, _load_of), ""
     if not pairs and all(len({_pressed(row) for row in rows}) == 1 for rows in only):
         pairs = _matches(*only, _load_of)
         paired = _paired(pairs[0]) if pairs else ""
@@ -98,37 +98,29 @@ def _pressed(row: Row) -> tuple[Hashable, ...]:
 
 def _load_of(row: Row) -> tuple[Hashable, ...]:
     """How hard."""
-    load, value = (row["load"], row["load_value"]) if row["load"] else ("p_star", row["p_star"])
-    return load, f"{value:.12g}"
+    return row["load"], f"{row['load_value']:.12g}"
 
 
-def _contact(row: Row) -> tuple[Hashable, ...]:
-    return *_pressed(row), *_load_of(row)
-
-
-def _matches(one: list[Row], other: list[Row], key: Key) -> list[Pair]:
-    """Pairs of the same key, alike in grid and solver if they can be; taken from both lists."""
+def _matches(one: list[Row], other: list[Row], *keys: Key) -> list[Pair]:
+    """Pairs of the same keys, alike in grid and solver if they can be; taken from both lists."""
     pairs: list[Pair] = []
+    taken: set[int] = set()
     for alike in (("points", "solver", "tolerance"), ("points",), ()):
-        pairs += _match(one, other, key, alike)
-    return sorted(pairs, key=lambda pair: int(pair.one["task"]))
 
+        def key_of(row: Row, alike: tuple[str, ...] = alike) -> Hashable:
+            return *(key(row) for key in keys), *(row[name] for name in alike)
 
-def _match(one: list[Row], other: list[Row], key: Key, alike: tuple[str, ...]) -> list[Pair]:
-    """Pairs of the same key with these columns alike, in order; taken from both lists."""
-    waiting: dict[Hashable, list[Row]] = defaultdict(list)
-
-    def waiting_for(row: Row) -> list[Row]:
-        return waiting[(*key(row), *(row[name] for name in alike))]
-
-    for row in other:
-        waiting_for(row).append(row)
-    found = [(row, waiting_for(row).pop(0)) for row in one if waiting_for(row)]
-    taken = {id(row) for pair in found for row in pair}
+        waiting = grouped((row for row in other if id(row) not in taken), key_of)
+        for row in one:
+            if id(row) not in taken and (partners := waiting.get(key_of(row))):
+                partner = partners.pop(0)
+                taken |= {id(row), id(partner)}
+                # another surface or elastomer has other units: equal then is the pressure in Pa
+                physical = row["load"] == "pressure" and _pressed(row) != _pressed(partner)
+                pairs.append(Pair(row, partner, physical))
     for rows in (one, other):
         rows[:] = [row for row in rows if id(row) not in taken]
-    # another surface or elastomer has other units: what is equal then is the pressure in Pa
-    return [Pair(a, b, a["load"] == "pressure" and _pressed(a) != _pressed(b)) for a, b in found]
+    return sorted(pairs, key=lambda pair: int(pair.one["task"]))
 
 
 def _paired(pair: Pair) -> str:
@@ -138,6 +130,6 @@ def _paired(pair: Pair) -> str:
         for what, names in {"surfaces": ("surface", "seed"), "bodies": ("elastomer",)}.items()
         if any(pair.one[name] != pair.other[name] for name in names)
     ]
-    load = str(_load_of(pair.one)[0])
+    load = pair.one["load"]
     units = "sigma_p in Pa, u_g in m" if pair.physical else "values in reduced units"
     return f"{' and '.join(apart)} differ: paired by {LOADS.get(load, load)}, {units}"

@@ -1,10 +1,12 @@
 """The differences of two studies: as tables, as records."""
 
 import json
+from functools import partial
 from typing import Any
 
 from gfmd_cli.analysis.compare import Row
-from gfmd_cli.analysis.diff import Deviation, Difference, Pair
+from gfmd_cli.analysis.diff import Difference, Pair
+from gfmd_cli.analysis.selection import grouped
 from gfmd_cli.analysis.table import BLANK, Column, Record, Table, groups_of, known, plain
 from gfmd_cli.physics.observables import QUANTITIES
 from gfmd_cli.study.tasks import SYMBOLS
@@ -13,13 +15,27 @@ LEGEND = (
     "Relative differences (B - A) / max(|A|, |B|); in brackets: in units of the combined error bar."
 )
 NOTHING = "no contact in common"
-DIFFERENCES = (
-    Column("load", "load"),
-    Column("points", "points"),
-    *(Column(name, name) for name in QUANTITIES),
-)
 CONTACT = ("surface", "seed", "elastomer", "load", "load_value")
 """Keys that both rows of a pair share, unless the studies are paired by load."""
+ONE_STUDY = (*CONTACT, "points", "p_star")
+"""Keys of a row that one study alone has."""
+
+
+def _load(record: Record) -> str:
+    return f"{SYMBOLS[record['load']]}={record['load_value']:.4g}"
+
+
+def _deviation(record: Record, name: str) -> str:
+    relative, in_errors = record[f"{name}_relative"], record[f"{name}_in_errors"]
+    bars = f" ({in_errors:+.1f})" if known(in_errors) else ""
+    return (f"{relative:+.2e}" if known(relative) else BLANK) + bars
+
+
+DIFFERENCES = (
+    Column("load", _load),
+    Column("points", lambda record: f"{record['points_a']} -> {record['points_b']}"),
+    *(Column(name, partial(_deviation, name=name)) for name in QUANTITIES),
+)
 
 
 def diff_table(found: Difference) -> Table:
@@ -48,9 +64,9 @@ def diff_json(found: Difference) -> str:
     """The same as JSON; what does not apply is null."""
     return json.dumps(
         {
-            "rows": [_as_json(pair) for pair in found.pairs],
-            "only_a": [_of_one_study(row) for row in found.only[0]],
-            "only_b": [_of_one_study(row) for row in found.only[1]],
+            "rows": [_plain(_record(pair)) for pair in found.pairs],
+            "only_a": [_plain(row, *ONE_STUDY) for row in found.only[0]],
+            "only_b": [_plain(row, *ONE_STUDY) for row in found.only[1]],
             "spec": found.spec,
             "paired": found.paired,
         },
@@ -64,23 +80,19 @@ def _title(pair: Pair) -> str:
 
 
 def _record(pair: Pair) -> Record:
-    cells = {name: _cell(pair.deviation(name)) for name in QUANTITIES}
-    points = f"{pair.one['points']} -> {pair.other['points']}"
-    return {"load": _load(pair.one), "points": points, **cells}
-
-
-def _as_json(pair: Pair) -> dict[str, Any]:
-    record = {key: plain(pair.one[key]) for key in CONTACT}
+    """Both values of what is compared, as `a_r_a` and `a_r_b`, and how far they lie apart."""
+    record = {key: pair.one[key] for key in CONTACT}
     for key in ("points", "p_star", *QUANTITIES):
-        record |= {f"{key}_a": plain(pair.one[key]), f"{key}_b": plain(pair.other[key])}
+        record |= {f"{key}_a": pair.one[key], f"{key}_b": pair.other[key]}
     for name in QUANTITIES:
         deviation = pair.deviation(name)._asdict()
-        record |= {f"{name}_{what}": plain(value) for what, value in deviation.items()}
+        record |= {f"{name}_{what}": value for what, value in deviation.items()}
     return record
 
 
-def _of_one_study(row: Row) -> dict[str, Any]:
-    return {key: plain(row[key]) for key in (*CONTACT, "points", "p_star")}
+def _plain(record: Record, *keys: str) -> dict[str, Any]:
+    """These keys of a record as JSON has them; without any all of them."""
+    return {key: plain(record[key]) for key in keys or record}
 
 
 def _name(row: Row) -> str:
@@ -89,23 +101,9 @@ def _name(row: Row) -> str:
 
 def _listed(rows: list[Row]) -> list[str]:
     """Loads grouped by scene, a line for each grid."""
-    scenes: dict[str, dict[int, list[str]]] = {}
-    for row in rows:
-        scenes.setdefault(_name(row), {}).setdefault(row["points"], []).append(_load(row))
-    return [
-        line
-        for name, grids in scenes.items()
-        for line in (f"  {name}", *(f"    {n}: {', '.join(loads)}" for n, loads in grids.items()))
-    ]
-
-
-def _cell(deviation: Deviation) -> str:
-    relative, in_errors = deviation
-    bars = f" ({in_errors:+.1f})" if known(in_errors) else ""
-    return (f"{relative:+.2e}" if known(relative) else BLANK) + bars
-
-
-def _load(row: Row) -> str:
-    if not row["load"]:
-        return f"p*={row['p_star']:.4g}"
-    return f"{SYMBOLS.get(row['load'], row['load'])}={row['load_value']:.4g}"
+    lines = []
+    for name, scene in grouped(rows, _name).items():
+        grids = grouped(scene, lambda row: row["points"])
+        loads = {points: ", ".join(map(_load, grid)) for points, grid in grids.items()}
+        lines += [f"  {name}", *(f"    {points}: {text}" for points, text in loads.items())]
+    return lines

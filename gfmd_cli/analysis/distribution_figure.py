@@ -1,22 +1,125 @@
-"""Figure of Pr(sigma) in the continuum, as the paper's Figs. 7 and 13."""
+"""Figures of Pr(sigma), on the grids and in the continuum, as the paper's Figs. 7 and 13."""
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from gfmd_cli.analysis.compare import Comparison
-from gfmd_cli.analysis.curve_styles import CurveStyle, curve_styles, order
-from gfmd_cli.analysis.distribution import StressDistribution, distributions
+from gfmd_cli.analysis.compare import Comparison, Row
+from gfmd_cli.analysis.curve_styles import CurveStyle, colours, curve_styles, order
+from gfmd_cli.analysis.distribution import StressDistribution, bin_counts, distributions
 from gfmd_cli.analysis.edge_law import fit
-from gfmd_cli.analysis.plotting import ColumnFigure
-from gfmd_cli.analysis.selection import at_one_pressure, grouped, pressure_label
+from gfmd_cli.analysis.ensemble import by_load
+from gfmd_cli.analysis.plotting import THEORY, ColumnFigure
+from gfmd_cli.analysis.selection import at_one_pressure, evenly, grouped, pressure_label
+from gfmd_cli.analysis.series import Item, seed_groups
+from gfmd_cli.grid.arrays import Field
 from gfmd_cli.physics.observables import logarithmic_middles
+from gfmd_cli.status import Status
+from gfmd_cli.study.columns import BINS, PR_LINEAR, PR_LOGARITHMIC
 
+PRESSURES = 5  # at which the distribution of one elastomer is drawn
+FEW = 10  # grid points; a bin with fewer is noise of 30 % and more
 MOST = 8  # contacts; more cannot be told apart
 BEYOND = 2.5  # factor that the edge law is drawn beyond the window of its fit
 LOWEST = 3e-3  # share of the highest density that is drawn at the least, and of the lowest known
 EDGE_LAW = "edge law"
 STRESS, DENSITY = r"stress  $\sigma\,/\,\Delta\sigma$", r"$\mathrm{Pr}(\sigma)\;\Delta\sigma$"
+
+
+@dataclass(frozen=True)
+class Density:
+    """Pr(sigma) of one contact as it is drawn, all in units of Delta_sigma."""
+
+    item: Item
+    row: Row
+    sigma: Field
+    density: Field
+    """Of bins with enough points."""
+
+    def theory(self, sigma: Field) -> Field:
+        """Persson theory. Paper Eq. (24)."""
+        return self.item.curve.stress_density(sigma, self.row["p_star"])
+
+
+def densities(items: list[Item]) -> dict[str, list[Density]]:
+    """What the figures of Pr(sigma) show, by their names: curves, or pressures, side by side.
+
+    The curves are shown at about one pressure, the pressures of the curve nearest to n = 1.
+    """
+    groups = _densities(items, PR_LOGARITHMIC)
+    side_by_side = at_one_pressure(groups, lambda each: (each.row["p_star"], each.row["a_r"]))
+    several = [group for group in _densities(items, PR_LINEAR) if len(group) > 1]
+    several.sort(key=lambda group: np.nan_to_num(abs(group[0].item.curve.n - 1), nan=9.0))
+    return {
+        "stress_distribution": side_by_side,
+        "stress_distribution_pressures": evenly(several[0], PRESSURES) if several else [],
+    }
+
+
+def _densities(items: list[Item], name: str) -> list[list[Density]]:
+    """The contacts of each curve that have enough bins for a line; of seeds the mean of all."""
+    groups = []
+    for group in seed_groups(items):
+        shown = []
+        for seeds in by_load(row for item in group for row in item.curve.rows):
+            stored = [row for row in seeds if name in row and _bins(row, name)[0].size > 2]
+            if stored:
+                row = stored[0] | {name: np.mean([row[name] for row in stored], axis=0)}
+                shown.append(Density(group[0], row, *_bins(row, name)))
+        groups.append(shown)
+    return [group for group in groups if group]
+
+
+def _bins(row: Row, name: str) -> tuple[Field, Field]:
+    """Pr(sigma) Delta_sigma over sigma / Delta_sigma, bins with fewer than FEW points left out."""
+    kept = bin_counts(row, name) > FEW - 0.5
+    return BINS[name].middles()[kept], np.nan_to_num(row[name])[kept]
+
+
+def distribution_figures(items: list[Item]) -> dict[str, ColumnFigure | None]:
+    """The figures of `densities`; None without data."""
+    shown = densities(items)
+    figures = {"stress_distribution": _side_by_side, "stress_distribution_pressures": _pressures}
+    return {name: draw(shown[name]) if shown[name] else None for name, draw in figures.items()}
+
+
+def _side_by_side(shown: list[Density]) -> ColumnFigure:
+    """Pr(sigma) of the curves at one pressure."""
+    plot = _at_pressure([found.row["p_star"] for found in shown])
+    for place, found in enumerate(shown):
+        style, x, y = found.item.style, found.sigma, found.density
+        plot.unnamed_line((style.label,), x, y, color=style.colour, lw=0.7)
+        converged = np.full(x.size, found.row["status"] == Status.CONVERGED)
+        plot.points(style, x, y, converged, every=(place % 3, 3) if len(shown) > 1 else 1)
+    _scale(plot, "log", shown)
+    sigma = np.geomspace(*plot.axes.get_xlim(), 400)
+    plot.theory([(found.item.style, sigma, found.theory(sigma)) for found in shown])
+    return plot
+
+
+def _at_pressure(p_stars: list[float]) -> ColumnFigure:
+    return ColumnFigure(f"{STRESS}  at  {pressure_label(p_stars)}", DENSITY)
+
+
+def _pressures(shown: list[Density]) -> ColumnFigure:
+    """Pr(sigma) of one curve at a few pressures."""
+    plot = ColumnFigure(f"{STRESS}  for  {shown[0].item.style.label[:24]}", DENSITY)
+    for found, colour in zip(shown, colours(len(shown)), strict=True):
+        label = f"p* = {found.row['p_star']:.3g}"
+        plot.line(label, found.sigma, found.density, color=colour, lw=1.6)
+    _scale(plot, "linear", shown)
+    sigma = np.linspace(0.0, plot.axes.get_xlim()[1], 400)
+    for found in shown:
+        if found.item.curve.has_theory:
+            density = found.theory(sigma)
+            plot.line(THEORY, sigma, density, color="black", lw=0.6, zorder=3)
+    return plot
+
+
+def _scale(plot: ColumnFigure, x_scale: str, shown: list[Density]) -> None:
+    plot.scale("x", x_scale, np.concatenate([found.sigma for found in shown]))
+    plot.scale("y", "log", np.concatenate([found.density for found in shown]))
 
 
 def continuum_figure(comparison: Comparison) -> ColumnFigure | None:
@@ -27,8 +130,7 @@ def continuum_figure(comparison: Comparison) -> ColumnFigure | None:
     chosen = _chosen([f for f in distributions(comparison) if np.isfinite(f.density).sum() > 2])
     if not chosen:
         return None
-    label = pressure_label([found.finest["p_star"] for found in chosen])
-    plot = ColumnFigure(f"{STRESS}  at  {label}", DENSITY)
+    plot = _at_pressure([found.finest["p_star"] for found in chosen])
     styles = curve_styles([found.curve for found in chosen])
     spans = [_draw(plot, found, style) for found, style in zip(chosen, styles, strict=True)]
     ends = np.array(spans)
@@ -81,4 +183,4 @@ def _edge_law(plot: ColumnFigure, found: StressDistribution, style: CurveStyle) 
         dashed: dict[str, Any] = {"ls": (0, (4, 2)), "lw": 0.8, "zorder": 2.5}
         density = law.edge_prefactor * sigma**law.theory
         plot.unnamed_line((style.label, EDGE_LAW), sigma, density, color=style.colour, **dashed)
-        plot.line(plot.axes, EDGE_LAW, sigma[:0], density[:0], color="0.4", **dashed)
+        plot.line(EDGE_LAW, sigma[:0], density[:0], color="0.4", **dashed)

@@ -9,7 +9,9 @@ import numpy as np
 from scipy.special import stdtrit
 
 from gfmd_cli.analysis.compare import Comparison, Row, of_study
-from gfmd_cli.analysis.grid_size import grid_size
+from gfmd_cli.analysis.selection import grouped
+from gfmd_cli.analysis.units import grid_size
+from gfmd_cli.physics.observables import QUANTITIES
 from gfmd_cli.study.columns import PARAMETERS
 
 CONFIDENCE = 0.95
@@ -47,6 +49,18 @@ class Ensemble:
         best = [row.get(f"{name}_continuum", np.nan) for row in self.rows]
         return spread_of(best if np.all(np.isfinite(best)) else [row[name] for row in self.rows])
 
+    def means(self) -> dict[str, Any]:
+        """Number of seeds, and the spread of each quantity, as the records of a study have them."""
+        record: dict[str, Any] = {"seeds": len(self.rows)}
+        for name in QUANTITIES:
+            spread = self.spread(name)
+            record |= {
+                f"{name}_mean": spread.mean,
+                f"{name}_standard_error": spread.standard_error,
+                f"{name}_confidence": spread.half_width,
+            }
+        return record
+
 
 def spread_of(values: Sequence[float]) -> Spread:
     """Statistics of two values or more."""
@@ -67,20 +81,19 @@ def without_seed(row: Row) -> tuple[Any, ...]:
 
 def by_load(rows: Iterable[Row]) -> list[list[Row]]:
     """The rows of each load, one a seed."""
-    groups: dict[tuple[Any, ...], dict[int, Row]] = {}
-    for row in rows:
-        groups.setdefault((row["load"], f"{row['load_value']:.12g}"), {})[row["seed"]] = row
-    return [[*seeds.values()] for seeds in groups.values()]
+    groups = grouped(rows, lambda row: (row["load"], f"{row['load_value']:.12g}"))
+    return [[*{row["seed"]: row for row in group}.values()] for group in groups.values()]
 
 
 def ensembles(comparison: Comparison) -> list[Ensemble]:
     """The contacts of a study that were solved for two seeds or more, pressure rising."""
-    groups: dict[tuple[str, tuple[Any, ...]], list[Row]] = {}
-    for curve in comparison.curves:
-        groups.setdefault((curve.study, without_seed(curve.rows[0])), []).extend(curve.rows)
+    groups = grouped(comparison.curves, lambda curve: (curve.study, without_seed(curve.rows[0])))
     return [
         Ensemble(rows, study)
-        for (study, _), group in groups.items()
-        for rows in sorted(by_load(group), key=lambda seeds: float(seeds[0]["p_star"]))
+        for (study, _), curves in groups.items()
+        for rows in sorted(
+            by_load(row for curve in curves for row in curve.rows),
+            key=lambda seeds: float(seeds[0]["p_star"]),
+        )
         if len(rows) > 1
     ]

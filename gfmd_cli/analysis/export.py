@@ -2,7 +2,7 @@
 
 import csv
 import io
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +23,6 @@ from gfmd_cli.study.columns import (
     SHELLS,
     TASK,
     TASK_GROUPS,
-    HistogramColumn,
 )
 from gfmd_cli.study.reading import StudyFile, open_study, read_rows, solved_rows
 
@@ -66,7 +65,7 @@ def _cell(value: Any) -> str:
         return ""
     if isinstance(value, str) and value.startswith(FORMULA):
         return f"'{value}"
-    return repr(value) if isinstance(value, float) else str(value)
+    return str(value)
 
 
 def as_dataset(path: Path) -> Any:
@@ -107,12 +106,15 @@ def _labelled_study(path: Path) -> Any:
     """A study as a data set without an index over parameters."""
     with open_study(path) as study:
         rows = study.rows
-        columns = (*study.columns, SCENE)
-        variables = {c.name: _labelled(("task",), _values(rows, c), c) for c in columns}
-        variables |= _histograms(rows) | _curves(study)
-        coordinates = {"task": _values(rows, TASK)}
+        variables = {c.name: _of_tasks(rows, c) for c in (*study.columns, SCENE)}
+        coordinates: dict[str, Any] = {"task": _of_tasks(rows, TASK)[1]}
         coordinates |= {name: variables.pop(name) for name in COORDINATES if name in variables}
-        coordinates |= {h.axis: _bins(h) for h in HISTOGRAMS if h.name in variables}
+        for bins in HISTOGRAMS:
+            if rows and bins.name in rows[0]:
+                variables[bins.name] = _of_tasks(rows, bins.column, bins.axis)
+                about = {"units": "1", "long_name": bins.axis_meaning, "edges": bins.edges()}
+                coordinates[bins.axis] = (bins.axis,), bins.middles(), about
+        variables |= _curves(study)
         return _xarray().Dataset(variables, coordinates, study.attributes)
 
 
@@ -123,31 +125,15 @@ def write_netcdf(path: Path, target: Path) -> None:
         made.to_netcdf(file, engine="h5netcdf")
 
 
-def _values(rows: Rows, column: Column) -> Any:
-    return np.array([row[column.name] for row in rows], dtype=column.kind)
+def _of_tasks(rows: Rows, column: Column, *axis: str) -> Any:
+    """A column of the rows; `axis`: that of the values that each row has."""
+    values: Any = np.array([row[column.name] for row in rows], dtype=column.kind)
+    return _labelled(("task", *axis), values, column)
 
 
-def _labelled(axes: Iterable[str], values: Any, column: Column) -> Any:
+def _labelled(axes: tuple[str, ...], values: Any, column: Column) -> Any:
     units = {"units": column.units} if column.units else {}
-    return tuple(axes), values, units | {"long_name": column.meaning}
-
-
-def _histograms(rows: Rows) -> dict[str, Any]:
-    """The histograms that are stored."""
-    return {
-        histogram.name: _labelled(
-            ("task", histogram.axis),
-            np.array([row[histogram.name] for row in rows]),
-            histogram.column,
-        )
-        for histogram in HISTOGRAMS
-        if rows and histogram.name in rows[0]
-    }
-
-
-def _bins(histogram: HistogramColumn) -> Any:
-    attributes = {"units": "1", "long_name": histogram.axis_meaning, "edges": histogram.edges()}
-    return (histogram.axis,), histogram.middles(), attributes
+    return axes, values, units | {"long_name": column.meaning}
 
 
 def _curves(study: StudyFile) -> dict[str, Any]:
@@ -170,19 +156,12 @@ def _padded(
     arrays: Sequence[Mapping[str, Field]],
 ) -> dict[str, Any]:
     """Curves side by side, NaN where one is shorter than another; none where there is none."""
-    if not any(arrays):
-        return {}
-    over = (axes[0], f"{name}_{axes[1]}")
-    return {
-        f"{name}_{column.name}": _labelled(
-            over, _side_by_side([curves.get(column.name, np.empty(0)) for curves in arrays]), column
-        )
-        for column in columns
-    }
-
-
-def _side_by_side(curves: list[Field]) -> Field:
-    table = np.full((len(curves), max(curve.size for curve in curves)), np.nan)
-    for row, curve in zip(table, curves, strict=True):
-        row[: curve.size] = curve
-    return table
+    variables: dict[str, Any] = {}
+    for column in columns if any(arrays) else ():
+        curves = [each.get(column.name, np.empty(0)) for each in arrays]
+        table = np.full((len(curves), max(curve.size for curve in curves)), np.nan)
+        for row, curve in zip(table, curves, strict=True):
+            row[: curve.size] = curve
+        over = (axes[0], f"{name}_{axes[1]}")
+        variables[f"{name}_{column.name}"] = _labelled(over, table, column)
+    return variables

@@ -2,15 +2,15 @@
 
 from collections.abc import Sequence
 from contextlib import AbstractContextManager
+from dataclasses import dataclass, replace
 from functools import partial
 from io import BytesIO
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from gfmd_cli.analysis.curve_styles import CurveStyle
-from gfmd_cli.analysis.layers import Layer
 from gfmd_cli.errors import INSTALL, InputError
 from gfmd_cli.files.atomic import write_whole
 from gfmd_cli.grid.arrays import Field, Mask
@@ -27,6 +27,7 @@ except ImportError as error:
 WIDTH, HEIGHT, ROW = 3.39, 2.35, 0.145  # inches: a column of 86 mm; a row of the legend adds ROW
 SMALL = 8.0  # points
 COLUMN = 54  # characters and symbols that a row of the legend holds
+SYMBOL = 6  # characters that a symbol and the space around it take
 SCRIPTED = 9.3  # points: sub- and superscripts are printed at 0.7 of it, 6.5 points
 STYLE = {
     "font.family": "DejaVu Sans",
@@ -56,6 +57,38 @@ THEORY, UNCONVERGED, CONFIDENCE = "Persson theory", "not converged", "95 % confi
 BAND = 0.25  # opacity of a confidence band
 
 
+@dataclass(frozen=True)
+class Layer:
+    """Points, a line or a band of a figure, as data for a page that draws them anew."""
+
+    kind: Literal["points", "line", "band"]
+    names: tuple[str, ...]
+    """Entries of the legend that the layer belongs to, that of its curve first."""
+    x: Field
+    y: Field
+    """Of a band its lower end."""
+    colour: str
+    """As #rrggbb."""
+    marker: str = ""
+    """Of points, as matplotlib names it."""
+    width: float = 0.9
+    """Of a line [points]."""
+    dashed: bool = False
+    error: Field | None = None
+    """Error bars of points, shape (points,), or (2, points) for down and up; NaN: none."""
+    high: Field | None = None
+    """Upper end of a band."""
+    details: Sequence[str] = ()
+    """What else is known of each point, a text of some lines."""
+
+    def errors(self) -> tuple[Field, Field] | None:
+        """Lengths of the error bars down and up; None without any."""
+        if self.error is None or not np.any(np.isfinite(self.error)):
+            return None
+        down, up = np.broadcast_to(self.error, (2, self.x.size))
+        return down, up
+
+
 def styled() -> AbstractContextManager[None]:
     """A context in which all figures are drawn in the same style."""
     style: AbstractContextManager[None] = rc_context(STYLE)
@@ -70,8 +103,8 @@ class LegendFigure:
         self.figure = Figure(figsize=(width, height), layout="constrained")
         self.legend: dict[str, Any] = {}
 
-    def line(self, axes: Any, label: str, x: Field, y: Field, **style: Any) -> None:
-        """Draw a line where y > 0."""
+    def line_on(self, axes: Any, label: str, x: Field, y: Field, **style: Any) -> None:
+        """Draw a line where y > 0 on some axes, with an entry of the legend."""
         axes.plot(x, np.where(y > 0, y, np.nan), **style)
         self.legend[label] = Line2D([], [], **style)
 
@@ -91,13 +124,6 @@ class LegendFigure:
             handletextpad=0.5,
         )
 
-    def _lay_out(self) -> None:
-        """Fix the layout, which all files share."""
-        if self.legend:
-            self._write_legend()
-        self.figure.draw_without_rendering()
-        self.figure.set_layout_engine("none")
-
     def svg(self) -> str:
         """An SVG with outlined text and no background; the same figure gives the same bytes."""
         if self.legend:
@@ -113,10 +139,8 @@ class LegendFigure:
 
     def write(self, path: Path) -> list[Path]:
         """Write a PDF and a PNG, each whole or not at all. Raises SpaceError."""
-        self._lay_out()
         files = [path.with_name(f"{path.name}.{kind}") for kind in ("pdf", "png")]
-        for file in files:
-            self._save(file, dpi=300)
+        self._save(files, dpi=300)
         return files
 
     def write_file(self, path: Path) -> None:
@@ -124,13 +148,18 @@ class LegendFigure:
         if path.suffix not in METADATA:
             known = ", ".join(METADATA)
             raise InputError(f"{path}: unknown suffix {path.suffix!r}; allowed: {known}")
-        self._lay_out()
-        self._save(path, dpi=200)
+        self._save([path], dpi=200)
 
-    def _save(self, path: Path, dpi: int) -> None:
-        image, metadata = BytesIO(), METADATA[path.suffix]
-        self.figure.savefig(image, format=path.suffix[1:], dpi=dpi, metadata=metadata)
-        write_whole(path, image.getvalue())
+    def _save(self, files: Sequence[Path], dpi: int) -> None:
+        """Write files with one layout."""
+        if self.legend:
+            self._write_legend()
+        self.figure.draw_without_rendering()
+        self.figure.set_layout_engine("none")
+        for file in files:
+            image, metadata = BytesIO(), METADATA[file.suffix]
+            self.figure.savefig(image, format=file.suffix[1:], dpi=dpi, metadata=metadata)
+            write_whole(file, image.getvalue())
 
 
 class ColumnFigure(LegendFigure):
@@ -160,33 +189,26 @@ class ColumnFigure(LegendFigure):
         are texts for the points.
         """
         if error is not None:
-            self._bars(style, x, y, error)
+            known = np.isfinite(np.broadcast_to(error, (2, x.size))).all(axis=0)
+            bars: dict[str, Any] = {"fmt": "none", "elinewidth": 0.7, "capsize": CAP}
+            if np.any(known):
+                self.axes.errorbar(
+                    x[known], y[known], error[..., known], ecolor=style.colour, **bars
+                )
         options: dict[str, Any] = {"ls": "none", "mfc": "none", "color": style.colour, "zorder": 3}
-        for chosen, marker in ((converged, style.marker), (~converged, "x")):
+        for chosen, names, marker in (
+            (converged, (style.label,), style.marker),
+            (~converged, (style.label, UNCONVERGED), "x"),
+        ):
             self.axes.plot(x[chosen], y[chosen], marker=marker, markevery=every, **options)
             if np.any(chosen):
-                self.layers.append(
-                    Layer(
-                        "points",
-                        (style.label,) if marker == style.marker else (style.label, UNCONVERGED),
-                        x[chosen],
-                        y[chosen],
-                        to_hex(style.colour),
-                        marker=marker,
-                        error=None if error is None else error[..., chosen],
-                        details=[text for text, c in zip(details, chosen, strict=False) if c],
-                    )
-                )
+                layer = Layer("points", names, x[chosen], y[chosen], to_hex(style.colour), marker)
+                texts = [text for text, c in zip(details, chosen, strict=False) if c]
+                part = None if error is None else error[..., chosen]
+                self.layers.append(replace(layer, error=part, details=texts))
         self.legend[style.label] = Line2D([], [], marker=style.marker, **options)
         if not np.all(converged):
             self.legend[UNCONVERGED] = Line2D([], [], marker="x", ls="none", color="0.4")
-
-    def _bars(self, style: CurveStyle, x: Field, y: Field, error: Field) -> None:
-        known = np.isfinite(np.broadcast_to(error, (2, x.size))).all(axis=0)
-        if np.any(known):
-            options: dict[str, Any] = {"fmt": "none", "elinewidth": 0.7, "capsize": CAP}
-            bars = error[..., known]
-            self.axes.errorbar(x[known], y[known], bars, ecolor=style.colour, **options)
 
     def band(self, style: CurveStyle, x: Field, low: Field, high: Field) -> None:
         """Draw the confidence band of a mean."""
@@ -196,7 +218,7 @@ class ColumnFigure(LegendFigure):
         names = (style.label, CONFIDENCE)
         self.layers.append(Layer("band", names, x, low, to_hex(colour), high=high))
 
-    def line(self, axes: Any, label: str, x: Field, y: Field, **style: Any) -> None:
+    def line(self, label: str, x: Field, y: Field, **style: Any) -> None:
         """Draw a line where y > 0, with an entry of the legend."""
         self.unnamed_line((label,), x, y, **style)
         self.legend[label] = Line2D([], [], **style)
@@ -261,10 +283,8 @@ def shades(name: str, start: float, none: str, beyond: str) -> Any:
 def _legend_shape(labels: list[str], wide: float) -> tuple[int, int]:
     """Columns and rows of a legend; `wide`: its width over that of a printed column."""
     for columns in range(min(int(4 * wide), len(labels)), 0, -1):
-        split = np.array_split([len(label) for label in labels], columns)
-        if (
-            sum(max(lengths) + 6 for lengths in split) <= COLUMN * wide
-        ):  # 6: symbol and space around it
+        split = np.array_split([len(label) + SYMBOL for label in labels], columns)
+        if sum(max(lengths) for lengths in split) <= COLUMN * wide:
             break
     return columns, len(split[0])
 

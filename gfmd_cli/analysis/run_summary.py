@@ -1,14 +1,13 @@
 """What a run has computed, as a short table, and why tasks are not converged."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Sized
 from typing import Any
 
-from gfmd_cli.analysis.grid_size import grid_size
-from gfmd_cli.analysis.records import with_best
+from gfmd_cli.analysis.compare import with_best
 from gfmd_cli.analysis.selection import grouped
 from gfmd_cli.analysis.table import Column, Record, Table, groups_of
 from gfmd_cli.analysis.tables import P_STAR, PRESSURE, RESIDUAL, STATUS, warnings_in
-from gfmd_cli.analysis.units import shown
+from gfmd_cli.analysis.units import grid_size, shown
 from gfmd_cli.physics.observables import QUANTITIES
 from gfmd_cli.status import Status
 from gfmd_cli.study.load_search import load_in_jump
@@ -32,10 +31,14 @@ def run_text(rows: list[dict[str, Any]]) -> str:
     solved = solved_rows(rows)
     listed = solved[:MAX_ROWS]
     table = Table("", shown(RUN, listed), groups_of((_scene(r), with_best(r)) for r in listed))
-    left_out = len(solved) - MAX_ROWS
-    more = [f"and {left_out} more contacts"] if left_out > 0 else []
     warnings = [f"warning: {line}" for line in warnings_in(solved)]
-    return "\n\n".join(filter(None, [table.as_text(), *more, "\n".join(warnings)]))
+    blocks = [table.as_text(), *_left_out(solved, MAX_ROWS, "contacts"), "\n".join(warnings)]
+    return "\n\n".join(filter(None, blocks))
+
+
+def _left_out(items: Sized, limit: int, what: str) -> list[str]:
+    """A line on what is not listed, if anything is not."""
+    return [f"and {len(items) - limit} more {what}"] if len(items) > limit else []
 
 
 def edge_warnings(rows: Sequence[Mapping[str, Any]]) -> list[str]:
@@ -66,11 +69,10 @@ def other_tasks(rows: list[dict[str, Any]]) -> list[str]:
         return []
     lines = [f"{len(rows)} more contacts stay in the study; they do not belong to this spec:"]
     for scene, group in list(scenes.items())[:MAX_SCENES]:
-        loads = sorted(row["p_star"] for row in group)
-        span = f"{loads[0]:.4g}" if len(loads) == 1 else f"{loads[0]:.4g} to {loads[-1]:.4g}"
-        lines.append(f"  {len(group)} with {scene}, p* = {span}")
-    left_out = len(scenes) - MAX_SCENES
-    return [*lines, f"  and {left_out} more scenes"] if left_out > 0 else lines
+        loads = sorted({row["p_star"] for row in group})
+        ends = " to ".join(f"{load:.4g}" for load in dict.fromkeys([loads[0], loads[-1]]))
+        lines.append(f"  {len(group)} with {scene}, p* = {ends}")
+    return [*lines, *(f"  {line}" for line in _left_out(scenes, MAX_SCENES, "scenes"))]
 
 
 def _scene(row: Record) -> str:
@@ -85,13 +87,10 @@ def unconverged(rows: list[dict[str, Any]], errors: Mapping[int, str]) -> list[s
     """
     lines = []
     for row in rows:
-        status = Status(row["status"])
+        status, name = Status(row["status"]), f"task {row['task']}"
         if status.is_converged:
             continue
-        reason = errors.get(row["task"]) or status.explain(row)
-        name = f"task {row['task']}"
         if status != Status.MISSING:
             name += f" ({row['elastomer']}, p* = {row['p_star']:.4g}): {status}"
-        lines.append(f"{name}: {reason}")
-    more = len(lines) - MAX_ROWS
-    return [*lines[:MAX_ROWS], f"and {more} more tasks"] if more > 0 else lines
+        lines.append(f"{name}: {errors.get(row['task']) or status.explain(row)}")
+    return [*lines[:MAX_ROWS], *_left_out(lines, MAX_ROWS, "tasks")]

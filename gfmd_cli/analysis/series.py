@@ -2,19 +2,20 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 
-from gfmd_cli.analysis.compare import Curve, Prediction, Row, best
+from gfmd_cli.analysis.compare import Curve, Prediction, Row
 from gfmd_cli.analysis.curve_styles import CurveStyle
 from gfmd_cli.analysis.ensemble import by_load, spread_of, without_seed
-from gfmd_cli.analysis.grid_size import grid_size
 from gfmd_cli.analysis.plotting import ColumnFigure
 from gfmd_cli.analysis.selection import grouped
-from gfmd_cli.analysis.units import in_si, quantity
+from gfmd_cli.analysis.units import grid_size, in_si, quantity
 from gfmd_cli.grid.arrays import Field, Mask
 from gfmd_cli.status import Status
+
+LOWEST = 1e-3  # of a mean: lower end of its band on a logarithmic axis
 
 
 @dataclass(frozen=True)
@@ -64,34 +65,21 @@ class Series:
 
     @classmethod
     def of(cls, view: View, items: list[Item]) -> Self:
-        """The series of curves that differ in their seed only."""
-        units = {
-            row["task"]: unit if view.ratio else 1.0
-            for item in items
-            for row, unit in zip(
-                item.curve.rows, getattr(item.curve.prediction, view.column), strict=True
-            )
-        }
-        loads = by_load(row for item in items for row in item.curve.rows)
-        points = [_point(view.column, rows, units) for rows in loads]
-        x, y, error, half_width, converged = (np.array(v) for v in zip(*points, strict=True))
-        details = [_details(rows) for rows in loads]
-        rising = np.argsort(x, kind="stable")
+        """The series of curves that differ in their seed only: what its scale can show."""
+        loads = by_load(record for item in items for record in item.curve.records)
+        loads.sort(key=lambda seeds: float(np.mean([record["p_star"] for record in seeds])))
+        points = [_point(view, seeds) for seeds in loads]
+        x, y, error, half_width, converged = (
+            np.array(values) for values in zip(*points, strict=True)
+        )
+        shown = np.isfinite(y) & ((y > 0) | (view.y_scale == "linear"))
+        details = [_details(seeds) for seeds, s in zip(loads, shown, strict=True) if s]
         style = items[0].style
         if len(items) > 1:
             style = replace(style, label=f"{style.label}, {len(items)} seeds")
         theory = np.mean([getattr(item.theory, view.column) for item in items], axis=0)
-        series = cls(style, x, y, error, half_width, converged, details, theory)
-        return series.only(rising)
-
-    def only(self, kept: Any) -> Self:
-        """The same with some of the points, by a mask or by their places."""
-        names = ("x", "y", "error", "half_width", "converged")
-        places = np.arange(self.x.size)[kept]
-        details = [self.details[place] for place in places]
-        return replace(
-            self, details=details, **{name: getattr(self, name)[places] for name in names}
-        )
+        x, y, error = x[shown], y[shown], error[shown]
+        return cls(style, x, y, error, half_width[shown], converged[shown], details, theory)
 
     def draw(self, plot: ColumnFigure, *, line: bool) -> None:
         """Draw points with error bars, the band of several seeds, and a line on request."""
@@ -110,20 +98,16 @@ class Series:
         return np.concatenate([self.y, self.y + np.nan_to_num(self.half_width)])
 
 
-LOWEST = 1e-3  # of a mean: lower end of its band on a logarithmic axis
-
-
-def _point(
-    name: str, rows: list[Row], units: dict[int, float]
-) -> tuple[float, float, float, float, bool]:
+def _point(view: View, records: list[Row]) -> tuple[float, float, float, float, bool]:
     """p*, value, error, half width of the confidence interval, and whether all converged."""
-    pairs = [best(row, name) for row in rows]
-    values = [value / units[row["task"]] for row, (value, _) in zip(rows, pairs, strict=True)]
-    errors = [abs(e) / units[row["task"]] for row, (_, e) in zip(rows, pairs, strict=True)]
-    half_width = spread_of(values).half_width if len(rows) > 1 else np.nan
-    converged = all(row["status"] == Status.CONVERGED for row in rows)
-    p_star = float(np.mean([row["p_star"] for row in rows]))
-    return p_star, float(np.mean(values)), float(np.mean(errors)), half_width, converged
+    name = view.column
+    units = np.array([r[f"{name}_persson"] if view.ratio else 1.0 for r in records])
+    values = np.array([r[f"{name}_best"] for r in records]) / units
+    errors = np.abs([r[f"{name}_best_error"] for r in records]) / units
+    half_width = spread_of(values).half_width if len(records) > 1 else np.nan
+    converged = all(record["status"] == Status.CONVERGED for record in records)
+    p_star = np.mean([record["p_star"] for record in records])
+    return float(p_star), float(values.mean()), float(errors.mean()), half_width, converged
 
 
 def _details(rows: list[Row]) -> str:

@@ -92,17 +92,13 @@ def _draw_profile(axes: Any, heights: Field, side: float, unit: str) -> None:
 
 def _draw_scale_bar(axes: Any, side: float) -> None:
     """A bar of 1, 2 or 5 times a power of ten below the left corner of the picture."""
-    length = scale_bar(BAR * side)
+    longest = BAR * side * (1 + 1e-9)
+    power = 10.0 ** np.floor(np.log10(longest))
+    length = power * max(digit for digit in (1, 2, 5) if digit * power <= longest)
     divisor, unit = scaled(length, "m")
     end, below = length / side, axes.transAxes
     axes.plot([0, end], [-0.05] * 2, color="black", lw=2.0, clip_on=False, transform=below)
     axes.text(end + 0.03, -0.05, f"{length / divisor:.3g} {unit}", transform=below, va="center")
-
-
-def scale_bar(longest: float) -> float:
-    """The largest of 1, 2 and 5 times a power of ten that is no longer than this."""
-    power = 10.0 ** np.floor(np.log10(longest * (1 + 1e-9)))
-    return float(power * max(digit for digit in (1, 2, 5) if digit * power <= longest * (1 + 1e-9)))
 
 
 def _draw_spectrum(axes: Any, summary: SurfaceSummary) -> None:

@@ -20,7 +20,7 @@ from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.physics.spectrum_fit import Moments, SelfAffineFit, fit, moments
 from gfmd_cli.study.plausibility import METRES
 
-PRESSURES = (0.003, 0.03, 0.3)  # p* of the predictions
+PRESSURES = np.array([0.003, 0.03, 0.3])  # p* of the predictions
 MIN_HURST = 0.01  # of the table [surface] that is suggested
 MAX_SCATTER = 3.0  # per shell, relative to Gaussian roughness; a self-affine surface has less
 
@@ -129,96 +129,86 @@ def as_text(summary: SurfaceSummary) -> str:
     """The summary of one surface as text."""
     grid, measured, record = summary.scene.grid, summary.moments, summary.record()
     sides = " x ".join(dict.fromkeys(f"{side:.6g}" for side in record["sides"]))  # a square: one
-    points = extent(record["points"][::-1])
     metres, per_metre = (" m", " 1/m") if summary.in_si else ("", "")
+    words = [
+        f"{name} {'-' if value is None else f'{value:.5g}'}{metres if name in UNITS else ''}"
+        for name, value in summary.parameters.items()
+    ]
     lines = [
-        summary.surface.preparation() or summary.surface.label,
-        f"  L = {sides}{metres} on {points} points",
-        *_parameter_lines(summary.parameters, metres),
-        f"  spectral: rms height {measured.height:.6g}{metres}, "
+        f"L = {sides}{metres} on {extent(record['points'][::-1])} points",
+        ", ".join(words[:5]),
+        ", ".join(words[5:]),
+        f"spectral: rms height {measured.height:.6g}{metres}, "
         f"rms gradient {measured.gradient:.5g}, rms curvature {measured.curvature:.5g}{per_metre}",
     ]
     if grid.dimension == 2:
-        lines.append(f"  half-space: p* = 1 is p = {0.5 * measured.gradient:.5g} E_star")
-    lines += [f"  note: {remark}" for remark in summary.remarks]
-    if grid.dimension == 1:
-        return "\n".join(lines)
-    theories = {"spectrum": Persson(summary.scene.shells)}
-    if summary.fit is None:
-        no_fit = f"  no fit: {summary.no_fit}"
-        return "\n".join([*lines, no_fit, *_predicted(theories, summary.in_si)])
-    table = _table(summary.fit, measured, grid.length)
-    model = SelfAffine.model_validate(table)
-    theories["fit"] = Persson(build_scene(model, HalfSpace(), 2 * model.smallest_grid()).shells)
-    gaussian = float(summary.copies**2)  # modes (+-q_x, +-q_y) of a mirrored map are alike
-    lines += [
-        *_fit_lines(summary.fit, gaussian, metres),
-        *_predicted(theories, summary.in_si),
-        "  random surface with the fitted spectrum:",
-        "",
-        "  [surface]",
-    ]
-    return "\n".join([*lines, *(f"  {key} = {json.dumps(value)}" for key, value in table.items())])
+        lines.append(f"half-space: p* = 1 is p = {0.5 * measured.gradient:.5g} E_star")
+    lines += [f"note: {remark}" for remark in summary.remarks]
+    theories = {"spectrum": summary.scene}
+    if summary.fit is not None:
+        table = _table(record, grid.length)
+        model = SelfAffine.model_validate(table)
+        theories["fit"] = build_scene(model, HalfSpace(), 2 * model.smallest_grid())
+        random = ["random surface with the fitted spectrum:", "", "[surface]"]
+        random += [f"{key} = {json.dumps(value)}" for key, value in table.items()]
+        lines += [
+            *_fit_lines(summary.fit, record, summary.copies, metres),
+            *_predicted(theories, metres),
+            *random,
+        ]
+    elif grid.dimension == 2:
+        lines += [f"no fit: {summary.no_fit}", *_predicted(theories, metres)]
+    title = summary.surface.preparation() or summary.surface.label
+    return "\n".join([title, *(f"  {line}".rstrip() for line in lines)])
 
 
-def _parameter_lines(parameters: dict[str, float | None], metres: str) -> list[str]:
-    """The parameters by their names in the standards, in two lines."""
-    words = [
-        f"{name} {'-' if value is None else f'{value:.5g}'}{metres if name in UNITS else ''}"
-        for name, value in parameters.items()
-    ]
-    return [f"  {', '.join(words[:5])}", f"  {', '.join(words[5:])}"]
-
-
-def _predicted(theories: dict[str, Persson], in_si: bool) -> list[str]:
+def _predicted(scenes: dict[str, Scene], metres: str) -> list[str]:
     """Persson theory of a half-space, Eqs. (25) and (28), on one spectrum or two."""
-    unit = next(iter(theories.values())).delta_sigma
-    gap = "gap [m]" if in_si else "gap"
+    theories = {name: Persson(scene.shells) for name, scene in scenes.items()}
+    gap = "gap [m]" if metres else "gap"
     heads = "".join(f"{f'{gap}, {name}':>24}" for name in theories)
-    lines = ["  Persson theory, half-space:", f"    p / E_star       a_r{heads}"]
-    for p_star in PRESSURES:
-        p = p_star * unit
+    lines = ["Persson theory, half-space:", f"  p / E_star       a_r{heads}"]
+    for p in PRESSURES * theories["spectrum"].delta_sigma:
         gaps = "".join(f"{float(theory.mean_gap(p)):24.4g}" for theory in theories.values())
-        area = float(next(iter(theories.values())).contact_area(p))
-        lines.append(f"    {p:10.3g}  {area:8.4f}{gaps}")
+        lines.append(f"  {p:10.3g}  {float(theories['spectrum'].contact_area(p)):8.4f}{gaps}")
     return lines
 
 
-def _fit_lines(nearest: SelfAffineFit, gaussian: float, metres: str) -> list[str]:
-    """The fit with warnings; `gaussian` is the scatter that Gaussian roughness has."""
-    short = 2 * pi / nearest.q_s
-    lines = [f"  fitted spectrum: H = {nearest.hurst:.3f} +- {nearest.hurst_error:.3f}"]
+def _fit_lines(
+    nearest: SelfAffineFit, record: dict[str, Any], copies: int, metres: str
+) -> list[str]:
+    """The fit with warnings."""
+    rolloff = "no roll-off within the cell"
     if nearest.q_r:
-        long = 2 * pi / nearest.q_r
-        error = long * nearest.q_r_error / nearest.q_r
-        lines[0] += f", lambda_r = {long:.3g} +- {error:.1g}{metres}"
-    else:
-        lines[0] += ", no roll-off within the cell"
-    lines[0] += f", lambda_s = {short:.3g}{metres} (scatter {nearest.scatter:.3g})"
+        error = record["rolloff_wavelength"] * nearest.q_r_error / nearest.q_r
+        rolloff = f"lambda_r = {record['rolloff_wavelength']:.3g} +- {error:.1g}{metres}"
+    lines = [
+        f"fitted spectrum: H = {nearest.hurst:.3f} +- {nearest.hurst_error:.3f}, {rolloff}, "
+        f"lambda_s = {record['cutoff_wavelength']:.3g}{metres} (scatter {nearest.scatter:.3g})"
+    ]
+    gaussian = float(copies**2)  # modes (+-q_x, +-q_y) of a mirrored map are alike
     if nearest.scatter > MAX_SCATTER * gaussian:
         lines.append(
-            f"  The scatter is far above {gaussian:g}: the surface is not self-affine; the surface "
+            f"The scatter is far above {gaussian:g}: the surface is not self-affine; the surface "
             "below has the same rms height and gradient only."
         )
     if not MIN_HURST <= nearest.hurst <= 1:
         lines.append(
-            f"  The Hurst exponent is outside {MIN_HURST:g} to 1: the surface below has "
+            f"The Hurst exponent is outside {MIN_HURST:g} to 1: the surface below has "
             "the nearest possible one, and another gradient."
         )
     return lines
 
 
-def _table(nearest: SelfAffineFit, measured: Moments, length: float) -> dict[str, Any]:
+def _table(record: dict[str, Any], length: float) -> dict[str, Any]:
     """The fit as a table [surface] of a run spec."""
-    if nearest.q_r:
-        keys: dict[str, Any] = {"rolloff": 2 * pi / nearest.q_r / length}
-    else:
-        keys = {"spectrum": "cutoff", "rolloff": 1.0}
-    keys |= {
-        "hurst": min(max(nearest.hurst, MIN_HURST), 1.0),
-        "cutoff": 2 * pi / nearest.q_s / length,
-        "h_std": measured.height,
+    rolloff = record["rolloff_wavelength"]
+    numbers = {
+        "rolloff": rolloff / length if rolloff else 1.0,
+        "hurst": min(max(record["hurst"], MIN_HURST), 1.0),
+        "cutoff": record["cutoff_wavelength"] / length,
+        "h_std": record["h_std"],
         "length": length,
     }
-    rounded = {k: v if isinstance(v, str) else float(f"{v:.4g}") for k, v in keys.items()}
-    return {"kind": "self-affine", **rounded}
+    rounded = {key: float(f"{value:.4g}") for key, value in numbers.items()}
+    return {"kind": "self-affine"} | ({} if rolloff else {"spectrum": "cutoff"}) | rounded

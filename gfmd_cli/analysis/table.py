@@ -116,31 +116,26 @@ class Table:
         return "\n\n".join([caption, *blocks] if caption and blocks else blocks)
 
     def as_html(self) -> str:
-        """The table in HTML without any style, group by group."""
-        blocks = []
-        for group in self.groups:
-            cells = [[column.cell(record) for column in self.columns] for record in group.records]
-            rows = [_html_row("td", row) for row in cells]
-            head = _html_row("th", [column.title for column in self.columns])
-            caption = f"<caption>{escape(group.title or self.caption)}</caption>"
-            blocks.append(f"<table>{caption}{head}{''.join(rows)}</table>")
+        """The table in HTML, group by group, each below its title."""
+        blocks = [
+            f"<p>{escape(group.title or self.caption)}</p>{self._tabulated(group, 'html')}"
+            for group in self.groups
+        ]
         return "".join(blocks)
 
     def _block(self, group: Group) -> str:
-        columns = self.columns
-        lines = tabulate.tabulate(
-            [[column.cell(record) for column in columns] for record in group.records],
-            [column.title for column in columns],
-            tablefmt="plain",
+        lines = self._tabulated(group, "plain").splitlines()
+        indented = [f"  {line}".rstrip() for line in lines]
+        return "\n".join([*filter(None, [group.title]), *group.notes, *indented])
+
+    def _tabulated(self, group: Group, tablefmt: str) -> str:
+        return tabulate.tabulate(
+            [[column.cell(record) for column in self.columns] for record in group.records],
+            [column.title for column in self.columns],
+            tablefmt=tablefmt,
             disable_numparse=True,
             colalign=self.alignments,
         )
-        indented = [f"  {line}".rstrip() for line in lines.splitlines()]
-        return "\n".join([*filter(None, [group.title]), *group.notes, *indented])
-
-
-def _html_row(tag: str, cells: Sequence[str]) -> str:
-    return f"<tr>{''.join(f'<{tag}>{escape(cell)}</{tag}>' for cell in cells)}</tr>"
 
 
 def _value(record: Record, value: Value) -> Any:
@@ -170,17 +165,9 @@ def plus_minus(value: float, error: float) -> str:
 
 def ratio(value: str, reference: str) -> Callable[[Record], float]:
     """One value over another; NaN where either is unknown or the other is zero."""
-
-    def of(record: Record) -> float:
-        return record[value] / record[reference] if record[reference] else math.nan
-
-    return of
+    return lambda record: record[value] / record[reference] if record[reference] else math.nan
 
 
 def product(value: str, unit: str) -> Callable[[Record], float]:
     """A reduced value in its physical unit."""
-
-    def of(record: Record) -> float:
-        return float(record[value] * record[unit])
-
-    return of
+    return lambda record: float(record[value] * record[unit])

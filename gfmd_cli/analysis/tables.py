@@ -1,15 +1,16 @@
 """The tables of a study: their columns, and the records that fill them."""
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import replace
+from functools import partial
 
-from gfmd_cli.analysis.compare import Comparison, Curve, in_continuum, of_study
-from gfmd_cli.analysis.distribution_tables import power_laws
+from gfmd_cli.analysis.compare import VARIANTS, Comparison, Curve, in_continuum, of_study
+from gfmd_cli.analysis.distribution import StressDistribution, distributions
+from gfmd_cli.analysis.edge_law import fit
 from gfmd_cli.analysis.ensemble import ensembles
-from gfmd_cli.analysis.grid_size import grid_size
-from gfmd_cli.analysis.records import VARIANTS, means_of, records_of, true_contact_areas
 from gfmd_cli.analysis.table import Column, Group, Record, Table, groups_of, known, product, ratio
-from gfmd_cli.analysis.units import in_si, shown
+from gfmd_cli.analysis.units import grid_size, in_si, shown
 from gfmd_cli.physics.observables import QUANTITIES
 from gfmd_cli.study.observables import OBSERVABLES, Observable
 from gfmd_cli.study.plausibility import SEPARATOR
@@ -31,69 +32,65 @@ BEST = {name: Column(heading, f"{name}_best", error=f"{name}_best_error")
 """Continuum values where they are known, else values on the grid."""
 
 
-def _beside_theory(name: str, theory: str) -> tuple[Column, Column, Column]:
-    """A quantity on the grid, its prediction, and their ratio."""
-    predicted = f"{name}_{theory}"
-    heading = "closed form" if theory == "einstein" else "Persson"
-    return (
-        Column(name, name),
-        Column(heading, predicted, optional=True),
-        Column("ratio", ratio(name, predicted), ".3f", optional=True),
-    )
+def _beside_theory(
+    value: Column, predicted: str, heading: str = "Persson", *, unit: str = "", si: str = ""
+) -> list[Column]:
+    """A quantity, its prediction and their ratio; `unit`: a column that gives both in SI units."""
+    columns = [value, Column(heading, predicted, optional=True)]
+    if unit:
+        name = predicted.removesuffix("_persson")
+        physical = [
+            Column(name, product(f"{name}_best", unit), unit=si),
+            Column(heading, product(predicted, unit), unit=si, optional=True),
+        ]
+        columns = [value, physical[0], columns[1], physical[1]]
+    return [*columns, Column("ratio", ratio(str(value.value), predicted), ".3f", optional=True)]
+
+
+def _continuum(record: Record, name: str) -> float | None:
+    return record[f"{name}_continuum"] if in_continuum(record, name) else None
 
 
 COMPARISON = (
     P_STAR,
-    *(column for name in QUANTITIES for column in _beside_theory(name, "persson")),
+    *(c for name in QUANTITIES for c in _beside_theory(Column(name, name), f"{name}_persson")),
     Column("p ratio", ratio("p_star_persson_at_u_g", "p_star"), ".3f", optional=True),
     STATUS,
 )
 EINSTEIN = (
     P_STAR,
-    *(column for name in QUANTITIES for column in _beside_theory(name, "einstein")),
+    *(
+        column
+        for name in QUANTITIES
+        for column in _beside_theory(Column(name, name), f"{name}_einstein", "closed form")
+    ),
 )
 CONTINUUM = (
     P_STAR,
     POINTS,
     *(
-        Column(heading, f"{name}_shown", error=f"{name}_continuum_error",
-               otherwise=f"{name}_verdict")
+        Column(
+            heading,
+            partial(_continuum, name=name),
+            error=f"{name}_continuum_error",
+            otherwise=f"{name}_verdict",
+        )
         for name, heading in REDUCED.items()
     ),
-)  # fmt: skip
+)
 SEEDS = (
     P_STAR,
-    *(
-        Column(heading, f"{name}_mean", error=f"{name}_confidence")
-        for name, heading in REDUCED.items()
-    ),
+    *(Column(REDUCED[name], f"{name}_mean", error=f"{name}_confidence") for name in QUANTITIES),
 )
-CONTACT_AREA = (
-    P_STAR,
-    PRESSURE,
-    BEST["a_r"],
-    Column("Persson", "a_r_persson", optional=True),
-    Column("ratio", ratio("a_r_best", "a_r_persson"), ".3f", optional=True),
-    STATUS,
-)
-
-
-def _with_units(name: str, unit: str, unit_name: str) -> tuple[Column, ...]:
-    """A quantity beside theory, in reduced and in physical units."""
-    return (
+CONTACT_AREA, STRESS_DEVIATION, MEAN_GAP = (
+    (
         P_STAR,
         PRESSURE,
-        BEST[name],
-        Column(name, product(f"{name}_best", unit), unit=unit_name),
-        Column("Persson", f"{name}_persson", optional=True),
-        Column("Persson", product(f"{name}_persson", unit), unit=unit_name, optional=True),
-        Column("ratio", ratio(f"{name}_best", f"{name}_persson"), ".3f", optional=True),
+        *_beside_theory(BEST[name], f"{name}_persson", unit=unit, si=si),
         STATUS,
     )
-
-
-STRESS_DEVIATION = _with_units("sigma_p", "delta_sigma", "Pa")
-MEAN_GAP = _with_units("u_g", "h_std", "m")
+    for name, unit, si in (("a_r", "", ""), ("sigma_p", "delta_sigma", "Pa"), ("u_g", "h_std", "m"))
+)
 TRUE_CONTACT = (
     P_STAR,
     AREA,
@@ -108,6 +105,24 @@ TRUE_CONTACT = (
             Column("\nratio", ratio("a_r", area), ".3f"),
         )
     ),
+)
+POWER_LAWS = (
+    Column("p*", "p_star", ".4g"),
+    Column("a_r", "a_r"),
+    Column("grids", "grids"),
+    Column("seeds", "seeds", "d"),
+    Column("stress", "law"),
+    Column("sigma / Delta_sigma\nfrom", "lowest", ".3g"),
+    Column("\nto", "highest", ".3g"),
+    Column("exponent", "exponent", error="error"),
+    Column("at the edge", "limit", error="limit_error"),
+    Column("theory", "theory", ".3g"),
+    Column("prefactor", "prefactor", ".3g"),
+)
+POWER_LAWS_CAPTION = (
+    "Power laws of Pr(sigma) in the continuum. exponent: fit between the two stresses; at the "
+    "edge: fit with the first correction to the power law; theory: exponent at the edge of a "
+    "contact, n / (2 - n)."
 )
 
 
@@ -130,7 +145,7 @@ def _flag(name: str) -> Callable[[Record], bool | None]:
 
 
 IN_TABLE = tuple(observable for observable in OBSERVABLES if observable.heading)
-"""The observables that the table of optional observables shows."""
+"""The observables that [output] turns on, without those that have a table of their own."""
 OPTIONAL_OBSERVABLES = (P_STAR, AREA, *(c for each in IN_TABLE for c in _columns_of(each)))
 
 
@@ -157,7 +172,7 @@ def study_tables(comparison: Comparison) -> list[Table]:
 
 def comparison_table(curves: TitledCurves) -> Table:
     """Simulation beside Persson theory, with the values on the grid."""
-    groups = [Group(title, records_of(curve), _scales(curve)) for title, curve in curves]
+    groups = [Group(title, curve.records, _scales(curve)) for title, curve in curves]
     caption = "Values on the grid, not extrapolated."
     if any(curve.has_theory for _, curve in curves):
         source = curves[0][1].persson.mean_gap_source
@@ -169,33 +184,45 @@ def comparison_table(curves: TitledCurves) -> Table:
     return Table(caption, COMPARISON, groups)
 
 
-def over_pressure(columns: Sequence[Column], caption: str, curves: TitledCurves) -> Table:
-    """Columns of the records of some curves, curve by curve."""
-    rows = [row for _, curve in curves for row in curve.rows]
-    groups = [Group(title, records_of(curve)) for title, curve in curves]
+def over_pressure(
+    columns: Sequence[Column], caption: str, curves: TitledCurves, keys: Collection[str] = ()
+) -> Table:
+    """Columns of the records of the curves; with `keys`, of those that have a value of one."""
+    groups = [
+        Group(title, curve.records) for title, curve in curves if not keys or curve.stores(keys)
+    ]
+    rows = [record for group in groups for record in group.records]
     return Table(caption, shown(columns, rows), groups)
 
 
 def einstein_table(curves: TitledCurves) -> Table:
     """Springs (n = 0) beside the closed form."""
-    springs = [(title, curve) for title, curve in curves if curve.n == 0 and curve.has_theory]
-    return over_pressure(
-        EINSTEIN, "Comparison with the closed form for n = 0 and Gaussian heights.", springs
-    )
+    caption = "Comparison with the closed form for n = 0 and Gaussian heights."
+    return over_pressure(EINSTEIN, caption, curves, ["a_r_einstein"])
 
 
 def continuum_table(curves: TitledCurves) -> Table:
     """Continuum values with their errors, or the reason why there is none."""
-    groups = []
-    for title, curve in curves:
-        records = records_of(curve)
-        if any(record.get(f"{name}_verdict") for record in records for name in QUANTITIES):
-            for record in records:
-                shown = [name for name in QUANTITIES if in_continuum(record, name)]
-                record |= {f"{name}_shown": record[f"{name}_continuum"] for name in shown}
-            groups.append(Group(title, records))
     caption = "Continuum values with their estimated errors, or the reason why there is none."
-    return Table(caption, CONTINUUM, groups)
+    return over_pressure(CONTINUUM, caption, curves, [f"{name}_verdict" for name in QUANTITIES])
+
+
+def true_contact_table(curves: TitledCurves) -> Table:
+    """Persson theory with Delta_sigma over the contact."""
+    caption = "Persson theory with Delta_sigma over the contact instead of over the whole surface."
+    return over_pressure(TRUE_CONTACT, caption, curves, VARIANTS.values())
+
+
+def observables_table(curves: TitledCurves) -> Table:
+    """The observables that keys of [output] have turned on, with their meaning."""
+    columns = [observable.column for observable in IN_TABLE]
+    table = over_pressure(OPTIONAL_OBSERVABLES, "", curves, [column.name for column in columns])
+    meanings = [
+        column.meaning[:1].upper() + column.meaning[1:]
+        for column in columns
+        if any(known(record[column.name]) for record in table.records)
+    ]
+    return replace(table, caption=f"Observables: {'. '.join(meanings)}.")
 
 
 def seeds_table(comparison: Comparison) -> Table:
@@ -203,7 +230,7 @@ def seeds_table(comparison: Comparison) -> Table:
     groups = groups_of(
         (
             f"{ensemble.title}: mean of {len(ensemble.rows)} seeds",
-            {"p_star": ensemble.rows[0]["p_star"], **means_of(ensemble)},
+            {"p_star": ensemble.rows[0]["p_star"], **ensemble.means()},
         )
         for ensemble in ensembles(comparison)
     )
@@ -211,27 +238,25 @@ def seeds_table(comparison: Comparison) -> Table:
     return Table(caption, SEEDS, groups)
 
 
-def true_contact_table(curves: TitledCurves) -> Table:
-    """Persson theory with Delta_sigma over the contact."""
-    stored = [pair for pair in curves if true_contact_areas(pair[1])]
-    caption = "Persson theory with Delta_sigma over the contact instead of over the whole surface."
-    return over_pressure(TRUE_CONTACT, caption, stored)
+def power_laws(comparison: Comparison) -> Table:
+    """The power laws of Pr(sigma), a record each; without one where no contact has two grids."""
+    titled = [
+        (found.scene, record)
+        for found in distributions(comparison)
+        for record in _law_records(found)
+    ]
+    return Table(POWER_LAWS_CAPTION, POWER_LAWS, groups_of(titled))
 
 
-def observables_table(curves: TitledCurves) -> Table:
-    """The observables that keys of [output] have turned on, with their meaning."""
-    columns = [observable.column for observable in IN_TABLE]
-    stored = [
-        (title, curve)
-        for title, curve in curves
-        if any(known(row[column.name]) for column in columns for row in curve.rows)
-    ]
-    meanings = [
-        column.meaning[:1].upper() + column.meaning[1:]
-        for column in columns
-        if any(known(row[column.name]) for _, curve in stored for row in curve.rows)
-    ]
-    return over_pressure(OPTIONAL_OBSERVABLES, f"Observables: {'. '.join(meanings)}.", stored)
+def _law_records(found: StressDistribution) -> list[Record]:
+    record = {
+        "p_star": found.finest["p_star"],
+        "a_r": found.a_r,
+        "grids": f"{found.points[0]} to {found.points[-1]}",
+        "seeds": len(found.seeds),
+    }
+    laws = [vars(law) for law in (fit(found, "small"), fit(found, "large")) if law is not None]
+    return [record | law for law in laws or [{"law": "too few bins are resolved"}]]
 
 
 def curve_title(curve: Curve) -> str:

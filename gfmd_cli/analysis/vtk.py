@@ -60,15 +60,20 @@ def _head(fields: dict[str, Field], sides: list[float], first: float) -> str:
     `sides` are those of the cell along x and y [m], `first` the position of its first point along
     each of them, as a share of the side.
     """
-    values = next(iter(fields.values()))
-    counts = [*values.shape[::-1], 1, 1][:3]
-    extent = " ".join(f"0 {count - 1}" for count in counts)
-    steps = [side / count for side, count in zip(sides, values.shape[::-1], strict=False)]
-    spacing = " ".join(map(repr, [*steps, *[steps[0]] * (3 - len(steps))]))
-    corner = " ".join([*(repr(first * side) for side in sides[: len(steps)]), "0", "0"][:3])
-    arrays, offset = [], 0
+    shape = next(iter(fields.values())).shape[::-1]
+    missing = 3 - len(shape)  # axes of an image that the fields lack
+    steps = [side / count for side, count in zip(sides, shape, strict=False)]
+    extent = " ".join(f"0 {count - 1}" for count in (*shape, *[1] * missing))
+    spacing = " ".join(map(repr, [*steps, *[steps[0]] * missing]))
+    corner = " ".join([*(repr(first * side) for side in sides[: len(shape)]), *["0"] * missing])
+    columns = {column.name: column for column in FIELDS}
+    arrays, offset = "", 0
     for name, values in fields.items():
-        arrays.append(_array(name, offset))
+        arrays += (
+            f'<DataArray type="Float64" Name="{NAMES[name]}" format="appended" offset="{offset}">'
+            f'<InformationKey name="UNITS_LABEL" location="vtkDataArray">{columns[name].units}'
+            "</InformationKey></DataArray>\n"
+        )
         offset += values.nbytes + 8
     return f"""\
 <?xml version="1.0"?>
@@ -76,17 +81,8 @@ def _head(fields: dict[str, Field], sides: list[float], first: float) -> str:
 <ImageData WholeExtent="{extent}" Origin="{corner}" Spacing="{spacing}">
 <Piece Extent="{extent}">
 <PointData>
-{"".join(arrays)}</PointData>
+{arrays}</PointData>
 </Piece>
 </ImageData>
 <AppendedData encoding="raw">
 _"""
-
-
-def _array(name: str, offset: int) -> str:
-    (column,) = (column for column in FIELDS if column.name == name)
-    unit = f'<InformationKey name="UNITS_LABEL" location="vtkDataArray">{column.units}'
-    return (
-        f'<DataArray type="Float64" Name="{NAMES[name]}" format="appended" offset="{offset}">'
-        f"{unit}</InformationKey></DataArray>\n"
-    )

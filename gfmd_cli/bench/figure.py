@@ -41,15 +41,19 @@ def draw_bench(traces: list[Trace], folder: Path) -> list[Path]:
 
 def bench_figures(traces: list[Trace]) -> dict[str, LegendFigure]:
     """The figures by name; to be called inside `styled`."""
-    pairs = zip(traces, _styles(traces), strict=True)
+    names = solver_names(traces)
+    solvers = list(dict.fromkeys(names))  # each has its colour and symbol in all scenes
+    styles = {
+        name: CurveStyle(colour, MARKERS[i % len(MARKERS)], name)
+        for i, (name, colour) in enumerate(zip(solvers, colours(len(solvers)), strict=True))
+    }
+    pairs = ((trace, styles[name]) for trace, name in zip(traces, names, strict=True))
     rows = list(grouped(pairs, lambda pair: scene_of(pair[0])).values())
     if len(rows) <= SCENES:
-        figures = {"work_precision": rows}
-    else:
-        figures = {
-            f"work_precision_{i}_{_slug(_title(row[0][0]))}": [row] for i, row in enumerate(rows)
-        }
-    return {name: _draw(rows) for name, rows in figures.items()}
+        return {"work_precision": _draw(rows)}
+    return {
+        f"work_precision_{i}_{_slug(_title(row[0][0]))}": _draw([row]) for i, row in enumerate(rows)
+    }
 
 
 def _draw(scenes: list[list[tuple[Trace, CurveStyle]]]) -> LegendFigure:
@@ -82,32 +86,22 @@ def _curve(
     plot: LegendFigure, axes: Any, trace: Trace, style: CurveStyle, cost: str
 ) -> tuple[float, float]:
     """One solve, its end marked; thin, the error itself. Returns where it begins and ends."""
-    kept = np.isfinite(_errors(trace))
-    x = trace.samples[cost][kept]
+    errors = _errors(trace)
+    kept = np.isfinite(errors)
+    x, y = trace.samples[cost][kept], errors[kept]
     options = {"color": style.colour, "mfc": "white", "lw": 1.3, "marker": style.marker}
     if x.size == 0:
-        plot.line(axes, style.label, x, x, **options)
-        ends: Field = trace.samples[cost][[0, -1]]
-        return float(ends[0]), float(ends[1])
-    y = _errors(trace)[kept]
+        plot.line_on(axes, style.label, x, y, **options)
+        return float(trace.samples[cost][0]), float(trace.samples[cost][-1])
     itself = np.maximum(trace.samples["u_g_error"][kept], y.min())
     axes.plot(x, itself, color=style.colour, lw=0.4, alpha=0.6)
-    ended = trace.row["status"] == Status.CONVERGED
-    plot.line(axes, style.label, x, y, markevery=0.2, **options)
-    end = {"ls": "none", "marker": style.marker if ended else "x", "color": style.colour}
-    if ended:
-        axes.plot(x[-1:], y[-1:], zorder=4, **end)
+    plot.line_on(axes, style.label, x, y, markevery=0.2, **options)
+    end: dict[str, Any] = {"ls": "none", "zorder": 4}
+    if trace.row["status"] == Status.CONVERGED:
+        axes.plot(x[-1:], y[-1:], marker=style.marker, color=style.colour, **end)
     else:
-        plot.line(axes, "not converged", x[-1:], y[-1:], zorder=4, **end | {"color": "0.3"})
+        plot.line_on(axes, "not converged", x[-1:], y[-1:], marker="x", color="0.3", **end)
     return float(x[0]), float(x[-1])
-
-
-def _styles(traces: list[Trace]) -> list[CurveStyle]:
-    """A colour and a symbol for each solver, the same in all scenes."""
-    names = solver_names(traces)
-    known = list(dict.fromkeys(names))
-    chosen = dict(zip(known, colours(len(known)), strict=True))
-    return [CurveStyle(chosen[n], MARKERS[known.index(n) % len(MARKERS)], n) for n in names]
 
 
 def _title(trace: Trace) -> str:

@@ -7,19 +7,16 @@ states are no answer on the solved grid.
 """
 
 import time
-from collections.abc import Iterator
 from dataclasses import dataclass, field
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
+from gfmd_cli.analysis.selection import grouped
 from gfmd_cli.bench.file import Trace
 from gfmd_cli.errors import InputError
-from gfmd_cli.physics.contact import Contact, Scene
-from gfmd_cli.physics.elastomers import LinearElastomer
+from gfmd_cli.physics.contact import Contact
 from gfmd_cli.physics.free_contact import SCENES
-from gfmd_cli.physics.indenters import RigidSurface
 from gfmd_cli.physics.observables import QUANTITIES, Observables, observe
 from gfmd_cli.solvers.auto import Auto
 from gfmd_cli.solvers.ccg import ConstrainedCG
@@ -28,14 +25,13 @@ from gfmd_cli.solvers.loop import Solver, State
 from gfmd_cli.solvers.nested_grids import Solution, solve_contact
 from gfmd_cli.solvers.polonsky_keer import PolonskyKeer
 from gfmd_cli.spec.models import SOUGHT, Spec
+from gfmd_cli.study.context import Progress, Report
 from gfmd_cli.study.measure import planned
-from gfmd_cli.study.progress import Progress, Report
 from gfmd_cli.study.resources import check_memory
 from gfmd_cli.study.tasks import Task, plan
 
 GROWTH = 1.05  # of the transforms between two samples
 REFERENCE = Auto(tolerance=1e-10)
-PATIENCE = 100  # steps, or half of those so far if more, without a new least residual
 COMPARED = (Auto, ConstrainedCG, Fire, PolonskyKeer)
 """Solvers to compare if a spec leaves the choice of the solver open."""
 
@@ -53,10 +49,6 @@ class Recorder:
     begun: float = field(default_factory=lambda: time.process_time())
     own: float = 0.0
     """Seconds spent here, which are not the solver's."""
-    points: int = 0
-    """Of the grid of the last state."""
-    due: float = 0.0
-    """Transforms at which the next sample is taken."""
     a_r: float = np.nan
     """Of the last sample."""
 
@@ -65,9 +57,8 @@ class Recorder:
         now = time.process_time()
         share = contact.grid.size / self.contact.grid.size
         transforms = state.coarser_transforms + state.transforms * share
-        if transforms >= self.due or contact.grid.points != self.points:
-            self.points = contact.grid.points
-            self.due = GROWTH * transforms
+        before, _, points, *_ = self.samples[-1] if self.samples else (0.0, 0.0, 0.0)
+        if transforms >= GROWTH * before or contact.grid.points != points:
             self._sample(contact, state, transforms, now)
         self.own += time.process_time() - now
 
@@ -99,38 +90,9 @@ def _distance(seen: Observables, reference: Observables, name: str) -> float:
     return float(abs(value - exact) / (abs(exact) or 1.0))
 
 
-class _Stalled(Exception):
-    """The residual has reached what rounding lets it reach."""
-
-
-@dataclass
-class _Patience:
-    """A watcher that ends a solve whose residual falls no more."""
-
-    contact: Contact
-    least: float = np.inf
-    since: int = 0
-    last: State | None = None
-
-    def __call__(self, contact: Contact, state: State) -> None:
-        if contact is not self.contact:
-            return
-        self.last = state
-        if state.residual < self.least:
-            self.least, self.since = state.residual, state.step
-        elif state.step > self.since + max(PATIENCE, self.since // 2):
-            raise _Stalled
-
-
 def solve_reference(contact: Contact) -> tuple[Observables, float]:
-    """What a solution as exact as it gets has to show, and its residual."""
-    patience = _Patience(contact)
-    found: Solution | State | None
-    try:
-        found = solve_contact(contact, REFERENCE, patience)
-    except _Stalled:
-        found = patience.last
-    assert found is not None
+    """What a solution as exact as double precision allows has to show, and its residual."""
+    found = solve_contact(contact, REFERENCE)
     residual = contact.recompute(found.u, found.sigma)
     return observe(contact, found.u, found.sigma), residual
 
@@ -163,34 +125,21 @@ def run_bench(spec: Spec, report: Report) -> list[Trace]:
         raise InputError('grid.points: "auto" is no grid to compare solvers on; give a number')
     check_memory(tasks)
     traces: list[Trace] = []
-    for task, contact in _contacts(tasks):
-        reference, residual = solve_reference(contact)
-        row = planned(task) | {"p_star": contact.pressure} | {"reference_residual": residual}
-        row |= {f"{name}_reference": getattr(reference, name) for name in QUANTITIES}
-        for solver in solvers_to_compare(spec, task, contact):
-            traces.append(_trace(contact, solver, reference, row, report, len(traces)))
+    for in_scene in grouped(tasks, lambda task: task.scene_id).values():
+        first = in_scene[0]
+        scene = SCENES[first.boundary](
+            first.surface, first.elastomer, first.points, points_y=first.points_y
+        )
+        for task, *_ in grouped(in_scene, lambda task: task.load).values():
+            contact = scene.contact(task.p_star(scene.delta_sigma))
+            reference, residual = solve_reference(contact)
+            row = planned(task) | {"p_star": contact.pressure, "reference_residual": residual}
+            row |= {f"{name}_reference": getattr(reference, name) for name in QUANTITIES}
+            for solver in solvers_to_compare(spec, task, contact):
+                traces.append(_trace(contact, solver, reference, row, report, len(traces)))
     if not traces:
         raise InputError("solver.kind: fit for none of the bodies; take auto, ccg, fire or pcg")
     return traces
-
-
-def _contacts(tasks: list[Task]) -> Iterator[tuple[Task, Contact]]:
-    """Each contact of the spec once, with one of its tasks."""
-    seen: set[Any] = set()
-    scene_of = lru_cache(maxsize=1)(_scene)  # pressures of one scene follow each other
-    for task in tasks:
-        scene_key = (task.boundary, task.surface, task.elastomer, task.points, task.points_y)
-        key = (*scene_key, task.load)
-        if key not in seen:
-            seen.add(key)
-            scene = scene_of(*scene_key)
-            yield task, scene.contact(task.p_star(scene.delta_sigma))
-
-
-def _scene(
-    boundary: str, surface: RigidSurface, elastomer: LinearElastomer, points: int, points_y: int
-) -> Scene:
-    return SCENES[boundary](surface, elastomer, points, points_y=points_y)
 
 
 def _trace(

@@ -37,31 +37,28 @@ def bench_table(traces: list[Trace]) -> Table:
     Transforms and seconds until the error of the mean gap falls below a level for good; the errors
     and the residual at the end. The surface is a column where there are several.
     """
-    surfaces = {trace.row["surface"]: None for trace in traces}
-    title, columns = (*surfaces, "")[0], BENCH
+    surfaces = list(dict.fromkeys(trace.row["surface"] for trace in traces))
+    title, columns = surfaces[0], BENCH
     if len(surfaces) > 1:
         title, columns = "", (*BENCH, Column("surface", "surface"))
+    worst = max(trace.row["reference_residual"] for trace in traces)
+    caption = (
+        "Cost until the error of the mean gap stays below a level: Fourier transforms, in units of "
+        "one on the final grid, and seconds of processor time on one thread, without the "
+        f"recording. Errors are relative to a reference with a residual of {worst:.0e} or less."
+    )
     names = solver_names(traces)
     records = [_record(trace, name) for trace, name in zip(traces, names, strict=True)]
-    return Table(_caption(traces), columns, [Group(title, records)])
+    return Table(caption, columns, [Group(title, records)])
 
 
 def _record(trace: Trace, name: str) -> Record:
     record = trace.row | {"name": name}
     for level in LEVELS:
-        cost = trace.reached("u_g", level) or (None, None)
-        record |= {f"transforms_{level}": cost[0], f"seconds_{level}": cost[1]}
+        transforms, seconds = trace.reached("u_g", level) or (None, None)
+        record |= {f"transforms_{level}": transforms, f"seconds_{level}": seconds}
     errors = {f"{error}_error": float(trace.samples[f"{error}_error"][-1]) for error in QUANTITIES}
     return record | errors
-
-
-def _caption(traces: list[Trace]) -> str:
-    worst = max(trace.row["reference_residual"] for trace in traces)
-    return (
-        "Cost until the error of the mean gap stays below a level: Fourier transforms, in units of "
-        "one on the final grid, and seconds of processor time on one thread, without the "
-        f"recording. Errors are relative to a reference with a residual of {worst:.0e} or less."
-    )
 
 
 def scene_of(trace: Trace) -> tuple[Any, ...]:

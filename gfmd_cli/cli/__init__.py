@@ -10,17 +10,20 @@ import click
 
 import gfmd_cli
 from gfmd_cli.cli.bench import bench
-from gfmd_cli.cli.completion import completion
-from gfmd_cli.cli.diff import diff
+from gfmd_cli.cli.completion import completion, schema
 from gfmd_cli.cli.init import init, surface
 from gfmd_cli.cli.messages import tell
-from gfmd_cli.cli.report import report
-from gfmd_cli.cli.results import analyze, export
+from gfmd_cli.cli.results import analyze, diff, export, report
 from gfmd_cli.cli.run import run
-from gfmd_cli.cli.schema import schema
 from gfmd_cli.cli.status import collect, status
 from gfmd_cli.cli.submit import submit
 from gfmd_cli.errors import GfmdError, SpaceError, StudyError
+
+COMMANDS = [
+    *(init, surface, run, submit, status, collect),
+    *(analyze, report, export, diff, bench, schema, completion),
+]
+"""In the order in which a user needs them."""
 
 
 class Commands(click.Group):
@@ -51,7 +54,7 @@ class Commands(click.Group):
         return ctx.exit(status)
 
 
-@click.group(cls=Commands, context_settings={"max_content_width": 100})
+@click.group(cls=Commands, commands=COMMANDS, context_settings={"max_content_width": 100})
 @click.version_option(gfmd_cli.__version__, prog_name="gfmd")
 def main() -> None:
     """Elastic contact of rough surfaces, from springs (n = 0) to plates (n = 4).
@@ -68,21 +71,3 @@ def main() -> None:
     # multiple of the work when several processes run at the same time.
     for library in ("OPENBLAS", "OMP", "MKL"):
         os.environ.setdefault(f"{library}_NUM_THREADS", "1")
-
-
-for command in (
-    init,
-    surface,
-    run,
-    submit,
-    status,
-    collect,
-    analyze,
-    report,
-    export,
-    diff,
-    bench,
-    schema,
-    completion,
-):
-    main.add_command(command)

@@ -1,4 +1,6 @@
-"""`gfmd completion`."""
+"""`gfmd completion` and `gfmd schema`: words that shells and editors complete."""
+
+import json
 
 import click
 from click.shell_completion import get_completion_class
@@ -20,3 +22,17 @@ def completion(shell: str) -> None:
     kind = get_completion_class(shell)
     assert kind is not None
     click.echo(kind(main, {}, "gfmd", "_GFMD_COMPLETE").source())
+
+
+@click.command()
+def schema() -> None:
+    """Print the JSON Schema of the run spec, for editors.
+
+    Editors use it to complete and check a spec. Editors with Taplo (VS Code: Even Better TOML) find
+    the schema by the line `#:schema FILE` at the top of a spec. Example:
+
+        gfmd schema > run-spec.schema.json
+    """
+    from gfmd_cli.spec.schema import spec_schema
+
+    click.echo(json.dumps(spec_schema(), indent=2))

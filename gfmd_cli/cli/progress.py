@@ -19,8 +19,8 @@ class Reporter:
     """Progress: on a terminal a bar for the run and one a task at work, else a line a minute."""
 
     def __init__(self, quiet: bool) -> None:
-        self.bars: dict[int, Any] = {}
-        self.whole: Any = None
+        self.bars: dict[int | None, Any] = {}
+        """By task; that of the run is under None."""
         self.last_line = time.monotonic()
         self.quiet = quiet
         self.terminal = sys.stderr.isatty()
@@ -31,18 +31,15 @@ class Reporter:
         return self.show
 
     def __exit__(self, *_: object) -> None:
-        for bar in [*self.bars.values(), self.whole]:
-            if bar is not None:
-                with suppress(OSError):
-                    bar.close()
+        for task in list(self.bars):
+            self._close(task)
 
     def show(self, progress: Any) -> None:
         """One event of one task."""
         if progress.event == "end" and progress.status.is_failure:
             self.failed[progress.task] = progress.message
             self._close(progress.task)
-            message = f"gfmd: task {progress.task} ({progress.label}): {progress.message}"
-            tell(message)
+            tell(f"gfmd: task {progress.task} ({progress.label}): {progress.message}")
         elif progress.event == "warning":
             tell(f"gfmd: {progress.message}")
         elif self.quiet:
@@ -57,9 +54,9 @@ class Reporter:
         from tqdm import tqdm
 
         if progress.tasks_left is not None:
-            if self.whole is None:  # a bar without a total has no truth value
-                self.whole = tqdm(position=0, leave=False, bar_format=RUN)
-            self.whole.set_description_str(_left(progress))
+            if None not in self.bars:
+                self.bars[None] = tqdm(position=0, leave=False, bar_format=RUN)
+            self.bars[None].set_description_str(_left(progress))
         if progress.event == "end":
             self._close(progress.task)
             return
@@ -76,7 +73,7 @@ class Reporter:
                 f"a_r {progress.a_r:.4f}"
             )
 
-    def _close(self, task: int) -> None:
+    def _close(self, task: int | None) -> None:
         bar = self.bars.pop(task, None)
         if bar is not None:
             with suppress(OSError):

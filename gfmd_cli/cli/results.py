@@ -1,6 +1,7 @@
-"""`gfmd analyze` and `gfmd export`: tables, figures and files of a study."""
+"""`gfmd analyze`, `report`, `export` and `diff`: tables, figures and files of studies."""
 
 import json
+import os
 from pathlib import Path
 from typing import Literal
 
@@ -60,6 +61,41 @@ def analyze(
 
 @click.command()
 @click.argument("study", type=FILE)
+@click.argument("other", type=FILE, required=False)
+@click.option("-o", "--output", type=FILE, help="HTML file; default: STUDY[-OTHER].html.")
+@click.option(
+    "--bench", type=FILE, help="File of `gfmd bench`; adds a figure of speed against error."
+)
+def report(study: Path, other: Path | None, output: Path | None, bench: Path | None) -> None:
+    """Write a report with figures, tables and maps as one HTML page.
+
+    With two studies, such as two materials or two treatments of a scan, each figure has the curves
+    of both, and the table of `gfmd diff` comes first. The page needs no network and no other
+    file. The same study always gives the same page.
+
+    Examples:
+
+        gfmd report demo.h5
+
+        gfmd report soft.h5 stiff.h5
+    """
+    from gfmd_cli.files.atomic import check_place, write_whole
+    from gfmd_cli.report.page import report as page
+
+    name = study.stem if other is None else f"{study.stem}-{other.stem}"
+    path = output or study.with_name(f"{name}.html")
+    if path.suffix not in (".html", ".htm"):
+        raise InputError(f"{path}: unknown suffix {path.suffix!r}; allowed: .html, .htm")
+    for source in (study, other, bench):
+        if source is not None and os.path.realpath(path) == os.path.realpath(source):
+            raise InputError(f"{path}: the report would replace what it is made from; use -o")
+    check_place(path)
+    write_whole(path, page(study, bench, other).encode())
+    show(str(path))
+
+
+@click.command()
+@click.argument("study", type=FILE)
 @click.option(
     "-o", "--output", type=FILE, help="FILE.csv, .nc or .vti; by default CSV on standard output."
 )
@@ -79,22 +115,50 @@ def export(study: Path, output: Path | None, task: int | None) -> None:
         raise InputError(f"{output}: unknown suffix {suffix!r}; allowed: .csv, .nc, .vti")
     if task is not None and suffix != ".vti":
         raise InputError("--task: chooses fields, for a .vti file")
-    if output is None:
-        from gfmd_cli.analysis.export import export_csv
+    from gfmd_cli.analysis.export import export_csv, write_netcdf
+    from gfmd_cli.analysis.vtk import write_image
+    from gfmd_cli.files.atomic import write_whole
 
+    if output is None:
         click.echo(export_csv(study), nl=False)
         return
     if suffix == ".csv":
-        from gfmd_cli.analysis.export import export_csv
-        from gfmd_cli.files.atomic import write_whole
-
         write_whole(output, export_csv(study).encode())
     elif suffix == ".nc":
-        from gfmd_cli.analysis.export import write_netcdf
-
         write_netcdf(study, output)
     else:
-        from gfmd_cli.analysis.vtk import write_image
-
         write_image(study, task, output)
     show(str(output))
+
+
+@click.command()
+@click.argument("one", type=FILE, metavar="A.h5")
+@click.argument("other", type=FILE, metavar="B.h5")
+@click.option(
+    "--tolerance",
+    type=click.FloatRange(min=0),
+    help="Exit with status 1 if a difference is larger.",
+)
+@click.option("--json", "as_json", is_flag=True, help="Print records instead of tables.")
+@click.pass_context
+def diff(
+    context: click.Context, one: Path, other: Path, tolerance: float | None, as_json: bool
+) -> None:
+    """Compare the results of two studies.
+
+    The command compares contact area, stress deviation and mean gap. Contacts are paired by
+    surface, seed, elastomer and load; grids and solvers may differ. Contacts of only one study are
+    listed, but not compared. If no contacts match and each study has one surface and one elastomer,
+    contacts are paired by load alone. Differences are relative.
+
+    Example:
+
+        gfmd diff coarse.h5 fine.h5 --tolerance 0.01
+    """
+    from gfmd_cli.analysis.diff import diff as diff_studies
+    from gfmd_cli.analysis.diff_table import diff_json, diff_text
+
+    found = diff_studies(one, other)
+    click.echo(diff_json(found) if as_json else diff_text(found))
+    if tolerance is not None and found.exceeds(tolerance):
+        context.exit(1)

@@ -13,12 +13,25 @@ from gfmd_cli.errors import InputError
 from gfmd_cli.status import Status
 
 
+def _shard(context: click.Context, parameter: click.Parameter, text: str | None) -> tuple[int, int]:
+    """ "I/N" as two numbers, 0 <= I < N."""
+    if text is None:
+        return 0, 1
+    index, _, count = text.partition("/")
+    if not (index.isdecimal() and count.isdecimal() and int(index) < int(count)):
+        raise InputError(f"--shard {text}: write I/N with 0 <= I < N, such as 0/8")
+    return int(index), int(count)
+
+
 @click.command()
 @click.argument("specs", metavar="SPEC...", type=FILE, nargs=-1, required=True)
 @output_option
 @overrides_option
 @click.option(
-    "--shard", metavar="I/N", help="Run only shard I of N: the tasks with index I modulo N."
+    "--shard",
+    metavar="I/N",
+    callback=_shard,
+    help="Run only shard I of N: the tasks with index I modulo N.",
 )
 @click.option(
     "-j",
@@ -58,14 +71,10 @@ def run(
     specs: tuple[Path, ...],
     output: Path | None,
     overrides: tuple[str, ...],
-    shard: str | None,
-    jobs: int | None,
-    overwrite: bool,
     dry_run: bool,
-    checkpoint_every: float,
     max_hours: float | None,
-    reproducible: bool,
     quiet: bool,
+    **how: Any,
 ) -> None:
     """Run all tasks that the study does not contain yet.
 
@@ -79,51 +88,35 @@ def run(
     """
     from gfmd_cli.grid.ranks import launched, together
 
-    ranks = launched()
-    how = {
-        "jobs": jobs,
-        "checkpoint_every": checkpoint_every,
-        "max_seconds": None if max_hours is None else 3600 * max_hours,
-        "reproducible": reproducible,
-        "ranks": ranks,
-        "shard": _shard(shard),
-        "overwrite": overwrite,
-    }
-    with together(ranks):
+    how["ranks"] = launched()
+    how["max_seconds"] = None if max_hours is None else 3600 * max_hours
+    missed = 0
+    with together(how["ranks"]):
         from gfmd_cli.spec.parse import read_spec
 
-        if overwrite and output is not None and len(specs) > 1:
+        if how["overwrite"] and output is not None and len(specs) > 1:
             raise InputError(
                 "--overwrite: not with -o and several specs; each would start a new study"
             )
-        read = [read_spec(spec, overrides) for spec in specs]
-        missed = sum(_run(*each, output, dry_run, quiet, how) for each in read)
+        for spec, text in [read_spec(spec, overrides) for spec in specs]:
+            path = study_path(spec, output)
+            if dry_run:
+                _print_tasks(spec, path, how)
+            else:
+                missed += _run(spec, text, path, quiet, how)
     sys.exit(1 if missed else 0)
 
 
-def _run(
-    spec: Any,
-    text: str,
-    output: Path | None,
-    dry_run: bool,
-    quiet: bool,
-    how: dict[str, Any],
-) -> int:
-    """Run, or list, the tasks of a spec; how many ended other than converged."""
+def _run(spec: Any, text: str, path: Path, quiet: bool, how: dict[str, Any]) -> int:
+    """Run the tasks of a spec; how many ended other than converged."""
     from gfmd_cli.grid.ranks import leads
-
-    path = study_path(spec, output)
-    ranks = how["ranks"]
-    if dry_run:
-        _print_tasks(spec, path, how)
-        return 0
     from gfmd_cli.study.run import run_study
 
+    first = leads(how["ranks"])
     reporter = Reporter(quiet)
     with reporter as report:
-        tell = report if leads(ranks) else lambda progress: None
-        outcome = run_study(spec, text, path, tell, **how)
-    if leads(ranks) and not quiet:
+        outcome = run_study(spec, text, path, report if first else lambda progress: None, **how)
+    if first and not quiet:
         _print_results(spec, path, how["shard"], outcome, reporter.failed)
     return sum(outcome.values()) - outcome[Status.CONVERGED]
 
@@ -159,16 +152,6 @@ def _print_results(
     for line in other_tasks([row for row in stored if row["task_id"] not in indices]):
         show(f"  {line}")
     show(f"next: gfmd analyze {path}\n      gfmd report {path}")
-
-
-def _shard(text: str | None) -> tuple[int, int]:
-    """ "I/N" as two numbers, 0 <= I < N."""
-    if text is None:
-        return 0, 1
-    index, _, count = text.partition("/")
-    if not (index.isdecimal() and count.isdecimal() and int(index) < int(count)):
-        raise InputError(f"--shard {text}: write I/N with 0 <= I < N, such as 0/8")
-    return int(index), int(count)
 
 
 def _print_tasks(spec: Any, path: Path, how: dict[str, Any]) -> None:

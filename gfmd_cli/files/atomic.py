@@ -6,6 +6,7 @@ import stat
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from tempfile import TemporaryFile
 from typing import Any
 from uuid import uuid4
 
@@ -71,8 +72,10 @@ def write_whole(path: Path, content: bytes) -> None:
 def check_place(path: Path) -> None:
     """Raise SpaceError where no file can be written at `path`, before the work for it begins."""
     folder = next(folder for folder in path.absolute().parents if folder.exists())
-    if not (folder.is_dir() and os.access(folder, os.W_OK)):
-        raise SpaceError(f"{path}: cannot be written")
+    try:
+        TemporaryFile(dir=folder).close()
+    except OSError as error:
+        raise SpaceError(f"{path}: cannot be written: {error.strerror}") from error
 
 
 def make_folder(path: Path) -> None:

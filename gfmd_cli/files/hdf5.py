@@ -1,7 +1,7 @@
 """HDF5 files: new ones, and those from elsewhere, whose datasets are checked before reading."""
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from math import prod
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -30,12 +30,9 @@ def open_hdf5(source: Path | BinaryIO) -> Iterator[Any]:
 
     `source` is a path, which may be a link to a regular file, or a file that is open already.
     """
-    if isinstance(source, Path):
-        with open_regular(source, follow=True) as raw, h5py.File(raw, "r") as file:
-            yield file
-    else:
-        with h5py.File(source, "r") as file:
-            yield file
+    raw = open_regular(source, follow=True) if isinstance(source, Path) else nullcontext(source)
+    with raw as opened, h5py.File(opened, "r") as file:
+        yield file
 
 
 def has(group: Any, name: str) -> bool:
@@ -58,27 +55,24 @@ def datasets_below(group: Any) -> dict[str, Any]:
     `MAX_DEPTH`.
     """
     datasets: dict[str, Any] = {}
-    level, groups, count = [("", group)], {h5py.h5o.get_info(group.id).addr}, 0
-    for _ in range(MAX_DEPTH):
-        deeper = []
-        for path, parent in level:
-            count += len(parent)
-            if count > MAX_OBJECTS:
-                raise ValueError(f"holds more than {MAX_OBJECTS} objects")
-            for name in parent:
-                if not isinstance(parent.get(name, getlink=True), h5py.HardLink):
-                    continue
-                item = parent[name]
-                if isinstance(item, h5py.Dataset):
-                    datasets[path + name] = item
-                elif (address := h5py.h5o.get_info(item.id).addr) not in groups:
-                    groups.add(address)
-                    if isinstance(item, h5py.Group):
-                        deeper.append((f"{path}{name}/", item))
-        if not deeper:
-            return datasets
-        level = deeper
-    raise ValueError(f"groups are nested deeper than {MAX_DEPTH}")
+    queue, known, count = [("", group, 1)], {h5py.h5o.get_info(group.id).addr}, 0
+    for path, parent, depth in queue:  # which grows meanwhile, level by level
+        if depth > MAX_DEPTH:
+            raise ValueError(f"groups are nested deeper than {MAX_DEPTH}")
+        count += len(parent)
+        if count > MAX_OBJECTS:
+            raise ValueError(f"holds more than {MAX_OBJECTS} objects")
+        for name in parent:
+            if not isinstance(parent.get(name, getlink=True), h5py.HardLink):
+                continue
+            item = parent[name]
+            if isinstance(item, h5py.Dataset):
+                datasets[path + name] = item
+            elif (address := h5py.h5o.get_info(item.id).addr) not in known:
+                known.add(address)
+                if isinstance(item, h5py.Group):
+                    queue.append((f"{path}{name}/", item, depth + 1))
+    return datasets
 
 
 def find(group: Any, path: str) -> Any:

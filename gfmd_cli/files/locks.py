@@ -60,15 +60,18 @@ def locked(path: Path, *, shared: bool = False, wait: bool = True) -> Iterator[b
 
 def _opened(path: Path) -> BinaryIO:
     """A lock file, made where it is missing. Raises SpaceError."""
+    reason: str | None = None
     for _ in range(ATTEMPTS):
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             return open_regular(path, os.O_RDWR | os.O_CREAT)  # NFS asks for both
-        except FileNotFoundError:  # the folder was deleted just now, or cannot be made at all
+        except (FileNotFoundError, FileExistsError) as error:
+            # the folder was deleted just now, perhaps between two looks of mkdir, or cannot be made
+            reason = error.strerror
             time.sleep(WAIT_SECONDS)
         except OSError as error:
             raise SpaceError(f"{path}: cannot be written: {error.strerror}") from error
-    raise SpaceError(f"{path}: cannot be written: its folder cannot be made")
+    raise SpaceError(f"{path}: cannot be written: its folder cannot be made: {reason}")
 
 
 def _is_at(descriptor: int, path: Path) -> bool:
@@ -107,11 +110,13 @@ def _owned(path: Path, shared: bool, wait: bool) -> Iterator[bool]:
             )
         else:
             time.sleep(WAIT_SECONDS)
+    mine = _owner(path)
     try:
         yield True
     finally:
-        with suppress(OSError):
-            path.unlink()
+        if _owner(path) == mine:  # else it was deleted, and another process has one now
+            with suppress(OSError):
+                path.unlink()
 
 
 def _claim(path: Path) -> bool:

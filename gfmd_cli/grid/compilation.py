@@ -39,8 +39,12 @@ def kernel(function: Callable[..., Any]) -> Any:
 
 
 def part_of_kernel(function: Callable[..., Any]) -> Any:
-    """Compile a function that only kernels of the same file call, as a part of each of them."""
-    return njit(no_cpython_wrapper=True, **OPTIONS)(function)
+    """Compile a function that only kernels of the same file call, as a part of each of them.
+
+    It is always inlined. Otherwise kernels that are loaded from the cache would share one copy of
+    it, and its last bits would depend on which of them is loaded first.
+    """
+    return njit(no_cpython_wrapper=True, forceinline=True, **OPTIONS)(function)
 
 
 def _is_cache_known() -> bool:

@@ -7,9 +7,11 @@ share a field exchange no zero rows either.
 """
 
 from collections.abc import Callable, Iterator
-from functools import cached_property
+from concurrent.futures import ThreadPoolExecutor
+from functools import cached_property, partial
+from itertools import pairwise
 from math import prod
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 import pyfftw
@@ -17,6 +19,15 @@ import pyfftw
 from gfmd_cli.grid import plans
 from gfmd_cli.grid.arrays import Field, Modes
 from gfmd_cli.grid.ranks import Ranks
+from gfmd_cli.grid.shared_transforms import (
+    Execute,
+    Pairs,
+    Plan,
+    along_columns,
+    along_rows,
+    in_turn,
+    side_by_side,
+)
 from gfmd_cli.grid.transposition import Span, Transposition, column_spans
 
 BLOCK = 2**14  # coefficients of a block of columns: 256 KiB, in the cache of a core
@@ -43,6 +54,7 @@ class PaddedTransform:
         threads: int = 1,
     ) -> None:
         self.shape, self.threads = shape, threads
+        self.pool = ThreadPoolExecutor(threads) if threads > 1 else None
         self.rows, self.columns = (1, *shape)[-2:]
         self.padded_rows, self.padded_columns = (1, *padded)[-2:]
         self.real = np.dtype(np.float64 if precision == "double" else np.float32)
@@ -87,7 +99,7 @@ class PaddedTransform:
         forward()
         work = self._to_columns(lines)
         symbol = np.empty(self.symbol_shape, self.real)
-        block, forward, _ = self._column_plans
+        block, forward, _ = self._column_plans[0]
         for part, here in self._blocks(work, block):
             here[self.padded_rows - self.rows + 1 :] = work[:0:-1, part]
             forward()
@@ -114,20 +126,29 @@ class PaddedTransform:
 
     def _filter_columns(self, work: Modes, symbol: Field) -> None:
         """Transform the padded columns, multiply them by the symbol and transform back."""
-        block, forward, backward = self._column_plans
         upper, lower = slice(len(symbol)), slice(len(symbol), None)
         mirrored = symbol[(self.padded_rows - 1) // 2 : 0 : -1]
-        for part, here in self._blocks(work, block):
-            forward()
-            here[upper] *= symbol[:, part]
-            here[lower] *= mirrored[:, part]
-            backward()
-            work[:, part] = here[: self.rows]
 
-    def _blocks(self, work: Modes, block: Modes) -> Iterator[tuple[slice, Modes]]:
-        """Columns of `work`, and the part of `block` into which they are copied, padded."""
+        def filter_share(thread: int, block: Modes, forward: Execute, backward: Execute) -> None:
+            for part, here in self._blocks(work, block, thread, self.threads):
+                forward()
+                here[upper] *= symbol[:, part]
+                here[lower] *= mirrored[:, part]
+                backward()
+                work[:, part] = here[: self.rows]
+
+        shares = [partial(filter_share, i, *own) for i, own in enumerate(self._column_plans)]
+        side_by_side(self.pool, shares)
+
+    def _blocks(
+        self, work: Modes, block: Modes, first: int = 0, step: int = 1
+    ) -> Iterator[tuple[slice, Modes]]:
+        """Columns of `work`, and the part of `block` into which they are copied, padded.
+
+        Every so many blocks from a first one on.
+        """
         count = work.shape[1]
-        for start in range(0, count, self.width):
+        for start in range(first * self.width, count, step * self.width):
             part = slice(start, min(start + self.width, count))
             here = block[:, : part.stop - part.start]
             here[: self.rows] = work[:, part]
@@ -142,48 +163,40 @@ class PaddedTransform:
         """Undo `_to_columns`."""
 
     @cached_property
-    def _row_plans(self) -> tuple[Modes, Field, Callable[[], None], Callable[[], None]]:
+    def _row_plans(self) -> tuple[Modes, Field, Execute, Execute]:
         """Coefficients of the rows, their values in the same memory, and both transforms."""
         lines = self._empty_lines()
         values = lines.view(self.real)[:, : self.padded_columns]
-        forward, backward = self._planned((values, lines), (lines, values), axis=1)
-        return lines, values, forward, backward
+        edges = np.linspace(0, len(lines), self.threads + 1).astype(int)
+        parts = [(int(a), int(b)) for a, b in pairwise(edges) if a < b]
+        there, back = _planned(partial(along_rows, values, lines, parts))
+        return lines, values, in_turn(self.pool, there), in_turn(self.pool, back)
 
     def _empty_lines(self) -> Modes:
         """Memory of the coefficients of the rows."""
         return self._empty((self.own_rows, self.modes))
 
     @cached_property
-    def _column_plans(self) -> tuple[Modes, Callable[[], None], Callable[[], None]]:
-        """A block of padded columns, and both transforms, in place."""
-        block = self._empty((self.padded_rows, self.width))
-        block[...] = 0.0
-        forward, backward = self._planned((block, block), (block, block), axis=0)
-        return block, forward, backward
+    def _column_plans(self) -> list[tuple[Modes, Execute, Execute]]:
+        """For each thread a block of padded columns, and both transforms, in place."""
+        found = []
+        for _ in range(self.threads):
+            block = self._empty((self.padded_rows, self.width))
+            block[...] = 0.0
+            (forward,), (backward,) = _planned(partial(along_columns, block, 1))
+            found.append((block, forward, backward))
+        return found
 
     def _empty(self, shape: tuple[int, ...]) -> Modes:
         kind = np.result_type(self.real, np.complex64)
         array: Modes = pyfftw.empty_aligned(shape, dtype=kind)
         return array
 
-    def _planned(self, there: Any, back: Any, axis: int) -> list[Callable[[], None]]:
-        """Execute functions of the plans of a transform and its inverse, without 1/size."""
 
-        def plan(flags: tuple[str, ...]) -> list[Callable[[], None]]:
-            ways = ((there, "FFTW_FORWARD"), (back, "FFTW_BACKWARD"))
-            return [
-                pyfftw.FFTW(
-                    *arrays,
-                    axes=(axis,),
-                    direction=way,
-                    flags=flags,
-                    threads=self.threads,
-                    planning_timelimit=PLANNING,
-                ).execute
-                for arrays, way in ways
-            ]
-
-        return plans.planned(plan)
+def _planned(make: Callable[[Plan], Pairs]) -> Pairs:
+    """Transforms and their inverses, without 1/size."""
+    limit = {"planning_timelimit": PLANNING}
+    return plans.planned(lambda flags: make(partial(pyfftw.FFTW, flags=flags, **limit)))
 
 
 class DistributedPaddedTransform(PaddedTransform):

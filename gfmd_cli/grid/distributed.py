@@ -5,9 +5,8 @@ columns (wavenumbers along x) of the coefficients. An all-to-all exchange conver
 other. Every process computes smaller grids as a whole, with identical results.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, fields
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import pairwise
 from typing import Any, Literal
 
@@ -21,6 +20,13 @@ from gfmd_cli.grid.fft_grid import PLANNING, Grid, Shape, shared_modes
 from gfmd_cli.grid.halo import HALO_ROWS, DistributedColumns, DistributedRows, is_distributable
 from gfmd_cli.grid.ranks import Ranks, leads
 from gfmd_cli.grid.rows import LocalRows
+from gfmd_cli.grid.shared_transforms import (
+    Execute,
+    Pairs,
+    along_columns,
+    along_rows,
+    side_by_side,
+)
 from gfmd_cli.grid.transposition import Span, Transposition, column_spans
 
 
@@ -136,44 +142,31 @@ class DistributedGrid(Grid):
         return pyfftw.empty_aligned(size, self._complex), pyfftw.empty_aligned(2 * room, self.real)
 
     @cached_property
-    def _workspace(self) -> tuple[Modes, Callable[[], None], Callable[[], None]]:
+    def _workspace(self) -> tuple[Modes, Execute, Execute]:
         shape = self.spectral_shape
         work = self._memory[0][: shape[0] * shape[1]].reshape(shape)
         spare = self._memory[1].view(work.dtype)
         lines = self._lines()
         real = lines.view(self.real)[:, : self.points]
 
-        def plan(flags: tuple[str, ...]) -> list[Callable[[], None]]:
-            ways = (
-                (real, lines, 1, "FFTW_FORWARD"),
-                (work, work, 0, "FFTW_FORWARD"),
-                (work, work, 0, "FFTW_BACKWARD"),
-                (lines, real, 1, "FFTW_BACKWARD"),
-            )
-            return [
-                pyfftw.FFTW(
-                    source,
-                    target,
-                    (axis,),
-                    way,
-                    flags,
-                    threads=self._threads,
-                    planning_timelimit=PLANNING[0] + PLANNING[1] * real.size,
-                ).execute
-                for source, target, axis, way in ways
-            ]
+        parts, pool = self.rows.parts, self.rows.pool
 
-        along, across, back_across, back_along = plans.planned(plan)
+        def plan(flags: tuple[str, ...]) -> tuple[Pairs, Pairs]:
+            limit = PLANNING[0] + PLANNING[1] * real.size
+            fftw = partial(pyfftw.FFTW, flags=flags, planning_timelimit=limit)
+            return along_rows(real, lines, parts, fftw), along_columns(work, len(parts), fftw)
+
+        (along, back_along), (across, back_across) = plans.planned(plan)
 
         def forward() -> None:
-            along()
+            side_by_side(pool, along)
             self._transposition.to_columns(lines, work, spare)
-            across()
+            side_by_side(pool, across)
 
         def backward() -> None:
-            back_across()
+            side_by_side(pool, back_across)
             self._transposition.to_lines(work, lines, spare)
-            back_along()
+            side_by_side(pool, back_along)
 
         return work, forward, backward
 

@@ -4,9 +4,8 @@ h(x) = sum_q h(q) exp(i q x): the forward transform carries 1/size, so that h(q 
 Coefficients are kept for non-negative wavenumbers of the last axis only (real transforms).
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from math import prod
 from typing import Any, Literal, TypeVar
 
@@ -18,6 +17,7 @@ from gfmd_cli.grid.arrays import Field, Modes
 from gfmd_cli.grid.convolution import PaddedTransform, padded_shape
 from gfmd_cli.grid.pixels import average_along_x, average_rows, covered_rows
 from gfmd_cli.grid.rows import LocalRows
+from gfmd_cli.grid.shared_transforms import Execute, Pair, in_place
 from gfmd_cli.grid.transposition import Span
 
 T = TypeVar("T")
@@ -201,7 +201,7 @@ class Grid:
         return grid
 
     @cached_property
-    def _workspace(self) -> tuple[Modes, Callable[[], None], Callable[[], None]]:
+    def _workspace(self) -> tuple[Modes, Execute, Execute]:
         """Memory that every transform of this grid works in, and the two plans, in place.
 
         In place they spare a field, and a third of the time of transforms between two arrays.
@@ -210,20 +210,10 @@ class Grid:
         work = self._memory[0][: prod(self.spectral_shape)].reshape(self.spectral_shape)
         real = work.view(self.real)[..., : self.points]
 
-        def plan(flags: tuple[str, ...]) -> list[Callable[[], None]]:
-            ways = ((real, work, "FFTW_FORWARD"), (work, real, "FFTW_BACKWARD"))
-            return [
-                pyfftw.FFTW(
-                    source,
-                    target,
-                    tuple(range(self.dimension)),
-                    way,
-                    flags,
-                    threads=self._threads,
-                    planning_timelimit=PLANNING[0] + PLANNING[1] * self.size,
-                ).execute
-                for source, target, way in ways
-            ]
+        def plan(flags: tuple[str, ...]) -> Pair:
+            limit = PLANNING[0] + PLANNING[1] * self.size
+            fftw = partial(pyfftw.FFTW, flags=flags, planning_timelimit=limit)
+            return in_place(real, work, self.rows, fftw)
 
         forward, backward = plans.planned(plan)
         return work, forward, backward
@@ -361,7 +351,7 @@ class Grid:
     ) -> PaddedTransform:
         """Transforms of fields that are padded by zeros to `factor` times the points a side."""
         padded = padded_shape(self.whole_shape, factor)
-        return PaddedTransform(self.whole_shape, padded, precision, self.threads)
+        return PaddedTransform(self.whole_shape, padded, precision, self._threads)
 
     def next_row(self, lines: Any) -> Any:
         """The row of a field that follows the rows of this process."""

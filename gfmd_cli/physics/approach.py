@@ -11,7 +11,6 @@ import numpy as np
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.physics.contact import Contact, Scene
 from gfmd_cli.physics.elastomers import LinearElastomer
-from gfmd_cli.physics.free_contact import FreeContact
 from gfmd_cli.physics.persson import Persson
 
 TRIED = (1e-8, 1e4, 121)  # reduced pressures of the estimate: from, to, how many
@@ -21,20 +20,18 @@ def approach(
     scene: Scene, elastomer: LinearElastomer, contact: Contact, u: Field, sigma: Field
 ) -> float:
     """Displacement of the indenter from first touch [m]; NaN where c does not exist."""
-    grid = scene.grid
-    if not elastomer.has_level(contact.boundary, grid.dimension):
+    if not elastomer.has_level(contact.boundary, scene.grid.dimension):
         return np.nan
-    if isinstance(contact, FreeContact):
-        level = contact.undeformed_level(u, sigma)
-    else:
+    level = contact.reference_level(u, sigma)
+    if contact.boundary == "periodic":
         assert elastomer.uniform_stiffness is not None
         uniform = elastomer.uniform_stiffness * scene.h_std / scene.delta_sigma
-        level = grid.total(float(u.sum())) / grid.size - contact.pressure / uniform
+        level -= contact.pressure / uniform
     return (scene.highest - level) * scene.h_std
 
 
-def estimated_pressure(scene: Scene, elastomer: LinearElastomer, displacement: float) -> float:
-    """Pressure [Pa] of a displacement [m], from the mean gap of Persson theory.
+def estimated_pressures(scene: Scene, elastomer: LinearElastomer, displacements: Field) -> Field:
+    """Pressures [Pa] of some displacements [m], from the mean gap of Persson theory.
 
     d = max h - <u> + p / k(0). Without k(0), the stiffness at q = 2 / side takes its place: for a
     half-space p / k is then within 6 % the mean displacement of a square under uniform pressure.
@@ -47,4 +44,4 @@ def estimated_pressure(scene: Scene, elastomer: LinearElastomer, displacement: f
     )
     gap = Persson(scene.shells).mean_gap(pressure)
     depth = scene.highest * scene.h_std - gap + pressure / uniform
-    return float(np.exp(np.interp(displacement, depth, np.log(pressure))))
+    return np.asarray(np.exp(np.interp(displacements, depth, np.log(pressure))))

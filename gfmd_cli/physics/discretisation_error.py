@@ -3,7 +3,7 @@
 All constants were fitted to one half of the calibration set of `scripts/calibration.py` and checked
 on the other (docs/accuracy.md): elastomers of n = 0 to 4 and slabs, random and simple surfaces,
 each on up to six nested grids. Contacts of few spots and surfaces that are not isotropic or not
-band-limited are left to `irregular_error`. Symbols: x = contact line times spacing, that is contact
+band-limited are left to `error_estimates`. Symbols: x = contact line times spacing, that is contact
 switches per point; n = exponent of the stiffness k(q); w = 2 pi waves / points, the phase of the
 short waves from one point to the next (pi at most); b = curvature / points^2, the height [h_std] by
 which the surface bends from one point to the next.
@@ -16,9 +16,14 @@ from math import exp, hypot, isnan, log, nan, pi, sqrt
 import numpy as np
 
 from gfmd_cli.physics.elastomers import LinearElastomer
-from gfmd_cli.physics.error_estimates import UNKNOWN, Estimate, Level, unknown
-from gfmd_cli.physics.free_error import estimate_free
-from gfmd_cli.physics.irregular_error import estimate_by_change
+from gfmd_cli.physics.error_estimates import (
+    UNKNOWN,
+    Estimate,
+    Level,
+    estimate_by_change,
+    estimate_free,
+    unknown,
+)
 from gfmd_cli.physics.persson import Shells
 
 # Excess of the counted area: AREA_EXCESS n x. Measured: 0.00, 0.05, 0.10, 0.15, 0.21, 0.26, 0.31,

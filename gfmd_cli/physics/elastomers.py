@@ -18,10 +18,14 @@ from pydantic import model_validator
 from gfmd_cli.choice import Choice, FilePath, Positive
 from gfmd_cli.errors import InputError
 from gfmd_cli.grid.arrays import Field
-from gfmd_cli.physics import free_compliance, table_compliance
-from gfmd_cli.physics.free_compliance import ALL_ROWS, Shape, Spacings
-from gfmd_cli.physics.persson import gamma_n, gamma_slab, monotone_cubic
+from gfmd_cli.physics.compliance_transforms import Compliance, separated
+from gfmd_cli.physics.free_compliance import ALL_ROWS, Shape, Spacings, power_law
+from gfmd_cli.physics.interpolation import monotone_cubic
+from gfmd_cli.physics.persson import gamma_n, gamma_slab
 
+LONG_WAVE = 1e-6  # q t up to which k of a layer is constant: (q t)^2 is below rounding
+DECAYED = 25.0  # thicknesses from which the displacement of a layer is below rounding
+MAX_SPACING = 16.0  # of a grid, in thicknesses of a layer with a free boundary
 MAX_TABLE = 2**20  # bytes of a tabulated stiffness; a choice, some 40000 rows
 STEP = 1e-3  # of ln q: the truncation error is of order 1e-7, the rounding error 1e-13
 
@@ -47,16 +51,28 @@ class LinearElastomer(Choice):
 
         `spacings` are the sides of a pixel [m], in the order (y, x). The result of this shape, or
         in two dimensions some of its rows, is indexed by the distance of the two pixels in points.
-        See `free_compliance`.
+        See `free_compliance`, and for a stiffness that is no power law `compliance_transforms`.
 
         Raises InputError where the displacement does not decay with the distance.
         """
         self.check_free_boundary(len(shape))
+        if self.exponent is None:
+            return self.compliance().displacements(shape, spacings, rows)
+        prefactor = float(self.stiffness(np.ones(1))[0])
+        return power_law(self.exponent, shape, spacings, rows) / prefactor
+
+    def compliance(self) -> Compliance:
+        """1/k(q) of an elastomer whose displacement decays and whose k(q) is no power law."""
         raise NotImplementedError
 
     def decays(self, dimension: int) -> bool:
-        """Whether the displacement decays with the distance from the load."""
-        return False
+        """Whether the displacement decays with the distance from the load.
+
+        That of a power law does for n < 2; in one dimension for n <= 1, the logarithm included.
+        """
+        if self.exponent is None:
+            return False
+        return self.exponent < 2 if dimension == 2 else self.exponent <= 1
 
     def check_free_boundary(self, dimension: int) -> None:
         """Raise InputError for an elastomer that a free boundary does not suit."""
@@ -144,14 +160,6 @@ class Power(LinearElastomer):
         """k_0 of springs, n = 0."""
         return self.k_n if self.n == 0 else None
 
-    def decays(self, dimension: int) -> bool:
-        """For n < 2; in one dimension for n <= 1, the logarithm included."""
-        return self.n < 2 if dimension == 2 else self.n <= 1
-
-    def free_compliance(self, shape: Shape, spacings: Spacings, rows: slice = ALL_ROWS) -> Field:
-        """Displacements [m/Pa] by the Riesz kernel, for n < 2; in one dimension for n <= 1."""
-        return _free_power_law(self, self.n, self.k_n, shape, spacings, rows)
-
 
 class HalfSpace(LinearElastomer):
     """Semi-infinite solid, k = E* q / 2. Paper Eq. (2), n = 1."""
@@ -164,14 +172,6 @@ class HalfSpace(LinearElastomer):
     def stiffness(self, q: Field, length: float = 1.0) -> Field:
         """k(q) [Pa/m]."""
         return 0.5 * self.E_star * q
-
-    def decays(self, dimension: int) -> bool:
-        """Yes; in one dimension as a logarithm, up to a level of reference."""
-        return True
-
-    def free_compliance(self, shape: Shape, spacings: Spacings, rows: slice = ALL_ROWS) -> Field:
-        """Displacements [m/Pa] by the Boussinesq kernel; of a line load, by its logarithm."""
-        return _free_power_law(self, 1.0, 0.5 * self.E_star, shape, spacings, rows)
 
 
 class Membrane(LinearElastomer):
@@ -273,16 +273,17 @@ class Layer(LinearElastomer):
         return True
 
     def free_compliance(self, shape: Shape, spacings: Spacings, rows: slice = ALL_ROWS) -> Field:
-        """Displacements [m/Pa] by the kernel of the half-space and a smooth rest."""
-        body = self.softening, self.thickness
-        try:
-            if len(shape) == 1:
-                kernel = free_compliance.layer_line(*body, *shape, *spacings)
-            else:
-                kernel = free_compliance.layer(*body, shape, spacings, rows)
-        except ValueError as error:
-            raise InputError(f"elastomer.thickness, grid.points: {error}") from error
-        return kernel * (2 / self.E_star)
+        """Displacements [m/Pa]. Raises InputError for a layer that is far thinner than a pixel."""
+        if max(spacings) > MAX_SPACING * self.thickness:
+            raise InputError(
+                "elastomer.thickness, grid.points: the thickness is less than "
+                f"1/{MAX_SPACING:g} of the spacing"
+            )
+        return super().free_compliance(shape, spacings, rows)
+
+    def compliance(self) -> Compliance:
+        """1/k(q), constant for the longest waves; displacements decay over the thickness."""
+        return _compliance_of_layer(self)
 
 
 class Tabulated(LinearElastomer):
@@ -312,13 +313,9 @@ class Tabulated(LinearElastomer):
                 'compliance of this one has no kernel: use "periodic"'
             )
 
-    def free_compliance(self, shape: Shape, spacings: Spacings, rows: slice = ALL_ROWS) -> Field:
-        """Displacements [m/Pa] by quadrature of the compliance between the rows of the table."""
-        self.check_free_boundary(len(shape))
-        compliance = _compliance(tuple(map(tuple, self._table().tolist())))
-        if len(shape) == 1:
-            return table_compliance.line(compliance, *shape, *spacings)
-        return table_compliance.plane(compliance, shape, spacings, rows)
+    def compliance(self) -> Compliance:
+        """1/k(q) between the rows of the table and beyond."""
+        return _compliance_of_table(tuple(map(tuple, self._table().tolist())))
 
     @property
     def uniform_stiffness(self) -> float | None:
@@ -331,11 +328,8 @@ class Tabulated(LinearElastomer):
         try:
             if not self.path.is_file() or self.path.stat().st_size > MAX_TABLE:
                 raise ValueError(f"no regular file of at most {MAX_TABLE} bytes")
-            with warnings.catch_warnings():
-                warnings.simplefilter(
-                    "ignore", UserWarning
-                )  # about an empty file, which is refused below
-                table = np.loadtxt(self.path, ndmin=2)
+            with warnings.catch_warnings(action="ignore", category=UserWarning):
+                table = np.loadtxt(self.path, ndmin=2)  # warns of an empty file, refused below
         except (OSError, ValueError) as error:
             raise InputError(f"{self.path}: elastomer.path: cannot be read: {error}") from error
         if table.shape[0] < 2 or table.shape[1] != 2:
@@ -372,34 +366,23 @@ def _end_exponents(table: Field) -> tuple[float, float]:
 
 
 @lru_cache(maxsize=4)
-def _compliance(rows: tuple[tuple[float, ...], ...]) -> table_compliance.Compliance:
-    """The compliance of a table; cached, because its transforms serve all grids."""
+def _compliance_of_layer(layer: Layer) -> Compliance:
+    """The compliance of a layer; cached, because its transforms serve all grids."""
+    t = layer.thickness
+    return Compliance(layer.stiffness, np.array([LONG_WAVE / t]), 0.0, reach=DECAYED * t)
+
+
+@lru_cache(maxsize=4)
+def _compliance_of_table(rows: tuple[tuple[float, ...], ...]) -> Compliance:
+    """The compliance of a table; cached likewise."""
     table = np.array(rows)
-    knots = table_compliance.separated(table[:, 0])
-    return table_compliance.Compliance(_interpolated(table), knots, _end_exponents(table)[0])
+    return Compliance(_interpolated(table), separated(table[:, 0]), _end_exponents(table)[0])
 
 
 Elastomer = Annotated[
     Power | HalfSpace | Membrane | Plate | Slab | Layer | Tabulated,
     Key(discriminator="kind"),
 ]
-
-
-def _free_power_law(
-    elastomer: LinearElastomer,
-    n: float,
-    k_n: float,
-    shape: Shape,
-    spacings: Spacings,
-    rows: slice,
-) -> Field:
-    """Displacements [m/Pa] for k = k_n q^n. Raises InputError where they do not decay."""
-    elastomer.check_free_boundary(len(shape))
-    if len(shape) == 2:
-        return free_compliance.power_law(n, shape, spacings, rows) / k_n
-    if n == 1:
-        return free_compliance.logarithmic_line(*shape, *spacings) / k_n
-    return free_compliance.power_law_line(n, *shape, *spacings) / k_n
 
 
 def layer_softening(t: Field, poisson: float | None) -> Field:
@@ -424,22 +407,16 @@ def layer_softening(t: Field, poisson: float | None) -> Field:
 def slab_factor(t: Field) -> Field:
     """S(t) = (cosh 2t - 2t^2 - 1) / (sinh 2t + 2t) for t >= 0, accurate to a few roundings.
 
-    Paper Eq. (41), which as printed cancels at small t and overflows at t = 355. Here
-    S = (sinh t - t)(sinh t + t) / (sinh t cosh t + t), with the series of sinh t - t below t = 1,
-    and S = 1 - (4 t^2 + 4 t + 2) exp(-2 t) above t = 20, where the next term is below rounding.
+    Paper Eq. (41), which as printed cancels at small t and overflows at t = 355. Here both factors
+    of S = (sinh t - t)(sinh t + t) / (sinh t cosh t + t) have 2 exp(-t), so that nothing overflows,
+    and sinh t - t is a series below t = 1.
     """
     t = np.asarray(t, dtype=np.float64)
-    thin, thick = t < 1, t > 20
-    middle = np.clip(t, 1e-300, 20.0)
-    sinh, cosh = np.sinh(middle), np.cosh(middle)
-    square = np.where(thin, t, 0.0) ** 2
-    tail = np.ones_like(square)  # sinh t - t = t^3/6 (1 + t^2/20 (1 + t^2/42 (...)))
+    decay, rising = np.exp(-t), -np.expm1(-2 * t)  # 2 exp(-t) sinh t
+    small = np.minimum(t, 1.0)
+    tail = np.ones_like(t)  # sinh t - t = t^3/6 (1 + t^2/20 (1 + t^2/42 (...)))
     for divisor in (272.0, 210.0, 156.0, 110.0, 72.0, 42.0, 20.0):  # 17*16, 15*14, ..., 5*4
-        tail = 1.0 + square / divisor * tail
-    difference = np.where(thin, square * np.where(thin, t, 0.0) / 6 * tail, sinh - middle)
-    factor = difference * (
-        (sinh + middle) / (sinh * cosh + middle)
-    )  # in this order, because t^4 would underflow
-    large = np.clip(t, 20.0, 400.0)
-    bulk = 1.0 - (4 * large**2 + 4 * large + 2) * np.exp(-2 * large)
-    return np.where(thick, bulk, factor)
+        tail = 1.0 + small**2 / divisor * tail
+    difference = np.where(t < 1, small**3 / 3 * decay * tail, rising - 2 * t * decay)
+    whole = np.maximum(4 * t * decay**2 - np.expm1(-4 * t), 1e-300)  # not zero at t = 0
+    return np.asarray(difference * ((rising + 2 * t * decay) / whole))

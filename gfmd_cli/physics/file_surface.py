@@ -1,7 +1,6 @@
 """Height maps and line profiles from files as surfaces: reading, preparation, heights on grids."""
 
 from functools import lru_cache
-from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
@@ -17,15 +16,20 @@ from gfmd_cli.physics.interpolation import Interpolation, monotone, nearest, sui
 from gfmd_cli.physics.map_preparation import (
     Edges,
     Levelling,
+    border_step,
     fill_missing,
     level,
     make_periodic,
     mirror,
     window,
 )
-from gfmd_cli.physics.map_remarks import map_remarks
 from gfmd_cli.physics.pictures import Picture, picture
-from gfmd_cli.physics.topography import Region, Topography, read_topography, square_part
+from gfmd_cli.physics.topography import Region, Topography, read_topography
+
+STEEP = 3.0  # rms gradient; a choice: surfaces of machined or worn solids have less
+SMOOTH = 1e-6  # rms gradient; a choice: polished mirrors have about that
+CLIFF = 5.0  # ratio of the step across the border to that inside; a choice: 1 if periodic
+FILLED = 0.05  # share of filled heights; a choice, as for the frame of the window
 
 
 class FileSurface(RigidSurface):
@@ -122,7 +126,7 @@ class FileSurface(RigidSurface):
 
     def _is_reflected(self) -> bool:
         """Whether the map has borders, beyond which it is reflected for the interpolation only."""
-        return self.treatment()[1] == "none" and not self._is_periodic()
+        return self.edges in (None, "none") and not self._is_periodic()
 
     @property
     def band_limited(self) -> bool:  # type: ignore[override]
@@ -139,11 +143,12 @@ class FileSurface(RigidSurface):
 
     def parameters(self) -> dict[str, Any]:
         """Value of every key, with the defaults that depend on the file as they are applied."""
-        level, edges = self.treatment()
-        applied: dict[str, Any] = {"level": level, "edges": edges}
-        applied["periodic"] = self._is_periodic()
-        applied["interpolation"] = self.applied_interpolation()
-        return super().parameters() | applied
+        return super().parameters() | {
+            "level": self.levelling(),
+            "edges": self.edges or "none",
+            "periodic": self._is_periodic(),
+            "interpolation": self.applied_interpolation(),
+        }
 
     @property
     def sides(self) -> tuple[float, ...]:
@@ -163,13 +168,9 @@ class FileSurface(RigidSurface):
         side = float(topography.heights.shape[-1] * topography.spacing[-1])
         return side if topography.metres else self.scale * side
 
-    def treatment(self) -> tuple[Levelling, Edges]:
-        """Levelling and treatment of the edges that are applied to the map."""
-        periodic = self._is_periodic()
-        return (
-            self.level or ("none" if periodic else "plane"),
-            self.edges or "none",
-        )
+    def levelling(self) -> Levelling:
+        """The trend that is subtracted from the map."""
+        return self.level or ("none" if self._is_periodic() else "plane")
 
     @property
     def has_borders(self) -> bool:  # type: ignore[override]
@@ -185,29 +186,34 @@ class FileSurface(RigidSurface):
     @property
     def copies(self) -> int:  # type: ignore[override]
         """Copies of the map along each side of its cell: two where it is mirrored."""
-        return 2 if self.treatment()[1] == "mirror" else 1
+        return 2 if self.edges == "mirror" else 1
 
     def _is_periodic(self) -> bool:
         """Whether the map is periodic, by the spec or else by the file."""
-        if self.periodic is not None:
-            return self.periodic
-        return self._topography().periodic in (True, None)
+        stated = self._topography().periodic if self.periodic is None else self.periodic
+        return stated is not False
 
     def measured_map(self) -> "tuple[np.ma.MaskedArray[Any, Any], tuple[float, ...]]":
         """Levelled heights [m] as measured, masked where missing, and their spacing [m].
 
         Nothing is subtracted from a map that is taken as periodic, unless `level` says so.
         """
+        missing = self._topography().missing
+        mask = np.ma.nomask if missing is None else missing
+        return np.ma.masked_array(self._levelled(), mask), self._map_spacing()
+
+    def _levelled(self) -> Field:
+        """The heights [m] less the trend of the known ones, any value where missing."""
         topography = self._topography()
-        heights = self.scale * topography.heights
         known = None if topography.missing is None else ~topography.missing
-        levelled = level(heights, self.treatment()[0], known)
-        mask = np.ma.nomask if topography.missing is None else topography.missing
-        return np.ma.masked_array(levelled, mask), self._map_spacing()
+        heights = topography.heights  # read-only; not copied, because maps are large
+        if self.scale != 1.0:
+            heights = self.scale * heights
+        return level(heights, self.levelling(), known)
 
     def tapered(self, grid: Grid) -> Mask | None:
         """Points of a grid whose heights the window has changed."""
-        if self.treatment()[1] != "window":
+        if self.edges != "window":
             return None
         return np.asarray(window(grid.whole_shape, self.taper)[grid.own] < 1.0)
 
@@ -223,7 +229,7 @@ class FileSurface(RigidSurface):
         missing = self._topography().missing
         if self.missing != "void" or missing is None:
             return None
-        if self.treatment()[1] == "mirror":
+        if self.edges == "mirror":
             missing = mirror(missing)
         return np.asarray(nearest(missing, grid.whole_shape)[grid.own])
 
@@ -246,22 +252,42 @@ class FileSurface(RigidSurface):
         return tuple(side / self.copies / n for side, n in zip(self.sides, shape, strict=True))
 
     def _topography(self) -> Topography:
-        return _topography(self.path, self.dataset, self.region, self.flip, self.crop)
+        return _read(self.path, self.dataset, region=self.region, flip=self.flip, crop=self.crop)
 
     def remarks(self, boundary: str = "periodic") -> list[str]:
-        """Warnings about the map, for `grid.boundary`; see `map_remarks`."""
-        topography = self._topography()
-        return map_remarks(
-            _prepared(self),
-            self.sides,
-            unsized=self._known_length() is None,
-            repeated=boundary == "periodic" and not self.has_borders,
-            filled=topography.holes / topography.heights.size if self.missing == "fill" else 0.0,
-        )
+        """Warnings: a missing side, filled heights, an unusual gradient, a step at the border."""
+        topography, heights, remarks = self._topography(), _prepared(self), []
+        if self._known_length() is None:
+            remarks.append(
+                "the file does not state its side; L = 1 m is assumed: set surface.length"
+            )
+        filled = topography.holes / topography.heights.size if self.missing == "fill" else 0.0
+        if filled > FILLED:
+            remarks.append(
+                f"{filled:.0%} of the heights are missing and were filled in: contact there was "
+                'not measured; set surface.region, or surface.missing = "void" where nothing can '
+                "touch"
+            )
+        slopes = (np.diff(heights, axis=i) / step for i, step in enumerate(self._map_spacing()))
+        gradient = np.sqrt(sum(float(np.mean(slope**2)) for slope in slopes))
+        if gradient > STEEP or 0 < gradient < SMOOTH:
+            remarks.append(
+                f"rms gradient {gradient:.3g}: check that heights and side are in metres; "
+                "surface.scale is the factor from the heights of the file to metres, "
+                "surface.length the side"
+            )
+        is_repeated = boundary == "periodic" and not self.has_borders
+        cliff = border_step(heights) if is_repeated else 1.0
+        if cliff > CLIFF:
+            remarks.append(
+                f"the height step across the border is {cliff:.3g} times that inside the map: if "
+                "the map is not periodic, set surface.periodic = false"
+            )
+        return remarks
 
     def preparation(self, boundary: str = "") -> str:
         """Description of how the map was read and prepared for a boundary."""
-        topography, (levelling, edges) = self._topography(), self.treatment()
+        topography, levelling = self._topography(), self.levelling()
         steps = [f"{self.path.name} ({topography.source}): {extent(topography.shape)} points"]
         if self.region is not None:
             steps.append(f"region {self.region}")
@@ -279,9 +305,9 @@ class FileSurface(RigidSurface):
             steps.append("free boundary")
         elif self.has_borders and not boundary:
             steps.append("not periodic (free boundary or mirrored)")
-        if edges == "window":
+        if self.edges == "window":
             steps.append(f"edges tapered to the mean height over {self.taper:g} of the side")
-        elif edges == "mirror":
+        elif self.edges == "mirror":
             steps.append("mirrored to twice the side")
         elif boundary != "free" and not self.has_borders:
             steps.append("periodic")
@@ -296,46 +322,28 @@ def _suited_interpolation(surface: FileSurface) -> Interpolation:
     return suited_interpolation(mirror(heights) if surface._is_reflected() else heights)
 
 
-@lru_cache(maxsize=4)
-def _topography(
-    path: Path, dataset: str | None, region: Region | None, flip: bool, crop: bool
-) -> Topography:
-    """Read a file; cached, because the same surface is sampled on several grids."""
-    topography = read_topography(path, dataset, region=region, flip=flip)
-    return square_part(topography) if crop and topography.heights.ndim == 2 else topography
+_read = lru_cache(maxsize=4)(read_topography)
+"""Cached, because the same surface is sampled on several grids."""
 
 
 @lru_cache(maxsize=4)
 def _prepared(surface: FileSurface) -> Field:
     """The periodic heights [m], levelled and filled in; cached likewise."""
-    topography, (levelling, edges) = surface._topography(), surface.treatment()
-    missing = topography.missing
-    if missing is None:
-        heights = level(surface.scale * topography.heights, levelling)
-    else:
+    missing, heights = surface._topography().missing, surface._levelled()
+    if missing is not None:
         if surface.missing == "refuse":
-            raise InputError(_holes(surface.path, missing))
-        heights = level(surface.scale * topography.heights, levelling, ~missing)
+            first = zip(("x", "y"), np.argwhere(missing)[0][::-1], strict=False)
+            raise InputError(
+                f"{surface.path}: {np.count_nonzero(missing)} of {missing.size} heights are NaN, "
+                "infinite or marked as missing, the first at "
+                f"{', '.join(f'{axis} = {index}' for axis, index in first)}; "
+                'surface.missing = "fill" fills them in, "void" keeps them out of contact'
+            )
         heights = fill_missing(heights, missing)
-    return make_periodic(heights, edges, surface.taper)
-
-
-def _holes(path: Path, missing: Mask) -> str:
-    """Message for a map whose missing heights the spec refuses."""
-    first = ", ".join(
-        f"{axis} = {index}"
-        for axis, index in zip(
-            ("x", "y"), np.unravel_index(np.argmax(missing), missing.shape)[::-1], strict=False
-        )
-    )
-    return (
-        f"{path}: {np.count_nonzero(missing)} of {missing.size} heights are NaN, infinite or "
-        f'marked as missing, the first at {first}; surface.missing = "fill" fills them in, '
-        '"void" keeps them out of contact'
-    )
+    return make_periodic(heights, surface.edges or "none", surface.taper)
 
 
 def forget_files() -> None:
     """Drop the maps that were read, so that a file that has changed is read again."""
-    for cached in (_topography, _prepared, _suited_interpolation):
+    for cached in (_read, _prepared, _suited_interpolation):
         cached.cache_clear()

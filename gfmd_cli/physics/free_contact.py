@@ -116,16 +116,12 @@ class FreeContact(Contact):
         self.set_displacement(u, gap, sigma > 0)
         return residual
 
-    def undeformed_level(self, u: Field, sigma: Field) -> float:
+    def reference_level(self, u: Field, sigma: Field) -> float:
         """Level c of the undeformed surface: <sigma u> = <sigma C sigma> + c p."""
         response = self.free.displacement(sigma, out=self.grid.empty())
         np.subtract(u, response, out=response)
         work, load = self.grid.total(np.array([np.vdot(sigma, response), sigma.sum()]))
         return float(work / load)
-
-    def reference_level(self, u: Field, sigma: Field) -> float:
-        """Level from which displacements enter the energy: that of the undeformed surface."""
-        return self.undeformed_level(u, sigma)
 
     def mirrored(self) -> Contact:
         """The periodic contact of the map mirrored to twice its sides, whose Delta_sigma is 1.

@@ -145,25 +145,28 @@ class SingleIndenter(RigidSurface):
         """Smallest number of points along y."""
         return SMALLEST_GRID if self.dimension == 2 else 1
 
-    def _x(self, grid: Grid) -> Field:
-        """Signed distance from the middle of the cell along x [m]."""
-        return (np.arange(grid.points) / grid.points + self.x_first) * self.length
+    def heights_on(self, grid: Grid) -> Field:
+        """Heights [m] at the points of a grid that this process holds."""
+        x = (np.arange(grid.points) / grid.points + self.x_first) * self.length
+        if self.dimension == 1:
+            return self.profile(np.abs(x))
+        y = (np.arange(grid.points_y) / grid.points_y + self.x_first) * grid.length_y
+        return self.profile(np.hypot(y[grid.own, None], x))
+
+    def profile(self, r: Field) -> Field:
+        """Heights [m] at distances r >= 0 from the middle of the cell [m]."""
+        raise NotImplementedError
 
 
 class RoundIndenter(SingleIndenter):
-    """A single indenter of revolution in the middle of the cell."""
+    """A single indenter of revolution in the middle of the cell, h(r)."""
 
     length_y: Positive | None = None
     """Side of the cell along y [m]; by default the points along y times the spacing along x."""
 
-    def _radius(self, grid: Grid) -> Field:
-        """Distance r from the middle of the cell [m]."""
-        y = (np.arange(grid.points_y) / grid.points_y - 0.5) * grid.length_y
-        return np.hypot(y[grid.own, None], self._x(grid))
-
 
 class LineIndenter(SingleIndenter):
-    """A single indenter of a line contact, h(x)."""
+    """A single indenter of a line contact, h(|x|)."""
 
     dimension: ClassVar[int] = 1
 
@@ -175,9 +178,9 @@ class Parabola(RoundIndenter):
     radius: Positive = 1.0
     """Radius of curvature R [m]."""
 
-    def heights_on(self, grid: Grid) -> Field:
-        """Heights [m] at the points of a grid that this process holds."""
-        return -(self._radius(grid) ** 2) / (2 * self.radius)
+    def profile(self, r: Field) -> Field:
+        """Heights [m] at distances r from the middle [m]."""
+        return -(r**2) / (2 * self.radius)
 
 
 class PowerLawIndenter(RoundIndenter):
@@ -189,9 +192,9 @@ class PowerLawIndenter(RoundIndenter):
     radius: Positive = 1.0
     """Length R [m]; the radius of curvature for m = 2."""
 
-    def heights_on(self, grid: Grid) -> Field:
-        """Heights [m] at the points of a grid that this process holds."""
-        return -self.radius * (self._radius(grid) / self.radius) ** self.exponent / self.exponent
+    def profile(self, r: Field) -> Field:
+        """Heights [m] at distances r from the middle [m]."""
+        return -self.radius * (r / self.radius) ** self.exponent / self.exponent
 
 
 class Cone(RoundIndenter):
@@ -201,9 +204,9 @@ class Cone(RoundIndenter):
     slope: Positive = 1.0
     """Slope of the flanks."""
 
-    def heights_on(self, grid: Grid) -> Field:
-        """Heights [m] at the points of a grid that this process holds."""
-        return -self.slope * self._radius(grid)
+    def profile(self, r: Field) -> Field:
+        """Heights [m] at distances r from the middle [m]."""
+        return -self.slope * r
 
 
 class Punch(RoundIndenter):
@@ -222,12 +225,10 @@ class Punch(RoundIndenter):
             raise ValueError(f"radius = {self.radius:g} leaves no rim in a cell of {side:g}")
         return self
 
-    def heights_on(self, grid: Grid) -> Field:
-        """Heights [m] at the points of a grid that this process holds."""
-        face = self._radius(grid) <= self.radius * (
-            1 + 1e-12
-        )  # including points on the rim, up to rounding
-        return np.where(face, 0.0, -self.depth)
+    def profile(self, r: Field) -> Field:
+        """Heights [m] at distances r from the middle [m]."""
+        rim = self.radius * (1 + 1e-12)  # points on the rim belong to the face, up to rounding
+        return np.where(r <= rim, 0.0, -self.depth)
 
 
 class Ridge(LineIndenter):
@@ -242,10 +243,9 @@ class Ridge(LineIndenter):
     width: Annotated[float, Key(gt=0, le=1)] = 1.0
     """Width of the ridge at its foot / L; the rest of the cell is flat."""
 
-    def heights_on(self, grid: Grid) -> Field:
-        """Heights [m] at the points of a grid that this process holds."""
-        across = np.minimum(np.abs(self._x(grid)), 0.5 * self.width * self.length)
-        return -self.slope * across
+    def profile(self, r: Field) -> Field:
+        """Heights [m] at distances r from the middle [m]."""
+        return -self.slope * np.minimum(r, 0.5 * self.width * self.length)
 
 
 class LineParabola(LineIndenter):
@@ -258,9 +258,9 @@ class LineParabola(LineIndenter):
     radius: Positive = 1.0
     """Radius of curvature R [m]."""
 
-    def heights_on(self, grid: Grid) -> Field:
-        """Heights [m] at the points of a grid that this process holds."""
-        return -(self._x(grid) ** 2) / (2 * self.radius)
+    def profile(self, r: Field) -> Field:
+        """Heights [m] at distances r from the middle [m]."""
+        return -(r**2) / (2 * self.radius)
 
 
 class Wave(LineIndenter):
@@ -274,7 +274,6 @@ class Wave(LineIndenter):
     amplitude: Positive = 1.0
     """Amplitude [m]."""
 
-    def heights_on(self, grid: Grid) -> Field:
-        """Heights [m] at the points of a grid that this process holds."""
-        phase: Field = 2 * np.pi * self._x(grid) / self.length
-        return self.amplitude * np.cos(phase)
+    def profile(self, r: Field) -> Field:
+        """Heights [m] at distances r from the middle [m]."""
+        return np.asarray(self.amplitude * np.cos(2 * np.pi * r / self.length))

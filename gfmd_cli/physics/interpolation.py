@@ -4,6 +4,7 @@ A Fourier series is exact for a map whose waves all end below the highest of its
 map it overshoots: a plateau gets ripples, and contact then takes place on the ripples.
 """
 
+from collections.abc import Callable
 from typing import Literal
 
 import numpy as np
@@ -90,10 +91,15 @@ def nearest(mask: Mask, shape: tuple[int, ...]) -> Mask:
 
 def _along_axis(heights: Field, position: Field, axis: int) -> Field:
     """Values at positions along an axis, in points, by a periodic monotone cubic."""
-    from scipy.interpolate import PchipInterpolator  # half a second that most processes save
-
     margins = [(MARGIN, MARGIN) if i == axis else (0, 0) for i in range(heights.ndim)]
     wrapped = np.pad(heights, margins, mode="wrap")
     knots = np.arange(-MARGIN, heights.shape[axis] + MARGIN, dtype=np.float64)
-    values: Field = PchipInterpolator(knots, wrapped, axis=axis)(position)
-    return values
+    return monotone_cubic(knots, wrapped, axis)(position)
+
+
+def monotone_cubic(x: Field, y: Field, axis: int = 0) -> Callable[[Field], Field]:
+    """Monotone cubic (PCHIP) through points of rising x, along an axis of y."""
+    from scipy.interpolate import PchipInterpolator  # half a second that most processes save
+
+    curve: Callable[[Field], Field] = PchipInterpolator(x, y, axis=axis)
+    return curve

@@ -6,8 +6,6 @@ Maps have shape (rows, columns), any numbers of both; line profiles have shape (
 from typing import Any, Literal
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.linalg import spsolve
 
 from gfmd_cli.grid.arrays import Field, Mask
 from gfmd_cli.physics.pictures import block_sums
@@ -142,6 +140,9 @@ def _smooth(known: Field, missing: Mask) -> Field:
 
 def _harmonic(known: Field, missing: Mask) -> Field:
     """Filling by the sparse linear system; `known` is zero where missing."""
+    from scipy.sparse import coo_array  # a tenth of a second that most processes save
+    from scipy.sparse.linalg import spsolve
+
     points = np.argwhere(missing)
     number = np.full(missing.shape, -1)
     number[missing] = diagonal = np.arange(len(points))

@@ -31,8 +31,7 @@ def picture(heights: Field, sides: tuple[float, ...], missing: Mask | None = Non
     """A picture whose pixels are means over the known heights of some points."""
     pixels = PIXELS if heights.ndim == 2 else LINE_PIXELS
     step = -(-max(heights.shape) // pixels)
-    known = np.ones(heights.shape) if missing is None else (~missing).astype(np.float64)
-    total = heights if missing is None else np.where(missing, 0.0, heights)
-    count = block_sums(known, step)
-    with np.errstate(invalid="ignore"):
-        return Picture(np.where(count > 0, block_sums(total, step) / count, np.nan), sides)
+    known = np.ones(heights.shape, bool) if missing is None else ~missing
+    count = block_sums(known.astype(np.float64), step)
+    total = block_sums(np.where(known, heights, 0.0), step)
+    return Picture(np.divide(total, count, out=np.full_like(total, np.nan), where=count > 0), sides)

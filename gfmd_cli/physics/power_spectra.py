@@ -1,4 +1,4 @@
-"""Power spectra and autocorrelations of fields, averaged over directions.
+"""Power spectra and autocorrelations of fields, averaged over directions, and their anisotropy.
 
 The shells are those of Persson theory, Mueser, "Elastic contacts of randomly rough surfaces across
 the spatial dimensions", Sect. 4.1.1: exact shells at long waves, then logarithmic bins. They
@@ -7,16 +7,16 @@ By Parseval's theorem the sum over the shells of a field is its variance.
 """
 
 from collections.abc import Mapping
+from math import inf, sqrt
 
 import numpy as np
 
-from gfmd_cli.grid.arrays import Field, row_blocks
+from gfmd_cli.grid.arrays import BLOCK, Field, row_blocks
 from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.physics.contact import radial_power
 from gfmd_cli.physics.free_contact import twice
 from gfmd_cli.physics.persson import bin_edges
-
-EXACT, BINS = 64, 500  # shells of one |q|, and logarithmic bins; as in `persson.shells`
+from gfmd_cli.physics.roughness_parameters import autocorrelation, distances
 
 
 def spectra(grid: Grid, fields: Mapping[str, Field]) -> tuple[Field, Field, dict[str, Field]]:
@@ -28,7 +28,7 @@ def spectra(grid: Grid, fields: Mapping[str, Field]) -> tuple[Field, Field, dict
     point = np.zeros(grid.shape)
     point.flat[0] = grid.size  # every wave of a single point has |f(q)| = 1
     m, count, _ = radial_power(grid, point)
-    edges = bin_edges(m.copy(), EXACT, BINS)
+    edges = bin_edges(m.copy())
 
     def binned(at: Field, values: Field) -> Field:
         return np.asarray(np.bincount(np.searchsorted(edges, at), values, edges.size + 1), float)
@@ -51,16 +51,19 @@ def autocorrelations(
     are not periodic have the mean over the pairs of points of the grid at each displacement.
     """
     step = max(grid.spacings)
-    correlated = correlation if periodic else correlation_within
     cell = grid if periodic else twice(grid)
-    distance, rings = _distance(cell, step), int(0.5 * min(grid.sides) / step * (1 + 1e-12)) + 1
+    distance = distances(cell.whole_shape, (spacing / step for spacing in cell.spacings))
+    rings = int(0.5 * min(grid.sides) / step * (1 + 1e-12)) + 1
     ring = np.rint(distance).astype(np.int64).ravel()
     count = np.bincount(ring)
 
     def mean(values: Field) -> Field:
         return np.asarray(np.bincount(ring, values.ravel())[:rings] / count[:rings])
 
-    means = {name: mean(correlated(grid, values)) for name, values in fields.items()}
+    def correlated(field: Field) -> Field:
+        return correlation(grid, field) if periodic else autocorrelation(np.ma.asarray(field))
+
+    means = {name: mean(correlated(values)) for name, values in fields.items()}
     return mean(distance) * step, means
 
 
@@ -79,26 +82,24 @@ def correlation(grid: Grid, field: Field) -> Field:
     return np.divide(products, variance if variance > 0 else np.nan, out=products)
 
 
-def correlation_within(grid: Grid, field: Field) -> Field:
-    """C(r) / C(0) of a field that is not periodic, from the pairs of points at a displacement r.
+def anisotropy(grid: Grid, height: Field) -> float:
+    """Ratio of the rms slopes along the principal axes: 1 if isotropic, infinite for a line.
 
-    The shape is twice that of the grid; displacements without pairs have zero. The products are
-    those of the field padded with zeros, and of N points along an axis N - |d| pairs are d apart.
+    From the eigenvalues of the tensor <grad h grad h>, summed over the waves of the surface. The
+    cost is one transform.
     """
-    padded = np.zeros([2 * points for points in grid.shape])
-    padded[tuple(map(slice, grid.shape))] = field - field.mean()
-    products = correlation(twice(grid), padded)
-    for axis, points in enumerate(grid.shape):
-        pairs = np.abs(points - np.arange(2.0 * points)) / points
-        pairs[points] = 1.0  # without pairs: the products are rounding
-        products /= pairs[:, None] if axis < products.ndim - 1 else pairs
-    return products
-
-
-def _distance(grid: Grid, step: float) -> Field:
-    """Distance of every point from the nearest periodic image of the first [`step`]."""
-    square = np.zeros(())
-    for points, spacing in zip(grid.whole_shape, grid.spacings, strict=True):
-        along = np.minimum(np.arange(points), points - np.arange(points)) * (spacing / step)
-        square = np.add.outer(square, along**2)
-    return np.sqrt(square)
+    if grid.dimension == 1:
+        return inf
+    modes = grid.forward_into_work(height)
+    x = np.arange(*grid.span, dtype=np.float64)
+    weight = grid.multiplicity()
+    sums = np.zeros(3)
+    for rows in row_blocks(modes, max(modes.size // 16, BLOCK)):
+        y = grid.mode_number_y(rows)[:, None]
+        power = weight * np.abs(modes[rows]) ** 2
+        # the waves with the highest q_y of an even number of points have both signs of q_y
+        mixed = np.where(np.abs(y) * grid.length_y < 0.5 * grid.points_y * grid.length, x * y, 0.0)
+        sums += [float(np.sum(power * term)) for term in (x * x, y * y, mixed)]
+    xx, yy, xy = grid.total(sums)
+    middle, half = 0.5 * (xx + yy), sqrt((0.5 * (xx - yy)) ** 2 + xy**2)
+    return sqrt((middle + half) / (middle - half)) if middle - half > 1e-12 * middle else inf

@@ -5,6 +5,7 @@ triangles between neighbouring points: each square of four known points is divid
 diagonals, so that no direction is preferred.
 """
 
+from collections.abc import Iterable
 from itertools import product
 from math import inf
 from typing import Any
@@ -84,13 +85,18 @@ def _correlation_length(
 ) -> float | None:
     """Shortest distance at which the autocorrelation is at most `LEVEL`, right to one point."""
     correlation = autocorrelation(heights)
-    squared: Any = 0.0
-    for axis, (points, step) in enumerate(zip(correlation.shape, spacing, strict=True)):
-        shift = np.fft.fftfreq(points, 1 / points) * step
-        along = [-1 if i == axis else 1 for i in range(correlation.ndim)]
-        squared = squared + shift.reshape(along) ** 2
+    distance = distances(correlation.shape, spacing)
     low = correlation <= LEVEL  # false where unknown
-    return float(np.sqrt(np.min(squared, initial=inf, where=low))) if low.any() else None
+    return float(np.min(distance, initial=inf, where=low)) if low.any() else None
+
+
+def distances(shape: tuple[int, ...], spacing: Iterable[float]) -> Field:
+    """Length of every shift of a periodic array, in the unit of the spacing, as in an FFT."""
+    square = np.zeros(())
+    for points, step in zip(shape, spacing, strict=True):
+        shift = np.minimum(np.arange(points), points - np.arange(points)) * step
+        square = np.add.outer(square, shift**2)
+    return np.sqrt(square)
 
 
 def autocorrelation(heights: "np.ma.MaskedArray[Any, Any]") -> Field:

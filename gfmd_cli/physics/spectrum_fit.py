@@ -170,15 +170,10 @@ def _errors(q: Field, count: Field, power: Field, best: Field) -> tuple[list[flo
     def misfit(shift: Field) -> float:
         return _misfit(best + shift, q, count, power)
 
-    curvature = np.array(
-        [
-            [
-                (misfit(a + b) - misfit(a - b) - misfit(b - a) + misfit(-a - b)) / (4 * STEP**2)
-                for b in steps
-            ]
-            for a in steps
-        ]
-    )
+    def second(a: Field, b: Field) -> float:
+        return (misfit(a + b) - misfit(a - b) - misfit(b - a) + misfit(-a - b)) / (4 * STEP**2)
+
+    curvature = np.array([[second(a, b) for b in steps] for a in steps])
     ratio = power / (_scale(best, q, count, power) * _shape(q, best, q[0]))
     # of q and -q only one is free: m / 2 samples per shell
     deviance = float(np.sum(count * (ratio - 1 - np.log(ratio)))) / (q.size - best.size - 1)
@@ -211,8 +206,5 @@ def _cut_off(shells: Shells, count: Field, best: Field) -> int:
     q, power = shells.q, count * _shape(shells.q, best, shells.q[0])
     ratio = np.sqrt(np.cumsum(q**2 * power) / np.cumsum(power))
     measured = moments(shells)
-    return int(
-        np.clip(
-            np.searchsorted(ratio, measured.gradient / measured.height * ROUNDING) + 1, 1, q.size
-        )
-    )
+    reached = np.searchsorted(ratio, measured.gradient / measured.height * ROUNDING) + 1
+    return int(np.clip(reached, 1, q.size))

@@ -19,9 +19,8 @@ SAMPLE_BYTES = 2**16  # at the end of each window; a choice
 MIN_DIGITS = 0.2  # share of the characters of a table; a choice, as heights are mostly digits
 GRID_LINES = 20_000  # whose positions are compared; a choice
 MATRIX_COLUMNS = 4  # fewer are positions: the rule of SurfaceTopography
-END, BLANK, NUMBER, WORD = range(4)
-"""Kinds of characters."""
-NUMBERS = b"+-.,;0123456789eEdDinfaINFA"
+NUMBERS = b" \t+-.,;0123456789eEdDinfaINFA"
+"""Characters of lines without words."""
 
 
 def table_formats(file: BinaryIO) -> set[str]:
@@ -44,14 +43,14 @@ def _columns(file: BinaryIO, separators: bytes) -> int:
 
     Lines with words, which are headers, are left out, and so is a last line that is cut short.
     """
-    kinds = _kinds(separators)
+    blanks = bytes.maketrans(separators, b" " * len(separators))
     columns = 0
     for position, lines in _windows(file):
         sample = lines[len(lines) // 2 :][-SAMPLE_BYTES:]
         digits = sum(sample.count(b"%d" % digit) for digit in range(10))
         if b"\0" in lines or digits < MIN_DIGITS * len(sample):
             return 0
-        counts = _counts(lines, kinds)
+        counts = _counts(lines.translate(blanks))
         if not columns:
             columns = int(counts[counts > 0][-1]) if counts.any() else 0
         if position == 0:
@@ -69,7 +68,7 @@ def _windows(file: BinaryIO) -> Iterator[tuple[int, bytes]]:
     while position < size:
         file.seek(position)
         window = file.read(WINDOW)
-        begin = _first_end(window) if position and gap else 0
+        begin = len(re.split(rb"[\r\n]", window, maxsplit=1)[0]) + 1 if position and gap else 0
         end = max(window.rfind(b"\n"), window.rfind(b"\r")) + 1
         if end <= begin and position + len(window) < size:
             yield position, b"\0"
@@ -79,32 +78,11 @@ def _windows(file: BinaryIO) -> Iterator[tuple[int, bytes]]:
         position += (end or len(window)) + gap
 
 
-def _first_end(window: bytes) -> int:
-    """Where the second line begins."""
-    match = re.search(rb"[\r\n]", window)
-    return match.end() if match else len(window)
-
-
-def _kinds(separators: bytes) -> bytes:
-    """The kind of each character, for `bytes.translate`."""
-    kinds = bytearray([WORD]) * 256
-    for characters, kind in ((NUMBERS, NUMBER), (separators, BLANK), (b"\r\n", END)):
-        for character in characters:
-            kinds[character] = kind
-    return bytes(kinds)
-
-
-def _counts(lines: bytes, kinds: bytes) -> np.ndarray[Any, np.dtype[np.int64]]:
-    """Numbers in each line, 0 where there are words."""
-    kind = np.frombuffer(lines.translate(kinds), np.uint8)
-    inside = kind >= NUMBER
-    begins = inside.copy()
-    begins[1:] &= ~inside[:-1]
-    ends = kind == END
-    starts = np.concatenate([[0], np.flatnonzero(ends[:-1]) + 1])
-    counts = np.add.reduceat(begins, starts, dtype=np.int64)
-    counts[np.logical_or.reduceat(kind == WORD, starts)] = 0
-    return counts
+def _counts(lines: bytes) -> np.ndarray[Any, np.dtype[np.int64]]:
+    """Numbers between blanks in each line, 0 where there are words."""
+    return np.array(
+        [0 if line.translate(None, NUMBERS) else len(line.split()) for line in lines.splitlines()]
+    )
 
 
 def _is_grid(file: BinaryIO) -> bool:

@@ -1,9 +1,11 @@
 """Measured surfaces: a height map or a line profile from a file, with every height checked.
 
-Array index [i, j] is [y, x].
+The files are not trusted: their size, type and layout are checked before any height is read. Array
+index [i, j] is [y, x].
 """
 
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -14,9 +16,17 @@ from pydantic import Strict, model_validator
 from gfmd_cli.choice import Choice
 from gfmd_cli.errors import InputError
 from gfmd_cli.grid.arrays import Field, Mask
-from gfmd_cli.physics.height_map import SMALLEST_MAP, HeightMap
-from gfmd_cli.physics.map_files import MAX_BYTES, read_map
+from gfmd_cli.physics.height_map import (
+    REMEDY,
+    SMALLEST_MAP,
+    HeightMap,
+    first_line,
+    read_hdf5,
+    read_npy,
+)
+from gfmd_cli.physics.microscope_files import read_microscope_file
 
+MAX_BYTES = 2**33  # 32768 x 32768 heights in double precision
 MAX_HEIGHT = 1e30  # in any unit; the usual values for no data are 9.97e36 (netCDF) and 3.4e38
 SPACING_TOLERANCE = 1e-6  # relative: files store sides in single precision or with six digits
 AXES = ("y", "x")
@@ -78,7 +88,7 @@ class Topography:
 
     heights: Field
     """Heights, shape (rows, columns) or (points,), zero where missing; in metres where the file
-    states its unit, else in the file's unit."""
+    states its unit, else in the file's unit. Read-only."""
     missing: Mask | None
     """Mask of the missing heights; None where there is none."""
     spacing: tuple[float, ...] | None
@@ -106,8 +116,13 @@ def read_topography(
     *,
     region: Region | None = None,
     flip: bool = False,
+    crop: bool = False,
 ) -> Topography:
     """Read a height map or a line profile from a .npy, HDF5, netCDF or microscope file.
+
+    `.npy` and HDF5 arrays (netCDF 4 is HDF5) are taken as they are, indexed [y, x], without unit.
+    SurfaceTopography reads all other formats; its height channel [x, y] is transposed to [y, x]
+    and converted to metres.
 
     Parameters
     ----------
@@ -117,16 +132,47 @@ def read_topography(
     max_bytes : size of the largest map that is read, counted in double precision
     region : the part of the map to read
     flip : change the sign of the heights
+    crop : of a map, use the largest square of an even number of points in the middle
 
     Raises InputError, which states the file, its content, and what is needed.
     """
+    if not path.exists():
+        raise InputError(f"{path}: no such file")
+    if not path.is_file():
+        kind = "a directory" if path.is_dir() else "not a regular file"
+        raise InputError(f"{path}: {kind}; a height map file is needed")
+    if path.stat().st_size == 0:
+        raise InputError(f"{path}: the file is empty")
     try:
-        return _checked(path, read_map(path, dataset, max_bytes), region, flip)
+        return _checked(path, _reader(path)(path, dataset, max_bytes), region, flip, crop)
+    except InputError:
+        raise
     except MemoryError as error:
         raise InputError(f"{path}: too large for the memory that is available") from error
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error}") from error
+    except Exception as error:  # the reader of a damaged file can raise any exception
+        raise InputError(
+            f"{path}: cannot be read ({first_line(error)}): damaged, or no height map? {REMEDY}"
+        ) from error
 
 
-def _checked(path: Path, data: HeightMap, region: Region | None, flip: bool) -> Topography:
+def _reader(path: Path) -> Callable[[Path, str | None, int], HeightMap]:
+    """The function that reads a file, by its suffix or its first bytes."""
+    with path.open("rb") as file:
+        signature = file.read(len(np.lib.format.MAGIC_PREFIX))
+    if path.suffix.lower() == ".npy" or signature == np.lib.format.MAGIC_PREFIX:
+        return read_npy
+    import h5py
+
+    if path.suffix.lower() in (".h5", ".hdf5") or h5py.is_hdf5(path):
+        return read_hdf5
+    return read_microscope_file
+
+
+def _checked(
+    path: Path, data: HeightMap, region: Region | None, flip: bool, crop: bool
+) -> Topography:
     """The chosen part of a map, with every height checked. Raises InputError."""
     shape = tuple(map(int, data.heights.shape))
     spacing = _spacing(path, data, shape)
@@ -136,6 +182,10 @@ def _checked(path: Path, data: HeightMap, region: Region | None, flip: bool) -> 
             part = part[region.slices(shape, spacing if data.metres else None)]
         except ValueError as error:
             raise InputError(f"{path}: surface.region: {error}") from error
+    if crop and part.ndim == 2:
+        side = min(part.shape) // 2 * 2
+        rows, columns = ((points - side) // 2 for points in part.shape)
+        part = part[rows : rows + side, columns : columns + side]
     heights = np.ma.filled(np.ma.asarray(part).astype(np.float64), np.nan)
     missing: Mask = ~(np.abs(heights) < MAX_HEIGHT)
     if missing.all():
@@ -143,6 +193,7 @@ def _checked(path: Path, data: HeightMap, region: Region | None, flip: bool) -> 
             f"{path}: all of the {missing.size} heights are NaN, infinite or marked as missing"
         )
     heights = np.ascontiguousarray(np.where(missing, 0.0, -heights if flip else heights))
+    heights.flags.writeable = False
     return Topography(
         heights,
         missing if missing.any() else None,
@@ -152,16 +203,6 @@ def _checked(path: Path, data: HeightMap, region: Region | None, flip: bool) -> 
         data.source,
         shape,
     )
-
-
-def square_part(topography: Topography) -> Topography:
-    """The largest square of an even number of points in the middle of a map."""
-    heights, missing = topography.heights, topography.missing
-    side = min(heights.shape) // 2 * 2
-    rows, columns = ((size - side) // 2 for size in heights.shape)
-    middle = slice(rows, rows + side), slice(columns, columns + side)
-    part = None if missing is None or not missing[middle].any() else missing[middle]
-    return replace(topography, heights=np.ascontiguousarray(heights[middle]), missing=part)
 
 
 def _spacing(path: Path, data: HeightMap, shape: tuple[int, ...]) -> tuple[float, ...] | None:

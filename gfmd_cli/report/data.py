@@ -1,7 +1,7 @@
 """The data of a page: a study compared with theory, and a bench where one is given."""
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -15,7 +15,7 @@ from gfmd_cli.analysis.table import Column
 from gfmd_cli.analysis.tables import TitledCurves, curve_title
 from gfmd_cli.analysis.units import in_si, shown
 from gfmd_cli.bench.file import Trace
-from gfmd_cli.report.section import Section
+from gfmd_cli.status import Status
 from gfmd_cli.study.reading import open_study, solved_rows
 
 
@@ -54,6 +54,16 @@ class ReportData:
         return solved_rows(self.rows)
 
     @property
+    def failed(self) -> list[Row]:
+        """The rows whose contact is solved, but not to its tolerance."""
+        return [row for row in self.solved if row["status"] != Status.CONVERGED]
+
+    @property
+    def missing(self) -> list[str]:
+        """The tasks that are not solved yet."""
+        return [str(row["task"]) for row in self.rows if row["status"] == Status.MISSING]
+
+    @property
     def name(self) -> str:
         """Name of the study; of two studies, which may share it, that of the file."""
         return self.comparison.path.name if self.letter else self.attributes.get("title", "study")
@@ -84,10 +94,6 @@ class ReportData:
         except (ValueError, RecursionError):
             return {}
         return data if isinstance(data, dict) else {}
-
-
-SectionOf = Callable[[ReportData], Section | None]
-"""Makes a section, or none where the study has no data for it."""
 
 
 def read_report_data(study: Path, letter: str = "") -> ReportData:

@@ -5,8 +5,7 @@ from collections.abc import Iterable
 from html import escape
 from typing import Any
 
-from gfmd_cli.analysis.layers import Layer
-from gfmd_cli.analysis.plotting import BAND, ColumnFigure
+from gfmd_cli.analysis.plotting import BAND, ColumnFigure, Layer
 from gfmd_cli.analysis.table import known, plus_minus
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.report.labels import html_label, plain_label
@@ -93,17 +92,12 @@ def _points(layer: Layer, names: tuple[str, str]) -> dict[str, Any]:
 
 def _hover(layer: Layer, place: int, names: tuple[str, str], errors: Errors) -> str:
     """What a point says when it is pointed at: curve, values, and what else is known of it."""
-    details = clean(layer.details[place]).split("\n") if layer.details else []
-    lines = [_name(layer.names[0]), *_values(layer, place, names, errors), *details]
-    return "<br>".join(escape(line, quote=False) for line in lines)
-
-
-def _values(layer: Layer, place: int, names: tuple[str, str], errors: Errors) -> list[str]:
-    """Both values of a point, with the error."""
     x, y = float(layer.x[place]), float(layer.y[place])
     error = math.nan if errors is None else float(max(side[place] for side in errors))
     shown = plus_minus(y, error).replace("+-", "±") if known(error) else f"{y:.4g}"
-    return [f"{names[0]}: {x:.4g}", f"{names[1]}: {shown}"]
+    details = clean(layer.details[place]).split("\n") if layer.details else []
+    lines = [_name(layer.names[0]), f"{names[0]}: {x:.4g}", f"{names[1]}: {shown}", *details]
+    return "<br>".join(escape(line, quote=False) for line in lines)
 
 
 def _axis(title: str, scale: str, limits: tuple[float, float]) -> dict[str, Any]:

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from gfmd_cli.analysis.compare import Row
-from gfmd_cli.analysis.plotting import WIDTH, ColumnFigure, shades
+from gfmd_cli.analysis.plotting import WIDTH, ColumnFigure, LegendFigure, shades
 from gfmd_cli.analysis.selection import evenly, grouped
 from gfmd_cli.analysis.table import Column, Group, Table
 from gfmd_cli.analysis.tables import AREA, P_STAR, POINTS, PRESSURE
@@ -15,8 +15,15 @@ from gfmd_cli.grid.arrays import Field, Mask
 from gfmd_cli.physics.observables import contact_points
 from gfmd_cli.physics.pictures import block_sums
 from gfmd_cli.report.data import ReportData
-from gfmd_cli.report.profiles import plane, profile_figure, read_profile
-from gfmd_cli.report.scales import HEIGHT_SCALE, LENGTH_SCALE, STRESS_SCALE, Scale
+from gfmd_cli.report.profiles import (
+    HEIGHT_SCALE,
+    LENGTH_SCALE,
+    STRESS_SCALE,
+    Scale,
+    plane,
+    profile_figure,
+    read_profile,
+)
 from gfmd_cli.report.section import Section
 from gfmd_cli.report.svg import drawing
 from gfmd_cli.study.reading import StudyFile, open_study
@@ -67,7 +74,7 @@ def maps(data: ReportData) -> Section:
     return Section(
         "Maps and cross-sections",
         notes=notes,
-        tables={"Table: the contacts shown": table},
+        disclosed={"Table: the contacts shown": table},
         template="maps.html",
         content=series,
     )
@@ -84,20 +91,19 @@ def _chosen(stored: list[Row]) -> list[list[Row]]:
 def _contact_maps(study: StudyFile, row: Row, prefix: str) -> dict[str, Any]:
     """Title, maps and cross-section of one contact."""
     task = row["task"]
-    drawings = [
-        drawing(plot, f"{prefix}{name}-{task}", f"{what}, task {task}", f"{what}.")
-        for name, plot, what in _map_figures(study, row)
-    ]
+    figures: list[tuple[str, LegendFigure, str]] = [*_map_figures(study, row)]
     profile = read_profile(study, row)
     if profile is not None:
         line = f"along {profile.along}{profile.place}"
         what = f"Cross-section {line}: heights above, stress below"
-        plot = profile_figure(profile)
-        drawings.append(
-            drawing(plot, f"{prefix}section-{task}", f"{what}, task {task}", f"{what}.")
-        )
-    title = f"{pressure_text(row)}, a_r = {row['a_r']:.3g}"
-    return {"title": title, "drawings": drawings}
+        figures.append(("section", profile_figure(profile), what))
+    return {
+        "title": f"{pressure_text(row)}, a_r = {row['a_r']:.3g}",
+        "drawings": [
+            drawing(figure, f"{prefix}{name}-{task}", f"{what}, task {task}", f"{what}.")
+            for name, figure, what in figures
+        ],
+    }
 
 
 def _map_figures(study: StudyFile, row: Row) -> list[tuple[str, ColumnFigure, str]]:
@@ -140,9 +146,7 @@ def _means(block: Field, step: int) -> Field:
 def _contact_figure(touching: Field, row: Row) -> ColumnFigure:
     plot, extent = _cell(row)
     colour = np.array(list(bytes.fromhex(TOUCHING[1:]))) / 255
-    image = np.concatenate(
-        [np.broadcast_to(colour, (*touching.shape, 3)), touching[..., None]], axis=2
-    )
+    image = np.dstack([np.broadcast_to(colour, (*touching.shape, 3)), touching])
     plot.axes.imshow(image, origin="lower", extent=extent, interpolation="none")
     return plot
 

@@ -1,6 +1,6 @@
 """The page: one HTML file that needs nothing else."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -8,29 +8,26 @@ from urllib.parse import quote
 from gfmd_cli.analysis.export import csv_text
 from gfmd_cli.analysis.plotting import styled
 from gfmd_cli.bench.file import Trace, read_bench
-from gfmd_cli.report.data import ReportData, SectionOf, read_report_data, side_by_side
-from gfmd_cli.report.difference import difference
-from gfmd_cli.report.maps import maps
-from gfmd_cli.report.measured_surface import measured_surface
-from gfmd_cli.report.provenance import provenance
-from gfmd_cli.report.quantities import (
+from gfmd_cli.report.data import ReportData, read_report_data, side_by_side
+from gfmd_cli.report.facts import difference, failures, provenance
+from gfmd_cli.report.figures import (
     contact_area,
     error_bars,
     mean_gap,
     optional_observables,
     stress_deviation,
+    stress_distribution,
+    work_precision,
 )
-from gfmd_cli.report.rendering import render
-from gfmd_cli.report.scripts import policy, scripts
+from gfmd_cli.report.maps import maps
+from gfmd_cli.report.rendering import policy, render, scripts
 from gfmd_cli.report.section import Section
-from gfmd_cli.report.stress_distribution import stress_distribution
-from gfmd_cli.report.summary import failures, headline, key_numbers, verdict, warnings
-from gfmd_cli.report.surface import surface_spectrum
+from gfmd_cli.report.summary import headline, key_numbers, success, warnings
+from gfmd_cli.report.surface import measured_surface, surface_spectrum
 from gfmd_cli.report.theme import variables
-from gfmd_cli.report.work_precision import work_precision
 
 OWN, SHARED = True, False
-SECTIONS: tuple[tuple[SectionOf, bool], ...] = (
+SECTIONS: tuple[tuple[Callable[[ReportData], Section], bool], ...] = (
     (failures, OWN),
     (measured_surface, OWN),
     (contact_area, SHARED),
@@ -45,8 +42,6 @@ SECTIONS: tuple[tuple[SectionOf, bool], ...] = (
     (provenance, OWN),
 )
 """In the order of the page; of two studies each has its own, or both share it."""
-
-
 MAX_CSV = 1_000_000  # bytes of the table of a study in its page; a larger one is for gfmd export
 UNQUOTED = " ,;:()*/=@+"
 
@@ -82,7 +77,7 @@ def _top(data: ReportData) -> dict[str, Any]:
         "title": data.title,
         "headline": headline(data),
         "warnings": warnings(data),
-        "verdict": verdict(data),
+        "success": success(data),
         "key_numbers": key_numbers(data),
         "csv_name": f"{data.comparison.path.stem}.csv",
         "csv_address": _csv_address(data),
@@ -103,5 +98,5 @@ def _sections(studies: list[ReportData], traces: list[Trace]) -> Iterator[Sectio
     for make, own in SECTIONS:
         for data in studies if own else [shared]:
             section = make(data)
-            if section is not None:
+            if not section.is_blank:
                 yield section.of(data.letter)

@@ -1,16 +1,19 @@
-"""Cross-sections: heights of indenter and elastomer, and the stress."""
+"""Cross-sections: heights of indenter and elastomer, and the stress.
+
+Their axes, and those of maps, are in SI units where these mean something, else reduced.
+"""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from gfmd_cli.analysis.compare import Row
 from gfmd_cli.analysis.plotting import HEIGHT, WIDTH, LegendFigure
-from gfmd_cli.analysis.units import largest
+from gfmd_cli.analysis.units import in_si, largest
 from gfmd_cli.grid.arrays import Field
-from gfmd_cli.report.scales import HEIGHT_SCALE, LENGTH_SCALE, STRESS_SCALE
 from gfmd_cli.study.reading import StudyFile
+from gfmd_cli.units import scaled
 
 LINES = {
     "height": ("indenter h", {"color": "black", "lw": 1.2}),
@@ -18,6 +21,27 @@ LINES = {
 }
 STRESS = "#cc3311"
 ROWS = 256  # of the fields that are held at a time
+
+
+class Scale(NamedTuple):
+    """Units of a quantity on axes."""
+
+    si: str
+    column: str
+    """Column of a row that holds the reduced unit."""
+    symbol: str
+
+    def axis(self, row: Row, most: float, label: str) -> tuple[float, str]:
+        """A divisor for values up to `most`, and the label with the unit that this gives."""
+        if in_si(row):
+            divisor, unit = scaled(most, self.si)
+            return divisor, f"{label} ({unit})"
+        return float(row[self.column]), f"{label} / {self.symbol}"
+
+
+LENGTH_SCALE = Scale("m", "length", "L")
+HEIGHT_SCALE = Scale("m", "h_std", r"$h_\mathrm{std}$")
+STRESS_SCALE = Scale("Pa", "delta_sigma", r"$\Delta\sigma$")
 
 
 @dataclass(frozen=True)

@@ -1,12 +1,20 @@
-"""HTML from the templates: every value is escaped unless it is markup already."""
+"""HTML from the templates: every value is escaped unless it is markup already.
 
+The page runs its own scripts and no others.
+"""
+
+import base64
+import hashlib
 import re
 from functools import cache
+from importlib.resources import files
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
+SCRIPTS = ("plotly-basic.min.js", "report.js")
+"""Files of gfmd_cli/report/assets, in the order in which they run."""
 CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\ufffe\uffff]")
 """Characters that neither HTML nor XML may contain, and carriage returns."""
 SYMBOLS = {
@@ -75,3 +83,26 @@ def environment() -> Environment:
 def render(template: str, **values: Any) -> Markup:
     """A template filled in."""
     return Markup(environment().get_template(template).render(**values))
+
+
+@cache
+def scripts() -> tuple[Markup, ...]:
+    """The text of each script."""
+    folder = files("gfmd_cli.report") / "assets"
+    return tuple(Markup((folder / name).read_text("utf-8")) for name in SCRIPTS)
+
+
+@cache
+def policy() -> str:
+    """Content security policy: nothing is fetched, and no script runs but these.
+
+    Scripts are named by their hashes, so that none that a study contains can run.
+    """
+    hashes = " ".join(f"'sha256-{_digest(text)}'" for text in scripts())
+    return (
+        f"default-src 'none'; script-src {hashes}; style-src 'unsafe-inline'; img-src data: blob:"
+    )
+
+
+def _digest(text: str) -> str:
+    return base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()

@@ -24,22 +24,31 @@ class Drawing(NamedTuple):
 
 @dataclass(frozen=True)
 class Section:
-    """A part of the page under a heading."""
+    """A part of the page under a heading; tables without records are left out."""
 
     title: str
     notes: Sequence[str] = ()
     """Paragraphs above the figures."""
+    tables: Sequence[Table] = ()
+    """Tables that are always visible."""
     drawings: Sequence[Drawing] = ()
-    tables: Mapping[str, Table] = field(default_factory=dict)
-    """By the summary of the disclosure that holds the table; an empty one: always visible."""
+    disclosed: Mapping[str, Table] = field(default_factory=dict)
+    """Tables by the summary of the disclosure that holds them."""
     template: str = "section.html"
     content: Any = None
-    """What the template needs besides."""
+    """What the template needs besides; None where it needs nothing."""
 
     @property
     def anchor(self) -> str:
         """Its identifier in the page."""
         return self.title.lower().replace(" ", "-")
+
+    @property
+    def is_blank(self) -> bool:
+        """Whether the study has no data for it."""
+        tables = [*self.tables, *self.disclosed.values()]
+        has_records = any(table.records for table in tables)
+        return not (self.drawings or has_records or self.content is not None)
 
     def of(self, letter: str) -> "Section":
         """The same, of one of two studies."""

@@ -1,19 +1,15 @@
-"""The top of the page: what was run, whether it converged, the key numbers; what failed."""
+"""The top of the page: what was run, whether it converged, the key numbers."""
 
 import math
 from collections import Counter
 from typing import NamedTuple
 
 from gfmd_cli.analysis.compare import Row, best, in_continuum
-from gfmd_cli.analysis.grid_size import grid_size
 from gfmd_cli.analysis.run_summary import edge_warnings
-from gfmd_cli.analysis.table import Column, Group, Record, Table
-from gfmd_cli.analysis.tables import P_STAR, RESIDUAL, STATUS, warnings_in
-from gfmd_cli.analysis.units import count, listed, pretty, quantity, span
+from gfmd_cli.analysis.tables import warnings_in
+from gfmd_cli.analysis.units import count, grid_size, listed, pretty, quantity, span
 from gfmd_cli.physics.observables import QUANTITIES
 from gfmd_cli.report.data import ReportData
-from gfmd_cli.report.section import Section
-from gfmd_cli.status import Status
 from gfmd_cli.units import duration
 
 NEARLY_FULL = 0.5  # p*; above, the gap falls by decades, and a ratio of gaps tells little
@@ -25,26 +21,6 @@ UNRESOLVED = {
     "unknown": "has no error bar: the grids are too coarse for one",
 }
 """Verdicts on a quantity that leave it without an error bar."""
-CONVERGED = "The contact converged."
-MAX_ROWS = 100  # contacts that the table of failures lists
-UNCONVERGED = (
-    Column("task", "task", "d"),
-    Column("body", "elastomer"),
-    Column("surface", "surface"),
-    P_STAR,
-    STATUS,
-    RESIDUAL,
-    Column("tolerance", "tolerance", ".1e"),
-    Column("steps", "steps", "d"),
-    Column("reason", lambda row: _reason(row)),
-)
-
-
-class Verdict(NamedTuple):
-    """Whether all contacts are solved, in words."""
-
-    good: bool
-    text: str
 
 
 class KeyNumber(NamedTuple):
@@ -77,18 +53,12 @@ def _some(names: list[str], what: str) -> str:
     return count(len(names), what) + (f" ({listed(names)})" if len(names) <= MAX_NAMES else "")
 
 
-def verdict(data: ReportData) -> Verdict:
-    """Whether every contact is solved to its tolerance."""
-    total, missing = len(data.rows), len(_missing(data))
-    failed = sum(row["status"] != Status.CONVERGED for row in data.solved)
-    parts = []
-    if failed:
-        parts.append(f"{failed} of {total} contacts did not reach their tolerance")
-    if missing:
-        parts.append(f"{missing} of {total} are not solved yet")
-    if parts:
-        return Verdict(False, "; ".join(parts) + ".")
-    return Verdict(True, f"All {total} contacts converged." if total > 1 else CONVERGED)
+def success(data: ReportData) -> str:
+    """That every contact is solved to its tolerance; empty where some is not."""
+    if data.failed or data.missing:
+        return ""
+    total = len(data.rows)
+    return f"All {total} contacts converged." if total > 1 else "The contact converged."
 
 
 def key_numbers(data: ReportData) -> list[KeyNumber]:
@@ -110,58 +80,54 @@ def key_numbers(data: ReportData) -> list[KeyNumber]:
 def _quantities(data: ReportData) -> list[KeyNumber]:
     """Pressure, area, gap and stress; in SI units with the scales behind them, or reduced."""
     rows = data.solved
-    p_star, full = span(_column(rows, "p_star")), span(_column(rows, "delta_sigma"), "Pa")
-    gap, deviation = (span(_best(rows, name)) for name in ("u_g", "sigma_p"))
-    gap_where, deviation_where = (_where(rows, name) for name in ("u_g", "sigma_p"))
+    p_star = span(_column(rows, "p_star"))
     note = f"a_r, share of the nominal area{_where(rows, 'a_r')}"
-    area = KeyNumber("Contact area", span(_best(rows, "a_r")), note)
+    quantities = [
+        KeyNumber("Pressure", p_star, "p*, in units of Delta_sigma"),
+        KeyNumber("Contact area", span(_best(rows, "a_r")), note),
+        _scaled(data, "Mean gap", "u_g / h_std", "m"),
+        _scaled(data, "Stress deviation", "sigma_p / Delta_sigma", "Pa"),
+    ]
     if not data.in_si:
-        return [
-            KeyNumber("Pressure", p_star, "p*, in units of Delta_sigma"),
-            area,
-            KeyNumber("Mean gap", gap, f"u_g / h_std{gap_where}"),
-            KeyNumber("Stress deviation", deviation, f"sigma_p / Delta_sigma{deviation_where}"),
-        ]
+        return quantities
+    full, height, side = (
+        span(_column(rows, name), unit)
+        for name, unit in (("delta_sigma", "Pa"), ("h_std", "m"), ("length", "m"))
+    )
     return [
         KeyNumber("Pressure", span(_column(rows, "pressure"), "Pa"), f"p* = {p_star}"),
-        area,
-        KeyNumber(
-            "Mean gap", span(_best(rows, "u_g", "h_std"), "m"), f"u_g / h_std = {gap}{gap_where}"
-        ),
-        KeyNumber(
-            "Stress deviation",
-            span(_best(rows, "sigma_p", "delta_sigma"), "Pa"),
-            f"sigma_p / Delta_sigma = {deviation}{deviation_where}",
-        ),
+        *quantities[1:],
         KeyNumber("Stress in full contact", full, "rms Delta_sigma"),
-        KeyNumber(
-            "Roughness",
-            span(_column(rows, "h_std"), "m"),
-            f"rms height h_std, side {span(_column(rows, 'length'), 'm')}",
-        ),
+        KeyNumber("Roughness", height, f"rms height h_std, side {side}"),
     ]
+
+
+def _scaled(data: ReportData, title: str, symbol: str, unit: str) -> KeyNumber:
+    """A quantity that rows hold over their scale, as its symbol says; the scale is in `unit`."""
+    name, scale = symbol.lower().split(" / ")
+    reduced, where = _best(data.solved, name), _where(data.solved, name)
+    if not data.in_si:
+        return KeyNumber(title, span(reduced), f"{symbol}{where}")
+    scales = _column(data.solved, scale)
+    values = [value * scale for value, scale in zip(reduced, scales, strict=True)]
+    return KeyNumber(title, span(values, unit), f"{symbol} = {span(reduced)}{where}")
 
 
 def _theory_numbers(data: ReportData) -> list[KeyNumber]:
     """Simulation over theory, where the theory applies."""
     if not data.comparison.has_theory:
         return []
-    rows = data.solved
+    area, gap = (_where(data.solved, name) for name in ("a_r", "u_g"))
+    up_to = f"u_g up to p* = {NEARLY_FULL}{gap}"
     return [
-        KeyNumber(
-            "Area / Persson theory", _ratios(data, "a_r", math.inf), f"a_r{_where(rows, 'a_r')}"
-        ),
-        KeyNumber(
-            "Gap / Persson theory",
-            _ratios(data, "u_g", NEARLY_FULL),
-            f"u_g up to p* = {NEARLY_FULL}{_where(rows, 'u_g')}",
-        ),
+        KeyNumber("Area / Persson theory", _ratios(data, "a_r", math.inf), f"a_r{area}"),
+        KeyNumber("Gap / Persson theory", _ratios(data, "u_g", NEARLY_FULL), up_to),
     ]
 
 
-def _best(rows: list[Row], name: str, unit: str = "") -> list[float]:
-    """A quantity in the continuum where that is known, in its unit or times that column."""
-    return [best(row, name)[0] * (row[unit] if unit else 1.0) for row in rows]
+def _best(rows: list[Row], name: str) -> list[float]:
+    """A quantity in the continuum where that is known, else on the grid."""
+    return [best(row, name)[0] for row in rows]
 
 
 def _where(rows: list[Row], name: str) -> str:
@@ -198,9 +164,19 @@ def _column(rows: list[Row], name: str) -> list[float]:
 
 def warnings(data: ReportData) -> list[str]:
     """What stands before any result: what failed, is doubtful or not resolved, the edges."""
-    told = verdict(data)
-    failed = [] if told.good else [told.text]
-    return [*failed, *warnings_in(data.solved), *_unresolved(data), *edge_warnings(data.solved)]
+    unsolved = _unsolved(data)
+    return [*unsolved, *warnings_in(data.solved), *_unresolved(data), *edge_warnings(data.solved)]
+
+
+def _unsolved(data: ReportData) -> list[str]:
+    """A line on the contacts that are not converged or missing; none where all are solved."""
+    total = len(data.rows)
+    parts = []
+    if data.failed:
+        parts.append(f"{len(data.failed)} of {total} contacts did not reach their tolerance")
+    if data.missing:
+        parts.append(f"{len(data.missing)} of {total} are not solved yet")
+    return ["; ".join(parts) + "."] if parts else []
 
 
 def _unresolved(data: ReportData) -> list[str]:
@@ -216,35 +192,3 @@ def _unresolved(data: ReportData) -> list[str]:
         f"{name} {UNRESOLVED[found]} ({number} of {total} contacts)"
         for (name, found), number in counts.items()
     ]
-
-
-def failures(data: ReportData) -> Section | None:
-    """Contacts that are not converged or missing."""
-    failed = [row for row in data.solved if row["status"] != Status.CONVERGED]
-    missing = _missing(data)
-    if not (failed or missing):
-        return None
-    caption = (
-        "Contacts that ended above the requested tolerance. Their values are kept; figures show "
-        "them as crosses."
-    )
-    left_out = len(failed) > MAX_ROWS
-    return Section(
-        "What failed or is missing",
-        notes=[f"The first {MAX_ROWS} of {len(failed)} are listed."] if left_out else [],
-        template="failures.html",
-        content={
-            "unconverged": Table(caption, UNCONVERGED, [Group("", failed[:MAX_ROWS])]),
-            "missing": count(len(missing), "contact") if missing else "",
-            "tasks": ", ".join(missing[:MAX_ROWS]) + (", ..." if len(missing) > MAX_ROWS else ""),
-        },
-    )
-
-
-def _reason(row: Record) -> str:
-    """Why a contact is not converged; empty for a status that is unknown."""
-    return Status(row["status"]).explain(row) if row["status"] in list(Status) else ""
-
-
-def _missing(data: ReportData) -> list[str]:
-    return [str(row["task"]) for row in data.rows if row["status"] == Status.MISSING]

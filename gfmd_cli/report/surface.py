@@ -1,4 +1,4 @@
-"""Power spectral densities of the surfaces of a study."""
+"""Sections: pictures of measured surfaces; power spectral densities of all surfaces."""
 
 from contextlib import suppress
 from dataclasses import dataclass
@@ -8,18 +8,55 @@ import numpy as np
 from gfmd_cli.analysis.compare import Row
 from gfmd_cli.analysis.curve_styles import MARKERS, MAX_LABEL, CurveStyle, colours
 from gfmd_cli.analysis.plotting import ColumnFigure
+from gfmd_cli.analysis.surface_figure import height_figure
 from gfmd_cli.analysis.table import Column, Group, Table
 from gfmd_cli.errors import InputError
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.physics.persson import Shells
+from gfmd_cli.physics.pictures import Picture
 from gfmd_cli.physics.spectrum_fit import SelfAffineFit, fit
 from gfmd_cli.report.data import ReportData
-from gfmd_cli.report.section import Section
+from gfmd_cli.report.section import Drawing, Section
 from gfmd_cli.report.svg import drawing
+from gfmd_cli.study.reading import open_study
 
+MAX_PICTURES = 4  # measured surfaces that are shown; a choice
+MISSING = " Grey: missing heights."
 BANDS_PER_DECADE = 10
 MAX_SURFACES = 8  # of the figure; more cannot be told apart
 LABEL = r"$C(q)$"
+
+
+def measured_surface(data: ReportData) -> Section:
+    """Pictures of the measured surfaces; a blank section without such a surface."""
+    surfaces = {str(row["surface"]): row for row in reversed(data.solved)}
+    shown: list[Row] = []
+    drawings: list[Drawing] = []
+    with open_study(data.comparison.path) as study:
+        for row in reversed(surfaces.values()):
+            pictures = study.pictures(row["scene"])
+            if pictures and len(shown) < MAX_PICTURES:
+                shown.append(row)
+                drawings += _drawings(row, pictures, f"{data.prefix}{len(shown)}")
+    notes = [str(row["preparation"]) for row in shown]
+    return Section("Measured surface", notes=notes, drawings=drawings)
+
+
+def _drawings(row: Row, pictures: dict[str, Picture], place: str) -> list[Drawing]:
+    """The pictures of one surface."""
+    captions = {
+        "measured": "Heights as measured, relative to their mean.",
+        "prepared": "Heights as prepared for the contact, relative to their mean.",
+    }
+    return [
+        drawing(
+            height_figure(picture),
+            f"heights-{name}-{place}",
+            f"Map of {captions[name].lower()} {row['surface']}",
+            captions[name] + (MISSING if np.isnan(picture.heights).any() else ""),
+        )
+        for name, picture in pictures.items()
+    ]
 
 
 @dataclass(frozen=True)
@@ -42,7 +79,7 @@ class Spectrum:
     """What was read from a file and how it was treated."""
 
 
-def surface_spectrum(data: ReportData) -> Section | None:
+def surface_spectrum(data: ReportData) -> Section:
     """C(q), double logarithmic."""
     scenes: dict[tuple[str, str, float], tuple[Row, Shells]] = {}
     for _, curve in data.curves:
@@ -54,17 +91,16 @@ def surface_spectrum(data: ReportData) -> Section | None:
     spectra = [each for each in spectra if each.q.size]
     shown = spectra[:MAX_SURFACES]
     if not shown:
-        return None
+        return Section("Surface spectrum")
     names = "; ".join(each.name for each in shown)
     label = f"Power spectral density of the surface over the wavenumber: {names}"
     left_out = len(spectra) > len(shown)
     more = f" The first {MAX_SURFACES} of {len(spectra)} are shown." if left_out else ""
-    tables = {"Self-affine fit": _fits(shown), "Table behind the figure": _bands(shown)}
     return Section(
         "Surface spectrum",
         notes=[each.preparation for each in shown if each.preparation],
         drawings=[drawing(_spectrum_figure(shown), "spectrum", label, CAPTION + more)],
-        tables={summary: table for summary, table in tables.items() if table.records},
+        disclosed={"Self-affine fit": _fits(shown), "Table behind the figure": _bands(shown)},
     )
 
 

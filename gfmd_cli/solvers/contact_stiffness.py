@@ -51,7 +51,7 @@ def _mean_response(contact: Contact, touching: Mask) -> float:
     gains, total, old_slope = deque([np.inf], DELAY), 0.0, np.inf
     for _ in range(MAX_STEPS):
         slope, turned = preconditioner.apply(stress, contact_state, PRESSED, change)
-        direction *= max(0.0, -turned / old_slope) if old_slope > 0 else 0.0  # as in `pcg`
+        direction *= max(0.0, -turned / old_slope) if old_slope > 0 else 0.0  # Polak-Ribiere+
         np.add(direction, z, out=direction, where=free)
         descent, old_slope = -float(np.vdot(direction, stress)), slope
         values[...] = direction

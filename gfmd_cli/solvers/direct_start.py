@@ -27,8 +27,10 @@ from gfmd_cli.grid.arrays import Field, Mask, row_blocks
 from gfmd_cli.physics.contact import Contact
 from gfmd_cli.solvers.contact_state import refined
 from gfmd_cli.solvers.local_start import COARSE_TOLERANCE, Start
+from gfmd_cli.solvers.multigrid import STEEP, largest_growth
 
 COST = 5000  # largest n^3 per point of a grid; measured: with more, the iteration is faster
+COST_NOT_STEEP = 150  # the same where a V-cycle without squared Laplacians is used
 HEADROOM = 1.3  # largest number of points over that of the first set
 GROWTH = 0.4  # largest share of points that join a set at a time; measured: from 0.3 to 0.6 as good
 PATIENCE = 3  # sets without fewer wrong points
@@ -51,7 +53,7 @@ def direct_start(
     solved: _DirectSolve | None = None
     spent = 0.0
     for contact in finer:
-        largest = int((COST * contact.grid.size) ** (1 / 3))
+        largest = _largest_count(contact)
         if not contact.grid.whole or np.count_nonzero(touching) > largest:
             break
         touching = refined(touching, contact)
@@ -64,6 +66,13 @@ def direct_start(
             break
         solved, touching = solve, solve.touching
     return Start(solved.displacement(), spent, solved.contact) if solved else None
+
+
+def _largest_count(contact: Contact) -> int:
+    """Largest number of points in contact for which a direct solve is faster than the iteration."""
+    has_fast_cycle = contact.grid.dimension == 2 and largest_growth(contact) <= STEEP
+    cost = COST_NOT_STEEP if has_fast_cycle else COST
+    return int((cost * contact.grid.size) ** (1 / 3))
 
 
 class _DirectSolve:

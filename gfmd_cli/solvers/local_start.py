@@ -22,14 +22,14 @@ import numpy as np
 
 from gfmd_cli.grid.arrays import Field, Mask
 from gfmd_cli.physics.contact import Contact
-from gfmd_cli.solvers.local_kernels import lay
+from gfmd_cli.solvers.local_kernels import penetration
 from gfmd_cli.solvers.projected_move import choose
 from gfmd_cli.solvers.tile_operators import TileOperators
 from gfmd_cli.solvers.tiles import SIDE, Tiles
 
 EXPONENTS = (0.2, 1.3)  # of k(q) for which the solve on tiles converges in about 20 steps
 SMALLEST = 512  # points per side from which on a solve on tiles is faster
-LARGEST_SHARE = 0.15  # of the tiles; with more a solve on the whole grid is faster: measured
+LARGEST_SHARE = 0.1  # of the tiles; with more a solve on the whole grid is faster: measured
 REACH = 2  # points by which the contact may grow from a grid to the next
 COARSE_TOLERANCE = 0.03  # on grids before the finest; measured: 0.01 to 0.1 differ by 5 %
 FIRST_TOLERANCE = 3e-3  # before the operators on tiles are corrected
@@ -75,6 +75,7 @@ def start_from(
         if tiles.count > LARGEST_SHARE * tiles.used.size:
             return None
         solve = _LocalSolve(contact, tiles, _refined(pressure, tiles), pause)
+        del pressure  # its memory is needed now
         if contact is last:
             u = solve.displacement(tolerance)
         else:
@@ -150,23 +151,27 @@ class _LocalSolve:
 
     def displacement(self, tolerance: float) -> Field:
         """Solve, with the exact operator in the end; return the displacement on the indenter."""
-        u, aim = self.grid.empty(), FIRST_TOLERANCE
-        for _ in range(MAX_EVALUATIONS):
+        aim = FIRST_TOLERANCE
+        for evaluation in range(1, MAX_EVALUATIONS + 1):
             self.run(aim)
-            residual, laid, entered = self.evaluate(u)
-            if laid < MARGIN * tolerance:
+            level, residual, laid, entered = self.evaluate()
+            if laid < MARGIN * tolerance or evaluation == MAX_EVALUATIONS:
                 break
             aim = residual * max(AIM * tolerance / laid, GAIN)
             self.correct(entered)
+        u = self.grid.empty()  # only now: the solves on tiles need memory, too
+        np.subtract(self.values_everywhere, level, out=u)
+        np.maximum(u, self.contact.height, out=u)
         self.tiles.copy_where(self.s > 0, self.height, u)
         return u
 
-    def evaluate(self, u: Field) -> tuple[float, float, Mask]:
-        """u <- max(C s, h), at the level where C s is, in the mean, at the indenter in contact.
+    def evaluate(self) -> tuple[float, float, float, Mask]:
+        """C s at all points, which stays in `grid.padded`, compared with the indenter.
 
-        Returns the natural residual of s and C s; an estimate of that of the displacement that is
-        laid on the indenter, whose stress differs from s by K times the change; and the tiles,
-        other than those here, where C s is below h. The values of C s stay in `grid.padded`.
+        Returns the level of C s where it is, in the mean, at the indenter in contact; the natural
+        residual of s and C s; an estimate of that of the displacement that is laid on the indenter,
+        whose stress differs from s by K times the change; and the tiles, other than those here,
+        where C s is below h.
         """
         contact, grid = self.contact, self.grid
         self.tiles.put(self.s, self.values_everywhere)
@@ -179,12 +184,12 @@ class _LocalSolve:
         stress = self.s + self.map_displacement(laid - gap)
         inside = np.minimum(gap, self.s), np.minimum(laid, stress)
         entered = np.zeros(self.tiles.used.shape, dtype=np.bool_)
-        sweep = (self.values_everywhere, level, contact.height, self.tiles.used, u, entered)
-        (outside,) = grid.rows.sums(1, lay, *sweep)
+        sweep = (self.values_everywhere, level, contact.height, self.tiles.used, entered)
+        (outside,) = grid.rows.sums(1, penetration, *sweep)
         residual, estimate = (
             contact.as_residual(float(outside) + _dot(worst, worst)) for worst in inside
         )
-        return residual, estimate, entered
+        return level, residual, estimate, entered
 
     def correct(self, entered: Mask) -> None:
         """Add tiles that were entered, and correct the operator on tiles by the exact C s."""
@@ -200,6 +205,11 @@ class _LocalSolve:
         """The values that the grid transforms in place."""
         return self.grid.padded[..., : self.grid.points]
 
+    def residual(self, gap: Field, s: Field) -> float:
+        """The natural residual on the tiles."""
+        violation = np.minimum(gap, s)
+        return self.contact.as_residual(_dot(violation, violation))
+
     def run(self, tolerance: float) -> None:
         """Projected conjugate gradients on the tiles, to a natural residual on them."""
         s, height = self.s, self.height - self.correction
@@ -211,8 +221,7 @@ class _LocalSolve:
             gap = w - height
             pressed = s > 0
             gap -= float(gap[pressed].mean())
-            violation = np.minimum(gap, s)
-            if self.contact.as_residual(_dot(violation, violation)) < tolerance:
+            if self.residual(gap, s) < tolerance:
                 break
             active = pressed | (gap < 0)
             last, force = force, _balanced(-gap, active)
@@ -223,6 +232,7 @@ class _LocalSolve:
             direction = _balanced(z + beta * direction, active)
             if _dot(direction, force) <= 0:
                 direction = z
+            del last, z  # memory for the compliance
             step = length * direction
             move = np.maximum(step, -s)
             change = self.compliance(move)

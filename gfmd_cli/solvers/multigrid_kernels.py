@@ -7,15 +7,36 @@ Rows in ring buffers have two more values at either end. The rows above the firs
 row are those at the other end of the array, which are the halo in a slab decomposition.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from gfmd_cli.grid.compilation import kernel, part_of_kernel
 
-PLATE = 20.0  # diagonal element of the squared five-point Laplacian with weights of 1
-DAMPING = 0.55  # of the Jacobi iteration
 WHOLE_WEIGHT = 4  # weight of a point held, in quarters
 TIES_PER_QUARTER = 16  # units of the ties per unit of the weights
-ZERO, HALF, ONE, TWO, FOUR = map(np.float32, (0.0, 0.5, 1.0, 2.0, 4.0))
+ZERO, HALF, ONE = map(np.float32, (0.0, 0.5, 1.0))
+
+
+class Operator(NamedTuple):
+    """The negative nine-point Laplacian, or its square; all numbers are in single precision."""
+
+    centre: np.float32
+    """Element of the Laplacian for the point itself."""
+    y: np.float32
+    """Minus the element for the neighbours along y."""
+    x: np.float32
+    """Minus the element for the neighbours along x."""
+    corner: np.float32
+    """Minus the element for the diagonal neighbours."""
+    is_squared: bool
+    """Whether the operator is the square of the Laplacian."""
+    damped_diagonal: np.float32
+    """Diagonal element of the operator, divided by the damping of the Jacobi iteration."""
+    spring: np.float32
+    """Stiffness of a spring per unit of the ties."""
+    damped_spring: np.float32
+    """The same, divided by the damping."""
 
 
 @part_of_kernel
@@ -65,31 +86,27 @@ def _wrap(row):  # type: ignore[no-untyped-def]
 
 
 @part_of_kernel
-def _at(up, mid, down, stencil, j):  # type: ignore[no-untyped-def]
-    """Negative five-point Laplacian at column j; the stencil has the weights along y and x.
+def _laplacian(up, mid, down, operator, j):  # type: ignore[no-untyped-def]
+    """Negative Laplacian at column j."""
+    sides = operator.y * (up[j] + down[j]) + operator.x * (mid[j - 1] + mid[j + 1])
+    corners = (up[j - 1] + up[j + 1]) + (down[j - 1] + down[j + 1])
+    return operator.centre * mid[j] - sides - operator.corner * corners
 
-    It is None where both are 1: the compiler then leaves the products out.
+
+@part_of_kernel
+def _inner_rows(i, x, laplacian, operator):  # type: ignore[no-untyped-def]
+    """Rows i - 1, i and i + 1 of the field whose Laplacian is A x: of x, or of its Laplacian.
+
+    `x` and `laplacian` are ring buffers. The last row of the Laplacian is computed here from row
+    i + 2 of x.
     """
-    if stencil is None:
-        return FOUR * mid[j] - (up[j] + down[j] + mid[j - 1] + mid[j + 1])
-    y, x = stencil
-    return TWO * (y + x) * mid[j] - (y * (up[j] + down[j]) + x * (mid[j - 1] + mid[j + 1]))
-
-
-@part_of_kernel
-def _laplacian(up, mid, down, stencil, out):  # type: ignore[no-untyped-def]
-    """Negative five-point Laplacian of a row, in rows with two more values at either end."""
+    if not operator.is_squared:
+        return x[(i - 1) % 5], x[i % 5], x[(i + 1) % 5]
+    up, mid, down = x[i % 5], x[(i + 1) % 5], x[(i + 2) % 5]
+    out = laplacian[(i + 1) % 3]
     for j in range(1, mid.size - 1):
-        out[j] = _at(up, mid, down, stencil, j)
-
-
-@part_of_kernel
-def _diagonal(stencil):  # type: ignore[no-untyped-def]
-    """Diagonal element of the squared five-point Laplacian (a plate)."""
-    if stencil is None:
-        return PLATE
-    y, x = np.float64(stencil[0]), np.float64(stencil[1])
-    return 4 * (y + x) ** 2 + 2 * (y**2 + x**2)
+        out[j] = _laplacian(up, mid, down, operator, j)
+    return laplacian[(i - 1) % 3], laplacian[i % 3], out
 
 
 @part_of_kernel
@@ -126,13 +143,13 @@ def _interpolate(coarse, k, ratio, out):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def first_residual(sigma, contact_state, threshold, stencil, coarse, a, b):  # type: ignore[no-untyped-def]
+def first_residual(sigma, contact_state, threshold, operator, coarse, a, b):  # type: ignore[no-untyped-def]
     """Restrict the residual of the force after one Jacobi sweep from zero to `coarse`.
 
     The residual itself is written to a field that is as wide as `sigma`.
     """
     height, n = sigma.shape
-    step = np.float32(DAMPING / _diagonal(stencil))
+    step = ONE / operator.damped_diagonal
     force, laplacian = np.empty((5, n + 4), np.float32), np.empty((3, n + 4), np.float32)
     defect = np.empty((3, n + 1), np.float32)
     ratio = 1 if coarse.shape[1] == n else 2
@@ -143,15 +160,14 @@ def first_residual(sigma, contact_state, threshold, stencil, coarse, a, b):  # t
         for j in range(n):
             new[j + 2] = ZERO if held[j] >= threshold else -np.float32(stress[j])
         _wrap(new)
-        _laplacian(force[i % 5], force[(i + 1) % 5], new, stencil, laplacian[(i + 1) % 3])
+        up, mid, down = _inner_rows(i, force, laplacian, operator)
         if i < ratio * (a - 1) + 1:
             continue
-        up, mid, down = laplacian[(i - 1) % 3], laplacian[i % 3], laplacian[(i + 1) % 3]
         source, row, held = force[i % 5], defect[i % 3], contact_state[i % height]
         for j in range(n):
             c = j + 2
-            plate = _at(up, mid, down, stencil, c)
-            row[j + 1] = ZERO if held[j] >= threshold else source[c] - step * plate
+            pull = _laplacian(up, mid, down, operator, c)
+            row[j + 1] = ZERO if held[j] >= threshold else source[c] - step * pull
         row[0] = row[n]
         if ratio == 1:
             for j in range(n):
@@ -162,7 +178,7 @@ def first_residual(sigma, contact_state, threshold, stencil, coarse, a, b):  # t
 
 @kernel
 def last_smooth(  # type: ignore[no-untyped-def]
-    sigma, contact_state, threshold, stencil, coarse, ratio, scale, change, padded, out, a, b
+    sigma, contact_state, threshold, operator, coarse, ratio, scale, change, padded, out, a, b
 ):
     """Write z, one Jacobi sweep on the sum of the first sweep and P coarse, to `padded`.
 
@@ -170,7 +186,7 @@ def last_smooth(  # type: ignore[no-untyped-def]
     """
     height, n = sigma.shape
     halo = (height - change.shape[0]) // 2
-    step = np.float32(DAMPING / _diagonal(stencil))
+    step = ONE / operator.damped_diagonal
     x, laplacian = np.empty((5, n + 4), np.float32), np.empty((3, n + 4), np.float32)
     for i in range(a - 4, b):
         k = (i + 2) % height
@@ -180,18 +196,16 @@ def last_smooth(  # type: ignore[no-untyped-def]
             moved = new[j + 2] - step * np.float32(stress[j])
             new[j + 2] = ZERO if held[j] >= threshold else moved
         _wrap(new)
-        _laplacian(x[i % 5], x[(i + 1) % 5], new, stencil, laplacian[(i + 1) % 3])
+        up, mid, down = _inner_rows(i, x, laplacian, operator)
         if i < a:
             continue
-        up, mid, down = laplacian[(i - 1) % 3], laplacian[i % 3], laplacian[(i + 1) % 3]
         source, held, stress = x[i % 5], contact_state[i], sigma[i]
         row, changed = padded[i - halo], change[i - halo]
         slope = turned = 0.0
         for j in range(n):
             c = j + 2
-            plate = _at(up, mid, down, stencil, c)
             s = np.float32(stress[j])
-            z = source[c] - step * (s + plate)
+            z = source[c] - step * (s + _laplacian(up, mid, down, operator, c))
             z = ZERO if held[j] >= threshold else z * scale
             row[j] = z
             slope -= z * stress[j]
@@ -200,20 +214,19 @@ def last_smooth(  # type: ignore[no-untyped-def]
 
 
 @part_of_kernel
-def _residual_row(i, x, laplacian, stencil, ties, spring, rhs, out):  # type: ignore[no-untyped-def]
-    """Write row i of the residual rhs - A x to `out`; `x` and `laplacian` are ring buffers."""
+def _residual_row(i, x, rows, operator, ties, rhs, out):  # type: ignore[no-untyped-def]
+    """Write row i of the residual rhs - A x to `out`; see `_inner_rows`."""
     height, n = rhs.shape
     xu, xm, xd = x[(i - 1) % 5], x[i % 5], x[(i + 1) % 5]
-    up, mid, down = laplacian[(i - 1) % 3], laplacian[i % 3], laplacian[(i + 1) % 3]
+    up, mid, down = rows
+    spring = operator.spring
     k = i % height
     above = k - 1 if k > 0 else height - 1
     own, east, south, cross = ties[k, 0], ties[k, 1], ties[k, 2], ties[k, 3]
     north, past, b = ties[above, 2], ties[above, 3], rhs[k]
     # Four loops, because the compiler does not vectorise one loop over as many arrays.
     for j in range(n):
-        c = j + 2
-        plate = _at(up, mid, down, stencil, c)
-        out[j + 1] = b[j] - plate
+        out[j + 1] = b[j] - _laplacian(up, mid, down, operator, j + 2)
     for j in range(n):
         c, t = j + 2, j + 1
         springs = np.float32(own[t]) * xm[c]
@@ -229,59 +242,72 @@ def _residual_row(i, x, laplacian, stencil, ties, spring, rhs, out):  # type: ig
         out[t] -= spring * springs
 
 
+@part_of_kernel
+def _first_row(rhs, operator, ties, k, row):  # type: ignore[no-untyped-def]
+    """Write row k of the result of a Jacobi sweep from zero to a row of a ring buffer."""
+    force, own = rhs[k], ties[k, 0]
+    for j in range(force.size):
+        tied = operator.damped_diagonal + operator.damped_spring * np.float32(own[j + 1])
+        row[j + 2] = force[j] / tied
+
+
 @kernel
-def smooth(rhs, stencil, ties, spring, old, coarse, ratio, is_zero, y, a, b):  # type: ignore[no-untyped-def]
+def smooth(rhs, operator, ties, old, is_zero, coarse, ratio, y, a, b):  # type: ignore[no-untyped-def]
     """Write the result of one Jacobi sweep on x to `y`.
 
     x is the result of a sweep from zero where `is_zero`, else `old`, plus P coarse where the ratio
     of the scales is positive.
     """
     height, n = rhs.shape
-    unit = spring * np.float32(1 / DAMPING)
-    plate = np.float32(_diagonal(stencil) / DAMPING)
+    diagonal, spring = operator.damped_diagonal, operator.damped_spring
     x, laplacian = np.empty((5, n + 4), np.float32), np.empty((3, n + 4), np.float32)
-    defect = np.empty(n + 1, np.float32)
+    defect, correction = np.empty(n + 1, np.float32), np.empty(n + 4, np.float32)
     for i in range(a - 4, b):
         k = (i + 2) % height
-        new, own, source = x[(i + 2) % 5], ties[k, 0], old[k]
+        new, source = x[(i + 2) % 5], old[k]
         if is_zero:
-            force = rhs[k]
-            for j in range(n):
-                new[j + 2] = force[j] / (plate + unit * np.float32(own[j + 1]))
-        elif ratio > 0:
-            _interpolate(coarse, k, ratio, new)
-            for j in range(n):
-                new[j + 2] += source[j]
+            _first_row(rhs, operator, ties, k, new)
         else:
             for j in range(n):
                 new[j + 2] = source[j]
+        if ratio > 0:
+            _interpolate(coarse, k, ratio, correction)
+            for j in range(2, n + 2):
+                new[j] += correction[j]
         _wrap(new)
-        _laplacian(x[i % 5], x[(i + 1) % 5], new, stencil, laplacian[(i + 1) % 3])
+        rows = _inner_rows(i, x, laplacian, operator)
         if i >= a:
-            _residual_row(i, x, laplacian, stencil, ties, spring, rhs, defect)
+            _residual_row(i, x, rows, operator, ties, rhs, defect)
             own, source, target = ties[i, 0], x[i % 5], y[i]
             for j in range(n):
-                diagonal = plate + unit * np.float32(own[j + 1])
-                target[j] = source[j + 2] + defect[j + 1] / diagonal
+                tied = diagonal + spring * np.float32(own[j + 1])
+                target[j] = source[j + 2] + defect[j + 1] / tied
 
 
 @kernel
-def residual(rhs, y, stencil, ties, spring, coarse, a, b):  # type: ignore[no-untyped-def]
-    """Restrict the residual of y to `coarse`, or write it to a field as wide as `y`."""
+def residual(rhs, operator, ties, y, is_zero, coarse, a, b):  # type: ignore[no-untyped-def]
+    """Restrict the residual of y to `coarse`, or write it to a field as wide as `rhs`.
+
+    Where `is_zero`, the result of a Jacobi sweep from zero takes the place of y.
+    """
     height, n = rhs.shape
     x, laplacian = np.empty((5, n + 4), np.float32), np.empty((3, n + 4), np.float32)
     defect = np.empty((3, n + 1), np.float32)
     ratio = 1 if coarse.shape[1] == n else 2
     for i in range(ratio * a - ratio - 3, ratio * b):
-        new, source = x[(i + 2) % 5], y[(i + 2) % height]
-        for j in range(n):
-            new[j + 2] = source[j]
+        k = (i + 2) % height
+        new, source = x[(i + 2) % 5], y[k]
+        if is_zero:
+            _first_row(rhs, operator, ties, k, new)
+        else:
+            for j in range(n):
+                new[j + 2] = source[j]
         _wrap(new)
-        _laplacian(x[i % 5], x[(i + 1) % 5], new, stencil, laplacian[(i + 1) % 3])
+        rows = _inner_rows(i, x, laplacian, operator)
         if i < ratio * (a - 1) + 1:
             continue
         row = defect[i % 3]
-        _residual_row(i, x, laplacian, stencil, ties, spring, rhs, row)
+        _residual_row(i, x, rows, operator, ties, rhs, row)
         row[0] = row[n]
         if ratio == 1:
             for j in range(n):

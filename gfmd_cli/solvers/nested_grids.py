@@ -19,6 +19,7 @@ from gfmd_cli.status import Status
 
 COARSEST = 64  # points per side of a square; a solve on as many points costs next to nothing
 FEWEST = 8  # points along an axis that is not coarsened; a choice: fewer resolve no contact
+MAX_LAYINGS = 5  # of a good start; points that the first one leaves free may be pressed then
 SAME_HEIGHT = 1000  # units of rounding by which indenters on other numbers of processes differ
 
 
@@ -92,6 +93,14 @@ def solve_contact(
                 while grids[-1] is not local.contact:
                     grids.pop()
     assert state is not None
+    for _ in range(MAX_LAYINGS if contact.boundary == "periodic" else 0):
+        good_start = status.is_converged and state.step == 0  # no step has laid points yet
+        if not good_start or not contact.lay_pressed(state.u, state.sigma):
+            break
+        state = solver.begin(contact, state.u)
+        state.coarser_transforms = spent
+        status = solve(contact, solver, state, watch)
+        spent += state.transforms
     return Solution(state.u, state.sigma, state.residual, status, solver.kind, state.step, spent)
 
 

@@ -5,7 +5,7 @@ A step of the method, with the numbers beside the code lines:
 [1] Choose the points of contact that are held, by proportioning (Dostal, SIAM J. Optim. 7, 871,
     1997), and a preconditioner that suits their pattern (see `preconditioners`).
 [2] Precondition the force on the free points.
-[3] Compute a Polak-Ribiere+ direction d on the free points.
+[3] Compute a direction d on the free points, from the preconditioned force and the last direction.
 [4] Project the move of length s on the constraint: u -> max(u + s d, h).
 [5] Go to the point of lowest energy on the straight way to the projected point.
 
@@ -38,7 +38,7 @@ from gfmd_cli.solvers import pcg_kernels as kernels
 from gfmd_cli.solvers.contact_state import PRESSED, TENSE, refined
 from gfmd_cli.solvers.loop import Solver, State
 from gfmd_cli.solvers.preconditioners import Preconditioner, Selection, create, select
-from gfmd_cli.solvers.projected_move import choose
+from gfmd_cli.solvers.projected_move import MoveChoice, choose, conjugation
 
 PROPORTION = 0.3  # of rms tension to rms free force; from 0.1 to 1 within 20 % at n = 1 to 4
 MAX_HALVINGS = 60  # of a move along which the energy rises; beyond, it is rounding
@@ -61,8 +61,12 @@ class PCGState(State):
     """Change of sigma by the last move."""
     length: float = 0.0
     """Step length of the last move; 0 before the first one."""
-    slope: float = 0.0
-    """Sum of preconditioned force times force; 0 where the conjugation restarts."""
+    moved: float = 0.0
+    """Length of the last move along the direction; 0 where the conjugation restarts."""
+    best_length: float = 0.0
+    """Length along the direction at which the energy was lowest."""
+    curvature: float = 0.0
+    """Sum of the direction times K times the direction."""
     screening: float = 0.0
     """k(q_c) of the screened Green's function."""
     multilevel: bool = False
@@ -117,9 +121,9 @@ class ProjectedCG(Solver):
 
     def iterate(self, contact: Contact, state: PCGState) -> Iterator[PCGState]:
         """Advance `state` in place by conjugate-gradient steps."""
+        yield state  # a start that is good enough needs no working memory
         run = _Run(contact, state)
         while True:
-            yield state
             if state.exact:
                 run.assess(run.classify())
                 state.rounding = 0.0
@@ -127,6 +131,7 @@ class ProjectedCG(Solver):
             beta = run.precondition()  # [2]
             run.advance(beta)  # [3] to [5]
             state.step += 1
+            yield state
 
 
 class _Run:
@@ -188,11 +193,11 @@ class _Run:
             if selection.multilevel != state.multilevel:
                 state.length = 0.0
             state.screening, state.multilevel = selection.screening, selection.multilevel
-            state.slope = 0.0
+            state.moved = 0.0
             self.preconditioner = None
 
     def precondition(self) -> float:
-        """Precondition the force, set the slope, and return the factor beta of the conjugation."""
+        """Precondition the force, and return the factor beta of the conjugation."""
         state = self.state
         if self.preconditioner is None:
             selection = Selection(state.screening, state.multilevel)
@@ -200,11 +205,9 @@ class _Run:
         fields = (self.sigma, self.contact_state, self.threshold)
         slope, turned = self.preconditioner.apply(*fields, self.change)
         state.transforms += self.preconditioner.transforms
-        # Polak-Ribiere+. The force has changed by -change since the last direction, so that
-        # z (f - f_old) = -z change.
-        beta = max(0.0, -turned / state.slope) if state.slope > 0 else 0.0
-        state.slope = slope
-        return beta
+        if state.moved == 0.0 or slope <= 0.0:
+            return 0.0
+        return conjugation(slope, turned, state.moved, state.best_length, state.curvature)
 
     def apply_stiffness(self) -> float:
         """Replace the values in `padded` by K times them; return the sum of their products."""
@@ -218,20 +221,24 @@ class _Run:
         if descent <= 0:
             self.precondition()
             descent, fall, square, stopped = self.turn(0.0)
-        fraction, moved = 0.0, state.length > 0
-        if not moved:
+        fraction, is_moved = 0.0, state.length > 0
+        if not is_moved:
             state.length = self.exact_length(descent)
         for _ in range(MAX_HALVINGS):
             length = state.length
-            if not moved:  # [4]
+            if not is_moved:  # [4]
                 _, fall, square, stopped = self.turn(0.0, is_kept=True)
             curvature = self.apply_stiffness()
             if fall > 0:
                 best = float(fall) / curvature if curvature > 0 else 1.0  # 1: a rigid shift
-                fraction = self.fraction_of_move(best, stopped > 0)
+                choice = self.choose_move(best, stopped > 0)
+                fraction = choice.fraction
+                restart = choice.restart or curvature <= 0
+                state.moved = 0.0 if restart else fraction * length
+                state.best_length, state.curvature = best * length, curvature / length**2
                 break
-            state.length, state.slope = 0.5 * length, 0.0
-            moved = False
+            state.length, state.moved = 0.5 * length, 0.0
+            is_moved = False
         way = (self.direction, length, fraction, self.padded, self.change)
         self.assess(self.rows.sums(3, kernels.advance, *fields, *way, self.own_state))  # [5]
         state.exact = False
@@ -245,15 +252,13 @@ class _Run:
         direction = (self.preconditioner.z, beta, self.direction, is_kept)
         return self.rows.sums(4, kernels.turn, *fields, *direction, self.state.length, self.padded)
 
-    def fraction_of_move(self, best: float, stopped: bool) -> float:
-        """Fraction of a move to take if the energy is lowest at the fraction `best`."""
+    def choose_move(self, best: float, stopped: bool) -> MoveChoice:
+        """How much of a move to take if the energy is lowest at the fraction `best`."""
         state = self.state
         exact = not stopped and (best <= 1 or not self.crosses(best * state.length))
         choice = choose(best, exact)
         state.length *= choice.factor
-        if choice.restart:
-            state.slope = 0.0
-        return choice.fraction
+        return choice
 
     def crosses(self, length: float) -> bool:
         """Whether the indenter would stop a move of this length at some point."""

@@ -21,7 +21,7 @@ from gfmd_cli.solvers.contact_state import ContactState
 from gfmd_cli.solvers.multigrid import COARSEST, Multigrid, level_count, suits
 from gfmd_cli.solvers.multilevel import Multilevel
 
-STEEP = 0.9  # local exponent of k(q) above which the V-cycle is faster than the Green's function
+STEEP = 0.7  # local exponent of k(q) above which the V-cycle is faster than the Green's function
 
 
 class Preconditioner(Protocol):

@@ -1,7 +1,8 @@
-"""How far a solver goes along a move that is projected on its constraint, and the next length.
+"""How far a solver goes along a move that is projected on its constraint, and where it goes next.
 
-The solvers in u and in sigma share this rule. The energy is a parabola along the straight way to
-the projected point, lowest at the fraction `best` of it; all points on the way are feasible.
+The solvers in u and in sigma share the rule for the length of a move. The energy is a parabola
+along the straight way to the projected point, lowest at the fraction `best` of it; all points on
+the way are feasible.
 """
 
 from typing import NamedTuple
@@ -29,3 +30,26 @@ def choose(best: float, exact: bool) -> MoveChoice:
     is_full = best >= FULL_MOVE
     fraction = 1.0 if is_full else max(best, 0.0)
     return MoveChoice(fraction, min(max(best, low), high), not is_full)
+
+
+def conjugation(slope: float, turned: float, moved: float, best: float, curvature: float) -> float:
+    """The factor beta >= 0 for which z + beta d leads to the lowest energy in the plane of z and d.
+
+    z is the preconditioned force f, and d the last direction; f and d are those on the free points.
+
+    Parameters
+    ----------
+    slope : z f, positive
+    turned : z times the change of -f by the last move, which is `moved` K d
+    moved : length of the last move along d
+    best : length along d at which the energy was lowest
+    curvature : d K d
+
+    With the lengths l of the move and l* of lowest energy, f d = (l* - l) d K d. z K z is not
+    known. It is estimated as if the energy along z were lowest at the same length l*. At l = l*
+    this is the formula of Hestenes & Stiefel (J. Res. Natl. Bur. Stand. 49, 409, 1952).
+    """
+    rest = best - moved
+    coupling = turned / (moved * curvature)  # z K d / d K d
+    share = 1.0 - rest * curvature * coupling / slope
+    return max(0.0, (rest / best - coupling) / share) if share > 0.0 else 0.0

@@ -19,7 +19,6 @@ from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import BSpline
 from scipy.special import gammainc, gammaincc
 
 from gfmd_cli.grid.arrays import Field
@@ -110,9 +109,8 @@ def _nodes_of_tile() -> Indices:
 
 def _weights() -> Field:
     """Values of the splines of the coarse grid at the points of a tile, shape (64, 25)."""
-    spline = BSpline.basis_element(np.arange(ORDER + 1) - ORDER / 2, extrapolate=False)
-    distances = np.arange(SIDE)[:, None] / COARSENING - _nodes_of_tile()
-    line = np.nan_to_num(spline(distances))
+    distances = np.abs(np.arange(SIDE)[:, None] / COARSENING - _nodes_of_tile())
+    line = (np.maximum(2 - distances, 0) ** 3 - 4 * np.maximum(1 - distances, 0) ** 3) / 6
     weights: Field = np.einsum("ia,jb->ijab", line, line).reshape(SIDE * SIDE, -1)
     return weights
 

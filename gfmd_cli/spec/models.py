@@ -2,7 +2,7 @@
 
 import hashlib
 import json
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from itertools import product
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self, get_args
@@ -14,7 +14,7 @@ from pydantic import Field as Key
 from gfmd_cli.choice import Choice, Positive
 from gfmd_cli.errors import InputError
 from gfmd_cli.physics.contact import PRESSURES
-from gfmd_cli.physics.elastomers import Elastomer
+from gfmd_cli.physics.elastomers import Elastomer, LinearElastomer
 from gfmd_cli.physics.indenters import SMALLEST_GRID, RigidSurface
 from gfmd_cli.physics.surfaces import Surface
 from gfmd_cli.solvers.auto import AnySolver
@@ -77,6 +77,33 @@ class GridTable(Choice):
         given = self.points_y and surface.copies * self.points_y
         points_y = given or surface.points_y(points)
         return surface.on_cell(points, points_y), points_y
+
+
+def with_boundary(
+    surface: RigidSurface,
+    elastomer: LinearElastomer,
+    grid: GridTable,
+    solver: AnySolver,
+) -> tuple[RigidSurface, GridTable]:
+    """The surface with the treatment of its edges, and the grid with its boundary.
+
+    A map that ends at its borders has a free boundary where elastomer and solver allow it, and is
+    mirrored elsewhere. Every other surface is periodic.
+    """
+    if grid.boundary is None:
+        free = surface.has_borders and _allows_free(surface.dimension, elastomer, solver)
+        grid = grid.model_copy(update={"boundary": "free" if free else "periodic"})
+    return surface.within(grid.boundary or "periodic"), grid
+
+
+def _allows_free(dimension: int, elastomer: LinearElastomer, solver: AnySolver) -> bool:
+    """Whether contacts of this elastomer and solver can have a free boundary."""
+    try:
+        solver.check_boundary("free")
+        elastomer.check_free_boundary(dimension)
+    except InputError:
+        return False
+    return True
 
 
 class Ladder(Choice):
@@ -397,26 +424,3 @@ def _short(value: Any) -> str:
 def _fit(places: list[tuple[int | None, ...]]) -> bool:
     """Whether entries stand at the same places of the paired lists."""
     return all(len(set(pair) - {None}) <= 1 for pair in zip(*places, strict=True))
-
-
-def axes_of(table: dict[str, Any], paired: Sequence[list[str]]) -> list[list[str]]:
-    """The keys of a table that have a list, those of paired lists together."""
-    swept = [key for key, value in table.items() if isinstance(value, list)]
-    groups = [[key for key in swept if key in group] for group in paired]
-    single = [[key] for key in swept if not any(key in group for group in groups)]
-    return [*filter(None, groups), *single]
-
-
-def expand(
-    table: dict[str, Any], paired: Sequence[list[str]]
-) -> list[tuple[dict[str, Any], dict[str, int]]]:
-    """All combinations of the lists in a table, with the place that each value has in its list.
-
-    The lists of the keys in a group of `paired` go together, value by value.
-    """
-    axes = axes_of(table, paired)
-    combinations = []
-    for places in product(*(range(len(table[keys[0]])) for keys in axes)):
-        where = {key: place for keys, place in zip(axes, places, strict=True) for key in keys}
-        combinations.append((table | {key: table[key][i] for key, i in where.items()}, where))
-    return combinations

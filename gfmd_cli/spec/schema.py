@@ -1,10 +1,11 @@
 """JSON Schema of the run spec, for editors."""
 
+import json
 from typing import Any
 
 from gfmd_cli.choice import Choice
+from gfmd_cli.spec.check import DEFAULT_KINDS, MODELS, REQUIRED, kinds_of
 from gfmd_cli.spec.models import REPEATED, SWEPT
-from gfmd_cli.spec.parse import DEFAULT_KINDS, MODELS, REQUIRED, kinds_of
 
 UNKNOWN_KEY = {"not": {"description": "unknown key"}}
 """No value is valid. An editor marks the key, where it marks the whole table for `false`."""
@@ -34,20 +35,14 @@ def spec_schema() -> dict[str, Any]:
         "additionalProperties": False,
         "$defs": shared,
     }
-    marked: dict[str, Any] = _marking_keys(schema)
+    marked: dict[str, Any] = json.loads(json.dumps(schema), object_hook=_marking_keys)
     return marked
 
 
-def _marking_keys(schema: Any) -> Any:
-    """The schema with UNKNOWN_KEY wherever additional properties are forbidden."""
-    if isinstance(schema, list):
-        return [_marking_keys(part) for part in schema]
-    if not isinstance(schema, dict):
-        return schema
-    marked = {name: _marking_keys(part) for name, part in schema.items()}
-    if schema.get("additionalProperties") is False:
-        marked["additionalProperties"] = UNKNOWN_KEY
-    return marked
+def _marking_keys(schema: dict[str, Any]) -> dict[str, Any]:
+    """The same with UNKNOWN_KEY where additional properties are forbidden."""
+    forbids = schema.get("additionalProperties") is False
+    return schema | {"additionalProperties": UNKNOWN_KEY} if forbids else schema
 
 
 def _table(

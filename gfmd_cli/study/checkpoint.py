@@ -62,7 +62,10 @@ class Checkpoint:
     @classmethod
     @contextmanager
     def held(cls, folder: Path, ranks: Ranks | None = None) -> Iterator[Self]:
-        """The checkpoint for one run alone: a second one neither reads nor writes it."""
+        """The checkpoint for one run alone: a second one neither reads nor writes it.
+
+        Where no state was saved, nothing is left of the folder.
+        """
         if folder.is_symlink():
             raise StudyError(f"{folder}: a link in the place of a checkpoint; remove it")
         checkpoint = cls(folder, ranks)
@@ -71,7 +74,11 @@ class Checkpoint:
                 if leads(ranks):
                     checkpoint.mine = stack.enter_context(locked(folder / "lock", wait=False))
             checkpoint.mine = agree(ranks, checkpoint.mine)
-            yield checkpoint
+            try:
+                yield checkpoint
+            finally:
+                if not checkpoint.exists():
+                    checkpoint.remove()
 
     def restore(self) -> str | None:
         """Take up what is saved and whole; say what is not, and set aside what cannot be used."""
@@ -83,7 +90,7 @@ class Checkpoint:
         return note
 
     def _restore(self) -> str | None:
-        if not (self.pointer.exists() or self.pointer.is_symlink()):
+        if not self.exists():
             return None
         slots = read_pointer(self.pointer)
         self.slots = [slot for slot in slots if all(map(self._is_whole, slot.parts))]
@@ -92,6 +99,10 @@ class Checkpoint:
         if self.slots:
             return f"{self.folder}: the newest state is damaged; the one before it is resumed"
         return self.set_aside()
+
+    def exists(self) -> bool:
+        """Whether a state is saved, whole or not."""
+        return os.path.lexists(self.pointer)
 
     def set_aside(self) -> str:
         """Rename all files of a state that cannot be resumed; return a message."""

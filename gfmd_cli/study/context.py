@@ -1,15 +1,47 @@
 """What the solves of a run share: options, progress reports, the request to stop."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from math import inf
 from threading import Event
+from typing import Literal, NamedTuple
 
 from gfmd_cli.grid.ranks import Ranks
 from gfmd_cli.physics.contact import Contact
 from gfmd_cli.solvers.loop import State
 from gfmd_cli.solvers.nested_grids import Resume
+from gfmd_cli.status import Status
 from gfmd_cli.study.notes import Notes
-from gfmd_cli.study.progress import Progress, Report, ignore
+
+
+class Progress(NamedTuple):
+    """Progress event of one task."""
+
+    task: int
+    """Index of the task; -1 in a warning that concerns the whole run."""
+    event: Literal["start", "step", "end", "warning"]
+    label: str
+    points: int = 0
+    step: int = 0
+    residual: float = float("nan")
+    a_r: float = float("nan")
+    status: Status | None = None
+    """Of a task that has ended."""
+    message: str = ""
+    """The error that ended the task, or the text of a warning."""
+    tasks_left: int | None = None
+    """Number of tasks of the run that have not ended, if known."""
+    seconds_left: float = float("nan")
+    """Estimated time that they take."""
+    size: int = 0
+    """Number of points of the grid."""
+
+
+Report = Callable[[Progress], None]
+
+
+def ignore(progress: Progress) -> None:
+    """A report that does nothing."""
 
 
 @dataclass(frozen=True)

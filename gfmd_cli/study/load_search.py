@@ -16,8 +16,11 @@ from dataclasses import replace
 from math import exp, expm1, inf, isfinite, log
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from gfmd_cli.errors import InputError
-from gfmd_cli.physics.approach import estimated_pressure
+from gfmd_cli.grid.arrays import Field
+from gfmd_cli.physics.approach import estimated_pressures
 from gfmd_cli.physics.contact import PRESSURES, Scene
 from gfmd_cli.physics.persson import Persson
 from gfmd_cli.spec.models import SOUGHT
@@ -30,9 +33,12 @@ from gfmd_cli.study.tasks import FIRST, Task
 
 COARSER = 2  # grids, each of half the points, on which the search begins
 COARSE = 0.02  # relative distance to the load, or of two pressures, that is good enough on them
+COARSE_RESIDUAL = 1e-3  # natural residual of a solve on them
 STEP = log(8.0)  # of ln p at the most, until the root is enclosed
+NEARBY = 0.95  # of a load, at which the theory gives the slope
 FLATTEST = 1e-3  # slope of ln(value) over ln(p) that a step is made from
 ROUNDING = 1e-13  # width in ln p of an enclosure that holds no other pressure
+SMOOTH = 0.01  # of the solver's tolerance in ln p: gaps and displacements have no steps
 TRIALS = 60  # on one grid; three to five are usual
 
 
@@ -40,10 +46,10 @@ def solve_at_load(task: Task, context: SolveContext, watcher: Watcher) -> Solved
     """Solve a task, searching its pressure if that is not given; else as `solve_on_grids`.
 
     The search returns the nearest contact that it met. It succeeds where that is within
-    `task.load_tolerance` of the load, and also, with a warning, where the value jumps there:
-    contact area is a whole number of grid points, several of which may enter contact together. A
-    jump is a difference of one grid point, or two pressures that the solver cannot tell apart, as
-    they differ by less than its tolerance. Otherwise the status is "load_not_reached".
+    `task.load_tolerance` of the load, and also, with a warning, where a contact area jumps there:
+    it is a whole number of grid points, several of which may enter contact together. A jump is a
+    difference of one grid point, or two pressures that the solver cannot tell apart, as they differ
+    by less than its tolerance. Otherwise the status is "load_not_reached".
 
     Raises InputError for a mean gap that no pressure has, and an area below one grid point.
     """
@@ -59,10 +65,12 @@ def solve_at_load(task: Task, context: SolveContext, watcher: Watcher) -> Solved
         return solved
 
     solved: Solved | None = None
-    first, slope = 0.0, 1.0
+    first = slope = 0.0
     for points in _grids(task):
         scene = task_scene(task, points, context)
-        search = _Search(task, scene, first or _guess(task, scene), slope)
+        if not first:
+            first, slope = _guess(task, scene)
+        search = _Search(task, scene, first, slope)
         for trial in trials:
             if trial.points == points:
                 search.add(trial)
@@ -104,8 +112,8 @@ def _check_known(task: Task, solved: Solved) -> None:
 
 
 def load_in_jump(quantity: str, load: float, results: Mapping[str, Any], tolerance: float) -> str:
-    """A message where the solved value is farther than the tolerance from the load, else ""."""
-    if quantity not in SOUGHT:
+    """A message where a contact area is farther than the tolerance from the load, else ""."""
+    if quantity != "contact_area":
         return ""
     value = loaded_value(quantity, results)
     if abs(value - load) <= tolerance * load:
@@ -131,10 +139,14 @@ def _grids(task: Task) -> list[int]:
 
 
 def _at(task: Task, points: int, pressure: float) -> Task:
-    """The contact of one trial."""
-    accuracy = task.accuracy if points == task.points else None
+    """The contact of one trial; on a coarser grid only as accurate as the search needs it."""
+    solver, accuracy = task.solver, task.accuracy
+    if points != task.points:
+        tolerance = max(solver.tolerance, COARSE_RESIDUAL)
+        solver, accuracy = solver.model_copy(update={"tolerance": tolerance}), None
     return replace(
         task,
+        solver=solver,
         quantity="pressure",
         load=pressure,
         points=points,
@@ -143,23 +155,33 @@ def _at(task: Task, points: int, pressure: float) -> Task:
     )
 
 
-def _guess(task: Task, scene: Scene) -> float:
-    """The pressure [Pa] of Persson theory. Raises InputError for a load that no pressure has."""
-    if task.quantity == "contact_area":
-        if task.load * scene.grid.size < 1:
-            raise InputError(
-                f"load.contact_area: {task.load:g} is less than one of the {scene.grid.size} "
-                "points of the grid"
-            )
-        return float(Persson(scene.shells).pressure_at_area(task.load))
-    if task.quantity == "displacement":
-        return estimated_pressure(scene, task.elastomer, task.load)
+def _guess(task: Task, scene: Scene) -> tuple[float, float]:
+    """The pressure [Pa] of Persson theory, and the slope of ln(value) over ln(p) there.
+
+    Raises InputError for a load that no pressure has.
+    """
     highest = scene.highest
-    if task.load >= highest:
+    if task.quantity == "contact_area" and task.load * scene.grid.size < 1:
+        raise InputError(
+            f"load.contact_area: {task.load:g} is less than one of the {scene.grid.size} "
+            "points of the grid"
+        )
+    if task.quantity == "mean_gap" and task.load >= highest:
         raise InputError(
             f"load.mean_gap: {task.load:g} h_std are never reached: without load it is {highest:g}"
         )
-    return float(Persson(scene.shells).pressure_at_gap(task.load * scene.h_std))
+    p, nearby = _pressures(task, scene, np.array([task.load, NEARBY * task.load])).tolist()
+    return p, max(abs(log(NEARBY) / log(nearby / p)), FLATTEST) if nearby != p else 1.0
+
+
+def _pressures(task: Task, scene: Scene, loads: Field) -> Field:
+    """The pressures [Pa] of some loads in Persson theory."""
+    if task.quantity == "displacement":
+        return estimated_pressures(scene, task.elastomer, loads)
+    theory = Persson(scene.shells)
+    if task.quantity == "contact_area":
+        return theory.pressure_at_area(loads)
+    return theory.pressure_at_gap(loads * scene.h_std)
 
 
 class _Point(NamedTuple):
@@ -184,7 +206,8 @@ class _Search:
         is_area, is_last = task.quantity == "contact_area", scene.grid.points == task.points
         self.sign = -1 if task.quantity == "mean_gap" else 1
         self.tolerance = task.load_tolerance if is_last else COARSE
-        self.resolution = max(task.solver.tolerance, ROUNDING) if is_last else COARSE
+        apart = (1.0 if is_area else SMOOTH) * task.solver.tolerance
+        self.resolution = max(apart, ROUNDING) if is_last else COARSE
         self.quantum = 1 / scene.grid.size if is_area else 0.0
         self.points: list[_Point] = []
         """Nearest to the root first; on a plateau (full contact) the innermost."""
@@ -210,9 +233,13 @@ class _Search:
 
     @property
     def succeeded(self) -> bool:
-        """Whether the nearest trial is within the tolerance, or no pressure comes nearer."""
-        if abs(expm1(self.sign * self.points[0].y)) <= self.tolerance:
-            return True
+        """Whether the nearest trial is within the tolerance, or the contact area jumps there."""
+        within = abs(expm1(self.sign * self.points[0].y)) <= self.tolerance
+        return within or (self.quantum > 0 and self._exhausted)
+
+    @property
+    def _exhausted(self) -> bool:
+        """Whether the solver tells no pressures apart that come nearer."""
         low, high = self._enclosure()
         if low is None or high is None:
             return False
@@ -229,7 +256,7 @@ class _Search:
         """The pressure to try next, None where the search has ended."""
         if not self.points:
             return self.first
-        if self.succeeded or len(self.points) >= TRIALS:
+        if self.succeeded or self._exhausted or len(self.points) >= TRIALS:
             return None
         x, y, _ = self.points[0]
         x -= max(-STEP, min(y / self.slope, STEP))

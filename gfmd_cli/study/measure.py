@@ -12,10 +12,14 @@ import numpy as np
 
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.physics.approach import approach
-from gfmd_cli.physics.edge_share import edge_shares
 from gfmd_cli.physics.free_contact import twice
 from gfmd_cli.physics.map_preparation import mirror
-from gfmd_cli.physics.observables import contact_pressure, gap_histogram, stress_histogram
+from gfmd_cli.physics.observables import (
+    contact_pressure,
+    edge_shares,
+    gap_histogram,
+    stress_histogram,
+)
 from gfmd_cli.physics.patches import area_distribution
 from gfmd_cli.physics.power_spectra import autocorrelations, spectra
 from gfmd_cli.spec.models import SWEPT, OutputTable

@@ -23,6 +23,8 @@ from gfmd_cli.study.writing import write_study
 SUFFIX = ".record"
 OWN_FILES = re.compile(r"(in-use|collecting|planning)(\..*)?|wisdom-.*\.json|.*\.(record|bad)|\..*")
 """Files that gfmd makes in the folder."""
+LOCKS = ("in-use", "in-use.owner", "collecting", "collecting.owner")
+"""Held while the folder is removed, in the order in which they are deleted."""
 OWN_FOLDERS = re.compile(r"[0-9a-f]{16}")
 """Checkpoints, by the id of the task."""
 IN_CHECKPOINT = re.compile(r"pointer|lock(\..*)?|[ab][0-9]*|\..*")
@@ -30,9 +32,9 @@ IN_CHECKPOINT = re.compile(r"pointer|lock(\..*)?|[ab][0-9]*|\..*")
 
 def check_own(parts: Path) -> None:
     """Refuse a folder that is not gfmd's. Raises InputError, SpaceError where none can be made."""
-    if parts.is_symlink() or (parts.exists() and not parts.is_dir()):
+    if parts.is_symlink() or parts.is_file():
         raise SpaceError(f"{parts}: not a folder; move it away or choose another name (-o)")
-    for path in parts.iterdir() if parts.exists() else ():
+    for path in _listed(parts):
         is_folder = path.is_dir() and not path.is_symlink()
         if not (OWN_FOLDERS if is_folder else OWN_FILES).fullmatch(path.name) and not (
             path.suffix == ".bad"  # a folder that was in the place of a file
@@ -44,19 +46,34 @@ def check_own(parts: Path) -> None:
 
 
 def remove_parts(parts: Path) -> None:
-    """Delete the folder with what gfmd made in it; whatever else is there stays."""
-    for path in parts.iterdir():
+    """Delete the folder with what gfmd made in it; whatever else is there stays.
+
+    The locks that are held go last: who finds no `collecting` finds no `in-use` of this process
+    either, and so can lock both, and delete what it made in the meantime.
+    """
+    for path in _listed(parts):
         is_folder = path.is_dir() and not path.is_symlink()
         if is_folder and OWN_FOLDERS.fullmatch(path.name):
             _delete(IN_CHECKPOINT, path)
-        elif not is_folder and path.name != "in-use" and OWN_FILES.fullmatch(path.name):
+        elif not is_folder and path.name not in LOCKS and OWN_FILES.fullmatch(path.name):
             path.unlink(missing_ok=True)
-    _delete(OWN_FILES, parts)  # the lock that is held, last
+    for name in LOCKS:
+        (parts / name).unlink(missing_ok=True)
+    with suppress(OSError):
+        parts.rmdir()
+
+
+def _listed(folder: Path) -> list[Path]:
+    """What is in a folder; nothing where another process has just deleted it."""
+    try:
+        return list(folder.iterdir())
+    except FileNotFoundError:
+        return []
 
 
 def _delete(own: re.Pattern[str], folder: Path) -> None:
     """Delete files by name, then the folder where it is empty."""
-    for path in folder.iterdir():
+    for path in _listed(folder):
         if own.fullmatch(path.name):
             with suppress(OSError):
                 path.unlink()

@@ -11,8 +11,7 @@ from multiprocessing.connection import Connection, Pipe, wait
 from pathlib import Path
 
 from gfmd_cli.status import Status
-from gfmd_cli.study.context import SolveContext, WorkerOptions
-from gfmd_cli.study.progress import Progress
+from gfmd_cli.study.context import Progress, SolveContext, WorkerOptions
 from gfmd_cli.study.resources import available_memory, gib, out_of_memory_kills
 from gfmd_cli.study.signals import blocked
 from gfmd_cli.study.tasks import Task

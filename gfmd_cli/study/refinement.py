@@ -2,14 +2,12 @@
 
 from dataclasses import dataclass, field
 from functools import lru_cache
-from math import sqrt
 from threading import get_ident
 from typing import Any
 
 from gfmd_cli.errors import InputError
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.grid.ranks import Ranks, agree
-from gfmd_cli.physics.anisotropy import anisotropy
 from gfmd_cli.physics.contact import Contact, Scene
 from gfmd_cli.physics.discretisation_error import (
     RoughnessScales,
@@ -18,11 +16,11 @@ from gfmd_cli.physics.discretisation_error import (
     local_exponent,
     roughness_scales,
 )
-from gfmd_cli.physics.error_bounds import Certificate
+from gfmd_cli.physics.error_bounds import CERTIFY, Certificate
 from gfmd_cli.physics.error_estimates import Estimate, Level, unknown
 from gfmd_cli.physics.free_contact import SCENES
-from gfmd_cli.physics.free_error_bounds import CERTIFY
 from gfmd_cli.physics.observables import Observables, border_contact, contact_points, observe
+from gfmd_cli.physics.power_spectra import anisotropy
 from gfmd_cli.solvers.nested_grids import Resume, Solution, solve_contact
 from gfmd_cli.status import Status
 from gfmd_cli.study.context import SolveContext, Watcher, WorkerOptions
@@ -32,9 +30,6 @@ from gfmd_cli.study.tasks import FIRST, Task
 FINAL = ("bound", "slow", "diverges")  # verdicts that no finer grid changes
 ENOUGH = 3  # grids after which an unknown error stays unknown: two give all that is calibrated
 UNSOLVED = 0.1  # natural residual from which nothing is said of the continuum
-ALGEBRAIC = 2.0
-"""Largest errors of u_g and sigma_p on their grid that were met, in natural residuals times the
-value x, or its root where that is less than 1: n = 0.5 to 4, slabs, p* = 0.003 to 1."""
 
 
 @dataclass
@@ -52,10 +47,7 @@ class Solved:
     def algebraic(self, name: str) -> float:
         """Estimated error of a column on this grid, from stopping at this residual."""
         assert self.certificate is not None
-        if name == "a_r":
-            return self.certificate.a_r
-        value = float(getattr(self.observables, name))
-        return ALGEBRAIC * self.solution.residual * max(value, sqrt(value))
+        return self.certificate.estimated_error(name, self.observables, self.solution.residual)
 
 
 @lru_cache(maxsize=1)

@@ -1,6 +1,7 @@
 """Cores and memory that a run may use on this machine."""
 
 import os
+from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 
@@ -27,24 +28,42 @@ def available_cores() -> int:
 
 
 def available_memory() -> float:
-    """Bytes that this process may take: the smallest limit of kernel, cgroup and Slurm."""
-    limits = []
+    """Bytes that this process may take: the smallest limit of kernel, cgroups and Slurm."""
+    limits = list(_cgroup_limits(Path("/proc/self/cgroup"), Path("/sys/fs/cgroup")))
     with suppress(OSError, ValueError, IndexError):
         _, _, rest = Path("/proc/meminfo").read_text(encoding="ascii").partition("MemAvailable:")
         limits.append(1024.0 * int(rest.split()[0]))
-    for limit, used in (
-        ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory.current"),
-        (
-            "/sys/fs/cgroup/memory/memory.limit_in_bytes",
-            "/sys/fs/cgroup/memory/memory.usage_in_bytes",
-        ),
-    ):
-        with suppress(OSError, ValueError):  # "max" is no number: no limit
-            limits.append(float(int(Path(limit).read_text())) - int(Path(used).read_text()))
-    per_node = os.environ.get("SLURM_MEM_PER_NODE", "")
-    if per_node.isdigit() and int(per_node) > 0:
-        limits.append(2.0**20 * int(per_node))
+    grants = (("SLURM_MEM_PER_NODE", 1), ("SLURM_MEM_PER_CPU", available_cores()))
+    for name, count in grants:
+        megabytes = os.environ.get(name, "")
+        if megabytes.isdigit() and int(megabytes) > 0:
+            limits.append(2.0**20 * int(megabytes) * count)
     return min(limits, default=float("inf"))
+
+
+def _cgroup_limits(membership: Path, root: Path) -> Iterator[float]:
+    """Bytes that the cgroups of this process leave, version 1 and 2: its own and all around it.
+
+    `membership` lists the groups of the process, and their files lie below `root`.
+    """
+    try:
+        lines = membership.read_text(encoding="utf-8").splitlines()
+    except (OSError, ValueError):
+        return
+    for line in lines:
+        _, controllers, group = line.split(":", 2)
+        if not controllers:
+            top, limit, used = root, "memory.max", "memory.current"
+        elif "memory" in controllers.split(","):
+            top, limit, used = root / "memory", "memory.limit_in_bytes", "memory.usage_in_bytes"
+        else:
+            continue
+        own = top / group.strip("/")
+        for folder in (own, *own.parents):
+            with suppress(OSError, ValueError):  # "max" is no number: no limit
+                yield float(int((folder / limit).read_text()) - int((folder / used).read_text()))
+            if folder == top:
+                break
 
 
 def room(ranks: Ranks | None = None) -> float:
@@ -82,8 +101,6 @@ def share_out(
     If there are fewer tasks than cores, large grids use the remaining cores as threads, unless the
     run is to be `reproducible`: the number of threads may change the last bits.
     """
-    if jobs is not None and jobs < 1:
-        raise InputError(f"--jobs {jobs}: at least 1 worker process is needed")
     if not tasks:
         return 1, 1
     size = max(task.size for task in tasks)

@@ -1,7 +1,7 @@
 """Run a spec: what is missing is solved, task by task, on one or more processes."""
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from threading import TIMEOUT_MAX, Event, Timer
@@ -12,9 +12,8 @@ from gfmd_cli.grid.ranks import Ranks, agree, leads, together
 from gfmd_cli.physics.file_surface import forget_files
 from gfmd_cli.spec.models import Spec
 from gfmd_cli.status import Status
-from gfmd_cli.study.context import SolveContext, WorkerOptions
+from gfmd_cli.study.context import Progress, Report, SolveContext, WorkerOptions
 from gfmd_cli.study.pool import solve_in_pool
-from gfmd_cli.study.progress import Progress, Report
 from gfmd_cli.study.refinement import forget_scene
 from gfmd_cli.study.resources import check_memory, room, seconds_to_stop, share_out
 from gfmd_cli.study.result import Held
@@ -64,13 +63,15 @@ def run_study(
     """
     for name, seconds in (("checkpoint_every", checkpoint_every), ("max_seconds", max_seconds)):
         if seconds is not None and not seconds >= 0:
-            raise InputError(f"{name}: must be a positive number, got {seconds:g}")
+            raise InputError(f"{name}: must be 0 or a positive number, got {seconds:g}")
+    if jobs is not None and jobs < 1:
+        raise InputError(f"--jobs {jobs}: at least 1 worker process is needed")
     forget_files()
     forget_scene()
     study = Study(path)
     tasks = plan(spec)
-    if ranks is not None:
-        _check_shared(spec)
+    if ranks is not None and (names := spec.output.on_request()):
+        raise InputError(f"output.{names[0]}: takes whole grids; run it without mpiexec")
     moved = _move_aside(study, shard, ranks) if overwrite else []
     held = agree(ranks, study.held())
     share = [task for task in tasks if task.index % shard[1] == shard[0]]
@@ -86,16 +87,28 @@ def run_study(
     check_memory(pending, ranks)
     jobs, threads = share_out(pending, jobs, reproducible, ranks)
     options = WorkerOptions(threads, room(ranks) / jobs, reproducible, checkpoint_every)
-    stop, begun, tell = Event(), Event(), Clock(pending, jobs).watched(report)
+    stop, due, begun = Event(), Event(), Event()
+    tell = Clock(pending, jobs).watched(report)
+
+    def stop_if_due() -> None:
+        if due.is_set() and begun.is_set():  # each call begins a task
+            stop.set()
 
     def watch(progress: Progress) -> None:
         if progress.event == "start":
             begun.set()
+            stop_if_due()
         tell(progress)
 
+    def time_is_over() -> None:
+        due.set()
+        stop_if_due()
+
     context = SolveContext(options, watch, stop, ranks)
-    limit = _time_to_work(max_seconds, pending, jobs)
-    with noted(stop), _timer(stop, limit, begun), _folder(study, tasks, ranks) as damaged:
+    limit = None
+    if max_seconds is not None and pending:  # early enough to save all and to collect it
+        limit = max(max_seconds / 2, max_seconds - seconds_to_stop(pending, jobs))
+    with noted(stop), _timer(time_is_over, limit), _folder(study, tasks, ranks) as damaged:
         unusable = plans.plan_with(study.parts, estimated=reproducible)
         context.warn(*moved, *damaged, *filter(None, [unusable]))
         try:
@@ -110,13 +123,6 @@ def run_study(
         if not any(status.is_failure for status in solved):
             _check_output(pending, agree(ranks, study.held()))
     return outcome + solved
-
-
-def _check_shared(spec: Spec) -> None:
-    """Raise InputError for a spec whose contacts several processes cannot share."""
-    problems = [f"output.{name}: takes whole grids" for name in spec.output.on_request()]
-    if problems:
-        raise InputError(f"{problems[0]}; run it without mpiexec")
 
 
 def _move_aside(study: Study, shard: tuple[int, int], ranks: Ranks | None) -> list[str]:
@@ -173,29 +179,16 @@ def _solve_all(
     return outcome
 
 
-def _time_to_work(max_seconds: float | None, pending: list[Task], jobs: int) -> float | None:
-    """Seconds after which to stop, so that all is saved and collected within `max_seconds`."""
-    if max_seconds is None or not pending:
-        return None
-    return max(max_seconds / 2, max_seconds - seconds_to_stop(pending, jobs))
-
-
 @contextmanager
-def _timer(stop: Event, seconds: float | None, begun: Event) -> Iterator[None]:
-    """Inside, an orderly stop is requested after so much time, but not before a task has begun."""
+def _timer(call: Callable[[], None], seconds: float | None) -> Iterator[None]:
+    """Inside, something is called after so much time."""
     if seconds is None:
         yield
         return
-
-    def request_stop() -> None:
-        begun.wait()
-        stop.set()
-
-    timer = Timer(min(seconds, TIMEOUT_MAX), request_stop)
+    timer = Timer(min(seconds, TIMEOUT_MAX), call)
     timer.daemon = True
     timer.start()
     try:
         yield
     finally:
         timer.cancel()
-        begun.set()  # ends a timer that still waits

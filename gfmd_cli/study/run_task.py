@@ -13,11 +13,10 @@ from gfmd_cli.solvers.loop import State
 from gfmd_cli.solvers.nested_grids import Resume
 from gfmd_cli.status import Status
 from gfmd_cli.study.checkpoint import Checkpoint
-from gfmd_cli.study.context import SolveContext, Watcher
+from gfmd_cli.study.context import Progress, SolveContext, Watcher
 from gfmd_cli.study.load_search import solve_at_load
 from gfmd_cli.study.measure import result
 from gfmd_cli.study.parts import read_record_entry, record_path, write_record
-from gfmd_cli.study.progress import Progress
 from gfmd_cli.study.tasks import Task
 from gfmd_cli.units import duration
 
@@ -75,13 +74,13 @@ class TaskWatcher(Watcher):
             if reached == self.first:  # else calls with too little time would never get further
                 self.short = True
                 return
-            self._save(contact, state)
+            self.checkpoint.save(contact, state, self.notes)
             if self.short:
                 self._warn_of_short_call()
             raise Interrupted(f"{self.task.label}: stopped, state saved")
         if request == SAVE:
             try:
-                self._save(contact, state)
+                self.checkpoint.save(contact, state, self.notes)
             except SpaceError as error:  # the solve does not need the saved state
                 self._warn(str(error))
             self.last_save = time.monotonic()
@@ -100,9 +99,6 @@ class TaskWatcher(Watcher):
             f"{self.task.label}: the stop was requested before the first step, which ended "
             f"{seconds} after the start of the task; each call needs more time than that"
         )
-
-    def _save(self, contact: Contact, state: State) -> None:
-        self.checkpoint.save(contact, state, self.notes)
 
     def _warn(self, message: str) -> None:
         self.context.warn(message, task=self.task.index, label=self.task.label)

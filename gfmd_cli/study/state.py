@@ -105,10 +105,10 @@ def _state(
     saved = {name: Checkpoint(study.parts / name).saved() for name, _ in tasks}
     set_aside = study.set_aside()
     records, damaged = study.records()
-    held = [*study.collected().items(), *((e.task_id, e.held) for e in records.values())]
-    known = {name: found.status for name, found in held if found.stored >= output}
+    held = study.held()
+    known = {name: found.status for name, found in held.items() if found.stored >= output}
     names = [path.name for path in (*set_aside, *damaged)]
-    others = {name for name, _ in held}.difference(name for name, _ in tasks)
+    others = held.keys() - {name for name, _ in tasks}
     states = [
         TaskState(
             index, label, known.get(name, Status.MISSING), None if name in known else saved[name]

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from math import prod
 from typing import Any
 
@@ -16,7 +17,6 @@ from gfmd_cli.physics.indenters import RigidSurface
 from gfmd_cli.physics.surfaces import check_resolved
 from gfmd_cli.solvers.auto import AnySolver
 from gfmd_cli.solvers.multigrid import ASPECT
-from gfmd_cli.spec.boundary import with_boundary
 from gfmd_cli.spec.models import (
     SOUGHT,
     SWEPT,
@@ -25,6 +25,7 @@ from gfmd_cli.spec.models import (
     OutputTable,
     Spec,
     digest,
+    with_boundary,
 )
 
 STIFFNESS_FIELDS, SPECTRA_FIELDS = 3.0, 1.0
@@ -48,12 +49,27 @@ SYMBOLS = {
     "mean_gap": "u_g",
     "displacement": "d",
 }
-SEARCH = 4.5  # solves that a search of the pressure takes, those on coarser grids included
+SEARCH = 3.5  # solves that a search of the pressure takes, those on coarser grids included
 LOAD_DIGITS = 14  # of a load that name its task: the last bit of a ladder depends on the machine
 MAX_TASKS = 100_000  # upper limit of a study, guards against typing errors
 MAX_COMBINATIONS = 2_000_000  # of all lists, of which paired lists choose a part
 SECONDS_PER_PAIR = 1.7e-8
 """Per grid point and pair of transforms, with all work between two of them, on one thread."""
+DECADES = -4, -3, -2, -1, 0
+PAIRS = {
+    0.1: (19, 32, 33, 15, 13),
+    0.25: (7, 7, 9, 15, 11),
+    0.5: (8, 5, 7, 20, 15),
+    1.0: (7, 7, 12, 15, 16),
+    1.5: (9, 22, 20, 15, 13),
+    2.0: (8, 21, 19, 18, 14),
+    2.5: (9, 23, 26, 23, 17),
+    3.0: (11, 33, 40, 33, 23),
+    3.5: (17, 65, 61, 50, 24),
+    4.0: (48, 97, 70, 51, 33),
+}
+"""Time of a solve over that of a pair of transforms, by n, at p* of these powers of ten. Measured
+on the default surface, 1024^2, residual 1e-6; at 2048^2 the ratio is 0.7 to 1.4 times as large."""
 
 
 @dataclass(frozen=True)
@@ -174,16 +190,18 @@ class Task:
         return 0.01 + solves * SECONDS_PER_PAIR * self.size * self._pairs()
 
     def _pairs(self) -> float:
-        """Pairs of transforms, fitted to the default surface at 512^2, tolerance 1e-6."""
+        """Time of the solve over that of a pair of transforms."""
         n = self.elastomer.exponent
-        n = 2.0 if n is None else n
-        if n == 0:
-            return 1.0
-        p = min(max(self.load if self.quantity == "p_star" else 0.05, 1e-5), 3.0)
-        pairs = float(np.interp(n, [0, 0.5, 1, 2, 3, 4], [30, 35, 30, 22, 30, 44]))
-        slope = float(np.interp(n, [0, 1, 2, 3, 4], [0.0, 0.1, 0.08, 0.07, 0.15]))
+        p = self.load if self.quantity == "p_star" else 0.05
         tightness = 1 - 0.1 * float(np.log10(max(self.solver.tolerance, 1e-14) / 1e-6))
-        return float(pairs * (p / 0.1) ** -slope * tightness)
+        return 1.0 if n == 0 else tightness * _measured_pairs(2.0 if n is None else n, p)
+
+
+@lru_cache(maxsize=1024)
+def _measured_pairs(n: float, p_star: float) -> float:
+    """See `PAIRS`, interpolated."""
+    by_pressure = [np.interp(n, list(PAIRS), pairs) for pairs in zip(*PAIRS.values(), strict=True)]
+    return float(np.interp(np.log10(max(p_star, 1e-14)), DECADES, by_pressure))
 
 
 def first_grid(surface: RigidSurface) -> int:
@@ -192,37 +210,6 @@ def first_grid(surface: RigidSurface) -> int:
     if surface.is_map:
         return needed
     return 2 * int(pyfftw.next_fast_len((max(needed, FIRST) + 1) // 2))
-
-
-def forecast(
-    surface: RigidSurface,
-    elastomer: LinearElastomer,
-    p_star: float | None,
-    accuracy: AccuracyTable | None,
-    boundary: str = "periodic",
-) -> int:
-    """Points along x that an "auto" grid will end with, right within a factor of two as a rule.
-
-    Relative errors on the first grid, and the order at which they fall: read off the default
-    surface with cutoff = 0.03, n = 0 to 4, p* = 0.01 to 1.
-    """
-    n, p = elastomer.exponent, p_star or 0.1
-    n = 1.0 if n is None else n
-    steep = float(np.interp(n, [0, 2, 3], [0.4, 0.48, 0.96]))
-    area = float(np.interp(n, [0, 1, 2, 3], [0.05, 0.09, 0.26, 0.8])) * min(p / 0.1, 1.0) ** -steep
-    gap = float(np.interp(n, [0, 1, 2, 3, 4], [0.007, 0.012, 0.035, 0.09, 0.27]))
-    typical = {
-        "a_r": (area, 1.6),
-        "u_g": (3 * gap if p > 0.3 else gap, 2.5),
-        "sigma_p": (0.03 * 3**n, max(0.5, min(2.0, 3.0 - n))),
-    }
-    doublings = [1 if boundary == "free" else 0]  # one grid gives no error there
-    for name, share in (accuracy.asked() if accuracy is not None else {}).items():
-        error, order = typical[name]
-        if n <= LAST[name]:
-            doublings.append(int(np.ceil((np.log2(error) - np.log2(share)) / order)))
-    points = first_grid(surface) * int(2 ** min(max(doublings), 20))
-    return points if accuracy is None else min(points, accuracy.max_points)
 
 
 def plan(spec: Spec) -> list[Task]:
@@ -251,7 +238,7 @@ def _tasks(spec: Spec) -> list[Task]:
             if key in tables[table]
         }
         for load in loads:
-            points = _points(spec, load=load, **chosen)
+            points = _points(spec, chosen, load)
             surface, points_y = chosen["grid"].on_cell(chosen["surface"], points)
             tasks.append(
                 Task(
@@ -274,7 +261,7 @@ def _tasks(spec: Spec) -> list[Task]:
 
 
 def _check(spec: Spec) -> None:
-    """Raise InputError for too many tasks, an unfit file, or a grid too coarse for its surface."""
+    """Raise InputError for too many tasks, an unfit file, or tables that do not suit each other."""
     count = prod(len(getattr(spec, table)) for table in SWEPT) * len(spec.load.values())
     if spec.sweep and count <= MAX_COMBINATIONS:
         count = sum(len(loads) for _, loads in spec.combinations())
@@ -287,7 +274,13 @@ def _check(spec: Spec) -> None:
         _check_grid(spec.surface[i], spec.grid[j])
     for places in dict.fromkeys(tuple(at[table] for table in SWEPT) for at in combinations):
         chosen = _chosen(spec, dict(zip(SWEPT, places, strict=True)))
-        _check_boundary(spec.load.quantity, **chosen)
+        elastomer, dimension = chosen["elastomer"], chosen["surface"].dimension
+        boundary = chosen["grid"].boundary or "periodic"
+        chosen["solver"].check_boundary(boundary)
+        if boundary == "free":
+            elastomer.check_free_boundary(dimension)
+        if spec.load.quantity == "displacement":
+            elastomer.check_displacement_load(boundary, dimension)
 
 
 def _chosen(spec: Spec, at: dict[str, int]) -> dict[str, Any]:
@@ -310,34 +303,33 @@ def _check_grid(surface: RigidSurface, grid: GridTable) -> None:
         check_resolved(on_cell, points, points_y)
 
 
-def _check_boundary(
-    quantity: str,
-    surface: RigidSurface,
-    elastomer: LinearElastomer,
-    grid: GridTable,
-    solver: AnySolver,
-) -> None:
-    """Raise InputError for an elastomer, a solver or a load that does not suit the boundary."""
-    solver.check_boundary(grid.boundary or "periodic")
-    if grid.boundary == "free":
-        elastomer.check_free_boundary(surface.dimension)
-    if quantity == "displacement":
-        elastomer.check_displacement_load(grid.boundary or "periodic", surface.dimension)
+def _points(spec: Spec, chosen: dict[str, Any], load: float) -> int:
+    """Points along x of the cell; of an "auto" grid a forecast, mostly within a factor of two.
 
-
-def _points(
-    spec: Spec,
-    surface: RigidSurface,
-    elastomer: LinearElastomer,
-    grid: GridTable,
-    solver: AnySolver,
-    load: float,
-) -> int:
-    """Points along x of the cell; of an "auto" grid the forecast."""
+    Relative errors on the first grid, and the order at which they fall: read off the default
+    surface with cutoff = 0.03, n = 0 to 4, p* = 0.01 to 1.
+    """
+    surface, grid, accuracy = chosen["surface"], chosen["grid"], spec.accuracy
     if grid.points != "auto":
-        return surface.copies * grid.points
-    p_star = load if spec.load.quantity == "p_star" else None
-    return forecast(surface, elastomer, p_star, spec.accuracy, grid.boundary or "periodic")
+        return int(surface.copies * grid.points)
+    p = load if spec.load.quantity == "p_star" and load else 0.1
+    n = chosen["elastomer"].exponent
+    n = 1.0 if n is None else n
+    steep = float(np.interp(n, [0, 2, 3], [0.4, 0.48, 0.96]))
+    area = float(np.interp(n, [0, 1, 2, 3], [0.05, 0.09, 0.26, 0.8])) * min(p / 0.1, 1.0) ** -steep
+    gap = float(np.interp(n, [0, 1, 2, 3, 4], [0.007, 0.012, 0.035, 0.09, 0.27]))
+    typical = {
+        "a_r": (area, 1.6),
+        "u_g": (3 * gap if p > 0.3 else gap, 2.5),
+        "sigma_p": (0.03 * 3**n, max(0.5, min(2.0, 3.0 - n))),
+    }
+    doublings = [1 if grid.boundary == "free" else 0]  # one grid gives no error there
+    for name, share in (accuracy.asked() if accuracy is not None else {}).items():
+        error, order = typical[name]
+        if n <= LAST[name]:
+            doublings.append(int(np.ceil((np.log2(error) - np.log2(share)) / order)))
+    points = first_grid(surface) * int(2 ** min(max(doublings), 20))
+    return points if accuracy is None else min(points, accuracy.max_points)
 
 
 def _task_id(spec: Spec, resolved: dict[str, Any], tables: dict[str, Any], load: float) -> str:

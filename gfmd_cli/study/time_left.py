@@ -6,11 +6,12 @@ from dataclasses import dataclass
 from math import isfinite, log
 from typing import Any
 
-from gfmd_cli.study.progress import Progress, Report
+from gfmd_cli.study.context import Progress, Report
 from gfmd_cli.study.tasks import SECONDS_PER_PAIR, Task
 
 AGAIN = 0.5  # least share of the elapsed time that the forecast alone says to remain
 KNOWN = 0.1  # share of the forecast work after which the measured speed is used
+ENDING = 2.0  # pairs of transforms after the last step, which show and store the result
 FOUND = 0.05  # share of the decrease of ln(residual) after which its rate predicts the rest
 
 
@@ -124,7 +125,10 @@ class Clock:
         if was.size == task.size and isfinite(was.first) and was.last > 0:
             way = log(max(was.first / task.solver.tolerance, 1.0))
             gone = log(max(was.first / was.last, 1.0))
-            if way > gone > FOUND * way:
+            ending = ENDING * SECONDS_PER_PAIR * task.size
+            if gone >= way:
+                return ending
+            if gone > FOUND * way:
                 by_residual = (now - was.reached) * (way - gone) / gone
-                return float(by_residual ** (gone / way) * left ** (1 - gone / way))
+                return float(ending + by_residual ** (gone / way) * left ** (1 - gone / way))
         return left

@@ -2,10 +2,10 @@
 
 from pathlib import Path
 
+import exact_solutions as reference
 import numpy as np
 
 from gfmd_cli.analysis.plotting import ColumnFigure, log_scale
-from gfmd_cli.physics import exact_solutions as reference
 from paper import kappa
 from paper.claims import Finding, Value, by_exponent
 from paper.studies import Held, needs
@@ -39,7 +39,7 @@ def fig01(held: Held, folder: Path) -> list[Finding]:
         every = slice(points // SHOWN // 2, None, points // SHOWN)
         style = style_of(row["n"], exponents)
         plot.points(style, x[every], shown[every], np.ones(shown[every].size, bool))
-        plot.line(plot.axes, "line force", x, np.minimum(theory, 1.3), **THIN)
+        plot.line("line force", x, np.minimum(theory, 1.3), **THIN)
         outside = np.abs(x) > 1.5 * touched
         off[f"n = {row['n']:g}"] = Value(np.abs(shown - theory)[outside].max())
         near = np.abs(np.abs(x) - 0.5) < 0.03
@@ -105,7 +105,7 @@ def fig02(held: Held, folder: Path) -> list[Finding]:
         style = style_of(tip.n, exponents)
         plot.points(style, tip.r[inside] / a, sigma[inside], np.ones(inside.size, bool))
         line = reference.hertz_profile(tip.n, rho, 1.0) if tip.n < 4 else np.ones_like(rho)
-        plot.line(plot.axes, "exact", rho, line, **THIN)
+        plot.line("exact", rho, line, **THIN)
     plot.axes.set(xlim=(0, 1.1), ylim=(0, 3))
     plot.write(folder / "fig02")
     return [_stress_law(held), *_plate_stress(shown)]
@@ -168,10 +168,10 @@ def fig03(held: Held, folder: Path) -> list[Finding]:
         plot.axes.plot(rho, drawn, **DASHED)
         near[f"n = {tip.n:g}"] = Value(abs(u - far)[np.searchsorted(rho, 2.0)])
         low.append(u[every].min())
-    plot.line(plot.axes, "point force in the cell", np.ones(1), np.ones(1), **DASHED)
+    plot.line("point force in the cell", np.ones(1), np.ones(1), **DASHED)
     rho = np.linspace(0, 3, 200)
     plot.axes.plot(rho, -(rho**2) / 2, color="0.7", lw=2, zorder=1)
-    plot.line(plot.axes, "indenter", np.ones(1), np.ones(1), color="0.7", lw=2)
+    plot.line("indenter", np.ones(1), np.ones(1), color="0.7", lw=2)
     plot.axes.set(xlim=(0, 5), ylim=(max(-5.0, 1.05 * min(low)), 0.2))
     plot.write(folder / "fig03")
     quantity = "difference at r = 2 a in a²/R, heights matched at the corner of the cell"
@@ -251,7 +251,7 @@ def fig03b(held: Held, folder: Path) -> list[Finding]:
         x = np.geomspace(0.01, 1, 100)
         if tip.n < 4:
             exact = (1 + x) ** 2 / 2 - reference.hertz_sag(tip.n, 1.0, 1.0, 1 + x)
-            plot.line(plot.axes, "exact, infinite plane", x, exact, **THIN)
+            plot.line("exact, infinite plane", x, exact, **THIN)
     log_scale(plot.axes, "x", 0.014, 0.8)
     log_scale(plot.axes, "y", 1e-6, 1)
     plot.write(folder / "fig03b")

@@ -2,11 +2,11 @@
 
 from pathlib import Path
 
+import exact_solutions as reference
 import numpy as np
 from scipy.optimize import least_squares
 
 from gfmd_cli.analysis.plotting import ColumnFigure
-from gfmd_cli.physics import exact_solutions as reference
 from paper.claims import Finding, Value, by_exponent
 from paper.studies import Held, needs
 from paper.tips import Tip, spread, stress_fit, style_of, tips
@@ -57,8 +57,8 @@ def kappa(held: Held, folder: Path) -> list[Finding]:
     shown = [n for n in primes if n < 3]
     x = np.linspace(0, 2.95, 200)
     exact = np.array([reference.kappa(n) for n in x])
-    plot.line(plot.axes, "exact", x, exact, color="black", lw=0.8)
-    plot.line(plot.axes, "Persson theory", x, np.full(x.size, PERSSON), color="0.5", ls=(0, (4, 2)))
+    plot.line("exact", x, exact, color="black", lw=0.8)
+    plot.line("Persson theory", x, np.full(x.size, PERSSON), color="0.5", ls=(0, (4, 2)))
     values = np.array(
         [primes[n].value * reference.kappa(n) / reference.kappa_prime(n) for n in shown]
     )

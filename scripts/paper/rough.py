@@ -31,10 +31,10 @@ def fig04(held: Held, folder: Path) -> list[Finding]:
         h, u = section["height"] / unit, section["u"] / unit
         x = (np.arange(h.size) / h.size - 0.5) * np.sqrt(2)
         if row is rows[0]:
-            plot.line(plot.axes, "indenter", x, h + SHIFT, color="black", lw=0.6)
+            plot.line("indenter", x, h + SHIFT, color="black", lw=0.6)
             plot.axes.lines[-1].set_ydata(h)
         style = STYLES[row["n"]]
-        plot.line(plot.axes, style.label, x, u + SHIFT, color=style.colour, lw=0.9)
+        plot.line(style.label, x, u + SHIFT, color=style.colour, lw=0.9)
         plot.axes.lines[-1].set_ydata(u)
         touching = contact_points(section)
         starts = np.flatnonzero(touching & ~np.roll(touching, 1))

@@ -34,7 +34,7 @@ def fig12(held: Held, folder: Path) -> list[Finding]:
         xs, ys = [*xs, p], [*ys, u.value]
     line = np.geomspace(min(map(np.min, xs)), max(map(np.max, xs)), 300)
     theory, exact = group.first.predict(line).u_g, einstein_prediction(line).u_g
-    plot.line(plot.axes, "exact, Gaussian", line, exact, color="black", ls=(0, (4, 2)), lw=0.9)
+    plot.line("exact, Gaussian", line, exact, color="black", ls=(0, (4, 2)), lw=0.9)
     plot.theory([(STYLES[1.0], line, theory)])
     finish(plot, folder, "fig12", "log", "linear", np.concatenate(xs), np.concatenate(ys))
     off = {at: float(np.interp(-at, -exact, theory) / at - 1) for at in (2.0, 2.5, 3.5)}

@@ -3,11 +3,11 @@
 from dataclasses import dataclass
 from itertools import product
 
+import exact_solutions as reference
 import numpy as np
 from scipy.optimize import curve_fit
 
 from gfmd_cli.analysis.curve_styles import MARKERS, CurveStyle, colours
-from gfmd_cli.physics import exact_solutions as reference
 from paper.claims import Value
 from paper.studies import Held
 

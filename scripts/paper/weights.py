@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 from scipy.special import erf
 
+from gfmd_cli.analysis.compare import VARIANTS
 from gfmd_cli.analysis.plotting import ColumnFigure
-from gfmd_cli.analysis.records import VARIANTS, true_contact_areas
 from gfmd_cli.physics.persson import gamma_n
 from paper.claims import Finding, Value
 from paper.drawing import STYLES, column, draw_points, finish, label
@@ -90,7 +90,7 @@ def _sampling(held: Held) -> list[Finding]:
         if group.n > 1:
             continue
         key = VARIANTS["deviation_bearing"]
-        predicted = Mean(np.array([true_contact_areas(curve)[key][:1] for curve in group.curves]))
+        predicted = Mean(np.array([[curve.records[0][key]] for curve in group.curves]))
         light[label(group.n)] = estimate(
             lambda theory, a: theory[0] / a[0], predicted, group.continuum("a_r").only([0])
         )

@@ -2,12 +2,12 @@
 
 from functools import cache
 
+import exact_solutions as reference
 import numpy as np
 import pytest
 from scipy.integrate import simpson
 from scipy.special import gamma, zeta
 
-from gfmd_cli.physics import exact_solutions as reference
 from gfmd_cli.physics.contact import build_scene
 from gfmd_cli.physics.elastomers import Power
 from gfmd_cli.physics.indenters import Parabola

@@ -1,7 +1,10 @@
-"""The mean gap by coarse-graining: waves join the law of the interface, the shortest first.
+"""Two other theories of the mean gap; no equations of the paper, compared in docs/theory.md.
 
-No equation of the paper, and no constant of its own: derived in docs/physics.md, compared with
-simulations in docs/theory.md. With all waves shorter than a wavelength the interface has a law
+`FittedWeight` has another weight of the elastic energy, with constants that scripts/gap_theories.py
+fits to simulations.
+
+`CoarseGrained` has no constant of its own (docs/physics.md): waves join the law of the interface,
+the shortest first. With all waves shorter than a wavelength the interface has a law
 u_g(p). Under a longer wave it acts as springs of stiffness kappa = -dp/du_g in series with the
 elastomer of stiffness k(q), which flatten the share T = kappa / (kappa + k) of the wave. The work
 F(p), the integral of u_g from 0 to p, increases by T k dC / 2 with waves of squared height dC.
@@ -15,7 +18,8 @@ import numpy as np
 from scipy.linalg import solve_banded
 
 from gfmd_cli.grid.arrays import Field
-from gfmd_cli.physics.persson import Persson, monotone_cubic
+from gfmd_cli.physics.interpolation import monotone_cubic
+from gfmd_cli.physics.persson import Persson
 
 _LOWEST, _HIGHEST = 1e-8, 8.0  # pressures of the law [Delta_sigma]
 _CELL, _BEND = 0.06, 0.5  # cells of 6 % of p well below _BEND, of 0.03 Delta_sigma above
@@ -24,6 +28,10 @@ _STAGE = 1 - np.sqrt(0.5)  # of SDIRK2, of second order and L-stable
 _NEWTON_STEPS = 50  # a bound; 2 to 3 are taken
 _CONVERGED = 1e-6  # last Newton step relative to the largest gap; it converges quadratically
 _VANISHED = 1e-12  # relative to the largest gap; rounding below
+_ALPHA = (0.413, 0.609)  # alpha = 0.413 + 0.609 n
+_BETA = (0.623, 0.874)  # beta = 0.623 exp(-n / 0.874)
+_C = (0.921, -0.304, 0.144)  # c = 0.921 - 0.304 n + 0.144 n^2
+_LEAST = 1e-300  # contact area: below, the slopes count as zero
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,6 +92,37 @@ class CoarseGrained(Persson):
             start = gap + (1 - _STAGE) / _STAGE * (middle - gap)
             gap = _implicit(faces, start, middle, k, _STAGE * added)
         return faces, gap
+
+
+@dataclass(frozen=True, eq=False)
+class FittedWeight(Persson):
+    """Persson theory with W = a^alpha s^beta [c + (1 - c) a^2] of two contact areas.
+
+    a is the contact area at the scale q, as in Eq. (30), s that with all waves. Fitted at p* = 0.01
+    to 0.3 on nine spectra with lambda_r / lambda_s = 16 and 32 for n = 0 to 4.
+    """
+
+    n: Field
+    """Exponent of k(q) of every shell; exponents beyond [0, 4] count as these ends."""
+
+    mean_gap_source: ClassVar[str] = "a fitted weight"
+
+    def weight(self, a: Field, s: Field) -> tuple[Field, Field, Field]:
+        """W, dW/da and dW/ds, all of shape (pressures, bins); 0 <= a, s <= 1.
+
+        Parameters
+        ----------
+        a : mean contact area of every bin, shape (pressures, bins)
+        s : contact area with all waves, shape (pressures, 1)
+        """
+        n = np.clip(self.n, 0.0, 4.0)
+        alpha = _ALPHA[0] + _ALPHA[1] * n
+        beta = _BETA[0] * np.exp(-n / _BETA[1])
+        c = _C[0] + _C[1] * n + _C[2] * n * n
+        power, rest = a**alpha * s**beta, (1 - c) * a * a
+        w = power * (c + rest)
+        by_a = (alpha * w + 2 * power * rest) / np.maximum(a, _LEAST)
+        return w, by_a, beta * w / np.maximum(s, _LEAST)
 
 
 def _interpolated(x: Field, values: Field, at: Field) -> Field:

@@ -1,4 +1,4 @@
-"""Displacements of an elastomer without borders whose stiffness is a table.
+"""Displacements of an elastomer without borders whose stiffness is no power law.
 
 The compliance kernel in two dimensions, and its integral over a disc, are the Hankel transforms
 
@@ -11,9 +11,9 @@ of the compliance, with s = q r and d[t J_1(t)]/dt = t J_0(t). In one dimension
 
 The integrals over s end at about CUT radians, where a smooth step turns the wave off (Abel's
 summation): a smooth compliance has no part in the rest. Each integral is Gauss's rule on intervals
-that end at the knots of the table, where its derivatives jump; below the first knot k is a power
-law. The integral of G over the triangle between the x-axis, the line x = X and the direction to the
-corner (X, Y) is that of H over the angle; with the distance X cosh(v) on this line it is
+that end at the knots of the stiffness, where its derivatives jump; below the first knot k is a
+power law. The integral of G over the triangle between the x-axis, the line x = X and the direction
+to the corner (X, Y) is that of H over the angle; with the distance X cosh(v) on this line it is
 
     int_0^asinh(Y/X) H(X cosh v) / cosh v dv,
 
@@ -22,7 +22,8 @@ and a second triangle makes the rectangle from the origin to the corner.
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from math import hypot
+from functools import partial
+from math import hypot, inf
 
 import numpy as np
 from scipy.special import erfc, j0, j1
@@ -33,8 +34,10 @@ from gfmd_cli.physics.free_compliance import (
     ALL_ROWS,
     Shape,
     Spacings,
+    by_corners,
     near_shape,
-    pixel_averages,
+    overwrite,
+    pixel_integrals,
 )
 
 CUT, STEP = 300.0, 20.0  # radians; the step leaves exp(-STEP^2 / 4) of a wave
@@ -58,7 +61,7 @@ WAVES: dict[str, tuple[Callable[[Field], Field], int, int]] = {
 
 @dataclass(frozen=True, eq=False)
 class Compliance:
-    """1/k(q) of a table, and its transforms."""
+    """1/k(q), and its transforms."""
 
     stiffness: Callable[[Field], Field]
     """k(q) for q > 0."""
@@ -66,8 +69,34 @@ class Compliance:
     """Wavenumbers [1/m] at which derivatives of k jump, rising; below them k is a power law."""
     lowest_exponent: float
     """Exponent of this power law, less than the dimension."""
+    reach: float = inf
+    """Distance from which displacements are below rounding [m]."""
     known: dict[tuple[str, int], float] = field(default_factory=dict)
     """Transforms that were computed, by wave and PER_E_FOLD ln r."""
+
+    def displacements(self, shape: Shape, spacings: Spacings, rows: slice = ALL_ROWS) -> Field:
+        """Displacements indexed by the distance of two pixels, in two dimensions or in one."""
+        if len(shape) == 1:
+            return self._line(*shape, *spacings)
+        held = near_shape(shape, spacings, self.reach / max(spacings) + 1)
+        near = near_shape(shape, spacings, NEAR + 1)
+        out = np.zeros((len(range(*rows.indices(shape[0]))), shape[1]))
+        if near != shape:
+            least = max(0.5 * min(spacings), NEAR * max(spacings) - hypot(*spacings))
+            kernel = self.spline("point", least, max(least, _diagonal(held, spacings)))
+            closer = near_shape(held, spacings, free_compliance.NEAR)
+            for part, nodes in ((held, free_compliance.NODES), (closer, NODES)):
+                values = pixel_integrals(
+                    lambda r: kernel(np.maximum(r, least)), part, spacings, rows, nodes
+                )
+                overwrite(out, values)
+        disc = self.spline("disc", 0.5 * min(spacings), _diagonal(near, spacings))
+        return overwrite(out, by_corners(partial(_corner, disc), near, spacings, rows))
+
+    def _line(self, points: int, spacing: float) -> Field:
+        edges = (np.arange(points + 1) - 0.5) * spacing
+        integral = self.spline("line", 0.5 * spacing, edges[-1])
+        return np.asarray(np.diff(np.sign(edges) * integral(np.abs(edges))))
 
     def spline(self, wave: str, low: float, high: float) -> Callable[[Field], Field]:
         """A transform as a function of the distance, from `low` to `high` [m]."""
@@ -116,32 +145,6 @@ def _intervals(low: float, high: float) -> Field:
     return np.concatenate([np.geomspace(low, turn, count), np.arange(turn, high, WIDEST)[1:]])
 
 
-def plane(
-    compliance: Compliance, shape: Shape, spacings: Spacings, rows: slice = ALL_ROWS
-) -> Field:
-    """Displacements in two dimensions, indexed by the distance of two pixels [y, x]."""
-    shortest, diagonal = 0.5 * min(spacings), hypot(*spacings)
-    reach = NEAR * max(spacings)
-    near = tuple(min(m, int(reach / side) + 1) for m, side in zip(shape, spacings, strict=True))
-    out = np.zeros((len(range(*rows.indices(shape[0]))), shape[1]))
-    if near != shape:
-        least = max(shortest, reach - diagonal)
-        kernel = compliance.spline("point", least, _diagonal(shape, spacings))
-        parts = (shape, free_compliance.NODES), (near_shape(shape, spacings), NODES)
-        for part, nodes in parts:  # the nearer pixels of each part are overwritten
-            values = pixel_averages(
-                lambda r: kernel(np.maximum(r, least)), part, spacings, rows, nodes
-            )
-            out[: len(values), : part[1]] = values
-        out *= spacings[0] * spacings[1]
-    disc = compliance.spline("disc", shortest, _diagonal(near, spacings))
-    y, x = ((np.arange(m + 1) - 0.5) * side for m, side in zip(near, spacings, strict=True))
-    corner = _corner(disc, y[:, None], x[None, :])
-    closed = np.diff(np.diff(corner, axis=0), axis=1)[rows]
-    out[: len(closed), : near[1]] = closed
-    return out
-
-
 def _diagonal(shape: Shape, spacings: Spacings) -> float:
     """Diagonal of a map of these points [m]."""
     return hypot(*(m * side for m, side in zip(shape, spacings, strict=True)))
@@ -157,10 +160,3 @@ def _corner(disc: Callable[[Field], Field], y: Field, x: Field) -> Field:
             stretch = np.cosh(half * (1 + node))
             total += weight * half * disc(across * stretch) / stretch
     return np.asarray(np.sign(y) * np.sign(x) * total)
-
-
-def line(compliance: Compliance, points: int, spacing: float) -> Field:
-    """Displacements in one dimension, indexed by the distance of two points."""
-    edges = (np.arange(points + 1) - 0.5) * spacing
-    integral = compliance.spline("line", 0.5 * spacing, edges[-1])
-    return np.asarray(np.diff(np.sign(edges) * integral(np.abs(edges))))

@@ -1,4 +1,4 @@
-"""Displacements of an elastomer whose stiffness is a table: closed forms, other quadratures."""
+"""Displacements of an elastomer by transforms: closed forms, other quadratures."""
 
 from itertools import pairwise
 
@@ -7,9 +7,9 @@ import pytest
 from scipy.integrate import quad
 from scipy.special import gamma, j0, j1
 
+from gfmd_cli.physics.compliance_transforms import Compliance, separated
 from gfmd_cli.physics.elastomers import HalfSpace, Layer, Power, Tabulated
-from gfmd_cli.physics.persson import monotone_cubic
-from gfmd_cli.physics.table_compliance import Compliance, separated
+from gfmd_cli.physics.interpolation import monotone_cubic
 
 
 def table_of(tmp_path, q, k):

@@ -1,0 +1,88 @@
+"""Sections without figures: what failed, how two studies differ, where a study comes from."""
+
+import json
+
+from gfmd_cli.analysis.diff import diff
+from gfmd_cli.analysis.diff_table import NOTHING, diff_lists, diff_table
+from gfmd_cli.analysis.table import Column, Group, Record, Table
+from gfmd_cli.analysis.tables import P_STAR, RESIDUAL, STATUS
+from gfmd_cli.analysis.units import count
+from gfmd_cli.report.data import ReportData
+from gfmd_cli.report.section import Section
+from gfmd_cli.status import Status
+
+MAX_ROWS = 100  # contacts that the table of failures lists
+MACHINE = {
+    "node": "Node",
+    "system": "System",
+    "processor": "Processor",
+    "cores": "Cores",
+    "python": "Python",
+    "slurm_job": "Slurm job",
+    "plans": "FFT plans",
+}
+
+
+def failures(data: ReportData) -> Section:
+    """Contacts that are not converged or missing."""
+    failed, missing = data.failed, data.missing
+    tasks = ", ".join(missing[:MAX_ROWS]) + (", ..." if len(missing) > MAX_ROWS else "")
+    left_out = len(failed) > MAX_ROWS
+    return Section(
+        "What failed or is missing",
+        notes=[f"The first {MAX_ROWS} of {len(failed)} are listed."] if left_out else [],
+        tables=[Table(UNCONVERGED_CAPTION, UNCONVERGED, [Group("", failed[:MAX_ROWS])])],
+        template="failures.html",
+        content={"count": count(len(missing), "contact"), "tasks": tasks} if missing else None,
+    )
+
+
+def _reason(row: Record) -> str:
+    """Why a contact is not converged; empty for a status that is unknown."""
+    return Status(row["status"]).explain(row) if row["status"] in list(Status) else ""
+
+
+UNCONVERGED_CAPTION = (
+    "Contacts that ended above the requested tolerance. Their values are kept; figures show "
+    "them as crosses."
+)
+UNCONVERGED = (
+    Column("task", "task", "d"),
+    Column("body", "elastomer"),
+    Column("surface", "surface"),
+    P_STAR,
+    STATUS,
+    RESIDUAL,
+    Column("tolerance", "tolerance", ".1e"),
+    Column("steps", "steps", "d"),
+    Column("reason", _reason),
+)
+
+
+def difference(one: ReportData, other: ReportData) -> Section:
+    """What `gfmd diff` writes: pairs of contacts, rows of one study only, keys that differ."""
+    found = diff(one.comparison.path, other.comparison.path)
+    notes = [] if found.pairs else [f"{NOTHING.capitalize()}."]
+    lists = diff_lists(found)
+    tables = [diff_table(found)]
+    return Section("Difference", notes, tables, template="difference.html", content=lists)
+
+
+def provenance(data: ReportData) -> Section:
+    """Spec, versions, machine, date, commit."""
+    attributes, machine = data.attributes, data.json("machine")
+    software = [attributes.get(name, "") for name in ("software", "software_version")]
+    facts = [
+        ("Study", data.name),
+        ("Written", attributes.get("date", "")),
+        ("Software", " ".join(software).strip()),
+        ("Git commit", attributes.get("git_commit", "")),
+        *((title, str(machine.get(key, ""))) for key, title in MACHINE.items()),
+        *data.json("packages").items(),
+    ]
+    content = {
+        "spec_text": attributes.get("spec_text", ""),
+        "resolved": json.dumps(data.json("spec"), indent=1),
+        "facts": facts,
+    }
+    return Section("Provenance", template="provenance.html", content=content)

@@ -1,0 +1,185 @@
+"""Sections whose figures are those of `gfmd analyze` and `gfmd bench`, with the tables behind them.
+
+Contact area, mean gap and stress deviation over the pressure, distribution of the stress, speed
+against error; error bars and optional observables, which are tables alone.
+"""
+
+from gfmd_cli.analysis.distribution_figure import Density, densities
+from gfmd_cli.analysis.table import Column, Group, Table, product, ratio
+from gfmd_cli.analysis.tables import (
+    CONTACT_AREA,
+    MEAN_GAP,
+    STRESS_DEVIATION,
+    continuum_table,
+    observables_table,
+    over_pressure,
+    power_laws,
+    seeds_table,
+    true_contact_table,
+)
+from gfmd_cli.bench.figure import bench_figures
+from gfmd_cli.bench.table import bench_table
+from gfmd_cli.report.data import ReportData, item_title
+from gfmd_cli.report.section import Drawing, Section
+from gfmd_cli.report.svg import drawing
+
+EXPLANATION = (
+    "In this and the next figures over the pressure, symbols are the simulation: in the continuum "
+    "with its error where that is known, else on the grid. Bars: estimated distance to the "
+    "continuum; crosses: not converged."
+)
+LINES = " Lines: Persson theory of the same spectrum."
+BEHIND = "Table behind the figures"
+FIGURES = {
+    "contact_area": "Relative contact area over reduced pressure",
+    "contact_area_ratio": "Contact area over that of Persson theory",
+    "mean_gap_log": "Mean gap over the logarithm of the reduced pressure",
+    "mean_gap_tail": "Logarithm of the mean gap over the reduced pressure",
+    "stress_deviation": "Standard deviation of the stress over reduced pressure",
+}
+"""Figures over the pressure by name, with what they show."""
+DISTRIBUTIONS = {
+    "stress_distribution": (
+        "Distribution of the stress over logarithmic stress, bodies side by side",
+        "Pr(sigma) of the bodies at about one pressure, over logarithmic bins. Symbols: "
+        "simulation{lines}. Bins with fewer than ten grid points are left out.",
+    ),
+    "stress_distribution_pressures": (
+        "Distribution of the stress over linear stress, at several pressures",
+        "Pr(sigma) of one body at several pressures. Thick: simulation{thin}.",
+    ),
+    "stress_distribution_continuum": (
+        "Distribution of the stress in the continuum, with error bars and edge laws",
+        "Pr(sigma) extrapolated over the grids, with error bars; faint: the grids; dashed: power "
+        "law of the stress at the edge of a contact.",
+    ),
+}
+"""Label and caption by the name of the figure; {lines}, {thin}: what says which is theory."""
+BINS_BEHIND = {
+    "stress_distribution": "Table: bodies at about one pressure",
+    "stress_distribution_pressures": "Table: one body at several pressures",
+}
+BINS = (
+    Column("sigma / Delta_sigma", "sigma"),
+    Column("sigma", product("sigma", "delta_sigma"), unit="Pa"),
+    Column("Pr(sigma) Delta_sigma", "density"),
+    Column("Pr(sigma)", ratio("density", "delta_sigma"), unit="1/Pa"),
+    Column("Persson, Pr(sigma) Delta_sigma", "theory", optional=True),
+)
+MAX_SCENES = 6  # of a bench, each with a figure
+BENCH_LABEL = "Relative error of the mean gap over transforms, and over seconds, for each solver"
+BENCH_CAPTION = (
+    "Error of the mean gap over the transforms and the processor time that a solver took. Thick: "
+    "the largest error from there on; thin: the error itself; crosses: not converged."
+)
+
+
+def contact_area(data: ReportData) -> Section:
+    """Relative contact area."""
+    caption, lines = "Relative contact area a_r.", ""
+    if data.comparison.has_theory:
+        caption = "Relative contact area a_r and Persson theory; ratio: simulation / theory."
+        lines = LINES
+    return Section(
+        "Contact area",
+        notes=[EXPLANATION + lines],
+        drawings=_drawings(data, "contact_area", "contact_area_ratio"),
+        disclosed={
+            BEHIND: over_pressure(CONTACT_AREA, caption, data.curves),
+            "Table: Persson theory with the stress over the true contact": true_contact_table(
+                data.curves
+            ),
+        },
+    )
+
+
+def mean_gap(data: ReportData) -> Section:
+    """Mean gap."""
+    caption = "Mean gap u_g between the surfaces, over the whole interface."
+    return Section(
+        "Mean gap",
+        drawings=_drawings(data, "mean_gap_log", "mean_gap_tail"),
+        disclosed={BEHIND: over_pressure(MEAN_GAP, caption, data.curves)},
+    )
+
+
+def stress_deviation(data: ReportData) -> Section:
+    """Standard deviation of the stress."""
+    caption = "Standard deviation sigma_p of the stress over the whole interface."
+    return Section(
+        "Stress deviation",
+        drawings=_drawings(data, "stress_deviation"),
+        disclosed={BEHIND: over_pressure(STRESS_DEVIATION, caption, data.curves)},
+    )
+
+
+def _drawings(data: ReportData, *names: str) -> list[Drawing]:
+    """The figures over the pressure of these names that the study has data for."""
+    return [
+        drawing(figure, name, f"{FIGURES[name]}: {', '.join(figure.legend)}", f"{FIGURES[name]}.")
+        for name in names
+        if (figure := data.figures.get(name))
+    ]
+
+
+def stress_distribution(data: ReportData) -> Section:
+    """Figures of Pr(sigma), the bins behind them, and power laws."""
+    lines, thin = "; lines: Persson theory", "; thin: Persson theory"
+    if not data.comparison.has_theory:
+        lines, thin = "", ""
+    bins = data.shown(BINS)
+    disclosed = {
+        BINS_BEHIND[name]: Table(
+            "Middle of each bin, density and theory.", bins, [_bins(density) for density in shown]
+        )
+        for name, shown in densities(data.items).items()
+    }
+    return Section(
+        "Stress distribution",
+        drawings=[
+            drawing(figure, name, label, caption.format(lines=lines, thin=thin))
+            for name, (label, caption) in DISTRIBUTIONS.items()
+            if (figure := data.figures.get(name))
+        ],
+        disclosed=disclosed | {"Table: power laws": power_laws(data.comparison)},
+    )
+
+
+def _bins(density: Density) -> Group:
+    unit = float(density.row["delta_sigma"])
+    theory = density.theory(density.sigma)
+    records = [
+        {"sigma": float(s), "density": float(d), "theory": float(t), "delta_sigma": unit}
+        for s, d, t in zip(density.sigma, density.density, theory, strict=True)
+    ]
+    return Group(f"{item_title(density.item)}, p* = {density.row['p_star']:.4g}", records)
+
+
+def error_bars(data: ReportData) -> Section:
+    """Continuum values with error bars, and means over seeds."""
+    tables = [continuum_table(data.curves), seeds_table(data.comparison)]
+    return Section("Error bars", tables=tables)
+
+
+def optional_observables(data: ReportData) -> Section:
+    """The observables that keys of [output] have turned on."""
+    return Section("Optional observables", tables=[observables_table(data.curves)])
+
+
+def work_precision(data: ReportData) -> Section:
+    """Work-precision diagrams of the bench that goes with the study, and their table."""
+    title = "Speed against error"
+    if not data.traces:
+        return Section(title)
+    figures = list(bench_figures(data.traces).values())
+    left_out = len(figures) > MAX_SCENES
+    return Section(
+        title,
+        notes=[f"{MAX_SCENES} of {len(figures)} scenes are shown."] if left_out else [],
+        drawings=[
+            drawing(figure, f"speed-{place}", BENCH_LABEL, BENCH_CAPTION, scrolls=True)
+            for place, figure in enumerate(figures[:MAX_SCENES])
+        ],
+        disclosed={BEHIND: bench_table(data.traces)},
+        template="work_precision.html",
+    )

@@ -1,0 +1,294 @@
+"""From plain tables to a Spec, or to one message that says what is wrong and where."""
+
+import os
+import re
+from collections.abc import Iterable, Sequence
+from difflib import get_close_matches
+from itertools import product
+from math import prod
+from pathlib import Path
+from typing import Any, get_args
+
+from pydantic import TypeAdapter, ValidationError
+
+from gfmd_cli.choice import Choice
+from gfmd_cli.errors import InputError
+from gfmd_cli.physics.elastomers import Elastomer
+from gfmd_cli.physics.surfaces import Surface
+from gfmd_cli.solvers.auto import AnySolver
+from gfmd_cli.spec.models import (
+    REPEATED,
+    SHAPES,
+    SOUGHT,
+    SWEPT,
+    AccuracyTable,
+    GridTable,
+    Ladder,
+    LoadTable,
+    OutputTable,
+    Spec,
+    StudyTable,
+    SweepTable,
+)
+
+MAX_SHOWN = 200  # characters of what was given, in a message
+MAX_PROBLEMS = 20  # of a spec that a message lists
+MAX_SWEEP = 100_000  # combinations of one table
+
+NUMBER = re.compile(r"\s*[+-]?\d[\d_]*\.?\d*([eE][+-]?\d+)?\s*")
+WORDS = {
+    "string_pattern_mismatch": "must begin with a letter or a digit and contain only letters, "
+    "digits, '.', '_' and '-', at most 100 of them"
+}
+"""What is allowed, by the type of pydantic's error, where its message is a regular expression."""
+MODELS: dict[str, Any] = {
+    "study": StudyTable,
+    "surface": Surface,
+    "elastomer": Elastomer,
+    "grid": GridTable,
+    "load": LoadTable,
+    "solver": AnySolver,
+    "output": OutputTable,
+    "accuracy": AccuracyTable,
+    "sweep": SweepTable,
+}
+"""The class of each table, or the union of the classes of its kinds."""
+ADAPTERS: dict[str, TypeAdapter[Any]] = {name: TypeAdapter(MODELS[name]) for name in MODELS}
+DEFAULT_KINDS = {"solver": "auto"}
+"""Of the tables whose `kind` may be left out."""
+REQUIRED = ("surface", "elastomer", "grid", "load")
+
+
+def kinds_of(table: str) -> dict[str, type[Choice]]:
+    """The classes of a table by their `kind`; empty for a table without kinds."""
+    model = MODELS[table]
+    if isinstance(model, type):
+        return {}
+    return {choice.model_fields["kind"].default: choice for choice in get_args(get_args(model)[0])}
+
+
+Places = tuple[int | None, ...]
+"""Where an entry stands in each group of paired lists; None where it has no list of the group."""
+Entry = tuple[Choice, Places]
+
+
+class Check:
+    """The check of the tables of one spec, which collects all that is wrong.
+
+    Each problem has its place: the line in `text`, or the --set that gave the key. Paths are
+    relative to `folder`.
+    """
+
+    def __init__(
+        self, name: str, text: str = "", overrides: Sequence[str] = (), folder: Path = Path()
+    ) -> None:
+        self.name, self.folder = name, folder
+        self.problems: list[str] = []
+        self.places = {
+            override.partition("=")[0].strip(): f"--set {override}" for override in overrides
+        }
+        table = ""
+        for number, line in enumerate(text.splitlines(), 1):
+            if header := re.match(r"\s*\[+\s*([\w.\-]+)\s*\]+", line):
+                table = header[1]
+                self.places.setdefault(table, f"{name}:{number}")
+            elif key := re.match(r"\s*([\w.\-]+)\s*=", line):
+                self.places.setdefault(f"{table}.{key[1]}" if table else key[1], f"{name}:{number}")
+
+    def where(self, key: str) -> str:
+        """The place of a key, or of the table around it."""
+        plain = re.sub(r"\[\d+\]", "", key)
+        while plain and plain not in self.places:
+            plain = plain.rpartition(".")[0]
+        return self.places.get(plain, self.name)
+
+    def add(self, key: str, text: str) -> None:
+        """Note what is wrong with a key."""
+        self.problems.append(f"{self.where(key)}: {key}: {text}")
+
+    def refuse(self) -> None:
+        """Raise InputError with all that is wrong, if anything is."""
+        if self.problems:
+            lines = list(dict.fromkeys(self.problems))
+            more = [f"and {len(lines) - MAX_PROBLEMS} more"] if len(lines) > MAX_PROBLEMS else []
+            raise InputError("\n".join([*lines[:MAX_PROBLEMS], *more]))
+
+    def spec(self, data: dict[str, Any]) -> Spec:
+        """The spec of these tables. Raises InputError."""
+        for name in map(str, data):  # tables from Python may have other keys
+            if name not in MODELS:
+                self.problems.append(f"{self.where(name)}: {_unknown(name, MODELS, 'table')}")
+        sweeps = self._sweeps(data)
+        tables: dict[str, Any] = {"sweep": sweeps, "places": {}, "source": self.name}
+        for name in [name for name in MODELS if name != "sweep"]:
+            if name in REQUIRED and name not in data:
+                self.problems.append(f"{self.name}: table [{name}] is missing")
+                continue
+            entries = self.entries(name, data.get(name, {}), _keys_of(name, sweeps))
+            choices = [choice for choice, _ in entries]
+            tables[name] = choices if name in SWEPT else next(iter(choices), None)
+            if sweeps and name in SWEPT:
+                tables["places"][name] = [places for _, places in entries]
+        load = tables.get("load")
+        if sweeps and load is not None:
+            groups = _keys_of("load", sweeps)
+            tables["places"]["load"] = [
+                _places_of({load.quantity: i}, groups) for i in range(len(load.listed()))
+            ]
+        if "accuracy" not in data:
+            tables["accuracy"] = None
+        self._compare(tables)
+        self.refuse()
+        return Spec(**tables)
+
+    def entries(self, name: str, given: Any, paired: Sequence[list[str]] = ()) -> list[Entry]:
+        """The choices of one table, different ones, with their places in the paired lists."""
+        entries: list[Entry] = []
+        for table in _alternatives(given) if name in REPEATED else [given]:
+            if isinstance(table, dict):
+                entries += self._build(name, table, paired)
+            else:
+                self.add(name, f"must be a table, got {shortened(repr(table))}")
+        return list(dict.fromkeys(entries)) if name in SWEPT else entries
+
+    def _build(self, name: str, table: dict[str, Any], paired: Sequence[list[str]]) -> list[Entry]:
+        """The choices of one table, every combination of its lists."""
+        axes = _axes(table, paired) if name in SWEPT else []
+        count = prod(len(table[keys[0]]) for keys in axes)
+        if not 0 < count <= MAX_SWEEP:
+            self.add(name, f"its lists have {count} combinations; 1 to {MAX_SWEEP} are allowed")
+            return []
+        built: list[Entry] = []
+        for indices in product(*(range(len(table[keys[0]])) for keys in axes)):
+            places = {key: i for keys, i in zip(axes, indices, strict=True) for key in keys}
+            values = table | {key: table[key][i] for key, i in places.items()}
+            if isinstance(values.get("path"), str):
+                values = values | {"path": os.path.realpath(self.folder / values["path"])}
+            if name in DEFAULT_KINDS:
+                values = {"kind": DEFAULT_KINDS[name]} | values
+            try:
+                built.append((ADAPTERS[name].validate_python(values), _places_of(places, paired)))
+            except ValidationError as error:
+                for detail in error.errors(include_url=False):
+                    self.add(*_problem(name, places, detail))
+        return built
+
+    def _sweeps(self, data: dict[str, Any]) -> list[SweepTable]:
+        """The groups of paired lists that are right."""
+        sweeps: list[SweepTable] = []
+        for sweep, _ in self.entries("sweep", data["sweep"]) if "sweep" in data else []:
+            assert isinstance(sweep, SweepTable)
+            wrong = _problems_of(sweep, data)
+            for text in wrong:
+                self.add("sweep.paired", text)
+            sweeps += [] if wrong else [sweep]
+        return sweeps
+
+    def _compare(self, tables: dict[str, Any]) -> None:
+        """Note what is wrong with tables that are each right by itself."""
+        accuracy, load = tables["accuracy"], tables.get("load")
+        auto = [grid for grid in tables.get("grid", []) if grid.points == "auto"]
+        if auto and accuracy is None:
+            self.add(
+                "grid.points",
+                '"auto" needs a table [accuracy] with the accuracy to reach, such as '
+                "mean_gap = 0.01",
+            )
+        if any(grid.points_y is not None for grid in auto):
+            self.add(
+                "grid.points_y",
+                'with grid.points = "auto" the points along y follow from the sides; give '
+                "surface.length_y",
+            )
+        if auto and load is not None and load.quantity in SOUGHT:
+            self.add(
+                "grid.points",
+                f'"auto" needs load.p_star or load.pressure; load.{load.quantity} is searched on '
+                "a given grid",
+            )
+        if accuracy is not None and not accuracy.asked():
+            self.add("accuracy", "give mean_gap, contact_area or stress_deviation")
+
+
+def _axes(table: dict[str, Any], paired: Sequence[list[str]]) -> list[list[str]]:
+    """The keys of a table that have a list, those of paired lists together."""
+    swept = [key for key, value in table.items() if isinstance(value, list)]
+    groups = [[key for key in swept if key in group] for group in paired]
+    single = [[key] for key in swept if not any(key in group for group in groups)]
+    return [*filter(None, groups), *single]
+
+
+def _alternatives(given: Any) -> list[Any]:
+    """The tables of a name that may be repeated."""
+    return given if isinstance(given, list) and given else [given]
+
+
+def _keys_of(table: str, sweeps: list[SweepTable]) -> list[list[str]]:
+    """The keys of one table in each group of paired lists."""
+    addresses = [[key.partition(".") for key in sweep.paired] for sweep in sweeps]
+    return [[key for name, _, key in group if name == table] for group in addresses]
+
+
+def _places_of(where: dict[str, int], groups: Sequence[list[str]]) -> Places:
+    """The places of an entry, from the place of each key in its list."""
+    return tuple(next((where[key] for key in group if key in where), None) for group in groups)
+
+
+def _problems_of(sweep: SweepTable, data: dict[str, Any]) -> list[str]:
+    """What is wrong with one group of paired lists."""
+    lengths: dict[str, list[int]] = {}
+    for address in sweep.paired:
+        table, _, key = address.partition(".")
+        values = [a.get(key) for a in _alternatives(data.get(table, {})) if isinstance(a, dict)]
+        lengths[address] = [len(value) for value in values if isinstance(value, list)]
+    problems = [f"{address} has no list" for address, found in lengths.items() if not found]
+    if len(lengths) < len(sweep.paired):
+        problems.append("a key is named twice")
+    if len({length for found in lengths.values() for length in found}) > 1:
+        told = [f"{address} has {' and '.join(map(str, n))}" for address, n in lengths.items()]
+        problems.append(f"all lists must have the same length; {', '.join(told)}")
+    return problems
+
+
+def _problem(name: str, places: dict[str, int], detail: Any) -> tuple[str, str]:
+    """The key, and what was given and what is allowed."""
+    kinds, loc = kinds_of(name), list(detail["loc"])
+    if detail["type"].startswith("union_tag") and kinds and not loc:
+        if detail["type"] == "union_tag_not_found":
+            return f"{name}.kind", f"is missing (known: {', '.join(kinds)})"
+        return f"{name}.kind", _unknown(str(detail["ctx"]["tag"]), kinds, "kind")
+    model = kinds[loc.pop(0)] if kinds else MODELS[name]
+    path = [part for part in loc if part not in SHAPES]
+    key = name
+    for part in path:
+        key += f"[{part}]" if isinstance(part, int) else f".{part}"
+        key += f"[{places[part]}]" if part in places else ""
+    if detail["type"] == "extra_forbidden":
+        within = Ladder if len(path) > 1 else model
+        known = [field.alias or field_name for field_name, field in within.model_fields.items()]
+        text = _unknown(str(path[-1]), known, "key")
+        owners = [kind for kind, other in kinds.items() if path[-1] in other.model_fields]
+        text += f"; kind {' or '.join(owners)} has it" if owners else ""
+    elif detail["type"] == "missing":
+        text = "is missing"
+    else:
+        message = detail["msg"].removeprefix("Value error, ")
+        message = message[:1].lower() + message[1:]
+        given = detail["input"]
+        message = WORDS.get(detail["type"], message)
+        text = message if isinstance(given, dict) else f"{message}, got {shortened(repr(given))}"
+        if isinstance(given, str) and NUMBER.fullmatch(given):
+            text += ": write the number without quotation marks"
+    return key, text
+
+
+def _unknown(given: str, known: Iterable[str], what: str) -> str:
+    """Message for a name that is not known, with the nearest known one."""
+    near = get_close_matches(given[:MAX_SHOWN], known, 1, 0.5)
+    hint = f" - did you mean {near[0]!r}?" if near else ""
+    return f"unknown {what} {shortened(given)!r}{hint} (known: {', '.join(known)})"
+
+
+def shortened(text: str) -> str:
+    """A text short enough for a message."""
+    return text if len(text) <= MAX_SHOWN else text[:MAX_SHOWN] + "..."
