@@ -64,10 +64,10 @@ def remove_parts(parts: Path) -> None:
 
 
 def _listed(folder: Path) -> list[Path]:
-    """What is in a folder; nothing where another process has just deleted it."""
+    """What is in a folder; nothing where there is none: perhaps it has just been deleted."""
     try:
         return list(folder.iterdir())
-    except FileNotFoundError:
+    except (FileNotFoundError, NotADirectoryError):
         return []
 
 
