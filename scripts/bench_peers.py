@@ -51,14 +51,14 @@ def gfmd(job, height):
         scene = build_scene(surface, HalfSpace(), len(height))
         contact = scene.contact(job["pressure"] / scene.delta_sigma)
         solver = Auto(tolerance=job["tolerance"])
-        found = solve_contact(contact, solver)
-        gap, pressure = found.u, found.sigma
+        solution = solve_contact(contact, solver)
+        gap, pressure = solution.u, solution.sigma
         gap -= contact.height
         pressure[gap > 0] = 0.0
         np.maximum(pressure, 0.0, out=pressure)
         gap *= scene.h_std
         pressure *= scene.delta_sigma
-        return gap, pressure, found.steps, found.status == "converged"
+        return gap, pressure, solution.steps, solution.status == "converged"
 
     return solve
 
@@ -102,16 +102,16 @@ def contact_mechanics(job, height):
         topography = Topography(height, (1.0, 1.0), periodic=True)
         system = NonSmoothContactSystem(substrate, topography)
         if job["variant"] == "pk":
-            found = system.minimize_proxy(
+            result = system.minimize_proxy(
                 external_force=job["pressure"],
                 pentol=length,
                 forcetol=job["tolerance"] * force,
                 thermotol=job["tolerance"],
                 maxiter=MAX_STEPS,
             )
-            return found.x - height - found.offset, found.jac / area, found.nit, found.success
+            return result.x - height - result.offset, result.jac / area, result.nit, result.success
         if job["variant"] == "dual":
-            found = constrained_conjugate_gradients(
+            result = constrained_conjugate_gradients(
                 system.dual_objective(0.0),
                 system.dual_hessian_product,
                 x0=uniform,
@@ -121,13 +121,13 @@ def contact_mechanics(job, height):
             )
         else:  # a uniform pressure lowers this code's half-space, too
             offset = float(substrate.evaluate_disp(-uniform).mean()) - job["mean_gap"]
-            found = system.dual_minimize_proxy(
+            result = system.dual_minimize_proxy(
                 offset, init_force=uniform, gtol=length, maxiter=MAX_STEPS
             )
-        forces = np.reshape(found.x, height.shape)
+        forces = np.reshape(result.x, height.shape)
         gap = substrate.evaluate_disp(-forces) - height  # `jac` is projected, hence of no use
         shift = gap[forces > 0].mean() if job["variant"] == "dual" else offset
-        return gap - shift, forces / area, found.nit, found.success
+        return gap - shift, forces / area, result.nit, result.success
 
     return solve
 
@@ -144,13 +144,13 @@ def aspher(job, height):
     def solve():
         if job["variant"] == "pcg":
             solver = code.ContactSolver(grid_size=len(height), backend="periodic")
-            found = solver.solve(**arguments, precond="fourier-fft")
+            result = solver.solve(**arguments, precond="fourier-fft")
         else:
             precision = "float_then_double" if job["variant"] == "mixed" else "double"
-            found = code.solve_nested(
+            result = code.solve_nested(
                 grid_size=len(height), backend="periodic", precision=precision, **arguments
             )
-        return found.gap, found.pressure, found.iterations, found.converged
+        return result.gap, result.pressure, result.iterations, result.converged
 
     return solve
 
@@ -333,8 +333,8 @@ def install(venv, packages=PEERS):
             pythons[package] = python
         else:
             print(f"{package}: left out, `{python} -m pip install {package}` fails")
-    found = [f"{package} {version(python, package)}" for package, python in pythons.items()]
-    print(", ".join(found))
+    versions = [f"{package} {version(python, package)}" for package, python in pythons.items()]
+    print(", ".join(versions))
     return pythons
 
 

@@ -45,23 +45,23 @@ def of_fftw(points: int, precision: str, threads: int) -> Callable[[], object]:
 
 def times(pair: Callable[[], object]) -> list[float]:
     """Milliseconds of each pair, for a while."""
-    found, end = [], time.monotonic() + SECONDS
-    while len(found) < 3 or time.monotonic() < end:
+    seconds, end = [], time.monotonic() + SECONDS
+    while len(seconds) < 3 or time.monotonic() < end:
         begun = time.perf_counter()
         pair()
-        found.append(1e3 * (time.perf_counter() - begun))
-    return found
+        seconds.append(1e3 * (time.perf_counter() - begun))
+    return seconds
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--points", type=int, nargs="+", default=[1024, 2048, 4096])
     parser.add_argument("--precision", default="double", choices=["double", "single"])
-    given = parser.parse_args()
+    arguments = parser.parse_args()
     ways = {"gfmd, 1 thread": (of_gfmd, 1), "gfmd, 2": (of_gfmd, 2), "FFTW, 2": (of_fftw, 2)}
-    for points in given.points:
+    for points in arguments.points:
         for name, (way, threads) in ways.items():
-            pair = way(points, given.precision, threads)
+            pair = way(points, arguments.precision, threads)
             alone = min(times(pair))
             other = multiprocessing.Process(target=spin, daemon=True)
             other.start()

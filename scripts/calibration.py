@@ -283,17 +283,17 @@ def measure(case: Case, tolerance: float = 1e-6) -> dict:
         contact, length = scene.contact(case.p_star / stress), scene.grid.length
         begun = time.perf_counter()
         solution = solve_contact(contact, Auto(tolerance=tolerance))
-        seen = observe(contact, solution.u, solution.sigma)
+        observables = observe(contact, solution.u, solution.sigma)
         levels.append(
             {
                 "points": points,
                 "exponent": local_exponent(case.elastomer, points, length),
                 "spread": exponent_spread(case.elastomer, points, length),
-                "a_r": seen.a_r,
-                "sigma_p": seen.sigma_p * stress,
-                "u_g": seen.u_g * height,
-                "perimeter": seen.perimeter,
-                "energy": seen.energy * stress * height,
+                "a_r": observables.a_r,
+                "sigma_p": observables.sigma_p * stress,
+                "u_g": observables.u_g * height,
+                "perimeter": observables.perimeter,
+                "energy": observables.energy * stress * height,
                 "border": _border(contact, solution),
                 "texture": None if case.body else _texture(case, scene),
                 "status": solution.status,
@@ -375,32 +375,32 @@ def scores(records: list[dict]) -> Iterator[Score]:
     """Every estimate from one, two or three neighbouring grids, FINER times coarser than truth."""
     for record in records:
         exact = truth(record["levels"])
-        seen = [
+        levels = [
             Level(*(level[key] for key in KEYS), border=level.get("border"))
             for level in record["levels"]
         ]
-        for last in range(len(seen) - int(np.log2(FINER))):
-            fine, found = seen[last], record["levels"][last]
-            rough = None if record["body"] else RoughnessScales(**found["texture"])
+        for last in range(len(levels) - int(np.log2(FINER))):
+            fine, at_last = levels[last], record["levels"][last]
+            rough = None if record["body"] else RoughnessScales(**at_last["texture"])
             if fine.u_g < FULL:
                 continue
             for grids in range(1, min(last + 1, 3) + 1):
-                given = seen[last + 1 - grids : last + 1]
-                by_name = estimate(given, found["exponent"], rough, found["spread"])
-                for quantity, made in by_name.items():
-                    if np.isnan(made.error):
+                used = levels[last + 1 - grids : last + 1]
+                by_name = estimate(used, at_last["exponent"], rough, at_last["spread"])
+                for quantity, value in by_name.items():
+                    if np.isnan(value.error):
                         continue
                     error = abs(getattr(fine, quantity) - exact[quantity])
                     yield Score(
                         record["name"],
                         record["fit"],
-                        found["exponent"],
+                        at_last["exponent"],
                         grids,
                         quantity,
                         error,
-                        made.error,
-                        abs(made.continuum - exact[quantity]),
-                        made.continuum_error,
+                        value.error,
+                        abs(value.continuum - exact[quantity]),
+                        value.continuum_error,
                     )
 
 
@@ -419,11 +419,11 @@ def summary(chosen: list[Score]) -> tuple[int, float, float, int, float, float]:
     )
 
 
-def table(found: list[Score]) -> None:
+def table(scored: list[Score]) -> None:
     """Print coverage and medians."""
 
     def line(label: str, which: Callable[[Score], bool]) -> None:
-        chosen = [score for score in found if which(score)]
+        chosen = [score for score in scored if which(score)]
         if chosen:
             n, held, ratio, m, held_too, ratio_too = summary(chosen)
             print(
@@ -475,7 +475,7 @@ def table(found: list[Score]) -> None:
         )
 
 
-def figure(found: list[Score], path: Path) -> None:
+def figure(scored: list[Score], path: Path) -> None:
     """Bar over true error of the cases that nothing was fitted to."""
     from gfmd_cli.analysis.plotting import ColumnFigure, Line2D, styled
 
@@ -489,7 +489,7 @@ def figure(found: list[Score], path: Path) -> None:
         }
         labels = {"a_r": "$a_r$", "sigma_p": "$\\sigma_p/\\Delta\\sigma$", "u_g": "$u_g/h_{std}$"}
         for quantity, (marker, colour) in looks.items():
-            chosen = [s for s in found if not s.fit and s.quantity == quantity]
+            chosen = [s for s in scored if not s.fit and s.quantity == quantity]
             x, y = ([getattr(s, name) for s in chosen] for name in ("error", "bar"))
             style = {"marker": marker, "ls": "none", "mfc": "none", "color": colour}
             plot.axes.plot(*np.clip((x, y), *span), ms=2.2, mew=0.4, **style)
@@ -539,10 +539,10 @@ def main() -> None:
         else:
             wanted = cases(folder, chosen.seed)
         records = collect(quick(wanted) if chosen.quick else wanted, chosen.cache)
-    found = list(scores(records))
-    table(found)
+    scored = list(scores(records))
+    table(scored)
     if chosen.figure:
-        figure(found, chosen.figure)
+        figure(scored, chosen.figure)
 
 
 if __name__ == "__main__":

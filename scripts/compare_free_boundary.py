@@ -34,14 +34,14 @@ def contact_mechanics(height, sides, pressure):
 
     substrate = FreeFFTElasticHalfSpace(height.shape, MODULUS, sides)
     system = NonSmoothContactSystem(substrate, Topography(height, sides))
-    found = system.minimize_proxy(
+    result = system.minimize_proxy(
         external_force=pressure * sides[0] * sides[1],
         pentol=TOLERANCE * float(height.std()),
         maxiter=MAX_STEPS,
     )
     own = tuple(slice(n) for n in height.shape)
     area = sides[0] * sides[1] / height.size
-    return found.x[own] - height - found.offset, found.jac[own] / area, found.success
+    return result.x[own] - height - result.offset, result.jac[own] / area, result.success
 
 
 def tamaas(height, sides, pressure):
@@ -83,8 +83,8 @@ def solve_by(code, python, height, sides, pressure):
         )
         command = [str(python), __file__, "--work", files["job"]]
         subprocess.run(command, check=True, capture_output=True, env={**os.environ, **ONE_THREAD})
-        found = np.load(result)
-        return found["gap"], found["stress"], bool(found["done"])
+        fields = np.load(result)
+        return fields["gap"], fields["stress"], bool(fields["done"])
 
 
 def cases(points, scans):
@@ -111,15 +111,15 @@ def compare(name, surface, points, points_y, p_star, pythons):
 
     scene = build_free_scene(surface, HalfSpace(E_star=MODULUS), points, points_y=points_y)
     contact = scene.contact(p_star)
-    found = solve_contact(contact, Auto(tolerance=TOLERANCE))
-    stress = scene.in_pascals(contact_pressure(contact.height, found.u, found.sigma))
-    gap = (found.u - contact.height) * scene.h_std
+    solution = solve_contact(contact, Auto(tolerance=TOLERANCE))
+    stress = scene.in_pascals(contact_pressure(contact.height, solution.u, solution.sigma))
+    gap = (solution.u - contact.height) * scene.h_std
     shape = f"{points} x {points_y}"
     touching = stress > 0
     print(
         f"{name:12} {shape:>9} {p_star:5g}  {'gfmd':18} {np.count_nonzero(touching):8d} {'':6} "
         f"{gap.mean() / scene.h_std:9.6f} {stress.std() / scene.delta_sigma:9.6f} "
-        f"{stress.max() / scene.delta_sigma:9.6f}  {found.status}, {found.residual:.0e}",
+        f"{stress.max() / scene.delta_sigma:9.6f}  {solution.status}, {solution.residual:.0e}",
         flush=True,
     )
     for code in CODES:

@@ -43,7 +43,7 @@ class Cost:
 
     counted: float
     """Pairs of transforms of the grid, those in single precision as half a pair."""
-    taken: float
+    time: float
     """Processor time of the whole solve over that of a pair of transforms in double precision."""
 
 
@@ -84,8 +84,8 @@ def table(points: int, repeats: int) -> None:
     print("| --- |", *("--- |" for _ in PRESSURES))
     for n in EXPONENTS:
         scene = build_scene(SURFACE, Power(n=n), points)
-        found = [cost(scene, p, pair, repeats) for p in PRESSURES]
-        shown = [f"{c.counted:.1f} → {c.taken:.0f} ({c.taken / c.counted:.1f}) |" for c in found]
+        costs = [cost(scene, p, pair, repeats) for p in PRESSURES]
+        shown = [f"{c.counted:.1f} → {c.time:.0f} ({c.time / c.counted:.1f}) |" for c in costs]
         print(f"| {n:g} |", *shown, flush=True)
 
 
@@ -95,7 +95,7 @@ def by_pressure(points: int, path: Path, repeats: int) -> None:
     curves = {}
     for n in EXPONENTS:
         scene = build_scene(SURFACE, Power(n=n), points)
-        costs = [cost(scene, p, pair, repeats).taken for p in pressures]
+        costs = [cost(scene, p, pair, repeats).time for p in pressures]
         curves[f"n = {n:g}"] = (pressures, np.array(costs))
     limit = np.full(pressures.size, 1 + preparation(points, pair, repeats))
     draw(P_STAR, curves, pressures, limit, path)
@@ -107,7 +107,7 @@ def by_grid(sizes: list[int], path: Path, repeats: int) -> None:
     pairs = {points: pair_of(Grid(points)) for points in sizes}
     curves = {}
     for p in PRESSURES:
-        costs = [cost(scene, p, pairs[points], repeats).taken for points, scene in scenes.items()]
+        costs = [cost(scene, p, pairs[points], repeats).time for points, scene in scenes.items()]
         curves[f"$p^*$ = {p:g}"] = (np.array(sizes), np.array(costs))
     limit = np.array([1 + preparation(points, pairs[points], repeats) for points in sizes])
     draw("points along a side", curves, np.array(sizes), limit, path)
@@ -117,11 +117,11 @@ def draw(label, curves, x, limit, path: Path) -> None:  # type: ignore[no-untype
     """Write a PNG, and print its values."""
     with styled():
         plot = ColumnFigure(label, COSTS)
-        for place, (name, (at, taken)) in enumerate(curves.items()):
+        for place, (name, (at, values)) in enumerate(curves.items()):
             style = CurveStyle(colours(len(curves))[place], MARKERS[place], name)
-            plot.axes.plot(at, taken, color=style.colour, lw=0.7)
-            plot.points(style, at, taken, np.full(at.size, True))
-            print(f"{name}: " + ", ".join(f"{value:.1f}" for value in taken), flush=True)
+            plot.axes.plot(at, values, color=style.colour, lw=0.7)
+            plot.points(style, at, values, np.full(at.size, True))
+            print(f"{name}: " + ", ".join(f"{value:.1f}" for value in values), flush=True)
         name = "preparation and one pair"
         plot.line(name, x, limit, color="0.4", ls=(0, (4, 2)), lw=0.9)
         print(f"{name}: " + ", ".join(f"{value:.1f}" for value in limit), flush=True)
@@ -139,11 +139,11 @@ def main() -> None:
     parser.add_argument("--repeats", type=int, default=3)
     parser.add_argument("--figures", type=Path, default=Path("docs/figures"))
     parser.add_argument("--table-only", action="store_true")
-    given = parser.parse_args()
-    table(given.points, given.repeats)
-    if not given.table_only:
-        by_pressure(given.points, given.figures / "cost_by_pressure", given.repeats)
-        by_grid(given.sizes, given.figures / "cost_by_grid", given.repeats)
+    arguments = parser.parse_args()
+    table(arguments.points, arguments.repeats)
+    if not arguments.table_only:
+        by_pressure(arguments.points, arguments.figures / "cost_by_pressure", arguments.repeats)
+        by_grid(arguments.sizes, arguments.figures / "cost_by_grid", arguments.repeats)
 
 
 if __name__ == "__main__":

@@ -35,9 +35,9 @@ def print_trend(title: str, groups: Groups, measure, digits: int) -> None:  # ty
     rows = []
     for n in exponents:
         for place, p in enumerate(LIGHT):
-            seen = [spread([measure(c)[place] for c in groups[n, depth]]) for depth in depths]
+            values = [spread([measure(c)[place] for c in groups[n, depth]]) for depth in depths]
             rows.append(
-                [f"{n:g}", f"{p:g}", *(f"{m:.{digits}f} ± {e:.{digits}f}" for m, e in seen)]
+                [f"{n:g}", f"{p:g}", *(f"{m:.{digits}f} ± {e:.{digits}f}" for m, e in values)]
             )
     print_table(title, ["$n$", "$p^\\ast$", *(f"{depth:g}" for depth in depths)], rows)
 

@@ -105,9 +105,9 @@ def print_weights(records: list[Record]) -> None:
         chosen = [r for r in records if (r["kind"], r["n"]) == (kind, n)]
         if len(chosen) < 2:
             continue
-        seen = np.array([r["weight"][i] for r in chosen])
+        fractions = np.array([r["weight"][i] for r in chosen])
         said = theory_weights(kind, n, p, float(gamma_n(n)))
-        cells = [f"{w:.3f} ({s:.3f})" for w, s in zip(seen.mean(axis=0), said, strict=True)]
+        cells = [f"{w:.3f} ({s:.3f})" for w, s in zip(fractions.mean(axis=0), said, strict=True)]
         beyond = np.mean([r["beyond"][i] for r in chosen])
         print(f"| {kind} | {n:g} | {p:g} | " + " | ".join(cells) + f" | {100 * beyond:.1f} % |")
 
@@ -116,12 +116,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("cache", type=Path, help="file of the measured surfaces, one a line")
     parser.add_argument("--no-run", action="store_true", help="use what is there")
-    given = parser.parse_args()
-    lines = given.cache.read_text().splitlines() if given.cache.exists() else []
+    arguments = parser.parse_args()
+    lines = arguments.cache.read_text().splitlines() if arguments.cache.exists() else []
     wanted = list(product(SEEDS, KINDS, EXPONENTS))
-    for seed, kind, n in [] if given.no_run else wanted[len(lines) :]:
+    for seed, kind, n in [] if arguments.no_run else wanted[len(lines) :]:
         lines.append(json.dumps(measure(kind, n, seed)))
-        given.cache.write_text("\n".join(lines) + "\n")
+        arguments.cache.write_text("\n".join(lines) + "\n")
     records = [json.loads(line) for line in lines]
     print_weights(records)
 

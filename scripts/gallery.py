@@ -56,9 +56,9 @@ def main() -> None:
         screenshot(folder)
         FIGURES.mkdir(parents=True, exist_ok=True)
         for picture in sorted(folder.glob("*.png")):
-            kept = FIGURES / picture.name
-            Image.open(picture).convert("RGB").quantize(COLOURS).save(kept, optimize=True)
-            size = kept.stat().st_size
+            copy = FIGURES / picture.name
+            Image.open(picture).convert("RGB").quantize(COLOURS).save(copy, optimize=True)
+            size = copy.stat().st_size
             print(f"{picture.name}: {size / 1000:.0f} kB")
             assert size <= MAX_SIZE, f"more than {MAX_SIZE} bytes"
         os.chdir(ROOT)

@@ -88,8 +88,8 @@ class Surface:
 def least(errors: Callable[[float], np.ndarray]) -> float:
     """The gamma of the least sum of squares."""
     squares = lambda gamma: float(np.sum(errors(gamma) ** 2))  # noqa: E731
-    found = minimize_scalar(squares, bounds=(0.0, 1.0), method="bounded", options={"xatol": 1e-5})
-    return float(found.x)
+    minimum = minimize_scalar(squares, bounds=(0.0, 1.0), method="bounded", options={"xatol": 1e-5})
+    return float(minimum.x)
 
 
 def spectrum_of(row: dict) -> str:
@@ -136,13 +136,13 @@ def fit(surfaces: dict[Key, Surface], springs: list[float], without: str = "") -
     """
     mean, scatter = [np.mean(springs)], [np.std(springs, ddof=1)]
     for n in EXPONENTS:
-        kept = [
+        usable = [
             surfaces[name, hurst, n].best()[FITTED].mean()
             for name, hurst in product(SPECTRA, HURST)
             if name != without
         ]
-        mean.append(np.mean(kept))
-        scatter.append(np.std(kept, ddof=1))
+        mean.append(np.mean(usable))
+        scatter.append(np.std(usable, ddof=1))
     n = np.array([0, *EXPONENTS])
     return np.asarray(curve_fit(smooth, n, mean, [0.4, 1.5, 0.1], scatter, absolute_sigma=True)[0])
 
@@ -210,14 +210,14 @@ def print_errors(surfaces: dict[Key, Surface], fits: dict[str, np.ndarray]) -> N
         return [float(gamma_n(n)), float(smooth(n, *fits[""])), float(smooth(n, *fits[name])), own]
 
     def cells(keys: list[Key]) -> list[str]:
-        told = []
+        words = []
         for chosen in range(4):
             errors = [surfaces[key].errors(gammas(key)[chosen]) for key in keys]
             of_mean = rms([one.mean(axis=0) for one in errors])
-            told.append(f"{100 * rms(errors):.1f} / {100 * of_mean:.1f}")
+            words.append(f"{100 * rms(errors):.1f} / {100 * of_mean:.1f}")
         scatter = rms([one - one.mean(axis=0) for one in errors])
         of_mean = scatter / np.sqrt(len(TEST) - 1)
-        return [*told, f"{100 * scatter:.1f} / {100 * of_mean:.1f}"]
+        return [*words, f"{100 * scatter:.1f} / {100 * of_mean:.1f}"]
 
     heads = ["Eq. (39)", "smooth", "smooth, other spectra", "same spectrum", "scatter of seeds"]
     by_n = [[f"{n:g}", *cells([key for key in surfaces if key[2] == n])] for n in EXPONENTS]
@@ -271,8 +271,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--folder", type=Path, default=Path("results/theory"))
     parser.add_argument("--figure", type=Path, default=Path("docs/figures/gamma"))
-    given = parser.parse_args()
-    surfaces = read(given.folder / "gamma.h5")
+    arguments = parser.parse_args()
+    surfaces = read(arguments.folder / "gamma.h5")
     chosen = [surfaces[name, hurst, EXPONENTS[0]] for name, hurst in product(SPECTRA, HURST)]
     springs = [exact_springs(surface.shells) for surface in chosen]
     print("gamma of n = 0 from the closed form:", *(f"{gamma:.4f}" for gamma in springs))
@@ -283,8 +283,8 @@ def main() -> None:
     print_best(surfaces)
     print_differences(surfaces)
     print_errors(surfaces, fits)
-    print_slabs(given.folder / "slab.h5", fits[""])
-    draw(surfaces, fits[""], given.figure)
+    print_slabs(arguments.folder / "slab.h5", fits[""])
+    draw(surfaces, fits[""], arguments.figure)
 
 
 if __name__ == "__main__":

@@ -104,9 +104,9 @@ def print_differences(curves: Curves) -> None:
     print("\nu_g(p_i) - u_g(p_i+1) over the integral of 1/kappa dp between 0.2 and 0.8, all seeds")
     for n in ALL_EXPONENTS:
         u_g, kappa = column(curves, n, "u_g"), column(curves, n, "stiffness")
-        kept = [i for i in range(P_STAR.size - 1) if P_STAR[i] >= 0.2 and P_STAR[i + 1] <= 0.6]
+        pairs = [i for i in range(P_STAR.size - 1) if P_STAR[i] >= 0.2 and P_STAR[i + 1] <= 0.6]
         ratios = []
-        for i in kept:
+        for i in pairs:
             step = np.log(P_STAR[i + 1] / P_STAR[i])
             ends = [P_STAR[j] / kappa[:, j] for j in (i, i + 1)]
             ratios.append((u_g[:, i] - u_g[:, i + 1]) / (step * (ends[0] + ends[1]) / 2))
@@ -143,8 +143,8 @@ def print_percolation(curves: Curves) -> None:
         for points in GRIDS:
             held = areas(curves, n, points)
             counted = column(curves, n, "a_r", points)
-            kept = slice(0, 4)  # the seeds of the finest grid
-            ends = [thresholds(curves, n, points, one)[kept].mean() for one in (counted, held)]
+            finest = slice(0, 4)  # the seeds of the finest grid
+            ends = [thresholds(curves, n, points, one)[finest].mean() for one in (counted, held)]
             cells.append("{:.3f} ({:.3f})".format(*ends))
         for held in (areas(curves, n, GRID), column(curves, n, "u_g"), np.tile(P_STAR, (16, 1))):
             ends = thresholds(curves, n, GRID, held)
@@ -181,12 +181,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--folder", type=Path, default=Path("results/theory"))
     parser.add_argument("--figures", type=Path, default=Path("docs/figures"))
-    given = parser.parse_args()
-    curves = read(given.folder / "stiffness.h5")
+    arguments = parser.parse_args()
+    curves = read(arguments.folder / "stiffness.h5")
     print_stiffness(curves)
     print_differences(curves)
     print_percolation(curves)
-    draw(curves, given.figures)
+    draw(curves, arguments.figures)
 
 
 if __name__ == "__main__":

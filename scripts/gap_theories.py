@@ -129,8 +129,8 @@ class Fits:
             keys = [(name, h, n) for name, h in product(SPECTRA, HURST) if name != without]
 
             def residuals(c: np.ndarray) -> np.ndarray:
-                found = [self.errors(form, c, key, FITTED).mean(axis=0) for key in keys]
-                return np.concatenate(found)
+                errors = [self.errors(form, c, key, FITTED).mean(axis=0) for key in keys]
+                return np.concatenate(errors)
 
             start = FORMS[form][1]
             self.known[form, n, without] = least_squares(residuals, start, method="lm").x
@@ -143,17 +143,17 @@ class Fits:
             weight = FORMS[GENERAL][0]
 
             def residuals(t: np.ndarray) -> np.ndarray:
-                found = [
+                errors = [
                     areas.log_gap(weight, of_n(0.0, t), P_STAR) - exact
                     for key, areas in self.springs.items()
                     if key[0] != without
                 ]
-                found += [
+                errors += [
                     self.errors(GENERAL, of_n(key[2], t), key, FITTED).mean(axis=0)
                     for key in self.surfaces
                     if key[0] != without
                 ]
-                return np.concatenate(found)
+                return np.concatenate(errors)
 
             self.known[WEIGHT, 0.0, without] = least_squares(residuals, SMOOTH, method="lm").x
         return self.known[WEIGHT, 0.0, without]
@@ -238,8 +238,8 @@ def print_between(path: Path) -> None:
         shells[key] = curve.persson.shells
     for key, grids in sorted(held.items()):
         finer = 4 / 3 * (grids[FINER][0] - grids[GRID][0])
-        seen = np.mean(grids[GRID], axis=0) + finer
-        errors = {name: log_gap(name, shells[key], key[0], P_STAR) - seen for name in THEORIES}
+        simulated = np.mean(grids[GRID], axis=0) + finer
+        errors = {name: log_gap(name, shells[key], key[0], P_STAR) - simulated for name in THEORIES}
         for name, error in errors.items():
             rows.append([f"{key[0]:g}", f"{key[1]}, H = {key[2]}", THEORIES[name], *signed(error)])
     heads = ["n", "surface", "", *(f"p* = {p:g}" for p in P_STAR)]
@@ -249,21 +249,21 @@ def print_between(path: Path) -> None:
 def print_other(path: Path) -> None:
     """Other pressures, on the grid of 512^2."""
     rows = []
-    for curves, seen in means(path, GRID):
+    for curves, simulated in means(path, GRID):
         n, p, shells = curves[0].n, curves[0].column("p_star"), curves[0].persson.shells
         at = np.array([np.argmin(np.abs(p - one)) for one in OTHER])
         for name, head in THEORIES.items():
-            rows.append([f"{n:g}", head, *signed(log_gap(name, shells, n, p[at]) - seen[at])])
+            rows.append([f"{n:g}", head, *signed(log_gap(name, shells, n, p[at]) - simulated[at])])
     print_table("Other pressures, per cent", ["n", "", *(f"p* = {p:g}" for p in OTHER)], rows)
 
 
 def print_depth(path: Path) -> None:
     """The range of the spectrum at p* = 0.01 and 0.1."""
     rows = []
-    for curves, seen in means(path):
+    for curves, simulated in means(path):
         n, p, row = curves[0].n, curves[0].column("p_star"), curves[0].rows[0]
-        told = [log_gap(name, curves[0].persson.shells, n, p) - seen for name in THEORIES]
-        cells = [" / ".join(signed(error[[0, 2]])) for error in told]
+        errors = [log_gap(name, curves[0].persson.shells, n, p) - simulated for name in THEORIES]
+        cells = [" / ".join(signed(error[[0, 2]])) for error in errors]
         rows.append([f"{n:g}", f"{row['rolloff'] / row['cutoff']:.0f}", *cells])
     heads = ["n", "λr/λs", *THEORIES.values()]
     print_table("Range of the spectrum, p* = 0.01 / 0.1, per cent", heads, rows)
@@ -275,9 +275,9 @@ def print_slabs(path: Path) -> None:
     for curve in compare(path).curves:
         row, shells = curve.rows[0], curve.persson.shells
         p = curve.column("p_star") * row["delta_sigma"] / curve.persson.delta_sigma
-        seen = np.log(curve.column("u_g_continuum"))
-        told = [log_gap(name, shells, np.nan, p) - seen for name in THEORIES]
-        held[row["thickness"]].append(told)
+        simulated = np.log(curve.column("u_g_continuum"))
+        differences = [log_gap(name, shells, np.nan, p) - simulated for name in THEORIES]
+        held[row["thickness"]].append(differences)
     rows = [
         [f"{t:g}", name, *signed(np.mean(errors, axis=0)[i])]
         for t, errors in held.items()
@@ -297,13 +297,13 @@ def print_weights(records: list[Record], fits: Fits) -> None:
         forms[WEIGHT] = FORMS[GENERAL][0], of_n(n, fits.smooth())
         errors: dict[str, list[np.ndarray]] = {form: [] for form in forms}
         for kind in KINDS:
-            seen = np.mean([r["weight"] for r in records if (r["kind"], r["n"]) == (kind, n)], 0)
+            mean = np.mean([r["weight"] for r in records if (r["kind"], r["n"]) == (kind, n)], 0)
             shells = scene_of(kind, n, 0).shells
             areas = Areas(shells)
             group = np.digitize(shells.q / (2 * np.pi), groups()) - 1
             for form, (weight, c) in forms.items():
                 w = weight(areas.scale, areas.all, c)
-                for p, measured in zip(PRESSURES, seen, strict=True):
+                for p, measured in zip(PRESSURES, mean, strict=True):
                     at = w[np.argmin(np.abs(np.log(NODES / p)))] * shells.energy
                     full = np.bincount(group, shells.energy, GROUPS)
                     with np.errstate(invalid="ignore"):
@@ -318,15 +318,15 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--folder", type=Path, default=Path("results/theory"))
     parser.add_argument("--weights", type=Path, default=Path("results/energy_weights.jsonl"))
-    given = parser.parse_args()
-    fits = Fits(read(given.folder / "gamma.h5"))
+    arguments = parser.parse_args()
+    fits = Fits(read(arguments.folder / "gamma.h5"))
     print_errors(fits)
     print_spectra(fits)
-    print_between(given.folder / "between.h5")
-    print_other(given.folder / "stiffness.h5")
-    print_depth(given.folder / "depth.h5")
-    print_slabs(given.folder / "slab.h5")
-    lines = given.weights.read_text().splitlines()
+    print_between(arguments.folder / "between.h5")
+    print_other(arguments.folder / "stiffness.h5")
+    print_depth(arguments.folder / "depth.h5")
+    print_slabs(arguments.folder / "slab.h5")
+    lines = arguments.weights.read_text().splitlines()
     print_weights([json.loads(line) for line in lines], fits)
 
 

@@ -38,20 +38,20 @@ def main() -> None:
     parser.add_argument("--p-star", type=float, nargs="+", default=[0.01, 0.1, 1.0])
     parser.add_argument("--tolerance", type=float, default=1e-4)
     parser.add_argument("--without-v-cycle", action="store_true")
-    given = parser.parse_args()
-    if given.without_v_cycle:
+    arguments = parser.parse_args()
+    if arguments.without_v_cycle:
         preconditioners.suits = lambda contact: False
-    print("| grid |" + "".join(f" n = {n:g} |" for n in given.exponents))
-    print("| --- |" + " --- |" * len(given.exponents))
+    print("| grid |" + "".join(f" n = {n:g} |" for n in arguments.exponents))
+    print("| --- |" + " --- |" * len(arguments.exponents))
     for name, (points, points_y, length_y) in SHAPES.items():
         print(f"| {name} |", end="")
         surface = SelfAffine(cutoff=0.02, length_y=length_y)
-        for n in given.exponents:
+        for n in arguments.exponents:
             scene = build_scene(surface, Power(n=n), points, points_y=points_y)
             numbers, seconds = [], []
-            for p_star in given.p_star:
+            for p_star in arguments.p_star:
                 start = time.process_time()
-                solution = solve_contact(scene.contact(p_star), Auto(tolerance=given.tolerance))
+                solution = solve_contact(scene.contact(p_star), Auto(tolerance=arguments.tolerance))
                 seconds.append(f"{time.process_time() - start:.2f}")
                 numbers.append(f"{solution.transforms:.0f}")
             print(f" {', '.join(numbers)}; {', '.join(seconds)} |", end="", flush=True)

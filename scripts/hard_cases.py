@@ -183,12 +183,12 @@ class Result:
     solution: Solution
     status: str
     seconds: float
-    seen: Observables
+    observables: Observables
 
     @property
     def identity(self) -> float:
         """|2 v / (<sigma h> - p <u>) - 1|."""
-        return abs(2 * self.seen.energy / self.seen.work - 1)
+        return abs(2 * self.observables.energy / self.observables.work - 1)
 
     def floor(self) -> float:
         """The residual that rounding u leaves."""
@@ -233,13 +233,14 @@ def row(case: Case, points: int, seconds: float) -> str:
         warnings.simplefilter("always")
         contact = case.contact(points)
         result = solve(contact, seconds=seconds)
-    found, seen = result.solution, result.seen
+    solution, observables = result.solution, result.observables
     floor, status = result.floor(), result.status
     off = "-"
     if result.status == "converged":
         tighter = solve(contact, TIGHTER, seconds)
         if tighter.status == "converged":
-            off = f"{abs(seen.u_g - tighter.seen.u_g) / max(tighter.seen.u_g, TINY):.1e}"
+            exact = tighter.observables.u_g
+            off = f"{abs(observables.u_g - exact) / max(exact, TINY):.1e}"
     if caught:
         status += f" ({len(caught)} warnings: {caught[0].message})"
     cells = [
@@ -248,11 +249,11 @@ def row(case: Case, points: int, seconds: float) -> str:
         case.exponent,
         f"{contact.pressure:.3g}",
         status,
-        f"{found.residual:.1e}",
-        f"{found.transforms / 2:.0f}",
+        f"{solution.residual:.1e}",
+        f"{solution.transforms / 2:.0f}",
         f"{result.seconds:.2f}",
-        f"{seen.a_r:.3g}",
-        f"{seen.u_g:.4g}",
+        f"{observables.a_r:.3g}",
+        f"{observables.u_g:.4g}",
         f"{result.identity:.1e}",
         off,
         f"{floor:.0e}" + (" **out of reach**" if floor > TOLERANCE else ""),
@@ -265,14 +266,14 @@ def main() -> None:
     parser.add_argument("--points", type=int, default=512)
     parser.add_argument("--only", default="", help="cases whose name contains this")
     parser.add_argument("--seconds", type=float, default=30.0, help="for one solve")
-    given = parser.parse_args()
+    arguments = parser.parse_args()
     print("| " + " | ".join(HEAD) + " |\n" + "| --- " * len(HEAD) + "|")
     solve(build_scene(SelfAffine(cutoff=0.1), Power(n=3), 64).contact(0.1))  # loads the kernels
     with tempfile.TemporaryDirectory() as name:
-        write_inputs(Path(name), given.points)
-        for case in cases(given.points, Path(name)):
-            if given.only in str(case):
-                print(row(case, given.points, given.seconds), flush=True)
+        write_inputs(Path(name), arguments.points)
+        for case in cases(arguments.points, Path(name)):
+            if arguments.only in str(case):
+                print(row(case, arguments.points, arguments.seconds), flush=True)
 
 
 if __name__ == "__main__":

@@ -27,7 +27,7 @@ def main(points: int = 512, tolerance: float = 1e-8) -> None:
         scene = build_scene(SelfAffine(), Power(n=n), points)
         solver = Auto(tolerance=tolerance)
 
-        def seen(p, scene=scene, solver=solver):
+        def observables_at(p, scene=scene, solver=solver):
             contact = scene.contact(float(p))
             solution = solve_contact(contact, solver)
             assert solution.status == "converged"
@@ -35,7 +35,11 @@ def main(points: int = 512, tolerance: float = 1e-8) -> None:
 
         work, slope = 0.0, 0.0
         for p in (0.01, 0.1, 0.5, 1.0, 3.0):
-            middle, low, high = seen(p), seen(p * (1 - STEP)), seen(p * (1 + STEP))
+            middle, low, high = (
+                observables_at(p),
+                observables_at(p * (1 - STEP)),
+                observables_at(p * (1 + STEP)),
+            )
             work = max(work, abs(2 * middle.energy / middle.work - 1))
             slope = max(slope, abs((low.energy - high.energy) / (high.u_g - low.u_g) / p - 1))
         nodes, weights = np.polynomial.legendre.leggauss(4)
@@ -45,8 +49,8 @@ def main(points: int = 512, tolerance: float = 1e-8) -> None:
         for left in edges[:-1]:
             for node, weight in zip(nodes, weights, strict=True):
                 p = np.exp(left + half * (1 + node))
-                integral += half * weight * p * seen(p).u_g
-        first, last = seen(0.01), seen(3.0)
+                integral += half * weight * p * observables_at(p).u_g
+        first, last = observables_at(0.01), observables_at(3.0)
         exact = last.energy + 3.0 * last.u_g - first.energy - 0.01 * first.u_g
         print(f"{n:4g} {work:28.1e} {slope:19.1e} {abs(integral / exact - 1):30.1e}", flush=True)
 

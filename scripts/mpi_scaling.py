@@ -34,10 +34,11 @@ def main() -> None:
         print(f"{title}: n = 1, p* = 0.1, tolerance 1e-6; load {os.getloadavg()[0]:.1f}")
         print(" processes points  pair [ms]  exchange  V-cycle [ms]  solve [s]  transforms")
         for count, points in cases:
-            found = json.loads(_launch(count, points))
+            record = json.loads(_launch(count, points))
             print(
-                f"{count:10d} {points:6d} {1e3 * found['pair']:10.2f} {found['share']:9.0%} "
-                f"{1e3 * found['cycle']:13.2f} {found['solve']:10.3f} {found['transforms']:11.1f}",
+                f"{count:10d} {points:6d} {1e3 * record['pair']:10.2f} {record['share']:9.0%} "
+                f"{1e3 * record['cycle']:13.2f} {record['solve']:10.3f} "
+                f"{record['transforms']:11.1f}",
                 flush=True,
             )
 
@@ -67,14 +68,14 @@ def measure(points: int) -> None:
     cycle, change = Multigrid(contact, grid), np.zeros(grid.shape, np.float32)
     sigma = contact.stress(u, out=grid.empty())
     once, _ = least(grid, lambda: cycle.apply(sigma, state, PRESSED, change), exchange)
-    found: list[float] = []
+    counts: list[float] = []
 
     def solve() -> None:
         solution = solve_contact(contact, Auto())
-        found.append(solution.transforms)
+        counts.append(solution.transforms)
 
     whole, _ = least(grid, solve, exchange, repeats=5)
-    said = {"pair": pair, "share": share, "cycle": once, "solve": whole, "transforms": found[-1]}
+    said = {"pair": pair, "share": share, "cycle": once, "solve": whole, "transforms": counts[-1]}
     if ranks is None or ranks.rank == 0:
         print(json.dumps(said))
 

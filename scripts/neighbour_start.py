@@ -77,12 +77,12 @@ def main() -> None:
     parser.add_argument("--points", type=int, default=1024)
     parser.add_argument("--tolerance", type=float, default=1e-4)
     parser.add_argument("--p-star", type=float, nargs=2, default=[1e-3, 1e-2])
-    given = parser.parse_args()
-    scene = build_scene(SelfAffine(), Power(n=1), given.points)
-    pressures = np.geomspace(*given.p_star, COUNT).tolist()
+    arguments = parser.parse_args()
+    scene = build_scene(SelfAffine(), Power(n=1), arguments.points)
+    pressures = np.geomspace(*arguments.p_star, COUNT).tolist()
     for name, order in (("loading", pressures), ("unloading", pressures[::-1])):
         print(f"{name}; transforms and seconds, of a new start and from the neighbour")
-        ladder(scene, ProjectedCG(tolerance=given.tolerance), order)
+        ladder(scene, ProjectedCG(tolerance=arguments.tolerance), order)
 
 
 if __name__ == "__main__":

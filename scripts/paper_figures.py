@@ -30,21 +30,26 @@ def main() -> None:
     parser.add_argument("-j", "--jobs", type=int, help="worker processes, as in gfmd run")
     parser.add_argument("--no-run", action="store_true", help="draw what is there")
     parser.add_argument("--page", type=Path, help="where the page goes, by default with the rest")
-    given = parser.parse_args()
-    given.output.mkdir(parents=True, exist_ok=True)
-    names = given.only or [name for name in STUDIES if not (given.quick and name in LARGE)]
-    for name in () if given.no_run else names:
+    arguments = parser.parse_args()
+    arguments.output.mkdir(parents=True, exist_ok=True)
+    names = arguments.only or [name for name in STUDIES if not (arguments.quick and name in LARGE)]
+    for name in () if arguments.no_run else names:
         begun = time.perf_counter()
-        run(name, given.output, given.quick, given.jobs)
+        run(name, arguments.output, arguments.quick, arguments.jobs)
         print(f"{name}: {time.perf_counter() - begun:.0f} s", flush=True)
-    held = Held(given.output)
+    held = Held(arguments.output)
     findings: list[Finding] = []
     with styled():
         for draw in FIGURES:
             if all(held.has(name) for name in draw.needs):
-                findings += draw(held, given.output / "figures")
+                findings += draw(held, arguments.output / "figures")
     findings.sort(key=lambda finding: list(page.STATEMENTS).index(finding.key))
-    page.write(findings, held, given.output / "figures", given.page or given.output / "paper.md")
+    page.write(
+        findings,
+        held,
+        arguments.output / "figures",
+        arguments.page or arguments.output / "paper.md",
+    )
     print(page.count(findings))
 
 

@@ -64,12 +64,12 @@ def scores(record: dict) -> Iterator[Score]:
     last = levels[-1].a_r
     exact = max(0.0, last - (levels[-2].a_r - last) / (2**ORDER - 1))
     for k in range(1, len(levels) - 2):
-        found = record["levels"][k]
+        at_grid = record["levels"][k]
         if levels[k].a_r < 1:
-            rough = RoughnessScales(**found["texture"])
-            made = estimate(levels[k - 1 : k + 1], found["exponent"], rough)["a_r"]
-            if isfinite(made.continuum_error):  # else "unknown": no promise that could fail
-                yield Score(record["fit"], abs(made.continuum - exact), made.continuum_error)
+            rough = RoughnessScales(**at_grid["texture"])
+            area = estimate(levels[k - 1 : k + 1], at_grid["exponent"], rough)["a_r"]
+            if isfinite(area.continuum_error):  # else "unknown": no promise that could fail
+                yield Score(record["fit"], abs(area.continuum - exact), area.continuum_error)
 
 
 def main() -> None:
@@ -82,14 +82,14 @@ def main() -> None:
         default=FITTED,
         help=f"{FITTED}: the constants were fitted to every second case of this set",
     )
-    given = parser.parse_args()
-    done = given.cache.read_text().splitlines() if given.cache.exists() else []
-    for case in [] if given.no_run else list(cases(given.seed))[len(done) :]:
+    arguments = parser.parse_args()
+    done = arguments.cache.read_text().splitlines() if arguments.cache.exists() else []
+    for case in [] if arguments.no_run else list(cases(arguments.seed))[len(done) :]:
         done.append(json.dumps(measure(case, tolerance=1e-5), default=str))
-        given.cache.write_text("\n".join(done) + "\n")
-    found = [score for line in done for score in scores(json.loads(line))]
+        arguments.cache.write_text("\n".join(done) + "\n")
+    scored = [score for line in done for score in scores(json.loads(line))]
     for half in (True, False):
-        chosen = [score for score in found if score.fit == half]
+        chosen = [score for score in scored if score.fit == half]
         if not chosen:
             continue
         held = np.mean([score.error <= score.bar for score in chosen])

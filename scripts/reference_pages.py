@@ -87,8 +87,8 @@ def allowed(schema: dict[str, Any], shared: dict[str, Any]) -> str:
         return allowed(shared[schema["$ref"].rpartition("/")[2]], shared)
     if "anyOf" in schema or "oneOf" in schema:
         forms = schema.get("anyOf", schema.get("oneOf", []))
-        told = [allowed(form, shared) for form in forms if form.get("type") != "null"]
-        return "; or ".join(dict.fromkeys(told))
+        options = [allowed(form, shared) for form in forms if form.get("type") != "null"]
+        return "; or ".join(dict.fromkeys(options))
     if "const" in schema:
         return f"`{toml(schema['const'])}`"
     if "enum" in schema:
@@ -102,7 +102,7 @@ def allowed(schema: dict[str, Any], shared: dict[str, Any]) -> str:
     kind = NAMES[schema["type"]]
     if "pattern" in schema:
         return f"{kind}: letters, digits, `.`, `_`, `-`"
-    limits = [told.format(amount(schema[key])) for key, told in LIMITS if key in schema]
+    limits = [options.format(amount(schema[key])) for key, options in LIMITS if key in schema]
     return escaped(", ".join([kind, *limits]))
 
 
@@ -120,8 +120,8 @@ def keys(model: Any, shared_by: Any = None) -> str:
         if name == "kind" or (shared_by and name in shared_by.model_fields):
             continue
         field = next(f for n, f in model.model_fields.items() if name in (n, f.alias))
-        given = field.get_default(call_default_factory=True)
-        default = "required" if field.is_required() else "" if given is None else f"`{toml(given)}`"
+        value = field.get_default(call_default_factory=True)
+        default = "required" if field.is_required() else "" if value is None else f"`{toml(value)}`"
         meaning = escaped(key.get("description", ""))
         rows.append((f"`{name}`", allowed(key, shared), default, meaning))
     if shared_by:
@@ -161,8 +161,8 @@ def commands() -> str:
     """The help of every command."""
     parts = []
     for words in ([], *([name] for name in main.list_commands(click.Context(main)))):
-        title, asked = " ".join(["gfmd", *words]), [*words, "--help"]
-        done = CliRunner().invoke(main, asked, env={"COLUMNS": WIDTH}, prog_name="gfmd")
+        title, command = " ".join(["gfmd", *words]), [*words, "--help"]
+        done = CliRunner().invoke(main, command, env={"COLUMNS": WIDTH}, prog_name="gfmd")
         parts.append(f"## {title}\n\n```console\n$ {title} --help\n{done.output.rstrip()}\n```")
     return "\n\n".join(parts)
 
@@ -192,8 +192,10 @@ def distributions() -> str:
         (f"`{h.name}`", f"`{h.axis}`", f"`{h.option}`", escaped(h.meaning), escaped(h.axis_meaning))
         for h in HISTOGRAMS
     ]
-    told = table(("name", "bins", "key of `[output]`", "meaning", "coordinate of the bins"), rows)
-    return f"{told}\n\n{columns(c for found in WEIGHTS.values() for c in found)}"
+    densities = table(
+        ("name", "bins", "key of `[output]`", "meaning", "coordinate of the bins"), rows
+    )
+    return f"{densities}\n\n{columns(c for weights in WEIGHTS.values() for c in weights)}"
 
 
 MAKERS = {

@@ -59,15 +59,15 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, nargs="+", default=[0, 1, 2])
     parser.add_argument("--tolerance", type=float, default=1e-4)
     parser.add_argument("--repeats", type=int, default=2)
-    given = parser.parse_args()
+    arguments = parser.parse_args()
     print("points     n     p*  with (transforms)      without  time ratio  difference of u_g")
-    for points in given.points:
-        for n in given.exponents:
-            surfaces = [SelfAffine(seed=seed, cutoff=given.cutoff) for seed in given.seeds]
+    for points in arguments.points:
+        for n in arguments.exponents:
+            surfaces = [SelfAffine(seed=seed, cutoff=arguments.cutoff) for seed in arguments.seeds]
             scenes = [build_scene(surface, Power(n=n), points) for surface in surfaces]
-            for p_star in given.p_star:
+            for p_star in arguments.p_star:
                 results = [
-                    compare(scene.contact(p_star), given.tolerance, given.repeats)
+                    compare(scene.contact(p_star), arguments.tolerance, arguments.repeats)
                     for scene in scenes
                 ]
                 small, whole, ratio, difference = np.transpose(results)

@@ -22,19 +22,19 @@ WINDOWS = ((2.0, 6.0), (4.0, 8.0), (4.0, 12.0), (6.0, 13.0), (8.0, 16.0), (10.0,
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--study", type=Path, default=Path("results/paper/fig13.h5"))
-    (found,) = distributions(compare(parser.parse_args().study))
+    (distribution,) = distributions(compare(parser.parse_args().study))
     sigma, rows = logarithmic_middles(), []
-    finest = found.finest["points"]
-    studied = found.counts.shape[1]
+    finest = distribution.finest["points"]
+    studied = distribution.counts.shape[1]
     for place in range(studied):
-        counts = found.counts[:, place]
+        counts = distribution.counts[:, place]
         cells = []
         for low, high in WINDOWS:
             inside = (sigma > low) & (sigma < high)
-            seen = counts[:, inside]
-            enough = np.count_nonzero(seen.sum(axis=0)) > 2
-            cells.append(str(tail_exponent(sigma[inside], seen)) if enough else "")
-        points = found.points[place] * found.finest["cutoff"]
+            inner = counts[:, inside]
+            enough = np.count_nonzero(inner.sum(axis=0)) > 2
+            cells.append(str(tail_exponent(sigma[inside], inner)) if enough else "")
+        points = distribution.points[place] * distribution.finest["cutoff"]
         rows.append([f"{points:.0f}", f"{mean_stress(sigma, counts):.1f}", *cells])
     heads = ["points per λs", "mean stress", *(f"{low:g} to {high:g}" for low, high in WINDOWS)]
     print_table(f"n = 3, exponents on grids up to {finest}², stress in Δσ", heads, rows)

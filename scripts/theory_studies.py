@@ -34,8 +34,8 @@ def table(heading: str, **keys: object) -> str:
 
 
 def surface(spectrum: str, rolloff: float, cutoff: float | list[float], **keys: object) -> str:
-    given = {"spectrum": spectrum, "rolloff": rolloff, "cutoff": cutoff} | keys
-    return table("[[surface]]", kind="self-affine", **given)
+    parameters = {"spectrum": spectrum, "rolloff": rolloff, "cutoff": cutoff} | keys
+    return table("[[surface]]", kind="self-affine", **parameters)
 
 
 def power(exponents: list[float]) -> str:
@@ -122,15 +122,15 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--folder", type=Path, default=Path("results/theory"))
     parser.add_argument("names", nargs="*", choices=[[], *STUDIES], default=[])
-    given = parser.parse_args()
-    given.folder.mkdir(parents=True, exist_ok=True)
-    for name in given.names or STUDIES:
+    arguments = parser.parse_args()
+    arguments.folder.mkdir(parents=True, exist_ok=True)
+    for name in arguments.names or STUDIES:
         for number, text in enumerate(STUDIES[name](), 1):
-            path = given.folder / f"{name}-{number}.toml"
+            path = arguments.folder / f"{name}-{number}.toml"
             path.write_text(text.lstrip())
             resolved, text = read_spec(path, ())
             with Reporter(True) as report:
-                store = given.folder / f"{name}.h5"
+                store = arguments.folder / f"{name}.h5"
                 outcome = run_study(resolved, text, store, report, jobs=1)
             print(f"{path.stem}: {dict(outcome)}", flush=True)
 

@@ -19,21 +19,21 @@ def main():
     parser.add_argument("spec", type=Path)
     parser.add_argument("--set", action="append", default=[])
     parser.add_argument("--jobs", type=int)
-    given = parser.parse_args()
-    spec, text = read_spec(given.spec, tuple(given.set))
-    told, begun = [], time.monotonic()
+    arguments = parser.parse_args()
+    spec, text = read_spec(arguments.spec, tuple(arguments.set))
+    estimates, begun = [], time.monotonic()
     with tempfile.TemporaryDirectory() as folder:
         run_study(
             spec,
             text,
             Path(folder) / "study.h5",
-            lambda progress: told.append((time.monotonic() - begun, progress.seconds_left)),
-            jobs=given.jobs,
+            lambda progress: estimates.append((time.monotonic() - begun, progress.seconds_left)),
+            jobs=arguments.jobs,
         )
-    end = told[-1][0]
-    print(f"{given.spec} {' '.join(given.set)}: {end:.1f} s")
+    end = estimates[-1][0]
+    print(f"{arguments.spec} {' '.join(arguments.set)}: {end:.1f} s")
     for tenth in range(1, 10):
-        when, left = min(told, key=lambda word: abs(word[0] - tenth * end / 10))
+        when, left = min(estimates, key=lambda word: abs(word[0] - tenth * end / 10))
         print(f"  {when / end:5.0%}  told {left:8.1f} s  true {end - when:8.1f} s  "
               f"ratio {left / (end - when):5.2f}")  # fmt: skip
 

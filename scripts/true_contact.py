@@ -54,7 +54,7 @@ def over_seeds(columns: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
 
 def print_tables(groups: dict[float, list[Curve]]) -> None:
     p_star = next(iter(groups.values()))[0].column("p_star")
-    kept = p_star <= HIGHEST
+    low = p_star <= HIGHEST
     for n, curves in groups.items():
         print(
             f"\nn = {n:g}: Delta_sigma_c / Delta_sigma; a_r of theory / simulated ± standard error"
@@ -68,11 +68,11 @@ def print_tables(groups: dict[float, list[Curve]]) -> None:
             over_seeds([contact_area(measured(c, name), p_star) / simulated(c) for c in curves])
             for name in (PERSSON, *VARIANTS)
         ]
-        for i in np.flatnonzero(kept):
-            told = [f"{p_star[i]:g}", f"{means[0][i]:.4f}", f"{means[1][i]:.3f}"]
-            told += [f"{width[i]:.3f}" for width in widths]
-            told += [f"{mean[i]:.3f} ± {error[i]:.3f}" for mean, error in ratios]
-            print("| " + " | ".join(told) + " |")
+        for i in np.flatnonzero(low):
+            cells = [f"{p_star[i]:g}", f"{means[0][i]:.4f}", f"{means[1][i]:.3f}"]
+            cells += [f"{width[i]:.3f}" for width in widths]
+            cells += [f"{mean[i]:.3f} ± {error[i]:.3f}" for mean, error in ratios]
+            print("| " + " | ".join(cells) + " |")
 
 
 def draw(groups: dict[float, list[Curve]], path: Path) -> None:
@@ -83,17 +83,17 @@ def draw(groups: dict[float, list[Curve]], path: Path) -> None:
         for place, (n, curves) in enumerate(shown.items()):
             style = CurveStyle(colours(len(shown))[place], MARKERS[place], f"n = {n:g}")
             p_star = curves[0].column("p_star")
-            kept = p_star <= HIGHEST
-            value, error = (part[kept] for part in over_seeds([needed(c) for c in curves]))
+            low = p_star <= HIGHEST
+            value, error = (part[low] for part in over_seeds([needed(c) for c in curves]))
             bars = {"fmt": "none", "ecolor": style.colour, "elinewidth": 0.7, "capsize": 2}
-            plot.axes.errorbar(p_star[kept], value, 2 * error, **bars)
-            plot.points(style, p_star[kept], value, np.full(value.size, True))
-            line = over_seeds([measured(c, "deviation_bearing") for c in curves])[0][kept]
-            plot.axes.plot(p_star[kept], line, color=style.colour)
+            plot.axes.errorbar(p_star[low], value, 2 * error, **bars)
+            plot.points(style, p_star[low], value, np.full(value.size, True))
+            line = over_seeds([measured(c, "deviation_bearing") for c in curves])[0][low]
+            plot.axes.plot(p_star[low], line, color=style.colour)
         plot.line("highest points", p_star[:0], p_star[:0], color="0.4")
         dashed = {"color": "black", "ls": (0, (4, 2)), "lw": 0.9}
-        plot.line("whole surface", p_star[kept], np.ones(value.size), **dashed)
-        plot.scale("x", "log", p_star[kept])
+        plot.line("whole surface", p_star[low], np.ones(value.size), **dashed)
+        plot.scale("x", "log", p_star[low])
         plot.axes.set(ylim=(0, 1.7))
         files = plot.write(path)
     files[0].unlink()  # docs show the PNG
@@ -103,10 +103,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--folder", type=Path, default=Path("results/theory"))
     parser.add_argument("--figure", type=Path, default=Path("docs/figures/true_contact"))
-    given = parser.parse_args()
-    groups = by_exponent(given.folder / "true-contact.h5")
+    arguments = parser.parse_args()
+    groups = by_exponent(arguments.folder / "true-contact.h5")
     print_tables(groups)
-    draw(groups, given.figure)
+    draw(groups, arguments.figure)
 
 
 if __name__ == "__main__":

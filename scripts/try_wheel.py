@@ -20,9 +20,9 @@ DATA = ("run-spec.schema.json", "report/templates/page.html", "report/templates/
 def call(*words: object, where: Path) -> str:
     """Run a command, tell what it took, return what it printed."""
     begin = time.monotonic()
-    kept = {k: v for k, v in os.environ.items() if k not in ("PYTHONPATH", "VIRTUAL_ENV")}
+    environment = {k: v for k, v in os.environ.items() if k not in ("PYTHONPATH", "VIRTUAL_ENV")}
     done = subprocess.run(
-        [str(word) for word in words], cwd=where, env=kept, capture_output=True, text=True
+        [str(word) for word in words], cwd=where, env=environment, capture_output=True, text=True
     )
     shown = " ".join(Path(str(word)).name if "/" in str(word) else str(word) for word in words)
     print(f"{time.monotonic() - begin:6.1f} s  {shown}", flush=True)
@@ -51,10 +51,10 @@ def main() -> None:
         version = call(gfmd, "--version", where=there)
         assert wheel.name.split("-")[1] in version, version
         call(gfmd, "init", where=there)
-        found = call(gfmd, "run", "study.toml", "--set", "grid.points=128", where=there)
-        assert "12 converged" in found, found
-        told = call(gfmd, "analyze", "study.h5", "--figures", "figures", where=there)
-        assert "Persson" in told, told
+        done = call(gfmd, "run", "study.toml", "--set", "grid.points=128", where=there)
+        assert "12 converged" in done, done
+        output = call(gfmd, "analyze", "study.h5", "--figures", "figures", where=there)
+        assert "Persson" in output, output
         assert (there / "figures" / "contact_area.png").exists()
         call(gfmd, "report", "study.h5", where=there)
         assert "Persson" in (there / "study.html").read_text("utf-8")

@@ -84,11 +84,11 @@ def goes_on_bit_for_bit(rows_of, tmp_path, monkeypatch):
     def goes_on_bit_for_bit(*overrides):
         monkeypatch.setattr(run_task, "REPORT_EVERY", 0.0)
         (straight,) = rows_of(*overrides)
-        seen = []
+        states = []
 
         def interrupt(progress):
-            seen.append(progress)
-            if len(seen) % 11 == 0:
+            states.append(progress)
+            if len(states) % 11 == 0:
                 signal.raise_signal(signal.SIGTERM)
 
         for _ in range(1000):
@@ -101,7 +101,7 @@ def goes_on_bit_for_bit(rows_of, tmp_path, monkeypatch):
             if column.name != "seconds":
                 same = stopped[column.name], straight[column.name]
                 assert same[0] == same[1] or np.all(np.isnan(same))
-        return stopped, len(seen)
+        return stopped, len(states)
 
     return goes_on_bit_for_bit
 

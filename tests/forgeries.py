@@ -16,9 +16,9 @@ WHERE = ("/", "/nowhere", "/scenes", "/scenes/0/q", "../s.toml")
 
 def objects(file):
     """The paths of all groups and datasets."""
-    found = []
-    file.visit(found.append)
-    return found
+    paths = []
+    file.visit(paths.append)
+    return paths
 
 
 def change(file, draw):

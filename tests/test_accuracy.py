@@ -200,9 +200,9 @@ def test_a_bench_takes_no_auto_grid(spec_of):
 
 def test_reduced_pressures_of_a_kinked_cell_are_refused(rows_of):
     text = SPEC.replace('kind = "self-affine"\ncutoff = 0.06', 'kind = "parabola"\nradius = 1.0')
-    told = []
-    rows_of(text=text, report=told.append)
-    assert any("load.pressure" in progress.message for progress in told)
+    messages = []
+    rows_of(text=text, report=messages.append)
+    assert any("load.pressure" in progress.message for progress in messages)
 
 
 def test_the_forecast_of_grids_is_right_within_a_factor_of_four(spec_of, rows_of):
@@ -225,20 +225,26 @@ def test_the_certificate_bounds_the_distance_to_the_solution(body, p_star, toler
     contact = build_scene(SelfAffine(cutoff=0.04), body, 128).contact(p_star)
 
     def solved(tolerance):
-        found = solve_contact(contact, Auto(tolerance=tolerance))
-        return found, observe(contact, found.u, found.sigma)
+        solution = solve_contact(contact, Auto(tolerance=tolerance))
+        return solution, observe(contact, solution.u, solution.sigma)
 
-    (_, exact), (found, seen) = solved(1e-11), solved(tolerance)
-    contact.stress(found.u, out=found.sigma)
-    proof = certify(contact, found.u, found.sigma)
-    assert abs(seen.u_g - exact.u_g) <= proof.u_g
-    assert abs(seen.sigma_p - exact.sigma_p) <= proof.sigma_p
-    assert seen.energy + p_star * seen.u_g - exact.energy - p_star * exact.u_g + 1e-12 >= 0
-    assert seen.energy + p_star * seen.u_g - exact.energy - p_star * exact.u_g <= proof.gap + 1e-12
+    (_, exact), (approximate, observables) = solved(1e-11), solved(tolerance)
+    contact.stress(approximate.u, out=approximate.sigma)
+    proof = certify(contact, approximate.u, approximate.sigma)
+    assert abs(observables.u_g - exact.u_g) <= proof.u_g
+    assert abs(observables.sigma_p - exact.sigma_p) <= proof.sigma_p
+    assert (
+        observables.energy + p_star * observables.u_g - exact.energy - p_star * exact.u_g + 1e-12
+        >= 0
+    )
+    assert (
+        observables.energy + p_star * observables.u_g - exact.energy - p_star * exact.u_g
+        <= proof.gap + 1e-12
+    )
     for name in ("u_g", "sigma_p"):
-        error = proof.estimated_error(name, seen, found.residual)
-        assert abs(getattr(seen, name) - getattr(exact, name)) <= error + 1e-13
-    assert abs(seen.a_r - exact.a_r) <= proof.a_r + 3 / contact.grid.size
+        error = proof.estimated_error(name, observables, approximate.residual)
+        assert abs(getattr(observables, name) - getattr(exact, name)) <= error + 1e-13
+    assert abs(observables.a_r - exact.a_r) <= proof.a_r + 3 / contact.grid.size
 
 
 def test_a_bad_solution_gets_no_good_certificate():
@@ -268,10 +274,10 @@ def test_seeds_have_a_mean_and_a_confidence_interval(rows_of, tmp_path, output_o
     plain = SPEC.partition("[accuracy]")[0].replace('points = "auto"', "points = 64")
     rows = rows_of("surface.seed=[0, 1, 2, 3]", "load.p_star=[0.1, 1.0]", text=plain)
     comparison = compare(tmp_path / "study.h5")
-    found = ensembles(comparison)
-    assert [len(ensemble.rows) for ensemble in found] == [4, 4]
+    groups = ensembles(comparison)
+    assert [len(ensemble.rows) for ensemble in groups] == [4, 4]
     values = [row["u_g"] for row in rows if row["p_star"] == 0.1]
-    spread = found[0].spread("u_g")
+    spread = groups[0].spread("u_g")
     low, high = stats.t.interval(0.95, 3, np.mean(values), stats.sem(values))
     assert spread.mean == pytest.approx(np.mean(values))
     assert spread.standard_error == pytest.approx(stats.sem(values))

@@ -30,16 +30,16 @@ def test_a_notebook_gets_the_numbers_of_the_command(tmp_path):
 
 def test_fields_are_those_of_the_contact_problem():
     """sigma >= 0, g >= 0, sigma g = 0; sigma - p = K u with k = E* q / 2, by NumPy."""
-    found = solve(TABLES | {"solver": {"tolerance": 1e-9}})
-    assert found.stress.mean() == pytest.approx(1e6, rel=1e-9)
-    assert found.gap.min() > -1e-16
-    assert np.abs(found.stress * found.gap).max() < 1e-6 * found.delta_sigma * found.h_std
+    result = solve(TABLES | {"solver": {"tolerance": 1e-9}})
+    assert result.stress.mean() == pytest.approx(1e6, rel=1e-9)
+    assert result.gap.min() > -1e-16
+    assert np.abs(result.stress * result.gap).max() < 1e-6 * result.delta_sigma * result.h_std
     q = 2 * np.pi * np.fft.fftfreq(64, 1e-3 / 64)
-    elastic = np.fft.ifft2(1e9 * np.hypot(q[:, None], q) * np.fft.fft2(found.displacement)).real
-    np.testing.assert_allclose(found.stress, elastic + 1e6, atol=1e-6 * found.delta_sigma)
-    assert found.p_star == pytest.approx(1e6 / found.delta_sigma)
-    assert found.contact.mean() == found.a_r
-    assert found.gap.mean() == pytest.approx(found.u_g * found.h_std, rel=1e-6)
+    elastic = np.fft.ifft2(1e9 * np.hypot(q[:, None], q) * np.fft.fft2(result.displacement)).real
+    np.testing.assert_allclose(result.stress, elastic + 1e6, atol=1e-6 * result.delta_sigma)
+    assert result.p_star == pytest.approx(1e6 / result.delta_sigma)
+    assert result.contact.mean() == result.a_r
+    assert result.gap.mean() == pytest.approx(result.u_g * result.h_std, rel=1e-6)
 
 
 def test_an_array_may_be_pressed():
@@ -135,31 +135,31 @@ class Topography:
 
     def to_unit(self, unit):
         assert unit == "m"
-        made = Topography(1e-9 * self._heights, 1e-9 * self.physical_sizes[0])
-        made.unit = unit
-        return made
+        scaled = Topography(1e-9 * self._heights, 1e-9 * self.physical_sizes[0])
+        scaled.unit = unit
+        return scaled
 
 
 def test_the_contact_pressure_is_zero_off_contact_and_gives_the_area():
-    found = solve(TABLES)
-    assert (found.pressure > 0).mean() == found.a_r
-    assert (found.pressure[found.gap > 0] == 0).all()
-    np.testing.assert_array_equal(found.pressure[found.contact], found.stress[found.contact])
-    assert found.pressure.mean() == pytest.approx(found.nominal_pressure, rel=1e-5)
-    assert found.sigma_p * found.delta_sigma == pytest.approx(found.pressure.std(), rel=1e-12)
+    result = solve(TABLES)
+    assert (result.pressure > 0).mean() == result.a_r
+    assert (result.pressure[result.gap > 0] == 0).all()
+    np.testing.assert_array_equal(result.pressure[result.contact], result.stress[result.contact])
+    assert result.pressure.mean() == pytest.approx(result.nominal_pressure, rel=1e-5)
+    assert result.sigma_p * result.delta_sigma == pytest.approx(result.pressure.std(), rel=1e-12)
 
 
 def test_points_and_sides_come_from_the_heights():
     heights = rough_map()
-    found = solve({**MATERIAL, "surface": {"length": 1e-5}}, heights=heights)
-    assert found.height.shape == (32, 32)
+    result = solve({**MATERIAL, "surface": {"length": 1e-5}}, heights=heights)
+    assert result.height.shape == (32, 32)
     twice = solve({**MATERIAL, "grid": {}, "surface": {"length": 1e-5}}, heights=heights.tolist())
-    assert twice.a_r == found.a_r
+    assert twice.a_r == result.a_r
     topography = Topography(1e9 * heights.T, 1e4)
     measured = solve(MATERIAL, heights=topography)
     assert measured.length == pytest.approx(1e-5, rel=1e-12)
-    assert measured.a_r == found.a_r
-    np.testing.assert_allclose(measured.height, found.height, rtol=1e-12)
+    assert measured.a_r == result.a_r
+    np.testing.assert_allclose(measured.height, result.height, rtol=1e-12)
 
 
 def test_numbers_of_numpy_are_numbers():
@@ -212,23 +212,23 @@ def test_x_counts_from_the_crest(kind, tmp_path):
         "load": {"p_star": 0.1},
         "output": {"cross_section": True},
     }
-    found = solve(tables)
-    shape = {"wave": np.cos(np.pi * found.x), "ridge": -abs(found.x)}
-    wanted = shape.get(kind, -(found.x**2) / 2)
-    np.testing.assert_allclose(found.height, wanted, atol=1e-15)
+    result = solve(tables)
+    shape = {"wave": np.cos(np.pi * result.x), "ridge": -abs(result.x)}
+    wanted = shape.get(kind, -(result.x**2) / 2)
+    np.testing.assert_allclose(result.height, wanted, atol=1e-15)
     with h5py.File(run(tables, tmp_path / "a.h5")) as file:
         stored = file["cross_sections/0"]
-        np.testing.assert_array_equal(stored["x"][()], found.x)
-        np.testing.assert_array_equal(stored["contact_pressure"][()] > 0, found.contact)
+        np.testing.assert_array_equal(stored["x"][()], result.x)
+        np.testing.assert_array_equal(stored["contact_pressure"][()] > 0, result.contact)
 
 
 def test_a_result_shows_itself():
-    found = solve(TABLES)
-    for shown in (str(found), repr(found), found._repr_html_()):
+    result = solve(TABLES)
+    for shown in (str(result), repr(result), result._repr_html_()):
         assert "converged" in shown
-        assert f"{found.a_r:.5g}" in shown
-    assert len(str(found).splitlines()) < 12
-    assert found._repr_html_().startswith("<table>")
+        assert f"{result.a_r:.5g}" in shown
+    assert len(str(result).splitlines()) < 12
+    assert result._repr_html_().startswith("<table>")
 
 
 def test_a_comparison_shows_its_tables(tmp_path):

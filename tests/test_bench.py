@@ -42,11 +42,11 @@ def ignore(_):
 
 def kinds(spec):
     """Solvers that are compared on each contact, one contact a body."""
-    found = []
+    names = []
     for task in plan(spec):
         contact = build_scene(task.surface, task.elastomer, task.points).contact(task.load)
-        found.append([solver.kind for solver in solvers_to_compare(spec, task, contact)])
-    return found
+        names.append([solver.kind for solver in solvers_to_compare(spec, task, contact)])
+    return names
 
 
 def made_up(errors, points=64, **row):
@@ -125,9 +125,9 @@ def test_a_reference_that_rounding_stops_is_as_good_as_it_gets(spec_of, monkeypa
     monkeypatch.setattr(bench, "REFERENCE", hopeless)
     task = plan(spec_of("grid.points=64"))[0]
     contact = build_scene(task.surface, task.elastomer, task.points).contact(task.load)
-    seen, residual = solve_reference(contact)
+    observables, residual = solve_reference(contact)
     assert 1e-16 < residual < 1e-10
-    assert seen.u_g > 0
+    assert observables.u_g > 0
 
 
 def test_an_error_counts_as_reached_where_it_lasts():
@@ -192,19 +192,19 @@ def test_few_scenes_share_a_figure_and_many_have_one_each(tmp_path):
 
 
 def test_bench_prints_a_table_and_keeps_file_and_figure(gfmd):
-    told = gfmd("bench", "spec.toml", "--figures", "out")
-    assert told.exit_code == 0, told.output
+    result = gfmd("bench", "spec.toml", "--figures", "out")
+    assert result.exit_code == 0, result.output
     for solver in ("pcg", "ccg", "fire"):
         assert any(
             f" {solver} " in line and line.endswith("converged")
-            for line in told.stdout.splitlines()
+            for line in result.stdout.splitlines()
         )
     assert Path("out/work_precision.png").read_bytes().startswith(b"\x89PNG")
     assert Path("out/work_precision.pdf").exists()
     assert len(read_bench(Path("tiny-bench.h5"))) == 3
-    told = gfmd("analyze", "tiny-bench.h5")
-    assert told.exit_code == 74
-    assert "a bench, no study" in told.output
+    result = gfmd("analyze", "tiny-bench.h5")
+    assert result.exit_code == 74
+    assert "a bench, no study" in result.output
     again = gfmd("bench", "spec.toml", "-q")  # measures again
     assert again.exit_code == 0
     other = gfmd("bench", "spec.toml", "--set", "load.p_star=0.2")
@@ -218,9 +218,9 @@ def test_what_is_no_bench_is_not_replaced(gfmd):
         file.attrs["layout"] = 1
     for name in ("notes.h5", "study.h5"):
         before = Path(name).read_bytes()
-        told = gfmd("bench", "spec.toml", "-o", name)
-        assert told.exit_code == 2
-        assert "is no bench" in told.output
+        result = gfmd("bench", "spec.toml", "-o", name)
+        assert result.exit_code == 2
+        assert "is no bench" in result.output
         assert Path(name).read_bytes() == before
 
 
@@ -235,23 +235,23 @@ def test_what_is_no_bench_is_not_replaced(gfmd):
 )
 def test_a_bad_spec_ends_in_status_2_and_leaves_nothing(gfmd, words):
     before = set(Path().iterdir())
-    told = gfmd("bench", *words)
-    assert told.exit_code == 2
-    assert told.output.strip()
+    result = gfmd("bench", *words)
+    assert result.exit_code == 2
+    assert result.output.strip()
     assert set(Path().iterdir()) == before
 
 
 def test_a_place_that_cannot_be_written_is_told_before_anything_is_solved(gfmd):
     Path("file").write_text("")
-    told = gfmd("bench", "spec.toml", "-o", "file/b.h5")
-    assert told.exit_code == 73
-    assert "task" not in told.output
+    result = gfmd("bench", "spec.toml", "-o", "file/b.h5")
+    assert result.exit_code == 73
+    assert "task" not in result.output
 
 
 def test_a_missed_tolerance_is_status_1(gfmd):
-    told = gfmd("bench", "spec.toml", "--set", "solver.max_steps=3")
-    assert told.exit_code == 1
-    assert "max_steps" in told.output
+    result = gfmd("bench", "spec.toml", "--set", "solver.max_steps=3")
+    assert result.exit_code == 1
+    assert "max_steps" in result.output
     assert Path("tiny-bench.h5").exists()
 
 
@@ -264,8 +264,8 @@ def test_a_bench_of_a_free_boundary_has_the_solver_that_suits_it(spec_of):
     (task,) = plan(spec)
     contact = build_free_scene(task.surface, task.elastomer, 64).contact(0.1)
     solution = solve_contact(contact, Dual(tolerance=1e-9))
-    seen = observe(contact, solution.u, solution.sigma)
-    assert trace.row["u_g_reference"] == pytest.approx(seen.u_g, rel=1e-6)
+    observables = observe(contact, solution.u, solution.sigma)
+    assert trace.row["u_g_reference"] == pytest.approx(observables.u_g, rel=1e-6)
     assert trace.samples["u_g_error"][-1] < 1e-4
 
 

@@ -27,9 +27,9 @@ def test_run_then_analyze_then_export(gfmd):
     assert done.exit_code == 0, done.output
     assert "4 converged" in done.output
     assert "gfmd analyze small.h5" in done.output
-    told = gfmd("analyze", "small.h5")
-    assert told.exit_code == 0
-    assert "Persson" in told.output
+    result = gfmd("analyze", "small.h5")
+    assert result.exit_code == 0
+    assert "Persson" in result.output
     rows = list(csv.DictReader(io.StringIO(gfmd("export", "small.h5").output)))
     assert ",".join(rows[0]).startswith(CONTRACT)
     assert len(rows) == 4
@@ -65,10 +65,10 @@ def test_analyze_prints_records_with_the_promised_keys(gfmd):
 
 def test_a_dry_run_lists_the_tasks_and_writes_nothing(gfmd):
     before = set(Path().iterdir())
-    told = gfmd("run", "spec.toml", "--dry-run")
-    assert told.exit_code == 0
-    assert "4 tasks, 4 to do" in told.output
-    assert "MiB" in told.output
+    result = gfmd("run", "spec.toml", "--dry-run")
+    assert result.exit_code == 0
+    assert "4 tasks, 4 to do" in result.output
+    assert "MiB" in result.output
     assert set(Path().iterdir()) == before
     assert "2 tasks" in gfmd("run", "spec.toml", "--dry-run", "--shard", "1/2").output
 
@@ -84,9 +84,9 @@ def test_a_shard_takes_its_share(gfmd):
 
 @pytest.mark.parametrize("shard", ["2/2", "-1/2", "a/b", "1", "0/0", "1/2/3", "²/3", "0/²"])
 def test_a_bad_shard_is_refused(gfmd, shard):
-    told = gfmd("run", "spec.toml", f"--shard={shard}")
-    assert told.exit_code == 2
-    assert "0 <= I < N" in told.output
+    result = gfmd("run", "spec.toml", f"--shard={shard}")
+    assert result.exit_code == 2
+    assert "0 <= I < N" in result.output
 
 
 @pytest.mark.parametrize(
@@ -111,17 +111,17 @@ def test_a_bad_shard_is_refused(gfmd, shard):
 )
 def test_bad_usage_ends_in_status_2_without_traceback_or_file(gfmd, words):
     before = set(Path().iterdir())
-    told = gfmd(*words)
-    assert told.exit_code == 2
-    assert "Traceback" not in told.output
-    assert told.output.strip()
+    result = gfmd(*words)
+    assert result.exit_code == 2
+    assert "Traceback" not in result.output
+    assert result.output.strip()
     assert set(Path().iterdir()) == before
 
 
 def test_a_missed_tolerance_is_status_1_and_the_others_are_kept(gfmd):
-    told = gfmd("run", "spec.toml", "--set", "solver.max_steps=1")
-    assert told.exit_code == 1
-    assert "2 converged, 2 max_steps" in told.output
+    result = gfmd("run", "spec.toml", "--set", "solver.max_steps=1")
+    assert result.exit_code == 1
+    assert "2 converged, 2 max_steps" in result.output
     assert gfmd("run", "spec.toml", "--set", "solver.max_steps=1").exit_code == 1
     assert len(gfmd("export", "small.h5").output.splitlines()) == 5
 
@@ -133,16 +133,16 @@ def test_an_unreadable_study_is_status_74(gfmd):
         ("export", "bad.h5"),
         ("run", "spec.toml", "-o", "bad.h5"),
     ):
-        told = gfmd(*words)
-        assert told.exit_code == 74
-        assert "bad.h5" in told.output
+        result = gfmd(*words)
+        assert result.exit_code == 74
+        assert "bad.h5" in result.output
 
 
 def test_a_place_that_cannot_be_written_is_status_73(gfmd):
     Path("file").write_text("")
-    told = gfmd("run", "spec.toml", "-o", "file/study.h5")
-    assert told.exit_code == 73
-    assert "cannot be written" in told.output
+    result = gfmd("run", "spec.toml", "-o", "file/study.h5")
+    assert result.exit_code == 73
+    assert "cannot be written" in result.output
 
 
 def test_a_file_that_cannot_be_written_is_told_with_the_reason(gfmd):
@@ -161,24 +161,24 @@ def test_a_file_that_cannot_be_written_is_told_with_the_reason(gfmd):
             ("bench", "spec.toml", "-o", f"{folder}/x.h5"),
             ("init", f"{folder}/x.toml"),
         ):
-            told = gfmd(*words)
-            assert told.exit_code == 73, words
+            result = gfmd(*words)
+            assert result.exit_code == 73, words
             expected = rf"gfmd: {folder}/x\S*: cannot be written: .*({reason})"
-            assert re.fullmatch(expected, told.output.splitlines()[-1]), told.output
+            assert re.fullmatch(expected, result.output.splitlines()[-1]), result.output
 
 
 def test_a_name_that_is_too_long_is_status_73(gfmd):
-    told = gfmd("run", "spec.toml", "-o", 300 * "x" + ".h5")
-    assert told.exit_code == 73
-    assert "File name too long" in told.output
+    result = gfmd("run", "spec.toml", "-o", 300 * "x" + ".h5")
+    assert result.exit_code == 73
+    assert "File name too long" in result.output
 
 
 def test_a_grid_beyond_the_memory_is_refused_before_it_is_allocated(gfmd, monkeypatch):
     monkeypatch.setattr(resources, "available_memory", lambda: 2.0**30)
-    told = gfmd("run", "spec.toml", "--set", "grid.points=8192")
-    assert told.exit_code == 2
-    assert "8192 points" in told.output
-    assert "GiB" in told.output
+    result = gfmd("run", "spec.toml", "--set", "grid.points=8192")
+    assert result.exit_code == 2
+    assert "8192 points" in result.output
+    assert "GiB" in result.output
 
 
 @pytest.mark.parametrize(
@@ -192,12 +192,12 @@ def test_a_grid_beyond_the_memory_is_refused_before_it_is_allocated(gfmd, monkey
 )
 def test_a_height_file_that_will_not_do_is_refused(gfmd, array, words):
     np.save("h.npy", array, allow_pickle=True)
-    told = gfmd(
+    result = gfmd(
         "run", "spec.toml", "--set", "surface={kind='file', path='h.npy'}", "--set",
         "grid.points=16",
     )  # fmt: skip
-    assert told.exit_code == 2
-    assert words in told.output
+    assert result.exit_code == 2
+    assert words in result.output
     assert not Path("small.h5").exists()
 
 
@@ -205,8 +205,8 @@ def test_a_height_array_is_used_as_it_is(gfmd):
     heights = np.random.default_rng(5).normal(size=(32, 32))
     np.save("h.npy", heights)
     surface = ("--set", "surface={kind='file', path='h.npy', length=2.0}", "--set", "load.p_star=9")
-    told = gfmd("run", "spec.toml", *surface, "--set", "grid.points=32")
-    assert told.exit_code == 0, told.output
+    result = gfmd("run", "spec.toml", *surface, "--set", "grid.points=32")
+    assert result.exit_code == 0, result.output
     row = next(csv.DictReader(io.StringIO(gfmd("export", "small.h5").output)))
     assert float(row["h_std"]) == pytest.approx(heights.std(), rel=1e-14)
     assert float(row["length"]) == 2.0
@@ -221,11 +221,11 @@ def test_a_height_array_is_used_as_it_is(gfmd):
 
 
 def test_pressures_may_be_given_in_pascal(gfmd):
-    told = gfmd(
+    result = gfmd(
         "run", "spec.toml", "--set", "load={pressure=[1e3, 1e5]}", "--set",
         "elastomer={kind='half-space', E_star=1e6}",
     )  # fmt: skip
-    assert told.exit_code == 0, told.output
+    assert result.exit_code == 0, result.output
     rows = list(csv.DictReader(io.StringIO(gfmd("export", "small.h5").output)))
     for row, pressure in zip(rows, (1e3, 1e5), strict=True):
         assert float(row["pressure"]) == pytest.approx(pressure, rel=1e-14)
@@ -316,17 +316,17 @@ def test_every_config_runs_on_a_small_grid(gfmd, config):
         pytest.importorskip("SurfaceTopography")
     small = (SMALL_SETTINGS | PAPER_SETTINGS)[config.stem]
     settings = [word for s in small for word in ("--set", s)]
-    told = gfmd("run", config, "-o", "study.h5", *settings)
-    assert told.exit_code == 0, told.output
+    result = gfmd("run", config, "-o", "study.h5", *settings)
+    assert result.exit_code == 0, result.output
     assert gfmd("analyze", "study.h5").exit_code == 0
 
 
 def test_a_study_is_no_height_map_unless_it_holds_heights(gfmd):
     gfmd("run", "spec.toml", "--set", "elastomer.n=0")
-    told = gfmd("surface", "small.h5")
-    assert told.exit_code == 2
-    assert "choose one by surface.dataset" in told.output
+    result = gfmd("surface", "small.h5")
+    assert result.exit_code == 2
+    assert "choose one by surface.dataset" in result.output
     gfmd("run", "spec.toml", "--set", "elastomer.n=0", "--set", 'output.fields=["u", "height"]')
-    told = gfmd("surface", "small.h5")
-    assert told.exit_code == 0, told.output
-    assert "64 x 64 points" in told.output
+    result = gfmd("surface", "small.h5")
+    assert result.exit_code == 0, result.output
+    assert "64 x 64 points" in result.output

@@ -23,7 +23,7 @@ def time():
     return SimpleNamespace(now=0.0)
 
 
-def clock(time, *tasks, jobs=1):
+def clock_of(time, *tasks, jobs=1):
     return Clock(tasks, jobs, lambda: time.now)
 
 
@@ -34,55 +34,55 @@ def word(index, event, residual=float("nan"), points=64, status=None):
 
 
 def test_before_any_task_the_forecast_is_told(time):
-    assert clock(time, task(0, 3.0), task(1, 5.0)).left() == 8.0
-    assert clock(time, task(0, 3.0), task(1, 5.0), jobs=2).left() == 4.0
+    assert clock_of(time, task(0, 3.0), task(1, 5.0)).left() == 8.0
+    assert clock_of(time, task(0, 3.0), task(1, 5.0), jobs=2).left() == 4.0
 
 
 def test_forecasts_are_corrected_by_what_ended_of_the_same_body(time):
-    told = clock(time, task(0, 1.0), task(1, 1.0), task(2, 1.0, "b"), task(3, 1.0, "b"))
+    clock = clock_of(time, task(0, 1.0), task(1, 1.0), task(2, 1.0, "b"), task(3, 1.0, "b"))
     for index, seconds in ((0, 10.0), (2, 2.0)):
-        told.take_in(word(index, "start"))
+        clock.take_in(word(index, "start"))
         time.now += seconds
-        told.take_in(word(index, "end", status=Status.CONVERGED))
-    assert told.left() == pytest.approx(10 + 2)
+        clock.take_in(word(index, "end", status=Status.CONVERGED))
+    assert clock.left() == pytest.approx(10 + 2)
 
 
 def test_a_body_not_met_yet_is_taken_as_the_others(time):
-    told = clock(time, task(0, 1.0), task(1, 2.0, "b"))
-    told.take_in(word(0, "start"))
+    clock = clock_of(time, task(0, 1.0), task(1, 2.0, "b"))
+    clock.take_in(word(0, "start"))
     time.now = 3.0
-    told.take_in(word(0, "end", status=Status.CONVERGED))
-    assert told.left() == pytest.approx(6.0)
+    clock.take_in(word(0, "end", status=Status.CONVERGED))
+    assert clock.left() == pytest.approx(6.0)
 
 
 def test_near_its_end_a_task_is_told_by_its_residual(time):
     """1e-1 to 1e-5.9 in 10 s: 0.1 of 5 decades are left, 0.2 s at that rate."""
-    told = clock(time, task(0, 100.0))
-    told.take_in(word(0, "start"))
-    told.take_in(word(0, "step", 1e-1))
+    clock = clock_of(time, task(0, 100.0))
+    clock.take_in(word(0, "start"))
+    clock.take_in(word(0, "step", 1e-1))
     time.now = 10.0
-    told.take_in(word(0, "step", 10**-5.9))
-    assert 0.2 < told.left() < 0.25
+    clock.take_in(word(0, "step", 10**-5.9))
+    assert 0.2 < clock.left() < 0.25
 
 
 def test_little_remains_after_the_last_step(time):
-    told = clock(time, task(0, 100.0))
-    told.take_in(word(0, "start"))
-    told.take_in(word(0, "step", 1e-1))
+    clock = clock_of(time, task(0, 100.0))
+    clock.take_in(word(0, "start"))
+    clock.take_in(word(0, "step", 1e-1))
     time.now = 10.0
-    told.take_in(word(0, "step", 1e-7))
-    assert 0.0 < told.left() < 0.1
+    clock.take_in(word(0, "step", 1e-7))
+    assert 0.0 < clock.left() < 0.1
 
 
 def test_the_longest_task_bounds_the_end_of_the_run(time):
-    told = clock(time, task(0, 100.0), task(1, 1.0), jobs=2)
-    told.take_in(word(0, "start"))
-    assert told.left() == 100.0
+    clock = clock_of(time, task(0, 100.0), task(1, 1.0), jobs=2)
+    clock.take_in(word(0, "start"))
+    assert clock.left() == 100.0
 
 
 def test_words_are_passed_on_with_what_is_left(time):
     words = []
-    tell = clock(time, task(0, 2.0), task(1, 2.0)).watched(words.append)
+    tell = clock_of(time, task(0, 2.0), task(1, 2.0)).watched(words.append)
     tell(word(0, "start"))
     time.now = 1.0
     tell(word(0, "end", status=Status.CONVERGED))
@@ -91,8 +91,8 @@ def test_words_are_passed_on_with_what_is_left(time):
 
 
 def test_failed_tasks_do_not_correct_forecasts(time):
-    told = clock(time, task(0, 1.0), task(1, 1.0))
-    told.take_in(word(0, "start"))
+    clock = clock_of(time, task(0, 1.0), task(1, 1.0))
+    clock.take_in(word(0, "start"))
     time.now = 50.0
-    told.take_in(word(0, "end", status=Status.FAILED))
-    assert told.left() == 1.0
+    clock.take_in(word(0, "end", status=Status.FAILED))
+    assert clock.left() == 1.0

@@ -22,29 +22,29 @@ def table_of(tmp_path, q, k):
 @pytest.mark.parametrize(("shape", "spacings"), [((40, 50), (0.02, 0.03)), ((70, 3), (0.1, 0.01))])
 def test_table_of_the_half_space_has_the_displacements_of_love(tmp_path, shape, spacings):
     q = np.array([1.0, 3.0, 10.0, 200.0])
-    found = table_of(tmp_path, q, 1.5 * q).free_compliance(shape, spacings)
+    compliance = table_of(tmp_path, q, 1.5 * q).free_compliance(shape, spacings)
     exact = HalfSpace(E_star=3.0).free_compliance(shape, spacings)
-    assert found == pytest.approx(exact, rel=1e-8)
+    assert compliance == pytest.approx(exact, rel=1e-8)
 
 
 @pytest.mark.parametrize("n", [0.3, 1.7])
 def test_table_of_a_power_law_has_its_displacements(tmp_path, n):
     q = np.array([1e-3, 1e5])
-    found = table_of(tmp_path, q, q**n).free_compliance((30, 20), (0.1, 0.1))
-    assert found == pytest.approx(Power(n=n).free_compliance((30, 20), (0.1, 0.1)), rel=2e-8)
+    compliance = table_of(tmp_path, q, q**n).free_compliance((30, 20), (0.1, 0.1))
+    assert compliance == pytest.approx(Power(n=n).free_compliance((30, 20), (0.1, 0.1)), rel=2e-8)
 
 
 def test_table_of_a_power_law_has_its_displacements_in_one_dimension(tmp_path):
     q = np.array([1.0, 10.0, 100.0])
-    found = table_of(tmp_path, q, q**0.6).free_compliance((50,), (0.02,))
-    assert found == pytest.approx(Power(n=0.6).free_compliance((50,), (0.02,)), rel=1e-8)
+    compliance = table_of(tmp_path, q, q**0.6).free_compliance((50,), (0.02,))
+    assert compliance == pytest.approx(Power(n=0.6).free_compliance((50,), (0.02,)), rel=1e-8)
 
 
 def test_table_of_a_layer_has_its_displacements(tmp_path):
     layer, q = Layer(thickness=0.3, base="sliding"), np.geomspace(0.01, 3000, 400)
-    found = table_of(tmp_path, q, layer.stiffness(q)).free_compliance((24, 24), (0.05, 0.05))
+    compliance = table_of(tmp_path, q, layer.stiffness(q)).free_compliance((24, 24), (0.05, 0.05))
     exact = layer.free_compliance((24, 24), (0.05, 0.05))
-    assert found == pytest.approx(exact, abs=2e-7 * exact.max())  # the limit of the layer
+    assert compliance == pytest.approx(exact, abs=2e-7 * exact.max())  # the limit of the layer
 
 
 def wide_table():
@@ -92,9 +92,9 @@ def test_transforms_are_those_of_another_quadrature(r):
 def test_displacements_far_away_are_those_of_the_longest_waves(tmp_path):
     q, k = wide_table()
     low = np.log(k[1] / k[0]) / np.log(q[1] / q[0])
-    found = table_of(tmp_path, q, k).free_compliance((2, 64), (20.0, 20.0))
+    compliance = table_of(tmp_path, q, k).free_compliance((2, 64), (20.0, 20.0))
     exact = Power(n=low, k_n=k[0] / q[0] ** low).free_compliance((2, 64), (20.0, 20.0))
-    assert found[:, 32:] == pytest.approx(exact[:, 32:], rel=1e-3)
+    assert compliance[:, 32:] == pytest.approx(exact[:, 32:], rel=1e-3)
 
 
 def test_knots_that_are_close_to_the_one_before_are_left_out():

@@ -20,10 +20,10 @@ STEP = 1e-5  # of the pressure, for differences
 def solved(scene, p_star, tolerance=1e-11):
     """The points that carry load, and the mean gap."""
     contact = scene.contact(p_star)
-    found = solve_contact(contact, Auto(tolerance=tolerance))
-    assert found.status == "converged"
-    return contact_points(contact.height, found.u, found.sigma), observe(
-        contact, found.u, found.sigma
+    solution = solve_contact(contact, Auto(tolerance=tolerance))
+    assert solution.status == "converged"
+    return contact_points(contact.height, solution.u, solution.sigma), observe(
+        contact, solution.u, solution.sigma
     ).u_g
 
 
@@ -40,16 +40,16 @@ def test_it_is_the_slope_of_pressure_over_mean_gap(body, p_star):
     tolerance = 1e-10 if getattr(body, "n", 0) == 4 else 1e-11
     scene = build_scene(SelfAffine(cutoff=0.04), body, 64)
     touching, _ = solved(scene, p_star, tolerance)
-    found = contact_stiffness(scene.contact(p_star), touching)
-    assert found == pytest.approx(by_difference(scene, p_star, tolerance), rel=1e-5)
+    stiffness = contact_stiffness(scene.contact(p_star), touching)
+    assert stiffness == pytest.approx(by_difference(scene, p_star, tolerance), rel=1e-5)
 
 
 @pytest.mark.parametrize("points", [50, 96])
 def test_it_is_so_on_grids_that_no_power_of_two_divides(points):
     scene = build_scene(SelfAffine(cutoff=0.05), Power(n=1), points)
     touching, _ = solved(scene, 0.2)
-    found = contact_stiffness(scene.contact(0.2), touching)
-    assert found == pytest.approx(by_difference(scene, 0.2, 1e-11), rel=1e-5)
+    stiffness = contact_stiffness(scene.contact(0.2), touching)
+    assert stiffness == pytest.approx(by_difference(scene, 0.2, 1e-11), rel=1e-5)
 
 
 def test_springs_have_it_in_closed_form():
@@ -58,8 +58,8 @@ def test_springs_have_it_in_closed_form():
     for p_star in (0.01, 0.3, 2.0):
         touching, _ = solved(scene, p_star)
         a_r = touching.mean()
-        found = contact_stiffness(scene.contact(p_star), touching)
-        assert found == pytest.approx(a_r / (1 - a_r), rel=1e-9)
+        stiffness = contact_stiffness(scene.contact(p_star), touching)
+        assert stiffness == pytest.approx(a_r / (1 - a_r), rel=1e-9)
 
 
 def line_contact(n, width, points=4096):
@@ -94,8 +94,8 @@ def test_strings_and_beams_between_strips_sag_as_they_should(width):
 def test_a_line_scene_has_it_too():
     scene = build_scene(LineParabola(radius=1.0), Power(n=1), 1024)
     touching, _ = solved(scene, 0.1)
-    found = contact_stiffness(scene.contact(0.1), touching)
-    assert found == pytest.approx(by_difference(scene, 0.1, 1e-11), rel=1e-5)
+    stiffness = contact_stiffness(scene.contact(0.1), touching)
+    assert stiffness == pytest.approx(by_difference(scene, 0.1, 1e-11), rel=1e-5)
 
 
 def test_a_hertz_contact_is_as_stiff_as_a_flat_punch_of_its_radius():
@@ -108,9 +108,9 @@ def test_a_hertz_contact_is_as_stiff_as_a_flat_punch_of_its_radius():
     unit = scene.delta_sigma / scene.h_std
     for force in (2e-4, 1.6e-3):
         touching, _ = solved(scene, force / scene.delta_sigma, 1e-9)
-        found = contact_stiffness(scene.contact(0.1), touching) * unit
+        stiffness = contact_stiffness(scene.contact(0.1), touching) * unit
         radius = float(hertz_radius(1, 1.0, 1.0, force))
-        assert 1 / found == pytest.approx(1 / (4 * radius) - 3.900265 / (2 * np.pi), rel=3e-3)
+        assert 1 / stiffness == pytest.approx(1 / (4 * radius) - 3.900265 / (2 * np.pi), rel=3e-3)
 
 
 def test_full_contact_is_rigid_and_no_contact_has_no_stiffness():

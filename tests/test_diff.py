@@ -21,7 +21,7 @@ histogram = false
 
 
 @pytest.fixture(scope="module")
-def made(output_of, tmp_path_factory):
+def study_of(output_of, tmp_path_factory):
     """Runs SPEC with overrides; the same ones give the same study."""
     folder = tmp_path_factory.mktemp("diff")
     (folder / "spec.toml").write_text(SPEC)
@@ -37,55 +37,55 @@ def made(output_of, tmp_path_factory):
     return study
 
 
-def test_a_study_does_not_differ_from_itself(output_of, made):
-    found = diff(made(), made())
-    assert len(found.pairs) == 4
-    assert found.only == ([], [])
-    assert found.spec == []
+def test_a_study_does_not_differ_from_itself(output_of, study_of):
+    difference = diff(study_of(), study_of())
+    assert len(difference.pairs) == 4
+    assert difference.only == ([], [])
+    assert difference.spec == []
     assert all(pair.deviation("u_g") == (0.0, pytest.approx(nan, nan_ok=True))
-               for pair in found.pairs)  # fmt: skip
-    assert not found.exceeds(0)
-    assert "+0.00e+00" in output_of("diff", made(), made(), "--tolerance", 0)
+               for pair in difference.pairs)  # fmt: skip
+    assert not difference.exceeds(0)
+    assert "+0.00e+00" in output_of("diff", study_of(), study_of(), "--tolerance", 0)
 
 
-def test_other_grids_are_compared_and_the_keys_that_differ_are_told(output_of, made):
-    fine = made("grid.points=64")
-    found = diff(made(), fine)
-    assert [(p.one["points"], p.other["points"]) for p in found.pairs] == [(32, 64)] * 4
-    assert found.spec == ["grid.points: 32 -> 64"]
-    for pair, a, b in zip(found.pairs, read_rows(made()), read_rows(fine), strict=True):
+def test_other_grids_are_compared_and_the_keys_that_differ_are_told(output_of, study_of):
+    fine = study_of("grid.points=64")
+    difference = diff(study_of(), fine)
+    assert [(p.one["points"], p.other["points"]) for p in difference.pairs] == [(32, 64)] * 4
+    assert difference.spec == ["grid.points: 32 -> 64"]
+    for pair, a, b in zip(difference.pairs, read_rows(study_of()), read_rows(fine), strict=True):
         expected = (b["u_g"] - a["u_g"]) / max(a["u_g"], b["u_g"])
         assert pair.deviation("u_g").relative == pytest.approx(expected, rel=1e-12)
-    text = output_of("diff", made(), fine)
+    text = output_of("diff", study_of(), fine)
     assert "32 -> 64" in text
     assert "grid.points: 32 -> 64" in text
 
 
-def test_the_tolerance_decides_the_exit_status(output_of, made):
-    fine = made("grid.points=64")
+def test_the_tolerance_decides_the_exit_status(output_of, study_of):
+    fine = study_of("grid.points=64")
     largest = max(
         abs(pair.deviation(name).relative)
-        for pair in diff(made(), fine).pairs
+        for pair in diff(study_of(), fine).pairs
         for name in ("a_r", "sigma_p", "u_g")
     )
-    output_of("diff", made(), fine, "--tolerance", 1.001 * largest)
-    output_of("diff", made(), fine, "--tolerance", 0.999 * largest, status=1)
-    output_of("diff", made(), fine)
+    output_of("diff", study_of(), fine, "--tolerance", 1.001 * largest)
+    output_of("diff", study_of(), fine, "--tolerance", 0.999 * largest, status=1)
+    output_of("diff", study_of(), fine)
 
 
-def test_rows_of_one_study_alone_are_listed(output_of, made):
-    more = made("load.p_star=[0.3, 1.0]")
-    found = diff(made(), more)
-    assert len(found.pairs) == 2
-    assert [row["p_star"] for row in found.only[0]] == [0.1, 0.1]
-    assert [row["p_star"] for row in found.only[1]] == [0.3, 0.3]
-    text = output_of("diff", made(), more)
+def test_rows_of_one_study_alone_are_listed(output_of, study_of):
+    more = study_of("load.p_star=[0.3, 1.0]")
+    difference = diff(study_of(), more)
+    assert len(difference.pairs) == 2
+    assert [row["p_star"] for row in difference.only[0]] == [0.1, 0.1]
+    assert [row["p_star"] for row in difference.only[1]] == [0.3, 0.3]
+    text = output_of("diff", study_of(), more)
     assert "only in A:" in text
     assert "  power n=2 on self-affine cutoff=0.1\n    32: p*=0.3\n" in text
 
 
-def test_many_rows_of_one_study_alone_are_one_line(output_of, made):
-    text = output_of("diff", made(), made("load.p_star=[0.01, 0.02, 0.03]"))
+def test_many_rows_of_one_study_alone_are_one_line(output_of, study_of):
+    text = output_of("diff", study_of(), study_of("load.p_star=[0.01, 0.02, 0.03]"))
     assert "  power n=2 on self-affine cutoff=0.1\n    32: p*=0.01, p*=0.02, p*=0.03\n" in text
 
 
@@ -96,71 +96,75 @@ IN_PASCAL = (
 )
 
 
-def test_another_body_is_paired_by_pressure_and_compared_in_pascal_and_metres(output_of, made):
+def test_another_body_is_paired_by_pressure_and_compared_in_pascal_and_metres(output_of, study_of):
     stiff = (IN_PASCAL[0].replace("2e9", "4e9"), *IN_PASCAL[1:])
-    found = diff(made(*IN_PASCAL), made(*stiff))
-    assert [(p.one["pressure"], p.other["pressure"]) for p in found.pairs] == [
+    difference = diff(study_of(*IN_PASCAL), study_of(*stiff))
+    assert [(p.one["pressure"], p.other["pressure"]) for p in difference.pairs] == [
         (1e8, 1e8),
         (5e8, 5e8),
     ]
-    for pair in found.pairs:
+    for pair in difference.pairs:
         for name, unit in (("a_r", None), ("sigma_p", "delta_sigma"), ("u_g", "h_std")):
             a, b = (row[name] * (row[unit] if unit else 1) for row in (pair.one, pair.other))
             expected = pytest.approx((b - a) / max(a, b), rel=1e-12)
             assert pair.deviation(name).relative == expected
         assert pair.deviation("a_r").relative < 0 < pair.deviation("u_g").relative
-    text = output_of("diff", made(*IN_PASCAL), made(*stiff))
+    text = output_of("diff", study_of(*IN_PASCAL), study_of(*stiff))
     assert text.startswith("bodies differ: paired by pressure, sigma_p in Pa, u_g in m. ")
-    told = json.loads(output_of("diff", made(*IN_PASCAL), made(*stiff), "--json"))
-    assert told["paired"] == found.paired
+    data = json.loads(output_of("diff", study_of(*IN_PASCAL), study_of(*stiff), "--json"))
+    assert data["paired"] == difference.paired
 
 
-def test_another_surface_of_one_body_is_paired_by_load(output_of, made):
-    one, other = made("elastomer.n=1"), made("elastomer.n=1", "surface.hurst=0.5")
-    found = diff(one, other)
-    assert [pair.one["p_star"] for pair in found.pairs] == [0.1, 1.0]
+def test_another_surface_of_one_body_is_paired_by_load(output_of, study_of):
+    one, other = study_of("elastomer.n=1"), study_of("elastomer.n=1", "surface.hurst=0.5")
+    difference = diff(one, other)
+    assert [pair.one["p_star"] for pair in difference.pairs] == [0.1, 1.0]
     text = output_of("diff", one, other)
     assert text.startswith("surfaces differ: paired by reduced pressure, values in reduced units")
     assert "A: power n=1 on self-affine cutoff=0.1\nB: power n=1 on self-affine hurst=0.5" in text
     assert "only in" not in text
 
 
-def test_rows_of_one_body_and_surface_that_share_no_load_stay_apart(made):
-    found = diff(made("elastomer.n=1"), made("elastomer.n=1", "load.p_star=0.3"))
-    assert (found.pairs, found.paired) == ([], "")
+def test_rows_of_one_body_and_surface_that_share_no_load_stay_apart(study_of):
+    difference = diff(study_of("elastomer.n=1"), study_of("elastomer.n=1", "load.p_star=0.3"))
+    assert (difference.pairs, difference.paired) == ([], "")
 
 
-def test_another_seed_is_another_contact_and_nothing_to_compare_is_no_agreement(output_of, made):
-    other = made("surface.seed=1")
-    assert diff(made(), other).pairs == []
-    assert "no contact in common" in output_of("diff", made(), other, "--tolerance", 1, status=1)
+def test_another_seed_is_another_contact_and_nothing_to_compare_is_no_agreement(
+    output_of, study_of
+):
+    other = study_of("surface.seed=1")
+    assert diff(study_of(), other).pairs == []
+    assert "no contact in common" in output_of(
+        "diff", study_of(), other, "--tolerance", 1, status=1
+    )
 
 
-def test_of_several_grids_the_same_ones_belong_together(made):
-    both, one = made("grid.points=[32, 64]"), made("grid.points=64")
-    found = diff(both, one)
-    assert [(p.one["points"], p.other["points"]) for p in found.pairs] == [(64, 64)] * 4
-    assert {row["points"] for row in found.only[0]} == {32}
-    assert not found.exceeds(0)
+def test_of_several_grids_the_same_ones_belong_together(study_of):
+    both, one = study_of("grid.points=[32, 64]"), study_of("grid.points=64")
+    difference = diff(both, one)
+    assert [(p.one["points"], p.other["points"]) for p in difference.pairs] == [(64, 64)] * 4
+    assert {row["points"] for row in difference.only[0]} == {32}
+    assert not difference.exceeds(0)
 
 
-def test_differences_are_told_in_units_of_the_error_bars(output_of, made):
+def test_differences_are_told_in_units_of_the_error_bars(output_of, study_of):
     bars = ("accuracy.mean_gap=0.5", "elastomer.n=1", "load.p_star=0.1")
-    one, other = made(*bars), made(*bars, "grid.points=48")
-    found = diff(one, other)
-    for pair in found.pairs:
+    one, other = study_of(*bars), study_of(*bars, "grid.points=48")
+    difference = diff(one, other)
+    for pair in difference.pairs:
         error = hypot(pair.one["u_g_error"], pair.other["u_g_error"])
         expected = (pair.other["u_g"] - pair.one["u_g"]) / error
         assert pair.deviation("u_g").in_errors == pytest.approx(expected, rel=1e-12)
     text = output_of("diff", one, other)
-    assert f"({found.pairs[0].deviation('u_g').in_errors:+.1f})" in text
+    assert f"({difference.pairs[0].deviation('u_g').in_errors:+.1f})" in text
 
 
-def test_json_holds_rows_and_keys(output_of, made):
-    told = json.loads(output_of("diff", made(), made("grid.points=64"), "--json"))
-    assert told["spec"] == ["grid.points: 32 -> 64"]
-    assert (told["only_a"], told["only_b"]) == ([], [])
-    row = told["rows"][0]
+def test_json_holds_rows_and_keys(output_of, study_of):
+    data = json.loads(output_of("diff", study_of(), study_of("grid.points=64"), "--json"))
+    assert data["spec"] == ["grid.points: 32 -> 64"]
+    assert (data["only_a"], data["only_b"]) == ([], [])
+    row = data["rows"][0]
     assert (row["points_a"], row["points_b"]) == (32, 64)
     expected = (row["a_r_b"] - row["a_r_a"]) / max(row["a_r_a"], row["a_r_b"])
     assert row["a_r_relative"] == pytest.approx(expected)
@@ -179,6 +183,6 @@ def test_values_that_are_missing_or_zero_do_not_agree_by_chance():
     assert isinstance(apart(1.0, 2.0), Deviation)
 
 
-def test_a_study_that_is_not_there_is_bad_input(output_of, made, tmp_path):
-    assert "no such study" in output_of("diff", made(), tmp_path / "none.h5", status=2)
-    output_of("diff", made(), made(), "--tolerance", "-1", status=2)
+def test_a_study_that_is_not_there_is_bad_input(output_of, study_of, tmp_path):
+    assert "no such study" in output_of("diff", study_of(), tmp_path / "none.h5", status=2)
+    output_of("diff", study_of(), study_of(), "--tolerance", "-1", status=2)

@@ -118,8 +118,8 @@ def test_the_start_does_not_need_all_points_in_contact_on_the_coarse_grid(n):
     held = solve_contact(coarse, WholeGrids()).u == coarse.height
     whole = solve_contact(contact, WholeGrids(tolerance=1e-7))
     for seed in range(3):
-        kept = held & (np.random.default_rng(seed).random(held.shape) < 0.7)
-        start = direct_start(kept, [contact])
+        part = held & (np.random.default_rng(seed).random(held.shape) < 0.7)
+        start = direct_start(part, [contact])
         assert start is not None
         assert start.u == pytest.approx(whole.u, abs=1e-7)
 
@@ -150,15 +150,15 @@ def test_a_large_contact_is_left_to_the_iteration():
 
 
 def test_a_solve_stopped_on_a_coarse_grid_goes_on_bit_by_bit():
-    contact, kept = square(Power(n=3)), []
+    contact, states = square(Power(n=3)), []
 
     def keep(current, state):
-        kept.append((current.grid.whole_shape, copy.deepcopy(state)))
+        states.append((current.grid.whole_shape, copy.deepcopy(state)))
 
     straight = solve_contact(contact, ProjectedCG(tolerance=1e-6), keep)
-    assert [shape for shape, _ in kept].count((256, 256)) == 1  # after a direct solve
-    for chosen in (1, len(kept) // 2, len(kept) - 1):
-        shape, state = kept[chosen]
+    assert [shape for shape, _ in states].count((256, 256)) == 1  # after a direct solve
+    for chosen in (1, len(states) // 2, len(states) - 1):
+        shape, state = states[chosen]
         rest = solve_contact(contact, ProjectedCG(tolerance=1e-6), start=Resume(shape, vars(state)))
         assert np.array_equal(rest.u, straight.u)
         assert np.array_equal(rest.sigma, straight.sigma)

@@ -46,26 +46,26 @@ def sequence(n, grids=GRIDS, area=0.2, stress=0.5, gap=0.3, line=10.0):
 @pytest.mark.parametrize("n", [0.0, 0.5, 1.0, 2.0, 2.5, 3.5])
 @pytest.mark.parametrize("grids", [GRIDS[-1:], GRIDS[-2:], GRIDS])
 def test_the_area_of_a_regular_sequence_is_recovered(n, grids):
-    made = estimate(sequence(n, grids), n, ROUGH)["a_r"]
-    assert made.continuum == pytest.approx(0.2, rel=1e-12)
-    assert made.error >= AREA_EXCESS * n * 10 / 256
-    assert made.verdict == "regular"
+    area = estimate(sequence(n, grids), n, ROUGH)["a_r"]
+    assert area.continuum == pytest.approx(0.2, rel=1e-12)
+    assert area.error >= AREA_EXCESS * n * 10 / 256
+    assert area.verdict == "regular"
 
 
 @pytest.mark.parametrize("n", [1.0, 1.5, 2.0, 2.5])
 def test_the_stress_of_a_regular_sequence_is_recovered(n):
     levels = sequence(n)
-    made = estimate(levels, n, ROUGH)["sigma_p"]
-    assert made.continuum == pytest.approx(0.5, rel=1e-12)
-    assert made.error >= 0.5 - levels[-1].sigma_p
-    assert made.continuum_error < made.error
+    stress = estimate(levels, n, ROUGH)["sigma_p"]
+    assert stress.continuum == pytest.approx(0.5, rel=1e-12)
+    assert stress.error >= 0.5 - levels[-1].sigma_p
+    assert stress.continuum_error < stress.error
 
 
 def test_the_gap_is_its_own_best_guess():
     levels = sequence(1.0)
-    made = estimate(levels, 1.0, ROUGH)["u_g"]
-    assert made.continuum == levels[-1].u_g
-    assert made.error == made.continuum_error >= levels[-1].u_g - 0.3
+    gap = estimate(levels, 1.0, ROUGH)["u_g"]
+    assert gap.continuum == levels[-1].u_g
+    assert gap.error == gap.continuum_error >= levels[-1].u_g - 0.3
 
 
 @pytest.mark.parametrize("quantity", QUANTITIES)
@@ -75,9 +75,9 @@ def test_a_jump_that_no_order_explains_widens_the_bar(quantity, sign):
     jump = sign * 0.1
     moved = replace(levels[1], **{quantity: getattr(levels[1], quantity) + jump})
     calm = estimate(levels, 1.0, ROUGH)[quantity]
-    made = estimate([levels[0], moved, levels[2]], 1.0, ROUGH)[quantity]
-    assert made.continuum_error > calm.continuum_error
-    assert made.error >= abs(jump) / 10
+    value = estimate([levels[0], moved, levels[2]], 1.0, ROUGH)[quantity]
+    assert value.continuum_error > calm.continuum_error
+    assert value.error >= abs(jump) / 10
 
 
 @pytest.mark.parametrize("rough", [ROUGH, None])
@@ -95,24 +95,24 @@ def test_a_finer_grid_has_smaller_bars(n):
 
 @pytest.mark.parametrize(("n", "verdict"), [(2.5, "regular"), (2.75, "slow"), (3, "diverges")])
 def test_the_stress_says_where_it_has_no_limit(n, verdict):
-    made = estimate(sequence(min(n, 2.9)), n, ROUGH)["sigma_p"]
-    assert made.verdict == verdict
-    assert isnan(made.error) == isnan(made.continuum) == (verdict != "regular")
+    stress = estimate(sequence(min(n, 2.9)), n, ROUGH)["sigma_p"]
+    assert stress.verdict == verdict
+    assert isnan(stress.error) == isnan(stress.continuum) == (verdict != "regular")
 
 
 def test_the_area_of_a_plate_on_a_single_indenter_is_a_bound():
     for level in sequence(0.0), [Level(64, 0.01, 2.0, 0.1, 2.5)]:
-        made = estimate(level, 4.0)["a_r"]
-        assert made.verdict == "bound"
-        assert made.error == min(level[-1].a_r, level[-1].line)
-        assert isnan(made.continuum)
-        assert isnan(made.continuum_error)
+        area = estimate(level, 4.0)["a_r"]
+        assert area.verdict == "bound"
+        assert area.error == min(level[-1].a_r, level[-1].line)
+        assert isnan(area.continuum)
+        assert isnan(area.continuum_error)
 
 
 def test_the_area_of_a_plate_is_unknown_from_one_grid():
-    made = estimate([Level(64, 0.01, 2.0, 0.1, 2.5)], 4.0, ROUGH)["a_r"]
-    assert made.verdict == "unknown"
-    assert isnan(made.error)
+    area = estimate([Level(64, 0.01, 2.0, 0.1, 2.5)], 4.0, ROUGH)["a_r"]
+    assert area.verdict == "unknown"
+    assert isnan(area.error)
     assert estimate(sequence(3.5), MAX_AREA_EXPONENT, ROUGH)["a_r"].verdict == "regular"
 
 
@@ -120,9 +120,9 @@ def test_the_area_of_a_plate_is_unknown_from_one_grid():
 def test_lone_points_of_a_plate_have_no_area(count):
     """A fixed number of loaded points, each with four neighbours without load."""
     levels = [Level(N, count / N**2, 2.0, 0.1, 4 * count / N) for N in (128, 256)]
-    made = estimate(levels, 4.0, ROUGH)["a_r"]
-    assert made.continuum <= made.continuum_error
-    assert made.continuum_error < 2 * levels[-1].a_r
+    area = estimate(levels, 4.0, ROUGH)["a_r"]
+    assert area.continuum <= area.continuum_error
+    assert area.continuum_error < 2 * levels[-1].a_r
 
 
 @pytest.mark.parametrize("excess", [0.33, 0.4, 0.6])
@@ -130,29 +130,29 @@ def test_the_area_inside_of_a_ragged_line_is_within_the_bar(excess):
     """An excess of first order: a share of the points on a line of fixed length, as measured in
     broad contacts (least, median, largest)."""
     levels = [Level(N, 0.2 + excess * 10 / N, 2.0, 0.1, 10.0) for N in (128, 256)]
-    made = estimate(levels, 4.0, ROUGH)["a_r"]
-    assert abs(made.continuum - 0.2) <= made.continuum_error
-    assert abs(levels[-1].a_r - 0.2) <= made.error
+    area = estimate(levels, 4.0, ROUGH)["a_r"]
+    assert abs(area.continuum - 0.2) <= area.continuum_error
+    assert abs(levels[-1].a_r - 0.2) <= area.error
 
 
 def test_full_contact_is_exact():
     for n in (0.0, 1.0, 4.0):
-        for made in estimate([Level(64, 1.0, 1.0, 0.0, 0.0)], n, ROUGH).values():
-            assert (made.error, made.continuum_error, made.verdict) == (0.0, 0.0, "exact")
+        for value in estimate([Level(64, 1.0, 1.0, 0.0, 0.0)], n, ROUGH).values():
+            assert (value.error, value.continuum_error, value.verdict) == (0.0, 0.0, "exact")
 
 
 def test_no_contact_is_unknown():
-    for made in estimate([Level(64, 0.0, 0.0, 1.0, 0.0)], 1.0, ROUGH).values():
-        assert isnan(made.error)
-        assert made.verdict == "unknown"
+    for value in estimate([Level(64, 0.0, 0.0, 1.0, 0.0)], 1.0, ROUGH).values():
+        assert isnan(value.error)
+        assert value.verdict == "unknown"
 
 
 def test_a_single_body_on_one_grid_is_unknown():
-    made = estimate(sequence(1.0, (64,)), 1.0)
-    assert made["a_r"].verdict == "regular"
+    values = estimate(sequence(1.0, (64,)), 1.0)
+    assert values["a_r"].verdict == "regular"
     for quantity in ("sigma_p", "u_g"):
-        assert made[quantity].verdict == "unknown"
-        assert isnan(made[quantity].error)
+        assert values[quantity].verdict == "unknown"
+        assert isnan(values[quantity].error)
 
 
 @pytest.mark.parametrize("n", [0.5, 1.0, 2.0, 3.0])
@@ -164,9 +164,9 @@ def test_estimates_stay_in_range(n):
         for levels, rough in (([fine], None), ([coarse, fine], None), ([coarse, fine], ROUGH)):
             if rough is not None and n > 2.5:
                 continue
-            made = estimate(levels, n, rough)["a_r"]
-            assert 0 <= made.continuum <= 1
-            assert 0 < made.continuum_error <= 1
+            area = estimate(levels, n, rough)["a_r"]
+            assert 0 <= area.continuum <= 1
+            assert 0 < area.continuum_error <= 1
 
 
 IRREGULAR = (
@@ -178,40 +178,40 @@ IRREGULAR = (
 @pytest.mark.parametrize("n", [0.0, 1.0, 2.0, 3.0])
 @pytest.mark.parametrize("rough", IRREGULAR)
 def test_an_irregular_surface_on_one_grid_is_unknown(rough, n):
-    for name, made in estimate(sequence(min(n, 2.9), (64,)), n, rough).items():
-        assert isnan(made.error)
-        assert isnan(made.continuum)
-        assert made.verdict == ("diverges" if (name, n) == ("sigma_p", 3.0) else "unknown")
+    for name, value in estimate(sequence(min(n, 2.9), (64,)), n, rough).items():
+        assert isnan(value.error)
+        assert isnan(value.continuum)
+        assert value.verdict == ("diverges" if (name, n) == ("sigma_p", 3.0) else "unknown")
 
 
 @pytest.mark.parametrize("rough", IRREGULAR)
 def test_an_irregular_surface_on_two_grids_has_bars_of_its_own(rough):
     """Wider than those of isotropic roughness, and at least as wide as the change."""
     levels = sequence(1.0)
-    made, calm = (estimate(levels, 1.0, surface) for surface in (rough, ROUGH))
+    irregular, calm = (estimate(levels, 1.0, surface) for surface in (rough, ROUGH))
     for name in QUANTITIES:
         change = getattr(levels[-1], name) - getattr(levels[-2], name)
-        assert made[name].verdict == "regular"
-        assert made[name].error > 0.8 * abs(change)
-        assert made[name].continuum_error > calm[name].continuum_error
-    assert made["a_r"].continuum == pytest.approx(2 * levels[-1].a_r - levels[-2].a_r)
+        assert irregular[name].verdict == "regular"
+        assert irregular[name].error > 0.8 * abs(change)
+        assert irregular[name].continuum_error > calm[name].continuum_error
+    assert irregular["a_r"].continuum == pytest.approx(2 * levels[-1].a_r - levels[-2].a_r)
 
 
 @pytest.mark.parametrize(("n", "known"), [(1.0, 3), (1.5, 2), (2.5, 2), (2.75, 1), (3.25, 0)])
 def test_an_irregular_surface_is_unknown_where_no_bars_were_calibrated(n, known):
-    made = estimate(sequence(min(n, 2.9)), n, IRREGULAR[0])
-    assert sum(each.verdict == "regular" for each in made.values()) == known
+    values = estimate(sequence(min(n, 2.9)), n, IRREGULAR[0])
+    assert sum(each.verdict == "regular" for each in values.values()) == known
 
 
 def test_the_area_on_oblong_pixels_has_the_bars_of_an_irregular_surface():
     """Its excess is that of square pixels only where they are nearly square."""
     for aspect, verdict in ((1.05, "regular"), (2.0, "unknown")):
         rough = replace(ROUGH, aspect=aspect)
-        made = estimate(sequence(1.0, (64,)), 1.0, rough)
-        assert made["a_r"].verdict == verdict
-        assert made["u_g"] == estimate(sequence(1.0, (64,)), 1.0, ROUGH)["u_g"]
-    made = estimate(sequence(1.0), 1.0, rough)["a_r"]
-    assert made == estimate(sequence(1.0), 1.0, IRREGULAR[0])["a_r"]
+        area = estimate(sequence(1.0, (64,)), 1.0, rough)
+        assert area["a_r"].verdict == verdict
+        assert area["u_g"] == estimate(sequence(1.0, (64,)), 1.0, ROUGH)["u_g"]
+    area = estimate(sequence(1.0), 1.0, rough)["a_r"]
+    assert area == estimate(sequence(1.0), 1.0, IRREGULAR[0])["a_r"]
 
 
 def test_few_contact_spots_on_one_grid_are_unknown():
@@ -220,16 +220,16 @@ def test_few_contact_spots_on_one_grid_are_unknown():
         r = 0.05
         level = Level(256, spots * np.pi * r**2, 0.5, 0.3, spots * 8 * r)
         assert level.spots == pytest.approx(spots)
-        for made in estimate([level], 1.0, ROUGH).values():
-            assert made.verdict == verdict
+        for value in estimate([level], 1.0, ROUGH).values():
+            assert value.verdict == verdict
 
 
 def test_an_exponent_that_changes_widens_the_area():
     """By the excess of that change of exponent."""
     level = sequence(2.0, (128,))
-    calm, made = (estimate(level, 2.0, ROUGH, spread)["a_r"] for spread in (0.0, 0.5))
+    calm, area = (estimate(level, 2.0, ROUGH, spread)["a_r"] for spread in (0.0, 0.5))
     extra = AREA_EXCESS * 0.5 * level[0].line
-    assert made.continuum_error == pytest.approx(np.hypot(calm.continuum_error, extra))
+    assert area.continuum_error == pytest.approx(np.hypot(calm.continuum_error, extra))
     slab = Slab(thickness=0.05)
     assert exponent_spread(slab, 32, 1.0) > 0.1
     assert exponent_spread(Power(n=2), 32, 1.0) < 1e-9
@@ -240,9 +240,9 @@ def measured(surface, elastomer, pressure, points):
     scene = build_scene(surface, elastomer, points)
     contact = scene.contact(pressure / scene.delta_sigma)
     solution = solve_contact(contact, Auto(tolerance=1e-8))
-    seen = observe(contact, solution.u, solution.sigma)
-    stress, gap = seen.sigma_p * scene.delta_sigma, seen.u_g * scene.h_std
-    return Level(points, seen.a_r, stress, gap, seen.perimeter)
+    observables = observe(contact, solution.u, solution.sigma)
+    stress, gap = observables.sigma_p * scene.delta_sigma, observables.u_g * scene.h_std
+    return Level(points, observables.a_r, stress, gap, observables.perimeter)
 
 
 @pytest.mark.parametrize("pressure", [0.05, 0.3, 1.0, 4.0])
@@ -250,22 +250,22 @@ def measured(surface, elastomer, pressure, points):
 def test_the_area_of_a_membrane_on_a_paraboloid(pressure, count):
     levels = [measured(Parabola(), Membrane(), pressure, points) for points in (32, 64, 128)]
     exact = float(reference.membrane_area(pressure, 1.0, 1.0))
-    made = estimate(levels[-count:], 2.0)["a_r"]
-    assert abs(made.continuum - exact) <= made.continuum_error
-    assert abs(levels[-1].a_r - exact) <= made.error
-    assert abs(made.continuum - exact) < 0.5 * abs(levels[-1].a_r - exact)
+    area = estimate(levels[-count:], 2.0)["a_r"]
+    assert abs(area.continuum - exact) <= area.continuum_error
+    assert abs(levels[-1].a_r - exact) <= area.error
+    assert abs(area.continuum - exact) < 0.5 * abs(levels[-1].a_r - exact)
 
 
 @pytest.mark.parametrize("p_bar", [0.05, 0.2, 0.5, 0.9])
 def test_westergaards_wave(p_bar):
     levels = [measured(Wave(), Power(n=1), p_bar * 2 * np.pi, points) for points in (64, 128, 256)]
-    made = estimate(levels, 1.0)
+    values = estimate(levels, 1.0)
     for quantity, exact in (
         ("a_r", reference.westergaard_area(p_bar)),
         ("u_g", reference.westergaard_gap(p_bar)),
     ):
-        assert abs(getattr(levels[-1], quantity) - exact) <= made[quantity].error
-        assert abs(made[quantity].continuum - exact) <= made[quantity].continuum_error
+        assert abs(getattr(levels[-1], quantity) - exact) <= values[quantity].error
+        assert abs(values[quantity].continuum - exact) <= values[quantity].continuum_error
 
 
 @pytest.mark.parametrize("points", [64, 100, 256, 2048])
@@ -294,12 +294,12 @@ def test_the_scales_of_waves_of_one_length():
         surface = SelfAffine(
             spectrum="cutoff", rolloff=1 / 9.9, cutoff=0.1, length=length, h_std=h_std
         )
-        found = roughness_scales(build_scene(surface, Power(n=1), 64).shells, length)
-        assert found.waves == pytest.approx(10, rel=0.01)
-        assert found.curvature == pytest.approx((2 * np.pi * found.waves) ** 2, rel=1e-3)
-    found = roughness_scales(build_scene(Wave(), Power(n=1), 64).shells, 1.0)
-    assert found.waves == pytest.approx(1, rel=1e-12)
-    assert found.curvature == pytest.approx(4 * np.pi**2, rel=1e-12)
+        case = roughness_scales(build_scene(surface, Power(n=1), 64).shells, length)
+        assert case.waves == pytest.approx(10, rel=0.01)
+        assert case.curvature == pytest.approx((2 * np.pi * case.waves) ** 2, rel=1e-3)
+    case = roughness_scales(build_scene(Wave(), Power(n=1), 64).shells, 1.0)
+    assert case.waves == pytest.approx(1, rel=1e-12)
+    assert case.curvature == pytest.approx(4 * np.pi**2, rel=1e-12)
 
 
 def test_a_rough_surface_on_nested_grids():
@@ -308,7 +308,7 @@ def test_a_rough_surface_on_nested_grids():
     scene = build_scene(surface, Power(n=1), 64)
     levels = [measured(surface, Power(n=1), 10.0, points) for points in (32, 64, 512)]
     levels = [replace(level, u_g=level.u_g / scene.h_std) for level in levels]
-    made = estimate(levels[:2], 1.0, roughness_scales(scene.shells, 1.0))
+    values = estimate(levels[:2], 1.0, roughness_scales(scene.shells, 1.0))
     for quantity in QUANTITIES:
         value, exact = getattr(levels[1], quantity), getattr(levels[2], quantity)
-        assert abs(value - exact) <= made[quantity].error
+        assert abs(value - exact) <= values[quantity].error

@@ -84,13 +84,13 @@ def test_the_edge_has_the_law_of_hertz(n, exponent):
 
 @pytest.mark.parametrize("n", [0.0, 0.5, 1.0, 1.5, 2.5, 3.0])
 def test_the_density_of_hertz_is_that_of_the_points_of_its_profile(n):
-    found = hertz_row(n, 2048, 0.3)["pr_sigma_log"]
+    histogram = hertz_row(n, 2048, 0.3)["pr_sigma_log"]
     fine = np.geomspace(EDGES[:-1], EDGES[1:], 41)
     exact = hertz_density(n, fine, 2 - n / 2, np.pi * 0.09)
     mean = np.trapezoid(exact, fine, axis=0) / WIDTH
     whole = np.all(exact > 0, axis=0) & (mean * WIDTH * 2048**2 > 5000)
     assert whole.sum() > 4
-    np.testing.assert_allclose(found[whole], mean[whole], rtol=0.04)
+    np.testing.assert_allclose(histogram[whole], mean[whole], rtol=0.04)
 
 
 @pytest.mark.parametrize(
@@ -98,12 +98,12 @@ def test_the_density_of_hertz_is_that_of_the_points_of_its_profile(n):
 )
 def test_the_exponent_of_hertz_is_found_within_its_error(n, law):
     rows = [hertz_row(n, points, 0.3) for points in (512, 1024, 2048)]
-    found = fit(distribution(rows), law)
-    assert found.theory == edge_exponent(n)
-    assert abs(found.exponent - found.theory) < 2 * found.error
+    fitted = fit(distribution(rows), law)
+    assert fitted.theory == edge_exponent(n)
+    assert abs(fitted.exponent - fitted.theory) < 2 * fitted.error
     exact = hertz_density(n, 1.0, 2 - n / 2, np.pi * 0.09) if n < 2 else None
     if exact:
-        assert found.edge_prefactor == pytest.approx(float(exact), rel=0.1)
+        assert fitted.edge_prefactor == pytest.approx(float(exact), rel=0.1)
 
 
 def test_first_order_errors_of_a_grid_are_taken_off():
@@ -111,24 +111,24 @@ def test_first_order_errors_of_a_grid_are_taken_off():
     cells = [256**2, 512**2, 1024**2]
     factors = np.array([1.2, 1.1, 1.05])[:, None]
     counts = 1e6 * exact * WIDTH * np.array(cells)[:, None] * factors
-    found = extrapolate(counts, [1e6 * cell for cell in cells])
+    limit = extrapolate(counts, [1e6 * cell for cell in cells])
     inner = slice(5, 95)
-    error = np.exp(found.log_density - np.log(exact))[inner] - 1
+    error = np.exp(limit.log_density - np.log(exact))[inner] - 1
     assert np.all(np.abs(error) < 0.003)
-    assert np.all(np.abs(error) < np.abs(found.discretisation[inner]))
+    assert np.all(np.abs(error) < np.abs(limit.discretisation[inner]))
 
 
 def test_irregular_changes_are_not_extrapolated():
     cells = [64**2, 128**2, 256**2]
     counts = 1e9 * np.ones(100) * np.array([1.0, 0.9, 1.0])[:, None] * np.array(cells)[:, None]
-    found = extrapolate(counts, cells)
-    np.testing.assert_allclose(found.log_density, np.log(1e9 / WIDTH))
-    assert np.all(np.abs(found.discretisation) > 0.1)
+    limit = extrapolate(counts, cells)
+    np.testing.assert_allclose(limit.log_density, np.log(1e9 / WIDTH))
+    assert np.all(np.abs(limit.discretisation) > 0.1)
 
 
 def test_a_bin_that_changes_too_much_is_not_resolved():
-    found = extrapolate(np.array([100 * np.ones(100), 200 * np.ones(100)]), [64**2, 128**2])
-    assert np.all(np.isnan(found.log_density))  # by ln 2
+    limit = extrapolate(np.array([100 * np.ones(100), 200 * np.ones(100)]), [64**2, 128**2])
+    assert np.all(np.isnan(limit.log_density))  # by ln 2
 
 
 def test_errors_of_a_slope_hold_as_often_as_they_say():
@@ -155,9 +155,9 @@ def test_errors_of_an_exponent_hold_over_noisy_samples():
                 counts = draw.poisson(density * WIDTH * size**2)
                 rows.append(row(1.0, size, counts, 0.1, 12.0, seed))
             seeds.append(rows)
-        found = fit(distribution(*seeds), "small")
+        fitted = fit(distribution(*seeds), "small")
         hits.append(
-            (abs(found.exponent - 1) < found.error, abs(found.limit - 1) < found.limit_error)
+            (abs(fitted.exponent - 1) < fitted.error, abs(fitted.limit - 1) < fitted.limit_error)
         )
     narrow, limit = np.mean(hits, axis=0)
     assert 0.6 < narrow < 0.99
@@ -165,17 +165,17 @@ def test_errors_of_an_exponent_hold_over_noisy_samples():
 
 
 def test_bins_next_to_the_edge_are_not_resolved():
-    found = distribution([hertz_row(1.0, points, 0.3) for points in (128, 256)])
-    lowest = MIDDLE[np.flatnonzero(np.isfinite(found.density))[0]]
+    stresses = distribution([hertz_row(1.0, points, 0.3) for points in (128, 256)])
+    lowest = MIDDLE[np.flatnonzero(np.isfinite(stresses.density))[0]]
     distance = 0.3 * (1 - np.sqrt(1 - (lowest / 1.5) ** 2))
     assert 0.7 < distance * 256 < 1.5
 
 
 def test_a_study_of_two_grids_has_a_distribution_and_of_one_grid_none(study):
-    found = distributions(compare(study()))
-    assert [part.points for part in found] == [[64, 128, 256]]
-    assert len(found[0].seeds) == 1
-    assert found[0].counts[0, -1].sum() == pytest.approx(found[0].a_r * 256**2, abs=30)
+    stresses = distributions(compare(study()))
+    assert [part.points for part in stresses] == [[64, 128, 256]]
+    assert len(stresses[0].seeds) == 1
+    assert stresses[0].counts[0, -1].sum() == pytest.approx(stresses[0].a_r * 256**2, abs=30)
 
 
 def test_one_grid_has_no_distribution_table_nor_figure(study):
@@ -199,15 +199,15 @@ def test_bodies_whose_unit_of_stress_depends_on_the_grid_are_not_compared(study)
 
 def test_seeds_are_averaged_with_their_spread(study):
     path = study("surface.seed=[0, 1, 2]")
-    (found,) = distributions(compare(path))
-    assert len(found.seeds) == 3
-    assert "seed" not in found.surface
+    (stresses,) = distributions(compare(path))
+    assert len(stresses.seeds) == 3
+    assert "seed" not in stresses.surface
     table = power_laws(compare(path)).as_text()
     assert "power n=1 on self-affine cutoff=0.1" in table
-    assert found.points == [64, 128, 256]
-    known = np.isfinite(found.density)
+    assert stresses.points == [64, 128, 256]
+    known = np.isfinite(stresses.density)
     assert known.sum() > 3
-    assert np.isfinite(found.error[known]).all()
+    assert np.isfinite(stresses.error[known]).all()
     plot = continuum_figure(compare(path))
     assert "Persson theory" in plot.legend
     plot.figure.draw_without_rendering()
@@ -215,8 +215,8 @@ def test_seeds_are_averaged_with_their_spread(study):
 
 def test_line_scenes_and_slabs_are_taken(study):
     path = study('surface={kind="wave"}', "elastomer={kind='slab', thickness=0.1}")
-    (found,) = distributions(compare(path))
-    assert found.cells == [64, 128, 256]
+    (stresses,) = distributions(compare(path))
+    assert stresses.cells == [64, 128, 256]
     assert power_laws(compare(path)).records
 
 
@@ -228,12 +228,12 @@ def test_a_solved_paraboloid_has_the_exponent_and_the_amplitude_of_hertz():
         contact = scene.contact(force / scene.delta_sigma)
         solution = solve_contact(contact, Auto())
         sigma = contact.stress(solution.u, solution.sigma)
-        seen = observe(contact, solution.u, sigma)
+        observables = observe(contact, solution.u, sigma)
         loaded = sigma[contact_points(contact.height, solution.u, sigma)] * scene.delta_sigma
         counts, _ = np.histogram(loaded * np.pi * radius**2 / force, EDGES)  # mean stress 1
-        rows.append(row(n, points, counts, seen.a_r, seen.perimeter, seed=-1))
-    found = fit(distribution(rows), "small")
-    assert found.error < 0.2
-    assert abs(found.exponent - found.theory) < 2 * found.error
+        rows.append(row(n, points, counts, observables.a_r, observables.perimeter, seed=-1))
+    fitted = fit(distribution(rows), "small")
+    assert fitted.error < 0.2
+    assert abs(fitted.exponent - fitted.theory) < 2 * fitted.error
     exact = float(hertz_density(n, 1.0, 1.5, np.pi * radius**2))
-    assert found.edge_prefactor == pytest.approx(exact, rel=0.1)
+    assert fitted.edge_prefactor == pytest.approx(exact, rel=0.1)

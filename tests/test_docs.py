@@ -76,7 +76,7 @@ class Block(NamedTuple):
 
 def blocks(page: Path) -> list[Block]:
     text = page.read_text(encoding="utf-8")
-    found = []
+    result = []
     for fence in FENCE.finditer(text):
         said, before = {}, text[: fence.start()].rstrip(" ").removesuffix("\n")
         while comment := COMMENT.search(before.rpartition("\n")[2]):
@@ -84,23 +84,23 @@ def blocks(page: Path) -> list[Block]:
             before = before.rpartition("\n")[0]
         line = text[: fence.start()].count("\n") + 1
         inner = re.sub(rf"^{fence[1]}", "", fence[3], flags=re.MULTILINE)
-        found.append(Block(page, line, fence[2], inner, said))
-    return found
+        result.append(Block(page, line, fence[2], inner, said))
+    return result
 
 
-def same_token(shown: str, found: str) -> bool:
+def same_token(shown: str, printed: str) -> bool:
     """Whether two words agree, numbers in them up to their last digits."""
-    if shown == found:
+    if shown == printed:
         return True
-    if NUMBER.sub("#", shown) != NUMBER.sub("#", found):
+    if NUMBER.sub("#", shown) != NUMBER.sub("#", printed):
         return False
-    return all(map(same_number, NUMBER.findall(shown), NUMBER.findall(found)))
+    return all(map(same_number, NUMBER.findall(shown), NUMBER.findall(printed)))
 
 
-def same_number(shown: str, found: str) -> bool:
+def same_number(shown: str, printed: str) -> bool:
     if shown.lstrip("+-").isdigit():
-        return shown == found
-    a, b = float(shown), float(found)
+        return shown == printed
+    a, b = float(shown), float(printed)
     mantissa, _, exponent = shown.partition("e")
     digit = 10.0 ** (int(exponent or 0) - len(mantissa.partition(".")[2]))
     if "e" in shown and len(mantissa.strip("+-")) <= 3 and max(abs(a), abs(b)) < SMALL:
@@ -108,18 +108,18 @@ def same_number(shown: str, found: str) -> bool:
     return abs(a - b) <= max(LAST_DIGITS * digit * 1.001, RELATIVE * abs(a))
 
 
-def same_line(shown: str, found: str) -> bool:
-    one, other = shown.split(), found.split()
+def same_line(shown: str, printed: str) -> bool:
+    one, other = shown.split(), printed.split()
     return len(one) == len(other) and all(map(same_token, one, other))
 
 
-def matches(shown: list[str], found: list[str]) -> bool:
+def matches(shown: list[str], printed: list[str]) -> bool:
     """Whether the lines of a page are what was printed, `...` standing for any lines."""
     if not shown:
-        return not found
+        return not printed
     if shown[0].strip() == "...":
-        return any(matches(shown[1:], found[skip:]) for skip in range(len(found) + 1))
-    return bool(found) and same_line(shown[0], found[0]) and matches(shown[1:], found[1:])
+        return any(matches(shown[1:], printed[skip:]) for skip in range(len(printed) + 1))
+    return bool(printed) and same_line(shown[0], printed[0]) and matches(shown[1:], printed[1:])
 
 
 def run_console(block: Block) -> None:
@@ -141,9 +141,9 @@ def run_console(block: Block) -> None:
         lines = [line.rstrip() for line in done.output.strip("\n").splitlines()]
         while shown and not shown[-1].strip():
             shown.pop()
-        told = f"{block.place}: $ {command}\n{done.output}"
-        assert done.exit_code == wanted, told
-        assert matches(shown, lines), told
+        transcript = f"{block.place}: $ {command}\n{done.output}"
+        assert done.exit_code == wanted, transcript
+        assert matches(shown, lines), transcript
 
 
 def run_toml(block: Block) -> None:
@@ -248,8 +248,8 @@ def test_blocks_that_are_not_run_say_why(capsys):
         assert block.language, f"{block.place}: no language"
         assert block.said.get("not run", "because") != "", f"{block.place}: no reason"
     for page in PAGES:  # an indented block has no language to be run by
-        found = INDENTED.search(FENCE.sub("", page.read_text(encoding="utf-8")))
-        assert found is None, f"{page.name}: {found}"
+        indented = INDENTED.search(FENCE.sub("", page.read_text(encoding="utf-8")))
+        assert indented is None, f"{page.name}: {indented}"
     assert len(every) == sum(len(re.findall(r"^ *```\S", p.read_text(), re.M)) for p in PAGES)
 
 
@@ -322,7 +322,7 @@ def test_every_test_file_that_the_makefile_names_exists():
 
 
 @pytest.mark.parametrize(
-    ("shown", "found", "same"),
+    ("shown", "printed", "same"),
     [
         ("0.1234", "0.1236", True),
         ("0.1234", "0.1244", False),
@@ -333,8 +333,8 @@ def test_every_test_file_that_the_makefile_names_exists():
         ("converged", "missing", False),
     ],
 )
-def test_numbers_are_compared_to_their_last_digits(shown, found, same):
-    assert same_token(shown, found) is same
+def test_numbers_are_compared_to_their_last_digits(shown, printed, same):
+    assert same_token(shown, printed) is same
 
 
 def test_dots_stand_for_any_lines():
@@ -344,6 +344,6 @@ def test_dots_stand_for_any_lines():
 
 
 def test_the_citation_names_this_version():
-    told = re.search(r"^version: (\S+)$", (ROOT / "CITATION.cff").read_text(), re.MULTILINE)
-    assert told is not None
-    assert told[1] == gfmd_cli.__version__
+    version = re.search(r"^version: (\S+)$", (ROOT / "CITATION.cff").read_text(), re.MULTILINE)
+    assert version is not None
+    assert version[1] == gfmd_cli.__version__

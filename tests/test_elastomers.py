@@ -204,9 +204,9 @@ def test_the_local_exponent_of_a_slab_goes_from_four_to_one():
     """Small t: k ~ q^4 (1 - t^2/5), exponent 4 - 2 t^2/5; large t: 1."""
     slab = Slab(thickness=1.0)
     t = np.array([1e-3, 0.05, 50.0])
-    found = slab.local_exponent(t)
-    assert found[:2] == pytest.approx(4 - 0.4 * t[:2] ** 2, rel=1e-6)
-    assert found[2] == pytest.approx(1.0, rel=1e-12)
+    exponents = slab.local_exponent(t)
+    assert exponents[:2] == pytest.approx(4 - 0.4 * t[:2] ** 2, rel=1e-6)
+    assert exponents[2] == pytest.approx(1.0, rel=1e-12)
 
 
 @pytest.mark.parametrize(

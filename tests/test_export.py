@@ -71,55 +71,56 @@ def test_csv_has_the_columns_of_the_layout(output_of, study, tmp_path):
 
 
 def test_a_dataset_has_columns_distributions_scenes_and_curves(study):
-    found, rows = as_dataset(study), read_rows(study)
-    assert {c.name for c in (*CONTRACT, *DETAILS)} <= {*found.variables}
-    for column in (c for c in COLUMNS if c.name in found.variables):
-        told = found[column.name]
-        np.testing.assert_array_equal(told.values, [row[column.name] for row in rows])
-        assert told.dims == ("task",)
-        assert told.attrs["long_name"] == column.meaning
-    assert found.pr_sigma.dims == ("task", "sigma")
-    assert found.pr_gap_log.dims == ("task", "gap_log")
-    assert found.gap.attrs["edges"].size == found.gap.size + 1
-    total = found.pr_gap_zero + found.pr_gap_beyond + found.pr_gap.sum("gap") * 0.05
+    dataset, rows = as_dataset(study), read_rows(study)
+    assert {c.name for c in (*CONTRACT, *DETAILS)} <= {*dataset.variables}
+    for column in (c for c in COLUMNS if c.name in dataset.variables):
+        variable = dataset[column.name]
+        np.testing.assert_array_equal(variable.values, [row[column.name] for row in rows])
+        assert variable.dims == ("task",)
+        assert variable.attrs["long_name"] == column.meaning
+    assert dataset.pr_sigma.dims == ("task", "sigma")
+    assert dataset.pr_gap_log.dims == ("task", "gap_log")
+    assert dataset.gap.attrs["edges"].size == dataset.gap.size + 1
+    total = dataset.pr_gap_zero + dataset.pr_gap_beyond + dataset.pr_gap.sum("gap") * 0.05
     np.testing.assert_allclose(total, 1, rtol=1e-12)
-    assert set(found.scene.values) == {0, 1}
+    assert set(dataset.scene.values) == {0, 1}
     with open_study(study) as file:
         shells = [file.shells(scene) for scene in range(2)]
     for scene in range(2):
         expected = shells[scene].q
-        q = found.scenes_q[scene].values
+        q = dataset.scenes_q[scene].values
         np.testing.assert_array_equal(q[: expected.size], expected)
         assert np.all(np.isnan(q[expected.size :]))
     with h5py.File(study) as file:
         for name in ("u", "sigma"):
             variance = [file[f"fields/{task}/{name}"][()].var() for task in range(4)]
-            power = found[f"spectra_{name}"].sum("spectra_shell")
+            power = dataset[f"spectra_{name}"].sum("spectra_shell")
             np.testing.assert_allclose(power, variance, rtol=1e-10)
-    assert found.spectra_q.attrs["units"] == "m-1"
+    assert dataset.spectra_q.attrs["units"] == "m-1"
 
 
 def test_netcdf_opens_labelled_in_xarray_as_the_dataset_was(output_of, study, tmp_path):
     output_of("export", study, "-o", tmp_path / "s.nc")
-    with xarray.open_dataset(tmp_path / "s.nc", engine="h5netcdf") as found:
-        made = as_dataset(study)
-        xarray.testing.assert_equal(found.load(), made)
-        assert found.attrs["Conventions"] == made.attrs["Conventions"]
-        assert found.a_r.attrs == made.a_r.attrs
+    with xarray.open_dataset(tmp_path / "s.nc", engine="h5netcdf") as dataset:
+        expected = as_dataset(study)
+        xarray.testing.assert_equal(dataset.load(), expected)
+        assert dataset.attrs["Conventions"] == expected.attrs["Conventions"]
+        assert dataset.a_r.attrs == expected.a_r.attrs
 
 
 def test_netcdf_opens_in_the_netcdf_library(output_of, study, tmp_path):
     netcdf = pytest.importorskip("netCDF4")
     output_of("export", study, "-o", tmp_path / "s.nc")
-    with netcdf.Dataset(tmp_path / "s.nc") as found:
-        assert found.data_model == "NETCDF4"
-        assert found["pr_gap"].dimensions == ("task", "gap")
+    with netcdf.Dataset(tmp_path / "s.nc") as dataset:
+        assert dataset.data_model == "NETCDF4"
+        assert dataset["pr_gap"].dimensions == ("task", "gap")
         assert (
-            found["sigma_p"].long_name == "standard deviation of the contact pressure / Delta_sigma"
+            dataset["sigma_p"].long_name
+            == "standard deviation of the contact pressure / Delta_sigma"
         )
         expected = [row["a_r"] for row in read_rows(study)]
-        np.testing.assert_array_equal(found["a_r"][:], expected)
-        assert list(found["status"][:]) == ["converged"] * 4
+        np.testing.assert_array_equal(dataset["a_r"][:], expected)
+        assert list(dataset["status"][:]) == ["converged"] * 4
 
 
 def parsed(path):
@@ -190,17 +191,17 @@ def test_what_cannot_be_written_is_refused_in_one_message(
     output_of, study, tmp_path, words, message
 ):
     place = [str(tmp_path / word) if word.startswith("a") else word for word in words]
-    told = output_of("export", study, *place, status=2)
-    assert re.search(message, told)
-    assert len(told.splitlines()) == 1
+    output = output_of("export", study, *place, status=2)
+    assert re.search(message, output)
+    assert len(output.splitlines()) == 1
     assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("words", [("a.csv",), ("a.nc",), ("a.vti", "--task", "0")])
 def test_a_place_that_cannot_be_written_is_status_73(output_of, study, tmp_path, words):
     (tmp_path / "file").write_text("")
-    told = output_of("export", study, "-o", tmp_path / "file" / words[0], *words[1:], status=73)
-    assert "cannot be written" in told
+    output = output_of("export", study, "-o", tmp_path / "file" / words[0], *words[1:], status=73)
+    assert "cannot be written" in output
 
 
 def test_a_study_without_fields_makes_no_image(output_of, tmp_path):
@@ -209,18 +210,18 @@ def test_a_study_without_fields_makes_no_image(output_of, tmp_path):
         "run", tmp_path / "spec.toml", "-o", tmp_path / "s.h5", "-q", "--set", "output={}",
         "--set", "load.p_star=0.5", "--set", "grid.points=32",
     )  # fmt: skip
-    told = output_of("export", tmp_path / "s.h5", "-o", tmp_path / "s.vti", status=2)
-    assert "holds no fields" in told
+    output = output_of("export", tmp_path / "s.h5", "-o", tmp_path / "s.vti", status=2)
+    assert "holds no fields" in output
     assert "spectra_q" not in as_dataset(tmp_path / "s.h5")
 
 
 def test_a_study_that_is_not_finished_is_exported_as_far_as_it_goes(output_of, study, tmp_path):
     spec = study.parent / "spec.toml"
     output_of("run", spec, "-o", tmp_path / "s.h5", "-q", "-j", "1", "--shard", "1/4")
-    found = as_dataset(tmp_path / "s.h5")
-    assert list(found.status.values) == ["missing", "converged", "missing", "missing"]
-    assert np.isnan(found.spectra_u[0]).all()
-    assert found.spectra_u[1].notnull().any()
+    dataset = as_dataset(tmp_path / "s.h5")
+    assert list(dataset.status.values) == ["missing", "converged", "missing", "missing"]
+    assert np.isnan(dataset.spectra_u[0]).all()
+    assert dataset.spectra_u[1].notnull().any()
 
 
 @pytest.mark.parametrize("text", ["=1+1", "+1", "-1", "@sum(a1)", "\tx", "\rx"])

@@ -16,8 +16,8 @@ def not_regular(folder):
     (folder / "dangling").symlink_to(folder / "nowhere")
     (folder / "directory").mkdir()
     os.mkfifo(folder / "pipe")
-    with socket.socket(socket.AF_UNIX) as made:
-        made.bind(str(folder / "socket"))
+    with socket.socket(socket.AF_UNIX) as server:
+        server.bind(str(folder / "socket"))
     (folder / "device").symlink_to("/dev/zero")
     return [path for path in sorted(folder.iterdir()) if path.name != "target"]
 

@@ -82,8 +82,8 @@ def test_forged_plans_change_no_number(wisdom, tmp_path):
         keep(tmp_path, [forged(wisdom[0], rng), wisdom[1]])
         pyfftw.forget_wisdom()
         read += plans.read_wisdom(tmp_path) is not None
-        found, exact = transformed()
-        assert np.abs(found - exact).max() < 1e-12 * np.abs(exact).max()
+        values, exact = transformed()
+        assert np.abs(values - exact).max() < 1e-12 * np.abs(exact).max()
     assert 0 < read < COUNT
 
 

@@ -64,19 +64,19 @@ def test_the_certificate_bounds_the_distance_to_the_solution(elastomer, void, pr
     contact = oblong_contact(elastomer, pressure, void=void)
 
     def solved(tolerance):
-        found = solve_contact(contact, Auto(tolerance=tolerance, nested=False))
-        return found, observe(contact, found.u, found.sigma)
+        solution = solve_contact(contact, Auto(tolerance=tolerance, nested=False))
+        return solution, observe(contact, solution.u, solution.sigma)
 
-    (_, exact), (found, seen) = solved(1e-11), solved(tolerance)
-    proof = certify_free(contact, found.u, found.sigma)
+    (_, exact), (approximate, inexact) = solved(1e-11), solved(tolerance)
+    proof = certify_free(contact, approximate.u, approximate.sigma)
     rounding = 1e-9
-    assert abs(seen.u_g - exact.u_g) <= proof.u_g + rounding
-    assert abs(seen.sigma_p - exact.sigma_p) <= proof.sigma_p + rounding
+    assert abs(inexact.u_g - exact.u_g) <= proof.u_g + rounding
+    assert abs(inexact.sigma_p - exact.sigma_p) <= proof.sigma_p + rounding
 
     def energy(observables):  # E(s) = <s C s>/2 - <s h>, with the work <s h> - <s C s>
         return -observables.energy - (observables.work - 2 * observables.energy)
 
-    assert energy(seen) - energy(exact) <= proof.gap + rounding
+    assert energy(inexact) - energy(exact) <= proof.gap + rounding
 
 
 def test_a_bad_solution_gets_no_good_certificate():
@@ -141,10 +141,10 @@ def test_contact_at_the_border_has_a_singular_stress(n, verdict):
 
 def test_contact_away_from_the_border_has_bars_from_two_grids_only():
     levels = [Level(points, 0.3, 1.0, 0.5, 8.0, border=0.0) for points in (64, 128)]
-    for name, made in estimate(levels, 1.5).items():
-        assert made.verdict == "regular", name
-        assert 0 < made.error < 0.3
-    assert {made.verdict for made in estimate(levels[:1], 1.5).values()} == {"unknown"}
+    for name, value in estimate(levels, 1.5).items():
+        assert value.verdict == "regular", name
+        assert 0 < value.error < 0.3
+    assert {value.verdict for value in estimate(levels[:1], 1.5).values()} == {"unknown"}
 
 
 def test_the_border_is_the_outermost_points():
@@ -178,7 +178,7 @@ def test_a_map_gets_bars_on_its_second_grid(rows_of, tmp_path):
 
 
 def test_reduced_pressures_of_a_cell_that_is_no_map_are_refused(rows_of):
-    told = []
+    messages = []
     text = SPEC.replace('kind = "parabola"\nradius = 2.0', 'kind = "self-affine"\ncutoff = 0.1')
-    rows_of(text=text.replace("pressure = 0.02", "p_star = 0.1"), report=told.append)
-    assert any("load.pressure" in progress.message for progress in told)
+    rows_of(text=text.replace("pressure = 0.02", "p_star = 0.1"), report=messages.append)
+    assert any("load.pressure" in progress.message for progress in messages)

@@ -61,12 +61,12 @@ def test_hertz_contact_has_no_images():
     radius, modulus, a = 2.0, 3.0, 0.3
     scene = build_free_scene(Parabola(radius=radius), HalfSpace(E_star=modulus), 128)
     contact = scene.contact(4 * modulus * a**3 / (3 * radius) / scene.delta_sigma)
-    found = solve_contact(contact, Auto())
-    highest = found.sigma.max() * scene.delta_sigma
+    solution = solve_contact(contact, Auto())
+    highest = solution.sigma.max() * scene.delta_sigma
     assert highest == pytest.approx(2 * modulus * a / (np.pi * radius), rel=2e-4)
-    depth = contact.height.max() - contact.reference_level(found.u, found.sigma)
+    depth = contact.height.max() - contact.reference_level(solution.u, solution.sigma)
     assert depth * scene.h_std == pytest.approx(a**2 / radius, rel=2e-4)
-    area = observe(contact, found.u, found.sigma).a_r
+    area = observe(contact, solution.u, solution.sigma).a_r
     assert area == pytest.approx(np.pi * a**2, rel=2e-2)  # the perimeter times a spacing / 4
 
 
@@ -75,10 +75,10 @@ def test_hertz_line_contact_has_no_images():
     radius, modulus, a = 2.0, 3.0, 0.3
     scene = build_free_scene(LineParabola(radius=radius), HalfSpace(E_star=modulus), 512)
     load = np.pi * modulus * a**2 / (4 * radius)
-    found = solve_contact(scene.contact(load / scene.delta_sigma), Auto())
-    highest = found.sigma.max() * scene.delta_sigma
+    solution = solve_contact(scene.contact(load / scene.delta_sigma), Auto())
+    highest = solution.sigma.max() * scene.delta_sigma
     assert highest == pytest.approx(modulus * a / (2 * radius), rel=1e-4)
-    assert np.mean(found.sigma > 0) == pytest.approx(2 * a, abs=2 / 512)
+    assert np.mean(solution.sigma > 0) == pytest.approx(2 * a, abs=2 / 512)
 
 
 @pytest.mark.parametrize("n", [0.5, 1.5])
@@ -90,21 +90,21 @@ def test_generalised_hertz_contact_has_no_images(n):
     scene = build_free_scene(Parabola(radius=1.0), Power(n=n), points)
     force = np.pi * 2 ** (n - 1) * a ** (4 - n) / (gamma(3 - n / 2) * gamma(2 - n / 2))
     contact = scene.contact(force / scene.delta_sigma)
-    found = solve_contact(contact, Auto())
-    highest = found.sigma.max() * scene.delta_sigma
+    solution = solve_contact(contact, Auto())
+    highest = solution.sigma.max() * scene.delta_sigma
     assert highest == pytest.approx(2 ** (n - 1) * a ** (2 - n) / gamma(2 - n / 2) ** 2, rel=3e-3)
-    depth = contact.height.max() - contact.reference_level(found.u, found.sigma)
+    depth = contact.height.max() - contact.reference_level(solution.u, solution.sigma)
     assert depth * scene.h_std == pytest.approx(a**2 / (2 - n), rel=3e-3)
 
 
 @pytest.mark.parametrize("p_star", [1e-3, 0.1, 2.0])
 def test_energy_is_half_of_the_work_and_stress_has_its_mean(p_star):
     contact = build_free_scene(ROUGH, HalfSpace(), 64).contact(p_star)
-    found = solve_contact(contact, Auto(tolerance=1e-9))
-    seen = observe(contact, found.u, found.sigma)
-    assert seen.work == pytest.approx(2 * seen.energy, rel=1e-7)
-    assert found.sigma.mean() == pytest.approx(p_star, rel=1e-12)
-    assert np.all(found.u[found.sigma > 0] == contact.height[found.sigma > 0])
+    solution = solve_contact(contact, Auto(tolerance=1e-9))
+    observables = observe(contact, solution.u, solution.sigma)
+    assert observables.work == pytest.approx(2 * observables.energy, rel=1e-7)
+    assert solution.sigma.mean() == pytest.approx(p_star, rel=1e-12)
+    assert np.all(solution.u[solution.sigma > 0] == contact.height[solution.sigma > 0])
 
 
 def test_unit_of_pressure_is_that_of_the_mirrored_map():

@@ -22,19 +22,19 @@ SPEC = f"{free_contacts.SPEC}[output]\nstiffness = true\n"
 def test_stiffness_is_that_of_a_direct_solution_and_of_two_contacts(elastomer):
     contact = oblong_contact(elastomer)
     touching = solve_contact(contact, Auto(tolerance=1e-10)).sigma > 0
-    found = free_contact_stiffness(contact, touching)
+    stiffness = free_contact_stiffness(contact, touching)
 
     compliance = compliance_matrix(elastomer, contact.grid)
     held = touching.ravel()
     punch = np.zeros(held.size)
     punch[held] = np.linalg.solve(compliance[np.ix_(held, held)], np.ones(held.sum()))
-    assert found == pytest.approx(punch.mean() / np.mean(1 - compliance @ punch), rel=1e-7)
+    assert stiffness == pytest.approx(punch.mean() / np.mean(1 - compliance @ punch), rel=1e-7)
 
     step, gaps = 1e-3, []
     for share in (1 - step, 1 + step):
         pressed = replace(contact, pressure=contact.pressure * share)
         gaps.append(float(np.mean(solve_contact(pressed, Auto(tolerance=1e-11)).u)))
-    assert found == pytest.approx(2 * step * contact.pressure / (gaps[0] - gaps[1]), rel=1e-2)
+    assert stiffness == pytest.approx(2 * step * contact.pressure / (gaps[0] - gaps[1]), rel=1e-2)
 
 
 def test_circular_contact_on_a_half_space_is_a_punch():

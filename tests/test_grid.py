@@ -61,9 +61,9 @@ def test_the_coefficients_are_those_of_the_fourier_sum(grid):
 def test_backward_undoes_forward_and_leaves_its_input_alone(grid):
     field = noise(grid)
     modes = grid.forward(field)
-    kept = modes.copy()
+    copy = modes.copy()
     assert grid.backward(modes) == pytest.approx(field, abs=10 * ROUNDING)
-    assert np.array_equal(modes, kept)
+    assert np.array_equal(modes, copy)
 
 
 @pytest.mark.parametrize("grid", GRIDS, ids=str)

@@ -91,14 +91,14 @@ def test_a_study_keeps_its_results_and_solves_what_is_missing(run, way):
     before, known = times(path), by_parameters(path)
     _, solved, _ = run(*WAYS[way])
     fresh, _, _ = run(*WAYS[way], name="fresh.h5")
-    asked = by_parameters(fresh)
-    assert solved == len(set(asked) - set(before))
+    expected = by_parameters(fresh)
+    assert solved == len(set(expected) - set(before))
     after = times(path)
-    assert set(after) == set(before) | set(asked)
+    assert set(after) == set(before) | set(expected)
     assert {task: after[task] for task in before} == before
-    np.testing.assert_equal(by_parameters(path), asked | known)
+    np.testing.assert_equal(by_parameters(path), expected | known)
     order = [tuple(row[name] for name in PARAMETERS) for row in read_rows(path)]
-    assert order[: len(asked)] == list(asked)
+    assert order[: len(expected)] == list(expected)
     assert not Path("grown.parts").exists()
 
 
@@ -122,8 +122,8 @@ def test_a_study_grown_five_times_is_that_of_all_specs_at_once(run):
 
 def without_patches(tasks):
     """Numbers that do not depend on the output asked for."""
-    kept = [i for i, name in enumerate(NUMBERS) if "patch" not in name]
-    return {task: [row[i] for i in kept] for task, row in tasks.items()}
+    columns = [i for i, name in enumerate(NUMBERS) if "patch" not in name]
+    return {task: [row[i] for i in columns] for task, row in tasks.items()}
 
 
 def test_a_spec_that_asks_for_less_changes_nothing(run):
@@ -255,10 +255,10 @@ def test_two_specs_at_the_same_time_lose_nothing(run):
     assert errors == []
     rows = read_rows(path)
     read = [read_spec(Path("spec.toml"), overrides)[0] for overrides in specs]
-    asked = {task.id for spec in read for task in plan(spec)}
-    assert {row["task_id"] for row in rows} == asked
+    expected = {task.id for spec in read for task in plan(spec)}
+    assert {row["task_id"] for row in rows} == expected
     assert {row["status"] for row in rows} == {"converged"}
-    assert len(rows) == len(asked)
+    assert len(rows) == len(expected)
     assert not Study(path).parts.exists()
 
 
@@ -296,13 +296,13 @@ def test_a_record_with_less_output_replaces_nothing(run):
     spec, text = read_spec(Path("spec.toml"), other)
     study, tasks = Study(path), plan(spec)
     run(*other, name="other.h5")
-    with open_study(Path("other.h5")) as made:
-        late = made.result(0)
+    with open_study(Path("other.h5")) as study_file:
+        late = study_file.result(0)
     with study.work(tasks):
         write_record(study.parts, late)
         study.collect(spec, tasks, text)
-    with open_study(path) as kept:
-        assert set(kept.arrays("fields", 0)) == {"u"}
+    with open_study(path) as full:
+        assert set(full.arrays("fields", 0)) == {"u"}
     assert run(*other)[1] == 1
-    with open_study(path) as kept:
-        assert set(kept.arrays("fields", 0)) == {"u", "sigma"}
+    with open_study(path) as full:
+        assert set(full.arrays("fields", 0)) == {"u", "sigma"}

@@ -130,10 +130,10 @@ def test_the_start_has_the_residual_that_the_solve_asks_for(elastomer):
 
 def test_a_contact_that_the_coarse_grid_misses_is_entered():
     """A spike of one point, between the points of the coarser grids."""
-    made = build_scene(SelfAffine(cutoff=0.1), Power(n=1), 512)
-    height = 0.01 * made.height
+    case = build_scene(SelfAffine(cutoff=0.1), Power(n=1), 512)
+    height = 0.01 * case.height
     height[301, 77] += 10.0
-    contact = Contact(made.grid, height, made.stiffness, 1e-3)
+    contact = Contact(case.grid, height, case.stiffness, 1e-3)
     coarse = contact.coarsen((256, 256))
     pressure = np.zeros((256, 256))
     pressure[10, 10] = contact.pressure * 256**2
@@ -159,16 +159,16 @@ def test_a_large_contact_is_solved_on_the_whole_grid():
 
 def test_a_solve_stopped_on_a_coarse_grid_goes_on_bit_by_bit():
     contact = build_scene(SelfAffine(cutoff=0.02), Power(n=1), 512).contact(1e-3)
-    kept = []
+    states = []
 
     def keep(current, state):
-        kept.append((current.grid.whole_shape, copy.deepcopy(state)))
+        states.append((current.grid.whole_shape, copy.deepcopy(state)))
 
     straight = solve(contact, True, 1e-6, keep)
-    assert kept[-1][0] == (512, 512)
-    coarse = [at for at, (shape, _) in enumerate(kept) if shape[0] < 512]
-    for chosen in (coarse[1], coarse[len(coarse) // 2], coarse[-1], len(kept) - 1):
-        shape, state = kept[chosen]
+    assert states[-1][0] == (512, 512)
+    coarse = [at for at, (shape, _) in enumerate(states) if shape[0] < 512]
+    for chosen in (coarse[1], coarse[len(coarse) // 2], coarse[-1], len(states) - 1):
+        shape, state = states[chosen]
         resumed = solve_contact(
             contact, ProjectedCG(tolerance=1e-6), start=Resume(shape, vars(state))
         )

@@ -74,25 +74,25 @@ def holder(lock):
 
 def test_a_second_process_does_not_get_a_lock_until_it_is_left(lock, kind, holder):
     process = holder(kind, "exclusive")
-    with locked(lock, wait=False) as got:
-        assert not got
+    with locked(lock, wait=False) as acquired:
+        assert not acquired
     process.communicate("\n")
-    with locked(lock, wait=False) as got:
-        assert got
+    with locked(lock, wait=False) as acquired:
+        assert acquired
 
 
 def test_the_lock_of_a_killed_process_is_free(lock, kind, holder):
     process = holder(kind, "exclusive")
     process.send_signal(signal.SIGKILL)
     process.wait()
-    with locked(lock) as got:
-        assert got
+    with locked(lock) as acquired:
+        assert acquired
 
 
 def test_shared_locks_of_the_kernel_are_held_side_by_side(lock, holder):
     holder("kernel", "shared")
-    with locked(lock, shared=True) as got:
-        assert got
+    with locked(lock, shared=True) as acquired:
+        assert acquired
 
 
 def test_without_locks_a_second_process_is_refused_by_name(lock, holder, monkeypatch):
@@ -110,8 +110,8 @@ def test_a_lock_of_another_machine_is_never_taken(lock, monkeypatch):
     lock.parent.mkdir()
     owner = {"host": "elsewhere", "pid": 1, "started": ""}
     lock.with_name("lock.owner").write_text(json.dumps(owner))
-    with locked(lock, wait=False) as got:
-        assert not got
+    with locked(lock, wait=False) as acquired:
+        assert not acquired
     assert lock.with_name("lock.owner").exists()
 
 
@@ -120,8 +120,8 @@ def test_a_process_with_the_number_of_a_dead_one_is_told_by_its_start(lock, monk
     lock.parent.mkdir()
     owner = {"host": socket.gethostname(), "pid": os.getpid(), "started": "earlier"}
     lock.with_name("lock.owner").write_text(json.dumps(owner))
-    with locked(lock, wait=False) as got:
-        assert got
+    with locked(lock, wait=False) as acquired:
+        assert acquired
 
 
 @pytest.mark.usefixtures("springs")
@@ -180,8 +180,8 @@ def test_a_file_system_that_asks_for_both_ways_of_access_gets_them(lock, monkeyp
 
     monkeypatch.setattr(locks.fcntl, "flock", flock)
     for shared in (True, False):
-        with locked(lock, shared=shared) as got:
-            assert got
+        with locked(lock, shared=shared) as acquired:
+            assert acquired
 
 
 NO_OWNER = {
@@ -236,8 +236,8 @@ def test_without_locks_an_owner_that_leaves_after_long_is_no_damaged_lock(lock, 
 
     monkeypatch.setattr(locks, "_owner", leave_at_the_tenth)
     monkeypatch.setattr(locks, "time", SimpleNamespace(monotonic=seconds.__next__, sleep=id))
-    with locked(lock) as got:
-        assert got
+    with locked(lock) as acquired:
+        assert acquired
 
 
 @pytest.mark.usefixtures("springs")

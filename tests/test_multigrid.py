@@ -120,12 +120,12 @@ TRANSFERS = [((33, 45), (18, 24)), ((30, 31), (30, 16)), ((9, 64), (6, 32)), ((3
 def test_hats_of_any_numbers_of_points(fine, coarse):
     rng = np.random.default_rng(7)
     along_y, along_x = (hats(*numbers) for numbers in zip(fine, coarse, strict=True))
-    residual, found = rng.normal(size=fine).astype(np.float32), np.empty(coarse, np.float32)
-    kernels.restrict(residual, found, 0, coarse[0])
-    assert found == pytest.approx(along_y.T @ residual @ along_x, abs=1e-5)
-    values, found = rng.normal(size=coarse).astype(np.float32), np.empty(fine, np.float32)
-    kernels.interpolate(values, found, 0, fine[0])
-    assert found == pytest.approx(along_y @ values @ along_x.T, abs=1e-5)
+    residual, restricted = rng.normal(size=fine).astype(np.float32), np.empty(coarse, np.float32)
+    kernels.restrict(residual, restricted, 0, coarse[0])
+    assert restricted == pytest.approx(along_y.T @ residual @ along_x, abs=1e-5)
+    values, restricted = rng.normal(size=coarse).astype(np.float32), np.empty(fine, np.float32)
+    kernels.interpolate(values, restricted, 0, fine[0])
+    assert restricted == pytest.approx(along_y @ values @ along_x.T, abs=1e-5)
 
 
 @pytest.mark.parametrize(("fine", "coarse"), TRANSFERS)

@@ -44,7 +44,7 @@ COLUMNS = (
 )
 
 
-def made(output_of, folder, *overrides, text=SPEC):
+def study_of(output_of, folder, *overrides, text=SPEC):
     (folder / "spec.toml").write_text(text)
     options = [word for override in overrides for word in ("--set", override)]
     output_of("run", folder / "spec.toml", "-o", folder / "s.h5", "-q", "-j", "1", *options)
@@ -53,7 +53,7 @@ def made(output_of, folder, *overrides, text=SPEC):
 
 @pytest.fixture(scope="module")
 def study(output_of, tmp_path_factory):
-    return made(output_of, tmp_path_factory.mktemp("all"), *ALL)
+    return study_of(output_of, tmp_path_factory.mktemp("all"), *ALL)
 
 
 def test_patches_make_up_the_contact_area(study):
@@ -116,13 +116,14 @@ def test_analyze_tells_the_columns_in_a_table_and_in_records(output_of, study):
 
 
 def test_nothing_is_there_that_was_not_asked_for(output_of, tmp_path):
-    plain = made(output_of, tmp_path)
+    plain = study_of(output_of, tmp_path)
     with h5py.File(plain) as file:
-        told = set(file)
+        groups = set(file)
         assert not set(ON_REQUEST) & set(json.loads(file.attrs["spec"])["output"])
-    assert not {h.name for h in HISTOGRAMS if h.option != "histogram"} & told
+    assert not {h.name for h in HISTOGRAMS if h.option != "histogram"} & groups
     assert (
-        not {*(group.name for group in TASK_GROUPS[2:]), "pr_gap_zero", "gap", "patch_area"} & told
+        not {*(group.name for group in TASK_GROUPS[2:]), "pr_gap_zero", "gap", "patch_area"}
+        & groups
     )
     row = read_rows(plain)[0]
     assert (row["patches"], row["percolates_x"], row["percolates_y"]) == (-1, -1, -1)
@@ -133,13 +134,13 @@ def test_nothing_is_there_that_was_not_asked_for(output_of, tmp_path):
 
 @pytest.mark.parametrize("name", ON_REQUEST[1:])
 def test_each_can_be_asked_for_alone(output_of, tmp_path, name):
-    found = made(output_of, tmp_path, f"output.{name}=true", "elastomer.n=1", "load.p_star=0.2")
-    (row,) = read_rows(found)
+    path = study_of(output_of, tmp_path, f"output.{name}=true", "elastomer.n=1", "load.p_star=0.2")
+    (row,) = read_rows(path)
     assert (row["patches"] > 0) == (name == "patches")
     assert (row["percolates_x"] >= 0) == (name == "percolation")
     assert np.isfinite(row["stiffness"]) == (name == "stiffness")
     assert ("pr_gap" in row) == (name == "gap_distribution")
-    output_of("analyze", found)
+    output_of("analyze", path)
 
 
 def test_what_was_collected_first_is_kept_when_more_is_added(output_of, tmp_path, study):
@@ -155,15 +156,15 @@ def test_what_was_collected_first_is_kept_when_more_is_added(output_of, tmp_path
     with open_study(target) as file, open_study(study) as whole:
         for group in TASK_GROUPS[2:]:
             for task in range(6):
-                found = file.arrays(group.name, task)
+                arrays = file.arrays(group.name, task)
                 expected = whole.arrays(group.name, task)
-                assert list(found) == [column.name for column in group.columns]
+                assert list(arrays) == [column.name for column in group.columns]
                 for name, values in expected.items():
-                    np.testing.assert_array_equal(found[name], values)
+                    np.testing.assert_array_equal(arrays[name], values)
 
 
 def test_line_scenes_have_them_but_for_a_second_axis(output_of, tmp_path):
-    study = made(
+    study = study_of(
         output_of,
         tmp_path,
         *ALL,
@@ -184,7 +185,7 @@ def test_line_scenes_have_them_but_for_a_second_axis(output_of, tmp_path):
 
 
 def test_grids_chosen_by_accuracy_have_spectra_of_their_own(output_of, tmp_path):
-    study = made(output_of,
+    study = study_of(output_of,
         tmp_path, "output.spectra=true", 'grid.points="auto"', "accuracy.mean_gap=0.03",
         "load.p_star=[0.1,1.0]", "elastomer.n=2",
     )  # fmt: skip
@@ -205,7 +206,7 @@ def test_processes_that_share_a_grid_are_refused(tmp_path, name):
 
 def test_an_older_study_without_the_keys_goes_on(output_of, tmp_path):
     """Its stored spec and the names of its tasks are those that this version makes."""
-    first = made(output_of, tmp_path, "load.p_star=0.1")
+    first = study_of(output_of, tmp_path, "load.p_star=0.1")
     shutil.copy(first, tmp_path / "copy.h5")
     again = output_of(
         "run", tmp_path / "spec.toml", "-o", tmp_path / "copy.h5", "--set", "load.p_star=0.1"

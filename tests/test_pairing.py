@@ -133,7 +133,7 @@ def test_several_scans_make_one_study_with_a_group_of_rows_each(tmp_path, monkey
     for name, points in {"rough": 32, "smooth": 16}.items():
         np.save(f"{name}.npy", 1e-8 * rng.normal(size=(points, points)))
     (tmp_path / "scans.toml").write_text(SCANS)
-    told = output_of("run", "scans.toml", "-j", "1")
-    assert "path=rough.npy length=10 µm, 32 points a side" in told
-    assert "path=smooth.npy length=10 µm, 16 points a side" in told
-    assert "scans.h5: 4 converged" in told
+    output = output_of("run", "scans.toml", "-j", "1")
+    assert "path=rough.npy length=10 µm, 32 points a side" in output
+    assert "path=smooth.npy length=10 µm, 16 points a side" in output
+    assert "scans.h5: 4 converged" in output

@@ -129,39 +129,39 @@ SEEDS = np.array([[1.0, 8.0], [2.0, 9.0], [4.0, 6.0], [5.0, 5.0]])  # [seed, pre
 
 def test_the_jackknife_of_a_mean_is_its_standard_error(paper):
     mean = paper.ensembles.Mean(SEEDS)
-    found = paper.ensembles.estimate(lambda y: y[0], mean)
-    assert found.value == pytest.approx(3.0)
-    assert found.error == pytest.approx(np.std([1, 2, 4, 5], ddof=1) / 2)
-    assert mean.error[0] == pytest.approx(found.error)
+    value = paper.ensembles.estimate(lambda y: y[0], mean)
+    assert value.value == pytest.approx(3.0)
+    assert value.error == pytest.approx(np.std([1, 2, 4, 5], ddof=1) / 2)
+    assert mean.error[0] == pytest.approx(value.error)
 
 
 def test_seeds_that_scatter_together_leave_no_error_in_a_ratio(paper):
     numerator, denominator = (paper.ensembles.Mean(SEEDS[:, :1] * factor) for factor in (3, 1))
-    found = paper.ensembles.estimate(lambda a, b: a[0] / b[0], numerator, denominator)
-    assert found.value == pytest.approx(3.0)
-    assert found.error == pytest.approx(0.0, abs=1e-12)
+    value = paper.ensembles.estimate(lambda a, b: a[0] / b[0], numerator, denominator)
+    assert value.value == pytest.approx(3.0)
+    assert value.error == pytest.approx(0.0, abs=1e-12)
 
 
 def test_errors_of_the_grid_add_in_quadrature_and_do_not_shrink_with_seeds(paper):
     grid = np.array([0.3, 0.4])
     mean = paper.ensembles.Mean(np.tile([1.0, 2.0], (16, 1)), grid)
-    found = paper.ensembles.estimate(np.sum, mean)
-    assert (found.value, found.error) == (pytest.approx(3.0), pytest.approx(0.5))
+    value = paper.ensembles.estimate(np.sum, mean)
+    assert (value.value, value.error) == (pytest.approx(3.0), pytest.approx(0.5))
     assert mean.error == pytest.approx(grid)
 
 
 def test_a_power_law_is_found_with_its_error(paper):
     x = np.array([1.0, 2.0, 4.0])
     mean = paper.ensembles.Mean(np.outer([1.0, 1.1, 0.9], 5 * x**1.5))
-    found = paper.ensembles.power(x, mean)
-    assert found.value == pytest.approx(1.5)
-    assert found.error == pytest.approx(0.0, abs=1e-9)
+    value = paper.ensembles.power(x, mean)
+    assert value.value == pytest.approx(1.5)
+    assert value.error == pytest.approx(0.0, abs=1e-9)
 
 
 def test_one_seed_decides_nothing(paper):
-    found = paper.ensembles.estimate(np.sum, paper.ensembles.Mean(SEEDS[:1]))
-    assert (found.value, isfinite(found.error)) == (9.0, False)
-    assert paper.claims.Criterion("x", low=0.0).holds(found) is None
+    value = paper.ensembles.estimate(np.sum, paper.ensembles.Mean(SEEDS[:1]))
+    assert (value.value, isfinite(value.error)) == (9.0, False)
+    assert paper.claims.Criterion("x", low=0.0).holds(value) is None
 
 
 def test_means_over_different_seeds_are_refused(paper):

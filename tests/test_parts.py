@@ -34,8 +34,8 @@ SOLVER = Solver(kind="plain")
 @pytest.fixture
 def checkpoint(tmp_path):
     """The folder of a checkpoint with one state."""
-    with Checkpoint.held(tmp_path / "c") as made:
-        made.save(Contact(), STATE, Notes())
+    with Checkpoint.held(tmp_path / "c") as opened:
+        opened.save(Contact(), STATE, Notes())
     return tmp_path / "c"
 
 
@@ -143,19 +143,19 @@ def in_place_of(path, kind):
 def test_a_checkpoint_with_another_kind_of_file_is_not_read(checkpoint, name, kind):
     (checkpoint.parent / "target").write_bytes((checkpoint / name).read_bytes())
     in_place_of(checkpoint / name, kind)
-    found = Checkpoint(checkpoint)
-    assert "set aside" in found.restore()
-    assert found.load(Contact.grid, SOLVER) is None
+    opened = Checkpoint(checkpoint)
+    assert "set aside" in opened.restore()
+    assert opened.load(Contact.grid, SOLVER) is None
 
 
 def test_a_slot_is_not_written_through_a_link(checkpoint):
     target = checkpoint.parent / "target"
     target.write_text("precious")
     (checkpoint / "a").symlink_to(target)
-    with Checkpoint.held(checkpoint) as found:
-        found.restore()
+    with Checkpoint.held(checkpoint) as opened:
+        opened.restore()
         with pytest.raises(SpaceError, match="cannot be written"):
-            found.save(Contact(), STATE, Notes())
+            opened.save(Contact(), STATE, Notes())
     assert target.read_text() == "precious"
 
 

@@ -120,13 +120,13 @@ def tiled_winds(mask, corners, copies=7):
 @pytest.mark.parametrize("corners", [False, True])
 def test_random_masks_percolate_as_their_tiled_copies_do(corners):
     random = np.random.default_rng(0)
-    found = []
+    results = []
     for _ in range(400):
         mask = random.random((6, 6)) < random.uniform(0.3, 0.8)
-        told = tuple(regions(mask, corners=corners).winds.tolist())
-        assert told == tiled_winds(mask, corners)
-        found.append(told)
-    assert len(set(found)) == 4  # along none, one, the other, both
+        directions = tuple(regions(mask, corners=corners).winds.tolist())
+        assert directions == tiled_winds(mask, corners)
+        results.append(directions)
+    assert len(set(results)) == 4  # along none, one, the other, both
 
 
 @given(arrays(bool, st.tuples(st.integers(3, 9), st.integers(3, 9))))

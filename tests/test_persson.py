@@ -281,7 +281,7 @@ def test_the_exponent_of_a_slab_is_read_off_the_shells(default):
     q, power = default
     slab = Slab(thickness=0.03)
     binned = shells(q, power, slab.stiffness(q), np.full(q.size, 0.35))
-    found, exact = binned.exponents(), slab.local_exponent(binned.q)
+    exponents, exact = binned.exponents(), slab.local_exponent(binned.q)
     assert exact[0] > 3.5
     assert exact[-1] < 1.01
-    assert np.abs(found - exact)[1:-1].max() < 0.05
+    assert np.abs(exponents - exact)[1:-1].max() < 0.05

@@ -29,19 +29,19 @@ def only_warning(spec):
 
 
 def test_a_sound_contact_has_no_warning():
-    found = solve(tables())
-    assert found.warnings == ()
-    assert "warnings" not in str(found)
+    result = solve(tables())
+    assert result.warnings == ()
+    assert "warnings" not in str(result)
 
 
 def test_few_points_in_contact():
-    found = solve(tables(p_star=1e-3))
-    assert int(found.contact.sum()) < 30
-    assert found.warnings == (
+    result = solve(tables(p_star=1e-3))
+    assert int(result.contact.sum()) < 30
+    assert result.warnings == (
         "fewer than 30 grid points in contact: contact area and stress depend on the grid; "
         "use more points",
     )
-    assert found.warnings[0] in str(found)
+    assert result.warnings[0] in str(result)
 
 
 def test_a_cutoff_above_the_rolloff():

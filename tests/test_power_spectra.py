@@ -63,11 +63,11 @@ def test_the_correlation_is_the_mean_product_with_the_field_moved(shape):
     grid = Grid(shape[0], len(shape))
     field = noise(grid)
     centred = field - field.mean()
-    found = correlation(grid, field)
+    values = correlation(grid, field)
     for step in ((0,) * len(shape), (1,) * len(shape), (5, 3)[: len(shape)], (7, 11)[: len(shape)]):
         moved = np.roll(centred, step, axis=tuple(range(len(shape))))
         expected = np.mean(centred * moved) / field.var()
-        assert found[step] == pytest.approx(expected, abs=1e-12)
+        assert values[step] == pytest.approx(expected, abs=1e-12)
 
 
 def test_the_correlation_over_all_displacements_sums_up_to_nothing():
@@ -78,9 +78,9 @@ def test_the_correlation_over_all_displacements_sums_up_to_nothing():
 
 def test_a_wave_on_a_line_is_correlated_as_a_wave():
     grid = Grid(64, 1, 4.0)
-    r, found = autocorrelations(grid, {"f": np.cos(2 * np.pi * 3 * np.arange(64) / 64)})
+    r, values = autocorrelations(grid, {"f": np.cos(2 * np.pi * 3 * np.arange(64) / 64)})
     np.testing.assert_allclose(r, np.arange(33) * 4.0 / 64, rtol=1e-14)
-    np.testing.assert_allclose(found["f"], np.cos(2 * np.pi * 3 * r / 4.0), atol=1e-12)
+    np.testing.assert_allclose(values["f"], np.cos(2 * np.pi * 3 * r / 4.0), atol=1e-12)
 
 
 def test_a_bump_is_correlated_as_a_wider_one():
@@ -89,30 +89,30 @@ def test_a_bump_is_correlated_as_a_wider_one():
     x = (np.arange(256) - 128) / 256
     w = 0.03
     bump = np.exp(-(x[:, None] ** 2 + x**2) / (2 * w**2))
-    r, found = autocorrelations(grid, {"f": bump})
+    r, values = autocorrelations(grid, {"f": bump})
     mean = np.pi * w**2 * 4  # <f>^2 / <f^2> of a cell of side 1
     expected = (np.exp(-(r**2) / (4 * w**2)) - mean) / (1 - mean)
-    np.testing.assert_allclose(found["f"][1:], expected[1:], atol=2e-3)
-    assert found["f"][0] == 1.0
+    np.testing.assert_allclose(values["f"][1:], expected[1:], atol=2e-3)
+    assert values["f"][0] == 1.0
     assert r[0] == 0.0
 
 
 def test_a_constant_field_has_no_correlation():
     grid = Grid(16)
-    _, found = autocorrelations(grid, {"f": np.zeros(grid.shape)})
-    assert np.all(np.isnan(found["f"]))
+    _, values = autocorrelations(grid, {"f": np.zeros(grid.shape)})
+    assert np.all(np.isnan(values["f"]))
 
 
 @pytest.mark.parametrize("grid", [Grid(9, points_y=6), Grid(10, dimension=1)], ids=str)
 def test_without_repetition_the_correlation_is_that_of_pairs_within_the_map(grid):
     field = np.random.default_rng(2).standard_normal(grid.shape)
-    found = autocorrelation(np.ma.asarray(field))
+    values = autocorrelation(np.ma.asarray(field))
     change = field - field.mean()
     for shift in np.ndindex(*(n // 2 + 1 for n in grid.shape)):
         first = tuple(slice(0, n - d) for n, d in zip(grid.shape, shift, strict=True))
         second = tuple(slice(d, n) for n, d in zip(grid.shape, shift, strict=True))
         expected = np.mean(change[first] * change[second]) / change.var()
-        assert found[shift] == pytest.approx(expected, abs=1e-12)
+        assert values[shift] == pytest.approx(expected, abs=1e-12)
 
 
 def test_rings_of_a_map_without_repetition_end_at_half_of_its_side():

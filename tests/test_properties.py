@@ -154,7 +154,7 @@ def check(tables):
     except GfmdError as error:
         note(f"refused: {error}")
         return
-    contact, solution, seen = solved.contact, solved.solution, solved.observables
+    contact, solution, observables = solved.contact, solved.solution, solved.observables
     u, sigma, h, p = solution.u, solution.sigma, contact.height, contact.pressure
     assert solution.status in STATUS
     assert solution.steps <= tables["solver"]["max_steps"]
@@ -163,10 +163,10 @@ def check(tables):
     check_conditions(contact, solution, tables["solver"]["tolerance"])
     gap, pressure = u - h, contact_pressure(h, u, sigma)
     size = sqrt(np.mean(u**2)) * max(sqrt(np.mean(sigma**2)), p)
-    assert abs(2 * seen.energy - seen.work - np.mean(sigma * gap)) <= 64 * EPS * size
-    assert seen.u_g == pytest.approx(gap.mean(), rel=1e-12)
-    assert seen.sigma_p == pytest.approx(pressure.std(), rel=1e-9, abs=64 * EPS * p)
-    assert 0 <= seen.a_r <= 1
+    assert abs(2 * observables.energy - observables.work - np.mean(sigma * gap)) <= 64 * EPS * size
+    assert observables.u_g == pytest.approx(gap.mean(), rel=1e-12)
+    assert observables.sigma_p == pytest.approx(pressure.std(), rel=1e-9, abs=64 * EPS * p)
+    assert 0 <= observables.a_r <= 1
     columns = error_columns(solved)
     assert bool(columns) == ("accuracy" in tables)
     for name in QUANTITIES if columns else ():
@@ -176,7 +176,7 @@ def check(tables):
             assert error >= 0
             assert isfinite(columns[f"{name}_continuum"])
             assert columns[f"{name}_continuum_error"] >= 0
-    check_certificate(contact, solution, seen)
+    check_certificate(contact, solution, observables)
 
 
 def check_conditions(contact, solution, tolerance):
@@ -200,7 +200,7 @@ def check_conditions(contact, solution, tolerance):
     assert abs(np.mean(gap * stress)) <= residual * unit * partner * (1 + 1e-6)
 
 
-def check_certificate(contact, solution, seen):
+def check_certificate(contact, solution, observables):
     """The bounds hold the distance to a solution at 1e-10, which has bounds of its own."""
     bounds = certify(contact, solution.u, solution.sigma)
     assert bounds.gap >= 0
@@ -208,8 +208,8 @@ def check_certificate(contact, solution, seen):
     contact.stress(close.u, out=close.sigma)
     best, truth = certify(contact, close.u, close.sigma), observe(contact, close.u, close.sigma)
     rounding = 64 * EPS * (1 + contact.pressure)
-    assert abs(seen.u_g - truth.u_g) <= bounds.u_g + best.u_g + rounding
-    assert abs(seen.sigma_p - truth.sigma_p) <= bounds.sigma_p + best.sigma_p + rounding
+    assert abs(observables.u_g - truth.u_g) <= bounds.u_g + best.u_g + rounding
+    assert abs(observables.sigma_p - truth.sigma_p) <= bounds.sigma_p + best.sigma_p + rounding
 
 
 PLAIN = settings(max_examples=EXAMPLES, suppress_health_check=list(HealthCheck))
@@ -265,8 +265,14 @@ def numbers(n, modulus=1.0, h_std=1.0, length=1.0):
     surface = {"kind": "self-affine", "cutoff": 0.06, "h_std": h_std, "length": length}
     solved = solve(plain_tables(surface=surface, elastomer=body(n, modulus)))
     assert solved.solution.residual < 1e-11  # for n = 3 and 4 rounding ends the solve above 1e-12
-    seen, columns = solved.observables, error_columns(solved)
-    values = [seen.u_g, seen.a_r, seen.sigma_p, seen.perimeter, seen.energy]
+    observables, columns = solved.observables, error_columns(solved)
+    values = [
+        observables.u_g,
+        observables.a_r,
+        observables.sigma_p,
+        observables.perimeter,
+        observables.energy,
+    ]
     # NaN where a quantity has no continuum value
     bars = [columns[f"{name}_{what}"] for name in QUANTITIES for what in ("error", "continuum")]
     exact = [solved.solution.residual, columns["u_g_bound"], columns["sigma_p_bound"]]
@@ -424,8 +430,8 @@ def test_a_table_keeps_its_digits_over_forty_decades(tmp_path):
     q = np.logspace(-20, 20, 41)
     path = tmp_path / "k.txt"
     np.savetxt(path, np.column_stack([q, 1e-30 * q**4]), fmt="%.17g")
-    got = Tabulated(path=path).stiffness(1.07 * q)
-    assert got == pytest.approx(1e-30 * (1.07 * q) ** 4, rel=2e-13, abs=0)
+    stiffness = Tabulated(path=path).stiffness(1.07 * q)
+    assert stiffness == pytest.approx(1e-30 * (1.07 * q) ** 4, rel=2e-13, abs=0)
 
 
 SHELL = Persson(Shells(*(np.array([x]) for x in (1.0, 1.0, 1.0, 2.0, 0.3))))

@@ -99,11 +99,11 @@ def test_the_side_along_y_follows_from_the_points():
     assert surface.sides == (2.0, 2.0)
     assert surface.on_cell(64, 96).sides == (3.0, 2.0)
     assert surface.on_cell(64, 64) is surface
-    given = SelfAffine(cutoff=0.1, length=2.0, length_y=0.5)
-    assert given.on_cell(64, 96).sides == (0.5, 2.0)
-    assert given.points_y(64) == 16
-    assert given.points_y(100) == 24  # even
-    assert build_scene(given, Power(n=1), 64).grid.whole_shape == (16, 64)
+    oblong = SelfAffine(cutoff=0.1, length=2.0, length_y=0.5)
+    assert oblong.on_cell(64, 96).sides == (0.5, 2.0)
+    assert oblong.points_y(64) == 16
+    assert oblong.points_y(100) == 24  # even
+    assert build_scene(oblong, Power(n=1), 64).grid.whole_shape == (16, 64)
 
 
 def test_a_grid_too_coarse_along_y_is_refused():
@@ -205,8 +205,8 @@ def test_two_equal_halves_solve_as_one(axis, n):
         scene = build_scene(as_map(values_on, **cell), Power(n=n), values_on.shape[1])
         contact = scene.contact(0.1)
         solution = solve_contact(contact, Auto(tolerance=1e-12))
-        seen = observe(contact, solution.u, solution.sigma)
-        values.append((seen.a_r, seen.sigma_p, seen.u_g, seen.energy))
+        observables = observe(contact, solution.u, solution.sigma)
+        values.append((observables.a_r, observables.sigma_p, observables.u_g, observables.energy))
     assert values[1] == pytest.approx(values[0], rel=1e-10)
 
 
@@ -233,9 +233,9 @@ def test_hertz_on_an_oblong_cell(shape, length_y):
     pressure = 4 * E_star * radius**3 / 3 / length_y
     contact = scene.contact(pressure / scene.delta_sigma)
     solution = solve_contact(contact, Auto(tolerance=1e-8))
-    seen = observe(contact, solution.u, solution.sigma)
+    observables = observe(contact, solution.u, solution.sigma)
     spacing = max(scene.grid.spacings)
-    assert np.sqrt(seen.a_r * length_y / np.pi) == pytest.approx(radius, abs=0.25 * spacing)
+    assert np.sqrt(observables.a_r * length_y / np.pi) == pytest.approx(radius, abs=0.25 * spacing)
     peak = solution.sigma.max() * scene.delta_sigma
     assert peak == pytest.approx(2 * E_star * radius / np.pi, rel=0.02)
 

@@ -163,12 +163,12 @@ def test_a_line_is_solved_as_well(solver):
 def test_a_stopped_solve_goes_on_bit_by_bit(solver, n):
     contact = contact_of(n, 0.05)
     state = solver.begin(contact, flat(contact))
-    kept = [copy.deepcopy(current) for current in islice(solver.iterate(contact, state), 60)]
+    states = [copy.deepcopy(current) for current in islice(solver.iterate(contact, state), 60)]
     for chosen in (0, 1, 7, 30, 58):
-        resumed = copy.deepcopy(kept[chosen])
+        resumed = copy.deepcopy(states[chosen])
         steps = 60 - chosen
         for current in islice(solver.iterate(contact, resumed), steps):
-            same(current, kept[current.step])
+            same(current, states[current.step])
         assert resumed.step == 59
 
 

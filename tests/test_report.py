@@ -183,8 +183,8 @@ def test_every_figure_and_table_is_there(whole):
     assert "All 8 contacts converged." in text
     assert "8 contacts: 2 elastic bodies (power n=0 and power n=1) on the surface" in text
     assert 'kind = "self-affine"' in text
-    for told in ("numpy", "Git commit", "Python"):
-        assert told in text
+    for words in ("numpy", "Git commit", "Python"):
+        assert words in text
 
 
 OBSERVABLES = """\
@@ -223,8 +223,8 @@ def test_optional_observables_are_a_table_in_si_units(invoke, tmp_path):
 
 def test_a_fit_stands_beside_the_spectrum(whole):
     """H = 0.8 and lambda_r = L / 2 are the defaults of the surface."""
-    told = whole.partition("Self-affine fit")[2]
-    assert re.search(r"<td[^>]*>0\.[78]\d*( ± \S+)?</td>", told)
+    fit = whole.partition("Self-affine fit")[2]
+    assert re.search(r"<td[^>]*>0\.[78]\d*( ± \S+)?</td>", fit)
 
 
 def test_the_whole_table_is_in_the_page(invoke, whole, study):
@@ -496,10 +496,10 @@ def test_a_flat_spectrum_is_found_flat(dimension, kind):
     shells = Shells(q, 3.0 * modes, blank, blank, blank, 1.0 * modes)
     row = {"surface": kind, "dimension": dimension, "length": length, "points": points}
     row |= {"length_y": length, "points_y": points}
-    found = surface.spectrum(row, shells)
-    assert found.q.size > 6
-    kept = found.q < 2 * np.pi / length * (points / 2 - 1)
-    assert found.density[kept] == pytest.approx(3 * length**dimension, rel=1e-12)
+    density = surface.spectrum(row, shells)
+    assert density.q.size > 6
+    resolved = density.q < 2 * np.pi / length * (points / 2 - 1)
+    assert density.density[resolved] == pytest.approx(3 * length**dimension, rel=1e-12)
 
 
 def test_colours_are_legible_on_both_papers():
@@ -548,8 +548,8 @@ def test_key_numbers_and_tables_are_of_the_continuum_where_that_is_known(invoke,
     shown = [row["a_r_continuum" if row["a_r_verdict"] == "regular" else "a_r"] for row in rows]
     assert words[start + 1] == span(shown)
     assert words[start + 1] != span(row["a_r"] for row in rows)
-    told = " ".join("".join(words).split())
-    assert "share of the nominal area, in the continuum" in told
+    text_of_page = " ".join("".join(words).split())
+    assert "share of the nominal area, in the continuum" in text_of_page
     (curve,) = compare(path).curves
     ratios = span(np.array(shown) / curve.prediction.a_r)
     assert words[words.index("Area / Persson theory") + 1] == ratios

@@ -118,14 +118,14 @@ def test_a_share_between_two_points_gives_the_nearer(rows_of, area, count):
     assert row["a_r"] == count / 64**2
 
 
-@pytest.mark.parametrize(("asked", "count"), [(11, 10), (13, 14)])
-def test_four_points_that_enter_contact_together_are_a_step(rows_of, tmp_path, asked, count):
+@pytest.mark.parametrize(("load", "count"), [(11, 10), (13, 14)])
+def test_four_points_that_enter_contact_together_are_a_step(rows_of, tmp_path, load, count):
     heights = np.linspace(0.0, 1.0, 256)
     heights[-14:-10] = heights[-14]
     np.save(tmp_path / "map.npy", np.random.default_rng(0).permutation(heights).reshape(16, 16))
     (row,) = rows_of(
         "surface={kind='file', path='map.npy'}", "elastomer.n=0", "grid.points=16",
-        f"load={{contact_area={asked / 256}}}",
+        f"load={{contact_area={load / 256}}}",
     )  # fmt: skip
     assert row["status"] == "converged"
     assert row["a_r"] == count / 256
@@ -170,7 +170,7 @@ def test_a_load_in_a_jump_of_the_area_is_warned_of(gfmd):
 
 
 @pytest.mark.parametrize(
-    ("overrides", "told"),
+    ("overrides", "message"),
     [
         (("load={contact_area=1.0}",), "less than 1"),
         (("load={contact_area=0.1, p_star=1}",), "give one of p_star"),
@@ -178,8 +178,8 @@ def test_a_load_in_a_jump_of_the_area_is_warned_of(gfmd):
         (("grid.points='auto'", "accuracy={mean_gap=0.1}"), "searched on a given grid"),
     ],
 )
-def test_what_makes_no_sense_is_refused(spec_of, overrides, told):
-    with pytest.raises(InputError, match=told):
+def test_what_makes_no_sense_is_refused(spec_of, overrides, message):
+    with pytest.raises(InputError, match=message):
         spec_of(*overrides)
 
 

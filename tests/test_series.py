@@ -76,9 +76,9 @@ def test_seeds_with_other_loads_are_averaged_where_they_agree(tmp_path, rows_of)
     rows_of()
     rows_of("surface.seed=[0, 1]", "load.p_star=[0.2]", "elastomer.n=1")
     comparison = compare(tmp_path / "study.h5")
-    found = [
+    points = [
         (each.rows[0]["n"], each.rows[0]["p_star"], len(each.rows))
         for each in ensembles(comparison)
     ]
-    assert (1.0, 0.2, 2) in [(n, round(p, 9), count) for n, p, count in found]
-    assert sum(count == 4 for *_, count in found) == 6
+    assert (1.0, 0.2, 2) in [(n, round(p, 9), count) for n, p, count in points]
+    assert sum(count == 4 for *_, count in points) == 6

@@ -56,32 +56,34 @@ def directives(text):
 
 def test_a_dry_run_prints_script_and_commands_and_writes_nothing(gfmd, calls):
     before = set(Path().iterdir())
-    told = gfmd("submit", "spec.toml", "--shards", 2, "--dry-run")
-    assert told.exit_code == 0, told.output
-    assert "# sbatch --parsable --array=0-1 " in told.output
-    assert "--dependency=afterany:JOB" in told.output
-    assert subprocess.run(["bash", "-n"], input=told.output, text=True, check=False).returncode == 0
+    result = gfmd("submit", "spec.toml", "--shards", 2, "--dry-run")
+    assert result.exit_code == 0, result.output
+    assert "# sbatch --parsable --array=0-1 " in result.output
+    assert "--dependency=afterany:JOB" in result.output
+    assert (
+        subprocess.run(["bash", "-n"], input=result.output, text=True, check=False).returncode == 0
+    )
     assert set(Path().iterdir()) == before
     assert calls() == []
 
 
 def test_the_script_is_written_and_submitted_and_a_collection_follows(gfmd, calls):
-    told = gfmd("submit", "spec.toml", "--shards", 3, "--time", "2:00:00", "--sbatch", "qos=a b")
-    assert told.exit_code == 0, told.output
-    assert "job 1: 3 of 3 shards" in told.output
-    assert "next: gfmd status spec.toml" in told.output
+    result = gfmd("submit", "spec.toml", "--shards", 3, "--time", "2:00:00", "--sbatch", "qos=a b")
+    assert result.exit_code == 0, result.output
+    assert "job 1: 3 of 3 shards" in result.output
+    assert "next: gfmd status spec.toml" in result.output
     assert Path("logs").is_dir()
     script = Path("small.sbatch").resolve()
-    given = directives(script.read_text())
-    assert given[:4] == [
+    options = directives(script.read_text())
+    assert options[:4] == [
         "--job-name=gfmd-small",
         f"--output={Path('logs').resolve()}/%x-%A_%a.out",
         "--open-mode=append",
         "--requeue",
     ]
-    assert {"--time=2:00:00", "--qos=a b", "--cpus-per-task=1"} < set(given)
-    asked, array, collection = calls()
-    assert asked.startswith("squeue --me")
+    assert {"--time=2:00:00", "--qos=a b", "--cpus-per-task=1"} < set(options)
+    query, array, collection = calls()
+    assert query.startswith("squeue --me")
     assert array == f"sbatch --parsable --array=0-2 {script}"
     assert "--dependency=afterany:1 " in collection
     assert collection.endswith(str(script))
@@ -115,8 +117,8 @@ def test_the_script_runs_a_shard_and_queues_it_again_after_75(gfmd, calls, tmp_p
     assert subprocess.run(call, env=os.environ | MEMBER, check=False).returncode == 75
     spec = str(Path("spec.toml").resolve())
     words = ["run", spec, "-o", str(study), "--set", *override.split("\n"), "--shard", "2/2"]
-    asked = "squeue --noheader --jobs=7_2 --format=%T"
-    assert calls()[before:] == [*words, asked, "scontrol requeue 7_2"]
+    query = "squeue --noheader --jobs=7_2 --format=%T"
+    assert calls()[before:] == [*words, query, "scontrol requeue 7_2"]
     assert not list(tmp_path.rglob("harm"))
 
 
@@ -171,28 +173,28 @@ def test_missing_takes_the_shards_that_miss_something_by_the_old_script(gfmd, ca
     written = Path("small.sbatch").read_text()
     for shard in ("0/4", "2/4"):
         assert gfmd("run", "spec.toml", "--shard", shard).exit_code == 0
-    told = gfmd("submit", "spec.toml", "--missing", "--mem", "8G")
-    assert told.exit_code == 0, told.output
-    assert "2 of 4 shards" in told.output
+    result = gfmd("submit", "spec.toml", "--missing", "--mem", "8G")
+    assert result.exit_code == 0, result.output
+    assert "2 of 4 shards" in result.output
     assert Path("small.sbatch").read_text() == written
     assert "--array=1,3 --mem=8G" in calls()[-2]
     assert "--mem=8G" in calls()[-1]
     for shard in ("1/4", "3/4"):
         gfmd("run", "spec.toml", "--shard", shard)
     before = calls()
-    told = gfmd("submit", "spec.toml", "--missing")
-    assert (told.exit_code, calls()) == (0, before)
-    assert "nothing is missing" in told.output
+    result = gfmd("submit", "spec.toml", "--missing")
+    assert (result.exit_code, calls()) == (0, before)
+    assert "nothing is missing" in result.output
 
 
 def test_a_study_in_the_queue_is_not_submitted_twice(gfmd, calls, tmp_path):
     gfmd("submit", "spec.toml", "--shards", 4)
     path = Path("small.sbatch").resolve()
     (tmp_path / "queue").write_text(f"9 /other.sbatch\n12_[1-3] {path}\n13 {path}\n")
-    told = gfmd("submit", "spec.toml", "--missing")
-    assert told.exit_code == 2
-    assert "job 12_[1-3] of this study is in the queue" in told.output
-    assert "scancel 12`" in told.output
+    result = gfmd("submit", "spec.toml", "--missing")
+    assert result.exit_code == 2
+    assert "job 12_[1-3] of this study is in the queue" in result.output
+    assert "scancel 12`" in result.output
 
 
 @pytest.mark.parametrize(
@@ -212,34 +214,34 @@ def test_a_study_in_the_queue_is_not_submitted_twice(gfmd, calls, tmp_path):
 )
 def test_bad_usage_is_refused_in_one_message_and_writes_nothing(gfmd, calls, words, message):
     before = set(Path().iterdir())
-    told = gfmd("submit", "spec.toml", *words)
-    assert told.exit_code == 2, told.output
-    assert message in told.output
+    result = gfmd("submit", "spec.toml", *words)
+    assert result.exit_code == 2, result.output
+    assert message in result.output
     assert set(Path().iterdir()) == before
     assert calls() == []
 
 
 def test_another_call_does_not_run_the_old_script(gfmd):
     gfmd("submit", "spec.toml", "--shards", 4)
-    told = gfmd("submit", "spec.toml", "--missing", "--set", "load.p_star=0.1")
-    assert told.exit_code == 2
-    assert "load.p_star=0.1" in told.output
+    result = gfmd("submit", "spec.toml", "--missing", "--set", "load.p_star=0.1")
+    assert result.exit_code == 2
+    assert "load.p_star=0.1" in result.output
     Path("small.sbatch").write_text("#!/bin/sh\n")
     assert gfmd("submit", "spec.toml", "--missing").exit_code == 2
 
 
 def test_what_sbatch_complains_of_is_told(gfmd, monkeypatch):
     monkeypatch.setenv("REFUSAL", "invalid partition specified: fast")
-    told = gfmd("submit", "spec.toml", "--shards", 2)
-    assert told.exit_code == 1
-    assert "invalid partition specified: fast" in told.output
+    result = gfmd("submit", "spec.toml", "--shards", 2)
+    assert result.exit_code == 1
+    assert "invalid partition specified: fast" in result.output
 
 
 def test_a_machine_without_slurm_is_told_and_nothing_written(gfmd, monkeypatch):
     monkeypatch.setenv("PATH", "/nowhere")
-    told = gfmd("submit", "spec.toml", "--shards", 2)
-    assert told.exit_code == 1
-    assert "no such command here" in told.output
+    result = gfmd("submit", "spec.toml", "--shards", 2)
+    assert result.exit_code == 1
+    assert "no such command here" in result.output
     assert {path.name for path in Path().iterdir()} == {"spec.toml"}
 
 
@@ -259,25 +261,25 @@ def test_other_time_limits_are_refused(text):
 
 
 @pytest.mark.parametrize(
-    ("shards", "told"), [([0, 1, 2], "0-2"), ([4], "4"), ([1, 3, 4], "1,3,4"), ([2, 3], "2-3")]
+    ("shards", "numbers"), [([0, 1, 2], "0-2"), ([4], "4"), ([1, 3, 4], "1,3,4"), ([2, 3], "2-3")]
 )
-def test_shards_are_numbered_as_slurm_numbers_them(shards, told):
-    assert slurm.array(shards) == told
+def test_shards_are_numbered_as_slurm_numbers_them(shards, numbers):
+    assert slurm.array(shards) == numbers
 
 
 def test_what_a_shard_asks_for_grows_with_its_tasks(gfmd):
-    def asked(points, cpus=1, limit=None):
+    def needs_of(points, cpus=1, limit=None):
         overrides = (f"grid.points={points}", "elastomer.n=1")
         tasks = plan(read_spec(Path("spec.toml"), overrides)[0])
-        told = slurm.resources(tasks, 2, cpus, limit)
-        return int(told["mem"][:-1]), int(told["signal"].partition("@")[2])
+        needs = slurm.resources(tasks, 2, cpus, limit)
+        return int(needs["mem"][:-1]), int(needs["signal"].partition("@")[2])
 
-    memory, notice = asked(64)
+    memory, notice = needs_of(64)
     assert 2 * 205 < memory < 500
     assert 120 <= notice < 130
-    assert asked(64, cpus=8)[0] == pytest.approx(memory + BASE_BYTES / 0.9 / 2**20, abs=3)
-    memory, notice = asked(16384)
+    assert needs_of(64, cpus=8)[0] == pytest.approx(memory + BASE_BYTES / 0.9 / 2**20, abs=3)
+    memory, notice = needs_of(16384)
     assert 6.65 * 2**31 / 2**20 < memory < 1.3 * 6.65 * 2**31 / 2**20
     assert notice > 250
-    assert asked(16384, cpus=8)[0] == memory  # one task at a time, on all threads
-    assert asked(64, limit=240)[1] == 60
+    assert needs_of(16384, cpus=8)[0] == memory  # one task at a time, on all threads
+    assert needs_of(64, limit=240)[1] == 60

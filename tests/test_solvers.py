@@ -54,7 +54,7 @@ class Solved:
         assert self.solution.status == "converged"
         self.u, self.sigma = self.solution.u, self.solution.sigma
         self.gap = self.u - contact.height
-        self.seen = observe(contact, self.u, self.sigma)
+        self.observables = observe(contact, self.u, self.sigma)
 
     @cached_property
     def stress(self):
@@ -99,17 +99,17 @@ def test_twice_the_energy_is_the_work(elastomer, p_star):
     it = solved(elastomer, p_star)
     partner = np.sqrt(np.mean(np.maximum(it.gap, it.stress) ** 2))
     allowed = TOLERANCE * min(p_star, 1) * partner + 1e-13
-    assert abs(2 * it.seen.energy - it.seen.work) <= allowed
+    assert abs(2 * it.observables.energy - it.observables.work) <= allowed
     modes = np.fft.rfft2(it.u) / it.u.size
     count = it.contact.grid.multiplicity()
     spectral = 0.5 * np.sum(it.contact.stiffness * np.abs(modes) ** 2 * count)
-    assert it.seen.energy == pytest.approx(spectral, rel=1e-11, abs=1e-14)
+    assert it.observables.energy == pytest.approx(spectral, rel=1e-11, abs=1e-14)
 
 
 @pytest.mark.parametrize("elastomer", POWERS + SLABS, ids=name)
 def test_more_pressure_makes_more_contact_and_a_smaller_gap(elastomer):
-    seen = [solved(elastomer, p_star).seen for p_star in PRESSURES]
-    area, gap = [s.a_r for s in seen], [s.u_g for s in seen]
+    observables = [solved(elastomer, p_star).observables for p_star in PRESSURES]
+    area, gap = [s.a_r for s in observables], [s.u_g for s in observables]
     assert area == sorted(area)
     assert gap == sorted(gap, reverse=True)
 
@@ -118,7 +118,7 @@ def test_more_pressure_makes_more_contact_and_a_smaller_gap(elastomer):
 def test_the_energy_changes_by_minus_p_times_the_gap(elastomer):
     """v is convex in u_g with slope -p, so a chord's slope lies between those of its ends."""
     p, step = 0.1, 0.01
-    low, high = (solved(elastomer, p * (1 + s * step)).seen for s in (-1, 1))
+    low, high = (solved(elastomer, p * (1 + s * step)).observables for s in (-1, 1))
     slope = -(high.energy - low.energy) / (high.u_g - low.u_g)
     assert p * (1 - step) < slope < p * (1 + step)
     assert slope == pytest.approx(p, rel=1e-3)  # step^2 times a curvature of order one: some 1e-4
@@ -132,11 +132,11 @@ def test_full_contact_copies_the_surface(elastomer):
     it = solved(elastomer, p_star * (1 + 1e-9))
     assert np.array_equal(it.u, it.contact.height)
     assert it.sigma == pytest.approx(elastic + p_star, abs=1e-8 * p_star)
-    assert (it.seen.u_g, it.seen.a_r) == (0, 1)
+    assert (it.observables.u_g, it.observables.a_r) == (0, 1)
     assert it.solution.steps == 0
     below = solved(elastomer, p_star * 0.99)
-    assert below.seen.a_r < 1
-    assert below.seen.u_g > 0
+    assert below.observables.a_r < 1
+    assert below.observables.u_g > 0
 
 
 def test_the_energy_never_rises_from_step_to_step():
@@ -212,7 +212,7 @@ def test_small_contacts_agree_with_pivoting_on_dense_matrices(elastomer, p_star)
     gap = lemke(matrix, matrix @ h + p_star)
     assert it.gap.ravel() == pytest.approx(gap, abs=1e-9)
     touching = np.count_nonzero(gap == 0) / 256
-    assert it.seen.a_r == touching
+    assert it.observables.a_r == touching
     assert 0 < touching < 1
 
 
@@ -233,8 +233,8 @@ def test_springs_agree_with_sorting(p_star):
     level = (h[:count].sum() - p_star / k * h.size) / count
     stress = k * np.maximum(it.contact.height - level, 0)
     assert it.sigma == pytest.approx(stress, abs=1e-13)
-    assert it.seen.a_r == count / h.size
-    assert it.seen.u_g == pytest.approx(np.maximum(level - h, 0).mean(), abs=1e-13)
+    assert it.observables.a_r == count / h.size
+    assert it.observables.u_g == pytest.approx(np.maximum(level - h, 0).mean(), abs=1e-13)
 
 
 def test_springs_are_solved_without_iteration_and_by_iteration_alike():
@@ -258,23 +258,25 @@ def test_sorting_refuses_what_is_not_flat():
 
 
 def on_line(surface, elastomer, points, pressure, tolerance=1e-8):
-    made = scene(surface, elastomer, points)
-    return made, Solved(made.contact(pressure / made.delta_sigma), tolerance)
+    case = scene(surface, elastomer, points)
+    return case, Solved(case.contact(pressure / case.delta_sigma), tolerance)
 
 
 @pytest.mark.parametrize("points", [64, 250, 1024])
 @pytest.mark.parametrize("p_bar", [0.05, 0.3, 0.7, 0.95])
 def test_the_wave_is_westergaards(p_bar, points):
     full = 2 * np.pi  # k(q) h_0
-    made, it = on_line(Wave(), HalfSpace(E_star=2.0), points, p_bar * full)
+    case, it = on_line(Wave(), HalfSpace(E_star=2.0), points, p_bar * full)
     a_r = float(reference.westergaard_area(p_bar))
-    assert it.seen.a_r == pytest.approx(a_r, abs=2 / points)
-    assert it.seen.perimeter == 2
+    assert it.observables.a_r == pytest.approx(a_r, abs=2 / points)
+    assert it.observables.perimeter == 2
     allowed = (2 / (points * min(a_r, 1 - a_r))) ** 2
     gap = float(reference.westergaard_gap(p_bar))
-    assert it.seen.u_g * made.h_std == pytest.approx(gap, rel=allowed)
+    assert it.observables.u_g * case.h_std == pytest.approx(gap, rel=allowed)
     energy = full * float(reference.westergaard_energy(p_bar))
-    assert it.seen.energy * made.h_std * made.delta_sigma == pytest.approx(energy, rel=allowed)
+    assert it.observables.energy * case.h_std * case.delta_sigma == pytest.approx(
+        energy, rel=allowed
+    )
 
 
 @pytest.mark.parametrize("points", [128, 512, 2048])
@@ -284,18 +286,20 @@ def test_a_start_that_is_good_enough_touches_where_it_is_pressed(p_bar, toleranc
     """The wave in nearly full contact, interpolated: pressed points have gaps of rounding."""
     full = 2 * np.pi
     _, it = on_line(Wave(), HalfSpace(E_star=2.0), points, p_bar * full, tolerance)
-    assert it.seen.a_r == pytest.approx(float(reference.westergaard_area(p_bar)), abs=5 / points)
+    assert it.observables.a_r == pytest.approx(
+        float(reference.westergaard_area(p_bar)), abs=5 / points
+    )
 
 
 @pytest.mark.parametrize("points", [64, 250, 1024])
 @pytest.mark.parametrize("p", [0.1, 1.0, 10.0])
 def test_the_string_lies_on_its_parabola(p, points):
-    made, it = on_line(LineParabola(radius=2.0), Power(n=2), points, p)
+    case, it = on_line(LineParabola(radius=2.0), Power(n=2), points, p)
     a_r = float(reference.string_area(p, 1.0, 2.0))
-    assert it.seen.a_r == pytest.approx(a_r, abs=2 / points)
+    assert it.observables.a_r == pytest.approx(a_r, abs=2 / points)
     allowed = (2 / (points * (1 - a_r))) ** 2
     gap = float(reference.string_gap(p, 1.0, 2.0, 1.0))
-    assert it.seen.u_g * made.h_std == pytest.approx(gap, rel=allowed)
+    assert it.observables.u_g * case.h_std == pytest.approx(gap, rel=allowed)
 
 
 @pytest.mark.parametrize("points", [64, 250, 1024])
@@ -303,22 +307,22 @@ def test_the_string_lies_on_its_parabola(p, points):
 def test_the_string_lies_on_its_wave(a_r, points):
     pressure = (2 * np.pi) ** 2 * float(reference.string_wave_pressure(a_r))
     _, it = on_line(Wave(), Power(n=2), points, pressure)
-    assert it.seen.a_r == pytest.approx(a_r, abs=2 / points)
+    assert it.observables.a_r == pytest.approx(a_r, abs=2 / points)
 
 
 @pytest.mark.parametrize(("points", "p_over_pc"), [(64, 0.3), (64, 0.9), (256, 0.3), (256, 0.9)])
 def test_the_beam_touches_the_crest_only_below_its_line_pressure(points, p_over_pc):
     p = p_over_pc * reference.beam_line_pressure(1.0, 2.0, 1.0)
-    made, it = on_line(LineParabola(radius=2.0), Power(n=4), points, p, 1e-6)
-    assert it.seen.a_r == 1 / points
+    case, it = on_line(LineParabola(radius=2.0), Power(n=4), points, p, 1e-6)
+    assert it.observables.a_r == 1 / points
     gap = float(reference.beam_gap(p, 1.0, 2.0, 1.0))
-    assert it.seen.u_g * made.h_std == pytest.approx(gap, rel=(2 / points) ** 2)
+    assert it.observables.u_g * case.h_std == pytest.approx(gap, rel=(2 / points) ** 2)
 
 
 @pytest.mark.parametrize(("points", "p_over_pc"), [(64, 3.0), (64, 30.0), (256, 3.0), (256, 30.0)])
 def test_the_beam_lies_on_the_crest_above_its_line_pressure(points, p_over_pc):
     p = p_over_pc * reference.beam_line_pressure(1.0, 2.0, 1.0)
-    made, it = on_line(LineParabola(radius=2.0), Power(n=4), points, p, 1e-5)
+    case, it = on_line(LineParabola(radius=2.0), Power(n=4), points, p, 1e-5)
     # the line force at the edge falls between two points; it may lift some just inside of it a
     # little (gaps of 1e-6), so the place of the outermost ones is what is known to a point an edge
     reach = np.ptp(np.flatnonzero(it.gap == 0)) / points
@@ -326,7 +330,7 @@ def test_the_beam_lies_on_the_crest_above_its_line_pressure(points, p_over_pc):
     span = float(reference.beam_free_half_length(p, 1.0, 2.0, 1.0))
     gap = float(reference.beam_gap(p, 1.0, 2.0, 1.0))
     # relative change of l^5 and l^4 with the line force spread over a point: 5/4 (dx/l)^2 measured
-    assert it.seen.u_g * made.h_std == pytest.approx(gap, rel=1.5 / (points * span) ** 2)
+    assert it.observables.u_g * case.h_std == pytest.approx(gap, rel=1.5 / (points * span) ** 2)
 
 
 def place(radius_at, a):
@@ -354,13 +358,13 @@ def line_curvature(n, load):
 def test_the_ridge_makes_a_hertz_contact(n, points):
     a = 0.1
     load = place(lambda P: reference.line_half_width(n, 1.0, 1 / line_curvature(n, P), P), a)
-    made, it = on_line(LineParabola(), Power(n=n), points, load, 1e-7)
+    case, it = on_line(LineParabola(), Power(n=n), points, load, 1e-7)
     edge = 0.5 if n <= 2 else 1.5  # for n > 2 the load, singular at the edge, spills over a point
-    assert it.seen.a_r / 2 == pytest.approx(a, abs=edge / points + a * a ** (5 - n))
+    assert it.observables.a_r / 2 == pytest.approx(a, abs=edge / points + a * a ** (5 - n))
     peak = float(reference.line_peak_stress(n, 1.0, 1 / line_curvature(n, load), a))
     x = np.arange(points) / points - 0.5
     inner = np.abs(x) < 0.8 * a
-    stress = it.sigma[inner] * made.delta_sigma / peak
+    stress = it.sigma[inner] * case.delta_sigma / peak
     allowed = misplaced(n, a, points) + a ** (5 - n)  # next term of the images: x^4
     assert stress == pytest.approx(reference.hertz_profile(n, x[inner], a), rel=allowed)
 
@@ -403,8 +407,8 @@ A = 0.12  # contact radius of the Hertz tests
 @cache
 def hertz(n, points, a=A):
     force = place(lambda F: reference.hertz_radius(n, 1.0, 1 / curvature(n, F), F), a)
-    made = scene(Parabola(), Power(n=n), points)
-    return made, force, Solved(made.contact(force / made.delta_sigma), 1e-6)
+    case = scene(Parabola(), Power(n=n), points)
+    return case, force, Solved(case.contact(force / case.delta_sigma), 1e-6)
 
 
 def radius(points):
@@ -414,24 +418,26 @@ def radius(points):
 
 def stress_error(n, points):
     """Largest relative deviation from the exact stress within 0.8 a."""
-    made, force, it = hertz(n, points)
+    case, force, it = hertz(n, points)
     r = radius(points)
     inner = r < 0.8 * A
     peak = float(reference.hertz_peak_stress(n, 1.0, 1 / curvature(n, force), A))
     exact = peak * reference.hertz_profile(n, r[inner], A)
-    return float(np.abs(it.sigma[inner] * made.delta_sigma / exact - 1).max())
+    return float(np.abs(it.sigma[inner] * case.delta_sigma / exact - 1).max())
 
 
 @pytest.mark.parametrize("points", [128, 256])
 @pytest.mark.parametrize("n", [0.25, 0.5, 1, 1.5, 2, 2.5, 3])
 def test_the_paraboloid_makes_a_hertz_contact(n, points):
     """Radius, stress and its exponent; the count of points errs by the rim it cuts in half."""
-    made, _, it = hertz(n, points)
-    assert np.sqrt(it.seen.a_r / np.pi) == pytest.approx(A, abs=(0.5 + 0.1) / points + A ** (7 - n))
+    case, _, it = hertz(n, points)
+    assert np.sqrt(it.observables.a_r / np.pi) == pytest.approx(
+        A, abs=(0.5 + 0.1) / points + A ** (7 - n)
+    )
     assert stress_error(n, points) < misplaced(n, A, points) + A ** (6 - n)  # images: next is r^4
     r = radius(points)
     fitted = (r > 0.1 * A) & (r < 0.9 * A)
-    log_stress = np.log(it.sigma[fitted] * made.delta_sigma)
+    log_stress = np.log(it.sigma[fitted] * case.delta_sigma)
     exponent = np.polyfit(np.log(1 - (r[fitted] / A) ** 2), log_stress, 1)[0]
     spacing = 1 / (points * A)
     assert exponent == pytest.approx(1 - n / 2, abs=2 * spacing**2 if n <= 2 else spacing)
@@ -448,7 +454,7 @@ def test_the_area_of_a_half_space_is_exact_after_its_edge_correction():
     errors = []
     for a in np.linspace(0.08, 0.15, 12):
         _, _, it = hertz(1, 256, float(a))
-        area = it.seen.a_r - (np.pi - 1 + np.log(2)) / 24 * it.seen.perimeter / 256
+        area = it.observables.a_r - (np.pi - 1 + np.log(2)) / 24 * it.observables.perimeter / 256
         errors.append((np.sqrt(area / np.pi) - a) * 256)  # in spacings; raw: +0.1
     assert abs(np.mean(errors)) < 0.05
     assert np.abs(errors).max() < 0.2
@@ -469,10 +475,10 @@ def outer_gap(n, r, force):
 
 @pytest.mark.parametrize("n", [0.25, 0.5, 1, 1.5])
 def test_the_gap_opens_with_its_exponent(n):
-    made, force, it = hertz(n, 512)
+    case, force, it = hertz(n, 512)
     r = radius(512)
     outside = (r > 1.2 * A) & (r < 2 * A)  # 12 spacings from the edge on
-    gap = it.gap[outside] * made.h_std
+    gap = it.gap[outside] * case.h_std
     # the edge half a spacing off: (1 + n/2) 0.5 dx / (r - a) < 7 %; as the gap is
     # stationary, its square counts, some 0.5 %
     assert gap == pytest.approx(outer_gap(n, r[outside], force), rel=5e-3)
@@ -480,7 +486,7 @@ def test_the_gap_opens_with_its_exponent(n):
     near = (r > A * np.sqrt(1.1)) & (r < A * np.sqrt(1.5))
     rise = (r[near] / A) ** 2 - 1
     terms = np.column_stack([np.ones(rise.size), np.log(rise), rise, rise**2])
-    log_gap = np.log(it.gap[near] * made.h_std)
+    log_gap = np.log(it.gap[near] * case.h_std)
     exponent = np.linalg.lstsq(terms, log_gap, rcond=None)[0][1]
     assert exponent == pytest.approx(1 + n / 2, abs=5e-3)  # of the exact gap: 1e-3 to 4e-3 by n
 
@@ -488,12 +494,12 @@ def test_the_gap_opens_with_its_exponent(n):
 @pytest.mark.parametrize("points", [128, 256])
 @pytest.mark.parametrize("p", [0.1, 1.0, 10.0])
 def test_the_membrane_carries_twice_tension_over_radius(p, points):
-    made = scene(Parabola(radius=2.0), Power(n=2), points)
-    it = Solved(made.contact(p / made.delta_sigma))
+    case = scene(Parabola(radius=2.0), Power(n=2), points)
+    it = Solved(case.contact(p / case.delta_sigma))
     a_r = float(reference.membrane_area(p, 1.0, 2.0))
     # a chain of edge points, each cut at random: half a spacing times the contact line, see above
-    assert it.seen.a_r == pytest.approx(a_r, abs=0.5 * it.seen.perimeter / points)
-    centre = it.sigma[points // 2, points // 2] * made.delta_sigma
+    assert it.observables.a_r == pytest.approx(a_r, abs=0.5 * it.observables.perimeter / points)
+    centre = it.sigma[points // 2, points // 2] * case.delta_sigma
     reach = np.sqrt(min(a_r, np.pi / 4) / np.pi)  # radius of the contact; half a cell at most
     assert centre - p == pytest.approx(2 * 1.0 / 2.0, rel=1 / (points * reach) ** 2 + 1e-3)
 
@@ -504,8 +510,8 @@ TIGHT = 1e-12
 
 
 def reduced(surface, elastomer, p_star=0.1, points=128):
-    seen = Solved(build_scene(surface, elastomer, points).contact(p_star), TIGHT).seen
-    return np.array([seen.a_r, seen.sigma_p, seen.u_g, seen.energy, seen.perimeter])
+    case = Solved(build_scene(surface, elastomer, points).contact(p_star), TIGHT).observables
+    return np.array([case.a_r, case.sigma_p, case.u_g, case.energy, case.perimeter])
 
 
 SMOOTHER = SelfAffine(cutoff=0.03)
@@ -549,8 +555,8 @@ def test_moving_the_surface_moves_the_solution(n, move):
     here = Solved(contact, 1e-11)
     assert moved.u == pytest.approx(MOVES[move](here.u), abs=1e-8)  # 1e-11 times the softest wave
     assert moved.sigma == pytest.approx(MOVES[move](here.sigma), abs=1e-8)
-    assert moved.seen.u_g == pytest.approx(here.seen.u_g, rel=1e-9)
-    assert moved.seen.a_r == here.seen.a_r
+    assert moved.observables.u_g == pytest.approx(here.observables.u_g, rel=1e-9)
+    assert moved.observables.a_r == here.observables.a_r
 
 
 @pytest.mark.parametrize("n", [0.5, 2])
@@ -564,7 +570,7 @@ def test_a_ridge_across_the_cell_is_the_line_scene(n):
     narrow = Solved(flat, 1e-10)
     expected = np.broadcast_to(narrow.sigma, height.shape)
     assert plane.sigma == pytest.approx(expected, abs=1e-7)
-    assert plane.seen.a_r == narrow.seen.a_r
+    assert plane.observables.a_r == narrow.observables.a_r
 
 
 # --- grids and starts -----------------------------------------------------------------------------
@@ -574,9 +580,9 @@ def test_a_ridge_across_the_cell_is_the_line_scene(n):
 @pytest.mark.parametrize("n", [1, 3])
 def test_grids_of_any_even_size_work(points, n):
     it = solved(Power(n=n), 0.1, SMOOTHER, points)
-    reference_gap = solved(Power(n=n), 0.1, SMOOTHER, 256).seen.u_g
+    reference_gap = solved(Power(n=n), 0.1, SMOOTHER, 256).observables.u_g
     # measured elsewhere, from lambda_s / 2.56 to lambda_s / 10: 0.05 % for n = 1, 3.7 % for n = 3
-    assert it.seen.u_g == pytest.approx(reference_gap, rel=5e-4 if n == 1 else 0.037)
+    assert it.observables.u_g == pytest.approx(reference_gap, rel=5e-4 if n == 1 else 0.037)
 
 
 def squares(points):
@@ -613,10 +619,10 @@ def test_oblong_grids_are_halved_along_the_shorter_side_of_their_pixels(shape, s
 
 
 def test_the_watch_sees_every_grid_from_coarse_to_fine():
-    seen, spent = [], {}
+    shapes, spent = [], {}
 
     def note(contact, state):
-        seen.append((contact.grid.points, state.step))
+        shapes.append((contact.grid.points, state.step))
         assert spent.setdefault(contact.grid.points, state.coarser_transforms) > 0
 
     contact = scene(ROUGH, Power(n=2), 256).contact(0.1)
@@ -624,8 +630,8 @@ def test_the_watch_sees_every_grid_from_coarse_to_fine():
     assert list(spent) == [64, 128, 256]
     transforms = [*spent.values(), solution.transforms]
     assert all(before < after for before, after in pairwise(transforms))
-    assert [points for points, _ in seen] == sorted(points for points, _ in seen)
-    assert seen[-1] == (256, solution.steps)
+    assert [points for points, _ in shapes] == sorted(points for points, _ in shapes)
+    assert shapes[-1] == (256, solution.steps)
 
 
 def test_any_start_ends_in_the_same_solution():
@@ -644,12 +650,12 @@ def test_any_start_ends_in_the_same_solution():
 
 
 def test_a_coarser_contact_is_the_same_surface_on_fewer_points():
-    made = scene(SelfAffine(cutoff=0.05), Power(n=1.5), 128)
-    fine = made.contact(0.1)
+    case = scene(SelfAffine(cutoff=0.05), Power(n=1.5), 128)
+    fine = case.contact(0.1)
     coarse = fine.coarsen((64, 64))
     assert coarse.height == pytest.approx(fine.height[::2, ::2], abs=1e-13)
     assert coarse.pressure == fine.pressure
-    k = Power(n=1.5).stiffness(Grid(64).wavenumber()) * made.h_std / made.delta_sigma
+    k = Power(n=1.5).stiffness(Grid(64).wavenumber()) * case.h_std / case.delta_sigma
     assert coarse.stiffness == pytest.approx(k, rel=1e-13)
 
 
@@ -671,16 +677,16 @@ def test_giving_up_says_so():
 def test_a_stopped_solve_goes_on_bit_by_bit(elastomer, tolerance):
     contact = scene(SMOOTHER, elastomer, 128).contact(0.05)
     solver = Auto(tolerance=tolerance)
-    kept = []
+    states = []
 
     def keep(current, state):
-        kept.append((current.grid.whole_shape, copy.deepcopy(state)))
+        states.append((current.grid.whole_shape, copy.deepcopy(state)))
 
     straight = solve_contact(contact, solver, keep)
-    finest = next(i for i, (shape, _) in enumerate(kept) if shape[0] == 128)
-    assert 0 < finest < len(kept) - 1
-    for chosen in {1, finest - 1, finest, finest + 1, (finest + len(kept)) // 2, len(kept) - 1}:
-        shape, state = kept[chosen]
+    finest = next(i for i, (shape, _) in enumerate(states) if shape[0] == 128)
+    assert 0 < finest < len(states) - 1
+    for chosen in {1, finest - 1, finest, finest + 1, (finest + len(states)) // 2, len(states) - 1}:
+        shape, state = states[chosen]
         resumed = solve_contact(contact, solver, start=Resume(shape, vars(copy.deepcopy(state))))
         assert np.array_equal(resumed.u, straight.u)
         assert np.array_equal(resumed.sigma, straight.sigma)

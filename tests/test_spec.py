@@ -67,8 +67,8 @@ def test_several_tables_of_one_kind_are_a_sweep_too(read):
 
 
 def ladder(read, **keys):
-    given = ", ".join(f"{key.strip('_')} = {value!r}" for key, value in keys.items())
-    return read(("p_star = [0.1, 1.0]", f"pressure = {{ {given} }}"))
+    pairs = ", ".join(f"{key.strip('_')} = {value!r}" for key, value in keys.items())
+    return read(("p_star = [0.1, 1.0]", f"pressure = {{ {pairs} }}"))
 
 
 def test_a_ladder_has_a_fixed_step_and_stays_below_its_end(read):
@@ -276,8 +276,8 @@ def test_the_schema_refuses_what_the_models_refuse(change):
 def test_two_sweeps_differ_in_the_values_of_their_keys():
     old = [{"kind": "a", "hurst": h, "seed": s} for h in (0.3, 0.8) for s in range(5)]
     new = [{"kind": "a", "hurst": h, "seed": s} for h in (0.3, 0.8) for s in range(7)]
-    told = differences({"surface": old}, {"surface": new})
-    assert told == ["surface.seed: [0, 1, 2, 3, 4] -> [0, 1, 2, 3, 4, 5, 6]"]
+    words = differences({"surface": old}, {"surface": new})
+    assert words == ["surface.seed: [0, 1, 2, 3, 4] -> [0, 1, 2, 3, 4, 5, 6]"]
     assert differences([{"n": 1}], [{"n": 1}, {"n": 2}], "elastomer") == [
         "elastomer.n: 1 -> [1, 2]"
     ]

@@ -25,19 +25,19 @@ def shells_of(surface, points):
 def test_the_fit_of_a_self_affine_surface_gives_what_it_was_made_from(keys):
     """The phases alone are random here: nothing scatters."""
     surface = SelfAffine(**keys)
-    found = fit(shells_of(surface, surface.smallest_grid() + 20))
-    assert found.hurst == pytest.approx(surface.hurst, abs=1e-5)
-    assert 2 * np.pi / found.q_r == pytest.approx(surface.rolloff * surface.length, rel=1e-4)
-    assert 2 * np.pi / found.q_s == pytest.approx(surface.cutoff * surface.length, rel=5e-3)
-    assert found.scatter < 1e-8
+    fitted = fit(shells_of(surface, surface.smallest_grid() + 20))
+    assert fitted.hurst == pytest.approx(surface.hurst, abs=1e-5)
+    assert 2 * np.pi / fitted.q_r == pytest.approx(surface.rolloff * surface.length, rel=1e-4)
+    assert 2 * np.pi / fitted.q_s == pytest.approx(surface.cutoff * surface.length, rel=5e-3)
+    assert fitted.scatter < 1e-8
 
 
 def test_a_power_law_shows_no_roll_off():
     surface = SelfAffine(spectrum="cutoff", rolloff=1.0, cutoff=0.02, hurst=0.7)
-    found = fit(shells_of(surface, 128))
-    assert found.q_r == 0
-    assert found.hurst == pytest.approx(0.7, abs=1e-4)
-    assert 2 * np.pi / found.q_s == pytest.approx(0.02, rel=5e-3)
+    fitted = fit(shells_of(surface, 128))
+    assert fitted.q_r == 0
+    assert fitted.hurst == pytest.approx(0.7, abs=1e-4)
+    assert 2 * np.pi / fitted.q_s == pytest.approx(0.02, rel=5e-3)
 
 
 def gaussian_roughness(draw, points, hurst, mode_r, mode_s):
@@ -55,15 +55,15 @@ def test_standard_errors_hold_on_gaussian_roughness():
     pulls, scatters, cut_offs = [], [], []
     for _ in range(40):
         m, power, modes = radial_power(Grid(256), gaussian_roughness(draw, 256, 0.7, 5.0, 64.0))
-        found = fit(shells(2 * np.pi * m, power, m, m, modes))
+        fitted = fit(shells(2 * np.pi * m, power, m, m, modes))
         pulls.append(
             (
-                (found.hurst - 0.7) / found.hurst_error,
-                (found.q_r - 10 * np.pi) / found.q_r_error,
+                (fitted.hurst - 0.7) / fitted.hurst_error,
+                (fitted.q_r - 10 * np.pi) / fitted.q_r_error,
             )
         )
-        scatters.append(found.scatter)
-        cut_offs.append(found.q_s / (2 * np.pi))
+        scatters.append(fitted.scatter)
+        cut_offs.append(fitted.q_s / (2 * np.pi))
     assert np.all(np.abs(np.mean(pulls, 0)) < 0.5)  # 3 / sqrt 40
     assert np.all(np.abs(np.std(pulls, 0) - 1) < 0.35)  # 3 / sqrt 80
     assert np.mean(scatters) == pytest.approx(1, abs=0.1)
@@ -76,11 +76,11 @@ def test_the_fit_has_the_gradient_of_a_surface_whose_spectrum_fills_the_grid(hur
     height = gaussian_roughness(np.random.default_rng(1), 128, hurst, 5.0, np.inf)
     m, power, modes = radial_power(Grid(128), height)
     measured = shells(2 * np.pi * m, power, m, m, modes)
-    found = fit(measured, complete=2 * np.pi * 64)
-    wavelengths = {"rolloff": 2 * np.pi / found.q_r, "cutoff": 2 * np.pi / found.q_s}
-    fitted = SelfAffine(hurst=found.hurst, h_std=height.std(), **wavelengths)
+    spectrum = fit(measured, complete=2 * np.pi * 64)
+    wavelengths = {"rolloff": 2 * np.pi / spectrum.q_r, "cutoff": 2 * np.pi / spectrum.q_s}
+    fitted = SelfAffine(hurst=spectrum.hurst, h_std=height.std(), **wavelengths)
     expected = moments(measured).gradient
-    assert found.q_s > 2 * np.pi * 64
+    assert spectrum.q_s > 2 * np.pi * 64
     gradient = moments(shells_of(fitted, 2 * fitted.smallest_grid())).gradient
     assert gradient == pytest.approx(expected, rel=0.01)
 
@@ -94,18 +94,18 @@ def test_moments_are_those_of_the_heights():
     modes = np.fft.fft2(heights)
     slopes = [np.fft.ifft2(1j * k * modes).real for k in (y, x)]
     laplacian = np.fft.ifft2(-(x**2 + y**2) * modes).real
-    found = moments(shells_of(surface, 64))
-    assert found.height == pytest.approx(heights.std(), rel=1e-12)
-    assert found.gradient == pytest.approx(np.sqrt(np.mean(slopes[0] ** 2 + slopes[1] ** 2)))
-    assert found.curvature == pytest.approx(0.5 * laplacian.std(), rel=1e-3)  # shells have width
+    values = moments(shells_of(surface, 64))
+    assert values.height == pytest.approx(heights.std(), rel=1e-12)
+    assert values.gradient == pytest.approx(np.sqrt(np.mean(slopes[0] ** 2 + slopes[1] ** 2)))
+    assert values.curvature == pytest.approx(0.5 * laplacian.std(), rel=1e-3)  # shells have width
 
 
 def test_the_density_is_that_of_single_modes():
     """Paper Eq. (3) with C = 1 m^2 at long wavelengths."""
-    found = shells_of(SelfAffine(cutoff=0.05), 64)
-    expected = (1 + (found.q * 0.5 / (2 * np.pi)) ** 2) ** -1.8
-    np.testing.assert_allclose(density(found), expected, rtol=2e-4)
-    assert found.modes.sum() == np.count_nonzero(
+    spectrum = shells_of(SelfAffine(cutoff=0.05), 64)
+    expected = (1 + (spectrum.q * 0.5 / (2 * np.pi)) ** 2) ** -1.8
+    np.testing.assert_allclose(density(spectrum), expected, rtol=2e-4)
+    assert spectrum.modes.sum() == np.count_nonzero(
         (lambda m: (m > 0) & (m <= 20))(np.hypot(*np.mgrid[-31:33, -31:33]))
     )
 

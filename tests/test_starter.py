@@ -33,8 +33,8 @@ def test_what_init_writes_runs(gfmd, tmp_path, words):
     if "scan.di" in words:
         pytest.importorskip("SurfaceTopography")
     holed(tmp_path / "holed.npy")
-    told = gfmd("init", "first.toml", *words)
-    assert told.endswith("next: gfmd run first.toml\n")
+    result = gfmd("init", "first.toml", *words)
+    assert result.endswith("next: gfmd run first.toml\n")
     short = () if words else ("--set", "load.p_star=0.1", "--set", "grid.points=128")
     assert "converged" in gfmd("run", "first.toml", *short)
     assert all(row["status"] == "converged" for row in read_rows(tmp_path / "first.h5"))
@@ -42,9 +42,9 @@ def test_what_init_writes_runs(gfmd, tmp_path, words):
 
 def test_an_oblong_scan_with_holes_is_solved_as_it_is(gfmd, tmp_path):
     holed(tmp_path / "holed.npy", (21, 16))
-    told = gfmd("init", "first.toml", "--from", "holed.npy", "--set", "surface.periodic=false")
+    result = gfmd("init", "first.toml", "--from", "holed.npy", "--set", "surface.periodic=false")
     done = "16 x 21 points, 2 missing heights filled in, plane subtracted, free boundary"
-    assert done in told
+    assert done in result
     gfmd("run", "first.toml", "--set", "load.p_star=0.1")
     (row,) = read_rows(tmp_path / "first.h5")
     assert (row["points"], row["points_y"], row["boundary"]) == (16, 21, "free")
@@ -76,12 +76,12 @@ def test_a_scan_is_free_where_that_is_available_and_else_mirrored(
         'kind = "half-space"\nE_star = 1\n[grid]\npoints = 16\n[load]\npressure = 0.1\n'
     )
     tasks = plan(read_spec(path, overrides)[0])
-    found = [(task.boundary, task.surface.edges or "none", task.points) for task in tasks]
+    settings = [(task.boundary, task.surface.edges or "none", task.points) for task in tasks]
     if boundary is None:  # n = 1 and n = 3
-        assert found == [("free", "none", 16), ("periodic", "mirror", 32)]
+        assert settings == [("free", "none", 16), ("periodic", "mirror", 32)]
         assert len({task.id for task in tasks}) == 2
     else:
-        assert found == [(boundary, edges, points)]
+        assert settings == [(boundary, edges, points)]
 
 
 @pytest.mark.parametrize("words", [(), ("--from", "scan.di")])
@@ -152,16 +152,16 @@ def test_a_scan_that_will_not_do_is_refused_as_it_is(gfmd, tmp_path):
 def test_the_fit_that_surface_prints_can_be_run(gfmd, tmp_path, edges):
     """A random surface from it has the rms height and gradient of the scan."""
     pytest.importorskip("SurfaceTopography")
-    told = gfmd("surface", "scan.di", "--set", f"surface.edges={edges}")
-    table = told[told.index("  [surface]") :].replace("\n  ", "\n").strip()
+    result = gfmd("surface", "scan.di", "--set", f"surface.edges={edges}")
+    table = result[result.index("  [surface]") :].replace("\n  ", "\n").strip()
     (tmp_path / "fit.toml").write_text(
         f'{table}\n[elastomer]\nkind = "half-space"\n[grid]\npoints = 512\n[load]\np_star = 1\n'
     )
-    seen, found = (
+    expected, fitted = (
         np.array(re.search(r"rms height (\S+) m, rms gradient (\S+),", text).groups(), float)
-        for text in (told, gfmd("surface", "fit.toml"))
+        for text in (result, gfmd("surface", "fit.toml"))
     )
-    np.testing.assert_allclose(found, seen, rtol=0.02)
+    np.testing.assert_allclose(fitted, expected, rtol=0.02)
 
 
 def test_surface_summarises_a_line(gfmd, tmp_path):
@@ -181,8 +181,8 @@ def test_several_surfaces_give_one_table_and_one_figure(gfmd, tmp_path):
     pytest.importorskip("matplotlib")
     holed(tmp_path / "holed.npy", (16, 16))
     np.save(tmp_path / "line.npy", np.random.default_rng(1).normal(size=64))
-    told = gfmd("surface", "holed.npy", "line.npy", "--figure", "both.svg")
-    header, first, second = [line.split() for line in told.splitlines()][:3]
+    result = gfmd("surface", "holed.npy", "line.npy", "--figure", "both.svg")
+    header, first, second = [line.split() for line in result.splitlines()][:3]
     records = json.loads(gfmd("surface", "holed.npy", "line.npy", "--json"))
     assert float(first[1]) == pytest.approx(records[0]["Sq"], rel=1e-3)
     assert second[1:9] == ["-"] * 8
@@ -197,15 +197,15 @@ def test_a_scan_in_nanometres_that_does_not_repeat_is_remarked_on_and_mended(gfm
     """Tilted by 300 nm, 2 nm rough, 1 um wide."""
     rough = np.random.default_rng(0).normal(size=(32, 32)) * 2
     np.save(tmp_path / "nm.npy", rough + np.linspace(0, 300, 32))
-    told = gfmd("surface", "nm.npy")
+    result = gfmd("surface", "nm.npy")
     remarks = ("does not state its side", "heights and side are in metres", "across the border")
     for remark in remarks:
-        assert remark in told
+        assert remark in result
     mended = [f"surface.{key}" for key in ("scale=1e-9", "length=1e-6", "periodic=false")]
     words = [word for key in mended for word in ("--set", key)]
-    told = gfmd("surface", "nm.npy", *words)
-    assert "note:" not in told
-    assert "L = 1e-06 m" in told
+    result = gfmd("surface", "nm.npy", *words)
+    assert "note:" not in result
+    assert "L = 1e-06 m" in result
     gfmd("init", "first.toml", "--from", "nm.npy", *words)
     (surface,) = read_spec(tmp_path / "first.toml")[0].surface
     assert (surface.scale, surface.length, surface.periodic) == (1e-9, 1e-6, False)
@@ -213,16 +213,16 @@ def test_a_scan_in_nanometres_that_does_not_repeat_is_remarked_on_and_mended(gfm
 
 
 @pytest.mark.parametrize(
-    ("pair", "told"),
+    ("pair", "message"),
     [
         ("surface.scael=1", "unknown key 'scael' - did you mean 'scale'"),
         ("surface.scale=[1,2]", "with one value"),
         ("grid.points=64", "takes surface.key=value"),
     ],
 )
-def test_a_wrong_word_on_a_scan_is_refused(gfmd, tmp_path, pair, told):
+def test_a_wrong_word_on_a_scan_is_refused(gfmd, tmp_path, pair, message):
     np.save(tmp_path / "h.npy", np.random.default_rng(0).normal(size=(16, 16)))
-    assert told in gfmd("surface", "h.npy", "--set", pair, status=2)
+    assert message in gfmd("surface", "h.npy", "--set", pair, status=2)
 
 
 def test_an_exponent_that_is_no_roughness_is_said_to_be_changed(gfmd, tmp_path):

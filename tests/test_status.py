@@ -19,7 +19,7 @@ from gfmd_cli.study.tasks import plan
 SPEC = power_spec(n=[0, 1], points=64, p_star=[0.1, 1.0], cutoff=0.05, name="small")
 
 
-def told(done):
+def answer(done):
     assert done.exit_code == 0, done.output
     return json.loads(done.output)
 
@@ -44,7 +44,7 @@ def uncollected(spec="spec.toml", shard=(0, 2), stop_at=None):
 
 def test_of_nothing_all_is_missing_and_nothing_is_written(gfmd):
     before = everything()
-    state = told(gfmd("status", "spec.toml", "--json"))
+    state = answer(gfmd("status", "spec.toml", "--json"))
     assert (state["tasks"], state["missing"], state["missing_tasks"]) == (4, 4, [0, 1, 2, 3])
     assert state["next"] == "gfmd run spec.toml"
     assert everything() == before
@@ -60,14 +60,14 @@ def test_a_finished_study_is_to_be_analyzed(gfmd):
 
 def test_what_did_not_converge_is_counted_apart(gfmd):
     gfmd("run", "spec.toml", "--set", "solver.max_steps=1")
-    state = told(gfmd("status", "small.h5", "--json"))
+    state = answer(gfmd("status", "small.h5", "--json"))
     assert state["statuses"] == {"converged": 2, "max_steps": 2}
     assert (state["converged"], state["missing"]) == (2, 0)
 
 
 def test_each_shard_is_told_where_asked_for(gfmd):
     gfmd("run", "spec.toml", "--shard", "1/3")
-    state = told(gfmd("status", "spec.toml", "--shards", "3", "--json"))
+    state = answer(gfmd("status", "spec.toml", "--shards", "3", "--json"))
     assert state["shards"] == [{"missing": 2}, {"converged": 1}, {"missing": 1}]
     lines = gfmd("status", "small.h5", "--shards", "3").output.splitlines()
     assert lines[1:4] == [
@@ -79,7 +79,7 @@ def test_each_shard_is_told_where_asked_for(gfmd):
 def test_records_and_saved_states_are_seen_before_they_are_collected(gfmd):
     uncollected(stop_at=2)  # task 0 has its record, task 2 a state
     before = everything()
-    state = told(gfmd("status", "spec.toml", "--json"))
+    state = answer(gfmd("status", "spec.toml", "--json"))
     assert (state["records"], state["missing_tasks"]) == (1, [1, 2, 3])
     (saved,) = state["saved"]
     assert (saved["task"], saved["points"]) == (2, 64)
@@ -97,7 +97,7 @@ def test_collecting_brings_the_records_in_and_solves_nothing(gfmd):
     assert done.exit_code == 1
     assert "1 converged, 3 missing" in done.output
     assert len(gfmd("export", "small.h5").output.splitlines()) == 2
-    assert told(gfmd("status", "spec.toml", "--json"))["saved"]  # to go on from
+    assert answer(gfmd("status", "spec.toml", "--json"))["saved"]  # to go on from
     gfmd("run", "spec.toml")
     done = gfmd("collect", "spec.toml")
     assert done.exit_code == 0
@@ -116,7 +116,7 @@ def test_damaged_records_are_told_and_left_alone(gfmd):
     (parts / f"{'0' * 16}.record").write_bytes(b"\x89HDF\r\n\x1a\n" + bytes(500))
     (parts / f"{'1' * 16}.bad").write_bytes(b"")
     before = everything()
-    state = told(gfmd("status", "spec.toml", "--json"))
+    state = answer(gfmd("status", "spec.toml", "--json"))
     assert state["damaged"] == [f"{'1' * 16}.bad", f"{'0' * 16}.record"]
     assert "damaged, to be solved again: 1111" in gfmd("status", "small.h5").output
     assert everything() == before
@@ -125,7 +125,7 @@ def test_damaged_records_are_told_and_left_alone(gfmd):
 def test_status_neither_waits_for_a_collector_nor_stops_it(gfmd):
     gfmd("run", "spec.toml", "--shard", "0/2")
     with locked(Path("small.parts/collecting")):
-        assert told(gfmd("status", "spec.toml", "--json"))["missing"] == 2
+        assert answer(gfmd("status", "spec.toml", "--json"))["missing"] == 2
 
 
 @pytest.mark.parametrize(
@@ -152,26 +152,26 @@ def test_a_stopped_shard_leaves_its_records_to_others(gfmd):
     uncollected(stop_at=2)
     assert len(list(Path("small.parts").glob("*.record"))) == 1
     assert gfmd("run", "spec.toml", "--shard", "1/2").exit_code == 0
-    assert told(gfmd("status", "spec.toml", "--json"))["records"] == 0
+    assert answer(gfmd("status", "spec.toml", "--json"))["records"] == 0
     assert len(gfmd("export", "small.h5").output.splitlines()) == 4
 
 
 def test_a_lock_holds_though_its_folder_is_removed_and_made_again(tmp_path):
-    folder, found = tmp_path / "parts", []
+    folder, results = tmp_path / "parts", []
 
     def wait_for_it():
         with locked(folder / "lock"):
-            found.append((folder / "lock").exists())
+            results.append((folder / "lock").exists())
 
     waiting = Thread(target=wait_for_it)
     with locked(folder / "lock"):
         waiting.start()
         time.sleep(0.2)  # it waits for the lock of a file that will be gone
-        assert found == []
+        assert results == []
         (folder / "lock").unlink()
         folder.rmdir()
     waiting.join(20)
-    assert found == [True]
+    assert results == [True]
 
 
 def test_a_record_that_is_collected_meanwhile_is_not_missed(gfmd, monkeypatch):

@@ -370,13 +370,13 @@ def test_plans_are_kept_beside_an_unfinished_study(run, tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     monkeypatch.setattr(plans, "_always_estimated", False)  # under `make test-portable` too
     run(shard=(0, 4))
-    kept = plans.read_wisdom(tmp_path / "study.parts")
-    assert kept == plans.read_wisdom(tmp_path / "cache" / "gfmd")
+    wisdom = plans.read_wisdom(tmp_path / "study.parts")
+    assert wisdom == plans.read_wisdom(tmp_path / "cache" / "gfmd")
     shutil.rmtree(tmp_path / "cache")
-    seen = []
-    monkeypatch.setattr(plans, "_take_in", lambda known: seen.append(known))
+    shapes = []
+    monkeypatch.setattr(plans, "_take_in", lambda known: shapes.append(known))
     run(shard=(1, 4))
-    assert seen[0] == kept
+    assert shapes[0] == wisdom
     (file,) = (tmp_path / "study.parts").glob("wisdom-*.json")
     flip(file, 8 * 300)
     _, events, _ = run(shard=(2, 4))
@@ -422,13 +422,13 @@ def test_a_run_stopped_again_and_again_ends_bit_for_bit(run, case, monkeypatch):
     monkeypatch.setattr(run_task, "REPORT_EVERY", 0.0)
     overrides = ("load.p_star=[0.1]", *STOPPED[case])
     unbroken, _, _ = run(name="unbroken.h5", overrides=overrides, jobs=1)
-    seen, stops, resumed = [], 0, 0
+    events, stops, resumed = [], 0, 0
 
     def stop_at_every_seventh_word(progress):
         nonlocal resumed
-        seen.append(progress)
-        resumed += progress.event == "step" and progress.step > 0 and seen[-2].event == "start"
-        if len(seen) % 7 == 0:
+        events.append(progress)
+        resumed += progress.event == "step" and progress.step > 0 and events[-2].event == "start"
+        if len(events) % 7 == 0:
             signal.raise_signal(signal.SIGTERM)
 
     while stops < 200:
@@ -518,8 +518,8 @@ SMALL_CONTACT = power_spec(n=1, points=512, p_star=0.002, cutoff=0.02)
 def test_calls_that_are_too_short_advance_all_the_same(run, tmp_path, monkeypatch):
     """Also in the solve on tiles, which follows the grid of 256 points here."""
     monkeypatch.setattr(run_task, "REPORT_EVERY", 0.0)
-    straight, seen, _ = run(SMALL_CONTACT, "straight.h5", jobs=1, reproducible=True)
-    steps = [(event.points, event.step) for event in seen if event.event == "step"]
+    straight, progress, _ = run(SMALL_CONTACT, "straight.h5", jobs=1, reproducible=True)
+    steps = [(event.points, event.step) for event in progress if event.event == "step"]
     assert steps.count((256, max(step for points, step in steps if points == 256))) > 20
 
     def stop_at_256(event):

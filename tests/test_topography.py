@@ -87,7 +87,7 @@ def test_hdf5_is_known_by_its_content(hdf5, heights):
 
 
 @pytest.mark.parametrize(
-    ("array", "told"),
+    ("array", "message"),
     [
         (np.zeros((4, 16, 16)), "two dimensions, a line profile one"),
         (np.zeros(()), "two dimensions, a line profile one"),
@@ -100,8 +100,8 @@ def test_hdf5_is_known_by_its_content(hdf5, heights):
         (np.zeros((16, 16), [("h", "f8")]), "real numbers"),
     ],
 )
-def test_what_is_no_map_of_real_numbers_is_refused(npy, array, told):
-    with pytest.raises(InputError, match=f"h.npy: .*{told}"):
+def test_what_is_no_map_of_real_numbers_is_refused(npy, array, message):
+    with pytest.raises(InputError, match=f"h.npy: .*{message}"):
         read_topography(npy(array))
 
 
@@ -152,8 +152,12 @@ def test_a_map_beyond_the_size_limit_is_refused(npy, hdf5, heights):
 
 def test_no_file_a_directory_and_an_empty_file_are_told_apart(tmp_path):
     (tmp_path / "empty.npy").touch()
-    for name, told in (("none.npy", "no such file"), ("", "a directory"), ("empty.npy", "empty")):
-        with pytest.raises(InputError, match=told):
+    for name, message in (
+        ("none.npy", "no such file"),
+        ("", "a directory"),
+        ("empty.npy", "empty"),
+    ):
+        with pytest.raises(InputError, match=message):
             read_topography(tmp_path / name)
 
 
@@ -187,8 +191,8 @@ def test_an_array_file_takes_no_dataset_name(npy):
 
 def test_two_maps_and_an_unknown_name_list_the_candidates(hdf5, heights):
     path = hdf5(a=heights, b=heights, x=np.arange(16.0))
-    for dataset, told in ((None, "several datasets"), ("c", "no dataset 'c'")):
-        with pytest.raises(InputError, match=f"{told}.*: a, b$"):
+    for dataset, message in ((None, "several datasets"), ("c", "no dataset 'c'")):
+        with pytest.raises(InputError, match=f"{message}.*: a, b$"):
             read_topography(path, dataset)
 
 
@@ -383,16 +387,16 @@ def test_a_region_in_metres_uses_the_spacing_of_each_axis(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("region", "told"),
+    ("region", "message"),
     [
         ({"x": [0, 14]}, r"the map has x = 0 to 13 pixels, 13 points"),
         ({"y": [3, 4]}, r"a region has at least 2"),
         ({"x": [0, 1e-6], "unit": "m"}, "does not state its sides: give the region in pixels"),
     ],
 )
-def test_a_region_beyond_the_map_is_refused(npy, region, told):
+def test_a_region_beyond_the_map_is_refused(npy, region, message):
     path = npy(np.zeros((9, 13)))
-    with pytest.raises(InputError, match=f"h.npy: surface.region: .*{told}"):
+    with pytest.raises(InputError, match=f"h.npy: surface.region: .*{message}"):
         read_topography(path, region=Region.model_validate(region))
 
 

@@ -33,16 +33,16 @@ def radius(points=POINTS):
 @pytest.mark.parametrize("n", [0, 0.5, 1, 2.5, 4])
 def test_over_the_whole_surface_both_measures_are_delta_sigma(n):
     contact = rough(n)
-    found = contact_stress(contact, np.full(contact.grid.shape, True))
-    assert found.deviation == pytest.approx(1, rel=1e-12)
-    assert found.quadrature == pytest.approx(1, rel=1e-12)
+    stress = contact_stress(contact, np.full(contact.grid.shape, True))
+    assert stress.deviation == pytest.approx(1, rel=1e-12)
+    assert stress.quadrature == pytest.approx(1, rel=1e-12)
 
 
 def test_on_a_line_they_are_delta_sigma_but_for_the_highest_wave():
     contact = build_scene(LineParabola(radius=R), Power(n=0.5), 256).contact(0.1)
-    found = contact_stress(contact, np.full(contact.grid.shape, True))
-    assert found.deviation == pytest.approx(1, rel=1e-12)
-    assert found.quadrature == pytest.approx(1, rel=1e-4)
+    stress = contact_stress(contact, np.full(contact.grid.shape, True))
+    assert stress.deviation == pytest.approx(1, rel=1e-12)
+    assert stress.quadrature == pytest.approx(1, rel=1e-4)
 
 
 def test_for_a_half_space_the_quadrature_is_the_slope():
@@ -55,49 +55,49 @@ def test_for_a_half_space_the_quadrature_is_the_slope():
     )
     square = (2 * np.pi) ** 2 * (slope[0] ** 2 + slope[1] ** 2)
     touching = np.random.default_rng(0).random(grid.shape) < 0.1
-    found = contact_stress(Contact(grid, height, grid.wavenumber(), 1.0), touching)
-    assert found.quadrature == pytest.approx(np.sqrt(square[touching].mean()), rel=1e-12)
+    stress = contact_stress(Contact(grid, height, grid.wavenumber(), 1.0), touching)
+    assert stress.quadrature == pytest.approx(np.sqrt(square[touching].mean()), rel=1e-12)
 
 
 def test_for_springs_the_deviation_is_that_of_the_heights():
     contact = rough(0)
     touching = contact.height > 1.0
-    found = contact_stress(contact, touching)
-    assert found.deviation == pytest.approx(contact.height[touching].std(), rel=1e-12)
+    stress = contact_stress(contact, touching)
+    assert stress.deviation == pytest.approx(contact.height[touching].std(), rel=1e-12)
 
 
 def test_without_contact_there_is_none():
     contact = rough(1)
-    found = contact_stress(contact, np.full(contact.grid.shape, False))
-    assert np.isnan(found.deviation)
-    assert np.isnan(found.quadrature)
+    stress = contact_stress(contact, np.full(contact.grid.shape, False))
+    assert np.isnan(stress.deviation)
+    assert np.isnan(stress.quadrature)
 
 
 def test_a_paraboloid_on_a_half_space_has_the_quadrature_of_the_paper():
     """Eq. (21) at n = 1: k a / (sqrt(2) R); 0.833 against Persson's 0.798 by Eq. (19)."""
     scene = build_scene(Parabola(radius=R), Power(n=1), POINTS)
     a, r = 0.2, radius()
-    found = contact_stress(scene.contact(0.1), r < a)
+    stress = contact_stress(scene.contact(0.1), r < a)
     disc = np.sqrt(np.mean(r[r < a] ** 2)) / R
     assert disc == pytest.approx(a / np.sqrt(2) / R, rel=0.01)
-    assert found.quadrature * scene.delta_sigma == pytest.approx(disc, rel=0.02)
+    assert stress.quadrature * scene.delta_sigma == pytest.approx(disc, rel=0.02)
     assert kappa(1) / KAPPA == pytest.approx(1.044, abs=1e-3)
 
 
 def test_a_paraboloid_on_a_membrane_has_no_deviation_at_all():
     """K h = 2 tension / R everywhere on it: no theory of a variance can work there."""
     scene = build_scene(Parabola(radius=R), Power(n=2), POINTS)
-    found = contact_stress(scene.contact(0.1), radius() < 0.2)
-    assert found.deviation * scene.delta_sigma < 0.05 * 2 / R
+    stress = contact_stress(scene.contact(0.1), radius() < 0.2)
+    assert stress.deviation * scene.delta_sigma < 0.05 * 2 / R
 
 
 def test_the_deviation_over_the_highest_points_is_that_of_a_sort():
     contact = rough(1)
     order = np.argsort(-contact.height.ravel())
     stress = contact.elasticity(contact.height, contact.grid.empty()).ravel()[order]
-    found = bearing(contact)
-    assert np.all(np.diff(found.area) > 0)
-    for share, deviation in list(zip(found.area, found.deviation, strict=True))[::100]:
+    curve = bearing(contact)
+    assert np.all(np.diff(curve.area) > 0)
+    for share, deviation in list(zip(curve.area, curve.deviation, strict=True))[::100]:
         count = round(share * stress.size)
         assert share == pytest.approx(count / stress.size, rel=1e-12)
         assert deviation == pytest.approx(stress[:count].std(), rel=1e-9)
@@ -125,11 +125,11 @@ def test_a_deviation_that_is_delta_sigma_gives_back_persson_theory():
 
 def test_the_area_obeys_its_own_equation():
     contact = rough(0.5)
-    found = bearing(contact)
+    curve = bearing(contact)
     for p_star in (0.03, 0.1, 0.5, 1.0):
-        a_r = float(contact_area(found.delta_sigma_c(p_star), p_star))
+        a_r = float(contact_area(curve.delta_sigma_c(p_star), p_star))
         assert a_r == pytest.approx(
-            float(contact_area(np.interp(a_r, found.area, found.deviation), p_star)), rel=1e-3
+            float(contact_area(np.interp(a_r, curve.area, curve.deviation), p_star)), rel=1e-3
         )
 
 
@@ -165,11 +165,11 @@ def records(output_of, tmp_path):
 
 
 def test_analyze_tells_of_it_where_it_was_asked_for(records):
-    found, text = records("output.true_contact=true")
+    rows, text = records("output.true_contact=true")
     assert "Delta_sigma over the contact" in text
     assert text.count("deviation_bearing") == 2
     for n, p_star in product((0, 1), (0.1, 1.0)):
-        (record,) = [r for r in found if r["n"] == n and r["p_star"] == p_star]
+        (record,) = [r for r in rows if r["n"] == n and r["p_star"] == p_star]
         for name in ("deviation_c", "quadrature_c", "deviation_bearing"):
             predicted = record[f"a_r_persson_{name}"]
             assert predicted == pytest.approx(float(contact_area(record[name], p_star)), rel=1e-12)
@@ -179,21 +179,21 @@ def test_analyze_tells_of_it_where_it_was_asked_for(records):
 
 
 def test_analyze_says_nothing_of_it_where_it_was_not(records):
-    found, text = records()
+    rows, text = records()
     assert "over the contact" not in text
-    assert not any("a_r_persson_deviation_c" in record for record in found)
+    assert not any("a_r_persson_deviation_c" in record for record in rows)
 
 
 def test_analyze_takes_another_theory_for_the_mean_gap_alone(records, output_of, tmp_path):
     paper, _ = records()
-    told = output_of("analyze", tmp_path / "s.h5", "--json", "--theory", "coarse-grained")
-    for before, after in zip(paper, json.loads(told), strict=True):
+    output = output_of("analyze", tmp_path / "s.h5", "--json", "--theory", "coarse-grained")
+    for before, after in zip(paper, json.loads(output), strict=True):
         assert after["a_r_persson"] == before["a_r_persson"]
         if before["n"] == 0 and before["p_star"] <= 1:
             exact = float(einstein_prediction(before["p_star"]).u_g)
             assert after["u_g_persson"] == pytest.approx(exact, rel=1e-3)
-    told = output_of("analyze", tmp_path / "s.h5", "--json", "--theory", "fitted")
-    for before, after in zip(paper, json.loads(told), strict=True):
+    output = output_of("analyze", tmp_path / "s.h5", "--json", "--theory", "fitted")
+    for before, after in zip(paper, json.loads(output), strict=True):
         assert after["a_r_persson"] == before["a_r_persson"]
         assert after["u_g_persson"] == pytest.approx(before["u_g_persson"], rel=0.2)
         assert after["u_g_persson"] != before["u_g_persson"]

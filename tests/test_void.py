@@ -139,19 +139,19 @@ def test_unknown_points_are_as_good_as_deep_holes(surface, boundary):
     deep = np.where(contact.may_touch, contact.height, -1e3)
     hole = replace(contact, height=deep, may_touch=None)
     solver = Auto(tolerance=1e-10, nested=False)
-    found, same = solve_contact(contact, solver), solve_contact(hole, solver)
-    assert found.sigma == pytest.approx(same.sigma, abs=1e-7)
-    assert found.u == pytest.approx(same.u, abs=1e-7)
-    assert observe(contact, found.u, found.sigma).a_r == observe(hole, same.u, same.sigma).a_r
+    solution, same = solve_contact(contact, solver), solve_contact(hole, solver)
+    assert solution.sigma == pytest.approx(same.sigma, abs=1e-7)
+    assert solution.u == pytest.approx(same.u, abs=1e-7)
+    assert observe(contact, solution.u, solution.sigma).a_r == observe(hole, same.u, same.sigma).a_r
 
 
 @pytest.mark.parametrize("solver", [ConstrainedCG, Fire, PolonskyKeer])
 def test_every_solver_leaves_unknown_points_out(surface, solver):
     contact = scene_of(surface, HalfSpace()).contact(0.1)
     best = solve_contact(contact, Auto(tolerance=1e-9))
-    found = solve_contact(contact, solver(tolerance=1e-7))
-    assert found.status == "converged"
-    assert found.sigma == pytest.approx(best.sigma, abs=1e-5)
+    solution = solve_contact(contact, solver(tolerance=1e-7))
+    assert solution.status == "converged"
+    assert solution.sigma == pytest.approx(best.sigma, abs=1e-5)
 
 
 def test_filled_points_would_touch(surface):
@@ -160,8 +160,8 @@ def test_filled_points_would_touch(surface):
     area = {}
     for case in (surface, filled):
         contact = scene_of(case, HalfSpace()).contact(0.3)
-        found = solve_contact(contact, Auto())
-        area[case.missing] = observe(contact, found.u, found.sigma).a_r
+        solution = solve_contact(contact, Auto())
+        area[case.missing] = observe(contact, solution.u, solution.sigma).a_r
     assert area["fill"] > 1.02 * area["void"]
 
 
@@ -173,14 +173,16 @@ def test_punch_with_a_hole_has_the_stress_of_its_ring(tmp_path):
     face = Punch(radius=0.3).heights(96)
     np.save(tmp_path / "void.npy", np.where(r < 0.12, np.nan, face))
     np.save(tmp_path / "bore.npy", np.where(r < 0.12, -1.0, face))
-    found = {}
+    deviations = {}
     for name in ("void", "bore"):
         surface = FileSurface(path=tmp_path / f"{name}.npy", missing="void")
         scene = build_scene(surface, HalfSpace(), 96)
         contact = scene.contact(0.02 / scene.delta_sigma)
         solution = solve_contact(contact, Auto(tolerance=1e-10))
-        found[name] = solution.sigma * scene.delta_sigma
-    assert found["void"] == pytest.approx(found["bore"], abs=1e-6 * found["bore"].max())
+        deviations[name] = solution.sigma * scene.delta_sigma
+    assert deviations["void"] == pytest.approx(
+        deviations["bore"], abs=1e-6 * deviations["bore"].max()
+    )
 
 
 def test_bounds_hold(surface):
@@ -188,32 +190,37 @@ def test_bounds_hold(surface):
     best = solve_contact(contact, Auto(tolerance=1e-12))
     exact = observe(contact, best.u, best.sigma)
     for tolerance in (1e-2, 1e-4):
-        found = solve_contact(contact, Auto(tolerance=tolerance))
-        certificate = certify(contact, found.u, found.sigma)
-        seen = observe(contact, found.u, found.sigma)
-        assert abs(seen.u_g - exact.u_g) <= certificate.u_g < 300 * tolerance
-        assert abs(seen.sigma_p - exact.sigma_p) <= certificate.sigma_p
+        solution = solve_contact(contact, Auto(tolerance=tolerance))
+        certificate = certify(contact, solution.u, solution.sigma)
+        observables = observe(contact, solution.u, solution.sigma)
+        assert abs(observables.u_g - exact.u_g) <= certificate.u_g < 300 * tolerance
+        assert abs(observables.sigma_p - exact.sigma_p) <= certificate.sigma_p
 
 
 def test_derivative_of_the_energy_by_the_mean_gap_is_the_pressure(surface):
     """-dv/du_g = p, which holds for the distance of the mean planes."""
     scene, p, step = scene_of(surface, HalfSpace()), 0.1, 1e-3
     low, high = (
-        observe(contact, found.u, found.sigma)
+        observe(contact, solution.u, solution.sigma)
         for contact in (scene.contact(p * (1 - step)), scene.contact(p * (1 + step)))
-        for found in [solve_contact(contact, Auto(tolerance=1e-10))]
+        for solution in [solve_contact(contact, Auto(tolerance=1e-10))]
     )
     assert (high.energy - low.energy) / (low.u_g - high.u_g) == pytest.approx(p, rel=1e-4)
 
 
 def test_histograms_count_known_gaps_and_all_stresses(surface):
     contact = scene_of(surface, HalfSpace()).contact(0.1)
-    found = solve_contact(contact, Auto())
-    gap, stress = gap_histogram(contact, found.u), stress_histogram(contact, found.u, found.sigma)
+    solution = solve_contact(contact, Auto())
+    gap, stress = (
+        gap_histogram(contact, solution.u),
+        stress_histogram(contact, solution.u, solution.sigma),
+    )
     known = contact.may_touch
-    touching = (found.u == contact.height) & known
+    touching = (solution.u == contact.height) & known
     assert gap.zero == pytest.approx(touching.sum() / known.sum(), rel=1e-12)
-    assert stress.zero == pytest.approx(1 - observe(contact, found.u, found.sigma).a_r, rel=1e-12)
+    assert stress.zero == pytest.approx(
+        1 - observe(contact, solution.u, solution.sigma).a_r, rel=1e-12
+    )
 
 
 def test_finer_grid_has_the_void_of_its_nearest_points():

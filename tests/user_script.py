@@ -19,22 +19,22 @@ SPEC = {
 }
 
 
-def largest(found: Result) -> float:
-    assert_type(found.a_r, float)
-    assert_type(found.gap, NDArray[np.floating])
-    assert_type(found.contact, NDArray[np.bool_])
-    return float(np.max(found.pressure)) / found.nominal_pressure
+def largest(result: Result) -> float:
+    assert_type(result.a_r, float)
+    assert_type(result.gap, NDArray[np.floating])
+    assert_type(result.contact, NDArray[np.bool_])
+    return float(np.max(result.pressure)) / result.nominal_pressure
 
 
 def main(folder: Path) -> float:
-    found = assert_type(solve(SPEC), Result)
-    again = solve(SPEC | {"surface": {"periodic": True}}, heights=found.height)
+    result = assert_type(solve(SPEC), Result)
+    again = solve(SPEC | {"surface": {"periodic": True}}, heights=result.height)
     study = assert_type(run(SPEC, folder / "study.h5", jobs=1), Path)
     areas = [float(row["a_r"]) for row in rows(study)]
-    assert areas == [found.a_r]
+    assert areas == [result.a_r]
     for curve in compare(study).curves:
         assert_type(curve.predict(np.array([0.1])).a_r, NDArray[np.floating])
-    return largest(found) / largest(again)
+    return largest(result) / largest(again)
 
 
 def mistakes() -> None:

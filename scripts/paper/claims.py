@@ -50,14 +50,14 @@ class Criterion:
     low: float = -inf
     high: float = inf
 
-    def holds(self, found: Value) -> bool | None:
+    def holds(self, value: Value) -> bool | None:
         """Whether the value lies within the limits; None if its error does not decide it."""
-        if not isfinite(found.value):
+        if not isfinite(value.value):
             return None
-        reach = SIGMAS * found.error if isfinite(found.error) else inf
-        if self.low <= found.value - reach and found.value + reach <= self.high:
+        reach = SIGMAS * value.error if isfinite(value.error) else inf
+        if self.low <= value.value - reach and value.value + reach <= self.high:
             return True
-        if found.value + reach < self.low or found.value - reach > self.high:
+        if value.value + reach < self.low or value.value - reach > self.high:
             return False
         return None
 
@@ -97,8 +97,8 @@ class Finding:
 
     def cases(self, criterion: Criterion) -> dict[str, Value]:
         """The values of a criterion by case; a single value has no name."""
-        found = self.measured.get(criterion.quantity, {})
-        return {"": found} if isinstance(found, Value) else dict(found)
+        values = self.measured.get(criterion.quantity, {})
+        return {"": values} if isinstance(values, Value) else dict(values)
 
     def judged(self, criteria: Iterable[Criterion]) -> list[bool | None]:
         """Whether each criterion holds, case by case; None where nothing was measured."""
@@ -134,14 +134,14 @@ def verdict(statement: Statement, finding: Finding) -> Verdict:
 
 def result(statement: Statement, finding: Finding) -> str:
     """Each criterion with its limits, the values found, and which of them hold."""
-    told = []
+    lines = []
     for criterion in (*statement.criteria, *statement.printed):
         values = [
             f"{f'{case}: ' if case else ''}{value} {MARKS[criterion.holds(value)]}"
             for case, value in finding.cases(criterion).items()
         ]
         note = "; printed form" if criterion in statement.printed else ""
-        told.append(
+        lines.append(
             f"{criterion.quantity} ({criterion.limits}{note}): {', '.join(values) or 'not measured ?'}"
         )
-    return "<br>".join([*told, *([finding.remark] if finding.remark else [])])
+    return "<br>".join([*lines, *([finding.remark] if finding.remark else [])])

@@ -75,7 +75,7 @@ def slope(x: Any, y: Any, error: Any) -> Value:
     x, y, weight = np.asarray(x), np.asarray(y), 1 / np.square(error)
     centre = weight @ x / weight.sum()
     moment = weight @ (x - centre) ** 2
-    found = float(weight @ ((x - centre) * y) / moment)
-    rest = y - (weight @ y / weight.sum() + found * (x - centre))
+    exponent = float(weight @ ((x - centre) * y) / moment)
+    rest = y - (weight @ y / weight.sum() + exponent * (x - centre))
     misfit = max(1.0, float(weight @ rest**2) / max(1, x.size - 2))
-    return Value(found, float(np.sqrt(misfit / moment)))
+    return Value(exponent, float(np.sqrt(misfit / moment)))

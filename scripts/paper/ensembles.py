@@ -39,10 +39,10 @@ class Mean:
             return np.full(self.each.shape[1:], np.nan)
         return np.hypot(self.each.std(axis=0, ddof=1) / np.sqrt(count), np.nan_to_num(self.grid))
 
-    def only(self, kept: Any) -> "Mean":
+    def only(self, index: Any) -> "Mean":
         """Some of the values."""
         grid = np.broadcast_to(self.grid, self.each.shape[1:])
-        return Mean(self.each[:, kept], grid[kept])
+        return Mean(self.each[:, index], grid[index])
 
     def over(self, unit: Field) -> "Mean":
         """In other units."""
@@ -60,9 +60,9 @@ def estimate(of: Callable[..., float], *means: Mean) -> Value:
     if any(len(mean.each) != count for mean in means):
         raise ValueError("means over different numbers of seeds")
     values = [np.array(mean.value, dtype=float) for mean in means]
-    found = float(of(*values))
+    central = float(of(*values))
     if count < 2:
-        return Value(found, np.nan)
+        return Value(central, np.nan)
     without = [
         of(*(np.delete(mean.each, seed, axis=0).mean(axis=0) for mean in means))
         for seed in range(count)
@@ -73,9 +73,9 @@ def estimate(of: Callable[..., float], *means: Mean) -> Value:
         for place in map(tuple, np.argwhere(grid)):
             held = value[place]
             value[place] = held + grid[place]
-            variance += (of(*values) - found) ** 2
+            variance += (of(*values) - central) ** 2
             value[place] = held
-    return Value(found, float(np.sqrt(variance)))
+    return Value(central, float(np.sqrt(variance)))
 
 
 def power(x: Field, mean: Mean) -> Value:
@@ -139,15 +139,15 @@ def groups(held: Any, name: str) -> list[Group]:
 
     Raises ValueError where seeds have different pressures.
     """
-    found: dict[tuple[Any, ...], list[Curve]] = {}
+    by_key: dict[tuple[Any, ...], list[Curve]] = {}
     for curve in held.comparison(name).curves:
         row = curve.rows[0]
-        found.setdefault((without_seed(row), *solver_of(row)), []).append(curve)
-    for curves in found.values():
+        by_key.setdefault((without_seed(row), *solver_of(row)), []).append(curve)
+    for curves in by_key.values():
         if any(not np.allclose(c.column("p_star"), curves[0].column("p_star")) for c in curves):
             raise ValueError(f"{name}: seeds at different pressures")
     return sorted(
-        map(Group, found.values()),
+        map(Group, by_key.values()),
         key=lambda group: (np.nan_to_num(group.n, nan=9.0), group.first.points),
     )
 

@@ -26,9 +26,9 @@ def _gap_over_pressure(
     held: Held, folder: Path, study: str, name: str, x_scale: str, y_scale: str
 ) -> list[Group]:
     """u_g over p* with theory, all exponents but n = 0."""
-    found = [group for group in groups(held, study) if group.n > 0]
+    ensembles = [group for group in groups(held, study) if group.n > 0]
     plot, xs, ys, lines = ColumnFigure(P_STAR, GAP), [], [], []
-    for group in found:
+    for group in ensembles:
         p, u = group.p, group.best("u_g")
         shown = (u.value > TAIL) | (y_scale == "linear")
         draw_points(plot, STYLES[group.n], p[shown], u.value[shown], u.error[shown])
@@ -37,7 +37,7 @@ def _gap_over_pressure(
         xs, ys = [*xs, p[shown]], [*ys, u.value[shown]]
     plot.theory(lines)
     finish(plot, folder, name, x_scale, y_scale, np.concatenate(xs), np.concatenate(ys))
-    return found
+    return ensembles
 
 
 @dataclass(frozen=True)
@@ -55,9 +55,9 @@ class Errors:
 def _gap_errors(group: Group, highest: float, least: float = 0.0) -> Errors:
     """Relative errors of the theoretical u_g up to a pressure, where u_g is above a least value."""
     u = group.best("u_g")
-    kept = (group.p <= highest * 1.0001) & (u.value > least)
-    theory = group.theory.u_g[kept]
-    return Errors(u.only(kept), lambda u: np.abs(theory / u - 1))
+    usable = (group.p <= highest * 1.0001) & (u.value > least)
+    theory = group.theory.u_g[usable]
+    return Errors(u.only(usable), lambda u: np.abs(theory / u - 1))
 
 
 def _pressure_errors(group: Group) -> Errors:
@@ -70,9 +70,9 @@ def _pressure_errors(group: Group) -> Errors:
 @needs("fig06", "fig09b")
 def fig09a(held: Held, folder: Path) -> list[Finding]:
     """H = 0.8 over the logarithm of the pressure; errors of theory, at large pressures of Fig. 9b."""
-    found = _gap_over_pressure(held, folder, "fig06", "fig09a", "log", "linear")
-    gaps = {label(group.n): _gap_errors(group, 1.0) for group in found}
-    light = {label(group.n): _gap_errors(group, 0.5) for group in found if group.n < 4}
+    ensembles = _gap_over_pressure(held, folder, "fig06", "fig09a", "log", "linear")
+    gaps = {label(group.n): _gap_errors(group, 1.0) for group in ensembles}
+    light = {label(group.n): _gap_errors(group, 0.5) for group in ensembles if group.n < 4}
     linear = {label(group.n): group for group in groups(held, "fig09b") if group.n > 0}
     pressures = {name: _pressure_errors(group) for name, group in linear.items()}
     pressures = {name: errors for name, errors in pressures.items() if errors.u.value.size}
@@ -102,20 +102,20 @@ def fig09a(held: Held, folder: Path) -> list[Finding]:
 
 def _cases(errors: dict[str, Errors], statistic: Callable[[Field], float]) -> dict[str, Value]:
     """One number of each set of errors."""
-    return {name: found.value(statistic) for name, found in errors.items()}
+    return {name: error.value(statistic) for name, error in errors.items()}
 
 
 @needs("fig09b")
 def fig09b(held: Held, folder: Path) -> list[Finding]:
     """Large pressures on a linear axis."""
-    found = _gap_over_pressure(held, folder, "fig09b", "fig09b", "linear", "log")
+    ensembles = _gap_over_pressure(held, folder, "fig09b", "fig09b", "linear", "log")
     first, second, third = ({}, {}, {})
-    for group in found:
+    for group in ensembles:
         slopes = [_decay(group, at) for at in LINEAR]
         first[label(group.n)] = _over(slopes[1], slopes[0], group)
         second[label(group.n)] = _over(slopes[2], slopes[0], group)
         third[group.n] = [slope(group.best("u_g").value) for slope in slopes]
-    told = ", ".join(f"{slope:.2f}" for slope in third[1.0])
+    slopes_text = ", ".join(f"{slope:.2f}" for slope in third[1.0])
     at = ", ".join(f"{p:g}" for p in LINEAR)
     return [
         Finding(
@@ -124,7 +124,7 @@ def fig09b(held: Held, folder: Path) -> list[Finding]:
                 "d ln u_g/d p* at p* = 1.75 over that at 1.25": first,
                 "d ln u_g/d p* at p* = 2.75 over that at 1.25": second,
             },
-            f"n = 1: {told} at p* = {at}. {sample(held, 'fig09b')} In theory the tail is Gaussian, "
+            f"n = 1: {slopes_text} at p* = {at}. {sample(held, 'fig09b')} In theory the tail is Gaussian, "
             "and a finite surface has no gap beyond a finite pressure.",
         )
     ]
@@ -156,7 +156,7 @@ def small_pressure(held: Held, folder: Path) -> list[Finding]:
             ratios[label(n)] = estimate(_falls(p, limits[n]), u)
     plot.theory(lines)
     finish(plot, folder, "small_pressure", "log", "linear", np.concatenate(xs), [0, 3.7])
-    told = ", ".join(f"{limit:.2g} at {label(n)}" for n, limit in limits.items())
+    limits_text = ", ".join(f"{limit:.2g} at {label(n)}" for n, limit in limits.items())
     quantity = (
         "fall of u_g over one decade of p* over that of the decade above, below the pressure at which the "
         "long waves are in contact"
@@ -166,7 +166,7 @@ def small_pressure(held: Held, folder: Path) -> list[Finding]:
             "quasi_logarithmic",
             {quantity: ratios},
             f"1 means a logarithm. The pressures, at which p is the rms stress of the waves up to 2 qᵣ, are "
-            f"p* = {told}: the range shrinks as n rises. {sample(held, 'small_pressure')}",
+            f"p* = {limits_text}: the range shrinks as n rises. {sample(held, 'small_pressure')}",
         )
     ]
 
@@ -194,22 +194,22 @@ def _long_waves(curve: Curve) -> float:
 def fig10(held: Held, folder: Path) -> list[Finding]:
     """H = 0.3."""
     _gap_over_pressure(held, folder, "fig10b", "fig10b", "linear", "log")
-    found = _gap_over_pressure(held, folder, "fig10", "fig10a", "log", "linear")
-    return [_transfer(held, found, "hurst", "H = 0.3 over H = 0.8")]
+    ensembles = _gap_over_pressure(held, folder, "fig10", "fig10a", "log", "linear")
+    return [_transfer(held, ensembles, "hurst", "H = 0.3 over H = 0.8")]
 
 
 @needs("fig06", "cut_off")
 def cut_off(held: Held, folder: Path) -> list[Finding]:
     """A cut-off spectrum."""
-    found = _gap_over_pressure(held, folder, "cut_off", "cut_off", "log", "linear")
-    return [_transfer(held, found, "cut_off", "cut-off over roll-off")]
+    ensembles = _gap_over_pressure(held, folder, "cut_off", "cut_off", "log", "linear")
+    return [_transfer(held, ensembles, "cut_off", "cut-off over roll-off")]
 
 
-def _transfer(held: Held, found: list[Group], key: str, ratio: str) -> Finding:
+def _transfer(held: Held, ensembles: list[Group], key: str, ratio: str) -> Finding:
     """Errors of theory on other surfaces over those on the default ones, all exponents together."""
     default = {group.n: _gap_errors(group, 1.0) for group in groups(held, "fig06")}
-    first = [_gap_errors(group, 1.0) for group in found]
-    second = [default[group.n] for group in found]
+    first = [_gap_errors(group, 1.0) for group in ensembles]
+    second = [default[group.n] for group in ensembles]
     means = [errors.u for errors in (*first, *second)]
 
     def over(statistic: Callable[[Field], float]) -> Value:
@@ -222,7 +222,7 @@ def _transfer(held: Held, found: list[Group], key: str, ratio: str) -> Finding:
 
     each = ", ".join(
         f"{100 * errors.value(np.max).value:.0f} % at {label(group.n)}"
-        for group, errors in zip(found, first, strict=True)
+        for group, errors in zip(ensembles, first, strict=True)
     )
     return Finding(
         key,
@@ -238,9 +238,9 @@ def _transfer(held: Held, found: list[Group], key: str, ratio: str) -> Finding:
 def spacing(held: Held, folder: Path) -> list[Finding]:
     """Is u_g at two points per lambda_s good to a per cent?"""
     off = {}
-    found = groups(held, "spacing")
+    ensembles = groups(held, "spacing")
     coarse, fine = (
-        {group.n: group for group in found if group.first.points == points}
+        {group.n: group for group in ensembles if group.first.points == points}
         for points in (128, 1024)
     )
     for n, group in coarse.items():
@@ -260,13 +260,13 @@ def spacing(held: Held, folder: Path) -> list[Finding]:
 @needs("fig11")
 def fig11(held: Held, folder: Path) -> list[Finding]:
     """Slabs of four thicknesses, and a half-space."""
-    found = sorted(
+    ensembles = sorted(
         groups(held, "fig11"),
         key=lambda group: np.nan_to_num(group.first.rows[0]["thickness"], nan=np.inf),
     )
     x_label = P_STAR.replace("sigma", "sigma_\\mathrm{si}")
     plot, xs, ys, lines, off = ColumnFigure(x_label, GAP), [], [], [], {}
-    for i, (group, colour) in enumerate(zip(found, colours(len(found)), strict=True)):
+    for i, (group, colour) in enumerate(zip(ensembles, colours(len(ensembles)), strict=True)):
         t = group.first.rows[0]["thickness"] / DEFAULT_WIDTH
         name = f"t/λᵣ = {t:.2g}" if np.isfinite(t) else "half-space"
         style = CurveStyle(colour, MARKERS[i], name)

@@ -47,7 +47,7 @@ def fig01(held: Held, folder: Path) -> list[Finding]:
         width[row["n"]] = np.mean(shown > 0.75)
     plot.axes.set(xlim=(-0.5, 0.5), ylim=(-0.04, 1.12))
     plot.write(folder / "fig01")
-    told = ", ".join(f"{value:.1f}" for value in bend.values())
+    bends = ", ".join(f"{value:.1f}" for value in bend.values())
     period, thickness = 2500.0, 10.0  # µm, both as the paper gives them
     return [
         Finding("skin", {}, "The measured profile is not available."),
@@ -63,7 +63,7 @@ def fig01(held: Held, folder: Path) -> list[Finding]:
                 ),
                 "the same width, n = 1 over n = 2": Value(width[1] / width[2]),
             },
-            f"Curvatures: {told} for n = 1, 2, 3 (a point contact on n = 2: exactly 8).",
+            f"Curvatures: {bends} for n = 1, 2, 3 (a point contact on n = 2: exactly 8).",
         ),
         Finding(
             "stiffness_alone",
@@ -238,16 +238,16 @@ def fig03b(held: Held, folder: Path) -> list[Finding]:
     plot = ColumnFigure(
         r"distance from the edge  $(r - a_c)\,/\,a_c$", r"gap  $g\,/\,(a_c^2 / R_c)$"
     )
-    found = tips(held, "fig02")
-    exponents = [tip.n for tip in found]
+    contacts = tips(held, "fig02")
+    exponents = [tip.n for tip in contacts]
     fits = []
-    for tip in found:
+    for tip in contacts:
         a, beta = gap_fit(tip)
         fits.append((tip.n, beta))
         d, gap = tip.r / a.value - 1, tip.gap / a.value**2
         shown = np.flatnonzero((d > 2 * tip.spacing / a.value) & (d < 1))
-        kept = shown[np.unique(np.geomspace(1, shown.size, 22).astype(int) - 1)]
-        plot.points(style_of(tip.n, exponents), d[kept], gap[kept], np.ones(kept.size, bool))
+        sample = shown[np.unique(np.geomspace(1, shown.size, 22).astype(int) - 1)]
+        plot.points(style_of(tip.n, exponents), d[sample], gap[sample], np.ones(sample.size, bool))
         x = np.geomspace(0.01, 1, 100)
         if tip.n < 4:
             exact = (1 + x) ** 2 / 2 - reference.hertz_sag(tip.n, 1.0, 1.0, 1 + x)

@@ -24,28 +24,28 @@ def _radius(tip: Tip) -> float:
     return stress_fit(tip, 1 - tip.n / 2)[0].value
 
 
-def _kappa_primes(found: list[Tip], cell: bool) -> list[tuple[Tip, float]]:
+def _kappa_primes(contacts: list[Tip], cell: bool) -> list[tuple[Tip, float]]:
     """k a^(4-n) / (F R) of each contact, R that of the tip or what the cell makes of it."""
     return [
         (tip, _radius(tip) ** (4 - tip.n) / tip.force * (tip.curvature if cell else 1.0))
-        for tip in found
+        for tip in contacts
     ]
 
 
-def kappa_prime(found: list[Tip]) -> Value:
+def kappa_prime(contacts: list[Tip]) -> Value:
     """That of the best resolved contact, corrected for the images; error: change on half the grid."""
-    finest = max(tip.points for tip in found)
-    grids = ([t for t in found if t.points == points] for points in (finest, finest // 2))
+    finest = max(tip.points for tip in contacts)
+    grids = ([t for t in contacts if t.points == points] for points in (finest, finest // 2))
     best = [max(grid, key=lambda tip: tip.force) for grid in grids if grid]
     values = [value for _, value in _kappa_primes(best, cell=True)]
     return Value(values[0], abs(values[0] - values[-1]))
 
 
 def _by_exponent(held: Held) -> dict[float, list[Tip]]:
-    found: dict[float, list[Tip]] = {}
+    contacts: dict[float, list[Tip]] = {}
     for tip in tips(held, "kappa"):
-        found.setdefault(tip.n, []).append(tip)
-    return found
+        contacts.setdefault(tip.n, []).append(tip)
+    return contacts
 
 
 @needs("kappa")
@@ -53,7 +53,7 @@ def kappa(held: Held, folder: Path) -> list[Finding]:
     """kappa_n over n beside the closed form."""
     plot = ColumnFigure(r"exponent  $n$", r"coefficient  $\kappa_n$")
     groups = _by_exponent(held)
-    primes = {n: kappa_prime(found) for n, found in groups.items()}
+    primes = {n: kappa_prime(contacts) for n, contacts in groups.items()}
     shown = [n for n in primes if n < 3]
     x = np.linspace(0, 2.95, 200)
     exact = np.array([reference.kappa(n) for n in x])
@@ -71,9 +71,9 @@ def kappa(held: Held, folder: Path) -> list[Finding]:
 
 
 def _coefficients(primes: dict[float, Value]) -> list[Finding]:
-    over = {n: primes[n].times(1 / given) for n, given in GIVEN.items() if n in primes}
+    over = {n: primes[n].times(1 / of_paper) for n, of_paper in GIVEN.items() if n in primes}
     exact = ", ".join(
-        f"{found} ({reference.kappa_prime(n):.6f}) at n = {n:g}" for n, found in primes.items()
+        f"{prime} ({reference.kappa_prime(n):.6f}) at n = {n:g}" for n, prime in primes.items()
     )
     solved = {n: primes[n].times(reference.kappa(n) / reference.kappa_prime(n)) for n in (0.0, 1.0)}
     return [
@@ -135,8 +135,8 @@ def _half(groups: dict[float, list[Tip]], primes: dict[float, Value]) -> list[Fi
 
 def _radius_law(groups: dict[float, list[Tip]]) -> list[Finding]:
     powers = {}
-    for n, found in groups.items():
-        finest = [tip for tip in found if tip.points == max(t.points for t in found)]
+    for n, contacts in groups.items():
+        finest = [tip for tip in contacts if tip.points == max(t.points for t in contacts)]
         force = [tip.force / tip.curvature for tip in finest]
         if len(finest) > 2:
             slopes = np.diff(np.log(force)) / np.diff(np.log([_radius(tip) for tip in finest]))
@@ -165,18 +165,18 @@ def _radius_law(groups: dict[float, list[Tip]]) -> list[Finding]:
 def _size_power(n: float, radius: float) -> float:
     """d ln a / d ln L at fixed force for a contact of this radius in an infinite cell, in L."""
 
-    def found(L: float) -> float:
+    def radius_at(L: float) -> float:
         force = float(reference.hertz_force(n, 1.0, 1.0, radius))
         curvature = 1 + reference.hertz_cell_curvature(n, 1.0, force, L)
         return float(reference.hertz_radius(n, 1.0, 1 / curvature, force))
 
     step = 1.01
-    return float(np.log(found(step) / found(1 / step)) / (2 * np.log(step)))
+    return float(np.log(radius_at(step) / radius_at(1 / step)) / (2 * np.log(step)))
 
 
-def _depths(found: list[Tip]) -> list[tuple[float, float]]:
+def _depths(contacts: list[Tip]) -> list[tuple[float, float]]:
     """Largest contact radius first: a / L and the height of the top above the corner, in a^2/R."""
-    finest = [tip for tip in found if tip.points == max(t.points for t in found)]
+    finest = [tip for tip in contacts if tip.points == max(t.points for t in contacts)]
     return [(_radius(t), (t.u[0] - t.u[-1]) / _radius(t) ** 2) for t in reversed(finest)]
 
 
@@ -196,8 +196,8 @@ def _far_fit(tip: Tip, free: bool) -> tuple[float, float]:
         gone = part.u - t[0] * field
         return (gone - gone.mean()) / np.ptp(part.u)
 
-    found = least_squares(off, [1.0, tip.n], x_scale=[1, 0.1], xtol=1e-12).x
-    return found[0], found[1]
+    parameters = least_squares(off, [1.0, tip.n], x_scale=[1, 0.1], xtol=1e-12).x
+    return parameters[0], parameters[1]
 
 
 def _far_enough(tip: Tip) -> bool:
@@ -208,9 +208,9 @@ def _far_enough(tip: Tip) -> bool:
 def _exponent(groups: dict[float, list[Tip]]) -> list[Finding]:
     powers = {}
     for n in (0.25, 0.5, 1.0):
-        found = [tip for tip in groups.get(n, []) if _far_enough(tip)]
-        if found:
-            powers[n] = spread([_far_fit(tip, free=True)[1] - 2 for tip in found])
+        contacts = [tip for tip in groups.get(n, []) if _far_enough(tip)]
+        if contacts:
+            powers[n] = spread([_far_fit(tip, free=True)[1] - 2 for tip in contacts])
     faster = {n: power.times(1 / (n - 2)) for n, power in powers.items() if n >= 0.5}
     quarter = {"fitted power of r": powers[0.25]} if 0.25 in powers else {}
     return [
@@ -247,8 +247,8 @@ def _amplitude(groups: dict[float, list[Tip]]) -> list[Finding]:
 
 def _depth_findings(groups: dict[float, list[Tip]]) -> list[Finding]:
     growth = {}
-    for n, found in groups.items():
-        large, middle, small = (depth for _, depth in _depths(found))
+    for n, contacts in groups.items():
+        large, middle, small = (depth for _, depth in _depths(contacts))
         growth[n] = Value((small - middle) / (middle - large)) if n else Value(0.0)
     quantity = "growth of the depth from L to 2 L over that from L/2 to L, n < 2"
     further = {n: Value(_growth(n, 0.025)) for n in (2.5, 3.0)}
@@ -298,8 +298,8 @@ def _period_effect(n: float, r: float) -> float:
 
 
 def _volume(groups: dict[float, list[Tip]]) -> list[Finding]:
-    found = groups.get(0.25, [])
-    finest = [tip for tip in found if tip.points == max(t.points for t in found)]
+    contacts = groups.get(0.25, [])
+    finest = [tip for tip in contacts if tip.points == max(t.points for t in contacts)]
     radii = [_radius(tip) for tip in finest]
     volume = [-tip.u[-1] / a**4 for tip, a in zip(finest, radii, strict=True)]
     power = spread((-np.diff(np.log(volume)) / np.diff(np.log(radii))).tolist())

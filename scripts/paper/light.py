@@ -20,8 +20,8 @@ LIGHTEST, POWER, PLATES = 0.02, 0.17, 0.1
 def light_area(held: Held, folder: Path) -> list[Finding]:
     """Contact area at n = 3 and 4: on the finest grid, and in the continuum."""
     plot, ys = ColumnFigure(P_STAR, r"relative contact area  $a_r$"), []
-    found = groups(held, "light")
-    for group in (_finest(found, n) for n in (3.0, 4.0)):
+    ensembles = groups(held, "light")
+    for group in (_finest(ensembles, n) for n in (3.0, 4.0)):
         p, a, own = group.p, group.continuum("a_r"), group.column("a_r").value
         style = STYLES[group.n]
         known = draw_limits(plot, style, p, a.value, a.error)
@@ -33,27 +33,27 @@ def light_area(held: Held, folder: Path) -> list[Finding]:
     finish(plot, folder, "light_area", "log", "log", p, np.concatenate(ys))
     slopes = {
         f"{group.first.points}²": _power(group, group.continuum("a_r"))
-        for group in _grids(found, 3.0)
+        for group in _grids(ensembles, 3.0)
     }
-    finest = _finest(found, 3.0)
+    finest = _finest(ensembles, 3.0)
     return [
         Finding(
             "other_power",
             {f"d ln a_r/d ln p* in the continuum, p* ≤ {POWER - 0.01:g}": slopes},
-            f"{sample(held, 'light')} {_spacings(_grids(found, 3.0))} points per λₛ. The area on the grid "
+            f"{sample(held, 'light')} {_spacings(_grids(ensembles, 3.0))} points per λₛ. The area on the grid "
             f"itself has the slope {_power(finest, finest.column('a_r'))} on {finest.first.points}².",
         ),
-        *_plates(held, _grids(found, 4.0)),
+        *_plates(held, _grids(ensembles, 4.0)),
     ]
 
 
-def _grids(found: list[Group], n: float) -> list[Group]:
+def _grids(ensembles: list[Group], n: float) -> list[Group]:
     """The contacts of one body, grids rising."""
-    return [group for group in found if group.n == n]
+    return [group for group in ensembles if group.n == n]
 
 
-def _finest(found: list[Group], n: float) -> Group:
-    return _grids(found, n)[-1]
+def _finest(ensembles: list[Group], n: float) -> Group:
+    return _grids(ensembles, n)[-1]
 
 
 def _power(group: Group, a: Mean) -> Value:
@@ -90,7 +90,7 @@ def _plates(held: Held, grids: list[Group]) -> list[Finding]:
         f"{', '.join(f'{each.value[at]:.4f}' for each in areas)} at p* = {finest.p[at]:g}"
         for at in heavy
     )
-    told = ", ".join(
+    cases = ", ".join(
         f"{Value(*pair)} at p* = {at:g}" for *pair, at in zip(a.value, a.error, p, strict=True)
     )
     rows = [row for group in grids for curve in group.curves for row in curve.rows]
@@ -108,7 +108,7 @@ def _plates(held: Held, grids: list[Group]) -> list[Finding]:
                 )
             },
             f"Two standard errors. {sample(held, 'light')} Up to {_spacings(grids[-1:])} points per λₛ; "
-            f"continuum values: {told}. {missed} contacts missed the residual of 1e-5; the slowest took "
+            f"continuum values: {cases}. {missed} contacts missed the residual of 1e-5; the slowest took "
             f"{max(row['seconds'] for row in rows):.0f} s.",
         ),
         Finding("plate_limit", {quantity: ratios}, f"a_r from grid to grid: {steps}."),
@@ -131,7 +131,7 @@ def light_deviation(held: Held, folder: Path) -> list[Finding]:
     finish(plot, folder, "light_deviation", "log", "linear", p, np.concatenate(ys))
     squares = [Mean(group.column("sigma_p").each ** 2) for group in grids]
     steps = {f"p* = {at:g}": np.flatnonzero(p == at)[0] for at in p[-3:]}
-    told = "; ".join(
+    cases = "; ".join(
         f"{', '.join(f'{step:.3f}' for step in np.diff([each.value[i] for each in squares]))} at {at}"
         for at, i in steps.items()
     )
@@ -154,7 +154,7 @@ def light_deviation(held: Held, folder: Path) -> list[Finding]:
                     for at, i in steps.items()
                 },
             },
-            f"Equal increments mean a logarithm; {_spacings(grids)} points per λₛ: {told}. "
+            f"Equal increments mean a logarithm; {_spacings(grids)} points per λₛ: {cases}. "
             f"{sample(held, 'light')}",
         ),
         Finding(

@@ -109,8 +109,8 @@ def table(findings: list[Finding]) -> str:
 def count(findings: list[Finding]) -> str:
     """Number of statements by verdict."""
     verdicts = sorted(verdict(STATEMENTS[finding.key], finding) for finding in findings)
-    told = ", ".join(f"{verdicts.count(v)} {v}" for v in dict.fromkeys(verdicts))
-    return f"{len(findings)} statements: {told}"
+    counts = ", ".join(f"{verdicts.count(v)} {v}" for v in dict.fromkeys(verdicts))
+    return f"{len(findings)} statements: {counts}"
 
 
 def _grids(points: Iterable[int]) -> str:

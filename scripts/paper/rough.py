@@ -42,7 +42,7 @@ def fig04(held: Held, folder: Path) -> list[Finding]:
         longest[row["n"]] = _longest_free(touching) / h.size * np.sqrt(2)
         y += [h, u]
     finish(plot, folder, "fig04", "ratio", "ratio", [-0.65, 0.65], np.concatenate(y))
-    told = ", ".join(f"{pieces[n]} ({longest[n]:.2f} L) at {label(n)}" for n in pieces)
+    cases = ", ".join(f"{pieces[n]} ({longest[n]:.2f} L) at {label(n)}" for n in pieces)
     area = ", ".join(
         f"{Value(row['a_r_continuum'], row['a_r_continuum_error'])} at {label(row['n'])}"
         for row in rows
@@ -57,7 +57,7 @@ def fig04(held: Held, folder: Path) -> list[Finding]:
                     pieces[3.0] / max(1, pieces[0.0])
                 ),
             },
-            f"Contacts (longest stretch): {told}. a_r in the continuum: {area}. One realisation.",
+            f"Contacts (longest stretch): {cases}. a_r in the continuum: {area}. One realisation.",
         )
     ]
 

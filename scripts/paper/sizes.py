@@ -24,8 +24,8 @@ PARTED = 0.05  # relative difference from the closed form that counts
 def fig12(held: Held, folder: Path) -> list[Finding]:
     """The Einstein foundation in two cells."""
     plot, xs, ys, ends = ColumnFigure(P_STAR, GAP), [], [], {}
-    found = sorted(groups(held, "fig12"), key=lambda group: -group.first.rows[0]["rolloff"])
-    for group, colour, marker in zip(found, colours(3), "so", strict=False):
+    ensembles = sorted(groups(held, "fig12"), key=lambda group: -group.first.rows[0]["rolloff"])
+    for group, colour, marker in zip(ensembles, colours(3), "so", strict=False):
         row = group.first.rows[0]
         name = f"L/λᵣ = {1 / row['rolloff']:g}"
         p, u = group.p, group.column("u_g")
@@ -56,7 +56,7 @@ def fig12(held: Held, folder: Path) -> list[Finding]:
         Finding(
             "size_effect",
             {"gap at which they differ by 5 %, over Δh/2": ends},
-            f"Each surface with its own Δh. Mean of {len(found[0].curves)} seeds, λᵣ/λₛ = 16.",
+            f"Each surface with its own Δh. Mean of {len(ensembles[0].curves)} seeds, λᵣ/λₛ = 16.",
         ),
         Finding(
             "einstein",
@@ -94,8 +94,8 @@ def _spans(ratio: int) -> tuple[float, float, int]:
     heights = [
         sample(_surface(1 / ratio, 0.01 / ratio, seed), 256 * ratio)[1] for seed in range(count)
     ]
-    found = [float(np.ptp(height) / height.std()) for height in heights]
-    return float(np.mean(found)), float(np.std(found, ddof=1)), count
+    spans = [float(np.ptp(height) / height.std()) for height in heights]
+    return float(np.mean(spans)), float(np.std(spans, ddof=1)), count
 
 
 @needs("large_cell_2", "large_cell_4")
@@ -120,10 +120,10 @@ def large_cell(held: Held, folder: Path) -> list[Finding]:
         lines.append((STYLES[n], dense(curve), curve.predict(dense(curve)).u_g))
     plot.theory(lines)
     finish(plot, folder, "large_cell", "log", "linear", np.concatenate(xs), np.concatenate(ys))
-    changes, told = {}, []
+    changes, cases = {}, []
     for (n, ratio), (mean, error) in means.items():
         first, spread = means[n, 2]
-        told.append(f"{mean[0]:.3f} ± {error[0]:.3f} ({label(n)}, L/λᵣ = {ratio})")
+        cases.append(f"{mean[0]:.3f} ± {error[0]:.3f} ({label(n)}, L/λᵣ = {ratio})")
         if ratio > 2:
             at = int(np.abs(mean - first).argmax())
             difference = Value(abs(mean - first)[at], float(np.hypot(error[at], spread[at])))
@@ -136,7 +136,7 @@ def large_cell(held: Held, folder: Path) -> list[Finding]:
         Finding(
             "large_cell",
             {quantity: changes},
-            f"Means over {seeds} seeds, λᵣ/λₛ = 32. u_g/h_std at p* = {p[0]:g}: {', '.join(told)}.",
+            f"Means over {seeds} seeds, λᵣ/λₛ = 32. u_g/h_std at p* = {p[0]:g}: {', '.join(cases)}.",
         )
     ]
 

@@ -27,30 +27,30 @@ TAIL = (4.0, 12.0)
 def fig07(held: Held, folder: Path) -> list[Finding]:
     """Pr(sigma) at 10 % contact on the finest grid; extrapolated where the grids allow."""
     plot, ys = ColumnFigure(STRESS, DENSITY), []
-    found = [one for group in _by_body(held, "fig07").values() for one in group]
+    stresses = [one for group in _by_body(held, "fig07").values() for one in group]
     middle = logarithmic_middles()
-    for one in found:
+    for one in stresses:
         style, fine = STYLES[one.curve.n], one.grids[-1]
         plot.axes.plot(middle, np.where(fine > 0, fine, np.nan), color=style.colour, lw=0.7)
         draw_points(plot, style, *_known(one))
-        seen = (fine > 1e-2 * fine.max()) & (middle > LOWEST)
-        ys.append(fine[seen])
+        resolved = (fine > 1e-2 * fine.max()) & (middle > LOWEST)
+        ys.append(fine[resolved])
     sigma = np.geomspace(LOWEST, 6, 300)
-    mean = float(np.mean([one.finest["p_star"] for one in found]))
-    plot.theory([(STYLES[1.0], sigma, found[0].curve.stress_density(sigma, mean))])
+    mean = float(np.mean([one.finest["p_star"] for one in stresses]))
+    plot.theory([(STYLES[1.0], sigma, stresses[0].curve.stress_density(sigma, mean))])
     finish(plot, folder, "fig07", "log", "log", [LOWEST, 6.0], np.concatenate(ys))
     return _small_stress(held)
 
 
 def _small_stress(held: Held) -> list[Finding]:
     """Exponents of Pr(sigma) at small stress, on a surface whose edges the grids resolve."""
-    paper, told, exponents = {0.5: 0.3, 1.0: 0.6}, [], {}
+    paper, cases, exponents = {0.5: 0.3, 1.0: 0.6}, [], {}
     for n, group in _by_body(held, "edges").items():
         law = fit(group[0], "small") if n in paper else None
         if law is None:
             continue
         exponents[n] = Value(law.exponent, law.error)
-        told.append(
+        cases.append(
             f"{label(n)}: {exponents[n]} for σ = {law.lowest:.2g} to {law.highest:.2g} Δσ, "
             f"{Value(law.limit, law.limit_error)} at the edge"
         )
@@ -69,7 +69,7 @@ def _small_stress(held: Held) -> list[Finding]:
                 law: {label(n): Value(edge_exponent(n) - mu) for n, mu in paper.items()},
                 **({f"{half}, n = 1/2": exponents[0.5]} if 0.5 in exponents else {}),
             },
-            f"{'; '.join(told)}. {sample(held, 'edges')} Up to {points:.0f} points per λₛ: finer surfaces "
+            f"{'; '.join(cases)}. {sample(held, 'edges')} Up to {points:.0f} points per λₛ: finer surfaces "
             "are not resolved. σ ∝ d^(1−n/2) at an edge implies n/(2 − n) for n < 2; for n = 2 "
             "the stress at the edge is finite and no law follows.",
         ),
@@ -102,24 +102,28 @@ def fig08(held: Held, folder: Path) -> list[Finding]:
 def fig13(held: Held, folder: Path) -> list[Finding]:
     """Pr(sigma) at n = 3 from grid to grid, and its tail."""
     plot = ColumnFigure(STRESS, DENSITY)
-    (found,) = [one for group in _by_body(held, "fig13").values() for one in group]
+    (distribution,) = [one for group in _by_body(held, "fig13").values() for one in group]
     middle = logarithmic_middles()
-    tones = colours(len(found.points))
+    tones = colours(len(distribution.points))
     tails = {}
-    for i, (points, density) in enumerate(zip(found.points, found.grids, strict=True)):
-        name = f"λₛ/Δa = {points * found.finest['cutoff']:.3g}"
-        kept = (density > 0) & (middle > 1e-2)
-        draw_points(plot, CurveStyle(tones[i], MARKERS[i], name), middle[kept], density[kept])
-        kept &= (middle > TAIL[0]) & (middle < TAIL[1])
-        tails[name] = tail_exponent(middle[kept], found.counts[:, i][:, kept])
+    for i, (points, density) in enumerate(
+        zip(distribution.points, distribution.grids, strict=True)
+    ):
+        name = f"λₛ/Δa = {points * distribution.finest['cutoff']:.3g}"
+        resolved = (density > 0) & (middle > 1e-2)
+        draw_points(
+            plot, CurveStyle(tones[i], MARKERS[i], name), middle[resolved], density[resolved]
+        )
+        resolved &= (middle > TAIL[0]) & (middle < TAIL[1])
+        tails[name] = tail_exponent(middle[resolved], distribution.counts[:, i][:, resolved])
     sigma = np.geomspace(1e-2, 100, 300)
-    theory = found.curve.stress_density(sigma, found.finest["p_star"])
+    theory = distribution.curve.stress_density(sigma, distribution.finest["p_star"])
     plot.theory([(STYLES[1.0], sigma, theory)])
     finish(plot, folder, "fig13", "log", "log", [0.02, 60], [1e-6, 1.0])
     coarser, finest = list(tails.values())[-2:]
     change = abs(finest.value - coarser.value)  # what the grid leaves open
-    mean = mean_stress(middle, found.counts[:, -1])
-    told = ", ".join(f"{exponent} at {name}" for name, exponent in tails.items())
+    mean = mean_stress(middle, distribution.counts[:, -1])
+    tails_text = ", ".join(f"{exponent} at {name}" for name, exponent in tails.items())
     return [
         Finding(
             "tail",
@@ -129,7 +133,7 @@ def fig13(held: Held, folder: Path) -> list[Finding]:
                 ),
                 "exponent of the law of the contact edge": Value(edge_exponent(3.0)),
             },
-            f"Its error includes the change from the coarser grid: {told}; p* = {found.finest['p_star']:g}. "
+            f"Its error includes the change from the coarser grid: {tails_text}; p* = {distribution.finest['p_star']:g}. "
             f"The mean stress in contact is {mean:.2g} Δσ; [other windows](theory.md#tail-of-the-stress-"
             f"distribution-at-n-3). {sample(held, 'fig13')} The edge implies σ^−3, with which σ_p diverges logarithmically, as it "
             "does on the grids; with σ^−2.6 it would diverge as a power.",
@@ -148,10 +152,10 @@ def tail_exponent(sigma: Field, counts: Field) -> Value:
     sigma has the shape (bins,), counts (seeds, bins). Bins without points are left out.
     """
 
-    def of(seen: Field) -> float:
-        held = seen > 0
-        errors = 1 / np.sqrt(seen[held])  # relative, of the counted points
-        return slope(np.log(sigma[held]), np.log(seen[held] / sigma[held]), errors).value
+    def of(density: Field) -> float:
+        held = density > 0
+        errors = 1 / np.sqrt(density[held])  # relative, of the counted points
+        return slope(np.log(sigma[held]), np.log(density[held] / sigma[held]), errors).value
 
     return estimate(of, Mean(counts))
 
@@ -159,15 +163,19 @@ def tail_exponent(sigma: Field, counts: Field) -> Value:
 def _by_body(held: Held, name: str) -> dict[float, list[Any]]:
     """The distributions of a study by exponent."""
     groups: dict[float, list[Any]] = {}
-    for found in distributions(held.comparison(name)):
-        groups.setdefault(found.curve.n, []).append(found)
+    for distribution in distributions(held.comparison(name)):
+        groups.setdefault(distribution.curve.n, []).append(distribution)
     return dict(sorted(groups.items()))
 
 
-def _known(found: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _known(distribution: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Bins whose density is known: stress, density, its error."""
-    kept = np.isfinite(found.density) & (found.error < 0.5)
-    return logarithmic_middles()[kept], found.density[kept], (found.density * found.error)[kept]
+    known = np.isfinite(distribution.density) & (distribution.error < 0.5)
+    return (
+        logarithmic_middles()[known],
+        distribution.density[known],
+        (distribution.density * distribution.error)[known],
+    )
 
 
 FIGURES = (fig07, fig08, fig13)

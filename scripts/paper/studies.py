@@ -97,8 +97,8 @@ class Held:
     def rows(self, name: str, **wanted: Any) -> list[dict[str, Any]]:
         """The solved rows of a study with these values in these columns."""
         if name not in self._rows:
-            found = read_rows(self.path(name))
-            self._rows[name] = [row for row in found if row["status"] != "missing"]
+            rows = read_rows(self.path(name))
+            self._rows[name] = [row for row in rows if row["status"] != "missing"]
         return [
             row
             for row in self._rows[name]

@@ -60,7 +60,7 @@ class Tip:
 
 def tips(held: Held, name: str) -> list[Tip]:
     """The contacts of a study, by n, force and grid."""
-    found = []
+    contacts = []
     for row in held.rows(name):
         section = held.section(name, row)
         half = slice(row["points"] // 2, None)
@@ -69,8 +69,8 @@ def tips(held: Held, name: str) -> list[Tip]:
         mean = row["mean_height"] + row["mean_gap"]
         sigma, gap = section["sigma"][half], np.maximum(u - height, 0.0)
         about = (row["n"], row["points"], row["pressure"], row["a_r"])
-        found.append(Tip(*about, place, sigma, u - mean, gap))
-    return sorted(found, key=lambda tip: (tip.n, tip.force, tip.points))
+        contacts.append(Tip(*about, place, sigma, u - mean, gap))
+    return sorted(contacts, key=lambda tip: (tip.n, tip.force, tip.points))
 
 
 def style_of(n: float, exponents: list[float]) -> CurveStyle:
@@ -91,8 +91,8 @@ def stress_fit(tip: Tip, exponent: float | None = None) -> tuple[Value, Value]:
             return peak * np.maximum(1 - (r / a) ** 2, 1e-9) ** nu
 
         first = [tip.sigma[0], 1.005 * start] + [1 - tip.n / 2] * (exponent is None)
-        found, _ = curve_fit(shape, tip.r[m], tip.sigma[m], p0=first, maxfev=20000)
-        fits.append((found[1], found[2] if exponent is None else exponent))
+        parameters, _ = curve_fit(shape, tip.r[m], tip.sigma[m], p0=first, maxfev=20000)
+        fits.append((parameters[1], parameters[2] if exponent is None else exponent))
     radii, exponents = np.transpose(fits).tolist()
     return spread(radii), spread(exponents)
 
@@ -113,7 +113,7 @@ def gap_fit(tip: Tip) -> tuple[Value, Value]:
             return scale + beta * np.log(d) + first * d + second * d**2
 
         p0 = (0.0, 1 + tip.n / 2, 0.0, 0.0, start)
-        found, _ = curve_fit(shape, tip.r[m], np.log(tip.gap[m]), p0=p0, maxfev=20000)
-        fits.append((found[4], found[1]))
+        parameters, _ = curve_fit(shape, tip.r[m], np.log(tip.gap[m]), p0=p0, maxfev=20000)
+        fits.append((parameters[4], parameters[1]))
     radii, exponents = np.transpose(fits).tolist()
     return spread(radii), spread(exponents)

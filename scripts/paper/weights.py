@@ -28,20 +28,20 @@ def weights(held: Held, folder: Path) -> list[Finding]:
         curves = [curve for curve in held.comparison("weights").curves if curve.n == n]
         pairs = [_weights(held, curve) for curve in curves]
         q, energy, theory = pairs[0][0], pairs[0][2], pairs[0][3]
-        seen = np.array([pair[1] for pair in pairs])
+        exponents = np.array([pair[1] for pair in pairs])
         style = STYLES[n]
         bins = np.digitize(q, np.geomspace(0.9, 65, 14))
         parts = [(bins == b, energy[bins == b]) for b in np.unique(bins)]
         at = [np.average(q[part], weights=weight) for part, weight in parts]
         mean = Mean(
-            np.transpose([np.average(seen[:, part], axis=1, weights=w) for part, w in parts])
+            np.transpose([np.average(exponents[:, part], axis=1, weights=w) for part, w in parts])
         )
         draw_points(plot, style, at, mean.value, mean.error)
         plot.axes.plot(q, theory, color=style.colour)
         for octave, cases in octaves.items():
             inside = (q >= octave[0]) & (q < octave[1])
             whole = energy[inside] @ theory[inside]
-            ratio = Mean(seen[:, inside] @ energy[inside] / whole)
+            ratio = Mean(exponents[:, inside] @ energy[inside] / whole)
             cases[label(n)] = Value(float(ratio.value), float(ratio.error))
     plot.legend["Eq. (30)"] = plot.axes.lines[-1]
     finish(plot, folder, "weights", "log", "log", [1, 64], [0.01, 1])
@@ -66,13 +66,13 @@ def _weights(held: Held, curve: Any) -> tuple[np.ndarray, ...]:
     spectra = held.spectra("weights", row)
     full = spectra["height"] > 1e-12 * spectra["height"].max()
     q = spectra["q"][full]
-    seen = spectra["u"][full] / spectra["height"][full]
+    ratio = spectra["u"][full] / spectra["height"][full]
     energy = q**curve.n * spectra["height"][full]
     variance = np.cumsum(q ** (2 * curve.n) * spectra["height"][full])
     variance -= 0.5 * np.diff(variance, prepend=0.0)
     area = erf(SHOWN * np.sqrt(variance[-1]) / np.sqrt(2 * variance))
     gamma = float(gamma_n(curve.n))
-    return q * row["length"] / (2 * np.pi), seen, energy, area * (gamma + (1 - gamma) * area**2)
+    return q * row["length"] / (2 * np.pi), ratio, energy, area * (gamma + (1 - gamma) * area**2)
 
 
 def _sampling(held: Held) -> list[Finding]:
@@ -94,7 +94,7 @@ def _sampling(held: Held) -> list[Finding]:
         light[label(group.n)] = estimate(
             lambda theory, a: theory[0] / a[0], predicted, group.continuum("a_r").only([0])
         )
-    told = ", ".join(f"{mean('a_r_continuum', n).value:.3f}" for n in (0.5, 2.0))
+    areas = ", ".join(f"{mean('a_r_continuum', n).value:.3f}" for n in (0.5, 2.0))
     return [
         Finding(
             "sampling",
@@ -104,7 +104,7 @@ def _sampling(held: Held) -> list[Finding]:
                 ),
                 "standard deviation of K h, n = 2 over n = 1/2": ratio("deviation_c"),
             },
-            f"Over the true contact at p* = {SHOWN:g}, in Δσ; a_r = {told}. Both readings of Eq. (20) have "
+            f"Over the true contact at p* = {SHOWN:g}, in Δσ; a_r = {areas}. Both readings of Eq. (20) have "
             "the mean square Δσ² over the whole surface ([theory](theory.md#full-contact-stress-over-the-contact)).",
         ),
         Finding(

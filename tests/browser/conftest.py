@@ -41,8 +41,8 @@ class Browser:
     def requests(self):
         """Addresses that were asked for since the last call."""
         events = (json.loads(entry["message"])["message"] for entry in self._log("performance"))
-        asked = (e for e in events if e["method"] == "Network.requestWillBeSent")
-        return [event["params"]["request"]["url"] for event in asked]
+        sent = (e for e in events if e["method"] == "Network.requestWillBeSent")
+        return [event["params"]["request"]["url"] for event in sent]
 
     def complaints(self):
         """What the console says."""

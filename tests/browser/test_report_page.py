@@ -107,8 +107,8 @@ def test_nothing_reaches_beyond_the_window(browser, page, width, scheme):
 def test_only_the_page_is_asked_for_and_nothing_complains(browser, page):
     browser.visit(page)
     browser.run(OPEN)
-    asked = [url for url in browser.requests() if not url.startswith("data:")]
-    assert asked == [page.as_uri()]
+    addresses = [url for url in browser.requests() if not url.startswith("data:")]
+    assert addresses == [page.as_uri()]
     assert browser.complaints() == []
     assert browser.run("return window.hit") is None
     assert browser.run("return document.images.length") == 0
@@ -174,9 +174,9 @@ def test_a_point_says_its_value_status_and_parameters(browser, page):
     point = browser.run("return document.querySelector('.plot .scatterlayer path.point')")
     browser.run("arguments[0].scrollIntoView({block: 'center', behavior: 'instant'})", point)
     ActionChains(browser.driver).move_to_element(point).perform()
-    told = browser.wait("return document.querySelector('.hoverlayer')?.textContent")
+    label = browser.wait("return document.querySelector('.hoverlayer')?.textContent")
     for words in ("n = 0", "Δσ: 0.03", "relative contact area a_r: 0.", "converged: residual"):
-        assert words in told
+        assert words in label
 
 
 def test_curves_are_turned_off_and_on(browser, page):

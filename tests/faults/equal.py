@@ -8,15 +8,15 @@ TIMES = ("seconds",)
 
 def data(path):
     """All datasets of a study but the wall times, as bytes."""
-    found = {}
+    contents = {}
     with h5py.File(path, "r", locking=False) as file:
 
         def note(name, item):
             if isinstance(item, h5py.Dataset) and name not in TIMES:
-                found[name] = np.asarray(item[()]).tobytes()
+                contents[name] = np.asarray(item[()]).tobytes()
 
         file.visititems(note)
-    return found
+    return contents
 
 
 def assert_same_bits(path, other):

@@ -37,11 +37,11 @@ def count(path, copy, read, seed=0):
     for bad in damaged(content, seed):
         copy.write_bytes(bad)
         try:
-            found = read(copy)
+            contents = read(copy)
         except GfmdError as error:
             met["refused" if str(copy) in str(error) else "without its name"] += 1
             continue
-        np.testing.assert_equal(found, before)
+        np.testing.assert_equal(contents, before)
         met["harmless"] += 1
     print(path.name, dict(met))
     return met
@@ -96,15 +96,15 @@ def test_a_damaged_checkpoint_gives_an_older_state_or_none(tmp_path):
         for bad in damaged(content, 1):
             shutil.copytree(tmp_path / "c", tmp_path / "d")
             (tmp_path / "d" / name).write_bytes(bad)
-            found = Checkpoint(tmp_path / "d")
-            said, resume = found.restore(), found.load(grid, Solver(kind="plain"))
+            checkpoint = Checkpoint(tmp_path / "d")
+            said, resume = checkpoint.restore(), checkpoint.load(grid, Solver(kind="plain"))
             if resume is None:
                 met["anew"] += 1
                 assert ".bad" in said
             else:
                 step = resume.values["step"]
                 met[f"from step {step}"] += 1
-                assert found.notes.trials[0].pressure == step
+                assert checkpoint.notes.trials[0].pressure == step
                 assert (said is None) == (step == 2)
                 np.testing.assert_array_equal(resume.values["u"], states[step - 1])
             shutil.rmtree(tmp_path / "d")

@@ -118,10 +118,10 @@ def survey(folder, cases, batch=100):
                     file.write(json.dumps(["error", traceback.format_exc()]) + "\n")
             os._exit(0)
         ended = os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
-        told = [json.loads(line) for line in log.read_text().splitlines()]
-        case = first + len(told) - 1
+        data = [json.loads(line) for line in log.read_text().splitlines()]
+        case = first + len(data) - 1
         assert ended == 0, f"case {case} ended the process ({ended}); it lies in {folder}"
-        for status, output, seconds in told:
+        for status, output, seconds in data:
             assert status in STATUSES, output
             assert "Traceback" not in output
             assert output.strip()
@@ -142,11 +142,11 @@ def _call_all(folder, cases, log):
         (folder / name).write_bytes(content)
         resource.setrlimit(resource.RLIMIT_CPU, (_cpu() + 3 * int(SECONDS), -1))
         begun = time.process_time()
-        told = CliRunner().invoke(main, words)
+        result = CliRunner().invoke(main, words)
         seconds = time.process_time() - begun
-        status, output = told.exit_code, told.output
-        if told.exception is not None and not isinstance(told.exception, SystemExit):
-            status, output = "raised", "".join(traceback.format_exception(told.exception))
+        status, output = result.exit_code, result.output
+        if result.exception is not None and not isinstance(result.exception, SystemExit):
+            status, output = "raised", "".join(traceback.format_exception(result.exception))
         if status == 0 and check is not None and output != check:
             status, output = "wrong", output
         with log.open("a") as file:

@@ -72,15 +72,15 @@ def on_one(path, output):
 
 def contents(path):
     """Every dataset and every attribute of a study file, by name."""
-    found = {}
+    values = {}
 
     def note(name, item):
         if isinstance(item, h5py.Dataset):
-            found[name] = item.asstr()[()] if item.dtype.kind in "OS" else item[()]
+            values[name] = item.asstr()[()] if item.dtype.kind in "OS" else item[()]
 
     with h5py.File(path) as file:
         file.visititems(note)
-        return found, {name: file.attrs[name] for name in ("spec", "layout", "title")}
+        return values, {name: file.attrs[name] for name in ("spec", "layout", "title")}
 
 
 def assert_same(one, other, exact=False):
@@ -91,15 +91,15 @@ def assert_same(one, other, exact=False):
     for name, expected in values.items():
         if name == "seconds" or (not exact and OF_THE_RUN.search(name)):
             continue
-        found = others[name]
-        assert found.shape == expected.shape, name
+        value = others[name]
+        assert value.shape == expected.shape, name
         if expected.dtype.kind in "OUSi" or exact:
-            assert np.array_equal(found, expected, equal_nan=expected.dtype.kind == "f"), name
+            assert np.array_equal(value, expected, equal_nan=expected.dtype.kind == "f"), name
         else:
             of = values.get(name.replace("cross_sections", "fields"), expected)
             of = values["h_std"] if name == "mean_height" else of
             size = np.nanmax(np.abs(of), initial=1e-300)
-            np.testing.assert_allclose(found, expected, rtol=0, atol=SAME * size, err_msg=name)
+            np.testing.assert_allclose(value, expected, rtol=0, atol=SAME * size, err_msg=name)
     assert set(others["status"]) <= {"converged", "rounding"}
 
 
@@ -224,8 +224,8 @@ def test_a_scan_with_holes(mpiexec, tmp_path, points, boundary):
 def test_an_error_of_one_process_ends_all(mpiexec, kind, others):
     done = mpiexec(3, "failing.py", kind, others, status=73 if kind == "known" else 1)
     said = "no space on one of them" if kind == "known" else "rank 1: KeyError: 'x'"
-    told = (done.stdout + done.stderr).count(said)
-    assert told == 3 if others == "done" else told >= 1  # each that waits in vain may say so
+    count = (done.stdout + done.stderr).count(said)
+    assert count == 3 if others == "done" else count >= 1  # each that waits in vain may say so
 
 
 def test_bad_input_gives_one_message(mpiexec, tmp_path):

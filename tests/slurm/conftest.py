@@ -66,9 +66,9 @@ class Cluster:
         done = subprocess.run(
             words, cwd=self.work, env=self.environment, capture_output=True, text=True, timeout=600
         )
-        told = done.stdout + done.stderr
-        assert done.returncode == status, f"{' '.join(words)}: {done.returncode}: {told}"
-        return told
+        output = done.stdout + done.stderr
+        assert done.returncode == status, f"{' '.join(words)}: {done.returncode}: {output}"
+        return output
 
     def queue(self):
         """State and reason by job number, shards of an array each for itself."""
@@ -78,13 +78,13 @@ class Cluster:
     def wait(self, met, what, seconds=600):
         """Wait until a condition is met; return what it gave."""
         end = time.monotonic() + seconds
-        while not (found := met()):
+        while not (state := met()):
             if time.monotonic() > end:
                 logs = [*self.work.glob("logs/*"), *self.folder.glob("*.log")]
                 tails = "\n".join(f"== {log}\n{log.read_text()[-1500:]}" for log in logs)
                 raise TimeoutError(f"{what}: not in {seconds} s\n{self.queue()}\n{tails}")
             time.sleep(0.2)
-        return found
+        return state
 
 
 @contextmanager

@@ -37,8 +37,8 @@ def test_an_array_with_a_preempted_and_a_killed_shard_equals_a_serial_run(cluste
     (work / "spec.toml").write_text(SPEC)
     cluster(*gfmd, "run", "spec.toml", "-o", "serial.h5", "-j", "1")
 
-    told = cluster(*gfmd, "submit", *STUDY, "--shards", "4", "--time", "10")
-    job, collection = re.findall(r"^job (\d+):", told, re.MULTILINE)
+    output = cluster(*gfmd, "submit", *STUDY, "--shards", "4", "--time", "10")
+    job, collection = re.findall(r"^job (\d+):", output, re.MULTILINE)
     cluster.wait((work / "array.parts" / "in-use").exists, "a shard at work")
     first = preempt(cluster, job)
     refused = cluster(*gfmd, "submit", *STUDY, "--missing", status=2)
@@ -60,8 +60,8 @@ def test_an_array_with_a_preempted_and_a_killed_shard_equals_a_serial_run(cluste
     collected = (work / "logs" / f"gfmd-array-{collection}.out").read_text()
     assert f"{len(state['missing_tasks'])} missing" in collected
 
-    told = cluster(*gfmd, "submit", *STUDY, "--missing")
-    assert "1 of 4 shards" in told
+    output = cluster(*gfmd, "submit", *STUDY, "--missing")
+    assert "1 of 4 shards" in output
     cluster.wait(lambda: not cluster.queue(), "an end of the missing shard and its collection")
     assert "23 converged" in cluster(*gfmd, "status", *STUDY)
     assert "nothing is missing" in cluster(*gfmd, "submit", *STUDY, "--missing")

@@ -27,7 +27,7 @@ def records(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def found(records):
+def scores(records):
     return list(calibration.scores(records))
 
 
@@ -39,9 +39,9 @@ def test_the_set_is_large_and_solved(records):
 
 
 @pytest.mark.parametrize("quantity", calibration.QUANTITIES)
-def test_bars_hold_and_are_not_too_wide(found, quantity):
+def test_bars_hold_and_are_not_too_wide(scores, quantity):
     """In 95 of 100 cases; half of the bars are less than five times the error."""
-    chosen = [score for score in found if score.quantity == quantity]
+    chosen = [score for score in scores if score.quantity == quantity]
     count, held, ratio, _, held_too, ratio_too = calibration.summary(chosen)
     assert count >= 200
     assert held >= 0.95
@@ -52,9 +52,9 @@ def test_bars_hold_and_are_not_too_wide(found, quantity):
 
 @pytest.mark.parametrize("grids", [1, 2, 3])
 @pytest.mark.parametrize("quantity", calibration.QUANTITIES)
-def test_bars_hold_whatever_the_number_of_grids(found, quantity, grids):
+def test_bars_hold_whatever_the_number_of_grids(scores, quantity, grids):
     """As above, but for the chance in a smaller sample."""
-    chosen = [s for s in found if (s.quantity, s.grids) == (quantity, grids)]
+    chosen = [s for s in scores if (s.quantity, s.grids) == (quantity, grids)]
     count, held, ratio, _, held_too, ratio_too = calibration.summary(chosen)
     assert count >= 50
     assert min(held, held_too) >= 0.92

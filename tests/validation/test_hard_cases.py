@@ -97,9 +97,9 @@ def test_the_solution_meets_the_conditions_of_contact(name, solved):
     allowed = noise(contact, u)
     assert np.isfinite(u).all()
     assert np.isfinite(sigma).all()
-    assert np.isfinite([it.seen.energy, it.seen.work, it.seen.perimeter]).all()
+    assert np.isfinite([it.observables.energy, it.observables.work, it.observables.perimeter]).all()
     assert np.min(u - contact.height) == 0
-    assert 0 < it.seen.a_r <= 1
+    assert 0 < it.observables.a_r <= 1
     assert rms(sigma - elastic(contact, u) - contact.pressure) < 2 * allowed  # two codes
     assert abs(sigma.mean() - contact.pressure) < allowed + EPS * contact.pressure
     # |x|_max <= |x|_2 = N rms for x = min(g, sigma)
@@ -119,13 +119,13 @@ def meets_the_identity(it, residual):
     partner = rms(np.maximum(gap, sigma))
     allowed = residual * min(contact.pressure, 1.0) * partner
     rounding = rms(u) * (noise(contact, u) + 10 * EPS * rms(sigma))
-    assert abs(2 * it.seen.energy - it.seen.work) <= allowed + rounding
+    assert abs(2 * it.observables.energy - it.observables.work) <= allowed + rounding
 
 
 @pytest.mark.parametrize("name", [name for name in NAMES if name != SLOW])
 def test_the_energy_changes_by_minus_p_times_the_gap(name, solved):
     """v is convex in u_g with slope -p, so a chord's slope lies between those of its ends."""
-    it, low, high = (solved(name, factor).seen for factor in (1.0, 1 - STEP, 1 + STEP))
+    it, low, high = (solved(name, factor).observables for factor in (1.0, 1 - STEP, 1 + STEP))
     p = solved(name).contact.pressure
     if it.u_g == 0:
         assert it.a_r == 1

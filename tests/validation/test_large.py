@@ -35,8 +35,8 @@ def scene(n, points=512, surface=None):
     return build_scene(surface or SelfAffine(), Power(n=n), points)
 
 
-def solve(made, p_star, tolerance=1e-6):
-    contact = made.contact(p_star)
+def solve(case, p_star, tolerance=1e-6):
+    contact = case.contact(p_star)
     solver = Auto(tolerance=tolerance)
     solution = solve_contact(contact, solver)
     assert solution.status == "converged"
@@ -64,9 +64,9 @@ def test_the_mean_gap_is_that_of_another_realisation(n, p_star):
 @pytest.mark.parametrize("p_star", [0.5, 0.1, 0.02])
 @pytest.mark.parametrize("n", [0.5, 1, 2, 3])
 def test_the_mean_gap_is_near_persson_theory(n, p_star):
-    made = scene(n)
-    theory = Persson(made.shells)
-    expected = float(theory.mean_gap(np.array([p_star * made.delta_sigma]))[0]) / made.h_std
+    case = scene(n)
+    theory = Persson(case.shells)
+    expected = float(theory.mean_gap(np.array([p_star * case.delta_sigma]))[0]) / case.h_std
     assert mean_gap(n, p_star) == pytest.approx(expected, rel=0.2)
 
 
@@ -76,15 +76,15 @@ def test_the_gap_summed_over_the_pressure_is_the_energy_of_full_contact(n):
 
     From p_0 on it is v_full - v(p_0) - p_0 u_g(p_0). Simpson's rule in ln p, 20 pressures a decade.
     """
-    made = scene(n, 256, SelfAffine(cutoff=0.01))
-    full = made.contact(1.0)
-    elastic = full.elasticity(full.height.copy(), made.grid.empty())
-    energy = 0.5 * float(np.vdot(full.height, elastic)) / made.grid.size
+    case = scene(n, 256, SelfAffine(cutoff=0.01))
+    full = case.contact(1.0)
+    elastic = full.elasticity(full.height.copy(), case.grid.empty())
+    energy = 0.5 * float(np.vdot(full.height, elastic)) / case.grid.size
     lowest, highest = 0.01, -float(elastic.min())
     log_p = np.linspace(np.log(lowest), np.log(highest), 61)
-    seen = [solve(made, float(p), 1e-7)[2] for p in np.exp(log_p)]
-    total = simpson([s.u_g for s in seen] * np.exp(log_p), x=log_p)
-    head = seen[0].energy + lowest * seen[0].u_g
+    gaps = [solve(case, float(p), 1e-7)[2] for p in np.exp(log_p)]
+    total = simpson([s.u_g for s in gaps] * np.exp(log_p), x=log_p)
+    head = gaps[0].energy + lowest * gaps[0].u_g
     assert total + head == pytest.approx(energy, rel=1e-4)
 
 
@@ -104,13 +104,13 @@ def curvature(n, force):
 @pytest.mark.parametrize(("n", "points"), [(0.5, 1024), (1, 1024), (1.5, 1024)])
 def test_the_paraboloid_makes_a_hertz_contact_on_a_fine_grid(n, points):
     """The count of points errs by a fraction of a spacing, the peak by the square of one."""
-    made = build_scene(Parabola(), Power(n=n), points)
+    case = build_scene(Parabola(), Power(n=n), points)
     force = float(reference.hertz_force(n, 1.0, 1.0, 0.1))
     R = 1 / curvature(n, force)
     radius = float(reference.hertz_radius(n, 1.0, R, force))
-    _, solution, seen = solve(made, force / made.delta_sigma)
-    assert np.sqrt(seen.a_r / np.pi) == pytest.approx(radius, abs=0.3 / points)
+    _, solution, result = solve(case, force / case.delta_sigma)
+    assert np.sqrt(result.a_r / np.pi) == pytest.approx(radius, abs=0.3 / points)
     peak = float(reference.hertz_peak_stress(n, 1.0, R, radius))
-    centre = solution.sigma[points // 2, points // 2] * made.delta_sigma
+    centre = solution.sigma[points // 2, points // 2] * case.delta_sigma
     allowed = 1 / (points * radius) ** 2 + radius ** (6 - n)  # images: their next term is r^4
     assert centre == pytest.approx(peak, rel=allowed)

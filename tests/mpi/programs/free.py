@@ -39,8 +39,8 @@ def check_convolution(shape):
     transform = grid.padded_transform(2.0)
     assert isinstance(transform, DistributedPaddedTransform)
     mine = field[grid.own]
-    found = transform.apply(transform.symbol_of(kernel[grid.own]), mine, np.empty(grid.shape))
-    np.testing.assert_allclose(found, expected[grid.own], rtol=1e-12)
+    product = transform.apply(transform.symbol_of(kernel[grid.own]), mine, np.empty(grid.shape))
+    np.testing.assert_allclose(product, expected[grid.own], rtol=1e-12)
 
 
 def check_symbol(shape):
@@ -52,9 +52,9 @@ def check_symbol(shape):
         transform = part.padded_transform(1.25, "single")
         symbol = np.sqrt(transform.wavenumber(SPACINGS)).astype(np.float32)
         results.append(transform.apply(symbol, field[part.own], np.empty(part.shape)))
-    expected, found = results
+    expected, distributed = results
     size = np.abs(expected).max()
-    np.testing.assert_allclose(found, expected[grid.own], rtol=0, atol=1e-5 * size)
+    np.testing.assert_allclose(distributed, expected[grid.own], rtol=0, atol=1e-5 * size)
 
 
 def check_averages(shape, other):
@@ -63,8 +63,8 @@ def check_averages(shape, other):
     expected = average_pixels(values, other)
     pairs = [(grid, target), (grid, coarse), (whole, target), (whole, coarse)]
     for source, to in pairs:
-        found = source.average(values[source.own], to)
-        np.testing.assert_allclose(found, expected[to.own], rtol=1e-13)
+        averages = source.average(values[source.own], to)
+        np.testing.assert_allclose(averages, expected[to.own], rtol=1e-13)
 
 
 def check_compliance(shape):
@@ -74,12 +74,12 @@ def check_compliance(shape):
         file.flush()
         table = Tabulated(path=file.name)
         expected = table.free_compliance(shape, SPACINGS)
-        found = table.free_compliance(shape, SPACINGS, grid.own)
-    np.testing.assert_allclose(found, expected[grid.own], rtol=1e-14)
+        compliance = table.free_compliance(shape, SPACINGS, grid.own)
+    np.testing.assert_allclose(compliance, expected[grid.own], rtol=1e-14)
     for body in (HalfSpace(), Power(n=1.5), Layer(thickness=0.9, poisson=0.4)):
         expected = body.free_compliance(shape, SPACINGS)
-        found = body.free_compliance(shape, SPACINGS, grid.own)
-        np.testing.assert_allclose(found, expected[grid.own], rtol=1e-14)
+        compliance = body.free_compliance(shape, SPACINGS, grid.own)
+        np.testing.assert_allclose(compliance, expected[grid.own], rtol=1e-14)
 
 
 def check_scene(shape):

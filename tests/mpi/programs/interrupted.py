@@ -5,15 +5,18 @@ import sys
 from gfmd_cli.cli import main
 from gfmd_cli.study.run_task import TaskWatcher
 
-seen, looks, rank = 0, int(sys.argv.pop(1)), int(sys.argv.pop(1))
+count, looks, rank = 0, int(sys.argv.pop(1)), int(sys.argv.pop(1))
 look = TaskWatcher.__call__
 
 
 def interrupted(self, contact, state):
-    global seen
+    global count
     if contact.grid.points == 128:
-        seen += 1
-        if seen == looks and (0 if self.context.ranks is None else self.context.ranks.rank) == rank:
+        count += 1
+        if (
+            count == looks
+            and (0 if self.context.ranks is None else self.context.ranks.rank) == rank
+        ):
             self.context.stop.set()
     look(self, contact, state)
 

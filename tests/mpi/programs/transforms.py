@@ -58,8 +58,8 @@ def check_other_grids(shape, other):
     assert not target.whole
     field = np.random.default_rng(1).standard_normal(shape)
     expected = whole.resample(field, coarse)
-    for made in (grid.resample(field[grid.own], target), whole.resample(field, target)):
-        np.testing.assert_allclose(made, expected[target.own], atol=1e-14)
+    for resampled in (grid.resample(field[grid.own], target), whole.resample(field, target)):
+        np.testing.assert_allclose(resampled, expected[target.own], atol=1e-14)
     np.testing.assert_allclose(grid.resample(field[grid.own], coarse), expected, atol=1e-14)
     if other[0] <= shape[0] and other[1] <= shape[1]:
         assert grid.coarser(other) == target
@@ -115,7 +115,7 @@ def check_preconditioners(points, n):
     for held in (draw.random((points, points)) < 0.02, (x - 9) ** 2 + (y - points + 2) ** 2 < 300):
         state = np.where(held, PRESSED, 0).astype(np.int8)
         for kind in (Multigrid, Multilevel):
-            found = []
+            results = []
             for grid in (Grid(points), DistributedGrid(points, ranks=ranks)):
                 k = Power(n=n).stiffness(grid.wavenumber()) / points**n
                 contact = Contact(grid, force[grid.own], k, 1.0)
@@ -124,8 +124,8 @@ def check_preconditioners(points, n):
                 change = np.ones(grid.shape, np.float32)
                 preconditioner = kind(contact, grid)
                 sums = preconditioner.apply(-force[grid.own], with_halo, PRESSED, change)
-                found.append((preconditioner.z[:, :points], sums))
-            (whole, sums), (mine, others) = found
+                results.append((preconditioner.z[:, :points], sums))
+            (whole, sums), (mine, others) = results
             size = np.abs(whole).max()
             own = grid.own
             np.testing.assert_allclose(mine, whole[own], rtol=0, atol=2e-6 * size)
@@ -144,11 +144,11 @@ def check_against_mpi4py_fft(points):
     array[...] = field[array.local_slice()]
     modes = other.forward(array)
     grid = DistributedGrid(points, ranks=ranks)
-    found = grid.forward(field[grid.own])
+    own_modes = grid.forward(field[grid.own])
     full = np.zeros((points, points // 2 + 1), complex)
     full[modes.local_slice()] = modes
     summed = ranks.total(full)
-    np.testing.assert_allclose(found, summed[:, slice(*grid.span)], atol=1e-16)
+    np.testing.assert_allclose(own_modes, summed[:, slice(*grid.span)], atol=1e-16)
     print("mpi4py-fft agrees")
 
 
