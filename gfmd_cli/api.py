@@ -291,10 +291,10 @@ def _read(spec: Path | str | Tables, overrides: tuple[str, ...] = ()) -> tuple[S
     return read_spec(Path(spec), overrides)
 
 
-def _plain(given: Any) -> Any:
+def _plain(item: Any) -> Any:
     """A copy of the tables of a spec, with numbers and lists in the place of those of NumPy."""
-    if isinstance(given, Mapping):
-        return {key: _plain(value) for key, value in given.items()}
-    if isinstance(given, list | tuple):
-        return [_plain(value) for value in given]
-    return given.tolist() if isinstance(given, np.ndarray | np.generic) else given
+    if isinstance(item, Mapping):
+        return {key: _plain(value) for key, value in item.items()}
+    if isinstance(item, list | tuple):
+        return [_plain(value) for value in item]
+    return item.tolist() if isinstance(item, np.ndarray | np.generic) else item

@@ -104,22 +104,22 @@ def _load_of(row: Row) -> tuple[Hashable, ...]:
 def _matches(one: list[Row], other: list[Row], *keys: Key) -> list[Pair]:
     """Pairs of the same keys, alike in grid and solver if they can be; taken from both lists."""
     pairs: list[Pair] = []
-    taken: set[int] = set()
+    paired: set[int] = set()
     for alike in (("points", "solver", "tolerance"), ("points",), ()):
 
         def key_of(row: Row, alike: tuple[str, ...] = alike) -> Hashable:
             return *(key(row) for key in keys), *(row[name] for name in alike)
 
-        waiting = grouped((row for row in other if id(row) not in taken), key_of)
+        waiting = grouped((row for row in other if id(row) not in paired), key_of)
         for row in one:
-            if id(row) not in taken and (partners := waiting.get(key_of(row))):
+            if id(row) not in paired and (partners := waiting.get(key_of(row))):
                 partner = partners.pop(0)
-                taken |= {id(row), id(partner)}
+                paired |= {id(row), id(partner)}
                 # another surface or elastomer has other units: equal then is the pressure in Pa
                 physical = row["load"] == "pressure" and _pressed(row) != _pressed(partner)
                 pairs.append(Pair(row, partner, physical))
     for rows in (one, other):
-        rows[:] = [row for row in rows if id(row) not in taken]
+        rows[:] = [row for row in rows if id(row) not in paired]
     return sorted(pairs, key=lambda pair: int(pair.one["task"]))
 
 

@@ -38,37 +38,37 @@ DIFFERENCES = (
 )
 
 
-def diff_table(found: Difference) -> Table:
+def diff_table(difference: Difference) -> Table:
     """The pairs of contacts, grouped by what is compared."""
-    groups = groups_of((_title(pair), _record(pair)) for pair in found.pairs)
-    caption = f"{found.paired}. {LEGEND}" if found.paired else LEGEND
+    groups = groups_of((_title(pair), _record(pair)) for pair in difference.pairs)
+    caption = f"{difference.paired}. {LEGEND}" if difference.paired else LEGEND
     return Table(caption, DIFFERENCES, groups)
 
 
-def diff_text(found: Difference) -> str:
+def diff_text(difference: Difference) -> str:
     """The table, the rows of one study only, and the keys of the specs that differ."""
-    lists = ("\n".join([f"{title}:", *lines]) for title, lines in diff_lists(found).items())
-    return "\n\n".join([diff_table(found).as_text() or NOTHING, *lists])
+    lists = ("\n".join([f"{title}:", *lines]) for title, lines in diff_lists(difference).items())
+    return "\n\n".join([diff_table(difference).as_text() or NOTHING, *lists])
 
 
-def diff_lists(found: Difference) -> dict[str, list[str]]:
+def diff_lists(difference: Difference) -> dict[str, list[str]]:
     """Rows that one study alone has, and the keys of the specs that differ: lines by title."""
     lists = {
-        f"only in {which}": _listed(rows) for which, rows in zip("AB", found.only, strict=True)
+        f"only in {which}": _listed(rows) for which, rows in zip("AB", difference.only, strict=True)
     }
-    lists["specs, A -> B"] = [f"  {line}" for line in found.spec]
+    lists["specs, A -> B"] = [f"  {line}" for line in difference.spec]
     return {title: lines for title, lines in lists.items() if lines}
 
 
-def diff_json(found: Difference) -> str:
+def diff_json(difference: Difference) -> str:
     """The same as JSON; what does not apply is null."""
     return json.dumps(
         {
-            "rows": [_plain(_record(pair)) for pair in found.pairs],
-            "only_a": [_plain(row, *ONE_STUDY) for row in found.only[0]],
-            "only_b": [_plain(row, *ONE_STUDY) for row in found.only[1]],
-            "spec": found.spec,
-            "paired": found.paired,
+            "rows": [_plain(_record(pair)) for pair in difference.pairs],
+            "only_a": [_plain(row, *ONE_STUDY) for row in difference.only[0]],
+            "only_b": [_plain(row, *ONE_STUDY) for row in difference.only[1]],
+            "spec": difference.spec,
+            "paired": difference.paired,
         },
         indent=1,
     )

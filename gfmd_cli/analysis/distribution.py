@@ -148,9 +148,9 @@ class StressDistribution:
     @cached_property
     def extrapolated(self) -> Extrapolated:
         """In the continuum, the points of all seeds together."""
-        found = extrapolate(self.counts.sum(axis=0), self.cells)
+        extrapolated = extrapolate(self.counts.sum(axis=0), self.cells)
         known = self.depth > SHALLOWEST
-        return replace(found, log_density=np.where(known, found.log_density, np.nan))
+        return replace(extrapolated, log_density=np.where(known, extrapolated.log_density, np.nan))
 
     @cached_property
     def depth(self) -> Field:
@@ -186,8 +186,8 @@ class StressDistribution:
         if count == 1:
             return np.asarray(np.sqrt(expected))
         with np.errstate(divide="ignore", invalid="ignore"):
-            seen = np.var(fine, axis=0, ddof=1) / np.mean(fine, axis=0) ** 2 / count
-        weighed = (count - 1) * seen + PRIOR_SEEDS * expected
+            variance = np.var(fine, axis=0, ddof=1) / np.mean(fine, axis=0) ** 2 / count
+        weighed = (count - 1) * variance + PRIOR_SEEDS * expected
         return np.asarray(np.sqrt(weighed / (count - 1 + PRIOR_SEEDS)))
 
     @property
@@ -216,16 +216,16 @@ def distributions(comparison: Comparison) -> list[StressDistribution]:
     Rows are one contact where surface, elastomer, solver, tolerance and pressure are the same and
     so is the unit of stress; surfaces that differ in their seed only are averaged.
     """
-    found: dict[tuple[Any, ...], dict[int, dict[int, tuple[Curve, Row]]]] = {}
+    by_contact: dict[tuple[Any, ...], dict[int, dict[int, tuple[Curve, Row]]]] = {}
     for curve in comparison.curves:
         for row in curve.rows:
             if PR_LOGARITHMIC not in row or not row["a_r"] > 0 or row["status"] != Status.CONVERGED:
                 continue
             units = (f"{row['pressure']:.6g}", f"{row['delta_sigma']:.6g}")
             key = (curve.study, row["elastomer"], row["ensemble"], *solver_of(row), *units)
-            found.setdefault(key, {}).setdefault(row["seed"], {})[row["points"]] = (curve, row)
+            by_contact.setdefault(key, {}).setdefault(row["seed"], {})[row["points"]] = (curve, row)
     merged = []
-    for seeds in found.values():
+    for seeds in by_contact.values():
         grids = _nested(sorted(set.intersection(*(set(grids) for grids in seeds.values()))))
         if len(grids) > 1:
             rows = [[held[points][1] for points in grids] for held in seeds.values()]
@@ -235,7 +235,7 @@ def distributions(comparison: Comparison) -> list[StressDistribution]:
 
 def _nested(points: list[int]) -> list[int]:
     """The finest grids of which each has twice the points of the one before."""
-    kept = points[-1:]
-    while kept and kept[0] % 2 == 0 and kept[0] // 2 in points:
-        kept.insert(0, kept[0] // 2)
-    return kept
+    chosen = points[-1:]
+    while chosen and chosen[0] % 2 == 0 and chosen[0] // 2 in points:
+        chosen.insert(0, chosen[0] // 2)
+    return chosen

@@ -73,8 +73,8 @@ def _densities(items: list[Item], name: str) -> list[list[Density]]:
 
 def _bins(row: Row, name: str) -> tuple[Field, Field]:
     """Pr(sigma) Delta_sigma over sigma / Delta_sigma, bins with fewer than FEW points left out."""
-    kept = bin_counts(row, name) > FEW - 0.5
-    return BINS[name].middles()[kept], np.nan_to_num(row[name])[kept]
+    frequent = bin_counts(row, name) > FEW - 0.5
+    return BINS[name].middles()[frequent], np.nan_to_num(row[name])[frequent]
 
 
 def distribution_figures(items: list[Item]) -> dict[str, ColumnFigure | None]:
@@ -86,15 +86,15 @@ def distribution_figures(items: list[Item]) -> dict[str, ColumnFigure | None]:
 
 def _side_by_side(shown: list[Density]) -> ColumnFigure:
     """Pr(sigma) of the curves at one pressure."""
-    plot = _at_pressure([found.row["p_star"] for found in shown])
-    for place, found in enumerate(shown):
-        style, x, y = found.item.style, found.sigma, found.density
+    plot = _at_pressure([stress.row["p_star"] for stress in shown])
+    for place, stress in enumerate(shown):
+        style, x, y = stress.item.style, stress.sigma, stress.density
         plot.unnamed_line((style.label,), x, y, color=style.colour, lw=0.7)
-        converged = np.full(x.size, found.row["status"] == Status.CONVERGED)
+        converged = np.full(x.size, stress.row["status"] == Status.CONVERGED)
         plot.points(style, x, y, converged, every=(place % 3, 3) if len(shown) > 1 else 1)
     _scale(plot, "log", shown)
     sigma = np.geomspace(*plot.axes.get_xlim(), 400)
-    plot.theory([(found.item.style, sigma, found.theory(sigma)) for found in shown])
+    plot.theory([(stress.item.style, sigma, stress.theory(sigma)) for stress in shown])
     return plot
 
 
@@ -105,21 +105,21 @@ def _at_pressure(p_stars: list[float]) -> ColumnFigure:
 def _pressures(shown: list[Density]) -> ColumnFigure:
     """Pr(sigma) of one curve at a few pressures."""
     plot = ColumnFigure(f"{STRESS}  for  {shown[0].item.style.label[:24]}", DENSITY)
-    for found, colour in zip(shown, colours(len(shown)), strict=True):
-        label = f"p* = {found.row['p_star']:.3g}"
-        plot.line(label, found.sigma, found.density, color=colour, lw=1.6)
+    for stress, colour in zip(shown, colours(len(shown)), strict=True):
+        label = f"p* = {stress.row['p_star']:.3g}"
+        plot.line(label, stress.sigma, stress.density, color=colour, lw=1.6)
     _scale(plot, "linear", shown)
     sigma = np.linspace(0.0, plot.axes.get_xlim()[1], 400)
-    for found in shown:
-        if found.item.curve.has_theory:
-            density = found.theory(sigma)
+    for stress in shown:
+        if stress.item.curve.has_theory:
+            density = stress.theory(sigma)
             plot.line(THEORY, sigma, density, color="black", lw=0.6, zorder=3)
     return plot
 
 
 def _scale(plot: ColumnFigure, x_scale: str, shown: list[Density]) -> None:
-    plot.scale("x", x_scale, np.concatenate([found.sigma for found in shown]))
-    plot.scale("y", "log", np.concatenate([found.density for found in shown]))
+    plot.scale("x", x_scale, np.concatenate([stress.sigma for stress in shown]))
+    plot.scale("y", "log", np.concatenate([stress.density for stress in shown]))
 
 
 def continuum_figure(comparison: Comparison) -> ColumnFigure | None:
@@ -130,9 +130,9 @@ def continuum_figure(comparison: Comparison) -> ColumnFigure | None:
     chosen = _chosen([f for f in distributions(comparison) if np.isfinite(f.density).sum() > 2])
     if not chosen:
         return None
-    plot = _at_pressure([found.finest["p_star"] for found in chosen])
-    styles = curve_styles([found.curve for found in chosen])
-    spans = [_draw(plot, found, style) for found, style in zip(chosen, styles, strict=True)]
+    plot = _at_pressure([stress.finest["p_star"] for stress in chosen])
+    styles = curve_styles([stress.curve for stress in chosen])
+    spans = [_draw(plot, stress, style) for stress, style in zip(chosen, styles, strict=True)]
     ends = np.array(spans)
     plot.scale("x", "log", ends[:, :2])
     plot.scale("y", "log", ends[:, 2:])
@@ -143,38 +143,38 @@ def continuum_figure(comparison: Comparison) -> ColumnFigure | None:
             for f, style in zip(chosen, styles, strict=True)
         ],
     )
-    for found, style in zip(chosen, styles, strict=True):
-        _edge_law(plot, found, style)
+    for stress, style in zip(chosen, styles, strict=True):
+        _edge_law(plot, stress, style)
     return plot
 
 
-def _chosen(found: list[StressDistribution]) -> list[StressDistribution]:
+def _chosen(stresses: list[StressDistribution]) -> list[StressDistribution]:
     """One distribution of each scene, at about one pressure."""
-    ordered = sorted(found, key=lambda each: order(each.curve))
+    ordered = sorted(stresses, key=lambda each: order(each.curve))
     scenes = list(grouped(ordered, lambda each: each.scene).values())
     return at_one_pressure(scenes, lambda each: (each.finest["p_star"], each.a_r))[:MOST]
 
 
 def _draw(
-    plot: ColumnFigure, found: StressDistribution, style: CurveStyle
+    plot: ColumnFigure, stress: StressDistribution, style: CurveStyle
 ) -> tuple[float, float, float, float]:
     """Symbols with error bars over the faint lines of the grids; return the span of the symbols."""
     sigma = logarithmic_middles()
-    for density in found.grids:
+    for density in stress.grids:
         faint = {"color": style.colour, "lw": 0.4, "alpha": 0.45}
         plot.unnamed_line((style.label,), sigma, density, **faint)
-    known = np.isfinite(found.density) & np.isfinite(found.error)
-    x, y, error = sigma[known], found.density[known], found.error[known]
+    known = np.isfinite(stress.density) & np.isfinite(stress.error)
+    x, y, error = sigma[known], stress.density[known], stress.error[known]
     bars = np.array([y * -np.expm1(-error), y * np.expm1(error)])  # of ln Pr
     plot.points(style, x, y, np.full(x.size, True), error=bars)
-    seen = y > LOWEST * y.max()
-    return float(x[seen].min()), float(x[seen].max()), float(y[seen].min()), float(y.max())
+    visible = y > LOWEST * y.max()
+    return float(x[visible].min()), float(x[visible].max()), float(y[visible].min()), float(y.max())
 
 
-def _edge_law(plot: ColumnFigure, found: StressDistribution, style: CurveStyle) -> None:
+def _edge_law(plot: ColumnFigure, stress: StressDistribution, style: CurveStyle) -> None:
     """The law of the edge through the bins nearest to it, dashed."""
     for name in ("small", "large"):
-        law = fit(found, name)
+        law = fit(stress, name)
         if law is None or not np.isfinite(law.theory):
             continue
         low, high = law.lowest, law.highest

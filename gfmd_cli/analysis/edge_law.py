@@ -89,32 +89,32 @@ def power_law(
     columns = [np.ones_like(x), x - centre, *([] if correction is None else [correction])]
     design = np.array(columns)
     levers = np.linalg.pinv((design * weight) @ design.T) @ (design * weight)
-    found = levers @ y
-    rest = (y - found @ design) / own
+    coefficients = levers @ y
+    rest = (y - coefficients @ design) / own
     freedom = max(x.size - len(columns), 1)
     misfit = np.sqrt(max(1.0, float(rest @ rest) / freedom))
     errors: Field = np.hypot(np.sqrt(levers**2 @ own**2) * misfit, levers @ shared)
     return Line(
-        slope=float(found[1]),
+        slope=float(coefficients[1]),
         error=float(errors[1]),
         shared=float(abs(levers[1] @ shared)),
-        level=float(found[0] - found[1] * centre),
+        level=float(coefficients[0] - coefficients[1] * centre),
     )
 
 
-def fit(found: StressDistribution, law: str) -> Fit | None:
+def fit(stress: StressDistribution, law: str) -> Fit | None:
     """Power law nearest to the limit of resolution; None where too few bins are resolved.
 
     "small": the lowest BASE usable bins below SMALL p / a_r. "large" (n > 2 alone): the highest
     above LARGE p / a_r. The window is then moved and stretched; half the range of exponents that
     this gives is an error of its own.
     """
-    n, small = found.curve.n, law == "small"
+    n, small = stress.curve.n, law == "small"
     if not (small or n > 2):
         return None
     edges, middle = logarithmic_edges(), logarithmic_middles()
-    mean = found.finest["p_star"] / found.a_r
-    usable = np.isfinite(found.density) & (found.error < USABLE)
+    mean = stress.finest["p_star"] / stress.a_r
+    usable = np.isfinite(stress.density) & (stress.error < USABLE)
     usable &= middle < SMALL * mean if small else middle > LARGE * mean
     places = np.flatnonzero(usable)
     runs = np.split(places, np.flatnonzero(np.diff(places) > 1) + 1)
@@ -128,19 +128,19 @@ def fit(found: StressDistribution, law: str) -> Fit | None:
         if start + length <= places.size
     ]
     base = places[:BASE]
-    line = _line(found, base, middle)
-    slopes = [_line(found, window, middle).slope for window in windows]
+    line = _line(stress, base, middle)
+    slopes = [_line(stress, window, middle).slope for window in windows]
     theory = edge_exponent(n) if (n < 2) == small else np.nan  # n > 2, small: patch centres
     limit, limit_error = np.nan, np.nan
     if np.isfinite(theory) and places.size > FEWEST:
         correction = (middle / mean) ** (2 / (2 - n))
-        longest = _line(found, places[:LONGEST], middle, correction)
-        shorter = _line(found, places[: min(LONGEST, places.size) - 1], middle, correction)
+        longest = _line(stress, places[:LONGEST], middle, correction)
+        shorter = _line(stress, places[: min(LONGEST, places.size) - 1], middle, correction)
         limit = longest.slope
         limit_error = float(np.hypot(longest.error, longest.slope - shorter.slope))
     nearest = base[:NEAREST]
-    fixed = found.extrapolated.log_density[nearest] - theory * np.log(middle[nearest])
-    weight = 1 / found.error[nearest] ** 2
+    fixed = stress.extrapolated.log_density[nearest] - theory * np.log(middle[nearest])
+    weight = 1 / stress.error[nearest] ** 2
     return Fit(
         law=law,
         lowest=float(edges[base.min()]),
@@ -156,16 +156,16 @@ def fit(found: StressDistribution, law: str) -> Fit | None:
 
 
 def _line(
-    found: StressDistribution, chosen: Any, middle: Field, correction: Field | None = None
+    stress: StressDistribution, chosen: Any, middle: Field, correction: Field | None = None
 ) -> Line:
     """The law in some bins.
 
     What surfaces differ by is counted as each bin's own, at first. With the law found anew without
     each seed in turn (jackknife) the error is that of whole curves, weighed as in `sampling`.
     """
-    part, fine = found.extrapolated, found.counts[:, -1][:, chosen]
+    part, fine = stress.extrapolated, stress.counts[:, -1][:, chosen]
     x, y = np.log(middle[chosen]), part.log_density[chosen]
-    own, shared = np.hypot(part.counting, found.sampling)[chosen], part.discretisation[chosen]
+    own, shared = np.hypot(part.counting, stress.sampling)[chosen], part.discretisation[chosen]
     more = None if correction is None else correction[chosen]
     line, count = power_law(x, y, own, shared, more), len(fine)
     without = fine.sum(axis=0) - fine
@@ -173,9 +173,9 @@ def _line(
         return line
     shifts = np.log(without / (count - 1)) - np.log(fine.mean(axis=0))
     slopes = [power_law(x, y + shift, own, shared, more).slope for shift in shifts]
-    seen = (count - 1) * float(np.var(slopes)) + line.shared**2
+    scatter = (count - 1) * float(np.var(slopes)) + line.shared**2
     known = count - 1
-    error = np.sqrt((known * seen + PRIOR_SEEDS * line.error**2) / (known + PRIOR_SEEDS))
+    error = np.sqrt((known * scatter + PRIOR_SEEDS * line.error**2) / (known + PRIOR_SEEDS))
     return replace(line, error=float(error))
 
 

@@ -120,9 +120,9 @@ def _labelled_study(path: Path) -> Any:
 
 def write_netcdf(path: Path, target: Path) -> None:
     """Write a study as netCDF 4. Raises InputError, StudyError, SpaceError."""
-    made = _labelled_study(path)
+    dataset = _labelled_study(path)
     with new_file(target) as file:
-        made.to_netcdf(file, engine="h5netcdf")
+        dataset.to_netcdf(file, engine="h5netcdf")
 
 
 def _of_tasks(rows: Rows, column: Column, *axis: str) -> Any:

@@ -276,8 +276,8 @@ def log_scale(axes: Any, name: str, low: float, high: float) -> None:
 
 def shades(name: str, start: float, none: str, beyond: str) -> Any:
     """The colours of a named map from `start` to 1; those of NaN and of values above the scale."""
-    kept = colormaps[name](np.linspace(start, 1.0, 256))
-    return LinearSegmentedColormap.from_list(name, kept).with_extremes(bad=none, over=beyond)
+    colours = colormaps[name](np.linspace(start, 1.0, 256))
+    return LinearSegmentedColormap.from_list(name, colours).with_extremes(bad=none, over=beyond)
 
 
 def _legend_shape(labels: list[str], wide: float) -> tuple[int, int]:

@@ -241,21 +241,21 @@ def seeds_table(comparison: Comparison) -> Table:
 def power_laws(comparison: Comparison) -> Table:
     """The power laws of Pr(sigma), a record each; without one where no contact has two grids."""
     titled = [
-        (found.scene, record)
-        for found in distributions(comparison)
-        for record in _law_records(found)
+        (stress.scene, record)
+        for stress in distributions(comparison)
+        for record in _law_records(stress)
     ]
     return Table(POWER_LAWS_CAPTION, POWER_LAWS, groups_of(titled))
 
 
-def _law_records(found: StressDistribution) -> list[Record]:
+def _law_records(stress: StressDistribution) -> list[Record]:
     record = {
-        "p_star": found.finest["p_star"],
-        "a_r": found.a_r,
-        "grids": f"{found.points[0]} to {found.points[-1]}",
-        "seeds": len(found.seeds),
+        "p_star": stress.finest["p_star"],
+        "a_r": stress.a_r,
+        "grids": f"{stress.points[0]} to {stress.points[-1]}",
+        "seeds": len(stress.seeds),
     }
-    laws = [vars(law) for law in (fit(found, "small"), fit(found, "large")) if law is not None]
+    laws = [vars(law) for law in (fit(stress, "small"), fit(stress, "large")) if law is not None]
     return [record | law for law in laws or [{"law": "too few bins are resolved"}]]
 
 

@@ -34,12 +34,12 @@ def write_image(study: Path, task: int | None, target: Path) -> None:
         fields = {name: np.ascontiguousarray(values, "<f8") for name, values in arrays.items()}
         sides = [float(stored.rows[chosen][name]) for name in ("length", "length_y")]
         first = float(stored.rows[chosen]["x_first"])
-    with new_file(target) as made:
-        made.write(_head(fields, sides, first).encode())
+    with new_file(target) as fresh:
+        fresh.write(_head(fields, sides, first).encode())
         for values in fields.values():
-            made.write(np.uint64(values.nbytes).astype("<u8").tobytes())
-            made.write(values)
-        made.write(b"\n</AppendedData>\n</VTKFile>\n")
+            fresh.write(np.uint64(values.nbytes).astype("<u8").tobytes())
+            fresh.write(values)
+        fresh.write(b"\n</AppendedData>\n</VTKFile>\n")
 
 
 def _choose(study: Path, held: list[int], task: int | None) -> int:

@@ -87,13 +87,13 @@ def _curve(
 ) -> tuple[float, float]:
     """One solve, its end marked; thin, the error itself. Returns where it begins and ends."""
     errors = _errors(trace)
-    kept = np.isfinite(errors)
-    x, y = trace.samples[cost][kept], errors[kept]
+    finite = np.isfinite(errors)
+    x, y = trace.samples[cost][finite], errors[finite]
     options = {"color": style.colour, "mfc": "white", "lw": 1.3, "marker": style.marker}
     if x.size == 0:
         plot.line_on(axes, style.label, x, y, **options)
         return float(trace.samples[cost][0]), float(trace.samples[cost][-1])
-    itself = np.maximum(trace.samples["u_g_error"][kept], y.min())
+    itself = np.maximum(trace.samples["u_g_error"][finite], y.min())
     axes.plot(x, itself, color=style.colour, lw=0.4, alpha=0.6)
     plot.line_on(axes, style.label, x, y, markevery=0.2, **options)
     end: dict[str, Any] = {"ls": "none", "zorder": 4}

@@ -74,9 +74,9 @@ class Recorder:
         errors = (np.nan,) * len(QUANTITIES)
         if contact is self.contact:
             with np.errstate(invalid="ignore", over="ignore"):  # of a solve that diverges
-                seen = observe(contact, state.u, state.sigma)
-            self.a_r = seen.a_r
-            errors = tuple(_distance(seen, self.reference, name) for name in QUANTITIES)
+                observables = observe(contact, state.u, state.sigma)
+            self.a_r = observables.a_r
+            errors = tuple(_distance(observables, self.reference, name) for name in QUANTITIES)
         points, seconds = contact.grid.points, now - self.begun - self.own
         self.samples.append((transforms, seconds, points, state.residual, *errors))
         step = state.step if isinstance(state, State) else state.steps
@@ -84,17 +84,17 @@ class Recorder:
         self.report(event)
 
 
-def _distance(seen: Observables, reference: Observables, name: str) -> float:
+def _distance(observables: Observables, reference: Observables, name: str) -> float:
     """Relative to the reference; absolute where that is zero."""
-    value, exact = getattr(seen, name), getattr(reference, name)
+    value, exact = getattr(observables, name), getattr(reference, name)
     return float(abs(value - exact) / (abs(exact) or 1.0))
 
 
 def solve_reference(contact: Contact) -> tuple[Observables, float]:
     """What a solution as exact as double precision allows has to show, and its residual."""
-    found = solve_contact(contact, REFERENCE)
-    residual = contact.recompute(found.u, found.sigma)
-    return observe(contact, found.u, found.sigma), residual
+    solution = solve_contact(contact, REFERENCE)
+    residual = contact.recompute(solution.u, solution.sigma)
+    return observe(contact, solution.u, solution.sigma), residual
 
 
 def solvers_to_compare(spec: Spec, task: Task, contact: Contact) -> list[Solver]:
@@ -102,13 +102,13 @@ def solvers_to_compare(spec: Spec, task: Task, contact: Contact) -> list[Solver]
 
     A single "auto" stands for COMPARED; elsewhere it is the solver that it chooses.
     """
-    given: list[Solver] = [*spec.solver]
-    if len(given) == 1 and isinstance(given[0], Auto):
+    solvers: list[Solver] = [*spec.solver]
+    if len(solvers) == 1 and isinstance(solvers[0], Auto):
         kinds = COMPARED if contact.boundary == "periodic" else (Auto,)
-        given = [kind(**given[0].shared_keys()) for kind in kinds]
+        solvers = [kind(**solvers[0].shared_keys()) for kind in kinds]
     n = task.elastomer.exponent
     steepness = np.inf if n is None else n  # unknown: only what suits all elastomers
-    chosen = [solver.for_contact(contact) for solver in given]
+    chosen = [solver.for_contact(contact) for solver in solvers]
     return list(dict.fromkeys(s for s in chosen if steepness <= s.max_exponent))
 
 

@@ -62,8 +62,8 @@ class Reporter:
             return
         bar = self.bars.get(progress.task)
         if bar is None:
-            taken = {0, *(-bar.pos for bar in self.bars.values())}
-            place = min(set(range(len(taken) + 1)) - taken)
+            positions = {0, *(-bar.pos for bar in self.bars.values())}
+            place = min(set(range(len(positions) + 1)) - positions)
             bar = tqdm(desc=printable(progress.label), position=place, leave=False, bar_format=TASK)
             self.bars[progress.task] = bar
         if progress.event == "step":

@@ -158,7 +158,7 @@ def diff(
     from gfmd_cli.analysis.diff import diff as diff_studies
     from gfmd_cli.analysis.diff_table import diff_json, diff_text
 
-    found = diff_studies(one, other)
-    click.echo(diff_json(found) if as_json else diff_text(found))
-    if tolerance is not None and found.exceeds(tolerance):
+    difference = diff_studies(one, other)
+    click.echo(diff_json(difference) if as_json else diff_text(difference))
+    if tolerance is not None and difference.exceeds(tolerance):
         context.exit(1)

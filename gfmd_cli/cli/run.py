@@ -177,7 +177,7 @@ def _print_tasks(spec: Any, path: Path, how: dict[str, Any]) -> None:
             done = "  [again: more output is requested]"
         points = f"~{task.points}" if task.auto else str(task.points)
         show(
-            f"{task.index:6d} {points:>6} {task.asked:>10} {task.bytes / 2**20:8.0f} "
+            f"{task.index:6d} {points:>6} {task.load_label:>10} {task.bytes / 2**20:8.0f} "
             f"{task.seconds:8.2g}  {task.surface.label} | {task.elastomer.label}{done}"
         )
     show(

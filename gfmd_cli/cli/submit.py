@@ -69,7 +69,7 @@ def submit(
         [str(spec.absolute()), *repeated(study, overrides)],
         shards=shards,
         missing=missing,
-        asked={
+        named_options={
             name.replace("_", "-"): str(value) for name, value in given.items() if value is not None
         },
         sbatch_options=sbatch_options,

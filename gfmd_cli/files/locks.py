@@ -53,8 +53,8 @@ def locked(path: Path, *, shared: bool = False, wait: bool = True) -> Iterator[b
                     yield True
                     return
                 continue
-        with _owned(path.with_name(f"{path.name}.owner"), shared, wait) as got:
-            yield got
+        with _owned(path.with_name(f"{path.name}.owner"), shared, wait) as acquired:
+            yield acquired
         return
 
 

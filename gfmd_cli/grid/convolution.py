@@ -179,13 +179,13 @@ class PaddedTransform:
     @cached_property
     def _column_plans(self) -> list[tuple[Modes, Execute, Execute]]:
         """For each thread a block of padded columns, and both transforms, in place."""
-        found = []
+        blocks = []
         for _ in range(self.threads):
             block = self._empty((self.padded_rows, self.width))
             block[...] = 0.0
             (forward,), (backward,) = _planned(partial(along_columns, block, 1))
-            found.append((block, forward, backward))
-        return found
+            blocks.append((block, forward, backward))
+        return blocks
 
     def _empty(self, shape: tuple[int, ...]) -> Modes:
         kind = np.result_type(self.real, np.complex64)

@@ -245,15 +245,15 @@ class DistributedGrid(Grid):
         come = [_shared(span, want[rank]) for span in have]
         sent = np.concatenate([rows[:, slice(*_from(s, have[rank]))].ravel() for s in away])
         height = len(rows)
-        got = np.empty(height * sum(b - a for a, b in come), rows.dtype)
+        received = np.empty(height * sum(b - a for a, b in come), rows.dtype)
         outgoing = [sent, [height * (b - a) for a, b in away]]
-        incoming = [got, [height * (b - a) for a, b in come]]
+        incoming = [received, [height * (b - a) for a, b in come]]
         self.ranks.wait(self.ranks.comm.Ialltoallv(outgoing, incoming))
         first, last = want[rank]
         gathered, at = np.empty((height, last - first), rows.dtype), 0
         for a, b in come:
             end = at + height * (b - a)
-            gathered[:, a - first : b - first] = got[at:end].reshape(height, b - a)
+            gathered[:, a - first : b - first] = received[at:end].reshape(height, b - a)
             at = end
         return gathered
 

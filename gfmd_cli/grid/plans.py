@@ -77,9 +77,9 @@ def plan_with(folder: Path | None, *, estimated: bool = False) -> str | None:
     if folder is None or _estimated:
         return None
     with _alone(folder):
-        kept = read_wisdom(folder)
-        damaged = kept is None and _path(folder).exists()
-        if kept is None and (known := read_wisdom(cache_folder())) is not None:
+        wisdom = read_wisdom(folder)
+        damaged = wisdom is None and _path(folder).exists()
+        if wisdom is None and (known := read_wisdom(cache_folder())) is not None:
             _write(folder, known)
     if not damaged:
         return None
@@ -108,13 +108,13 @@ def _measured(plan: Callable[[tuple[str, ...]], T]) -> T:
     with _alone(folder):
         _take_in(read_wisdom(folder))
         before = _export()
-        found = plan(("FFTW_MEASURE",))
+        pair = plan(("FFTW_MEASURE",))
         if _export() != before:
             _write(folder, _export())
     if _folder is not None:
         with _alone(cache_folder()):
             _write(cache_folder(), _joined(read_wisdom(cache_folder()), _export()))
-    return found
+    return pair
 
 
 def read_wisdom(folder: Path) -> Wisdom | None:
@@ -141,12 +141,12 @@ def _export() -> Wisdom:
     return [text.decode("ascii") for text in pyfftw.export_wisdom()[:2]]
 
 
-def _joined(kept: Wisdom | None, more: Wisdom) -> Wisdom:
+def _joined(wisdom: Wisdom | None, more: Wisdom) -> Wisdom:
     """Both, the first where both know a plan: a line each, flags and problem after two words."""
-    if kept is None:
+    if wisdom is None:
         return more
     joined = []
-    for old, new in zip(kept, more, strict=True):
+    for old, new in zip(wisdom, more, strict=True):
         known = {tuple(line.split()[2:]) for line in old.splitlines()[1:-1]}
         added = [line for line in new.splitlines()[1:-1] if tuple(line.split()[2:]) not in known]
         joined.append("\n".join([*old.splitlines()[:-1], *added, ")"]) + "\n")

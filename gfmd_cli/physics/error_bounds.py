@@ -65,15 +65,15 @@ class Certificate:
     a_r: float
     """Share of the points whose contact state is uncertain: an estimate, not a bound."""
 
-    def estimated_error(self, name: str, seen: Observables, residual: float) -> float:
+    def estimated_error(self, name: str, observables: Observables, residual: float) -> float:
         """Estimated error of an observable on its grid, from stopping at a natural residual.
 
         See `ALGEBRAIC`. That of a_r is the uncertain share.
         """
         if name == "a_r":
             return self.a_r
-        value = abs(float(getattr(seen, name)))  # u_g < 0: below the filled-in heights of voids
-        open_share = max(1.0 - seen.a_r, 0.0) + self.a_r
+        value = abs(float(getattr(observables, name)))  # u_g may be < 0 where voids are filled in
+        open_share = max(1.0 - observables.a_r, 0.0) + self.a_r
         return ALGEBRAIC * residual * max(value, sqrt(value), 0.5 * sqrt(open_share))
 
 

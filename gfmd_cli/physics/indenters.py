@@ -89,9 +89,9 @@ class RigidSurface(Choice):
     @property
     def sides(self) -> tuple[float, ...]:
         """Sides of the periodic cell [m], along y and x; of a line, its length."""
-        given = dict(self)
-        length = float(given["length"])
-        return (length,) if self.dimension == 1 else (given.get("length_y") or length, length)
+        fields = dict(self)
+        length = float(fields["length"])
+        return (length,) if self.dimension == 1 else (fields.get("length_y") or length, length)
 
     def within(self, boundary: str) -> Self:
         """The surface with the treatment of its edges that goes with a boundary by default."""

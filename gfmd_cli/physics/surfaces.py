@@ -44,11 +44,11 @@ Surface = Annotated[
 
 def check_resolved(surface: RigidSurface, points: int, points_y: int) -> None:
     """Raise InputError where a grid of so many points along x and y does not resolve a surface."""
-    asked = {
+    wavelengths = {
         "points": (points, surface.smallest_grid()),
         "points_y": (points_y, surface.smallest_grid_y()),
     }
-    for key, (given, needed) in asked.items():
+    for key, (given, needed) in wavelengths.items():
         if given < needed:
             raise InputError(
                 f"grid.{key}: {given // surface.copies} points along {AXIS[key]} do not resolve "

@@ -68,11 +68,11 @@ class Region(Choice):
         for axis, points in enumerate(shape, -len(shape)):
             name = AXES[axis]
             step = 1.0 if self.unit == "pixels" or spacing is None else spacing[axis]
-            given = getattr(self, name)
-            first, last = (0, points) if given is None else (round(each / step) for each in given)
+            bounds = getattr(self, name)
+            first, last = (0, points) if bounds is None else (round(each / step) for each in bounds)
             if last > points or last - first < SMALLEST_MAP:
                 raise ValueError(
-                    f"{name} = {list(given or ())} {self.unit}: the map has {name} = 0 to "
+                    f"{name} = {list(bounds or ())} {self.unit}: the map has {name} = 0 to "
                     f"{points * step:g} {self.unit}, {points} points; a region has at least "
                     f"{SMALLEST_MAP} of them"
                 )

@@ -112,8 +112,8 @@ def bearing(contact: Contact) -> Bearing:
         for total, weight in zip(sums, (np.ones_like(values), values, values**2), strict=True):
             total += np.bincount(where, weight, minlength=BINS)
     count, total, square = np.cumsum(sums, axis=1)
-    kept = (count >= MIN_POINTS) & (count < height.size) & (sums[0] > 0)
-    mean = total[kept] / count[kept]
-    variance = np.maximum(square[kept] / count[kept] - mean**2, 0.0)
+    usable = (count >= MIN_POINTS) & (count < height.size) & (sums[0] > 0)
+    mean = total[usable] / count[usable]
+    variance = np.maximum(square[usable] / count[usable] - mean**2, 0.0)
     known = variance > 0
-    return Bearing((count[kept] / height.size)[known], np.sqrt(variance[known]))
+    return Bearing((count[usable] / height.size)[known], np.sqrt(variance[known]))

@@ -61,10 +61,10 @@ UNCONVERGED = (
 
 def difference(one: ReportData, other: ReportData) -> Section:
     """What `gfmd diff` writes: pairs of contacts, rows of one study only, keys that differ."""
-    found = diff(one.comparison.path, other.comparison.path)
-    notes = [] if found.pairs else [f"{NOTHING.capitalize()}."]
-    lists = diff_lists(found)
-    tables = [diff_table(found)]
+    differences = diff(one.comparison.path, other.comparison.path)
+    notes = [] if differences.pairs else [f"{NOTHING.capitalize()}."]
+    lists = diff_lists(differences)
+    tables = [diff_table(differences)]
     return Section("Difference", notes, tables, template="difference.html", content=lists)
 
 

@@ -27,19 +27,19 @@ def plain_label(label: str) -> str:
 
 
 def _math(text: str) -> str:
-    return "".join(_token(found) for found in TOKEN.finditer(text))
+    return "".join(_token(token) for token in TOKEN.finditer(text))
 
 
-def _token(found: re.Match[str]) -> str:
-    if found["script"]:
-        part = found["part"]
+def _token(token: re.Match[str]) -> str:
+    if token["script"]:
+        part = token["part"]
         inside = _math(part[1:-1] if part.startswith("{") else part)
-        name = "sub" if found["script"] == "_" else "sup"
+        name = "sub" if token["script"] == "_" else "sup"
         return inside if inside == "*" else f"<{name}>{inside}</{name}>"
-    if found["upright"] is not None:
-        return escape(found["upright"])
-    if found["name"]:
-        return SYMBOLS.get(found["name"], found["name"])
-    if found["letter"]:
-        return f"<i>{found['letter']}</i>"
-    return " " if found["space"] else escape(found["other"].replace("-", "−"))
+    if token["upright"] is not None:
+        return escape(token["upright"])
+    if token["name"]:
+        return SYMBOLS.get(token["name"], token["name"])
+    if token["letter"]:
+        return f"<i>{token['letter']}</i>"
+    return " " if token["space"] else escape(token["other"].replace("-", "−"))

@@ -56,7 +56,7 @@ def clean(value: Any) -> Any:
 
 def typeset(text: object) -> Markup:
     """A text with the symbols of SYMBOLS set in HTML."""
-    return Markup(SYMBOL.sub(lambda found: SYMBOLS[found[0]], str(escape(clean(text)))))
+    return Markup(SYMBOL.sub(lambda symbol: SYMBOLS[symbol[0]], str(escape(clean(text)))))
 
 
 def cell(text: str) -> str:
@@ -67,7 +67,7 @@ def cell(text: str) -> str:
 @cache
 def environment() -> Environment:
     """The templates of this package."""
-    made = Environment(
+    result = Environment(
         loader=PackageLoader("gfmd_cli.report"),
         autoescape=True,
         finalize=clean,
@@ -75,9 +75,9 @@ def environment() -> Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    made.policies["json.dumps_kwargs"] = {"separators": (",", ":")}
-    made.filters |= {"typeset": typeset, "cell": cell}
-    return made
+    result.policies["json.dumps_kwargs"] = {"separators": (",", ":")}
+    result.filters |= {"typeset": typeset, "cell": cell}
+    return result
 
 
 def render(template: str, **values: Any) -> Markup:

@@ -189,6 +189,6 @@ def _unresolved(data: ReportData) -> list[str]:
     )
     total = len(data.solved)
     return [
-        f"{name} {UNRESOLVED[found]} ({number} of {total} contacts)"
-        for (name, found), number in counts.items()
+        f"{name} {UNRESOLVED[text]} ({number} of {total} contacts)"
+        for (name, text), number in counts.items()
     ]

@@ -108,7 +108,7 @@ def _fits(shown: list[Spectrum]) -> Table:
     """The self-affine surface nearest to each."""
     records = [
         {
-            "surface": found.name,
+            "surface": curve.name,
             "hurst": fit.hurst,
             "hurst_error": fit.hurst_error,
             "rolloff": 2 * np.pi / fit.q_r if fit.q_r else None,
@@ -117,8 +117,8 @@ def _fits(shown: list[Spectrum]) -> Table:
             "cutoff": 2 * np.pi / fit.q_s,
             "scatter": fit.scatter,
         }
-        for found in shown
-        if (fit := found.fit)
+        for curve in shown
+        if (fit := curve.fit)
     ]
     return Table(FIT, FITS, [Group("", records)])
 
@@ -166,15 +166,15 @@ def spectrum(row: Row, shells: Shells) -> Spectrum:
         np.bincount(place[inside], weight[inside], edges.size - 1).astype(float)
         for weight in (shells.height, shells.height * shells.q, shells.modes, fitted)
     )
-    kept, unit = total > 0, length**dimension / ratio
+    usable, unit = total > 0, length**dimension / ratio
     return Spectrum(
         name,
         dimension,
-        q=moment[kept] / total[kept],
-        density=total[kept] / modes[kept] * unit,
-        modes=modes[kept],
+        q=moment[usable] / total[usable],
+        density=total[usable] / modes[usable] * unit,
+        modes=modes[usable],
         fit=nearest,
-        fitted=fitted[kept] / modes[kept] * unit,
+        fitted=fitted[usable] / modes[usable] * unit,
         preparation=str(row.get("preparation", "")),
     )
 
@@ -196,14 +196,14 @@ def _edges(radius: Field, nyquist: float) -> Field:
 def _spectrum_figure(shown: list[Spectrum]) -> ColumnFigure:
     power = {1: "3", 2: "4"}.get(shown[0].dimension)
     plot = ColumnFigure(r"wavenumber  $q$ (m$^{-1}$)", rf"{LABEL} (m$^{power}$)")
-    for place, (found, colour) in enumerate(zip(shown, colours(len(shown)), strict=True)):
-        name = found.name[:MAX_LABEL].replace("$", r"\$")
+    for place, (curve, colour) in enumerate(zip(shown, colours(len(shown)), strict=True)):
+        name = curve.name[:MAX_LABEL].replace("$", r"\$")
         style = CurveStyle(colour, MARKERS[place % len(MARKERS)], name)
-        if found.fit is not None:
-            plot.unnamed_line((name,), found.q, found.fitted, color=colour, lw=0.7)
-        plot.points(style, found.q, found.density, np.full(found.q.size, True))
-    plot.scale("x", "log", np.concatenate([found.q for found in shown]))
-    plot.scale("y", "log", np.concatenate([found.density for found in shown]))
+        if curve.fit is not None:
+            plot.unnamed_line((name,), curve.q, curve.fitted, color=colour, lw=0.7)
+        plot.points(style, curve.q, curve.density, np.full(curve.q.size, True))
+    plot.scale("x", "log", np.concatenate([curve.q for curve in shown]))
+    plot.scale("y", "log", np.concatenate([curve.density for curve in shown]))
     return plot
 
 
@@ -217,12 +217,12 @@ def _bands(shown: list[Spectrum]) -> Table:
     )
     groups = [
         Group(
-            found.name,
+            curve.name,
             [
                 {"q": float(q), "density": float(density), "modes": float(modes)}
-                for q, density, modes in zip(found.q, found.density, found.modes, strict=True)
+                for q, density, modes in zip(curve.q, curve.density, curve.modes, strict=True)
             ],
         )
-        for found in shown
+        for curve in shown
     ]
     return Table("Bands of wavenumber.", columns, groups)

@@ -61,7 +61,7 @@ def _rewritten(key: str, value: str, name: str) -> str:
     if key == "href" and value.startswith("#"):
         return f"#{name}-{value[1:]}"
     if key in COORDINATES:
-        return NUMBER.sub(lambda found: f"{float(found[0]):.2f}", value).replace("\n", "")
+        return NUMBER.sub(lambda number: f"{float(number[0]):.2f}", value).replace("\n", "")
     value = value.replace("url(#", f"url(#{name}-")
     return value if key == "href" else COLOUR.sub(lambda f: variable(f[0].lower()), value)
 

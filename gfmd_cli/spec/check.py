@@ -206,7 +206,7 @@ class Check:
                 f'"auto" needs load.p_star or load.pressure; load.{load.quantity} is searched on '
                 "a given grid",
             )
-        if accuracy is not None and not accuracy.asked():
+        if accuracy is not None and not accuracy.tolerances():
             self.add("accuracy", "give mean_gap, contact_area or stress_deviation")
 
 
@@ -241,12 +241,12 @@ def _problems_of(sweep: SweepTable, data: dict[str, Any]) -> list[str]:
         table, _, key = address.partition(".")
         values = [a.get(key) for a in _alternatives(data.get(table, {})) if isinstance(a, dict)]
         lengths[address] = [len(value) for value in values if isinstance(value, list)]
-    problems = [f"{address} has no list" for address, found in lengths.items() if not found]
+    problems = [f"{address} has no list" for address, counts in lengths.items() if not counts]
     if len(lengths) < len(sweep.paired):
         problems.append("a key is named twice")
-    if len({length for found in lengths.values() for length in found}) > 1:
-        told = [f"{address} has {' and '.join(map(str, n))}" for address, n in lengths.items()]
-        problems.append(f"all lists must have the same length; {', '.join(told)}")
+    if len({length for counts in lengths.values() for length in counts}) > 1:
+        lists = [f"{address} has {' and '.join(map(str, n))}" for address, n in lengths.items()]
+        problems.append(f"all lists must have the same length; {', '.join(lists)}")
     return problems
 
 

@@ -193,14 +193,14 @@ class LoadTable(Choice):
 
     @model_validator(mode="after")
     def _one_of_all(self) -> Self:
-        given = [name for name in LOADS if getattr(self, name) is not None]
-        if len(given) != 1:
+        loads = [name for name in LOADS if getattr(self, name) is not None]
+        if len(loads) != 1:
             raise ValueError(f"give one of {', '.join(LOADS)}")
         low, high = PRESSURES
         beyond = [p for p in self.listed() if not low <= p <= high]
         if beyond and self.p_star is not None:
             raise ValueError(f"p_star must be from {low:g} to {high:g}, got {beyond[0]:g}")
-        if "tolerance" in self.model_fields_set and given[0] not in SOUGHT:
+        if "tolerance" in self.model_fields_set and loads[0] not in SOUGHT:
             raise ValueError(f"tolerance belongs to {' or '.join(SOUGHT)}")
         return self
 
@@ -211,10 +211,10 @@ class LoadTable(Choice):
 
     def listed(self) -> list[float]:
         """The prescribed values in the given order."""
-        given = getattr(self, self.quantity)
-        if isinstance(given, Ladder):
-            return given.pressures()
-        return list(given) if isinstance(given, list) else [given]
+        values = getattr(self, self.quantity)
+        if isinstance(values, Ladder):
+            return values.pressures()
+        return list(values) if isinstance(values, list) else [values]
 
     def values(self) -> list[float]:
         """The prescribed values, in the given order, without duplicates."""
@@ -234,7 +234,7 @@ class AccuracyTable(Choice):
     """Largest number of points along x for grid.points = "auto". The available memory may set a
     lower limit."""
 
-    def asked(self) -> dict[str, float]:
+    def tolerances(self) -> dict[str, float]:
         """Requested relative errors, by the name of the column."""
         given = {
             "u_g": self.mean_gap,
@@ -411,8 +411,8 @@ def _is_sweep(value: Any) -> bool:
 def _swept(tables: list[dict[str, Any]]) -> dict[str, Any]:
     """Values that each key of a sweep takes, one by itself."""
     keys = dict.fromkeys(key for table in tables for key in table)
-    taken = {key: [t[key] for t in tables if key in t] for key in keys}
-    distinct = {key: [v for i, v in enumerate(vs) if v not in vs[:i]] for key, vs in taken.items()}
+    values = {key: [t[key] for t in tables if key in t] for key in keys}
+    distinct = {key: [v for i, v in enumerate(vs) if v not in vs[:i]] for key, vs in values.items()}
     return {key: vs[0] if len(vs) == 1 else vs for key, vs in distinct.items()}
 
 

@@ -87,13 +87,13 @@ def error_columns(solved: Solved) -> Row:
     if solved.certificate is None:
         return {}
     row: Row = {"u_g_bound": solved.certificate.u_g, "sigma_p_bound": solved.certificate.sigma_p}
-    for name, made in solved.estimates.items():
+    for name, estimate in solved.estimates.items():
         algebraic = solved.algebraic(name)
         row |= {
-            f"{name}_error": made.error + algebraic,
-            f"{name}_continuum": made.continuum,
-            f"{name}_continuum_error": made.continuum_error + algebraic,
-            f"{name}_verdict": made.verdict,
+            f"{name}_error": estimate.error + algebraic,
+            f"{name}_continuum": estimate.continuum,
+            f"{name}_continuum_error": estimate.continuum_error + algebraic,
+            f"{name}_verdict": estimate.verdict,
             f"{name}_algebraic": algebraic,
         }
     return row

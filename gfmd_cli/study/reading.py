@@ -183,8 +183,8 @@ class StudyFile:
 
     def tasks_with(self, group: str) -> list[int]:
         """The indices of the tasks that have arrays in a group, rising."""
-        found = find(self._file, group)
-        return [] if found is None else sorted(map(int, found))
+        indices = find(self._file, group)
+        return [] if indices is None else sorted(map(int, indices))
 
     def entry(self, task: int) -> Entry:
         """All that is stored of one task but its arrays."""

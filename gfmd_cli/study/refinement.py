@@ -195,7 +195,7 @@ def _inaccurate(task: Task, solved: Solved) -> list[str]:
         return []
     return [
         name
-        for name, share in task.accuracy.asked().items()
+        for name, share in task.accuracy.tolerances().items()
         if not solved.estimates[name].continuum_error + solved.algebraic(name)
         <= share * abs(solved.estimates[name].continuum)
     ]

@@ -81,10 +81,10 @@ def check_memory(tasks: list[Task], ranks: Ranks | None = None) -> None:
     """Raise InputError, before anything is allocated, if a single task does not fit."""
     memory = room(ranks)
     needs = ((task.bytes_on(task.least_points), task.least_points) for task in tasks)
-    taken, points = max(needs, default=(0.0, 0))
-    if taken > memory:
+    needed, points = max(needs, default=(0.0, 0))
+    if needed > memory:
         raise InputError(
-            f"grid.points: {points} points along x take {gib(taken)} of memory, "
+            f"grid.points: {points} points along x take {gib(needed)} of memory, "
             f"{gib(memory)} are available; take a smaller grid or a larger machine"
         )
 

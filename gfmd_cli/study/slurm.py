@@ -98,7 +98,7 @@ def batch(
     *,
     shards: int | None,
     missing: bool,
-    asked: dict[str, str],
+    named_options: dict[str, str],
     sbatch_options: tuple[str, ...],
 ) -> Batch:
     """The batch of a study. Raises InputError.
@@ -109,11 +109,11 @@ def batch(
     words : spec and options that `gfmd run` and `gfmd collect` take alike, with absolute paths
     shards : number of shards; None uses the script of the last submission
     missing : take only the shards with tasks that are not solved yet
-    asked, sbatch_options : options of sbatch, by name and as they are
+    named_options, sbatch_options : options of sbatch, by name and as they are
     """
     path = state.study.with_suffix(SUFFIX)
-    limit = time_limit(asked["time"]) if "time" in asked else None
-    options = [option(f"{name}={value}") for name, value in asked.items()]
+    limit = time_limit(named_options["time"]) if "time" in named_options else None
+    options = [option(f"{name}={value}") for name, value in named_options.items()]
     options += [option(word) for word in sbatch_options]
     fresh = shards is not None
     if shards is None:
@@ -121,8 +121,8 @@ def batch(
         shards = int(SHARDS.findall(text)[0])
     else:
         check_shards(shards, len(tasks))
-        own = resources(tasks, shards, int(asked.get("cpus-per-task", 1)), limit)
-        named = [f"--{name}={value}" for name, value in own.items() if name not in asked]
+        own = resources(tasks, shards, int(named_options.get("cpus-per-task", 1)), limit)
+        named = [f"--{name}={value}" for name, value in own.items() if name not in named_options]
         text, options = script(state.study, words, shards, [*named, *options]), []
     members = sorted({task % shards for task in state.missing}) if missing else list(range(shards))
     return Batch(path, text, fresh, shards, members, options)
@@ -196,11 +196,11 @@ def time_limit(text: str) -> float | None:
             f"--time {text}: write minutes, hours:minutes:seconds or days-hours, such as 12:00:00"
         )
     days, *rest = form.groups()
-    given = [int(part) for part in rest if part is not None]
-    if days is None and len(given) < 3:  # minutes, minutes:seconds
-        given = [0, *given]
+    parts = [int(part) for part in rest if part is not None]
+    if days is None and len(parts) < 3:  # minutes, minutes:seconds
+        parts = [0, *parts]
     seconds = 86400 * int(days or 0)
-    seconds += sum(n * unit for n, unit in zip(given, (3600, 60, 1), strict=False))
+    seconds += sum(n * unit for n, unit in zip(parts, (3600, 60, 1), strict=False))
     return float(seconds) or None
 
 

@@ -106,7 +106,7 @@ def _state(
     set_aside = study.set_aside()
     records, damaged = study.records()
     held = study.held()
-    known = {name: found.status for name, found in held.items() if found.stored >= output}
+    known = {name: result.status for name, result in held.items() if result.stored >= output}
     names = [path.name for path in (*set_aside, *damaged)]
     others = held.keys() - {name for name, _ in tasks}
     states = [

@@ -122,10 +122,10 @@ class Task:
         points = "auto" if self.auto else str(self.points)
         if not self.auto and self.points_y not in (1, self.points):
             points += f"x{self.points_y}"
-        return " ".join([self.elastomer.label, *self.swept, points, self.asked])
+        return " ".join([self.elastomer.label, *self.swept, points, self.load_label])
 
     @property
-    def asked(self) -> str:
+    def load_label(self) -> str:
         """The load with its symbol."""
         return f"{SYMBOLS[self.quantity]}={self.load:.4g}"
 
@@ -324,7 +324,7 @@ def _points(spec: Spec, chosen: dict[str, Any], load: float) -> int:
         "sigma_p": (0.03 * 3**n, max(0.5, min(2.0, 3.0 - n))),
     }
     doublings = [1 if grid.boundary == "free" else 0]  # one grid gives no error there
-    for name, share in (accuracy.asked() if accuracy is not None else {}).items():
+    for name, share in (accuracy.tolerances() if accuracy is not None else {}).items():
         error, order = typical[name]
         if n <= LAST[name]:
             doublings.append(int(np.ceil((np.log2(error) - np.log2(share)) / order)))
