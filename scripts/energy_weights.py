@@ -73,9 +73,9 @@ def weights(scene: Scene, n: float, u: np.ndarray) -> tuple[list[float], float]:
     energy = q**n * moved
     group = np.digitize(q, bounds) - 1
     full = np.bincount(np.digitize(own, bounds) - 1, own**n * height[height > 0], GROUPS)
-    held = np.bincount(group[group < GROUPS], energy[group < GROUPS], GROUPS)
+    sums = np.bincount(group[group < GROUPS], energy[group < GROUPS], GROUPS)
     beyond = energy[q > own.max() * (1 + 1e-9)].sum() / energy.sum()
-    share = np.divide(held, full, out=np.full(GROUPS, np.nan), where=full > 0)
+    share = np.divide(sums, full, out=np.full(GROUPS, np.nan), where=full > 0)
     return share.tolist(), float(beyond)
 
 
@@ -88,8 +88,8 @@ def theory_weights(kind: str, n: float, p: float, gamma: float) -> list[float]:
     w = a * (gamma + (1 - gamma) * a**2)
     group = np.digitize(shells.q / (2 * np.pi), groups()) - 1
     full = np.bincount(group, shells.energy, GROUPS)
-    held = np.bincount(group, w * shells.energy, GROUPS)
-    return np.divide(held, full, out=np.full(GROUPS, np.nan), where=full > 0).tolist()
+    sums = np.bincount(group, w * shells.energy, GROUPS)
+    return np.divide(sums, full, out=np.full(GROUPS, np.nan), where=full > 0).tolist()
 
 
 def print_weights(records: list[Record]) -> None:
@@ -106,8 +106,8 @@ def print_weights(records: list[Record]) -> None:
         if len(chosen) < 2:
             continue
         fractions = np.array([r["weight"][i] for r in chosen])
-        said = theory_weights(kind, n, p, float(gamma_n(n)))
-        cells = [f"{w:.3f} ({s:.3f})" for w, s in zip(fractions.mean(axis=0), said, strict=True)]
+        theory = theory_weights(kind, n, p, float(gamma_n(n)))
+        cells = [f"{w:.3f} ({s:.3f})" for w, s in zip(fractions.mean(axis=0), theory, strict=True)]
         beyond = np.mean([r["beyond"][i] for r in chosen])
         print(f"| {kind} | {n:g} | {p:g} | " + " | ".join(cells) + f" | {100 * beyond:.1f} % |")
 
@@ -118,8 +118,8 @@ def main() -> None:
     parser.add_argument("--no-run", action="store_true", help="use what is there")
     arguments = parser.parse_args()
     lines = arguments.cache.read_text().splitlines() if arguments.cache.exists() else []
-    wanted = list(product(SEEDS, KINDS, EXPONENTS))
-    for seed, kind, n in [] if arguments.no_run else wanted[len(lines) :]:
+    cases = list(product(SEEDS, KINDS, EXPONENTS))
+    for seed, kind, n in [] if arguments.no_run else cases[len(lines) :]:
         lines.append(json.dumps(measure(kind, n, seed)))
         arguments.cache.write_text("\n".join(lines) + "\n")
     records = [json.loads(line) for line in lines]

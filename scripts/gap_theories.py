@@ -173,10 +173,11 @@ def print_errors(fits: Fits) -> None:
     rows = []
     for n in EXPONENTS:
         keys = [(name, hurst, n) for name, hurst in product(SPECTRA, HURST)]
-        held = {key: fits.surfaces[key].log_gap[HELD_OUT] for key in keys}
+        simulated = {key: fits.surfaces[key].log_gap[HELD_OUT] for key in keys}
         weights = float(gamma_n(n)), float(gamma(n, *GAMMA))
         cells = [
-            cell([fits.surfaces[key].theory(one) - held[key] for key in keys]) for one in weights
+            cell([fits.surfaces[key].theory(one) - simulated[key] for key in keys])
+            for one in weights
         ]
         cells += [
             cell(
@@ -189,7 +190,7 @@ def print_errors(fits: Fits) -> None:
         theory = {
             key: log_gap("coarse-grained", fits.surfaces[key].shells, n, P_STAR) for key in keys
         }
-        cells.append(cell([theory[key] - held[key] for key in keys]))
+        cells.append(cell([theory[key] - simulated[key] for key in keys]))
         rows.append([f"{n:g}", *cells])
     heads = ["n", "Eq. (39)", "fitted γ", *FREE, WEIGHT, "coarse-graining"]
     print_table("ln u_g on the test seeds, per cent; forms on spectra left out", heads, rows)
@@ -219,24 +220,24 @@ def print_spectra(fits: Fits) -> None:
 
 def means(path: Path, points: int | None = None) -> Iterator[tuple[list[Curve], np.ndarray]]:
     """Curves of one surface and elastomer, and the mean of their ln u_g over the seeds."""
-    held = defaultdict(list)
+    by_key = defaultdict(list)
     for curve in compare(path).curves:
         if points in (None, curve.points):
-            held[curve.n, curve.rows[0]["cutoff"]].append(curve)
-    for _, curves in sorted(held.items(), key=lambda item: (item[0][0], -item[0][1])):
+            by_key[curve.n, curve.rows[0]["cutoff"]].append(curve)
+    for _, curves in sorted(by_key.items(), key=lambda item: (item[0][0], -item[0][1])):
         yield curves, np.mean([np.log(curve.column("u_g")) for curve in curves], axis=0)
 
 
 def print_between(path: Path) -> None:
     """Exponents that no constant was fitted to; mean of the seeds, in the continuum."""
     rows = []
-    held: dict[tuple, dict[int, list[np.ndarray]]] = defaultdict(lambda: defaultdict(list))
+    by_key: dict[tuple, dict[int, list[np.ndarray]]] = defaultdict(lambda: defaultdict(list))
     shells = {}
     for curve in sorted(compare(path).curves, key=lambda one: one.rows[0]["seed"]):
         key = curve.n, spectrum_of(curve.rows[0]), curve.rows[0]["hurst"]
-        held[key][curve.points].append(np.log(curve.column("u_g")))
+        by_key[key][curve.points].append(np.log(curve.column("u_g")))
         shells[key] = curve.persson.shells
-    for key, grids in sorted(held.items()):
+    for key, grids in sorted(by_key.items()):
         finer = 4 / 3 * (grids[FINER][0] - grids[GRID][0])
         simulated = np.mean(grids[GRID], axis=0) + finer
         errors = {name: log_gap(name, shells[key], key[0], P_STAR) - simulated for name in THEORIES}
@@ -271,20 +272,20 @@ def print_depth(path: Path) -> None:
 
 def print_slabs(path: Path) -> None:
     """Slabs, in the continuum, with the constants at the local exponent."""
-    held = defaultdict(list)
+    by_thickness = defaultdict(list)
     for curve in compare(path).curves:
         row, shells = curve.rows[0], curve.persson.shells
         p = curve.column("p_star") * row["delta_sigma"] / curve.persson.delta_sigma
         simulated = np.log(curve.column("u_g_continuum"))
         differences = [log_gap(name, shells, np.nan, p) - simulated for name in THEORIES]
-        held[row["thickness"]].append(differences)
+        by_thickness[row["thickness"]].append(differences)
     rows = [
         [f"{t:g}", name, *signed(np.mean(errors, axis=0)[i])]
-        for t, errors in held.items()
+        for t, errors in by_thickness.items()
         for i, name in enumerate(THEORIES.values())
     ]
     print_table("Slabs, per cent", ["t/L", "", *(f"p* = {p:g}" for p in P_STAR)], rows)
-    every = np.array([one for errors in held.values() for one in errors])
+    every = np.array([one for errors in by_thickness.values() for one in errors])
     ends = zip(THEORIES.values(), np.moveaxis(every, 1, 0), strict=True)
     print("\nrms:", *(f"{name} {100 * rms(list(errors)):.1f}" for name, errors in ends))
 
@@ -307,9 +308,9 @@ def print_weights(records: list[Record], fits: Fits) -> None:
                     at = w[np.argmin(np.abs(np.log(NODES / p)))] * shells.energy
                     full = np.bincount(group, shells.energy, GROUPS)
                     with np.errstate(invalid="ignore"):
-                        said = np.bincount(group, at, GROUPS) / full
+                        theory = np.bincount(group, at, GROUPS) / full
                     if p <= P_STAR[-1]:
-                        errors[form].append(np.log(said / measured)[full > 0])
+                        errors[form].append(np.log(theory / measured)[full > 0])
         rows.append([f"{n:g}", *(f"{rms([np.concatenate(e)]):.2f}" for e in errors.values())])
     print_table("W by shell: rms of ln W - ln W measured", ["n", *FORMS, WEIGHT], rows)
 

@@ -75,9 +75,9 @@ def measure(points: int) -> None:
         counts.append(solution.transforms)
 
     whole, _ = least(grid, solve, exchange, repeats=5)
-    said = {"pair": pair, "share": share, "cycle": once, "solve": whole, "transforms": counts[-1]}
+    record = {"pair": pair, "share": share, "cycle": once, "solve": whole, "transforms": counts[-1]}
     if ranks is None or ranks.rank == 0:
-        print(json.dumps(said))
+        print(json.dumps(record))
 
 
 def _clock_exchange(grid: Grid, spent: list[float]) -> None:

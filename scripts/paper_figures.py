@@ -13,7 +13,7 @@ from pathlib import Path
 
 from paper import beyond, gaps, hertz, light, page, rough, sizes, stress, weights
 from paper.claims import Finding
-from paper.studies import LARGE, STUDIES, Held, run
+from paper.studies import LARGE, STUDIES, StoredStudies, run
 
 from gfmd_cli.analysis.plotting import styled
 
@@ -37,16 +37,16 @@ def main() -> None:
         begun = time.perf_counter()
         run(name, arguments.output, arguments.quick, arguments.jobs)
         print(f"{name}: {time.perf_counter() - begun:.0f} s", flush=True)
-    held = Held(arguments.output)
+    studies = StoredStudies(arguments.output)
     findings: list[Finding] = []
     with styled():
         for draw in FIGURES:
-            if all(held.has(name) for name in draw.needs):
-                findings += draw(held, arguments.output / "figures")
+            if all(studies.has(name) for name in draw.needs):
+                findings += draw(studies, arguments.output / "figures")
     findings.sort(key=lambda finding: list(page.STATEMENTS).index(finding.key))
     page.write(
         findings,
-        held,
+        studies,
         arguments.output / "figures",
         arguments.page or arguments.output / "paper.md",
     )

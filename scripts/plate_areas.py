@@ -92,9 +92,9 @@ def main() -> None:
         chosen = [score for score in scored if score.fit == half]
         if not chosen:
             continue
-        held = np.mean([score.error <= score.bar for score in chosen])
+        share = np.mean([score.error <= score.bar for score in chosen])
         ratio = np.median([score.bar / max(score.error, 1e-12) for score in chosen])
-        print(f"{'fit' if half else 'verify'}: {len(chosen)} estimates, {100 * held:.1f} % held, "
+        print(f"{'fit' if half else 'verify'}: {len(chosen)} estimates, {100 * share:.1f} % held, "
               f"median of bar over error {ratio:.1f}")  # fmt: skip
 
 

@@ -172,8 +172,8 @@ def examples() -> str:
     rows = []
     for path in sorted(CONFIGS.glob("*.toml")):
         text = path.read_text(encoding="utf-8").partition("[study]")[0]
-        said = " ".join(line.lstrip("# ") for line in text.splitlines())
-        rows.append((f"`configs/{path.name}`", escaped(said)))
+        comments = " ".join(line.lstrip("# ") for line in text.splitlines())
+        rows.append((f"`configs/{path.name}`", escaped(comments)))
     return table(("spec", "content"), rows)
 
 

@@ -78,13 +78,13 @@ def blocks(page: Path) -> list[Block]:
     text = page.read_text(encoding="utf-8")
     result = []
     for fence in FENCE.finditer(text):
-        said, before = {}, text[: fence.start()].rstrip(" ").removesuffix("\n")
+        options, before = {}, text[: fence.start()].rstrip(" ").removesuffix("\n")
         while comment := COMMENT.search(before.rpartition("\n")[2]):
-            said[comment[1]] = comment[2] or ""
+            options[comment[1]] = comment[2] or ""
             before = before.rpartition("\n")[0]
         line = text[: fence.start()].count("\n") + 1
         inner = re.sub(rf"^{fence[1]}", "", fence[3], flags=re.MULTILINE)
-        result.append(Block(page, line, fence[2], inner, said))
+        result.append(Block(page, line, fence[2], inner, options))
     return result
 
 

@@ -34,8 +34,8 @@ def test_the_batch_script_imports_nothing_from_the_working_directory(folder, com
     submit = [*command, "submit", "spec.toml", "--shards", "1", "-o", "study.h5"]
     bin_folder = folder / "bin"
     bin_folder.mkdir()
-    for name, said in (("sbatch", "echo 1"), ("squeue", "true")):
-        (bin_folder / name).write_text(f"#!/bin/sh\n{said}\n")
+    for name, script in (("sbatch", "echo 1"), ("squeue", "true")):
+        (bin_folder / name).write_text(f"#!/bin/sh\n{script}\n")
         (bin_folder / name).chmod(0o755)
     path = f"{bin_folder}:{os.environ['PATH']}"
     subprocess.run(submit, cwd=folder, env=os.environ | {"PATH": path}, check=True)

@@ -34,7 +34,7 @@ SOLVER = Solver(kind="plain")
 @pytest.fixture
 def checkpoint(tmp_path):
     """The folder of a checkpoint with one state."""
-    with Checkpoint.held(tmp_path / "c") as opened:
+    with Checkpoint.exclusive(tmp_path / "c") as opened:
         opened.save(Contact(), STATE, Notes())
     return tmp_path / "c"
 
@@ -152,7 +152,7 @@ def test_a_slot_is_not_written_through_a_link(checkpoint):
     target = checkpoint.parent / "target"
     target.write_text("precious")
     (checkpoint / "a").symlink_to(target)
-    with Checkpoint.held(checkpoint) as opened:
+    with Checkpoint.exclusive(checkpoint) as opened:
         opened.restore()
         with pytest.raises(SpaceError, match="cannot be written"):
             opened.save(Contact(), STATE, Notes())

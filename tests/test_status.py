@@ -181,7 +181,7 @@ def test_a_record_that_is_collected_meanwhile_is_not_missed(gfmd, monkeypatch):
     listed = study.record_paths()
     study.collect(spec, plan(spec), text)
     monkeypatch.setattr(study, "record_paths", lambda: listed)  # as seen before
-    assert study.held() == {plan(spec)[0].id: ("converged", spec.output.names())}
+    assert study.outcomes() == {plan(spec)[0].id: ("converged", spec.output.names())}
 
 
 @pytest.mark.parametrize("status", Status)

@@ -262,7 +262,7 @@ def test_checkpoints_come_back_as_they_were(tmp_path):
     )
     state.exact, state.residual, state.step, state.transforms = False, 0.1, 7, 9
     state.misses, state.multilevel, state.coarser_transforms = 2, True, 12.5
-    with Checkpoint.held(tmp_path / "c") as checkpoint:
+    with Checkpoint.exclusive(tmp_path / "c") as checkpoint:
         assert checkpoint.restore() is None
         assert checkpoint.load(grid, SOLVER) is None
         checkpoint.save(contact, state, Notes())
@@ -270,7 +270,7 @@ def test_checkpoints_come_back_as_they_were(tmp_path):
         state.u += 1
         state.step = 8
         checkpoint.save(contact, state, NOTES)
-        with Checkpoint.held(tmp_path / "c") as second:
+        with Checkpoint.exclusive(tmp_path / "c") as second:
             assert second.restore() is None
             assert second.load(grid, SOLVER) is None  # another process has it
     checkpoint = Checkpoint(tmp_path / "c")

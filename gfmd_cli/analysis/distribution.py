@@ -228,7 +228,7 @@ def distributions(comparison: Comparison) -> list[StressDistribution]:
     for seeds in by_contact.values():
         grids = _nested(sorted(set.intersection(*(set(grids) for grids in seeds.values()))))
         if len(grids) > 1:
-            rows = [[held[points][1] for points in grids] for held in seeds.values()]
+            rows = [[seed[points][1] for points in grids] for seed in seeds.values()]
             merged.append(StressDistribution(next(iter(seeds.values()))[grids[-1]][0], rows))
     return merged
 

@@ -42,16 +42,18 @@ def write_image(study: Path, task: int | None, target: Path) -> None:
         fresh.write(b"\n</AppendedData>\n</VTKFile>\n")
 
 
-def _choose(study: Path, held: list[int], task: int | None) -> int:
+def _choose(study: Path, tasks: list[int], task: int | None) -> int:
     """The task to write. Raises InputError where it has no fields, or many do and none is named."""
-    if not held:
+    if not tasks:
         raise InputError(f'{study}: holds no fields; ask for them: fields = ["u"] in [output]')
-    allowed = ", ".join(map(str, held))
-    if task is None and len(held) > 1:
-        raise InputError(f"{study}: {len(held)} tasks have fields; choose --task, one of {allowed}")
-    if task is not None and task not in held:
+    allowed = ", ".join(map(str, tasks))
+    if task is None and len(tasks) > 1:
+        raise InputError(
+            f"{study}: {len(tasks)} tasks have fields; choose --task, one of {allowed}"
+        )
+    if task is not None and task not in tasks:
         raise InputError(f"--task: {task} has no fields in {study}; allowed: {allowed}")
-    return held[0] if task is None else task
+    return tasks[0] if task is None else task
 
 
 def _head(fields: dict[str, Field], sides: list[float], first: float) -> str:

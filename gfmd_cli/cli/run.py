@@ -163,8 +163,8 @@ def _print_tasks(spec: Any, path: Path, how: dict[str, Any]) -> None:
 
     (index, count), ranks = how["shard"], how["ranks"]
     tasks = [task for task in plan(spec) if task.index % count == index]
-    held = {} if how["overwrite"] else Study(path).held()
-    missing = without_result(tasks, held)
+    outcomes = {} if how["overwrite"] else Study(path).outcomes()
+    missing = without_result(tasks, outcomes)
     to_do = {task.id for task in missing}
     if tasks:
         check_memory(tasks, ranks)
@@ -172,7 +172,7 @@ def _print_tasks(spec: Any, path: Path, how: dict[str, Any]) -> None:
         return
     show(f"{'task':>6} {'points':>6} {'load':>10} {'MiB':>8} {'s':>8}  scene")
     for task in tasks:
-        done = f"  [{held[task.id].status}]" if task.id in held else ""
+        done = f"  [{outcomes[task.id].status}]" if task.id in outcomes else ""
         if done and task.id in to_do:
             done = "  [again: more output is requested]"
         points = f"~{task.points}" if task.auto else str(task.points)

@@ -34,10 +34,10 @@ def spectra(grid: Grid, fields: Mapping[str, Field]) -> tuple[Field, Field, dict
         return np.asarray(np.bincount(np.searchsorted(edges, at), values, edges.size + 1), float)
 
     waves = binned(m, count)
-    held = waves > 0
-    powers = {name: binned(*radial_power(grid, f)[:2])[held] for name, f in fields.items()}
-    q = binned(m, m * count)[held] / waves[held] * (2 * np.pi / grid.length)
-    return q, waves[held], powers
+    occupied = waves > 0
+    powers = {name: binned(*radial_power(grid, f)[:2])[occupied] for name, f in fields.items()}
+    q = binned(m, m * count)[occupied] / waves[occupied] * (2 * np.pi / grid.length)
+    return q, waves[occupied], powers
 
 
 def autocorrelations(

@@ -51,7 +51,7 @@ def direct_start(
     """
     last, touching = finer[-1], np.atleast_2d(touching)
     solved: _DirectSolve | None = None
-    spent = 0.0
+    transforms = 0.0
     for contact in finer:
         largest = _largest_count(contact)
         if not contact.grid.whole or np.count_nonzero(touching) > largest:
@@ -61,11 +61,11 @@ def direct_start(
             break
         solve = _DirectSolve(contact, touching)
         is_solved = solve.run(largest, 0.0 if contact is last else COARSE_TOLERANCE, pause)
-        spent += solve.transforms * contact.grid.size / last.grid.size
+        transforms += solve.transforms * contact.grid.size / last.grid.size
         if not is_solved:
             break
         solved, touching = solve, solve.touching
-    return Start(solved.displacement(), spent, solved.contact) if solved else None
+    return Start(solved.displacement(), transforms, solved.contact) if solved else None
 
 
 def _largest_count(contact: Contact) -> int:

@@ -65,7 +65,7 @@ def start_from(
     end the solve by an exception. None where a solve on the whole grid is faster or the operators
     on tiles do not apply.
     """
-    last, spent = finer[-1], 0.0
+    last, transforms = finer[-1], 0.0
     shapes = [contact.grid.shape for contact in (coarse, *finer)]
     doubled = all(b == tuple(2 * n for n in a) for a, b in pairwise(shapes))
     if not doubled or not pressure.any() or not all(map(tiles_apply, finer)):
@@ -82,9 +82,9 @@ def start_from(
             solve.run(COARSE_TOLERANCE)
             pressure = np.empty(contact.grid.shape)
             solve.tiles.put(solve.s, pressure)
-        spent += solve.transforms * contact.grid.size / last.grid.size
+        transforms += solve.transforms * contact.grid.size / last.grid.size
         coarse = contact
-    return Start(u, spent, last)
+    return Start(u, transforms, last)
 
 
 def tiles_apply(contact: Contact) -> bool:

@@ -66,10 +66,10 @@ def solve_contact(
     """
     solver = solver.for_contact(contact)
     grids = _grids(contact, solver, start)
-    spent = 0.0  # transforms
+    transforms = 0.0  # of the size of the finest grid
     can_touch_everywhere = contact.boundary == "periodic" and contact.may_touch is None
     if solver.iterative and can_touch_everywhere and not isinstance(start, Resume):
-        full, spent = _full_contact(grids[::-1], solver)
+        full, transforms = _full_contact(grids[::-1], solver)
         if full is not None:
             return full
     coarse: Contact | None = None
@@ -78,18 +78,18 @@ def solve_contact(
         fine = grids.pop()
         if isinstance(start, Resume):
             state = _resumed(fine, solver, start)
-            spent, start = state.coarser_transforms, None
+            transforms, start = state.coarser_transforms, None
         else:
             state = _begin(solver, fine, coarse, state, start)
             coarse = start = None  # frees their memory, which is needed now
-            state.coarser_transforms = spent
+            state.coarser_transforms = transforms
         status = solve(fine, solver if fine is contact else _loose(solver), state, watch)
-        spent += state.transforms * fine.grid.size / contact.grid.size
+        transforms += state.transforms * fine.grid.size / contact.grid.size
         coarse = fine
         if grids and solver.starts_locally:
             local = _local_start(fine, state, grids[::-1], solver.tolerance, watch)
             if local is not None:
-                start, spent = local.u, spent + local.transforms
+                start, transforms = local.u, transforms + local.transforms
                 while grids[-1] is not local.contact:
                     grids.pop()
     assert state is not None
@@ -98,10 +98,12 @@ def solve_contact(
         if not good_start or not contact.lay_pressed(state.u, state.sigma):
             break
         state = solver.begin(contact, state.u)
-        state.coarser_transforms = spent
+        state.coarser_transforms = transforms
         status = solve(contact, solver, state, watch)
-        spent += state.transforms
-    return Solution(state.u, state.sigma, state.residual, status, solver.kind, state.step, spent)
+        transforms += state.transforms
+    return Solution(
+        state.u, state.sigma, state.residual, status, solver.kind, state.step, transforms
+    )
 
 
 def _local_start(
@@ -209,14 +211,14 @@ def _full_contact(grids: list[Contact], solver: Solver) -> tuple[Solution | None
     A rough contact that is not full on a coarse grid is not full on a finer one, where the stress
     varies more; elsewhere the iteration finds full contact, too.
     """
-    spent = 0.0
+    transforms = 0.0
     full: Solution | None = None
     for contact in grids:
         full = full_contact(contact, solver.kind)
-        spent += 2 * contact.grid.size / grids[-1].grid.size
+        transforms += 2 * contact.grid.size / grids[-1].grid.size
         if full is None:
-            return None, spent
-    return full and replace(full, transforms=spent), spent
+            return None, transforms
+    return full and replace(full, transforms=transforms), transforms
 
 
 def full_contact(contact: Contact, solver: str) -> Solution | None:

@@ -114,10 +114,10 @@ class ProjectedCG(Solver):
         if fine.grid.whole:
             pressed = contact_points(coarse.obstacle, state.u, state.sigma)
             np.copyto(u, fine.obstacle, where=refined(pressed, fine))
-        begun = self.begin(fine, u)
-        begun.length = state.length
-        begun.screening, begun.multilevel = state.screening, state.multilevel
-        return begun
+        fresh = self.begin(fine, u)
+        fresh.length = state.length
+        fresh.screening, fresh.multilevel = state.screening, state.multilevel
+        return fresh
 
     def iterate(self, contact: Contact, state: PCGState) -> Iterator[PCGState]:
         """Advance `state` in place by conjugate-gradient steps."""

@@ -61,7 +61,7 @@ class Checkpoint:
 
     @classmethod
     @contextmanager
-    def held(cls, folder: Path, ranks: Ranks | None = None) -> Iterator[Self]:
+    def exclusive(cls, folder: Path, ranks: Ranks | None = None) -> Iterator[Self]:
         """The checkpoint for one run alone: a second one neither reads nor writes it.
 
         Where no state was saved, nothing is left of the folder.

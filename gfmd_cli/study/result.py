@@ -10,7 +10,7 @@ from gfmd_cli.physics.pictures import Picture
 from gfmd_cli.status import Status
 
 
-class Held(NamedTuple):
+class Outcome(NamedTuple):
     """What a study or a record holds of a task."""
 
     status: Status
@@ -25,14 +25,14 @@ class Entry(NamedTuple):
     scene_id: str
     """Tasks of one scene share surface, elastomer and grid."""
     stored: frozenset[str]
-    """As in `Held`; nothing of a task that is not solved yet."""
+    """As in `Outcome`; nothing of a task that is not solved yet."""
     row: Mapping[str, Any]
     """Columns and histograms by name."""
 
     @property
-    def held(self) -> Held:
+    def outcome(self) -> Outcome:
         """Status and output."""
-        return Held(Status(self.row["status"]), self.stored)
+        return Outcome(Status(self.row["status"]), self.stored)
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from gfmd_cli.study.context import Progress, Report, SolveContext, WorkerOptions
 from gfmd_cli.study.pool import solve_in_pool
 from gfmd_cli.study.refinement import forget_scene
 from gfmd_cli.study.resources import check_memory, room, seconds_to_stop, share_out
-from gfmd_cli.study.result import Held
+from gfmd_cli.study.result import Outcome
 from gfmd_cli.study.run_task import attempt
 from gfmd_cli.study.signals import noted
 from gfmd_cli.study.store import Study, without_result
@@ -73,11 +73,11 @@ def run_study(
     if ranks is not None and (names := spec.output.on_request()):
         raise InputError(f"output.{names[0]}: takes whole grids; run it without mpiexec")
     moved = _move_aside(study, shard, ranks) if overwrite else []
-    held = agree(ranks, study.held())
+    outcomes = agree(ranks, study.outcomes())
     share = [task for task in tasks if task.index % shard[1] == shard[0]]
-    pending = without_result(share, held)
+    pending = without_result(share, outcomes)
     to_solve = {task.id for task in pending}
-    outcome = Counter(held[task.id].status for task in share if task.id not in to_solve)
+    outcome = Counter(outcomes[task.id].status for task in share if task.id not in to_solve)
     waiting = agree(ranks, bool(study.record_paths()))
     if not pending and not waiting:
         if leads(ranks) and study.parts.exists():  # of a run that was killed as it ended
@@ -87,16 +87,16 @@ def run_study(
     check_memory(pending, ranks)
     jobs, threads = share_out(pending, jobs, reproducible, ranks)
     options = WorkerOptions(threads, room(ranks) / jobs, reproducible, checkpoint_every)
-    stop, due, begun = Event(), Event(), Event()
+    stop, due, started = Event(), Event(), Event()
     tell = Clock(pending, jobs).watched(report)
 
     def stop_if_due() -> None:
-        if due.is_set() and begun.is_set():  # each call begins a task
+        if due.is_set() and started.is_set():  # each call begins a task
             stop.set()
 
     def watch(progress: Progress) -> None:
         if progress.event == "start":
-            begun.set()
+            started.set()
             stop_if_due()
         tell(progress)
 
@@ -121,7 +121,7 @@ def run_study(
             plans.plan_with(None)
         _check_ended(solved, len(pending), stop)
         if not any(status.is_failure for status in solved):
-            _check_output(pending, agree(ranks, study.held()))
+            _check_output(pending, agree(ranks, study.outcomes()))
     return outcome + solved
 
 
@@ -158,9 +158,9 @@ def _check_ended(solved: Counter[Status], pending: int, stop: Event) -> None:
         raise Interrupted(f"{left} tasks left whose workers were killed; call again to go on")
 
 
-def _check_output(solved: list[Task], held: dict[str, Held]) -> None:
+def _check_output(solved: list[Task], outcomes: dict[str, Outcome]) -> None:
     """Raise Interrupted where another run of the same tasks, with other output, came first."""
-    lacking = [task for task in without_result(solved, held) if task.id in held]
+    lacking = [task for task in without_result(solved, outcomes) if task.id in outcomes]
     if lacking:
         raise Interrupted(
             f"{len(lacking)} tasks were solved by another run at the same time, with other output; "

@@ -128,7 +128,7 @@ def attempt(task: Task, parts: Path, context: SolveContext) -> Status:
 def _recorded_status(parts: Path, task: Task) -> Status | None:
     """The status in the record of a task, None without an intact record."""
     with suppress(StudyError):
-        return read_record_entry(record_path(parts, task.id, task.output.names())).held.status
+        return read_record_entry(record_path(parts, task.id, task.output.names())).outcome.status
     return None
 
 
@@ -139,7 +139,7 @@ def solve_task(task: Task, parts: Path, context: SolveContext) -> Status:
     """
     context.report(Progress(task.index, "start", task.label))
     start = time.perf_counter()
-    with Checkpoint.held(parts / task.id, context.ranks) as checkpoint:
+    with Checkpoint.exclusive(parts / task.id, context.ranks) as checkpoint:
         solved = solve_at_load(task, context, TaskWatcher(task, checkpoint, context))
         record = result(task, solved, time.perf_counter() - start)
         if leads(context.ranks):

@@ -105,10 +105,10 @@ def _state(
     saved = {name: Checkpoint(study.parts / name).saved() for name, _ in tasks}
     set_aside = study.set_aside()
     records, damaged = study.records()
-    held = study.held()
-    known = {name: result.status for name, result in held.items() if result.stored >= output}
+    outcomes = study.outcomes()
+    known = {name: result.status for name, result in outcomes.items() if result.stored >= output}
     names = [path.name for path in (*set_aside, *damaged)]
-    others = held.keys() - {name for name, _ in tasks}
+    others = outcomes.keys() - {name for name, _ in tasks}
     states = [
         TaskState(
             index, label, known.get(name, Status.MISSING), None if name in known else saved[name]

@@ -35,7 +35,7 @@ from gfmd_cli.study.parts import (
 )
 from gfmd_cli.study.provenance import origin
 from gfmd_cli.study.reading import StudyFile, open_study
-from gfmd_cli.study.result import Entry, Held, TaskResult
+from gfmd_cli.study.result import Entry, Outcome, TaskResult
 from gfmd_cli.study.tasks import Task
 from gfmd_cli.study.writing import write_study
 
@@ -82,22 +82,22 @@ class Study:
             if alone and self._is_complete(tasks):
                 remove_parts(self.parts)
 
-    def held(self) -> dict[str, Held]:
-        """What is held of each task that is solved, collected or not, by its id."""
+    def outcomes(self) -> dict[str, Outcome]:
+        """What is stored of each task that is solved, collected or not, by its id."""
         records, _ = self.records()  # before the study, which may take them in meanwhile
-        held = self.collected()
+        outcomes = self.collected()
         for entry in records.values():
-            if entry.task_id not in held or entry.stored >= held[entry.task_id].stored:
-                held[entry.task_id] = entry.held
-        return held
+            if entry.task_id not in outcomes or entry.stored >= outcomes[entry.task_id].stored:
+                outcomes[entry.task_id] = entry.outcome
+        return outcomes
 
-    def collected(self) -> dict[str, Held]:
+    def collected(self) -> dict[str, Outcome]:
         """What the study file holds of each task that is solved, by its id."""
         if not self.path.exists():
             return {}
         with open_study(self.path) as file:
             tasks = zip(file.task_ids, file.statuses, file.stored, strict=True)
-            return {n: Held(status, out) for n, status, out in tasks if status != Status.MISSING}
+            return {n: Outcome(status, out) for n, status, out in tasks if status != Status.MISSING}
 
     def collect(self, spec: Spec, tasks: list[Task], text: str) -> list[str]:
         """Write all records into the study file, then drop them; inside `work`.
@@ -197,16 +197,16 @@ class Study:
         return locked(self.parts / "collecting")
 
 
-def without_result(tasks: Iterable[Task], held: dict[str, Held]) -> list[Task]:
-    """The tasks to solve: those not held with all their output.
+def without_result(tasks: Iterable[Task], outcomes: dict[str, Outcome]) -> list[Task]:
+    """The tasks to solve: those that are not stored with all their output.
 
-    What is held of them with less output is kept: they store what is held as well.
+    What is stored of them with less output is kept: they store it as well.
     """
-    nothing = Held(Status.MISSING, frozenset())
+    nothing = Outcome(Status.MISSING, frozenset())
     return [
-        task.storing(held.get(task.id, nothing).stored)
+        task.storing(outcomes.get(task.id, nothing).stored)
         for task in tasks
-        if task.id not in held or not task.output.names() <= held[task.id].stored
+        if task.id not in outcomes or not task.output.names() <= outcomes[task.id].stored
     ]
 
 

@@ -5,20 +5,20 @@ from pathlib import Path
 from gfmd_cli.analysis.plotting import WIDTH, LegendFigure
 from paper.claims import Finding
 from paper.drawing import label
-from paper.studies import Held, needs
+from paper.studies import StoredStudies, needs
 
 HIGHEST = 0.5  # gap / h_std at the end of the colours
 
 
 @needs("plate_map")
-def plate_map(held: Held, folder: Path) -> list[Finding]:
+def plate_map(studies: StoredStudies, folder: Path) -> list[Finding]:
     """Maps of the contact over the gap, n = 1 to 4, a quarter of the cell."""
     plot = LegendFigure(WIDTH, WIDTH * 1.25)
     axes = plot.figure.subplots(2, 2)
     for ax, row in zip(
-        axes.flat, sorted(held.rows("plate_map"), key=lambda r: r["n"]), strict=False
+        axes.flat, sorted(studies.rows("plate_map"), key=lambda r: r["n"]), strict=False
     ):
-        fields = held.fields("plate_map", row)
+        fields = studies.fields("plate_map", row)
         gap = (fields["u"] - fields["height"]) / row["h_std"]
         touching = (fields["u"] == fields["height"]) & (fields["sigma"] > 0)
         half = len(gap) // 2

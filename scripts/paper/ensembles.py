@@ -71,10 +71,10 @@ def estimate(of: Callable[..., float], *means: Mean) -> Value:
     for value, mean in zip(values, means, strict=True):
         grid = np.nan_to_num(np.broadcast_to(mean.grid, value.shape))
         for place in map(tuple, np.argwhere(grid)):
-            held = value[place]
-            value[place] = held + grid[place]
+            before = value[place]
+            value[place] = before + grid[place]
             variance += (of(*values) - central) ** 2
-            value[place] = held
+            value[place] = before
     return Value(central, float(np.sqrt(variance)))
 
 
@@ -134,13 +134,13 @@ class Group:
         return self.first.prediction
 
 
-def groups(held: Any, name: str) -> list[Group]:
+def groups(studies: Any, name: str) -> list[Group]:
     """The bodies of a study, exponents and grids rising.
 
     Raises ValueError where seeds have different pressures.
     """
     by_key: dict[tuple[Any, ...], list[Curve]] = {}
-    for curve in held.comparison(name).curves:
+    for curve in studies.comparison(name).curves:
         row = curve.rows[0]
         by_key.setdefault((without_seed(row), *solver_of(row)), []).append(curve)
     for curves in by_key.values():
@@ -152,10 +152,10 @@ def groups(held: Any, name: str) -> list[Group]:
     )
 
 
-def sample(held: Any, name: str) -> str:
+def sample(studies: Any, name: str) -> str:
     """The surfaces of a study in words: seeds, size of the cell and range of the spectrum."""
-    row = held.rows(name)[0]
-    seeds = len({row["seed"] for row in held.rows(name)})
+    row = studies.rows(name)[0]
+    seeds = len({row["seed"] for row in studies.rows(name)})
     return (
         f"Mean of {seeds} seeds, L = {1 / row['rolloff']:g} λᵣ, "
         f"λᵣ/λₛ = {row['rolloff'] / row['cutoff']:g}."

@@ -14,7 +14,7 @@ from gfmd_cli.grid.arrays import Field
 from paper.claims import Finding, Value
 from paper.drawing import STYLES, dense, draw_points, finish, label
 from paper.ensembles import Group, Mean, estimate, groups, sample
-from paper.studies import Held, needs
+from paper.studies import StoredStudies, needs
 
 TAIL = 3e-4  # least gap of the logarithmic representation
 LINEAR = (1.25, 1.75, 2.75)  # p* at which the slope of ln u_g is compared
@@ -23,10 +23,10 @@ DEFAULT_WIDTH = 0.1953125  # lambda_r / L of the slabs
 
 
 def _gap_over_pressure(
-    held: Held, folder: Path, study: str, name: str, x_scale: str, y_scale: str
+    studies: StoredStudies, folder: Path, study: str, name: str, x_scale: str, y_scale: str
 ) -> list[Group]:
     """u_g over p* with theory, all exponents but n = 0."""
-    ensembles = [group for group in groups(held, study) if group.n > 0]
+    ensembles = [group for group in groups(studies, study) if group.n > 0]
     plot, xs, ys, lines = ColumnFigure(P_STAR, GAP), [], [], []
     for group in ensembles:
         p, u = group.p, group.best("u_g")
@@ -68,12 +68,12 @@ def _pressure_errors(group: Group) -> Errors:
 
 
 @needs("fig06", "fig09b")
-def fig09a(held: Held, folder: Path) -> list[Finding]:
+def fig09a(studies: StoredStudies, folder: Path) -> list[Finding]:
     """H = 0.8 over the logarithm of the pressure; errors of theory, at large pressures of Fig. 9b."""
-    ensembles = _gap_over_pressure(held, folder, "fig06", "fig09a", "log", "linear")
+    ensembles = _gap_over_pressure(studies, folder, "fig06", "fig09a", "log", "linear")
     gaps = {label(group.n): _gap_errors(group, 1.0) for group in ensembles}
     light = {label(group.n): _gap_errors(group, 0.5) for group in ensembles if group.n < 4}
-    linear = {label(group.n): group for group in groups(held, "fig09b") if group.n > 0}
+    linear = {label(group.n): group for group in groups(studies, "fig09b") if group.n > 0}
     pressures = {name: _pressure_errors(group) for name, group in linear.items()}
     pressures = {name: errors for name, errors in pressures.items() if errors.u.value.size}
     largest = ", ".join(
@@ -86,7 +86,7 @@ def fig09a(held: Held, folder: Path) -> list[Finding]:
                 "median error of u_g, p* ≤ 1": _cases(gaps, np.median),
                 "median error of p, p* ≥ 1": _cases(pressures, np.median),
             },
-            f"Continuum values. {sample(held, 'fig06')} Largest errors of u_g: {largest}.",
+            f"Continuum values. {sample(studies, 'fig06')} Largest errors of u_g: {largest}.",
         ),
         Finding(
             "twenty_percent",
@@ -106,9 +106,9 @@ def _cases(errors: dict[str, Errors], statistic: Callable[[Field], float]) -> di
 
 
 @needs("fig09b")
-def fig09b(held: Held, folder: Path) -> list[Finding]:
+def fig09b(studies: StoredStudies, folder: Path) -> list[Finding]:
     """Large pressures on a linear axis."""
-    ensembles = _gap_over_pressure(held, folder, "fig09b", "fig09b", "linear", "log")
+    ensembles = _gap_over_pressure(studies, folder, "fig09b", "fig09b", "linear", "log")
     first, second, third = ({}, {}, {})
     for group in ensembles:
         slopes = [_decay(group, at) for at in LINEAR]
@@ -124,7 +124,7 @@ def fig09b(held: Held, folder: Path) -> list[Finding]:
                 "d ln u_g/d p* at p* = 1.75 over that at 1.25": first,
                 "d ln u_g/d p* at p* = 2.75 over that at 1.25": second,
             },
-            f"n = 1: {slopes_text} at p* = {at}. {sample(held, 'fig09b')} In theory the tail is Gaussian, "
+            f"n = 1: {slopes_text} at p* = {at}. {sample(studies, 'fig09b')} In theory the tail is Gaussian, "
             "and a finite surface has no gap beyond a finite pressure.",
         )
     ]
@@ -142,10 +142,10 @@ def _over(above: Callable[[Field], float], below: Callable[[Field], float], grou
 
 
 @needs("small_pressure")
-def small_pressure(held: Held, folder: Path) -> list[Finding]:
+def small_pressure(studies: StoredStudies, folder: Path) -> list[Finding]:
     """Small pressures: how much the gap falls from decade to decade."""
     plot, xs, ys, lines, ratios, limits = ColumnFigure(P_STAR, GAP), [], [], [], {}, {}
-    for group in groups(held, "small_pressure"):
+    for group in groups(studies, "small_pressure"):
         n, p, u = group.n, group.p, group.column("u_g")
         draw_points(plot, STYLES[n], p, u.value, u.error)
         line = dense(group.first)
@@ -166,7 +166,7 @@ def small_pressure(held: Held, folder: Path) -> list[Finding]:
             "quasi_logarithmic",
             {quantity: ratios},
             f"1 means a logarithm. The pressures, at which p is the rms stress of the waves up to 2 qᵣ, are "
-            f"p* = {limits_text}: the range shrinks as n rises. {sample(held, 'small_pressure')}",
+            f"p* = {limits_text}: the range shrinks as n rises. {sample(studies, 'small_pressure')}",
         )
     ]
 
@@ -191,23 +191,23 @@ def _long_waves(curve: Curve) -> float:
 
 
 @needs("fig06", "fig10", "fig10b")
-def fig10(held: Held, folder: Path) -> list[Finding]:
+def fig10(studies: StoredStudies, folder: Path) -> list[Finding]:
     """H = 0.3."""
-    _gap_over_pressure(held, folder, "fig10b", "fig10b", "linear", "log")
-    ensembles = _gap_over_pressure(held, folder, "fig10", "fig10a", "log", "linear")
-    return [_transfer(held, ensembles, "hurst", "H = 0.3 over H = 0.8")]
+    _gap_over_pressure(studies, folder, "fig10b", "fig10b", "linear", "log")
+    ensembles = _gap_over_pressure(studies, folder, "fig10", "fig10a", "log", "linear")
+    return [_transfer(studies, ensembles, "hurst", "H = 0.3 over H = 0.8")]
 
 
 @needs("fig06", "cut_off")
-def cut_off(held: Held, folder: Path) -> list[Finding]:
+def cut_off(studies: StoredStudies, folder: Path) -> list[Finding]:
     """A cut-off spectrum."""
-    ensembles = _gap_over_pressure(held, folder, "cut_off", "cut_off", "log", "linear")
-    return [_transfer(held, ensembles, "cut_off", "cut-off over roll-off")]
+    ensembles = _gap_over_pressure(studies, folder, "cut_off", "cut_off", "log", "linear")
+    return [_transfer(studies, ensembles, "cut_off", "cut-off over roll-off")]
 
 
-def _transfer(held: Held, ensembles: list[Group], key: str, ratio: str) -> Finding:
+def _transfer(studies: StoredStudies, ensembles: list[Group], key: str, ratio: str) -> Finding:
     """Errors of theory on other surfaces over those on the default ones, all exponents together."""
-    default = {group.n: _gap_errors(group, 1.0) for group in groups(held, "fig06")}
+    default = {group.n: _gap_errors(group, 1.0) for group in groups(studies, "fig06")}
     first = [_gap_errors(group, 1.0) for group in ensembles]
     second = [default[group.n] for group in ensembles]
     means = [errors.u for errors in (*first, *second)]
@@ -230,15 +230,15 @@ def _transfer(held: Held, ensembles: list[Group], key: str, ratio: str) -> Findi
             f"{name} error of u_g over all n, {ratio}": over(of)
             for name, of in (("median", np.median), ("largest", np.max))
         },
-        f"p* ≤ 1. {sample(held, 'fig06')} Largest errors: {each}.",
+        f"p* ≤ 1. {sample(studies, 'fig06')} Largest errors: {each}.",
     )
 
 
 @needs("spacing")
-def spacing(held: Held, folder: Path) -> list[Finding]:
+def spacing(studies: StoredStudies, folder: Path) -> list[Finding]:
     """Is u_g at two points per lambda_s good to a per cent?"""
     off = {}
-    ensembles = groups(held, "spacing")
+    ensembles = groups(studies, "spacing")
     coarse, fine = (
         {group.n: group for group in ensembles if group.first.points == points}
         for points in (128, 1024)
@@ -252,16 +252,16 @@ def spacing(held: Held, folder: Path) -> list[Finding]:
         Finding(
             "spacing",
             {"distance of u_g from the continuum": off},
-            f"p* = 0.1; u_g is too small on the grid for n ≥ 1. {sample(held, 'spacing')}",
+            f"p* = 0.1; u_g is too small on the grid for n ≥ 1. {sample(studies, 'spacing')}",
         )
     ]
 
 
 @needs("fig11")
-def fig11(held: Held, folder: Path) -> list[Finding]:
+def fig11(studies: StoredStudies, folder: Path) -> list[Finding]:
     """Slabs of four thicknesses, and a half-space."""
     ensembles = sorted(
-        groups(held, "fig11"),
+        groups(studies, "fig11"),
         key=lambda group: np.nan_to_num(group.first.rows[0]["thickness"], nan=np.inf),
     )
     x_label = P_STAR.replace("sigma", "sigma_\\mathrm{si}")
@@ -289,7 +289,7 @@ def fig11(held: Held, folder: Path) -> list[Finding]:
                     off["half-space"],
                 ),
             },
-            f"{sample(held, 'fig11')} Eq. 42 as printed gives γ₄ for qt → 0 and γ₁ for qt → ∞, which is "
+            f"{sample(studies, 'fig11')} Eq. 42 as printed gives γ₄ for qt → 0 and γ₁ for qt → ∞, which is "
             "correct; the conclusions interchange the two limits.",
         )
     ]

@@ -8,7 +8,7 @@ import numpy as np
 from gfmd_cli.analysis.plotting import ColumnFigure, log_scale
 from paper import kappa
 from paper.claims import Finding, Value, by_exponent
-from paper.studies import Held, needs
+from paper.studies import StoredStudies, needs
 from paper.tips import Tip, gap_fit, spread, stress_fit, style_of, tips
 
 THIN = {"color": "black", "lw": 0.6, "zorder": 4}
@@ -18,13 +18,13 @@ SHOWN = 40  # symbols on a curve
 
 
 @needs("fig01")
-def fig01(held: Held, folder: Path) -> list[Finding]:
+def fig01(studies: StoredStudies, folder: Path) -> list[Finding]:
     """Displacement over one period of a ridge, beside that of a line force."""
     plot = ColumnFigure(r"position  $x\,/\,\lambda$", r"(displacement $-$ valley) / depth")
-    rows = sorted(held.rows("fig01"), key=lambda row: row["n"])
+    rows = sorted(studies.rows("fig01"), key=lambda row: row["n"])
     exponents, off, bend, width = [row["n"] for row in rows], {}, {}, {}
     for row in rows:
-        section = held.section("fig01", row)
+        section = studies.section("fig01", row)
         points, u = row["points"], section["u"]
         x = np.arange(points) / points - 0.5
         mean = row["mean_height"] + row["mean_gap"]
@@ -83,16 +83,16 @@ def fig01(held: Held, folder: Path) -> list[Finding]:
     ]
 
 
-def _shown(held: Held) -> list[Tip]:
+def _shown(studies: StoredStudies) -> list[Tip]:
     """One contact for each exponent of the paper."""
-    return [tip for tip in tips(held, "fig02") if tip.n != 0.25]
+    return [tip for tip in tips(studies, "fig02") if tip.n != 0.25]
 
 
 @needs("fig02")
-def fig02(held: Held, folder: Path) -> list[Finding]:
+def fig02(studies: StoredStudies, folder: Path) -> list[Finding]:
     """Stress over the distance from the axis, in units of its value there."""
     plot = ColumnFigure(DISTANCE, r"stress  $\sigma(r)\,/\,\sigma(0)$")
-    shown = _shown(held)
+    shown = _shown(studies)
     exponents = [tip.n for tip in shown]
     rho = np.linspace(0, 1, 600)[:-1]
     for tip in shown:
@@ -108,11 +108,11 @@ def fig02(held: Held, folder: Path) -> list[Finding]:
         plot.line("exact", rho, line, **THIN)
     plot.axes.set(xlim=(0, 1.1), ylim=(0, 3))
     plot.write(folder / "fig02")
-    return [_stress_law(held), *_plate_stress(shown)]
+    return [_stress_law(studies), *_plate_stress(shown)]
 
 
-def _stress_law(held: Held) -> Finding:
-    fits = {tip.n: stress_fit(tip)[1] for tip in tips(held, "fig02") if tip.n not in (2, 4)}
+def _stress_law(studies: StoredStudies) -> Finding:
+    fits = {tip.n: stress_fit(tip)[1] for tip in tips(studies, "fig02") if tip.n not in (2, 4)}
 
     half = by_exponent({n: fit.times(1 / (1 - n / 2)) for n, fit in fits.items()})
     whole = by_exponent({n: fit.times(1 / (2 - n)) for n, fit in fits.items()})
@@ -149,10 +149,10 @@ def _plate_stress(shown: list[Tip]) -> list[Finding]:
 
 
 @needs("fig02")
-def fig03(held: Held, folder: Path) -> list[Finding]:
+def fig03(studies: StoredStudies, folder: Path) -> list[Finding]:
     """Displacement over the distance from the axis, beside that of a point force in the cell."""
     plot = ColumnFigure(DISTANCE, r"displacement  $u\,/\,(a_c^2 / R_c)$")
-    shown = _shown(held)
+    shown = _shown(studies)
     exponents = [tip.n for tip in shown]
     near, low = {}, []
     for tip in shown:
@@ -233,12 +233,12 @@ def _harmonic(tip: Tip) -> Finding:
 
 
 @needs("fig02")
-def fig03b(held: Held, folder: Path) -> list[Finding]:
+def fig03b(studies: StoredStudies, folder: Path) -> list[Finding]:
     """The gap just outside the contact, on logarithmic scales."""
     plot = ColumnFigure(
         r"distance from the edge  $(r - a_c)\,/\,a_c$", r"gap  $g\,/\,(a_c^2 / R_c)$"
     )
-    contacts = tips(held, "fig02")
+    contacts = tips(studies, "fig02")
     exponents = [tip.n for tip in contacts]
     fits = []
     for tip in contacts:

@@ -8,7 +8,7 @@ from scipy.optimize import least_squares
 
 from gfmd_cli.analysis.plotting import ColumnFigure
 from paper.claims import Finding, Value, by_exponent
-from paper.studies import Held, needs
+from paper.studies import StoredStudies, needs
 from paper.tips import Tip, spread, stress_fit, style_of, tips
 
 GIVEN = {0.0: 2 * np.sqrt(3) * 2 / np.sqrt(3) / np.pi, 0.5: 0.6655, 1.0: 3 / 8}
@@ -41,18 +41,18 @@ def kappa_prime(contacts: list[Tip]) -> Value:
     return Value(values[0], abs(values[0] - values[-1]))
 
 
-def _by_exponent(held: Held) -> dict[float, list[Tip]]:
+def _by_exponent(studies: StoredStudies) -> dict[float, list[Tip]]:
     contacts: dict[float, list[Tip]] = {}
-    for tip in tips(held, "kappa"):
+    for tip in tips(studies, "kappa"):
         contacts.setdefault(tip.n, []).append(tip)
     return contacts
 
 
 @needs("kappa")
-def kappa(held: Held, folder: Path) -> list[Finding]:
+def kappa(studies: StoredStudies, folder: Path) -> list[Finding]:
     """kappa_n over n beside the closed form."""
     plot = ColumnFigure(r"exponent  $n$", r"coefficient  $\kappa_n$")
-    groups = _by_exponent(held)
+    groups = _by_exponent(studies)
     primes = {n: kappa_prime(contacts) for n, contacts in groups.items()}
     shown = [n for n in primes if n < 3]
     x = np.linspace(0, 2.95, 200)

@@ -10,17 +10,17 @@ from gfmd_cli.analysis.plotting import ColumnFigure
 from paper.claims import SIGMAS, Finding, Value
 from paper.drawing import STYLES, dense, draw_limits, draw_points, finish
 from paper.ensembles import Group, Mean, estimate, groups, power, sample
-from paper.studies import Held, needs
+from paper.studies import StoredStudies, needs
 
 LIGHTEST, POWER, PLATES = 0.02, 0.17, 0.1
 """p* from and to which the power at n = 3 is taken, and from which plates are."""
 
 
 @needs("light")
-def light_area(held: Held, folder: Path) -> list[Finding]:
+def light_area(studies: StoredStudies, folder: Path) -> list[Finding]:
     """Contact area at n = 3 and 4: on the finest grid, and in the continuum."""
     plot, ys = ColumnFigure(P_STAR, r"relative contact area  $a_r$"), []
-    ensembles = groups(held, "light")
+    ensembles = groups(studies, "light")
     for group in (_finest(ensembles, n) for n in (3.0, 4.0)):
         p, a, own = group.p, group.continuum("a_r"), group.column("a_r").value
         style = STYLES[group.n]
@@ -40,10 +40,10 @@ def light_area(held: Held, folder: Path) -> list[Finding]:
         Finding(
             "other_power",
             {f"d ln a_r/d ln p* in the continuum, p* ≤ {POWER - 0.01:g}": slopes},
-            f"{sample(held, 'light')} {_spacings(_grids(ensembles, 3.0))} points per λₛ. The area on the grid "
+            f"{sample(studies, 'light')} {_spacings(_grids(ensembles, 3.0))} points per λₛ. The area on the grid "
             f"itself has the slope {_power(finest, finest.column('a_r'))} on {finest.first.points}².",
         ),
-        *_plates(held, _grids(ensembles, 4.0)),
+        *_plates(studies, _grids(ensembles, 4.0)),
     ]
 
 
@@ -70,7 +70,7 @@ def _spacings(grids: list[Group]) -> str:
     return ", ".join(f"{group.first.points * group.first.rows[0]['cutoff']:.0f}" for group in grids)
 
 
-def _plates(held: Held, grids: list[Group]) -> list[Finding]:
+def _plates(studies: StoredStudies, grids: list[Group]) -> list[Finding]:
     """Whether plates have a contact area, and 10 % of it."""
     finest = grids[-1]
     p, a = finest.p, finest.continuum("a_r")
@@ -107,7 +107,7 @@ def _plates(held: Held, grids: list[Group]) -> list[Finding]:
                     SIGMAS * a.error[nearest] / a.value[nearest]
                 )
             },
-            f"Two standard errors. {sample(held, 'light')} Up to {_spacings(grids[-1:])} points per λₛ; "
+            f"Two standard errors. {sample(studies, 'light')} Up to {_spacings(grids[-1:])} points per λₛ; "
             f"continuum values: {cases}. {missed} contacts missed the residual of 1e-5; the slowest took "
             f"{max(row['seconds'] for row in rows):.0f} s.",
         ),
@@ -116,10 +116,10 @@ def _plates(held: Held, grids: list[Group]) -> list[Finding]:
 
 
 @needs("light", "fig06")
-def light_deviation(held: Held, folder: Path) -> list[Finding]:
+def light_deviation(studies: StoredStudies, folder: Path) -> list[Finding]:
     """Stress deviation at n = 3 from grid to grid."""
     plot, ys = ColumnFigure(P_STAR, r"stress deviation  $\sigma_p\,/\,\Delta\sigma$"), []
-    grids = _grids(groups(held, "light"), 3.0)
+    grids = _grids(groups(studies, "light"), 3.0)
     for group, colour, marker in zip(grids, colours(len(grids)), MARKERS, strict=False):
         style = CurveStyle(colour, marker, f"{_spacings([group])} points per λₛ")
         deviation = group.column("sigma_p")
@@ -135,7 +135,7 @@ def light_deviation(held: Held, folder: Path) -> list[Finding]:
         f"{', '.join(f'{step:.3f}' for step in np.diff([each.value[i] for each in squares]))} at {at}"
         for at, i in steps.items()
     )
-    others = [group for group in groups(held, "fig06") if group.n <= 2]
+    others = [group for group in groups(studies, "fig06") if group.n <= 2]
     return [
         Finding(
             "divergence",
@@ -155,7 +155,7 @@ def light_deviation(held: Held, folder: Path) -> list[Finding]:
                 },
             },
             f"Equal increments mean a logarithm; {_spacings(grids)} points per λₛ: {cases}. "
-            f"{sample(held, 'light')}",
+            f"{sample(studies, 'light')}",
         ),
         Finding(
             "rise",

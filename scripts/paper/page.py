@@ -12,7 +12,7 @@ from paper.captions import CAPTIONS
 from paper.claims import Finding, Statement, result, verdict
 from paper.statements_hertz import HERTZ
 from paper.statements_rough import ROUGH
-from paper.studies import CONFIGS, STUDIES, Held
+from paper.studies import CONFIGS, STUDIES, StoredStudies
 
 WIDTH = 120  # characters of a line
 STATEMENTS: dict[str, Statement] = HERTZ | ROUGH
@@ -133,13 +133,13 @@ def _wavelengths(rows: list[dict[str, Any]]) -> tuple[str, str]:
     return long, short
 
 
-def sizes(held: Held) -> str:
+def sizes(studies: StoredStudies) -> str:
     """The studies of the page as a Markdown table, beside their full size where one is smaller."""
     heads = ["study", "L/λᵣ", "λᵣ/λₛ", "grids (points per side)", "surfaces", "contacts"]
     heads += ["missed their tolerance", "`make paper`"]
     lines = []
-    for name in (name for name in STUDIES if held.has(name)):
-        rows = held.rows(name)
+    for name in (name for name in STUDIES if studies.has(name)):
+        rows = studies.rows(name)
         grids = _grids(row["points"] for row in rows)
         full = planned(name)
         other = "" if full == (grids, len(rows)) else f"{full[0]}; {full[1]} contacts"
@@ -152,7 +152,7 @@ def sizes(held: Held) -> str:
     return "\n".join(f"| {' | '.join(line[:width])} |" for line in table)
 
 
-def write(findings: list[Finding], held: Held, figures: Path, target: Path) -> None:
+def write(findings: list[Finding], studies: StoredStudies, figures: Path, target: Path) -> None:
     """Write the page, and its figures (PNG) to figures/paper beside it."""
     folder = target.parent / "figures" / "paper"
     folder.mkdir(parents=True, exist_ok=True)
@@ -169,7 +169,7 @@ def write(findings: list[Finding], held: Held, figures: Path, target: Path) -> N
         table(findings),
         THEORY,
         SIZES,
-        sizes(held),
+        sizes(studies),
         MISPRINTS,
         "## Figures",
         gallery,

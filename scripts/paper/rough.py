@@ -10,7 +10,7 @@ from gfmd_cli.physics import einstein_solid
 from paper.claims import Finding, Value
 from paper.drawing import STYLES, dense, draw_limits, finish, label
 from paper.ensembles import estimate, groups, power, sample
-from paper.studies import Held, needs
+from paper.studies import StoredStudies, needs
 
 LIGHT = 0.035  # p* up to which a contact is called light
 HEAVY = 0.999  # p* from which it is called heavy
@@ -19,15 +19,15 @@ SHIFT = 100.0  # lines of `ColumnFigure` are drawn where they are positive; heig
 
 
 @needs("fig04")
-def fig04(held: Held, folder: Path) -> list[Finding]:
+def fig04(studies: StoredStudies, folder: Path) -> list[Finding]:
     """Displacement along the diagonal at 10 % contact."""
     plot = ColumnFigure(
         r"position along the diagonal  $r\,/\,L$", r"height  $h,\,u\;/\,h_\mathrm{std}$"
     )
-    rows = sorted(held.rows("fig04"), key=lambda row: row["n"])
+    rows = sorted(studies.rows("fig04"), key=lambda row: row["n"])
     longest, pieces, y = {}, {}, []
     for row in rows:
-        section, unit = held.section("fig04", row), row["h_std"]
+        section, unit = studies.section("fig04", row), row["h_std"]
         h, u = section["height"] / unit, section["u"] / unit
         x = (np.arange(h.size) / h.size - 0.5) * np.sqrt(2)
         if row is rows[0]:
@@ -81,10 +81,10 @@ def _highest(height: np.ndarray, half: int) -> int:
 
 
 @needs("fig05")
-def fig05(held: Held, folder: Path) -> list[Finding]:
+def fig05(studies: StoredStudies, folder: Path) -> list[Finding]:
     """Stress along the diagonal at its highest asperity: where the mean height is the largest."""
-    rows = {row["n"]: row for row in held.rows("fig05")}
-    sections = {n: held.section("fig05", row) for n, row in rows.items()}
+    rows = {row["n"]: row for row in studies.rows("fig05")}
+    sections = {n: studies.section("fig05", row) for n, row in rows.items()}
     height = sections[0.5]["height"]
     half = round(WINDOW * 0.005 * height.size / np.sqrt(2))  # lambda_s = 0.005 L
     summits = {wide: _highest(height, wide * half) for wide in (1, 2)}  # in lambda_s
@@ -135,11 +135,11 @@ def fig05(held: Held, folder: Path) -> list[Finding]:
 
 
 @needs("fig06", "fig09b")
-def fig06(held: Held, folder: Path) -> list[Finding]:
+def fig06(studies: StoredStudies, folder: Path) -> list[Finding]:
     """Contact area over pressure, and its ratio to theory, in the continuum."""
     area = ColumnFigure(P_STAR, r"relative contact area  $a_r$")
     xs, ys, slopes = [], [], {}
-    for group in groups(held, "fig06"):
+    for group in groups(studies, "fig06"):
         p, a, style = group.p, group.continuum("a_r"), STYLES[group.n]
         known = draw_limits(area, style, p, a.value, a.error)
         light = known & (p <= LIGHT)
@@ -151,7 +151,7 @@ def fig06(held: Held, folder: Path) -> list[Finding]:
     finish(area, folder, "fig06a", "log", "log", np.concatenate(xs), np.concatenate(ys))
     ratio = ColumnFigure(P_STAR, r"$a_r\,/\,a_r$(Persson)")
     xs, ys, heavy, gaussian = [], [], {}, ""
-    for group in groups(held, "fig09b"):
+    for group in groups(studies, "fig09b"):
         p, style = group.p, STYLES[group.n]
         a = group.continuum("a_r").over(group.theory.a_r)
         known = draw_limits(ratio, style, p, a.value, a.error)
@@ -165,7 +165,7 @@ def fig06(held: Held, folder: Path) -> list[Finding]:
         xs, ys = [*xs, p], [*ys, a.value[known]]
     ratio.axes.axhline(1.0, color="black", lw=0.9)
     finish(ratio, folder, "fig06b", "linear", "ratio", np.concatenate(xs), np.concatenate(ys))
-    remark = f"Continuum values. {sample(held, 'fig06')}"
+    remark = f"Continuum values. {sample(studies, 'fig06')}"
     return [
         Finding("linear", {f"d ln a_r/d ln p* for p* ≤ {LIGHT:g}": slopes}, remark),
         Finding(

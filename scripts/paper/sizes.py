@@ -13,7 +13,7 @@ from gfmd_cli.physics.surfaces import sample
 from paper.claims import Finding, Value
 from paper.drawing import STYLES, column, dense, draw_points, finish, label
 from paper.ensembles import Mean, groups
-from paper.studies import SEEDS, Held, needs
+from paper.studies import SEEDS, StoredStudies, needs
 
 GIVEN = {2: 6.0, 8: 8.0}  # height difference of the paper by L / lambda_r, in h_std
 SHIFTED = 1.3  # p of n = 1/2 in the figure, so that the symbols of n = 1 are seen
@@ -21,10 +21,10 @@ PARTED = 0.05  # relative difference from the closed form that counts
 
 
 @needs("fig12")
-def fig12(held: Held, folder: Path) -> list[Finding]:
+def fig12(studies: StoredStudies, folder: Path) -> list[Finding]:
     """The Einstein foundation in two cells."""
     plot, xs, ys, ends = ColumnFigure(P_STAR, GAP), [], [], {}
-    ensembles = sorted(groups(held, "fig12"), key=lambda group: -group.first.rows[0]["rolloff"])
+    ensembles = sorted(groups(studies, "fig12"), key=lambda group: -group.first.rows[0]["rolloff"])
     for group, colour, marker in zip(ensembles, colours(3), "so", strict=False):
         row = group.first.rows[0]
         name = f"L/λᵣ = {1 / row['rolloff']:g}"
@@ -99,15 +99,15 @@ def _spans(ratio: int) -> tuple[float, float, int]:
 
 
 @needs("large_cell_2", "large_cell_4")
-def large_cell(held: Held, folder: Path) -> list[Finding]:
+def large_cell(studies: StoredStudies, folder: Path) -> list[Finding]:
     """u_g over p* in cells of several sizes, mean over seeds."""
     plot, xs, ys, lines = ColumnFigure(P_STAR, GAP), [], [], []
-    ratios = [ratio for ratio in SEEDS if held.has(f"large_cell_{ratio}")]
+    ratios = [ratio for ratio in SEEDS if studies.has(f"large_cell_{ratio}")]
     means: dict[tuple[float, int], tuple[np.ndarray, np.ndarray]] = {}
     tones = colours(len(ratios))
     for n, filled in ((0.5, True), (1.0, False)):
         for ratio, colour, marker in zip(ratios, tones, MARKERS, strict=False):
-            p, mean, error = _ensemble(held, ratio, n)
+            p, mean, error = _ensemble(studies, ratio, n)
             means[n, ratio] = mean, error
             style = CurveStyle(colour, marker, f"{label(n)}, L/λᵣ = {ratio}")
             shown = p * (SHIFTED if filled else 1.0)
@@ -116,7 +116,7 @@ def large_cell(held: Held, folder: Path) -> list[Finding]:
                 plot.axes.lines[-2].set_markerfacecolor(colour)
                 plot.legend[style.label].set_markerfacecolor(colour)
             xs, ys = [*xs, shown], [*ys, mean]
-        curve = next(c for c in held.comparison("large_cell_2").curves if c.n == n)
+        curve = next(c for c in studies.comparison("large_cell_2").curves if c.n == n)
         lines.append((STYLES[n], dense(curve), curve.predict(dense(curve)).u_g))
     plot.theory(lines)
     finish(plot, folder, "large_cell", "log", "linear", np.concatenate(xs), np.concatenate(ys))
@@ -129,7 +129,7 @@ def large_cell(held: Held, folder: Path) -> list[Finding]:
             difference = Value(abs(mean - first)[at], float(np.hypot(error[at], spread[at])))
             changes[f"{label(n)}, L/λᵣ = {ratio}"] = difference
     seeds = ", ".join(
-        str(len({row["seed"] for row in held.rows(f"large_cell_{ratio}")})) for ratio in ratios
+        str(len({row["seed"] for row in studies.rows(f"large_cell_{ratio}")})) for ratio in ratios
     )
     quantity = "largest change of u_g against L = 2 λᵣ, in h_std (a symbol of Fig. 9a: 0.1)"
     return [
@@ -141,9 +141,11 @@ def large_cell(held: Held, folder: Path) -> list[Finding]:
     ]
 
 
-def _ensemble(held: Held, ratio: int, n: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _ensemble(
+    studies: StoredStudies, ratio: int, n: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Pressures, mean gap over seeds, and its standard error."""
-    rows = held.rows(f"large_cell_{ratio}", n=n)
+    rows = studies.rows(f"large_cell_{ratio}", n=n)
     p = np.unique(column(rows, "p_star"))
     each = [column([row for row in rows if row["p_star"] == at], "u_g") for at in p]
     mean = np.array([u.mean() for u in each])

@@ -16,7 +16,7 @@ from gfmd_cli.physics.observables import logarithmic_middles
 from paper.claims import Finding, Value
 from paper.drawing import STYLES, dense, draw_points, finish, label, slope
 from paper.ensembles import Mean, estimate, groups, sample
-from paper.studies import Held, needs
+from paper.studies import StoredStudies, needs
 
 LOWEST = 0.02  # stress [Delta_sigma] that is drawn
 TAIL = (4.0, 12.0)
@@ -24,10 +24,10 @@ TAIL = (4.0, 12.0)
 
 
 @needs("fig07", "edges")
-def fig07(held: Held, folder: Path) -> list[Finding]:
+def fig07(studies: StoredStudies, folder: Path) -> list[Finding]:
     """Pr(sigma) at 10 % contact on the finest grid; extrapolated where the grids allow."""
     plot, ys = ColumnFigure(STRESS, DENSITY), []
-    stresses = [one for group in _by_body(held, "fig07").values() for one in group]
+    stresses = [one for group in _by_body(studies, "fig07").values() for one in group]
     middle = logarithmic_middles()
     for one in stresses:
         style, fine = STYLES[one.curve.n], one.grids[-1]
@@ -39,13 +39,13 @@ def fig07(held: Held, folder: Path) -> list[Finding]:
     mean = float(np.mean([one.finest["p_star"] for one in stresses]))
     plot.theory([(STYLES[1.0], sigma, stresses[0].curve.stress_density(sigma, mean))])
     finish(plot, folder, "fig07", "log", "log", [LOWEST, 6.0], np.concatenate(ys))
-    return _small_stress(held)
+    return _small_stress(studies)
 
 
-def _small_stress(held: Held) -> list[Finding]:
+def _small_stress(studies: StoredStudies) -> list[Finding]:
     """Exponents of Pr(sigma) at small stress, on a surface whose edges the grids resolve."""
     paper, cases, exponents = {0.5: 0.3, 1.0: 0.6}, [], {}
-    for n, group in _by_body(held, "edges").items():
+    for n, group in _by_body(studies, "edges").items():
         law = fit(group[0], "small") if n in paper else None
         if law is None:
             continue
@@ -54,7 +54,7 @@ def _small_stress(held: Held) -> list[Finding]:
             f"{label(n)}: {exponents[n]} for σ = {law.lowest:.2g} to {law.highest:.2g} Δσ, "
             f"{Value(law.limit, law.limit_error)} at the edge"
         )
-    points = max(row["points"] * row["cutoff"] for row in held.rows("edges"))
+    points = max(row["points"] * row["cutoff"] for row in studies.rows("edges"))
     law = "n/(2 − n), law of the contact edge, less the μ of the paper"
     half = "exponent in the lowest resolved half decade"
     rises = {}
@@ -69,7 +69,7 @@ def _small_stress(held: Held) -> list[Finding]:
                 law: {label(n): Value(edge_exponent(n) - mu) for n, mu in paper.items()},
                 **({f"{half}, n = 1/2": exponents[0.5]} if 0.5 in exponents else {}),
             },
-            f"{'; '.join(cases)}. {sample(held, 'edges')} Up to {points:.0f} points per λₛ: finer surfaces "
+            f"{'; '.join(cases)}. {sample(studies, 'edges')} Up to {points:.0f} points per λₛ: finer surfaces "
             "are not resolved. σ ∝ d^(1−n/2) at an edge implies n/(2 − n) for n < 2; for n = 2 "
             "the stress at the edge is finite and no law follows.",
         ),
@@ -78,11 +78,11 @@ def _small_stress(held: Held) -> list[Finding]:
 
 
 @needs("fig06")
-def fig08(held: Held, folder: Path) -> list[Finding]:
+def fig08(studies: StoredStudies, folder: Path) -> list[Finding]:
     """Stress deviation over pressure; at n = 3 a lower bound on this grid."""
     plot = ColumnFigure(P_STAR, r"stress deviation  $\sigma_p\,/\,\Delta\sigma$")
     xs, ys = [], []
-    for group in groups(held, "fig06"):
+    for group in groups(studies, "fig06"):
         if group.n > 3:
             continue
         deviation, style = group.best("sigma_p"), STYLES[group.n]
@@ -99,10 +99,10 @@ def fig08(held: Held, folder: Path) -> list[Finding]:
 
 
 @needs("fig13")
-def fig13(held: Held, folder: Path) -> list[Finding]:
+def fig13(studies: StoredStudies, folder: Path) -> list[Finding]:
     """Pr(sigma) at n = 3 from grid to grid, and its tail."""
     plot = ColumnFigure(STRESS, DENSITY)
-    (distribution,) = [one for group in _by_body(held, "fig13").values() for one in group]
+    (distribution,) = [one for group in _by_body(studies, "fig13").values() for one in group]
     middle = logarithmic_middles()
     tones = colours(len(distribution.points))
     tails = {}
@@ -135,7 +135,7 @@ def fig13(held: Held, folder: Path) -> list[Finding]:
             },
             f"Its error includes the change from the coarser grid: {tails_text}; p* = {distribution.finest['p_star']:g}. "
             f"The mean stress in contact is {mean:.2g} Δσ; [other windows](theory.md#tail-of-the-stress-"
-            f"distribution-at-n-3). {sample(held, 'fig13')} The edge implies σ^−3, with which σ_p diverges logarithmically, as it "
+            f"distribution-at-n-3). {sample(studies, 'fig13')} The edge implies σ^−3, with which σ_p diverges logarithmically, as it "
             "does on the grids; with σ^−2.6 it would diverge as a power.",
         )
     ]
@@ -153,17 +153,19 @@ def tail_exponent(sigma: Field, counts: Field) -> Value:
     """
 
     def of(density: Field) -> float:
-        held = density > 0
-        errors = 1 / np.sqrt(density[held])  # relative, of the counted points
-        return slope(np.log(sigma[held]), np.log(density[held] / sigma[held]), errors).value
+        positive = density > 0
+        errors = 1 / np.sqrt(density[positive])  # relative, of the counted points
+        return slope(
+            np.log(sigma[positive]), np.log(density[positive] / sigma[positive]), errors
+        ).value
 
     return estimate(of, Mean(counts))
 
 
-def _by_body(held: Held, name: str) -> dict[float, list[Any]]:
+def _by_body(studies: StoredStudies, name: str) -> dict[float, list[Any]]:
     """The distributions of a study by exponent."""
     groups: dict[float, list[Any]] = {}
-    for distribution in distributions(held.comparison(name)):
+    for distribution in distributions(studies.comparison(name)):
         groups.setdefault(distribution.curve.n, []).append(distribution)
     return dict(sorted(groups.items()))
 

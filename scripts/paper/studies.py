@@ -79,7 +79,7 @@ LARGE = ("large_cell_8", "large_cell_16", "large_cell_32")  # not in a quick run
 
 
 @dataclass
-class Held:
+class StoredStudies:
     """The studies that have been run; each is read at its first use."""
 
     folder: Path
@@ -94,7 +94,7 @@ class Held:
         """Whether the study was run."""
         return self.path(name).exists()
 
-    def rows(self, name: str, **wanted: Any) -> list[dict[str, Any]]:
+    def rows(self, name: str, **values: Any) -> list[dict[str, Any]]:
         """The solved rows of a study with these values in these columns."""
         if name not in self._rows:
             rows = read_rows(self.path(name))
@@ -102,7 +102,7 @@ class Held:
         return [
             row
             for row in self._rows[name]
-            if all(row[key] == value for key, value in wanted.items())
+            if all(row[key] == value for key, value in values.items())
         ]
 
     def comparison(self, name: str) -> Comparison:
@@ -136,9 +136,9 @@ def run(name: str, folder: Path, quick: bool, jobs: int | None = None) -> None:
     command += ["-o", folder / f"{name}.h5", "-q"]
     command += ["-j", jobs] if jobs else []
     command += [word for setting in settings for word in ("--set", setting)]
-    ended = subprocess.run([str(word) for word in command], check=False)
-    if ended.returncode not in (0, 1):  # 1: some contact missed its tolerance, which its row says
-        raise SystemExit(ended.returncode)
+    done = subprocess.run([str(word) for word in command], check=False)
+    if done.returncode not in (0, 1):  # 1: some contact missed its tolerance, which its row says
+        raise SystemExit(done.returncode)
 
 
 def needs(*names: str) -> Any:

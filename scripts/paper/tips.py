@@ -9,7 +9,7 @@ from scipy.optimize import curve_fit
 
 from gfmd_cli.analysis.curve_styles import MARKERS, CurveStyle, colours
 from paper.claims import Value
-from paper.studies import Held
+from paper.studies import StoredStudies
 
 INSIDE = (0.8, 0.9, 0.95)  # shares of the contact radius up to which stress is fitted
 BEGINS, ENDS = (3, 4, 6), (0.3, 0.4, 0.5)  # gap: from so many points to so many radii off the edge
@@ -58,11 +58,11 @@ class Tip:
         return self.point() - moment / 4 * self.point(self.n - 2)
 
 
-def tips(held: Held, name: str) -> list[Tip]:
+def tips(studies: StoredStudies, name: str) -> list[Tip]:
     """The contacts of a study, by n, force and grid."""
     contacts = []
-    for row in held.rows(name):
-        section = held.section(name, row)
+    for row in studies.rows(name):
+        section = studies.section(name, row)
         half = slice(row["points"] // 2, None)
         u, height = section["u"][half], section["height"][half]
         place = np.arange(u.size) / row["points"] * np.sqrt(2)

@@ -12,7 +12,7 @@ from gfmd_cli.physics.persson import gamma_n
 from paper.claims import Finding, Value
 from paper.drawing import STYLES, column, draw_points, finish, label
 from paper.ensembles import Mean, estimate, groups, sample
-from paper.studies import Held, needs
+from paper.studies import StoredStudies, needs
 
 SHOWN = 0.1  # p* of the figure and of the comparison
 BODIES = (0.5, 1.0, 2.0)
@@ -20,13 +20,13 @@ LONGEST, SHORTEST = (0.9, 2.0), (32.0, 64.1)  # q L / 2 pi of the octaves; lambd
 
 
 @needs("weights")
-def weights(held: Held, folder: Path) -> list[Finding]:
+def weights(studies: StoredStudies, folder: Path) -> list[Finding]:
     """W over q beside Eq. (30), mean over the seeds."""
     plot = ColumnFigure(r"wave number  $qL\,/\,2\pi$", r"weight  $W$")
     octaves: dict[tuple[float, float], dict[str, Value]] = {LONGEST: {}, SHORTEST: {}}
     for n in BODIES:
-        curves = [curve for curve in held.comparison("weights").curves if curve.n == n]
-        pairs = [_weights(held, curve) for curve in curves]
+        curves = [curve for curve in studies.comparison("weights").curves if curve.n == n]
+        pairs = [_weights(studies, curve) for curve in curves]
         q, energy, theory = pairs[0][0], pairs[0][2], pairs[0][3]
         exponents = np.array([pair[1] for pair in pairs])
         style = STYLES[n]
@@ -52,18 +52,18 @@ def weights(held: Held, folder: Path) -> list[Finding]:
                 "measured W over Eq. (30), longest octave of waves": octaves[LONGEST],
                 "measured W over Eq. (30), shortest octave of waves": octaves[SHORTEST],
             },
-            f"p* = {SHOWN:g}. {sample(held, 'weights')} W = |u(q)|²/|h(q)|² weighted with k C. The errors of the "
+            f"p* = {SHOWN:g}. {sample(studies, 'weights')} W = |u(q)|²/|h(q)|² weighted with k C. The errors of the "
             "energy cancel in u_g ([measured](theory.md#the-weight-w-measured)).",
         ),
         Finding("exact_order", {}, "The program solves hard-wall contact only."),
-        *_sampling(held),
+        *_sampling(studies),
     ]
 
 
-def _weights(held: Held, curve: Any) -> tuple[np.ndarray, ...]:
+def _weights(studies: StoredStudies, curve: Any) -> tuple[np.ndarray, ...]:
     """Shells q L / 2 pi, W, k C and W of Eq. (30) at the pressure of the figure."""
     row = next(row for row in curve.rows if abs(row["p_star"] - SHOWN) < 1e-6)
-    spectra = held.spectra("weights", row)
+    spectra = studies.spectra("weights", row)
     full = spectra["height"] > 1e-12 * spectra["height"].max()
     q = spectra["q"][full]
     ratio = spectra["u"][full] / spectra["height"][full]
@@ -75,9 +75,9 @@ def _weights(held: Held, curve: Any) -> tuple[np.ndarray, ...]:
     return q * row["length"] / (2 * np.pi), ratio, energy, area * (gamma + (1 - gamma) * area**2)
 
 
-def _sampling(held: Held) -> list[Finding]:
+def _sampling(studies: StoredStudies) -> list[Finding]:
     """Delta_sigma over the contact: how it depends on n, and the area that it predicts."""
-    rows = [row for row in held.rows("weights") if abs(row["p_star"] - SHOWN) < 1e-6]
+    rows = [row for row in studies.rows("weights") if abs(row["p_star"] - SHOWN) < 1e-6]
 
     def mean(name: str, n: float) -> Mean:
         return Mean(column([row for row in rows if row["n"] == n], name))
@@ -86,7 +86,7 @@ def _sampling(held: Held) -> list[Finding]:
         return estimate(lambda large, small: large / small, mean(name, 2.0), mean(name, 0.5))
 
     light = {}
-    for group in groups(held, "weights"):
+    for group in groups(studies, "weights"):
         if group.n > 1:
             continue
         key = VARIANTS["deviation_bearing"]
@@ -110,7 +110,7 @@ def _sampling(held: Held) -> list[Finding]:
         Finding(
             "percentile",
             {"predicted over computed a_r at p* = 0.01": light},
-            f"a_r in the continuum. {sample(held, 'weights')}",
+            f"a_r in the continuum. {sample(studies, 'weights')}",
         ),
     ]
 

@@ -85,7 +85,7 @@ def test_a_damaged_checkpoint_gives_an_older_state_or_none(tmp_path):
     contact = Contact()
     contact.grid = grid
     states = []
-    with Checkpoint.held(tmp_path / "c") as checkpoint:
+    with Checkpoint.exclusive(tmp_path / "c") as checkpoint:
         for step in (1, 2):
             state = State(u=rng.random((16, 16)), sigma=rng.random((16, 16)), step=step)
             checkpoint.save(contact, state, Notes(trials=[Trial(16, step, 0.1, 1.0)]))
@@ -97,15 +97,15 @@ def test_a_damaged_checkpoint_gives_an_older_state_or_none(tmp_path):
             shutil.copytree(tmp_path / "c", tmp_path / "d")
             (tmp_path / "d" / name).write_bytes(bad)
             checkpoint = Checkpoint(tmp_path / "d")
-            said, resume = checkpoint.restore(), checkpoint.load(grid, Solver(kind="plain"))
+            message, resume = checkpoint.restore(), checkpoint.load(grid, Solver(kind="plain"))
             if resume is None:
                 met["anew"] += 1
-                assert ".bad" in said
+                assert ".bad" in message
             else:
                 step = resume.values["step"]
                 met[f"from step {step}"] += 1
                 assert checkpoint.notes.trials[0].pressure == step
-                assert (said is None) == (step == 2)
+                assert (message is None) == (step == 2)
                 np.testing.assert_array_equal(resume.values["u"], states[step - 1])
             shutil.rmtree(tmp_path / "d")
             for bad_file in tmp_path.glob("*.bad"):

@@ -22,14 +22,14 @@ def test_a_full_disk_is_one_message_and_the_run_goes_on_when_there_is_space(
             shutil.rmtree(path) if path.is_dir() else path.unlink()
         disk(f"size={size}k")
         words = ("run", folder / "spec.toml", *RUN[2:])
-        status, said = gfmd(place, *words)
+        status, output = gfmd(place, *words)
         statuses.append(status)
-        assert status in (0, 73), (size, said)
-        assert "Traceback" not in said
-        assert ("cannot be written" in said) or status == 0
+        assert status in (0, 73), (size, output)
+        assert "Traceback" not in output
+        assert ("cannot be written" in output) or status == 0
         disk("size=64m")
-        status, said = gfmd(place, *words)
-        assert (status, said) == (0, ""), size
+        status, output = gfmd(place, *words)
+        assert (status, output) == (0, ""), size
         assert_same_bits(place / "study.h5", folder / "unbroken.h5")
     print(dict(zip(SIZES, statuses, strict=True)))
     assert 73 in statuses
@@ -41,10 +41,10 @@ def test_a_read_only_folder_is_status_73_and_can_be_read(folder, gfmd, disk):
     (place / "spec.toml").write_text(SPEC)
     assert gfmd(place, *RUN, "--shard", "0/2")[0] == 0
     disk("ro")
-    status, said = gfmd(place, *RUN)
+    status, output = gfmd(place, *RUN)
     assert status == 73
-    assert "cannot be written" in said
-    assert "Traceback" not in said
+    assert "cannot be written" in output
+    assert "Traceback" not in output
     assert gfmd(place, "export", "study.h5")[0] == 0
     assert gfmd(place, "analyze", "study.h5")[0] == 0
     assert gfmd(place, "run", "spec.toml", "-o", "study.h5", "--dry-run")[0] == 0
@@ -54,9 +54,9 @@ def test_a_read_only_folder_is_status_73_and_can_be_read(folder, gfmd, disk):
         ("run", "spec.toml", "-o", "new.h5"),
         ("bench", "spec.toml"),
     ):
-        status, said = gfmd(place, *words)
-        assert status == 73, (words, said)
-        assert "Traceback" not in said
+        status, output = gfmd(place, *words)
+        assert status == 73, (words, output)
+        assert "Traceback" not in output
     disk("rw")
     assert gfmd(place, *RUN)[0] == 0
 
@@ -67,6 +67,6 @@ def test_a_directory_or_file_in_the_way_is_one_message(folder, gfmd, name):
         (folder / name).mkdir()
     else:
         (folder / name).write_text("")
-    status, said = gfmd(folder, *RUN)
+    status, output = gfmd(folder, *RUN)
     assert status in (73, 74)
-    assert len(said.strip().splitlines()) == 1
+    assert len(output.strip().splitlines()) == 1

@@ -275,7 +275,7 @@ def test_a_forged_column_of_a_study_is_refused(folder, gfmd, how):
         else:
             file.create_dataset("a_r", (2**40,), "f8", chunks=(2**20,), compression="gzip")
     for words in (("export",), ("analyze",)):
-        status, said = gfmd(folder, *words, "study.h5")
+        status, output = gfmd(folder, *words, "study.h5")
         assert status == 74
-        assert "a_r" in said
-        assert "Traceback" not in said
+        assert "a_r" in output
+        assert "Traceback" not in output

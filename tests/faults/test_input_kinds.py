@@ -56,11 +56,11 @@ def test_what_is_no_input_file_is_refused_soon(folder, start, gfmd, place):
                     if kind in word)  # fmt: skip
         make(folder / name.name, kind)
         child = start(folder, words, lambda: signal.alarm(SECONDS))
-        status, said = child.wait(), child.said
-        assert status in (2, 73, 74), (kind, status, said)
-        assert "Traceback" not in said, (kind, said)
-        assert kind in said or Path(os.path.realpath(folder / name.name)).name in said, said
-        assert len(said.splitlines()) < 6
+        status, output = child.wait(), child.said
+        assert status in (2, 73, 74), (kind, status, output)
+        assert "Traceback" not in output, (kind, output)
+        assert kind in output or Path(os.path.realpath(folder / name.name)).name in output, output
+        assert len(output.splitlines()) < 6
 
 
 LONG = 10_000_000  # bytes
@@ -84,6 +84,6 @@ def test_a_long_text_that_is_no_map_is_refused_soon(folder, start, text, suffix)
     pytest.importorskip("SurfaceTopography")
     (folder / f"map.{suffix}").write_bytes(TEXTS[text])
     child = start(folder, ("surface", f"map.{suffix}"), lambda: signal.alarm(SECONDS))
-    status, said = child.wait(), child.said
-    assert status == 2, (status, said)
-    assert "no known topography format" in said
+    status, output = child.wait(), child.said
+    assert status == 2, (status, output)
+    assert "no known topography format" in output

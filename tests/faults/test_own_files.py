@@ -138,18 +138,18 @@ def test_what_is_no_file_of_gfmd_is_refused_or_made_anew(study, start, gfmd, tmp
                 as_nobody(folder)
 
         child = start(folder, PLACES[place], prepare)
-        status, said = child.wait(), child.said
-        assert status in (0, *REFUSED), (kind, status, said)
-        assert "Traceback" not in said, (kind, said)
-        assert len(said.splitlines()) < 6
+        status, output = child.wait(), child.said
+        assert status in (0, *REFUSED), (kind, status, output)
+        assert "Traceback" not in output, (kind, output)
+        assert len(output.splitlines()) < 6
         assert outside.read_bytes() == b"precious", kind
         assert outside.stat().st_mode & 0o777 == 0o640, kind
         if status in REFUSED:
             known = (path.name, path.parent.name, os.path.realpath(path))
-            assert any(name in said for name in known), (kind, said)
+            assert any(name in output for name in known), (kind, output)
             assert os.path.lexists(path), kind
             shutil.rmtree(path) if kind == "directory" else path.unlink()
             assert gfmd(folder, *RUN) == (0, ""), kind
         else:
-            assert len(said.splitlines()) < 2
+            assert len(output.splitlines()) < 2
         assert [row["status"] for row in read_rows(folder / "study.h5")] == ["converged"] * 2

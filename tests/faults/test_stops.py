@@ -93,12 +93,12 @@ def test_max_hours_ends_in_time_with_all_saved(folder, gfmd):
     # Three times the limit on this machine, however fast it is.
     words = long(int(200 * 36 / (time.monotonic() - begun)))
     begun = time.monotonic()
-    status, said = gfmd(folder, *words, "--max-hours", str(12 / 3600))
-    assert status == 75, said
+    status, output = gfmd(folder, *words, "--max-hours", str(12 / 3600))
+    assert status == 75, output
     assert time.monotonic() - begun < 12
     assert any((folder / "study.parts").glob("*/pointer"))
     while status == 75:
-        status, said = gfmd(folder, *words, "--max-hours", str(12 / 3600))
+        status, output = gfmd(folder, *words, "--max-hours", str(12 / 3600))
     assert status == 1
     assert gfmd(folder, *words, "-o", "unbroken.h5")[0] == 1
     assert_same_bits(folder / "study.h5", folder / "unbroken.h5")
@@ -116,8 +116,8 @@ def test_a_clock_that_is_set_back_changes_nothing(folder, gfmd, start):
     assert child.wait() in (75, 0)
     for path in (folder / "study.parts").rglob("*"):
         os.utime(path, (4e9, 4e9))  # the year 2096
-    status, said = gfmd(folder, *RUN, "study.h5", before=set_back)
-    assert status == 0, said
+    status, output = gfmd(folder, *RUN, "study.h5", before=set_back)
+    assert status == 0, output
     assert_same_bits(folder / "study.h5", folder / "unbroken.h5")
 
 

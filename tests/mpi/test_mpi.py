@@ -223,8 +223,8 @@ def test_a_scan_with_holes(mpiexec, tmp_path, points, boundary):
 @pytest.mark.parametrize("others", ["done", "waiting"])
 def test_an_error_of_one_process_ends_all(mpiexec, kind, others):
     done = mpiexec(3, "failing.py", kind, others, status=73 if kind == "known" else 1)
-    said = "no space on one of them" if kind == "known" else "rank 1: KeyError: 'x'"
-    count = (done.stdout + done.stderr).count(said)
+    message = "no space on one of them" if kind == "known" else "rank 1: KeyError: 'x'"
+    count = (done.stdout + done.stderr).count(message)
     assert count == 3 if others == "done" else count >= 1  # each that waits in vain may say so
 
 
