@@ -22,6 +22,7 @@ from gfmd_cli.study.columns import COLUMNS
 from gfmd_cli.study.reading import read_rows
 from gfmd_cli.study.run import run_study
 
+BY_SIZE = Grid._threads
 if "GFMD_TEST_THREADS" in os.environ:  # `make test-portable`: on small grids too
     every_grid = int(os.environ["GFMD_TEST_THREADS"])
     Grid._threads = property(lambda grid: every_grid if grid.dimension == 2 else 1)
@@ -54,6 +55,12 @@ SPRINGS = power_spec(n=0, points=32, p_star=[0.1, 0.3])
 def springs(tmp_path):
     """spec.toml in tmp_path, of two contacts that take no time to solve."""
     (tmp_path / "spec.toml").write_text(SPRINGS)
+
+
+@pytest.fixture
+def threads_by_size(monkeypatch):
+    """As many threads as in the processes that a test starts, where the last bits are compared."""
+    monkeypatch.setattr(Grid, "_threads", BY_SIZE)
 
 
 @pytest.fixture(scope="session")

@@ -356,7 +356,8 @@ def test_max_hours_stop_a_run_as_a_signal_does(run, tmp_path, monkeypatch):
     assert list((tmp_path / "study.parts").glob("*/pointer"))
 
 
-def test_a_reproducible_run_has_the_same_bits_on_any_number_of_processes(run, monkeypatch):
+@pytest.mark.usefixtures("threads_by_size")
+def test_a_reproducible_run_has_the_same_bits_on_any_number_of_processes(run):
     paths = [
         run(LONG, f"{jobs}.h5", ("solver.max_steps=20",), jobs=jobs, reproducible=True)[0]
         for jobs in (1, 2)
@@ -453,6 +454,7 @@ def assert_equal_studies(path, other):
                 np.testing.assert_array_equal(a[name][()], b[name][()], name)
 
 
+@pytest.mark.usefixtures("threads_by_size")
 @pytest.mark.parametrize("jobs", ["1", "2"])
 def test_a_signal_saves_the_state_and_the_same_call_goes_on(run, tmp_path, jobs):
     unbroken, _, _ = run(LONG, name="unbroken.h5")
