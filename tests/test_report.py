@@ -181,7 +181,7 @@ def test_every_figure_and_table_is_there(whole):
     assert len(page.all("details")) == 3 + 2 + 1 + 1 + 1 + 1 + 1
     text = " ".join(page.words)
     assert "All 8 contacts converged." in text
-    assert "8 contacts: 2 elastic bodies (power n=0 and power n=1) on the surface" in text
+    assert "8 contacts: 2 elastomers (power n=0 and power n=1), surface" in text
     assert 'kind = "self-affine"' in text
     for words in ("numpy", "Git commit", "Python"):
         assert words in text

@@ -40,7 +40,7 @@ def headline(data: ReportData) -> str:
     pascals = span(_column(rows, "pressure"), "Pa")
     pressures = count(max(len(curve.rows) for curve in curves), "pressure")
     return (
-        f"{count(len(data.rows), 'contact')}: {_some(elastomers, 'elastic body')} on "
+        f"{count(len(data.rows), 'contact')}: {_some(elastomers, 'elastomer')}, "
         f"{_some(surfaces, 'surface')}, {count(seeds, 'seed') + ', ' if seeds > 1 else ''}"
         f"{pressures} from p* = {span(_column(rows, 'p_star'))}"
         f"{f' ({pascals})' if data.in_si else ''}, {grid_size(rows)}."
@@ -49,7 +49,7 @@ def headline(data: ReportData) -> str:
 
 def _some(names: list[str], what: str) -> str:
     if len(names) == 1:
-        return f"the {what} {names[0]}"
+        return f"{what} {names[0]}"
     return count(len(names), what) + (f" ({listed(names)})" if len(names) <= MAX_NAMES else "")
 
 
