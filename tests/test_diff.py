@@ -110,7 +110,7 @@ def test_another_body_is_paired_by_pressure_and_compared_in_pascal_and_metres(ou
             assert pair.deviation(name).relative == expected
         assert pair.deviation("a_r").relative < 0 < pair.deviation("u_g").relative
     text = output_of("diff", study_of(*IN_PASCAL), study_of(*stiff))
-    assert text.startswith("bodies differ: paired by pressure, sigma_p in Pa, u_g in m. ")
+    assert text.startswith("elastomers differ: paired by pressure, sigma_p in Pa, u_g in m. ")
     data = json.loads(output_of("diff", study_of(*IN_PASCAL), study_of(*stiff), "--json"))
     assert data["paired"] == difference.paired
 

@@ -519,7 +519,7 @@ def test_values_are_told_with_units():
     assert span([7e6, 1.2e8, np.nan], "Pa") == f"7 to 120{SPACE}MPa"
     assert span([2e-6]) == f"2{SPACE}×{SPACE}10⁻⁶"
     assert span([]) == "unknown"
-    assert [count(n, "body") for n in (1, 2)] == ["1 body", "2 bodies"]
+    assert [count(n, "task") for n in (1, 2)] == ["1 task", "2 tasks"]
 
 
 def test_templates_and_style_sheet_are_installed_with_the_package():

@@ -127,7 +127,7 @@ def _paired(pair: Pair) -> str:
     """What sets the studies apart, and by what their rows are paired."""
     apart = [
         what
-        for what, names in {"surfaces": ("surface", "seed"), "bodies": ("elastomer",)}.items()
+        for what, names in {"surfaces": ("surface", "seed"), "elastomers": ("elastomer",)}.items()
         if any(pair.one[name] != pair.other[name] for name in names)
     ]
     load = pair.one["load"]

@@ -87,9 +87,7 @@ def grid_size(rows: Sequence[Mapping[str, Any]]) -> str:
 
 def count(number: int, what: str) -> str:
     """A number of things, in the singular or the plural."""
-    if number == 1:
-        return f"1 {what}"
-    return f"{number} {what[:-1] + 'ies' if what.endswith('dy') else what + 's'}"
+    return f"1 {what}" if number == 1 else f"{number} {what}s"
 
 
 def listed(words: list[str]) -> str:

@@ -106,8 +106,8 @@ def _curve(
 
 def _title(trace: Trace) -> str:
     row = trace.row
-    body = f"{row['elastomer']} on {row['surface']}"[:MAX_LABEL].replace("$", r"\$")
-    return f"{body}, {row['points']} points, p* = {row['p_star']:.4g}"
+    contact = f"{row['elastomer']} on {row['surface']}"[:MAX_LABEL].replace("$", r"\$")
+    return f"{contact}, {row['points']} points, p* = {row['p_star']:.4g}"
 
 
 def _slug(text: str) -> str:

@@ -138,7 +138,7 @@ def run_bench(spec: Spec, report: Report) -> list[Trace]:
             for solver in solvers_to_compare(spec, task, contact):
                 traces.append(_trace(contact, solver, reference, row, report, len(traces)))
     if not traces:
-        raise InputError("solver.kind: fit for none of the bodies; take auto, ccg, fire or pcg")
+        raise InputError("solver.kind: fit for none of the elastomers; take auto, ccg, fire or pcg")
     return traces
 
 

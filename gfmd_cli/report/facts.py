@@ -48,7 +48,7 @@ UNCONVERGED_CAPTION = (
 )
 UNCONVERGED = (
     Column("task", "task", "d"),
-    Column("body", "elastomer"),
+    Column("elastomer", "elastomer"),
     Column("surface", "surface"),
     P_STAR,
     STATUS,

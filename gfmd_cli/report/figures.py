@@ -40,13 +40,13 @@ FIGURES = {
 """Figures over the pressure by name, with what they show."""
 DISTRIBUTIONS = {
     "stress_distribution": (
-        "Distribution of the stress over logarithmic stress, bodies side by side",
-        "Pr(sigma) of the bodies at about one pressure, over logarithmic bins. Symbols: "
+        "Distribution of the stress over logarithmic stress, elastomers side by side",
+        "Pr(sigma) of the elastomers at about one pressure, over logarithmic bins. Symbols: "
         "simulation{lines}. Bins with fewer than ten grid points are left out.",
     ),
     "stress_distribution_pressures": (
         "Distribution of the stress over linear stress, at several pressures",
-        "Pr(sigma) of one body at several pressures. Thick: simulation{thin}.",
+        "Pr(sigma) of one elastomer at several pressures. Thick: simulation{thin}.",
     ),
     "stress_distribution_continuum": (
         "Distribution of the stress in the continuum, with error bars and edge laws",
@@ -56,8 +56,8 @@ DISTRIBUTIONS = {
 }
 """Label and caption by the name of the figure; {lines}, {thin}: what says which is theory."""
 BINS_BEHIND = {
-    "stress_distribution": "Table: bodies at about one pressure",
-    "stress_distribution_pressures": "Table: one body at several pressures",
+    "stress_distribution": "Table: elastomers at about one pressure",
+    "stress_distribution_pressures": "Table: one elastomer at several pressures",
 }
 BINS = (
     Column("sigma / Delta_sigma", "sigma"),

@@ -42,7 +42,7 @@ STORED = ("fields", "cross_sections")
 CAPTION = "The values are in /fields/TASK and /cross_sections/TASK of the study file."
 SHOWN = (
     Column("task", "task", "d"),
-    Column("body", "elastomer"),
+    Column("elastomer", "elastomer"),
     P_STAR,
     PRESSURE,
     AREA,
