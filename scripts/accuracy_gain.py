@@ -2,8 +2,8 @@
 
     python scripts/accuracy_gain.py --max-points 4096
 
-The default study, mean gap to 1 % and contact area to 5 %: each body and pressure on the coarsest
-grid that gives it, against all of them on the finest grid that one of them needed.
+The default study, mean gap to 1 % and contact area to 5 %: each elastomer and pressure on the
+coarsest grid that meets both, against all of them on the finest grid that one of them needed.
 """
 
 import argparse

@@ -74,7 +74,8 @@ class Case:
     """Spacing along y over that along x; `base` counts the points along y."""
 
     @property
-    def body(self) -> bool:
+    def is_single(self) -> bool:
+        """Whether the indenter is a single one."""
         return isinstance(self.surface, Parabola | Wave)
 
 
@@ -110,28 +111,32 @@ def free_cases(folder: Path, seed: int) -> list[Case]:
     """Parts of random maps and profiles, and paraboloids, with a free boundary."""
     draw, out = np.random.default_rng(seed + 3), []
 
-    def add(kind: str, body: Elastomer, surface: Surface | np.ndarray, doublings: int) -> None:
+    def add(kind: str, elastomer: Elastomer, surface: Surface | np.ndarray, doublings: int) -> None:
         path = folder / f"{kind}-{seed}-{len(out)}.npy"
         base = 32
         if isinstance(surface, np.ndarray):
             np.save(path, surface)
             base = surface.shape[-1]
             surface = FileSurface(path=path, periodic=False).within("free")
-        p, name = float(draw.choice(PRESSURES[1:8])), f"{_name(body)} {kind}"
-        case = Case(len(out), name, surface, body, p, base, doublings, False, "free")
+        p, name = float(draw.choice(PRESSURES[1:8])), f"{_name(elastomer)} {kind}"
+        case = Case(len(out), name, surface, elastomer, p, base, doublings, False, "free")
         out.append(case)
 
     for _ in range(2):
-        for body in [*(Power(n=n) for n in FREE_EXPONENTS), Layer(thickness=0.1, base="sliding")]:
+        for elastomer in [
+            *(Power(n=n) for n in FREE_EXPONENTS),
+            Layer(thickness=0.1, base="sliding"),
+        ]:
             for kind in FREE:
-                sizes = [32, 64, 128] if (body.exponent or 0.0) <= 1 else [32, 64]  # 1024^2 is slow
+                is_fast = (elastomer.exponent or 0.0) <= 1  # else 1024^2 is slow
+                sizes = [32, 64, 128] if is_fast else [32, 64]
                 points = int(draw.choice(sizes))
                 whole = irregular_map(kind.replace("part", "random"), draw, 2 * points)
-                add(kind, body, whole[: points - 5, :points], 4 if points == 32 else 3)
-            if isinstance(body, Power):
-                add("parabola", body, Parabola(), 4)
-            if body.decays(1):
-                add("line", body, irregular_map("random", draw, 128)[0, :64], 5)
+                add(kind, elastomer, whole[: points - 5, :points], 4 if points == 32 else 3)
+            if isinstance(elastomer, Power):
+                add("parabola", elastomer, Parabola(), 4)
+            if elastomer.decays(1):
+                add("line", elastomer, irregular_map("random", draw, 128)[0, :64], 5)
     return out
 
 
@@ -148,8 +153,10 @@ def shape_cases(folder: Path, seed: int) -> list[Case]:
                     seed=int(draw.integers(1, 10**6)),
                 )
                 p, name = float(draw.choice(PRESSURES[1:7])), f"n={n:g} pixels {aspect}:1"
-                body = Power(n=n)
-                out.append(Case(len(out), name, surface, body, p, base, 3, False, aspect=aspect))
+                elastomer = Power(n=n)
+                out.append(
+                    Case(len(out), name, surface, elastomer, p, base, 3, False, aspect=aspect)
+                )
         for missing in ("fill", "void"):
             for points in (32, 32, 48):
                 path = folder / f"{missing}-{seed}-{len(out)}.npy"
@@ -202,15 +209,15 @@ def cases(folder: Path, seed: int = 20) -> list[Case]:
     draw = np.random.default_rng(seed)
     out: list[Case] = []
 
-    def add(name: str, surface: Surface, body: Elastomer, p: float, base: int) -> None:
-        steep = isinstance(body, Power) and body.n > 3
+    def add(name: str, surface: Surface, elastomer: Elastomer, p: float, base: int) -> None:
+        steep = isinstance(elastomer, Power) and elastomer.n > 3
         doublings = 3 if base > 72 else 4 if steep or base > 32 else 5
         fit = replicate == 0
-        out.append(Case(len(out), name, surface, body, float(p), base, doublings, fit))
+        out.append(Case(len(out), name, surface, elastomer, float(p), base, doublings, fit))
 
     for replicate in range(2):
-        for body in [Power(n=n) for n in EXPONENTS] + [Slab(thickness=t) for t in THICKNESSES]:
-            pressures = PRESSURES if isinstance(body, Power) else PRESSURES[1:6]
+        for elastomer in [Power(n=n) for n in EXPONENTS] + [Slab(thickness=t) for t in THICKNESSES]:
+            pressures = PRESSURES if isinstance(elastomer, Power) else PRESSURES[1:6]
             for p in pressures:
                 modes = int(draw.choice([10, 12, 16, 20, 24]))
                 spectrum = str(draw.choice(["rolloff", "cutoff"]))
@@ -222,7 +229,13 @@ def cases(folder: Path, seed: int = 20) -> list[Case]:
                     seed=int(draw.integers(1, 10**6)),
                 )
                 base = 2 * round(modes * float(draw.choice([1.0, 1.25, 1.5])))
-                add(_name(body) + f" H={surface.hurst:g} {spectrum}", surface, body, p, base)
+                add(
+                    _name(elastomer) + f" H={surface.hurst:g} {spectrum}",
+                    surface,
+                    elastomer,
+                    p,
+                    base,
+                )
         for kind in ("peaks", "pits", "ridges", "white"):
             for n in (0.5, 1.0, 2.0, 3.0):
                 path = folder / f"{kind}-{replicate}-{n:g}.npy"
@@ -246,8 +259,12 @@ def cases(folder: Path, seed: int = 20) -> list[Case]:
     return out
 
 
-def _name(body: Elastomer) -> str:
-    return f"n={body.n:g}" if isinstance(body, Power) else f"{body.kind} t={body.thickness:g}"
+def _name(elastomer: Elastomer) -> str:
+    return (
+        f"n={elastomer.n:g}"
+        if isinstance(elastomer, Power)
+        else f"{elastomer.kind} t={elastomer.thickness:g}"
+    )
 
 
 def height_map(kind: str, draw: np.random.Generator, points: int = 32) -> np.ndarray:
@@ -277,7 +294,7 @@ def measure(case: Case, tolerance: float = 1e-6) -> dict:
         scene = scene_of(case, points)
         first = first or scene
         # Delta_sigma of a kink, or of a map interpolated by monotone cubics, is one of the grid
-        changes = case.body or not case.surface.band_limited
+        changes = case.is_single or not case.surface.band_limited
         stress = scene.delta_sigma / first.delta_sigma if changes else 1.0
         height = scene.h_std / first.h_std if changes else 1.0
         contact, length = scene.contact(case.p_star / stress), scene.grid.length
@@ -295,7 +312,7 @@ def measure(case: Case, tolerance: float = 1e-6) -> dict:
                 "perimeter": observables.perimeter,
                 "energy": observables.energy * stress * height,
                 "border": _border(contact, solution),
-                "texture": None if case.body else _texture(case, scene),
+                "texture": None if case.is_single else _texture(case, scene),
                 "status": solution.status,
                 "seconds": round(time.perf_counter() - begun, 3),
             }
@@ -304,7 +321,7 @@ def measure(case: Case, tolerance: float = 1e-6) -> dict:
         "name": case.name,
         "fit": case.fit,
         "p_star": case.p_star,
-        "body": case.body,
+        "single": case.is_single,
         "levels": levels,
     }
 
@@ -381,7 +398,7 @@ def scores(records: list[dict]) -> Iterator[Score]:
         ]
         for last in range(len(levels) - int(np.log2(FINER))):
             fine, at_last = levels[last], record["levels"][last]
-            rough = None if record["body"] else RoughnessScales(**at_last["texture"])
+            rough = None if record["single"] else RoughnessScales(**at_last["texture"])
             if fine.u_g < FULL:
                 continue
             for grids in range(1, min(last + 1, 3) + 1):
@@ -466,7 +483,7 @@ def table(scored: list[Score]) -> None:
                 lambda s: not s.fit and s.quantity == quantity and kind in s.name,  # noqa: B023
             )
         line(
-            f"verify {quantity} single body",
+            f"verify {quantity} single indenter",
             lambda s: (
                 not s.fit
                 and s.quantity == quantity  # noqa: B023

@@ -2,8 +2,8 @@
 
     python scripts/hard_cases.py [--points 512] [--only WORDS] > table.md
 
-Loads that leave one spot of contact or one of gap, stiff and soft bodies, flat plateaus, roughness
-down to two grid points. Columns beyond the obvious:
+Loads that leave one spot of contact or one of gap, stiff and soft elastomers, flat plateaus,
+roughness down to two grid points. Columns beyond the obvious:
 
     identity  |2 v / (<sigma h> - p <u>) - 1|; the two differ by <sigma g>, zero at the solution
     u_g off   by how much u_g changes, relatively, once the residual is 1e-8
@@ -70,7 +70,7 @@ class Case:
     elastomer: Elastomer
     p_star: float
     of_full: bool = False
-    body: str = ""
+    stiffness: str = ""
     """What stands in the column n; by default the exponent."""
     finer: int = 1
     """Factor on the points of a side."""
@@ -82,7 +82,7 @@ class Case:
 
     @property
     def exponent(self) -> str:
-        return self.body or f"{self.elastomer.n:g}"
+        return self.stiffness or f"{self.elastomer.n:g}"
 
     def contact(self, points: int) -> Contact:
         scene = build_scene(self.surface, self.elastomer, points * self.finer)
@@ -134,9 +134,9 @@ def cases(points: int, folder: Path) -> Iterator[Case]:
             p = share * float(reference.beam_line_pressure(1.0, 1.0, 1.0))
             yield Case("line parabola", ridge, beam, p / scene.delta_sigma, finer=finer)
     for table in TABLES:
-        body = Tabulated(path=folder / f"{table}.txt")
+        elastomer = Tabulated(path=folder / f"{table}.txt")
         for p_star in (1e-3, 0.05):
-            yield Case(table.replace("-", " "), rough, body, p_star, body="table")
+            yield Case(table.replace("-", " "), rough, elastomer, p_star, stiffness="table")
 
 
 def coated(m):

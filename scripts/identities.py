@@ -1,7 +1,7 @@
 """How well the exact identities of the contact problem hold on the default surface.
 
 2 v = <sigma h> - p <u>;  -dv/du_g = p;  integral of u_g dp = v + p u_g between two pressures, which
-becomes v_full over all pressures. Prints one line for each body.
+becomes v_full over all pressures. Prints one line for each elastomer.
 """
 
 import sys

@@ -219,10 +219,10 @@ def test_the_forecast_of_grids_is_right_within_a_factor_of_four(spec_of, rows_of
 @pytest.mark.parametrize("tolerance", [1e-2, 1e-4, 1e-6])
 @pytest.mark.parametrize("p_star", [0.003, 0.1, 1.0, 3.0])
 @pytest.mark.parametrize(
-    "body", [Power(n=0.5), Power(n=1), Power(n=2), Power(n=4), Slab(thickness=0.02)]
+    "elastomer", [Power(n=0.5), Power(n=1), Power(n=2), Power(n=4), Slab(thickness=0.02)]
 )
-def test_the_certificate_bounds_the_distance_to_the_solution(body, p_star, tolerance):
-    contact = build_scene(SelfAffine(cutoff=0.04), body, 128).contact(p_star)
+def test_the_certificate_bounds_the_distance_to_the_solution(elastomer, p_star, tolerance):
+    contact = build_scene(SelfAffine(cutoff=0.04), elastomer, 128).contact(p_star)
 
     def solved(tolerance):
         solution = solve_contact(contact, Auto(tolerance=tolerance))

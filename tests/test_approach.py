@@ -90,8 +90,8 @@ def test_table_that_begins_constant_has_a_level(rows_of, tmp_path):
     np.savetxt(tmp_path / "k.txt", np.column_stack([q, k]), fmt="%.17g")
     rough = "surface={kind='self-affine', cutoff=0.1}"
     rows = [
-        rows_of(rough, f"elastomer={body}", "grid={points=64}", "load={p_star=0.3}", name=name)[0]
-        for name, body in {
+        rows_of(rough, f"elastomer={table}", "grid={points=64}", "load={p_star=0.3}", name=name)[0]
+        for name, table in {
             "layer": "{kind='layer', thickness=0.1, base='sliding'}",
             "table": f"{{kind='table', path='{tmp_path / 'k.txt'}'}}",
         }.items()

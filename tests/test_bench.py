@@ -41,7 +41,7 @@ def ignore(_):
 
 
 def kinds(spec):
-    """Solvers that are compared on each contact, one contact a body."""
+    """Solvers that are compared on each contact, one contact a elastomer."""
     names = []
     for task in plan(spec):
         contact = build_scene(task.surface, task.elastomer, task.points).contact(task.load)
@@ -108,7 +108,7 @@ def test_the_recording_is_not_timed(spec_of, monkeypatch):
         assert np.all(trace.samples["seconds"] == 0)
 
 
-def test_an_open_choice_of_solver_compares_all_that_fit_the_body(spec_of):
+def test_an_open_choice_of_solver_compares_all_that_fit_the_elastomer(spec_of):
     spec = spec_of("solver.kind='auto'", "elastomer.n=[0, 1, 3]", "grid.points=64")
     assert kinds(spec) == [
         ["sort", "ccg", "fire", "polonsky-keer"],

@@ -7,11 +7,11 @@ from gfmd_cli.study.context import Progress
 from gfmd_cli.study.time_left import Clock
 
 
-def task(index, seconds, body="a"):
+def task(index, seconds, elastomer="a"):
     return SimpleNamespace(
         index=index,
         seconds=seconds,
-        elastomer=body,
+        elastomer=elastomer,
         surface=SimpleNamespace(dimension=2),
         size=64**2,
         solver=SimpleNamespace(tolerance=1e-6),
@@ -38,7 +38,7 @@ def test_before_any_task_the_forecast_is_told(time):
     assert clock_of(time, task(0, 3.0), task(1, 5.0), jobs=2).left() == 4.0
 
 
-def test_forecasts_are_corrected_by_what_ended_of_the_same_body(time):
+def test_forecasts_are_corrected_by_what_ended_of_the_same_elastomer(time):
     clock = clock_of(time, task(0, 1.0), task(1, 1.0), task(2, 1.0, "b"), task(3, 1.0, "b"))
     for index, seconds in ((0, 10.0), (2, 2.0)):
         clock.take_in(word(index, "start"))
@@ -47,7 +47,7 @@ def test_forecasts_are_corrected_by_what_ended_of_the_same_body(time):
     assert clock.left() == pytest.approx(10 + 2)
 
 
-def test_a_body_not_met_yet_is_taken_as_the_others(time):
+def test_a_elastomer_not_met_yet_is_taken_as_the_others(time):
     clock = clock_of(time, task(0, 1.0), task(1, 2.0, "b"))
     clock.take_in(word(0, "start"))
     time.now = 3.0

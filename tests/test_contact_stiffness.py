@@ -34,11 +34,11 @@ def by_difference(scene, p_star, tolerance):
 
 @pytest.mark.parametrize("p_star", [0.03, 1.0])
 @pytest.mark.parametrize(
-    "body", [*(Power(n=n) for n in (0, 0.5, 1, 1.5, 2, 3, 4)), Slab(thickness=0.02)], ids=str
+    "elastomer", [*(Power(n=n) for n in (0, 0.5, 1, 1.5, 2, 3, 4)), Slab(thickness=0.02)], ids=str
 )
-def test_it_is_the_slope_of_pressure_over_mean_gap(body, p_star):
-    tolerance = 1e-10 if getattr(body, "n", 0) == 4 else 1e-11
-    scene = build_scene(SelfAffine(cutoff=0.04), body, 64)
+def test_it_is_the_slope_of_pressure_over_mean_gap(elastomer, p_star):
+    tolerance = 1e-10 if getattr(elastomer, "n", 0) == 4 else 1e-11
+    scene = build_scene(SelfAffine(cutoff=0.04), elastomer, 64)
     touching, _ = solved(scene, p_star, tolerance)
     stiffness = contact_stiffness(scene.contact(p_star), touching)
     assert stiffness == pytest.approx(by_difference(scene, p_star, tolerance), rel=1e-5)

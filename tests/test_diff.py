@@ -96,7 +96,9 @@ IN_PASCAL = (
 )
 
 
-def test_another_body_is_paired_by_pressure_and_compared_in_pascal_and_metres(output_of, study_of):
+def test_another_elastomer_is_paired_by_pressure_and_compared_in_pascal_and_metres(
+    output_of, study_of
+):
     stiff = (IN_PASCAL[0].replace("2e9", "4e9"), *IN_PASCAL[1:])
     difference = diff(study_of(*IN_PASCAL), study_of(*stiff))
     assert [(p.one["pressure"], p.other["pressure"]) for p in difference.pairs] == [
@@ -115,7 +117,7 @@ def test_another_body_is_paired_by_pressure_and_compared_in_pascal_and_metres(ou
     assert data["paired"] == difference.paired
 
 
-def test_another_surface_of_one_body_is_paired_by_load(output_of, study_of):
+def test_another_surface_of_one_elastomer_is_paired_by_load(output_of, study_of):
     one, other = study_of("elastomer.n=1"), study_of("elastomer.n=1", "surface.hurst=0.5")
     difference = diff(one, other)
     assert [pair.one["p_star"] for pair in difference.pairs] == [0.1, 1.0]
@@ -125,7 +127,7 @@ def test_another_surface_of_one_body_is_paired_by_load(output_of, study_of):
     assert "only in" not in text
 
 
-def test_rows_of_one_body_and_surface_that_share_no_load_stay_apart(study_of):
+def test_rows_of_one_elastomer_and_surface_that_share_no_load_stay_apart(study_of):
     difference = diff(study_of("elastomer.n=1"), study_of("elastomer.n=1", "load.p_star=0.3"))
     assert (difference.pairs, difference.paired) == ([], "")
 

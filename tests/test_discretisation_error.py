@@ -147,7 +147,7 @@ def test_no_contact_is_unknown():
         assert value.verdict == "unknown"
 
 
-def test_a_single_body_on_one_grid_is_unknown():
+def test_a_single_indenter_on_one_grid_is_unknown():
     values = estimate(sequence(1.0, (64,)), 1.0)
     assert values["a_r"].verdict == "regular"
     for quantity in ("sigma_p", "u_g"):

@@ -192,7 +192,7 @@ def test_without_a_histogram_there_is_nothing_to_extrapolate(study):
     assert distributions(compare(study("output.histogram=false"))) == []
 
 
-def test_bodies_whose_unit_of_stress_depends_on_the_grid_are_not_compared(study):
+def test_elastomers_whose_unit_of_stress_depends_on_the_grid_are_not_compared(study):
     path = study('surface={kind="parabola"}', "load={p_star=1e-2}")
     assert distributions(compare(path)) == []
 

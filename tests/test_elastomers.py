@@ -1,4 +1,4 @@
-"""The stiffness of every elastic body: printed formulae in many digits, limits, tables."""
+"""The stiffness of every elastomer: printed formulae in many digits, limits, tables."""
 
 import mpmath as mp
 import numpy as np
@@ -34,8 +34,8 @@ BODIES = [
 ]
 
 
-def name(body):
-    return "-".join(str(value) for value in body.model_dump().values())
+def name(elastomer):
+    return "-".join(str(value) for value in elastomer.model_dump().values())
 
 
 def printed_slab_factor(t):
@@ -76,9 +76,9 @@ def test_the_slab_factor_rises():
     )  # beyond, in steps of rounding
 
 
-@pytest.mark.parametrize("body", BODIES, ids=name)
-def test_the_mean_displacement_meets_no_stiffness(body):
-    k = body.stiffness(Q)
+@pytest.mark.parametrize("elastomer", BODIES, ids=name)
+def test_the_mean_displacement_meets_no_stiffness(elastomer):
+    k = elastomer.stiffness(Q)
     assert k[0] == 0
     assert np.all(k[1:] > 0)
     assert np.all(np.isfinite(k))
@@ -93,7 +93,7 @@ def test_power_laws_are_power_laws(n):
 
 
 @pytest.mark.parametrize(
-    ("body", "power"),
+    ("elastomer", "power"),
     [
         (HalfSpace(E_star=3.0), Power(n=1, k_n=1.5)),
         (Membrane(tension=3.0), Power(n=2, k_n=3.0)),
@@ -101,9 +101,9 @@ def test_power_laws_are_power_laws(n):
     ],
     ids=["half-space", "membrane", "plate"],
 )
-def test_the_named_bodies_are_power_laws_of_the_right_prefactor(body, power):
-    assert body.stiffness(Q) == pytest.approx(power.stiffness(Q), rel=1e-14, abs=0)
-    assert np.array_equal(body.gamma(Q), power.gamma(Q))
+def test_the_named_elastomers_are_power_laws_of_the_right_prefactor(elastomer, power):
+    assert elastomer.stiffness(Q) == pytest.approx(power.stiffness(Q), rel=1e-14, abs=0)
+    assert np.array_equal(elastomer.gamma(Q), power.gamma(Q))
 
 
 def test_a_thin_slab_is_a_plate():
@@ -149,36 +149,42 @@ def test_gamma_of_a_slab_goes_from_plate_to_half_space():
 @pytest.mark.parametrize("n", [0, 0.5, 1, 2.3, 4])
 def test_a_table_of_a_power_law_is_that_power_law_everywhere(tmp_path, n):
     q = np.array([0.1, 0.5, 1, 30, 100])  # Q goes five and four decades beyond
-    body = table(tmp_path / "k.txt", q, 2.0 * q**n)
-    assert body.stiffness(Q) == pytest.approx(Power(n=n, k_n=2.0).stiffness(Q), rel=1e-12, abs=0)
-    assert body.gamma(Q[1:]) == pytest.approx(Power(n=n).gamma(Q[1:]), rel=1e-9)
+    elastomer = table(tmp_path / "k.txt", q, 2.0 * q**n)
+    assert elastomer.stiffness(Q) == pytest.approx(
+        Power(n=n, k_n=2.0).stiffness(Q), rel=1e-12, abs=0
+    )
+    assert elastomer.gamma(Q[1:]) == pytest.approx(Power(n=n).gamma(Q[1:]), rel=1e-9)
 
 
 def test_two_rows_make_a_table(tmp_path):
-    body = table(tmp_path / "k.txt", [1.0, 10.0], [5.0, 500.0])
-    assert body.stiffness(Q) == pytest.approx(Power(n=2, k_n=5.0).stiffness(Q), rel=1e-12, abs=0)
+    elastomer = table(tmp_path / "k.txt", [1.0, 10.0], [5.0, 500.0])
+    assert elastomer.stiffness(Q) == pytest.approx(
+        Power(n=2, k_n=5.0).stiffness(Q), rel=1e-12, abs=0
+    )
 
 
 def test_a_table_of_a_slab_passes_through_its_rows_and_close_in_between(tmp_path):
     slab, q = Slab(thickness=0.1), np.logspace(-1, 4, 101)  # 20 rows a decade
-    body = table(tmp_path / "k.txt", q, slab.stiffness(q))
-    assert body.stiffness(q) == pytest.approx(slab.stiffness(q), rel=1e-13)
+    elastomer = table(tmp_path / "k.txt", q, slab.stiffness(q))
+    assert elastomer.stiffness(q) == pytest.approx(slab.stiffness(q), rel=1e-13)
     between = np.sqrt(q[1:] * q[:-1])
     # a cubic through rows log(10)/20 apart, curvature of log k below 2: error (0.115)^3 / 10
-    assert body.stiffness(between) == pytest.approx(slab.stiffness(between), rel=2e-4)
+    assert elastomer.stiffness(between) == pytest.approx(slab.stiffness(between), rel=2e-4)
 
 
 def test_gamma_of_a_table_follows_its_local_exponent(tmp_path):
     q = np.array([1e-3, 1e-2, 1e2, 1e3])
-    body = table(tmp_path / "k.txt", q, [1e-12, 1e-8, 1e-2, 1e-1])  # n = 4 below, 1 above
-    assert body.gamma(np.array([1e-5, 1e5])) == pytest.approx([0.02, 0.35], rel=1e-9)
+    elastomer = table(tmp_path / "k.txt", q, [1e-12, 1e-8, 1e-2, 1e-1])  # n = 4 below, 1 above
+    assert elastomer.gamma(np.array([1e-5, 1e5])) == pytest.approx([0.02, 0.35], rel=1e-9)
 
 
 @pytest.mark.parametrize("n", [0.5, 1, 3.3])
 def test_persson_theory_of_a_tabulated_power_law_is_that_of_the_power_law(tmp_path, n):
     surface, p = SelfAffine(cutoff=0.05), np.array([1e-3, 0.1, 2.0])
-    body = table(tmp_path / "k.txt", np.geomspace(1.0, 300.0, 7), np.geomspace(1.0, 300.0, 7) ** n)
-    power, tabulated = (build_scene(surface, e, 64) for e in (Power(n=n), body))
+    elastomer = table(
+        tmp_path / "k.txt", np.geomspace(1.0, 300.0, 7), np.geomspace(1.0, 300.0, 7) ** n
+    )
+    power, tabulated = (build_scene(surface, e, 64) for e in (Power(n=n), elastomer))
     assert tabulated.delta_sigma == pytest.approx(power.delta_sigma, rel=1e-12)
     gaps = [Persson(s.shells).mean_gap(p * s.delta_sigma) for s in (power, tabulated)]
     assert gaps[1] == pytest.approx(gaps[0], rel=1e-9)
@@ -186,9 +192,9 @@ def test_persson_theory_of_a_tabulated_power_law_is_that_of_the_power_law(tmp_pa
 
 def test_persson_theory_of_a_tabulated_slab_has_its_stiffness_and_gamma_between(tmp_path):
     slab, q = Slab(thickness=0.05), np.logspace(0, 3, 301)  # 100 rows a decade
-    body = table(tmp_path / "k.txt", q, slab.stiffness(q))
+    elastomer = table(tmp_path / "k.txt", q, slab.stiffness(q))
     surface = SelfAffine(cutoff=0.02)
-    exact, tabulated = (build_scene(surface, e, 128).shells for e in (slab, body))
+    exact, tabulated = (build_scene(surface, e, 128).shells for e in (slab, elastomer))
     assert tabulated.variance == pytest.approx(exact.variance, rel=1e-5)
     assert tabulated.energy == pytest.approx(exact.energy, rel=1e-5)
     # the exponent from the slope of Eq. (41) itself, in closed steps of 1e-5
@@ -265,7 +271,7 @@ def test_an_empty_table_is_refused(tmp_path):
         {"kind": "jelly"},
     ],
 )
-def test_bodies_out_of_range_are_refused(keys):
+def test_elastomers_out_of_range_are_refused(keys):
     with pytest.raises(ValidationError):
         TypeAdapter(Elastomer).validate_python(keys)
 

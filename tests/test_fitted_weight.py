@@ -74,7 +74,7 @@ def test_springs_have_nearly_their_closed_form():
     assert gap == pytest.approx(einstein_prediction(p_star).u_g, rel=0.02)
 
 
-def test_a_body_without_one_exponent_takes_the_local_one():
+def test_a_elastomer_without_one_exponent_takes_the_local_one():
     q = np.geomspace(1, 30, 40)
     k = q**2.5
     spectrum = Shells(q, q**-3.0, k * q**-3.0, k * k * q**-3.0, np.full(40, 0.3))

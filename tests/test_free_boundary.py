@@ -236,11 +236,11 @@ def test_table_without_a_compliance_kernel_is_refused(gfmd, tmp_path, rows, mess
 def test_table_of_a_half_space_is_solved_as_the_half_space(rows_of, tmp_path):
     np.savetxt(tmp_path / "k.txt", [[1.0, 0.5], [10.0, 5.0]])  # E* = 1
     (table,) = rows_of("elastomer={kind='table', path='k.txt'}", name="table.h5")
-    (body,) = rows_of("elastomer={kind='half-space', E_star=1}")
+    (half_space,) = rows_of("elastomer={kind='half-space', E_star=1}")
     assert table["status"] == "converged"
-    assert table["a_r"] == pytest.approx(body["a_r"], abs=2 / 32**2)
+    assert table["a_r"] == pytest.approx(half_space["a_r"], abs=2 / 32**2)
     for name in ("sigma_p", "u_g", "delta_sigma", "displacement"):
-        assert table[name] == pytest.approx(body[name], rel=1e-5)
+        assert table[name] == pytest.approx(half_space[name], rel=1e-5)
 
 
 def test_dual_solver_is_for_a_free_boundary(gfmd):

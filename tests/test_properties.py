@@ -75,7 +75,7 @@ UNIT = power_of_ten(-9, 3)
 
 @st.composite
 def surfaces(draw, points):
-    kind = draw(st.sampled_from(["self-affine"] * 4 + ["line", "body"]))
+    kind = draw(st.sampled_from(["self-affine"] * 4 + ["line", "single"]))
     length = draw(UNIT)
     if kind == "self-affine":
         mode = draw(st.integers(1, points // 2))
@@ -91,20 +91,20 @@ def surfaces(draw, points):
             surface["h_std"] = draw(UNIT)
         return surface | {"length": length}
     share = draw(st.floats(0.05, 0.45))
-    bodies = {
+    kinds = {
         "line": [
             {"kind": "ridge", "slope": draw(UNIT), "width": draw(st.floats(0.2, 1))},
             {"kind": "line-parabola", "radius": draw(UNIT)},
             {"kind": "wave", "amplitude": draw(UNIT)},
         ],
-        "body": [
+        "single": [
             {"kind": "parabola", "radius": draw(UNIT)},
             {"kind": "power-law", "exponent": draw(st.floats(0.5, 8)), "radius": draw(UNIT)},
             {"kind": "cone", "slope": draw(UNIT)},
             {"kind": "punch", "radius": share * length, "depth": draw(UNIT)},
         ],
     }
-    return draw(st.sampled_from(bodies[kind])) | {"length": length}
+    return draw(st.sampled_from(kinds[kind])) | {"length": length}
 
 
 ELASTOMERS = st.one_of(
@@ -229,7 +229,7 @@ def test_many_more_specs_are_solved_or_say_why_not(tables):
 
 
 @pytest.mark.parametrize("n", [0.5, 1, 3])
-def test_sorting_a_body_that_is_not_flat_is_bad_input(n):
+def test_sorting_an_elastomer_that_is_not_flat_is_bad_input(n):
     with pytest.raises(InputError, match="independent of q"):
         solve(plain_tables(elastomer={"kind": "power", "n": n}, solver={"kind": "sort"}))
 
@@ -253,7 +253,7 @@ def plain_tables(**changes):
     } | changes
 
 
-def body(n, modulus=1.0):
+def elastomer_table(n, modulus=1.0):
     """A power law, or a slab where `n` says so."""
     if n == "slab":
         return {"kind": "slab", "thickness": 0.03, "E_star": modulus}
@@ -263,7 +263,7 @@ def body(n, modulus=1.0):
 def numbers(n, modulus=1.0, h_std=1.0, length=1.0):
     """Reduced results and error bars of one contact in some units."""
     surface = {"kind": "self-affine", "cutoff": 0.06, "h_std": h_std, "length": length}
-    solved = solve(plain_tables(surface=surface, elastomer=body(n, modulus)))
+    solved = solve(plain_tables(surface=surface, elastomer=elastomer_table(n, modulus)))
     assert solved.solution.residual < 1e-11  # for n = 3 and 4 rounding ends the solve above 1e-12
     observables, columns = solved.observables, error_columns(solved)
     values = [
@@ -317,7 +317,9 @@ def test_units_of_all_kinds_at_once_drop_out(n, scale):
 @pytest.mark.parametrize("n", [0, 1, 4])
 @pytest.mark.parametrize("p_star", [1e-30, 1e-20, 1e-12, 40.0, 1e6])
 def test_pressures_at_both_ends_say_what_was_reached(n, p_star):
-    tables = plain_tables(elastomer=body(n), load={"p_star": p_star}, grid={"points": 64})
+    tables = plain_tables(
+        elastomer=elastomer_table(n), load={"p_star": p_star}, grid={"points": 64}
+    )
     tables["solver"] = {"tolerance": 1e-6, "max_steps": 3000}
     solved = solve(tables)
     reached = solved.solution.residual < 1e-6
@@ -340,7 +342,7 @@ def test_pressures_beyond_the_ends_are_refused(factor):
 
 
 def test_a_pressure_that_is_nothing_in_reduced_units_is_refused():
-    tables = plain_tables(load={"pressure": 1e-300}, elastomer=body(1, modulus=1e60))
+    tables = plain_tables(load={"pressure": 1e-300}, elastomer=elastomer_table(1, modulus=1e60))
     with pytest.raises(InputError, match=r"p\* = 0 is out of range"):
         solve(tables)
 

@@ -134,17 +134,17 @@ SHAPES = [((64, 64), 1.0), ((48, 30), 0.4), ((31, 49), 2.0), ((27, 27), 1.0), ((
 
 
 @pytest.mark.parametrize(("shape", "length_y"), SHAPES)
-@pytest.mark.parametrize("body", [Power(n=0.5), Power(n=3), Slab(thickness=0.1)], ids=str)
-def test_the_spectrum_has_every_mode_once(shape, length_y, body):
+@pytest.mark.parametrize("elastomer", [Power(n=0.5), Power(n=3), Slab(thickness=0.1)], ids=str)
+def test_the_spectrum_has_every_mode_once(shape, length_y, elastomer):
     heights = np.random.default_rng(1).standard_normal(shape)
-    scene = build_scene(as_map(heights, length_y=length_y), body, shape[1], points_y=shape[0])
+    scene = build_scene(as_map(heights, length_y=length_y), elastomer, shape[1], points_y=shape[0])
     q = wavenumbers(shape, (length_y, 1.0))
     power = np.abs(np.fft.fft2(heights)) ** 2 / heights.size**2
     power[0, 0] = 0.0
-    k = body.stiffness(q)
+    k = elastomer.stiffness(q)
     shells = scene.shells
     assert scene.delta_sigma**2 == pytest.approx(
-        np.sum(power * body.unit_stiffness(q) ** 2), rel=1e-12
+        np.sum(power * elastomer.unit_stiffness(q) ** 2), rel=1e-12
     )
     assert shells.modes.sum() == heights.size - 1
     assert shells.height.sum() == pytest.approx(heights.var(), rel=1e-12)
@@ -215,8 +215,8 @@ def test_two_equal_halves_solve_as_one(axis, n):
 def test_a_wave_along_y_has_the_contact_of_westergaard(shape, length_y, share):
     """p / p_full = sin^2(pi a_r / 2), where p_full = pi E* / L_y for an amplitude of 1."""
     wave = np.cos(2 * np.pi * np.arange(shape[0]) / shape[0])[:, None] * np.ones(shape)
-    body = as_map(wave, length_y=length_y)
-    scene = build_scene(body, HalfSpace(E_star=2.0), shape[1], points_y=shape[0])
+    indenter = as_map(wave, length_y=length_y)
+    scene = build_scene(indenter, HalfSpace(E_star=2.0), shape[1], points_y=shape[0])
     contact = scene.contact(share * 2 * np.pi / length_y / scene.delta_sigma)
     solution = solve_contact(contact, Auto(tolerance=1e-9))
     touching = solution.sigma > 1e-3
@@ -228,8 +228,8 @@ def test_a_wave_along_y_has_the_contact_of_westergaard(shape, length_y, share):
 def test_hertz_on_an_oblong_cell(shape, length_y):
     """p_0 = 2 E* a / (pi R) at the force 4 E* a^3 / (3 R); images lie far from the contact."""
     radius, E_star = 0.06, 2.0
-    body = Parabola(radius=1.0, length_y=length_y)
-    scene = build_scene(body, HalfSpace(E_star=E_star), shape[1], points_y=shape[0])
+    indenter = Parabola(radius=1.0, length_y=length_y)
+    scene = build_scene(indenter, HalfSpace(E_star=E_star), shape[1], points_y=shape[0])
     pressure = 4 * E_star * radius**3 / 3 / length_y
     contact = scene.contact(pressure / scene.delta_sigma)
     solution = solve_contact(contact, Auto(tolerance=1e-8))

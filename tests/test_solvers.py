@@ -1,4 +1,4 @@
-"""The solvers: bodies x pressures, identities, exact and brute-force solutions, symmetries.
+"""The solvers: elastomers x pressures, identities, exact and brute-force solutions, symmetries.
 
 Contacts are in reduced units: heights and gaps in h_std, stresses in Delta_sigma.
 """
@@ -72,7 +72,7 @@ def solved(elastomer, p_star, surface=ROUGH, points=POINTS, tolerance=TOLERANCE)
     return Solved(scene(surface, elastomer, points).contact(p_star), tolerance)
 
 
-# --- bodies x pressures ---------------------------------------------------------------------------
+# --- elastomers x pressures -----------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("p_star", PRESSURES)

@@ -1,4 +1,4 @@
-"""Surfaces and bodies: spectra, phases, one surface on many grids, shapes and curvatures."""
+"""Surfaces and indenters: spectra, phases, one surface on many grids, shapes and curvatures."""
 
 import numpy as np
 import pytest
@@ -138,10 +138,10 @@ def test_scenes_are_reduced_to_mean_zero_and_height_one():
     assert scene.stiffness * scene.delta_sigma / scene.h_std == pytest.approx(k, rel=1e-13)
 
 
-def test_scenes_know_the_mean_height_of_their_body():
-    body = Parabola(radius=3.0, length=2.0)
-    scene = build_scene(body, Power(n=1), 64)
-    heights = body.heights(64)
+def test_scenes_know_the_mean_height_of_their_indenter():
+    indenter = Parabola(radius=3.0, length=2.0)
+    scene = build_scene(indenter, Power(n=1), 64)
+    heights = indenter.heights(64)
     assert scene.mean_height == pytest.approx(heights.mean(), rel=1e-13)
     restored = scene.height * scene.h_std + scene.mean_height
     assert restored == pytest.approx(heights, abs=1e-14)
@@ -161,8 +161,8 @@ def test_a_stiffness_that_overflows_is_refused():
 
 
 def test_scenes_know_their_spectrum():
-    body = Plate(thickness=0.1, E_star=12.0)
-    scene = build_scene(SelfAffine(cutoff=0.02, length=2.0), body, 128)
+    elastomer = Plate(thickness=0.1, E_star=12.0)
+    scene = build_scene(SelfAffine(cutoff=0.02, length=2.0), elastomer, 128)
     shells = scene.shells
     assert shells.height.sum() == pytest.approx(scene.h_std**2, rel=1e-12)
     assert shells.variance.sum() == pytest.approx(scene.delta_sigma**2, rel=1e-12)
@@ -225,10 +225,10 @@ def test_surfaces_out_of_range_are_refused(options):
         SelfAffine(**options)
 
 
-@pytest.mark.parametrize("body", BODIES, ids=lambda body: body.kind)
+@pytest.mark.parametrize("indenter", BODIES, ids=lambda indenter: indenter.kind)
 @pytest.mark.parametrize("points", [8, 30, 64])
-def test_bodies_are_highest_in_the_middle_and_symmetric(body, points):
-    grid, h = sample(body, points)
+def test_indenters_are_highest_in_the_middle_and_symmetric(indenter, points):
+    grid, h = sample(indenter, points)
     assert h.shape == grid.shape
     assert h[(points // 2,) * h.ndim] == h.max()
     mirrored = h[(slice(None, 0, -1),) * h.ndim]  # about the middle; row 0 is its own image
@@ -284,7 +284,7 @@ def test_the_wave_is_one_mode():
     assert np.abs(np.delete(modes, 1)).max() < 1e-15
 
 
-def test_bodies_stand_on_any_grid_from_the_smallest():
+def test_indenters_stand_on_any_grid_from_the_smallest():
     with pytest.raises(InputError, match="8 or more"):
         sample(Cone(), 6)
 

@@ -1,4 +1,4 @@
-"""What the figures share: the style of a body, values with their errors, a quantity over pressure."""
+"""What the figures share: the style of a elastomer, values with their errors, a quantity over pressure."""
 
 from pathlib import Path
 from typing import Any

@@ -90,14 +90,14 @@ def power(x: Field, mean: Mean) -> Value:
 
 @dataclass(frozen=True)
 class Group:
-    """One body on surfaces that differ in their seed only, at the same pressures."""
+    """One elastomer on surfaces that differ in their seed only, at the same pressures."""
 
     curves: list[Curve]
     """One a seed."""
 
     @property
     def first(self) -> Curve:
-        """The curve of one seed, for what all seeds share: spectrum, body and grid."""
+        """The curve of one seed, for what all seeds share: spectrum, elastomer and grid."""
         return self.curves[0]
 
     @property
@@ -135,7 +135,7 @@ class Group:
 
 
 def groups(studies: Any, name: str) -> list[Group]:
-    """The bodies of a study, exponents and grids rising.
+    """The elastomers of a study, exponents and grids rising.
 
     Raises ValueError where seeds have different pressures.
     """

@@ -48,7 +48,7 @@ def light_area(studies: StoredStudies, folder: Path) -> list[Finding]:
 
 
 def _grids(ensembles: list[Group], n: float) -> list[Group]:
-    """The contacts of one body, grids rising."""
+    """The contacts of one elastomer, grids rising."""
     return [group for group in ensembles if group.n == n]
 
 

@@ -27,7 +27,7 @@ TAIL = (4.0, 12.0)
 def fig07(studies: StoredStudies, folder: Path) -> list[Finding]:
     """Pr(sigma) at 10 % contact on the finest grid; extrapolated where the grids allow."""
     plot, ys = ColumnFigure(STRESS, DENSITY), []
-    stresses = [one for group in _by_body(studies, "fig07").values() for one in group]
+    stresses = [one for group in _by_elastomer(studies, "fig07").values() for one in group]
     middle = logarithmic_middles()
     for one in stresses:
         style, fine = STYLES[one.curve.n], one.grids[-1]
@@ -45,7 +45,7 @@ def fig07(studies: StoredStudies, folder: Path) -> list[Finding]:
 def _small_stress(studies: StoredStudies) -> list[Finding]:
     """Exponents of Pr(sigma) at small stress, on a surface whose edges the grids resolve."""
     paper, cases, exponents = {0.5: 0.3, 1.0: 0.6}, [], {}
-    for n, group in _by_body(studies, "edges").items():
+    for n, group in _by_elastomer(studies, "edges").items():
         law = fit(group[0], "small") if n in paper else None
         if law is None:
             continue
@@ -102,7 +102,7 @@ def fig08(studies: StoredStudies, folder: Path) -> list[Finding]:
 def fig13(studies: StoredStudies, folder: Path) -> list[Finding]:
     """Pr(sigma) at n = 3 from grid to grid, and its tail."""
     plot = ColumnFigure(STRESS, DENSITY)
-    (distribution,) = [one for group in _by_body(studies, "fig13").values() for one in group]
+    (distribution,) = [one for group in _by_elastomer(studies, "fig13").values() for one in group]
     middle = logarithmic_middles()
     tones = colours(len(distribution.points))
     tails = {}
@@ -162,7 +162,7 @@ def tail_exponent(sigma: Field, counts: Field) -> Value:
     return estimate(of, Mean(counts))
 
 
-def _by_body(studies: StoredStudies, name: str) -> dict[float, list[Any]]:
+def _by_elastomer(studies: StoredStudies, name: str) -> dict[float, list[Any]]:
     """The distributions of a study by exponent."""
     groups: dict[float, list[Any]] = {}
     for distribution in distributions(studies.comparison(name)):

@@ -61,7 +61,7 @@ OF_THE_RUN = re.compile("residual|transforms|steps|status|algebraic|bound")
 def spec(folder, n, points, kind="auto", **more):
     path = folder / "spec.toml"
     text = SPEC.format(n=n, points=points, kind=kind, cutoff=2.56 / points)
-    path.write_text(text + "".join(f"[{table}]\n{body}\n" for table, body in more.items()))
+    path.write_text(text + "".join(f"[{table}]\n{keys}\n" for table, keys in more.items()))
     return path
 
 

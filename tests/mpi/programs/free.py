@@ -76,9 +76,9 @@ def check_compliance(shape):
         expected = table.free_compliance(shape, SPACINGS)
         compliance = table.free_compliance(shape, SPACINGS, grid.own)
     np.testing.assert_allclose(compliance, expected[grid.own], rtol=1e-14)
-    for body in (HalfSpace(), Power(n=1.5), Layer(thickness=0.9, poisson=0.4)):
-        expected = body.free_compliance(shape, SPACINGS)
-        compliance = body.free_compliance(shape, SPACINGS, grid.own)
+    for elastomer in (HalfSpace(), Power(n=1.5), Layer(thickness=0.9, poisson=0.4)):
+        expected = elastomer.free_compliance(shape, SPACINGS)
+        compliance = elastomer.free_compliance(shape, SPACINGS, grid.own)
         np.testing.assert_allclose(compliance, expected[grid.own], rtol=1e-14)
 
 
