@@ -3,11 +3,11 @@
     python scripts/bench_peers.py --points 512 1024 --repeats 3 --p-star 0.1 0.01
 
 A half-space (E* = 1, the only elastomer that all codes know) under the default surface. Each solve
-runs in a process of its own and starts from the height field in memory: imports, files and a first solve
-on 64^2 points, which loads what a code loads late, are not timed; the code's own set-up is. What it
-returns is judged here, by the same measures for all, against our solution at natural residual 1e-9.
-A code's tolerance means what its authors chose it to mean, so each is run from loose to tight and
-compared where its mean gap, or its residual, has become, and stays, as good.
+runs in a process of its own and starts from the height field in memory: imports, files and a first
+solve on 64^2 points, which loads what a code loads late, are not timed; the code's own set-up is.
+What it returns is judged here, by the same measures for all, against our solution at natural
+residual 1e-9. Tolerances mean different things in different codes. Each code is therefore run from
+loose to tight, and compared where its mean gap, or its residual, is as good and stays so.
 
 The peers are installed by pip into a virtual environment of their own.
 """
