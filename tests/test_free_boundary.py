@@ -11,6 +11,7 @@ import scipy.fft
 from free_contacts import ELASTOMERS, compliance_matrix, oblong_contact
 from scipy.optimize import nnls
 
+from gfmd_cli import api
 from gfmd_cli.errors import InputError
 from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.grid.pixels import average_pixels
@@ -125,11 +126,11 @@ def test_finer_grid_of_a_map_does_not_join_its_borders(tmp_path, shape):
     steps = np.floor(np.arange(24) / 4)
     np.save(tmp_path / "stairs.npy", np.broadcast_to(steps, shape))
     surface = FileSurface(path=tmp_path / "stairs.npy", periodic=False, level="none", edges="none")
-    fine = build_free_scene(surface, HalfSpace(), 96)
+    fine = build_free_scene(surface, HalfSpace(), 72)
     rows = fine.in_metres(fine.height)
     assert np.diff(rows, axis=-1).min() >= -1e-12
-    assert rows[..., ::4] == pytest.approx(np.broadcast_to(steps, (*fine.grid.shape[:-1], 24)))
-    periodic = build_scene(surface, HalfSpace(), 96)
+    assert rows[..., 1::3] == pytest.approx(np.broadcast_to(steps, (*fine.grid.shape[:-1], 24)))
+    periodic = build_scene(surface, HalfSpace(), 72)
     assert np.diff(periodic.height, axis=-1).min() < -0.1
 
 
@@ -139,8 +140,41 @@ def test_points_beside_a_border_never_touch_because_of_the_other_border(tmp_path
     np.save(tmp_path / "holed.npy", heights)
     surface = FileSurface(path=tmp_path / "holed.npy", periodic=False, edges="none", missing="void")
     known = build_free_scene(surface, HalfSpace(), 128).may_touch
-    assert np.all(known[:, 2:])
-    assert not np.any(known[:, :2])
+    assert np.all(known[:, 4:])
+    assert not np.any(known[:, :4])
+
+
+def solved_map(heights, points, **surface):
+    keys = {"length": 1e-6, "periodic": False, "level": "none"}
+    return api.solve(
+        {
+            "surface": keys | surface,
+            "elastomer": {"kind": "half-space", "E_star": 1e9},
+            "grid": {"points": points, "boundary": "free"},
+            "load": {"p_star": 0.1},
+            "solver": {"tolerance": 1e-9},
+        },
+        heights=heights,
+    )
+
+
+@pytest.mark.parametrize("points", [24, 37, 48, 72])
+@pytest.mark.parametrize("interpolation", ["monotone", "fourier"])
+def test_a_map_may_be_turned_on_any_grid(interpolation, points):
+    heights = 1e-9 * SelfAffine(cutoff=0.1, seed=3).heights(48)[:24, 5:29]
+    turned = (heights, heights[::-1, ::-1], heights[:, ::-1])
+    results = [solved_map(each, points, interpolation=interpolation) for each in turned]
+    for result in results:
+        assert result.height.std() == pytest.approx(result.h_std, rel=1e-9)
+        assert result.a_r == pytest.approx(results[0].a_r, abs=2 / points**2)
+        assert result.u_g == pytest.approx(results[0].u_g, rel=1e-6)
+
+
+def test_the_gap_of_a_map_converges_with_the_grid():
+    """All grids cover the same area."""
+    heights = 1e-9 * SelfAffine(cutoff=0.2, seed=1).heights(64)[:24, :24]
+    gaps = [solved_map(heights, points).gap.mean() for points in (48, 96, 192)]
+    assert abs(gaps[2] - gaps[1]) < 0.6 * abs(gaps[1] - gaps[0])
 
 
 @pytest.mark.parametrize("stop_at", [0, 1, 5])

@@ -12,7 +12,13 @@ from gfmd_cli.grid.arrays import Field, Mask
 from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.physics.height_map import extent
 from gfmd_cli.physics.indenters import SMALLEST_GRID, RigidSurface
-from gfmd_cli.physics.interpolation import Interpolation, monotone, nearest, suited_interpolation
+from gfmd_cli.physics.interpolation import (
+    Interpolation,
+    at_centres,
+    monotone,
+    nearest,
+    suited_interpolation,
+)
 from gfmd_cli.physics.map_preparation import (
     Edges,
     Levelling,
@@ -42,6 +48,8 @@ class FileSurface(RigidSurface):
 
     rough: ClassVar[bool] = True
     is_map: ClassVar[bool] = True
+    is_centred: ClassVar[bool] = False
+    """Where the points of finer grids lie, see `interpolation.positions`."""
     kind: Literal["file"] = "file"
     path: FilePath
     """Path of the file, relative to the run spec."""
@@ -120,7 +128,9 @@ class FileSurface(RigidSurface):
         if heights.shape == grid.whole_shape:
             return heights.copy() if grid.whole else heights[grid.own].copy()
         if self.applied_interpolation() == "monotone":
-            return monotone(heights, grid.whole_shape, grid.own)
+            return monotone(heights, grid.whole_shape, grid.own, centred=self.is_centred)
+        if self.is_centred:
+            heights = at_centres(heights, grid.whole_shape)
         own_grid = Grid(heights.shape[-1], heights.ndim, points_y=heights.shape[0])
         return own_grid.resample(heights, grid)
 
@@ -217,12 +227,15 @@ class FileSurface(RigidSurface):
             return None
         return np.asarray(window(grid.whole_shape, self.taper)[grid.own] < 1.0)
 
-    def mirrored(self) -> Self | None:
-        """The map mirrored to twice its sides; None if it is periodic or made so."""
+    def mirrored(self) -> "FileSurface | None":
+        """The map mirrored to twice its sides; None if it is periodic or made so.
+
+        Half of it on a finer grid has the area of the map.
+        """
         if not self._is_reflected():
             return None
         same = {"interpolation": self.applied_interpolation()}
-        return self.model_copy(update=same | {"edges": "mirror"})
+        return MirroredMap.model_construct(**dict(self) | same | {"edges": "mirror"})
 
     def void(self, grid: Grid) -> Mask | None:
         """Points of a grid nearest to a missing height of the map, if these never touch."""
@@ -231,7 +244,7 @@ class FileSurface(RigidSurface):
             return None
         if self.edges == "mirror":
             missing = mirror(missing)
-        return np.asarray(nearest(missing, grid.whole_shape)[grid.own])
+        return np.asarray(nearest(missing, grid.whole_shape, centred=self.is_centred)[grid.own])
 
     def holes(self) -> int:
         """Number of missing heights of the map."""
@@ -313,6 +326,12 @@ class FileSurface(RigidSurface):
             steps.append("periodic")
         steps.append(f"interpolation on finer grids: {self.applied_interpolation()}")
         return ", ".join(steps)
+
+
+class MirroredMap(FileSurface):
+    """A map with borders, mirrored to find the heights between its points."""
+
+    is_centred: ClassVar[bool] = True
 
 
 @lru_cache(maxsize=16)

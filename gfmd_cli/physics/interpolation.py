@@ -58,7 +58,39 @@ def _ties(heights: Field) -> float:
     return float(np.mean([np.mean(heights == np.roll(heights, 1, axis)) for axis in (0, 1)]))
 
 
-def monotone(heights: Field, shape: tuple[int, ...], rows: slice = slice(None)) -> Field:
+def positions(old: int, new: int, centred: bool = False) -> Field:
+    """Positions of the points of a finer grid, in points of the map along the same axis.
+
+    By default both grids have the first point in common. The points that are `centred` lie in the
+    middle of equal parts of the pixels of the map, which reach from -1/2 to `old` - 1/2: both grids
+    then cover the same area, and a map that is mirrored at its borders remains so.
+    """
+    step = old / new
+    return np.arange(new) * step + (0.5 * (step - 1) if centred else 0.0)
+
+
+def at_centres(heights: Field, shape: tuple[int, ...]) -> Field:
+    """A periodic map moved so that a grid of this shape with the same first point is centred.
+
+    Exact where the map has no waves at the highest wavenumbers of its grid, as a mirrored map.
+    """
+    modes = np.fft.rfftn(heights)
+    for axis, (old, new) in enumerate(zip(heights.shape, shape, strict=True)):
+        last = axis == heights.ndim - 1
+        q = 2 * np.pi * (np.fft.rfftfreq(old) if last else np.fft.fftfreq(old))
+        phase = np.exp(1j * q * positions(old, new, centred=True)[0])
+        modes *= phase.reshape([-1 if i == axis else 1 for i in range(heights.ndim)])
+    moved: Field = np.fft.irfftn(modes, heights.shape, axes=tuple(range(heights.ndim)))
+    return moved
+
+
+def monotone(
+    heights: Field,
+    shape: tuple[int, ...],
+    rows: slice = slice(None),
+    *,
+    centred: bool = False,
+) -> Field:
     """A periodic map or line on a finer grid of the same cell, without new maxima and minima.
 
     Monotone cubics (Fritsch and Carlson 1980) along one axis and then along the other; the mean of
@@ -70,21 +102,27 @@ def monotone(heights: Field, shape: tuple[int, ...], rows: slice = slice(None)) 
     heights : shape (rows, columns), or (points,) of a line
     shape : points of the finer grid along y and x
     rows : rows of the finer grid to compute
+    centred : where the points of the finer grid lie, see `positions`
     """
+    places = [positions(old, new, centred) for old, new in zip(heights.shape, shape, strict=True)]
     if heights.ndim == 1:
-        return _along_axis(heights, np.arange(shape[0]) * (heights.size / shape[0]), 0)
-    y, x = (np.arange(new) * (old / new) for new, old in zip(shape, heights.shape, strict=True))
+        return _along_axis(heights, places[0], 0)
+    y, x = places
     x_first = _along_axis(_along_axis(heights, x, 1), y[rows], 0)
     y_first = _along_axis(_along_axis(heights, y[rows], 0), x, 1)
     mean: Field = 0.5 * (x_first + y_first)
     return mean
 
 
-def nearest(mask: Mask, shape: tuple[int, ...]) -> Mask:
-    """A periodic mask on another grid of the same cell: that of the nearest point."""
+def nearest(mask: Mask, shape: tuple[int, ...], *, centred: bool = False) -> Mask:
+    """A periodic mask on another grid of the same cell: that of the nearest point.
+
+    `centred` tells where the points of the other grid lie, see `positions`.
+    """
     for axis, points in enumerate(shape):
         old = mask.shape[axis]
-        index = (2 * np.arange(points) * old + points) // (2 * points) % old  # half rounds up
+        beyond = old if centred else points  # half rounds up
+        index = (2 * np.arange(points) * old + beyond) // (2 * points) % old
         mask = mask.take(index, axis)
     return mask
 
