@@ -156,12 +156,12 @@ def solve(spec: Path | str | Tables, *, heights: Any = None, threads: int = 1) -
         return _solve(spec, threads)
     if not isinstance(spec, Mapping):
         raise InputError("heights go with a dictionary; a spec in a file has a surface")
-    values, stated = given_heights(heights)
+    given = given_heights(heights)
     with TemporaryDirectory() as folder:
         path = Path(folder) / "heights.npy"
-        np.save(path, values)
+        np.save(path, given.values)
         try:
-            surface = surface_table(stated, _plain(spec.get("surface", {})))
+            surface = surface_table(given, _plain(spec.get("surface", {})))
             surface["path"] = str(path)
             return _solve(_with_points({**spec, "surface": surface}), threads)
         except InputError as error:  # the file is not the caller's

@@ -127,17 +127,20 @@ class Topography:
     unit = "nm"
     is_periodic = True
 
-    def __init__(self, heights, side):
-        self._heights, self.physical_sizes = heights, (side, side)
+    def __init__(self, heights, *sides):
+        self._heights, self.physical_sizes = heights, sides
 
     def heights(self):
         return self._heights
 
     def to_unit(self, unit):
         assert unit == "m"
-        scaled = Topography(1e-9 * self._heights, 1e-9 * self.physical_sizes[0])
+        scaled = Topography(1e-9 * self._heights, *(1e-9 * side for side in self.physical_sizes))
         scaled.unit = unit
         return scaled
+
+
+SQUARE = Topography(np.eye(16), 1e3, 1e3)
 
 
 def test_the_contact_pressure_is_zero_off_contact_and_gives_the_area():
@@ -155,11 +158,51 @@ def test_points_and_sides_come_from_the_heights():
     assert result.height.shape == (32, 32)
     twice = solve({**MATERIAL, "grid": {}, "surface": {"length": 1e-5}}, heights=heights.tolist())
     assert twice.a_r == result.a_r
-    topography = Topography(1e9 * heights.T, 1e4)
+    topography = Topography(1e9 * heights.T, 1e4, 1e4)
     measured = solve(MATERIAL, heights=topography)
     assert measured.length == pytest.approx(1e-5, rel=1e-12)
     assert measured.a_r == result.a_r
     np.testing.assert_allclose(measured.height, result.height, rtol=1e-12)
+
+
+def test_a_topography_states_both_sides_also_of_a_part():
+    heights = rough_map()[:20]
+    whole = Topography(1e9 * heights.T, 1e4, 4e4)
+    result = solve(MATERIAL, heights=whole)
+    assert (result.length, result.length_y) == pytest.approx((1e-5, 4e-5), rel=1e-12)
+    by_hand = solve({**MATERIAL, "surface": {"length": 1e-5, "length_y": 4e-5}}, heights=heights)
+    assert result.a_r == by_hand.a_r
+    unknown = Topography(1e9 * heights.T, 1e4, 4e4)
+    unknown.unit = None
+    scaled = solve({**MATERIAL, "surface": {"scale": 1e-9}}, heights=unknown)
+    assert (scaled.length, scaled.length_y) == pytest.approx((1e-5, 4e-5), rel=1e-12)
+    assert scaled.a_r == pytest.approx(result.a_r)
+    for region in ({"x": [8, 24]}, {"x": [8 * 1e-5 / 32, 24 * 1e-5 / 32], "unit": "m"}):
+        part = solve({**MATERIAL, "surface": {"region": region}}, heights=whole)
+        assert part.height.shape == (20, 16)
+        assert (part.length, part.length_y) == pytest.approx((5e-6, 4e-5), rel=1e-12)
+    square = solve({**MATERIAL, "surface": {"crop": True}}, heights=whole)
+    assert square.height.shape == (20, 20)
+    assert (square.length, square.length_y) == pytest.approx((20 / 32 * 1e-5, 4e-5), rel=1e-12)
+
+
+def test_a_line_scan_at_unequal_distances_is_interpolated():
+    class LineScan(Topography):
+        is_uniform = False
+
+        def to_unit(self, unit):
+            return self
+
+        def positions_and_heights(self):
+            return self._heights
+
+    x = np.sort(np.random.default_rng(0).uniform(0, 1e-5, 60))
+    result = solve(MATERIAL, heights=LineScan((x, 1e-8 * np.sin(2e6 * x)), 1e-5))
+    assert result.length == pytest.approx((x[-1] - x[0]) * 60 / 59)
+    at = x[0] + np.arange(60) * result.length / 60
+    np.testing.assert_allclose(
+        result.height, np.interp(at, x, 1e-8 * np.sin(2e6 * x)), atol=1e-20, rtol=1e-9
+    )
 
 
 def test_numbers_of_numpy_are_numbers():
@@ -188,7 +231,14 @@ def test_numbers_of_numpy_are_numbers():
         ),
         (np.eye(16), {"kind": "wave"}, "surface.kind = 'wave' and the argument heights"),
         (np.eye(16), {"path": "a.npy"}, "surface.path = 'a.npy' and the argument heights"),
-        (Topography(np.eye(16), 1e3), {"length": 2e-6}, "surface.length = 2e-06: .* 1e-06 m wide"),
+        (SQUARE, {"length": 2e-6}, "surface.length = 2e-06: .* a side of 1e-06 m"),
+        (SQUARE, {"length_y": 2e-6}, "surface.length_y = 2e-06: .* a side of 1e-06 m"),
+        (
+            SQUARE,
+            {"region": {"x": [0, 2e-6], "unit": "m"}},
+            "heights: surface.region: x = .* m: the map",
+        ),
+        (SQUARE, {"region": {"z": 1}}, "surface.region.z: unknown key"),
         (np.eye(16), {"lenght": 1.0}, "surface.lenght: unknown key"),
     ],
 )

@@ -3,10 +3,13 @@
 import json
 from math import hypot, inf, isnan, nan
 
+import numpy as np
 import pytest
 from specs import power_spec
 
+from gfmd_cli import run
 from gfmd_cli.analysis.diff import Deviation, Pair, diff
+from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.study.reading import read_rows
 
 SPEC = power_spec(
@@ -125,6 +128,24 @@ def test_another_surface_of_one_elastomer_is_paired_by_load(output_of, study_of)
     assert text.startswith("surfaces differ: paired by reduced pressure, values in reduced units")
     assert "A: power n=1 on self-affine cutoff=0.1\nB: power n=1 on self-affine hurst=0.5" in text
     assert "only in" not in text
+
+
+def test_other_maps_of_one_name_are_other_surfaces(tmp_path):
+    heights = 1e-9 * SelfAffine(cutoff=0.2).heights(32)
+    studies = []
+    for name, factor in (("a", 1), ("b", 2)):
+        (tmp_path / name).mkdir()
+        np.save(tmp_path / name / "map.npy", factor * heights)
+        tables = {
+            "surface": {"kind": "file", "path": str(tmp_path / name / "map.npy"), "length": 1e-6},
+            "elastomer": {"kind": "half-space", "E_star": 1e9},
+            "grid": {"points": 32},
+            "load": {"pressure": 1e6},
+        }
+        studies.append(run(tables, tmp_path / name / "s.h5"))
+    difference = diff(*studies)
+    assert difference.paired.startswith("surfaces differ")
+    assert difference.pairs[0].physical
 
 
 def test_rows_of_one_elastomer_and_surface_that_share_no_load_stay_apart(study_of):

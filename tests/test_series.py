@@ -5,10 +5,10 @@ import pytest
 from scipy import stats
 
 from gfmd_cli.analysis.compare import compare
-from gfmd_cli.analysis.ensemble import ensembles
+from gfmd_cli.analysis.ensemble import Ensemble, ensembles
 from gfmd_cli.analysis.figures import VIEWS, items_of, study_figures
 from gfmd_cli.analysis.plotting import styled
-from gfmd_cli.analysis.series import Series, seed_groups
+from gfmd_cli.analysis.series import Series, _point, seed_groups
 
 SPEC = """\
 [surface]
@@ -82,3 +82,14 @@ def test_seeds_with_other_loads_are_averaged_where_they_agree(tmp_path, rows_of)
     ]
     assert (1.0, 0.2, 2) in [(n, round(p, 9), count) for n, p, count in points]
     assert sum(count == 4 for *_, count in points) == 6
+
+
+def test_continuum_values_are_averaged_if_all_seeds_have_one(comparison):
+    records = [dict(row) for row in ensembles(comparison)[0].rows[:2]]
+    for record, area in zip(records, (0.2, 0.4), strict=True):
+        record |= {"a_r": area, "a_r_error": 0.01, "a_r_persson": 0.3, "p_star": 0.1}
+        record |= {"a_r_continuum": area / 2, "a_r_continuum_error": 0.02}
+    for mean, error in ((0.15, 0.02), (0.3, 0.01)):
+        assert Ensemble(records).spread("a_r").mean == pytest.approx(mean)
+        assert _point(AREA, records)[1:3] == pytest.approx((mean, error))
+        records[1]["a_r_continuum"] = np.nan

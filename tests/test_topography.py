@@ -135,6 +135,18 @@ def test_heights_marked_as_missing_in_hdf5_are_located(hdf5):
     np.testing.assert_array_equal(read.missing, stored == 18)
 
 
+@pytest.mark.parametrize("mark", [np.float64(-9999.9), np.float64(1e20), np.float32(-9999.9)])
+def test_a_mark_of_another_precision_is_found(hdf5, heights, mark):
+    heights = heights.astype(np.float32)
+    heights[1, 2] = mark
+
+    def write_mark(file):
+        file["h"].attrs["missing_value"] = mark
+
+    read = read_topography(hdf5(write_mark, h=heights))
+    assert list(zip(*np.nonzero(read.missing), strict=True)) == [(1, 2)]
+
+
 def test_packed_netcdf_heights_are_refused(hdf5, heights):
     def pack(file):
         file["h"].attrs["scale_factor"] = 0.5

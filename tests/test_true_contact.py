@@ -11,8 +11,8 @@ from specs import power_spec
 from gfmd_cli.analysis.compare import einstein_prediction
 from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.physics.contact import Contact, build_scene
-from gfmd_cli.physics.elastomers import Power
-from gfmd_cli.physics.indenters import LineParabola, Parabola
+from gfmd_cli.physics.elastomers import HalfSpace, Power
+from gfmd_cli.physics.indenters import LineParabola, Parabola, Ridge
 from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.physics.true_contact import Bearing, bearing, contact_area, contact_stress
 
@@ -121,6 +121,11 @@ def test_a_deviation_that_is_delta_sigma_gives_back_persson_theory():
     p_star = np.geomspace(1e-4, 4.0, 20)
     areas = contact_area(whole.delta_sigma_c(p_star), p_star)
     assert areas == pytest.approx(contact_area(1.0, p_star), rel=1e-14)
+
+
+def test_a_bearing_without_a_known_share_has_no_deviation():
+    scene = build_scene(Ridge(width=0.05), HalfSpace(), 64)
+    assert np.isnan(bearing(scene.contact(0.01)).delta_sigma_c(0.01))
 
 
 def test_the_area_obeys_its_own_equation():

@@ -1,6 +1,6 @@
 """A study beside Persson theory."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -38,8 +38,14 @@ def in_continuum(row: Mapping[str, Any], name: str) -> bool:
 
 def best(row: Row, name: str) -> tuple[float, float]:
     """A quantity with its error: of the continuum where that is known, else of the grid."""
-    value = f"{name}_continuum" if in_continuum(row, name) else name
-    return float(row[value]), float(row[f"{value}_error"])
+    ((value, error),) = best_of_all([row], name)
+    return value, error
+
+
+def best_of_all(rows: Sequence[Row], name: str) -> list[tuple[float, float]]:
+    """The same of rows that are averaged: of the continuum only where that is known of all."""
+    value = f"{name}_continuum" if all(in_continuum(row, name) for row in rows) else name
+    return [(float(row[value]), float(row[f"{value}_error"])) for row in rows]
 
 
 def with_best(row: Row) -> Row:

@@ -12,6 +12,8 @@ from gfmd_cli.physics.observables import QUANTITIES
 from gfmd_cli.spec.models import differences
 from gfmd_cli.study.reading import read_rows, solved_rows, stored_spec
 
+SURFACE = ("surface", "surface_sha256", "seed")
+"""Columns of a surface: two files may have the same name."""
 UNITS = {"sigma_p": "delta_sigma", "u_g": "h_std"}
 """Columns that reduced quantities are in units of."""
 LOADS = {
@@ -93,7 +95,7 @@ def diff(one: Path, other: Path) -> Difference:
 
 def _pressed(row: Row) -> tuple[Hashable, ...]:
     """What is pressed together."""
-    return row["surface"], row["seed"], row["elastomer"]
+    return (*(row[name] for name in SURFACE), row["elastomer"])
 
 
 def _load_of(row: Row) -> tuple[Hashable, ...]:
@@ -127,7 +129,7 @@ def _paired(pair: Pair) -> str:
     """What sets the studies apart, and by what their rows are paired."""
     apart = [
         what
-        for what, names in {"surfaces": ("surface", "seed"), "elastomers": ("elastomer",)}.items()
+        for what, names in {"surfaces": SURFACE, "elastomers": ("elastomer",)}.items()
         if any(pair.one[name] != pair.other[name] for name in names)
     ]
     load = pair.one["load"]

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from scipy.special import stdtrit
 
-from gfmd_cli.analysis.compare import Comparison, Row, of_study
+from gfmd_cli.analysis.compare import Comparison, Row, best_of_all, of_study
 from gfmd_cli.analysis.selection import grouped
 from gfmd_cli.analysis.units import grid_size
 from gfmd_cli.physics.observables import QUANTITIES
@@ -44,10 +44,14 @@ class Ensemble:
         grid = "" if row.get("grid") == "auto" else f", {grid_size([row])}"
         return of_study(self.study, f"{row['elastomer']} on {row['ensemble']}{grid}")
 
+    @property
+    def p_star(self) -> float:
+        """Mean reduced pressure, which differs where another load is prescribed."""
+        return float(np.mean([row["p_star"] for row in self.rows]))
+
     def spread(self, name: str) -> Spread:
         """Of "a_r", "sigma_p" or "u_g": of the continuum values where all rows have one."""
-        best = [row.get(f"{name}_continuum", np.nan) for row in self.rows]
-        return spread_of(best if np.all(np.isfinite(best)) else [row[name] for row in self.rows])
+        return spread_of([value for value, _ in best_of_all(self.rows, name)])
 
     def means(self) -> dict[str, Any]:
         """Number of seeds, and the spread of each quantity, as the records of a study have them."""

@@ -6,7 +6,7 @@ from typing import Self
 
 import numpy as np
 
-from gfmd_cli.analysis.compare import Curve, Prediction, Row
+from gfmd_cli.analysis.compare import Curve, Prediction, Row, best_of_all
 from gfmd_cli.analysis.curve_styles import CurveStyle
 from gfmd_cli.analysis.ensemble import by_load, spread_of, without_seed
 from gfmd_cli.analysis.plotting import ColumnFigure
@@ -102,12 +102,11 @@ def _point(view: View, records: list[Row]) -> tuple[float, float, float, float, 
     """p*, value, error, half width of the confidence interval, and whether all converged."""
     name = view.column
     units = np.array([r[f"{name}_persson"] if view.ratio else 1.0 for r in records])
-    values = np.array([r[f"{name}_best"] for r in records]) / units
-    errors = np.abs([r[f"{name}_best_error"] for r in records]) / units
+    values, errors = np.transpose(best_of_all(records, name)) / units
     half_width = spread_of(values).half_width if len(records) > 1 else np.nan
     converged = all(record["status"] == Status.CONVERGED for record in records)
     p_star = np.mean([record["p_star"] for record in records])
-    return float(p_star), float(values.mean()), float(errors.mean()), half_width, converged
+    return float(p_star), float(values.mean()), float(np.abs(errors).mean()), half_width, converged
 
 
 def _details(rows: list[Row]) -> str:

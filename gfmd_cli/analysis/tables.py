@@ -230,7 +230,7 @@ def seeds_table(comparison: Comparison) -> Table:
     groups = groups_of(
         (
             f"{ensemble.title}: mean of {len(ensemble.rows)} seeds",
-            {"p_star": ensemble.rows[0]["p_star"], **ensemble.means()},
+            {"p_star": ensemble.p_star, **ensemble.means()},
         )
         for ensemble in ensembles(comparison)
     )

@@ -91,7 +91,10 @@ def read_hdf5(path: Path, dataset: str | None, max_bytes: int) -> HeightMap:
             )
         values = np.ma.asarray(data[()])
         for mark in {"_FillValue", "missing_value"} & set(data.attrs):
-            values = np.ma.masked_where(values == data.attrs[mark], values)
+            missing = np.asarray(data.attrs[mark])
+            if missing.dtype.kind == values.dtype.kind == "f":  # perhaps of another precision
+                missing = missing.astype(values.dtype)
+            values = np.ma.masked_where(values == missing, values)
         return HeightMap(values, None, False, None, f"HDF5, {name}, {data.dtype}")
 
 
@@ -143,3 +146,10 @@ def map_names(path: Path) -> list[str]:
             return [name for name in names if not is_study or name.endswith("/height")]
     except Exception:  # a damaged file can raise any; reading it will say what is wrong
         return []
+
+
+def at_equal_distances(x: Any, heights: Any) -> tuple[Any, tuple[float]]:
+    """Linear interpolation of a line profile at as many points, and the length of their cell."""
+    points = len(x)
+    spacing = float(x[-1] - x[0]) / (points - 1)
+    return np.interp(x[0] + spacing * np.arange(points), x, heights), (points * spacing,)

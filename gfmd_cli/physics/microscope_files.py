@@ -7,7 +7,13 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from gfmd_cli.errors import INSTALL, InputError
-from gfmd_cli.physics.height_map import REMEDY, HeightMap, check_layout, first_line
+from gfmd_cli.physics.height_map import (
+    REMEDY,
+    HeightMap,
+    at_equal_distances,
+    check_layout,
+    first_line,
+)
 from gfmd_cli.physics.text_tables import table_formats
 
 TABLES = {"xyz", "asc"}  # formats of SurfaceTopography that are tables of numbers
@@ -88,7 +94,7 @@ def _read_channel(path: Path, reader: Any, dataset: str | None, max_bytes: int) 
     if scan.is_uniform:
         heights, sides = scan.heights().T, tuple(map(float, scan.physical_sizes))[::-1]
     else:
-        heights, sides = _at_equal_distances(*scan.positions_and_heights())
+        heights, sides = at_equal_distances(*scan.positions_and_heights())
         source += ", interpolated at equal distances"
     return HeightMap(
         heights=heights,
@@ -125,13 +131,6 @@ def _is_number(word: bytes) -> bool:
     except ValueError:
         return False
     return True
-
-
-def _at_equal_distances(x: Any, heights: Any) -> tuple[Any, tuple[float]]:
-    """Linear interpolation of a line profile at as many points, and the length of their cell."""
-    points = len(x)
-    spacing = float(x[-1] - x[0]) / (points - 1)
-    return np.interp(x[0] + spacing * np.arange(points), x, heights), (points * spacing,)
 
 
 def _height_channel(path: Path, reader: Any, name: str | None) -> Any:

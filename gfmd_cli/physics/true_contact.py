@@ -84,10 +84,13 @@ class Bearing:
         """Delta_sigma_c [Delta_sigma] that is consistent with its contact area. Paper Sect. 7.
 
         The pressure for a share a is p = sqrt(2) Delta_sigma_c(a) erfinv(a). Where p(a) does not
-        increase, the smallest share is used; beyond its ends, Delta_sigma_c is constant.
+        increase, the smallest share is used; beyond its ends, Delta_sigma_c is constant. NaN where
+        no share of the points is known.
         """
         p = np.sqrt(2) * self.deviation * erfinv(self.area)
         rises = p > np.maximum.accumulate(np.append(0.0, p))[:-1]
+        if not rises.any():
+            return np.full(np.shape(p_star), np.nan)
         return np.asarray(np.interp(np.log(p_star), np.log(p[rises]), self.deviation[rises]))
 
 

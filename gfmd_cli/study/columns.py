@@ -155,7 +155,12 @@ WEIGHTS = {
         Column("pr_beyond", float, "1", "fraction of points beyond the linear bins of Pr(sigma)"),
     ),
     "gap_distribution": (
-        Column("pr_gap_zero", float, "1", "weight of the delta function of Pr(g) at zero"),
+        Column(
+            "pr_gap_zero",
+            float,
+            "1",
+            "weight of the delta function of Pr(g) at zero, of the points with a known height",
+        ),
         Column("pr_gap_beyond", float, "1", "fraction of points beyond the linear bins of Pr(g)"),
         Column("pr_gap_below", float, "1", "fraction of points below the logarithmic bins"),
     ),
