@@ -7,7 +7,7 @@ A spec is the path of a TOML file, or its tables as a dictionary.
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from html import escape
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -31,8 +31,8 @@ from gfmd_cli.spec.parse import read_spec, read_tables
 from gfmd_cli.status import Status
 from gfmd_cli.study.context import Report, SolveContext, Watcher, WorkerOptions, ignore
 from gfmd_cli.study.load_search import solve_at_load
-from gfmd_cli.study.measure import measured, planned
-from gfmd_cli.study.plausibility import warnings_of
+from gfmd_cli.study.measure import all_columns
+from gfmd_cli.study.plausibility import SEPARATOR
 from gfmd_cli.study.reading import read_rows, solved_rows
 from gfmd_cli.study.refinement import forget_scene
 from gfmd_cli.study.resources import room
@@ -83,6 +83,9 @@ class Result:
     """"converged", or the reason why the tolerance was missed."""
     warnings: tuple[str, ...] = ()
     """What makes the numbers doubtful."""
+    columns: Mapping[str, Any] = field(default_factory=dict)
+    """All columns that a study would have of the contact, such as "a_r_continuum" where the table
+    [accuracy] requests errors, "patches" where [output] requests them, and histograms."""
 
     @property
     def p_star(self) -> float:
@@ -113,6 +116,10 @@ class Result:
             "largest pressure": f"{self.pressure.max():.4g} Pa",
             "scales": f"h_std = {self.h_std:.4g} m, Delta_sigma = {self.delta_sigma:.4g} Pa",
         }
+        for name, symbol in {"contact area": "a_r", "mean gap": "u_g"}.items():
+            if self.columns.get(f"{symbol}_verdict") == "regular":
+                value, error = (self.columns[f"{symbol}_continuum{end}"] for end in ("", "_error"))
+                numbers[f"{name} in the continuum"] = f"{symbol} = {value:.5g} +- {error:.1g}"
         return numbers | ({"warnings": "; ".join(self.warnings)} if self.warnings else {})
 
     def __str__(self) -> str:
@@ -189,7 +196,7 @@ def _solve(spec: Path | str | Tables, threads: int) -> Result:
     context = SolveContext(WorkerOptions(threads, room()))
     solved = solve_at_load(tasks[0], context, Watcher())
     scene, solution, obstacle = solved.scene, solved.solution, solved.contact.obstacle
-    row = planned(tasks[0]) | measured(tasks[0], solved)
+    row = all_columns(tasks[0], solved)
     x = np.arange(row["points"]) / row["points"] + row["x_first"]
     return Result(
         height=scene.in_metres(solved.contact.height),
@@ -198,7 +205,8 @@ def _solve(spec: Path | str | Tables, threads: int) -> Result:
         pressure=scene.in_pascals(contact_pressure(obstacle, solution.u, solution.sigma)),
         x=x * row["length"],
         nominal_pressure=row["pressure"],
-        warnings=tuple(warnings_of(tasks[0], solved)),
+        warnings=tuple(filter(None, row["warnings"].split(SEPARATOR))),
+        columns=row,
         **{name: row[name] for name in NUMBERS},
     )
 

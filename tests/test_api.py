@@ -205,6 +205,16 @@ def test_a_line_scan_at_unequal_distances_is_interpolated():
     )
 
 
+def test_a_result_has_the_columns_of_a_study():
+    accuracy = {"grid": {"points": "auto"}, "accuracy": {"contact_area": 0.1}}
+    result = solve(TABLES | accuracy | {"output": {"patches": True}})
+    assert result.columns["a_r_verdict"] == "regular"
+    assert abs(result.columns["a_r_continuum"] - result.a_r) < 0.2 * result.a_r
+    assert "contact area in the continuum" in result.summary()
+    assert result.columns["patches"] > 0
+    assert result.columns["pr_sigma_log"].sum() > 0
+
+
 def test_numbers_of_numpy_are_numbers():
     one = solve(TABLES)
     same = {

@@ -34,6 +34,22 @@ def test_a_sound_contact_has_no_warning():
     assert "warnings" not in str(result)
 
 
+def test_a_tolerance_too_loose_to_be_meant():
+    loose = tables() | {"solver": {"tolerance": 0.5}}
+    assert "solver.tolerance = 0.5: contact area" in only_warning(loose)
+
+
+def test_a_table_of_stiffness_that_does_not_reach_the_surface(tmp_path):
+    np.savetxt(tmp_path / "k.txt", [[1e-2, 1.0], [1e2, 1e4]])
+    elastomer = {"kind": "table", "path": str(tmp_path / "k.txt")}
+    assert "100% of the squared stress" in only_warning(tables(elastomer=elastomer))
+
+
+def test_a_layer_thinner_than_the_roughness():
+    layer = {"kind": "layer", "base": "sliding", "E_star": 1e6, "thickness": 1e-9}
+    assert "is less than the rms height" in only_warning(tables(elastomer=layer))
+
+
 def test_few_points_in_contact():
     result = solve(tables(p_star=1e-3))
     assert int(result.contact.sum()) < 30

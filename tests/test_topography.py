@@ -135,6 +135,44 @@ def test_heights_marked_as_missing_in_hdf5_are_located(hdf5):
     np.testing.assert_array_equal(read.missing, stored == 18)
 
 
+@pytest.mark.parametrize("factor", [1.0, 1e6])
+def test_distances_of_a_profile_are_compared_with_each_other(tmp_path, factor):
+    x = np.concatenate([np.arange(60) * 1e-8, 6e-7 + np.arange(20) * 1e-7])
+    height = 5e-8 * np.cos(2 * np.pi * x / 2e-6)
+    for name, order in (("up", slice(None)), ("down", slice(None, None, -1))):
+        path = tmp_path / f"{name}.txt"
+        np.savetxt(path, factor * np.column_stack([x, height])[order])
+        read = read_topography(path)
+        even = x[0] + np.arange(80) * (x[-1] - x[0]) / 79
+        np.testing.assert_allclose(read.heights, factor * np.interp(even, x, height), atol=1e-12)
+        assert "interpolated at equal distances" in read.source
+    even = np.arange(80) * 1e-8
+    np.savetxt(tmp_path / "even.txt", factor * np.column_stack([even, height])[::-1])
+    read = read_topography(tmp_path / "even.txt")
+    np.testing.assert_allclose(read.heights, factor * height)
+    assert read.spacing == pytest.approx((factor * 1e-8,))
+
+
+def test_positions_of_a_profile_in_no_order_are_refused(tmp_path):
+    x = np.random.default_rng(0).permutation(100) * 1e-8
+    np.savetxt(tmp_path / "mixed.txt", np.column_stack([x, np.sin(1e7 * x)]))
+    with pytest.raises(InputError, match="positions along a profile must increase or decrease"):
+        read_topography(tmp_path / "mixed.txt")
+
+
+@pytest.mark.parametrize("mark", [-9999.0, 50.0])
+def test_marks_of_missing_heights_and_spikes_are_remarked_on(npy, heights, mark):
+    heights[3, 5] = mark
+    (remark,) = [r for r in FileSurface(path=npy(heights)).remarks() if "far from" in r]
+    assert remark.startswith(f"1 height is exactly {mark:g}, far from all others")
+
+
+def test_a_side_that_replaces_that_of_the_file_is_remarked_on():
+    assert not any("replaces" in remark for remark in FileSurface(path=SCAN).remarks())
+    remarks = FileSurface(path=SCAN, length=1e-3).remarks()
+    assert any("replaces the side of the file" in remark for remark in remarks)
+
+
 @pytest.mark.parametrize("mark", [np.float64(-9999.9), np.float64(1e20), np.float32(-9999.9)])
 def test_a_mark_of_another_precision_is_found(hdf5, heights, mark):
     heights = heights.astype(np.float32)

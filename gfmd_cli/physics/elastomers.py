@@ -26,6 +26,7 @@ from gfmd_cli.physics.persson import gamma_n, gamma_slab
 LONG_WAVE = 1e-6  # q t up to which k of a layer is constant: (q t)^2 is below rounding
 DECAYED = 25.0  # thicknesses from which the displacement of a layer is below rounding
 MAX_SPACING = 16.0  # of a grid, in thicknesses of a layer with a free boundary
+EXTRAPOLATED = 0.1  # share of the squared stress beyond a table of k(q); a choice
 MAX_TABLE = 2**20  # bytes of a tabulated stiffness; a choice, some 40000 rows
 STEP = 1e-3  # of ln q: the truncation error is of order 1e-7, the rounding error 1e-13
 
@@ -64,6 +65,13 @@ class LinearElastomer(Choice):
     def compliance(self) -> Compliance:
         """1/k(q) of an elastomer whose displacement decays and whose k(q) is no power law."""
         raise NotImplementedError
+
+    def remarks(self, h_std: float, q: Field, variance: Field) -> list[str]:
+        """Warnings on a surface of this rms height [m]; mostly none.
+
+        `variance` is the part of the squared full-contact stress at the wavenumbers q [1/m].
+        """
+        return []
 
     def decays(self, dimension: int) -> bool:
         """Whether the displacement decays with the distance from the load.
@@ -256,6 +264,15 @@ class Layer(LinearElastomer):
         t = np.where(q > 0, q, 1.0) * self.thickness
         return np.where(q > 0, 0.5 * self.E_star * q / self.softening(t), 0.0)
 
+    def remarks(self, h_std: float, q: Field, variance: Field) -> list[str]:
+        """See `LinearElastomer.remarks`."""
+        if self.thickness > h_std:
+            return []
+        return [
+            f"elastomer.thickness = {self.thickness:g} m is less than the rms height, "
+            f"{h_std:.3g} m: linear elasticity does not hold for such compressions"
+        ]
+
     def softening(self, t: Field) -> Field:
         """Compliance relative to the half-space, c(q t): zero for q t = 0, one for q t >> 1."""
         return layer_softening(t, self.poisson if self.base == "bonded" else None)
@@ -299,6 +316,18 @@ class Tabulated(LinearElastomer):
     def stiffness(self, q: Field, length: float = 1.0) -> Field:
         """k(q) [Pa/m]. Raises InputError for an invalid table."""
         return np.where(q > 0, _interpolated(self._table())(np.where(q > 0, q, 1.0)), 0.0)
+
+    def remarks(self, h_std: float, q: Field, variance: Field) -> list[str]:
+        """See `LinearElastomer.remarks`."""
+        first, *_, last = self._table()[:, 0]
+        share = float(variance[(q < first) | (q > last)].sum() / variance.sum())
+        if share <= EXTRAPOLATED:
+            return []
+        return [
+            f"{self.path.name}: k(q) is given for q = {first:.3g} to {last:.3g} 1/m, but "
+            f"{share:.0%} of the squared stress in full contact is at other wavenumbers (the "
+            f"surface has {q.min():.3g} to {q.max():.3g} 1/m), where k is extrapolated"
+        ]
 
     def decays(self, dimension: int) -> bool:
         """Whether the power law below the table rises less than q^dimension."""

@@ -35,6 +35,8 @@ from gfmd_cli.physics.topography import Region, Topography, read_topography
 STEEP = 3.0  # rms gradient; a choice: surfaces of machined or worn solids have less
 SMOOTH = 1e-6  # rms gradient; a choice: polished mirrors have about that
 CLIFF = 5.0  # ratio of the step across the border to that inside; a choice: 1 if periodic
+FEW = 0.01  # share of the heights that can be outliers; a choice
+SIDES = 1e-3  # relative difference of two sides beyond which one is probably wrong; a choice
 FILLED = 0.05  # share of filled heights; a choice, as for the frame of the window
 
 
@@ -84,8 +86,8 @@ class FileSurface(RigidSurface):
     scale: Positive = 1.0
     """Factor from the heights of the file to metres; also for its side if it states no unit."""
     length: Positive | None = None
-    """Side of the map along x [m]; if the map is cropped, of the part that is used. By default that
-    of the file, or 1 if the file states none."""
+    """Side of the map along x [m]; with a region or cropped, of the part that is used. By default
+    that of the file, or 1 if the file states none."""
     length_y: Positive | None = None
     """Side of the map along y [m]; by default that of the file, else the points along y times the
     spacing along x."""
@@ -274,6 +276,14 @@ class FileSurface(RigidSurface):
             remarks.append(
                 "the file does not state its side; L = 1 m is assumed: set surface.length"
             )
+        if self.length is not None and topography.spacing is not None and topography.metres:
+            stated = topography.spacing[-1] * heights.shape[-1] / self.copies
+            if abs(self.length / stated - 1) > SIDES:
+                remarks.append(
+                    f"surface.length = {self.length:g} m replaces the side of the file, "
+                    f"{stated:g} m"
+                )
+        remarks += _outliers(topography)
         filled = topography.holes / topography.heights.size if self.missing == "fill" else 0.0
         if filled > FILLED:
             remarks.append(
@@ -360,6 +370,25 @@ def _prepared(surface: FileSurface) -> Field:
             )
         heights = fill_missing(heights, missing)
     return make_periodic(heights, surface.edges or "none", surface.taper)
+
+
+def _outliers(topography: Topography) -> list[str]:
+    """A warning about heights farther from all others than these are from each other."""
+    heights = topography.heights
+    if topography.missing is not None:
+        heights = heights[~topography.missing]
+    for extreme in (heights.min(), heights.max()):
+        others = heights[heights != extreme]
+        count = heights.size - others.size
+        if count > FEW * heights.size or others.size < SMALLEST_GRID:
+            continue
+        if min(abs(others.max() - extreme), abs(others.min() - extreme)) > np.ptp(others) > 0:
+            what = "1 height is" if count == 1 else f"{count} heights are"
+            return [
+                f"{what} exactly {extreme:g}, far from all others: a spike or "
+                "a mark of missing heights? Replace it by NaN"
+            ]
+    return []
 
 
 def forget_files() -> None:

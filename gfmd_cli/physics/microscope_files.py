@@ -18,6 +18,7 @@ from gfmd_cli.physics.text_tables import table_formats
 
 TABLES = {"xyz", "asc"}  # formats of SurfaceTopography that are tables of numbers
 SMALL_FILE = 2**14  # bytes, which the readers of tables parse in a second
+EVEN = 1e-3  # deviation of distances, over their mean, up to which they are equal; a choice
 SIGNATURE_BYTES = 512  # at the beginning of a file, by which readers recognise their format
 
 
@@ -86,6 +87,8 @@ def _read_channel(path: Path, reader: Any, dataset: str | None, max_bytes: int) 
     check_layout(path, shape, np.dtype(float), max_bytes)
     unsized = channel.physical_sizes is None
     scan = channel.topography(physical_sizes=(1.0,) * len(shape) if unsized else None)
+    if reader.format() == "xyz" and len(shape) == 1:
+        scan = _with_positions(reader, scan)
     if scan.unit is not None:
         scan = scan.to_unit("m")
     source = f"{reader.format()}, {channel.channel_id}"
@@ -93,8 +96,10 @@ def _read_channel(path: Path, reader: Any, dataset: str | None, max_bytes: int) 
         _check_all_rows_read(path, *shape)
     if scan.is_uniform:
         heights, sides = scan.heights().T, tuple(map(float, scan.physical_sizes))[::-1]
+        if len(shape) == 1 and sides[0] < 0:  # recorded backwards
+            heights, sides = heights[::-1], (-sides[0],)
     else:
-        heights, sides = at_equal_distances(*scan.positions_and_heights())
+        heights, sides = at_equal_distances(*_increasing(path, *scan.positions_and_heights()))
         source += ", interpolated at equal distances"
     return HeightMap(
         heights=heights,
@@ -103,6 +108,35 @@ def _read_channel(path: Path, reader: Any, dataset: str | None, max_bytes: int) 
         periodic=bool(scan.is_periodic),
         source=source,
     )
+
+
+def _with_positions(reader: Any, scan: Any) -> Any:
+    """A profile with its positions, unless their distances are equal.
+
+    The reader takes distances as equal that differ by less than 1e-6 in the unit of the file, which
+    is all of a profile in metres.
+    """
+    if not scan.is_uniform:
+        return scan
+    tolerance = EVEN * abs(float(scan.physical_sizes[0])) / scan.nb_grid_pts[0]
+    try:
+        again = reader._read(tol=tolerance)
+    except Exception:  # a first column that counts the rows is found by the same tolerance
+        return scan
+    return again if again.dim == 1 else scan
+
+
+def _increasing(path: Path, x: Any, heights: Any) -> tuple[Any, Any]:
+    """Positions that increase, and the heights there. Raises InputError where they do neither."""
+    if x[-1] < x[0]:
+        x, heights = x[::-1], heights[::-1]
+    wrong = np.flatnonzero(np.diff(x) <= 0)
+    if wrong.size:
+        raise InputError(
+            f"{path}: the positions along a profile must increase or decrease; "
+            f"{x[wrong[0]]:.6g} is followed by {x[wrong[0] + 1]:.6g}"
+        )
+    return x, heights
 
 
 def _check_all_rows_read(path: Path, rows: int, columns: int) -> None:

@@ -53,7 +53,7 @@ def starter_of_scan(
         dataset=surface.dataset,
         holes=surface.holes(),
         missing=surface.missing,
-        level=surface.levelling(),
+        level=surface.level or (None if surface.levelling() == "none" else surface.levelling()),
         sides=" x ".join(sides),
         h_std=scene.h_std,
         delta_sigma=scene.delta_sigma,

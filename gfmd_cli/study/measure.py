@@ -99,18 +99,25 @@ def error_columns(solved: Solved) -> Row:
     return row
 
 
+def all_columns(task: Task, solved: Solved) -> Row:
+    """The columns and histograms of a solved contact, without the time."""
+    contact, solution = solved.contact, solved.solution
+    u, sigma = solution.u, solution.sigma
+    return (
+        empty_row()
+        | planned(task)
+        | measured(task, solved)
+        | {"warnings": SEPARATOR.join(warnings_of(task, solved))}
+        | edge_shares(task.surface, solved.scene.grid, contact.obstacle, u, sigma)
+        | on_request(task.output, SolvedContact(contact, u, sigma))
+    )
+
+
 def result(task: Task, solved: Solved, seconds: float) -> TaskResult:
     """All that a study keeps of one solution, which took so many seconds."""
     scene, contact, solution = solved.scene, solved.contact, solved.solution
     u, sigma, output = solution.u, solution.sigma, task.output
-    row = (
-        empty_row()
-        | planned(task)
-        | measured(task, solved)
-        | {"seconds": seconds, "warnings": SEPARATOR.join(warnings_of(task, solved))}
-        | edge_shares(task.surface, scene.grid, contact.obstacle, u, sigma)
-        | on_request(output, SolvedContact(contact, u, sigma))
-    )
+    row = all_columns(task, solved) | {"seconds": seconds}
     physical: dict[str, Callable[[], Field]] = {  # of which one at a time takes memory
         "u": lambda: scene.in_metres(u),
         "sigma": lambda: scene.in_pascals(sigma),

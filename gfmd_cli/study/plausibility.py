@@ -13,6 +13,7 @@ surfaces are in full contact from about 6 on; below, the largest grids have few 
 SMALL_GAPS = (1e-5, 1e-3)
 """Mean gaps [h_std]: below the first, or below the second if that is a possible gap in m, they are
 probably meant in m; a choice."""
+LOOSE = 0.01  # natural residual; the mean gap of the default surface is then wrong by 0.1 to 1 %
 SMALL_DISPLACEMENT = 1e-4  # [h_std], below which heights have another unit; a choice
 SEPARATOR = " | "
 """Between the warnings of one contact in a column of text."""
@@ -27,6 +28,12 @@ def warnings_of(task: Task, solved: Solved) -> list[str]:
             f"a modulus of {elastomer.modulus:.3g} Pa and an rms height of {scene.h_std:.3g} m: "
             "are heights and lengths in metres? Set surface.h_std, surface.length or surface.scale"
         )
+    if task.solver.tolerance > LOOSE:
+        warnings.append(
+            f"solver.tolerance = {task.solver.tolerance:g}: contact area and mean gap may be wrong "
+            f"by several percent; at most {LOOSE:g} is usual"
+        )
+    warnings += elastomer.remarks(scene.h_std, scene.shells.q, scene.shells.variance)
     units = _doubtful_unit(task, solved)
     if units:
         return [*warnings, units]  # few points in contact follow from it

@@ -15,7 +15,7 @@ from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from gfmd_cli.errors import InputError, StudyError
+from gfmd_cli.errors import InputError, SpaceError, StudyError
 from gfmd_cli.files.atomic import new_file
 from gfmd_cli.files.hdf5 import new_hdf5
 from gfmd_cli.files.locks import locked
@@ -138,9 +138,9 @@ class Study:
             with locked(self.parts / "in-use", wait=False) as alone:
                 if not alone:
                     raise InputError(f"{self.path}: another run works on this study; wait for it")
-                moved.append(self.parts.rename(Study(target).parts))
+                moved.append(_renamed(self.parts, Study(target).parts))
         if self.path.exists():
-            moved.append(self.path.rename(target))
+            moved.append(_renamed(self.path, target))
         return moved
 
     def records(self) -> tuple[dict[Path, Entry], dict[Path, StudyError]]:
@@ -195,6 +195,14 @@ class Study:
     def _collecting(self) -> Any:
         """Keep other collectors out."""
         return locked(self.parts / "collecting")
+
+
+def _renamed(path: Path, target: Path) -> Path:
+    """Rename a file or folder; return its new path. Raises SpaceError where that cannot be done."""
+    try:
+        return path.rename(target)
+    except OSError as error:
+        raise SpaceError(f"{path}: cannot be renamed to {target}: {error.strerror}") from error
 
 
 def without_result(tasks: Iterable[Task], outcomes: dict[str, Outcome]) -> list[Task]:

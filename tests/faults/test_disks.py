@@ -52,6 +52,7 @@ def test_a_read_only_folder_is_status_73_and_can_be_read(folder, gfmd, disk):
         ("export", "study.h5", "-o", "a.csv"),
         ("analyze", "study.h5", "--figures", "figures"),
         ("run", "spec.toml", "-o", "new.h5"),
+        ("run", "spec.toml", "-o", "study.h5", "--overwrite"),
         ("bench", "spec.toml"),
     ):
         status, output = gfmd(place, *words)
