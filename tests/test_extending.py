@@ -86,7 +86,7 @@ class RandomWaves(RigidSurface):
 OBSERVABLE = """OBSERVABLES = (
     Observable(
         "lowest",
-        Column("lowest_point", float, "1", "depth of the lowest point of the elastomer / h_std"),
+        Column("lowest_point", "depth of the lowest point of the elastomer / h_std"),
         lambda solved: float(-solved.u.min()),
         "lowest point",
         ReducedUnit("h_std", "m", lambda row: float(row["h_std"])),

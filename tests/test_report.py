@@ -282,7 +282,7 @@ def test_warnings_stand_before_the_green_tick(copied):
     with h5py.File(copied, "r+") as file:
         for name, value in (("warnings", "few points"), ("a_r_verdict", "unknown")):
             del file[name]
-            write_column(file, Column(name, str, "", ""), [value], [])
+            write_column(file, Column(name, "", "", str), [value], [])
         file["edge_contact"][...] = file["edge_load"][...] = 0.5
     text = report(copied)
     words = [" ".join(word.split()) for word in Page(text).words]
@@ -335,7 +335,7 @@ def test_hostile_texts_are_text(copied):
         for name in ("elastomer", "surface", "status", "solver"):
             size = file[name].size
             del file[name]
-            write_column(file, Column(name, str, "", ""), [f"$x$ {name} {HOSTILE}"] * size, [])
+            write_column(file, Column(name, "", "", str), [f"$x$ {name} {HOSTILE}"] * size, [])
     text = report(copied)
     page = Page(text)
     kinds = [script.get("type") for script in page.all("script")]

@@ -21,15 +21,13 @@ from gfmd_cli.study.writing import write_column, write_scale
 
 BENCH_LAYOUT = 1
 SAMPLES = (
-    Column("transforms", float, "1", "real Fourier transforms so far, in units of the solved grid"),
-    Column(
-        "seconds", float, "s", "processor time so far on one thread, without that of the record"
-    ),
-    Column("points", int, "1", "points per side of the grid that the solver was on"),
-    Column("residual", float, "1", "natural residual on that grid"),
-    Column("a_r_error", float, "1", "relative distance of the contact area to the reference"),
-    Column("sigma_p_error", float, "1", "relative distance of the stress deviation to it"),
-    Column("u_g_error", float, "1", "relative distance of the mean gap to it"),
+    Column("transforms", "real Fourier transforms so far, in units of the solved grid"),
+    Column("seconds", "processor time so far on one thread, without that of the record", "s"),
+    Column("points", "points per side of the grid that the solver was on", kind=int),
+    Column("residual", "natural residual on that grid"),
+    Column("a_r_error", "relative distance of the contact area to the reference"),
+    Column("sigma_p_error", "relative distance of the stress deviation to it"),
+    Column("u_g_error", "relative distance of the mean gap to it"),
 )
 """Over `sample`. The errors are NaN on the coarser grids, absolute where the reference is zero."""
 COSTS = ("transforms", "seconds")

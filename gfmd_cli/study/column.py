@@ -8,11 +8,11 @@ class Column(NamedTuple):
     """Name, type and meaning of a value that every task has."""
 
     name: str
-    kind: type
-    """`str`, `int` or `float`."""
-    units: str
-    """As in CF conventions; "1" for a pure number, "" for text and mixed units."""
     meaning: str
+    units: str = "1"
+    """As in CF conventions; "1" for a pure number, "" for text and mixed units."""
+    kind: type = float
+    """`str`, `int` or `float`."""
 
     @property
     def blank(self) -> Any:

@@ -21,87 +21,76 @@ BENCH = "bench_layout"
 """Attribute that a bench has in the place of a study's `layout`."""
 
 
-STATUS = Column("status", str, "", "converged, or the reason why not")
+STATUS = Column("status", "converged, or the reason why not", "", str)
 CONTRACT = (
-    Column("surface", str, "", "kind of surface, and the keys that the spec gives"),
-    Column("seed", int, "1", "seed of the random phases; -1 if the surface has none"),
-    Column("elastomer", str, "", "kind of elastomer, and the keys that the spec gives"),
-    Column("n", float, "1", "exponent of the stiffness k ~ q^n; NaN if k is not a power law"),
-    Column(
-        "thickness", float, "", "elastomer.thickness: of a slab t / L, of a plate or layer t [m]"
-    ),
-    Column("points", int, "1", "grid points along x"),
-    Column("p_star", float, "1", "reduced pressure p / Delta_sigma"),
-    Column("a_r", float, "1", "relative contact area"),
-    Column("a_r_error", float, "1", "estimated distance of a_r from its continuum value"),
-    Column("sigma_p", float, "1", "standard deviation of the contact pressure / Delta_sigma"),
-    Column("sigma_p_error", float, "1", "estimated distance of sigma_p from its continuum value"),
-    Column("u_g", float, "1", "mean gap / h_std"),
-    Column("u_g_error", float, "1", "estimated distance of u_g from its continuum value"),
-    Column("residual", float, "1", "natural residual of the stored solution"),
-    Column("solver", str, "", "kind of the solver that was used"),
-    Column("transforms", float, "1", "real Fourier transforms, in units of one on the final grid"),
-    Column("seconds", float, "s", "wall time"),
+    Column("surface", "kind of surface, and the keys that the spec gives", "", str),
+    Column("seed", "seed of the random phases; -1 if the surface has none", kind=int),
+    Column("elastomer", "kind of elastomer, and the keys that the spec gives", "", str),
+    Column("n", "exponent of the stiffness k ~ q^n; NaN if k is not a power law"),
+    Column("thickness", "elastomer.thickness: of a slab t / L, of a plate or layer t [m]", ""),
+    Column("points", "grid points along x", kind=int),
+    Column("p_star", "reduced pressure p / Delta_sigma"),
+    Column("a_r", "relative contact area"),
+    Column("a_r_error", "estimated distance of a_r from its continuum value"),
+    Column("sigma_p", "standard deviation of the contact pressure / Delta_sigma"),
+    Column("sigma_p_error", "estimated distance of sigma_p from its continuum value"),
+    Column("u_g", "mean gap / h_std"),
+    Column("u_g_error", "estimated distance of u_g from its continuum value"),
+    Column("residual", "natural residual of the stored solution"),
+    Column("solver", "kind of the solver that was used", "", str),
+    Column("transforms", "real Fourier transforms, in units of one on the final grid"),
+    Column("seconds", "wall time", "s"),
     STATUS,
 )
 """The columns that every `export` begins with, in this order."""
 
 DETAILS = (
-    Column("pressure", float, "Pa", "nominal pressure"),
-    Column("delta_sigma", float, "Pa", "unit of pressure: rms stress in full contact"),
-    Column("h_std", float, "m", "root-mean-square height"),
-    Column("mean_height", float, "m", "mean height of the indenter"),
-    Column("length", float, "m", "side of the cell along x, L"),
-    Column("length_y", float, "m", "side of the cell along y; NaN for a line contact"),
-    Column("points_y", int, "1", "grid points along y; 1 for a line contact"),
-    Column("dimension", int, "1", "1 for a line contact, otherwise 2"),
-    Column("rough", int, "1", "1 for random and measured roughness, 0 for a single indenter"),
-    Column("warnings", str, "", "reasons to doubt the result"),
-    Column(
-        "x_first",
-        float,
-        "1",
-        "x / L of the first grid point; -0.5 if x = 0 is the crest of an indenter",
-    ),
-    Column("ensemble", str, "", "the column surface without the seed, the same for all seeds"),
-    Column("surface_sha256", str, "", "SHA-256 checksum of the file of the surface"),
-    Column("mean_gap", float, "m", "mean gap"),
-    Column("displacement", float, "m", "that of the indenter from first touch; NaN if not defined"),
+    Column("pressure", "nominal pressure", "Pa"),
+    Column("delta_sigma", "unit of pressure: rms stress in full contact", "Pa"),
+    Column("h_std", "root-mean-square height", "m"),
+    Column("mean_height", "mean height of the indenter", "m"),
+    Column("length", "side of the cell along x, L", "m"),
+    Column("length_y", "side of the cell along y; NaN for a line contact", "m"),
+    Column("points_y", "grid points along y; 1 for a line contact", kind=int),
+    Column("dimension", "1 for a line contact, otherwise 2", kind=int),
+    Column("rough", "1 for random and measured roughness, 0 for a single indenter", kind=int),
+    Column("warnings", "reasons to doubt the result", "", str),
+    Column("x_first", "x / L of the first grid point; -0.5 if x = 0 is the crest of an indenter"),
+    Column("ensemble", "the column surface without the seed, the same for all seeds", "", str),
+    Column("surface_sha256", "SHA-256 checksum of the file of the surface", "", str),
+    Column("mean_gap", "mean gap", "m"),
+    Column("displacement", "that of the indenter from first touch; NaN if not defined", "m"),
     Column(
         "perimeter",
-        float,
-        "1",
         "length of the contact line per area times L; in a line contact, number of contact edges",
     ),
-    Column("energy", float, "1", "elastic energy per area / (h_std Delta_sigma)"),
-    Column("work", float, "1", "(<sigma h> - p <u>) / (h_std Delta_sigma): twice the energy"),
-    Column("steps", int, "1", "solver steps on the finest grid"),
-    Column("tolerance", float, "1", "requested natural residual, solver.tolerance"),
-    Column("load", str, "", "prescribed quantity, a key of [load]"),
-    Column(
-        "load_value", float, "", "prescribed value, [Pa] for a pressure, [m] for a displacement"
-    ),
-    Column("preparation", str, "", "how the map was read from its file and prepared"),
-    Column("grid", str, "", "auto if the program chose the grid by the requested accuracy"),
+    Column("energy", "elastic energy per area / (h_std Delta_sigma)"),
+    Column("work", "(<sigma h> - p <u>) / (h_std Delta_sigma): twice the energy"),
+    Column("steps", "solver steps on the finest grid", kind=int),
+    Column("tolerance", "requested natural residual, solver.tolerance"),
+    Column("load", "prescribed quantity, a key of [load]", "", str),
+    Column("load_value", "prescribed value, [Pa] for a pressure, [m] for a displacement", ""),
+    Column("preparation", "how the map was read from its file and prepared", "", str),
+    Column("grid", "auto if the program chose the grid by the requested accuracy", "", str),
     *(
         column
         for name in QUANTITIES
         for column in (
-            Column(f"{name}_continuum", float, "1", "estimate of the continuum value"),
-            Column(f"{name}_continuum_error", float, "1", "its estimated error"),
+            Column(f"{name}_continuum", "estimate of the continuum value"),
+            Column(f"{name}_continuum_error", "its estimated error"),
             Column(
                 f"{name}_verdict",
-                str,
-                "",
                 "regular, exact or why there is no number (docs/accuracy.md)",
+                "",
+                str,
             ),
-            Column(f"{name}_algebraic", float, "1", "estimated error due to the residual"),
+            Column(f"{name}_algebraic", "estimated error due to the residual"),
         )
     ),
-    Column("sigma_p_bound", float, "1", "proven bound of the error of sigma_p due to the residual"),
-    Column("u_g_bound", float, "1", "proven bound of the error of u_g due to the residual"),
-    Column("edge_contact", float, "1", "fraction of the contact in the tapered zone at the edges"),
-    Column("edge_load", float, "1", "fraction of the load there; NaN without a window"),
+    Column("sigma_p_bound", "proven bound of the error of sigma_p due to the residual"),
+    Column("u_g_bound", "proven bound of the error of u_g due to the residual"),
+    Column("edge_contact", "fraction of the contact in the tapered zone at the edges"),
+    Column("edge_load", "fraction of the load there; NaN without a window"),
     *(observable.column for observable in OBSERVABLES),
 )
 PARAMETERS = parameters((*CONTRACT, *DETAILS))
@@ -129,7 +118,7 @@ class HistogramColumn(NamedTuple):
     @property
     def column(self) -> Column:
         """Name, type and meaning of the densities."""
-        return Column(self.name, float, "1", self.meaning)
+        return Column(self.name, self.meaning)
 
     def middles(self) -> Field:
         """Middles of the bins, geometric in logarithmic ones."""
@@ -151,67 +140,57 @@ HISTOGRAMS = (
 BINS = {histogram.name: histogram for histogram in HISTOGRAMS}
 WEIGHTS = {
     "histogram": (
-        Column("pr_zero", float, "1", "weight of the delta function of Pr(sigma) at zero"),
-        Column("pr_beyond", float, "1", "fraction of points beyond the linear bins of Pr(sigma)"),
+        Column("pr_zero", "weight of the delta function of Pr(sigma) at zero"),
+        Column("pr_beyond", "fraction of points beyond the linear bins of Pr(sigma)"),
     ),
     "gap_distribution": (
         Column(
             "pr_gap_zero",
-            float,
-            "1",
             "weight of the delta function of Pr(g) at zero, of the points with a known height",
         ),
-        Column("pr_gap_beyond", float, "1", "fraction of points beyond the linear bins of Pr(g)"),
-        Column("pr_gap_below", float, "1", "fraction of points below the logarithmic bins"),
+        Column("pr_gap_beyond", "fraction of points beyond the linear bins of Pr(g)"),
+        Column("pr_gap_below", "fraction of points below the logarithmic bins"),
     ),
 }
 """Fractions of points in no bin, by the key of [output] that turns the histogram on."""
 WEIGHT_COLUMNS = tuple(column for columns in WEIGHTS.values() for column in columns)
 ROW_COLUMNS = (*COLUMNS, *WEIGHT_COLUMNS)
 """All columns with one value a task."""
-TASK = Column("task", int, "1", "index of the task")
-TASK_ID = Column("task_id", str, "", "task by its content")
-SCENE_ID = Column("scene_id", str, "", "surface, elastomer and grid by their content")
-STORED = Column("stored_output", str, "", "what [output] stored of the task")
-SCENE = Column("scene", int, "1", "group of /scenes")
+TASK = Column("task", "index of the task", kind=int)
+TASK_ID = Column("task_id", "task by its content", "", str)
+SCENE_ID = Column("scene_id", "surface, elastomer and grid by their content", "", str)
+STORED = Column("stored_output", "what [output] stored of the task", "", str)
+SCENE = Column("scene", "group of /scenes", kind=int)
 SHELLS = (
-    Column("q", float, "m-1", "mean wavenumber of the shell"),
-    Column("height", float, "m2", "sum of C(q) over the shell"),
-    Column("energy", float, "Pa m", "sum of k(q) C(q) over the shell"),
-    Column("variance", float, "Pa2", "sum of k(q)^2 C(q) over the shell"),
-    Column("gamma", float, "1", "weight gamma of the elastic energy in Persson theory"),
-    Column("modes", float, "1", "number of modes in the shell"),
+    Column("q", "mean wavenumber of the shell", "m-1"),
+    Column("height", "sum of C(q) over the shell", "m2"),
+    Column("energy", "sum of k(q) C(q) over the shell", "Pa m"),
+    Column("variance", "sum of k(q)^2 C(q) over the shell", "Pa2"),
+    Column("gamma", "weight gamma of the elastic energy in Persson theory"),
+    Column("modes", "number of modes in the shell"),
 )
 PICTURES = "pictures"
 """Group of a scene that holds pictures of a measured surface, and the sides of each [m]."""
 FIELDS = (
-    Column("u", float, "m", "displacement"),
+    Column("u", "displacement", "m"),
     Column(
-        "sigma",
-        float,
-        "Pa",
-        "compressive stress K u + p; zero up to the residual outside the contact",
+        "sigma", "compressive stress K u + p; zero up to the residual outside the contact", "Pa"
     ),
-    Column("height", float, "m", "height of the indenter"),
-    Column(
-        "contact_pressure",
-        float,
-        "Pa",
-        "stress in contact, exactly zero outside the contact",
-    ),
+    Column("height", "height of the indenter", "m"),
+    Column("contact_pressure", "stress in contact, exactly zero outside the contact", "Pa"),
 )
 SPECTRA = (
-    Column("q", float, "m-1", "mean wavenumber of the shell"),
-    Column("waves", float, "1", "number of waves q in the shell"),
-    Column("height", float, "m2", "sum of |h(q)|^2 over the shell"),
-    Column("u", float, "m2", "sum of |u(q)|^2 over the shell"),
-    Column("sigma", float, "Pa2", "sum of |sigma(q)|^2 over the shell"),
+    Column("q", "mean wavenumber of the shell", "m-1"),
+    Column("waves", "number of waves q in the shell"),
+    Column("height", "sum of |h(q)|^2 over the shell", "m2"),
+    Column("u", "sum of |u(q)|^2 over the shell", "m2"),
+    Column("sigma", "sum of |sigma(q)|^2 over the shell", "Pa2"),
 )
 AUTOCORRELATIONS = (
-    Column("r", float, "m", "mean distance in the ring"),
-    Column("height", float, "1", "mean of C(r) / C(0) over the ring, for the height"),
-    Column("u", float, "1", "the same for the displacement"),
-    Column("sigma", float, "1", "the same for the stress"),
+    Column("r", "mean distance in the ring", "m"),
+    Column("height", "mean of C(r) / C(0) over the ring, for the height"),
+    Column("u", "the same for the displacement"),
+    Column("sigma", "the same for the stress"),
 )
 
 

@@ -101,25 +101,19 @@ OBSERVABLES = (
         "true_contact",
         Column(
             "deviation_c",
-            float,
-            "1",
             "standard deviation of the full-contact stress K h over the true contact / Delta_sigma",
         ),
         lambda solved: solved.full_contact_stress.deviation,
     ),
     Observable(
         "true_contact",
-        Column(
-            "quadrature_c", float, "1", "rms of i (q / |q|) k h over the true contact / Delta_sigma"
-        ),
+        Column("quadrature_c", "rms of i (q / |q|) k h over the true contact / Delta_sigma"),
         lambda solved: solved.full_contact_stress.quadrature,
     ),
     Observable(
         "true_contact",
         Column(
             "deviation_bearing",
-            float,
-            "1",
             "standard deviation of K h over the highest points, as many as the predicted a_r, "
             "/ Delta_sigma",
         ),
@@ -127,27 +121,27 @@ OBSERVABLES = (
     ),
     Observable(
         "patches",
-        Column("patches", int, "1", "number of contact patches (8-connected points)"),
+        Column("patches", "number of contact patches (8-connected points)", kind=int),
         lambda solved: solved.patch_areas.size,
         "patches",
     ),
     Observable(
         "patches",
-        Column("patch_area_mean", float, "1", "mean area of a patch / L^2; in a line contact, / L"),
+        Column("patch_area_mean", "mean area of a patch / L^2; in a line contact, / L"),
         lambda solved: solved.patch_areas.mean() if solved.patch_areas.size else None,
         "mean patch",
         PATCH_AREA,
     ),
     Observable(
         "patches",
-        Column("patch_area_largest", float, "1", "area of the largest patch, in the same units"),
+        Column("patch_area_largest", "area of the largest patch, in the same units"),
         lambda solved: solved.patch_areas.max() if solved.patch_areas.size else None,
         "largest patch",
         PATCH_AREA,
     ),
     Observable(
         "stiffness",
-        Column("stiffness", float, "1", "contact stiffness -dp/du_g / (Delta_sigma / h_std)"),
+        Column("stiffness", "contact stiffness -dp/du_g / (Delta_sigma / h_std)"),
         lambda solved: CONTACT_STIFFNESS[solved.contact.boundary](solved.contact, solved.touching),
         "-dp/du_g",
         STIFFNESS,
@@ -156,10 +150,9 @@ OBSERVABLES = (
         "percolation",
         Column(
             "percolates_x",
-            int,
-            "1",
             "1 if the gap (4-connected points) percolates along x, 0 if not; through the periodic "
             "cell or, with a free boundary, from border to border",
+            kind=int,
         ),
         lambda solved: solved.percolates[0],
         "percolates\nalong x",
@@ -167,7 +160,7 @@ OBSERVABLES = (
     ),
     Observable(
         "percolation",
-        Column("percolates_y", int, "1", "the same along y; -1 for a line contact"),
+        Column("percolates_y", "the same along y; -1 for a line contact", kind=int),
         lambda solved: solved.percolates[1] if len(solved.percolates) > 1 else None,
         "along y",
         is_flag=True,

@@ -84,7 +84,7 @@ def _column(name: str, address: str, alternatives: list[Any]) -> Column:
         texts = [UNIT.sub("", text) for text in texts]
     meaning = "; ".join(dict.fromkeys(filter(None, texts)))
     unit = units.pop() if len(units) == 1 else ""
-    return Column(name, kind, unit, f"{address}: {meaning}" if meaning else address)
+    return Column(name, f"{address}: {meaning}" if meaning else address, unit, kind)
 
 
 def _type_of(annotations: Iterable[Any]) -> type:
