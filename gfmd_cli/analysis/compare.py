@@ -103,11 +103,6 @@ class Curve:
         """A column of the study over the pressures."""
         return np.array([row[name] for row in self.rows], dtype=np.float64)
 
-    def best(self, name: str) -> tuple[Field, Field]:
-        """A quantity over the pressures with its errors: of the continuum where that is known."""
-        values, errors = zip(*(best(row, name) for row in self.rows), strict=True)
-        return np.array(values), np.array(errors)
-
     @property
     def has_theory(self) -> bool:
         """Whether Persson theory applies: it describes rough surfaces, not single indenters."""

@@ -10,7 +10,7 @@ from gfmd_cli.analysis.compare import Row
 from gfmd_cli.analysis.selection import grouped
 from gfmd_cli.physics.observables import QUANTITIES
 from gfmd_cli.spec.models import differences
-from gfmd_cli.study.reading import read_rows, solved_rows, stored_spec
+from gfmd_cli.study.reading import open_study, solved_rows
 
 SURFACE = ("surface", "surface_sha256", "seed")
 """Columns of a surface: two files may have the same name."""
@@ -85,12 +85,14 @@ def diff(one: Path, other: Path) -> Difference:
     elastomer on one surface, rows belong together by their load alone. Raises InputError,
     StudyError.
     """
-    only = solved_rows(read_rows(one)), solved_rows(read_rows(other))
+    with open_study(one) as a, open_study(other) as b:
+        only = solved_rows(a.rows), solved_rows(b.rows)
+        spec = differences(a.spec, b.spec)
     pairs, paired = _matches(*only, _pressed, _load_of), ""
     if not pairs and all(len({_pressed(row) for row in rows}) == 1 for rows in only):
         pairs = _matches(*only, _load_of)
         paired = _paired(pairs[0]) if pairs else ""
-    return Difference(differences(stored_spec(one), stored_spec(other)), pairs, only, paired)
+    return Difference(spec, pairs, only, paired)
 
 
 def _pressed(row: Row) -> tuple[Hashable, ...]:

@@ -14,7 +14,6 @@ from gfmd_cli.analysis.plotting import THEORY, ColumnFigure
 from gfmd_cli.analysis.selection import at_one_pressure, evenly, grouped, pressure_label
 from gfmd_cli.analysis.series import Item, seed_groups
 from gfmd_cli.grid.arrays import Field
-from gfmd_cli.physics.observables import logarithmic_middles
 from gfmd_cli.status import Status
 from gfmd_cli.study.columns import BINS, PR_LINEAR, PR_LOGARITHMIC
 
@@ -159,7 +158,7 @@ def _draw(
     plot: ColumnFigure, stress: StressDistribution, style: CurveStyle
 ) -> tuple[float, float, float, float]:
     """Symbols with error bars over the faint lines of the grids; return the span of the symbols."""
-    sigma = logarithmic_middles()
+    sigma = BINS[PR_LOGARITHMIC].middles()
     for density in stress.grids:
         faint = {"color": style.colour, "lw": 0.4, "alpha": 0.45}
         plot.unnamed_line((style.label,), sigma, density, **faint)

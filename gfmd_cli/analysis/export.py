@@ -79,18 +79,16 @@ def as_dataset(path: Path) -> Any:
     The path may be that of an exported netCDF file. Raises InputError where xarray is missing or
     there is no such study, StudyError.
     """
-    data = _opened(path) if path.suffix == ".nc" else _labelled_study(path)
+    if path.suffix == ".nc":
+        try:
+            data = _xarray().open_dataset(path, engine="h5netcdf")
+        except (OSError, ValueError) as error:
+            raise InputError(f"{path}: no readable netCDF file: {error}") from error
+    else:
+        data = _labelled_study(path)
     from gfmd_cli.analysis.parameter_index import ParameterIndex
 
     return data.set_xindex([name for name in COORDINATES if name in data.coords], ParameterIndex)
-
-
-def _opened(path: Path) -> Any:
-    """An exported netCDF file. Raises InputError."""
-    try:
-        return _xarray().open_dataset(path, engine="h5netcdf")
-    except (OSError, ValueError) as error:
-        raise InputError(f"{path}: no readable netCDF file: {error}") from error
 
 
 def _xarray() -> Any:

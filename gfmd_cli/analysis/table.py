@@ -55,10 +55,6 @@ class Column:
         error = _value(record, self.error)
         return plus_minus(value, abs(error)) if known(error) else format(value, self.format)
 
-    def is_known(self, record: Record) -> bool:
-        """Whether a record has a value here."""
-        return known(_value(record, self.value))
-
     def is_text(self, records: Sequence[Record]) -> bool:
         """Whether the column holds words, which are aligned to the left."""
         values = (_value(record, self.value) for record in records)
@@ -100,7 +96,8 @@ class Table:
         return [
             column
             for column in self.declared
-            if not column.optional or any(map(column.is_known, self.records))
+            if not column.optional
+            or any(known(_value(record, column.value)) for record in self.records)
         ]
 
     @property

@@ -90,11 +90,6 @@ class Grid:
         return min(float(self.points), self.points_y * (self.length / self.length_y))
 
     @property
-    def is_square(self) -> bool:
-        """Whether x and y have the same side and the same number of points."""
-        return self.points == self.points_y and self.length == self.length_y
-
-    @property
     def area(self) -> float:
         """Area of the cell [m^2]; of a line, its length [m]."""
         return prod(self.sides)
@@ -283,9 +278,13 @@ class Grid:
         self.spectral_rows.run(kernels.divide_by_symbol, *arguments)
         self.transform_back()
 
-    def operator(self, symbol: Field) -> "Operator":
-        """The linear map F^-1 symbol F."""
-        return Operator(self, symbol)
+    def apply(self, symbol: Field, field: Field, out: Field) -> Field:
+        """out <- F^-1 symbol F field, which is returned: one pair of transforms."""
+        values = self.padded[..., : self.points]
+        values[...] = field
+        self.filter_padded(symbol)
+        out[...] = values
+        return out
 
     @cached_property
     def rows(self) -> LocalRows:
@@ -438,20 +437,3 @@ def shared_modes(source: int, target: int) -> SharedModes:
     if target < source:
         return SharedModes((target + 1) // 2, (target - 1) // 2, False)
     return SharedModes(source // 2 + 1, source // 2, target > source and source % 2 == 0)
-
-
-@dataclass(frozen=True)
-class Operator:
-    """F^-1 symbol F on one grid: one pair of transforms a call."""
-
-    grid: Grid
-    symbol: Field
-    """Shape `grid.spectral_shape`."""
-
-    def __call__(self, field: Field, out: Field) -> Field:
-        """Apply to `field`, write to `out`, return `out`."""
-        values = self.grid.padded[..., : self.grid.points]
-        values[...] = field
-        self.grid.filter_padded(self.symbol)
-        out[...] = values
-        return out

@@ -10,14 +10,14 @@ see one scale, whatever the units of a scene; the stiffness is then in Delta_sig
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import sqrt
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
 from gfmd_cli.errors import InputError
 from gfmd_cli.grid.arrays import Field, Mask, Modes, row_blocks
 from gfmd_cli.grid.compilation import kernel
-from gfmd_cli.grid.fft_grid import Grid, Operator, Shape, multiplicity
+from gfmd_cli.grid.fft_grid import Grid, Shape, multiplicity
 from gfmd_cli.grid.ranks import Ranks
 from gfmd_cli.physics.elastomers import LinearElastomer
 from gfmd_cli.physics.indenters import RigidSurface
@@ -46,6 +46,8 @@ DEEP = -1e30
 class Contact:
     """Contact problem of a scene at one pressure."""
 
+    boundary: ClassVar[str] = "periodic"
+    """The boundary of the map: what `grid.boundary` is."""
     grid: Grid
     height: Field
     """Indenter h, shape `grid.shape`, zero mean; filled in where it is unknown."""
@@ -76,28 +78,23 @@ class Contact:
         """
         grid = self.grid
         m, k = np.arange(1.0, self.line.size), self.line[1:]
-        if grid.dimension == 1 or grid.is_square:
+        is_square = grid.points == grid.points_y and grid.length == grid.length_y
+        if grid.dimension == 1 or is_square:
             return m, k
         column = grid.column(self.stiffness)
         m = np.concatenate([m, np.arange(1, column.size) * (grid.length / grid.length_y)])
         order = np.argsort(m, kind="stable")
         return m[order], np.concatenate([k, column[1:]])[order]
 
-    @cached_property
-    def elasticity(self) -> Operator:
-        """The map K."""
-        return self.grid.operator(self.stiffness)
+    def elasticity(self, field: Field, out: Field) -> Field:
+        """K times a field. Written to `out`, which is returned."""
+        return self.grid.apply(self.stiffness, field, out)
 
     def stress(self, u: Field, out: Field) -> Field:
         """sigma = K u + p. Written to `out`, which is returned."""
         self.elasticity(u, out)
         out += self.pressure
         return out
-
-    @property
-    def boundary(self) -> str:
-        """The boundary of the map: what `grid.boundary` is."""
-        return "periodic"
 
     def recompute(self, u: Field, sigma: Field) -> float:
         """Compute sigma from u, or u from sigma if that is the unknown; return the residual."""

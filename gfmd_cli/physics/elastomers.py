@@ -262,7 +262,8 @@ class Layer(LinearElastomer):
     def stiffness(self, q: Field, length: float = 1.0) -> Field:
         """k(q) [Pa/m], zero at q = 0."""
         t = np.where(q > 0, q, 1.0) * self.thickness
-        return np.where(q > 0, 0.5 * self.E_star * q / self.softening(t), 0.0)
+        softening = layer_softening(t, self.poisson if self.base == "bonded" else None)
+        return np.where(q > 0, 0.5 * self.E_star * q / softening, 0.0)
 
     def remarks(self, h_std: float, q: Field, variance: Field) -> list[str]:
         """See `LinearElastomer.remarks`."""
@@ -272,10 +273,6 @@ class Layer(LinearElastomer):
             f"elastomer.thickness = {self.thickness:g} m is less than the rms height, "
             f"{h_std:.3g} m: linear elasticity does not hold for such compressions"
         ]
-
-    def softening(self, t: Field) -> Field:
-        """Compliance relative to the half-space, c(q t): zero for q t = 0, one for q t >> 1."""
-        return layer_softening(t, self.poisson if self.base == "bonded" else None)
 
     @property
     def uniform_stiffness(self) -> float:

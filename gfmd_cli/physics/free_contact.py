@@ -12,7 +12,7 @@ where means are taken over the map. At the solution, g = C sigma + c - h >= 0 an
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from scipy.fft import dctn
@@ -100,12 +100,8 @@ class FreeContact(Contact):
     `stiffness` is empty: the elastomer is described by `free`.
     """
 
+    boundary: ClassVar[str] = "free"
     free: FreeElasticity = field(kw_only=True)
-
-    @property
-    def boundary(self) -> str:
-        """The boundary of the map."""
-        return "free"
 
     def recompute(self, u: Field, sigma: Field) -> float:
         """Compute u from sigma, u = h in contact and above it elsewhere; return the residual."""

@@ -1,6 +1,7 @@
 """The page: one HTML file that needs nothing else."""
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -99,4 +100,5 @@ def _sections(studies: list[ReportData], traces: list[Trace]) -> Iterator[Sectio
         for data in studies if own else [shared]:
             section = make(data)
             if not section.is_blank:
-                yield section.of(data.letter)
+                of_one = f" of {data.letter}" if data.letter else ""  # of two studies
+                yield replace(section, title=section.title + of_one)

@@ -1,7 +1,7 @@
 """A section of the page: what a template fills in."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from markupsafe import Markup
@@ -49,7 +49,3 @@ class Section:
         tables = [*self.tables, *self.disclosed.values()]
         has_records = any(table.records for table in tables)
         return not (self.drawings or has_records or self.content is not None)
-
-    def of(self, letter: str) -> "Section":
-        """The same, of one of two studies."""
-        return replace(self, title=f"{self.title} of {letter}") if letter else self

@@ -146,15 +146,10 @@ def _time(rows: list[Row]) -> str:
 def _ratios(data: ReportData, name: str, most: float) -> str:
     """Simulation over theory at reduced pressures up to `most`."""
     return span(
-        simulated / theory
+        record[f"{name}_best"] / record[f"{name}_persson"]
         for curve in data.comparison.curves
-        for p_star, simulated, theory in zip(
-            curve.column("p_star"),
-            curve.best(name)[0],
-            getattr(curve.prediction, name),
-            strict=True,
-        )
-        if theory > 0 and p_star <= most
+        for record in curve.records
+        if record[f"{name}_persson"] > 0 and record["p_star"] <= most
     )
 
 

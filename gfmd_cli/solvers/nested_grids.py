@@ -65,6 +65,7 @@ def solve_contact(
         overwritten; without it the solve starts on the coarsest grid
     """
     solver = solver.for_contact(contact)
+    loose = solver.model_copy(update={"tolerance": max(solver.tolerance, COARSE_TOLERANCE)})
     grids = _grids(contact, solver, start)
     transforms = 0.0  # of the size of the finest grid
     can_touch_everywhere = contact.boundary == "periodic" and contact.may_touch is None
@@ -83,7 +84,7 @@ def solve_contact(
             state = _begin(solver, fine, coarse, state, start)
             coarse = start = None  # frees their memory, which is needed now
             state.coarser_transforms = transforms
-        status = solve(fine, solver if fine is contact else _loose(solver), state, watch)
+        status = solve(fine, solver if fine is contact else loose, state, watch)
         transforms += state.transforms * fine.grid.size / contact.grid.size
         coarse = fine
         if grids and solver.starts_locally:
@@ -160,12 +161,6 @@ def _grids(contact: Contact, solver: Solver, start: Resume | Field | None) -> li
     for shape in chain[-2::-1]:
         contacts.append(contacts[-1].coarsen(shape))
     return contacts
-
-
-def _loose(solver: Solver) -> Solver:
-    """The solver with the tolerance of coarse grids."""
-    tolerance = max(solver.tolerance, COARSE_TOLERANCE)
-    return solver.model_copy(update={"tolerance": tolerance})
 
 
 def _begin(

@@ -23,6 +23,7 @@ for n = 3 and 4 (p* = 0.1, residual above 1 after 20000) and for a slab of t = 0
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -62,7 +63,7 @@ class PolonskyKeer(Solver):
         sigma = contact.stress(u, out=contact.grid.empty())
         pressure = contact.clear_untouchable(np.maximum(sigma, 0.0))
         pressure *= contact.pressure / _mean(contact.grid, pressure)
-        compute_displacement = contact.grid.operator(compliance(contact))
+        compute_displacement = partial(contact.grid.apply, compliance(contact))
         response = compute_displacement(pressure, out=contact.grid.empty())
         return PolonskyKeerState(
             u=u,
@@ -80,13 +81,15 @@ class PolonskyKeer(Solver):
         the residual, not for the method, and is not counted.
         """
         s, w, t, grid = state.pressure, state.response, state.direction, contact.grid
-        compute_displacement = grid.operator(compliance(contact))
+        compute_displacement = partial(grid.apply, compliance(contact))
         gap, displacement = grid.empty(), grid.empty()
         while True:
             touching: Mask = s > 0
             np.subtract(w, contact.height, out=gap)
             gap -= _mean(grid, gap, touching)  # [1]
-            _set_displacement(contact, state, gap, touching)
+            contact.set_displacement(state.u, gap, touching)
+            contact.stress(state.u, out=state.sigma)
+            state.residual = contact.residual(state.u, state.sigma)
             yield state
             inside = gap[touching]
             norm = grid.total(float(inside @ inside))  # [2]
@@ -130,10 +133,3 @@ def compliance(contact: Contact) -> Field:
     k = contact.stiffness
     out: Field = np.divide(1.0, k, out=np.zeros_like(k), where=k > 0)
     return out
-
-
-def _set_displacement(contact: Contact, state: State, gap: Field, touching: Mask) -> None:
-    """Set u = h where there is pressure, else h + max(gap, 0), and its stress and residual."""
-    contact.set_displacement(state.u, gap, touching)
-    contact.stress(state.u, out=state.sigma)
-    state.residual = contact.residual(state.u, state.sigma)

@@ -237,17 +237,12 @@ def open_study(source: Path, opened: BinaryIO | None = None) -> Iterator[StudyFi
         )
     if opened is None and not source.exists():
         raise InputError(f"{source}: no such study")
-    with _damage_named(source), open_hdf5(opened or source) as file:
-        _check_layout(source, file)
-        yield StudyFile(file)
-
-
-@contextmanager
-def _damage_named(path: Path) -> Iterator[None]:
     try:
-        yield
+        with open_hdf5(opened or source) as file:
+            _check_layout(source, file)
+            yield StudyFile(file)
     except DAMAGE as error:
-        raise StudyError(f"{path}: no readable study, or damaged: {error}") from error
+        raise StudyError(f"{source}: no readable study, or damaged: {error}") from error
 
 
 def _check_layout(path: Path, file: Any) -> None:
@@ -281,9 +276,3 @@ def read_rows(path: Path) -> list[dict[str, Any]]:
 def solved_rows(rows: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
     """The rows that have a result, converged or not."""
     return [row for row in rows if row["status"] != Status.MISSING]
-
-
-def stored_spec(path: Path) -> Any:
-    """The resolved spec of a study, as plain data. Raises InputError, StudyError."""
-    with open_study(path) as study:
-        return study.spec

@@ -12,6 +12,7 @@ import json
 import os
 from collections.abc import Iterable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -212,7 +213,7 @@ def without_result(tasks: Iterable[Task], outcomes: dict[str, Outcome]) -> list[
     """
     nothing = Outcome(Status.MISSING, frozenset())
     return [
-        task.storing(outcomes.get(task.id, nothing).stored)
+        replace(task, output=task.output.with_names(outcomes.get(task.id, nothing).stored))
         for task in tasks
         if task.id not in outcomes or not task.output.names() <= outcomes[task.id].stored
     ]

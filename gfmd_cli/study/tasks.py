@@ -1,7 +1,6 @@
 """A spec as a list of tasks, one for each pressure, with what each will take."""
 
-from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 from math import prod
 from typing import Any
@@ -101,10 +100,6 @@ class Task:
     """Checksum of the file of the surface; "" without a file."""
     swept: tuple[str, ...]
     """Values of the swept keys of surface, grid and solver, as words of the label."""
-
-    def storing(self, names: Iterable[str]) -> "Task":
-        """The same task with more output (`OutputTable.names`)."""
-        return replace(self, output=self.output.with_names(names))
 
     @property
     def auto(self) -> bool:

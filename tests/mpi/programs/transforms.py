@@ -36,8 +36,8 @@ def check_transforms(points, points_y):
     assert np.array_equal(grid.line(grid.wavenumber()), whole.wavenumber()[0])
     weighted = np.abs(grid.forward(mine)) ** 2 * grid.multiplicity()
     assert np.isclose(grid.total(weighted.sum()), np.mean(field**2), rtol=1e-13)  # Parseval
-    filtered = grid.operator(np.exp(-grid.wavenumber()))(mine, out=grid.empty())
-    expected = whole.operator(np.exp(-whole.wavenumber()))(field, out=whole.empty())
+    filtered = grid.apply(np.exp(-grid.wavenumber()), mine, out=grid.empty())
+    expected = whole.apply(np.exp(-whole.wavenumber()), field, out=whole.empty())
     np.testing.assert_allclose(filtered, expected[grid.own], atol=1e-14)
     single = grid.in_single()
     single.padded[:, :points] = mine
