@@ -317,7 +317,7 @@ class Tabulated(LinearElastomer):
     def remarks(self, h_std: float, q: Field, variance: Field) -> list[str]:
         """See `LinearElastomer.remarks`."""
         first, *_, last = self._table()[:, 0]
-        share = float(variance[(q < first) | (q > last)].sum() / variance.sum())
+        share = float(variance[(q < first) | (q > last)].sum() / variance.sum()) if q.size else 0.0
         if share <= EXTRAPOLATED:
             return []
         return [

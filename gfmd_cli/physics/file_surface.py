@@ -283,7 +283,7 @@ class FileSurface(RigidSurface):
                     f"surface.length = {self.length:g} m replaces the side of the file, "
                     f"{stated:g} m"
                 )
-        remarks += _outliers(topography)
+        remarks += _outliers(self)
         filled = topography.holes / topography.heights.size if self.missing == "fill" else 0.0
         if filled > FILLED:
             remarks.append(
@@ -372,8 +372,13 @@ def _prepared(surface: FileSurface) -> Field:
     return make_periodic(heights, surface.edges or "none", surface.taper)
 
 
-def _outliers(topography: Topography) -> list[str]:
-    """A warning about heights farther from all others than these are from each other."""
+@lru_cache(maxsize=16)
+def _outliers(surface: FileSurface) -> tuple[str, ...]:
+    """A warning about heights farther from all others than these are from each other.
+
+    Cached, because every contact of a study has the same.
+    """
+    topography = surface._topography()
     heights = topography.heights
     if topography.missing is not None:
         heights = heights[~topography.missing]
@@ -384,14 +389,14 @@ def _outliers(topography: Topography) -> list[str]:
             continue
         if min(abs(others.max() - extreme), abs(others.min() - extreme)) > np.ptp(others) > 0:
             what = "1 height is" if count == 1 else f"{count} heights are"
-            return [
-                f"{what} exactly {extreme:g}, far from all others: a spike or "
-                "a mark of missing heights? Replace it by NaN"
-            ]
-    return []
+            return (
+                f"{what} exactly {extreme:g}, far from all others: a spike or a mark of missing "
+                "heights? Replace it by NaN",
+            )
+    return ()
 
 
 def forget_files() -> None:
     """Drop the maps that were read, so that a file that has changed is read again."""
-    for cached in (_read, _prepared, _suited_interpolation):
+    for cached in (_read, _prepared, _suited_interpolation, _outliers):
         cached.cache_clear()

@@ -69,7 +69,9 @@ def surface_table(heights: GivenHeights, table: dict[str, Any]) -> dict[str, Any
     part = _part(heights, table)
     for name in ("length", "length_y"):
         given, side = table.get(name), part.get(name)
-        if given and side and not math.isclose(given, side, rel_tol=SAME_SIDE):
+        if not isinstance(given, int | float) or not side:
+            continue  # what is no number is refused by the spec
+        if not math.isclose(given, side, rel_tol=SAME_SIDE):
             raise InputError(
                 f"surface.{name} = {given:g}: the topography in the argument heights has a side of "
                 f"{side:g} m; leave out surface.{name}"
@@ -96,5 +98,7 @@ def _part(heights: GivenHeights, table: dict[str, Any]) -> dict[str, Any]:
     if table.get("crop"):
         shape = middle_square(shape)
     scale = 1.0 if heights.metres else table.get("scale", 1.0)
+    if not isinstance(scale, int | float):
+        return {}  # likewise
     sides = [scale * points * step for points, step in zip(shape, spacing, strict=True)]
     return keys | dict(zip(("length", "length_y"), reversed(sides), strict=False))
