@@ -194,8 +194,8 @@ def _fit_lines(
         )
     if not MIN_HURST <= nearest.hurst <= 1:
         lines.append(
-            f"The Hurst exponent is outside {MIN_HURST:g} to 1: the surface below has "
-            "the nearest possible one, and another gradient."
+            f"The fit gives H = {nearest.hurst:.2g}, which is outside {MIN_HURST:g} to 1. The "
+            "table below has the nearest possible exponent; its surface has another rms gradient."
         )
     return lines
 

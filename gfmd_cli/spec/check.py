@@ -38,9 +38,10 @@ MAX_SWEEP = 100_000  # combinations of one table
 NUMBER = re.compile(r"\s*[+-]?\d[\d_]*\.?\d*([eE][+-]?\d+)?\s*")
 WORDS = {
     "string_pattern_mismatch": "must begin with a letter or a digit and contain only letters, "
-    "digits, '.', '_' and '-', at most 100 of them"
+    "digits, '.', '_' and '-', at most 100 of them",
+    "too_short": "has too few values",
 }
-"""What is allowed, by the type of pydantic's error, where its message is a regular expression."""
+"""What is allowed, by the type of pydantic's error, where its message is not plain."""
 MODELS: dict[str, Any] = {
     "study": StudyTable,
     "surface": Surface,

@@ -67,7 +67,9 @@ def read_scan(path: Path, overrides: tuple[str, ...] = ()) -> FileSurface:
     data: dict[str, Any] = {"surface": {"kind": "file", "path": str(path)}}
     surfaces = _choices("surface", data, path, overrides)
     if set(data) != {"surface"} or len(surfaces) != 1:
-        raise InputError(f"{path}: --set takes surface.key=value with one value, for a height map")
+        raise InputError(
+            f"{path}: for a scan, --set takes only keys of the table surface, with one value each"
+        )
     surface = surfaces[0]
     if not isinstance(surface, FileSurface):
         raise InputError(f'{path}: surface.kind must be "file" for a height map')
@@ -115,7 +117,8 @@ def _toml(text: str, name: str) -> dict[str, Any]:
     for number, line in enumerate(text.splitlines(), 1):
         if line.count(".") > MAX_DOTS:
             raise InputError(
-                f"{name}:{number}: {line.count('.')} dots in a line; at most {MAX_DOTS}: break it"
+                f"{name}:{number}: {line.count('.')} dots in a line, at most {MAX_DOTS} are read: "
+                "spread a long list over several lines, or use {from, to, per_decade}"
             )
     try:
         data = tomllib.loads(text)

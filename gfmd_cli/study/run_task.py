@@ -96,8 +96,8 @@ class TaskWatcher(Watcher):
     def _warn_of_short_call(self) -> None:
         seconds = duration(max(1.0, time.monotonic() - self.begun))
         self._warn(
-            f"{self.task.label}: the stop was requested before the first step, which ended "
-            f"{seconds} after the start of the task; each call needs more time than that"
+            f"{self.task.label}: stopped after its first step, which took {seconds}; a shorter "
+            "call makes no progress"
         )
 
     def _warn(self, message: str) -> None:

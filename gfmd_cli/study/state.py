@@ -91,7 +91,8 @@ def is_study(path: Path) -> bool:
 def check_shards(count: int, tasks: int) -> None:
     """Raise InputError where some shard would have no task."""
     if not 0 < count <= tasks:
-        raise InputError(f"--shards {count}: the spec has {tasks} tasks; take 1 to {tasks}")
+        has = "1 task; take 1" if tasks == 1 else f"{tasks} tasks; take 1 to {tasks}"
+        raise InputError(f"--shards {count}: the spec has {has}")
 
 
 def _state(
