@@ -41,48 +41,48 @@ def test_before_any_task_the_forecast_is_told(time):
 def test_forecasts_are_corrected_by_what_ended_of_the_same_elastomer(time):
     clock = clock_of(time, task(0, 1.0), task(1, 1.0), task(2, 1.0, "b"), task(3, 1.0, "b"))
     for index, seconds in ((0, 10.0), (2, 2.0)):
-        clock.take_in(word(index, "start"))
+        clock.update(word(index, "start"))
         time.now += seconds
-        clock.take_in(word(index, "end", status=Status.CONVERGED))
+        clock.update(word(index, "end", status=Status.CONVERGED))
     assert clock.left() == pytest.approx(10 + 2)
 
 
 def test_a_elastomer_not_met_yet_is_taken_as_the_others(time):
     clock = clock_of(time, task(0, 1.0), task(1, 2.0, "b"))
-    clock.take_in(word(0, "start"))
+    clock.update(word(0, "start"))
     time.now = 3.0
-    clock.take_in(word(0, "end", status=Status.CONVERGED))
+    clock.update(word(0, "end", status=Status.CONVERGED))
     assert clock.left() == pytest.approx(6.0)
 
 
 def test_near_its_end_a_task_is_told_by_its_residual(time):
     """1e-1 to 1e-5.9 in 10 s: 0.1 of 5 decades are left, 0.2 s at that rate."""
     clock = clock_of(time, task(0, 100.0))
-    clock.take_in(word(0, "start"))
-    clock.take_in(word(0, "step", 1e-1))
+    clock.update(word(0, "start"))
+    clock.update(word(0, "step", 1e-1))
     time.now = 10.0
-    clock.take_in(word(0, "step", 10**-5.9))
+    clock.update(word(0, "step", 10**-5.9))
     assert 0.2 < clock.left() < 0.25
 
 
 def test_little_remains_after_the_last_step(time):
     clock = clock_of(time, task(0, 100.0))
-    clock.take_in(word(0, "start"))
-    clock.take_in(word(0, "step", 1e-1))
+    clock.update(word(0, "start"))
+    clock.update(word(0, "step", 1e-1))
     time.now = 10.0
-    clock.take_in(word(0, "step", 1e-7))
+    clock.update(word(0, "step", 1e-7))
     assert 0.0 < clock.left() < 0.1
 
 
 def test_the_longest_task_bounds_the_end_of_the_run(time):
     clock = clock_of(time, task(0, 100.0), task(1, 1.0), jobs=2)
-    clock.take_in(word(0, "start"))
+    clock.update(word(0, "start"))
     assert clock.left() == 100.0
 
 
 def test_words_are_passed_on_with_what_is_left(time):
     words = []
-    tell = clock_of(time, task(0, 2.0), task(1, 2.0)).watched(words.append)
+    tell = clock_of(time, task(0, 2.0), task(1, 2.0)).with_time_left(words.append)
     tell(word(0, "start"))
     time.now = 1.0
     tell(word(0, "end", status=Status.CONVERGED))
@@ -92,7 +92,7 @@ def test_words_are_passed_on_with_what_is_left(time):
 
 def test_failed_tasks_do_not_correct_forecasts(time):
     clock = clock_of(time, task(0, 1.0), task(1, 1.0))
-    clock.take_in(word(0, "start"))
+    clock.update(word(0, "start"))
     time.now = 50.0
-    clock.take_in(word(0, "end", status=Status.FAILED))
+    clock.update(word(0, "end", status=Status.FAILED))
     assert clock.left() == 1.0

@@ -73,8 +73,8 @@ class Difference:
 
     def exceeds(self, tolerance: float) -> bool:
         """Whether some relative difference is larger; also where nothing can be compared."""
-        apart = (abs(p.deviation(name).relative) for p in self.pairs for name in QUANTITIES)
-        return not self.pairs or any(value > tolerance for value in apart)
+        differing = (abs(p.deviation(name).relative) for p in self.pairs for name in QUANTITIES)
+        return not self.pairs or any(value > tolerance for value in differing)
 
 
 def diff(one: Path, other: Path) -> Difference:
@@ -88,14 +88,14 @@ def diff(one: Path, other: Path) -> Difference:
     with open_study(one) as a, open_study(other) as b:
         only = solved_rows(a.rows), solved_rows(b.rows)
         spec = differences(a.spec, b.spec)
-    pairs, paired = _matches(*only, _pressed, _load_of), ""
-    if not pairs and all(len({_pressed(row) for row in rows}) == 1 for rows in only):
+    pairs, paired = _matches(*only, _contact_of, _load_of), ""
+    if not pairs and all(len({_contact_of(row) for row in rows}) == 1 for rows in only):
         pairs = _matches(*only, _load_of)
-        paired = _paired(pairs[0]) if pairs else ""
+        paired = _pairing_note(pairs[0]) if pairs else ""
     return Difference(spec, pairs, only, paired)
 
 
-def _pressed(row: Row) -> tuple[Hashable, ...]:
+def _contact_of(row: Row) -> tuple[Hashable, ...]:
     """What is pressed together."""
     return (*(row[name] for name in SURFACE), row["elastomer"])
 
@@ -120,20 +120,20 @@ def _matches(one: list[Row], other: list[Row], *keys: Key) -> list[Pair]:
                 partner = partners.pop(0)
                 paired |= {id(row), id(partner)}
                 # another surface or elastomer has other units: equal then is the pressure in Pa
-                physical = row["load"] == "pressure" and _pressed(row) != _pressed(partner)
+                physical = row["load"] == "pressure" and _contact_of(row) != _contact_of(partner)
                 pairs.append(Pair(row, partner, physical))
     for rows in (one, other):
         rows[:] = [row for row in rows if id(row) not in paired]
     return sorted(pairs, key=lambda pair: int(pair.one["task"]))
 
 
-def _paired(pair: Pair) -> str:
+def _pairing_note(pair: Pair) -> str:
     """What sets the studies apart, and by what their rows are paired."""
-    apart = [
+    differing = [
         what
         for what, names in {"surfaces": SURFACE, "elastomers": ("elastomer",)}.items()
         if any(pair.one[name] != pair.other[name] for name in names)
     ]
     load = pair.one["load"]
     units = "sigma_p in Pa, u_g in m" if pair.physical else "values in reduced units"
-    return f"{' and '.join(apart)} differ: paired by {LOADS.get(load, load)}, {units}"
+    return f"{' and '.join(differing)} differ: paired by {LOADS.get(load, load)}, {units}"

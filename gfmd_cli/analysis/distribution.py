@@ -24,10 +24,10 @@ from gfmd_cli.physics.observables import logarithmic_edges
 from gfmd_cli.status import Status
 from gfmd_cli.study.columns import BINS, PR_LOGARITHMIC
 
-MOST_CHANGE = 0.35  # of ln Pr from one grid to the next; beyond, a bin is not resolved
+MAX_CHANGE = 0.35  # of ln Pr from one grid to the next; beyond, a bin is not resolved
 NEIGHBOURS = 2  # bins to each side that the change between grids is averaged over
 PRIOR_SEEDS = 4.0  # seeds that the expected spread stands for beside the one that is seen
-SHALLOWEST = 0.75  # distance from the edge, in spacings, below which a bin is not resolved
+MIN_DEPTH = 0.75  # distance from the edge, in spacings, below which a bin is not resolved
 
 
 def bin_counts(row: Row, name: str = PR_LOGARITHMIC) -> Field:
@@ -70,7 +70,7 @@ def extrapolate(counts: Field, cells: Sequence[int]) -> Extrapolated:
             for (coarse, fine), (b, a) in zip(pairwise(log), pairwise(noise), strict=True)
         ]
     change, error = steps[-1]
-    change = np.where(np.abs(change) < MOST_CHANGE, change, np.nan)
+    change = np.where(np.abs(change) < MAX_CHANGE, change, np.nan)
     added, left = change, change
     if len(steps) > 1:
         before, unsure = (np.nan_to_num(part) for part in steps[-2])
@@ -149,7 +149,7 @@ class StressDistribution:
     def extrapolated(self) -> Extrapolated:
         """In the continuum, the points of all seeds together."""
         extrapolated = extrapolate(self.counts.sum(axis=0), self.cells)
-        known = self.depth > SHALLOWEST
+        known = self.depth > MIN_DEPTH
         return replace(extrapolated, log_density=np.where(known, extrapolated.log_density, np.nan))
 
     @cached_property

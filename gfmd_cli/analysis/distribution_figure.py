@@ -18,10 +18,10 @@ from gfmd_cli.status import Status
 from gfmd_cli.study.columns import BINS, PR_LINEAR, PR_LOGARITHMIC
 
 PRESSURES = 5  # at which the distribution of one elastomer is drawn
-FEW = 10  # grid points; a bin with fewer is noise of 30 % and more
-MOST = 8  # contacts; more cannot be told apart
-BEYOND = 2.5  # factor that the edge law is drawn beyond the window of its fit
-LOWEST = 3e-3  # share of the highest density that is drawn at the least, and of the lowest known
+MIN_COUNT = 10  # grid points; a bin with fewer is noise of 30 % and more
+MAX_CONTACTS = 8  # contacts; more cannot be told apart
+EXTENSION = 2.5  # factor that the edge law is drawn beyond the window of its fit
+MIN_DENSITY = 3e-3  # lowest density that is drawn, as a share of the highest
 EDGE_LAW = "edge law"
 STRESS, DENSITY = r"stress  $\sigma\,/\,\Delta\sigma$", r"$\mathrm{Pr}(\sigma)\;\Delta\sigma$"
 
@@ -72,7 +72,7 @@ def _densities(items: list[Item], name: str) -> list[list[Density]]:
 
 def _bins(row: Row, name: str) -> tuple[Field, Field]:
     """Pr(sigma) Delta_sigma over sigma / Delta_sigma, bins with fewer than FEW points left out."""
-    frequent = bin_counts(row, name) > FEW - 0.5
+    frequent = bin_counts(row, name) > MIN_COUNT - 0.5
     return BINS[name].middles()[frequent], np.nan_to_num(row[name])[frequent]
 
 
@@ -151,7 +151,7 @@ def _chosen(stresses: list[StressDistribution]) -> list[StressDistribution]:
     """One distribution of each scene, at about one pressure."""
     ordered = sorted(stresses, key=lambda each: order(each.curve))
     scenes = list(grouped(ordered, lambda each: each.scene).values())
-    return at_one_pressure(scenes, lambda each: (each.finest["p_star"], each.a_r))[:MOST]
+    return at_one_pressure(scenes, lambda each: (each.finest["p_star"], each.a_r))[:MAX_CONTACTS]
 
 
 def _draw(
@@ -166,7 +166,7 @@ def _draw(
     x, y, error = sigma[known], stress.density[known], stress.error[known]
     bars = np.array([y * -np.expm1(-error), y * np.expm1(error)])  # of ln Pr
     plot.points(style, x, y, np.full(x.size, True), error=bars)
-    visible = y > LOWEST * y.max()
+    visible = y > MIN_DENSITY * y.max()
     return float(x[visible].min()), float(x[visible].max()), float(y[visible].min()), float(y.max())
 
 
@@ -177,7 +177,7 @@ def _edge_law(plot: ColumnFigure, stress: StressDistribution, style: CurveStyle)
         if law is None or not np.isfinite(law.theory):
             continue
         low, high = law.lowest, law.highest
-        span = (low / BEYOND, high) if name == "small" else (low, high * BEYOND)
+        span = (low / EXTENSION, high) if name == "small" else (low, high * EXTENSION)
         sigma = np.geomspace(*span, 50)
         dashed: dict[str, Any] = {"ls": (0, (4, 2)), "lw": 0.8, "zorder": 2.5}
         density = law.edge_prefactor * sigma**law.theory

@@ -58,7 +58,7 @@ BAND = 0.25  # opacity of a confidence band
 
 
 @dataclass(frozen=True)
-class Layer:
+class PlotLayer:
     """Points, a line or a band of a figure, as data for a page that draws them anew."""
 
     kind: Literal["points", "line", "band"]
@@ -168,7 +168,7 @@ class ColumnFigure(LegendFigure):
     def __init__(self, x_label: str, y_label: str) -> None:
         super().__init__(WIDTH, HEIGHT)
         self.axes = self.figure.add_subplot(xlabel=x_label, ylabel=y_label)
-        self.layers: list[Layer] = []
+        self.layers: list[PlotLayer] = []
         self.second: tuple[str, float] | None = None
         """Label of an axis at the top, and its values over those of x."""
 
@@ -202,7 +202,9 @@ class ColumnFigure(LegendFigure):
         ):
             self.axes.plot(x[chosen], y[chosen], marker=marker, markevery=every, **options)
             if np.any(chosen):
-                layer = Layer("points", names, x[chosen], y[chosen], to_hex(style.colour), marker)
+                layer = PlotLayer(
+                    "points", names, x[chosen], y[chosen], to_hex(style.colour), marker
+                )
                 texts = [text for text, c in zip(details, chosen, strict=False) if c]
                 part = None if error is None else error[..., chosen]
                 self.layers.append(replace(layer, error=part, details=texts))
@@ -216,7 +218,7 @@ class ColumnFigure(LegendFigure):
         self.axes.fill_between(x, low, high, color=colour, alpha=BAND, lw=0, zorder=1)
         self.legend[CONFIDENCE] = Line2D([], [], color="0.4", alpha=2 * BAND, lw=5)
         names = (style.label, CONFIDENCE)
-        self.layers.append(Layer("band", names, x, low, to_hex(colour), high=high))
+        self.layers.append(PlotLayer("band", names, x, low, to_hex(colour), high=high))
 
     def line(self, label: str, x: Field, y: Field, **style: Any) -> None:
         """Draw a line where y > 0, with an entry of the legend."""
@@ -229,7 +231,7 @@ class ColumnFigure(LegendFigure):
         self.axes.plot(x, y, **style)
         if x.size:
             colour, width = to_hex(style["color"]), style.get("lw", STYLE["lines.linewidth"])
-            layer = Layer("line", names, x, y, colour, width=width, dashed="ls" in style)
+            layer = PlotLayer("line", names, x, y, colour, width=width, dashed="ls" in style)
             self.layers.append(layer)
 
     def theory(self, lines: list[tuple[CurveStyle, Field, Field]]) -> None:

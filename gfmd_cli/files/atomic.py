@@ -13,7 +13,7 @@ from uuid import uuid4
 from gfmd_cli.errors import SpaceError
 
 
-class Fresh(io.FileIO):
+class NewFile(io.FileIO):
     """A file being written whose first error waits: HDF5 crashes at exit if a write fails."""
 
     error: OSError | None = None
@@ -31,17 +31,17 @@ class Fresh(io.FileIO):
 
 
 @contextmanager
-def new_file(path: Path, aside: Path | None = None) -> Iterator[Fresh]:
+def new_file(path: Path, aside: Path | None = None) -> Iterator[NewFile]:
     """A file that is at `path` once the block has ended well: written aside, synced, renamed.
 
     `aside` is the folder to write it in, on the same file system; by default that of `path`.
     Raises SpaceError where it cannot be written.
     """
     fresh = (aside or path.parent) / f".{path.name}.{uuid4().hex}"
-    file: Fresh | None = None
+    file: NewFile | None = None
     try:
         fresh.parent.mkdir(parents=True, exist_ok=True)
-        with Fresh(fresh, "w+b") as file:
+        with NewFile(fresh, "w+b") as file:
             yield file
             if file.error is not None:
                 raise file.error

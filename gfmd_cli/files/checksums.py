@@ -4,7 +4,7 @@ import os
 import zlib
 from typing import BinaryIO
 
-from gfmd_cli.files.atomic import Fresh
+from gfmd_cli.files.atomic import NewFile
 
 SEAL = b"gfmd"  # followed by four bytes, the crc32 of all before
 CHUNK = 2**24  # bytes that are read at a time
@@ -12,7 +12,7 @@ MAX_SPARSENESS = 1032  # bytes of a file per byte on the disk: what the best com
 MIN_BLOCK = 4096  # bytes that a file takes at least; small ones may be stored in its inode
 
 
-def seal(file: Fresh) -> None:
+def seal(file: NewFile) -> None:
     """End a new file with the checksum of its content."""
     file.seek(0)
     content_sum = _sum(file, os.fstat(file.fileno()).st_size)
@@ -49,7 +49,7 @@ def check_stored(status: os.stat_result) -> None:
         raise ValueError("a sparse file")
 
 
-def _sum(file: BinaryIO | Fresh, size: int) -> bytes:
+def _sum(file: BinaryIO | NewFile, size: int) -> bytes:
     """The crc32 of the next `size` bytes."""
     total = 0
     while size > 0 and (chunk := file.read(min(size, CHUNK))):

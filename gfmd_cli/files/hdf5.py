@@ -9,7 +9,7 @@ from typing import Any, BinaryIO
 import h5py
 import numpy as np
 
-from gfmd_cli.files.atomic import Fresh
+from gfmd_cli.files.atomic import NewFile
 from gfmd_cli.files.regular import open_regular
 
 MAGIC = b"\x89HDF\r\n\x1a\n"  # first bytes of an HDF5 file
@@ -19,7 +19,7 @@ MAX_DEPTH = 32  # of nested groups that are searched; paths of 20000 names take 
 VERSION = ("v110", "v110")  # of HDF5: the first whose metadata all carry checksums
 
 
-def new_hdf5(file: Fresh) -> Any:
+def new_hdf5(file: NewFile) -> Any:
     """HDF5 written into a new file, of any size, without a copy of it in memory."""
     return h5py.File(file, "w", libver=VERSION)
 

@@ -76,7 +76,7 @@ def plan_with(folder: Path | None, *, estimated: bool = False) -> str | None:
         _without_lock.clear()
     if folder is None or _estimated:
         return None
-    with _alone(folder):
+    with _planning_lock(folder):
         wisdom = read_wisdom(folder)
         damaged = wisdom is None and _path(folder).exists()
         if wisdom is None and (known := read_wisdom(cache_folder())) is not None:
@@ -105,14 +105,14 @@ def planned(plan: Callable[[tuple[str, ...]], T]) -> T:
 def _measured(plan: Callable[[tuple[str, ...]], T]) -> T:
     """`plan`, measured unless another process did, and kept for all."""
     folder = _folder or cache_folder()
-    with _alone(folder):
-        _take_in(read_wisdom(folder))
+    with _planning_lock(folder):
+        _import(read_wisdom(folder))
         before = _export()
         pair = plan(("FFTW_MEASURE",))
         if _export() != before:
             _write(folder, _export())
     if _folder is not None:
-        with _alone(cache_folder()):
+        with _planning_lock(cache_folder()):
             _write(cache_folder(), _joined(read_wisdom(cache_folder()), _export()))
     return pair
 
@@ -148,12 +148,14 @@ def _joined(wisdom: Wisdom | None, more: Wisdom) -> Wisdom:
     joined = []
     for old, new in zip(wisdom, more, strict=True):
         known = {tuple(line.split()[2:]) for line in old.splitlines()[1:-1]}
-        added = [line for line in new.splitlines()[1:-1] if tuple(line.split()[2:]) not in known]
-        joined.append("\n".join([*old.splitlines()[:-1], *added, ")"]) + "\n")
+        new_lines = [
+            line for line in new.splitlines()[1:-1] if tuple(line.split()[2:]) not in known
+        ]
+        joined.append("\n".join([*old.splitlines()[:-1], *new_lines, ")"]) + "\n")
     return joined
 
 
-def _take_in(wisdom: Wisdom | None) -> None:
+def _import(wisdom: Wisdom | None) -> None:
     """Know what others measured."""
     if wisdom is not None:
         double, single = wisdom
@@ -168,7 +170,7 @@ def _write(folder: Path, wisdom: Wisdom) -> None:
 
 
 @contextmanager
-def _alone(folder: Path) -> Iterator[None]:
+def _planning_lock(folder: Path) -> Iterator[None]:
     """Inside, no other process plans; that is not assured where the folder cannot be locked."""
     with ExitStack() as stack:
         if folder not in _without_lock:

@@ -167,7 +167,7 @@ def launched() -> Ranks | None:
     return Ranks(MPI.COMM_WORLD)
 
 
-def cores_and_company(ranks: Ranks, cores: set[int]) -> tuple[int, int]:
+def cores_and_processes_on_node(ranks: Ranks, cores: set[int]) -> tuple[int, int]:
     """Cores for this process, and how many processes of the run share this machine.
 
     `cores` are those that this process may use; what is shared is shared out.
@@ -175,6 +175,6 @@ def cores_and_company(ranks: Ranks, cores: set[int]) -> tuple[int, int]:
     from mpi4py import MPI
 
     node = ranks.comm.Split_type(MPI.COMM_TYPE_SHARED)
-    count, together = int(node.Get_size()), set().union(*node.allgather(cores))
+    count, all_cores = int(node.Get_size()), set().union(*node.allgather(cores))
     node.Free()
-    return max(1, len(together) // count), count
+    return max(1, len(all_cores) // count), count

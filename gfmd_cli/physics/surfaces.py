@@ -44,15 +44,15 @@ Surface = Annotated[
 
 def check_resolved(surface: RigidSurface, points: int, points_y: int) -> None:
     """Raise InputError where a grid of so many points along x and y does not resolve a surface."""
-    wavelengths = {
+    points_along = {
         "points": (points, surface.smallest_grid()),
         "points_y": (points_y, surface.smallest_grid_y()),
     }
-    for key, (given, needed) in wavelengths.items():
-        if given < needed:
+    for key, (count, least) in points_along.items():
+        if count < least:
             raise InputError(
-                f"grid.{key}: {given // surface.copies} points along {AXIS[key]} do not resolve "
-                f"the surface ({surface.resolution()}); use {needed // surface.copies} or more"
+                f"grid.{key}: {count // surface.copies} points along {AXIS[key]} do not resolve "
+                f"the surface ({surface.resolution()}); use {least // surface.copies} or more"
             )
 
 

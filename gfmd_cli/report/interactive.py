@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from html import escape
 from typing import Any
 
-from gfmd_cli.analysis.plotting import BAND, ColumnFigure, Layer
+from gfmd_cli.analysis.plotting import BAND, ColumnFigure, PlotLayer
 from gfmd_cli.analysis.table import known, plus_minus
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.report.labels import html_label, plain_label
@@ -60,7 +60,7 @@ def interactive(figure: ColumnFigure) -> dict[str, Any] | None:
     }
 
 
-def _trace(layer: Layer, names: tuple[str, str]) -> dict[str, Any]:
+def _trace(layer: PlotLayer, names: tuple[str, str]) -> dict[str, Any]:
     """A layer as plotly.js has it; `meta` names the entries of the legend it belongs to."""
     meta = [_name(name) for name in layer.names]
     digits = LINE_DIGITS if layer.kind == "line" else DIGITS
@@ -76,7 +76,7 @@ def _trace(layer: Layer, names: tuple[str, str]) -> dict[str, Any]:
     return {"meta": meta, "x": x, "y": y, "mode": "lines", "line": line, "hoverinfo": "skip"}
 
 
-def _points(layer: Layer, names: tuple[str, str]) -> dict[str, Any]:
+def _points(layer: PlotLayer, names: tuple[str, str]) -> dict[str, Any]:
     symbol, _ = SYMBOLS[layer.marker]
     width = 0.9 * PIXELS
     marker = {"symbol": symbol, "color": layer.colour, "size": 8, "line": {"width": width}}
@@ -90,7 +90,7 @@ def _points(layer: Layer, names: tuple[str, str]) -> dict[str, Any]:
     return trace
 
 
-def _hover(layer: Layer, place: int, names: tuple[str, str], errors: Errors) -> str:
+def _hover(layer: PlotLayer, place: int, names: tuple[str, str], errors: Errors) -> str:
     """What a point says when it is pointed at: curve, values, and what else is known of it."""
     x, y = float(layer.x[place]), float(layer.y[place])
     error = math.nan if errors is None else float(max(side[place] for side in errors))

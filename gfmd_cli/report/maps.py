@@ -30,14 +30,14 @@ from gfmd_cli.study.reading import StudyFile, open_study
 
 MAX_CONTACTS, MAX_CURVES = 12, 3  # contacts that are shown, of at most so many curves
 SIDE = 256  # pixels of a map at the most
-LOWEST, HIGHEST = 0.35, 1.2  # height of a figure over its width, for oblong cells; a choice
+MIN_ASPECT, MAX_ASPECT = 0.35, 1.2  # height of a figure over its width, for oblong cells; a choice
 NOISE = 1e-3  # of the nominal pressure; where contact is not known, less stress is none
 ROWS = 256  # pixels' worth of rows that are held at a time
 TOUCHING = "#0077bb"
 COLOURS, FAINTEST = "viridis", 0.3
 """Colours of stress and gap, and how far along them the least is: told from none by LEGIBLE."""
 NONE, BEYOND = "black", "#cc3311"
-MOST = 99  # percentile of the stress in contact, of the gap beside it, that the colours reach to
+PERCENTILE = 99  # of the stress in contact, and of the gap beside it, that the colours reach to
 STORED = ("fields", "cross_sections")
 CAPTION = "The values are in /fields/TASK and /cross_sections/TASK of the study file."
 SHOWN = (
@@ -113,7 +113,7 @@ def _map_figures(study: StudyFile, row: Row) -> list[tuple[str, ColumnFigure, st
         return []
     pixels = _thumbnails(study, row["task"], -(-max(stored["sigma"].shape) // SIDE))
     stress, touching = pixels["stress"], pixels.get("contact")
-    red = f"red: the {100 - MOST} % of the {{}} above the scale"
+    red = f"red: the {100 - PERCENTILE} % of the {{}} above the scale"
     what = f"Stress; black: none, {red.format('contact')}"
     loaded = stress > NOISE * row["pressure"] if touching is None else touching > 0
     label = r"stress $\sigma$"
@@ -154,7 +154,7 @@ def _contact_figure(touching: Field, row: Row) -> ColumnFigure:
 def _scaled_figure(values: Field, shown: Mask, row: Row, scale: Scale, label: str) -> ColumnFigure:
     """Colours up to what but a few of the values shown exceed, else peaks leave all dark."""
     plot, extent = _cell(row)
-    top = float(np.percentile(values[shown], MOST)) if np.any(shown) else 0.0
+    top = float(np.percentile(values[shown], PERCENTILE)) if np.any(shown) else 0.0
     divisor, label = scale.axis(row, top, label)
     image = plot.axes.imshow(
         np.where(shown, values / divisor, np.nan),
@@ -175,5 +175,5 @@ def _cell(row: Row) -> tuple[ColumnFigure, tuple[float, float, float, float]]:
     length, length_y = float(row["length"]), float(row["length_y"])
     divisor, x = LENGTH_SCALE.axis(row, max(length, length_y), "x")
     plot = ColumnFigure(x, f"y{x[1:]}")
-    plot.height = min(max(0.85 * length_y / length, LOWEST), HIGHEST) * WIDTH
+    plot.height = min(max(0.85 * length_y / length, MIN_ASPECT), MAX_ASPECT) * WIDTH
     return plot, (0.0, length / divisor, 0.0, length_y / divisor)

@@ -40,14 +40,14 @@ def headline(data: ReportData) -> str:
     pascals = span(_column(rows, "pressure"), "Pa")
     pressures = count(max(len(curve.rows) for curve in curves), "pressure")
     return (
-        f"{count(len(data.rows), 'contact')}: {_some(elastomers, 'elastomer')}, "
-        f"{_some(surfaces, 'surface')}, {count(seeds, 'seed') + ', ' if seeds > 1 else ''}"
+        f"{count(len(data.rows), 'contact')}: {_names_of(elastomers, 'elastomer')}, "
+        f"{_names_of(surfaces, 'surface')}, {count(seeds, 'seed') + ', ' if seeds > 1 else ''}"
         f"{pressures} from p* = {span(_column(rows, 'p_star'))}"
         f"{f' ({pascals})' if data.in_si else ''}, {grid_size(rows)}."
     )
 
 
-def _some(names: list[str], what: str) -> str:
+def _names_of(names: list[str], what: str) -> str:
     if len(names) == 1:
         return f"{what} {names[0]}"
     return count(len(names), what) + (f" ({listed(names)})" if len(names) <= MAX_NAMES else "")
@@ -81,7 +81,7 @@ def _quantities(data: ReportData) -> list[KeyNumber]:
     """Pressure, area, gap and stress; in SI units with the scales behind them, or reduced."""
     rows = data.solved
     p_star = span(_column(rows, "p_star"))
-    note = f"a_r, share of the nominal area{_where(rows, 'a_r')}"
+    note = f"a_r, share of the nominal area{_continuum_note(rows, 'a_r')}"
     quantities = [
         KeyNumber("Pressure", p_star, "p*, in units of Delta_sigma"),
         KeyNumber("Contact area", span(_best(rows, "a_r")), note),
@@ -105,7 +105,7 @@ def _quantities(data: ReportData) -> list[KeyNumber]:
 def _scaled(data: ReportData, title: str, symbol: str, unit: str) -> KeyNumber:
     """A quantity that rows hold over their scale, as its symbol says; the scale is in `unit`."""
     name, scale = symbol.lower().split(" / ")
-    reduced, where = _best(data.solved, name), _where(data.solved, name)
+    reduced, where = _best(data.solved, name), _continuum_note(data.solved, name)
     if not data.in_si:
         return KeyNumber(title, span(reduced), f"{symbol}{where}")
     scales = _column(data.solved, scale)
@@ -117,7 +117,7 @@ def _theory_numbers(data: ReportData) -> list[KeyNumber]:
     """Simulation over theory, where the theory applies."""
     if not data.comparison.has_theory:
         return []
-    area, gap = (_where(data.solved, name) for name in ("a_r", "u_g"))
+    area, gap = (_continuum_note(data.solved, name) for name in ("a_r", "u_g"))
     up_to = f"u_g up to p* = {NEARLY_FULL}{gap}"
     return [
         KeyNumber("Area / Persson theory", _ratios(data, "a_r", math.inf), f"a_r{area}"),
@@ -130,7 +130,7 @@ def _best(rows: list[Row], name: str) -> list[float]:
     return [best(row, name)[0] for row in rows]
 
 
-def _where(rows: list[Row], name: str) -> str:
+def _continuum_note(rows: list[Row], name: str) -> str:
     """Whether the values are those of the continuum; empty where none is."""
     known = [in_continuum(row, name) for row in rows]
     if not any(known):

@@ -111,38 +111,38 @@ class _DirectSolve:
                 return False
             self.evaluate(points, s)
             self.level = float((self.values[points] - self.obstacle[points]).mean())
-            wrong, violation = self.compare(points, s)
-            count = int(np.count_nonzero(wrong))
+            misclassified, violation = self.compare(points, s)
+            count = int(np.count_nonzero(misclassified))
             if count == 0 or violation < tolerance:
                 break
             patience = PATIENCE if count < fewest else patience - 1
             fewest = min(count, fewest)
             if patience < 0:
-                wrong.ravel()[: np.flatnonzero(wrong)[-1]] = False
-            self.exchange(wrong, max(1, int(GROWTH * s.size)))
+                misclassified.ravel()[: np.flatnonzero(misclassified)[-1]] = False
+            self.exchange(misclassified, max(1, int(GROWTH * s.size)))
         return True
 
     def compare(self, points: Points, s: Field) -> tuple[Mask, float]:
         """The points that are in contact or not by mistake, and the natural residual of that."""
-        wrong = np.empty(self.touching.shape, dtype=np.bool_)
+        misclassified = np.empty(self.touching.shape, dtype=np.bool_)
         violation = 0.0
         for rows in row_blocks(self.values):
             gap = self.values[rows] - self.obstacle[rows]
-            np.less(gap, self.level, out=wrong[rows])
-            wrong[rows] &= ~self.touching[rows]
-            violation += float(np.square(gap[wrong[rows]] - self.level).sum())
-        wrong[points] = s < 0
+            np.less(gap, self.level, out=misclassified[rows])
+            misclassified[rows] &= ~self.touching[rows]
+            violation += float(np.square(gap[misclassified[rows]] - self.level).sum())
+        misclassified[points] = s < 0
         violation += float(np.square(s[s < 0]).sum())
-        return wrong, self.contact.as_residual(violation)
+        return misclassified, self.contact.as_residual(violation)
 
-    def exchange(self, wrong: Mask, most: int) -> None:
+    def exchange(self, misclassified: Mask, most: int) -> None:
         """Change whether these points are in contact; the `most` deepest of those entered join."""
-        entered = np.nonzero(wrong & ~self.touching)
+        entered = np.nonzero(misclassified & ~self.touching)
         if entered[0].size > most:
             gap = self.values[entered] - self.obstacle[entered]
             shallow = np.argpartition(gap, most)[most:]
-            wrong[tuple(places[shallow] for places in entered)] = False
-        self.touching ^= wrong
+            misclassified[tuple(places[shallow] for places in entered)] = False
+        self.touching ^= misclassified
 
     def stress(self, points: Points) -> Field:
         """The stresses of these points. Raises LinAlgError if rounding makes C_AA indefinite."""

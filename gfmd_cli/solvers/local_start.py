@@ -71,7 +71,7 @@ def start_from(
     if not doubled or not pressure.any() or not all(map(tiles_apply, finer)):
         return None
     for contact in finer:
-        tiles = Tiles(_reached(coarse.grid.shape, pressure > 0))
+        tiles = Tiles(_tiles_in_reach(coarse.grid.shape, pressure > 0))
         if tiles.count > LARGEST_SHARE * tiles.used.size:
             return None
         solve = _LocalSolve(contact, tiles, _refined(pressure, tiles), pause)
@@ -100,7 +100,7 @@ def tiles_apply(contact: Contact) -> bool:
     return bool(low <= exponents.min() and exponents.max() <= high)
 
 
-def _reached(shape: tuple[int, ...], touching: Mask) -> Mask:
+def _tiles_in_reach(shape: tuple[int, ...], touching: Mask) -> Mask:
     """The tiles of a grid of twice the points that contact on a grid of this shape can reach."""
     down, right = (2 * points // SIDE for points in shape)
     used = np.zeros((down, right), dtype=np.bool_)

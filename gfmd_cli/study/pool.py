@@ -99,24 +99,24 @@ class Pool:
 
         Tasks that are left to the next call are not counted.
         """
-        asked_to_stop = False
+        is_stopping = False
         try:
             while True:
-                if self.stop.is_set() and not asked_to_stop:
-                    asked_to_stop = True
+                if self.stop.is_set() and not is_stopping:
+                    is_stopping = True
                     self.waiting.clear()
                     for worker in self.workers.values():
                         worker.give(None)
-                self._staff()
+                self._assign_tasks()
                 if not self.workers:
                     return self.outcome
                 for pipe in wait(list(self.workers), POLL_SECONDS):
-                    self._hear(self.workers[pipe])  # type: ignore[index]
+                    self._receive(self.workers[pipe])  # type: ignore[index]
         finally:
             for worker in self.workers.values():
                 worker.dismiss()
 
-    def _staff(self) -> None:
+    def _assign_tasks(self) -> None:
         """Give tasks to idle workers, start more if there is work for them, and end the others."""
         for worker in [worker for worker in self.workers.values() if worker.task is None]:
             if not self.waiting:
@@ -124,21 +124,21 @@ class Pool:
                 worker.dismiss()
             elif worker.ready:
                 worker.give(self.waiting.popleft())
-        at_work = sum(worker.task is not None for worker in self.workers.values())
-        while self.waiting and len(self.workers) < min(self.jobs, at_work + len(self.waiting)):
+        busy = sum(worker.task is not None for worker in self.workers.values())
+        while self.waiting and len(self.workers) < min(self.jobs, busy + len(self.waiting)):
             try:
                 worker = self.start()
             except OSError as error:
-                self._lose_start(f"a worker process cannot be started: {error.strerror}")
+                self._count_failed_start(f"a worker process cannot be started: {error.strerror}")
             else:
                 self.workers[worker.pipe] = worker
 
-    def _hear(self, worker: Worker) -> None:
+    def _receive(self, worker: Worker) -> None:
         """Receive a message of a worker."""
         try:
             message = worker.pipe.recv()
         except (EOFError, OSError):
-            self._bury(worker)
+            self._remove_dead(worker)
             return
         if isinstance(message, Progress):
             self.report(message)
@@ -149,30 +149,30 @@ class Pool:
             self.outcome[message] += 1
         worker.ready, worker.task = True, None
 
-    def _bury(self, worker: Worker) -> None:
+    def _remove_dead(self, worker: Worker) -> None:
         """Take leave of a worker that has died; the others continue."""
         del self.workers[worker.pipe]
         status, task = worker.end(), worker.task
         if not worker.ready:
-            self._lose_start(f"a worker process {ending(status)} as it started")
+            self._count_failed_start(f"a worker process {ending(status)} as it started")
         if task is not None:
-            self._lose_task(task, status)
+            self._handle_lost_task(task, status)
 
-    def _lose_task(self, task: Task, status: int) -> None:
+    def _handle_lost_task(self, task: Task, status: int) -> None:
         """Decide about a task whose worker has died: left, tried once more, or failed.
 
         A kill from outside leaves the task to the next call. Every other end is tried once more,
         after all other tasks: memory may suffice then.
         """
         reason = f"its worker process {ending(status)}"
-        outside = -status in KILLS
+        killed_from_outside = -status in KILLS
         if status == -signal.SIGKILL and self._memory_ran_out():
-            outside = False
+            killed_from_outside = False
             self.jobs = max(1, len(self.workers))
             reason += f" (out of memory? {gib(task.bytes)} were predicted, "
             reason += f"{gib(available_memory())} are available now)"
         self.deaths[task.index] += 1
-        if outside or self.stop.is_set():
+        if killed_from_outside or self.stop.is_set():
             self._end(task, Status.INTERRUPTED, f"{reason}; call again to resume the task")
         elif self.deaths[task.index] <= RETRIES:
             self.waiting.append(task)
@@ -186,7 +186,7 @@ class Pool:
         before, self.kills = self.kills, out_of_memory_kills()
         return self.kills is None or self.kills != before
 
-    def _lose_start(self, reason: str) -> None:
+    def _count_failed_start(self, reason: str) -> None:
         """Count a worker that could not start; give up after several, if no other is at work."""
         self.lost_starts += 1
         if self.lost_starts <= MAX_LOST_STARTS:

@@ -6,7 +6,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from gfmd_cli.errors import InputError
-from gfmd_cli.grid.ranks import Ranks, cores_and_company
+from gfmd_cli.grid.ranks import Ranks, cores_and_processes_on_node
 from gfmd_cli.solvers.loop import Solver
 from gfmd_cli.study.tasks import BASE_BYTES, Task
 
@@ -71,7 +71,7 @@ def room(ranks: Ranks | None = None) -> float:
     memory = HEADROOM * available_memory()
     if ranks is None:
         return memory
-    _, company = cores_and_company(ranks, set())
+    _, company = cores_and_processes_on_node(ranks, set())
     own = min(ranks.gather(memory / company - BASE_BYTES))
     fields = Solver.fields_in_memory
     return ranks.size * float(own) * fields / (fields + 1) + BASE_BYTES
@@ -108,7 +108,7 @@ def share_out(
     if ranks is not None:
         if jobs not in (None, 1):
             raise InputError(f"--jobs {jobs}: under mpiexec its processes share each task")
-        cores, _ = cores_and_company(ranks, os.sched_getaffinity(0))
+        cores, _ = cores_and_processes_on_node(ranks, os.sched_getaffinity(0))
         return 1, min(cores, available_cores()) if threaded else 1
     cores = available_cores()
     largest = max(task.bytes for task in tasks)

@@ -88,7 +88,7 @@ def run_study(
     jobs, threads = share_out(pending, jobs, reproducible, ranks)
     options = WorkerOptions(threads, room(ranks) / jobs, reproducible, checkpoint_every)
     stop, due, started = Event(), Event(), Event()
-    tell = Clock(pending, jobs).watched(report)
+    report_with_time_left = Clock(pending, jobs).with_time_left(report)
 
     def stop_if_due() -> None:
         if due.is_set() and started.is_set():  # each call begins a task
@@ -98,7 +98,7 @@ def run_study(
         if progress.event == "start":
             started.set()
             stop_if_due()
-        tell(progress)
+        report_with_time_left(progress)
 
     def time_is_over() -> None:
         due.set()

@@ -18,7 +18,7 @@ SIGNALS = (
 """SIGHUP: the terminal is closed; SIGXCPU: the soft limit of processor time is reached."""
 
 
-def _heeded() -> list[signal.Signals]:
+def _handled_signals() -> list[signal.Signals]:
     """The signals that this process was not started to ignore, as under nohup."""
     return [number for number in SIGNALS if signal.getsignal(number) is not signal.SIG_IGN]
 
@@ -38,7 +38,7 @@ def noted(stop: Event) -> Iterator[None]:
             os._exit(130)
         stop.set()
 
-    before = {number: signal.signal(number, note) for number in _heeded()}
+    before = {number: signal.signal(number, note) for number in _handled_signals()}
     try:
         yield
     finally:
@@ -58,6 +58,6 @@ def blocked() -> Iterator[None]:
 
 def note_in_worker(stop: Event) -> None:
     """From now on every signal sets `stop`; those that were blocked at the start come now."""
-    for number in _heeded():
+    for number in _handled_signals():
         signal.signal(number, lambda *_: stop.set())
     signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)

@@ -17,7 +17,7 @@ from gfmd_cli.study.tasks import BASE_BYTES, SECONDS_PER_PAIR, Task
 SUFFIX = ".sbatch"
 MAX_BYTES = 2**20  # of a script
 SBATCH = ("sbatch", "--parsable")
-OURS = ("array", "parsable", "wait", "wrap")  # options of sbatch that --sbatch may not take
+RESERVED = ("array", "parsable", "wait", "wrap")  # options of sbatch that --sbatch may not take
 MAX_REQUEUES = 100  # of one shard; a study that needs more has too short a time limit
 NOTICE = 120  # seconds before the time limit at which a small run has to save its state
 SAVE_RATE = 1e8  # bytes per second, a low estimate of the rate at which a state is written
@@ -210,7 +210,7 @@ def option(text: str) -> str:
     name = bare.partition("=")[0]
     if not re.fullmatch(r"[a-z][a-z-]*", name):
         raise InputError(f"--sbatch {text!r}: write an option of sbatch, such as --sbatch qos=long")
-    if name in OURS:
+    if name in RESERVED:
         raise InputError(f"--sbatch {text!r}: gfmd submit sets --{name} itself")
     return _one_line(f"--{bare}")
 
