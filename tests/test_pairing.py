@@ -87,7 +87,7 @@ def test_equal_values_in_a_paired_list_stay_in_their_places():
     [
         ('["surface.cutoff", "surface.seed"]', "surface.cutoff has 3, surface.seed has 2"),
         ('["surface.cutoff", "surface.rolloff"]', "surface.rolloff has no list"),
-        ('["surface.cutoff"]', "at least 2 items"),
+        ('["surface.cutoff"]', "must have 2 or more values"),
         ('["surface.cutoff", "surface.cutoff"]', "named twice"),
         ('["surface.cutoff", "output.fields"]', "TABLE one of surface, elastomer, grid"),
         ('["surface.cutoff", "load.p_star"]', "load.p_star has no list"),

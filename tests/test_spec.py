@@ -159,7 +159,7 @@ def test_task_ids_do_not_depend_on_the_output(read):
         (("points = 64", "points = 64.5"), ["grid.points", "integer", "64.5"]),
         (("[0.1, 1.0]", "[0.1, 0.0]"), ["load.p_star[1]", "greater than 0", "0.0"]),
         (("[0.1, 1.0]", "-1"), ["load.p_star", "greater than 0", "-1"]),
-        (("[0.1, 1.0]", "[]"), ["load.p_star", "has too few values, got []"]),
+        (("[0.1, 1.0]", "[]"), ["load.p_star", "must have 1 or more values, got []"]),
         (("[0.1, 1.0]", "[0.1, 1e26]"), ["load: p_star", "from 1e-30 to 1e+06", "got 1e+26"]),
         (("[0.1, 1.0]", "{from=1e-300, to=1}"), ["load: p_star", "got 1e-300"]),
         (("[0.1, 1.0]", "{from=1, to=0.1}"), ["load.p_star", "lies below"]),

@@ -217,7 +217,7 @@ def test_a_scan_in_nanometres_that_does_not_repeat_is_remarked_on_and_mended(gfm
     [
         ("surface.scael=1", "unknown key 'scael' - did you mean 'scale'"),
         ("surface.scale=[1,2]", "with one value"),
-        ("grid.points=64", "takes surface.key=value"),
+        ("grid.points=64", "takes only keys of the table surface"),
     ],
 )
 def test_a_wrong_word_on_a_scan_is_refused(gfmd, tmp_path, pair, message):

@@ -375,7 +375,7 @@ def test_plans_are_kept_beside_an_unfinished_study(run, tmp_path, monkeypatch):
     assert wisdom == plans.read_wisdom(tmp_path / "cache" / "gfmd")
     shutil.rmtree(tmp_path / "cache")
     shapes = []
-    monkeypatch.setattr(plans, "_take_in", lambda known: shapes.append(known))
+    monkeypatch.setattr(plans, "_import", lambda known: shapes.append(known))
     run(shard=(1, 4))
     assert shapes[0] == wisdom
     (file,) = (tmp_path / "study.parts").glob("wisdom-*.json")
@@ -539,7 +539,7 @@ def test_calls_that_are_too_short_advance_all_the_same(run, tmp_path, monkeypatc
         except Interrupted:
             reached += [(e.points, e.step) for e in events if e.event == "step"][-1:]
             (warning,) = [e.message for e in events if e.event == "warning"]
-            assert "each call needs more time" in warning
+            assert "a shorter call makes no progress" in warning
     assert reached == sorted(set(reached))
     assert_equal_studies(straight, path)
 

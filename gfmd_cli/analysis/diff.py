@@ -108,22 +108,22 @@ def _load_of(row: Row) -> tuple[Hashable, ...]:
 def _matches(one: list[Row], other: list[Row], *keys: Key) -> list[Pair]:
     """Pairs of the same keys, alike in grid and solver if they can be; taken from both lists."""
     pairs: list[Pair] = []
-    paired: set[int] = set()
+    paired_ids: set[int] = set()
     for alike in (("points", "solver", "tolerance"), ("points",), ()):
 
         def key_of(row: Row, alike: tuple[str, ...] = alike) -> Hashable:
             return *(key(row) for key in keys), *(row[name] for name in alike)
 
-        waiting = grouped((row for row in other if id(row) not in paired), key_of)
+        waiting = grouped((row for row in other if id(row) not in paired_ids), key_of)
         for row in one:
-            if id(row) not in paired and (partners := waiting.get(key_of(row))):
+            if id(row) not in paired_ids and (partners := waiting.get(key_of(row))):
                 partner = partners.pop(0)
-                paired |= {id(row), id(partner)}
+                paired_ids |= {id(row), id(partner)}
                 # another surface or elastomer has other units: equal then is the pressure in Pa
                 physical = row["load"] == "pressure" and _contact_of(row) != _contact_of(partner)
                 pairs.append(Pair(row, partner, physical))
     for rows in (one, other):
-        rows[:] = [row for row in rows if id(row) not in paired]
+        rows[:] = [row for row in rows if id(row) not in paired_ids]
     return sorted(pairs, key=lambda pair: int(pair.one["task"]))
 
 

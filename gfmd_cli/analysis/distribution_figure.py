@@ -62,9 +62,9 @@ def _densities(items: list[Item], name: str) -> list[list[Density]]:
     for group in seed_groups(items):
         shown = []
         for seeds in by_load(row for item in group for row in item.curve.rows):
-            stored = [row for row in seeds if name in row and _bins(row, name)[0].size > 2]
-            if stored:
-                row = stored[0] | {name: np.mean([row[name] for row in stored], axis=0)}
+            rows = [row for row in seeds if name in row and _bins(row, name)[0].size > 2]
+            if rows:
+                row = rows[0] | {name: np.mean([row[name] for row in rows], axis=0)}
                 shown.append(Density(group[0], row, *_bins(row, name)))
         groups.append(shown)
     return [group for group in groups if group]
@@ -126,12 +126,12 @@ def continuum_figure(comparison: Comparison) -> ColumnFigure | None:
 
     The pressure is that of `at_one_pressure`. None where no contact has two grids.
     """
-    chosen = _chosen([f for f in distributions(comparison) if np.isfinite(f.density).sum() > 2])
-    if not chosen:
+    stresses = _chosen([f for f in distributions(comparison) if np.isfinite(f.density).sum() > 2])
+    if not stresses:
         return None
-    plot = _at_pressure([stress.finest["p_star"] for stress in chosen])
-    styles = curve_styles([stress.curve for stress in chosen])
-    spans = [_draw(plot, stress, style) for stress, style in zip(chosen, styles, strict=True)]
+    plot = _at_pressure([stress.finest["p_star"] for stress in stresses])
+    styles = curve_styles([stress.curve for stress in stresses])
+    spans = [_draw(plot, stress, style) for stress, style in zip(stresses, styles, strict=True)]
     ends = np.array(spans)
     plot.scale("x", "log", ends[:, :2])
     plot.scale("y", "log", ends[:, 2:])
@@ -139,10 +139,10 @@ def continuum_figure(comparison: Comparison) -> ColumnFigure | None:
     plot.theory(
         [
             (style, sigma, f.curve.stress_density(sigma, f.finest["p_star"]))
-            for f, style in zip(chosen, styles, strict=True)
+            for f, style in zip(stresses, styles, strict=True)
         ],
     )
-    for stress, style in zip(chosen, styles, strict=True):
+    for stress, style in zip(stresses, styles, strict=True):
         _edge_law(plot, stress, style)
     return plot
 

@@ -90,9 +90,9 @@ def power_law(
     design = np.array(columns)
     levers = np.linalg.pinv((design * weight) @ design.T) @ (design * weight)
     coefficients = levers @ y
-    rest = (y - coefficients @ design) / own
+    deviations = (y - coefficients @ design) / own
     freedom = max(x.size - len(columns), 1)
-    misfit = np.sqrt(max(1.0, float(rest @ rest) / freedom))
+    misfit = np.sqrt(max(1.0, float(deviations @ deviations) / freedom))
     errors: Field = np.hypot(np.sqrt(levers**2 @ own**2) * misfit, levers @ shared)
     return Line(
         slope=float(coefficients[1]),

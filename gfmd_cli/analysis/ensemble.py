@@ -70,8 +70,8 @@ def spread_of(values: Sequence[float]) -> Spread:
     """Statistics of two values or more."""
     numbers = np.asarray(values, np.float64)
     error = float(np.std(numbers, ddof=1)) / sqrt(numbers.size)
-    wide = float(stdtrit(numbers.size - 1, 0.5 + 0.5 * CONFIDENCE))
-    return Spread(float(numbers.mean()), error, wide * error)
+    t_factor = float(stdtrit(numbers.size - 1, 0.5 + 0.5 * CONFIDENCE))
+    return Spread(float(numbers.mean()), error, t_factor * error)
 
 
 def without_seed(row: Row) -> tuple[Any, ...]:

@@ -65,11 +65,11 @@ def _fits(values: Any, label: Any, method: Literal["nearest"] | None) -> Mask:
     if isinstance(label, slice):
         low, high = (-np.inf if label.start is None else label.start), label.stop
         return np.asarray((values >= low) & (values <= (np.inf if high is None else high)))
-    wanted = np.atleast_1d(np.asarray(label))
+    labels = np.atleast_1d(np.asarray(label))
     if values.dtype.kind not in "if":
-        return np.isin(values, wanted)
+        return np.isin(values, labels)
     if method == "nearest":
-        distance = np.abs(values - wanted[:, np.newaxis])
-        wanted = values[np.nanargmin(distance, axis=1)]
-    close = np.isclose(values, wanted[:, np.newaxis], rtol=ROUNDING, atol=0.0)
+        distance = np.abs(values - labels[:, np.newaxis])
+        labels = values[np.nanargmin(distance, axis=1)]
+    close = np.isclose(values, labels[:, np.newaxis], rtol=ROUNDING, atol=0.0)
     return np.asarray(close.any(axis=0))

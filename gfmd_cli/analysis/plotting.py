@@ -196,17 +196,15 @@ class ColumnFigure(LegendFigure):
                     x[known], y[known], error[..., known], ecolor=style.colour, **bars
                 )
         options: dict[str, Any] = {"ls": "none", "mfc": "none", "color": style.colour, "zorder": 3}
-        for chosen, names, marker in (
+        for mask, names, marker in (
             (converged, (style.label,), style.marker),
             (~converged, (style.label, UNCONVERGED), "x"),
         ):
-            self.axes.plot(x[chosen], y[chosen], marker=marker, markevery=every, **options)
-            if np.any(chosen):
-                layer = PlotLayer(
-                    "points", names, x[chosen], y[chosen], to_hex(style.colour), marker
-                )
-                texts = [text for text, c in zip(details, chosen, strict=False) if c]
-                part = None if error is None else error[..., chosen]
+            self.axes.plot(x[mask], y[mask], marker=marker, markevery=every, **options)
+            if np.any(mask):
+                layer = PlotLayer("points", names, x[mask], y[mask], to_hex(style.colour), marker)
+                texts = [text for text, c in zip(details, mask, strict=False) if c]
+                part = None if error is None else error[..., mask]
                 self.layers.append(replace(layer, error=part, details=texts))
         self.legend[style.label] = Line2D([], [], marker=style.marker, **options)
         if not np.all(converged):

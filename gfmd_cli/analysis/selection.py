@@ -20,9 +20,9 @@ def grouped(values: Iterable[T], key: Callable[[T], K]) -> dict[K, list[T]]:
     return groups
 
 
-def evenly(values: Sequence[T], most: int) -> list[T]:
+def evenly(values: Sequence[T], max_count: int) -> list[T]:
     """At most `most` values at equal distances, the first and the last among them."""
-    places = np.linspace(0, len(values) - 1, min(most, len(values))).round().astype(int)
+    places = np.linspace(0, len(values) - 1, min(max_count, len(values))).round().astype(int)
     return [values[place] for place in np.unique(places)]
 
 

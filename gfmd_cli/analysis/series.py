@@ -72,14 +72,14 @@ class Series:
         x, y, error, half_width, converged = (
             np.array(values) for values in zip(*points, strict=True)
         )
-        shown = np.isfinite(y) & ((y > 0) | (view.y_scale == "linear"))
-        details = [_details(seeds) for seeds, s in zip(loads, shown, strict=True) if s]
+        visible = np.isfinite(y) & ((y > 0) | (view.y_scale == "linear"))
+        details = [_details(seeds) for seeds, s in zip(loads, visible, strict=True) if s]
         style = items[0].style
         if len(items) > 1:
             style = replace(style, label=f"{style.label}, {len(items)} seeds")
         theory = np.mean([getattr(item.theory, view.column) for item in items], axis=0)
-        x, y, error = x[shown], y[shown], error[shown]
-        return cls(style, x, y, error, half_width[shown], converged[shown], details, theory)
+        x, y, error = x[visible], y[visible], error[visible]
+        return cls(style, x, y, error, half_width[visible], converged[visible], details, theory)
 
     def draw(self, plot: ColumnFigure, *, line: bool) -> None:
         """Draw points with error bars, the band of several seeds, and a line on request."""

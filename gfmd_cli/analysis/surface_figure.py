@@ -44,9 +44,9 @@ def summary_figure(summaries: Sequence[SurfaceSummary], names: Sequence[str]) ->
 
 
 def _pictures(summary: SurfaceSummary) -> list[Picture]:
-    shown = list(summary.surface.pictures().values())
+    pictures = list(summary.surface.pictures().values())
     scene = summary.scene
-    return shown or [Picture(scene.in_metres(scene.height), scene.grid.sides)]
+    return pictures or [Picture(scene.in_metres(scene.height), scene.grid.sides)]
 
 
 def _height(picture: Picture) -> float:

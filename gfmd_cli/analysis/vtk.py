@@ -29,11 +29,11 @@ def write_image(study: Path, task: int | None, target: Path) -> None:
     Without `task` the only one that has fields. Raises InputError, StudyError, SpaceError.
     """
     with open_study(study) as stored:
-        chosen = _choose(study, stored.tasks_with("fields"), task)
-        arrays = stored.arrays("fields", chosen)
+        index = _choose(study, stored.tasks_with("fields"), task)
+        arrays = stored.arrays("fields", index)
         fields = {name: np.ascontiguousarray(values, "<f8") for name, values in arrays.items()}
-        sides = [float(stored.rows[chosen][name]) for name in ("length", "length_y")]
-        first = float(stored.rows[chosen]["x_first"])
+        sides = [float(stored.rows[index][name]) for name in ("length", "length_y")]
+        first = float(stored.rows[index]["x_first"])
     with new_file(target) as fresh:
         fresh.write(_head(fields, sides, first).encode())
         for values in fields.values():

@@ -93,8 +93,8 @@ def _curve(
     if x.size == 0:
         plot.line_on(axes, style.label, x, y, **options)
         return float(trace.samples[cost][0]), float(trace.samples[cost][-1])
-    itself = np.maximum(trace.samples["u_g_error"][finite], y.min())
-    axes.plot(x, itself, color=style.colour, lw=0.4, alpha=0.6)
+    error = np.maximum(trace.samples["u_g_error"][finite], y.min())
+    axes.plot(x, error, color=style.colour, lw=0.4, alpha=0.6)
     plot.line_on(axes, style.label, x, y, markevery=0.2, **options)
     end: dict[str, Any] = {"ls": "none", "zorder": 4}
     if trace.row["status"] == Status.CONVERGED:

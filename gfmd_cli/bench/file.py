@@ -80,16 +80,16 @@ def check_target(path: Path, spec: Spec) -> None:
         return
     try:
         with open_hdf5(path) as file:
-            stored = json.loads(file.attrs["spec"]) if BENCH in file.attrs else None
+            old_spec = json.loads(file.attrs["spec"]) if BENCH in file.attrs else None
     except (OSError, KeyError, ValueError):
-        stored = None
-    if stored is None:
+        old_spec = None
+    if old_spec is None:
         raise InputError(f"{path}: exists and is no bench; take another name (-o)")
-    if changed := differences(stored, spec.resolved()):
-        shown = "\n".join(f"  {line}" for line in changed[:20])
+    if changed := differences(old_spec, spec.resolved()):
+        lines = "\n".join(f"  {line}" for line in changed[:20])
         raise InputError(
             f"{path}: a bench of another spec; take another name (-o).\n"
-            f"Stored -> requested:\n{shown}"
+            f"Stored -> requested:\n{lines}"
         )
 
 

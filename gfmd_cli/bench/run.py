@@ -108,8 +108,8 @@ def solvers_to_compare(spec: Spec, task: Task, contact: Contact) -> list[Solver]
         solvers = [kind(**solvers[0].shared_keys()) for kind in kinds]
     n = task.elastomer.exponent
     steepness = np.inf if n is None else n  # unknown: only what suits all elastomers
-    chosen = [solver.for_contact(contact) for solver in solvers]
-    return list(dict.fromkeys(s for s in chosen if steepness <= s.max_exponent))
+    suited = [solver.for_contact(contact) for solver in solvers]
+    return list(dict.fromkeys(s for s in suited if steepness <= s.max_exponent))
 
 
 def run_bench(spec: Spec, report: Report) -> list[Trace]:

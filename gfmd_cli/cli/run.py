@@ -90,7 +90,7 @@ def run(
 
     how["ranks"] = launched()
     how["max_seconds"] = None if max_hours is None else 3600 * max_hours
-    missed = 0
+    unconverged = 0
     with together(how["ranks"]):
         from gfmd_cli.spec.parse import read_spec
 
@@ -103,8 +103,8 @@ def run(
             if dry_run:
                 _print_tasks(spec, path, how)
             else:
-                missed += _run(spec, text, path, quiet, how)
-    sys.exit(1 if missed else 0)
+                unconverged += _run(spec, text, path, quiet, how)
+    sys.exit(1 if unconverged else 0)
 
 
 def _run(spec: Any, text: str, path: Path, quiet: bool, how: dict[str, Any]) -> int:

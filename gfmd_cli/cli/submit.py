@@ -91,15 +91,15 @@ def _send(job: Any) -> None:
     from gfmd_cli.files.atomic import make_folder, write_whole
     from gfmd_cli.study.slurm import call, queued
 
-    if waiting := queued(job.path):
+    if queued_jobs := queued(job.path):
         raise InputError(
-            f"{job.path}: job {waiting[0]} of this study is in the queue; wait for it, "
-            f"or end it by `scancel {waiting[0].partition('_')[0]}`"
+            f"{job.path}: job {queued_jobs[0]} of this study is in the queue; wait for it, "
+            f"or end it by `scancel {queued_jobs[0].partition('_')[0]}`"
         )
     make_folder(job.logs)
     if job.fresh:
         write_whole(job.path, job.text.encode())
     number = call(job.array_call()).partition(";")[0]
     show(f"job {number}: {len(job.members)} of {job.shards} shards, by {job.path}")
-    following = call(job.collect_call(number)).partition(";")[0]
-    show(f"job {following}: collects when they have ended; logs in {job.logs}")
+    collect_job = call(job.collect_call(number)).partition(";")[0]
+    show(f"job {collect_job}: collects when they have ended; logs in {job.logs}")

@@ -55,7 +55,7 @@ def datasets_below(group: Any) -> dict[str, Any]:
     `MAX_DEPTH`.
     """
     datasets: dict[str, Any] = {}
-    queue, known, count = [("", group, 1)], {h5py.h5o.get_info(group.id).addr}, 0
+    queue, visited, count = [("", group, 1)], {h5py.h5o.get_info(group.id).addr}, 0
     for path, parent, depth in queue:  # which grows meanwhile, level by level
         if depth > MAX_DEPTH:
             raise ValueError(f"groups are nested deeper than {MAX_DEPTH}")
@@ -68,8 +68,8 @@ def datasets_below(group: Any) -> dict[str, Any]:
             item = parent[name]
             if isinstance(item, h5py.Dataset):
                 datasets[path + name] = item
-            elif (address := h5py.h5o.get_info(item.id).addr) not in known:
-                known.add(address)
+            elif (address := h5py.h5o.get_info(item.id).addr) not in visited:
+                visited.add(address)
                 if isinstance(item, h5py.Group):
                     queue.append((f"{path}{name}/", item, depth + 1))
     return datasets
@@ -135,10 +135,11 @@ def _checked(group: Any, path: str, compression: float) -> Any:
     kind = dataset.dtype
     if kind.kind not in PLAIN:
         raise ValueError(f"dataset {path!r} has type {kind}; numbers or text are read")
-    claimed = prod(dataset.shape) * kind.itemsize
-    stored = min(dataset.get_storage_size(), h5py.h5i.get_file_id(dataset).get_filesize())
-    if claimed > compression * stored:
+    claimed_bytes = prod(dataset.shape) * kind.itemsize
+    stored_bytes = min(dataset.get_storage_size(), h5py.h5i.get_file_id(dataset).get_filesize())
+    if claimed_bytes > compression * stored_bytes:
         raise ValueError(
-            f"dataset {path!r} claims {claimed} bytes, but hardly any are stored ({stored})"
+            f"dataset {path!r} claims {claimed_bytes} bytes, but hardly any are stored "
+            f"({stored_bytes})"
         )
     return dataset

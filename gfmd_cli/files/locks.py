@@ -37,11 +37,11 @@ def locked(path: Path, *, shared: bool = False, wait: bool = True) -> Iterator[b
     one that has waited for `OWNED_SECONDS`. That of a dead process of this machine is removed; two
     that remove it at the same moment may both go on.
     """
-    how = (fcntl.LOCK_SH if shared else fcntl.LOCK_EX) | (0 if wait else fcntl.LOCK_NB)
+    operation = (fcntl.LOCK_SH if shared else fcntl.LOCK_EX) | (0 if wait else fcntl.LOCK_NB)
     while True:
         with _opened(path) as file:
             try:
-                fcntl.flock(file, how)
+                fcntl.flock(file, operation)
             except BlockingIOError:
                 yield False
                 return
@@ -110,11 +110,11 @@ def _owned(path: Path, shared: bool, wait: bool) -> Iterator[bool]:
             )
         else:
             time.sleep(WAIT_SECONDS)
-    mine = _owner(path)
+    own_record = _owner(path)
     try:
         yield True
     finally:
-        if _owner(path) == mine:  # else it was deleted, and another process has one now
+        if _owner(path) == own_record:  # else it was deleted, and another process has one now
             with suppress(OSError):
                 path.unlink()
 

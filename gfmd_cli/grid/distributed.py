@@ -239,34 +239,36 @@ class DistributedGrid(Grid):
     def _redistributed(self, rows: Any, source: Grid, target: Grid, kept: int) -> Any:
         """The columns below `kept`, redistributed from the processes of one grid to another's."""
         rank, count = self.ranks.rank, self.ranks.size
-        have = _spans(source, [(0, kept), *[(0, 0)] * (count - 1)], kept)
-        want = _spans(target, [(0, kept)] * count, kept)
-        away = [_shared(have[rank], span) for span in want]
-        come = [_shared(span, want[rank]) for span in have]
-        sent = np.concatenate([rows[:, slice(*_from(s, have[rank]))].ravel() for s in away])
+        source_spans = _spans(source, [(0, kept), *[(0, 0)] * (count - 1)], kept)
+        target_spans = _spans(target, [(0, kept)] * count, kept)
+        send_spans = [_shared(source_spans[rank], span) for span in target_spans]
+        receive_spans = [_shared(span, target_spans[rank]) for span in source_spans]
+        send_buffer = np.concatenate(
+            [rows[:, slice(*_from(s, source_spans[rank]))].ravel() for s in send_spans]
+        )
         height = len(rows)
-        received = np.empty(height * sum(b - a for a, b in come), rows.dtype)
-        outgoing = [sent, [height * (b - a) for a, b in away]]
-        incoming = [received, [height * (b - a) for a, b in come]]
+        receive_buffer = np.empty(height * sum(b - a for a, b in receive_spans), rows.dtype)
+        outgoing = [send_buffer, [height * (b - a) for a, b in send_spans]]
+        incoming = [receive_buffer, [height * (b - a) for a, b in receive_spans]]
         self.ranks.wait(self.ranks.comm.Ialltoallv(outgoing, incoming))
-        first, last = want[rank]
+        first, last = target_spans[rank]
         gathered, at = np.empty((height, last - first), rows.dtype), 0
-        for a, b in come:
+        for a, b in receive_spans:
             end = at + height * (b - a)
-            gathered[:, a - first : b - first] = received[at:end].reshape(height, b - a)
+            gathered[:, a - first : b - first] = receive_buffer[at:end].reshape(height, b - a)
             at = end
         return gathered
 
     def gather_rows(self, values: Any, span: Span) -> Any:
         """The rows `span` of the grid, of all processes; each process may need others."""
         own = self.row_span
-        away = [_shared(own, (int(a), int(b))) for a, b in self.ranks.gather(span)]
-        come = [_shared(other, span) for other in pairwise(self.rows.edges)]
-        sent = np.concatenate([values[slice(*_from(part, own))] for part in away])
+        send_spans = [_shared(own, (int(a), int(b))) for a, b in self.ranks.gather(span)]
+        receive_spans = [_shared(other, span) for other in pairwise(self.rows.edges)]
+        sent = np.concatenate([values[slice(*_from(part, own))] for part in send_spans])
         rows = np.empty((span[1] - span[0], *values.shape[1:]), values.dtype)
         outgoing, incoming = (
             [array, [(b - a) * values[0].size for a, b in parts]]
-            for array, parts in ((sent, away), (rows, come))
+            for array, parts in ((sent, send_spans), (rows, receive_spans))
         )
         self.ranks.wait(self.ranks.comm.Ialltoallv(outgoing, incoming))
         return rows

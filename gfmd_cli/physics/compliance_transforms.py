@@ -78,14 +78,14 @@ class Compliance:
         """Displacements indexed by the distance of two pixels, in two dimensions or in one."""
         if len(shape) == 1:
             return self._line(*shape, *spacings)
-        held = near_shape(shape, spacings, self.reach / max(spacings) + 1)
+        reached_shape = near_shape(shape, spacings, self.reach / max(spacings) + 1)
         near = near_shape(shape, spacings, NEAR + 1)
         out = np.zeros((len(range(*rows.indices(shape[0]))), shape[1]))
         if near != shape:
             least = max(0.5 * min(spacings), NEAR * max(spacings) - hypot(*spacings))
-            kernel = self.spline("point", least, max(least, _diagonal(held, spacings)))
-            closer = near_shape(held, spacings, free_compliance.NEAR)
-            for part, nodes in ((held, free_compliance.NODES), (closer, NODES)):
+            kernel = self.spline("point", least, max(least, _diagonal(reached_shape, spacings)))
+            closer = near_shape(reached_shape, spacings, free_compliance.NEAR)
+            for part, nodes in ((reached_shape, free_compliance.NODES), (closer, NODES)):
                 values = pixel_integrals(
                     lambda r: kernel(np.maximum(r, least)), part, spacings, rows, nodes
                 )

@@ -33,8 +33,8 @@ def non_contact_height(p_star: Field | float) -> Field:
     p = np.where(target > 0, target, 1.0)
     z: Field = np.where(p < 1, -np.sqrt(-2 * np.log(np.minimum(p, 1.0))), p)
     for _ in range(_NEWTON_STEPS):
-        reached = pressure(z)
-        step = np.log(p / reached) * reached / contact_area(z)
+        trial_pressure = pressure(z)
+        step = np.log(p / trial_pressure) * trial_pressure / contact_area(z)
         z += step
         if np.all(np.abs(step) < _LAST_STEP * (1 + np.abs(z))):
             break

@@ -91,13 +91,13 @@ def certify(contact: Contact, u: Field, sigma: Field) -> Certificate:
         )
     )
     scale = p * grid.size / loaded
-    rest = grid.padded[..., : grid.points]
+    stress_difference = grid.padded[..., : grid.points]
     sums = np.zeros(7)
     for rows in row_blocks(u):
         v, h = u[rows], contact.height[rows]
         s = scale * contact.clear_untouchable(np.maximum(sigma[rows], 0.0), rows)
         e = sigma[rows] - s
-        rest[rows] = e
+        stress_difference[rows] = e
         g = v - h
         violation = np.minimum(v - obstacle[rows], sigma[rows])
         left_out = sigma[rows] - contact_pressure(obstacle[rows], v, sigma[rows])

@@ -199,12 +199,12 @@ def _mirrored(
     whole = twice(replace(surface.grid(grid.points, grid.points_y), threads=grid.threads))
     doubled = create_grid(whole, ranks)
     own_points = (surface.smallest_grid_y(), surface.smallest_grid())
-    twin = surface.mirrored()
-    if twin is None or own_points == (grid.points_y, grid.points):
+    mirrored_surface = surface.mirrored()
+    if mirrored_surface is None or own_points == (grid.points_y, grid.points):
         own, height = sample(surface, grid.points, grid.points_y, ranks)
         return doubled, _reflected(own, height, doubled), surface.void(grid)
-    _, mirrored = sample(twin, doubled.points, doubled.points_y, ranks)
-    void = twin.void(doubled)
+    _, mirrored = sample(mirrored_surface, doubled.points, doubled.points_y, ranks)
+    void = mirrored_surface.void(doubled)
     return doubled, mirrored, None if void is None else _on_map(doubled, void, grid)
 
 

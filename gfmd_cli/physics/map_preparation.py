@@ -30,17 +30,17 @@ def level(heights: Field, degree: Levelling, known: Mask | None = None) -> Field
     rows = np.atleast_2d(heights)
     basis_y, basis_x = (_polynomials(points, DEGREES[degree]) for points in rows.shape)
     order = np.add.outer(np.arange(basis_y.shape[1]), np.arange(basis_x.shape[1]))
-    chosen = order <= DEGREES[degree]
-    coefficients = np.zeros(chosen.shape)
+    terms = order <= DEGREES[degree]
+    coefficients = np.zeros(terms.shape)
     if known is None:  # products of orthonormal polynomials are orthonormal: a projection
-        coefficients[chosen] = (basis_y.T @ rows @ basis_x)[chosen]
+        coefficients[terms] = (basis_y.T @ rows @ basis_x)[terms]
     else:
         weight = np.atleast_2d(known).astype(np.float64)
-        right = (basis_y.T @ np.where(weight > 0, rows, 0.0) @ basis_x)[chosen]
+        right = (basis_y.T @ np.where(weight > 0, rows, 0.0) @ basis_x)[terms]
         products = _products(basis_y).T @ weight @ _products(basis_x)  # over the known heights
         sizes = (basis_y.shape[1],) * 2 + (basis_x.shape[1],) * 2
-        gram = products.reshape(sizes).transpose(0, 2, 1, 3)[chosen][:, chosen]
-        coefficients[chosen] = np.linalg.lstsq(gram, right, rcond=None)[0]
+        gram = products.reshape(sizes).transpose(0, 2, 1, 3)[terms][:, terms]
+        coefficients[terms] = np.linalg.lstsq(gram, right, rcond=None)[0]
     trend: Field = basis_y @ coefficients @ basis_x.T
     return heights - trend.reshape(heights.shape)
 

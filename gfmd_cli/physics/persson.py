@@ -116,8 +116,8 @@ def shells(
         weights = (*products, counts[part] * (height > 0))
         for total, weight in zip(sums, weights, strict=True):
             total += np.bincount(where, weight, minlength=total.size)
-    moment, height, energy, variance, weighted, held = sums[:, sums[3] > 0]
-    return Shells(moment / height, height, energy, variance, weighted / energy, held)
+    moment, height, energy, variance, weighted, mode_counts = sums[:, sums[3] > 0]
+    return Shells(moment / height, height, energy, variance, weighted / energy, mode_counts)
 
 
 def bin_edges(q: Field, exact: int = EXACT, bins: int = BINS) -> Field:
@@ -251,8 +251,8 @@ class Persson:
         Good to 1e-4 for Delta_sigma / 1e6 <= p <= 6 Delta_sigma; NaN for no gap, the ends beyond.
         """
         rising, table = self._pressures_over_gap
-        wanted = -np.log(np.where(np.asarray(u_g) > 0, u_g, np.nan))
-        return np.asarray(np.exp(table(np.clip(wanted, rising[0], rising[-1]))))
+        log_gap = -np.log(np.where(np.asarray(u_g) > 0, u_g, np.nan))
+        return np.asarray(np.exp(table(np.clip(log_gap, rising[0], rising[-1]))))
 
     @cached_property
     def _pressures_over_gap(self) -> tuple[Field, Callable[[Field], Field]]:

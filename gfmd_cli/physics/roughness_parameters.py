@@ -74,9 +74,9 @@ def _slopes(
     known = np.isfinite(sum(squares))
     if not known.any():
         return np.nan, np.nan
-    chosen = [square[known] for square in squares]
-    slope = float(np.sqrt(np.mean([np.mean(square) for square in chosen])))
-    area = np.mean([np.mean(square / (np.sqrt(1 + square) + 1)) for square in chosen])
+    known_squares = [square[known] for square in squares]
+    slope = float(np.sqrt(np.mean([np.mean(square) for square in known_squares])))
+    area = np.mean([np.mean(square / (np.sqrt(1 + square) + 1)) for square in known_squares])
     return slope, float(area)  # sqrt(1 + s) - 1 = s / (sqrt(1 + s) + 1) without cancellation
 
 

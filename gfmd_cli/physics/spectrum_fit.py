@@ -94,16 +94,17 @@ def fit(shells: Shells, complete: float = inf) -> SelfAffineFit:
     """
     q, count, power = shells.q, _modes(shells), density(shells)
     isotropic = _isotropic(q, count, complete)
-    best, used = np.array([0.8, np.log(2 * q[0])]), q.size
+    best, shell_count = np.array([0.8, np.log(2 * q[0])]), q.size
     for _ in range(MAX_ITERATIONS):
-        if used < MIN_SHELLS or q[used - 1] < MIN_RANGE * q[0]:
+        if shell_count < MIN_SHELLS or q[shell_count - 1] < MIN_RANGE * q[0]:
             raise InputError(
-                f"spectrum: from q = {q[0]:.3g} to {q[used - 1]:.3g} 1/m; too narrow for a fit"
+                f"spectrum: from q = {q[0]:.3g} to {q[shell_count - 1]:.3g} 1/m; too narrow for a "
+                "fit"
             )
-        range_ = (q[:used], count[:used], power[:used])
+        range_ = (q[:shell_count], count[:shell_count], power[:shell_count])
         best = _maximise_likelihood(*range_, best)
-        before, used = used, _cut_off(shells, isotropic, best)
-        if used == before:
+        before, shell_count = shell_count, _cut_off(shells, isotropic, best)
+        if shell_count == before:
             break
     errors, scatter = _errors(*range_, best)
     q_r = float(np.exp(best[1])) if best.size == 2 else 0.0
@@ -113,7 +114,7 @@ def fit(shells: Shells, complete: float = inf) -> SelfAffineFit:
         hurst_error=errors[0],
         q_r=q_r,
         q_r_error=q_r_error,
-        q_s=float(q[used - 1]),
+        q_s=float(q[shell_count - 1]),
         scatter=scatter,
         c_0=_scale(best, *range_),
         q_1=float(q[0]),

@@ -94,9 +94,9 @@ def _hover(layer: PlotLayer, place: int, names: tuple[str, str], errors: Errors)
     """What a point says when it is pointed at: curve, values, and what else is known of it."""
     x, y = float(layer.x[place]), float(layer.y[place])
     error = math.nan if errors is None else float(max(side[place] for side in errors))
-    shown = plus_minus(y, error).replace("+-", "±") if known(error) else f"{y:.4g}"
+    value_text = plus_minus(y, error).replace("+-", "±") if known(error) else f"{y:.4g}"
     details = clean(layer.details[place]).split("\n") if layer.details else []
-    lines = [_name(layer.names[0]), f"{names[0]}: {x:.4g}", f"{names[1]}: {shown}", *details]
+    lines = [_name(layer.names[0]), f"{names[0]}: {x:.4g}", f"{names[1]}: {value_text}", *details]
     return "<br>".join(escape(line, quote=False) for line in lines)
 
 

@@ -54,23 +54,23 @@ def maps(data: ReportData) -> Section:
     """Where the surfaces touch, and how hard."""
     with open_study(data.comparison.path) as study:
         tasks = {task for group in STORED for task in study.tasks_with(group)}
-        stored = [row for row in data.solved if row["task"] in tasks]
-        chosen = _chosen(stored)
-        shown = [row for rows in chosen for row in rows]
+        rows_with_fields = [row for row in data.solved if row["task"] in tasks]
+        contacts_by_curve = _chosen(rows_with_fields)
+        contacts = [row for rows in contacts_by_curve for row in rows]
         series = [
             {
                 "title": f"{rows[0]['elastomer']} on {rows[0]['surface']}",
                 "contacts": [_contact_maps(study, row, data.prefix) for row in rows],
             }
-            for rows in chosen
+            for rows in contacts_by_curve
         ]
     notes = [
-        f"{len(shown)} of {len(stored)} contacts with stored fields are shown, "
+        f"{len(contacts)} of {len(rows_with_fields)} contacts with stored fields are shown, "
         f"{MAX_CONTACTS} at most."
     ]
-    if any(plane(row) and max(row["points"], row["points_y"]) > SIDE for row in shown):
+    if any(plane(row) and max(row["points"], row["points_y"]) > SIDE for row in contacts):
         notes.append(f"Maps have up to {SIDE} pixels a side, each the mean of some grid points.")
-    table = Table(CAPTION, data.shown(SHOWN), [Group("", shown)])
+    table = Table(CAPTION, data.shown(SHOWN), [Group("", contacts)])
     return Section(
         "Maps and cross-sections",
         notes=notes,
@@ -108,10 +108,10 @@ def _contact_maps(study: StudyFile, row: Row, prefix: str) -> dict[str, Any]:
 
 def _map_figures(study: StudyFile, row: Row) -> list[tuple[str, ColumnFigure, str]]:
     """Maps of contact, stress and gap, as far as the fields for them are stored."""
-    stored = study.datasets("fields", row["task"])
-    if "sigma" not in stored or stored["sigma"].ndim != 2:
+    datasets = study.datasets("fields", row["task"])
+    if "sigma" not in datasets or datasets["sigma"].ndim != 2:
         return []
-    pixels = _thumbnails(study, row["task"], -(-max(stored["sigma"].shape) // SIDE))
+    pixels = _thumbnails(study, row["task"], -(-max(datasets["sigma"].shape) // SIDE))
     stress, touching = pixels["stress"], pixels.get("contact")
     red = f"red: the {100 - PERCENTILE} % of the {{}} above the scale"
     what = f"Stress; black: none, {red.format('contact')}"

@@ -30,15 +30,15 @@ LABEL = r"$C(q)$"
 def measured_surface(data: ReportData) -> Section:
     """Pictures of the measured surfaces; a blank section without such a surface."""
     surfaces = {str(row["surface"]): row for row in reversed(data.solved)}
-    shown: list[Row] = []
+    rows: list[Row] = []
     drawings: list[Drawing] = []
     with open_study(data.comparison.path) as study:
         for row in reversed(surfaces.values()):
             pictures = study.pictures(row["scene"])
-            if pictures and len(shown) < MAX_PICTURES:
-                shown.append(row)
-                drawings += _drawings(row, pictures, f"{data.prefix}{len(shown)}")
-    notes = [str(row["preparation"]) for row in shown]
+            if pictures and len(rows) < MAX_PICTURES:
+                rows.append(row)
+                drawings += _drawings(row, pictures, f"{data.prefix}{len(rows)}")
+    notes = [str(row["preparation"]) for row in rows]
     return Section("Measured surface", notes=notes, drawings=drawings)
 
 
@@ -86,21 +86,24 @@ def surface_spectrum(data: ReportData) -> Section:
         row = curve.rows[0]
         key = (curve.surface, row["preparation"], row["h_std"])  # of two studies the same once
         scenes.setdefault(key, (row, curve.persson.shells))
-    counted = [(row, shells) for row, shells in scenes.values() if shells.modes is not None]
-    spectra = [spectrum(row, shells) for row, shells in counted if shells.q.size]
+    with_modes = [(row, shells) for row, shells in scenes.values() if shells.modes is not None]
+    spectra = [spectrum(row, shells) for row, shells in with_modes if shells.q.size]
     spectra = [each for each in spectra if each.q.size]
-    shown = spectra[:MAX_SURFACES]
-    if not shown:
+    drawn_spectra = spectra[:MAX_SURFACES]
+    if not drawn_spectra:
         return Section("Surface spectrum")
-    names = "; ".join(each.name for each in shown)
+    names = "; ".join(each.name for each in drawn_spectra)
     label = f"Power spectral density of the surface over the wavenumber: {names}"
-    left_out = len(spectra) > len(shown)
+    left_out = len(spectra) > len(drawn_spectra)
     more = f" The first {MAX_SURFACES} of {len(spectra)} are shown." if left_out else ""
     return Section(
         "Surface spectrum",
-        notes=[each.preparation for each in shown if each.preparation],
-        drawings=[drawing(_spectrum_figure(shown), "spectrum", label, CAPTION + more)],
-        disclosed={"Self-affine fit": _fits(shown), "Table behind the figure": _bands(shown)},
+        notes=[each.preparation for each in drawn_spectra if each.preparation],
+        drawings=[drawing(_spectrum_figure(drawn_spectra), "spectrum", label, CAPTION + more)],
+        disclosed={
+            "Self-affine fit": _fits(drawn_spectra),
+            "Table behind the figure": _bands(drawn_spectra),
+        },
     )
 
 

@@ -155,8 +155,8 @@ class _DirectSolve:
         factor = cho_factor(matrix.T, overwrite_a=True, check_finite=False)
         sides = np.stack([self.obstacle[points], np.ones(rows.size)], axis=1)
         by_height, by_level = cho_solve(factor, sides, check_finite=False).T
-        missing = self.contact.pressure * self.grid.size - by_height.sum()
-        stress: Field = by_height + by_level * (missing / by_level.sum())
+        remaining_load = self.contact.pressure * self.grid.size - by_height.sum()
+        stress: Field = by_height + by_level * (remaining_load / by_level.sum())
         return stress
 
     def displacement(self) -> Field:

@@ -153,8 +153,8 @@ def grids_of(solver: Solver, grid: Grid) -> list[Shape]:
 
 def _grids(contact: Contact, solver: Solver, start: Resume | Field | None) -> list[Contact]:
     """The contact on all grids that are to be solved, the finest first."""
-    given = isinstance(start, np.ndarray)
-    chain = [contact.grid.whole_shape] if given else grids_of(solver, contact.grid)
+    starts_here = isinstance(start, np.ndarray)
+    chain = [contact.grid.whole_shape] if starts_here else grids_of(solver, contact.grid)
     if isinstance(start, Resume):
         chain = chain[chain.index(start.shape) :]
     contacts = [contact]

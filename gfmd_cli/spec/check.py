@@ -39,7 +39,7 @@ NUMBER = re.compile(r"\s*[+-]?\d[\d_]*\.?\d*([eE][+-]?\d+)?\s*")
 WORDS = {
     "string_pattern_mismatch": "must begin with a letter or a digit and contain only letters, "
     "digits, '.', '_' and '-', at most 100 of them",
-    "too_short": "has too few values",
+    "too_short": "must have {min_length} or more values",
 }
 """What is allowed, by the type of pydantic's error, where its message is not plain."""
 MODELS: dict[str, Any] = {
@@ -179,10 +179,10 @@ class Check:
         sweeps: list[SweepTable] = []
         for sweep, _ in self.entries("sweep", data["sweep"]) if "sweep" in data else []:
             assert isinstance(sweep, SweepTable)
-            wrong = _problems_of(sweep, data)
-            for text in wrong:
+            problems = _problems_of(sweep, data)
+            for text in problems:
                 self.add("sweep.paired", text)
-            sweeps += [] if wrong else [sweep]
+            sweeps += [] if problems else [sweep]
         return sweeps
 
     def _compare(self, tables: dict[str, Any]) -> None:
@@ -276,7 +276,8 @@ def _problem(name: str, places: dict[str, int], detail: Any) -> tuple[str, str]:
         message = detail["msg"].removeprefix("Value error, ")
         message = message[:1].lower() + message[1:]
         given = detail["input"]
-        message = WORDS.get(detail["type"], message)
+        if detail["type"] in WORDS:
+            message = WORDS[detail["type"]].format(**detail["ctx"])
         text = message if isinstance(given, dict) else f"{message}, got {shortened(repr(given))}"
         if isinstance(given, str) and NUMBER.fullmatch(given):
             text += ": write the number without quotation marks"
@@ -285,8 +286,8 @@ def _problem(name: str, places: dict[str, int], detail: Any) -> tuple[str, str]:
 
 def _unknown(given: str, known: Iterable[str], what: str) -> str:
     """Message for a name that is not known, with the nearest known one."""
-    near = get_close_matches(given[:MAX_SHOWN], known, 1, 0.5)
-    hint = f" - did you mean {near[0]!r}?" if near else ""
+    matches = get_close_matches(given[:MAX_SHOWN], known, 1, 0.5)
+    hint = f" - did you mean {matches[0]!r}?" if matches else ""
     return f"unknown {what} {shortened(given)!r}{hint} (known: {', '.join(known)})"
 
 

@@ -36,10 +36,10 @@ class StudyTable(Choice):
 MAX_POINTS = 2**17
 
 
-def _points_form(given: Any) -> str | None:
+def _points_form(value: Any) -> str | None:
     """The form in which points are given: a number or the word "auto"."""
-    if isinstance(given, str):
-        return "word" if given == "auto" else None
+    if isinstance(value, str):
+        return "word" if value == "auto" else None
     return "count"
 
 
@@ -142,11 +142,11 @@ class Ladder(Choice):
         return float(value * 10.0**decades)
 
 
-def _shape(given: Any) -> str:
+def _shape(value: Any) -> str:
     """The form in which values are given: a number, a list or a ladder."""
-    if isinstance(given, dict | Ladder):
+    if isinstance(value, dict | Ladder):
         return "ladder"
-    return "list" if isinstance(given, list) else "number"
+    return "list" if isinstance(value, list) else "number"
 
 
 Pressures = Annotated[
@@ -236,12 +236,12 @@ class AccuracyTable(Choice):
 
     def tolerances(self) -> dict[str, float]:
         """Requested relative errors, by the name of the column."""
-        given = {
+        tolerances = {
             "u_g": self.mean_gap,
             "a_r": self.contact_area,
             "sigma_p": self.stress_deviation,
         }
-        return {name: share for name, share in given.items() if share is not None}
+        return {name: share for name, share in tolerances.items() if share is not None}
 
 
 FieldName = Literal["u", "sigma", "height", "contact_pressure"]
@@ -299,9 +299,9 @@ class OutputTable(Choice):
 
     def with_names(self, names: Iterable[str]) -> "OutputTable":
         """The same with these things stored as well."""
-        every = self.names().union(names)
-        keys: dict[str, Any] = {key: key in every for key, value in self if key != "fields"}
-        fields = [name for name in get_args(FieldName) if f"fields.{name}" in every]
+        all_names = self.names().union(names)
+        keys: dict[str, Any] = {key: key in all_names for key, value in self if key != "fields"}
+        fields = [name for name in get_args(FieldName) if f"fields.{name}" in all_names]
         return OutputTable(fields=fields, **keys)
 
 
@@ -335,11 +335,11 @@ class Spec(Choice):
         """The entries of the swept tables that go together, by table, and their loads."""
         for entries in product(*(range(len(getattr(self, table))) for table in SWEPT)):
             at = dict(zip(SWEPT, entries, strict=True))
-            chosen = [self.places[table][i] for table, i in at.items() if self.places]
+            places = [self.places[table][i] for table, i in at.items() if self.places]
             loads = [
                 load
                 for i, load in enumerate(self.load.listed())
-                if _fit([*chosen, *self.places.get("load", [])[i : i + 1]])
+                if _fit([*places, *self.places.get("load", [])[i : i + 1]])
             ]
             if loads:
                 yield at, list(dict.fromkeys(loads))

@@ -179,5 +179,5 @@ def _does_not_go_with(table: str, key: str, value: str, other: str) -> bool:
     if table == "load":
         return key in LOADS and other in LOADS
     kinds = kinds_of(table) if key == "kind" else {}
-    chosen = kinds.get(value.strip("'\""))
-    return chosen is not None and other not in chosen.model_fields
+    model = kinds.get(value.strip("'\""))
+    return model is not None and other not in model.model_fields

@@ -77,8 +77,8 @@ class StudyFile:
     @cached_property
     def columns(self) -> list[Column]:
         """The columns with one value a task that are stored."""
-        stored = self._packed or set(self._file)
-        return [column for column in ROW_COLUMNS if column.name in stored]
+        names = self._packed or set(self._file)
+        return [column for column in ROW_COLUMNS if column.name in names]
 
     @cached_property
     def rows(self) -> list[dict[str, Any]]:
@@ -159,13 +159,13 @@ class StudyFile:
         group = find(self._file, f"scenes/{scene}/{PICTURES}")
         if group is None:
             return {}
-        shown = {}
+        pictures = {}
         for name in ("measured", "prepared"):
             heights, sides = read_dataset(group, name), read_dataset(group, f"{name}_sides")
             if sides.shape != (heights.ndim,) or {heights.dtype.kind, sides.dtype.kind} != {"f"}:
                 raise ValueError(f"{PICTURES}/{name} is not of the shape of its sides")
-            shown[name] = Picture(heights.astype(np.float64), tuple(map(float, sides)))
-        return shown
+            pictures[name] = Picture(heights.astype(np.float64), tuple(map(float, sides)))
+        return pictures
 
     def arrays(self, group: str, task: int) -> dict[str, Field]:
         """The arrays of a task by name, none where it has no such group."""
@@ -175,8 +175,8 @@ class StudyFile:
         self, group: str, task: int, rows: int, names: Iterable[str]
     ) -> Iterator[dict[str, Field]]:
         """The named arrays of a task that are stored, at most `rows` of their rows at a time."""
-        stored = self.datasets(group, task)
-        datasets = {name: stored[name] for name in names if name in stored}
+        by_name = self.datasets(group, task)
+        datasets = {name: by_name[name] for name in names if name in by_name}
         size = min((data.shape[0] for data in datasets.values()), default=0)
         for start in range(0, size, rows):
             yield {name: data[start : start + rows] for name, data in datasets.items()}

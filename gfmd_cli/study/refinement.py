@@ -179,14 +179,14 @@ def _continues(task: Task, solved: Solved, grids: int, options: WorkerOptions) -
     improvable = any(
         solved.estimates[name].verdict not in final for name in _inaccurate(task, solved)
     )
-    wanted = improvable and finer <= task.accuracy.max_points
+    should_refine = improvable and finer <= task.accuracy.max_points
     fits = task.bytes_on(finer) <= options.memory
-    if wanted and not fits and options.reproducible:
+    if should_refine and not fits and options.reproducible:
         raise InputError(
             f"accuracy: needs {finer} points along x, more than memory holds now; with "
             f"--reproducible give accuracy.max_points = {points}"
         )
-    return wanted and fits and solved.solution.status.is_converged
+    return should_refine and fits and solved.solution.status.is_converged
 
 
 def _inaccurate(task: Task, solved: Solved) -> list[str]:

@@ -21,9 +21,9 @@ SECONDS_TO_END = 2.0  # for worker processes and small files
 
 def available_cores() -> int:
     """Cores that this process may use: Slurm's grant, else the affinity mask."""
-    granted = os.environ.get("SLURM_CPUS_PER_TASK", "")
-    if granted.isdigit() and int(granted) > 0:
-        return int(granted)
+    slurm_cpus = os.environ.get("SLURM_CPUS_PER_TASK", "")
+    if slurm_cpus.isdigit() and int(slurm_cpus) > 0:
+        return int(slurm_cpus)
     return len(os.sched_getaffinity(0))
 
 
@@ -71,8 +71,8 @@ def room(ranks: Ranks | None = None) -> float:
     memory = HEADROOM * available_memory()
     if ranks is None:
         return memory
-    _, company = cores_and_processes_on_node(ranks, set())
-    own = min(ranks.gather(memory / company - BASE_BYTES))
+    _, processes_on_node = cores_and_processes_on_node(ranks, set())
+    own = min(ranks.gather(memory / processes_on_node - BASE_BYTES))
     fields = Solver.fields_in_memory
     return ranks.size * float(own) * fields / (fields + 1) + BASE_BYTES
 

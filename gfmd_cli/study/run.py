@@ -78,8 +78,8 @@ def run_study(
     pending = without_result(share, outcomes)
     to_solve = {task.id for task in pending}
     outcome = Counter(outcomes[task.id].status for task in share if task.id not in to_solve)
-    waiting = agree(ranks, bool(study.record_paths()))
-    if not pending and not waiting:
+    has_records = agree(ranks, bool(study.record_paths()))
+    if not pending and not has_records:
         if leads(ranks) and study.parts.exists():  # of a run that was killed as it ended
             with study.work(tasks):
                 pass
@@ -129,11 +129,13 @@ def _move_aside(study: Study, shard: tuple[int, int], ranks: Ranks | None) -> li
     """Rename a study that is to be solved anew; say where it is. Raises InputError."""
     if shard[1] != 1:
         raise InputError("--overwrite: not with --shard; each shard would start a new study")
-    moved: list[str] = []
+    messages: list[str] = []
     with together(ranks):
         if leads(ranks):
-            moved = [f"{study.path}: the old one is kept as {path}" for path in study.move_aside()]
-    return moved
+            messages = [
+                f"{study.path}: the old one is kept as {path}" for path in study.move_aside()
+            ]
+    return messages
 
 
 @contextmanager
@@ -151,11 +153,12 @@ def _check_ended(solved: Counter[Status], pending: int, stop: Event) -> None:
     """Raise SpaceError or Interrupted if that ended the run."""
     if count := solved[Status.NO_SPACE]:
         raise SpaceError(f"no space for the results of {count} tasks; make some, call again")
-    left = pending - sum(solved.values())
-    if stop.is_set() and left:
-        raise Interrupted(f"stopped, states saved; {left} tasks left, call again to go on")
-    if left and not any(status.is_failure for status in solved):
-        raise Interrupted(f"{left} tasks left whose workers were killed; call again to go on")
+    unsolved = pending - sum(solved.values())
+    if stop.is_set() and unsolved:
+        tasks = "1 task" if unsolved == 1 else f"{unsolved} tasks"
+        raise Interrupted(f"stopped, states saved; {tasks} left, call again to go on")
+    if unsolved and not any(status.is_failure for status in solved):
+        raise Interrupted(f"{unsolved} tasks left whose workers were killed; call again to go on")
 
 
 def _check_output(solved: list[Task], outcomes: dict[str, Outcome]) -> None:

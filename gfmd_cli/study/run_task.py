@@ -89,8 +89,8 @@ class TaskWatcher(Watcher):
         points, step = contact.grid.points, state.step
         a_r = float(contact_points(contact.obstacle, state.u, state.sigma).mean())
         label = self.task.label
-        reached = (points, step, state.residual, a_r)
-        event = Progress(self.task.index, "step", label, *reached, size=contact.grid.size)
+        numbers = (points, step, state.residual, a_r)
+        event = Progress(self.task.index, "step", label, *numbers, size=contact.grid.size)
         self.context.report(event)
 
     def _warn_of_short_call(self) -> None:

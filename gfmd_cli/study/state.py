@@ -104,11 +104,11 @@ def _state(
     writes them, so that a task that ends meanwhile is not overlooked.
     """
     saved = {name: Checkpoint(study.parts / name).saved() for name, _ in tasks}
-    set_aside = study.set_aside()
+    damaged_files = study.set_aside()
     records, damaged = study.records()
     outcomes = study.outcomes()
     known = {name: result.status for name, result in outcomes.items() if result.stored >= output}
-    names = [path.name for path in (*set_aside, *damaged)]
+    names = [path.name for path in (*damaged_files, *damaged)]
     others = outcomes.keys() - {name for name, _ in tasks}
     states = [
         TaskState(

@@ -103,14 +103,14 @@ class _Writer(NamedTuple):
                     write_column(file, column, of_column, [task])
             return
         for kind in KINDS:
-            chosen = {
+            columns = {
                 column: of_column
                 for column, of_column in values.items()
                 if column.kind is kind and not all(map(column.is_blank, of_column))
             }
             group = file.create_group(f"{PACKED}/{kind.__name__}")
-            create_dataset(group, "names", _array(str, [column.name for column in chosen]))
-            create_dataset(group, "values", _array(kind, list(chosen.values())))
+            create_dataset(group, "names", _array(str, [column.name for column in columns]))
+            create_dataset(group, "values", _array(kind, list(columns.values())))
 
     def histogram(
         self, file: Any, histogram: HistogramColumn, task: Any, rows: list[Mapping[str, Any]]
