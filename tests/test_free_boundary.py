@@ -148,7 +148,7 @@ def solved_map(heights, points, **surface):
     keys = {"length": 1e-6, "periodic": False, "level": "none"}
     return api.solve(
         {
-            "surface": keys | surface,
+            "surface": {key: value for key, value in (keys | surface).items() if value is not None},
             "elastomer": {"kind": "half-space", "E_star": 1e9},
             "grid": {"points": points, "boundary": "free"},
             "load": {"p_star": 0.1},
@@ -168,6 +168,16 @@ def test_a_map_may_be_turned_on_any_grid(interpolation, points):
         assert result.height.std() == pytest.approx(result.h_std, rel=1e-9)
         assert result.a_r == pytest.approx(results[0].a_r, abs=2 / points**2)
         assert result.u_g == pytest.approx(results[0].u_g, rel=1e-6)
+
+
+def test_an_array_ends_at_a_free_boundary_and_is_not_levelled():
+    """Also between its points: those at opposite borders do not meet."""
+    heights = 1e-9 * SelfAffine(cutoff=0.1, seed=3).heights(48)[:24, 5:29]
+    array, stated = (solved_map(heights, 48, **keys) for keys in ({"periodic": None}, {}))
+    assert array.height == pytest.approx(stated.height)
+    assert array.a_r == stated.a_r
+    keys = {"periodic": None, "level": None}
+    assert solved_map(heights, 48, **keys).height == pytest.approx(stated.height)
 
 
 def test_the_gap_of_a_map_converges_with_the_grid():

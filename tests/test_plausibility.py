@@ -8,6 +8,7 @@ import pytest
 from gfmd_cli import compare, rows, run, solve
 from gfmd_cli.analysis.records import as_records
 from gfmd_cli.physics.file_surface import FileSurface
+from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.report.page import report
 
 SURFACE = {"kind": "self-affine", "cutoff": 0.125, "h_std": 1e-8, "length": 1e-5}
@@ -143,6 +144,24 @@ def test_a_step_across_the_border_matters_only_where_the_map_is_repeated():
         }
         warnings = solve(tables, heights=ramp).warnings
         assert any("step across the border" in warning for warning in warnings) is warned
+
+
+@pytest.mark.parametrize(
+    ("tilt", "keys", "warned"),
+    [(1.0, {}, True), (1.0, {"level": "plane"}, False), (1.0, {"periodic": False}, False)]
+    + [(0.1, {}, False)],
+)
+def test_a_tilt_that_a_free_boundary_leaves_in(tilt, keys, warned):
+    heights = 1e-9 * SelfAffine(cutoff=0.1, seed=3).heights(32)
+    heights += 10 * tilt * heights.std() * np.linspace(-1, 1, 32)
+    tables = {
+        "surface": {"length": 1e-6} | keys,
+        "elastomer": {"kind": "half-space", "E_star": 1e9},
+        "grid": {"boundary": "free"},
+        "load": {"pressure": 1e6},
+    }
+    warnings = solve(tables, heights=heights).warnings
+    assert any("a tilt makes up" in warning for warning in warnings) is warned
 
 
 def test_warnings_are_stored_and_shown(tmp_path):

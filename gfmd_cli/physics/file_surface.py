@@ -35,6 +35,7 @@ from gfmd_cli.physics.topography import Region, Topography, read_topography
 STEEP = 3.0  # rms gradient; a choice: surfaces of machined or worn solids have less
 SMOOTH = 1e-6  # rms gradient; a choice: polished mirrors have about that
 CLIFF = 5.0  # ratio of the step across the border to that inside; a choice: 1 if periodic
+TILTED = 0.5  # share of the variance of the heights that is a tilt; a choice
 FEW = 0.01  # share of the heights that can be outliers; a choice
 SIDES = 1e-3  # relative difference of two sides beyond which one is probably wrong; a choice
 FILLED = 0.05  # share of filled heights; a choice, as for the frame of the window
@@ -69,10 +70,11 @@ class FileSurface(RigidSurface):
     equation. "void": likewise for spectrum and mean gap, but these points never touch. "refuse":
     a map with missing heights is an error."""
     periodic: bool | None = None
-    """Whether the map is periodic; by default true for arrays, false for scans."""
+    """Whether the map is periodic; by default true for arrays, unless grid.boundary is "free", and
+    false for scans."""
     level: Levelling | None = None
-    """Trend that is subtracted first: "none", "mean", "plane" or "curvature"; by default "none" for
-    a periodic map, otherwise "plane"."""
+    """Trend that is subtracted first: "none", "mean", "plane" or "curvature"; by default "plane"
+    for scans and with surface.periodic = false, otherwise "none"."""
     edges: Edges | None = None
     """How the map is made periodic: "window" tapers the heights near the border to their mean,
     "mirror" reflects the map to twice its sides, "none" changes nothing. By default "none" for a
@@ -190,20 +192,28 @@ class FileSurface(RigidSurface):
         return self.edges is None and not self._is_periodic()
 
     def within(self, boundary: str) -> Self:
-        """The map with the treatment of its edges that goes with a boundary by default."""
-        if not self.has_borders:
+        """The map with the treatment of its edges that goes with a boundary by default.
+
+        An array ends at a free boundary, like a scan, but nothing is subtracted from it.
+        """
+        if self.has_borders:
+            return self.model_copy(update={"edges": "none" if boundary == "free" else "mirror"})
+        if boundary == "periodic" or self.edges or self._stated_periodic() is not None:
             return self
-        return self.model_copy(update={"edges": "none" if boundary == "free" else "mirror"})
+        array = {"periodic": False, "level": self.levelling(), "edges": "none"}
+        return self.model_copy(update=array)
 
     @property
     def copies(self) -> int:  # type: ignore[override]
         """Copies of the map along each side of its cell: two where it is mirrored."""
         return 2 if self.edges == "mirror" else 1
 
+    def _stated_periodic(self) -> bool | None:
+        """Whether the map is periodic, by the spec or else by the file; None if neither says so."""
+        return self._topography().periodic if self.periodic is None else self.periodic
+
     def _is_periodic(self) -> bool:
-        """Whether the map is periodic, by the spec or else by the file."""
-        stated = self._topography().periodic if self.periodic is None else self.periodic
-        return stated is not False
+        return self._stated_periodic() is not False
 
     def measured_map(self) -> "tuple[np.ma.MaskedArray[Any, Any], tuple[float, ...]]":
         """Levelled heights [m] as measured, masked where missing, and their spacing [m].
@@ -306,6 +316,13 @@ class FileSurface(RigidSurface):
                 f"the height step across the border is {cliff:.3g} times that inside the map: if "
                 "the map is not periodic, set surface.periodic = false"
             )
+        if boundary == "free" and self.levelling() == "none":
+            tilt = 1 - float(np.var(level(heights, "plane"))) / (np.var(heights) or 1.0)
+            if tilt > TILTED:
+                remarks.append(
+                    f"a tilt makes up {tilt:.0%} of the variance of the heights, and nothing is "
+                    'subtracted: contact is at one edge first; surface.level = "plane" subtracts it'
+                )
         return remarks
 
     def preparation(self, boundary: str = "") -> str:
