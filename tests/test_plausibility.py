@@ -148,8 +148,10 @@ def test_a_step_across_the_border_matters_only_where_the_map_is_repeated():
 
 @pytest.mark.parametrize(
     ("tilt", "keys", "warned"),
-    [(1.0, {}, True), (1.0, {"level": "plane"}, False), (1.0, {"periodic": False}, False)]
-    + [(0.1, {}, False)],
+    [
+        *((1.0, {}, True), (1.0, {"level": "plane"}, False), (1.0, {"periodic": False}, False)),
+        (0.1, {}, False),
+    ],
 )
 def test_a_tilt_that_a_free_boundary_leaves_in(tilt, keys, warned):
     heights = 1e-9 * SelfAffine(cutoff=0.1, seed=3).heights(32)

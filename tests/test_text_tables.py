@@ -8,6 +8,7 @@ import pytest
 
 from gfmd_cli.physics import text_tables
 from gfmd_cli.physics.text_tables import table_formats
+from gfmd_cli.physics.topography import read_topography
 
 RNG = np.random.default_rng(0)
 
@@ -76,6 +77,25 @@ OTHERS = {
 def test_other_texts_are_no_tables(monkeypatch, case, window):
     monkeypatch.setattr(text_tables, "WINDOW", window)
     assert table_formats(BytesIO(OTHERS[case])) == set()
+
+
+SEPARATORS = [(",", "."), (", ", "."), (";", "."), ("; ", "."), ("\t", ".")]
+SEPARATORS += [(" ", ","), ("\t", ","), (";", ","), ("; ", ",")]
+
+
+@pytest.mark.parametrize(("separator", "decimal"), SEPARATORS)
+@pytest.mark.parametrize("end", ["", "at each end"])
+@pytest.mark.parametrize("columns", [2, 3, 4, 40])
+def test_separators_and_decimal_commas(tmp_path, separator, decimal, end, columns):
+    """Profiles, points on a grid, and matrices, as spreadsheets and microscopes write them."""
+    header = "# measured on 3,5 samples; twice\n" if columns == 40 else ""
+    table = {2: POINTS[:50, ::2], 3: POINTS, 4: MATRIX[:, :4], 40: MATRIX}[columns]
+    rows = (separator.join(f"{value:.9f}" for value in row).replace(".", decimal) for row in table)
+    last = separator if end and columns > 3 else ""
+    path = tmp_path / "table.csv"
+    path.write_text(header + "".join(f"{row}{last}\n" for row in rows))
+    heights = table[:, -1].reshape(-1, 50).squeeze() if columns < 4 else table
+    assert read_topography(path).heights == pytest.approx(heights, abs=1e-9)
 
 
 LONG = {

@@ -14,7 +14,7 @@ from gfmd_cli.physics.height_map import (
     check_layout,
     first_line,
 )
-from gfmd_cli.physics.text_tables import table_formats
+from gfmd_cli.physics.text_tables import table_formats, with_blanks
 
 TABLES = {"xyz", "asc"}  # formats of SurfaceTopography that are tables of numbers
 SMALL_FILE = 2**14  # bytes, which the readers of tables parse in a second
@@ -37,8 +37,9 @@ def read_microscope_file(path: Path, dataset: str | None, max_bytes: int) -> Hei
                 f"{path}: not .npy or HDF5; other formats need SurfaceTopography: "
                 f"{INSTALL.format('topography')}"
             ) from error
-        with _open_scan(path, file, readers) as reader:
-            return _read_channel(path, reader, dataset, max_bytes)
+        table = with_blanks(file)
+        with _open_scan(path, table, readers) as reader:
+            return _read_channel(path, table, reader, dataset, max_bytes)
 
 
 def _open_scan(path: Path, file: BinaryIO, readers: list[Any]) -> Any:
@@ -76,7 +77,9 @@ def _open_scan(path: Path, file: BinaryIO, readers: list[Any]) -> Any:
     )
 
 
-def _read_channel(path: Path, reader: Any, dataset: str | None, max_bytes: int) -> HeightMap:
+def _read_channel(
+    path: Path, file: BinaryIO, reader: Any, dataset: str | None, max_bytes: int
+) -> HeightMap:
     """Read one height channel of an open microscope file, in metres."""
     if reader.format() == "hgt" and path.suffix.lower() != ".hgt":  # accepts any 2 n^2 bytes
         raise InputError(f"{path}: no known topography format")
@@ -93,7 +96,7 @@ def _read_channel(path: Path, reader: Any, dataset: str | None, max_bytes: int) 
         scan = scan.to_unit("m")
     source = f"{reader.format()}, {channel.channel_id}"
     if reader.format() == "asc" and len(shape) == 2:
-        _check_all_rows_read(path, *shape)
+        _check_all_rows_read(path, file, *shape)
     if scan.is_uniform:
         heights, sides = scan.heights().T, tuple(map(float, scan.physical_sizes))[::-1]
         if len(shape) == 1 and sides[0] < 0:  # recorded backwards
@@ -139,24 +142,23 @@ def _increasing(path: Path, x: Any, heights: Any) -> tuple[Any, Any]:
     return x, heights
 
 
-def _check_all_rows_read(path: Path, rows: int, columns: int) -> None:
+def _check_all_rows_read(path: Path, file: BinaryIO, rows: int, columns: int) -> None:
     """Raise InputError where a table has more rows than were read.
 
     The reader skips lines with words, also in the table, where they would shift all rows below.
     """
-    with path.open("rb") as file:
-        lengths = [len(line.split()) for line in file]
+    file.seek(0)
+    lengths = [len(line.split()) for line in file]
     if lengths.count(columns) <= rows:
         return
-    with path.open("rb") as file:
-        for number, line in enumerate(file, 1):
-            words = [word for word in line.split() if not _is_number(word)]
-            if lengths[number - 1] == columns and 0 < len(words) <= columns / 2:
-                raise InputError(
-                    f"{path}:{number}: {words[0].decode(errors='replace')!r} in a row of the table "
-                    "is no number; write NaN for a missing height, and save text without a byte "
-                    "order mark"
-                )
+    file.seek(0)
+    for number, line in enumerate(file, 1):
+        words = [word for word in line.split() if not _is_number(word)]
+        if lengths[number - 1] == columns and 0 < len(words) <= columns / 2:
+            raise InputError(
+                f"{path}:{number}: {words[0].decode(errors='replace')!r} in a row of the table is "
+                "no number; write NaN for a missing height, and save text without a byte order mark"
+            )
 
 
 def _is_number(word: bytes) -> bool:

@@ -8,6 +8,7 @@ most some seconds.
 import os
 import re
 from collections.abc import Iterator
+from io import BytesIO
 from typing import Any, BinaryIO
 
 import numpy as np
@@ -36,6 +37,24 @@ def table_formats(file: BinaryIO) -> set[str]:
     if columns == 2 or (columns == 3 and _is_grid(file)):
         formats.add("xyz")
     return formats
+
+
+def with_blanks(file: BinaryIO) -> BinaryIO:
+    """A table with commas or semicolons as one between blanks; any other file as it is.
+
+    A comma between two digits is a decimal one where blanks or semicolons separate the numbers.
+    """
+    start = file.read(WINDOW)
+    if b"," in start or b";" in start:
+        between_blanks = _columns(file, b" \t;")
+        if between_blanks > 1 or (between_blanks and _columns(file, b",") >= MATRIX_COLUMNS):
+            is_decimal = between_blanks > 1 and re.search(rb"\d,\d", start[len(start) // 2 :])
+            file.seek(0)
+            return BytesIO(
+                file.read().replace(b";", b" ").replace(b",", b"." if is_decimal else b" ")
+            )
+    file.seek(0)
+    return file
 
 
 def _columns(file: BinaryIO, separators: bytes) -> int:
