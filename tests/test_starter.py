@@ -1,5 +1,6 @@
 import json
 import re
+import shlex
 import tomllib
 
 import h5py
@@ -38,6 +39,18 @@ def test_what_init_writes_runs(gfmd, tmp_path, words):
     short = () if words else ("--set", "load.p_star=0.1", "--set", "grid.points=128")
     assert "converged" in gfmd("run", "first.toml", *short)
     assert all(row["status"] == "converged" for row in read_rows(tmp_path / "first.h5"))
+
+
+@pytest.mark.parametrize(
+    ("stem", "name"),
+    [("probe 3 (größe)", "probe-3-gr-e"), ("(ä)", "study"), (120 * "a", 100 * "a")],
+)
+def test_files_of_any_name_have_a_study_of_a_valid_name(gfmd, tmp_path, stem, name):
+    holed(tmp_path / f"{stem}.npy")
+    result = gfmd("init", f"{stem}.toml", "--from", f"{stem}.npy")
+    _, command = result.split("next: ")
+    gfmd(*shlex.split(command)[1:], "--set", "load.p_star=0.1")
+    assert (tmp_path / f"{name}.h5").exists()
 
 
 def test_an_oblong_scan_with_holes_is_solved_as_it_is(gfmd, tmp_path):

@@ -1,6 +1,7 @@
 """`gfmd init` and `gfmd surface`: from a scan to a spec."""
 
 import json
+import shlex
 from pathlib import Path
 
 import click
@@ -44,7 +45,7 @@ def init(spec: Path, scan: Path | None, overrides: tuple[str, ...]) -> None:
         for remark in surface.remarks():
             tell(f"gfmd: {scan}: {remark}")
     write_whole(spec, text.encode())
-    show(f"{spec}: written\nnext: gfmd run {spec}")
+    show(f"{spec}: written\nnext: {shlex.join(['gfmd', 'run', str(spec)])}")
 
 
 @click.command()

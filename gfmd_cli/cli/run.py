@@ -1,5 +1,6 @@
 """`gfmd run`."""
 
+import shlex
 import sys
 from pathlib import Path
 from typing import Any
@@ -151,7 +152,8 @@ def _print_results(
         show(f"  {line}")
     for line in other_tasks([row for row in stored if row["task_id"] not in indices]):
         show(f"  {line}")
-    show(f"next: gfmd analyze {path}\n      gfmd report {path}")
+    quoted = shlex.quote(str(path))
+    show(f"next: gfmd analyze {quoted}\n      gfmd report {quoted}")
 
 
 def _print_tasks(spec: Any, path: Path, how: dict[str, Any]) -> None:

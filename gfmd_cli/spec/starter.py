@@ -2,6 +2,7 @@
 
 import json
 import re
+import shlex
 import tomllib
 from math import log10
 from os.path import relpath
@@ -80,7 +81,10 @@ def _render(template: str, file: str, **values: Any) -> str:
         keep_trailing_newline=True,
     )
     environment.globals["key"] = lambda name, value, comment: _line(name, _json(value), comment)
-    return environment.get_template(template).render(file=file, name=Path(file).stem, **values)
+    name = re.sub(r"[^a-zA-Z0-9._-]+", "-", Path(file).stem).strip("-._")[:100]
+    return environment.get_template(template).render(
+        file=shlex.quote(file), name=name or "study", **values
+    )
 
 
 def _line(key: str, value: str, comment: str) -> str:
