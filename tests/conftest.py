@@ -51,6 +51,18 @@ settings.load_profile("same")
 SPRINGS = power_spec(n=0, points=32, p_star=[0.1, 0.3])
 
 
+@pytest.fixture(scope="session", autouse=True)
+def plans_of_the_tests(tmp_path_factory):
+    """A folder for the plans of all processes of the tests.
+
+    Studies are compared to the last bit. Without plans in common they would differ there: where the
+    user's cache cannot be written, or other processes write it at the same time.
+    """
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
+        yield
+
+
 @pytest.fixture
 def springs(tmp_path):
     """spec.toml in tmp_path, of two contacts that take no time to solve."""

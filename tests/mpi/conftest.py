@@ -12,12 +12,8 @@ PROGRAMS = Path(__file__).parent / "programs"
 
 
 @pytest.fixture(scope="session")
-def mpiexec(tmp_path_factory):
-    """Runs a program of this folder, or `gfmd`, on so many processes.
-
-    All of them keep their plans in a cache of their own: two studies are compared to the last bit,
-    which no user's cache may decide.
-    """
+def mpiexec():
+    """Runs a program of this folder, or `gfmd`, on so many processes, with `more` variables."""
     pytest.importorskip("mpi4py", reason='needs pip install ".[mpi]"')
     beside = Path(sys.executable).with_name("mpiexec")
     launcher = str(beside) if beside.exists() else shutil.which("mpiexec")
@@ -25,15 +21,14 @@ def mpiexec(tmp_path_factory):
         pytest.skip("no mpiexec")
     once = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS")
     environment = os.environ | dict.fromkeys(once, "1") | {"UCX_LOG_LEVEL": "error"}
-    environment["XDG_CACHE_HOME"] = str(tmp_path_factory.mktemp("cache"))
 
-    def run(count, program, *arguments, cwd=None, status=0):
+    def run(count, program, *arguments, cwd=None, status=0, **more):
         script = [str(PROGRAMS / program)] if program.endswith(".py") else ["-P", "-m", program]
         command = [launcher, "-n", str(count), sys.executable, "-W", "error", *script]
         done = subprocess.run(
             [*command, *map(str, arguments)],
             cwd=cwd,
-            env=environment,
+            env=environment | more,
             capture_output=True,
             text=True,
             timeout=300,

@@ -152,17 +152,17 @@ def test_a_stopped_run_goes_on(mpiexec, tmp_path, before, after, boundary):
     n, boundary = (1.5, boundary) if boundary else (1, "periodic")
     path, cut, whole = spec(tmp_path, [n], 128), tmp_path / "cut.h5", tmp_path / "whole.h5"
     run = ("run", path, "-q", "--set", "load.p_star=0.3", "--set", f"grid.boundary={boundary}")
-    run = (*run, "-o")
-    mpiexec(before, "gfmd_cli", *run, whole)
+    run, plans = (*run, "-o"), {"GFMD_PLANS": "estimated"}  # the same in both studies
+    mpiexec(before, "gfmd_cli", *run, whole, **plans)
     steps = contents(whole)[0]["steps"][0]
-    mpiexec(before, "interrupted.py", steps // 2 + 3, before - 1, *run, cut, status=75)
+    mpiexec(before, "interrupted.py", steps // 2 + 3, before - 1, *run, cut, status=75, **plans)
     (pointer,) = (tmp_path / "cut.parts").glob("*/pointer")
     saved = read_pointer(pointer)[0]
     assert [part.rows for part in saved.parts] == [128 // before] * before
     assert saved.shape == (128, 128)
     few = steps - saved.state.step + 5  # looks that are enough to go on, but not to begin anew
     assert saved.state.step > 5
-    mpiexec(after, "interrupted.py", few, 0, *run, cut)
+    mpiexec(after, "interrupted.py", few, 0, *run, cut, **plans)
     assert_same(whole, cut, exact=before == after)
 
 
