@@ -98,6 +98,7 @@ def test_a_bad_shard_is_refused(gfmd, shard):
         ("run", "spec.toml", "--jobs", "0"),
         ("run", "spec.toml", "-o", "."),
         ("run", "spec.toml", "-o", ""),
+        ("run", "spec.toml", "-o", "small.csv"),
         ("run", "spec.toml", "--dry-run", "-o", "/"),
         ("status", "spec.toml", "-o", "."),
         ("run", "spec.toml", "--max-hours", "nan"),

@@ -6,6 +6,10 @@ from typing import Any
 
 import click
 
+from gfmd_cli.errors import InputError
+
+OF_OTHERS = {".csv", ".nc", ".vti", ".html", ".json", ".toml"}
+"""Suffixes of files that other commands write or read."""
 FILE = click.Path(path_type=Path)
 overrides_option = click.option(
     "--set",
@@ -21,7 +25,12 @@ output_option = click.option(
 
 
 def study_path(spec: Any, output: Path | None) -> Path:
-    """The study file of a spec."""
+    """The study file of a spec. Raises InputError for the suffix of a file of another kind."""
+    if output is not None and output.suffix.lower() in OF_OTHERS:
+        raise InputError(
+            f"-o {output}: a study is an HDF5 file, such as {output.stem}.h5; gfmd export writes "
+            "CSV, netCDF and VTK, gfmd report HTML"
+        )
     return output or Path(f"{spec.study.name}.h5")
 
 

@@ -152,8 +152,9 @@ def _print_results(
         show(f"  {line}")
     for line in other_tasks([row for row in stored if row["task_id"] not in indices]):
         show(f"  {line}")
-    quoted = shlex.quote(str(path))
-    show(f"next: gfmd analyze {quoted}\n      gfmd report {quoted}")
+    if stored:
+        quoted = shlex.quote(str(path))
+        show(f"next: gfmd analyze {quoted}\n      gfmd report {quoted}")
 
 
 def _print_tasks(spec: Any, path: Path, how: dict[str, Any]) -> None:
