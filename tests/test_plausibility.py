@@ -46,6 +46,14 @@ def test_a_table_of_stiffness_that_does_not_reach_the_surface(tmp_path):
     assert "100% of the squared stress" in only_warning(tables(elastomer=elastomer))
 
 
+@pytest.mark.parametrize(("thickness", "warned"), [(1e-7, False), (1e-6, True)])
+def test_waves_that_are_short_for_a_plate(thickness, warned):
+    """The shortest wavelength is 1.25 um, 2 pi t is 0.6 and 6 um."""
+    plate = {"kind": "plate", "E_star": 1e9, "thickness": thickness}
+    warnings = solve(tables(elastomer=plate, pressure=1e3)).warnings
+    assert any("a thin plate is too stiff" in warning for warning in warnings) is warned
+
+
 def test_a_layer_thinner_than_the_roughness():
     layer = {"kind": "layer", "base": "sliding", "E_star": 1e6, "thickness": 1e-9}
     assert "is less than the rms height" in only_warning(tables(elastomer=layer))

@@ -26,6 +26,7 @@ from gfmd_cli.physics.persson import gamma_n, gamma_slab
 LONG_WAVE = 1e-6  # q t up to which k of a layer is constant: (q t)^2 is below rounding
 DECAYED = 25.0  # thicknesses from which the displacement of a layer is below rounding
 MAX_SPACING = 16.0  # of a grid, in thicknesses of a layer with a free boundary
+SHORT = 0.1  # share of the squared stress at waves that are short for a thin plate; a choice
 EXTRAPOLATED = 0.1  # share of the squared stress beyond a table of k(q); a choice
 MAX_TABLE = 2**20  # bytes of a tabulated stiffness; a choice, some 40000 rows
 STEP = 1e-3  # of ln q: the truncation error is of order 1e-7, the rounding error 1e-13
@@ -208,6 +209,18 @@ class Plate(LinearElastomer):
     def stiffness(self, q: Field, length: float = 1.0) -> Field:
         """k(q) [Pa/m]."""
         return self.E_star / 12 * (self.thickness * q) ** 3 * q
+
+    def remarks(self, h_std: float, q: Field, variance: Field) -> list[str]:
+        """See `LinearElastomer.remarks`. At q t = 1 a slab has 0.81 of the stiffness of a plate."""
+        is_short = q * self.thickness > 1
+        share = float(variance[is_short].sum() / variance.sum()) if q.size else 0.0
+        if share <= SHORT:
+            return []
+        return [
+            f"elastomer.thickness = {self.thickness:g} m: {share:.0%} of the squared stress in "
+            f"full contact is at wavelengths below {2 * np.pi * self.thickness:.3g} m, for which "
+            'a thin plate is too stiff; kind = "slab" has the stiffness of an elastic layer'
+        ]
 
 
 class Slab(LinearElastomer):
