@@ -6,6 +6,7 @@ from io import BytesIO
 import numpy as np
 import pytest
 
+from gfmd_cli.errors import InputError
 from gfmd_cli.physics import text_tables
 from gfmd_cli.physics.text_tables import table_formats
 from gfmd_cli.physics.topography import read_topography
@@ -96,6 +97,12 @@ def test_separators_and_decimal_commas(tmp_path, separator, decimal, end, column
     path.write_text(header + "".join(f"{row}{last}\n" for row in rows))
     heights = table[:, -1].reshape(-1, 50).squeeze() if columns < 4 else table
     assert read_topography(path).heights == pytest.approx(heights, abs=1e-9)
+
+
+def test_points_on_a_grid_with_gaps_are_refused_with_the_reason(tmp_path):
+    (tmp_path / "points.txt").write_bytes(text(np.delete(POINTS, [7, 900], axis=0)))
+    with pytest.raises(InputError, match="does not contain a regular grid"):
+        read_topography(tmp_path / "points.txt")
 
 
 LONG = {

@@ -64,7 +64,8 @@ def _open_scan(path: Path, file: BinaryIO, readers: list[Any]) -> Any:
         except Exception as error:  # a reader can raise any exception at other formats
             if is_guess:
                 continue
-            if answer == "YES" or path.suffix[1:].lower() in reader.file_extensions():
+            is_likely = answer == "YES" or reader.format() in tables
+            if is_likely or path.suffix[1:].lower() in reader.file_extensions():
                 reasons.append(f"{reader.format()}: {first_line(error)}")
     if reasons:
         raise InputError(
