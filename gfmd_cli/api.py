@@ -95,8 +95,7 @@ class Result:
     @property
     def contact(self) -> Mask:
         """Points in contact: no gap and positive stress. Their share is a_r."""
-        mask: Mask = self.pressure > 0
-        return mask
+        return self.pressure > 0
 
     @property
     def gap(self) -> Field:

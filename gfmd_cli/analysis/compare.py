@@ -140,8 +140,7 @@ class Curve:
         if not self.has_theory:
             return np.full(np.shape(u_g), np.nan)
         unit, height = self.rows[0]["delta_sigma"], self.rows[0]["h_std"]
-        pressure: Field = self.persson.pressure_at_gap(np.asarray(u_g) * height) / unit
-        return pressure
+        return self.persson.pressure_at_gap(np.asarray(u_g) * height) / unit
 
     @cached_property
     def records(self) -> list[Row]:

@@ -33,8 +33,7 @@ MIN_DEPTH = 0.75  # distance from the edge, in spacings, below which a bin is no
 def bin_counts(row: Row, name: str = PR_LOGARITHMIC) -> Field:
     """Grid points in each bin of Pr(sigma): density times width times the points of the cell."""
     widths = np.diff(BINS[name].edges())
-    counts: Field = np.nan_to_num(row[name]) * widths * row["points"] * row["points_y"]
-    return counts
+    return np.nan_to_num(row[name]) * widths * row["points"] * row["points_y"]
 
 
 @dataclass(frozen=True)
@@ -142,8 +141,7 @@ class StressDistribution:
     def grids(self) -> Field:
         """Density on each grid, mean over the seeds, shape (grids, bins)."""
         widths = np.diff(logarithmic_edges())
-        density: Field = self.counts.sum(axis=0) / (np.array(self.cells)[:, None] * widths)
-        return density
+        return self.counts.sum(axis=0) / (np.array(self.cells)[:, None] * widths)
 
     @cached_property
     def extrapolated(self) -> Extrapolated:

@@ -91,8 +91,7 @@ class PlotLayer:
 
 def styled() -> AbstractContextManager[None]:
     """A context in which all figures are drawn in the same style."""
-    style: AbstractContextManager[None] = rc_context(STYLE)
-    return style
+    return rc_context(STYLE)
 
 
 class LegendFigure:

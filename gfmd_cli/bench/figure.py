@@ -78,8 +78,7 @@ def _draw(scenes: list[list[tuple[Trace, CurveStyle]]]) -> LegendFigure:
 def _errors(trace: Trace) -> Field:
     """What lasts of the error of the mean gap, no less than the reference can tell."""
     floor = max(trace.row["reference_residual"], REFERENCE.tolerance)
-    errors: Field = np.maximum(trace.lasting_error("u_g"), floor)
-    return errors
+    return np.maximum(trace.lasting_error("u_g"), floor)
 
 
 def _curve(

@@ -61,8 +61,7 @@ class Trace:
         The error itself passes zero wherever its sign changes. Infinite on the coarser grids.
         """
         error = np.nan_to_num(self.samples[f"{name}_error"], nan=np.inf)
-        lasting: Field = np.maximum.accumulate(error[::-1])[::-1]
-        return lasting
+        return np.maximum.accumulate(error[::-1])[::-1]
 
     def reached(self, name: str, error: float) -> tuple[float, float] | None:
         """Transforms and seconds after which the error stays below `error`, None if never."""

@@ -189,8 +189,7 @@ class PaddedTransform:
 
     def _empty(self, shape: tuple[int, ...]) -> Modes:
         kind = np.result_type(self.real, np.complex64)
-        array: Modes = pyfftw.empty_aligned(shape, dtype=kind)
-        return array
+        return pyfftw.empty_aligned(shape, dtype=kind)
 
 
 def _planned(make: Callable[[Plan], Pairs]) -> Pairs:

@@ -179,8 +179,7 @@ class DistributedGrid(Grid):
     def _lines(self) -> Modes:
         """Memory of coefficients as rows, transformed along x."""
         rows, columns = self.rows.count, self.points // 2 + 1
-        lines: Modes = self._memory[0][: rows * columns].reshape(rows, columns)
-        return lines
+        return self._memory[0][: rows * columns].reshape(rows, columns)
 
     @cached_property
     def _transposition(self) -> Transposition:
@@ -206,8 +205,7 @@ class DistributedGrid(Grid):
         """The values of a symbol at the wavenumbers of a coarser grid."""
         half = target.points_y // 2
         rows = np.concatenate([symbol[: target.points_y - half], symbol[-half:]])
-        moved: Field = self._redistributed(rows, self, target, target.points // 2 + 1)
-        return moved
+        return self._redistributed(rows, self, target, target.points // 2 + 1)
 
     def resample(self, field: Field, target: Grid) -> Field:
         """The same trigonometric polynomial on another grid; see `Grid.resample`."""

@@ -133,13 +133,11 @@ class Grid:
 
     def empty(self) -> Field:
         """A real field, aligned for the transforms, values undefined."""
-        array: Field = pyfftw.empty_aligned(self.shape, dtype=self.real)
-        return array
+        return pyfftw.empty_aligned(self.shape, dtype=self.real)
 
     def empty_modes(self) -> Modes:
         """Fourier coefficients, aligned for the transforms, values undefined."""
-        array: Modes = pyfftw.empty_aligned(self.spectral_shape, dtype=self._complex)
-        return array
+        return pyfftw.empty_aligned(self.spectral_shape, dtype=self._complex)
 
     def mode_number(self, rows: slice = ALL) -> Field:
         """|q| L / 2 pi of every coefficient, shape `spectral_shape` (or of some of its rows).
@@ -162,13 +160,11 @@ class Grid:
 
     def line(self, symbol: Field) -> Field:
         """The values of a symbol along x, from q = 0 to the highest wavenumber."""
-        line: Field = symbol.reshape(-1, symbol.shape[-1])[0]
-        return line
+        return symbol.reshape(-1, symbol.shape[-1])[0]
 
     def column(self, symbol: Field) -> Field:
         """The values of a symbol along y, from q = 0 to the highest wavenumber."""
-        column: Field = symbol[: self.points_y // 2 + 1, 0]
-        return column
+        return symbol[: self.points_y // 2 + 1, 0]
 
     def multiplicity(self) -> Field:
         """How often a coefficient counts in a sum over all q, a row of them."""

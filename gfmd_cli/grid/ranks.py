@@ -66,8 +66,7 @@ class Ranks:
 
     def agree(self, value: T) -> T:
         """The value of the first rank, on every rank."""
-        first: T = self.comm.bcast(value)
-        return first
+        return self.comm.bcast(value)
 
     def settle(self, error: BaseException | None) -> None:
         """Raise, on all ranks, the error of the first that has one.

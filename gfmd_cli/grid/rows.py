@@ -48,8 +48,7 @@ class LocalRows:
         """Run a kernel whose last array receives `count` sums for each row; return the totals."""
         row_sums = np.zeros((self.count, count))
         self.run(kernel, *arguments, row_sums)
-        totals: Field = row_sums.sum(axis=0)
-        return totals
+        return row_sums.sum(axis=0)
 
     def empty_with_halo(self, *shape: int, dtype: Any) -> Any:
         """An array with a halo; `shape` is the shape of one row."""

@@ -179,8 +179,7 @@ class Contact:
         """Points of a coarser grid with a known height on a part of their pixel."""
         if self.may_touch is None:
             return None
-        shared: Mask = self.grid.average(self.may_touch.astype(np.float64), grid) > 0
-        return shared
+        return self.grid.average(self.may_touch.astype(np.float64), grid) > 0
 
 
 @kernel

@@ -43,14 +43,12 @@ def non_contact_height(p_star: Field | float) -> Field:
 
 def contact_area(z: Field | float) -> Field:
     """Relative contact area a_r = [1 + erf(z / sqrt 2)] / 2. Paper Eq. (36a)."""
-    area: Field = ndtr(np.asarray(z))
-    return area
+    return ndtr(np.asarray(z))
 
 
 def pressure(z: Field | float) -> Field:
     """Pressure p / (k_0 h_std) = <u> / h_std. Paper Eqs. (36b) and (38), corrected: p = k_0 <u>."""
-    displacement: Field = ierfc(-np.asarray(z) / np.sqrt(2)) / np.sqrt(2)
-    return displacement
+    return ierfc(-np.asarray(z) / np.sqrt(2)) / np.sqrt(2)
 
 
 def mean_gap(z: Field | float) -> Field:
@@ -60,8 +58,7 @@ def mean_gap(z: Field | float) -> Field:
 
 def stress_deviation(z: Field | float) -> Field:
     """Standard deviation of the stress sigma_p / (k_0 h_std) = sqrt(<u^2> - <u>^2) / h_std."""
-    deviation: Field = np.sqrt(2 * elastic_energy(z))
-    return deviation
+    return np.sqrt(2 * elastic_energy(z))
 
 
 def elastic_energy(z: Field | float) -> Field:
@@ -76,8 +73,7 @@ def elastic_energy(z: Field | float) -> Field:
     pressed = a + above * phi * (rest - a) + above**2 * a * rest - phi**2
     below = np.minimum(z, 0.0)
     light = 2 * elastic_energy_with_mean(below) - pressure(below) ** 2
-    energy: Field = 0.5 * np.where(z > 0, pressed, light)
-    return energy
+    return 0.5 * np.where(z > 0, pressed, light)
 
 
 def elastic_energy_with_mean(z: Field | float) -> Field:
@@ -89,8 +85,7 @@ def elastic_energy_with_mean(z: Field | float) -> Field:
     near, far = np.minimum(x, _FAR), np.clip(x, _FAR, _UNDERFLOW)
     bounded = np.maximum(near, -_UNDERFLOW)
     closed = (0.5 + near**2) * erfc(near) - bounded * np.exp(-(bounded**2)) / np.sqrt(np.pi)
-    energy: Field = 0.5 * np.where(x > _FAR, 2 * _i2erfc(far), closed)
-    return energy
+    return 0.5 * np.where(x > _FAR, 2 * _i2erfc(far), closed)
 
 
 def _i2erfc(x: Field) -> Field:
@@ -103,5 +98,4 @@ def _i2erfc(x: Field) -> Field:
     for level in range(_LEVELS, 1, -1):
         ratio = 1 / (2 * x + 2 * (level + 1) * ratio)
     first = 1 / (2 * x + 4 * ratio)
-    value: Field = ratio * first * erfcx(x) * np.exp(-x * x)
-    return value
+    return ratio * first * erfcx(x) * np.exp(-x * x)

@@ -80,8 +80,7 @@ def at_centres(heights: Field, shape: tuple[int, ...]) -> Field:
         q = 2 * np.pi * (np.fft.rfftfreq(old) if last else np.fft.fftfreq(old))
         phase = np.exp(1j * q * positions(old, new, centred=True)[0])
         modes *= phase.reshape([-1 if i == axis else 1 for i in range(heights.ndim)])
-    moved: Field = np.fft.irfftn(modes, heights.shape, axes=tuple(range(heights.ndim)))
-    return moved
+    return np.fft.irfftn(modes, heights.shape, axes=tuple(range(heights.ndim)))
 
 
 def monotone(
@@ -110,8 +109,7 @@ def monotone(
     y, x = places
     x_first = _along_axis(_along_axis(heights, x, 1), y[rows], 0)
     y_first = _along_axis(_along_axis(heights, y[rows], 0), x, 1)
-    mean: Field = 0.5 * (x_first + y_first)
-    return mean
+    return 0.5 * (x_first + y_first)
 
 
 def nearest(mask: Mask, shape: tuple[int, ...], *, centred: bool = False) -> Mask:
@@ -139,5 +137,4 @@ def monotone_cubic(x: Field, y: Field, axis: int = 0) -> Callable[[Field], Field
     """Monotone cubic (PCHIP) through points of rising x, along an axis of y."""
     from scipy.interpolate import PchipInterpolator  # half a second that most processes save
 
-    curve: Callable[[Field], Field] = PchipInterpolator(x, y, axis=axis)
-    return curve
+    return PchipInterpolator(x, y, axis=axis)

@@ -56,8 +56,7 @@ def gamma_slab(qt: Field) -> Field:
     Paper Eq. (42): gamma_4 for q t -> 0 (thin sheet), gamma_1 for q t -> infinity (half-space); the
     paper's conclusions name the two limits the wrong way round.
     """
-    value: Field = _GAMMA[4.0] + (_GAMMA[1.0] - _GAMMA[4.0]) * np.tanh(np.asarray(qt) / 6)
-    return value
+    return _GAMMA[4.0] + (_GAMMA[1.0] - _GAMMA[4.0]) * np.tanh(np.asarray(qt) / 6)
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,13 +159,11 @@ class Persson:
 
     def contact_area(self, p: Field | float) -> Field:
         """Relative contact area a_r = erf(p / sqrt(2) Delta_sigma). Paper Eq. (25)."""
-        area: Field = erf(self._reduced(p))
-        return area
+        return erf(self._reduced(p))
 
     def non_contact_weight(self, p: Field | float) -> Field:
         """Weight 1 - a_r of the delta function at sigma = 0 in Pr(sigma). Paper Eq. (24)."""
-        weight: Field = erfc(self._reduced(p))
-        return weight
+        return erfc(self._reduced(p))
 
     def stress_density(self, sigma: Field | float, p: Field | float) -> Field:
         """Continuous part of the stress distribution Pr(sigma); zero for sigma <= 0.
@@ -193,8 +190,7 @@ class Persson:
         p = np.asarray(p, dtype=np.float64)
         if not self.shells.variance.size:
             return np.zeros_like(p)
-        deviation: Field = np.sqrt(_resolved_variance(p, self.delta_sigma**2))
-        return deviation
+        return np.sqrt(_resolved_variance(p, self.delta_sigma**2))
 
     def weight(self, a: Field, s: Field) -> tuple[Field, Field, Field]:
         """Weight W = gamma a + (1 - gamma) a^3 of the elastic energy, dW/da and dW/ds.
@@ -311,8 +307,7 @@ def _bin_area(p: Field, variance: Field) -> tuple[Field, Field]:
 def _resolved_variance(p: Field, s: Field | float) -> Field:
     """int_0^s ds' erf(p/sqrt(2s')) = F(s) - F(0) in Eq. (32), as a sum of positive terms."""
     x = p / np.sqrt(2 * s)
-    value: Field = s * erf(x) + p * np.sqrt(2 * s) * ierfc(x)
-    return value
+    return s * erf(x) + p * np.sqrt(2 * s) * ierfc(x)
 
 
 def _panel_edges(p: Field, delta_sigma: float) -> Field:

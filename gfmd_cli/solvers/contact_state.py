@@ -33,5 +33,4 @@ def refined(touching: Mask, contact: Contact) -> Mask:
     near = left.take(before[0], axis=0) & right.take(after[0], axis=0)
     near |= right.take(before[0], axis=0) & left.take(after[0], axis=0)
     near[np.ix_(*nearest)] |= touching
-    candidates: Mask = contact.clear_untouchable(near)
-    return candidates
+    return contact.clear_untouchable(near)

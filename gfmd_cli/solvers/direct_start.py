@@ -156,8 +156,7 @@ class _DirectSolve:
         sides = np.stack([self.obstacle[points], np.ones(rows.size)], axis=1)
         by_height, by_level = cho_solve(factor, sides, check_finite=False).T
         remaining_load = self.contact.pressure * self.grid.size - by_height.sum()
-        stress: Field = by_height + by_level * (remaining_load / by_level.sum())
-        return stress
+        return by_height + by_level * (remaining_load / by_level.sum())
 
     def displacement(self) -> Field:
         """The displacement, laid on the indenter in contact."""

@@ -75,8 +75,7 @@ class Multilevel:
 
     def coarse(self, level: int) -> Field:
         """The field of a level, aligned with the next finer level."""
-        aligned: Field = self.coarse_rows[level].aligned_with_finer(self.fields[level])
-        return aligned
+        return self.coarse_rows[level].aligned_with_finer(self.fields[level])
 
 
 def hat_energies(contact: Contact) -> list[float]:

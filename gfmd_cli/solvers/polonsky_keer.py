@@ -131,5 +131,4 @@ def _mean(grid: Grid, field: Field, where: Mask | None = None) -> float:
 def compliance(contact: Contact) -> Field:
     """1 / k(q), zero at q = 0."""
     k = contact.stiffness
-    out: Field = np.divide(1.0, k, out=np.zeros_like(k), where=k > 0)
-    return out
+    return np.divide(1.0, k, out=np.zeros_like(k), where=k > 0)

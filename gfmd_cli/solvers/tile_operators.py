@@ -111,8 +111,7 @@ def _weights() -> Field:
     """Values of the splines of the coarse grid at the points of a tile, shape (64, 25)."""
     distances = np.abs(np.arange(SIDE)[:, None] / COARSENING - _nodes_of_tile())
     line = (np.maximum(2 - distances, 0) ** 3 - 4 * np.maximum(1 - distances, 0) ** 3) / 6
-    weights: Field = np.einsum("ia,jb->ijab", line, line).reshape(SIDE * SIDE, -1)
-    return weights
+    return np.einsum("ia,jb->ijab", line, line).reshape(SIDE * SIDE, -1)
 
 
 def _spline_spectrum(grid: Grid) -> Field:
@@ -137,5 +136,4 @@ def _stiffness_of_small_cell(contact: Contact) -> tuple[Field, Field]:
 def _near_values(symbol: Field) -> Field:
     """The kernel of a symbol at distances from -8 to 8 points along both axes."""
     kernel = np.fft.irfft2(symbol)
-    near: Field = np.roll(kernel, (SIDE, SIDE), axis=(0, 1))[: 2 * SIDE + 1, : 2 * SIDE + 1]
-    return near
+    return np.roll(kernel, (SIDE, SIDE), axis=(0, 1))[: 2 * SIDE + 1, : 2 * SIDE + 1]

@@ -32,8 +32,7 @@ class Tiles:
 
     def take(self, field: Field) -> Field:
         """The values of a field of the grid on the tiles."""
-        values: Field = _blocks(field)[self.used].reshape(self.count, SIDE * SIDE)
-        return values
+        return _blocks(field)[self.used].reshape(self.count, SIDE * SIDE)
 
     def put(self, values: Field, field: Field) -> None:
         """Overwrite a field of the grid by values on the tiles, and by zero elsewhere."""

@@ -43,8 +43,7 @@ class SolvedContact:
         """Areas of the contact patches / L^2; of a line contact, lengths / L."""
         grid = self.contact.grid
         point = grid.area / grid.size / grid.length**grid.dimension
-        areas: Field = contact_patches(self.touching, periodic=self.is_periodic).sizes * point
-        return areas
+        return contact_patches(self.touching, periodic=self.is_periodic).sizes * point
 
     @cached_property
     def mirrored(self) -> Contact:
@@ -60,8 +59,7 @@ class SolvedContact:
     @cached_property
     def percolates(self) -> list[bool]:
         """Whether the gap percolates along x and, if there is a second axis, along y."""
-        along: list[bool] = open_gap(self.touching, periodic=self.is_periodic).winds.tolist()[::-1]
-        return along
+        return open_gap(self.touching, periodic=self.is_periodic).winds.tolist()[::-1]
 
 
 class ReducedUnit(NamedTuple):
