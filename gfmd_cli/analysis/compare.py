@@ -133,7 +133,7 @@ class Curve:
         if not self.has_theory:
             return np.full(np.shape(sigma), np.nan)
         unit = self.rows[0]["delta_sigma"]
-        return np.asarray(unit * self.persson.stress_density(sigma * unit, p_star * unit))
+        return unit * self.persson.stress_density(sigma * unit, p_star * unit)
 
     def pressure_at_gap(self, u_g: Field) -> Field:
         """Reduced pressure at which Persson theory has this mean gap; NaN for no gap."""

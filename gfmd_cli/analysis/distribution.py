@@ -182,11 +182,11 @@ class StressDistribution:
         contacts = sum(_contacts(rows[-1]) for rows in self.seeds)
         expected = 1 / np.maximum(np.minimum(contacts, fine.sum(axis=0)), 1.0)
         if count == 1:
-            return np.asarray(np.sqrt(expected))
+            return np.sqrt(expected)
         with np.errstate(divide="ignore", invalid="ignore"):
             variance = np.var(fine, axis=0, ddof=1) / np.mean(fine, axis=0) ** 2 / count
         weighed = (count - 1) * variance + PRIOR_SEEDS * expected
-        return np.asarray(np.sqrt(weighed / (count - 1 + PRIOR_SEEDS)))
+        return np.sqrt(weighed / (count - 1 + PRIOR_SEEDS))
 
     @property
     def density(self) -> Field:

@@ -64,7 +64,7 @@ def _fits(values: Any, label: Any, method: Literal["nearest"] | None) -> Mask:
     """Which values are those of a label."""
     if isinstance(label, slice):
         low, high = (-np.inf if label.start is None else label.start), label.stop
-        return np.asarray((values >= low) & (values <= (np.inf if high is None else high)))
+        return (values >= low) & (values <= (np.inf if high is None else high))
     labels = np.atleast_1d(np.asarray(label))
     if values.dtype.kind not in "if":
         return np.isin(values, labels)
@@ -72,4 +72,4 @@ def _fits(values: Any, label: Any, method: Literal["nearest"] | None) -> Mask:
         distance = np.abs(values - labels[:, np.newaxis])
         labels = values[np.nanargmin(distance, axis=1)]
     close = np.isclose(values, labels[:, np.newaxis], rtol=ROUNDING, atol=0.0)
-    return np.asarray(close.any(axis=0))
+    return close.any(axis=0)

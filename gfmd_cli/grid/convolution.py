@@ -82,7 +82,7 @@ class PaddedTransform:
         sides = self.padded_rows * spacings[0], self.padded_columns * spacings[-1]
         numbers = np.arange(self.symbol_shape[0]), np.arange(*self.span)
         y, x = (m * (2 * np.pi / side) for m, side in zip(numbers, sides, strict=True))
-        return np.asarray(np.hypot(y[:, None], x))
+        return np.hypot(y[:, None], x)
 
     def symbol_of(self, kernel: Field) -> Field:
         """The symbol of a convolution with a kernel G(|y|, |x|), given at the points of a field.

@@ -152,7 +152,7 @@ class Grid:
     def mode_number_y(self, rows: slice = ALL) -> Field:
         """q_y L / 2 pi of the rows of coefficients, where L is the side along x."""
         across = np.fft.fftfreq(self.points_y, 1 / self.points_y)[rows]
-        return np.asarray(across * (self.length / self.length_y))
+        return across * (self.length / self.length_y)
 
     def wavenumber(self, rows: slice = ALL) -> Field:
         """|q| of every coefficient [1/m], shape `spectral_shape` (or of some of its rows)."""

@@ -53,7 +53,7 @@ class DistributedRows(LocalRows):
 
     def sums(self, count: int, kernel: Kernel, *arguments: Any) -> Field:
         """Totals over all processes; see `LocalRows.sums`."""
-        return np.asarray(self.ranks.total(super().sums(count, kernel, *arguments)))
+        return self.ranks.total(super().sums(count, kernel, *arguments))
 
     def empty_with_halo(self, *shape: int, dtype: Any) -> Any:
         """An array with a halo that is not filled yet."""
@@ -94,7 +94,7 @@ class DistributedRows(LocalRows):
         """Run a kernel over arrays with halos; return its totals over all processes."""
         row_sums = self.empty_with_halo(count, dtype=np.float64)
         self.run_with_halo(kernel, *arguments, row_sums)
-        return np.asarray(self.ranks.total(self.interior(row_sums).sum(axis=0)))
+        return self.ranks.total(self.interior(row_sums).sum(axis=0))
 
     def coarser(self) -> LocalRows:
         """The rows of the next coarser level, distributed if the level is large enough."""
@@ -151,4 +151,4 @@ class DistributedColumns(LocalRows):
 
     def sums(self, count: int, kernel: Kernel, *arguments: Any) -> Field:
         """Totals over all processes; see `LocalRows.sums`."""
-        return np.asarray(self.ranks.total(super().sums(count, kernel, *arguments)))
+        return self.ranks.total(super().sums(count, kernel, *arguments))

@@ -44,4 +44,4 @@ def estimated_pressures(scene: Scene, elastomer: LinearElastomer, displacements:
     )
     gap = Persson(scene.shells).mean_gap(pressure)
     depth = scene.highest * scene.h_std - gap + pressure / uniform
-    return np.asarray(np.exp(np.interp(displacements, depth, np.log(pressure))))
+    return np.exp(np.interp(displacements, depth, np.log(pressure)))

@@ -96,7 +96,7 @@ class Compliance:
     def _line(self, points: int, spacing: float) -> Field:
         edges = (np.arange(points + 1) - 0.5) * spacing
         integral = self.spline("line", 0.5 * spacing, edges[-1])
-        return np.asarray(np.diff(np.sign(edges) * integral(np.abs(edges))))
+        return np.diff(np.sign(edges) * integral(np.abs(edges)))
 
     def spline(self, wave: str, low: float, high: float) -> Callable[[Field], Field]:
         """A transform as a function of the distance, from `low` to `high` [m]."""
@@ -135,7 +135,7 @@ def separated(knots: Field) -> Field:
     """
     chosen = np.ones(knots.size, dtype=bool)
     chosen[1:-1] = knots[1:-1] > CLOSEST * knots[:-2]
-    return np.asarray(knots[chosen])
+    return knots[chosen]
 
 
 def _intervals(low: float, high: float) -> Field:
@@ -159,4 +159,4 @@ def _corner(disc: Callable[[Field], Field], y: Field, x: Field) -> Field:
         for node, weight in zip(nodes, weights, strict=True):
             stretch = np.cosh(half * (1 + node))
             total += weight * half * disc(across * stretch) / stretch
-    return np.asarray(np.sign(y) * np.sign(x) * total)
+    return np.sign(y) * np.sign(x) * total

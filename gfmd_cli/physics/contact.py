@@ -363,4 +363,4 @@ def _opposite_rows_added(modes: Modes) -> Field:
 
 
 def _squared(modes: Modes) -> Field:
-    return np.asarray(np.square(modes.real) + np.square(modes.imag))
+    return np.square(modes.real) + np.square(modes.imag)

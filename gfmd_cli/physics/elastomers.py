@@ -137,7 +137,7 @@ class LinearElastomer(Choice):
         above, below = (self.stiffness(q * np.exp(shift), length) for shift in (step, -step))
         safe = (above > 0) & (below > 0)
         ratio = np.where(safe, above, 1.0) / np.where(safe, below, 1.0)
-        return np.asarray(np.log(ratio) / (2 * step))
+        return np.log(ratio) / (2 * step)
 
     def gamma(self, q: Field, length: float = 1.0) -> Field:
         """Weight of the elastic energy in Persson theory: paper Eq. (39) at the exponent n(q)."""
@@ -393,7 +393,7 @@ def _interpolated(table: Field) -> Callable[[Field], Field]:
     def stiffness(q: Field) -> Field:
         log_q = np.log(q)
         beyond = low * np.minimum(log_q - x[0], 0.0) + high * np.maximum(log_q - x[-1], 0.0)
-        return np.asarray(np.exp(cubic(np.clip(log_q, x[0], x[-1])) + beyond))
+        return np.exp(cubic(np.clip(log_q, x[0], x[-1])) + beyond)
 
     return stiffness
 
@@ -437,10 +437,10 @@ def layer_softening(t: Field, poisson: float | None) -> Field:
     """
     decay = np.exp(-2 * t)
     if poisson is None:
-        return np.asarray(np.expm1(-2 * t) ** 2 / (4 * t * decay - np.expm1(-4 * t)))
+        return np.expm1(-2 * t) ** 2 / (4 * t * decay - np.expm1(-4 * t))
     kappa = 3 - 4 * poisson
     above = -kappa * np.expm1(-4 * t) - 4 * t * decay
-    return np.asarray(above / (kappa * (1 + decay**2) + (4 * t**2 + 1 + kappa**2) * decay))
+    return above / (kappa * (1 + decay**2) + (4 * t**2 + 1 + kappa**2) * decay)
 
 
 def slab_factor(t: Field) -> Field:
@@ -458,4 +458,4 @@ def slab_factor(t: Field) -> Field:
         tail = 1.0 + small**2 / divisor * tail
     difference = np.where(t < 1, small**3 / 3 * decay * tail, rising - 2 * t * decay)
     whole = np.maximum(4 * t * decay**2 - np.expm1(-4 * t), 1e-300)  # not zero at t = 0
-    return np.asarray(difference * ((rising + 2 * t * decay) / whole))
+    return difference * ((rising + 2 * t * decay) / whole)

@@ -237,7 +237,7 @@ class FileSurface(RigidSurface):
         """Points of a grid whose heights the window has changed."""
         if self.edges != "window":
             return None
-        return np.asarray(window(grid.whole_shape, self.taper)[grid.own] < 1.0)
+        return window(grid.whole_shape, self.taper)[grid.own] < 1.0
 
     def mirrored(self) -> "FileSurface | None":
         """The map mirrored to twice its sides; None if it is periodic or made so.
@@ -256,7 +256,7 @@ class FileSurface(RigidSurface):
             return None
         if self.edges == "mirror":
             missing = mirror(missing)
-        return np.asarray(nearest(missing, grid.whole_shape, centred=self.is_centred)[grid.own])
+        return nearest(missing, grid.whole_shape, centred=self.is_centred)[grid.own]
 
     def holes(self) -> int:
         """Number of missing heights of the map."""

@@ -60,7 +60,7 @@ def _side_integral(n: float, distance: Field, end: Field) -> Field:
     """X int_0^Y (X^2 + t^2)^(n/2 - 1) dt with X = `distance`, Y = `end`."""
     ratio = end / distance
     integral = hyp2f1(1 - n / 2, 0.5, 1.5, -(ratio**2))
-    return np.asarray(np.sign(distance) * np.abs(distance) ** (n - 1) * end * integral)
+    return np.sign(distance) * np.abs(distance) ** (n - 1) * end * integral
 
 
 def near_shape(shape: Shape, spacings: Spacings, sides: float) -> Shape:
@@ -111,7 +111,7 @@ def _line(n: float, points: int, spacing: float) -> Field:
     """Displacements for k = q^n, 0 <= n < 1, in one dimension."""
     prefactor = gamma(1 - n) * np.sinc(n / 2) / 2  # sin(pi n / 2) / (pi n), also at n = 0
     edges = (np.arange(points + 1) - 0.5) * spacing
-    return np.asarray(np.diff(prefactor * np.sign(edges) * np.abs(edges) ** n))
+    return np.diff(prefactor * np.sign(edges) * np.abs(edges) ** n)
 
 
 def _logarithmic_line(points: int, spacing: float) -> Field:
@@ -122,4 +122,4 @@ def _logarithmic_line(points: int, spacing: float) -> Field:
     """
     edges = (np.arange(points + 1) - 0.5) / points
     antiderivative = edges * (1 - np.log(np.abs(edges)))
-    return np.asarray(np.diff(antiderivative) * points * spacing / np.pi)
+    return np.diff(antiderivative) * points * spacing / np.pi

@@ -130,7 +130,7 @@ def _interpolated(x: Field, values: Field, at: Field) -> Field:
 
     Beyond the ends of x they are those at the ends.
     """
-    return np.asarray(np.exp(monotone_cubic(x, np.log(values))(np.clip(at, x[0], x[-1]))))
+    return np.exp(monotone_cubic(x, np.log(values))(np.clip(at, x[0], x[-1])))
 
 
 def _centres(faces: Field) -> Field:

@@ -276,4 +276,4 @@ class Wave(LineIndenter):
 
     def profile(self, r: Field) -> Field:
         """Heights [m] at distances r from the middle [m]."""
-        return np.asarray(self.amplitude * np.cos(2 * np.pi * r / self.length))
+        return self.amplitude * np.cos(2 * np.pi * r / self.length)

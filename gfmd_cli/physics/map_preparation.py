@@ -49,7 +49,7 @@ def _polynomials(points: int, degree: int) -> Field:
     """Discrete orthonormal polynomials up to a degree, shape (points, degree + 1 at most)."""
     order = min(degree, points - 1) + 1
     basis, _ = np.linalg.qr(np.vander(np.linspace(-1.0, 1.0, points), order, increasing=True))
-    return np.asarray(basis)
+    return basis
 
 
 def _products(basis: Field) -> Field:
@@ -76,9 +76,9 @@ def make_periodic(heights: Field, how: Edges, taper: float = 0.1) -> Field:
     if how == "none":
         return heights
     if how == "mirror":
-        return np.asarray(mirror(heights))
+        return mirror(heights)
     mean = heights.mean()
-    return np.asarray(mean + window(heights.shape, taper) * (heights - mean))
+    return mean + window(heights.shape, taper) * (heights - mean)
 
 
 def mirror(values: np.ndarray[Any, Any]) -> Any:

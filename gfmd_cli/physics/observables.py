@@ -158,7 +158,7 @@ def logarithmic_middles() -> Field:
 
 def geometric_middles(edges: Field) -> Field:
     """Geometric means of neighbouring edges, shape (edges - 1,)."""
-    return np.asarray(np.sqrt(edges[1:] * edges[:-1]))
+    return np.sqrt(edges[1:] * edges[:-1])
 
 
 def stress_histogram(contact: Contact, u: Field, sigma: Field) -> Histogram:

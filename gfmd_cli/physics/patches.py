@@ -124,4 +124,4 @@ def area_edges() -> Field:
 def area_distribution(shares: Field) -> Field:
     """Pr(A): share of the patches per area in logarithmic bins; zero without patches."""
     counts = np.histogram(shares, area_edges())[0]
-    return np.asarray(counts / (max(shares.size, 1) * np.diff(area_edges())))
+    return counts / (max(shares.size, 1) * np.diff(area_edges()))

@@ -46,7 +46,7 @@ def gamma_n(n: Field | float) -> Field:
         raise ValueError(f"gamma_n is known for 0 <= n <= 4, got n = {n}")
     values = np.array(list(_GAMMA.values()))
     if np.isin(exponent, nodes).all():
-        return np.asarray(values[np.searchsorted(nodes, exponent)])
+        return values[np.searchsorted(nodes, exponent)]
     return monotone_cubic(nodes, values)(exponent)
 
 
@@ -74,7 +74,7 @@ class Shells:
         """d ln k / d ln q, of k = sum of k^2 C / sum of k C in every shell."""
         if self.q.size < 2:
             return np.zeros_like(self.q)
-        return np.asarray(np.gradient(np.log(self.variance / self.energy), np.log(self.q)))
+        return np.gradient(np.log(self.variance / self.energy), np.log(self.q))
 
 
 def shells(
@@ -239,7 +239,7 @@ class Persson:
 
     def pressure_at_area(self, a_r: Field | float) -> Field:
         """Pressure at a relative contact area, sqrt(2) Delta_sigma erfinv(a_r). Eq. (25)."""
-        return np.asarray(np.sqrt(2) * self.delta_sigma * erfinv(a_r))
+        return np.sqrt(2) * self.delta_sigma * erfinv(a_r)
 
     def pressure_at_gap(self, u_g: Field | float) -> Field:
         """Pressure at a mean gap, Eq. (28) inverted by a monotone cubic in logarithms.
@@ -248,7 +248,7 @@ class Persson:
         """
         rising, table = self._pressures_over_gap
         log_gap = -np.log(np.where(np.asarray(u_g) > 0, u_g, np.nan))
-        return np.asarray(np.exp(table(np.clip(log_gap, rising[0], rising[-1]))))
+        return np.exp(table(np.clip(log_gap, rising[0], rising[-1])))
 
     @cached_property
     def _pressures_over_gap(self) -> tuple[Field, Callable[[Field], Field]]:

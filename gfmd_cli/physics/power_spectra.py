@@ -58,7 +58,7 @@ def autocorrelations(
     count = np.bincount(ring)
 
     def mean(values: Field) -> Field:
-        return np.asarray(np.bincount(ring, values.ravel())[:rings] / count[:rings])
+        return np.bincount(ring, values.ravel())[:rings] / count[:rings]
 
     def correlated(field: Field) -> Field:
         return correlation(grid, field) if periodic else autocorrelation(np.ma.asarray(field))

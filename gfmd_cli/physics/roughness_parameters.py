@@ -113,10 +113,10 @@ def autocorrelation(heights: "np.ma.MaskedArray[Any, Any]") -> Field:
 
     def pairs(values: Field) -> Field:
         power = np.abs(np.fft.rfftn(values, shape, axes)) ** 2
-        return np.asarray(np.fft.irfftn(power, shape, axes))
+        return np.fft.irfftn(power, shape, axes)
 
     count = np.rint(pairs(known.astype(np.float64)))
     enough = count >= MIN_OVERLAP * np.count_nonzero(known)
     with np.errstate(invalid="ignore", divide="ignore"):
         means = np.where(enough, pairs(z) / count, np.nan)
-        return np.asarray(means / means.flat[0])
+        return means / means.flat[0]

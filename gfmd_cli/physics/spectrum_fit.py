@@ -72,7 +72,7 @@ def density(shells: Shells) -> Field:
 
     C(q) L^2 is the isotropic power spectral density in the usual convention [m^4].
     """
-    return np.asarray(shells.height / _modes(shells))
+    return shells.height / _modes(shells)
 
 
 def moments(shells: Shells) -> Moments:
@@ -131,7 +131,7 @@ def _modes(shells: Shells) -> Field:
 def _shape(q: Field, x: Field, q_1: float) -> Field:
     """C(q) / C_0 below the cut-off: paper Eq. (3) for x = (H, ln q_r), a power law for x = (H,)."""
     ratio = (q / np.exp(x[1])) ** 2 + 1 if x.size == 2 else (q / q_1) ** 2
-    return np.asarray(ratio ** (-1 - x[0]))
+    return ratio ** (-1 - x[0])
 
 
 def _misfit(x: Field, q: Field, count: Field, power: Field) -> float:
@@ -161,7 +161,7 @@ def _maximise_likelihood(q: Field, count: Field, power: Field, start: Field) -> 
     )
     if start.size == 2 and result.x[1] < np.log(q[0]):
         return _maximise_likelihood(q, count, power, result.x[:1])
-    return np.asarray(result.x)
+    return result.x
 
 
 def _errors(q: Field, count: Field, power: Field, best: Field) -> tuple[list[float], float]:

@@ -91,7 +91,7 @@ class Bearing:
         rises = p > np.maximum.accumulate(np.append(0.0, p))[:-1]
         if not rises.any():
             return np.full(np.shape(p_star), np.nan)
-        return np.asarray(np.interp(np.log(p_star), np.log(p[rises]), self.deviation[rises]))
+        return np.interp(np.log(p_star), np.log(p[rises]), self.deviation[rises])
 
 
 def contact_area(delta_sigma_c: Field | float, p_star: Field | float) -> Field:
@@ -100,7 +100,7 @@ def contact_area(delta_sigma_c: Field | float, p_star: Field | float) -> Field:
     Paper Sect. 6 (printed without sqrt(2)); both arguments in units of Delta_sigma.
     """
     with np.errstate(divide="ignore"):
-        return np.asarray(erf(np.divide(p_star, np.sqrt(2) * np.asarray(delta_sigma_c))))
+        return erf(np.divide(p_star, np.sqrt(2) * np.asarray(delta_sigma_c)))
 
 
 def bearing(contact: Contact) -> Bearing:

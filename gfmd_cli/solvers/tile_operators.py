@@ -118,7 +118,7 @@ def _spline_spectrum(grid: Grid) -> Field:
     """Fourier transform of the splines of a grid, shape `grid.spectral_shape`."""
     down, right = grid.shape
     y, x = np.fft.fftfreq(down), np.fft.rfftfreq(right)
-    return np.asarray(np.sinc(y)[:, None] ** ORDER * np.sinc(x) ** ORDER)
+    return np.sinc(y)[:, None] ** ORDER * np.sinc(x) ** ORDER
 
 
 def _stiffness_of_small_cell(contact: Contact) -> tuple[Field, Field]:
