@@ -4,7 +4,7 @@ from gfmd_cli.grid.compilation import kernel
 
 
 @kernel
-def apply_symbol(modes, k, factor, first, final, out, a, b):  # type: ignore[no-untyped-def]
+def apply_symbol(modes, k, factor, first, final, out, a, b):
     """Multiply coefficients by factor k(q); sums over q of k(q) |coefficient|^2.
 
     `first` and `final` tell whether a row begins at q_x = 0 and ends at the highest q_x.
@@ -23,7 +23,7 @@ def apply_symbol(modes, k, factor, first, final, out, a, b):  # type: ignore[no-
 
 
 @kernel
-def divide_by_symbol(modes, k, factor, a, b):  # type: ignore[no-untyped-def]
+def divide_by_symbol(modes, k, factor, a, b):
     """Multiply coefficients by factor / k(q), and by zero where k is zero."""
     for i in range(a, b):
         for j in range(k.shape[1]):

@@ -7,7 +7,7 @@ from gfmd_cli.solvers.tiles import SIDE
 
 
 @kernel
-def penetration(w, level, h, used, entered, out, a, b):  # type: ignore[no-untyped-def]
+def penetration(w, level, h, used, entered, out, a, b):
     """Sums of the squares of h - (w - level) where that is positive, outside the tiles.
 
     Marks the tiles outside in which it is positive somewhere.

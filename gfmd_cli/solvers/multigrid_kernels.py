@@ -40,13 +40,13 @@ class Operator(NamedTuple):
 
 
 @part_of_kernel
-def _weight(value, threshold, weighted):  # type: ignore[no-untyped-def]
+def _weight(value, threshold, weighted):
     """Weight of a fine point in quarters; see `compute_ties`."""
     return WHOLE_WEIGHT if value >= threshold else weighted * value
 
 
 @kernel
-def compute_ties(fine, threshold, weighted, ties, weights, a, b):  # type: ignore[no-untyped-def]
+def compute_ties(fine, threshold, weighted, ties, weights, a, b):
     """Springs that tie bilinear hats to zero at the points held, and the weights of the hats.
 
     The ties are P^T w P in units of 1/64 for a point itself, its right neighbour, its lower
@@ -78,7 +78,7 @@ def compute_ties(fine, threshold, weighted, ties, weights, a, b):  # type: ignor
 
 
 @part_of_kernel
-def _wrap(row):  # type: ignore[no-untyped-def]
+def _wrap(row):
     """Copy two values from either end of a row to the other (periodic boundary)."""
     n = row.size - 4
     row[0], row[1] = row[n], row[n + 1]
@@ -86,7 +86,7 @@ def _wrap(row):  # type: ignore[no-untyped-def]
 
 
 @part_of_kernel
-def _laplacian(up, mid, down, operator, j):  # type: ignore[no-untyped-def]
+def _laplacian(up, mid, down, operator, j):
     """Negative Laplacian at column j."""
     sides = operator.y * (up[j] + down[j]) + operator.x * (mid[j - 1] + mid[j + 1])
     corners = (up[j - 1] + up[j + 1]) + (down[j - 1] + down[j + 1])
@@ -94,7 +94,7 @@ def _laplacian(up, mid, down, operator, j):  # type: ignore[no-untyped-def]
 
 
 @part_of_kernel
-def _inner_rows(i, x, laplacian, operator):  # type: ignore[no-untyped-def]
+def _inner_rows(i, x, laplacian, operator):
     """Rows i - 1, i and i + 1 of the field whose Laplacian is A x: of x, or of its Laplacian.
 
     `x` and `laplacian` are ring buffers. The last row of the Laplacian is computed here from row
@@ -110,7 +110,7 @@ def _inner_rows(i, x, laplacian, operator):  # type: ignore[no-untyped-def]
 
 
 @part_of_kernel
-def _restrict(up, mid, down, coarse):  # type: ignore[no-untyped-def]
+def _restrict(up, mid, down, coarse):
     """Restrict three fine rows, with the last value before the first; `up` is overwritten."""
     for j in range(mid.size):
         up[j] = HALF * (up[j] + down[j]) + mid[j]
@@ -119,7 +119,7 @@ def _restrict(up, mid, down, coarse):  # type: ignore[no-untyped-def]
 
 
 @part_of_kernel
-def _interpolate(coarse, k, ratio, out):  # type: ignore[no-untyped-def]
+def _interpolate(coarse, k, ratio, out):
     """Write ratio times row k of P coarse to a row of a ring buffer.
 
     A field that is as wide as the row is P coarse itself.
@@ -143,7 +143,7 @@ def _interpolate(coarse, k, ratio, out):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def first_residual(sigma, contact_state, threshold, operator, coarse, a, b):  # type: ignore[no-untyped-def]
+def first_residual(sigma, contact_state, threshold, operator, coarse, a, b):
     """Restrict the residual of the force after one Jacobi sweep from zero to `coarse`.
 
     The residual itself is written to a field that is as wide as `sigma`.
@@ -177,7 +177,7 @@ def first_residual(sigma, contact_state, threshold, operator, coarse, a, b):  # 
 
 
 @kernel
-def last_smooth(  # type: ignore[no-untyped-def]
+def last_smooth(
     sigma, contact_state, threshold, operator, coarse, ratio, scale, change, padded, out, a, b
 ):
     """Write z, one Jacobi sweep on the sum of the first sweep and P coarse, to `padded`.
@@ -214,7 +214,7 @@ def last_smooth(  # type: ignore[no-untyped-def]
 
 
 @part_of_kernel
-def _residual_row(i, x, rows, operator, ties, rhs, out):  # type: ignore[no-untyped-def]
+def _residual_row(i, x, rows, operator, ties, rhs, out):
     """Write row i of the residual rhs - A x to `out`; see `_inner_rows`."""
     height, n = rhs.shape
     xu, xm, xd = x[(i - 1) % 5], x[i % 5], x[(i + 1) % 5]
@@ -243,7 +243,7 @@ def _residual_row(i, x, rows, operator, ties, rhs, out):  # type: ignore[no-unty
 
 
 @part_of_kernel
-def _first_row(rhs, operator, ties, k, row):  # type: ignore[no-untyped-def]
+def _first_row(rhs, operator, ties, k, row):
     """Write row k of the result of a Jacobi sweep from zero to a row of a ring buffer."""
     force, own = rhs[k], ties[k, 0]
     for j in range(force.size):
@@ -252,7 +252,7 @@ def _first_row(rhs, operator, ties, k, row):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def smooth(rhs, operator, ties, old, is_zero, coarse, ratio, y, a, b):  # type: ignore[no-untyped-def]
+def smooth(rhs, operator, ties, old, is_zero, coarse, ratio, y, a, b):
     """Write the result of one Jacobi sweep on x to `y`.
 
     x is the result of a sweep from zero where `is_zero`, else `old`, plus P coarse where the ratio
@@ -285,7 +285,7 @@ def smooth(rhs, operator, ties, old, is_zero, coarse, ratio, y, a, b):  # type: 
 
 
 @kernel
-def residual(rhs, operator, ties, y, is_zero, coarse, a, b):  # type: ignore[no-untyped-def]
+def residual(rhs, operator, ties, y, is_zero, coarse, a, b):
     """Restrict the residual of y to `coarse`, or write it to a field as wide as `rhs`.
 
     Where `is_zero`, the result of a Jacobi sweep from zero takes the place of y.
@@ -317,7 +317,7 @@ def residual(rhs, operator, ties, y, is_zero, coarse, a, b):  # type: ignore[no-
 
 
 @part_of_kernel
-def _hats(n, m):  # type: ignore[no-untyped-def]
+def _hats(n, m):
     """The two of m hats that reach each of n points, and the share of the second one."""
     left, right, share = np.empty(n, np.int32), np.empty(n, np.int32), np.empty(n, np.float32)
     for i in range(n):
@@ -327,13 +327,13 @@ def _hats(n, m):  # type: ignore[no-untyped-def]
 
 
 @part_of_kernel
-def _reach(k, n, m):  # type: ignore[no-untyped-def]
+def _reach(k, n, m):
     """First of n points that hat k of m reaches, and the one after the last."""
     return -((1 - k) * n // m), -(-(k + 1) * n // m)
 
 
 @kernel
-def restrict(fine, coarse, a, b):  # type: ignore[no-untyped-def]
+def restrict(fine, coarse, a, b):
     """Write P^T fine to `coarse`, for any numbers of points."""
     (height, n), (rows, m) = fine.shape, coarse.shape
     left, right, share = _hats(n, m)
@@ -354,7 +354,7 @@ def restrict(fine, coarse, a, b):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def interpolate(coarse, fine, a, b):  # type: ignore[no-untyped-def]
+def interpolate(coarse, fine, a, b):
     """Write P coarse to `fine`, for any numbers of points."""
     (height, n), (rows, m) = fine.shape, coarse.shape
     left, right, share = _hats(n, m)
@@ -370,7 +370,7 @@ def interpolate(coarse, fine, a, b):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def compute_any_ties(fine, threshold, weighted, ties, weights, a, b):  # type: ignore[no-untyped-def]
+def compute_any_ties(fine, threshold, weighted, ties, weights, a, b):
     """The same as `compute_ties`, rounded, for any numbers of points."""
     (height, n), (rows, m) = fine.shape, weights.shape
     left, right, share = _hats(n, m)

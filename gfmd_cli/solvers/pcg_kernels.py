@@ -8,7 +8,7 @@ from gfmd_cli.solvers.contact_state import FREE, PRESSED, TENSE
 
 
 @part_of_kernel
-def _assess_point(gap, s):  # type: ignore[no-untyped-def]
+def _assess_point(gap, s):
     """Squares of violation, free force and tension of a point, and its contact state."""
     smaller, square = min(gap, s), s * s
     free, tense = gap != 0.0, s < 0.0
@@ -21,7 +21,7 @@ def _assess_point(gap, s):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def classify(h, u, sigma, contact_state, out, a, b):  # type: ignore[no-untyped-def]
+def classify(h, u, sigma, contact_state, out, a, b):
     """Compute the contact state; sums of squares of violation, free force and tension."""
     for i in range(a, b):
         violation = free = tension = 0.0
@@ -32,7 +32,7 @@ def classify(h, u, sigma, contact_state, out, a, b):  # type: ignore[no-untyped-
 
 
 @kernel
-def turn(h, u, sigma, state, threshold, z, beta, direction, is_kept, length, padded, out, a, b):  # type: ignore[no-untyped-def]
+def turn(h, u, sigma, state, threshold, z, beta, direction, is_kept, length, padded, out, a, b):
     """Set the direction d to z + beta d on the free points, and compute the move along it.
 
     The direction stays where it `is_kept`. The move max(u + length d, h) - u is written to
@@ -58,7 +58,7 @@ def turn(h, u, sigma, state, threshold, z, beta, direction, is_kept, length, pad
 
 
 @kernel
-def crossing(h, u, direction, length, out, a, b):  # type: ignore[no-untyped-def]
+def crossing(h, u, direction, length, out, a, b):
     """Number of points at which u + length d is below h."""
     for i in range(a, b):
         count = 0
@@ -68,7 +68,7 @@ def crossing(h, u, direction, length, out, a, b):  # type: ignore[no-untyped-def
 
 
 @kernel
-def advance(h, u, sigma, direction, length, fraction, padded, change, contact_state, out, a, b):  # type: ignore[no-untyped-def]
+def advance(h, u, sigma, direction, length, fraction, padded, change, contact_state, out, a, b):
     """Take a fraction of the move; `padded` is K times the move. Returns the sums of `classify`.
 
     u += fraction move, sigma += change, change = fraction K move.
