@@ -99,6 +99,21 @@ def test_separators_and_decimal_commas(tmp_path, separator, decimal, end, column
     assert read_topography(path).heights == pytest.approx(heights, abs=1e-9)
 
 
+HEADERS = {
+    "X;Y;valid\n[mm];[um];[1/0]": ";",
+    "Scan Parameters,\nStylus,tip\nScan Data\n\nLateral mm,Raw um,": ",",
+}
+
+
+@pytest.mark.parametrize("header", HEADERS)
+def test_profiles_with_a_header_of_an_instrument(tmp_path, header):
+    """The readers of such files need their separators."""
+    rows = (HEADERS[header].join((f"{x:.6f}", f"{y:.6f}", "1")) for x, y in POINTS[:50, ::2])
+    (tmp_path / "profile.csv").write_text("\n".join([header, *rows]))
+    heights = read_topography(tmp_path / "profile.csv").heights
+    assert heights == pytest.approx(1e-6 * POINTS[:50, 2], abs=1e-12)
+
+
 def test_points_on_a_grid_with_gaps_are_refused_with_the_reason(tmp_path):
     (tmp_path / "points.txt").write_bytes(text(np.delete(POINTS, [7, 900], axis=0)))
     with pytest.raises(InputError, match="does not contain a regular grid"):

@@ -40,19 +40,22 @@ def table_formats(file: BinaryIO) -> set[str]:
 
 
 def with_blanks(file: BinaryIO) -> BinaryIO:
-    """A table with commas or semicolons as one between blanks; any other file as it is.
+    """A matrix with commas or semicolons as one between blanks, and decimal commas as points.
 
     A comma between two digits is a decimal one where blanks or semicolons separate the numbers.
+    Any other file is returned as it is: the readers of positions know commas and semicolons.
     """
     start = file.read(WINDOW)
-    if b"," in start or b";" in start:
-        between_blanks = _columns(file, b" \t;")
-        if between_blanks > 1 or (between_blanks and _columns(file, b",") >= MATRIX_COLUMNS):
-            is_decimal = between_blanks > 1 and re.search(rb"\d,\d", start[len(start) // 2 :])
+    table = start[len(start) // 2 :]  # without most headers
+    if b"," in table or b";" in table:
+        columns = _columns(file, b" \t;")
+        is_decimal = columns > 1 and re.search(rb"\d,\d", table)
+        if columns == 1:
+            columns = _columns(file, b",")
+        if is_decimal or columns >= MATRIX_COLUMNS:
             file.seek(0)
-            return BytesIO(
-                file.read().replace(b";", b" ").replace(b",", b"." if is_decimal else b" ")
-            )
+            text = file.read().replace(b";", b" ")
+            return BytesIO(text.replace(b",", b"." if is_decimal else b" "))
     file.seek(0)
     return file
 
