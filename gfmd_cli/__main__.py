@@ -1,5 +1,6 @@
 """`gfmd` and `python -m gfmd_cli`: signals are heeded before the slow imports begin."""
 
+import gc
 import signal
 import sys
 import warnings
@@ -18,6 +19,7 @@ def main() -> None:
     for number in ENDING:
         if signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, _leave)
+    gc.set_threshold(10_000)  # compilation makes many objects, and most of them stay
     warnings.formatwarning = lambda message, *_, **__: f"gfmd: {message}\n"
     from gfmd_cli.cli import main as commands
 
