@@ -128,6 +128,29 @@ def test_the_start_has_the_residual_that_the_solve_asks_for(elastomer):
         assert contact.residual(start.u, sigma) < tolerance
 
 
+def test_the_start_leaves_no_steps_to_the_whole_grid():
+    """At any tolerance; a point that rounding leaves above the indenter may take one."""
+    steps = []
+    for seed in (0, 1, 2):
+        scene = build_scene(SelfAffine(cutoff=0.02, seed=seed), HalfSpace(), 512)
+        for p_star in (1e-3, 0.01):
+            contact = scene.contact(p_star)
+            steps += [solve(contact, True, tolerance).steps for tolerance in (0.1, 0.01, 1e-3)]
+    assert sum(steps) <= 1
+
+
+@pytest.mark.parametrize("points", [64, 65])
+@pytest.mark.parametrize("n", [0.5, 1, 3])
+def test_the_stiffness_of_a_point(n, points):
+    """The stress at a point where this point alone is displaced."""
+    scene = build_scene(SelfAffine(cutoff=0.1), Power(n=n), points)
+    contact = scene.contact(0.1)
+    u = np.zeros(contact.grid.shape)
+    u[5, 7] = 1.0
+    stress = contact.elasticity(u, np.empty(u.shape))
+    assert contact.point_stiffness == pytest.approx(stress[5, 7], rel=1e-12)
+
+
 def test_a_contact_that_the_coarse_grid_misses_is_entered():
     """A spike of one point, between the points of the coarser grids."""
     case = build_scene(SelfAffine(cutoff=0.1), Power(n=1), 512)

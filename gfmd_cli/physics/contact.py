@@ -133,19 +133,31 @@ class Contact:
         """Lay pressed points on the indenter if the gap of some is below the error of u.
 
         Contact is u = h to the last bit, and of such a point the residual counts only the gap.
-        Points are laid whose stress is larger than the gap and than its error; sigma is not
-        changed. Returns whether any point was laid.
+        Points are laid whose stress is larger than its error and stays compressive when they are
+        laid alone; sigma is not changed. Returns whether any point was laid.
         """
-        doubt, missed = DOUBT * self.residual(u, sigma) * min(self.pressure, 1.0), 0
-        for rows in row_blocks(u):
+        doubt = DOUBT * self.residual(u, sigma) * min(self.pressure, 1.0)
+
+        def pressed(rows: slice) -> tuple[Field, Mask]:
             gap = u[rows] - self.obstacle[rows]
-            missed += int(np.count_nonzero((gap > 0) & (gap < doubt) & (sigma[rows] > doubt)))
+            return gap, sigma[rows] > np.maximum(self.point_stiffness * gap, doubt)
+
+        missed = 0
+        for rows in row_blocks(u):
+            gap, is_pressed = pressed(rows)
+            missed += int(np.count_nonzero((gap > 0) & (gap < doubt) & is_pressed))
         if not self.grid.total(missed):
             return False
         for rows in row_blocks(u):
-            h, s = self.obstacle[rows], sigma[rows]
-            np.copyto(u[rows], h, where=(u[rows] - h < s) & (s > doubt))
+            np.copyto(u[rows], self.obstacle[rows], where=pressed(rows)[1])
         return True
+
+    @cached_property
+    def point_stiffness(self) -> float:
+        """Stress at a point per displacement of this point alone: the mean of k over all q."""
+        by_column = self.stiffness.reshape(-1, self.stiffness.shape[-1]).sum(axis=0)
+        total = self.grid.total(float(np.sum(by_column * self.grid.multiplicity())))
+        return total / self.grid.size
 
     def set_displacement(self, u: Field, gap: Field, touching: Mask) -> None:
         """u <- h in contact, else h + gap, where a point that can touch has a gap >= 0."""

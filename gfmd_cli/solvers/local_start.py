@@ -32,11 +32,15 @@ SMALLEST = 512  # points per side from which on a solve on tiles is faster
 LARGEST_SHARE = 0.1  # of the tiles; with more a solve on the whole grid is faster: measured
 REACH = 2  # points by which the contact may grow from a grid to the next
 COARSE_TOLERANCE = 0.03  # on grids before the finest; measured: 0.01 to 0.1 differ by 5 %
-FIRST_TOLERANCE = 3e-3  # before the operators on tiles are corrected
+FIRST_TOLERANCE = 6e-3  # before the operators on tiles are corrected
 GAIN = 1e-3  # of the residual by a solve on tiles: the relative error of their operators
-MARGIN = 0.8  # of the tolerance, for the estimated residual of the displacement on the indenter
-AIM = 0.5  # of the tolerance, for that residual after the next solve on the tiles
+LEAST_GAIN = 0.02  # a choice: an evaluation at all points takes longer than a few steps on tiles
+MARGIN = 0.9  # of the tolerance, for the estimated residual of the displacement on the indenter
+AIM = 0.25  # of the tolerance, for that residual after the next solve on the tiles
 MAX_EVALUATIONS = 6  # of the displacement at all points
+SWEEPS = 3  # of relaxation of the displacement on the indenter; 2 to 6 are similar
+DAMPING = 0.8  # of the relaxation
+LAYING = 2.0  # over the stiffness at which a point is pressed: its neighbours are laid, too
 MAX_STEPS = 60  # on the same tiles
 
 
@@ -122,6 +126,23 @@ def _refined(field: Field, tiles: Tiles) -> Field:
     return values.reshape(tiles.count, -1)
 
 
+@dataclass
+class Evaluation:
+    """C s at all points, compared with the indenter."""
+
+    level: float
+    """The level of C s where it is, in the mean, at the indenter in contact."""
+    gap: Field
+    """Gap on the tiles of the displacement that is laid on the indenter."""
+    residual: float
+    """Natural residual of s and C s."""
+    laid_residual: float
+    """Natural residual of the displacement that is laid on the indenter: an estimate, without the
+    change of the stress by points outside of the tiles."""
+    entered: Mask
+    """Other tiles in which C s is below h."""
+
+
 class _LocalSolve:
     """The pressure s on tiles of one grid."""
 
@@ -154,25 +175,21 @@ class _LocalSolve:
         aim = FIRST_TOLERANCE
         for evaluation in range(1, MAX_EVALUATIONS + 1):
             self.run(aim)
-            level, residual, laid, entered = self.evaluate()
-            if laid < MARGIN * tolerance or evaluation == MAX_EVALUATIONS:
+            found = self.evaluate()
+            is_good = found.laid_residual < MARGIN * tolerance and not found.entered.any()
+            if is_good or evaluation == MAX_EVALUATIONS:
                 break
-            aim = residual * max(AIM * tolerance / laid, GAIN)
-            self.correct(entered)
+            gain = max(AIM * tolerance / found.laid_residual, GAIN)
+            aim = found.residual * min(gain, LEAST_GAIN)
+            self.correct(found.entered)
         u = self.grid.empty()  # only now: the solves on tiles need memory, too
-        np.subtract(self.values_everywhere, level, out=u)
+        np.subtract(self.values_everywhere, found.level, out=u)
         np.maximum(u, self.contact.height, out=u)
-        self.tiles.copy_where(self.s > 0, self.height, u)
+        self.tiles.overwrite(self.height + found.gap, u)
         return u
 
-    def evaluate(self) -> tuple[float, float, float, Mask]:
-        """C s at all points, which stays in `grid.padded`, compared with the indenter.
-
-        Returns the level of C s where it is, in the mean, at the indenter in contact; the natural
-        residual of s and C s; an estimate of that of the displacement that is laid on the indenter,
-        whose stress differs from s by K times the change; and the tiles, other than those here,
-        where C s is below h.
-        """
+    def evaluate(self) -> Evaluation:
+        """C s at all points, which stays in `grid.padded`, compared with the indenter."""
         contact, grid = self.contact, self.grid
         self.tiles.put(self.s, self.values_everywhere)
         grid.unfilter_padded(contact.stiffness)
@@ -180,16 +197,31 @@ class _LocalSolve:
         gap = self.tiles.take(self.values_everywhere) - self.height
         level = float(gap[self.s > 0].mean())
         gap -= level
-        laid = np.where(self.s > 0, 0.0, np.maximum(gap, 0.0))
-        stress = self.s + self.map_displacement(laid - gap)
-        inside = np.minimum(gap, self.s), np.minimum(laid, stress)
+        laid, stress = self.lay(gap)
         entered = np.zeros(self.tiles.used.shape, dtype=np.bool_)
         sweep = (self.values_everywhere, level, contact.height, self.tiles.used, entered)
         (outside,) = grid.rows.sums(1, penetration, *sweep)
-        residual, estimate = (
-            contact.as_residual(float(outside) + _dot(worst, worst)) for worst in inside
+        residual, laid_residual = (
+            contact.as_residual(float(outside) + _dot(violation, violation))
+            for violation in (np.minimum(gap, self.s), np.minimum(laid, stress))
         )
-        return level, residual, estimate, entered
+        return Evaluation(level, laid, residual, laid_residual, entered)
+
+    def lay(self, gap: Field) -> tuple[Field, Field]:
+        """The gap on the tiles after C s is laid on the indenter, and the stress.
+
+        With C s the stress is s; K times the change of the gap is added. Projected Jacobi sweeps
+        reduce the residual, which consists of short waves.
+        """
+        stiffness = self.contact.point_stiffness
+        laid = np.where(self.s > stiffness * gap, 0.0, np.maximum(gap, 0.0))
+        stress = self.s + self.map_displacement(laid - gap)
+        for _ in range(SWEEPS):
+            change = stress / stiffness
+            relaxed = np.maximum(laid - DAMPING * change, 0.0)
+            laid = np.where(laid < LAYING * change, 0.0, relaxed)
+            stress = self.s + self.map_displacement(laid - gap)
+        return laid, stress
 
     def correct(self, entered: Mask) -> None:
         """Add tiles that were entered, and correct the operator on tiles by the exact C s."""

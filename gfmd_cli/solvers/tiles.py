@@ -37,12 +37,11 @@ class Tiles:
     def put(self, values: Field, field: Field) -> None:
         """Overwrite a field of the grid by values on the tiles, and by zero elsewhere."""
         field[...] = 0.0
-        _blocks(field)[self.used] = values.reshape(self.count, SIDE, SIDE)
+        self.overwrite(values, field)
 
-    def copy_where(self, condition: Mask, values: Field, field: Field) -> None:
-        """Overwrite those points of a field of the grid that fulfil a condition on the tiles."""
-        merged = np.where(condition, values, self.take(field))
-        _blocks(field)[self.used] = merged.reshape(self.count, SIDE, SIDE)
+    def overwrite(self, values: Field, field: Field) -> None:
+        """Overwrite a field of the grid on the tiles."""
+        _blocks(field)[self.used] = values.reshape(self.count, SIDE, SIDE)
 
     def convolve(self, matrix: Field, values: Field, pool: ThreadPoolExecutor | None) -> Field:
         """The convolution of values on the tiles with the kernel of `convolution_matrix`."""
