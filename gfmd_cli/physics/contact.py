@@ -129,14 +129,15 @@ class Contact:
                 np.maximum(u[rows], self.obstacle[rows], out=u[rows])
         return u
 
-    def lay_pressed(self, u: Field, sigma: Field) -> bool:
+    def lay_pressed(self, u: Field, sigma: Field, residual: float) -> bool:
         """Lay pressed points on the indenter if the gap of some is below the error of u.
 
         Contact is u = h to the last bit, and of such a point the residual counts only the gap.
         Points are laid whose stress is larger than its error and stays compressive when they are
-        laid alone; sigma is not changed. Returns whether any point was laid.
+        laid alone; sigma is not changed. `residual` is that of u. Returns whether any point was
+        laid.
         """
-        doubt = DOUBT * self.residual(u, sigma) * min(self.pressure, 1.0)
+        doubt = DOUBT * residual * min(self.pressure, 1.0)
 
         def pressed(rows: slice) -> tuple[Field, Mask]:
             gap = u[rows] - self.obstacle[rows]

@@ -29,7 +29,7 @@ from gfmd_cli.solvers.tiles import SIDE, Tiles
 
 EXPONENTS = (0.2, 1.3)  # of k(q) for which the solve on tiles converges in about 20 steps
 SMALLEST = 512  # points per side from which on a solve on tiles is faster
-LARGEST_SHARE = 0.1  # of the tiles; with more a solve on the whole grid is faster: measured
+LARGEST_SHARE = 0.065  # of the tiles; with more a solve on the whole grid is faster: measured
 REACH = 2  # points by which the contact may grow from a grid to the next
 COARSE_TOLERANCE = 0.03  # on grids before the finest; measured: 0.01 to 0.1 differ by 5 %
 FIRST_TOLERANCE = 6e-3  # before the operators on tiles are corrected

@@ -96,7 +96,7 @@ def solve_contact(
     assert state is not None
     for _ in range(MAX_LAYINGS if contact.boundary == "periodic" else 0):
         good_start = status.is_converged and state.step == 0  # no step has laid points yet
-        if not good_start or not contact.lay_pressed(state.u, state.sigma):
+        if not good_start or not contact.lay_pressed(state.u, state.sigma, state.residual):
             break
         state = solver.begin(contact, state.u)
         state.coarser_transforms = transforms
