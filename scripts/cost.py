@@ -20,6 +20,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from matplotlib.ticker import NullLocator
 
 from gfmd_cli.analysis.curve_styles import MARKERS, CurveStyle, colours
 from gfmd_cli.analysis.figures import P_STAR
@@ -128,7 +129,10 @@ def draw(label, curves, x, limit, path: Path) -> None:  # type: ignore[no-untype
         plot.axes.set(xscale="log", yscale="log")
         if path.name.endswith("grid"):
             plot.axes.set_xticks(x, [str(points) for points in x], minor=False)
-            plot.axes.minorticks_off()
+            plot.axes.xaxis.set_minor_locator(NullLocator())
+        ticks = (3, 5, 10, 20, 50, 100)
+        plot.axes.set_yticks(ticks, [str(tick) for tick in ticks])
+        plot.axes.yaxis.set_minor_locator(NullLocator())
         plot.write_file(path.with_suffix(".png"))
 
 

@@ -9,8 +9,11 @@ import numpy as np
 import pytest
 
 from gfmd_cli.errors import InputError
+from gfmd_cli.physics.contact import build_scene
+from gfmd_cli.physics.elastomers import HalfSpace
 from gfmd_cli.physics.file_surface import FileSurface
 from gfmd_cli.physics.map_preparation import level
+from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.physics.topography import Region, read_topography
 
 SCAN = Path(__file__).parents[1] / "configs" / "data" / "di-3.di"
@@ -165,6 +168,21 @@ def test_marks_of_missing_heights_and_spikes_are_remarked_on(npy, heights, mark)
     heights[3, 5] = mark
     (remark,) = [r for r in FileSurface(path=npy(heights)).remarks() if "far from" in r]
     assert remark.startswith(f"1 height is exactly {mark:g}, far from all others")
+
+
+@pytest.mark.parametrize(("rounding", "is_coarse"), [(1.0, True), (0.25, False)])
+def test_rounded_heights_are_remarked_on(npy, rounding, is_coarse):
+    """In steps as large as the rms difference of neighbours; a quarter of that is fine."""
+    heights = build_scene(SelfAffine(cutoff=0.05), HalfSpace(), 128).height
+    step = rounding * np.diff(heights, axis=1).std()
+    remarks = FileSurface(path=npy(np.round(heights / step) * step), scale=1e-6).remarks()
+    found = [remark for remark in remarks if "neighbouring heights are equal" in remark]
+    assert len(found) == is_coarse
+    assert not is_coarse or f"smallest step is {1e-6 * step:.3g} m" in found[0]
+
+
+def test_the_heights_of_a_microscope_are_fine_enough():
+    assert not any("are equal" in remark for remark in FileSurface(path=SCAN).remarks())
 
 
 def test_a_side_that_replaces_that_of_the_file_is_remarked_on():

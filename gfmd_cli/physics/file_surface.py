@@ -8,7 +8,7 @@ from pydantic import Field as Key
 
 from gfmd_cli.choice import FilePath, Positive
 from gfmd_cli.errors import InputError
-from gfmd_cli.grid.arrays import Field, Mask
+from gfmd_cli.grid.arrays import Field, Mask, row_blocks
 from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.physics.height_map import extent
 from gfmd_cli.physics.indenters import SMALLEST_GRID, RigidSurface
@@ -36,6 +36,7 @@ STEEP = 3.0  # rms gradient; a choice: surfaces of machined or worn solids have 
 SMOOTH = 1e-6  # rms gradient; a choice: polished mirrors have about that
 CLIFF = 5.0  # ratio of the step across the border to that inside; a choice: 1 if periodic
 TILTED = 0.5  # share of the variance of the heights that is a tilt; a choice
+ROUNDED = 0.2  # share of equal neighbouring heights, at which the gradient is 3 % too large
 FEW = 0.01  # share of the heights that can be outliers; a choice
 SIDES = 1e-3  # relative difference of two sides beyond which one is probably wrong; a choice
 FILLED = 0.05  # share of filled heights; a choice, as for the frame of the window
@@ -293,7 +294,7 @@ class FileSurface(RigidSurface):
                     f"surface.length = {self.length:g} m replaces the side of the file, "
                     f"{stated:g} m"
                 )
-        remarks += _outliers(self)
+        remarks += _remarks_on_heights(self)
         filled = topography.holes / topography.heights.size if self.missing == "fill" else 0.0
         if filled > FILLED:
             remarks.append(
@@ -390,12 +391,15 @@ def _prepared(surface: FileSurface) -> Field:
 
 
 @lru_cache(maxsize=16)
-def _outliers(surface: FileSurface) -> tuple[str, ...]:
-    """A warning about heights farther from all others than these are from each other.
-
-    Cached, because every contact of a study has the same.
-    """
+def _remarks_on_heights(surface: FileSurface) -> tuple[str, ...]:
+    """Warnings about outliers and rounding. Cached: every contact of a study has the same."""
     topography = surface._topography()
+    remarks = _outliers(topography), _rounding(topography, surface.scale)
+    return tuple(remark for remark in remarks if remark)
+
+
+def _outliers(topography: Topography) -> str:
+    """A warning about heights farther from all others than these are from each other, else ""."""
     heights = topography.heights
     if topography.missing is not None:
         heights = heights[~topography.missing]
@@ -408,12 +412,36 @@ def _outliers(surface: FileSurface) -> tuple[str, ...]:
             what = "1 height is" if count == 1 else f"{count} heights are"
             return (
                 f"{what} exactly {extreme:g}, far from all others: a spike or a mark of missing "
-                "heights? Replace it by NaN",
+                "heights? Replace it by NaN"
             )
-    return ()
+    return ""
+
+
+def _rounding(topography: Topography, scale: float) -> str:
+    """A warning about heights in steps as coarse as the differences of neighbours, else ""."""
+    heights, smallest = topography.heights, np.inf
+    pairs = changes = 0
+    for rows in row_blocks(heights):
+        block = heights[rows]
+        if topography.missing is not None:
+            block = np.where(topography.missing[rows], np.nan, block)
+        for axis in range(heights.ndim):
+            steps = np.abs(np.diff(block, axis=axis))
+            pairs += int(np.count_nonzero(np.isfinite(steps)))
+            steps = steps[steps > 0]
+            changes += steps.size
+            smallest = min(smallest, steps.min(initial=np.inf))
+    equal = 1 - changes / max(pairs, 1)
+    if equal < ROUNDED or not changes:
+        return ""
+    return (
+        f"{equal:.0%} of the neighbouring heights are equal: if they were rounded (the smallest "
+        f"step is {scale * smallest:.3g} m), the gradient is too large and the contact area "
+        "too small; read the heights with more digits"
+    )
 
 
 def forget_files() -> None:
     """Drop the maps that were read, so that a file that has changed is read again."""
-    for cached in (_read, _prepared, _suited_interpolation, _outliers):
+    for cached in (_read, _prepared, _suited_interpolation, _remarks_on_heights):
         cached.cache_clear()
