@@ -170,6 +170,12 @@ def test_marks_of_missing_heights_and_spikes_are_remarked_on(npy, heights, mark)
     assert remark.startswith(f"1 height is exactly {mark:g}, far from all others")
 
 
+def test_a_taper_without_a_window_is_remarked_on(npy, heights):
+    for edges, count in (("mirror", 1), ("window", 0)):
+        remarks = FileSurface(path=npy(heights), periodic=False, edges=edges, taper=0.2).remarks()
+        assert sum("surface.taper has no effect" in remark for remark in remarks) == count
+
+
 @pytest.mark.parametrize(("rounding", "is_coarse"), [(1.0, True), (0.25, False)])
 def test_rounded_heights_are_remarked_on(npy, rounding, is_coarse):
     """In steps as large as the rms difference of neighbours; a quarter of that is fine."""

@@ -294,6 +294,8 @@ class FileSurface(RigidSurface):
                     f"surface.length = {self.length:g} m replaces the side of the file, "
                     f"{stated:g} m"
                 )
+        if "taper" in self.model_fields_set and self.edges != "window":
+            remarks.append('surface.taper has no effect without surface.edges = "window"')
         remarks += _remarks_on_heights(self)
         filled = topography.holes / topography.heights.size if self.missing == "fill" else 0.0
         if filled > FILLED:
