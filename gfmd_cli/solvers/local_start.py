@@ -38,9 +38,9 @@ LEAST_GAIN = 0.02  # a choice: an evaluation at all points takes longer than a f
 MARGIN = 0.9  # of the tolerance, for the estimated residual of the displacement on the indenter
 AIM = 0.25  # of the tolerance, for that residual after the next solve on the tiles
 MAX_EVALUATIONS = 6  # of the displacement at all points
-SWEEPS = 3  # of relaxation of the displacement on the indenter; 2 to 6 are similar
+SWEEPS = 3  # of relaxation of the displacement on the indenter; 2 to 6 take about as long
 DAMPING = 0.8  # of the relaxation
-LAYING = 2.0  # over the stiffness at which a point is pressed: its neighbours are laid, too
+LAYING = 2.0  # largest gap that is closed, over the move of a point that would relieve it alone
 MAX_STEPS = 60  # on the same tiles
 
 
@@ -49,7 +49,7 @@ class Start:
     """A displacement to start from."""
 
     u: Field
-    """u >= h, and u = h where the pressure is positive."""
+    """u >= h, and u = h at the points that are pressed on the indenter."""
     transforms: float
     """Transforms by their share of points of the finest grid."""
     contact: Contact
@@ -173,19 +173,19 @@ class _LocalSolve:
     def displacement(self, tolerance: float) -> Field:
         """Solve, with the exact operator in the end; return the displacement on the indenter."""
         aim = FIRST_TOLERANCE
-        for evaluation in range(1, MAX_EVALUATIONS + 1):
+        for count in range(1, MAX_EVALUATIONS + 1):
             self.run(aim)
-            found = self.evaluate()
-            is_good = found.laid_residual < MARGIN * tolerance and not found.entered.any()
-            if is_good or evaluation == MAX_EVALUATIONS:
+            result = self.evaluate()
+            is_good = result.laid_residual < MARGIN * tolerance and not result.entered.any()
+            if is_good or count == MAX_EVALUATIONS:
                 break
-            gain = max(AIM * tolerance / found.laid_residual, GAIN)
-            aim = found.residual * min(gain, LEAST_GAIN)
-            self.correct(found.entered)
+            gain = max(AIM * tolerance / result.laid_residual, GAIN)
+            aim = result.residual * min(gain, LEAST_GAIN)
+            self.correct(result.entered)
         u = self.grid.empty()  # only now: the solves on tiles need memory, too
-        np.subtract(self.values_everywhere, found.level, out=u)
+        np.subtract(self.values_everywhere, result.level, out=u)
         np.maximum(u, self.contact.height, out=u)
-        self.tiles.overwrite(self.height + found.gap, u)
+        self.tiles.overwrite(self.height + result.gap, u)
         return u
 
     def evaluate(self) -> Evaluation:
