@@ -129,7 +129,7 @@ def draw(label, curves, x, limit, path: Path) -> None:  # type: ignore[no-untype
         plot.axes.set(xscale="log", yscale="log")
         if path.name.endswith("grid"):
             plot.axes.set_xticks(x, [str(points) for points in x], minor=False)
-            plot.axes.xaxis.set_minor_locator(NullLocator())
+            plot.axes.minorticks_off()
         ticks = (3, 5, 10, 20, 50, 100)
         plot.axes.set_yticks(ticks, [str(tick) for tick in ticks])
         plot.axes.yaxis.set_minor_locator(NullLocator())

@@ -46,7 +46,7 @@ def main() -> None:
             surface = SelfAffine(cutoff=POINTS_PER_WAVE / points, seed=seed)
             scene = build_scene(surface, HalfSpace(), points)
             difference = float(np.diff(scene.height, axis=1).std())
-            exact = results(scene, scene.height.copy())
+            exact = results(scene, scene.height)
             for rounding in ROUNDINGS:
                 step = rounding * difference
                 height = np.round(scene.height / step) * step

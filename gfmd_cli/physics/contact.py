@@ -133,24 +133,24 @@ class Contact:
         """Lay pressed points on the indenter if the gap of some is below the error of u.
 
         Contact is u = h to the last bit, and of such a point the residual counts only the gap.
-        Points are laid whose stress is larger than its error and stays compressive when they are
-        laid alone; sigma is not changed. `residual` is that of u. Returns whether any point was
-        laid.
+        A point is laid if its stress is larger than the error of sigma and stays compressive when
+        this point alone is laid; sigma is not changed. `residual` is the natural residual of u and
+        sigma. Returns whether any point was laid.
         """
         doubt = DOUBT * residual * min(self.pressure, 1.0)
 
-        def pressed(rows: slice) -> tuple[Field, Mask]:
-            gap = u[rows] - self.obstacle[rows]
-            return gap, sigma[rows] > np.maximum(self.point_stiffness * gap, doubt)
+        def pressed(rows: slice, gap: Field) -> Mask:
+            return sigma[rows] > np.maximum(self.point_stiffness * gap, doubt)
 
         missed = 0
         for rows in row_blocks(u):
-            gap, is_pressed = pressed(rows)
-            missed += int(np.count_nonzero((gap > 0) & (gap < doubt) & is_pressed))
+            gap = u[rows] - self.obstacle[rows]
+            missed += int(np.count_nonzero((gap > 0) & (gap < doubt) & pressed(rows, gap)))
         if not self.grid.total(missed):
             return False
         for rows in row_blocks(u):
-            np.copyto(u[rows], self.obstacle[rows], where=pressed(rows)[1])
+            h = self.obstacle[rows]
+            np.copyto(u[rows], h, where=pressed(rows, u[rows] - h))
         return True
 
     @cached_property

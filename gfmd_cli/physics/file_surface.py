@@ -281,7 +281,7 @@ class FileSurface(RigidSurface):
         return _read(self.path, self.dataset, region=self.region, flip=self.flip, crop=self.crop)
 
     def remarks(self, boundary: str = "periodic") -> list[str]:
-        """Warnings: a missing side, filled heights, an unusual gradient, a step at the border."""
+        """Warnings about the side, the heights, their gradient and borders, and unused keys."""
         topography, heights, remarks = self._topography(), _prepared(self), []
         if self._known_length() is None:
             remarks.append(
@@ -439,7 +439,7 @@ def _rounding(topography: Topography, scale: float) -> str:
     return (
         f"{equal:.0%} of the neighbouring heights are equal: if they were rounded (the smallest "
         f"step is {scale * smallest:.3g} m), the gradient is too large and the contact area "
-        "too small; read the heights with more digits"
+        "too small; export the heights with more digits"
     )
 
 

@@ -33,14 +33,16 @@ LARGEST_SHARE = 0.065  # of the tiles; with more a solve on the whole grid is fa
 REACH = 2  # points by which the contact may grow from a grid to the next
 COARSE_TOLERANCE = 0.03  # on grids before the finest; measured: 0.01 to 0.1 differ by 5 %
 FIRST_TOLERANCE = 6e-3  # before the operators on tiles are corrected
-GAIN = 1e-3  # of the residual by a solve on tiles: the relative error of their operators
-LEAST_GAIN = 0.02  # a choice: an evaluation at all points takes longer than a few steps on tiles
+REDUCTION = (1e-3, 0.02)
+"""Smallest and largest factor of the residual that a solve on tiles aims at. The smallest is the
+relative error of their operators; the largest is a choice, because an evaluation at all points
+takes longer than a few steps on tiles."""
 MARGIN = 0.9  # of the tolerance, for the estimated residual of the displacement on the indenter
 AIM = 0.25  # of the tolerance, for that residual after the next solve on the tiles
 MAX_EVALUATIONS = 6  # of the displacement at all points
 SWEEPS = 3  # of relaxation of the displacement on the indenter; 2 to 6 take about as long
 DAMPING = 0.8  # of the relaxation
-LAYING = 2.0  # largest gap that is closed, over the move of a point that would relieve it alone
+LAYING = 2.0  # largest gap that is closed, over the move that takes the stress off this point
 MAX_STEPS = 60  # on the same tiles
 
 
@@ -179,8 +181,8 @@ class _LocalSolve:
             is_good = result.laid_residual < MARGIN * tolerance and not result.entered.any()
             if is_good or count == MAX_EVALUATIONS:
                 break
-            gain = max(AIM * tolerance / result.laid_residual, GAIN)
-            aim = result.residual * min(gain, LEAST_GAIN)
+            reduction = np.clip(AIM * tolerance / result.laid_residual, *REDUCTION)
+            aim = result.residual * float(reduction)
             self.correct(result.entered)
         u = self.grid.empty()  # only now: the solves on tiles need memory, too
         np.subtract(self.values_everywhere, result.level, out=u)
@@ -210,16 +212,16 @@ class _LocalSolve:
     def lay(self, gap: Field) -> tuple[Field, Field]:
         """The gap on the tiles after C s is laid on the indenter, and the stress.
 
-        With C s the stress is s; K times the change of the gap is added. Projected Jacobi sweeps
-        reduce the residual, which consists of short waves.
+        With C s the stress is s; K times the change of the gap is added. Laying leaves a residual
+        of short waves, which projected Jacobi sweeps reduce.
         """
         stiffness = self.contact.point_stiffness
         laid = np.where(self.s > stiffness * gap, 0.0, np.maximum(gap, 0.0))
         stress = self.s + self.map_displacement(laid - gap)
         for _ in range(SWEEPS):
-            change = stress / stiffness
-            relaxed = np.maximum(laid - DAMPING * change, 0.0)
-            laid = np.where(laid < LAYING * change, 0.0, relaxed)
+            move = stress / stiffness
+            relaxed = np.maximum(laid - DAMPING * move, 0.0)
+            laid = np.where(laid < LAYING * move, 0.0, relaxed)
             stress = self.s + self.map_displacement(laid - gap)
         return laid, stress
 

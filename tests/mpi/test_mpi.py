@@ -86,7 +86,7 @@ def contents(path):
 def assert_same(one, other, exact=False):
     """Two study files hold the same, to 1e-10 of the largest value of each column or field.
 
-    An estimated error is a difference of values: of it, to 1e-10 of the value whose error it is.
+    An estimated error is a difference of values; it is the same to 1e-10 of the value itself.
     """
     (values, attributes), (others, other_attributes) = contents(one), contents(other)
     assert attributes == other_attributes
