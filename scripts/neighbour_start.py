@@ -37,7 +37,7 @@ def from_neighbour(contact: Contact, solver: ProjectedCG, pressure: Field) -> fl
     start = start_from(contact.coarsen(half), coarse, [contact], solver.tolerance)
     if start is None:
         raise SystemExit("the contact is too large for a solve on tiles")
-    state = solver.begin(contact, start.u)
+    state = solver.begin_from(start)
     solve(contact, solver, state)
     return start.transforms + state.transforms
 

@@ -2,6 +2,7 @@
 
     python scripts/small_contacts.py --points 512 1024 2048 --p-star 0.001 0.01
     python scripts/small_contacts.py --exponents 2 3 4 --cutoff 0.02
+    python scripts/small_contacts.py --boundary free --points 256 512 1024 --cutoff 0.02
 
 Default surface, one thread. Both ways are timed side by side, `--repeats` times; the minimum
 counts. The numbers of transforms are means over the seeds, and the ratio of times is their median.
@@ -17,9 +18,12 @@ from typing import ClassVar
 
 import numpy as np
 
-from gfmd_cli.physics.contact import Contact, build_scene
+from gfmd_cli.physics.contact import Contact
 from gfmd_cli.physics.elastomers import Power
+from gfmd_cli.physics.free_contact import SCENES
 from gfmd_cli.physics.self_affine import SelfAffine
+from gfmd_cli.solvers.dual import Dual
+from gfmd_cli.solvers.loop import Solver
 from gfmd_cli.solvers.nested_grids import Solution, solve_contact
 from gfmd_cli.solvers.pcg import ProjectedCG
 
@@ -30,7 +34,19 @@ class WholeGrids(ProjectedCG):
     starts_locally: ClassVar[bool] = False
 
 
-def timed(contact: Contact, solver: ProjectedCG) -> tuple[float, Solution]:
+class WholeMaps(Dual):
+    """The same for a free boundary."""
+
+    starts_locally: ClassVar[bool] = False
+
+
+WAYS: dict[str, tuple[type[Solver], type[Solver]]] = {
+    "periodic": (ProjectedCG, WholeGrids),
+    "free": (Dual, WholeMaps),
+}
+
+
+def timed(contact: Contact, solver: Solver) -> tuple[float, Solution]:
     """Processor seconds and solution."""
     start = time.process_time()
     solution = solve_contact(contact, solver)
@@ -39,7 +55,7 @@ def timed(contact: Contact, solver: ProjectedCG) -> tuple[float, Solution]:
 
 def compare(contact: Contact, tolerance: float, repeats: int) -> tuple[float, ...]:
     """Transforms with and without the start, ratio of times, relative difference of gaps."""
-    solvers = [kind(tolerance=tolerance) for kind in (ProjectedCG, WholeGrids)]
+    solvers = [kind(tolerance=tolerance) for kind in WAYS[contact.boundary]]
     seconds = [np.inf, np.inf]
     for _ in range(repeats):
         pairs = [timed(contact, solver) for solver in solvers]
@@ -53,6 +69,7 @@ def compare(contact: Contact, tolerance: float, repeats: int) -> tuple[float, ..
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--points", type=int, nargs="+", default=[512, 1024, 2048])
+    parser.add_argument("--boundary", choices=list(SCENES), default="periodic")
     parser.add_argument("--exponents", type=float, nargs="+", default=[1.0])
     parser.add_argument("--cutoff", type=float, default=0.005, help="lambda_s / L")
     parser.add_argument("--p-star", type=float, nargs="+", default=[0.001, 0.01, 0.1])
@@ -64,7 +81,8 @@ def main() -> None:
     for points in arguments.points:
         for n in arguments.exponents:
             surfaces = [SelfAffine(seed=seed, cutoff=arguments.cutoff) for seed in arguments.seeds]
-            scenes = [build_scene(surface, Power(n=n), points) for surface in surfaces]
+            build = SCENES[arguments.boundary]
+            scenes = [build(surface, Power(n=n), points) for surface in surfaces]
             for p_star in arguments.p_star:
                 results = [
                     compare(scene.contact(p_star), arguments.tolerance, arguments.repeats)

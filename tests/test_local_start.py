@@ -1,20 +1,24 @@
 """The start on tiles: its operators against transforms, its solutions against those without it."""
 
 import copy
+from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
 import pytest
+import scipy.signal
 
 from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.physics.contact import Contact, build_scene
 from gfmd_cli.physics.elastomers import HalfSpace, Power, Slab
+from gfmd_cli.physics.free_contact import SCENES, build_free_scene
 from gfmd_cli.physics.observables import contact_pressure
 from gfmd_cli.physics.self_affine import SelfAffine
+from gfmd_cli.solvers.dual import Dual
 from gfmd_cli.solvers.local_start import start_from
 from gfmd_cli.solvers.nested_grids import Resume, solve_contact
 from gfmd_cli.solvers.pcg import ProjectedCG
-from gfmd_cli.solvers.tile_operators import TileOperators
+from gfmd_cli.solvers.tile_operators import OPERATORS, FreeOperators, PeriodicOperators
 from gfmd_cli.solvers.tiles import Tiles, convolution_matrix
 
 SUITED = [Power(n=0.25), Power(n=0.5), Power(n=1), Power(n=1.25), HalfSpace(E_star=2e9)]
@@ -24,36 +28,35 @@ def name(value):
     return f"n={value.n:g}" if isinstance(value, Power) else None
 
 
-@pytest.fixture
-def some_tiles():
+def some_tiles(*, is_periodic=True):
     """A third of the tiles of a grid of 64 x 96 points, tiles at its edges among them."""
     used = np.random.default_rng(0).random((8, 12)) < 0.3
     used[0, 0] = used[-1, -1] = used[3, 0] = used[0, 7] = True
-    return Tiles(used)
+    return Tiles(used, is_periodic=is_periodic)
 
 
-def test_a_field_on_tiles_is_that_of_the_grid(some_tiles):
+def test_a_field_on_tiles_is_that_of_the_grid():
+    tiles = some_tiles()
     field = np.arange(64 * 96.0).reshape(64, 96)
-    values = some_tiles.take(field)
+    values = tiles.take(field)
     again = np.empty_like(field)
-    some_tiles.put(values, again)
-    everywhere = np.kron(some_tiles.used, np.ones((8, 8), dtype=bool))
+    tiles.put(values, again)
+    everywhere = np.kron(tiles.used, np.ones((8, 8), dtype=bool))
     assert np.array_equal(again, np.where(everywhere, field, 0.0))
 
 
-def test_a_convolution_on_tiles_is_that_of_the_periodic_grid(some_tiles):
+@pytest.mark.parametrize("boundary", ["wrap", "fill"])
+def test_a_convolution_on_tiles_is_that_of_the_grid(boundary):
+    """Periodic, or zero beyond the borders."""
+    tiles = some_tiles(is_periodic=boundary == "wrap")
     random = np.random.default_rng(1)
     kernel = random.standard_normal((17, 17))
-    values = random.standard_normal((some_tiles.count, 64))
+    values = random.standard_normal((tiles.count, 64))
     field = np.empty((64, 96))
-    some_tiles.put(values, field)
-    expected = sum(
-        kernel[8 + i, 8 + j] * np.roll(field, (i, j), axis=(0, 1))
-        for i in range(-8, 9)
-        for j in range(-8, 9)
-    )
-    convolved = some_tiles.convolve(convolution_matrix(kernel), values, None)
-    assert convolved == pytest.approx(some_tiles.take(expected), abs=2e-4)
+    tiles.put(values, field)
+    expected = scipy.signal.convolve2d(field, kernel, mode="same", boundary=boundary)
+    convolved = tiles.convolve(convolution_matrix(kernel), values, None)
+    assert convolved == pytest.approx(tiles.take(expected), abs=2e-4)
 
 
 GRIDS = [Grid(256), Grid(320, points_y=128), Grid(192, points_y=128, length_y=0.8)]
@@ -71,19 +74,41 @@ def test_the_compliance_on_tiles_is_that_of_transforms(elastomer, grid):
     tiles.put(s, field)
     compliance = np.divide(1.0, k, out=np.zeros_like(k), where=k > 0)
     expected = tiles.take(np.fft.irfft2(np.fft.rfft2(field) * compliance, s=grid.shape))
-    difference = TileOperators(contact).displacement(tiles)(s) - expected
+    difference = PeriodicOperators(contact).displacement(tiles)(s) - expected
     assert np.std(difference) < 3e-3 * np.std(expected)  # a rigid displacement is free
 
 
-def test_the_stiffness_on_tiles_is_that_of_a_point_up_to_its_reach():
-    grid = Grid(256)
-    k = Power(n=1).stiffness(grid.wavenumber(), 1.0)
-    contact = Contact(grid, np.zeros(grid.shape), k, 0.01)
+MAPS = [(256, 256, 1.0), (192, 320, 0.6), (192, 256, 1.0)]  # points along y and x, side along y
+
+
+@pytest.mark.parametrize("size", MAPS, ids=["square", "oblong", "oblong pixels"])
+@pytest.mark.parametrize("elastomer", SUITED, ids=name)
+def test_the_compliance_on_tiles_of_a_map_is_that_of_its_transforms(elastomer, size):
+    down, right, length_y = size
+    surface = SelfAffine(cutoff=0.05, length_y=length_y)
+    contact = build_free_scene(surface, elastomer, right, points_y=down).contact(0.01)
+    random = np.random.default_rng(2)
+    used = random.random((down // 8, right // 8)) < 0.2
+    used[0, 0] = used[-1, -1] = True
+    tiles = Tiles(used, is_periodic=False)
+    s = random.random((tiles.count, 64))
+    field = np.empty(contact.grid.shape)
+    tiles.put(s, field)
+    expected = tiles.take(contact.free.displacement(field, out=field))
+    difference = FreeOperators(contact).displacement(tiles)(s) - expected
+    assert np.std(difference) < 3e-3 * np.std(expected)
+
+
+@pytest.mark.parametrize("boundary", ["periodic", "free"])
+def test_the_stiffness_on_tiles_is_that_of_a_point_up_to_its_reach(boundary):
+    scene = SCENES[boundary](SelfAffine(cutoff=0.05), Power(n=1), 256)
+    contact, grid = scene.contact(0.01), Grid(256)
+    k = Power(n=1).stiffness(grid.wavenumber(), 1.0) * (scene.h_std / scene.delta_sigma)
     tiles = Tiles(np.ones((32, 32), dtype=bool))
     u = np.zeros(grid.shape)
     u[100, 100] = 1.0
     stress = np.empty(grid.shape)
-    tiles.put(TileOperators(contact).stress(tiles)(tiles.take(u)), stress)
+    tiles.put(OPERATORS[boundary](contact).stress(tiles)(tiles.take(u)), stress)
     near = (slice(92, 109), slice(92, 109))
     exact = np.fft.irfft2(np.fft.rfft2(u) * k)
     assert stress[near] == pytest.approx(exact[near], abs=1e-3 * exact.max())
@@ -91,27 +116,47 @@ def test_the_stiffness_on_tiles_is_that_of_a_point_up_to_its_reach():
     assert not stress.any()
 
 
+KINDS = {"periodic": ProjectedCG, "free": Dual}
+
+
 def solve(contact, locally, tolerance=1e-8, watch=lambda contact, state: None):
     """The solution with or without a start on tiles."""
 
-    class Solver(ProjectedCG):
+    class Solver(KINDS[contact.boundary]):
         starts_locally: ClassVar[bool] = locally
 
     return solve_contact(contact, Solver(tolerance=tolerance), watch)
 
 
+def with_holes(contact):
+    """The contact, a tenth of whose points never touch: discs of all sizes up to 20 points."""
+    random = np.random.default_rng(5)
+    y, x = np.indices(contact.grid.shape)
+    may_touch = np.ones(contact.grid.shape, dtype=bool)
+    while may_touch.mean() > 0.9:
+        radius, *centre = random.random(3) * (20, *contact.grid.shape)
+        may_touch &= np.hypot(y - centre[0], x - centre[1]) > radius
+    return replace(contact, may_touch=may_touch)
+
+
 @pytest.mark.parametrize("p_star", [1e-5, 1e-3, 0.01])
 @pytest.mark.parametrize("elastomer", [SUITED[1], SUITED[2], SUITED[4]], ids=name)
-def test_the_solution_is_that_of_the_whole_grid(elastomer, p_star):
-    contact = build_scene(SelfAffine(cutoff=0.02), elastomer, 512).contact(p_star)
+@pytest.mark.parametrize("boundary", ["periodic", "free"])
+@pytest.mark.parametrize("change", [None, with_holes], ids=["", "with holes"])
+def test_the_solution_is_that_of_the_whole_grid(elastomer, p_star, boundary, change):
+    contact = SCENES[boundary](SelfAffine(cutoff=0.02), elastomer, 512).contact(p_star)
+    contact = change(contact) if change else contact
     local, whole = solve(contact, True), solve(contact, False)
     assert local.status == whole.status == "converged"
     assert local.transforms < 0.6 * whole.transforms
     assert local.u == pytest.approx(whole.u, abs=1e-7)
-    touching = local.u == contact.height
-    assert np.count_nonzero(touching != (whole.u == contact.height)) <= 2
-    assert np.all(local.u >= contact.height)
-    assert local.sigma == pytest.approx(contact.stress(local.u, np.empty(local.u.shape)), abs=1e-9)
+    touching, touching_whole = (one.u == contact.obstacle for one in (local, whole))
+    assert np.count_nonzero(touching != touching_whole) <= 2
+    assert np.all(local.u >= contact.obstacle)
+    u, sigma = local.u.copy(), local.sigma.copy()
+    assert contact.recompute(u, sigma) == pytest.approx(local.residual, abs=1e-9)
+    assert u == pytest.approx(local.u, abs=1e-9)
+    assert sigma == pytest.approx(local.sigma, abs=1e-9)
 
 
 @pytest.mark.parametrize("elastomer", [Power(n=0.5), Power(n=1)], ids=name)
@@ -180,8 +225,9 @@ def test_a_large_contact_is_solved_on_the_whole_grid():
     assert start_from(contact.coarsen((256, 256)), np.ones((256, 256)), [contact], 1e-3) is None
 
 
-def test_a_solve_stopped_on_a_coarse_grid_goes_on_bit_by_bit():
-    contact = build_scene(SelfAffine(cutoff=0.02), Power(n=1), 512).contact(1e-3)
+@pytest.mark.parametrize("boundary", ["periodic", "free"])
+def test_a_solve_stopped_on_a_coarse_grid_goes_on_bit_by_bit(boundary):
+    contact = SCENES[boundary](SelfAffine(cutoff=0.02), Power(n=1), 512).contact(1e-3)
     states = []
 
     def keep(current, state):
@@ -193,15 +239,16 @@ def test_a_solve_stopped_on_a_coarse_grid_goes_on_bit_by_bit():
     for chosen in (coarse[1], coarse[len(coarse) // 2], coarse[-1], len(states) - 1):
         shape, state = states[chosen]
         resumed = solve_contact(
-            contact, ProjectedCG(tolerance=1e-6), start=Resume(shape, vars(state))
+            contact, KINDS[boundary](tolerance=1e-6), start=Resume(shape, vars(state))
         )
         assert np.array_equal(resumed.u, straight.u)
         assert np.array_equal(resumed.sigma, straight.sigma)
         assert resumed.residual == straight.residual
 
 
-def test_a_solve_on_tiles_notices_a_request_to_stop():
-    contact = build_scene(SelfAffine(cutoff=0.02), Power(n=1), 512).contact(1e-3)
+@pytest.mark.parametrize("boundary", ["periodic", "free"])
+def test_a_solve_on_tiles_notices_a_request_to_stop(boundary):
+    contact = SCENES[boundary](SelfAffine(cutoff=0.02), Power(n=1), 512).contact(1e-3)
     states = []
 
     def stop_at_the_third(current, state):
@@ -211,4 +258,4 @@ def test_a_solve_on_tiles_notices_a_request_to_stop():
 
     with pytest.raises(KeyboardInterrupt):
         solve(contact, True, 1e-6, stop_at_the_third)
-    assert states[-1][0] == (256, 256)
+    assert states[-1][0] == {"periodic": (256, 256), "free": (64, 64)}[boundary]

@@ -70,6 +70,13 @@ class Contact:
         """k(q) of the waves along x, from q = 0 on, shape (points/2 + 1,)."""
         return self.grid.line(self.stiffness)
 
+    @property
+    def exponents(self) -> tuple[float, float]:
+        """Smallest and largest exponent d ln k / d ln q of the waves along x."""
+        k = self.line[1:]
+        exponents = np.diff(np.log(k)) / np.diff(np.log(np.arange(1, k.size + 1)))
+        return float(exponents.min()), float(exponents.max())
+
     @cached_property
     def dispersion(self) -> tuple[Field, Field]:
         """|q| L / 2 pi of the waves along the axes, rising from the longest wave, and their k(q).
@@ -181,12 +188,19 @@ class Contact:
         """Natural residual from the sum of the squares of min(g, sigma)."""
         return sqrt(violation / self.grid.size) / min(self.pressure, 1.0)
 
-    def coarsen(self, shape: Shape) -> "Contact":
-        """The same contact, low-pass filtered on a coarser grid."""
+    def coarsen(self, shape: Shape, *, is_sampled: bool = False) -> "Contact":
+        """The same contact on a coarser grid.
+
+        The heights are low-pass filtered, or those of every other point of the grid where half of
+        them are asked for and `is_sampled` is true, which needs no transform.
+        """
         grid = self.grid.coarser(shape)
         k = self.grid.cut(self.stiffness, grid)
-        height, mask = self.grid.resample(self.height, grid), self._coarse_mask(grid)
-        return Contact(grid, height, k, self.pressure, mask)
+        if is_sampled and self.grid.shape == tuple(2 * points for points in shape):
+            height = np.ascontiguousarray(self.height[(slice(None, None, 2),) * grid.dimension])
+        else:
+            height = self.grid.resample(self.height, grid)
+        return Contact(grid, height, k, self.pressure, self._coarse_mask(grid))
 
     def _coarse_mask(self, grid: Grid) -> Mask | None:
         """Points of a coarser grid with a known height on a part of their pixel."""

@@ -18,12 +18,13 @@ the two pixels in points, [y, x]. In two dimensions `rows` are the rows of such 
 from collections.abc import Callable
 
 import numpy as np
-from scipy.special import gamma, hyp2f1, rgamma
+from scipy.special import gamma, gammainc, hyp2f1, rgamma
 
 from gfmd_cli.grid.arrays import Field
 
 NEAR = 64  # sides of a pixel within which the integral over it is in closed form
 NODES = 2  # of Gauss's rule along each side beyond: relative error below 1e-9 (tested)
+SMALLEST = 1e-12  # (alpha r)^2 below which the smooth part is that at r = 0, within this share
 ALL_ROWS = slice(None)
 
 Shape = tuple[int, ...]
@@ -35,6 +36,23 @@ def power_law(n: float, shape: Shape, spacings: Spacings, rows: slice = ALL_ROWS
     if len(shape) == 2:
         return _plane(n, shape, spacings, rows)
     return _logarithmic_line(*shape, *spacings) if n == 1 else _line(n, *shape, *spacings)
+
+
+def smooth_part(n: float, alpha: float, r: Field) -> Field:
+    """The part of G(r) whose transform is Q(n/2, q^2 / 4 alpha^2) / q^n, for 0 < n < 2.
+
+    Q is the regularised incomplete gamma function. With q^(-n) as the integral of
+    t^(n/2-1) exp(-q^2 t) / Gamma(n/2), this is the part t > 1 / 4 alpha^2, in two dimensions
+
+        c_n r^(n-2) P(1 - n/2, alpha^2 r^2),    P = 1 - Q,
+
+    which is finite at r = 0. For n = 1 it is erf(alpha r) / (2 pi r).
+    """
+    power = 1 - n / 2
+    far = 2 ** (1 - n) * gamma(power) * rgamma(n / 2) / (2 * np.pi)
+    x = np.maximum((alpha * r) ** 2, SMALLEST)
+    values: Field = far * alpha ** (2 * power) * gammainc(power, x) * x**-power
+    return values
 
 
 def _plane(n: float, shape: Shape, spacings: Spacings, rows: slice) -> Field:

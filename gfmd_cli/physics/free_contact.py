@@ -12,6 +12,7 @@ where means are taken over the map. At the solution, g = C sigma + c - h >= 0 an
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from math import inf
 from typing import Any, ClassVar
 
 import numpy as np
@@ -103,6 +104,12 @@ class FreeContact(Contact):
     boundary: ClassVar[str] = "free"
     free: FreeElasticity = field(kw_only=True)
 
+    @property
+    def exponents(self) -> tuple[float, float]:
+        """The exponent of a power law, twice; no limits where k(q) is none."""
+        n = self.free.elastomer.exponent
+        return (-inf, inf) if n is None else (n, n)
+
     def recompute(self, u: Field, sigma: Field) -> float:
         """Compute u from sigma, u = h in contact and above it elsewhere; return the residual."""
         gap = self.free.displacement(sigma, out=self.grid.empty())
@@ -129,7 +136,7 @@ class FreeContact(Contact):
         mask = None if self.may_touch is None else mirror(self.may_touch)
         return Contact(grid, mirror(self.height), k, self.pressure, mask)
 
-    def coarsen(self, shape: Shape) -> "FreeContact":
+    def coarsen(self, shape: Shape, *, is_sampled: bool = False) -> "FreeContact":
         """The same contact on larger pixels, with the means of the heights over them."""
         grid = self.grid.coarser(shape)
         return replace(

@@ -26,7 +26,8 @@ from scipy.linalg import LinAlgError, cho_factor, cho_solve
 from gfmd_cli.grid.arrays import Field, Mask, row_blocks
 from gfmd_cli.physics.contact import Contact
 from gfmd_cli.solvers.contact_state import refined
-from gfmd_cli.solvers.local_start import COARSE_TOLERANCE, Start
+from gfmd_cli.solvers.local_start import COARSE_TOLERANCE
+from gfmd_cli.solvers.loop import Start
 from gfmd_cli.solvers.multigrid import STEEP, largest_growth
 
 COST = 5000  # largest n^3 per point of a grid; measured: with more, the iteration is faster
@@ -65,7 +66,7 @@ def direct_start(
         if not is_solved:
             break
         solved, touching = solve, solve.touching
-    return Start(solved.displacement(), transforms, solved.contact) if solved else None
+    return Start(solved.contact, transforms, solved.displacement()) if solved else None
 
 
 def _largest_count(contact: Contact) -> int:

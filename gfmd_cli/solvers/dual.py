@@ -29,7 +29,7 @@ from gfmd_cli.grid.arrays import Field, Mask
 from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.physics.contact import Contact
 from gfmd_cli.physics.free_contact import FreeContact, mean_over
-from gfmd_cli.solvers.loop import Solver, State
+from gfmd_cli.solvers.loop import Solver, Start, State
 from gfmd_cli.solvers.projected_move import choose
 
 PROPORTION = 0.3  # of the gap on overlapping points to that in contact; as in `pcg`
@@ -59,34 +59,44 @@ class Dual(Solver):
     """Fields of double precision at the peak of a solve; scripts/memory.py measures it."""
 
     state_type: ClassVar[type[State]] = DualState
+    starts_locally: ClassVar[bool] = True
     boundary: ClassVar[str] = "free"
 
     def begin(self, contact: Any, u: Field) -> DualState:
         """Start from a uniform stress."""
-        return self._begin_from(contact, u, np.ones(contact.grid.shape))
+        return self._begin_with(contact, u, np.ones(contact.grid.shape))
 
     def continue_from(self, coarse: Contact, state: State, fine: Any) -> DualState:
         """Start from the stress on larger pixels."""
         stress = coarse.grid.average(state.sigma, fine.grid)
-        return self._begin_from(fine, fine.grid.empty(), stress)
+        return self._begin_with(fine, fine.grid.empty(), stress)
 
-    def _begin_from(self, contact: FreeContact, u: Field, stress: Field) -> DualState:
+    def begin_from(self, start: Start) -> DualState:
+        """Start from a stress of the mean p and the displacement that it causes."""
+        assert start.sigma is not None
+        assert isinstance(start.contact, FreeContact)
+        state = _new_state(start.contact.grid.empty(), start.sigma, start.u)
+        self._compare(start.contact, state)
+        return state
+
+    def _begin_with(self, contact: FreeContact, u: Field, stress: Field) -> DualState:
         """Start from a stress, where the surface can touch, scaled to the mean p."""
         contact.clear_untouchable(stress)
         stress *= contact.pressure * contact.grid.size / contact.grid.total(stress.sum())
-        zeros = np.zeros_like(stress)
-        state = DualState(
-            u=u, sigma=stress, gap=contact.grid.empty(), direction=zeros, change=zeros.copy()
-        )
+        state = _new_state(u, stress, contact.grid.empty())
         self.refresh(contact, state)
         return state
 
     def refresh(self, contact: Any, state: Any) -> None:
         """Compute the gap, u and the residual from the stress."""
         contact.free.displacement(state.sigma, out=state.gap)
+        state.transforms += contact.free.transforms
+        self._compare(contact, state)
+
+    def _compare(self, contact: FreeContact, state: DualState) -> None:
+        """Compute the gap from the displacement in its place, then u and the residual."""
         state.gap -= contact.height
         state.exact = True
-        state.transforms += contact.free.transforms
         self._assess(contact, state)
 
     def _assess(self, contact: FreeContact, state: DualState) -> None:
@@ -169,6 +179,12 @@ class Dual(Solver):
         if choice.restart:
             state.slope = 0.0
         return choice.fraction
+
+
+def _new_state(u: Field, stress: Field, gap: Field) -> DualState:
+    """A state without a last direction."""
+    direction, change = np.zeros_like(stress), np.zeros_like(stress)
+    return DualState(u=u, sigma=stress, gap=gap, direction=direction, change=change)
 
 
 def _chosen(contact: FreeContact, state: DualState) -> Mask:

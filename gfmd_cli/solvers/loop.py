@@ -47,6 +47,20 @@ class State:
     """Smallest residual measured on a sigma computed afresh."""
 
 
+@dataclass
+class Start:
+    """What a solver starts from on a grid."""
+
+    contact: Contact
+    """The contact on this grid."""
+    transforms: float
+    """Transforms that it took, in units of transforms on this grid."""
+    u: Field
+    """Displacement u >= h, and u = h in contact. With a free boundary C sigma."""
+    sigma: Field | None = None
+    """Stress, with a free boundary only."""
+
+
 class Solver(Choice):
     """The keys that all kinds of solvers share."""
 
@@ -96,6 +110,10 @@ class Solver(Choice):
     def begin(self, contact: Any, u: Field) -> State:
         """Return the state that starts from displacement `u`, which is overwritten."""
         raise NotImplementedError
+
+    def begin_from(self, start: Start) -> State:
+        """Return the state that begins with a start, whose fields are overwritten."""
+        return self.begin(start.contact, start.u)
 
     def continue_from(self, coarse: Contact, state: State, fine: Any) -> State:
         """Return the state that starts from a solution on a coarser grid."""

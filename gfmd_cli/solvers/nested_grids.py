@@ -12,8 +12,8 @@ from gfmd_cli.grid.fft_grid import Grid, Shape
 from gfmd_cli.physics.contact import Contact
 from gfmd_cli.physics.observables import contact_pressure
 from gfmd_cli.solvers.direct_start import direct_start
-from gfmd_cli.solvers.local_start import COARSE_TOLERANCE, Start, start_from, tiles_apply
-from gfmd_cli.solvers.loop import Solver, State, Watch, ignore, solve
+from gfmd_cli.solvers.local_start import COARSE_TOLERANCE, start_from, tiles_apply
+from gfmd_cli.solvers.loop import Solver, Start, State, Watch, ignore, solve
 from gfmd_cli.solvers.multigrid import ASPECT
 from gfmd_cli.status import Status
 
@@ -53,7 +53,7 @@ def solve_contact(
     contact: Contact,
     solver: Solver,
     watch: Watch = ignore,
-    start: Resume | Field | None = None,
+    start: Resume | Start | None = None,
 ) -> Solution:
     """Solve one contact, nested over grids.
 
@@ -61,8 +61,8 @@ def solve_contact(
     ----------
     watch : is called with every state on every grid, and with the last state of the coarse grid at
         every step of a start on tiles and for every set of points of a direct one
-    start : the state of an unfinished solve, or a displacement on the grid of the contact, which is
-        overwritten; without it the solve starts on the coarsest grid
+    start : the state of an unfinished solve, or a start on the grid of the contact; without it the
+        solve starts on the coarsest grid
     """
     solver = solver.for_contact(contact)
     loose = solver.model_copy(update={"tolerance": max(solver.tolerance, COARSE_TOLERANCE)})
@@ -88,10 +88,10 @@ def solve_contact(
         transforms += state.transforms * fine.grid.size / contact.grid.size
         coarse = fine
         if grids and solver.starts_locally:
-            local = _local_start(fine, state, grids[::-1], solver.tolerance, watch)
-            if local is not None:
-                start, transforms = local.u, transforms + local.transforms
-                while grids[-1] is not local.contact:
+            start = _local_start(fine, state, grids[::-1], solver.tolerance, watch)
+            if start is not None:
+                transforms += start.transforms
+                while grids[-1] is not start.contact:
                     grids.pop()
     assert state is not None
     for _ in range(MAX_LAYINGS if contact.boundary == "periodic" else 0):
@@ -119,7 +119,7 @@ def _local_start(
     pause = partial(watch, coarse, state)
     if tiles_apply(finer[-1]):
         return start_from(coarse, pressure, finer, tolerance, pause)
-    return direct_start(pressure > 0, finer, pause)
+    return direct_start(pressure > 0, finer, pause) if coarse.boundary == "periodic" else None
 
 
 def levels(shape: Shape, sides: tuple[float, ...]) -> list[Shape]:
@@ -151,15 +151,20 @@ def grids_of(solver: Solver, grid: Grid) -> list[Shape]:
     return levels(grid.whole_shape, grid.sides) if nested else [grid.whole_shape]
 
 
-def _grids(contact: Contact, solver: Solver, start: Resume | Field | None) -> list[Contact]:
-    """The contact on all grids that are to be solved, the finest first."""
-    starts_here = isinstance(start, np.ndarray)
+def _grids(contact: Contact, solver: Solver, start: Resume | Start | None) -> list[Contact]:
+    """The contact on all grids that are to be solved, the finest first.
+
+    Where a small contact will be solved on tiles, heights at every other point of a grid predict
+    the contact as well as filtered ones (docs/solvers.md), and need no transform.
+    """
+    starts_here = isinstance(start, Start)
     chain = [contact.grid.whole_shape] if starts_here else grids_of(solver, contact.grid)
     if isinstance(start, Resume):
         chain = chain[chain.index(start.shape) :]
     contacts = [contact]
+    is_sampled = solver.starts_locally and tiles_apply(contact)
     for shape in chain[-2::-1]:
-        contacts.append(contacts[-1].coarsen(shape))
+        contacts.append(contacts[-1].coarsen(shape, is_sampled=is_sampled))
     return contacts
 
 
@@ -168,11 +173,11 @@ def _begin(
     fine: Contact,
     coarse: Contact | None,
     state: State | None,
-    start: Field | Resume | None,
+    start: Start | None,
 ) -> State:
-    """The first state: from a displacement, a coarser grid, or u flat on the highest point."""
-    if isinstance(start, np.ndarray):
-        return solver.begin(fine, start)
+    """The first state: from a start, a coarser grid, or u flat on the highest point."""
+    if start is not None:
+        return solver.begin_from(start)
     if coarse is not None and state is not None:
         return solver.continue_from(coarse, state, fine)
     u = fine.grid.empty()

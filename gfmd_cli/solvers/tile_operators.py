@@ -11,26 +11,32 @@ its kernel decays like a Gaussian; it is summed directly over a tile and the eig
 decays like a Gaussian; it is evaluated by transforms on a grid with a quarter of the points along
 each axis, with pressures and displacements interpolated by B-splines (Essmann et al., J. Chem.
 Phys. 103, 8577, 1995). For k ~ q, P = erf x and the kernel of P / k is erfc(alpha r) / r.
+
+With a free boundary k ~ q^n, and both parts are known in real space: the smooth one from
+`free_compliance.smooth_part`, the short-ranged one as the rest of the displacement by a pixel.
 """
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any, TypeAlias
+from math import prod
+from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import gammainc, gammaincc
 
 from gfmd_cli.grid.arrays import Field
-from gfmd_cli.grid.fft_grid import Grid
+from gfmd_cli.grid.convolution import PaddedTransform, padded_shape
+from gfmd_cli.grid.fft_grid import Grid, Shape
 from gfmd_cli.physics.contact import Contact
+from gfmd_cli.physics.free_compliance import smooth_part
+from gfmd_cli.physics.free_contact import FreeContact
 from gfmd_cli.solvers.tiles import SIDE, Tiles, convolution_matrix
 
 COARSENING = 4  # spacing of the grid of the smooth part, in grid points
-DECAY = (
-    3.0  # x^2 at the highest wavenumber of that grid. The error of C s, relative to its standard
-)
-# deviation, is then smallest, 7e-4 (default surface, 1024^2, n = 1, p* = 0.01)
+DECAY = 3.0
+"""x^2 at the highest wavenumber of that grid. The error of C s, relative to its standard deviation,
+is then smallest, 7e-4 (default surface, 1024^2, n = 1, p* = 0.01)."""
 ORDER = 4  # of the B-splines: cubic
 LARGEST_X = 4.0  # Q is below 1e-6 of its largest value there
 TABLE = 4096  # values of Q: the error of linear interpolation is below 1e-6
@@ -43,46 +49,37 @@ TileMap = Callable[[Field], Field]
 
 
 class TileOperators:
-    """Compliance and stiffness of a contact on tiles of its grid."""
+    """Compliance and stiffness on tiles of a grid; a subclass provides what the boundary changes.
 
-    def __init__(self, contact: Contact) -> None:
-        self.grid = grid = contact.grid
-        coarse = grid.coarser(tuple(points // COARSENING for points in grid.shape))
-        self.coarse = replace(coarse, precision="single")
-        alpha = np.pi / (2 * COARSENING * max(grid.spacings) * np.sqrt(DECAY))
-        line = contact.line
-        order = 0.5 * float(np.log2(line[2] / line[1]))  # a
-        k, q = _stiffness_of_small_cell(contact)
-        q[0, 0], k[0, 0] = 2 * np.pi / grid.length, line[1]  # P / k is constant at small q
-        self.short_ranged = convolution_matrix(
-            _near_values(gammainc(order, (q / (2 * alpha)) ** 2) / k)
-        )
-        k[0, 0] = 0.0
-        self.stiffness = convolution_matrix(_near_values(k))
-        x = np.linspace(0.0, LARGEST_X, TABLE)
-        self.smooth = np.interp(self.coarse.wavenumber() / (2 * alpha), x, gammaincc(order, x * x))
-        k = grid.cut(contact.stiffness, self.coarse)
-        np.divide(self.smooth, k, out=self.smooth, where=k > 0)
-        self.smooth[0, 0] = 0.0
-        self.smooth /= _spline_spectrum(self.coarse) ** 2 * COARSENING**2
+    Parameters
+    ----------
+    short_ranged, stiffness : kernels of P / k and of k, as for `convolution_matrix`
+    coarse_shape : shape of the grid of the smooth part
+    """
+
+    first_node: ClassVar[int] = 0
+    """Number of the point of the coarse grid at the first point of the grid."""
+    transforms: float
+    """Transforms of one displacement, by their share of points."""
+
+    def __init__(
+        self, grid: Grid, short_ranged: Field, stiffness: Field, coarse_shape: Shape
+    ) -> None:
+        self.grid = grid
+        self.short_ranged = convolution_matrix(short_ranged)
+        self.stiffness = convolution_matrix(stiffness)
+        self.coarse_shape = coarse_shape
         self.weights = _weights()
-
-    @property
-    def transforms(self) -> float:
-        """Transforms of one displacement, by their share of points."""
-        return self.coarse.pair_count * self.coarse.size / self.grid.size
 
     def displacement(self, tiles: Tiles) -> TileMap:
         """The map s -> C s on these tiles, up to a rigid displacement."""
         nodes = self._nodes(tiles)
-        values = self.coarse.padded[..., : self.coarse.points]
-        rows, columns = np.unravel_index(nodes, self.coarse.shape)
+        size = prod(self.coarse_shape)
+        rows, columns = np.unravel_index(nodes, self.coarse_shape)
 
         def map_pressure(s: Field) -> Field:
-            loads = (s @ self.weights).ravel()
-            density = np.bincount(nodes.ravel(), loads, minlength=self.coarse.size)
-            values[...] = density.reshape(self.coarse.shape)
-            self.coarse.filter_padded(self.smooth)
+            loads: Any = np.bincount(nodes.ravel(), (s @ self.weights).ravel(), size)
+            values = self._smooth(loads.reshape(self.coarse_shape))
             w: Field = values[rows, columns] @ self.weights.T
             w += tiles.convolve(self.short_ranged, s, self.grid.rows.pool)
             return w
@@ -93,13 +90,98 @@ class TileOperators:
         """The map u -> K u on these tiles, with the kernel of K cut off at 8 points."""
         return lambda u: tiles.convolve(self.stiffness, u, self.grid.rows.pool)
 
+    def _smooth(self, loads: Field) -> Field:
+        """The smooth part of the displacement by loads, as coefficients of the splines."""
+        raise NotImplementedError
+
     def _nodes(self, tiles: Tiles) -> Indices:
         """Numbers of the points of the coarse grid around each tile, shape (tiles, 25)."""
-        down, right = self.coarse.shape
-        nodes = _nodes_of_tile()
+        down, right = self.coarse_shape
+        nodes = _nodes_of_tile() + self.first_node
         i = (tiles.rows[:, None] * (SIDE // COARSENING) + nodes) % down
         j = (tiles.columns[:, None] * (SIDE // COARSENING) + nodes) % right
         return (i[:, :, None] * right + j[:, None, :]).reshape(tiles.count, -1)
+
+
+class PeriodicOperators(TileOperators):
+    """The operators of a periodic cell."""
+
+    def __init__(self, contact: Contact) -> None:
+        grid, line, alpha = contact.grid, contact.line, _alpha(contact.grid)
+        order = 0.5 * float(np.log2(line[2] / line[1]))  # a
+        k, q = _stiffness_of_small_cell(contact)
+        stiffness = _near_values(k)
+        q[0, 0], k[0, 0] = 2 * np.pi / grid.length, line[1]  # P / k is constant at small q
+        short_ranged = _near_values(gammainc(order, (q / (2 * alpha)) ** 2) / k)
+        shape = tuple(points // COARSENING for points in grid.shape)
+        super().__init__(grid, short_ranged, stiffness, shape)
+        self.coarse = replace(grid.coarser(shape), precision="single")
+        x = np.linspace(0.0, LARGEST_X, TABLE)
+        q = self.coarse.wavenumber()
+        symbol: Field = np.interp(q / (2 * alpha), x, gammaincc(order, x * x))
+        k = grid.cut(contact.stiffness, self.coarse)
+        np.divide(symbol, k, out=symbol, where=k > 0)
+        symbol[0, 0] = 0.0
+        splines = _spline_spectrum(np.fft.fftfreq(shape[0]), np.fft.rfftfreq(shape[1]))
+        self.symbol = symbol / (splines**2 * COARSENING**2)
+        self.transforms = self.coarse.pair_count * self.coarse.size / grid.size
+
+    def _smooth(self, loads: Field) -> Field:
+        values = self.coarse.padded[..., : self.coarse.points]
+        values[...] = loads
+        self.coarse.filter_padded(self.symbol)
+        return values
+
+
+class FreeOperators(TileOperators):
+    """The operators of an elastomer of stiffness k_n q^n that extends beyond the map."""
+
+    first_node: ClassVar[int] = (
+        ORDER // 2 - 1
+    )  # splines around points beyond the border overlap tiles, too
+
+    def __init__(self, contact: FreeContact) -> None:
+        grid, free, near = contact.grid, contact.free, (SIDE + 1, SIDE + 1)
+        pixel = free.elastomer.free_compliance(near, grid.spacings) * free.unit
+        distance = np.abs(np.arange(-SIDE, SIDE + 1))
+        short_ranged = (pixel - _smooth_part(contact, near, 1))[distance[:, None], distance]
+        sides = [CELL * spacing for spacing in grid.spacings]
+        cell = Grid(CELL, points_y=CELL, length=sides[1], length_y=sides[0])
+        k = free.elastomer.stiffness(cell.wavenumber(), grid.length) / free.unit
+        shape = tuple(points // COARSENING + ORDER - 1 for points in grid.shape)
+        super().__init__(grid, short_ranged, _near_values(k), shape)
+        padded = padded_shape(shape, 2.0)
+        self.transform = PaddedTransform(shape, padded, "single", len(grid.rows.parts))
+        y, x = (np.arange(points // 2 + 1) / points for points in padded)
+        symbol = self.transform.symbol_of(_smooth_part(contact, shape, COARSENING))
+        self.symbol = (symbol / _spline_spectrum(y, x) ** 2).astype(np.float32)
+        self.values = np.empty(shape, np.float32)
+        self.transforms = padded[0] * padded[1] / grid.size
+
+    def _smooth(self, loads: Field) -> Field:
+        return self.transform.apply(self.symbol, loads, self.values)
+
+
+OPERATORS: dict[str, Callable[..., TileOperators]] = {
+    "periodic": PeriodicOperators,
+    "free": FreeOperators,
+}
+"""The operators, by the boundary of the contact."""
+
+
+def _alpha(grid: Grid) -> float:
+    """The inverse range of the short-ranged part [1/m]."""
+    return float(np.pi / (2 * COARSENING * max(grid.spacings) * np.sqrt(DECAY)))
+
+
+def _smooth_part(contact: FreeContact, shape: Shape, step: int) -> Field:
+    """The smooth part of the displacement by unit pressure on a pixel, at every so many points."""
+    grid, elastomer = contact.grid, contact.free.elastomer
+    assert elastomer.exponent is not None
+    y, x = (step * h * np.arange(m) for m, h in zip(shape, grid.spacings, strict=True))
+    kernel = smooth_part(elastomer.exponent, _alpha(grid), np.hypot(y[:, None], x))
+    k_n = float(elastomer.stiffness(np.ones(1))[0])
+    return kernel * (contact.free.unit / k_n * float(np.prod(grid.spacings)))
 
 
 def _nodes_of_tile() -> Indices:
@@ -114,11 +196,10 @@ def _weights() -> Field:
     return np.einsum("ia,jb->ijab", line, line).reshape(SIDE * SIDE, -1)
 
 
-def _spline_spectrum(grid: Grid) -> Field:
-    """Fourier transform of the splines of a grid, shape `grid.spectral_shape`."""
-    down, right = grid.shape
-    y, x = np.fft.fftfreq(down), np.fft.rfftfreq(right)
-    return np.sinc(y)[:, None] ** ORDER * np.sinc(x) ** ORDER
+def _spline_spectrum(y: Field, x: Field) -> Field:
+    """Fourier transform of the splines of a grid, at waves with so many periods per spacing."""
+    spectrum: Field = np.sinc(y)[:, None] ** ORDER * np.sinc(x) ** ORDER
+    return spectrum
 
 
 def _stiffness_of_small_cell(contact: Contact) -> tuple[Field, Field]:

@@ -2,6 +2,7 @@
 
 from concurrent.futures import ThreadPoolExecutor
 from itertools import product
+from typing import Any
 
 import numpy as np
 
@@ -14,24 +15,28 @@ CHUNK = 256  # tiles of a matrix product: its operands stay in the cache
 class Tiles:
     """Some tiles of a grid; a field on them has the shape (tiles, 64)."""
 
-    def __init__(self, used: Mask) -> None:
-        """`used` has one value per tile of the grid, shape (points_y / 8, points / 8)."""
-        self.used = used
+    def __init__(self, used: Mask, *, is_periodic: bool = True) -> None:
+        """`used` has one value per tile of the grid, shape (points_y / 8, points / 8).
+
+        On a periodic grid the first tiles of a row or column are next to the last ones.
+        """
+        self.used, self.is_periodic = used, is_periodic
         self.rows, self.columns = np.nonzero(used)
         self.count = len(self.rows)
         number = np.full(used.shape, self.count)  # unused tiles share the number of an empty one
         number[used] = np.arange(self.count)
+        if is_periodic:
+            number = np.pad(number, 1, "wrap")
+        else:
+            number = np.pad(number, 1, constant_values=self.count)
         self.neighbours = np.stack(
-            [
-                number[(self.rows + i) % used.shape[0], (self.columns + j) % used.shape[1]]
-                for i, j in product((-1, 0, 1), repeat=2)
-            ],
+            [number[self.rows + i, self.columns + j] for i, j in product((0, 1, 2), repeat=2)],
             axis=1,
         )
         """Numbers of the tile and the eight around it, shape (tiles, 9)."""
 
-    def take(self, field: Field) -> Field:
-        """The values of a field of the grid on the tiles."""
+    def take(self, field: Any) -> Any:
+        """The values of a field or mask of the grid on the tiles."""
         return _blocks(field)[self.used].reshape(self.count, SIDE * SIDE)
 
     def put(self, values: Field, field: Field) -> None:
@@ -75,7 +80,7 @@ def convolution_matrix(kernel: Field) -> Field:
     return matrix.reshape(9 * SIDE * SIDE, SIDE * SIDE)
 
 
-def _blocks(field: Field) -> Field:
+def _blocks(field: Any) -> Any:
     """A view of a field of the grid, with axes (tile row, tile column, row, column in the tile)."""
     down, right = field.shape
     return field.reshape(down // SIDE, SIDE, right // SIDE, SIDE).swapaxes(1, 2)

@@ -21,6 +21,7 @@ from gfmd_cli.physics.error_estimates import Estimate, Level, unknown
 from gfmd_cli.physics.free_contact import SCENES
 from gfmd_cli.physics.observables import Observables, border_contact, contact_points, observe
 from gfmd_cli.physics.power_spectra import anisotropy
+from gfmd_cli.solvers.loop import Start
 from gfmd_cli.solvers.nested_grids import Resume, Solution, solve_contact
 from gfmd_cli.status import Status
 from gfmd_cli.study.context import SolveContext, Watcher, WorkerOptions
@@ -93,9 +94,9 @@ def solve_on_grids(task: Task, context: SolveContext, watcher: Watcher) -> Solve
     while True:
         scene = task_scene(task, points, context)
         contact = scene.contact(task.p_star(scene.delta_sigma))
-        start: Resume | Field | None = watcher.saved_state(contact)
+        start: Resume | Start | None = watcher.saved_state(contact)
         if start is None and solved is not None and task.boundary == "periodic":
-            start = _interpolate(solved, scene)  # a free boundary takes a stress, not u
+            start = Start(contact, 0.0, _interpolate(solved, scene))  # free: a stress, not u
         solved = None  # frees its memory, which is needed now
         solved = _solve_on_grid(task, scene, contact, watcher, start)
         start = None
@@ -120,7 +121,7 @@ def _solve_on_grid(
     scene: Scene,
     contact: Contact,
     watcher: Watcher,
-    start: Resume | Field | None,
+    start: Resume | Start | None,
 ) -> Solved:
     """Solve a contact; its stress and residual are measured on the displacement that is stored."""
     solution = solve_contact(contact, task.solver, watcher, start)

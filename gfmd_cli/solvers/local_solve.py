@@ -1,0 +1,214 @@
+"""The contact on tiles of a grid, solved for the pressure at a cost in proportion to the contact.
+
+On the tiles that the contact can reach
+
+    minimise <s C s> / 2 - <s h>  over s >= 0,  <s> = p.
+
+The method is that of Polonsky & Keer, Wear 231, 206 (1999), with the stiffness K restricted to the
+tiles as preconditioner (Vollebregt, Tribol. Int. 78, 40, 2014, uses its transform on the whole
+grid). C s is then evaluated at all points by the exact operator. This shows tiles that the
+displacement enters elsewhere, which are added, and the error of the operators on tiles, which is
+corrected in the next solve on the tiles.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from gfmd_cli.grid.arrays import Field, Mask
+from gfmd_cli.physics.contact import Contact
+from gfmd_cli.solvers.local_kernels import penetration
+from gfmd_cli.solvers.loop import Start
+from gfmd_cli.solvers.projected_move import choose
+from gfmd_cli.solvers.tile_operators import OPERATORS
+from gfmd_cli.solvers.tiles import SIDE, Tiles
+
+FIRST_TOLERANCE = 6e-3  # before the operators on tiles are corrected
+REDUCTION = (1e-3, 0.02)
+"""Smallest and largest factor of the residual that a solve on tiles aims at. The smallest is the
+relative error of their operators; the largest is a choice, because an evaluation at all points
+takes longer than a few steps on tiles."""
+MARGIN = 0.9  # of the tolerance, for the estimated residual of the start
+AIM = 0.25  # of the tolerance, for that residual after the next solve on the tiles
+MAX_EVALUATIONS = 6  # of the displacement at all points
+MAX_STEPS = 60  # on the same tiles
+
+
+@dataclass
+class Evaluation:
+    """C s at all points, compared with the indenter."""
+
+    level: float
+    """The level of C s where it is, in the mean, at the indenter in contact."""
+    gap: Field
+    """Gap on the tiles of the start."""
+    residual: float
+    """Natural residual of s and C s."""
+    start_residual: float
+    """Natural residual of the start."""
+    entered: Mask
+    """Other tiles in which C s is below h."""
+
+
+class LocalSolve:
+    """The pressure s on tiles of one grid; a subclass provides what the boundary changes.
+
+    Parameters
+    ----------
+    s : pressure on the tiles to start from, zero where nothing can touch
+    pause : is called at every step and may end the solve by an exception
+    """
+
+    def __init__(self, contact: Contact, tiles: Tiles, s: Field, pause: Callable[[], None]) -> None:
+        self.contact, self.grid, self.pause = contact, contact.grid, pause
+        self.operators = OPERATORS[contact.boundary](contact)
+        self.transforms = 0.0
+        self.place(tiles, s)
+
+    def place(self, tiles: Tiles, s: Field) -> None:
+        """Take these tiles, and s with the mean pressure of the contact."""
+        self.tiles, self.s = tiles, s * (self.total / float(s.sum()))
+        self.obstacle = tiles.take(self.contact.obstacle)
+        self.correction: Field | float = 0.0
+        self.map_pressure = self.operators.displacement(tiles)
+        self.map_displacement = self.operators.stress(tiles)
+
+    @property
+    def total(self) -> float:
+        """Sum of the pressure over the grid."""
+        return self.contact.pressure * self.grid.size
+
+    def compliance(self, s: Field) -> Field:
+        """C s on the tiles."""
+        self.transforms += self.operators.transforms
+        return self.map_pressure(s)
+
+    def compliance_everywhere(self, *, is_rough: bool) -> Field:
+        """C s at all points, in single precision where that is faster and `is_rough` is true.
+
+        Valid until the next call.
+        """
+        raise NotImplementedError
+
+    def lay(self, gap: Field) -> tuple[Field, Field]:
+        """The gap and the stress on the tiles of the start, from the gap of C s."""
+        return gap, self.s
+
+    def start(self, tolerance: float) -> Start:
+        """Solve until the start has a residual below the tolerance; return the start."""
+        raise NotImplementedError
+
+    def solve(self, tolerance: float) -> tuple[Evaluation, Field]:
+        """Solve until the start has a residual below the tolerance, with the exact C in the end.
+
+        Returns the last evaluation, and C s at all points. The first evaluation corrects operators
+        with an error of 1e-3 and can be rough, unless the tolerance is so loose that it may be the
+        last one.
+        """
+        aim = FIRST_TOLERANCE
+        for count in range(1, MAX_EVALUATIONS + 1):
+            self.run(aim)
+            is_rough = count == 1 and tolerance < FIRST_TOLERANCE
+            displacement = self.compliance_everywhere(is_rough=is_rough)
+            result = self.evaluate(displacement)
+            is_good = result.start_residual < MARGIN * tolerance and not result.entered.any()
+            if (is_good and not is_rough) or count == MAX_EVALUATIONS:
+                break
+            reduction = np.clip(AIM * tolerance / result.start_residual, *REDUCTION)
+            aim = result.residual * float(reduction)
+            self.correct(displacement, result.entered)
+        return result, displacement
+
+    def evaluate(self, displacement: Field) -> Evaluation:
+        """Compare C s at all points with the indenter."""
+        contact = self.contact
+        gap = self.tiles.take(displacement) - self.obstacle
+        level = float(gap[self.s > 0].mean())
+        gap -= level
+        gap_of_start, stress = self.lay(gap)
+        entered = np.zeros(self.tiles.used.shape, dtype=np.bool_)
+        sweep = (displacement, level, contact.obstacle, self.tiles.used, entered)
+        (outside,) = self.grid.rows.sums(1, penetration, *sweep)
+        residual, start_residual = (
+            contact.as_residual(float(outside) + _dot(violation, violation))
+            for violation in (np.minimum(gap, self.s), np.minimum(gap_of_start, stress))
+        )
+        return Evaluation(level, gap_of_start, residual, start_residual, entered)
+
+    def correct(self, displacement: Field, entered: Mask) -> None:
+        """Add tiles that were entered, and correct the operator on tiles by the exact C s."""
+        if entered.any():
+            tiles = Tiles(
+                self.tiles.used | _with_neighbours(entered), is_periodic=self.tiles.is_periodic
+            )
+            s = np.zeros((tiles.count, SIDE * SIDE))
+            s[self.tiles.used[tiles.used]] = self.s
+            self.place(tiles, s)
+        self.correction = self.tiles.take(displacement) - self.compliance(self.s)
+
+    def residual(self, gap: Field, s: Field) -> float:
+        """The natural residual on the tiles."""
+        violation = np.minimum(gap, s)
+        return self.contact.as_residual(_dot(violation, violation))
+
+    def run(self, tolerance: float) -> None:
+        """Projected conjugate gradients on the tiles, to a natural residual on them."""
+        s, height = self.s, self.obstacle - self.correction
+        w = self.compliance(s)
+        direction, force = np.zeros_like(s), np.zeros_like(s)
+        slope, length = 0.0, 1.0  # K preconditions well: the natural length of a move is 1
+        for _ in range(MAX_STEPS):
+            self.pause()
+            gap = w - height
+            pressed = s > 0
+            gap -= float(gap[pressed].mean())
+            if self.residual(gap, s) < tolerance:
+                break
+            active = pressed | (gap < 0)
+            last, force = force, _balanced(-gap, active)
+            z = _balanced(self.map_displacement(force), active)
+            old, slope = slope, _dot(z, force)
+            # Polak-Ribiere+
+            beta = max(0.0, (slope - _dot(z, last)) / old) if old > 0 else 0.0
+            direction = _balanced(z + beta * direction, active)
+            if _dot(direction, force) <= 0:
+                direction = z
+            del last, z  # memory for the compliance
+            step = length * direction
+            move = np.maximum(step, -s)
+            change = self.compliance(move)
+            curvature = _dot(move, change)
+            best = -_dot(move, gap) / curvature if curvature > 0 else 1.0
+            exact = np.array_equal(step, move) and (
+                best <= 1 or float((s + best * move).min()) >= 0
+            )
+            choice = choose(best, exact)
+            length *= choice.factor
+            if choice.restart:
+                slope = 0.0
+            s = np.maximum(s + choice.fraction * move, 0.0)
+            w += choice.fraction * change
+            scale = self.total / float(s.sum())
+            s *= scale
+            w *= scale
+        self.s = s
+
+
+def _balanced(values: Field, points: Mask) -> Field:
+    """The values at some points, with a mean of zero over them; zero at the others."""
+    balanced = np.where(points, values, 0.0)
+    balanced -= points * (float(balanced.sum()) / np.count_nonzero(points))
+    return balanced
+
+
+def _dot(one: Field, other: Field) -> float:
+    """Sum of products, which does not depend on the threads of BLAS."""
+    return float(np.einsum("ij,ij->", one, other))
+
+
+def _with_neighbours(used: Mask) -> Mask:
+    """Tiles and the eight around each."""
+    for axis in range(2):
+        used = used | np.roll(used, 1, axis) | np.roll(used, -1, axis)
+    return used
