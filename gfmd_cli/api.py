@@ -142,11 +142,11 @@ def solve(spec: Path | str | Tables, *, heights: Any = None, threads: int = 1) -
     spec
         The spec of one task.
     heights
-        Height map that replaces the surface: an array or nested list of shape (N, N), a masked
-        array, or a topography of SurfaceTopography, which states its side, unit and periodicity.
-        The spec is then a dictionary, whose table "surface" may contain length, periodic, level,
-        edges, interpolation, scale, crop and missing. Without a table "grid" the points of the map
-        are those of the grid.
+        Height map that replaces the surface: an array or nested list of shape (points_y, points),
+        for a line profile (points,), a masked array, or a topography of SurfaceTopography, which
+        states its sides, unit and periodicity. The spec is then a dictionary, whose table "surface"
+        may contain the keys of a map, such as length, periodic, level and missing. Without
+        grid.points the points of the map are those of the grid.
     threads
         Number of threads.
 

@@ -1,4 +1,4 @@
-"""Processor seconds of the ten first tasks of docs/tutorial.md, as the table of that page.
+"""Processor seconds of the ten first questions of docs/tutorial.md, as the table of that page.
 
     python scripts/first_tasks.py
 
@@ -20,9 +20,9 @@ PAGE = ROOT / "docs" / "tutorial.md"
 RUNS = 2
 
 
-def tasks() -> dict[str, list[str]]:
-    """The commands of each task, by its heading."""
-    section = PAGE.read_text(encoding="utf-8").partition("## Ten first tasks")[2]
+def questions() -> dict[str, list[str]]:
+    """The commands of each question, by its heading."""
+    section = PAGE.read_text(encoding="utf-8").partition("## Ten first questions")[2]
     section = section.partition("\n## ")[0]
     parts = re.split(r"^### (.*)$", section, flags=re.MULTILINE)[1:]
     commands = (re.findall(r"^\$ gfmd (.*)$", part, flags=re.MULTILINE) for part in parts[1::2])
@@ -45,10 +45,10 @@ def main() -> None:
         with tempfile.TemporaryDirectory() as name:
             folder = Path(name)
             shutil.copytree(ROOT / "configs", folder / "configs")
-            for title, commands in tasks().items():
+            for title, commands in questions().items():
                 seconds.setdefault(title, []).append(processor_seconds(commands, folder))
-    print("| task | commands | processor seconds |\n| --- | --- | --- |")
-    for title, commands in tasks().items():
+    print("| question | commands | processor seconds |\n| --- | --- | --- |")
+    for title, commands in questions().items():
         print(f"| {title} | {len(commands)} | {min(seconds[title]):.1f} |")
 
 

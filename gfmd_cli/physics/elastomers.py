@@ -105,7 +105,7 @@ class LinearElastomer(Choice):
 
         With a free boundary that is the level far from all loads, which does not exist under a line
         load on a half-space (n = 1, a logarithm); with a periodic one it exists for an elastomer on
-        a base, which has a finite stiffness k(0).
+        a base, whose stiffness k(0) is not zero.
         """
         if boundary == "free":
             is_logarithm = dimension == 1 and self.exponent == 1
@@ -119,7 +119,7 @@ class LinearElastomer(Choice):
             raise InputError(
                 f'load.displacement: {self.label} with grid.boundary = "{boundary}" in '
                 f"{dimension} dimension{'s'[: dimension - 1]} has no level of the undeformed "
-                f"surface to count from; it needs {remedy}an elastomer of finite k(0) "
+                f"surface to count from; it needs {remedy}an elastomer whose k(0) is not zero "
                 "(layer, n = 0): use load.mean_gap"
             )
 
@@ -252,8 +252,8 @@ class Slab(LinearElastomer):
 class Layer(LinearElastomer):
     """Elastic layer of finite thickness t on a rigid base, k = E* q / (2 c(q t)).
 
-    c(q t) is the compliance relative to that of the half-space: c = 1 for q t >> 1, and k is finite
-    for q -> 0.
+    c(q t) is the compliance relative to that of the half-space: c = 1 for q t >> 1, and k has
+    a limit above zero for q -> 0.
     """
 
     kind: Literal["layer"] = "layer"

@@ -186,7 +186,7 @@ class LoadTable(Choice):
     grid. The program searches the pressures."""
     displacement: Pressures | None = None
     """Displacements [m] of the indenter from first touch, on the grid; for a free boundary or an
-    elastomer of finite k(0). The program searches the pressures."""
+    elastomer whose k(0) is not zero. The program searches the pressures."""
     tolerance: Share = 1e-3
     """Largest relative deviation from contact_area, mean_gap or displacement. If the value lies in
     a jump of the contact area, the result is the nearest contact."""
@@ -229,7 +229,7 @@ class AccuracyTable(Choice):
     contact_area: Share | None = None
     """Relative error of the contact area a_r."""
     stress_deviation: Share | None = None
-    """Relative error of the standard deviation sigma_p of the stress."""
+    """Relative error of the standard deviation sigma_p of the contact pressure."""
     max_points: Annotated[int, Key(ge=SMALLEST_GRID, le=MAX_POINTS)] = MAX_POINTS
     """Largest number of points along x for grid.points = "auto". The available memory may set a
     lower limit."""
