@@ -274,13 +274,12 @@ class Grid:
         self.spectral_rows.run(kernels.divide_by_symbol, *arguments)
         self.transform_back()
 
-    def apply(self, symbol: Field, field: Field, out: Field) -> Field:
-        """out <- F^-1 symbol F field, which is returned: one pair of transforms."""
+    def apply(self, symbol: Field, field: Field, out: Field, mean: float = 0.0) -> Field:
+        """out <- F^-1 symbol F field + `mean`, which is returned: one pair of transforms."""
         values = self.padded[..., : self.points]
         values[...] = field
         self.filter_padded(symbol)
-        out[...] = values
-        return out
+        return np.add(values, mean, out=out)
 
     @cached_property
     def rows(self) -> LocalRows:

@@ -99,9 +99,7 @@ class Contact:
 
     def stress(self, u: Field, out: Field) -> Field:
         """sigma = K u + p. Written to `out`, which is returned."""
-        self.elasticity(u, out)
-        out += self.pressure
-        return out
+        return self.grid.apply(self.stiffness, u, out, self.pressure)
 
     def recompute(self, u: Field, sigma: Field) -> float:
         """Compute sigma from u, or u from sigma if that is the unknown; return the residual."""
