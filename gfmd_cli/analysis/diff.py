@@ -14,8 +14,6 @@ from gfmd_cli.study.reading import open_study, solved_rows
 
 SURFACE = ("surface", "surface_sha256", "seed")
 """Columns of a surface: two files may have the same name."""
-UNITS = {"sigma_p": "delta_sigma", "u_g": "h_std"}
-"""Columns that reduced quantities are in units of."""
 LOADS = {
     "p_star": "reduced pressure",
     "contact_area": "contact area",
@@ -48,8 +46,8 @@ class Pair:
 
     def deviation(self, name: str) -> Deviation:
         """How far a column of the second study lies from that of the first."""
-        physical = self.physical and name in UNITS
-        units = [row[UNITS[name]] if physical else 1.0 for row in (self.one, self.other)]
+        scale = QUANTITIES[name].scale if self.physical else ""
+        units = [row[scale] if scale else 1.0 for row in (self.one, self.other)]
         a, b = self.one[name] * units[0], self.other[name] * units[1]
         if math.isnan(a) or math.isnan(b):
             return Deviation(math.nan if math.isnan(a) and math.isnan(b) else math.inf, math.nan)

@@ -25,10 +25,8 @@ STATUS = Column("status", "status")
 SCALES = (("Delta_sigma", "delta_sigma", "Pa"), ("h_std", "h_std", "m"), ("L", "length", "m"))
 """Symbol, column and SI unit of the scales of a contact."""
 RESIDUAL = Column("residual", "residual", ".1e")
-REDUCED = {"a_r": "a_r", "sigma_p": "sigma_p / Delta_sigma", "u_g": "u_g / h_std"}
-"""Headings of the three quantities in reduced units."""
-BEST = {name: Column(heading, f"{name}_best", error=f"{name}_best_error")
-        for name, heading in REDUCED.items()}  # fmt: skip
+BEST = {name: Column(quantity.heading, f"{name}_best", error=f"{name}_best_error")
+        for name, quantity in QUANTITIES.items()}  # fmt: skip
 """Continuum values where they are known, else values on the grid."""
 
 
@@ -70,26 +68,29 @@ CONTINUUM = (
     POINTS,
     *(
         Column(
-            heading,
+            quantity.heading,
             partial(_continuum, name=name),
             error=f"{name}_continuum_error",
             otherwise=f"{name}_verdict",
         )
-        for name, heading in REDUCED.items()
+        for name, quantity in QUANTITIES.items()
     ),
 )
 SEEDS = (
     P_STAR,
-    *(Column(REDUCED[name], f"{name}_mean", error=f"{name}_confidence") for name in QUANTITIES),
+    *(
+        Column(quantity.heading, f"{name}_mean", error=f"{name}_confidence")
+        for name, quantity in QUANTITIES.items()
+    ),
 )
 CONTACT_AREA, STRESS_DEVIATION, MEAN_GAP = (
     (
         P_STAR,
         PRESSURE,
-        *_beside_theory(BEST[name], f"{name}_persson", unit=unit, si=si),
+        *_beside_theory(BEST[name], f"{name}_persson", unit=quantity.scale, si=quantity.si),
         STATUS,
     )
-    for name, unit, si in (("a_r", "", ""), ("sigma_p", "delta_sigma", "Pa"), ("u_g", "h_std", "m"))
+    for name, quantity in QUANTITIES.items()
 )
 TRUE_CONTACT = (
     P_STAR,

@@ -1,6 +1,7 @@
 """Observables of a solved contact, in reduced units."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -52,8 +53,23 @@ def border_contact(grid: Grid, mask: Mask) -> float:
     return float(touching / outermost)
 
 
-QUANTITIES = ("a_r", "sigma_p", "u_g")
-"""Names of the observables that have error estimates."""
+class Quantity(NamedTuple):
+    """An observable that has error estimates."""
+
+    heading: str
+    """Symbol in tables, over the reduced unit."""
+    scale: str = ""
+    """Column of the reduced unit in a study; empty for a pure number."""
+    si: str = ""
+    """SI unit."""
+
+
+QUANTITIES = {
+    "a_r": Quantity("a_r"),
+    "sigma_p": Quantity("sigma_p / Delta_sigma", "delta_sigma", "Pa"),
+    "u_g": Quantity("u_g / h_std", "h_std", "m"),
+}
+"""The observables that have error estimates, by their names."""
 
 
 @dataclass(frozen=True)

@@ -173,7 +173,9 @@ def _scaled_figure(values: Field, shown: Mask, row: Row, scale: Scale, label: st
 def _cell(row: Row) -> tuple[ColumnFigure, tuple[float, float, float, float]]:
     """Axes of the cell, and where it ends in their units."""
     length, length_y = float(row["length"]), float(row["length_y"])
-    divisor, x = LENGTH_SCALE.axis(row, max(length, length_y), "x")
-    plot = ColumnFigure(x, f"y{x[1:]}")
+    longest = max(length, length_y)
+    divisor, x = LENGTH_SCALE.axis(row, longest, "x")
+    _, y = LENGTH_SCALE.axis(row, longest, "y")
+    plot = ColumnFigure(x, y)
     plot.height = min(max(0.85 * length_y / length, MIN_ASPECT), MAX_ASPECT) * WIDTH
     return plot, (0.0, length / divisor, 0.0, length_y / divisor)
