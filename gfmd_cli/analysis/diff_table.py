@@ -9,7 +9,7 @@ from gfmd_cli.analysis.diff import Difference, Pair
 from gfmd_cli.analysis.selection import grouped
 from gfmd_cli.analysis.table import BLANK, Column, Record, Table, groups_of, known, plain
 from gfmd_cli.physics.observables import QUANTITIES
-from gfmd_cli.study.tasks import SYMBOLS
+from gfmd_cli.spec.models import load_text
 
 LEGEND = (
     "Relative differences (B - A) / max(|A|, |B|); in brackets: in units of the combined error bar."
@@ -22,7 +22,7 @@ ONE_STUDY = (*CONTACT, "points", "p_star")
 
 
 def _load(record: Record) -> str:
-    return f"{SYMBOLS[record['load']]}={record['load_value']:.4g}"
+    return load_text(record["load"], record["load_value"])
 
 
 def _deviation(record: Record, name: str) -> str:
