@@ -8,6 +8,7 @@ from gfmd_cli.analysis.compare import Row
 from gfmd_cli.analysis.diff import Difference, Pair
 from gfmd_cli.analysis.selection import grouped
 from gfmd_cli.analysis.table import BLANK, Column, Record, Table, groups_of, known, plain
+from gfmd_cli.analysis.units import contact_title
 from gfmd_cli.physics.observables import QUANTITIES
 from gfmd_cli.spec.models import load_text
 
@@ -75,7 +76,7 @@ def diff_json(difference: Difference) -> str:
 
 
 def _title(pair: Pair) -> str:
-    one, other = _name(pair.one), _name(pair.other)
+    one, other = contact_title(pair.one), contact_title(pair.other)
     return one if one == other else f"A: {one}\nB: {other}"
 
 
@@ -95,14 +96,10 @@ def _plain(record: Record, *keys: str) -> dict[str, Any]:
     return {key: plain(record[key]) for key in keys or record}
 
 
-def _name(row: Row) -> str:
-    return f"{row['elastomer']} on {row['surface']}"
-
-
 def _listed(rows: list[Row]) -> list[str]:
     """Loads grouped by scene, a line for each grid."""
     lines = []
-    for name, scene in grouped(rows, _name).items():
+    for name, scene in grouped(rows, contact_title).items():
         grids = grouped(scene, lambda row: row["points"])
         loads = {points: ", ".join(map(_load, grid)) for points, grid in grids.items()}
         lines += [f"  {name}", *(f"    {points}: {text}" for points, text in loads.items())]

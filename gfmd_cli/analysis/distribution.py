@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from gfmd_cli.analysis.compare import Comparison, Curve, Row, of_study, solver_of
+from gfmd_cli.analysis.units import contact_title
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.physics.observables import logarithmic_edges
 from gfmd_cli.status import Status
@@ -122,14 +123,10 @@ class StressDistribution:
         return float(np.mean([rows[-1]["a_r"] for rows in self.seeds]))
 
     @property
-    def surface(self) -> str:
-        """The surface, without its seed where there are several."""
-        return str(self.finest["ensemble" if len(self.seeds) > 1 else "surface"])
-
-    @property
-    def scene(self) -> str:
-        """Elastomer and surface."""
-        return of_study(self.curve.study, f"{self.finest['elastomer']} on {self.surface}")
+    def title(self) -> str:
+        """Elastomer and surface, without its seed where there are several."""
+        title = contact_title(self.finest, of_seeds=len(self.seeds) > 1)
+        return of_study(self.curve.study, title)
 
     @cached_property
     def cells(self) -> list[int]:

@@ -10,7 +10,7 @@ from gfmd_cli.analysis.distribution import StressDistribution, distributions
 from gfmd_cli.analysis.edge_law import fit
 from gfmd_cli.analysis.ensemble import ensembles
 from gfmd_cli.analysis.table import Column, Group, Record, Table, groups_of, known, product, ratio
-from gfmd_cli.analysis.units import grid_size, in_si, shown
+from gfmd_cli.analysis.units import contact_title, grid_size, in_si, shown
 from gfmd_cli.physics.observables import QUANTITIES
 from gfmd_cli.study.observables import OBSERVABLES, Observable
 from gfmd_cli.study.plausibility import SEPARATOR
@@ -242,7 +242,7 @@ def seeds_table(comparison: Comparison) -> Table:
 def power_laws(comparison: Comparison) -> Table:
     """The power laws of Pr(sigma), a record each; without one where no contact has two grids."""
     titled = [
-        (stress.scene, record)
+        (stress.title, record)
         for stress in distributions(comparison)
         for record in _law_records(stress)
     ]
@@ -262,7 +262,7 @@ def _law_records(stress: StressDistribution) -> list[Record]:
 
 def curve_title(curve: Curve) -> str:
     """Elastomer, surface and grid in words."""
-    text = f"{curve.elastomer} on {curve.surface}, {grid_size(curve.rows)}"
+    text = f"{contact_title(curve.rows[0])}, {grid_size(curve.rows)}"
     return of_study(curve.study, text)
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from gfmd_cli.analysis.curve_styles import MARKERS, CurveStyle, colours
 from gfmd_cli.analysis.plotting import SMALL, WIDTH, LegendFigure, log_scale, styled
 from gfmd_cli.analysis.selection import grouped
+from gfmd_cli.analysis.units import contact_title
 from gfmd_cli.bench.file import Trace
 from gfmd_cli.bench.run import REFERENCE
 from gfmd_cli.bench.table import scene_of, solver_names
@@ -105,7 +106,7 @@ def _curve(
 
 def _title(trace: Trace) -> str:
     row = trace.row
-    contact = f"{row['elastomer']} on {row['surface']}"[:MAX_LABEL].replace("$", r"\$")
+    contact = contact_title(row)[:MAX_LABEL].replace("$", r"\$")
     return f"{contact}, {row['points']} points, p* = {row['p_star']:.4g}"
 
 

@@ -10,7 +10,7 @@ from gfmd_cli.analysis.plotting import WIDTH, ColumnFigure, LegendFigure, shades
 from gfmd_cli.analysis.selection import evenly, grouped
 from gfmd_cli.analysis.table import Column, Group, Table
 from gfmd_cli.analysis.tables import AREA, P_STAR, POINTS, PRESSURE
-from gfmd_cli.analysis.units import pressure_text
+from gfmd_cli.analysis.units import contact_title, pressure_text
 from gfmd_cli.grid.arrays import Field, Mask
 from gfmd_cli.physics.observables import contact_points
 from gfmd_cli.physics.pictures import block_sums
@@ -59,7 +59,7 @@ def maps(data: ReportData) -> Section:
         contacts = [row for rows in contacts_by_curve for row in rows]
         series = [
             {
-                "title": f"{rows[0]['elastomer']} on {rows[0]['surface']}",
+                "title": contact_title(rows[0]),
                 "contacts": [_contact_maps(study, row, data.prefix) for row in rows],
             }
             for rows in contacts_by_curve
