@@ -41,6 +41,15 @@ def contact_line(grid: Grid, mask: Mask, *, periodic: bool = True) -> float:
     return float(grid.total(counts) @ across) * grid.length / grid.size
 
 
+def estimated_patches(perimeter: float, a_r: float, area: float) -> float:
+    """Number of circles with this relative contact area and perimeter, as in `Observables`.
+
+    The area of the cell is in units of L^2. A circle of radius r has 8 r switches along rows and
+    columns, in units of the spacing.
+    """
+    return np.pi * area * perimeter**2 / (64 * a_r) if a_r > 0 else 0.0
+
+
 def border_contact(grid: Grid, mask: Mask) -> float:
     """Share of the outermost points of a map that a mask contains."""
     inner = [slice(1, -1)] * mask.ndim
