@@ -25,6 +25,16 @@ class CurveStyle:
     label: str
 
 
+def literal(text: str) -> str:
+    """A text as a label of a figure, its dollar signs escaped: they would delimit formulas."""
+    return text.replace("$", r"\$")
+
+
+def without_escapes(label: str) -> str:
+    """The text of a label: the inverse of `literal`."""
+    return label.replace(r"\$", "$")
+
+
 def order(curve: Curve) -> tuple[float, float]:
     """Key for sorting: slabs by thickness, then power laws by exponent, then the others."""
     thickness = curve.rows[0]["thickness"] if np.isnan(curve.n) else np.nan
@@ -52,7 +62,7 @@ def curve_styles(curves: list[Curve]) -> list[CurveStyle]:
         colour = palette[place if by_variant else elastomers.index(elastomer)]
         label = ", ".join(filter(None, (names[elastomer], variant)))[:MAX_LABEL]
         marker = MARKERS[place % len(MARKERS)]
-        styles.append(CurveStyle(colour, marker, label.replace("$", r"\$")))
+        styles.append(CurveStyle(colour, marker, literal(label)))
     return styles
 
 

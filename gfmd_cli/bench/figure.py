@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from gfmd_cli.analysis.curve_styles import MARKERS, CurveStyle, colours
+from gfmd_cli.analysis.curve_styles import MARKERS, CurveStyle, colours, literal
 from gfmd_cli.analysis.plotting import SMALL, WIDTH, LegendFigure, log_scale, styled
 from gfmd_cli.analysis.selection import grouped
 from gfmd_cli.analysis.units import contact_title
@@ -106,8 +106,8 @@ def _curve(
 
 def _title(trace: Trace) -> str:
     row = trace.row
-    contact = contact_title(row)[:MAX_LABEL].replace("$", r"\$")
-    return f"{contact}, {row['points']} points, p* = {row['p_star']:.4g}"
+    contact = contact_title(row)[:MAX_LABEL]
+    return f"{literal(contact)}, {row['points']} points, p* = {row['p_star']:.4g}"
 
 
 def _slug(text: str) -> str:
