@@ -53,7 +53,7 @@ class Extrapolated:
 def extrapolate(counts: Field, cells: Sequence[int]) -> Extrapolated:
     """Richardson extrapolation of ln Pr on grids N/2 and N to zero spacing, at first order.
 
-    Bins that change by more than MOST_CHANGE are not resolved. A third grid tells where the change
+    Bins that change by more than MAX_CHANGE are not resolved. A third grid tells where the change
     is irregular, growing or turning: there, the finest grid is the best guess.
 
     Parameters

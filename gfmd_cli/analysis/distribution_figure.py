@@ -71,7 +71,7 @@ def _densities(items: list[Item], name: str) -> list[list[Density]]:
 
 
 def _bins(row: Row, name: str) -> tuple[Field, Field]:
-    """Pr(sigma) Delta_sigma over sigma / Delta_sigma, bins with fewer than FEW points left out."""
+    """Pr(sigma) Delta_sigma over sigma / Delta_sigma, in bins of MIN_COUNT points or more."""
     frequent = bin_counts(row, name) > MIN_COUNT - 0.5
     return BINS[name].middles()[frequent], np.nan_to_num(row[name])[frequent]
 

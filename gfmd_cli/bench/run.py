@@ -150,7 +150,7 @@ def _trace(
     report: Report,
     run: int,
 ) -> Trace:
-    """One solve under the eyes of a recorder."""
+    """Solve a contact, with samples of the error."""
     label = f"{solver.kind} {row['elastomer']} {row['points']} p*={row['p_star']:.4g}"
     report(Progress(run, "start", label))
     warm_up = solver.model_copy(update={"max_steps": 1})  # plans of all grids, pages of memory

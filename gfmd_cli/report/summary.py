@@ -143,13 +143,13 @@ def _time(rows: list[Row]) -> str:
     return quantity(seconds, "s") if seconds < SECONDS else duration(seconds)
 
 
-def _ratios(data: ReportData, name: str, most: float) -> str:
-    """Simulation over theory at reduced pressures up to `most`."""
+def _ratios(data: ReportData, name: str, limit: float) -> str:
+    """Simulation over theory at reduced pressures up to `limit`."""
     return span(
         record[f"{name}_best"] / record[f"{name}_persson"]
         for curve in data.comparison.curves
         for record in curve.records
-        if record[f"{name}_persson"] > 0 and record["p_star"] <= most
+        if record[f"{name}_persson"] > 0 and record["p_star"] <= limit
     )
 
 

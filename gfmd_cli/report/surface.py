@@ -68,7 +68,7 @@ class Spectrum:
     q: Field
     """Mean wavenumber of each band [1/m]."""
     density: Field
-    """[m^4], of a line scene [m^3]."""
+    """[m^4], of a line contact [m^3]."""
     modes: Field
     """Number of modes of each band."""
     fit: SelfAffineFit | None

@@ -7,8 +7,8 @@ solve of its own.
 With `[accuracy]` a contact area or mean gap is that in the continuum on the last grid, and that of
 the grid on the coarser ones, which only give a first pressure.
 
-The contact area of a grid has steps, so that the search also ends between two attainable areas,
-with the nearest; which pressures have them depends on the last bits, that it ends does not.
+The contact area of a grid has steps. Where the requested area lies between two attainable ones, the
+search ends with the nearest contact, at a pressure that may depend on rounding errors.
 """
 
 from collections.abc import Mapping
