@@ -65,9 +65,9 @@ def diff_json(difference: Difference) -> str:
     """The same as JSON; what does not apply is null."""
     return json.dumps(
         {
-            "rows": [_plain(_record(pair)) for pair in difference.pairs],
-            "only_a": [_plain(row, *ONE_STUDY) for row in difference.only[0]],
-            "only_b": [_plain(row, *ONE_STUDY) for row in difference.only[1]],
+            "rows": [_json_values(_record(pair)) for pair in difference.pairs],
+            "only_a": [_json_values(row, *ONE_STUDY) for row in difference.only[0]],
+            "only_b": [_json_values(row, *ONE_STUDY) for row in difference.only[1]],
             "spec": difference.spec,
             "paired": difference.paired,
         },
@@ -91,7 +91,7 @@ def _record(pair: Pair) -> Record:
     return record
 
 
-def _plain(record: Record, *keys: str) -> dict[str, Any]:
+def _json_values(record: Record, *keys: str) -> dict[str, Any]:
     """These keys of a record as JSON has them; without any all of them."""
     return {key: plain(record[key]) for key in keys or record}
 
