@@ -16,7 +16,7 @@ $(VENV)/.test: $(VENV)/.core
 	$(BIN)/pip install --quiet --disable-pip-version-check -e ".[test]"
 	touch $@
 
-demo: $(VENV)/.core ## the paper's default surface on six bodies: study, table, figures
+demo: $(VENV)/.core ## the paper's default surface on six elastomers: study, table, figures
 	mkdir -p $(RESULTS)
 	$(BIN)/gfmd run configs/demo.toml -o $(RESULTS)/demo.h5
 	$(BIN)/gfmd analyze $(RESULTS)/demo.h5 --figures $(RESULTS)/figures > $(RESULTS)/demo.txt

@@ -167,7 +167,7 @@ def solve(spec: Path | str | Tables, *, heights: Any = None, threads: int = 1) -
         path = Path(folder) / "heights.npy"
         np.save(path, given.values)
         try:
-            surface = surface_table(given, _plain(spec.get("surface", {})))
+            surface = surface_table(given, _without_numpy(spec.get("surface", {})))
             surface["path"] = str(path)
             return _solve(_with_points({**spec, "surface": surface}), threads)
         except InputError as error:  # the file is not the caller's
@@ -179,7 +179,7 @@ def _with_points(tables: dict[str, Any]) -> dict[str, Any]:
     grid = tables.get("grid", {})
     if "points" in grid:
         return tables
-    spec = read_tables(_plain(tables | {"grid": {**grid, "points": SMALLEST_GRID}}))
+    spec = read_tables(_without_numpy(tables | {"grid": {**grid, "points": SMALLEST_GRID}}))
     surface = spec.surface[0]
     assert isinstance(surface, FileSurface)
     return tables | {"grid": {**grid, "points": surface.own_points()}}
@@ -293,15 +293,15 @@ def _read(spec: Path | str | Tables, overrides: tuple[str, ...] = ()) -> tuple[S
     if isinstance(spec, Mapping):
         if overrides:
             raise InputError("overrides go with a spec in a file; change the dictionary")
-        tables = _plain(spec)
+        tables = _without_numpy(spec)
         return read_tables(tables), json.dumps(tables, indent=1, default=str)
     return read_spec(Path(spec), overrides)
 
 
-def _plain(item: Any) -> Any:
+def _without_numpy(item: Any) -> Any:
     """A copy of the tables of a spec, with numbers and lists in the place of those of NumPy."""
     if isinstance(item, Mapping):
-        return {key: _plain(value) for key, value in item.items()}
+        return {key: _without_numpy(value) for key, value in item.items()}
     if isinstance(item, list | tuple):
-        return [_plain(value) for value in item]
+        return [_without_numpy(value) for value in item]
     return item.tolist() if isinstance(item, np.ndarray | np.generic) else item

@@ -9,11 +9,11 @@ DIGITS = 12  # of a number in a label, so that different parameters have differe
 DURATIONS = (("d", 86400), ("h", 3600), ("min", 60), ("s", 1))
 
 
-def scaled(most: float, unit: str) -> tuple[float, str]:
-    """A divisor for values up to `most`, and the unit with its SI prefix."""
-    if not (math.isfinite(most) and most > 0):
+def scaled(largest: float, unit: str) -> tuple[float, str]:
+    """A divisor for values up to `largest`, and the unit with its SI prefix."""
+    if not (math.isfinite(largest) and largest > 0):
         return 1.0, unit
-    power = 3 * math.floor(math.log10(1.1 * most) / 3)
+    power = 3 * math.floor(math.log10(1.1 * largest) / 3)
     power = min(max(power, min(PREFIXES)), max(PREFIXES))
     return 10.0**power, PREFIXES[power] + unit
 

@@ -14,13 +14,12 @@ import os
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-import time
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from matplotlib.ticker import NullLocator
+from timing import least
 
 from gfmd_cli.analysis.curve_styles import MARKERS, CurveStyle, colours
 from gfmd_cli.analysis.figures import P_STAR
@@ -46,16 +45,6 @@ class Cost:
     """Pairs of transforms of the grid, those in single precision as half a pair."""
     time: float
     """Processor time of the whole solve over that of a pair of transforms in double precision."""
-
-
-def least(action: Callable[[], object], repeats: int) -> float:
-    """Processor seconds of the fastest of some calls."""
-    seconds = []
-    for _ in range(repeats):
-        begun = time.process_time()
-        action()
-        seconds.append(time.process_time() - begun)
-    return min(seconds)
 
 
 def pair_of(grid: Grid) -> float:

@@ -1,15 +1,15 @@
-"""What it saves to model only what a scene needs: processor seconds with and without.
+"""What it saves to model only what a contact needs: processor seconds with and without.
 
 python scripts/economy.py --points 1024
 """
 
 import argparse
 import tempfile
-import time
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from timing import least
 
 from gfmd_cli.physics.contact import Contact, build_scene
 from gfmd_cli.physics.elastomers import HalfSpace, Power
@@ -25,19 +25,10 @@ from gfmd_cli.solvers.sort import Sort
 REPEATS = 3  # the least counts
 
 
-def least(action):
-    """Processor seconds of the fastest of some calls, and what the last one returned."""
-    seconds, result = [], None
-    for _ in range(REPEATS):
-        begun = time.process_time()
-        result = action()
-        seconds.append(time.process_time() - begun)
-    return min(seconds), result
-
-
 def solved(contact: Contact, solver=Auto, **keys):
     """Seconds of a solve, and what was measured on it."""
-    seconds, solution = least(lambda: solve_contact(contact, solver(**keys)))
+    solution = solve_contact(contact, solver(**keys))
+    seconds = least(lambda: solve_contact(contact, solver(**keys)), REPEATS)
     return seconds, observe(contact, solution.u, solution.sigma), solution
 
 
@@ -64,7 +55,7 @@ def main() -> None:
         plane = build_scene(FileSurface(path=path), HalfSpace(), points)
         slow, a, _ = solved(plane.contact(0.5 / plane.delta_sigma), tolerance=1e-6)
     fast, b, _ = solved(line.contact(p_star), tolerance=1e-6)
-    show("a line scene on a line", slow, fast, abs(a.u_g / b.u_g - 1))
+    show("a line contact on a line", slow, fast, abs(a.u_g / b.u_g - 1))
 
     half_space = build_scene(SelfAffine(), Power(n=1), points).contact(0.1)
     slow, a, _ = solved(half_space, tolerance=1e-4)
@@ -82,7 +73,7 @@ def main() -> None:
     show("full contact seen at once (against p* = 3)", slow, fast, 0.0)
 
     solve, _, solution = solved(half_space, tolerance=1e-4)
-    extra, _ = least(lambda: stress_histogram(half_space, solution.u, solution.sigma))
+    extra = least(lambda: stress_histogram(half_space, solution.u, solution.sigma), REPEATS)
     show("no histogram", solve + extra, solve, 0.0)
 
 

@@ -11,10 +11,10 @@ import os
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
+from timing import least
 
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.grid.pixels import average_pixels
@@ -28,6 +28,7 @@ from gfmd_cli.solvers.nested_grids import Solution, solve_contact
 from gfmd_cli.solvers.pcg import ProjectedCG
 
 COUNT = 10  # pressures
+REPEATS = 2  # the faster counts
 
 
 def from_neighbour(contact: Contact, solver: ProjectedCG, pressure: Field) -> float:
@@ -42,16 +43,6 @@ def from_neighbour(contact: Contact, solver: ProjectedCG, pressure: Field) -> fl
     return start.transforms + state.transforms
 
 
-def least_seconds(action: Callable[[], object]) -> float:
-    """Processor seconds of the faster of two calls."""
-    seconds = []
-    for _ in range(2):
-        begun = time.process_time()
-        action()
-        seconds.append(time.process_time() - begun)
-    return min(seconds)
-
-
 def ladder(scene: Scene, solver: ProjectedCG, pressures: Sequence[float]) -> None:
     """Print the cost at each pressure but the first, and the ratios of the sums."""
     costs, last = [], None
@@ -62,8 +53,8 @@ def ladder(scene: Scene, solver: ProjectedCG, pressures: Sequence[float]) -> Non
             pressure = last
             transforms = from_neighbour(contact, solver, pressure)
             seconds = (
-                least_seconds(lambda: solve_contact(contact, solver)),  # noqa: B023
-                least_seconds(lambda: from_neighbour(contact, solver, pressure)),  # noqa: B023
+                least(lambda: solve_contact(contact, solver), REPEATS),  # noqa: B023
+                least(lambda: from_neighbour(contact, solver, pressure), REPEATS),  # noqa: B023
             )
             costs.append((solution.transforms, transforms, *seconds))
             print(f"{p_star:8.5f}" + "{:7.1f}{:7.1f}{:7.2f}{:7.2f}".format(*costs[-1]))

@@ -10,7 +10,7 @@ from gfmd_cli.bench import run as bench
 from gfmd_cli.bench.figure import draw_bench
 from gfmd_cli.bench.file import Trace, read_bench, write_bench
 from gfmd_cli.bench.run import GROWTH, REFERENCE, run_bench, solve_reference, solvers_to_compare
-from gfmd_cli.bench.table import bench_table, scene_of, solver_names
+from gfmd_cli.bench.table import bench_table, contact_of, solver_names
 from gfmd_cli.physics.contact import build_scene
 from gfmd_cli.physics.free_contact import build_free_scene
 from gfmd_cli.physics.observables import QUANTITIES, observe
@@ -271,4 +271,4 @@ def test_a_bench_of_a_free_boundary_has_the_solver_that_suits_it(spec_of):
 
 def test_boundaries_are_scenes_of_their_own():
     periodic, free = (made_up([1e-3], boundary=name) for name in ("periodic", "free"))
-    assert scene_of(periodic) != scene_of(free)
+    assert contact_of(periodic) != contact_of(free)

@@ -214,12 +214,12 @@ def test_the_area_on_oblong_pixels_has_the_bars_of_an_irregular_surface():
     assert area == estimate(sequence(1.0), 1.0, IRREGULAR[0])["a_r"]
 
 
-def test_few_contact_spots_on_one_grid_are_unknown():
+def test_few_contact_patches_on_one_grid_are_unknown():
     """Nine circles of the same size against eleven: area pi r^2, perimeter 8 r each."""
-    for spots, verdict in ((9, "unknown"), (11, "regular")):
+    for patches, verdict in ((9, "unknown"), (11, "regular")):
         r = 0.05
-        level = Level(256, spots * np.pi * r**2, 0.5, 0.3, spots * 8 * r)
-        assert level.spots == pytest.approx(spots)
+        level = Level(256, patches * np.pi * r**2, 0.5, 0.3, patches * 8 * r)
+        assert level.patches == pytest.approx(patches)
         for value in estimate([level], 1.0, ROUGH).values():
             assert value.verdict == verdict
 

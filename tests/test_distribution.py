@@ -201,7 +201,7 @@ def test_seeds_are_averaged_with_their_spread(study):
     path = study("surface.seed=[0, 1, 2]")
     (stresses,) = distributions(compare(path))
     assert len(stresses.seeds) == 3
-    assert "seed" not in stresses.surface
+    assert "seed" not in stresses.title
     table = power_laws(compare(path)).as_text()
     assert "power n=1 on self-affine cutoff=0.1" in table
     assert stresses.points == [64, 128, 256]

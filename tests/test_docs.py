@@ -305,6 +305,15 @@ def test_every_name_that_a_script_imports_exists(script):
                 assert re.search(rf"\b{alias.name}\b", there.read_text(encoding="utf-8"))
 
 
+def test_every_name_that_the_page_on_the_api_lists_exists():
+    page = (ROOT / "docs" / "api.md").read_text(encoding="utf-8")
+    lists = re.findall(r"^::: (\S+)\n(?: {4}.*\n)*? +members: \[(.*)\]", page, re.MULTILINE)
+    assert lists
+    for module, members in lists:
+        for member in members.split(", "):
+            assert hasattr(importlib.import_module(module), member), f"{module}.{member}"
+
+
 @pytest.mark.parametrize("page", PAGES, ids=name)
 def test_every_file_that_the_page_names_exists(page):
     quoted = re.findall(r"`([^`\n]+)`", FENCE.sub("", page.read_text(encoding="utf-8")))

@@ -57,6 +57,21 @@ def slab_samples():
     return np.concatenate([np.logspace(-8, 4, 401), around, 20 * around, np.linspace(0.8, 25, 200)])
 
 
+@pytest.mark.parametrize(
+    ("elastomer", "short"),
+    [
+        (Power(n=1.5), "n = 3/2"),
+        (Power(n=0.77), "n = 0.77"),
+        (HalfSpace(E_star=2e9), "half-space"),
+        (Plate(thickness=1e-5), "n = 4"),
+        (Slab(thickness=0.01), "t/L = 0.01"),
+        (Layer(thickness=1e-5, base="sliding"), "layer thickness=10 µm base=sliding"),
+    ],
+)
+def test_the_short_label_names_what_tells_elastomers_apart(elastomer, short):
+    assert elastomer.short_label == short
+
+
 def test_the_slab_factor_has_all_digits_of_the_printed_formula():
     t = slab_samples()
     exact = [printed_slab_factor(x) for x in t]

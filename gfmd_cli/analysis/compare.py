@@ -223,6 +223,11 @@ def solver_of(row: Row) -> tuple[Any, ...]:
     return tuple(row[each.column.name] for each in PARAMETERS if each.table == "solver")
 
 
+def load_of(row: Row) -> tuple[str, str]:
+    """The prescribed load of a row, equal where loads differ by rounding alone."""
+    return row["load"], f"{row['load_value']:.12g}"
+
+
 def theory_of(theory: Theory, spectrum: Shells, n: float) -> Persson:
     """A theory of a spectrum and the exponent n of k(q); where n is NaN, the local exponent."""
     if theory == "coarse-grained":

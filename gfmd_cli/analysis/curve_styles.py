@@ -1,7 +1,6 @@
 """Styles of curves: a label that tells the curves apart, colour, marker."""
 
 from dataclasses import dataclass
-from fractions import Fraction
 
 import numpy as np
 
@@ -11,8 +10,6 @@ from gfmd_cli.study.columns import PARAMETERS
 PALETTE = ("#332288", "#0077bb", "#009988", "#999933", "#ee7733", "#cc3311")
 """Safe for colour-blind readers (P. Tol, Colour schemes, 2021), ordered by hue."""
 MARKERS = "os^Dv<p>h"
-HALF_SPACE = "half-space"
-"""The kind of elastomer that is called so, and not by its exponent."""
 MAX_LABEL = 46  # characters
 MAX_STYLES = 8  # more styles cannot be told apart
 Colour = tuple[float, float, float]
@@ -26,6 +23,16 @@ class CurveStyle:
     colour: Colour
     marker: str
     label: str
+
+
+def literal(text: str) -> str:
+    """A text as a label of a figure, its dollar signs escaped: they would delimit formulas."""
+    return text.replace("$", r"\$")
+
+
+def without_escapes(label: str) -> str:
+    """The text of a label: the inverse of `literal`."""
+    return label.replace(r"\$", "$")
 
 
 def order(curve: Curve) -> tuple[float, float]:
@@ -55,7 +62,7 @@ def curve_styles(curves: list[Curve]) -> list[CurveStyle]:
         colour = palette[place if by_variant else elastomers.index(elastomer)]
         label = ", ".join(filter(None, (names[elastomer], variant)))[:MAX_LABEL]
         marker = MARKERS[place % len(MARKERS)]
-        styles.append(CurveStyle(colour, marker, label.replace("$", r"\$")))
+        styles.append(CurveStyle(colour, marker, literal(label)))
     return styles
 
 
@@ -69,15 +76,7 @@ def colours(count: int) -> list[Colour]:
 
 def _names(elastomers: dict[str, Curve]) -> dict[str, str]:
     """A short name for each elastomer; the full labels where short names would coincide."""
-    short = {}
-    for label, curve in elastomers.items():
-        thickness = curve.rows[0]["thickness"]
-        short[label] = f"t/L = {thickness:g}" if np.isfinite(thickness) else label
-        if np.isfinite(curve.n):
-            fraction = Fraction(curve.n).limit_denominator(4)
-            short[label] = f"n = {fraction}" if fraction == curve.n else f"n = {curve.n:g}"
-        if curve.rows[0]["elastomer_kind"] == HALF_SPACE:
-            short[label] = HALF_SPACE
+    short = {label: str(curve.rows[0]["elastomer_short"]) for label, curve in elastomers.items()}
     return short if len(set(short.values())) == len(short) else {label: label for label in short}
 
 

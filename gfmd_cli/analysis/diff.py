@@ -6,22 +6,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
-from gfmd_cli.analysis.compare import Row
+from gfmd_cli.analysis.compare import Row, load_of
 from gfmd_cli.analysis.selection import grouped
 from gfmd_cli.physics.observables import QUANTITIES
-from gfmd_cli.spec.models import differences
+from gfmd_cli.spec.models import LOADS, differences
 from gfmd_cli.study.reading import open_study, solved_rows
 
 SURFACE = ("surface", "surface_sha256", "seed")
 """Columns of a surface: two files may have the same name."""
-UNITS = {"sigma_p": "delta_sigma", "u_g": "h_std"}
-"""Columns that reduced quantities are in units of."""
-LOADS = {
-    "p_star": "reduced pressure",
-    "contact_area": "contact area",
-    "mean_gap": "mean gap",
-    "displacement": "displacement",
-}
 
 
 Key = Callable[[Row], tuple[Hashable, ...]]
@@ -48,8 +40,8 @@ class Pair:
 
     def deviation(self, name: str) -> Deviation:
         """How far a column of the second study lies from that of the first."""
-        physical = self.physical and name in UNITS
-        units = [row[UNITS[name]] if physical else 1.0 for row in (self.one, self.other)]
+        scale = QUANTITIES[name].scale if self.physical else ""
+        units = [row[scale] if scale else 1.0 for row in (self.one, self.other)]
         a, b = self.one[name] * units[0], self.other[name] * units[1]
         if math.isnan(a) or math.isnan(b):
             return Deviation(math.nan if math.isnan(a) and math.isnan(b) else math.inf, math.nan)
@@ -88,21 +80,16 @@ def diff(one: Path, other: Path) -> Difference:
     with open_study(one) as a, open_study(other) as b:
         only = solved_rows(a.rows), solved_rows(b.rows)
         spec = differences(a.spec, b.spec)
-    pairs, paired = _matches(*only, _contact_of, _load_of), ""
+    pairs, paired = _matches(*only, _contact_of, load_of), ""
     if not pairs and all(len({_contact_of(row) for row in rows}) == 1 for rows in only):
-        pairs = _matches(*only, _load_of)
+        pairs = _matches(*only, load_of)
         paired = _pairing_note(pairs[0]) if pairs else ""
     return Difference(spec, pairs, only, paired)
 
 
 def _contact_of(row: Row) -> tuple[Hashable, ...]:
-    """What is pressed together."""
+    """Columns that identify surface and elastomer."""
     return (*(row[name] for name in SURFACE), row["elastomer"])
-
-
-def _load_of(row: Row) -> tuple[Hashable, ...]:
-    """How hard."""
-    return row["load"], f"{row['load_value']:.12g}"
 
 
 def _matches(one: list[Row], other: list[Row], *keys: Key) -> list[Pair]:
@@ -134,6 +121,6 @@ def _pairing_note(pair: Pair) -> str:
         for what, names in {"surfaces": SURFACE, "elastomers": ("elastomer",)}.items()
         if any(pair.one[name] != pair.other[name] for name in names)
     ]
-    load = pair.one["load"]
+    load = LOADS[pair.one["load"]].words
     units = "sigma_p in Pa, u_g in m" if pair.physical else "values in reduced units"
-    return f"{' and '.join(differing)} differ: paired by {LOADS.get(load, load)}, {units}"
+    return f"{' and '.join(differing)} differ: paired by {load}, {units}"

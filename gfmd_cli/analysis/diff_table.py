@@ -8,8 +8,9 @@ from gfmd_cli.analysis.compare import Row
 from gfmd_cli.analysis.diff import Difference, Pair
 from gfmd_cli.analysis.selection import grouped
 from gfmd_cli.analysis.table import BLANK, Column, Record, Table, groups_of, known, plain
+from gfmd_cli.analysis.units import contact_title
 from gfmd_cli.physics.observables import QUANTITIES
-from gfmd_cli.study.tasks import SYMBOLS
+from gfmd_cli.spec.models import load_text
 
 LEGEND = (
     "Relative differences (B - A) / max(|A|, |B|); in brackets: in units of the combined error bar."
@@ -22,7 +23,7 @@ ONE_STUDY = (*CONTACT, "points", "p_star")
 
 
 def _load(record: Record) -> str:
-    return f"{SYMBOLS[record['load']]}={record['load_value']:.4g}"
+    return load_text(record["load"], record["load_value"])
 
 
 def _deviation(record: Record, name: str) -> str:
@@ -64,9 +65,9 @@ def diff_json(difference: Difference) -> str:
     """The same as JSON; what does not apply is null."""
     return json.dumps(
         {
-            "rows": [_plain(_record(pair)) for pair in difference.pairs],
-            "only_a": [_plain(row, *ONE_STUDY) for row in difference.only[0]],
-            "only_b": [_plain(row, *ONE_STUDY) for row in difference.only[1]],
+            "rows": [_json_values(_record(pair)) for pair in difference.pairs],
+            "only_a": [_json_values(row, *ONE_STUDY) for row in difference.only[0]],
+            "only_b": [_json_values(row, *ONE_STUDY) for row in difference.only[1]],
             "spec": difference.spec,
             "paired": difference.paired,
         },
@@ -75,7 +76,7 @@ def diff_json(difference: Difference) -> str:
 
 
 def _title(pair: Pair) -> str:
-    one, other = _name(pair.one), _name(pair.other)
+    one, other = contact_title(pair.one), contact_title(pair.other)
     return one if one == other else f"A: {one}\nB: {other}"
 
 
@@ -90,19 +91,15 @@ def _record(pair: Pair) -> Record:
     return record
 
 
-def _plain(record: Record, *keys: str) -> dict[str, Any]:
+def _json_values(record: Record, *keys: str) -> dict[str, Any]:
     """These keys of a record as JSON has them; without any all of them."""
     return {key: plain(record[key]) for key in keys or record}
-
-
-def _name(row: Row) -> str:
-    return f"{row['elastomer']} on {row['surface']}"
 
 
 def _listed(rows: list[Row]) -> list[str]:
     """Loads grouped by scene, a line for each grid."""
     lines = []
-    for name, scene in grouped(rows, _name).items():
+    for name, scene in grouped(rows, contact_title).items():
         grids = grouped(scene, lambda row: row["points"])
         loads = {points: ", ".join(map(_load, grid)) for points, grid in grids.items()}
         lines += [f"  {name}", *(f"    {points}: {text}" for points, text in loads.items())]

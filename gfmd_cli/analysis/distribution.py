@@ -19,8 +19,9 @@ from typing import Any
 import numpy as np
 
 from gfmd_cli.analysis.compare import Comparison, Curve, Row, of_study, solver_of
+from gfmd_cli.analysis.units import contact_title
 from gfmd_cli.grid.arrays import Field
-from gfmd_cli.physics.observables import logarithmic_edges
+from gfmd_cli.physics.observables import estimated_patches, logarithmic_edges
 from gfmd_cli.status import Status
 from gfmd_cli.study.columns import BINS, PR_LOGARITHMIC
 
@@ -52,7 +53,7 @@ class Extrapolated:
 def extrapolate(counts: Field, cells: Sequence[int]) -> Extrapolated:
     """Richardson extrapolation of ln Pr on grids N/2 and N to zero spacing, at first order.
 
-    Bins that change by more than MOST_CHANGE are not resolved. A third grid tells where the change
+    Bins that change by more than MAX_CHANGE are not resolved. A third grid tells where the change
     is irregular, growing or turning: there, the finest grid is the best guess.
 
     Parameters
@@ -122,14 +123,10 @@ class StressDistribution:
         return float(np.mean([rows[-1]["a_r"] for rows in self.seeds]))
 
     @property
-    def surface(self) -> str:
-        """The surface, without its seed where there are several."""
-        return str(self.finest["ensemble" if len(self.seeds) > 1 else "surface"])
-
-    @property
-    def scene(self) -> str:
-        """Elastomer and surface."""
-        return of_study(self.curve.study, f"{self.finest['elastomer']} on {self.surface}")
+    def title(self) -> str:
+        """Elastomer and surface, without its seed where there are several."""
+        title = contact_title(self.finest, of_seeds=len(self.seeds) > 1)
+        return of_study(self.curve.study, title)
 
     @cached_property
     def cells(self) -> list[int]:
@@ -170,17 +167,16 @@ class StressDistribution:
 
     @cached_property
     def sampling(self) -> Field:
-        """Relative standard error of the mean over surfaces, for the few contacts that one holds.
+        """Relative standard error of the mean over surfaces, for the few patches that one holds.
 
-        All points of a bin in one contact are one draw. The number of contacts is that of discs of
-        the same area and line: with the switches of rows and columns 8 a a disc, pi P^2 / 64 a_r.
-        The spread over seeds is weighed against it as PRIOR_SEEDS further seeds would be.
+        All points of a bin in one patch are one draw. The spread over seeds is weighed against it
+        as PRIOR_SEEDS further seeds would be.
         """
         count, fine = len(self.seeds), self.counts[:, -1]
         if self.finest["seed"] < 0:  # nothing random
             return np.zeros(fine.shape[-1])
-        contacts = sum(_contacts(rows[-1]) for rows in self.seeds)
-        expected = 1 / np.maximum(np.minimum(contacts, fine.sum(axis=0)), 1.0)
+        patches = sum(_patches(rows[-1]) for rows in self.seeds)
+        expected = 1 / np.maximum(np.minimum(patches, fine.sum(axis=0)), 1.0)
         if count == 1:
             return np.sqrt(expected)
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -200,12 +196,11 @@ class StressDistribution:
         return np.sqrt(sum((np.square(part) for part in parts), np.zeros(1)))
 
 
-def _contacts(row: Row) -> float:
-    """Number of contacts in the cell, estimated."""
-    line, area = float(row["perimeter"]), float(row["a_r"])
+def _patches(row: Row) -> float:
+    """Estimated number of contact patches in the cell."""
     if row["dimension"] == 1:
-        return line / 2
-    return np.pi * line**2 / (64 * area) * float(row["length_y"] / row["length"])
+        return float(row["perimeter"]) / 2
+    return estimated_patches(row["perimeter"], row["a_r"], row["length_y"] / row["length"])
 
 
 def distributions(comparison: Comparison) -> list[StressDistribution]:

@@ -71,7 +71,7 @@ def _densities(items: list[Item], name: str) -> list[list[Density]]:
 
 
 def _bins(row: Row, name: str) -> tuple[Field, Field]:
-    """Pr(sigma) Delta_sigma over sigma / Delta_sigma, bins with fewer than FEW points left out."""
+    """Pr(sigma) Delta_sigma over sigma / Delta_sigma, in bins of MIN_COUNT points or more."""
     frequent = bin_counts(row, name) > MIN_COUNT - 0.5
     return BINS[name].middles()[frequent], np.nan_to_num(row[name])[frequent]
 
@@ -148,10 +148,10 @@ def continuum_figure(comparison: Comparison) -> ColumnFigure | None:
 
 
 def _chosen(stresses: list[StressDistribution]) -> list[StressDistribution]:
-    """One distribution of each scene, at about one pressure."""
+    """One distribution of each elastomer on each surface, at about one pressure."""
     ordered = sorted(stresses, key=lambda each: order(each.curve))
-    scenes = list(grouped(ordered, lambda each: each.scene).values())
-    return at_one_pressure(scenes, lambda each: (each.finest["p_star"], each.a_r))[:MAX_CONTACTS]
+    by_title = list(grouped(ordered, lambda each: each.title).values())
+    return at_one_pressure(by_title, lambda each: (each.finest["p_star"], each.a_r))[:MAX_CONTACTS]
 
 
 def _draw(

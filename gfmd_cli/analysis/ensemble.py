@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from scipy.special import stdtrit
 
-from gfmd_cli.analysis.compare import Comparison, Row, best_of_all, of_study
+from gfmd_cli.analysis.compare import Comparison, Row, best_of_all, load_of, of_study
 from gfmd_cli.analysis.selection import grouped
-from gfmd_cli.analysis.units import grid_size
+from gfmd_cli.analysis.units import contact_title, grid_size
 from gfmd_cli.physics.observables import QUANTITIES
 from gfmd_cli.study.columns import PARAMETERS
 
@@ -42,7 +42,7 @@ class Ensemble:
         """Elastomer, surface without its seed, and the grid where that was given."""
         row = self.rows[0]
         grid = "" if row.get("grid") == "auto" else f", {grid_size([row])}"
-        return of_study(self.study, f"{row['elastomer']} on {row['ensemble']}{grid}")
+        return of_study(self.study, contact_title(row, of_seeds=True) + grid)
 
     @property
     def p_star(self) -> float:
@@ -85,7 +85,7 @@ def without_seed(row: Row) -> tuple[Any, ...]:
 
 def by_load(rows: Iterable[Row]) -> list[list[Row]]:
     """The rows of each load, one a seed."""
-    groups = grouped(rows, lambda row: (row["load"], f"{row['load_value']:.12g}"))
+    groups = grouped(rows, load_of)
     return [[*{row["seed"]: row for row in group}.values()] for group in groups.values()]
 
 

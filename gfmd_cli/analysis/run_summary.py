@@ -7,7 +7,7 @@ from gfmd_cli.analysis.compare import with_best
 from gfmd_cli.analysis.selection import grouped
 from gfmd_cli.analysis.table import Column, Record, Table, groups_of
 from gfmd_cli.analysis.tables import P_STAR, PRESSURE, RESIDUAL, STATUS, warnings_in
-from gfmd_cli.analysis.units import grid_size, shown
+from gfmd_cli.analysis.units import contact_title, grid_size, shown
 from gfmd_cli.physics.observables import QUANTITIES
 from gfmd_cli.status import Status
 from gfmd_cli.study.load_search import load_in_jump
@@ -77,7 +77,7 @@ def other_tasks(rows: list[dict[str, Any]]) -> list[str]:
 
 def _scene(row: Record) -> str:
     """Elastomer, surface and grid of a row in words."""
-    return f"{row['elastomer']} on {row['surface']}, {grid_size([row])}"
+    return f"{contact_title(row)}, {grid_size([row])}"
 
 
 def unconverged(rows: list[dict[str, Any]], errors: Mapping[int, str]) -> list[str]:

@@ -21,7 +21,7 @@ def grouped(values: Iterable[T], key: Callable[[T], K]) -> dict[K, list[T]]:
 
 
 def evenly(values: Sequence[T], max_count: int) -> list[T]:
-    """At most `most` values at equal distances, the first and the last among them."""
+    """At most `max_count` values at equal distances, the first and the last among them."""
     places = np.linspace(0, len(values) - 1, min(max_count, len(values))).round().astype(int)
     return [values[place] for place in np.unique(places)]
 

@@ -11,7 +11,7 @@ from gfmd_cli.analysis.curve_styles import CurveStyle
 from gfmd_cli.analysis.ensemble import by_load, spread_of, without_seed
 from gfmd_cli.analysis.plotting import ColumnFigure
 from gfmd_cli.analysis.selection import grouped
-from gfmd_cli.analysis.units import grid_size, in_si, quantity
+from gfmd_cli.analysis.units import contact_title, grid_size, in_si, quantity
 from gfmd_cli.grid.arrays import Field, Mask
 from gfmd_cli.status import Status
 
@@ -114,7 +114,7 @@ def _details(rows: list[Row]) -> str:
     first = rows[0]
     lines = [
         *([f"pressure {quantity(first['pressure'], 'Pa')}"] if in_si(first) else []),
-        f"{first['elastomer']} on {first['ensemble' if len(rows) > 1 else 'surface']}",
+        contact_title(first, of_seeds=len(rows) > 1),
         f"{grid_size(rows)}, solver {first['solver']}",
     ]
     if len(rows) > 1:

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from gfmd_cli.analysis.curve_styles import literal
 from gfmd_cli.analysis.plotting import HEIGHT, WIDTH, LegendFigure, shades
 from gfmd_cli.analysis.surface_summary import SurfaceSummary
 from gfmd_cli.grid.arrays import Field
@@ -36,7 +37,7 @@ def summary_figure(summaries: Sequence[SurfaceSummary], names: Sequence[str]) ->
         titles = ("as measured", "as prepared") if len(shown) == 2 else ("surface",)
         for place, picture, title in zip(row, shown, titles, strict=False):
             draw_heights(place, picture)
-            place.set_title(f"{name}: {title}".replace("$", r"\$"), fontsize="medium")
+            place.set_title(literal(f"{name}: {title}"), fontsize="medium")
         if len(shown) == 1:
             row[1].set_axis_off()
         _draw_spectrum(row[2], summary)

@@ -10,7 +10,7 @@ from gfmd_cli.analysis.distribution import StressDistribution, distributions
 from gfmd_cli.analysis.edge_law import fit
 from gfmd_cli.analysis.ensemble import ensembles
 from gfmd_cli.analysis.table import Column, Group, Record, Table, groups_of, known, product, ratio
-from gfmd_cli.analysis.units import grid_size, in_si, shown
+from gfmd_cli.analysis.units import contact_title, grid_size, in_si, shown
 from gfmd_cli.physics.observables import QUANTITIES
 from gfmd_cli.study.observables import OBSERVABLES, Observable
 from gfmd_cli.study.plausibility import SEPARATOR
@@ -25,10 +25,8 @@ STATUS = Column("status", "status")
 SCALES = (("Delta_sigma", "delta_sigma", "Pa"), ("h_std", "h_std", "m"), ("L", "length", "m"))
 """Symbol, column and SI unit of the scales of a contact."""
 RESIDUAL = Column("residual", "residual", ".1e")
-REDUCED = {"a_r": "a_r", "sigma_p": "sigma_p / Delta_sigma", "u_g": "u_g / h_std"}
-"""Headings of the three quantities in reduced units."""
-BEST = {name: Column(heading, f"{name}_best", error=f"{name}_best_error")
-        for name, heading in REDUCED.items()}  # fmt: skip
+BEST = {name: Column(quantity.heading, f"{name}_best", error=f"{name}_best_error")
+        for name, quantity in QUANTITIES.items()}  # fmt: skip
 """Continuum values where they are known, else values on the grid."""
 
 
@@ -70,26 +68,29 @@ CONTINUUM = (
     POINTS,
     *(
         Column(
-            heading,
+            quantity.heading,
             partial(_continuum, name=name),
             error=f"{name}_continuum_error",
             otherwise=f"{name}_verdict",
         )
-        for name, heading in REDUCED.items()
+        for name, quantity in QUANTITIES.items()
     ),
 )
 SEEDS = (
     P_STAR,
-    *(Column(REDUCED[name], f"{name}_mean", error=f"{name}_confidence") for name in QUANTITIES),
+    *(
+        Column(quantity.heading, f"{name}_mean", error=f"{name}_confidence")
+        for name, quantity in QUANTITIES.items()
+    ),
 )
 CONTACT_AREA, STRESS_DEVIATION, MEAN_GAP = (
     (
         P_STAR,
         PRESSURE,
-        *_beside_theory(BEST[name], f"{name}_persson", unit=unit, si=si),
+        *_beside_theory(BEST[name], f"{name}_persson", unit=quantity.scale, si=quantity.si),
         STATUS,
     )
-    for name, unit, si in (("a_r", "", ""), ("sigma_p", "delta_sigma", "Pa"), ("u_g", "h_std", "m"))
+    for name, quantity in QUANTITIES.items()
 )
 TRUE_CONTACT = (
     P_STAR,
@@ -241,7 +242,7 @@ def seeds_table(comparison: Comparison) -> Table:
 def power_laws(comparison: Comparison) -> Table:
     """The power laws of Pr(sigma), a record each; without one where no contact has two grids."""
     titled = [
-        (stress.scene, record)
+        (stress.title, record)
         for stress in distributions(comparison)
         for record in _law_records(stress)
     ]
@@ -261,7 +262,7 @@ def _law_records(stress: StressDistribution) -> list[Record]:
 
 def curve_title(curve: Curve) -> str:
     """Elastomer, surface and grid in words."""
-    text = f"{curve.elastomer} on {curve.surface}, {grid_size(curve.rows)}"
+    text = f"{contact_title(curve.rows[0])}, {grid_size(curve.rows)}"
     return of_study(curve.study, text)
 
 

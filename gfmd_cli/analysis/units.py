@@ -70,6 +70,11 @@ def span(values: Iterable[float], unit: str = "") -> str:
     return f"{bare if unit and high.endswith(SPACE + low_unit) else low} to {high}"
 
 
+def contact_title(row: Mapping[str, Any], *, of_seeds: bool = False) -> str:
+    """Elastomer and surface of a contact; `of_seeds`: the surface without its seed."""
+    return f"{row['elastomer']} on {row['ensemble' if of_seeds else 'surface']}"
+
+
 def grid_size(rows: Sequence[Mapping[str, Any]]) -> str:
     """Points of the grids of some rows, from the coarsest to the finest.
 

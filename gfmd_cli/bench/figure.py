@@ -6,17 +6,18 @@ from typing import Any
 
 import numpy as np
 
-from gfmd_cli.analysis.curve_styles import MARKERS, CurveStyle, colours
+from gfmd_cli.analysis.curve_styles import MARKERS, CurveStyle, colours, literal
 from gfmd_cli.analysis.plotting import SMALL, WIDTH, LegendFigure, log_scale, styled
 from gfmd_cli.analysis.selection import grouped
+from gfmd_cli.analysis.units import contact_title
 from gfmd_cli.bench.file import Trace
 from gfmd_cli.bench.run import REFERENCE
-from gfmd_cli.bench.table import scene_of, solver_names
+from gfmd_cli.bench.table import contact_of, solver_names
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.status import Status
 
 FULL_WIDTH, ROW_HEIGHT = 2.09 * WIDTH, 2.0  # inches: a page of 180 mm; a row of panels
-SCENES = 4  # rows of panels that a page holds
+MAX_CONTACTS = 4  # rows of panels that a page holds
 COSTS = (
     ("transforms", "transforms of the solved size"),
     ("seconds", "processor time on one thread (s)"),
@@ -27,7 +28,7 @@ ERROR = r"relative error of $u_g$"
 
 
 def draw_bench(traces: list[Trace], folder: Path) -> list[Path]:
-    """Draw a bench as PDF and PNG: one figure, or one for each of many scenes; return the paths.
+    """Draw a bench as PDF and PNG: one figure, or one for each of many contacts; return the paths.
 
     Raises SpaceError where the folder cannot be written.
     """
@@ -42,41 +43,41 @@ def draw_bench(traces: list[Trace], folder: Path) -> list[Path]:
 def bench_figures(traces: list[Trace]) -> dict[str, LegendFigure]:
     """The figures by name; to be called inside `styled`."""
     names = solver_names(traces)
-    solvers = list(dict.fromkeys(names))  # each has its colour and symbol in all scenes
+    solvers = list(dict.fromkeys(names))  # each has its colour and symbol in all contacts
     styles = {
         name: CurveStyle(colour, MARKERS[i % len(MARKERS)], name)
         for i, (name, colour) in enumerate(zip(solvers, colours(len(solvers)), strict=True))
     }
     pairs = ((trace, styles[name]) for trace, name in zip(traces, names, strict=True))
-    rows = list(grouped(pairs, lambda pair: scene_of(pair[0])).values())
-    if len(rows) <= SCENES:
+    rows = list(grouped(pairs, lambda pair: contact_of(pair[0])).values())
+    if len(rows) <= MAX_CONTACTS:
         return {"work_precision": _draw(rows)}
     return {
         f"work_precision_{i}_{_slug(_title(row[0][0]))}": _draw([row]) for i, row in enumerate(rows)
     }
 
 
-def _draw(scenes: list[list[tuple[Trace, CurveStyle]]]) -> LegendFigure:
-    """A row of two panels for each scene."""
-    plot = LegendFigure(FULL_WIDTH, ROW_HEIGHT * len(scenes))
-    grid = plot.figure.subplots(len(scenes), len(COSTS), sharey="row", squeeze=False)
-    for scene, panels in zip(scenes, grid, strict=True):
-        errors = np.concatenate([_errors(trace) for trace, _ in scene])
+def _draw(contacts: list[list[tuple[Trace, CurveStyle]]]) -> LegendFigure:
+    """A row of two panels for each contact."""
+    plot = LegendFigure(FULL_WIDTH, ROW_HEIGHT * len(contacts))
+    grid = plot.figure.subplots(len(contacts), len(COSTS), sharey="row", squeeze=False)
+    for solves, panels in zip(contacts, grid, strict=True):
+        errors = np.concatenate([_errors(trace) for trace, _ in solves])
         errors = errors[np.isfinite(errors)]
         for axes, (cost, label) in zip(panels, COSTS, strict=True):
-            spans = [_curve(plot, axes, trace, style, cost) for trace, style in scene]
+            spans = [_curve(plot, axes, trace, style, cost) for trace, style in solves]
             log_scale(axes, "x", min(s[0] for s in spans), max(s[1] for s in spans))
             if errors.size:
                 log_scale(axes, "y", float(errors.min()) / ROOM, float(errors.max()) * ROOM)
-            if scene is scenes[-1]:
+            if solves is contacts[-1]:
                 axes.set_xlabel(label)
         panels[0].set_ylabel(ERROR)
-        panels[0].set_title(_title(scene[0][0]), loc="left", fontsize=SMALL)
+        panels[0].set_title(_title(solves[0][0]), loc="left", fontsize=SMALL)
     return plot
 
 
 def _errors(trace: Trace) -> Field:
-    """What lasts of the error of the mean gap, no less than the reference can tell."""
+    """Error of the mean gap that no later step exceeds, at least that of the reference."""
     floor = max(trace.row["reference_residual"], REFERENCE.tolerance)
     return np.maximum(trace.lasting_error("u_g"), floor)
 
@@ -105,8 +106,8 @@ def _curve(
 
 def _title(trace: Trace) -> str:
     row = trace.row
-    contact = f"{row['elastomer']} on {row['surface']}"[:MAX_LABEL].replace("$", r"\$")
-    return f"{contact}, {row['points']} points, p* = {row['p_star']:.4g}"
+    contact = contact_title(row)[:MAX_LABEL]
+    return f"{literal(contact)}, {row['points']} points, p* = {row['p_star']:.4g}"
 
 
 def _slug(text: str) -> str:

@@ -24,7 +24,7 @@ from gfmd_cli.solvers.fire import Fire
 from gfmd_cli.solvers.loop import Solver, State
 from gfmd_cli.solvers.nested_grids import Solution, solve_contact
 from gfmd_cli.solvers.polonsky_keer import PolonskyKeer
-from gfmd_cli.spec.models import SOUGHT, Spec
+from gfmd_cli.spec.models import LOADS, Spec
 from gfmd_cli.study.context import Progress, Report
 from gfmd_cli.study.measure import planned
 from gfmd_cli.study.resources import check_memory
@@ -119,7 +119,7 @@ def run_bench(spec: Spec, report: Report) -> list[Trace]:
     an elastomer.
     """
     tasks = plan(spec)
-    if spec.load.quantity in SOUGHT:
+    if LOADS[spec.load.quantity].searched:
         raise InputError(f"load.{spec.load.quantity}: a bench takes load.p_star or load.pressure")
     if any(task.auto for task in tasks):
         raise InputError('grid.points: "auto" is no grid to compare solvers on; give a number')
@@ -150,7 +150,7 @@ def _trace(
     report: Report,
     run: int,
 ) -> Trace:
-    """One solve under the eyes of a recorder."""
+    """Solve a contact, with samples of the error."""
     label = f"{solver.kind} {row['elastomer']} {row['points']} p*={row['p_star']:.4g}"
     report(Progress(run, "start", label))
     warm_up = solver.model_copy(update={"max_steps": 1})  # plans of all grids, pages of memory

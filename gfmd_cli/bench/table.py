@@ -61,8 +61,8 @@ def _record(trace: Trace, name: str) -> Record:
     return record | errors
 
 
-def scene_of(trace: Trace) -> tuple[Any, ...]:
-    """What traces of one scene share."""
+def contact_of(trace: Trace) -> tuple[Any, ...]:
+    """Values that identify the contact of a trace."""
     keys = ("surface", "seed", "elastomer", "boundary", "points", "p_star")
     return tuple(trace.row.get(key) for key in keys)
 

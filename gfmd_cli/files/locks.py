@@ -151,7 +151,7 @@ def _owner(path: Path) -> dict[str, str | int] | None:
 
 
 def _is_dead(owner: dict[str, str | int]) -> bool:
-    """Whether the owner was a process of this machine that has ended; of others nobody knows."""
+    """Whether the owner is a process of this machine that has ended; False for other machines."""
     if owner["host"] != socket.gethostname():
         return False
     return _start_time(int(owner["pid"])) != owner["started"]

@@ -30,7 +30,7 @@ Shape = tuple[int, ...]
 
 @dataclass(frozen=True)
 class Grid:
-    """Points of a periodic cell, in one dimension (line scenes) or two: any sides, any numbers."""
+    """Points of a periodic cell, in two dimensions or, for line contacts, in one; any sides."""
 
     points: int
     """Number of points along x."""
@@ -356,7 +356,7 @@ class Grid:
         return field
 
     def diagonal(self, field: Field) -> Field:
-        """Values along the diagonal of the cell; of a line scene, the whole line.
+        """Values along the diagonal of the cell; of a line contact, the whole line.
 
         On an oblong grid, the points of each row or column, whichever are more, next to it.
         """

@@ -2,7 +2,7 @@
 
 All constants were fitted to one half of the calibration set of `scripts/calibration.py` and checked
 on the other (docs/accuracy.md): elastomers of n = 0 to 4 and slabs, random and simple surfaces,
-each on up to six nested grids. Contacts of few spots and surfaces that are not isotropic or not
+each on up to six nested grids. Contacts of few patches and surfaces that are not isotropic or not
 band-limited are left to `error_estimates`. Symbols: x = contact line times spacing, that is contact
 switches per point; n = exponent of the stiffness k(q); w = 2 pi waves / points, the phase of the
 short waves from one point to the next (pi at most); b = curvature / points^2, the height [h_std] by
@@ -60,8 +60,8 @@ SINGLE_CONTACT = 2.5  # times the change: bar of a single indenter, from the cal
 SINGLE_CONTACT_AREA = 0.2  # error of a corrected a_r in x, of a single or line contact, likewise
 SINGLE_CONTACT_STRESS = 0.07  # in n sigma_p x / a_r: waves at n = 2 have up to 0.07 where D = 0
 SINGLE_CONTACT_GAP = 5.0  # in u_g / points^2: waves and paraboloids have 2.7 to 3.5 at 32 points
-MIN_SPOTS = 10.0
-"""Contact spots from which errors average out: with 6 or less 70 to 90 of 100 bars held."""
+MIN_PATCHES = 10.0
+"""Contact patches from which errors average out: with 6 or less 70 to 90 of 100 bars held."""
 MAX_ANISOTROPY = 2.0
 """Largest ratio of rms slopes of a calibrated surface; isotropic maps of 32 points have up to 1.3,
 maps stretched by 3, whose bars failed, 2.6 or more."""
@@ -155,7 +155,7 @@ def estimate(
         return unknown()
     n, phase, bend = max(exponent, 0.0), nan, nan
     if rough is not None:
-        if fine.spots < MIN_SPOTS or not rough.calibrated:
+        if fine.patches < MIN_PATCHES or not rough.calibrated:
             return estimate_by_change(fine, coarse, n)
         phase, bend = 2 * pi * rough.waves / fine.points, rough.curvature / fine.points**2
     oblong = rough is not None and rough.aspect > MAX_ASPECT

@@ -8,6 +8,7 @@ surfaces across the spatial dimensions".
 
 import warnings
 from collections.abc import Callable
+from fractions import Fraction
 from functools import lru_cache
 from typing import Annotated, ClassVar, Literal, Self
 
@@ -43,6 +44,14 @@ class LinearElastomer(Choice):
     exponent: ClassVar[float | None] = None
     """Exponent n where the stiffness is a power law k = k_n q^n, else None."""
     kind: str
+
+    @property
+    def short_label(self) -> str:
+        """Name in figures: the exponent as "n = 3/2" where there is one, else the label."""
+        if self.exponent is None:
+            return self.label
+        fraction = Fraction(self.exponent).limit_denominator(4)
+        return f"n = {fraction}" if fraction == self.exponent else f"n = {self.exponent:g}"
 
     def stiffness(self, q: Field, length: float = 1.0) -> Field:
         """k(q) [Pa/m], zero at q = 0."""
@@ -178,6 +187,11 @@ class HalfSpace(LinearElastomer):
     E_star: Positive = 1.0
     """Contact modulus E / (1 - nu^2) [Pa]."""
 
+    @property
+    def short_label(self) -> str:
+        """The kind."""
+        return self.kind
+
     def stiffness(self, q: Field, length: float = 1.0) -> Field:
         """k(q) [Pa/m]."""
         return 0.5 * self.E_star * q
@@ -235,6 +249,11 @@ class Slab(LinearElastomer):
     """Thickness t / L."""
     E_star: Positive = 1.0
     """Contact modulus E / (1 - nu^2) [Pa]."""
+
+    @property
+    def short_label(self) -> str:
+        """The thickness."""
+        return f"t/L = {self.thickness:g}"
 
     def stiffness(self, q: Field, length: float = 1.0) -> Field:
         """k(q) [Pa/m]."""

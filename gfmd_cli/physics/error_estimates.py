@@ -1,9 +1,9 @@
 """Discretisation errors of contacts that no law describes: from the change between two grids.
 
-These are contacts of few spots, maps that are clipped, stepped, anisotropic or measured, and
+These are contacts of few patches, maps that are clipped, stepped, anisotropic or measured, and
 contacts with a free boundary. One grid gives no error. All constants were fitted to one half of the
-calibration set (`scripts/calibration.py`: maps, and random surfaces with less than six spots; with
-`--free` for a free boundary) and checked on the other (docs/accuracy.md). Each factor is the
+calibration set (`scripts/calibration.py`: maps, and random surfaces with less than six patches;
+with `--free` for a free boundary) and checked on the other (docs/accuracy.md). Each factor is the
 largest that any class of surface needs for 95 of 100 bars. Symbols: D = change of an observable
 from the coarser to the finer grid, x = contact line times spacing.
 
@@ -13,9 +13,9 @@ as spacing^(1 - n), and has no limit for n >= 1.
 """
 
 from dataclasses import dataclass, replace
-from math import hypot, nan, pi
+from math import hypot, nan
 
-from gfmd_cli.physics.observables import QUANTITIES
+from gfmd_cli.physics.observables import QUANTITIES, estimated_patches
 
 # Error bars: FACTOR times the root of the sum of the squares of D and FLOOR times
 #   a_r: x          sigma_p: sigma_p x / a_r          u_g: u_g x / a_r
@@ -58,9 +58,9 @@ class Level:
         return self.perimeter / self.points
 
     @property
-    def spots(self) -> float:
-        """Number of circles with this area and perimeter, in 8 r grid lines of radius r each."""
-        return pi * self.area * self.perimeter**2 / (64 * self.a_r) if self.a_r > 0 else 0.0
+    def patches(self) -> float:
+        """Estimated number of contact patches."""
+        return estimated_patches(self.perimeter, self.a_r, self.area)
 
 
 @dataclass(frozen=True)

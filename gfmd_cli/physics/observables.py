@@ -1,6 +1,7 @@
 """Observables of a solved contact, in reduced units."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -40,6 +41,15 @@ def contact_line(grid: Grid, mask: Mask, *, periodic: bool = True) -> float:
     return float(grid.total(counts) @ across) * grid.length / grid.size
 
 
+def estimated_patches(perimeter: float, a_r: float, area: float) -> float:
+    """Number of circles with this relative contact area and perimeter, as in `Observables`.
+
+    The area of the cell is in units of L^2. A circle of radius r has 8 r switches along rows and
+    columns, in units of the spacing.
+    """
+    return np.pi * area * perimeter**2 / (64 * a_r) if a_r > 0 else 0.0
+
+
 def border_contact(grid: Grid, mask: Mask) -> float:
     """Share of the outermost points of a map that a mask contains."""
     inner = [slice(1, -1)] * mask.ndim
@@ -52,8 +62,23 @@ def border_contact(grid: Grid, mask: Mask) -> float:
     return float(touching / outermost)
 
 
-QUANTITIES = ("a_r", "sigma_p", "u_g")
-"""Names of the observables that have error estimates."""
+class Quantity(NamedTuple):
+    """An observable that has error estimates."""
+
+    heading: str
+    """Symbol in tables, over the reduced unit."""
+    scale: str = ""
+    """Column of the reduced unit in a study; empty for a pure number."""
+    si: str = ""
+    """SI unit."""
+
+
+QUANTITIES = {
+    "a_r": Quantity("a_r"),
+    "sigma_p": Quantity("sigma_p / Delta_sigma", "delta_sigma", "Pa"),
+    "u_g": Quantity("u_g / h_std", "h_std", "m"),
+}
+"""The observables that have error estimates, by their names."""
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from gfmd_cli.analysis.compare import Comparison, Row, compare_open
+from gfmd_cli.analysis.curve_styles import without_escapes
 from gfmd_cli.analysis.figures import items_of, study_figures
 from gfmd_cli.analysis.plotting import ColumnFigure
 from gfmd_cli.analysis.series import Item
@@ -118,5 +119,5 @@ def side_by_side(studies: Sequence[ReportData], traces: list[Trace]) -> ReportDa
 
 def item_title(item: Item) -> str:
     """A curve by its name in figures and in full."""
-    short, full = item.style.label.replace(r"\$", "$"), curve_title(item.curve)
+    short, full = without_escapes(item.style.label), curve_title(item.curve)
     return full if short == item.curve.elastomer else f"{short}: {full}"

@@ -5,6 +5,7 @@ from collections.abc import Iterable
 from html import escape
 from typing import Any
 
+from gfmd_cli.analysis.curve_styles import without_escapes
 from gfmd_cli.analysis.plotting import BAND, ColumnFigure, PlotLayer
 from gfmd_cli.analysis.table import known, plus_minus
 from gfmd_cli.grid.arrays import Field
@@ -124,7 +125,7 @@ def _symbol(handle: Any) -> str:
 
 
 def _name(label: str) -> str:
-    return str(clean(label)).replace(r"\$", "$")
+    return without_escapes(str(clean(label)))
 
 
 def _numbers(values: Iterable[float] | Field, digits: int) -> list[float | None]:

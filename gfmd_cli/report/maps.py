@@ -10,7 +10,7 @@ from gfmd_cli.analysis.plotting import WIDTH, ColumnFigure, LegendFigure, shades
 from gfmd_cli.analysis.selection import evenly, grouped
 from gfmd_cli.analysis.table import Column, Group, Table
 from gfmd_cli.analysis.tables import AREA, P_STAR, POINTS, PRESSURE
-from gfmd_cli.analysis.units import pressure_text
+from gfmd_cli.analysis.units import contact_title, pressure_text
 from gfmd_cli.grid.arrays import Field, Mask
 from gfmd_cli.physics.observables import contact_points
 from gfmd_cli.physics.pictures import block_sums
@@ -59,7 +59,7 @@ def maps(data: ReportData) -> Section:
         contacts = [row for rows in contacts_by_curve for row in rows]
         series = [
             {
-                "title": f"{rows[0]['elastomer']} on {rows[0]['surface']}",
+                "title": contact_title(rows[0]),
                 "contacts": [_contact_maps(study, row, data.prefix) for row in rows],
             }
             for rows in contacts_by_curve
@@ -108,10 +108,10 @@ def _contact_maps(study: StudyFile, row: Row, prefix: str) -> dict[str, Any]:
 
 def _map_figures(study: StudyFile, row: Row) -> list[tuple[str, ColumnFigure, str]]:
     """Maps of contact, stress and gap, as far as the fields for them are stored."""
-    datasets = study.datasets("fields", row["task"])
-    if "sigma" not in datasets or datasets["sigma"].ndim != 2:
+    shape = study.shapes("fields", row["task"]).get("sigma", ())
+    if len(shape) != 2:
         return []
-    pixels = _thumbnails(study, row["task"], -(-max(datasets["sigma"].shape) // SIDE))
+    pixels = _thumbnails(study, row["task"], -(-max(shape) // SIDE))
     stress, touching = pixels["stress"], pixels.get("contact")
     red = f"red: the {100 - PERCENTILE} % of the {{}} above the scale"
     what = f"Stress; black: none, {red.format('contact')}"
@@ -173,7 +173,9 @@ def _scaled_figure(values: Field, shown: Mask, row: Row, scale: Scale, label: st
 def _cell(row: Row) -> tuple[ColumnFigure, tuple[float, float, float, float]]:
     """Axes of the cell, and where it ends in their units."""
     length, length_y = float(row["length"]), float(row["length_y"])
-    divisor, x = LENGTH_SCALE.axis(row, max(length, length_y), "x")
-    plot = ColumnFigure(x, f"y{x[1:]}")
+    longest = max(length, length_y)
+    divisor, x = LENGTH_SCALE.axis(row, longest, "x")
+    _, y = LENGTH_SCALE.axis(row, longest, "y")
+    plot = ColumnFigure(x, y)
     plot.height = min(max(0.85 * length_y / length, MIN_ASPECT), MAX_ASPECT) * WIDTH
     return plot, (0.0, length / divisor, 0.0, length_y / divisor)

@@ -31,10 +31,10 @@ class Scale(NamedTuple):
     """Column of a row that holds the reduced unit."""
     symbol: str
 
-    def axis(self, row: Row, most: float, label: str) -> tuple[float, str]:
-        """A divisor for values up to `most`, and the label with the unit that this gives."""
+    def axis(self, row: Row, largest_value: float, label: str) -> tuple[float, str]:
+        """A divisor for values up to `largest_value`, and the label with its unit."""
         if in_si(row):
-            divisor, unit = scaled(most, self.si)
+            divisor, unit = scaled(largest_value, self.si)
             return divisor, f"{label} ({unit})"
         return float(row[self.column]), f"{label} / {self.symbol}"
 
@@ -61,13 +61,13 @@ class Profile:
 
 
 def read_profile(study: StudyFile, row: Row) -> Profile | None:
-    """The cross-section of a contact; a line scene may have stored it as its fields.
+    """The cross-section of a contact; a line contact may have stored it as its fields.
 
     Where the fields of a cell are stored, the row of the grid that carries most load; the diagonal,
     which can miss all contacts, only where that alone is stored.
     """
     line = not plane(row)
-    if not line and LINES.keys() | {"sigma"} <= study.datasets("fields", row["task"]).keys():
+    if not line and LINES.keys() | {"sigma"} <= study.shapes("fields", row["task"]).keys():
         return _most_loaded(study, row)
     values = study.arrays("cross_sections", row["task"])
     if line and not values:
@@ -88,7 +88,7 @@ def _most_loaded(study: StudyFile, row: Row) -> Profile:
         [np.nan_to_num(np.maximum(block["sigma"], 0.0)).sum(axis=1) for block in blocks]
     )
     y = int(np.argmax(loads))
-    values = {name: data[y] for name, data in study.datasets("fields", row["task"]).items()}
+    values = study.grid_row("fields", row["task"], y)
     size = values["sigma"].size
     position = (np.arange(size) / size + row["x_first"]) * float(row["length"])
     place = f" through the row that carries most load (y = {y / loads.size:.2f} of the side)"
@@ -96,7 +96,7 @@ def _most_loaded(study: StudyFile, row: Row) -> Profile:
 
 
 def plane(row: Row) -> bool:
-    """Whether a contact has maps; a line scene has none."""
+    """Whether a contact has maps; a line contact has none."""
     return int(row["dimension"]) == 2
 
 

@@ -85,8 +85,8 @@ def _quantities(data: ReportData) -> list[KeyNumber]:
     quantities = [
         KeyNumber("Pressure", p_star, "p*, in units of Delta_sigma"),
         KeyNumber("Contact area", span(_best(rows, "a_r")), note),
-        _scaled(data, "Mean gap", "u_g / h_std", "m"),
-        _scaled(data, "Stress deviation", "sigma_p / Delta_sigma", "Pa"),
+        _scaled(data, "Mean gap", "u_g"),
+        _scaled(data, "Stress deviation", "sigma_p"),
     ]
     if not data.in_si:
         return quantities
@@ -102,9 +102,9 @@ def _quantities(data: ReportData) -> list[KeyNumber]:
     ]
 
 
-def _scaled(data: ReportData, title: str, symbol: str, unit: str) -> KeyNumber:
-    """A quantity that rows hold over their scale, as its symbol says; the scale is in `unit`."""
-    name, scale = symbol.lower().split(" / ")
+def _scaled(data: ReportData, title: str, name: str) -> KeyNumber:
+    """A quantity that has a reduced unit; in SI units where those mean something."""
+    symbol, scale, unit = QUANTITIES[name]
     reduced, where = _best(data.solved, name), _continuum_note(data.solved, name)
     if not data.in_si:
         return KeyNumber(title, span(reduced), f"{symbol}{where}")
@@ -143,13 +143,13 @@ def _time(rows: list[Row]) -> str:
     return quantity(seconds, "s") if seconds < SECONDS else duration(seconds)
 
 
-def _ratios(data: ReportData, name: str, most: float) -> str:
-    """Simulation over theory at reduced pressures up to `most`."""
+def _ratios(data: ReportData, name: str, limit: float) -> str:
+    """Simulation over theory at reduced pressures up to `limit`."""
     return span(
         record[f"{name}_best"] / record[f"{name}_persson"]
         for curve in data.comparison.curves
         for record in curve.records
-        if record[f"{name}_persson"] > 0 and record["p_star"] <= most
+        if record[f"{name}_persson"] > 0 and record["p_star"] <= limit
     )
 
 

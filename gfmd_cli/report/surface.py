@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gfmd_cli.analysis.compare import Row
-from gfmd_cli.analysis.curve_styles import MARKERS, MAX_LABEL, CurveStyle, colours
+from gfmd_cli.analysis.curve_styles import MARKERS, MAX_LABEL, CurveStyle, colours, literal
 from gfmd_cli.analysis.plotting import ColumnFigure
 from gfmd_cli.analysis.surface_figure import height_figure
 from gfmd_cli.analysis.table import Column, Group, Table
@@ -68,7 +68,7 @@ class Spectrum:
     q: Field
     """Mean wavenumber of each band [1/m]."""
     density: Field
-    """[m^4], of a line scene [m^3]."""
+    """[m^4], of a line contact [m^3]."""
     modes: Field
     """Number of modes of each band."""
     fit: SelfAffineFit | None
@@ -200,7 +200,7 @@ def _spectrum_figure(shown: list[Spectrum]) -> ColumnFigure:
     power = {1: "3", 2: "4"}.get(shown[0].dimension)
     plot = ColumnFigure(r"wavenumber  $q$ (m$^{-1}$)", rf"{LABEL} (m$^{power}$)")
     for place, (curve, colour) in enumerate(zip(shown, colours(len(shown)), strict=True)):
-        name = curve.name[:MAX_LABEL].replace("$", r"\$")
+        name = literal(curve.name[:MAX_LABEL])
         style = CurveStyle(colour, MARKERS[place % len(MARKERS)], name)
         if curve.fit is not None:
             plot.unnamed_line((name,), curve.q, curve.fitted, color=colour, lw=0.7)

@@ -17,9 +17,9 @@ from gfmd_cli.physics.elastomers import Elastomer
 from gfmd_cli.physics.surfaces import Surface
 from gfmd_cli.solvers.auto import AnySolver
 from gfmd_cli.spec.models import (
+    LOADS,
     REPEATED,
     SHAPES,
-    SOUGHT,
     SWEPT,
     AccuracyTable,
     GridTable,
@@ -201,7 +201,7 @@ class Check:
                 'with grid.points = "auto" the points along y follow from the sides; give '
                 "surface.length_y",
             )
-        if auto and load is not None and load.quantity in SOUGHT:
+        if auto and load is not None and LOADS[load.quantity].searched:
             self.add(
                 "grid.points",
                 f'"auto" needs load.p_star or load.pressure; load.{load.quantity} is searched on '

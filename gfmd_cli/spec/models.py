@@ -5,7 +5,7 @@ import json
 from collections.abc import Iterable, Iterator
 from itertools import product
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self, get_args
+from typing import Annotated, Any, Literal, NamedTuple, Self, get_args
 
 import numpy as np
 from pydantic import Discriminator, StrictStr, Tag, model_validator
@@ -165,10 +165,30 @@ Areas = Annotated[
     | Annotated[list[Share], Key(min_length=1, max_length=MAX_LADDER), Tag("list")],
     Discriminator(_shape),
 ]
-LOADS = ("p_star", "pressure", "contact_area", "mean_gap", "displacement")
-"""Quantities that can be prescribed as the load."""
-SOUGHT = {"contact_area": "a_r", "mean_gap": "u_g", "displacement": "displacement"}
-"""Prescribed quantities whose pressure is searched, with the column that must match."""
+
+
+class Load(NamedTuple):
+    """A quantity that can be prescribed as the load."""
+
+    symbol: str
+    words: str
+    searched: str = ""
+    """Column that must match if the pressure is searched; empty if the pressure is given."""
+
+
+LOADS = {
+    "p_star": Load("p*", "reduced pressure"),
+    "pressure": Load("p", "pressure"),
+    "contact_area": Load("a_r", "contact area", "a_r"),
+    "mean_gap": Load("u_g", "mean gap", "u_g"),
+    "displacement": Load("d", "displacement", "displacement"),
+}
+"""The quantities by their keys in [load]."""
+
+
+def load_text(quantity: str, value: float) -> str:
+    """A load with its symbol."""
+    return f"{LOADS[quantity].symbol}={value:.4g}"
 
 
 class LoadTable(Choice):
@@ -200,8 +220,9 @@ class LoadTable(Choice):
         beyond = [p for p in self.listed() if not low <= p <= high]
         if beyond and self.p_star is not None:
             raise ValueError(f"p_star must be from {low:g} to {high:g}, got {beyond[0]:g}")
-        if "tolerance" in self.model_fields_set and loads[0] not in SOUGHT:
-            raise ValueError(f"tolerance belongs to {' or '.join(SOUGHT)}")
+        if "tolerance" in self.model_fields_set and not LOADS[loads[0]].searched:
+            searched = [name for name, load in LOADS.items() if load.searched]
+            raise ValueError(f"tolerance belongs to {' or '.join(searched)}")
         return self
 
     @property
@@ -361,7 +382,7 @@ class Spec(Choice):
                     dumped["path"] = Path(dumped["path"]).name
                     dumped["sha256"] = file_digest(choice.path)
         data["load"] = {self.load.quantity: self.load.values()}
-        if self.load.quantity in SOUGHT:
+        if LOADS[self.load.quantity].searched:
             data["load"]["tolerance"] = self.load.tolerance
         return data
 

@@ -57,6 +57,7 @@ DETAILS = (
     Column("warnings", "reasons to doubt the result", "", str),
     Column("x_first", "x / L of the first grid point; -0.5 if x = 0 is the crest of an indenter"),
     Column("ensemble", "the column surface without the seed, the same for all seeds", "", str),
+    Column("elastomer_short", "short name of the elastomer in figures", "", str),
     Column("surface_sha256", "SHA-256 checksum of the file of the surface", "", str),
     Column("mean_gap", "mean gap", "m"),
     Column("displacement", "that of the indenter from first touch; NaN if not defined", "m"),

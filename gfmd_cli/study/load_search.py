@@ -7,8 +7,8 @@ solve of its own.
 With `[accuracy]` a contact area or mean gap is that in the continuum on the last grid, and that of
 the grid on the coarser ones, which only give a first pressure.
 
-The contact area of a grid has steps, so that the search also ends between two attainable areas,
-with the nearest; which pressures have them depends on the last bits, that it ends does not.
+The contact area of a grid has steps. Where the requested area lies between two attainable ones, the
+search ends with the nearest contact, at a pressure that may depend on rounding errors.
 """
 
 from collections.abc import Mapping
@@ -23,7 +23,7 @@ from gfmd_cli.grid.arrays import Field
 from gfmd_cli.physics.approach import estimated_pressures
 from gfmd_cli.physics.contact import PRESSURES, Scene
 from gfmd_cli.physics.persson import Persson
-from gfmd_cli.spec.models import SOUGHT
+from gfmd_cli.spec.models import LOADS
 from gfmd_cli.status import Status
 from gfmd_cli.study.context import SolveContext, Watcher
 from gfmd_cli.study.measure import measured
@@ -53,7 +53,7 @@ def solve_at_load(task: Task, context: SolveContext, watcher: Watcher) -> Solved
 
     Raises InputError for a mean gap that no pressure has, and an area below one grid point.
     """
-    if task.quantity not in SOUGHT:
+    if not LOADS[task.quantity].searched:
         return solve_on_grids(task, context, watcher)
     trials = watcher.notes.trials
 
@@ -96,14 +96,14 @@ def solve_at_load(task: Task, context: SolveContext, watcher: Watcher) -> Solved
 
 def loaded_value(quantity: str, results: Mapping[str, Any]) -> float:
     """The value that a load prescribes: in the continuum if it is known, else on the grid."""
-    name = SOUGHT[quantity]
+    name = LOADS[quantity].searched
     continuum = float(results.get(f"{name}_continuum", inf))
     return continuum if isfinite(continuum) else float(results[name])
 
 
 def _check_known(task: Task, solved: Solved) -> None:
     """Raise InputError where [accuracy] asks for a continuum value that cannot be given."""
-    name = SOUGHT[task.quantity]
+    name = LOADS[task.quantity].searched
     if name in solved.estimates and not isfinite(solved.estimates[name].continuum):
         raise InputError(
             f"load.{task.quantity}: the continuum value is not known on a grid of {task.points} "

@@ -47,6 +47,7 @@ def planned(task: Task) -> Row:
         "rough": int(surface.rough),
         "preparation": surface.preparation(task.boundary),
         "elastomer": elastomer.label,
+        "elastomer_short": elastomer.short_label,
         "points_y": task.points_y,
         "length_y": surface.sides[0] if surface.dimension == 2 else np.nan,
         "n": np.nan if elastomer.exponent is None else elastomer.exponent,

@@ -46,10 +46,10 @@ def check_own(parts: Path) -> None:
 
 
 def remove_parts(parts: Path) -> None:
-    """Delete the folder with what gfmd made in it; whatever else is there stays.
+    """Delete what gfmd made in the folder, and the folder if nothing else is in it.
 
-    The locks that are held go last: who finds no `collecting` finds no `in-use` of this process
-    either, and so can lock both, and delete what it made in the meantime.
+    The locks that this process holds are deleted last, `collecting` after `in-use`: a process that
+    can take `collecting` can then take both, and delete what it made in the meantime.
     """
     for path in _listed(parts):
         is_folder = path.is_dir() and not path.is_symlink()

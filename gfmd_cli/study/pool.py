@@ -150,7 +150,7 @@ class Pool:
         worker.ready, worker.task = True, None
 
     def _remove_dead(self, worker: Worker) -> None:
-        """Take leave of a worker that has died; the others continue."""
+        """Remove a worker that has died; the others continue."""
         del self.workers[worker.pipe]
         status, task = worker.end(), worker.task
         if not worker.ready:

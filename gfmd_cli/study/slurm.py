@@ -45,8 +45,8 @@ run=$!
 while [ $told = 1 ]; do told=0; wait $run; status=$?; done   # a signal ends `wait` early
 
 shard=${{SLURM_ARRAY_JOB_ID}}_${{SLURM_ARRAY_TASK_ID}}   # the job number would be the whole array
-requeue() {{   # unless the shard was requeued {most} times or was cancelled
-  [ "${{SLURM_RESTART_COUNT:-0}}" -lt {most} ] &&
+requeue() {{   # unless the shard was requeued {max_requeues} times or was cancelled
+  [ "${{SLURM_RESTART_COUNT:-0}}" -lt {max_requeues} ] &&
     [ "$(squeue --noheader --jobs="$shard" --format=%T)" = RUNNING ] &&
     scontrol requeue "$shard" && sleep 60
 }}
@@ -148,7 +148,7 @@ def script(study: Path, words: list[str], shards: int, options: list[str]) -> st
         options="\n".join(f"#SBATCH {_directive(line)}" for line in lines),
         study=shlex.join(words),
         gfmd=shlex.join([sys.executable, "-P", "-m", "gfmd_cli"]),
-        most=MAX_REQUEUES,
+        max_requeues=MAX_REQUEUES,
     )
 
 

@@ -175,7 +175,7 @@ class Study:
         return known[1]
 
     def _is_complete(self, tasks: list[Task]) -> bool:
-        """Whether nothing is left to do, and nothing to look at."""
+        """Whether no task is missing, and no record or unfinished checkpoint is left."""
         if self.set_aside() or self.record_paths() or not self.path.exists():
             return False
         with open_study(self.path) as file:
@@ -232,32 +232,32 @@ class _Sources:
 
     def __init__(self, records: dict[Path, Entry], old: StudyFile | None) -> None:
         self.old = old
-        self.found: dict[str, tuple[Entry, Path | int]] = {}
+        self.by_task: dict[str, tuple[Entry, Path | int]] = {}
         """By task id: its entry, and the record or the index in the study so far."""
         if old is not None:
             for index, status in enumerate(old.statuses):
                 if status != Status.MISSING:
-                    self.found[old.task_ids[index]] = old.entry(index), index
+                    self.by_task[old.task_ids[index]] = old.entry(index), index
         for path, entry in records.items():
-            known = self.found.get(entry.task_id)
+            known = self.by_task.get(entry.task_id)
             if known is None or entry.stored >= known[0].stored:
-                self.found[entry.task_id] = entry, path
+                self.by_task[entry.task_id] = entry, path
 
     def entries(self, tasks: list[Task]) -> list[Entry]:
         """The tasks of a spec, solved or not, then all others that are solved."""
         own = {task.id: self._entry(task) for task in tasks}
-        return [*own.values(), *(e for name, (e, _) in self.found.items() if name not in own)]
+        return [*own.values(), *(e for name, (e, _) in self.by_task.items() if name not in own)]
 
     def _entry(self, task: Task) -> Entry:
         """What the spec gives of a task, and what was measured if it is solved."""
         missing = Entry(task.id, task.scene_id, frozenset(), {"status": Status.MISSING})
-        entry, _ = self.found.get(task.id, (missing, 0))
+        entry, _ = self.by_task.get(task.id, (missing, 0))
         points = {name: entry.row.get(name, -1) for name in ("points", "points_y")}
         return entry._replace(row=empty_row() | {**entry.row} | planned(task) | points)
 
     def load(self, task_id: str) -> TaskResult:
         """The whole result of a task."""
-        _, place = self.found[task_id]
+        _, place = self.by_task[task_id]
         if isinstance(place, Path):
             return read_record(place)
         assert self.old is not None

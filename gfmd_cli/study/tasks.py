@@ -17,13 +17,14 @@ from gfmd_cli.physics.surfaces import check_resolved
 from gfmd_cli.solvers.auto import AnySolver
 from gfmd_cli.solvers.multigrid import ASPECT
 from gfmd_cli.spec.models import (
-    SOUGHT,
+    LOADS,
     SWEPT,
     AccuracyTable,
     GridTable,
     OutputTable,
     Spec,
     digest,
+    load_text,
     with_boundary,
 )
 
@@ -41,13 +42,6 @@ BASE_BYTES = 240e6
 FIRST = 64  # points along x that "auto" begins with at the least; such a solve costs nothing
 LAST = {"a_r": MAX_AREA_EXPONENT, "u_g": 4.0, "sigma_p": MAX_STRESS_EXPONENT}
 """Exponents n up to which a quantity has a continuum value to come near to."""
-SYMBOLS = {
-    "p_star": "p*",
-    "pressure": "p",
-    "contact_area": "a_r",
-    "mean_gap": "u_g",
-    "displacement": "d",
-}
 SEARCH = 3.5  # solves that a search of the pressure takes, those on coarser grids included
 LOAD_DIGITS = 14  # of a load that name its task: the last bit of a ladder depends on the machine
 MAX_TASKS = 100_000  # upper limit of a study, guards against typing errors
@@ -122,7 +116,7 @@ class Task:
     @property
     def load_label(self) -> str:
         """The load with its symbol."""
-        return f"{SYMBOLS[self.quantity]}={self.load:.4g}"
+        return load_text(self.quantity, self.load)
 
     def p_star(self, delta_sigma: float) -> float:
         """The reduced pressure, where it is known, on a scene with this Delta_sigma [Pa]."""
@@ -181,7 +175,7 @@ class Task:
     @property
     def seconds(self) -> float:
         """Time that the solve is expected to take on one thread, within a factor of about three."""
-        solves = SEARCH if self.quantity in SOUGHT else 1.0
+        solves = SEARCH if LOADS[self.quantity].searched else 1.0
         return 0.01 + solves * SECONDS_PER_PAIR * self.size * self._pairs()
 
     def _pairs(self) -> float:
@@ -331,7 +325,7 @@ def _task_id(spec: Spec, resolved: dict[str, Any], tables: dict[str, Any], load:
     """Name of a task: the digest of everything that its solution depends on."""
     quantity = spec.load.quantity
     content = [tables, quantity == "p_star", f"{load:.{LOAD_DIGITS}g}"]
-    if quantity in SOUGHT:
+    if LOADS[quantity].searched:
         content += [quantity, spec.load.tolerance]
     if spec.accuracy is not None:
         content.append(resolved["accuracy"])
