@@ -357,9 +357,9 @@ class Spec(Choice):
             del data["output"][name]  # a new key must not change the identity of other tasks
         for table in ("surface", "elastomer"):
             for dumped, choice in zip(data[table], getattr(self, table), strict=True):
-                if "path" in dumped:
-                    dumped["path"] = Path(dumped["path"]).name
-                    dumped["sha256"] = file_digest(choice.path)
+                if choice.file is not None:
+                    dumped["path"] = choice.file.name
+                    dumped["sha256"] = file_digest(choice.file)
         data["load"] = {self.load.quantity: self.load.values()}
         if self.load.quantity in SOUGHT:
             data["load"]["tolerance"] = self.load.tolerance
