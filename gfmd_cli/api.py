@@ -35,7 +35,7 @@ from gfmd_cli.study.plausibility import SEPARATOR
 from gfmd_cli.study.reading import read_rows, solved_rows
 from gfmd_cli.study.refinement import forget_scene
 from gfmd_cli.study.resources import room
-from gfmd_cli.study.run import run_study
+from gfmd_cli.study.run import RunOptions, run_study
 from gfmd_cli.study.tasks import plan
 
 Tables = Mapping[str, Any]
@@ -245,7 +245,7 @@ def run(
     """
     resolved, text = _read(spec, overrides)
     path = Path(study if study is not None else f"{resolved.study.name}.h5")
-    run_study(resolved, text, path, report, jobs=jobs)
+    run_study(resolved, text, path, report, RunOptions(jobs=jobs))
     return path
 
 

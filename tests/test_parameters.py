@@ -29,7 +29,7 @@ from gfmd_cli.study.columns import (
     TASK_ID,
 )
 from gfmd_cli.study.reading import read_rows
-from gfmd_cli.study.run import run_study
+from gfmd_cli.study.run import RunOptions, run_study
 from gfmd_cli.study.tasks import plan
 
 SPEC = """
@@ -154,7 +154,7 @@ def test_rows_of_one_ensemble_differ_in_their_seed_only(rows_of, tmp_path):
 
 def test_tasks_that_are_not_solved_yet_have_their_parameters(spec_of, rows_of, tmp_path):
     spec = spec_of("elastomer.E_star=1.0")
-    run_study(spec, SPEC, tmp_path / "s.h5", lambda _: None, shard=(0, 4), jobs=1)
+    run_study(spec, SPEC, tmp_path / "s.h5", lambda _: None, RunOptions(shard=(0, 4), jobs=1))
     rows = read_rows(tmp_path / "s.h5")
     assert values(rows, "hurst") == 4 * [0.3] + 4 * [0.8]
     assert {row["status"] for row in rows} == {"converged", "missing"}

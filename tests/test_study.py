@@ -19,14 +19,13 @@ from gfmd_cli.grid import plans
 from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.solvers.pcg import PCGState, ProjectedCG
 from gfmd_cli.spec.parse import read_spec
-from gfmd_cli.study import run as study_run
-from gfmd_cli.study import run_task
+from gfmd_cli.study import run_task, time_limit
 from gfmd_cli.study.checkpoint import Checkpoint
 from gfmd_cli.study.columns import COLUMNS, LAYOUT
 from gfmd_cli.study.notes import Notes, Trial
 from gfmd_cli.study.parts import read_record
 from gfmd_cli.study.reading import open_study, read_rows
-from gfmd_cli.study.run import run_study
+from gfmd_cli.study.run import RunOptions, run_study
 
 SMALL = power_spec(
     n=[0, 1],
@@ -68,7 +67,8 @@ def run(tmp_path):
         spec_path.write_text(text)
         spec, _ = read_spec(spec_path, overrides)
         events = []
-        outcome = run_study(spec, text, tmp_path / name, report or events.append, **options)
+        report = report or events.append
+        outcome = run_study(spec, text, tmp_path / name, report, RunOptions(**options))
         return tmp_path / name, events, outcome
 
     return run
@@ -349,7 +349,7 @@ def test_max_hours_stop_a_run_as_a_signal_does(run, tmp_path, monkeypatch):
         if event.event == "step":
             timers[0].function()
 
-    monkeypatch.setattr(study_run, "Timer", AtFirstStep)
+    monkeypatch.setattr(time_limit, "Timer", AtFirstStep)
     with pytest.raises(Interrupted, match="call again"):
         run(LONG, report=report, max_seconds=20.0, jobs=1)
     assert 10 <= timers[0].interval <= 20

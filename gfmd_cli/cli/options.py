@@ -7,6 +7,7 @@ from typing import Any
 import click
 
 from gfmd_cli.errors import InputError
+from gfmd_cli.status import Status
 
 OF_OTHERS = {".csv", ".nc", ".vti", ".html", ".json", ".toml"}
 """Suffixes of files that other commands write or read."""
@@ -34,7 +35,7 @@ def study_path(spec: Any, output: Path | None) -> Path:
     return output or Path(f"{spec.study.name}.h5")
 
 
-def counted(counts: Mapping[str, int]) -> str:
+def counted(counts: Mapping[Status, int]) -> str:
     """The counts as text, such as "2 converged, 1 missing"."""
     return ", ".join(f"{count} {what}" for what, count in sorted(counts.items()))
 
