@@ -74,11 +74,7 @@ def test_no_column_has_the_name_of_another_data_set_of_a_study_file():
 
 def test_units_and_meaning_of_a_column_are_those_of_the_key():
     columns = {column.name: column for column in COLUMNS}
-    assert columns["E_star"][1:] == (
-        "elastomer.E_star: Contact modulus E / (1 - nu^2)",
-        "Pa",
-        float,
-    )
+    assert columns["tension"][1:] == ("elastomer.tension: Tension", "N/m", float)
     assert columns["hurst"].units == "1"
     assert columns["spectrum"][2:] == ("", str)
     assert columns["max_steps"].kind is columns["nested"].kind is int
