@@ -280,26 +280,26 @@ class FileSurface(RigidSurface):
     def _topography(self) -> Topography:
         return _read(self.path, self.dataset, region=self.region, flip=self.flip, crop=self.crop)
 
-    def remarks(self, boundary: str = "periodic") -> list[str]:
+    def warnings(self, boundary: str = "periodic") -> list[str]:
         """Warnings about the side, the heights, their gradient and borders, and unused keys."""
-        topography, heights, remarks = self._topography(), _prepared(self), []
+        topography, heights, warnings = self._topography(), _prepared(self), []
         if self._known_length() is None:
-            remarks.append(
+            warnings.append(
                 "the file does not state its side; L = 1 m is assumed: set surface.length"
             )
         if self.length is not None and topography.spacing is not None and topography.metres:
             stated = topography.spacing[-1] * heights.shape[-1] / self.copies
             if abs(self.length / stated - 1) > SIDES:
-                remarks.append(
+                warnings.append(
                     f"surface.length = {self.length:g} m replaces the side of the file, "
                     f"{stated:g} m"
                 )
         if "taper" in self.model_fields_set and self.edges != "window":
-            remarks.append('surface.taper has no effect without surface.edges = "window"')
-        remarks += _remarks_on_heights(self)
+            warnings.append('surface.taper has no effect without surface.edges = "window"')
+        warnings += _warnings_on_heights(self)
         filled = topography.holes / topography.heights.size if self.missing == "fill" else 0.0
         if filled > FILLED:
-            remarks.append(
+            warnings.append(
                 f"{filled:.0%} of the heights are missing and were filled in: contact there was "
                 'not measured; set surface.region, or surface.missing = "void" where nothing can '
                 "touch"
@@ -307,7 +307,7 @@ class FileSurface(RigidSurface):
         slopes = (np.diff(heights, axis=i) / step for i, step in enumerate(self._map_spacing()))
         gradient = np.sqrt(sum(float(np.mean(slope**2)) for slope in slopes))
         if gradient > STEEP or 0 < gradient < SMOOTH:
-            remarks.append(
+            warnings.append(
                 f"rms gradient {gradient:.3g}: check that heights and side are in metres; "
                 "surface.scale is the factor from the heights of the file to metres, "
                 "surface.length the side"
@@ -315,18 +315,18 @@ class FileSurface(RigidSurface):
         is_repeated = boundary == "periodic" and not self.has_borders
         cliff = border_step(heights) if is_repeated else 1.0
         if cliff > CLIFF:
-            remarks.append(
+            warnings.append(
                 f"the height step across the border is {cliff:.3g} times that inside the map: if "
                 "the map is not periodic, set surface.periodic = false"
             )
         if boundary == "free" and self.levelling() == "none":
             tilt = 1 - float(np.var(level(heights, "plane"))) / (np.var(heights) or 1.0)
             if tilt > TILTED:
-                remarks.append(
+                warnings.append(
                     f"a tilt makes up {tilt:.0%} of the variance of the heights, and nothing is "
                     'subtracted: contact is at one edge first; surface.level = "plane" subtracts it'
                 )
-        return remarks
+        return warnings
 
     def preparation(self, boundary: str = "") -> str:
         """Description of how the map was read and prepared for a boundary."""
@@ -393,11 +393,11 @@ def _prepared(surface: FileSurface) -> Field:
 
 
 @lru_cache(maxsize=16)
-def _remarks_on_heights(surface: FileSurface) -> tuple[str, ...]:
+def _warnings_on_heights(surface: FileSurface) -> tuple[str, ...]:
     """Warnings about outliers and rounding. Cached: every contact of a study has the same."""
     topography = surface._topography()
-    remarks = _outliers(topography), _rounding(topography, surface.scale)
-    return tuple(remark for remark in remarks if remark)
+    warnings = _outliers(topography), _rounding(topography, surface.scale)
+    return tuple(warning for warning in warnings if warning)
 
 
 def _outliers(topography: Topography) -> str:
@@ -445,5 +445,5 @@ def _rounding(topography: Topography, scale: float) -> str:
 
 def forget_files() -> None:
     """Drop the maps that were read, so that a file that has changed is read again."""
-    for cached in (_read, _prepared, _suited_interpolation, _remarks_on_heights):
+    for cached in (_read, _prepared, _suited_interpolation, _warnings_on_heights):
         cached.cache_clear()
