@@ -24,8 +24,9 @@ from gfmd_cli.physics.power_spectra import anisotropy
 from gfmd_cli.solvers.nested_grids import Resume, Solution, solve_contact
 from gfmd_cli.status import Status
 from gfmd_cli.study.context import SolveContext, Watcher, WorkerOptions
+from gfmd_cli.study.forecast import FIRST
 from gfmd_cli.study.notes import GridResult
-from gfmd_cli.study.tasks import FIRST, Task
+from gfmd_cli.study.tasks import Task
 
 FINAL = ("bound", "slow", "diverges")  # verdicts that no finer grid changes
 ENOUGH = 3  # grids after which an unknown error stays unknown: two give all that is calibrated
