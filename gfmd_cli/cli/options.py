@@ -2,12 +2,15 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import click
 
 from gfmd_cli.errors import InputError
 from gfmd_cli.status import Status
+
+if TYPE_CHECKING:
+    from gfmd_cli.spec.models import Spec
 
 OF_OTHERS = {".csv", ".nc", ".vti", ".html", ".json", ".toml"}
 """Suffixes of files that other commands write or read."""
@@ -25,7 +28,7 @@ output_option = click.option(
 )
 
 
-def study_path(spec: Any, output: Path | None) -> Path:
+def study_path(spec: "Spec", output: Path | None) -> Path:
     """The study file of a spec. Raises InputError for the suffix of a file of another kind."""
     if output is not None and output.suffix.lower() in OF_OTHERS:
         raise InputError(
