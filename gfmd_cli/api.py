@@ -21,7 +21,6 @@ from gfmd_cli.analysis.compare import compare as compare_study
 from gfmd_cli.analysis.export import as_dataset
 from gfmd_cli.errors import InputError
 from gfmd_cli.grid.arrays import Field, Mask
-from gfmd_cli.physics.elastomers import Tabulated
 from gfmd_cli.physics.file_surface import FileSurface, forget_files
 from gfmd_cli.physics.given_heights import given_heights, surface_table
 from gfmd_cli.physics.indenters import SMALLEST_GRID
@@ -36,7 +35,7 @@ from gfmd_cli.study.plausibility import SEPARATOR
 from gfmd_cli.study.reading import read_rows, solved_rows
 from gfmd_cli.study.refinement import forget_scene
 from gfmd_cli.study.resources import room
-from gfmd_cli.study.run import run_study
+from gfmd_cli.study.run import RunOptions, run_study
 from gfmd_cli.study.tasks import plan
 
 Tables = Mapping[str, Any]
@@ -188,7 +187,7 @@ def _with_points(tables: dict[str, Any]) -> dict[str, Any]:
 def _solve(spec: Path | str | Tables, threads: int) -> Result:
     forget_files()  # they may have changed since the last call
     tasks = plan(_read(spec)[0])
-    if isinstance(tasks[0].surface, FileSurface) or isinstance(tasks[0].elastomer, Tabulated):
+    if tasks[0].surface.file or tasks[0].elastomer.file:
         forget_scene()
     if len(tasks) != 1:
         raise InputError(f"solve takes one contact, the spec has {len(tasks)}; run() takes them")
@@ -246,7 +245,7 @@ def run(
     """
     resolved, text = _read(spec, overrides)
     path = Path(study if study is not None else f"{resolved.study.name}.h5")
-    run_study(resolved, text, path, report, jobs=jobs)
+    run_study(resolved, text, path, report, RunOptions(jobs=jobs))
     return path
 
 

@@ -32,6 +32,11 @@ class Choice(BaseModel):
         return dict(self)
 
     @property
+    def file(self) -> Path | None:
+        """The file that the table names; None without one."""
+        return dict(self).get("path")
+
+    @property
     def label(self) -> str:
         """The kind and every key that the spec gives, including those with the default value."""
         return self.label_without(())

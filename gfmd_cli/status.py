@@ -46,7 +46,7 @@ class Status(StrEnum):
 
     # of a run only; such a task has no record
     FAILED = "failed", "an error ended the task"
-    NO_SPACE = "no space", "the results could not be written"
+    NO_SPACE = "no_space", "the results could not be written"
     KILLED = "killed", "its worker processes died again and again (out of memory?)"
     INTERRUPTED = "interrupted", "stopped by a signal; its state is saved"
 

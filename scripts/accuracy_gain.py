@@ -12,7 +12,7 @@ from pathlib import Path
 
 from gfmd_cli.spec.parse import read_spec
 from gfmd_cli.study.reading import read_rows
-from gfmd_cli.study.run import run_study
+from gfmd_cli.study.run import RunOptions, run_study
 
 SPEC = """\
 [surface]
@@ -36,7 +36,8 @@ def rows_of(folder: Path, name: str, *overrides: str) -> list[dict]:
     spec = folder / "spec.toml"
     spec.write_text(SPEC)
     path = folder / name
-    run_study(read_spec(spec, overrides)[0], SPEC, path, lambda progress: None, jobs=1)
+    resolved, text = read_spec(spec, overrides)
+    run_study(resolved, text, path, lambda progress: None, RunOptions(jobs=1))
     return read_rows(path)
 
 

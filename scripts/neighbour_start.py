@@ -17,7 +17,6 @@ import numpy as np
 from timing import least
 
 from gfmd_cli.grid.arrays import Field
-from gfmd_cli.grid.pixels import average_pixels
 from gfmd_cli.physics.contact import Contact, Scene, build_scene
 from gfmd_cli.physics.elastomers import Power
 from gfmd_cli.physics.observables import contact_pressure
@@ -34,8 +33,9 @@ REPEATS = 2  # the faster counts
 def from_neighbour(contact: Contact, solver: ProjectedCG, pressure: Field) -> float:
     """Transforms of a solve that starts from the contact pressure at another load."""
     half = tuple(n // 2 for n in contact.grid.shape)
-    coarse = average_pixels(pressure, half)
-    start = start_from(contact.coarsen(half), coarse, [contact], solver.tolerance)
+    coarse = contact.coarsen(half)
+    averaged = contact.grid.average(pressure, coarse.grid)
+    start = start_from(coarse, averaged, [contact], solver.tolerance)
     if start is None:
         raise SystemExit("the contact is too large for a solve on tiles")
     state = solver.begin_from(start)

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from gfmd_cli.cli.progress import Reporter
 from gfmd_cli.spec.parse import read_spec
-from gfmd_cli.study.run import run_study
+from gfmd_cli.study.run import RunOptions, run_study
 
 TRAINING, TEST = range(100, 108), range(200, 208)
 """Disjoint sets of seeds: constants are fitted to the first and tested on the second."""
@@ -131,7 +131,7 @@ def main() -> None:
             resolved, text = read_spec(path, ())
             with Reporter(True) as report:
                 store = arguments.folder / f"{name}.h5"
-                outcome = run_study(resolved, text, store, report, jobs=1)
+                outcome = run_study(resolved, text, store, report, RunOptions(jobs=1))
             print(f"{path.stem}: {dict(outcome)}", flush=True)
 
 

@@ -11,7 +11,7 @@ import time
 from pathlib import Path
 
 from gfmd_cli.spec.parse import read_spec
-from gfmd_cli.study.run import run_study
+from gfmd_cli.study.run import RunOptions, run_study
 
 
 def main():
@@ -28,7 +28,7 @@ def main():
             text,
             Path(folder) / "study.h5",
             lambda progress: estimates.append((time.monotonic() - begun, progress.seconds_left)),
-            jobs=arguments.jobs,
+            RunOptions(jobs=arguments.jobs),
         )
     end = estimates[-1][0]
     print(f"{arguments.spec} {' '.join(arguments.set)}: {end:.1f} s")

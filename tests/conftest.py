@@ -20,7 +20,7 @@ from gfmd_cli.spec.parse import read_spec
 from gfmd_cli.study import run_task
 from gfmd_cli.study.columns import COLUMNS
 from gfmd_cli.study.reading import read_rows
-from gfmd_cli.study.run import run_study
+from gfmd_cli.study.run import RunOptions, run_study
 
 BY_SIZE = Grid._threads
 if "GFMD_TEST_THREADS" in os.environ:  # `make test-portable`: on small grids too
@@ -131,7 +131,7 @@ def rows_of(tmp_path, spec_of, request):
 
     def rows_of(*overrides, text=None, name="study.h5", report=lambda progress: None):
         spec = spec_of(*overrides, text=text)
-        run_study(spec, text or request.module.SPEC, tmp_path / name, report, jobs=1)
+        run_study(spec, text or request.module.SPEC, tmp_path / name, report, RunOptions(jobs=1))
         return read_rows(tmp_path / name)
 
     return rows_of

@@ -8,7 +8,7 @@ from gfmd_cli import dataset
 from gfmd_cli.errors import InputError
 from gfmd_cli.spec.parse import read_spec
 from gfmd_cli.study.reading import read_rows
-from gfmd_cli.study.run import run_study
+from gfmd_cli.study.run import RunOptions, run_study
 
 SPEC = """\
 [surface]
@@ -34,7 +34,7 @@ def study(tmp_path_factory):
     folder = tmp_path_factory.mktemp("data")
     (folder / "spec.toml").write_text(SPEC)
     spec, text = read_spec(folder / "spec.toml")
-    run_study(spec, text, folder / "study.h5", lambda event: None, jobs=1)
+    run_study(spec, text, folder / "study.h5", lambda event: None, RunOptions(jobs=1))
     return folder / "study.h5"
 
 

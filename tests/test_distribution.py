@@ -17,7 +17,7 @@ from gfmd_cli.physics.observables import contact_points, logarithmic_edges, obse
 from gfmd_cli.solvers.auto import Auto
 from gfmd_cli.solvers.nested_grids import solve_contact
 from gfmd_cli.spec.parse import read_spec
-from gfmd_cli.study.run import run_study
+from gfmd_cli.study.run import RunOptions, run_study
 
 EDGES = logarithmic_edges()
 MIDDLE, WIDTH = np.sqrt(EDGES[1:] * EDGES[:-1]), np.diff(EDGES)
@@ -30,7 +30,7 @@ def study(tmp_path):
         path = tmp_path / "spec.toml"
         path.write_text(SPEC)
         spec, _ = read_spec(path, overrides)
-        run_study(spec, SPEC, tmp_path / "study.h5", lambda _: None, jobs=1)
+        run_study(spec, SPEC, tmp_path / "study.h5", lambda _: None, RunOptions(jobs=1))
         return tmp_path / "study.h5"
 
     return study

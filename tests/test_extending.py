@@ -1,4 +1,4 @@
-"""A new elastomer, rough surface or observable is one class or declaration and one name in a list.
+"""A new elastomer, surface, solver or observable is one declaration, and one name in a list.
 
 They go into a copy of the package, as an author would write them there; then the command line
 solves a spec that uses them.
@@ -83,6 +83,55 @@ class RandomWaves(RigidSurface):
 
 
 '''
+DESCENT = '''
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Annotated, ClassVar, Literal
+
+import numpy as np
+from pydantic import Field as Key
+
+from gfmd_cli.grid.arrays import Field
+from gfmd_cli.physics.contact import Contact
+from gfmd_cli.solvers.loop import Solver, State
+
+
+@dataclass(kw_only=True)
+class DescentState(State):
+    """State of projected descent."""
+
+    velocity: Field
+    """The last move."""
+
+
+class Descent(Solver):
+    """Projected gradient descent with momentum: slow and safe."""
+
+    kind: Literal["descent"] = "descent"
+    momentum: Annotated[float, Key(ge=0, lt=1)] = 0.9
+    """Fraction of the last move that is added to the next one."""
+
+    state_type: ClassVar[type[State]] = DescentState
+
+    def begin(self, contact: Contact, u: Field) -> DescentState:
+        """Start at rest from u, lifted above the indenter."""
+        contact.settle(u)
+        sigma = contact.stress(u, out=contact.grid.empty())
+        return DescentState(u=u, sigma=sigma, transforms=2, velocity=np.zeros_like(u))
+
+    def iterate(self, contact: Contact, state: DescentState) -> Iterator[State]:
+        """Advance the state in place, with one pair of transforms a step."""
+        length = 1.0 / contact.stiffness.max()
+        while True:
+            state.residual = contact.residual(state.u, state.sigma)
+            yield state
+            move = self.momentum * state.velocity - length * state.sigma
+            u = np.maximum(state.u + move, contact.height)
+            state.velocity, state.u = u - state.u, u
+            contact.stress(state.u, out=state.sigma)
+            state.transforms += 2
+            state.step += 1
+'''
 OBSERVABLE = """OBSERVABLES = (
     Observable(
         "lowest",
@@ -112,7 +161,7 @@ contact_area = 0.1
 
 @pytest.fixture(scope="module")
 def package(tmp_path_factory):
-    """A copy of the package with all three, with the compiled kernels of the original."""
+    """A copy of the package with all of them, with the compiled kernels of the original."""
     folder = tmp_path_factory.mktemp("package")
     copy = folder / "gfmd_cli"
     shutil.copytree(Path(gfmd_cli.__file__).parent, copy)
@@ -126,6 +175,9 @@ def package(tmp_path_factory):
         "FileSurface",
         "RandomWaves",
     )
+    (copy / "solvers/descent.py").write_text(DESCENT)
+    imported = "from gfmd_cli.solvers.descent import Descent\n\n"
+    extend(copy / "solvers/auto.py", imported, "AnySolver = Annotated[", "PolonskyKeer", "Descent")
     replace(copy / "study/observables.py", "OBSERVABLES = (\n", OBSERVABLE)
     replace(copy / "spec/models.py", "    def on_request(", OPTION)
     return folder
@@ -200,6 +252,16 @@ def test_a_new_rough_surface_has_error_bars(export):
     for row in (first, second):
         assert row["a_r_verdict"] == row["u_g_verdict"] == "regular"
         assert 0 < float(row["a_r_continuum_error"]) < 0.1 * float(row["a_r"])
+
+
+def test_a_new_solver_is_one_class_and_one_name(export):
+    solver = '[solver]\nkind = "descent"\nmomentum = 0.8\ntolerance = 1e-4'
+    (slow,) = export(ROUGH, 'kind = "half-space"', solver)
+    assert (slow["solver"], slow["momentum"], slow["status"]) == ("descent", "0.8", "converged")
+    (fast,) = export(ROUGH, 'kind = "half-space"')
+    assert float(slow["u_g"]) == pytest.approx(float(fast["u_g"]), rel=1e-3)
+    assert float(slow["a_r_continuum"]) == pytest.approx(float(fast["a_r_continuum"]), rel=1e-2)
+    assert float(slow["transforms"]) > 2 * float(fast["transforms"])
 
 
 def test_a_new_observable_is_in_csv_xarray_tables_records_and_report(export, python, tmp_path):

@@ -13,7 +13,7 @@ from gfmd_cli.analysis.figures import VIEWS, draw_all, items_of, study_figures
 from gfmd_cli.analysis.plotting import styled
 from gfmd_cli.errors import InputError, SpaceError
 from gfmd_cli.spec.parse import read_spec
-from gfmd_cli.study.run import run_study
+from gfmd_cli.study.run import RunOptions, run_study
 
 ROUGH = power_spec(n=[0, 1], points=64, p_star=[0.05, 0.3, 1.5], cutoff=0.05)
 LINE = """\
@@ -40,7 +40,7 @@ def study(tmp_path):
         path = tmp_path / "spec.toml"
         path.write_text(text)
         spec, _ = read_spec(path, overrides)
-        run_study(spec, text, tmp_path / "study.h5", lambda _: None, jobs=1)
+        run_study(spec, text, tmp_path / "study.h5", lambda _: None, RunOptions(jobs=1))
         return compare(tmp_path / "study.h5")
 
     return study

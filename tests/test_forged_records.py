@@ -16,7 +16,7 @@ from gfmd_cli.files.checksums import sealed
 from gfmd_cli.spec.parse import read_spec
 from gfmd_cli.status import Status
 from gfmd_cli.study.reading import read_rows
-from gfmd_cli.study.run import run_study
+from gfmd_cli.study.run import RunOptions, run_study
 
 SPEC = power_spec(
     n=0,
@@ -43,7 +43,7 @@ def half(tmp_path_factory):
         if progress.event == "end":  # a shard that was stopped leaves its record to others
             signal.raise_signal(signal.SIGTERM)
 
-    run_study(spec, text, folder / "s.h5", stop, jobs=1, shard=(0, 2))
+    run_study(spec, text, folder / "s.h5", stop, RunOptions(jobs=1, shard=(0, 2)))
     return folder
 
 

@@ -17,7 +17,7 @@ from gfmd_cli.errors import Interrupted
 from gfmd_cli.files.checksums import sealed
 from gfmd_cli.spec.parse import read_spec
 from gfmd_cli.study.reading import read_rows
-from gfmd_cli.study.run import run_study
+from gfmd_cli.study.run import RunOptions, run_study
 
 SPEC = power_spec(n=1, points=32, p_star=0.1)
 EXAMPLES = int(os.environ.get("GFMD_FORGERIES", "25"))  # `make test-kills` takes 200
@@ -30,14 +30,14 @@ def stopped(tmp_path_factory):
     folder = tmp_path_factory.mktemp("stopped")
     (folder / "spec.toml").write_text(SPEC)
     spec, text = read_spec(folder / "spec.toml", ())
-    run_study(spec, text, folder / "whole.h5", lambda progress: None, jobs=1)
+    run_study(spec, text, folder / "whole.h5", lambda progress: None, RunOptions(jobs=1))
 
     def stop(progress):
         if progress.event == "step":
             signal.raise_signal(signal.SIGTERM)
 
     with pytest.raises(Interrupted):
-        run_study(spec, text, folder / "s.h5", stop, jobs=1)
+        run_study(spec, text, folder / "s.h5", stop, RunOptions(jobs=1))
     return folder, read_rows(folder / "whole.h5")[0]
 
 
@@ -110,7 +110,7 @@ def test_a_stress_that_claims_to_be_exact_is_measured(tmp_path, solver, case):
             signal.raise_signal(signal.SIGTERM)
 
     with pytest.raises(Interrupted):
-        run_study(spec, text, tmp_path / "s.h5", stop, jobs=1)
+        run_study(spec, text, tmp_path / "s.h5", stop, RunOptions(jobs=1))
     (pointer,) = tmp_path.glob("s.parts/*/pointer")
     plain = json.loads(pointer.read_bytes()[:-8])
     slot = plain["slots"][0]
@@ -125,10 +125,11 @@ def test_a_stress_that_claims_to_be_exact_is_measured(tmp_path, solver, case):
     warnings = []
     run_study(
         spec, text, tmp_path / "s.h5",
-        lambda progress: warnings.append(progress.message) if progress.message else None, jobs=1,
+        lambda progress: warnings.append(progress.message) if progress.message else None,
+        RunOptions(jobs=1),
     )  # fmt: skip
     (row,) = read_rows(tmp_path / "s.h5")
-    run_study(spec, text, tmp_path / "whole.h5", lambda progress: None, jobs=1)
+    run_study(spec, text, tmp_path / "whole.h5", lambda progress: None, RunOptions(jobs=1))
     (whole,) = read_rows(tmp_path / "whole.h5")
     assert row["status"] == "converged"
     assert row["residual"] < 1e-6

@@ -14,7 +14,6 @@ from scipy.optimize import nnls
 from gfmd_cli import api
 from gfmd_cli.errors import InputError
 from gfmd_cli.grid.fft_grid import Grid
-from gfmd_cli.grid.pixels import average_pixels
 from gfmd_cli.physics.contact import build_scene
 from gfmd_cli.physics.elastomers import HalfSpace, Power
 from gfmd_cli.physics.file_surface import FileSurface
@@ -216,6 +215,11 @@ def test_energy_never_rises():
     solve(contact, Dual(tolerance=1e-8), state, watch)
     assert np.all(np.diff(energies) <= 1e-13)
     assert len(energies) > 10
+
+
+def average_pixels(values, shape):
+    grid, target = (Grid(columns, points_y=rows) for rows, columns in (values.shape, shape))
+    return grid.average(values, target)
 
 
 def test_averages_over_larger_pixels_keep_the_mean():

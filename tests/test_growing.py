@@ -16,7 +16,7 @@ from gfmd_cli.spec.parse import read_spec
 from gfmd_cli.study.columns import COLUMNS
 from gfmd_cli.study.parts import write_record
 from gfmd_cli.study.reading import open_study, read_rows
-from gfmd_cli.study.run import run_study
+from gfmd_cli.study.run import RunOptions, run_study
 from gfmd_cli.study.store import Study
 from gfmd_cli.study.tasks import plan
 
@@ -54,7 +54,7 @@ def run(tmp_path, monkeypatch):
             if report is not None:
                 report(event)
 
-        outcome = run_study(spec, text, Path(name), note, jobs=1, **options)
+        outcome = run_study(spec, text, Path(name), note, RunOptions(jobs=1, **options))
         assert set(outcome) == {"converged"}
         warnings = [event.message for event in events if event.event == "warning"]
         assert "damaged" not in " ".join(warnings)
@@ -242,7 +242,9 @@ def test_two_specs_at_the_same_time_lose_nothing(run):
         try:
             spec, text = read_spec(Path("spec.toml"), overrides)
             for shard in range(3):
-                run_study(spec, text, path, lambda event: None, jobs=1, shard=(shard, 3))
+                run_study(
+                    spec, text, path, lambda event: None, RunOptions(jobs=1, shard=(shard, 3))
+                )
         except BaseException as error:
             errors.append(error)
 

@@ -21,7 +21,7 @@ from gfmd_cli.study.columns import HISTOGRAMS, TASK_GROUPS
 from gfmd_cli.study.measure import on_request
 from gfmd_cli.study.observables import OBSERVABLES, SolvedContact
 from gfmd_cli.study.reading import open_study, read_rows
-from gfmd_cli.study.run import run_study
+from gfmd_cli.study.run import RunOptions, run_study
 
 SPEC = power_spec(
     n=[0, 2],
@@ -201,7 +201,7 @@ def test_processes_that_share_a_grid_are_refused(tmp_path, name):
     (tmp_path / "spec.toml").write_text(SPEC)
     spec, text = read_spec(tmp_path / "spec.toml", (f"output.{name}=true",))
     with pytest.raises(InputError, match=f"output.{name}: takes whole grids"):
-        run_study(spec, text, tmp_path / "s.h5", print, ranks=object())
+        run_study(spec, text, tmp_path / "s.h5", print, RunOptions(ranks=object()))
 
 
 def test_an_older_study_without_the_keys_goes_on(output_of, tmp_path):

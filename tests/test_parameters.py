@@ -29,7 +29,7 @@ from gfmd_cli.study.columns import (
     TASK_ID,
 )
 from gfmd_cli.study.reading import read_rows
-from gfmd_cli.study.run import run_study
+from gfmd_cli.study.run import RunOptions, run_study
 from gfmd_cli.study.tasks import plan
 
 SPEC = """
@@ -74,11 +74,7 @@ def test_no_column_has_the_name_of_another_data_set_of_a_study_file():
 
 def test_units_and_meaning_of_a_column_are_those_of_the_key():
     columns = {column.name: column for column in COLUMNS}
-    assert columns["E_star"][1:] == (
-        "elastomer.E_star: Contact modulus E / (1 - nu^2)",
-        "Pa",
-        float,
-    )
+    assert columns["tension"][1:] == ("elastomer.tension: Tension", "N/m", float)
     assert columns["hurst"].units == "1"
     assert columns["spectrum"][2:] == ("", str)
     assert columns["max_steps"].kind is columns["nested"].kind is int
@@ -154,7 +150,7 @@ def test_rows_of_one_ensemble_differ_in_their_seed_only(rows_of, tmp_path):
 
 def test_tasks_that_are_not_solved_yet_have_their_parameters(spec_of, rows_of, tmp_path):
     spec = spec_of("elastomer.E_star=1.0")
-    run_study(spec, SPEC, tmp_path / "s.h5", lambda _: None, shard=(0, 4), jobs=1)
+    run_study(spec, SPEC, tmp_path / "s.h5", lambda _: None, RunOptions(shard=(0, 4), jobs=1))
     rows = read_rows(tmp_path / "s.h5")
     assert values(rows, "hurst") == 4 * [0.3] + 4 * [0.8]
     assert {row["status"] for row in rows} == {"converged", "missing"}

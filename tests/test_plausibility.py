@@ -119,14 +119,14 @@ def test_a_map_that_is_too_steep(tmp_path):
     surface = {"kind": "file", "path": str(tmp_path / "h.npy"), "length": 1e-5}
     warnings = solve(tables(surface, {"kind": "half-space"})).warnings
     assert any("rms gradient" in warning for warning in warnings)
-    assert set(FileSurface(path=tmp_path / "h.npy", length=1e-5).remarks()) <= set(warnings)
+    assert set(FileSurface(path=tmp_path / "h.npy", length=1e-5).warnings()) <= set(warnings)
 
 
 def test_a_side_in_micrometres_makes_a_map_too_smooth(tmp_path):
     np.save(tmp_path / "h.npy", solve(tables()).height)
     right, wrong = (FileSurface(path=tmp_path / "h.npy", length=side) for side in (1e-5, 10.0))
-    assert right.remarks() == []
-    assert "check that heights and side are in metres" in wrong.remarks()[0]
+    assert right.warnings() == []
+    assert "check that heights and side are in metres" in wrong.warnings()[0]
 
 
 @pytest.mark.parametrize(
@@ -137,8 +137,8 @@ def test_heights_that_are_mostly_filled_in(tmp_path, missing, share, warned):
     heights = np.random.default_rng(1).normal(0, 1e-9, (50, 50))
     heights[: round(50 * share)] = np.nan
     np.save(tmp_path / "h.npy", heights)
-    remarks = FileSurface(path=tmp_path / "h.npy", length=1e-5, missing=missing).remarks()
-    assert any(f"{share:.0%} of the heights are missing" in remark for remark in remarks) == warned
+    warnings = FileSurface(path=tmp_path / "h.npy", length=1e-5, missing=missing).warnings()
+    assert (f"{share:.0%} of the heights are missing" in " ".join(warnings)) == warned
 
 
 def test_a_step_across_the_border_matters_only_where_the_map_is_repeated():

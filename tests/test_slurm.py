@@ -11,7 +11,8 @@ from specs import power_spec
 from gfmd_cli.errors import InputError
 from gfmd_cli.spec.parse import read_spec
 from gfmd_cli.study import slurm
-from gfmd_cli.study.tasks import BASE_BYTES, plan
+from gfmd_cli.study.forecast import BASE_BYTES
+from gfmd_cli.study.tasks import plan
 
 SPEC = power_spec(n=0, points=64, p_star=[0.1, 0.3, 1.0, 2.0], cutoff=0.05, name="small")
 FAKE = """\

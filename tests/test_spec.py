@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from specs import power_spec
 
 from gfmd_cli.errors import InputError
-from gfmd_cli.spec.models import differences
+from gfmd_cli.spec.differences import differences
 from gfmd_cli.spec.parse import read_spec, read_tables
 from gfmd_cli.spec.schema import spec_schema
 from gfmd_cli.study.tasks import plan

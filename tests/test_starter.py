@@ -206,18 +206,18 @@ def test_several_surfaces_give_one_table_and_one_figure(gfmd, tmp_path):
     )
 
 
-def test_a_scan_in_nanometres_that_does_not_repeat_is_remarked_on_and_mended(gfmd, tmp_path):
+def test_a_scan_in_nanometres_that_does_not_repeat_gives_warnings_and_is_mended(gfmd, tmp_path):
     """Tilted by 300 nm, 2 nm rough, 1 um wide."""
     rough = np.random.default_rng(0).normal(size=(32, 32)) * 2
     np.save(tmp_path / "nm.npy", rough + np.linspace(0, 300, 32))
     result = gfmd("surface", "nm.npy")
-    remarks = ("does not state its side", "heights and side are in metres", "across the border")
-    for remark in remarks:
-        assert remark in result
+    warnings = ("does not state its side", "heights and side are in metres", "across the border")
+    for warning in warnings:
+        assert warning in result
     mended = [f"surface.{key}" for key in ("scale=1e-9", "length=1e-6", "periodic=false")]
     words = [word for key in mended for word in ("--set", key)]
     result = gfmd("surface", "nm.npy", *words)
-    assert "note:" not in result
+    assert "warning:" not in result
     assert "L = 1e-06 m" in result
     gfmd("init", "first.toml", "--from", "nm.npy", *words)
     (surface,) = read_spec(tmp_path / "first.toml")[0].surface

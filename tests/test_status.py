@@ -12,7 +12,7 @@ from gfmd_cli.files.locks import locked
 from gfmd_cli.spec.parse import read_spec
 from gfmd_cli.status import Status
 from gfmd_cli.study.columns import empty_row
-from gfmd_cli.study.run import run_study
+from gfmd_cli.study.run import RunOptions, run_study
 from gfmd_cli.study.store import Study
 from gfmd_cli.study.tasks import plan
 
@@ -39,7 +39,7 @@ def uncollected(spec="spec.toml", shard=(0, 2), stop_at=None):
             signal.raise_signal(signal.SIGTERM)
 
     with pytest.raises(Interrupted):
-        run_study(resolved, text, Path("small.h5"), report, shard=shard, jobs=1)
+        run_study(resolved, text, Path("small.h5"), report, RunOptions(shard=shard, jobs=1))
 
 
 def test_of_nothing_all_is_missing_and_nothing_is_written(gfmd):

@@ -7,6 +7,7 @@ import sys
 import time
 from contextlib import suppress
 from threading import Timer
+from unittest.mock import Mock
 
 import h5py
 import numpy as np
@@ -17,16 +18,17 @@ from specs import power_spec
 from gfmd_cli.errors import Interrupted, StudyError
 from gfmd_cli.grid import plans
 from gfmd_cli.grid.fft_grid import Grid
+from gfmd_cli.solvers import preconditioners
+from gfmd_cli.solvers.multilevel import Multilevel
 from gfmd_cli.solvers.pcg import PCGState, ProjectedCG
 from gfmd_cli.spec.parse import read_spec
-from gfmd_cli.study import run as study_run
-from gfmd_cli.study import run_task
+from gfmd_cli.study import run_task, time_limit
 from gfmd_cli.study.checkpoint import Checkpoint
 from gfmd_cli.study.columns import COLUMNS, LAYOUT
 from gfmd_cli.study.notes import Notes, Trial
 from gfmd_cli.study.parts import read_record
 from gfmd_cli.study.reading import open_study, read_rows
-from gfmd_cli.study.run import run_study
+from gfmd_cli.study.run import RunOptions, run_study
 
 SMALL = power_spec(
     n=[0, 1],
@@ -68,7 +70,8 @@ def run(tmp_path):
         spec_path.write_text(text)
         spec, _ = read_spec(spec_path, overrides)
         events = []
-        outcome = run_study(spec, text, tmp_path / name, report or events.append, **options)
+        report = report or events.append
+        outcome = run_study(spec, text, tmp_path / name, report, RunOptions(**options))
         return tmp_path / name, events, outcome
 
     return run
@@ -349,7 +352,7 @@ def test_max_hours_stop_a_run_as_a_signal_does(run, tmp_path, monkeypatch):
         if event.event == "step":
             timers[0].function()
 
-    monkeypatch.setattr(study_run, "Timer", AtFirstStep)
+    monkeypatch.setattr(time_limit, "Timer", AtFirstStep)
     with pytest.raises(Interrupted, match="call again"):
         run(LONG, report=report, max_seconds=20.0, jobs=1)
     assert 10 <= timers[0].interval <= 20
@@ -405,7 +408,7 @@ def gfmd(folder, *words):
 
 STOPPED = {
     "multigrid": ("elastomer.n=2",),
-    "multilevel": ("elastomer={kind='slab', thickness=0.02}",),
+    "multilevel": ("elastomer={kind='table', path='jump.txt'}",),
     "green": ("elastomer.n=0.5",),
     "steep": ("elastomer.n=4",),
     "line": ("surface={kind='ridge'}", "elastomer.n=1", "output.cross_section=false"),
@@ -419,8 +422,12 @@ STOPPED = {
 
 
 @pytest.mark.parametrize("case", STOPPED)
-def test_a_run_stopped_again_and_again_ends_bit_for_bit(run, case, monkeypatch):
+def test_a_run_stopped_again_and_again_ends_bit_for_bit(run, case, monkeypatch, tmp_path):
     monkeypatch.setattr(run_task, "REPORT_EVERY", 0.0)
+    q = np.geomspace(1.0, 1e4, 200)
+    np.savetxt(tmp_path / "jump.txt", np.c_[q, q**2 * np.where(q < 60, 1.0, 100.0)])
+    multilevel = Mock(wraps=Multilevel)
+    monkeypatch.setattr(preconditioners, "Multilevel", multilevel)
     overrides = ("load.p_star=[0.1]", *STOPPED[case])
     unbroken, _, _ = run(name="unbroken.h5", overrides=overrides, jobs=1)
     events, stops, resumed = [], 0, 0
@@ -440,6 +447,7 @@ def test_a_run_stopped_again_and_again_ends_bit_for_bit(run, case, monkeypatch):
             stops += 1
     assert 0 < stops < 200 or case == "sort"  # that has one step
     assert resumed > 0 or case == "sort"
+    assert multilevel.called == (case == "multilevel")
     assert_equal_studies(path, unbroken)
 
 

@@ -164,37 +164,37 @@ def test_positions_of_a_profile_in_no_order_are_refused(tmp_path):
 
 
 @pytest.mark.parametrize("mark", [-9999.0, 50.0])
-def test_marks_of_missing_heights_and_spikes_are_remarked_on(npy, heights, mark):
+def test_marks_of_missing_heights_and_spikes_give_a_warning(npy, heights, mark):
     heights[3, 5] = mark
-    (remark,) = [r for r in FileSurface(path=npy(heights)).remarks() if "far from" in r]
-    assert remark.startswith(f"1 height is exactly {mark:g}, far from all others")
+    (warning,) = [r for r in FileSurface(path=npy(heights)).warnings() if "far from" in r]
+    assert warning.startswith(f"1 height is exactly {mark:g}, far from all others")
 
 
-def test_a_taper_without_a_window_is_remarked_on(npy, heights):
+def test_a_taper_without_a_window_gives_a_warning(npy, heights):
     for edges, count in (("mirror", 1), ("window", 0)):
-        remarks = FileSurface(path=npy(heights), periodic=False, edges=edges, taper=0.2).remarks()
-        assert sum("surface.taper has no effect" in remark for remark in remarks) == count
+        warnings = FileSurface(path=npy(heights), periodic=False, edges=edges, taper=0.2).warnings()
+        assert sum("surface.taper has no effect" in warning for warning in warnings) == count
 
 
 @pytest.mark.parametrize(("rounding", "is_coarse"), [(1.0, True), (0.25, False)])
-def test_rounded_heights_are_remarked_on(npy, rounding, is_coarse):
+def test_rounded_heights_give_a_warning(npy, rounding, is_coarse):
     """In steps as large as the rms difference of neighbours; a quarter of that is fine."""
     heights = build_scene(SelfAffine(cutoff=0.05), HalfSpace(), 128).height
     step = rounding * np.diff(heights, axis=1).std()
-    remarks = FileSurface(path=npy(np.round(heights / step) * step), scale=1e-6).remarks()
-    found = [remark for remark in remarks if "neighbouring heights are equal" in remark]
+    warnings = FileSurface(path=npy(np.round(heights / step) * step), scale=1e-6).warnings()
+    found = [warning for warning in warnings if "neighbouring heights are equal" in warning]
     assert len(found) == is_coarse
     assert not is_coarse or f"smallest step is {1e-6 * step:.3g} m" in found[0]
 
 
 def test_the_heights_of_a_microscope_are_fine_enough():
-    assert not any("are equal" in remark for remark in FileSurface(path=SCAN).remarks())
+    assert not any("are equal" in warning for warning in FileSurface(path=SCAN).warnings())
 
 
-def test_a_side_that_replaces_that_of_the_file_is_remarked_on():
-    assert not any("replaces" in remark for remark in FileSurface(path=SCAN).remarks())
-    remarks = FileSurface(path=SCAN, length=1e-3).remarks()
-    assert any("replaces the side of the file" in remark for remark in remarks)
+def test_a_side_that_replaces_that_of_the_file_gives_a_warning():
+    assert not any("replaces" in warning for warning in FileSurface(path=SCAN).warnings())
+    warnings = FileSurface(path=SCAN, length=1e-3).warnings()
+    assert any("replaces the side of the file" in warning for warning in warnings)
 
 
 @pytest.mark.parametrize("mark", [np.float64(-9999.9), np.float64(1e20), np.float32(-9999.9)])

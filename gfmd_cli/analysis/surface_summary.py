@@ -53,9 +53,9 @@ class SurfaceSummary:
         return self.moments.height <= METRES
 
     @property
-    def remarks(self) -> list[str]:
+    def warnings(self) -> list[str]:
         """Warnings about likely mistakes."""
-        return self.surface.remarks()
+        return self.surface.warnings()
 
     def record(self) -> dict[str, Any]:
         """The summary as plain data in SI units."""
@@ -69,7 +69,7 @@ class SurfaceSummary:
             "h_std": self.moments.height,
             "gradient": self.moments.gradient,
             "curvature": self.moments.curvature,
-            "remarks": self.remarks,
+            "warnings": self.warnings,
         }
         if self.fit is not None:
             record |= {
@@ -143,7 +143,7 @@ def as_text(summary: SurfaceSummary) -> str:
     ]
     if grid.dimension == 2:
         lines.append(f"half-space: p* = 1 is p = {0.5 * measured.gradient:.5g} E_star")
-    lines += [f"note: {remark}" for remark in summary.remarks]
+    lines += [f"warning: {warning}" for warning in summary.warnings]
     theories = {"spectrum": summary.scene}
     if summary.fit is not None:
         table = _table(record, grid.length)

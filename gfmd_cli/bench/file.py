@@ -11,7 +11,8 @@ from gfmd_cli.errors import InputError, StudyError
 from gfmd_cli.files.atomic import check_place, new_file
 from gfmd_cli.files.hdf5 import find, new_hdf5, open_hdf5, read_dataset
 from gfmd_cli.grid.arrays import Field
-from gfmd_cli.spec.models import Spec, differences
+from gfmd_cli.spec.differences import differences
+from gfmd_cli.spec.models import Spec
 from gfmd_cli.status import Status
 from gfmd_cli.study.column import Column
 from gfmd_cli.study.columns import BENCH

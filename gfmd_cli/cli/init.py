@@ -42,8 +42,8 @@ def init(spec: Path, scan: Path | None, overrides: tuple[str, ...]) -> None:
         surface = read_scan(scan, of_surface)
         text, preparation = starter_of_scan(spec, surface, overrides)
         show(preparation)
-        for remark in surface.remarks():
-            tell(f"gfmd: {scan}: {remark}")
+        for warning in surface.warnings():
+            tell(f"gfmd: {scan}: {warning}")
     write_whole(spec, text.encode())
     show(f"{spec}: written\nnext: {shlex.join(['gfmd', 'run', str(spec)])}")
 
@@ -86,8 +86,8 @@ def surface(
     else:
         show(summary_table(summaries, names).as_text())
         for summary, name in zip(summaries, names, strict=True):
-            for remark in summary.remarks:
-                tell(f"gfmd: {name}: {remark}")
+            for warning in summary.warnings:
+                tell(f"gfmd: {name}: {warning}")
     if figure is not None:
         from gfmd_cli.analysis.plotting import styled
         from gfmd_cli.analysis.surface_figure import summary_figure

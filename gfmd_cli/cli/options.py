@@ -2,11 +2,15 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import click
 
 from gfmd_cli.errors import InputError
+from gfmd_cli.status import Status
+
+if TYPE_CHECKING:
+    from gfmd_cli.spec.models import Spec
 
 OF_OTHERS = {".csv", ".nc", ".vti", ".html", ".json", ".toml"}
 """Suffixes of files that other commands write or read."""
@@ -24,7 +28,7 @@ output_option = click.option(
 )
 
 
-def study_path(spec: Any, output: Path | None) -> Path:
+def study_path(spec: "Spec", output: Path | None) -> Path:
     """The study file of a spec. Raises InputError for the suffix of a file of another kind."""
     if output is not None and output.suffix.lower() in OF_OTHERS:
         raise InputError(
@@ -34,7 +38,7 @@ def study_path(spec: Any, output: Path | None) -> Path:
     return output or Path(f"{spec.study.name}.h5")
 
 
-def counted(counts: Mapping[str, int]) -> str:
+def counted(counts: Mapping[Status, int]) -> str:
     """The counts as text, such as "2 converged, 1 missing"."""
     return ", ".join(f"{count} {what}" for what, count in sorted(counts.items()))
 

@@ -2,13 +2,15 @@
 
 import sys
 import time
-from collections.abc import Callable
 from contextlib import suppress
 from math import isfinite
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from gfmd_cli.cli.messages import printable, tell
 from gfmd_cli.units import duration
+
+if TYPE_CHECKING:
+    from gfmd_cli.study.context import Progress, Report
 
 LOG_EVERY = 60.0  # seconds between two lines where stderr is no terminal
 TASK = "{desc}: {n_fmt} steps, {elapsed}{postfix}"
@@ -27,16 +29,16 @@ class Reporter:
         self.failed: dict[int, str] = {}
         """Why tasks failed, by task."""
 
-    def __enter__(self) -> Callable[[Any], None]:
+    def __enter__(self) -> "Report":
         return self.show
 
     def __exit__(self, *_: object) -> None:
         for task in list(self.bars):
             self._close(task)
 
-    def show(self, progress: Any) -> None:
+    def show(self, progress: "Progress") -> None:
         """One event of one task."""
-        if progress.event == "end" and progress.status.is_failure:
+        if progress.status is not None and progress.status.is_failure:
             self.failed[progress.task] = progress.message
             self._close(progress.task)
             tell(f"gfmd: task {progress.task} ({progress.label}): {progress.message}")
@@ -50,7 +52,7 @@ class Reporter:
         else:
             self._line(progress)
 
-    def _bar(self, progress: Any) -> None:
+    def _bar(self, progress: "Progress") -> None:
         from tqdm import tqdm
 
         if progress.tasks_left is not None:
@@ -79,7 +81,7 @@ class Reporter:
             with suppress(OSError):
                 bar.close()
 
-    def _line(self, progress: Any) -> None:
+    def _line(self, progress: "Progress") -> None:
         now = time.monotonic()
         if progress.event not in ("end", "step") or now - self.last_line < LOG_EVERY:
             return
@@ -91,7 +93,7 @@ class Reporter:
         )
 
 
-def _left(progress: Any) -> str:
+def _left(progress: "Progress") -> str:
     """Number of tasks and time that are left."""
     if progress.tasks_left is None:
         return ""

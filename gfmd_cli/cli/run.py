@@ -2,8 +2,10 @@
 
 import shlex
 import sys
+from collections import Counter
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -12,6 +14,10 @@ from gfmd_cli.cli.options import FILE, counted, output_option, overrides_option,
 from gfmd_cli.cli.progress import Reporter
 from gfmd_cli.errors import InputError
 from gfmd_cli.status import Status
+
+if TYPE_CHECKING:
+    from gfmd_cli.spec.models import Spec
+    from gfmd_cli.study.run import RunOptions
 
 
 def _shard(context: click.Context, parameter: click.Parameter, text: str | None) -> tuple[int, int]:
@@ -75,7 +81,7 @@ def run(
     dry_run: bool,
     max_hours: float | None,
     quiet: bool,
-    **how: Any,
+    **given: Any,
 ) -> None:
     """Run all tasks that the study does not contain yet.
 
@@ -89,41 +95,48 @@ def run(
     """
     from gfmd_cli.grid.ranks import launched, together
 
-    how["ranks"] = launched()
-    how["max_seconds"] = None if max_hours is None else 3600 * max_hours
+    ranks = launched()
+    max_seconds = None if max_hours is None else 3600 * max_hours
     unconverged = 0
-    with together(how["ranks"]):
+    with together(ranks):
         from gfmd_cli.spec.parse import read_spec
+        from gfmd_cli.study.run import RunOptions
 
-        if how["overwrite"] and output is not None and len(specs) > 1:
+        options = RunOptions(ranks=ranks, max_seconds=max_seconds, **given)
+        if options.overwrite and output is not None and len(specs) > 1:
             raise InputError(
                 "--overwrite: not with -o and several specs; each would start a new study"
             )
         for spec, text in [read_spec(spec, overrides) for spec in specs]:
             path = study_path(spec, output)
             if dry_run:
-                _print_tasks(spec, path, how)
+                _print_tasks(spec, path, options)
             else:
-                unconverged += _run(spec, text, path, quiet, how)
+                unconverged += _run(spec, text, path, quiet, options)
     sys.exit(1 if unconverged else 0)
 
 
-def _run(spec: Any, text: str, path: Path, quiet: bool, how: dict[str, Any]) -> int:
+def _run(spec: "Spec", text: str, path: Path, quiet: bool, options: "RunOptions") -> int:
     """Run the tasks of a spec; how many ended other than converged."""
     from gfmd_cli.grid.ranks import leads
+    from gfmd_cli.study.context import ignore
     from gfmd_cli.study.run import run_study
 
-    first = leads(how["ranks"])
+    first = leads(options.ranks)
     reporter = Reporter(quiet)
     with reporter as report:
-        outcome = run_study(spec, text, path, report if first else lambda progress: None, **how)
+        outcome = run_study(spec, text, path, report if first else ignore, options)
     if first and not quiet:
-        _print_results(spec, path, how["shard"], outcome, reporter.failed)
+        _print_results(spec, path, options, outcome, reporter.failed)
     return sum(outcome.values()) - outcome[Status.CONVERGED]
 
 
 def _print_results(
-    spec: Any, path: Path, shard: tuple[int, int], outcome: Any, failed: Any
+    spec: "Spec",
+    path: Path,
+    options: "RunOptions",
+    outcome: Counter[Status],
+    failed: Mapping[int, str],
 ) -> None:
     """Print the results, the tasks that have not converged, and the next commands."""
     from gfmd_cli.analysis.run_summary import (
@@ -137,12 +150,9 @@ def _print_results(
     from gfmd_cli.study.tasks import plan
 
     stored = read_rows(path) if outcome and path.exists() else []
-    indices = {task.id: task.index for task in plan(spec)}
-    rows = [
-        row | {"task": indices[row["task_id"]]}
-        for row in stored
-        if indices.get(row["task_id"], -1) % shard[1] == shard[0] and row["task_id"] in indices
-    ]
+    tasks = plan(spec)
+    indices = {task.id: task.index for task in options.share_of(tasks)}
+    rows = [row | {"task": indices[row["task_id"]]} for row in stored if row["task_id"] in indices]
     if table := run_text(rows):
         show(f"{table}\n")
     counts = counted(outcome)
@@ -150,28 +160,28 @@ def _print_results(
     jumps = loads_in_jumps(rows, spec.load.tolerance)
     for line in [*unconverged(rows, failed), *jumps, *edge_warnings(rows)]:
         show(f"  {line}")
-    for line in other_tasks([row for row in stored if row["task_id"] not in indices]):
+    ids = {task.id for task in tasks}
+    for line in other_tasks([row for row in stored if row["task_id"] not in ids]):
         show(f"  {line}")
     if stored:
         quoted = shlex.quote(str(path))
         show(f"next: gfmd analyze {quoted}\n      gfmd report {quoted}")
 
 
-def _print_tasks(spec: Any, path: Path, how: dict[str, Any]) -> None:
+def _print_tasks(spec: "Spec", path: Path, options: "RunOptions") -> None:
     """Print the tasks of a shard with their load, memory and time, and those that are done."""
     from gfmd_cli.grid.ranks import leads
     from gfmd_cli.study.resources import check_memory
     from gfmd_cli.study.store import Study, without_result
     from gfmd_cli.study.tasks import plan
 
-    (index, count), ranks = how["shard"], how["ranks"]
-    tasks = [task for task in plan(spec) if task.index % count == index]
-    outcomes = {} if how["overwrite"] else Study(path).outcomes()
+    tasks = options.share_of(plan(spec))
+    outcomes = {} if options.overwrite else Study(path).outcomes()
     missing = without_result(tasks, outcomes)
     to_do = {task.id for task in missing}
     if tasks:
-        check_memory(tasks, ranks)
-    if not leads(ranks):
+        check_memory(tasks, options.ranks)
+    if not leads(options.ranks):
         return
     show(f"{'task':>6} {'points':>6} {'load':>10} {'MiB':>8} {'s':>8}  scene")
     for task in tasks:

@@ -6,7 +6,7 @@ import sys
 import time
 from math import isfinite
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -22,6 +22,10 @@ from gfmd_cli.cli.options import (
 from gfmd_cli.errors import InputError
 from gfmd_cli.status import Status
 from gfmd_cli.units import duration
+
+if TYPE_CHECKING:
+    from gfmd_cli.study.checkpoint import Saved
+    from gfmd_cli.study.state import StudyState
 
 
 @click.command()
@@ -92,7 +96,7 @@ def collect(spec: Path, output: Path | None, overrides: tuple[str, ...]) -> None
     sys.exit(0 if state.converged else 1)
 
 
-def _lines(state: Any, shards: int | None) -> list[str]:
+def _lines(state: "StudyState", shards: int | None) -> list[str]:
     """The state of a study as lines of text."""
     lines = [f"{state.study}: {len(state.tasks)} tasks: {counted(state.counts)}"]
     for task in state.tasks:
@@ -113,7 +117,7 @@ def _lines(state: Any, shards: int | None) -> list[str]:
     return lines
 
 
-def _next(state: Any, spec: str, output: Path | None, overrides: tuple[str, ...]) -> str:
+def _next(state: "StudyState", spec: str, output: Path | None, overrides: tuple[str, ...]) -> str:
     """The command to run next."""
     from gfmd_cli.study.slurm import SUFFIX
 
@@ -128,12 +132,12 @@ def _next(state: Any, spec: str, output: Path | None, overrides: tuple[str, ...]
     return shlex.join(["gfmd", "run", *words])
 
 
-def _saved(task: Any) -> dict[str, Any]:
-    data = {"task": task.task, **task.saved._asdict()}
-    return data | ({} if isfinite(task.saved.residual) else {"residual": None})  # JSON has no NaN
+def _saved(task: int, saved: "Saved") -> dict[str, Any]:
+    data = {"task": task, **saved._asdict()}
+    return data | ({} if isfinite(saved.residual) else {"residual": None})  # JSON has no NaN
 
 
-def _as_data(state: Any, shards: int | None, following: str) -> dict[str, Any]:
+def _as_data(state: "StudyState", shards: int | None, following: str) -> dict[str, Any]:
     """The same as plain data."""
     counts = state.counts
     data: dict[str, Any] = {
@@ -143,7 +147,7 @@ def _as_data(state: Any, shards: int | None, following: str) -> dict[str, Any]:
         "missing": counts[Status.MISSING],
         "statuses": dict(counts),
         "missing_tasks": state.missing,
-        "saved": [_saved(task) for task in state.tasks if task.saved is not None],
+        "saved": [_saved(task.task, task.saved) for task in state.tasks if task.saved],
         "records": state.records,
         "others": state.others,
         "damaged": state.damaged,

@@ -3,13 +3,16 @@
 import os
 import shlex
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from gfmd_cli.cli.messages import show
 from gfmd_cli.cli.options import FILE, output_option, overrides_option, repeated, study_path
 from gfmd_cli.errors import InputError
+
+if TYPE_CHECKING:
+    from gfmd_cli.study.slurm import Batch
 
 
 @click.command()
@@ -86,7 +89,7 @@ def submit(
         show(f"next: gfmd status {words}")
 
 
-def _send(job: Any) -> None:
+def _send(job: "Batch") -> None:
     """Write the script and submit it, first as an array, then to collect."""
     from gfmd_cli.files.atomic import make_folder, write_whole
     from gfmd_cli.study.slurm import call, queued

@@ -35,6 +35,11 @@ def open_hdf5(source: Path | BinaryIO) -> Iterator[Any]:
         yield file
 
 
+def is_hdf5(path: Path) -> bool:
+    """Whether a file is HDF5, perhaps behind a user block."""
+    return bool(h5py.is_hdf5(path))
+
+
 def has(group: Any, name: str) -> bool:
     """Whether the group itself holds something of this name; a link to elsewhere is not followed.
 
@@ -108,6 +113,12 @@ def read_dataset(group: Any, path: str) -> Any:
     if values.size:
         dataset.read(h5py.h5s.ALL, h5py.h5s.ALL, values, dataset.get_type())
     return values
+
+
+def as_text(values: Any) -> Any:
+    """Text as it is stored: UTF-8 of a fixed length."""
+    encoded = np.char.encode(np.asarray(values, str), "utf-8")
+    return encoded.astype(h5py.string_dtype("utf-8", max(encoded.itemsize, 1)))
 
 
 def create_dataset(group: Any, name: str, values: Any) -> None:

@@ -16,7 +16,7 @@ import pyfftw
 from gfmd_cli.grid import plans
 from gfmd_cli.grid.arrays import Field, Modes
 from gfmd_cli.grid.convolution import DistributedPaddedTransform, padded_shape
-from gfmd_cli.grid.fft_grid import PLANNING, Grid, Shape, shared_modes
+from gfmd_cli.grid.fft_grid import PLANNING, Grid, Shape
 from gfmd_cli.grid.halo import HALO_ROWS, DistributedColumns, DistributedRows, is_distributable
 from gfmd_cli.grid.ranks import Ranks, leads
 from gfmd_cli.grid.rows import LocalRows
@@ -216,23 +216,14 @@ class DistributedGrid(Grid):
         return self._resampled(source, field, self)
 
     def _resampled(self, source: Grid, field: Field, target: Grid) -> Field:
-        modes, out = source.forward_into_work(field), target.work
-        shared = shared_modes(source.points_y, target.points_y)
-        columns = shared_modes(source.points, target.points)
-        if shared.halved:
-            modes[shared.positive - 1] *= 0.5
-        if columns.halved and source.ends[1]:
-            modes[:, -1] *= 0.5
+        modes, shared, columns = source.modes_for(target, field)
         rows = np.concatenate([modes[part] for part in shared.slices])
         rows = self._redistributed(rows, source, target, columns.positive)
+        out, width, (positive, negative) = target.work, rows.shape[1], shared.slices
         out[...] = 0.0
-        width, (positive, negative) = rows.shape[1], shared.slices
         out[positive, :width] = rows[: shared.positive]
         out[negative, :width] = rows[shared.positive :]
-        resampled = target.empty()
-        target.backward_into(resampled)
-        resampled *= 1.0 / source.size
-        return resampled
+        return target.field_of_work(source.size)
 
     def _redistributed(self, rows: Any, source: Grid, target: Grid, kept: int) -> Any:
         """The columns below `kept`, redistributed from the processes of one grid to another's."""

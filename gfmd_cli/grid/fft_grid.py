@@ -381,24 +381,37 @@ class Grid:
         return source._resample(field, self)
 
     def _resample(self, field: Field, target: "Grid") -> Field:
-        modes, out = self.forward_into_work(field), target.work
-        columns = shared_modes(self.points, target.points)
-        if columns.halved:
-            modes[..., -1] *= 0.5
+        modes, rows, columns = self.modes_for(target, field)
+        out, kept = target.work, columns.positive
         out[...] = 0.0
-        kept = columns.positive
         if self.dimension == 1:
             out[:kept] = modes[:kept]
         else:
-            rows = shared_modes(self.points_y, target.points_y)
-            if rows.halved:
-                modes[rows.positive - 1] *= 0.5
             for part in rows.slices:
                 out[part, :kept] = modes[part, :kept]
-        resampled = target.empty()
-        target.backward_into(resampled)
-        resampled *= 1.0 / self.size
-        return resampled
+        return target.field_of_work(self.size)
+
+    def modes_for(self, target: "Grid", field: Field) -> "tuple[Modes, SharedModes, SharedModes]":
+        """Coefficients of a field, without 1/size, for another grid, in `work`.
+
+        At the Nyquist wavenumbers they are halved if that grid has +q and -q. Also returned are the
+        wavenumbers along y and along x that both grids have.
+        """
+        modes = self.forward_into_work(field)
+        rows = shared_modes(self.points_y, target.points_y)
+        columns = shared_modes(self.points, target.points)
+        if rows.halved:
+            modes[rows.positive - 1] *= 0.5
+        if columns.halved and self.ends[1]:
+            modes[..., -1] *= 0.5
+        return modes, rows, columns
+
+    def field_of_work(self, size: int) -> Field:
+        """The field of the coefficients in `work` of a grid of so many points; `work` is lost."""
+        field = self.empty()
+        self.backward_into(field)
+        field *= 1.0 / size
+        return field
 
 
 def multiplicity(points: int) -> Field:

@@ -6,14 +6,6 @@ from gfmd_cli.grid.arrays import Field
 from gfmd_cli.grid.transposition import Span
 
 
-def average_pixels(values: Field, shape: tuple[int, ...]) -> Field:
-    """Means over the pixels of another grid of the same map; values are constant on a pixel."""
-    values = average_along_x(values, shape[-1])
-    if values.ndim == 1:
-        return values
-    return average_rows(values, (0, shape[0]), len(values), shape[0])
-
-
 def average_along_x(values: Field, target: int) -> Field:
     """Means over `target` columns of equal width instead of those of the array."""
     columns = np.moveaxis(values, -1, 0)

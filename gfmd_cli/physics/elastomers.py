@@ -76,7 +76,7 @@ class LinearElastomer(Choice):
         """1/k(q) of an elastomer whose displacement decays and whose k(q) is no power law."""
         raise NotImplementedError
 
-    def remarks(self, h_std: float, q: Field, variance: Field) -> list[str]:
+    def warnings(self, h_std: float, q: Field, variance: Field) -> list[str]:
         """Warnings on a surface of this rms height [m]; mostly none.
 
         `variance` is the part of the squared full-contact stress at the wavenumbers q [1/m].
@@ -224,8 +224,8 @@ class Plate(LinearElastomer):
         """k(q) [Pa/m]."""
         return self.E_star / 12 * (self.thickness * q) ** 3 * q
 
-    def remarks(self, h_std: float, q: Field, variance: Field) -> list[str]:
-        """See `LinearElastomer.remarks`. At q t = 1 a slab has 0.81 of the stiffness of a plate."""
+    def warnings(self, h_std: float, q: Field, variance: Field) -> list[str]:
+        """See `LinearElastomer.warnings`. At q t = 1 a slab is 0.81 times as stiff as a plate."""
         is_short = q * self.thickness > 1
         share = float(variance[is_short].sum() / variance.sum()) if q.size else 0.0
         if share <= SHORT:
@@ -297,8 +297,8 @@ class Layer(LinearElastomer):
         softening = layer_softening(t, self.poisson if self.base == "bonded" else None)
         return np.where(q > 0, 0.5 * self.E_star * q / softening, 0.0)
 
-    def remarks(self, h_std: float, q: Field, variance: Field) -> list[str]:
-        """See `LinearElastomer.remarks`."""
+    def warnings(self, h_std: float, q: Field, variance: Field) -> list[str]:
+        """See `LinearElastomer.warnings`."""
         if self.thickness > h_std:
             return []
         return [
@@ -346,8 +346,8 @@ class Tabulated(LinearElastomer):
         """k(q) [Pa/m]. Raises InputError for an invalid table."""
         return np.where(q > 0, _interpolated(self._table())(np.where(q > 0, q, 1.0)), 0.0)
 
-    def remarks(self, h_std: float, q: Field, variance: Field) -> list[str]:
-        """See `LinearElastomer.remarks`."""
+    def warnings(self, h_std: float, q: Field, variance: Field) -> list[str]:
+        """See `LinearElastomer.warnings`."""
         first, *_, last = self._table()[:, 0]
         share = float(variance[(q < first) | (q > last)].sum() / variance.sum()) if q.size else 0.0
         if share <= EXTRAPOLATED:

@@ -35,8 +35,8 @@ is admissible at any other pressure q; the best q gives, with A = <s C s>,
     | c* - (<s h> - A) / p | <= sqrt(2 A G) / p.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
+from functools import singledispatch
 from math import nan, sqrt
 
 import numpy as np
@@ -53,7 +53,7 @@ uncertain, which matters next to full contact: n = 0.5 to 4, slabs, p* = 0.003 t
 
 
 @dataclass(frozen=True)
-class Certificate:
+class ErrorBounds:
     """Bounds of the errors of an approximate solution on its grid, in reduced units."""
 
     gap: float
@@ -77,8 +77,9 @@ class Certificate:
         return ALGEBRAIC * residual * max(value, sqrt(value), 0.5 * sqrt(open_share))
 
 
-def certify(contact: Contact, u: Field, sigma: Field) -> Certificate:
-    """Bound the errors of a displacement u >= h with its stress sigma = K u + p.
+@singledispatch
+def error_bounds(contact: Contact, u: Field, sigma: Field) -> ErrorBounds:
+    """Bound the errors of a solution: of a periodic contact, u >= h with sigma = K u + p.
 
     The cost is one transform.
     """
@@ -108,7 +109,7 @@ def certify(contact: Contact, u: Field, sigma: Field) -> Certificate:
     duality_gap = max(product + 0.5 * remainder, 0.0)
     reaction = max(twice_energy - 2 * mixed + remainder, 0.0)  # B, as s - p = K u - e
     centre = (lifted - reaction) / p
-    return Certificate(
+    return ErrorBounds(
         gap=duality_gap,
         u_g=abs(mean - centre) + _level_bound(duality_gap, reaction, p),
         sigma_p=sqrt(2 * duality_gap * grid.max(float(contact.stiffness.max()))) + sqrt(omitted),
@@ -116,7 +117,8 @@ def certify(contact: Contact, u: Field, sigma: Field) -> Certificate:
     )
 
 
-def certify_free(contact: FreeContact, u: Field, sigma: Field) -> Certificate:
+@error_bounds.register
+def _of_free_contact(contact: FreeContact, u: Field, sigma: Field) -> ErrorBounds:
     """Bound the errors of a displacement u and a stress sigma of a contact with a free boundary.
 
     The cost is three transforms of twice the points a side. The bound of sigma_p is NaN where no
@@ -140,7 +142,7 @@ def certify_free(contact: FreeContact, u: Field, sigma: Field) -> Certificate:
     smallest = free.smallest_compliance
     omitted = sqrt(mean((contact_pressure(contact.obstacle, u, sigma) - s) ** 2))
     violation = np.minimum(u - contact.obstacle, sigma)
-    return Certificate(
+    return ErrorBounds(
         gap=duality_gap,
         u_g=abs(mean(u - h) - centre)
         + sqrt(mean_compliance * duality_gap)
@@ -185,7 +187,3 @@ def _compliance(contact: Contact) -> float:
         weight = count if grid.dimension == 2 else count[rows]
         total += float(np.sum(weight * np.abs(grid.work[rows]) ** 2 / stiffness))
     return grid.total(total) / float(grid.size) ** 2
-
-
-CERTIFY: dict[str, Callable[..., Certificate]] = {"periodic": certify, "free": certify_free}
-"""How a solution is certified, by the boundary of the contact."""

@@ -8,8 +8,9 @@ from pydantic import Field as Key
 
 from gfmd_cli.choice import FilePath, Positive
 from gfmd_cli.errors import InputError
-from gfmd_cli.grid.arrays import Field, Mask, row_blocks
+from gfmd_cli.grid.arrays import Field, Mask
 from gfmd_cli.grid.fft_grid import Grid
+from gfmd_cli.physics import map_warnings
 from gfmd_cli.physics.height_map import extent
 from gfmd_cli.physics.indenters import SMALLEST_GRID, RigidSurface
 from gfmd_cli.physics.interpolation import (
@@ -22,7 +23,6 @@ from gfmd_cli.physics.interpolation import (
 from gfmd_cli.physics.map_preparation import (
     Edges,
     Levelling,
-    border_step,
     fill_missing,
     level,
     make_periodic,
@@ -31,15 +31,6 @@ from gfmd_cli.physics.map_preparation import (
 )
 from gfmd_cli.physics.pictures import Picture, picture
 from gfmd_cli.physics.topography import Region, Topography, read_topography
-
-STEEP = 3.0  # rms gradient; a choice: surfaces of machined or worn solids have less
-SMOOTH = 1e-6  # rms gradient; a choice: polished mirrors have about that
-CLIFF = 5.0  # ratio of the step across the border to that inside; a choice: 1 if periodic
-TILTED = 0.5  # share of the variance of the heights that is a tilt; a choice
-ROUNDED = 0.2  # share of equal neighbouring heights, at which the gradient is 3 % too large
-FEW = 0.01  # share of the heights that can be outliers; a choice
-SIDES = 1e-3  # relative difference of two sides beyond which one is probably wrong; a choice
-FILLED = 0.05  # share of filled heights; a choice, as for the frame of the window
 
 
 class FileSurface(RigidSurface):
@@ -280,53 +271,28 @@ class FileSurface(RigidSurface):
     def _topography(self) -> Topography:
         return _read(self.path, self.dataset, region=self.region, flip=self.flip, crop=self.crop)
 
-    def remarks(self, boundary: str = "periodic") -> list[str]:
+    def warnings(self, boundary: str = "periodic") -> list[str]:
         """Warnings about the side, the heights, their gradient and borders, and unused keys."""
-        topography, heights, remarks = self._topography(), _prepared(self), []
+        topography, heights = self._topography(), _prepared(self)
+        warnings: list[str] = []
         if self._known_length() is None:
-            remarks.append(
+            warnings.append(
                 "the file does not state its side; L = 1 m is assumed: set surface.length"
             )
         if self.length is not None and topography.spacing is not None and topography.metres:
             stated = topography.spacing[-1] * heights.shape[-1] / self.copies
-            if abs(self.length / stated - 1) > SIDES:
-                remarks.append(
-                    f"surface.length = {self.length:g} m replaces the side of the file, "
-                    f"{stated:g} m"
-                )
+            warnings.append(map_warnings.other_side(self.length, stated))
         if "taper" in self.model_fields_set and self.edges != "window":
-            remarks.append('surface.taper has no effect without surface.edges = "window"')
-        remarks += _remarks_on_heights(self)
-        filled = topography.holes / topography.heights.size if self.missing == "fill" else 0.0
-        if filled > FILLED:
-            remarks.append(
-                f"{filled:.0%} of the heights are missing and were filled in: contact there was "
-                'not measured; set surface.region, or surface.missing = "void" where nothing can '
-                "touch"
-            )
-        slopes = (np.diff(heights, axis=i) / step for i, step in enumerate(self._map_spacing()))
-        gradient = np.sqrt(sum(float(np.mean(slope**2)) for slope in slopes))
-        if gradient > STEEP or 0 < gradient < SMOOTH:
-            remarks.append(
-                f"rms gradient {gradient:.3g}: check that heights and side are in metres; "
-                "surface.scale is the factor from the heights of the file to metres, "
-                "surface.length the side"
-            )
-        is_repeated = boundary == "periodic" and not self.has_borders
-        cliff = border_step(heights) if is_repeated else 1.0
-        if cliff > CLIFF:
-            remarks.append(
-                f"the height step across the border is {cliff:.3g} times that inside the map: if "
-                "the map is not periodic, set surface.periodic = false"
-            )
+            warnings.append('surface.taper has no effect without surface.edges = "window"')
+        warnings += _warnings_on_heights(self)
+        if self.missing == "fill":
+            warnings.append(map_warnings.many_filled_in(topography))
+        warnings.append(map_warnings.unlikely_gradient(heights, self._map_spacing()))
+        if boundary == "periodic" and not self.has_borders:
+            warnings.append(map_warnings.step_at_border(heights))
         if boundary == "free" and self.levelling() == "none":
-            tilt = 1 - float(np.var(level(heights, "plane"))) / (np.var(heights) or 1.0)
-            if tilt > TILTED:
-                remarks.append(
-                    f"a tilt makes up {tilt:.0%} of the variance of the heights, and nothing is "
-                    'subtracted: contact is at one edge first; surface.level = "plane" subtracts it'
-                )
-        return remarks
+            warnings.append(map_warnings.tilted(heights))
+        return [warning for warning in warnings if warning]
 
     def preparation(self, boundary: str = "") -> str:
         """Description of how the map was read and prepared for a boundary."""
@@ -393,57 +359,13 @@ def _prepared(surface: FileSurface) -> Field:
 
 
 @lru_cache(maxsize=16)
-def _remarks_on_heights(surface: FileSurface) -> tuple[str, ...]:
+def _warnings_on_heights(surface: FileSurface) -> tuple[str, ...]:
     """Warnings about outliers and rounding. Cached: every contact of a study has the same."""
     topography = surface._topography()
-    remarks = _outliers(topography), _rounding(topography, surface.scale)
-    return tuple(remark for remark in remarks if remark)
-
-
-def _outliers(topography: Topography) -> str:
-    """A warning about heights farther from all others than these are from each other, else ""."""
-    heights = topography.heights
-    if topography.missing is not None:
-        heights = heights[~topography.missing]
-    for extreme in (heights.min(), heights.max()):
-        others = heights[heights != extreme]
-        count = heights.size - others.size
-        if count > FEW * heights.size or others.size < SMALLEST_GRID:
-            continue
-        if min(abs(others.max() - extreme), abs(others.min() - extreme)) > np.ptp(others) > 0:
-            what = "1 height is" if count == 1 else f"{count} heights are"
-            return (
-                f"{what} exactly {extreme:g}, far from all others: a spike or a mark of missing "
-                "heights? Replace it by NaN"
-            )
-    return ""
-
-
-def _rounding(topography: Topography, scale: float) -> str:
-    """A warning about heights in steps as coarse as the differences of neighbours, else ""."""
-    heights, smallest = topography.heights, np.inf
-    pairs = changes = 0
-    for rows in row_blocks(heights):
-        block = heights[rows]
-        if topography.missing is not None:
-            block = np.where(topography.missing[rows], np.nan, block)
-        for axis in range(heights.ndim):
-            steps = np.abs(np.diff(block, axis=axis))
-            pairs += int(np.count_nonzero(np.isfinite(steps)))
-            steps = steps[steps > 0]
-            changes += steps.size
-            smallest = min(smallest, steps.min(initial=np.inf))
-    equal = 1 - changes / max(pairs, 1)
-    if equal < ROUNDED or not changes:
-        return ""
-    return (
-        f"{equal:.0%} of the neighbouring heights are equal: if they were rounded (the smallest "
-        f"step is {scale * smallest:.3g} m), the gradient is too large and the contact area "
-        "too small; export the heights with more digits"
-    )
+    return map_warnings.outliers(topography), map_warnings.rounded(topography, surface.scale)
 
 
 def forget_files() -> None:
     """Drop the maps that were read, so that a file that has changed is read again."""
-    for cached in (_read, _prepared, _suited_interpolation, _remarks_on_heights):
+    for cached in (_read, _prepared, _suited_interpolation, _warnings_on_heights):
         cached.cache_clear()

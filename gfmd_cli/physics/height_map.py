@@ -75,11 +75,9 @@ def read_npy(path: Path, dataset: str | None, max_bytes: int) -> HeightMap:
 
 def read_hdf5(path: Path, dataset: str | None, max_bytes: int) -> HeightMap:
     """Read one dataset of an HDF5 file, reached by hard links and stored in the file itself."""
-    import h5py
+    from gfmd_cli.files.hdf5 import open_hdf5, take
 
-    from gfmd_cli.files.hdf5 import take
-
-    with h5py.File(path, "r") as file:
+    with open_hdf5(path) as file:
         name = _dataset_name(path, file, dataset)
         check_layout(path, file[name].shape or (), file[name].dtype, max_bytes)
         data = take(file, name, MAX_COMPRESSION)

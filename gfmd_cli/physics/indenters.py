@@ -125,7 +125,7 @@ class RigidSurface(Choice):
         """Pictures of a map as it was "measured" and as it was "prepared"; none of others."""
         return {}
 
-    def remarks(self, boundary: str = "periodic") -> list[str]:
+    def warnings(self, boundary: str = "periodic") -> list[str]:
         """Warnings about values that are probably mistakes of the user, for `grid.boundary`."""
         return []
 

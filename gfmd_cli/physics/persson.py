@@ -10,7 +10,7 @@ from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
-from scipy.special import erf, erfc, erfcx, erfinv
+from scipy.special import erf, erfcx, erfinv
 
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.physics.interpolation import monotone_cubic
@@ -160,10 +160,6 @@ class Persson:
     def contact_area(self, p: Field | float) -> Field:
         """Relative contact area a_r = erf(p / sqrt(2) Delta_sigma). Paper Eq. (25)."""
         return erf(self._reduced(p))
-
-    def non_contact_weight(self, p: Field | float) -> Field:
-        """Weight 1 - a_r of the delta function at sigma = 0 in Pr(sigma). Paper Eq. (24)."""
-        return erfc(self._reduced(p))
 
     def stress_density(self, sigma: Field | float, p: Field | float) -> Field:
         """Continuous part of the stress distribution Pr(sigma); zero for sigma <= 0.

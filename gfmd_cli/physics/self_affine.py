@@ -71,7 +71,7 @@ class SelfAffine(RigidSurface):
         """Reason for the smallest grid: the cut-off needs two points per lambda_s."""
         return f"kind {self.kind!r}, cutoff = {self.cutoff:g}: two points per lambda_s"
 
-    def remarks(self, boundary: str = "periodic") -> list[str]:
+    def warnings(self, boundary: str = "periodic") -> list[str]:
         """A warning about a spectrum without a self-affine part."""
         if self.cutoff <= self.rolloff:
             return []

@@ -163,9 +163,9 @@ def _reader(path: Path) -> Callable[[Path, str | None, int], HeightMap]:
         signature = file.read(len(np.lib.format.MAGIC_PREFIX))
     if path.suffix.lower() == ".npy" or signature == np.lib.format.MAGIC_PREFIX:
         return read_npy
-    import h5py
+    from gfmd_cli.files.hdf5 import is_hdf5
 
-    if path.suffix.lower() in (".h5", ".hdf5") or h5py.is_hdf5(path):
+    if path.suffix.lower() in (".h5", ".hdf5") or is_hdf5(path):
         return read_hdf5
     return read_microscope_file
 

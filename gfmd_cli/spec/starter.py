@@ -28,7 +28,7 @@ def starter(path: Path, overrides: tuple[str, ...] = ()) -> str:
 
     Raises InputError where the result is no valid spec.
     """
-    text = with_keys(_render("study.toml", path.name, remarks=[]), overrides)
+    text = with_keys(_render("study.toml", path.name, warnings=[]), overrides)
     read_text(text, path, overrides)
     return text
 
@@ -63,7 +63,7 @@ def starter_of_scan(
         is_finer=points > surface.smallest_grid() // surface.copies,
         low=low,
         high=high,
-        remarks=surface.remarks(),
+        warnings=surface.warnings(),
     )
     text = with_keys(text, overrides)
     spec = read_text(text, path, overrides)

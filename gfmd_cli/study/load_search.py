@@ -26,10 +26,11 @@ from gfmd_cli.physics.persson import Persson
 from gfmd_cli.spec.models import LOADS
 from gfmd_cli.status import Status
 from gfmd_cli.study.context import SolveContext, Watcher
+from gfmd_cli.study.forecast import FIRST
 from gfmd_cli.study.measure import measured
 from gfmd_cli.study.notes import Trial
 from gfmd_cli.study.refinement import Solved, solve_on_grids, task_scene
-from gfmd_cli.study.tasks import FIRST, Task
+from gfmd_cli.study.tasks import Task
 
 COARSER = 2  # grids, each of half the points, on which the search begins
 COARSE = 0.02  # relative distance to the load, or of two pressures, that is good enough on them

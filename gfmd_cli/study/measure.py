@@ -85,9 +85,9 @@ def measured(task: Task, solved: Solved) -> Row:
 
 def error_columns(solved: Solved) -> Row:
     """The errors and continuum values; none unless an accuracy is requested."""
-    if solved.certificate is None:
+    if solved.bounds is None:
         return {}
-    row: Row = {"u_g_bound": solved.certificate.u_g, "sigma_p_bound": solved.certificate.sigma_p}
+    row: Row = {"u_g_bound": solved.bounds.u_g, "sigma_p_bound": solved.bounds.sigma_p}
     for name, estimate in solved.estimates.items():
         algebraic = solved.algebraic(name)
         row |= {

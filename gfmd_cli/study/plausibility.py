@@ -22,7 +22,7 @@ SEPARATOR = " | "
 def warnings_of(task: Task, solved: Solved) -> list[str]:
     """Reasons to doubt the result of one contact, a sentence each; mostly none."""
     elastomer, scene = task.elastomer, solved.scene
-    warnings = task.surface.remarks(task.boundary)
+    warnings = task.surface.warnings(task.boundary)
     if elastomer.modulus > PASCALS and scene.h_std > METRES:
         warnings.append(
             f"a modulus of {elastomer.modulus:.3g} Pa and an rms height of {scene.h_std:.3g} m: "
@@ -33,7 +33,7 @@ def warnings_of(task: Task, solved: Solved) -> list[str]:
             f"solver.tolerance = {task.solver.tolerance:g}: contact area and mean gap may be wrong "
             f"by several percent; at most {LOOSE:g} is usual"
         )
-    warnings += elastomer.remarks(scene.h_std, scene.shells.q, scene.shells.variance)
+    warnings += elastomer.warnings(scene.h_std, scene.shells.q, scene.shells.variance)
     units = _doubtful_unit(task, solved)
     if units:
         return [*warnings, units]  # few points in contact follow from it

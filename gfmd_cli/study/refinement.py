@@ -16,7 +16,7 @@ from gfmd_cli.physics.discretisation_error import (
     local_exponent,
     roughness_scales,
 )
-from gfmd_cli.physics.error_bounds import CERTIFY, Certificate
+from gfmd_cli.physics.error_bounds import ErrorBounds, error_bounds
 from gfmd_cli.physics.error_estimates import Estimate, Level, unknown
 from gfmd_cli.physics.free_contact import SCENES
 from gfmd_cli.physics.observables import Observables, border_contact, contact_points, observe
@@ -25,8 +25,9 @@ from gfmd_cli.solvers.loop import Start
 from gfmd_cli.solvers.nested_grids import Resume, Solution, solve_contact
 from gfmd_cli.status import Status
 from gfmd_cli.study.context import SolveContext, Watcher, WorkerOptions
+from gfmd_cli.study.forecast import FIRST
 from gfmd_cli.study.notes import GridResult
-from gfmd_cli.study.tasks import FIRST, Task
+from gfmd_cli.study.tasks import Task
 
 FINAL = ("bound", "slow", "diverges")  # verdicts that no finer grid changes
 ENOUGH = 3  # grids after which an unknown error stays unknown: two give all that is calibrated
@@ -41,14 +42,14 @@ class Solved:
     contact: Contact
     solution: Solution
     observables: Observables
-    certificate: Certificate | None = None
+    bounds: ErrorBounds | None = None
     estimates: dict[str, Estimate] = field(default_factory=dict)
     """Errors and continuum values by column; empty unless an accuracy is requested."""
 
     def algebraic(self, name: str) -> float:
         """Estimated error of a column on this grid, from stopping at this residual."""
-        assert self.certificate is not None
-        return self.certificate.estimated_error(name, self.observables, self.solution.residual)
+        assert self.bounds is not None
+        return self.bounds.estimated_error(name, self.observables, self.solution.residual)
 
 
 @lru_cache(maxsize=1)
@@ -102,8 +103,8 @@ def solve_on_grids(task: Task, context: SolveContext, watcher: Watcher) -> Solve
         start = None
         grids.append(_grid_result(solved))
         if task.accuracy is not None:
-            certify, solution = CERTIFY[task.boundary], solved.solution
-            solved.certificate = certify(contact, solution.u, solution.sigma)
+            solution = solved.solution
+            solved.bounds = error_bounds(contact, solution.u, solution.sigma)
             solved.estimates = _estimates(task, solved, grids)
         if not agree(context.ranks, _continues(task, solved, len(grids), context.options)):
             break

@@ -8,7 +8,8 @@ from pathlib import Path
 from gfmd_cli.errors import InputError
 from gfmd_cli.grid.ranks import Ranks, cores_and_processes_on_node
 from gfmd_cli.solvers.loop import Solver
-from gfmd_cli.study.tasks import BASE_BYTES, Task
+from gfmd_cli.study.forecast import BASE_BYTES
+from gfmd_cli.study.tasks import Task
 
 THREADED_POINTS = 1024  # per side of a square; a second thread does not pay below it (measured)
 HEADROOM = 0.9  # share of the available memory that a run may plan with

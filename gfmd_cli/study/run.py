@@ -1,10 +1,11 @@
 """Run a spec: what is missing is solved, task by task, on one or more processes."""
 
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
 from pathlib import Path
-from threading import TIMEOUT_MAX, Event, Timer
+from threading import Event
 
 from gfmd_cli.errors import InputError, Interrupted, SpaceError
 from gfmd_cli.grid import plans
@@ -12,7 +13,7 @@ from gfmd_cli.grid.ranks import Ranks, agree, leads, together
 from gfmd_cli.physics.file_surface import forget_files
 from gfmd_cli.spec.models import Spec
 from gfmd_cli.status import Status
-from gfmd_cli.study.context import Progress, Report, SolveContext, WorkerOptions
+from gfmd_cli.study.context import Report, SolveContext, WorkerOptions
 from gfmd_cli.study.pool import solve_in_pool
 from gfmd_cli.study.refinement import forget_scene
 from gfmd_cli.study.resources import check_memory, room, seconds_to_stop, share_out
@@ -22,23 +23,44 @@ from gfmd_cli.study.signals import noted
 from gfmd_cli.study.store import Study, without_result
 from gfmd_cli.study.tasks import Task, plan
 from gfmd_cli.study.time_left import Clock
+from gfmd_cli.study.time_limit import TimeLimit
 
-CHECKPOINT_EVERY = 600.0  # seconds
+
+@dataclass(frozen=True)
+class RunOptions:
+    """How the tasks of a spec are run. Raises InputError for a value out of range."""
+
+    shard: tuple[int, int] = (0, 1)
+    """(i, n) takes the tasks with index i modulo n."""
+    overwrite: bool = False
+    """Whether to rename the study and its unfinished work, and to solve all tasks anew."""
+    jobs: int | None = None
+    """Worker processes; by default as many as cores, memory and tasks suggest."""
+    checkpoint_every: float = 600.0
+    """Time between two saves of the state of a solve [s]."""
+    max_seconds: float | None = None
+    """Wall time before which the run saves all states and stops, as after a signal."""
+    reproducible: bool = False
+    """Whether to plan transforms without measuring, with one thread a task."""
+    ranks: Ranks | None = None
+    """The processes of an MPI run, which share every task."""
+
+    def __post_init__(self) -> None:
+        for name in ("checkpoint_every", "max_seconds"):
+            seconds = getattr(self, name)
+            if seconds is not None and not seconds >= 0:
+                raise InputError(f"{name}: must be 0 or a positive number, got {seconds:g}")
+        if self.jobs is not None and self.jobs < 1:
+            raise InputError(f"--jobs {self.jobs}: at least 1 worker process is needed")
+
+    def share_of(self, tasks: list[Task]) -> list[Task]:
+        """The tasks of the shard."""
+        index, count = self.shard
+        return [task for task in tasks if task.index % count == index]
 
 
 def run_study(
-    spec: Spec,
-    text: str,
-    path: Path,
-    report: Report,
-    *,
-    shard: tuple[int, int] = (0, 1),
-    overwrite: bool = False,
-    jobs: int | None = None,
-    checkpoint_every: float = CHECKPOINT_EVERY,
-    max_seconds: float | None = None,
-    reproducible: bool = False,
-    ranks: Ranks | None = None,
+    spec: Spec, text: str, path: Path, report: Report, options: RunOptions | None = None
 ) -> Counter[Status]:
     """Solve the tasks of this shard that the study does not hold yet, and collect all records.
 
@@ -49,32 +71,24 @@ def run_study(
     spec, text : the run spec and the text it was read from
     path : the study file
     report : receives an event at every start, step and end of a task
-    shard : (i, n) takes the tasks with index i modulo n
-    overwrite : rename the study and its unfinished work, and solve all tasks anew
-    jobs : worker processes, by default as many as cores, memory and tasks suggest
-    max_seconds : wall time before which the run saves all states and stops, as after a signal
-    reproducible : plan transforms without measuring, one thread a task
-    ranks : the processes of an MPI run, which share every task; all of them call this
+    options : how the tasks are run; all processes of an MPI run call this
 
     Returns how many tasks of this shard ended in which status (`FAILED`: an error ended it).
     Raises InputError for a spec that does not fit the machine, SpaceError, and Interrupted after a
     signal or the time given, when all states are saved, and where tasks are left whose workers
     were killed.
     """
-    for name, seconds in (("checkpoint_every", checkpoint_every), ("max_seconds", max_seconds)):
-        if seconds is not None and not seconds >= 0:
-            raise InputError(f"{name}: must be 0 or a positive number, got {seconds:g}")
-    if jobs is not None and jobs < 1:
-        raise InputError(f"--jobs {jobs}: at least 1 worker process is needed")
+    options = options or RunOptions()
+    ranks = options.ranks
     forget_files()
     forget_scene()
     study = Study(path)
     tasks = plan(spec)
     if ranks is not None and (names := spec.output.on_request()):
         raise InputError(f"output.{names[0]}: takes whole grids; run it without mpiexec")
-    moved = _move_aside(study, shard, ranks) if overwrite else []
+    moved = _move_aside(study, options) if options.overwrite else []
     outcomes = agree(ranks, study.outcomes())
-    share = [task for task in tasks if task.index % shard[1] == shard[0]]
+    share = options.share_of(tasks)
     pending = without_result(share, outcomes)
     to_solve = {task.id for task in pending}
     outcome = Counter(outcomes[task.id].status for task in share if task.id not in to_solve)
@@ -85,38 +99,26 @@ def run_study(
                 pass
         return outcome
     check_memory(pending, ranks)
-    jobs, threads = share_out(pending, jobs, reproducible, ranks)
-    options = WorkerOptions(threads, room(ranks) / jobs, reproducible, checkpoint_every)
-    stop, due, started = Event(), Event(), Event()
-    report_with_time_left = Clock(pending, jobs).with_time_left(report)
-
-    def stop_if_due() -> None:
-        if due.is_set() and started.is_set():  # each call begins a task
-            stop.set()
-
-    def watch(progress: Progress) -> None:
-        if progress.event == "start":
-            started.set()
-            stop_if_due()
-        report_with_time_left(progress)
-
-    def time_is_over() -> None:
-        due.set()
-        stop_if_due()
-
-    context = SolveContext(options, watch, stop, ranks)
-    limit = None
-    if max_seconds is not None and pending:  # early enough to save all and to collect it
-        limit = max(max_seconds / 2, max_seconds - seconds_to_stop(pending, jobs))
-    with noted(stop), _timer(time_is_over, limit), _folder(study, tasks, ranks) as damaged:
-        unusable = plans.plan_with(study.parts, estimated=reproducible)
+    jobs, threads = share_out(pending, options.jobs, options.reproducible, ranks)
+    worker_options = WorkerOptions(
+        threads, room(ranks) / jobs, options.reproducible, options.checkpoint_every
+    )
+    stop = Event()
+    time_limit = TimeLimit(stop)
+    watch = time_limit.watching(Clock(pending, jobs).with_time_left(report))
+    context = SolveContext(worker_options, watch, stop, ranks)
+    seconds = None
+    if options.max_seconds is not None and pending:  # early enough to save all and to collect it
+        seconds = max(options.max_seconds / 2, options.max_seconds - seconds_to_stop(pending, jobs))
+    with noted(stop), time_limit.after(seconds), _folder(study, tasks, ranks) as damaged:
+        unusable = plans.plan_with(study.parts, estimated=options.reproducible)
         context.warn(*moved, *damaged, *filter(None, [unusable]))
         try:
             solved = _solve_all(pending, study.parts, jobs, context)
         finally:
             with together(ranks):
                 # a stopped shard ends soon: its records stand, others collect them
-                if leads(ranks) and (shard[1] == 1 or not stop.is_set()):
+                if leads(ranks) and (options.shard[1] == 1 or not stop.is_set()):
                     context.warn(*study.collect(spec, tasks, text))
             plans.plan_with(None)
         _check_ended(solved, len(pending), stop)
@@ -125,13 +127,13 @@ def run_study(
     return outcome + solved
 
 
-def _move_aside(study: Study, shard: tuple[int, int], ranks: Ranks | None) -> list[str]:
+def _move_aside(study: Study, options: RunOptions) -> list[str]:
     """Rename a study that is to be solved anew; say where it is. Raises InputError."""
-    if shard[1] != 1:
+    if options.shard[1] != 1:
         raise InputError("--overwrite: not with --shard; each shard would start a new study")
     messages: list[str] = []
-    with together(ranks):
-        if leads(ranks):
+    with together(options.ranks):
+        if leads(options.ranks):
             messages = [
                 f"{study.path}: the old one is kept as {path}" for path in study.move_aside()
             ]
@@ -180,18 +182,3 @@ def _solve_all(
     outcome = Counter(attempt(task, parts, context) for task in pending)
     del outcome[Status.INTERRUPTED]
     return outcome
-
-
-@contextmanager
-def _timer(call: Callable[[], None], seconds: float | None) -> Iterator[None]:
-    """Inside, something is called after so much time."""
-    if seconds is None:
-        yield
-        return
-    timer = Timer(min(seconds, TIMEOUT_MAX), call)
-    timer.daemon = True
-    timer.start()
-    try:
-        yield
-    finally:
-        timer.cancel()

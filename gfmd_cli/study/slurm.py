@@ -10,9 +10,10 @@ from pathlib import Path
 
 from gfmd_cli.errors import GfmdError, InputError
 from gfmd_cli.files.regular import read_regular
+from gfmd_cli.study.forecast import BASE_BYTES, SECONDS_PER_PAIR
 from gfmd_cli.study.resources import HEADROOM, THREADED_POINTS
 from gfmd_cli.study.state import StudyState, check_shards
-from gfmd_cli.study.tasks import BASE_BYTES, SECONDS_PER_PAIR, Task
+from gfmd_cli.study.tasks import Task
 
 SUFFIX = ".sbatch"
 MAX_BYTES = 2**20  # of a script

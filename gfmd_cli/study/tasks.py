@@ -1,21 +1,17 @@
 """A spec as a list of tasks, one for each pressure, with what each will take."""
 
 from dataclasses import dataclass
-from functools import lru_cache
 from math import prod
 from typing import Any
 
 import numpy as np
-import pyfftw
 
 from gfmd_cli.choice import Choice
 from gfmd_cli.errors import InputError
-from gfmd_cli.physics.discretisation_error import MAX_AREA_EXPONENT, MAX_STRESS_EXPONENT
 from gfmd_cli.physics.elastomers import LinearElastomer
 from gfmd_cli.physics.indenters import RigidSurface
 from gfmd_cli.physics.surfaces import check_resolved
 from gfmd_cli.solvers.auto import AnySolver
-from gfmd_cli.solvers.multigrid import ASPECT
 from gfmd_cli.spec.models import (
     LOADS,
     SWEPT,
@@ -27,42 +23,11 @@ from gfmd_cli.spec.models import (
     load_text,
     with_boundary,
 )
+from gfmd_cli.study import forecast
 
-STIFFNESS_FIELDS, SPECTRA_FIELDS = 3.0, 1.0
-"""Fields that output.stiffness and output.spectra add to those of the solver, by peak memory."""
-MIRRORED_FIELDS = {"true_contact": 2.0, "spectra": 11.0}
-"""Fields that keys of [output] add with a free boundary, by peak memory at 1536^2."""
-STORED_FIELDS, ACCURACY_FIELDS = 1.0, 0.5
-"""Fields that each name in output.fields, and [accuracy], add, by peak memory."""
-OBLONG_FIELDS, ODD_FIELDS = 4.5, 0.5
-"""Fields that coarser grids and levels add where only the shorter side of the pixels is coarsened,
-and where an odd number of points is, by peak memory."""
-BASE_BYTES = 240e6
-"""Memory of the interpreter and its libraries."""
-FIRST = 64  # points along x that "auto" begins with at the least; such a solve costs nothing
-LAST = {"a_r": MAX_AREA_EXPONENT, "u_g": 4.0, "sigma_p": MAX_STRESS_EXPONENT}
-"""Exponents n up to which a quantity has a continuum value to come near to."""
-SEARCH = 3.5  # solves that a search of the pressure takes, those on coarser grids included
 LOAD_DIGITS = 14  # of a load that name its task: the last bit of a ladder depends on the machine
 MAX_TASKS = 100_000  # upper limit of a study, guards against typing errors
 MAX_COMBINATIONS = 2_000_000  # of all lists, of which paired lists choose a part
-SECONDS_PER_PAIR = 1.7e-8
-"""Per grid point and pair of transforms, with all work between two of them, on one thread."""
-DECADES = -4, -3, -2, -1, 0
-PAIRS = {
-    0.1: (19, 32, 33, 15, 13),
-    0.25: (7, 7, 9, 15, 11),
-    0.5: (8, 5, 7, 20, 15),
-    1.0: (7, 7, 12, 15, 16),
-    1.5: (9, 22, 20, 15, 13),
-    2.0: (8, 21, 19, 18, 14),
-    2.5: (9, 23, 26, 23, 17),
-    3.0: (11, 33, 40, 33, 23),
-    3.5: (17, 65, 61, 50, 24),
-    4.0: (48, 97, 70, 51, 33),
-}
-"""Time of a solve over that of a pair of transforms, by n, at p* of these powers of ten. Measured
-on the default surface, 1024^2, residual 1e-6; at 2048^2 the ratio is 0.7 to 1.4 times as large."""
 
 
 @dataclass(frozen=True)
@@ -147,58 +112,26 @@ class Task:
 
     def bytes_on(self, points: int) -> float:
         """Memory that a solve on this many points along x takes, with its process."""
-        fields = self.solver.fields_for(self.boundary, self.elastomer.exponent)
-        fields += STIFFNESS_FIELDS if self.output.stiffness else 0.0
-        fields += SPECTRA_FIELDS if self.output.spectra else 0.0
-        if self.boundary == "free":
-            fields += sum(MIRRORED_FIELDS.get(key, 0.0) for key in self.output.names())
-        fields += STORED_FIELDS * len(self.output.fields)
-        fields += ACCURACY_FIELDS if self.accuracy is not None else 0.0
-        fields += self._fields_of_levels(points)
-        return fields * 8 * float(points * self.points_y_on(points)) + BASE_BYTES
-
-    def _fields_of_levels(self, points: int) -> float:
-        """Fields that coarser grids and levels add where the points are not halved."""
-        if self.surface.dimension == 1 or self.boundary != "periodic":
-            return 0.0
         shape = (self.points_y_on(points), points)
-        dy, dx = (side / count for side, count in zip(self.surface.sides, shape, strict=True))
-        if max(dy, dx) > ASPECT * min(dy, dx):
-            return OBLONG_FIELDS
-        return ODD_FIELDS if any(count % 2 for count in shape) else 0.0
+        fields = self.solver.fields_for(self.boundary, self.elastomer.exponent)
+        fields += forecast.fields_of_output(self.output, self.boundary)
+        fields += forecast.ACCURACY_FIELDS if self.accuracy is not None else 0.0
+        if self.surface.dimension == 2 and self.boundary == "periodic":
+            fields += forecast.fields_of_levels(shape, self.surface.sides)
+        return fields * 8 * float(prod(shape)) + forecast.BASE_BYTES
 
     @property
     def least_points(self) -> int:
         """Points along x without which the task cannot begin."""
-        return first_grid(self.surface) if self.auto else self.points
+        return forecast.first_grid(self.surface) if self.auto else self.points
 
     @property
     def seconds(self) -> float:
         """Time that the solve is expected to take on one thread, within a factor of about three."""
-        solves = SEARCH if LOADS[self.quantity].searched else 1.0
-        return 0.01 + solves * SECONDS_PER_PAIR * self.size * self._pairs()
-
-    def _pairs(self) -> float:
-        """Time of the solve over that of a pair of transforms."""
-        n = self.elastomer.exponent
-        p = self.load if self.quantity == "p_star" else 0.05
-        tightness = 1 - 0.1 * float(np.log10(max(self.solver.tolerance, 1e-14) / 1e-6))
-        return 1.0 if n == 0 else tightness * _measured_pairs(2.0 if n is None else n, p)
-
-
-@lru_cache(maxsize=1024)
-def _measured_pairs(n: float, p_star: float) -> float:
-    """See `PAIRS`, interpolated."""
-    by_pressure = [np.interp(n, list(PAIRS), pairs) for pairs in zip(*PAIRS.values(), strict=True)]
-    return float(np.interp(np.log10(max(p_star, 1e-14)), DECADES, by_pressure))
-
-
-def first_grid(surface: RigidSurface) -> int:
-    """Points along x that an "auto" grid begins with: the fewest that resolve the surface."""
-    needed = surface.smallest_grid()
-    if surface.is_map:
-        return needed
-    return 2 * int(pyfftw.next_fast_len((max(needed, FIRST) + 1) // 2))
+        solves = forecast.SEARCH if LOADS[self.quantity].searched else 1.0
+        p_star = self.load if self.quantity == "p_star" else 0.05
+        pairs = forecast.pairs(self.elastomer.exponent, p_star, self.solver.tolerance)
+        return 0.01 + solves * forecast.SECONDS_PER_PAIR * self.size * pairs
 
 
 def plan(spec: Spec) -> list[Task]:
@@ -293,32 +226,13 @@ def _check_grid(surface: RigidSurface, grid: GridTable) -> None:
 
 
 def _points(spec: Spec, chosen: dict[str, Any], load: float) -> int:
-    """Points along x of the cell; of an "auto" grid a forecast, mostly within a factor of two.
-
-    Relative errors on the first grid, and the order at which they fall: read off the default
-    surface with cutoff = 0.03, n = 0 to 4, p* = 0.01 to 1.
-    """
-    surface, grid, accuracy = chosen["surface"], chosen["grid"], spec.accuracy
+    """Points along x of the cell; of an "auto" grid a forecast."""
+    surface, grid = chosen["surface"], chosen["grid"]
     if grid.points != "auto":
         return int(surface.copies * grid.points)
-    p = load if spec.load.quantity == "p_star" and load else 0.1
-    n = chosen["elastomer"].exponent
-    n = 1.0 if n is None else n
-    steep = float(np.interp(n, [0, 2, 3], [0.4, 0.48, 0.96]))
-    area = float(np.interp(n, [0, 1, 2, 3], [0.05, 0.09, 0.26, 0.8])) * min(p / 0.1, 1.0) ** -steep
-    gap = float(np.interp(n, [0, 1, 2, 3, 4], [0.007, 0.012, 0.035, 0.09, 0.27]))
-    typical = {
-        "a_r": (area, 1.6),
-        "u_g": (3 * gap if p > 0.3 else gap, 2.5),
-        "sigma_p": (0.03 * 3**n, max(0.5, min(2.0, 3.0 - n))),
-    }
-    doublings = [1 if grid.boundary == "free" else 0]  # one grid gives no error there
-    for name, share in (accuracy.tolerances() if accuracy is not None else {}).items():
-        error, order = typical[name]
-        if n <= LAST[name]:
-            doublings.append(int(np.ceil((np.log2(error) - np.log2(share)) / order)))
-    points = first_grid(surface) * int(2 ** min(max(doublings), 20))
-    return points if accuracy is None else min(points, accuracy.max_points)
+    p_star = load if spec.load.quantity == "p_star" and load else 0.1
+    exponent = chosen["elastomer"].exponent
+    return forecast.last_grid(surface, exponent, p_star, grid.boundary, spec.accuracy)
 
 
 def _task_id(spec: Spec, resolved: dict[str, Any], tables: dict[str, Any], load: float) -> str:

@@ -7,7 +7,8 @@ from math import isfinite, log
 from typing import Any
 
 from gfmd_cli.study.context import Progress, Report
-from gfmd_cli.study.tasks import SECONDS_PER_PAIR, Task
+from gfmd_cli.study.forecast import SECONDS_PER_PAIR
+from gfmd_cli.study.tasks import Task
 
 MIN_REMAINING_SHARE = 0.5  # least share of the elapsed time that the forecast alone says to remain
 MEASURED_FROM = 0.1  # share of the forecast work after which the measured speed is used

@@ -7,10 +7,9 @@ chunk has a checksum.
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
-import h5py
 import numpy as np
 
-from gfmd_cli.files.hdf5 import create_dataset
+from gfmd_cli.files.hdf5 import as_text, create_dataset
 from gfmd_cli.status import Status
 from gfmd_cli.study.column import Column
 from gfmd_cli.study.columns import (
@@ -188,10 +187,7 @@ def write_column(group: Any, column: Column, values: Any, scales: list[Any]) -> 
 
 def _array(kind: type, values: Any) -> Any:
     """The values as they are stored: numbers, or text in UTF-8 of a fixed length."""
-    if kind is not str:
-        return np.asarray(values, kind)
-    encoded = np.char.encode(np.asarray(values, str), "utf-8")
-    return encoded.astype(h5py.string_dtype("utf-8", max(encoded.itemsize, 1)))
+    return as_text(values) if kind is str else np.asarray(values, kind)
 
 
 def _with_checksums(group: Any, name: str, values: Any) -> Any:

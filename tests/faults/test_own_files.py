@@ -11,7 +11,7 @@ from specs import power_spec
 from gfmd_cli.errors import Interrupted
 from gfmd_cli.spec.parse import read_spec
 from gfmd_cli.study.reading import read_rows
-from gfmd_cli.study.run import run_study
+from gfmd_cli.study.run import RunOptions, run_study
 
 from .test_input_kinds import SECONDS, make
 
@@ -58,8 +58,8 @@ def unfinished(tmp_path_factory):
     for shard, event in ((0, "end"), (1, "step")):
         with suppress(Interrupted):
             run_study(
-                spec, text, folder / "study.h5", stop_at(event), jobs=1,
-                shard=(shard, 2), reproducible=True,
+                spec, text, folder / "study.h5", stop_at(event),
+                RunOptions(shard=(shard, 2), jobs=1, reproducible=True),
             )  # fmt: skip
     return folder
 

@@ -9,7 +9,6 @@ from mpi4py import MPI
 from gfmd_cli.grid.convolution import DistributedPaddedTransform
 from gfmd_cli.grid.distributed import create_grid
 from gfmd_cli.grid.fft_grid import Grid
-from gfmd_cli.grid.pixels import average_pixels
 from gfmd_cli.grid.ranks import Ranks
 from gfmd_cli.physics.elastomers import HalfSpace, Layer, Power, Tabulated
 from gfmd_cli.physics.free_contact import build_free_scene
@@ -60,8 +59,8 @@ def check_symbol(shape):
 def check_averages(shape, other):
     (whole, grid), (coarse, target) = grids(*shape), grids(*other)
     values = np.random.default_rng(3).random(shape)
-    expected = average_pixels(values, other)
-    pairs = [(grid, target), (grid, coarse), (whole, target), (whole, coarse)]
+    expected = whole.average(values, coarse)
+    pairs = [(grid, target), (grid, coarse), (whole, target)]
     for source, to in pairs:
         averages = source.average(values[source.own], to)
         np.testing.assert_allclose(averages, expected[to.own], rtol=1e-13)

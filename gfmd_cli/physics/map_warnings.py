@@ -1,0 +1,117 @@
+"""Warnings about a measured map: what its user has probably not meant.
+
+Each function returns one warning, or "" without a reason for it.
+"""
+
+import numpy as np
+
+from gfmd_cli.grid.arrays import Field, row_blocks
+from gfmd_cli.physics.indenters import SMALLEST_GRID
+from gfmd_cli.physics.map_preparation import border_step, level
+from gfmd_cli.physics.topography import Topography
+
+STEEP = 3.0  # rms gradient; a choice: surfaces of machined or worn solids have less
+SMOOTH = 1e-6  # rms gradient; a choice: polished mirrors have about that
+CLIFF = 5.0  # ratio of the step across the border to that inside; a choice: 1 if periodic
+TILTED = 0.5  # share of the variance of the heights that is a tilt; a choice
+ROUNDED = 0.2  # share of equal neighbouring heights, at which the gradient is 3 % too large
+FEW = 0.01  # share of the heights that can be outliers; a choice
+SIDES = 1e-3  # relative difference of two sides beyond which one is probably wrong; a choice
+FILLED = 0.05  # share of filled heights; a choice, as for the frame of the window
+
+
+def other_side(length: float, stated: float) -> str:
+    """A side [m] other than the one that the file states."""
+    if abs(length / stated - 1) <= SIDES:
+        return ""
+    return f"surface.length = {length:g} m replaces the side of the file, {stated:g} m"
+
+
+def many_filled_in(topography: Topography) -> str:
+    """Many missing heights, all of them filled in."""
+    share = topography.holes / topography.heights.size
+    if share <= FILLED:
+        return ""
+    return (
+        f"{share:.0%} of the heights are missing and were filled in: contact there was "
+        'not measured; set surface.region, or surface.missing = "void" where nothing can '
+        "touch"
+    )
+
+
+def unlikely_gradient(heights: Field, spacing: tuple[float, ...]) -> str:
+    """Heights and spacing [m] that make an unlikely gradient."""
+    slopes = (np.diff(heights, axis=i) / step for i, step in enumerate(spacing))
+    gradient = np.sqrt(sum(float(np.mean(slope**2)) for slope in slopes))
+    if not (gradient > STEEP or 0 < gradient < SMOOTH):
+        return ""
+    return (
+        f"rms gradient {gradient:.3g}: check that heights and side are in metres; "
+        "surface.scale is the factor from the heights of the file to metres, "
+        "surface.length the side"
+    )
+
+
+def step_at_border(heights: Field) -> str:
+    """Opposite borders of a repeated map that do not fit."""
+    cliff = border_step(heights)
+    if cliff <= CLIFF:
+        return ""
+    return (
+        f"the height step across the border is {cliff:.3g} times that inside the map: if "
+        "the map is not periodic, set surface.periodic = false"
+    )
+
+
+def tilted(heights: Field) -> str:
+    """A tilt from which nothing is subtracted."""
+    tilt = 1 - float(np.var(level(heights, "plane"))) / (np.var(heights) or 1.0)
+    if tilt <= TILTED:
+        return ""
+    return (
+        f"a tilt makes up {tilt:.0%} of the variance of the heights, and nothing is "
+        'subtracted: contact is at one edge first; surface.level = "plane" subtracts it'
+    )
+
+
+def outliers(topography: Topography) -> str:
+    """Heights farther from all others than these are from each other."""
+    heights = topography.heights
+    if topography.missing is not None:
+        heights = heights[~topography.missing]
+    for extreme in (heights.min(), heights.max()):
+        others = heights[heights != extreme]
+        count = heights.size - others.size
+        if count > FEW * heights.size or others.size < SMALLEST_GRID:
+            continue
+        if min(abs(others.max() - extreme), abs(others.min() - extreme)) > np.ptp(others) > 0:
+            what = "1 height is" if count == 1 else f"{count} heights are"
+            return (
+                f"{what} exactly {extreme:g}, far from all others: a spike or a mark of missing "
+                "heights? Replace it by NaN"
+            )
+    return ""
+
+
+def rounded(topography: Topography, scale: float) -> str:
+    """Heights in steps as coarse as the differences of neighbours."""
+    heights, smallest = topography.heights, np.inf
+    pairs = changes = 0
+    for rows in row_blocks(heights):
+        block = heights[rows]
+        if topography.missing is not None:
+            block = np.where(topography.missing[rows], np.nan, block)
+        for axis in range(heights.ndim):
+            steps = np.abs(np.diff(block, axis=axis))
+            pairs += int(np.count_nonzero(np.isfinite(steps)))
+            steps = steps[steps > 0]
+            changes += steps.size
+            smallest = min(smallest, steps.min(initial=np.inf))
+    equal = 1 - changes / max(pairs, 1)
+    if equal < ROUNDED or not changes:
+        return ""
+    return (
+        f"{equal:.0%} of the neighbouring heights are equal: if they were rounded (the smallest "
+        f"step is {scale * smallest:.3g} m), the gradient is too large and the contact area "
+        "too small; export the heights with more digits"
+    )
