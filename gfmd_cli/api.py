@@ -21,6 +21,7 @@ from gfmd_cli.analysis.compare import compare as compare_study
 from gfmd_cli.analysis.export import as_dataset
 from gfmd_cli.errors import InputError
 from gfmd_cli.grid.arrays import Field, Mask
+from gfmd_cli.grid.blas import one_blas_thread
 from gfmd_cli.physics.file_surface import FileSurface, forget_files
 from gfmd_cli.physics.given_heights import given_heights, surface_table
 from gfmd_cli.physics.indenters import SMALLEST_GRID
@@ -184,6 +185,7 @@ def _with_points(tables: dict[str, Any]) -> dict[str, Any]:
     return tables | {"grid": {**grid, "points": surface.own_points()}}
 
 
+@one_blas_thread()
 def _solve(spec: Path | str | Tables, threads: int) -> Result:
     forget_files()  # they may have changed since the last call
     tasks = plan(_read(spec)[0])

@@ -259,3 +259,17 @@ def test_a_solve_on_tiles_notices_a_request_to_stop(boundary):
     with pytest.raises(KeyboardInterrupt):
         solve(contact, True, 1e-6, stop_at_the_third)
     assert states[-1][0] == {"periodic": (256, 256), "free": (64, 64)}[boundary]
+
+
+@pytest.mark.parametrize("boundary", ["periodic", "free"])
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-6])
+def test_a_single_point_carries_the_load(boundary, tolerance):
+    """Its equations are solved exactly: the residual of the start is zero up to rounding."""
+    scene = SCENES[boundary](SelfAffine(cutoff=0.03, seed=3), Power(n=1), 512)
+    contact = scene.contact(1e-8)
+    local, whole = solve(contact, True, tolerance), solve(contact, False, 1e-9)
+    assert local.status == "converged"
+    assert np.flatnonzero(local.sigma > 0.5 * local.sigma.max()).tolist() == [
+        int(np.argmax(contact.height))
+    ]
+    assert np.mean(local.u) == pytest.approx(np.mean(whole.u), rel=1e-9)

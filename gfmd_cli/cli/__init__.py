@@ -67,7 +67,6 @@ def main() -> None:
         gfmd analyze study.h5           compare the results with Persson theory
     """
     faulthandler.enable(sys.__stderr__ or 2)  # a crash prints a traceback
-    # BLAS computes only dot products here. Its threads give no speed-up, and they cost a
-    # multiple of the work when several processes run at the same time.
+    # A solve uses one thread of BLAS (grid/blas.py); others need not be started.
     for library in ("OPENBLAS", "OMP", "MKL"):
         os.environ.setdefault(f"{library}_NUM_THREADS", "1")

@@ -115,8 +115,9 @@ class LocalSolve:
             is_good = result.start_residual < MARGIN * tolerance and not result.entered.any()
             if (is_good and not is_rough) or count == MAX_EVALUATIONS:
                 break
-            reduction = np.clip(AIM * tolerance / result.start_residual, *REDUCTION)
-            aim = result.residual * float(reduction)
+            if result.start_residual > 0:  # it is zero if a single point is in contact
+                reduction = np.clip(AIM * tolerance / result.start_residual, *REDUCTION)
+                aim = result.residual * float(reduction)
             self.correct(displacement, result.entered)
         return result, displacement
 

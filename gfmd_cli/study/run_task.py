@@ -5,6 +5,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from gfmd_cli.errors import GfmdError, Interrupted, SpaceError, StudyError
+from gfmd_cli.grid.blas import one_blas_thread
 from gfmd_cli.grid.fft_grid import Shape
 from gfmd_cli.grid.ranks import agree, leads, together
 from gfmd_cli.physics.contact import Contact
@@ -132,6 +133,7 @@ def _recorded_status(parts: Path, task: Task) -> Status | None:
     return None
 
 
+@one_blas_thread()
 def solve_task(task: Task, parts: Path, context: SolveContext) -> Status:
     """Solve one task and commit its record; return its status.
 
