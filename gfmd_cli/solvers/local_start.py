@@ -37,7 +37,7 @@ class Limits(NamedTuple):
     """Largest share of tiles that the contact can reach."""
 
 
-LIMITS = {"periodic": Limits(512, 0.065), "free": Limits(128, 0.2)}
+LIMITS = {"periodic": Limits(512, 0.065), "free": Limits(256, 0.25)}
 """By the boundary of the contact."""
 
 
