@@ -26,7 +26,7 @@ from gfmd_cli.physics.discretisation_error import (
     roughness_scales,
 )
 from gfmd_cli.physics.elastomers import Elastomer, Layer, Power, Slab
-from gfmd_cli.physics.error_estimates import Level
+from gfmd_cli.physics.error_estimates import GridValues
 from gfmd_cli.physics.file_surface import FileSurface
 from gfmd_cli.physics.free_contact import SCENES
 from gfmd_cli.physics.indenters import Parabola, Wave
@@ -393,7 +393,7 @@ def scores(records: list[dict]) -> Iterator[Score]:
     for record in records:
         exact = truth(record["levels"])
         levels = [
-            Level(*(level[key] for key in KEYS), border=level.get("border"))
+            GridValues(*(level[key] for key in KEYS), border=level.get("border"))
             for level in record["levels"]
         ]
         for last in range(len(levels) - int(np.log2(FINER))):

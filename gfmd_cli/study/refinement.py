@@ -17,7 +17,7 @@ from gfmd_cli.physics.discretisation_error import (
     roughness_scales,
 )
 from gfmd_cli.physics.error_bounds import ErrorBounds, error_bounds
-from gfmd_cli.physics.error_estimates import Estimate, Level, unknown
+from gfmd_cli.physics.error_estimates import Estimate, GridValues, unknown
 from gfmd_cli.physics.free_contact import SCENES
 from gfmd_cli.physics.observables import Observables, border_contact, contact_points, observe
 from gfmd_cli.physics.power_spectra import anisotropy
@@ -235,7 +235,7 @@ def _estimates(task: Task, solved: Solved, grids: list[GridResult]) -> dict[str,
         return unknown()
     resolution, length = scene.grid.resolution, scene.grid.length
     levels = [
-        Level(
+        GridValues(
             grid.points * (resolution / scene.grid.points),
             grid.a_r,
             grid.sigma_p / scene.delta_sigma,
