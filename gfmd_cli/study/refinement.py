@@ -213,10 +213,6 @@ def _interpolate(solved: Solved, scene: Scene) -> Field:
 
 def _grid_result(solved: Solved) -> GridResult:
     measured, scene, contact = solved.observables, solved.scene, solved.contact
-    border = None
-    if contact.boundary == "free":
-        u, sigma = solved.solution.u, solved.solution.sigma
-        border = border_contact(scene.grid, contact_points(contact.obstacle, u, sigma))
     return GridResult(
         points=scene.grid.points,
         a_r=measured.a_r,
@@ -224,8 +220,16 @@ def _grid_result(solved: Solved) -> GridResult:
         u_g=measured.u_g * scene.h_std,
         perimeter=measured.perimeter,
         work=solved.solution.transforms * scene.grid.size,
-        border=border,
+        border=border_share(contact, solved.solution),
     )
+
+
+def border_share(contact: Contact, solution: Solution) -> float | None:
+    """Share of the border of the map in contact; None with a periodic boundary."""
+    if contact.boundary == "periodic":
+        return None
+    touching = contact_points(contact.obstacle, solution.u, solution.sigma)
+    return border_contact(contact.grid, touching)
 
 
 def _estimates(task: Task, solved: Solved, grids: list[GridResult]) -> dict[str, Estimate]:
@@ -248,17 +252,17 @@ def _estimates(task: Task, solved: Solved, grids: list[GridResult]) -> dict[str,
     ]
     exponent = local_exponent(task.elastomer, resolution, length)
     spread = exponent_spread(task.elastomer, resolution, length)
-    return estimate(levels, exponent, _scales(task, scene), spread)
+    has_scales = task.surface.rough and task.boundary == "periodic"
+    rough = scales_of(scene, task.surface.band_limited) if has_scales else None
+    return estimate(levels, exponent, rough, spread)
 
 
-def _scales(task: Task, scene: Scene) -> RoughnessScales | None:
-    """The scales of a rough surface; None for a single indenter, and with a free boundary."""
-    if not task.surface.rough or task.boundary == "free":
-        return None
+def scales_of(scene: Scene, band_limited: bool) -> RoughnessScales:
+    """The scales of a rough surface, as `estimate` needs them."""
     return roughness_scales(
         scene.shells,
         scene.grid.length,
         anisotropy(scene.grid, scene.height),
-        band_limited=task.surface.band_limited,
+        band_limited=band_limited,
         aspect=max(scene.grid.spacings) / min(scene.grid.spacings),
     )
