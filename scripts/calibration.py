@@ -16,26 +16,25 @@ from pathlib import Path
 
 import numpy as np
 
-from gfmd_cli.physics.contact import Contact, Scene
+from gfmd_cli.physics.contact import Scene
 from gfmd_cli.physics.discretisation_error import (
     MAX_AREA_EXPONENT,
     RoughnessScales,
     estimate,
     exponent_spread,
     local_exponent,
-    roughness_scales,
 )
 from gfmd_cli.physics.elastomers import Elastomer, Layer, Power, Slab
-from gfmd_cli.physics.error_estimates import Level
+from gfmd_cli.physics.error_estimates import GridValues
 from gfmd_cli.physics.file_surface import FileSurface
 from gfmd_cli.physics.free_contact import SCENES
 from gfmd_cli.physics.indenters import Parabola, Wave
-from gfmd_cli.physics.observables import QUANTITIES, border_contact, contact_points, observe
-from gfmd_cli.physics.power_spectra import anisotropy
+from gfmd_cli.physics.observables import QUANTITIES, observe
 from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.physics.surfaces import Surface
 from gfmd_cli.solvers.auto import Auto
-from gfmd_cli.solvers.nested_grids import Solution, solve_contact
+from gfmd_cli.solvers.nested_grids import solve_contact
+from gfmd_cli.study.refinement import border_share, scales_of
 
 EXPONENTS = (0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0)
 THICKNESSES = (0.01, 0.03, 0.1)
@@ -301,6 +300,8 @@ def measure(case: Case, tolerance: float = 1e-6) -> dict:
         begun = time.perf_counter()
         solution = solve_contact(contact, Auto(tolerance=tolerance))
         observables = observe(contact, solution.u, solution.sigma)
+        limited = case.surface.band_limited
+        texture = None if case.is_single else asdict(scales_of(scene, limited))
         levels.append(
             {
                 "points": points,
@@ -311,8 +312,8 @@ def measure(case: Case, tolerance: float = 1e-6) -> dict:
                 "u_g": observables.u_g * height,
                 "perimeter": observables.perimeter,
                 "energy": observables.energy * stress * height,
-                "border": _border(contact, solution),
-                "texture": None if case.is_single else _texture(case, scene),
+                "border": border_share(contact, solution),
+                "texture": texture,
                 "status": solution.status,
                 "seconds": round(time.perf_counter() - begun, 3),
             }
@@ -324,23 +325,6 @@ def measure(case: Case, tolerance: float = 1e-6) -> dict:
         "single": case.is_single,
         "levels": levels,
     }
-
-
-def _border(contact: Contact, solution: Solution) -> float | None:
-    """Share of the border of the map in contact; None with a periodic boundary."""
-    if contact.boundary == "periodic":
-        return None
-    touching = contact_points(contact.obstacle, solution.u, solution.sigma)
-    return border_contact(contact.grid, touching)
-
-
-def _texture(case: Case, scene: Scene) -> dict:
-    """The scales of a rough surface, as `estimate` needs them."""
-    ratio = anisotropy(scene.grid, scene.height)
-    limited = case.surface.band_limited
-    shells, length, spacings = scene.shells, scene.grid.length, scene.grid.spacings
-    aspect = max(spacings) / min(spacings)
-    return asdict(roughness_scales(shells, length, ratio, band_limited=limited, aspect=aspect))
 
 
 def truth(levels: list[dict]) -> dict[str, float]:
@@ -393,7 +377,7 @@ def scores(records: list[dict]) -> Iterator[Score]:
     for record in records:
         exact = truth(record["levels"])
         levels = [
-            Level(*(level[key] for key in KEYS), border=level.get("border"))
+            GridValues(*(level[key] for key in KEYS), border=level.get("border"))
             for level in record["levels"]
         ]
         for last in range(len(levels) - int(np.log2(FINER))):

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from calibration import KEYS, Case, measure
 
-from gfmd_cli.physics.discretisation_error import Level, RoughnessScales, estimate
+from gfmd_cli.physics.discretisation_error import GridValues, RoughnessScales, estimate
 from gfmd_cli.physics.elastomers import Power
 from gfmd_cli.physics.self_affine import SelfAffine
 
@@ -60,7 +60,7 @@ def cases(seed: int) -> Iterator[Case]:
 
 def scores(record: dict) -> Iterator[Score]:
     """Estimates from grids that are at least four times coarser than the reference."""
-    levels = [Level(*(level[key] for key in KEYS)) for level in record["levels"]]
+    levels = [GridValues(*(level[key] for key in KEYS)) for level in record["levels"]]
     last = levels[-1].a_r
     exact = max(0.0, last - (levels[-2].a_r - last) / (2**ORDER - 1))
     for k in range(1, len(levels) - 2):

@@ -18,7 +18,7 @@ from gfmd_cli.physics.discretisation_error import (
     roughness_scales,
 )
 from gfmd_cli.physics.elastomers import HalfSpace, Membrane, Power, Slab
-from gfmd_cli.physics.error_estimates import Level
+from gfmd_cli.physics.error_estimates import GridValues
 from gfmd_cli.physics.indenters import Parabola, Wave
 from gfmd_cli.physics.observables import QUANTITIES, observe
 from gfmd_cli.physics.self_affine import SelfAffine
@@ -32,7 +32,7 @@ GRIDS = (64, 128, 256)
 def sequence(n, grids=GRIDS, area=0.2, stress=0.5, gap=0.3, line=10.0):
     """Levels that converge to the given values with the orders that are assumed."""
     return [
-        Level(
+        GridValues(
             points=points,
             a_r=area + AREA_EXCESS * n * line / points,
             sigma_p=stress - 0.4 * points ** -min(2.0, 3 - n),
@@ -101,7 +101,7 @@ def test_the_stress_says_where_it_has_no_limit(n, verdict):
 
 
 def test_the_area_of_a_plate_on_a_single_indenter_is_a_bound():
-    for level in sequence(0.0), [Level(64, 0.01, 2.0, 0.1, 2.5)]:
+    for level in sequence(0.0), [GridValues(64, 0.01, 2.0, 0.1, 2.5)]:
         area = estimate(level, 4.0)["a_r"]
         assert area.verdict == "bound"
         assert area.error == min(level[-1].a_r, level[-1].line)
@@ -110,7 +110,7 @@ def test_the_area_of_a_plate_on_a_single_indenter_is_a_bound():
 
 
 def test_the_area_of_a_plate_is_unknown_from_one_grid():
-    area = estimate([Level(64, 0.01, 2.0, 0.1, 2.5)], 4.0, ROUGH)["a_r"]
+    area = estimate([GridValues(64, 0.01, 2.0, 0.1, 2.5)], 4.0, ROUGH)["a_r"]
     assert area.verdict == "unknown"
     assert isnan(area.error)
     assert estimate(sequence(3.5), MAX_AREA_EXPONENT, ROUGH)["a_r"].verdict == "regular"
@@ -119,7 +119,7 @@ def test_the_area_of_a_plate_is_unknown_from_one_grid():
 @pytest.mark.parametrize("count", [17, 400])
 def test_lone_points_of_a_plate_have_no_area(count):
     """A fixed number of loaded points, each with four neighbours without load."""
-    levels = [Level(N, count / N**2, 2.0, 0.1, 4 * count / N) for N in (128, 256)]
+    levels = [GridValues(N, count / N**2, 2.0, 0.1, 4 * count / N) for N in (128, 256)]
     area = estimate(levels, 4.0, ROUGH)["a_r"]
     assert area.continuum <= area.continuum_error
     assert area.continuum_error < 2 * levels[-1].a_r
@@ -129,7 +129,7 @@ def test_lone_points_of_a_plate_have_no_area(count):
 def test_the_area_inside_of_a_ragged_line_is_within_the_bar(excess):
     """An excess of first order: a share of the points on a line of fixed length, as measured in
     broad contacts (least, median, largest)."""
-    levels = [Level(N, 0.2 + excess * 10 / N, 2.0, 0.1, 10.0) for N in (128, 256)]
+    levels = [GridValues(N, 0.2 + excess * 10 / N, 2.0, 0.1, 10.0) for N in (128, 256)]
     area = estimate(levels, 4.0, ROUGH)["a_r"]
     assert abs(area.continuum - 0.2) <= area.continuum_error
     assert abs(levels[-1].a_r - 0.2) <= area.error
@@ -137,12 +137,12 @@ def test_the_area_inside_of_a_ragged_line_is_within_the_bar(excess):
 
 def test_full_contact_is_exact():
     for n in (0.0, 1.0, 4.0):
-        for value in estimate([Level(64, 1.0, 1.0, 0.0, 0.0)], n, ROUGH).values():
+        for value in estimate([GridValues(64, 1.0, 1.0, 0.0, 0.0)], n, ROUGH).values():
             assert (value.error, value.continuum_error, value.verdict) == (0.0, 0.0, "exact")
 
 
 def test_no_contact_is_unknown():
-    for value in estimate([Level(64, 0.0, 0.0, 1.0, 0.0)], 1.0, ROUGH).values():
+    for value in estimate([GridValues(64, 0.0, 0.0, 1.0, 0.0)], 1.0, ROUGH).values():
         assert isnan(value.error)
         assert value.verdict == "unknown"
 
@@ -158,9 +158,9 @@ def test_a_single_indenter_on_one_grid_is_unknown():
 @pytest.mark.parametrize("n", [0.5, 1.0, 2.0, 3.0])
 def test_estimates_stay_in_range(n):
     """Single points in contact, and a single gap."""
-    coarse = Level(32, 0.5, 0.1, 1e-3, 4.0)
+    coarse = GridValues(32, 0.5, 0.1, 1e-3, 4.0)
     for a_r, perimeter in ((1 / 64**2, 4 / 64), (1 - 1 / 64**2, 4 / 64)):
-        fine = Level(64, a_r, 0.1, 1e-3, perimeter)
+        fine = GridValues(64, a_r, 0.1, 1e-3, perimeter)
         for levels, rough in (([fine], None), ([coarse, fine], None), ([coarse, fine], ROUGH)):
             if rough is not None and n > 2.5:
                 continue
@@ -218,7 +218,7 @@ def test_few_contact_patches_on_one_grid_are_unknown():
     """Nine circles of the same size against eleven: area pi r^2, perimeter 8 r each."""
     for patches, verdict in ((9, "unknown"), (11, "regular")):
         r = 0.05
-        level = Level(256, patches * np.pi * r**2, 0.5, 0.3, patches * 8 * r)
+        level = GridValues(256, patches * np.pi * r**2, 0.5, 0.3, patches * 8 * r)
         assert level.patches == pytest.approx(patches)
         for value in estimate([level], 1.0, ROUGH).values():
             assert value.verdict == verdict
@@ -236,13 +236,13 @@ def test_an_exponent_that_changes_widens_the_area():
 
 
 def measured(surface, elastomer, pressure, points):
-    """Level of a contact at a pressure in Pa, in the units Pa and m."""
+    """Values of a contact at a pressure in Pa, in the units Pa and m."""
     scene = build_scene(surface, elastomer, points)
     contact = scene.contact(pressure / scene.delta_sigma)
     solution = solve_contact(contact, Auto(tolerance=1e-8))
     observables = observe(contact, solution.u, solution.sigma)
     stress, gap = observables.sigma_p * scene.delta_sigma, observables.u_g * scene.h_std
-    return Level(points, observables.a_r, stress, gap, observables.perimeter)
+    return GridValues(points, observables.a_r, stress, gap, observables.perimeter)
 
 
 @pytest.mark.parametrize("pressure", [0.05, 0.3, 1.0, 4.0])

@@ -9,7 +9,7 @@ from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.physics.discretisation_error import estimate
 from gfmd_cli.physics.elastomers import HalfSpace
 from gfmd_cli.physics.error_bounds import error_bounds
-from gfmd_cli.physics.error_estimates import Level
+from gfmd_cli.physics.error_estimates import GridValues
 from gfmd_cli.physics.observables import border_contact, observe
 from gfmd_cli.solvers.auto import Auto
 from gfmd_cli.solvers.nested_grids import solve_contact
@@ -131,7 +131,7 @@ def test_the_stress_of_a_punch_is_within_the_bar(rows_of, tmp_path, n):
 @pytest.mark.parametrize(("n", "verdict"), [(0.5, "regular"), (0.9, "slow"), (1, "diverges")])
 def test_contact_at_the_border_has_a_singular_stress(n, verdict):
     fine, coarse = (
-        Level(points, 0.3, 1.0 - 1 / points, 0.5 + 1 / points, 8.0, border=0.1)
+        GridValues(points, 0.3, 1.0 - 1 / points, 0.5 + 1 / points, 8.0, border=0.1)
         for points in (128, 64)
     )
     estimates = estimate([fine, coarse], n)
@@ -140,7 +140,7 @@ def test_contact_at_the_border_has_a_singular_stress(n, verdict):
 
 
 def test_contact_away_from_the_border_has_bars_from_two_grids_only():
-    levels = [Level(points, 0.3, 1.0, 0.5, 8.0, border=0.0) for points in (64, 128)]
+    levels = [GridValues(points, 0.3, 1.0, 0.5, 8.0, border=0.0) for points in (64, 128)]
     for name, value in estimate(levels, 1.5).items():
         assert value.verdict == "regular", name
         assert 0 < value.error < 0.3

@@ -19,7 +19,7 @@ from gfmd_cli.physics.elastomers import LinearElastomer
 from gfmd_cli.physics.error_estimates import (
     UNKNOWN,
     Estimate,
-    Level,
+    GridValues,
     estimate_by_change,
     estimate_free,
     unknown,
@@ -125,7 +125,7 @@ def exponent_spread(elastomer: LinearElastomer, points: float, length: float) ->
 
 
 def estimate(
-    levels: Sequence[Level],
+    levels: Sequence[GridValues],
     exponent: float,
     rough: RoughnessScales | None = None,
     spread: float = 0.0,
@@ -177,7 +177,9 @@ def _bar(name: str, typical: float, change: float) -> float:
     return TWO_GRIDS[name] * hypot(change, FLOOR[name] * typical)
 
 
-def _area(fine: Level, coarse: Level | None, n: float, phase: float, spread: float) -> Estimate:
+def _area(
+    fine: GridValues, coarse: GridValues | None, n: float, phase: float, spread: float
+) -> Estimate:
     """Relative contact area: the error is of first order in the spacing, as AREA_EXCESS n x.
 
     Where the exponent n is not that of all short waves, the excess is uncertain by its change.
@@ -197,7 +199,7 @@ def _area(fine: Level, coarse: Level | None, n: float, phase: float, spread: flo
     return Estimate(whole, best, error, "regular")
 
 
-def _plate_area(fine: Level, coarse: Level | None, *, rough: bool) -> Estimate:
+def _plate_area(fine: GridValues, coarse: GridValues | None, *, rough: bool) -> Estimate:
     """Relative contact area of a plate: on a grid the line force at its edge is a row of points."""
     if not rough:
         return Estimate(min(fine.a_r, fine.line), nan, nan, "bound")
@@ -211,7 +213,7 @@ def _plate_area(fine: Level, coarse: Level | None, *, rough: bool) -> Estimate:
     return Estimate(whole, best, error, "regular")
 
 
-def _stress(fine: Level, coarse: Level | None, n: float, phase: float) -> Estimate:
+def _stress(fine: GridValues, coarse: GridValues | None, n: float, phase: float) -> Estimate:
     """Stress deviation: at the edge of a patch the stress is as (1 - r^2/a^2)^(1 - n/2)."""
     value = fine.sigma_p
     if n > MAX_STRESS_EXPONENT:
@@ -232,7 +234,9 @@ def _stress(fine: Level, coarse: Level | None, n: float, phase: float) -> Estima
     return Estimate(error, max(0.0, value + rest), EXTRAPOLATED * error, "regular")
 
 
-def _gap(fine: Level, coarse: Level | None, n: float, phase: float, bend: float) -> Estimate:
+def _gap(
+    fine: GridValues, coarse: GridValues | None, n: float, phase: float, bend: float
+) -> Estimate:
     """Mean gap: the error is small and of either sign, so the value is not extrapolated."""
     value = fine.u_g
     patch = fine.line / fine.a_r

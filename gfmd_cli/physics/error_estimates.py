@@ -34,7 +34,7 @@ MAX_BORDER_EXPONENT = 0.75  # n up to which those of contact at the border were 
 
 
 @dataclass(frozen=True)
-class Level:
+class GridValues:
     """Observables of one contact on one of several nested grids."""
 
     points: float
@@ -87,7 +87,9 @@ def unknown() -> dict[str, Estimate]:
     return dict.fromkeys(QUANTITIES, UNKNOWN)
 
 
-def estimate_by_change(fine: Level, coarse: Level | None, n: float) -> dict[str, Estimate]:
+def estimate_by_change(
+    fine: GridValues, coarse: GridValues | None, n: float
+) -> dict[str, Estimate]:
     """Estimates from two nested grids; unknown from one grid or beyond `MAX_EXPONENT`."""
     estimates = unknown()
     if n >= DIVERGENT:
@@ -102,7 +104,7 @@ def estimate_by_change(fine: Level, coarse: Level | None, n: float) -> dict[str,
     return estimates | {name: by_change[name] for name in QUANTITIES if n <= MAX_EXPONENT[name]}
 
 
-def estimate_free(fine: Level, coarse: Level | None, n: float) -> dict[str, Estimate]:
+def estimate_free(fine: GridValues, coarse: GridValues | None, n: float) -> dict[str, Estimate]:
     """Estimates with a free boundary; unknown from one grid, except full contact."""
     estimates = unknown()
     if fine.a_r == 0 or fine.border is None:
@@ -121,7 +123,7 @@ def estimate_free(fine: Level, coarse: Level | None, n: float) -> dict[str, Esti
     return estimates
 
 
-def _border_stress(fine: Level, coarse: Level | None, n: float) -> Estimate:
+def _border_stress(fine: GridValues, coarse: GridValues | None, n: float) -> Estimate:
     """Standard deviation of a pressure that is singular at the border of the map."""
     if n > MAX_BORDER_EXPONENT:
         return replace(UNKNOWN, verdict="diverges" if n >= 1 else "slow")
@@ -130,7 +132,7 @@ def _border_stress(fine: Level, coarse: Level | None, n: float) -> Estimate:
     return _on_grid("sigma_p", fine, coarse, BORDER_FACTOR / (2 ** (1 - n) - 1))
 
 
-def _area(fine: Level, coarse: Level, continuum_factor: float) -> Estimate:
+def _area(fine: GridValues, coarse: GridValues, continuum_factor: float) -> Estimate:
     """Relative contact area: of first order in the spacing, as contact lines are a point wide."""
     change = fine.a_r - coarse.a_r
     scale = hypot(change, FLOOR["a_r"] * fine.line)
@@ -140,7 +142,7 @@ def _area(fine: Level, coarse: Level, continuum_factor: float) -> Estimate:
     return Estimate(error, best, min(continuum_factor * scale, part), "regular")
 
 
-def _on_grid(name: str, fine: Level, coarse: Level, factor: float) -> Estimate:
+def _on_grid(name: str, fine: GridValues, coarse: GridValues, factor: float) -> Estimate:
     """sigma_p or u_g: the value on the grid is the best estimate."""
     value: float = getattr(fine, name)
     change = value - getattr(coarse, name)

@@ -70,7 +70,8 @@ def kinds_of(table: str) -> dict[str, type[Choice]]:
 
 Places = tuple[int | None, ...]
 """Where an entry stands in each group of paired lists; None where it has no list of the group."""
-Entry = tuple[Choice, Places]
+PlacedChoice = tuple[Choice, Places]
+"""An entry and where it stands."""
 
 
 class Check:
@@ -142,9 +143,11 @@ class Check:
         self.refuse()
         return Spec(**tables)
 
-    def entries(self, name: str, given: Any, paired: Sequence[list[str]] = ()) -> list[Entry]:
+    def entries(
+        self, name: str, given: Any, paired: Sequence[list[str]] = ()
+    ) -> list[PlacedChoice]:
         """The choices of one table, different ones, with their places in the paired lists."""
-        entries: list[Entry] = []
+        entries: list[PlacedChoice] = []
         for table in _alternatives(given) if name in REPEATED else [given]:
             if isinstance(table, dict):
                 entries += self._build(name, table, paired)
@@ -152,14 +155,16 @@ class Check:
                 self.add(name, f"must be a table, got {shortened(repr(table))}")
         return list(dict.fromkeys(entries)) if name in SWEPT else entries
 
-    def _build(self, name: str, table: dict[str, Any], paired: Sequence[list[str]]) -> list[Entry]:
+    def _build(
+        self, name: str, table: dict[str, Any], paired: Sequence[list[str]]
+    ) -> list[PlacedChoice]:
         """The choices of one table, every combination of its lists."""
         axes = _axes(table, paired) if name in SWEPT else []
         count = prod(len(table[keys[0]]) for keys in axes)
         if not 0 < count <= MAX_SWEEP:
             self.add(name, f"its lists have {count} combinations; 1 to {MAX_SWEEP} are allowed")
             return []
-        built: list[Entry] = []
+        built: list[PlacedChoice] = []
         for indices in product(*(range(len(table[keys[0]])) for keys in axes)):
             places = {key: i for keys, i in zip(axes, indices, strict=True) for key in keys}
             values = table | {key: table[key][i] for key, i in places.items()}

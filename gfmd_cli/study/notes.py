@@ -3,12 +3,13 @@
 from dataclasses import dataclass, field
 from typing import Annotated
 
-from pydantic import ConfigDict, with_config
+from pydantic import ConfigDict, Strict, with_config
 from pydantic import Field as Key
 
 from gfmd_cli.spec.models import MAX_POINTS
 
-_Points = Annotated[int, Key(ge=1, le=MAX_POINTS)]
+PointCount = Annotated[int, Strict(), Key(ge=1, le=MAX_POINTS)]
+"""Number of points along an axis."""
 _Finite = Annotated[float, Key(allow_inf_nan=False)]
 
 
@@ -16,7 +17,7 @@ _Finite = Annotated[float, Key(allow_inf_nan=False)]
 class GridResult:
     """Results on one grid, in units that all grids share."""
 
-    points: _Points
+    points: PointCount
     a_r: float
     sigma_p: float
     """[Pa]."""
@@ -33,7 +34,7 @@ class GridResult:
 class Trial:
     """One solve of a load search."""
 
-    points: _Points
+    points: PointCount
     pressure: Annotated[_Finite, Key(gt=0)]
     """[Pa]."""
     value: Annotated[_Finite, Key(ge=0)]

@@ -18,8 +18,7 @@ from gfmd_cli.files.checksums import check_seal
 from gfmd_cli.files.regular import open_regular
 from gfmd_cli.grid import arrays
 from gfmd_cli.solvers.loop import State
-from gfmd_cli.spec.models import MAX_POINTS
-from gfmd_cli.study.notes import Notes
+from gfmd_cli.study.notes import Notes, PointCount
 
 LAYOUT = 5
 """Raised whenever a state of the old layout must not be resumed."""
@@ -29,8 +28,7 @@ MAX_PARTS = 65536
 PRECISIONS = {arrays.Field: "<f8", arrays.SingleField: "<f4"}
 """Types of the values of an array, by its annotation in the class of a state."""
 Whole = Annotated[int, Field(ge=0, lt=2**53)]
-Points = Annotated[int, Strict(), Field(ge=1, le=MAX_POINTS)]
-Positive = Annotated[int, Field(ge=1, lt=2**53)]
+Count = Annotated[int, Field(ge=1, lt=2**53)]
 Name = Annotated[str, Field(pattern=r"^[A-Za-z_]\w{0,60}$")]
 
 
@@ -43,9 +41,9 @@ class Part(_Checked):
 
     file: Annotated[str, Field(pattern=r"^[ab][0-9]{0,6}$")]
     first: Whole
-    rows: Positive
+    rows: Count
     crc: Annotated[int, Field(ge=0, lt=2**32)]
-    bytes: Positive
+    bytes: Count
 
 
 class Scalars(_Checked):
@@ -63,7 +61,7 @@ class Slot(_Checked):
 
     name: Literal["a", "b"]
     parts: Annotated[list[Part], Field(min_length=1, max_length=MAX_PARTS)]
-    shape: Annotated[tuple[Points, ...], Strict(False), Field(min_length=1, max_length=2)]
+    shape: Annotated[tuple[PointCount, ...], Strict(False), Field(min_length=1, max_length=2)]
     """Points along y and x of the whole grid."""
     fields: Annotated[dict[Name, str], Field(min_length=1, max_length=64)]
     state: Scalars

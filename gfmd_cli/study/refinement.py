@@ -17,7 +17,7 @@ from gfmd_cli.physics.discretisation_error import (
     roughness_scales,
 )
 from gfmd_cli.physics.error_bounds import ErrorBounds, error_bounds
-from gfmd_cli.physics.error_estimates import Estimate, Level, unknown
+from gfmd_cli.physics.error_estimates import Estimate, GridValues, unknown
 from gfmd_cli.physics.free_contact import SCENES
 from gfmd_cli.physics.observables import Observables, border_contact, contact_points, observe
 from gfmd_cli.physics.power_spectra import anisotropy
@@ -214,10 +214,6 @@ def _interpolate(solved: Solved, scene: Scene) -> Field:
 
 def _grid_result(solved: Solved) -> GridResult:
     measured, scene, contact = solved.observables, solved.scene, solved.contact
-    border = None
-    if contact.boundary == "free":
-        u, sigma = solved.solution.u, solved.solution.sigma
-        border = border_contact(scene.grid, contact_points(contact.obstacle, u, sigma))
     return GridResult(
         points=scene.grid.points,
         a_r=measured.a_r,
@@ -225,8 +221,16 @@ def _grid_result(solved: Solved) -> GridResult:
         u_g=measured.u_g * scene.h_std,
         perimeter=measured.perimeter,
         work=solved.solution.transforms * scene.grid.size,
-        border=border,
+        border=border_share(contact, solved.solution),
     )
+
+
+def border_share(contact: Contact, solution: Solution) -> float | None:
+    """Share of the border of the map in contact; None with a periodic boundary."""
+    if contact.boundary == "periodic":
+        return None
+    touching = contact_points(contact.obstacle, solution.u, solution.sigma)
+    return border_contact(contact.grid, touching)
 
 
 def _estimates(task: Task, solved: Solved, grids: list[GridResult]) -> dict[str, Estimate]:
@@ -236,7 +240,7 @@ def _estimates(task: Task, solved: Solved, grids: list[GridResult]) -> dict[str,
         return unknown()
     resolution, length = scene.grid.resolution, scene.grid.length
     levels = [
-        Level(
+        GridValues(
             grid.points * (resolution / scene.grid.points),
             grid.a_r,
             grid.sigma_p / scene.delta_sigma,
@@ -249,17 +253,17 @@ def _estimates(task: Task, solved: Solved, grids: list[GridResult]) -> dict[str,
     ]
     exponent = local_exponent(task.elastomer, resolution, length)
     spread = exponent_spread(task.elastomer, resolution, length)
-    return estimate(levels, exponent, _scales(task, scene), spread)
+    has_scales = task.surface.rough and task.boundary == "periodic"
+    rough = scales_of(scene, task.surface.band_limited) if has_scales else None
+    return estimate(levels, exponent, rough, spread)
 
 
-def _scales(task: Task, scene: Scene) -> RoughnessScales | None:
-    """The scales of a rough surface; None for a single indenter, and with a free boundary."""
-    if not task.surface.rough or task.boundary == "free":
-        return None
+def scales_of(scene: Scene, band_limited: bool) -> RoughnessScales:
+    """The scales of a rough surface, as `estimate` needs them."""
     return roughness_scales(
         scene.shells,
         scene.grid.length,
         anisotropy(scene.grid, scene.height),
-        band_limited=task.surface.band_limited,
+        band_limited=band_limited,
         aspect=max(scene.grid.spacings) / min(scene.grid.spacings),
     )
