@@ -4,13 +4,13 @@ from math import inf, nan
 
 import pytest
 
-from gfmd_cli.analysis.table import Column, Group, Table, plain, plus_minus, ratio
+from gfmd_cli.analysis.table import Group, Table, TableColumn, plain, plus_minus, ratio
 
 COLUMNS = (
-    Column("p*", "p_star", ".4g"),
-    Column("gap", "gap", unit="m", error="gap_error", otherwise="verdict"),
-    Column("ratio\nto theory", ratio("gap", "theory"), ".2f"),
-    Column("percolates", "percolates", optional=True),
+    TableColumn("p*", "p_star", ".4g"),
+    TableColumn("gap", "gap", unit="m", error="gap_error", otherwise="verdict"),
+    TableColumn("ratio\nto theory", ratio("gap", "theory"), ".2f"),
+    TableColumn("percolates", "percolates", optional=True),
 )
 
 

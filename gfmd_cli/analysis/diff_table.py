@@ -7,7 +7,7 @@ from typing import Any
 from gfmd_cli.analysis.compare import Row
 from gfmd_cli.analysis.diff import Difference, Pair
 from gfmd_cli.analysis.selection import grouped
-from gfmd_cli.analysis.table import BLANK, Column, Record, Table, groups_of, known, plain
+from gfmd_cli.analysis.table import BLANK, Record, Table, TableColumn, groups_of, known, plain
 from gfmd_cli.analysis.units import contact_title
 from gfmd_cli.physics.observables import QUANTITIES
 from gfmd_cli.spec.models import load_text
@@ -33,9 +33,9 @@ def _deviation(record: Record, name: str) -> str:
 
 
 DIFFERENCES = (
-    Column("load", _load),
-    Column("points", lambda record: f"{record['points_a']} -> {record['points_b']}"),
-    *(Column(name, partial(_deviation, name=name)) for name in QUANTITIES),
+    TableColumn("load", _load),
+    TableColumn("points", lambda record: f"{record['points_a']} -> {record['points_b']}"),
+    *(TableColumn(name, partial(_deviation, name=name)) for name in QUANTITIES),
 )
 
 

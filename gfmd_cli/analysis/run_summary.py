@@ -5,7 +5,7 @@ from typing import Any
 
 from gfmd_cli.analysis.compare import with_best
 from gfmd_cli.analysis.selection import grouped
-from gfmd_cli.analysis.table import Column, Record, Table, groups_of
+from gfmd_cli.analysis.table import Record, Table, TableColumn, groups_of
 from gfmd_cli.analysis.tables import P_STAR, PRESSURE, RESIDUAL, STATUS, warnings_in
 from gfmd_cli.analysis.units import contact_title, grid_size, shown
 from gfmd_cli.physics.observables import QUANTITIES
@@ -19,8 +19,8 @@ MAX_SCENES = 6  # of other specs that a run names
 RUN = (
     P_STAR,
     PRESSURE,
-    *(Column(name, f"{name}_best", ".5g", error=f"{name}_best_error") for name in QUANTITIES),
-    Column("gap", "mean_gap", ".3g", "m"),
+    *(TableColumn(name, f"{name}_best", ".5g", error=f"{name}_best_error") for name in QUANTITIES),
+    TableColumn("gap", "mean_gap", ".3g", "m"),
     RESIDUAL,
     STATUS,
 )

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from gfmd_cli.analysis.table import Column, Group, Table, plain
+from gfmd_cli.analysis.table import Group, Table, TableColumn, plain
 from gfmd_cli.errors import InputError
 from gfmd_cli.physics.contact import Scene, build_scene
 from gfmd_cli.physics.elastomers import HalfSpace
@@ -104,14 +104,16 @@ def summarise(surface: RigidSurface) -> SurfaceSummary:
 UNITS = dict.fromkeys(("Sq", "Sa", "Sz", "Sal", "Pq", "Pa", "Pt", "Pal"), "m")
 FORMATS = dict.fromkeys(("Ssk", "Sku", "Psk", "Pku"), ".3f")
 COLUMNS = (
-    Column("surface", "surface"),
+    TableColumn("surface", "surface"),
     *(
-        Column(name, name, FORMATS.get(name, Column.format), UNITS.get(name, ""), optional=True)
+        TableColumn(
+            name, name, FORMATS.get(name, TableColumn.format), UNITS.get(name, ""), optional=True
+        )
         for name in (*MAP_NAMES, *PROFILE_NAMES)
     ),
-    Column("H", "hurst", ".2f", optional=True),
-    Column("lambda_r", "rolloff_wavelength", ".3g", unit="m", optional=True),
-    Column("lambda_s", "cutoff_wavelength", ".3g", unit="m", optional=True),
+    TableColumn("H", "hurst", ".2f", optional=True),
+    TableColumn("lambda_r", "rolloff_wavelength", ".3g", unit="m", optional=True),
+    TableColumn("lambda_s", "cutoff_wavelength", ".3g", unit="m", optional=True),
 )
 
 

@@ -20,7 +20,7 @@ WIDTH = 98  # characters of a line of the caption
 
 
 @dataclass(frozen=True)
-class Column:
+class TableColumn:
     """One column of a table."""
 
     heading: str
@@ -82,7 +82,7 @@ class Table:
     """Groups of records with the same columns."""
 
     caption: str
-    declared: Sequence[Column]
+    declared: Sequence[TableColumn]
     groups: Sequence[Group]
 
     @property
@@ -91,7 +91,7 @@ class Table:
         return [record for group in self.groups for record in group.records]
 
     @property
-    def columns(self) -> list[Column]:
+    def columns(self) -> list[TableColumn]:
         """The columns without the optional ones that are blank."""
         return [
             column

@@ -9,7 +9,16 @@ from gfmd_cli.analysis.compare import VARIANTS, Comparison, Curve, in_continuum,
 from gfmd_cli.analysis.distribution import StressDistribution, distributions
 from gfmd_cli.analysis.edge_law import fit
 from gfmd_cli.analysis.ensemble import ensembles
-from gfmd_cli.analysis.table import Column, Group, Record, Table, groups_of, known, product, ratio
+from gfmd_cli.analysis.table import (
+    Group,
+    Record,
+    Table,
+    TableColumn,
+    groups_of,
+    known,
+    product,
+    ratio,
+)
 from gfmd_cli.analysis.units import contact_title, grid_size, in_si, shown
 from gfmd_cli.physics.observables import QUANTITIES
 from gfmd_cli.study.observables import OBSERVABLES, Observable
@@ -17,32 +26,35 @@ from gfmd_cli.study.plausibility import SEPARATOR
 
 TitledCurves = list[tuple[str, Curve]]
 """Curves with the titles that tables give them."""
-P_STAR = Column("p*", "p_star", ".4g")
-PRESSURE = Column("p", "pressure", ".4g", "Pa")
-AREA = Column("a_r", "a_r")
-POINTS = Column("points", "points", "d")
-STATUS = Column("status", "status")
+P_STAR = TableColumn("p*", "p_star", ".4g")
+PRESSURE = TableColumn("p", "pressure", ".4g", "Pa")
+AREA = TableColumn("a_r", "a_r")
+POINTS = TableColumn("points", "points", "d")
+STATUS = TableColumn("status", "status")
 SCALES = (("Delta_sigma", "delta_sigma", "Pa"), ("h_std", "h_std", "m"), ("L", "length", "m"))
 """Symbol, column and SI unit of the scales of a contact."""
-RESIDUAL = Column("residual", "residual", ".1e")
-BEST = {name: Column(quantity.heading, f"{name}_best", error=f"{name}_best_error")
+RESIDUAL = TableColumn("residual", "residual", ".1e")
+BEST = {name: TableColumn(quantity.heading, f"{name}_best", error=f"{name}_best_error")
         for name, quantity in QUANTITIES.items()}  # fmt: skip
 """Continuum values where they are known, else values on the grid."""
 
 
 def _beside_theory(
-    value: Column, predicted: str, heading: str = "Persson", *, unit: str = "", si: str = ""
-) -> list[Column]:
+    value: TableColumn, predicted: str, heading: str = "Persson", *, unit: str = "", si: str = ""
+) -> list[TableColumn]:
     """A quantity, its prediction and their ratio; `unit`: a column that gives both in SI units."""
-    columns = [value, Column(heading, predicted, optional=True)]
+    columns = [value, TableColumn(heading, predicted, optional=True)]
     if unit:
         name = predicted.removesuffix("_persson")
         physical = [
-            Column(name, product(f"{name}_best", unit), unit=si),
-            Column(heading, product(predicted, unit), unit=si, optional=True),
+            TableColumn(name, product(f"{name}_best", unit), unit=si),
+            TableColumn(heading, product(predicted, unit), unit=si, optional=True),
         ]
         columns = [value, physical[0], columns[1], physical[1]]
-    return [*columns, Column("ratio", ratio(str(value.value), predicted), ".3f", optional=True)]
+    return [
+        *columns,
+        TableColumn("ratio", ratio(str(value.value), predicted), ".3f", optional=True),
+    ]
 
 
 def _continuum(record: Record, name: str) -> float | None:
@@ -51,8 +63,8 @@ def _continuum(record: Record, name: str) -> float | None:
 
 COMPARISON = (
     P_STAR,
-    *(c for name in QUANTITIES for c in _beside_theory(Column(name, name), f"{name}_persson")),
-    Column("p ratio", ratio("p_star_persson_at_u_g", "p_star"), ".3f", optional=True),
+    *(c for name in QUANTITIES for c in _beside_theory(TableColumn(name, name), f"{name}_persson")),
+    TableColumn("p ratio", ratio("p_star_persson_at_u_g", "p_star"), ".3f", optional=True),
     STATUS,
 )
 EINSTEIN = (
@@ -60,14 +72,14 @@ EINSTEIN = (
     *(
         column
         for name in QUANTITIES
-        for column in _beside_theory(Column(name, name), f"{name}_einstein", "closed form")
+        for column in _beside_theory(TableColumn(name, name), f"{name}_einstein", "closed form")
     ),
 )
 CONTINUUM = (
     P_STAR,
     POINTS,
     *(
-        Column(
+        TableColumn(
             quantity.heading,
             partial(_continuum, name=name),
             error=f"{name}_continuum_error",
@@ -79,7 +91,7 @@ CONTINUUM = (
 SEEDS = (
     P_STAR,
     *(
-        Column(quantity.heading, f"{name}_mean", error=f"{name}_confidence")
+        TableColumn(quantity.heading, f"{name}_mean", error=f"{name}_confidence")
         for name, quantity in QUANTITIES.items()
     ),
 )
@@ -95,30 +107,30 @@ CONTACT_AREA, STRESS_DEVIATION, MEAN_GAP = (
 TRUE_CONTACT = (
     P_STAR,
     AREA,
-    Column("whole surface\na_r", "a_r_persson"),
-    Column("\nratio", ratio("a_r", "a_r_persson"), ".3f"),
+    TableColumn("whole surface\na_r", "a_r_persson"),
+    TableColumn("\nratio", ratio("a_r", "a_r_persson"), ".3f"),
     *(
         column
         for name, area in VARIANTS.items()
         for column in (
-            Column(f"{name}\n/ Delta_sigma", name),
-            Column("\na_r", area),
-            Column("\nratio", ratio("a_r", area), ".3f"),
+            TableColumn(f"{name}\n/ Delta_sigma", name),
+            TableColumn("\na_r", area),
+            TableColumn("\nratio", ratio("a_r", area), ".3f"),
         )
     ),
 )
 POWER_LAWS = (
-    Column("p*", "p_star", ".4g"),
-    Column("a_r", "a_r"),
-    Column("grids", "grids"),
-    Column("seeds", "seeds", "d"),
-    Column("stress", "law"),
-    Column("sigma / Delta_sigma\nfrom", "lowest", ".3g"),
-    Column("\nto", "highest", ".3g"),
-    Column("exponent", "exponent", error="error"),
-    Column("at the edge", "limit", error="limit_error"),
-    Column("theory", "theory", ".3g"),
-    Column("prefactor", "prefactor", ".3g"),
+    TableColumn("p*", "p_star", ".4g"),
+    TableColumn("a_r", "a_r"),
+    TableColumn("grids", "grids"),
+    TableColumn("seeds", "seeds", "d"),
+    TableColumn("stress", "law"),
+    TableColumn("sigma / Delta_sigma\nfrom", "lowest", ".3g"),
+    TableColumn("\nto", "highest", ".3g"),
+    TableColumn("exponent", "exponent", error="error"),
+    TableColumn("at the edge", "limit", error="limit_error"),
+    TableColumn("theory", "theory", ".3g"),
+    TableColumn("prefactor", "prefactor", ".3g"),
 )
 POWER_LAWS_CAPTION = (
     "Power laws of Pr(sigma) in the continuum. exponent: fit between the two stresses; at the "
@@ -127,17 +139,17 @@ POWER_LAWS_CAPTION = (
 )
 
 
-def _columns_of(observable: Observable) -> list[Column]:
+def _columns_of(observable: Observable) -> list[TableColumn]:
     """An observable in reduced and in SI units; the columns that no task has are left out."""
     heading, name, unit = observable.heading, observable.column.name, observable.unit
     if observable.is_flag:
-        return [Column(heading, _flag(name), optional=True)]
-    number_format = "d" if observable.column.kind is int else Column.format
+        return [TableColumn(heading, _flag(name), optional=True)]
+    number_format = "d" if observable.column.kind is int else TableColumn.format
     if unit is None:
-        return [Column(heading, name, number_format, optional=True)]
+        return [TableColumn(heading, name, number_format, optional=True)]
     return [
-        Column(f"{heading}\n/ {unit.symbol}", name, number_format, optional=True),
-        Column(f"{heading}\n", lambda r: r[name] * unit.value(r), unit=unit.si, optional=True),
+        TableColumn(f"{heading}\n/ {unit.symbol}", name, number_format, optional=True),
+        TableColumn(f"{heading}\n", lambda r: r[name] * unit.value(r), unit=unit.si, optional=True),
     ]
 
 
@@ -186,7 +198,7 @@ def comparison_table(curves: TitledCurves) -> Table:
 
 
 def over_pressure(
-    columns: Sequence[Column], caption: str, curves: TitledCurves, keys: Collection[str] = ()
+    columns: Sequence[TableColumn], caption: str, curves: TitledCurves, keys: Collection[str] = ()
 ) -> Table:
     """Columns of the records of the curves; with `keys`, of those that have a value of one."""
     groups = [

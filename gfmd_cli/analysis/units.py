@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from gfmd_cli.analysis.table import Column, Record
+from gfmd_cli.analysis.table import Record, TableColumn
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.study.plausibility import METRES
 from gfmd_cli.units import scaled
@@ -29,7 +29,7 @@ def in_si(row: Mapping[str, Any]) -> bool:
     return bool(row["load"] == "pressure" or row["h_std"] <= METRES)
 
 
-def shown(columns: Sequence[Column], rows: Iterable[Record]) -> list[Column]:
+def shown(columns: Sequence[TableColumn], rows: Iterable[Record]) -> list[TableColumn]:
     """The columns without those in SI units where these mean nothing in any row."""
     physical = any(map(in_si, rows))
     return [column for column in columns if physical or not column.unit]

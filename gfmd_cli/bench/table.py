@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from gfmd_cli.analysis.table import Column, Group, Record, Table
+from gfmd_cli.analysis.table import Group, Record, Table, TableColumn
 from gfmd_cli.analysis.tables import P_STAR, POINTS, RESIDUAL, STATUS
 from gfmd_cli.bench.file import Trace
 from gfmd_cli.physics.observables import QUANTITIES
@@ -11,21 +11,23 @@ LEVELS = (1e-2, 1e-4, 1e-6)
 """Relative errors of the mean gap."""
 
 
-def _costs(cost: str, number_format: str) -> list[Column]:
+def _costs(cost: str, number_format: str) -> list[TableColumn]:
     return [
-        Column(f"{cost}\nto {level:.0e}".replace("e-0", "e-"), f"{cost}_{level}", number_format)
+        TableColumn(
+            f"{cost}\nto {level:.0e}".replace("e-0", "e-"), f"{cost}_{level}", number_format
+        )
         for level in LEVELS
     ]
 
 
 BENCH = (
-    Column("elastomer", "elastomer"),
+    TableColumn("elastomer", "elastomer"),
     POINTS,
     P_STAR,
-    Column("solver", "name"),
+    TableColumn("solver", "name"),
     *_costs("transforms", ".0f"),
     *_costs("seconds", ".3g"),
-    *(Column(f"error of\n{name}", f"{name}_error", ".1e") for name in QUANTITIES),
+    *(TableColumn(f"error of\n{name}", f"{name}_error", ".1e") for name in QUANTITIES),
     RESIDUAL,
     STATUS,
 )
@@ -40,7 +42,7 @@ def bench_table(traces: list[Trace]) -> Table:
     surfaces = list(dict.fromkeys(trace.row["surface"] for trace in traces))
     title, columns = surfaces[0], BENCH
     if len(surfaces) > 1:
-        title, columns = "", (*BENCH, Column("surface", "surface"))
+        title, columns = "", (*BENCH, TableColumn("surface", "surface"))
     worst = max(trace.row["reference_residual"] for trace in traces)
     caption = (
         "Cost until the error of the mean gap stays below a level: Fourier transforms, in units of "

@@ -12,7 +12,7 @@ from gfmd_cli.analysis.curve_styles import without_escapes
 from gfmd_cli.analysis.figures import items_of, study_figures
 from gfmd_cli.analysis.plotting import ColumnFigure
 from gfmd_cli.analysis.series import Item
-from gfmd_cli.analysis.table import Column
+from gfmd_cli.analysis.table import TableColumn
 from gfmd_cli.analysis.tables import TitledCurves, curve_title
 from gfmd_cli.analysis.units import in_si, shown
 from gfmd_cli.bench.file import Trace
@@ -84,7 +84,7 @@ class ReportData:
         """Whether metres and pascals mean something in some contact."""
         return any(map(in_si, self.solved))
 
-    def shown(self, columns: Sequence[Column]) -> list[Column]:
+    def shown(self, columns: Sequence[TableColumn]) -> list[TableColumn]:
         """The columns whose units mean something in this study."""
         return shown(columns, self.solved)
 

@@ -4,7 +4,7 @@ import json
 
 from gfmd_cli.analysis.diff import diff
 from gfmd_cli.analysis.diff_table import NOTHING, diff_lists, diff_table
-from gfmd_cli.analysis.table import Column, Group, Record, Table
+from gfmd_cli.analysis.table import Group, Record, Table, TableColumn
 from gfmd_cli.analysis.tables import P_STAR, RESIDUAL, STATUS
 from gfmd_cli.analysis.units import count
 from gfmd_cli.report.data import ReportData
@@ -47,15 +47,15 @@ UNCONVERGED_CAPTION = (
     "them as crosses."
 )
 UNCONVERGED = (
-    Column("task", "task", "d"),
-    Column("elastomer", "elastomer"),
-    Column("surface", "surface"),
+    TableColumn("task", "task", "d"),
+    TableColumn("elastomer", "elastomer"),
+    TableColumn("surface", "surface"),
     P_STAR,
     STATUS,
     RESIDUAL,
-    Column("tolerance", "tolerance", ".1e"),
-    Column("steps", "steps", "d"),
-    Column("reason", _reason),
+    TableColumn("tolerance", "tolerance", ".1e"),
+    TableColumn("steps", "steps", "d"),
+    TableColumn("reason", _reason),
 )
 
 

@@ -5,7 +5,7 @@ against error; error bars and optional observables, which are tables alone.
 """
 
 from gfmd_cli.analysis.distribution_figure import Density, densities
-from gfmd_cli.analysis.table import Column, Group, Table, product, ratio
+from gfmd_cli.analysis.table import Group, Table, TableColumn, product, ratio
 from gfmd_cli.analysis.tables import (
     CONTACT_AREA,
     MEAN_GAP,
@@ -60,11 +60,11 @@ BINS_BEHIND = {
     "stress_distribution_pressures": "Table: one elastomer at several pressures",
 }
 BINS = (
-    Column("sigma / Delta_sigma", "sigma"),
-    Column("sigma", product("sigma", "delta_sigma"), unit="Pa"),
-    Column("Pr(sigma) Delta_sigma", "density"),
-    Column("Pr(sigma)", ratio("density", "delta_sigma"), unit="1/Pa"),
-    Column("Persson, Pr(sigma) Delta_sigma", "theory", optional=True),
+    TableColumn("sigma / Delta_sigma", "sigma"),
+    TableColumn("sigma", product("sigma", "delta_sigma"), unit="Pa"),
+    TableColumn("Pr(sigma) Delta_sigma", "density"),
+    TableColumn("Pr(sigma)", ratio("density", "delta_sigma"), unit="1/Pa"),
+    TableColumn("Persson, Pr(sigma) Delta_sigma", "theory", optional=True),
 )
 MAX_SCENES = 6  # of a bench, each with a figure
 BENCH_LABEL = "Relative error of the mean gap over transforms, and over seconds, for each solver"

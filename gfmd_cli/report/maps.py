@@ -8,7 +8,7 @@ import numpy as np
 from gfmd_cli.analysis.compare import Row
 from gfmd_cli.analysis.plotting import WIDTH, ColumnFigure, LegendFigure, shades
 from gfmd_cli.analysis.selection import evenly, grouped
-from gfmd_cli.analysis.table import Column, Group, Table
+from gfmd_cli.analysis.table import Group, Table, TableColumn
 from gfmd_cli.analysis.tables import AREA, P_STAR, POINTS, PRESSURE
 from gfmd_cli.analysis.units import contact_title, pressure_text
 from gfmd_cli.grid.arrays import Field, Mask
@@ -41,8 +41,8 @@ PERCENTILE = 99  # of the stress in contact, and of the gap beside it, that the 
 STORED = ("fields", "cross_sections")
 CAPTION = "The values are in /fields/TASK and /cross_sections/TASK of the study file."
 SHOWN = (
-    Column("task", "task", "d"),
-    Column("elastomer", "elastomer"),
+    TableColumn("task", "task", "d"),
+    TableColumn("elastomer", "elastomer"),
     P_STAR,
     PRESSURE,
     AREA,

@@ -9,7 +9,7 @@ from gfmd_cli.analysis.compare import Row
 from gfmd_cli.analysis.curve_styles import MARKERS, MAX_LABEL, CurveStyle, colours, literal
 from gfmd_cli.analysis.plotting import ColumnFigure
 from gfmd_cli.analysis.surface_figure import height_figure
-from gfmd_cli.analysis.table import Column, Group, Table
+from gfmd_cli.analysis.table import Group, Table, TableColumn
 from gfmd_cli.errors import InputError
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.physics.persson import Shells
@@ -133,11 +133,11 @@ CAPTION = (
     "are left out. Lines: the self-affine surface nearest to it."
 )
 FITS = (
-    Column("surface", "surface"),
-    Column("Hurst exponent", "hurst", error="hurst_error"),
-    Column("roll-off", "rolloff", unit="m", error="rolloff_error", otherwise="no_rolloff"),
-    Column("cut-off", "cutoff", unit="m"),
-    Column("scatter", "scatter"),
+    TableColumn("surface", "surface"),
+    TableColumn("Hurst exponent", "hurst", error="hurst_error"),
+    TableColumn("roll-off", "rolloff", unit="m", error="rolloff_error", otherwise="no_rolloff"),
+    TableColumn("cut-off", "cutoff", unit="m"),
+    TableColumn("scatter", "scatter"),
 )
 FIT = (
     "C ~ [1 + (q/q_r)²]^(−1−H) up to q_s, most likely below q_s, with the rms height and gradient "
@@ -213,10 +213,10 @@ def _spectrum_figure(shown: list[Spectrum]) -> ColumnFigure:
 def _bands(shown: list[Spectrum]) -> Table:
     """The bands of wavenumber of each surface."""
     columns = (
-        Column("q", "q", unit="1/m"),
-        Column("wavelength", lambda record: 2 * np.pi / record["q"], unit="m"),
-        Column("C(q)", "density", unit="m³" if shown[0].dimension == 1 else "m⁴"),
-        Column("modes", "modes", ".0f"),
+        TableColumn("q", "q", unit="1/m"),
+        TableColumn("wavelength", lambda record: 2 * np.pi / record["q"], unit="m"),
+        TableColumn("C(q)", "density", unit="m³" if shown[0].dimension == 1 else "m⁴"),
+        TableColumn("modes", "modes", ".0f"),
     )
     groups = [
         Group(
