@@ -258,7 +258,7 @@ def test_a_solve_on_tiles_notices_a_request_to_stop(boundary):
 
     with pytest.raises(KeyboardInterrupt):
         solve(contact, True, 1e-6, stop_at_the_third)
-    assert states[-1][0] == {"periodic": (256, 256), "free": (64, 64)}[boundary]
+    assert states[-1][0] == {"periodic": (256, 256), "free": (128, 128)}[boundary]
 
 
 @pytest.mark.parametrize("boundary", ["periodic", "free"])
