@@ -183,10 +183,10 @@ def test_every_transform_is_counted(solver, monkeypatch):
     pairs = 0
     apply = Grid.apply
 
-    def counted(self, *arguments):
+    def counted(self, *arguments, **named):
         nonlocal pairs
         pairs += 1
-        return apply(self, *arguments)
+        return apply(self, *arguments, **named)
 
     monkeypatch.setattr(Grid, "apply", counted)
     contact = contact_of(1, 0.1)
