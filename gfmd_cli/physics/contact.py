@@ -143,20 +143,22 @@ class Contact:
         sigma. Returns whether any point was laid.
         """
         doubt = DOUBT * residual * min(self.pressure, 1.0)
-
-        def pressed(rows: slice, gap: Field) -> Mask:
-            return sigma[rows] > np.maximum(self.point_stiffness * gap, doubt)
-
         missed = 0
         for rows in row_blocks(u):
             gap = u[rows] - self.obstacle[rows]
-            missed += int(np.count_nonzero((gap > 0) & (gap < doubt) & pressed(rows, gap)))
+            uncertain = (gap > 0) & (gap < doubt)
+            if uncertain.any():
+                missed += int(np.count_nonzero(uncertain & self._pressed(gap, sigma[rows], doubt)))
         if not self.grid.total(missed):
             return False
         for rows in row_blocks(u):
             h = self.obstacle[rows]
-            np.copyto(u[rows], h, where=pressed(rows, u[rows] - h))
+            np.copyto(u[rows], h, where=self._pressed(u[rows] - h, sigma[rows], doubt))
         return True
+
+    def _pressed(self, gap: Field, sigma: Field, doubt: float) -> Mask:
+        """Where the stress is above its error, and stays compressive when one point is laid."""
+        return sigma > np.maximum(self.point_stiffness * gap, doubt)
 
     @cached_property
     def point_stiffness(self) -> float:
