@@ -75,8 +75,8 @@ class FileSurface(RigidSurface):
     """Width of the tapered zone of the window at each edge, as a fraction of the side."""
     interpolation: Interpolation | None = None
     """Interpolation on grids finer than the map: "fourier", exact for band-limited maps, or
-    "monotone", without overshoot. The default depends on the spectrum and the plateaus of the
-    map."""
+    "monotone", without overshoot. The default depends on the spectrum, the plateaus and the steps
+    of the map."""
     scale: Positive = 1.0
     """Factor from the heights of the file to metres; also for its side if it states no unit."""
     length: Positive | None = None
