@@ -249,7 +249,14 @@ def _estimates(task: Task, solved: Solved, grids: list[GridResult]) -> dict[str,
     ]
     exponent = local_exponent(task.elastomer, resolution, length)
     spread = exponent_spread(task.elastomer, resolution, length)
-    return estimate(levels, exponent, _scales(task, scene), spread)
+    return estimate(
+        levels,
+        exponent,
+        _scales(task, scene),
+        spread,
+        band_limited=task.surface.band_limited,
+        stepped=task.surface.stepped,
+    )
 
 
 def _scales(task: Task, scene: Scene) -> RoughnessScales | None:
