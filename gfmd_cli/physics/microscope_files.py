@@ -14,8 +14,9 @@ from gfmd_cli.physics.height_map import (
     check_layout,
     first_line,
 )
-from gfmd_cli.physics.text_tables import table_formats, with_blanks
+from gfmd_cli.physics.text_tables import MATRIX_COLUMNS, columns, table_formats, with_blanks
 
+NO_GRID = "three columns that are not the points (x, y, height) of a full grid"
 TABLES = {"xyz", "asc"}  # formats of SurfaceTopography that are tables of numbers
 SMALL_FILE = 2**14  # bytes, which the readers of tables parse in a second
 EVEN = 1e-3  # deviation of distances, over their mean, up to which they are equal; a choice
@@ -66,7 +67,9 @@ def _open_scan(path: Path, file: BinaryIO, readers: list[Any]) -> Any:
                 continue
             is_likely = answer == "YES" or reader.format() in tables
             if is_likely or path.suffix[1:].lower() in reader.file_extensions():
-                reasons.append(f"{reader.format()}: {first_line(error)}")
+                is_scattered = reader.format() == "xyz" and columns(file) == 3
+                reason = NO_GRID if is_scattered else reader.format()
+                reasons.append(f"{reason}: {first_line(error)}")
     if reasons:
         raise InputError(
             f"{path}: SurfaceTopography recognises the format but cannot read the file "
@@ -97,7 +100,13 @@ def _read_channel(
         scan = scan.to_unit("m")
     source = f"{reader.format()}, {channel.channel_id}"
     if reader.format() == "asc" and len(shape) == 2:
-        _check_all_rows_read(path, file, *shape)
+        rows, columns_read = shape
+        if unsized and columns_read < MATRIX_COLUMNS:
+            raise InputError(
+                f"{path}: {NO_GRID}; a matrix of heights has at least {MATRIX_COLUMNS} columns, or "
+                f"a header that states its sides. {REMEDY}"
+            )
+        _check_all_rows_read(path, file, rows, columns_read)
     if scan.is_uniform:
         heights, sides = scan.heights().T, tuple(map(float, scan.physical_sizes))[::-1]
         if len(shape) == 1 and sides[0] < 0:  # recorded backwards
