@@ -90,7 +90,7 @@ def _read_channel(
     if reader.format() == "npz":
         raise InputError(f"{path}: an archive of NumPy arrays; save the map as a .npy file")
     channel = _height_channel(path, reader, dataset)
-    shape = (channel.nb_grid_pts or ())[::-1]
+    shape: tuple[int, ...] = (channel.nb_grid_pts or ())[::-1]
     check_layout(path, shape, np.dtype(float), max_bytes)
     unsized = channel.physical_sizes is None
     scan = channel.topography(physical_sizes=(1.0,) * len(shape) if unsized else None)
