@@ -1,5 +1,6 @@
 """Height maps read from files, and what is refused before it is read."""
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -538,6 +539,32 @@ def test_a_side_without_a_unit_is_in_that_of_the_heights(tmp_path):
     assert plain.sides[1] == pytest.approx(16e-8)
     assert FileSurface(path=tmp_path / "h.xyz", scale=1e-3).sides[1] == pytest.approx(16e-11)
     assert FileSurface(path=tmp_path / "h.xyz", length=2.0).sides == (2.0, 2.0)
+
+
+def test_a_factor_of_the_heights_that_also_multiplies_the_sides_is_a_warning(tmp_path):
+    pytest.importorskip("SurfaceTopography")
+    rows = (f"{x} {y} {(x * y) % 5}" for y in range(16) for x in range(16))
+    (tmp_path / "h.xyz").write_text("# x[um] y[um] z[nm]\n" + "\n".join(rows))
+    scaled = {"path": tmp_path / "h.xyz", "scale": 1e-9}
+    warning = "surface.scale also multiplies the sides.*L = 1.6e-08 m; set surface.length"
+    assert re.search(warning, "\n".join(FileSurface(**scaled).warnings()))
+    for keys in ({"length": 16e-6}, {"scale": 1.0}):
+        warnings = FileSurface(**(scaled | keys)).warnings()
+        assert not any("also multiplies" in each for each in warnings)
+
+
+@pytest.mark.parametrize("unit", ["\N{MICRO SIGN}m", "um", "\N{GREEK SMALL LETTER MU}m"])
+def test_sides_keep_their_unit_where_the_heights_have_none(tmp_path, heights, unit):
+    pytest.importorskip("SurfaceTopography")
+    header = f"# Width: 20.00 {unit}\n# Height: 15.00 {unit}\n"
+    rows = (" ".join(map(str, row)) for row in heights)
+    (tmp_path / "h.txt").write_text(header + "\n".join(rows), encoding="utf-8")
+    surface = FileSurface(path=tmp_path / "h.txt", scale=1e-9)
+    assert surface.sides == pytest.approx((15e-6, 20e-6))
+    assert surface.heights(16) == pytest.approx(1e-9 * level(heights, "plane"))
+    assert surface.warnings() == []
+    (warning, _) = FileSurface(path=tmp_path / "h.txt").warnings()
+    assert "not of its heights" in warning
 
 
 @pytest.mark.parametrize(("depth", "width"), [(2000, 0), (0, 11000)])

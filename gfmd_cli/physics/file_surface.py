@@ -282,6 +282,10 @@ class FileSurface(RigidSurface):
         if self.length is not None and topography.spacing is not None and topography.metres:
             stated = topography.spacing[-1] * heights.shape[-1] / self.copies
             warnings.append(map_warnings.other_side(self.length, stated))
+        if self.length is None:
+            side = self._known_length() or 1.0
+            warnings.append(map_warnings.scaled_side(topography, self.scale, side))
+        warnings.append(map_warnings.heights_without_unit(topography, self.scale))
         if "taper" in self.model_fields_set and self.edges != "window":
             warnings.append('surface.taper has no effect without surface.edges = "window"')
         warnings += _warnings_on_heights(self)

@@ -27,6 +27,26 @@ def other_side(length: float, stated: float) -> str:
     return f"surface.length = {length:g} m replaces the side of the file, {stated:g} m"
 
 
+def scaled_side(topography: Topography, scale: float, length: float) -> str:
+    """A factor of the heights that also multiplies a side of unknown unit, to `length` [m]."""
+    if scale == 1.0 or topography.spacing is None or topography.metres:
+        return ""
+    return (
+        "surface.scale also multiplies the sides, whose unit the file does not state: "
+        f"L = {length:g} m; set surface.length"
+    )
+
+
+def heights_without_unit(topography: Topography, scale: float) -> str:
+    """Heights of unknown unit, beside sides in metres."""
+    if scale != 1.0 or not topography.metres or topography.metric_heights:
+        return ""
+    return (
+        "the file states the unit of its sides, but not of its heights; metres are assumed: set "
+        "surface.scale"
+    )
+
+
 def many_filled_in(topography: Topography) -> str:
     """Many missing heights, all of them filled in."""
     share = topography.holes / topography.heights.size

@@ -14,6 +14,7 @@ from gfmd_cli.physics.height_map import (
     check_layout,
     first_line,
 )
+from gfmd_cli.physics.length_units import in_metres
 from gfmd_cli.physics.text_tables import MATRIX_COLUMNS, columns, table_formats, with_blanks
 
 NO_GRID = "three columns that are not the points (x, y, height) of a full grid"
@@ -114,13 +115,29 @@ def _read_channel(
     else:
         heights, sides = at_equal_distances(*_increasing(path, *scan.positions_and_heights()))
         source += ", interpolated at equal distances"
+    has_unit = scan.unit is not None
+    metric_sides = None if has_unit or unsized else _sides_with_unit(channel, sides)
     return HeightMap(
         heights=heights,
-        sides=None if unsized else sides,
-        metres=scan.unit is not None,
+        sides=None if unsized else metric_sides or sides,
+        metres=has_unit or metric_sides is not None,
         periodic=bool(scan.is_periodic),
         source=source,
+        metric_heights=has_unit,
     )
+
+
+def _sides_with_unit(channel: Any, sides: tuple[float, ...]) -> tuple[float, ...] | None:
+    """The sides [m] of a text table whose header states units of them but not of the heights."""
+    header = channel.info.get("raw_metadata", {}) if channel.info else {}
+    unit_x = header.get("xunit") if isinstance(header, dict) else None
+    if not unit_x:
+        return None
+    units = (header.get("yunit") or unit_x, unit_x)[-len(sides) :]
+    factors = [in_metres(unit) for unit in units]
+    if None in factors:
+        return None
+    return tuple(factor * side for factor, side in zip(factors, sides, strict=True) if factor)
 
 
 def _with_positions(reader: Any, scan: Any) -> Any:
