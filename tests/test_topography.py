@@ -164,6 +164,37 @@ def test_positions_of_a_profile_in_no_order_are_refused(tmp_path):
         read_topography(tmp_path / "mixed.txt")
 
 
+@pytest.mark.parametrize(
+    ("is_mark", "words"),
+    [
+        (True, r"\d+ heights \(\d+%\) are exactly 0, far from all others"),
+        (False, r"\d+ heights \(\d+%\) are exactly the maximum, \d+\.\d+: clipped"),
+    ],
+)
+@pytest.mark.parametrize("share", [0.02, 0.3])
+def test_marks_and_clipped_heights_at_many_points_give_a_warning(npy, is_mark, words, share):
+    """Zeros among heights of 10 +- 0.5, and heights above a limit of the instrument."""
+    draw = np.random.default_rng(4)
+    heights = 10 + 0.5 * draw.normal(size=(40, 40))
+    if is_mark:
+        heights[draw.random(heights.shape) < share] = 0.0
+    else:
+        heights = np.minimum(heights, np.quantile(heights, 1 - share))
+    assert re.search(words, "\n".join(FileSurface(path=npy(heights)).warnings()))
+
+
+@pytest.mark.parametrize("case", ["rounded", "wave", "flat with bumps"])
+def test_other_equal_heights_are_not_clipped(npy, case):
+    heights = np.random.default_rng(5).normal(size=(40, 40))
+    heights = {
+        "rounded": np.round(heights * 1.5),
+        "wave": np.tile(np.cos(np.arange(40) * np.pi / 10), (40, 1)),
+        "flat with bumps": np.maximum(heights, 0.3),
+    }[case]
+    warnings = FileSurface(path=npy(heights)).warnings()
+    assert not any("clipped" in each or "far from" in each for each in warnings)
+
+
 @pytest.mark.parametrize("mark", [-9999.0, 50.0])
 def test_marks_of_missing_heights_and_spikes_give_a_warning(npy, heights, mark):
     heights[3, 5] = mark
