@@ -7,6 +7,7 @@ import pytest
 from scipy import stats
 from specs import power_spec
 
+from gfmd_cli import solve
 from gfmd_cli.analysis.compare import compare
 from gfmd_cli.analysis.ensemble import Ensemble, ensembles
 from gfmd_cli.analysis.table import plus_minus
@@ -168,6 +169,27 @@ def test_full_contact_is_exact(rows_of):
     (row,) = rows_of("load.p_star=30")
     assert (row["a_r"], row["a_r_error"], row["u_g_error"]) == (1, 0, 0)
     assert row["status"] == "converged"
+
+
+def test_full_contact_with_white_noise_has_a_bar_of_the_stress(tmp_path):
+    """Delta_sigma of a map with monotone interpolation depends on the grid."""
+    heights = np.random.default_rng(7).normal(size=(32, 32))
+    spec = {
+        "elastomer": {"kind": "power", "n": 0.5},
+        "load": {"pressure": 100.0},
+        "accuracy": {"stress_deviation": 0.01},
+    }
+    rows = [
+        solve(spec | {"grid": {"points": points}}, heights=heights).columns
+        for points in (32, 128, 256)
+    ]
+    assert [row["a_r"] for row in rows] == [1, 1, 1]
+    assert rows[0]["sigma_p_verdict"] == rows[0]["a_r_verdict"] == "unknown"
+    assert rows[1]["sigma_p_verdict"] == "regular"
+    first, *finer = (row["sigma_p"] * row["delta_sigma"] for row in rows)
+    assert first > 1.2 * finer[0]
+    error = rows[1]["sigma_p_error"] * rows[1]["delta_sigma"]
+    assert 0 < abs(finer[1] - finer[0]) <= error < 0.05 * finer[0]
 
 
 def test_an_interrupted_auto_grid_goes_on_bit_for_bit(goes_on_bit_for_bit):

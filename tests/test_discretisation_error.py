@@ -141,6 +141,29 @@ def test_full_contact_is_exact():
             assert (value.error, value.continuum_error, value.verdict) == (0.0, 0.0, "exact")
 
 
+def test_full_contact_is_not_exact_where_finer_grids_contain_shorter_waves():
+    """Two grids give the change of the stress; a single indenter has kinks, and gaps at them."""
+    coarse, fine = (GridValues(points, 1.0, 1 - 1 / points, 0.0, 0.0) for points in (64, 128))
+    map_scales = replace(ROUGH, band_limited=False)
+    for levels, verdict in (([fine], "unknown"), ([coarse, fine], "regular")):
+        for value in estimate(levels, 1.0, map_scales, band_limited=False).values():
+            assert value.verdict == verdict
+    stress = estimate([coarse, fine], 1.0, map_scales, band_limited=False)["sigma_p"]
+    assert stress.error >= fine.sigma_p - coarse.sigma_p
+    for value in estimate([coarse, fine], 1.0, band_limited=False).values():
+        assert value.verdict == "unknown"
+    fine, coarse = replace(fine, border=0.0), replace(coarse, border=0.0)
+    assert estimate([fine], 1.0, band_limited=False)["a_r"].verdict == "unknown"
+    assert estimate([fine], 1.0, band_limited=True)["a_r"].verdict == "exact"
+
+
+@pytest.mark.parametrize(("n", "verdict"), [(0.5, "regular"), (0.9, "slow"), (1.0, "diverges")])
+def test_the_stress_at_a_step_is_that_of_a_punch(n, verdict):
+    levels = sequence(n)
+    assert estimate(levels, n, stepped=True)["sigma_p"].verdict == verdict
+    assert estimate(levels, n, stepped=True)["a_r"] == estimate(levels, n)["a_r"]
+
+
 def test_no_contact_is_unknown():
     for value in estimate([GridValues(64, 0.0, 0.0, 1.0, 0.0)], 1.0, ROUGH).values():
         assert isnan(value.error)

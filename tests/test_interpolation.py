@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from gfmd_cli import solve
 from gfmd_cli.physics.file_surface import FileSurface
 from gfmd_cli.physics.interpolation import monotone, suited_interpolation
 from gfmd_cli.physics.self_affine import SelfAffine
@@ -40,6 +41,45 @@ def test_band_limited_maps_are_interpolated_by_a_fourier_series(points_per_wave,
 )
 def test_plateaus_and_steps_are_not(points_per_wave, worn):
     assert suited_interpolation(worn(rough(points_per_wave))) == "monotone"
+
+
+@pytest.mark.parametrize("shape", [(POINTS, POINTS), (2 * POINTS, POINTS)])
+@pytest.mark.parametrize("axis", [0, 1])
+@pytest.mark.parametrize("points_per_wave", [2, 4])
+def test_rough_maps_with_a_step_along_an_axis_are_not(shape, axis, points_per_wave):
+    """Neither in the corners of the spectrum nor by equal neighbours: mesa, trenches, one edge."""
+    roughness = np.tile(rough(points_per_wave), (shape[0] // POINTS, 1))
+    place = np.arange(shape[axis]) / shape[axis]
+    for step in ((place > 0.2) & (place < 0.7), place * 4 % 1 < 0.5):
+        profile = 20.0 * step
+        heights = roughness + (profile if axis == 1 else profile[:, None])
+        assert suited_interpolation(heights) == "monotone"
+        assert suited_interpolation(np.pad(heights, [(0, n) for n in shape], "symmetric")) == (
+            "monotone"
+        )
+
+
+@pytest.mark.parametrize("points", [8, 16, 32])
+def test_jumps_of_roughness_are_not_steps(points):
+    for seed in range(50):
+        heights = rough(2, seed, points)
+        assert suited_interpolation(heights) == "fourier"
+
+
+def test_contact_on_a_mesa_is_not_on_ripples(tmp_path):
+    """The area on a finer grid is that on the points of the map, and one grid gives no error."""
+    x = np.arange(32) / 32
+    heights = 0.03 * rough(6, points=32) + ((x > 0.2) & (x < 0.7))
+    spec = {
+        "elastomer": {"kind": "half-space", "E_star": 1.0},
+        "load": {"pressure": 0.5},
+        "accuracy": {"contact_area": 0.01},
+    }
+    map_itself, finer = (
+        solve(spec | {"grid": {"points": points}}, heights=heights) for points in (32, 128)
+    )
+    assert map_itself.columns["a_r_verdict"] == "unknown"
+    assert finer.a_r == pytest.approx(map_itself.a_r, rel=0.1)
 
 
 def test_white_noise_is_not():

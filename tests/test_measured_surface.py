@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from gfmd_cli import solve
 from gfmd_cli.physics.pictures import PIXELS, picture
 from gfmd_cli.study.reading import open_study
 
@@ -84,3 +85,24 @@ def test_the_report_begins_with_both_maps(gfmd, tmp_path):
     page = (tmp_path / "study.html").read_text(encoding="utf-8")
     assert page.index("Heights as measured") < page.index("Heights as prepared")
     assert page.index("Heights as prepared") < page.index('id="contact-area"')
+
+
+def test_areas_in_square_metres_of_an_oblong_mirrored_map():
+    """a_r times both sides of the cell, patches in L^2; the cell is four copies of the map."""
+    heights = 1e-9 * np.random.default_rng(0).normal(size=(24, 40))
+    contact = solve(
+        {
+            "surface": {"length": 1e-6, "periodic": False, "edges": "mirror"},
+            "elastomer": {"kind": "half-space", "E_star": 1e9},
+            "load": {"p_star": 0.3},
+            "output": {"patches": True},
+        },
+        heights=heights,
+    )
+    row, touching = contact.columns, contact.pressure > 0
+    assert (row["length"], row["length_y"]) == pytest.approx((2e-6, 1.2e-6))
+    pixel = (1e-6 / 40) ** 2
+    area = row["a_r"] * row["length"] * row["length_y"]
+    assert area == pytest.approx(np.count_nonzero(touching) * pixel)
+    assert area / 4 == pytest.approx(np.count_nonzero(touching[:24, :40]) * pixel)
+    assert row["patches"] * row["patch_area_mean"] * row["length"] ** 2 == pytest.approx(area)

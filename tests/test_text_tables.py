@@ -120,6 +120,28 @@ def test_points_on_a_grid_with_gaps_are_refused_with_the_reason(tmp_path):
         read_topography(tmp_path / "points.txt")
 
 
+THREE_COLUMNS = {
+    "scattered points": RNG.random((300, 3)),
+    "many scattered points": RNG.random((1000, 3)),
+    "two profiles": np.column_stack([np.arange(40.0), RNG.random((40, 2))]),
+}
+
+
+@pytest.mark.parametrize("case", THREE_COLUMNS)
+def test_three_columns_that_are_no_grid_are_refused(tmp_path, case):
+    """They are not a matrix of heights of three columns."""
+    (tmp_path / "points.txt").write_bytes(text(THREE_COLUMNS[case]))
+    with pytest.raises(InputError, match="three columns that are not the points"):
+        read_topography(tmp_path / "points.txt")
+
+
+def test_three_columns_with_stated_sides_are_a_matrix(tmp_path):
+    header = "# Channel: a\n# Width: 3 µm\n# Height: 4 µm\n# Value units: m\n"
+    (tmp_path / "small.txt").write_bytes(text(MATRIX[:4, :3], header=header.encode()))
+    heights = read_topography(tmp_path / "small.txt").heights
+    assert heights == pytest.approx(MATRIX[:4, :3], rel=1e-5)
+
+
 LONG = {
     "a matrix that breaks off in the middle": (text(MATRIX), text(MATRIX[:, 1:])),
     "points anywhere": (text(RNG.random((10_000, 3))),) * 2,

@@ -1,5 +1,6 @@
 """Height maps read from files, and what is refused before it is read."""
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -161,6 +162,37 @@ def test_positions_of_a_profile_in_no_order_are_refused(tmp_path):
     np.savetxt(tmp_path / "mixed.txt", np.column_stack([x, np.sin(1e7 * x)]))
     with pytest.raises(InputError, match="positions along a profile must increase or decrease"):
         read_topography(tmp_path / "mixed.txt")
+
+
+@pytest.mark.parametrize(
+    ("is_mark", "words"),
+    [
+        (True, r"\d+ heights \(\d+%\) are exactly 0, far from all others"),
+        (False, r"\d+ heights \(\d+%\) are exactly the maximum, \d+\.\d+: clipped"),
+    ],
+)
+@pytest.mark.parametrize("share", [0.02, 0.3])
+def test_marks_and_clipped_heights_at_many_points_give_a_warning(npy, is_mark, words, share):
+    """Zeros among heights of 10 +- 0.5, and heights above a limit of the instrument."""
+    draw = np.random.default_rng(4)
+    heights = 10 + 0.5 * draw.normal(size=(40, 40))
+    if is_mark:
+        heights[draw.random(heights.shape) < share] = 0.0
+    else:
+        heights = np.minimum(heights, np.quantile(heights, 1 - share))
+    assert re.search(words, "\n".join(FileSurface(path=npy(heights)).warnings()))
+
+
+@pytest.mark.parametrize("case", ["rounded", "wave", "flat with bumps"])
+def test_other_equal_heights_are_not_clipped(npy, case):
+    heights = np.random.default_rng(5).normal(size=(40, 40))
+    heights = {
+        "rounded": np.round(heights * 1.5),
+        "wave": np.tile(np.cos(np.arange(40) * np.pi / 10), (40, 1)),
+        "flat with bumps": np.maximum(heights, 0.3),
+    }[case]
+    warnings = FileSurface(path=npy(heights)).warnings()
+    assert not any("clipped" in each or "far from" in each for each in warnings)
 
 
 @pytest.mark.parametrize("mark", [-9999.0, 50.0])
@@ -538,6 +570,32 @@ def test_a_side_without_a_unit_is_in_that_of_the_heights(tmp_path):
     assert plain.sides[1] == pytest.approx(16e-8)
     assert FileSurface(path=tmp_path / "h.xyz", scale=1e-3).sides[1] == pytest.approx(16e-11)
     assert FileSurface(path=tmp_path / "h.xyz", length=2.0).sides == (2.0, 2.0)
+
+
+def test_a_factor_of_the_heights_that_also_multiplies_the_sides_is_a_warning(tmp_path):
+    pytest.importorskip("SurfaceTopography")
+    rows = (f"{x} {y} {(x * y) % 5}" for y in range(16) for x in range(16))
+    (tmp_path / "h.xyz").write_text("# x[um] y[um] z[nm]\n" + "\n".join(rows))
+    scaled = {"path": tmp_path / "h.xyz", "scale": 1e-9}
+    warning = "surface.scale also multiplies the sides.*L = 1.6e-08 m; set surface.length"
+    assert re.search(warning, "\n".join(FileSurface(**scaled).warnings()))
+    for keys in ({"length": 16e-6}, {"scale": 1.0}):
+        warnings = FileSurface(**(scaled | keys)).warnings()
+        assert not any("also multiplies" in each for each in warnings)
+
+
+@pytest.mark.parametrize("unit", ["\N{MICRO SIGN}m", "um", "\N{GREEK SMALL LETTER MU}m"])
+def test_sides_keep_their_unit_where_the_heights_have_none(tmp_path, heights, unit):
+    pytest.importorskip("SurfaceTopography")
+    header = f"# Width: 20.00 {unit}\n# Height: 15.00 {unit}\n"
+    rows = (" ".join(map(str, row)) for row in heights)
+    (tmp_path / "h.txt").write_text(header + "\n".join(rows), encoding="utf-8")
+    surface = FileSurface(path=tmp_path / "h.txt", scale=1e-9)
+    assert surface.sides == pytest.approx((15e-6, 20e-6))
+    assert surface.heights(16) == pytest.approx(1e-9 * level(heights, "plane"))
+    assert surface.warnings() == []
+    (warning, _) = FileSurface(path=tmp_path / "h.txt").warnings()
+    assert "not of its heights" in warning
 
 
 @pytest.mark.parametrize(("depth", "width"), [(2000, 0), (0, 11000)])

@@ -20,8 +20,10 @@ from gfmd_cli.physics.error_estimates import (
     UNKNOWN,
     Estimate,
     GridValues,
+    border_stress,
     estimate_by_change,
     estimate_free,
+    full_contact,
     unknown,
 )
 from gfmd_cli.physics.persson import Shells
@@ -129,6 +131,9 @@ def estimate(
     exponent: float,
     rough: RoughnessScales | None = None,
     spread: float = 0.0,
+    *,
+    band_limited: bool = True,
+    stepped: bool = False,
 ) -> dict[str, Estimate]:
     """Estimate errors and continuum values of `a_r`, `sigma_p` and `u_g` on the finest grid.
 
@@ -140,20 +145,32 @@ def estimate(
     rough : scales of a rough surface. None for a single indenter or a line contact: errors of many
         patches then do not average out, and one grid gives no error of sigma_p and u_g
     spread : change of the local exponent over one octave, see `exponent_spread`
+    band_limited : whether all grids contain the same waves, so that full contact is exact
+    stepped : whether the surface has vertical steps, where the stress is that of a punch
     """
     ordered = sorted(levels, key=lambda level: level.points)
     fine, coarse = ordered[-1], ordered[-2] if len(ordered) > 1 else None
+    n = max(exponent, 0.0)
     if fine.border is not None:
-        return estimate_free(fine, coarse, exponent)
-    if fine.a_r == 1:
-        return {
-            "a_r": Estimate(0.0, 1.0, 0.0, "exact"),
-            "sigma_p": Estimate(0.0, fine.sigma_p, 0.0, "exact"),
-            "u_g": Estimate(0.0, 0.0, 0.0, "exact"),
-        }
-    if fine.a_r == 0:  # no contact
+        estimates = estimate_free(fine, coarse, n, band_limited=band_limited)
+    elif fine.a_r == 1 and band_limited:
+        return full_contact(fine)
+    elif fine.a_r == 0 or (fine.a_r == 1 and rough is None):
         return unknown()
-    n, phase, bend = max(exponent, 0.0), nan, nan
+    else:
+        estimates = _estimate_periodic(fine, coarse, n, rough, spread)
+    return estimates | {"sigma_p": border_stress(fine, coarse, n)} if stepped else estimates
+
+
+def _estimate_periodic(
+    fine: GridValues,
+    coarse: GridValues | None,
+    n: float,
+    rough: RoughnessScales | None,
+    spread: float,
+) -> dict[str, Estimate]:
+    """Estimates with a periodic boundary."""
+    phase, bend = nan, nan
     if rough is not None:
         if fine.patches < MIN_PATCHES or not rough.calibrated:
             return estimate_by_change(fine, coarse, n)

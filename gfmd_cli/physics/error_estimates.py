@@ -74,9 +74,9 @@ class Estimate:
     continuum_error: float
     """The continuum value is within continuum +- continuum_error with the same probability."""
     verdict: str
-    """"exact": full contact; "regular"; "bound": only an interval is known; "slow": converges too
-    slowly for a number; "diverges": there is no continuum value; "unknown": no valid error can be
-    given from these grids."""
+    """"exact": full contact with a band-limited surface; "regular"; "bound": only an interval is
+    known; "slow": converges too slowly for a number; "diverges": there is no continuum value;
+    "unknown": no valid error can be given from these grids."""
 
 
 UNKNOWN = Estimate(nan, nan, nan, "unknown")
@@ -85,6 +85,12 @@ UNKNOWN = Estimate(nan, nan, nan, "unknown")
 def unknown() -> dict[str, Estimate]:
     """Estimates that give no number."""
     return dict.fromkeys(QUANTITIES, UNKNOWN)
+
+
+def full_contact(fine: GridValues) -> dict[str, Estimate]:
+    """Full contact with a surface of which all grids contain the same waves."""
+    values = {"a_r": 1.0, "sigma_p": fine.sigma_p, "u_g": 0.0}
+    return {name: Estimate(0.0, value, 0.0, "exact") for name, value in values.items()}
 
 
 def estimate_by_change(
@@ -104,8 +110,10 @@ def estimate_by_change(
     return estimates | {name: by_change[name] for name in QUANTITIES if n <= MAX_EXPONENT[name]}
 
 
-def estimate_free(fine: GridValues, coarse: GridValues | None, n: float) -> dict[str, Estimate]:
-    """Estimates with a free boundary; unknown from one grid, except full contact."""
+def estimate_free(
+    fine: GridValues, coarse: GridValues | None, n: float, *, band_limited: bool
+) -> dict[str, Estimate]:
+    """Estimates with a free boundary; unknown from one grid, except a_r and u_g of full contact."""
     estimates = unknown()
     if fine.a_r == 0 or fine.border is None:
         return estimates
@@ -115,16 +123,15 @@ def estimate_free(fine: GridValues, coarse: GridValues | None, n: float) -> dict
             "sigma_p": _on_grid("sigma_p", fine, coarse, FACTOR["sigma_p"]),
             "u_g": _on_grid("u_g", fine, coarse, FREE_GAP_FACTOR),
         }
-    if fine.a_r == 1:
-        estimates["a_r"] = Estimate(0.0, 1.0, 0.0, "exact")
-        estimates["u_g"] = Estimate(0.0, 0.0, 0.0, "exact")
+    if fine.a_r == 1 and band_limited:
+        estimates |= {name: full_contact(fine)[name] for name in ("a_r", "u_g")}
     if fine.border > 0:
-        estimates["sigma_p"] = _border_stress(fine, coarse, n)
+        estimates["sigma_p"] = border_stress(fine, coarse, n)
     return estimates
 
 
-def _border_stress(fine: GridValues, coarse: GridValues | None, n: float) -> Estimate:
-    """Standard deviation of a pressure that is singular at the border of the map."""
+def border_stress(fine: GridValues, coarse: GridValues | None, n: float) -> Estimate:
+    """Standard deviation of a pressure that is singular at the border of the map, or at a step."""
     if n > MAX_BORDER_EXPONENT:
         return replace(UNKNOWN, verdict="diverges" if n >= 1 else "slow")
     if coarse is None:

@@ -75,8 +75,8 @@ class FileSurface(RigidSurface):
     """Width of the tapered zone of the window at each edge, as a fraction of the side."""
     interpolation: Interpolation | None = None
     """Interpolation on grids finer than the map: "fourier", exact for band-limited maps, or
-    "monotone", without overshoot. The default depends on the spectrum and the plateaus of the
-    map."""
+    "monotone", without overshoot. The default depends on the spectrum, the plateaus and the steps
+    of the map."""
     scale: Positive = 1.0
     """Factor from the heights of the file to metres; also for its side if it states no unit."""
     length: Positive | None = None
@@ -282,6 +282,10 @@ class FileSurface(RigidSurface):
         if self.length is not None and topography.spacing is not None and topography.metres:
             stated = topography.spacing[-1] * heights.shape[-1] / self.copies
             warnings.append(map_warnings.other_side(self.length, stated))
+        if self.length is None:
+            side = self._known_length() or 1.0
+            warnings.append(map_warnings.scaled_side(topography, self.scale, side))
+        warnings.append(map_warnings.heights_without_unit(topography, self.scale))
         if "taper" in self.model_fields_set and self.edges != "window":
             warnings.append('surface.taper has no effect without surface.edges = "window"')
         warnings += _warnings_on_heights(self)

@@ -32,6 +32,8 @@ class HeightMap(NamedTuple):
     """Whether the map is periodic, None where the file does not state it."""
     source: str
     """Format, and dataset or channel."""
+    metric_heights: bool = False
+    """Whether the heights are in metres, not in an unknown unit."""
 
 
 def check_layout(path: Path, shape: tuple[int, ...], dtype: np.dtype[Any], max_bytes: int) -> None:

@@ -38,6 +38,8 @@ class RigidSurface(Choice):
     """Whether the surface is a map, whose points are those of the smallest grid."""
     band_limited: ClassVar[bool] = False
     """Whether the smallest grid resolves all waves, so that all grids have one Delta_sigma."""
+    stepped: ClassVar[bool] = False
+    """Whether the surface has vertical steps, at which the stress of any contact is singular."""
     has_borders: ClassVar[bool] = False
     """Whether the surface ends at its borders, and the spec does not make it periodic."""
     copies: ClassVar[int] = 1
@@ -212,6 +214,7 @@ class Cone(RoundIndenter):
 class Punch(RoundIndenter):
     """Flat cylindrical punch: h = 0 for r <= radius, -depth beyond."""
 
+    stepped: ClassVar[bool] = True
     kind: Literal["punch"] = "punch"
     radius: Positive = 0.25
     """Radius of the face [m]."""

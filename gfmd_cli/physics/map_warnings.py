@@ -15,7 +15,9 @@ SMOOTH = 1e-6  # rms gradient; a choice: polished mirrors have about that
 CLIFF = 5.0  # ratio of the step across the border to that inside; a choice: 1 if periodic
 TILTED = 0.5  # share of the variance of the heights that is a tilt; a choice
 ROUNDED = 0.2  # share of equal neighbouring heights, at which the gradient is 3 % too large
-FEW = 0.01  # share of the heights that can be outliers; a choice
+FEW = 0.01  # share of the heights of which a warning tells the percentage; a choice
+PLATEAU = 0.5  # share of equal heights that are taken as a part of the surface; a choice
+CLIPPED = 10  # ratio of the numbers of equal heights, highest to second; about 1 if rounded
 SIDES = 1e-3  # relative difference of two sides beyond which one is probably wrong; a choice
 FILLED = 0.05  # share of filled heights; a choice, as for the frame of the window
 
@@ -25,6 +27,26 @@ def other_side(length: float, stated: float) -> str:
     if abs(length / stated - 1) <= SIDES:
         return ""
     return f"surface.length = {length:g} m replaces the side of the file, {stated:g} m"
+
+
+def scaled_side(topography: Topography, scale: float, length: float) -> str:
+    """A factor of the heights that also multiplies a side of unknown unit, to `length` [m]."""
+    if scale == 1.0 or topography.spacing is None or topography.metres:
+        return ""
+    return (
+        "surface.scale also multiplies the sides, whose unit the file does not state: "
+        f"L = {length:g} m; set surface.length"
+    )
+
+
+def heights_without_unit(topography: Topography, scale: float) -> str:
+    """Heights of unknown unit, beside sides in metres."""
+    if scale != 1.0 or not topography.metres or topography.metric_heights:
+        return ""
+    return (
+        "the file states the unit of its sides, but not of its heights; metres are assumed: set "
+        "surface.scale"
+    )
 
 
 def many_filled_in(topography: Topography) -> str:
@@ -75,20 +97,27 @@ def tilted(heights: Field) -> str:
 
 
 def outliers(topography: Topography) -> str:
-    """Heights farther from all others than these are from each other."""
+    """Equal heights farther from all others than these are from each other, or many at a limit."""
     heights = topography.heights
     if topography.missing is not None:
         heights = heights[~topography.missing]
-    for extreme in (heights.min(), heights.max()):
+    for extreme, word in ((heights.min(), "minimum"), (heights.max(), "maximum")):
         others = heights[heights != extreme]
         count = heights.size - others.size
-        if count > FEW * heights.size or others.size < SMALLEST_GRID:
+        if count > PLATEAU * heights.size or others.size < SMALLEST_GRID:
             continue
+        share = f" ({count / heights.size:.0%})" if count > FEW * heights.size else ""
         if min(abs(others.max() - extreme), abs(others.min() - extreme)) > np.ptp(others) > 0:
-            what = "1 height is" if count == 1 else f"{count} heights are"
+            what = "1 height is" if count == 1 else f"{count} heights{share} are"
             return (
                 f"{what} exactly {extreme:g}, far from all others: a spike or a mark of missing "
                 "heights? Replace it by NaN"
+            )
+        following = others.min() if word == "minimum" else others.max()
+        if share and count > CLIPPED * np.count_nonzero(others == following):
+            return (
+                f"{count} heights{share} are exactly the {word}, {extreme:g}: clipped at the range "
+                "of the instrument, or a mark of missing heights? Replace such a mark by NaN"
             )
     return ""
 

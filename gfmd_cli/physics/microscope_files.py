@@ -14,8 +14,10 @@ from gfmd_cli.physics.height_map import (
     check_layout,
     first_line,
 )
-from gfmd_cli.physics.text_tables import table_formats, with_blanks
+from gfmd_cli.physics.length_units import in_metres
+from gfmd_cli.physics.text_tables import MATRIX_COLUMNS, columns, table_formats, with_blanks
 
+NO_GRID = "three columns that are not the points (x, y, height) of a full grid"
 TABLES = {"xyz", "asc"}  # formats of SurfaceTopography that are tables of numbers
 SMALL_FILE = 2**14  # bytes, which the readers of tables parse in a second
 EVEN = 1e-3  # deviation of distances, over their mean, up to which they are equal; a choice
@@ -66,7 +68,9 @@ def _open_scan(path: Path, file: BinaryIO, readers: list[Any]) -> Any:
                 continue
             is_likely = answer == "YES" or reader.format() in tables
             if is_likely or path.suffix[1:].lower() in reader.file_extensions():
-                reasons.append(f"{reader.format()}: {first_line(error)}")
+                is_scattered = reader.format() == "xyz" and columns(file) == 3
+                reason = NO_GRID if is_scattered else reader.format()
+                reasons.append(f"{reason}: {first_line(error)}")
     if reasons:
         raise InputError(
             f"{path}: SurfaceTopography recognises the format but cannot read the file "
@@ -87,7 +91,7 @@ def _read_channel(
     if reader.format() == "npz":
         raise InputError(f"{path}: an archive of NumPy arrays; save the map as a .npy file")
     channel = _height_channel(path, reader, dataset)
-    shape = (channel.nb_grid_pts or ())[::-1]
+    shape: tuple[int, ...] = (channel.nb_grid_pts or ())[::-1]
     check_layout(path, shape, np.dtype(float), max_bytes)
     unsized = channel.physical_sizes is None
     scan = channel.topography(physical_sizes=(1.0,) * len(shape) if unsized else None)
@@ -97,7 +101,13 @@ def _read_channel(
         scan = scan.to_unit("m")
     source = f"{reader.format()}, {channel.channel_id}"
     if reader.format() == "asc" and len(shape) == 2:
-        _check_all_rows_read(path, file, *shape)
+        rows, columns_read = shape
+        if unsized and columns_read < MATRIX_COLUMNS:
+            raise InputError(
+                f"{path}: {NO_GRID}; a matrix of heights has at least {MATRIX_COLUMNS} columns, or "
+                f"a header that states its sides. {REMEDY}"
+            )
+        _check_all_rows_read(path, file, rows, columns_read)
     if scan.is_uniform:
         heights, sides = scan.heights().T, tuple(map(float, scan.physical_sizes))[::-1]
         if len(shape) == 1 and sides[0] < 0:  # recorded backwards
@@ -105,13 +115,29 @@ def _read_channel(
     else:
         heights, sides = at_equal_distances(*_increasing(path, *scan.positions_and_heights()))
         source += ", interpolated at equal distances"
+    has_unit = scan.unit is not None
+    metric_sides = None if has_unit or unsized else _sides_with_unit(channel, sides)
     return HeightMap(
         heights=heights,
-        sides=None if unsized else sides,
-        metres=scan.unit is not None,
+        sides=None if unsized else metric_sides or sides,
+        metres=has_unit or metric_sides is not None,
         periodic=bool(scan.is_periodic),
         source=source,
+        metric_heights=has_unit,
     )
+
+
+def _sides_with_unit(channel: Any, sides: tuple[float, ...]) -> tuple[float, ...] | None:
+    """The sides [m] of a text table whose header states units of them but not of the heights."""
+    header = channel.info.get("raw_metadata", {}) if channel.info else {}
+    unit_x = header.get("xunit") if isinstance(header, dict) else None
+    if not unit_x:
+        return None
+    units = (header.get("yunit") or unit_x, unit_x)[-len(sides) :]
+    factors = [in_metres(unit) for unit in units]
+    if None in factors:
+        return None
+    return tuple(factor * side for factor, side in zip(factors, sides, strict=True) if factor)
 
 
 def _with_positions(reader: Any, scan: Any) -> Any:

@@ -33,10 +33,15 @@ def table_formats(file: BinaryIO) -> set[str]:
     formats = set()
     if _columns(file, b" \t") >= MATRIX_COLUMNS:
         formats.add("asc")
-    columns = _columns(file, b" \t,;")
-    if columns == 2 or (columns == 3 and _is_grid(file)):
+    positions = columns(file)
+    if positions == 2 or (positions == 3 and _is_grid(file)):
         formats.add("xyz")
     return formats
+
+
+def columns(file: BinaryIO) -> int:
+    """Columns of a table of numbers between any separators, 0 for any other file."""
+    return _columns(file, b" \t,;")
 
 
 def with_blanks(file: BinaryIO) -> BinaryIO:
@@ -48,11 +53,11 @@ def with_blanks(file: BinaryIO) -> BinaryIO:
     start = file.read(WINDOW)
     table = start[len(start) // 2 :]  # without most headers
     if b"," in table or b";" in table:
-        columns = _columns(file, b" \t;")
-        is_decimal = columns > 1 and re.search(rb"\d,\d", table)
-        if columns == 1:
-            columns = _columns(file, b",")
-        if is_decimal or columns >= MATRIX_COLUMNS:
+        numbers = _columns(file, b" \t;")
+        is_decimal = numbers > 1 and re.search(rb"\d,\d", table)
+        if numbers == 1:
+            numbers = _columns(file, b",")
+        if is_decimal or numbers >= MATRIX_COLUMNS:
             file.seek(0)
             text = file.read().replace(b";", b" ")
             return BytesIO(text.replace(b",", b"." if is_decimal else b" "))

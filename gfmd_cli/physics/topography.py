@@ -102,6 +102,8 @@ class Topography:
     """Format, and dataset or channel."""
     shape: tuple[int, ...]
     """Shape of the map in the file."""
+    metric_heights: bool = False
+    """Whether the heights are in metres; else they are in an unknown unit."""
 
     @property
     def holes(self) -> int:
@@ -202,6 +204,7 @@ def _checked(
         data.periodic,
         data.source,
         shape,
+        data.metric_heights,
     )
 
 

@@ -254,8 +254,14 @@ def _estimates(task: Task, solved: Solved, grids: list[GridResult]) -> dict[str,
     exponent = local_exponent(task.elastomer, resolution, length)
     spread = exponent_spread(task.elastomer, resolution, length)
     has_scales = task.surface.rough and task.boundary == "periodic"
-    rough = scales_of(scene, task.surface.band_limited) if has_scales else None
-    return estimate(levels, exponent, rough, spread)
+    return estimate(
+        levels,
+        exponent,
+        scales_of(scene, task.surface.band_limited) if has_scales else None,
+        spread,
+        band_limited=task.surface.band_limited,
+        stepped=task.surface.stepped,
+    )
 
 
 def scales_of(scene: Scene, band_limited: bool) -> RoughnessScales:
