@@ -33,10 +33,10 @@ def contact_line(grid: Grid, mask: Mask, *, periodic: bool = True) -> float:
     for axis in range(mask.ndim):
         lines = np.moveaxis(mask, axis, 0)
         counts[axis] += np.count_nonzero(lines[1:] != lines[:-1])
-        below = grid.next_row(lines) if axis == 0 else lines[0]
+        following = grid.next_row(lines) if axis == 0 else lines[0]
         goes_on = axis == 0 and grid.row_span[1] < grid.points_y
         if periodic or goes_on:
-            counts[axis] += np.count_nonzero(lines[-1] != below)
+            counts[axis] += np.count_nonzero(lines[-1] != following)
     across = np.divide(1.0, grid.spacings)  # edge length over the area of a point
     return float(grid.total(counts) @ across) * grid.length / grid.size
 

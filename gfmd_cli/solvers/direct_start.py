@@ -34,7 +34,7 @@ COST = 5000  # largest n^3 per point of a grid; measured: with more, the iterati
 COST_NOT_STEEP = 150  # the same where a V-cycle without squared Laplacians is used
 HEADROOM = 1.3  # largest number of points over that of the first set
 GROWTH = 0.4  # largest share of points that join a set at a time; measured: from 0.3 to 0.6 as good
-PATIENCE = 3  # sets without fewer wrong points
+MAX_STALLED_SETS = 3  # in a row, without fewer wrong points
 MAX_SETS = 40
 
 Points = tuple[Any, ...]
@@ -100,7 +100,7 @@ class _DirectSolve:
 
         The displacement stays in `values`, its level above the indenter in `level`.
         """
-        fewest, patience = self.grid.size, PATIENCE
+        fewest, stalled = self.grid.size, 0
         for _ in range(MAX_SETS):
             pause()
             points = np.nonzero(self.touching)
@@ -116,9 +116,9 @@ class _DirectSolve:
             count = int(np.count_nonzero(misclassified))
             if count == 0 or violation < tolerance:
                 break
-            patience = PATIENCE if count < fewest else patience - 1
+            stalled = 0 if count < fewest else stalled + 1
             fewest = min(count, fewest)
-            if patience < 0:
+            if stalled > MAX_STALLED_SETS:
                 misclassified.ravel()[: np.flatnonzero(misclassified)[-1]] = False
             self.exchange(misclassified, max(1, int(GROWTH * s.size)))
         return True
@@ -136,12 +136,15 @@ class _DirectSolve:
         violation += float(np.square(s[s < 0]).sum())
         return misclassified, self.contact.as_residual(violation)
 
-    def exchange(self, misclassified: Mask, most: int) -> None:
-        """Change whether these points are in contact; the `most` deepest of those entered join."""
+    def exchange(self, misclassified: Mask, limit: int) -> None:
+        """Change whether these points are in contact; up to `limit` of those entered join.
+
+        They are the deepest.
+        """
         entered = np.nonzero(misclassified & ~self.touching)
-        if entered[0].size > most:
+        if entered[0].size > limit:
             gap = self.values[entered] - self.obstacle[entered]
-            shallow = np.argpartition(gap, most)[most:]
+            shallow = np.argpartition(gap, limit)[limit:]
             misclassified[tuple(places[shallow] for places in entered)] = False
         self.touching ^= misclassified
 

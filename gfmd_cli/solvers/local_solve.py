@@ -129,8 +129,8 @@ class LocalSolve:
         gap -= level
         gap_of_start, stress = self.lay(gap)
         entered = np.zeros(self.tiles.used.shape, dtype=np.bool_)
-        sweep = (displacement, level, contact.obstacle, self.tiles.used, entered)
-        (outside,) = self.grid.rows.sums(1, penetration, *sweep)
+        fields = (displacement, level, contact.obstacle, self.tiles.used, entered)
+        (outside,) = self.grid.rows.sums(1, penetration, *fields)
         residual, start_residual = (
             contact.as_residual(float(outside) + _dot(violation, violation))
             for violation in (np.minimum(gap, self.s), np.minimum(gap_of_start, stress))

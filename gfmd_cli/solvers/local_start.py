@@ -23,7 +23,7 @@ from gfmd_cli.solvers.tiles import SIDE, Tiles
 EXPONENTS = (0.2, 1.3)  # of k(q) for which the solve on tiles converges in about 20 steps
 REACH = 2  # points by which the contact may grow from a grid to the next
 COARSE_TOLERANCE = 0.03  # on grids before the finest; measured: 0.01 to 0.1 differ by 5 %
-SWEEPS = 3  # of relaxation of the displacement on the indenter; 2 to 6 take about as long
+RELAXATIONS = 3  # of the displacement on the indenter; 2 to 6 take about as long
 DAMPING = 0.8  # of the relaxation
 LAYING = 2.0  # largest gap that is closed, over the move that takes the stress off this point
 
@@ -151,12 +151,12 @@ class PeriodicSolve(LocalSolve):
         """The gap and the stress on the tiles after C s is laid on the indenter.
 
         With C s the stress is s; K times the change of the gap is added. Laying leaves a residual
-        of short waves, which projected Jacobi sweeps reduce.
+        of short waves, which projected Jacobi steps reduce.
         """
         stiffness = self.contact.point_stiffness
         laid = np.where(self.s > stiffness * gap, 0.0, np.maximum(gap, 0.0))
         stress = self.s + self.map_displacement(laid - gap)
-        for _ in range(SWEEPS):
+        for _ in range(RELAXATIONS):
             move = stress / stiffness
             relaxed = np.maximum(laid - DAMPING * move, 0.0)
             laid = np.where(laid < LAYING * move, 0.0, relaxed)
