@@ -36,9 +36,10 @@ from gfmd_cli.physics.topography import Region, Topography, read_topography
 class FileSurface(RigidSurface):
     """Height map from a .npy, HDF5, netCDF or microscope file (SurfaceTopography).
 
-    A `.npy` or HDF5 array is used unchanged, as a periodic map. A microscope scan is not periodic:
-    a plane is subtracted, and the contact has a free boundary or, if this is not available, the
-    map is mirrored. The keys `periodic`, `level` and `edges` override this.
+    A `.npy` or HDF5 array is used unchanged, as a periodic map. A microscope scan, or an array with
+    coordinates and units, is not periodic: a plane is subtracted, and the contact has a free
+    boundary or, if this is not available, the map is mirrored. The keys `periodic`, `level` and
+    `edges` override this.
     """
 
     rough: ClassVar[bool] = True
@@ -274,8 +275,8 @@ class FileSurface(RigidSurface):
     def warnings(self, boundary: str = "periodic") -> list[str]:
         """Warnings about the side, the heights, their gradient and borders, and unused keys."""
         topography, heights = self._topography(), _prepared(self)
-        warnings: list[str] = []
-        if self._known_length() is None:
+        warnings = list(topography.notes)
+        if self._known_length() is None and not topography.metric_heights:
             warnings.append(
                 "the file does not state its side; L = 1 m is assumed: set surface.length"
             )
@@ -285,7 +286,7 @@ class FileSurface(RigidSurface):
         if self.length is None:
             side = self._known_length() or 1.0
             warnings.append(map_warnings.scaled_side(topography, self.scale, side))
-        warnings.append(map_warnings.heights_without_unit(topography, self.scale))
+        warnings.append(map_warnings.unit_of_heights(topography, self.scale))
         if "taper" in self.model_fields_set and self.edges != "window":
             warnings.append('surface.taper has no effect without surface.edges = "window"')
         warnings += _warnings_on_heights(self)

@@ -13,8 +13,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from gfmd_cli.errors import InputError
+from gfmd_cli.physics.array_coordinates import axes_of, factor, is_transposed, stated_unit
 
 MAX_COMPRESSION = 1032  # the limit of deflate, https://zlib.net/zlib_tech.html
+MAX_HEIGHT = 1e30  # in any unit; the usual values for no data are 9.97e36 (netCDF) and 3.4e38
 SMALLEST_MAP = 2  # points per side; fewer have no roughness
 REMEDY = "Heights that other programs read can be saved by numpy.save as a .npy file."
 
@@ -34,6 +36,8 @@ class HeightMap(NamedTuple):
     """Format, and dataset or channel."""
     metric_heights: bool = False
     """Whether the heights are in metres, not in an unknown unit."""
+    notes: tuple[str, ...] = ()
+    """Warnings about what the file states and the reader does not use."""
 
 
 def check_layout(path: Path, shape: tuple[int, ...], dtype: np.dtype[Any], max_bytes: int) -> None:
@@ -81,7 +85,8 @@ def read_hdf5(path: Path, dataset: str | None, max_bytes: int) -> HeightMap:
 
     with open_hdf5(path) as file:
         name = _dataset_name(path, file, dataset)
-        check_layout(path, file[name].shape or (), file[name].dtype, max_bytes)
+        shape = _map_shape(file[name].shape or ())
+        check_layout(path, shape, file[name].dtype, max_bytes)
         data = take(file, name, MAX_COMPRESSION)
         packed = {"scale_factor", "add_offset"} & set(data.attrs)
         if packed:
@@ -89,13 +94,58 @@ def read_hdf5(path: Path, dataset: str | None, max_bytes: int) -> HeightMap:
                 f"{path}: dataset {name!r} is packed ({', '.join(sorted(packed))}); "
                 "store the heights themselves"
             )
-        values = np.ma.asarray(data[()])
+        values = np.ma.asarray(data[()]).reshape(shape)
         for mark in {"_FillValue", "missing_value"} & set(data.attrs):
             missing = np.asarray(data.attrs[mark])
             if missing.dtype.kind == values.dtype.kind == "f":  # perhaps of another precision
                 missing = missing.astype(values.dtype)
             values = np.ma.masked_where(values == missing, values)
-        return HeightMap(values, None, False, None, f"HDF5, {name}, {data.dtype}")
+        bare = HeightMap(values, None, False, None, f"HDF5, {name}, {data.dtype}")
+        return bare if "spec_text" in file.attrs else _with_coordinates(path, file, data, bare)
+
+
+def _map_shape(shape: tuple[int, ...]) -> tuple[int, ...]:
+    """The shape of an array without leading axes of one point beyond two, such as one time."""
+    while len(shape) > 2 and shape[0] == 1:
+        shape = shape[1:]
+    return shape
+
+
+def _with_coordinates(path: Path, file: Any, data: Any, bare: HeightMap) -> HeightMap:
+    """A map with the order of its axes, sides and units by its dimension scales.
+
+    With units of heights and positions it is in metres and not periodic, as a microscope scan.
+    Without positions it is a bare array.
+    """
+    heights, unit = bare.heights, stated_unit(data)
+    axes = axes_of(path, file, data, MAX_COMPRESSION)[-heights.ndim :]
+    if is_transposed(axes):
+        heights, axes = heights.T, axes[::-1]
+    steps = [axis.step for axis in axes if axis.step is not None]
+    if len(steps) < len(axes):
+        note = f"the heights state the unit {unit!r}, which is not read: set surface.scale"
+        return bare._replace(heights=heights, notes=(note,) if unit else ())
+    forward = tuple(slice(None, None, -1 if step < 0 else None) for step in steps)
+    heights = heights[forward]
+    sides = [abs(step) * points for step, points in zip(steps, heights.shape, strict=True)]
+    metres, metric = factor(path, data.name, unit), [axis.metres for axis in axes if axis.metres]
+    if metres is not None:
+        is_height = np.abs(heights) < MAX_HEIGHT  # in the unit of the file
+        heights = np.ma.masked_where(~is_height, metres * heights.astype(np.float64))
+    if len(metric) == len(axes):
+        sides = [side * metre for side, metre in zip(sides, metric, strict=True)]
+        known = metres is not None
+        return bare._replace(
+            heights=heights,
+            sides=tuple(sides),
+            metres=True,
+            periodic=False if known else None,
+            metric_heights=known,
+        )
+    if metres is None:
+        return bare._replace(heights=heights, sides=tuple(sides))
+    note = "the positions along the axes state no unit: set surface.length"
+    return bare._replace(heights=heights, metric_heights=True, notes=(note,))
 
 
 def _dataset_name(path: Path, file: Any, name: str | None) -> str:
@@ -128,7 +178,7 @@ def _dataset_name(path: Path, file: Any, name: str | None) -> str:
 def _maps(datasets: dict[str, Any]) -> list[str]:
     """The names of the maps among some datasets; without maps those of the lines."""
     numbers = {key: item for key, item in datasets.items() if item.dtype.kind in "iuf"}
-    maps = [key for key, item in numbers.items() if item.ndim == 2]
+    maps = [key for key, item in numbers.items() if len(_map_shape(item.shape or ())) == 2]
     return maps or [key for key, item in numbers.items() if item.ndim == 1]
 
 

@@ -39,8 +39,10 @@ def scaled_side(topography: Topography, scale: float, length: float) -> str:
     )
 
 
-def heights_without_unit(topography: Topography, scale: float) -> str:
-    """Heights of unknown unit, beside sides in metres."""
+def unit_of_heights(topography: Topography, scale: float) -> str:
+    """A factor of heights that are in metres, or none where only the sides are in metres."""
+    if topography.metric_heights and scale != 1.0:
+        return "the file states the unit of its heights: surface.scale multiplies metres"
     if scale != 1.0 or not topography.metres or topography.metric_heights:
         return ""
     return (

@@ -17,6 +17,7 @@ from gfmd_cli.choice import Choice
 from gfmd_cli.errors import InputError
 from gfmd_cli.grid.arrays import Field, Mask
 from gfmd_cli.physics.height_map import (
+    MAX_HEIGHT,
     REMEDY,
     SMALLEST_MAP,
     HeightMap,
@@ -27,7 +28,6 @@ from gfmd_cli.physics.height_map import (
 from gfmd_cli.physics.microscope_files import read_microscope_file
 
 MAX_BYTES = 2**33  # 32768 x 32768 heights in double precision
-MAX_HEIGHT = 1e30  # in any unit; the usual values for no data are 9.97e36 (netCDF) and 3.4e38
 SPACING_TOLERANCE = 1e-6  # relative: files store sides in single precision or with six digits
 AXES = ("y", "x")
 
@@ -104,6 +104,8 @@ class Topography:
     """Shape of the map in the file."""
     metric_heights: bool = False
     """Whether the heights are in metres; else they are in an unknown unit."""
+    notes: tuple[str, ...] = ()
+    """Warnings about what the file states and the reader does not use."""
 
     @property
     def holes(self) -> int:
@@ -122,7 +124,8 @@ def read_topography(
 ) -> Topography:
     """Read a height map or a line profile from a .npy, HDF5, netCDF or microscope file.
 
-    `.npy` and HDF5 arrays (netCDF 4 is HDF5) are taken as they are, indexed [y, x], without unit.
+    `.npy` and HDF5 arrays (netCDF 4 is HDF5) are taken as they are, indexed [y, x], without unit,
+    unless dimension scales give the order, the positions and the unit.
     SurfaceTopography reads all other formats; its height channel [x, y] is transposed to [y, x]
     and converted to metres.
 
@@ -205,6 +208,7 @@ def _checked(
         data.source,
         shape,
         data.metric_heights,
+        data.notes,
     )
 
 

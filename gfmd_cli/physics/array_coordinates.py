@@ -1,0 +1,89 @@
+"""Axes and units of an array in an HDF5 or netCDF 4 file: its dimension scales and attributes.
+
+A dimension scale of HDF5, which is a coordinate variable of netCDF, has the positions of the points
+along one axis. An array without scales is a bare one.
+"""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from gfmd_cli.errors import InputError
+from gfmd_cli.physics.length_units import METRES, in_metres
+
+AXIS_NAMES = {
+    **dict.fromkeys(("x", "lon", "longitude"), "x"),
+    **dict.fromkeys(("y", "lat", "latitude"), "y"),
+}
+EVEN = 1e-3  # deviation of distances, over their mean, up to which they are equal; a choice
+NO_VARIABLE = b"This is a netCDF dimension but not a netCDF variable"  # begins the attribute NAME
+UNIT_NAMES = ("units", "unit")
+NO_UNITS = ("", "1")
+
+
+class Axis(NamedTuple):
+    """One axis of an array."""
+
+    name: str
+    """Name of its dimension scale, "" where it has none."""
+    step: float | None
+    """Signed distance of neighbouring points, None where no positions are stored."""
+    metres: float | None
+    """Metres per unit of the positions, None where they state no unit."""
+
+
+def axes_of(path: Path, file: Any, data: Any, compression: float) -> list[Axis]:
+    """The axes of a dataset. Raises InputError for uneven positions, or an unknown unit."""
+    return [_axis(path, file, dimension, compression) for dimension in data.dims]
+
+
+def stated_unit(data: Any) -> str:
+    """The unit that a dataset states, "" where it states none."""
+    for name in UNIT_NAMES:
+        unit = data.attrs.get(name, "")
+        text = unit.decode(errors="replace") if isinstance(unit, bytes) else str(unit)
+        if text.strip() not in NO_UNITS:
+            return text.strip()
+    return ""
+
+
+def factor(path: Path, name: str, unit: str) -> float | None:
+    """Metres per unit, None without a unit. Raises InputError for one that is no known length."""
+    metres = in_metres(unit)
+    if unit and metres is None:
+        raise InputError(
+            f"{path}: {name!r} has the unit {unit!r}; known are {', '.join(METRES)}: convert it"
+        )
+    return metres
+
+
+def is_transposed(axes: Sequence[Axis]) -> bool:
+    """Whether an array is indexed [x, y], by the names of its axes."""
+    return [AXIS_NAMES.get(axis.name.lower()) for axis in axes] == ["x", "y"]
+
+
+def _axis(path: Path, file: Any, dimension: Any, compression: float) -> Axis:
+    from gfmd_cli.files.hdf5 import take
+
+    scales = dimension.values()
+    if not scales:
+        return Axis("", None, None)
+    scale = scales[0]
+    name = scale.name.strip("/")
+    label = name.rpartition("/")[-1]
+    is_empty = bytes(scale.attrs.get("NAME", b"")).startswith(NO_VARIABLE)
+    if is_empty or scale.dtype.kind not in "iuf" or scale.ndim != 1:
+        return Axis(label, None, None)
+    positions = np.asarray(take(file, name, compression)[()], dtype=np.float64)
+    if positions.size < 2:
+        return Axis(label, None, None)
+    steps = np.diff(positions)
+    step = float(positions[-1] - positions[0]) / steps.size
+    if not (np.abs(steps - step) <= EVEN * abs(step)).all() or step == 0:
+        raise InputError(
+            f"{path}: the positions {label!r} are not evenly spaced: resample the map, or save it "
+            "without them"
+        )
+    return Axis(label, step, factor(path, label, stated_unit(scale)))

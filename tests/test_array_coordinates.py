@@ -1,0 +1,136 @@
+"""Order, sides and units of arrays in HDF5 and netCDF files that state them."""
+
+import re
+
+import h5py
+import numpy as np
+import pytest
+
+from gfmd_cli.errors import InputError
+from gfmd_cli.physics.file_surface import FileSurface
+from gfmd_cli.physics.topography import read_topography
+
+HEIGHTS = np.random.default_rng(1).normal(size=(12, 16))  # [y, x]
+X, Y = 0.5 * np.arange(16) + 3.0, 0.25 * np.arange(12)
+UNITS = {"height": "nm", "x": "um", "y": "um"}
+
+
+@pytest.fixture
+def array(tmp_path):
+    """Writes heights with dimension scales and units; None writes no unit."""
+
+    def write(heights=HEIGHTS, axes=None, units=UNITS, extra=None):
+        axes = {"y": Y, "x": X} if axes is None else axes
+        path = tmp_path / f"{len(list(tmp_path.iterdir()))}.nc"
+        with h5py.File(path, "w") as file:
+            file["height"] = heights
+            for index, (name, positions) in enumerate(axes.items()):
+                file[name] = positions
+                file[name].make_scale(name)
+                file["height"].dims[index].attach_scale(file[name])
+            for name, unit in units.items():
+                if name in file and unit is not None:
+                    file[name].attrs["units"] = unit
+            if extra is not None:
+                extra(file)
+        return path
+
+    return write
+
+
+def test_units_and_positions_give_a_scan_in_metres(array):
+    read = read_topography(array())
+    assert read.heights == pytest.approx(1e-9 * HEIGHTS)
+    assert read.spacing == pytest.approx((0.25e-6, 0.5e-6))
+    assert (read.metres, read.metric_heights, read.periodic) == (True, True, False)
+    surface = FileSurface(path=array())
+    assert surface.sides == pytest.approx((3e-6, 8e-6))
+    assert surface.levelling() == "plane"
+    assert surface.warnings() == []
+
+
+@pytest.mark.parametrize("names", [("x", "y"), ("lon", "lat"), ("X", "Y")])
+def test_an_array_indexed_by_x_and_y_is_transposed(array, names):
+    axes = dict(zip(names, (X, Y), strict=True))
+    read = read_topography(array(HEIGHTS.T, axes, {"height": "nm", **dict.fromkeys(names, "um")}))
+    assert read.heights == pytest.approx(1e-9 * HEIGHTS)
+    assert read.spacing == pytest.approx((0.25e-6, 0.5e-6))
+
+
+def test_axes_of_other_names_keep_their_order(array):
+    units = {"height": "m", "scan": "m", "line": "m"}
+    read = read_topography(array(HEIGHTS, {"scan": Y, "line": X}, units))
+    assert read.heights == pytest.approx(HEIGHTS)
+    assert read.spacing == pytest.approx((0.25, 0.5))
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_a_descending_axis_is_turned(array, axis):
+    axes = {"y": Y[::-1] if axis == 0 else Y, "x": X[::-1] if axis == 1 else X}
+    read = read_topography(array(np.flip(HEIGHTS, axis), axes))
+    assert read.heights == pytest.approx(1e-9 * HEIGHTS)
+
+
+def test_uneven_positions_are_refused_by_the_name_of_the_axis(array):
+    with pytest.raises(InputError, match="'x' are not evenly spaced"):
+        read_topography(array(axes={"y": Y, "x": X**2}))
+
+
+@pytest.mark.parametrize("name", ["x", "height"])
+def test_an_unknown_unit_is_refused_by_its_name(array, name):
+    with pytest.raises(InputError, match=rf"{name}' has the unit 'furlong'"):
+        read_topography(array(units=UNITS | {name: "furlong"}))
+
+
+def test_heights_without_a_unit_beside_positions_with_one(array):
+    path = array(units=UNITS | {"height": None})
+    plain, scaled = FileSurface(path=path), FileSurface(path=path, scale=1e-9)
+    assert plain.sides == scaled.sides == pytest.approx((3e-6, 8e-6))
+    assert scaled.heights(16) == pytest.approx(1e-9 * plain.heights(16))
+    assert any("not of its heights" in warning for warning in plain.warnings())
+    assert not any("not of its heights" in warning for warning in scaled.warnings())
+
+
+def test_positions_without_a_unit(array):
+    """Beside metric heights the side is not known; beside others it is in the same unit."""
+    metric = FileSurface(path=array(units={"height": "nm"}))
+    warnings = "\n".join(metric.warnings())
+    assert "state no unit: set surface.length" in warnings
+    assert "does not state its side" not in warnings
+    plain = FileSurface(path=array(units={}), scale=1e-9)
+    assert plain.sides == pytest.approx((3e-9, 8e-9))
+
+
+def test_a_factor_of_metric_heights_gives_a_warning(array):
+    warnings = FileSurface(path=array(), scale=1e-9).warnings()
+    assert any("surface.scale multiplies metres" in warning for warning in warnings)
+
+
+def test_a_unit_without_positions_gives_a_warning(array):
+    """The array is read as it is."""
+    surface = FileSurface(path=array(axes={}))
+    assert surface.heights(16) == pytest.approx(HEIGHTS)
+    assert re.search("unit 'nm', which is not read: set surface.scale", surface.warnings()[0])
+
+
+def test_a_leading_axis_of_one_point_is_dropped(array):
+    read = read_topography(array(HEIGHTS[None], {"time": [7.0], "y": Y, "x": X}))
+    assert read.heights == pytest.approx(1e-9 * HEIGHTS)
+    assert read.spacing == pytest.approx((0.25e-6, 0.5e-6))
+
+
+def test_marks_of_missing_heights_are_found_before_units_are_converted(array):
+    heights = HEIGHTS.copy()
+    heights[2, 3] = 9.97e36
+    assert read_topography(array(heights)).holes == 1
+
+
+def test_a_study_is_read_as_before(array):
+    """Its fields have positions and units, and are periodic."""
+
+    def mark(file):
+        file.attrs["spec_text"] = ""
+
+    read = read_topography(array(extra=mark))
+    np.testing.assert_array_equal(read.heights, HEIGHTS)
+    assert (read.spacing, read.periodic) == (None, None)
