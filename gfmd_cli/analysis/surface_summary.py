@@ -18,6 +18,7 @@ from gfmd_cli.physics.persson import Persson
 from gfmd_cli.physics.roughness_parameters import MAP_NAMES, PROFILE_NAMES, roughness_parameters
 from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.physics.spectrum_fit import Moments, SelfAffineFit, fit, moments
+from gfmd_cli.study.forecast import first_grid
 from gfmd_cli.study.plausibility import METRES
 
 PRESSURES = np.array([0.003, 0.03, 0.3])  # p* of the predictions
@@ -150,7 +151,7 @@ def as_text(summary: SurfaceSummary) -> str:
     if summary.fit is not None:
         table = _table(record, grid.length)
         model = SelfAffine.model_validate(table)
-        theories["fit"] = build_scene(model, HalfSpace(), 2 * model.smallest_grid())
+        theories["fit"] = build_scene(model, HalfSpace(), first_grid(model))
         random = ["random surface with the fitted spectrum:", "", "[surface]"]
         random += [f"{key} = {json.dumps(value)}" for key, value in table.items()]
         lines += [
