@@ -8,6 +8,7 @@ import pytest
 
 from gfmd_cli.errors import InputError
 from gfmd_cli.physics import text_tables
+from gfmd_cli.physics.file_surface import FileSurface
 from gfmd_cli.physics.text_tables import table_formats
 from gfmd_cli.physics.topography import read_topography
 
@@ -164,3 +165,42 @@ def test_a_long_table_that_is_no_map_takes_no_longer_than_a_short_one(tmp_path, 
         seconds.append(time.process_time() - begun)
     assert max(seconds) < 5
     assert seconds[1] < 3 * seconds[0] + 0.5
+
+
+def labelled(heights, kind):
+    """A table of heights with positions in its first row, in its first column, or in both."""
+    rows, columns = heights.shape
+    x, y = 0.5 * np.arange(columns), 0.5 * np.arange(rows)[:, None]
+    if kind == "row":
+        return np.vstack([x, heights])
+    if kind == "column":
+        return np.hstack([y, heights])
+    return np.vstack([np.hstack([0.0, x]), np.hstack([y, heights])])
+
+
+@pytest.mark.parametrize("kind", ["row", "column", "both"])
+def test_positions_beside_the_heights_are_refused(tmp_path, kind):
+    heights = np.random.default_rng(0).standard_normal((9, 7))
+    path = tmp_path / "map.csv"
+    np.savetxt(path, labelled(heights, kind), delimiter=",")
+    with pytest.raises(InputError, match="positions or numbers, not heights"):
+        FileSurface(path=path).smallest_grid()
+
+
+def test_a_tilted_plane_with_roughness_in_one_row_is_a_map(tmp_path):
+    """Its rows are evenly spaced, and so are those beside them."""
+    heights = np.add.outer(0.1 * np.arange(9), np.arange(7.0))
+    heights[4, 3] += 1.0
+    path = tmp_path / "map.txt"
+    np.savetxt(path, heights)
+    assert FileSurface(path=path).smallest_grid() == 7
+
+
+def test_a_fourth_column_beside_positions_is_refused(tmp_path):
+    """Columns x, y, height and quality."""
+    y, x = np.indices((8, 6))
+    values = np.random.default_rng(0).standard_normal((2, 48))
+    path = tmp_path / "map.txt"
+    np.savetxt(path, np.column_stack([x.ravel(), y.ravel(), *values]))
+    with pytest.raises(InputError, match="one of 4 columns is sorted"):
+        FileSurface(path=path).smallest_grid()

@@ -7,6 +7,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from gfmd_cli.errors import INSTALL, InputError
+from gfmd_cli.grid.arrays import Field
 from gfmd_cli.physics.height_map import (
     REMEDY,
     HeightMap,
@@ -21,6 +22,7 @@ NO_GRID = "three columns that are not the points (x, y, height) of a full grid"
 TABLES = {"xyz", "asc"}  # formats of SurfaceTopography that are tables of numbers
 SMALL_FILE = 2**14  # bytes, which the readers of tables parse in a second
 EVEN = 1e-3  # deviation of distances, over their mean, up to which they are equal; a choice
+SORTED_ROWS = 20  # heights of so many rows are not sorted by chance; a choice
 SIGNATURE_BYTES = 512  # at the beginning of a file, by which readers recognise their format
 
 
@@ -108,6 +110,8 @@ def _read_channel(
                 f"a header that states its sides. {REMEDY}"
             )
         _check_all_rows_read(path, file, rows, columns_read)
+        if unsized:
+            _check_all_are_heights(path, scan.heights().T)
     if scan.is_uniform:
         heights, sides = scan.heights().T, tuple(map(float, scan.physical_sizes))[::-1]
         if len(shape) == 1 and sides[0] < 0:  # recorded backwards
@@ -167,6 +171,34 @@ def _increasing(path: Path, x: Any, heights: Any) -> tuple[Any, Any]:
             f"{x[wrong[0]]:.6g} is followed by {x[wrong[0] + 1]:.6g}"
         )
     return x, heights
+
+
+def _check_all_are_heights(path: Path, table: Field) -> None:
+    """Raise InputError where a row or column of a table seems to be positions or numbers.
+
+    The first value of such a row may be that of a corner.
+    """
+    for word, values in (("row", table), ("column", table.T)):
+        for first, second in (values[:2, 1:], values[:-3:-1, 1:]):
+            if _is_evenly_spaced(first) and not _is_evenly_spaced(second):
+                raise InputError(
+                    f"{path}: a {word} of the table is ..., {first[0]:g}, {first[1]:g}, "
+                    f"{first[2]:g}, ...: positions or numbers, not heights? Remove it from the file"
+                )
+    if table.shape[1] == MATRIX_COLUMNS and len(table) > SORTED_ROWS:
+        steps = np.diff(table, axis=0)
+        is_sorted = np.all(steps >= 0, axis=0) | np.all(steps <= 0, axis=0)
+        if np.any(is_sorted & np.any(steps, axis=0)):
+            raise InputError(
+                f"{path}: one of {MATRIX_COLUMNS} columns is sorted: positions, not heights? Save "
+                "the columns x, y and height alone, or a matrix of heights"
+            )
+
+
+def _is_evenly_spaced(values: Field) -> bool:
+    """Whether all steps from one value to the next are equal, and not zero."""
+    steps = np.diff(values)
+    return bool(values.size > 2 and steps[0] != 0 and np.ptp(steps) <= EVEN * abs(steps[0]))
 
 
 def _check_all_rows_read(path: Path, file: BinaryIO, rows: int, columns: int) -> None:
