@@ -139,13 +139,8 @@ def with_holes(contact):
     return replace(contact, may_touch=may_touch)
 
 
-@pytest.mark.parametrize("p_star", [1e-5, 1e-3, 0.01])
-@pytest.mark.parametrize("elastomer", [SUITED[1], SUITED[2], SUITED[4]], ids=name)
-@pytest.mark.parametrize("boundary", ["periodic", "free"])
-@pytest.mark.parametrize("change", [None, with_holes], ids=["", "with holes"])
-def test_the_solution_is_that_of_the_whole_grid(elastomer, p_star, boundary, change):
-    contact = SCENES[boundary](SelfAffine(cutoff=0.02), elastomer, 512).contact(p_star)
-    contact = change(contact) if change else contact
+def check_solution(contact):
+    """That the solution by tiles is the one of the whole grid, with fewer transforms."""
     local, whole = solve(contact, True), solve(contact, False)
     assert local.status == whole.status == "converged"
     assert local.transforms < 0.6 * whole.transforms
@@ -157,6 +152,20 @@ def test_the_solution_is_that_of_the_whole_grid(elastomer, p_star, boundary, cha
     assert contact.recompute(u, sigma) == pytest.approx(local.residual, abs=1e-9)
     assert u == pytest.approx(local.u, abs=1e-9)
     assert sigma == pytest.approx(local.sigma, abs=1e-9)
+
+
+@pytest.mark.parametrize("p_star", [1e-5, 1e-3, 0.01])
+@pytest.mark.parametrize("elastomer", [SUITED[1], SUITED[2], SUITED[4]], ids=name)
+@pytest.mark.parametrize("boundary", ["periodic", "free"])
+def test_the_solution_is_that_of_the_whole_grid(elastomer, p_star, boundary):
+    check_solution(SCENES[boundary](SelfAffine(cutoff=0.02), elastomer, 512).contact(p_star))
+
+
+@pytest.mark.parametrize("p_star", [1e-4, 0.01])
+@pytest.mark.parametrize("boundary", ["periodic", "free"])
+def test_the_solution_with_holes_is_that_of_the_whole_grid(boundary, p_star):
+    scene = SCENES[boundary](SelfAffine(cutoff=0.02), Power(n=1), 512)
+    check_solution(with_holes(scene.contact(p_star)))
 
 
 @pytest.mark.parametrize("elastomer", [Power(n=0.5), Power(n=1)], ids=name)
