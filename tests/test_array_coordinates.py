@@ -110,7 +110,7 @@ def test_a_unit_without_positions_gives_a_warning(array):
     """The array is read as it is."""
     surface = FileSurface(path=array(axes={}))
     assert surface.heights(16) == pytest.approx(HEIGHTS)
-    assert re.search("unit 'nm', which is not read: set surface.scale", surface.warnings()[0])
+    assert re.search("state a unit, which is not read: set surface.scale", surface.warnings()[0])
 
 
 def test_a_leading_axis_of_one_point_is_dropped(array):

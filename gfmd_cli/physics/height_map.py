@@ -13,7 +13,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from gfmd_cli.errors import InputError
-from gfmd_cli.physics.array_coordinates import axes_of, factor, is_transposed, stated_unit
+from gfmd_cli.physics.array_coordinates import (
+    UNIT_NAMES,
+    axes_of,
+    factor,
+    is_transposed,
+    stated_unit,
+)
 
 MAX_COMPRESSION = 1032  # the limit of deflate, https://zlib.net/zlib_tech.html
 MAX_HEIGHT = 1e30  # in any unit; the usual values for no data are 9.97e36 (netCDF) and 3.4e38
@@ -115,20 +121,23 @@ def _with_coordinates(path: Path, file: Any, data: Any, bare: HeightMap) -> Heig
     """A map with the order of its axes, sides and units by its dimension scales.
 
     With units of heights and positions it is in metres and not periodic, as a microscope scan.
-    Without positions it is a bare array.
+    Without positions it is a bare array. The text of its unit is then not read: in a damaged file
+    HDF5 may look for it without end.
     """
-    heights, unit = bare.heights, stated_unit(data)
+    heights = bare.heights
     axes = axes_of(path, file, data, MAX_COMPRESSION)[-heights.ndim :]
     if is_transposed(axes):
         heights, axes = heights.T, axes[::-1]
     steps = [axis.step for axis in axes if axis.step is not None]
     if len(steps) < len(axes):
-        note = f"the heights state the unit {unit!r}, which is not read: set surface.scale"
-        return bare._replace(heights=heights, notes=(note,) if unit else ())
+        note = "the heights state a unit, which is not read: set surface.scale"
+        has_unit = any(name in data.attrs for name in UNIT_NAMES)
+        return bare._replace(heights=heights, notes=(note,) if has_unit else ())
     forward = tuple(slice(None, None, -1 if step < 0 else None) for step in steps)
     heights = heights[forward]
     sides = [abs(step) * points for step, points in zip(steps, heights.shape, strict=True)]
-    metres, metric = factor(path, data.name, unit), [axis.metres for axis in axes if axis.metres]
+    metres = factor(path, data.name, stated_unit(data))
+    metric = [axis.metres for axis in axes if axis.metres]
     if metres is not None:
         is_height = np.abs(heights) < MAX_HEIGHT  # in the unit of the file
         heights = np.ma.masked_where(~is_height, metres * heights.astype(np.float64))
