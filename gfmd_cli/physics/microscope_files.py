@@ -8,6 +8,7 @@ import numpy as np
 
 from gfmd_cli.errors import INSTALL, InputError
 from gfmd_cli.grid.arrays import Field
+from gfmd_cli.physics.array_coordinates import EVEN
 from gfmd_cli.physics.height_map import (
     REMEDY,
     HeightMap,
@@ -21,7 +22,6 @@ from gfmd_cli.physics.text_tables import MATRIX_COLUMNS, columns, table_formats,
 NO_GRID = "three columns that are not the points (x, y, height) of a full grid"
 TABLES = {"xyz", "asc"}  # formats of SurfaceTopography that are tables of numbers
 SMALL_FILE = 2**14  # bytes, which the readers of tables parse in a second
-EVEN = 1e-3  # deviation of distances, over their mean, up to which they are equal; a choice
 SORTED_ROWS = 20  # heights of so many rows are not sorted by chance; a choice
 SIGNATURE_BYTES = 512  # at the beginning of a file, by which readers recognise their format
 

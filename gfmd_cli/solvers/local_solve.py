@@ -84,8 +84,8 @@ class LocalSolve:
         self.transforms += self.operators.transforms
         return self.map_pressure(s)
 
-    def compliance_everywhere(self, *, is_rough: bool) -> Field:
-        """C s at all points, in single precision where that is faster and `is_rough` is true.
+    def compliance_everywhere(self, *, in_single_precision: bool) -> Field:
+        """C s at all points, in single precision if that is allowed and faster.
 
         Valid until the next call.
         """
@@ -103,17 +103,17 @@ class LocalSolve:
         """Solve until the start has a residual below the tolerance, with the exact C in the end.
 
         Returns the last evaluation, and C s at all points. The first evaluation corrects operators
-        with an error of 1e-3 and can be rough, unless the tolerance is so loose that it may be the
-        last one.
+        with an error of 1e-3 and may be in single precision, unless the tolerance is so loose that
+        it may be the last one.
         """
         aim = FIRST_TOLERANCE
         for count in range(1, MAX_EVALUATIONS + 1):
             self.run(aim)
-            is_rough = count == 1 and tolerance < FIRST_TOLERANCE
-            displacement = self.compliance_everywhere(is_rough=is_rough)
+            in_single_precision = count == 1 and tolerance < FIRST_TOLERANCE
+            displacement = self.compliance_everywhere(in_single_precision=in_single_precision)
             result = self.evaluate(displacement)
             is_good = result.start_residual < MARGIN * tolerance and not result.entered.any()
-            if (is_good and not is_rough) or count == MAX_EVALUATIONS:
+            if (is_good and not in_single_precision) or count == MAX_EVALUATIONS:
                 break
             if result.start_residual > 0:  # it is zero if a single point is in contact
                 reduction = np.clip(AIM * tolerance / result.start_residual, *REDUCTION)

@@ -125,9 +125,9 @@ def _refined(field: Field, tiles: Tiles) -> Field:
 class PeriodicSolve(LocalSolve):
     """The solve in a periodic cell, from which the iteration on the whole grid takes u."""
 
-    def compliance_everywhere(self, *, is_rough: bool) -> Field:
+    def compliance_everywhere(self, *, in_single_precision: bool) -> Field:
         """C s at all points, in the memory of the transforms."""
-        grid = self.grid.in_single() if is_rough else self.grid
+        grid = self.grid.in_single() if in_single_precision else self.grid
         values = grid.padded[..., : grid.points]
         self.tiles.put(self.s, values)
         grid.unfilter_padded(self.contact.stiffness)
@@ -169,7 +169,7 @@ class FreeSolve(LocalSolve):
 
     contact: FreeContact
 
-    def compliance_everywhere(self, *, is_rough: bool) -> Field:
+    def compliance_everywhere(self, *, in_single_precision: bool) -> Field:
         """C s at all points, always in double precision."""
         values = self.grid.empty()
         self.tiles.put(self.s, values)
