@@ -23,6 +23,7 @@ SPIN_SECONDS, LONG_SPIN_SECONDS = 2e-4, 2e-2  # of testing a request without sle
 POLL_SECONDS = 2e-5  # of sleep between two tests after that
 ERROR_POLL_SECONDS = 1e-3
 ABORT_AFTER_SECONDS = 10.0  # that a rank with an error waits for the others before it ends them all
+FORWARD_SECONDS = 1.0  # for the launcher to forward the last message
 log = logging.getLogger(__name__)
 
 
@@ -89,9 +90,16 @@ class Ranks:
             raise self.error_comm.bcast(_portable(error, self.rank), root=int(failed[0]))
 
     def abort(self, error: BaseException) -> None:
-        """End all ranks, with the exit status of this error."""
-        log.critical("gfmd: rank %d: %s", self.rank, _portable(error, self.rank))
+        """End all ranks, with the exit status of this error.
+
+        The launcher drops what it has not yet forwarded of the output, hence the pause; and
+        MPI's own abort may return.
+        """
+        text = error if isinstance(error, GfmdError) else f"{type(error).__name__}: {error}"
+        log.critical("gfmd: rank %d: %s", self.rank, text)
+        time.sleep(FORWARD_SECONDS)
         self.comm.Abort(_status(error))
+        os._exit(_status(error))
 
 
 @contextmanager
