@@ -232,7 +232,7 @@ def run(
     overrides
         Strings "table.key=value" that override keys of a spec in a file.
     jobs
-        Number of worker processes; above one the script needs `if __name__ == "__main__":`.
+        Number of worker processes.
     report
         Function that is called at every start, step and end of a task.
 

@@ -6,6 +6,7 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from threading import Event
+from time import monotonic
 
 from gfmd_cli.errors import InputError, Interrupted, SpaceError
 from gfmd_cli.grid import plans
@@ -13,7 +14,7 @@ from gfmd_cli.grid.ranks import Ranks, agree, leads, together
 from gfmd_cli.physics.file_surface import forget_files
 from gfmd_cli.spec.models import Spec
 from gfmd_cli.status import Status
-from gfmd_cli.study.context import Report, SolveContext, WorkerOptions
+from gfmd_cli.study.context import Progress, Report, SolveContext, WorkerOptions
 from gfmd_cli.study.pool import solve_in_pool
 from gfmd_cli.study.refinement import forget_scene
 from gfmd_cli.study.resources import check_memory, room, seconds_to_stop, share_out
@@ -23,7 +24,6 @@ from gfmd_cli.study.signals import noted
 from gfmd_cli.study.store import Study, without_result
 from gfmd_cli.study.tasks import Task, plan
 from gfmd_cli.study.time_left import Clock
-from gfmd_cli.study.time_limit import TimeLimit
 
 
 @dataclass(frozen=True)
@@ -104,13 +104,12 @@ def run_study(
         threads, room(ranks) / jobs, options.reproducible, options.checkpoint_every
     )
     stop = Event()
-    time_limit = TimeLimit(stop)
-    watch = time_limit.watching(Clock(pending, jobs).with_time_left(report))
-    context = SolveContext(worker_options, watch, stop, ranks)
-    seconds = None
+    watch = Clock(pending, jobs).with_time_left(report)
     if options.max_seconds is not None and pending:  # early enough to save all and to collect it
         seconds = max(options.max_seconds / 2, options.max_seconds - seconds_to_stop(pending, jobs))
-    with noted(stop), time_limit.after(seconds), _folder(study, tasks, ranks) as damaged:
+        watch = _until(monotonic() + seconds, stop, watch)
+    context = SolveContext(worker_options, watch, stop, ranks)
+    with noted(stop), _folder(study, tasks, ranks) as damaged:
         unusable = plans.plan_with(study.parts, estimated=options.reproducible)
         context.warn(*moved, *damaged, *filter(None, [unusable]))
         try:
@@ -125,6 +124,20 @@ def run_study(
         if not any(status.is_failure for status in solved):
             _check_output(pending, agree(ranks, study.outcomes()))
     return outcome + solved
+
+
+def _until(end: float, stop: Event, report: Report) -> Report:
+    """The report, which also sets `stop` at the first event of a task after a time.
+
+    Each call of a run therefore advances at least one task, however short its time.
+    """
+
+    def watch(progress: Progress) -> None:
+        report(progress)
+        if progress.task >= 0 and monotonic() > end:
+            stop.set()
+
+    return watch
 
 
 def _move_aside(study: Study, options: RunOptions) -> list[str]:
