@@ -323,6 +323,8 @@ def measure(case: Case, tolerance: float = 1e-6) -> dict:
         "fit": case.fit,
         "p_star": case.p_star,
         "single": case.is_single,
+        "band_limited": case.surface.band_limited,
+        "stepped": case.surface.stepped,
         "levels": levels,
     }
 
@@ -387,7 +389,14 @@ def scores(records: list[dict]) -> Iterator[Score]:
                 continue
             for grids in range(1, min(last + 1, 3) + 1):
                 used = levels[last + 1 - grids : last + 1]
-                by_name = estimate(used, at_last["exponent"], rough, at_last["spread"])
+                by_name = estimate(
+                    used,
+                    at_last["exponent"],
+                    rough,
+                    at_last["spread"],
+                    band_limited=record["band_limited"],
+                    stepped=record["stepped"],
+                )
                 for quantity, value in by_name.items():
                     if np.isnan(value.error):
                         continue
