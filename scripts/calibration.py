@@ -486,11 +486,11 @@ def table(scored: list[Score]) -> None:
 
 
 def figure(scored: list[Score], path: Path) -> None:
-    """Bar over true error of the cases that nothing was fitted to."""
+    """Error bar over true error of the cases that nothing was fitted to."""
     from gfmd_cli.analysis.plotting import ColumnFigure, Line2D, styled
 
     with styled():
-        plot = ColumnFigure("true error", "bar")
+        plot = ColumnFigure("true error", "error bar")
         span = (1e-6, 1.0)
         looks = {
             "a_r": ("o", "tab:blue"),
@@ -504,7 +504,7 @@ def figure(scored: list[Score], path: Path) -> None:
             style = {"marker": marker, "ls": "none", "mfc": "none", "color": colour}
             plot.axes.plot(*np.clip((x, y), *span), ms=2.2, mew=0.4, **style)
             plot.legend[labels[quantity]] = Line2D([], [], **style)
-        plot.line("bar = error", np.array(span), np.array(span), color="black")
+        plot.line("error bar = true error", np.array(span), np.array(span), color="black")
         for axis in "xy":
             plot.scale(axis, "log", span)
         plot.write(path)
