@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from gfmd_cli.errors import InputError
+from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.physics.contact import build_scene
 from gfmd_cli.physics.elastomers import HalfSpace
 from gfmd_cli.physics.file_surface import FileSurface
@@ -524,7 +525,7 @@ def test_holes_are_filled_and_do_not_tilt_the_map(npy):
     plane = 3 + x - 2 * y
     plane[:9, :12] = np.nan
     surface = FileSurface(path=npy(plane), periodic=False, edges="none")
-    np.testing.assert_allclose(surface.heights(16), 0, atol=1e-12)
+    np.testing.assert_allclose(surface.heights_on(Grid(16)), 0, atol=1e-12)
 
 
 def test_an_oblong_map_is_used_as_it_is_and_its_middle_as_asked(npy):

@@ -106,6 +106,8 @@ class Topography:
     """Whether the heights are in metres; else they are in an unknown unit."""
     notes: tuple[str, ...] = ()
     """Warnings about what the file states and the reader does not use."""
+    precision: float = float(np.finfo(float).eps)
+    """Distance of the numbers next to 1 in the type of the heights in the file."""
 
     @property
     def holes(self) -> int:
@@ -209,6 +211,7 @@ def _checked(
         shape,
         data.metric_heights,
         data.notes,
+        float(np.finfo(data.heights.dtype if data.heights.dtype.kind == "f" else float).eps),
     )
 
 
