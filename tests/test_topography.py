@@ -220,6 +220,17 @@ def test_rounded_heights_give_a_warning(npy, rounding, is_coarse):
     assert not is_coarse or f"smallest step is {1e-6 * step:.3g} m" in found[0]
 
 
+@pytest.mark.parametrize("axis", [0, 1])
+@pytest.mark.parametrize("rounding", [0.0, 1.0])
+def test_a_map_that_is_constant_along_an_axis_is_not_rounded(npy, axis, rounding):
+    """A profile that is extended to a map; its own rounding is still found."""
+    line = np.random.default_rng(0).normal(size=64).cumsum()
+    line = np.round(line / rounding) * rounding if rounding else line
+    heights = np.stack([line] * 32, axis=axis)
+    warnings = FileSurface(path=npy(heights)).warnings()
+    assert any("neighbouring heights are equal" in each for each in warnings) == bool(rounding)
+
+
 def test_the_heights_of_a_microscope_are_fine_enough():
     assert not any("are equal" in warning for warning in FileSurface(path=SCAN).warnings())
 

@@ -127,21 +127,21 @@ def outliers(topography: Topography) -> str:
 
 
 def rounded(topography: Topography, scale: float) -> str:
-    """Heights in steps as coarse as the differences of neighbours."""
+    """Heights in steps as coarse as the differences of neighbours along the rougher axis."""
     heights, smallest = topography.heights, np.inf
-    pairs = changes = 0
+    pairs, changes = np.zeros((2, heights.ndim), int)
     for rows in row_blocks(heights):
         block = heights[rows]
         if topography.missing is not None:
             block = np.where(topography.missing[rows], np.nan, block)
         for axis in range(heights.ndim):
             steps = np.abs(np.diff(block, axis=axis))
-            pairs += int(np.count_nonzero(np.isfinite(steps)))
+            pairs[axis] += np.count_nonzero(np.isfinite(steps))
             steps = steps[steps > 0]
-            changes += steps.size
+            changes[axis] += steps.size
             smallest = min(smallest, steps.min(initial=np.inf))
-    equal = 1 - changes / max(pairs, 1)
-    if equal < ROUNDED or not changes:
+    equal = 1 - float((changes / np.maximum(pairs, 1)).max())
+    if equal < ROUNDED or not changes.any():
         return ""
     return (
         f"{equal:.0%} of the neighbouring heights are equal: if they were rounded (the smallest "
