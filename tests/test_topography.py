@@ -610,6 +610,25 @@ def test_sides_keep_their_unit_where_the_heights_have_none(tmp_path, heights, un
     assert "not of its heights" in warning
 
 
+@pytest.mark.parametrize(("stated", "other"), [("Width", "Height"), ("Height", "Width")])
+@pytest.mark.parametrize("unit", ["", "# Value units: nm\n"])
+def test_a_header_with_one_side_is_refused(tmp_path, heights, stated, other, unit):
+    pytest.importorskip("SurfaceTopography")
+    rows = (" ".join(map(str, row)) for row in heights)
+    (tmp_path / "h.txt").write_text(f"# {stated}: 20 um\n{unit}" + "\n".join(rows))
+    with pytest.raises(InputError, match=rf"h\.txt: .*\({stated}\) alone; add .*# {other}: 20 um"):
+        read_topography(tmp_path / "h.txt")
+
+
+@pytest.mark.parametrize("unit", ["", "# Value units: nm\n"])
+def test_a_table_without_sides_gives_a_warning(tmp_path, heights, unit):
+    pytest.importorskip("SurfaceTopography")
+    rows = (" ".join(map(str, row)) for row in heights)
+    (tmp_path / "h.txt").write_text(f"# Channel: a\n{unit}" + "\n".join(rows))
+    warnings = FileSurface(path=tmp_path / "h.txt").warnings()
+    assert "does not state its side in metres; L = 1 m is assumed" in warnings[0]
+
+
 @pytest.mark.parametrize(("depth", "width"), [(2000, 0), (0, 11000)])
 def test_the_search_for_a_map_in_many_groups_is_bounded(tmp_path, depth, width):
     path = tmp_path / "groups.h5"

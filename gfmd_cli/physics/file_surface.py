@@ -289,9 +289,9 @@ class FileSurface(RigidSurface):
         """Warnings about the side, the heights, their gradient and borders, and unused keys."""
         topography, heights = self._topography(), _prepared(self)
         warnings = list(topography.notes)
-        if self._known_length() is None and not topography.metric_heights:
+        if self._known_length() is None:
             warnings.append(
-                "the file does not state its side; L = 1 m is assumed: set surface.length"
+                "the file does not state its side in metres; L = 1 m is assumed: set surface.length"
             )
         if self.length is not None and topography.spacing is not None and topography.metres:
             stated = topography.spacing[-1] * heights.shape[-1] / self.copies

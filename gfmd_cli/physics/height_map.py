@@ -153,8 +153,7 @@ def _with_coordinates(path: Path, file: Any, data: Any, bare: HeightMap) -> Heig
         )
     if metres is None:
         return bare._replace(heights=heights, sides=tuple(sides))
-    note = "the positions along the axes state no unit: set surface.length"
-    return bare._replace(heights=heights, metric_heights=True, notes=(note,))
+    return bare._replace(heights=heights, metric_heights=True)
 
 
 def _dataset_name(path: Path, file: Any, name: str | None) -> str:

@@ -96,6 +96,8 @@ def _read_channel(
     shape: tuple[int, ...] = (channel.nb_grid_pts or ())[::-1]
     check_layout(path, shape, np.dtype(float), max_bytes)
     unsized = channel.physical_sizes is None
+    if len(shape) == 2:
+        _check_sides(path, channel)
     scan = channel.topography(physical_sizes=(1.0,) * len(shape) if unsized else None)
     if reader.format() == "xyz" and len(shape) == 1:
         scan = _with_positions(reader, scan)
@@ -131,10 +133,27 @@ def _read_channel(
     )
 
 
+def _header(channel: Any) -> dict[str, Any]:
+    """The keys and values of the header of a text table."""
+    header = channel.info.get("raw_metadata") if channel.info else None
+    return header if isinstance(header, dict) else {}
+
+
+def _check_sides(path: Path, channel: Any) -> None:
+    """Raise InputError where the header of a table states only one side of a map."""
+    sides = channel.physical_sizes or ()
+    if len(sides) == 1 or (not sides and "physical_size_y" in _header(channel)):
+        stated, other = ("Width", "Height") if sides else ("Height", "Width")
+        raise InputError(
+            f"{path}: the header states the side along {'x' if sides else 'y'} ({stated}) alone; "
+            f"add a line such as '# {other}: 20 um', or remove both and set surface.length"
+        )
+
+
 def _sides_with_unit(channel: Any, sides: tuple[float, ...]) -> tuple[float, ...] | None:
     """The sides [m] of a text table whose header states units of them but not of the heights."""
-    header = channel.info.get("raw_metadata", {}) if channel.info else {}
-    unit_x = header.get("xunit") if isinstance(header, dict) else None
+    header = _header(channel)
+    unit_x = header.get("xunit")
     if not unit_x:
         return None
     units = (header.get("yunit") or unit_x, unit_x)[-len(sides) :]
