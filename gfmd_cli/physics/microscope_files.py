@@ -17,7 +17,13 @@ from gfmd_cli.physics.height_map import (
     first_line,
 )
 from gfmd_cli.physics.length_units import in_metres
-from gfmd_cli.physics.text_tables import MATRIX_COLUMNS, columns, table_formats, with_blanks
+from gfmd_cli.physics.text_tables import (
+    MATRIX_COLUMNS,
+    columns,
+    in_utf8,
+    table_formats,
+    with_blanks,
+)
 
 NO_GRID = "three columns that are not the points (x, y, height) of a full grid"
 TABLES = {"xyz", "asc"}  # formats of SurfaceTopography that are tables of numbers
@@ -41,7 +47,7 @@ def read_microscope_file(path: Path, dataset: str | None, max_bytes: int) -> Hei
                 f"{path}: not .npy or HDF5; other formats need SurfaceTopography: "
                 f"{INSTALL.format('topography')}"
             ) from error
-        table = with_blanks(file)
+        table = in_utf8(with_blanks(file))
         with _open_scan(path, table, readers) as reader:
             return _read_channel(path, table, reader, dataset, max_bytes)
 

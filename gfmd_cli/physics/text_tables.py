@@ -20,6 +20,7 @@ SAMPLE_BYTES = 2**16  # at the end of each window; a choice
 MIN_DIGITS = 0.2  # share of the characters of a table; a choice, as heights are mostly digits
 GRID_LINES = 20_000  # whose positions are compared; a choice
 MATRIX_COLUMNS = 4  # fewer are positions: the rule of SurfaceTopography
+LATIN_1 = b"Scan Parameters"  # begins a table of Dektak, which its reader takes as Latin-1
 NUMBERS = b" \t+-.,;0123456789eEdDinfaINFA"
 """Characters of lines without words."""
 
@@ -62,6 +63,21 @@ def with_blanks(file: BinaryIO) -> BinaryIO:
             text = file.read().replace(b";", b" ")
             return BytesIO(text.replace(b",", b"." if is_decimal else b" "))
     file.seek(0)
+    return file
+
+
+def in_utf8(file: BinaryIO) -> BinaryIO:
+    """A table in Latin-1 as one in UTF-8; any other file is returned as it is."""
+    is_table = columns(file) > 0
+    file.seek(0)
+    content = file.read() if is_table else b""
+    file.seek(0)
+    if content.isascii() or content.startswith(LATIN_1):
+        return file
+    try:
+        content.decode()
+    except UnicodeDecodeError:
+        return BytesIO(content.decode("latin-1").encode())
     return file
 
 
