@@ -100,6 +100,38 @@ def test_separators_and_decimal_commas(tmp_path, separator, decimal, end, column
     assert read_topography(path).heights == pytest.approx(heights, abs=1e-9)
 
 
+def in_nm(separator, shape):
+    """Heights from 0.9 to 1.3 um as numbers in nm, or in um with three decimals."""
+    heights = np.random.default_rng(0).integers(900, 1300, shape)
+    return heights, lambda word: "\n".join(separator.join(map(word, row)) for row in heights)
+
+
+@pytest.mark.parametrize("separator", [" ", "\t", ";", "; "])
+@pytest.mark.parametrize("columns", [2, 3, 4, 30])
+def test_separators_of_thousands_are_refused(tmp_path, separator, columns):
+    _, table = in_nm(separator, (20, columns))
+    (tmp_path / "h.txt").write_text("# by 5\n" + table("{:,}".format))
+    with pytest.raises(InputError, match=r"1,\d\d\d beside 9\d\d: does the comma separate thous"):
+        read_topography(tmp_path / "h.txt")
+    (tmp_path / "h.txt").write_text(table(lambda nm: f"{1e4 * nm:,.1f}"))
+    with pytest.raises(InputError, match="does the comma separate thousands"):
+        read_topography(tmp_path / "h.txt")
+
+
+@pytest.mark.parametrize("separator", [" ", ";"])
+@pytest.mark.parametrize("offset", [0, 100])
+def test_three_digits_after_each_comma_are_decimals(tmp_path, separator, offset):
+    """With a warning, unless one number begins with zero."""
+    heights, table = in_nm(separator, (20, 30))
+    (tmp_path / "h.txt").write_text(
+        table(lambda nm: f"{1e-3 * (nm + offset):.3f}".replace(".", ","))
+    )
+    read = read_topography(tmp_path / "h.txt")
+    assert read.heights == pytest.approx(1e-3 * (heights + offset))
+    warnings = FileSurface(path=tmp_path / "h.txt").warnings()
+    assert any("are they thousands?" in each for each in warnings) == bool(offset)
+
+
 HEADERS = {
     "X;Y;valid\n[mm];[um];[1/0]": ";",
     "Scan Parameters,\nStylus,tip\nScan Data\n\nLateral mm,Raw um,": ",",

@@ -47,9 +47,14 @@ def read_microscope_file(path: Path, dataset: str | None, max_bytes: int) -> Hei
                 f"{path}: not .npy or HDF5; other formats need SurfaceTopography: "
                 f"{INSTALL.format('topography')}"
             ) from error
-        table = in_utf8(with_blanks(file))
+        try:
+            table, warning = with_blanks(file)
+        except ValueError as error:
+            raise InputError(f"{path}: {error}") from error
+        table = in_utf8(table)
         with _open_scan(path, table, readers) as reader:
-            return _read_channel(path, table, reader, dataset, max_bytes)
+            heights = _read_channel(path, table, reader, dataset, max_bytes)
+    return heights._replace(notes=(warning,) if warning else ())
 
 
 def _open_scan(path: Path, file: BinaryIO, readers: list[Any]) -> Any:
