@@ -8,6 +8,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from scipy.io import savemat
 
 from gfmd_cli.errors import InputError
 from gfmd_cli.grid.fft_grid import Grid
@@ -71,7 +72,8 @@ def test_every_real_type_becomes_double_precision(npy, heights, dtype):
 
 
 def test_the_only_map_of_an_hdf5_file_needs_no_name(hdf5, heights):
-    read = read_topography(hdf5(x=np.arange(16.0), h=heights.astype("f4")))
+    numbers = {"a": np.ones((1, 1)), "b": np.ones((1, 16)), "x": np.arange(16.0)}
+    read = read_topography(hdf5(**numbers, h=heights.astype("f4")))
     np.testing.assert_array_equal(read.heights, heights.astype("f4"))
     assert (read.spacing, read.periodic, read.source) == (None, None, "HDF5, h, float32")
 
@@ -312,6 +314,32 @@ def test_two_maps_and_an_unknown_name_list_the_candidates(hdf5, heights):
     for dataset, message in ((None, "several datasets"), ("c", "no dataset 'c'")):
         with pytest.raises(InputError, match=f"{message}.*: a, b$"):
             read_topography(path, dataset)
+
+
+@pytest.mark.parametrize("name", ["height", "Topography", "scan/z"])
+def test_a_map_whose_name_means_heights_is_preferred(hdf5, heights, name):
+    read = read_topography(hdf5(**{"error": 0 * heights, name: heights, "zz": 0 * heights}))
+    np.testing.assert_array_equal(read.heights, heights)
+    assert f"HDF5, {name}," in read.source
+
+
+def test_two_maps_whose_names_mean_heights_are_listed_alone(hdf5, heights):
+    path = hdf5(**{"error": heights, "a/height": heights, "b/height": heights})
+    with pytest.raises(InputError, match=r"several datasets: .*: a/height, b/height$"):
+        read_topography(path)
+
+
+def test_arrays_of_matlab_are_chosen_by_name(tmp_path, heights):
+    """Scalars and positions are no maps."""
+    pytest.importorskip("SurfaceTopography")
+    arrays = {"a": 3.0, "x": np.arange(16.0), "b": 0 * heights}
+    savemat(tmp_path / "two.mat", arrays | {"z": heights})
+    assert read_topography(tmp_path / "two.mat").source == "mat, z"
+    savemat(tmp_path / "one.mat", arrays)
+    assert read_topography(tmp_path / "one.mat").source == "mat, b"
+    savemat(tmp_path / "other.mat", arrays | {"c": heights})
+    with pytest.raises(InputError, match=r"several datasets: .*: b, c$"):
+        read_topography(tmp_path / "other.mat")
 
 
 @pytest.mark.parametrize("link", [h5py.SoftLink("/h"), h5py.ExternalLink("other.h5", "/h")])

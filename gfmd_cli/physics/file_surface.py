@@ -51,7 +51,8 @@ class FileSurface(RigidSurface):
     path: FilePath
     """Path of the file, relative to the run spec."""
     dataset: str | None = None
-    """HDF5 dataset or microscope channel; by default the only map, or the default channel."""
+    """HDF5 dataset or microscope channel; by default the only map, the only one with a name such as
+    "height", or the default channel."""
     region: Region | None = None
     """Part of the map to use, such as { x = [10, 110], y = [0, 90] } in pixels, or with
     unit = "m" in metres; by default all of it."""

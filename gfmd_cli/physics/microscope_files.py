@@ -11,10 +11,12 @@ from gfmd_cli.grid.arrays import Field
 from gfmd_cli.physics.array_coordinates import EVEN
 from gfmd_cli.physics.height_map import (
     REMEDY,
+    SMALLEST_MAP,
     HeightMap,
     at_equal_distances,
     check_layout,
     first_line,
+    only_map,
 )
 from gfmd_cli.physics.length_units import in_metres
 from gfmd_cli.physics.text_tables import (
@@ -268,7 +270,10 @@ def _height_channel(path: Path, reader: Any, name: str | None) -> Any:
         for channel in reader.channels
         if channel.data_kind.value == "height" and not isinstance(channel.unit, tuple)
     }  # a channel with a pair of units holds phases or error signals over lengths
-    if name is None and channels:
+    if name is None and channels and reader.format() == "mat":  # arrays without a meaning
+        maps = [key for key, item in channels.items() if min(item.nb_grid_pts) >= SMALLEST_MAP]
+        name = only_map(path, maps or list(channels))
+    elif name is None and channels:
         default = reader.default_channel.channel_id
         name = default if default in channels else next(iter(channels))
     if name not in channels:

@@ -134,8 +134,8 @@ def read_topography(
     Parameters
     ----------
     path : the file
-    dataset : name of the HDF5 dataset or microscope channel; by default the only 2-D dataset
-        or the default height channel
+    dataset : name of the HDF5 dataset or microscope channel; by default the only 2-D dataset, the
+        only one with a name such as "height", or the default height channel
     max_bytes : size of the largest map that is read, counted in double precision
     region : the part of the map to read
     flip : change the sign of the heights
