@@ -94,9 +94,7 @@ def test_heights_without_a_unit_beside_positions_with_one(array):
 def test_positions_without_a_unit(array):
     """Beside metric heights the side is not known; beside others it is in the same unit."""
     metric = FileSurface(path=array(units={"height": "nm"}))
-    warnings = "\n".join(metric.warnings())
-    assert "state no unit: set surface.length" in warnings
-    assert "does not state its side" not in warnings
+    assert "does not state its side in metres; L = 1 m is assumed" in metric.warnings()[0]
     plain = FileSurface(path=array(units={}), scale=1e-9)
     assert plain.sides == pytest.approx((3e-9, 8e-9))
 

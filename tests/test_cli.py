@@ -329,5 +329,8 @@ def test_a_study_is_no_height_map_unless_it_holds_heights(gfmd):
     assert "choose one by surface.dataset" in result.output
     gfmd("run", "spec.toml", "--set", "elastomer.n=0", "--set", 'output.fields=["u", "height"]')
     result = gfmd("surface", "small.h5")
+    assert result.exit_code == 2
+    name = re.search(r"its height maps: (\S+/height), \S+/height$", result.output.strip())[1]
+    result = gfmd("surface", "small.h5", "--set", f"surface.dataset={name}")
     assert result.exit_code == 0, result.output
     assert "64 x 64 points" in result.output

@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from gfmd_cli.errors import InputError
+from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.physics import map_preparation
 from gfmd_cli.physics.file_surface import FileSurface
 from gfmd_cli.physics.map_preparation import fill_missing, level, make_periodic
@@ -153,3 +155,46 @@ def test_lines_are_made_periodic_along_their_axis():
     windowed = make_periodic(line, "window")
     assert windowed[0] == line.mean()
     np.testing.assert_allclose(windowed[2:19], line[2:19])
+
+
+PLANE = np.add.outer(3 + np.arange(24) / 7, np.arange(20) / 9)
+
+
+@pytest.mark.parametrize("heights", [0.3 + 0 * PLANE, PLANE, PLANE.astype(np.float32)])
+@pytest.mark.parametrize("scale", [1.0, 1e-9])
+@pytest.mark.parametrize("hole", [False, True])
+def test_a_map_that_is_flat_after_levelling_is_refused(tmp_path, heights, scale, hole):
+    """What is left is rounding, which would be solved as roughness."""
+    heights = heights.copy()
+    if hole:
+        heights[3:6, 4] = np.nan
+    np.save(tmp_path / "h.npy", heights)
+    surface = FileSurface(path=tmp_path / "h.npy", periodic=False, scale=scale)
+    with pytest.raises(InputError, match="the map is flat") as error:
+        surface.smallest_grid()
+    left = float(np.ptp(surface.heights_on(Grid(20, points_y=24))))
+    assert ("is the rounding of heights of up to" in str(error.value)) == (left > 0)
+
+
+def test_roughness_in_single_precision_far_from_zero_is_used(tmp_path):
+    """Heights of 1 nm beside an offset of 2 mm, which is rounded to 0.2 nm."""
+    rough = 2e-3 + 1e-9 * np.random.default_rng(0).normal(size=(24, 20))
+    np.save(tmp_path / "h.npy", rough.astype(np.float32))
+    assert FileSurface(path=tmp_path / "h.npy", periodic=False).smallest_grid() == 20
+
+
+@pytest.mark.parametrize(
+    ("heights", "is_flat"),
+    [
+        (np.round(PLANE, 1), True),
+        (np.round(10 * PLANE).astype(int), True),
+        (PLANE.astype(np.float32).astype(float), True),
+        (np.round(PLANE + 0.2 * np.random.default_rng(0).normal(size=PLANE.shape), 1), False),
+        (PLANE + 1e-4 * np.random.default_rng(0).normal(size=PLANE.shape), False),
+    ],
+)
+def test_a_plane_of_rounded_heights_gives_a_warning(tmp_path, heights, is_flat):
+    """It could be meant: the terraces of a vicinal surface."""
+    np.save(tmp_path / "h.npy", heights)
+    warnings = FileSurface(path=tmp_path / "h.npy", periodic=False, scale=1e-9).warnings()
+    assert any("probably flat and its roughness rounding" in each for each in warnings) == is_flat

@@ -138,14 +138,16 @@ def test_a_map_of_few_points_is_interpolated(gfmd, tmp_path):
     assert row["status"] == "converged"
 
 
-def test_the_first_map_of_several_is_taken_and_named(gfmd, tmp_path):
+def test_one_of_several_maps_has_to_be_chosen(gfmd, tmp_path):
     first, second = np.random.default_rng(0).normal(size=(2, 16, 16))
     with h5py.File(tmp_path / "two.h5", "w") as file:
         file["first"], file["second"] = first, second
-    assert "HDF5, first" in gfmd("init", "spec.toml", "--from", "two.h5")
+    for words in (("surface", "two.h5"), ("init", "spec.toml", "--from", "two.h5")):
+        message = "choose one by surface.dataset; its height maps: first, second"
+        assert message in gfmd(*words, status=2)
+    gfmd("init", "spec.toml", "--from", "two.h5", "--set", "surface.dataset=second")
     (surface,) = read_spec(tmp_path / "spec.toml")[0].surface
-    assert surface.dataset == "first"
-    assert "HDF5, first" in gfmd("surface", "two.h5")
+    assert surface.dataset == "second"
     assert "HDF5, second" in gfmd("surface", "two.h5", "--set", "surface.dataset=second")
 
 

@@ -100,9 +100,42 @@ def test_separators_and_decimal_commas(tmp_path, separator, decimal, end, column
     assert read_topography(path).heights == pytest.approx(heights, abs=1e-9)
 
 
+def in_nm(separator, shape):
+    """Heights from 0.9 to 1.3 um as numbers in nm, or in um with three decimals."""
+    heights = np.random.default_rng(0).integers(900, 1300, shape)
+    return heights, lambda word: "\n".join(separator.join(map(word, row)) for row in heights)
+
+
+@pytest.mark.parametrize("separator", [" ", "\t", ";", "; "])
+@pytest.mark.parametrize("columns", [2, 3, 4, 30])
+def test_separators_of_thousands_are_refused(tmp_path, separator, columns):
+    _, table = in_nm(separator, (20, columns))
+    (tmp_path / "h.txt").write_text("# by 5\n" + table("{:,}".format))
+    with pytest.raises(InputError, match=r"1,\d\d\d beside 9\d\d: does the comma separate thous"):
+        read_topography(tmp_path / "h.txt")
+    (tmp_path / "h.txt").write_text(table(lambda nm: f"{1e4 * nm:,.1f}"))
+    with pytest.raises(InputError, match="does the comma separate thousands"):
+        read_topography(tmp_path / "h.txt")
+
+
+@pytest.mark.parametrize("separator", [" ", ";"])
+@pytest.mark.parametrize("offset", [0, 100])
+def test_three_digits_after_each_comma_are_decimals(tmp_path, separator, offset):
+    """With a warning, unless one number begins with zero."""
+    heights, table = in_nm(separator, (20, 30))
+    (tmp_path / "h.txt").write_text(
+        table(lambda nm: f"{1e-3 * (nm + offset):.3f}".replace(".", ","))
+    )
+    read = read_topography(tmp_path / "h.txt")
+    assert read.heights == pytest.approx(1e-3 * (heights + offset))
+    warnings = FileSurface(path=tmp_path / "h.txt").warnings()
+    assert any("are they thousands?" in each for each in warnings) == bool(offset)
+
+
 HEADERS = {
     "X;Y;valid\n[mm];[um];[1/0]": ";",
     "Scan Parameters,\nStylus,tip\nScan Data\n\nLateral mm,Raw um,": ",",
+    "Scan Parameters,\nStylus,3°\nScan Data\n\nLateral mm,Raw µm,": ",",
 }
 
 
@@ -110,7 +143,7 @@ HEADERS = {
 def test_profiles_with_a_header_of_an_instrument(tmp_path, header):
     """The readers of such files need their separators."""
     rows = (HEADERS[header].join((f"{x:.6f}", f"{y:.6f}", "1")) for x, y in POINTS[:50, ::2])
-    (tmp_path / "profile.csv").write_text("\n".join([header, *rows]))
+    (tmp_path / "profile.csv").write_text("\n".join([header, *rows]), encoding="latin-1")
     heights = read_topography(tmp_path / "profile.csv").heights
     assert heights == pytest.approx(1e-6 * POINTS[:50, 2], abs=1e-12)
 
@@ -141,6 +174,25 @@ def test_three_columns_with_stated_sides_are_a_matrix(tmp_path):
     (tmp_path / "small.txt").write_bytes(text(MATRIX[:4, :3], header=header.encode()))
     heights = read_topography(tmp_path / "small.txt").heights
     assert heights == pytest.approx(MATRIX[:4, :3], rel=1e-5)
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "latin-1"])
+@pytest.mark.parametrize("comma", [False, True])
+def test_headers_in_latin_1_are_read(tmp_path, encoding, comma):
+    header = "# Width: 30 µm\n# Height: 20 µm\n# turned by 3°\n# Value units: µm\n"
+    table = text(MATRIX[:20, :30]).replace(b".", b"," if comma else b".")
+    (tmp_path / "h.txt").write_bytes(header.encode(encoding) + table)
+    read = read_topography(tmp_path / "h.txt")
+    assert read.heights == pytest.approx(1e-6 * MATRIX[:20, :30], rel=1e-5)
+    assert read.spacing == pytest.approx((1e-6, 1e-6))
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "latin-1"])
+def test_the_header_of_a_profile_in_latin_1_is_read(tmp_path, encoding):
+    header = "# Channel: 3°\n# Lateral units: µm\n# Value units: nm\n"
+    (tmp_path / "h.txt").write_bytes(header.encode(encoding) + text(POINTS[:50, ::2]))
+    read = read_topography(tmp_path / "h.txt")
+    assert read.heights == pytest.approx(1e-9 * POINTS[:50, 2], rel=1e-4)
 
 
 LONG = {

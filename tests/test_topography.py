@@ -8,8 +8,10 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from scipy.io import savemat
 
 from gfmd_cli.errors import InputError
+from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.physics.contact import build_scene
 from gfmd_cli.physics.elastomers import HalfSpace
 from gfmd_cli.physics.file_surface import FileSurface
@@ -70,7 +72,8 @@ def test_every_real_type_becomes_double_precision(npy, heights, dtype):
 
 
 def test_the_only_map_of_an_hdf5_file_needs_no_name(hdf5, heights):
-    read = read_topography(hdf5(x=np.arange(16.0), h=heights.astype("f4")))
+    numbers = {"a": np.ones((1, 1)), "b": np.ones((1, 16)), "x": np.arange(16.0)}
+    read = read_topography(hdf5(**numbers, h=heights.astype("f4")))
     np.testing.assert_array_equal(read.heights, heights.astype("f4"))
     assert (read.spacing, read.periodic, read.source) == (None, None, "HDF5, h, float32")
 
@@ -219,6 +222,17 @@ def test_rounded_heights_give_a_warning(npy, rounding, is_coarse):
     assert not is_coarse or f"smallest step is {1e-6 * step:.3g} m" in found[0]
 
 
+@pytest.mark.parametrize("axis", [0, 1])
+@pytest.mark.parametrize("rounding", [0.0, 1.0])
+def test_a_map_that_is_constant_along_an_axis_is_not_rounded(npy, axis, rounding):
+    """A profile that is extended to a map; its own rounding is still found."""
+    line = np.random.default_rng(0).normal(size=64).cumsum()
+    line = np.round(line / rounding) * rounding if rounding else line
+    heights = np.stack([line] * 32, axis=axis)
+    warnings = FileSurface(path=npy(heights)).warnings()
+    assert any("neighbouring heights are equal" in each for each in warnings) == bool(rounding)
+
+
 def test_the_heights_of_a_microscope_are_fine_enough():
     assert not any("are equal" in warning for warning in FileSurface(path=SCAN).warnings())
 
@@ -300,6 +314,32 @@ def test_two_maps_and_an_unknown_name_list_the_candidates(hdf5, heights):
     for dataset, message in ((None, "several datasets"), ("c", "no dataset 'c'")):
         with pytest.raises(InputError, match=f"{message}.*: a, b$"):
             read_topography(path, dataset)
+
+
+@pytest.mark.parametrize("name", ["height", "Topography", "scan/z"])
+def test_a_map_whose_name_means_heights_is_preferred(hdf5, heights, name):
+    read = read_topography(hdf5(**{"error": 0 * heights, name: heights, "zz": 0 * heights}))
+    np.testing.assert_array_equal(read.heights, heights)
+    assert f"HDF5, {name}," in read.source
+
+
+def test_two_maps_whose_names_mean_heights_are_listed_alone(hdf5, heights):
+    path = hdf5(**{"error": heights, "a/height": heights, "b/height": heights})
+    with pytest.raises(InputError, match=r"several datasets: .*: a/height, b/height$"):
+        read_topography(path)
+
+
+def test_arrays_of_matlab_are_chosen_by_name(tmp_path, heights):
+    """Scalars and positions are no maps."""
+    pytest.importorskip("SurfaceTopography")
+    arrays = {"a": 3.0, "x": np.arange(16.0), "b": 0 * heights}
+    savemat(tmp_path / "two.mat", arrays | {"z": heights})
+    assert read_topography(tmp_path / "two.mat").source == "mat, z"
+    savemat(tmp_path / "one.mat", arrays)
+    assert read_topography(tmp_path / "one.mat").source == "mat, b"
+    savemat(tmp_path / "other.mat", arrays | {"c": heights})
+    with pytest.raises(InputError, match=r"several datasets: .*: b, c$"):
+        read_topography(tmp_path / "other.mat")
 
 
 @pytest.mark.parametrize("link", [h5py.SoftLink("/h"), h5py.ExternalLink("other.h5", "/h")])
@@ -524,7 +564,7 @@ def test_holes_are_filled_and_do_not_tilt_the_map(npy):
     plane = 3 + x - 2 * y
     plane[:9, :12] = np.nan
     surface = FileSurface(path=npy(plane), periodic=False, edges="none")
-    np.testing.assert_allclose(surface.heights(16), 0, atol=1e-12)
+    np.testing.assert_allclose(surface.heights_on(Grid(16)), 0, atol=1e-12)
 
 
 def test_an_oblong_map_is_used_as_it_is_and_its_middle_as_asked(npy):
@@ -596,6 +636,25 @@ def test_sides_keep_their_unit_where_the_heights_have_none(tmp_path, heights, un
     assert surface.warnings() == []
     (warning, _) = FileSurface(path=tmp_path / "h.txt").warnings()
     assert "not of its heights" in warning
+
+
+@pytest.mark.parametrize(("stated", "other"), [("Width", "Height"), ("Height", "Width")])
+@pytest.mark.parametrize("unit", ["", "# Value units: nm\n"])
+def test_a_header_with_one_side_is_refused(tmp_path, heights, stated, other, unit):
+    pytest.importorskip("SurfaceTopography")
+    rows = (" ".join(map(str, row)) for row in heights)
+    (tmp_path / "h.txt").write_text(f"# {stated}: 20 um\n{unit}" + "\n".join(rows))
+    with pytest.raises(InputError, match=rf"h\.txt: .*\({stated}\) alone; add .*# {other}: 20 um"):
+        read_topography(tmp_path / "h.txt")
+
+
+@pytest.mark.parametrize("unit", ["", "# Value units: nm\n"])
+def test_a_table_without_sides_gives_a_warning(tmp_path, heights, unit):
+    pytest.importorskip("SurfaceTopography")
+    rows = (" ".join(map(str, row)) for row in heights)
+    (tmp_path / "h.txt").write_text(f"# Channel: a\n{unit}" + "\n".join(rows))
+    warnings = FileSurface(path=tmp_path / "h.txt").warnings()
+    assert "does not state its side in metres; L = 1 m is assumed" in warnings[0]
 
 
 @pytest.mark.parametrize(("depth", "width"), [(2000, 0), (0, 11000)])

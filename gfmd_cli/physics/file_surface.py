@@ -21,6 +21,7 @@ from gfmd_cli.physics.interpolation import (
     suited_interpolation,
 )
 from gfmd_cli.physics.map_preparation import (
+    ROUNDING,
     Edges,
     Levelling,
     fill_missing,
@@ -50,7 +51,8 @@ class FileSurface(RigidSurface):
     path: FilePath
     """Path of the file, relative to the run spec."""
     dataset: str | None = None
-    """HDF5 dataset or microscope channel; by default the only map, or the default channel."""
+    """HDF5 dataset or microscope channel; by default the only map, the only one with a name such as
+    "height", or the default channel."""
     region: Region | None = None
     """Part of the map to use, such as { x = [10, 110], y = [0, 90] } in pixels, or with
     unit = "m" in metres; by default all of it."""
@@ -93,10 +95,22 @@ class FileSurface(RigidSurface):
         return self._topography().heights.ndim
 
     def smallest_grid(self) -> int:
-        """Number of points of the map along x. Raises InputError for a flat map."""
-        heights = _prepared(self)
-        if np.ptp(heights) == 0:
-            raise InputError(f"{self.path}: surface.path: the map is flat; roughness is needed")
+        """Number of points of the map along x.
+
+        Raises InputError for a flat map, also where levelling leaves the rounding of its heights.
+        """
+        heights, topography = _prepared(self), self._topography()
+        largest = self.scale * float(max(topography.heights.max(), -topography.heights.min()))
+        left = float(np.ptp(heights))
+        if left <= (ROUNDING + 2 * topography.precision) * largest:
+            rounding = (
+                f' with surface.level = "{self.levelling()}": what is left, {left:.2g} m, is the '
+                f"rounding of heights of up to {largest:.3g} m"
+            )
+            raise InputError(
+                f"{self.path}: surface.path: the map is flat{rounding if left else ''}; roughness "
+                "is needed"
+            )
         return int(heights.shape[-1])
 
     def smallest_grid_y(self) -> int:
@@ -276,9 +290,9 @@ class FileSurface(RigidSurface):
         """Warnings about the side, the heights, their gradient and borders, and unused keys."""
         topography, heights = self._topography(), _prepared(self)
         warnings = list(topography.notes)
-        if self._known_length() is None and not topography.metric_heights:
+        if self._known_length() is None:
             warnings.append(
-                "the file does not state its side; L = 1 m is assumed: set surface.length"
+                "the file does not state its side in metres; L = 1 m is assumed: set surface.length"
             )
         if self.length is not None and topography.spacing is not None and topography.metres:
             stated = topography.spacing[-1] * heights.shape[-1] / self.copies
@@ -366,8 +380,12 @@ def _prepared(surface: FileSurface) -> Field:
 @lru_cache(maxsize=16)
 def _warnings_on_heights(surface: FileSurface) -> tuple[str, ...]:
     """Warnings about outliers and rounding. Cached: every contact of a study has the same."""
-    topography = surface._topography()
-    return map_warnings.outliers(topography), map_warnings.rounded(topography, surface.scale)
+    topography, scale = surface._topography(), surface.scale
+    return (
+        map_warnings.outliers(topography),
+        map_warnings.rounded(topography, scale),
+        map_warnings.rounded_trend(topography, surface._levelled(), scale),
+    )
 
 
 def forget_files() -> None:

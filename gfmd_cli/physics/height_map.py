@@ -23,6 +23,8 @@ from gfmd_cli.physics.array_coordinates import (
 
 MAX_COMPRESSION = 1032  # the limit of deflate, https://zlib.net/zlib_tech.html
 MAX_HEIGHT = 1e30  # in any unit; the usual values for no data are 9.97e36 (netCDF) and 3.4e38
+HEIGHT_NAMES = "h", "height", "heights", "height_map", "z", "topography", "topo", "elevation"
+MAX_LISTED = 20  # names in a message
 SMALLEST_MAP = 2  # points per side; fewer have no roughness
 REMEDY = "Heights that other programs read can be saved by numpy.save as a .npy file."
 
@@ -153,8 +155,7 @@ def _with_coordinates(path: Path, file: Any, data: Any, bare: HeightMap) -> Heig
         )
     if metres is None:
         return bare._replace(heights=heights, sides=tuple(sides))
-    note = "the positions along the axes state no unit: set surface.length"
-    return bare._replace(heights=heights, metric_heights=True, notes=(note,))
+    return bare._replace(heights=heights, metric_heights=True)
 
 
 def _dataset_name(path: Path, file: Any, name: str | None) -> str:
@@ -172,39 +173,41 @@ def _dataset_name(path: Path, file: Any, name: str | None) -> str:
     maps = _maps(datasets)
     if name is not None and name.strip("/") in datasets:
         return name.strip("/")
-    if name is None and len(maps) == 1:
-        return maps[0]
-    problem = (
-        "several datasets: choose one by surface.dataset"
-        if name is None and maps
-        else f"no dataset {name!r} (links do not count)"
-        if name is not None
-        else "no numeric dataset with one or two dimensions"
+    if name is not None:
+        raise InputError(
+            f"{path}: no dataset {name!r} (links do not count); its height maps: {listed(maps)}"
+        )
+    if not maps:
+        raise InputError(f"{path}: no numeric dataset with one or two dimensions")
+    return only_map(path, maps)
+
+
+def only_map(path: Path, names: Sequence[str]) -> str:
+    """The only one of some arrays, or the only one whose name means heights. Raises InputError."""
+    heights = [name for name in names if name.rpartition("/")[-1].lower() in HEIGHT_NAMES]
+    if len(names) == 1 or len(heights) == 1:
+        return (heights or names)[0]
+    raise InputError(
+        f"{path}: several datasets: choose one by surface.dataset; its height maps: "
+        f"{listed(heights or names)}"
     )
-    raise InputError(f"{path}: {problem}; its height maps: {', '.join(maps) or 'none'}")
+
+
+def listed(names: Sequence[str]) -> str:
+    """Some names for a message."""
+    more = f" and {len(names) - MAX_LISTED} more" if len(names) > MAX_LISTED else ""
+    return ", ".join(names[:MAX_LISTED]) + more or "none"
 
 
 def _maps(datasets: dict[str, Any]) -> list[str]:
-    """The names of the maps among some datasets; without maps those of the lines."""
+    """The names of the maps among some datasets; without maps those of the lines.
+
+    Arrays with one row or column are positions or numbers, as MATLAB stores them.
+    """
     numbers = {key: item for key, item in datasets.items() if item.dtype.kind in "iuf"}
     maps = [key for key, item in numbers.items() if len(_map_shape(item.shape or ())) == 2]
+    maps = [key for key in maps if min(_map_shape(numbers[key].shape)) >= SMALLEST_MAP] or maps
     return maps or [key for key, item in numbers.items() if item.ndim == 1]
-
-
-def map_names(path: Path) -> list[str]:
-    """The height maps of an HDF5 file, in its order; none for any other file, or a damaged one.
-
-    Of a study these are its stored heights; its other arrays are no maps.
-    """
-    from gfmd_cli.files.hdf5 import datasets_below, open_hdf5
-
-    try:
-        with open_hdf5(path) as file:
-            names = _maps(datasets_below(file))
-            is_study = "spec_text" in file.attrs
-            return [name for name in names if not is_study or name.endswith("/height")]
-    except Exception:  # a damaged file can raise any; reading it will say what is wrong
-        return []
 
 
 def at_equal_distances(x: Any, heights: Any) -> tuple[Any, tuple[float]]:

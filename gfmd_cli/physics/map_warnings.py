@@ -14,6 +14,8 @@ STEEP = 3.0  # rms gradient; a choice: surfaces of machined or worn solids have 
 SMOOTH = 1e-6  # rms gradient; a choice: polished mirrors have about that
 CLIFF = 5.0  # ratio of the step across the border to that inside; a choice: 1 if periodic
 TILTED = 0.5  # share of the variance of the heights that is a tilt; a choice
+STEPS = 1.5  # that the rounding of a plane leaves at most: 1, and up to 1.4 on 8 x 8 points
+SINGLE = float(np.finfo(np.float32).eps)  # double precision may have been single before
 ROUNDED = 0.2  # share of equal neighbouring heights, at which the gradient is 3 % too large
 FEW = 0.01  # share of the heights of which a warning tells the percentage; a choice
 PLATEAU = 0.5  # share of equal heights that are taken as a part of the surface; a choice
@@ -125,24 +127,42 @@ def outliers(topography: Topography) -> str:
 
 
 def rounded(topography: Topography, scale: float) -> str:
-    """Heights in steps as coarse as the differences of neighbours."""
+    """Heights in steps as coarse as the differences of neighbours along the rougher axis."""
     heights, smallest = topography.heights, np.inf
-    pairs = changes = 0
+    pairs, changes = np.zeros((2, heights.ndim), int)
     for rows in row_blocks(heights):
         block = heights[rows]
         if topography.missing is not None:
             block = np.where(topography.missing[rows], np.nan, block)
         for axis in range(heights.ndim):
             steps = np.abs(np.diff(block, axis=axis))
-            pairs += int(np.count_nonzero(np.isfinite(steps)))
+            pairs[axis] += np.count_nonzero(np.isfinite(steps))
             steps = steps[steps > 0]
-            changes += steps.size
+            changes[axis] += steps.size
             smallest = min(smallest, steps.min(initial=np.inf))
-    equal = 1 - changes / max(pairs, 1)
-    if equal < ROUNDED or not changes:
+    equal = 1 - float((changes / np.maximum(pairs, 1)).max())
+    if equal < ROUNDED or not changes.any():
         return ""
     return (
         f"{equal:.0%} of the neighbouring heights are equal: if they were rounded (the smallest "
         f"step is {scale * smallest:.3g} m), the gradient is too large and the contact area "
         "too small; export the heights with more digits"
+    )
+
+
+def rounded_trend(topography: Topography, levelled: Field, scale: float) -> str:
+    """Levelled heights [m] that are the rounding of what was subtracted."""
+    heights = scale * topography.heights
+    if topography.missing is not None:
+        heights, levelled = heights[~topography.missing], levelled[~topography.missing]
+    left = float(np.ptp(levelled))
+    if not 0 < left < 0.5 * np.ptp(heights):  # the trend has two steps or more
+        return ""
+    step = max(np.diff(np.unique(heights)).min(), SINGLE * max(heights.max(), -heights.min()))
+    if left > STEPS * step:
+        return ""
+    return (
+        f"levelling leaves heights in a range of {left:.3g} m, and the heights are rounded to "
+        f"{step:.3g} m: the map is probably flat and its roughness rounding; export the heights "
+        "with more digits"
     )

@@ -11,13 +11,21 @@ from gfmd_cli.grid.arrays import Field
 from gfmd_cli.physics.array_coordinates import EVEN
 from gfmd_cli.physics.height_map import (
     REMEDY,
+    SMALLEST_MAP,
     HeightMap,
     at_equal_distances,
     check_layout,
     first_line,
+    only_map,
 )
 from gfmd_cli.physics.length_units import in_metres
-from gfmd_cli.physics.text_tables import MATRIX_COLUMNS, columns, table_formats, with_blanks
+from gfmd_cli.physics.text_tables import (
+    MATRIX_COLUMNS,
+    columns,
+    in_utf8,
+    table_formats,
+    with_blanks,
+)
 
 NO_GRID = "three columns that are not the points (x, y, height) of a full grid"
 TABLES = {"xyz", "asc"}  # formats of SurfaceTopography that are tables of numbers
@@ -41,9 +49,14 @@ def read_microscope_file(path: Path, dataset: str | None, max_bytes: int) -> Hei
                 f"{path}: not .npy or HDF5; other formats need SurfaceTopography: "
                 f"{INSTALL.format('topography')}"
             ) from error
-        table = with_blanks(file)
+        try:
+            table, warning = with_blanks(file)
+        except ValueError as error:
+            raise InputError(f"{path}: {error}") from error
+        table = in_utf8(table)
         with _open_scan(path, table, readers) as reader:
-            return _read_channel(path, table, reader, dataset, max_bytes)
+            heights = _read_channel(path, table, reader, dataset, max_bytes)
+    return heights._replace(notes=(warning,) if warning else ())
 
 
 def _open_scan(path: Path, file: BinaryIO, readers: list[Any]) -> Any:
@@ -96,6 +109,8 @@ def _read_channel(
     shape: tuple[int, ...] = (channel.nb_grid_pts or ())[::-1]
     check_layout(path, shape, np.dtype(float), max_bytes)
     unsized = channel.physical_sizes is None
+    if len(shape) == 2:
+        _check_sides(path, channel)
     scan = channel.topography(physical_sizes=(1.0,) * len(shape) if unsized else None)
     if reader.format() == "xyz" and len(shape) == 1:
         scan = _with_positions(reader, scan)
@@ -131,10 +146,27 @@ def _read_channel(
     )
 
 
+def _header(channel: Any) -> dict[str, Any]:
+    """The keys and values of the header of a text table."""
+    header = channel.info.get("raw_metadata") if channel.info else None
+    return header if isinstance(header, dict) else {}
+
+
+def _check_sides(path: Path, channel: Any) -> None:
+    """Raise InputError where the header of a table states only one side of a map."""
+    sides = channel.physical_sizes or ()
+    if len(sides) == 1 or (not sides and "physical_size_y" in _header(channel)):
+        stated, other = ("Width", "Height") if sides else ("Height", "Width")
+        raise InputError(
+            f"{path}: the header states the side along {'x' if sides else 'y'} ({stated}) alone; "
+            f"add a line such as '# {other}: 20 um', or remove both and set surface.length"
+        )
+
+
 def _sides_with_unit(channel: Any, sides: tuple[float, ...]) -> tuple[float, ...] | None:
     """The sides [m] of a text table whose header states units of them but not of the heights."""
-    header = channel.info.get("raw_metadata", {}) if channel.info else {}
-    unit_x = header.get("xunit") if isinstance(header, dict) else None
+    header = _header(channel)
+    unit_x = header.get("xunit")
     if not unit_x:
         return None
     units = (header.get("yunit") or unit_x, unit_x)[-len(sides) :]
@@ -238,7 +270,10 @@ def _height_channel(path: Path, reader: Any, name: str | None) -> Any:
         for channel in reader.channels
         if channel.data_kind.value == "height" and not isinstance(channel.unit, tuple)
     }  # a channel with a pair of units holds phases or error signals over lengths
-    if name is None and channels:
+    if name is None and channels and reader.format() == "mat":  # arrays without a meaning
+        maps = [key for key, item in channels.items() if min(item.nb_grid_pts) >= SMALLEST_MAP]
+        name = only_map(path, maps or list(channels))
+    elif name is None and channels:
         default = reader.default_channel.channel_id
         name = default if default in channels else next(iter(channels))
     if name not in channels:

@@ -20,6 +20,8 @@ SAMPLE_BYTES = 2**16  # at the end of each window; a choice
 MIN_DIGITS = 0.2  # share of the characters of a table; a choice, as heights are mostly digits
 GRID_LINES = 20_000  # whose positions are compared; a choice
 MATRIX_COLUMNS = 4  # fewer are positions: the rule of SurfaceTopography
+LATIN_1 = b"Scan Parameters"  # begins a table of Dektak, which its reader takes as Latin-1
+THOUSANDS = re.compile(rb"[-+]?[1-9]\d{0,2}(,\d{3})+(\.\d*)?")
 NUMBERS = b" \t+-.,;0123456789eEdDinfaINFA"
 """Characters of lines without words."""
 
@@ -44,12 +46,15 @@ def columns(file: BinaryIO) -> int:
     return _columns(file, b" \t,;")
 
 
-def with_blanks(file: BinaryIO) -> BinaryIO:
+def with_blanks(file: BinaryIO) -> tuple[BinaryIO, str]:
     """A matrix with commas or semicolons as one between blanks, and decimal commas as points.
 
     A comma between two digits is a decimal one where blanks or semicolons separate the numbers.
     Any other file is returned as it is: the readers of positions know commas and semicolons.
+
+    Returns the table, and a warning or "". Raises ValueError if the commas can separate thousands.
     """
+    warning = ""
     start = file.read(WINDOW)
     table = start[len(start) // 2 :]  # without most headers
     if b"," in table or b";" in table:
@@ -57,11 +62,52 @@ def with_blanks(file: BinaryIO) -> BinaryIO:
         is_decimal = numbers > 1 and re.search(rb"\d,\d", table)
         if numbers == 1:
             numbers = _columns(file, b",")
+        if is_decimal:
+            warning = _warning_of_thousands(start, numbers)
         if is_decimal or numbers >= MATRIX_COLUMNS:
             file.seek(0)
             text = file.read().replace(b";", b" ")
-            return BytesIO(text.replace(b",", b"." if is_decimal else b" "))
+            file = BytesIO(text.replace(b",", b"." if is_decimal else b" "))
     file.seek(0)
+    return file, warning
+
+
+def _warning_of_thousands(start: bytes, columns: int) -> str:
+    """Warning if each number of a table has a comma where it could separate thousands.
+
+    One number such as 0,125 or 1,5 shows that the commas are decimal. Raises ValueError if only
+    some of the numbers have such a comma, as where it separates thousands.
+    """
+    lines = [line for line in start.splitlines() if not line.translate(None, NUMBERS)]
+    rows = [
+        row for line in lines if len(row := re.split(rb"[\s;]+", line.strip(b" \t;"))) == columns
+    ]
+    numbers = [word for row in rows for word in row if word[-1:].isdigit()]
+    with_comma = [word for word in numbers if b"," in word]
+    if not with_comma or not all(map(THOUSANDS.fullmatch, with_comma)):
+        return ""
+    first = with_comma[0].decode()
+    others = [word for word in numbers if word.count(b",") != 1 or b"." in word]
+    if others:
+        raise ValueError(
+            f"{first} beside {others[0].decode()}: does the comma separate thousands or decimals? "
+            "Save the numbers with decimal points and without separators of thousands"
+        )
+    return f"{first} and all other numbers were read with decimal commas; are they thousands?"
+
+
+def in_utf8(file: BinaryIO) -> BinaryIO:
+    """A table in Latin-1 as one in UTF-8; any other file is returned as it is."""
+    is_table = columns(file) > 0
+    file.seek(0)
+    content = file.read() if is_table else b""
+    file.seek(0)
+    if content.isascii() or content.startswith(LATIN_1):
+        return file
+    try:
+        content.decode()
+    except UnicodeDecodeError:
+        return BytesIO(content.decode("latin-1").encode())
     return file
 
 

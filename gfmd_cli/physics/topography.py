@@ -106,6 +106,8 @@ class Topography:
     """Whether the heights are in metres; else they are in an unknown unit."""
     notes: tuple[str, ...] = ()
     """Warnings about what the file states and the reader does not use."""
+    precision: float = float(np.finfo(float).eps)
+    """Distance of the numbers next to 1 in the type of the heights in the file."""
 
     @property
     def holes(self) -> int:
@@ -132,8 +134,8 @@ def read_topography(
     Parameters
     ----------
     path : the file
-    dataset : name of the HDF5 dataset or microscope channel; by default the only 2-D dataset
-        or the default height channel
+    dataset : name of the HDF5 dataset or microscope channel; by default the only 2-D dataset, the
+        only one with a name such as "height", or the default height channel
     max_bytes : size of the largest map that is read, counted in double precision
     region : the part of the map to read
     flip : change the sign of the heights
@@ -209,6 +211,7 @@ def _checked(
         shape,
         data.metric_heights,
         data.notes,
+        float(np.finfo(data.heights.dtype if data.heights.dtype.kind == "f" else float).eps),
     )
 
 

@@ -11,7 +11,6 @@ from gfmd_cli.files.hdf5 import MAGIC
 from gfmd_cli.files.regular import open_regular
 from gfmd_cli.physics.elastomers import LinearElastomer
 from gfmd_cli.physics.file_surface import FileSurface
-from gfmd_cli.physics.height_map import map_names
 from gfmd_cli.spec.check import Check, shortened
 from gfmd_cli.spec.models import LOADS, Spec
 
@@ -60,7 +59,7 @@ def read_tables(data: dict[str, Any]) -> Spec:
 
 
 def read_scan(path: Path, overrides: tuple[str, ...] = ()) -> FileSurface:
-    """A height map as a surface, "surface.key=value" each; the first one of several in a file.
+    """A height map as a surface, "surface.key=value" each.
 
     Raises InputError.
     """
@@ -73,9 +72,7 @@ def read_scan(path: Path, overrides: tuple[str, ...] = ()) -> FileSurface:
     surface = surfaces[0]
     if not isinstance(surface, FileSurface):
         raise InputError(f'{path}: surface.kind must be "file" for a height map')
-    names = map_names(path) if surface.dataset is None else []
-    first = {"dataset": names[0]} if len(names) > 1 else {}
-    return surface.model_copy(update={"path": path, **first})  # the path as given, for messages
+    return surface.model_copy(update={"path": path})  # the path as given, for messages
 
 
 def read_elastomer(default: dict[str, Any], overrides: tuple[str, ...]) -> LinearElastomer:
