@@ -1,6 +1,7 @@
 """Order, sides and units of arrays in HDF5 and netCDF files that state them."""
 
 import re
+import struct
 
 import h5py
 import numpy as np
@@ -121,6 +122,25 @@ def test_marks_of_missing_heights_are_found_before_units_are_converted(array):
     heights = HEIGHTS.copy()
     heights[2, 3] = 9.97e36
     assert read_topography(array(heights)).holes == 1
+
+
+@pytest.mark.parametrize(("number", "size"), [(1, 2**64 - 16), (1, 2**13), (0, 0)])
+def test_a_damaged_list_of_positions_is_refused(array, number, size):
+    """With the first and the last of these, HDF5 2.0 looks for the end of the list for ever."""
+    path = array()
+    content = bytearray(path.read_bytes())
+    first = content.index(b"GCOL") + 16  # number (2 bytes), references (2), 0 (4), size (8)
+    content[first : first + 16] = struct.pack("<HHIQ", number, 1, 0, size)
+    path.write_bytes(content)
+    with pytest.raises(InputError, match="damaged: a heap of texts and lists"):
+        read_topography(path)
+
+
+def test_a_damaged_scale_does_not_end_the_process(array):
+    """Its class is no longer that of a scale."""
+    path = array()
+    path.write_bytes(path.read_bytes().replace(b"DIMENSION_SCALE", b"DIMENSION_SCALF"))
+    assert read_topography(path).heights.shape == (12, 16)
 
 
 def test_a_study_is_read_as_before(array):

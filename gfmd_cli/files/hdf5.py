@@ -1,9 +1,11 @@
 """HDF5 files: new ones, and those from elsewhere, whose datasets are checked before reading."""
 
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
 from math import prod
 from pathlib import Path
+from struct import unpack_from
 from typing import Any, BinaryIO
 
 import h5py
@@ -16,6 +18,9 @@ MAGIC = b"\x89HDF\r\n\x1a\n"  # first bytes of an HDF5 file
 PLAIN = "iufS"  # kinds of values that are read: numbers and text
 MAX_OBJECTS = 10_000  # in all groups that are searched for datasets; a scan has some tens
 MAX_DEPTH = 32  # of nested groups that are searched; paths of 20000 names take minutes
+HEAP = b"GCOL\x01\0\0\0"  # first bytes of a global heap
+HEADER = 16  # bytes at the beginning of a heap and of each object in it
+MAX_HEAP = 2**26  # bytes of a heap that are checked, in a second; usual are 4096
 VERSION = ("v110", "v110")  # of HDF5: the first whose metadata all carry checksums
 
 
@@ -31,8 +36,41 @@ def open_hdf5(source: Path | BinaryIO) -> Iterator[Any]:
     `source` is a path, which may be a link to a regular file, or a file that is open already.
     """
     raw = open_regular(source, follow=True) if isinstance(source, Path) else nullcontext(source)
-    with raw as opened, h5py.File(opened, "r") as file:
+    with raw as opened, h5py.File(_CheckedHeaps(opened), "r") as file:
         yield file
+
+
+class _CheckedHeaps:
+    """A file for HDF5 that refuses damaged global heaps, in which HDF5 (2.0) can loop without end.
+
+    These heaps contain the values of variable length. After a header of 16 bytes come objects with
+    headers of 16 bytes each: number, references and size. Number 0 is the free space
+    (specification of the file format, Sect. III.E).
+    """
+
+    def __init__(self, file: Any) -> None:
+        self._file = file
+        self.read, self.seek, self.tell = file.read, file.seek, file.tell
+
+    def readinto(self, buffer: memoryview) -> int:
+        """Read at the current position. Raises OSError if a damaged heap begins in what is read."""
+        position = self._file.tell()
+        count = int(self._file.readinto(buffer))
+        for heap in re.finditer(HEAP, buffer):
+            self._check_heap(position + heap.start())
+        return count
+
+    def _check_heap(self, position: int) -> None:
+        self._file.seek(position + len(HEAP))
+        size = int.from_bytes(self._file.read(8), "little") - HEADER
+        objects = self._file.read(max(0, min(size, MAX_HEAP)))
+        at = 0
+        while at + HEADER <= len(objects):
+            number, _, _, used = unpack_from("<HHIQ", objects, at)
+            step = HEADER + -(-used // 8) * 8 if number else used
+            if step < HEADER or at + step > size:
+                raise OSError(f"damaged: a heap of texts and lists at byte {position}")
+            at += step
 
 
 def is_hdf5(path: Path) -> bool:

@@ -67,10 +67,9 @@ def is_transposed(axes: Sequence[Axis]) -> bool:
 def _axis(path: Path, file: Any, dimension: Any, compression: float) -> Axis:
     from gfmd_cli.files.hdf5 import take
 
-    scales = dimension.values()
-    if not scales:
+    if not len(dimension):
         return Axis("", None, None)
-    scale = scales[0]
+    scale = dimension[0]  # `dimension.values()` crashes on a scale that is damaged
     name = scale.name.strip("/")
     label = name.rpartition("/")[-1]
     is_empty = bytes(scale.attrs.get("NAME", b"")).startswith(NO_VARIABLE)

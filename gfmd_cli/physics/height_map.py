@@ -123,8 +123,7 @@ def _with_coordinates(path: Path, file: Any, data: Any, bare: HeightMap) -> Heig
     """A map with the order of its axes, sides and units by its dimension scales.
 
     With units of heights and positions it is in metres and not periodic, as a microscope scan.
-    Without positions it is a bare array. The text of its unit is then not read: in a damaged file
-    HDF5 may look for it without end.
+    Without positions it is a bare array, whose unit is not read.
     """
     heights = bare.heights
     axes = axes_of(path, file, data, MAX_COMPRESSION)[-heights.ndim :]

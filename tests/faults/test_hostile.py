@@ -165,6 +165,9 @@ def test_mutated_specs(folder):
     assert met[2] > 500
 
 
+HEIGHT_FILES = ("h.npy", "old.h5", "new.h5", "old.nc", "new.nc")
+
+
 def height_files(folder):
     """One of each kind: their names and content."""
     heights = np.random.default_rng(0).normal(size=(32, 32))
@@ -173,10 +176,19 @@ def height_files(folder):
         with h5py.File(folder / name, "w", libver=libver) as file:
             file.create_dataset("h", data=heights, compression="gzip", chunks=(16, 16))
             file["h"].attrs["units"] = "m"
-    return {name: (folder / name).read_bytes() for name in ("h.npy", "old.h5", "new.h5")}
+    for name, libver in (("old.nc", "earliest"), ("new.nc", "latest")):
+        with h5py.File(folder / name, "w", libver=libver) as file:
+            file["h"] = heights
+            for axis, positions in enumerate("yx"):
+                file[positions] = 0.5 * np.arange(32)
+                file[positions].make_scale(positions)
+                file["h"].dims[axis].attach_scale(file[positions])
+            for dataset in file.values():
+                dataset.attrs["units"] = "nm"
+    return {name: (folder / name).read_bytes() for name in HEIGHT_FILES}
 
 
-@pytest.mark.parametrize("kind", ["h.npy", "old.h5", "new.h5"])
+@pytest.mark.parametrize("kind", HEIGHT_FILES)
 def test_mutated_height_files(folder, kind):
     content, rng, cases = height_files(folder)[kind], random.Random(kind), []
     for i in range(500):
