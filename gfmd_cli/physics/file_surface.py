@@ -99,19 +99,7 @@ class FileSurface(RigidSurface):
 
         Raises InputError for a flat map, also where levelling leaves the rounding of its heights.
         """
-        heights, topography = _prepared(self), self._topography()
-        largest = self.scale * float(max(topography.heights.max(), -topography.heights.min()))
-        left = float(np.ptp(heights))
-        if left <= (ROUNDING + 2 * topography.precision) * largest:
-            rounding = (
-                f' with surface.level = "{self.levelling()}": what is left, {left:.2g} m, is the '
-                f"rounding of heights of up to {largest:.3g} m"
-            )
-            raise InputError(
-                f"{self.path}: surface.path: the map is flat{rounding if left else ''}; roughness "
-                "is needed"
-            )
-        return int(heights.shape[-1])
+        return _smallest_grid(self)
 
     def smallest_grid_y(self) -> int:
         """Number of points of the map along y."""
@@ -378,6 +366,24 @@ def _prepared(surface: FileSurface) -> Field:
 
 
 @lru_cache(maxsize=16)
+def _smallest_grid(surface: FileSurface) -> int:
+    """See `FileSurface.smallest_grid`; cached, because every scene asks for it several times."""
+    heights, topography = _prepared(surface), surface._topography()
+    largest = surface.scale * float(max(topography.heights.max(), -topography.heights.min()))
+    left = float(np.ptp(heights))
+    if left <= (ROUNDING + 2 * topography.precision) * largest:
+        rounding = (
+            f' with surface.level = "{surface.levelling()}": what is left, {left:.2g} m, is the '
+            f"rounding of heights of up to {largest:.3g} m"
+        )
+        raise InputError(
+            f"{surface.path}: surface.path: the map is flat{rounding if left else ''}; roughness "
+            "is needed"
+        )
+    return int(heights.shape[-1])
+
+
+@lru_cache(maxsize=16)
 def _warnings_on_heights(surface: FileSurface) -> tuple[str, ...]:
     """Warnings about outliers and rounding. Cached: every contact of a study has the same."""
     topography, scale = surface._topography(), surface.scale
@@ -390,5 +396,5 @@ def _warnings_on_heights(surface: FileSurface) -> tuple[str, ...]:
 
 def forget_files() -> None:
     """Drop the maps that were read, so that a file that has changed is read again."""
-    for cached in (_read, _prepared, _suited_interpolation, _warnings_on_heights):
+    for cached in (_read, _prepared, _smallest_grid, _suited_interpolation, _warnings_on_heights):
         cached.cache_clear()
