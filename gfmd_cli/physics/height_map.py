@@ -170,9 +170,9 @@ def _dataset_name(path: Path, file: Any, name: str | None) -> str:
     except ValueError as error:
         raise InputError(f"{path}: {error}; choose one by surface.dataset") from error
     maps = _maps(datasets)
-    if name is not None and name.strip("/") in datasets:
-        return name.strip("/")
     if name is not None:
+        if name.strip("/") in datasets:
+            return name.strip("/")
         raise InputError(
             f"{path}: no dataset {name!r} (links do not count); its height maps: {listed(maps)}"
         )

@@ -160,8 +160,9 @@ def rounded_trend(topography: Topography, levelled: Field, scale: float) -> str:
     if not 0 < left < 0.5 * np.ptp(heights):  # the trend has two steps or more
         return ""
     smallest = SINGLE * max(heights.max(), -heights.min())
-    for some in (heights.flat[:: 1 + heights.size // SAMPLE], heights):  # a sample has larger steps
-        step = max(np.diff(np.unique(some)).min(initial=np.inf), smallest)
+    sample = heights.flat[:: 1 + heights.size // SAMPLE]
+    for values in (sample, heights):  # the smallest step of a sample is no smaller than that of all
+        step = max(np.diff(np.unique(values)).min(initial=np.inf), smallest)
         if left > STEPS * step:
             return ""
     return (

@@ -141,8 +141,8 @@ OBSERVABLES = (
         "stiffness",
         Column(
             "stiffness",
-            "contact stiffness -dp/du_g / (Delta_sigma / h_std); also with a free boundary with "
-            "respect to the mean gap of the map, not to the displacement of the indenter",
+            "contact stiffness -dp/du_g / (Delta_sigma / h_std); for both boundaries with respect "
+            "to the mean gap of the map, not to the displacement of the indenter",
         ),
         lambda solved: CONTACT_STIFFNESS[solved.contact.boundary](solved.contact, solved.touching),
         "-dp/du_g",

@@ -127,7 +127,7 @@ def run_study(
 
 
 def _until(end: float, stop: Event, report: Report) -> Report:
-    """The report, which also sets `stop` at the first event of a task after a time.
+    """A report that also sets `stop` at the first event of a task after `end` [s, monotonic clock].
 
     Each call of a run therefore advances at least one task, however short its time.
     """
