@@ -21,7 +21,7 @@ from gfmd_cli.physics.contact import Contact
 from gfmd_cli.solvers.local_kernels import penetration
 from gfmd_cli.solvers.loop import Start
 from gfmd_cli.solvers.projected_move import choose
-from gfmd_cli.solvers.tile_operators import OPERATORS
+from gfmd_cli.solvers.tile_operators import OPERATORS, Indices
 from gfmd_cli.solvers.tiles import SIDE, Tiles
 
 FIRST_TOLERANCE = 6e-3  # before the operators on tiles are corrected
@@ -148,64 +148,72 @@ class LocalSolve:
             self.place(tiles, s)
         self.correction = self.tiles.take(displacement) - self.compliance(self.s)
 
-    def residual(self, gap: Field, s: Field) -> float:
-        """The natural residual on the tiles."""
-        violation = np.minimum(gap, s)
-        return self.contact.as_residual(_dot(violation, violation))
-
     def run(self, tolerance: float) -> None:
-        """Projected conjugate gradients on the tiles, to a natural residual on them."""
+        """Projected conjugate gradients on the tiles, to a natural residual on them.
+
+        At points that are not active, s = 0 and the gap is not negative: nothing moves there, and
+        they do not count in the residual.
+        """
         s, height = self.s, self.obstacle - self.correction
-        w = self.compliance(s)
+        w = self.compliance(s).astype(np.float64)
         direction, force = np.zeros_like(s), np.zeros_like(s)
         slope, length = 0.0, 1.0  # K preconditions well: the natural length of a move is 1
         for _ in range(MAX_STEPS):
             self.pause()
             gap = w - height
             pressed = s > 0
-            gap -= float(gap[pressed].mean())
-            if self.residual(gap, s) < tolerance:
+            level = float(gap.ravel()[np.flatnonzero(pressed)].mean())
+            active = np.flatnonzero(pressed | (gap < level))
+            g, t = gap.ravel()[active] - level, s.ravel()[active]
+            violation = np.minimum(g, t)
+            if self.contact.as_residual(_dot(violation, violation)) < tolerance:
                 break
-            active = pressed | (gap < 0)
-            last, force = force, _balanced(-gap, active)
-            z = _balanced(self.map_displacement(force), active)
-            old, slope = slope, _dot(z, force)
+            f, last = _balanced(-g), force.ravel()[active]
+            force = _field(f, active, s)
+            z = _balanced(self.map_displacement(force).ravel()[active])
+            old, slope = slope, _dot(z, f)
             # Polak-Ribiere+
             beta = max(0.0, (slope - _dot(z, last)) / old) if old > 0 else 0.0
-            direction = _balanced(z + beta * direction, active)
-            if _dot(direction, force) <= 0:
-                direction = z
-            del last, z  # memory for the compliance
-            step = length * direction
-            move = np.maximum(step, -s)
-            change = self.compliance(move)
-            curvature = _dot(move, change)
-            best = -_dot(move, gap) / curvature if curvature > 0 else 1.0
+            d = _balanced(z + beta * direction.ravel()[active])
+            if _dot(d, f) <= 0:
+                d = z
+            direction = _field(d, active, s)
+            step = length * d
+            move = np.maximum(step, -t)
+            change = self.compliance(_field(move, active, s))
+            curvature = _dot(move, change.ravel()[active])
+            best = -_dot(move, g) / curvature if curvature > 0 else 1.0
             exact = np.array_equal(step, move) and (
-                best <= 1 or float((s + best * move).min()) >= 0
+                best <= 1 or float((t + best * move).min()) >= 0
             )
             choice = choose(best, exact)
             length *= choice.factor
             if choice.restart:
                 slope = 0.0
-            s = np.maximum(s + choice.fraction * move, 0.0)
+            t = np.maximum(t + choice.fraction * move, 0.0)
+            scale = self.total / float(t.sum())
+            s = _field(scale * t, active, s)
             w += choice.fraction * change
-            scale = self.total / float(s.sum())
-            s *= scale
             w *= scale
         self.s = s
 
 
-def _balanced(values: Field, points: Mask) -> Field:
-    """The values at some points, with a mean of zero over them; zero at the others."""
-    balanced = np.where(points, values, 0.0)
-    balanced -= points * (float(balanced.sum()) / np.count_nonzero(points))
+def _field(values: Field, points: Indices, like: Field) -> Field:
+    """A field on tiles with these values at some points, and zero at the others."""
+    field = np.zeros_like(like)
+    field.ravel()[points] = values
+    return field
+
+
+def _balanced(values: Field) -> Field:
+    """The values less their mean."""
+    balanced: Field = values - values.mean()
     return balanced
 
 
 def _dot(one: Field, other: Field) -> float:
     """Sum of products, which does not depend on the threads of BLAS."""
-    return float(np.einsum("ij,ij->", one, other))
+    return float(np.einsum("i,i->", one.ravel(), other.ravel()))
 
 
 def _with_neighbours(used: Mask) -> Mask:

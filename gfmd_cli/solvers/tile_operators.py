@@ -17,7 +17,9 @@ With a free boundary k ~ q^n, and both parts are known in real space: the smooth
 """
 
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from functools import lru_cache
 from math import prod
 from typing import Any, ClassVar, TypeAlias
 
@@ -31,7 +33,8 @@ from gfmd_cli.grid.fft_grid import Grid, Shape
 from gfmd_cli.physics.contact import Contact
 from gfmd_cli.physics.free_compliance import smooth_part
 from gfmd_cli.physics.free_contact import FreeContact
-from gfmd_cli.solvers.tiles import SIDE, Tiles, convolution_matrix
+from gfmd_cli.solvers.local_kernels import convolve
+from gfmd_cli.solvers.tiles import SIDE, Tiles
 
 COARSENING = 4  # spacing of the grid of the smooth part, in grid points
 DECAY = 3.0
@@ -40,6 +43,7 @@ is then smallest, 7e-4 (default surface, 1024^2, n = 1, p* = 0.01)."""
 ORDER = 4  # of the B-splines: cubic
 LARGEST_X = 4.0  # Q is below 1e-6 of its largest value there
 TABLE = 4096  # values of Q: the error of linear interpolation is below 1e-6
+CHUNK = 256  # tiles that a thread convolves at a time
 CELL = 48  # smallest number of points along a side of the cell on which kernels are computed
 
 Indices: TypeAlias = NDArray[np.integer[Any]]
@@ -53,7 +57,7 @@ class TileOperators:
 
     Parameters
     ----------
-    short_ranged, stiffness : kernels of P / k and of k, as for `convolution_matrix`
+    short_ranged, stiffness : kernels of P / k and of k, as for `convolution`
     coarse_shape : shape of the grid of the smooth part
     """
 
@@ -66,29 +70,30 @@ class TileOperators:
         self, grid: Grid, short_ranged: Field, stiffness: Field, coarse_shape: Shape
     ) -> None:
         self.grid = grid
-        self.short_ranged = convolution_matrix(short_ranged)
-        self.stiffness = convolution_matrix(stiffness)
+        self.short_ranged, self.stiffness = short_ranged, stiffness
         self.coarse_shape = coarse_shape
-        self.weights = _weights()
+        self.weights = _weights().astype(np.float32)
 
     def displacement(self, tiles: Tiles) -> TileMap:
         """The map s -> C s on these tiles, up to a rigid displacement."""
         nodes = self._nodes(tiles)
         size = prod(self.coarse_shape)
         rows, columns = np.unravel_index(nodes, self.coarse_shape)
+        near = convolution(self.short_ranged, tiles, self.grid.rows.pool)
 
         def map_pressure(s: Field) -> Field:
+            s = s.astype(np.float32)
             loads: Any = np.bincount(nodes.ravel(), (s @ self.weights).ravel(), size)
             values = self._smooth(loads.reshape(self.coarse_shape))
             w: Field = values[rows, columns] @ self.weights.T
-            w += tiles.convolve(self.short_ranged, s, self.grid.rows.pool)
+            w += near(s)
             return w
 
         return map_pressure
 
     def stress(self, tiles: Tiles) -> TileMap:
         """The map u -> K u on these tiles, with the kernel of K cut off at 8 points."""
-        return lambda u: tiles.convolve(self.stiffness, u, self.grid.rows.pool)
+        return convolution(self.stiffness, tiles, self.grid.rows.pool)
 
     def _smooth(self, loads: Field) -> Field:
         """The smooth part of the displacement by loads, as coefficients of the splines."""
@@ -116,9 +121,8 @@ class PeriodicOperators(TileOperators):
         shape = tuple(points // COARSENING for points in grid.shape)
         super().__init__(grid, short_ranged, stiffness, shape)
         self.coarse = replace(grid.coarser(shape), precision="single")
-        x = np.linspace(0.0, LARGEST_X, TABLE)
         q = self.coarse.wavenumber()
-        symbol: Field = np.interp(q / (2 * alpha), x, gammaincc(order, x * x))
+        symbol: Field = np.interp(q / (2 * alpha), *_table_of_q(order))
         k = grid.cut(contact.stiffness, self.coarse)
         np.divide(symbol, k, out=symbol, where=k > 0)
         symbol[0, 0] = 0.0
@@ -143,8 +147,7 @@ class FreeOperators(TileOperators):
     def __init__(self, contact: FreeContact) -> None:
         grid, free, near = contact.grid, contact.free, (SIDE + 1, SIDE + 1)
         pixel = free.elastomer.free_compliance(near, grid.spacings) * free.unit
-        distance = np.abs(np.arange(-SIDE, SIDE + 1))
-        short_ranged = (pixel - _smooth_part(contact, near, 1))[distance[:, None], distance]
+        short_ranged = pixel - _smooth_part(contact, near, 1)
         sides = [CELL * spacing for spacing in grid.spacings]
         cell = Grid(CELL, points_y=CELL, length=sides[1], length_y=sides[0])
         k = free.elastomer.stiffness(cell.wavenumber(), grid.length) / free.unit
@@ -167,6 +170,38 @@ OPERATORS: dict[str, Callable[..., TileOperators]] = {
     "free": FreeOperators,
 }
 """The operators, by the boundary of the contact."""
+
+
+def convolution(kernel: Field, tiles: Tiles, pool: ThreadPoolExecutor | None) -> TileMap:
+    """The convolution of values on tiles with a kernel, in single precision.
+
+    The kernel is even along both axes, and given at distances from 0 to 8 points, shape (9, 9).
+    """
+    quadrant = kernel.astype(np.float32)
+    quadrant[0] /= 2
+    quadrant[:, 0] /= 2
+    padded = np.zeros((tiles.count + 1, SIDE * SIDE), np.float32)  # unused tiles are the last one
+
+    def apply(values: Field) -> Field:
+        padded[:-1] = values
+        out = np.empty(values.shape, np.float32)
+
+        def part(start: int) -> None:
+            stop = min(start + CHUNK, tiles.count)
+            convolve(padded, tiles.neighbours, quadrant, out, start, stop)
+
+        starts = range(0, tiles.count, CHUNK)
+        list(map(part, starts) if pool is None else pool.map(part, starts))
+        return out
+
+    return apply
+
+
+@lru_cache(maxsize=1)
+def _table_of_q(order: float) -> tuple[Field, Field]:
+    """x and Q(a, x^2), for the orders a of all grids of a contact."""
+    x = np.linspace(0.0, LARGEST_X, TABLE)
+    return x, gammaincc(order, x * x)
 
 
 def _alpha(grid: Grid) -> float:
@@ -215,6 +250,6 @@ def _stiffness_of_small_cell(contact: Contact) -> tuple[Field, Field]:
 
 
 def _near_values(symbol: Field) -> Field:
-    """The kernel of a symbol at distances from -8 to 8 points along both axes."""
-    kernel = np.fft.irfft2(symbol)
-    return np.roll(kernel, (SIDE, SIDE), axis=(0, 1))[: 2 * SIDE + 1, : 2 * SIDE + 1]
+    """The kernel of a symbol at distances from 0 to 8 points along both axes."""
+    near: Field = np.fft.irfft2(symbol)[: SIDE + 1, : SIDE + 1]
+    return near

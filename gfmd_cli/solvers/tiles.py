@@ -1,6 +1,5 @@
 """Tiles of 8 x 8 grid points: fields that are kept only where the contact can be."""
 
-from concurrent.futures import ThreadPoolExecutor
 from itertools import product
 from typing import Any
 
@@ -9,7 +8,6 @@ import numpy as np
 from gfmd_cli.grid.arrays import Field, Mask
 
 SIDE = 8  # points per side of a tile
-CHUNK = 256  # tiles of a matrix product: its operands stay in the cache
 
 
 class Tiles:
@@ -47,37 +45,6 @@ class Tiles:
     def overwrite(self, values: Field, field: Field) -> None:
         """Overwrite a field of the grid on the tiles."""
         _blocks(field)[self.used] = values.reshape(self.count, SIDE, SIDE)
-
-    def convolve(self, matrix: Field, values: Field, pool: ThreadPoolExecutor | None) -> Field:
-        """The convolution of values on the tiles with the kernel of `convolution_matrix`."""
-        padded = np.zeros((self.count + 1, SIDE * SIDE), dtype=matrix.dtype)
-        padded[:-1] = values
-        out = np.empty(values.shape, dtype=matrix.dtype)
-
-        def multiply(start: int) -> None:
-            chunk = slice(start, start + CHUNK)
-            window = padded[self.neighbours[chunk]].reshape(-1, len(matrix))
-            np.matmul(window, matrix, out=out[chunk])
-
-        starts = range(0, self.count, CHUNK)
-        list(map(multiply, starts) if pool is None else pool.map(multiply, starts))
-        return out
-
-
-def convolution_matrix(kernel: Field) -> Field:
-    """The matrix of a convolution, from the values on 3 x 3 tiles to those on the middle one.
-
-    `kernel` holds the values at distances from -8 to 8 points along both axes, shape (17, 17). The
-    matrix has the shape (576, 64) and is in single precision.
-    """
-    matrix = np.zeros((9, SIDE, SIDE, SIDE, SIDE), dtype=np.float32)
-    point = np.arange(SIDE)
-    for tile, shift in enumerate(product((-1, 0, 1), repeat=2)):
-        i, j = (point - (SIDE * along + point[:, None]) for along in shift)
-        near = (np.abs(i) <= SIDE)[:, None, :, None] & (np.abs(j) <= SIDE)[None, :, None, :]
-        i, j = (np.clip(distance, -SIDE, SIDE) + SIDE for distance in (i, j))
-        matrix[tile] = np.where(near, kernel[i[:, None, :, None], j[None, :, None, :]], 0.0)
-    return matrix.reshape(9 * SIDE * SIDE, SIDE * SIDE)
 
 
 def _blocks(field: Any) -> Any:
