@@ -307,9 +307,19 @@ def test_seeds_have_a_mean_and_a_confidence_interval(rows_of, tmp_path, output_o
         (low, high)
     )
     assert "mean of 4 seeds" in seeds_table(comparison).as_text()
+    assert "not converged" not in seeds_table(comparison).as_text()
     records = json.loads(output_of("analyze", tmp_path / "study.h5", "--json"))
     assert len(records) == 8
     assert records[0]["u_g_mean"] == pytest.approx(np.mean(values))
+
+
+def test_means_over_seeds_name_the_contacts_that_have_not_converged(rows_of, tmp_path):
+    plain = SPEC.partition("[accuracy]")[0].replace('points = "auto"', "points = 64")
+    steps = "solver={max_steps=1, nested=false}"
+    rows_of("surface.seed=[0, 1]", "load.p_star=0.1", steps, text=plain)
+    table = seeds_table(compare(tmp_path / "study.h5")).as_text()
+    assert "not converged" in table
+    assert table.endswith("2 max_steps")
 
 
 def test_the_interval_holds_the_truth_as_often_as_it_says():

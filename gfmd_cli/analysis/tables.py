@@ -94,6 +94,7 @@ SEEDS = (
         TableColumn(quantity.heading, f"{name}_mean", error=f"{name}_confidence")
         for name, quantity in QUANTITIES.items()
     ),
+    TableColumn("not converged", "failures", optional=True),
 )
 CONTACT_AREA, STRESS_DEVIATION, MEAN_GAP = (
     (
@@ -243,7 +244,7 @@ def seeds_table(comparison: Comparison) -> Table:
     groups = groups_of(
         (
             f"{ensemble.title}: mean of {len(ensemble.rows)} seeds",
-            {"p_star": ensemble.p_star, **ensemble.means()},
+            {"p_star": ensemble.p_star, "failures": ensemble.failures, **ensemble.means()},
         )
         for ensemble in ensembles(comparison)
     )
