@@ -12,6 +12,7 @@ from gfmd_cli.physics.discretisation_error import (
     AREA_EXCESS,
     MAX_AREA_EXPONENT,
     RoughnessScales,
+    Tip,
     estimate,
     exponent_spread,
     local_exponent,
@@ -19,7 +20,7 @@ from gfmd_cli.physics.discretisation_error import (
 )
 from gfmd_cli.physics.elastomers import HalfSpace, Membrane, Power, Slab
 from gfmd_cli.physics.error_estimates import GridValues
-from gfmd_cli.physics.indenters import Parabola, Wave
+from gfmd_cli.physics.indenters import LineParabola, Parabola, Ridge, Wave
 from gfmd_cli.physics.observables import QUANTITIES, observe
 from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.solvers.auto import Auto
@@ -162,6 +163,72 @@ def test_the_stress_at_a_step_is_that_of_a_punch(n, verdict):
     levels = sequence(n)
     assert estimate(levels, n, stepped=True)["sigma_p"].verdict == verdict
     assert estimate(levels, n, stepped=True)["a_r"] == estimate(levels, n)["a_r"]
+
+
+RIDGE, CONE = Tip(1.0, dimension=1), Tip(1.0)
+
+
+@pytest.mark.parametrize(
+    ("tip", "n", "verdict"),
+    [
+        (RIDGE, 1.0, "regular"), (RIDGE, 1.3, "slow"), (RIDGE, 1.5, "diverges"),
+        (CONE, 1.75, "regular"), (CONE, 1.9, "slow"), (CONE, 2.0, "diverges"),
+        (Tip(2.0), 2.5, "regular"),
+    ],
+)  # fmt: skip
+def test_the_stress_of_a_sharp_tip_has_its_own_limit(tip, n, verdict):
+    """<sigma^2> around a tip -r^m, with the stress r^(m - n)."""
+    assert estimate(sequence(n), n, tip=tip)["sigma_p"].verdict == verdict
+    free = [replace(level, border=0.0) for level in sequence(n)]
+    if n < 2:
+        assert estimate(free, n, tip=tip)["sigma_p"].verdict == verdict
+
+
+def test_the_area_of_a_ridge_is_unknown_where_its_stress_rings():
+    assert estimate(sequence(1.75), 1.75, tip=RIDGE)["a_r"].verdict == "regular"
+    assert estimate(sequence(2.0), 2.0, tip=RIDGE)["a_r"].verdict == "unknown"
+    assert estimate(sequence(2.0), 2.0, tip=CONE)["a_r"].verdict == "regular"
+
+
+def test_one_contact_point_has_no_stress():
+    levels = [GridValues(N, 1 / N, N**0.5, 0.1, 2.0) for N in (64, 128)]
+    assert estimate(levels, 1.5)["sigma_p"].verdict == "unknown"
+
+
+@pytest.mark.parametrize("n", [0.0, 1.0, 2.0])
+def test_a_change_that_is_small_by_accident_leaves_a_bar(n):
+    """As the edge of a contact falls between the points of two grids alike."""
+    levels = [GridValues(N, 0.9, 0.5, 0.01, 2.0) for N in (64, 128)]
+    smooth, sharp = (estimate(levels, n, tip=tip) for tip in (Tip(), RIDGE))
+    assert smooth["sigma_p"].error > 0
+    assert smooth["u_g"].error == pytest.approx(5 * 0.01 / (128 * 0.1) ** 2)
+    assert sharp["u_g"].error == pytest.approx(20 * 0.01 / (128 * 0.1) ** 2)
+
+
+@pytest.mark.parametrize("shape", [Ridge(), Ridge(width=0.3), LineParabola()])
+@pytest.mark.parametrize("n", [0.0, 0.5, 1.0, 1.5, 2.0])
+def test_bars_of_line_contacts_hold(shape, n):
+    pressures = 3 ** (n - 1) * np.geomspace(0.005, 1.5, 6)
+    elastomer, measured = Power(n=n), {}
+    for points in (64, 128, 2048):
+        scene = build_scene(shape, elastomer, points)
+        for p in pressures:
+            contact = scene.contact(p / scene.delta_sigma)
+            solution = solve_contact(contact, Auto(tolerance=1e-7))
+            o = observe(contact, solution.u, solution.sigma)
+            measured[points, p] = GridValues(
+                points, o.a_r, o.sigma_p * scene.delta_sigma, o.u_g * scene.h_std, o.perimeter
+            )
+    held = {"sigma_p": [], "u_g": []}
+    for p in pressures:
+        levels = [measured[points, p] for points in (64, 128)]
+        values = estimate(levels, n, tip=Tip(shape.tip_exponent, dimension=1))
+        for name, of_shape in held.items():
+            estimated, exact = values[name], getattr(measured[2048, p], name)
+            if estimated.verdict == "regular" and measured[2048, p].a_r < 1:
+                of_shape.append(abs(estimated.continuum - exact) <= estimated.continuum_error)
+    assert all(held["u_g"])
+    assert np.mean(held["sigma_p"] or [1.0]) > 0.8
 
 
 def test_no_contact_is_unknown():

@@ -11,6 +11,7 @@ from gfmd_cli.grid.ranks import Ranks, agree
 from gfmd_cli.physics.contact import Contact, Scene
 from gfmd_cli.physics.discretisation_error import (
     RoughnessScales,
+    Tip,
     estimate,
     exponent_spread,
     local_exponent,
@@ -261,6 +262,7 @@ def _estimates(task: Task, solved: Solved, grids: list[GridResult]) -> dict[str,
         spread,
         band_limited=task.surface.band_limited,
         stepped=task.surface.stepped,
+        tip=Tip(task.surface.tip_exponent, scene.grid.dimension),
     )
 
 
