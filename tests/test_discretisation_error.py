@@ -7,6 +7,7 @@ import exact_solutions as reference
 import numpy as np
 import pytest
 
+from gfmd_cli import rows, run
 from gfmd_cli.physics.contact import build_scene
 from gfmd_cli.physics.discretisation_error import (
     AREA_EXCESS,
@@ -163,6 +164,25 @@ def test_the_stress_at_a_step_is_that_of_a_punch(n, verdict):
     levels = sequence(n)
     assert estimate(levels, n, stepped=True)["sigma_p"].verdict == verdict
     assert estimate(levels, n, stepped=True)["a_r"] == estimate(levels, n)["a_r"]
+
+
+def test_full_contact_on_a_coarse_grid_leaves_a_bar_where_finer_grids_have_gaps(tmp_path):
+    """Between the points of 24^2 the stress is tensile; far above that pressure it is not."""
+    spec = {
+        "surface": {"kind": "self-affine", "cutoff": 0.1},
+        "elastomer": {"kind": "half-space"},
+        "grid": {"points": [24, 256]},
+        "load": {"p_star": [2.9, 6.0]},
+        "accuracy": {"mean_gap": 0.5},
+    }
+    coarse, above, fine, _ = rows(run(spec, tmp_path / "full.h5"))
+    assert coarse["a_r"] == 1
+    assert coarse["a_r_verdict"] == "regular"
+    for name in QUANTITIES:
+        exact, value = (row[f"{name}_continuum"] for row in (fine, coarse))
+        assert 0 < abs(value - exact) <= coarse[f"{name}_continuum_error"]
+        assert above[f"{name}_verdict"] == "exact"
+        assert above[f"{name}_continuum_error"] == pytest.approx(0, abs=1e-4)
 
 
 RIDGE, CONE = Tip(1.0, dimension=1), Tip(1.0)

@@ -9,7 +9,7 @@ short waves from one point to the next (pi at most); b = curvature / points^2, t
 which the surface bends from one point to the next.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import exp, hypot, inf, isnan, log, nan, pi, sqrt
 
@@ -18,6 +18,7 @@ import numpy as np
 from gfmd_cli.physics.elastomers import LinearElastomer
 from gfmd_cli.physics.error_estimates import (
     DIVERGENT,
+    NO_ERRORS,
     UNKNOWN,
     Estimate,
     GridValues,
@@ -166,6 +167,7 @@ def estimate(
     band_limited: bool = True,
     stepped: bool = False,
     tip: Tip = SMOOTH,
+    between: Mapping[str, float] = NO_ERRORS,
 ) -> dict[str, Estimate]:
     """Estimate errors and continuum values of `a_r`, `sigma_p` and `u_g` on the finest grid.
 
@@ -180,14 +182,15 @@ def estimate(
     band_limited : whether all grids contain the same waves, so that full contact is exact
     stepped : whether the surface has vertical steps, where the stress is that of a punch
     tip : of a single indenter
+    between : errors in full contact, of tensile stress between the points, by quantity
     """
     ordered = sorted(levels, key=lambda level: level.points)
     fine, coarse = ordered[-1], ordered[-2] if len(ordered) > 1 else None
     n = max(exponent, 0.0)
     if fine.border is not None:
-        estimates = estimate_free(fine, coarse, n, band_limited=band_limited)
+        estimates = estimate_free(fine, coarse, n, band_limited=band_limited, between=between)
     elif fine.a_r == 1 and band_limited:
-        return full_contact(fine)
+        return full_contact(fine, between)
     elif fine.a_r == 0 or (fine.a_r == 1 and rough is None):
         return unknown()
     else:

@@ -12,6 +12,7 @@ has the singularity of a punch: s^(-n/2) at the distance s from the border. Then
 as spacing^(1 - n), and has no limit for n >= 1.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from math import hypot, nan
 
@@ -74,12 +75,14 @@ class Estimate:
     continuum_error: float
     """The continuum value is within continuum +- continuum_error with the same probability."""
     verdict: str
-    """"exact": full contact with a band-limited surface; "regular"; "bound": only an interval is
-    known; "slow": converges too slowly for a number; "diverges": there is no continuum value;
-    "unknown": no valid error can be given from these grids."""
+    """"exact": full contact with a band-limited surface, also between the points; "regular";
+    "bound": only an interval is known; "slow": converges too slowly for a number;
+    "diverges": there is no continuum value; "unknown": no valid error can be given from these
+    grids."""
 
 
 UNKNOWN = Estimate(nan, nan, nan, "unknown")
+NO_ERRORS = dict.fromkeys(QUANTITIES, 0.0)
 
 
 def unknown() -> dict[str, Estimate]:
@@ -87,10 +90,14 @@ def unknown() -> dict[str, Estimate]:
     return dict.fromkeys(QUANTITIES, UNKNOWN)
 
 
-def full_contact(fine: GridValues) -> dict[str, Estimate]:
-    """Full contact with a surface of which all grids contain the same waves."""
+def full_contact(fine: GridValues, errors: Mapping[str, float]) -> dict[str, Estimate]:
+    """Full contact with a surface of which all grids contain the same waves.
+
+    `errors` are those of a stress that may be tensile between the points of the grid.
+    """
     values = {"a_r": 1.0, "sigma_p": fine.sigma_p, "u_g": 0.0}
-    return {name: Estimate(0.0, value, 0.0, "exact") for name, value in values.items()}
+    verdict = "regular" if errors["a_r"] > 0 else "exact"
+    return {name: Estimate(errors[name], x, errors[name], verdict) for name, x in values.items()}
 
 
 def estimate_by_change(
@@ -111,7 +118,12 @@ def estimate_by_change(
 
 
 def estimate_free(
-    fine: GridValues, coarse: GridValues | None, n: float, *, band_limited: bool
+    fine: GridValues,
+    coarse: GridValues | None,
+    n: float,
+    *,
+    band_limited: bool,
+    between: Mapping[str, float] = NO_ERRORS,
 ) -> dict[str, Estimate]:
     """Estimates with a free boundary; unknown from one grid, except a_r and u_g of full contact."""
     estimates = unknown()
@@ -124,7 +136,7 @@ def estimate_free(
             "u_g": _on_grid("u_g", fine, coarse, FREE_GAP_FACTOR),
         }
     if fine.a_r == 1 and band_limited:
-        estimates |= {name: full_contact(fine)[name] for name in ("a_r", "u_g")}
+        estimates |= {name: full_contact(fine, between)[name] for name in ("a_r", "u_g")}
     if fine.border > 0:
         estimates["sigma_p"] = border_stress(fine, coarse, n)
     return estimates
