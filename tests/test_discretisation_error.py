@@ -251,6 +251,14 @@ def test_bars_of_line_contacts_hold(shape, n):
     assert np.mean(held["sigma_p"] or [1.0]) > 0.8
 
 
+def test_the_area_of_a_line_profile_has_a_wider_bar():
+    levels = sequence(1.0, grids=(64, 128), line=2.0)
+    few = RoughnessScales(waves=20.0, curvature=2e3, band_limited=False)
+    plane, line = (estimate(levels, 1.0, few, tip=Tip(2.0, d))["a_r"] for d in (2, 1))
+    assert line.continuum_error == pytest.approx(1.8 / 1.35 * plane.continuum_error)
+    assert line.error == plane.error
+
+
 def test_no_contact_is_unknown():
     for value in estimate([GridValues(64, 0.0, 0.0, 1.0, 0.0)], 1.0, ROUGH).values():
         assert isnan(value.error)

@@ -217,7 +217,7 @@ def _estimate_periodic(
     phase, bend = nan, nan
     if rough is not None:
         if fine.patches < MIN_PATCHES or not rough.calibrated:
-            return estimate_by_change(fine, coarse, n)
+            return estimate_by_change(fine, coarse, n, line=tip.dimension == 1)
         phase, bend = 2 * pi * rough.waves / fine.points, rough.curvature / fine.points**2
     oblong = rough is not None and rough.aspect > MAX_ASPECT
     return {
