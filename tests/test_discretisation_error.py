@@ -1,13 +1,13 @@
 """Error bars and continuum values: sequences of known limit, exact contacts, verdicts."""
 
 from dataclasses import replace
-from math import isnan
+from math import isnan, pi
 
 import exact_solutions as reference
 import numpy as np
 import pytest
 
-from gfmd_cli import rows, run
+from gfmd_cli import rows, run, solve
 from gfmd_cli.physics.contact import build_scene
 from gfmd_cli.physics.discretisation_error import (
     AREA_EXCESS,
@@ -212,7 +212,21 @@ def test_the_area_of_a_ridge_is_unknown_where_its_stress_rings():
 
 def test_one_contact_point_has_no_stress():
     levels = [GridValues(N, 1 / N, N**0.5, 0.1, 2.0) for N in (64, 128)]
-    assert estimate(levels, 1.5)["sigma_p"].verdict == "unknown"
+    assert estimate(levels, 1.5)["sigma_p"].verdict == "unresolved"
+
+
+def test_a_contact_of_one_point_is_refined_until_it_is_resolved():
+    spec = {
+        "surface": {"kind": "line-parabola"},
+        "elastomer": {"kind": "half-space"},
+        "grid": {"points": "auto"},
+        "load": {"pressure": 1e-5},
+        "accuracy": {"stress_deviation": 0.2},
+    }
+    result = solve(spec)
+    assert result.status == "converged"
+    assert result.columns["sigma_p_verdict"] == "regular"
+    assert result.pressure.max() == pytest.approx((1e-5 / pi) ** 0.5, rel=0.05)
 
 
 @pytest.mark.parametrize("n", [0.0, 1.0, 2.0])

@@ -78,8 +78,8 @@ class Estimate:
     verdict: str
     """"exact": full contact with a band-limited surface, also between the points; "regular";
     "bound": only an interval is known; "slow": converges too slowly for a number;
-    "diverges": there is no continuum value; "unknown": no valid error can be given from these
-    grids."""
+    "diverges": there is no continuum value; "unresolved": the contact has too few points;
+    "unknown": no valid error can be given from these grids."""
 
 
 UNKNOWN = Estimate(nan, nan, nan, "unknown")
