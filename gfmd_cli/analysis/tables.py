@@ -89,7 +89,7 @@ CONTINUUM = (
     ),
 )
 SEEDS = (
-    P_STAR,
+    replace(P_STAR, error="p_star_confidence"),
     *(
         TableColumn(quantity.heading, f"{name}_mean", error=f"{name}_confidence")
         for name, quantity in QUANTITIES.items()
