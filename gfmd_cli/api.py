@@ -23,7 +23,7 @@ from gfmd_cli.errors import InputError
 from gfmd_cli.grid.arrays import Field, Mask
 from gfmd_cli.grid.blas import one_blas_thread
 from gfmd_cli.physics.file_surface import FileSurface, forget_files
-from gfmd_cli.physics.given_heights import given_heights, surface_table
+from gfmd_cli.physics.given_heights import given_heights, surface_table, write_heights
 from gfmd_cli.physics.indenters import SMALLEST_GRID
 from gfmd_cli.physics.observables import contact_pressure
 from gfmd_cli.spec.models import Spec
@@ -143,8 +143,9 @@ def solve(spec: Path | str | Tables, *, heights: Any = None, threads: int = 1) -
         The spec of one task.
     heights
         Height map that replaces the surface: an array or nested list of shape (points_y, points),
-        for a line profile (points,), a masked array, or a topography of SurfaceTopography, which
-        states its sides, unit and periodicity. The spec is then a dictionary, whose table "surface"
+        for a line profile (points,), a masked array, an array of xarray, whose coordinates and
+        units are read as those of a netCDF file, or a topography of SurfaceTopography, which states
+        its sides, unit and periodicity. The spec is then a dictionary, whose table "surface"
         may contain the keys of a map, such as length, periodic, level and missing. Without
         grid.points the points of the map are those of the grid.
     threads
@@ -164,8 +165,7 @@ def solve(spec: Path | str | Tables, *, heights: Any = None, threads: int = 1) -
         raise InputError("heights go with a dictionary; a spec in a file has a surface")
     given = given_heights(heights)
     with TemporaryDirectory() as folder:
-        path = Path(folder) / "heights.npy"
-        np.save(path, given.values)
+        path = write_heights(Path(folder), heights, given.values)
         try:
             surface = surface_table(given, _without_numpy(spec.get("surface", {})))
             surface["path"] = str(path)

@@ -9,7 +9,7 @@ from specs import power_spec
 
 from gfmd_cli import solve
 from gfmd_cli.analysis.compare import compare
-from gfmd_cli.analysis.ensemble import Ensemble, ensembles
+from gfmd_cli.analysis.ensemble import Ensemble, ensembles, spread_of
 from gfmd_cli.analysis.table import plus_minus
 from gfmd_cli.analysis.tables import seeds_table, study_tables
 from gfmd_cli.bench.run import run_bench
@@ -282,7 +282,7 @@ def test_the_table_says_that_its_values_are_counted_where_those_of_the_continuum
 ):
     rows_of()
     counted, *others = study_tables(compare(tmp_path / "study.h5"))
-    assert "Values on the grid, not extrapolated" in counted.as_text()
+    assert "Values on the grid, not extrapolated" in " ".join(counted.as_text().split())
     assert any(table.as_text().startswith("Continuum values") for table in others)
     rows_of(text=SPEC.partition("[accuracy]")[0].replace('"auto"', "64"), name="plain.h5")
     plain = study_tables(compare(tmp_path / "plain.h5"))
@@ -307,9 +307,37 @@ def test_seeds_have_a_mean_and_a_confidence_interval(rows_of, tmp_path, output_o
         (low, high)
     )
     assert "mean of 4 seeds" in seeds_table(comparison).as_text()
+    assert "not converged" not in seeds_table(comparison).as_text()
     records = json.loads(output_of("analyze", tmp_path / "study.h5", "--json"))
     assert len(records) == 8
     assert records[0]["u_g_mean"] == pytest.approx(np.mean(values))
+
+
+def test_a_pressure_that_was_searched_has_an_interval_and_a_given_one_is_exact(rows_of, tmp_path):
+    plain = SPEC.partition("[accuracy]")[0].replace('points = "auto"', "points = 64")
+    seeds = "surface.seed=[0, 1, 2]"
+    rows = rows_of(seeds, "load={mean_gap=0.5}", text=plain)
+    (ensemble,) = ensembles(compare(tmp_path / "study.h5"))
+    spread = spread_of([row["p_star"] for row in rows])
+    assert ensemble.means()["p_star_confidence"] == spread.half_width > 0
+    assert (
+        f"{spread.mean:.3f} +- {spread.half_width:.2g}"
+        in seeds_table(compare(tmp_path / "study.h5")).as_text()
+    )
+    half_space = 'elastomer={kind="half-space", E_star=1e9}'
+    keys = (seeds, "load={pressure=[1e6, 3.7e6]}", "surface.h_std=1e-6", half_space)
+    rows = rows_of(*keys, text=plain, name="pa.h5")
+    assert {row["pressure"] for row in rows} == {1e6, 3.7e6}
+    assert "p_star_confidence" not in ensembles(compare(tmp_path / "pa.h5"))[0].means()
+
+
+def test_means_over_seeds_name_the_contacts_that_have_not_converged(rows_of, tmp_path):
+    plain = SPEC.partition("[accuracy]")[0].replace('points = "auto"', "points = 64")
+    steps = "solver={max_steps=1, nested=false}"
+    rows_of("surface.seed=[0, 1]", "load.p_star=0.1", steps, text=plain)
+    table = seeds_table(compare(tmp_path / "study.h5")).as_text()
+    assert "not converged" in table
+    assert table.endswith("2 max_steps")
 
 
 def test_the_interval_holds_the_truth_as_often_as_it_says():

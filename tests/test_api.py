@@ -186,6 +186,36 @@ def test_a_topography_states_both_sides_also_of_a_part():
     assert (square.length, square.length_y) == pytest.approx((20 / 32 * 1e-5, 4e-5), rel=1e-12)
 
 
+def test_an_array_of_xarray_is_read_with_its_coordinates_and_units():
+    xarray = pytest.importorskip("xarray")
+    pytest.importorskip("h5netcdf")
+    heights = rough_map()[:20]
+    um = {"units": "um"}
+    scan = xarray.DataArray(
+        1e9 * heights,
+        dims=("y", "x"),
+        coords={
+            "x": ("x", 10 / 32 * np.arange(32.0), um),
+            "y": ("y", 5 - 0.25 * np.arange(20.0), um),
+            "time": 7.0,
+        },
+        attrs={"units": "nm", "comment": None},
+    )
+    by_hand = {"length": 1e-5, "length_y": 5e-6, "periodic": False}
+    expected = solve({**MATERIAL, "surface": by_hand}, heights=heights[::-1])
+    for array in (scan, scan.T, scan.isel(y=slice(None, None, -1))):
+        result = solve(MATERIAL, heights=array)
+        assert (result.length, result.length_y) == pytest.approx((1e-5, 5e-6), rel=1e-12)
+        assert result.a_r == expected.a_r
+        np.testing.assert_allclose(result.height, expected.height, rtol=1e-9, atol=1e-20)
+    bare = solve(
+        {**MATERIAL, "surface": {"length": 1e-5}}, heights=scan.drop_vars(["x", "y"]) / 1e9
+    )
+    assert bare.a_r == solve({**MATERIAL, "surface": {"length": 1e-5}}, heights=heights).a_r
+    with pytest.raises(InputError, match="unit 'furlong'"):
+        solve(MATERIAL, heights=scan.assign_attrs(units="furlong"))
+
+
 def test_a_line_scan_at_unequal_distances_is_interpolated():
     class LineScan(Topography):
         is_uniform = False

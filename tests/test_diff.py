@@ -120,6 +120,17 @@ def test_another_elastomer_is_paired_by_pressure_and_compared_in_pascal_and_metr
     assert data["paired"] == difference.paired
 
 
+def test_at_one_pressure_in_pascal_two_grids_of_an_indenter_are_compared_in_pascal_and_metres(
+    study_of,
+):
+    keys = ("surface={kind='parabola'}", "elastomer={kind='half-space'}", "load={pressure=0.01}")
+    (pair,) = diff(study_of(*keys), study_of(*keys, "grid.points=64")).pairs
+    assert pair.one["h_std"] != pytest.approx(pair.other["h_std"], rel=1e-3)  # the units differ
+    for name, unit in (("sigma_p", "delta_sigma"), ("u_g", "h_std")):
+        a, b = (row[name] * row[unit] for row in (pair.one, pair.other))
+        assert pair.deviation(name).relative == pytest.approx((b - a) / max(a, b), rel=1e-12)
+
+
 def test_another_surface_of_one_elastomer_is_paired_by_load(output_of, study_of):
     one, other = study_of("elastomer.n=1"), study_of("elastomer.n=1", "surface.hurst=0.5")
     difference = diff(one, other)

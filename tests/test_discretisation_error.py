@@ -1,17 +1,19 @@
 """Error bars and continuum values: sequences of known limit, exact contacts, verdicts."""
 
 from dataclasses import replace
-from math import isnan
+from math import isnan, pi
 
 import exact_solutions as reference
 import numpy as np
 import pytest
 
+from gfmd_cli import rows, run, solve
 from gfmd_cli.physics.contact import build_scene
 from gfmd_cli.physics.discretisation_error import (
     AREA_EXCESS,
     MAX_AREA_EXPONENT,
     RoughnessScales,
+    Tip,
     estimate,
     exponent_spread,
     local_exponent,
@@ -19,7 +21,7 @@ from gfmd_cli.physics.discretisation_error import (
 )
 from gfmd_cli.physics.elastomers import HalfSpace, Membrane, Power, Slab
 from gfmd_cli.physics.error_estimates import GridValues
-from gfmd_cli.physics.indenters import Parabola, Wave
+from gfmd_cli.physics.indenters import LineParabola, Parabola, Ridge, Wave
 from gfmd_cli.physics.observables import QUANTITIES, observe
 from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.solvers.auto import Auto
@@ -162,6 +164,113 @@ def test_the_stress_at_a_step_is_that_of_a_punch(n, verdict):
     levels = sequence(n)
     assert estimate(levels, n, stepped=True)["sigma_p"].verdict == verdict
     assert estimate(levels, n, stepped=True)["a_r"] == estimate(levels, n)["a_r"]
+
+
+def test_full_contact_on_a_coarse_grid_leaves_a_bar_where_finer_grids_have_gaps(tmp_path):
+    """Between the points of 24^2 the stress is tensile; far above that pressure it is not."""
+    spec = {
+        "surface": {"kind": "self-affine", "cutoff": 0.1},
+        "elastomer": {"kind": "half-space"},
+        "grid": {"points": [24, 256]},
+        "load": {"p_star": [2.9, 6.0]},
+        "accuracy": {"mean_gap": 0.5},
+    }
+    coarse, above, fine, _ = rows(run(spec, tmp_path / "full.h5"))
+    assert coarse["a_r"] == 1
+    assert coarse["a_r_verdict"] == "regular"
+    for name in QUANTITIES:
+        exact, value = (row[f"{name}_continuum"] for row in (fine, coarse))
+        assert 0 < abs(value - exact) <= coarse[f"{name}_continuum_error"]
+        assert above[f"{name}_verdict"] == "exact"
+        assert above[f"{name}_continuum_error"] == pytest.approx(0, abs=1e-4)
+
+
+RIDGE, CONE = Tip(1.0, dimension=1), Tip(1.0)
+
+
+@pytest.mark.parametrize(
+    ("tip", "n", "verdict"),
+    [
+        (RIDGE, 1.0, "regular"), (RIDGE, 1.3, "slow"), (RIDGE, 1.5, "diverges"),
+        (CONE, 1.75, "regular"), (CONE, 1.9, "slow"), (CONE, 2.0, "diverges"),
+        (Tip(2.0), 2.5, "regular"),
+    ],
+)  # fmt: skip
+def test_the_stress_of_a_sharp_tip_has_its_own_limit(tip, n, verdict):
+    """<sigma^2> around a tip -r^m, with the stress r^(m - n)."""
+    assert estimate(sequence(n), n, tip=tip)["sigma_p"].verdict == verdict
+    free = [replace(level, border=0.0) for level in sequence(n)]
+    if n < 2:
+        assert estimate(free, n, tip=tip)["sigma_p"].verdict == verdict
+
+
+def test_the_area_of_a_ridge_is_unknown_where_its_stress_rings():
+    assert estimate(sequence(1.75), 1.75, tip=RIDGE)["a_r"].verdict == "regular"
+    assert estimate(sequence(2.0), 2.0, tip=RIDGE)["a_r"].verdict == "unknown"
+    assert estimate(sequence(2.0), 2.0, tip=CONE)["a_r"].verdict == "regular"
+
+
+def test_one_contact_point_has_no_stress():
+    levels = [GridValues(N, 1 / N, N**0.5, 0.1, 2.0) for N in (64, 128)]
+    assert estimate(levels, 1.5)["sigma_p"].verdict == "unresolved"
+
+
+def test_a_contact_of_one_point_is_refined_until_it_is_resolved():
+    spec = {
+        "surface": {"kind": "line-parabola"},
+        "elastomer": {"kind": "half-space"},
+        "grid": {"points": "auto"},
+        "load": {"pressure": 1e-5},
+        "accuracy": {"stress_deviation": 0.2},
+    }
+    result = solve(spec)
+    assert result.status == "converged"
+    assert result.columns["sigma_p_verdict"] == "regular"
+    assert result.pressure.max() == pytest.approx((1e-5 / pi) ** 0.5, rel=0.05)
+
+
+@pytest.mark.parametrize("n", [0.0, 1.0, 2.0])
+def test_a_change_that_is_small_by_accident_leaves_a_bar(n):
+    """As the edge of a contact falls between the points of two grids alike."""
+    levels = [GridValues(N, 0.9, 0.5, 0.01, 2.0) for N in (64, 128)]
+    smooth, sharp = (estimate(levels, n, tip=tip) for tip in (Tip(), RIDGE))
+    assert smooth["sigma_p"].error > 0
+    assert smooth["u_g"].error == pytest.approx(5 * 0.01 / (128 * 0.1) ** 2)
+    assert sharp["u_g"].error == pytest.approx(20 * 0.01 / (128 * 0.1) ** 2)
+
+
+@pytest.mark.parametrize("shape", [Ridge(), Ridge(width=0.3), LineParabola()])
+@pytest.mark.parametrize("n", [0.0, 0.5, 1.0, 1.5, 2.0])
+def test_bars_of_line_contacts_hold(shape, n):
+    pressures = 3 ** (n - 1) * np.geomspace(0.005, 1.5, 6)
+    elastomer, measured = Power(n=n), {}
+    for points in (64, 128, 2048):
+        scene = build_scene(shape, elastomer, points)
+        for p in pressures:
+            contact = scene.contact(p / scene.delta_sigma)
+            solution = solve_contact(contact, Auto(tolerance=1e-7))
+            o = observe(contact, solution.u, solution.sigma)
+            measured[points, p] = GridValues(
+                points, o.a_r, o.sigma_p * scene.delta_sigma, o.u_g * scene.h_std, o.perimeter
+            )
+    held = {"sigma_p": [], "u_g": []}
+    for p in pressures:
+        levels = [measured[points, p] for points in (64, 128)]
+        values = estimate(levels, n, tip=Tip(shape.tip_exponent, dimension=1))
+        for name, of_shape in held.items():
+            estimated, exact = values[name], getattr(measured[2048, p], name)
+            if estimated.verdict == "regular" and measured[2048, p].a_r < 1:
+                of_shape.append(abs(estimated.continuum - exact) <= estimated.continuum_error)
+    assert all(held["u_g"])
+    assert np.mean(held["sigma_p"] or [1.0]) > 0.8
+
+
+def test_the_area_of_a_line_profile_has_a_wider_bar():
+    levels = sequence(1.0, grids=(64, 128), line=2.0)
+    few = RoughnessScales(waves=20.0, curvature=2e3, band_limited=False)
+    plane, line = (estimate(levels, 1.0, few, tip=Tip(2.0, d))["a_r"] for d in (2, 1))
+    assert line.continuum_error == pytest.approx(1.8 / 1.35 * plane.continuum_error)
+    assert line.error == plane.error
 
 
 def test_no_contact_is_unknown():

@@ -237,3 +237,11 @@ def test_a_solved_paraboloid_has_the_exponent_and_the_amplitude_of_hertz():
     assert abs(fitted.exponent - fitted.theory) < 2 * fitted.error
     exact = float(hertz_density(n, 1.0, 1.5, np.pi * radius**2))
     assert fitted.edge_prefactor == pytest.approx(exact, rel=0.1)
+
+
+def test_grids_of_other_pixels_are_other_contacts(study):
+    sweep = "grid={points=[32, 64], points_y=[32, 64]}", "surface.cutoff=0.1"
+    merged = distributions(compare(study(*sweep, "surface.length_y=1.0")))
+    sizes = [[(row["points"], row["points_y"]) for row in seeds] for [seeds] in
+             (stress.seeds for stress in merged)]  # fmt: skip
+    assert sizes == [[(32, 32), (64, 64)]]

@@ -8,7 +8,7 @@ from specs import power_spec
 
 from gfmd_cli.analysis import figures
 from gfmd_cli.analysis.compare import Curve, compare
-from gfmd_cli.analysis.curve_styles import curve_styles
+from gfmd_cli.analysis.curve_styles import MAX_LABEL, curve_styles, shortened
 from gfmd_cli.analysis.figures import VIEWS, draw_all, items_of, study_figures
 from gfmd_cli.analysis.plotting import styled
 from gfmd_cli.errors import InputError, SpaceError
@@ -28,6 +28,7 @@ points = 256
 [load]
 p_star = [0.01, 0.1]
 """
+LONG = "measurement_2024_11_sample_steel_ground_position_"
 OVER_PRESSURE = {view.name for view in VIEWS}
 DISTRIBUTIONS = {"stress_distribution", "stress_distribution_pressures"}
 
@@ -207,7 +208,8 @@ def test_more_variants_than_can_be_told_apart_are_named_by_their_elastomer(study
     ]  # fmt: skip
     labels = {style.label for style in curve_styles(many[:8])}
     assert labels >= {"n = 0, hurst=0.1", "n = 1, hurst=0.3"}
-    assert {style.label for style in curve_styles(many)} == {"n = 0", "n = 1"}
+    labels = {style.label for style in curve_styles(many)}
+    assert labels == {"n = 0, several hurst", "n = 1, several hurst"}
     assert len({style.colour for style in curve_styles(many)}) == 2
 
 
@@ -260,3 +262,27 @@ def test_missing_matplotlib_is_told(monkeypatch):
     monkeypatch.delitem(sys.modules, "gfmd_cli.analysis.plotting")
     with pytest.raises(InputError, match=r'pip install "\.\[plot\]"'):
         importlib.import_module("gfmd_cli.analysis.plotting")
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        [f"{LONG}1.npy", f"{LONG}2.npy"],
+        ["a" * 60 + word + "b" * 60 for word in ("one", "two")],
+        ["short", "other"],
+    ],
+)
+def test_long_labels_that_end_differently_stay_different(names):
+    cut = shortened(names)
+    assert len(set(cut)) == len(names)
+    assert all(len(label) <= MAX_LABEL for label in cut)
+    assert cut[0].startswith("short" if names[0] == "short" else cut[0][:3])
+    assert shortened(["x" * 90] * 2)[0] == shortened(["x" * 90] * 2)[1]
+
+
+def test_curves_that_share_a_style_say_what_differs(study):
+    comparison = study(
+        ROUGH, "elastomer.n=1", "surface.hurst=[0.1,0.2,0.3,0.4,0.5,0.6,0.7,0.8,0.9]"
+    )
+    (label,) = {style.label for style in curve_styles(comparison.curves)}
+    assert label == "n = 1, several hurst"

@@ -11,6 +11,7 @@ PALETTE = ("#332288", "#0077bb", "#009988", "#999933", "#ee7733", "#cc3311")
 """Safe for colour-blind readers (P. Tol, Colour schemes, 2021), ordered by hue."""
 MARKERS = "os^Dv<p>h"
 MAX_LABEL = 46  # characters
+TAILS = (20, 30, 8)  # characters after the part that is left out of a long label, tried in turn
 MAX_STYLES = 8  # more styles cannot be told apart
 Colour = tuple[float, float, float]
 """Red, green, blue from 0 to 1."""
@@ -26,8 +27,12 @@ class CurveStyle:
 
 
 def literal(text: str) -> str:
-    """A text as a label of a figure, its dollar signs escaped: they would delimit formulas."""
-    return text.replace("$", r"\$")
+    """A text as a label of a figure, its dollar signs escaped: they would delimit formulas.
+
+    Characters that no font has, such as those of control, are replaced.
+    """
+    shown = "".join(each if each.isprintable() else "\N{REPLACEMENT CHARACTER}" for each in text)
+    return shown.replace("$", r"\$")
 
 
 def without_escapes(label: str) -> str:
@@ -52,18 +57,38 @@ def curve_styles(curves: list[Curve]) -> list[CurveStyle]:
     variants = _variants(curves)
     pairs = [(curve.elastomer, variant) for curve, variant in zip(curves, variants, strict=True)]
     if len(set(pairs)) > MAX_STYLES:
-        pairs = [(curve.elastomer, curve.study) for curve in curves]
+        pairs = [(curve.elastomer, _merged(curve, curves)) for curve in curves]
     distinct = list(dict.fromkeys(pairs))
     by_variant = len(elastomers) == 1
     palette = colours(len(distinct) if by_variant else len(elastomers))
+    labels = shortened(
+        [", ".join(filter(None, (names[elastomer], variant))) for elastomer, variant in distinct]
+    )
     styles = []
     for elastomer, variant in pairs:
         place = distinct.index((elastomer, variant))
         colour = palette[place if by_variant else elastomers.index(elastomer)]
-        label = ", ".join(filter(None, (names[elastomer], variant)))[:MAX_LABEL]
         marker = MARKERS[place % len(MARKERS)]
-        styles.append(CurveStyle(colour, marker, literal(label)))
+        styles.append(CurveStyle(colour, marker, literal(labels[place])))
     return styles
+
+
+def shortened(labels: list[str]) -> list[str]:
+    """Labels of at most MAX_LABEL characters, different ones if the given ones are different.
+
+    The middle is left out, or the label is numbered where the rest is the same.
+    """
+    for tail in TAILS:
+        cut = [
+            label
+            if len(label) <= MAX_LABEL
+            else f"{label[: MAX_LABEL - tail - 1]}\N{HORIZONTAL ELLIPSIS}{label[-tail:]}"
+            for label in labels
+        ]
+        if len(set(cut)) == len(set(labels)):
+            return cut
+    numbers = {label: i for i, label in enumerate(dict.fromkeys(labels), 1)}
+    return [f"{numbers[label]}: {label}"[:MAX_LABEL] for label in labels]
 
 
 def colours(count: int) -> list[Colour]:
@@ -89,6 +114,13 @@ def _variants(curves: list[Curve]) -> list[str]:
         pieces = [own[key] for key in own if len({peer[key] for peer in peers}) > 1]
         variants.append(" ".join(filter(None, pieces)))
     return variants
+
+
+def _merged(curve: Curve, curves: list[Curve]) -> str:
+    """The study, and the parameters in which the curves of one style differ."""
+    peers = [_words(c) for c in curves if (c.elastomer, c.study) == (curve.elastomer, curve.study)]
+    keys = [key for key in peers[0] if len({peer[key] for peer in peers}) > 1]
+    return ", ".join(filter(None, (curve.study, ", ".join(keys) and f"several {', '.join(keys)}")))
 
 
 def _words(curve: Curve) -> dict[str, str]:

@@ -15,6 +15,8 @@ from gfmd_cli.study.reading import open_study, solved_rows
 
 SURFACE = ("surface", "surface_sha256", "seed")
 """Columns of a surface: two files may have the same name."""
+IN_SI = ("pressure", "displacement")
+"""Loads in SI units."""
 
 
 Key = Callable[[Row], tuple[Hashable, ...]]
@@ -37,7 +39,7 @@ class Pair:
     one: Row
     other: Row
     physical: bool = False
-    """Whether stress and gap are compared in Pa and m, as for two elastomers at one pressure."""
+    """Whether stress and gap are compared in Pa and m, as where the load is in SI units."""
 
     def deviation(self, name: str) -> Deviation:
         """How far a column of the second study lies from that of the first."""
@@ -107,9 +109,8 @@ def _matches(one: list[Row], other: list[Row], *keys: Key) -> list[Pair]:
             if id(row) not in paired_ids and (partners := waiting.get(key_of(row))):
                 partner = partners.pop(0)
                 paired_ids |= {id(row), id(partner)}
-                # another surface or elastomer has other units: equal then is the pressure in Pa
-                physical = row["load"] == "pressure" and _contact_of(row) != _contact_of(partner)
-                pairs.append(Pair(row, partner, physical))
+                # Delta_sigma and h_std depend on surface, elastomer and, for an indenter, the grid
+                pairs.append(Pair(row, partner, row["load"] in IN_SI))
     for rows in (one, other):
         rows[:] = [row for row in rows if id(row) not in paired_ids]
     return sorted(pairs, key=lambda pair: int(pair.one["task"]))

@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
+from math import log2
 from typing import Any
 
 import numpy as np
@@ -206,8 +207,9 @@ def _patches(row: Row) -> float:
 def distributions(comparison: Comparison) -> list[StressDistribution]:
     """The contacts of a study that were solved on two nested grids or more.
 
-    Rows are one contact where surface, elastomer, solver, tolerance and pressure are the same and
-    so is the unit of stress; surfaces that differ in their seed only are averaged.
+    Rows are one contact where surface, elastomer, boundary, solver, tolerance and pressure are the
+    same, and so are the unit of stress and the shape of the pixels; surfaces that differ in their
+    seed only are averaged.
     """
     by_contact: dict[tuple[Any, ...], dict[int, dict[int, tuple[Curve, Row]]]] = {}
     for curve in comparison.curves:
@@ -215,7 +217,8 @@ def distributions(comparison: Comparison) -> list[StressDistribution]:
             if PR_LOGARITHMIC not in row or not row["a_r"] > 0 or row["status"] != Status.CONVERGED:
                 continue
             units = (f"{row['pressure']:.6g}", f"{row['delta_sigma']:.6g}")
-            key = (curve.study, row["elastomer"], row["ensemble"], *solver_of(row), *units)
+            same = row["elastomer"], row["ensemble"], row["boundary"], _pixel_shape(row)
+            key = (curve.study, *same, *solver_of(row), *units)
             by_contact.setdefault(key, {}).setdefault(row["seed"], {})[row["points"]] = (curve, row)
     merged = []
     for seeds in by_contact.values():
@@ -224,6 +227,14 @@ def distributions(comparison: Comparison) -> list[StressDistribution]:
             rows = [[seed[points][1] for points in grids] for seed in seeds.values()]
             merged.append(StressDistribution(next(iter(seeds.values()))[grids[-1]][0], rows))
     return merged
+
+
+def _pixel_shape(row: Row) -> int:
+    """log2 of the ratio of the spacings along x and y, rounded; zero for a line."""
+    if row["dimension"] == 1:
+        return 0
+    spacings = row["length"] / row["points"], row["length_y"] / row["points_y"]
+    return round(log2(spacings[0] / spacings[1]))
 
 
 def _nested(points: list[int]) -> list[int]:

@@ -1,5 +1,6 @@
 """The spread of a quantity over seeds: mean, standard error, confidence interval."""
 
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from math import sqrt
@@ -12,6 +13,8 @@ from gfmd_cli.analysis.compare import Comparison, Row, best_of_all, load_of, of_
 from gfmd_cli.analysis.selection import grouped
 from gfmd_cli.analysis.units import contact_title, grid_size
 from gfmd_cli.physics.observables import QUANTITIES
+from gfmd_cli.spec.models import LOADS
+from gfmd_cli.status import Status
 from gfmd_cli.study.columns import PARAMETERS
 
 CONFIDENCE = 0.95
@@ -49,15 +52,26 @@ class Ensemble:
         """Mean reduced pressure, which differs where another load is prescribed."""
         return float(np.mean([row["p_star"] for row in self.rows]))
 
+    @property
+    def failures(self) -> str | None:
+        """The statuses of the rows that have not converged, with their numbers; None without."""
+        counts = Counter(row["status"] for row in self.rows if row["status"] != Status.CONVERGED)
+        return ", ".join(f"{number} {status}" for status, number in counts.items()) or None
+
     def spread(self, name: str) -> Spread:
         """Of "a_r", "sigma_p" or "u_g": of the continuum values where all rows have one."""
         return spread_of([value for value, _ in best_of_all(self.rows, name)])
 
     def means(self) -> dict[str, Any]:
-        """Number of seeds, and the spread of each quantity, as the records of a study have them."""
+        """Number of seeds, and the spread of each quantity, as the records of a study have them.
+
+        The pressure is one of them where it was searched.
+        """
         record: dict[str, Any] = {"seeds": len(self.rows)}
-        for name in QUANTITIES:
-            spread = self.spread(name)
+        spreads = {name: self.spread(name) for name in QUANTITIES}
+        if LOADS[self.rows[0]["load"]].searched:
+            spreads["p_star"] = spread_of([row["p_star"] for row in self.rows])
+        for name, spread in spreads.items():
             record |= {
                 f"{name}_mean": spread.mean,
                 f"{name}_standard_error": spread.standard_error,

@@ -89,11 +89,12 @@ CONTINUUM = (
     ),
 )
 SEEDS = (
-    P_STAR,
+    replace(P_STAR, error="p_star_confidence"),
     *(
         TableColumn(quantity.heading, f"{name}_mean", error=f"{name}_confidence")
         for name, quantity in QUANTITIES.items()
     ),
+    TableColumn("not converged", "failures", optional=True),
 )
 CONTACT_AREA, STRESS_DEVIATION, MEAN_GAP = (
     (
@@ -191,8 +192,9 @@ def comparison_table(curves: TitledCurves) -> Table:
         source = curves[0][1].persson.mean_gap_source
         of_gap = f", mean gap by {source}" if source else ""
         caption = (
-            f"Comparison with Persson theory{of_gap}. Values on the grid, not extrapolated. p "
-            "ratio: pressure at which the theory gives the simulated mean gap / simulated pressure."
+            f"Comparison with Persson theory{of_gap}, which assumes Gaussian heights. Values on "
+            "the grid, not extrapolated. p ratio: pressure at which the theory gives the simulated "
+            "mean gap / simulated pressure."
         )
     return Table(caption, COMPARISON, groups)
 
@@ -243,7 +245,7 @@ def seeds_table(comparison: Comparison) -> Table:
     groups = groups_of(
         (
             f"{ensemble.title}: mean of {len(ensemble.rows)} seeds",
-            {"p_star": ensemble.p_star, **ensemble.means()},
+            {"p_star": ensemble.p_star, "failures": ensemble.failures, **ensemble.means()},
         )
         for ensemble in ensembles(comparison)
     )

@@ -9,14 +9,16 @@ short waves from one point to the next (pi at most); b = curvature / points^2, t
 which the surface bends from one point to the next.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from math import exp, hypot, isnan, log, nan, pi, sqrt
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import exp, hypot, inf, isnan, log, nan, pi, sqrt
 
 import numpy as np
 
 from gfmd_cli.physics.elastomers import LinearElastomer
 from gfmd_cli.physics.error_estimates import (
+    DIVERGENT,
+    NO_ERRORS,
     UNKNOWN,
     Estimate,
     GridValues,
@@ -61,7 +63,16 @@ MIN_EXPONENT = 0.5  # n below which bars no longer decrease: the error at n = 0 
 SINGLE_CONTACT = 2.5  # times the change: bar of a single indenter, from the calibration set
 SINGLE_CONTACT_AREA = 0.2  # error of a corrected a_r in x, of a single or line contact, likewise
 SINGLE_CONTACT_STRESS = 0.07  # in n sigma_p x / a_r: waves at n = 2 have up to 0.07 where D = 0
-SINGLE_CONTACT_GAP = 5.0  # in u_g / points^2: waves and paraboloids have 2.7 to 3.5 at 32 points
+MAX_LINE = 1.5  # x / a_r from which a single contact is of too few points for a bar of sigma_p
+SINGLE_CONTACT_GAP = 5.0  # in u_g / [points (1 - a_r)]^2: smooth indenters have 3.8 at most
+
+# A tip -r^m has the stress r^(m - n) around it, so that <sigma^2> converges as spacing^(2 (M - n))
+# with M = m + dimension / 2. Measured on ridges, cones and r^m, m = 0.5 to 1.5, n = 0 to 3.5.
+SHARP = 2.0  # m below which the law of the tip holds, and bars of u_g are those of the next lines
+SHARP_GAP_CHANGE = 5.0  # times D: the order is n - 1 where the contact is smaller than the spacing
+SHARP_GAP = 20.0  # in place of SINGLE_CONTACT_GAP
+MAX_RIDGE_EXPONENT = 1.75  # n beyond which the stress of a line's tip rings over spacing^(1/2)
+SLOWEST = 0.5  # order of <sigma^2> below which it converges too slowly for an estimate
 MIN_PATCHES = 10.0
 """Contact patches from which errors average out: with 6 or less 70 to 90 of 100 bars held."""
 MAX_ANISOTROPY = 2.0
@@ -93,6 +104,27 @@ class RoughnessScales:
     def calibrated(self) -> bool:
         """Whether the errors are those of isotropic band-limited roughness."""
         return self.band_limited and self.anisotropy <= MAX_ANISOTROPY
+
+
+@dataclass(frozen=True)
+class Tip:
+    """Tip of a single indenter."""
+
+    exponent: float = SHARP
+    """Exponent m of the heights -r^m."""
+    dimension: int = 2
+
+    @property
+    def is_sharp(self) -> bool:
+        """Whether the stress at the tip is singular for some n < 3."""
+        return self.exponent < SHARP
+
+    def stress_order(self, n: float) -> float:
+        """Order at which <sigma^2> around the tip converges; infinite for a smooth tip."""
+        return 2 * (self.exponent - n) + self.dimension if self.is_sharp else inf
+
+
+SMOOTH = Tip()
 
 
 def roughness_scales(
@@ -134,6 +166,8 @@ def estimate(
     *,
     band_limited: bool = True,
     stepped: bool = False,
+    tip: Tip = SMOOTH,
+    between: Mapping[str, float] = NO_ERRORS,
 ) -> dict[str, Estimate]:
     """Estimate errors and continuum values of `a_r`, `sigma_p` and `u_g` on the finest grid.
 
@@ -147,19 +181,28 @@ def estimate(
     spread : change of the local exponent over one octave, see `exponent_spread`
     band_limited : whether all grids contain the same waves, so that full contact is exact
     stepped : whether the surface has vertical steps, where the stress is that of a punch
+    tip : of a single indenter
+    between : errors in full contact, of tensile stress between the points, by quantity
     """
     ordered = sorted(levels, key=lambda level: level.points)
     fine, coarse = ordered[-1], ordered[-2] if len(ordered) > 1 else None
     n = max(exponent, 0.0)
     if fine.border is not None:
-        estimates = estimate_free(fine, coarse, n, band_limited=band_limited)
+        estimates = estimate_free(fine, coarse, n, band_limited=band_limited, between=between)
     elif fine.a_r == 1 and band_limited:
-        return full_contact(fine)
+        return full_contact(fine, between)
     elif fine.a_r == 0 or (fine.a_r == 1 and rough is None):
         return unknown()
     else:
-        estimates = _estimate_periodic(fine, coarse, n, rough, spread)
-    return estimates | {"sigma_p": border_stress(fine, coarse, n)} if stepped else estimates
+        estimates = _estimate_periodic(fine, coarse, n, rough, spread, tip)
+    if stepped:
+        return estimates | {"sigma_p": border_stress(fine, coarse, n)}
+    if tip.is_sharp and tip.dimension == 1 and n > MAX_RIDGE_EXPONENT:
+        estimates = estimates | {"a_r": UNKNOWN}
+    if tip.stress_order(n) < SLOWEST and n < DIVERGENT:
+        verdict = "slow" if tip.stress_order(n) > 0 else "diverges"
+        return estimates | {"sigma_p": replace(UNKNOWN, verdict=verdict)}
+    return estimates
 
 
 def _estimate_periodic(
@@ -168,20 +211,21 @@ def _estimate_periodic(
     n: float,
     rough: RoughnessScales | None,
     spread: float,
+    tip: Tip,
 ) -> dict[str, Estimate]:
     """Estimates with a periodic boundary."""
     phase, bend = nan, nan
     if rough is not None:
         if fine.patches < MIN_PATCHES or not rough.calibrated:
-            return estimate_by_change(fine, coarse, n)
+            return estimate_by_change(fine, coarse, n, line=tip.dimension == 1)
         phase, bend = 2 * pi * rough.waves / fine.points, rough.curvature / fine.points**2
     oblong = rough is not None and rough.aspect > MAX_ASPECT
     return {
         "a_r": estimate_by_change(fine, coarse, n)["a_r"]
         if oblong
         else _area(fine, coarse, n, phase, spread),
-        "sigma_p": _stress(fine, coarse, n, phase),
-        "u_g": _gap(fine, coarse, n, phase, bend),
+        "sigma_p": _stress(fine, coarse, n, phase, tip),
+        "u_g": _gap(fine, coarse, n, phase, bend, tip),
     }
 
 
@@ -230,7 +274,9 @@ def _plate_area(fine: GridValues, coarse: GridValues | None, *, rough: bool) -> 
     return Estimate(whole, best, error, "regular")
 
 
-def _stress(fine: GridValues, coarse: GridValues | None, n: float, phase: float) -> Estimate:
+def _stress(
+    fine: GridValues, coarse: GridValues | None, n: float, phase: float, tip: Tip
+) -> Estimate:
     """Stress deviation: at the edge of a patch the stress is as (1 - r^2/a^2)^(1 - n/2)."""
     value = fine.sigma_p
     if n > MAX_STRESS_EXPONENT:
@@ -242,17 +288,20 @@ def _stress(fine: GridValues, coarse: GridValues | None, n: float, phase: float)
         error = _bar("sigma_p", typical, nan)
         return _on_grid(value, error)
     single = isnan(phase)
-    rest = (value - coarse.sigma_p) / (2 ** min(1.0 if single else 2.0, 3 - n) - 1)
+    if single and patch > MAX_LINE:
+        return replace(UNKNOWN, verdict="unresolved")
+    order = min(1.0, 3 - n, max(tip.stress_order(n), SLOWEST)) if single else min(2.0, 3 - n)
+    rest = (value - coarse.sigma_p) / (2**order - 1)
     error = _bar("sigma_p", typical, rest)
     if single:
-        error = hypot(error, SINGLE_CONTACT_STRESS * n * value * patch)
+        error = hypot(error, SINGLE_CONTACT_STRESS * max(n, MIN_EXPONENT) * value * patch)
     if n < 1 or single:
         return Estimate(error, value, error, "regular")
     return Estimate(error, max(0.0, value + rest), EXTRAPOLATED * error, "regular")
 
 
 def _gap(
-    fine: GridValues, coarse: GridValues | None, n: float, phase: float, bend: float
+    fine: GridValues, coarse: GridValues | None, n: float, phase: float, bend: float, tip: Tip
 ) -> Estimate:
     """Mean gap: the error is small and of either sign, so the value is not extrapolated."""
     value = fine.u_g
@@ -260,12 +309,14 @@ def _gap(
     typical = (
         exp(-6.8 + 0.62 * max(n, MIN_EXPONENT)) * patch**0.25 * phase**1.5 * sqrt(bend * value)
     )
-    order = 2.0 if isnan(phase) else ORDER
-    change = nan if coarse is None else (value - coarse.u_g) / (2**order - 1)
-    error = _bar("u_g", typical, change)
     if isnan(phase) and coarse is not None:
-        error = max(error, SINGLE_CONTACT_GAP * value / fine.points**2)
-    return _on_grid(value, error)
+        change = abs(value - coarse.u_g)
+        across = value / (fine.points * (1 - fine.a_r)) ** 2  # points across the gap, in one line
+        smooth = max(SINGLE_CONTACT * change / 3, SINGLE_CONTACT_GAP * across)
+        sharp = max(SHARP_GAP_CHANGE * change, SHARP_GAP * across)
+        return _on_grid(value, sharp if tip.is_sharp else smooth)
+    change = nan if coarse is None else (value - coarse.u_g) / (2**ORDER - 1)
+    return _on_grid(value, _bar("u_g", typical, change))
 
 
 def _on_grid(value: float, error: float) -> Estimate:

@@ -152,6 +152,32 @@ def _of_free_contact(contact: FreeContact, u: Field, sigma: Field) -> ErrorBound
     )
 
 
+def full_contact_errors(
+    contact: Contact, sigma: Field, curvature: float, stiffness: float, sigma_p: float
+) -> dict[str, float]:
+    """Errors in full contact, where the stress can be tensile between the points of the grid.
+
+    Around a minimum of a Gaussian stress the curvature is on average `curvature` p, so that between
+    points of spacing d the stress is lower by up to m = p curvature d^2 / 8. Points with
+    sigma < m may lose contact: their share, their mean deficit m - sigma over the stiffness of the
+    shortest wave, and the change of the variance.
+
+    Parameters
+    ----------
+    curvature : mean of q^2, weighted with the variance of the stress [1/m^2]
+    stiffness : k(q) of the shortest wave along an axis, in reduced units
+    """
+    grid = contact.grid
+    margin = contact.pressure * curvature * max(grid.spacings) ** 2 / 8
+    sums = np.zeros(3)
+    for rows in row_blocks(sigma):
+        deficit = np.maximum(margin - sigma[rows], 0.0)
+        sums += [np.count_nonzero(deficit), deficit.sum(), np.square(deficit).sum()]
+    share, mean, square = grid.total(sums) / grid.size
+    errors = {"a_r": share, "sigma_p": 0.5 * square / sigma_p, "u_g": mean / stiffness}
+    return {name: float(error) for name, error in errors.items()}
+
+
 def _level_bound(duality_gap: float, reaction: float, p: float) -> float:
     """(t B / 2 + G / t) / p at t = |q - p| / p = sqrt(2 G / B), where it is sqrt(2 G B) / p.
 

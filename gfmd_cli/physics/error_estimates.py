@@ -12,6 +12,7 @@ has the singularity of a punch: s^(-n/2) at the distance s from the border. Then
 as spacing^(1 - n), and has no limit for n >= 1.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from math import hypot, nan
 
@@ -26,7 +27,8 @@ MAX_EXPONENT = {"a_r": 2.5, "sigma_p": 1.0, "u_g": 3.0}
 """Exponents n up to which 95 of 100 bars of every class hold."""
 
 DIVERGENT = 3.0  # exponent n from which the stress has no finite variance
-FREE_CONTINUUM_FACTOR = 1.8  # with a free boundary; with 1.35, 91 of 100 bars of profiles held
+WIDE_CONTINUUM_FACTOR = 1.8  # with a free boundary, and of line profiles: with 1.35, 91 to 93 of
+# 100 bars of profiles held
 FREE_GAP_FACTOR = 1.8  # likewise; with 1.5, 94 of 100 bars of maps in steps held
 BORDER_FACTOR = 2.0  # times what is left of a change D at the order 1 - n: D / (2^(1 - n) - 1)
 MAX_FREE_EXPONENT = 2.0  # n up to which any of the bars with a free boundary were calibrated
@@ -74,12 +76,14 @@ class Estimate:
     continuum_error: float
     """The continuum value is within continuum +- continuum_error with the same probability."""
     verdict: str
-    """"exact": full contact with a band-limited surface; "regular"; "bound": only an interval is
-    known; "slow": converges too slowly for a number; "diverges": there is no continuum value;
+    """"exact": full contact with a band-limited surface, also between the points; "regular";
+    "bound": only an interval is known; "slow": converges too slowly for a number;
+    "diverges": there is no continuum value; "unresolved": the contact has too few points;
     "unknown": no valid error can be given from these grids."""
 
 
 UNKNOWN = Estimate(nan, nan, nan, "unknown")
+NO_ERRORS = dict.fromkeys(QUANTITIES, 0.0)
 
 
 def unknown() -> dict[str, Estimate]:
@@ -87,23 +91,30 @@ def unknown() -> dict[str, Estimate]:
     return dict.fromkeys(QUANTITIES, UNKNOWN)
 
 
-def full_contact(fine: GridValues) -> dict[str, Estimate]:
-    """Full contact with a surface of which all grids contain the same waves."""
+def full_contact(fine: GridValues, errors: Mapping[str, float]) -> dict[str, Estimate]:
+    """Full contact with a surface of which all grids contain the same waves.
+
+    `errors` are those of a stress that may be tensile between the points of the grid.
+    """
     values = {"a_r": 1.0, "sigma_p": fine.sigma_p, "u_g": 0.0}
-    return {name: Estimate(0.0, value, 0.0, "exact") for name, value in values.items()}
+    verdict = "regular" if errors["a_r"] > 0 else "exact"
+    return {name: Estimate(errors[name], x, errors[name], verdict) for name, x in values.items()}
 
 
 def estimate_by_change(
-    fine: GridValues, coarse: GridValues | None, n: float
+    fine: GridValues, coarse: GridValues | None, n: float, *, line: bool = False
 ) -> dict[str, Estimate]:
-    """Estimates from two nested grids; unknown from one grid or beyond `MAX_EXPONENT`."""
+    """Estimates from two nested grids; unknown from one grid or beyond `MAX_EXPONENT`.
+
+    `line`: whether the surface is a line profile.
+    """
     estimates = unknown()
     if n >= DIVERGENT:
         estimates["sigma_p"] = replace(UNKNOWN, verdict="diverges")
     if coarse is None:
         return estimates
     by_change = {
-        "a_r": _area(fine, coarse, CONTINUUM_FACTOR),
+        "a_r": _area(fine, coarse, WIDE_CONTINUUM_FACTOR if line else CONTINUUM_FACTOR),
         "sigma_p": _on_grid("sigma_p", fine, coarse, FACTOR["sigma_p"]),
         "u_g": _on_grid("u_g", fine, coarse, FACTOR["u_g"]),
     }
@@ -111,7 +122,12 @@ def estimate_by_change(
 
 
 def estimate_free(
-    fine: GridValues, coarse: GridValues | None, n: float, *, band_limited: bool
+    fine: GridValues,
+    coarse: GridValues | None,
+    n: float,
+    *,
+    band_limited: bool,
+    between: Mapping[str, float] = NO_ERRORS,
 ) -> dict[str, Estimate]:
     """Estimates with a free boundary; unknown from one grid, except a_r and u_g of full contact."""
     estimates = unknown()
@@ -119,12 +135,12 @@ def estimate_free(
         return estimates
     if coarse is not None and n <= MAX_FREE_EXPONENT:
         estimates = {
-            "a_r": _area(fine, coarse, FREE_CONTINUUM_FACTOR),
+            "a_r": _area(fine, coarse, WIDE_CONTINUUM_FACTOR),
             "sigma_p": _on_grid("sigma_p", fine, coarse, FACTOR["sigma_p"]),
             "u_g": _on_grid("u_g", fine, coarse, FREE_GAP_FACTOR),
         }
     if fine.a_r == 1 and band_limited:
-        estimates |= {name: full_contact(fine)[name] for name in ("a_r", "u_g")}
+        estimates |= {name: full_contact(fine, between)[name] for name in ("a_r", "u_g")}
     if fine.border > 0:
         estimates["sigma_p"] = border_stress(fine, coarse, n)
     return estimates

@@ -1,14 +1,16 @@
 """Heights that a Python program has in memory: arrays, nested lists, SurfaceTopography objects."""
 
 import math
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 from pydantic import ValidationError
 
-from gfmd_cli.errors import InputError
+from gfmd_cli.errors import INSTALL, InputError
 from gfmd_cli.grid.arrays import Field
-from gfmd_cli.physics.height_map import at_equal_distances
+from gfmd_cli.physics.array_coordinates import UNIT_NAMES
+from gfmd_cli.physics.height_map import at_equal_distances, first_line
 from gfmd_cli.physics.topography import Region, middle_square
 
 SAME_SIDE = 1e-6  # relative difference of two sides that are meant to be equal
@@ -42,6 +44,28 @@ def given_heights(heights: Any) -> GivenHeights:
     if values.dtype.kind not in "iuf":
         raise InputError(f"heights: data of type {values.dtype}; real numbers are needed")
     return GivenHeights(np.ma.filled(values.astype(np.float64), np.nan), keys)
+
+
+def write_heights(folder: Path, heights: Any, values: Field) -> Path:
+    """Write heights as a file; those of an array of xarray with its axes and units.
+
+    Raises InputError if xarray cannot write them.
+    """
+    if not hasattr(heights, "to_netcdf"):
+        path = folder / "heights.npy"
+        np.save(path, values)
+        return path
+    path = folder / "heights.nc"
+    bare = heights.astype(np.float64).reset_coords(drop=True).drop_encoding().rename("heights")
+    bare.attrs = {name: unit for name, unit in heights.attrs.items() if name in UNIT_NAMES}
+    try:
+        bare.to_netcdf(path, engine="h5netcdf")
+    except (ImportError, TypeError, ValueError) as error:
+        raise InputError(
+            f"heights: an array of xarray is read as a netCDF file: {first_line(error)}; "
+            f"{INSTALL.format('export')}"
+        ) from error
+    return path
 
 
 def _topography(topography: Any) -> GivenHeights:

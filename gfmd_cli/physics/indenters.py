@@ -40,6 +40,8 @@ class RigidSurface(Choice):
     """Whether the smallest grid resolves all waves, so that all grids have one Delta_sigma."""
     stepped: ClassVar[bool] = False
     """Whether the surface has vertical steps, at which the stress of any contact is singular."""
+    tip_exponent: ClassVar[float] = 2.0
+    """Exponent m of the heights -r^m next to the tip of a single indenter; below 2 it is sharp."""
     has_borders: ClassVar[bool] = False
     """Whether the surface ends at its borders, and the spec does not make it periodic."""
     copies: ClassVar[int] = 1
@@ -194,6 +196,11 @@ class PowerLawIndenter(RoundIndenter):
     radius: Positive = 1.0
     """Length R [m]; the radius of curvature for m = 2."""
 
+    @property
+    def tip_exponent(self) -> float:  # type: ignore[override]
+        """The exponent m, at the tip as elsewhere."""
+        return self.exponent
+
     def profile(self, r: Field) -> Field:
         """Heights [m] at distances r from the middle [m]."""
         return -self.radius * (r / self.radius) ** self.exponent / self.exponent
@@ -202,6 +209,7 @@ class PowerLawIndenter(RoundIndenter):
 class Cone(RoundIndenter):
     """Cone h = -slope r."""
 
+    tip_exponent: ClassVar[float] = 1.0
     kind: Literal["cone"] = "cone"
     slope: Positive = 1.0
     """Slope of the flanks."""
@@ -240,6 +248,7 @@ class Ridge(LineIndenter):
     Paper Fig. 1 (periodic ridges, one per cell).
     """
 
+    tip_exponent: ClassVar[float] = 1.0
     kind: Literal["ridge"] = "ridge"
     slope: Positive = 1.0
     """Slope of the flanks."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gfmd_cli.analysis.compare import Row
-from gfmd_cli.analysis.curve_styles import MARKERS, MAX_LABEL, CurveStyle, colours, literal
+from gfmd_cli.analysis.curve_styles import MARKERS, CurveStyle, colours, literal, shortened
 from gfmd_cli.analysis.plotting import ColumnFigure
 from gfmd_cli.analysis.surface_figure import height_figure
 from gfmd_cli.analysis.table import Group, Table, TableColumn
@@ -199,8 +199,10 @@ def _edges(radius: Field, nyquist: float) -> Field:
 def _spectrum_figure(shown: list[Spectrum]) -> ColumnFigure:
     power = {1: "3", 2: "4"}.get(shown[0].dimension)
     plot = ColumnFigure(r"wavenumber  $q$ (m$^{-1}$)", rf"{LABEL} (m$^{power}$)")
-    for place, (curve, colour) in enumerate(zip(shown, colours(len(shown)), strict=True)):
-        name = literal(curve.name[:MAX_LABEL])
+    names = map(literal, shortened([curve.name for curve in shown]))
+    for place, (curve, colour, name) in enumerate(
+        zip(shown, colours(len(shown)), names, strict=True)
+    ):
         style = CurveStyle(colour, MARKERS[place % len(MARKERS)], name)
         if curve.fit is not None:
             plot.unnamed_line((name,), curve.q, curve.fitted, color=colour, lw=0.7)

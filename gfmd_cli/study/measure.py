@@ -70,7 +70,7 @@ def measured(task: Task, solved: Solved) -> Row:
         "solver": solution.solver,
         "transforms": solution.transforms,
         "status": solution.status,
-        "pressure": contact.pressure * scene.delta_sigma,
+        "pressure": _pressure(task, solved),
         "delta_sigma": scene.delta_sigma,
         "h_std": scene.h_std,
         "mean_height": scene.mean_height,
@@ -81,6 +81,13 @@ def measured(task: Task, solved: Solved) -> Row:
         "tolerance": task.solver.tolerance,
         **error_columns(solved),
     }
+
+
+def _pressure(task: Task, solved: Solved) -> float:
+    """The nominal pressure [Pa]: as prescribed, so that contacts can be grouped by it."""
+    if task.quantity == "pressure":
+        return task.load
+    return solved.contact.pressure * solved.scene.delta_sigma
 
 
 def error_columns(solved: Solved) -> Row:

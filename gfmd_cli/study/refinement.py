@@ -5,19 +5,22 @@ from functools import lru_cache
 from threading import get_ident
 from typing import Any
 
+import numpy as np
+
 from gfmd_cli.errors import InputError
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.grid.ranks import Ranks, agree
 from gfmd_cli.physics.contact import Contact, Scene
 from gfmd_cli.physics.discretisation_error import (
     RoughnessScales,
+    Tip,
     estimate,
     exponent_spread,
     local_exponent,
     roughness_scales,
 )
-from gfmd_cli.physics.error_bounds import ErrorBounds, error_bounds
-from gfmd_cli.physics.error_estimates import Estimate, GridValues, unknown
+from gfmd_cli.physics.error_bounds import ErrorBounds, error_bounds, full_contact_errors
+from gfmd_cli.physics.error_estimates import NO_ERRORS, Estimate, GridValues, unknown
 from gfmd_cli.physics.free_contact import SCENES
 from gfmd_cli.physics.observables import Observables, border_contact, contact_points, observe
 from gfmd_cli.physics.power_spectra import anisotropy
@@ -261,6 +264,23 @@ def _estimates(task: Task, solved: Solved, grids: list[GridResult]) -> dict[str,
         spread,
         band_limited=task.surface.band_limited,
         stepped=task.surface.stepped,
+        tip=Tip(task.surface.tip_exponent, scene.grid.dimension),
+        between=_between_points(task, solved),
+    )
+
+
+def _between_points(task: Task, solved: Solved) -> dict[str, float]:
+    """Errors in full contact, of tensile stress between the points of the grid; zero otherwise."""
+    scene, sigma = solved.scene, solved.solution.sigma
+    variance = scene.shells.variance
+    if solved.observables.a_r < 1 or not variance.any():
+        return NO_ERRORS
+    curvature = float(variance @ scene.shells.q**2 / variance.sum())
+    shortest = np.array(np.pi / min(scene.grid.spacings))
+    stiffness = task.elastomer.stiffness(shortest, scene.grid.length)
+    reduced = float(stiffness) * scene.h_std / scene.delta_sigma
+    return full_contact_errors(
+        solved.contact, sigma, curvature, reduced, solved.observables.sigma_p
     )
 
 

@@ -1,0 +1,55 @@
+"""Every script with a command line starts, and those that take small sizes run on them."""
+
+import runpy
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+SCRIPTS = ROOT / "scripts"
+WITH_OPTIONS = [
+    path.name
+    for path in sorted(SCRIPTS.glob("*.py"))
+    if "ArgumentParser(" in path.read_text("utf-8")
+]
+SMALL = {
+    "accuracy_gain.py": "--max-points 128",
+    "cost.py": "--table-only --points 128 --sizes 128 --repeats 1",
+    "economy.py": "--points 400",
+    "energy_weights.py": "none.jsonl --no-run",
+    "hard_cases.py": "--points 32 --only cliff --seconds 1",
+    "indenter_bars.py": "--points 64 --line-reference 256 --round-reference 128 --exponents 1 "
+    "--pressures 1",
+    "neighbour_start.py": "--points 512 --p-star 0.001 0.0011",
+    "plain_processor.py": "",
+    "plate_areas.py": "none.jsonl --no-run",
+    "reference_pages.py": "--check",
+    "rounded_heights.py": "--points 64 --seeds 1",
+    "scan_files.py": f"{ROOT / 'configs' / 'data'} --limit 60",
+    "small_contacts.py": "--points 64 --cutoff 0.1 --p-star 0.1 --seeds 0 --repeats 1",
+    "time_left.py": f"{ROOT / 'configs' / 'smoke.toml'} --set grid.points=100 --jobs 1",
+}
+"""Arguments with which a script takes seconds."""
+
+
+def run(name, arguments, monkeypatch):
+    monkeypatch.setattr(sys, "argv", [name, *arguments])
+    monkeypatch.syspath_prepend(SCRIPTS)
+    try:
+        runpy.run_path(str(SCRIPTS / name), run_name="__main__")
+    except SystemExit as end:
+        if end.code:
+            pytest.fail(str(end.code))
+
+
+@pytest.mark.parametrize("name", WITH_OPTIONS)
+def test_a_script_shows_its_help(name, monkeypatch, capsys):
+    run(name, ["--help"], monkeypatch)
+    assert capsys.readouterr().out.startswith(f"usage: {name}")
+
+
+@pytest.mark.parametrize("name", SMALL)
+def test_a_script_runs_on_small_sizes(name, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    run(name, SMALL[name].split(), monkeypatch)
