@@ -289,7 +289,7 @@ def _stress(
         return _on_grid(value, error)
     single = isnan(phase)
     if single and patch > MAX_LINE:
-        return replace(UNKNOWN, verdict="unresolved")
+        return replace(UNKNOWN, is_too_coarse=True)
     order = min(1.0, 3 - n, max(tip.stress_order(n), SLOWEST)) if single else min(2.0, 3 - n)
     rest = (value - coarse.sigma_p) / (2**order - 1)
     error = _bar("sigma_p", typical, rest)

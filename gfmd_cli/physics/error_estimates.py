@@ -78,8 +78,10 @@ class Estimate:
     verdict: str
     """"exact": full contact with a band-limited surface, also between the points; "regular";
     "bound": only an interval is known; "slow": converges too slowly for a number;
-    "diverges": there is no continuum value; "unresolved": the contact has too few points;
-    "unknown": no valid error can be given from these grids."""
+    "diverges": there is no continuum value; "unknown": no valid error can be given from these
+    grids."""
+    is_too_coarse: bool = False
+    """Whether the contact has too few points for a valid error, which a finer grid may give."""
 
 
 UNKNOWN = Estimate(nan, nan, nan, "unknown")

@@ -17,7 +17,6 @@ SECONDS = 120  # below, a time is given with three digits
 MAX_NAMES = 3  # elastomers and surfaces that the headline names
 UNRESOLVED = {
     "slow": "converges too slowly with the grid for a value in the continuum",
-    "unresolved": "is of a contact of too few grid points for a value in the continuum",
     "diverges": "has no value in the continuum",
     "unknown": "has no error bar: the grids are too coarse for one",
 }

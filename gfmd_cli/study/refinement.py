@@ -181,9 +181,8 @@ def _continues(task: Task, solved: Solved, grids: int, options: WorkerOptions) -
         return points != task.points
     finer = _next_points(task, points)
     final = FINAL if grids < ENOUGH else (*FINAL, "unknown")
-    improvable = any(
-        solved.estimates[name].verdict not in final for name in _inaccurate(task, solved)
-    )
+    inaccurate = [solved.estimates[name] for name in _inaccurate(task, solved)]
+    improvable = any(each.verdict not in final or each.is_too_coarse for each in inaccurate)
     should_refine = improvable and finer <= task.accuracy.max_points
     fits = task.bytes_on(finer) <= options.memory
     if should_refine and not fits and options.reproducible:
