@@ -68,7 +68,7 @@ class Shells:
     energy: Field  # sum of k C: twice the energy of full contact [Pa m]
     variance: Field  # sum of k^2 C: variance of the full-contact stress, Eq. (23) [Pa^2]
     gamma: Field  # mean gamma of Eq. (30), weighted with k C
-    modes: Field | None = None  # number of modes with power, for fits of the spectrum
+    modes: Field  # number of modes with power, for fits of the spectrum
 
     def exponents(self) -> Field:
         """d ln k / d ln q, of k = sum of k^2 C / sum of k C in every shell."""
@@ -77,16 +77,7 @@ class Shells:
         return np.gradient(np.log(self.variance / self.energy), np.log(self.q))
 
 
-def shells(
-    q: Field,
-    power: Field,
-    k: Field,
-    gamma: Field,
-    modes: Field | None = None,
-    *,
-    exact: int = EXACT,
-    bins: int = BINS,
-) -> Shells:
+def shells(q: Field, power: Field, k: Field, gamma: Field, modes: Field) -> Shells:
     """Bin the modes of a surface: exact shells at long wavelengths, then logarithmic bins.
 
     Paper Sect. 4.1.1 (with 500 bins). Empty bins are dropped; a flat surface has no bins at all.
@@ -97,36 +88,32 @@ def shells(
     power : |h(q)|^2 times the multiplicity of the mode [m^2], shape (modes,)
     k : stiffness k(q) [Pa/m], shape (modes,)
     gamma : weight gamma(q) of Eq. (30), shape (modes,)
-    modes : number of modes that an entry represents, by default one each, shape (modes,)
-    exact : number of smallest |q| with power that get a bin each
-    bins : number of logarithmic bins between the last of these and the largest |q| with power
+    modes : number of modes that an entry represents, shape (modes,)
     """
     carries_power = power > 0
     if not np.any(carries_power):
         return Shells(*np.empty((6, 0)))
-    counts = np.ones_like(q) if modes is None else modes
-    edges = bin_edges(q[carries_power], exact, bins)
+    edges = bin_edges(q[carries_power])
     sums = np.zeros((6, edges.size + 1))
     for start in range(0, q.size, _CHUNK):
         part = slice(start, start + _CHUNK)
         where = np.searchsorted(edges, q[part])
         height, energy = power[part], k[part] * power[part]
         products = (q[part] * height, height, energy, k[part] * energy, gamma[part] * energy)
-        weights = (*products, counts[part] * (height > 0))
+        weights = (*products, modes[part] * (height > 0))
         for total, weight in zip(sums, weights, strict=True):
             total += np.bincount(where, weight, minlength=total.size)
     moment, height, energy, variance, weighted, mode_counts = sums[:, sums[3] > 0]
     return Shells(moment / height, height, energy, variance, weighted / energy, mode_counts)
 
 
-def bin_edges(q: Field, exact: int = EXACT, bins: int = BINS) -> Field:
+def bin_edges(q: Field) -> Field:
     """Inner edges: half-way between the smallest |q|, then in geometric progression."""
-    low = _smallest_distinct(q, exact + 1)
+    low = _smallest_distinct(q, EXACT + 1)
     between = 0.5 * (low[1:] + low[:-1])
-    if low.size <= exact:
+    if low.size <= EXACT:
         return between
-    start = between[-1] if exact else low[0]
-    return np.concatenate([between, np.geomspace(start, q.max(), bins + 1)[1:-1]])
+    return np.concatenate([between, np.geomspace(between[-1], q.max(), BINS + 1)[1:-1]])
 
 
 def _smallest_distinct(q: Field, count: int) -> Field:
