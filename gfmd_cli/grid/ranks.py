@@ -95,8 +95,7 @@ class Ranks:
         The launcher drops what it has not yet forwarded of the output, hence the pause; and
         MPI's own abort may return.
         """
-        text = error if isinstance(error, GfmdError) else f"{type(error).__name__}: {error}"
-        log.critical("gfmd: rank %d: %s", self.rank, text)
+        log.critical("gfmd: rank %d: %s", self.rank, _text(error))
         time.sleep(FORWARD_SECONDS)
         self.comm.Abort(_status(error))
         os._exit(_status(error))
@@ -130,11 +129,16 @@ def _status(error: BaseException | None) -> int:
     return 0 if error is None else getattr(error, "exit_status", 1)
 
 
+def _text(error: BaseException) -> str:
+    """The message of an error, with its type where it is not one of this program."""
+    return str(error) if isinstance(error, GfmdError) else f"{type(error).__name__}: {error}"
+
+
 def _portable(error: BaseException | None, rank: int) -> BaseException | None:
     """The error, or one that can be sent to other ranks."""
     if error is None or isinstance(error, GfmdError | MemoryError):
         return error
-    return GfmdError(f"rank {rank}: {type(error).__name__}: {error}")
+    return GfmdError(f"rank {rank}: {_text(error)}")
 
 
 def announced() -> int:

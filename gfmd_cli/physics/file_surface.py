@@ -393,10 +393,11 @@ def _smallest_grid(surface: FileSurface) -> int:
 def _warnings_on_heights(surface: FileSurface) -> tuple[str, ...]:
     """Warnings about outliers and rounding. Cached: every contact of a study has the same."""
     topography, scale = surface._topography(), surface.scale
+    levelled = _prepared(surface)[tuple(map(slice, topography.heights.shape))]  # without copies
     return (
         map_warnings.outliers(topography),
         map_warnings.rounded(topography, scale),
-        map_warnings.rounded_trend(topography, surface._levelled(), scale),
+        map_warnings.rounded_trend(topography, levelled, scale),
     )
 
 
