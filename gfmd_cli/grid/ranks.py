@@ -69,7 +69,7 @@ class Ranks:
         """The value of the first rank, on every rank."""
         return self.comm.bcast(value)
 
-    def settle(self, error: BaseException | None) -> None:
+    def share_error(self, error: BaseException | None) -> None:
         """Raise, on all ranks, the error of the first that has one.
 
         If other ranks do not call this in time, because they wait for data from this one, all
@@ -103,7 +103,7 @@ class Ranks:
 
 @contextmanager
 def together(ranks: Ranks | None) -> Iterator[None]:
-    """An error inside on one rank is raised on all; see `Ranks.settle`."""
+    """An error inside on one rank is raised on all; see `Ranks.share_error`."""
     if ranks is None:
         yield
         return
@@ -112,7 +112,7 @@ def together(ranks: Ranks | None) -> Iterator[None]:
         yield
     except Exception as error:
         failed = error
-    ranks.settle(failed)
+    ranks.share_error(failed)
 
 
 def agree(ranks: Ranks | None, value: T) -> T:

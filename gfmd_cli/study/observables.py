@@ -11,7 +11,6 @@ from typing import Any, NamedTuple
 
 from gfmd_cli.grid.arrays import Field, Mask
 from gfmd_cli.physics.contact import Contact
-from gfmd_cli.physics.free_contact import FreeContact
 from gfmd_cli.physics.map_preparation import mirror
 from gfmd_cli.physics.observables import contact_points
 from gfmd_cli.physics.patches import contact_patches, open_gap
@@ -47,8 +46,8 @@ class SolvedContact:
 
     @cached_property
     def mirrored(self) -> Contact:
-        """The contact in a periodic cell: of a map with a free boundary, its mirrored one."""
-        return self.contact.mirrored() if isinstance(self.contact, FreeContact) else self.contact
+        """See `Contact.mirrored`."""
+        return self.contact.mirrored()
 
     @cached_property
     def full_contact_stress(self) -> ContactStress:

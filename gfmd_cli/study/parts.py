@@ -24,7 +24,7 @@ SUFFIX = ".record"
 OWN_FILES = re.compile(r"(in-use|collecting|planning)(\..*)?|wisdom-.*\.json|.*\.(record|bad)|\..*")
 """Files that gfmd makes in the folder."""
 LOCKS = ("in-use", "in-use.owner", "collecting", "collecting.owner")
-"""Outcome while the folder is removed, in the order in which they are deleted."""
+"""Kept while the rest of the folder is deleted, and then deleted in this order."""
 OWN_FOLDERS = re.compile(r"[0-9a-f]{16}")
 """Checkpoints, by the id of the task."""
 IN_CHECKPOINT = re.compile(r"pointer|lock(\..*)?|[ab][0-9]*|\..*")
