@@ -21,12 +21,12 @@ _SAME_SHELL = 1e-9  # relative difference of |q| within one shell: far above rou
 _CHUNK = 1 << 18  # elements of one temporary array, 2 MiB: fits a cache and bounds the memory
 _NARROW = 1e-5  # bin width / variance where the mid point errs as little as the difference, ~1e-10
 _TABLE = (1e-6, 20.0, 300)  # pressures [Delta_sigma] of a table of the mean gap
-_UNDERFLOW = 40.0  # exp(-x^2) is zero in double precision well before this x
+UNDERFLOW = 40.0  # exp(-x^2) is zero in double precision well before this x
 
 
 def ierfc(x: Field) -> Field:
     """Integral of erfc from x to infinity: exp(-x^2)/sqrt(pi) - x erfc(x), to 2 x^2 roundings."""
-    y = np.minimum(np.abs(x), _UNDERFLOW)
+    y = np.minimum(np.abs(x), UNDERFLOW)
     tail: Field = np.exp(-y * y) * (1 / np.sqrt(np.pi) - y * erfcx(y))
     value: Field = tail + 2 * np.maximum(-x, 0.0)  # ierfc(-y) = ierfc(y) + 2 y
     return value
@@ -160,7 +160,7 @@ class Persson:
         """
         width = self.delta_sigma
         x, y = np.maximum(sigma, 0.0) / width, np.asarray(p) / width
-        apart = np.minimum(np.abs(x - y), _UNDERFLOW)
+        apart = np.minimum(np.abs(x - y), UNDERFLOW)
         density: Field = -np.expm1(-2 * x * y) * np.exp(-0.5 * apart**2)
         density /= np.sqrt(2 * np.pi) * width
         return density
@@ -256,7 +256,7 @@ class Persson:
         for part in self._chunks(p.size):
             pressure = p.ravel()[part]
             a, da = _bin_area(pressure, self.shells.variance)
-            x = np.minimum(self._reduced(pressure), _UNDERFLOW)[:, None]
+            x = np.minimum(self._reduced(pressure), UNDERFLOW)[:, None]
             ds = np.sqrt(2 / np.pi) / self.delta_sigma * np.exp(-x * x)
             w, by_a, by_s = self.weight(a, erf(x))
             v[part] = w @ energy
@@ -281,7 +281,7 @@ def _bin_area(p: Field, variance: Field) -> tuple[Field, Field]:
     slope = np.diff(2 * np.sqrt(2 * s) * ierfc(p / np.sqrt(2 * s)), prepend=0.0) / width
     if np.any(narrow):  # the mid point instead of a difference that cancels
         scale = np.sqrt(2 * s - variance)[narrow]
-        x = np.minimum(p / scale, _UNDERFLOW)
+        x = np.minimum(p / scale, UNDERFLOW)
         area[:, narrow] = erf(x)
         slope[:, narrow] = 2 / np.sqrt(np.pi) * np.exp(-x * x) / scale
     return area, slope
@@ -300,7 +300,7 @@ def _panel_edges(p: Field, delta_sigma: float) -> Field:
     """
     if not p.size:
         return np.array([1.0, 1.0])
-    highest = min(p.max() / delta_sigma, _UNDERFLOW)
+    highest = min(p.max() / delta_sigma, UNDERFLOW)
     y_end = min(0.5 * highest**2 + 40, 745)  # exp(-40) < eps; exp(-745) is 0
     end = delta_sigma * np.sqrt(2 * y_end)
     start = min(p.min(), end)

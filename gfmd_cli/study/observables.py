@@ -15,7 +15,7 @@ from gfmd_cli.physics.map_preparation import mirror
 from gfmd_cli.physics.observables import contact_points
 from gfmd_cli.physics.patches import contact_patches, open_gap
 from gfmd_cli.physics.true_contact import ContactStress, bearing, contact_stress
-from gfmd_cli.solvers.free_contact_stiffness import STIFFNESS as CONTACT_STIFFNESS
+from gfmd_cli.solvers.contact_stiffness import contact_stiffness
 from gfmd_cli.study.column import Column
 
 
@@ -143,7 +143,7 @@ OBSERVABLES = (
             "contact stiffness -dp/du_g / (Delta_sigma / h_std); for both boundaries with respect "
             "to the mean gap of the map, not to the displacement of the indenter",
         ),
-        lambda solved: CONTACT_STIFFNESS[solved.contact.boundary](solved.contact, solved.touching),
+        lambda solved: contact_stiffness(solved.contact, solved.touching),
         "-dp/du_g",
         STIFFNESS,
     ),
