@@ -12,10 +12,9 @@ from pathlib import Path
 
 from gfmd_cli.errors import InputError, SpaceError, StudyError
 from gfmd_cli.files.atomic import new_file
-from gfmd_cli.files.checksums import check_seal, seal
+from gfmd_cli.files.checksums import check_seal, digest, seal
 from gfmd_cli.files.hdf5 import new_hdf5
 from gfmd_cli.files.regular import open_regular
-from gfmd_cli.spec.models import digest
 from gfmd_cli.study.reading import StudyFile, open_study
 from gfmd_cli.study.result import Entry, TaskResult
 from gfmd_cli.study.writing import write_study
