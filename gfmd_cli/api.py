@@ -6,6 +6,7 @@ A spec is the path of a TOML file, or its tables as a dictionary.
 """
 
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from html import escape
@@ -23,7 +24,7 @@ from gfmd_cli.errors import InputError
 from gfmd_cli.grid.arrays import Field, Mask
 from gfmd_cli.grid.blas import one_blas_thread
 from gfmd_cli.physics.file_surface import FileSurface, forget_files
-from gfmd_cli.physics.given_heights import given_heights, surface_table, write_heights
+from gfmd_cli.physics.given_heights import write_heights
 from gfmd_cli.physics.indenters import SMALLEST_GRID
 from gfmd_cli.physics.observables import contact_pressure
 from gfmd_cli.spec.models import Spec
@@ -40,6 +41,7 @@ from gfmd_cli.study.run import RunOptions, run_study
 from gfmd_cli.study.tasks import plan
 
 Tables = Mapping[str, Any]
+SAME_SIDE = 1e-6  # relative difference of two sides that are meant to be equal
 NUMBERS = (
     "length", "length_y", "h_std", "delta_sigma", "a_r", "sigma_p", "u_g", "residual", "status",
 )  # fmt: skip
@@ -159,35 +161,49 @@ def solve(spec: Path | str | Tables, *, heights: Any = None, threads: int = 1) -
     """
     if threads < 1:
         raise InputError(f"threads = {threads}: one or more are needed")
+    forget_files()  # they may have changed since the last call
     if heights is None:
         return _solve(spec, threads)
     if not isinstance(spec, Mapping):
         raise InputError("heights go with a dictionary; a spec in a file has a surface")
-    given = given_heights(heights)
     with TemporaryDirectory() as folder:
-        path = write_heights(Path(folder), heights, given.values)
+        path = Path(folder) / "heights.h5"
+        keys = write_heights(path, heights)
         try:
-            surface = surface_table(given, _without_numpy(spec.get("surface", {})))
-            surface["path"] = str(path)
-            return _solve(_with_points({**spec, "surface": surface}), threads)
+            return _solve(_with_map(_without_numpy(spec), path, keys), threads)
         except InputError as error:  # the file is not the caller's
             raise InputError(str(error).replace(str(path), "heights")) from None
 
 
-def _with_points(tables: dict[str, Any]) -> dict[str, Any]:
-    """The tables with the points of the map, unless the table grid has them."""
+def _with_map(tables: Tables, path: Path, keys: Tables) -> Tables:
+    """The tables of a spec whose surface is a map and whose grid has, by default, its points.
+
+    Raises InputError where the table [surface] contradicts the map, which has some keys by default.
+    """
+    given = tables.get("surface", {})
+    for name in ("kind", "path"):
+        if given.get(name, "file") != "file":
+            raise InputError(
+                f"surface.{name} = {given[name]!r} and the argument heights both give a "
+                "surface; leave one out"
+            )
+    tables = {**tables, "surface": {**keys, **given, "kind": "file", "path": str(path)}}
     grid = tables.get("grid", {})
-    if "points" in grid:
-        return tables
-    spec = read_tables(_without_numpy(tables | {"grid": {**grid, "points": SMALLEST_GRID}}))
-    surface = spec.surface[0]
+    (surface, *_) = read_tables(tables | {"grid": {"points": SMALLEST_GRID, **grid}}).surface
     assert isinstance(surface, FileSurface)
-    return tables | {"grid": {**grid, "points": surface.own_points()}}
+    sides = reversed(surface.stated_sides() or ())
+    for name, side in zip(("length", "length_y"), sides, strict=False):
+        length = getattr(surface, name)
+        if length is not None and not math.isclose(length, side, rel_tol=SAME_SIDE):
+            raise InputError(
+                f"surface.{name} = {length:g}: the topography in the argument heights has a side "
+                f"of {side:g} m; leave out surface.{name}"
+            )
+    return tables | {"grid": {"points": surface.own_points(), **grid}}
 
 
 @one_blas_thread()
 def _solve(spec: Path | str | Tables, threads: int) -> Result:
-    forget_files()  # they may have changed since the last call
     tasks = plan(_read(spec)[0])
     if tasks[0].surface.file or tasks[0].elastomer.file:
         forget_scene()

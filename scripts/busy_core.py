@@ -27,7 +27,7 @@ def spin():
 def of_gfmd(points: int, precision: str, threads: int) -> Callable[[], object]:
     grid = Grid(points, precision=precision, threads=threads)
     field = np.random.default_rng(0).normal(size=grid.shape).astype(grid.real)
-    grid.backward(grid.forward(field))
+    grid.forward_into_work(field)
     _, forward, backward = grid._workspace
     return lambda: (forward(), backward())
 

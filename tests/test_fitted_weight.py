@@ -13,7 +13,7 @@ VARIANCE, ENERGY = (1.0, 2.7), (1.0, 0.9)  # of two shells: heights 1 and 0.3, k
 
 
 def two_shells(n):
-    shells = Shells(*np.array([[1, 2], [1, 0.3], ENERGY, VARIANCE, [0.3, 0.3]]))
+    shells = Shells(*np.array([[1, 2], [1, 0.3], ENERGY, VARIANCE, [0.3, 0.3], [1, 1]]))
     return FittedWeight(shells, np.full(2, n))
 
 
@@ -68,7 +68,7 @@ def test_the_weight_rises_to_one_in_full_contact(n):
 def test_springs_have_nearly_their_closed_form():
     """The fit contains it."""
     height = np.full(400, 1 / 400)
-    springs = Shells(np.arange(1.0, 401), height, height, height, np.full(400, 0.5))
+    springs = Shells(np.arange(1.0, 401), height, height, height, np.full(400, 0.5), height)
     p_star = np.array([0.01, 0.03, 0.1, 0.3])
     gap = FittedWeight(springs, np.zeros(400)).mean_gap(p_star)
     assert gap == pytest.approx(einstein_prediction(p_star).u_g, rel=0.02)
@@ -77,7 +77,7 @@ def test_springs_have_nearly_their_closed_form():
 def test_a_elastomer_without_one_exponent_takes_the_local_one():
     q = np.geomspace(1, 30, 40)
     k = q**2.5
-    spectrum = Shells(q, q**-3.0, k * q**-3.0, k * k * q**-3.0, np.full(40, 0.3))
+    spectrum = Shells(q, q**-3.0, k * q**-3.0, k * k * q**-3.0, np.full(40, 0.3), q)
     local, one = theory_of("fitted", spectrum, np.nan), theory_of("fitted", spectrum, 2.5)
     p = np.array([0.01, 0.1, 1.0]) * local.delta_sigma
     assert local.mean_gap(p) == pytest.approx(one.mean_gap(p), rel=1e-6)

@@ -21,7 +21,9 @@ P_STAR = np.array([1e-7, 1e-4, 0.01, 0.1, 0.3, 1.0])
 def waves(stiffness, height):
     """Shells of given stiffness [k] and squared height, q rising."""
     k, c = np.array(stiffness, dtype=float), np.array(height, dtype=float)
-    return Shells(np.arange(1.0, k.size + 1), c, k * c, k * k * c, np.full(k.size, 0.5))
+    return Shells(
+        np.arange(1.0, k.size + 1), c, k * c, k * k * c, np.full(k.size, 0.5), np.ones_like(k)
+    )
 
 
 def surface(n, seed=0):

@@ -3,6 +3,7 @@
 import numpy as np
 import pyfftw
 import pytest
+from fourier import backward, forward
 
 from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.physics.self_affine import SelfAffine
@@ -39,7 +40,7 @@ def polynomial(shape, highest, seed=1):
 @pytest.mark.parametrize("grid", GRIDS, ids=str)
 def test_the_coefficient_at_zero_is_the_mean(grid):
     field = 3.0 + noise(grid)
-    assert grid.forward(field).flat[0] == pytest.approx(field.mean(), rel=ROUNDING)
+    assert forward(grid, field).flat[0] == pytest.approx(field.mean(), rel=ROUNDING)
 
 
 def dense_transform(points):
@@ -54,22 +55,24 @@ def test_the_coefficients_are_those_of_the_fourier_sum(grid):
     expected = field @ dense_transform(grid.points)
     if grid.dimension == 2:
         expected = dense_transform(grid.points_y) @ expected
-    assert grid.forward(field) == pytest.approx(expected[..., : grid.points // 2 + 1], abs=ROUNDING)
+    assert forward(grid, field) == pytest.approx(
+        expected[..., : grid.points // 2 + 1], abs=ROUNDING
+    )
 
 
 @pytest.mark.parametrize("grid", GRIDS, ids=str)
 def test_backward_undoes_forward_and_leaves_its_input_alone(grid):
     field = noise(grid)
-    modes = grid.forward(field)
+    modes = forward(grid, field)
     copy = modes.copy()
-    assert grid.backward(modes) == pytest.approx(field, abs=10 * ROUNDING)
+    assert backward(grid, modes) == pytest.approx(field, abs=10 * ROUNDING)
     assert np.array_equal(modes, copy)
 
 
 @pytest.mark.parametrize("grid", GRIDS, ids=str)
 def test_the_squares_of_all_modes_sum_to_the_mean_square(grid):
     field = noise(grid)
-    total = np.sum(np.abs(grid.forward(field)) ** 2 * grid.multiplicity())
+    total = np.sum(np.abs(forward(grid, field)) ** 2 * grid.multiplicity())
     assert total == pytest.approx(np.mean(field**2), rel=ROUNDING)
 
 
@@ -83,7 +86,7 @@ def test_a_plane_wave_has_the_wavenumber_of_its_only_mode():
     grid = Grid(16, 2, length=3.0)
     x = np.arange(16) / 16 * 3.0
     field = np.cos(2 * np.pi / 3.0 * (-3 * x[:, None] + 4 * x))  # |m| = 5
-    power = np.abs(grid.forward(field)) ** 2
+    power = np.abs(forward(grid, field)) ** 2
     row, column = np.unravel_index(np.argmax(power), power.shape)
     assert (row, column) == (16 - 3, 4)
     assert power[row, column] == pytest.approx(0.25)
@@ -95,7 +98,7 @@ def test_a_wave_on_an_oblong_cell_has_the_wavenumber_of_its_periods():
     grid = Grid(15, length=3.0, points_y=20, length_y=0.5)
     x, y = np.arange(15) / 15 * 3.0, np.arange(20) / 20 * 0.5
     q_x, q_y = 2 * np.pi * 6 / 3.0, -2 * np.pi * 4 / 0.5
-    power = np.abs(grid.forward(np.cos(q_x * x + q_y * y[:, None]))) ** 2
+    power = np.abs(forward(grid, np.cos(q_x * x + q_y * y[:, None]))) ** 2
     row, column = np.unravel_index(np.argmax(power), power.shape)
     assert (row, column) == (20 - 4, 6)
     assert power[row, column] == pytest.approx(0.25)
@@ -219,11 +222,11 @@ def test_coarse_to_fine_and_back_loses_the_highest_mode_only(coarse, fine, dimen
     small, large = Grid(coarse, dimension), Grid(fine, dimension)
     field = noise(small)
     back = large.resample(small.resample(field, large), small)
-    modes = small.forward(field)
+    modes = forward(small, field)
     modes[..., -1] = 0.0
     if dimension == 2:
         modes[coarse // 2] = 0.0
-    assert back == pytest.approx(small.backward(modes), abs=10 * ROUNDING)
+    assert back == pytest.approx(backward(small, modes), abs=10 * ROUNDING)
 
 
 @pytest.mark.parametrize("shape", [(513, 512), (512, 777), (600, 600), (1, 300000)])
@@ -233,11 +236,11 @@ def test_threads_change_nothing(shape, precision):
     size = {"points": shape[1], "points_y": shape[0], "precision": precision}
     one, *others = [Grid(**size, threads=threads) for threads in (1, 2, 3)]
     field = np.random.default_rng(3).normal(size=one.shape).astype(one.real)
-    modes, eps = one.forward(field), np.finfo(one.real).eps
+    modes, eps = forward(one, field), np.finfo(one.real).eps
     for other in others:
         assert other._threads > 1
-        np.testing.assert_allclose(other.forward(field), modes, atol=8 * eps * abs(modes).max())
-        np.testing.assert_allclose(other.backward(modes), field, atol=50 * eps)
+        np.testing.assert_allclose(forward(other, field), modes, atol=8 * eps * abs(modes).max())
+        np.testing.assert_allclose(backward(other, modes), field, atol=50 * eps)
 
 
 def test_a_plan_measured_for_the_first_time_destroys_nothing(tmp_path, monkeypatch):
@@ -248,4 +251,4 @@ def test_a_plan_measured_for_the_first_time_destroys_nothing(tmp_path, monkeypat
     field = np.random.default_rng(3).normal(size=(54, 54))
     pyfftw.forget_wisdom()
     fresh = Grid(54)
-    np.testing.assert_allclose(fresh.backward(fresh.forward(field)), field, atol=1e-14)
+    np.testing.assert_allclose(backward(fresh, forward(fresh, field)), field, atol=1e-14)

@@ -10,7 +10,7 @@ from gfmd_cli.analysis.curve_styles import CurveStyle
 from gfmd_cli.analysis.figures import GAP, P_STAR
 from gfmd_cli.analysis.plotting import CONFIDENCE, THEORY, UNCONVERGED, ColumnFigure
 from gfmd_cli.report.interactive import interactive
-from gfmd_cli.report.labels import html_label, plain_label
+from gfmd_cli.report.rendering import html_label, plain_label
 
 STYLE = CurveStyle((0.0, 0.0, 1.0), "s", r"n = 1 \$<b>")
 X = np.array([0.1, 1.0, 10.0])
@@ -92,11 +92,11 @@ def test_axes_have_the_scales_and_ends_of_the_static_figure(figure):
 @pytest.mark.parametrize(
     ("label", "html", "plain"),
     [
-        (P_STAR, "reduced pressure <i>p</i>* = <i>p</i> / Δσ", "reduced pressure p* = p / Δσ"),
-        (GAP, "mean gap <i>u</i><sub><i>g</i></sub> / <i>h</i><sub>std</sub>",
-         "mean gap u_g / h_std"),
-        (r"$C(q)$ (m$^4$)", "<i>C</i>(<i>q</i>) (m<sup>4</sup>)", "C(q) (m4)"),
-        (r"$q$ (m$^{-1}$)", "<i>q</i> (m<sup>−1</sup>)", "q (m−1)"),
+        (P_STAR, "reduced pressure <i>p</i>* = <i>p</i> / Δ<i>σ</i>",
+         "reduced pressure p* = p / Δσ"),
+        (GAP, "mean gap <i>u</i><sub>g</sub> / <i>h</i><sub>std</sub>", "mean gap u_g / h_std"),
+        (r"$C(q)$ (m$^4$)", "<i>C</i>(<i>q</i>) (m⁴)", "C(q) (m⁴)"),
+        (r"$q$ (m$^{-1}$)", "<i>q</i> (m⁻¹)", "q (m⁻¹)"),
         (r"a \$ < b", "a $ &lt; b", "a $ < b"),
     ],
 )  # fmt: skip

@@ -6,6 +6,7 @@ import pytest
 from scipy.integrate import trapezoid
 from scipy.special import erf, exp1
 
+from gfmd_cli.physics import persson
 from gfmd_cli.physics.elastomers import Slab
 from gfmd_cli.physics.persson import (
     Persson,
@@ -33,6 +34,7 @@ FEW = Shells(
     energy=np.array([1.0, 0.8, 0.4, 1e-7]),
     variance=np.array([0.01, 1.0, 2.0, 1e-6]),
     gamma=np.array([0.3, 0.2, 0.2, 0.1]),
+    modes=np.ones(4),
 )
 
 
@@ -45,14 +47,17 @@ def default():
     return q, (1 + (q / (4 * np.pi)) ** 2) ** -1.8
 
 
-def theory(surface, n, **options):
+def theory(surface, n):
     q, power = surface
-    return Persson(shells(q, power, q**n, np.full(q.size, float(gamma_n(n))), **options))
+    ones = np.ones_like(q)
+    return Persson(shells(q, power, q**n, float(gamma_n(n)) * ones, ones))
 
 
 @pytest.mark.parametrize("n", TABLE)
-def test_exact_shells_reproduce_the_table(default, n):
-    exact = theory(default, n, exact=default[0].size)
+def test_exact_shells_reproduce_the_table(default, n, monkeypatch):
+    with monkeypatch.context() as patched:
+        patched.setattr(persson, "EXACT", default[0].size)
+        exact = theory(default, n)
     h_std = np.sqrt(exact.shells.height.sum())
     delta_sigma, gaps = TABLE[n]
     assert h_std**2 == pytest.approx(14.6986420768, rel=1e-11)
@@ -115,7 +120,7 @@ def test_a_thin_bin_is_a_single_wavenumber(width):
     """All energy at variance 1, W = a_r: u_g = int dp' a_r'(p') / p' = E_1(p^2/2) / sqrt(2 pi)."""
     two = np.ones(2)
     variance = np.array([1 - width / 2, width])
-    thin = Persson(Shells(two, two, np.array([0.0, 2.0]), variance, two))
+    thin = Persson(Shells(two, two, np.array([0.0, 2.0]), variance, two, two))
     p = np.array([1e-5, 0.1, 1, 6])
     rel = 1e-10 + 50 * width**2  # the curvature of a_r across the bin, (p^2/2)^2 w^2 / 24
     assert thin.mean_gap(p) == pytest.approx(exp1(p**2 / 2) / np.sqrt(2 * np.pi), rel=rel, abs=0)
@@ -125,7 +130,7 @@ def test_a_thin_bin_is_a_single_wavenumber(width):
 def test_slices_of_a_bin_add_up():
     def linear(slices):
         even = np.full(slices, 1 / slices)
-        return Persson(Shells(even, even, even, even, np.ones(slices)))  # W = a_r
+        return Persson(Shells(even, even, even, even, np.ones(slices), even))  # W = a_r
 
     p = np.array([1e-5, 0.1, 1, 6])
     for obtained in (linear(10), linear(1000)):
@@ -177,7 +182,7 @@ def test_the_gap_does_not_depend_on_the_pressures_asked_with_it():
 @pytest.mark.parametrize("p", [0.05, 0.5, 1.5, 3])
 def test_the_stress_density_has_first_moment_p(p):
     even = np.array([1.0])
-    unit = Persson(Shells(even, even, even, even, even))
+    unit = Persson(Shells(*6 * [even]))
     node, weight = np.polynomial.legendre.leggauss(80)
     sigma, weight = 0.5 * (p + 10) * (1 + node), 0.5 * (p + 10) * weight
     density = unit.stress_density(sigma, p)
@@ -202,7 +207,7 @@ def test_nothing_breaks_at_the_ends_of_the_pressure_scale():
 
 def test_a_flat_surface_is_in_full_contact():
     zero, one = np.zeros(5), np.ones(5)
-    flat = Persson(shells(one, zero, one, one))
+    flat = Persson(shells(one, zero, one, one, one))
     p = np.array([0.0, 1.0])
     assert flat.shells.q.size == 0
     assert flat.delta_sigma == 0
@@ -212,14 +217,16 @@ def test_a_flat_surface_is_in_full_contact():
     assert np.all(flat.stress_deviation(p) == 0)
 
 
-def test_the_shells_keep_every_sum_and_separate_the_longest_waves():
+def test_the_shells_keep_every_sum_and_separate_the_longest_waves(monkeypatch):
+    monkeypatch.setattr(persson, "EXACT", 20)
+    monkeypatch.setattr(persson, "BINS", 30)
     rng = np.random.default_rng(1)
     m = np.arange(-40, 41)
     q = np.sqrt(np.add.outer(m**2, m**2).ravel().astype(float))
     q = q[q > 0] * (1 + 1e-13 * rng.standard_normal(m.size**2 - 1))  # rounding of |q|
     power, gamma = rng.random(q.size), rng.random(q.size)
     power[q > 35] = 0
-    result = shells(q, power, q**2, gamma, exact=20, bins=30)
+    result = shells(q, power, q**2, gamma, np.ones_like(q))
     assert result.q[:20] ** 2 == pytest.approx(
         [1, 2, 4, 5, 8, 9, 10, 13, 16, 17, 18, 20, 25, 26, 29, 32, 34, 36, 37, 40]
     )
@@ -235,7 +242,7 @@ def test_the_shells_keep_every_sum_and_separate_the_longest_waves():
 def test_a_line_of_few_modes_gets_one_shell_for_each():
     q = np.arange(1.0, 11.0)
     power = np.where(q % 2 == 0, q**-2, 0.0)
-    result = shells(q, power, q, np.ones(10))
+    result = shells(q, power, q, np.ones(10), np.ones(10))
     assert result.q == pytest.approx([2, 4, 6, 8, 10])
     assert result.energy == pytest.approx(1 / result.q)
 
@@ -264,11 +271,11 @@ def test_the_integral_of_erfc_keeps_its_digits():
 
 @pytest.mark.parametrize("n", [0, 1, 4])
 def test_area_and_gap_give_their_pressure_back(default, n):
-    persson = theory(default, n)
-    p = np.array([1e-3, 0.02, 0.3, 2.5]) * persson.delta_sigma
-    np.testing.assert_allclose(persson.pressure_at_area(persson.contact_area(p)), p, rtol=1e-12)
-    np.testing.assert_allclose(persson.pressure_at_gap(persson.mean_gap(p)), p, rtol=1e-4)
-    assert np.isnan(persson.pressure_at_gap(0.0))
+    of_n = theory(default, n)
+    p = np.array([1e-3, 0.02, 0.3, 2.5]) * of_n.delta_sigma
+    np.testing.assert_allclose(of_n.pressure_at_area(of_n.contact_area(p)), p, rtol=1e-12)
+    np.testing.assert_allclose(of_n.pressure_at_gap(of_n.mean_gap(p)), p, rtol=1e-4)
+    assert np.isnan(of_n.pressure_at_gap(0.0))
 
 
 @pytest.mark.parametrize("n", [0, 0.5, 2, 3.7])
@@ -279,7 +286,7 @@ def test_the_exponent_of_the_stiffness_is_read_off_the_shells(default, n):
 def test_the_exponent_of_a_slab_is_read_off_the_shells(default):
     q, power = default
     slab = Slab(thickness=0.03)
-    binned = shells(q, power, slab.stiffness(q), np.full(q.size, 0.35))
+    binned = shells(q, power, slab.stiffness(q), np.full(q.size, 0.35), np.ones_like(q))
     exponents, exact = binned.exponents(), slab.local_exponent(binned.q)
     assert exact[0] > 3.5
     assert exact[-1] < 1.01

@@ -437,7 +437,7 @@ def test_a_table_keeps_its_digits_over_forty_decades(tmp_path):
     assert stiffness == pytest.approx(1e-30 * (1.07 * q) ** 4, rel=2e-13, abs=0)
 
 
-SHELL = Persson(Shells(*(np.array([x]) for x in (1.0, 1.0, 1.0, 2.0, 0.3))))
+SHELL = Persson(Shells(*(np.array([x]) for x in (1.0, 1.0, 1.0, 2.0, 0.3, 1.0))))
 
 
 @pytest.mark.parametrize("p_star", [1e-30, 1e-3, 1.0, 6.0, 15.0, 20.0, 30.0, 37.0])

@@ -121,8 +121,8 @@ TRUE_CONTACT = (
     ),
 )
 POWER_LAWS = (
-    TableColumn("p*", "p_star", ".4g"),
-    TableColumn("a_r", "a_r"),
+    P_STAR,
+    AREA,
     TableColumn("grids", "grids"),
     TableColumn("seeds", "seeds", "d"),
     TableColumn("stress", "law"),

@@ -9,7 +9,7 @@ import numpy as np
 
 from gfmd_cli.errors import InputError, StudyError
 from gfmd_cli.files.atomic import check_place, new_file
-from gfmd_cli.files.hdf5 import find, new_hdf5, open_hdf5, read_dataset
+from gfmd_cli.files.hdf5 import find, new_hdf5, open_hdf5, read_dataset, write_scale
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.spec.differences import differences
 from gfmd_cli.spec.models import Spec
@@ -18,7 +18,7 @@ from gfmd_cli.study.column import Column
 from gfmd_cli.study.columns import BENCH
 from gfmd_cli.study.provenance import origin
 from gfmd_cli.study.reading import DAMAGE, check_column
-from gfmd_cli.study.writing import write_column, write_scale
+from gfmd_cli.study.writing import write_column
 
 BENCH_LAYOUT = 1
 SAMPLES = (

@@ -125,17 +125,17 @@ def _run(spec: "Spec", text: str, path: Path, quiet: bool, options: "RunOptions"
     first = leads(options.ranks)
     reporter = Reporter(quiet)
     with reporter as report:
-        outcome = run_study(spec, text, path, report if first else ignore, options)
+        counts = run_study(spec, text, path, report if first else ignore, options)
     if first and not quiet:
-        _print_results(spec, path, options, outcome, reporter.failed)
-    return sum(outcome.values()) - outcome[Status.CONVERGED]
+        _print_results(spec, path, options, counts, reporter.failed)
+    return sum(counts.values()) - counts[Status.CONVERGED]
 
 
 def _print_results(
     spec: "Spec",
     path: Path,
     options: "RunOptions",
-    outcome: Counter[Status],
+    counts: Counter[Status],
     failed: Mapping[int, str],
 ) -> None:
     """Print the results, the tasks that have not converged, and the next commands."""
@@ -149,14 +149,13 @@ def _print_results(
     from gfmd_cli.study.reading import read_rows
     from gfmd_cli.study.tasks import plan
 
-    stored = read_rows(path) if outcome and path.exists() else []
+    stored = read_rows(path) if counts and path.exists() else []
     tasks = plan(spec)
     indices = {task.id: task.index for task in options.share_of(tasks)}
     rows = [row | {"task": indices[row["task_id"]]} for row in stored if row["task_id"] in indices]
     if table := run_text(rows):
         show(f"{table}\n")
-    counts = counted(outcome)
-    show(f"{path}: {counts or 'no tasks in this shard'}")
+    show(f"{path}: {counted(counts) or 'no tasks in this shard'}")
     jumps = loads_in_jumps(rows, spec.load.tolerance)
     for line in [*unconverged(rows, failed), *jumps, *edge_warnings(rows)]:
         show(f"  {line}")

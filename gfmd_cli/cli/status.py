@@ -84,7 +84,7 @@ def collect(spec: Path, output: Path | None, overrides: tuple[str, ...]) -> None
 
     resolved, text = read_spec(spec, overrides)
     study = Study(study_path(resolved, output))
-    if study.record_paths() or study.set_aside():
+    if study.record_paths() or study.damaged_paths():
         tasks = plan(resolved)
         with study.work(tasks) as damaged:
             damaged += study.collect(resolved, tasks, text)

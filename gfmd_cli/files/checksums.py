@@ -1,9 +1,13 @@
-"""Checksums at the end of a file: they show whether the content has changed."""
+"""Checksums: at the end of a file they show whether the content has changed, digests name it."""
 
+import hashlib
+import json
 import os
 import zlib
-from typing import BinaryIO
+from pathlib import Path
+from typing import Any, BinaryIO
 
+from gfmd_cli.errors import InputError
 from gfmd_cli.files.atomic import NewFile
 
 SEAL = b"gfmd"  # followed by four bytes, the crc32 of all before
@@ -56,3 +60,20 @@ def _sum(file: BinaryIO | NewFile, size: int) -> bytes:
         total = zlib.crc32(chunk, total)
         size -= len(chunk)
     return total.to_bytes(4, "little")
+
+
+def file_digest(path: Path) -> str:
+    """SHA-256 of a file's content. Raises InputError where it cannot be read."""
+    if not path.is_file():
+        raise InputError(f"{path}: no such file, or not a regular one")
+    try:
+        with path.open("rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror}") from error
+
+
+def digest(data: Any) -> str:
+    """Short name of plain data by its content."""
+    text = json.dumps(data, sort_keys=True, separators=(",", ":"))
+    return hashlib.sha256(text.encode()).hexdigest()[:16]

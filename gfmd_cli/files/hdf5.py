@@ -168,6 +168,19 @@ def create_dataset(group: Any, name: str, values: Any) -> None:
         dataset.write(h5py.h5s.ALL, h5py.h5s.ALL, np.ascontiguousarray(values))
 
 
+def write_checked(group: Any, name: str, values: Any) -> Any:
+    """A dataset whose every chunk has a checksum: a changed one cannot be read."""
+    return group.create_dataset(name, data=values, fletcher32=values.size > 0)
+
+
+def write_scale(group: Any, name: str, values: Any, units: str, meaning: str) -> Any:
+    """A dimension scale: the labels along one axis of other datasets."""
+    scale = write_checked(group, name, np.asarray(values))
+    scale.make_scale(name)
+    scale.attrs.update({"units": units, "long_name": meaning})
+    return scale
+
+
 def _checked(group: Any, path: str, compression: float) -> Any:
     folder, _, name = path.rpartition("/")
     parent = find(group, folder) if folder else group

@@ -135,10 +135,6 @@ class Grid:
         """A real field, aligned for the transforms, values undefined."""
         return pyfftw.empty_aligned(self.shape, dtype=self.real)
 
-    def empty_modes(self) -> Modes:
-        """Fourier coefficients, aligned for the transforms, values undefined."""
-        return pyfftw.empty_aligned(self.spectral_shape, dtype=self._complex)
-
     def mode_number(self, rows: slice = ALL) -> Field:
         """|q| L / 2 pi of every coefficient, shape `spectral_shape` (or of some of its rows).
 
@@ -237,19 +233,6 @@ class Grid:
         self.padded[..., : self.points] = field
         self.transform()
         return self.work
-
-    def forward(self, field: Field) -> Modes:
-        """Fourier coefficients of a field."""
-        modes = self.empty_modes()
-        np.multiply(self.forward_into_work(field), 1.0 / self.size, out=modes)
-        return modes
-
-    def backward(self, modes: Modes) -> Field:
-        """The field of these Fourier coefficients."""
-        field = self.empty()
-        self.work[...] = modes
-        self.backward_into(field)
-        return field
 
     def backward_into(self, field: Field) -> None:
         """field <- the field of the coefficients in `work`, which are lost; without 1/size."""

@@ -69,7 +69,7 @@ class Ranks:
         """The value of the first rank, on every rank."""
         return self.comm.bcast(value)
 
-    def settle(self, error: BaseException | None) -> None:
+    def share_error(self, error: BaseException | None) -> None:
         """Raise, on all ranks, the error of the first that has one.
 
         If other ranks do not call this in time, because they wait for data from this one, all
@@ -95,8 +95,7 @@ class Ranks:
         The launcher drops what it has not yet forwarded of the output, hence the pause; and
         MPI's own abort may return.
         """
-        text = error if isinstance(error, GfmdError) else f"{type(error).__name__}: {error}"
-        log.critical("gfmd: rank %d: %s", self.rank, text)
+        log.critical("gfmd: rank %d: %s", self.rank, _text(error))
         time.sleep(FORWARD_SECONDS)
         self.comm.Abort(_status(error))
         os._exit(_status(error))
@@ -104,7 +103,7 @@ class Ranks:
 
 @contextmanager
 def together(ranks: Ranks | None) -> Iterator[None]:
-    """An error inside on one rank is raised on all; see `Ranks.settle`."""
+    """An error inside on one rank is raised on all; see `Ranks.share_error`."""
     if ranks is None:
         yield
         return
@@ -113,7 +112,7 @@ def together(ranks: Ranks | None) -> Iterator[None]:
         yield
     except Exception as error:
         failed = error
-    ranks.settle(failed)
+    ranks.share_error(failed)
 
 
 def agree(ranks: Ranks | None, value: T) -> T:
@@ -130,11 +129,16 @@ def _status(error: BaseException | None) -> int:
     return 0 if error is None else getattr(error, "exit_status", 1)
 
 
+def _text(error: BaseException) -> str:
+    """The message of an error, with its type where it is not one of this program."""
+    return str(error) if isinstance(error, GfmdError) else f"{type(error).__name__}: {error}"
+
+
 def _portable(error: BaseException | None, rank: int) -> BaseException | None:
     """The error, or one that can be sent to other ranks."""
     if error is None or isinstance(error, GfmdError | MemoryError):
         return error
-    return GfmdError(f"rank {rank}: {type(error).__name__}: {error}")
+    return GfmdError(f"rank {rank}: {_text(error)}")
 
 
 def announced() -> int:

@@ -11,7 +11,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from gfmd_cli.errors import InputError
-from gfmd_cli.physics.length_units import METRES, in_metres
 
 AXIS_NAMES = {
     **dict.fromkeys(("x", "lon", "longitude"), "x"),
@@ -21,6 +20,16 @@ EVEN = 1e-3  # deviation of distances, over their mean, up to which they are equ
 NO_VARIABLE = b"This is a netCDF dimension but not a netCDF variable"  # begins the attribute NAME
 UNIT_NAMES = ("units", "unit")
 NO_UNITS = ("", "1")
+LENGTHS = {
+    1.0: "m metre metres meter meters",
+    1e-3: "mm",
+    1e-6: "um \N{MICRO SIGN}m \N{GREEK SMALL LETTER MU}m micron microns micrometer micrometre",
+    1e-9: "nm nanometer nanometre",
+    1e-10: "\N{ANGSTROM SIGN} \N{LATIN CAPITAL LETTER A WITH RING ABOVE} angstrom Angstrom",
+    1e-12: "pm",
+}
+METRES = {name: metres for metres, names in LENGTHS.items() for name in names.split()}
+"""Metres per unit; Unicode has two letters for micro and two for angstrom."""
 
 
 class Axis(NamedTuple):
@@ -47,6 +56,11 @@ def stated_unit(data: Any) -> str:
         if text.strip() not in NO_UNITS:
             return text.strip()
     return ""
+
+
+def in_metres(unit: str) -> float | None:
+    """Metres per unit of a text such as "nm" or "[um]"; None where the unit is not known."""
+    return METRES.get(unit.strip().strip("[]()").strip())
 
 
 def factor(path: Path, name: str, unit: str) -> float | None:

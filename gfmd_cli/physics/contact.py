@@ -188,6 +188,10 @@ class Contact:
         """Natural residual from the sum of the squares of min(g, sigma)."""
         return sqrt(violation / self.grid.size) / min(self.pressure, 1.0)
 
+    def mirrored(self) -> "Contact":
+        """The contact in a periodic cell; of a free boundary, that of the mirrored map."""
+        return self
+
     def coarsen(self, shape: Shape, *, is_sampled: bool = False) -> "Contact":
         """The same contact on a coarser grid.
 

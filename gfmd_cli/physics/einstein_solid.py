@@ -10,13 +10,12 @@ import numpy as np
 from scipy.special import erfc, erfcx, ndtr
 
 from gfmd_cli.grid.arrays import Field
-from gfmd_cli.physics.persson import ierfc
+from gfmd_cli.physics.persson import UNDERFLOW, ierfc
 
 _NEWTON_STEPS = 50  # a bound; at most 6 are taken for pressures from 1e-300 to 1e300
 _LAST_STEP = 1e-8  # relative; the error left behind it is of the order of its square
 _FAR = 3.0  # x from which the continued fraction is used; terms of the closed form cancel as x^4
 _LEVELS = 40  # of the continued fraction: all digits for x >= _FAR
-_UNDERFLOW = 40.0  # exp(-x^2) is zero in double precision well before this x
 
 
 def non_contact_height(p_star: Field | float) -> Field:
@@ -68,7 +67,7 @@ def elastic_energy(z: Field | float) -> Field:
     a + z phi (1 - 2a) + z^2 a (1 - a) - phi^2 with phi the normal density and a = a_r.
     """
     z = np.asarray(z, dtype=np.float64)
-    above = np.clip(z, 0.0, _UNDERFLOW)
+    above = np.clip(z, 0.0, UNDERFLOW)
     a, rest, phi = ndtr(above), ndtr(-above), np.exp(-0.5 * above**2) / np.sqrt(2 * np.pi)
     pressed = a + above * phi * (rest - a) + above**2 * a * rest - phi**2
     below = np.minimum(z, 0.0)
@@ -82,8 +81,8 @@ def elastic_energy_with_mean(z: Field | float) -> Field:
     Paper Eq. (36c).
     """
     x = -np.asarray(z, dtype=np.float64) / np.sqrt(2)
-    near, far = np.minimum(x, _FAR), np.clip(x, _FAR, _UNDERFLOW)
-    bounded = np.maximum(near, -_UNDERFLOW)
+    near, far = np.minimum(x, _FAR), np.clip(x, _FAR, UNDERFLOW)
+    bounded = np.maximum(near, -UNDERFLOW)
     closed = (0.5 + near**2) * erfc(near) - bounded * np.exp(-(bounded**2)) / np.sqrt(np.pi)
     return 0.5 * np.where(x > _FAR, 2 * _i2erfc(far), closed)
 

@@ -171,11 +171,17 @@ class FileSurface(RigidSurface):
 
     def _known_length(self) -> float | None:
         """Side of the map [m], a side without a unit scaled as the heights; None if unknown."""
+        stated = self.stated_sides()
+        return self.length if self.length is not None or stated is None else stated[-1]
+
+    def stated_sides(self) -> tuple[float, ...] | None:
+        """Sides of the map [m] by its file, scaled as the heights where it states no unit."""
         topography = self._topography()
-        if self.length is not None or topography.spacing is None:
-            return self.length
-        side = float(topography.heights.shape[-1] * topography.spacing[-1])
-        return side if topography.metres else self.scale * side
+        if topography.spacing is None:
+            return None
+        factor = 1.0 if topography.metres else self.scale
+        shape = topography.heights.shape
+        return tuple(factor * (n * step) for n, step in zip(shape, topography.spacing, strict=True))
 
     def levelling(self) -> Levelling:
         """The trend that is subtracted from the map."""
@@ -282,9 +288,9 @@ class FileSurface(RigidSurface):
             warnings.append(
                 "the file does not state its side in metres; L = 1 m is assumed: set surface.length"
             )
-        if self.length is not None and topography.spacing is not None and topography.metres:
-            stated = topography.spacing[-1] * heights.shape[-1] / self.copies
-            warnings.append(map_warnings.other_side(self.length, stated))
+        stated = self.stated_sides()
+        if self.length is not None and stated is not None and topography.metres:
+            warnings.append(map_warnings.other_side(self.length, stated[-1]))
         if self.length is None:
             side = self._known_length() or 1.0
             warnings.append(map_warnings.scaled_side(topography, self.scale, side))
@@ -387,10 +393,11 @@ def _smallest_grid(surface: FileSurface) -> int:
 def _warnings_on_heights(surface: FileSurface) -> tuple[str, ...]:
     """Warnings about outliers and rounding. Cached: every contact of a study has the same."""
     topography, scale = surface._topography(), surface.scale
+    levelled = _prepared(surface)[tuple(map(slice, topography.heights.shape))]  # without copies
     return (
         map_warnings.outliers(topography),
         map_warnings.rounded(topography, scale),
-        map_warnings.rounded_trend(topography, surface._levelled(), scale),
+        map_warnings.rounded_trend(topography, levelled, scale),
     )
 
 

@@ -14,7 +14,6 @@ import numpy as np
 
 from gfmd_cli.errors import InputError
 from gfmd_cli.physics.array_coordinates import (
-    UNIT_NAMES,
     axes_of,
     factor,
     is_transposed,
@@ -132,8 +131,7 @@ def _with_coordinates(path: Path, file: Any, data: Any, bare: HeightMap) -> Heig
     steps = [axis.step for axis in axes if axis.step is not None]
     if len(steps) < len(axes):
         note = "the heights state a unit, which is not read: set surface.scale"
-        has_unit = any(name in data.attrs for name in UNIT_NAMES)
-        return bare._replace(heights=heights, notes=(note,) if has_unit else ())
+        return bare._replace(heights=heights, notes=(note,) if stated_unit(data) else ())
     forward = tuple(slice(None, None, -1 if step < 0 else None) for step in steps)
     heights = heights[forward]
     sides = [abs(step) * points for step, points in zip(steps, heights.shape, strict=True)]

@@ -8,7 +8,7 @@ import numpy as np
 
 from gfmd_cli.errors import INSTALL, InputError
 from gfmd_cli.grid.arrays import Field
-from gfmd_cli.physics.array_coordinates import EVEN
+from gfmd_cli.physics.array_coordinates import EVEN, in_metres
 from gfmd_cli.physics.height_map import (
     REMEDY,
     SMALLEST_MAP,
@@ -18,7 +18,6 @@ from gfmd_cli.physics.height_map import (
     first_line,
     only_map,
 )
-from gfmd_cli.physics.length_units import in_metres
 from gfmd_cli.physics.text_tables import (
     MATRIX_COLUMNS,
     columns,

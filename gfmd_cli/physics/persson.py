@@ -21,12 +21,12 @@ _SAME_SHELL = 1e-9  # relative difference of |q| within one shell: far above rou
 _CHUNK = 1 << 18  # elements of one temporary array, 2 MiB: fits a cache and bounds the memory
 _NARROW = 1e-5  # bin width / variance where the mid point errs as little as the difference, ~1e-10
 _TABLE = (1e-6, 20.0, 300)  # pressures [Delta_sigma] of a table of the mean gap
-_UNDERFLOW = 40.0  # exp(-x^2) is zero in double precision well before this x
+UNDERFLOW = 40.0  # exp(-x^2) is zero in double precision well before this x
 
 
 def ierfc(x: Field) -> Field:
     """Integral of erfc from x to infinity: exp(-x^2)/sqrt(pi) - x erfc(x), to 2 x^2 roundings."""
-    y = np.minimum(np.abs(x), _UNDERFLOW)
+    y = np.minimum(np.abs(x), UNDERFLOW)
     tail: Field = np.exp(-y * y) * (1 / np.sqrt(np.pi) - y * erfcx(y))
     value: Field = tail + 2 * np.maximum(-x, 0.0)  # ierfc(-y) = ierfc(y) + 2 y
     return value
@@ -68,7 +68,7 @@ class Shells:
     energy: Field  # sum of k C: twice the energy of full contact [Pa m]
     variance: Field  # sum of k^2 C: variance of the full-contact stress, Eq. (23) [Pa^2]
     gamma: Field  # mean gamma of Eq. (30), weighted with k C
-    modes: Field | None = None  # number of modes with power, for fits of the spectrum
+    modes: Field  # number of modes with power, for fits of the spectrum
 
     def exponents(self) -> Field:
         """d ln k / d ln q, of k = sum of k^2 C / sum of k C in every shell."""
@@ -77,16 +77,7 @@ class Shells:
         return np.gradient(np.log(self.variance / self.energy), np.log(self.q))
 
 
-def shells(
-    q: Field,
-    power: Field,
-    k: Field,
-    gamma: Field,
-    modes: Field | None = None,
-    *,
-    exact: int = EXACT,
-    bins: int = BINS,
-) -> Shells:
+def shells(q: Field, power: Field, k: Field, gamma: Field, modes: Field) -> Shells:
     """Bin the modes of a surface: exact shells at long wavelengths, then logarithmic bins.
 
     Paper Sect. 4.1.1 (with 500 bins). Empty bins are dropped; a flat surface has no bins at all.
@@ -97,36 +88,32 @@ def shells(
     power : |h(q)|^2 times the multiplicity of the mode [m^2], shape (modes,)
     k : stiffness k(q) [Pa/m], shape (modes,)
     gamma : weight gamma(q) of Eq. (30), shape (modes,)
-    modes : number of modes that an entry represents, by default one each, shape (modes,)
-    exact : number of smallest |q| with power that get a bin each
-    bins : number of logarithmic bins between the last of these and the largest |q| with power
+    modes : number of modes that an entry represents, shape (modes,)
     """
     carries_power = power > 0
     if not np.any(carries_power):
         return Shells(*np.empty((6, 0)))
-    counts = np.ones_like(q) if modes is None else modes
-    edges = bin_edges(q[carries_power], exact, bins)
+    edges = bin_edges(q[carries_power])
     sums = np.zeros((6, edges.size + 1))
     for start in range(0, q.size, _CHUNK):
         part = slice(start, start + _CHUNK)
         where = np.searchsorted(edges, q[part])
         height, energy = power[part], k[part] * power[part]
         products = (q[part] * height, height, energy, k[part] * energy, gamma[part] * energy)
-        weights = (*products, counts[part] * (height > 0))
+        weights = (*products, modes[part] * (height > 0))
         for total, weight in zip(sums, weights, strict=True):
             total += np.bincount(where, weight, minlength=total.size)
     moment, height, energy, variance, weighted, mode_counts = sums[:, sums[3] > 0]
     return Shells(moment / height, height, energy, variance, weighted / energy, mode_counts)
 
 
-def bin_edges(q: Field, exact: int = EXACT, bins: int = BINS) -> Field:
+def bin_edges(q: Field) -> Field:
     """Inner edges: half-way between the smallest |q|, then in geometric progression."""
-    low = _smallest_distinct(q, exact + 1)
+    low = _smallest_distinct(q, EXACT + 1)
     between = 0.5 * (low[1:] + low[:-1])
-    if low.size <= exact:
+    if low.size <= EXACT:
         return between
-    start = between[-1] if exact else low[0]
-    return np.concatenate([between, np.geomspace(start, q.max(), bins + 1)[1:-1]])
+    return np.concatenate([between, np.geomspace(between[-1], q.max(), BINS + 1)[1:-1]])
 
 
 def _smallest_distinct(q: Field, count: int) -> Field:
@@ -173,7 +160,7 @@ class Persson:
         """
         width = self.delta_sigma
         x, y = np.maximum(sigma, 0.0) / width, np.asarray(p) / width
-        apart = np.minimum(np.abs(x - y), _UNDERFLOW)
+        apart = np.minimum(np.abs(x - y), UNDERFLOW)
         density: Field = -np.expm1(-2 * x * y) * np.exp(-0.5 * apart**2)
         density /= np.sqrt(2 * np.pi) * width
         return density
@@ -269,7 +256,7 @@ class Persson:
         for part in self._chunks(p.size):
             pressure = p.ravel()[part]
             a, da = _bin_area(pressure, self.shells.variance)
-            x = np.minimum(self._reduced(pressure), _UNDERFLOW)[:, None]
+            x = np.minimum(self._reduced(pressure), UNDERFLOW)[:, None]
             ds = np.sqrt(2 / np.pi) / self.delta_sigma * np.exp(-x * x)
             w, by_a, by_s = self.weight(a, erf(x))
             v[part] = w @ energy
@@ -294,7 +281,7 @@ def _bin_area(p: Field, variance: Field) -> tuple[Field, Field]:
     slope = np.diff(2 * np.sqrt(2 * s) * ierfc(p / np.sqrt(2 * s)), prepend=0.0) / width
     if np.any(narrow):  # the mid point instead of a difference that cancels
         scale = np.sqrt(2 * s - variance)[narrow]
-        x = np.minimum(p / scale, _UNDERFLOW)
+        x = np.minimum(p / scale, UNDERFLOW)
         area[:, narrow] = erf(x)
         slope[:, narrow] = 2 / np.sqrt(np.pi) * np.exp(-x * x) / scale
     return area, slope
@@ -313,7 +300,7 @@ def _panel_edges(p: Field, delta_sigma: float) -> Field:
     """
     if not p.size:
         return np.array([1.0, 1.0])
-    highest = min(p.max() / delta_sigma, _UNDERFLOW)
+    highest = min(p.max() / delta_sigma, UNDERFLOW)
     y_end = min(0.5 * highest**2 + 40, 745)  # exp(-40) < eps; exp(-745) is 0
     end = delta_sigma * np.sqrt(2 * y_end)
     start = min(p.min(), end)

@@ -68,11 +68,11 @@ class SelfAffineFit:
 
 
 def density(shells: Shells) -> Field:
-    """C(q) = <|h(q)|^2> of the modes of every shell [m^2]. Raises InputError without mode counts.
+    """C(q) = <|h(q)|^2> of the modes of every shell [m^2].
 
     C(q) L^2 is the isotropic power spectral density in the usual convention [m^4].
     """
-    return shells.height / _modes(shells)
+    return shells.height / shells.modes
 
 
 def moments(shells: Shells) -> Moments:
@@ -89,10 +89,10 @@ def fit(shells: Shells, complete: float = inf) -> SelfAffineFit:
 
     Parameters
     ----------
-    shells : the spectrum with its numbers of modes
+    shells : the spectrum
     complete : wavenumber up to which the grid has the modes of all directions [1/m]
     """
-    q, count, power = shells.q, _modes(shells), density(shells)
+    q, count, power = shells.q, shells.modes, density(shells)
     isotropic = _isotropic(q, count, complete)
     best, shell_count = np.array([0.8, np.log(2 * q[0])]), q.size
     for _ in range(MAX_ITERATIONS):
@@ -119,13 +119,6 @@ def fit(shells: Shells, complete: float = inf) -> SelfAffineFit:
         c_0=_scale(best, *range_),
         q_1=float(q[0]),
     )
-
-
-def _modes(shells: Shells) -> Field:
-    """Number of modes of every shell. Raises InputError where it is unknown."""
-    if shells.modes is None:
-        raise InputError("spectrum: this study does not contain the number of modes of its shells")
-    return shells.modes
 
 
 def _shape(q: Field, x: Field, q_1: float) -> Field:

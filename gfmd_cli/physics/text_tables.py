@@ -97,13 +97,12 @@ def _warning_of_thousands(start: bytes, columns: int) -> str:
 
 
 def in_utf8(file: BinaryIO) -> BinaryIO:
-    """A table in Latin-1 as one in UTF-8; any other file is returned as it is."""
-    is_table = columns(file) > 0
+    """A table whose header is in Latin-1 as one in UTF-8; any other file is returned as it is."""
+    start = file.read(WINDOW)
+    is_table = not start.isascii() and not start.startswith(LATIN_1) and columns(file) > 0
     file.seek(0)
     content = file.read() if is_table else b""
     file.seek(0)
-    if content.isascii() or content.startswith(LATIN_1):
-        return file
     try:
         content.decode()
     except UnicodeDecodeError:

@@ -9,8 +9,7 @@ from gfmd_cli.analysis.curve_styles import without_escapes
 from gfmd_cli.analysis.plotting import BAND, ColumnFigure, PlotLayer
 from gfmd_cli.analysis.table import known, plus_minus
 from gfmd_cli.grid.arrays import Field
-from gfmd_cli.report.labels import html_label, plain_label
-from gfmd_cli.report.rendering import clean
+from gfmd_cli.report.rendering import clean, html_label, plain_label
 from gfmd_cli.report.theme import INK, hex_of
 
 SYMBOLS = {

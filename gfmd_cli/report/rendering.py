@@ -7,11 +7,14 @@ import base64
 import hashlib
 import re
 from functools import cache
+from html import unescape
 from importlib.resources import files
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
+
+from gfmd_cli.analysis.units import RAISED
 
 SCRIPTS = ("plotly-basic.min.js", "report.js")
 """Files of gfmd_cli/report/assets, in the order in which they run."""
@@ -35,7 +38,7 @@ SYMBOLS = {
     "q": "<var>q</var>",
     "L": "<var>L</var>",
 }
-"""Symbols in headings and captions, as they are set in HTML."""
+"""Symbols in headings, captions and labels, as they are set in HTML."""
 SYMBOL = re.compile(
     "|".join(
         (r"(?<![\w/])" if symbol[0].isalpha() else "")
@@ -57,6 +60,20 @@ def clean(value: Any) -> Any:
 def typeset(text: object) -> Markup:
     """A text with the symbols of SYMBOLS set in HTML."""
     return Markup(SYMBOL.sub(lambda symbol: SYMBOLS[symbol[0]], str(escape(clean(text)))))
+
+
+def html_label(label: str) -> str:
+    """A label that matplotlib typesets, in the few elements of HTML that plotly.js knows."""
+    text = label.replace(r"\Delta\sigma", "Delta_sigma").replace("^*", "*")
+    text = re.sub(r"\^\{?(-?\d)\}?", lambda power: power[1].translate(RAISED), text)
+    text = re.sub(r"\\[,;]|\s+", " ", re.sub(r"\\mathrm\{(.*?)\}", r"\1", text))
+    text = re.sub(r"(?<!\\)\$|\\(?=[$A-Za-z])", "", text)  # delimiters, and begins of names
+    return re.sub(r"(?<=[</])var>", "i>", typeset(text))
+
+
+def plain_label(label: str) -> str:
+    """A label without any markup; subscripts follow an underscore."""
+    return unescape(re.sub("<[^>]+>", "", html_label(label).replace("<sub>", "_")))
 
 
 def cell(text: str) -> str:

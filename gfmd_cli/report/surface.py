@@ -86,8 +86,7 @@ def surface_spectrum(data: ReportData) -> Section:
         row = curve.rows[0]
         key = (curve.surface, row["preparation"], row["h_std"])  # of two studies the same once
         scenes.setdefault(key, (row, curve.persson.shells))
-    with_modes = [(row, shells) for row, shells in scenes.values() if shells.modes is not None]
-    spectra = [spectrum(row, shells) for row, shells in with_modes if shells.q.size]
+    spectra = [spectrum(row, shells) for row, shells in scenes.values() if shells.q.size]
     spectra = [each for each in spectra if each.q.size]
     drawn_spectra = spectra[:MAX_SURFACES]
     if not drawn_spectra:
@@ -159,7 +158,6 @@ def spectrum(row: Row, shells: Shells) -> Spectrum:
     edges = _edges(radius, 0.5 * points)
     place = np.searchsorted(edges, radius) - 1
     inside = (place >= 0) & (place < edges.size - 1)
-    assert shells.modes is not None
     nearest = None
     if dimension == 2:
         with suppress(InputError):  # too narrow

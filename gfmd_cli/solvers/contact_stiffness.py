@@ -1,9 +1,9 @@
 """Contact stiffness from the linear response of a solved contact: one linear solve.
 
-On the free points sigma = K u + p = 0, on the contact u = h. If p grows by dp, the contact area
-stays the same to first order, except for points at which u = h and sigma = 0. Then (K du)_free =
--dp and du = 0 on the contact. With w from (K w)_free = 1 and w = 0 on the contact, du = -w dp and
-du_g = <du> = -<w> dp. The contact stiffness is -dp/du_g = 1 / <w>.
+Periodic boundary: on the free points sigma = K u + p = 0, on the contact u = h. If p grows by dp,
+the contact area stays the same to first order, except for points at which u = h and sigma = 0. Then
+(K du)_free = -dp and du = 0 on the contact. With w from (K w)_free = 1 and w = 0 on the contact,
+du = -w dp and du_g = <du> = -<w> dp. The contact stiffness is -dp/du_g = 1 / <w>.
 
 K is positive definite on the free points if at least one point is held. Conjugate gradients
 minimise Q(w) = <w K w> / 2 - <w>, whose minimum is -<w> / 2. A step to the lowest point along d
@@ -11,19 +11,33 @@ lowers Q by (d f)^2 / (2 d K d) with f = 1 - K w. The sum of these gains approac
 with the square of the error of w itself (Hestenes & Stiefel, J. Res. Natl. Bur. Stand. 49, 409,
 1952, Theorem 6:1). The gain of the last few steps estimates the remaining error (Strakos & Tichy,
 Electron. Trans. Numer. Anal. 13, 56, 2002). The field w itself is not needed.
+
+Free boundary: on the contact u = C sigma + c = h, elsewhere sigma = 0. If the load grows by a
+little, the contact area stays the same to first order, and the level c of the undeformed surface
+falls by dd. With t from (C t)_contact = 1 and t = 0 elsewhere, dsigma = t dd. The mean pressure
+grows by <t> dd, and the mean gap falls by <1 - C t> dd, to which the contact adds nothing. Hence
+
+    -dp/du_g = <t> / <1 - C t>.
+
+t is the pressure of a flat punch of the shape of the contact. C is positive definite, and conjugate
+gradients find t, preconditioned by the stiffness as in `dual`, with the Polak-Ribiere formula, as
+the preconditioner has single precision.
 """
 
 from collections import deque
+from functools import singledispatch
 
 import numpy as np
 
 from gfmd_cli.grid.arrays import Mask
 from gfmd_cli.physics.contact import Contact
+from gfmd_cli.physics.free_contact import FreeContact
 from gfmd_cli.solvers.contact_state import FREE, PRESSED
 from gfmd_cli.solvers.preconditioners import create, select
 
 DELAY = 8  # number of last steps whose gain estimates the error
 MIN_GAIN = 1e-9  # ends the iteration: gain of these steps relative to the sum of all gains
+TOLERANCE = 1e-9  # rms of 1 - C t on the contact
 MAX_STEPS = 5000
 
 
@@ -36,11 +50,12 @@ def contact_stiffness(contact: Contact, touching: Mask) -> float:
         return np.nan
     if np.all(touching):
         return np.inf
-    return 1.0 / _mean_response(contact, touching)
+    return _stiffness(contact, touching)
 
 
-def _mean_response(contact: Contact, touching: Mask) -> float:
-    """<w> by preconditioned conjugate gradients; NaN if the iteration does not converge."""
+@singledispatch
+def _stiffness(contact: Contact, touching: Mask) -> float:
+    """1 / <w> by preconditioned conjugate gradients; NaN if the iteration does not converge."""
     grid = contact.grid
     free = ~np.atleast_2d(touching)
     contact_state = np.where(free, FREE, PRESSED).astype(np.int8)
@@ -62,5 +77,30 @@ def _mean_response(contact: Contact, touching: Mask) -> float:
         gains.append(descent * length)
         total += gains[-1]
         if sum(gains) <= MIN_GAIN * total:
-            return total / grid.size
+            return 1.0 / (total / grid.size)
+    return np.nan
+
+
+@_stiffness.register
+def _of_free_contact(contact: FreeContact, touching: Mask) -> float:
+    """<t> / <1 - C t> likewise."""
+    free = contact.free
+    rest = np.ones(contact.grid.shape)  # 1 - C t
+    force, z, response = (contact.grid.empty() for _ in range(3))
+    direction = np.zeros_like(rest)
+    total, slope, length = 0.0, 0.0, 0.0
+    for _ in range(MAX_STEPS):
+        np.multiply(rest, touching, out=force)
+        if float(np.vdot(force, force)) <= TOLERANCE**2 * np.count_nonzero(touching):
+            return total / float(rest[~touching].sum())
+        free.approximate_stress(force, out=z)
+        z *= touching
+        turned = -length * float(np.vdot(z, response))  # z times the change of the force
+        direction *= max(0.0, turned / slope) if slope > 0 else 0.0
+        direction += z
+        slope = float(np.vdot(z, force))
+        free.displacement(direction, out=response)
+        length = float(np.vdot(direction, force)) / float(np.vdot(direction, response))
+        rest -= length * response
+        total += length * float(direction.sum())
     return np.nan

@@ -62,10 +62,8 @@ REQUIRED = ("surface", "elastomer", "grid", "load")
 
 def kinds_of(table: str) -> dict[str, type[Choice]]:
     """The classes of a table by their `kind`; empty for a table without kinds."""
-    model = MODELS[table]
-    if isinstance(model, type):
-        return {}
-    return {choice.model_fields["kind"].default: choice for choice in get_args(get_args(model)[0])}
+    union = next(iter(get_args(MODELS.get(table))), None)
+    return {choice.model_fields["kind"].default: choice for choice in get_args(union)}
 
 
 Places = tuple[int | None, ...]

@@ -1,10 +1,7 @@
 """The models of the run spec, and its sweeps: a list instead of a scalar makes a sweep."""
 
-import hashlib
-import json
 from collections.abc import Iterable, Iterator
 from itertools import product
-from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple, Self, get_args
 
 import numpy as np
@@ -13,6 +10,7 @@ from pydantic import Field as Key
 
 from gfmd_cli.choice import Choice, Positive
 from gfmd_cli.errors import InputError
+from gfmd_cli.files.checksums import file_digest
 from gfmd_cli.physics.contact import PRESSURES
 from gfmd_cli.physics.elastomers import Elastomer, LinearElastomer
 from gfmd_cli.physics.indenters import SMALLEST_GRID, RigidSurface
@@ -385,23 +383,6 @@ class Spec(Choice):
         if LOADS[self.load.quantity].searched:
             data["load"]["tolerance"] = self.load.tolerance
         return data
-
-
-def file_digest(path: Path) -> str:
-    """SHA-256 of a file's content. Raises InputError where it cannot be read."""
-    if not path.is_file():
-        raise InputError(f"{path}: no such file, or not a regular one")
-    try:
-        with path.open("rb") as file:
-            return hashlib.file_digest(file, "sha256").hexdigest()
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror}") from error
-
-
-def digest(data: Any) -> str:
-    """Short name of plain data by its content."""
-    text = json.dumps(data, sort_keys=True, separators=(",", ":"))
-    return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
 def _fit(places: list[tuple[int | None, ...]]) -> bool:

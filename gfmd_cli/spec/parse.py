@@ -166,7 +166,7 @@ def set_override(data: dict[str, Any], override: str) -> None:
         if not isinstance(inner, dict):
             raise InputError(f"--set {override}: {part!r} is not a table")
         table = inner
-    if parts[0] == "load" and len(parts) == 2 and parts[1] in LOADS:
-        for other in set(LOADS) & set(table):  # one way to say it takes the place of another
-            del table[other]
+    if parts[0] == "load" and len(parts) > 1 and parts[1] in LOADS:
+        for other in set(LOADS) & set(data["load"]) - {parts[1]}:  # one takes the place of another
+            del data["load"][other]
     table[parts[-1]] = parsed

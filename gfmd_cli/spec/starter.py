@@ -11,11 +11,12 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
+from gfmd_cli.choice import Choice
 from gfmd_cli.errors import InputError
 from gfmd_cli.physics.contact import build_scene
 from gfmd_cli.physics.file_surface import FileSurface
 from gfmd_cli.spec.check import kinds_of
-from gfmd_cli.spec.models import LOADS, with_boundary
+from gfmd_cli.spec.models import with_boundary
 from gfmd_cli.spec.parse import read_elastomer, read_text, set_override, split_override
 
 E_STAR = 2e9  # Pa, a stiff polymer
@@ -103,25 +104,42 @@ def with_keys(text: str, overrides: tuple[str, ...]) -> str:
     that do not go with it are removed. A whole table takes the place of all its keys; the tables
     [[sweep]] become a list before all others. Raises InputError for any other form.
     """
-    lines = text.splitlines()
+    data = tomllib.loads(text)
+    given: dict[str, set[str]] = {}
     for override in overrides:
-        (table, *keys), _ = split_override(override)
-        data = tomllib.loads("\n".join(lines))
         set_override(data, override)
-        values = data[table]
+        (table, *keys), _ = split_override(override)
         if table == "sweep" and not keys:
-            lines = [line for line in lines if not line.startswith("sweep = ")]
-            first = min(i for i, line in enumerate(lines) if _header(line))
-            lines[first:first] = [f"sweep = {_as_toml(values)} # {COMMENT}", ""]
             continue
-        if not isinstance(values, dict):
+        if not isinstance(data[table], dict):
             raise InputError(f"--set {override}: write table.key=value, such as grid.points=128")
-        if not keys:
-            first, last = _span(lines, table)
-            lines[first:last] = [line for line in lines[first:last] if not _key(line)]
-        for key in keys[:1] or values:
-            _set_key(lines, table, key, _as_toml(values[key]))
-    return "\n".join(lines) + "\n"
+        given.setdefault(table, set()).update(keys[:1] or data[table])
+    first, *sections = re.split(r"^(?=#?\[\w+\]$)", text, flags=re.MULTILINE)
+    if "sweep" in data and "sweep" not in given:
+        first += f"sweep = {_as_toml(data['sweep'])} # {COMMENT}\n\n"
+    by_table = {section[: section.index("]")].strip("#["): section for section in sections}
+    for table, of_table in given.items():
+        section = by_table.get(table, f"\n[{table}]\n").removeprefix("#")
+        by_table[table] = _with_values(section, data[table], of_table, kinds_of(table))
+    return first + "".join(by_table.values())
+
+
+def _with_values(
+    section: str, values: dict[str, Any], given: set[str], kinds: dict[str, type[Choice]]
+) -> str:
+    """The lines of a table with its values, those of the given keys in the place of others."""
+    new = {key: _line(key, _as_toml(values[key]), COMMENT) for key in values if key in given}
+    kind = values.get("kind") if "kind" in given else None
+    known = kinds[kind].model_fields if isinstance(kind, str) and kind in kinds else values
+    lines = []
+    for line in section.rstrip().splitlines():
+        match = re.match(r"(#?)(\w+) = ", line)
+        if match and match[2] in new:
+            lines.append(new.pop(match[2]))
+        elif match is None or match[1] or (match[2] in values and match[2] in known):
+            lines.append(line)
+    end = section[len(section.rstrip()) :]
+    return "\n".join([*lines, *new.values()]) + end
 
 
 def _as_toml(value: Any) -> str:
@@ -135,53 +153,3 @@ def _as_toml(value: Any) -> str:
         text = short if float(short) == value else repr(value)
         return re.sub(r"e\+?(-?)0*", r"e\1", text)  # 7e10 and not 7e+10
     return _json(value)
-
-
-def _set_key(lines: list[str], table: str, key: str, value: str) -> None:
-    """Set one key of a table, which is made where it is missing."""
-    first, last = _span(lines, table)
-    for place in reversed(range(first, last)):
-        if _does_not_go_with(table, key, value, _key(lines[place])):
-            del lines[place]
-    first, last = _span(lines, table)
-    line = _line(key, value, COMMENT)
-    places = [i for i in range(first, last) if key in (_key(lines[i]), _key(lines[i].lstrip("#")))]
-    if places:
-        lines[places[0]] = line
-    else:
-        while last > first and not lines[last - 1].strip():
-            last -= 1
-        lines.insert(last, line)
-
-
-def _span(lines: list[str], table: str) -> tuple[int, int]:
-    """First line after the header of a table, and the first line beyond the table."""
-    headers = [(i, match[1]) for i, line in enumerate(lines) if (match := _header(line))]
-    for (place, name), (end, _) in zip(headers, [*headers[1:], (len(lines), "")], strict=True):
-        if name == table:
-            lines[place] = f"[{table}]"
-            return place + 1, end
-    lines += ["", f"[{table}]"]
-    return len(lines), len(lines)
-
-
-def _header(line: str) -> "re.Match[str] | None":
-    """The name of the table that a line begins, commented out or not."""
-    return re.match(r"#?\[(\w+)\]\s*$", line)
-
-
-def _key(line: str) -> str:
-    """The key of a line, "" where it has none."""
-    match = re.match(r"(\w+) = ", line)
-    return match[1] if match else ""
-
-
-def _does_not_go_with(table: str, key: str, value: str, other: str) -> bool:
-    """Whether the key `other` of a table has to go when `key` is set to a value."""
-    if other in ("", key):
-        return False
-    if table == "load":
-        return key in LOADS and other in LOADS
-    kinds = kinds_of(table) if key == "kind" else {}
-    model = kinds.get(value.strip("'\""))
-    return model is not None and other not in model.model_fields

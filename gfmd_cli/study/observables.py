@@ -11,12 +11,11 @@ from typing import Any, NamedTuple
 
 from gfmd_cli.grid.arrays import Field, Mask
 from gfmd_cli.physics.contact import Contact
-from gfmd_cli.physics.free_contact import FreeContact
 from gfmd_cli.physics.map_preparation import mirror
 from gfmd_cli.physics.observables import contact_points
 from gfmd_cli.physics.patches import contact_patches, open_gap
 from gfmd_cli.physics.true_contact import ContactStress, bearing, contact_stress
-from gfmd_cli.solvers.free_contact_stiffness import STIFFNESS as CONTACT_STIFFNESS
+from gfmd_cli.solvers.contact_stiffness import contact_stiffness
 from gfmd_cli.study.column import Column
 
 
@@ -47,8 +46,8 @@ class SolvedContact:
 
     @cached_property
     def mirrored(self) -> Contact:
-        """The contact in a periodic cell: of a map with a free boundary, its mirrored one."""
-        return self.contact.mirrored() if isinstance(self.contact, FreeContact) else self.contact
+        """See `Contact.mirrored`."""
+        return self.contact.mirrored()
 
     @cached_property
     def full_contact_stress(self) -> ContactStress:
@@ -144,7 +143,7 @@ OBSERVABLES = (
             "contact stiffness -dp/du_g / (Delta_sigma / h_std); for both boundaries with respect "
             "to the mean gap of the map, not to the displacement of the indenter",
         ),
-        lambda solved: CONTACT_STIFFNESS[solved.contact.boundary](solved.contact, solved.touching),
+        lambda solved: contact_stiffness(solved.contact, solved.touching),
         "-dp/du_g",
         STIFFNESS,
     ),

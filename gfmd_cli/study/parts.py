@@ -12,10 +12,9 @@ from pathlib import Path
 
 from gfmd_cli.errors import InputError, SpaceError, StudyError
 from gfmd_cli.files.atomic import new_file
-from gfmd_cli.files.checksums import check_seal, seal
+from gfmd_cli.files.checksums import check_seal, digest, seal
 from gfmd_cli.files.hdf5 import new_hdf5
 from gfmd_cli.files.regular import open_regular
-from gfmd_cli.spec.models import digest
 from gfmd_cli.study.reading import StudyFile, open_study
 from gfmd_cli.study.result import Entry, TaskResult
 from gfmd_cli.study.writing import write_study
@@ -24,7 +23,7 @@ SUFFIX = ".record"
 OWN_FILES = re.compile(r"(in-use|collecting|planning)(\..*)?|wisdom-.*\.json|.*\.(record|bad)|\..*")
 """Files that gfmd makes in the folder."""
 LOCKS = ("in-use", "in-use.owner", "collecting", "collecting.owner")
-"""Outcome while the folder is removed, in the order in which they are deleted."""
+"""Kept while the rest of the folder is deleted, and then deleted in this order."""
 OWN_FOLDERS = re.compile(r"[0-9a-f]{16}")
 """Checkpoints, by the id of the task."""
 IN_CHECKPOINT = re.compile(r"pointer|lock(\..*)?|[ab][0-9]*|\..*")

@@ -88,7 +88,7 @@ class Pool:
         self.report, self.stop = context.report, context.stop
         self.jobs, self.start = jobs, start
         self.workers: dict[Connection, Worker] = {}
-        self.outcome: Counter[Status] = Counter()
+        self.counts: Counter[Status] = Counter()
         self.lost_starts = 0
         self.deaths: Counter[int] = Counter()
         """Workers that died at a task, by its index."""
@@ -109,7 +109,7 @@ class Pool:
                         worker.give(None)
                 self._assign_tasks()
                 if not self.workers:
-                    return self.outcome
+                    return self.counts
                 for pipe in wait(list(self.workers), POLL_SECONDS):
                     self._receive(self.workers[pipe])  # type: ignore[index]
         finally:
@@ -146,7 +146,7 @@ class Pool:
         if message == Status.INTERRUPTED:
             self.stop.set()  # a signal that came to the worker alone stops the run
         elif message != READY:
-            self.outcome[message] += 1
+            self.counts[message] += 1
         worker.ready, worker.task = True, None
 
     def _remove_dead(self, worker: Worker) -> None:
@@ -178,7 +178,7 @@ class Pool:
             self.waiting.append(task)
             self._end(task, None, f"{reason}; the task is tried again at the end")
         else:
-            self.outcome[Status.KILLED] += 1
+            self.counts[Status.KILLED] += 1
             self._end(task, Status.KILLED, f"{reason}, as before; call again to resume the task")
 
     def _memory_ran_out(self) -> bool:
@@ -194,7 +194,7 @@ class Pool:
         self.jobs = len(self.workers)
         if not self.workers:
             for task in self.waiting:
-                self.outcome[Status.KILLED] += 1
+                self.counts[Status.KILLED] += 1
                 self._end(task, Status.KILLED, reason)
             self.waiting.clear()
 

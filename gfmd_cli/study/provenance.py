@@ -11,8 +11,9 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 import gfmd_cli
+from gfmd_cli.files.checksums import digest
 from gfmd_cli.grid.plans import plans, processor
-from gfmd_cli.spec.models import Spec, digest
+from gfmd_cli.spec.models import Spec
 
 PACKAGES = ("numpy", "scipy", "pyFFTW", "h5py", "pydantic", "SurfaceTopography")
 

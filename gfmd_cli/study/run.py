@@ -91,13 +91,13 @@ def run_study(
     share = options.share_of(tasks)
     pending = without_result(share, outcomes)
     to_solve = {task.id for task in pending}
-    outcome = Counter(outcomes[task.id].status for task in share if task.id not in to_solve)
+    counts = Counter(outcomes[task.id].status for task in share if task.id not in to_solve)
     has_records = agree(ranks, bool(study.record_paths()))
     if not pending and not has_records:
         if leads(ranks) and study.parts.exists():  # of a run that was killed as it ended
             with study.work(tasks):
                 pass
-        return outcome
+        return counts
     check_memory(pending, ranks)
     jobs, threads = share_out(pending, options.jobs, options.reproducible, ranks)
     worker_options = WorkerOptions(
@@ -123,7 +123,7 @@ def run_study(
         _check_ended(solved, len(pending), stop)
         if not any(status.is_failure for status in solved):
             _check_output(pending, agree(ranks, study.outcomes()))
-    return outcome + solved
+    return counts + solved
 
 
 def _until(end: float, stop: Event, report: Report) -> Report:
@@ -192,6 +192,6 @@ def _solve_all(
     """Solve tasks, on worker processes if there are several jobs; the statuses of those ended."""
     if jobs > 1:
         return solve_in_pool(pending, parts, jobs, context)
-    outcome = Counter(attempt(task, parts, context) for task in pending)
-    del outcome[Status.INTERRUPTED]
-    return outcome
+    counts = Counter(attempt(task, parts, context) for task in pending)
+    del counts[Status.INTERRUPTED]
+    return counts

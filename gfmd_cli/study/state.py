@@ -104,7 +104,7 @@ def _state(
     writes them, so that a task that ends meanwhile is not overlooked.
     """
     saved = {name: Checkpoint(study.parts / name).saved() for name, _ in tasks}
-    damaged_files = study.set_aside()
+    damaged_files = study.damaged_paths()
     records, damaged = study.records()
     outcomes = study.outcomes()
     known = {name: result.status for name, result in outcomes.items() if result.stored >= output}

@@ -176,7 +176,7 @@ class Study:
 
     def _is_complete(self, tasks: list[Task]) -> bool:
         """Whether no task is missing, and no record or unfinished checkpoint is left."""
-        if self.set_aside() or self.record_paths() or not self.path.exists():
+        if self.damaged_paths() or self.record_paths() or not self.path.exists():
             return False
         with open_study(self.path) as file:
             if Status.MISSING in file.statuses:
@@ -185,8 +185,8 @@ class Study:
         solved = {task.id for task in tasks} - lacking
         return all(folder.name in solved for folder in checkpoint_folders(self.parts))
 
-    def set_aside(self) -> list[Path]:
-        """The damaged records that were set aside."""
+    def damaged_paths(self) -> list[Path]:
+        """The damaged files that were set aside."""
         return sorted(self.parts.glob("*.bad"))
 
     def record_paths(self) -> list[Path]:

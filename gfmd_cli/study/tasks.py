@@ -8,6 +8,7 @@ import numpy as np
 
 from gfmd_cli.choice import Choice
 from gfmd_cli.errors import InputError
+from gfmd_cli.files.checksums import digest
 from gfmd_cli.physics.elastomers import LinearElastomer
 from gfmd_cli.physics.indenters import RigidSurface
 from gfmd_cli.physics.surfaces import check_resolved
@@ -19,7 +20,6 @@ from gfmd_cli.spec.models import (
     GridTable,
     OutputTable,
     Spec,
-    digest,
     load_text,
     with_boundary,
 )

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from gfmd_cli.files.hdf5 import as_text, create_dataset
+from gfmd_cli.files.hdf5 import as_text, create_dataset, write_checked, write_scale
 from gfmd_cli.status import Status
 from gfmd_cli.study.column import Column
 from gfmd_cli.study.columns import (
@@ -134,8 +134,8 @@ class _Writer(NamedTuple):
                 self.column(group, column, getattr(result.shells, column.name), [shell])
             for name, picture in result.pictures.items():
                 shown = group.require_group(PICTURES)
-                _with_checksums(shown, name, picture.heights.astype(np.float32))
-                _with_checksums(shown, f"{name}_sides", np.array(picture.sides))
+                write_checked(shown, name, picture.heights.astype(np.float32))
+                write_checked(shown, f"{name}_sides", np.array(picture.sides))
         for declared in groups:
             if arrays := result.arrays.get(declared.name):
                 group = file.create_group(f"{declared.name}/{index}")
@@ -165,17 +165,9 @@ class _Writer(NamedTuple):
         ]
 
 
-def write_scale(group: Any, name: str, values: Any, units: str, meaning: str) -> Any:
-    """A dimension scale: the labels along one axis of other datasets."""
-    scale = _with_checksums(group, name, np.asarray(values))
-    scale.make_scale(name)
-    scale.attrs.update({"units": units, "long_name": meaning})
-    return scale
-
-
 def write_column(group: Any, column: Column, values: Any, scales: list[Any]) -> None:
     """A labelled dataset."""
-    dataset = _with_checksums(group, column.name, _array(column.kind, values))
+    dataset = write_checked(group, column.name, _array(column.kind, values))
     if column.kind is str:
         dataset.attrs["_Encoding"] = "utf-8"
     if column.units:
@@ -188,8 +180,3 @@ def write_column(group: Any, column: Column, values: Any, scales: list[Any]) -> 
 def _array(kind: type, values: Any) -> Any:
     """The values as they are stored: numbers, or text in UTF-8 of a fixed length."""
     return as_text(values) if kind is str else np.asarray(values, kind)
-
-
-def _with_checksums(group: Any, name: str, values: Any) -> Any:
-    """A dataset whose every chunk has a checksum: a changed one cannot be read."""
-    return group.create_dataset(name, data=values, fletcher32=values.size > 0)

@@ -1,0 +1,14 @@
+"""Fourier coefficients of the fields of a grid, one array each."""
+
+
+def forward(grid, field):
+    """Coefficients of a field."""
+    return grid.forward_into_work(field) / grid.size
+
+
+def backward(grid, modes):
+    """The field of these coefficients."""
+    field = grid.empty()
+    grid.work[...] = modes
+    grid.backward_into(field)
+    return field
