@@ -180,6 +180,9 @@ def _with_map(tables: Tables, path: Path, keys: Tables) -> Tables:
 
     Raises InputError where the table [surface] contradicts the map, which has some keys by default.
     """
+    for name in ("surface", "grid"):
+        if not isinstance(tables.get(name, {}), Mapping):
+            raise InputError(f"spec: {name} is not a table; with the argument heights it is one")
     given = tables.get("surface", {})
     for name in ("kind", "path"):
         if given.get(name, "file") != "file":
@@ -312,6 +315,8 @@ def _read(spec: Path | str | Tables, overrides: tuple[str, ...] = ()) -> tuple[S
             raise InputError("overrides go with a spec in a file; change the dictionary")
         tables = _without_numpy(spec)
         return read_tables(tables), json.dumps(tables, indent=1, default=str)
+    if not isinstance(spec, Path | str):
+        raise InputError(f"spec: a path or a dictionary is needed, not {type(spec).__name__}")
     return read_spec(Path(spec), overrides)
 
 

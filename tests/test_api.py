@@ -289,6 +289,17 @@ def test_messages_name_the_argument(heights, surface, message):
     assert not re.search(r"\.(npy|h5)", str(caught.value).replace("'a.npy'", ""))
 
 
+@pytest.mark.parametrize("name", ["surface", "grid"])
+def test_a_list_in_the_place_of_a_table_is_refused(name):
+    with pytest.raises(InputError, match=f"spec: {name} is not a table"):
+        solve({**MATERIAL, name: [{}]}, heights=SQUARE)
+
+
+def test_what_is_no_spec_is_refused():
+    with pytest.raises(InputError, match="a path or a dictionary is needed, not NoneType"):
+        solve(None)
+
+
 def test_no_thread_is_refused():
     with pytest.raises(InputError, match="threads = 0"):
         solve(TABLES, threads=0)
