@@ -192,9 +192,9 @@ def comparison_table(curves: TitledCurves) -> Table:
         source = curves[0][1].persson.mean_gap_source
         of_gap = f", mean gap by {source}" if source else ""
         caption = (
-            f"Comparison with Persson theory{of_gap}, which assumes Gaussian heights. Values on "
-            "the grid, not extrapolated. p ratio: pressure at which the theory gives the simulated "
-            "mean gap / simulated pressure."
+            f"Comparison with Persson theory{of_gap}. The theory assumes Gaussian heights. Values "
+            "on the grid, not extrapolated. p ratio: pressure at which the theory gives the "
+            "simulated mean gap / simulated pressure."
         )
     return Table(caption, COMPARISON, groups)
 
