@@ -182,7 +182,7 @@ def _with_map(tables: Tables, path: Path, keys: Tables) -> Tables:
     """
     for name in ("surface", "grid"):
         if not isinstance(tables.get(name, {}), Mapping):
-            raise InputError(f"spec: {name} is not a table; with the argument heights it is one")
+            raise InputError(f"spec: {name} must be one table where heights are given")
     given = tables.get("surface", {})
     for name in ("kind", "path"):
         if given.get(name, "file") != "file":
@@ -194,7 +194,8 @@ def _with_map(tables: Tables, path: Path, keys: Tables) -> Tables:
     grid = tables.get("grid", {})
     (surface, *_) = read_tables(tables | {"grid": {"points": SMALLEST_GRID, **grid}}).surface
     assert isinstance(surface, FileSurface)
-    sides = reversed(surface.stated_sides() or ())
+    is_topography = "periodic" in keys
+    sides = reversed((is_topography and surface.stated_sides()) or ())
     for name, side in zip(("length", "length_y"), sides, strict=False):
         length = getattr(surface, name)
         if length is not None and not math.isclose(length, side, rel_tol=SAME_SIDE):

@@ -217,6 +217,23 @@ def test_an_array_of_xarray_is_read_with_its_coordinates_and_units():
         solve(MATERIAL, heights=scan.assign_attrs(units="furlong"))
 
 
+def test_positions_of_xarray_without_a_unit_leave_the_side_to_the_spec():
+    xarray = pytest.importorskip("xarray")
+    pytest.importorskip("h5netcdf")
+    heights = rough_map()
+    points = {axis: np.arange(32) for axis in "yx"}
+    array = xarray.DataArray(heights, dims=("y", "x"), coords=points)
+    spec = {**MATERIAL, "surface": {"length": 1e-5}}
+    result = solve(spec, heights=array)
+    assert result.length == 1e-5
+    assert result.a_r == solve(spec, heights=heights).a_r
+    for wrong in (array * 1j, array.astype(str), array.to_dataset(name="h")):
+        with pytest.raises(InputError, match=r"^heights: "):
+            solve(spec, heights=wrong)
+    with pytest.raises(InputError, match=r"^heights: "):
+        solve(spec, heights=array.stack(both=("y", "x")))
+
+
 def test_a_line_scan_at_unequal_distances_is_interpolated():
     class LineScan(Topography):
         is_uniform = False
@@ -291,7 +308,7 @@ def test_messages_name_the_argument(heights, surface, message):
 
 @pytest.mark.parametrize("name", ["surface", "grid"])
 def test_a_list_in_the_place_of_a_table_is_refused(name):
-    with pytest.raises(InputError, match=f"spec: {name} is not a table"):
+    with pytest.raises(InputError, match=f"spec: {name} must be one table"):
         solve({**MATERIAL, name: [{}]}, heights=SQUARE)
 
 

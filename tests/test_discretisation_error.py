@@ -204,6 +204,11 @@ def test_the_stress_of_a_sharp_tip_has_its_own_limit(tip, n, verdict):
         assert estimate(free, n, tip=tip)["sigma_p"].verdict == verdict
 
 
+def test_contact_at_the_border_diverges_at_a_sharp_tip_too():
+    levels = [replace(level, border=0.2) for level in sequence(1.9)]
+    assert estimate(levels, 1.9, tip=CONE)["sigma_p"].verdict == "diverges"
+
+
 def test_the_area_of_a_ridge_is_unknown_where_its_stress_rings():
     assert estimate(sequence(1.75), 1.75, tip=RIDGE)["a_r"].verdict == "regular"
     assert estimate(sequence(2.0), 2.0, tip=RIDGE)["a_r"].verdict == "unknown"

@@ -195,6 +195,13 @@ def test_the_header_of_a_profile_in_latin_1_is_read(tmp_path, encoding):
     assert read.heights == pytest.approx(1e-9 * POINTS[:50, 2], rel=1e-4)
 
 
+def test_a_long_table_may_end_in_latin_1(tmp_path):
+    matrix = RNG.random((600, 600))
+    (tmp_path / "h.txt").write_bytes(text(matrix) + "# Ende: µm\n".encode("latin-1"))
+    assert (tmp_path / "h.txt").stat().st_size > text_tables.WINDOW
+    assert read_topography(tmp_path / "h.txt").heights == pytest.approx(matrix, rel=1e-5)
+
+
 LONG = {
     "a matrix that breaks off in the middle": (text(MATRIX), text(MATRIX[:, 1:])),
     "points anywhere": (text(RNG.random((10_000, 3))),) * 2,

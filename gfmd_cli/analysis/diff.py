@@ -39,7 +39,7 @@ class Pair:
     one: Row
     other: Row
     physical: bool = False
-    """Whether stress and gap are compared in Pa and m, as where the load is in SI units."""
+    """Whether stress and gap are compared in Pa and m: where the load is in SI units."""
 
     def deviation(self, name: str) -> Deviation:
         """How far a column of the second study lies from that of the first."""

@@ -230,11 +230,11 @@ def distributions(comparison: Comparison) -> list[StressDistribution]:
 
 
 def _pixel_shape(row: Row) -> int:
-    """log2 of the ratio of the spacings along x and y, rounded; zero for a line."""
+    """The ratio of the spacings along x and y as a whole number of steps of 7 %; 0 for a line."""
     if row["dimension"] == 1:
         return 0
     spacings = row["length"] / row["points"], row["length_y"] / row["points_y"]
-    return round(log2(spacings[0] / spacings[1]))
+    return round(10 * log2(spacings[0] / spacings[1]))
 
 
 def _nested(points: list[int]) -> list[int]:

@@ -189,7 +189,7 @@ class Contact:
         return sqrt(violation / self.grid.size) / min(self.pressure, 1.0)
 
     def mirrored(self) -> "Contact":
-        """The contact in a periodic cell; of a free boundary, that of the mirrored map."""
+        """This contact, or with a free boundary the periodic contact of the mirrored map."""
         return self
 
     def coarsen(self, shape: Shape, *, is_sampled: bool = False) -> "Contact":

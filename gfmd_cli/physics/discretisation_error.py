@@ -116,7 +116,7 @@ class Tip:
 
     @property
     def is_sharp(self) -> bool:
-        """Whether the stress at the tip is singular for some n < 3."""
+        """Whether the exponent m is below that of a smooth tip."""
         return self.exponent < SHARP
 
     def stress_order(self, n: float) -> float:
@@ -199,7 +199,8 @@ def estimate(
         return estimates | {"sigma_p": border_stress(fine, coarse, n)}
     if tip.is_sharp and tip.dimension == 1 and n > MAX_RIDGE_EXPONENT:
         estimates = estimates | {"a_r": UNKNOWN}
-    if tip.stress_order(n) < SLOWEST and n < DIVERGENT:
+    is_undecided = fine.a_r > 0 and estimates["sigma_p"].verdict != "diverges"
+    if is_undecided and tip.stress_order(n) < SLOWEST and n < DIVERGENT:
         verdict = "slow" if tip.stress_order(n) > 0 else "diverges"
         return estimates | {"sigma_p": replace(UNKNOWN, verdict=verdict)}
     return estimates

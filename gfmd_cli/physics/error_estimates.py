@@ -27,9 +27,10 @@ MAX_EXPONENT = {"a_r": 2.5, "sigma_p": 1.0, "u_g": 3.0}
 """Exponents n up to which 95 of 100 bars of every class hold."""
 
 DIVERGENT = 3.0  # exponent n from which the stress has no finite variance
-WIDE_CONTINUUM_FACTOR = 1.8  # with a free boundary, and of line profiles: with 1.35, 91 to 93 of
-# 100 bars of profiles held
-FREE_GAP_FACTOR = 1.8  # likewise; with 1.5, 94 of 100 bars of maps in steps held
+WIDE_CONTINUUM_FACTOR = 1.8
+"""The same with a free boundary or of line profiles: with 1.35, 91 to 93 of 100 bars held."""
+FREE_GAP_FACTOR = 1.8
+"""Factor of the mean gap with a free boundary: with 1.5, 94 of 100 bars of maps in steps held."""
 BORDER_FACTOR = 2.0  # times what is left of a change D at the order 1 - n: D / (2^(1 - n) - 1)
 MAX_FREE_EXPONENT = 2.0  # n up to which any of the bars with a free boundary were calibrated
 MAX_BORDER_EXPONENT = 0.75  # n up to which those of contact at the border were calibrated
@@ -81,7 +82,7 @@ class Estimate:
     "diverges": there is no continuum value; "unknown": no valid error can be given from these
     grids."""
     is_too_coarse: bool = False
-    """Whether the contact has too few points for a valid error, which a finer grid may give."""
+    """Whether a single contact has too few points for an error of sigma_p: a finer grid helps."""
 
 
 UNKNOWN = Estimate(nan, nan, nan, "unknown")

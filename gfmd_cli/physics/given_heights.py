@@ -57,14 +57,20 @@ def write_heights(path: Path, heights: Any) -> dict[str, Any]:
 
 def _write_netcdf(path: Path, array: Any) -> None:
     """Write an array of xarray with its axes and units as netCDF, which is HDF5."""
-    bare = array.astype(np.float64).reset_coords(drop=True).drop_encoding().rename("heights")
-    bare.attrs = {name: unit for name, unit in array.attrs.items() if name in UNIT_NAMES}
+    if not hasattr(array, "dtype"):
+        raise InputError("heights: a data set of xarray; choose one of its arrays")
+    if array.dtype.kind not in "iuf":
+        raise InputError(f"heights: data of type {array.dtype}; heights are real numbers")
     try:
+        bare = array.astype(np.float64).reset_coords(drop=True).drop_encoding().rename("heights")
+        for each in (bare, *bare.coords.values()):
+            each.attrs = {name: unit for name, unit in each.attrs.items() if name in UNIT_NAMES}
         bare.to_netcdf(path, engine="h5netcdf")
-    except (ImportError, TypeError, ValueError) as error:
+    except ImportError as error:
+        raise InputError(f"heights: {first_line(error)}; {INSTALL.format('export')}") from error
+    except (NotImplementedError, TypeError, ValueError) as error:
         raise InputError(
-            f"heights: an array of xarray is read as a netCDF file: {first_line(error)}; "
-            f"{INSTALL.format('export')}"
+            f"heights: an array of xarray is read as a netCDF file: {first_line(error)}"
         ) from error
 
 

@@ -97,9 +97,11 @@ def _warning_of_thousands(start: bytes, columns: int) -> str:
 
 
 def in_utf8(file: BinaryIO) -> BinaryIO:
-    """A table whose header is in Latin-1 as one in UTF-8; any other file is returned as it is."""
+    """A table whose header or end is in Latin-1 as one in UTF-8; any other file as it is."""
     start = file.read(WINDOW)
-    is_table = not start.isascii() and not start.startswith(LATIN_1) and columns(file) > 0
+    file.seek(max(0, file.seek(0, os.SEEK_END) - WINDOW))
+    is_ascii = start.isascii() and file.read().isascii()
+    is_table = not is_ascii and not start.startswith(LATIN_1) and columns(file) > 0
     file.seek(0)
     content = file.read() if is_table else b""
     file.seek(0)

@@ -5,6 +5,10 @@ import numpy as np
 from gfmd_cli.grid.compilation import kernel
 from gfmd_cli.solvers.tiles import SIDE
 
+BATCH = 8  # tiles that are convolved at once: the 8 numbers of a point lie next to each other
+WIDTH = 3 * SIDE * BATCH  # numbers of a row of points in the 3 x 3 tiles around each
+OFFSET = SIDE * BATCH  # numbers between points of neighbouring tiles
+
 
 @kernel
 def penetration(w, level, h, used, entered, out, a, b):
@@ -25,11 +29,6 @@ def penetration(w, level, h, used, entered, out, a, b):
                 entered[tile, block] = True
                 total += outside
         out[i, 0] = total
-
-
-BATCH = 8  # tiles that are convolved at once: the 8 numbers of a point lie next to each other
-WIDTH = 3 * SIDE * BATCH  # numbers of a row of points in the 3 x 3 tiles around each
-OFFSET = SIDE * BATCH  # numbers between points of neighbouring tiles
 
 
 @kernel

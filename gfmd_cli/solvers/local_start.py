@@ -34,10 +34,16 @@ class Limits(NamedTuple):
     points: int
     """Smallest number of points per side."""
     share: float
-    """Largest share of tiles that the contact can reach."""
+    """Largest share of tiles that the contact can reach, for n = 0."""
+    decrease: float
+    """By how much this share decreases with the largest exponent n of k(q)."""
+
+    def largest_share(self, contact: Contact) -> float:
+        """Largest share of tiles that a contact can reach."""
+        return self.share - self.decrease * contact.exponents[1]
 
 
-LIMITS = {"periodic": Limits(512, 0.065), "free": Limits(256, 0.25)}
+LIMITS = {"periodic": Limits(512, 0.17, 0.1), "free": Limits(256, 0.25, 0.0)}
 """By the boundary of the contact."""
 
 
@@ -65,7 +71,7 @@ def start_from(
         s = _refined(pressure, tiles)
         if contact.may_touch is not None:
             s *= tiles.take(contact.may_touch)
-        if tiles.count > limits.share * tiles.used.size or not s.any():
+        if tiles.count > limits.largest_share(contact) * tiles.used.size or not s.any():
             return None
         solve = solve_on_tiles(contact, tiles, s, pause)
         del pressure, s  # their memory is needed now
