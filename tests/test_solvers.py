@@ -154,6 +154,18 @@ def test_the_energy_never_rises_from_step_to_step():
         assert np.all(np.diff(finest) <= 1e-10 * np.abs(finest[0]))
 
 
+@pytest.mark.parametrize("p_star", np.linspace(0.05, 0.0505, 6))
+def test_a_move_that_overflows_in_single_precision_is_shortened(p_star):
+    """The stiffness rises by 20 decades between L / 8 and L / 16."""
+    half_space = build_scene(SelfAffine(cutoff=0.02), Power(n=1), 128)
+    grid, k = half_space.grid, half_space.stiffness
+    cliff = 10.0 ** (20 * np.clip(np.log2(np.maximum(grid.mode_number(), 1) / 8), 0, 1))
+    modes = np.fft.rfft2(half_space.height) * k * cliff
+    scale = np.std(np.fft.irfft2(modes))
+    contact = Contact(grid, half_space.height, k * cliff / scale, p_star)
+    assert solve_contact(contact, Auto(tolerance=1e-6)).status == "converged"
+
+
 @pytest.mark.parametrize("n", [1, 4])
 def test_the_rounding_of_sigma_is_estimated_and_removed(n):
     """Updates in single precision: what sigma has drifted by, and the residual after all."""

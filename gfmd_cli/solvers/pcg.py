@@ -26,7 +26,7 @@ constraints are excluded from the scaling (Bertsekas, SIAM J. Control Optim. 20,
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from math import hypot
+from math import hypot, isfinite
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -229,7 +229,8 @@ class _Run:
             if not is_moved:  # [4]
                 _, fall, square, stopped = self.turn(0.0, is_kept=True)
             curvature = self.apply_stiffness()
-            if fall > 0:
+            is_finite = isfinite(curvature)  # else the move overflows in single precision
+            if fall > 0 and is_finite:
                 best = float(fall) / curvature if curvature > 0 else 1.0  # 1: a rigid shift
                 choice = self.choose_move(best, stopped > 0)
                 fraction = choice.fraction
@@ -237,7 +238,8 @@ class _Run:
                 state.moved = 0.0 if restart else fraction * length
                 state.best_length, state.curvature = best * length, curvature / length**2
                 break
-            state.length, state.moved = 0.5 * length, 0.0
+            state.length = 0.5 * length if is_finite else min(0.5 * length, self.longest())
+            state.moved = 0.0
             is_moved = False
         way = (self.direction, length, fraction, self.padded, self.change)
         self.assess(self.rows.sums(3, kernels.advance, *fields, *way, self.own_state))  # [5]
@@ -271,5 +273,9 @@ class _Run:
         curvature = self.apply_stiffness()
         if curvature > RIGID_CURVATURE * descent:
             return float(descent) / curvature
+        return self.longest()  # upper limit of a rigid shift
+
+    def longest(self) -> float:
+        """Length at which the point that moves farthest moves by the range of the heights."""
         largest = self.grid.max(float(np.abs(self.direction).max()))
-        return self.contact.height_range / largest  # upper limit of a rigid shift
+        return self.contact.height_range / largest
