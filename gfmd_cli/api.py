@@ -194,9 +194,8 @@ def _with_map(tables: Tables, path: Path, keys: Tables) -> Tables:
     grid = tables.get("grid", {})
     (surface, *_) = read_tables(tables | {"grid": {"points": SMALLEST_GRID, **grid}}).surface
     assert isinstance(surface, FileSurface)
-    is_topography = "periodic" in keys
-    sides = reversed((is_topography and surface.stated_sides()) or ())
-    for name, side in zip(("length", "length_y"), sides, strict=False):
+    stated = surface.stated_sides() if "periodic" in keys else None  # those of a topography
+    for name, side in zip(("length", "length_y"), reversed(stated or ()), strict=False):
         length = getattr(surface, name)
         if length is not None and not math.isclose(length, side, rel_tol=SAME_SIDE):
             raise InputError(

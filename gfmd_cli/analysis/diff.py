@@ -15,8 +15,6 @@ from gfmd_cli.study.reading import open_study, solved_rows
 
 SURFACE = ("surface", "surface_sha256", "seed")
 """Columns of a surface: two files may have the same name."""
-IN_SI = ("pressure", "displacement")
-"""Loads in SI units."""
 
 
 Key = Callable[[Row], tuple[Hashable, ...]]
@@ -110,7 +108,7 @@ def _matches(one: list[Row], other: list[Row], *keys: Key) -> list[Pair]:
                 partner = partners.pop(0)
                 paired_ids |= {id(row), id(partner)}
                 # Delta_sigma and h_std depend on surface, elastomer and, for an indenter, the grid
-                pairs.append(Pair(row, partner, row["load"] in IN_SI))
+                pairs.append(Pair(row, partner, bool(LOADS[row["load"]].unit)))
     for rows in (one, other):
         rows[:] = [row for row in rows if id(row) not in paired_ids]
     return sorted(pairs, key=lambda pair: int(pair.one["task"]))

@@ -10,7 +10,12 @@ from gfmd_cli.errors import INSTALL, InputError
 from gfmd_cli.files.atomic import new_file
 from gfmd_cli.files.hdf5 import new_hdf5, write_scale
 from gfmd_cli.physics.array_coordinates import UNIT_NAMES
-from gfmd_cli.physics.height_map import at_equal_distances, check_layout, first_line
+from gfmd_cli.physics.height_map import (
+    at_equal_distances,
+    check_layout,
+    check_type,
+    first_line,
+)
 from gfmd_cli.physics.topography import AXES, MAX_BYTES
 
 
@@ -59,8 +64,7 @@ def _write_netcdf(path: Path, array: Any) -> None:
     """Write an array of xarray with its axes and units as netCDF, which is HDF5."""
     if not hasattr(array, "dtype"):
         raise InputError("heights: a data set of xarray; choose one of its arrays")
-    if array.dtype.kind not in "iuf":
-        raise InputError(f"heights: data of type {array.dtype}; heights are real numbers")
+    check_type(Path("heights"), array.dtype)
     try:
         bare = array.astype(np.float64).reset_coords(drop=True).drop_encoding().rename("heights")
         for each in (bare, *bare.coords.values()):

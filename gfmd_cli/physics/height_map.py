@@ -47,10 +47,15 @@ class HeightMap(NamedTuple):
     """Warnings about what the file states and the reader does not use."""
 
 
-def check_layout(path: Path, shape: tuple[int, ...], dtype: np.dtype[Any], max_bytes: int) -> None:
-    """Raise InputError for anything but real numbers on a map or a line, within the limits."""
+def check_type(path: Path, dtype: np.dtype[Any]) -> None:
+    """Raise InputError for anything but real numbers."""
     if dtype.kind not in "iuf":
         raise InputError(f"{path}: data of type {dtype}; heights are real numbers (int or float)")
+
+
+def check_layout(path: Path, shape: tuple[int, ...], dtype: np.dtype[Any], max_bytes: int) -> None:
+    """Raise InputError for anything but real numbers on a map or a line, within the limits."""
+    check_type(path, dtype)
     if len(shape) not in (1, 2):
         raise InputError(
             f"{path}: data of shape {shape}; a height map has two dimensions, a line profile one"

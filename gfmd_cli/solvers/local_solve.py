@@ -164,35 +164,35 @@ class LocalSolve:
             pressed = s > 0
             level = float(gap.ravel()[np.flatnonzero(pressed)].mean())
             active = np.flatnonzero(pressed | (gap < level))
-            g, t = gap.ravel()[active] - level, s.ravel()[active]
-            violation = np.minimum(g, t)
+            active_gap, active_s = gap.ravel()[active] - level, s.ravel()[active]
+            violation = np.minimum(active_gap, active_s)
             if self.contact.as_residual(_dot(violation, violation)) < tolerance:
                 break
-            f, last = _balanced(-g), force.ravel()[active]
-            force = _field(f, active, s)
+            active_force, last = _balanced(-active_gap), force.ravel()[active]
+            force = _field(active_force, active, s)
             z = _balanced(self.map_displacement(force).ravel()[active])
-            old, slope = slope, _dot(z, f)
+            old, slope = slope, _dot(z, active_force)
             # Polak-Ribiere+
             beta = max(0.0, (slope - _dot(z, last)) / old) if old > 0 else 0.0
-            d = _balanced(z + beta * direction.ravel()[active])
-            if _dot(d, f) <= 0:
-                d = z
-            direction = _field(d, active, s)
-            step = length * d
-            move = np.maximum(step, -t)
+            active_direction = _balanced(z + beta * direction.ravel()[active])
+            if _dot(active_direction, active_force) <= 0:
+                active_direction = z
+            direction = _field(active_direction, active, s)
+            step = length * active_direction
+            move = np.maximum(step, -active_s)
             change = self.compliance(_field(move, active, s))
             curvature = _dot(move, change.ravel()[active])
-            best = -_dot(move, g) / curvature if curvature > 0 else 1.0
+            best = -_dot(move, active_gap) / curvature if curvature > 0 else 1.0
             exact = np.array_equal(step, move) and (
-                best <= 1 or float((t + best * move).min()) >= 0
+                best <= 1 or float((active_s + best * move).min()) >= 0
             )
             choice = choose(best, exact)
             length *= choice.factor
             if choice.restart:
                 slope = 0.0
-            t = np.maximum(t + choice.fraction * move, 0.0)
-            scale = self.total / float(t.sum())
-            s = _field(scale * t, active, s)
+            active_s = np.maximum(active_s + choice.fraction * move, 0.0)
+            scale = self.total / float(active_s.sum())
+            s = _field(scale * active_s, active, s)
             w += choice.fraction * change
             w *= scale
         self.s = s

@@ -172,14 +172,16 @@ class Load(NamedTuple):
     words: str
     searched: str = ""
     """Column that must match if the pressure is searched; empty if the pressure is given."""
+    unit: str = ""
+    """Its SI unit; empty if it is reduced."""
 
 
 LOADS = {
     "p_star": Load("p*", "reduced pressure"),
-    "pressure": Load("p", "pressure"),
+    "pressure": Load("p", "pressure", unit="Pa"),
     "contact_area": Load("a_r", "contact area", "a_r"),
     "mean_gap": Load("u_g", "mean gap", "u_g"),
-    "displacement": Load("d", "displacement", "displacement"),
+    "displacement": Load("d", "displacement", "displacement", "m"),
 }
 """The quantities by their keys in [load]."""
 
