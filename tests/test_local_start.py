@@ -26,7 +26,7 @@ from gfmd_cli.solvers.tile_operators import (
 )
 from gfmd_cli.solvers.tiles import Tiles
 
-SUITED = [Power(n=0.25), Power(n=0.5), Power(n=1), Power(n=1.25), HalfSpace(E_star=2e9)]
+SUITED = [*(Power(n=n) for n in (0.25, 0.5, 1, 1.25, 1.5)), HalfSpace(E_star=2e9)]
 
 
 def name(value):
@@ -162,10 +162,17 @@ def check_solution(contact):
 
 
 @pytest.mark.parametrize("p_star", [1e-5, 1e-3, 0.01])
-@pytest.mark.parametrize("elastomer", [SUITED[1], SUITED[2], SUITED[4]], ids=name)
+@pytest.mark.parametrize("elastomer", [SUITED[1], SUITED[2], SUITED[-1]], ids=name)
 @pytest.mark.parametrize("boundary", ["periodic", "free"])
 def test_the_solution_is_that_of_the_whole_grid(elastomer, p_star, boundary):
     check_solution(SCENES[boundary](SelfAffine(cutoff=0.02), elastomer, 512).contact(p_star))
+
+
+@pytest.mark.parametrize("boundary", ["periodic", "free"])
+def test_the_solution_of_a_stiffer_elastomer_is_that_of_the_whole_grid(boundary):
+    """At n = 1.5 the limit of the share of tiles permits only smaller contacts."""
+    scene = SCENES[boundary](SelfAffine(cutoff=0.02), Power(n=1.5), 512)
+    check_solution(scene.contact(1e-4))
 
 
 @pytest.mark.parametrize("p_star", [1e-4, 0.01])

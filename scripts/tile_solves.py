@@ -1,0 +1,128 @@
+"""Solves on tiles at any share of tiles and any n: share, steps, prediction, time.
+
+    python scripts/tile_solves.py --points 1024 2048 --exponents 0.25 0.5 1 1.25 \\
+        --p-star 0.01 0.02 0.05 0.1 --tolerance 1e-3 --seeds 0 1 2
+    python scripts/tile_solves.py --exponents 1 1.5 2 --p-star 0.001 --max-steps 2000
+
+Periodic cell, default surface, one thread. The columns: share of the tiles that are kept on the
+finest grid; evaluations of the displacement at all points, and steps on the tiles, both on the
+finest grid; natural residual of the start, measured at all points over the prediction on the
+tiles; processor time of a solve on whole grids over that of the solve with tiles, each the smallest
+of `--repeats` times; microseconds that the convolution with the stiffness takes per tile.
+"""
+
+import argparse
+import os
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+from dataclasses import dataclass
+
+from small_contacts import WholeGrids
+from timing import least
+
+from gfmd_cli.physics.contact import Contact, build_scene
+from gfmd_cli.physics.elastomers import Power
+from gfmd_cli.physics.self_affine import SelfAffine
+from gfmd_cli.solvers import local_solve, local_start
+from gfmd_cli.solvers.local_solve import Evaluation
+from gfmd_cli.solvers.loop import State
+from gfmd_cli.solvers.nested_grids import solve_contact
+from gfmd_cli.solvers.pcg import ProjectedCG
+
+
+@dataclass
+class Record:
+    """What was seen of the last solve on tiles."""
+
+    share: float = 0.0
+    evaluations: int = 0
+    steps: int = 0
+    predicted: float = 0.0
+    measured: float = 0.0
+    microseconds: float = 0.0
+
+
+last = Record()
+
+
+class RecordedSolve(local_start.PeriodicSolve):
+    """The solve on the tiles of one grid, which starts a new record."""
+
+    def solve(self, tolerance: float) -> tuple[Evaluation, local_solve.Field]:
+        """See `LocalSolve`."""
+        global last
+        last = Record(share=self.tiles.count / self.tiles.used.size)
+        self.pause = self.count_step
+        seconds = least(lambda: self.map_displacement(self.s), 3)
+        last.microseconds = 1e6 * seconds / self.tiles.count
+        return super().solve(tolerance)
+
+    def count_step(self) -> None:
+        """Count a step; the test that ends a solve counts as one, too."""
+        last.steps += 1
+
+    def evaluate(self, displacement: local_solve.Field) -> Evaluation:
+        """See `LocalSolve`."""
+        result = super().evaluate(displacement)
+        last.evaluations += 1
+        last.predicted = result.start_residual
+        return result
+
+
+def row(contact: Contact, tolerance: float, repeats: int) -> str:
+    """The columns of one contact."""
+
+    def watch(current: Contact, state: State) -> None:
+        if current is contact and state.step == 0:
+            last.measured = state.residual
+
+    def with_tiles() -> None:
+        solve_contact(contact, ProjectedCG(tolerance=tolerance), watch)
+
+    seconds = least(with_tiles, repeats)
+    whole = least(lambda: solve_contact(contact, WholeGrids(tolerance=tolerance)), repeats)
+    if last.predicted == 0.0:
+        return "not solved on tiles"
+    return (
+        f"{last.share:7.3f} {last.evaluations:11} {last.steps:6} {last.predicted:10.1e} "
+        f"{last.measured / last.predicted:8.2f} {whole / seconds:11.2f} {last.microseconds:6.2f}"
+    )
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--points", type=int, nargs="+", default=[1024])
+    parser.add_argument("--exponents", type=float, nargs="+", default=[1.0])
+    parser.add_argument("--cutoff", type=float, default=0.005, help="lambda_s / L")
+    parser.add_argument("--p-star", type=float, nargs="+", default=[0.001, 0.01, 0.1])
+    parser.add_argument("--seeds", type=int, nargs="+", default=[0])
+    parser.add_argument("--tolerance", type=float, nargs="+", default=[1e-4])
+    parser.add_argument("--max-steps", type=int, default=local_solve.MAX_STEPS, help="on tiles")
+    parser.add_argument("--repeats", type=int, default=2)
+    arguments = parser.parse_args()
+    smallest = local_start.LIMITS["periodic"].points
+    local_start.LIMITS["periodic"] = local_start.Limits(smallest, 1.0, 0.0)
+    local_start.EXPONENTS = (0.0, 9.0)
+    local_start.SOLVES["periodic"] = RecordedSolve
+    local_solve.MAX_STEPS = arguments.max_steps
+    print(
+        "points     n     p* tolerance seed   share evaluations  steps  predicted measured "
+        "time ratio us/tile"
+    )
+    for points in arguments.points:
+        for n in arguments.exponents:
+            for seed in arguments.seeds:
+                surface = SelfAffine(seed=seed, cutoff=arguments.cutoff)
+                scene = build_scene(surface, Power(n=n), points)
+                for p_star in arguments.p_star:
+                    for tolerance in arguments.tolerance:
+                        head = f"{points:6} {n:5g} {p_star:6g} {tolerance:9g} {seed:4} "
+                        print(
+                            head + row(scene.contact(p_star), tolerance, arguments.repeats),
+                            flush=True,
+                        )
+
+
+if __name__ == "__main__":
+    main()
