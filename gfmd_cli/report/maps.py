@@ -108,10 +108,10 @@ def _contact_maps(study: StudyFile, row: Row, prefix: str) -> dict[str, Any]:
 
 def _map_figures(study: StudyFile, row: Row) -> list[tuple[str, ColumnFigure, str]]:
     """Maps of contact, stress and gap, as far as the fields for them are stored."""
-    shape = study.shapes("fields", row["task"]).get("sigma", ())
-    if len(shape) != 2:
+    sigma = study.datasets("fields", row["task"]).get("sigma")
+    if sigma is None or sigma.ndim != 2:
         return []
-    pixels = _thumbnails(study, row["task"], -(-max(shape) // SIDE))
+    pixels = _thumbnails(study, row["task"], -(-max(sigma.shape) // SIDE))
     stress, touching = pixels["stress"], pixels.get("contact")
     red = f"red: the {100 - PERCENTILE} % of the {{}} above the scale"
     what = f"Stress; black: none, {red.format('contact')}"

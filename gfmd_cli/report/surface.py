@@ -113,10 +113,10 @@ def _fits(shown: list[Spectrum]) -> Table:
             "surface": curve.name,
             "hurst": fit.hurst,
             "hurst_error": fit.hurst_error,
-            "rolloff": 2 * np.pi / fit.q_r if fit.q_r else None,
-            "rolloff_error": 2 * np.pi / fit.q_r**2 * fit.q_r_error if fit.q_r else None,
+            "rolloff": fit.rolloff_wavelength,
+            "rolloff_error": fit.rolloff_error,
             "no_rolloff": "none within the cell",
-            "cutoff": 2 * np.pi / fit.q_s,
+            "cutoff": fit.cutoff_wavelength,
             "scatter": fit.scatter,
         }
         for curve in shown
