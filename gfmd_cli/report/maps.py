@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from gfmd_cli.analysis.compare import Row
+from gfmd_cli.analysis.curve_styles import rgb
 from gfmd_cli.analysis.plotting import WIDTH, ColumnFigure, LegendFigure, shades
 from gfmd_cli.analysis.selection import evenly, grouped
 from gfmd_cli.analysis.table import Group, Table, TableColumn
@@ -145,8 +146,7 @@ def _means(block: Field, step: int) -> Field:
 
 def _contact_figure(touching: Field, row: Row) -> ColumnFigure:
     plot, extent = _cell(row)
-    colour = np.array(list(bytes.fromhex(TOUCHING[1:]))) / 255
-    image = np.dstack([np.broadcast_to(colour, (*touching.shape, 3)), touching])
+    image = np.dstack([np.broadcast_to(rgb(TOUCHING), (*touching.shape, 3)), touching])
     plot.axes.imshow(image, origin="lower", extent=extent, interpolation="none")
     return plot
 
