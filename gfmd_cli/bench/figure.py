@@ -108,6 +108,6 @@ def _title(trace: Trace) -> str:
 
 
 def _slug(text: str) -> str:
-    """A file name that tells."""
+    """A file name from a title."""
     plain = text.replace("*", "").replace(" = ", "=")
     return re.sub(r"[^\w.=]+", "-", plain).strip("-")[:MAX_LABEL]

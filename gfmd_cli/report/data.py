@@ -76,7 +76,7 @@ class ReportData:
 
     @property
     def prefix(self) -> str:
-        """What the names of figures begin with that two studies have of their own."""
+        """Prefix of the names of figures that each of two studies has."""
         return f"{self.letter}-" if self.letter else ""
 
     @property

@@ -18,9 +18,9 @@ PALETTE = {
 """Light and dark by name: text has a contrast of at least 4.5 to paper and panel."""
 LIGHT, DARK = PALETTE["paper"]
 INK, PAPER = "#000000", "#ffffff"
-"""What figures are drawn with and on."""
+"""Ink and background of figures."""
 LEGIBLE = 3.0
-"""Contrast that WCAG 2 asks of what is no text."""
+"""Least contrast of graphics by WCAG 2."""
 USED = re.compile(r"var\(--c-([0-9a-f]{6})\)")
 
 

@@ -1,4 +1,4 @@
-"""Run a spec: what is missing is solved, task by task, on one or more processes."""
+"""Run a spec: solve the tasks that have no result yet, on one or more processes."""
 
 from collections import Counter
 from collections.abc import Iterator
