@@ -17,9 +17,7 @@ ROUNDING = 1e-9  # relative difference of equal values that were computed on dif
 P_STAR = r"reduced pressure  $p^* = p\,/\,\Delta\sigma$"
 AREA, GAP = r"relative contact area  $a_r$", r"mean gap  $u_g\,/\,h_\mathrm{std}$"
 VIEWS = (
-    View(
-        "contact_area", "a_r", AREA, "Relative contact area over reduced pressure", y_scale="log"
-    ),
+    View("contact_area", "a_r", AREA, "Relative contact area over reduced pressure", y_scale="log"),
     View(
         "contact_area_ratio",
         "a_r",

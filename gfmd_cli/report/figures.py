@@ -88,22 +88,18 @@ def contact_area(data: ReportData) -> Section:
 
 def mean_gap(data: ReportData) -> Section:
     """Mean gap."""
-    caption = "Mean gap u_g between the surfaces, over the whole interface."
-    return Section(
-        "Mean gap",
-        drawings=_drawings(data, "u_g"),
-        disclosed={BEHIND: over_pressure(MEAN_GAP, caption, data.curves)},
+    table = over_pressure(
+        MEAN_GAP, "Mean gap u_g between the surfaces, over the whole interface.", data.curves
     )
+    return Section("Mean gap", drawings=_drawings(data, "u_g"), disclosed={BEHIND: table})
 
 
 def stress_deviation(data: ReportData) -> Section:
     """Standard deviation of the stress."""
     caption = "Standard deviation sigma_p of the stress over the whole interface."
-    return Section(
-        "Stress deviation",
-        drawings=_drawings(data, "sigma_p"),
-        disclosed={BEHIND: over_pressure(STRESS_DEVIATION, caption, data.curves)},
-    )
+    table = over_pressure(STRESS_DEVIATION, caption, data.curves)
+    drawings = _drawings(data, "sigma_p")
+    return Section("Stress deviation", drawings=drawings, disclosed={BEHIND: table})
 
 
 def _drawings(data: ReportData, column: str) -> list[Drawing]:

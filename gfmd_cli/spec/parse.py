@@ -58,7 +58,7 @@ def read_tables(data: dict[str, Any]) -> Spec:
     return Check("spec").spec(data)
 
 
-def read_scan(path: Path, overrides: tuple[str, ...] = ()) -> FileSurface:
+def read_scan(path: Path, overrides: tuple[str, ...]) -> FileSurface:
     """The surface of a height map, with overrides "surface.key=value". Raises InputError."""
     data: dict[str, Any] = {"surface": {"kind": "file", "path": str(path)}}
     surfaces = _choices("surface", data, path, overrides)

@@ -24,7 +24,7 @@ COMMENT = "as given on the command line"
 COLUMN = 27  # characters before a comment
 
 
-def starter(path: Path, overrides: tuple[str, ...] = ()) -> str:
+def starter(path: Path, overrides: tuple[str, ...]) -> str:
     """The spec of a random surface, for the file `path`, with overrides "table.key=value".
 
     Raises InputError where the result is no valid spec.
@@ -35,7 +35,7 @@ def starter(path: Path, overrides: tuple[str, ...] = ()) -> str:
 
 
 def starter_of_scan(
-    path: Path, surface: FileSurface, overrides: tuple[str, ...] = ()
+    path: Path, surface: FileSurface, overrides: tuple[str, ...]
 ) -> tuple[str, str]:
     """The spec of a measured surface, for the file `path`, and how the map is prepared.
 
