@@ -16,19 +16,17 @@ WIDE = 20  # a ratio that varies by more is drawn on a log scale
 ROUNDING = 1e-9  # relative difference of equal values that were computed on different grids
 P_STAR = r"reduced pressure  $p^* = p\,/\,\Delta\sigma$"
 AREA, GAP = r"relative contact area  $a_r$", r"mean gap  $u_g\,/\,h_\mathrm{std}$"
+RATIO = r"$a_r\,/\,a_r$(Persson)"
+DEVIATION = r"stress deviation  $\sigma_p\,/\,\Delta\sigma$"
 VIEWS = (
     View("contact_area", "a_r", AREA, "Relative contact area over reduced pressure", y_scale="log"),
     View(
-        "contact_area_ratio",
-        "a_r",
-        r"$a_r\,/\,a_r$(Persson)",
-        "Contact area over that of Persson theory",
-        ratio=True,
+        "contact_area_ratio", "a_r", RATIO, "Contact area over that of Persson theory", ratio=True
     ),
     View(
         "stress_deviation",
         "sigma_p",
-        r"stress deviation  $\sigma_p\,/\,\Delta\sigma$",
+        DEVIATION,
         "Standard deviation of the stress over reduced pressure",
     ),
     View("mean_gap_log", "u_g", GAP, "Mean gap over the logarithm of the reduced pressure"),
