@@ -26,6 +26,14 @@ class CurveStyle:
     label: str
 
 
+def distinct_styles(labels: list[str]) -> list[CurveStyle]:
+    """A style for each label, colours along the palette."""
+    return [
+        CurveStyle(colour, MARKERS[place % len(MARKERS)], label)
+        for place, (colour, label) in enumerate(zip(colours(len(labels)), labels, strict=True))
+    ]
+
+
 def literal(text: str) -> str:
     """A text as a label of a figure, its dollar signs escaped: they would delimit formulas.
 
@@ -93,10 +101,16 @@ def shortened(labels: list[str]) -> list[str]:
 
 def colours(count: int) -> list[Colour]:
     """Colours at equal distances along the palette."""
-    steps = np.array([list(bytes.fromhex(colour[1:])) for colour in PALETTE]).T / 255
     at = np.linspace(0, len(PALETTE) - 1, count)
-    red, green, blue = (np.interp(at, range(len(PALETTE)), step).tolist() for step in steps)
+    channels = zip(*map(rgb, PALETTE), strict=True)
+    red, green, blue = (np.interp(at, range(len(PALETTE)), part).tolist() for part in channels)
     return list(zip(red, green, blue, strict=True))
+
+
+def rgb(colour: str) -> Colour:
+    """The colour #rrggbb."""
+    red, green, blue = bytes.fromhex(colour[1:])
+    return red / 255, green / 255, blue / 255
 
 
 def _names(elastomers: dict[str, Curve]) -> dict[str, str]:

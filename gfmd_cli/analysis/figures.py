@@ -16,13 +16,30 @@ WIDE = 20  # a ratio that varies by more is drawn on a log scale
 ROUNDING = 1e-9  # relative difference of equal values that were computed on different grids
 P_STAR = r"reduced pressure  $p^* = p\,/\,\Delta\sigma$"
 AREA, GAP = r"relative contact area  $a_r$", r"mean gap  $u_g\,/\,h_\mathrm{std}$"
+RATIO = r"$a_r\,/\,a_r$(Persson)"
+DEVIATION = r"stress deviation  $\sigma_p\,/\,\Delta\sigma$"
 VIEWS = (
-    View("contact_area", "a_r", AREA, y_scale="log"),
-    View("contact_area_ratio", "a_r", r"$a_r\,/\,a_r$(Persson)", ratio=True),
-    View("stress_deviation", "sigma_p", r"stress deviation  $\sigma_p\,/\,\Delta\sigma$"),
-    View("mean_gap_log", "u_g", GAP),
-    View("mean_gap_tail", "u_g", GAP, x_scale="linear", y_scale="log"),
+    View("contact_area", "a_r", AREA, "Relative contact area over reduced pressure", y_scale="log"),
+    View(
+        "contact_area_ratio", "a_r", RATIO, "Contact area over that of Persson theory", ratio=True
+    ),
+    View(
+        "stress_deviation",
+        "sigma_p",
+        DEVIATION,
+        "Standard deviation of the stress over reduced pressure",
+    ),
+    View("mean_gap_log", "u_g", GAP, "Mean gap over the logarithm of the reduced pressure"),
+    View(
+        "mean_gap_tail",
+        "u_g",
+        GAP,
+        "Logarithm of the mean gap over the reduced pressure",
+        x_scale="linear",
+        y_scale="log",
+    ),
 )
+"""The figures over the pressure."""
 
 
 def draw_all(comparison: Comparison, folder: Path) -> list[Path]:
@@ -37,10 +54,10 @@ def draw_all(comparison: Comparison, folder: Path) -> list[Path]:
 
 def study_figures(comparison: Comparison, items: list[Item]) -> dict[str, ColumnFigure]:
     """Every figure that the study has data for, by name; to be called inside `styled`."""
-    drawn = {view.name: _over_pressure(view, items) for view in VIEWS}
-    drawn |= distribution_figures(items)
-    drawn["stress_distribution_continuum"] = continuum_figure(comparison)
-    return {name: plot for name, plot in drawn.items() if plot is not None}
+    figures = {view.name: _over_pressure(view, items) for view in VIEWS}
+    figures |= distribution_figures(items)
+    figures["stress_distribution_continuum"] = continuum_figure(comparison)
+    return {name: plot for name, plot in figures.items() if plot is not None}
 
 
 def items_of(comparison: Comparison) -> list[Item]:

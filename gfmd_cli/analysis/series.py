@@ -25,6 +25,9 @@ class View:
     name: str
     column: str
     label: str
+    """Of the axis."""
+    meaning: str
+    """What the figure shows, as its caption."""
     x_scale: str = "log"
     y_scale: str = "linear"
     ratio: bool = False

@@ -53,11 +53,6 @@ class SurfaceSummary:
         """Whether lengths are in metres: rms heights of real surfaces are small."""
         return self.moments.height <= METRES
 
-    @property
-    def warnings(self) -> list[str]:
-        """Warnings about likely mistakes."""
-        return self.surface.warnings()
-
     def record(self) -> dict[str, Any]:
         """The summary as plain data in SI units."""
         grid = self.scene.grid
@@ -70,14 +65,14 @@ class SurfaceSummary:
             "h_std": self.moments.height,
             "gradient": self.moments.gradient,
             "curvature": self.moments.curvature,
-            "warnings": self.warnings,
+            "warnings": self.surface.warnings(),
         }
         if self.fit is not None:
             record |= {
                 "hurst": self.fit.hurst,
                 "hurst_error": self.fit.hurst_error,
-                "rolloff_wavelength": 2 * pi / self.fit.q_r if self.fit.q_r else None,
-                "cutoff_wavelength": 2 * pi / self.fit.q_s,
+                "rolloff_wavelength": self.fit.rolloff_wavelength,
+                "cutoff_wavelength": self.fit.cutoff_wavelength,
                 "scatter": self.fit.scatter,
             }
         return {key: plain(value) for key, value in record.items()}
@@ -146,7 +141,7 @@ def as_text(summary: SurfaceSummary) -> str:
     ]
     if grid.dimension == 2:
         lines.append(f"half-space: p* = 1 is p = {0.5 * measured.gradient:.5g} E_star")
-    lines += [f"warning: {warning}" for warning in summary.warnings]
+    lines += [f"warning: {warning}" for warning in summary.surface.warnings()]
     theories = {"spectrum": summary.scene}
     if summary.fit is not None:
         table = _table(record, grid.length)
@@ -155,7 +150,7 @@ def as_text(summary: SurfaceSummary) -> str:
         random = ["random surface with the fitted spectrum:", "", "[surface]"]
         random += [f"{key} = {json.dumps(value)}" for key, value in table.items()]
         lines += [
-            *_fit_lines(summary.fit, record, summary.copies, metres),
+            *_fit_lines(summary.fit, summary.copies, metres),
             *_predicted(theories, metres),
             *random,
         ]
@@ -177,17 +172,15 @@ def _predicted(scenes: dict[str, Scene], metres: str) -> list[str]:
     return lines
 
 
-def _fit_lines(
-    nearest: SelfAffineFit, record: dict[str, Any], copies: int, metres: str
-) -> list[str]:
+def _fit_lines(nearest: SelfAffineFit, copies: int, metres: str) -> list[str]:
     """The fit with warnings."""
+    wavelength, error = nearest.rolloff_wavelength, nearest.rolloff_error
     rolloff = "no roll-off within the cell"
-    if nearest.q_r:
-        error = record["rolloff_wavelength"] * nearest.q_r_error / nearest.q_r
-        rolloff = f"lambda_r = {record['rolloff_wavelength']:.3g} +- {error:.1g}{metres}"
+    if wavelength is not None:
+        rolloff = f"lambda_r = {wavelength:.3g} +- {error:.1g}{metres}"
     lines = [
         f"fitted spectrum: H = {nearest.hurst:.3f} +- {nearest.hurst_error:.3f}, {rolloff}, "
-        f"lambda_s = {record['cutoff_wavelength']:.3g}{metres} (scatter {nearest.scatter:.3g})"
+        f"lambda_s = {nearest.cutoff_wavelength:.3g}{metres} (scatter {nearest.scatter:.3g})"
     ]
     gaussian = float(copies**2)  # modes (+-q_x, +-q_y) of a mirrored map are alike
     if nearest.scatter > MAX_SCATTER * gaussian:

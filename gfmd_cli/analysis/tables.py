@@ -1,7 +1,7 @@
 """The tables of a study: their columns, and the records that fill them."""
 
 from collections import Counter
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -75,6 +75,7 @@ EINSTEIN = (
         for column in _beside_theory(TableColumn(name, name), f"{name}_einstein", "closed form")
     ),
 )
+EINSTEIN_CAPTION = "Comparison with the closed form for n = 0 and Gaussian heights."
 CONTINUUM = (
     P_STAR,
     POINTS,
@@ -144,7 +145,7 @@ def _columns_of(observable: Observable) -> list[TableColumn]:
     """An observable in reduced and in SI units; the columns that no task has are left out."""
     heading, name, unit = observable.heading, observable.column.name, observable.unit
     if observable.is_flag:
-        return [TableColumn(heading, _flag(name), optional=True)]
+        return [TableColumn(heading, partial(_flag, name=name), optional=True)]
     number_format = "d" if observable.column.kind is int else TableColumn.format
     if unit is None:
         return [TableColumn(heading, name, number_format, optional=True)]
@@ -154,8 +155,8 @@ def _columns_of(observable: Observable) -> list[TableColumn]:
     ]
 
 
-def _flag(name: str) -> Callable[[Record], bool | None]:
-    return lambda record: bool(record[name]) if known(record[name]) else None
+def _flag(record: Record, name: str) -> bool | None:
+    return bool(record[name]) if known(record[name]) else None
 
 
 IN_TABLE = tuple(observable for observable in OBSERVABLES if observable.heading)
@@ -174,7 +175,7 @@ def study_tables(comparison: Comparison) -> list[Table]:
     curves = [(curve_title(curve), curve) for curve in comparison.curves]
     tables = [
         comparison_table(curves),
-        einstein_table(curves),
+        over_pressure(EINSTEIN, EINSTEIN_CAPTION, curves, ["a_r_einstein"]),
         continuum_table(curves),
         seeds_table(comparison),
         true_contact_table(curves),
@@ -208,12 +209,6 @@ def over_pressure(
     ]
     rows = [record for group in groups for record in group.records]
     return Table(caption, shown(columns, rows), groups)
-
-
-def einstein_table(curves: TitledCurves) -> Table:
-    """Springs (n = 0) beside the closed form."""
-    caption = "Comparison with the closed form for n = 0 and Gaussian heights."
-    return over_pressure(EINSTEIN, caption, curves, ["a_r_einstein"])
 
 
 def continuum_table(curves: TitledCurves) -> Table:

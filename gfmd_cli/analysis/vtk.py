@@ -14,13 +14,8 @@ from gfmd_cli.grid.arrays import Field
 from gfmd_cli.study.columns import FIELDS
 from gfmd_cli.study.reading import open_study
 
-NAMES = {
-    "height": "height",
-    "u": "displacement",
-    "sigma": "stress",
-    "contact_pressure": "contact_pressure",
-}
-"""Fields of a study with the names that their arrays have here."""
+NAMES = {"u": "displacement", "sigma": "stress"}
+"""Names of arrays that differ from those of the fields of a study."""
 
 
 def write_image(study: Path, task: int | None, target: Path) -> None:
@@ -72,7 +67,8 @@ def _head(fields: dict[str, Field], sides: list[float], first: float) -> str:
     arrays, offset = "", 0
     for name, values in fields.items():
         arrays += (
-            f'<DataArray type="Float64" Name="{NAMES[name]}" format="appended" offset="{offset}">'
+            f'<DataArray type="Float64" Name="{NAMES.get(name, name)}" '
+            f'format="appended" offset="{offset}">'
             f'<InformationKey name="UNITS_LABEL" location="vtkDataArray">{columns[name].units}'
             "</InformationKey></DataArray>\n"
         )

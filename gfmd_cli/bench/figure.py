@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from gfmd_cli.analysis.curve_styles import MARKERS, CurveStyle, colours, literal
+from gfmd_cli.analysis.curve_styles import CurveStyle, distinct_styles, literal
 from gfmd_cli.analysis.plotting import SMALL, WIDTH, LegendFigure, log_scale, styled
 from gfmd_cli.analysis.selection import grouped
 from gfmd_cli.analysis.units import contact_title
@@ -43,11 +43,8 @@ def draw_bench(traces: list[Trace], folder: Path) -> list[Path]:
 def bench_figures(traces: list[Trace]) -> dict[str, LegendFigure]:
     """The figures by name; to be called inside `styled`."""
     names = solver_names(traces)
-    solvers = list(dict.fromkeys(names))  # each has its colour and symbol in all contacts
-    styles = {
-        name: CurveStyle(colour, MARKERS[i % len(MARKERS)], name)
-        for i, (name, colour) in enumerate(zip(solvers, colours(len(solvers)), strict=True))
-    }
+    solvers = list(dict.fromkeys(names))
+    styles = {style.label: style for style in distinct_styles(solvers)}  # the same in all contacts
     pairs = ((trace, styles[name]) for trace, name in zip(traces, names, strict=True))
     rows = list(grouped(pairs, lambda pair: contact_of(pair[0])).values())
     if len(rows) <= MAX_CONTACTS:
@@ -111,6 +108,6 @@ def _title(trace: Trace) -> str:
 
 
 def _slug(text: str) -> str:
-    """A file name that tells."""
+    """A file name from a title."""
     plain = text.replace("*", "").replace(" = ", "=")
     return re.sub(r"[^\w.=]+", "-", plain).strip("-")[:MAX_LABEL]

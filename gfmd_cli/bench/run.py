@@ -91,7 +91,7 @@ def _distance(observables: Observables, reference: Observables, name: str) -> fl
 
 
 def solve_reference(contact: Contact) -> tuple[Observables, float]:
-    """What a solution as exact as double precision allows has to show, and its residual."""
+    """Observables and residual of a solution as exact as double precision allows."""
     solution = solve_contact(contact, REFERENCE)
     residual = contact.recompute(solution.u, solution.sigma)
     return observe(contact, solution.u, solution.sigma), residual

@@ -86,7 +86,7 @@ def surface(
     else:
         show(summary_table(summaries, names).as_text())
         for summary, name in zip(summaries, names, strict=True):
-            for warning in summary.warnings:
+            for warning in summary.surface.warnings():
                 tell(f"gfmd: {name}: {warning}")
     if figure is not None:
         from gfmd_cli.analysis.plotting import styled

@@ -3,13 +3,16 @@
 import json
 import os
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING
 
 import click
 
 from gfmd_cli.cli.messages import show, tell
 from gfmd_cli.cli.options import FILE
 from gfmd_cli.errors import InputError
+
+if TYPE_CHECKING:
+    from gfmd_cli.analysis.compare import Theory
 
 
 @click.command()
@@ -23,12 +26,7 @@ from gfmd_cli.errors import InputError
     show_default=True,
     help="Theory of the mean gap; see docs/theory.md.",
 )
-def analyze(
-    study: Path,
-    as_json: bool,
-    figures: Path | None,
-    theory: Literal["paper", "fitted", "coarse-grained"],
-) -> None:
+def analyze(study: Path, as_json: bool, figures: Path | None, theory: "Theory") -> None:
     """Compare a study with Persson theory.
 
     The tables contain the results beside the theory and, if there are any, continuum values, means

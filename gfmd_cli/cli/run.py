@@ -81,7 +81,7 @@ def run(
     dry_run: bool,
     max_hours: float | None,
     quiet: bool,
-    **given: Any,
+    **run_options: Any,
 ) -> None:
     """Run all tasks that the study does not contain yet.
 
@@ -102,7 +102,7 @@ def run(
         from gfmd_cli.spec.parse import read_spec
         from gfmd_cli.study.run import RunOptions
 
-        options = RunOptions(ranks=ranks, max_seconds=max_seconds, **given)
+        options = RunOptions(ranks=ranks, max_seconds=max_seconds, **run_options)
         if options.overwrite and output is not None and len(specs) > 1:
             raise InputError(
                 "--overwrite: not with -o and several specs; each would start a new study"

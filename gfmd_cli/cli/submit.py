@@ -44,7 +44,7 @@ def submit(
     missing: bool,
     dry_run: bool,
     sbatch_options: tuple[str, ...],
-    **given: Any,
+    **slurm_options: Any,
 ) -> None:
     """Run a study as an array job of Slurm.
 
@@ -73,7 +73,9 @@ def submit(
         shards=shards,
         missing=missing,
         named_options={
-            name.replace("_", "-"): str(value) for name, value in given.items() if value is not None
+            name.replace("_", "-"): str(value)
+            for name, value in slurm_options.items()
+            if value is not None
         },
         sbatch_options=sbatch_options,
     )

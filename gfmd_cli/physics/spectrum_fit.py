@@ -61,6 +61,21 @@ class SelfAffineFit:
     q_1: float
     """Wavenumber of the longest wave [1/m]."""
 
+    @property
+    def rolloff_wavelength(self) -> float | None:
+        """2 pi / q_r [m]; None if the spectrum has no roll-off."""
+        return 2 * np.pi / self.q_r if self.q_r else None
+
+    @property
+    def rolloff_error(self) -> float | None:
+        """Standard error of the roll-off wavelength [m]."""
+        return 2 * np.pi / self.q_r**2 * self.q_r_error if self.q_r else None
+
+    @property
+    def cutoff_wavelength(self) -> float:
+        """2 pi / q_s [m]."""
+        return 2 * np.pi / self.q_s
+
     def density(self, q: Field) -> Field:
         """C(q) of one mode [m^2], zero beyond q_s. Paper Eq. (3)."""
         x = (self.hurst, np.log(self.q_r)) if self.q_r else (self.hurst,)

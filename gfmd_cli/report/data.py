@@ -76,7 +76,7 @@ class ReportData:
 
     @property
     def prefix(self) -> str:
-        """What the names of figures begin with that two studies have of their own."""
+        """Prefix of the names of figures that each of two studies has."""
         return f"{self.letter}-" if self.letter else ""
 
     @property
@@ -97,8 +97,8 @@ class ReportData:
         return data if isinstance(data, dict) else {}
 
 
-def read_report_data(study: Path, letter: str = "") -> ReportData:
-    """Read a study. Raises InputError, StudyError."""
+def read_report_data(study: Path, letter: str) -> ReportData:
+    """Read a study; `letter` as in `ReportData`. Raises InputError, StudyError."""
     with open_study(study) as file:
         comparison, rows, attributes = compare_open(file, study), file.rows, file.attributes
     curves = [replace(curve, study=letter) for curve in comparison.curves]

@@ -5,6 +5,7 @@ against error; error bars and optional observables, which are tables alone.
 """
 
 from gfmd_cli.analysis.distribution_figure import Density, densities
+from gfmd_cli.analysis.figures import VIEWS
 from gfmd_cli.analysis.table import Group, Table, TableColumn, product, ratio
 from gfmd_cli.analysis.tables import (
     CONTACT_AREA,
@@ -30,14 +31,6 @@ EXPLANATION = (
 )
 LINES = " Lines: Persson theory of the same spectrum."
 BEHIND = "Table behind the figures"
-FIGURES = {
-    "contact_area": "Relative contact area over reduced pressure",
-    "contact_area_ratio": "Contact area over that of Persson theory",
-    "mean_gap_log": "Mean gap over the logarithm of the reduced pressure",
-    "mean_gap_tail": "Logarithm of the mean gap over the reduced pressure",
-    "stress_deviation": "Standard deviation of the stress over reduced pressure",
-}
-"""Figures over the pressure by name, with what they show."""
 DISTRIBUTIONS = {
     "stress_distribution": (
         "Distribution of the stress over logarithmic stress, elastomers side by side",
@@ -54,7 +47,7 @@ DISTRIBUTIONS = {
         "law of the stress at the edge of a contact.",
     ),
 }
-"""Label and caption by the name of the figure; {lines}, {thin}: what says which is theory."""
+"""Label and caption by the name of the figure; {lines}, {thin}: the legend of the theory."""
 BINS_BEHIND = {
     "stress_distribution": "Table: elastomers at about one pressure",
     "stress_distribution_pressures": "Table: one elastomer at several pressures",
@@ -83,7 +76,7 @@ def contact_area(data: ReportData) -> Section:
     return Section(
         "Contact area",
         notes=[EXPLANATION + lines],
-        drawings=_drawings(data, "contact_area", "contact_area_ratio"),
+        drawings=_drawings(data, "a_r"),
         disclosed={
             BEHIND: over_pressure(CONTACT_AREA, caption, data.curves),
             "Table: Persson theory with the stress over the true contact": true_contact_table(
@@ -95,30 +88,28 @@ def contact_area(data: ReportData) -> Section:
 
 def mean_gap(data: ReportData) -> Section:
     """Mean gap."""
-    caption = "Mean gap u_g between the surfaces, over the whole interface."
-    return Section(
-        "Mean gap",
-        drawings=_drawings(data, "mean_gap_log", "mean_gap_tail"),
-        disclosed={BEHIND: over_pressure(MEAN_GAP, caption, data.curves)},
+    table = over_pressure(
+        MEAN_GAP, "Mean gap u_g between the surfaces, over the whole interface.", data.curves
     )
+    return Section("Mean gap", drawings=_drawings(data, "u_g"), disclosed={BEHIND: table})
 
 
 def stress_deviation(data: ReportData) -> Section:
     """Standard deviation of the stress."""
     caption = "Standard deviation sigma_p of the stress over the whole interface."
-    return Section(
-        "Stress deviation",
-        drawings=_drawings(data, "stress_deviation"),
-        disclosed={BEHIND: over_pressure(STRESS_DEVIATION, caption, data.curves)},
-    )
+    table = over_pressure(STRESS_DEVIATION, caption, data.curves)
+    drawings = _drawings(data, "sigma_p")
+    return Section("Stress deviation", drawings=drawings, disclosed={BEHIND: table})
 
 
-def _drawings(data: ReportData, *names: str) -> list[Drawing]:
-    """The figures over the pressure of these names that the study has data for."""
+def _drawings(data: ReportData, column: str) -> list[Drawing]:
+    """The figures of a column over the pressure that the study has data for."""
     return [
-        drawing(figure, name, f"{FIGURES[name]}: {', '.join(figure.legend)}", f"{FIGURES[name]}.")
-        for name in names
-        if (figure := data.figures.get(name))
+        drawing(
+            figure, view.name, f"{view.meaning}: {', '.join(figure.legend)}", f"{view.meaning}."
+        )
+        for view in VIEWS
+        if view.column == column and (figure := data.figures.get(view.name))
     ]
 
 

@@ -91,7 +91,7 @@ def _points(layer: PlotLayer, names: tuple[str, str]) -> dict[str, Any]:
 
 
 def _hover(layer: PlotLayer, place: int, names: tuple[str, str], errors: Errors) -> str:
-    """What a point says when it is pointed at: curve, values, and what else is known of it."""
+    """Text that appears at a point under the pointer: curve, values and details."""
     x, y = float(layer.x[place]), float(layer.y[place])
     error = math.nan if errors is None else float(max(side[place] for side in errors))
     value_text = plus_minus(y, error).replace("+-", "±") if known(error) else f"{y:.4g}"

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from gfmd_cli.analysis.compare import Row
+from gfmd_cli.analysis.curve_styles import rgb
 from gfmd_cli.analysis.plotting import WIDTH, ColumnFigure, LegendFigure, shades
 from gfmd_cli.analysis.selection import evenly, grouped
 from gfmd_cli.analysis.table import Group, Table, TableColumn
@@ -32,12 +33,12 @@ MAX_CONTACTS, MAX_CURVES = 12, 3  # contacts that are shown, of at most so many 
 SIDE = 256  # pixels of a map at the most
 MIN_ASPECT, MAX_ASPECT = 0.35, 1.2  # height of a figure over its width, for oblong cells; a choice
 NOISE = 1e-3  # of the nominal pressure; where contact is not known, less stress is none
-ROWS = 256  # pixels' worth of rows that are held at a time
+ROWS = 256  # rows of pixels that are in memory at a time
 TOUCHING = "#0077bb"
 COLOURS, FAINTEST = "viridis", 0.3
-"""Colours of stress and gap, and how far along them the least is: told from none by LEGIBLE."""
+"""Colour map of stress and gap, and where it begins: with a contrast of LEGIBLE to NONE."""
 NONE, BEYOND = "black", "#cc3311"
-PERCENTILE = 99  # of the stress in contact, and of the gap beside it, that the colours reach to
+PERCENTILE = 99  # of the stress in contact and of the gap elsewhere: the end of the colour scale
 STORED = ("fields", "cross_sections")
 CAPTION = "The values are in /fields/TASK and /cross_sections/TASK of the study file."
 SHOWN = (
@@ -51,7 +52,7 @@ SHOWN = (
 
 
 def maps(data: ReportData) -> Section:
-    """Where the surfaces touch, and how hard."""
+    """Maps of contact, stress and gap, and cross-sections."""
     with open_study(data.comparison.path) as study:
         tasks = {task for group in STORED for task in study.tasks_with(group)}
         rows_with_fields = [row for row in data.solved if row["task"] in tasks]
@@ -108,10 +109,10 @@ def _contact_maps(study: StudyFile, row: Row, prefix: str) -> dict[str, Any]:
 
 def _map_figures(study: StudyFile, row: Row) -> list[tuple[str, ColumnFigure, str]]:
     """Maps of contact, stress and gap, as far as the fields for them are stored."""
-    shape = study.shapes("fields", row["task"]).get("sigma", ())
-    if len(shape) != 2:
+    sigma = study.datasets("fields", row["task"]).get("sigma")
+    if sigma is None or sigma.ndim != 2:
         return []
-    pixels = _thumbnails(study, row["task"], -(-max(shape) // SIDE))
+    pixels = _thumbnails(study, row["task"], -(-max(sigma.shape) // SIDE))
     stress, touching = pixels["stress"], pixels.get("contact")
     red = f"red: the {100 - PERCENTILE} % of the {{}} above the scale"
     what = f"Stress; black: none, {red.format('contact')}"
@@ -139,20 +140,19 @@ def _thumbnails(study: StudyFile, task: int, step: int) -> dict[str, Field]:
 
 
 def _means(block: Field, step: int) -> Field:
-    """Over squares of step x step points, smaller ones at the end."""
+    """Means over squares of step x step points; the last ones of a side may be smaller."""
     return block_sums(block, step) / block_sums(np.ones_like(block), step)
 
 
 def _contact_figure(touching: Field, row: Row) -> ColumnFigure:
     plot, extent = _cell(row)
-    colour = np.array(list(bytes.fromhex(TOUCHING[1:]))) / 255
-    image = np.dstack([np.broadcast_to(colour, (*touching.shape, 3)), touching])
+    image = np.dstack([np.broadcast_to(rgb(TOUCHING), (*touching.shape, 3)), touching])
     plot.axes.imshow(image, origin="lower", extent=extent, interpolation="none")
     return plot
 
 
 def _scaled_figure(values: Field, shown: Mask, row: Row, scale: Scale, label: str) -> ColumnFigure:
-    """Colours up to what but a few of the values shown exceed, else peaks leave all dark."""
+    """Values in colours up to a percentile: a scale up to the peaks would leave the rest dark."""
     plot, extent = _cell(row)
     top = float(np.percentile(values[shown], PERCENTILE)) if np.any(shown) else 0.0
     divisor, label = scale.axis(row, top, label)

@@ -73,7 +73,9 @@ def report(study: Path, bench: Path | None = None, other: Path | None = None) ->
 
 
 def _top(data: ReportData) -> dict[str, Any]:
-    """What stands above the sections."""
+    """Values of the part of the page above the sections."""
+    csv = csv_text(data.solved)
+    csv = csv if len(csv) < MAX_CSV else ""
     return {
         "title": data.title,
         "headline": headline(data),
@@ -81,14 +83,8 @@ def _top(data: ReportData) -> dict[str, Any]:
         "success": success(data),
         "key_numbers": key_numbers(data),
         "csv_name": f"{data.comparison.path.stem}.csv",
-        "csv_address": _csv_address(data),
+        "csv_address": f"data:text/csv;charset=utf-8,{quote(csv, UNQUOTED)}" if csv else "",
     }
-
-
-def _csv_address(data: ReportData) -> str:
-    """The whole table of a study as the address of a link; empty for a large one."""
-    text = csv_text(data.solved)
-    return f"data:text/csv;charset=utf-8,{quote(text, UNQUOTED)}" if len(text) < MAX_CSV else ""
 
 
 def _sections(studies: list[ReportData], traces: list[Trace]) -> Iterator[Section]:

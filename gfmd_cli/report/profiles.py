@@ -20,7 +20,7 @@ LINES = {
     "u": ("elastomer u", {"color": "#0077bb", "lw": 0.9}),
 }
 STRESS = "#cc3311"
-ROWS = 256  # of the fields that are held at a time
+ROWS = 256  # of the fields that are in memory at a time
 
 
 class Scale(NamedTuple):
@@ -67,7 +67,7 @@ def read_profile(study: StudyFile, row: Row) -> Profile | None:
     which can miss all contacts, only where that alone is stored.
     """
     line = not plane(row)
-    if not line and LINES.keys() | {"sigma"} <= study.shapes("fields", row["task"]).keys():
+    if not line and LINES.keys() | {"sigma"} <= study.datasets("fields", row["task"]).keys():
         return _most_loaded(study, row)
     values = study.arrays("cross_sections", row["task"])
     if line and not values:
@@ -88,7 +88,7 @@ def _most_loaded(study: StudyFile, row: Row) -> Profile:
         [np.nan_to_num(np.maximum(block["sigma"], 0.0)).sum(axis=1) for block in blocks]
     )
     y = int(np.argmax(loads))
-    values = study.grid_row("fields", row["task"], y)
+    values = {name: data[y] for name, data in study.datasets("fields", row["task"]).items()}
     size = values["sigma"].size
     position = (np.arange(size) / size + row["x_first"]) * float(row["length"])
     place = f" through the row that carries most load (y = {y / loads.size:.2f} of the side)"

@@ -54,7 +54,7 @@ def _names_of(names: list[str], what: str) -> str:
 
 
 def success(data: ReportData) -> str:
-    """That every contact is solved to its tolerance; empty where some is not."""
+    """Statement that all contacts have converged; empty if some have not."""
     if data.failed or data.missing:
         return ""
     total = len(data.rows)
@@ -158,7 +158,7 @@ def _column(rows: list[Row], name: str) -> list[float]:
 
 
 def warnings(data: ReportData) -> list[str]:
-    """What stands before any result: what failed, is doubtful or not resolved, the edges."""
+    """Warnings above the results: missing, doubtful and unresolved values, effects of edges."""
     unsolved = _unsolved(data)
     return [*unsolved, *warnings_in(data.solved), *_unresolved(data), *edge_warnings(data.solved)]
 

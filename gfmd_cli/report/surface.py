@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gfmd_cli.analysis.compare import Row
-from gfmd_cli.analysis.curve_styles import MARKERS, CurveStyle, colours, literal, shortened
+from gfmd_cli.analysis.curve_styles import distinct_styles, literal, shortened
 from gfmd_cli.analysis.plotting import ColumnFigure
 from gfmd_cli.analysis.surface_figure import height_figure
 from gfmd_cli.analysis.table import Group, Table, TableColumn
@@ -24,7 +24,6 @@ MAX_PICTURES = 4  # measured surfaces that are shown; a choice
 MISSING = " Grey: missing heights."
 BANDS_PER_DECADE = 10
 MAX_SURFACES = 8  # of the figure; more cannot be told apart
-LABEL = r"$C(q)$"
 
 
 def measured_surface(data: ReportData) -> Section:
@@ -113,10 +112,10 @@ def _fits(shown: list[Spectrum]) -> Table:
             "surface": curve.name,
             "hurst": fit.hurst,
             "hurst_error": fit.hurst_error,
-            "rolloff": 2 * np.pi / fit.q_r if fit.q_r else None,
-            "rolloff_error": 2 * np.pi / fit.q_r**2 * fit.q_r_error if fit.q_r else None,
+            "rolloff": fit.rolloff_wavelength,
+            "rolloff_error": fit.rolloff_error,
             "no_rolloff": "none within the cell",
-            "cutoff": 2 * np.pi / fit.q_s,
+            "cutoff": fit.cutoff_wavelength,
             "scatter": fit.scatter,
         }
         for curve in shown
@@ -195,15 +194,13 @@ def _edges(radius: Field, nyquist: float) -> Field:
 
 
 def _spectrum_figure(shown: list[Spectrum]) -> ColumnFigure:
-    power = {1: "3", 2: "4"}.get(shown[0].dimension)
-    plot = ColumnFigure(r"wavenumber  $q$ (m$^{-1}$)", rf"{LABEL} (m$^{power}$)")
-    names = map(literal, shortened([curve.name for curve in shown]))
-    for place, (curve, colour, name) in enumerate(
-        zip(shown, colours(len(shown)), names, strict=True)
-    ):
-        style = CurveStyle(colour, MARKERS[place % len(MARKERS)], name)
+    power = 2 + shown[0].dimension
+    plot = ColumnFigure(r"wavenumber  $q$ (m$^{-1}$)", rf"$C(q)$ (m$^{power}$)")
+    labels = [literal(name) for name in shortened([curve.name for curve in shown])]
+    for curve, style in zip(shown, distinct_styles(labels), strict=True):
         if curve.fit is not None:
-            plot.unnamed_line((name,), curve.q, curve.fitted, color=colour, lw=0.7)
+            line = {"color": style.colour, "lw": 0.7}
+            plot.unnamed_line((style.label,), curve.q, curve.fitted, **line)
         plot.points(style, curve.q, curve.density, np.full(curve.q.size, True))
     plot.scale("x", "log", np.concatenate([curve.q for curve in shown]))
     plot.scale("y", "log", np.concatenate([curve.density for curve in shown]))

@@ -3,6 +3,8 @@
 import colorsys
 import re
 
+from gfmd_cli.analysis.curve_styles import rgb
+
 PALETTE = {
     "paper": ("#ffffff", "#15181d"),
     "panel": ("#f4f5f7", "#1e2229"),
@@ -16,9 +18,9 @@ PALETTE = {
 """Light and dark by name: text has a contrast of at least 4.5 to paper and panel."""
 LIGHT, DARK = PALETTE["paper"]
 INK, PAPER = "#000000", "#ffffff"
-"""What figures are drawn with and on."""
+"""Ink and background of figures."""
 LEGIBLE = 3.0
-"""Contrast that WCAG 2 asks of what is no text."""
+"""Least contrast of graphics by WCAG 2."""
 USED = re.compile(r"var\(--c-([0-9a-f]{6})\)")
 
 
@@ -44,7 +46,7 @@ def variables(body: str) -> str:
 
 def toned(colour: str, paper: str) -> str:
     """The colour of the same hue that is light or dark enough to be seen on the paper."""
-    hue, lightness, saturation = colorsys.rgb_to_hls(*_rgb(colour))
+    hue, lightness, saturation = colorsys.rgb_to_hls(*rgb(colour))
     away = 1.0 if _luminance(paper) < 0.2 else 0.0
     for step in range(101):
         moved = lightness + (away - lightness) * step / 100
@@ -62,15 +64,9 @@ def contrast(one: str, other: str) -> float:
 
 def _luminance(colour: str) -> float:
     red, green, blue = (
-        part / 12.92 if part <= 0.04045 else ((part + 0.055) / 1.055) ** 2.4
-        for part in _rgb(colour)
+        part / 12.92 if part <= 0.04045 else ((part + 0.055) / 1.055) ** 2.4 for part in rgb(colour)
     )
     return 0.2126 * red + 0.7152 * green + 0.0722 * blue
-
-
-def _rgb(colour: str) -> tuple[float, float, float]:
-    red, green, blue = bytes.fromhex(colour[1:])
-    return red / 255, green / 255, blue / 255
 
 
 def hex_of(*parts: float) -> str:

@@ -144,7 +144,7 @@ class Check:
     def entries(
         self, name: str, given: Any, paired: Sequence[list[str]] = ()
     ) -> list[PlacedChoice]:
-        """The choices of one table, different ones, with their places in the paired lists."""
+        """The distinct choices of one table, with their places in the paired lists."""
         entries: list[PlacedChoice] = []
         for table in _alternatives(given) if name in REPEATED else [given]:
             if isinstance(table, dict):
@@ -178,7 +178,7 @@ class Check:
         return built
 
     def _sweeps(self, data: dict[str, Any]) -> list[SweepTable]:
-        """The groups of paired lists that are right."""
+        """The valid groups of paired lists."""
         sweeps: list[SweepTable] = []
         for sweep, _ in self.entries("sweep", data["sweep"]) if "sweep" in data else []:
             assert isinstance(sweep, SweepTable)
@@ -189,7 +189,7 @@ class Check:
         return sweeps
 
     def _compare(self, tables: dict[str, Any]) -> None:
-        """Note what is wrong with tables that are each right by itself."""
+        """Note contradictions between tables that are valid by themselves."""
         accuracy, load = tables["accuracy"], tables.get("load")
         auto = [grid for grid in tables.get("grid", []) if grid.points == "auto"]
         if auto and accuracy is None:

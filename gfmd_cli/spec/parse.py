@@ -58,11 +58,8 @@ def read_tables(data: dict[str, Any]) -> Spec:
     return Check("spec").spec(data)
 
 
-def read_scan(path: Path, overrides: tuple[str, ...] = ()) -> FileSurface:
-    """A height map as a surface, "surface.key=value" each.
-
-    Raises InputError.
-    """
+def read_scan(path: Path, overrides: tuple[str, ...]) -> FileSurface:
+    """The surface of a height map, with overrides "surface.key=value". Raises InputError."""
     data: dict[str, Any] = {"surface": {"kind": "file", "path": str(path)}}
     surfaces = _choices("surface", data, path, overrides)
     if set(data) != {"surface"} or len(surfaces) != 1:
@@ -76,9 +73,9 @@ def read_scan(path: Path, overrides: tuple[str, ...] = ()) -> FileSurface:
 
 
 def read_elastomer(default: dict[str, Any], overrides: tuple[str, ...]) -> LinearElastomer:
-    """The elastomer of a spec that is to be written, "elastomer.key=value" each.
+    """The elastomer of a spec that `gfmd init` writes, with overrides "elastomer.key=value".
 
-    A kind replaces the default; of a sweep it is the first. Raises InputError.
+    A given kind replaces the default; of several kinds the first is taken. Raises InputError.
     """
     other = any(override.partition("=")[0].strip() == "elastomer.kind" for override in overrides)
     data: dict[str, Any] = {"elastomer": {} if other else dict(default)}

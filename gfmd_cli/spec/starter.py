@@ -24,8 +24,8 @@ COMMENT = "as given on the command line"
 COLUMN = 27  # characters before a comment
 
 
-def starter(path: Path, overrides: tuple[str, ...] = ()) -> str:
-    """The spec of a random surface, for the file `path`, with "table.key=value" each.
+def starter(path: Path, overrides: tuple[str, ...]) -> str:
+    """The spec of a random surface, for the file `path`, with overrides "table.key=value".
 
     Raises InputError where the result is no valid spec.
     """
@@ -35,7 +35,7 @@ def starter(path: Path, overrides: tuple[str, ...] = ()) -> str:
 
 
 def starter_of_scan(
-    path: Path, surface: FileSurface, overrides: tuple[str, ...] = ()
+    path: Path, surface: FileSurface, overrides: tuple[str, ...]
 ) -> tuple[str, str]:
     """The spec of a measured surface, for the file `path`, and how the map is prepared.
 
@@ -98,7 +98,7 @@ def _json(value: Any) -> str:
 
 
 def with_keys(text: str, overrides: tuple[str, ...]) -> str:
-    """The text of a spec with "key.name=value" each, as `gfmd run --set` takes them.
+    """The text of a spec with overrides "key.name=value", as `gfmd run --set` takes them.
 
     A key takes the place of the line that has it, or of the line where it is commented out; keys
     that do not go with it are removed. A whole table takes the place of all its keys; the tables

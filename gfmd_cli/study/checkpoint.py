@@ -35,7 +35,7 @@ CHUNK = 2**26  # bytes that a checkpoint maps at a time
 
 
 class Saved(NamedTuple):
-    """Where a saved state stands."""
+    """Progress of a saved state."""
 
     points: int
     """Along x."""
@@ -57,7 +57,7 @@ class Checkpoint:
         self.pointer = folder / "pointer"
         self.mine = True
         self.slots: list[Slot] = []
-        """What the pointer says of the slots that are whole, the newer one first."""
+        """The intact slots as the pointer describes them, the newer one first."""
 
     @classmethod
     @contextmanager
@@ -81,7 +81,7 @@ class Checkpoint:
                     checkpoint.remove()
 
     def restore(self) -> str | None:
-        """Take up what is saved and whole; say what is not, and set aside what cannot be used."""
+        """Read the intact states; return a message on damaged ones, set aside if none is intact."""
         note = None
         with together(self.ranks):
             if self.mine and leads(self.ranks):
@@ -113,7 +113,7 @@ class Checkpoint:
         return f"{self.folder}: no state to resume; set aside as .bad, the task starts anew"
 
     def saved(self) -> Saved | None:
-        """Where the newest state stands, without loading it; None where there is none."""
+        """Progress of the newest saved state, without loading it; None without one."""
         with suppress(OSError):
             when = self.pointer.lstat().st_mtime
             for slot in read_pointer(self.pointer):
@@ -144,7 +144,7 @@ class Checkpoint:
         self.slots = slots
 
     def _write_part(self, name: str, grid: Grid, fields: dict[str, Field]) -> Part:
-        """Write the rows that this process holds; what the pointer says of them."""
+        """Write the rows that this process holds; return their entry in the pointer."""
         first = grid.own.start or 0
         file = name if grid.whole else f"{name}{first}"
         try:
@@ -206,7 +206,7 @@ class Checkpoint:
 
 
 def _write_slot(path: Path, fields: list[Field]) -> int:
-    """Lay the fields one after the other into a mapped file; return the checksum of it."""
+    """Write the fields one after the other into a mapped file; return its checksum."""
     total = offset = 0
     with open_regular(path, os.O_RDWR | os.O_CREAT) as file:
         file.truncate(sum(field.nbytes for field in fields))
@@ -219,7 +219,7 @@ def _write_slot(path: Path, fields: list[Field]) -> int:
                     memory[offset : offset + len(chunk)] = chunk
                     offset += len(chunk)
                     total = zlib.crc32(chunk, total)
-                    memory.madvise(mmap.MADV_DONTNEED)  # the file has it: memory need not
+                    memory.madvise(mmap.MADV_DONTNEED)  # the chunk is in the file
             memory.flush()
         os.fsync(file.fileno())
     return total

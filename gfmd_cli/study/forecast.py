@@ -10,10 +10,10 @@ from gfmd_cli.physics.indenters import RigidSurface
 from gfmd_cli.solvers.multigrid import ASPECT
 from gfmd_cli.spec.models import AccuracyTable, OutputTable
 
-STIFFNESS_FIELDS, SPECTRA_FIELDS = 3.0, 1.0
-"""Fields that output.stiffness and output.spectra add to those of the solver, by peak memory."""
+OUTPUT_FIELDS = {"stiffness": 3.0, "spectra": 1.0}
+"""Fields that keys of [output] add to those of the solver, by peak memory."""
 MIRRORED_FIELDS = {"true_contact": 2.0, "spectra": 11.0}
-"""Fields that keys of [output] add with a free boundary, by peak memory at 1536^2."""
+"""Those that they add besides with a free boundary, by peak memory at 1536^2."""
 STORED_FIELDS, ACCURACY_FIELDS = 1.0, 0.5
 """Fields that each name in output.fields, and [accuracy], add, by peak memory."""
 OBLONG_FIELDS, ODD_FIELDS = 4.5, 0.5
@@ -46,11 +46,11 @@ on the default surface, 1024^2, residual 1e-6; at 2048^2 the ratio is 0.7 to 1.4
 
 def fields_of_output(output: OutputTable, boundary: str) -> float:
     """Fields that [output] adds to those of the solver."""
-    fields = STIFFNESS_FIELDS if output.stiffness else 0.0
-    fields += SPECTRA_FIELDS if output.spectra else 0.0
+    keys = output.names()
+    fields = STORED_FIELDS * len(output.fields) + sum(OUTPUT_FIELDS.get(key, 0.0) for key in keys)
     if boundary == "free":
-        fields += sum(MIRRORED_FIELDS.get(key, 0.0) for key in output.names())
-    return fields + STORED_FIELDS * len(output.fields)
+        fields += sum(MIRRORED_FIELDS.get(key, 0.0) for key in keys)
+    return fields
 
 
 def fields_of_levels(shape: tuple[int, int], sides: tuple[float, ...]) -> float:

@@ -61,6 +61,9 @@ def measured(task: Task, solved: Solved) -> Row:
     """The columns of a solved contact that need no key of [output], without the time."""
     scene, contact, solution = solved.scene, solved.contact, solved.solution
     u, sigma = solution.u, solution.sigma
+    pressure = contact.pressure * scene.delta_sigma
+    if task.quantity == "pressure":  # exactly as prescribed, so that contacts can be grouped by it
+        pressure = task.load
     return {
         **asdict(solved.observables),
         "points": scene.grid.points,
@@ -70,7 +73,7 @@ def measured(task: Task, solved: Solved) -> Row:
         "solver": solution.solver,
         "transforms": solution.transforms,
         "status": solution.status,
-        "pressure": _pressure(task, solved),
+        "pressure": pressure,
         "delta_sigma": scene.delta_sigma,
         "h_std": scene.h_std,
         "mean_height": scene.mean_height,
@@ -81,13 +84,6 @@ def measured(task: Task, solved: Solved) -> Row:
         "tolerance": task.solver.tolerance,
         **error_columns(solved),
     }
-
-
-def _pressure(task: Task, solved: Solved) -> float:
-    """The nominal pressure [Pa]: as prescribed, so that contacts can be grouped by it."""
-    if task.quantity == "pressure":
-        return task.load
-    return solved.contact.pressure * solved.scene.delta_sigma
 
 
 def error_columns(solved: Solved) -> Row:

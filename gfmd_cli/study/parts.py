@@ -34,10 +34,8 @@ def check_own(parts: Path) -> None:
     if parts.is_symlink() or parts.is_file():
         raise SpaceError(f"{parts}: not a folder; move it away or choose another name (-o)")
     for path in _listed(parts):
-        is_folder = path.is_dir() and not path.is_symlink()
-        if not (OWN_FOLDERS if is_folder else OWN_FILES).fullmatch(path.name) and not (
-            path.suffix == ".bad"  # a folder that was in the place of a file
-        ):
+        own = OWN_FOLDERS if _is_folder(path) else OWN_FILES
+        if not own.fullmatch(path.name) and path.suffix != ".bad":  # a folder set aside
             raise InputError(
                 f"{parts}: needed for unfinished work, but holds {path.name!r}, which is not "
                 "gfmd's; move it away or take another name (-o)"
@@ -51,10 +49,10 @@ def remove_parts(parts: Path) -> None:
     can take `collecting` can then take both, and delete what it made in the meantime.
     """
     for path in _listed(parts):
-        is_folder = path.is_dir() and not path.is_symlink()
-        if is_folder and OWN_FOLDERS.fullmatch(path.name):
-            _delete(IN_CHECKPOINT, path)
-        elif not is_folder and path.name not in LOCKS and OWN_FILES.fullmatch(path.name):
+        if _is_folder(path):
+            if OWN_FOLDERS.fullmatch(path.name):
+                _delete_checkpoint(path)
+        elif path.name not in LOCKS and OWN_FILES.fullmatch(path.name):
             path.unlink(missing_ok=True)
     for name in LOCKS:
         (parts / name).unlink(missing_ok=True)
@@ -70,10 +68,15 @@ def _listed(folder: Path) -> list[Path]:
         return []
 
 
-def _delete(own: re.Pattern[str], folder: Path) -> None:
-    """Delete files by name, then the folder where it is empty."""
+def _is_folder(path: Path) -> bool:
+    """Whether a path is a folder, not a link to one."""
+    return path.is_dir() and not path.is_symlink()
+
+
+def _delete_checkpoint(folder: Path) -> None:
+    """Delete the files of a checkpoint, then the folder if it is empty."""
     for path in _listed(folder):
-        if own.fullmatch(path.name):
+        if IN_CHECKPOINT.fullmatch(path.name):
             with suppress(OSError):
                 path.unlink()
     with suppress(OSError):

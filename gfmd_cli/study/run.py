@@ -1,4 +1,4 @@
-"""Run a spec: what is missing is solved, task by task, on one or more processes."""
+"""Run a spec: solve the tasks that have no result yet, on one or more processes."""
 
 from collections import Counter
 from collections.abc import Iterator
@@ -60,7 +60,7 @@ class RunOptions:
 
 
 def run_study(
-    spec: Spec, text: str, path: Path, report: Report, options: RunOptions | None = None
+    spec: Spec, text: str, path: Path, report: Report, options: RunOptions
 ) -> Counter[Status]:
     """Solve the tasks of this shard that the study does not hold yet, and collect all records.
 
@@ -78,7 +78,6 @@ def run_study(
     signal or the time given, when all states are saved, and where tasks are left whose workers
     were killed.
     """
-    options = options or RunOptions()
     ranks = options.ranks
     forget_files()
     forget_scene()

@@ -133,16 +133,16 @@ class Study:
         while target.exists() or Study(target).parts.exists():
             target = self.path.with_name(f"{self.path.stem}.{number}{self.path.suffix}")
             number += 1
-        moved = []
+        new_paths = []
         if self.parts.exists():
             check_own(self.parts)
             with locked(self.parts / "in-use", wait=False) as alone:
                 if not alone:
                     raise InputError(f"{self.path}: another run works on this study; wait for it")
-                moved.append(_renamed(self.parts, Study(target).parts))
+                new_paths.append(_renamed(self.parts, Study(target).parts))
         if self.path.exists():
-            moved.append(_renamed(self.path, target))
-        return moved
+            new_paths.append(_renamed(self.path, target))
+        return new_paths
 
     def records(self) -> tuple[dict[Path, Entry], dict[Path, StudyError]]:
         """The records that are not collected yet, and what is wrong with the damaged ones."""

@@ -67,12 +67,12 @@ class Clock:
     def with_time_left(self, report: Report) -> Report:
         """A report that also receives the number of remaining tasks and the remaining time."""
 
-        def tell(progress: Progress) -> None:
+        def report_with_time(progress: Progress) -> None:
             self.update(progress)
             left = len(self.waiting) + len(self.running)
             report(progress._replace(tasks_left=left, seconds_left=self.left()))
 
-        return tell
+        return report_with_time
 
     def update(self, progress: Progress) -> None:
         """Update the estimate by one progress event of a task."""
