@@ -6,7 +6,7 @@ are never stored padded, so that the memory is that of a field padded along x al
 share a field exchange no zero rows either.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from functools import cached_property, partial
 from itertools import pairwise
@@ -21,8 +21,6 @@ from gfmd_cli.grid.arrays import Field, Modes
 from gfmd_cli.grid.ranks import Ranks
 from gfmd_cli.grid.shared_transforms import (
     Execute,
-    Pairs,
-    Plan,
     along_columns,
     along_rows,
     in_turn,
@@ -32,7 +30,6 @@ from gfmd_cli.grid.transposition import Span, Transposition, column_spans
 
 BLOCK = 2**14  # coefficients of a block of columns: 256 KiB, in the cache of a core
 NARROWEST = 8  # columns of a block; four make a line of the cache
-PLANNING = 30.0  # seconds at most to look for a plan
 
 
 def padded_shape(shape: tuple[int, ...], factor: float) -> tuple[int, ...]:
@@ -169,7 +166,7 @@ class PaddedTransform:
         values = lines.view(self.real)[:, : self.padded_columns]
         edges = np.linspace(0, len(lines), self.threads + 1).astype(int)
         parts = [(int(a), int(b)) for a, b in pairwise(edges) if a < b]
-        there, back = _planned(partial(along_rows, values, lines, parts))
+        there, back = plans.planned(partial(along_rows, values, lines, parts))
         return lines, values, in_turn(self.pool, there), in_turn(self.pool, back)
 
     def _empty_lines(self) -> Modes:
@@ -183,19 +180,13 @@ class PaddedTransform:
         for _ in range(self.threads):
             block = self._empty((self.padded_rows, self.width))
             block[...] = 0.0
-            (forward,), (backward,) = _planned(partial(along_columns, block, 1))
+            (forward,), (backward,) = plans.planned(partial(along_columns, block, 1))
             blocks.append((block, forward, backward))
         return blocks
 
     def _empty(self, shape: tuple[int, ...]) -> Modes:
         kind = np.result_type(self.real, np.complex64)
         return pyfftw.empty_aligned(shape, dtype=kind)
-
-
-def _planned(make: Callable[[Plan], Pairs]) -> Pairs:
-    """Transforms and their inverses, without 1/size."""
-    limit = {"planning_timelimit": PLANNING}
-    return plans.planned(lambda flags: make(partial(pyfftw.FFTW, flags=flags, **limit)))
 
 
 class DistributedPaddedTransform(PaddedTransform):

@@ -6,7 +6,7 @@ other. Every process computes smaller grids as a whole, with identical results.
 """
 
 from dataclasses import dataclass, fields
-from functools import cached_property, partial
+from functools import cached_property
 from itertools import pairwise
 from typing import Any, Literal
 
@@ -16,7 +16,7 @@ import pyfftw
 from gfmd_cli.grid import plans
 from gfmd_cli.grid.arrays import Field, Modes
 from gfmd_cli.grid.convolution import DistributedPaddedTransform, padded_shape
-from gfmd_cli.grid.fft_grid import PLANNING, Grid, Shape
+from gfmd_cli.grid.fft_grid import Grid, Shape
 from gfmd_cli.grid.halo import HALO_ROWS, DistributedColumns, DistributedRows, is_distributable
 from gfmd_cli.grid.ranks import Ranks, leads
 from gfmd_cli.grid.rows import LocalRows
@@ -148,15 +148,12 @@ class DistributedGrid(Grid):
         spare = self._memory[1].view(work.dtype)
         lines = self._lines()
         real = lines.view(self.real)[:, : self.points]
-
         parts, pool = self.rows.parts, self.rows.pool
 
-        def plan(flags: tuple[str, ...]) -> tuple[Pairs, Pairs]:
-            limit = PLANNING[0] + PLANNING[1] * real.size
-            fftw = partial(pyfftw.FFTW, flags=flags, planning_timelimit=limit)
+        def make(fftw: plans.Plan) -> tuple[Pairs, Pairs]:
             return along_rows(real, lines, parts, fftw), along_columns(work, len(parts), fftw)
 
-        (along, back_along), (across, back_across) = plans.planned(plan)
+        (along, back_along), (across, back_across) = plans.planned(make, real.size)
 
         def forward() -> None:
             side_by_side(pool, along)

@@ -17,13 +17,12 @@ from gfmd_cli.grid.arrays import Field, Modes
 from gfmd_cli.grid.convolution import PaddedTransform, padded_shape
 from gfmd_cli.grid.pixels import average_along_x, average_rows, covered_rows
 from gfmd_cli.grid.rows import LocalRows
-from gfmd_cli.grid.shared_transforms import Execute, Pair, in_place
+from gfmd_cli.grid.shared_transforms import Execute, in_place
 from gfmd_cli.grid.transposition import Span
 
 T = TypeVar("T")
 ALL = slice(None)
 THREADED = 512  # points per side from which a second thread pays
-PLANNING = (30.0, 1e-6)  # seconds at most to look for a plan, at all and per grid point
 Shape = tuple[int, ...]
 """Numbers of points along the axes of a field, (y, x), or (x,) of a line."""
 
@@ -196,14 +195,7 @@ class Grid:
         """
         work = self._memory[0][: prod(self.spectral_shape)].reshape(self.spectral_shape)
         real = work.view(self.real)[..., : self.points]
-
-        def plan(flags: tuple[str, ...]) -> Pair:
-            limit = PLANNING[0] + PLANNING[1] * self.size
-            fftw = partial(pyfftw.FFTW, flags=flags, planning_timelimit=limit)
-            return in_place(real, work, self.rows, fftw)
-
-        forward, backward = plans.planned(plan)
-        return work, forward, backward
+        return work, *plans.planned(partial(in_place, real, work, self.rows), self.size)
 
     @property
     def work(self) -> Modes:

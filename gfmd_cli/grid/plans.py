@@ -13,10 +13,10 @@ import platform
 import re
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from threading import Lock
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import pyfftw
 
@@ -27,8 +27,11 @@ from gfmd_cli.files.locks import locked
 from gfmd_cli.files.regular import read_regular
 
 T = TypeVar("T")
+Plan = Callable[..., Any]
+"""Makes a plan on one thread from source, target, axes and direction."""
 Wisdom = list[str]
 """Text in double and in single precision."""
+PLANNING = (30.0, 1e-6)  # seconds at most to look for a plan, at all and per grid point
 MAX_BYTES = 2**24  # of a file of wisdom
 WISDOM = re.compile(
     r"\([\w. -]+( #x[0-9a-f]{1,8}){4}\n"
@@ -92,29 +95,33 @@ def plans() -> str:
     return "estimated" if _estimated else f"measured {_digest(known) if known else ''}".strip()
 
 
-def planned(plan: Callable[[tuple[str, ...]], T]) -> T:
-    """`plan` with the flags of a planner: of what is known, else measured, and kept for all."""
+def planned(make: Callable[[Plan], T], size: int = 0) -> T:
+    """The transforms that `make` plans: by known plans, else by measured ones, kept for all.
+
+    The time limit of a measurement increases with the number of grid points, `size`.
+    """
+    fftw = partial(pyfftw.FFTW, planning_timelimit=PLANNING[0] + PLANNING[1] * size)
     with _planner:
         if _estimated:
-            return plan(("FFTW_ESTIMATE",))
+            return make(partial(fftw, flags=("FFTW_ESTIMATE",)))
         with suppress(RuntimeError):  # not known
-            return plan(("FFTW_MEASURE", "FFTW_WISDOM_ONLY"))
-        return _measured(plan)
+            return make(partial(fftw, flags=("FFTW_MEASURE", "FFTW_WISDOM_ONLY")))
+        return _measured(make, partial(fftw, flags=("FFTW_MEASURE",)))
 
 
-def _measured(plan: Callable[[tuple[str, ...]], T]) -> T:
-    """`plan`, measured unless another process did, and kept for all."""
+def _measured(make: Callable[[Plan], T], fftw: Plan) -> T:
+    """The transforms that `make` plans, measured unless another process did, and kept for all."""
     folder = _folder or cache_folder()
     with _planning_lock(folder):
         _import(read_wisdom(folder))
         before = _export()
-        pair = plan(("FFTW_MEASURE",))
+        transforms = make(fftw)
         if _export() != before:
             _write(folder, _export())
     if _folder is not None:
         with _planning_lock(cache_folder()):
             _write(cache_folder(), _joined(read_wisdom(cache_folder()), _export()))
-    return pair
+    return transforms
 
 
 def read_wisdom(folder: Path) -> Wisdom | None:

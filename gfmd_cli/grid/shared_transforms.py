@@ -8,11 +8,11 @@ transforms of 3200^2 took 5 to 50 times as long as on one thread.
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
 from gfmd_cli.grid.arrays import Field, Modes
+from gfmd_cli.grid.plans import Plan
 from gfmd_cli.grid.rows import LocalRows
 from gfmd_cli.grid.transposition import Span
 
@@ -23,8 +23,6 @@ Pair = tuple[Execute, Execute]
 """A transform and its inverse."""
 Pairs = tuple[list[Execute], list[Execute]]
 """The same for some parts of an array."""
-Plan = Callable[..., Any]
-"""Makes a plan on one thread from source, target, axes and direction."""
 
 
 def in_place(real: Field, work: Modes, rows: LocalRows, fftw: Plan) -> Pair:
