@@ -78,30 +78,9 @@ class DistributedGrid(Grid):
         return self.spans[self.ranks.rank]
 
     @property
-    def shape(self) -> Shape:
-        """Shape of the rows of this process."""
-        return self.rows.count, self.points
-
-    @property
-    def spectral_shape(self) -> Shape:
-        """Shape of the coefficients of this process."""
-        first, last = self.span
-        return self.points_y, last - first
-
-    @property
-    def own(self) -> slice:
-        """The rows of this process."""
-        return slice(*self.row_span)
-
-    @property
     def row_span(self) -> Span:
         """First row of this process, and the row after its last."""
         return self.rows.start, self.rows.stop
-
-    @property
-    def whole(self) -> bool:
-        """Whether this process holds all rows of the grid: it does not."""
-        return False
 
     def total(self, values: Any) -> Any:
         """Sum over all processes."""
@@ -258,17 +237,6 @@ class DistributedGrid(Grid):
         )
         self.ranks.wait(self.ranks.comm.Ialltoallv(outgoing, incoming))
         return rows
-
-    def next_row(self, lines: Any) -> Any:
-        """The first row of the next process."""
-        rank, count = self.ranks.rank, self.ranks.size
-        gathered = np.empty_like(lines[0])
-        first = np.ascontiguousarray(lines[0])
-        comm = self.ranks.comm
-        self.ranks.wait(
-            comm.Irecv(gathered, (rank + 1) % count), comm.Isend(first, (rank - 1) % count)
-        )
-        return gathered
 
     def collect(self, field: Field) -> Field | None:
         """All of a field, on the first process; None on the others."""

@@ -67,8 +67,9 @@ class Grid:
 
     @property
     def shape(self) -> Shape:
-        """Shape of the part of a real field that this process holds, here all of it."""
-        return self.whole_shape
+        """Shape of the part of a real field that this process holds."""
+        first, last = self.row_span
+        return (last - first, self.points)[-self.dimension :]
 
     @property
     def sides(self) -> tuple[float, ...]:
@@ -95,8 +96,9 @@ class Grid:
 
     @property
     def spectral_shape(self) -> Shape:
-        """Shape of its Fourier coefficients."""
-        return (*self.shape[:-1], self.points // 2 + 1)
+        """Shape of the Fourier coefficients that this process holds: all rows, some columns."""
+        first, last = self.span
+        return (*self.whole_shape[:-1], last - first)
 
     @property
     def size(self) -> int:
@@ -117,8 +119,8 @@ class Grid:
 
     @property
     def own(self) -> slice:
-        """The rows of the grid that a field of this process holds."""
-        return ALL
+        """The rows of the grid that a field of this process holds; all points of a line."""
+        return slice(*self.row_span) if self.dimension == 2 else ALL
 
     @property
     def row_span(self) -> Span:
@@ -128,7 +130,7 @@ class Grid:
     @property
     def whole(self) -> bool:
         """Whether this process holds all rows of the grid."""
-        return True
+        return self.shape == self.whole_shape
 
     def empty(self) -> Field:
         """A real field, aligned for the transforms, values undefined."""
@@ -322,10 +324,6 @@ class Grid:
         padded = padded_shape(self.whole_shape, factor)
         return PaddedTransform(self.whole_shape, padded, precision, self._threads)
 
-    def next_row(self, lines: Any) -> Any:
-        """The row of a field that follows the rows of this process."""
-        return lines[0]
-
     def collect(self, field: Field) -> Field | None:
         """All of a field, on the first process; None on the others."""
         return field
@@ -353,18 +351,15 @@ class Grid:
 
     def take(self, source: "Grid", field: Field) -> Field:
         """A field of another grid, see `resample`."""
-        return source._resample(field, self)
-
-    def _resample(self, field: Field, target: "Grid") -> Field:
-        modes, rows, columns = self.modes_for(target, field)
-        out, kept = target.work, columns.positive
+        modes, rows, columns = source.modes_for(self, field)
+        out, kept = self.work, columns.positive
         out[...] = 0.0
         if self.dimension == 1:
             out[:kept] = modes[:kept]
         else:
             for part in rows.slices:
                 out[part, :kept] = modes[part, :kept]
-        return target.field_of_work(self.size)
+        return self.field_of_work(source.size)
 
     def modes_for(self, target: "Grid", field: Field) -> "tuple[Modes, SharedModes, SharedModes]":
         """Coefficients of a field, without 1/size, for another grid, in `work`.

@@ -30,13 +30,14 @@ def contact_pressure(height: Field, u: Field, sigma: Field) -> Field:
 def contact_line(grid: Grid, mask: Mask, *, periodic: bool = True) -> float:
     """Contact line per area times the side along x; of a line contact, the number of edges."""
     counts = np.zeros(mask.ndim)
+    next_row = grid.row_span[1] % grid.points_y
     for axis in range(mask.ndim):
         lines = np.moveaxis(mask, axis, 0)
         counts[axis] += np.count_nonzero(lines[1:] != lines[:-1])
-        following = grid.next_row(lines) if axis == 0 else lines[0]
+        following = grid.gather_rows(mask, (next_row, next_row + 1)) if axis == 0 else lines[:1]
         goes_on = axis == 0 and grid.row_span[1] < grid.points_y
         if periodic or goes_on:
-            counts[axis] += np.count_nonzero(lines[-1] != following)
+            counts[axis] += np.count_nonzero(lines[-1:] != following)
     across = np.divide(1.0, grid.spacings)  # edge length over the area of a point
     return float(grid.total(counts) @ across) * grid.length / grid.size
 
