@@ -17,6 +17,9 @@ Modes: TypeAlias = NDArray[np.complexfloating[Any, Any]]
 Mask: TypeAlias = NDArray[np.bool_]
 """A choice of grid points."""
 
+MaskedField: TypeAlias = "np.ma.MaskedArray[Any, Any]"
+"""Real values, masked where they are not known."""
+
 BLOCK = 2**15  # points of a block of rows: it and its temporaries stay in the cache
 
 

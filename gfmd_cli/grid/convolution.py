@@ -8,6 +8,7 @@ share a field exchange no zero rows either.
 
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
 from functools import cached_property, partial
 from itertools import pairwise
 from math import prod
@@ -40,21 +41,20 @@ def padded_shape(shape: tuple[int, ...], factor: float) -> tuple[int, ...]:
     return tuple(int(pyfftw.next_fast_len(int(np.ceil(factor * n)))) for n in shape)
 
 
+@dataclass(eq=False)
 class PaddedTransform:
     """Maps F^-1 symbol F of real fields of a shape, padded by zeros; symbols are real and even."""
 
-    def __init__(
-        self,
-        shape: tuple[int, ...],
-        padded: tuple[int, ...],
-        precision: Literal["double", "single"] = "double",
-        threads: int = 1,
-    ) -> None:
-        self.shape, self.threads = shape, threads
-        self.pool = ThreadPoolExecutor(threads) if threads > 1 else None
-        self.rows, self.columns = (1, *shape)[-2:]
-        self.padded_rows, self.padded_columns = (1, *padded)[-2:]
-        self.real = np.dtype(np.float64 if precision == "double" else np.float32)
+    shape: tuple[int, ...]
+    padded: tuple[int, ...]
+    precision: Literal["double", "single"] = "double"
+    threads: int = 1
+
+    def __post_init__(self) -> None:
+        self.pool = ThreadPoolExecutor(self.threads) if self.threads > 1 else None
+        self.rows, self.columns = (1, *self.shape)[-2:]
+        self.padded_rows, self.padded_columns = (1, *self.padded)[-2:]
+        self.real = np.dtype(np.float64 if self.precision == "double" else np.float32)
         self.modes = self.padded_columns // 2 + 1
         self.width = min(self.modes, max(NARROWEST, BLOCK // self.padded_rows))
 
@@ -189,6 +189,7 @@ class PaddedTransform:
         return pyfftw.empty_aligned(shape, dtype=kind)
 
 
+@dataclass(eq=False, kw_only=True)
 class DistributedPaddedTransform(PaddedTransform):
     """The same for fields and symbols that processes share.
 
@@ -196,30 +197,24 @@ class DistributedPaddedTransform(PaddedTransform):
     the coefficients between the transforms along the two axes.
     """
 
-    def __init__(
-        self,
-        shape: tuple[int, ...],
-        padded: tuple[int, ...],
-        precision: Literal["double", "single"] = "double",
-        threads: int = 1,
-        *,
-        ranks: Ranks,
-        edges: list[int],
-    ) -> None:
-        super().__init__(shape, padded, precision, threads)
-        spans = column_spans(self.modes, ranks.size)
-        self.transposition = Transposition(ranks, edges, spans)
+    ranks: Ranks
+    edges: list[int]
+    """First row of each process, and the number of rows."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        spans = column_spans(self.modes, self.ranks.size)
+        self.transposition = Transposition(self.ranks, self.edges, spans)
 
     @property
     def own_rows(self) -> int:
         """Number of rows of a field that this process holds."""
-        edges, rank = self.transposition.edges, self.transposition.ranks.rank
-        return edges[rank + 1] - edges[rank]
+        return self.edges[self.ranks.rank + 1] - self.edges[self.ranks.rank]
 
     @property
     def span(self) -> Span:
         """First and last but one wavenumber along x that this process holds."""
-        return self.transposition.spans[self.transposition.ranks.rank]
+        return self.transposition.spans[self.ranks.rank]
 
     def _to_columns(self, lines: Modes) -> Modes:
         _, columns, spare = self._memory

@@ -21,7 +21,7 @@ from gfmd_cli.grid.shared_transforms import Execute, in_place
 from gfmd_cli.grid.transposition import Span
 
 T = TypeVar("T")
-ALL = slice(None)
+ALL_ROWS = slice(None)
 THREADED = 512  # points per side from which a second thread pays
 Shape = tuple[int, ...]
 """Numbers of points along the axes of a field, (y, x), or (x,) of a line."""
@@ -120,7 +120,7 @@ class Grid:
     @property
     def own(self) -> slice:
         """The rows of the grid that a field of this process holds; all points of a line."""
-        return slice(*self.row_span) if self.dimension == 2 else ALL
+        return slice(*self.row_span) if self.dimension == 2 else ALL_ROWS
 
     @property
     def row_span(self) -> Span:
@@ -136,7 +136,7 @@ class Grid:
         """A real field, aligned for the transforms, values undefined."""
         return pyfftw.empty_aligned(self.shape, dtype=self.real)
 
-    def mode_number(self, rows: slice = ALL) -> Field:
+    def mode_number(self, rows: slice = ALL_ROWS) -> Field:
         """|q| L / 2 pi of every coefficient, shape `spectral_shape` (or of some of its rows).
 
         L is the side along x, so that the numbers are whole for waves along x only.
@@ -146,12 +146,12 @@ class Grid:
             return along[rows]
         return np.sqrt(self.mode_number_y(rows)[:, None] ** 2 + along**2)
 
-    def mode_number_y(self, rows: slice = ALL) -> Field:
+    def mode_number_y(self, rows: slice = ALL_ROWS) -> Field:
         """q_y L / 2 pi of the rows of coefficients, where L is the side along x."""
         across = np.fft.fftfreq(self.points_y, 1 / self.points_y)[rows]
         return across * (self.length / self.length_y)
 
-    def wavenumber(self, rows: slice = ALL) -> Field:
+    def wavenumber(self, rows: slice = ALL_ROWS) -> Field:
         """|q| of every coefficient [1/m], shape `spectral_shape` (or of some of its rows)."""
         return self.mode_number(rows) * (2 * np.pi / self.length)
 

@@ -19,8 +19,9 @@ from pydantic import model_validator
 from gfmd_cli.choice import Choice, FilePath, Positive
 from gfmd_cli.errors import InputError
 from gfmd_cli.grid.arrays import Field
+from gfmd_cli.grid.fft_grid import ALL_ROWS, Shape
 from gfmd_cli.physics.compliance_transforms import Compliance, separated
-from gfmd_cli.physics.free_compliance import ALL_ROWS, Shape, Spacings, power_law
+from gfmd_cli.physics.free_compliance import Spacings, power_law
 from gfmd_cli.physics.interpolation import monotone_cubic
 from gfmd_cli.physics.persson import gamma_n, gamma_slab
 

@@ -8,7 +8,7 @@ from pydantic import Field as Key
 
 from gfmd_cli.choice import FilePath, Positive
 from gfmd_cli.errors import InputError
-from gfmd_cli.grid.arrays import Field, Mask
+from gfmd_cli.grid.arrays import Field, Mask, MaskedField
 from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.physics import map_warnings
 from gfmd_cli.physics.height_map import extent
@@ -216,7 +216,7 @@ class FileSurface(RigidSurface):
     def _is_periodic(self) -> bool:
         return self._stated_periodic() is not False
 
-    def measured_map(self) -> "tuple[np.ma.MaskedArray[Any, Any], tuple[float, ...]]":
+    def measured_map(self) -> tuple[MaskedField, tuple[float, ...]]:
         """Levelled heights [m] as measured, masked where missing, and their spacing [m].
 
         Nothing is subtracted from a map that is taken as periodic, unless `level` says so.

@@ -145,19 +145,16 @@ def _with_coordinates(path: Path, file: Any, data: Any, bare: HeightMap) -> Heig
     if metres is not None:
         is_height = np.abs(heights) < MAX_HEIGHT  # in the unit of the file
         heights = np.ma.masked_where(~is_height, metres * heights.astype(np.float64))
-    if len(metric) == len(axes):
+    has_metric_sides, has_metric_heights = len(metric) == len(axes), metres is not None
+    if has_metric_sides:
         sides = [side * metre for side, metre in zip(sides, metric, strict=True)]
-        known = metres is not None
-        return bare._replace(
-            heights=heights,
-            sides=tuple(sides),
-            metres=True,
-            periodic=False if known else None,
-            metric_heights=known,
-        )
-    if metres is None:
-        return bare._replace(heights=heights, sides=tuple(sides))
-    return bare._replace(heights=heights, metric_heights=True)
+    return bare._replace(
+        heights=heights,
+        sides=tuple(sides) if has_metric_sides or not has_metric_heights else None,
+        metres=has_metric_sides,
+        periodic=False if has_metric_sides and has_metric_heights else None,
+        metric_heights=has_metric_heights,
+    )
 
 
 def _dataset_name(path: Path, file: Any, name: str | None) -> str:

@@ -17,7 +17,7 @@ import numpy as np
 from scipy.special import erf, erfinv
 
 from gfmd_cli.grid.arrays import Field, Mask, row_blocks
-from gfmd_cli.grid.fft_grid import ALL, Grid
+from gfmd_cli.grid.fft_grid import ALL_ROWS, Grid
 from gfmd_cli.physics.contact import Contact
 
 BINS = 1 << 14  # of height, of width 1e-3 h_std or less for heights within +-8 h_std
@@ -56,7 +56,7 @@ def _quadratures(contact: Contact, out: Field) -> Iterator[Field]:
         yield out
 
 
-def direction(grid: Grid, axis: int, rows: slice = ALL) -> Field:
+def direction(grid: Grid, axis: int, rows: slice = ALL_ROWS) -> Field:
     """Component of q / |q| along an axis for rows of `grid.spectral_shape`; zero at q = 0.
 
     Also zero where the component is the highest wavenumber of the grid, which has no sign.
