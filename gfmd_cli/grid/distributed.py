@@ -8,6 +8,7 @@ other. Every process computes smaller grids as a whole, with identical results.
 from dataclasses import dataclass, fields
 from functools import cached_property
 from itertools import pairwise
+from math import prod
 from typing import Any, Literal
 
 import numpy as np
@@ -206,37 +207,29 @@ class DistributedGrid(Grid):
         rank, count = self.ranks.rank, self.ranks.size
         source_spans = _spans(source, [(0, kept), *[(0, 0)] * (count - 1)], kept)
         target_spans = _spans(target, [(0, kept)] * count, kept)
-        send_spans = [_shared(source_spans[rank], span) for span in target_spans]
-        receive_spans = [_shared(span, target_spans[rank]) for span in source_spans]
-        send_buffer = np.concatenate(
-            [rows[:, slice(*_from(s, source_spans[rank]))].ravel() for s in send_spans]
-        )
-        height = len(rows)
-        receive_buffer = np.empty(height * sum(b - a for a, b in receive_spans), rows.dtype)
-        outgoing = [send_buffer, [height * (b - a) for a, b in send_spans]]
-        incoming = [receive_buffer, [height * (b - a) for a, b in receive_spans]]
-        self.ranks.wait(self.ranks.comm.Ialltoallv(outgoing, incoming))
-        first, last = target_spans[rank]
-        gathered, at = np.empty((height, last - first), rows.dtype), 0
-        for a, b in receive_spans:
-            end = at + height * (b - a)
-            gathered[:, a - first : b - first] = receive_buffer[at:end].reshape(height, b - a)
-            at = end
-        return gathered
+        own, wanted = source_spans[rank], target_spans[rank]
+        parts = [rows[:, _shared(own, span, own[0])] for span in target_spans]
+        columns = [_shared(span, wanted) for span in source_spans]
+        blocks = self._exchanged(parts, [(len(rows), c.stop - c.start) for c in columns])
+        return np.concatenate(blocks, axis=1)
 
     def gather_rows(self, values: Any, span: Span) -> Any:
         """The rows `span` of the grid, of all processes; each process may need others."""
         own = self.row_span
-        send_spans = [_shared(own, (int(a), int(b))) for a, b in self.ranks.gather(span)]
-        receive_spans = [_shared(other, span) for other in pairwise(self.rows.edges)]
-        sent = np.concatenate([values[slice(*_from(part, own))] for part in send_spans])
-        rows = np.empty((span[1] - span[0], *values.shape[1:]), values.dtype)
-        outgoing, incoming = (
-            [array, [(b - a) * values[0].size for a, b in parts]]
-            for array, parts in ((sent, send_spans), (rows, receive_spans))
-        )
+        parts = [values[_shared(own, (int(a), int(b)), own[0])] for a, b in self.ranks.gather(span)]
+        rows = [_shared(other, span) for other in pairwise(self.rows.edges)]
+        shapes = [(r.stop - r.start, *values.shape[1:]) for r in rows]
+        return np.concatenate(self._exchanged(parts, shapes))
+
+    def _exchanged(self, parts: list[Any], shapes: list[Shape]) -> list[Any]:
+        """Send a part to each process; return what each has sent to this one, of these shapes."""
+        sizes = [prod(shape) for shape in shapes]
+        sent = np.concatenate([part.ravel() for part in parts])
+        received = np.empty(sum(sizes), sent.dtype)
+        outgoing, incoming = [sent, [part.size for part in parts]], [received, sizes]
         self.ranks.wait(self.ranks.comm.Ialltoallv(outgoing, incoming))
-        return rows
+        blocks = np.split(received, np.cumsum(sizes)[:-1])
+        return [block.reshape(shape) for block, shape in zip(blocks, shapes, strict=True)]
 
     def collect(self, field: Field) -> Field | None:
         """All of a field, on the first process; None on the others."""
@@ -265,10 +258,7 @@ def _spans(grid: Grid, whole: list[Span], kept: int) -> list[Span]:
     return [(min(a, kept), min(b, kept)) for a, b in grid.spans]
 
 
-def _shared(one: Span, other: Span) -> Span:
+def _shared(one: Span, other: Span, origin: int = 0) -> slice:
+    """The indices in both spans, counted from `origin`."""
     first, last = max(one[0], other[0]), min(one[1], other[1])
-    return first, max(first, last)
-
-
-def _from(span: Span, start: Span) -> Span:
-    return span[0] - start[0], span[1] - start[0]
+    return slice(first - origin, max(first, last) - origin)

@@ -265,12 +265,9 @@ class FileSurface(RigidSurface):
 
     def pictures(self) -> dict[str, Picture]:
         """The map as it is in the file, and as it is solved."""
-        topography, spacing = self._topography(), self._map_spacing()
-        shape, prepared = topography.heights.shape, _prepared(self)
-        sides = tuple(n * step for n, step in zip(shape, spacing, strict=True))
-        cell = tuple(n * step for n, step in zip(prepared.shape, spacing, strict=True))
+        topography, sides = self._topography(), tuple(side / self.copies for side in self.sides)
         measured = picture(self.scale * topography.heights, sides, topography.missing)
-        return {"measured": measured, "prepared": picture(prepared, cell)}
+        return {"measured": measured, "prepared": picture(_prepared(self), self.sides)}
 
     def _map_spacing(self) -> tuple[float, ...]:
         """Distance of the points of the map along each axis [m]."""

@@ -10,6 +10,12 @@ from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.physics.contact import Contact
 from gfmd_cli.physics.indenters import RigidSurface
 
+LINEAR_EDGES = np.linspace(0.0, 10.0, 201)
+"""Edges of the linear bins of stresses [Delta_sigma] and gaps [h_std]: at the end a Gaussian of
+unit width is below 1e-21."""
+LOGARITHMIC_EDGES = np.logspace(-6.0, 4.0, 101)
+"""Edges of the logarithmic bins [Delta_sigma, h_std]: ten per decade from 1e-6 to 1e4."""
+
 
 def contact_points(height: Field, u: Field, sigma: Field) -> Mask:
     """Mask of the points in contact, where u = h and sigma > 0.
@@ -164,24 +170,6 @@ class Histogram:
     """Share of points above zero and below the first logarithmic bin."""
 
 
-def linear_edges() -> Field:
-    """Edges of the linear bins of stresses [Delta_sigma] and gaps [h_std].
-
-    The width is 0.05 and the end is 10, where a Gaussian of unit width is below 1e-21.
-    """
-    return np.linspace(0.0, 10.0, 201)
-
-
-def logarithmic_edges() -> Field:
-    """Edges of the logarithmic bins [Delta_sigma, h_std]: ten per decade from 1e-6 to 1e4."""
-    return np.logspace(-6.0, 4.0, 101)
-
-
-def logarithmic_middles() -> Field:
-    """Geometric means of the edges of the logarithmic bins."""
-    return geometric_middles(logarithmic_edges())
-
-
 def geometric_middles(edges: Field) -> Field:
     """Geometric means of neighbouring edges, shape (edges - 1,)."""
     return np.sqrt(edges[1:] * edges[:-1])
@@ -204,13 +192,12 @@ def _histogram(grid: Grid, positive: Field, points: int) -> Histogram:
     """Histogram of a field with these positive values among so many points, zero at the others."""
     size, count = int(grid.total(points)), int(grid.total(positive.size))
     linear, logarithmic = (
-        grid.total(np.histogram(positive, edges())[0])
-        for edges in (linear_edges, logarithmic_edges)
+        grid.total(np.histogram(positive, edges)[0]) for edges in (LINEAR_EDGES, LOGARITHMIC_EDGES)
     )
-    below = grid.total(np.count_nonzero(positive < logarithmic_edges()[0]))
+    below = grid.total(np.count_nonzero(positive < LOGARITHMIC_EDGES[0]))
     return Histogram(
-        linear=linear / (size * np.diff(linear_edges())),
-        logarithmic=logarithmic / (size * np.diff(logarithmic_edges())),
+        linear=linear / (size * np.diff(LINEAR_EDGES)),
+        logarithmic=logarithmic / (size * np.diff(LOGARITHMIC_EDGES)),
         zero=1.0 - count / size,
         beyond=float(count - linear.sum()) / size,
         below=int(below) / size,

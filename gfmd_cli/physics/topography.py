@@ -189,10 +189,10 @@ def _checked(
             part = part[region.slices(shape, spacing if data.metres else None)]
         except ValueError as error:
             raise InputError(f"{path}: surface.region: {error}") from error
-    if crop:
-        used = middle_square(part.shape)
-        first = [(points - side) // 2 for points, side in zip(part.shape, used, strict=True)]
-        part = part[tuple(slice(a, a + side) for a, side in zip(first, used, strict=True))]
+    if crop and part.ndim == 2:
+        side = min(part.shape) // 2 * 2
+        first = [(points - side) // 2 for points in part.shape]
+        part = part[tuple(slice(a, a + side) for a in first)]
     heights = np.ma.filled(np.ma.asarray(part).astype(np.float64), np.nan)
     missing: Mask = ~(np.abs(heights) < MAX_HEIGHT)
     if missing.all():
@@ -213,11 +213,6 @@ def _checked(
         data.notes,
         float(np.finfo(data.heights.dtype if data.heights.dtype.kind == "f" else float).eps),
     )
-
-
-def middle_square(shape: tuple[int, ...]) -> tuple[int, ...]:
-    """Shape of the largest square of an even number of points in a map; that of a line itself."""
-    return shape if len(shape) == 1 else (min(shape) // 2 * 2,) * 2
 
 
 def _spacing(path: Path, data: HeightMap, shape: tuple[int, ...]) -> tuple[float, ...] | None:
