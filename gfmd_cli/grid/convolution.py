@@ -65,7 +65,7 @@ class PaddedTransform:
 
     @property
     def span(self) -> Span:
-        """First and last but one wavenumber along x that this process holds."""
+        """First wavenumber along x that this process holds, and the one after its last."""
         return 0, self.modes
 
     @property
@@ -97,10 +97,10 @@ class PaddedTransform:
         work = self._to_columns(lines)
         symbol = np.empty(self.symbol_shape, self.real)
         block, forward, _ = self._column_plans[0]
-        for part, here in self._blocks(work, block):
-            here[self.padded_rows - self.rows + 1 :] = work[:0:-1, part]
+        for part, padded in self._blocks(work, block):
+            padded[self.padded_rows - self.rows + 1 :] = work[:0:-1, part]
             forward()
-            symbol[:, part] = here[: len(symbol)].real
+            symbol[:, part] = padded[: len(symbol)].real
         return symbol
 
     def apply(self, symbol: Field, field: Field, out: Field) -> Field:
@@ -127,12 +127,12 @@ class PaddedTransform:
         mirrored = symbol[(self.padded_rows - 1) // 2 : 0 : -1]
 
         def filter_share(thread: int, block: Modes, forward: Execute, backward: Execute) -> None:
-            for part, here in self._blocks(work, block, thread, self.threads):
+            for part, padded in self._blocks(work, block, thread, self.threads):
                 forward()
-                here[upper] *= symbol[:, part]
-                here[lower] *= mirrored[:, part]
+                padded[upper] *= symbol[:, part]
+                padded[lower] *= mirrored[:, part]
                 backward()
-                work[:, part] = here[: self.rows]
+                work[:, part] = padded[: self.rows]
 
         shares = [partial(filter_share, i, *own) for i, own in enumerate(self._column_plans)]
         side_by_side(self.pool, shares)
@@ -147,10 +147,10 @@ class PaddedTransform:
         count = work.shape[1]
         for start in range(first * self.width, count, step * self.width):
             part = slice(start, min(start + self.width, count))
-            here = block[:, : part.stop - part.start]
-            here[: self.rows] = work[:, part]
-            here[self.rows :] = 0.0
-            yield part, here
+            padded = block[:, : part.stop - part.start]
+            padded[: self.rows] = work[:, part]
+            padded[self.rows :] = 0.0
+            yield part, padded
 
     def _to_columns(self, lines: Modes) -> Modes:
         """All rows of the columns of `span`, from the coefficients of the rows."""
@@ -213,7 +213,7 @@ class DistributedPaddedTransform(PaddedTransform):
 
     @property
     def span(self) -> Span:
-        """First and last but one wavenumber along x that this process holds."""
+        """First wavenumber along x that this process holds, and the one after its last."""
         return self.transposition.spans[self.ranks.rank]
 
     def _to_columns(self, lines: Modes) -> Modes:

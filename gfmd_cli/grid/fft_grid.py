@@ -270,7 +270,7 @@ class Grid:
 
     @property
     def span(self) -> Span:
-        """First and last but one wavenumber along x of the coefficients that this process holds."""
+        """First wavenumber along x that this process holds, and the one after its last."""
         return 0, self.points // 2 + 1
 
     @property

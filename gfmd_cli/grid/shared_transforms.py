@@ -39,8 +39,8 @@ def in_place(real: Field, work: Modes, rows: LocalRows, fftw: Plan) -> Pair:
 def along_rows(real: Field, work: Modes, parts: Sequence[Span], fftw: Plan) -> Pairs:
     """The transforms of some parts of the rows of real values to coefficients, and back."""
     arrays = [(real[a:b], work[a:b]) for a, b in parts]
-    there = [fftw(values, modes, (1,), "FFTW_FORWARD").execute for values, modes in arrays]
-    return there, [fftw(modes, values, (1,), "FFTW_BACKWARD").execute for values, modes in arrays]
+    forward = [fftw(values, modes, (1,), "FFTW_FORWARD").execute for values, modes in arrays]
+    return forward, [fftw(modes, values, (1,), "FFTW_BACKWARD").execute for values, modes in arrays]
 
 
 def along_columns(work: Modes, count: int, fftw: Plan) -> Pairs:
@@ -48,8 +48,8 @@ def along_columns(work: Modes, count: int, fftw: Plan) -> Pairs:
     lines = np.linspace(0, -(-work.shape[1] // ALIGNED), count + 1).astype(int)
     edges = np.minimum(lines * ALIGNED, work.shape[1])
     parts = [work[:, a:b] for a, b in pairwise(edges) if a < b]
-    there = [fftw(part, part, (0,), "FFTW_FORWARD").execute for part in parts]
-    return there, [fftw(part, part, (0,), "FFTW_BACKWARD").execute for part in parts]
+    forward = [fftw(part, part, (0,), "FFTW_FORWARD").execute for part in parts]
+    return forward, [fftw(part, part, (0,), "FFTW_BACKWARD").execute for part in parts]
 
 
 def in_turn(pool: ThreadPoolExecutor | None, *stages: Sequence[Execute]) -> Execute:

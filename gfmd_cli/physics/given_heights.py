@@ -1,5 +1,4 @@
-"""Heights that a Python program has in memory: arrays, also of xarray, nested lists, topographies
-of SurfaceTopography."""
+"""Heights in the memory of a Python program: arrays, nested lists, objects of xarray and others."""
 
 from pathlib import Path
 from typing import Any
