@@ -7,10 +7,8 @@ share a field exchange no zero rows either.
 """
 
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property, partial
-from itertools import pairwise
 from math import prod
 from typing import Literal
 
@@ -20,6 +18,7 @@ import pyfftw
 from gfmd_cli.grid import plans
 from gfmd_cli.grid.arrays import Field, Modes
 from gfmd_cli.grid.ranks import Ranks
+from gfmd_cli.grid.rows import LocalRows
 from gfmd_cli.grid.shared_transforms import (
     Execute,
     along_columns,
@@ -51,12 +50,13 @@ class PaddedTransform:
     threads: int = 1
 
     def __post_init__(self) -> None:
-        self.pool = ThreadPoolExecutor(self.threads) if self.threads > 1 else None
         self.rows, self.columns = (1, *self.shape)[-2:]
         self.padded_rows, self.padded_columns = (1, *self.padded)[-2:]
         self.real = np.dtype(np.float64 if self.precision == "double" else np.float32)
         self.modes = self.padded_columns // 2 + 1
         self.width = min(self.modes, max(NARROWEST, BLOCK // self.padded_rows))
+        local_rows = LocalRows(self.own_rows, self.threads)
+        self.pool, self.parts = local_rows.pool, local_rows.parts
 
     @property
     def own_rows(self) -> int:
@@ -164,10 +164,8 @@ class PaddedTransform:
         """Coefficients of the rows, their values in the same memory, and both transforms."""
         lines = self._empty_lines()
         values = lines.view(self.real)[:, : self.padded_columns]
-        edges = np.linspace(0, len(lines), self.threads + 1).astype(int)
-        parts = [(int(a), int(b)) for a, b in pairwise(edges) if a < b]
-        there, back = plans.planned(partial(along_rows, values, lines, parts))
-        return lines, values, in_turn(self.pool, there), in_turn(self.pool, back)
+        forward, backward = plans.planned(partial(along_rows, values, lines, self.parts))
+        return lines, values, in_turn(self.pool, forward), in_turn(self.pool, backward)
 
     def _empty_lines(self) -> Modes:
         """Memory of the coefficients of the rows."""

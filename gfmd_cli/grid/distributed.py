@@ -91,10 +91,6 @@ class DistributedGrid(Grid):
         """Maximum over all processes."""
         return float(self.ranks.gather(value).max())
 
-    def line(self, symbol: Field) -> Field:
-        """The values of a symbol along x, of all processes."""
-        return self._gathered(symbol[0], [last - first for first, last in self.spans])
-
     def column(self, symbol: Field) -> Field:
         """The values of a symbol along y, which the first process holds."""
         counts = [self.points_y // 2 + 1, *[0] * (self.ranks.size - 1)]

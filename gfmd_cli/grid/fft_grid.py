@@ -157,7 +157,7 @@ class Grid:
 
     def line(self, symbol: Field) -> Field:
         """The values of a symbol along x, from q = 0 to the highest wavenumber."""
-        return symbol.reshape(-1, symbol.shape[-1])[0]
+        return self.gather_columns(self.as_rows(symbol)[:1])[0]
 
     def column(self, symbol: Field) -> Field:
         """The values of a symbol along y, from q = 0 to the highest wavenumber."""

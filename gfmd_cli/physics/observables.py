@@ -41,8 +41,8 @@ def contact_line(grid: Grid, mask: Mask, *, periodic: bool = True) -> float:
         lines = np.moveaxis(mask, axis, 0)
         counts[axis] += np.count_nonzero(lines[1:] != lines[:-1])
         following = grid.gather_rows(mask, (next_row, next_row + 1)) if axis == 0 else lines[:1]
-        goes_on = axis == 0 and grid.row_span[1] < grid.points_y
-        if periodic or goes_on:
+        continues = axis == 0 and grid.row_span[1] < grid.points_y
+        if periodic or continues:
             counts[axis] += np.count_nonzero(lines[-1:] != following)
     across = np.divide(1.0, grid.spacings)  # edge length over the area of a point
     return float(grid.total(counts) @ across) * grid.length / grid.size

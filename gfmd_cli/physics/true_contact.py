@@ -111,9 +111,9 @@ def bearing(contact: Contact) -> Bearing:
     sums = np.zeros((3, BINS))
     for rows in row_blocks(height):
         depth = (high - height[rows]) * ((BINS - 1) / (high - low))
-        where, values = depth.astype(np.int64).ravel(), stress[rows].ravel()
+        bin_number, values = depth.astype(np.int64).ravel(), stress[rows].ravel()
         for total, weight in zip(sums, (np.ones_like(values), values, values**2), strict=True):
-            total += np.bincount(where, weight, minlength=BINS)
+            total += np.bincount(bin_number, weight, minlength=BINS)
     count, total, square = np.cumsum(sums, axis=1)
     usable = (count >= MIN_POINTS) & (count < height.size) & (sums[0] > 0)
     mean = total[usable] / count[usable]
