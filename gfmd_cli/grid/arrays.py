@@ -1,6 +1,6 @@
 """Array types shared by the whole package, and how to walk over an array."""
 
-from typing import Any, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,8 @@ Mask: TypeAlias = NDArray[np.bool_]
 
 MaskedField: TypeAlias = "np.ma.MaskedArray[Any, Any]"
 """Real values, masked where they are not known."""
+
+Precision = Literal["double", "single"]
 
 BLOCK = 2**15  # points of a block of rows: it and its temporaries stay in the cache
 

@@ -10,13 +10,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property, partial
 from math import prod
-from typing import Literal
 
 import numpy as np
 import pyfftw
 
 from gfmd_cli.grid import plans
-from gfmd_cli.grid.arrays import Field, Modes
+from gfmd_cli.grid.arrays import Field, Modes, Precision
 from gfmd_cli.grid.ranks import Ranks
 from gfmd_cli.grid.rows import LocalRows
 from gfmd_cli.grid.shared_transforms import (
@@ -46,7 +45,7 @@ class PaddedTransform:
 
     shape: tuple[int, ...]
     padded: tuple[int, ...]
-    precision: Literal["double", "single"] = "double"
+    precision: Precision = "double"
     threads: int = 1
 
     def __post_init__(self) -> None:

@@ -9,14 +9,14 @@ from dataclasses import dataclass, fields
 from functools import cached_property
 from itertools import pairwise
 from math import prod
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import pyfftw
 
 from gfmd_cli.grid import plans
-from gfmd_cli.grid.arrays import Field, Modes
-from gfmd_cli.grid.convolution import DistributedPaddedTransform, padded_shape
+from gfmd_cli.grid.arrays import Field, Modes, Precision
+from gfmd_cli.grid.convolution import DistributedPaddedTransform, PaddedTransform, padded_shape
 from gfmd_cli.grid.fft_grid import Grid, Shape
 from gfmd_cli.grid.halo import HALO_ROWS, DistributedColumns, DistributedRows, is_distributable
 from gfmd_cli.grid.ranks import Ranks, leads
@@ -158,9 +158,7 @@ class DistributedGrid(Grid):
     def _transposition(self) -> Transposition:
         return Transposition(self.ranks, self.rows.edges, self.spans)
 
-    def padded_transform(
-        self, factor: float, precision: Literal["double", "single"] = "double"
-    ) -> DistributedPaddedTransform:
+    def padded_transform(self, factor: float, precision: Precision = "double") -> PaddedTransform:
         """Transforms of fields that are padded by zeros; see `Grid.padded_transform`."""
         padded = padded_shape(self.whole_shape, factor)
         edges = self.rows.edges

@@ -7,13 +7,13 @@ Coefficients are kept for non-negative wavenumbers of the last axis only (real t
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from math import prod
-from typing import Any, Literal, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 import pyfftw
 
 from gfmd_cli.grid import kernels, plans
-from gfmd_cli.grid.arrays import Field, Modes
+from gfmd_cli.grid.arrays import Field, Modes, Precision
 from gfmd_cli.grid.convolution import PaddedTransform, padded_shape
 from gfmd_cli.grid.pixels import average_along_x, average_rows, covered_rows
 from gfmd_cli.grid.rows import LocalRows
@@ -37,7 +37,7 @@ class Grid:
     length: float = 1.0
     """Side of the cell along x [m]."""
     threads: int = 1
-    precision: Literal["double", "single"] = "double"
+    precision: Precision = "double"
     """Of fields and transforms."""
     points_y: int = 0
     """Number of points along y; 0 stands for as many as along x. A line has one."""
@@ -317,9 +317,7 @@ class Grid:
         rows = self.gather_rows(values, covered_rows(target.row_span, *of))
         return average_rows(rows, target.row_span, *of).reshape(target.shape)
 
-    def padded_transform(
-        self, factor: float, precision: Literal["double", "single"] = "double"
-    ) -> PaddedTransform:
+    def padded_transform(self, factor: float, precision: Precision = "double") -> PaddedTransform:
         """Transforms of fields that are padded by zeros to `factor` times the points a side."""
         padded = padded_shape(self.whole_shape, factor)
         return PaddedTransform(self.whole_shape, padded, precision, self._threads)
