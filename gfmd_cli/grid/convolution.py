@@ -44,7 +44,9 @@ class PaddedTransform:
     """Maps F^-1 symbol F of real fields of a shape, padded by zeros; symbols are real and even."""
 
     shape: tuple[int, ...]
+    """Of the fields."""
     padded: tuple[int, ...]
+    """Of the padded fields."""
     precision: Precision = "double"
     threads: int = 1
 
@@ -96,10 +98,10 @@ class PaddedTransform:
         work = self._to_columns(lines)
         symbol = np.empty(self.symbol_shape, self.real)
         block, forward, _ = self._column_plans[0]
-        for part, padded in self._blocks(work, block):
-            padded[self.padded_rows - self.rows + 1 :] = work[:0:-1, part]
+        for part, coefficients in self._blocks(work, block):
+            coefficients[self.padded_rows - self.rows + 1 :] = work[:0:-1, part]
             forward()
-            symbol[:, part] = padded[: len(symbol)].real
+            symbol[:, part] = coefficients[: len(symbol)].real
         return symbol
 
     def apply(self, symbol: Field, field: Field, out: Field) -> Field:
@@ -126,12 +128,12 @@ class PaddedTransform:
         mirrored = symbol[(self.padded_rows - 1) // 2 : 0 : -1]
 
         def filter_share(thread: int, block: Modes, forward: Execute, backward: Execute) -> None:
-            for part, padded in self._blocks(work, block, thread, self.threads):
+            for part, coefficients in self._blocks(work, block, thread, self.threads):
                 forward()
-                padded[upper] *= symbol[:, part]
-                padded[lower] *= mirrored[:, part]
+                coefficients[upper] *= symbol[:, part]
+                coefficients[lower] *= mirrored[:, part]
                 backward()
-                work[:, part] = padded[: self.rows]
+                work[:, part] = coefficients[: self.rows]
 
         shares = [partial(filter_share, i, *own) for i, own in enumerate(self._column_plans)]
         side_by_side(self.pool, shares)
@@ -146,10 +148,10 @@ class PaddedTransform:
         count = work.shape[1]
         for start in range(first * self.width, count, step * self.width):
             part = slice(start, min(start + self.width, count))
-            padded = block[:, : part.stop - part.start]
-            padded[: self.rows] = work[:, part]
-            padded[self.rows :] = 0.0
-            yield part, padded
+            coefficients = block[:, : part.stop - part.start]
+            coefficients[: self.rows] = work[:, part]
+            coefficients[self.rows :] = 0.0
+            yield part, coefficients
 
     def _to_columns(self, lines: Modes) -> Modes:
         """All rows of the columns of `span`, from the coefficients of the rows."""

@@ -8,7 +8,6 @@ other. Every process computes smaller grids as a whole, with identical results.
 from dataclasses import dataclass, fields
 from functools import cached_property
 from itertools import pairwise
-from math import prod
 from typing import Any
 
 import numpy as np
@@ -204,26 +203,25 @@ class DistributedGrid(Grid):
         own, wanted = source_spans[rank], target_spans[rank]
         parts = [rows[:, _shared(own, span, own[0])] for span in target_spans]
         columns = [_shared(span, wanted) for span in source_spans]
-        blocks = self._exchanged(parts, [(len(rows), c.stop - c.start) for c in columns])
-        return np.concatenate(blocks, axis=1)
+        sizes = [len(rows) * (c.stop - c.start) for c in columns]
+        blocks = np.split(self._exchanged(parts, sizes), np.cumsum(sizes)[:-1])
+        return np.concatenate([block.reshape(len(rows), -1) for block in blocks], axis=1)
 
     def gather_rows(self, values: Any, span: Span) -> Any:
         """The rows `span` of the grid, of all processes; each process may need others."""
         own = self.row_span
         parts = [values[_shared(own, (int(a), int(b)), own[0])] for a, b in self.ranks.gather(span)]
         rows = [_shared(other, span) for other in pairwise(self.rows.edges)]
-        shapes = [(r.stop - r.start, *values.shape[1:]) for r in rows]
-        return np.concatenate(self._exchanged(parts, shapes))
+        sizes = [(r.stop - r.start) * values[0].size for r in rows]
+        return self._exchanged(parts, sizes).reshape(-1, *values.shape[1:])
 
-    def _exchanged(self, parts: list[Any], shapes: list[Shape]) -> list[Any]:
-        """Send a part to each process; return what each has sent to this one, of these shapes."""
-        sizes = [prod(shape) for shape in shapes]
+    def _exchanged(self, parts: list[Any], sizes: list[int]) -> Any:
+        """Send a part to each process; return the numbers of these sizes that each has sent."""
         sent = np.concatenate([part.ravel() for part in parts])
         received = np.empty(sum(sizes), sent.dtype)
         outgoing, incoming = [sent, [part.size for part in parts]], [received, sizes]
         self.ranks.wait(self.ranks.comm.Ialltoallv(outgoing, incoming))
-        blocks = np.split(received, np.cumsum(sizes)[:-1])
-        return [block.reshape(shape) for block, shape in zip(blocks, shapes, strict=True)]
+        return received
 
     def collect(self, field: Field) -> Field | None:
         """All of a field, on the first process; None on the others."""
