@@ -14,7 +14,7 @@ from paper.stress import mean_stress, tail_exponent
 
 from gfmd_cli.analysis.compare import compare
 from gfmd_cli.analysis.distribution import distributions
-from gfmd_cli.physics.observables import logarithmic_middles
+from gfmd_cli.physics.observables import LOGARITHMIC_EDGES, geometric_middles
 
 WINDOWS = ((2.0, 6.0), (4.0, 8.0), (4.0, 12.0), (6.0, 13.0), (8.0, 16.0), (10.0, 20.0))
 
@@ -23,7 +23,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--study", type=Path, default=Path("results/paper/fig13.h5"))
     (distribution,) = distributions(compare(parser.parse_args().study))
-    sigma, rows = logarithmic_middles(), []
+    sigma, rows = geometric_middles(LOGARITHMIC_EDGES), []
     finest = distribution.finest["points"]
     studied = distribution.counts.shape[1]
     for place in range(studied):

@@ -13,13 +13,13 @@ from gfmd_cli.analysis.tables import power_laws
 from gfmd_cli.physics.contact import build_scene
 from gfmd_cli.physics.elastomers import Power
 from gfmd_cli.physics.indenters import Parabola
-from gfmd_cli.physics.observables import contact_points, logarithmic_edges, observe
+from gfmd_cli.physics.observables import LOGARITHMIC_EDGES, contact_points, observe
 from gfmd_cli.solvers.auto import Auto
 from gfmd_cli.solvers.nested_grids import solve_contact
 from gfmd_cli.spec.parse import read_spec
 from gfmd_cli.study.run import RunOptions, run_study
 
-EDGES = logarithmic_edges()
+EDGES = LOGARITHMIC_EDGES
 MIDDLE, WIDTH = np.sqrt(EDGES[1:] * EDGES[:-1]), np.diff(EDGES)
 SPEC = power_spec(n=1, points=[64, 128, 256], p_star=0.1)
 

@@ -11,8 +11,8 @@ from specs import power_spec
 from gfmd_cli.errors import InputError
 from gfmd_cli.physics.contact import build_scene
 from gfmd_cli.physics.elastomers import Power
-from gfmd_cli.physics.observables import linear_edges, logarithmic_edges
-from gfmd_cli.physics.patches import area_edges
+from gfmd_cli.physics.observables import LINEAR_EDGES, LOGARITHMIC_EDGES
+from gfmd_cli.physics.patches import AREA_EDGES
 from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.spec.models import ON_REQUEST, OutputTable
 from gfmd_cli.spec.parse import read_spec
@@ -60,7 +60,7 @@ def test_patches_make_up_the_contact_area(study):
     for row in read_rows(study):
         assert row["patches"] * row["patch_area_mean"] == pytest.approx(row["a_r"], rel=1e-12)
         assert row["patch_area_mean"] <= row["patch_area_largest"] <= row["a_r"] * (1 + 1e-12)
-        assert row["pr_patch_area"] @ np.diff(area_edges()) == pytest.approx(1, rel=1e-12)
+        assert row["pr_patch_area"] @ np.diff(AREA_EDGES) == pytest.approx(1, rel=1e-12)
 
 
 def test_full_contact_is_one_rigid_patch_that_seals(study):
@@ -80,7 +80,7 @@ def test_under_small_loads_the_gap_leaks_and_yields(study):
 
 
 def test_the_gap_distribution_is_normalised_and_has_the_mean_gap(study):
-    linear, logarithmic = linear_edges(), logarithmic_edges()
+    linear, logarithmic = LINEAR_EDGES, LOGARITHMIC_EDGES
     for row in read_rows(study):
         inside = row["pr_gap"] @ np.diff(linear)
         assert row["pr_gap_zero"] + inside + row["pr_gap_beyond"] == pytest.approx(1, rel=1e-12)

@@ -8,8 +8,8 @@ from hypothesis.extra.numpy import arrays
 from scipy import ndimage
 
 from gfmd_cli.physics.patches import (
+    AREA_EDGES,
     area_distribution,
-    area_edges,
     contact_patches,
     open_gap,
     regions,
@@ -158,5 +158,5 @@ def test_regions_do_not_depend_on_where_the_cell_is_cut(mask, i, j):
 def test_the_distribution_of_areas_is_normalised():
     shares = np.array([2.0**-34, 1e-3, 1e-3, 0.2, 1.0])
     density = area_distribution(shares)
-    assert np.sum(density * np.diff(area_edges())) == pytest.approx(1, rel=1e-14)
+    assert np.sum(density * np.diff(AREA_EDGES)) == pytest.approx(1, rel=1e-14)
     assert not area_distribution(np.empty(0)).any()

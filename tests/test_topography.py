@@ -12,6 +12,7 @@ from scipy.io import savemat
 
 from gfmd_cli.errors import InputError
 from gfmd_cli.grid.fft_grid import Grid
+from gfmd_cli.physics import height_map, microscope_files
 from gfmd_cli.physics.contact import build_scene
 from gfmd_cli.physics.elastomers import HalfSpace
 from gfmd_cli.physics.file_surface import FileSurface
@@ -263,11 +264,22 @@ def test_packed_netcdf_heights_are_refused(hdf5, heights):
         read_topography(hdf5(pack, h=heights))
 
 
-def test_a_map_beyond_the_size_limit_is_refused(npy, hdf5, heights):
+@pytest.fixture
+def limit_bytes(monkeypatch):
+    def limit(max_bytes):
+        for module in (height_map, microscope_files):
+            monkeypatch.setattr(module, "MAX_BYTES", max_bytes)
+
+    return limit
+
+
+def test_a_map_beyond_the_size_limit_is_refused(npy, hdf5, heights, limit_bytes):
     for path in (npy(), hdf5(h=heights)):
+        limit_bytes(2047)
         with pytest.raises(InputError, match="take 2048 bytes; at most 2047"):
-            read_topography(path, max_bytes=2047)
-        assert read_topography(path, max_bytes=2048).heights.shape == (16, 16)
+            read_topography(path)
+        limit_bytes(2048)
+        assert read_topography(path).heights.shape == (16, 16)
 
 
 def test_no_file_a_directory_and_an_empty_file_are_told_apart(tmp_path):
@@ -407,11 +419,12 @@ def test_a_channel_that_holds_no_heights_lists_those_that_do():
         read_topography(SCAN, "Phase")
 
 
-def test_a_scan_beyond_the_size_limit_is_refused():
+def test_a_scan_beyond_the_size_limit_is_refused(limit_bytes):
     pytest.importorskip("SurfaceTopography")
     for limit in (SCAN.stat().st_size - 1, 256 * 256 * 8 - 1):
+        limit_bytes(limit)
         with pytest.raises(InputError, match=f"at most {limit}"):
-            read_topography(SCAN, max_bytes=limit)
+            read_topography(SCAN)
 
 
 def write_text_map(path, height="2 um", first="1"):

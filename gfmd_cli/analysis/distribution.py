@@ -22,7 +22,7 @@ import numpy as np
 from gfmd_cli.analysis.compare import Comparison, Curve, Row, of_study, solver_of
 from gfmd_cli.analysis.units import contact_title
 from gfmd_cli.grid.arrays import Field
-from gfmd_cli.physics.observables import estimated_patches, logarithmic_edges
+from gfmd_cli.physics.observables import LOGARITHMIC_EDGES, estimated_patches
 from gfmd_cli.status import Status
 from gfmd_cli.study.columns import BINS, PR_LOGARITHMIC
 
@@ -34,7 +34,7 @@ MIN_DEPTH = 0.75  # distance from the edge, in spacings, below which a bin is no
 
 def bin_counts(row: Row, name: str = PR_LOGARITHMIC) -> Field:
     """Grid points in each bin of Pr(sigma): density times width times the points of the cell."""
-    widths = np.diff(BINS[name].edges())
+    widths = np.diff(BINS[name].edges)
     return np.nan_to_num(row[name]) * widths * row["points"] * row["points_y"]
 
 
@@ -59,10 +59,10 @@ def extrapolate(counts: Field, cells: Sequence[int]) -> Extrapolated:
 
     Parameters
     ----------
-    counts : points in the bins of `logarithmic_edges`, shape (grids, bins), grids rising by twos
+    counts : points in the bins of `LOGARITHMIC_EDGES`, shape (grids, bins), grids rising by twos
     cells : points of each grid's cell, or of all cells that were counted together
     """
-    widths = np.diff(logarithmic_edges())
+    widths = np.diff(LOGARITHMIC_EDGES)
     with np.errstate(divide="ignore", invalid="ignore"):
         log = np.log(counts / (widths * np.asarray(cells, dtype=np.float64)[:, None]))
         noise = 1 / counts
@@ -138,7 +138,7 @@ class StressDistribution:
     @cached_property
     def grids(self) -> Field:
         """Density on each grid, mean over the seeds, shape (grids, bins)."""
-        widths = np.diff(logarithmic_edges())
+        widths = np.diff(LOGARITHMIC_EDGES)
         return self.counts.sum(axis=0) / (np.array(self.cells)[:, None] * widths)
 
     @cached_property

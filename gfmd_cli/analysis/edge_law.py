@@ -20,7 +20,7 @@ import numpy as np
 
 from gfmd_cli.analysis.distribution import PRIOR_SEEDS, StressDistribution
 from gfmd_cli.grid.arrays import Field
-from gfmd_cli.physics.observables import logarithmic_edges, logarithmic_middles
+from gfmd_cli.physics.observables import LOGARITHMIC_EDGES, geometric_middles
 
 USABLE = 0.3  # largest relative error of a bin in a fit
 NEAREST = 3  # bins next to the limit of resolution that the law of the edge is drawn through
@@ -112,7 +112,7 @@ def fit(stress: StressDistribution, law: str) -> Fit | None:
     n, small = stress.curve.n, law == "small"
     if not (small or n > 2):
         return None
-    edges, middle = logarithmic_edges(), logarithmic_middles()
+    edges, middle = LOGARITHMIC_EDGES, geometric_middles(LOGARITHMIC_EDGES)
     mean = stress.finest["p_star"] / stress.a_r
     usable = np.isfinite(stress.density) & (stress.error < USABLE)
     usable &= middle < SMALL * mean if small else middle > LARGE * mean
@@ -182,6 +182,6 @@ def _line(
 def _bending(exponent: float) -> float:
     """ln of the mean of sigma^exponent over a bin over its value in the (geometric) middle."""
     node, weight = np.polynomial.legendre.leggauss(5)
-    ratio = np.sqrt(logarithmic_edges()[1] / logarithmic_edges()[0])
+    ratio = np.sqrt(LOGARITHMIC_EDGES[1] / LOGARITHMIC_EDGES[0])
     sigma = 0.5 * (ratio + 1 / ratio) + 0.5 * (ratio - 1 / ratio) * node
     return float(np.log(0.5 * weight @ sigma**exponent))

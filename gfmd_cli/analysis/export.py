@@ -110,7 +110,7 @@ def _labelled_study(path: Path) -> Any:
         for bins in HISTOGRAMS:
             if rows and bins.name in rows[0]:
                 variables[bins.name] = _of_tasks(rows, bins.column, bins.axis)
-                about = {"units": "1", "long_name": bins.axis_meaning, "edges": bins.edges()}
+                about = {"units": "1", "long_name": bins.axis_meaning, "edges": bins.edges}
                 coordinates[bins.axis] = (bins.axis,), bins.middles(), about
         variables |= _curves(study)
         return _xarray().Dataset(variables, coordinates, study.attributes)

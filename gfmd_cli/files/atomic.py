@@ -14,12 +14,12 @@ from gfmd_cli.errors import SpaceError
 
 
 class NewFile(io.FileIO):
-    """A file being written whose first error waits: HDF5 crashes at exit if a write fails."""
+    """A new file that keeps its first error: HDF5 crashes at exit if a write fails."""
 
     error: OSError | None = None
 
     def write(self, content: Any) -> int:
-        """Write all of it, or note why not and drop it and all that follows."""
+        """Write all of the content; keep the first error and write nothing after it."""
         view = memoryview(content).cast("B")
         size = len(view)
         try:
@@ -32,7 +32,7 @@ class NewFile(io.FileIO):
 
 @contextmanager
 def new_file(path: Path, aside: Path | None = None) -> Iterator[NewFile]:
-    """A file that is at `path` once the block has ended well: written aside, synced, renamed.
+    """A file that appears at `path` if the block ends without an error: written aside and renamed.
 
     `aside` is the folder to write it in, on the same file system; by default that of `path`.
     Raises SpaceError where it cannot be written.

@@ -1,4 +1,4 @@
-"""Folders for what is kept between runs and can be lost: FFTW's plans, compiled code."""
+"""Folders for files that can be made again: FFTW's plans and compiled code."""
 
 import os
 import stat
@@ -8,12 +8,12 @@ from pathlib import Path
 
 
 def cache_folder() -> Path:
-    """The user's cache for this program; one of temporary files for a user without a home."""
+    """The user's cache for this program; without a home directory, a temporary folder."""
     if home := os.environ.get("XDG_CACHE_HOME"):
         return Path(home) / "gfmd"
     try:
         return Path.home() / ".cache" / "gfmd"
-    except RuntimeError:  # no HOME, and nobody of this number is known to the system
+    except RuntimeError:  # no HOME, and the system does not know the user id
         return private_folder() or Path(os.devnull) / "gfmd"
 
 

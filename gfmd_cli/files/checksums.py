@@ -12,7 +12,7 @@ from gfmd_cli.files.atomic import NewFile
 
 SEAL = b"gfmd"  # followed by four bytes, the crc32 of all before
 CHUNK = 2**24  # bytes that are read at a time
-MAX_SPARSENESS = 1032  # bytes of a file per byte on the disk: what the best compression reaches
+MAX_COMPRESSION = 1032  # of files and data: the limit of deflate, https://zlib.net/zlib_tech.html
 MIN_BLOCK = 4096  # bytes that a file takes at least; small ones may be stored in its inode
 
 
@@ -49,7 +49,7 @@ def check_seal(file: BinaryIO) -> int:
 
 def check_stored(status: os.stat_result) -> None:
     """Raise ValueError where a file claims far more bytes than the disk holds of it."""
-    if status.st_size > MAX_SPARSENESS * max(512 * status.st_blocks, MIN_BLOCK):
+    if status.st_size > MAX_COMPRESSION * max(512 * status.st_blocks, MIN_BLOCK):
         raise ValueError("a sparse file")
 
 

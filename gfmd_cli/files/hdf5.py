@@ -138,8 +138,8 @@ def take(group: Any, path: str, compression: float = 1.0) -> Any:
     path : below the group
     compression : how many times larger than on the disk it may be
 
-    Text is of a fixed length. Raises KeyError where there is none, ValueError where it is not what
-    it seems.
+    Text is of a fixed length. Raises KeyError where there is no dataset, ValueError where it is
+    stored elsewhere, has another type, or claims more data than are stored.
     """
     return h5py.Dataset(_checked(group, path, compression))
 

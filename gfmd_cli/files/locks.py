@@ -26,11 +26,11 @@ OWNED_SECONDS = 600.0  # to wait for the owner of a plain lock, who may be dead 
 
 @contextmanager
 def locked(path: Path, *, shared: bool = False, wait: bool = True) -> Iterator[bool]:
-    """Inside, this process has a lock file; the kernel takes it from a process that dies.
+    """Hold a lock file inside the block; the kernel releases that of a process that dies.
 
-    Its holder may delete the file: a process that waited for it then takes the one that is there
-    now. Yields whether it was got, always true where `wait` is. Raises SpaceError where the file
-    cannot be written.
+    The holder may delete the file: a process that waited for it then locks a new one. Yields
+    whether the lock was obtained, always true if `wait` is. Raises SpaceError where the file cannot
+    be written.
 
     On a file system without locks, the lock is a file beside it with the name of its owner, which
     others respect. It cannot be shared: a second process is refused with a SpaceError, and so is
@@ -64,9 +64,9 @@ def _opened(path: Path) -> BinaryIO:
     for _ in range(ATTEMPTS):
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
-            return open_regular(path, os.O_RDWR | os.O_CREAT)  # NFS asks for both
+            return open_regular(path, os.O_RDWR | os.O_CREAT)  # NFS needs both
         except (FileNotFoundError, FileExistsError) as error:
-            # the folder was deleted just now, perhaps between two looks of mkdir, or cannot be made
+            # the folder was deleted just now, perhaps while mkdir was running, or cannot be made
             reason = error.strerror
             time.sleep(WAIT_SECONDS)
         except OSError as error:

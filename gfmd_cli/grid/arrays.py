@@ -1,6 +1,6 @@
 """Array types shared by the whole package, and how to walk over an array."""
 
-from typing import Any, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,11 @@ Modes: TypeAlias = NDArray[np.complexfloating[Any, Any]]
 
 Mask: TypeAlias = NDArray[np.bool_]
 """A choice of grid points."""
+
+MaskedField: TypeAlias = "np.ma.MaskedArray[Any, Any]"
+"""Real values, masked where they are not known."""
+
+Precision = Literal["double", "single"]
 
 BLOCK = 2**15  # points of a block of rows: it and its temporaries stay in the cache
 

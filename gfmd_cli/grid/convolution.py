@@ -6,23 +6,20 @@ are never stored padded, so that the memory is that of a field padded along x al
 share a field exchange no zero rows either.
 """
 
-from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Iterator
+from dataclasses import dataclass
 from functools import cached_property, partial
-from itertools import pairwise
 from math import prod
-from typing import Literal
 
 import numpy as np
 import pyfftw
 
 from gfmd_cli.grid import plans
-from gfmd_cli.grid.arrays import Field, Modes
+from gfmd_cli.grid.arrays import Field, Modes, Precision
 from gfmd_cli.grid.ranks import Ranks
+from gfmd_cli.grid.rows import LocalRows
 from gfmd_cli.grid.shared_transforms import (
     Execute,
-    Pairs,
-    Plan,
     along_columns,
     along_rows,
     in_turn,
@@ -32,7 +29,6 @@ from gfmd_cli.grid.transposition import Span, Transposition, column_spans
 
 BLOCK = 2**14  # coefficients of a block of columns: 256 KiB, in the cache of a core
 NARROWEST = 8  # columns of a block; four make a line of the cache
-PLANNING = 30.0  # seconds at most to look for a plan
 
 
 def padded_shape(shape: tuple[int, ...], factor: float) -> tuple[int, ...]:
@@ -43,23 +39,25 @@ def padded_shape(shape: tuple[int, ...], factor: float) -> tuple[int, ...]:
     return tuple(int(pyfftw.next_fast_len(int(np.ceil(factor * n)))) for n in shape)
 
 
+@dataclass(eq=False)
 class PaddedTransform:
     """Maps F^-1 symbol F of real fields of a shape, padded by zeros; symbols are real and even."""
 
-    def __init__(
-        self,
-        shape: tuple[int, ...],
-        padded: tuple[int, ...],
-        precision: Literal["double", "single"] = "double",
-        threads: int = 1,
-    ) -> None:
-        self.shape, self.threads = shape, threads
-        self.pool = ThreadPoolExecutor(threads) if threads > 1 else None
-        self.rows, self.columns = (1, *shape)[-2:]
-        self.padded_rows, self.padded_columns = (1, *padded)[-2:]
-        self.real = np.dtype(np.float64 if precision == "double" else np.float32)
+    shape: tuple[int, ...]
+    """Of the fields."""
+    padded: tuple[int, ...]
+    """Of the padded fields."""
+    precision: Precision = "double"
+    threads: int = 1
+
+    def __post_init__(self) -> None:
+        self.rows, self.columns = (1, *self.shape)[-2:]
+        self.padded_rows, self.padded_columns = (1, *self.padded)[-2:]
+        self.real = np.dtype(np.float64 if self.precision == "double" else np.float32)
         self.modes = self.padded_columns // 2 + 1
         self.width = min(self.modes, max(NARROWEST, BLOCK // self.padded_rows))
+        local_rows = LocalRows(self.own_rows, self.threads)
+        self.pool, self.parts = local_rows.pool, local_rows.parts
 
     @property
     def own_rows(self) -> int:
@@ -68,7 +66,7 @@ class PaddedTransform:
 
     @property
     def span(self) -> Span:
-        """First and last but one wavenumber along x that this process holds."""
+        """First wavenumber along x that this process holds, and the one after its last."""
         return 0, self.modes
 
     @property
@@ -100,10 +98,10 @@ class PaddedTransform:
         work = self._to_columns(lines)
         symbol = np.empty(self.symbol_shape, self.real)
         block, forward, _ = self._column_plans[0]
-        for part, here in self._blocks(work, block):
-            here[self.padded_rows - self.rows + 1 :] = work[:0:-1, part]
+        for part, coefficients in self._blocks(work, block):
+            coefficients[self.padded_rows - self.rows + 1 :] = work[:0:-1, part]
             forward()
-            symbol[:, part] = here[: len(symbol)].real
+            symbol[:, part] = coefficients[: len(symbol)].real
         return symbol
 
     def apply(self, symbol: Field, field: Field, out: Field) -> Field:
@@ -130,12 +128,12 @@ class PaddedTransform:
         mirrored = symbol[(self.padded_rows - 1) // 2 : 0 : -1]
 
         def filter_share(thread: int, block: Modes, forward: Execute, backward: Execute) -> None:
-            for part, here in self._blocks(work, block, thread, self.threads):
+            for part, coefficients in self._blocks(work, block, thread, self.threads):
                 forward()
-                here[upper] *= symbol[:, part]
-                here[lower] *= mirrored[:, part]
+                coefficients[upper] *= symbol[:, part]
+                coefficients[lower] *= mirrored[:, part]
                 backward()
-                work[:, part] = here[: self.rows]
+                work[:, part] = coefficients[: self.rows]
 
         shares = [partial(filter_share, i, *own) for i, own in enumerate(self._column_plans)]
         side_by_side(self.pool, shares)
@@ -150,10 +148,10 @@ class PaddedTransform:
         count = work.shape[1]
         for start in range(first * self.width, count, step * self.width):
             part = slice(start, min(start + self.width, count))
-            here = block[:, : part.stop - part.start]
-            here[: self.rows] = work[:, part]
-            here[self.rows :] = 0.0
-            yield part, here
+            coefficients = block[:, : part.stop - part.start]
+            coefficients[: self.rows] = work[:, part]
+            coefficients[self.rows :] = 0.0
+            yield part, coefficients
 
     def _to_columns(self, lines: Modes) -> Modes:
         """All rows of the columns of `span`, from the coefficients of the rows."""
@@ -167,10 +165,8 @@ class PaddedTransform:
         """Coefficients of the rows, their values in the same memory, and both transforms."""
         lines = self._empty_lines()
         values = lines.view(self.real)[:, : self.padded_columns]
-        edges = np.linspace(0, len(lines), self.threads + 1).astype(int)
-        parts = [(int(a), int(b)) for a, b in pairwise(edges) if a < b]
-        there, back = _planned(partial(along_rows, values, lines, parts))
-        return lines, values, in_turn(self.pool, there), in_turn(self.pool, back)
+        forward, backward = plans.planned(partial(along_rows, values, lines, self.parts))
+        return lines, values, in_turn(self.pool, forward), in_turn(self.pool, backward)
 
     def _empty_lines(self) -> Modes:
         """Memory of the coefficients of the rows."""
@@ -183,7 +179,7 @@ class PaddedTransform:
         for _ in range(self.threads):
             block = self._empty((self.padded_rows, self.width))
             block[...] = 0.0
-            (forward,), (backward,) = _planned(partial(along_columns, block, 1))
+            (forward,), (backward,) = plans.planned(partial(along_columns, block, 1))
             blocks.append((block, forward, backward))
         return blocks
 
@@ -192,12 +188,7 @@ class PaddedTransform:
         return pyfftw.empty_aligned(shape, dtype=kind)
 
 
-def _planned(make: Callable[[Plan], Pairs]) -> Pairs:
-    """Transforms and their inverses, without 1/size."""
-    limit = {"planning_timelimit": PLANNING}
-    return plans.planned(lambda flags: make(partial(pyfftw.FFTW, flags=flags, **limit)))
-
-
+@dataclass(eq=False, kw_only=True)
 class DistributedPaddedTransform(PaddedTransform):
     """The same for fields and symbols that processes share.
 
@@ -205,30 +196,24 @@ class DistributedPaddedTransform(PaddedTransform):
     the coefficients between the transforms along the two axes.
     """
 
-    def __init__(
-        self,
-        shape: tuple[int, ...],
-        padded: tuple[int, ...],
-        precision: Literal["double", "single"] = "double",
-        threads: int = 1,
-        *,
-        ranks: Ranks,
-        edges: list[int],
-    ) -> None:
-        super().__init__(shape, padded, precision, threads)
-        spans = column_spans(self.modes, ranks.size)
-        self.transposition = Transposition(ranks, edges, spans)
+    ranks: Ranks
+    edges: list[int]
+    """First row of each process, and the number of rows."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        spans = column_spans(self.modes, self.ranks.size)
+        self.transposition = Transposition(self.ranks, self.edges, spans)
 
     @property
     def own_rows(self) -> int:
         """Number of rows of a field that this process holds."""
-        edges, rank = self.transposition.edges, self.transposition.ranks.rank
-        return edges[rank + 1] - edges[rank]
+        return self.edges[self.ranks.rank + 1] - self.edges[self.ranks.rank]
 
     @property
     def span(self) -> Span:
-        """First and last but one wavenumber along x that this process holds."""
-        return self.transposition.spans[self.transposition.ranks.rank]
+        """First wavenumber along x that this process holds, and the one after its last."""
+        return self.transposition.spans[self.ranks.rank]
 
     def _to_columns(self, lines: Modes) -> Modes:
         _, columns, spare = self._memory

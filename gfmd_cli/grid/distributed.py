@@ -6,17 +6,17 @@ other. Every process computes smaller grids as a whole, with identical results.
 """
 
 from dataclasses import dataclass, fields
-from functools import cached_property, partial
+from functools import cached_property
 from itertools import pairwise
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import pyfftw
 
 from gfmd_cli.grid import plans
-from gfmd_cli.grid.arrays import Field, Modes
-from gfmd_cli.grid.convolution import DistributedPaddedTransform, padded_shape
-from gfmd_cli.grid.fft_grid import PLANNING, Grid, Shape
+from gfmd_cli.grid.arrays import Field, Modes, Precision
+from gfmd_cli.grid.convolution import DistributedPaddedTransform, PaddedTransform, padded_shape
+from gfmd_cli.grid.fft_grid import Grid, Shape
 from gfmd_cli.grid.halo import HALO_ROWS, DistributedColumns, DistributedRows, is_distributable
 from gfmd_cli.grid.ranks import Ranks, leads
 from gfmd_cli.grid.rows import LocalRows
@@ -78,30 +78,9 @@ class DistributedGrid(Grid):
         return self.spans[self.ranks.rank]
 
     @property
-    def shape(self) -> Shape:
-        """Shape of the rows of this process."""
-        return self.rows.count, self.points
-
-    @property
-    def spectral_shape(self) -> Shape:
-        """Shape of the coefficients of this process."""
-        first, last = self.span
-        return self.points_y, last - first
-
-    @property
-    def own(self) -> slice:
-        """The rows of this process."""
-        return slice(*self.row_span)
-
-    @property
     def row_span(self) -> Span:
         """First row of this process, and the row after its last."""
         return self.rows.start, self.rows.stop
-
-    @property
-    def whole(self) -> bool:
-        """Whether this process holds all rows of the grid: it does not."""
-        return False
 
     def total(self, values: Any) -> Any:
         """Sum over all processes."""
@@ -110,10 +89,6 @@ class DistributedGrid(Grid):
     def max(self, value: float) -> float:
         """Maximum over all processes."""
         return float(self.ranks.gather(value).max())
-
-    def line(self, symbol: Field) -> Field:
-        """The values of a symbol along x, of all processes."""
-        return self._gathered(symbol[0], [last - first for first, last in self.spans])
 
     def column(self, symbol: Field) -> Field:
         """The values of a symbol along y, which the first process holds."""
@@ -148,15 +123,12 @@ class DistributedGrid(Grid):
         spare = self._memory[1].view(work.dtype)
         lines = self._lines()
         real = lines.view(self.real)[:, : self.points]
-
         parts, pool = self.rows.parts, self.rows.pool
 
-        def plan(flags: tuple[str, ...]) -> tuple[Pairs, Pairs]:
-            limit = PLANNING[0] + PLANNING[1] * real.size
-            fftw = partial(pyfftw.FFTW, flags=flags, planning_timelimit=limit)
+        def make(fftw: plans.Plan) -> tuple[Pairs, Pairs]:
             return along_rows(real, lines, parts, fftw), along_columns(work, len(parts), fftw)
 
-        (along, back_along), (across, back_across) = plans.planned(plan)
+        (along, back_along), (across, back_across) = plans.planned(make, real.size)
 
         def forward() -> None:
             side_by_side(pool, along)
@@ -185,9 +157,7 @@ class DistributedGrid(Grid):
     def _transposition(self) -> Transposition:
         return Transposition(self.ranks, self.rows.edges, self.spans)
 
-    def padded_transform(
-        self, factor: float, precision: Literal["double", "single"] = "double"
-    ) -> DistributedPaddedTransform:
+    def padded_transform(self, factor: float, precision: Precision = "double") -> PaddedTransform:
         """Transforms of fields that are padded by zeros; see `Grid.padded_transform`."""
         padded = padded_shape(self.whole_shape, factor)
         edges = self.rows.edges
@@ -230,48 +200,28 @@ class DistributedGrid(Grid):
         rank, count = self.ranks.rank, self.ranks.size
         source_spans = _spans(source, [(0, kept), *[(0, 0)] * (count - 1)], kept)
         target_spans = _spans(target, [(0, kept)] * count, kept)
-        send_spans = [_shared(source_spans[rank], span) for span in target_spans]
-        receive_spans = [_shared(span, target_spans[rank]) for span in source_spans]
-        send_buffer = np.concatenate(
-            [rows[:, slice(*_from(s, source_spans[rank]))].ravel() for s in send_spans]
-        )
-        height = len(rows)
-        receive_buffer = np.empty(height * sum(b - a for a, b in receive_spans), rows.dtype)
-        outgoing = [send_buffer, [height * (b - a) for a, b in send_spans]]
-        incoming = [receive_buffer, [height * (b - a) for a, b in receive_spans]]
-        self.ranks.wait(self.ranks.comm.Ialltoallv(outgoing, incoming))
-        first, last = target_spans[rank]
-        gathered, at = np.empty((height, last - first), rows.dtype), 0
-        for a, b in receive_spans:
-            end = at + height * (b - a)
-            gathered[:, a - first : b - first] = receive_buffer[at:end].reshape(height, b - a)
-            at = end
-        return gathered
+        own, wanted = source_spans[rank], target_spans[rank]
+        parts = [rows[:, _shared(own, span, own[0])] for span in target_spans]
+        columns = [_shared(span, wanted) for span in source_spans]
+        sizes = [len(rows) * (c.stop - c.start) for c in columns]
+        blocks = np.split(self._exchanged(parts, sizes), np.cumsum(sizes)[:-1])
+        return np.concatenate([block.reshape(len(rows), -1) for block in blocks], axis=1)
 
     def gather_rows(self, values: Any, span: Span) -> Any:
         """The rows `span` of the grid, of all processes; each process may need others."""
         own = self.row_span
-        send_spans = [_shared(own, (int(a), int(b))) for a, b in self.ranks.gather(span)]
-        receive_spans = [_shared(other, span) for other in pairwise(self.rows.edges)]
-        sent = np.concatenate([values[slice(*_from(part, own))] for part in send_spans])
-        rows = np.empty((span[1] - span[0], *values.shape[1:]), values.dtype)
-        outgoing, incoming = (
-            [array, [(b - a) * values[0].size for a, b in parts]]
-            for array, parts in ((sent, send_spans), (rows, receive_spans))
-        )
-        self.ranks.wait(self.ranks.comm.Ialltoallv(outgoing, incoming))
-        return rows
+        parts = [values[_shared(own, (int(a), int(b)), own[0])] for a, b in self.ranks.gather(span)]
+        rows = [_shared(other, span) for other in pairwise(self.rows.edges)]
+        sizes = [(r.stop - r.start) * values[0].size for r in rows]
+        return self._exchanged(parts, sizes).reshape(-1, *values.shape[1:])
 
-    def next_row(self, lines: Any) -> Any:
-        """The first row of the next process."""
-        rank, count = self.ranks.rank, self.ranks.size
-        gathered = np.empty_like(lines[0])
-        first = np.ascontiguousarray(lines[0])
-        comm = self.ranks.comm
-        self.ranks.wait(
-            comm.Irecv(gathered, (rank + 1) % count), comm.Isend(first, (rank - 1) % count)
-        )
-        return gathered
+    def _exchanged(self, parts: list[Any], sizes: list[int]) -> Any:
+        """Send a part to each process; return the numbers of these sizes that each has sent."""
+        sent = np.concatenate([part.ravel() for part in parts])
+        received = np.empty(sum(sizes), sent.dtype)
+        outgoing, incoming = [sent, [part.size for part in parts]], [received, sizes]
+        self.ranks.wait(self.ranks.comm.Ialltoallv(outgoing, incoming))
+        return received
 
     def collect(self, field: Field) -> Field | None:
         """All of a field, on the first process; None on the others."""
@@ -300,10 +250,7 @@ def _spans(grid: Grid, whole: list[Span], kept: int) -> list[Span]:
     return [(min(a, kept), min(b, kept)) for a, b in grid.spans]
 
 
-def _shared(one: Span, other: Span) -> Span:
+def _shared(one: Span, other: Span, origin: int = 0) -> slice:
+    """The indices in both spans, counted from `origin`."""
     first, last = max(one[0], other[0]), min(one[1], other[1])
-    return first, max(first, last)
-
-
-def _from(span: Span, start: Span) -> Span:
-    return span[0] - start[0], span[1] - start[0]
+    return slice(first - origin, max(first, last) - origin)

@@ -7,23 +7,22 @@ Coefficients are kept for non-negative wavenumbers of the last axis only (real t
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from math import prod
-from typing import Any, Literal, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 import pyfftw
 
 from gfmd_cli.grid import kernels, plans
-from gfmd_cli.grid.arrays import Field, Modes
+from gfmd_cli.grid.arrays import Field, Modes, Precision
 from gfmd_cli.grid.convolution import PaddedTransform, padded_shape
 from gfmd_cli.grid.pixels import average_along_x, average_rows, covered_rows
 from gfmd_cli.grid.rows import LocalRows
-from gfmd_cli.grid.shared_transforms import Execute, Pair, in_place
+from gfmd_cli.grid.shared_transforms import Execute, in_place
 from gfmd_cli.grid.transposition import Span
 
 T = TypeVar("T")
-ALL = slice(None)
+ALL_ROWS = slice(None)
 THREADED = 512  # points per side from which a second thread pays
-PLANNING = (30.0, 1e-6)  # seconds at most to look for a plan, at all and per grid point
 Shape = tuple[int, ...]
 """Numbers of points along the axes of a field, (y, x), or (x,) of a line."""
 
@@ -38,7 +37,7 @@ class Grid:
     length: float = 1.0
     """Side of the cell along x [m]."""
     threads: int = 1
-    precision: Literal["double", "single"] = "double"
+    precision: Precision = "double"
     """Of fields and transforms."""
     points_y: int = 0
     """Number of points along y; 0 stands for as many as along x. A line has one."""
@@ -68,8 +67,9 @@ class Grid:
 
     @property
     def shape(self) -> Shape:
-        """Shape of the part of a real field that this process holds, here all of it."""
-        return self.whole_shape
+        """Shape of the part of a real field that this process holds."""
+        first, last = self.row_span
+        return (last - first, self.points)[-self.dimension :]
 
     @property
     def sides(self) -> tuple[float, ...]:
@@ -96,8 +96,9 @@ class Grid:
 
     @property
     def spectral_shape(self) -> Shape:
-        """Shape of its Fourier coefficients."""
-        return (*self.shape[:-1], self.points // 2 + 1)
+        """Shape of the Fourier coefficients that this process holds: all rows, some columns."""
+        first, last = self.span
+        return (*self.whole_shape[:-1], last - first)
 
     @property
     def size(self) -> int:
@@ -118,8 +119,8 @@ class Grid:
 
     @property
     def own(self) -> slice:
-        """The rows of the grid that a field of this process holds."""
-        return ALL
+        """The rows of the grid that a field of this process holds; all points of a line."""
+        return slice(*self.row_span) if self.dimension == 2 else ALL_ROWS
 
     @property
     def row_span(self) -> Span:
@@ -129,13 +130,13 @@ class Grid:
     @property
     def whole(self) -> bool:
         """Whether this process holds all rows of the grid."""
-        return True
+        return self.shape == self.whole_shape
 
     def empty(self) -> Field:
         """A real field, aligned for the transforms, values undefined."""
         return pyfftw.empty_aligned(self.shape, dtype=self.real)
 
-    def mode_number(self, rows: slice = ALL) -> Field:
+    def mode_number(self, rows: slice = ALL_ROWS) -> Field:
         """|q| L / 2 pi of every coefficient, shape `spectral_shape` (or of some of its rows).
 
         L is the side along x, so that the numbers are whole for waves along x only.
@@ -145,18 +146,18 @@ class Grid:
             return along[rows]
         return np.sqrt(self.mode_number_y(rows)[:, None] ** 2 + along**2)
 
-    def mode_number_y(self, rows: slice = ALL) -> Field:
+    def mode_number_y(self, rows: slice = ALL_ROWS) -> Field:
         """q_y L / 2 pi of the rows of coefficients, where L is the side along x."""
         across = np.fft.fftfreq(self.points_y, 1 / self.points_y)[rows]
         return across * (self.length / self.length_y)
 
-    def wavenumber(self, rows: slice = ALL) -> Field:
+    def wavenumber(self, rows: slice = ALL_ROWS) -> Field:
         """|q| of every coefficient [1/m], shape `spectral_shape` (or of some of its rows)."""
         return self.mode_number(rows) * (2 * np.pi / self.length)
 
     def line(self, symbol: Field) -> Field:
         """The values of a symbol along x, from q = 0 to the highest wavenumber."""
-        return symbol.reshape(-1, symbol.shape[-1])[0]
+        return self.gather_columns(self.as_rows(symbol)[:1])[0]
 
     def column(self, symbol: Field) -> Field:
         """The values of a symbol along y, from q = 0 to the highest wavenumber."""
@@ -196,14 +197,7 @@ class Grid:
         """
         work = self._memory[0][: prod(self.spectral_shape)].reshape(self.spectral_shape)
         real = work.view(self.real)[..., : self.points]
-
-        def plan(flags: tuple[str, ...]) -> Pair:
-            limit = PLANNING[0] + PLANNING[1] * self.size
-            fftw = partial(pyfftw.FFTW, flags=flags, planning_timelimit=limit)
-            return in_place(real, work, self.rows, fftw)
-
-        forward, backward = plans.planned(plan)
-        return work, forward, backward
+        return work, *plans.planned(partial(in_place, real, work, self.rows), self.size)
 
     @property
     def work(self) -> Modes:
@@ -276,7 +270,7 @@ class Grid:
 
     @property
     def span(self) -> Span:
-        """First and last but one wavenumber along x of the coefficients that this process holds."""
+        """First wavenumber along x that this process holds, and the one after its last."""
         return 0, self.points // 2 + 1
 
     @property
@@ -323,16 +317,10 @@ class Grid:
         rows = self.gather_rows(values, covered_rows(target.row_span, *of))
         return average_rows(rows, target.row_span, *of).reshape(target.shape)
 
-    def padded_transform(
-        self, factor: float, precision: Literal["double", "single"] = "double"
-    ) -> PaddedTransform:
+    def padded_transform(self, factor: float, precision: Precision = "double") -> PaddedTransform:
         """Transforms of fields that are padded by zeros to `factor` times the points a side."""
         padded = padded_shape(self.whole_shape, factor)
         return PaddedTransform(self.whole_shape, padded, precision, self._threads)
-
-    def next_row(self, lines: Any) -> Any:
-        """The row of a field that follows the rows of this process."""
-        return lines[0]
 
     def collect(self, field: Field) -> Field | None:
         """All of a field, on the first process; None on the others."""
@@ -361,18 +349,15 @@ class Grid:
 
     def take(self, source: "Grid", field: Field) -> Field:
         """A field of another grid, see `resample`."""
-        return source._resample(field, self)
-
-    def _resample(self, field: Field, target: "Grid") -> Field:
-        modes, rows, columns = self.modes_for(target, field)
-        out, kept = target.work, columns.positive
+        modes, rows, columns = source.modes_for(self, field)
+        out, kept = self.work, columns.positive
         out[...] = 0.0
         if self.dimension == 1:
             out[:kept] = modes[:kept]
         else:
             for part in rows.slices:
                 out[part, :kept] = modes[part, :kept]
-        return target.field_of_work(self.size)
+        return self.field_of_work(source.size)
 
     def modes_for(self, target: "Grid", field: Field) -> "tuple[Modes, SharedModes, SharedModes]":
         """Coefficients of a field, without 1/size, for another grid, in `work`.

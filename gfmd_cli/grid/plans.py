@@ -1,8 +1,8 @@
-"""How transforms are planned: measured once and kept, or estimated, which is the same every time.
+"""Plans of Fourier transforms: measured once and stored, or estimated, always the same.
 
-What FFTW measured, its wisdom, is kept as text: of a run beside its study, so that it goes on with
-the plans that it began with, and of all runs in the user's cache. One process plans at a time and
-then tells the others: all processes of a machine compute with the same plans, and so to the same
+FFTW's wisdom (what it has measured) is stored as text: beside the study of a run, so that a resumed
+run uses the plans of the first one, and in the user's cache for other runs. One process at a time
+measures plans and stores them for the others, so that all processes of a machine compute the same
 bits.
 """
 
@@ -13,10 +13,10 @@ import platform
 import re
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from threading import Lock
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import pyfftw
 
@@ -27,8 +27,11 @@ from gfmd_cli.files.locks import locked
 from gfmd_cli.files.regular import read_regular
 
 T = TypeVar("T")
+Plan = Callable[..., Any]
+"""Makes a plan on one thread from source, target, axes and direction."""
 Wisdom = list[str]
 """Text in double and in single precision."""
+PLANNING = (30.0, 1e-6)  # seconds at most to look for a plan, at all and per grid point
 MAX_BYTES = 2**24  # of a file of wisdom
 WISDOM = re.compile(
     r"\([\w. -]+( #x[0-9a-f]{1,8}){4}\n"
@@ -49,7 +52,7 @@ def processor() -> str:
 
 
 def _here() -> dict[str, str]:
-    """What plans depend on."""
+    """The processor and the versions on which plans depend."""
     return {
         "processor": processor(),
         "fftw": pyfftw.fftw_version,
@@ -65,9 +68,9 @@ _estimated = _always_estimated
 
 
 def plan_with(folder: Path | None, *, estimated: bool = False) -> str | None:
-    """From now on keep wisdom in `folder`, which begins with that of the cache, or only estimate.
+    """From now on store wisdom in `folder`, which starts with that of the cache, or only estimate.
 
-    All that this process knew is forgotten. Says so where the folder's wisdom is damaged.
+    The process forgets its own wisdom. Returns a warning if the folder's wisdom is damaged.
     """
     global _folder, _estimated
     with _planner:
@@ -92,29 +95,33 @@ def plans() -> str:
     return "estimated" if _estimated else f"measured {_digest(known) if known else ''}".strip()
 
 
-def planned(plan: Callable[[tuple[str, ...]], T]) -> T:
-    """`plan` with the flags of a planner: of what is known, else measured, and kept for all."""
+def planned(make: Callable[[Plan], T], size: int = 0) -> T:
+    """The transforms that `make` plans: by known plans, else by measured ones, kept for all.
+
+    The time limit of a measurement increases with the number of grid points, `size`.
+    """
+    fftw = partial(pyfftw.FFTW, planning_timelimit=PLANNING[0] + PLANNING[1] * size)
     with _planner:
         if _estimated:
-            return plan(("FFTW_ESTIMATE",))
+            return make(partial(fftw, flags=("FFTW_ESTIMATE",)))
         with suppress(RuntimeError):  # not known
-            return plan(("FFTW_MEASURE", "FFTW_WISDOM_ONLY"))
-        return _measured(plan)
+            return make(partial(fftw, flags=("FFTW_MEASURE", "FFTW_WISDOM_ONLY")))
+        return _measured(make, partial(fftw, flags=("FFTW_MEASURE",)))
 
 
-def _measured(plan: Callable[[tuple[str, ...]], T]) -> T:
-    """`plan`, measured unless another process did, and kept for all."""
+def _measured(make: Callable[[Plan], T], fftw: Plan) -> T:
+    """The transforms that `make` plans, measured unless another process did, and kept for all."""
     folder = _folder or cache_folder()
     with _planning_lock(folder):
         _import(read_wisdom(folder))
         before = _export()
-        pair = plan(("FFTW_MEASURE",))
+        transforms = make(fftw)
         if _export() != before:
             _write(folder, _export())
     if _folder is not None:
         with _planning_lock(cache_folder()):
             _write(cache_folder(), _joined(read_wisdom(cache_folder()), _export()))
-    return pair
+    return transforms
 
 
 def read_wisdom(folder: Path) -> Wisdom | None:
@@ -142,7 +149,7 @@ def _export() -> Wisdom:
 
 
 def _joined(wisdom: Wisdom | None, more: Wisdom) -> Wisdom:
-    """Both, the first where both know a plan: a line each, flags and problem after two words."""
+    """Both; the first where both have a plan: one line each, flags and problem after two words."""
     if wisdom is None:
         return more
     joined = []
@@ -156,14 +163,14 @@ def _joined(wisdom: Wisdom | None, more: Wisdom) -> Wisdom:
 
 
 def _import(wisdom: Wisdom | None) -> None:
-    """Know what others measured."""
+    """Add what other processes measured to the wisdom of this one."""
     if wisdom is not None:
         double, single = wisdom
         pyfftw.import_wisdom((double.encode(), single.encode(), b""))  # third: of long double
 
 
 def _write(folder: Path, wisdom: Wisdom) -> None:
-    """Keep it; where the folder cannot be written, that costs time only."""
+    """Store wisdom, unless the folder cannot be written, which only costs time."""
     data = {"for": _here(), "sha256": _digest(wisdom), "wisdom": wisdom}
     with suppress(SpaceError):
         write_whole(_path(folder), json.dumps(data, indent=1).encode("ascii"))
@@ -171,7 +178,7 @@ def _write(folder: Path, wisdom: Wisdom) -> None:
 
 @contextmanager
 def _planning_lock(folder: Path) -> Iterator[None]:
-    """Inside, no other process plans; that is not assured where the folder cannot be locked."""
+    """Keep other processes from planning inside the block, where the folder can be locked."""
     with ExitStack() as stack:
         if folder not in _without_lock:
             try:

@@ -8,11 +8,11 @@ transforms of 3200^2 took 5 to 50 times as long as on one thread.
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
 from gfmd_cli.grid.arrays import Field, Modes
+from gfmd_cli.grid.plans import Plan
 from gfmd_cli.grid.rows import LocalRows
 from gfmd_cli.grid.transposition import Span
 
@@ -23,8 +23,6 @@ Pair = tuple[Execute, Execute]
 """A transform and its inverse."""
 Pairs = tuple[list[Execute], list[Execute]]
 """The same for some parts of an array."""
-Plan = Callable[..., Any]
-"""Makes a plan on one thread from source, target, axes and direction."""
 
 
 def in_place(real: Field, work: Modes, rows: LocalRows, fftw: Plan) -> Pair:
@@ -41,8 +39,8 @@ def in_place(real: Field, work: Modes, rows: LocalRows, fftw: Plan) -> Pair:
 def along_rows(real: Field, work: Modes, parts: Sequence[Span], fftw: Plan) -> Pairs:
     """The transforms of some parts of the rows of real values to coefficients, and back."""
     arrays = [(real[a:b], work[a:b]) for a, b in parts]
-    there = [fftw(values, modes, (1,), "FFTW_FORWARD").execute for values, modes in arrays]
-    return there, [fftw(modes, values, (1,), "FFTW_BACKWARD").execute for values, modes in arrays]
+    forward = [fftw(values, modes, (1,), "FFTW_FORWARD").execute for values, modes in arrays]
+    return forward, [fftw(modes, values, (1,), "FFTW_BACKWARD").execute for values, modes in arrays]
 
 
 def along_columns(work: Modes, count: int, fftw: Plan) -> Pairs:
@@ -50,8 +48,8 @@ def along_columns(work: Modes, count: int, fftw: Plan) -> Pairs:
     lines = np.linspace(0, -(-work.shape[1] // ALIGNED), count + 1).astype(int)
     edges = np.minimum(lines * ALIGNED, work.shape[1])
     parts = [work[:, a:b] for a, b in pairwise(edges) if a < b]
-    there = [fftw(part, part, (0,), "FFTW_FORWARD").execute for part in parts]
-    return there, [fftw(part, part, (0,), "FFTW_BACKWARD").execute for part in parts]
+    forward = [fftw(part, part, (0,), "FFTW_FORWARD").execute for part in parts]
+    return forward, [fftw(part, part, (0,), "FFTW_BACKWARD").execute for part in parts]
 
 
 def in_turn(pool: ThreadPoolExecutor | None, *stages: Sequence[Execute]) -> Execute:

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from gfmd_cli.errors import InputError
+from gfmd_cli.files.checksums import MAX_COMPRESSION
 
 AXIS_NAMES = {
     **dict.fromkeys(("x", "lon", "longitude"), "x"),
@@ -43,9 +44,9 @@ class Axis(NamedTuple):
     """Metres per unit of the positions, None where they state no unit."""
 
 
-def axes_of(path: Path, file: Any, data: Any, compression: float) -> list[Axis]:
+def axes_of(path: Path, file: Any, data: Any) -> list[Axis]:
     """The axes of a dataset. Raises InputError for uneven positions, or an unknown unit."""
-    return [_axis(path, file, dimension, compression) for dimension in data.dims]
+    return [_axis(path, file, dimension) for dimension in data.dims]
 
 
 def stated_unit(data: Any) -> str:
@@ -78,7 +79,7 @@ def is_transposed(axes: Sequence[Axis]) -> bool:
     return [AXIS_NAMES.get(axis.name.lower()) for axis in axes] == ["x", "y"]
 
 
-def _axis(path: Path, file: Any, dimension: Any, compression: float) -> Axis:
+def _axis(path: Path, file: Any, dimension: Any) -> Axis:
     from gfmd_cli.files.hdf5 import take
 
     if not len(dimension):
@@ -89,7 +90,7 @@ def _axis(path: Path, file: Any, dimension: Any, compression: float) -> Axis:
     is_empty = bytes(scale.attrs.get("NAME", b"")).startswith(NO_VARIABLE)
     if is_empty or scale.dtype.kind not in "iuf" or scale.ndim != 1:
         return Axis(label, None, None)
-    positions = np.asarray(take(file, name, compression)[()], dtype=np.float64)
+    positions = np.asarray(take(file, name, MAX_COMPRESSION)[()], dtype=np.float64)
     if positions.size < 2:
         return Axis(label, None, None)
     steps = np.diff(positions)

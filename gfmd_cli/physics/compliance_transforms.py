@@ -29,10 +29,9 @@ import numpy as np
 from scipy.special import erfc, j0, j1
 
 from gfmd_cli.grid.arrays import Field
+from gfmd_cli.grid.fft_grid import ALL_ROWS, Shape
 from gfmd_cli.physics import free_compliance
 from gfmd_cli.physics.free_compliance import (
-    ALL_ROWS,
-    Shape,
     Spacings,
     by_corners,
     near_shape,

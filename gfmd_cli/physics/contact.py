@@ -17,7 +17,7 @@ import numpy as np
 from gfmd_cli.errors import InputError
 from gfmd_cli.grid.arrays import Field, Mask, Modes, row_blocks
 from gfmd_cli.grid.compilation import kernel
-from gfmd_cli.grid.fft_grid import Grid, Shape, multiplicity
+from gfmd_cli.grid.fft_grid import ALL_ROWS, Grid, Shape, multiplicity
 from gfmd_cli.grid.ranks import Ranks
 from gfmd_cli.physics.elastomers import LinearElastomer
 from gfmd_cli.physics.indenters import RigidSurface
@@ -37,7 +37,6 @@ The contact state of a point with such a gap and such a stress is uncertain. Mea
 4 and slabs at residuals of 1e-2 to 1e-4 (128^2): the area was wrong by at most three points more
 than these, and with a factor of 1 by up to 17. At n = 0.25 by up to 9.
 """
-ALL_ROWS = slice(None)
 DEEP = -1e30
 """Height where nothing can touch [h_std]: below all displacements, with a square in range."""
 

@@ -19,8 +19,9 @@ from pydantic import model_validator
 from gfmd_cli.choice import Choice, FilePath, Positive
 from gfmd_cli.errors import InputError
 from gfmd_cli.grid.arrays import Field
+from gfmd_cli.grid.fft_grid import ALL_ROWS, Shape
 from gfmd_cli.physics.compliance_transforms import Compliance, separated
-from gfmd_cli.physics.free_compliance import ALL_ROWS, Shape, Spacings, power_law
+from gfmd_cli.physics.free_compliance import Spacings, power_law
 from gfmd_cli.physics.interpolation import monotone_cubic
 from gfmd_cli.physics.persson import gamma_n, gamma_slab
 
@@ -315,7 +316,7 @@ class Layer(LinearElastomer):
         return self.E_star * (1 - nu) ** 2 / ((1 - 2 * nu) * self.thickness)
 
     def decays(self, dimension: int) -> bool:
-        """Exponentially."""
+        """True: displacements decay exponentially, over the thickness."""
         return True
 
     def free_compliance(self, shape: Shape, spacings: Spacings, rows: slice = ALL_ROWS) -> Field:
@@ -458,8 +459,8 @@ def layer_softening(t: Field, poisson: float | None) -> Field:
     if poisson is None:
         return np.expm1(-2 * t) ** 2 / (4 * t * decay - np.expm1(-4 * t))
     kappa = 3 - 4 * poisson
-    above = -kappa * np.expm1(-4 * t) - 4 * t * decay
-    return above / (kappa * (1 + decay**2) + (4 * t**2 + 1 + kappa**2) * decay)
+    numerator = -kappa * np.expm1(-4 * t) - 4 * t * decay
+    return numerator / (kappa * (1 + decay**2) + (4 * t**2 + 1 + kappa**2) * decay)
 
 
 def slab_factor(t: Field) -> Field:
@@ -476,5 +477,5 @@ def slab_factor(t: Field) -> Field:
     for divisor in (272.0, 210.0, 156.0, 110.0, 72.0, 42.0, 20.0):  # 17*16, 15*14, ..., 5*4
         tail = 1.0 + small**2 / divisor * tail
     difference = np.where(t < 1, small**3 / 3 * decay * tail, rising - 2 * t * decay)
-    whole = np.maximum(4 * t * decay**2 - np.expm1(-4 * t), 1e-300)  # not zero at t = 0
-    return difference * ((rising + 2 * t * decay) / whole)
+    denominator = np.maximum(4 * t * decay**2 - np.expm1(-4 * t), 1e-300)  # not zero at t = 0
+    return difference * ((rising + 2 * t * decay) / denominator)

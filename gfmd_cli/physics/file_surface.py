@@ -8,7 +8,7 @@ from pydantic import Field as Key
 
 from gfmd_cli.choice import FilePath, Positive
 from gfmd_cli.errors import InputError
-from gfmd_cli.grid.arrays import Field, Mask
+from gfmd_cli.grid.arrays import Field, Mask, MaskedField
 from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.physics import map_warnings
 from gfmd_cli.physics.height_map import extent
@@ -216,7 +216,7 @@ class FileSurface(RigidSurface):
     def _is_periodic(self) -> bool:
         return self._stated_periodic() is not False
 
-    def measured_map(self) -> "tuple[np.ma.MaskedArray[Any, Any], tuple[float, ...]]":
+    def measured_map(self) -> tuple[MaskedField, tuple[float, ...]]:
         """Levelled heights [m] as measured, masked where missing, and their spacing [m].
 
         Nothing is subtracted from a map that is taken as periodic, unless `level` says so.
@@ -265,12 +265,9 @@ class FileSurface(RigidSurface):
 
     def pictures(self) -> dict[str, Picture]:
         """The map as it is in the file, and as it is solved."""
-        topography, spacing = self._topography(), self._map_spacing()
-        shape, prepared = topography.heights.shape, _prepared(self)
-        sides = tuple(n * step for n, step in zip(shape, spacing, strict=True))
-        cell = tuple(n * step for n, step in zip(prepared.shape, spacing, strict=True))
+        topography, sides = self._topography(), tuple(side / self.copies for side in self.sides)
         measured = picture(self.scale * topography.heights, sides, topography.missing)
-        return {"measured": measured, "prepared": picture(prepared, cell)}
+        return {"measured": measured, "prepared": picture(_prepared(self), self.sides)}
 
     def _map_spacing(self) -> tuple[float, ...]:
         """Distance of the points of the map along each axis [m]."""

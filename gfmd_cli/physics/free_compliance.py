@@ -21,13 +21,12 @@ import numpy as np
 from scipy.special import gamma, gammainc, hyp2f1, rgamma
 
 from gfmd_cli.grid.arrays import Field
+from gfmd_cli.grid.fft_grid import ALL_ROWS, Shape
 
 NEAR = 64  # sides of a pixel within which the integral over it is in closed form
 NODES = 2  # of Gauss's rule along each side beyond: relative error below 1e-9 (tested)
 SMALLEST = 1e-12  # (alpha r)^2 below which the smooth part is that at r = 0, within this share
-ALL_ROWS = slice(None)
 
-Shape = tuple[int, ...]
 Spacings = tuple[float, ...]
 
 

@@ -56,9 +56,9 @@ class CoarseGrained(Persson):
         x, lost = np.log(_centres(faces)), -np.diff(gap)
         light = np.exp(x[0]) * lost[0] / (x[1] - x[0])  # v is linear in p for a gap linear in ln p
         v = light + np.append(0.0, np.cumsum(faces[1:-1] * lost))
-        at = np.log(np.where(p > 0, p, 1.0))
-        inside = _interpolated(x, v, at)
-        return np.where(p > 0, inside * np.exp(np.minimum(at - x[0], 0.0)), 0.0)
+        log_p = np.log(np.where(p > 0, p, 1.0))
+        inside = _interpolated(x, v, log_p)
+        return np.where(p > 0, inside * np.exp(np.minimum(log_p - x[0], 0.0)), 0.0)
 
     def mean_gap(self, p: Field | float) -> Field:
         """Mean gap u_g; infinite at p = 0, linear in ln p below the law, zero beyond it.
@@ -73,10 +73,10 @@ class CoarseGrained(Persson):
         faces, gap = self._law
         known = gap > _VANISHED * gap[0]
         x = np.log(_centres(faces)[known])
-        at = np.log(np.where(p > 0, p, 1.0))
-        inside = _interpolated(x, gap[known], at)
-        below = np.maximum(x[0] - at, 0.0) * (gap[0] - gap[1]) / (x[1] - x[0])
-        return np.where(p > 0, np.where(at <= x[-1], inside + below, 0.0), np.inf)
+        log_p = np.log(np.where(p > 0, p, 1.0))
+        inside = _interpolated(x, gap[known], log_p)
+        below = np.maximum(x[0] - log_p, 0.0) * (gap[0] - gap[1]) / (x[1] - x[0])
+        return np.where(p > 0, np.where(log_p <= x[-1], inside + below, 0.0), np.inf)
 
     @cached_property
     def _law(self) -> tuple[Field, Field]:

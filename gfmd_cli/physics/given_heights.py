@@ -1,5 +1,4 @@
-"""Heights that a Python program has in memory: arrays, also of xarray, nested lists, topographies
-of SurfaceTopography."""
+"""Heights in the memory of a Python program: arrays, nested lists, objects of xarray and others."""
 
 from pathlib import Path
 from typing import Any
@@ -16,7 +15,7 @@ from gfmd_cli.physics.height_map import (
     check_type,
     first_line,
 )
-from gfmd_cli.physics.topography import AXES, MAX_BYTES
+from gfmd_cli.physics.topography import AXES
 
 
 def write_heights(path: Path, heights: Any) -> dict[str, Any]:
@@ -48,7 +47,7 @@ def write_heights(path: Path, heights: Any) -> dict[str, Any]:
         values = np.ma.asarray(heights)
     except ValueError as error:
         raise InputError(f"heights: rows of different lengths ({error})") from error
-    check_layout(Path("heights"), values.shape, values.dtype, MAX_BYTES)
+    check_layout(Path("heights"), values.shape, values.dtype)
     with new_file(path) as fresh, new_hdf5(fresh) as file:
         data = file.create_dataset("heights", data=np.ma.filled(values.astype(float), np.nan))
         data.attrs["units"] = unit

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from gfmd_cli.errors import InputError
+from gfmd_cli.files.checksums import MAX_COMPRESSION
 from gfmd_cli.physics.array_coordinates import (
     axes_of,
     factor,
@@ -20,7 +21,7 @@ from gfmd_cli.physics.array_coordinates import (
     stated_unit,
 )
 
-MAX_COMPRESSION = 1032  # the limit of deflate, https://zlib.net/zlib_tech.html
+MAX_BYTES = 2**33  # 32768 x 32768 heights in double precision
 MAX_HEIGHT = 1e30  # in any unit; the usual values for no data are 9.97e36 (netCDF) and 3.4e38
 HEIGHT_NAMES = "h", "height", "heights", "height_map", "z", "topography", "topo", "elevation"
 MAX_LISTED = 20  # names in a message
@@ -53,7 +54,7 @@ def check_type(path: Path, dtype: np.dtype[Any]) -> None:
         raise InputError(f"{path}: data of type {dtype}; heights are real numbers (int or float)")
 
 
-def check_layout(path: Path, shape: tuple[int, ...], dtype: np.dtype[Any], max_bytes: int) -> None:
+def check_layout(path: Path, shape: tuple[int, ...], dtype: np.dtype[Any]) -> None:
     """Raise InputError for anything but real numbers on a map or a line, within the limits."""
     check_type(path, dtype)
     if len(shape) not in (1, 2):
@@ -65,9 +66,9 @@ def check_layout(path: Path, shape: tuple[int, ...], dtype: np.dtype[Any], max_b
             f"{path}: {extent(shape)} points; at least {SMALLEST_MAP} along each axis are needed"
         )
     needed = math.prod(shape) * np.dtype(np.float64).itemsize
-    if needed > max_bytes:
+    if needed > MAX_BYTES:
         raise InputError(
-            f"{path}: {extent(shape)} heights take {needed} bytes; at most {max_bytes} are "
+            f"{path}: {extent(shape)} heights take {needed} bytes; at most {MAX_BYTES} are "
             "allowed: resample the map, or save a part of it"
         )
 
@@ -82,23 +83,23 @@ def first_line(error: Exception) -> str:
     return f"{type(error).__name__}: {error}".partition("\n")[0].rstrip(": ")
 
 
-def read_npy(path: Path, dataset: str | None, max_bytes: int) -> HeightMap:
+def read_npy(path: Path, dataset: str | None) -> HeightMap:
     """Map a `.npy` array into memory, which fails where the header states more than is stored."""
     if dataset is not None:
         raise InputError(f"{path}: a .npy file holds one array; leave out dataset {dataset!r}")
     mapped = np.lib.format.open_memmap(path, mode="r")  # reads neither pickles nor archives
-    check_layout(path, mapped.shape, mapped.dtype, max_bytes)
+    check_layout(path, mapped.shape, mapped.dtype)
     return HeightMap(mapped, None, False, None, f"npy, {mapped.dtype}")
 
 
-def read_hdf5(path: Path, dataset: str | None, max_bytes: int) -> HeightMap:
+def read_hdf5(path: Path, dataset: str | None) -> HeightMap:
     """Read one dataset of an HDF5 file, reached by hard links and stored in the file itself."""
     from gfmd_cli.files.hdf5 import open_hdf5, take
 
     with open_hdf5(path) as file:
         name = _dataset_name(path, file, dataset)
         shape = _map_shape(file[name].shape or ())
-        check_layout(path, shape, file[name].dtype, max_bytes)
+        check_layout(path, shape, file[name].dtype)
         data = take(file, name, MAX_COMPRESSION)
         packed = {"scale_factor", "add_offset"} & set(data.attrs)
         if packed:
@@ -130,7 +131,7 @@ def _with_coordinates(path: Path, file: Any, data: Any, bare: HeightMap) -> Heig
     Without positions it is a bare array, whose unit is not read.
     """
     heights = bare.heights
-    axes = axes_of(path, file, data, MAX_COMPRESSION)[-heights.ndim :]
+    axes = axes_of(path, file, data)[-heights.ndim :]
     if is_transposed(axes):
         heights, axes = heights.T, axes[::-1]
     steps = [axis.step for axis in axes if axis.step is not None]
@@ -145,19 +146,16 @@ def _with_coordinates(path: Path, file: Any, data: Any, bare: HeightMap) -> Heig
     if metres is not None:
         is_height = np.abs(heights) < MAX_HEIGHT  # in the unit of the file
         heights = np.ma.masked_where(~is_height, metres * heights.astype(np.float64))
-    if len(metric) == len(axes):
+    has_metric_sides, has_metric_heights = len(metric) == len(axes), metres is not None
+    if has_metric_sides:
         sides = [side * metre for side, metre in zip(sides, metric, strict=True)]
-        known = metres is not None
-        return bare._replace(
-            heights=heights,
-            sides=tuple(sides),
-            metres=True,
-            periodic=False if known else None,
-            metric_heights=known,
-        )
-    if metres is None:
-        return bare._replace(heights=heights, sides=tuple(sides))
-    return bare._replace(heights=heights, metric_heights=True)
+    return bare._replace(
+        heights=heights,
+        sides=tuple(sides) if has_metric_sides or not has_metric_heights else None,
+        metres=has_metric_sides,
+        periodic=False if has_metric_sides and has_metric_heights else None,
+        metric_heights=has_metric_heights,
+    )
 
 
 def _dataset_name(path: Path, file: Any, name: str | None) -> str:

@@ -6,14 +6,14 @@ rough surfaces across the spatial dimensions".
 """
 
 from math import ceil
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import Annotated, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import Field as Key
 from pydantic import model_validator
 
 from gfmd_cli.choice import Choice, Positive
-from gfmd_cli.grid.arrays import Field, Mask
+from gfmd_cli.grid.arrays import Field, Mask, MaskedField
 from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.physics.pictures import Picture
 
@@ -109,7 +109,7 @@ class RigidSurface(Choice):
         """Description of how a map was read and prepared for a boundary; "" for other surfaces."""
         return ""
 
-    def measured_map(self) -> "tuple[np.ma.MaskedArray[Any, Any], tuple[float, ...]] | None":
+    def measured_map(self) -> tuple[MaskedField, tuple[float, ...]] | None:
         """Levelled heights [m] as measured, and their spacing [m]; None where nothing was."""
         return None
 
@@ -153,11 +153,11 @@ class SingleIndenter(RigidSurface):
         """Heights [m] at the points of a grid that this process holds."""
         x = (np.arange(grid.points) / grid.points + self.x_first) * self.length
         if self.dimension == 1:
-            return self.profile(np.abs(x))
+            return self._profile(np.abs(x))
         y = (np.arange(grid.points_y) / grid.points_y + self.x_first) * grid.length_y
-        return self.profile(np.hypot(y[grid.own, None], x))
+        return self._profile(np.hypot(y[grid.own, None], x))
 
-    def profile(self, r: Field) -> Field:
+    def _profile(self, r: Field) -> Field:
         """Heights [m] at distances r >= 0 from the middle of the cell [m]."""
         raise NotImplementedError
 
@@ -182,8 +182,7 @@ class Parabola(RoundIndenter):
     radius: Positive = 1.0
     """Radius of curvature R [m]."""
 
-    def profile(self, r: Field) -> Field:
-        """Heights [m] at distances r from the middle [m]."""
+    def _profile(self, r: Field) -> Field:
         return -(r**2) / (2 * self.radius)
 
 
@@ -201,8 +200,7 @@ class PowerLawIndenter(RoundIndenter):
         """The exponent m, at the tip as elsewhere."""
         return self.exponent
 
-    def profile(self, r: Field) -> Field:
-        """Heights [m] at distances r from the middle [m]."""
+    def _profile(self, r: Field) -> Field:
         return -self.radius * (r / self.radius) ** self.exponent / self.exponent
 
 
@@ -214,8 +212,7 @@ class Cone(RoundIndenter):
     slope: Positive = 1.0
     """Slope of the flanks."""
 
-    def profile(self, r: Field) -> Field:
-        """Heights [m] at distances r from the middle [m]."""
+    def _profile(self, r: Field) -> Field:
         return -self.slope * r
 
 
@@ -236,8 +233,7 @@ class Punch(RoundIndenter):
             raise ValueError(f"radius = {self.radius:g} leaves no rim in a cell of {side:g}")
         return self
 
-    def profile(self, r: Field) -> Field:
-        """Heights [m] at distances r from the middle [m]."""
+    def _profile(self, r: Field) -> Field:
         rim = self.radius * (1 + 1e-12)  # points on the rim belong to the face, up to rounding
         return np.where(r <= rim, 0.0, -self.depth)
 
@@ -255,8 +251,7 @@ class Ridge(LineIndenter):
     width: Annotated[float, Key(gt=0, le=1)] = 1.0
     """Width of the ridge at its foot / L; the rest of the cell is flat."""
 
-    def profile(self, r: Field) -> Field:
-        """Heights [m] at distances r from the middle [m]."""
+    def _profile(self, r: Field) -> Field:
         return -self.slope * np.minimum(r, 0.5 * self.width * self.length)
 
 
@@ -270,8 +265,7 @@ class LineParabola(LineIndenter):
     radius: Positive = 1.0
     """Radius of curvature R [m]."""
 
-    def profile(self, r: Field) -> Field:
-        """Heights [m] at distances r from the middle [m]."""
+    def _profile(self, r: Field) -> Field:
         return -(r**2) / (2 * self.radius)
 
 
@@ -286,6 +280,5 @@ class Wave(LineIndenter):
     amplitude: Positive = 1.0
     """Amplitude [m]."""
 
-    def profile(self, r: Field) -> Field:
-        """Heights [m] at distances r from the middle [m]."""
+    def _profile(self, r: Field) -> Field:
         return self.amplitude * np.cos(2 * np.pi * r / self.length)

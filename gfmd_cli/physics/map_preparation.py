@@ -149,20 +149,20 @@ def _harmonic(known: Field, missing: Mask) -> Field:
     points = np.argwhere(missing)
     number = np.full(missing.shape, -1)
     number[missing] = diagonal = np.arange(len(points))
-    neighbours, right = np.zeros((2, len(points)))
+    counts, right = np.zeros((2, len(points)))
     pairs = []
     for step in ((1, 0), (-1, 0), (0, 1), (0, -1)):
-        there = points + step
-        inside = np.flatnonzero(np.all((there >= 0) & (there < missing.shape), axis=1))
-        beside = tuple(there[inside].T)
-        neighbours[inside] += 1.0
-        right[inside] += known[beside]
-        is_missing = missing[beside]
-        pairs.append((inside[is_missing], number[beside][is_missing]))
+        neighbours = points + step
+        inside = np.flatnonzero(np.all((neighbours >= 0) & (neighbours < missing.shape), axis=1))
+        indices = tuple(neighbours[inside].T)
+        counts[inside] += 1.0
+        right[inside] += known[indices]
+        is_missing = missing[indices]
+        pairs.append((inside[is_missing], number[indices][is_missing]))
     row, column = np.hstack(pairs)
     matrix = coo_array(
         (
-            np.concatenate([neighbours, -np.ones(row.size)]),
+            np.concatenate([counts, -np.ones(row.size)]),
             (np.concatenate([diagonal, row]), np.concatenate([diagonal, column])),
         )
     )

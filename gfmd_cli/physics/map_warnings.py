@@ -1,4 +1,4 @@
-"""Warnings about a measured map: what its user has probably not meant.
+"""Warnings about probable mistakes in the use of a measured map.
 
 Each function returns one warning, or "" without a reason for it.
 """

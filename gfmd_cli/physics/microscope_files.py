@@ -10,6 +10,7 @@ from gfmd_cli.errors import INSTALL, InputError
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.physics.array_coordinates import EVEN, in_metres
 from gfmd_cli.physics.height_map import (
+    MAX_BYTES,
     REMEDY,
     SMALLEST_MAP,
     HeightMap,
@@ -33,10 +34,10 @@ SORTED_ROWS = 20  # heights of so many rows are not sorted by chance; a choice
 SIGNATURE_BYTES = 512  # at the beginning of a file, by which readers recognise their format
 
 
-def read_microscope_file(path: Path, dataset: str | None, max_bytes: int) -> HeightMap:
+def read_microscope_file(path: Path, dataset: str | None) -> HeightMap:
     """Read a microscope file by SurfaceTopography."""
-    if path.stat().st_size > max_bytes:
-        raise InputError(f"{path}: {path.stat().st_size} bytes; at most {max_bytes} are read")
+    if path.stat().st_size > MAX_BYTES:
+        raise InputError(f"{path}: {path.stat().st_size} bytes; at most {MAX_BYTES} are read")
     with path.open("rb") as file, warnings.catch_warnings():
         ignored = (DeprecationWarning, FutureWarning, ImportWarning, RuntimeWarning)
         for category in ignored:  # of other packages
@@ -54,7 +55,7 @@ def read_microscope_file(path: Path, dataset: str | None, max_bytes: int) -> Hei
             raise InputError(f"{path}: {error}") from error
         table = in_utf8(table)
         with _open_scan(path, table, readers) as reader:
-            heights = _read_channel(path, table, reader, dataset, max_bytes)
+            heights = _read_channel(path, table, reader, dataset)
     return heights._replace(notes=(warning,) if warning else ())
 
 
@@ -96,9 +97,7 @@ def _open_scan(path: Path, file: BinaryIO, readers: list[Any]) -> Any:
     )
 
 
-def _read_channel(
-    path: Path, file: BinaryIO, reader: Any, dataset: str | None, max_bytes: int
-) -> HeightMap:
+def _read_channel(path: Path, file: BinaryIO, reader: Any, dataset: str | None) -> HeightMap:
     """Read one height channel of an open microscope file, in metres."""
     if reader.format() == "hgt" and path.suffix.lower() != ".hgt":  # accepts any 2 n^2 bytes
         raise InputError(f"{path}: no known topography format")
@@ -106,7 +105,7 @@ def _read_channel(
         raise InputError(f"{path}: an archive of NumPy arrays; save the map as a .npy file")
     channel = _height_channel(path, reader, dataset)
     shape: tuple[int, ...] = (channel.nb_grid_pts or ())[::-1]
-    check_layout(path, shape, np.dtype(float), max_bytes)
+    check_layout(path, shape, np.dtype(float))
     unsized = channel.physical_sizes is None
     if len(shape) == 2:
         _check_sides(path, channel)

@@ -10,6 +10,12 @@ from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.physics.contact import Contact
 from gfmd_cli.physics.indenters import RigidSurface
 
+LINEAR_EDGES = np.linspace(0.0, 10.0, 201)
+"""Edges of the linear bins of stresses [Delta_sigma] and gaps [h_std]: at the end a Gaussian of
+unit width is below 1e-21."""
+LOGARITHMIC_EDGES = np.logspace(-6.0, 4.0, 101)
+"""Edges of the logarithmic bins [Delta_sigma, h_std]: ten per decade from 1e-6 to 1e4."""
+
 
 def contact_points(height: Field, u: Field, sigma: Field) -> Mask:
     """Mask of the points in contact, where u = h and sigma > 0.
@@ -30,13 +36,14 @@ def contact_pressure(height: Field, u: Field, sigma: Field) -> Field:
 def contact_line(grid: Grid, mask: Mask, *, periodic: bool = True) -> float:
     """Contact line per area times the side along x; of a line contact, the number of edges."""
     counts = np.zeros(mask.ndim)
+    next_row = grid.row_span[1] % grid.points_y
     for axis in range(mask.ndim):
         lines = np.moveaxis(mask, axis, 0)
         counts[axis] += np.count_nonzero(lines[1:] != lines[:-1])
-        following = grid.next_row(lines) if axis == 0 else lines[0]
-        goes_on = axis == 0 and grid.row_span[1] < grid.points_y
-        if periodic or goes_on:
-            counts[axis] += np.count_nonzero(lines[-1] != following)
+        following = grid.gather_rows(mask, (next_row, next_row + 1)) if axis == 0 else lines[:1]
+        continues = axis == 0 and grid.row_span[1] < grid.points_y
+        if periodic or continues:
+            counts[axis] += np.count_nonzero(lines[-1:] != following)
     across = np.divide(1.0, grid.spacings)  # edge length over the area of a point
     return float(grid.total(counts) @ across) * grid.length / grid.size
 
@@ -163,24 +170,6 @@ class Histogram:
     """Share of points above zero and below the first logarithmic bin."""
 
 
-def linear_edges() -> Field:
-    """Edges of the linear bins of stresses [Delta_sigma] and gaps [h_std].
-
-    The width is 0.05 and the end is 10, where a Gaussian of unit width is below 1e-21.
-    """
-    return np.linspace(0.0, 10.0, 201)
-
-
-def logarithmic_edges() -> Field:
-    """Edges of the logarithmic bins [Delta_sigma, h_std]: ten per decade from 1e-6 to 1e4."""
-    return np.logspace(-6.0, 4.0, 101)
-
-
-def logarithmic_middles() -> Field:
-    """Geometric means of the edges of the logarithmic bins."""
-    return geometric_middles(logarithmic_edges())
-
-
 def geometric_middles(edges: Field) -> Field:
     """Geometric means of neighbouring edges, shape (edges - 1,)."""
     return np.sqrt(edges[1:] * edges[:-1])
@@ -203,13 +192,12 @@ def _histogram(grid: Grid, positive: Field, points: int) -> Histogram:
     """Histogram of a field with these positive values among so many points, zero at the others."""
     size, count = int(grid.total(points)), int(grid.total(positive.size))
     linear, logarithmic = (
-        grid.total(np.histogram(positive, edges())[0])
-        for edges in (linear_edges, logarithmic_edges)
+        grid.total(np.histogram(positive, edges)[0]) for edges in (LINEAR_EDGES, LOGARITHMIC_EDGES)
     )
-    below = grid.total(np.count_nonzero(positive < logarithmic_edges()[0]))
+    below = grid.total(np.count_nonzero(positive < LOGARITHMIC_EDGES[0]))
     return Histogram(
-        linear=linear / (size * np.diff(linear_edges())),
-        logarithmic=logarithmic / (size * np.diff(logarithmic_edges())),
+        linear=linear / (size * np.diff(LINEAR_EDGES)),
+        logarithmic=logarithmic / (size * np.diff(LOGARITHMIC_EDGES)),
         zero=1.0 - count / size,
         beyond=float(count - linear.sum()) / size,
         below=int(below) / size,

@@ -23,6 +23,8 @@ from gfmd_cli.grid.arrays import Field, Mask
 
 Integers = NDArray[np.signedinteger[Any]]
 """Integers: labels, counts, displacements in cells with one number per axis."""
+AREA_EDGES = np.logspace(-11.0, 0.0, 111)
+"""Edges of the bins of patch areas [L^2, or L in a line contact]: ten per decade to 1."""
 
 
 @dataclass(frozen=True)
@@ -116,12 +118,7 @@ class _Tree:
         return loop
 
 
-def area_edges() -> Field:
-    """Edges of the bins of patch areas [L^2, or L in a line contact]: ten per decade to 1."""
-    return np.logspace(-11.0, 0.0, 111)
-
-
 def area_distribution(shares: Field) -> Field:
     """Pr(A): share of the patches per area in logarithmic bins; zero without patches."""
-    counts = np.histogram(shares, area_edges())[0]
-    return counts / (max(shares.size, 1) * np.diff(area_edges()))
+    counts = np.histogram(shares, AREA_EDGES)[0]
+    return counts / (max(shares.size, 1) * np.diff(AREA_EDGES))

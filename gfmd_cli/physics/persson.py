@@ -97,12 +97,12 @@ def shells(q: Field, power: Field, k: Field, gamma: Field, modes: Field) -> Shel
     sums = np.zeros((6, edges.size + 1))
     for start in range(0, q.size, _CHUNK):
         part = slice(start, start + _CHUNK)
-        where = np.searchsorted(edges, q[part])
+        bin_number = np.searchsorted(edges, q[part])
         height, energy = power[part], k[part] * power[part]
         products = (q[part] * height, height, energy, k[part] * energy, gamma[part] * energy)
         weights = (*products, modes[part] * (height > 0))
         for total, weight in zip(sums, weights, strict=True):
-            total += np.bincount(where, weight, minlength=total.size)
+            total += np.bincount(bin_number, weight, minlength=total.size)
     moment, height, energy, variance, weighted, mode_counts = sums[:, sums[3] > 0]
     return Shells(moment / height, height, energy, variance, weighted / energy, mode_counts)
 

@@ -8,11 +8,10 @@ diagonals, so that no direction is preferred.
 from collections.abc import Iterable
 from itertools import product
 from math import inf
-from typing import Any
 
 import numpy as np
 
-from gfmd_cli.grid.arrays import Field
+from gfmd_cli.grid.arrays import Field, MaskedField
 
 LEVEL = 0.2  # of the autocorrelation at the autocorrelation length: default of ISO 25178-2
 MAP_NAMES = ("Sq", "Sa", "Ssk", "Sku", "Sz", "Sdq", "Sdr", "Sal")
@@ -21,7 +20,7 @@ MIN_OVERLAP = 0.25  # of the map and its shifted copy; a choice: fewer points gi
 
 
 def roughness_parameters(
-    heights: "np.ma.MaskedArray[Any, Any]", spacing: tuple[float, ...]
+    heights: MaskedField, spacing: tuple[float, ...]
 ) -> dict[str, float | None]:
     """Parameters of a levelled map, S..., or of a profile, P..., by their names in the standards.
 
@@ -55,9 +54,7 @@ def roughness_parameters(
     return dict(zip(MAP_NAMES if heights.ndim == 2 else PROFILE_NAMES, values, strict=True))
 
 
-def _slopes(
-    heights: "np.ma.MaskedArray[Any, Any]", spacing: tuple[float, ...]
-) -> tuple[float, float]:
+def _slopes(heights: MaskedField, spacing: tuple[float, ...]) -> tuple[float, float]:
     """Rms gradient and additional area of the triangles between neighbouring points.
 
     NaN where no square of points is known.
@@ -80,9 +77,7 @@ def _slopes(
     return slope, float(area)  # sqrt(1 + s) - 1 = s / (sqrt(1 + s) + 1) without cancellation
 
 
-def _correlation_length(
-    heights: "np.ma.MaskedArray[Any, Any]", spacing: tuple[float, ...]
-) -> float | None:
+def _correlation_length(heights: MaskedField, spacing: tuple[float, ...]) -> float | None:
     """Shortest distance at which the autocorrelation is at most `LEVEL`, right to one point."""
     correlation = autocorrelation(heights)
     distance = distances(correlation.shape, spacing)
@@ -99,7 +94,7 @@ def distances(shape: tuple[int, ...], spacing: Iterable[float]) -> Field:
     return np.sqrt(square)
 
 
-def autocorrelation(heights: "np.ma.MaskedArray[Any, Any]") -> Field:
+def autocorrelation(heights: MaskedField) -> Field:
     """Autocorrelation over its value at zero shift, mean over the known pairs of points.
 
     A map is not continued periodically: pairs exist where the map and its shifted copy overlap.

@@ -26,8 +26,6 @@ from gfmd_cli.physics.indenters import (
 )
 from gfmd_cli.physics.self_affine import SelfAffine
 
-AXIS = {"points": "x", "points_y": "y"}
-
 Surface = Annotated[
     SelfAffine
     | Parabola
@@ -44,14 +42,12 @@ Surface = Annotated[
 
 def check_resolved(surface: RigidSurface, points: int, points_y: int) -> None:
     """Raise InputError where a grid of so many points along x and y does not resolve a surface."""
-    points_along = {
-        "points": (points, surface.smallest_grid()),
-        "points_y": (points_y, surface.smallest_grid_y()),
-    }
-    for key, (count, least) in points_along.items():
+    along_x = ("points", "x", points, surface.smallest_grid())
+    along_y = ("points_y", "y", points_y, surface.smallest_grid_y())
+    for key, axis, count, least in (along_x, along_y):
         if count < least:
             raise InputError(
-                f"grid.{key}: {count // surface.copies} points along {AXIS[key]} do not resolve "
+                f"grid.{key}: {count // surface.copies} points along {axis} do not resolve "
                 f"the surface ({surface.resolution()}); use {least // surface.copies} or more"
             )
 

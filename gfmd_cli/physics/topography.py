@@ -27,7 +27,6 @@ from gfmd_cli.physics.height_map import (
 )
 from gfmd_cli.physics.microscope_files import read_microscope_file
 
-MAX_BYTES = 2**33  # 32768 x 32768 heights in double precision
 SPACING_TOLERANCE = 1e-6  # relative: files store sides in single precision or with six digits
 AXES = ("y", "x")
 
@@ -118,7 +117,6 @@ class Topography:
 def read_topography(
     path: Path,
     dataset: str | None = None,
-    max_bytes: int = MAX_BYTES,
     *,
     region: Region | None = None,
     flip: bool = False,
@@ -136,7 +134,6 @@ def read_topography(
     path : the file
     dataset : name of the HDF5 dataset or microscope channel; by default the only 2-D dataset, the
         only one with a name such as "height", or the default height channel
-    max_bytes : size of the largest map that is read, counted in double precision
     region : the part of the map to read
     flip : change the sign of the heights
     crop : of a map, use the largest square of an even number of points in the middle
@@ -151,7 +148,7 @@ def read_topography(
     if path.stat().st_size == 0:
         raise InputError(f"{path}: the file is empty")
     try:
-        return _checked(path, _reader(path)(path, dataset, max_bytes), region, flip, crop)
+        return _checked(path, _reader(path)(path, dataset), region, flip, crop)
     except InputError:
         raise
     except MemoryError as error:
@@ -164,7 +161,7 @@ def read_topography(
         ) from error
 
 
-def _reader(path: Path) -> Callable[[Path, str | None, int], HeightMap]:
+def _reader(path: Path) -> Callable[[Path, str | None], HeightMap]:
     """The function that reads a file, by its suffix or its first bytes."""
     with path.open("rb") as file:
         signature = file.read(len(np.lib.format.MAGIC_PREFIX))
@@ -189,10 +186,10 @@ def _checked(
             part = part[region.slices(shape, spacing if data.metres else None)]
         except ValueError as error:
             raise InputError(f"{path}: surface.region: {error}") from error
-    if crop:
-        used = middle_square(part.shape)
-        first = [(points - side) // 2 for points, side in zip(part.shape, used, strict=True)]
-        part = part[tuple(slice(a, a + side) for a, side in zip(first, used, strict=True))]
+    if crop and part.ndim == 2:
+        side = min(part.shape) // 2 * 2
+        first = [(points - side) // 2 for points in part.shape]
+        part = part[tuple(slice(a, a + side) for a in first)]
     heights = np.ma.filled(np.ma.asarray(part).astype(np.float64), np.nan)
     missing: Mask = ~(np.abs(heights) < MAX_HEIGHT)
     if missing.all():
@@ -213,11 +210,6 @@ def _checked(
         data.notes,
         float(np.finfo(data.heights.dtype if data.heights.dtype.kind == "f" else float).eps),
     )
-
-
-def middle_square(shape: tuple[int, ...]) -> tuple[int, ...]:
-    """Shape of the largest square of an even number of points in a map; that of a line itself."""
-    return shape if len(shape) == 1 else (min(shape) // 2 * 2,) * 2
 
 
 def _spacing(path: Path, data: HeightMap, shape: tuple[int, ...]) -> tuple[float, ...] | None:

@@ -17,7 +17,7 @@ import numpy as np
 from scipy.special import erf, erfinv
 
 from gfmd_cli.grid.arrays import Field, Mask, row_blocks
-from gfmd_cli.grid.fft_grid import ALL, Grid
+from gfmd_cli.grid.fft_grid import ALL_ROWS, Grid
 from gfmd_cli.physics.contact import Contact
 
 BINS = 1 << 14  # of height, of width 1e-3 h_std or less for heights within +-8 h_std
@@ -56,7 +56,7 @@ def _quadratures(contact: Contact, out: Field) -> Iterator[Field]:
         yield out
 
 
-def direction(grid: Grid, axis: int, rows: slice = ALL) -> Field:
+def direction(grid: Grid, axis: int, rows: slice = ALL_ROWS) -> Field:
     """Component of q / |q| along an axis for rows of `grid.spectral_shape`; zero at q = 0.
 
     Also zero where the component is the highest wavenumber of the grid, which has no sign.
@@ -111,9 +111,9 @@ def bearing(contact: Contact) -> Bearing:
     sums = np.zeros((3, BINS))
     for rows in row_blocks(height):
         depth = (high - height[rows]) * ((BINS - 1) / (high - low))
-        where, values = depth.astype(np.int64).ravel(), stress[rows].ravel()
+        bin_number, values = depth.astype(np.int64).ravel(), stress[rows].ravel()
         for total, weight in zip(sums, (np.ones_like(values), values, values**2), strict=True):
-            total += np.bincount(where, weight, minlength=BINS)
+            total += np.bincount(bin_number, weight, minlength=BINS)
     count, total, square = np.cumsum(sums, axis=1)
     usable = (count >= MIN_POINTS) & (count < height.size) & (sums[0] > 0)
     mean = total[usable] / count[usable]

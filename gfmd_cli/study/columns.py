@@ -1,16 +1,15 @@
 """The layout of a study file: its columns, and which of them `export` prints."""
 
-from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.physics.observables import (
+    LINEAR_EDGES,
+    LOGARITHMIC_EDGES,
     QUANTITIES,
     geometric_middles,
-    linear_edges,
-    logarithmic_edges,
 )
-from gfmd_cli.physics.patches import area_edges
+from gfmd_cli.physics.patches import AREA_EDGES
 from gfmd_cli.study.column import Column
 from gfmd_cli.study.observables import OBSERVABLES
 from gfmd_cli.study.parameters import parameters
@@ -113,7 +112,7 @@ class HistogramColumn(NamedTuple):
     """Name of the axis of its bins."""
     axis_meaning: str
     meaning: str
-    edges: Callable[[], Field]
+    edges: Field
     logarithmic: bool = True
 
     @property
@@ -123,7 +122,7 @@ class HistogramColumn(NamedTuple):
 
     def middles(self) -> Field:
         """Middles of the bins, geometric in logarithmic ones."""
-        edges = self.edges()
+        edges = self.edges
         return geometric_middles(edges) if self.logarithmic else 0.5 * (edges[:-1] + edges[1:])
 
 
@@ -132,11 +131,11 @@ _STRESS = ("middle of the stress bin / Delta_sigma", "Pr(sigma) Delta_sigma")
 _GAP = ("middle of the gap bin / h_std", "Pr(g) h_std")
 _AREA = ("middle of the area bin / L^2; for a line contact, / L", "Pr(A) L^2, by number of patches")
 HISTOGRAMS = (
-    HistogramColumn("histogram", PR_LINEAR, "sigma", *_STRESS, linear_edges, logarithmic=False),
-    HistogramColumn("histogram", PR_LOGARITHMIC, "sigma_log", *_STRESS, logarithmic_edges),
-    HistogramColumn("gap_distribution", "pr_gap", "gap", *_GAP, linear_edges, logarithmic=False),
-    HistogramColumn("gap_distribution", "pr_gap_log", "gap_log", *_GAP, logarithmic_edges),
-    HistogramColumn("patches", "pr_patch_area", "patch_area", *_AREA, area_edges),
+    HistogramColumn("histogram", PR_LINEAR, "sigma", *_STRESS, LINEAR_EDGES, logarithmic=False),
+    HistogramColumn("histogram", PR_LOGARITHMIC, "sigma_log", *_STRESS, LOGARITHMIC_EDGES),
+    HistogramColumn("gap_distribution", "pr_gap", "gap", *_GAP, LINEAR_EDGES, logarithmic=False),
+    HistogramColumn("gap_distribution", "pr_gap_log", "gap_log", *_GAP, LOGARITHMIC_EDGES),
+    HistogramColumn("patches", "pr_patch_area", "patch_area", *_AREA, AREA_EDGES),
 )
 BINS = {histogram.name: histogram for histogram in HISTOGRAMS}
 WEIGHTS = {

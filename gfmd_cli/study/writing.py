@@ -115,7 +115,7 @@ class _Writer(NamedTuple):
         self, file: Any, histogram: HistogramColumn, task: Any, rows: list[Mapping[str, Any]]
     ) -> None:
         """The densities of all tasks over the bins."""
-        edges, middles = histogram.edges(), histogram.middles()
+        edges, middles = histogram.edges, histogram.middles()
         bins = self.scale(file, histogram.axis, middles, "1", histogram.axis_meaning)
         if bins is not None:
             bins.attrs["edges"] = edges

@@ -12,7 +12,7 @@ from gfmd_cli.analysis.edge_law import edge_exponent, fit
 from gfmd_cli.analysis.figures import P_STAR
 from gfmd_cli.analysis.plotting import ColumnFigure
 from gfmd_cli.grid.arrays import Field
-from gfmd_cli.physics.observables import logarithmic_middles
+from gfmd_cli.physics.observables import LOGARITHMIC_EDGES, geometric_middles
 from paper.claims import Finding, Value
 from paper.drawing import STYLES, dense, draw_points, finish, label, slope
 from paper.ensembles import Mean, estimate, groups, sample
@@ -28,7 +28,7 @@ def fig07(studies: StoredStudies, folder: Path) -> list[Finding]:
     """Pr(sigma) at 10 % contact on the finest grid; extrapolated where the grids allow."""
     plot, ys = ColumnFigure(STRESS, DENSITY), []
     stresses = [one for group in _by_elastomer(studies, "fig07").values() for one in group]
-    middle = logarithmic_middles()
+    middle = geometric_middles(LOGARITHMIC_EDGES)
     for one in stresses:
         style, fine = STYLES[one.curve.n], one.grids[-1]
         plot.axes.plot(middle, np.where(fine > 0, fine, np.nan), color=style.colour, lw=0.7)
@@ -103,7 +103,7 @@ def fig13(studies: StoredStudies, folder: Path) -> list[Finding]:
     """Pr(sigma) at n = 3 from grid to grid, and its tail."""
     plot = ColumnFigure(STRESS, DENSITY)
     (distribution,) = [one for group in _by_elastomer(studies, "fig13").values() for one in group]
-    middle = logarithmic_middles()
+    middle = geometric_middles(LOGARITHMIC_EDGES)
     tones = colours(len(distribution.points))
     tails = {}
     for i, (points, density) in enumerate(
@@ -174,7 +174,7 @@ def _known(distribution: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Bins whose density is known: stress, density, its error."""
     known = np.isfinite(distribution.density) & (distribution.error < 0.5)
     return (
-        logarithmic_middles()[known],
+        geometric_middles(LOGARITHMIC_EDGES)[known],
         distribution.density[known],
         (distribution.density * distribution.error)[known],
     )
