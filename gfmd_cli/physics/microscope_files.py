@@ -105,11 +105,14 @@ def _read_channel(
     if reader.format() == "npz":
         raise InputError(f"{path}: an archive of NumPy arrays; save the map as a .npy file")
     channel = _height_channel(path, reader, dataset)
-    shape: tuple[int, ...] = (channel.nb_grid_pts or ())[::-1]
+    rows_along_y = reader.format() == "mat"  # bare arrays; those of all other formats are [x, y]
+    shape: tuple[int, ...] = (channel.nb_grid_pts or ())[:: 1 if rows_along_y else -1]
     check_layout(path, shape, np.dtype(float), max_bytes)
     unsized = channel.physical_sizes is None
     if len(shape) == 2:
         _check_sides(path, channel)
+    if reader.format() == "nc":
+        _check_is_own_netcdf(path, reader)
     scan = channel.topography(physical_sizes=(1.0,) * len(shape) if unsized else None)
     if reader.format() == "xyz" and len(shape) == 1:
         scan = _with_positions(reader, scan)
@@ -127,7 +130,9 @@ def _read_channel(
         if unsized:
             _check_all_are_heights(path, scan.heights().T)
     if scan.is_uniform:
-        heights, sides = scan.heights().T, tuple(map(float, scan.physical_sizes))[::-1]
+        heights, sides = scan.heights(), tuple(map(float, scan.physical_sizes))[::-1]
+        if not rows_along_y:
+            heights = heights.T
         if len(shape) == 1 and sides[0] < 0:  # recorded backwards
             heights, sides = heights[::-1], (-sides[0],)
     else:
@@ -139,7 +144,7 @@ def _read_channel(
         heights=heights,
         sides=None if unsized else metric_sides or sides,
         metres=has_unit or metric_sides is not None,
-        periodic=bool(scan.is_periodic),
+        periodic=None if rows_along_y else bool(scan.is_periodic),
         source=source,
         metric_heights=has_unit,
     )
@@ -151,9 +156,32 @@ def _header(channel: Any) -> dict[str, Any]:
     return header if isinstance(header, dict) else {}
 
 
+def _check_is_own_netcdf(path: Path, reader: Any) -> None:
+    """Raise InputError for a classic netCDF file that SurfaceTopography has not written.
+
+    The reader takes any map as [x, y], and reads neither positions nor the attribute `units`.
+    """
+    variables = [reader._heights_var, *filter(None, (reader._x_var, reader._y_var))]
+    dimensions = variables[0].dimensions
+    if dimensions == ("y", "x") or any(hasattr(each, "units") for each in variables):
+        raise InputError(
+            f"{path}: a classic netCDF file (version 3), whose units and order of axes are not "
+            "read; save it as netCDF 4"
+        )
+
+
 def _check_sides(path: Path, channel: Any) -> None:
-    """Raise InputError where the header of a table states only one side of a map."""
-    sides = channel.physical_sizes or ()
+    """Raise InputError where the header of a table states only one side, or sides without unit.
+
+    The reader takes the unit of the heights as that of the sides, which is seldom true.
+    """
+    sides, header = channel.physical_sizes or (), _header(channel)
+    is_bare = "xunit" in header and not header["xunit"] and not header.get("yunit")
+    if len(sides) == 2 and is_bare and header.get("zunit"):
+        raise InputError(
+            f"{path}: the header states the unit of the heights, {header['zunit']}, but not of the "
+            "sides; add it, as in '# Width: 20 um', or remove them and set surface.length"
+        )
     if len(sides) == 1 or (not sides and "physical_size_y" in _header(channel)):
         stated, other = ("Width", "Height") if sides else ("Height", "Width")
         raise InputError(
