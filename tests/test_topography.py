@@ -681,6 +681,24 @@ def test_a_header_with_one_side_is_refused(tmp_path, heights, stated, other, uni
         read_topography(tmp_path / "h.txt")
 
 
+@pytest.mark.parametrize("mark", ["NA", "No data", "1.#QNAN", ""])
+@pytest.mark.parametrize("by_rows", [True, False, None])
+def test_positions_beside_a_mark_are_refused(tmp_path, heights, mark, by_rows):
+    """The reader would take all rows up to it as the header: of a grid, whole rows or columns."""
+    pytest.importorskip("SurfaceTopography")
+    points = [(x, y, heights[y, x]) for y in range(16) for x in range(10)]
+    if by_rows is None:
+        points = [(x, heights[0, x]) for x in range(16)]
+    elif not by_rows:
+        points = sorted(points)
+    lines = [" ".join(map(str, point)) for point in points]
+    end = 10 if by_rows is None else 3 * (10 if by_rows else 16)
+    lines[end - 1] = lines[end - 1].rpartition(" ")[0] + f" {mark}"
+    (tmp_path / "h.txt").write_text("# x and height\n" + "\n".join(lines) + "\n")
+    with pytest.raises(InputError, match=rf"h\.txt:{end + 1}: .* write NaN for a missing height"):
+        read_topography(tmp_path / "h.txt")
+
+
 def test_sides_do_not_get_the_unit_of_the_heights(tmp_path, heights):
     pytest.importorskip("SurfaceTopography")
     rows = "\n".join(" ".join(map(str, row)) for row in heights)

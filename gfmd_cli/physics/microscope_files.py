@@ -1,6 +1,8 @@
 """Files of microscopes and tables of numbers, by the readers of SurfaceTopography."""
 
+import re
 import warnings
+from itertools import islice
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -19,6 +21,8 @@ from gfmd_cli.physics.height_map import (
     only_map,
 )
 from gfmd_cli.physics.text_tables import (
+    HEADER_LINES,
+    LATIN_1,
     MATRIX_COLUMNS,
     columns,
     in_utf8,
@@ -29,6 +33,7 @@ from gfmd_cli.physics.text_tables import (
 NO_GRID = "three columns that are not the points (x, y, height) of a full grid"
 TABLES = {"xyz", "asc"}  # formats of SurfaceTopography that are tables of numbers
 SMALL_FILE = 2**14  # bytes, which the readers of tables parse in a second
+OWN_HEADERS = LATIN_1, b"X;Y;valid"  # of tables whose readers know the length of the header
 SORTED_ROWS = 20  # heights of so many rows are not sorted by chance; a choice
 SIGNATURE_BYTES = 512  # at the beginning of a file, by which readers recognise their format
 
@@ -114,8 +119,10 @@ def _read_channel(
     if reader.format() == "nc":
         _check_is_own_netcdf(path, reader)
     scan = channel.topography(physical_sizes=(1.0,) * len(shape) if unsized else None)
-    if reader.format() == "xyz" and len(shape) == 1:
-        scan = _with_positions(reader, scan)
+    if reader.format() == "xyz":
+        _check_begins_once(path, file)
+        if len(shape) == 1:
+            scan = _with_positions(reader, scan)
     if scan.unit is not None:
         scan = scan.to_unit("m")
     source = f"{reader.format()}, {channel.channel_id}"
@@ -276,6 +283,32 @@ def _check_all_rows_read(path: Path, file: BinaryIO, rows: int, columns: int) ->
             raise InputError(
                 f"{path}:{number}: {words[0].decode(errors='replace')!r} in a row of the table is "
                 "no number; write NaN for a missing height, and save text without a byte order mark"
+            )
+
+
+def _check_begins_once(path: Path, file: BinaryIO) -> None:
+    """Raise InputError where a line of a table of positions is no row of it.
+
+    The reader takes such a line, and all rows above it, as the header.
+    """
+    file.seek(0)
+    start = list(islice(file, HEADER_LINES + 1))
+    file.seek(0)
+    if start and start[0].startswith(OWN_HEADERS):
+        return
+    rows = [re.split(rb"[\s,;]+", line.strip(b" \t\r\n,;")) for line in start]
+    are_numbers = [all(map(_is_number, row)) for row in rows]
+    columns_read = next((len(row) for row in reversed(rows) if row != [b""]), 0)
+    is_row = [ok and len(row) == columns_read for ok, row in zip(are_numbers, rows, strict=True)]
+    if not any(is_row):
+        return
+    first = is_row.index(True)
+    for number, row in enumerate(rows[first:], first):
+        if row != [b""] and not is_row[number]:
+            text = b" ".join(row).decode(errors="replace")
+            raise InputError(
+                f"{path}:{number + 1}: {text!r} in a table of {columns_read} columns of numbers; "
+                "write NaN for a missing height"
             )
 
 
