@@ -8,7 +8,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from scipy.io import savemat
+from scipy.io import netcdf_file, savemat
 
 from gfmd_cli.errors import InputError
 from gfmd_cli.grid.fft_grid import Grid
@@ -354,6 +354,39 @@ def test_arrays_of_matlab_are_chosen_by_name(tmp_path, heights):
         read_topography(tmp_path / "other.mat")
 
 
+@pytest.mark.parametrize("version", ["5", "7.3"])
+def test_the_rows_of_a_matrix_of_matlab_run_along_y(tmp_path, heights, version):
+    """Version 7.3 is HDF5 with the columns first."""
+    path, matrix = tmp_path / "h.mat", heights[:10]
+    if version == "5":
+        pytest.importorskip("SurfaceTopography")
+        savemat(path, {"z": matrix})
+    else:
+        with h5py.File(path, "w", userblock_size=512) as file:
+            file["z"] = matrix.T
+            file["z"].attrs["MATLAB_class"] = np.bytes_("double")
+    read = read_topography(path)
+    np.testing.assert_array_equal(read.heights, matrix)
+    assert read.periodic is None
+    assert FileSurface(path=path, length=16e-6).sides == pytest.approx((10e-6, 16e-6))
+
+
+@pytest.mark.parametrize(("axes", "units"), [("yx", {}), ("xy", {"units": "nm"})])
+def test_a_classic_netcdf_file_of_other_programs_is_refused(tmp_path, heights, axes, units):
+    """The reader of such files would transpose the first map, and take the second in metres."""
+    pytest.importorskip("SurfaceTopography")
+    with netcdf_file(tmp_path / "h.nc", "w") as file:
+        for name, points in zip(axes, heights.shape, strict=True):
+            file.createDimension(name, points)
+            file.createVariable(name, "d", (name,))[:] = np.arange(points)
+        variable = file.createVariable("heights", "d", tuple(axes))
+        variable[:] = heights
+        for name, value in units.items():
+            setattr(variable, name, value)
+    with pytest.raises(InputError, match=r"classic netCDF file .* save it as netCDF 4"):
+        read_topography(tmp_path / "h.nc")
+
+
 @pytest.mark.parametrize("link", [h5py.SoftLink("/h"), h5py.ExternalLink("other.h5", "/h")])
 def test_links_to_a_dataset_are_not_followed(hdf5, heights, link):
     def add(file):
@@ -659,6 +692,36 @@ def test_a_header_with_one_side_is_refused(tmp_path, heights, stated, other, uni
     (tmp_path / "h.txt").write_text(f"# {stated}: 20 um\n{unit}" + "\n".join(rows))
     with pytest.raises(InputError, match=rf"h\.txt: .*\({stated}\) alone; add .*# {other}: 20 um"):
         read_topography(tmp_path / "h.txt")
+
+
+@pytest.mark.parametrize("mark", ["NA", "No data", "1.#QNAN", ""])
+@pytest.mark.parametrize("by_rows", [True, False, None])
+def test_positions_beside_a_mark_are_refused(tmp_path, heights, mark, by_rows):
+    """The reader would take all rows up to it as the header: of a grid, whole rows or columns."""
+    pytest.importorskip("SurfaceTopography")
+    points = [(x, y, heights[y, x]) for y in range(16) for x in range(10)]
+    if by_rows is None:
+        points = [(x, heights[0, x]) for x in range(16)]
+    elif not by_rows:
+        points = sorted(points)
+    lines = [" ".join(map(str, point)) for point in points]
+    end = 10 if by_rows is None else 3 * (10 if by_rows else 16)
+    lines[end - 1] = lines[end - 1].rpartition(" ")[0] + f" {mark}"
+    (tmp_path / "h.txt").write_text("# x and height\n" + "\n".join(lines) + "\n")
+    with pytest.raises(InputError, match=rf"h\.txt:{end + 1}: .* write NaN for a missing height"):
+        read_topography(tmp_path / "h.txt")
+
+
+def test_sides_do_not_get_the_unit_of_the_heights(tmp_path, heights):
+    pytest.importorskip("SurfaceTopography")
+    rows = "\n".join(" ".join(map(str, row)) for row in heights)
+    header = "# Width: 20\n# Height: 15\n"
+    path = tmp_path / "h.txt"
+    path.write_text(f"{header}# Value units: nm\n{rows}")
+    with pytest.raises(InputError, match=r"h\.txt: .* heights, nm, but not of the sides"):
+        read_topography(path)
+    path.write_text(header + rows)  # one unknown unit of all lengths
+    assert read_topography(path).spacing == pytest.approx((15 / 16, 20 / 16))
 
 
 @pytest.mark.parametrize("unit", ["", "# Value units: nm\n"])

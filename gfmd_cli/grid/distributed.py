@@ -82,6 +82,11 @@ class DistributedGrid(Grid):
         """First row of this process, and the row after its last."""
         return self.rows.start, self.rows.stop
 
+    @property
+    def whole(self) -> bool:
+        """Whether this is a grid of one process: it is not, even if only one process takes part."""
+        return False
+
     def total(self, values: Any) -> Any:
         """Sum over all processes."""
         return self.ranks.total(values)

@@ -108,6 +108,8 @@ def read_hdf5(path: Path, dataset: str | None) -> HeightMap:
                 "store the heights themselves"
             )
         values = np.ma.asarray(data[()]).reshape(shape)
+        if "MATLAB_class" in data.attrs:  # columns first; MATLAB plots rows along y
+            values = values.T
         for mark in {"_FillValue", "missing_value"} & set(data.attrs):
             missing = np.asarray(data.attrs[mark])
             if missing.dtype.kind == values.dtype.kind == "f":  # perhaps of another precision

@@ -1,6 +1,8 @@
 """Files of microscopes and tables of numbers, by the readers of SurfaceTopography."""
 
+import re
 import warnings
+from itertools import islice
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -20,6 +22,8 @@ from gfmd_cli.physics.height_map import (
     only_map,
 )
 from gfmd_cli.physics.text_tables import (
+    HEADER_LINES,
+    LATIN_1,
     MATRIX_COLUMNS,
     columns,
     in_utf8,
@@ -30,6 +34,7 @@ from gfmd_cli.physics.text_tables import (
 NO_GRID = "three columns that are not the points (x, y, height) of a full grid"
 TABLES = {"xyz", "asc"}  # formats of SurfaceTopography that are tables of numbers
 SMALL_FILE = 2**14  # bytes, which the readers of tables parse in a second
+OWN_HEADERS = LATIN_1, b"X;Y;valid"  # of tables whose readers know the length of the header
 SORTED_ROWS = 20  # heights of so many rows are not sorted by chance; a choice
 SIGNATURE_BYTES = 512  # at the beginning of a file, by which readers recognise their format
 
@@ -104,14 +109,19 @@ def _read_channel(path: Path, file: BinaryIO, reader: Any, dataset: str | None) 
     if reader.format() == "npz":
         raise InputError(f"{path}: an archive of NumPy arrays; save the map as a .npy file")
     channel = _height_channel(path, reader, dataset)
-    shape: tuple[int, ...] = (channel.nb_grid_pts or ())[::-1]
+    rows_along_y = reader.format() == "mat"  # bare arrays; those of all other formats are [x, y]
+    shape: tuple[int, ...] = (channel.nb_grid_pts or ())[:: 1 if rows_along_y else -1]
     check_layout(path, shape, np.dtype(float))
     unsized = channel.physical_sizes is None
     if len(shape) == 2:
         _check_sides(path, channel)
+    if reader.format() == "nc":
+        _check_is_own_netcdf(path, reader)
     scan = channel.topography(physical_sizes=(1.0,) * len(shape) if unsized else None)
-    if reader.format() == "xyz" and len(shape) == 1:
-        scan = _with_positions(reader, scan)
+    if reader.format() == "xyz":
+        _check_begins_once(path, file)
+        if len(shape) == 1:
+            scan = _with_positions(reader, scan)
     if scan.unit is not None:
         scan = scan.to_unit("m")
     source = f"{reader.format()}, {channel.channel_id}"
@@ -126,7 +136,9 @@ def _read_channel(path: Path, file: BinaryIO, reader: Any, dataset: str | None) 
         if unsized:
             _check_all_are_heights(path, scan.heights().T)
     if scan.is_uniform:
-        heights, sides = scan.heights().T, tuple(map(float, scan.physical_sizes))[::-1]
+        heights, sides = scan.heights(), tuple(map(float, scan.physical_sizes))[::-1]
+        if not rows_along_y:
+            heights = heights.T
         if len(shape) == 1 and sides[0] < 0:  # recorded backwards
             heights, sides = heights[::-1], (-sides[0],)
     else:
@@ -138,7 +150,7 @@ def _read_channel(path: Path, file: BinaryIO, reader: Any, dataset: str | None) 
         heights=heights,
         sides=None if unsized else metric_sides or sides,
         metres=has_unit or metric_sides is not None,
-        periodic=bool(scan.is_periodic),
+        periodic=None if rows_along_y else bool(scan.is_periodic),
         source=source,
         metric_heights=has_unit,
     )
@@ -150,9 +162,32 @@ def _header(channel: Any) -> dict[str, Any]:
     return header if isinstance(header, dict) else {}
 
 
+def _check_is_own_netcdf(path: Path, reader: Any) -> None:
+    """Raise InputError for a classic netCDF file that SurfaceTopography has not written.
+
+    The reader takes any map as [x, y], and reads neither positions nor the attribute `units`.
+    """
+    variables = [reader._heights_var, *filter(None, (reader._x_var, reader._y_var))]
+    dimensions = variables[0].dimensions
+    if dimensions == ("y", "x") or any(hasattr(each, "units") for each in variables):
+        raise InputError(
+            f"{path}: a classic netCDF file (version 3), whose units and order of axes are not "
+            "read; save it as netCDF 4"
+        )
+
+
 def _check_sides(path: Path, channel: Any) -> None:
-    """Raise InputError where the header of a table states only one side of a map."""
-    sides = channel.physical_sizes or ()
+    """Raise InputError where the header of a table states only one side, or sides without unit.
+
+    The reader takes the unit of the heights as that of the sides, which is seldom true.
+    """
+    sides, header = channel.physical_sizes or (), _header(channel)
+    is_bare = "xunit" in header and not header["xunit"] and not header.get("yunit")
+    if len(sides) == 2 and is_bare and header.get("zunit"):
+        raise InputError(
+            f"{path}: the header states the unit of the heights, {header['zunit']}, but not of the "
+            "sides; add it, as in '# Width: 20 um', or remove them and set surface.length"
+        )
     if len(sides) == 1 or (not sides and "physical_size_y" in _header(channel)):
         stated, other = ("Width", "Height") if sides else ("Height", "Width")
         raise InputError(
@@ -247,6 +282,32 @@ def _check_all_rows_read(path: Path, file: BinaryIO, rows: int, columns: int) ->
             raise InputError(
                 f"{path}:{number}: {words[0].decode(errors='replace')!r} in a row of the table is "
                 "no number; write NaN for a missing height, and save text without a byte order mark"
+            )
+
+
+def _check_begins_once(path: Path, file: BinaryIO) -> None:
+    """Raise InputError where a line of a table of positions is no row of it.
+
+    The reader takes such a line, and all rows above it, as the header.
+    """
+    file.seek(0)
+    start = list(islice(file, HEADER_LINES + 1))
+    file.seek(0)
+    if start and start[0].startswith(OWN_HEADERS):
+        return
+    rows = [re.split(rb"[\s,;]+", line.strip(b" \t\r\n,;")) for line in start]
+    are_numbers = [all(map(_is_number, row)) for row in rows]
+    columns_read = next((len(row) for row in reversed(rows) if row != [b""]), 0)
+    is_row = [ok and len(row) == columns_read for ok, row in zip(are_numbers, rows, strict=True)]
+    if not any(is_row):
+        return
+    first = is_row.index(True)
+    for number, row in enumerate(rows[first:], first):
+        if row != [b""] and not is_row[number]:
+            text = b" ".join(row).decode(errors="replace")
+            raise InputError(
+                f"{path}:{number + 1}: {text!r} in a table of {columns_read} columns of numbers; "
+                "write NaN for a missing height"
             )
 
 
