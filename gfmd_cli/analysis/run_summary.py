@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence, Sized
 from typing import Any
 
-from gfmd_cli.analysis.compare import with_best
+from gfmd_cli.analysis.compare import with_best, with_solvers
 from gfmd_cli.analysis.selection import grouped
 from gfmd_cli.analysis.table import Record, Table, TableColumn, groups_of
 from gfmd_cli.analysis.tables import P_STAR, PRESSURE, RESIDUAL, STATUS, warnings_in
@@ -30,7 +30,9 @@ def run_text(rows: list[dict[str, Any]]) -> str:
     """The solved contacts by scene, MAX_ROWS at most; an empty string where nothing was solved."""
     solved = solved_rows(rows)
     listed = solved[:MAX_ROWS]
-    table = Table("", shown(RUN, listed), groups_of((_scene(r), with_best(r)) for r in listed))
+    titles = with_solvers(map(_scene, listed), listed)
+    records = map(with_best, listed)
+    table = Table("", shown(RUN, listed), groups_of(zip(titles, records, strict=True)))
     warnings = [f"warning: {line}" for line in warnings_in(solved)]
     blocks = [table.as_text(), *_left_out(solved, MAX_ROWS, "contacts"), "\n".join(warnings)]
     return "\n\n".join(filter(None, blocks))

@@ -188,9 +188,12 @@ def _print_tasks(spec: "Spec", path: Path, options: "RunOptions") -> None:
         if done and task.id in to_do:
             done = "  [again: more output is requested]"
         points = f"~{task.points}" if task.auto else str(task.points)
+        surface = task.surface.label
+        swept = " ".join(word for word in task.swept if word not in surface)
+        scene = " | ".join(filter(None, (surface, task.elastomer.label, swept)))
         show(
             f"{task.index:6d} {points:>6} {task.load_label:>10} {task.bytes / 2**20:8.0f} "
-            f"{task.seconds:8.2g}  {task.surface.label} | {task.elastomer.label}{done}"
+            f"{task.seconds:8.2g}  {scene}{done}"
         )
     show(
         f"{len(tasks)} tasks, {len(missing)} to do, about {sum(t.seconds for t in missing):.3g} s "
