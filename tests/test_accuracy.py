@@ -103,6 +103,14 @@ def test_an_auto_grid_ends_where_it_may_not_grow(rows_of):
     assert (row["status"], row["points"]) == (Status.ACCURACY_NOT_REACHED, 64)
     assert row["points_y"] == 64  # not those of the forecast, 100
     assert row["u_g_error"] > 1e-6 * row["u_g"]
+    assert "next to full contact" not in Status.ACCURACY_NOT_REACHED.explain(row)
+
+
+def test_a_grid_that_ends_next_to_full_contact_says_why(rows_of):
+    (row,) = rows_of("load.p_star=3.1", "accuracy={mean_gap=1e-3, max_points=128}")
+    assert row["status"] == Status.ACCURACY_NOT_REACHED
+    assert 0.99 < row["a_r"] < 1
+    assert "loosen accuracy.mean_gap" in Status.ACCURACY_NOT_REACHED.explain(row)
 
 
 def test_an_auto_grid_ends_where_memory_ends(rows_of, monkeypatch, spec_of):

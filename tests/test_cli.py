@@ -77,6 +77,12 @@ def test_a_dry_run_lists_the_tasks_and_writes_nothing(gfmd):
     assert swept.count("| tolerance=1e-06") == swept.count("| tolerance=1e-08") == 4
 
 
+def test_a_quiet_run_says_why_its_exit_status_is_not_zero(gfmd):
+    done = gfmd("run", "spec.toml", "-q", "--set", "solver={kind='ccg', max_steps=1}")
+    assert done.exit_code == 1
+    assert re.search(r"gfmd: small\.h5: \d+ .*max_steps", done.output)
+
+
 def test_a_shard_takes_its_share(gfmd):
     assert gfmd("run", "spec.toml", "--shard", "0/2").exit_code == 0
     assert "2 tasks not solved yet" in gfmd("analyze", "small.h5").output

@@ -21,7 +21,7 @@ from specs import power_spec
 from gfmd_cli.analysis.compare import compare
 from gfmd_cli.analysis.diff import diff
 from gfmd_cli.analysis.table import Group, Table, TableColumn
-from gfmd_cli.analysis.units import SPACE, count, quantity, span
+from gfmd_cli.analysis.wording import SPACE, count, quantity, span
 from gfmd_cli.physics.persson import Shells
 from gfmd_cli.report import maps, rendering, surface
 from gfmd_cli.report.page import report

@@ -11,7 +11,7 @@ from scipy.special import stdtrit
 
 from gfmd_cli.analysis.compare import Comparison, Row, best_of_all, load_of, of_study
 from gfmd_cli.analysis.selection import grouped
-from gfmd_cli.analysis.units import contact_title, grid_size
+from gfmd_cli.analysis.wording import contact_title, grid_size
 from gfmd_cli.physics.observables import QUANTITIES
 from gfmd_cli.spec.models import LOADS
 from gfmd_cli.status import Status

@@ -7,7 +7,7 @@ from gfmd_cli.analysis.compare import with_best, with_solvers
 from gfmd_cli.analysis.selection import grouped
 from gfmd_cli.analysis.table import Record, Table, TableColumn, groups_of
 from gfmd_cli.analysis.tables import P_STAR, PRESSURE, RESIDUAL, STATUS, warnings_in
-from gfmd_cli.analysis.units import contact_title, grid_size, shown
+from gfmd_cli.analysis.wording import contact_title, grid_size, shown
 from gfmd_cli.physics.observables import QUANTITIES
 from gfmd_cli.status import Status
 from gfmd_cli.study.load_search import load_in_jump

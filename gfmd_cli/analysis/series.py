@@ -11,7 +11,7 @@ from gfmd_cli.analysis.curve_styles import CurveStyle
 from gfmd_cli.analysis.ensemble import by_load, spread_of, without_seed
 from gfmd_cli.analysis.plotting import ColumnFigure
 from gfmd_cli.analysis.selection import grouped
-from gfmd_cli.analysis.units import contact_title, grid_size, in_si, quantity
+from gfmd_cli.analysis.wording import contact_title, grid_size, in_si, quantity
 from gfmd_cli.grid.arrays import Field, Mask
 from gfmd_cli.status import Status
 

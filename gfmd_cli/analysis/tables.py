@@ -26,7 +26,7 @@ from gfmd_cli.analysis.table import (
     product,
     ratio,
 )
-from gfmd_cli.analysis.units import contact_title, grid_size, in_si, shown
+from gfmd_cli.analysis.wording import contact_title, grid_size, in_si, shown
 from gfmd_cli.physics.observables import QUANTITIES
 from gfmd_cli.study.observables import OBSERVABLES, Observable
 from gfmd_cli.study.plausibility import SEPARATOR
@@ -70,6 +70,7 @@ def _continuum(record: Record, name: str) -> float | None:
 
 COMPARISON = (
     P_STAR,
+    PRESSURE,
     *(c for name in QUANTITIES for c in _beside_theory(TableColumn(name, name), f"{name}_persson")),
     TableColumn("p ratio", ratio("p_star_persson_at_u_g", "p_star"), ".3f", optional=True),
     STATUS,
@@ -205,7 +206,8 @@ def comparison_table(curves: TitledCurves) -> Table:
             "on the grid, not extrapolated. p ratio: pressure at which the theory gives the "
             "simulated mean gap / simulated pressure."
         )
-    return Table(caption, COMPARISON, groups)
+    rows = [record for group in groups for record in group.records]
+    return Table(caption, shown(COMPARISON, rows), groups)
 
 
 def over_pressure(

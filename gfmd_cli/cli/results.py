@@ -41,7 +41,7 @@ def analyze(
     from gfmd_cli.analysis.compare import compare
     from gfmd_cli.analysis.records import as_records
     from gfmd_cli.analysis.run_summary import edge_warnings
-    from gfmd_cli.analysis.units import count
+    from gfmd_cli.analysis.wording import count
 
     comparison = compare(study, theory)
     if as_json:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from gfmd_cli.cli.messages import show
+from gfmd_cli.cli.messages import show, tell
 from gfmd_cli.cli.options import FILE, counted, output_option, overrides_option, study_path
 from gfmd_cli.cli.progress import Reporter
 from gfmd_cli.errors import InputError
@@ -126,9 +126,12 @@ def _run(spec: "Spec", text: str, path: Path, quiet: bool, options: "RunOptions"
     reporter = Reporter(quiet)
     with reporter as report:
         counts = run_study(spec, text, path, report if first else ignore, options)
+    unconverged = sum(counts.values()) - counts[Status.CONVERGED]
     if first and not quiet:
         _print_results(spec, path, options, counts, reporter.failed)
-    return sum(counts.values()) - counts[Status.CONVERGED]
+    elif first and unconverged:
+        tell(f"gfmd: {path}: {counted(counts)}")
+    return unconverged
 
 
 def _print_results(

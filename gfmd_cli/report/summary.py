@@ -7,7 +7,7 @@ from typing import NamedTuple
 from gfmd_cli.analysis.compare import Row, best, in_continuum
 from gfmd_cli.analysis.run_summary import edge_warnings
 from gfmd_cli.analysis.tables import warnings_in
-from gfmd_cli.analysis.units import count, grid_size, listed, pretty, quantity, span
+from gfmd_cli.analysis.wording import count, grid_size, listed, pretty, quantity, span
 from gfmd_cli.physics.observables import QUANTITIES
 from gfmd_cli.report.data import ReportData
 from gfmd_cli.units import duration
