@@ -112,8 +112,9 @@ def _point(view: View, records: list[Row]) -> tuple[float, float, float, float, 
 def _details(rows: list[Row]) -> str:
     """Load, status and parameters of a point, a line each."""
     first = rows[0]
+    pressure = float(np.mean([row["pressure"] for row in rows]))
     lines = [
-        *([f"pressure {quantity(first['pressure'], 'Pa')}"] if in_si(first) else []),
+        *([f"pressure {quantity(pressure, 'Pa')}"] if in_si(first) else []),
         contact_title(first, of_seeds=len(rows) > 1),
         f"{grid_size(rows)}, solver {first['solver']}",
     ]
