@@ -10,7 +10,6 @@ from gfmd_cli.analysis.tables import P_STAR, PRESSURE, RESIDUAL, STATUS, warning
 from gfmd_cli.analysis.wording import contact_title, grid_size, shown
 from gfmd_cli.physics.observables import QUANTITIES
 from gfmd_cli.status import Status
-from gfmd_cli.study.load_search import load_in_jump
 from gfmd_cli.study.reading import solved_rows
 
 MAX_ROWS = 40
@@ -52,16 +51,6 @@ def edge_warnings(rows: Sequence[Mapping[str, Any]]) -> list[str]:
         "window has changed the heights; leave out surface.edges to keep them"
         for surface, group in grouped(much, lambda row: row["surface"]).items()
     ]
-
-
-def loads_in_jumps(rows: list[dict[str, Any]], tolerance: float) -> list[str]:
-    """A line for each converged task whose load no pressure gives within the tolerance."""
-    messages = {
-        row["task"]: load_in_jump(row["load"], row["load_value"], row, tolerance)
-        for row in rows
-        if Status(row["status"]).is_converged
-    }
-    return [f"task {task}: {message}" for task, message in messages.items() if message][:MAX_ROWS]
 
 
 def other_tasks(rows: list[dict[str, Any]]) -> list[str]:

@@ -144,7 +144,6 @@ def _print_results(
     """Print the results, the tasks that have not converged, and the next commands."""
     from gfmd_cli.analysis.run_summary import (
         edge_warnings,
-        loads_in_jumps,
         other_tasks,
         run_text,
         unconverged,
@@ -159,8 +158,7 @@ def _print_results(
     if table := run_text(rows):
         show(f"{table}\n")
     show(f"{path}: {counted(counts) or 'no tasks in this shard'}")
-    jumps = loads_in_jumps(rows, spec.load.tolerance)
-    for line in [*unconverged(rows, failed), *jumps, *edge_warnings(rows)]:
+    for line in [*unconverged(rows, failed), *edge_warnings(rows)]:
         show(f"  {line}")
     ids = {task.id for task in tasks}
     for line in other_tasks([row for row in stored if row["task_id"] not in ids]):
