@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 from gamma_fit import print_table, spread
-from theory_studies import LIGHT
+from theory_studies import LIGHT, run_with_studies
 
 from gfmd_cli.analysis.compare import Curve, compare
 from gfmd_cli.analysis.selection import grouped
@@ -53,4 +53,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_with_studies(main, "python scripts/theory_studies.py")

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 from scipy.optimize import curve_fit, minimize_scalar
-from theory_studies import EXPONENTS, HURST, LIGHT, SPECTRA, TEST, TRAINING
+from theory_studies import EXPONENTS, HURST, LIGHT, SPECTRA, TEST, TRAINING, run_with_studies
 
 from gfmd_cli.analysis.compare import compare, einstein_prediction
 from gfmd_cli.analysis.curve_styles import MARKERS, CurveStyle, colours
@@ -288,4 +288,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_with_studies(main, "python scripts/theory_studies.py")

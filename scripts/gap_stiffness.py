@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 from gamma_fit import GAMMA, mean_gap, print_table, smooth, spread
-from theory_studies import EXPONENTS, LADDER, TRAINING
+from theory_studies import EXPONENTS, LADDER, TRAINING, run_with_studies
 
 from gfmd_cli.analysis.compare import Curve, compare
 from gfmd_cli.analysis.curve_styles import MARKERS, CurveStyle, colours
@@ -190,4 +190,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_with_studies(main, "python scripts/theory_studies.py")

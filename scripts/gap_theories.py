@@ -35,7 +35,7 @@ from gamma_fit import (
 from gamma_fit import smooth as gamma
 from scipy.optimize import least_squares
 from scipy.special import erf
-from theory_studies import EXPONENTS, HURST, SPECTRA
+from theory_studies import EXPONENTS, HURST, SPECTRA, run_with_studies
 
 from gfmd_cli.analysis.compare import Curve, Theory, compare, einstein_prediction, theory_of
 from gfmd_cli.physics.persson import Shells, gamma_n
@@ -332,4 +332,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_with_studies(main, "python scripts/theory_studies.py")

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 from gamma_fit import print_table
 from paper.stress import mean_stress, tail_exponent
+from theory_studies import run_with_studies
 
 from gfmd_cli.analysis.compare import compare
 from gfmd_cli.analysis.distribution import distributions
@@ -41,4 +42,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_with_studies(main, "make paper")

@@ -7,9 +7,12 @@ python scripts/theory_studies.py --folder results/theory
 """
 
 import argparse
+import sys
+from collections.abc import Callable
 from pathlib import Path
 
 from gfmd_cli.cli.progress import Reporter
+from gfmd_cli.errors import InputError
 from gfmd_cli.spec.parse import read_spec
 from gfmd_cli.study.run import RunOptions, run_study
 
@@ -116,6 +119,14 @@ STUDIES = {
     "stiffness": stiffness_specs,
     "true-contact": true_contact_specs,
 }
+
+
+def run_with_studies(main: Callable[[], None], maker: str) -> None:
+    """Run a script that reads studies; if one is missing, print the command that makes them."""
+    try:
+        main()
+    except InputError as error:
+        sys.exit(f"{error}; `{maker}` makes the studies")
 
 
 def main() -> None:

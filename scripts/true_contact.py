@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 from gamma_fit import spread
 from scipy.special import erfinv
+from theory_studies import run_with_studies
 
 from gfmd_cli.analysis.compare import VARIANTS, Curve, compare
 from gfmd_cli.analysis.curve_styles import MARKERS, CurveStyle, colours
@@ -110,4 +111,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_with_studies(main, "python scripts/theory_studies.py")

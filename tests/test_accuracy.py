@@ -10,6 +10,7 @@ from specs import power_spec
 from gfmd_cli import solve
 from gfmd_cli.analysis.compare import compare
 from gfmd_cli.analysis.ensemble import Ensemble, ensembles, spread_of
+from gfmd_cli.analysis.run_summary import run_text
 from gfmd_cli.analysis.table import plus_minus
 from gfmd_cli.analysis.tables import seeds_table, study_tables
 from gfmd_cli.bench.run import run_bench
@@ -102,6 +103,14 @@ def test_an_auto_grid_ends_where_it_may_not_grow(rows_of):
     assert (row["status"], row["points"]) == (Status.ACCURACY_NOT_REACHED, 64)
     assert row["points_y"] == 64  # not those of the forecast, 100
     assert row["u_g_error"] > 1e-6 * row["u_g"]
+    assert "next to full contact" not in Status.ACCURACY_NOT_REACHED.explain(row)
+
+
+def test_a_grid_that_ends_next_to_full_contact_says_why(rows_of):
+    (row,) = rows_of("load.p_star=3.1", "accuracy={mean_gap=1e-3, max_points=128}")
+    assert row["status"] == Status.ACCURACY_NOT_REACHED
+    assert 0.99 < row["a_r"] < 1
+    assert "loosen accuracy.mean_gap" in Status.ACCURACY_NOT_REACHED.explain(row)
 
 
 def test_an_auto_grid_ends_where_memory_ends(rows_of, monkeypatch, spec_of):
@@ -311,6 +320,24 @@ def test_seeds_have_a_mean_and_a_confidence_interval(rows_of, tmp_path, output_o
     records = json.loads(output_of("analyze", tmp_path / "study.h5", "--json"))
     assert len(records) == 8
     assert records[0]["u_g_mean"] == pytest.approx(np.mean(values))
+
+
+def test_seeds_with_grids_of_their_own_on_an_oblong_cell_are_averaged(rows_of, tmp_path):
+    keys = ("surface.seed=[0, 1]", "surface.length_y=0.5", "accuracy={mean_gap=0.01}")
+    rows = rows_of(*keys, "surface.cutoff=0.2")
+    assert len({(row["points"], row["points_y"]) for row in rows}) == 2
+    (ensemble,) = ensembles(compare(tmp_path / "study.h5"))
+    assert len(ensemble.rows) == 2
+
+
+def test_contacts_of_several_tolerances_have_titles_of_their_own(rows_of, tmp_path, output_of):
+    plain = SPEC.partition("[accuracy]")[0].replace('points = "auto"', "points = 32")
+    seeds, tolerances = "surface.seed=[0, 1]", "solver.tolerance=[1e-6, 1e-8]"
+    rows = rows_of(seeds, tolerances, "surface.cutoff=0.2", text=plain)
+    tables = [table.as_text() for table in study_tables(compare(tmp_path / "study.h5"))]
+    for text in (*tables, run_text(rows)):
+        assert text.count("points a side, tolerance=1e-06") == (1 if "mean of" in text else 2)
+        assert text.count("points a side, tolerance=1e-08") == (1 if "mean of" in text else 2)
 
 
 def test_a_pressure_that_was_searched_has_an_interval_and_a_given_one_is_exact(rows_of, tmp_path):

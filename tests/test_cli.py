@@ -51,14 +51,16 @@ def test_export_writes_a_file(gfmd):
     assert Path("a.csv").read_text().startswith(CONTRACT)
 
 
-def test_analyze_prints_records_with_the_promised_keys(gfmd):
-    gfmd("run", "spec.toml")
+def test_analyze_prints_records_with_the_columns_of_export_and_theory(gfmd):
+    gfmd("run", "spec.toml", "--set", "solver.tolerance=[1e-6, 1e-8]")
     records = json.loads(gfmd("analyze", "small.h5", "--json").output)
-    assert len(records) == 4
-    assert list(records[0])[:11] == [
-        "n", "thickness", "points", "seed", "p_star", "a_r", "a_r_persson", "sigma_p",
-        "sigma_p_persson", "u_g", "u_g_persson",
-    ]  # fmt: skip
+    rows = list(csv.DictReader(gfmd("export", "small.h5").output.splitlines()))
+    assert len(records) == len(rows) == 8
+    theory = {"a_r_persson", "sigma_p_persson", "u_g_persson", "p_star_persson_at_u_g"}
+    assert set(records[0]) == {*rows[0], *theory}
+    for record in records:
+        texts = {key: "" if record[key] is None else str(record[key]) for key in rows[0]}
+        assert texts in rows
     assert records[0]["thickness"] is None
     assert records[0]["a_r_persson"] == pytest.approx(0.07965567455405798, rel=1e-12)  # erf
 
@@ -71,6 +73,14 @@ def test_a_dry_run_lists_the_tasks_and_writes_nothing(gfmd):
     assert "MiB" in result.output
     assert set(Path().iterdir()) == before
     assert "2 tasks" in gfmd("run", "spec.toml", "--dry-run", "--shard", "1/2").output
+    swept = gfmd("run", "spec.toml", "--dry-run", "--set", "solver.tolerance=[1e-6, 1e-8]").output
+    assert swept.count("| tolerance=1e-06") == swept.count("| tolerance=1e-08") == 4
+
+
+def test_a_quiet_run_says_why_its_exit_status_is_not_zero(gfmd):
+    done = gfmd("run", "spec.toml", "-q", "--set", "solver={kind='ccg', max_steps=1}")
+    assert done.exit_code == 1
+    assert re.search(r"gfmd: small\.h5: \d+ .*max_steps", done.output)
 
 
 def test_a_shard_takes_its_share(gfmd):

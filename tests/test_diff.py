@@ -118,6 +118,14 @@ def test_another_elastomer_is_paired_by_pressure_and_compared_in_pascal_and_metr
     assert text.startswith("elastomers differ: paired by pressure, sigma_p in Pa, u_g in m. ")
     data = json.loads(output_of("diff", study_of(*IN_PASCAL), study_of(*stiff), "--json"))
     assert data["paired"] == difference.paired
+    for row in data["rows"]:
+        assert [row[f"{name}_unit"] for name in ("a_r", "sigma_p", "u_g")] == ["1", "Pa", "m"]
+        for name in ("a_r", "sigma_p", "u_g"):
+            a, b = row[f"{name}_a"], row[f"{name}_b"]
+            assert row[f"{name}_relative"] == pytest.approx((b - a) / max(a, b), rel=1e-12)
+    assert data["rows"][0]["sigma_p_a"] == pytest.approx(
+        difference.pairs[0].one["sigma_p"] * difference.pairs[0].one["delta_sigma"], rel=1e-12
+    )
 
 
 def test_at_one_pressure_in_pascal_two_grids_of_an_indenter_are_compared_in_pascal_and_metres(

@@ -2,7 +2,7 @@
 
 import pytest
 
-from gfmd_cli.analysis.units import grid_size
+from gfmd_cli.analysis.wording import grid_size
 
 
 @pytest.mark.parametrize(

@@ -21,12 +21,14 @@ from specs import power_spec
 from gfmd_cli.analysis.compare import compare
 from gfmd_cli.analysis.diff import diff
 from gfmd_cli.analysis.table import Group, Table, TableColumn
-from gfmd_cli.analysis.units import SPACE, count, quantity, span
+from gfmd_cli.analysis.wording import SPACE, count, quantity, span
 from gfmd_cli.physics.persson import Shells
 from gfmd_cli.report import maps, rendering, surface
+from gfmd_cli.report.data import read_report_data
 from gfmd_cli.report.page import report
 from gfmd_cli.report.profiles import STRESS_SCALE, read_profile
 from gfmd_cli.report.rendering import environment, typeset
+from gfmd_cli.report.summary import headline
 from gfmd_cli.report.theme import DARK, LEGIBLE, LIGHT, PALETTE, contrast, toned
 from gfmd_cli.study.column import Column
 from gfmd_cli.study.reading import ATTRIBUTES_SUM, attributes_sum, open_study, read_rows
@@ -563,3 +565,13 @@ def test_two_grids_of_one_contact_add_the_continuum(invoke, tmp_path):
     page = Page(report(solved(invoke, tmp_path, text)))
     labels = [drawing["aria-label"] for drawing in page.all("svg")]
     assert "Distribution of the stress in the continuum, with error bars and edge laws" in labels
+
+
+def test_the_headline_does_not_count_an_indenter_as_a_seed(rows_of, tmp_path):
+    surfaces = "surface=[{kind='self-affine', cutoff=0.2, seed=SEEDS}, {kind='parabola'}]"
+    for seeds, text in (("3", "2 surfaces"), ("[3, 4]", "2 seeds")):
+        name = f"{len(seeds)}.h5"
+        rows_of(surfaces.replace("SEEDS", seeds), "elastomer.n=1", text=SPEC, name=name)
+        sentence = headline(read_report_data(tmp_path / name))
+        assert text in sentence
+        assert ("seeds" in sentence) == (seeds == "[3, 4]")

@@ -9,6 +9,7 @@ from gfmd_cli.analysis.ensemble import Ensemble, ensembles
 from gfmd_cli.analysis.figures import VIEWS, items_of, study_figures
 from gfmd_cli.analysis.plotting import styled
 from gfmd_cli.analysis.series import Series, _point, seed_groups
+from gfmd_cli.analysis.wording import quantity
 
 SPEC = """\
 [surface]
@@ -93,3 +94,14 @@ def test_continuum_values_are_averaged_if_all_seeds_have_one(comparison):
         assert Ensemble(records).spread("a_r").mean == pytest.approx(mean)
         assert _point(AREA, records)[1:3] == pytest.approx((mean, error))
         records[1]["a_r_continuum"] = np.nan
+
+
+def test_the_pressure_of_a_mean_over_seeds_is_that_of_its_place_on_the_axis(tmp_path, rows_of):
+    keys = ("elastomer.n=1", "surface.h_std=1e-6", "load={mean_gap=0.5}", "surface.seed=[0, 1]")
+    rows = rows_of(*keys, name="gap.h5")
+    assert rows[0]["pressure"] != pytest.approx(rows[1]["pressure"], rel=0.01)
+    (group,) = seed_groups(items_of(compare(tmp_path / "gap.h5")))
+    series = Series.of(AREA, group)
+    mean = np.mean([row["pressure"] for row in rows])
+    assert series.details[0].startswith(f"pressure {quantity(mean, 'Pa')}\n")
+    assert mean == pytest.approx(series.x[0] * rows[0]["delta_sigma"], rel=1e-12)

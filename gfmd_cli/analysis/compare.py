@@ -223,6 +223,16 @@ def solver_of(row: Row) -> tuple[Any, ...]:
     return tuple(row[each.column.name] for each in PARAMETERS if each.table == "solver")
 
 
+def with_solvers(titles: Iterable[str], rows: Sequence[Row]) -> list[str]:
+    """Titles of contacts, followed by the keys of [solver] in which the contacts differ."""
+    words = [[each.word(row) for row in rows] for each in PARAMETERS if each.table == "solver"]
+    differing = [column for column in words if len(set(column)) > 1]
+    return [
+        ", ".join(filter(None, (title, *(column[i] for column in differing))))
+        for i, title in enumerate(titles)
+    ]
+
+
 def load_of(row: Row) -> tuple[str, str]:
     """The prescribed load of a row, equal where loads differ by rounding alone."""
     return row["load"], f"{row['load_value']:.12g}"

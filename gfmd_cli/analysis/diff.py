@@ -39,15 +39,25 @@ class Pair:
     physical: bool = False
     """Whether stress and gap are compared in Pa and m: where the load is in SI units."""
 
-    def deviation(self, name: str) -> Deviation:
-        """How far a column of the second study lies from that of the first."""
+    def unit(self, name: str) -> str:
+        """Unit in which a quantity is compared."""
+        return (self.physical and QUANTITIES[name].si) or "1"
+
+    def values(self, name: str, suffix: str = "") -> tuple[float, float]:
+        """A quantity in both studies, in the unit in which it is compared; "_error": its error."""
         scale = QUANTITIES[name].scale if self.physical else ""
-        units = [row[scale] if scale else 1.0 for row in (self.one, self.other)]
-        a, b = self.one[name] * units[0], self.other[name] * units[1]
+        a, b = (
+            float(row[name + suffix] * (row[scale] if scale else 1.0))
+            for row in (self.one, self.other)
+        )
+        return a, b
+
+    def deviation(self, name: str) -> Deviation:
+        """How far a quantity of the second study lies from that of the first."""
+        a, b = self.values(name)
         if math.isnan(a) or math.isnan(b):
             return Deviation(math.nan if math.isnan(a) and math.isnan(b) else math.inf, math.nan)
-        errors = self.one[f"{name}_error"] * units[0], self.other[f"{name}_error"] * units[1]
-        error = math.hypot(*errors)
+        error = math.hypot(*self.values(name, "_error"))
         in_errors = (b - a) / error if error > 0 else math.nan
         return Deviation((b - a) / max(abs(a), abs(b)) if a != b else 0.0, in_errors)
 

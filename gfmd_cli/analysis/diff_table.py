@@ -4,11 +4,11 @@ import json
 from functools import partial
 from typing import Any
 
-from gfmd_cli.analysis.compare import Row
+from gfmd_cli.analysis.compare import Row, with_solvers
 from gfmd_cli.analysis.diff import Difference, Pair
 from gfmd_cli.analysis.selection import grouped
 from gfmd_cli.analysis.table import BLANK, Record, Table, TableColumn, groups_of, known, plain
-from gfmd_cli.analysis.units import contact_title
+from gfmd_cli.analysis.wording import contact_title
 from gfmd_cli.physics.observables import QUANTITIES
 from gfmd_cli.spec.models import load_text
 
@@ -41,7 +41,9 @@ DIFFERENCES = (
 
 def diff_table(difference: Difference) -> Table:
     """The pairs of contacts, grouped by what is compared."""
-    groups = groups_of((_title(pair), _record(pair)) for pair in difference.pairs)
+    pairs = difference.pairs
+    titles = with_solvers(map(_title, pairs), [pair.one for pair in pairs])
+    groups = groups_of(zip(titles, map(_record, pairs), strict=True))
     caption = f"{difference.paired}. {LEGEND}" if difference.paired else LEGEND
     return Table(caption, DIFFERENCES, groups)
 
@@ -81,11 +83,13 @@ def _title(pair: Pair) -> str:
 
 
 def _record(pair: Pair) -> Record:
-    """Both values of what is compared, as `a_r_a` and `a_r_b`, and how far they lie apart."""
+    """Both values of what is compared, as `a_r_a` and `a_r_b`, their unit, and how far apart."""
     record = {key: pair.one[key] for key in CONTACT}
-    for key in ("points", "p_star", *QUANTITIES):
+    for key in ("points", "p_star"):
         record |= {f"{key}_a": pair.one[key], f"{key}_b": pair.other[key]}
     for name in QUANTITIES:
+        a, b = pair.values(name)
+        record |= {f"{name}_a": a, f"{name}_b": b, f"{name}_unit": pair.unit(name)}
         deviation = pair.deviation(name)._asdict()
         record |= {f"{name}_{what}": value for what, value in deviation.items()}
     return record

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from gfmd_cli.analysis.compare import Comparison, Curve, Row, of_study, solver_of
-from gfmd_cli.analysis.units import contact_title
+from gfmd_cli.analysis.wording import contact_title
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.physics.observables import LOGARITHMIC_EDGES, estimated_patches
 from gfmd_cli.status import Status

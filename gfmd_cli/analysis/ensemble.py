@@ -11,7 +11,7 @@ from scipy.special import stdtrit
 
 from gfmd_cli.analysis.compare import Comparison, Row, best_of_all, load_of, of_study
 from gfmd_cli.analysis.selection import grouped
-from gfmd_cli.analysis.units import contact_title, grid_size
+from gfmd_cli.analysis.wording import contact_title, grid_size
 from gfmd_cli.physics.observables import QUANTITIES
 from gfmd_cli.spec.models import LOADS
 from gfmd_cli.status import Status
@@ -90,11 +90,9 @@ def spread_of(values: Sequence[float]) -> Spread:
 
 def without_seed(row: Row) -> tuple[Any, ...]:
     """What contacts have in common that differ in seed and load only."""
-    points = "auto" if row.get("grid") == "auto" else str(row["points"])
-    words = [
-        each.word(row) for each in PARAMETERS if each.key != "seed" and each.column.name != "points"
-    ]
-    return (points, row["surface_sha256"], *words)
+    auto = row["grid"] == "auto"  # with points of its own for each seed
+    keys = {"seed", "points", "points_y"} if auto else {"seed"}
+    return (auto, row["surface_sha256"], *(e.word(row) for e in PARAMETERS if e.key not in keys))
 
 
 def by_load(rows: Iterable[Row]) -> list[list[Row]]:

@@ -42,7 +42,7 @@ def export_csv(path: Path) -> str:
 
 def csv_text(rows: Rows) -> str:
     """The solved rows of a study as CSV, below a header."""
-    names = [*(c.name for c in (*CONTRACT, *DETAILS)), *parameter_names(rows)]
+    names = column_names(rows)
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(names)
@@ -50,13 +50,14 @@ def csv_text(rows: Rows) -> str:
     return text.getvalue()
 
 
-def parameter_names(rows: Rows) -> list[str]:
-    """Columns of parameters that some row has, without those of the contract."""
-    return [
-        column.name
+def column_names(rows: Rows) -> list[str]:
+    """All columns, without the parameters that no row has."""
+    parameters = (
+        column
         for column in PARAMETER_COLUMNS
         if not all(column.is_blank(row[column.name]) for row in rows)
-    ]
+    )
+    return [column.name for column in (*CONTRACT, *DETAILS, *parameters)]
 
 
 def _cell(value: Any) -> str:

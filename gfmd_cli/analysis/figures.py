@@ -9,7 +9,7 @@ from gfmd_cli.analysis.curve_styles import curve_styles, order
 from gfmd_cli.analysis.distribution_figure import continuum_figure, distribution_figures
 from gfmd_cli.analysis.plotting import ColumnFigure, styled
 from gfmd_cli.analysis.series import Item, Series, View, seed_groups
-from gfmd_cli.analysis.units import in_si
+from gfmd_cli.analysis.wording import in_si
 from gfmd_cli.units import scaled
 
 WIDE = 20  # a ratio that varies by more is drawn on a log scale

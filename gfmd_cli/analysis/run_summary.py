@@ -3,14 +3,13 @@
 from collections.abc import Mapping, Sequence, Sized
 from typing import Any
 
-from gfmd_cli.analysis.compare import with_best
+from gfmd_cli.analysis.compare import with_best, with_solvers
 from gfmd_cli.analysis.selection import grouped
 from gfmd_cli.analysis.table import Record, Table, TableColumn, groups_of
 from gfmd_cli.analysis.tables import P_STAR, PRESSURE, RESIDUAL, STATUS, warnings_in
-from gfmd_cli.analysis.units import contact_title, grid_size, shown
+from gfmd_cli.analysis.wording import contact_title, grid_size, shown
 from gfmd_cli.physics.observables import QUANTITIES
 from gfmd_cli.status import Status
-from gfmd_cli.study.load_search import load_in_jump
 from gfmd_cli.study.reading import solved_rows
 
 MAX_ROWS = 40
@@ -30,7 +29,9 @@ def run_text(rows: list[dict[str, Any]]) -> str:
     """The solved contacts by scene, MAX_ROWS at most; an empty string where nothing was solved."""
     solved = solved_rows(rows)
     listed = solved[:MAX_ROWS]
-    table = Table("", shown(RUN, listed), groups_of((_scene(r), with_best(r)) for r in listed))
+    titles = with_solvers(map(_scene, listed), listed)
+    records = map(with_best, listed)
+    table = Table("", shown(RUN, listed), groups_of(zip(titles, records, strict=True)))
     warnings = [f"warning: {line}" for line in warnings_in(solved)]
     blocks = [table.as_text(), *_left_out(solved, MAX_ROWS, "contacts"), "\n".join(warnings)]
     return "\n\n".join(filter(None, blocks))
@@ -50,16 +51,6 @@ def edge_warnings(rows: Sequence[Mapping[str, Any]]) -> list[str]:
         "window has changed the heights; leave out surface.edges to keep them"
         for surface, group in grouped(much, lambda row: row["surface"]).items()
     ]
-
-
-def loads_in_jumps(rows: list[dict[str, Any]], tolerance: float) -> list[str]:
-    """A line for each converged task whose load no pressure gives within the tolerance."""
-    messages = {
-        row["task"]: load_in_jump(row["load"], row["load_value"], row, tolerance)
-        for row in rows
-        if Status(row["status"]).is_converged
-    }
-    return [f"task {task}: {message}" for task, message in messages.items() if message][:MAX_ROWS]
 
 
 def other_tasks(rows: list[dict[str, Any]]) -> list[str]:

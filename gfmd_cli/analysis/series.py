@@ -11,7 +11,7 @@ from gfmd_cli.analysis.curve_styles import CurveStyle
 from gfmd_cli.analysis.ensemble import by_load, spread_of, without_seed
 from gfmd_cli.analysis.plotting import ColumnFigure
 from gfmd_cli.analysis.selection import grouped
-from gfmd_cli.analysis.units import contact_title, grid_size, in_si, quantity
+from gfmd_cli.analysis.wording import contact_title, grid_size, in_si, quantity
 from gfmd_cli.grid.arrays import Field, Mask
 from gfmd_cli.status import Status
 
@@ -115,8 +115,9 @@ def _point(view: View, records: list[Row]) -> tuple[float, float, float, float, 
 def _details(rows: list[Row]) -> str:
     """Load, status and parameters of a point, a line each."""
     first = rows[0]
+    pressure = float(np.mean([row["pressure"] for row in rows]))
     lines = [
-        *([f"pressure {quantity(first['pressure'], 'Pa')}"] if in_si(first) else []),
+        *([f"pressure {quantity(pressure, 'Pa')}"] if in_si(first) else []),
         contact_title(first, of_seeds=len(rows) > 1),
         f"{grid_size(rows)}, solver {first['solver']}",
     ]

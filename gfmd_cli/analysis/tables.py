@@ -5,7 +5,14 @@ from collections.abc import Collection, Sequence
 from dataclasses import replace
 from functools import partial
 
-from gfmd_cli.analysis.compare import VARIANTS, Comparison, Curve, in_continuum, of_study
+from gfmd_cli.analysis.compare import (
+    VARIANTS,
+    Comparison,
+    Curve,
+    in_continuum,
+    of_study,
+    with_solvers,
+)
 from gfmd_cli.analysis.distribution import StressDistribution, distributions
 from gfmd_cli.analysis.edge_law import fit
 from gfmd_cli.analysis.ensemble import ensembles
@@ -19,7 +26,7 @@ from gfmd_cli.analysis.table import (
     product,
     ratio,
 )
-from gfmd_cli.analysis.units import contact_title, grid_size, in_si, shown
+from gfmd_cli.analysis.wording import contact_title, grid_size, in_si, shown
 from gfmd_cli.physics.observables import QUANTITIES
 from gfmd_cli.study.observables import OBSERVABLES, Observable
 from gfmd_cli.study.plausibility import SEPARATOR
@@ -63,6 +70,7 @@ def _continuum(record: Record, name: str) -> float | None:
 
 COMPARISON = (
     P_STAR,
+    PRESSURE,
     *(c for name in QUANTITIES for c in _beside_theory(TableColumn(name, name), f"{name}_persson")),
     TableColumn("p ratio", ratio("p_star_persson_at_u_g", "p_star"), ".3f", optional=True),
     STATUS,
@@ -172,7 +180,9 @@ def warnings_in(rows: Sequence[Record]) -> list[str]:
 
 def study_tables(comparison: Comparison) -> list[Table]:
     """The tables of `gfmd analyze`, without those that have no record."""
-    curves = [(curve_title(curve), curve) for curve in comparison.curves]
+    firsts = [curve.rows[0] for curve in comparison.curves]
+    titles = with_solvers(map(curve_title, comparison.curves), firsts)
+    curves = list(zip(titles, comparison.curves, strict=True))
     tables = [
         comparison_table(curves),
         over_pressure(EINSTEIN, EINSTEIN_CAPTION, curves, ["a_r_einstein"]),
@@ -197,7 +207,8 @@ def comparison_table(curves: TitledCurves) -> Table:
             "on the grid, not extrapolated. p ratio: pressure at which the theory gives the "
             "simulated mean gap / simulated pressure."
         )
-    return Table(caption, COMPARISON, groups)
+    rows = [record for group in groups for record in group.records]
+    return Table(caption, shown(COMPARISON, rows), groups)
 
 
 def over_pressure(
@@ -237,12 +248,14 @@ def observables_table(curves: TitledCurves) -> Table:
 
 def seeds_table(comparison: Comparison) -> Table:
     """Means over seeds."""
+    means = ensembles(comparison)
+    titles = with_solvers((each.title for each in means), [each.rows[0] for each in means])
     groups = groups_of(
         (
-            f"{ensemble.title}: mean of {len(ensemble.rows)} seeds",
+            f"{title}: mean of {len(ensemble.rows)} seeds",
             {"p_star": ensemble.p_star, "failures": ensemble.failures, **ensemble.means()},
         )
-        for ensemble in ensembles(comparison)
+        for title, ensemble in zip(titles, means, strict=True)
     )
     caption = "Means over seeds, +- half the width of the 95 % confidence interval (Student's t)."
     return Table(caption, SEEDS, groups)
@@ -250,9 +263,11 @@ def seeds_table(comparison: Comparison) -> Table:
 
 def power_laws(comparison: Comparison) -> Table:
     """The power laws of Pr(sigma), a record each; without one where no contact has two grids."""
+    stresses = distributions(comparison)
+    titles = with_solvers((each.title for each in stresses), [each.finest for each in stresses])
     titled = [
-        (stress.title, record)
-        for stress in distributions(comparison)
+        (title, record)
+        for title, stress in zip(titles, stresses, strict=True)
         for record in _law_records(stress)
     ]
     return Table(POWER_LAWS_CAPTION, POWER_LAWS, groups_of(titled))

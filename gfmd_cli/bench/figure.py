@@ -9,7 +9,7 @@ import numpy as np
 from gfmd_cli.analysis.curve_styles import CurveStyle, distinct_styles, literal
 from gfmd_cli.analysis.plotting import SMALL, WIDTH, LegendFigure, log_scale, styled
 from gfmd_cli.analysis.selection import grouped
-from gfmd_cli.analysis.units import contact_title
+from gfmd_cli.analysis.wording import contact_title
 from gfmd_cli.bench.file import Trace
 from gfmd_cli.bench.run import REFERENCE
 from gfmd_cli.bench.table import contact_of, solver_names

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from gfmd_cli.cli.messages import show
+from gfmd_cli.cli.messages import show, tell
 from gfmd_cli.cli.options import FILE, counted, output_option, overrides_option, study_path
 from gfmd_cli.cli.progress import Reporter
 from gfmd_cli.errors import InputError
@@ -126,9 +126,12 @@ def _run(spec: "Spec", text: str, path: Path, quiet: bool, options: "RunOptions"
     reporter = Reporter(quiet)
     with reporter as report:
         counts = run_study(spec, text, path, report if first else ignore, options)
+    unconverged = sum(counts.values()) - counts[Status.CONVERGED]
     if first and not quiet:
         _print_results(spec, path, options, counts, reporter.failed)
-    return sum(counts.values()) - counts[Status.CONVERGED]
+    elif first and unconverged:
+        tell(f"gfmd: {path}: {counted(counts)}")
+    return unconverged
 
 
 def _print_results(
@@ -141,7 +144,6 @@ def _print_results(
     """Print the results, the tasks that have not converged, and the next commands."""
     from gfmd_cli.analysis.run_summary import (
         edge_warnings,
-        loads_in_jumps,
         other_tasks,
         run_text,
         unconverged,
@@ -156,8 +158,7 @@ def _print_results(
     if table := run_text(rows):
         show(f"{table}\n")
     show(f"{path}: {counted(counts) or 'no tasks in this shard'}")
-    jumps = loads_in_jumps(rows, spec.load.tolerance)
-    for line in [*unconverged(rows, failed), *jumps, *edge_warnings(rows)]:
+    for line in [*unconverged(rows, failed), *edge_warnings(rows)]:
         show(f"  {line}")
     ids = {task.id for task in tasks}
     for line in other_tasks([row for row in stored if row["task_id"] not in ids]):
@@ -188,9 +189,12 @@ def _print_tasks(spec: "Spec", path: Path, options: "RunOptions") -> None:
         if done and task.id in to_do:
             done = "  [again: more output is requested]"
         points = f"~{task.points}" if task.auto else str(task.points)
+        surface = task.surface.label
+        swept = " ".join(word for word in task.swept if word not in surface)
+        scene = " | ".join(filter(None, (surface, task.elastomer.label, swept)))
         show(
             f"{task.index:6d} {points:>6} {task.load_label:>10} {task.bytes / 2**20:8.0f} "
-            f"{task.seconds:8.2g}  {task.surface.label} | {task.elastomer.label}{done}"
+            f"{task.seconds:8.2g}  {scene}{done}"
         )
     show(
         f"{len(tasks)} tasks, {len(missing)} to do, about {sum(t.seconds for t in missing):.3g} s "

@@ -14,7 +14,7 @@ from gfmd_cli.analysis.plotting import ColumnFigure
 from gfmd_cli.analysis.series import Item
 from gfmd_cli.analysis.table import TableColumn
 from gfmd_cli.analysis.tables import TitledCurves, curve_title
-from gfmd_cli.analysis.units import in_si, shown
+from gfmd_cli.analysis.wording import in_si, shown
 from gfmd_cli.bench.file import Trace
 from gfmd_cli.status import Status
 from gfmd_cli.study.reading import open_study, solved_rows

@@ -6,7 +6,7 @@ from gfmd_cli.analysis.diff import diff
 from gfmd_cli.analysis.diff_table import NOTHING, diff_lists, diff_table
 from gfmd_cli.analysis.table import Group, Record, Table, TableColumn
 from gfmd_cli.analysis.tables import P_STAR, RESIDUAL, STATUS
-from gfmd_cli.analysis.units import count
+from gfmd_cli.analysis.wording import count
 from gfmd_cli.report.data import ReportData
 from gfmd_cli.report.section import Section
 from gfmd_cli.status import Status

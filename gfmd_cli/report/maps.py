@@ -11,7 +11,7 @@ from gfmd_cli.analysis.plotting import WIDTH, ColumnFigure, LegendFigure, shades
 from gfmd_cli.analysis.selection import evenly, grouped
 from gfmd_cli.analysis.table import Group, Table, TableColumn
 from gfmd_cli.analysis.tables import AREA, P_STAR, POINTS, PRESSURE
-from gfmd_cli.analysis.units import contact_title, pressure_text
+from gfmd_cli.analysis.wording import contact_title, pressure_text
 from gfmd_cli.grid.arrays import Field, Mask
 from gfmd_cli.physics.observables import contact_points
 from gfmd_cli.physics.pictures import block_sums

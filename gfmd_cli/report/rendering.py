@@ -14,7 +14,7 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
-from gfmd_cli.analysis.units import RAISED
+from gfmd_cli.analysis.wording import RAISED
 
 SCRIPTS = ("plotly-basic.min.js", "report.js")
 """Files of gfmd_cli/report/assets, in the order in which they run."""

@@ -6,8 +6,9 @@ from typing import NamedTuple
 
 from gfmd_cli.analysis.compare import Row, best, in_continuum
 from gfmd_cli.analysis.run_summary import edge_warnings
+from gfmd_cli.analysis.table import known
 from gfmd_cli.analysis.tables import warnings_in
-from gfmd_cli.analysis.units import count, grid_size, listed, pretty, quantity, span
+from gfmd_cli.analysis.wording import count, grid_size, listed, pretty, quantity, span
 from gfmd_cli.physics.observables import QUANTITIES
 from gfmd_cli.report.data import ReportData
 from gfmd_cli.units import duration
@@ -36,7 +37,7 @@ def headline(data: ReportData) -> str:
     rows, curves = data.solved, data.comparison.curves
     surfaces = list(dict.fromkeys(str(row["ensemble"]) for row in rows))
     elastomers = list(dict.fromkeys(str(row["elastomer"]) for row in rows))
-    seeds = len({row["seed"] for row in rows})
+    seeds = len({row["seed"] for row in rows if known(row["seed"])})
     pascals = span(_column(rows, "pressure"), "Pa")
     pressures = count(max(len(curve.rows) for curve in curves), "pressure")
     return (

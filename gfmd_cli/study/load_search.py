@@ -11,10 +11,9 @@ The contact area of a grid has steps. Where the requested area lies between two 
 search ends with the nearest contact, at a pressure that may depend on rounding errors.
 """
 
-from collections.abc import Mapping
 from dataclasses import replace
 from math import exp, expm1, inf, isfinite, log
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -29,6 +28,7 @@ from gfmd_cli.study.context import SolveContext, Watcher
 from gfmd_cli.study.forecast import FIRST
 from gfmd_cli.study.measure import measured
 from gfmd_cli.study.notes import Trial
+from gfmd_cli.study.plausibility import loaded_value
 from gfmd_cli.study.refinement import Solved, solve_on_grids, task_scene
 from gfmd_cli.study.tasks import Task
 
@@ -88,18 +88,7 @@ def solve_at_load(task: Task, context: SolveContext, watcher: Watcher) -> Solved
     solver_ended = solved.solution.status in (Status.CONVERGED, Status.ROUNDING)
     if solver_ended and not search.succeeded:
         solved.solution.status = Status.LOAD_NOT_REACHED
-    elif message := load_in_jump(
-        task.quantity, task.load, measured(task, solved), task.load_tolerance
-    ):
-        context.warn(f"{task.label}: {message}", task=task.index, label=task.label)
     return solved
-
-
-def loaded_value(quantity: str, results: Mapping[str, Any]) -> float:
-    """The value that a load prescribes: in the continuum if it is known, else on the grid."""
-    name = LOADS[quantity].searched
-    continuum = float(results.get(f"{name}_continuum", inf))
-    return continuum if isfinite(continuum) else float(results[name])
 
 
 def _check_known(task: Task, solved: Solved) -> None:
@@ -110,16 +99,6 @@ def _check_known(task: Task, solved: Solved) -> None:
             f"load.{task.quantity}: the continuum value is not known on a grid of {task.points} "
             "points per side; give a finer grid, or leave out [accuracy] for the value on the grid"
         )
-
-
-def load_in_jump(quantity: str, load: float, results: Mapping[str, Any], tolerance: float) -> str:
-    """A message where a contact area is farther than the tolerance from the load, else ""."""
-    if quantity != "contact_area":
-        return ""
-    value = loaded_value(quantity, results)
-    if abs(value - load) <= tolerance * load:
-        return ""
-    return f"load.{quantity} = {load:g} lies in a jump; the nearest value is {value:g}"
 
 
 def _grids(task: Task) -> list[int]:

@@ -107,11 +107,12 @@ def all_columns(task: Task, solved: Solved) -> Row:
     """The columns and histograms of a solved contact, without the time."""
     contact, solution = solved.contact, solved.solution
     u, sigma = solution.u, solution.sigma
+    results = measured(task, solved)
     return (
         empty_row()
         | planned(task)
-        | measured(task, solved)
-        | {"warnings": SEPARATOR.join(warnings_of(task, solved))}
+        | results
+        | {"warnings": SEPARATOR.join(warnings_of(task, solved, results))}
         | edge_shares(task.surface, solved.scene.grid, contact.obstacle, u, sigma)
         | on_request(task.output, SolvedContact(contact, u, sigma))
     )

@@ -1,5 +1,11 @@
 """Warnings about results that are probably not what the user means."""
 
+from collections.abc import Mapping
+from math import inf, isfinite
+from typing import Any
+
+from gfmd_cli.spec.models import LOADS
+from gfmd_cli.status import Status
 from gfmd_cli.study.refinement import Solved
 from gfmd_cli.study.tasks import Task
 
@@ -19,7 +25,14 @@ SEPARATOR = " | "
 """Between the warnings of one contact in a column of text."""
 
 
-def warnings_of(task: Task, solved: Solved) -> list[str]:
+def loaded_value(quantity: str, results: Mapping[str, Any]) -> float:
+    """The value that a load prescribes: in the continuum if it is known, else on the grid."""
+    name = LOADS[quantity].searched
+    continuum = float(results.get(f"{name}_continuum", inf))
+    return continuum if isfinite(continuum) else float(results[name])
+
+
+def warnings_of(task: Task, solved: Solved, results: Mapping[str, Any]) -> list[str]:
     """Reasons to doubt the result of one contact, a sentence each; mostly none."""
     elastomer, scene = task.elastomer, solved.scene
     warnings = task.surface.warnings(task.boundary)
@@ -34,6 +47,7 @@ def warnings_of(task: Task, solved: Solved) -> list[str]:
             f"by several percent; at most {LOOSE:g} is usual"
         )
     warnings += elastomer.warnings(scene.h_std, scene.shells.q, scene.shells.variance)
+    warnings += _load_in_jump(task, solved.solution.status, results)
     units = _doubtful_unit(task, solved)
     if units:
         return [*warnings, units]  # few points in contact follow from it
@@ -44,6 +58,16 @@ def warnings_of(task: Task, solved: Solved) -> list[str]:
             "the grid; use more points"
         )
     return warnings
+
+
+def _load_in_jump(task: Task, status: Status, results: Mapping[str, Any]) -> list[str]:
+    """A warning if a contact area is farther than the tolerance from the load."""
+    if task.quantity != "contact_area" or status == Status.LOAD_NOT_REACHED:
+        return []
+    value = loaded_value(task.quantity, results)
+    if abs(value - task.load) <= task.load_tolerance * task.load:
+        return []
+    return [f"load.contact_area = {task.load:g} lies in a jump; the nearest value is {value:g}"]
 
 
 def _doubtful_unit(task: Task, solved: Solved) -> str:

@@ -1,4 +1,4 @@
-"""Values in SI units, sizes of grids and numbers in sentences."""
+"""Contacts, values in SI units, sizes of grids and counts in words."""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
