@@ -532,6 +532,7 @@ def main() -> None:
     parser.add_argument("--cache", type=Path, help="JSON file of what is measured already")
     parser.add_argument("--quick", action="store_true", help="half the cases, smaller grids")
     parser.add_argument("--seed", type=int, default=20, help="20 is the set of the constants")
+    parser.add_argument("--shift", type=float, default=1.0, help="factor of the pressures")
     parser.add_argument("--figure", type=Path, help="path of a figure, without suffix")
     parser.add_argument("--maps", action="store_true", help="irregular maps instead")
     parser.add_argument("--free", action="store_true", help="maps with a free boundary instead")
@@ -548,6 +549,7 @@ def main() -> None:
             wanted = map_cases(folder, chosen.seed, chosen.scans)
         else:
             wanted = cases(folder, chosen.seed)
+        wanted = [replace(case, p_star=chosen.shift * case.p_star) for case in wanted]
         records = collect(quick(wanted) if chosen.quick else wanted, chosen.cache)
     scored = list(scores(records))
     table(scored)
