@@ -53,7 +53,7 @@ def test_a_script_shows_its_help(name, monkeypatch, capsys):
 def test_a_script_without_its_study_ends_with_one_message(monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
     for path in SCRIPTS.glob("*.py"):
-        if "run_with_studies(main" in path.read_text("utf-8"):
+        if "run_with_studies(main, " in path.read_text("utf-8"):
             with pytest.raises(pytest.fail.Exception, match=r"no such study; `.*` makes"):
                 run(path.name, [], monkeypatch)
 
