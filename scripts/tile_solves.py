@@ -17,6 +17,8 @@ import os
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from dataclasses import dataclass
+from itertools import product
+from unittest.mock import patch
 
 from small_contacts import WholeGrids
 from timing import least
@@ -102,26 +104,28 @@ def main() -> None:
     parser.add_argument("--repeats", type=int, default=2)
     arguments = parser.parse_args()
     smallest = local_start.LIMITS["periodic"].points
-    local_start.LIMITS["periodic"] = local_start.Limits(smallest, 1.0, 0.0)
-    local_start.EXPONENTS = (0.0, 9.0)
-    local_start.SOLVES["periodic"] = RecordedSolve
-    local_solve.MAX_STEPS = arguments.max_steps
+    with (
+        patch.dict(local_start.LIMITS, periodic=local_start.Limits(smallest, 1.0, 0.0)),
+        patch.dict(local_start.SOLVES, periodic=RecordedSolve),
+        patch.object(local_start, "EXPONENTS", (0.0, 9.0)),
+        patch.object(local_solve, "MAX_STEPS", arguments.max_steps),
+    ):
+        print_table(arguments)
+
+
+def print_table(arguments: argparse.Namespace) -> None:
+    """A line for each contact."""
     print(
         "points     n     p* tolerance seed   share evaluations  steps  predicted measured "
         "time ratio us/tile"
     )
-    for points in arguments.points:
-        for n in arguments.exponents:
-            for seed in arguments.seeds:
-                surface = SelfAffine(seed=seed, cutoff=arguments.cutoff)
-                scene = build_scene(surface, Power(n=n), points)
-                for p_star in arguments.p_star:
-                    for tolerance in arguments.tolerance:
-                        head = f"{points:6} {n:5g} {p_star:6g} {tolerance:9g} {seed:4} "
-                        print(
-                            head + row(scene.contact(p_star), tolerance, arguments.repeats),
-                            flush=True,
-                        )
+    chosen = (arguments.points, arguments.exponents, arguments.seeds)
+    for points, n, seed in product(*chosen):
+        surface = SelfAffine(seed=seed, cutoff=arguments.cutoff)
+        scene = build_scene(surface, Power(n=n), points)
+        for p_star, tolerance in product(arguments.p_star, arguments.tolerance):
+            columns = row(scene.contact(p_star), tolerance, arguments.repeats)
+            print(f"{points:6} {n:5g} {p_star:6g} {tolerance:9g} {seed:4} {columns}", flush=True)
 
 
 if __name__ == "__main__":
