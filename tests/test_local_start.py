@@ -146,11 +146,11 @@ def with_holes(contact):
     return replace(contact, may_touch=may_touch)
 
 
-def check_solution(contact):
-    """That the solution by tiles is the one of the whole grid, with fewer transforms."""
+def check_solution(contact, share=0.6):
+    """That the solution by tiles is the one of the whole grid, with this share of its transforms."""
     local, whole = solve(contact, True), solve(contact, False)
     assert local.status == whole.status == "converged"
-    assert local.transforms < 0.6 * whole.transforms
+    assert local.transforms < share * whole.transforms
     assert local.u == pytest.approx(whole.u, abs=1e-7)
     touching, touching_whole = (one.u == contact.obstacle for one in (local, whole))
     assert np.count_nonzero(touching != touching_whole) <= 2
@@ -170,9 +170,9 @@ def test_the_solution_is_that_of_the_whole_grid(elastomer, p_star, boundary):
 
 @pytest.mark.parametrize("boundary", ["periodic", "free"])
 def test_the_solution_of_a_stiffer_elastomer_is_that_of_the_whole_grid(boundary):
-    """At n = 1.5 the limit of the share of tiles permits only smaller contacts."""
+    """At n = 1.5 only smaller contacts are solved on tiles, and less is saved."""
     scene = SCENES[boundary](SelfAffine(cutoff=0.02), Power(n=1.5), 512)
-    check_solution(scene.contact(1e-4))
+    check_solution(scene.contact(1e-4), share=0.9)
 
 
 @pytest.mark.parametrize("p_star", [1e-4, 0.01])
