@@ -16,13 +16,15 @@ import os
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-from dataclasses import dataclass
 from itertools import product
+from typing import ClassVar
 from unittest.mock import patch
 
+import numpy as np
 from small_contacts import WholeGrids
 from timing import least
 
+from gfmd_cli.grid.arrays import Field
 from gfmd_cli.physics.contact import Contact, build_scene
 from gfmd_cli.physics.elastomers import Power
 from gfmd_cli.physics.self_affine import SelfAffine
@@ -32,63 +34,56 @@ from gfmd_cli.solvers.loop import State
 from gfmd_cli.solvers.nested_grids import solve_contact
 from gfmd_cli.solvers.pcg import ProjectedCG
 
-
-@dataclass
-class Record:
-    """What was seen of the last solve on tiles."""
-
-    share: float = 0.0
-    evaluations: int = 0
-    steps: int = 0
-    predicted: float = 0.0
-    measured: float = 0.0
-    microseconds: float = 0.0
-
-
-last = Record()
+CONVOLUTIONS = 3  # whose fastest is printed
 
 
 class RecordedSolve(local_start.PeriodicSolve):
-    """The solve on the tiles of one grid, which starts a new record."""
+    """The solve on tiles, which counts its evaluations and steps on the finest grid."""
 
-    def solve(self, tolerance: float) -> tuple[Evaluation, local_solve.Field]:
+    latest: ClassVar["RecordedSolve | None"] = None
+    """The last solve on a finest grid."""
+
+    def solve(self, tolerance: float) -> tuple[Evaluation, Field]:
         """See `LocalSolve`."""
-        global last
-        last = Record(share=self.tiles.count / self.tiles.used.size)
+        RecordedSolve.latest = self
+        self.share = self.tiles.count / self.tiles.used.size
+        self.evaluations = self.steps = 0
         self.pause = self.count_step
-        seconds = least(lambda: self.map_displacement(self.s), 3)
-        last.microseconds = 1e6 * seconds / self.tiles.count
         return super().solve(tolerance)
 
     def count_step(self) -> None:
         """Count a step; the test that ends a solve counts as one, too."""
-        last.steps += 1
+        self.steps += 1
 
-    def evaluate(self, displacement: local_solve.Field) -> Evaluation:
+    def evaluate(self, displacement: Field) -> Evaluation:
         """See `LocalSolve`."""
         result = super().evaluate(displacement)
-        last.evaluations += 1
-        last.predicted = result.start_residual
+        self.evaluations += 1
+        self.predicted = result.start_residual
         return result
 
 
 def row(contact: Contact, tolerance: float, repeats: int) -> str:
     """The columns of one contact."""
+    RecordedSolve.latest, measured = None, np.nan
 
     def watch(current: Contact, state: State) -> None:
+        nonlocal measured
         if current is contact and state.step == 0:
-            last.measured = state.residual
+            measured = state.residual
 
     def with_tiles() -> None:
         solve_contact(contact, ProjectedCG(tolerance=tolerance), watch)
 
     seconds = least(with_tiles, repeats)
     whole = least(lambda: solve_contact(contact, WholeGrids(tolerance=tolerance)), repeats)
-    if last.predicted == 0.0:
+    solve = RecordedSolve.latest
+    if solve is None:
         return "not solved on tiles"
+    convolution = least(lambda: solve.map_displacement(solve.s), CONVOLUTIONS) / solve.tiles.count
     return (
-        f"{last.share:7.3f} {last.evaluations:11} {last.steps:6} {last.predicted:10.1e} "
-        f"{last.measured / last.predicted:8.2f} {whole / seconds:11.2f} {last.microseconds:6.2f}"
+        f"{solve.share:7.3f} {solve.evaluations:11} {solve.steps:6} {solve.predicted:10.1e} "
+        f"{measured / solve.predicted:8.2f} {whole / seconds:11.2f} {1e6 * convolution:6.2f}"
     )
 
 

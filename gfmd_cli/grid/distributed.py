@@ -84,7 +84,7 @@ class DistributedGrid(Grid):
 
     @property
     def whole(self) -> bool:
-        """Whether this is a grid of one process: it is not, even if only one process takes part."""
+        """False: the rows are distributed, be it to a single process."""
         return False
 
     def total(self, values: Any) -> Any:

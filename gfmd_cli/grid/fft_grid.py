@@ -129,7 +129,7 @@ class Grid:
 
     @property
     def whole(self) -> bool:
-        """Whether this is a grid of one process, whose rows are never exchanged."""
+        """Whether each process holds all rows, so that none are exchanged."""
         return True
 
     def empty(self) -> Field:

@@ -226,8 +226,8 @@ def _estimate_periodic(
         phase, bend = 2 * pi * rough.waves / fine.points, rough.curvature / fine.points**2
         if fine.patches < MIN_PATCHES or not rough.calibrated:
             estimates = estimate_by_change(fine, coarse, n, line=tip.dimension == 1)
-            is_known = rough.calibrated and not oblong and tip.dimension == 2
-            if is_known and not isnan(estimates["a_r"].error):
+            follows_law = rough.calibrated and not oblong and tip.dimension == 2
+            if follows_law and not isnan(estimates["a_r"].error):
                 return estimates | {"a_r": _area(fine, coarse, n, phase, spread)}
             return estimates
     return {

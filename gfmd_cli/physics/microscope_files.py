@@ -119,7 +119,7 @@ def _read_channel(path: Path, file: BinaryIO, reader: Any, dataset: str | None) 
         _check_is_own_netcdf(path, reader)
     scan = channel.topography(physical_sizes=(1.0,) * len(shape) if unsized else None)
     if reader.format() == "xyz":
-        _check_begins_once(path, file)
+        _check_no_row_in_header(path, file)
         if len(shape) == 1:
             scan = _with_positions(reader, scan)
     if scan.unit is not None:
@@ -285,10 +285,10 @@ def _check_all_rows_read(path: Path, file: BinaryIO, rows: int, columns: int) ->
             )
 
 
-def _check_begins_once(path: Path, file: BinaryIO) -> None:
-    """Raise InputError where a line of a table of positions is no row of it.
+def _check_no_row_in_header(path: Path, file: BinaryIO) -> None:
+    """Raise InputError for a line that is no row below the first row of a table of positions.
 
-    The reader takes such a line, and all rows above it, as the header.
+    The reader would take this line and all rows above it as the header.
     """
     file.seek(0)
     start = list(islice(file, HEADER_LINES + 1))
@@ -296,9 +296,12 @@ def _check_begins_once(path: Path, file: BinaryIO) -> None:
     if start and start[0].startswith(OWN_HEADERS):
         return
     rows = [re.split(rb"[\s,;]+", line.strip(b" \t\r\n,;")) for line in start]
-    are_numbers = [all(map(_is_number, row)) for row in rows]
+    has_numbers_only = [all(map(_is_number, row)) for row in rows]
     columns_read = next((len(row) for row in reversed(rows) if row != [b""]), 0)
-    is_row = [ok and len(row) == columns_read for ok, row in zip(are_numbers, rows, strict=True)]
+    is_row = [
+        numeric and len(row) == columns_read
+        for numeric, row in zip(has_numbers_only, rows, strict=True)
+    ]
     if not any(is_row):
         return
     first = is_row.index(True)

@@ -20,7 +20,7 @@ from gfmd_cli.solvers.local_solve import LocalSolve
 from gfmd_cli.solvers.loop import Start
 from gfmd_cli.solvers.tiles import SIDE, Tiles
 
-EXPONENTS = (0.2, 1.55)  # of k(q) for which the solve on tiles is faster; measured up to 1.5
+EXPONENTS = (0.2, 1.55)  # of k(q) for which there are tiles; measured from 0.25 to 1.5
 REACH = 2  # points by which the contact may grow from a grid to the next
 COARSE_TOLERANCE = 0.03  # on grids before the finest; measured: 0.01 to 0.1 differ by 5 %
 RELAXATIONS = 3  # of the displacement on the indenter; 2 to 6 take about as long
