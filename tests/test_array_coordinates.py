@@ -77,6 +77,25 @@ def test_uneven_positions_are_refused_by_the_name_of_the_axis(array):
         read_topography(array(axes={"y": Y, "x": X**2}))
 
 
+def test_positions_rounded_to_single_precision_are_even(array):
+    """Far from the origin their distances differ by the rounding, here by a fifth of a percent."""
+    far = (1000.0 + 0.03 * np.arange(16)).astype(np.float32)
+    assert np.ptp(np.diff(far)) > 2e-3 * 0.03
+    read = read_topography(array(axes={"y": Y, "x": far}))
+    assert read.spacing == pytest.approx((0.25e-6, 0.03e-6), rel=1e-3)
+
+
+def test_a_unit_of_one_axis_alone_is_refused(array):
+    with pytest.raises(InputError, match="the positions 'y' state no unit"):
+        read_topography(array(units={"height": "nm", "x": "um"}))
+
+
+@pytest.mark.parametrize("unit", ["nanometers", "nanometre", "nm"])
+def test_units_in_words(array, unit):
+    read = read_topography(array(units=UNITS | {"height": unit}))
+    assert read.heights == pytest.approx(1e-9 * HEIGHTS)
+
+
 @pytest.mark.parametrize("name", ["x", "height"])
 def test_an_unknown_unit_is_refused_by_its_name(array, name):
     with pytest.raises(InputError, match=rf"{name}' has the unit 'furlong'"):

@@ -35,6 +35,14 @@ def test_a_sound_contact_has_no_warning():
     assert "warnings" not in str(result)
 
 
+@pytest.mark.parametrize(("p_star", "warned"), [(0.1, False), (2.0, True), (20.0, False)])
+def test_a_single_indenter_that_meets_its_periodic_copies(p_star, warned):
+    """In full contact, the last case, the contact area says so itself."""
+    result = solve(tables({"kind": "parabola"}, {"kind": "power", "n": 1}, p_star=p_star))
+    assert any("border of the cell" in warning for warning in result.warnings) is warned
+    assert (result.a_r == 1) is (p_star == 20.0)
+
+
 def test_a_tolerance_too_loose_to_be_meant():
     loose = tables() | {"solver": {"tolerance": 0.5}}
     assert "solver.tolerance = 0.5: contact area" in only_warning(loose)

@@ -23,9 +23,10 @@ UNIT_NAMES = ("units", "unit")
 NO_UNITS = ("", "1")
 LENGTHS = {
     1.0: "m metre metres meter meters",
-    1e-3: "mm",
-    1e-6: "um \N{MICRO SIGN}m \N{GREEK SMALL LETTER MU}m micron microns micrometer micrometre",
-    1e-9: "nm nanometer nanometre",
+    1e-3: "mm millimetre millimetres millimeter millimeters",
+    1e-6: "um \N{MICRO SIGN}m \N{GREEK SMALL LETTER MU}m micron microns "
+    "micrometre micrometres micrometer micrometers",
+    1e-9: "nm nanometre nanometres nanometer nanometers",
     1e-10: "\N{ANGSTROM SIGN} \N{LATIN CAPITAL LETTER A WITH RING ABOVE} angstrom Angstrom",
     1e-12: "pm",
 }
@@ -90,12 +91,14 @@ def _axis(path: Path, file: Any, dimension: Any) -> Axis:
     is_empty = bytes(scale.attrs.get("NAME", b"")).startswith(NO_VARIABLE)
     if is_empty or scale.dtype.kind not in "iuf" or scale.ndim != 1:
         return Axis(label, None, None)
-    positions = np.asarray(take(file, name, MAX_COMPRESSION)[()], dtype=np.float64)
+    stored = take(file, name, MAX_COMPRESSION)[()]
+    positions = np.asarray(stored, dtype=np.float64)
     if positions.size < 2:
         return Axis(label, None, None)
     steps = np.diff(positions)
     step = float(positions[-1] - positions[0]) / steps.size
-    if not (np.abs(steps - step) <= EVEN * abs(step)).all() or step == 0:
+    rounding = np.spacing(np.abs(stored).max()) if stored.dtype.kind == "f" else 0.0
+    if not (np.abs(steps - step) <= EVEN * abs(step) + rounding).all() or step == 0:
         raise InputError(
             f"{path}: the positions {label!r} are not evenly spaced: resample the map, or save it "
             "without them"

@@ -130,7 +130,8 @@ def _with_coordinates(path: Path, file: Any, data: Any, bare: HeightMap) -> Heig
     """A map with the order of its axes, sides and units by its dimension scales.
 
     With units of heights and positions it is in metres and not periodic, as a microscope scan.
-    Without positions it is a bare array, whose unit is not read.
+    Without positions it is a bare array, whose unit is not read. Raises InputError where the
+    positions of one axis alone state a unit.
     """
     heights = bare.heights
     axes = axes_of(path, file, data)[-heights.ndim :]
@@ -145,6 +146,11 @@ def _with_coordinates(path: Path, file: Any, data: Any, bare: HeightMap) -> Heig
     sides = [abs(step) * points for step, points in zip(steps, heights.shape, strict=True)]
     metres = factor(path, data.name, stated_unit(data))
     metric = [axis.metres for axis in axes if axis.metres]
+    if 0 < len(metric) < len(axes):
+        bare_name = next(axis.name for axis in axes if not axis.metres)
+        raise InputError(
+            f"{path}: the positions {bare_name!r} state no unit, those of the other axis do: add it"
+        )
     if metres is not None:
         is_height = np.abs(heights) < MAX_HEIGHT  # in the unit of the file
         heights = np.ma.masked_where(~is_height, metres * heights.astype(np.float64))

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from math import inf, isfinite
 from typing import Any
 
+from gfmd_cli.physics.observables import border_contact, contact_points
 from gfmd_cli.spec.models import LOADS
 from gfmd_cli.status import Status
 from gfmd_cli.study.refinement import Solved
@@ -48,6 +49,7 @@ def warnings_of(task: Task, solved: Solved, results: Mapping[str, Any]) -> list[
         )
     warnings += elastomer.warnings(scene.h_std, scene.shells.q, scene.shells.variance)
     warnings += _load_in_jump(task, solved.solution.status, results)
+    warnings += _contact_at_border(task, solved)
     units = _doubtful_unit(task, solved)
     if units:
         return [*warnings, units]  # few points in contact follow from it
@@ -68,6 +70,20 @@ def _load_in_jump(task: Task, status: Status, results: Mapping[str, Any]) -> lis
     if abs(value - task.load) <= task.load_tolerance * task.load:
         return []
     return [f"load.contact_area = {task.load:g} lies in a jump; the nearest value is {value:g}"]
+
+
+def _contact_at_border(task: Task, solved: Solved) -> list[str]:
+    """A warning if the contact of a single indenter meets that of its periodic copies."""
+    if task.surface.rough or task.boundary != "periodic" or solved.observables.a_r == 1:
+        return []
+    contact, solution = solved.contact, solved.solution
+    touching = contact_points(contact.obstacle, solution.u, solution.sigma)
+    if not border_contact(contact.grid, touching):
+        return []
+    return [
+        "the contact reaches the border of the cell, where it meets that of the next periodic copy "
+        "of the indenter: enlarge surface.length for a single one"
+    ]
 
 
 def _doubtful_unit(task: Task, solved: Solved) -> str:
