@@ -31,19 +31,13 @@ PYTEST := pytest -n 2 --dist loadfile
 # Files whose tests solve contacts on grids: threads change only their last bits.
 SOLVING := accuracy bench grid local_start multigrid properties reference_solvers search solvers study \
 	true_contact
-# Files whose tests compute: the others check texts, files and processes, with the same bits anywhere.
-COMPUTING := $(SOLVING) anisotropy approach compliance_transforms contact_stiffness convolution direct_start \
-	discretisation_error distribution einstein_solid elastomers exact_solutions free_accuracy \
-	free_boundary free_compliance free_contact_stiffness gap_theories interpolation map_preparation \
-	observables_on_request patches persson power_spectra rectangular_cells roughness_parameters spectrum_fit \
-	surfaces topography void
 
 test: $(VENV)/.test ## the whole suite, with the newest versions that pip found for a new .venv
 	$(BIN)/$(PYTEST)
 
-test-portable: $(VENV)/.test ## what computes, with the last bits of other machines: a plain processor, three threads
+test-portable: $(VENV)/.test ## the suite with the last bits of other machines: a plain processor; then three threads
 	env $$($(BIN)/python scripts/plain_processor.py) NUMBA_CACHE_DIR=$(CURDIR)/$(VENV)/plain-kernels \
-		GFMD_PLANS=estimated $(BIN)/$(PYTEST) $(COMPUTING:%=tests/test_%.py)
+		GFMD_PLANS=estimated $(BIN)/$(PYTEST)
 	GFMD_PLANS=estimated GFMD_TEST_THREADS=3 $(BIN)/$(PYTEST) $(SOLVING:%=tests/test_%.py)
 
 $(LOWEST)/.test: pyproject.toml $(VENV)/.test

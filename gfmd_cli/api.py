@@ -23,8 +23,8 @@ from gfmd_cli.analysis.export import as_dataset
 from gfmd_cli.errors import InputError
 from gfmd_cli.grid.arrays import Field, Mask
 from gfmd_cli.grid.blas import one_blas_thread
+from gfmd_cli.maps.given_heights import write_heights
 from gfmd_cli.physics.file_surface import FileSurface, forget_files
-from gfmd_cli.physics.given_heights import write_heights
 from gfmd_cli.physics.indenters import SMALLEST_GRID
 from gfmd_cli.physics.observables import contact_pressure
 from gfmd_cli.spec.models import Spec

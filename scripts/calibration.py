@@ -19,9 +19,10 @@ import numpy as np
 from gfmd_cli.physics.contact import Scene
 from gfmd_cli.physics.discretisation_error import (
     MAX_AREA_EXPONENT,
+    ExcessExponent,
     RoughnessScales,
     estimate,
-    exponent_spread,
+    excess_exponent,
     local_exponent,
 )
 from gfmd_cli.physics.elastomers import Elastomer, Layer, Power, Slab
@@ -166,6 +167,33 @@ def shape_cases(folder: Path, seed: int) -> list[Case]:
     return out
 
 
+def layered_cases(seed: int) -> list[Case]:
+    """Slabs and layers whose local exponent changes within the waves of the surface or beyond."""
+    draw, out = np.random.default_rng(seed), []
+    for number in range(200):
+        thickness = float(np.exp(draw.uniform(np.log(0.004), np.log(0.2))))
+        elastomer: Elastomer = (
+            Slab(thickness=thickness)
+            if number % 4 < 2
+            else Layer(thickness=thickness, base="sliding")
+            if number % 8 > 3
+            else Layer(thickness=thickness, base="bonded", poisson=0.45)
+        )
+        modes = int(draw.choice([10, 12, 16, 20, 24]))
+        surface = SelfAffine(
+            hurst=float(draw.choice([0.1, 0.3, 0.5, 0.8, 1.0])),
+            rolloff=float(draw.choice([0.25, 0.5, 1.0])),
+            cutoff=1 / modes,
+            spectrum="rolloff" if draw.choice(["rolloff", "cutoff"]) == "rolloff" else "cutoff",
+            seed=int(draw.integers(1, 10**6)),
+        )
+        base = 2 * round(modes * float(draw.choice([1.0, 1.25, 1.5])))
+        p = float(np.exp(draw.uniform(np.log(0.005), np.log(1.5))))
+        doublings = 4 if base > 32 else 5
+        out.append(Case(number, _name(elastomer), surface, elastomer, p, base, doublings, False))
+    return out
+
+
 def with_holes(heights: np.ndarray, draw: np.random.Generator) -> np.ndarray:
     """Three round holes with radii of a fiftieth to a tenth of the side."""
     points = len(heights)
@@ -306,7 +334,7 @@ def measure(case: Case, tolerance: float = 1e-6) -> dict:
             {
                 "points": points,
                 "exponent": local_exponent(case.elastomer, points, length),
-                "spread": exponent_spread(case.elastomer, points, length),
+                "area_exponent": excess_exponent(case.elastomer, points, length),
                 "a_r": observables.a_r,
                 "sigma_p": observables.sigma_p * stress,
                 "u_g": observables.u_g * height,
@@ -393,7 +421,7 @@ def scores(records: list[dict]) -> Iterator[Score]:
                     used,
                     at_last["exponent"],
                     rough,
-                    at_last["spread"],
+                    ExcessExponent(*at_last["area_exponent"]),
                     band_limited=record["band_limited"],
                     stepped=record["stepped"],
                 )
@@ -537,6 +565,7 @@ def main() -> None:
     parser.add_argument("--maps", action="store_true", help="irregular maps instead")
     parser.add_argument("--free", action="store_true", help="maps with a free boundary instead")
     parser.add_argument("--shapes", action="store_true", help="oblong pixels and holes instead")
+    parser.add_argument("--layers", action="store_true", help="slabs and layers alone instead")
     parser.add_argument("--scans", type=Path, help="with --maps: folder of maps of 64 x 64 points")
     chosen = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
@@ -545,6 +574,8 @@ def main() -> None:
             wanted = free_cases(folder, chosen.seed)
         elif chosen.shapes:
             wanted = shape_cases(folder, chosen.seed)
+        elif chosen.layers:
+            wanted = layered_cases(chosen.seed)
         elif chosen.maps:
             wanted = map_cases(folder, chosen.seed, chosen.scans)
         else:

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from gfmd_cli.errors import InputError
+from gfmd_cli.maps.topography import read_topography
 from gfmd_cli.physics.file_surface import FileSurface
-from gfmd_cli.physics.topography import read_topography
 
 HEIGHTS = np.random.default_rng(1).normal(size=(12, 16))  # [y, x]
 X, Y = 0.5 * np.arange(16) + 3.0, 0.25 * np.arange(12)

@@ -7,9 +7,9 @@ import pytest
 from scipy.integrate import quad
 from scipy.special import gamma, j0, j1
 
+from gfmd_cli.maps.interpolation import monotone_cubic
 from gfmd_cli.physics.compliance_transforms import Compliance, separated
 from gfmd_cli.physics.elastomers import HalfSpace, Layer, Power, Tabulated
-from gfmd_cli.physics.interpolation import monotone_cubic
 
 
 def table_of(tmp_path, q, k):

@@ -12,14 +12,15 @@ from gfmd_cli.physics.contact import build_scene
 from gfmd_cli.physics.discretisation_error import (
     AREA_EXCESS,
     MAX_AREA_EXPONENT,
+    ExcessExponent,
     RoughnessScales,
     Tip,
     estimate,
-    exponent_spread,
+    excess_exponent,
     local_exponent,
     roughness_scales,
 )
-from gfmd_cli.physics.elastomers import HalfSpace, Membrane, Power, Slab
+from gfmd_cli.physics.elastomers import HalfSpace, Layer, Membrane, Power, Slab
 from gfmd_cli.physics.error_estimates import GridValues
 from gfmd_cli.physics.indenters import LineParabola, Parabola, Ridge, Wave
 from gfmd_cli.physics.observables import QUANTITIES, observe
@@ -361,15 +362,30 @@ def test_few_contact_patches_on_one_grid_are_unknown():
             assert value.verdict == verdict
 
 
-def test_an_exponent_that_changes_widens_the_area():
-    """By the excess of that change of exponent."""
+def test_an_uncertain_exponent_widens_the_error_of_the_area():
     level = sequence(2.0, (128,))
-    calm, area = (estimate(level, 2.0, ROUGH, spread)["a_r"] for spread in (0.0, 0.5))
+    certain, uncertain = (
+        estimate(level, 1.0, ROUGH, ExcessExponent(2.0, uncertainty))["a_r"]
+        for uncertainty in (0.0, 0.5)
+    )
     extra = AREA_EXCESS * 0.5 * level[0].line
-    assert area.continuum_error == pytest.approx(np.hypot(calm.continuum_error, extra))
-    slab = Slab(thickness=0.05)
-    assert exponent_spread(slab, 32, 1.0) > 0.1
-    assert exponent_spread(Power(n=2), 32, 1.0) < 1e-9
+    assert uncertain.continuum == certain.continuum
+    assert uncertain.continuum_error == pytest.approx(np.hypot(certain.continuum_error, extra))
+
+
+@pytest.mark.parametrize("elastomer", [Slab(thickness=0.05), Layer(thickness=0.02, base="sliding")])
+def test_the_excess_of_the_area_is_a_sum_over_all_finer_grids(elastomer):
+    """From each grid to the next the excess decreases by n x / 2, with the exponent n there."""
+    length, x = 1.0, 1.0
+    exponents = [local_exponent(elastomer, 32 * 2**k, length) for k in range(30)]
+    excess = sum(n * x / 2**k / 2 for k, n in enumerate(exponents))
+    value, uncertainty = excess_exponent(elastomer, 32, length)
+    assert value == pytest.approx(excess, abs=2e-3)
+    assert uncertainty > 0.1
+
+
+def test_the_excess_of_a_power_law_has_its_exponent():
+    assert excess_exponent(Power(n=2), 32, 1.0) == (2.0, pytest.approx(0.0, abs=1e-12))
 
 
 def measured(surface, elastomer, pressure, points):

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from gfmd_cli import solve
+from gfmd_cli.maps.interpolation import monotone, suited_interpolation
 from gfmd_cli.physics.file_surface import FileSurface
-from gfmd_cli.physics.interpolation import monotone, suited_interpolation
 from gfmd_cli.physics.self_affine import SelfAffine
 
 POINTS = 64

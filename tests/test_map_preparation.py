@@ -5,9 +5,9 @@ import pytest
 
 from gfmd_cli.errors import InputError
 from gfmd_cli.grid.fft_grid import Grid
-from gfmd_cli.physics import map_preparation
+from gfmd_cli.maps import map_preparation
+from gfmd_cli.maps.map_preparation import fill_missing, level, make_periodic
 from gfmd_cli.physics.file_surface import FileSurface
-from gfmd_cli.physics.map_preparation import fill_missing, level, make_periodic
 
 
 @pytest.fixture

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from gfmd_cli import solve
-from gfmd_cli.physics.pictures import PIXELS, picture
+from gfmd_cli.maps.pictures import PIXELS, picture
 from gfmd_cli.study.reading import open_study
 
 SPEC = """\

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from gfmd_cli.grid.fft_grid import Grid
+from gfmd_cli.maps.roughness_parameters import autocorrelation
 from gfmd_cli.physics.contact import build_scene
 from gfmd_cli.physics.elastomers import Power
 from gfmd_cli.physics.power_spectra import (
@@ -11,7 +12,6 @@ from gfmd_cli.physics.power_spectra import (
     correlation,
     spectra,
 )
-from gfmd_cli.physics.roughness_parameters import autocorrelation
 from gfmd_cli.physics.self_affine import SelfAffine
 
 

@@ -5,7 +5,7 @@ import warnings
 import numpy as np
 import pytest
 
-from gfmd_cli.physics.roughness_parameters import autocorrelation, roughness_parameters
+from gfmd_cli.maps.roughness_parameters import autocorrelation, roughness_parameters
 
 
 def parameters(heights, *spacing):

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from gfmd_cli.errors import InputError
-from gfmd_cli.physics import text_tables
+from gfmd_cli.maps import text_tables
+from gfmd_cli.maps.text_tables import table_formats
+from gfmd_cli.maps.topography import read_topography
 from gfmd_cli.physics.file_surface import FileSurface
-from gfmd_cli.physics.text_tables import table_formats
-from gfmd_cli.physics.topography import read_topography
 
 RNG = np.random.default_rng(0)
 

@@ -12,13 +12,13 @@ from scipy.io import netcdf_file, savemat
 
 from gfmd_cli.errors import InputError
 from gfmd_cli.grid.fft_grid import Grid
-from gfmd_cli.physics import height_map, microscope_files
+from gfmd_cli.maps import height_map, microscope_files
+from gfmd_cli.maps.map_preparation import level
+from gfmd_cli.maps.topography import Region, read_topography
 from gfmd_cli.physics.contact import build_scene
 from gfmd_cli.physics.elastomers import HalfSpace
 from gfmd_cli.physics.file_surface import FileSurface
-from gfmd_cli.physics.map_preparation import level
 from gfmd_cli.physics.self_affine import SelfAffine
-from gfmd_cli.physics.topography import Region, read_topography
 
 SCAN = Path(__file__).parents[1] / "configs" / "data" / "di-3.di"
 
@@ -544,7 +544,7 @@ def test_without_surfacetopography_the_message_names_the_extra(monkeypatch):
 def test_arrays_are_read_without_loading_surfacetopography(npy):
     code = (
         "import sys; from pathlib import Path; "
-        "from gfmd_cli.physics.topography import read_topography; "
+        "from gfmd_cli.maps.topography import read_topography; "
         f"read_topography(Path({str(npy())!r})); "
         "assert not {'SurfaceTopography', 'h5py'} & set(sys.modules)"
     )

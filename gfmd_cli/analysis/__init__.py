@@ -1,1 +1,1 @@
-"""Comparison of a study with Persson theory, tables and figures."""
+"""What the results of a study mean: comparison with Persson theory, tables, figures, export."""

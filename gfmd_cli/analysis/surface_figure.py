@@ -9,7 +9,7 @@ from gfmd_cli.analysis.curve_styles import literal
 from gfmd_cli.analysis.plotting import HEIGHT, WIDTH, LegendFigure, shades
 from gfmd_cli.analysis.surface_summary import SurfaceSummary
 from gfmd_cli.grid.arrays import Field
-from gfmd_cli.physics.pictures import Picture
+from gfmd_cli.maps.pictures import Picture
 from gfmd_cli.physics.spectrum_fit import density
 from gfmd_cli.units import scaled
 

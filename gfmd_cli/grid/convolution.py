@@ -36,7 +36,7 @@ def padded_shape(shape: tuple[int, ...], factor: float) -> tuple[int, ...]:
 
     A factor of 2 makes a convolution linear: no load acts around the border.
     """
-    return tuple(int(pyfftw.next_fast_len(int(np.ceil(factor * n)))) for n in shape)
+    return tuple(plans.fast_length(factor * n) for n in shape)
 
 
 @dataclass(eq=False)

@@ -14,6 +14,7 @@ import re
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from functools import cache, partial
+from math import ceil
 from pathlib import Path
 from threading import Lock
 from typing import Any, TypeVar
@@ -39,6 +40,11 @@ WISDOM = re.compile(
     r"\)\n"
 )
 """Text that FFTW reads; flags of more than 20, 20 and 9 bits (its planner.h) abort the process."""
+
+
+def fast_length(points: float) -> int:
+    """The smallest number of points, at least `points`, that is fast to transform."""
+    return int(pyfftw.next_fast_len(ceil(points)))
 
 
 @cache

@@ -1,1 +1,1 @@
-"""The physics: wavenumbers, stiffness, surfaces, the contact problem, theory."""
+"""The physics: stiffness, surfaces, the contact problem, observables, theory, error estimates."""

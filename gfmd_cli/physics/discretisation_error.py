@@ -12,6 +12,7 @@ which the surface bends from one point to the next.
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import exp, hypot, inf, isnan, log, nan, pi, sqrt
+from typing import NamedTuple
 
 import numpy as np
 
@@ -49,6 +50,7 @@ PLATE_BAR, PLATE_FLOOR = 0.6, 0.2
 #   AREA_CHANGE D                              what neither explains, D from the coarser grid
 # A = area / L^2, N = points per L. Chosen on seeds 20 and 47 (full), 11 (--quick --shift 1.37).
 AREA_CHANCE, AREA_LAW, AREA_CHANGE = 0.5, 0.01, 0.3
+EXPONENT_CHANGE = 0.6  # uncertainty of the exponent of the excess over its change with q
 MAX_STRESS_EXPONENT = 2.5  # sigma_p converges as spacing^(3 - n): too slow for larger n
 
 # Typical errors on one grid: power laws and medians by regression; of equally good ones, those that
@@ -87,6 +89,7 @@ MAX_ASPECT = 1.1
 """Largest ratio of grid spacings with the excess of square pixels. With the wider spacing in x, a
 ratio of 2 has 0.7 of it and of 4 half, so that 56 of 100 bars of the corrected area held."""
 HALF_OCTAVE = 0.5 * log(2)  # in ln q: step of the local exponent that the calibration used
+OCTAVES = np.arange(-1, 10)  # from the highest wave of a grid; the last has a weight of 0.002
 EXTRAPOLATED = 0.8  # bar of the extrapolated sigma_p over that of the value, n >= 1, likewise
 
 
@@ -157,17 +160,32 @@ def local_exponent(elastomer: LinearElastomer, points: float, length: float) -> 
     return round(float(elastomer.local_exponent(highest, length, HALF_OCTAVE)), 12)
 
 
-def exponent_spread(elastomer: LinearElastomer, points: float, length: float) -> float:
-    """Change of the local exponent from the highest wave of a grid to one of twice the length."""
-    finer, coarser = (local_exponent(elastomer, size, length) for size in (points, points // 2))
-    return abs(finer - coarser)
+class ExcessExponent(NamedTuple):
+    """Exponent n of the excess AREA_EXCESS n x of the contact area on a grid."""
+
+    value: float
+    uncertainty: float = 0.0
+
+
+def excess_exponent(elastomer: LinearElastomer, points: float, length: float) -> ExcessExponent:
+    """Exponent of the excess of the contact area where the local exponent depends on q.
+
+    From a grid to the next finer one, x halves, and the excess decreases by n x / 2 with the local
+    exponent at this scale. Hence the mean over this and all finer grids, weighted 1/2, 1/4, ...
+    Its uncertainty is the difference from the exponent on the next coarser scale.
+    """
+    highest = pi * points / length * 2.0**OCTAVES
+    exponents = np.maximum(elastomer.local_exponent(highest, length, HALF_OCTAVE), 0.0)
+    weights = 0.5 ** np.minimum(OCTAVES[1:] + 1, OCTAVES[-1])
+    mean = float(weights @ exponents[1:])
+    return ExcessExponent(round(mean, 12), EXPONENT_CHANGE * abs(float(exponents[0]) - mean))
 
 
 def estimate(
     levels: Sequence[GridValues],
     exponent: float,
     rough: RoughnessScales | None = None,
-    spread: float = 0.0,
+    area_exponent: ExcessExponent | None = None,
     *,
     band_limited: bool = True,
     stepped: bool = False,
@@ -183,7 +201,7 @@ def estimate(
     exponent : local exponent of the stiffness at the highest wavenumber of the finest grid
     rough : scales of a rough surface. None for a single indenter or a line contact: errors of many
         patches then do not average out, and one grid gives no error of sigma_p and u_g
-    spread : change of the local exponent over one octave, see `exponent_spread`
+    area_exponent : exponent of the excess of the area, see `excess_exponent`; by default `exponent`
     band_limited : whether all grids contain the same waves, so that full contact is exact
     stepped : whether the surface has vertical steps, where the stress is that of a punch
     tip : of a single indenter
@@ -199,7 +217,8 @@ def estimate(
     elif fine.a_r == 0 or (fine.a_r == 1 and rough is None):
         return unknown()
     else:
-        estimates = _estimate_periodic(fine, coarse, n, rough, spread, tip)
+        area_n = area_exponent or ExcessExponent(n)
+        estimates = _estimate_periodic(fine, coarse, n, rough, area_n, tip)
     if stepped:
         return estimates | {"sigma_p": border_stress(fine, coarse, n)}
     if tip.is_sharp and tip.dimension == 1 and n > MAX_RIDGE_EXPONENT:
@@ -216,7 +235,7 @@ def _estimate_periodic(
     coarse: GridValues | None,
     n: float,
     rough: RoughnessScales | None,
-    spread: float,
+    area_n: ExcessExponent,
     tip: Tip,
 ) -> dict[str, Estimate]:
     """Estimates with a periodic boundary."""
@@ -228,12 +247,12 @@ def _estimate_periodic(
             estimates = estimate_by_change(fine, coarse, n, line=tip.dimension == 1)
             follows_law = rough.calibrated and not oblong and tip.dimension == 2
             if follows_law and not isnan(estimates["a_r"].error):
-                return estimates | {"a_r": _area(fine, coarse, n, phase, spread)}
+                return estimates | {"a_r": _area(fine, coarse, n, phase, area_n)}
             return estimates
     return {
         "a_r": estimate_by_change(fine, coarse, n)["a_r"]
         if oblong
-        else _area(fine, coarse, n, phase, spread),
+        else _area(fine, coarse, n, phase, area_n),
         "sigma_p": _stress(fine, coarse, n, phase, tip),
         "u_g": _gap(fine, coarse, n, phase, bend, tip),
     }
@@ -249,25 +268,26 @@ def _bar(name: str, typical: float, change: float) -> float:
 
 
 def _area(
-    fine: GridValues, coarse: GridValues | None, n: float, phase: float, spread: float
+    fine: GridValues, coarse: GridValues | None, n: float, phase: float, excess: ExcessExponent
 ) -> Estimate:
-    """Relative contact area: the error is of first order in the spacing, as AREA_EXCESS n x.
+    """Relative contact area: the error is of first order in the spacing, as AREA_EXCESS area_n x.
 
-    Where the exponent n is not that of all short waves, the excess is uncertain by its change.
+    Where the exponent is not that of all short waves, the excess is uncertain.
     """
-    if n > MAX_AREA_EXPONENT:
+    area_n = excess.value
+    if area_n > MAX_AREA_EXPONENT:
         return _plate_area(fine, coarse, rough=not isnan(phase))
-    best = max(0.0, fine.a_r - AREA_EXCESS * n * fine.line)
+    best = max(0.0, fine.a_r - AREA_EXCESS * area_n * fine.line)
     change = nan
     if coarse is not None:
-        change = best - max(0.0, coarse.a_r - AREA_EXCESS * n * coarse.line)
+        change = best - max(0.0, coarse.a_r - AREA_EXCESS * area_n * coarse.line)
     if isnan(phase):
         error = _bar("a_r", SINGLE_CONTACT_AREA * fine.line, change)
     else:
-        chance = AREA_CHANCE * (1 + n / 10) * sqrt(fine.line / fine.area) / fine.points
-        law = AREA_LAW * (n + 1) * fine.line * phase
+        chance = AREA_CHANCE * (1 + area_n / 10) * sqrt(fine.line / fine.area) / fine.points
+        law = AREA_LAW * (area_n + 1) * fine.line * phase
         error = hypot(chance, law, 0.0 if isnan(change) else AREA_CHANGE * change)
-    error = hypot(error, AREA_EXCESS * spread * fine.line)
+    error = hypot(error, AREA_EXCESS * excess.uncertainty * fine.line)
     error = min(error, max(best, 1 - best))
     whole = min(fine.a_r - best + error, max(fine.a_r, 1 - fine.a_r))
     return Estimate(whole, best, error, "regular")

@@ -20,9 +20,9 @@ from gfmd_cli.choice import Choice, FilePath, Positive
 from gfmd_cli.errors import InputError
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.grid.fft_grid import ALL_ROWS, Shape
+from gfmd_cli.maps.interpolation import monotone_cubic
 from gfmd_cli.physics.compliance_transforms import Compliance, separated
 from gfmd_cli.physics.free_compliance import Spacings, power_law
-from gfmd_cli.physics.interpolation import monotone_cubic
 from gfmd_cli.physics.persson import gamma_n, gamma_slab
 
 LONG_WAVE = 1e-6  # q t up to which k of a layer is constant: (q t)^2 is below rounding

@@ -10,17 +10,16 @@ from gfmd_cli.choice import FilePath, Positive
 from gfmd_cli.errors import InputError
 from gfmd_cli.grid.arrays import Field, Mask, MaskedField
 from gfmd_cli.grid.fft_grid import Grid
-from gfmd_cli.physics import map_warnings
-from gfmd_cli.physics.height_map import extent
-from gfmd_cli.physics.indenters import SMALLEST_GRID, RigidSurface
-from gfmd_cli.physics.interpolation import (
+from gfmd_cli.maps import map_warnings
+from gfmd_cli.maps.height_map import extent
+from gfmd_cli.maps.interpolation import (
     Interpolation,
     at_centres,
     monotone,
     nearest,
     suited_interpolation,
 )
-from gfmd_cli.physics.map_preparation import (
+from gfmd_cli.maps.map_preparation import (
     ROUNDING,
     Edges,
     Levelling,
@@ -30,8 +29,9 @@ from gfmd_cli.physics.map_preparation import (
     mirror,
     window,
 )
-from gfmd_cli.physics.pictures import Picture, picture
-from gfmd_cli.physics.topography import Region, Topography, read_topography
+from gfmd_cli.maps.pictures import Picture, picture
+from gfmd_cli.maps.topography import Region, Topography, read_topography
+from gfmd_cli.physics.indenters import SMALLEST_GRID, RigidSurface
 
 
 class FileSurface(RigidSurface):

@@ -18,7 +18,7 @@ import numpy as np
 from scipy.linalg import solve_banded
 
 from gfmd_cli.grid.arrays import Field
-from gfmd_cli.physics.interpolation import monotone_cubic
+from gfmd_cli.maps.interpolation import monotone_cubic
 from gfmd_cli.physics.persson import Persson
 
 _LOWEST, _HIGHEST = 1e-8, 8.0  # pressures of the law [Delta_sigma]

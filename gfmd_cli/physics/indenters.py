@@ -15,7 +15,7 @@ from pydantic import model_validator
 from gfmd_cli.choice import Choice, Positive
 from gfmd_cli.grid.arrays import Field, Mask, MaskedField
 from gfmd_cli.grid.fft_grid import Grid
-from gfmd_cli.physics.pictures import Picture
+from gfmd_cli.maps.pictures import Picture
 
 SMALLEST_GRID = 8  # points along an axis; a choice: smaller grids resolve no contact
 ROUNDING = 1e-9  # of a number of points that follows from a ratio of sides

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.special import erf, erfcx, erfinv
 
 from gfmd_cli.grid.arrays import Field
-from gfmd_cli.physics.interpolation import monotone_cubic
+from gfmd_cli.maps.interpolation import monotone_cubic
 
 _GAMMA = {0.0: 0.5, 0.5: 0.45, 1.0: 0.35, 2.0: 0.2, 3.0: 0.1, 4.0: 0.02}  # Eq. (39)
 EXACT, BINS = 64, 500  # shells of one |q|, and logarithmic bins; Sect. 4.1.1 has 500

@@ -13,10 +13,10 @@ import numpy as np
 
 from gfmd_cli.grid.arrays import BLOCK, Field, row_blocks
 from gfmd_cli.grid.fft_grid import Grid
+from gfmd_cli.maps.roughness_parameters import autocorrelation, distances
 from gfmd_cli.physics.contact import radial_power
 from gfmd_cli.physics.free_contact import twice
 from gfmd_cli.physics.persson import bin_edges
-from gfmd_cli.physics.roughness_parameters import autocorrelation, distances
 
 
 def spectra(grid: Grid, fields: Mapping[str, Field]) -> tuple[Field, Field, dict[str, Field]]:

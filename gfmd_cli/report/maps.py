@@ -13,8 +13,8 @@ from gfmd_cli.analysis.table import Group, Table, TableColumn
 from gfmd_cli.analysis.tables import AREA, P_STAR, POINTS, PRESSURE
 from gfmd_cli.analysis.wording import contact_title, pressure_text
 from gfmd_cli.grid.arrays import Field, Mask
+from gfmd_cli.maps.pictures import block_sums
 from gfmd_cli.physics.observables import contact_points
-from gfmd_cli.physics.pictures import block_sums
 from gfmd_cli.report.data import ReportData
 from gfmd_cli.report.profiles import (
     HEIGHT_SCALE,

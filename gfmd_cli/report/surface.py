@@ -12,8 +12,8 @@ from gfmd_cli.analysis.surface_figure import height_figure
 from gfmd_cli.analysis.table import Group, Table, TableColumn
 from gfmd_cli.errors import InputError
 from gfmd_cli.grid.arrays import Field
+from gfmd_cli.maps.pictures import Picture
 from gfmd_cli.physics.persson import Shells
-from gfmd_cli.physics.pictures import Picture
 from gfmd_cli.physics.spectrum_fit import SelfAffineFit, fit
 from gfmd_cli.report.data import ReportData
 from gfmd_cli.report.section import Drawing, Section

@@ -1,1 +1,1 @@
-"""Studies: the run spec, its tasks, the store, checkpoints and the runner."""
+"""Studies: tasks, runs, workers, checkpoints, the study file, Slurm."""

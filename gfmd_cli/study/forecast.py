@@ -3,8 +3,8 @@
 from functools import lru_cache
 
 import numpy as np
-import pyfftw
 
+from gfmd_cli.grid.plans import fast_length
 from gfmd_cli.physics.discretisation_error import MAX_AREA_EXPONENT, MAX_STRESS_EXPONENT
 from gfmd_cli.physics.indenters import RigidSurface
 from gfmd_cli.solvers.multigrid import ASPECT
@@ -83,7 +83,7 @@ def first_grid(surface: RigidSurface) -> int:
     needed = surface.smallest_grid()
     if surface.is_map:
         return needed
-    return 2 * int(pyfftw.next_fast_len((max(needed, FIRST) + 1) // 2))
+    return 2 * fast_length(max(needed, FIRST) / 2)
 
 
 def last_grid(

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from gfmd_cli.grid.arrays import Field
+from gfmd_cli.maps.map_preparation import mirror
 from gfmd_cli.physics.approach import approach
 from gfmd_cli.physics.free_contact import twice
-from gfmd_cli.physics.map_preparation import mirror
 from gfmd_cli.physics.observables import (
     contact_pressure,
     edge_shares,

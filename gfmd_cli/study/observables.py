@@ -10,8 +10,8 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 from gfmd_cli.grid.arrays import Field, Mask
+from gfmd_cli.maps.map_preparation import mirror
 from gfmd_cli.physics.contact import Contact
-from gfmd_cli.physics.map_preparation import mirror
 from gfmd_cli.physics.observables import contact_points
 from gfmd_cli.physics.patches import contact_patches, open_gap
 from gfmd_cli.physics.true_contact import ContactStress, bearing, contact_stress

@@ -13,8 +13,8 @@ import numpy as np
 from gfmd_cli.errors import InputError, StudyError
 from gfmd_cli.files.hdf5 import find, has, open_hdf5, read_dataset, take
 from gfmd_cli.grid.arrays import Field
+from gfmd_cli.maps.pictures import Picture
 from gfmd_cli.physics.persson import Shells
-from gfmd_cli.physics.pictures import Picture
 from gfmd_cli.status import Status
 from gfmd_cli.study.column import Column
 from gfmd_cli.study.columns import (

@@ -15,7 +15,7 @@ from gfmd_cli.physics.discretisation_error import (
     RoughnessScales,
     Tip,
     estimate,
-    exponent_spread,
+    excess_exponent,
     local_exponent,
     roughness_scales,
 )
@@ -254,13 +254,13 @@ def _estimates(task: Task, solved: Solved, grids: list[GridResult]) -> dict[str,
         for grid in grids
     ]
     exponent = local_exponent(task.elastomer, resolution, length)
-    spread = exponent_spread(task.elastomer, resolution, length)
+    area_exponent = excess_exponent(task.elastomer, resolution, length)
     has_scales = task.surface.rough and task.boundary == "periodic"
     return estimate(
         levels,
         exponent,
         scales_of(scene, task.surface.band_limited) if has_scales else None,
-        spread,
+        area_exponent,
         band_limited=task.surface.band_limited,
         stepped=task.surface.stepped,
         tip=Tip(task.surface.tip_exponent, scene.grid.dimension),

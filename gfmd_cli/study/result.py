@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from gfmd_cli.grid.arrays import Field
+from gfmd_cli.maps.pictures import Picture
 from gfmd_cli.physics.persson import Shells
-from gfmd_cli.physics.pictures import Picture
 from gfmd_cli.status import Status
 
 

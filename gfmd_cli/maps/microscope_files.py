@@ -10,8 +10,8 @@ import numpy as np
 
 from gfmd_cli.errors import INSTALL, InputError
 from gfmd_cli.grid.arrays import Field
-from gfmd_cli.physics.array_coordinates import EVEN, in_metres
-from gfmd_cli.physics.height_map import (
+from gfmd_cli.maps.array_coordinates import EVEN, in_metres
+from gfmd_cli.maps.height_map import (
     MAX_BYTES,
     REMEDY,
     SMALLEST_MAP,
@@ -21,7 +21,7 @@ from gfmd_cli.physics.height_map import (
     first_line,
     only_map,
 )
-from gfmd_cli.physics.text_tables import (
+from gfmd_cli.maps.text_tables import (
     HEADER_LINES,
     LATIN_1,
     MATRIX_COLUMNS,

@@ -8,14 +8,14 @@ import numpy as np
 from gfmd_cli.errors import INSTALL, InputError
 from gfmd_cli.files.atomic import new_file
 from gfmd_cli.files.hdf5 import new_hdf5, write_scale
-from gfmd_cli.physics.array_coordinates import UNIT_NAMES
-from gfmd_cli.physics.height_map import (
+from gfmd_cli.maps.array_coordinates import UNIT_NAMES
+from gfmd_cli.maps.height_map import (
     at_equal_distances,
     check_layout,
     check_type,
     first_line,
 )
-from gfmd_cli.physics.topography import AXES
+from gfmd_cli.maps.topography import AXES
 
 
 def write_heights(path: Path, heights: Any) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from typing import Any, Literal
 import numpy as np
 
 from gfmd_cli.grid.arrays import Field, Mask
-from gfmd_cli.physics.pictures import block_sums
+from gfmd_cli.maps.pictures import block_sums
 
 Levelling = Literal["none", "mean", "plane", "curvature"]
 Edges = Literal["none", "window", "mirror"]

@@ -6,9 +6,8 @@ Each function returns one warning, or "" without a reason for it.
 import numpy as np
 
 from gfmd_cli.grid.arrays import Field, row_blocks
-from gfmd_cli.physics.indenters import SMALLEST_GRID
-from gfmd_cli.physics.map_preparation import border_step, level
-from gfmd_cli.physics.topography import Topography
+from gfmd_cli.maps.map_preparation import border_step, level
+from gfmd_cli.maps.topography import Topography
 
 STEEP = 3.0  # rms gradient; a choice: surfaces of machined or worn solids have less
 SMOOTH = 1e-6  # rms gradient; a choice: polished mirrors have about that
@@ -20,6 +19,7 @@ SINGLE = float(np.finfo(np.float32).eps)  # double precision may have been singl
 ROUNDED = 0.2  # share of equal neighbouring heights, at which the gradient is 3 % too large
 FEW = 0.01  # share of the heights of which a warning tells the percentage; a choice
 PLATEAU = 0.5  # share of equal heights that are taken as a part of the surface; a choice
+FEW_OTHERS = 8  # heights that say nothing about one that is apart; a choice
 CLIPPED = 10  # ratio of the numbers of equal heights, highest to second; about 1 if rounded
 SIDES = 1e-3  # relative difference of two sides beyond which one is probably wrong; a choice
 FILLED = 0.05  # share of filled heights; a choice, as for the frame of the window
@@ -109,7 +109,7 @@ def outliers(topography: Topography) -> str:
     for extreme, word in ((heights.min(), "minimum"), (heights.max(), "maximum")):
         others = heights[heights != extreme]
         count = heights.size - others.size
-        if count > PLATEAU * heights.size or others.size < SMALLEST_GRID:
+        if count > PLATEAU * heights.size or others.size < FEW_OTHERS:
             continue
         share = f" ({count / heights.size:.0%})" if count > FEW * heights.size else ""
         if min(abs(others.max() - extreme), abs(others.min() - extreme)) > np.ptp(others) > 0:

@@ -14,7 +14,7 @@ import numpy as np
 
 from gfmd_cli.errors import InputError
 from gfmd_cli.files.checksums import MAX_COMPRESSION
-from gfmd_cli.physics.array_coordinates import (
+from gfmd_cli.maps.array_coordinates import (
     axes_of,
     factor,
     is_transposed,

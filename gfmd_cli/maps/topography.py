@@ -16,7 +16,7 @@ from pydantic import Strict, model_validator
 from gfmd_cli.choice import Choice
 from gfmd_cli.errors import InputError
 from gfmd_cli.grid.arrays import Field, Mask
-from gfmd_cli.physics.height_map import (
+from gfmd_cli.maps.height_map import (
     MAX_HEIGHT,
     REMEDY,
     SMALLEST_MAP,
@@ -25,7 +25,7 @@ from gfmd_cli.physics.height_map import (
     read_hdf5,
     read_npy,
 )
-from gfmd_cli.physics.microscope_files import read_microscope_file
+from gfmd_cli.maps.microscope_files import read_microscope_file
 
 SPACING_TOLERANCE = 1e-6  # relative: files store sides in single precision or with six digits
 AXES = ("y", "x")

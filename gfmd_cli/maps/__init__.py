@@ -1,0 +1,1 @@
+"""Height maps: the files that contain them, their preparation, interpolation and parameters."""
