@@ -1,20 +1,31 @@
-"""What a run has computed, as a short table, and why tasks are not converged."""
+"""What a run will compute and what it has computed, as tables; why tasks are not converged."""
 
 from collections.abc import Mapping, Sequence, Sized
+from dataclasses import replace
 from typing import Any
 
 from gfmd_cli.analysis.compare import with_best, with_solvers
 from gfmd_cli.analysis.selection import grouped
 from gfmd_cli.analysis.table import Record, Table, TableColumn, groups_of
-from gfmd_cli.analysis.tables import P_STAR, PRESSURE, RESIDUAL, STATUS, warnings_in
+from gfmd_cli.analysis.tables import P_STAR, POINTS, PRESSURE, RESIDUAL, STATUS, warnings_in
 from gfmd_cli.analysis.wording import contact_title, grid_size, shown
 from gfmd_cli.physics.observables import QUANTITIES
 from gfmd_cli.status import Status
 from gfmd_cli.study.reading import solved_rows
+from gfmd_cli.study.result import Outcome
+from gfmd_cli.study.tasks import Task
 
 MAX_ROWS = 40
 MAX_EDGE_SHARE = 0.05  # of contact or load in the tapered zone, without a warning; a choice
 MAX_SCENES = 6  # of other specs that a run names
+TASKS = (
+    TableColumn("task", "task", "d"),
+    POINTS,
+    TableColumn("load", "load"),
+    TableColumn("MiB", "memory", ".0f"),
+    TableColumn("s", "seconds", ".2g"),
+    replace(STATUS, optional=True),
+)
 RUN = (
     P_STAR,
     PRESSURE,
@@ -23,6 +34,33 @@ RUN = (
     RESIDUAL,
     STATUS,
 )
+
+
+def task_text(tasks: Sequence[Task], outcomes: Mapping[str, Outcome], missing: set[str]) -> str:
+    """The tasks by contact, with predicted memory and time, and the status of those stored.
+
+    `missing` are the ids of the tasks to solve, also those stored without the requested output.
+    """
+    status = {name: str(outcome.status) for name, outcome in outcomes.items()}
+    status |= dict.fromkeys(missing & status.keys(), "again: more output is requested")
+    records = (
+        {
+            "task": task.index,
+            "points": f"~{task.points}" if task.auto else task.points,
+            "load": task.load_label,
+            "memory": task.bytes / 2**20,
+            "seconds": task.seconds,
+            "status": status.get(task.id),
+        }
+        for task in tasks
+    )
+    return Table("", TASKS, groups_of(zip(map(_contact_of, tasks), records, strict=True))).as_text()
+
+
+def _contact_of(task: Task) -> str:
+    """Elastomer and surface of a task, and the swept keys of grid and solver."""
+    swept = [word for table, word in task.swept if table != "surface"]
+    return ", ".join([f"{task.elastomer.label} on {task.surface.label}", *swept])
 
 
 def run_text(rows: list[dict[str, Any]]) -> str:

@@ -170,6 +170,7 @@ def _print_results(
 
 def _print_tasks(spec: "Spec", path: Path, options: "RunOptions") -> None:
     """Print the tasks of a shard with their load, memory and time, and those that are done."""
+    from gfmd_cli.analysis.run_summary import task_text
     from gfmd_cli.grid.ranks import leads
     from gfmd_cli.study.resources import check_memory
     from gfmd_cli.study.store import Study, without_result
@@ -178,24 +179,12 @@ def _print_tasks(spec: "Spec", path: Path, options: "RunOptions") -> None:
     tasks = options.share_of(plan(spec))
     outcomes = {} if options.overwrite else Study(path).outcomes()
     missing = without_result(tasks, outcomes)
-    to_do = {task.id for task in missing}
     if tasks:
         check_memory(tasks, options.ranks)
     if not leads(options.ranks):
         return
-    show(f"{'task':>6} {'points':>6} {'load':>10} {'MiB':>8} {'s':>8}  scene")
-    for task in tasks:
-        done = f"  [{outcomes[task.id].status}]" if task.id in outcomes else ""
-        if done and task.id in to_do:
-            done = "  [again: more output is requested]"
-        points = f"~{task.points}" if task.auto else str(task.points)
-        surface = task.surface.label
-        swept = " ".join(word for word in task.swept if word not in surface)
-        scene = " | ".join(filter(None, (surface, task.elastomer.label, swept)))
-        show(
-            f"{task.index:6d} {points:>6} {task.load_label:>10} {task.bytes / 2**20:8.0f} "
-            f"{task.seconds:8.2g}  {scene}{done}"
-        )
+    if tasks:
+        show(f"{task_text(tasks, outcomes, {task.id for task in missing})}\n")
     show(
         f"{len(tasks)} tasks, {len(missing)} to do, about {sum(t.seconds for t in missing):.3g} s "
         f"of one core, at most {max((t.bytes for t in tasks), default=0) / 2**20:.0f} MiB a task; "
