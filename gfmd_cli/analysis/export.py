@@ -84,7 +84,7 @@ def as_dataset(path: Path) -> Any:
         try:
             data = _xarray().open_dataset(path, engine="h5netcdf")
         except (OSError, ValueError) as error:
-            raise InputError(f"{path}: no readable netCDF file: {error}") from error
+            raise InputError(f"{path}: not a readable netCDF file: {error}") from error
     else:
         data = _labelled_study(path)
     from gfmd_cli.analysis.parameter_index import ParameterIndex

@@ -59,7 +59,7 @@ BINS = (
     TableColumn("Pr(sigma)", ratio("density", "delta_sigma"), unit="1/Pa"),
     TableColumn("Persson, Pr(sigma) Delta_sigma", "theory", optional=True),
 )
-MAX_SCENES = 6  # of a bench, each with a figure
+MAX_CONTACTS = 6  # of a bench, each with a figure; a choice
 BENCH_LABEL = "Relative error of the mean gap over transforms, and over seconds, for each solver"
 BENCH_CAPTION = (
     "Error of the mean gap over the transforms and the processor time that a solver took. Thick: "
@@ -163,13 +163,13 @@ def work_precision(data: ReportData) -> Section:
     if not data.traces:
         return Section(title)
     figures = list(bench_figures(data.traces).values())
-    left_out = len(figures) > MAX_SCENES
+    left_out = len(figures) > MAX_CONTACTS
     return Section(
         title,
-        notes=[f"{MAX_SCENES} of {len(figures)} scenes are shown."] if left_out else [],
+        notes=[f"{MAX_CONTACTS} of {len(figures)} contacts are shown."] if left_out else [],
         drawings=[
             drawing(figure, f"speed-{place}", BENCH_LABEL, BENCH_CAPTION, scrolls=True)
-            for place, figure in enumerate(figures[:MAX_SCENES])
+            for place, figure in enumerate(figures[:MAX_CONTACTS])
         ],
         disclosed={BEHIND: bench_table(data.traces)},
         template="work_precision.html",

@@ -51,7 +51,7 @@ DAMAGE = (
 def check_column(column: Column, values: Any) -> None:
     """Raise ValueError for anything but one value of the kind of the column in each row."""
     if values.ndim != 1 or values.dtype.kind != KINDS[column.kind]:
-        raise ValueError(f"{column.name} is no column of {column.kind.__name__}")
+        raise ValueError(f"{column.name} is not a column of {column.kind.__name__}")
 
 
 class StudyFile:
@@ -228,7 +228,7 @@ def _check_alike(place: str, datasets: Mapping[str, Any], dimensions: int) -> No
 def open_study(source: Path, opened: BinaryIO | None = None) -> Iterator[StudyFile]:
     """The study file at a path, for reading; of `opened`, where that is the file.
 
-    Raises InputError where there is none, StudyError where it is no study or damaged.
+    Raises InputError where there is none, StudyError where it is not a study or damaged.
     """
     if source.suffix == ".toml":
         raise InputError(
@@ -242,15 +242,15 @@ def open_study(source: Path, opened: BinaryIO | None = None) -> Iterator[StudyFi
             _check_layout(source, file)
             yield StudyFile(file)
     except DAMAGE as error:
-        raise StudyError(f"{source}: no readable study, or damaged: {error}") from error
+        raise StudyError(f"{source}: not a readable study, or damaged: {error}") from error
 
 
 def _check_layout(path: Path, file: Any) -> None:
     if BENCH in file.attrs:
-        raise StudyError(f"{path}: a bench, no study; `gfmd bench` prints its table")
+        raise StudyError(f"{path}: a bench file, not a study; `gfmd bench` prints its table")
     layout = file.attrs.get("layout")
     if layout is None:
-        raise StudyError(f"{path}: no study")
+        raise StudyError(f"{path}: not a study")
     if int(layout) != LAYOUT:
         writer = file.attrs.get("software_version", "?")
         raise StudyError(
