@@ -106,7 +106,7 @@ def summary_table(summaries: Sequence[SurfaceSummary], names: Sequence[str]) -> 
     return Table("", columns, [Group("", records)])
 
 
-def as_text(summary: SurfaceSummary) -> str:
+def summary_text(summary: SurfaceSummary) -> str:
     """The summary of one surface as text."""
     grid, measured, record = summary.scene.grid, summary.moments, summary.record()
     sides = " x ".join(dict.fromkeys(f"{side:.6g}" for side in record["sides"]))  # a square: one

@@ -112,27 +112,45 @@ class Table:
         caption = textwrap.fill(self.caption, WIDTH)
         return "\n\n".join([caption, *blocks] if caption and blocks else blocks)
 
-    def as_html(self) -> str:
-        """The table in HTML, group by group, each below its title."""
-        blocks = [
-            f"<p>{escape(group.title or self.caption)}</p>{self._tabulated(group, 'html')}"
-            for group in self.groups
+    def as_html(self, typeset: Callable[[str], str] = escape) -> str:
+        """The table in HTML; `typeset` escapes headings and titles and sets their symbols."""
+        columns = self.columns
+        sides = [' class="t"' if side == "left" else "" for side in self.alignments]
+        caption = f"<caption><span>{typeset(self.caption)}</span></caption>" if self.caption else ""
+        heads = [
+            f'<th scope="col"{side}>{typeset(column.title)}</th>'
+            for column, side in zip(columns, sides, strict=True)
         ]
-        return "".join(blocks)
+        head = f"<thead><tr>{''.join(heads)}</tr></thead>" if any(c.title for c in columns) else ""
+        body = ""
+        for group in self.groups:
+            title = f'colspan="{len(columns)}"><span>{typeset(group.title)}</span>'
+            rows = [f'<tr class="group"><th scope="rowgroup" {title}</th></tr>'] * bool(group.title)
+            for record in group.records:
+                first, *others = (_html_cell(column.cell(record)) for column in columns)
+                cells = [f'<th scope="row"{sides[0]}>{first}</th>']
+                cells += [
+                    f"<td{side}>{cell}</td>" for side, cell in zip(sides[1:], others, strict=True)
+                ]
+                rows.append(f"<tr>{''.join(cells)}</tr>")
+            body += "<tbody>\n" + "\n".join(rows) + "\n</tbody>"
+        return f"<table>{caption}{head}{body}</table>"
 
     def _block(self, group: Group) -> str:
-        lines = self._tabulated(group, "plain").splitlines()
+        lines = tabulate.tabulate(
+            [[column.cell(record) for column in self.columns] for record in group.records],
+            [column.title for column in self.columns],
+            tablefmt="plain",
+            disable_numparse=True,
+            colalign=self.alignments,
+        ).splitlines()
         indented = [f"  {line}".rstrip() for line in lines]
         return "\n".join([*filter(None, [group.title]), *group.notes, *indented])
 
-    def _tabulated(self, group: Group, tablefmt: str) -> str:
-        return tabulate.tabulate(
-            [[column.cell(record) for column in self.columns] for record in group.records],
-            [column.title for column in self.columns],
-            tablefmt=tablefmt,
-            disable_numparse=True,
-            colalign=self.alignments,
-        )
+
+def _html_cell(text: str) -> str:
+    """A cell with the signs of typeset text."""
+    return "–" if text == BLANK else escape(text.replace("+-", "±"))
 
 
 def _value(record: Record, value: Value) -> Any:

@@ -5,7 +5,7 @@ against error; error bars and optional observables, which are tables alone.
 """
 
 from gfmd_cli.analysis.distribution_figure import Density, densities
-from gfmd_cli.analysis.figures import VIEWS
+from gfmd_cli.analysis.figures import FIGURES
 from gfmd_cli.analysis.table import Group, Table, TableColumn, product, ratio
 from gfmd_cli.analysis.tables import (
     CONTACT_AREA,
@@ -106,10 +106,13 @@ def _drawings(data: ReportData, column: str) -> list[Drawing]:
     """The figures of a column over the pressure that the study has data for."""
     return [
         drawing(
-            figure, view.name, f"{view.meaning}: {', '.join(figure.legend)}", f"{view.meaning}."
+            figure,
+            content.name,
+            f"{content.meaning}: {', '.join(figure.legend)}",
+            f"{content.meaning}.",
         )
-        for view in VIEWS
-        if view.column == column and (figure := data.figures.get(view.name))
+        for content in FIGURES
+        if content.column == column and (figure := data.figures.get(content.name))
     ]
 
 

@@ -5,7 +5,6 @@ from typing import Any
 
 import numpy as np
 
-from gfmd_cli.analysis.compare import Row
 from gfmd_cli.analysis.curve_styles import rgb
 from gfmd_cli.analysis.plotting import WIDTH, ColumnFigure, LegendFigure, shades
 from gfmd_cli.analysis.selection import evenly, grouped
@@ -27,6 +26,7 @@ from gfmd_cli.report.profiles import (
 )
 from gfmd_cli.report.section import Section
 from gfmd_cli.report.svg import drawing
+from gfmd_cli.study.column import Row
 from gfmd_cli.study.reading import StudyFile, open_study
 
 MAX_CONTACTS, MAX_CURVES = 12, 3  # contacts that are shown, of at most so many curves

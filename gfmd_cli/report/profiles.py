@@ -8,10 +8,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from gfmd_cli.analysis.compare import Row
 from gfmd_cli.analysis.plotting import HEIGHT, WIDTH, LegendFigure
 from gfmd_cli.analysis.wording import in_si, largest
 from gfmd_cli.grid.arrays import Field
+from gfmd_cli.study.column import Row
 from gfmd_cli.study.reading import StudyFile
 from gfmd_cli.units import scaled
 

@@ -14,6 +14,7 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
+from gfmd_cli.analysis.table import Table
 from gfmd_cli.analysis.wording import RAISED
 
 SCRIPTS = ("plotly-basic.min.js", "report.js")
@@ -76,9 +77,9 @@ def plain_label(label: str) -> str:
     return unescape(re.sub("<[^>]+>", "", html_label(label).replace("<sub>", "_")))
 
 
-def cell(text: str) -> str:
-    """A cell of a text table with the signs of typeset text."""
-    return "–" if text == "-" else text.replace("+-", "±")
+def table(content: Table) -> Markup:
+    """A table with typeset headings and titles."""
+    return Markup(clean(content.as_html(typeset)))
 
 
 @cache
@@ -93,7 +94,7 @@ def environment() -> Environment:
         lstrip_blocks=True,
     )
     result.policies["json.dumps_kwargs"] = {"separators": (",", ":")}
-    result.filters |= {"typeset": typeset, "cell": cell}
+    result.filters |= {"typeset": typeset, "table": table}
     return result
 
 

@@ -4,8 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from gfmd_cli.analysis.compare import Row
-from gfmd_cli.analysis.curve_styles import distinct_styles, literal, shortened
+from gfmd_cli.analysis.curve_styles import distinct_labels, distinct_styles, literal
 from gfmd_cli.analysis.plotting import ColumnFigure
 from gfmd_cli.analysis.surface_figure import height_figure, spectrum_labels
 from gfmd_cli.analysis.surface_spectrum import FIT, Spectrum, spectrum
@@ -15,6 +14,7 @@ from gfmd_cli.physics.persson import Shells
 from gfmd_cli.report.data import ReportData
 from gfmd_cli.report.section import Drawing, Section
 from gfmd_cli.report.svg import drawing
+from gfmd_cli.study.column import Row
 from gfmd_cli.study.reading import open_study
 
 MAX_PICTURES = 4  # measured surfaces that are shown; a choice
@@ -111,7 +111,7 @@ FIT_CAPTION = (
 
 def _spectrum_figure(names: list[str], shown: Sequence[Spectrum]) -> ColumnFigure:
     plot = ColumnFigure(*spectrum_labels(shown[0]))
-    labels = [literal(name) for name in shortened(names)]
+    labels = [literal(name) for name in distinct_labels(names)]
     for curve, style in zip(shown, distinct_styles(labels), strict=True):
         if curve.fit is not None:
             line = {"color": style.colour, "lw": 0.7}
