@@ -9,7 +9,7 @@ from specs import power_spec
 from gfmd_cli.analysis import figures
 from gfmd_cli.analysis.compare import Curve, compare
 from gfmd_cli.analysis.curve_styles import MAX_LABEL, curve_styles, distinct_labels
-from gfmd_cli.analysis.figures import FIGURES, draw_all, study_figures, with_styles
+from gfmd_cli.analysis.figures import PANELS, draw_all, study_figures, with_styles
 from gfmd_cli.analysis.plotting import styled
 from gfmd_cli.errors import InputError, SpaceError
 from gfmd_cli.spec.parse import read_spec
@@ -29,7 +29,7 @@ points = 256
 p_star = [0.01, 0.1]
 """
 LONG = "measurement_2024_11_sample_steel_ground_position_"
-OVER_PRESSURE = {content.name for content in FIGURES}
+OVER_PRESSURE = {panel.name for panel in PANELS}
 DISTRIBUTIONS = {"stress_distribution", "stress_distribution_pressures"}
 
 
@@ -69,8 +69,8 @@ def marked(comparison, rows):
     return replace(comparison, curves=[Curve(changed, first.persson), *others])
 
 
-def content(name):
-    return next(content for content in FIGURES if content.name == name)
+def panel(name):
+    return next(panel for panel in PANELS if panel.name == name)
 
 
 def figure_of(name, comparison):
@@ -82,7 +82,7 @@ def figure_of(name, comparison):
     ]
     if name in DISTRIBUTIONS:
         return figures.distribution_figures(items)[name]
-    return figures._over_pressure(content(name), items)
+    return figures._over_pressure(panel(name), items)
 
 
 def test_every_figure_is_a_pdf_and_a_png(study, tmp_path):

@@ -6,7 +6,7 @@ from scipy import stats
 
 from gfmd_cli.analysis.compare import compare
 from gfmd_cli.analysis.ensemble import Ensemble, ensembles
-from gfmd_cli.analysis.figures import FIGURES, study_figures, with_styles
+from gfmd_cli.analysis.figures import PANELS, study_figures, with_styles
 from gfmd_cli.analysis.plotting import styled
 from gfmd_cli.analysis.series import Series, _point, seed_groups
 from gfmd_cli.analysis.wording import quantity
@@ -24,7 +24,7 @@ points = 16
 [load]
 p_star = [0.1, 0.3, 1.0]
 """
-AREA, RATIO = FIGURES[0], FIGURES[1]
+AREA, RATIO = PANELS[0], PANELS[1]
 
 
 @pytest.fixture

@@ -20,7 +20,7 @@ LOWEST = 1e-3  # of a mean: lower end of its band on a logarithmic axis
 
 
 @dataclass(frozen=True)
-class FigureContent:
+class Panel:
     """A quantity over the reduced pressure."""
 
     name: str
@@ -68,20 +68,20 @@ class Series:
     """Theory at `StyledCurve.p_star`, the mean over seeds."""
 
     @classmethod
-    def of(cls, content: FigureContent, items: list[StyledCurve]) -> Self:
+    def of(cls, panel: Panel, items: list[StyledCurve]) -> Self:
         """The series of curves that differ in their seed only: what its scale can show."""
         loads = by_load(record for item in items for record in item.curve.records)
         loads.sort(key=lambda seeds: float(np.mean([record["p_star"] for record in seeds])))
-        points = [_point(content, seeds) for seeds in loads]
+        points = [_point(panel, seeds) for seeds in loads]
         x, y, error, half_width, converged = (
             np.array(values) for values in zip(*points, strict=True)
         )
-        visible = np.isfinite(y) & ((y > 0) | (content.y_scale == "linear"))
+        visible = np.isfinite(y) & ((y > 0) | (panel.y_scale == "linear"))
         details = [_details(seeds) for seeds, s in zip(loads, visible, strict=True) if s]
         style = items[0].style
         if len(items) > 1:
             style = replace(style, label=f"{style.label}, {len(items)} seeds")
-        theory = np.mean([getattr(item.theory, content.column) for item in items], axis=0)
+        theory = np.mean([getattr(item.theory, panel.column) for item in items], axis=0)
         x, y, error = x[visible], y[visible], error[visible]
         return cls(style, x, y, error, half_width[visible], converged[visible], details, theory)
 
@@ -102,10 +102,10 @@ class Series:
         return np.concatenate([self.y, self.y + np.nan_to_num(self.half_width)])
 
 
-def _point(content: FigureContent, records: list[Row]) -> tuple[float, float, float, float, bool]:
+def _point(panel: Panel, records: list[Row]) -> tuple[float, float, float, float, bool]:
     """p*, value, error, half width of the confidence interval, and whether all converged."""
-    name = content.column
-    units = np.array([r[f"{name}_persson"] if content.ratio else 1.0 for r in records])
+    name = panel.column
+    units = np.array([r[f"{name}_persson"] if panel.ratio else 1.0 for r in records])
     values, errors = np.transpose(best_of_all(records, name)) / units
     half_width = spread_of(values).half_width if len(records) > 1 else np.nan
     converged = all(record["status"] == Status.CONVERGED for record in records)

@@ -14,15 +14,7 @@ from gfmd_cli.physics.spectrum_fit import SelfAffineFit, fit
 BANDS_PER_DECADE = 10  # a choice
 FIT = (
     TableColumn("H", "hurst", ".2f", error="hurst_error", optional=True),
-    TableColumn(
-        "lambda_r",
-        "rolloff_wavelength",
-        ".3g",
-        "m",
-        error="rolloff_error",
-        otherwise="no_rolloff",
-        optional=True,
-    ),
+    TableColumn("lambda_r", "rolloff_wavelength", ".3g", "m", "rolloff_error", "no_rolloff", True),
     TableColumn("lambda_s", "cutoff_wavelength", ".3g", "m", optional=True),
     TableColumn("scatter", "scatter", ".3g", optional=True),
 )
@@ -53,11 +45,10 @@ class Spectrum:
     @property
     def fit_record(self) -> dict[str, float | None]:
         """The parameters of the fit [m], as the columns FIT show them; empty without a fit."""
-        names = (
-            "hurst", "hurst_error", "rolloff_wavelength", "rolloff_error", "cutoff_wavelength",
-            "scatter",
-        )  # fmt: skip
-        return {name: getattr(self.fit, name) for name in names if self.fit is not None}
+        if self.fit is None:
+            return {}
+        keys = (key for column in FIT for key in (column.value, column.error) if key)
+        return {str(key): getattr(self.fit, str(key)) for key in keys}
 
 
 def spectrum(shells: Shells, sides: tuple[float, ...], points: tuple[int, ...]) -> Spectrum:
@@ -85,16 +76,9 @@ def spectrum(shells: Shells, sides: tuple[float, ...], points: tuple[int, ...]) 
         for weight in (shells.height, shells.height * shells.q, shells.modes, fitted)
     )
     usable = total > 0
-    per_mode = prod(sides) / modes[usable]
-    return Spectrum(
-        len(sides),
-        q=moment[usable] / total[usable],
-        density=total[usable] * per_mode,
-        modes=modes[usable],
-        fit=nearest,
-        no_fit=no_fit,
-        fitted=fitted[usable] * per_mode,
-    )
+    total, moment, modes, fitted = (x[usable] for x in (total, moment, modes, fitted))
+    per_mode, q = prod(sides) / modes, moment / total
+    return Spectrum(len(sides), q, total * per_mode, modes, nearest, no_fit, fitted * per_mode)
 
 
 def _edges(q: Field, nyquist: float) -> Field:

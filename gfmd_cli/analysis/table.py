@@ -114,27 +114,22 @@ class Table:
 
     def as_html(self, typeset: Callable[[str], str] = escape) -> str:
         """The table in HTML; `typeset` escapes headings and titles and sets their symbols."""
-        columns = self.columns
+        columns, size = self.columns, len(self.columns)
         sides = [' class="t"' if side == "left" else "" for side in self.alignments]
-        caption = f"<caption><span>{typeset(self.caption)}</span></caption>" if self.caption else ""
-        heads = [
-            f'<th scope="col"{side}>{typeset(column.title)}</th>'
-            for column, side in zip(columns, sides, strict=True)
-        ]
-        head = f"<thead><tr>{''.join(heads)}</tr></thead>" if any(c.title for c in columns) else ""
-        body = ""
+        html = f"<caption><span>{typeset(self.caption)}</span></caption>" if self.caption else ""
+        if any(column.title for column in columns):
+            heads = (typeset(column.title) for column in columns)
+            tags = ['th scope="col"'] * size
+            html += f"<thead>{_html_row(tags, sides, heads)}</thead>"
         for group in self.groups:
-            title = f'colspan="{len(columns)}"><span>{typeset(group.title)}</span>'
-            rows = [f'<tr class="group"><th scope="rowgroup" {title}</th></tr>'] * bool(group.title)
+            title = f'colspan="{size}"><span>{typeset(group.title)}</span></th></tr>\n'
+            html += "<tbody>\n"
+            html += f'<tr class="group"><th scope="rowgroup" {title}' if group.title else ""
             for record in group.records:
-                first, *others = (_html_cell(column.cell(record)) for column in columns)
-                cells = [f'<th scope="row"{sides[0]}>{first}</th>']
-                cells += [
-                    f"<td{side}>{cell}</td>" for side, cell in zip(sides[1:], others, strict=True)
-                ]
-                rows.append(f"<tr>{''.join(cells)}</tr>")
-            body += "<tbody>\n" + "\n".join(rows) + "\n</tbody>"
-        return f"<table>{caption}{head}{body}</table>"
+                cells = (_html_cell(column.cell(record)) for column in columns)
+                html += _html_row(['th scope="row"', *["td"] * (size - 1)], sides, cells)
+            html += "</tbody>"
+        return f"<table>{html}</table>"
 
     def _block(self, group: Group) -> str:
         lines = tabulate.tabulate(
@@ -146,6 +141,11 @@ class Table:
         ).splitlines()
         indented = [f"  {line}".rstrip() for line in lines]
         return "\n".join([*filter(None, [group.title]), *group.notes, *indented])
+
+
+def _html_row(tags: Iterable[str], sides: Iterable[str], cells: Iterable[str]) -> str:
+    rows = zip(tags, sides, cells, strict=True)
+    return f"<tr>{''.join(f'<{tag}{side}>{cell}</{tag[:2]}>' for tag, side, cell in rows)}</tr>\n"
 
 
 def _html_cell(text: str) -> str:

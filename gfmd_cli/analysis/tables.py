@@ -80,11 +80,7 @@ COMPARISON = (
 )
 EINSTEIN = (
     P_STAR,
-    *(
-        column
-        for name in QUANTITIES
-        for column in _beside_theory(TableColumn(name, name), name, "einstein")
-    ),
+    *(c for q in QUANTITIES for c in _beside_theory(TableColumn(q, q), q, "einstein")),
 )
 EINSTEIN_CAPTION = "Comparison with the closed form for n = 0 and Gaussian heights."
 CONTINUUM = (

@@ -5,7 +5,7 @@ against error; error bars and optional observables, which are tables alone.
 """
 
 from gfmd_cli.analysis.distribution_figure import Density, densities
-from gfmd_cli.analysis.figures import FIGURES
+from gfmd_cli.analysis.figures import PANELS
 from gfmd_cli.analysis.table import Group, Table, TableColumn, product, ratio
 from gfmd_cli.analysis.tables import (
     CONTACT_AREA,
@@ -88,31 +88,25 @@ def contact_area(data: ReportData) -> Section:
 
 def mean_gap(data: ReportData) -> Section:
     """Mean gap."""
-    table = over_pressure(
-        MEAN_GAP, "Mean gap u_g between the surfaces, over the whole interface.", data.curves
-    )
-    return Section("Mean gap", drawings=_drawings(data, "u_g"), disclosed={BEHIND: table})
+    caption = "Mean gap u_g between the surfaces, over the whole interface."
+    disclosed = {BEHIND: over_pressure(MEAN_GAP, caption, data.curves)}
+    return Section("Mean gap", drawings=_drawings(data, "u_g"), disclosed=disclosed)
 
 
 def stress_deviation(data: ReportData) -> Section:
     """Standard deviation of the stress."""
     caption = "Standard deviation sigma_p of the stress over the whole interface."
-    table = over_pressure(STRESS_DEVIATION, caption, data.curves)
-    drawings = _drawings(data, "sigma_p")
-    return Section("Stress deviation", drawings=drawings, disclosed={BEHIND: table})
+    disclosed = {BEHIND: over_pressure(STRESS_DEVIATION, caption, data.curves)}
+    return Section("Stress deviation", drawings=_drawings(data, "sigma_p"), disclosed=disclosed)
 
 
 def _drawings(data: ReportData, column: str) -> list[Drawing]:
     """The figures of a column over the pressure that the study has data for."""
+    panels = ((panel, data.figures.get(panel.name)) for panel in PANELS if panel.column == column)
     return [
-        drawing(
-            figure,
-            content.name,
-            f"{content.meaning}: {', '.join(figure.legend)}",
-            f"{content.meaning}.",
-        )
-        for content in FIGURES
-        if content.column == column and (figure := data.figures.get(content.name))
+        drawing(plot, panel.name, f"{panel.meaning}: {', '.join(plot.legend)}", f"{panel.meaning}.")
+        for panel, plot in panels
+        if plot is not None
     ]
 
 

@@ -169,13 +169,13 @@ class StudyFile:
 
     def arrays(self, group: str, task: int) -> dict[str, Field]:
         """The arrays of a task by name, none where it has no such group."""
-        return {name: data[()] for name, data in self.datasets(group, task).items()}
+        return {name: data[()] for name, data in self._datasets(group, task).items()}
 
     def blocks(
         self, group: str, task: int, rows: int, names: Iterable[str]
     ) -> Iterator[dict[str, Field]]:
         """The named arrays of a task that are stored, at most `rows` of their rows at a time."""
-        by_name = self.datasets(group, task)
+        by_name = self._datasets(group, task)
         datasets = {name: by_name[name] for name in names if name in by_name}
         size = min((data.shape[0] for data in datasets.values()), default=0)
         for start in range(0, size, rows):
@@ -201,9 +201,9 @@ class StudyFile:
         self.shells(self.rows[task]["scene"])
         self.pictures(self.rows[task]["scene"])
         for group in TASK_GROUPS:
-            self.datasets(group.name, task)
+            self._datasets(group.name, task)
 
-    def datasets(self, group: str, task: int) -> dict[str, Any]:
+    def _datasets(self, group: str, task: int) -> dict[str, Any]:
         """The arrays of a task by name, not read yet: numbers, all of the same shape."""
         place, (declared,) = f"{group}/{task}", (g for g in TASK_GROUPS if g.name == group)
         stored = find(self._file, place)
