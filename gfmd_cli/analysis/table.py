@@ -158,7 +158,7 @@ def _value(record: Record, value: Value) -> Any:
 
 
 def known(value: Any) -> bool:
-    """Whether a value applies: neither None nor NaN, nor the -1 of a seed or of a count."""
+    """Whether a value applies: neither None nor the blank of a column of numbers, NaN or -1."""
     if isinstance(value, float):
         return not math.isnan(value)
     return value is not None and value != -1

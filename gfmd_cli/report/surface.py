@@ -102,10 +102,11 @@ CAPTION = (
 )
 FITS = (TableColumn("surface", "surface"), *FIT)
 FIT_CAPTION = (
-    "Self-affine spectrum C ∝ [1 + (q/q_r)²]^(−1−H) up to q_s, zero above. H and q_r maximise the "
-    "likelihood of the spectrum below q_s; q_s gives the fit the ratio of rms gradient to rms "
-    "height of the surface. Scatter: 1 for Gaussian roughness, 0 if only the phases are random, "
-    "much larger if the spectrum of the surface has another shape."
+    "Self-affine spectrum C ∝ [1 + (q / q_r)²]^(−1−H) up to q_s, zero above, with the Hurst "
+    "exponent H, the roll-off lambda_r = 2π / q_r and the cut-off lambda_s = 2π / q_s. H and q_r "
+    "maximise the likelihood of the spectrum below q_s; q_s gives the fit the ratio of rms "
+    "gradient to rms height of the surface. Scatter: 1 for Gaussian roughness, 0 if only the "
+    "phases are random, much larger if the spectrum of the surface has another shape."
 )
 
 
