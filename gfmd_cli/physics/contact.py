@@ -65,14 +65,14 @@ class Contact:
         return np.where(self.may_touch, self.height, DEEP)
 
     @cached_property
-    def line(self) -> Field:
+    def k_along_x(self) -> Field:
         """k(q) of the waves along x, from q = 0 on, shape (points/2 + 1,)."""
-        return self.grid.line(self.stiffness)
+        return self.grid.along_x(self.stiffness)
 
     @property
     def exponents(self) -> tuple[float, float]:
         """Smallest and largest exponent d ln k / d ln q of the waves along x."""
-        k = self.line[1:]
+        k = self.k_along_x[1:]
         exponents = np.diff(np.log(k)) / np.diff(np.log(np.arange(1, k.size + 1)))
         return float(exponents.min()), float(exponents.max())
 
@@ -83,11 +83,11 @@ class Contact:
         L is the side along x. On a square grid the waves along x are all of them.
         """
         grid = self.grid
-        m, k = np.arange(1.0, self.line.size), self.line[1:]
+        m, k = np.arange(1.0, self.k_along_x.size), self.k_along_x[1:]
         is_square = grid.points == grid.points_y and grid.length == grid.length_y
         if grid.dimension == 1 or is_square:
             return m, k
-        column = grid.column(self.stiffness)
+        column = grid.along_y(self.stiffness)
         m = np.concatenate([m, np.arange(1, column.size) * (grid.length / grid.length_y)])
         order = np.argsort(m, kind="stable")
         return m[order], np.concatenate([k, column[1:]])[order]

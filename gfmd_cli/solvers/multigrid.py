@@ -83,9 +83,9 @@ def _levels(contact: Contact) -> list[Level]:
     finer = grid.size
     for shape, rows in level_rows(grid):
         dy, dx = (side / points for side, points in zip(grid.sides, shape, strict=True))
-        line = contact.line if dx <= dy else grid.column(contact.stiffness)
+        k_along = contact.k_along_x if dx <= dy else grid.along_y(contact.stiffness)
         points = shape[1] if dx <= dy else shape[0]
-        k, k_twice = np.interp([points / 4, points / 2], np.arange(line.size), line).tolist()
+        k, k_twice = np.interp([points / 4, points / 2], np.arange(k_along.size), k_along).tolist()
         growth = k_twice / k if k > 0 else inf
         operator = _operator(dy, dx, growth, 4 * prod(shape) / finer)
         quarter = 4.0 if operator.is_squared else 2.0  # eigenvalue at a period of four points
