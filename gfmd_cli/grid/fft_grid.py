@@ -117,6 +117,11 @@ class Grid:
         """Sum over the grid of the products of two fields."""
         return self.total(float(np.vdot(one, other)))
 
+    def mean(self, values: Field) -> float:
+        """Mean of a field, or of some of its values, over the grid; zero without any."""
+        total, count = self.total(np.array([values.sum(), values.size]))
+        return float(total / count) if count else 0.0
+
     @property
     def own(self) -> slice:
         """The rows of the grid that a field of this process holds; all points of a line."""

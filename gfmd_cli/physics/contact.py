@@ -16,9 +16,9 @@ import numpy as np
 
 from gfmd_cli.errors import InputError
 from gfmd_cli.grid.arrays import Field, Mask, Modes, row_blocks
-from gfmd_cli.grid.compilation import kernel
 from gfmd_cli.grid.fft_grid import ALL_ROWS, Grid, Shape, multiplicity
 from gfmd_cli.grid.ranks import Ranks
+from gfmd_cli.physics import kernels
 from gfmd_cli.physics.elastomers import LinearElastomer
 from gfmd_cli.physics.indenters import RigidSurface
 from gfmd_cli.physics.persson import Shells, shells
@@ -180,7 +180,7 @@ class Contact:
         Zero exactly at the solution. All solvers stop by this residual.
         """
         fields = map(self.grid.as_rows, (self.obstacle, u, sigma))
-        (total,) = self.grid.rows.sums(1, _squared_violations, *fields)
+        (total,) = self.grid.rows.sums(1, kernels.squared_violations, *fields)
         return self.as_residual(total)
 
     def as_residual(self, violation: float) -> float:
@@ -210,17 +210,6 @@ class Contact:
         if self.may_touch is None:
             return None
         return self.grid.average(self.may_touch.astype(np.float64), grid) > 0
-
-
-@kernel
-def _squared_violations(h, u, sigma, out, a, b):  # type: ignore[no-untyped-def]
-    """Sums of the squares of min(g, sigma), by rows."""
-    for i in range(a, b):
-        violation = 0.0
-        for j in range(h.shape[1]):
-            worst = min(u[i, j] - h[i, j], sigma[i, j])
-            violation += worst * worst
-        out[i, 0] = violation
 
 
 @dataclass(frozen=True)
