@@ -9,7 +9,6 @@ import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from html import escape
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -20,6 +19,7 @@ import tabulate
 from gfmd_cli.analysis.compare import Comparison
 from gfmd_cli.analysis.compare import compare as compare_study
 from gfmd_cli.analysis.export import as_dataset
+from gfmd_cli.analysis.table import Group, Table, TableColumn
 from gfmd_cli.errors import InputError
 from gfmd_cli.grid.arrays import Field, Mask
 from gfmd_cli.grid.blas import one_blas_thread
@@ -132,9 +132,9 @@ class Result:
 
     def _repr_html_(self) -> str:
         """The summary as HTML, for notebooks."""
-        items = self.summary().items()
-        rows = (f"<tr><th>{escape(k)}</th><td>{escape(v)}</td></tr>" for k, v in items)
-        return f"<table>{''.join(rows)}</table>"
+        columns = [TableColumn("", key) for key in ("name", "value")]
+        records = [{"name": name, "value": value} for name, value in self.summary().items()]
+        return Table("", columns, [Group("", records)]).as_html()
 
 
 def solve(spec: Path | str | Tables, *, heights: Any = None, threads: int = 1) -> Result:

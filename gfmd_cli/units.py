@@ -1,4 +1,4 @@
-"""Numbers as people read them: with the prefixes of SI units, and times."""
+"""Numbers as people read them: with the prefixes of SI units, times, and counts."""
 
 import math
 
@@ -32,3 +32,8 @@ def duration(seconds: float) -> str:
         ((unit, size) for unit, size in DURATIONS if seconds >= 2 * size), DURATIONS[-1]
     )
     return f"{seconds / size:.0f} {unit}"
+
+
+def left_out(count: int, limit: int, what: str = "") -> list[str]:
+    """A line on how many things a list of at most `limit` leaves out, if any."""
+    return [f"and {count - limit} more {what}".rstrip()] if count > limit else []

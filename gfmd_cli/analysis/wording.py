@@ -95,6 +95,6 @@ def count(number: int, what: str) -> str:
     return f"1 {what}" if number == 1 else f"{number} {what}s"
 
 
-def listed(words: list[str]) -> str:
+def enumeration(words: list[str]) -> str:
     """Words as a sentence lists them."""
     return words[0] if len(words) == 1 else ", ".join(words[:-1]) + " and " + words[-1]

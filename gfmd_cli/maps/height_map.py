@@ -20,6 +20,7 @@ from gfmd_cli.maps.array_coordinates import (
     is_transposed,
     stated_unit,
 )
+from gfmd_cli.units import left_out
 
 MAX_BYTES = 2**33  # 32768 x 32768 heights in double precision
 MAX_HEIGHT = 1e30  # in any unit; the usual values for no data are 9.97e36 (netCDF) and 3.4e38
@@ -203,8 +204,7 @@ def only_map(path: Path, names: Sequence[str]) -> str:
 
 def listed(names: Sequence[str]) -> str:
     """Some names for a message."""
-    more = f" and {len(names) - MAX_LISTED} more" if len(names) > MAX_LISTED else ""
-    return ", ".join(names[:MAX_LISTED]) + more or "none"
+    return ", ".join([*names[:MAX_LISTED], *left_out(len(names), MAX_LISTED)]) or "none"
 
 
 def _maps(datasets: dict[str, Any]) -> list[str]:

@@ -4,14 +4,15 @@ import math
 from collections import Counter
 from typing import NamedTuple
 
-from gfmd_cli.analysis.compare import Row, best, in_continuum
+from gfmd_cli.analysis.compare import best, in_continuum
 from gfmd_cli.analysis.run_summary import edge_warnings
 from gfmd_cli.analysis.table import known
 from gfmd_cli.analysis.tables import warnings_in
-from gfmd_cli.analysis.wording import count, grid_size, listed, pretty, quantity, span
+from gfmd_cli.analysis.wording import count, enumeration, grid_size, pretty, quantity, span
 from gfmd_cli.physics.error_estimates import Verdict
 from gfmd_cli.physics.observables import QUANTITIES
 from gfmd_cli.report.data import ReportData
+from gfmd_cli.study.column import Row
 from gfmd_cli.units import duration
 
 NEARLY_FULL = 0.5  # p*; above, the gap falls by decades, and a ratio of gaps tells little
@@ -47,7 +48,7 @@ def headline(data: ReportData) -> str:
 def _names_of(names: list[str], what: str) -> str:
     if len(names) == 1:
         return f"{what} {names[0]}"
-    return count(len(names), what) + (f" ({listed(names)})" if len(names) <= MAX_NAMES else "")
+    return count(len(names), what) + (f" ({enumeration(names)})" if len(names) <= MAX_NAMES else "")
 
 
 def success(data: ReportData) -> str:

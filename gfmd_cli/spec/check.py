@@ -30,6 +30,7 @@ from gfmd_cli.spec.models import (
     StudyTable,
     SweepTable,
 )
+from gfmd_cli.units import left_out
 
 MAX_SHOWN = 200  # characters of what was given, in a message
 MAX_PROBLEMS = 20  # of a spec that a message lists
@@ -110,7 +111,7 @@ class Check:
         """Raise InputError with all that is wrong, if anything is."""
         if self.problems:
             lines = list(dict.fromkeys(self.problems))
-            more = [f"and {len(lines) - MAX_PROBLEMS} more"] if len(lines) > MAX_PROBLEMS else []
+            more = left_out(len(lines), MAX_PROBLEMS)
             raise InputError("\n".join([*lines[:MAX_PROBLEMS], *more]))
 
     def spec(self, data: dict[str, Any]) -> Spec:
@@ -294,6 +295,6 @@ def _unknown(given: str, known: Iterable[str], what: str) -> str:
     return f"unknown {what} {shortened(given)!r}{hint} (known: {', '.join(known)})"
 
 
-def shortened(text: str) -> str:
+def shortened(text: str, limit: int = MAX_SHOWN) -> str:
     """A text short enough for a message."""
-    return text if len(text) <= MAX_SHOWN else text[:MAX_SHOWN] + "..."
+    return text if len(text) <= limit else text[:limit] + "..."
