@@ -24,6 +24,7 @@ from gfmd_cli.errors import InputError
 from gfmd_cli.grid.arrays import Field, Mask
 from gfmd_cli.grid.blas import one_blas_thread
 from gfmd_cli.maps.given_heights import write_heights
+from gfmd_cli.physics.error_estimates import Verdict
 from gfmd_cli.physics.file_surface import FileSurface, forget_files
 from gfmd_cli.physics.indenters import SMALLEST_GRID
 from gfmd_cli.physics.observables import contact_pressure
@@ -118,7 +119,7 @@ class Result:
             "scales": f"h_std = {self.h_std:.4g} m, Delta_sigma = {self.delta_sigma:.4g} Pa",
         }
         for name, symbol in {"contact area": "a_r", "mean gap": "u_g"}.items():
-            if self.columns.get(f"{symbol}_verdict") == "regular":
+            if self.columns.get(f"{symbol}_verdict") == Verdict.REGULAR:
                 value, error = (self.columns[f"{symbol}_continuum{end}"] for end in ("", "_error"))
                 numbers[f"{name} in the continuum"] = f"{symbol} = {value:.5g} +- {error:.1g}"
         return numbers | ({"warnings": "; ".join(self.warnings)} if self.warnings else {})

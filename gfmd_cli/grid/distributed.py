@@ -95,7 +95,7 @@ class DistributedGrid(Grid):
         """Maximum over all processes."""
         return float(self.ranks.gather(value).max())
 
-    def column(self, symbol: Field) -> Field:
+    def along_y(self, symbol: Field) -> Field:
         """The values of a symbol along y, which the first process holds."""
         counts = [self.points_y // 2 + 1, *[0] * (self.ranks.size - 1)]
         return self._gathered(symbol[: counts[self.ranks.rank], 0], counts)

@@ -16,7 +16,6 @@ import numpy as np
 from pydantic import Field as Key
 from pydantic import model_validator
 
-from gfmd_cli.choice import Choice, FilePath, Positive
 from gfmd_cli.errors import InputError
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.grid.fft_grid import ALL_ROWS, Shape
@@ -24,6 +23,7 @@ from gfmd_cli.maps.interpolation import monotone_cubic
 from gfmd_cli.physics.compliance_transforms import Compliance, separated
 from gfmd_cli.physics.free_compliance import Spacings, power_law
 from gfmd_cli.physics.persson import gamma_n, gamma_slab
+from gfmd_cli.spec_table import FilePath, Positive, SpecTable
 
 LONG_WAVE = 1e-6  # q t up to which k of a layer is constant: (q t)^2 is below rounding
 DECAYED = 25.0  # thicknesses from which the displacement of a layer is below rounding
@@ -34,7 +34,7 @@ MAX_TABLE = 2**20  # bytes of a tabulated stiffness; a choice, some 40000 rows
 STEP = 1e-3  # of ln q: the truncation error is of order 1e-7, the rounding error 1e-13
 
 
-class LinearElastomer(Choice):
+class LinearElastomer(SpecTable):
     """Interface of all elastomers.
 
     A subclass implements `stiffness`, and overrides the defaults that do not hold for it.

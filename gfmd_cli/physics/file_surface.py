@@ -6,7 +6,6 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 import numpy as np
 from pydantic import Field as Key
 
-from gfmd_cli.choice import FilePath, Positive
 from gfmd_cli.errors import InputError
 from gfmd_cli.grid.arrays import Field, Mask, MaskedField
 from gfmd_cli.grid.fft_grid import Grid
@@ -32,6 +31,7 @@ from gfmd_cli.maps.map_preparation import (
 from gfmd_cli.maps.pictures import Picture, picture
 from gfmd_cli.maps.topography import Region, Topography, read_topography
 from gfmd_cli.physics.indenters import SMALLEST_GRID, RigidSurface
+from gfmd_cli.spec_table import FilePath, Positive
 
 
 class FileSurface(RigidSurface):

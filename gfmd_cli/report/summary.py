@@ -9,6 +9,7 @@ from gfmd_cli.analysis.run_summary import edge_warnings
 from gfmd_cli.analysis.table import known
 from gfmd_cli.analysis.tables import warnings_in
 from gfmd_cli.analysis.wording import count, enumeration, grid_size, pretty, quantity, span
+from gfmd_cli.physics.error_estimates import Verdict
 from gfmd_cli.physics.observables import QUANTITIES
 from gfmd_cli.report.data import ReportData
 from gfmd_cli.study.column import Row
@@ -17,12 +18,7 @@ from gfmd_cli.units import duration
 NEARLY_FULL = 0.5  # p*; above, the gap falls by decades, and a ratio of gaps tells little
 SECONDS = 120  # below, a time is given with three digits
 MAX_NAMES = 3  # elastomers and surfaces that the headline names
-UNRESOLVED = {
-    "slow": "converges too slowly with the grid for a value in the continuum",
-    "diverges": "has no value in the continuum",
-    "unknown": "has no error bar: the grids are too coarse for one",
-}
-"""Verdicts on a quantity that leave it without an error bar."""
+UNRESOLVED = [verdict for verdict in Verdict if not verdict.has_error]
 
 
 class KeyNumber(NamedTuple):
@@ -186,6 +182,6 @@ def _unresolved(data: ReportData) -> list[str]:
     )
     total = len(data.solved)
     return [
-        f"{name} {UNRESOLVED[text]} ({number} of {total} contacts)"
+        f"{name} {Verdict(text).explanation} ({number} of {total} contacts)"
         for (name, text), number in counts.items()
     ]

@@ -112,11 +112,11 @@ class PeriodicOperators(TileOperators):
     """The operators of a periodic cell."""
 
     def __init__(self, contact: Contact) -> None:
-        grid, line, alpha = contact.grid, contact.line, _alpha(contact.grid)
-        order = 0.5 * float(np.log2(line[2] / line[1]))  # a
+        grid, k_along_x, alpha = contact.grid, contact.k_along_x, _alpha(contact.grid)
+        order = 0.5 * float(np.log2(k_along_x[2] / k_along_x[1]))  # a
         k, q = _stiffness_of_small_cell(contact)
         stiffness = _near_values(k)
-        q[0, 0], k[0, 0] = 2 * np.pi / grid.length, line[1]  # P / k is constant at small q
+        q[0, 0], k[0, 0] = 2 * np.pi / grid.length, k_along_x[1]  # P / k is constant at small q
         short_ranged = _near_values(gammainc(order, (q / (2 * alpha)) ** 2) / k)
         shape = tuple(points // COARSENING for points in grid.shape)
         super().__init__(grid, short_ranged, stiffness, shape)

@@ -5,13 +5,13 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from gfmd_cli.choice import Choice
 from gfmd_cli.errors import InputError
 from gfmd_cli.files.hdf5 import MAGIC
 from gfmd_cli.files.regular import open_regular
 from gfmd_cli.physics.file_surface import FileSurface
 from gfmd_cli.spec.check import Check, shortened
 from gfmd_cli.spec.models import LOADS, Spec
+from gfmd_cli.spec_table import SpecTable
 
 MAX_BYTES = 256 * 1024  # of a spec; a few kB are usual
 MAX_DEPTH = 16  # of tables and lists
@@ -73,7 +73,7 @@ def read_scan(path: Path, overrides: tuple[str, ...]) -> FileSurface:
 
 def _choices(
     name: str, data: dict[str, Any], path: Path, overrides: tuple[str, ...]
-) -> list[Choice]:
+) -> list[SpecTable]:
     """The choices of one table, with overrides applied to `data`. Raises InputError."""
     for override in overrides:
         set_override(data, override)

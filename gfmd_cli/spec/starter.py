@@ -11,13 +11,13 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from gfmd_cli.choice import Choice
 from gfmd_cli.errors import InputError
 from gfmd_cli.physics.contact import build_scene
 from gfmd_cli.physics.file_surface import FileSurface
 from gfmd_cli.spec.check import kinds_of
 from gfmd_cli.spec.models import with_boundary
 from gfmd_cli.spec.parse import read_text, set_override, split_override
+from gfmd_cli.spec_table import SpecTable
 
 E_STAR = 2e9  # Pa, a stiff polymer
 COMMENT = "as given on the command line"
@@ -130,7 +130,7 @@ def with_keys(text: str, overrides: tuple[str, ...]) -> str:
 
 
 def _with_values(
-    section: str, values: dict[str, Any], given: set[str], kinds: dict[str, type[Choice]]
+    section: str, values: dict[str, Any], given: set[str], kinds: dict[str, type[SpecTable]]
 ) -> str:
     """The lines of a table with its values, those of the given keys in the place of others."""
     new = {key: _line(key, _as_toml(values[key]), COMMENT) for key in values if key in given}

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from gfmd_cli.choice import Choice
 from gfmd_cli.errors import InputError
 from gfmd_cli.files.checksums import digest
 from gfmd_cli.physics.elastomers import LinearElastomer
@@ -23,6 +22,7 @@ from gfmd_cli.spec.models import (
     load_text,
     with_boundary,
 )
+from gfmd_cli.spec_table import SpecTable
 from gfmd_cli.study import forecast
 
 LOAD_DIGITS = 14  # of a load that name its task: the last bit of a ladder depends on the machine
@@ -247,7 +247,7 @@ def _task_id(spec: Spec, resolved: dict[str, Any], tables: dict[str, Any], load:
     return digest(content)
 
 
-def _swept_keys(alternatives: list[Choice]) -> set[str]:
+def _swept_keys(alternatives: list[SpecTable]) -> set[str]:
     """The keys whose values differ between the alternatives of a table."""
     values: dict[str, set[Any]] = {}
     for choice in alternatives:
@@ -257,7 +257,7 @@ def _swept_keys(alternatives: list[Choice]) -> set[str]:
 
 
 def _swept_words(
-    chosen: dict[str, Choice], swept_keys: dict[str, set[str]]
+    chosen: dict[str, SpecTable], swept_keys: dict[str, set[str]]
 ) -> tuple[tuple[str, str], ...]:
     """The swept keys of surface, grid and solver, as words; the label has the others already."""
     words: list[tuple[str, str]] = []
