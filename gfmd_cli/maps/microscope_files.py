@@ -147,7 +147,8 @@ def _read_channel(path: Path, file: BinaryIO, reader: Any, dataset: str | None) 
         source += ", interpolated at equal distances"
     has_unit = scan.unit is not None
     metric_sides = None if has_unit or unsized else _sides_with_unit(channel, sides)
-    factors = _factors(path, file, len(shape) + 1) if reader.format() == "xyz" else []
+    is_bare = reader.format() == "xyz" and not has_unit and metric_sides is None
+    factors = _factors(path, file, len(shape) + 1) if is_bare else []
     if factors:
         *along_axes, of_heights = factors
         has_unit, heights = True, of_heights * heights
