@@ -14,7 +14,7 @@ from gfmd_cli.status import Status
 from gfmd_cli.study.reading import solved_rows
 from gfmd_cli.study.result import Outcome
 from gfmd_cli.study.tasks import Task
-from gfmd_cli.units import left_out
+from gfmd_cli.units import count, left_out
 
 MAX_ROWS = 40
 MAX_EDGE_SHARE = 0.05  # of contact or load in the tapered zone, without a warning; a choice
@@ -72,7 +72,7 @@ def run_text(rows: list[dict[str, Any]]) -> str:
     records = map(with_best, listed)
     table = Table("", shown(RUN, listed), groups_of(zip(titles, records, strict=True)))
     warnings = [f"warning: {line}" for line in warnings_in(solved)]
-    blocks = [table.as_text(), *left_out(len(solved), MAX_ROWS, "contacts"), "\n".join(warnings)]
+    blocks = [table.as_text(), *left_out(len(solved), MAX_ROWS, "contact"), "\n".join(warnings)]
     return "\n\n".join(filter(None, blocks))
 
 
@@ -92,12 +92,12 @@ def other_tasks(rows: list[dict[str, Any]]) -> list[str]:
     scenes = grouped(rows, _scene)
     if not scenes:
         return []
-    lines = [f"{len(rows)} more contacts stay in the study; they do not belong to this spec:"]
+    lines = [f"{count(len(rows), 'more contact')} of the study, not of this spec:"]
     for scene, group in list(scenes.items())[:MAX_SCENES]:
         loads = sorted({row["p_star"] for row in group})
         ends = " to ".join(f"{load:.4g}" for load in dict.fromkeys([loads[0], loads[-1]]))
         lines.append(f"  {len(group)} with {scene}, p* = {ends}")
-    return [*lines, *(f"  {line}" for line in left_out(len(scenes), MAX_SCENES, "scenes"))]
+    return [*lines, *(f"  {line}" for line in left_out(len(scenes), MAX_SCENES, "scene"))]
 
 
 def _scene(row: Record) -> str:
@@ -118,4 +118,4 @@ def unconverged(rows: list[dict[str, Any]], errors: Mapping[int, str]) -> list[s
         if status != Status.MISSING:
             name += f" ({row['elastomer']}, p* = {row['p_star']:.4g}): {status}"
         lines.append(f"{name}: {errors.get(row['task']) or status.explain(row)}")
-    return [*lines[:MAX_ROWS], *left_out(len(lines), MAX_ROWS, "tasks")]
+    return [*lines[:MAX_ROWS], *left_out(len(lines), MAX_ROWS, "task")]

@@ -90,11 +90,6 @@ def grid_size(rows: Sequence[Mapping[str, Any]]) -> str:
     return f"{free}{size} points{' a side' if is_square else ''}"
 
 
-def count(number: int, what: str) -> str:
-    """A number of things, in the singular or the plural."""
-    return f"1 {what}" if number == 1 else f"{number} {what}s"
-
-
 def enumeration(words: list[str]) -> str:
     """Words as a sentence lists them."""
     return words[0] if len(words) == 1 else ", ".join(words[:-1]) + " and " + words[-1]

@@ -14,6 +14,7 @@ from gfmd_cli.cli.options import FILE, counted, output_option, overrides_option,
 from gfmd_cli.cli.progress import Reporter
 from gfmd_cli.errors import InputError
 from gfmd_cli.status import Status
+from gfmd_cli.units import count
 
 if TYPE_CHECKING:
     from gfmd_cli.spec.models import Spec
@@ -186,7 +187,8 @@ def _print_tasks(spec: "Spec", path: Path, options: "RunOptions") -> None:
     if tasks:
         print_text(f"{task_text(tasks, outcomes, {task.id for task in missing})}\n")
     print_text(
-        f"{len(tasks)} tasks, {len(missing)} to do, about {sum(t.seconds for t in missing):.3g} s "
-        f"of one core, at most {max((t.bytes for t in tasks), default=0) / 2**20:.0f} MiB a task; "
+        f"{count(len(tasks), 'task')}, {len(missing)} to do, "
+        f"about {sum(t.seconds for t in missing):.3g} s of one core, "
+        f"at most {max((t.bytes for t in tasks), default=0) / 2**20:.0f} MiB a task; "
         f"study {path}"
     )

@@ -8,12 +8,12 @@ from gfmd_cli.analysis.compare import best, in_continuum
 from gfmd_cli.analysis.run_summary import edge_warnings
 from gfmd_cli.analysis.table import known
 from gfmd_cli.analysis.tables import warnings_in
-from gfmd_cli.analysis.wording import count, enumeration, grid_size, pretty, quantity, span
+from gfmd_cli.analysis.wording import enumeration, grid_size, pretty, quantity, span
 from gfmd_cli.physics.error_estimates import Verdict
 from gfmd_cli.physics.observables import QUANTITIES
 from gfmd_cli.report.data import ReportData
 from gfmd_cli.study.column import Row
-from gfmd_cli.units import duration
+from gfmd_cli.units import count, duration
 
 NEARLY_FULL = 0.5  # p*; above, the gap falls by decades, and a ratio of gaps tells little
 SECONDS = 120  # below, a time is given with three digits
