@@ -31,8 +31,8 @@ class SurfaceSummary:
 
     surface: RigidSurface
     scene: Scene
-    """The surface on its smallest grid, mirrored if it has borders, under a half-space of unit
-    modulus."""
+    """The surface on its own points or those of a spec, mirrored if it has borders, under a
+    half-space of unit modulus."""
     parameters: dict[str, float | None]
     """Of the measured part of a map, levelled, before its edges are treated; else of the cell."""
     moments: Moments
@@ -68,11 +68,16 @@ class SurfaceSummary:
         return {key: plain(value) for key, value in record.items()}
 
 
-def summarise(surface: RigidSurface) -> SurfaceSummary:
-    """The summary of a surface. Raises InputError for an unfit surface."""
-    finer = 1 if surface.is_map else 2  # modes at the Nyquist wavenumber are counted twice
+def summarise(surface: RigidSurface, points: int = 0) -> SurfaceSummary:
+    """The summary of a surface, unless it is a map on `points` points along x or more.
+
+    Raises InputError for an unfit surface.
+    """
     repeated = surface.within("periodic")
-    scene = build_scene(repeated, HalfSpace(), finer * repeated.smallest_grid())
+    smallest = repeated.smallest_grid()
+    # modes at the Nyquist wavenumber are counted twice
+    points = smallest if surface.is_map else max(points, 2 * smallest)
+    scene = build_scene(repeated, HalfSpace(), points)
     measured = surface.measured_map()
     if measured is None:
         heights = np.ma.asarray(scene.in_metres(scene.height))

@@ -68,17 +68,18 @@ def surface(
         gfmd surface worn.npy new.npy --set surface.scale=1e-9 --set surface.periodic=false
     """
     from gfmd_cli.analysis.surface_summary import summarise, summary_table, summary_text
-    from gfmd_cli.physics.indenters import RigidSurface
     from gfmd_cli.spec.parse import read_scan, read_spec
 
-    surfaces: list[tuple[str, RigidSurface]] = []
+    names, summaries = [], []
     for path in paths:
         if path.suffix == ".toml":
-            surfaces += [(each.label, each) for each in read_spec(path, overrides)[0].surface]
+            spec = read_spec(path, overrides)[0]
+            points = max(0 if grid.points == "auto" else grid.points for grid in spec.grid)
+            names += [each.label for each in spec.surface]
+            summaries += [summarise(each, points) for each in spec.surface]
         else:
-            surfaces.append((path.name, read_scan(path, overrides)))
-    names = [name for name, _ in surfaces]
-    summaries = [summarise(each) for _, each in surfaces]
+            names.append(path.name)
+            summaries.append(summarise(read_scan(path, overrides)))
     if as_json:
         click.echo(json.dumps([summary.record() for summary in summaries], indent=1))
     elif len(summaries) == 1:

@@ -97,7 +97,8 @@ def read_hdf5(path: Path, dataset: str | None) -> HeightMap:
         shape = _map_shape(file[name].shape or ())
         check_layout(path, shape, file[name].dtype)
         data = take(file, name, MAX_COMPRESSION)
-        packed = {"scale_factor", "add_offset"} & set(data.attrs)
+        neutral = {"scale_factor": 1, "add_offset": 0}
+        packed = {key for key in neutral.keys() & data.attrs if data.attrs[key] != neutral[key]}
         if packed:
             raise InputError(
                 f"{path}: dataset {name!r} is packed ({', '.join(sorted(packed))}); "

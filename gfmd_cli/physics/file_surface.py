@@ -290,7 +290,7 @@ class FileSurface(RigidSurface):
             warnings.append(map_warnings.other_side(self.length, stated[-1]))
         if self.length is None:
             side = self._known_length() or 1.0
-            warnings.append(map_warnings.scaled_side(topography, self.scale, side))
+            warnings.append(map_warnings.unknown_unit(topography, self.scale, side))
         warnings.append(map_warnings.unit_of_heights(topography, self.scale))
         if "taper" in self.model_fields_set and self.edges != "window":
             warnings.append('surface.taper has no effect without surface.edges = "window"')

@@ -8,7 +8,6 @@ from typing import Any
 from gfmd_cli.errors import InputError
 from gfmd_cli.files.hdf5 import MAGIC
 from gfmd_cli.files.regular import open_regular
-from gfmd_cli.physics.elastomers import LinearElastomer
 from gfmd_cli.physics.file_surface import FileSurface
 from gfmd_cli.spec.check import Check, shortened
 from gfmd_cli.spec.models import LOADS, Spec
@@ -70,18 +69,6 @@ def read_scan(path: Path, overrides: tuple[str, ...]) -> FileSurface:
     if not isinstance(surface, FileSurface):
         raise InputError(f'{path}: surface.kind must be "file" for a height map')
     return surface.model_copy(update={"path": path})  # the path as given, for messages
-
-
-def read_elastomer(default: dict[str, Any], overrides: tuple[str, ...]) -> LinearElastomer:
-    """The elastomer of a spec that `gfmd init` writes, with overrides "elastomer.key=value".
-
-    A given kind replaces the default; of several kinds the first is taken. Raises InputError.
-    """
-    other = any(override.partition("=")[0].strip() == "elastomer.kind" for override in overrides)
-    data: dict[str, Any] = {"elastomer": {} if other else dict(default)}
-    elastomer = _choices("elastomer", data, Path("spec"), overrides)[0]
-    assert isinstance(elastomer, LinearElastomer)
-    return elastomer
 
 
 def _choices(
