@@ -20,13 +20,7 @@ from gfmd_cli.grid.fft_grid import Grid, Shape
 from gfmd_cli.grid.halo import HALO_ROWS, DistributedColumns, DistributedRows, is_distributable
 from gfmd_cli.grid.ranks import Ranks, leads
 from gfmd_cli.grid.rows import LocalRows
-from gfmd_cli.grid.shared_transforms import (
-    Execute,
-    Pairs,
-    along_columns,
-    along_rows,
-    side_by_side,
-)
+from gfmd_cli.grid.shared_transforms import Execute, Pairs, along_columns, along_rows, side_by_side
 from gfmd_cli.grid.transposition import Span, Transposition, column_spans
 
 

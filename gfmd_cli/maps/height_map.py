@@ -14,12 +14,7 @@ import numpy as np
 
 from gfmd_cli.errors import InputError
 from gfmd_cli.files.checksums import MAX_COMPRESSION
-from gfmd_cli.maps.array_coordinates import (
-    axes_of,
-    factor,
-    is_transposed,
-    stated_unit,
-)
+from gfmd_cli.maps.array_coordinates import axes_of, factor, is_transposed, stated_unit
 from gfmd_cli.units import left_out
 
 MAX_BYTES = 2**33  # 32768 x 32768 heights in double precision

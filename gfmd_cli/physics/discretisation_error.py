@@ -318,7 +318,7 @@ def _stress(
     if n > MAX_STRESS_EXPONENT:
         return replace(UNKNOWN, verdict=Verdict.DIVERGES if n >= 3 else Verdict.SLOW)
     if rough is None:
-        return _single_stress(fine, coarse, n, tip)
+        return _single_stress(fine, coarse, n, tip) if coarse else UNKNOWN
     value, patch = fine.sigma_p, fine.switches_per_point / fine.a_r
     phase = rough.phase(fine.points)
     typical = exp(-7.08 + 2.18 * max(n, MIN_EXPONENT)) * patch**1.5 * phase**1.25 * value
@@ -332,10 +332,8 @@ def _stress(
     return Estimate(error, max(0.0, value + rest), EXTRAPOLATED * error, Verdict.REGULAR)
 
 
-def _single_stress(fine: GridValues, coarse: GridValues | None, n: float, tip: Tip) -> Estimate:
+def _single_stress(fine: GridValues, coarse: GridValues, n: float, tip: Tip) -> Estimate:
     """Stress deviation of a single indenter, or of a line contact."""
-    if coarse is None:
-        return UNKNOWN
     value, patch = fine.sigma_p, fine.switches_per_point / fine.a_r
     if patch > MAX_LINE:
         return replace(UNKNOWN, is_too_coarse=True)
@@ -350,7 +348,7 @@ def _gap(
 ) -> Estimate:
     """Mean gap: the error is small and of either sign, so the value is not extrapolated."""
     if rough is None:
-        return _single_gap(fine, coarse, tip)
+        return _single_gap(fine, coarse, tip) if coarse else UNKNOWN
     value, patch = fine.u_g, fine.switches_per_point / fine.a_r
     phase, bend = rough.phase(fine.points), rough.curvature / fine.points**2
     typical = (
@@ -360,10 +358,8 @@ def _gap(
     return _on_grid(value, _bar("u_g", typical, change))
 
 
-def _single_gap(fine: GridValues, coarse: GridValues | None, tip: Tip) -> Estimate:
+def _single_gap(fine: GridValues, coarse: GridValues, tip: Tip) -> Estimate:
     """Mean gap of a single indenter, or of a line contact."""
-    if coarse is None:
-        return UNKNOWN
     value, change = fine.u_g, abs(fine.u_g - coarse.u_g)
     across = value / (fine.points * (1 - fine.a_r)) ** 2  # points across the gap, in one line
     smooth = max(SINGLE_CONTACT * change / 3, SINGLE_CONTACT_GAP * across)

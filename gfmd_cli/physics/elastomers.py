@@ -387,7 +387,7 @@ class Tabulated(LinearElastomer):
         """The columns q and k, shape (rows, 2). Raises InputError for an invalid table."""
         try:
             if not self.path.is_file() or self.path.stat().st_size > MAX_TABLE:
-                raise ValueError(f"no regular file of at most {MAX_TABLE} bytes")
+                raise ValueError(f"not a regular file of at most {MAX_TABLE} bytes")
             with warnings.catch_warnings(action="ignore", category=UserWarning):
                 table = np.loadtxt(self.path, ndmin=2)  # warns of an empty file, refused below
         except (OSError, ValueError) as error:
@@ -440,8 +440,7 @@ def _compliance_of_table(rows: tuple[tuple[float, ...], ...]) -> Compliance:
 
 
 Elastomer = Annotated[
-    Power | HalfSpace | Membrane | Plate | Slab | Layer | Tabulated,
-    Key(discriminator="kind"),
+    Power | HalfSpace | Membrane | Plate | Slab | Layer | Tabulated, Key(discriminator="kind")
 ]
 
 

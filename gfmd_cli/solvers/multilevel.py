@@ -13,7 +13,7 @@ from gfmd_cli.grid.arrays import Field, Mask
 from gfmd_cli.grid.fft_grid import Grid, multiplicity
 from gfmd_cli.grid.rows import LocalRows
 from gfmd_cli.physics.contact import Contact
-from gfmd_cli.solvers import multilevel_kernels as kernels
+from gfmd_cli.solvers import preconditioner_kernels as kernels
 from gfmd_cli.solvers.contact_state import ContactState
 from gfmd_cli.solvers.multigrid import level_count
 

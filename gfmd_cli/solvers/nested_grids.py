@@ -50,10 +50,7 @@ class Resume:
 
 
 def solve_contact(
-    contact: Contact,
-    solver: Solver,
-    watch: Watch = ignore,
-    start: Resume | Start | None = None,
+    contact: Contact, solver: Solver, watch: Watch = ignore, start: Resume | Start | None = None
 ) -> Solution:
     """Solve one contact, nested over grids.
 
@@ -167,11 +164,7 @@ def _grids(contact: Contact, solver: Solver, start: Resume | Start | None) -> li
 
 
 def _begin(
-    solver: Solver,
-    fine: Contact,
-    coarse: Contact | None,
-    state: State | None,
-    start: Start | None,
+    solver: Solver, fine: Contact, coarse: Contact | None, state: State | None, start: Start | None
 ) -> State:
     """The first state: from a start, a coarser grid, or u flat on the highest point."""
     if start is not None:
