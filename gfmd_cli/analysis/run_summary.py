@@ -92,7 +92,7 @@ def other_tasks(rows: list[dict[str, Any]]) -> list[str]:
     scenes = grouped(rows, _scene)
     if not scenes:
         return []
-    lines = [f"{count(len(rows), 'more contact')} of the study, not of this spec:"]
+    lines = [f"the study also contains {count(len(rows), 'contact')} of other specs:"]
     for scene, group in list(scenes.items())[:MAX_SCENES]:
         loads = sorted({row["p_star"] for row in group})
         ends = " to ".join(f"{load:.4g}" for load in dict.fromkeys([loads[0], loads[-1]]))

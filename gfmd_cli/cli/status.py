@@ -110,7 +110,7 @@ def _lines(state: "StudyState", shards: int | None) -> list[str]:
     if state.records:
         lines.append(f"  {count(state.records, 'record')} not collected yet")
     if state.others:
-        lines.append(f"  {count(state.others, 'more task')} of the study, not of this spec")
+        lines.append(f"  the study also contains {count(state.others, 'task')} of other specs")
     lines += [f"  damaged, to be solved again: {name}" for name in state.damaged]
     for index in range(shards or 0):
         lines.append(f"  shard {index}/{shards}: {counted(state.shard(index, shards or 1))}")
