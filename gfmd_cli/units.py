@@ -1,4 +1,4 @@
-"""Numbers as people read them: with the prefixes of SI units, and times."""
+"""Numbers as people read them: with the prefixes of SI units, times, and counts."""
 
 import math
 
@@ -32,3 +32,8 @@ def duration(seconds: float) -> str:
         ((unit, size) for unit, size in DURATIONS if seconds >= 2 * size), DURATIONS[-1]
     )
     return f"{seconds / size:.0f} {unit}"
+
+
+def count(number: int, what: str) -> str:
+    """A number of things, in the singular or the plural."""
+    return f"1 {what}" if number == 1 else f"{number} {what}s"

@@ -226,7 +226,7 @@ def test_a_height_array_is_used_as_it_is(gfmd):
     np.save("h.npy", changed)
     again = gfmd("run", "spec.toml", *surface, "--set", "grid.points=32")
     assert again.exit_code == 0
-    assert "2 more contacts stay in the study" in again.output
+    assert "2 more contacts of the study" in again.output
     rows = list(csv.DictReader(io.StringIO(gfmd("export", "small.h5").output)))
     assert len({row["surface_sha256"] for row in rows}) == len({row["h_std"] for row in rows}) == 2
 

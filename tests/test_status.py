@@ -86,7 +86,7 @@ def test_records_and_saved_states_are_seen_before_they_are_collected(gfmd):
     assert saved["residual"] > 0
     lines = gfmd("status", "spec.toml").output
     assert "  task 2 power n=1 64 p*=0.1: state of step " in lines
-    assert "1 records are not collected yet" in lines
+    assert "1 record not collected yet" in lines
     assert everything() == before
 
 

@@ -2,7 +2,7 @@ import pytest
 
 from gfmd_cli.physics.elastomers import HalfSpace, Power
 from gfmd_cli.physics.self_affine import SelfAffine
-from gfmd_cli.units import duration, labelled
+from gfmd_cli.units import count, duration, labelled
 
 
 @pytest.mark.parametrize(
@@ -39,3 +39,7 @@ def test_parameters_that_differ_have_labels_that_differ():
 )
 def test_a_time_is_given_in_its_largest_unit(seconds, text):
     assert duration(seconds) == text
+
+
+def test_one_thing_is_in_the_singular():
+    assert [count(n, "task") for n in (0, 1, 2)] == ["0 tasks", "1 task", "2 tasks"]

@@ -11,6 +11,7 @@ from gfmd_cli.analysis.wording import contact_title, grid_size, shown
 from gfmd_cli.physics.observables import QUANTITIES
 from gfmd_cli.status import Status
 from gfmd_cli.study.reading import solved_rows
+from gfmd_cli.units import count
 
 MAX_ROWS = 40
 MAX_EDGE_SHARE = 0.05  # of contact or load in the tapered zone, without a warning; a choice
@@ -33,13 +34,13 @@ def run_text(rows: list[dict[str, Any]]) -> str:
     records = map(with_best, listed)
     table = Table("", shown(RUN, listed), groups_of(zip(titles, records, strict=True)))
     warnings = [f"warning: {line}" for line in warnings_in(solved)]
-    blocks = [table.as_text(), *_left_out(solved, MAX_ROWS, "contacts"), "\n".join(warnings)]
+    blocks = [table.as_text(), *_left_out(solved, MAX_ROWS, "contact"), "\n".join(warnings)]
     return "\n\n".join(filter(None, blocks))
 
 
 def _left_out(items: Sized, limit: int, what: str) -> list[str]:
     """A line on what is not listed, if anything is not."""
-    return [f"and {len(items) - limit} more {what}"] if len(items) > limit else []
+    return [f"and {count(len(items) - limit, f'more {what}')}"] if len(items) > limit else []
 
 
 def edge_warnings(rows: Sequence[Mapping[str, Any]]) -> list[str]:
@@ -58,12 +59,12 @@ def other_tasks(rows: list[dict[str, Any]]) -> list[str]:
     scenes = grouped(rows, _scene)
     if not scenes:
         return []
-    lines = [f"{len(rows)} more contacts stay in the study; they do not belong to this spec:"]
+    lines = [f"{count(len(rows), 'more contact')} of the study, not of this spec:"]
     for scene, group in list(scenes.items())[:MAX_SCENES]:
         loads = sorted({row["p_star"] for row in group})
         ends = " to ".join(f"{load:.4g}" for load in dict.fromkeys([loads[0], loads[-1]]))
         lines.append(f"  {len(group)} with {scene}, p* = {ends}")
-    return [*lines, *(f"  {line}" for line in _left_out(scenes, MAX_SCENES, "scenes"))]
+    return [*lines, *(f"  {line}" for line in _left_out(scenes, MAX_SCENES, "scene"))]
 
 
 def _scene(row: Record) -> str:
@@ -84,4 +85,4 @@ def unconverged(rows: list[dict[str, Any]], errors: Mapping[int, str]) -> list[s
         if status != Status.MISSING:
             name += f" ({row['elastomer']}, p* = {row['p_star']:.4g}): {status}"
         lines.append(f"{name}: {errors.get(row['task']) or status.explain(row)}")
-    return [*lines[:MAX_ROWS], *_left_out(lines, MAX_ROWS, "tasks")]
+    return [*lines[:MAX_ROWS], *_left_out(lines, MAX_ROWS, "task")]

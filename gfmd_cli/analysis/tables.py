@@ -30,6 +30,7 @@ from gfmd_cli.analysis.wording import contact_title, grid_size, in_si, shown
 from gfmd_cli.physics.observables import QUANTITIES
 from gfmd_cli.study.observables import OBSERVABLES, Observable
 from gfmd_cli.study.plausibility import SEPARATOR
+from gfmd_cli.units import count
 
 TitledCurves = list[tuple[str, Curve]]
 """Curves with the titles that tables give them."""
@@ -175,7 +176,7 @@ OPTIONAL_OBSERVABLES = (P_STAR, AREA, *(c for each in IN_TABLE for c in _columns
 def warnings_in(rows: Sequence[Record]) -> list[str]:
     """The warnings of some contacts, each once, with the number of contacts that have it."""
     counts = Counter(line for row in rows for line in row["warnings"].split(SEPARATOR) if line)
-    return [f"{line} ({n} of {len(rows)} contacts)" for line, n in counts.items()]
+    return [f"{line} ({n} of {count(len(rows), 'contact')})" for line, n in counts.items()]
 
 
 def study_tables(comparison: Comparison) -> list[Table]:

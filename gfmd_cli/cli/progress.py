@@ -7,7 +7,7 @@ from math import isfinite
 from typing import TYPE_CHECKING, Any
 
 from gfmd_cli.cli.messages import printable, tell
-from gfmd_cli.units import duration
+from gfmd_cli.units import count, duration
 
 if TYPE_CHECKING:
     from gfmd_cli.study.context import Progress, Report
@@ -97,6 +97,6 @@ def _left(progress: "Progress") -> str:
     """Number of tasks and time that are left."""
     if progress.tasks_left is None:
         return ""
-    text = f"{progress.tasks_left} tasks left"
+    text = f"{count(progress.tasks_left, 'task')} left"
     seconds = progress.seconds_left
     return f"{text}, about {duration(seconds)}" if isfinite(seconds) else text

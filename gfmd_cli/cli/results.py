@@ -39,7 +39,7 @@ def analyze(study: Path, as_json: bool, figures: Path | None, theory: "Theory") 
     from gfmd_cli.analysis.compare import compare
     from gfmd_cli.analysis.records import as_records
     from gfmd_cli.analysis.run_summary import edge_warnings
-    from gfmd_cli.analysis.wording import count
+    from gfmd_cli.units import count
 
     comparison = compare(study, theory)
     if as_json:

@@ -14,6 +14,7 @@ from gfmd_cli.cli.options import FILE, counted, output_option, overrides_option,
 from gfmd_cli.cli.progress import Reporter
 from gfmd_cli.errors import InputError
 from gfmd_cli.status import Status
+from gfmd_cli.units import count
 
 if TYPE_CHECKING:
     from gfmd_cli.spec.models import Spec
@@ -24,10 +25,10 @@ def _shard(context: click.Context, parameter: click.Parameter, text: str | None)
     """ "I/N" as two numbers, 0 <= I < N."""
     if text is None:
         return 0, 1
-    index, _, count = text.partition("/")
-    if not (index.isdecimal() and count.isdecimal() and int(index) < int(count)):
+    index, _, shards = text.partition("/")
+    if not (index.isdecimal() and shards.isdecimal() and int(index) < int(shards)):
         raise InputError(f"--shard {text}: write I/N with 0 <= I < N, such as 0/8")
-    return int(index), int(count)
+    return int(index), int(shards)
 
 
 @click.command()
@@ -197,7 +198,7 @@ def _print_tasks(spec: "Spec", path: Path, options: "RunOptions") -> None:
             f"{task.seconds:8.2g}  {scene}{done}"
         )
     show(
-        f"{len(tasks)} tasks, {len(missing)} to do, about {sum(t.seconds for t in missing):.3g} s "
-        f"of one core, at most {max((t.bytes for t in tasks), default=0) / 2**20:.0f} MiB a task; "
-        f"study {path}"
+        f"{count(len(tasks), 'task')}, {len(missing)} to do, "
+        f"about {sum(t.seconds for t in missing):.3g} s of one core, "
+        f"at most {max((t.bytes for t in tasks), default=0) / 2**20:.0f} MiB a task; study {path}"
     )

@@ -21,7 +21,7 @@ from gfmd_cli.cli.options import (
 )
 from gfmd_cli.errors import InputError
 from gfmd_cli.status import Status
-from gfmd_cli.units import duration
+from gfmd_cli.units import count, duration
 
 if TYPE_CHECKING:
     from gfmd_cli.study.checkpoint import Saved
@@ -98,7 +98,7 @@ def collect(spec: Path, output: Path | None, overrides: tuple[str, ...]) -> None
 
 def _lines(state: "StudyState", shards: int | None) -> list[str]:
     """The state of a study as lines of text."""
-    lines = [f"{state.study}: {len(state.tasks)} tasks: {counted(state.counts)}"]
+    lines = [f"{state.study}: {count(len(state.tasks), 'task')}: {counted(state.counts)}"]
     for task in state.tasks:
         if task.saved is not None:
             name = f"task {task.task} {task.label}".rstrip()
@@ -108,9 +108,9 @@ def _lines(state: "StudyState", shards: int | None) -> list[str]:
                 f"{task.saved.residual:.1e}, saved {duration(age)} ago"
             )
     if state.records:
-        lines.append(f"  {state.records} records are not collected yet")
+        lines.append(f"  {count(state.records, 'record')} not collected yet")
     if state.others:
-        lines.append(f"  {state.others} more tasks of the study do not belong to this spec")
+        lines.append(f"  {count(state.others, 'more task')} of the study, not of this spec")
     lines += [f"  damaged, to be solved again: {name}" for name in state.damaged]
     for index in range(shards or 0):
         lines.append(f"  shard {index}/{shards}: {counted(state.shard(index, shards or 1))}")

@@ -10,6 +10,7 @@ import click
 from gfmd_cli.cli.messages import show
 from gfmd_cli.cli.options import FILE, output_option, overrides_option, repeated, study_path
 from gfmd_cli.errors import InputError
+from gfmd_cli.units import count
 
 if TYPE_CHECKING:
     from gfmd_cli.study.slurm import Batch
@@ -105,6 +106,6 @@ def _send(job: "Batch") -> None:
     if job.fresh:
         write_whole(job.path, job.text.encode())
     number = call(job.array_call()).partition(";")[0]
-    show(f"job {number}: {len(job.members)} of {job.shards} shards, by {job.path}")
+    show(f"job {number}: {len(job.members)} of {count(job.shards, 'shard')}, by {job.path}")
     collect_job = call(job.collect_call(number)).partition(";")[0]
     show(f"job {collect_job}: collects when they have ended; logs in {job.logs}")

@@ -24,6 +24,7 @@ from gfmd_cli.maps.interpolation import monotone_cubic
 from gfmd_cli.physics.compliance_transforms import Compliance, separated
 from gfmd_cli.physics.free_compliance import Spacings, power_law
 from gfmd_cli.physics.persson import gamma_n, gamma_slab
+from gfmd_cli.units import count
 
 LONG_WAVE = 1e-6  # q t up to which k of a layer is constant: (q t)^2 is below rounding
 DECAYED = 25.0  # thicknesses from which the displacement of a layer is below rounding
@@ -97,9 +98,9 @@ class LinearElastomer(Choice):
         """Raise InputError for an elastomer that a free boundary does not suit."""
         if not self.decays(dimension):
             raise InputError(
-                f'grid.boundary: "free" needs an elastomer whose displacement decays with the '
-                f"distance from the load; that of {self.label} in {dimension} "
-                f'dimension{"s"[: dimension - 1]} does not: use "periodic"'
+                'grid.boundary: "free" needs an elastomer whose displacement decays with the '
+                f"distance from the load; that of {self.label} in {count(dimension, 'dimension')} "
+                'does not: use "periodic"'
             )
 
     @property
@@ -128,7 +129,7 @@ class LinearElastomer(Choice):
             remedy = "" if boundary == "free" else "a free boundary or "
             raise InputError(
                 f'load.displacement: {self.label} with grid.boundary = "{boundary}" in '
-                f"{dimension} dimension{'s'[: dimension - 1]} has no level of the undeformed "
+                f"{count(dimension, 'dimension')} has no level of the undeformed "
                 f"surface to count from; it needs {remedy}an elastomer whose k(0) is not zero "
                 "(layer, n = 0): use load.mean_gap"
             )

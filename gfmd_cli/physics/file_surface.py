@@ -32,6 +32,7 @@ from gfmd_cli.maps.map_preparation import (
 from gfmd_cli.maps.pictures import Picture, picture
 from gfmd_cli.maps.topography import Region, Topography, read_topography
 from gfmd_cli.physics.indenters import SMALLEST_GRID, RigidSurface
+from gfmd_cli.units import count
 
 
 class FileSurface(RigidSurface):
@@ -315,9 +316,8 @@ class FileSurface(RigidSurface):
         if self.flip:
             steps.append("turned upside down")
         if topography.holes:
-            heights = "height" if topography.holes == 1 else "heights"
             treatment = "never touch" if self.missing == "void" else "filled in"
-            steps.append(f"{topography.holes} missing {heights} {treatment}")
+            steps.append(f"{count(topography.holes, 'missing height')} {treatment}")
         if levelling != "none":
             steps.append(f"{levelling} subtracted")
         if boundary == "free":

@@ -6,10 +6,10 @@ from gfmd_cli.analysis.diff import diff
 from gfmd_cli.analysis.diff_table import NOTHING, diff_lists, diff_table
 from gfmd_cli.analysis.table import Group, Record, Table, TableColumn
 from gfmd_cli.analysis.tables import P_STAR, RESIDUAL, STATUS
-from gfmd_cli.analysis.wording import count
 from gfmd_cli.report.data import ReportData
 from gfmd_cli.report.section import Section
 from gfmd_cli.status import Status
+from gfmd_cli.units import count
 
 MAX_ROWS = 100  # contacts that the table of failures lists
 MACHINE = {

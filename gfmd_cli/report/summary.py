@@ -8,10 +8,10 @@ from gfmd_cli.analysis.compare import Row, best, in_continuum
 from gfmd_cli.analysis.run_summary import edge_warnings
 from gfmd_cli.analysis.table import known
 from gfmd_cli.analysis.tables import warnings_in
-from gfmd_cli.analysis.wording import count, grid_size, listed, pretty, quantity, span
+from gfmd_cli.analysis.wording import grid_size, listed, pretty, quantity, span
 from gfmd_cli.physics.observables import QUANTITIES
 from gfmd_cli.report.data import ReportData
-from gfmd_cli.units import duration
+from gfmd_cli.units import count, duration
 
 NEARLY_FULL = 0.5  # p*; above, the gap falls by decades, and a ratio of gaps tells little
 SECONDS = 120  # below, a time is given with three digits
@@ -169,7 +169,8 @@ def _unsolved(data: ReportData) -> list[str]:
     total = len(data.rows)
     parts = []
     if data.failed:
-        parts.append(f"{len(data.failed)} of {total} contacts did not reach their tolerance")
+        of_all = count(total, "contact")
+        parts.append(f"{len(data.failed)} of {of_all} did not reach their tolerance")
     if data.missing:
         parts.append(f"{len(data.missing)} of {total} are not solved yet")
     return ["; ".join(parts) + "."] if parts else []
@@ -185,6 +186,6 @@ def _unresolved(data: ReportData) -> list[str]:
     )
     total = len(data.solved)
     return [
-        f"{name} {UNRESOLVED[text]} ({number} of {total} contacts)"
+        f"{name} {UNRESOLVED[text]} ({number} of {count(total, 'contact')})"
         for (name, text), number in counts.items()
     ]

@@ -24,6 +24,7 @@ from gfmd_cli.study.signals import noted
 from gfmd_cli.study.store import Study, without_result
 from gfmd_cli.study.tasks import Task, plan
 from gfmd_cli.study.time_left import Clock
+from gfmd_cli.units import count
 
 
 @dataclass(frozen=True)
@@ -55,8 +56,8 @@ class RunOptions:
 
     def share_of(self, tasks: list[Task]) -> list[Task]:
         """The tasks of the shard."""
-        index, count = self.shard
-        return [task for task in tasks if task.index % count == index]
+        index, shards = self.shard
+        return [task for task in tasks if task.index % shards == index]
 
 
 def run_study(
@@ -165,14 +166,14 @@ def _folder(study: Study, tasks: list[Task], ranks: Ranks | None) -> Iterator[li
 
 def _check_ended(solved: Counter[Status], pending: int, stop: Event) -> None:
     """Raise SpaceError or Interrupted if that ended the run."""
-    if count := solved[Status.NO_SPACE]:
-        raise SpaceError(f"no space for the results of {count} tasks; make some, call again")
+    if lost := solved[Status.NO_SPACE]:
+        raise SpaceError(f"no space for {count(lost, 'result')}; make some, call again")
     unsolved = pending - sum(solved.values())
+    left = count(unsolved, "task")
     if stop.is_set() and unsolved:
-        tasks = "1 task" if unsolved == 1 else f"{unsolved} tasks"
-        raise Interrupted(f"stopped, states saved; {tasks} left, call again to go on")
+        raise Interrupted(f"stopped, states saved; {left} left, call again to go on")
     if unsolved and not any(status.is_failure for status in solved):
-        raise Interrupted(f"{unsolved} tasks left whose workers were killed; call again to go on")
+        raise Interrupted(f"{left} left whose workers were killed; call again to go on")
 
 
 def _check_output(solved: list[Task], outcomes: dict[str, Outcome]) -> None:
@@ -180,8 +181,8 @@ def _check_output(solved: list[Task], outcomes: dict[str, Outcome]) -> None:
     lacking = [task for task in without_result(solved, outcomes) if task.id in outcomes]
     if lacking:
         raise Interrupted(
-            f"{len(lacking)} tasks were solved by another run at the same time, with other output; "
-            "call again to add the output of this one"
+            f"another run solved {count(len(lacking), 'task')} at the same time, with other "
+            "output; call again to add the output of this one"
         )
 
 

@@ -13,6 +13,7 @@ from gfmd_cli.study.checkpoint import Checkpoint, Saved
 from gfmd_cli.study.reading import open_study
 from gfmd_cli.study.store import Study
 from gfmd_cli.study.tasks import plan
+from gfmd_cli.units import count
 
 
 @dataclass(frozen=True)
@@ -54,9 +55,9 @@ class StudyState:
         """Whether every task is solved to its tolerance."""
         return all(task.status.is_converged for task in self.tasks)
 
-    def shard(self, index: int, count: int) -> Counter[Status]:
+    def shard(self, index: int, shards: int) -> Counter[Status]:
         """How many tasks of one shard have which status."""
-        return Counter(task.status for task in self.tasks if task.task % count == index)
+        return Counter(task.status for task in self.tasks if task.task % shards == index)
 
 
 def state_of_spec(spec: Spec, path: Path) -> StudyState:
@@ -88,11 +89,11 @@ def is_study(path: Path) -> bool:
         return False
 
 
-def check_shards(count: int, tasks: int) -> None:
+def check_shards(shards: int, tasks: int) -> None:
     """Raise InputError where some shard would have no task."""
-    if not 0 < count <= tasks:
-        has = "1 task; take 1" if tasks == 1 else f"{tasks} tasks; take 1 to {tasks}"
-        raise InputError(f"--shards {count}: the spec has {has}")
+    if not 0 < shards <= tasks:
+        has = count(tasks, "task")
+        raise InputError(f"--shards {shards}: the spec has {has}; take 1 to {tasks}")
 
 
 def _state(
