@@ -9,7 +9,6 @@ from gfmd_cli.analysis.table import Record, Table, TableColumn, groups_of
 from gfmd_cli.analysis.tables import P_STAR, PRESSURE, RESIDUAL, STATUS, warnings_in
 from gfmd_cli.analysis.wording import contact_title, grid_size, shown
 from gfmd_cli.physics.observables import QUANTITIES
-from gfmd_cli.status import Status
 from gfmd_cli.study.reading import solved_rows
 from gfmd_cli.units import count
 
@@ -79,10 +78,10 @@ def unconverged(rows: list[dict[str, Any]], errors: Mapping[int, str]) -> list[s
     """
     lines = []
     for row in rows:
-        status, name = Status(row["status"]), f"task {row['task']}"
+        status, name = row["status"], f"task {row['task']}"
         if status.is_converged:
             continue
-        if status != Status.MISSING:
+        if status.is_solved:
             name += f" ({row['elastomer']}, p* = {row['p_star']:.4g}): {status}"
         lines.append(f"{name}: {errors.get(row['task']) or status.explain(row)}")
     return [*lines[:MAX_ROWS], *_left_out(lines, MAX_ROWS, "task")]

@@ -13,7 +13,6 @@ from gfmd_cli.analysis.plotting import ColumnFigure
 from gfmd_cli.analysis.selection import grouped
 from gfmd_cli.analysis.wording import contact_title, grid_size, in_si, quantity
 from gfmd_cli.grid.arrays import Field, Mask
-from gfmd_cli.status import Status
 
 LOWEST = 1e-3  # of a mean: lower end of its band on a logarithmic axis
 
@@ -107,7 +106,7 @@ def _point(view: View, records: list[Row]) -> tuple[float, float, float, float, 
     units = np.array([r[f"{name}_persson"] if view.ratio else 1.0 for r in records])
     values, errors = np.transpose(best_of_all(records, name)) / units
     half_width = spread_of(values).half_width if len(records) > 1 else np.nan
-    converged = all(record["status"] == Status.CONVERGED for record in records)
+    converged = all(record["status"].is_converged for record in records)
     p_star = np.mean([record["p_star"] for record in records])
     return float(p_star), float(values.mean()), float(np.abs(errors).mean()), half_width, converged
 

@@ -1,10 +1,10 @@
 """What a study stores of one task: its row and its arrays.
 
 The row is built here alone. `planned` gives the columns that follow from the spec, `measured` those
-of a solved contact, and `result` everything.
+of a solved contact, `task_row` both, and `result` everything.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from typing import Any
 
@@ -116,6 +116,12 @@ def all_columns(task: Task, solved: Solved) -> Row:
         | edge_shares(task.surface, solved.scene.grid, contact.obstacle, u, sigma)
         | on_request(task.output, SolvedContact(contact, u, sigma))
     )
+
+
+def task_row(task: Task, row: Mapping[str, Any]) -> Row:
+    """The row of a task in a study, worded as in its last spec; blank before it is solved."""
+    points = {name: row.get(name, -1) for name in ("points", "points_y")}  # of an "auto" grid
+    return empty_row() | dict(row) | planned(task) | points
 
 
 def result(task: Task, solved: Solved, seconds: float) -> TaskResult:

@@ -48,7 +48,7 @@ class StudyState:
     @property
     def missing(self) -> list[int]:
         """Indices of the tasks that are not solved yet."""
-        return [task.task for task in self.tasks if task.status == Status.MISSING]
+        return [task.task for task in self.tasks if not task.status.is_solved]
 
     @property
     def converged(self) -> bool:

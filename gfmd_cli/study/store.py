@@ -22,8 +22,7 @@ from gfmd_cli.files.hdf5 import new_hdf5
 from gfmd_cli.files.locks import locked
 from gfmd_cli.spec.models import Spec
 from gfmd_cli.status import Status
-from gfmd_cli.study.columns import empty_row
-from gfmd_cli.study.measure import planned
+from gfmd_cli.study.measure import task_row
 from gfmd_cli.study.parts import (
     SUFFIX,
     check_own,
@@ -98,7 +97,7 @@ class Study:
             return {}
         with open_study(self.path) as file:
             tasks = zip(file.task_ids, file.statuses, file.stored, strict=True)
-            return {n: Outcome(status, out) for n, status, out in tasks if status != Status.MISSING}
+            return {n: Outcome(status, out) for n, status, out in tasks if status.is_solved}
 
     def collect(self, spec: Spec, tasks: list[Task], text: str) -> list[str]:
         """Write all records into the study file, then drop them; inside `work`.
@@ -179,7 +178,7 @@ class Study:
         if self.damaged_paths() or self.record_paths() or not self.path.exists():
             return False
         with open_study(self.path) as file:
-            if Status.MISSING in file.statuses:
+            if not all(status.is_solved for status in file.statuses):
                 return False
         lacking = {task.id for task in without_result(tasks, self.collected())}
         solved = {task.id for task in tasks} - lacking
@@ -236,7 +235,7 @@ class _Sources:
         """By task id: its entry, and the record or the index in the study so far."""
         if old is not None:
             for index, status in enumerate(old.statuses):
-                if status != Status.MISSING:
+                if status.is_solved:
                     self.by_task[old.task_ids[index]] = old.entry(index), index
         for path, entry in records.items():
             known = self.by_task.get(entry.task_id)
@@ -252,8 +251,7 @@ class _Sources:
         """What the spec gives of a task, and what was measured if it is solved."""
         missing = Entry(task.id, task.scene_id, frozenset(), {"status": Status.MISSING})
         entry, _ = self.by_task.get(task.id, (missing, 0))
-        points = {name: entry.row.get(name, -1) for name in ("points", "points_y")}
-        return entry._replace(row=empty_row() | {**entry.row} | planned(task) | points)
+        return entry._replace(row=task_row(task, entry.row))
 
     def load(self, task_id: str) -> TaskResult:
         """The whole result of a task."""
