@@ -1,4 +1,4 @@
-"""`gfmd` and `python -m gfmd_cli`: signals are heeded before the slow imports begin."""
+"""`gfmd` and `python -m gfmd_cli`: signals are handled before the slow imports begin."""
 
 import gc
 import signal

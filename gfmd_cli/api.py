@@ -9,7 +9,6 @@ import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from html import escape
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -20,10 +19,12 @@ import tabulate
 from gfmd_cli.analysis.compare import Comparison
 from gfmd_cli.analysis.compare import compare as compare_study
 from gfmd_cli.analysis.export import as_dataset
+from gfmd_cli.analysis.table import Group, Table, TableColumn
 from gfmd_cli.errors import InputError
 from gfmd_cli.grid.arrays import Field, Mask
 from gfmd_cli.grid.blas import one_blas_thread
 from gfmd_cli.maps.given_heights import write_heights
+from gfmd_cli.physics.error_estimates import Verdict
 from gfmd_cli.physics.file_surface import FileSurface, forget_files
 from gfmd_cli.physics.indenters import SMALLEST_GRID
 from gfmd_cli.physics.observables import contact_pressure
@@ -118,7 +119,7 @@ class Result:
             "scales": f"h_std = {self.h_std:.4g} m, Delta_sigma = {self.delta_sigma:.4g} Pa",
         }
         for name, symbol in {"contact area": "a_r", "mean gap": "u_g"}.items():
-            if self.columns.get(f"{symbol}_verdict") == "regular":
+            if self.columns.get(f"{symbol}_verdict") == Verdict.REGULAR:
                 value, error = (self.columns[f"{symbol}_continuum{end}"] for end in ("", "_error"))
                 numbers[f"{name} in the continuum"] = f"{symbol} = {value:.5g} +- {error:.1g}"
         return numbers | ({"warnings": "; ".join(self.warnings)} if self.warnings else {})
@@ -131,9 +132,9 @@ class Result:
 
     def _repr_html_(self) -> str:
         """The summary as HTML, for notebooks."""
-        items = self.summary().items()
-        rows = (f"<tr><th>{escape(k)}</th><td>{escape(v)}</td></tr>" for k, v in items)
-        return f"<table>{''.join(rows)}</table>"
+        columns = [TableColumn("", key) for key in ("name", "value")]
+        records = [{"name": name, "value": value} for name, value in self.summary().items()]
+        return Table("", columns, [Group("", records)]).as_html()
 
 
 def solve(spec: Path | str | Tables, *, heights: Any = None, threads: int = 1) -> Result:

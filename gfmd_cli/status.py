@@ -9,11 +9,8 @@ NEARLY_FULL = 0.99
 2048 points (n = 0.5 to 3, p* = 2.6 to 3.3, accuracy.mean_gap = 0.01) had 0.997 and more."""
 
 
-class Status(StrEnum):
-    """How a task ended; the value is its text in files and tables.
-
-    The explanation of a member is a template for `explain`, over the columns of a row.
-    """
+class ExplainedEnum(StrEnum):
+    """Members with an explanation; the value of a member is its text in files and tables."""
 
     explanation: str
 
@@ -23,6 +20,10 @@ class Status(StrEnum):
         member._value_ = value
         member.explanation = explanation
         return member
+
+
+class Status(ExplainedEnum):
+    """How a task ended. The explanation is a template for `explain`, over the columns of a row."""
 
     CONVERGED = "converged", "the residual is below the tolerance"
     MAX_STEPS = (

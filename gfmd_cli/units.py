@@ -34,6 +34,12 @@ def duration(seconds: float) -> str:
     return f"{seconds / size:.0f} {unit}"
 
 
+def left_out(length: int, limit: int, what: str = "") -> list[str]:
+    """A line on how many things a list of at most `limit` leaves out, if any."""
+    more = count(length - limit, f"more {what}") if what else f"{length - limit} more"
+    return [f"and {more}"] if length > limit else []
+
+
 def count(number: int, what: str) -> str:
     """A number of things, in the singular or the plural."""
     return f"1 {what}" if number == 1 else f"{number} {what}s"

@@ -1,4 +1,4 @@
-"""Processor seconds of the ten first questions of docs/tutorial.md, as the table of that page.
+"""Processor seconds of the ten first questions of docs/tutorial.md, as a table.
 
     python scripts/first_tasks.py
 

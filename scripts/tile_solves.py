@@ -100,9 +100,9 @@ def main() -> None:
     arguments = parser.parse_args()
     smallest = local_start.LIMITS["periodic"].points
     with (
-        patch.dict(local_start.LIMITS, periodic=local_start.Limits(smallest, 1.0, 0.0)),
+        patch.dict(local_start.LIMITS, periodic=local_start.Limits(smallest, 1.0, 0.0, 0.0, 9.0)),
         patch.dict(local_start.SOLVES, periodic=RecordedSolve),
-        patch.object(local_start, "EXPONENTS", (0.0, 9.0)),
+        patch.object(local_start, "SMALLEST_EXPONENT", 0.0),
         patch.object(local_solve, "MAX_STEPS", arguments.max_steps),
     ):
         print_table(arguments)

@@ -204,7 +204,7 @@ def test_bench_prints_a_table_and_keeps_file_and_figure(gfmd):
     assert len(read_bench(Path("tiny-bench.h5"))) == 3
     result = gfmd("analyze", "tiny-bench.h5")
     assert result.exit_code == 74
-    assert "a bench, no study" in result.output
+    assert "a bench file, not a study" in result.output
     again = gfmd("bench", "spec.toml", "-q")  # measures again
     assert again.exit_code == 0
     other = gfmd("bench", "spec.toml", "--set", "load.p_star=0.2")
@@ -220,7 +220,7 @@ def test_what_is_no_bench_is_not_replaced(gfmd):
         before = Path(name).read_bytes()
         result = gfmd("bench", "spec.toml", "-o", name)
         assert result.exit_code == 2
-        assert "is no bench" in result.output
+        assert "is not a bench file" in result.output
         assert Path(name).read_bytes() == before
 
 

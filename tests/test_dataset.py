@@ -87,5 +87,5 @@ def test_only_known_ways_of_selecting_are_accepted(data):
 def test_a_file_that_is_no_netcdf_is_refused(tmp_path):
     path = Path(tmp_path / "none.nc")
     path.write_text("nothing")
-    with pytest.raises(InputError, match=r"none\.nc: no readable netCDF file"):
+    with pytest.raises(InputError, match=r"none\.nc: not a readable netCDF file"):
         dataset(path)

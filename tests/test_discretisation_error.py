@@ -107,7 +107,7 @@ def test_the_area_of_a_plate_on_a_single_indenter_is_a_bound():
     for level in sequence(0.0), [GridValues(64, 0.01, 2.0, 0.1, 2.5)]:
         area = estimate(level, 4.0)["a_r"]
         assert area.verdict == "bound"
-        assert area.error == min(level[-1].a_r, level[-1].line)
+        assert area.error == min(level[-1].a_r, level[-1].switches_per_point)
         assert isnan(area.continuum)
         assert isnan(area.continuum_error)
 
@@ -368,7 +368,7 @@ def test_an_uncertain_exponent_widens_the_error_of_the_area():
         estimate(level, 1.0, ROUGH, ExcessExponent(2.0, uncertainty))["a_r"]
         for uncertainty in (0.0, 0.5)
     )
-    extra = AREA_EXCESS * 0.5 * level[0].line
+    extra = AREA_EXCESS * 0.5 * level[0].switches_per_point
     assert uncertain.continuum == certain.continuum
     assert uncertain.continuum_error == pytest.approx(np.hypot(certain.continuum_error, extra))
 

@@ -41,7 +41,7 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field as Key
 
-from gfmd_cli.choice import Positive, Seed
+from gfmd_cli.spec_table import Positive, Seed
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.physics.indenters import SMALLEST_GRID, RigidSurface

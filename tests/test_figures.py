@@ -8,8 +8,8 @@ from specs import power_spec
 
 from gfmd_cli.analysis import figures
 from gfmd_cli.analysis.compare import Curve, compare
-from gfmd_cli.analysis.curve_styles import MAX_LABEL, curve_styles, shortened
-from gfmd_cli.analysis.figures import VIEWS, draw_all, items_of, study_figures
+from gfmd_cli.analysis.curve_styles import MAX_LABEL, curve_styles, distinct_labels
+from gfmd_cli.analysis.figures import PANELS, draw_all, study_figures, with_styles
 from gfmd_cli.analysis.plotting import styled
 from gfmd_cli.errors import InputError, SpaceError
 from gfmd_cli.spec.parse import read_spec
@@ -30,7 +30,7 @@ points = 256
 p_star = [0.01, 0.1]
 """
 LONG = "measurement_2024_11_sample_steel_ground_position_"
-OVER_PRESSURE = {view.name for view in VIEWS}
+OVER_PRESSURE = {panel.name for panel in PANELS}
 DISTRIBUTIONS = {"stress_distribution", "stress_distribution_pressures"}
 
 
@@ -70,20 +70,20 @@ def marked(comparison, rows):
     return replace(comparison, curves=[Curve(changed, first.persson), *others])
 
 
-def view(name):
-    return next(view for view in VIEWS if view.name == name)
+def panel(name):
+    return next(panel for panel in PANELS if panel.name == name)
 
 
 def figure_of(name, comparison):
     curves = comparison.curves
     p_star = np.geomspace(0.01, 3, 50)
     items = [
-        figures.Item(curve, style, p_star, curve.predict(p_star))
+        figures.StyledCurve(curve, style, p_star, curve.predict(p_star))
         for curve, style in zip(curves, curve_styles(curves), strict=True)
     ]
     if name in DISTRIBUTIONS:
         return figures.distribution_figures(items)[name]
-    return figures._over_pressure(view(name), items)
+    return figures._over_pressure(panel(name), items)
 
 
 def test_every_figure_is_a_pdf_and_a_png(study, tmp_path):
@@ -229,7 +229,7 @@ def test_a_study_in_pascals_has_them_on_a_second_axis(study):
     pressures = "load={pressure=[1e6, 1e7, 1e8]}"
     comparison = study(ROUGH, 'elastomer={kind="half-space", E_star=2e9}', pressures)
     with styled():
-        plot = study_figures(comparison, items_of(comparison))["contact_area"]
+        plot = study_figures(comparison, with_styles(comparison))["contact_area"]
         plot.svg()
     (second,) = plot.axes.child_axes
     delta_sigma = comparison.curves[0].rows[0]["delta_sigma"]
@@ -242,7 +242,7 @@ def test_a_study_in_pascals_has_them_on_a_second_axis(study):
 def test_a_study_in_reduced_units_has_no_second_axis(study):
     comparison = study(ROUGH)
     with styled():
-        plot = study_figures(comparison, items_of(comparison))["contact_area"]
+        plot = study_figures(comparison, with_styles(comparison))["contact_area"]
     assert plot.axes.child_axes == []
 
 
@@ -274,11 +274,11 @@ def test_missing_matplotlib_is_told(monkeypatch):
     ],
 )
 def test_long_labels_that_end_differently_stay_different(names):
-    cut = shortened(names)
+    cut = distinct_labels(names)
     assert len(set(cut)) == len(names)
     assert all(len(label) <= MAX_LABEL for label in cut)
     assert cut[0].startswith("short" if names[0] == "short" else cut[0][:3])
-    assert shortened(["x" * 90] * 2)[0] == shortened(["x" * 90] * 2)[1]
+    assert distinct_labels(["x" * 90] * 2)[0] == distinct_labels(["x" * 90] * 2)[1]
 
 
 def test_curves_that_share_a_style_say_what_differs(study):

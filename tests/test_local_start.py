@@ -168,10 +168,12 @@ def test_the_solution_is_that_of_the_whole_grid(elastomer, p_star, boundary):
     check_solution(SCENES[boundary](SelfAffine(cutoff=0.02), elastomer, 512).contact(p_star))
 
 
-@pytest.mark.parametrize(("boundary", "points"), [("periodic", 512), ("free", 256)])
-def test_the_solution_of_a_stiffer_elastomer_is_that_of_the_whole_grid(boundary, points):
-    """At n = 1.5 only smaller contacts are solved on tiles, and less is saved."""
-    scene = SCENES[boundary](SelfAffine(cutoff=0.02), Power(n=1.5), points)
+@pytest.mark.parametrize(
+    ("boundary", "n", "points"), [("periodic", 1.5, 512), ("periodic", 2, 512), ("free", 1.5, 256)]
+)
+def test_the_solution_of_a_stiffer_elastomer_is_that_of_the_whole_grid(boundary, n, points):
+    """From n = 1.5 on only smaller contacts are solved on tiles, and less is saved."""
+    scene = SCENES[boundary](SelfAffine(cutoff=0.02), Power(n=n), points)
     check_solution(scene.contact(1e-4), share=0.9)
 
 
@@ -235,7 +237,7 @@ def test_a_contact_that_the_coarse_grid_misses_is_entered():
     assert np.count_nonzero(touching) == np.count_nonzero(solve(contact, False).u == height)
 
 
-@pytest.mark.parametrize("elastomer", [Power(n=2), Slab(thickness=0.01)], ids=name)
+@pytest.mark.parametrize("elastomer", [Power(n=2.25), Slab(thickness=0.01)], ids=name)
 def test_other_elastomers_are_solved_on_the_whole_grid(elastomer):
     contact = build_scene(SelfAffine(cutoff=0.1), elastomer, 512).contact(1e-3)
     pressure = np.zeros((256, 256))

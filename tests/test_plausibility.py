@@ -35,12 +35,24 @@ def test_a_sound_contact_has_no_warning():
     assert "warnings" not in str(result)
 
 
-@pytest.mark.parametrize(("p_star", "warned"), [(0.1, False), (2.0, True), (20.0, False)])
-def test_a_single_indenter_that_meets_its_periodic_copies(p_star, warned):
-    """In full contact, the last case, the contact area says so itself."""
-    result = solve(tables({"kind": "parabola"}, {"kind": "power", "n": 1}, p_star=p_star))
-    assert any("border of the cell" in warning for warning in result.warnings) is warned
-    assert (result.a_r == 1) is (p_star == 20.0)
+@pytest.mark.parametrize(("p_star", "warned"), [(0.1, False), (2.0, True), (20.0, True)])
+@pytest.mark.parametrize("boundary", ["periodic", "free"])
+def test_a_single_indenter_whose_contact_reaches_the_border(p_star, warned, boundary):
+    spec = tables({"kind": "parabola"}, {"kind": "half-space"}, p_star=p_star)
+    spec["grid"]["boundary"] = boundary
+    warnings = solve(spec).warnings
+    assert any("reaches the border of the cell" in warning for warning in warnings) is warned
+
+
+def test_a_single_indenter_has_no_height_to_compare_with():
+    """Its rms height follows from the cell, and that of a punch from its depth."""
+    layer = {"kind": "layer", "base": "sliding", "E_star": 1e6, "thickness": 2e-4}
+    ball = {"kind": "parabola", "radius": 0.005, "length": 0.01}
+    result = solve(tables(ball, layer, p_star=0.01))
+    assert result.warnings == ()
+    assert result.h_std > 2e-4
+    punch = {"kind": "punch", "depth": 100.0}
+    assert solve(tables(punch, {"kind": "half-space"}, pressure=1e-5)).warnings == ()
 
 
 def test_a_tolerance_too_loose_to_be_meant():

@@ -6,7 +6,7 @@ from scipy import stats
 
 from gfmd_cli.analysis.compare import compare
 from gfmd_cli.analysis.ensemble import Ensemble, ensembles
-from gfmd_cli.analysis.figures import VIEWS, items_of, study_figures
+from gfmd_cli.analysis.figures import PANELS, study_figures, with_styles
 from gfmd_cli.analysis.plotting import styled
 from gfmd_cli.analysis.series import Series, _point, seed_groups
 from gfmd_cli.analysis.wording import quantity
@@ -24,7 +24,7 @@ points = 16
 [load]
 p_star = [0.1, 0.3, 1.0]
 """
-AREA, RATIO = VIEWS[0], VIEWS[1]
+AREA, RATIO = PANELS[0], PANELS[1]
 
 
 @pytest.fixture
@@ -39,7 +39,7 @@ def values(comparison, n, p_star, name="a_r"):
 
 
 def test_seeds_are_shown_by_their_mean_and_students_interval(comparison):
-    groups = seed_groups(items_of(comparison))
+    groups = seed_groups(with_styles(comparison))
     assert [len(group) for group in groups] == [4, 4]
     series = Series.of(AREA, groups[1])
     assert series.x == pytest.approx([0.1, 0.3, 1.0])
@@ -51,13 +51,13 @@ def test_seeds_are_shown_by_their_mean_and_students_interval(comparison):
 
 
 def test_a_ratio_is_that_of_each_seed_to_its_own_theory(comparison):
-    group = seed_groups(items_of(comparison))[0]
+    group = seed_groups(with_styles(comparison))[0]
     ratios = [item.curve.column("a_r") / item.curve.prediction.a_r for item in group]
     assert Series.of(RATIO, group).y == pytest.approx(np.mean(ratios, axis=0), rel=1e-12)
 
 
 def test_one_seed_is_shown_as_it_is(comparison):
-    (item, *_), _ = seed_groups(items_of(comparison))
+    (item, *_), _ = seed_groups(with_styles(comparison))
     series = Series.of(AREA, [item])
     np.testing.assert_array_equal(series.y, item.curve.column("a_r"))
     assert np.isnan(series.half_width).all()
@@ -66,7 +66,7 @@ def test_one_seed_is_shown_as_it_is(comparison):
 
 def test_a_figure_has_one_curve_for_all_seeds(comparison):
     with styled():
-        figures = study_figures(comparison, items_of(comparison))
+        figures = study_figures(comparison, with_styles(comparison))
     drawn = figures["contact_area"]
     assert {"n = 0, 4 seeds", "n = 1, 4 seeds", "95 % confidence"} <= set(drawn.legend)
     assert len(drawn.axes.collections) == 2  # bands
@@ -100,7 +100,7 @@ def test_the_pressure_of_a_mean_over_seeds_is_that_of_its_place_on_the_axis(tmp_
     keys = ("elastomer.n=1", "surface.h_std=1e-6", "load={mean_gap=0.5}", "surface.seed=[0, 1]")
     rows = rows_of(*keys, name="gap.h5")
     assert rows[0]["pressure"] != pytest.approx(rows[1]["pressure"], rel=0.01)
-    (group,) = seed_groups(items_of(compare(tmp_path / "gap.h5")))
+    (group,) = seed_groups(with_styles(compare(tmp_path / "gap.h5")))
     series = Series.of(AREA, group)
     mean = np.mean([row["pressure"] for row in rows])
     assert series.details[0].startswith(f"pressure {quantity(mean, 'Pa')}\n")

@@ -32,6 +32,20 @@ def test_the_fit_of_a_self_affine_surface_gives_what_it_was_made_from(keys):
     assert fitted.scatter < 1e-8
 
 
+@pytest.mark.parametrize("digits", [np.float32, "counts of 16 bits"])
+def test_rounding_of_the_heights_does_not_change_the_fit(digits):
+    """White noise of the rounding lies far below C(q), but has as many shells beyond q_s."""
+    surface = SelfAffine(hurst=0.8, rolloff=0.25, cutoff=0.04)
+    heights = surface.heights(256)
+    step = np.ptp(heights) / 2**16
+    rounded = heights.astype(digits) if digits is np.float32 else step * np.rint(heights / step)
+    m, power, modes = radial_power(Grid(256), rounded.astype(float))
+    fitted = fit(shells(2 * np.pi * m, power, m, m, modes))
+    assert fitted.hurst == pytest.approx(0.8, abs=0.02)
+    assert 2 * np.pi / fitted.q_r == pytest.approx(0.25, rel=0.02)
+    assert 2 * np.pi / fitted.q_s == pytest.approx(0.04, rel=0.02)
+
+
 def test_a_power_law_shows_no_roll_off():
     surface = SelfAffine(spectrum="cutoff", rolloff=1.0, cutoff=0.02, hurst=0.7)
     fitted = fit(shells_of(surface, 128))

@@ -7,6 +7,7 @@ import h5py
 import numpy as np
 import pytest
 
+from gfmd_cli.physics.contact import build_scene
 from gfmd_cli.spec.parse import read_spec
 from gfmd_cli.study.reading import read_rows
 from gfmd_cli.study.tasks import plan
@@ -136,6 +137,31 @@ def test_a_map_of_few_points_is_interpolated(gfmd, tmp_path):
     assert (row["points"], row["points_y"], row["boundary"]) == (9, 12, "free")
     assert (row["length"], row["length_y"]) == pytest.approx((12e-6, 16e-6))
     assert row["status"] == "converged"
+
+
+@pytest.mark.parametrize(
+    "words", [(), ("--set", "elastomer.kind=half-space"), ("--set", "elastomer.E_star=[2e9, 1e6]")]
+)
+def test_the_pressures_that_init_writes_suit_the_elastomer(gfmd, tmp_path, words):
+    """From p* = 0.003 to 0.3, to a power of ten, of the first elastomer."""
+    np.save(tmp_path / "map.npy", np.random.default_rng(5).normal(0, 1e-9, size=(32, 32)))
+    gfmd("init", "s.toml", "--from", "map.npy", "--set", "surface.length=1e-5", *words)
+    (first, *_) = plan(read_spec(tmp_path / "s.toml")[0])
+    assert first.elastomer.E_star == 2e9
+    delta_sigma = build_scene(first.surface, first.elastomer, first.points).delta_sigma
+    assert 0.0009 < first.p_star(delta_sigma) < 0.01
+    note = " for the first elastomer" in (tmp_path / "s.toml").read_text()
+    assert note is any("[" in word for word in words)
+
+
+def test_surface_uses_the_points_of_a_spec(gfmd, tmp_path):
+    """A punch, whose rms gradient depends on the grid."""
+    (tmp_path / "p.toml").write_text(
+        '[surface]\nkind = "punch"\n[elastomer]\nkind = "half-space"\n'
+        "[grid]\npoints = [32, 64]\n[load]\np_star = 0.1\n"
+    )
+    (record,) = json.loads(gfmd("surface", "p.toml", "--json"))
+    assert record["points"] == [64, 64]
 
 
 def test_one_of_several_maps_has_to_be_chosen(gfmd, tmp_path):

@@ -228,13 +228,13 @@ def test_columns_that_are_not_stored_are_blank(run):
 def test_a_file_that_is_no_study_is_refused_and_kept(run, tmp_path):
     path = tmp_path / "study.h5"
     path.write_bytes(b"not HDF5")
-    with pytest.raises(StudyError, match="no readable study"):
+    with pytest.raises(StudyError, match="not a readable study"):
         run()
     assert path.read_bytes() == b"not HDF5"
     path.unlink()
     with h5py.File(path, "w") as file:
         file["x"] = 1
-    with pytest.raises(StudyError, match="no study"):
+    with pytest.raises(StudyError, match="not a study"):
         run()
 
 

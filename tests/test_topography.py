@@ -658,10 +658,70 @@ def test_a_side_without_a_unit_is_in_that_of_the_heights(tmp_path):
     assert FileSurface(path=tmp_path / "h.xyz", length=2.0).sides == (2.0, 2.0)
 
 
+@pytest.mark.parametrize(
+    "header", ["# x[um] y[um] z[nm]", "X (µm)\tY (µm)\tZ (nm)", "x_um,y_um,height_nm"]
+)
+def test_a_table_of_positions_has_the_units_of_its_header(tmp_path, header):
+    pytest.importorskip("SurfaceTopography")
+    heights = np.random.default_rng(3).normal(size=(12, 16))
+    rows = (f"{0.5 * x} {0.25 * y} {heights[y, x]}" for y in range(12) for x in range(16))
+    (tmp_path / "h.xyz").write_text(header + "\n" + "\n".join(rows), encoding="utf-8")
+    read = read_topography(tmp_path / "h.xyz")
+    assert read.heights == pytest.approx(1e-9 * heights)
+    assert read.spacing == pytest.approx((0.25e-6, 0.5e-6))
+    assert (read.metres, read.metric_heights) == (True, True)
+
+
+def test_a_profile_has_the_units_of_its_header(tmp_path):
+    pytest.importorskip("SurfaceTopography")
+    x, heights = 0.5 * np.arange(32), np.random.default_rng(4).normal(size=32)
+    np.savetxt(tmp_path / "p.txt", np.column_stack([x, heights]), header="x [mm]  z [um]")
+    read = read_topography(tmp_path / "p.txt")
+    assert read.heights == pytest.approx(1e-6 * heights)
+    assert read.spacing == pytest.approx((0.5e-3,))
+
+
+def test_a_header_with_units_of_some_columns_is_refused(tmp_path):
+    pytest.importorskip("SurfaceTopography")
+    rows = (f"{x} {y} {(x * y) % 5}" for y in range(16) for x in range(16))
+    (tmp_path / "h.xyz").write_text("x y z [nm]\n" + "\n".join(rows))
+    with pytest.raises(InputError, match="not one for each of the 3 columns"):
+        read_topography(tmp_path / "h.xyz")
+
+
+def test_positions_without_a_unit_give_a_warning(tmp_path):
+    pytest.importorskip("SurfaceTopography")
+    rows = (f"{x} {y} {(x * y) % 5}" for y in range(16) for x in range(16))
+    (tmp_path / "h.xyz").write_text("\n".join(rows))
+    warnings = FileSurface(path=tmp_path / "h.xyz").warnings()
+    assert any("does not state the unit of its positions" in each for each in warnings)
+
+
+@pytest.mark.parametrize("mark", ["NA", "***", "--"])
+def test_a_row_of_marks_in_a_matrix_is_refused(tmp_path, mark):
+    """The reader would leave the row out and join the rows around it."""
+    pytest.importorskip("SurfaceTopography")
+    rows = [" ".join(f"{x * y % 7}.5" for x in range(12)) for y in range(12)]
+    rows[5] = " ".join([mark] * 12)
+    (tmp_path / "h.txt").write_text("\n".join(rows))
+    with pytest.raises(InputError, match=re.escape(f"h.txt:6: {mark!r} in a row")):
+        read_topography(tmp_path / "h.txt")
+
+
+def test_two_matrices_in_one_file_are_refused(tmp_path):
+    pytest.importorskip("SurfaceTopography")
+    rows = [" ".join(f"{x * y % 7}.5" for x in range(12)) for y in range(12)]
+    (tmp_path / "h.txt").write_text("\n".join([*rows, "", *rows]))
+    with pytest.raises(InputError, match=r"h\.txt:13: an empty line in the table"):
+        read_topography(tmp_path / "h.txt")
+    (tmp_path / "spaced.txt").write_text("\n\n".join(rows))
+    assert read_topography(tmp_path / "spaced.txt").shape == (12, 12)
+
+
 def test_a_factor_of_the_heights_that_also_multiplies_the_sides_is_a_warning(tmp_path):
     pytest.importorskip("SurfaceTopography")
     rows = (f"{x} {y} {(x * y) % 5}" for y in range(16) for x in range(16))
-    (tmp_path / "h.xyz").write_text("# x[um] y[um] z[nm]\n" + "\n".join(rows))
+    (tmp_path / "h.xyz").write_text("\n".join(rows))
     scaled = {"path": tmp_path / "h.xyz", "scale": 1e-9}
     warning = "surface.scale also multiplies the sides.*L = 1.6e-08 m; set surface.length"
     assert re.search(warning, "\n".join(FileSurface(**scaled).warnings()))

@@ -17,10 +17,10 @@ from gfmd_cli.physics.gap_theories import CoarseGrained, FittedWeight
 from gfmd_cli.physics.observables import QUANTITIES
 from gfmd_cli.physics.persson import Persson, Shells
 from gfmd_cli.physics.true_contact import contact_area
+from gfmd_cli.study.column import Row
 from gfmd_cli.study.columns import PARAMETERS
 from gfmd_cli.study.reading import StudyFile, open_study, solved_rows
 
-Row = dict[str, Any]
 Theory = Literal["paper", "fitted", "coarse-grained"]
 """Of the mean gap: Eq. (30) with gamma of Eqs. (39) and (42), the weight that is fitted in
 docs/theory.md, or coarse-graining without any constant."""

@@ -69,7 +69,7 @@ def curve_styles(curves: list[Curve]) -> list[CurveStyle]:
     distinct = list(dict.fromkeys(pairs))
     by_variant = len(elastomers) == 1
     palette = colours(len(distinct) if by_variant else len(elastomers))
-    labels = shortened(
+    labels = distinct_labels(
         [", ".join(filter(None, (names[elastomer], variant))) for elastomer, variant in distinct]
     )
     styles = []
@@ -81,7 +81,7 @@ def curve_styles(curves: list[Curve]) -> list[CurveStyle]:
     return styles
 
 
-def shortened(labels: list[str]) -> list[str]:
+def distinct_labels(labels: list[str]) -> list[str]:
     """Labels of at most MAX_LABEL characters, different ones if the given ones are different.
 
     The middle is left out, or the label is numbered where the rest is the same.

@@ -6,11 +6,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
-from gfmd_cli.analysis.compare import Row, load_of
+from gfmd_cli.analysis.compare import load_of
 from gfmd_cli.analysis.selection import grouped
 from gfmd_cli.physics.observables import QUANTITIES
 from gfmd_cli.spec.differences import differences
 from gfmd_cli.spec.models import LOADS
+from gfmd_cli.study.column import Row
 from gfmd_cli.study.reading import open_study, solved_rows
 
 SURFACE = ("surface", "surface_sha256", "seed")

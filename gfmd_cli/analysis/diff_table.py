@@ -4,13 +4,14 @@ import json
 from functools import partial
 from typing import Any
 
-from gfmd_cli.analysis.compare import Row, with_solvers
+from gfmd_cli.analysis.compare import with_solvers
 from gfmd_cli.analysis.diff import Difference, Pair
 from gfmd_cli.analysis.selection import grouped
 from gfmd_cli.analysis.table import BLANK, Record, Table, TableColumn, groups_of, known, plain
 from gfmd_cli.analysis.wording import contact_title
 from gfmd_cli.physics.observables import QUANTITIES
 from gfmd_cli.spec.models import load_text
+from gfmd_cli.study.column import Row
 
 LEGEND = (
     "Relative differences (B - A) / max(|A|, |B|); in brackets: in units of the combined error bar."
@@ -57,7 +58,8 @@ def diff_text(difference: Difference) -> str:
 def diff_lists(difference: Difference) -> dict[str, list[str]]:
     """Rows that one study alone has, and the keys of the specs that differ: lines by title."""
     lists = {
-        f"only in {which}": _listed(rows) for which, rows in zip("AB", difference.only, strict=True)
+        f"only in {which}": _loads_by_contact(rows)
+        for which, rows in zip("AB", difference.only, strict=True)
     }
     lists["specs, A -> B"] = [f"  {line}" for line in difference.spec]
     return {title: lines for title, lines in lists.items() if lines}
@@ -100,7 +102,7 @@ def _json_values(record: Record, *keys: str) -> dict[str, Any]:
     return {key: plain(record[key]) for key in keys or record}
 
 
-def _listed(rows: list[Row]) -> list[str]:
+def _loads_by_contact(rows: list[Row]) -> list[str]:
     """Loads grouped by scene, a line for each grid."""
     lines = []
     for name, scene in grouped(rows, contact_title).items():

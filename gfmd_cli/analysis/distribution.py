@@ -1,10 +1,11 @@
 """Pr(sigma) in the continuum, extrapolated over grids bin by bin, as for the paper's Fig. 7.
 
-A grid puts the edge of a contact wrong by a share of its spacing. What that does to the stress dies
-out with the distance from the edge over the spacing, about at first order. Stresses as next to the
-edge never converge: there, Pr falls as spacing^(n/2) for n < 2, to nothing. Since the share of the
-points below a stress is contact line times distance from the edge (above it, for n > 2), counts
-tell which bins these are.
+On a grid, the edge of a contact is displaced by a fraction of the grid spacing. The effect on the
+stress decreases with the distance from the edge in spacings, and is about of first order in the
+spacing. Densities at the stresses next to an edge do not converge: there, for n < 2, Pr decreases
+to zero as spacing^(n/2). The bins of these stresses are found by counting: the fraction of points
+below a stress (above it, for n > 2) is the length of the contact line per area times the distance
+from the edge at which the stress occurs.
 
 Stresses are in units of Delta_sigma and densities in 1 / Delta_sigma, in the logarithmic bins of
 `observables`. A relative error is one of ln Pr.
@@ -19,16 +20,17 @@ from typing import Any
 
 import numpy as np
 
-from gfmd_cli.analysis.compare import Comparison, Curve, Row, of_study, solver_of
+from gfmd_cli.analysis.compare import Comparison, Curve, of_study, solver_of
 from gfmd_cli.analysis.wording import contact_title
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.physics.observables import LOGARITHMIC_EDGES, estimated_patches
+from gfmd_cli.study.column import Row
 from gfmd_cli.study.columns import BINS, PR_LOGARITHMIC
 
-MAX_CHANGE = 0.35  # of ln Pr from one grid to the next; beyond, a bin is not resolved
-NEIGHBOURS = 2  # bins to each side that the change between grids is averaged over
-PRIOR_SEEDS = 4.0  # seeds that the expected spread stands for beside the one that is seen
-MIN_DEPTH = 0.75  # distance from the edge, in spacings, below which a bin is not resolved
+MAX_CHANGE = 0.35  # of ln Pr between grids; a bin with more is not resolved; a choice
+NEIGHBOURS = 2  # bins to each side in the mean of the change between grids; a choice
+PRIOR_SEEDS = 4.0  # weight of the expected spread beside the measured one; a choice
+MIN_DEPTH = 0.75  # spacings from the edge below which a bin is not resolved; a choice
 
 
 def bin_counts(row: Row, name: str = PR_LOGARITHMIC) -> Field:
@@ -71,15 +73,15 @@ def extrapolate(counts: Field, cells: Sequence[int]) -> Extrapolated:
         ]
     change, error = steps[-1]
     change = np.where(np.abs(change) < MAX_CHANGE, change, np.nan)
-    added, left = change, change
+    correction, discretisation = change, change
     if len(steps) > 1:
         before, unsure = (np.nan_to_num(part) for part in steps[-2])
         larger = np.maximum(np.abs(change), np.abs(before))
         turns = (change * before < 0) & (np.abs(change) > 2 * np.hypot(error, unsure))
         grows = np.abs(change) > np.abs(before) + 2 * np.hypot(error, unsure)
-        added = np.where(turns | grows, 0.0, change)
-        left = np.where(turns | grows, np.copysign(larger, change), change)
-    return Extrapolated(log[-1] + added, left, np.sqrt(noise[-1] + error**2))
+        correction = np.where(turns | grows, 0.0, change)
+        discretisation = np.where(turns | grows, np.copysign(larger, change), change)
+    return Extrapolated(log[-1] + correction, discretisation, np.sqrt(noise[-1] + error**2))
 
 
 def _averaged(values: Field, variance: Field) -> tuple[Field, Field]:

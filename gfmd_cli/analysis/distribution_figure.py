@@ -5,15 +5,16 @@ from typing import Any
 
 import numpy as np
 
-from gfmd_cli.analysis.compare import Comparison, Row
+from gfmd_cli.analysis.compare import Comparison
 from gfmd_cli.analysis.curve_styles import CurveStyle, colours, curve_styles, order
 from gfmd_cli.analysis.distribution import StressDistribution, bin_counts, distributions
-from gfmd_cli.analysis.edge_law import fit
+from gfmd_cli.analysis.edge_law import fit_power_law
 from gfmd_cli.analysis.ensemble import by_load
 from gfmd_cli.analysis.plotting import THEORY, ColumnFigure
 from gfmd_cli.analysis.selection import at_one_pressure, evenly, grouped, pressure_label
-from gfmd_cli.analysis.series import Item, seed_groups
+from gfmd_cli.analysis.series import StyledCurve, seed_groups
 from gfmd_cli.grid.arrays import Field
+from gfmd_cli.study.column import Row
 from gfmd_cli.study.columns import BINS, PR_LINEAR, PR_LOGARITHMIC
 
 PRESSURES = 5  # at which the distribution of one elastomer is drawn
@@ -29,7 +30,7 @@ STRESS, DENSITY = r"stress  $\sigma\,/\,\Delta\sigma$", r"$\mathrm{Pr}(\sigma)\;
 class Density:
     """Pr(sigma) of one contact as it is drawn, all in units of Delta_sigma."""
 
-    item: Item
+    item: StyledCurve
     row: Row
     sigma: Field
     density: Field
@@ -40,7 +41,7 @@ class Density:
         return self.item.curve.stress_density(sigma, self.row["p_star"])
 
 
-def densities(items: list[Item]) -> dict[str, list[Density]]:
+def densities(items: list[StyledCurve]) -> dict[str, list[Density]]:
     """What the figures of Pr(sigma) show, by their names: curves, or pressures, side by side.
 
     The curves are shown at about one pressure, the pressures of the curve nearest to n = 1.
@@ -55,7 +56,7 @@ def densities(items: list[Item]) -> dict[str, list[Density]]:
     }
 
 
-def _densities(items: list[Item], name: str) -> list[list[Density]]:
+def _densities(items: list[StyledCurve], name: str) -> list[list[Density]]:
     """The contacts of each curve that have enough bins for a line; of seeds the mean of all."""
     groups = []
     for group in seed_groups(items):
@@ -75,7 +76,7 @@ def _bins(row: Row, name: str) -> tuple[Field, Field]:
     return BINS[name].middles()[frequent], np.nan_to_num(row[name])[frequent]
 
 
-def distribution_figures(items: list[Item]) -> dict[str, ColumnFigure | None]:
+def distribution_figures(items: list[StyledCurve]) -> dict[str, ColumnFigure | None]:
     """The figures of `densities`; None without data."""
     shown = densities(items)
     figures = {"stress_distribution": _side_by_side, "stress_distribution_pressures": _pressures}
@@ -172,7 +173,7 @@ def _draw(
 def _edge_law(plot: ColumnFigure, stress: StressDistribution, style: CurveStyle) -> None:
     """The law of the edge through the bins nearest to it, dashed."""
     for name in ("small", "large"):
-        law = fit(stress, name)
+        law = fit_power_law(stress, name)
         if law is None or not np.isfinite(law.theory):
             continue
         low, high = law.lowest, law.highest

@@ -22,11 +22,11 @@ from gfmd_cli.analysis.distribution import PRIOR_SEEDS, StressDistribution
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.physics.observables import LOGARITHMIC_EDGES, geometric_middles
 
-USABLE = 0.3  # largest relative error of a bin in a fit
-NEAREST = 3  # bins next to the limit of resolution that the law of the edge is drawn through
-FEWEST, BASE, LONGEST = 4, 6, 9  # bins of the windows of a fit; ten are a decade
-SHIFTS = 3  # places that the end of a window near the limit of resolution is tried at
-SMALL, LARGE = 0.5, 0.75  # small and large stresses, in mean stresses of the contact p / a_r
+USABLE = 0.3  # largest relative error of a bin in a fit; a choice
+NEAREST = 3  # bins next to the limit of resolution, for the prefactor of the edge law; a choice
+FEWEST, BASE, LONGEST = 4, 6, 9  # bins of a window; ten are a decade; choices
+SHIFTS = 3  # positions of the end of a window near the limit of resolution; a choice
+SMALL, LARGE = 0.5, 0.75  # limits of small and large stresses / mean stress p / a_r; choices
 
 
 def edge_exponent(n: float) -> float:
@@ -35,7 +35,7 @@ def edge_exponent(n: float) -> float:
 
 
 @dataclass(frozen=True)
-class Fit:
+class PowerLaw:
     """Pr = prefactor sigma^exponent in a window, and the exponent at the edge itself."""
 
     law: str
@@ -72,7 +72,7 @@ class Line:
     """ln Pr at sigma = 1 without the correction."""
 
 
-def power_law(
+def straight_line(
     x: Field, y: Field, own: Field, shared: Field, correction: Field | None = None
 ) -> Line:
     """Least squares of y = level + slope x (+ b correction).
@@ -102,7 +102,7 @@ def power_law(
     )
 
 
-def fit(stress: StressDistribution, law: str) -> Fit | None:
+def fit_power_law(stress: StressDistribution, law: str) -> PowerLaw | None:
     """Power law nearest to the limit of resolution; None where too few bins are resolved.
 
     "small": the lowest BASE usable bins below SMALL p / a_r. "large" (n > 2 alone): the highest
@@ -141,7 +141,7 @@ def fit(stress: StressDistribution, law: str) -> Fit | None:
     nearest = base[:NEAREST]
     fixed = stress.extrapolated.log_density[nearest] - theory * np.log(middle[nearest])
     weight = 1 / stress.error[nearest] ** 2
-    return Fit(
+    return PowerLaw(
         law=law,
         lowest=float(edges[base.min()]),
         highest=float(edges[base.max() + 1]),
@@ -167,12 +167,12 @@ def _line(
     x, y = np.log(middle[chosen]), part.log_density[chosen]
     own, shared = np.hypot(part.counting, stress.sampling)[chosen], part.discretisation[chosen]
     more = None if correction is None else correction[chosen]
-    line, count = power_law(x, y, own, shared, more), len(fine)
+    line, count = straight_line(x, y, own, shared, more), len(fine)
     without = fine.sum(axis=0) - fine
     if count == 1 or not np.all(without > 0):
         return line
     shifts = np.log(without / (count - 1)) - np.log(fine.mean(axis=0))
-    slopes = [power_law(x, y + shift, own, shared, more).slope for shift in shifts]
+    slopes = [straight_line(x, y + shift, own, shared, more).slope for shift in shifts]
     scatter = (count - 1) * float(np.var(slopes)) + line.shared**2
     known = count - 1
     error = np.sqrt((known * scatter + PRIOR_SEEDS * line.error**2) / (known + PRIOR_SEEDS))

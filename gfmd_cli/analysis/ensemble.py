@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 from scipy.special import stdtrit
 
-from gfmd_cli.analysis.compare import Comparison, Row, best_of_all, load_of, of_study
+from gfmd_cli.analysis.compare import Comparison, best_of_all, load_of, of_study
 from gfmd_cli.analysis.selection import grouped
 from gfmd_cli.analysis.wording import contact_title, grid_size
 from gfmd_cli.physics.observables import QUANTITIES
 from gfmd_cli.spec.models import LOADS
+from gfmd_cli.study.column import Row
 from gfmd_cli.study.columns import PARAMETERS
 
 CONFIDENCE = 0.95

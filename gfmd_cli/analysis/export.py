@@ -12,7 +12,7 @@ from gfmd_cli.analysis.table import known
 from gfmd_cli.errors import INSTALL, InputError
 from gfmd_cli.files.atomic import new_file
 from gfmd_cli.grid.arrays import Field
-from gfmd_cli.study.column import Column
+from gfmd_cli.study.column import Column, Row
 from gfmd_cli.study.columns import (
     CONTRACT,
     DETAILS,
@@ -26,7 +26,6 @@ from gfmd_cli.study.columns import (
 )
 from gfmd_cli.study.reading import StudyFile, open_study, read_rows, solved_rows
 
-Rows = list[dict[str, Any]]
 FORMULA = ("=", "+", "-", "@", "\t", "\r")
 """Characters with which a formula of a spreadsheet begins."""
 COORDINATES = tuple(
@@ -40,7 +39,7 @@ def export_csv(path: Path) -> str:
     return csv_text(solved_rows(read_rows(path)))
 
 
-def csv_text(rows: Rows) -> str:
+def csv_text(rows: list[Row]) -> str:
     """The solved rows of a study as CSV, below a header."""
     names = column_names(rows)
     text = io.StringIO()
@@ -50,7 +49,7 @@ def csv_text(rows: Rows) -> str:
     return text.getvalue()
 
 
-def column_names(rows: Rows) -> list[str]:
+def column_names(rows: list[Row]) -> list[str]:
     """All columns, without the parameters that no row has."""
     parameters = (
         column
@@ -84,7 +83,7 @@ def as_dataset(path: Path) -> Any:
         try:
             data = _xarray().open_dataset(path, engine="h5netcdf")
         except (OSError, ValueError) as error:
-            raise InputError(f"{path}: no readable netCDF file: {error}") from error
+            raise InputError(f"{path}: not a readable netCDF file: {error}") from error
     else:
         data = _labelled_study(path)
     from gfmd_cli.analysis.parameter_index import ParameterIndex
@@ -124,7 +123,7 @@ def write_netcdf(path: Path, target: Path) -> None:
         dataset.to_netcdf(file, engine="h5netcdf")
 
 
-def _of_tasks(rows: Rows, column: Column, *axis: str) -> Any:
+def _of_tasks(rows: list[Row], column: Column, *axis: str) -> Any:
     """A column of the rows; `axis`: that of the values that each row has."""
     values: Any = np.array([row[column.name] for row in rows], dtype=column.kind)
     return _labelled(("task", *axis), values, column)

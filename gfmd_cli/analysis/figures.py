@@ -8,7 +8,7 @@ from gfmd_cli.analysis.compare import Comparison, einstein_prediction
 from gfmd_cli.analysis.curve_styles import curve_styles, order
 from gfmd_cli.analysis.distribution_figure import continuum_figure, distribution_figures
 from gfmd_cli.analysis.plotting import ColumnFigure, styled
-from gfmd_cli.analysis.series import Item, Series, View, seed_groups
+from gfmd_cli.analysis.series import Panel, Series, StyledCurve, seed_groups
 from gfmd_cli.analysis.wording import in_si
 from gfmd_cli.units import scaled
 
@@ -18,25 +18,27 @@ P_STAR = r"reduced pressure  $p^* = p\,/\,\Delta\sigma$"
 AREA, GAP = r"relative contact area  $a_r$", r"mean gap  $u_g\,/\,h_\mathrm{std}$"
 RATIO = r"$a_r\,/\,a_r$(Persson)"
 DEVIATION = r"stress deviation  $\sigma_p\,/\,\Delta\sigma$"
-VIEWS = (
-    View("contact_area", "a_r", AREA, "Relative contact area over reduced pressure", y_scale="log"),
-    View(
+PANELS = (
+    Panel(
+        "contact_area", "a_r", AREA, "Relative contact area over reduced pressure", y_scale="log"
+    ),
+    Panel(
         "contact_area_ratio", "a_r", RATIO, "Contact area over that of Persson theory", ratio=True
     ),
-    View(
+    Panel(
         "stress_deviation",
         "sigma_p",
         DEVIATION,
         "Standard deviation of the stress over reduced pressure",
     ),
-    View("mean_gap_log", "u_g", GAP, "Mean gap over the logarithm of the reduced pressure"),
-    View(
+    Panel("mean_gap_log", "u_g", GAP, "Mean gap over the logarithm of the reduced pressure"),
+    Panel(
         "mean_gap_tail",
         "u_g",
         GAP,
         "Logarithm of the mean gap over the reduced pressure",
-        x_scale="linear",
-        y_scale="log",
+        "linear",
+        "log",
     ),
 )
 """The figures over the pressure."""
@@ -48,19 +50,19 @@ def draw_all(comparison: Comparison, folder: Path) -> list[Path]:
     Raises SpaceError where the folder cannot be written.
     """
     with styled():
-        drawn = study_figures(comparison, items_of(comparison))
+        drawn = study_figures(comparison, with_styles(comparison))
         return [path for name, plot in drawn.items() for path in plot.write(folder / name)]
 
 
-def study_figures(comparison: Comparison, items: list[Item]) -> dict[str, ColumnFigure]:
+def study_figures(comparison: Comparison, items: list[StyledCurve]) -> dict[str, ColumnFigure]:
     """Every figure that the study has data for, by name; to be called inside `styled`."""
-    figures = {view.name: _over_pressure(view, items) for view in VIEWS}
+    figures = {panel.name: _over_pressure(panel, items) for panel in PANELS}
     figures |= distribution_figures(items)
     figures["stress_distribution_continuum"] = continuum_figure(comparison)
     return {name: plot for name, plot in figures.items() if plot is not None}
 
 
-def items_of(comparison: Comparison) -> list[Item]:
+def with_styles(comparison: Comparison) -> list[StyledCurve]:
     """The curves of a study in the order and style of its figures."""
     curves = sorted(comparison.curves, key=order)
     pressures = np.concatenate([curve.column("p_star") for curve in curves])
@@ -68,44 +70,44 @@ def items_of(comparison: Comparison) -> list[Item]:
     low = min(low, high / 1000)  # near the left end of a linear axis
     p_star = np.union1d(np.geomspace(low, high, 200), np.linspace(low, high, 100))
     return [
-        Item(curve, style, p_star, curve.predict(p_star))
+        StyledCurve(curve, style, p_star, curve.predict(p_star))
         for curve, style in zip(curves, curve_styles(curves), strict=True)
     ]
 
 
-def _over_pressure(view: View, items: list[Item]) -> ColumnFigure | None:
+def _over_pressure(panel: Panel, items: list[StyledCurve]) -> ColumnFigure | None:
     """One quantity of all curves over the pressure, beside theory; None without data."""
-    drawn = [Series.of(view, group) for group in seed_groups(items)]
+    drawn = [Series.of(panel, group) for group in seed_groups(items)]
     drawn = [series for series in drawn if series.x.size]
     if not drawn:
         return None
-    plot = ColumnFigure(P_STAR, view.label)
+    plot = ColumnFigure(P_STAR, panel.label)
     for series in drawn:
-        series.draw(plot, line=view.ratio)
+        series.draw(plot, line=panel.ratio)
     p_star = items[0].p_star
     lines = [(series.style, p_star, series.theory) for series in drawn]
-    if view.ratio:
+    if panel.ratio:
         lines = [(drawn[0].style, p_star, np.ones_like(p_star))]
     plot.theory(lines)
-    if view.column == "u_g" and any(item.curve.n == 0 and item.curve.has_theory for item in items):
+    if panel.column == "u_g" and any(item.curve.n == 0 and item.curve.has_theory for item in items):
         exact = einstein_prediction(p_star).u_g
         dashed = {"color": "black", "ls": (0, (4, 2)), "lw": 0.8, "zorder": 2.5}
         plot.line("n = 0, Gaussian", p_star, exact, **dashed)
     x = np.concatenate([series.x for series in drawn])
-    plot.scale("x", view.x_scale, x)
+    plot.scale("x", panel.x_scale, x)
     _add_pascals(plot, items, float(x.max()))
     ys = [series.extent() for series in drawn]
-    if view.y_scale == "linear":
+    if panel.y_scale == "linear":
         low, high = plot.axes.get_xlim()
         ys += [y[(p_star >= low) & (p_star <= high)] for *_, y in lines]
     y = np.concatenate(ys)
     y = y[np.isfinite(y)]
-    wide = view.ratio and y.max() > WIDE * y.min() > 0
-    plot.scale("y", "log" if wide else view.y_scale, y, zero=not view.ratio)
+    wide = panel.ratio and y.max() > WIDE * y.min() > 0
+    plot.scale("y", "log" if wide else panel.y_scale, y, zero=not panel.ratio)
     return plot
 
 
-def _add_pascals(plot: ColumnFigure, items: list[Item], largest: float) -> None:
+def _add_pascals(plot: ColumnFigure, items: list[StyledCurve], largest: float) -> None:
     """Add an axis in Pa, if the study has SI units and one Delta_sigma for all curves."""
     rows = [row for item in items for row in item.curve.rows]
     units = [float(row["delta_sigma"]) for row in rows]

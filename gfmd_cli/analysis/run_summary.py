@@ -1,20 +1,31 @@
-"""What a run has computed, as a short table, and why tasks are not converged."""
+"""What a run will compute and what it has computed, as tables; why tasks are not converged."""
 
-from collections.abc import Mapping, Sequence, Sized
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 from gfmd_cli.analysis.compare import with_best, with_solvers
 from gfmd_cli.analysis.selection import grouped
 from gfmd_cli.analysis.table import Record, Table, TableColumn, groups_of
-from gfmd_cli.analysis.tables import P_STAR, PRESSURE, RESIDUAL, STATUS, warnings_in
+from gfmd_cli.analysis.tables import P_STAR, POINTS, PRESSURE, RESIDUAL, STATUS, warnings_in
 from gfmd_cli.analysis.wording import contact_title, grid_size, shown
 from gfmd_cli.physics.observables import QUANTITIES
 from gfmd_cli.study.reading import solved_rows
-from gfmd_cli.units import count
+from gfmd_cli.study.result import Outcome
+from gfmd_cli.study.tasks import Task
+from gfmd_cli.units import count, left_out
 
 MAX_ROWS = 40
 MAX_EDGE_SHARE = 0.05  # of contact or load in the tapered zone, without a warning; a choice
 MAX_SCENES = 6  # of other specs that a run names
+TASKS = (
+    TableColumn("task", "task", "d"),
+    POINTS,
+    TableColumn("load", "load"),
+    TableColumn("MiB", "memory", ".0f"),
+    TableColumn("s", "seconds", ".2g"),
+    replace(STATUS, optional=True),
+)
 RUN = (
     P_STAR,
     PRESSURE,
@@ -25,6 +36,33 @@ RUN = (
 )
 
 
+def task_text(tasks: Sequence[Task], outcomes: Mapping[str, Outcome], missing: set[str]) -> str:
+    """The tasks by contact, with predicted memory and time, and the status of those stored.
+
+    `missing` are the ids of the tasks to solve, also those stored without the requested output.
+    """
+    status = {name: str(outcome.status) for name, outcome in outcomes.items()}
+    status |= dict.fromkeys(missing & status.keys(), "again: more output is requested")
+    records = (
+        {
+            "task": task.index,
+            "points": f"~{task.points}" if task.auto else task.points,
+            "load": task.load_label,
+            "memory": task.bytes / 2**20,
+            "seconds": task.seconds,
+            "status": status.get(task.id),
+        }
+        for task in tasks
+    )
+    return Table("", TASKS, groups_of(zip(map(_contact_of, tasks), records, strict=True))).as_text()
+
+
+def _contact_of(task: Task) -> str:
+    """Elastomer and surface of a task, and the swept keys of grid and solver."""
+    swept = [word for table, word in task.swept if table != "surface"]
+    return ", ".join([f"{task.elastomer.label} on {task.surface.label}", *swept])
+
+
 def run_text(rows: list[dict[str, Any]]) -> str:
     """The solved contacts by scene, MAX_ROWS at most; an empty string where nothing was solved."""
     solved = solved_rows(rows)
@@ -33,23 +71,18 @@ def run_text(rows: list[dict[str, Any]]) -> str:
     records = map(with_best, listed)
     table = Table("", shown(RUN, listed), groups_of(zip(titles, records, strict=True)))
     warnings = [f"warning: {line}" for line in warnings_in(solved)]
-    blocks = [table.as_text(), *_left_out(solved, MAX_ROWS, "contact"), "\n".join(warnings)]
+    blocks = [table.as_text(), *left_out(len(solved), MAX_ROWS, "contact"), "\n".join(warnings)]
     return "\n\n".join(filter(None, blocks))
-
-
-def _left_out(items: Sized, limit: int, what: str) -> list[str]:
-    """A line on what is not listed, if anything is not."""
-    return [f"and {count(len(items) - limit, f'more {what}')}"] if len(items) > limit else []
 
 
 def edge_warnings(rows: Sequence[Mapping[str, Any]]) -> list[str]:
     """A line for each scene that carries much of its load where a window changed the heights."""
-    much = [row for row in rows if max(row["edge_contact"], row["edge_load"]) > MAX_EDGE_SHARE]
+    tapered = [row for row in rows if max(row["edge_contact"], row["edge_load"]) > MAX_EDGE_SHARE]
     return [  # nothing where the shares are unknown
         f"{surface}: up to {max(row['edge_contact'] for row in group):.0%} of the contact and "
         f"{max(row['edge_load'] for row in group):.0%} of the load are at the edges, where the "
         "window has changed the heights; leave out surface.edges to keep them"
-        for surface, group in grouped(much, lambda row: row["surface"]).items()
+        for surface, group in grouped(tapered, lambda row: row["surface"]).items()
     ]
 
 
@@ -63,7 +96,7 @@ def other_tasks(rows: list[dict[str, Any]]) -> list[str]:
         loads = sorted({row["p_star"] for row in group})
         ends = " to ".join(f"{load:.4g}" for load in dict.fromkeys([loads[0], loads[-1]]))
         lines.append(f"  {len(group)} with {scene}, p* = {ends}")
-    return [*lines, *(f"  {line}" for line in _left_out(scenes, MAX_SCENES, "scene"))]
+    return [*lines, *(f"  {line}" for line in left_out(len(scenes), MAX_SCENES, "scene"))]
 
 
 def _scene(row: Record) -> str:
@@ -84,4 +117,4 @@ def unconverged(rows: list[dict[str, Any]], errors: Mapping[int, str]) -> list[s
         if status.is_solved:
             name += f" ({row['elastomer']}, p* = {row['p_star']:.4g}): {status}"
         lines.append(f"{name}: {errors.get(row['task']) or status.explain(row)}")
-    return [*lines[:MAX_ROWS], *_left_out(lines, MAX_ROWS, "task")]
+    return [*lines[:MAX_ROWS], *left_out(len(lines), MAX_ROWS, "task")]

@@ -6,19 +6,20 @@ from typing import Self
 
 import numpy as np
 
-from gfmd_cli.analysis.compare import Curve, Prediction, Row, best_of_all
+from gfmd_cli.analysis.compare import Curve, Prediction, best_of_all
 from gfmd_cli.analysis.curve_styles import CurveStyle
 from gfmd_cli.analysis.ensemble import by_load, spread_of, without_seed
 from gfmd_cli.analysis.plotting import ColumnFigure
 from gfmd_cli.analysis.selection import grouped
 from gfmd_cli.analysis.wording import contact_title, grid_size, in_si, quantity
 from gfmd_cli.grid.arrays import Field, Mask
+from gfmd_cli.study.column import Row
 
 LOWEST = 1e-3  # of a mean: lower end of its band on a logarithmic axis
 
 
 @dataclass(frozen=True)
-class View:
+class Panel:
     """A quantity over the reduced pressure."""
 
     name: str
@@ -33,7 +34,7 @@ class View:
 
 
 @dataclass(frozen=True)
-class Item:
+class StyledCurve:
     """A curve with its style, and its theory over pressures close enough for a line."""
 
     curve: Curve
@@ -42,7 +43,7 @@ class Item:
     theory: Prediction
 
 
-def seed_groups(items: list[Item]) -> list[list[Item]]:
+def seed_groups(items: list[StyledCurve]) -> list[list[StyledCurve]]:
     """The curves that differ in their seed only, together."""
     groups = grouped(items, lambda item: (item.curve.study, without_seed(item.curve.rows[0])))
     return list(groups.values())
@@ -63,23 +64,23 @@ class Series:
     details: Sequence[str]
     """Load, status and parameters of each point, a text of some lines."""
     theory: Field
-    """Theory at `Item.p_star`, the mean over seeds."""
+    """Theory at `StyledCurve.p_star`, the mean over seeds."""
 
     @classmethod
-    def of(cls, view: View, items: list[Item]) -> Self:
+    def of(cls, panel: Panel, items: list[StyledCurve]) -> Self:
         """The series of curves that differ in their seed only: what its scale can show."""
         loads = by_load(record for item in items for record in item.curve.records)
         loads.sort(key=lambda seeds: float(np.mean([record["p_star"] for record in seeds])))
-        points = [_point(view, seeds) for seeds in loads]
+        points = [_point(panel, seeds) for seeds in loads]
         x, y, error, half_width, converged = (
             np.array(values) for values in zip(*points, strict=True)
         )
-        visible = np.isfinite(y) & ((y > 0) | (view.y_scale == "linear"))
+        visible = np.isfinite(y) & ((y > 0) | (panel.y_scale == "linear"))
         details = [_details(seeds) for seeds, s in zip(loads, visible, strict=True) if s]
         style = items[0].style
         if len(items) > 1:
             style = replace(style, label=f"{style.label}, {len(items)} seeds")
-        theory = np.mean([getattr(item.theory, view.column) for item in items], axis=0)
+        theory = np.mean([getattr(item.theory, panel.column) for item in items], axis=0)
         x, y, error = x[visible], y[visible], error[visible]
         return cls(style, x, y, error, half_width[visible], converged[visible], details, theory)
 
@@ -100,10 +101,10 @@ class Series:
         return np.concatenate([self.y, self.y + np.nan_to_num(self.half_width)])
 
 
-def _point(view: View, records: list[Row]) -> tuple[float, float, float, float, bool]:
+def _point(panel: Panel, records: list[Row]) -> tuple[float, float, float, float, bool]:
     """p*, value, error, half width of the confidence interval, and whether all converged."""
-    name = view.column
-    units = np.array([r[f"{name}_persson"] if view.ratio else 1.0 for r in records])
+    name = panel.column
+    units = np.array([r[f"{name}_persson"] if panel.ratio else 1.0 for r in records])
     values, errors = np.transpose(best_of_all(records, name)) / units
     half_width = spread_of(values).half_width if len(records) > 1 else np.nan
     converged = all(record["status"].is_converged for record in records)

@@ -1,4 +1,4 @@
-"""Pictures of height maps with scale bar and colour bar, and profiles of lines."""
+"""Pictures of height maps with scale bar and colour bar, profiles of lines, and spectra."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -7,10 +7,10 @@ import numpy as np
 
 from gfmd_cli.analysis.curve_styles import literal
 from gfmd_cli.analysis.plotting import HEIGHT, WIDTH, LegendFigure, shades
+from gfmd_cli.analysis.surface_spectrum import Spectrum
 from gfmd_cli.analysis.surface_summary import SurfaceSummary
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.maps.pictures import Picture
-from gfmd_cli.physics.spectrum_fit import density
 from gfmd_cli.units import scaled
 
 HEIGHTS, HOLES, HIGHEST = "cividis", "0.85", "#fee838"
@@ -40,7 +40,7 @@ def summary_figure(summaries: Sequence[SurfaceSummary], names: Sequence[str]) ->
             place.set_title(literal(f"{name}: {title}"), fontsize="medium")
         if len(shown) == 1:
             row[1].set_axis_off()
-        _draw_spectrum(row[2], summary)
+        _draw_spectrum(row[2], summary.spectrum)
     return figure
 
 
@@ -102,13 +102,15 @@ def _draw_scale_bar(axes: Any, side: float) -> None:
     axes.text(end + 0.03, -0.05, f"{length / divisor:.3g} {unit}", transform=below, va="center")
 
 
-def _draw_spectrum(axes: Any, summary: SurfaceSummary) -> None:
+def spectrum_labels(spectrum: Spectrum) -> tuple[str, str]:
+    """Labels of the axes q and C(q)."""
+    return r"wavenumber  $q$ (m$^{-1}$)", rf"$C(q)$ (m$^{2 + spectrum.dimension}$)"
+
+
+def _draw_spectrum(axes: Any, spectrum: Spectrum) -> None:
     """C(q) of the cell that is solved, with the fit."""
-    shells, area = summary.scene.shells, summary.scene.grid.area
-    power = density(shells) * area
-    axes.loglog(shells.q, power, ".", ms=1.2, color="0.6", rasterized=True)
-    if summary.fit is not None:
-        fitted = summary.fit.density(shells.q) * area
-        axes.loglog(shells.q[fitted > 0], fitted[fitted > 0], color=LINE)
-    unit = 3 if summary.scene.grid.dimension == 1 else 4
-    axes.set(xlabel=r"wavenumber  $q$ (m$^{-1}$)", ylabel=rf"$C(q)$ (m$^{unit}$)")
+    axes.loglog(spectrum.q, spectrum.density, ".", ms=3, color="0.4")
+    fitted = spectrum.fitted > 0
+    axes.loglog(spectrum.q[fitted], spectrum.fitted[fitted], color=LINE)
+    x, y = spectrum_labels(spectrum)
+    axes.set(xlabel=x, ylabel=y)

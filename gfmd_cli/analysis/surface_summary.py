@@ -3,13 +3,12 @@
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import pi
 from typing import Any
 
 import numpy as np
 
+from gfmd_cli.analysis.surface_spectrum import FIT, Spectrum, spectrum
 from gfmd_cli.analysis.table import Group, Table, TableColumn, plain
-from gfmd_cli.errors import InputError
 from gfmd_cli.maps.height_map import extent
 from gfmd_cli.maps.roughness_parameters import MAP_NAMES, PROFILE_NAMES, roughness_parameters
 from gfmd_cli.physics.contact import Scene, build_scene
@@ -17,7 +16,7 @@ from gfmd_cli.physics.elastomers import HalfSpace
 from gfmd_cli.physics.indenters import RigidSurface
 from gfmd_cli.physics.persson import Persson
 from gfmd_cli.physics.self_affine import SelfAffine
-from gfmd_cli.physics.spectrum_fit import Moments, SelfAffineFit, fit, moments
+from gfmd_cli.physics.spectrum_fit import Moments, SelfAffineFit, moments
 from gfmd_cli.study.forecast import first_grid
 from gfmd_cli.study.plausibility import METRES
 
@@ -32,16 +31,14 @@ class SurfaceSummary:
 
     surface: RigidSurface
     scene: Scene
-    """The surface on its smallest grid, mirrored if it has borders, under a half-space of unit
-    modulus."""
+    """The surface on its own points or those of a spec, mirrored if it has borders, under a
+    half-space of unit modulus."""
     parameters: dict[str, float | None]
     """Of the measured part of a map, levelled, before its edges are treated; else of the cell."""
     moments: Moments
     """Of the cell that is solved."""
-    fit: SelfAffineFit | None
-    """The nearest self-affine surface; None where there is none."""
-    no_fit: str
-    """Why there is none."""
+    spectrum: Spectrum
+    """Of the cell that is solved."""
 
     @property
     def copies(self) -> int:
@@ -66,35 +63,28 @@ class SurfaceSummary:
             "gradient": self.moments.gradient,
             "curvature": self.moments.curvature,
             "warnings": self.surface.warnings(),
+            **self.spectrum.fit_record,
         }
-        if self.fit is not None:
-            record |= {
-                "hurst": self.fit.hurst,
-                "hurst_error": self.fit.hurst_error,
-                "rolloff_wavelength": self.fit.rolloff_wavelength,
-                "cutoff_wavelength": self.fit.cutoff_wavelength,
-                "scatter": self.fit.scatter,
-            }
         return {key: plain(value) for key, value in record.items()}
 
 
-def summarise(surface: RigidSurface) -> SurfaceSummary:
-    """The summary of a surface. Raises InputError for an unfit surface."""
-    finer = 1 if surface.is_map else 2  # modes at the Nyquist wavenumber are counted twice
+def summarise(surface: RigidSurface, points: int = 0) -> SurfaceSummary:
+    """The summary of a surface, unless it is a map on `points` points along x or more.
+
+    Raises InputError for an unfit surface.
+    """
     repeated = surface.within("periodic")
-    scene = build_scene(repeated, HalfSpace(), finer * repeated.smallest_grid())
+    smallest = repeated.smallest_grid()
+    # modes at the Nyquist wavenumber are counted twice
+    points = smallest if surface.is_map else max(points, 2 * smallest)
+    scene = build_scene(repeated, HalfSpace(), points)
     measured = surface.measured_map()
     if measured is None:
         heights = np.ma.asarray(scene.in_metres(scene.height))
         measured = heights, scene.grid.spacings
-    nearest, reason = None, "a line has no fit" if scene.grid.dimension == 1 else ""
-    if not reason:
-        try:
-            nearest = fit(scene.shells, pi / max(scene.grid.spacings))
-        except InputError as error:
-            reason = str(error)
     parameters = roughness_parameters(*measured)
-    return SurfaceSummary(surface, scene, parameters, moments(scene.shells), nearest, reason)
+    spectral = spectrum(scene.shells, scene.grid.sides, scene.grid.whole_shape)
+    return SurfaceSummary(surface, scene, parameters, moments(scene.shells), spectral)
 
 
 UNITS = dict.fromkeys(("Sq", "Sa", "Sz", "Sal", "Pq", "Pa", "Pt", "Pal"), "m")
@@ -107,9 +97,7 @@ COLUMNS = (
         )
         for name in (*MAP_NAMES, *PROFILE_NAMES)
     ),
-    TableColumn("H", "hurst", ".2f", optional=True),
-    TableColumn("lambda_r", "rolloff_wavelength", ".3g", unit="m", optional=True),
-    TableColumn("lambda_s", "cutoff_wavelength", ".3g", unit="m", optional=True),
+    *(replace(column, error="") for column in FIT if column.value != "scatter"),
 )
 
 
@@ -123,7 +111,7 @@ def summary_table(summaries: Sequence[SurfaceSummary], names: Sequence[str]) -> 
     return Table("", columns, [Group("", records)])
 
 
-def as_text(summary: SurfaceSummary) -> str:
+def summary_text(summary: SurfaceSummary) -> str:
     """The summary of one surface as text."""
     grid, measured, record = summary.scene.grid, summary.moments, summary.record()
     sides = " x ".join(dict.fromkeys(f"{side:.6g}" for side in record["sides"]))  # a square: one
@@ -143,19 +131,19 @@ def as_text(summary: SurfaceSummary) -> str:
         lines.append(f"half-space: p* = 1 is p = {0.5 * measured.gradient:.5g} E_star")
     lines += [f"warning: {warning}" for warning in summary.surface.warnings()]
     theories = {"spectrum": summary.scene}
-    if summary.fit is not None:
+    if summary.spectrum.fit is not None:
         table = _table(record, grid.length)
         model = SelfAffine.model_validate(table)
         theories["fit"] = build_scene(model, HalfSpace(), first_grid(model))
         random = ["random surface with the fitted spectrum:", "", "[surface]"]
         random += [f"{key} = {json.dumps(value)}" for key, value in table.items()]
         lines += [
-            *_fit_lines(summary.fit, summary.copies, metres),
+            *_fit_lines(summary.spectrum.fit, summary.copies, metres),
             *_predicted(theories, metres),
             *random,
         ]
     elif grid.dimension == 2:
-        lines += [f"no fit: {summary.no_fit}", *_predicted(theories, metres)]
+        lines += [f"no fit: {summary.spectrum.no_fit}", *_predicted(theories, metres)]
     title = summary.surface.preparation() or summary.surface.label
     return "\n".join([title, *(f"  {line}".rstrip() for line in lines)])
 
@@ -163,13 +151,19 @@ def as_text(summary: SurfaceSummary) -> str:
 def _predicted(scenes: dict[str, Scene], metres: str) -> list[str]:
     """Persson theory of a half-space, Eqs. (25) and (28), on one spectrum or two."""
     theories = {name: Persson(scene.shells) for name, scene in scenes.items()}
-    gap = "gap [m]" if metres else "gap"
-    heads = "".join(f"{f'{gap}, {name}':>24}" for name in theories)
-    lines = ["Persson theory, half-space:", f"  p / E_star       a_r{heads}"]
-    for p in PRESSURES * theories["spectrum"].delta_sigma:
-        gaps = "".join(f"{float(theory.mean_gap(p)):24.4g}" for theory in theories.values())
-        lines.append(f"  {p:10.3g}  {float(theories['spectrum'].contact_area(p)):8.4f}{gaps}")
-    return lines
+    pressures = PRESSURES * theories["spectrum"].delta_sigma
+    records = [
+        {"p": float(p), "a_r": float(theories["spectrum"].contact_area(p))}
+        | {name: float(theory.mean_gap(p)) for name, theory in theories.items()}
+        for p in pressures
+    ]
+    columns = [
+        TableColumn("p / E_star", "p", ".3g"),
+        TableColumn("a_r", "a_r", ".4f"),
+        *(TableColumn(f"gap, {name}", name, ".4g", metres.strip()) for name in theories),
+    ]
+    table = Table("", columns, [Group("Persson theory, half-space:", records)])
+    return table.as_text().splitlines()
 
 
 def _fit_lines(nearest: SelfAffineFit, copies: int, metres: str) -> list[str]:

@@ -112,27 +112,45 @@ class Table:
         caption = textwrap.fill(self.caption, WIDTH)
         return "\n\n".join([caption, *blocks] if caption and blocks else blocks)
 
-    def as_html(self) -> str:
-        """The table in HTML, group by group, each below its title."""
-        blocks = [
-            f"<p>{escape(group.title or self.caption)}</p>{self._tabulated(group, 'html')}"
-            for group in self.groups
-        ]
-        return "".join(blocks)
+    def as_html(self, typeset: Callable[[str], str] = escape) -> str:
+        """The table in HTML; `typeset` escapes headings and titles and sets their symbols."""
+        columns, size = self.columns, len(self.columns)
+        sides = [' class="t"' if side == "left" else "" for side in self.alignments]
+        html = f"<caption><span>{typeset(self.caption)}</span></caption>" if self.caption else ""
+        if any(column.title for column in columns):
+            heads = (typeset(column.title) for column in columns)
+            tags = ['th scope="col"'] * size
+            html += f"<thead>{_html_row(tags, sides, heads)}</thead>"
+        for group in self.groups:
+            title = f'colspan="{size}"><span>{typeset(group.title)}</span></th></tr>\n'
+            html += "<tbody>\n"
+            html += f'<tr class="group"><th scope="rowgroup" {title}' if group.title else ""
+            for record in group.records:
+                cells = (_html_cell(column.cell(record)) for column in columns)
+                html += _html_row(['th scope="row"', *["td"] * (size - 1)], sides, cells)
+            html += "</tbody>"
+        return f"<table>{html}</table>"
 
     def _block(self, group: Group) -> str:
-        lines = self._tabulated(group, "plain").splitlines()
+        lines = tabulate.tabulate(
+            [[column.cell(record) for column in self.columns] for record in group.records],
+            [column.title for column in self.columns],
+            tablefmt="plain",
+            disable_numparse=True,
+            colalign=self.alignments,
+        ).splitlines()
         indented = [f"  {line}".rstrip() for line in lines]
         return "\n".join([*filter(None, [group.title]), *group.notes, *indented])
 
-    def _tabulated(self, group: Group, tablefmt: str) -> str:
-        return tabulate.tabulate(
-            [[column.cell(record) for column in self.columns] for record in group.records],
-            [column.title for column in self.columns],
-            tablefmt=tablefmt,
-            disable_numparse=True,
-            colalign=self.alignments,
-        )
+
+def _html_row(tags: Iterable[str], sides: Iterable[str], cells: Iterable[str]) -> str:
+    rows = zip(tags, sides, cells, strict=True)
+    return f"<tr>{''.join(f'<{tag}{side}>{cell}</{tag[:2]}>' for tag, side, cell in rows)}</tr>\n"
+
+
+def _html_cell(text: str) -> str:
+    """A cell with the signs of typeset text."""
+    return "–" if text == BLANK else escape(text.replace("+-", "±"))
 
 
 def _value(record: Record, value: Value) -> Any:
@@ -140,7 +158,7 @@ def _value(record: Record, value: Value) -> Any:
 
 
 def known(value: Any) -> bool:
-    """Whether a value applies: neither None nor NaN, nor the -1 of a seed or of a count."""
+    """Whether a value applies: neither None nor the blank of a column of numbers, NaN or -1."""
     if isinstance(value, float):
         return not math.isnan(value)
     return value is not None and value != -1

@@ -14,7 +14,7 @@ from gfmd_cli.analysis.compare import (
     with_solvers,
 )
 from gfmd_cli.analysis.distribution import StressDistribution, distributions
-from gfmd_cli.analysis.edge_law import fit
+from gfmd_cli.analysis.edge_law import fit_power_law
 from gfmd_cli.analysis.ensemble import ensembles
 from gfmd_cli.analysis.table import (
     Group,
@@ -46,14 +46,17 @@ BEST = {name: TableColumn(quantity.heading, f"{name}_best", error=f"{name}_best_
         for name, quantity in QUANTITIES.items()}  # fmt: skip
 """Continuum values where they are known, else values on the grid."""
 
+THEORIES = {"persson": "Persson", "einstein": "closed form"}
+"""Headings of predictions, by the suffix of their keys."""
+
 
 def _beside_theory(
-    value: TableColumn, predicted: str, heading: str = "Persson", *, unit: str = "", si: str = ""
+    value: TableColumn, name: str, theory: str = "persson", *, unit: str = "", si: str = ""
 ) -> list[TableColumn]:
     """A quantity, its prediction and their ratio; `unit`: a column that gives both in SI units."""
+    predicted, heading = f"{name}_{theory}", THEORIES[theory]
     columns = [value, TableColumn(heading, predicted, optional=True)]
     if unit:
-        name = predicted.removesuffix("_persson")
         physical = [
             TableColumn(name, product(f"{name}_best", unit), unit=si),
             TableColumn(heading, product(predicted, unit), unit=si, optional=True),
@@ -72,17 +75,13 @@ def _continuum(record: Record, name: str) -> float | None:
 COMPARISON = (
     P_STAR,
     PRESSURE,
-    *(c for name in QUANTITIES for c in _beside_theory(TableColumn(name, name), f"{name}_persson")),
+    *(c for name in QUANTITIES for c in _beside_theory(TableColumn(name, name), name)),
     TableColumn("p ratio", ratio("p_star_persson_at_u_g", "p_star"), ".3f", optional=True),
     STATUS,
 )
 EINSTEIN = (
     P_STAR,
-    *(
-        column
-        for name in QUANTITIES
-        for column in _beside_theory(TableColumn(name, name), f"{name}_einstein", "closed form")
-    ),
+    *(c for q in QUANTITIES for c in _beside_theory(TableColumn(q, q), q, "einstein")),
 )
 EINSTEIN_CAPTION = "Comparison with the closed form for n = 0 and Gaussian heights."
 CONTINUUM = (
@@ -110,7 +109,7 @@ CONTACT_AREA, STRESS_DEVIATION, MEAN_GAP = (
     (
         P_STAR,
         PRESSURE,
-        *_beside_theory(BEST[name], f"{name}_persson", unit=quantity.scale, si=quantity.si),
+        *_beside_theory(BEST[name], name, unit=quantity.scale, si=quantity.si),
         STATUS,
     )
     for name, quantity in QUANTITIES.items()
@@ -281,7 +280,8 @@ def _law_records(stress: StressDistribution) -> list[Record]:
         "grids": f"{stress.points[0]} to {stress.points[-1]}",
         "seeds": len(stress.seeds),
     }
-    laws = [vars(law) for law in (fit(stress, "small"), fit(stress, "large")) if law is not None]
+    fits = (fit_power_law(stress, law) for law in ("small", "large"))
+    laws = [vars(fit) for fit in fits if fit is not None]
     return [record | law for law in laws or [{"law": "too few bins are resolved"}]]
 
 

@@ -1,4 +1,4 @@
-"""Contacts, values in SI units and sizes of grids in words."""
+"""Contacts, values in SI units, sizes of grids and counts in words."""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -90,6 +90,6 @@ def grid_size(rows: Sequence[Mapping[str, Any]]) -> str:
     return f"{free}{size} points{' a side' if is_square else ''}"
 
 
-def listed(words: list[str]) -> str:
+def enumeration(words: list[str]) -> str:
     """Words as a sentence lists them."""
     return words[0] if len(words) == 1 else ", ".join(words[:-1]) + " and " + words[-1]

@@ -74,7 +74,7 @@ class Trace:
 
 
 def check_target(path: Path, spec: Spec) -> None:
-    """Refuse to replace what is no bench of this spec. Raises InputError, SpaceError."""
+    """Refuse to replace anything but a bench file of this spec. Raises InputError, SpaceError."""
     check_place(path)
     if not path.exists():
         return
@@ -84,11 +84,11 @@ def check_target(path: Path, spec: Spec) -> None:
     except (OSError, KeyError, ValueError):
         old_spec = None
     if old_spec is None:
-        raise InputError(f"{path}: exists and is no bench; take another name (-o)")
+        raise InputError(f"{path}: exists and is not a bench file; take another name (-o)")
     if changed := differences(old_spec, spec.resolved()):
         lines = "\n".join(f"  {line}" for line in changed[:20])
         raise InputError(
-            f"{path}: a bench of another spec; take another name (-o).\n"
+            f"{path}: a bench file of another spec; take another name (-o).\n"
             f"Stored -> requested:\n{lines}"
         )
 
@@ -109,18 +109,18 @@ def write_bench(path: Path, spec: Spec, text: str, traces: list[Trace]) -> None:
 def read_bench(path: Path) -> list[Trace]:
     """The traces of a bench file, which is checked as a study is.
 
-    Raises InputError where there is none, StudyError where it is no bench or damaged.
+    Raises InputError where there is none, StudyError where it is not a bench file or damaged.
     """
     if not path.exists():
-        raise InputError(f"{path}: no such bench")
+        raise InputError(f"{path}: no such bench file")
     try:
         with open_hdf5(path) as file:
             if file.attrs.get(BENCH) != BENCH_LAYOUT:
-                raise StudyError(f"{path}: no bench of layout {BENCH_LAYOUT}")
+                raise StudyError(f"{path}: not a bench file of layout {BENCH_LAYOUT}")
             runs = find(file, "runs")
             return [_read_trace(find(runs, str(number))) for number in range(len(runs))]
     except DAMAGE as error:
-        raise StudyError(f"{path}: no readable bench, or damaged: {error}") from error
+        raise StudyError(f"{path}: not a readable bench file, or damaged: {error}") from error
 
 
 def _read_trace(group: Any) -> Trace:

@@ -122,7 +122,7 @@ def run_bench(spec: Spec, report: Report) -> list[Trace]:
     if LOADS[spec.load.quantity].searched:
         raise InputError(f"load.{spec.load.quantity}: a bench takes load.p_star or load.pressure")
     if any(task.auto for task in tasks):
-        raise InputError('grid.points: "auto" is no grid to compare solvers on; give a number')
+        raise InputError('grid.points: a bench takes a number, not "auto"')
     check_memory(tasks)
     traces: list[Trace] = []
     for in_scene in grouped(tasks, lambda task: task.scene_id).values():

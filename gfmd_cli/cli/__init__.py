@@ -12,7 +12,7 @@ import gfmd_cli
 from gfmd_cli.cli.bench import bench
 from gfmd_cli.cli.completion import completion, schema
 from gfmd_cli.cli.init import init, surface
-from gfmd_cli.cli.messages import tell
+from gfmd_cli.cli.messages import print_error
 from gfmd_cli.cli.results import analyze, diff, export, report
 from gfmd_cli.cli.run import run
 from gfmd_cli.cli.status import collect, status
@@ -50,7 +50,7 @@ class Commands(click.Group):
         from gfmd_cli.grid.ranks import is_first
 
         for line in message.splitlines() if is_first() else ():
-            tell(f"gfmd: {line}")
+            print_error(f"gfmd: {line}")
         return ctx.exit(status)
 
 

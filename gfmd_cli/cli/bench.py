@@ -5,7 +5,7 @@ from pathlib import Path
 
 import click
 
-from gfmd_cli.cli.messages import show, tell
+from gfmd_cli.cli.messages import print_error, print_text
 from gfmd_cli.cli.options import FILE, overrides_option
 from gfmd_cli.cli.progress import Reporter
 from gfmd_cli.status import Status
@@ -44,7 +44,7 @@ def bench(
     with Reporter(quiet) as report:
         traces = run_bench(resolved, report)
     write_bench(path, resolved, text, traces)
-    show(bench_table(traces).as_text())
+    print_text(bench_table(traces).as_text())
     for file in (path, *draw_bench(traces, figures or path.parent)):
-        tell(str(file))
+        print_error(str(file))
     sys.exit(0 if all(Status(trace.row["status"]).is_converged for trace in traces) else 1)

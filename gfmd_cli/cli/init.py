@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from gfmd_cli.cli.messages import show, tell
+from gfmd_cli.cli.messages import print_error, print_text
 from gfmd_cli.cli.options import FILE, overrides_option
 from gfmd_cli.errors import InputError
 
@@ -41,11 +41,11 @@ def init(spec: Path, scan: Path | None, overrides: tuple[str, ...]) -> None:
         of_surface = tuple(word for word in overrides if word.startswith("surface."))
         surface = read_scan(scan, of_surface)
         text, preparation = starter_of_scan(spec, surface, overrides)
-        show(preparation)
+        print_text(preparation)
         for warning in surface.warnings():
-            tell(f"gfmd: {scan}: {warning}")
+            print_error(f"gfmd: {scan}: {warning}")
     write_whole(spec, text.encode())
-    show(f"{spec}: written\nnext: {shlex.join(['gfmd', 'run', str(spec)])}")
+    print_text(f"{spec}: written\nnext: {shlex.join(['gfmd', 'run', str(spec)])}")
 
 
 @click.command()
@@ -67,31 +67,32 @@ def surface(
         gfmd surface scan.di --figure scan.png
         gfmd surface worn.npy new.npy --set surface.scale=1e-9 --set surface.periodic=false
     """
-    from gfmd_cli.analysis.surface_summary import as_text, summarise, summary_table
-    from gfmd_cli.physics.indenters import RigidSurface
+    from gfmd_cli.analysis.surface_summary import summarise, summary_table, summary_text
     from gfmd_cli.spec.parse import read_scan, read_spec
 
-    surfaces: list[tuple[str, RigidSurface]] = []
+    names, summaries = [], []
     for path in paths:
         if path.suffix == ".toml":
-            surfaces += [(each.label, each) for each in read_spec(path, overrides)[0].surface]
+            spec = read_spec(path, overrides)[0]
+            points = max(0 if grid.points == "auto" else grid.points for grid in spec.grid)
+            names += [each.label for each in spec.surface]
+            summaries += [summarise(each, points) for each in spec.surface]
         else:
-            surfaces.append((path.name, read_scan(path, overrides)))
-    names = [name for name, _ in surfaces]
-    summaries = [summarise(each) for _, each in surfaces]
+            names.append(path.name)
+            summaries.append(summarise(read_scan(path, overrides)))
     if as_json:
         click.echo(json.dumps([summary.record() for summary in summaries], indent=1))
     elif len(summaries) == 1:
-        show(as_text(summaries[0]))
+        print_text(summary_text(summaries[0]))
     else:
-        show(summary_table(summaries, names).as_text())
+        print_text(summary_table(summaries, names).as_text())
         for summary, name in zip(summaries, names, strict=True):
             for warning in summary.surface.warnings():
-                tell(f"gfmd: {name}: {warning}")
+                print_error(f"gfmd: {name}: {warning}")
     if figure is not None:
         from gfmd_cli.analysis.plotting import styled
         from gfmd_cli.analysis.surface_figure import summary_figure
 
         with styled():
             summary_figure(summaries, names).write_file(figure)
-        tell(str(figure))
+        print_error(str(figure))

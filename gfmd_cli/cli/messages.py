@@ -15,13 +15,13 @@ def printable(text: str) -> str:
     )
 
 
-def tell(text: str) -> None:
+def print_error(text: str) -> None:
     """Print on stderr; an error of writing is ignored."""
     with suppress(OSError):
         click.echo(printable(text), err=True)
 
 
-def show(text: str) -> None:
+def print_text(text: str) -> None:
     """Print on stdout; if the reader has closed the pipe, the rest is discarded."""
     try:
         click.echo(printable(text))

@@ -6,7 +6,7 @@ from contextlib import suppress
 from math import isfinite
 from typing import TYPE_CHECKING, Any
 
-from gfmd_cli.cli.messages import printable, tell
+from gfmd_cli.cli.messages import print_error, printable
 from gfmd_cli.units import count, duration
 
 if TYPE_CHECKING:
@@ -41,9 +41,9 @@ class Reporter:
         if progress.status is not None and progress.status.is_failure:
             self.failed[progress.task] = progress.message
             self._close(progress.task)
-            tell(f"gfmd: task {progress.task} ({progress.label}): {progress.message}")
+            print_error(f"gfmd: task {progress.task} ({progress.label}): {progress.message}")
         elif progress.event == "warning":
-            tell(f"gfmd: {progress.message}")
+            print_error(f"gfmd: {progress.message}")
         elif self.quiet:
             return
         elif self.terminal:
@@ -86,7 +86,7 @@ class Reporter:
         if progress.event not in ("end", "step") or now - self.last_line < LOG_EVERY:
             return
         self.last_line = now
-        tell(
+        print_error(
             f"{_left(progress)}; task {progress.task} {progress.label}: "
             f"step {progress.step} ({progress.points} points), residual "
             f"{progress.residual:.1e}, a_r {progress.a_r:.4g} {progress.status or ''}".strip("; ")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from gfmd_cli.cli.messages import show, tell
+from gfmd_cli.cli.messages import print_error, print_text
 from gfmd_cli.cli.options import FILE
 from gfmd_cli.errors import InputError
 
@@ -45,16 +45,16 @@ def analyze(study: Path, as_json: bool, figures: Path | None, theory: "Theory") 
     if as_json:
         click.echo(json.dumps(as_records(comparison), indent=1))
     else:
-        show(str(comparison))
+        print_text(str(comparison))
         for line in edge_warnings([row for curve in comparison.curves for row in curve.rows]):
-            show(f"\n{line}")
+            print_text(f"\n{line}")
         if comparison.missing:
-            show(f"\n{count(comparison.missing, 'task')} not solved yet: run the spec again.")
+            print_text(f"\n{count(comparison.missing, 'task')} not solved yet: run the spec again.")
     if figures is not None:
         from gfmd_cli.analysis.figures import draw_all
 
         for path in draw_all(comparison, figures):
-            tell(str(path))
+            print_error(str(path))
 
 
 @click.command()
@@ -89,7 +89,7 @@ def report(study: Path, other: Path | None, output: Path | None, bench: Path | N
             raise InputError(f"{path}: the report would replace what it is made from; use -o")
     check_place(path)
     write_whole(path, page(study, bench, other).encode())
-    show(str(path))
+    print_text(str(path))
 
 
 @click.command()
@@ -126,7 +126,7 @@ def export(study: Path, output: Path | None, task: int | None) -> None:
         write_netcdf(study, output)
     else:
         write_image(study, task, output)
-    show(str(output))
+    print_text(str(output))
 
 
 @click.command()

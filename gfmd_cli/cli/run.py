@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from gfmd_cli.cli.messages import show, tell
+from gfmd_cli.cli.messages import print_error, print_text
 from gfmd_cli.cli.options import FILE, counted, output_option, overrides_option, study_path
 from gfmd_cli.cli.progress import Reporter
 from gfmd_cli.errors import InputError
@@ -25,10 +25,10 @@ def _shard(context: click.Context, parameter: click.Parameter, text: str | None)
     """ "I/N" as two numbers, 0 <= I < N."""
     if text is None:
         return 0, 1
-    index, _, shards = text.partition("/")
-    if not (index.isdecimal() and shards.isdecimal() and int(index) < int(shards)):
+    index, _, count = text.partition("/")
+    if not (index.isdecimal() and count.isdecimal() and int(index) < int(count)):
         raise InputError(f"--shard {text}: write I/N with 0 <= I < N, such as 0/8")
-    return int(index), int(shards)
+    return int(index), int(count)
 
 
 @click.command()
@@ -131,7 +131,7 @@ def _run(spec: "Spec", text: str, path: Path, quiet: bool, options: "RunOptions"
     if first and not quiet:
         _print_results(spec, path, options, counts, reporter.failed)
     elif first and unconverged:
-        tell(f"gfmd: {path}: {counted(counts)}")
+        print_error(f"gfmd: {path}: {counted(counts)}")
     return unconverged
 
 
@@ -157,20 +157,21 @@ def _print_results(
     indices = {task.id: task.index for task in options.share_of(tasks)}
     rows = [row | {"task": indices[row["task_id"]]} for row in stored if row["task_id"] in indices]
     if table := run_text(rows):
-        show(f"{table}\n")
-    show(f"{path}: {counted(counts) or 'no tasks in this shard'}")
+        print_text(f"{table}\n")
+    print_text(f"{path}: {counted(counts) or 'no tasks in this shard'}")
     for line in [*unconverged(rows, failed), *edge_warnings(rows)]:
-        show(f"  {line}")
+        print_text(f"  {line}")
     ids = {task.id for task in tasks}
     for line in other_tasks([row for row in stored if row["task_id"] not in ids]):
-        show(f"  {line}")
+        print_text(f"  {line}")
     if stored:
         quoted = shlex.quote(str(path))
-        show(f"next: gfmd analyze {quoted}\n      gfmd report {quoted}")
+        print_text(f"next: gfmd analyze {quoted}\n      gfmd report {quoted}")
 
 
 def _print_tasks(spec: "Spec", path: Path, options: "RunOptions") -> None:
     """Print the tasks of a shard with their load, memory and time, and those that are done."""
+    from gfmd_cli.analysis.run_summary import task_text
     from gfmd_cli.grid.ranks import leads
     from gfmd_cli.study.resources import check_memory
     from gfmd_cli.study.store import Study, without_result
@@ -179,26 +180,15 @@ def _print_tasks(spec: "Spec", path: Path, options: "RunOptions") -> None:
     tasks = options.share_of(plan(spec))
     outcomes = {} if options.overwrite else Study(path).outcomes()
     missing = without_result(tasks, outcomes)
-    to_do = {task.id for task in missing}
     if tasks:
         check_memory(tasks, options.ranks)
     if not leads(options.ranks):
         return
-    show(f"{'task':>6} {'points':>6} {'load':>10} {'MiB':>8} {'s':>8}  scene")
-    for task in tasks:
-        done = f"  [{outcomes[task.id].status}]" if task.id in outcomes else ""
-        if done and task.id in to_do:
-            done = "  [again: more output is requested]"
-        points = f"~{task.points}" if task.auto else str(task.points)
-        surface = task.surface.label
-        swept = " ".join(word for word in task.swept if word not in surface)
-        scene = " | ".join(filter(None, (surface, task.elastomer.label, swept)))
-        show(
-            f"{task.index:6d} {points:>6} {task.load_label:>10} {task.bytes / 2**20:8.0f} "
-            f"{task.seconds:8.2g}  {scene}{done}"
-        )
-    show(
+    if tasks:
+        print_text(f"{task_text(tasks, outcomes, {task.id for task in missing})}\n")
+    print_text(
         f"{count(len(tasks), 'task')}, {len(missing)} to do, "
         f"about {sum(t.seconds for t in missing):.3g} s of one core, "
-        f"at most {max((t.bytes for t in tasks), default=0) / 2**20:.0f} MiB a task; study {path}"
+        f"at most {max((t.bytes for t in tasks), default=0) / 2**20:.0f} MiB a task; "
+        f"study {path}"
     )

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from gfmd_cli.cli.messages import show, tell
+from gfmd_cli.cli.messages import print_error, print_text
 from gfmd_cli.cli.options import (
     FILE,
     counted,
@@ -58,11 +58,11 @@ def status(
         spec = str(path)
     if shards is not None:
         check_shards(shards, len(state.tasks))
-    following = _next(state, spec, output if spec != "SPEC" else path, overrides)
+    next_command = _next_command(state, spec, output if spec != "SPEC" else path, overrides)
     if as_json:
-        click.echo(json.dumps(_as_data(state, shards, following), indent=1))
+        click.echo(json.dumps(_as_data(state, shards, next_command), indent=1))
     else:
-        show("\n".join([*_lines(state, shards), f"next: {following}"]))
+        print_text("\n".join([*_lines(state, shards), f"next: {next_command}"]))
 
 
 @click.command()
@@ -89,10 +89,10 @@ def collect(spec: Path, output: Path | None, overrides: tuple[str, ...]) -> None
         with study.work(tasks) as damaged:
             damaged += study.collect(resolved, tasks, text)
         for note in damaged:
-            tell(f"gfmd: {note}")
+            print_error(f"gfmd: {note}")
     state = state_of_spec(resolved, study.path)
-    following = _next(state, str(spec), output, overrides)
-    show("\n".join([*_lines(state, None), f"next: {following}"]))
+    next_command = _next_command(state, str(spec), output, overrides)
+    print_text("\n".join([*_lines(state, None), f"next: {next_command}"]))
     sys.exit(0 if state.converged else 1)
 
 
@@ -117,7 +117,9 @@ def _lines(state: "StudyState", shards: int | None) -> list[str]:
     return lines
 
 
-def _next(state: "StudyState", spec: str, output: Path | None, overrides: tuple[str, ...]) -> str:
+def _next_command(
+    state: "StudyState", spec: str, output: Path | None, overrides: tuple[str, ...]
+) -> str:
     """The command to run next."""
     from gfmd_cli.study.slurm import SUFFIX
 
@@ -137,7 +139,7 @@ def _saved(task: int, saved: "Saved") -> dict[str, Any]:
     return data | ({} if isfinite(saved.residual) else {"residual": None})  # JSON has no NaN
 
 
-def _as_data(state: "StudyState", shards: int | None, following: str) -> dict[str, Any]:
+def _as_data(state: "StudyState", shards: int | None, next_command: str) -> dict[str, Any]:
     """The same as plain data."""
     counts = state.counts
     data: dict[str, Any] = {
@@ -151,7 +153,7 @@ def _as_data(state: "StudyState", shards: int | None, following: str) -> dict[st
         "records": state.records,
         "others": state.others,
         "damaged": state.damaged,
-        "next": following,
+        "next": next_command,
     }
     if shards is not None:
         data["shards"] = [dict(state.shard(index, shards)) for index in range(shards)]

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from gfmd_cli.cli.messages import show
+from gfmd_cli.cli.messages import print_text
 from gfmd_cli.cli.options import FILE, output_option, overrides_option, repeated, study_path
 from gfmd_cli.errors import InputError
 from gfmd_cli.units import count
@@ -82,14 +82,14 @@ def submit(
     )
     words = shlex.join([str(spec), *repeated(output, overrides)])
     if not job.members:
-        show(f"{study}: nothing is missing\nnext: gfmd collect {words}")
+        print_text(f"{study}: nothing is missing\nnext: gfmd collect {words}")
     elif dry_run:
         click.echo(job.text, nl=False)
         for call in (job.array_call(), job.collect_call("JOB")):
-            show(f"# {shlex.join(call)}")
+            print_text(f"# {shlex.join(call)}")
     else:
         _send(job)
-        show(f"next: gfmd status {words}")
+        print_text(f"next: gfmd status {words}")
 
 
 def _send(job: "Batch") -> None:
@@ -106,6 +106,6 @@ def _send(job: "Batch") -> None:
     if job.fresh:
         write_whole(job.path, job.text.encode())
     number = call(job.array_call()).partition(";")[0]
-    show(f"job {number}: {len(job.members)} of {count(job.shards, 'shard')}, by {job.path}")
+    print_text(f"job {number}: {len(job.members)} of {count(job.shards, 'shard')}, by {job.path}")
     collect_job = call(job.collect_call(number)).partition(";")[0]
-    show(f"job {collect_job}: collects when they have ended; logs in {job.logs}")
+    print_text(f"job {collect_job}: collects when they have ended; logs in {job.logs}")

@@ -188,7 +188,7 @@ def _checked(group: Any, path: str, compression: float) -> Any:
         raise KeyError(f"no dataset {path!r}")
     dataset = h5py.h5o.open(parent.id, name.encode())
     if not isinstance(dataset, h5py.h5d.DatasetID):
-        raise ValueError(f"{path!r} is no dataset")
+        raise ValueError(f"{path!r} is not a dataset")
     if dataset.shape is None:
         raise ValueError(f"dataset {path!r} is empty")
     storage = dataset.get_create_plist()

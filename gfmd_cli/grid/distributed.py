@@ -20,13 +20,7 @@ from gfmd_cli.grid.fft_grid import Grid, Shape
 from gfmd_cli.grid.halo import HALO_ROWS, DistributedColumns, DistributedRows, is_distributable
 from gfmd_cli.grid.ranks import Ranks, leads
 from gfmd_cli.grid.rows import LocalRows
-from gfmd_cli.grid.shared_transforms import (
-    Execute,
-    Pairs,
-    along_columns,
-    along_rows,
-    side_by_side,
-)
+from gfmd_cli.grid.shared_transforms import Execute, Pairs, along_columns, along_rows, side_by_side
 from gfmd_cli.grid.transposition import Span, Transposition, column_spans
 
 
@@ -95,7 +89,7 @@ class DistributedGrid(Grid):
         """Maximum over all processes."""
         return float(self.ranks.gather(value).max())
 
-    def column(self, symbol: Field) -> Field:
+    def along_y(self, symbol: Field) -> Field:
         """The values of a symbol along y, which the first process holds."""
         counts = [self.points_y // 2 + 1, *[0] * (self.ranks.size - 1)]
         return self._gathered(symbol[: counts[self.ranks.rank], 0], counts)

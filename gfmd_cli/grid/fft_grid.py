@@ -117,6 +117,11 @@ class Grid:
         """Sum over the grid of the products of two fields."""
         return self.total(float(np.vdot(one, other)))
 
+    def mean(self, values: Field) -> float:
+        """Mean of a field, or of some of its values, over the grid; zero without any."""
+        total, count = self.total(np.array([values.sum(), values.size]))
+        return float(total / count) if count else 0.0
+
     @property
     def own(self) -> slice:
         """The rows of the grid that a field of this process holds; all points of a line."""
@@ -155,11 +160,11 @@ class Grid:
         """|q| of every coefficient [1/m], shape `spectral_shape` (or of some of its rows)."""
         return self.mode_number(rows) * (2 * np.pi / self.length)
 
-    def line(self, symbol: Field) -> Field:
+    def along_x(self, symbol: Field) -> Field:
         """The values of a symbol along x, from q = 0 to the highest wavenumber."""
         return self.gather_columns(self.as_rows(symbol)[:1])[0]
 
-    def column(self, symbol: Field) -> Field:
+    def along_y(self, symbol: Field) -> Field:
         """The values of a symbol along y, from q = 0 to the highest wavenumber."""
         return symbol[: self.points_y // 2 + 1, 0]
 

@@ -59,11 +59,7 @@ def processor() -> str:
 
 def _here() -> dict[str, str]:
     """The processor and the versions on which plans depend."""
-    return {
-        "processor": processor(),
-        "fftw": pyfftw.fftw_version,
-        "pyfftw": pyfftw.__version__,
-    }
+    return {"processor": processor(), "fftw": pyfftw.fftw_version, "pyfftw": pyfftw.__version__}
 
 
 _without_lock: set[Path] = set()  # folders that this process could not lock

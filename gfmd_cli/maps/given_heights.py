@@ -9,12 +9,7 @@ from gfmd_cli.errors import INSTALL, InputError
 from gfmd_cli.files.atomic import new_file
 from gfmd_cli.files.hdf5 import new_hdf5, write_scale
 from gfmd_cli.maps.array_coordinates import UNIT_NAMES
-from gfmd_cli.maps.height_map import (
-    at_equal_distances,
-    check_layout,
-    check_type,
-    first_line,
-)
+from gfmd_cli.maps.height_map import at_equal_distances, check_layout, check_type, first_line
 from gfmd_cli.maps.topography import AXES
 
 

@@ -14,12 +14,8 @@ import numpy as np
 
 from gfmd_cli.errors import InputError
 from gfmd_cli.files.checksums import MAX_COMPRESSION
-from gfmd_cli.maps.array_coordinates import (
-    axes_of,
-    factor,
-    is_transposed,
-    stated_unit,
-)
+from gfmd_cli.maps.array_coordinates import axes_of, factor, is_transposed, stated_unit
+from gfmd_cli.units import left_out
 
 MAX_BYTES = 2**33  # 32768 x 32768 heights in double precision
 MAX_HEIGHT = 1e30  # in any unit; the usual values for no data are 9.97e36 (netCDF) and 3.4e38
@@ -101,7 +97,8 @@ def read_hdf5(path: Path, dataset: str | None) -> HeightMap:
         shape = _map_shape(file[name].shape or ())
         check_layout(path, shape, file[name].dtype)
         data = take(file, name, MAX_COMPRESSION)
-        packed = {"scale_factor", "add_offset"} & set(data.attrs)
+        neutral = {"scale_factor": 1, "add_offset": 0}
+        packed = {key for key in neutral.keys() & data.attrs if data.attrs[key] != neutral[key]}
         if packed:
             raise InputError(
                 f"{path}: dataset {name!r} is packed ({', '.join(sorted(packed))}); "
@@ -203,8 +200,7 @@ def only_map(path: Path, names: Sequence[str]) -> str:
 
 def listed(names: Sequence[str]) -> str:
     """Some names for a message."""
-    more = f" and {len(names) - MAX_LISTED} more" if len(names) > MAX_LISTED else ""
-    return ", ".join(names[:MAX_LISTED]) + more or "none"
+    return ", ".join([*names[:MAX_LISTED], *left_out(len(names), MAX_LISTED)]) or "none"
 
 
 def _maps(datasets: dict[str, Any]) -> list[str]:

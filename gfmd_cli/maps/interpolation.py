@@ -110,11 +110,7 @@ def at_centres(heights: Field, shape: tuple[int, ...]) -> Field:
 
 
 def monotone(
-    heights: Field,
-    shape: tuple[int, ...],
-    rows: slice = slice(None),
-    *,
-    centred: bool = False,
+    heights: Field, shape: tuple[int, ...], rows: slice = slice(None), *, centred: bool = False
 ) -> Field:
     """A periodic map or line on a finer grid of the same cell, without new maxima and minima.
 

@@ -32,10 +32,15 @@ def other_side(length: float, stated: float) -> str:
     return f"surface.length = {length:g} m replaces the side of the file, {stated:g} m"
 
 
-def scaled_side(topography: Topography, scale: float, length: float) -> str:
-    """A factor of the heights that also multiplies a side of unknown unit, to `length` [m]."""
-    if scale == 1.0 or topography.spacing is None or topography.metres:
+def unknown_unit(topography: Topography, scale: float, length: float) -> str:
+    """Positions of unknown unit; a factor of the heights multiplies the side, to `length` [m]."""
+    if topography.spacing is None or topography.metres:
         return ""
+    if scale == 1.0:
+        return (
+            "the file does not state the unit of its positions and heights; metres are assumed, "
+            f"L = {length:g} m: set surface.scale, the metres per unit"
+        )
     return (
         "surface.scale also multiplies the sides, whose unit the file does not state: "
         f"L = {length:g} m; set surface.length"

@@ -10,7 +10,7 @@ import numpy as np
 
 from gfmd_cli.errors import INSTALL, InputError
 from gfmd_cli.grid.arrays import Field
-from gfmd_cli.maps.array_coordinates import EVEN, in_metres
+from gfmd_cli.maps.array_coordinates import EVEN, METRES, in_metres
 from gfmd_cli.maps.height_map import (
     MAX_BYTES,
     REMEDY,
@@ -28,6 +28,7 @@ from gfmd_cli.maps.text_tables import (
     columns,
     in_utf8,
     table_formats,
+    units_of_columns,
     with_blanks,
 )
 
@@ -146,6 +147,12 @@ def _read_channel(path: Path, file: BinaryIO, reader: Any, dataset: str | None) 
         source += ", interpolated at equal distances"
     has_unit = scan.unit is not None
     metric_sides = None if has_unit or unsized else _sides_with_unit(channel, sides)
+    is_bare = reader.format() == "xyz" and not has_unit and metric_sides is None
+    factors = _factors(path, file, len(shape) + 1) if is_bare else []
+    if factors:
+        *along_axes, of_heights = factors
+        has_unit, heights = True, of_heights * heights
+        sides = tuple(f * side for f, side in zip(along_axes[::-1], sides, strict=True))
     return HeightMap(
         heights=heights,
         sides=None if unsized else metric_sides or sides,
@@ -209,6 +216,20 @@ def _sides_with_unit(channel: Any, sides: tuple[float, ...]) -> tuple[float, ...
     return tuple(factor * side for factor, side in zip(factors, sides, strict=True) if factor)
 
 
+def _factors(path: Path, file: BinaryIO, columns: int) -> list[float]:
+    """Metres per unit of each column of a table of positions, by its header; [] without units.
+
+    Raises InputError where only some of the columns have a unit.
+    """
+    units = units_of_columns(file, columns)
+    if units and len(units) != columns:
+        raise InputError(
+            f"{path}: the line above the table states units ({', '.join(units)}), but not one for "
+            f"each of the {columns} columns, as 'x [um] z [nm]' does: add them, or remove the line"
+        )
+    return [METRES[unit] for unit in units]
+
+
 def _with_positions(reader: Any, scan: Any) -> Any:
     """A profile with its positions, unless their distances are equal.
 
@@ -267,18 +288,27 @@ def _is_evenly_spaced(values: Field) -> bool:
 
 
 def _check_all_rows_read(path: Path, file: BinaryIO, rows: int, columns: int) -> None:
-    """Raise InputError where a table has more rows than were read.
+    """Raise InputError where a table has more rows than were read, or is two tables.
 
     The reader skips lines with words, also in the table, where they would shift all rows below.
     """
     file.seek(0)
     lengths = [len(line.split()) for line in file]
+    first = next((i for i, length in enumerate(lengths) if length == columns), 0)
+    last = len(lengths) - next((i for i, length in enumerate(lengths[::-1]) if length), 0)
+    empty = lengths[first:last].count(0)
+    if 0 < empty < rows - 1:
+        number = lengths.index(0, first) + 1
+        raise InputError(
+            f"{path}:{number}: an empty line in the table: several maps? Save each in its own file"
+        )
     if lengths.count(columns) <= rows:
         return
     file.seek(0)
     for number, line in enumerate(file, 1):
         words = [word for word in line.split() if not _is_number(word)]
-        if lengths[number - 1] == columns and 0 < len(words) <= columns / 2:
+        is_row = lengths[number - 1] == columns and words
+        if is_row and (len(words) <= columns / 2 or len(set(words)) == 1):
             raise InputError(
                 f"{path}:{number}: {words[0].decode(errors='replace')!r} in a row of the table is "
                 "no number; write NaN for a missing height, and save text without a byte order mark"

@@ -9,9 +9,12 @@ import os
 import re
 from collections.abc import Iterator
 from io import BytesIO
+from itertools import islice
 from typing import Any, BinaryIO
 
 import numpy as np
+
+from gfmd_cli.maps.array_coordinates import in_metres
 
 WINDOW = 2**21  # bytes read at a time: 32768 heights of 25 digits take less than half of it
 WINDOWS = 32  # of a file; those of a larger one leave gaps
@@ -44,6 +47,19 @@ def table_formats(file: BinaryIO) -> set[str]:
 def columns(file: BinaryIO) -> int:
     """Columns of a table of numbers between any separators, 0 for any other file."""
     return _columns(file, b" \t,;")
+
+
+def units_of_columns(file: BinaryIO, columns: int) -> list[str]:
+    """The known units of length in the line above the first row of a table, as in "x [um]"."""
+    file.seek(0)
+    above = b""
+    for line in islice(file, HEADER_LINES + 1):
+        if len(re.split(rb"[\s,;]+", line.strip(b" \t\r\n,;"))) == columns and _counts(line):
+            break
+        above = line.strip() or above
+    file.seek(0)
+    words = re.split(r"[\s,;:=/_()\[\]\"#]+", above.decode(errors="replace"))
+    return [word for word in words if in_metres(word) is not None]
 
 
 def with_blanks(file: BinaryIO) -> tuple[BinaryIO, str]:

@@ -13,7 +13,6 @@ import numpy as np
 from pydantic import Field as Key
 from pydantic import Strict, model_validator
 
-from gfmd_cli.choice import Choice
 from gfmd_cli.errors import InputError
 from gfmd_cli.grid.arrays import Field, Mask
 from gfmd_cli.maps.height_map import (
@@ -26,6 +25,7 @@ from gfmd_cli.maps.height_map import (
     read_npy,
 )
 from gfmd_cli.maps.microscope_files import read_microscope_file
+from gfmd_cli.spec_table import SpecTable
 
 SPACING_TOLERANCE = 1e-6  # relative: files store sides in single precision or with six digits
 AXES = ("y", "x")
@@ -33,7 +33,7 @@ AXES = ("y", "x")
 Interval = Annotated[tuple[Annotated[float, Key(ge=0)], float], Strict(False)]
 
 
-class Region(Choice):
+class Region(SpecTable):
     """Part of a map, such as { x = [10, 110], y = [0, 90] }, by default in pixels."""
 
     x: Interval | None = None

@@ -16,9 +16,9 @@ import numpy as np
 
 from gfmd_cli.errors import InputError
 from gfmd_cli.grid.arrays import Field, Mask, Modes, row_blocks
-from gfmd_cli.grid.compilation import kernel
 from gfmd_cli.grid.fft_grid import ALL_ROWS, Grid, Shape, multiplicity
 from gfmd_cli.grid.ranks import Ranks
+from gfmd_cli.physics import kernels
 from gfmd_cli.physics.elastomers import LinearElastomer
 from gfmd_cli.physics.indenters import RigidSurface
 from gfmd_cli.physics.persson import Shells, shells
@@ -65,14 +65,14 @@ class Contact:
         return np.where(self.may_touch, self.height, DEEP)
 
     @cached_property
-    def line(self) -> Field:
+    def k_along_x(self) -> Field:
         """k(q) of the waves along x, from q = 0 on, shape (points/2 + 1,)."""
-        return self.grid.line(self.stiffness)
+        return self.grid.along_x(self.stiffness)
 
     @property
     def exponents(self) -> tuple[float, float]:
         """Smallest and largest exponent d ln k / d ln q of the waves along x."""
-        k = self.line[1:]
+        k = self.k_along_x[1:]
         exponents = np.diff(np.log(k)) / np.diff(np.log(np.arange(1, k.size + 1)))
         return float(exponents.min()), float(exponents.max())
 
@@ -83,11 +83,11 @@ class Contact:
         L is the side along x. On a square grid the waves along x are all of them.
         """
         grid = self.grid
-        m, k = np.arange(1.0, self.line.size), self.line[1:]
+        m, k = np.arange(1.0, self.k_along_x.size), self.k_along_x[1:]
         is_square = grid.points == grid.points_y and grid.length == grid.length_y
         if grid.dimension == 1 or is_square:
             return m, k
-        column = grid.column(self.stiffness)
+        column = grid.along_y(self.stiffness)
         m = np.concatenate([m, np.arange(1, column.size) * (grid.length / grid.length_y)])
         order = np.argsort(m, kind="stable")
         return m[order], np.concatenate([k, column[1:]])[order]
@@ -180,7 +180,7 @@ class Contact:
         Zero exactly at the solution. All solvers stop by this residual.
         """
         fields = map(self.grid.as_rows, (self.obstacle, u, sigma))
-        (total,) = self.grid.rows.sums(1, _squared_violations, *fields)
+        (total,) = self.grid.rows.sums(1, kernels.squared_violations, *fields)
         return self.as_residual(total)
 
     def as_residual(self, violation: float) -> float:
@@ -210,17 +210,6 @@ class Contact:
         if self.may_touch is None:
             return None
         return self.grid.average(self.may_touch.astype(np.float64), grid) > 0
-
-
-@kernel
-def _squared_violations(h, u, sigma, out, a, b):  # type: ignore[no-untyped-def]
-    """Sums of the squares of min(g, sigma), by rows."""
-    for i in range(a, b):
-        violation = 0.0
-        for j in range(h.shape[1]):
-            worst = min(u[i, j] - h[i, j], sigma[i, j])
-            violation += worst * worst
-        out[i, 0] = violation
 
 
 @dataclass(frozen=True)

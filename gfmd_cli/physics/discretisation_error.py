@@ -11,7 +11,7 @@ which the surface bends from one point to the next.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import exp, hypot, inf, isnan, log, nan, pi, sqrt
+from math import exp, hypot, inf, log, nan, pi, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -23,6 +23,7 @@ from gfmd_cli.physics.error_estimates import (
     UNKNOWN,
     Estimate,
     GridValues,
+    Verdict,
     border_stress,
     estimate_by_change,
     estimate_free,
@@ -112,6 +113,10 @@ class RoughnessScales:
     def calibrated(self) -> bool:
         """Whether the errors are those of isotropic band-limited roughness."""
         return self.band_limited and self.anisotropy <= MAX_ANISOTROPY
+
+    def phase(self, points: float) -> float:
+        """Phase w of the short waves from one point to the next."""
+        return 2 * pi * self.waves / points
 
 
 @dataclass(frozen=True)
@@ -223,9 +228,9 @@ def estimate(
         return estimates | {"sigma_p": border_stress(fine, coarse, n)}
     if tip.is_sharp and tip.dimension == 1 and n > MAX_RIDGE_EXPONENT:
         estimates = estimates | {"a_r": UNKNOWN}
-    is_undecided = fine.a_r > 0 and estimates["sigma_p"].verdict != "diverges"
+    is_undecided = fine.a_r > 0 and estimates["sigma_p"].verdict != Verdict.DIVERGES
     if is_undecided and tip.stress_order(n) < SLOWEST and n < DIVERGENT:
-        verdict = "slow" if tip.stress_order(n) > 0 else "diverges"
+        verdict = Verdict.SLOW if tip.stress_order(n) > 0 else Verdict.DIVERGES
         return estimates | {"sigma_p": replace(UNKNOWN, verdict=verdict)}
     return estimates
 
@@ -239,119 +244,129 @@ def _estimate_periodic(
     tip: Tip,
 ) -> dict[str, Estimate]:
     """Estimates with a periodic boundary."""
-    phase, bend = nan, nan
     oblong = rough is not None and rough.aspect > MAX_ASPECT
-    if rough is not None:
-        phase, bend = 2 * pi * rough.waves / fine.points, rough.curvature / fine.points**2
-        if fine.patches < MIN_PATCHES or not rough.calibrated:
-            estimates = estimate_by_change(fine, coarse, n, line=tip.dimension == 1)
-            follows_law = rough.calibrated and not oblong and tip.dimension == 2
-            if follows_law and not isnan(estimates["a_r"].error):
-                return estimates | {"a_r": _area(fine, coarse, n, phase, area_n)}
-            return estimates
+    if rough is not None and (fine.patches < MIN_PATCHES or not rough.calibrated):
+        estimates = estimate_by_change(fine, coarse, n, is_profile=tip.dimension == 1)
+        follows_law = rough.calibrated and not oblong and tip.dimension == 2
+        if follows_law and estimates["a_r"].verdict.has_error:
+            return estimates | {"a_r": _area(fine, coarse, rough, area_n)}
+        return estimates
     return {
         "a_r": estimate_by_change(fine, coarse, n)["a_r"]
         if oblong
-        else _area(fine, coarse, n, phase, area_n),
-        "sigma_p": _stress(fine, coarse, n, phase, tip),
-        "u_g": _gap(fine, coarse, n, phase, bend, tip),
+        else _area(fine, coarse, rough, area_n),
+        "sigma_p": _stress(fine, coarse, n, rough, tip),
+        "u_g": _gap(fine, coarse, n, rough, tip),
     }
 
 
-def _bar(name: str, typical: float, change: float) -> float:
+def _bar(name: str, typical: float, change: float | None) -> float:
     """Error bar from the typical error on this grid and the change from a coarser grid, if any."""
-    if isnan(change):
+    if change is None:
         return SINGLE_GRID[name] * typical
-    if isnan(typical):
-        return SINGLE_CONTACT * abs(change)
     return TWO_GRIDS[name] * hypot(change, FLOOR[name] * typical)
 
 
 def _area(
-    fine: GridValues, coarse: GridValues | None, n: float, phase: float, excess: ExcessExponent
+    fine: GridValues,
+    coarse: GridValues | None,
+    rough: RoughnessScales | None,
+    excess: ExcessExponent,
 ) -> Estimate:
     """Relative contact area: the error is of first order in the spacing, as AREA_EXCESS area_n x.
 
     Where the exponent is not that of all short waves, the excess is uncertain.
     """
-    area_n = excess.value
+    area_n, x = excess.value, fine.switches_per_point
     if area_n > MAX_AREA_EXPONENT:
-        return _plate_area(fine, coarse, rough=not isnan(phase))
-    best = max(0.0, fine.a_r - AREA_EXCESS * area_n * fine.line)
-    change = nan
+        if rough is not None:
+            return _plate_area(fine, coarse)
+        # the line force at the edge of a plate is, on a grid, a row of points
+        return Estimate(min(fine.a_r, x), nan, nan, Verdict.BOUND)
+    best = max(0.0, fine.a_r - AREA_EXCESS * area_n * x)
+    change = None
     if coarse is not None:
-        change = best - max(0.0, coarse.a_r - AREA_EXCESS * area_n * coarse.line)
-    if isnan(phase):
-        error = _bar("a_r", SINGLE_CONTACT_AREA * fine.line, change)
+        change = best - max(0.0, coarse.a_r - AREA_EXCESS * area_n * coarse.switches_per_point)
+    if rough is None:
+        error = _bar("a_r", SINGLE_CONTACT_AREA * x, change)
     else:
-        chance = AREA_CHANCE * (1 + area_n / 10) * sqrt(fine.line / fine.area) / fine.points
-        law = AREA_LAW * (area_n + 1) * fine.line * phase
-        error = hypot(chance, law, 0.0 if isnan(change) else AREA_CHANGE * change)
-    error = hypot(error, AREA_EXCESS * excess.uncertainty * fine.line)
+        chance = AREA_CHANCE * (1 + area_n / 10) * sqrt(x / fine.area) / fine.points
+        law = AREA_LAW * (area_n + 1) * x * rough.phase(fine.points)
+        error = hypot(chance, law, AREA_CHANGE * (change or 0.0))
+    error = hypot(error, AREA_EXCESS * excess.uncertainty * x)
     error = min(error, max(best, 1 - best))
     whole = min(fine.a_r - best + error, max(fine.a_r, 1 - fine.a_r))
-    return Estimate(whole, best, error, "regular")
+    return Estimate(whole, best, error, Verdict.REGULAR)
 
 
-def _plate_area(fine: GridValues, coarse: GridValues | None, *, rough: bool) -> Estimate:
-    """Relative contact area of a plate: on a grid the line force at its edge is a row of points."""
-    if not rough:
-        return Estimate(min(fine.a_r, fine.line), nan, nan, "bound")
+def _plate_area(fine: GridValues, coarse: GridValues | None) -> Estimate:
+    """Relative contact area of a plate on a rough surface."""
     if coarse is None:
         return UNKNOWN
-    step = coarse.a_r - fine.a_r
-    share = PLATE_EXCESS - PLATE_EXCESS_SLOPE * step / fine.line
+    step, x = coarse.a_r - fine.a_r, fine.switches_per_point
+    share = PLATE_EXCESS - PLATE_EXCESS_SLOPE * step / x
     best = min(1.0, max(0.0, fine.a_r - min(max(share, LONE_POINTS), PLATE_EXCESS) * step))
-    error = min(PLATE_BAR * hypot(step, PLATE_FLOOR * fine.line), max(best, 1 - best))
+    error = min(PLATE_BAR * hypot(step, PLATE_FLOOR * x), max(best, 1 - best))
     whole = min(abs(fine.a_r - best) + error, max(fine.a_r, 1 - fine.a_r))
-    return Estimate(whole, best, error, "regular")
+    return Estimate(whole, best, error, Verdict.REGULAR)
 
 
 def _stress(
-    fine: GridValues, coarse: GridValues | None, n: float, phase: float, tip: Tip
+    fine: GridValues, coarse: GridValues | None, n: float, rough: RoughnessScales | None, tip: Tip
 ) -> Estimate:
     """Stress deviation: at the edge of a patch the stress is as (1 - r^2/a^2)^(1 - n/2)."""
-    value = fine.sigma_p
     if n > MAX_STRESS_EXPONENT:
-        return Estimate(nan, nan, nan, "diverges" if n >= 3 else "slow")
-    patch = fine.line / fine.a_r
+        return replace(UNKNOWN, verdict=Verdict.DIVERGES if n >= 3 else Verdict.SLOW)
+    if rough is None:
+        return _single_stress(fine, coarse, n, tip) if coarse else UNKNOWN
+    value, patch = fine.sigma_p, fine.switches_per_point / fine.a_r
+    phase = rough.phase(fine.points)
     typical = exp(-7.08 + 2.18 * max(n, MIN_EXPONENT)) * patch**1.5 * phase**1.25 * value
     typical /= sqrt(1 - fine.a_r)
     if coarse is None:
-        error = _bar("sigma_p", typical, nan)
-        return _on_grid(value, error)
-    single = isnan(phase)
-    if single and patch > MAX_LINE:
-        return replace(UNKNOWN, is_too_coarse=True)
-    order = min(1.0, 3 - n, max(tip.stress_order(n), SLOWEST)) if single else min(2.0, 3 - n)
-    rest = (value - coarse.sigma_p) / (2**order - 1)
+        return _on_grid(value, _bar("sigma_p", typical, None))
+    rest = (value - coarse.sigma_p) / (2 ** min(2.0, 3 - n) - 1)
     error = _bar("sigma_p", typical, rest)
-    if single:
-        error = hypot(error, SINGLE_CONTACT_STRESS * max(n, MIN_EXPONENT) * value * patch)
-    if n < 1 or single:
-        return Estimate(error, value, error, "regular")
-    return Estimate(error, max(0.0, value + rest), EXTRAPOLATED * error, "regular")
+    if n < 1:
+        return _on_grid(value, error)
+    return Estimate(error, max(0.0, value + rest), EXTRAPOLATED * error, Verdict.REGULAR)
+
+
+def _single_stress(fine: GridValues, coarse: GridValues, n: float, tip: Tip) -> Estimate:
+    """Stress deviation of a single indenter, or of a line contact."""
+    value, patch = fine.sigma_p, fine.switches_per_point / fine.a_r
+    if patch > MAX_LINE:
+        return replace(UNKNOWN, is_too_coarse=True)
+    order = min(1.0, 3 - n, max(tip.stress_order(n), SLOWEST))
+    rest = (value - coarse.sigma_p) / (2**order - 1)
+    floor = SINGLE_CONTACT_STRESS * max(n, MIN_EXPONENT) * value * patch
+    return _on_grid(value, hypot(SINGLE_CONTACT * abs(rest), floor))
 
 
 def _gap(
-    fine: GridValues, coarse: GridValues | None, n: float, phase: float, bend: float, tip: Tip
+    fine: GridValues, coarse: GridValues | None, n: float, rough: RoughnessScales | None, tip: Tip
 ) -> Estimate:
     """Mean gap: the error is small and of either sign, so the value is not extrapolated."""
-    value = fine.u_g
-    patch = fine.line / fine.a_r
+    if rough is None:
+        return _single_gap(fine, coarse, tip) if coarse else UNKNOWN
+    value, patch = fine.u_g, fine.switches_per_point / fine.a_r
+    phase, bend = rough.phase(fine.points), rough.curvature / fine.points**2
     typical = (
         exp(-6.8 + 0.62 * max(n, MIN_EXPONENT)) * patch**0.25 * phase**1.5 * sqrt(bend * value)
     )
-    if isnan(phase) and coarse is not None:
-        change = abs(value - coarse.u_g)
-        across = value / (fine.points * (1 - fine.a_r)) ** 2  # points across the gap, in one line
-        smooth = max(SINGLE_CONTACT * change / 3, SINGLE_CONTACT_GAP * across)
-        sharp = max(SHARP_GAP_CHANGE * change, SHARP_GAP * across)
-        return _on_grid(value, sharp if tip.is_sharp else smooth)
-    change = nan if coarse is None else (value - coarse.u_g) / (2**ORDER - 1)
+    change = None if coarse is None else (value - coarse.u_g) / (2**ORDER - 1)
     return _on_grid(value, _bar("u_g", typical, change))
 
 
+def _single_gap(fine: GridValues, coarse: GridValues, tip: Tip) -> Estimate:
+    """Mean gap of a single indenter, or of a line contact."""
+    value, change = fine.u_g, abs(fine.u_g - coarse.u_g)
+    across = value / (fine.points * (1 - fine.a_r)) ** 2  # points across the gap, in one line
+    smooth = max(SINGLE_CONTACT * change / 3, SINGLE_CONTACT_GAP * across)
+    sharp = max(SHARP_GAP_CHANGE * change, SHARP_GAP * across)
+    return _on_grid(value, sharp if tip.is_sharp else smooth)
+
+
 def _on_grid(value: float, error: float) -> Estimate:
-    """The value on the grid as the best one, unknown if its error is NaN."""
-    return UNKNOWN if isnan(error) else Estimate(error, value, error, "regular")
+    """The value on the grid as the best one."""
+    return Estimate(error, value, error, Verdict.REGULAR)

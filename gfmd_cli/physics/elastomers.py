@@ -16,7 +16,6 @@ import numpy as np
 from pydantic import Field as Key
 from pydantic import model_validator
 
-from gfmd_cli.choice import Choice, FilePath, Positive
 from gfmd_cli.errors import InputError
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.grid.fft_grid import ALL_ROWS, Shape
@@ -24,6 +23,7 @@ from gfmd_cli.maps.interpolation import monotone_cubic
 from gfmd_cli.physics.compliance_transforms import Compliance, separated
 from gfmd_cli.physics.free_compliance import Spacings, power_law
 from gfmd_cli.physics.persson import gamma_n, gamma_slab
+from gfmd_cli.spec_table import FilePath, Positive, SpecTable
 from gfmd_cli.units import count
 
 LONG_WAVE = 1e-6  # q t up to which k of a layer is constant: (q t)^2 is below rounding
@@ -35,7 +35,7 @@ MAX_TABLE = 2**20  # bytes of a tabulated stiffness; a choice, some 40000 rows
 STEP = 1e-3  # of ln q: the truncation error is of order 1e-7, the rounding error 1e-13
 
 
-class LinearElastomer(Choice):
+class LinearElastomer(SpecTable):
     """Interface of all elastomers.
 
     A subclass implements `stiffness`, and overrides the defaults that do not hold for it.
@@ -98,9 +98,9 @@ class LinearElastomer(Choice):
         """Raise InputError for an elastomer that a free boundary does not suit."""
         if not self.decays(dimension):
             raise InputError(
-                'grid.boundary: "free" needs an elastomer whose displacement decays with the '
-                f"distance from the load; that of {self.label} in {count(dimension, 'dimension')} "
-                'does not: use "periodic"'
+                f'grid.boundary: "free" needs an elastomer whose displacement decays with the '
+                f"distance from the load; that of {self.label} in "
+                f'{count(dimension, "dimension")} does not: use "periodic"'
             )
 
     @property
@@ -387,7 +387,7 @@ class Tabulated(LinearElastomer):
         """The columns q and k, shape (rows, 2). Raises InputError for an invalid table."""
         try:
             if not self.path.is_file() or self.path.stat().st_size > MAX_TABLE:
-                raise ValueError(f"no regular file of at most {MAX_TABLE} bytes")
+                raise ValueError(f"not a regular file of at most {MAX_TABLE} bytes")
             with warnings.catch_warnings(action="ignore", category=UserWarning):
                 table = np.loadtxt(self.path, ndmin=2)  # warns of an empty file, refused below
         except (OSError, ValueError) as error:
@@ -440,8 +440,7 @@ def _compliance_of_table(rows: tuple[tuple[float, ...], ...]) -> Compliance:
 
 
 Elastomer = Annotated[
-    Power | HalfSpace | Membrane | Plate | Slab | Layer | Tabulated,
-    Key(discriminator="kind"),
+    Power | HalfSpace | Membrane | Plate | Slab | Layer | Tabulated, Key(discriminator="kind")
 ]
 
 

@@ -18,6 +18,7 @@ from dataclasses import dataclass, replace
 from math import hypot, nan
 
 from gfmd_cli.physics.observables import QUANTITIES, estimated_patches
+from gfmd_cli.status import ExplainedEnum
 
 # Error bars: FACTOR times the root of the sum of the squares of D and FLOOR times
 #   a_r: x          sigma_p: sigma_p x / a_r          u_g: u_g x / a_r
@@ -57,14 +58,35 @@ class GridValues:
     """Share of the border of the map in contact, with a free boundary; None with a periodic one."""
 
     @property
-    def line(self) -> float:
-        """Contact switches along rows and columns, per point."""
+    def switches_per_point(self) -> float:
+        """Changes between contact and gap along rows and columns, per point."""
         return self.perimeter / self.points
 
     @property
     def patches(self) -> float:
         """Estimated number of contact patches."""
         return estimated_patches(self.perimeter, self.a_r, self.area)
+
+
+class Verdict(ExplainedEnum):
+    """What is known of the continuum value of an observable; the explanation follows its name."""
+
+    REGULAR = "regular", "has an error bar"
+    EXACT = "exact", "is exact: full contact, also between the points of the grid"
+    BOUND = "bound", "is known only within an interval"
+    SLOW = "slow", "converges too slowly with the grid for a value in the continuum"
+    DIVERGES = "diverges", "has no value in the continuum"
+    UNKNOWN = "unknown", "has no error bar: the grids are too coarse for one"
+
+    @property
+    def has_error(self) -> bool:
+        """Whether the error on the grid is known."""
+        return self in (Verdict.REGULAR, Verdict.EXACT, Verdict.BOUND)
+
+    @property
+    def is_final(self) -> bool:
+        """Whether no finer grid changes it."""
+        return self in (Verdict.BOUND, Verdict.SLOW, Verdict.DIVERGES)
 
 
 @dataclass(frozen=True)
@@ -77,16 +99,12 @@ class Estimate:
     """Estimate of the continuum value."""
     continuum_error: float
     """The continuum value is within continuum +- continuum_error with the same probability."""
-    verdict: str
-    """"exact": full contact with a band-limited surface, also between the points; "regular";
-    "bound": only an interval is known; "slow": converges too slowly for a number;
-    "diverges": there is no continuum value; "unknown": no valid error can be given from these
-    grids."""
+    verdict: Verdict
     is_too_coarse: bool = False
     """Whether a single contact has too few points for an error of sigma_p: a finer grid helps."""
 
 
-UNKNOWN = Estimate(nan, nan, nan, "unknown")
+UNKNOWN = Estimate(nan, nan, nan, Verdict.UNKNOWN)
 NO_ERRORS = dict.fromkeys(QUANTITIES, 0.0)
 
 
@@ -101,24 +119,24 @@ def full_contact(fine: GridValues, errors: Mapping[str, float]) -> dict[str, Est
     `errors` are those of a stress that may be tensile between the points of the grid.
     """
     values = {"a_r": 1.0, "sigma_p": fine.sigma_p, "u_g": 0.0}
-    verdict = "regular" if errors["a_r"] > 0 else "exact"
+    verdict = Verdict.REGULAR if errors["a_r"] > 0 else Verdict.EXACT
     return {name: Estimate(errors[name], x, errors[name], verdict) for name, x in values.items()}
 
 
 def estimate_by_change(
-    fine: GridValues, coarse: GridValues | None, n: float, *, line: bool = False
+    fine: GridValues, coarse: GridValues | None, n: float, *, is_profile: bool = False
 ) -> dict[str, Estimate]:
     """Estimates from two nested grids; unknown from one grid or beyond `MAX_EXPONENT`.
 
-    `line`: whether the surface is a line profile.
+    `is_profile`: whether the surface is a line profile.
     """
     estimates = unknown()
     if n >= DIVERGENT:
-        estimates["sigma_p"] = replace(UNKNOWN, verdict="diverges")
+        estimates["sigma_p"] = replace(UNKNOWN, verdict=Verdict.DIVERGES)
     if coarse is None:
         return estimates
     by_change = {
-        "a_r": _area(fine, coarse, WIDE_CONTINUUM_FACTOR if line else CONTINUUM_FACTOR),
+        "a_r": _area(fine, coarse, WIDE_CONTINUUM_FACTOR if is_profile else CONTINUUM_FACTOR),
         "sigma_p": _on_grid("sigma_p", fine, coarse, FACTOR["sigma_p"]),
         "u_g": _on_grid("u_g", fine, coarse, FACTOR["u_g"]),
     }
@@ -153,7 +171,7 @@ def estimate_free(
 def border_stress(fine: GridValues, coarse: GridValues | None, n: float) -> Estimate:
     """Standard deviation of a pressure that is singular at the border of the map, or at a step."""
     if n > MAX_BORDER_EXPONENT:
-        return replace(UNKNOWN, verdict="diverges" if n >= 1 else "slow")
+        return replace(UNKNOWN, verdict=Verdict.DIVERGES if n >= 1 else Verdict.SLOW)
     if coarse is None:
         return UNKNOWN
     return _on_grid("sigma_p", fine, coarse, BORDER_FACTOR / (2 ** (1 - n) - 1))
@@ -162,16 +180,16 @@ def border_stress(fine: GridValues, coarse: GridValues | None, n: float) -> Esti
 def _area(fine: GridValues, coarse: GridValues, continuum_factor: float) -> Estimate:
     """Relative contact area: of first order in the spacing, as contact lines are a point wide."""
     change = fine.a_r - coarse.a_r
-    scale = hypot(change, FLOOR["a_r"] * fine.line)
+    scale = hypot(change, FLOOR["a_r"] * fine.switches_per_point)
     best = min(max(fine.a_r + change, 0.0), 1.0)
     whole, part = max(fine.a_r, 1 - fine.a_r), max(best, 1 - best)
     error = min(FACTOR["a_r"] * scale, whole)
-    return Estimate(error, best, min(continuum_factor * scale, part), "regular")
+    return Estimate(error, best, min(continuum_factor * scale, part), Verdict.REGULAR)
 
 
 def _on_grid(name: str, fine: GridValues, coarse: GridValues, factor: float) -> Estimate:
     """sigma_p or u_g: the value on the grid is the best estimate."""
     value: float = getattr(fine, name)
     change = value - getattr(coarse, name)
-    error = factor * hypot(change, FLOOR[name] * value / fine.a_r * fine.line)
-    return Estimate(error, value, error, "regular")
+    error = factor * hypot(change, FLOOR[name] * value / fine.a_r * fine.switches_per_point)
+    return Estimate(error, value, error, Verdict.REGULAR)

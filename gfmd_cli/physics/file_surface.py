@@ -6,7 +6,6 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 import numpy as np
 from pydantic import Field as Key
 
-from gfmd_cli.choice import FilePath, Positive
 from gfmd_cli.errors import InputError
 from gfmd_cli.grid.arrays import Field, Mask, MaskedField
 from gfmd_cli.grid.fft_grid import Grid
@@ -32,6 +31,7 @@ from gfmd_cli.maps.map_preparation import (
 from gfmd_cli.maps.pictures import Picture, picture
 from gfmd_cli.maps.topography import Region, Topography, read_topography
 from gfmd_cli.physics.indenters import SMALLEST_GRID, RigidSurface
+from gfmd_cli.spec_table import FilePath, Positive
 from gfmd_cli.units import count
 
 
@@ -291,7 +291,7 @@ class FileSurface(RigidSurface):
             warnings.append(map_warnings.other_side(self.length, stated[-1]))
         if self.length is None:
             side = self._known_length() or 1.0
-            warnings.append(map_warnings.scaled_side(topography, self.scale, side))
+            warnings.append(map_warnings.unknown_unit(topography, self.scale, side))
         warnings.append(map_warnings.unit_of_heights(topography, self.scale))
         if "taper" in self.model_fields_set and self.edges != "window":
             warnings.append('surface.taper has no effect without surface.edges = "window"')

@@ -114,7 +114,7 @@ class FreeContact(Contact):
         """Compute u from sigma, u = h in contact and above it elsewhere; return the residual."""
         gap = self.free.displacement(sigma, out=self.grid.empty())
         gap -= self.height
-        gap -= mean_over(self.grid, gap, sigma > 0)
+        gap -= self.grid.mean(gap[sigma > 0])
         residual = self.residual(gap + self.height, sigma)
         self.set_displacement(u, gap, sigma > 0)
         return residual
@@ -240,10 +240,3 @@ def twice(grid: Grid) -> Grid:
     if grid.dimension == 1:
         return along_x
     return replace(along_x, points_y=2 * grid.points_y, length_y=2 * grid.length_y)
-
-
-def mean_over(grid: Grid, values: Field, where: Mask) -> float:
-    """Mean of some values of a field over the grid; zero without any."""
-    chosen = values[where]
-    total, count = grid.total(np.array([chosen.sum(), chosen.size]))
-    return float(total / count) if count else 0.0

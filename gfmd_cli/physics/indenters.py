@@ -12,16 +12,16 @@ import numpy as np
 from pydantic import Field as Key
 from pydantic import model_validator
 
-from gfmd_cli.choice import Choice, Positive
 from gfmd_cli.grid.arrays import Field, Mask, MaskedField
 from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.maps.pictures import Picture
+from gfmd_cli.spec_table import Positive, SpecTable
 
 SMALLEST_GRID = 8  # points along an axis; a choice: smaller grids resolve no contact
 ROUNDING = 1e-9  # of a number of points that follows from a ratio of sides
 
 
-class RigidSurface(Choice):
+class RigidSurface(SpecTable):
     """Interface of all surfaces; the defaults are those of a single indenter.
 
     A subclass implements `smallest_grid` and `heights_on`, has the fields `length` and, unless it

@@ -10,10 +10,10 @@ import numpy as np
 from pydantic import Field as Key
 from pydantic import model_validator
 
-from gfmd_cli.choice import Positive, Seed
 from gfmd_cli.grid.arrays import Field, Modes
 from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.physics.indenters import SMALLEST_GRID, RigidSurface
+from gfmd_cli.spec_table import Positive, Seed
 
 
 class SelfAffine(RigidSurface):

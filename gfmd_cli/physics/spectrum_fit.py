@@ -19,6 +19,7 @@ MIN_RANGE = 3.0  # smallest q_s / q_1 of a fit; a choice
 MIN_SHELLS = 8  # of a fit with two parameters; a choice
 MAX_ITERATIONS = 40  # of fit and cut-off; ten are usual
 HURST = (0.0, 2.0)  # bounds of the fit: wider than those of a self-affine surface, 0 and 1
+NEGLIGIBLE = 1e-4  # share of the squared rms gradient; a choice: 16 bits leave 1e-5 or less
 STEP = 1e-4  # in H and ln q_r, for second differences: about eps^(1/4)
 ROUNDING = 1 - 1e-9  # factor by which sums may be too small due to rounding
 
@@ -100,7 +101,10 @@ def fit(shells: Shells, complete: float = inf) -> SelfAffineFit:
     """Fit a self-affine spectrum to that of a surface in two dimensions.
 
     The fit below q_s and the choice of q_s from the rms gradient alternate until q_s no longer
-    changes. Raises InputError where the spectrum is too narrow for a fit.
+    changes. The first fit leaves out the shortest waves if they contribute nearly nothing to the
+    rms gradient, as do those of rounded heights.
+
+    Raises InputError where the spectrum is too narrow for a fit.
 
     Parameters
     ----------
@@ -109,7 +113,9 @@ def fit(shells: Shells, complete: float = inf) -> SelfAffineFit:
     """
     q, count, power = shells.q, shells.modes, density(shells)
     isotropic = _isotropic(q, count, complete)
-    best, shell_count = np.array([0.8, np.log(2 * q[0])]), q.size
+    gradients = np.cumsum(shells.height * q**2)
+    shell_count = int(np.searchsorted(gradients, (1 - NEGLIGIBLE) * gradients[-1])) + 1
+    best = np.array([0.8, np.log(2 * q[0])])
     for _ in range(MAX_ITERATIONS):
         if shell_count < MIN_SHELLS or q[shell_count - 1] < MIN_RANGE * q[0]:
             raise InputError(

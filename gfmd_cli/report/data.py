@@ -7,15 +7,16 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from gfmd_cli.analysis.compare import Comparison, Row, compare_open
+from gfmd_cli.analysis.compare import Comparison, compare_open
 from gfmd_cli.analysis.curve_styles import without_escapes
-from gfmd_cli.analysis.figures import items_of, study_figures
+from gfmd_cli.analysis.figures import study_figures, with_styles
 from gfmd_cli.analysis.plotting import ColumnFigure
-from gfmd_cli.analysis.series import Item
+from gfmd_cli.analysis.series import StyledCurve
 from gfmd_cli.analysis.table import TableColumn
 from gfmd_cli.analysis.tables import TitledCurves, curve_title
 from gfmd_cli.analysis.wording import in_si, shown
 from gfmd_cli.bench.file import Trace
+from gfmd_cli.study.column import Row
 from gfmd_cli.study.reading import open_study, solved_rows
 
 
@@ -39,9 +40,9 @@ class ReportData:
         return study_figures(self.comparison, self.items)
 
     @cached_property
-    def items(self) -> list[Item]:
+    def items(self) -> list[StyledCurve]:
         """The curves in the order and style of the figures."""
-        return items_of(self.comparison)
+        return with_styles(self.comparison)
 
     @property
     def curves(self) -> TitledCurves:
@@ -116,7 +117,7 @@ def side_by_side(studies: Sequence[ReportData], traces: list[Trace]) -> ReportDa
     return ReportData(comparison, rows, {}, traces)
 
 
-def item_title(item: Item) -> str:
+def item_title(item: StyledCurve) -> str:
     """A curve by its name in figures and in full."""
     short, full = without_escapes(item.style.label), curve_title(item.curve)
     return full if short == item.curve.elastomer else f"{short}: {full}"

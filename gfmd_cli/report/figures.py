@@ -5,7 +5,7 @@ against error; error bars and optional observables, which are tables alone.
 """
 
 from gfmd_cli.analysis.distribution_figure import Density, densities
-from gfmd_cli.analysis.figures import VIEWS
+from gfmd_cli.analysis.figures import PANELS
 from gfmd_cli.analysis.table import Group, Table, TableColumn, product, ratio
 from gfmd_cli.analysis.tables import (
     CONTACT_AREA,
@@ -59,7 +59,7 @@ BINS = (
     TableColumn("Pr(sigma)", ratio("density", "delta_sigma"), unit="1/Pa"),
     TableColumn("Persson, Pr(sigma) Delta_sigma", "theory", optional=True),
 )
-MAX_SCENES = 6  # of a bench, each with a figure
+MAX_CONTACTS = 6  # of a bench, each with a figure; a choice
 BENCH_LABEL = "Relative error of the mean gap over transforms, and over seconds, for each solver"
 BENCH_CAPTION = (
     "Error of the mean gap over the transforms and the processor time that a solver took. Thick: "
@@ -88,28 +88,25 @@ def contact_area(data: ReportData) -> Section:
 
 def mean_gap(data: ReportData) -> Section:
     """Mean gap."""
-    table = over_pressure(
-        MEAN_GAP, "Mean gap u_g between the surfaces, over the whole interface.", data.curves
-    )
-    return Section("Mean gap", drawings=_drawings(data, "u_g"), disclosed={BEHIND: table})
+    caption = "Mean gap u_g between the surfaces, over the whole interface."
+    disclosed = {BEHIND: over_pressure(MEAN_GAP, caption, data.curves)}
+    return Section("Mean gap", drawings=_drawings(data, "u_g"), disclosed=disclosed)
 
 
 def stress_deviation(data: ReportData) -> Section:
     """Standard deviation of the stress."""
     caption = "Standard deviation sigma_p of the stress over the whole interface."
-    table = over_pressure(STRESS_DEVIATION, caption, data.curves)
-    drawings = _drawings(data, "sigma_p")
-    return Section("Stress deviation", drawings=drawings, disclosed={BEHIND: table})
+    disclosed = {BEHIND: over_pressure(STRESS_DEVIATION, caption, data.curves)}
+    return Section("Stress deviation", drawings=_drawings(data, "sigma_p"), disclosed=disclosed)
 
 
 def _drawings(data: ReportData, column: str) -> list[Drawing]:
     """The figures of a column over the pressure that the study has data for."""
+    panels = ((panel, data.figures.get(panel.name)) for panel in PANELS if panel.column == column)
     return [
-        drawing(
-            figure, view.name, f"{view.meaning}: {', '.join(figure.legend)}", f"{view.meaning}."
-        )
-        for view in VIEWS
-        if view.column == column and (figure := data.figures.get(view.name))
+        drawing(plot, panel.name, f"{panel.meaning}: {', '.join(plot.legend)}", f"{panel.meaning}.")
+        for panel, plot in panels
+        if plot is not None
     ]
 
 
@@ -163,13 +160,13 @@ def work_precision(data: ReportData) -> Section:
     if not data.traces:
         return Section(title)
     figures = list(bench_figures(data.traces).values())
-    left_out = len(figures) > MAX_SCENES
+    left_out = len(figures) > MAX_CONTACTS
     return Section(
         title,
-        notes=[f"{MAX_SCENES} of {len(figures)} scenes are shown."] if left_out else [],
+        notes=[f"{MAX_CONTACTS} of {len(figures)} contacts are shown."] if left_out else [],
         drawings=[
             drawing(figure, f"speed-{place}", BENCH_LABEL, BENCH_CAPTION, scrolls=True)
-            for place, figure in enumerate(figures[:MAX_SCENES])
+            for place, figure in enumerate(figures[:MAX_CONTACTS])
         ],
         disclosed={BEHIND: bench_table(data.traces)},
         template="work_precision.html",

@@ -5,7 +5,6 @@ from typing import Any
 
 import numpy as np
 
-from gfmd_cli.analysis.compare import Row
 from gfmd_cli.analysis.curve_styles import rgb
 from gfmd_cli.analysis.plotting import WIDTH, ColumnFigure, LegendFigure, shades
 from gfmd_cli.analysis.selection import evenly, grouped
@@ -27,6 +26,7 @@ from gfmd_cli.report.profiles import (
 )
 from gfmd_cli.report.section import Section
 from gfmd_cli.report.svg import drawing
+from gfmd_cli.study.column import Row
 from gfmd_cli.study.reading import StudyFile, open_study
 
 MAX_CONTACTS, MAX_CURVES = 12, 3  # contacts that are shown, of at most so many curves
@@ -109,10 +109,10 @@ def _contact_maps(study: StudyFile, row: Row, prefix: str) -> dict[str, Any]:
 
 def _map_figures(study: StudyFile, row: Row) -> list[tuple[str, ColumnFigure, str]]:
     """Maps of contact, stress and gap, as far as the fields for them are stored."""
-    sigma = study.datasets("fields", row["task"]).get("sigma")
-    if sigma is None or sigma.ndim != 2:
+    points = max(row["points"], row["points_y"])
+    pixels = _thumbnails(study, row["task"], -(-points // SIDE)) if plane(row) else {}
+    if "stress" not in pixels:
         return []
-    pixels = _thumbnails(study, row["task"], -(-max(sigma.shape) // SIDE))
     stress, touching = pixels["stress"], pixels.get("contact")
     red = f"red: the {100 - PERCENTILE} % of the {{}} above the scale"
     what = f"Stress; black: none, {red.format('contact')}"
@@ -131,8 +131,9 @@ def _thumbnails(study: StudyFile, task: int, step: int) -> dict[str, Field]:
     """Means over pixels of step^2 points: the stress and, as far as known, contact and gap."""
     rows: dict[str, list[Field]] = defaultdict(list)
     for block in study.blocks("fields", task, ROWS * step, ("u", "sigma", "height")):
-        rows["stress"].append(_means(block["sigma"], step))
-        if {"u", "height"} <= block.keys():
+        if "sigma" in block:
+            rows["stress"].append(_means(block["sigma"], step))
+        if {"u", "sigma", "height"} <= block.keys():
             mask = contact_points(block["height"], block["u"], block["sigma"])
             rows["contact"].append(_means(mask.astype(np.float64), step))
             rows["gap"].append(_means(block["u"] - block["height"], step))

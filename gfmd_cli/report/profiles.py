@@ -8,10 +8,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from gfmd_cli.analysis.compare import Row
 from gfmd_cli.analysis.plotting import HEIGHT, WIDTH, LegendFigure
 from gfmd_cli.analysis.wording import in_si, largest
 from gfmd_cli.grid.arrays import Field
+from gfmd_cli.study.column import Row
 from gfmd_cli.study.reading import StudyFile
 from gfmd_cli.units import scaled
 
@@ -67,8 +67,8 @@ def read_profile(study: StudyFile, row: Row) -> Profile | None:
     which can miss all contacts, only where that alone is stored.
     """
     line = not plane(row)
-    if not line and LINES.keys() | {"sigma"} <= study.datasets("fields", row["task"]).keys():
-        return _most_loaded(study, row)
+    if not line and (profile := _most_loaded(study, row)):
+        return profile
     values = study.arrays("cross_sections", row["task"])
     if line and not values:
         values = study.arrays("fields", row["task"])
@@ -81,15 +81,19 @@ def read_profile(study: StudyFile, row: Row) -> Profile | None:
     return Profile(values, position, "the cell" if line else "the diagonal", row)
 
 
-def _most_loaded(study: StudyFile, row: Row) -> Profile:
-    """The row of the grid that carries most load, of stored fields."""
-    blocks = study.blocks("fields", row["task"], ROWS, ["sigma"])
-    loads = np.concatenate(
-        [np.nan_to_num(np.maximum(block["sigma"], 0.0)).sum(axis=1) for block in blocks]
-    )
-    y = int(np.argmax(loads))
-    values = {name: data[y] for name, data in study.datasets("fields", row["task"]).items()}
-    size = values["sigma"].size
+def _most_loaded(study: StudyFile, row: Row) -> Profile | None:
+    """The row of the grid that carries most load; None where not all fields are stored."""
+    loads, values = np.empty(0), {}
+    for block in study.blocks("fields", row["task"], ROWS, (*LINES, "sigma")):
+        if len(block) <= len(LINES):
+            return None
+        of_block = np.nan_to_num(np.maximum(block["sigma"], 0.0)).sum(axis=1)
+        if of_block.max() > loads.max(initial=-1.0):
+            values = {name: data[np.argmax(of_block)].copy() for name, data in block.items()}
+        loads = np.append(loads, of_block)
+    if not values:
+        return None
+    y, size = int(np.argmax(loads)), values["sigma"].size
     position = (np.arange(size) / size + row["x_first"]) * float(row["length"])
     place = f" through the row that carries most load (y = {y / loads.size:.2f} of the side)"
     return Profile(values, position, "x", row, place)

@@ -14,6 +14,7 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
+from gfmd_cli.analysis.table import Table
 from gfmd_cli.analysis.wording import RAISED
 
 SCRIPTS = ("plotly-basic.min.js", "report.js")
@@ -27,6 +28,10 @@ SYMBOLS = {
     "C(q)": "<var>C</var>(<var>q</var>)",
     "h(q)": "<var>h</var>(<var>q</var>)",
     "sigma_p": "<var>σ</var><sub>p</sub>",
+    "lambda_r": "<var>λ</var><sub>r</sub>",
+    "lambda_s": "<var>λ</var><sub>s</sub>",
+    "q_r": "<var>q</var><sub>r</sub>",
+    "q_s": "<var>q</var><sub>s</sub>",
     "h_std": "<var>h</var><sub>std</sub>",
     "sigma": "<var>σ</var>",
     "a_r": "<var>a</var><sub>r</sub>",
@@ -76,9 +81,9 @@ def plain_label(label: str) -> str:
     return unescape(re.sub("<[^>]+>", "", html_label(label).replace("<sub>", "_")))
 
 
-def cell(text: str) -> str:
-    """A cell of a text table with the signs of typeset text."""
-    return "–" if text == "-" else text.replace("+-", "±")
+def table(content: Table) -> Markup:
+    """A table with typeset headings and titles."""
+    return Markup(clean(content.as_html(typeset)))
 
 
 @cache
@@ -93,7 +98,7 @@ def environment() -> Environment:
         lstrip_blocks=True,
     )
     result.policies["json.dumps_kwargs"] = {"separators": (",", ":")}
-    result.filters |= {"typeset": typeset, "cell": cell}
+    result.filters |= {"typeset": typeset, "table": table}
     return result
 
 

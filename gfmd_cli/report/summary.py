@@ -4,24 +4,21 @@ import math
 from collections import Counter
 from typing import NamedTuple
 
-from gfmd_cli.analysis.compare import Row, best, in_continuum
+from gfmd_cli.analysis.compare import best, in_continuum
 from gfmd_cli.analysis.run_summary import edge_warnings
 from gfmd_cli.analysis.table import known
 from gfmd_cli.analysis.tables import warnings_in
-from gfmd_cli.analysis.wording import grid_size, listed, pretty, quantity, span
+from gfmd_cli.analysis.wording import enumeration, grid_size, pretty, quantity, span
+from gfmd_cli.physics.error_estimates import Verdict
 from gfmd_cli.physics.observables import QUANTITIES
 from gfmd_cli.report.data import ReportData
+from gfmd_cli.study.column import Row
 from gfmd_cli.units import count, duration
 
 NEARLY_FULL = 0.5  # p*; above, the gap falls by decades, and a ratio of gaps tells little
 SECONDS = 120  # below, a time is given with three digits
 MAX_NAMES = 3  # elastomers and surfaces that the headline names
-UNRESOLVED = {
-    "slow": "converges too slowly with the grid for a value in the continuum",
-    "diverges": "has no value in the continuum",
-    "unknown": "has no error bar: the grids are too coarse for one",
-}
-"""Verdicts on a quantity that leave it without an error bar."""
+UNRESOLVED = [verdict for verdict in Verdict if not verdict.has_error]
 
 
 class KeyNumber(NamedTuple):
@@ -51,7 +48,7 @@ def headline(data: ReportData) -> str:
 def _names_of(names: list[str], what: str) -> str:
     if len(names) == 1:
         return f"{what} {names[0]}"
-    return count(len(names), what) + (f" ({listed(names)})" if len(names) <= MAX_NAMES else "")
+    return count(len(names), what) + (f" ({enumeration(names)})" if len(names) <= MAX_NAMES else "")
 
 
 def success(data: ReportData) -> str:
@@ -169,8 +166,7 @@ def _unsolved(data: ReportData) -> list[str]:
     total = len(data.rows)
     parts = []
     if data.failed:
-        of_all = count(total, "contact")
-        parts.append(f"{len(data.failed)} of {of_all} did not reach their tolerance")
+        parts.append(f"{len(data.failed)} of {total} contacts did not reach their tolerance")
     if data.missing:
         parts.append(f"{len(data.missing)} of {total} are not solved yet")
     return ["; ".join(parts) + "."] if parts else []
@@ -186,6 +182,6 @@ def _unresolved(data: ReportData) -> list[str]:
     )
     total = len(data.solved)
     return [
-        f"{name} {UNRESOLVED[text]} ({number} of {count(total, 'contact')})"
+        f"{name} {Verdict(text).explanation} ({number} of {total} contacts)"
         for (name, text), number in counts.items()
     ]

@@ -1,28 +1,24 @@
 """Sections: pictures of measured surfaces; power spectral densities of all surfaces."""
 
-from contextlib import suppress
-from dataclasses import dataclass
+from collections.abc import Sequence
 
 import numpy as np
 
-from gfmd_cli.analysis.compare import Row
-from gfmd_cli.analysis.curve_styles import distinct_styles, literal, shortened
+from gfmd_cli.analysis.curve_styles import distinct_labels, distinct_styles, literal
 from gfmd_cli.analysis.plotting import ColumnFigure
-from gfmd_cli.analysis.surface_figure import height_figure
+from gfmd_cli.analysis.surface_figure import height_figure, spectrum_labels
+from gfmd_cli.analysis.surface_spectrum import FIT, Spectrum, spectrum
 from gfmd_cli.analysis.table import Group, Table, TableColumn
-from gfmd_cli.errors import InputError
-from gfmd_cli.grid.arrays import Field
 from gfmd_cli.maps.pictures import Picture
 from gfmd_cli.physics.persson import Shells
-from gfmd_cli.physics.spectrum_fit import SelfAffineFit, fit
 from gfmd_cli.report.data import ReportData
 from gfmd_cli.report.section import Drawing, Section
 from gfmd_cli.report.svg import drawing
+from gfmd_cli.study.column import Row
 from gfmd_cli.study.reading import open_study
 
 MAX_PICTURES = 4  # measured surfaces that are shown; a choice
 MISSING = " Grey: missing heights."
-BANDS_PER_DECADE = 10
 MAX_SURFACES = 8  # of the figure; more cannot be told apart
 
 
@@ -58,26 +54,6 @@ def _drawings(row: Row, pictures: dict[str, Picture], place: str) -> list[Drawin
     ]
 
 
-@dataclass(frozen=True)
-class Spectrum:
-    """Power spectral density of one surface in bands of wavenumber."""
-
-    name: str
-    dimension: int
-    q: Field
-    """Mean wavenumber of each band [1/m]."""
-    density: Field
-    """[m^4], of a line contact [m^3]."""
-    modes: Field
-    """Number of modes of each band."""
-    fit: SelfAffineFit | None
-    """None where there is no range to fit."""
-    fitted: Field
-    """The density of the fit in the bands, zero beyond its cut-off."""
-    preparation: str
-    """What was read from a file and how it was treated."""
-
-
 def surface_spectrum(data: ReportData) -> Section:
     """C(q), double logarithmic."""
     scenes: dict[tuple[str, str, float], tuple[Row, Shells]] = {}
@@ -85,43 +61,37 @@ def surface_spectrum(data: ReportData) -> Section:
         row = curve.rows[0]
         key = (curve.surface, row["preparation"], row["h_std"])  # of two studies the same once
         scenes.setdefault(key, (row, curve.persson.shells))
-    spectra = [spectrum(row, shells) for row, shells in scenes.values() if shells.q.size]
-    spectra = [each for each in spectra if each.q.size]
-    drawn_spectra = spectra[:MAX_SURFACES]
-    if not drawn_spectra:
+    spectra = [(row, _spectrum(row, shells)) for row, shells in scenes.values() if shells.q.size]
+    spectra = [(row, each) for row, each in spectra if each.q.size]
+    if not spectra:
         return Section("Surface spectrum")
-    names = "; ".join(each.name for each in drawn_spectra)
-    label = f"Power spectral density of the surface over the wavenumber: {names}"
-    left_out = len(spectra) > len(drawn_spectra)
+    rows, drawn = zip(*spectra[:MAX_SURFACES], strict=True)
+    names = [str(row["surface"]) for row in rows]
+    label = f"Power spectral density of the surface over the wavenumber: {'; '.join(names)}"
+    left_out = len(spectra) > MAX_SURFACES
     more = f" The first {MAX_SURFACES} of {len(spectra)} are shown." if left_out else ""
+    fits = [
+        {"surface": name, "no_rolloff": "none within the cell", **each.fit_record}
+        for name, each in zip(names, drawn, strict=True)
+        if each.fit is not None
+    ]
     return Section(
         "Surface spectrum",
-        notes=[each.preparation for each in drawn_spectra if each.preparation],
-        drawings=[drawing(_spectrum_figure(drawn_spectra), "spectrum", label, CAPTION + more)],
+        notes=[str(row["preparation"]) for row in rows if row["preparation"]],
+        drawings=[drawing(_spectrum_figure(names, drawn), "spectrum", label, CAPTION + more)],
         disclosed={
-            "Self-affine fit": _fits(drawn_spectra),
-            "Table behind the figure": _bands(drawn_spectra),
+            "Self-affine fit": Table(FIT_CAPTION, FITS, [Group("", fits)]),
+            "Table behind the figure": _bands(names, drawn),
         },
     )
 
 
-def _fits(shown: list[Spectrum]) -> Table:
-    """The self-affine surface nearest to each."""
-    records = [
-        {
-            "surface": curve.name,
-            "hurst": fit.hurst,
-            "hurst_error": fit.hurst_error,
-            "rolloff": fit.rolloff_wavelength,
-            "rolloff_error": fit.rolloff_error,
-            "no_rolloff": "none within the cell",
-            "cutoff": fit.cutoff_wavelength,
-            "scatter": fit.scatter,
-        }
-        for curve in shown
-        if (fit := curve.fit)
-    ]
-    return Table(FIT, FITS, [Group("", records)])
+def _spectrum(row: Row, shells: Shells) -> Spectrum:
+    """The spectrum of the surface of a row."""
+    axes = slice(-row["dimension"], None)
+    sides = (row["length_y"], row["length"])[axes]
+    points = (row["points_y"], row["points"])[axes]
+    return spectrum(shells, sides, points)
 
 
 CAPTION = (
@@ -130,73 +100,19 @@ CAPTION = (
     "length), so that ⟨h²⟩ = ∫ C(q) d²q / (2π)². Waves shorter than two grid points along a side "
     "are left out. Lines: the self-affine surface nearest to it."
 )
-FITS = (
-    TableColumn("surface", "surface"),
-    TableColumn("Hurst exponent", "hurst", error="hurst_error"),
-    TableColumn("roll-off", "rolloff", unit="m", error="rolloff_error", otherwise="no_rolloff"),
-    TableColumn("cut-off", "cutoff", unit="m"),
-    TableColumn("scatter", "scatter"),
-)
-FIT = (
-    "C ~ [1 + (q/q_r)²]^(−1−H) up to q_s, most likely below q_s, with the rms height and gradient "
-    "of the surface. Scatter: 0 where phases alone are random, 1 as of Gaussian roughness, much "
-    "more where the surface is not of this kind."
+FITS = (TableColumn("surface", "surface"), *FIT)
+FIT_CAPTION = (
+    "Self-affine spectrum C ∝ [1 + (q / q_r)²]^(−1−H) up to q_s, zero above, with the Hurst "
+    "exponent H, the roll-off lambda_r = 2π / q_r and the cut-off lambda_s = 2π / q_s. H and q_r "
+    "maximise the likelihood of the spectrum below q_s; q_s gives the fit the ratio of rms "
+    "gradient to rms height of the surface. Scatter: 1 for Gaussian roughness, 0 if only the "
+    "phases are random, much larger if the spectrum of the surface has another shape."
 )
 
 
-def spectrum(row: Row, shells: Shells) -> Spectrum:
-    """The density of a surface from the sums that its shells hold.
-
-    <h^2> = sum of C over the modes, each of which has (2 pi)^d over the area of the cell in the
-    plane of q: the density is this area times the mean over the modes of a band.
-    """
-    name, length, dimension = str(row["surface"]), float(row["length"]), int(row["dimension"])
-    radius = shells.q * length / (2 * np.pi)
-    ratio = 1.0 if dimension == 1 else length / float(row["length_y"])
-    points = int(row["points"]) if dimension == 1 else min(row["points"], row["points_y"] * ratio)
-    edges = _edges(radius, 0.5 * points)
-    place = np.searchsorted(edges, radius) - 1
-    inside = (place >= 0) & (place < edges.size - 1)
-    nearest = None
-    if dimension == 2:
-        with suppress(InputError):  # too narrow
-            nearest = fit(shells, np.pi * points / length)
-    fitted = nearest.density(shells.q) * shells.modes if nearest else np.zeros_like(shells.q)
-    total, moment, modes, fitted = (
-        np.bincount(place[inside], weight[inside], edges.size - 1).astype(float)
-        for weight in (shells.height, shells.height * shells.q, shells.modes, fitted)
-    )
-    usable, unit = total > 0, length**dimension / ratio
-    return Spectrum(
-        name,
-        dimension,
-        q=moment[usable] / total[usable],
-        density=total[usable] / modes[usable] * unit,
-        modes=modes[usable],
-        fit=nearest,
-        fitted=fitted[usable] / modes[usable] * unit,
-        preparation=str(row.get("preparation", "")),
-    )
-
-
-def _edges(radius: Field, nyquist: float) -> Field:
-    """Edges of bands half-way between shells, about BANDS_PER_DECADE in a decade [2 pi / L]."""
-    between = np.sqrt(radius[1:] * radius[:-1])
-    ends = np.concatenate([[0.5 * radius[0]], between, [radius[-1] * (1 + 1e-6)]])
-    within = ends[ends < nyquist]  # on it, opposite modes are one
-    chosen = [ends[0]]
-    for edge in within[1:]:
-        if edge >= chosen[-1] * 10 ** (1 / BANDS_PER_DECADE):
-            chosen.append(edge)
-    if len(chosen) > 1:
-        chosen[-1] = within[-1]  # the last band is wider rather than that a shell is lost
-    return np.array(chosen)
-
-
-def _spectrum_figure(shown: list[Spectrum]) -> ColumnFigure:
-    power = 2 + shown[0].dimension
-    plot = ColumnFigure(r"wavenumber  $q$ (m$^{-1}$)", rf"$C(q)$ (m$^{power}$)")
-    labels = [literal(name) for name in shortened([curve.name for curve in shown])]
+def _spectrum_figure(names: list[str], shown: Sequence[Spectrum]) -> ColumnFigure:
+    plot = ColumnFigure(*spectrum_labels(shown[0]))
+    labels = [literal(name) for name in distinct_labels(names)]
     for curve, style in zip(shown, distinct_styles(labels), strict=True):
         if curve.fit is not None:
             line = {"color": style.colour, "lw": 0.7}
@@ -207,7 +123,7 @@ def _spectrum_figure(shown: list[Spectrum]) -> ColumnFigure:
     return plot
 
 
-def _bands(shown: list[Spectrum]) -> Table:
+def _bands(names: list[str], shown: Sequence[Spectrum]) -> Table:
     """The bands of wavenumber of each surface."""
     columns = (
         TableColumn("q", "q", unit="1/m"),
@@ -217,12 +133,12 @@ def _bands(shown: list[Spectrum]) -> Table:
     )
     groups = [
         Group(
-            curve.name,
+            name,
             [
                 {"q": float(q), "density": float(density), "modes": float(modes)}
                 for q, density, modes in zip(curve.q, curve.density, curve.modes, strict=True)
             ],
         )
-        for curve in shown
+        for name, curve in zip(names, shown, strict=True)
     ]
     return Table("Bands of wavenumber.", columns, groups)

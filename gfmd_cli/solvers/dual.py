@@ -28,7 +28,7 @@ import numpy as np
 from gfmd_cli.grid.arrays import Field, Mask
 from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.physics.contact import Contact
-from gfmd_cli.physics.free_contact import FreeContact, mean_over
+from gfmd_cli.physics.free_contact import FreeContact
 from gfmd_cli.solvers.loop import Solver, Start, State
 from gfmd_cli.solvers.projected_move import choose
 
@@ -101,7 +101,7 @@ class Dual(Solver):
 
     def _assess(self, contact: FreeContact, state: DualState) -> None:
         """Set the level of the gap [1], u and the residual."""
-        state.gap -= mean_over(contact.grid, state.gap, state.sigma > 0)
+        state.gap -= contact.grid.mean(state.gap[state.sigma > 0])
         state.residual = contact.residual(state.gap + contact.height, state.sigma)
         contact.set_displacement(state.u, state.gap, state.sigma > 0)
 
@@ -114,7 +114,7 @@ class Dual(Solver):
             force = np.where(chosen, state.gap, 0.0)
             contact.free.approximate_stress(force, out=z)  # [2]
             state.transforms += contact.free.preconditioner_transforms
-            z -= mean_over(contact.grid, z, chosen)
+            z -= contact.grid.mean(z[chosen])
             z[~chosen] = 0.0
             self._turn(contact.grid, state, z, force, chosen)  # [3]
             self._advance(contact, state, chosen)  # [4], [5]
@@ -130,7 +130,7 @@ class Dual(Solver):
         direction *= beta
         direction -= z
         direction[~chosen] = 0.0
-        direction[chosen] -= mean_over(grid, direction, chosen)
+        direction[chosen] -= grid.mean(direction[chosen])
         if grid.dot(direction, force) >= 0:
             np.negative(z, out=direction)
 

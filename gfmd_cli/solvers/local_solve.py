@@ -140,9 +140,8 @@ class LocalSolve:
     def correct(self, displacement: Field, entered: Mask) -> None:
         """Add tiles that were entered, and correct the operator on tiles by the exact C s."""
         if entered.any():
-            tiles = Tiles(
-                self.tiles.used | _with_neighbours(entered), is_periodic=self.tiles.is_periodic
-            )
+            used = self.tiles.used | _with_neighbours(entered)
+            tiles = Tiles(used, is_periodic=self.tiles.is_periodic)
             s = np.zeros((tiles.count, SIDE * SIDE))
             s[self.tiles.used[tiles.used]] = self.s
             self.place(tiles, s)
@@ -207,8 +206,7 @@ def _field(values: Field, points: Indices, like: Field) -> Field:
 
 def _balanced(values: Field) -> Field:
     """The values less their mean."""
-    balanced: Field = values - values.mean()
-    return balanced
+    return values - values.mean()
 
 
 def _dot(one: Field, other: Field) -> float:

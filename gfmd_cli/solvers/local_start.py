@@ -20,7 +20,7 @@ from gfmd_cli.solvers.local_solve import LocalSolve
 from gfmd_cli.solvers.loop import Start
 from gfmd_cli.solvers.tiles import SIDE, Tiles
 
-EXPONENTS = (0.2, 1.55)  # of k(q) for which there are tiles; measured from 0.25 to 1.5
+SMALLEST_EXPONENT = 0.2  # of k(q) for which there are tiles; measured from 0.25 on
 REACH = 2  # points by which the contact may grow from a grid to the next
 COARSE_TOLERANCE = 0.03  # on grids before the finest; measured: 0.01 to 0.1 differ by 5 %
 RELAXATIONS = 3  # of the displacement on the indenter; 2 to 6 take about as long
@@ -37,13 +37,20 @@ class Limits(NamedTuple):
     """Largest share of tiles that the contact can reach, for n = 0."""
     decrease: float
     """By how much this share decreases with the largest exponent n of k(q)."""
+    least_share: float
+    """The share where this is less."""
+    exponent: float
+    """Largest exponent n."""
 
     def largest_share(self, contact: Contact) -> float:
         """Largest share of tiles that a contact can reach."""
-        return self.share - self.decrease * contact.exponents[1]
+        return max(self.share - self.decrease * contact.exponents[1], self.least_share)
 
 
-LIMITS = {"periodic": Limits(512, 0.17, 0.1), "free": Limits(256, 0.25, 0.0)}
+LIMITS = {
+    "periodic": Limits(512, 0.17, 0.1, 0.012, 2.05),
+    "free": Limits(256, 0.25, 0.0, 0.0, 1.55),
+}
 """By the boundary of the contact."""
 
 
@@ -87,15 +94,15 @@ def start_from(
 
 def tiles_apply(contact: Contact) -> bool:
     """Whether the operators on tiles apply, and a solve on tiles can be faster."""
-    grid, (low, high) = contact.grid, EXPONENTS
+    grid, limits = contact.grid, LIMITS[contact.boundary]
     if grid.dimension == 1 or not grid.whole:
         return False
-    if min(grid.shape) < LIMITS[contact.boundary].points:
+    if min(grid.shape) < limits.points:
         return False
     if any(points % SIDE for points in grid.shape) or min(grid.spacings) < 0.5 * max(grid.spacings):
         return False
     smallest, largest = contact.exponents
-    return low <= smallest and largest <= high
+    return smallest >= SMALLEST_EXPONENT and largest <= limits.exponent
 
 
 def _tiles_in_reach(touching: Mask, *, is_periodic: bool) -> Tiles:

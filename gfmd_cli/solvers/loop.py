@@ -7,10 +7,10 @@ from typing import Annotated, Any, ClassVar
 
 from pydantic import Field as Key
 
-from gfmd_cli.choice import Choice
 from gfmd_cli.errors import InputError
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.physics.contact import Contact
+from gfmd_cli.spec_table import SpecTable
 from gfmd_cli.status import Status
 
 MAX_MISSES = 5  # one or two occur when sigma has drifted; this many in a row mean that rounding
@@ -61,7 +61,7 @@ class Start:
     """Stress, with a free boundary only."""
 
 
-class Solver(Choice):
+class Solver(SpecTable):
     """The keys that all kinds of solvers share."""
 
     kind: str

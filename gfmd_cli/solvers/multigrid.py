@@ -83,9 +83,9 @@ def _levels(contact: Contact) -> list[Level]:
     finer = grid.size
     for shape, rows in level_rows(grid):
         dy, dx = (side / points for side, points in zip(grid.sides, shape, strict=True))
-        line = contact.line if dx <= dy else grid.column(contact.stiffness)
+        k_along = contact.k_along_x if dx <= dy else grid.along_y(contact.stiffness)
         points = shape[1] if dx <= dy else shape[0]
-        k, k_twice = np.interp([points / 4, points / 2], np.arange(line.size), line).tolist()
+        k, k_twice = np.interp([points / 4, points / 2], np.arange(k_along.size), k_along).tolist()
         growth = k_twice / k if k > 0 else inf
         operator = _operator(dy, dx, growth, 4 * prod(shape) / finer)
         quarter = 4.0 if operator.is_squared else 2.0  # eigenvalue at a period of four points
@@ -136,9 +136,7 @@ def level_rows(grid: Grid) -> Iterator[tuple[Shape, LocalRows]]:
     shape, rows = grid.whole_shape, grid.rows
     while True:
         yield shape, rows
-        spacings = [side / points for side, points in zip(grid.sides, shape, strict=True)]
-        widest = ASPECT * min(spacings)
-        axes = [(n, spacing <= widest) for n, spacing in zip(shape, spacings, strict=True)]
+        axes = list(zip(shape, coarsened_axes(shape, grid.sides), strict=True))
         if any(n // 2 < COARSEST for n, halved in axes if halved):
             return
         coarser = tuple(_half(n) if halved else n for n, halved in axes)
@@ -149,6 +147,12 @@ def level_rows(grid: Grid) -> Iterator[tuple[Shape, LocalRows]]:
         else:
             return
         shape = coarser
+
+
+def coarsened_axes(shape: Shape, sides: tuple[float, ...]) -> list[bool]:
+    """Along which axes a grid is coarsened: where pixels are far from square, the shorter side."""
+    spacings = [side / points for side, points in zip(sides, shape, strict=True)]
+    return [spacing <= ASPECT * min(spacings) for spacing in spacings]
 
 
 def _half(points: int) -> int:

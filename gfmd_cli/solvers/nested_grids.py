@@ -14,7 +14,7 @@ from gfmd_cli.physics.observables import contact_pressure
 from gfmd_cli.solvers.direct_start import direct_start
 from gfmd_cli.solvers.local_start import COARSE_TOLERANCE, start_from, tiles_apply
 from gfmd_cli.solvers.loop import Solver, Start, State, Watch, ignore, solve
-from gfmd_cli.solvers.multigrid import ASPECT
+from gfmd_cli.solvers.multigrid import coarsened_axes
 from gfmd_cli.status import Status
 
 COARSEST = 64  # points per side of a square; a solve on as many points costs next to nothing
@@ -50,10 +50,7 @@ class Resume:
 
 
 def solve_contact(
-    contact: Contact,
-    solver: Solver,
-    watch: Watch = ignore,
-    start: Resume | Start | None = None,
+    contact: Contact, solver: Solver, watch: Watch = ignore, start: Resume | Start | None = None
 ) -> Solution:
     """Solve one contact, nested over grids.
 
@@ -137,11 +134,9 @@ def _coarser(shape: Shape, sides: tuple[float, ...]) -> Shape:
     """The next coarser grid, or the same."""
     if prod(shape) <= COARSEST ** len(shape):
         return shape
-    spacings = [side / points for side, points in zip(sides, shape, strict=True)]
-    widest = ASPECT * min(spacings)
     return tuple(
-        points if points <= FEWEST or spacing > widest else 2 * ((points + 3) // 4)
-        for points, spacing in zip(shape, spacings, strict=True)
+        2 * ((points + 3) // 4) if is_coarsened and points > FEWEST else points
+        for points, is_coarsened in zip(shape, coarsened_axes(shape, sides), strict=True)
     )
 
 
@@ -169,11 +164,7 @@ def _grids(contact: Contact, solver: Solver, start: Resume | Start | None) -> li
 
 
 def _begin(
-    solver: Solver,
-    fine: Contact,
-    coarse: Contact | None,
-    state: State | None,
-    start: Start | None,
+    solver: Solver, fine: Contact, coarse: Contact | None, state: State | None, start: Start | None
 ) -> State:
     """The first state: from a start, a coarser grid, or u flat on the highest point."""
     if start is not None:

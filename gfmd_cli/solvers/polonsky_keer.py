@@ -29,7 +29,6 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from gfmd_cli.grid.arrays import Field, Mask
-from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.physics.contact import Contact
 from gfmd_cli.solvers.loop import Solver, State
 
@@ -62,7 +61,7 @@ class PolonskyKeer(Solver):
         """Start from the compressive part of the stress that belongs to `u`."""
         sigma = contact.stress(u, out=contact.grid.empty())
         pressure = contact.clear_untouchable(np.maximum(sigma, 0.0))
-        pressure *= contact.pressure / _mean(contact.grid, pressure)
+        pressure *= contact.pressure / contact.grid.mean(pressure)
         compute_displacement = partial(contact.grid.apply, compliance(contact))
         response = compute_displacement(pressure, out=contact.grid.empty())
         return PolonskyKeerState(
@@ -86,7 +85,7 @@ class PolonskyKeer(Solver):
         while True:
             touching: Mask = s > 0
             np.subtract(w, contact.height, out=gap)
-            gap -= _mean(grid, gap, touching)  # [1]
+            gap -= grid.mean(gap[touching])  # [1]
             contact.set_displacement(state.u, gap, touching)
             contact.stress(state.u, out=state.sigma)
             state.residual = contact.residual(state.u, state.sigma)
@@ -98,7 +97,7 @@ class PolonskyKeer(Solver):
             t[~touching] = 0.0  # [3]
             state.norm = max(norm, 1e-300)
             compute_displacement(t, out=displacement)
-            displacement -= _mean(grid, displacement, touching)  # [4]
+            displacement -= grid.mean(displacement[touching])  # [4]
             curvature = grid.total(float(np.vdot(displacement, t)))
             descent = grid.total(float(np.vdot(gap, t)))
             length = descent / curvature if curvature > 0 else 0.0  # [5]
@@ -108,7 +107,7 @@ class PolonskyKeer(Solver):
             overlap = contact.clear_untouchable((s == 0) & (gap < 0))
             s[overlap] -= length * gap[overlap]  # [7]
             state.conjugate = bool(grid.total(np.count_nonzero(overlap)) == 0)
-            scale = contact.pressure / _mean(grid, s)
+            scale = contact.pressure / grid.mean(s)
             s *= scale  # [8]
             state.transforms += 2
             if cut or not state.conjugate:
@@ -119,13 +118,6 @@ class PolonskyKeer(Solver):
                 w -= displacement
                 w *= scale
             state.step += 1
-
-
-def _mean(grid: Grid, field: Field, where: Mask | None = None) -> float:
-    """Mean of a field, or of some of its points."""
-    chosen = field if where is None else field[where]
-    total, count = grid.total(np.array([chosen.sum(), chosen.size]))
-    return float(total / count)
 
 
 def compliance(contact: Contact) -> Field:

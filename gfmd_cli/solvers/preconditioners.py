@@ -14,9 +14,9 @@ from typing import Protocol
 import numpy as np
 
 from gfmd_cli.grid.arrays import Field
-from gfmd_cli.grid.compilation import kernel
 from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.physics.contact import Contact
+from gfmd_cli.solvers import preconditioner_kernels as kernels
 from gfmd_cli.solvers.contact_state import ContactState
 from gfmd_cli.solvers.multigrid import COARSEST, Multigrid, level_count, suits
 from gfmd_cli.solvers.multilevel import Multilevel
@@ -57,12 +57,12 @@ class GreensFunction:
         """See `Preconditioner.apply`."""
         grid, rows = self.grid, self.rows
         fields = (sigma, rows.interior(contact_state), threshold)
-        rows.run(_free_force, *fields, self.z)
+        rows.run(kernels.free_force, *fields, self.z)
         grid.transform()
         factors = (self.stiffness, self.screening, 1.0 / grid.size)
-        grid.spectral_rows.run(_apply_greens_function, grid.as_rows(grid.spectrum), *factors)
+        grid.spectral_rows.run(kernels.apply_greens_function, grid.as_rows(grid.spectrum), *factors)
         grid.transform_back()
-        slope, turned = rows.sums(2, _slopes, *fields, change, self.z)
+        slope, turned = rows.sums(2, kernels.slopes, *fields, change, self.z)
         return float(slope), float(turned)
 
 
@@ -80,7 +80,7 @@ def select(contact: Contact, contact_state: ContactState, threshold: int) -> Sel
     """Select a preconditioner for the points held; `contact_state` has a halo."""
     grid = contact.grid
     grid.rows.exchange_halo(contact_state)
-    held, changes = grid.rows.sums_with_halo(2, _pattern, contact_state, threshold)
+    held, changes = grid.rows.sums_with_halo(2, kernels.pattern, contact_state, threshold)
     screening, chord, exponent = _screening(contact, float(held), float(changes))
     if grid.dimension == 1:
         return Selection(screening, False)
@@ -125,51 +125,3 @@ def _screening(contact: Contact, held: float, changes: float) -> tuple[float, fl
     extrapolation = n * min(log_mode - log_m[0], 0.0)  # power law beyond the longest wave
     screening = float(np.exp(np.interp(log_mode, log_m, log_k) + extrapolation))
     return screening, chord * grid.length / min(grid.spacings), n
-
-
-@kernel
-def _pattern(contact_state, threshold, out, a, b):  # type: ignore[no-untyped-def]
-    """Numbers of points held, and of changes between neighbours along rows and columns."""
-    rows, columns = contact_state.shape
-    for i in range(a, b):
-        next_row = i + 1 if i + 1 < rows else 0
-        held = changes = 0
-        for j in range(columns):
-            here = contact_state[i, j] >= threshold
-            held += here
-            changes += here != (contact_state[next_row, j] >= threshold)
-        row = contact_state[i]
-        for j in range(columns - 1):
-            changes += (row[j] >= threshold) != (row[j + 1] >= threshold)
-        changes += (row[columns - 1] >= threshold) != (row[0] >= threshold)
-        out[i, 0], out[i, 1] = held, changes
-
-
-@kernel
-def _free_force(sigma, contact_state, threshold, padded, a, b):  # type: ignore[no-untyped-def]
-    """Write the force -sigma on the free points to `padded`, zero on those held."""
-    for i in range(a, b):
-        for j in range(sigma.shape[1]):
-            padded[i, j] = 0.0 if contact_state[i, j] >= threshold else -sigma[i, j]
-
-
-@kernel
-def _slopes(sigma, contact_state, threshold, change, z, out, a, b):  # type: ignore[no-untyped-def]
-    """Sums of z times force and of z times change over the free points."""
-    for i in range(a, b):
-        slope = turned = 0.0
-        for j in range(sigma.shape[1]):
-            free_z = 0.0 if contact_state[i, j] >= threshold else z[i, j]
-            slope -= free_z * sigma[i, j]
-            turned += free_z * change[i, j]
-        out[i, 0], out[i, 1] = slope, turned
-
-
-@kernel
-def _apply_greens_function(modes, k, screening, factor, a, b):  # type: ignore[no-untyped-def]
-    """Multiply coefficients by factor / (k(q) + screening)."""
-    for i in range(a, b):
-        for j in range(k.shape[1]):
-            weight = factor / (k[i, j] + screening)
-            modes[i, 2 * j] *= weight
-            modes[i, 2 * j + 1] *= weight

@@ -29,7 +29,7 @@ class Sort(Solver):
         """The solution; `u` is overwritten. Raises InputError if k(q) depends on q."""
         if not is_flat(contact):
             raise InputError('solver.kind: "sort" requires a stiffness independent of q (n = 0)')
-        displaced = contact.pressure / float(contact.line[-1])
+        displaced = contact.pressure / float(contact.k_along_x[-1])
         known = contact.height if contact.may_touch is None else contact.height[contact.may_touch]
         level = non_contact_height(contact.grid, known, displaced)
         np.maximum(contact.obstacle, level, out=u)

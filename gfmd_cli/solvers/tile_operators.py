@@ -112,11 +112,11 @@ class PeriodicOperators(TileOperators):
     """The operators of a periodic cell."""
 
     def __init__(self, contact: Contact) -> None:
-        grid, line, alpha = contact.grid, contact.line, _alpha(contact.grid)
-        order = 0.5 * float(np.log2(line[2] / line[1]))  # a
+        grid, k_along_x, alpha = contact.grid, contact.k_along_x, _alpha(contact.grid)
+        order = 0.5 * float(np.log2(k_along_x[2] / k_along_x[1]))  # a
         k, q = _stiffness_of_small_cell(contact)
         stiffness = _near_values(k)
-        q[0, 0], k[0, 0] = 2 * np.pi / grid.length, line[1]  # P / k is constant at small q
+        q[0, 0], k[0, 0] = 2 * np.pi / grid.length, k_along_x[1]  # P / k is constant at small q
         short_ranged = _near_values(gammainc(order, (q / (2 * alpha)) ** 2) / k)
         shape = tuple(points // COARSENING for points in grid.shape)
         super().__init__(grid, short_ranged, stiffness, shape)
@@ -140,9 +140,7 @@ class PeriodicOperators(TileOperators):
 class FreeOperators(TileOperators):
     """The operators of an elastomer of stiffness k_n q^n that extends beyond the map."""
 
-    first_node: ClassVar[int] = (
-        ORDER // 2 - 1
-    )  # splines around points beyond the border overlap tiles, too
+    first_node: ClassVar[int] = ORDER // 2 - 1  # splines beyond the border overlap tiles, too
 
     def __init__(self, contact: FreeContact) -> None:
         grid, free, near = contact.grid, contact.free, (SIDE + 1, SIDE + 1)
@@ -233,8 +231,7 @@ def _weights() -> Field:
 
 def _spline_spectrum(y: Field, x: Field) -> Field:
     """Fourier transform of the splines of a grid, at waves with so many periods per spacing."""
-    spectrum: Field = np.sinc(y)[:, None] ** ORDER * np.sinc(x) ** ORDER
-    return spectrum
+    return np.sinc(y)[:, None] ** ORDER * np.sinc(x) ** ORDER
 
 
 def _stiffness_of_small_cell(contact: Contact) -> tuple[Field, Field]:
@@ -251,5 +248,4 @@ def _stiffness_of_small_cell(contact: Contact) -> tuple[Field, Field]:
 
 def _near_values(symbol: Field) -> Field:
     """The kernel of a symbol at distances from 0 to 8 points along both axes."""
-    near: Field = np.fft.irfft2(symbol)[: SIDE + 1, : SIDE + 1]
-    return near
+    return np.fft.irfft2(symbol)[: SIDE + 1, : SIDE + 1]

@@ -11,7 +11,6 @@ from typing import Any, get_args
 
 from pydantic import TypeAdapter, ValidationError
 
-from gfmd_cli.choice import Choice
 from gfmd_cli.errors import InputError
 from gfmd_cli.physics.elastomers import Elastomer
 from gfmd_cli.physics.surfaces import Surface
@@ -30,6 +29,8 @@ from gfmd_cli.spec.models import (
     StudyTable,
     SweepTable,
 )
+from gfmd_cli.spec_table import SpecTable
+from gfmd_cli.units import left_out
 
 MAX_SHOWN = 200  # characters of what was given, in a message
 MAX_PROBLEMS = 20  # of a spec that a message lists
@@ -60,7 +61,7 @@ DEFAULT_KINDS = {"solver": "auto"}
 REQUIRED = ("surface", "elastomer", "grid", "load")
 
 
-def kinds_of(table: str) -> dict[str, type[Choice]]:
+def kinds_of(table: str) -> dict[str, type[SpecTable]]:
     """The classes of a table by their `kind`; empty for a table without kinds."""
     union = next(iter(get_args(MODELS.get(table))), None)
     return {choice.model_fields["kind"].default: choice for choice in get_args(union)}
@@ -68,7 +69,7 @@ def kinds_of(table: str) -> dict[str, type[Choice]]:
 
 Places = tuple[int | None, ...]
 """Where an entry stands in each group of paired lists; None where it has no list of the group."""
-PlacedChoice = tuple[Choice, Places]
+PlacedTable = tuple[SpecTable, Places]
 """An entry and where it stands."""
 
 
@@ -110,7 +111,7 @@ class Check:
         """Raise InputError with all that is wrong, if anything is."""
         if self.problems:
             lines = list(dict.fromkeys(self.problems))
-            more = [f"and {len(lines) - MAX_PROBLEMS} more"] if len(lines) > MAX_PROBLEMS else []
+            more = left_out(len(lines), MAX_PROBLEMS)
             raise InputError("\n".join([*lines[:MAX_PROBLEMS], *more]))
 
     def spec(self, data: dict[str, Any]) -> Spec:
@@ -141,11 +142,9 @@ class Check:
         self.refuse()
         return Spec(**tables)
 
-    def entries(
-        self, name: str, given: Any, paired: Sequence[list[str]] = ()
-    ) -> list[PlacedChoice]:
+    def entries(self, name: str, given: Any, paired: Sequence[list[str]] = ()) -> list[PlacedTable]:
         """The distinct choices of one table, with their places in the paired lists."""
-        entries: list[PlacedChoice] = []
+        entries: list[PlacedTable] = []
         for table in _alternatives(given) if name in REPEATED else [given]:
             if isinstance(table, dict):
                 entries += self._build(name, table, paired)
@@ -155,14 +154,14 @@ class Check:
 
     def _build(
         self, name: str, table: dict[str, Any], paired: Sequence[list[str]]
-    ) -> list[PlacedChoice]:
+    ) -> list[PlacedTable]:
         """The choices of one table, every combination of its lists."""
         axes = _axes(table, paired) if name in SWEPT else []
         count = prod(len(table[keys[0]]) for keys in axes)
         if not 0 < count <= MAX_SWEEP:
             self.add(name, f"its lists have {count} combinations; 1 to {MAX_SWEEP} are allowed")
             return []
-        built: list[PlacedChoice] = []
+        built: list[PlacedTable] = []
         for indices in product(*(range(len(table[keys[0]])) for keys in axes)):
             places = {key: i for keys, i in zip(axes, indices, strict=True) for key in keys}
             values = table | {key: table[key][i] for key, i in places.items()}
@@ -294,6 +293,6 @@ def _unknown(given: str, known: Iterable[str], what: str) -> str:
     return f"unknown {what} {shortened(given)!r}{hint} (known: {', '.join(known)})"
 
 
-def shortened(text: str) -> str:
+def shortened(text: str, limit: int = MAX_SHOWN) -> str:
     """A text short enough for a message."""
-    return text if len(text) <= MAX_SHOWN else text[:MAX_SHOWN] + "..."
+    return text if len(text) <= limit else text[:limit] + "..."

@@ -3,6 +3,10 @@
 import json
 from typing import Any
 
+from gfmd_cli.spec.check import shortened
+
+MAX_VALUE = 80  # characters of a value; a choice
+
 
 def differences(old: Any, new: Any, where: str = "") -> list[str]:
     """What changed between two pieces of plain data, a line for each key."""
@@ -22,7 +26,8 @@ def differences(old: Any, new: Any, where: str = "") -> list[str]:
         lines := differences(_swept(old), _swept(new), where)
     ):
         return lines  # else the combinations differ
-    return [] if old == new else [f"{where}: {_short(old)} -> {_short(new)}"]
+    texts = (shortened(json.dumps(value), MAX_VALUE) for value in (old, new))
+    return [] if old == new else [f"{where}: {' -> '.join(texts)}"]
 
 
 def _is_sweep(value: Any) -> bool:
@@ -35,8 +40,3 @@ def _swept(tables: list[dict[str, Any]]) -> dict[str, Any]:
     values = {key: [t[key] for t in tables if key in t] for key in keys}
     distinct = {key: [v for i, v in enumerate(vs) if v not in vs[:i]] for key, vs in values.items()}
     return {key: vs[0] if len(vs) == 1 else vs for key, vs in distinct.items()}
-
-
-def _short(value: Any) -> str:
-    text = json.dumps(value)
-    return text if len(text) <= 80 else text[:77] + "..."

@@ -8,7 +8,6 @@ import numpy as np
 from pydantic import Discriminator, StrictStr, Tag, model_validator
 from pydantic import Field as Key
 
-from gfmd_cli.choice import Choice, Positive
 from gfmd_cli.errors import InputError
 from gfmd_cli.files.checksums import file_digest
 from gfmd_cli.physics.contact import PRESSURES
@@ -16,6 +15,7 @@ from gfmd_cli.physics.elastomers import Elastomer, LinearElastomer
 from gfmd_cli.physics.indenters import SMALLEST_GRID, RigidSurface
 from gfmd_cli.physics.surfaces import Surface
 from gfmd_cli.solvers.auto import AnySolver
+from gfmd_cli.spec_table import Positive, SpecTable
 
 MAX_LADDER = 100_000  # pressures of one ladder; upper limit, guards against typing errors
 MAX_DECADES = 300.0  # of which a power of ten is no overflow
@@ -24,7 +24,7 @@ SWEPT = ("surface", "elastomer", "grid", "solver")
 REPEATED = (*SWEPT, "sweep")  # tables that may be given several times
 
 
-class StudyTable(Choice):
+class StudyTable(SpecTable):
     """Table [study]."""
 
     name: Annotated[StrictStr, Key(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,99}$")] = "study"
@@ -52,7 +52,7 @@ Points = Annotated[
 ]
 
 
-class GridTable(Choice):
+class GridTable(SpecTable):
     """Table [grid]."""
 
     points: Points
@@ -104,7 +104,7 @@ def _allows_free(dimension: int, elastomer: LinearElastomer, solver: AnySolver) 
     return True
 
 
-class Ladder(Choice):
+class Ladder(SpecTable):
     """The values from * 10^(i / per_decade), i = 0, 1, ..., up to `to`.
 
     The ratio of neighbouring values is fixed: a larger `to` adds values and changes no others.
@@ -191,7 +191,7 @@ def load_text(quantity: str, value: float) -> str:
     return f"{LOADS[quantity].symbol}={value:.4g}"
 
 
-class LoadTable(Choice):
+class LoadTable(SpecTable):
     """Table [load]: one of the quantities below, as a number, a list or a geometric sequence."""
 
     p_star: Pressures | None = None
@@ -242,7 +242,7 @@ class LoadTable(Choice):
         return list(dict.fromkeys(self.listed()))
 
 
-class AccuracyTable(Choice):
+class AccuracyTable(SpecTable):
     """Table [accuracy]: requested accuracy, as errors relative to the continuum value."""
 
     mean_gap: Share | None = None
@@ -268,7 +268,7 @@ class AccuracyTable(Choice):
 FieldName = Literal["u", "sigma", "height", "contact_pressure"]
 
 
-class SweepTable(Choice):
+class SweepTable(SpecTable):
     """Table [sweep]: lists that are combined value by value. All other lists multiply."""
 
     paired: Annotated[list[StrictStr], Key(min_length=2)]
@@ -285,7 +285,7 @@ class SweepTable(Choice):
         return self
 
 
-class OutputTable(Choice):
+class OutputTable(SpecTable):
     """Table [output]: results that are stored in addition to the scalar results."""
 
     histogram: bool = True
@@ -334,7 +334,7 @@ ON_REQUEST = tuple(
 """Keys of [output] that are off by default and need whole fields."""
 
 
-class Spec(Choice):
+class Spec(SpecTable):
     """A resolved run spec: every sweep expanded, every default filled in."""
 
     study: StudyTable

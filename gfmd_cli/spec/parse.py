@@ -5,14 +5,13 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from gfmd_cli.choice import Choice
 from gfmd_cli.errors import InputError
 from gfmd_cli.files.hdf5 import MAGIC
 from gfmd_cli.files.regular import open_regular
-from gfmd_cli.physics.elastomers import LinearElastomer
 from gfmd_cli.physics.file_surface import FileSurface
 from gfmd_cli.spec.check import Check, shortened
 from gfmd_cli.spec.models import LOADS, Spec
+from gfmd_cli.spec_table import SpecTable
 
 MAX_BYTES = 256 * 1024  # of a spec; a few kB are usual
 MAX_DEPTH = 16  # of tables and lists
@@ -72,21 +71,9 @@ def read_scan(path: Path, overrides: tuple[str, ...]) -> FileSurface:
     return surface.model_copy(update={"path": path})  # the path as given, for messages
 
 
-def read_elastomer(default: dict[str, Any], overrides: tuple[str, ...]) -> LinearElastomer:
-    """The elastomer of a spec that `gfmd init` writes, with overrides "elastomer.key=value".
-
-    A given kind replaces the default; of several kinds the first is taken. Raises InputError.
-    """
-    other = any(override.partition("=")[0].strip() == "elastomer.kind" for override in overrides)
-    data: dict[str, Any] = {"elastomer": {} if other else dict(default)}
-    elastomer = _choices("elastomer", data, Path("spec"), overrides)[0]
-    assert isinstance(elastomer, LinearElastomer)
-    return elastomer
-
-
 def _choices(
     name: str, data: dict[str, Any], path: Path, overrides: tuple[str, ...]
-) -> list[Choice]:
+) -> list[SpecTable]:
     """The choices of one table, with overrides applied to `data`. Raises InputError."""
     for override in overrides:
         set_override(data, override)

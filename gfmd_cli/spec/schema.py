@@ -3,9 +3,9 @@
 import json
 from typing import Any
 
-from gfmd_cli.choice import Choice
 from gfmd_cli.spec.check import DEFAULT_KINDS, MODELS, REQUIRED, kinds_of
 from gfmd_cli.spec.models import REPEATED, SWEPT
+from gfmd_cli.spec_table import SpecTable
 
 UNKNOWN_KEY = {"not": {"description": "unknown key"}}
 """No value is valid. An editor marks the key, where it marks the whole table for `false`."""
@@ -46,7 +46,7 @@ def _marking_keys(schema: dict[str, Any]) -> dict[str, Any]:
 
 
 def _table(
-    model: type[Choice], swept: bool, needs_kind: bool, shared: dict[str, Any]
+    model: type[SpecTable], swept: bool, needs_kind: bool, shared: dict[str, Any]
 ) -> dict[str, Any]:
     """The schema of one table; what it refers to goes to `shared`."""
     schema = model.model_json_schema()

@@ -11,13 +11,13 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from gfmd_cli.choice import Choice
 from gfmd_cli.errors import InputError
 from gfmd_cli.physics.contact import build_scene
 from gfmd_cli.physics.file_surface import FileSurface
 from gfmd_cli.spec.check import kinds_of
 from gfmd_cli.spec.models import with_boundary
-from gfmd_cli.spec.parse import read_elastomer, read_text, set_override, split_override
+from gfmd_cli.spec.parse import read_text, set_override, split_override
+from gfmd_cli.spec_table import SpecTable
 
 E_STAR = 2e9  # Pa, a stiff polymer
 COMMENT = "as given on the command line"
@@ -41,35 +41,40 @@ def starter_of_scan(
 
     The pressures run from p* = 0.003 to 0.3. Raises InputError if the scan cannot be used.
     """
-    elastomer = read_elastomer({"kind": "half-space", "E_star": E_STAR}, overrides)
     repeated = surface.within("periodic")
-    scene = build_scene(repeated, elastomer, repeated.smallest_grid())
     sides = dict.fromkeys(f"{side / surface.copies:.4g}" for side in reversed(surface.sides))
-    low, high = (round(log10(p_star * scene.delta_sigma)) for p_star in (0.003, 0.3))
     points = surface.own_points()
-    text = _render(
-        "scan.toml",
-        path.name,
-        scan="".join(c if c.isprintable() else "?" for c in surface.path.name),  # one comment line
-        path=relpath(surface.path, path.parent),
-        dataset=surface.dataset,
-        holes=surface.holes(),
-        missing=surface.missing,
-        level=surface.level or (None if surface.levelling() == "none" else surface.levelling()),
-        sides=" x ".join(sides),
-        h_std=scene.h_std,
-        delta_sigma=scene.delta_sigma,
-        E_star=E_STAR,
-        points=points,
-        is_finer=points > surface.smallest_grid() // surface.copies,
-        low=low,
-        high=high,
-        warnings=surface.warnings(),
-    )
-    text = with_keys(text, overrides)
-    spec = read_text(text, path, overrides)
+
+    def text(h_std: float, delta_sigma: float, elastomers: int) -> str:
+        low, high = (round(log10(p_star * delta_sigma)) for p_star in (0.003, 0.3))
+        rendered = _render(
+            "scan.toml",
+            path.name,
+            scan="".join(c if c.isprintable() else "?" for c in surface.path.name),  # one line
+            path=relpath(surface.path, path.parent),
+            dataset=surface.dataset,
+            holes=surface.holes(),
+            missing=surface.missing,
+            level=surface.level or (None if surface.levelling() == "none" else surface.levelling()),
+            sides=" x ".join(sides),
+            h_std=h_std,
+            delta_sigma=delta_sigma,
+            elastomers=elastomers,
+            E_star=E_STAR,
+            points=points,
+            is_finer=points > surface.smallest_grid() // surface.copies,
+            low=low,
+            high=high,
+            warnings=surface.warnings(),
+        )
+        return with_keys(rendered, overrides)
+
+    elastomers = read_text(text(1.0, 1.0, 1), path, overrides).elastomer
+    scene = build_scene(repeated, elastomers[0], repeated.smallest_grid())
+    finished = text(scene.h_std, scene.delta_sigma, len(elastomers))
+    spec = read_text(finished, path, overrides)
     used, grid = with_boundary(spec.surface[0], spec.elastomer[0], spec.grid[0], spec.solver[0])
-    return text, used.preparation(grid.boundary or "")
+    return finished, used.preparation(grid.boundary or "")
 
 
 def _render(template: str, file: str, **values: Any) -> str:
@@ -125,7 +130,7 @@ def with_keys(text: str, overrides: tuple[str, ...]) -> str:
 
 
 def _with_values(
-    section: str, values: dict[str, Any], given: set[str], kinds: dict[str, type[Choice]]
+    section: str, values: dict[str, Any], given: set[str], kinds: dict[str, type[SpecTable]]
 ) -> str:
     """The lines of a table with its values, those of the given keys in the place of others."""
     new = {key: _line(key, _as_toml(values[key]), COMMENT) for key in values if key in given}

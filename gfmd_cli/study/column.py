@@ -3,6 +3,9 @@
 from math import nan
 from typing import Any, NamedTuple
 
+Row = dict[str, Any]
+"""Columns of one task by name."""
+
 
 class Column(NamedTuple):
     """Name, type and meaning of a value that every task has."""

@@ -6,7 +6,6 @@ of a solved contact, `task_row` both, and `result` everything.
 
 from collections.abc import Callable, Mapping
 from dataclasses import asdict
-from typing import Any
 
 import numpy as np
 
@@ -23,14 +22,13 @@ from gfmd_cli.physics.observables import (
 from gfmd_cli.physics.patches import area_distribution
 from gfmd_cli.physics.power_spectra import autocorrelations, spectra
 from gfmd_cli.spec.models import SWEPT, OutputTable
+from gfmd_cli.study.column import Row
 from gfmd_cli.study.columns import PARAMETERS, PR_LINEAR, PR_LOGARITHMIC, empty_row
 from gfmd_cli.study.observables import OBSERVABLES, SolvedContact
 from gfmd_cli.study.plausibility import SEPARATOR, warnings_of
 from gfmd_cli.study.refinement import Solved
 from gfmd_cli.study.result import Entry, TaskResult
 from gfmd_cli.study.tasks import Task
-
-Row = dict[str, Any]
 
 
 def planned(task: Task) -> Row:

@@ -11,9 +11,9 @@ from pathlib import Path
 from types import NoneType
 from typing import Any, Literal, NamedTuple, get_args, get_origin
 
-from gfmd_cli.choice import UNIT, as_text
 from gfmd_cli.spec.check import MODELS, kinds_of
 from gfmd_cli.spec.models import SWEPT
+from gfmd_cli.spec_table import UNIT, as_text
 from gfmd_cli.study.column import Column
 
 SHARED = (

@@ -47,7 +47,8 @@ def warnings_of(task: Task, solved: Solved, results: Mapping[str, Any]) -> list[
             f"solver.tolerance = {task.solver.tolerance:g}: contact area and mean gap may be wrong "
             f"by several percent; at most {LOOSE:g} is usual"
         )
-    warnings += elastomer.warnings(scene.h_std, scene.shells.q, scene.shells.variance)
+    rms_height = scene.h_std if task.surface.rough else 0.0  # else it depends on the cell alone
+    warnings += elastomer.warnings(rms_height, scene.shells.q, scene.shells.variance)
     warnings += _load_in_jump(task, solved.solution.status, results)
     warnings += _contact_at_border(task, solved)
     units = _doubtful_unit(task, solved)
@@ -73,16 +74,24 @@ def _load_in_jump(task: Task, status: Status, results: Mapping[str, Any]) -> lis
 
 
 def _contact_at_border(task: Task, solved: Solved) -> list[str]:
-    """A warning if the contact of a single indenter meets that of its periodic copies."""
-    if task.surface.rough or task.boundary != "periodic" or solved.observables.a_r == 1:
-        return []
+    """A warning if the contact of a single indenter reaches the border of its cell.
+
+    Lines are left out: a wave or ridge is periodic by nature.
+    """
     contact, solution = solved.contact, solved.solution
+    if task.surface.rough or task.surface.dimension == 1:
+        return []
     touching = contact_points(contact.obstacle, solution.u, solution.sigma)
     if not border_contact(contact.grid, touching):
         return []
+    beyond = (
+        "where it meets that of the next periodic copy of the indenter"
+        if task.boundary == "periodic"
+        else "which acts as the edge of a punch"
+    )
     return [
-        "the contact reaches the border of the cell, where it meets that of the next periodic copy "
-        "of the indenter: enlarge surface.length for a single one"
+        f"the contact reaches the border of the cell, {beyond}: enlarge surface.length for a "
+        "single indenter"
     ]
 
 
@@ -108,6 +117,7 @@ def _doubtful_unit(task: Task, solved: Solved) -> str:
         if task.quantity == "p_star":
             return f"{key} is far above full contact; {unit}: load.pressure takes Pa"
         return f"{key} is far above full contact; {unit}: are moduli, heights and load in Pa and m?"
-    if task.quantity == "pressure" and solved.contact.pressure < low:
+    is_light = task.surface.rough and solved.contact.pressure < low
+    if task.quantity == "pressure" and is_light:
         return f"{key} is hardly a contact; {unit}: are moduli, heights and load in Pa and m?"
     return ""

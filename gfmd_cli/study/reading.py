@@ -51,7 +51,7 @@ DAMAGE = (
 def check_column(column: Column, values: Any) -> None:
     """Raise ValueError for anything but one value of the kind of the column in each row."""
     if values.ndim != 1 or values.dtype.kind != KINDS[column.kind]:
-        raise ValueError(f"{column.name} is no column of {column.kind.__name__}")
+        raise ValueError(f"{column.name} is not a column of {column.kind.__name__}")
 
 
 class StudyFile:
@@ -170,13 +170,13 @@ class StudyFile:
 
     def arrays(self, group: str, task: int) -> dict[str, Field]:
         """The arrays of a task by name, none where it has no such group."""
-        return {name: data[()] for name, data in self.datasets(group, task).items()}
+        return {name: data[()] for name, data in self._datasets(group, task).items()}
 
     def blocks(
         self, group: str, task: int, rows: int, names: Iterable[str]
     ) -> Iterator[dict[str, Field]]:
         """The named arrays of a task that are stored, at most `rows` of their rows at a time."""
-        by_name = self.datasets(group, task)
+        by_name = self._datasets(group, task)
         datasets = {name: by_name[name] for name in names if name in by_name}
         size = min((data.shape[0] for data in datasets.values()), default=0)
         for start in range(0, size, rows):
@@ -202,9 +202,9 @@ class StudyFile:
         self.shells(self.rows[task]["scene"])
         self.pictures(self.rows[task]["scene"])
         for group in TASK_GROUPS:
-            self.datasets(group.name, task)
+            self._datasets(group.name, task)
 
-    def datasets(self, group: str, task: int) -> dict[str, Any]:
+    def _datasets(self, group: str, task: int) -> dict[str, Any]:
         """The arrays of a task by name, not read yet: numbers, all of the same shape."""
         place, (declared,) = f"{group}/{task}", (g for g in TASK_GROUPS if g.name == group)
         stored = find(self._file, place)
@@ -229,7 +229,7 @@ def _check_alike(place: str, datasets: Mapping[str, Any], dimensions: int) -> No
 def open_study(source: Path, opened: BinaryIO | None = None) -> Iterator[StudyFile]:
     """The study file at a path, for reading; of `opened`, where that is the file.
 
-    Raises InputError where there is none, StudyError where it is no study or damaged.
+    Raises InputError where there is none, StudyError where it is not a study or damaged.
     """
     if source.suffix == ".toml":
         raise InputError(
@@ -243,15 +243,15 @@ def open_study(source: Path, opened: BinaryIO | None = None) -> Iterator[StudyFi
             _check_layout(source, file)
             yield StudyFile(file)
     except DAMAGE as error:
-        raise StudyError(f"{source}: no readable study, or damaged: {error}") from error
+        raise StudyError(f"{source}: not a readable study, or damaged: {error}") from error
 
 
 def _check_layout(path: Path, file: Any) -> None:
     if BENCH in file.attrs:
-        raise StudyError(f"{path}: a bench, no study; `gfmd bench` prints its table")
+        raise StudyError(f"{path}: a bench file, not a study; `gfmd bench` prints its table")
     layout = file.attrs.get("layout")
     if layout is None:
-        raise StudyError(f"{path}: no study")
+        raise StudyError(f"{path}: not a study")
     if int(layout) != LAYOUT:
         writer = file.attrs.get("software_version", "?")
         raise StudyError(

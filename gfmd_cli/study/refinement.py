@@ -20,7 +20,7 @@ from gfmd_cli.physics.discretisation_error import (
     roughness_scales,
 )
 from gfmd_cli.physics.error_bounds import ErrorBounds, error_bounds, full_contact_errors
-from gfmd_cli.physics.error_estimates import NO_ERRORS, Estimate, GridValues, unknown
+from gfmd_cli.physics.error_estimates import NO_ERRORS, Estimate, GridValues, Verdict, unknown
 from gfmd_cli.physics.free_contact import SCENES
 from gfmd_cli.physics.observables import Observables, border_contact, contact_points, observe
 from gfmd_cli.physics.power_spectra import anisotropy
@@ -32,7 +32,6 @@ from gfmd_cli.study.forecast import FIRST
 from gfmd_cli.study.notes import GridResult
 from gfmd_cli.study.tasks import Task
 
-FINAL = ("bound", "slow", "diverges")  # verdicts that no finer grid changes
 ENOUGH = 3  # grids after which an unknown error stays unknown: two give all that is calibrated
 UNSOLVED = 0.1  # natural residual from which nothing is said of the continuum
 
@@ -180,9 +179,8 @@ def _continues(task: Task, solved: Solved, grids: int, options: WorkerOptions) -
     if not task.auto or task.accuracy is None:
         return points != task.points
     finer = _next_points(task, points)
-    final = FINAL if grids < ENOUGH else (*FINAL, "unknown")
     inaccurate = [solved.estimates[name] for name in _inaccurate(task, solved)]
-    improvable = any(each.verdict not in final or each.is_too_coarse for each in inaccurate)
+    improvable = any(_is_improvable(each, grids) for each in inaccurate)
     should_refine = improvable and finer <= task.accuracy.max_points
     fits = task.bytes_on(finer) <= options.memory
     if should_refine and not fits and options.reproducible:
@@ -191,6 +189,12 @@ def _continues(task: Task, solved: Solved, grids: int, options: WorkerOptions) -
             f"--reproducible give accuracy.max_points = {points}"
         )
     return should_refine and fits and solved.solution.status.is_converged
+
+
+def _is_improvable(estimate: Estimate, grids: int) -> bool:
+    """Whether a grid finer than the `grids` so far may give a smaller error."""
+    is_settled = estimate.verdict is Verdict.UNKNOWN and grids >= ENOUGH
+    return estimate.is_too_coarse or not (estimate.verdict.is_final or is_settled)
 
 
 def _inaccurate(task: Task, solved: Solved) -> list[str]:

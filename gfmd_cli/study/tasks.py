@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from gfmd_cli.choice import Choice
 from gfmd_cli.errors import InputError
 from gfmd_cli.files.checksums import digest
 from gfmd_cli.physics.elastomers import LinearElastomer
@@ -23,6 +22,7 @@ from gfmd_cli.spec.models import (
     load_text,
     with_boundary,
 )
+from gfmd_cli.spec_table import SpecTable
 from gfmd_cli.study import forecast
 
 LOAD_DIGITS = 14  # of a load that name its task: the last bit of a ladder depends on the machine
@@ -57,8 +57,8 @@ class Task:
     """Name of its surface, elastomer and grid by their content."""
     surface_sha256: str
     """Checksum of the file of the surface; "" without a file."""
-    swept: tuple[str, ...]
-    """Values of the swept keys of surface, grid and solver, as words of the label."""
+    swept: tuple[tuple[str, str], ...]
+    """Swept keys of surface, grid and solver: the table, and the value as a word of the label."""
 
     @property
     def auto(self) -> bool:
@@ -76,7 +76,8 @@ class Task:
         points = "auto" if self.auto else str(self.points)
         if not self.auto and self.points_y not in (1, self.points):
             points += f"x{self.points_y}"
-        return " ".join([self.elastomer.label, *self.swept, points, self.load_label])
+        swept = (word for _, word in self.swept)
+        return " ".join([self.elastomer.label, *swept, points, self.load_label])
 
     @property
     def load_label(self) -> str:
@@ -246,7 +247,7 @@ def _task_id(spec: Spec, resolved: dict[str, Any], tables: dict[str, Any], load:
     return digest(content)
 
 
-def _swept_keys(alternatives: list[Choice]) -> set[str]:
+def _swept_keys(alternatives: list[SpecTable]) -> set[str]:
     """The keys whose values differ between the alternatives of a table."""
     values: dict[str, set[Any]] = {}
     for choice in alternatives:
@@ -255,10 +256,12 @@ def _swept_keys(alternatives: list[Choice]) -> set[str]:
     return {key for key, different in values.items() if len(different) > 1}
 
 
-def _swept_words(chosen: dict[str, Choice], swept_keys: dict[str, set[str]]) -> tuple[str, ...]:
+def _swept_words(
+    chosen: dict[str, SpecTable], swept_keys: dict[str, set[str]]
+) -> tuple[tuple[str, str], ...]:
     """The swept keys of surface, grid and solver, as words; the label has the others already."""
-    words: list[str] = []
+    words: list[tuple[str, str]] = []
     for table in ("surface", "grid", "solver"):
         given = {"kind", *chosen[table].model_fields_set} - {"points", "points_y"}
-        words += chosen[table].words(given & swept_keys[table])
+        words += [(table, word) for word in chosen[table].words(given & swept_keys[table])]
     return tuple(words)

@@ -8,7 +8,7 @@ import numpy as np
 from gfmd_cli.analysis.curve_styles import MARKERS, CurveStyle, colours
 from gfmd_cli.analysis.distribution import distributions
 from gfmd_cli.analysis.distribution_figure import DENSITY, STRESS
-from gfmd_cli.analysis.edge_law import edge_exponent, fit
+from gfmd_cli.analysis.edge_law import edge_exponent, fit_power_law
 from gfmd_cli.analysis.figures import P_STAR
 from gfmd_cli.analysis.plotting import ColumnFigure
 from gfmd_cli.grid.arrays import Field
@@ -46,7 +46,7 @@ def _small_stress(studies: StoredStudies) -> list[Finding]:
     """Exponents of Pr(sigma) at small stress, on a surface whose edges the grids resolve."""
     paper, cases, exponents = {0.5: 0.3, 1.0: 0.6}, [], {}
     for n, group in _by_elastomer(studies, "edges").items():
-        law = fit(group[0], "small") if n in paper else None
+        law = fit_power_law(group[0], "small") if n in paper else None
         if law is None:
             continue
         exponents[n] = Value(law.exponent, law.error)

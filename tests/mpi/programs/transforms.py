@@ -37,7 +37,7 @@ def check_transforms(points, points_y):
     assert grid.total(mine.shape[0]) == points_y
     assert grid.total(columns.stop - columns.start) == points // 2 + 1
     assert np.array_equal(grid.wavenumber(), whole.wavenumber()[:, columns])
-    assert np.array_equal(grid.line(grid.wavenumber()), whole.wavenumber()[0])
+    assert np.array_equal(grid.along_x(grid.wavenumber()), whole.wavenumber()[0])
     weighted = np.abs(forward(grid, mine)) ** 2 * grid.multiplicity()
     assert np.isclose(grid.total(weighted.sum()), np.mean(field**2), rtol=1e-13)  # Parseval
     filtered = grid.apply(np.exp(-grid.wavenumber()), mine, out=grid.empty())

@@ -16,7 +16,7 @@ Seed = Annotated[int, Field(ge=0, lt=2**63)]
 FilePath = Annotated[Path, Strict(False)]
 
 
-class Choice(BaseModel):
+class SpecTable(BaseModel):
     """A table of the run spec, which refuses unknown keys, NaN and infinities."""
 
     model_config = ConfigDict(
