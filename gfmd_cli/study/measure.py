@@ -116,7 +116,7 @@ def all_columns(task: Task, solved: Solved) -> Row:
     )
 
 
-def task_row(task: Task, row: Mapping[str, Any]) -> Row:
+def task_row(task: Task, row: Mapping[str, object]) -> Row:
     """The row of a task in a study, worded as in its last spec; blank before it is solved."""
     points = {name: row.get(name, -1) for name in ("points", "points_y")}  # of an "auto" grid
     return empty_row() | dict(row) | planned(task) | points
