@@ -23,7 +23,11 @@ from gfmd_cli.files.locks import locked
 from gfmd_cli.spec.models import Spec
 from gfmd_cli.status import Status
 from gfmd_cli.study.measure import task_row
-from gfmd_cli.study.parts import (
+from gfmd_cli.study.provenance import origin
+from gfmd_cli.study.reading import StudyFile, open_study
+from gfmd_cli.study.result import Entry, Outcome, TaskResult
+from gfmd_cli.study.tasks import Task
+from gfmd_cli.study.unfinished_work import (
     SUFFIX,
     check_own,
     checkpoint_folders,
@@ -33,10 +37,6 @@ from gfmd_cli.study.parts import (
     set_aside,
     version_of,
 )
-from gfmd_cli.study.provenance import origin
-from gfmd_cli.study.reading import StudyFile, open_study
-from gfmd_cli.study.result import Entry, Outcome, TaskResult
-from gfmd_cli.study.tasks import Task
 from gfmd_cli.study.writing import write_study
 
 EARLIER = "earlier_specs"
@@ -55,10 +55,10 @@ class Study:
             raise InputError(f"{path}: a symbolic link that leads to itself")
         if not self.path.name:
             raise InputError(f"{path}: a folder, where a study file (NAME.h5) is expected")
-        self._entries: dict[Path, tuple[tuple[int, ...], Entry]] = {}
-        """What is known of records, and of which file."""
-        known = self.path.suffix == ".h5"
-        self.parts = self.path.with_suffix(".parts" if known else f"{self.path.suffix}.parts.d")
+        self._entries: dict[tuple[Path, tuple[int, ...]], Entry] = {}
+        """The records read so far, by path and version."""
+        is_usual = self.path.suffix == ".h5"
+        self.parts = self.path.with_suffix(".parts" if is_usual else f"{self.path.suffix}.parts.d")
 
     @contextmanager
     def work(self, tasks: list[Task]) -> Iterator[list[str]]:
@@ -167,11 +167,10 @@ class Study:
 
         Raises StudyError.
         """
-        known = self._entries.get(path)
-        version = version_of(path)
-        if known is None or known[0] != version:
-            known = self._entries[path] = version, read_record_entry(path)
-        return known[1]
+        version = path, version_of(path)
+        if version not in self._entries:
+            self._entries[version] = read_record_entry(path)
+        return self._entries[version]
 
     def _is_complete(self, tasks: list[Task]) -> bool:
         """Whether no task is missing, and no record or unfinished checkpoint is left."""
@@ -238,8 +237,8 @@ class _Sources:
                 if status.is_solved:
                     self.by_task[old.task_ids[index]] = old.entry(index), index
         for path, entry in records.items():
-            known = self.by_task.get(entry.task_id)
-            if known is None or entry.stored >= known[0].stored:
+            before = self.by_task.get(entry.task_id)
+            if before is None or entry.stored >= before[0].stored:
                 self.by_task[entry.task_id] = entry, path
 
     def entries(self, tasks: list[Task]) -> list[Entry]:
