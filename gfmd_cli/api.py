@@ -37,7 +37,7 @@ from gfmd_cli.study.measure import all_columns
 from gfmd_cli.study.plausibility import SEPARATOR
 from gfmd_cli.study.reading import read_rows, solved_rows
 from gfmd_cli.study.refinement import forget_scene
-from gfmd_cli.study.resources import room
+from gfmd_cli.study.resources import usable_memory
 from gfmd_cli.study.run import RunOptions, run_study
 from gfmd_cli.study.tasks import plan
 
@@ -213,7 +213,7 @@ def _solve(spec: Path | str | Tables, threads: int) -> Result:
         forget_scene()
     if len(tasks) != 1:
         raise InputError(f"solve takes one contact, the spec has {len(tasks)}; run() takes them")
-    context = SolveContext(WorkerOptions(threads, room()))
+    context = SolveContext(WorkerOptions(threads, usable_memory()))
     solved = solve_at_load(tasks[0], context, Watcher())
     scene, solution, obstacle = solved.scene, solved.solution, solved.contact.obstacle
     row = all_columns(tasks[0], solved)

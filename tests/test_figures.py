@@ -13,6 +13,7 @@ from gfmd_cli.analysis.figures import PANELS, draw_all, study_figures, with_styl
 from gfmd_cli.analysis.plotting import styled
 from gfmd_cli.errors import InputError, SpaceError
 from gfmd_cli.spec.parse import read_spec
+from gfmd_cli.status import Status
 from gfmd_cli.study.run import RunOptions, run_study
 
 ROUGH = power_spec(n=[0, 1], points=64, p_star=[0.05, 0.3, 1.5], cutoff=0.05)
@@ -143,7 +144,7 @@ def test_what_is_not_converged_is_a_cross_and_known_errors_are_bars(study):
     comparison = study()
     assert "not converged" not in figure_of("mean_gap_log", comparison).legend
     assert not figure_of("mean_gap_log", comparison).axes.containers
-    states = [{"status": "max_steps"}, {"u_g_error": 0.1}, {}]
+    states = [{"status": Status.MAX_STEPS}, {"u_g_error": 0.1}, {}]
     plot = figure_of("mean_gap_log", marked(comparison, states))
     assert "not converged" in plot.legend
     assert len(plot.axes.containers) == 1
@@ -173,7 +174,7 @@ def test_no_gap_is_left_out_of_the_logarithmic_figure(study):
 
 
 def test_values_that_are_not_finite_are_left_out(study):
-    nothing = dict.fromkeys(("a_r", "sigma_p", "u_g"), np.nan) | {"status": "diverged"}
+    nothing = dict.fromkeys(("a_r", "sigma_p", "u_g"), np.nan) | {"status": Status.DIVERGED}
     comparison = marked(study(), [nothing, {}, {}])
     for name in OVER_PRESSURE:
         assert "not converged" not in figure_of(name, comparison).legend

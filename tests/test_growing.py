@@ -14,11 +14,11 @@ from gfmd_cli.errors import InputError, Interrupted
 from gfmd_cli.files.locks import locked
 from gfmd_cli.spec.parse import read_spec
 from gfmd_cli.study.columns import COLUMNS
-from gfmd_cli.study.parts import write_record
 from gfmd_cli.study.reading import open_study, read_rows
 from gfmd_cli.study.run import RunOptions, run_study
 from gfmd_cli.study.store import Study
 from gfmd_cli.study.tasks import plan
+from gfmd_cli.study.unfinished_work import write_record
 
 SPEC = """\
 [study]

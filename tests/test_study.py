@@ -26,9 +26,9 @@ from gfmd_cli.study import run_task
 from gfmd_cli.study.checkpoint import Checkpoint
 from gfmd_cli.study.columns import COLUMNS, LAYOUT
 from gfmd_cli.study.notes import Notes, Trial
-from gfmd_cli.study.parts import read_record
 from gfmd_cli.study.reading import open_study, read_rows
 from gfmd_cli.study.run import RunOptions, run_study
+from gfmd_cli.study.unfinished_work import read_record
 
 SMALL = power_spec(
     n=[0, 1],

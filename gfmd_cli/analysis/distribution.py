@@ -24,7 +24,6 @@ from gfmd_cli.analysis.compare import Comparison, Curve, of_study, solver_of
 from gfmd_cli.analysis.wording import contact_title
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.physics.observables import LOGARITHMIC_EDGES, estimated_patches
-from gfmd_cli.status import Status
 from gfmd_cli.study.column import Row
 from gfmd_cli.study.columns import BINS, PR_LOGARITHMIC
 
@@ -216,7 +215,7 @@ def distributions(comparison: Comparison) -> list[StressDistribution]:
     by_contact: dict[tuple[Any, ...], dict[int, dict[int, tuple[Curve, Row]]]] = {}
     for curve in comparison.curves:
         for row in curve.rows:
-            if PR_LOGARITHMIC not in row or not row["a_r"] > 0 or row["status"] != Status.CONVERGED:
+            if PR_LOGARITHMIC not in row or not (row["a_r"] > 0 and row["status"].is_converged):
                 continue
             units = (f"{row['pressure']:.6g}", f"{row['delta_sigma']:.6g}")
             same = row["elastomer"], row["ensemble"], row["boundary"], _pixel_shape(row)

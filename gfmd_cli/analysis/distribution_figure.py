@@ -14,7 +14,6 @@ from gfmd_cli.analysis.plotting import THEORY, ColumnFigure
 from gfmd_cli.analysis.selection import at_one_pressure, evenly, grouped, pressure_label
 from gfmd_cli.analysis.series import StyledCurve, seed_groups
 from gfmd_cli.grid.arrays import Field
-from gfmd_cli.status import Status
 from gfmd_cli.study.column import Row
 from gfmd_cli.study.columns import BINS, PR_LINEAR, PR_LOGARITHMIC
 
@@ -90,7 +89,7 @@ def _side_by_side(shown: list[Density]) -> ColumnFigure:
     for place, stress in enumerate(shown):
         style, x, y = stress.item.style, stress.sigma, stress.density
         plot.unnamed_line((style.label,), x, y, color=style.colour, lw=0.7)
-        converged = np.full(x.size, stress.row["status"] == Status.CONVERGED)
+        converged = np.full(x.size, stress.row["status"].is_converged)
         plot.points(style, x, y, converged, every=(place % 3, 3) if len(shown) > 1 else 1)
     _scale(plot, "log", shown)
     sigma = np.geomspace(*plot.axes.get_xlim(), 400)

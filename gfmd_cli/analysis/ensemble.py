@@ -14,7 +14,6 @@ from gfmd_cli.analysis.selection import grouped
 from gfmd_cli.analysis.wording import contact_title, grid_size
 from gfmd_cli.physics.observables import QUANTITIES
 from gfmd_cli.spec.models import LOADS
-from gfmd_cli.status import Status
 from gfmd_cli.study.column import Row
 from gfmd_cli.study.columns import PARAMETERS
 
@@ -56,7 +55,7 @@ class Ensemble:
     @property
     def failures(self) -> str | None:
         """The statuses of the rows that have not converged, with their numbers; None without."""
-        counts = Counter(row["status"] for row in self.rows if row["status"] != Status.CONVERGED)
+        counts = Counter(row["status"] for row in self.rows if not row["status"].is_converged)
         return ", ".join(f"{number} {status}" for status, number in counts.items()) or None
 
     def spread(self, name: str) -> Spread:

@@ -10,7 +10,6 @@ from gfmd_cli.analysis.table import Record, Table, TableColumn, groups_of
 from gfmd_cli.analysis.tables import P_STAR, POINTS, PRESSURE, RESIDUAL, STATUS, warnings_in
 from gfmd_cli.analysis.wording import contact_title, grid_size, shown
 from gfmd_cli.physics.observables import QUANTITIES
-from gfmd_cli.status import Status
 from gfmd_cli.study.reading import solved_rows
 from gfmd_cli.study.result import Outcome
 from gfmd_cli.study.tasks import Task
@@ -112,10 +111,10 @@ def unconverged(rows: list[dict[str, Any]], errors: Mapping[int, str]) -> list[s
     """
     lines = []
     for row in rows:
-        status, name = Status(row["status"]), f"task {row['task']}"
+        status, name = row["status"], f"task {row['task']}"
         if status.is_converged:
             continue
-        if status != Status.MISSING:
+        if status.is_solved:
             name += f" ({row['elastomer']}, p* = {row['p_star']:.4g}): {status}"
         lines.append(f"{name}: {errors.get(row['task']) or status.explain(row)}")
     return [*lines[:MAX_ROWS], *left_out(len(lines), MAX_ROWS, "task")]

@@ -13,7 +13,6 @@ from gfmd_cli.analysis.plotting import ColumnFigure
 from gfmd_cli.analysis.selection import grouped
 from gfmd_cli.analysis.wording import contact_title, grid_size, in_si, quantity
 from gfmd_cli.grid.arrays import Field, Mask
-from gfmd_cli.status import Status
 from gfmd_cli.study.column import Row
 
 LOWEST = 1e-3  # of a mean: lower end of its band on a logarithmic axis
@@ -108,7 +107,7 @@ def _point(panel: Panel, records: list[Row]) -> tuple[float, float, float, float
     units = np.array([r[f"{name}_persson"] if panel.ratio else 1.0 for r in records])
     values, errors = np.transpose(best_of_all(records, name)) / units
     half_width = spread_of(values).half_width if len(records) > 1 else np.nan
-    converged = all(record["status"] == Status.CONVERGED for record in records)
+    converged = all(record["status"].is_converged for record in records)
     p_star = np.mean([record["p_star"] for record in records])
     return float(p_star), float(values.mean()), float(np.abs(errors).mean()), half_width, converged
 

@@ -94,7 +94,7 @@ def _curve(
     axes.plot(x, error, color=style.colour, lw=0.4, alpha=0.6)
     plot.line_on(axes, style.label, x, y, markevery=0.2, **options)
     end: dict[str, Any] = {"ls": "none", "zorder": 4}
-    if trace.row["status"] == Status.CONVERGED:
+    if Status(trace.row["status"]).is_converged:
         axes.plot(x[-1:], y[-1:], marker=style.marker, color=style.colour, **end)
     else:
         plot.line_on(axes, "not converged", x[-1:], y[-1:], marker="x", color="0.3", **end)

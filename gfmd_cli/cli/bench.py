@@ -47,4 +47,4 @@ def bench(
     print_text(bench_table(traces).as_text())
     for file in (path, *draw_bench(traces, figures or path.parent)):
         print_error(str(file))
-    sys.exit(0 if all(trace.row["status"] == Status.CONVERGED for trace in traces) else 1)
+    sys.exit(0 if all(Status(trace.row["status"]).is_converged for trace in traces) else 1)

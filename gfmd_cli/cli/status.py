@@ -24,8 +24,8 @@ from gfmd_cli.status import Status
 from gfmd_cli.units import count, duration
 
 if TYPE_CHECKING:
-    from gfmd_cli.study.checkpoint import Saved
-    from gfmd_cli.study.state import StudyState
+    from gfmd_cli.study.checkpoint import SavedProgress
+    from gfmd_cli.study.progress import StudyProgress
 
 
 @click.command()
@@ -46,23 +46,23 @@ def status(
         gfmd status configs/demo.toml --shards 4
     """
     from gfmd_cli.spec.parse import read_spec
-    from gfmd_cli.study.state import check_shards, is_study, state_of_spec, state_of_study
+    from gfmd_cli.study.progress import check_shards, is_study, progress_of_spec, progress_of_study
 
     if is_study(path):
         if output is not None or overrides:
             raise InputError(f"-o and --set go with a spec; {path} is a study")
-        state, spec = state_of_study(path), "SPEC"
+        progress, spec = progress_of_study(path), "SPEC"
     else:
         resolved, _ = read_spec(path, overrides)
-        state = state_of_spec(resolved, study_path(resolved, output))
+        progress = progress_of_spec(resolved, study_path(resolved, output))
         spec = str(path)
     if shards is not None:
-        check_shards(shards, len(state.tasks))
-    next_command = _next_command(state, spec, output if spec != "SPEC" else path, overrides)
+        check_shards(shards, len(progress.tasks))
+    next_command = _next_command(progress, spec, output if spec != "SPEC" else path, overrides)
     if as_json:
-        click.echo(json.dumps(_as_data(state, shards, next_command), indent=1))
+        click.echo(json.dumps(_as_data(progress, shards, next_command), indent=1))
     else:
-        print_text("\n".join([*_lines(state, shards), f"next: {next_command}"]))
+        print_text("\n".join([*_lines(progress, shards), f"next: {next_command}"]))
 
 
 @click.command()
@@ -78,7 +78,7 @@ def collect(spec: Path, output: Path | None, overrides: tuple[str, ...]) -> None
         gfmd collect configs/demo.toml
     """
     from gfmd_cli.spec.parse import read_spec
-    from gfmd_cli.study.state import state_of_spec
+    from gfmd_cli.study.progress import progress_of_spec
     from gfmd_cli.study.store import Study
     from gfmd_cli.study.tasks import plan
 
@@ -90,16 +90,16 @@ def collect(spec: Path, output: Path | None, overrides: tuple[str, ...]) -> None
             damaged += study.collect(resolved, tasks, text)
         for note in damaged:
             print_error(f"gfmd: {note}")
-    state = state_of_spec(resolved, study.path)
-    next_command = _next_command(state, str(spec), output, overrides)
-    print_text("\n".join([*_lines(state, None), f"next: {next_command}"]))
-    sys.exit(0 if state.converged else 1)
+    progress = progress_of_spec(resolved, study.path)
+    next_command = _next_command(progress, str(spec), output, overrides)
+    print_text("\n".join([*_lines(progress, None), f"next: {next_command}"]))
+    sys.exit(0 if progress.converged else 1)
 
 
-def _lines(state: "StudyState", shards: int | None) -> list[str]:
+def _lines(progress: "StudyProgress", shards: int | None) -> list[str]:
     """The state of a study as lines of text."""
-    lines = [f"{state.study}: {count(len(state.tasks), 'task')}: {counted(state.counts)}"]
-    for task in state.tasks:
+    lines = [f"{progress.study}: {count(len(progress.tasks), 'task')}: {counted(progress.counts)}"]
+    for task in progress.tasks:
         if task.saved is not None:
             name = f"task {task.task} {task.label}".rstrip()
             age = max(0.0, time.time() - task.saved.time)
@@ -107,54 +107,54 @@ def _lines(state: "StudyState", shards: int | None) -> list[str]:
                 f"  {name}: state of step {task.saved.step} ({task.saved.points} points), residual "
                 f"{task.saved.residual:.1e}, saved {duration(age)} ago"
             )
-    if state.records:
-        lines.append(f"  {count(state.records, 'record')} not collected yet")
-    if state.others:
-        lines.append(f"  the study also contains {count(state.others, 'task')} of other specs")
-    lines += [f"  damaged, to be solved again: {name}" for name in state.damaged]
+    if progress.records:
+        lines.append(f"  {count(progress.records, 'record')} not collected yet")
+    if progress.others:
+        lines.append(f"  the study also contains {count(progress.others, 'task')} of other specs")
+    lines += [f"  damaged, to be solved again: {name}" for name in progress.damaged]
     for index in range(shards or 0):
-        lines.append(f"  shard {index}/{shards}: {counted(state.shard(index, shards or 1))}")
+        lines.append(f"  shard {index}/{shards}: {counted(progress.shard(index, shards or 1))}")
     return lines
 
 
 def _next_command(
-    state: "StudyState", spec: str, output: Path | None, overrides: tuple[str, ...]
+    progress: "StudyProgress", spec: str, output: Path | None, overrides: tuple[str, ...]
 ) -> str:
     """The command to run next."""
     from gfmd_cli.study.slurm import SUFFIX
 
     words = [spec, *repeated(output, overrides)]
-    if not state.missing:
-        if state.records:
+    if not progress.missing:
+        if progress.records:
             return shlex.join(["gfmd", "collect", *words])
-        return shlex.join(["gfmd", "analyze", str(state.study)])
-    if state.study.with_suffix(SUFFIX).exists():
+        return shlex.join(["gfmd", "analyze", str(progress.study)])
+    if progress.study.with_suffix(SUFFIX).exists():
         again = shlex.join(["gfmd", "submit", *words, "--missing"])
         return f"{again}    # when its jobs have left the queue"
     return shlex.join(["gfmd", "run", *words])
 
 
-def _saved(task: int, saved: "Saved") -> dict[str, Any]:
+def _saved(task: int, saved: "SavedProgress") -> dict[str, Any]:
     data = {"task": task, **saved._asdict()}
     return data | ({} if isfinite(saved.residual) else {"residual": None})  # JSON has no NaN
 
 
-def _as_data(state: "StudyState", shards: int | None, next_command: str) -> dict[str, Any]:
+def _as_data(progress: "StudyProgress", shards: int | None, next_command: str) -> dict[str, Any]:
     """The same as plain data."""
-    counts = state.counts
+    counts = progress.counts
     data: dict[str, Any] = {
-        "study": str(state.study),
-        "tasks": len(state.tasks),
+        "study": str(progress.study),
+        "tasks": len(progress.tasks),
         "converged": counts[Status.CONVERGED],
         "missing": counts[Status.MISSING],
         "statuses": dict(counts),
-        "missing_tasks": state.missing,
-        "saved": [_saved(task.task, task.saved) for task in state.tasks if task.saved],
-        "records": state.records,
-        "others": state.others,
-        "damaged": state.damaged,
+        "missing_tasks": progress.missing,
+        "saved": [_saved(task.task, task.saved) for task in progress.tasks if task.saved],
+        "records": progress.records,
+        "others": progress.others,
+        "damaged": progress.damaged,
         "next": next_command,
     }
     if shards is not None:
-        data["shards"] = [dict(state.shard(index, shards)) for index in range(shards)]
+        data["shards"] = [dict(progress.shard(index, shards)) for index in range(shards)]
     return data

@@ -59,8 +59,8 @@ def submit(
         gfmd submit configs/demo.toml --missing
     """
     from gfmd_cli.spec.parse import read_spec
+    from gfmd_cli.study.progress import progress_of_spec
     from gfmd_cli.study.slurm import batch
-    from gfmd_cli.study.state import state_of_spec
     from gfmd_cli.study.tasks import plan
 
     if shards is None and not missing:
@@ -68,7 +68,7 @@ def submit(
     resolved, _ = read_spec(spec, overrides)
     study = Path(os.path.realpath(study_path(resolved, output)))
     job = batch(
-        state_of_spec(resolved, study),
+        progress_of_spec(resolved, study),
         plan(resolved),
         [str(spec.absolute()), *repeated(study, overrides)],
         shards=shards,

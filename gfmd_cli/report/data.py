@@ -16,7 +16,6 @@ from gfmd_cli.analysis.table import TableColumn
 from gfmd_cli.analysis.tables import TitledCurves, curve_title
 from gfmd_cli.analysis.wording import in_si, shown
 from gfmd_cli.bench.file import Trace
-from gfmd_cli.status import Status
 from gfmd_cli.study.column import Row
 from gfmd_cli.study.reading import open_study, solved_rows
 
@@ -58,12 +57,12 @@ class ReportData:
     @property
     def failed(self) -> list[Row]:
         """The rows whose contact is solved, but not to its tolerance."""
-        return [row for row in self.solved if row["status"] != Status.CONVERGED]
+        return [row for row in self.solved if not row["status"].is_converged]
 
     @property
     def missing(self) -> list[str]:
         """The tasks that are not solved yet."""
-        return [str(row["task"]) for row in self.rows if row["status"] == Status.MISSING]
+        return [str(row["task"]) for row in self.rows if not row["status"].is_solved]
 
     @property
     def name(self) -> str:

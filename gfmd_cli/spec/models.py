@@ -18,7 +18,7 @@ from gfmd_cli.solvers.auto import AnySolver
 from gfmd_cli.spec_table import Positive, SpecTable
 
 MAX_LADDER = 100_000  # pressures of one ladder; upper limit, guards against typing errors
-MAX_DECADES = 300.0  # of which a power of ten is no overflow
+MAX_DECADES = 300.0  # of which a power of ten does not overflow
 LADDER_ROUNDINGS = 8  # of a power of ten, by which a value of the ladder may lie above `to`
 SWEPT = ("surface", "elastomer", "grid", "solver")
 REPEATED = (*SWEPT, "sweep")  # tables that may be given several times
@@ -132,7 +132,7 @@ class Ladder(SpecTable):
         return [value for value in values if value / self.to - 1 <= rounding]
 
     def _value(self, decades: float) -> float:
-        """The value so many decades above the first one; infinite beyond the largest number."""
+        """The value `decades` above the first one; infinite beyond the largest number."""
         value = self.from_
         while decades > MAX_DECADES:
             value *= 10.0**MAX_DECADES

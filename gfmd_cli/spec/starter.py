@@ -27,7 +27,7 @@ COLUMN = 27  # characters before a comment
 def starter(path: Path, overrides: tuple[str, ...]) -> str:
     """The spec of a random surface, for the file `path`, with overrides "table.key=value".
 
-    Raises InputError where the result is no valid spec.
+    Raises InputError where the result is not a valid spec.
     """
     text = with_keys(_render("study.toml", path.name, warnings=[]), overrides)
     read_text(text, path, overrides)
@@ -135,13 +135,13 @@ def _with_values(
     """The lines of a table with its values, those of the given keys in the place of others."""
     new = {key: _line(key, _as_toml(values[key]), COMMENT) for key in values if key in given}
     kind = values.get("kind") if "kind" in given else None
-    known = kinds[kind].model_fields if isinstance(kind, str) and kind in kinds else values
+    allowed = kinds[kind].model_fields if isinstance(kind, str) and kind in kinds else values
     lines = []
     for line in section.rstrip().splitlines():
         match = re.match(r"(#?)(\w+) = ", line)
         if match and match[2] in new:
             lines.append(new.pop(match[2]))
-        elif match is None or match[1] or (match[2] in values and match[2] in known):
+        elif match is None or match[1] or (match[2] in values and match[2] in allowed):
             lines.append(line)
     end = section[len(section.rstrip()) :]
     return "\n".join([*lines, *new.values()]) + end

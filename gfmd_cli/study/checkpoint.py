@@ -28,14 +28,14 @@ from gfmd_cli.physics.contact import Contact
 from gfmd_cli.solvers.loop import Solver, State
 from gfmd_cli.solvers.nested_grids import Resume, grids_of
 from gfmd_cli.study.notes import Notes
-from gfmd_cli.study.parts import set_aside
 from gfmd_cli.study.pointer import Part, Scalars, Slot, pointer_text, read_pointer
+from gfmd_cli.study.unfinished_work import set_aside
 
 CHUNK = 2**26  # bytes that a checkpoint maps at a time
 
 
-class Saved(NamedTuple):
-    """Progress of a saved state."""
+class SavedProgress(NamedTuple):
+    """How far a task had come when its state was saved."""
 
     points: int
     """Along x."""
@@ -112,12 +112,12 @@ class Checkpoint:
                 set_aside(path, self.folder.with_name(f"{self.folder.name}.{path.name}.bad"))
         return f"{self.folder}: no state to resume; set aside as .bad, the task starts anew"
 
-    def saved(self) -> Saved | None:
+    def saved(self) -> SavedProgress | None:
         """Progress of the newest saved state, without loading it; None without one."""
         with suppress(OSError):
             when = self.pointer.lstat().st_mtime
             for slot in read_pointer(self.pointer):
-                return Saved(slot.shape[-1], slot.state.step, slot.state.residual, when)
+                return SavedProgress(slot.shape[-1], slot.state.step, slot.state.residual, when)
         return None
 
     def save(self, contact: Contact, state: State, notes: Notes) -> None:

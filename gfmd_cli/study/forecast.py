@@ -27,6 +27,7 @@ LAST = {"a_r": MAX_AREA_EXPONENT, "u_g": 4.0, "sigma_p": MAX_STRESS_EXPONENT}
 SEARCH = 3.5  # solves that a search of the pressure takes, those on coarser grids included
 SECONDS_PER_PAIR = 1.7e-8
 """Per grid point and pair of transforms, with all work between two of them, on one thread."""
+P_STAR = 0.1  # reduced pressure of a forecast where the load is another quantity; a choice
 DECADES = -4, -3, -2, -1, 0
 PAIRS = {
     0.1: (19, 32, 33, 15, 13),

@@ -29,21 +29,22 @@ from gfmd_cli.study.forecast import FIRST
 from gfmd_cli.study.measure import measured
 from gfmd_cli.study.notes import Trial
 from gfmd_cli.study.plausibility import loaded_value
-from gfmd_cli.study.refinement import Solved, solve_on_grids, task_scene
+from gfmd_cli.study.refinement import TaskSolution, solve_on_grids, task_scene
 from gfmd_cli.study.tasks import Task
 
+# Choices, which change the number of trials (three to five on a grid) and hardly the result:
 COARSER = 2  # grids, each of half the points, on which the search begins
 COARSE = 0.02  # relative distance to the load, or of two pressures, that is good enough on them
 COARSE_RESIDUAL = 1e-3  # natural residual of a solve on them
 STEP = log(8.0)  # of ln p at the most, until the root is enclosed
 NEARBY = 0.95  # of a load, at which the theory gives the slope
 FLATTEST = 1e-3  # slope of ln(value) over ln(p) that a step is made from
-ROUNDING = 1e-13  # width in ln p of an enclosure that holds no other pressure
+ROUNDING = 1e-13  # width in ln p of the narrowest enclosure: 450 roundings of p
 SMOOTH = 0.01  # of the solver's tolerance in ln p: gaps and displacements have no steps
-TRIALS = 60  # on one grid; three to five are usual
+TRIALS = 60  # on one grid; 44 halve an interval of STEP down to ROUNDING
 
 
-def solve_at_load(task: Task, context: SolveContext, watcher: Watcher) -> Solved:
+def solve_at_load(task: Task, context: SolveContext, watcher: Watcher) -> TaskSolution:
     """Solve a task, searching its pressure if that is not given; else as `solve_on_grids`.
 
     The search returns the nearest contact that it met. It succeeds where that is within
@@ -58,14 +59,14 @@ def solve_at_load(task: Task, context: SolveContext, watcher: Watcher) -> Solved
         return solve_on_grids(task, context, watcher)
     trials = watcher.notes.trials
 
-    def attempt(points: int, pressure: float) -> Solved:
+    def attempt(points: int, pressure: float) -> TaskSolution:
         solved = solve_on_grids(_at(task, points, pressure), context, watcher)
         value = loaded_value(task.quantity, measured(task, solved))
         work = solved.solution.transforms * solved.contact.grid.size
         trials.append(Trial(points, pressure, value, work))
         return solved
 
-    solved: Solved | None = None
+    solved: TaskSolution | None = None
     first = slope = 0.0
     for points in _grids(task):
         scene = task_scene(task, points, context)
@@ -91,7 +92,7 @@ def solve_at_load(task: Task, context: SolveContext, watcher: Watcher) -> Solved
     return solved
 
 
-def _check_known(task: Task, solved: Solved) -> None:
+def _check_known(task: Task, solved: TaskSolution) -> None:
     """Raise InputError where [accuracy] asks for a continuum value that cannot be given."""
     name = LOADS[task.quantity].searched
     if name in solved.estimates and not isfinite(solved.estimates[name].continuum):

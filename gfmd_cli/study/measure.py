@@ -1,10 +1,10 @@
 """What a study stores of one task: its row and its arrays.
 
 The row is built here alone. `planned` gives the columns that follow from the spec, `measured` those
-of a solved contact, and `result` everything.
+of a solved contact, `task_row` both, and `result` everything.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import asdict
 
 import numpy as np
@@ -26,7 +26,7 @@ from gfmd_cli.study.column import Row
 from gfmd_cli.study.columns import PARAMETERS, PR_LINEAR, PR_LOGARITHMIC, empty_row
 from gfmd_cli.study.observables import OBSERVABLES, SolvedContact
 from gfmd_cli.study.plausibility import SEPARATOR, warnings_of
-from gfmd_cli.study.refinement import Solved
+from gfmd_cli.study.refinement import TaskSolution
 from gfmd_cli.study.result import Entry, TaskResult
 from gfmd_cli.study.tasks import Task
 
@@ -55,7 +55,7 @@ def planned(task: Task) -> Row:
     }
 
 
-def measured(task: Task, solved: Solved) -> Row:
+def measured(task: Task, solved: TaskSolution) -> Row:
     """The columns of a solved contact that need no key of [output], without the time."""
     scene, contact, solution = solved.scene, solved.contact, solved.solution
     u, sigma = solution.u, solution.sigma
@@ -84,7 +84,7 @@ def measured(task: Task, solved: Solved) -> Row:
     }
 
 
-def error_columns(solved: Solved) -> Row:
+def error_columns(solved: TaskSolution) -> Row:
     """The errors and continuum values; none unless an accuracy is requested."""
     if solved.bounds is None:
         return {}
@@ -101,7 +101,7 @@ def error_columns(solved: Solved) -> Row:
     return row
 
 
-def all_columns(task: Task, solved: Solved) -> Row:
+def all_columns(task: Task, solved: TaskSolution) -> Row:
     """The columns and histograms of a solved contact, without the time."""
     contact, solution = solved.contact, solved.solution
     u, sigma = solution.u, solution.sigma
@@ -116,8 +116,14 @@ def all_columns(task: Task, solved: Solved) -> Row:
     )
 
 
-def result(task: Task, solved: Solved, seconds: float) -> TaskResult:
-    """All that a study keeps of one solution, which took so many seconds."""
+def task_row(task: Task, row: Mapping[str, object]) -> Row:
+    """The row of a task in a study, worded as in its last spec; blank before it is solved."""
+    points = {name: row.get(name, -1) for name in ("points", "points_y")}  # of an "auto" grid
+    return empty_row() | dict(row) | planned(task) | points
+
+
+def result(task: Task, solved: TaskSolution, seconds: float) -> TaskResult:
+    """All that a study keeps of one solution, which took `seconds`."""
     scene, contact, solution = solved.scene, solved.contact, solved.solution
     u, sigma, output = solution.u, solution.sigma, task.output
     row = all_columns(task, solved) | {"seconds": seconds}
@@ -160,7 +166,7 @@ def on_request(output: OutputTable, solved: SolvedContact) -> Row:
     return row
 
 
-def _curves(solved: Solved) -> dict[str, dict[str, Field]]:
+def _curves(solved: TaskSolution) -> dict[str, dict[str, Field]]:
     """Power spectra and autocorrelations, in units of m and Pa.
 
     With a free boundary the spectra are those of the fields mirrored to twice the sides.

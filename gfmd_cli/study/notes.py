@@ -14,7 +14,7 @@ _Finite = Annotated[float, Key(allow_inf_nan=False)]
 
 
 @dataclass(frozen=True)
-class GridResult:
+class SolvedGrid:
     """Results on one grid, in units that all grids share."""
 
     points: PointCount
@@ -48,5 +48,5 @@ class Trial:
 class Notes:
     """Results of the grids and of the trials that have ended."""
 
-    grids: list[GridResult] = field(default_factory=list)
+    grids: list[SolvedGrid] = field(default_factory=list)
     trials: list[Trial] = field(default_factory=list)

@@ -7,7 +7,7 @@ from typing import Any
 from gfmd_cli.physics.observables import border_contact, contact_points
 from gfmd_cli.spec.models import LOADS
 from gfmd_cli.status import Status
-from gfmd_cli.study.refinement import Solved
+from gfmd_cli.study.refinement import TaskSolution
 from gfmd_cli.study.tasks import Task
 
 FEW_POINTS = 30  # a choice: the area of a circle of 30 points has an error of its rim of a third
@@ -33,7 +33,7 @@ def loaded_value(quantity: str, results: Mapping[str, Any]) -> float:
     return continuum if isfinite(continuum) else float(results[name])
 
 
-def warnings_of(task: Task, solved: Solved, results: Mapping[str, Any]) -> list[str]:
+def warnings_of(task: Task, solved: TaskSolution, results: Mapping[str, Any]) -> list[str]:
     """Reasons to doubt the result of one contact, a sentence each; mostly none."""
     elastomer, scene = task.elastomer, solved.scene
     warnings = task.surface.warnings(task.boundary)
@@ -73,7 +73,7 @@ def _load_in_jump(task: Task, status: Status, results: Mapping[str, Any]) -> lis
     return [f"load.contact_area = {task.load:g} lies in a jump; the nearest value is {value:g}"]
 
 
-def _contact_at_border(task: Task, solved: Solved) -> list[str]:
+def _contact_at_border(task: Task, solved: TaskSolution) -> list[str]:
     """A warning if the contact of a single indenter reaches the border of its cell.
 
     Lines are left out: a wave or ridge is periodic by nature.
@@ -95,7 +95,7 @@ def _contact_at_border(task: Task, solved: Solved) -> list[str]:
     ]
 
 
-def _doubtful_unit(task: Task, solved: Solved) -> str:
+def _doubtful_unit(task: Task, solved: TaskSolution) -> str:
     """A warning about a load that has probably another unit than was meant, else ""."""
     scene, key, load = solved.scene, f"load.{task.quantity}", task.load
     low, high = REDUCED_PRESSURES

@@ -47,7 +47,7 @@ class Part(_Checked):
 
 
 class Scalars(_Checked):
-    """The attributes of a state that are no arrays; those of all solvers are named here."""
+    """The attributes of a state that are not arrays; those of all solvers are named here."""
 
     model_config = ConfigDict(extra="allow")
     __pydantic_extra__: dict[str, bool | Whole | float]

@@ -13,7 +13,7 @@ from pathlib import Path
 from gfmd_cli.status import Status
 from gfmd_cli.study.context import Progress, SolveContext, WorkerOptions
 from gfmd_cli.study.resources import available_memory, gib, out_of_memory_kills
-from gfmd_cli.study.signals import blocked
+from gfmd_cli.study.signals import blocked_signals
 from gfmd_cli.study.tasks import Task
 from gfmd_cli.study.worker import READY
 
@@ -39,7 +39,7 @@ class Worker:
 
     def __init__(self, parts: Path, options: WorkerOptions) -> None:
         self.pipe, other = Pipe()
-        with other, blocked():  # a signal waits until the worker can note it
+        with other, blocked_signals():  # a signal waits until the worker can handle it
             number = str(other.fileno())
             command = [sys.executable, "-P", "-c", START, number]
             self.process = subprocess.Popen(

@@ -54,8 +54,8 @@ def git_commit() -> str:
         return ""
     with suppress(OSError, subprocess.SubprocessError):
         command = ["git", "-C", str(source), "describe", "--always", "--dirty", "--abbrev=40"]
-        done = subprocess.run(command, capture_output=True, text=True, timeout=5, check=True)
-        return done.stdout.strip()
+        completed = subprocess.run(command, capture_output=True, text=True, timeout=5, check=True)
+        return completed.stdout.strip()
     return ""
 
 

@@ -90,6 +90,7 @@ class StudyFile:
         columns = {column.name: self.values(column) for column in (*self.columns, SCENE)}
         columns[TASK.name] = list(range(size))
         columns[TASK_ID.name] = self.task_ids
+        columns[STATUS.name] = self.statuses
         for histogram in HISTOGRAMS:
             if has(self._file, histogram.name):
                 densities = read_dataset(self._file, histogram.name)
@@ -275,4 +276,4 @@ def read_rows(path: Path) -> list[dict[str, Any]]:
 
 def solved_rows(rows: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
     """The rows that have a result, converged or not."""
-    return [row for row in rows if row["status"] != Status.MISSING]
+    return [row for row in rows if row["status"].is_solved]

@@ -29,7 +29,7 @@ from gfmd_cli.solvers.nested_grids import Resume, Solution, solve_contact
 from gfmd_cli.status import Status
 from gfmd_cli.study.context import SolveContext, Watcher, WorkerOptions
 from gfmd_cli.study.forecast import FIRST
-from gfmd_cli.study.notes import GridResult
+from gfmd_cli.study.notes import SolvedGrid
 from gfmd_cli.study.tasks import Task
 
 ENOUGH = 3  # grids after which an unknown error stays unknown: two give all that is calibrated
@@ -37,7 +37,7 @@ UNSOLVED = 0.1  # natural residual from which nothing is said of the continuum
 
 
 @dataclass
-class Solved:
+class TaskSolution:
     """A contact on the last of its grids."""
 
     scene: Scene
@@ -73,7 +73,7 @@ def _scene(
 
 
 def task_scene(task: Task, points: int, context: SolveContext) -> Scene:
-    """The scene of a task on a grid of so many points along x."""
+    """The scene of a task on a grid of `points` points along x."""
     grid = task.boundary, points, task.points_y_on(points)
     shared = context.options.threads, context.ranks
     return _scene(task.surface, task.elastomer, *grid, *shared, get_ident())
@@ -84,7 +84,7 @@ def forget_scene() -> None:
     _scene.cache_clear()
 
 
-def solve_on_grids(task: Task, context: SolveContext, watcher: Watcher) -> Solved:
+def solve_on_grids(task: Task, context: SolveContext, watcher: Watcher) -> TaskSolution:
     """Solve a task on its grid, or on finer and finer grids until the errors are as requested.
 
     The notes of the watcher name the grids that an earlier run solved. Raises InputError, and what
@@ -93,7 +93,7 @@ def solve_on_grids(task: Task, context: SolveContext, watcher: Watcher) -> Solve
     _check_unit(task)
     grids = watcher.notes.grids = _ended_grids(task, watcher.notes.grids)
     points = _next_points(task, grids[-1].points) if grids else _first_points(task)
-    solved: Solved | None = None
+    solved: TaskSolution | None = None
     while True:
         scene = task_scene(task, points, context)
         contact = scene.contact(task.p_star(scene.delta_sigma))
@@ -103,7 +103,7 @@ def solve_on_grids(task: Task, context: SolveContext, watcher: Watcher) -> Solve
         solved = None  # frees its memory, which is needed now
         solved = _solve_on_grid(task, scene, contact, watcher, start)
         start = None
-        grids.append(_grid_result(solved))
+        grids.append(_solved_grid(solved))
         if task.accuracy is not None:
             solution = solved.solution
             solved.bounds = error_bounds(contact, solution.u, solution.sigma)
@@ -125,13 +125,13 @@ def _solve_on_grid(
     contact: Contact,
     watcher: Watcher,
     start: Resume | Start | None,
-) -> Solved:
+) -> TaskSolution:
     """Solve a contact; its stress and residual are measured on the displacement that is stored."""
     solution = solve_contact(contact, task.solver, watcher, start)
     solution.residual = contact.recompute(solution.u, solution.sigma)
     if solution.status.is_converged and not solution.residual < task.solver.tolerance:
         solution.status = Status.ROUNDING
-    return Solved(scene, contact, solution, observe(contact, solution.u, solution.sigma))
+    return TaskSolution(scene, contact, solution, observe(contact, solution.u, solution.sigma))
 
 
 def _check_unit(task: Task) -> None:
@@ -146,7 +146,7 @@ def _check_unit(task: Task) -> None:
     )
 
 
-def _ended_grids(task: Task, grids: list[GridResult]) -> list[GridResult]:
+def _ended_grids(task: Task, grids: list[SolvedGrid]) -> list[SolvedGrid]:
     """The grids of the notes; none where they are not the first grids of this task."""
     finest = task.accuracy.max_points if task.auto and task.accuracy else task.points
     points = _first_points(task)
@@ -170,7 +170,7 @@ def _next_points(task: Task, points: int) -> int:
     return 2 * points if task.auto else task.points
 
 
-def _continues(task: Task, solved: Solved, grids: int, options: WorkerOptions) -> bool:
+def _continues(task: Task, solved: TaskSolution, grids: int, options: WorkerOptions) -> bool:
     """Whether a finer grid follows the `grids` before it.
 
     Raises InputError where a reproducible run lacks memory.
@@ -197,7 +197,7 @@ def _is_improvable(estimate: Estimate, grids: int) -> bool:
     return estimate.is_too_coarse or not (estimate.verdict.is_final or is_settled)
 
 
-def _inaccurate(task: Task, solved: Solved) -> list[str]:
+def _inaccurate(task: Task, solved: TaskSolution) -> list[str]:
     """The columns whose continuum values have larger relative errors than the task requests."""
     if task.accuracy is None:
         return []
@@ -209,7 +209,7 @@ def _inaccurate(task: Task, solved: Solved) -> list[str]:
     ]
 
 
-def _interpolate(solved: Solved, scene: Scene) -> Field:
+def _interpolate(solved: TaskSolution, scene: Scene) -> Field:
     """The displacement on a coarser grid, on the grid and in the units of a finer scene."""
     coarse = solved.scene
     u = coarse.grid.resample(solved.solution.u, scene.grid)
@@ -218,9 +218,9 @@ def _interpolate(solved: Solved, scene: Scene) -> Field:
     return u
 
 
-def _grid_result(solved: Solved) -> GridResult:
+def _solved_grid(solved: TaskSolution) -> SolvedGrid:
     measured, scene, contact = solved.observables, solved.scene, solved.contact
-    return GridResult(
+    return SolvedGrid(
         points=scene.grid.points,
         a_r=measured.a_r,
         sigma_p=measured.sigma_p * scene.delta_sigma,
@@ -239,7 +239,7 @@ def border_share(contact: Contact, solution: Solution) -> float | None:
     return border_contact(contact.grid, touching)
 
 
-def _estimates(task: Task, solved: Solved, grids: list[GridResult]) -> dict[str, Estimate]:
+def _estimates(task: Task, solved: TaskSolution, grids: list[SolvedGrid]) -> dict[str, Estimate]:
     """Distance of the finest grid to the continuum, in the units of its scene."""
     scene = solved.scene
     if not solved.solution.residual < UNSOLVED or scene.may_touch is not None:  # voids have no law
@@ -272,7 +272,7 @@ def _estimates(task: Task, solved: Solved, grids: list[GridResult]) -> dict[str,
     )
 
 
-def _between_points(task: Task, solved: Solved) -> dict[str, float]:
+def _between_points(task: Task, solved: TaskSolution) -> dict[str, float]:
     """Errors in full contact, of tensile stress between the points of the grid; zero otherwise."""
     scene, sigma = solved.scene, solved.solution.sigma
     variance = scene.shells.variance

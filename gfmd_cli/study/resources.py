@@ -67,7 +67,7 @@ def _cgroup_limits(membership: Path, root: Path) -> Iterator[float]:
                 break
 
 
-def room(ranks: Ranks | None = None) -> float:
+def usable_memory(ranks: Ranks | None = None) -> float:
     """Bytes that one solve may take; of all `ranks` that share it, less their overhead."""
     memory = HEADROOM * available_memory()
     if ranks is None:
@@ -80,7 +80,7 @@ def room(ranks: Ranks | None = None) -> float:
 
 def check_memory(tasks: list[Task], ranks: Ranks | None = None) -> None:
     """Raise InputError, before anything is allocated, if a single task does not fit."""
-    memory = room(ranks)
+    memory = usable_memory(ranks)
     needs = ((task.bytes_on(task.least_points), task.least_points) for task in tasks)
     needed, points = max(needs, default=(0.0, 0))
     if needed > memory:
@@ -114,7 +114,7 @@ def share_out(
     cores = available_cores()
     largest = max(task.bytes for task in tasks)
     if jobs is None:
-        fitting = max(1, int(room() // largest))
+        fitting = max(1, int(usable_memory() // largest))
         jobs = min(cores, len(tasks), fitting)
         if sum(task.seconds for task in tasks) < POOL_SECONDS:
             jobs = 1

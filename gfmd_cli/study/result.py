@@ -32,7 +32,7 @@ class Entry(NamedTuple):
     @property
     def outcome(self) -> Outcome:
         """Status and output."""
-        return Outcome(Status(self.row["status"]), self.stored)
+        return Outcome(self.row["status"], self.stored)
 
 
 @dataclass(frozen=True)

@@ -17,13 +17,13 @@ from gfmd_cli.status import Status
 from gfmd_cli.study.context import Progress, Report, SolveContext, WorkerOptions
 from gfmd_cli.study.pool import solve_in_pool
 from gfmd_cli.study.refinement import forget_scene
-from gfmd_cli.study.resources import check_memory, room, seconds_to_stop, share_out
+from gfmd_cli.study.resources import check_memory, seconds_to_stop, share_out, usable_memory
 from gfmd_cli.study.result import Outcome
 from gfmd_cli.study.run_task import attempt
-from gfmd_cli.study.signals import noted
+from gfmd_cli.study.signals import signal_handlers
 from gfmd_cli.study.store import Study, without_result
 from gfmd_cli.study.tasks import Task, plan
-from gfmd_cli.study.time_left import Clock
+from gfmd_cli.study.time_left import RemainingTime
 from gfmd_cli.units import count
 
 
@@ -101,15 +101,15 @@ def run_study(
     check_memory(pending, ranks)
     jobs, threads = share_out(pending, options.jobs, options.reproducible, ranks)
     worker_options = WorkerOptions(
-        threads, room(ranks) / jobs, options.reproducible, options.checkpoint_every
+        threads, usable_memory(ranks) / jobs, options.reproducible, options.checkpoint_every
     )
     stop = Event()
-    watch = Clock(pending, jobs).with_time_left(report)
+    watch = RemainingTime(pending, jobs).with_time_left(report)
     if options.max_seconds is not None and pending:  # early enough to save all and to collect it
         seconds = max(options.max_seconds / 2, options.max_seconds - seconds_to_stop(pending, jobs))
         watch = _until(monotonic() + seconds, stop, watch)
     context = SolveContext(worker_options, watch, stop, ranks)
-    with noted(stop), _folder(study, tasks, ranks) as damaged:
+    with signal_handlers(stop), _folder(study, tasks, ranks) as damaged:
         unusable = plans.plan_with(study.parts, estimated=options.reproducible)
         context.warn(*moved, *damaged, *filter(None, [unusable]))
         try:

@@ -17,8 +17,8 @@ from gfmd_cli.study.checkpoint import Checkpoint
 from gfmd_cli.study.context import Progress, SolveContext, Watcher
 from gfmd_cli.study.load_search import solve_at_load
 from gfmd_cli.study.measure import result
-from gfmd_cli.study.parts import read_record_entry, record_path, write_record
 from gfmd_cli.study.tasks import Task
+from gfmd_cli.study.unfinished_work import read_record_entry, record_path, write_record
 from gfmd_cli.units import duration
 
 REPORT_EVERY = 0.2  # seconds between two reports of one task

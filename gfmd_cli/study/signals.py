@@ -24,7 +24,7 @@ def _handled_signals() -> list[signal.Signals]:
 
 
 @contextmanager
-def noted(stop: Event) -> Iterator[None]:
+def signal_handlers(stop: Event) -> Iterator[None]:
     """Inside, a signal sets `stop`; a second SIGINT leaves at once.
 
     Only the main thread of a program can take signals; in another they stay what they are.
@@ -33,12 +33,12 @@ def noted(stop: Event) -> Iterator[None]:
         yield
         return
 
-    def note(number: int, _frame: Any) -> None:
+    def handle(number: int, _frame: Any) -> None:
         if number == signal.SIGINT and stop.is_set():
             os._exit(130)
         stop.set()
 
-    before = {number: signal.signal(number, note) for number in _handled_signals()}
+    before = {number: signal.signal(number, handle) for number in _handled_signals()}
     try:
         yield
     finally:
@@ -47,7 +47,7 @@ def noted(stop: Event) -> Iterator[None]:
 
 
 @contextmanager
-def blocked() -> Iterator[None]:
+def blocked_signals() -> Iterator[None]:
     """Inside, signals wait; a process that is started inside begins with its signals blocked."""
     signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
     try:
@@ -56,7 +56,7 @@ def blocked() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
 
 
-def note_in_worker(stop: Event) -> None:
+def handle_signals_in_worker(stop: Event) -> None:
     """From now on every signal sets `stop`; those that were blocked at the start come now."""
     for number in _handled_signals():
         signal.signal(number, lambda *_: stop.set())

@@ -11,8 +11,8 @@ from pathlib import Path
 from gfmd_cli.errors import GfmdError, InputError
 from gfmd_cli.files.regular import read_regular
 from gfmd_cli.study.forecast import BASE_BYTES, SECONDS_PER_PAIR
+from gfmd_cli.study.progress import StudyProgress, check_shards
 from gfmd_cli.study.resources import HEADROOM, THREADED_POINTS
-from gfmd_cli.study.state import StudyState, check_shards
 from gfmd_cli.study.tasks import Task
 
 SUFFIX = ".sbatch"
@@ -36,14 +36,14 @@ if [ -z "$SLURM_ARRAY_TASK_ID" ]; then
   exec {gfmd} collect "${{study[@]}}"
 fi
 
-run= signal= told=1
-hand_on() {{ told=1 signal=$1; [ -z "$run" ] || kill -"$1" "$run" 2>/dev/null; }}
-trap 'hand_on USR1' USR1   # the time limit is near
-trap 'hand_on TERM' TERM   # preempted
+run= signal= signalled=1
+forward() {{ signalled=1 signal=$1; [ -z "$run" ] || kill -"$1" "$run" 2>/dev/null; }}
+trap 'forward USR1' USR1   # the time limit is near
+trap 'forward TERM' TERM   # preempted
 {gfmd} run "${{study[@]}}" --shard "${{SLURM_ARRAY_TASK_ID}}/{shards}" &
 run=$!
 [ -z "$signal" ] || kill -"$signal" "$run"   # the signal came before the run had started
-while [ $told = 1 ]; do told=0; wait $run; status=$?; done   # a signal ends `wait` early
+while [ $signalled = 1 ]; do signalled=0; wait $run; status=$?; done   # a signal ends `wait` early
 
 shard=${{SLURM_ARRAY_JOB_ID}}_${{SLURM_ARRAY_TASK_ID}}   # the job number would be the whole array
 requeue() {{   # unless the shard was requeued {max_requeues} times or was cancelled
@@ -93,7 +93,7 @@ class Batch:
 
 
 def batch(
-    state: StudyState,
+    progress: StudyProgress,
     tasks: list[Task],
     words: list[str],
     *,
@@ -106,13 +106,13 @@ def batch(
 
     Parameters
     ----------
-    state, tasks : of the study; its path is absolute
+    progress, tasks : of the study; its path is absolute
     words : spec and options that `gfmd run` and `gfmd collect` take alike, with absolute paths
     shards : number of shards; None uses the script of the last submission
     missing : take only the shards with tasks that are not solved yet
     named_options, sbatch_options : options of sbatch, by name and as they are
     """
-    path = state.study.with_suffix(SUFFIX)
+    path = progress.study.with_suffix(SUFFIX)
     limit = time_limit(named_options["time"]) if "time" in named_options else None
     options = [option(f"{name}={value}") for name, value in named_options.items()]
     options += [option(word) for word in sbatch_options]
@@ -124,9 +124,9 @@ def batch(
         check_shards(shards, len(tasks))
         own = resources(tasks, shards, int(named_options.get("cpus-per-task", 1)), limit)
         named = [f"--{name}={value}" for name, value in own.items() if name not in named_options]
-        text, options = script(state.study, words, shards, [*named, *options]), []
-    members = sorted({task % shards for task in state.missing}) if missing else list(range(shards))
-    return Batch(path, text, fresh, shards, members, options)
+        text, options = script(progress.study, words, shards, [*named, *options]), []
+    members = {task % shards for task in progress.missing} if missing else range(shards)
+    return Batch(path, text, fresh, shards, sorted(members), options)
 
 
 def script(study: Path, words: list[str], shards: int, options: list[str]) -> str:
@@ -233,7 +233,7 @@ def queued(path: Path) -> list[str]:
 def call(words: list[str]) -> str:
     """The output of a Slurm command. Raises GfmdError with its error message."""
     try:
-        done = subprocess.run(words, capture_output=True, text=True, check=True)
+        completed = subprocess.run(words, capture_output=True, text=True, check=True)
     except FileNotFoundError as error:
         raise GfmdError(
             f"{words[0]}: no such command here; submit where Slurm is, or look with --dry-run"
@@ -242,7 +242,7 @@ def call(words: list[str]) -> str:
         raise GfmdError(
             f"{words[0]} ended with status {error.returncode}: {error.stderr.strip()}"
         ) from error
-    return done.stdout.strip()
+    return completed.stdout.strip()
 
 
 def _pattern(path: Path) -> str:

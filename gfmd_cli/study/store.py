@@ -22,9 +22,12 @@ from gfmd_cli.files.hdf5 import new_hdf5
 from gfmd_cli.files.locks import locked
 from gfmd_cli.spec.models import Spec
 from gfmd_cli.status import Status
-from gfmd_cli.study.columns import empty_row
-from gfmd_cli.study.measure import planned
-from gfmd_cli.study.parts import (
+from gfmd_cli.study.measure import task_row
+from gfmd_cli.study.provenance import origin
+from gfmd_cli.study.reading import StudyFile, open_study
+from gfmd_cli.study.result import Entry, Outcome, TaskResult
+from gfmd_cli.study.tasks import Task
+from gfmd_cli.study.unfinished_work import (
     SUFFIX,
     check_own,
     checkpoint_folders,
@@ -34,10 +37,6 @@ from gfmd_cli.study.parts import (
     set_aside,
     version_of,
 )
-from gfmd_cli.study.provenance import origin
-from gfmd_cli.study.reading import StudyFile, open_study
-from gfmd_cli.study.result import Entry, Outcome, TaskResult
-from gfmd_cli.study.tasks import Task
 from gfmd_cli.study.writing import write_study
 
 EARLIER = "earlier_specs"
@@ -56,10 +55,10 @@ class Study:
             raise InputError(f"{path}: a symbolic link that leads to itself")
         if not self.path.name:
             raise InputError(f"{path}: a folder, where a study file (NAME.h5) is expected")
-        self._entries: dict[Path, tuple[tuple[int, ...], Entry]] = {}
-        """What is known of records, and of which file."""
-        known = self.path.suffix == ".h5"
-        self.parts = self.path.with_suffix(".parts" if known else f"{self.path.suffix}.parts.d")
+        self._entries: dict[tuple[Path, tuple[int, ...]], Entry] = {}
+        """The records read so far, by path and version."""
+        is_usual = self.path.suffix == ".h5"
+        self.parts = self.path.with_suffix(".parts" if is_usual else f"{self.path.suffix}.parts.d")
 
     @contextmanager
     def work(self, tasks: list[Task]) -> Iterator[list[str]]:
@@ -98,7 +97,7 @@ class Study:
             return {}
         with open_study(self.path) as file:
             tasks = zip(file.task_ids, file.statuses, file.stored, strict=True)
-            return {n: Outcome(status, out) for n, status, out in tasks if status != Status.MISSING}
+            return {n: Outcome(status, out) for n, status, out in tasks if status.is_solved}
 
     def collect(self, spec: Spec, tasks: list[Task], text: str) -> list[str]:
         """Write all records into the study file, then drop them; inside `work`.
@@ -168,18 +167,17 @@ class Study:
 
         Raises StudyError.
         """
-        known = self._entries.get(path)
-        version = version_of(path)
-        if known is None or known[0] != version:
-            known = self._entries[path] = version, read_record_entry(path)
-        return known[1]
+        version = path, version_of(path)
+        if version not in self._entries:
+            self._entries[version] = read_record_entry(path)
+        return self._entries[version]
 
     def _is_complete(self, tasks: list[Task]) -> bool:
         """Whether no task is missing, and no record or unfinished checkpoint is left."""
         if self.damaged_paths() or self.record_paths() or not self.path.exists():
             return False
         with open_study(self.path) as file:
-            if Status.MISSING in file.statuses:
+            if not all(status.is_solved for status in file.statuses):
                 return False
         lacking = {task.id for task in without_result(tasks, self.collected())}
         solved = {task.id for task in tasks} - lacking
@@ -236,11 +234,11 @@ class _Sources:
         """By task id: its entry, and the record or the index in the study so far."""
         if old is not None:
             for index, status in enumerate(old.statuses):
-                if status != Status.MISSING:
+                if status.is_solved:
                     self.by_task[old.task_ids[index]] = old.entry(index), index
         for path, entry in records.items():
-            known = self.by_task.get(entry.task_id)
-            if known is None or entry.stored >= known[0].stored:
+            before = self.by_task.get(entry.task_id)
+            if before is None or entry.stored >= before[0].stored:
                 self.by_task[entry.task_id] = entry, path
 
     def entries(self, tasks: list[Task]) -> list[Entry]:
@@ -252,8 +250,7 @@ class _Sources:
         """What the spec gives of a task, and what was measured if it is solved."""
         missing = Entry(task.id, task.scene_id, frozenset(), {"status": Status.MISSING})
         entry, _ = self.by_task.get(task.id, (missing, 0))
-        points = {name: entry.row.get(name, -1) for name in ("points", "points_y")}
-        return entry._replace(row=empty_row() | {**entry.row} | planned(task) | points)
+        return entry._replace(row=task_row(task, entry.row))
 
     def load(self, task_id: str) -> TaskResult:
         """The whole result of a task."""

@@ -100,7 +100,7 @@ class Task:
         return max(1, round(points * self.points_y / self.points))
 
     def resolves(self, points: int) -> bool:
-        """Whether the surface is resolved by a grid with so many points along x."""
+        """Whether the surface is resolved by a grid of `points` points along x."""
         return (
             points >= self.surface.smallest_grid()
             and self.points_y_on(points) >= self.surface.smallest_grid_y()
@@ -130,7 +130,7 @@ class Task:
     def seconds(self) -> float:
         """Time that the solve is expected to take on one thread, within a factor of about three."""
         solves = forecast.SEARCH if LOADS[self.quantity].searched else 1.0
-        p_star = self.load if self.quantity == "p_star" else 0.05
+        p_star = self.load if self.quantity == "p_star" else forecast.P_STAR
         pairs = forecast.pairs(self.elastomer.exponent, p_star, self.solver.tolerance)
         return 0.01 + solves * forecast.SECONDS_PER_PAIR * self.size * pairs
 
@@ -231,7 +231,7 @@ def _points(spec: Spec, chosen: dict[str, Any], load: float) -> int:
     surface, grid = chosen["surface"], chosen["grid"]
     if grid.points != "auto":
         return int(surface.copies * grid.points)
-    p_star = load if spec.load.quantity == "p_star" and load else 0.1
+    p_star = load if spec.load.quantity == "p_star" else forecast.P_STAR
     exponent = chosen["elastomer"].exponent
     return forecast.last_grid(surface, exponent, p_star, grid.boundary, spec.accuracy)
 

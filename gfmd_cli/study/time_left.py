@@ -1,6 +1,7 @@
 """Estimate of the remaining time of a run, from the times that its tasks have taken so far."""
 
 import time
+from collections import defaultdict
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import isfinite, log
@@ -10,6 +11,7 @@ from gfmd_cli.study.context import Progress, Report
 from gfmd_cli.study.forecast import SECONDS_PER_PAIR
 from gfmd_cli.study.tasks import Task
 
+# Choices; scripts/time_left.py compares the estimates with the true times.
 MIN_REMAINING_SHARE = 0.5  # least share of the elapsed time that the forecast alone says to remain
 MEASURED_FROM = 0.1  # share of the forecast work after which the measured speed is used
 FINAL_PAIRS = 2.0  # pairs of transforms after the last step, which show and store the result
@@ -39,7 +41,7 @@ class _Running:
         return self.work + self.step * float(self.size)
 
 
-class Clock:
+class RemainingTime:
     """The remaining time of a run, updated as its tasks start, step and end.
 
     The estimate for a waiting task is its forecast times the ratio of measured to forecast time of
@@ -55,11 +57,10 @@ class Clock:
         self.jobs, self.now = jobs, now
         self.seconds = {task.index: task.seconds for task in tasks}
         self.waiting = set(self.tasks)
-        self.waiting_seconds: dict[Any, float] = {}
+        self.waiting_seconds: dict[Any, float] = defaultdict(float)
         """Forecast seconds of the waiting tasks, by elastomer."""
         for task in tasks:
-            known = self.waiting_seconds.get(task.elastomer, 0.0)
-            self.waiting_seconds[task.elastomer] = known + task.seconds
+            self.waiting_seconds[task.elastomer] += task.seconds
         self.running: dict[int, _Running] = {}
         self.ended_seconds: dict[Any, tuple[float, float]] = {}
         """Measured and forecast seconds of the ended tasks, by elastomer; None has those of all."""

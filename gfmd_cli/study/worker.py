@@ -10,7 +10,7 @@ from threading import Event, Thread
 from gfmd_cli.grid import plans
 from gfmd_cli.study.context import SolveContext
 from gfmd_cli.study.run_task import attempt
-from gfmd_cli.study.signals import note_in_worker
+from gfmd_cli.study.signals import handle_signals_in_worker
 from gfmd_cli.study.tasks import Task
 
 READY = "ready"
@@ -25,7 +25,7 @@ def serve(pipe: Connection) -> None:
     faulthandler.enable(sys.__stderr__ or 2)
     parts, options = pipe.recv()
     context = SolveContext(options, pipe.send)
-    note_in_worker(context.stop)
+    handle_signals_in_worker(context.stop)
     tasks: SimpleQueue[Task] = SimpleQueue()
     Thread(target=_receive, args=(pipe, tasks, context.stop), daemon=True).start()
     try:

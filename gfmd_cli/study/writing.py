@@ -10,7 +10,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from gfmd_cli.files.hdf5 import as_text, create_dataset, write_checked, write_scale
-from gfmd_cli.status import Status
 from gfmd_cli.study.column import Column
 from gfmd_cli.study.columns import (
     COLUMNS,
@@ -73,7 +72,7 @@ def write_study(
     for index, entry in enumerate(entries):
         scene = f"scenes/{scenes[entry.scene_id]}"
         if any(name.partition(".")[0] in with_arrays for name in entry.stored) or (
-            scene not in file and entry.row["status"] != Status.MISSING
+            scene not in file and entry.row["status"].is_solved
         ):
             writer.result(file, index, scene, groups, load(index))
 

@@ -13,8 +13,8 @@ from gfmd_cli.solvers.loop import Solver, State
 from gfmd_cli.spec.models import OutputTable
 from gfmd_cli.study.checkpoint import Checkpoint
 from gfmd_cli.study.notes import Notes, Trial
-from gfmd_cli.study.parts import read_record, write_record
 from gfmd_cli.study.reading import open_study, read_rows
+from gfmd_cli.study.unfinished_work import read_record, write_record
 
 CUTS, FLIPS = 200, 500
 

@@ -17,8 +17,8 @@ from gfmd_cli.solvers.loop import Solver, State
 from gfmd_cli.study.checkpoint import Checkpoint
 from gfmd_cli.study.columns import LAYOUT as STUDY_LAYOUT
 from gfmd_cli.study.notes import Notes
-from gfmd_cli.study.parts import SUFFIX, read_record_entry
 from gfmd_cli.study.pointer import LAYOUT
+from gfmd_cli.study.unfinished_work import SUFFIX, read_record_entry
 
 SPEC = power_spec(n=1, points=16, p_star=[0.1, 0.3], cutoff=0.2)
 

@@ -4,7 +4,7 @@ import pytest
 
 from gfmd_cli.status import Status
 from gfmd_cli.study.context import Progress
-from gfmd_cli.study.time_left import Clock
+from gfmd_cli.study.time_left import RemainingTime
 
 
 def task(index, seconds, elastomer="a"):
@@ -24,7 +24,7 @@ def time():
 
 
 def clock_of(time, *tasks, jobs=1):
-    return Clock(tasks, jobs, lambda: time.now)
+    return RemainingTime(tasks, jobs, lambda: time.now)
 
 
 def word(index, event, residual=float("nan"), points=64, status=None):

@@ -9,7 +9,7 @@ from gfmd_cli.files.hdf5 import MAGIC
 from gfmd_cli.files.regular import open_regular
 from gfmd_cli.spec.models import Spec
 from gfmd_cli.status import Status
-from gfmd_cli.study.checkpoint import Checkpoint, Saved
+from gfmd_cli.study.checkpoint import Checkpoint, SavedProgress
 from gfmd_cli.study.reading import open_study
 from gfmd_cli.study.store import Study
 from gfmd_cli.study.tasks import plan
@@ -17,22 +17,22 @@ from gfmd_cli.units import count
 
 
 @dataclass(frozen=True)
-class TaskState:
+class TaskProgress:
     """The progress of one task."""
 
     task: int
     label: str
     status: Status
-    saved: Saved | None = None
+    saved: SavedProgress | None = None
     """The saved state from which the next run resumes."""
 
 
 @dataclass(frozen=True)
-class StudyState:
+class StudyProgress:
     """The progress of all tasks of a study."""
 
     study: Path
-    tasks: list[TaskState]
+    tasks: list[TaskProgress]
     records: int
     """Records that are not collected into the study file yet."""
     damaged: list[str]
@@ -48,7 +48,7 @@ class StudyState:
     @property
     def missing(self) -> list[int]:
         """Indices of the tasks that are not solved yet."""
-        return [task.task for task in self.tasks if task.status == Status.MISSING]
+        return [task.task for task in self.tasks if not task.status.is_solved]
 
     @property
     def converged(self) -> bool:
@@ -60,14 +60,14 @@ class StudyState:
         return Counter(task.status for task in self.tasks if task.task % shards == index)
 
 
-def state_of_spec(spec: Spec, path: Path) -> StudyState:
+def progress_of_spec(spec: Spec, path: Path) -> StudyProgress:
     """The progress of the tasks of a spec in the study file `path`."""
     tasks = plan(spec)
     output = frozenset(spec.output.names())
-    return _state(Study(path), [(task.id, task.label) for task in tasks], output)
+    return _progress(Study(path), [(task.id, task.label) for task in tasks], output)
 
 
-def state_of_study(path: Path) -> StudyState:
+def progress_of_study(path: Path) -> StudyProgress:
     """The progress of a study file; it contains no labels of the tasks that are missing."""
     with open_study(path) as file:
         ids, rows = file.task_ids, file.rows
@@ -75,7 +75,7 @@ def state_of_study(path: Path) -> StudyState:
         f"{row['elastomer']} {row['points']} p*={row['p_star']:.4g}" if row["elastomer"] else ""
         for row in rows
     ]
-    return _state(Study(path), list(zip(ids, labels, strict=True)))
+    return _progress(Study(path), list(zip(ids, labels, strict=True)))
 
 
 def is_study(path: Path) -> bool:
@@ -96,9 +96,9 @@ def check_shards(shards: int, tasks: int) -> None:
         raise InputError(f"--shards {shards}: the spec has {has}; take 1 to {tasks}")
 
 
-def _state(
+def _progress(
     study: Study, tasks: list[tuple[str, str]], output: frozenset[str] = frozenset()
-) -> StudyState:
+) -> StudyProgress:
     """The progress of these tasks (id, label); a result that lacks some of `output` is missing.
 
     Checkpoints are read before records, and these before the study, in the order in which a task
@@ -108,13 +108,16 @@ def _state(
     damaged_files = study.damaged_paths()
     records, damaged = study.records()
     outcomes = study.outcomes()
-    known = {name: result.status for name, result in outcomes.items() if result.stored >= output}
+    statuses = {name: result.status for name, result in outcomes.items() if result.stored >= output}
     names = [path.name for path in (*damaged_files, *damaged)]
     others = outcomes.keys() - {name for name, _ in tasks}
-    states = [
-        TaskState(
-            index, label, known.get(name, Status.MISSING), None if name in known else saved[name]
+    each = [
+        TaskProgress(
+            index,
+            label,
+            statuses.get(name, Status.MISSING),
+            None if name in statuses else saved[name],
         )
         for index, (name, label) in enumerate(tasks)
     ]
-    return StudyState(study.path, states, len(records), names, len(others))
+    return StudyProgress(study.path, each, len(records), names, len(others))
