@@ -14,6 +14,7 @@ from gfmd_cli.errors import SpaceError, StudyError
 from gfmd_cli.files.checksums import sealed
 from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.solvers.loop import Solver, State
+from gfmd_cli.study import unfinished_work
 from gfmd_cli.study.checkpoint import Checkpoint
 from gfmd_cli.study.columns import LAYOUT as STUDY_LAYOUT
 from gfmd_cli.study.notes import Notes
@@ -211,3 +212,9 @@ def test_a_study_keeps_its_mode_and_the_link_to_it(gfmd):
     assert Path("link.h5").is_symlink()
     assert len(gfmd("export", "s.h5").output.splitlines()) == 4
     assert not Path("s.parts").exists()
+
+
+def test_a_checkpoint_that_another_process_deletes_is_not_a_foreign_file(tmp_path, monkeypatch):
+    """It is in the list of the folder, but no longer there."""
+    monkeypatch.setattr(unfinished_work, "_listed", lambda folder: [folder / ("0" * 16)])
+    unfinished_work.check_own(tmp_path)

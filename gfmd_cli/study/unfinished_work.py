@@ -5,6 +5,7 @@ write to the folder, so that nothing in it is trusted: only regular files are op
 followed, and a damaged file is set aside.
 """
 
+import os
 import re
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
@@ -35,7 +36,8 @@ def check_own(parts: Path) -> None:
         raise SpaceError(f"{parts}: not a folder; move it away or choose another name (-o)")
     for path in _listed(parts):
         own = OWN_FOLDERS if _is_folder(path) else OWN_FILES
-        if not own.fullmatch(path.name) and path.suffix != ".bad":  # a folder set aside
+        is_own = own.fullmatch(path.name) or path.suffix == ".bad"  # a folder set aside
+        if not is_own and os.path.lexists(path):  # another process may have deleted it
             raise InputError(
                 f"{parts}: needed for unfinished work, but holds {path.name!r}, which is not "
                 "gfmd's; move it away or take another name (-o)"
