@@ -51,7 +51,7 @@ PLATE_BAR, PLATE_FLOOR = 0.6, 0.2
 #   AREA_CHANGE D                              what neither explains, D from the coarser grid
 # A = area / L^2, N = points per L. Chosen on seeds 20 and 47 (full), 11 (--quick --shift 1.37).
 AREA_CHANCE, AREA_LAW, AREA_CHANGE = 0.5, 0.01, 0.3
-EXPONENT_CHANGE = 0.6  # uncertainty of the exponent of the excess over its change with q
+EXPONENT_CHANGE = 0.6  # of its change with q is uncertain; chosen on --layers, seeds 1 and 2
 MAX_STRESS_EXPONENT = 2.5  # sigma_p converges as spacing^(3 - n): too slow for larger n
 
 # Typical errors on one grid: power laws and medians by regression; of equally good ones, those that

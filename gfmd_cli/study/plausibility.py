@@ -4,10 +4,9 @@ from collections.abc import Mapping
 from math import inf, isfinite
 from typing import Any
 
-from gfmd_cli.physics.observables import border_contact, contact_points
 from gfmd_cli.spec.models import LOADS
 from gfmd_cli.status import Status
-from gfmd_cli.study.refinement import TaskSolution
+from gfmd_cli.study.refinement import TaskSolution, border_share
 from gfmd_cli.study.tasks import Task
 
 FEW_POINTS = 30  # a choice: the area of a circle of 30 points has an error of its rim of a third
@@ -78,11 +77,9 @@ def _contact_at_border(task: Task, solved: TaskSolution) -> list[str]:
 
     Lines are left out: a wave or ridge is periodic by nature.
     """
-    contact, solution = solved.contact, solved.solution
     if task.surface.rough or task.surface.dimension == 1:
         return []
-    touching = contact_points(contact.obstacle, solution.u, solution.sigma)
-    if not border_contact(contact.grid, touching):
+    if not border_share(solved.contact, solved.solution):
         return []
     beyond = (
         "where it meets that of the next periodic copy of the indenter"

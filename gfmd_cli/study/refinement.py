@@ -227,14 +227,17 @@ def _solved_grid(solved: TaskSolution) -> SolvedGrid:
         u_g=measured.u_g * scene.h_std,
         perimeter=measured.perimeter,
         work=solved.solution.transforms * scene.grid.size,
-        border=border_share(contact, solved.solution),
+        border=free_border_share(contact, solved.solution),
     )
 
 
-def border_share(contact: Contact, solution: Solution) -> float | None:
+def free_border_share(contact: Contact, solution: Solution) -> float | None:
     """Share of the border of the map in contact; None with a periodic boundary."""
-    if contact.boundary == "periodic":
-        return None
+    return None if contact.boundary == "periodic" else border_share(contact, solution)
+
+
+def border_share(contact: Contact, solution: Solution) -> float:
+    """Share of the points at the border of the cell that are in contact."""
     touching = contact_points(contact.obstacle, solution.u, solution.sigma)
     return border_contact(contact.grid, touching)
 
