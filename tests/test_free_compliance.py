@@ -6,7 +6,7 @@ import pytest
 
 from gfmd_cli.errors import InputError
 from gfmd_cli.physics.elastomers import HalfSpace, Layer, Membrane, Plate, Power, Slab
-from gfmd_cli.physics.free_compliance import NEAR
+from gfmd_cli.physics.free_compliance import NEAR_SIDES
 
 SIDES = (0.7, 1.0)  # of a pixel, y and x
 
@@ -48,7 +48,7 @@ def test_riesz_kernel_is_the_fourier_transform_of_the_compliance(n):
 
 
 @pytest.mark.parametrize("n", [0.5, 1.0, 1.7])
-@pytest.mark.parametrize("pixel", [(0, 1), (3, 2), (0, NEAR), (70, 3), (80, 90)])
+@pytest.mark.parametrize("pixel", [(0, 1), (3, 2), (0, NEAR_SIDES), (70, 3), (80, 90)])
 def test_pressure_on_a_pixel_displaces_others_as_its_integral(n, pixel):
     """Closed form close to the pixel, Gauss's rule far from it."""
     ranges = [((j - 0.5) * side, (j + 0.5) * side) for j, side in zip(pixel, SIDES, strict=True)]

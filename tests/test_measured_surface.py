@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from gfmd_cli import solve
-from gfmd_cli.maps.pictures import PIXELS, picture
+from gfmd_cli.maps.pictures import MAP_PIXELS, picture
 from gfmd_cli.study.reading import open_study
 
 SPEC = """\
@@ -68,12 +68,12 @@ def test_a_study_keeps_the_map_as_measured_and_as_prepared(rows_of, tmp_path):
 
 
 def test_a_picture_has_the_means_of_the_known_heights():
-    heights = np.arange(4.0 * PIXELS * 2).reshape(4, -1)
+    heights = np.arange(4.0 * MAP_PIXELS * 2).reshape(4, -1)
     missing = np.zeros(heights.shape, dtype=bool)
     missing[0, 0] = missing[2:, 2:4] = True
     small = picture(heights, (1.0, 2.0), missing)
-    assert small.heights.shape == (2, PIXELS)
-    assert small.heights[0, 0] == pytest.approx(np.mean([1, 2 * PIXELS, 2 * PIXELS + 1]))
+    assert small.heights.shape == (2, MAP_PIXELS)
+    assert small.heights[0, 0] == pytest.approx(np.mean([1, 2 * MAP_PIXELS, 2 * MAP_PIXELS + 1]))
     assert np.isnan(small.heights[1, 1])
 
 

@@ -8,7 +8,7 @@ from gfmd_cli.physics.contact import Contact
 from gfmd_cli.physics.elastomers import Power
 from gfmd_cli.solvers import multigrid_kernels as kernels
 from gfmd_cli.solvers.contact_state import PRESSED, TENSE
-from gfmd_cli.solvers.multigrid import GROWTH, Multigrid, level_rows, suits
+from gfmd_cli.solvers.multigrid import MAX_GROWTH, Multigrid, level_rows, suits
 
 PATTERNS = ("none", "points", "sparse", "dense", "disc", "grooves", "all but one", "corner")
 
@@ -246,7 +246,7 @@ def test_knows_what_it_does_not_suit():
     assert suits(contact(1, 10))
     assert not suits(contact(2, 6))  # no coarser grid
     steep = contact(4)
-    steep.stiffness[:, 20:] *= GROWTH
+    steep.stiffness[:, 20:] *= MAX_GROWTH
     assert not suits(steep)
     steep.stiffness[0, 1] = 0.0
     assert not suits(steep)

@@ -56,7 +56,7 @@ def theory(surface, n):
 @pytest.mark.parametrize("n", TABLE)
 def test_exact_shells_reproduce_the_table(default, n, monkeypatch):
     with monkeypatch.context() as patched:
-        patched.setattr(persson, "EXACT", default[0].size)
+        patched.setattr(persson, "EXACT_SHELLS", default[0].size)
         exact = theory(default, n)
     h_std = np.sqrt(exact.shells.height.sum())
     delta_sigma, gaps = TABLE[n]
@@ -218,8 +218,8 @@ def test_a_flat_surface_is_in_full_contact():
 
 
 def test_the_shells_keep_every_sum_and_separate_the_longest_waves(monkeypatch):
-    monkeypatch.setattr(persson, "EXACT", 20)
-    monkeypatch.setattr(persson, "BINS", 30)
+    monkeypatch.setattr(persson, "EXACT_SHELLS", 20)
+    monkeypatch.setattr(persson, "LOGARITHMIC_BINS", 30)
     rng = np.random.default_rng(1)
     m = np.arange(-40, 41)
     q = np.sqrt(np.add.outer(m**2, m**2).ravel().astype(float))

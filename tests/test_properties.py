@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from gfmd_cli.errors import GfmdError, InputError
 from gfmd_cli.physics import einstein_solid
-from gfmd_cli.physics.contact import PRESSURES, build_scene
+from gfmd_cli.physics.contact import PRESSURE_RANGE, build_scene
 from gfmd_cli.physics.elastomers import Plate, Power, Slab, Tabulated, slab_factor
 from gfmd_cli.physics.error_bounds import error_bounds
 from gfmd_cli.physics.indenters import Parabola, PowerLawIndenter, Punch, Ridge
@@ -336,7 +336,7 @@ def test_pressures_at_both_ends_say_what_was_reached(n, p_star):
 @pytest.mark.parametrize("factor", [0.99, 1 / 0.99])
 def test_pressures_beyond_the_ends_are_refused(factor):
     scene = build_scene(SCALED, Power(n=1), 64)
-    end = PRESSURES[0] if factor < 1 else PRESSURES[1]
+    end = PRESSURE_RANGE[0] if factor < 1 else PRESSURE_RANGE[1]
     scene.contact(end)
     with pytest.raises(InputError, match="out of range"):
         scene.contact(end * factor)

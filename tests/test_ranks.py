@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from gfmd_cli.grid.halo import MIN_ROWS, block_edges, is_distributable
-from gfmd_cli.grid.ranks import NUMBERS, SIZES, announced, is_first
+from gfmd_cli.grid.ranks import RANK_VARIABLES, SIZE_VARIABLES, announced, is_first
 
 SMOKE = Path(__file__).parents[1] / "configs" / "smoke.toml"
 RUN = ["run", str(SMOKE), "--set", "elastomer.n=0"]
@@ -19,7 +19,7 @@ def launcher(monkeypatch):
     """Sets what a launcher tells its processes, and nothing else."""
 
     def launcher(**variables):
-        for name in (*SIZES, *NUMBERS, "SLURM_STEP_NUM_TASKS"):
+        for name in (*SIZE_VARIABLES, *RANK_VARIABLES, "SLURM_STEP_NUM_TASKS"):
             monkeypatch.delenv(name, raising=False)
         for name, value in variables.items():
             monkeypatch.setenv(name, value)

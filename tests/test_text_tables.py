@@ -47,7 +47,7 @@ MAPS = {
 @pytest.mark.parametrize("case", MAPS)
 @pytest.mark.parametrize("window", [2**12, 2**21])
 def test_tables_of_heights_are_recognised(monkeypatch, case, window):
-    monkeypatch.setattr(text_tables, "WINDOW", window)
+    monkeypatch.setattr(text_tables, "WINDOW_BYTES", window)
     content, formats = MAPS[case]
     assert table_formats(BytesIO(content)) == formats
 
@@ -77,7 +77,7 @@ OTHERS = {
 @pytest.mark.parametrize("case", OTHERS)
 @pytest.mark.parametrize("window", [2**14, 2**21])
 def test_other_texts_are_no_tables(monkeypatch, case, window):
-    monkeypatch.setattr(text_tables, "WINDOW", window)
+    monkeypatch.setattr(text_tables, "WINDOW_BYTES", window)
     assert table_formats(BytesIO(OTHERS[case])) == set()
 
 
@@ -198,7 +198,7 @@ def test_the_header_of_a_profile_in_latin_1_is_read(tmp_path, encoding):
 def test_a_long_table_may_end_in_latin_1(tmp_path):
     matrix = RNG.random((600, 600))
     (tmp_path / "h.txt").write_bytes(text(matrix) + "# Ende: µm\n".encode("latin-1"))
-    assert (tmp_path / "h.txt").stat().st_size > text_tables.WINDOW
+    assert (tmp_path / "h.txt").stat().st_size > text_tables.WINDOW_BYTES
     assert read_topography(tmp_path / "h.txt").heights == pytest.approx(matrix, rel=1e-5)
 
 

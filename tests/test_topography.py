@@ -268,7 +268,7 @@ def test_packed_netcdf_heights_are_refused(hdf5, heights):
 def limit_bytes(monkeypatch):
     def limit(max_bytes):
         for module in (height_map, microscope_files):
-            monkeypatch.setattr(module, "MAX_BYTES", max_bytes)
+            monkeypatch.setattr(module, "MAX_MAP_BYTES", max_bytes)
 
     return limit
 
@@ -502,7 +502,7 @@ def test_missing_points_of_a_scan_are_located(tmp_path):
 def test_an_unknown_format_is_refused(tmp_path, content):
     pytest.importorskip("SurfaceTopography")
     (tmp_path / "h.dat").write_bytes(content)
-    with pytest.raises(InputError, match="no known topography format"):
+    with pytest.raises(InputError, match="not in a known topography format"):
         read_topography(tmp_path / "h.dat")
 
 
@@ -820,7 +820,7 @@ def test_a_row_of_a_text_table_is_never_skipped(tmp_path, line, word, mark):
         rows[line - 1][0] = word
     path = tmp_path / "h.txt"
     path.write_text(mark + "\n".join(" ".join(row) for row in rows), encoding="utf-8")
-    with pytest.raises(InputError, match=rf"h\.txt:{line}: .* is no number; write NaN"):
+    with pytest.raises(InputError, match=rf"h\.txt:{line}: .* is not a number; write NaN"):
         read_topography(path)
 
 

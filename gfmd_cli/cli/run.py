@@ -94,12 +94,12 @@ def run(
         gfmd run configs/demo.toml --set load.p_star=0.1
         gfmd run one.toml two.toml -o both.h5
     """
-    from gfmd_cli.grid.ranks import launched, together
+    from gfmd_cli.grid.ranks import launched, shared_errors
 
     ranks = launched()
     max_seconds = None if max_hours is None else 3600 * max_hours
     unconverged = 0
-    with together(ranks):
+    with shared_errors(ranks):
         from gfmd_cli.spec.parse import read_spec
         from gfmd_cli.study.run import RunOptions
 
@@ -119,11 +119,11 @@ def run(
 
 def _run(spec: "Spec", text: str, path: Path, quiet: bool, options: "RunOptions") -> int:
     """Run the tasks of a spec; how many ended other than converged."""
-    from gfmd_cli.grid.ranks import leads
+    from gfmd_cli.grid.ranks import is_root
     from gfmd_cli.study.context import ignore
     from gfmd_cli.study.run import run_study
 
-    first = leads(options.ranks)
+    first = is_root(options.ranks)
     reporter = Reporter(quiet)
     with reporter as report:
         counts = run_study(spec, text, path, report if first else ignore, options)
@@ -172,7 +172,7 @@ def _print_results(
 def _print_tasks(spec: "Spec", path: Path, options: "RunOptions") -> None:
     """Print the tasks of a shard with their load, memory and time, and those that are done."""
     from gfmd_cli.analysis.run_summary import task_text
-    from gfmd_cli.grid.ranks import leads
+    from gfmd_cli.grid.ranks import is_root
     from gfmd_cli.study.resources import check_memory
     from gfmd_cli.study.store import Study, without_result
     from gfmd_cli.study.tasks import plan
@@ -182,7 +182,7 @@ def _print_tasks(spec: "Spec", path: Path, options: "RunOptions") -> None:
     missing = without_result(tasks, outcomes)
     if tasks:
         check_memory(tasks, options.ranks)
-    if not leads(options.ranks):
+    if not is_root(options.ranks):
         return
     if tasks:
         print_text(f"{task_text(tasks, outcomes, {task.id for task in missing})}\n")

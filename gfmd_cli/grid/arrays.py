@@ -22,10 +22,10 @@ MaskedField: TypeAlias = "np.ma.MaskedArray[Any, Any]"
 
 Precision = Literal["double", "single"]
 
-BLOCK = 2**15  # points of a block of rows: it and its temporaries stay in the cache
+BLOCK_POINTS = 2**15  # points of a block of rows: it and its temporaries stay in the cache
 
 
-def row_blocks(field: Field | Modes, block: int = BLOCK) -> list[slice]:
+def row_blocks(field: Field | Modes, block: int = BLOCK_POINTS) -> list[slice]:
     """Slices of whole rows of about `block` values each."""
     step = max(1, block * len(field) // field.size)
     return [slice(start, start + step) for start in range(0, len(field), step)]

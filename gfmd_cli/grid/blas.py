@@ -35,5 +35,5 @@ def one_blas_thread() -> Iterator[None]:
 
 @cache
 def _libraries() -> ThreadpoolController:
-    """The libraries of this process; to find them takes some milliseconds."""
+    """The BLAS libraries of this process. Cached, because the search takes milliseconds."""
     return ThreadpoolController()

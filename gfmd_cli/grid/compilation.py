@@ -12,7 +12,7 @@ from numba import njit
 
 from gfmd_cli.files.cache import private_folder
 
-OPTIONS: dict[str, Any] = {
+NUMBA_OPTIONS: dict[str, Any] = {
     "nogil": True,
     "no_cfunc_wrapper": True,
     "error_model": "numpy",
@@ -29,11 +29,11 @@ def kernel(function: Callable[..., Any]) -> Any:
     if not _is_cache_known():
         _take_private_folder()
     try:
-        compiled = njit(cache=True, **OPTIONS)(function)
+        compiled = njit(cache=True, **NUMBA_OPTIONS)(function)
     except RuntimeError:  # no folder can be written
         if not _take_private_folder():
-            return njit(**OPTIONS)(function)
-        compiled = njit(cache=True, **OPTIONS)(function)
+            return njit(**NUMBA_OPTIONS)(function)
+        compiled = njit(cache=True, **NUMBA_OPTIONS)(function)
     _tolerate_faults(compiled._cache)
     return compiled
 
@@ -44,7 +44,7 @@ def part_of_kernel(function: Callable[..., Any]) -> Any:
     It is always inlined. Otherwise kernels that are loaded from the cache would share one copy of
     it, and its last bits would depend on which of them is loaded first.
     """
-    return njit(no_cpython_wrapper=True, forceinline=True, **OPTIONS)(function)
+    return njit(no_cpython_wrapper=True, forceinline=True, **NUMBA_OPTIONS)(function)
 
 
 def _is_cache_known() -> bool:

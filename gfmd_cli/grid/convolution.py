@@ -27,8 +27,8 @@ from gfmd_cli.grid.shared_transforms import (
 )
 from gfmd_cli.grid.transposition import Span, Transposition, column_spans
 
-BLOCK = 2**14  # coefficients of a block of columns: 256 KiB, in the cache of a core
-NARROWEST = 8  # columns of a block; four make a line of the cache
+BLOCK_COEFFICIENTS = 2**14  # coefficients of a block of columns: 256 KiB, in the cache of a core
+MIN_BLOCK_COLUMNS = 8  # columns of a block; four make a line of the cache
 
 
 def padded_shape(shape: tuple[int, ...], factor: float) -> tuple[int, ...]:
@@ -55,7 +55,7 @@ class PaddedTransform:
         self.padded_rows, self.padded_columns = (1, *self.padded)[-2:]
         self.real = np.dtype(np.float64 if self.precision == "double" else np.float32)
         self.modes = self.padded_columns // 2 + 1
-        self.width = min(self.modes, max(NARROWEST, BLOCK // self.padded_rows))
+        self.width = min(self.modes, max(MIN_BLOCK_COLUMNS, BLOCK_COEFFICIENTS // self.padded_rows))
         local_rows = LocalRows(self.own_rows, self.threads)
         self.pool, self.parts = local_rows.pool, local_rows.parts
 
@@ -127,7 +127,7 @@ class PaddedTransform:
         upper, lower = slice(len(symbol)), slice(len(symbol), None)
         mirrored = symbol[(self.padded_rows - 1) // 2 : 0 : -1]
 
-        def filter_share(thread: int, block: Modes, forward: Execute, backward: Execute) -> None:
+        def filter_blocks(thread: int, block: Modes, forward: Execute, backward: Execute) -> None:
             for part, coefficients in self._blocks(work, block, thread, self.threads):
                 forward()
                 coefficients[upper] *= symbol[:, part]
@@ -135,8 +135,8 @@ class PaddedTransform:
                 backward()
                 work[:, part] = coefficients[: self.rows]
 
-        shares = [partial(filter_share, i, *own) for i, own in enumerate(self._column_plans)]
-        side_by_side(self.pool, shares)
+        calls = [partial(filter_blocks, i, *own) for i, own in enumerate(self._column_plans)]
+        side_by_side(self.pool, calls)
 
     def _blocks(
         self, work: Modes, block: Modes, first: int = 0, step: int = 1

@@ -18,7 +18,7 @@ from gfmd_cli.grid.arrays import Field, Modes, Precision
 from gfmd_cli.grid.convolution import DistributedPaddedTransform, PaddedTransform, padded_shape
 from gfmd_cli.grid.fft_grid import Grid, Shape
 from gfmd_cli.grid.halo import HALO_ROWS, DistributedColumns, DistributedRows, is_distributable
-from gfmd_cli.grid.ranks import Ranks, leads
+from gfmd_cli.grid.ranks import Ranks, is_root
 from gfmd_cli.grid.rows import LocalRows
 from gfmd_cli.grid.shared_transforms import Execute, Pairs, along_columns, along_rows, side_by_side
 from gfmd_cli.grid.transposition import Span, Transposition, column_spans
@@ -224,7 +224,7 @@ class DistributedGrid(Grid):
 
     def collect(self, field: Field) -> Field | None:
         """All of a field, on the first process; None on the others."""
-        gathered = np.empty(self.whole_shape, field.dtype) if leads(self.ranks) else None
+        gathered = np.empty(self.whole_shape, field.dtype) if is_root(self.ranks) else None
         counts = np.diff(self.rows.edges) * self.points
         target = None if gathered is None else [gathered, counts]
         self.ranks.wait(self.ranks.comm.Igatherv(np.ascontiguousarray(field), target))

@@ -22,7 +22,7 @@ from gfmd_cli.grid.transposition import Span
 
 T = TypeVar("T")
 ALL_ROWS = slice(None)
-THREADED = 512  # points per side from which a second thread pays
+MIN_THREADED_SIDE = 512  # points per side from which a second thread pays
 Shape = tuple[int, ...]
 """Numbers of points along the axes of a field, (y, x), or (x,) of a line."""
 
@@ -290,7 +290,7 @@ class Grid:
     @property
     def _threads(self) -> int:
         """Number of threads; 1 on small grids, for which a second thread is slower."""
-        return self.threads if self.size >= THREADED**2 and self.dimension == 2 else 1
+        return self.threads if self.size >= MIN_THREADED_SIDE**2 and self.dimension == 2 else 1
 
     def as_rows(self, field: Field) -> Field:
         """A field, a symbol or `padded` with two axes, in one dimension too."""

@@ -32,8 +32,8 @@ Plan = Callable[..., Any]
 """Makes a plan on one thread from source, target, axes and direction."""
 Wisdom = list[str]
 """Text in double and in single precision."""
-PLANNING = (30.0, 1e-6)  # seconds at most to look for a plan, at all and per grid point
-MAX_BYTES = 2**24  # of a file of wisdom
+PLANNING_SECONDS = (30.0, 1e-6)  # seconds at most to look for a plan, at all and per grid point
+MAX_WISDOM_BYTES = 2**24  # of a file of wisdom
 WISDOM = re.compile(
     r"\([\w. -]+( #x[0-9a-f]{1,8}){4}\n"
     r"(  \(\w+ \d{1,4}( #x[0-9a-f]{1,5}){2} #x1?[0-9a-f]{1,2}( #x[0-9a-f]{1,8}){4}\)\n)*"
@@ -102,7 +102,7 @@ def planned(make: Callable[[Plan], T], size: int = 0) -> T:
 
     The time limit of a measurement increases with the number of grid points, `size`.
     """
-    fftw = partial(pyfftw.FFTW, planning_timelimit=PLANNING[0] + PLANNING[1] * size)
+    fftw = partial(pyfftw.FFTW, planning_timelimit=PLANNING_SECONDS[0] + PLANNING_SECONDS[1] * size)
     with _planner:
         if _estimated:
             return make(partial(fftw, flags=("FFTW_ESTIMATE",)))
@@ -129,7 +129,7 @@ def _measured(make: Callable[[Plan], T], fftw: Plan) -> T:
 def read_wisdom(folder: Path) -> Wisdom | None:
     """The wisdom of a folder; None where there is none of this machine that is whole."""
     with suppress(OSError, ValueError, KeyError, TypeError, RecursionError):
-        data = json.loads(read_regular(_path(folder), MAX_BYTES))
+        data = json.loads(read_regular(_path(folder), MAX_WISDOM_BYTES))
         double, single = data["wisdom"]
         known = data["for"] == _here() and data["sha256"] == _digest([double, single])
         if known and WISDOM.fullmatch(double) and WISDOM.fullmatch(single):

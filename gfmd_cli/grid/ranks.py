@@ -16,11 +16,11 @@ from gfmd_cli.errors import INSTALL, GfmdError, InputError
 from gfmd_cli.grid.arrays import Field
 
 T = TypeVar("T")
-SIZES = ("PMI_SIZE", "OMPI_COMM_WORLD_SIZE", "MV2_COMM_WORLD_SIZE", "PMIX_SIZE")
-NUMBERS = ("PMI_RANK", "OMPI_COMM_WORLD_RANK", "MV2_COMM_WORLD_RANK", "PMIX_RANK")
-EXPECTED = (GfmdError, MemoryError, ArithmeticError, OSError)
+SIZE_VARIABLES = ("PMI_SIZE", "OMPI_COMM_WORLD_SIZE", "MV2_COMM_WORLD_SIZE", "PMIX_SIZE")
+RANK_VARIABLES = ("PMI_RANK", "OMPI_COMM_WORLD_RANK", "MV2_COMM_WORLD_RANK", "PMIX_RANK")
+EXPECTED_ERRORS = (GfmdError, MemoryError, ArithmeticError, OSError)
 SPIN_SECONDS, LONG_SPIN_SECONDS = 2e-4, 2e-2  # of testing a request without sleeping
-POLL_SECONDS = 2e-5  # of sleep between two tests after that
+REQUEST_POLL_SECONDS = 2e-5  # of sleep between two tests after that
 ERROR_POLL_SECONDS = 1e-3
 ABORT_AFTER_SECONDS = 10.0  # that a rank with an error waits for the others before it ends them all
 FORWARD_SECONDS = 1.0  # for the launcher to forward the last message
@@ -46,7 +46,7 @@ class Ranks:
         for request in requests:
             while not request.Test():
                 if time.perf_counter() > end:
-                    time.sleep(POLL_SECONDS)
+                    time.sleep(REQUEST_POLL_SECONDS)
 
     def gather(self, values: Any) -> Field:
         """The arrays of all ranks, stacked in rank order, on every rank."""
@@ -65,17 +65,17 @@ class Ranks:
         self.wait(self.comm.Ibcast(total))
         return total
 
-    def agree(self, value: T) -> T:
+    def broadcast(self, value: T) -> T:
         """The value of the first rank, on every rank."""
         return self.comm.bcast(value)
 
-    def share_error(self, error: BaseException | None) -> None:
+    def raise_on_all(self, error: BaseException | None) -> None:
         """Raise, on all ranks, the error of the first that has one.
 
         If other ranks do not call this in time, because they wait for data from this one, all
         ranks are aborted.
         """
-        if error is not None and not isinstance(error, EXPECTED):
+        if error is not None and not isinstance(error, EXPECTED_ERRORS):
             log.error("rank %d: unexpected error", self.rank, exc_info=error)
         own = np.array([_status(error)])
         statuses = np.zeros(self.size, own.dtype)
@@ -102,8 +102,8 @@ class Ranks:
 
 
 @contextmanager
-def together(ranks: Ranks | None) -> Iterator[None]:
-    """An error inside on one rank is raised on all; see `Ranks.share_error`."""
+def shared_errors(ranks: Ranks | None) -> Iterator[None]:
+    """Raise an error inside the block on one rank on all ranks; see `Ranks.raise_on_all`."""
     if ranks is None:
         yield
         return
@@ -112,16 +112,16 @@ def together(ranks: Ranks | None) -> Iterator[None]:
         yield
     except Exception as error:
         failed = error
-    ranks.share_error(failed)
+    ranks.raise_on_all(failed)
 
 
-def agree(ranks: Ranks | None, value: T) -> T:
+def broadcast(ranks: Ranks | None, value: T) -> T:
     """The value of the first rank, or the value itself without ranks."""
-    return value if ranks is None else ranks.agree(value)
+    return value if ranks is None else ranks.broadcast(value)
 
 
-def leads(ranks: Ranks | None) -> bool:
-    """Whether this process is the only one or the first rank, which prints and writes files."""
+def is_root(ranks: Ranks | None) -> bool:
+    """Whether this process is the first or only rank, which prints and writes files."""
     return ranks is None or ranks.rank == 0
 
 
@@ -143,15 +143,15 @@ def _portable(error: BaseException | None, rank: int) -> BaseException | None:
 
 def announced() -> int:
     """Number of processes that the launcher announces; 1 without a launcher."""
-    counts = [os.environ.get(name, "") for name in SIZES]
-    if any(name in os.environ for name in NUMBERS):
+    counts = [os.environ.get(name, "") for name in SIZE_VARIABLES]
+    if any(name in os.environ for name in RANK_VARIABLES):
         counts.append(os.environ.get("SLURM_STEP_NUM_TASKS", ""))
     return next((int(text) for text in counts if text.isdigit()), 1)
 
 
 def is_first() -> bool:
     """Whether this is the only process or the first rank, from the variables of the launcher."""
-    numbers = [os.environ.get(name, "0") for name in NUMBERS]
+    numbers = [os.environ.get(name, "0") for name in RANK_VARIABLES]
     return announced() == 1 or all(text in ("0", "") for text in numbers)
 
 
@@ -179,9 +179,9 @@ def launched() -> Ranks | None:
 
 
 def cores_and_processes_on_node(ranks: Ranks, cores: set[int]) -> tuple[int, int]:
-    """Cores for this process, and how many processes of the run share this machine.
+    """Cores for this process, and the number of processes of the run on this machine.
 
-    `cores` are those that this process may use; what is shared is shared out.
+    `cores` are those that this process may use. The cores of all processes are divided equally.
     """
     from mpi4py import MPI
 

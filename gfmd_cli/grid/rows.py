@@ -14,7 +14,7 @@ import numpy as np
 
 from gfmd_cli.grid.arrays import Field, Mask
 
-THREADED = 256  # smallest number of rows of a coarser level for which a second thread pays
+MIN_THREADED_ROWS = 256  # smallest number of rows of a coarser level for which a second thread pays
 
 Kernel = Callable[..., None]
 
@@ -79,7 +79,7 @@ class LocalRows:
 
     def with_count(self, count: int) -> "LocalRows":
         """The rows of a coarser level that has any number of rows."""
-        return LocalRows(count, len(self.parts) if count >= THREADED else 1)
+        return LocalRows(count, len(self.parts) if count >= MIN_THREADED_ROWS else 1)
 
     def run_from_finer(self, kernel: Kernel, fine: Any, coarse: Any) -> None:
         """Run a kernel that computes arrays of this level from arrays of the next finer level."""

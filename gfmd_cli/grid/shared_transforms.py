@@ -16,7 +16,7 @@ from gfmd_cli.grid.plans import Plan
 from gfmd_cli.grid.rows import LocalRows
 from gfmd_cli.grid.transposition import Span
 
-ALIGNED = 8  # complex numbers in single precision in a line of the cache
+CACHE_LINE = 8  # complex numbers in single precision in a line of the cache
 
 Execute = Callable[[], None]
 Pair = tuple[Execute, Execute]
@@ -45,8 +45,8 @@ def along_rows(real: Field, work: Modes, parts: Sequence[Span], fftw: Plan) -> P
 
 def along_columns(work: Modes, count: int, fftw: Plan) -> Pairs:
     """The transforms of `count` parts of the columns in place, and back."""
-    lines = np.linspace(0, -(-work.shape[1] // ALIGNED), count + 1).astype(int)
-    edges = np.minimum(lines * ALIGNED, work.shape[1])
+    lines = np.linspace(0, -(-work.shape[1] // CACHE_LINE), count + 1).astype(int)
+    edges = np.minimum(lines * CACHE_LINE, work.shape[1])
     parts = [work[:, a:b] for a, b in pairwise(edges) if a < b]
     forward = [fftw(part, part, (0,), "FFTW_FORWARD").execute for part in parts]
     return forward, [fftw(part, part, (0,), "FFTW_BACKWARD").execute for part in parts]

@@ -17,7 +17,7 @@ AXIS_NAMES = {
     **dict.fromkeys(("x", "lon", "longitude"), "x"),
     **dict.fromkeys(("y", "lat", "latitude"), "y"),
 }
-EVEN = 1e-3  # deviation of distances, over their mean, up to which they are equal; a choice
+EVEN_TOLERANCE = 1e-3  # deviation of equal distances, over their mean; a choice
 NO_VARIABLE = b"This is a netCDF dimension but not a netCDF variable"  # begins the attribute NAME
 UNIT_NAMES = ("units", "unit")
 NO_UNITS = ("", "1")
@@ -30,7 +30,7 @@ LENGTHS = {
     1e-10: "\N{ANGSTROM SIGN} \N{LATIN CAPITAL LETTER A WITH RING ABOVE} angstrom Angstrom",
     1e-12: "pm",
 }
-METRES = {name: metres for metres, names in LENGTHS.items() for name in names.split()}
+METRES_PER_UNIT = {name: metres for metres, names in LENGTHS.items() for name in names.split()}
 """Metres per unit; Unicode has two letters for micro and two for angstrom."""
 
 
@@ -62,15 +62,16 @@ def stated_unit(data: Any) -> str:
 
 def in_metres(unit: str) -> float | None:
     """Metres per unit of a text such as "nm" or "[um]"; None where the unit is not known."""
-    return METRES.get(unit.strip().strip("[]()").strip())
+    return METRES_PER_UNIT.get(unit.strip().strip("[]()").strip())
 
 
 def factor(path: Path, name: str, unit: str) -> float | None:
-    """Metres per unit, None without a unit. Raises InputError for one that is no known length."""
+    """Metres per unit, None without a unit. Raises InputError for an unknown one."""
     metres = in_metres(unit)
     if unit and metres is None:
         raise InputError(
-            f"{path}: {name!r} has the unit {unit!r}; known are {', '.join(METRES)}: convert it"
+            f"{path}: {name!r} has the unit {unit!r}; known are {', '.join(METRES_PER_UNIT)}: "
+            "convert it"
         )
     return metres
 
@@ -98,7 +99,7 @@ def _axis(path: Path, file: Any, dimension: Any) -> Axis:
     steps = np.diff(positions)
     step = float(positions[-1] - positions[0]) / steps.size
     rounding = np.spacing(np.abs(stored).max()) if stored.dtype.kind == "f" else 0.0
-    if not (np.abs(steps - step) <= EVEN * abs(step) + rounding).all() or step == 0:
+    if not (np.abs(steps - step) <= EVEN_TOLERANCE * abs(step) + rounding).all() or step == 0:
         raise InputError(
             f"{path}: the positions {label!r} are not evenly spaced: resample the map, or save it "
             "without them"

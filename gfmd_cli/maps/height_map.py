@@ -17,7 +17,7 @@ from gfmd_cli.files.checksums import MAX_COMPRESSION
 from gfmd_cli.maps.array_coordinates import axes_of, factor, is_transposed, stated_unit
 from gfmd_cli.units import left_out
 
-MAX_BYTES = 2**33  # 32768 x 32768 heights in double precision
+MAX_MAP_BYTES = 2**33  # 32768 x 32768 heights in double precision
 MAX_HEIGHT = 1e30  # in any unit; the usual values for no data are 9.97e36 (netCDF) and 3.4e38
 HEIGHT_NAMES = "h", "height", "heights", "height_map", "z", "topography", "topo", "elevation"
 MAX_LISTED = 20  # names in a message
@@ -62,9 +62,9 @@ def check_layout(path: Path, shape: tuple[int, ...], dtype: np.dtype[Any]) -> No
             f"{path}: {extent(shape)} points; at least {SMALLEST_MAP} along each axis are needed"
         )
     needed = math.prod(shape) * np.dtype(np.float64).itemsize
-    if needed > MAX_BYTES:
+    if needed > MAX_MAP_BYTES:
         raise InputError(
-            f"{path}: {extent(shape)} heights take {needed} bytes; at most {MAX_BYTES} are "
+            f"{path}: {extent(shape)} heights take {needed} bytes; at most {MAX_MAP_BYTES} are "
             "allowed: resample the map, or save a part of it"
         )
 

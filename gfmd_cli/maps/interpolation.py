@@ -15,21 +15,21 @@ Interpolation = Literal["fourier", "monotone"]
 """How heights between the points of a map are obtained."""
 
 MAX_SHORT_WAVES = 2e-3
-"""Share of the squared slope in the shortest waves up to which a map is band-limited. Measured:
+"""Fraction of the squared slope in the shortest waves up to which a map is band-limited. Measured:
 1e-14 in single precision, 1e-3 after rounding to 8 bits; 3e-3 for peaks exp(h), 7e-3 for clipped
 maps, 0.05 to 0.4 for scans, steps and white noise."""
 MAX_TIES = 0.1
-"""Share of neighbours of equal height up to which a map has no plateaus. Measured: 0.04 after
+"""Fraction of neighbours of equal height up to which a map has no plateaus. Measured: 0.04 after
 rounding to 8 bits; 0.2 where a quarter of the area is clipped, 0.5 for stripes."""
 MAX_JUMPS = 0.2
-"""Share of the squared differences of neighbours in isolated jumps up to which a map has no steps.
+"""Fraction of the squared differences of neighbours in isolated jumps, for a map without steps.
 Measured (20,000 random surfaces with 2 to 4 points per shortest wave, H = 0.1 to 1): at most 0.18
 on 8 x 8 to 10 x 10 points, 0.11 on 16 x 16, 0.05 on 32 x 32, 0.03 on 64 x 64 and more; bumps, caps,
 peaks exp(h), scans and white noise at most 0.1; steps of 3 times the rms height of the roughness
 0.05 to 0.65, of 5 times 0.3 to 0.9, of 10 times 0.86 or more."""
-ISOLATED = 4.0  # ratio of a jump to the differences around it; a choice
-HIGHEST = 0.9  # of the highest wavenumber of the grid: beyond, a wave is one of the shortest
-MARGIN = 4  # points beyond the border of the cell that the slopes of the monotone cubics need
+ISOLATED_RATIO = 4.0  # ratio of a jump to the differences around it; a choice
+SHORT_WAVE = 0.9  # of the highest wavenumber of the grid: beyond, a wave is one of the shortest
+CUBIC_MARGIN = 4  # points beyond the border of the cell that the slopes of the monotone cubics need
 
 
 def suited_interpolation(heights: Field) -> Interpolation:
@@ -51,7 +51,7 @@ def suited_interpolation(heights: Field) -> Interpolation:
 
 
 def _short_waves(heights: Field) -> tuple[float, float]:
-    """Shares of the squared slope in the corners and along the borders of the spectrum."""
+    """Fractions of the squared slope in the corners and along the borders of the spectrum."""
     rows, columns = heights.shape
     modes = np.fft.rfft2(heights - heights.mean())
     y = np.fft.fftfreq(rows, 0.5)[:, None]  # relative to the highest wavenumber of the grid
@@ -60,28 +60,28 @@ def _short_waves(heights: Field) -> tuple[float, float]:
     slope = weight * np.abs(modes) ** 2 * (y**2 + x**2)
     total = float(slope.sum()) or 1.0
     corners = float(slope[y**2 + x**2 > 1 + 1e-9].sum()) / total
-    return corners, float(slope[np.maximum(np.abs(y), x) > HIGHEST].sum()) / total
+    return corners, float(slope[np.maximum(np.abs(y), x) > SHORT_WAVE].sum()) / total
 
 
 def _ties(heights: Field) -> float:
-    """Share of the pairs of neighbours with the same height."""
+    """Fraction of the pairs of neighbours with the same height."""
     return float(np.mean([np.mean(heights == np.roll(heights, 1, axis)) for axis in (0, 1)]))
 
 
 def _jumps(heights: Field) -> float:
-    """Share of the squared differences of neighbours in isolated jumps, along the axis with more.
+    """Fraction of the squared differences of neighbours in isolated jumps, on the worse axis.
 
-    A jump is isolated where it is `ISOLATED` times larger than the two differences before it and
-    the two after it.
+    A jump is isolated where it is `ISOLATED_RATIO` times larger than the two differences before it
+    and the two after it.
     """
-    shares = [0.0]
+    fractions = [0.0]
     for axis in range(heights.ndim):
         steps = np.abs(heights - np.roll(heights, 1, axis))
         around = np.maximum.reduce([np.roll(steps, shift, axis) for shift in (-2, -1, 1, 2)])
         squares = np.square(steps, out=steps)
-        isolated = squares > ISOLATED**2 * np.square(around, out=around)
-        shares.append(float(squares[isolated].sum() / (squares.sum() or 1.0)))
-    return max(shares)
+        isolated = squares > ISOLATED_RATIO**2 * np.square(around, out=around)
+        fractions.append(float(squares[isolated].sum() / (squares.sum() or 1.0)))
+    return max(fractions)
 
 
 def positions(old: int, new: int, centred: bool = False) -> Field:
@@ -149,9 +149,9 @@ def nearest(mask: Mask, shape: tuple[int, ...], *, centred: bool = False) -> Mas
 
 def _along_axis(heights: Field, position: Field, axis: int) -> Field:
     """Values at positions along an axis, in points, by a periodic monotone cubic."""
-    margins = [(MARGIN, MARGIN) if i == axis else (0, 0) for i in range(heights.ndim)]
+    margins = [(CUBIC_MARGIN, CUBIC_MARGIN) if i == axis else (0, 0) for i in range(heights.ndim)]
     wrapped = np.pad(heights, margins, mode="wrap")
-    knots = np.arange(-MARGIN, heights.shape[axis] + MARGIN, dtype=np.float64)
+    knots = np.arange(-CUBIC_MARGIN, heights.shape[axis] + CUBIC_MARGIN, dtype=np.float64)
     return monotone_cubic(knots, wrapped, axis)(position)
 
 

@@ -14,8 +14,8 @@ Levelling = Literal["none", "mean", "plane", "curvature"]
 Edges = Literal["none", "window", "mirror"]
 
 MAX_EXACT = 100_000  # missing heights; the sparse solution of more takes seconds
-SWEEPS = 30  # a choice: the filling is then smooth over several points
-ROUNDING = 256 * float(np.finfo(float).eps)
+JACOBI_STEPS = 30  # a choice: the filling is then smooth over several points
+LEVELLING_ROUNDING = 256 * float(np.finfo(float).eps)
 """Of `level`, over the largest height: up to 92 eps in planes of 16 to 3000 points a side, with
 and without missing heights."""
 DEGREES: dict[Levelling, int] = {"mean": 0, "plane": 1, "curvature": 2}
@@ -74,7 +74,7 @@ def make_periodic(heights: Field, how: Edges, taper: float = 0.1) -> Field:
     Parameters
     ----------
     heights : shape (rows, columns), or (points,) of a line
-    taper : width of the tapered zone at each edge as a share of the side, 0 < taper <= 1/2
+    taper : width of the tapered zone at each edge as a fraction of the side, 0 < taper <= 1/2
     """
     if how == "none":
         return heights
@@ -112,8 +112,8 @@ def fill_missing(heights: Field, missing: Mask) -> Field:
 
     Each missing height is the mean of its neighbours (fewer than four at the edge of the map), so
     that the filling has no maximum or minimum of its own. Known heights are the boundary values.
-    Beyond `MAX_EXACT` missing heights the solution of a map of half the resolution is refined by
-    `SWEEPS` of Jacobi's iteration, which smooths it without solving the equation exactly.
+    Beyond `MAX_EXACT` missing heights, `JACOBI_STEPS` steps of the Jacobi iteration smooth the
+    solution of a map of half the resolution, without solving the equation exactly.
 
     Parameters
     ----------
@@ -134,7 +134,7 @@ def _smooth(known: Field, missing: Mask) -> Field:
     for axis in (0, 1):
         coarse = coarse.repeat(2, axis)
     filled = np.where(missing, coarse[: known.shape[0], : known.shape[1]], known)
-    for _ in range(SWEEPS):
+    for _ in range(JACOBI_STEPS):
         around = np.pad(filled, 1, mode="edge")
         mean = around[:-2, 1:-1] + around[2:, 1:-1] + around[1:-1, :-2] + around[1:-1, 2:]
         np.copyto(filled, 0.25 * mean, where=missing)

@@ -9,25 +9,25 @@ from gfmd_cli.grid.arrays import Field, row_blocks
 from gfmd_cli.maps.map_preparation import border_step, level
 from gfmd_cli.maps.topography import Topography
 
-STEEP = 3.0  # rms gradient; a choice: surfaces of machined or worn solids have less
-SMOOTH = 1e-6  # rms gradient; a choice: polished mirrors have about that
-CLIFF = 5.0  # ratio of the step across the border to that inside; a choice: 1 if periodic
-TILTED = 0.5  # share of the variance of the heights that is a tilt; a choice
-STEPS = 1.5  # that the rounding of a plane leaves at most: 1, and up to 1.4 on 8 x 8 points
-SAMPLE = 10_000  # heights that exclude most maps; to sort all takes seconds
-SINGLE = float(np.finfo(np.float32).eps)  # double precision may have been single before
-ROUNDED = 0.2  # share of equal neighbouring heights, at which the gradient is 3 % too large
-FEW = 0.01  # share of the heights of which a warning tells the percentage; a choice
-PLATEAU = 0.5  # share of equal heights that are taken as a part of the surface; a choice
-FEW_OTHERS = 8  # heights that say nothing about one that is apart; a choice
-CLIPPED = 10  # ratio of the numbers of equal heights, highest to second; about 1 if rounded
-SIDES = 1e-3  # relative difference of two sides beyond which one is probably wrong; a choice
-FILLED = 0.05  # share of filled heights; a choice, as for the frame of the window
+MAX_GRADIENT = 3.0  # rms; a choice: surfaces of machined or worn solids have less
+MIN_GRADIENT = 1e-6  # rms; a choice: polished mirrors have about that
+MAX_BORDER_STEP = 5.0  # ratio of the step across the border to that inside; a choice: 1 if periodic
+MAX_TILT = 0.5  # fraction of the variance of the heights that is a tilt; a choice
+MAX_ROUNDING_STEPS = 1.5  # that rounding leaves of a plane: 1, and up to 1.4 on 8 x 8 points
+SAMPLE_SIZE = 10_000  # heights that exclude most maps; to sort all takes seconds
+SINGLE_EPS = float(np.finfo(np.float32).eps)  # double precision may have been single before
+MAX_EQUAL_NEIGHBOURS = 0.2  # fraction of pairs, at which the gradient is 3 % too large
+MIN_SHOWN_FRACTION = 0.01  # of the heights, from which a warning states the percentage; a choice
+PLATEAU_FRACTION = 0.5  # of the heights: so many equal ones are part of the surface; a choice
+MIN_OTHERS = 8  # other heights, without which one that is apart is no outlier; a choice
+CLIPPED_RATIO = 10  # ratio of the numbers of equal heights, highest to second; about 1 if rounded
+SIDE_TOLERANCE = 1e-3  # relative difference, beyond which a side is probably wrong; a choice
+MAX_FILLED = 0.05  # fraction of filled heights; a choice
 
 
 def other_side(length: float, stated: float) -> str:
     """A side [m] other than the one that the file states."""
-    if abs(length / stated - 1) <= SIDES:
+    if abs(length / stated - 1) <= SIDE_TOLERANCE:
         return ""
     return f"surface.length = {length:g} m replaces the side of the file, {stated:g} m"
 
@@ -61,11 +61,11 @@ def unit_of_heights(topography: Topography, scale: float) -> str:
 
 def many_filled_in(topography: Topography) -> str:
     """Many missing heights, all of them filled in."""
-    share = topography.holes / topography.heights.size
-    if share <= FILLED:
+    fraction = topography.holes / topography.heights.size
+    if fraction <= MAX_FILLED:
         return ""
     return (
-        f"{share:.0%} of the heights are missing and were filled in: contact there was "
+        f"{fraction:.0%} of the heights are missing and were filled in: contact there was "
         'not measured; set surface.region, or surface.missing = "void" where nothing can '
         "touch"
     )
@@ -75,7 +75,7 @@ def unlikely_gradient(heights: Field, spacing: tuple[float, ...]) -> str:
     """Heights and spacing [m] that make an unlikely gradient."""
     slopes = (np.diff(heights, axis=i) / step for i, step in enumerate(spacing))
     gradient = np.sqrt(sum(float(np.mean(slope**2)) for slope in slopes))
-    if not (gradient > STEEP or 0 < gradient < SMOOTH):
+    if not (gradient > MAX_GRADIENT or 0 < gradient < MIN_GRADIENT):
         return ""
     return (
         f"rms gradient {gradient:.3g}: check that heights and side are in metres; "
@@ -87,7 +87,7 @@ def unlikely_gradient(heights: Field, spacing: tuple[float, ...]) -> str:
 def step_at_border(heights: Field) -> str:
     """Opposite borders of a repeated map that do not fit."""
     cliff = border_step(heights)
-    if cliff <= CLIFF:
+    if cliff <= MAX_BORDER_STEP:
         return ""
     return (
         f"the height step across the border is {cliff:.3g} times that inside the map: if "
@@ -98,7 +98,7 @@ def step_at_border(heights: Field) -> str:
 def tilted(heights: Field) -> str:
     """A tilt from which nothing is subtracted."""
     tilt = 1 - float(np.var(level(heights, "plane"))) / (np.var(heights) or 1.0)
-    if tilt <= TILTED:
+    if tilt <= MAX_TILT:
         return ""
     return (
         f"a tilt makes up {tilt:.0%} of the variance of the heights, and nothing is "
@@ -114,20 +114,21 @@ def outliers(topography: Topography) -> str:
     for extreme, word in ((heights.min(), "minimum"), (heights.max(), "maximum")):
         others = heights[heights != extreme]
         count = heights.size - others.size
-        if count > PLATEAU * heights.size or others.size < FEW_OTHERS:
+        fraction = count / heights.size
+        if fraction > PLATEAU_FRACTION or others.size < MIN_OTHERS:
             continue
-        share = f" ({count / heights.size:.0%})" if count > FEW * heights.size else ""
+        percentage = f" ({fraction:.0%})" if fraction > MIN_SHOWN_FRACTION else ""
         if min(abs(others.max() - extreme), abs(others.min() - extreme)) > np.ptp(others) > 0:
-            what = "1 height is" if count == 1 else f"{count} heights{share} are"
+            what = "1 height is" if count == 1 else f"{count} heights{percentage} are"
             return (
                 f"{what} exactly {extreme:g}, far from all others: a spike or a mark of missing "
                 "heights? Replace it by NaN"
             )
         following = others.min() if word == "minimum" else others.max()
-        if share and count > CLIPPED * np.count_nonzero(others == following):
+        if percentage and count > CLIPPED_RATIO * np.count_nonzero(others == following):
             return (
-                f"{count} heights{share} are exactly the {word}, {extreme:g}: clipped at the range "
-                "of the instrument, or a mark of missing heights? Replace such a mark by NaN"
+                f"{count} heights{percentage} are exactly the {word}, {extreme:g}: clipped at the "
+                "range of the instrument, or a mark of missing heights? Replace such a mark by NaN"
             )
     return ""
 
@@ -147,7 +148,7 @@ def rounded(topography: Topography, scale: float) -> str:
             changes[axis] += steps.size
             smallest = min(smallest, steps.min(initial=np.inf))
     equal = 1 - float((changes / np.maximum(pairs, 1)).max())
-    if equal < ROUNDED or not changes.any():
+    if equal < MAX_EQUAL_NEIGHBOURS or not changes.any():
         return ""
     return (
         f"{equal:.0%} of the neighbouring heights are equal: if they were rounded (the smallest "
@@ -164,11 +165,11 @@ def rounded_trend(topography: Topography, levelled: Field, scale: float) -> str:
     left = float(np.ptp(levelled))
     if not 0 < left < 0.5 * np.ptp(heights):  # the trend has two steps or more
         return ""
-    smallest = SINGLE * max(heights.max(), -heights.min())
-    sample = heights.flat[:: 1 + heights.size // SAMPLE]
-    for values in (sample, heights):  # the smallest step of a sample is no smaller than that of all
+    smallest = SINGLE_EPS * max(heights.max(), -heights.min())
+    sample = heights.flat[:: 1 + heights.size // SAMPLE_SIZE]
+    for values in (sample, heights):  # no step of a sample is smaller than the smallest of all
         step = max(np.diff(np.unique(values)).min(initial=np.inf), smallest)
-        if left > STEPS * step:
+        if left > MAX_ROUNDING_STEPS * step:
             return ""
     return (
         f"levelling leaves heights in a range of {left:.3g} m, and the heights are rounded to "

@@ -10,9 +10,9 @@ import numpy as np
 
 from gfmd_cli.errors import INSTALL, InputError
 from gfmd_cli.grid.arrays import Field
-from gfmd_cli.maps.array_coordinates import EVEN, METRES, in_metres
+from gfmd_cli.maps.array_coordinates import EVEN_TOLERANCE, METRES_PER_UNIT, in_metres
 from gfmd_cli.maps.height_map import (
-    MAX_BYTES,
+    MAX_MAP_BYTES,
     REMEDY,
     SMALLEST_MAP,
     HeightMap,
@@ -33,7 +33,7 @@ from gfmd_cli.maps.text_tables import (
 )
 
 NO_GRID = "three columns that are not the points (x, y, height) of a full grid"
-TABLES = {"xyz", "asc"}  # formats of SurfaceTopography that are tables of numbers
+TABLE_FORMATS = {"xyz", "asc"}  # formats of SurfaceTopography that are tables of numbers
 SMALL_FILE = 2**14  # bytes, which the readers of tables parse in a second
 OWN_HEADERS = LATIN_1, b"X;Y;valid"  # of tables whose readers know the length of the header
 SORTED_ROWS = 20  # heights of so many rows are not sorted by chance; a choice
@@ -42,8 +42,8 @@ SIGNATURE_BYTES = 512  # at the beginning of a file, by which readers recognise 
 
 def read_microscope_file(path: Path, dataset: str | None) -> HeightMap:
     """Read a microscope file by SurfaceTopography."""
-    if path.stat().st_size > MAX_BYTES:
-        raise InputError(f"{path}: {path.stat().st_size} bytes; at most {MAX_BYTES} are read")
+    if path.stat().st_size > MAX_MAP_BYTES:
+        raise InputError(f"{path}: {path.stat().st_size} bytes; at most {MAX_MAP_BYTES} are read")
     with path.open("rb") as file, warnings.catch_warnings():
         ignored = (DeprecationWarning, FutureWarning, ImportWarning, RuntimeWarning)
         for category in ignored:  # of other packages
@@ -78,7 +78,7 @@ def _open_scan(path: Path, file: BinaryIO, readers: list[Any]) -> Any:
     reasons = []
     for reader in readers:
         answer = reader.can_read(start).name
-        is_guess = reader.format() in TABLES - tables
+        is_guess = reader.format() in TABLE_FORMATS - tables
         if answer == "NO" or (is_guess and not is_small):
             continue
         file.seek(0)
@@ -98,7 +98,7 @@ def _open_scan(path: Path, file: BinaryIO, readers: list[Any]) -> Any:
             f"({'; '.join(reasons)}): damaged, or a variant of the format? {REMEDY}"
         )
     raise InputError(
-        f"{path}: no known topography format; .npy, HDF5 and the formats of "
+        f"{path}: not in a known topography format; .npy, HDF5 and the formats of "
         f"SurfaceTopography can be read. {REMEDY}"
     )
 
@@ -106,7 +106,7 @@ def _open_scan(path: Path, file: BinaryIO, readers: list[Any]) -> Any:
 def _read_channel(path: Path, file: BinaryIO, reader: Any, dataset: str | None) -> HeightMap:
     """Read one height channel of an open microscope file, in metres."""
     if reader.format() == "hgt" and path.suffix.lower() != ".hgt":  # accepts any 2 n^2 bytes
-        raise InputError(f"{path}: no known topography format")
+        raise InputError(f"{path}: not in a known topography format")
     if reader.format() == "npz":
         raise InputError(f"{path}: an archive of NumPy arrays; save the map as a .npy file")
     channel = _height_channel(path, reader, dataset)
@@ -227,7 +227,7 @@ def _factors(path: Path, file: BinaryIO, columns: int) -> list[float]:
             f"{path}: the line above the table states units ({', '.join(units)}), but not one for "
             f"each of the {columns} columns, as 'x [um] z [nm]' does: add them, or remove the line"
         )
-    return [METRES[unit] for unit in units]
+    return [METRES_PER_UNIT[unit] for unit in units]
 
 
 def _with_positions(reader: Any, scan: Any) -> Any:
@@ -238,7 +238,7 @@ def _with_positions(reader: Any, scan: Any) -> Any:
     """
     if not scan.is_uniform:
         return scan
-    tolerance = EVEN * abs(float(scan.physical_sizes[0])) / scan.nb_grid_pts[0]
+    tolerance = EVEN_TOLERANCE * abs(float(scan.physical_sizes[0])) / scan.nb_grid_pts[0]
     try:
         again = reader._read(tol=tolerance)
     except Exception:  # a first column that counts the rows is found by the same tolerance
@@ -283,8 +283,10 @@ def _check_all_are_heights(path: Path, table: Field) -> None:
 
 def _is_evenly_spaced(values: Field) -> bool:
     """Whether all steps from one value to the next are equal, and not zero."""
+    if values.size < 3:
+        return False
     steps = np.diff(values)
-    return bool(values.size > 2 and steps[0] != 0 and np.ptp(steps) <= EVEN * abs(steps[0]))
+    return bool(steps[0] != 0 and np.ptp(steps) <= EVEN_TOLERANCE * abs(steps[0]))
 
 
 def _check_all_rows_read(path: Path, file: BinaryIO, rows: int, columns: int) -> None:
@@ -311,12 +313,13 @@ def _check_all_rows_read(path: Path, file: BinaryIO, rows: int, columns: int) ->
         if is_row and (len(words) <= columns / 2 or len(set(words)) == 1):
             raise InputError(
                 f"{path}:{number}: {words[0].decode(errors='replace')!r} in a row of the table is "
-                "no number; write NaN for a missing height, and save text without a byte order mark"
+                "not a number; write NaN for a missing height, and save text without a byte order "
+                "mark"
             )
 
 
 def _check_no_row_in_header(path: Path, file: BinaryIO) -> None:
-    """Raise InputError for a line that is no row below the first row of a table of positions.
+    """Raise InputError for a line below the first row of a table of positions that is not a row.
 
     The reader would take this line and all rows above it as the header.
     """

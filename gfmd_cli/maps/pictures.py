@@ -6,7 +6,7 @@ import numpy as np
 
 from gfmd_cli.grid.arrays import Field, Mask
 
-PIXELS = 192  # along the longer side of a picture: half a page wide, more cannot be seen
+MAP_PIXELS = 192  # along the longer side of a picture: half a page wide, more cannot be seen
 LINE_PIXELS = 2048  # of a line profile
 
 
@@ -29,7 +29,7 @@ def block_sums(values: Field, step: int) -> Field:
 
 def picture(heights: Field, sides: tuple[float, ...], missing: Mask | None = None) -> Picture:
     """A picture whose pixels are means over the known heights of some points."""
-    pixels = PIXELS if heights.ndim == 2 else LINE_PIXELS
+    pixels = MAP_PIXELS if heights.ndim == 2 else LINE_PIXELS
     step = -(-max(heights.shape) // pixels)
     known = np.ones(heights.shape, bool) if missing is None else ~missing
     count = block_sums(known.astype(np.float64), step)

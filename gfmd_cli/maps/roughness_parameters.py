@@ -13,7 +13,7 @@ import numpy as np
 
 from gfmd_cli.grid.arrays import Field, MaskedField
 
-LEVEL = 0.2  # of the autocorrelation at the autocorrelation length: default of ISO 25178-2
+CORRELATION_LEVEL = 0.2  # at the autocorrelation length: default of ISO 25178-2
 MAP_NAMES = ("Sq", "Sa", "Ssk", "Sku", "Sz", "Sdq", "Sdr", "Sal")
 PROFILE_NAMES = ("Pq", "Pa", "Psk", "Pku", "Pt", "Pdq", "Pdr", "Pal")
 MIN_OVERLAP = 0.25  # of the map and its shifted copy; a choice: fewer points give no average
@@ -78,10 +78,13 @@ def _slopes(heights: MaskedField, spacing: tuple[float, ...]) -> tuple[float, fl
 
 
 def _correlation_length(heights: MaskedField, spacing: tuple[float, ...]) -> float | None:
-    """Shortest distance at which the autocorrelation is at most `LEVEL`, right to one point."""
+    """Shortest distance at which the autocorrelation is at most `CORRELATION_LEVEL`.
+
+    It is a distance of grid points, and therefore right to one spacing.
+    """
     correlation = autocorrelation(heights)
     distance = distances(correlation.shape, spacing)
-    low = correlation <= LEVEL  # false where unknown
+    low = correlation <= CORRELATION_LEVEL  # false where unknown
     return float(np.min(distance, initial=inf, where=low)) if low.any() else None
 
 

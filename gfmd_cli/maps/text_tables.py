@@ -1,8 +1,8 @@
 """Tables of numbers in text files: what kind of height map a file can be.
 
 The readers of such files parse them to the end, and some try several hundred times, so that a large
-table that is no map would take hours. Here lines are counted in parts of the file, which takes at
-most some seconds.
+table that is not a map would take hours. Here lines are counted in parts of the file, which takes
+some seconds at most.
 """
 
 import os
@@ -16,17 +16,21 @@ import numpy as np
 
 from gfmd_cli.maps.array_coordinates import in_metres
 
-WINDOW = 2**21  # bytes read at a time: 32768 heights of 25 digits take less than half of it
-WINDOWS = 32  # of a file; those of a larger one leave gaps
+WINDOW_BYTES = 2**21  # bytes read at a time: 32768 heights of 25 digits take less than half of it
+MAX_WINDOWS = 32  # of a file; those of a larger one leave gaps
 HEADER_LINES = 200  # that may differ from the table: as many as SurfaceTopography skips
 SAMPLE_BYTES = 2**16  # at the end of each window; a choice
-MIN_DIGITS = 0.2  # share of the characters of a table; a choice, as heights are mostly digits
+MIN_DIGIT_FRACTION = 0.2  # of the characters of a table, most of which are digits; a choice
 GRID_LINES = 20_000  # whose positions are compared; a choice
 MATRIX_COLUMNS = 4  # fewer are positions: the rule of SurfaceTopography
 LATIN_1 = b"Scan Parameters"  # begins a table of Dektak, which its reader takes as Latin-1
 THOUSANDS = re.compile(rb"[-+]?[1-9]\d{0,2}(,\d{3})+(\.\d*)?")
-NUMBERS = b" \t+-.,;0123456789eEdDinfaINFA"
+NUMBER_CHARACTERS = b" \t+-.,;0123456789eEdDinfaINFA"
 """Characters of lines without words."""
+
+
+def _is_numeric(line: bytes) -> bool:
+    return not line.translate(None, NUMBER_CHARACTERS)
 
 
 def table_formats(file: BinaryIO) -> set[str]:
@@ -71,7 +75,7 @@ def with_blanks(file: BinaryIO) -> tuple[BinaryIO, str]:
     Returns the table, and a warning or "". Raises ValueError if the commas can separate thousands.
     """
     warning = ""
-    start = file.read(WINDOW)
+    start = file.read(WINDOW_BYTES)
     table = start[len(start) // 2 :]  # without most headers
     if b"," in table or b";" in table:
         numbers = _columns(file, b" \t;")
@@ -94,7 +98,7 @@ def _warning_of_thousands(start: bytes, columns: int) -> str:
     One number such as 0,125 or 1,5 shows that the commas are decimal. Raises ValueError if only
     some of the numbers have such a comma, as where it separates thousands.
     """
-    lines = [line for line in start.splitlines() if not line.translate(None, NUMBERS)]
+    lines = [line for line in start.splitlines() if _is_numeric(line)]
     rows = [
         row for line in lines if len(row := re.split(rb"[\s;]+", line.strip(b" \t;"))) == columns
     ]
@@ -114,8 +118,8 @@ def _warning_of_thousands(start: bytes, columns: int) -> str:
 
 def in_utf8(file: BinaryIO) -> BinaryIO:
     """A table whose header or end is in Latin-1 as one in UTF-8; any other file as it is."""
-    start = file.read(WINDOW)
-    file.seek(max(0, file.seek(0, os.SEEK_END) - WINDOW))
+    start = file.read(WINDOW_BYTES)
+    file.seek(max(0, file.seek(0, os.SEEK_END) - WINDOW_BYTES))
     is_ascii = start.isascii() and file.read().isascii()
     is_table = not is_ascii and not start.startswith(LATIN_1) and columns(file) > 0
     file.seek(0)
@@ -138,7 +142,7 @@ def _columns(file: BinaryIO, separators: bytes) -> int:
     for position, lines in _windows(file):
         sample = lines[len(lines) // 2 :][-SAMPLE_BYTES:]
         digits = sum(sample.count(b"%d" % digit) for digit in range(10))
-        if b"\0" in lines or digits < MIN_DIGITS * len(sample):
+        if b"\0" in lines or digits < MIN_DIGIT_FRACTION * len(sample):
             return 0
         counts = _counts(lines.translate(blanks))
         if not columns:
@@ -153,11 +157,11 @@ def _columns(file: BinaryIO, separators: bytes) -> int:
 def _windows(file: BinaryIO) -> Iterator[tuple[int, bytes]]:
     """Position and whole lines of parts of a file; a line of more than a window has no content."""
     size = file.seek(0, os.SEEK_END)
-    gap = max(0, size // WINDOWS - WINDOW)
+    gap = max(0, size // MAX_WINDOWS - WINDOW_BYTES)
     position = 0
     while position < size:
         file.seek(position)
-        window = file.read(WINDOW)
+        window = file.read(WINDOW_BYTES)
         begin = len(re.split(rb"[\r\n]", window, maxsplit=1)[0]) + 1 if position and gap else 0
         end = max(window.rfind(b"\n"), window.rfind(b"\r")) + 1
         if end <= begin and position + len(window) < size:
@@ -170,9 +174,7 @@ def _windows(file: BinaryIO) -> Iterator[tuple[int, bytes]]:
 
 def _counts(lines: bytes) -> np.ndarray[Any, np.dtype[np.int64]]:
     """Numbers between blanks in each line, 0 where there are words."""
-    return np.array(
-        [0 if line.translate(None, NUMBERS) else len(line.split()) for line in lines.splitlines()]
-    )
+    return np.array([len(line.split()) if _is_numeric(line) else 0 for line in lines.splitlines()])
 
 
 def _is_grid(file: BinaryIO) -> bool:

@@ -157,7 +157,7 @@ def read_topography(
         raise InputError(f"{path}: cannot be read: {error}") from error
     except Exception as error:  # the reader of a damaged file can raise any exception
         raise InputError(
-            f"{path}: cannot be read ({first_line(error)}): damaged, or no height map? {REMEDY}"
+            f"{path}: cannot be read ({first_line(error)}): damaged, or not a height map? {REMEDY}"
         ) from error
 
 

@@ -13,7 +13,7 @@ from gfmd_cli.physics.contact import Contact, Scene
 from gfmd_cli.physics.elastomers import LinearElastomer
 from gfmd_cli.physics.persson import Persson
 
-PRESSURES = (1e-8, 1e4, 121)  # reduced pressures of the estimate: from, to, how many
+ESTIMATE_PRESSURES = (1e-8, 1e4, 121)  # reduced pressures of the estimate: from, to, how many
 
 
 def approach(
@@ -36,7 +36,7 @@ def estimated_pressures(scene: Scene, elastomer: LinearElastomer, displacements:
     d = max h - <u> + p / k(0). Without k(0), the stiffness at q = 2 / side takes its place: for a
     half-space p / k is then within 6 % the mean displacement of a square under uniform pressure.
     """
-    low, high, count = PRESSURES
+    low, high, count = ESTIMATE_PRESSURES
     pressure = scene.delta_sigma * np.geomspace(low, high, count)
     softest = np.array([2.0 / min(scene.grid.sides)])
     uniform = elastomer.uniform_stiffness or float(

@@ -1,4 +1,4 @@
-"""Displacements of an elastomer without borders whose stiffness is no power law.
+"""Displacements of an elastomer without borders whose stiffness is not a power law.
 
 The compliance kernel in two dimensions, and its integral over a disc, are the Hankel transforms
 
@@ -39,16 +39,16 @@ from gfmd_cli.physics.free_compliance import (
     pixel_integrals,
 )
 
-CUT, STEP = 300.0, 20.0  # radians; the step leaves exp(-STEP^2 / 4) of a wave
-SMALLEST = 1e-4  # radians up to which the wave is the first term of its series
-ORDER = 12  # of Gauss's rule in an interval of at most
-WIDEST, RATIO = 2.0, 1.5  # radians, and ratio of its ends
-CLOSEST = 1.01  # ratio to the knot before, below which a knot needs no interval of its own
+CUT, CUT_WIDTH = 300.0, 20.0  # radians; the step leaves exp(-CUT_WIDTH^2 / 4) of a wave
+SMALLEST_PHASE = 1e-4  # radians up to which the wave is the first term of its series
+INTERVAL_NODES = 12  # of Gauss's rule in an interval
+WIDEST_INTERVAL, INTERVAL_RATIO = 2.0, 1.5  # largest width [radians] and ratio of the ends
+MIN_KNOT_RATIO = 1.01  # ratio to the knot before, below which a knot needs no interval of its own
 PER_E_FOLD = 80  # distances at which the transforms are computed; a cubic spline joins them
-MARGIN = 3  # such distances beyond those that are needed
-NEAR = 5  # sides of a pixel within which the integral over it is taken in polar coordinates
-NODES = 8  # of Gauss's rule along each side beyond
-DIRECTIONS = 48  # of Gauss's rule within a triangle of a near pixel
+SPLINE_MARGIN = 3  # distances beyond the ends of the interval that is needed
+POLAR_SIDES = 5  # sides of a pixel within which the integral over it is taken in polar coordinates
+NEAR_NODES = 8  # of Gauss's rule along each side beyond, within `free_compliance.NEAR_SIDES`
+ANGLE_NODES = 48  # of Gauss's rule within a triangle of a near pixel
 
 WAVES: dict[str, tuple[Callable[[Field], Field], int, int]] = {
     "disc": (j1, 1, 0),
@@ -78,13 +78,13 @@ class Compliance:
         if len(shape) == 1:
             return self._line(*shape, *spacings)
         reached_shape = near_shape(shape, spacings, self.reach / max(spacings) + 1)
-        near = near_shape(shape, spacings, NEAR + 1)
+        near = near_shape(shape, spacings, POLAR_SIDES + 1)
         out = np.zeros((len(range(*rows.indices(shape[0]))), shape[1]))
         if near != shape:
-            least = max(0.5 * min(spacings), NEAR * max(spacings) - hypot(*spacings))
+            least = max(0.5 * min(spacings), POLAR_SIDES * max(spacings) - hypot(*spacings))
             kernel = self.spline("point", least, max(least, _diagonal(reached_shape, spacings)))
-            closer = near_shape(reached_shape, spacings, free_compliance.NEAR)
-            for part, nodes in ((reached_shape, free_compliance.NODES), (closer, NODES)):
+            closer = near_shape(reached_shape, spacings, free_compliance.NEAR_SIDES)
+            for part, nodes in ((reached_shape, free_compliance.FAR_NODES), (closer, NEAR_NODES)):
                 values = pixel_integrals(
                     lambda r: kernel(np.maximum(r, least)), part, spacings, rows, nodes
                 )
@@ -101,8 +101,8 @@ class Compliance:
         """A transform as a function of the distance, from `low` to `high` [m]."""
         from scipy.interpolate import CubicSpline  # half a second that most processes save
 
-        first = int(np.floor(PER_E_FOLD * np.log(low))) - MARGIN
-        last = int(np.ceil(PER_E_FOLD * np.log(high))) + MARGIN
+        first = int(np.floor(PER_E_FOLD * np.log(low))) - SPLINE_MARGIN
+        last = int(np.ceil(PER_E_FOLD * np.log(high))) + SPLINE_MARGIN
         for i in range(first, last + 1):
             if (wave, i) not in self.known:
                 self.known[wave, i] = self.transform(wave, float(np.exp(i / PER_E_FOLD)))
@@ -114,13 +114,13 @@ class Compliance:
     def transform(self, name: str, r: float) -> float:
         """r^m int_0^inf wave(s) / k(s / r) ds / 2 pi for one of the waves."""
         wave, power, in_front = WAVES[name]
-        knots, end = self.knots * r, CUT + 6 * STEP
-        begin = min(SMALLEST, knots[0])
+        knots, end = self.knots * r, CUT + 6 * CUT_WIDTH
+        begin = min(SMALLEST_PHASE, knots[0])
         ends = np.unique([*_intervals(begin, end), *knots[(knots > begin) & (knots < end)]])
-        nodes, weights = np.polynomial.legendre.leggauss(ORDER)
+        nodes, weights = np.polynomial.legendre.leggauss(INTERVAL_NODES)
         half = 0.5 * np.diff(ends)
         s = (ends[:-1] + half)[:, None] + np.multiply.outer(half, nodes)
-        values = wave(s) * (0.5 * erfc((s - CUT) / STEP)) / self.stiffness(s / r)
+        values = wave(s) * (0.5 * erfc((s - CUT) / CUT_WIDTH)) / self.stiffness(s / r)
         first = np.array(begin)  # below, wave / k is s^(power - n)
         series = wave(first) * first / self.stiffness(first / r)
         total = half @ (values @ weights) + series / (1 + power - self.lowest_exponent)
@@ -133,15 +133,16 @@ def separated(knots: Field) -> Field:
     The kinks of a table with close rows are small.
     """
     chosen = np.ones(knots.size, dtype=bool)
-    chosen[1:-1] = knots[1:-1] > CLOSEST * knots[:-2]
+    chosen[1:-1] = knots[1:-1] > MIN_KNOT_RATIO * knots[:-2]
     return knots[chosen]
 
 
 def _intervals(low: float, high: float) -> Field:
     """Ends of intervals that are short against a wave and against the distance to zero."""
-    turn = WIDEST / (RATIO - 1)
-    count = int(np.ceil(np.log(turn / low) / np.log(RATIO)))
-    return np.concatenate([np.geomspace(low, turn, count), np.arange(turn, high, WIDEST)[1:]])
+    turn = WIDEST_INTERVAL / (INTERVAL_RATIO - 1)
+    count = int(np.ceil(np.log(turn / low) / np.log(INTERVAL_RATIO)))
+    wide = np.arange(turn, high, WIDEST_INTERVAL)[1:]
+    return np.concatenate([np.geomspace(low, turn, count), wide])
 
 
 def _diagonal(shape: Shape, spacings: Spacings) -> float:
@@ -151,7 +152,7 @@ def _diagonal(shape: Shape, spacings: Spacings) -> float:
 
 def _corner(disc: Callable[[Field], Field], y: Field, x: Field) -> Field:
     """Integral of the kernel over the rectangle from the origin to each corner, odd in x and y."""
-    nodes, weights = np.polynomial.legendre.leggauss(DIRECTIONS)
+    nodes, weights = np.polynomial.legendre.leggauss(ANGLE_NODES)
     total = np.zeros(np.broadcast_shapes(y.shape, x.shape))
     for across, along in ((np.abs(x), np.abs(y)), (np.abs(y), np.abs(x))):
         half = 0.5 * np.arcsinh(along / across)

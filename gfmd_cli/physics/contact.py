@@ -24,20 +24,20 @@ from gfmd_cli.physics.indenters import RigidSurface
 from gfmd_cli.physics.persson import Shells, shells
 from gfmd_cli.physics.surfaces import sample
 
-ROUNDING = 1e-28  # |h(q)|^2 of a mode that only rounding has excited, relative to the largest
-SCALES = (1e-100, 1e100)  # [m, Pa]: squared, over all of the spectrum, still normal numbers
-PRESSURES = (1e-30, 1e6)
+ROUNDING_POWER = 1e-28  # |h(q)|^2 of a mode that only rounding has excited, relative to the largest
+SCALE_RANGE = (1e-100, 1e100)  # [m, Pa]: squared, over all of the spectrum, still normal numbers
+PRESSURE_RANGE = (1e-30, 1e6)
 """Reduced pressures that are solved. Above 2^17, full contact on every grid, as no peak of a field
 is above its rms times the points per side; sigma - p then only loses digits. Below, squares of p*
 vanish sooner or later, and rounding of sigma has long been larger than p*."""
-DOUBT = 2.0
+UNCERTAINTY_FACTOR = 2.0
 """Factor of the rms violation below which gaps and stresses may be errors.
 
 The contact state of a point with such a gap and such a stress is uncertain. Measured for n = 0.5 to
 4 and slabs at residuals of 1e-2 to 1e-4 (128^2): the area was wrong by at most three points more
 than these, and with a factor of 1 by up to 17. At n = 0.25 by up to 9.
 """
-DEEP = -1e30
+VOID_HEIGHT = -1e30
 """Height where nothing can touch [h_std]: below all displacements, with a square in range."""
 
 
@@ -59,10 +59,10 @@ class Contact:
 
     @cached_property
     def obstacle(self) -> Field:
-        """Lower limit of u: the height where it is known, `DEEP` elsewhere."""
+        """Lower limit of u: the height where it is known, `VOID_HEIGHT` elsewhere."""
         if self.may_touch is None:
             return self.height
-        return np.where(self.may_touch, self.height, DEEP)
+        return np.where(self.may_touch, self.height, VOID_HEIGHT)
 
     @cached_property
     def k_along_x(self) -> Field:
@@ -141,23 +141,23 @@ class Contact:
         this point alone is laid; sigma is not changed. `residual` is the natural residual of u and
         sigma. Returns whether any point was laid.
         """
-        doubt = DOUBT * residual * min(self.pressure, 1.0)
+        error = UNCERTAINTY_FACTOR * residual * min(self.pressure, 1.0)
         missed = 0
         for rows in row_blocks(u):
             gap = u[rows] - self.obstacle[rows]
-            uncertain = (gap > 0) & (gap < doubt)
+            uncertain = (gap > 0) & (gap < error)
             if uncertain.any():
-                missed += int(np.count_nonzero(uncertain & self._pressed(gap, sigma[rows], doubt)))
+                missed += int(np.count_nonzero(uncertain & self._pressed(gap, sigma[rows], error)))
         if not self.grid.total(missed):
             return False
         for rows in row_blocks(u):
             h = self.obstacle[rows]
-            np.copyto(u[rows], h, where=self._pressed(u[rows] - h, sigma[rows], doubt))
+            np.copyto(u[rows], h, where=self._pressed(u[rows] - h, sigma[rows], error))
         return True
 
-    def _pressed(self, gap: Field, sigma: Field, doubt: float) -> Mask:
+    def _pressed(self, gap: Field, sigma: Field, error: float) -> Mask:
         """Where the stress is above its error, and stays compressive when one point is laid."""
-        return sigma > np.maximum(self.point_stiffness * gap, doubt)
+        return sigma > np.maximum(self.point_stiffness * gap, error)
 
     @cached_property
     def point_stiffness(self) -> float:
@@ -253,7 +253,7 @@ class Scene:
 
     def check_pressure(self, p_star: float) -> None:
         """Raise InputError where a reduced pressure is out of range."""
-        low, high = PRESSURES
+        low, high = PRESSURE_RANGE
         if not low <= p_star <= high:
             raise InputError(
                 f"load: p* = {p_star:g} is out of range, {low:g} to {high:g}: p* = 1 is "
@@ -321,10 +321,10 @@ def reduce_scene(grid: Grid, height: Field, elastomer: LinearElastomer) -> Scene
         "Delta_sigma": delta_sigma,
     }
     for name, scale in scales.items():
-        if not SCALES[0] <= scale <= SCALES[1]:
+        if not SCALE_RANGE[0] <= scale <= SCALE_RANGE[1]:
             raise InputError(
                 f"surface, elastomer: {name} = {scale:g} is out of range, "
-                f"{SCALES[0]:g} to {SCALES[1]:g}: choose other units"
+                f"{SCALE_RANGE[0]:g} to {SCALE_RANGE[1]:g}: choose other units"
             )
     stiffness /= reduced
     return Scene(
@@ -350,7 +350,7 @@ def _stiffness(grid: Grid, elastomer: LinearElastomer) -> tuple[Field, float]:
     k /= stiffest
     waves = k.ravel()[1:] if grid.ends[0] else k  # the first is q = 0
     softest = -grid.max(-float(waves.min()))
-    if not softest >= SCALES[0]:
+    if not softest >= SCALE_RANGE[0]:
         raise InputError(f"elastomer: stiffness falls to {softest:g} of its largest value")
     return k, stiffest
 
@@ -364,7 +364,7 @@ def radial_power(grid: Grid, height: Field) -> tuple[Field, Field, Field]:
     modes = grid.forward_into_work(height).reshape(grid.points_y, -1)
     power = grid.gather_columns(_opposite_rows_added(modes) * grid.multiplicity())
     power[0, 0] = 0.0
-    row, column = np.nonzero(power > ROUNDING * power.max())
+    row, column = np.nonzero(power > ROUNDING_POWER * power.max())
     m_y = row * (grid.length / grid.length_y) if grid.dimension == 2 else row
     count = multiplicity(grid.points_y)[row] * multiplicity(grid.points)[column]
     return np.sqrt(m_y**2 + column**2), power[row, column] / float(grid.size) ** 2, count

@@ -60,13 +60,14 @@ MAX_STRESS_EXPONENT = 2.5  # sigma_p converges as spacing^(3 - n): too slow for 
 #   u_g [h_std]:          exp(-6.80 + 0.62 n) (x / a_r)^(1/4) w^(3/2) (b u_g)^(1/2)
 # where the last two use n >= MIN_EXPONENT.
 # Error bars on one grid: SINGLE_GRID times that. On two grids: TWO_GRIDS times the root of the sum
-# of the squares of FLOOR times the typical error and of the change D from the coarser grid, reduced
-# by the order of convergence. The factors are such that 95.5 to 98.8 of 100 bars hold in the fitted
-# half of the set. Here a_r is that of a single or line contact, with SINGLE_CONTACT_AREA x.
+# of the squares of TYPICAL_WEIGHT times the typical error and of the change D from the coarser
+# grid, reduced by the order of convergence. The factors are such that 95.5 to 98.8 of 100 bars hold
+# in the fitted half of the set. Here a_r is that of a single or line contact, with
+# SINGLE_CONTACT_AREA x.
 SINGLE_GRID = {"a_r": 4.2, "sigma_p": 4.1, "u_g": 4.2}
 TWO_GRIDS = {"a_r": 0.4, "sigma_p": 1.4, "u_g": 2.2}
-FLOOR = {"a_r": 8.0, "sigma_p": 1.2, "u_g": 1.2}
-ORDER = 3.0  # of u_g on a rough surface; sigma_p: 3 - n, at most 2; a_r: D as it is
+TYPICAL_WEIGHT = {"a_r": 8.0, "sigma_p": 1.2, "u_g": 1.2}
+GAP_ORDER = 3.0  # of u_g on a rough surface; sigma_p: 3 - n, at most 2; a_r: D as it is
 MIN_EXPONENT = 0.5  # n below which bars no longer decrease: the error at n = 0 is random
 SINGLE_CONTACT = 2.5  # times the change: bar of a single indenter, from the calibration set
 SINGLE_CONTACT_AREA = 0.2  # error of a corrected a_r in x, of a single or line contact, likewise
@@ -76,11 +77,12 @@ SINGLE_CONTACT_GAP = 5.0  # in u_g / [points (1 - a_r)]^2: smooth indenters have
 
 # A tip -r^m has the stress r^(m - n) around it, so that <sigma^2> converges as spacing^(2 (M - n))
 # with M = m + dimension / 2. Measured on ridges, cones and r^m, m = 0.5 to 1.5, n = 0 to 3.5.
-SHARP = 2.0  # m below which the law of the tip holds, and bars of u_g are those of the next lines
+# For m below SMOOTH_EXPONENT this law holds, and the bars of u_g are those of the next lines.
+SMOOTH_EXPONENT = 2.0
 SHARP_GAP_CHANGE = 5.0  # times D: the order is n - 1 where the contact is smaller than the spacing
 SHARP_GAP = 20.0  # in place of SINGLE_CONTACT_GAP
 MAX_RIDGE_EXPONENT = 1.75  # n beyond which the stress of a line's tip rings over spacing^(1/2)
-SLOWEST = 0.5  # order of <sigma^2> below which it converges too slowly for an estimate
+MIN_STRESS_ORDER = 0.5  # order of <sigma^2> below which it converges too slowly for an estimate
 MIN_PATCHES = 10.0
 """Contact patches from which errors average out: with 6 or less 70 to 90 of 100 bars held."""
 MAX_ANISOTROPY = 2.0
@@ -91,7 +93,7 @@ MAX_ASPECT = 1.1
 ratio of 2 has 0.7 of it and of 4 half, so that 56 of 100 bars of the corrected area held."""
 HALF_OCTAVE = 0.5 * log(2)  # in ln q: step of the local exponent that the calibration used
 OCTAVES = np.arange(-1, 10)  # from the highest wave of a grid; the last has a weight of 0.002
-EXTRAPOLATED = 0.8  # bar of the extrapolated sigma_p over that of the value, n >= 1, likewise
+EXTRAPOLATED_BAR = 0.8  # bar of the extrapolated sigma_p over that of the value, n >= 1, likewise
 
 
 @dataclass(frozen=True)
@@ -123,21 +125,21 @@ class RoughnessScales:
 class Tip:
     """Tip of a single indenter."""
 
-    exponent: float = SHARP
+    exponent: float = SMOOTH_EXPONENT
     """Exponent m of the heights -r^m."""
     dimension: int = 2
 
     @property
     def is_sharp(self) -> bool:
         """Whether the exponent m is below that of a smooth tip."""
-        return self.exponent < SHARP
+        return self.exponent < SMOOTH_EXPONENT
 
     def stress_order(self, n: float) -> float:
         """Order at which <sigma^2> around the tip converges; infinite for a smooth tip."""
         return 2 * (self.exponent - n) + self.dimension if self.is_sharp else inf
 
 
-SMOOTH = Tip()
+SMOOTH_TIP = Tip()
 
 
 def roughness_scales(
@@ -194,7 +196,7 @@ def estimate(
     *,
     band_limited: bool = True,
     stepped: bool = False,
-    tip: Tip = SMOOTH,
+    tip: Tip = SMOOTH_TIP,
     between: Mapping[str, float] = NO_ERRORS,
 ) -> dict[str, Estimate]:
     """Estimate errors and continuum values of `a_r`, `sigma_p` and `u_g` on the finest grid.
@@ -229,7 +231,7 @@ def estimate(
     if tip.is_sharp and tip.dimension == 1 and n > MAX_RIDGE_EXPONENT:
         estimates = estimates | {"a_r": UNKNOWN}
     is_undecided = fine.a_r > 0 and estimates["sigma_p"].verdict != Verdict.DIVERGES
-    if is_undecided and tip.stress_order(n) < SLOWEST and n < DIVERGENT:
+    if is_undecided and tip.stress_order(n) < MIN_STRESS_ORDER and n < DIVERGENT:
         verdict = Verdict.SLOW if tip.stress_order(n) > 0 else Verdict.DIVERGES
         return estimates | {"sigma_p": replace(UNKNOWN, verdict=verdict)}
     return estimates
@@ -264,7 +266,7 @@ def _bar(name: str, typical: float, change: float | None) -> float:
     """Error bar from the typical error on this grid and the change from a coarser grid, if any."""
     if change is None:
         return SINGLE_GRID[name] * typical
-    return TWO_GRIDS[name] * hypot(change, FLOOR[name] * typical)
+    return TWO_GRIDS[name] * hypot(change, TYPICAL_WEIGHT[name] * typical)
 
 
 def _area(
@@ -304,8 +306,8 @@ def _plate_area(fine: GridValues, coarse: GridValues | None) -> Estimate:
     if coarse is None:
         return UNKNOWN
     step, x = coarse.a_r - fine.a_r, fine.switches_per_point
-    share = PLATE_EXCESS - PLATE_EXCESS_SLOPE * step / x
-    best = min(1.0, max(0.0, fine.a_r - min(max(share, LONE_POINTS), PLATE_EXCESS) * step))
+    excess = PLATE_EXCESS - PLATE_EXCESS_SLOPE * step / x
+    best = min(1.0, max(0.0, fine.a_r - min(max(excess, LONE_POINTS), PLATE_EXCESS) * step))
     error = min(PLATE_BAR * hypot(step, PLATE_FLOOR * x), max(best, 1 - best))
     whole = min(abs(fine.a_r - best) + error, max(fine.a_r, 1 - fine.a_r))
     return Estimate(whole, best, error, Verdict.REGULAR)
@@ -329,7 +331,7 @@ def _stress(
     error = _bar("sigma_p", typical, rest)
     if n < 1:
         return _on_grid(value, error)
-    return Estimate(error, max(0.0, value + rest), EXTRAPOLATED * error, Verdict.REGULAR)
+    return Estimate(error, max(0.0, value + rest), EXTRAPOLATED_BAR * error, Verdict.REGULAR)
 
 
 def _single_stress(fine: GridValues, coarse: GridValues, n: float, tip: Tip) -> Estimate:
@@ -337,7 +339,7 @@ def _single_stress(fine: GridValues, coarse: GridValues, n: float, tip: Tip) -> 
     value, patch = fine.sigma_p, fine.switches_per_point / fine.a_r
     if patch > MAX_LINE:
         return replace(UNKNOWN, is_too_coarse=True)
-    order = min(1.0, 3 - n, max(tip.stress_order(n), SLOWEST))
+    order = min(1.0, 3 - n, max(tip.stress_order(n), MIN_STRESS_ORDER))
     rest = (value - coarse.sigma_p) / (2**order - 1)
     floor = SINGLE_CONTACT_STRESS * max(n, MIN_EXPONENT) * value * patch
     return _on_grid(value, hypot(SINGLE_CONTACT * abs(rest), floor))
@@ -354,7 +356,7 @@ def _gap(
     typical = (
         exp(-6.8 + 0.62 * max(n, MIN_EXPONENT)) * patch**0.25 * phase**1.5 * sqrt(bend * value)
     )
-    change = None if coarse is None else (value - coarse.u_g) / (2**ORDER - 1)
+    change = None if coarse is None else (value - coarse.u_g) / (2**GAP_ORDER - 1)
     return _on_grid(value, _bar("u_g", typical, change))
 
 

@@ -17,7 +17,7 @@ from pydantic import Field as Key
 from pydantic import model_validator
 
 from gfmd_cli.errors import InputError
-from gfmd_cli.grid.arrays import Field
+from gfmd_cli.grid.arrays import Field, Mask
 from gfmd_cli.grid.fft_grid import ALL_ROWS, Shape
 from gfmd_cli.maps.interpolation import monotone_cubic
 from gfmd_cli.physics.compliance_transforms import Compliance, separated
@@ -27,12 +27,12 @@ from gfmd_cli.spec_table import FilePath, Positive, SpecTable
 from gfmd_cli.units import count
 
 LONG_WAVE = 1e-6  # q t up to which k of a layer is constant: (q t)^2 is below rounding
-DECAYED = 25.0  # thicknesses from which the displacement of a layer is below rounding
+DECAY_DISTANCE = 25.0  # thicknesses from which the displacement of a layer is below rounding
 MAX_SPACING = 16.0  # of a grid, in thicknesses of a layer with a free boundary
-SHORT = 0.1  # share of the squared stress at waves that are short for a thin plate; a choice
-EXTRAPOLATED = 0.1  # share of the squared stress beyond a table of k(q); a choice
-MAX_TABLE = 2**20  # bytes of a tabulated stiffness; a choice, some 40000 rows
-STEP = 1e-3  # of ln q: the truncation error is of order 1e-7, the rounding error 1e-13
+MAX_SHORT_WAVE_STRESS = 0.1  # fraction of the squared stress, for a thin plate; a choice
+MAX_EXTRAPOLATED_STRESS = 0.1  # fraction of the squared stress beyond a table; a choice
+MAX_TABLE_BYTES = 2**20  # bytes of a tabulated stiffness; a choice, some 40000 rows
+EXPONENT_STEP = 1e-3  # of ln q: the truncation error is of order 1e-7, the rounding error 1e-13
 
 
 class LinearElastomer(SpecTable):
@@ -64,7 +64,7 @@ class LinearElastomer(SpecTable):
 
         `spacings` are the sides of a pixel [m], in the order (y, x). The result of this shape, or
         in two dimensions some of its rows, is indexed by the distance of the two pixels in points.
-        See `free_compliance`, and for a stiffness that is no power law `compliance_transforms`.
+        See `free_compliance`, for a stiffness that is not a power law `compliance_transforms`.
 
         Raises InputError where the displacement does not decay with the distance.
         """
@@ -75,7 +75,7 @@ class LinearElastomer(SpecTable):
         return power_law(self.exponent, shape, spacings, rows) / prefactor
 
     def compliance(self) -> Compliance:
-        """1/k(q) of an elastomer whose displacement decays and whose k(q) is no power law."""
+        """1/k(q) of an elastomer whose displacement decays and whose k(q) is not a power law."""
         raise NotImplementedError
 
     def warnings(self, h_std: float, q: Field, variance: Field) -> list[str]:
@@ -143,7 +143,7 @@ class LinearElastomer(SpecTable):
         """Elastic modulus [Pa], 0 where the elastomer has none."""
         return float(dict(self).get("E_star", 0.0))
 
-    def local_exponent(self, q: Field, length: float = 1.0, step: float = STEP) -> Field:
+    def local_exponent(self, q: Field, length: float = 1.0, step: float = EXPONENT_STEP) -> Field:
         """n(q) = d ln k / d ln q, by central differences over +-step; zero where k is zero."""
         above, below = (self.stiffness(q * np.exp(shift), length) for shift in (step, -step))
         safe = (above > 0) & (below > 0)
@@ -155,6 +155,11 @@ class LinearElastomer(SpecTable):
         if self.exponent is not None:
             return np.full_like(q, gamma_n(self.exponent))
         return gamma_n(np.clip(self.local_exponent(q, length), 0.0, 4.0))
+
+
+def _fraction(variance: Field, chosen: Mask) -> float:
+    """Fraction of a variance at chosen wavenumbers; zero for a flat surface, which has none."""
+    return float(variance[chosen].sum() / variance.sum()) if variance.size else 0.0
 
 
 class Power(LinearElastomer):
@@ -228,12 +233,11 @@ class Plate(LinearElastomer):
 
     def warnings(self, h_std: float, q: Field, variance: Field) -> list[str]:
         """See `LinearElastomer.warnings`. At q t = 1 a slab is 0.81 times as stiff as a plate."""
-        is_short = q * self.thickness > 1
-        share = float(variance[is_short].sum() / variance.sum()) if q.size else 0.0
-        if share <= SHORT:
+        fraction = _fraction(variance, q * self.thickness > 1)
+        if fraction <= MAX_SHORT_WAVE_STRESS:
             return []
         return [
-            f"elastomer.thickness = {self.thickness:g} m: {share:.0%} of the squared stress in "
+            f"elastomer.thickness = {self.thickness:g} m: {fraction:.0%} of the squared stress in "
             f"full contact is at wavelengths below {2 * np.pi * self.thickness:.3g} m, for which "
             'a thin plate is too stiff; kind = "slab" has the stiffness of an elastic layer'
         ]
@@ -351,12 +355,12 @@ class Tabulated(LinearElastomer):
     def warnings(self, h_std: float, q: Field, variance: Field) -> list[str]:
         """See `LinearElastomer.warnings`."""
         first, *_, last = self._table()[:, 0]
-        share = float(variance[(q < first) | (q > last)].sum() / variance.sum()) if q.size else 0.0
-        if share <= EXTRAPOLATED:
+        fraction = _fraction(variance, (q < first) | (q > last))
+        if fraction <= MAX_EXTRAPOLATED_STRESS:
             return []
         return [
             f"{self.path.name}: k(q) is given for q = {first:.3g} to {last:.3g} 1/m, but "
-            f"{share:.0%} of the squared stress in full contact is at other wavenumbers (the "
+            f"{fraction:.0%} of the squared stress in full contact is at other wavenumbers (the "
             f"surface has {q.min():.3g} to {q.max():.3g} 1/m), where k is extrapolated"
         ]
 
@@ -386,8 +390,8 @@ class Tabulated(LinearElastomer):
     def _table(self) -> Field:
         """The columns q and k, shape (rows, 2). Raises InputError for an invalid table."""
         try:
-            if not self.path.is_file() or self.path.stat().st_size > MAX_TABLE:
-                raise ValueError(f"not a regular file of at most {MAX_TABLE} bytes")
+            if not self.path.is_file() or self.path.stat().st_size > MAX_TABLE_BYTES:
+                raise ValueError(f"not a regular file of at most {MAX_TABLE_BYTES} bytes")
             with warnings.catch_warnings(action="ignore", category=UserWarning):
                 table = np.loadtxt(self.path, ndmin=2)  # warns of an empty file, refused below
         except (OSError, ValueError) as error:
@@ -429,7 +433,7 @@ def _end_exponents(table: Field) -> tuple[float, float]:
 def _compliance_of_layer(layer: Layer) -> Compliance:
     """The compliance of a layer; cached, because its transforms serve all grids."""
     t = layer.thickness
-    return Compliance(layer.stiffness, np.array([LONG_WAVE / t]), 0.0, reach=DECAYED * t)
+    return Compliance(layer.stiffness, np.array([LONG_WAVE / t]), 0.0, reach=DECAY_DISTANCE * t)
 
 
 @lru_cache(maxsize=4)

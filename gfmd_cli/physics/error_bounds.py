@@ -42,13 +42,13 @@ from math import nan, sqrt
 import numpy as np
 
 from gfmd_cli.grid.arrays import Field, row_blocks
-from gfmd_cli.physics.contact import DOUBT, Contact
+from gfmd_cli.physics.contact import UNCERTAINTY_FACTOR, Contact
 from gfmd_cli.physics.free_contact import FreeContact
 from gfmd_cli.physics.observables import Observables, contact_pressure
 
 ALGEBRAIC = 2.0
 """Largest errors of u_g and sigma_p on their grid that were met, in natural residuals times the
-largest of the value, its root, and half the root of the share of points that are not in contact or
+largest of the value, its root, and half the root of the fraction of points not in contact or
 uncertain, which matters next to full contact: n = 0.5 to 4, slabs, p* = 0.003 to 4."""
 
 
@@ -63,18 +63,18 @@ class ErrorBounds:
     sigma_p: float
     """Upper bound of the error of the deviation of the contact pressure [Delta_sigma]."""
     a_r: float
-    """Share of the points whose contact state is uncertain: an estimate, not a bound."""
+    """Fraction of the points whose contact state is uncertain: an estimate, not a bound."""
 
     def estimated_error(self, name: str, observables: Observables, residual: float) -> float:
         """Estimated error of an observable on its grid, from stopping at a natural residual.
 
-        See `ALGEBRAIC`. That of a_r is the uncertain share.
+        See `ALGEBRAIC`. That of a_r is the uncertain fraction.
         """
         if name == "a_r":
             return self.a_r
         value = abs(float(getattr(observables, name)))  # u_g may be < 0 where voids are filled in
-        open_share = max(1.0 - observables.a_r, 0.0) + self.a_r
-        return ALGEBRAIC * residual * max(value, sqrt(value), 0.5 * sqrt(open_share))
+        open_fraction = max(1.0 - observables.a_r, 0.0) + self.a_r
+        return ALGEBRAIC * residual * max(value, sqrt(value), 0.5 * sqrt(open_fraction))
 
 
 @singledispatch
@@ -113,7 +113,7 @@ def error_bounds(contact: Contact, u: Field, sigma: Field) -> ErrorBounds:
         gap=duality_gap,
         u_g=abs(mean - centre) + _level_bound(duality_gap, reaction, p),
         sigma_p=sqrt(2 * duality_gap * grid.max(float(contact.stiffness.max()))) + sqrt(omitted),
-        a_r=_uncertain_share(contact, u, sigma, violated),
+        a_r=_uncertain_fraction(contact, u, sigma, violated),
     )
 
 
@@ -148,7 +148,7 @@ def _of_free_contact(contact: FreeContact, u: Field, sigma: Field) -> ErrorBound
         + sqrt(mean_compliance * duality_gap)
         + _level_bound(duality_gap, energy, p),
         sigma_p=sqrt(duality_gap / smallest) + omitted if smallest > 0 else nan,
-        a_r=_uncertain_share(contact, u, sigma, mean(violation**2)),
+        a_r=_uncertain_fraction(contact, u, sigma, mean(violation**2)),
     )
 
 
@@ -159,8 +159,8 @@ def full_contact_errors(
 
     Around a minimum of a Gaussian stress the curvature is on average `curvature` p, so that between
     points of spacing d the stress is lower by up to m = p curvature d^2 / 8. Points with
-    sigma < m may lose contact: their share, their mean deficit m - sigma over the stiffness of the
-    shortest wave, and the change of the variance.
+    sigma < m may lose contact. The errors are their fraction, their mean deficit m - sigma over the
+    stiffness of the shortest wave, and the change of the variance, as the change of sigma_p.
 
     Parameters
     ----------
@@ -173,8 +173,8 @@ def full_contact_errors(
     for rows in row_blocks(sigma):
         deficit = np.maximum(margin - sigma[rows], 0.0)
         sums += [np.count_nonzero(deficit), deficit.sum(), np.square(deficit).sum()]
-    share, mean, square = grid.total(sums) / grid.size
-    errors = {"a_r": share, "sigma_p": 0.5 * square / sigma_p, "u_g": mean / stiffness}
+    fraction, mean, square = grid.total(sums) / grid.size
+    errors = {"a_r": fraction, "sigma_p": 0.5 * square / sigma_p, "u_g": mean / stiffness}
     return {name: float(error) for name, error in errors.items()}
 
 
@@ -183,23 +183,23 @@ def _level_bound(duality_gap: float, reaction: float, p: float) -> float:
 
     With t at most 1, as q >= 0.
     """
-    share = min(sqrt(2 * duality_gap / reaction), 1.0) if reaction > 0 else 1.0
-    spread = duality_gap / share if share > 0 else 0.0
-    return (0.5 * share * reaction + spread) / p
+    t = min(sqrt(2 * duality_gap / reaction), 1.0) if reaction > 0 else 1.0
+    return (0.5 * t * reaction + (duality_gap / t if t > 0 else 0.0)) / p
 
 
-def _uncertain_share(contact: Contact, u: Field, sigma: Field, violated: float) -> float:
-    """Share of the points with a gap and a stress below `DOUBT` times the rms violation.
+def _uncertain_fraction(contact: Contact, u: Field, sigma: Field, violated: float) -> float:
+    """Fraction of the points with a gap and a stress below the error of both.
 
-    Points with such a gap count at any compressive stress: they should touch, but do not. The mean
-    of min(g, sigma)^2 is `violated`.
+    The error is `UNCERTAINTY_FACTOR` times the rms violation, where `violated` is the mean of
+    min(g, sigma)^2. Points with such a gap count at any compressive stress: they should touch, but
+    do not.
     """
-    doubt, doubtful = DOUBT * sqrt(violated), 0
+    error, count = UNCERTAINTY_FACTOR * sqrt(violated), 0
     for rows in row_blocks(u):
         gap, stress = u[rows] - contact.obstacle[rows], sigma[rows]
-        uncertain = (gap < doubt) & (stress > -doubt) & ((gap > 0) | (stress < doubt))
-        doubtful += int(np.count_nonzero(uncertain))
-    return contact.grid.total(doubtful) / contact.grid.size
+        uncertain = (gap < error) & (stress > -error) & ((gap > 0) | (stress < error))
+        count += int(np.count_nonzero(uncertain))
+    return contact.grid.total(count) / contact.grid.size
 
 
 def _compliance(contact: Contact) -> float:

@@ -45,7 +45,7 @@ class GridValues:
     points: float
     """Points per length L of the cell, at the wider of the spacings along x and y."""
     a_r: float
-    """Relative contact area: share of the points that carry load."""
+    """Relative contact area: fraction of the points that carry load."""
     sigma_p: float
     """Standard deviation of the stress [Delta_sigma, or any unit that all levels share]."""
     u_g: float
@@ -55,7 +55,7 @@ class GridValues:
     area: float = 1.0
     """Area of the cell / L^2."""
     border: float | None = None
-    """Share of the border of the map in contact, with a free boundary; None with a periodic one."""
+    """Fraction of the border of the map in contact, with a free boundary; None if periodic."""
 
     @property
     def switches_per_point(self) -> float:

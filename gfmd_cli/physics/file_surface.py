@@ -19,7 +19,7 @@ from gfmd_cli.maps.interpolation import (
     suited_interpolation,
 )
 from gfmd_cli.maps.map_preparation import (
-    ROUNDING,
+    LEVELLING_ROUNDING,
     Edges,
     Levelling,
     fill_missing,
@@ -374,7 +374,7 @@ def _smallest_grid(surface: FileSurface) -> int:
     heights, topography = _prepared(surface), surface._topography()
     largest = surface.scale * float(max(topography.heights.max(), -topography.heights.min()))
     left = float(np.ptp(heights))
-    if left <= (ROUNDING + 2 * topography.precision) * largest:
+    if left <= (LEVELLING_ROUNDING + 2 * topography.precision) * largest:
         rounding = (
             f' with surface.level = "{surface.levelling()}": what is left, {left:.2g} m, is the '
             f"rounding of heights of up to {largest:.3g} m"

@@ -23,9 +23,9 @@ from scipy.special import gamma, gammainc, hyp2f1, rgamma
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.grid.fft_grid import ALL_ROWS, Shape
 
-NEAR = 64  # sides of a pixel within which the integral over it is in closed form
-NODES = 2  # of Gauss's rule along each side beyond: relative error below 1e-9 (tested)
-SMALLEST = 1e-12  # (alpha r)^2 below which the smooth part is that at r = 0, within this share
+NEAR_SIDES = 64  # sides of a pixel within which the integral over it is in closed form
+FAR_NODES = 2  # of Gauss's rule along each side beyond: relative error below 1e-9 (tested)
+SMALLEST_ARGUMENT = 1e-12  # (alpha r)^2, below which the smooth part is that at r = 0 to 1e-12
 
 Spacings = tuple[float, ...]
 
@@ -49,7 +49,7 @@ def smooth_part(n: float, alpha: float, r: Field) -> Field:
     """
     power = 1 - n / 2
     far = 2 ** (1 - n) * gamma(power) * rgamma(n / 2) / (2 * np.pi)
-    x = np.maximum((alpha * r) ** 2, SMALLEST)
+    x = np.maximum((alpha * r) ** 2, SMALLEST_ARGUMENT)
     values: Field = far * alpha ** (2 * power) * gammainc(power, x) * x**-power
     return values
 
@@ -69,7 +69,7 @@ def _plane(n: float, shape: Shape, spacings: Spacings, rows: slice) -> Field:
         return closed * (_side_integral(n, x, y) + _side_integral(n, y, x))
 
     out = pixel_integrals(lambda r: far * r ** (n - 2), shape, spacings, rows)
-    near = near_shape(shape, spacings, NEAR)
+    near = near_shape(shape, spacings, NEAR_SIDES)
     return overwrite(out, by_corners(corner, near, spacings, rows))
 
 
@@ -93,7 +93,7 @@ def pixel_integrals(
     shape: Shape,
     spacings: Spacings,
     rows: slice = ALL_ROWS,
-    nodes_per_side: int = NODES,
+    nodes_per_side: int = FAR_NODES,
 ) -> Field:
     """Integrals over each pixel of a kernel G(r), by Gauss's rule."""
     nodes, weights = (0.5 * each for each in np.polynomial.legendre.leggauss(nodes_per_side))

@@ -29,7 +29,7 @@ from gfmd_cli.physics.elastomers import LinearElastomer
 from gfmd_cli.physics.indenters import RigidSurface
 from gfmd_cli.physics.surfaces import sample
 
-MARGIN = 1.25
+PRECONDITIONER_PADDING = 1.25
 """Padding for the stiffness that serves as preconditioner. Measured at 256^2, p* = 1: 46 steps
 without padding, 36 with this, 33 with twofold padding (n = 1); 302 and 157 (n = 1.5)."""
 
@@ -55,7 +55,7 @@ class FreeElasticity:
     def _preconditioner(self) -> tuple[PaddedTransform, Field]:
         """A transform of a few more points, and the stiffness k(q) there, in single precision."""
         grid = self.grid
-        transform = grid.padded_transform(MARGIN, "single")
+        transform = grid.padded_transform(PRECONDITIONER_PADDING, "single")
         q = transform.wavenumber(grid.spacings)
         return transform, (self.elastomer.stiffness(q, grid.length) / self.unit).astype(np.float32)
 
@@ -131,7 +131,7 @@ class FreeContact(Contact):
 
         Its stress K h is that of full contact, of which a map with borders has none of its own.
         """
-        grid = twice(self.grid)
+        grid = doubled_grid(self.grid)
         k = self.free.elastomer.stiffness(grid.wavenumber(), grid.length) / self.free.unit
         mask = None if self.may_touch is None else mirror(self.may_touch)
         return Contact(grid, mirror(self.height), k, self.pressure, mask)
@@ -203,7 +203,7 @@ def _mirrored(
     A measured map is mirrored before it is interpolated, so that no height on a finer grid lies
     between those of opposite borders. On its own points no process needs the whole mirrored map.
     """
-    whole = twice(replace(surface.grid(grid.points, grid.points_y), threads=grid.threads))
+    whole = doubled_grid(replace(surface.grid(grid.points, grid.points_y), threads=grid.threads))
     doubled = create_grid(whole, ranks)
     own_points = (surface.smallest_grid_y(), surface.smallest_grid())
     mirrored_surface = surface.mirrored()
@@ -234,7 +234,7 @@ SCENES: dict[str, Callable[..., Scene]] = {"periodic": build_scene, "free": buil
 """How a scene is built, by the boundary of the map."""
 
 
-def twice(grid: Grid) -> Grid:
+def doubled_grid(grid: Grid) -> Grid:
     """A grid of twice the points along each axis, on a cell of twice the sides."""
     along_x = replace(grid, points=2 * grid.points, length=2 * grid.length)
     if grid.dimension == 1:

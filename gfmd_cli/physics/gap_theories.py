@@ -6,8 +6,8 @@ fits to simulations.
 `CoarseGrained` has no constant of its own (docs/physics.md): waves join the law of the interface,
 the shortest first. With all waves shorter than a wavelength the interface has a law
 u_g(p). Under a longer wave it acts as springs of stiffness kappa = -dp/du_g in series with the
-elastomer of stiffness k(q), which flatten the share T = kappa / (kappa + k) of the wave. The work
-F(p), the integral of u_g from 0 to p, increases by T k dC / 2 with waves of squared height dC.
+elastomer of stiffness k(q), which flatten the fraction T = kappa / (kappa + k) of the wave. The
+work F(p), the integral of u_g from 0 to p, increases by T k dC / 2 with waves of squared height dC.
 """
 
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ from gfmd_cli.physics.persson import Persson
 
 _LOWEST, _HIGHEST = 1e-8, 8.0  # pressures of the law [Delta_sigma]
 _CELL, _BEND = 0.06, 0.5  # cells of 6 % of p well below _BEND, of 0.03 Delta_sigma above
-_SHARE = 1 / 64  # of the squared height that waves may add in one step
+_STEP_FRACTION = 1 / 64  # of the squared height that waves may add in one step
 _STAGE = 1 - np.sqrt(0.5)  # of SDIRK2, of second order and L-stable
 _NEWTON_STEPS = 50  # a bound; 2 to 3 are taken
 _CONVERGED = 1e-6  # last Newton step relative to the largest gap; it converges quadratically
@@ -85,7 +85,7 @@ class CoarseGrained(Persson):
         faces = np.append(0.0, self.delta_sigma * _BEND * np.log1p(np.exp(x)))
         gap: Field = np.zeros(x.size)
         height = self.shells.height
-        steps = 1 + (height / (_SHARE * height.sum())).astype(int)
+        steps = 1 + (height / (_STEP_FRACTION * height.sum())).astype(int)
         stiffness = np.repeat(self.shells.energy / height, steps)
         for k, added in zip(stiffness[::-1], np.repeat(height / steps, steps)[::-1], strict=True):
             middle = _implicit(faces, gap, gap, k, _STAGE * added)

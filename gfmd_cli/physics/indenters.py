@@ -18,7 +18,7 @@ from gfmd_cli.maps.pictures import Picture
 from gfmd_cli.spec_table import Positive, SpecTable
 
 SMALLEST_GRID = 8  # points along an axis; a choice: smaller grids resolve no contact
-ROUNDING = 1e-9  # of a number of points that follows from a ratio of sides
+POINTS_ROUNDING = 1e-9  # of a number of points that follows from a ratio of sides
 
 
 class RigidSurface(SpecTable):
@@ -57,7 +57,7 @@ class RigidSurface(SpecTable):
         if self.dimension == 1:
             return 1
         length_y, length = self.sides
-        return max(SMALLEST_GRID, ceil(self.smallest_grid() * length_y / length - ROUNDING))
+        return max(SMALLEST_GRID, ceil(self.smallest_grid() * length_y / length - POINTS_ROUNDING))
 
     def points_y(self, points: int) -> int:
         """Points along y where a spec gives none: the even number nearest to square pixels."""

@@ -21,7 +21,7 @@ def contact_points(height: Field, u: Field, sigma: Field) -> Mask:
     """Mask of the points in contact, where u = h and sigma > 0.
 
     `height` and `u` are in the same unit. `Contact.obstacle` as the height leaves out points that
-    never touch. The stress alone is no criterion, because it is rounded.
+    never touch. The stress alone does not suffice, because it is rounded.
     """
     points: Mask = u == height
     points &= sigma > 0
@@ -58,7 +58,7 @@ def estimated_patches(perimeter: float, a_r: float, area: float) -> float:
 
 
 def border_contact(grid: Grid, mask: Mask) -> float:
-    """Share of the outermost points of a map that a mask contains."""
+    """Fraction of the outermost points of a map that a mask contains."""
     inner = [slice(1, -1)] * mask.ndim
     if grid.dimension == 2:  # of the rows of this process
         first, last = grid.row_span
@@ -93,7 +93,7 @@ class Observables:
     """Scalars of one contact."""
 
     a_r: float
-    """Relative contact area: share of the grid points that carry load."""
+    """Relative contact area: fraction of the grid points that carry load."""
     sigma_p: float
     """Standard deviation of the contact pressure over the whole interface [Delta_sigma]."""
     u_g: float
@@ -131,10 +131,10 @@ def observe(contact: Contact, u: Field, sigma: Field) -> Observables:
     )
 
 
-def edge_shares(
+def edge_fractions(
     surface: RigidSurface, grid: Grid, height: Field, u: Field, sigma: Field
 ) -> dict[str, float]:
-    """Shares of the contact area and of the load in the tapered zone at the edges.
+    """Fractions of the contact area and of the load in the tapered zone at the edges.
 
     Columns `edge_contact` and `edge_load`; none where the surface has no such zone.
     """
@@ -155,7 +155,7 @@ def edge_shares(
 class Histogram:
     """Distribution Pr(x) of x >= 0: zero + sum of density times width + beyond = 1.
 
-    For the logarithmic bins the sum includes the share `below` them.
+    For the logarithmic bins the sum includes the fraction `below` them.
     """
 
     linear: Field
@@ -165,9 +165,9 @@ class Histogram:
     zero: float
     """Weight of the delta function at zero."""
     beyond: float
-    """Share of points above the last linear bin."""
+    """Fraction of points above the last linear bin."""
     below: float
-    """Share of points above zero and below the first logarithmic bin."""
+    """Fraction of points above zero and below the first logarithmic bin."""
 
 
 def geometric_middles(edges: Field) -> Field:

@@ -118,7 +118,10 @@ class _Tree:
         return loop
 
 
-def area_distribution(shares: Field) -> Field:
-    """Pr(A): share of the patches per area in logarithmic bins; zero without patches."""
-    counts = np.histogram(shares, AREA_EDGES)[0]
-    return counts / (max(shares.size, 1) * np.diff(AREA_EDGES))
+def area_distribution(areas: Field) -> Field:
+    """Pr(A): fraction of the patches per area in logarithmic bins; zero without patches.
+
+    `areas` are those of the patches, in the unit of `AREA_EDGES`.
+    """
+    counts = np.histogram(areas, AREA_EDGES)[0]
+    return counts / (max(areas.size, 1) * np.diff(AREA_EDGES))

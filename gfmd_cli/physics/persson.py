@@ -16,11 +16,11 @@ from gfmd_cli.grid.arrays import Field
 from gfmd_cli.maps.interpolation import monotone_cubic
 
 _GAMMA = {0.0: 0.5, 0.5: 0.45, 1.0: 0.35, 2.0: 0.2, 3.0: 0.1, 4.0: 0.02}  # Eq. (39)
-EXACT, BINS = 64, 500  # shells of one |q|, and logarithmic bins; Sect. 4.1.1 has 500
+EXACT_SHELLS, LOGARITHMIC_BINS = 64, 500  # shells of one |q|: a choice; bins: Sect. 4.1.1
 _SAME_SHELL = 1e-9  # relative difference of |q| within one shell: far above rounding
 _CHUNK = 1 << 18  # elements of one temporary array, 2 MiB: fits a cache and bounds the memory
 _NARROW = 1e-5  # bin width / variance where the mid point errs as little as the difference, ~1e-10
-_TABLE = (1e-6, 20.0, 300)  # pressures [Delta_sigma] of a table of the mean gap
+_TABLE_PRESSURES = (1e-6, 20.0, 300)  # pressures [Delta_sigma] of a table of the mean gap
 UNDERFLOW = 40.0  # exp(-x^2) is zero in double precision well before this x
 
 
@@ -109,11 +109,11 @@ def shells(q: Field, power: Field, k: Field, gamma: Field, modes: Field) -> Shel
 
 def bin_edges(q: Field) -> Field:
     """Inner edges: half-way between the smallest |q|, then in geometric progression."""
-    low = _smallest_distinct(q, EXACT + 1)
+    low = _smallest_distinct(q, EXACT_SHELLS + 1)
     between = 0.5 * (low[1:] + low[:-1])
-    if low.size <= EXACT:
+    if low.size <= EXACT_SHELLS:
         return between
-    return np.concatenate([between, np.geomspace(between[-1], q.max(), BINS + 1)[1:-1]])
+    return np.concatenate([between, np.geomspace(between[-1], q.max(), LOGARITHMIC_BINS + 1)[1:-1]])
 
 
 def _smallest_distinct(q: Field, count: int) -> Field:
@@ -236,7 +236,7 @@ class Persson:
     @cached_property
     def _pressures_over_gap(self) -> tuple[Field, Callable[[Field], Field]]:
         """Rising values of -ln u_g, and ln p as a function of them."""
-        p = self.delta_sigma * np.geomspace(*_TABLE)
+        p = self.delta_sigma * np.geomspace(*_TABLE_PRESSURES)
         gap = self.mean_gap(p)
         known = gap > 0
         rising = -np.log(gap[known])

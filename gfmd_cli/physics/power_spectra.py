@@ -11,11 +11,11 @@ from math import inf, sqrt
 
 import numpy as np
 
-from gfmd_cli.grid.arrays import BLOCK, Field, row_blocks
+from gfmd_cli.grid.arrays import BLOCK_POINTS, Field, row_blocks
 from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.maps.roughness_parameters import autocorrelation, distances
 from gfmd_cli.physics.contact import radial_power
-from gfmd_cli.physics.free_contact import twice
+from gfmd_cli.physics.free_contact import doubled_grid
 from gfmd_cli.physics.persson import bin_edges
 
 
@@ -51,7 +51,7 @@ def autocorrelations(
     are not periodic have the mean over the pairs of points of the grid at each displacement.
     """
     step = max(grid.spacings)
-    cell = grid if periodic else twice(grid)
+    cell = grid if periodic else doubled_grid(grid)
     distance = distances(cell.whole_shape, (spacing / step for spacing in cell.spacings))
     rings = int(0.5 * min(grid.sides) / step * (1 + 1e-12)) + 1
     ring = np.rint(distance).astype(np.int64).ravel()
@@ -94,7 +94,7 @@ def anisotropy(grid: Grid, height: Field) -> float:
     x = np.arange(*grid.span, dtype=np.float64)
     weight = grid.multiplicity()
     sums = np.zeros(3)
-    for rows in row_blocks(modes, max(modes.size // 16, BLOCK)):
+    for rows in row_blocks(modes, max(modes.size // 16, BLOCK_POINTS)):
         y = grid.mode_number_y(rows)[:, None]
         power = weight * np.abs(modes[rows]) ** 2
         # the waves with the highest q_y of an even number of points have both signs of q_y

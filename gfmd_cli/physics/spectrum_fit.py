@@ -18,10 +18,10 @@ from gfmd_cli.physics.persson import Shells
 MIN_RANGE = 3.0  # smallest q_s / q_1 of a fit; a choice
 MIN_SHELLS = 8  # of a fit with two parameters; a choice
 MAX_ITERATIONS = 40  # of fit and cut-off; ten are usual
-HURST = (0.0, 2.0)  # bounds of the fit: wider than those of a self-affine surface, 0 and 1
-NEGLIGIBLE = 1e-4  # share of the squared rms gradient; a choice: 16 bits leave 1e-5 or less
-STEP = 1e-4  # in H and ln q_r, for second differences: about eps^(1/4)
-ROUNDING = 1 - 1e-9  # factor by which sums may be too small due to rounding
+HURST_BOUNDS = (0.0, 2.0)  # bounds of the fit: wider than those of a self-affine surface, 0 and 1
+NEGLIGIBLE_GRADIENT = 1e-4  # fraction of its square; a choice: 16 bits leave 1e-5 or less
+DIFFERENCE_STEP = 1e-4  # in H and ln q_r, for second differences: about eps^(1/4)
+ROUNDING_FACTOR = 1 - 1e-9  # factor by which sums may be too small due to rounding
 
 
 @dataclass(frozen=True)
@@ -114,7 +114,7 @@ def fit(shells: Shells, complete: float = inf) -> SelfAffineFit:
     q, count, power = shells.q, shells.modes, density(shells)
     isotropic = _isotropic(q, count, complete)
     gradients = np.cumsum(shells.height * q**2)
-    shell_count = int(np.searchsorted(gradients, (1 - NEGLIGIBLE) * gradients[-1])) + 1
+    shell_count = int(np.searchsorted(gradients, (1 - NEGLIGIBLE_GRADIENT) * gradients[-1])) + 1
     best = np.array([0.8, np.log(2 * q[0])])
     for _ in range(MAX_ITERATIONS):
         if shell_count < MIN_SHELLS or q[shell_count - 1] < MIN_RANGE * q[0]:
@@ -164,7 +164,7 @@ def _scale(x: Field, q: Field, count: Field, power: Field) -> float:
 
 def _maximise_likelihood(q: Field, count: Field, power: Field, start: Field) -> Field:
     """Maximum-likelihood H and ln q_r, or H alone where q_r would be below the lowest mode."""
-    bounds = (HURST, (np.log(q[0] / 2), np.log(q[-1])))[: start.size]
+    bounds = (HURST_BOUNDS, (np.log(q[0] / 2), np.log(q[-1])))[: start.size]
     result = minimize(
         _misfit,
         np.clip(start, *np.transpose(bounds)),
@@ -180,13 +180,14 @@ def _maximise_likelihood(q: Field, count: Field, power: Field, start: Field) -> 
 
 def _errors(q: Field, count: Field, power: Field, best: Field) -> tuple[list[float], float]:
     """Standard errors of H and ln q_r from the curvature of the likelihood, and the deviance."""
-    steps = STEP * np.eye(best.size)
+    steps = DIFFERENCE_STEP * np.eye(best.size)
 
     def misfit(shift: Field) -> float:
         return _misfit(best + shift, q, count, power)
 
     def second(a: Field, b: Field) -> float:
-        return (misfit(a + b) - misfit(a - b) - misfit(b - a) + misfit(-a - b)) / (4 * STEP**2)
+        difference = misfit(a + b) - misfit(a - b) - misfit(b - a) + misfit(-a - b)
+        return difference / (4 * DIFFERENCE_STEP**2)
 
     curvature = np.array([[second(a, b) for b in steps] for a in steps])
     ratio = power / (_scale(best, q, count, power) * _shape(q, best, q[0]))
@@ -221,5 +222,5 @@ def _cut_off(shells: Shells, count: Field, best: Field) -> int:
     q, power = shells.q, count * _shape(shells.q, best, shells.q[0])
     ratio = np.sqrt(np.cumsum(q**2 * power) / np.cumsum(power))
     measured = moments(shells)
-    reached = np.searchsorted(ratio, measured.gradient / measured.height * ROUNDING) + 1
+    reached = np.searchsorted(ratio, measured.gradient / measured.height * ROUNDING_FACTOR) + 1
     return int(np.clip(reached, 1, q.size))

@@ -20,7 +20,7 @@ from gfmd_cli.grid.arrays import Field, Mask, row_blocks
 from gfmd_cli.grid.fft_grid import ALL_ROWS, Grid
 from gfmd_cli.physics.contact import Contact
 
-BINS = 1 << 14  # of height, of width 1e-3 h_std or less for heights within +-8 h_std
+HEIGHT_BINS = 1 << 14  # of height, of width 1e-3 h_std or less for heights within +-8 h_std
 MIN_POINTS = 10  # for a standard deviation; a choice
 
 
@@ -73,19 +73,19 @@ def direction(grid: Grid, axis: int, rows: slice = ALL_ROWS) -> Field:
 
 @dataclass(frozen=True)
 class Bearing:
-    """Standard deviation of s over the highest points, as a function of their share."""
+    """Standard deviation of s over the highest points, as a function of their fraction."""
 
     area: Field
-    """Share of the points that are above a height, increasing."""
+    """Fraction of the points that are above a height, increasing."""
     deviation: Field
     """Standard deviation of s over these points [Delta_sigma]."""
 
     def delta_sigma_c(self, p_star: Field | float) -> Field:
         """Delta_sigma_c [Delta_sigma] that is consistent with its contact area. Paper Sect. 7.
 
-        The pressure for a share a is p = sqrt(2) Delta_sigma_c(a) erfinv(a). Where p(a) does not
-        increase, the smallest share is used; beyond its ends, Delta_sigma_c is constant. NaN where
-        no share of the points is known.
+        The pressure for a fraction a is p = sqrt(2) Delta_sigma_c(a) erfinv(a). Where p(a) does not
+        increase, the smallest fraction is used; beyond its ends, Delta_sigma_c is constant. NaN if
+        p(a) increases nowhere.
         """
         p = np.sqrt(2) * self.deviation * erfinv(self.area)
         rises = p > np.maximum.accumulate(np.append(0.0, p))[:-1]
@@ -108,12 +108,12 @@ def bearing(contact: Contact) -> Bearing:
     height = contact.height
     stress = contact.elasticity(contact.height, contact.grid.empty())
     low, high = float(height.min()), float(height.max())
-    sums = np.zeros((3, BINS))
+    sums = np.zeros((3, HEIGHT_BINS))
     for rows in row_blocks(height):
-        depth = (high - height[rows]) * ((BINS - 1) / (high - low))
+        depth = (high - height[rows]) * ((HEIGHT_BINS - 1) / (high - low))
         bin_number, values = depth.astype(np.int64).ravel(), stress[rows].ravel()
         for total, weight in zip(sums, (np.ones_like(values), values, values**2), strict=True):
-            total += np.bincount(bin_number, weight, minlength=BINS)
+            total += np.bincount(bin_number, weight, minlength=HEIGHT_BINS)
     count, total, square = np.cumsum(sums, axis=1)
     usable = (count >= MIN_POINTS) & (count < height.size) & (sums[0] > 0)
     mean = total[usable] / count[usable]

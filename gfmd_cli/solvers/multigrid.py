@@ -11,9 +11,9 @@ approximated by a penalty: springs tie the coarse hats to zero at the points hel
 operator of the level itself. This takes four bytes per coarse point, less than Galerkin stencils,
 and the levels are not too stiff, as bilinear hats would be for a plate.
 
-One sweep of the damped Jacobi iteration before and after the correction suffices for the
-Laplacian, as it does on the finest level. Its square takes two: with one, conjugate gradients take
-a tenth more steps at n = 3 and a quarter more at n = 4.
+One smoothing step (damped Jacobi) before and after the correction suffices for the Laplacian, as
+it does on the finest level. Its square takes two: with one, conjugate gradients take a tenth more
+steps at n = 3 and a quarter more at n = 4.
 
 The points of a level need not be half of those of the next finer one. An odd number is followed by
 the even number next to its half, and hats are evaluated at the points of the finer level. On pixels
@@ -22,8 +22,8 @@ only the direction of strong coupling is coarsened until the pixels are about sq
 (semi-coarsening; Trottenberg, Oosterlee & Schueller, Multigrid, 2001, section 5.1).
 
 The cycle is symmetric. It is positive as long as the eigenvalues of the damped Jacobi iteration,
-the damping times A over its diagonal, are below 2. Without springs the largest is `SMOOTHING`.
-Springs do not increase it, because they act on waves for which the operator is soft.
+the damping times A over its diagonal, are below 2. Without springs `JACOBI_EIGENVALUE` is the
+largest. Springs do not increase it, because they act on waves for which the operator is soft.
 """
 
 from collections.abc import Iterator
@@ -42,19 +42,19 @@ from gfmd_cli.solvers import multigrid_kernels as kernels
 from gfmd_cli.solvers.contact_state import ContactState
 from gfmd_cli.solvers.multigrid_kernels import WHOLE_WEIGHT, ZERO
 
-COARSEST = 4  # points along the shorter side on the coarsest level
-ASPECT = 1.5  # of pixels beyond which only their shorter side is coarsened; 1 / (2 / 1.5) then
+MIN_LEVEL_POINTS = 4  # points along the shorter side on the coarsest level
+MAX_PIXEL_ASPECT = 1.5  # beyond, only the shorter side is coarsened, which leaves 1 / (2 / 1.5)
 STEEP = 5.0  # growth of k(q) above which the Laplacian is squared; n = 2.3; measured
 SPRINGS = 0.125, 0.25  # stiffness over diagonal element and k(2 q) / k(q), without and with square
-SMOOTHING = 1.76  # largest eigenvalue of the damped Jacobi iteration; 1.6 to 1.85 do as well
-GROWTH = 70.0  # largest growth of k(q) between levels that the cycle permits; 64 at q^6; measured
-COARSEST_SWEEPS = 4  # pairs of Jacobi sweeps on the coarsest level
-UNIT = 1.0 / 64  # of the integers in `ties`
+JACOBI_EIGENVALUE = 1.76  # largest of the damped Jacobi iteration; 1.6 to 1.85 do as well
+MAX_GROWTH = 70.0  # of k(q) between levels, at which the cycle still works; 64 at q^6; measured
+COARSEST_STEPS = 4  # pairs of smoothing steps on the coarsest level
+TIE_UNIT = 1.0 / 64  # of the integers in `ties`
 
 
 def suits(contact: Contact) -> bool:
     """Whether there is a coarser level, and k(q) grows evenly enough between the levels."""
-    return largest_growth(contact) < GROWTH
+    return largest_growth(contact) < MAX_GROWTH
 
 
 def largest_growth(contact: Contact) -> float:
@@ -95,14 +95,14 @@ def _levels(contact: Contact) -> list[Level]:
     return levels
 
 
-def _operator(dy: float, dx: float, growth: float, share: float) -> kernels.Operator:
+def _operator(dy: float, dx: float, growth: float, density: float) -> kernels.Operator:
     """The operator of a level with pixels of dy x dx, and the stiffness of its springs.
 
     The operator is A(q) = y l_y + x l_x - c l_y l_x with l = 2 - 2 cos(q d) along either axis, the
     weights y = 1 / dy^2 and x = 1 / dx^2, the larger of which is 1, and c = min(y, x) / 6; or its
     square. On square pixels this is the nine-point stencil whose error of order q^4 is the same in
-    all directions. On oblong ones a larger c takes more steps. `share` is four times the number of
-    points of the level over that of the next finer one.
+    all directions. On oblong ones a larger c takes more steps. `density` is four times the number
+    of points of the level over that of the next finer one.
     """
     y, x = ((min(dy, dx) / spacing) ** 2 for spacing in (dy, dx))
     corner = min(y, x) / 6
@@ -112,8 +112,8 @@ def _operator(dy: float, dx: float, growth: float, share: float) -> kernels.Oper
     if is_squared:
         diagonal = centre**2 + 2 * (along_y**2 + along_x**2) + 4 * corner**2
         largest **= 2
-    damping = SMOOTHING * diagonal / largest
-    spring = UNIT * SPRINGS[is_squared] * diagonal * growth * share
+    damping = JACOBI_EIGENVALUE * diagonal / largest
+    spring = TIE_UNIT * SPRINGS[is_squared] * diagonal * growth * density
     return kernels.Operator(
         np.float32(centre),
         np.float32(along_y),
@@ -137,7 +137,7 @@ def level_rows(grid: Grid) -> Iterator[tuple[Shape, LocalRows]]:
     while True:
         yield shape, rows
         axes = list(zip(shape, coarsened_axes(shape, grid.sides), strict=True))
-        if any(n // 2 < COARSEST for n, halved in axes if halved):
+        if any(n // 2 < MIN_LEVEL_POINTS for n, halved in axes if halved):
             return
         coarser = tuple(_half(n) if halved else n for n, halved in axes)
         if _is_half(coarser, shape):
@@ -152,7 +152,7 @@ def level_rows(grid: Grid) -> Iterator[tuple[Shape, LocalRows]]:
 def coarsened_axes(shape: Shape, sides: tuple[float, ...]) -> list[bool]:
     """Along which axes a grid is coarsened: where pixels are far from square, the shorter side."""
     spacings = [side / points for side, points in zip(sides, shape, strict=True)]
-    return [spacing <= ASPECT * min(spacings) for spacing in spacings]
+    return [spacing <= MAX_PIXEL_ASPECT * min(spacings) for spacing in spacings]
 
 
 def _half(points: int) -> int:
@@ -208,7 +208,7 @@ class Multigrid:
         self.rows.exchange_halo(contact_state)
         self.set_ties(contact_state, threshold)  # [1] penalty terms
         fields = (self.rows.with_halo(sigma), contact_state, threshold, self.operators[0])
-        # [2] one Jacobi sweep from zero on the finest level, and the restriction of its residual
+        # [2] one smoothing step from zero on the finest level, and the restriction of the residual
         self.restrict(kernels.first_residual, fields, 0)
         self.descend()  # [3] pre-smoothing
         for level in range(len(self.coarse_rows) - 2, -1, -1):  # [4] correction, post-smoothing
@@ -218,7 +218,7 @@ class Multigrid:
                 self.smooth(level, x, y)
             else:
                 self.smooth(level, None, y, *correction)
-        # [5] correction and one sweep on the finest level, and the sums
+        # [5] correction and one smoothing step on the finest level, and the sums
         slope, turned = self.rows.sums_with_halo(
             2, kernels.last_smooth, *fields, *self.correction(0), self.scale, change, self.z
         )
@@ -234,7 +234,7 @@ class Multigrid:
             fields = (rhs, operator, self.ties[level], y, not operator.is_squared)
             self.restrict(kernels.residual, fields, level + 1)
         self.smooth(last, None, self.y[last])
-        for _ in range(COARSEST_SWEEPS):
+        for _ in range(COARSEST_STEPS):
             self.smooth(last, self.y[last], self.x[last])
             self.smooth(last, self.x[last], self.y[last])
 
@@ -267,9 +267,9 @@ class Multigrid:
         coarse: SingleField | None = None,
         ratio: np.float32 = ZERO,
     ) -> None:
-        """Write the result of a Jacobi sweep on `old` plus P coarse to `new`.
+        """Write the result of a smoothing step on `old` plus P coarse to `new`.
 
-        Without `old` the result of a sweep from zero takes its place.
+        Without `old`, the result of a smoothing step from zero takes its place.
         """
         rhs, rows = self.rhs[level], self.coarse_rows[level]
         matrix = (rhs, self.operators[level + 1], self.ties[level])

@@ -144,7 +144,7 @@ def _interpolate(coarse, k, ratio, out):
 
 @kernel
 def first_residual(sigma, contact_state, threshold, operator, coarse, a, b):
-    """Restrict the residual of the force after one Jacobi sweep from zero to `coarse`.
+    """Restrict the residual of the force after one smoothing step from zero to `coarse`.
 
     The residual itself is written to a field that is as wide as `sigma`.
     """
@@ -180,7 +180,7 @@ def first_residual(sigma, contact_state, threshold, operator, coarse, a, b):
 def last_smooth(
     sigma, contact_state, threshold, operator, coarse, ratio, scale, change, padded, out, a, b
 ):
-    """Write z, one Jacobi sweep on the sum of the first sweep and P coarse, to `padded`.
+    """Write z, one smoothing step on the result of the first plus P coarse, to `padded`.
 
     Returns the sums of `Multigrid.apply`. `change` and `padded` have no halo.
     """
@@ -244,7 +244,7 @@ def _residual_row(i, x, rows, operator, ties, rhs, out):
 
 @part_of_kernel
 def _first_row(rhs, operator, ties, k, row):
-    """Write row k of the result of a Jacobi sweep from zero to a row of a ring buffer."""
+    """Write row k of the result of a smoothing step from zero to a row of a ring buffer."""
     force, own = rhs[k], ties[k, 0]
     for j in range(force.size):
         tied = operator.damped_diagonal + operator.damped_spring * np.float32(own[j + 1])
@@ -253,10 +253,10 @@ def _first_row(rhs, operator, ties, k, row):
 
 @kernel
 def smooth(rhs, operator, ties, old, is_zero, coarse, ratio, y, a, b):
-    """Write the result of one Jacobi sweep on x to `y`.
+    """Write the result of one smoothing step (damped Jacobi) on x to `y`.
 
-    x is the result of a sweep from zero where `is_zero`, else `old`, plus P coarse where the ratio
-    of the scales is positive.
+    x is the result of a smoothing step from zero where `is_zero`, else `old`, plus P coarse where
+    the ratio of the scales is positive.
     """
     height, n = rhs.shape
     diagonal, spring = operator.damped_diagonal, operator.damped_spring
@@ -288,7 +288,7 @@ def smooth(rhs, operator, ties, old, is_zero, coarse, ratio, y, a, b):
 def residual(rhs, operator, ties, y, is_zero, coarse, a, b):
     """Restrict the residual of y to `coarse`, or write it to a field as wide as `rhs`.
 
-    Where `is_zero`, the result of a Jacobi sweep from zero takes the place of y.
+    Where `is_zero`, the result of a smoothing step from zero takes the place of y.
     """
     height, n = rhs.shape
     x, laplacian = np.empty((5, n + 4), np.float32), np.empty((3, n + 4), np.float32)
@@ -318,12 +318,13 @@ def residual(rhs, operator, ties, y, is_zero, coarse, a, b):
 
 @part_of_kernel
 def _hats(n, m):
-    """The two of m hats that reach each of n points, and the share of the second one."""
-    left, right, share = np.empty(n, np.int32), np.empty(n, np.int32), np.empty(n, np.float32)
+    """The two of m hats that reach each of n points, and the weight of the right one."""
+    left, right = np.empty(n, np.int32), np.empty(n, np.int32)
+    fraction = np.empty(n, np.float32)
     for i in range(n):
         left[i], right[i] = i * m // n, (i * m // n + 1) % m
-        share[i] = np.float32(i * m % n) / np.float32(n)
-    return left, right, share
+        fraction[i] = np.float32(i * m % n) / np.float32(n)
+    return left, right, fraction
 
 
 @part_of_kernel
@@ -336,7 +337,7 @@ def _reach(k, n, m):
 def restrict(fine, coarse, a, b):
     """Write P^T fine to `coarse`, for any numbers of points."""
     (height, n), (rows, m) = fine.shape, coarse.shape
-    left, right, share = _hats(n, m)
+    left, right, fraction = _hats(n, m)
     column = np.empty(n, np.float32)
     for k in range(a, b):
         column[:] = ZERO
@@ -349,15 +350,15 @@ def restrict(fine, coarse, a, b):
         target = coarse[k]
         target[:] = ZERO
         for j in range(n):
-            target[left[j]] += (ONE - share[j]) * column[j]
-            target[right[j]] += share[j] * column[j]
+            target[left[j]] += (ONE - fraction[j]) * column[j]
+            target[right[j]] += fraction[j] * column[j]
 
 
 @kernel
 def interpolate(coarse, fine, a, b):
     """Write P coarse to `fine`, for any numbers of points."""
     (height, n), (rows, m) = fine.shape, coarse.shape
-    left, right, share = _hats(n, m)
+    left, right, fraction = _hats(n, m)
     row = np.empty(m, np.float32)
     for i in range(a, b):
         k = i * rows // height
@@ -366,14 +367,14 @@ def interpolate(coarse, fine, a, b):
             row[j] = one[j] + value * (other[j] - one[j])
         for j in range(n):
             here = row[left[j]]
-            fine[i, j] = here + share[j] * (row[right[j]] - here)
+            fine[i, j] = here + fraction[j] * (row[right[j]] - here)
 
 
 @kernel
 def compute_any_ties(fine, threshold, weighted, ties, weights, a, b):
     """The same as `compute_ties`, rounded, for any numbers of points."""
     (height, n), (rows, m) = fine.shape, weights.shape
-    left, right, share = _hats(n, m)
+    left, right, fraction = _hats(n, m)
     columns, sums = np.empty((3, n), np.float32), np.empty((5, m), np.float32)
     down, tied, loaded = columns[0], columns[1], columns[2]
     own, east, south, cross, weight = sums[0], sums[1], sums[2], sums[3], sums[4]
@@ -391,7 +392,7 @@ def compute_any_ties(fine, threshold, weighted, ties, weights, a, b):
                 tied[j] += value * w
                 down[j] += below * w
         for j in range(n):
-            e, o, t = left[j], right[j], share[j]
+            e, o, t = left[j], right[j], fraction[j]
             s = ONE - t
             weight[e] += s * loaded[j]
             weight[o] += t * loaded[j]

@@ -18,10 +18,10 @@ from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.physics.contact import Contact
 from gfmd_cli.solvers import preconditioner_kernels as kernels
 from gfmd_cli.solvers.contact_state import ContactState
-from gfmd_cli.solvers.multigrid import COARSEST, Multigrid, level_count, suits
+from gfmd_cli.solvers.multigrid import MIN_LEVEL_POINTS, Multigrid, level_count, suits
 from gfmd_cli.solvers.multilevel import Multilevel
 
-STEEP = 0.7  # local exponent of k(q) above which the V-cycle is faster than the Green's function
+V_CYCLE_EXPONENT = 0.7  # of k(q), above which the V-cycle is faster than the Green's function
 
 
 class Preconditioner(Protocol):
@@ -85,8 +85,8 @@ def select(contact: Contact, contact_state: ContactState, threshold: int) -> Sel
     if grid.dimension == 1:
         return Selection(screening, False)
     if suits(contact):
-        return Selection(screening, exponent > STEEP)
-    if level_count(grid, COARSEST) == 1:
+        return Selection(screening, exponent > V_CYCLE_EXPONENT)
+    if level_count(grid, MIN_LEVEL_POINTS) == 1:
         return Selection(screening, False)
     # Measured on the default surface, p* = 0.001 to 1, and a paraboloid, 512^2, CPU seconds: the
     # sum over levels and the Green's function are equal at n = 1; for n = 2, 3, 4 the sum is faster

@@ -10,7 +10,7 @@ from pydantic import Field as Key
 
 from gfmd_cli.errors import InputError
 from gfmd_cli.files.checksums import file_digest
-from gfmd_cli.physics.contact import PRESSURES
+from gfmd_cli.physics.contact import PRESSURE_RANGE
 from gfmd_cli.physics.elastomers import Elastomer, LinearElastomer
 from gfmd_cli.physics.indenters import SMALLEST_GRID, RigidSurface
 from gfmd_cli.physics.surfaces import Surface
@@ -216,7 +216,7 @@ class LoadTable(SpecTable):
         loads = [name for name in LOADS if getattr(self, name) is not None]
         if len(loads) != 1:
             raise ValueError(f"give one of {', '.join(LOADS)}")
-        low, high = PRESSURES
+        low, high = PRESSURE_RANGE
         beyond = [p for p in self.listed() if not low <= p <= high]
         if beyond and self.p_star is not None:
             raise ValueError(f"p_star must be from {low:g} to {high:g}, got {beyond[0]:g}")

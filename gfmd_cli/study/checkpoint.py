@@ -23,7 +23,7 @@ from gfmd_cli.files.locks import locked
 from gfmd_cli.files.regular import open_regular
 from gfmd_cli.grid.arrays import Field, row_blocks
 from gfmd_cli.grid.fft_grid import Grid
-from gfmd_cli.grid.ranks import Ranks, agree, leads, together
+from gfmd_cli.grid.ranks import Ranks, broadcast, is_root, shared_errors
 from gfmd_cli.physics.contact import Contact
 from gfmd_cli.solvers.loop import Solver, State
 from gfmd_cli.solvers.nested_grids import Resume, grids_of
@@ -70,10 +70,10 @@ class Checkpoint:
             raise StudyError(f"{folder}: a link in the place of a checkpoint; remove it")
         checkpoint = cls(folder, ranks)
         with ExitStack() as stack:
-            with together(ranks):
-                if leads(ranks):
+            with shared_errors(ranks):
+                if is_root(ranks):
                     checkpoint.mine = stack.enter_context(locked(folder / "lock", wait=False))
-            checkpoint.mine = agree(ranks, checkpoint.mine)
+            checkpoint.mine = broadcast(ranks, checkpoint.mine)
             try:
                 yield checkpoint
             finally:
@@ -83,10 +83,10 @@ class Checkpoint:
     def restore(self) -> str | None:
         """Read the intact states; return a message on damaged ones, set aside if none is intact."""
         note = None
-        with together(self.ranks):
-            if self.mine and leads(self.ranks):
+        with shared_errors(self.ranks):
+            if self.mine and is_root(self.ranks):
                 note = self._restore()
-        self.slots = agree(self.ranks, self.slots)
+        self.slots = broadcast(self.ranks, self.slots)
         return note
 
     def _restore(self) -> str | None:
@@ -107,7 +107,7 @@ class Checkpoint:
     def set_aside(self) -> str:
         """Rename all files of a state that cannot be resumed; return a message."""
         self.slots = []
-        if self.mine and leads(self.ranks):
+        if self.mine and is_root(self.ranks):
             for path in (self.pointer, *self.folder.glob("[ab]*")):
                 set_aside(path, self.folder.with_name(f"{self.folder.name}.{path.name}.bad"))
         return f"{self.folder}: no state to resume; set aside as .bad, the task starts anew"
@@ -126,7 +126,7 @@ class Checkpoint:
             return
         fields = {name: v for name, v in vars(state).items() if isinstance(v, np.ndarray)}
         name: Literal["a", "b"] = "a" if self.slots and self.slots[0].name == "b" else "b"
-        with together(self.ranks):
+        with shared_errors(self.ranks):
             part = self._write_part(name, contact.grid, fields)
         parts = [part] if self.ranks is None else self.ranks.comm.allgather(part)
         slot = Slot(
@@ -138,8 +138,8 @@ class Checkpoint:
             fields={name: field.dtype.str for name, field in fields.items()},
         )
         slots = [slot, *(old for old in self.slots[:1] if old.name != name)]
-        with together(self.ranks):
-            if leads(self.ranks):
+        with shared_errors(self.ranks):
+            if is_root(self.ranks):
                 write_whole(self.pointer, sealed(pointer_text(slots)))
         self.slots = slots
 
@@ -182,7 +182,7 @@ class Checkpoint:
 
     def remove(self) -> None:
         """Forget the state: the task is done."""
-        if self.mine and leads(self.ranks):
+        if self.mine and is_root(self.ranks):
             for path in (self.pointer, self.folder / "lock", *self.folder.glob("[ab]*")):
                 with suppress(OSError):
                     path.unlink()

@@ -7,7 +7,7 @@ import numpy as np
 from gfmd_cli.grid.plans import fast_length
 from gfmd_cli.physics.discretisation_error import MAX_AREA_EXPONENT, MAX_STRESS_EXPONENT
 from gfmd_cli.physics.indenters import RigidSurface
-from gfmd_cli.solvers.multigrid import ASPECT
+from gfmd_cli.solvers.multigrid import MAX_PIXEL_ASPECT
 from gfmd_cli.spec.models import AccuracyTable, OutputTable
 
 OUTPUT_FIELDS = {"stiffness": 3.0, "spectra": 1.0}
@@ -57,7 +57,7 @@ def fields_of_output(output: OutputTable, boundary: str) -> float:
 def fields_of_levels(shape: tuple[int, int], sides: tuple[float, ...]) -> float:
     """Fields that coarser grids and levels add where the points are not halved."""
     dy, dx = (side / count for side, count in zip(sides, shape, strict=True))
-    if max(dy, dx) > ASPECT * min(dy, dx):
+    if max(dy, dx) > MAX_PIXEL_ASPECT * min(dy, dx):
         return OBLONG_FIELDS
     return ODD_FIELDS if any(count % 2 for count in shape) else 0.0
 

@@ -20,7 +20,7 @@ import numpy as np
 from gfmd_cli.errors import InputError
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.physics.approach import estimated_pressures
-from gfmd_cli.physics.contact import PRESSURES, Scene
+from gfmd_cli.physics.contact import PRESSURE_RANGE, Scene
 from gfmd_cli.physics.persson import Persson
 from gfmd_cli.spec.models import LOADS
 from gfmd_cli.status import Status
@@ -247,4 +247,4 @@ class _Search:
             if not low.x + margin < x < high.x - margin or len(self.points) % 5 == 4:
                 x = 0.5 * (low.x + high.x)
         p = exp(x)
-        return p if PRESSURES[0] < p / self.scene.delta_sigma < PRESSURES[1] else None
+        return p if PRESSURE_RANGE[0] < p / self.scene.delta_sigma < PRESSURE_RANGE[1] else None

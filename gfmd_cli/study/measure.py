@@ -12,10 +12,10 @@ import numpy as np
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.maps.map_preparation import mirror
 from gfmd_cli.physics.approach import approach
-from gfmd_cli.physics.free_contact import twice
+from gfmd_cli.physics.free_contact import doubled_grid
 from gfmd_cli.physics.observables import (
     contact_pressure,
-    edge_shares,
+    edge_fractions,
     gap_histogram,
     stress_histogram,
 )
@@ -111,7 +111,7 @@ def all_columns(task: Task, solved: TaskSolution) -> Row:
         | planned(task)
         | results
         | {"warnings": SEPARATOR.join(warnings_of(task, solved, results))}
-        | edge_shares(task.surface, solved.scene.grid, contact.obstacle, u, sigma)
+        | edge_fractions(task.surface, solved.scene.grid, contact.obstacle, u, sigma)
         | on_request(task.output, SolvedContact(contact, u, sigma))
     )
 
@@ -177,7 +177,7 @@ def _curves(solved: TaskSolution) -> dict[str, dict[str, Field]]:
     units = {"height": scene.h_std, "u": scene.h_std, "sigma": scene.delta_sigma}
     r, means = autocorrelations(grid, fields, periodic=periodic)
     if not periodic:
-        grid, fields = twice(grid), {name: mirror(field) for name, field in fields.items()}
+        grid, fields = doubled_grid(grid), {name: mirror(field) for name, field in fields.items()}
     q, waves, powers = spectra(grid, fields)
     powers = {name: power * units[name] ** 2 for name, power in powers.items()}
     return {

@@ -9,7 +9,7 @@ import numpy as np
 
 from gfmd_cli.errors import InputError
 from gfmd_cli.grid.arrays import Field
-from gfmd_cli.grid.ranks import Ranks, agree
+from gfmd_cli.grid.ranks import Ranks, broadcast
 from gfmd_cli.physics.contact import Contact, Scene
 from gfmd_cli.physics.discretisation_error import (
     RoughnessScales,
@@ -108,7 +108,7 @@ def solve_on_grids(task: Task, context: SolveContext, watcher: Watcher) -> TaskS
             solution = solved.solution
             solved.bounds = error_bounds(contact, solution.u, solution.sigma)
             solved.estimates = _estimates(task, solved, grids)
-        if not agree(context.ranks, _continues(task, solved, len(grids), context.options)):
+        if not broadcast(context.ranks, _continues(task, solved, len(grids), context.options)):
             break
         points = _next_points(task, points)
     watcher.notes.grids = []

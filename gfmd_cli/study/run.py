@@ -10,7 +10,7 @@ from time import monotonic
 
 from gfmd_cli.errors import InputError, Interrupted, SpaceError
 from gfmd_cli.grid import plans
-from gfmd_cli.grid.ranks import Ranks, agree, leads, together
+from gfmd_cli.grid.ranks import Ranks, broadcast, is_root, shared_errors
 from gfmd_cli.physics.file_surface import forget_files
 from gfmd_cli.spec.models import Spec
 from gfmd_cli.status import Status
@@ -87,14 +87,14 @@ def run_study(
     if ranks is not None and (names := spec.output.on_request()):
         raise InputError(f"output.{names[0]}: takes whole grids; run it without mpiexec")
     moved = _move_aside(study, options) if options.overwrite else []
-    outcomes = agree(ranks, study.outcomes())
+    outcomes = broadcast(ranks, study.outcomes())
     share = options.share_of(tasks)
     pending = without_result(share, outcomes)
     to_solve = {task.id for task in pending}
     counts = Counter(outcomes[task.id].status for task in share if task.id not in to_solve)
-    has_records = agree(ranks, bool(study.record_paths()))
+    has_records = broadcast(ranks, bool(study.record_paths()))
     if not pending and not has_records:
-        if leads(ranks) and study.parts.exists():  # of a run that was killed as it ended
+        if is_root(ranks) and study.parts.exists():  # of a run that was killed as it ended
             with study.work(tasks):
                 pass
         return counts
@@ -115,14 +115,14 @@ def run_study(
         try:
             solved = _solve_all(pending, study.parts, jobs, context)
         finally:
-            with together(ranks):
+            with shared_errors(ranks):
                 # a stopped shard ends soon: its records stand, others collect them
-                if leads(ranks) and (options.shard[1] == 1 or not stop.is_set()):
+                if is_root(ranks) and (options.shard[1] == 1 or not stop.is_set()):
                     context.warn(*study.collect(spec, tasks, text))
             plans.plan_with(None)
         _check_ended(solved, len(pending), stop)
         if not any(status.is_failure for status in solved):
-            _check_output(pending, agree(ranks, study.outcomes()))
+            _check_output(pending, broadcast(ranks, study.outcomes()))
     return counts + solved
 
 
@@ -145,8 +145,8 @@ def _move_aside(study: Study, options: RunOptions) -> list[str]:
     if options.shard[1] != 1:
         raise InputError("--overwrite: not with --shard; each shard would start a new study")
     messages: list[str] = []
-    with together(options.ranks):
-        if leads(options.ranks):
+    with shared_errors(options.ranks):
+        if is_root(options.ranks):
             messages = [
                 f"{study.path}: the old one is kept as {path}" for path in study.move_aside()
             ]
@@ -158,8 +158,8 @@ def _folder(study: Study, tasks: list[Task], ranks: Ranks | None) -> Iterator[li
     """The folder of unfinished work; where processes share the tasks, the first one holds it."""
     damaged: list[str] = []
     with ExitStack() as stack:
-        with together(ranks):
-            if leads(ranks):
+        with shared_errors(ranks):
+            if is_root(ranks):
                 damaged = stack.enter_context(study.work(tasks))
         yield damaged
 

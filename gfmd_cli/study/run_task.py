@@ -7,7 +7,7 @@ from pathlib import Path
 from gfmd_cli.errors import GfmdError, Interrupted, SpaceError, StudyError
 from gfmd_cli.grid.blas import one_blas_thread
 from gfmd_cli.grid.fft_grid import Shape
-from gfmd_cli.grid.ranks import agree, leads, together
+from gfmd_cli.grid.ranks import broadcast, is_root, shared_errors
 from gfmd_cli.physics.contact import Contact
 from gfmd_cli.physics.observables import contact_points
 from gfmd_cli.solvers.loop import State
@@ -112,10 +112,10 @@ def attempt(task: Task, parts: Path, context: SolveContext) -> Status:
     """
     if context.should_stop():
         return Status.INTERRUPTED
-    if status := agree(context.ranks, _recorded_status(parts, task)):
+    if status := broadcast(context.ranks, _recorded_status(parts, task)):
         return status
     try:
-        with together(context.ranks):
+        with shared_errors(context.ranks):
             return solve_task(task, parts, context)
     except Interrupted:
         status, message = Status.INTERRUPTED, ""
@@ -144,7 +144,7 @@ def solve_task(task: Task, parts: Path, context: SolveContext) -> Status:
     with Checkpoint.exclusive(parts / task.id, context.ranks) as checkpoint:
         solved = solve_at_load(task, context, TaskWatcher(task, checkpoint, context))
         record = result(task, solved, time.perf_counter() - start)
-        if leads(context.ranks):
+        if is_root(context.ranks):
             write_record(parts, record)
         checkpoint.remove()
     numbers = (record.entry.row[name] for name in ("points", "steps", "residual", "a_r", "status"))

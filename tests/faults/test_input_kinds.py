@@ -86,4 +86,4 @@ def test_a_long_text_that_is_no_map_is_refused_soon(folder, start, text, suffix)
     child = start(folder, ("surface", f"map.{suffix}"), lambda: signal.alarm(SECONDS))
     status, output = child.wait(), child.said
     assert status == 2, (status, output)
-    assert "no known topography format" in output
+    assert "not in a known topography format" in output

@@ -10,7 +10,7 @@ from gfmd_cli.grid import ranks as module
 ranks = module.Ranks(MPI.COMM_WORLD)
 module.ABORT_AFTER_SECONDS = 1.0
 try:
-    with module.together(ranks):
+    with module.shared_errors(ranks):
         if ranks.rank == 1:
             raise SpaceError("no space on one of them") if sys.argv[1] == "known" else KeyError("x")
         if sys.argv[2] == "waiting":
