@@ -10,7 +10,7 @@ import numpy as np
 
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.physics.contact import Contact, Scene
-from gfmd_cli.physics.elastomers import LinearElastomer
+from gfmd_cli.physics.linear_elastomer import LinearElastomer
 from gfmd_cli.physics.persson import Persson
 
 ESTIMATE_PRESSURES = (1e-8, 1e4, 121)  # reduced pressures of the estimate: from, to, how many

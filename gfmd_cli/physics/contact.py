@@ -19,8 +19,8 @@ from gfmd_cli.grid.arrays import Field, Mask, Modes, row_blocks
 from gfmd_cli.grid.fft_grid import ALL_ROWS, Grid, Shape, multiplicity
 from gfmd_cli.grid.ranks import Ranks
 from gfmd_cli.physics import kernels
-from gfmd_cli.physics.elastomers import LinearElastomer
 from gfmd_cli.physics.indenters import RigidSurface
+from gfmd_cli.physics.linear_elastomer import LinearElastomer
 from gfmd_cli.physics.persson import Shells, shells
 from gfmd_cli.physics.surfaces import sample
 

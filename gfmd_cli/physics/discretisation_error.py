@@ -16,7 +16,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gfmd_cli.physics.elastomers import LinearElastomer
 from gfmd_cli.physics.error_estimates import (
     DIVERGENT,
     NO_ERRORS,
@@ -30,6 +29,7 @@ from gfmd_cli.physics.error_estimates import (
     full_contact,
     unknown,
 )
+from gfmd_cli.physics.linear_elastomer import LinearElastomer
 from gfmd_cli.physics.persson import Shells
 
 # Excess of the counted area: AREA_EXCESS n x. Measured: 0.00, 0.05, 0.10, 0.15, 0.21, 0.26, 0.31,

@@ -1,14 +1,9 @@
-"""Elastomers: the stiffness k(q), the stress per displacement at wavenumber q.
+"""Elastomers: each class is one `kind` of [elastomer] in the run spec.
 
-Each class is one `kind` of [elastomer] in the run spec. The elastic energy per area is
-sum_q k(q) |u(q)|^2 / 2, paper Eq. (1). Sums exclude q = 0, where k is zero for every
-elastomer (load control). Equation numbers are those of Mueser, "Elastic contacts of randomly rough
-surfaces across the spatial dimensions".
+Equation numbers are those of Mueser, "Elastic contacts of randomly rough surfaces across the
+spatial dimensions".
 """
 
-import warnings
-from collections.abc import Callable
-from fractions import Fraction
 from functools import lru_cache
 from typing import Annotated, ClassVar, Literal, Self
 
@@ -19,147 +14,23 @@ from pydantic import model_validator
 from gfmd_cli.errors import InputError
 from gfmd_cli.grid.arrays import Field, Mask
 from gfmd_cli.grid.fft_grid import ALL_ROWS, Shape
-from gfmd_cli.maps.interpolation import monotone_cubic
-from gfmd_cli.physics.compliance_transforms import Compliance, separated
-from gfmd_cli.physics.free_compliance import Spacings, power_law
-from gfmd_cli.physics.persson import gamma_n, gamma_slab
-from gfmd_cli.spec_table import FilePath, Positive, SpecTable
-from gfmd_cli.units import count
+from gfmd_cli.physics.compliance_transforms import Compliance
+from gfmd_cli.physics.free_compliance import Spacings
+from gfmd_cli.physics.linear_elastomer import LinearElastomer
+from gfmd_cli.physics.persson import gamma_slab
+from gfmd_cli.physics.stiffness_table import (
+    compliance_of_table,
+    end_exponents,
+    interpolated,
+    read_table,
+)
+from gfmd_cli.spec_table import FilePath, Positive
 
 LONG_WAVE = 1e-6  # q t up to which k of a layer is constant: (q t)^2 is below rounding
 DECAY_DISTANCE = 25.0  # thicknesses from which the displacement of a layer is below rounding
 MAX_SPACING = 16.0  # of a grid, in thicknesses of a layer with a free boundary
 MAX_SHORT_WAVE_STRESS = 0.1  # fraction of the squared stress, for a thin plate; a choice
 MAX_EXTRAPOLATED_STRESS = 0.1  # fraction of the squared stress beyond a table; a choice
-MAX_TABLE_BYTES = 2**20  # bytes of a tabulated stiffness; a choice, some 40000 rows
-EXPONENT_STEP = 1e-3  # of ln q: the truncation error is of order 1e-7, the rounding error 1e-13
-
-
-class LinearElastomer(SpecTable):
-    """Interface of all elastomers.
-
-    A subclass implements `stiffness`, and overrides the defaults that do not hold for it.
-    Wavenumbers q are arrays [1/m]; `length` is the side of the cell L [m], which scales the
-    thickness of a slab.
-    """
-
-    exponent: ClassVar[float | None] = None
-    """Exponent n where the stiffness is a power law k = k_n q^n, else None."""
-    kind: str
-
-    @property
-    def short_label(self) -> str:
-        """Name in figures: the exponent as "n = 3/2" where there is one, else the label."""
-        if self.exponent is None:
-            return self.label
-        fraction = Fraction(self.exponent).limit_denominator(4)
-        return f"n = {fraction}" if fraction == self.exponent else f"n = {self.exponent:g}"
-
-    def stiffness(self, q: Field, length: float = 1.0) -> Field:
-        """k(q) [Pa/m], zero at q = 0."""
-        raise NotImplementedError
-
-    def free_compliance(self, shape: Shape, spacings: Spacings, rows: slice = ALL_ROWS) -> Field:
-        """Displacements [m/Pa] of an elastomer without borders, due to unit pressure on one pixel.
-
-        `spacings` are the sides of a pixel [m], in the order (y, x). The result of this shape, or
-        in two dimensions some of its rows, is indexed by the distance of the two pixels in points.
-        See `free_compliance`, for a stiffness that is not a power law `compliance_transforms`.
-
-        Raises InputError where the displacement does not decay with the distance.
-        """
-        self.check_free_boundary(len(shape))
-        if self.exponent is None:
-            return self.compliance().displacements(shape, spacings, rows)
-        prefactor = float(self.stiffness(np.ones(1))[0])
-        return power_law(self.exponent, shape, spacings, rows) / prefactor
-
-    def compliance(self) -> Compliance:
-        """1/k(q) of an elastomer whose displacement decays and whose k(q) is not a power law."""
-        raise NotImplementedError
-
-    def warnings(self, h_std: float, q: Field, variance: Field) -> list[str]:
-        """Warnings on a surface of this rms height [m]; mostly none.
-
-        `variance` is the part of the squared full-contact stress at the wavenumbers q [1/m].
-        """
-        return []
-
-    def decays(self, dimension: int) -> bool:
-        """Whether the displacement decays with the distance from the load.
-
-        That of a power law does for n < 2; in one dimension for n <= 1, the logarithm included.
-        """
-        if self.exponent is None:
-            return False
-        return self.exponent < 2 if dimension == 2 else self.exponent <= 1
-
-    def check_free_boundary(self, dimension: int) -> None:
-        """Raise InputError for an elastomer that a free boundary does not suit."""
-        if not self.decays(dimension):
-            raise InputError(
-                f'grid.boundary: "free" needs an elastomer whose displacement decays with the '
-                f"distance from the load; that of {self.label} in "
-                f'{count(dimension, "dimension")} does not: use "periodic"'
-            )
-
-    @property
-    def uniform_stiffness(self) -> float | None:
-        """Limit of k(q) for q -> 0 [Pa/m], where it is finite and not zero, else None.
-
-        It determines the mean displacement, which the solution under a given load does not need.
-        """
-        return None
-
-    def has_level(self, boundary: str, dimension: int) -> bool:
-        """Whether displacements count from the level of the undeformed surface.
-
-        With a free boundary that is the level far from all loads, which does not exist under a line
-        load on a half-space (n = 1, a logarithm); with a periodic one it exists for an elastomer on
-        a base, whose stiffness k(0) is not zero.
-        """
-        if boundary == "free":
-            is_logarithm = dimension == 1 and self.exponent == 1
-            return self.decays(dimension) and not is_logarithm
-        return self.uniform_stiffness is not None
-
-    def check_displacement_load(self, boundary: str, dimension: int) -> None:
-        """Raise InputError where a displacement from first touch is not defined."""
-        if not self.has_level(boundary, dimension):
-            remedy = "" if boundary == "free" else "a free boundary or "
-            raise InputError(
-                f'load.displacement: {self.label} with grid.boundary = "{boundary}" in '
-                f"{count(dimension, 'dimension')} has no level of the undeformed "
-                f"surface to count from; it needs {remedy}an elastomer whose k(0) is not zero "
-                "(layer, n = 0): use load.mean_gap"
-            )
-
-    def unit_stiffness(self, q: Field, length: float = 1.0) -> Field:
-        """k(q) [Pa/m] of the elastomer whose Delta_sigma is the unit of pressure."""
-        return self.stiffness(q, length)
-
-    @property
-    def modulus(self) -> float:
-        """Elastic modulus [Pa], 0 where the elastomer has none."""
-        return float(dict(self).get("E_star", 0.0))
-
-    def local_exponent(self, q: Field, length: float = 1.0, step: float = EXPONENT_STEP) -> Field:
-        """n(q) = d ln k / d ln q, by central differences over +-step; zero where k is zero."""
-        above, below = (self.stiffness(q * np.exp(shift), length) for shift in (step, -step))
-        safe = (above > 0) & (below > 0)
-        ratio = np.where(safe, above, 1.0) / np.where(safe, below, 1.0)
-        return np.log(ratio) / (2 * step)
-
-    def gamma(self, q: Field, length: float = 1.0) -> Field:
-        """Weight of the elastic energy in Persson theory: paper Eq. (39) at the exponent n(q)."""
-        if self.exponent is not None:
-            return np.full_like(q, gamma_n(self.exponent))
-        return gamma_n(np.clip(self.local_exponent(q, length), 0.0, 4.0))
-
-
-def _fraction(variance: Field, chosen: Mask) -> float:
-    """Fraction of a variance at chosen wavenumbers; zero for a flat surface, which has none."""
-    return float(variance[chosen].sum() / variance.sum()) if variance.size else 0.0
 
 
 class Power(LinearElastomer):
@@ -350,11 +221,12 @@ class Tabulated(LinearElastomer):
 
     def stiffness(self, q: Field, length: float = 1.0) -> Field:
         """k(q) [Pa/m]. Raises InputError for an invalid table."""
-        return np.where(q > 0, _interpolated(self._table())(np.where(q > 0, q, 1.0)), 0.0)
+        k = interpolated(read_table(self.path))
+        return np.where(q > 0, k(np.where(q > 0, q, 1.0)), 0.0)
 
     def warnings(self, h_std: float, q: Field, variance: Field) -> list[str]:
         """See `LinearElastomer.warnings`."""
-        first, *_, last = self._table()[:, 0]
+        first, *_, last = read_table(self.path)[:, 0]
         fraction = _fraction(variance, (q < first) | (q > last))
         if fraction <= MAX_EXTRAPOLATED_STRESS:
             return []
@@ -366,12 +238,12 @@ class Tabulated(LinearElastomer):
 
     def decays(self, dimension: int) -> bool:
         """Whether the power law below the table rises less than q^dimension."""
-        return 0 <= _end_exponents(self._table())[0] < dimension
+        return 0 <= end_exponents(read_table(self.path))[0] < dimension
 
     def check_free_boundary(self, dimension: int) -> None:
         """Raise InputError for exponents that have no compliance kernel."""
         super().check_free_boundary(dimension)
-        if not _end_exponents(self._table())[1] > 0:
+        if not end_exponents(read_table(self.path))[1] > 0:
             raise InputError(
                 'grid.boundary: "free" needs a table k(q) that rises at its upper end; the '
                 'compliance of this one has no kernel: use "periodic"'
@@ -379,54 +251,13 @@ class Tabulated(LinearElastomer):
 
     def compliance(self) -> Compliance:
         """1/k(q) between the rows of the table and beyond."""
-        return _compliance_of_table(tuple(map(tuple, self._table().tolist())))
+        return compliance_of_table(read_table(self.path).tobytes())
 
     @property
     def uniform_stiffness(self) -> float | None:
         """k of the first rows of the table [Pa/m] if it is constant there, else None."""
-        first, second = self._table()[:2, 1]
+        first, second = read_table(self.path)[:2, 1]
         return float(first) if first == second else None
-
-    def _table(self) -> Field:
-        """The columns q and k, shape (rows, 2). Raises InputError for an invalid table."""
-        try:
-            if not self.path.is_file() or self.path.stat().st_size > MAX_TABLE_BYTES:
-                raise ValueError(f"not a regular file of at most {MAX_TABLE_BYTES} bytes")
-            with warnings.catch_warnings(action="ignore", category=UserWarning):
-                table = np.loadtxt(self.path, ndmin=2)  # warns of an empty file, refused below
-        except (OSError, ValueError) as error:
-            raise InputError(f"{self.path}: elastomer.path: cannot be read: {error}") from error
-        if table.shape[0] < 2 or table.shape[1] != 2:
-            raise InputError(
-                f"{self.path}: elastomer.path: {table.shape[0]} rows, {table.shape[1]} columns; "
-                "at least two rows of two columns, q and k, are needed"
-            )
-        if not (
-            np.all(np.isfinite(table)) and np.all(table > 0) and np.all(np.diff(table[:, 0]) > 0)
-        ):
-            raise InputError(
-                f"{self.path}: elastomer.path: q and k must be finite and positive; q must increase"
-            )
-        return table
-
-
-def _interpolated(table: Field) -> Callable[[Field], Field]:
-    """k(q) [Pa/m] for q > 0 from the rows q, k of a table."""
-    (x, y), (low, high) = np.log(table).T, _end_exponents(table)
-    cubic = monotone_cubic(x, y)
-
-    def stiffness(q: Field) -> Field:
-        log_q = np.log(q)
-        beyond = low * np.minimum(log_q - x[0], 0.0) + high * np.maximum(log_q - x[-1], 0.0)
-        return np.exp(cubic(np.clip(log_q, x[0], x[-1])) + beyond)
-
-    return stiffness
-
-
-def _end_exponents(table: Field) -> tuple[float, float]:
-    """Exponents of the power laws below and above a table."""
-    slopes = np.diff(np.log(table[[0, 1, -2, -1]]), axis=0)
-    return float(slopes[0, 1] / slopes[0, 0]), float(slopes[2, 1] / slopes[2, 0])
 
 
 @lru_cache(maxsize=4)
@@ -436,11 +267,9 @@ def _compliance_of_layer(layer: Layer) -> Compliance:
     return Compliance(layer.stiffness, np.array([LONG_WAVE / t]), 0.0, reach=DECAY_DISTANCE * t)
 
 
-@lru_cache(maxsize=4)
-def _compliance_of_table(rows: tuple[tuple[float, ...], ...]) -> Compliance:
-    """The compliance of a table; cached likewise."""
-    table = np.array(rows)
-    return Compliance(_interpolated(table), separated(table[:, 0]), _end_exponents(table)[0])
+def _fraction(variance: Field, chosen: Mask) -> float:
+    """Fraction of a variance at chosen wavenumbers; zero for a flat surface, which has none."""
+    return float(variance[chosen].sum() / variance.sum()) if variance.size else 0.0
 
 
 Elastomer = Annotated[

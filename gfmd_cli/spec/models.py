@@ -11,8 +11,9 @@ from pydantic import Field as Key
 from gfmd_cli.errors import InputError
 from gfmd_cli.files.checksums import file_digest
 from gfmd_cli.physics.contact import PRESSURE_RANGE
-from gfmd_cli.physics.elastomers import Elastomer, LinearElastomer
+from gfmd_cli.physics.elastomers import Elastomer
 from gfmd_cli.physics.indenters import SMALLEST_GRID, RigidSurface
+from gfmd_cli.physics.linear_elastomer import LinearElastomer
 from gfmd_cli.physics.surfaces import Surface
 from gfmd_cli.solvers.auto import AnySolver
 from gfmd_cli.spec_table import Positive, SpecTable

@@ -8,8 +8,8 @@ import numpy as np
 
 from gfmd_cli.errors import InputError
 from gfmd_cli.files.checksums import digest
-from gfmd_cli.physics.elastomers import LinearElastomer
 from gfmd_cli.physics.indenters import RigidSurface
+from gfmd_cli.physics.linear_elastomer import LinearElastomer
 from gfmd_cli.physics.surfaces import check_resolved
 from gfmd_cli.solvers.auto import AnySolver
 from gfmd_cli.spec.models import (
