@@ -6,7 +6,7 @@ import pytest
 from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.physics.contact import Contact
 from gfmd_cli.physics.elastomers import Power
-from gfmd_cli.solvers import multigrid_kernels as kernels
+from gfmd_cli.solvers import multigrid_transfer_kernels as kernels
 from gfmd_cli.solvers.contact_state import PRESSED, TENSE
 from gfmd_cli.solvers.multigrid import MAX_GROWTH, Multigrid, level_rows, suits
 

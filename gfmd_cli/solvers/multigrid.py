@@ -39,8 +39,8 @@ from gfmd_cli.grid.fft_grid import Grid, Shape
 from gfmd_cli.grid.rows import Kernel, LocalRows
 from gfmd_cli.physics.contact import Contact
 from gfmd_cli.solvers import multigrid_kernels as kernels
+from gfmd_cli.solvers import multigrid_transfer_kernels as transfer
 from gfmd_cli.solvers.contact_state import ContactState
-from gfmd_cli.solvers.multigrid_kernels import WHOLE_WEIGHT, ZERO
 
 MIN_LEVEL_POINTS = 4  # points along the shorter side on the coarsest level
 MAX_PIXEL_ASPECT = 1.5  # beyond, only the shorter side is coarsened, which leaves 1 / (2 / 1.5)
@@ -245,14 +245,14 @@ class Multigrid:
             rows.run_from_finer(kernel, fields, self.rhs[level : level + 1])
         else:
             self.finer_rows(level).run(kernel, *fields, residual)
-            rows.run(kernels.restrict, residual, self.rhs[level])
+            rows.run(transfer.restrict, residual, self.rhs[level])
 
     def correction(self, level: int) -> tuple[SingleField, np.float32]:
         """The result on a level as `_interpolate` takes it, and the ratio of the scales."""
         interpolated, y = self.between[level], self.y[level]
         if interpolated is None:
             return self.coarse_rows[level].aligned_with_finer(y), self.ratios[level]
-        self.finer_rows(level).run(kernels.interpolate, y, interpolated)
+        self.finer_rows(level).run(transfer.interpolate, y, interpolated)
         return interpolated, self.ratios[level]
 
     def finer_rows(self, level: int) -> LocalRows:
@@ -265,7 +265,7 @@ class Multigrid:
         old: SingleField | None,
         new: SingleField,
         coarse: SingleField | None = None,
-        ratio: np.float32 = ZERO,
+        ratio: np.float32 = kernels.ZERO,
     ) -> None:
         """Write the result of a smoothing step on `old` plus P coarse to `new`.
 
@@ -284,7 +284,7 @@ class Multigrid:
             if level == 0:
                 source = (contact_state, threshold, 0)
             else:
-                source = (self.weights[level - 1], WHOLE_WEIGHT, 1)
+                source = (self.weights[level - 1], transfer.WHOLE_WEIGHT, 1)
             halved = self.between[level] is None
-            kernel = kernels.compute_ties if halved else kernels.compute_any_ties
+            kernel = transfer.compute_ties if halved else transfer.compute_any_ties
             rows.run_from_finer(kernel, source, targets)
