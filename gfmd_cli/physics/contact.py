@@ -16,7 +16,8 @@ import numpy as np
 
 from gfmd_cli.errors import InputError
 from gfmd_cli.grid.arrays import Field, Mask, Modes, row_blocks
-from gfmd_cli.grid.fft_grid import ALL_ROWS, Grid, Shape, multiplicity
+from gfmd_cli.grid.fft_grid import ALL_ROWS, Grid, Shape
+from gfmd_cli.grid.modes import multiplicity
 from gfmd_cli.grid.ranks import Ranks
 from gfmd_cli.physics import kernels
 from gfmd_cli.physics.indenters import RigidSurface

@@ -10,7 +10,8 @@ and no transform.
 import numpy as np
 
 from gfmd_cli.grid.arrays import Field, Mask
-from gfmd_cli.grid.fft_grid import Grid, multiplicity
+from gfmd_cli.grid.fft_grid import Grid
+from gfmd_cli.grid.modes import multiplicity
 from gfmd_cli.grid.rows import LocalRows
 from gfmd_cli.physics.contact import Contact
 from gfmd_cli.solvers import preconditioner_kernels as kernels
