@@ -65,10 +65,6 @@ class Ranks:
         self.wait(self.comm.Ibcast(total))
         return total
 
-    def broadcast(self, value: T) -> T:
-        """The value of the first rank, on every rank."""
-        return self.comm.bcast(value)
-
     def raise_on_all(self, error: BaseException | None) -> None:
         """Raise, on all ranks, the error of the first that has one.
 
@@ -117,7 +113,7 @@ def shared_errors(ranks: Ranks | None) -> Iterator[None]:
 
 def broadcast(ranks: Ranks | None, value: T) -> T:
     """The value of the first rank, or the value itself without ranks."""
-    return value if ranks is None else ranks.broadcast(value)
+    return value if ranks is None else ranks.comm.bcast(value)
 
 
 def is_root(ranks: Ranks | None) -> bool:

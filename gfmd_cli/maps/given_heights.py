@@ -9,7 +9,8 @@ from gfmd_cli.errors import INSTALL, InputError
 from gfmd_cli.files.atomic import new_file
 from gfmd_cli.files.hdf5 import new_hdf5, write_scale
 from gfmd_cli.maps.array_coordinates import UNIT_NAMES
-from gfmd_cli.maps.height_map import at_equal_distances, check_layout, check_type, first_line
+from gfmd_cli.maps.height_map import check_layout, check_type, first_line
+from gfmd_cli.maps.microscope_files import heights_and_sides
 from gfmd_cli.maps.topography import AXES
 
 
@@ -35,7 +36,7 @@ def write_heights(path: Path, heights: Any) -> dict[str, Any]:
         if heights.unit is not None:
             unit = "m"
             heights = heights.to_unit(unit)
-        heights, sides = _heights_and_sides(heights)
+        heights, sides = heights_and_sides(Path("heights"), heights, rows_along_y=False)
     if np.ma.is_masked(heights):
         keys["missing"] = "void"
     try:
@@ -70,10 +71,3 @@ def _write_netcdf(path: Path, array: Any) -> None:
         raise InputError(
             f"heights: an array of xarray is read as a netCDF file: {first_line(error)}"
         ) from error
-
-
-def _heights_and_sides(topography: Any) -> tuple[Any, tuple[float, ...]]:
-    """Heights and sides, indexed [y, x], of a topography, whose arrays are indexed [x, y]."""
-    if getattr(topography, "is_uniform", True):
-        return topography.heights().T, tuple(map(float, topography.physical_sizes))[::-1]
-    return at_equal_distances(*topography.positions_and_heights())

@@ -1,6 +1,5 @@
 """Files of microscopes and tables of numbers, by the readers of SurfaceTopography."""
 
-import re
 import warnings
 from itertools import islice
 from pathlib import Path
@@ -25,6 +24,7 @@ from gfmd_cli.maps.text_tables import (
     HEADER_LINES,
     LATIN_1,
     MATRIX_COLUMNS,
+    cells,
     columns,
     in_utf8,
     table_formats,
@@ -105,49 +105,33 @@ def _open_scan(path: Path, file: BinaryIO, readers: list[Any]) -> Any:
 
 def _read_channel(path: Path, file: BinaryIO, reader: Any, dataset: str | None) -> HeightMap:
     """Read one height channel of an open microscope file, in metres."""
-    if reader.format() == "hgt" and path.suffix.lower() != ".hgt":  # accepts any 2 n^2 bytes
+    kind = reader.format()
+    if kind == "hgt" and path.suffix.lower() != ".hgt":  # accepts any 2 n^2 bytes
         raise InputError(f"{path}: not in a known topography format")
-    if reader.format() == "npz":
+    if kind == "npz":
         raise InputError(f"{path}: an archive of NumPy arrays; save the map as a .npy file")
     channel = _height_channel(path, reader, dataset)
-    rows_along_y = reader.format() == "mat"  # bare arrays; those of all other formats are [x, y]
+    rows_along_y = kind == "mat"  # bare arrays; those of all other formats are [x, y]
     shape: tuple[int, ...] = (channel.nb_grid_pts or ())[:: 1 if rows_along_y else -1]
     check_layout(path, shape, np.dtype(float))
     unsized = channel.physical_sizes is None
     if len(shape) == 2:
         _check_sides(path, channel)
-    if reader.format() == "nc":
+    if kind == "nc":
         _check_is_own_netcdf(path, reader)
     scan = channel.topography(physical_sizes=(1.0,) * len(shape) if unsized else None)
-    if reader.format() == "xyz":
+    if kind == "xyz":
         _check_no_row_in_header(path, file)
         if len(shape) == 1:
             scan = _with_positions(reader, scan)
     if scan.unit is not None:
         scan = scan.to_unit("m")
-    source = f"{reader.format()}, {channel.channel_id}"
-    if reader.format() == "asc" and len(shape) == 2:
-        rows, columns_read = shape
-        if unsized and columns_read < MATRIX_COLUMNS:
-            raise InputError(
-                f"{path}: {NO_GRID}; a matrix of heights has at least {MATRIX_COLUMNS} columns, or "
-                f"a header that states its sides. {REMEDY}"
-            )
-        _check_all_rows_read(path, file, rows, columns_read)
-        if unsized:
-            _check_all_are_heights(path, scan.heights().T)
-    if scan.is_uniform:
-        heights, sides = scan.heights(), tuple(map(float, scan.physical_sizes))[::-1]
-        if not rows_along_y:
-            heights = heights.T
-        if len(shape) == 1 and sides[0] < 0:  # recorded backwards
-            heights, sides = heights[::-1], (-sides[0],)
-    else:
-        heights, sides = at_equal_distances(*_increasing(path, *scan.positions_and_heights()))
-        source += ", interpolated at equal distances"
+    if kind == "asc" and len(shape) == 2:
+        _check_matrix(path, file, scan, unsized)
+    heights, sides = heights_and_sides(path, scan, rows_along_y)
     has_unit = scan.unit is not None
     metric_sides = None if has_unit or unsized else _sides_with_unit(channel, sides)
-    is_bare = reader.format() == "xyz" and not has_unit and metric_sides is None
+    is_bare = kind == "xyz" and not has_unit and metric_sides is None
     factors = _factors(path, file, len(shape) + 1) if is_bare else []
     if factors:
         *along_axes, of_heights = factors
@@ -158,9 +142,40 @@ def _read_channel(path: Path, file: BinaryIO, reader: Any, dataset: str | None) 
         sides=None if unsized else metric_sides or sides,
         metres=has_unit or metric_sides is not None,
         periodic=None if rows_along_y else bool(scan.is_periodic),
-        source=source,
+        source=f"{kind}, {channel.channel_id}"
+        + ("" if scan.is_uniform else ", interpolated at equal distances"),
         metric_heights=has_unit,
     )
+
+
+def heights_and_sides(path: Path, scan: Any, rows_along_y: bool) -> tuple[Any, tuple[float, ...]]:
+    """Heights and sides, indexed [y, x], of a topography; `rows_along_y` if its heights are.
+
+    A profile with uneven distances is interpolated. Raises InputError for positions that neither
+    increase nor decrease.
+    """
+    if not getattr(scan, "is_uniform", True):
+        return at_equal_distances(*_increasing(path, *scan.positions_and_heights()))
+    heights, sides = scan.heights(), tuple(map(float, scan.physical_sizes))[::-1]
+    if len(sides) == 1 and sides[0] < 0:  # recorded backwards
+        return heights[::-1], (-sides[0],)
+    return heights if rows_along_y else heights.T, sides
+
+
+def _check_matrix(path: Path, file: BinaryIO, scan: Any, unsized: bool) -> None:
+    """Raise InputError where a matrix of numbers is not one of heights, or not all of it is read.
+
+    `unsized` is whether the file does not state its sides.
+    """
+    columns_read, rows = scan.nb_grid_pts
+    if unsized and columns_read < MATRIX_COLUMNS:
+        raise InputError(
+            f"{path}: {NO_GRID}; a matrix of heights has at least {MATRIX_COLUMNS} columns, or "
+            f"a header that states its sides. {REMEDY}"
+        )
+    _check_all_rows_read(path, file, rows, columns_read)
+    if unsized:
+        _check_all_are_heights(path, scan.heights().T)
 
 
 def _header(channel: Any) -> dict[str, Any]:
@@ -328,7 +343,7 @@ def _check_no_row_in_header(path: Path, file: BinaryIO) -> None:
     file.seek(0)
     if start and start[0].startswith(OWN_HEADERS):
         return
-    rows = [re.split(rb"[\s,;]+", line.strip(b" \t\r\n,;")) for line in start]
+    rows = [cells(line) for line in start]
     has_numbers_only = [all(map(_is_number, row)) for row in rows]
     columns_read = next((len(row) for row in reversed(rows) if row != [b""]), 0)
     is_row = [

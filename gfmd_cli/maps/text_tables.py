@@ -33,6 +33,11 @@ def _is_numeric(line: bytes) -> bool:
     return not line.translate(None, NUMBER_CHARACTERS)
 
 
+def cells(line: bytes) -> list[bytes]:
+    """The parts of a line between blanks, commas and semicolons; [b""] of an empty line."""
+    return re.split(rb"[\s,;]+", line.strip(b" \t\r\n,;"))
+
+
 def table_formats(file: BinaryIO) -> set[str]:
     """The formats of tables that a file can have.
 
@@ -58,7 +63,7 @@ def units_of_columns(file: BinaryIO, columns: int) -> list[str]:
     file.seek(0)
     above = b""
     for line in islice(file, HEADER_LINES + 1):
-        if len(re.split(rb"[\s,;]+", line.strip(b" \t\r\n,;"))) == columns and _counts(line):
+        if len(cells(line)) == columns and _counts(line):
             break
         above = line.strip() or above
     file.seek(0)

@@ -34,6 +34,7 @@ from gfmd_cli.physics import free_compliance
 from gfmd_cli.physics.free_compliance import (
     Spacings,
     by_corners,
+    by_edges,
     near_shape,
     overwrite,
     pixel_integrals,
@@ -76,7 +77,8 @@ class Compliance:
     def displacements(self, shape: Shape, spacings: Spacings, rows: slice = ALL_ROWS) -> Field:
         """Displacements indexed by the distance of two pixels, in two dimensions or in one."""
         if len(shape) == 1:
-            return self._line(*shape, *spacings)
+            low, high = 0.5 * spacings[0], (shape[0] - 0.5) * spacings[0]
+            return by_edges(self.spline("line", low, high), *shape, *spacings)
         reached_shape = near_shape(shape, spacings, self.reach / max(spacings) + 1)
         near = near_shape(shape, spacings, POLAR_SIDES + 1)
         out = np.zeros((len(range(*rows.indices(shape[0]))), shape[1]))
@@ -91,11 +93,6 @@ class Compliance:
                 overwrite(out, values)
         disc = self.spline("disc", 0.5 * min(spacings), _diagonal(near, spacings))
         return overwrite(out, by_corners(partial(_corner, disc), near, spacings, rows))
-
-    def _line(self, points: int, spacing: float) -> Field:
-        edges = (np.arange(points + 1) - 0.5) * spacing
-        integral = self.spline("line", 0.5 * spacing, edges[-1])
-        return np.diff(np.sign(edges) * integral(np.abs(edges)))
 
     def spline(self, wave: str, low: float, high: float) -> Callable[[Field], Field]:
         """A transform as a function of the distance, from `low` to `high` [m]."""

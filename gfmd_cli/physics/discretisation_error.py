@@ -295,10 +295,7 @@ def _area(
         chance = AREA_CHANCE * (1 + area_n / 10) * sqrt(x / fine.area) / fine.points
         law = AREA_LAW * (area_n + 1) * x * rough.phase(fine.points)
         error = hypot(chance, law, AREA_CHANGE * (change or 0.0))
-    error = hypot(error, AREA_EXCESS * excess.uncertainty * x)
-    error = min(error, max(best, 1 - best))
-    whole = min(fine.a_r - best + error, max(fine.a_r, 1 - fine.a_r))
-    return Estimate(whole, best, error, Verdict.REGULAR)
+    return _corrected_area(fine.a_r, best, hypot(error, AREA_EXCESS * excess.uncertainty * x))
 
 
 def _plate_area(fine: GridValues, coarse: GridValues | None) -> Estimate:
@@ -308,9 +305,13 @@ def _plate_area(fine: GridValues, coarse: GridValues | None) -> Estimate:
     step, x = coarse.a_r - fine.a_r, fine.switches_per_point
     excess = PLATE_EXCESS - PLATE_EXCESS_SLOPE * step / x
     best = min(1.0, max(0.0, fine.a_r - min(max(excess, LONE_POINTS), PLATE_EXCESS) * step))
-    error = min(PLATE_BAR * hypot(step, PLATE_FLOOR * x), max(best, 1 - best))
-    whole = min(abs(fine.a_r - best) + error, max(fine.a_r, 1 - fine.a_r))
-    return Estimate(whole, best, error, Verdict.REGULAR)
+    return _corrected_area(fine.a_r, best, PLATE_BAR * hypot(step, PLATE_FLOOR * x))
+
+
+def _corrected_area(a_r: float, best: float, error: float) -> Estimate:
+    """The best value of a relative contact area, with bars that do not leave 0 to 1."""
+    error = min(error, max(best, 1 - best))
+    return Estimate(min(abs(a_r - best) + error, max(a_r, 1 - a_r)), best, error, Verdict.REGULAR)
 
 
 def _stress(

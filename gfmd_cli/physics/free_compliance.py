@@ -118,6 +118,12 @@ def by_corners(
     return np.diff(np.diff(corner(y[:, None], x[None, :]), axis=0), axis=1)[rows]
 
 
+def by_edges(integral: Callable[[Field], Field], points: int, spacing: float) -> Field:
+    """Integrals over each pixel of a line, from those from the origin to a distance x > 0."""
+    edges = (np.arange(points + 1) - 0.5) * spacing
+    return np.diff(np.sign(edges) * integral(np.abs(edges)))
+
+
 def overwrite(values: Field, nearer: Field) -> Field:
     """The displacements with those of the nearer pixels written over them, in place."""
     values[: nearer.shape[0], : nearer.shape[1]] = nearer
@@ -127,8 +133,7 @@ def overwrite(values: Field, nearer: Field) -> Field:
 def _line(n: float, points: int, spacing: float) -> Field:
     """Displacements for k = q^n, 0 <= n < 1, in one dimension."""
     prefactor = gamma(1 - n) * np.sinc(n / 2) / 2  # sin(pi n / 2) / (pi n), also at n = 0
-    edges = (np.arange(points + 1) - 0.5) * spacing
-    return np.diff(prefactor * np.sign(edges) * np.abs(edges) ** n)
+    return by_edges(lambda x: prefactor * x**n, points, spacing)
 
 
 def _logarithmic_line(points: int, spacing: float) -> Field:

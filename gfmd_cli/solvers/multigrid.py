@@ -114,16 +114,9 @@ def _operator(dy: float, dx: float, growth: float, density: float) -> kernels.Op
         largest **= 2
     damping = JACOBI_EIGENVALUE * diagonal / largest
     spring = TIE_UNIT * SPRINGS[is_squared] * diagonal * growth * density
-    return kernels.Operator(
-        np.float32(centre),
-        np.float32(along_y),
-        np.float32(along_x),
-        np.float32(corner),
-        is_squared,
-        np.float32(diagonal / damping),
-        np.float32(spring),
-        np.float32(spring / damping),
-    )
+    laplacian = map(np.float32, (centre, along_y, along_x, corner))
+    damped = map(np.float32, (diagonal / damping, spring, spring / damping))
+    return kernels.Operator._make([*laplacian, is_squared, *damped])
 
 
 def level_rows(grid: Grid) -> Iterator[tuple[Shape, LocalRows]]:
