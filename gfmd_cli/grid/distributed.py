@@ -76,11 +76,6 @@ class DistributedGrid(Grid):
         """First row of this process, and the row after its last."""
         return self.rows.start, self.rows.stop
 
-    @property
-    def whole(self) -> bool:
-        """False: the rows are distributed, be it to a single process."""
-        return False
-
     def total(self, values: Any) -> Any:
         """Sum over all processes."""
         return self.ranks.total(values)

@@ -135,8 +135,8 @@ class Grid:
 
     @property
     def whole(self) -> bool:
-        """Whether each process holds all rows, so that none are exchanged."""
-        return True
+        """Whether this process holds all rows, so that none are exchanged."""
+        return self.rows.is_whole
 
     def empty(self) -> Field:
         """A real field, aligned for the transforms, values undefined."""

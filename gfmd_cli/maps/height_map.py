@@ -7,8 +7,9 @@ in the files is unpickled.
 import math
 from collections.abc import Sequence
 from contextlib import suppress
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -25,23 +26,30 @@ SMALLEST_MAP = 2  # points per side; fewer have no roughness
 REMEDY = "Heights that other programs read can be saved by numpy.save as a .npy file."
 
 
-class HeightMap(NamedTuple):
+@dataclass(frozen=True, kw_only=True)
+class MapMetadata:
+    """What a file states about its heights."""
+
+    source: str
+    """Format, and dataset or channel."""
+    metres: bool = False
+    """Whether the sides and distances are in metres, not in an unknown unit."""
+    metric_heights: bool = False
+    """Whether the heights are in metres, not in an unknown unit."""
+    periodic: bool | None = None
+    """Whether the map is periodic, None where the file does not state it."""
+    notes: tuple[str, ...] = ()
+    """Warnings about what the file states and the reader does not use."""
+
+
+@dataclass(frozen=True)
+class HeightMap(MapMetadata):
     """A height map, or the profile along a line, as stored in a file."""
 
     heights: np.ndarray[Any, Any]
     """Heights, shape (rows, columns) or (points,), masked where the file marks one as missing."""
-    sides: tuple[float, ...] | None
+    sides: tuple[float, ...] | None = None
     """Extent along each axis, None where the file does not state it."""
-    metres: bool
-    """Whether the sides are in metres, not in an unknown unit."""
-    periodic: bool | None
-    """Whether the map is periodic, None where the file does not state it."""
-    source: str
-    """Format, and dataset or channel."""
-    metric_heights: bool = False
-    """Whether the heights are in metres, not in an unknown unit."""
-    notes: tuple[str, ...] = ()
-    """Warnings about what the file states and the reader does not use."""
 
 
 def check_type(path: Path, dtype: np.dtype[Any]) -> None:
@@ -85,7 +93,7 @@ def read_npy(path: Path, dataset: str | None) -> HeightMap:
         raise InputError(f"{path}: a .npy file holds one array; leave out dataset {dataset!r}")
     mapped = np.lib.format.open_memmap(path, mode="r")  # reads neither pickles nor archives
     check_layout(path, mapped.shape, mapped.dtype)
-    return HeightMap(mapped, None, False, None, f"npy, {mapped.dtype}")
+    return HeightMap(mapped, source=f"npy, {mapped.dtype}")
 
 
 def read_hdf5(path: Path, dataset: str | None) -> HeightMap:
@@ -112,7 +120,7 @@ def read_hdf5(path: Path, dataset: str | None) -> HeightMap:
             if missing.dtype.kind == values.dtype.kind == "f":  # perhaps of another precision
                 missing = missing.astype(values.dtype)
             values = np.ma.masked_where(values == missing, values)
-        bare = HeightMap(values, None, False, None, f"HDF5, {name}, {data.dtype}")
+        bare = HeightMap(values, source=f"HDF5, {name}, {data.dtype}")
         return bare if "spec_text" in file.attrs else _with_coordinates(path, file, data, bare)
 
 
@@ -137,7 +145,7 @@ def _with_coordinates(path: Path, file: Any, data: Any, bare: HeightMap) -> Heig
     steps = [axis.step for axis in axes if axis.step is not None]
     if len(steps) < len(axes):
         note = "the heights state a unit, which is not read: set surface.scale"
-        return bare._replace(heights=heights, notes=(note,) if stated_unit(data) else ())
+        return replace(bare, heights=heights, notes=(note,) if stated_unit(data) else ())
     forward = tuple(slice(None, None, -1 if step < 0 else None) for step in steps)
     heights = heights[forward]
     sides = [abs(step) * points for step, points in zip(steps, heights.shape, strict=True)]
@@ -154,7 +162,8 @@ def _with_coordinates(path: Path, file: Any, data: Any, bare: HeightMap) -> Heig
     has_metric_sides, has_metric_heights = len(metric) == len(axes), metres is not None
     if has_metric_sides:
         sides = [side * metre for side, metre in zip(sides, metric, strict=True)]
-    return bare._replace(
+    return replace(
+        bare,
         heights=heights,
         sides=tuple(sides) if has_metric_sides or not has_metric_heights else None,
         metres=has_metric_sides,

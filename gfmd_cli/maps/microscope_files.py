@@ -1,6 +1,7 @@
 """Files of microscopes and tables of numbers, by the readers of SurfaceTopography."""
 
 import warnings
+from dataclasses import replace
 from itertools import islice
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -61,8 +62,8 @@ def read_microscope_file(path: Path, dataset: str | None) -> HeightMap:
             raise InputError(f"{path}: {error}") from error
         table = in_utf8(table)
         with _open_scan(path, table, readers) as reader:
-            heights = _read_channel(path, table, reader, dataset)
-    return heights._replace(notes=(warning,) if warning else ())
+            height_map = _read_channel(path, table, reader, dataset)
+    return replace(height_map, notes=(warning,) if warning else ())
 
 
 def _open_scan(path: Path, file: BinaryIO, readers: list[Any]) -> Any:

@@ -78,10 +78,7 @@ def _slopes(heights: MaskedField, spacing: tuple[float, ...]) -> tuple[float, fl
 
 
 def _correlation_length(heights: MaskedField, spacing: tuple[float, ...]) -> float | None:
-    """Shortest distance at which the autocorrelation is at most `CORRELATION_LEVEL`.
-
-    It is a distance of grid points, and therefore right to one spacing.
-    """
+    """Shortest distance of points with an autocorrelation of at most `CORRELATION_LEVEL`."""
     correlation = autocorrelation(heights)
     distance = distances(correlation.shape, spacing)
     low = correlation <= CORRELATION_LEVEL  # false where unknown

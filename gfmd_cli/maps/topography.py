@@ -5,7 +5,7 @@ index [i, j] is [y, x].
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -20,6 +20,7 @@ from gfmd_cli.maps.height_map import (
     REMEDY,
     SMALLEST_MAP,
     HeightMap,
+    MapMetadata,
     first_line,
     read_hdf5,
     read_npy,
@@ -82,8 +83,8 @@ class Region(SpecTable):
 
 
 @dataclass(frozen=True)
-class Topography:
-    """A height map or a line profile, with the sides and the kind of data that its file states."""
+class Topography(MapMetadata):
+    """A height map or a line profile, with every height checked."""
 
     heights: Field
     """Heights, shape (rows, columns) or (points,), zero where missing; in metres where the file
@@ -93,19 +94,9 @@ class Topography:
     spacing: tuple[float, ...] | None
     """Distance between neighbouring points along each axis, None where the file does not state
     it. Equal where the file says so to `SPACING_TOLERANCE`."""
-    metres: bool
-    """Whether the spacing is in metres; else it is in the unknown unit of the heights."""
-    periodic: bool | None
-    """Whether the map is periodic; None for a bare array, which does not state it."""
-    source: str
-    """Format, and dataset or channel."""
     shape: tuple[int, ...]
     """Shape of the map in the file."""
-    metric_heights: bool = False
-    """Whether the heights are in metres; else they are in an unknown unit."""
-    notes: tuple[str, ...] = ()
-    """Warnings about what the file states and the reader does not use."""
-    precision: float = float(np.finfo(float).eps)
+    precision: float
     """Distance of the numbers next to 1 in the type of the heights in the file."""
 
     @property
@@ -198,18 +189,11 @@ def _checked(
         )
     heights = np.ascontiguousarray(np.where(missing, 0.0, -heights if flip else heights))
     heights.flags.writeable = False
-    return Topography(
-        heights,
-        missing if missing.any() else None,
-        spacing,
-        data.metres,
-        data.periodic,
-        data.source,
-        shape,
-        data.metric_heights,
-        data.notes,
-        float(np.finfo(data.heights.dtype if data.heights.dtype.kind == "f" else float).eps),
-    )
+    kind = data.heights.dtype if data.heights.dtype.kind == "f" else float
+    precision = float(np.finfo(kind).eps)
+    metadata = {each.name: getattr(data, each.name) for each in fields(MapMetadata)}
+    mask = missing if missing.any() else None
+    return Topography(heights, mask, spacing, shape, precision, **metadata)
 
 
 def _spacing(path: Path, data: HeightMap, shape: tuple[int, ...]) -> tuple[float, ...] | None:

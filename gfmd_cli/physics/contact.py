@@ -108,7 +108,7 @@ class Contact:
 
     def reference_level(self, u: Field, sigma: Field) -> float:
         """Level from which displacements enter the energy: their mean, as k(0) = 0."""
-        return self.grid.total(float(u.sum())) / self.grid.size
+        return self.grid.mean(u)
 
     def clear_untouchable(self, values: Any, rows: slice = ALL_ROWS) -> Any:
         """Set values on some rows to zero, or false, where nothing can touch, in place."""
@@ -298,7 +298,7 @@ def touchable(void: Mask | None, grid: Grid) -> Mask | None:
 
 def reduce_scene(grid: Grid, height: Field, elastomer: LinearElastomer) -> Scene:
     """Reduce heights [m], which are overwritten, and stiffness to the scales of the surface."""
-    mean = grid.total(float(height.sum())) / grid.size
+    mean = grid.mean(height)
     height -= mean
     largest = grid.max(max(float(height.max()), -float(height.min())))
     height /= largest  # squares of heights of 1e-200 m would vanish

@@ -125,10 +125,7 @@ def _of_free_contact(contact: FreeContact, u: Field, sigma: Field) -> ErrorBound
     positive lower limit of the compliance is known.
     """
     grid, p, h, free = contact.grid, contact.pressure, contact.height, contact.free
-
-    def mean(values: Field) -> float:
-        return grid.total(float(values.sum())) / grid.size
-
+    mean = grid.mean
     s = contact.clear_untouchable(np.maximum(sigma, 0.0))
     s *= p / mean(s)
     gap = free.displacement(s, out=grid.empty())

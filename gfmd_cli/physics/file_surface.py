@@ -126,7 +126,7 @@ class FileSurface(RigidSurface):
         """Heights [m] at the points of a grid, between the points of the map by interpolation."""
         heights = _prepared(self)
         if heights.shape == grid.whole_shape:
-            return heights.copy() if grid.whole else heights[grid.own].copy()
+            return heights[grid.own].copy()
         if self.applied_interpolation() == "monotone":
             return monotone(heights, grid.whole_shape, grid.own, centred=self.is_centred)
         if self.is_centred:

@@ -182,17 +182,13 @@ def build_free_scene(
     doubled, mirrored, void = _mirrored(surface, grid, ranks)
     scene = reduce_scene(doubled, mirrored, elastomer)
     free = FreeElasticity(elastomer, grid, scene.delta_sigma / scene.h_std)
-    return FreeScene(
-        grid=grid,
-        height=_on_map(doubled, scene.height, grid),
-        stiffness=np.empty(0),
-        mean_height=scene.mean_height,
-        h_std=scene.h_std,
-        delta_sigma=scene.delta_sigma,
-        shells=scene.shells,
-        may_touch=touchable(void, grid),
-        free=free,
-    )
+    on_map = {
+        "grid": grid,
+        "height": _on_map(doubled, scene.height, grid),
+        "stiffness": np.empty(0),
+        "may_touch": touchable(void, grid),
+    }
+    return FreeScene(**(vars(scene) | on_map), free=free)
 
 
 def _mirrored(

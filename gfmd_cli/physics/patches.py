@@ -119,9 +119,6 @@ class _Tree:
 
 
 def area_distribution(areas: Field) -> Field:
-    """Pr(A): fraction of the patches per area in logarithmic bins; zero without patches.
-
-    `areas` are those of the patches, in the unit of `AREA_EDGES`.
-    """
+    """Pr(A): fraction of the patches per area in the bins of `AREA_EDGES`; zero without any."""
     counts = np.histogram(areas, AREA_EDGES)[0]
     return counts / (max(areas.size, 1) * np.diff(AREA_EDGES))

@@ -129,12 +129,11 @@ def fit(shells: Shells, complete: float = inf) -> SelfAffineFit:
             break
     errors, scatter = _errors(*range_, best)
     q_r = float(np.exp(best[1])) if best.size == 2 else 0.0
-    q_r_error = q_r * errors[-1] if q_r else 0.0
     return SelfAffineFit(
         hurst=float(best[0]),
         hurst_error=errors[0],
         q_r=q_r,
-        q_r_error=q_r_error,
+        q_r_error=q_r * errors[-1] if q_r else 0.0,
         q_s=float(q[shell_count - 1]),
         scatter=scatter,
         c_0=_scale(best, *range_),

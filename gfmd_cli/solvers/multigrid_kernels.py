@@ -202,12 +202,16 @@ def _residual_row(i, x, rows, operator, ties, rhs, out):
 
 
 @part_of_kernel
-def _first_row(rhs, operator, ties, k, row):
-    """Write row k of the result of a smoothing step from zero to a row of a ring buffer."""
-    force, own = rhs[k], ties[k, 0]
-    for j in range(force.size):
-        tied = operator.damped_diagonal + operator.damped_spring * np.float32(own[j + 1])
-        row[j + 2] = force[j] / tied
+def _start_row(rhs, operator, ties, old, is_zero, k, row):
+    """Write row k of `old`, or of the result of a smoothing step from zero, to a ring buffer."""
+    force, own, source = rhs[k], ties[k, 0], old[k]
+    if is_zero:
+        for j in range(force.size):
+            tied = operator.damped_diagonal + operator.damped_spring * np.float32(own[j + 1])
+            row[j + 2] = force[j] / tied
+    else:
+        for j in range(force.size):
+            row[j + 2] = source[j]
 
 
 @kernel
@@ -223,12 +227,8 @@ def smooth(rhs, operator, ties, old, is_zero, coarse, ratio, y, a, b):
     defect, correction = np.empty(n + 1, np.float32), np.empty(n + 4, np.float32)
     for i in range(a - 4, b):
         k = (i + 2) % height
-        new, source = x[(i + 2) % 5], old[k]
-        if is_zero:
-            _first_row(rhs, operator, ties, k, new)
-        else:
-            for j in range(n):
-                new[j + 2] = source[j]
+        new = x[(i + 2) % 5]
+        _start_row(rhs, operator, ties, old, is_zero, k, new)
         if ratio > 0:
             _interpolate(coarse, k, ratio, correction)
             for j in range(2, n + 2):
@@ -254,13 +254,8 @@ def residual(rhs, operator, ties, y, is_zero, coarse, a, b):
     defect = np.empty((3, n + 1), np.float32)
     ratio = 1 if coarse.shape[1] == n else 2
     for i in range(ratio * a - ratio - 3, ratio * b):
-        k = (i + 2) % height
-        new, source = x[(i + 2) % 5], y[k]
-        if is_zero:
-            _first_row(rhs, operator, ties, k, new)
-        else:
-            for j in range(n):
-                new[j + 2] = source[j]
+        new = x[(i + 2) % 5]
+        _start_row(rhs, operator, ties, y, is_zero, (i + 2) % height, new)
         _wrap(new)
         rows = _inner_rows(i, x, laplacian, operator)
         if i < ratio * (a - 1) + 1:
