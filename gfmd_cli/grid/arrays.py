@@ -15,7 +15,7 @@ Modes: TypeAlias = NDArray[np.complexfloating[Any, Any]]
 """Fourier coefficients in the half-spectrum layout of a real transform."""
 
 Mask: TypeAlias = NDArray[np.bool_]
-"""A choice of grid points."""
+"""True at chosen grid points."""
 
 MaskedField: TypeAlias = "np.ma.MaskedArray[Any, Any]"
 """Real values, masked where they are not known."""

@@ -15,7 +15,7 @@ from threadpoolctl import ThreadpoolController
 
 _lock = Lock()
 _active: list[Any] = []
-"""The limit, once for each call that is running: threads of one process share the libraries."""
+"""One entry, the limit, per running call: the threads of a process share the libraries."""
 
 
 @contextmanager

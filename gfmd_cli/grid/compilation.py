@@ -55,7 +55,7 @@ def _is_cache_known() -> bool:
 
 @cache
 def _take_private_folder() -> bool:
-    """Let this process and its workers cache in a private folder; whether there is one."""
+    """Let this process and its workers cache in a private folder; return whether they can."""
     folder = private_folder()
     place = "each run compiles anew" if folder is None else f"compiled code is kept in {folder}"
     warnings.warn(f"no cache folder can be written: {place}", RuntimeWarning, stacklevel=3)
@@ -67,7 +67,7 @@ def _take_private_folder() -> bool:
 
 
 def _tolerate_faults(store: Any) -> None:
-    """A full disk or a damaged file of the cache costs a compilation, and no more."""
+    """Compile anew, without an error, if the disk is full or a file of the cache is damaged."""
     load, save = store.load_overload, store.save_overload
 
     def load_or_forget(*arguments: Any) -> Any:

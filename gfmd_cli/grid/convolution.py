@@ -1,7 +1,7 @@
 """Linear maps of fields that are zero beyond their own points, by transforms of padded fields.
 
-The padded field has its first rows and columns from the field, the others are zero. The rows that
-are zero need no transform along x. The columns are transformed in blocks that stay in the cache and
+The first rows and columns of the padded field are the field, all others are zero. The rows that are
+zero need no transform along x. The columns are transformed in blocks that stay in the cache and
 are never stored padded, so that the memory is that of a field padded along x alone. Processes that
 share a field exchange no zero rows either.
 """
@@ -44,9 +44,9 @@ class PaddedTransform:
     """Maps F^-1 symbol F of real fields of a shape, padded by zeros; symbols are real and even."""
 
     shape: tuple[int, ...]
-    """Of the fields."""
+    """Shape of the fields."""
     padded: tuple[int, ...]
-    """Of the padded fields."""
+    """Shape of the padded fields."""
     precision: Precision = "double"
     threads: int = 1
 
@@ -141,10 +141,7 @@ class PaddedTransform:
     def _blocks(
         self, work: Modes, block: Modes, first: int = 0, step: int = 1
     ) -> Iterator[tuple[slice, Modes]]:
-        """Columns of `work`, and the part of `block` into which they are copied, padded.
-
-        Every so many blocks from a first one on.
-        """
+        """Columns of `work`, and a padded copy of them in `block`, for every `step`-th block."""
         count = work.shape[1]
         for start in range(first * self.width, count, step * self.width):
             part = slice(start, min(start + self.width, count))
@@ -190,7 +187,7 @@ class PaddedTransform:
 
 @dataclass(eq=False, kw_only=True)
 class DistributedPaddedTransform(PaddedTransform):
-    """The same for fields and symbols that processes share.
+    """The same as `PaddedTransform`, for fields and symbols that several processes share.
 
     A process holds the rows between two `edges` of a field, and some columns of a symbol, and of
     the coefficients between the transforms along the two axes.

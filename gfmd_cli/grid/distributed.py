@@ -138,7 +138,7 @@ class DistributedGrid(Grid):
 
     @property
     def padded(self) -> Field:
-        """Real values in the same memory, one or two more a row than the grid has points."""
+        """Real values in the same memory; a row has one or two more than the grid has points."""
         self.work  # noqa: B018 - planning overwrites the memory and has to be first
         return self._lines().view(self.real)
 

@@ -85,7 +85,7 @@ class Grid:
 
     @property
     def resolution(self) -> float:
-        """Points along the side along x if they had the wider of the spacings; of squares, all."""
+        """Number of points along x if their spacing were the wider one of both axes."""
         if self.dimension == 1:
             return float(self.points)
         return min(float(self.points), self.points_y * (self.length / self.length_y))
@@ -179,7 +179,7 @@ class Grid:
 
     @property
     def pair_count(self) -> int:
-        """What a pair of transforms of this grid counts as, in transforms in double precision."""
+        """Cost of a pair of transforms of this grid, in transforms in double precision."""
         return 2 if self.precision == "double" else 1
 
     @cached_property
@@ -198,8 +198,8 @@ class Grid:
     def _workspace(self) -> tuple[Modes, Execute, Execute]:
         """Memory that every transform of this grid works in, and the two plans, in place.
 
-        In place they spare a field, and a third of the time of transforms between two arrays.
-        Array and plans come together: measuring a plan overwrites the array.
+        Transforms in place need a field less and a third less time than those between two arrays.
+        The plans are made with the array, because measuring a plan overwrites it.
         """
         work = self._memory[0][: prod(self.spectral_shape)].reshape(self.spectral_shape)
         real = work.view(self.real)[..., : self.points]
@@ -212,12 +212,12 @@ class Grid:
 
     @property
     def spectrum(self) -> Field:
-        """The same as pairs of real values."""
+        """`work` as pairs of real values."""
         return self.work.view(self.real)
 
     @property
     def padded(self) -> Field:
-        """The same memory as real values, one or two more a row than the grid has points."""
+        """The same memory as real values; a row has one or two more than the grid has points."""
         return self.spectrum
 
     def transform(self) -> None:
@@ -242,7 +242,7 @@ class Grid:
     def filter_padded(self, symbol: Field) -> float:
         """`padded` <- F^-1 symbol F of the values in it: one pair of transforms, no copy.
 
-        Returns the sum over the grid of these values times what becomes of them.
+        Returns the sum over the grid of the old values times the new ones.
         """
         self.transform()
         arguments = (self.as_rows(self.spectrum), self.as_rows(symbol), 1.0 / self.size, *self.ends)
@@ -335,7 +335,7 @@ class Grid:
     def diagonal(self, field: Field) -> Field:
         """Values along the diagonal of the cell; of a line contact, the whole line.
 
-        On an oblong grid, the points of each row or column, whichever are more, next to it.
+        On an oblong grid, the point next to the diagonal in each row or column, whichever are more.
         """
         return field[self.diagonal_points()] if self.dimension == 2 else field.copy()
 

@@ -21,9 +21,9 @@ class SharedModes:
     """Wavenumbers along an axis that a field keeps on a grid of another number of points."""
 
     positive: int
-    """How many from zero on."""
+    """Number of wavenumbers q >= 0."""
     negative: int
-    """How many below zero."""
+    """Number of wavenumbers q < 0."""
     halved: bool
     """Whether the last of both is the Nyquist wavenumber, which stands for +q and -q alike."""
 
@@ -34,7 +34,7 @@ class SharedModes:
 
 
 def shared_modes(source: int, target: int) -> SharedModes:
-    """All modes of a grid of `source` points; if `target` is less, what is below its Nyquist."""
+    """The modes of `source` points; if `target` is less, those below its Nyquist wavenumber."""
     if target < source:
         return SharedModes((target + 1) // 2, (target - 1) // 2, False)
     return SharedModes(source // 2 + 1, source // 2, target > source and source % 2 == 0)

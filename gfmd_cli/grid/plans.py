@@ -98,7 +98,7 @@ def plans() -> str:
 
 
 def planned(make: Callable[[Plan], T], size: int = 0) -> T:
-    """The transforms that `make` plans: by known plans, else by measured ones, kept for all.
+    """The transforms that `make` plans. Plans that are not known yet are measured and stored.
 
     The time limit of a measurement increases with the number of grid points, `size`.
     """
@@ -112,10 +112,11 @@ def planned(make: Callable[[Plan], T], size: int = 0) -> T:
 
 
 def _measured(make: Callable[[Plan], T], fftw: Plan) -> T:
-    """The transforms that `make` plans, measured unless another process did, and kept for all."""
+    """The transforms that `make` plans, measured unless another process has measured them."""
     folder = _folder or cache_folder()
     with _planning_lock(folder):
-        _import(read_wisdom(folder))
+        if (known := read_wisdom(folder)) is not None:  # what other processes have measured
+            pyfftw.import_wisdom((known[0].encode(), known[1].encode(), b""))  # b"": long double
         before = _export()
         transforms = make(fftw)
         if _export() != before:
@@ -127,7 +128,7 @@ def _measured(make: Callable[[Plan], T], fftw: Plan) -> T:
 
 
 def read_wisdom(folder: Path) -> Wisdom | None:
-    """The wisdom of a folder; None where there is none of this machine that is whole."""
+    """The wisdom of a folder; None if it is damaged, missing or of another machine."""
     with suppress(OSError, ValueError, KeyError, TypeError, RecursionError):
         data = json.loads(read_regular(_path(folder), MAX_WISDOM_BYTES))
         double, single = data["wisdom"]
@@ -151,7 +152,10 @@ def _export() -> Wisdom:
 
 
 def _joined(wisdom: Wisdom | None, more: Wisdom) -> Wisdom:
-    """Both; the first where both have a plan: one line each, flags and problem after two words."""
+    """Both, without the plans of the second for problems of the first.
+
+    Each plan is one line, in which flags and problem follow two words.
+    """
     if wisdom is None:
         return more
     joined = []
@@ -162,13 +166,6 @@ def _joined(wisdom: Wisdom | None, more: Wisdom) -> Wisdom:
         ]
         joined.append("\n".join([*old.splitlines()[:-1], *new_lines, ")"]) + "\n")
     return joined
-
-
-def _import(wisdom: Wisdom | None) -> None:
-    """Add what other processes measured to the wisdom of this one."""
-    if wisdom is not None:
-        double, single = wisdom
-        pyfftw.import_wisdom((double.encode(), single.encode(), b""))  # third: of long double
 
 
 def _write(folder: Path, wisdom: Wisdom) -> None:

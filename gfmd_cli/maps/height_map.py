@@ -197,7 +197,7 @@ def _dataset_name(path: Path, file: Any, name: str | None) -> str:
 
 
 def only_map(path: Path, names: Sequence[str]) -> str:
-    """The only one of some arrays, or the only one whose name means heights. Raises InputError."""
+    """The only name, or the only one that means heights. Raises InputError if there are several."""
     heights = [name for name in names if name.rpartition("/")[-1].lower() in HEIGHT_NAMES]
     if len(names) == 1 or len(heights) == 1:
         return (heights or names)[0]
@@ -208,7 +208,7 @@ def only_map(path: Path, names: Sequence[str]) -> str:
 
 
 def listed(names: Sequence[str]) -> str:
-    """Some names for a message."""
+    """Names for a message, `MAX_LISTED` of them at most."""
     return ", ".join([*names[:MAX_LISTED], *left_out(len(names), MAX_LISTED)]) or "none"
 
 

@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 
 from gfmd_cli.grid.arrays import Field, Mask
+from gfmd_cli.grid.modes import multiplicity
 
 Interpolation = Literal["fourier", "monotone"]
 """How heights between the points of a map are obtained."""
@@ -56,8 +57,7 @@ def _short_waves(heights: Field) -> tuple[float, float]:
     modes = np.fft.rfft2(heights - heights.mean())
     y = np.fft.fftfreq(rows, 0.5)[:, None]  # relative to the highest wavenumber of the grid
     x = np.fft.rfftfreq(columns, 0.5)
-    weight = np.where((x == 0) | (x == 1), 1.0, 2.0)  # q and -q
-    slope = weight * np.abs(modes) ** 2 * (y**2 + x**2)
+    slope = multiplicity(columns) * np.abs(modes) ** 2 * (y**2 + x**2)
     total = float(slope.sum()) or 1.0
     corners = float(slope[y**2 + x**2 > 1 + 1e-9].sum()) / total
     return corners, float(slope[np.maximum(np.abs(y), x) > SHORT_WAVE].sum()) / total

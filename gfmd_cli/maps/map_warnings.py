@@ -1,6 +1,6 @@
 """Warnings about probable mistakes in the use of a measured map.
 
-Each function returns one warning, or "" without a reason for it.
+Each function returns a warning about what its docstring describes, or "" if it is not so.
 """
 
 import numpy as np

@@ -211,7 +211,7 @@ def _check_sides(path: Path, channel: Any) -> None:
             f"{path}: the header states the unit of the heights, {header['zunit']}, but not of the "
             "sides; add it, as in '# Width: 20 um', or remove them and set surface.length"
         )
-    if len(sides) == 1 or (not sides and "physical_size_y" in _header(channel)):
+    if len(sides) == 1 or (not sides and "physical_size_y" in header):
         stated, other = ("Width", "Height") if sides else ("Height", "Width")
         raise InputError(
             f"{path}: the header states the side along {'x' if sides else 'y'} ({stated}) alone; "

@@ -86,7 +86,7 @@ def _correlation_length(heights: MaskedField, spacing: tuple[float, ...]) -> flo
 
 
 def distances(shape: tuple[int, ...], spacing: Iterable[float]) -> Field:
-    """Length of every shift of a periodic array, in the unit of the spacing, as in an FFT."""
+    """Length of every shift of a periodic array [unit of the spacing], in the order of an FFT."""
     square = np.zeros(())
     for points, step in zip(shape, spacing, strict=True):
         shift = np.minimum(np.arange(points), points - np.arange(points)) * step

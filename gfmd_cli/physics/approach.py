@@ -19,7 +19,10 @@ ESTIMATE_PRESSURES = (1e-8, 1e4, 121)  # reduced pressures of the estimate: from
 def approach(
     scene: Scene, elastomer: LinearElastomer, contact: Contact, u: Field, sigma: Field
 ) -> float:
-    """Displacement of the indenter from first touch [m]; NaN where c does not exist."""
+    """Displacement of the indenter from first touch [m]; NaN where c does not exist.
+
+    `u` and `sigma` are the solution of `contact`, in reduced units.
+    """
     if not elastomer.has_level(contact.boundary, scene.grid.dimension):
         return np.nan
     level = contact.reference_level(u, sigma)

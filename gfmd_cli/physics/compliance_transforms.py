@@ -10,7 +10,7 @@ of the compliance, with s = q r and d[t J_1(t)]/dt = t J_0(t). In one dimension
     H(x) = int_0^x G(t) dt = int_0^inf sin(s) / [s k(s / x)] ds / pi.
 
 The integrals over s end at about CUT radians, where a smooth step turns the wave off (Abel's
-summation): a smooth compliance has no part in the rest. Each integral is Gauss's rule on intervals
+summation): a smooth compliance adds nothing beyond. Each integral is Gauss's rule on intervals
 that end at the knots of the stiffness, where its derivatives jump; below the first knot k is a
 power law. The integral of G over the triangle between the x-axis, the line x = X and the direction
 to the corner (X, Y) is that of H over the angle; with the distance X cosh(v) on this line it is

@@ -28,9 +28,9 @@ from gfmd_cli.physics.surfaces import sample
 ROUNDING_POWER = 1e-28  # |h(q)|^2 of a mode that only rounding has excited, relative to the largest
 SCALE_RANGE = (1e-100, 1e100)  # [m, Pa]: squared, over all of the spectrum, still normal numbers
 PRESSURE_RANGE = (1e-30, 1e6)
-"""Reduced pressures that are solved. Above 2^17, full contact on every grid, as no peak of a field
-is above its rms times the points per side; sigma - p then only loses digits. Below, squares of p*
-vanish sooner or later, and rounding of sigma has long been larger than p*."""
+"""Reduced pressures that are solved. Above 2^17 every grid is in full contact, as no peak exceeds
+its rms times the points per side; sigma - p then only loses digits. Far below the lower limit
+squares of p* underflow; rounding errors of sigma exceed p* much earlier."""
 UNCERTAINTY_FACTOR = 2.0
 """Factor of the rms violation below which gaps and stresses may be errors.
 
@@ -137,7 +137,7 @@ class Contact:
     def lay_pressed(self, u: Field, sigma: Field, residual: float) -> bool:
         """Lay pressed points on the indenter if the gap of some is below the error of u.
 
-        Contact is u = h to the last bit, and of such a point the residual counts only the gap.
+        Contact is u = h to the last bit. The residual contains only the gap of such a point.
         A point is laid if its stress is larger than the error of sigma and stays compressive when
         this point alone is laid; sigma is not changed. `residual` is the natural residual of u and
         sigma. Returns whether any point was laid.
@@ -273,8 +273,11 @@ def build_scene(
 ) -> Scene:
     """Sample the surface and reduce heights and stiffness to the scales of the resolved surface.
 
-    `ranks` are the processes that share large grids. By default the number of points along y makes
-    the pixels square.
+    Parameters
+    ----------
+    points, points_y : numbers of grid points along x and y; by default the pixels are square
+    threads : threads of the transforms and kernels
+    ranks : the processes that share large grids
 
     Raises InputError where the grid does not resolve the surface, the surface is flat, or a scale
     is out of range.

@@ -47,8 +47,8 @@ from gfmd_cli.physics.free_contact import FreeContact
 from gfmd_cli.physics.observables import Observables, contact_pressure
 
 ALGEBRAIC = 2.0
-"""Largest errors of u_g and sigma_p on their grid that were met, in natural residuals times the
-largest of the value, its root, and half the root of the fraction of points not in contact or
+"""Largest measured error of u_g or sigma_p, x, on its grid, over the natural residual times the
+largest of x, sqrt(x) and sqrt(f) / 2, with the fraction f of points that are not in contact or
 uncertain, which matters next to full contact: n = 0.5 to 4, slabs, p* = 0.003 to 4."""
 
 
@@ -81,7 +81,7 @@ class ErrorBounds:
 def error_bounds(contact: Contact, u: Field, sigma: Field) -> ErrorBounds:
     """Bound the errors of a solution: of a periodic contact, u >= h with sigma = K u + p.
 
-    The cost is one transform.
+    `u` and `sigma` are in reduced units, of shape `grid.shape`. The cost is one transform.
     """
     grid, p = contact.grid, contact.pressure
     obstacle = contact.obstacle

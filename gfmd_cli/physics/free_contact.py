@@ -71,7 +71,7 @@ class FreeElasticity:
 
     @property
     def smallest_compliance(self) -> float:
-        """Lower limit of the eigenvalues of C; of use if positive.
+        """Lower limit of the eigenvalues of C; useful only if positive.
 
         The smallest eigenvalue of the circulant matrix of the kernel reflected about the borders of
         its array, of which C is a principal submatrix: a discrete cosine transform of type I. Every
@@ -83,7 +83,7 @@ class FreeElasticity:
 
     @property
     def transforms(self) -> float:
-        """Transforms of the size of the map that `displacement` counts as, by number of points."""
+        """Cost of `displacement`, in transforms of the size of the map, by number of points."""
         transform, _ = self._convolution
         return 2.0 * transform.padded_rows * transform.padded_columns / self.grid.size
 
@@ -106,7 +106,7 @@ class FreeContact(Contact):
 
     @property
     def exponents(self) -> tuple[float, float]:
-        """The exponent of a power law, twice; no limits where k(q) is none."""
+        """The exponent of a power law as both limits; infinite limits for any other k(q)."""
         n = self.free.elastomer.exponent
         return (-inf, inf) if n is None else (n, n)
 
@@ -129,7 +129,7 @@ class FreeContact(Contact):
     def mirrored(self) -> Contact:
         """The periodic contact of the map mirrored to twice its sides, whose Delta_sigma is 1.
 
-        Its stress K h is that of full contact, of which a map with borders has none of its own.
+        Its stress K h is that of full contact, which is not defined for a map with borders.
         """
         grid = doubled_grid(self.grid)
         k = self.free.elastomer.stiffness(grid.wavenumber(), grid.length) / self.free.unit

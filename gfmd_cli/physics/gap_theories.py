@@ -1,4 +1,4 @@
-"""Two other theories of the mean gap; no equations of the paper, compared in docs/theory.md.
+"""Two theories of the mean gap that are not in the paper; docs/theory.md compares them.
 
 `FittedWeight` has another weight of the elastic energy, with constants that scripts/gap_theories.py
 fits to simulations.
@@ -103,7 +103,7 @@ class FittedWeight(Persson):
     """
 
     n: Field
-    """Exponent of k(q) of every shell; exponents beyond [0, 4] count as these ends."""
+    """Exponent of k(q) of every shell; values beyond [0, 4] are replaced by these limits."""
 
     mean_gap_source: ClassVar[str] = "a fitted weight"
 

@@ -109,7 +109,7 @@ class Observables:
 
 
 def observe(contact: Contact, u: Field, sigma: Field) -> Observables:
-    """Measure the scalars of a displacement and its stress."""
+    """Measure the scalars of a displacement and its stress [reduced units], shape `grid.shape`."""
     grid, touching = contact.grid, contact_points(contact.obstacle, u, sigma)
     sums = np.zeros(6)
     for rows in row_blocks(u):

@@ -35,7 +35,7 @@ class ContactStress:
 
 
 def contact_stress(contact: Contact, touching: Mask) -> ContactStress:
-    """Compute both moments over the points in contact, a mask of shape `grid.shape`."""
+    """Compute both moments over the points in contact; `touching` has the shape `grid.shape`."""
     if not np.any(touching):
         return ContactStress(np.nan, np.nan)
     field = contact.grid.empty()
