@@ -115,8 +115,7 @@ def _measured(make: Callable[[Plan], T], fftw: Plan) -> T:
     """The transforms that `make` plans, measured unless another process has measured them."""
     folder = _folder or cache_folder()
     with _planning_lock(folder):
-        if (known := read_wisdom(folder)) is not None:  # what other processes have measured
-            pyfftw.import_wisdom((known[0].encode(), known[1].encode(), b""))  # b"": long double
+        _import(read_wisdom(folder))
         before = _export()
         transforms = make(fftw)
         if _export() != before:
@@ -166,6 +165,13 @@ def _joined(wisdom: Wisdom | None, more: Wisdom) -> Wisdom:
         ]
         joined.append("\n".join([*old.splitlines()[:-1], *new_lines, ")"]) + "\n")
     return joined
+
+
+def _import(wisdom: Wisdom | None) -> None:
+    """Add what other processes measured to the wisdom of this one."""
+    if wisdom is not None:
+        double, single = wisdom
+        pyfftw.import_wisdom((double.encode(), single.encode(), b""))  # third: of long double
 
 
 def _write(folder: Path, wisdom: Wisdom) -> None:
