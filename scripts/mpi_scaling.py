@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gfmd_cli.grid.ranks import launched
+from gfmd_cli.grid.ranks import mpi_ranks
 from gfmd_cli.grid.transposition import Transposition
 from gfmd_cli.physics.contact import build_scene
 from gfmd_cli.physics.elastomers import Power
@@ -53,7 +53,7 @@ def _launch(count: int, points: int) -> str:
 
 def measure(points: int) -> None:
     """On each process: time the parts; the first prints them."""
-    ranks = launched()
+    ranks = mpi_ranks()
     contact = build_scene(SelfAffine(cutoff=2.56 / points), Power(n=1), points, 1, ranks).contact(
         0.1
     )

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from gfmd_cli.grid.halo import MIN_ROWS, block_edges, is_distributable
-from gfmd_cli.grid.ranks import RANK_VARIABLES, SIZE_VARIABLES, announced, is_first
+from gfmd_cli.grid.ranks import RANK_VARIABLES, SIZE_VARIABLES, is_first, process_count
 
 SMOKE = Path(__file__).parents[1] / "configs" / "smoke.toml"
 RUN = ["run", str(SMOKE), "--set", "elastomer.n=0"]
@@ -41,7 +41,7 @@ def launcher(monkeypatch):
 )
 def test_launchers_are_recognised(launcher, variables, count, first):
     launcher(**variables)
-    assert (announced(), is_first()) == (count, first)
+    assert (process_count(), is_first()) == (count, first)
 
 
 @pytest.mark.parametrize(("rank", "messages"), [("0", 1), ("1", 0)])

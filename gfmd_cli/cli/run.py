@@ -94,9 +94,9 @@ def run(
         gfmd run configs/demo.toml --set load.p_star=0.1
         gfmd run one.toml two.toml -o both.h5
     """
-    from gfmd_cli.grid.ranks import launched, shared_errors
+    from gfmd_cli.grid.ranks import mpi_ranks, shared_errors
 
-    ranks = launched()
+    ranks = mpi_ranks()
     max_seconds = None if max_hours is None else 3600 * max_hours
     unconverged = 0
     with shared_errors(ranks):

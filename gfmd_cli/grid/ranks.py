@@ -137,7 +137,7 @@ def _portable(error: BaseException | None, rank: int) -> BaseException | None:
     return GfmdError(f"rank {rank}: {_text(error)}")
 
 
-def announced() -> int:
+def process_count() -> int:
     """Number of processes that the launcher announces; 1 without a launcher."""
     counts = [os.environ.get(name, "") for name in SIZE_VARIABLES]
     if any(name in os.environ for name in RANK_VARIABLES):
@@ -148,27 +148,27 @@ def announced() -> int:
 def is_first() -> bool:
     """Whether this is the only process or the first rank, from the variables of the launcher."""
     numbers = [os.environ.get(name, "0") for name in RANK_VARIABLES]
-    return announced() == 1 or all(text in ("0", "") for text in numbers)
+    return process_count() == 1 or all(text in ("0", "") for text in numbers)
 
 
-def launched() -> Ranks | None:
+def mpi_ranks() -> Ranks | None:
     """The ranks of this run, None for a single process.
 
     Raises InputError if mpi4py is missing, or was built for another MPI than the launcher.
     """
-    if announced() == 1:
+    if process_count() == 1:
         return None
     try:
         from mpi4py import MPI
     except (ImportError, RuntimeError) as error:  # RuntimeError: no MPI library
         raise InputError(
-            f"started as {announced()} processes, but mpi4py cannot be used ({error}): "
+            f"started as {process_count()} processes, but mpi4py cannot be used ({error}): "
             f"{INSTALL.format('mpi')}, or run one process"
         ) from error
     size = MPI.COMM_WORLD.Get_size()
-    if size != announced():
+    if size != process_count():
         raise InputError(
-            f"started as {announced()} processes, of which mpi4py's MPI sees {size}: "
+            f"started as {process_count()} processes, of which mpi4py's MPI sees {size}: "
             "launch with the mpiexec of the MPI that mpi4py was built for"
         )
     return Ranks(MPI.COMM_WORLD)
