@@ -151,10 +151,7 @@ def _export() -> Wisdom:
 
 
 def _joined(wisdom: Wisdom | None, more: Wisdom) -> Wisdom:
-    """Both, without the plans of the second for problems of the first.
-
-    Each plan is one line, in which flags and problem follow two words.
-    """
+    """Both; of two plans for one problem (a line each, flags and problem from word 3) the first."""
     if wisdom is None:
         return more
     joined = []

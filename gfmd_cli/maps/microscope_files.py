@@ -164,10 +164,7 @@ def heights_and_sides(path: Path, scan: Any, rows_along_y: bool) -> tuple[Any, t
 
 
 def _check_matrix(path: Path, file: BinaryIO, scan: Any, unsized: bool) -> None:
-    """Raise InputError where a matrix of numbers is not one of heights, or not all of it is read.
-
-    `unsized` is whether the file does not state its sides.
-    """
+    """Raise InputError where a matrix, perhaps without sides, has not only heights or not all."""
     columns_read, rows = scan.nb_grid_pts
     if unsized and columns_read < MATRIX_COLUMNS:
         raise InputError(
