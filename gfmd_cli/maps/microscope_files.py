@@ -164,7 +164,7 @@ def heights_and_sides(path: Path, scan: Any, rows_along_y: bool) -> tuple[Any, t
 
 
 def _check_matrix(path: Path, file: BinaryIO, scan: Any, unsized: bool) -> None:
-    """Raise InputError where a matrix, perhaps without sides, has not only heights or not all."""
+    """Raise InputError for a matrix that is not one of heights, or was not read to its end."""
     columns_read, rows = scan.nb_grid_pts
     if unsized and columns_read < MATRIX_COLUMNS:
         raise InputError(

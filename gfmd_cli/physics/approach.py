@@ -19,7 +19,7 @@ ESTIMATE_PRESSURES = (1e-8, 1e4, 121)  # reduced pressures of the estimate: from
 def approach(
     scene: Scene, elastomer: LinearElastomer, contact: Contact, u: Field, sigma: Field
 ) -> float:
-    """Displacement of the indenter from first touch [m], of a solution; NaN where c is undefined."""
+    """Displacement of the indenter from first touch [m] at a solution; NaN where c is undefined."""
     if not elastomer.has_level(contact.boundary, scene.grid.dimension):
         return np.nan
     level = contact.reference_level(u, sigma)
