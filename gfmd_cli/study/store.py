@@ -10,9 +10,10 @@ time. A result leaves a study only for one of the same task with at least the sa
 
 import json
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -41,6 +42,8 @@ from gfmd_cli.study.writing import write_study
 
 EARLIER = "earlier_specs"
 """Attribute with the texts of the specs before the last one, as JSON."""
+_Results = dict[str, tuple[Entry, Callable[[], TaskResult]]]
+"""By the id of a task: its entry, and a function that reads the whole result."""
 
 
 class Study:
@@ -115,9 +118,9 @@ class Study:
                 file = stack.enter_context(new_hdf5(fresh))
                 attributes = origin(spec, text)
                 attributes[EARLIER] = json.dumps(_earlier_specs(old, text))
-                source = _Sources(records, old)
-                entries = source.entries(tasks)
-                write_study(file, attributes, entries, lambda i: source.load(entries[i].task_id))
+                results = _stored_results(records, old)
+                entries = _entries(tasks, results)
+                write_study(file, attributes, entries, lambda i: results[entries[i].task_id][1]())
             for path in records:
                 path.unlink(missing_ok=True)
             self._entries.clear()
@@ -225,37 +228,25 @@ def _earlier_specs(old: StudyFile | None, text: str) -> list[str]:
     return [earlier for earlier in dict.fromkeys(texts) if earlier != text]
 
 
-class _Sources:
-    """Where the results of a new study come from: records, and the study so far."""
+def _stored_results(records: dict[Path, Entry], old: StudyFile | None) -> _Results:
+    """The solved tasks of the records and of the study so far."""
+    results: _Results = {}
+    if old is not None:
+        for index, status in enumerate(old.statuses):
+            if status.is_solved:
+                results[old.task_ids[index]] = old.entry(index), partial(old.result, index)
+    for path, entry in records.items():
+        before = results.get(entry.task_id)
+        if before is None or entry.stored >= before[0].stored:
+            results[entry.task_id] = entry, partial(read_record, path)
+    return results
 
-    def __init__(self, records: dict[Path, Entry], old: StudyFile | None) -> None:
-        self.old = old
-        self.by_task: dict[str, tuple[Entry, Path | int]] = {}
-        """By task id: its entry, and the record or the index in the study so far."""
-        if old is not None:
-            for index, status in enumerate(old.statuses):
-                if status.is_solved:
-                    self.by_task[old.task_ids[index]] = old.entry(index), index
-        for path, entry in records.items():
-            before = self.by_task.get(entry.task_id)
-            if before is None or entry.stored >= before[0].stored:
-                self.by_task[entry.task_id] = entry, path
 
-    def entries(self, tasks: list[Task]) -> list[Entry]:
-        """The tasks of a spec, solved or not, then all others that are solved."""
-        own = {task.id: self._entry(task) for task in tasks}
-        return [*own.values(), *(e for name, (e, _) in self.by_task.items() if name not in own)]
-
-    def _entry(self, task: Task) -> Entry:
-        """What the spec gives of a task, and what was measured if it is solved."""
+def _entries(tasks: list[Task], results: _Results) -> list[Entry]:
+    """The tasks of a spec, solved or not, as the spec describes them; then the other results."""
+    own: dict[str, Entry] = {}
+    for task in tasks:
         missing = Entry(task.id, task.scene_id, frozenset(), {"status": Status.MISSING})
-        entry, _ = self.by_task.get(task.id, (missing, 0))
-        return entry._replace(row=task_row(task, entry.row))
-
-    def load(self, task_id: str) -> TaskResult:
-        """The whole result of a task."""
-        _, place = self.by_task[task_id]
-        if isinstance(place, Path):
-            return read_record(place)
-        assert self.old is not None
-        return self.old.result(place)
+        entry = results[task.id][0] if task.id in results else missing
+        own[task.id] = entry._replace(row=task_row(task, entry.row))
+    return [*own.values(), *(entry for name, (entry, _) in results.items() if name not in own)]
