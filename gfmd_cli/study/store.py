@@ -23,21 +23,12 @@ from gfmd_cli.files.hdf5 import new_hdf5
 from gfmd_cli.files.locks import locked
 from gfmd_cli.spec.models import Spec
 from gfmd_cli.status import Status
+from gfmd_cli.study import unfinished_work
 from gfmd_cli.study.measure import task_row
 from gfmd_cli.study.provenance import origin
 from gfmd_cli.study.reading import StudyFile, open_study
 from gfmd_cli.study.result import Entry, Outcome, TaskResult
 from gfmd_cli.study.tasks import Task
-from gfmd_cli.study.unfinished_work import (
-    SUFFIX,
-    check_own,
-    checkpoint_folders,
-    read_record,
-    read_record_entry,
-    remove_parts,
-    set_aside,
-    version_of,
-)
 from gfmd_cli.study.writing import write_study
 
 EARLIER = "earlier_specs"
@@ -70,7 +61,7 @@ class Study:
         Yields what was found damaged, and set aside. The last one to leave removes the folder
         unless something is left to do there. Raises InputError, SpaceError.
         """
-        check_own(self.parts)
+        unfinished_work.check_own(self.parts)
         in_use = self.parts / "in-use"
         with locked(in_use, wait=False) as alone:
             if alone:  # what was being written by a process that was killed
@@ -83,7 +74,7 @@ class Study:
             yield damaged
         with self._collecting(), locked(in_use, wait=False) as alone:
             if alone and self._is_complete(tasks):
-                remove_parts(self.parts)
+                unfinished_work.remove_parts(self.parts)
 
     def outcomes(self) -> dict[str, Outcome]:
         """What is stored of each task that is solved, collected or not, by its id."""
@@ -137,7 +128,7 @@ class Study:
             number += 1
         new_paths = []
         if self.parts.exists():
-            check_own(self.parts)
+            unfinished_work.check_own(self.parts)
             with locked(self.parts / "in-use", wait=False) as alone:
                 if not alone:
                     raise InputError(f"{self.path}: another run works on this study; wait for it")
@@ -160,8 +151,9 @@ class Study:
     def _sound_records(self) -> tuple[dict[Path, Entry], list[str]]:
         """The records by path; a damaged one is set aside, with a message."""
         entries, damaged = self.records()
+        bad = {path: unfinished_work.set_aside(path).name for path in damaged}
         return entries, [
-            f"{error}; set aside as {set_aside(path).name}, its task is solved again"
+            f"{error}; set aside as {bad[path]}, its task is solved again"
             for path, error in damaged.items()
         ]
 
@@ -170,9 +162,9 @@ class Study:
 
         Raises StudyError.
         """
-        version = path, version_of(path)
+        version = path, unfinished_work.version_of(path)
         if version not in self._entries:
-            self._entries[version] = read_record_entry(path)
+            self._entries[version] = unfinished_work.read_record_entry(path)
         return self._entries[version]
 
     def _is_complete(self, tasks: list[Task]) -> bool:
@@ -184,7 +176,8 @@ class Study:
                 return False
         lacking = {task.id for task in without_result(tasks, self.collected())}
         solved = {task.id for task in tasks} - lacking
-        return all(folder.name in solved for folder in checkpoint_folders(self.parts))
+        folders = unfinished_work.checkpoint_folders(self.parts)
+        return all(folder.name in solved for folder in folders)
 
     def damaged_paths(self) -> list[Path]:
         """The damaged files that were set aside."""
@@ -192,7 +185,7 @@ class Study:
 
     def record_paths(self) -> list[Path]:
         """The records that are not collected yet."""
-        return sorted(self.parts.glob(f"*{SUFFIX}"))
+        return sorted(self.parts.glob(f"*{unfinished_work.SUFFIX}"))
 
     def _collecting(self) -> Any:
         """Keep other collectors out."""
@@ -238,7 +231,7 @@ def _stored_results(records: dict[Path, Entry], old: StudyFile | None) -> _Resul
     for path, entry in records.items():
         before = results.get(entry.task_id)
         if before is None or entry.stored >= before[0].stored:
-            results[entry.task_id] = entry, partial(read_record, path)
+            results[entry.task_id] = entry, partial(unfinished_work.read_record, path)
     return results
 
 
