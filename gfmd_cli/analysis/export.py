@@ -1,4 +1,4 @@
-"""A study in other shapes: rows of a CSV file, an xarray data set, a netCDF file."""
+"""A study in other shapes: rows of a CSV file, records, an xarray data set, a netCDF file."""
 
 import csv
 import io
@@ -8,16 +8,20 @@ from typing import Any
 
 import numpy as np
 
-from gfmd_cli.analysis.table import known
+from gfmd_cli.analysis.compare import VARIANTS, Comparison
+from gfmd_cli.analysis.ensemble import ensembles
+from gfmd_cli.analysis.table import known, plain
 from gfmd_cli.errors import INSTALL, InputError
 from gfmd_cli.files.atomic import new_file
 from gfmd_cli.grid.arrays import Field
+from gfmd_cli.physics.observables import QUANTITIES
 from gfmd_cli.study import columns as layout
 from gfmd_cli.study.column import Column, Row
 from gfmd_cli.study.reading import StudyFile, open_study, read_rows, solved_rows
 
 FORMULA = ("=", "+", "-", "@", "\t", "\r")
 """Characters with which a formula of a spreadsheet begins."""
+THEORY = (*(f"{name}_persson" for name in QUANTITIES), "p_star_persson_at_u_g")
 _PARAMETER_NAMES = (each.column.name for each in layout.PARAMETERS)
 COORDINATES = tuple(dict.fromkeys(("surface", "elastomer", *_PARAMETER_NAMES, "p_star")))
 """Columns that are coordinates of the data set: labels, parameters and the reduced pressure."""
@@ -46,6 +50,27 @@ def column_names(rows: list[Row]) -> list[str]:
         if not all(column.is_blank(row[column.name]) for row in rows)
     )
     return [column.name for column in (*layout.CONTRACT, *layout.DETAILS, *parameters)]
+
+
+def as_records(comparison: Comparison) -> list[dict[str, Any]]:
+    """One record for each solved pressure, as JSON has it; what does not apply is None.
+
+    The keys are the columns of `gfmd export`, then theory and the means over seeds where they
+    apply.
+    """
+    means = {
+        row["task"]: ensemble.means() for ensemble in ensembles(comparison) for row in ensemble.rows
+    }
+    records = []
+    names = column_names([row for curve in comparison.curves for row in curve.rows])
+    for curve in comparison.curves:
+        keys = [*names, *(THEORY if curve.has_theory else ())]
+        if curve.stores(VARIANTS.values()):
+            keys += VARIANTS.values()
+        for row in curve.records:
+            record = {key: plain(row[key]) for key in keys}
+            records.append(record | means.get(row["task"], {}))
+    return records
 
 
 def _cell(value: Any) -> str:
