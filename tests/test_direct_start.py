@@ -159,7 +159,7 @@ def test_a_solve_stopped_on_a_coarse_grid_goes_on_bit_by_bit():
     assert [shape for shape, _ in states].count((256, 256)) == 1  # after a direct solve
     for chosen in (1, len(states) // 2, len(states) - 1):
         shape, state = states[chosen]
-        rest = solve_contact(contact, ProjectedCG(tolerance=1e-6), start=Resume(shape, vars(state)))
+        rest = solve_contact(contact, ProjectedCG(tolerance=1e-6), start=Resume(shape, state))
         assert np.array_equal(rest.u, straight.u)
         assert np.array_equal(rest.sigma, straight.sigma)
 

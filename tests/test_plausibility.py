@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gfmd_cli import compare, rows, run, solve
-from gfmd_cli.analysis.records import as_records
+from gfmd_cli.analysis.export import as_records
 from gfmd_cli.physics.file_surface import FileSurface
 from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.report.page import report

@@ -281,14 +281,14 @@ def test_checkpoints_come_back_as_they_were(tmp_path):
     assert checkpoint.notes == NOTES
     resume = checkpoint.load(grid, SOLVER)
     assert (resume.shape, resume.moved) == ((16, 16), False)
-    stored = PCGState(**resume.values)
+    stored = resume.state
     for name, value in vars(state).items():
         assert type(vars(stored)[name]) is type(value), name
         np.testing.assert_array_equal(vars(stored)[name], value, err_msg=name, strict=True)
     flip(tmp_path / "c" / checkpoint.slots[0].name, 800)
     checkpoint = Checkpoint(tmp_path / "c")
     assert "the one before it is resumed" in checkpoint.restore()
-    np.testing.assert_array_equal(checkpoint.load(grid, SOLVER).values["u"], older)
+    np.testing.assert_array_equal(checkpoint.load(grid, SOLVER).state.u, older)
     assert checkpoint.notes == Notes()
     flip(tmp_path / "c" / "pointer", 80)
     checkpoint = Checkpoint(tmp_path / "c")

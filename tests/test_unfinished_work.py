@@ -82,7 +82,7 @@ def test_a_pointer_that_nobody_changed_is_resumed(checkpoint):
     forge(checkpoint, lambda slot: None)
     saved = Checkpoint(checkpoint)
     assert saved.restore() is None
-    assert saved.load(Contact.grid, SOLVER).values["step"] == 3
+    assert saved.load(Contact.grid, SOLVER).state.step == 3
 
 
 @pytest.mark.parametrize("case", FORGED)

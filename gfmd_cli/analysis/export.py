@@ -1,4 +1,4 @@
-"""A study in other shapes: rows of a CSV file, an xarray data set, a netCDF file."""
+"""A study in other shapes: rows of a CSV file, records, an xarray data set, a netCDF file."""
 
 import csv
 import io
@@ -8,29 +8,22 @@ from typing import Any
 
 import numpy as np
 
-from gfmd_cli.analysis.table import known
+from gfmd_cli.analysis.compare import VARIANTS, Comparison
+from gfmd_cli.analysis.ensemble import ensembles
+from gfmd_cli.analysis.table import known, plain
 from gfmd_cli.errors import INSTALL, InputError
 from gfmd_cli.files.atomic import new_file
 from gfmd_cli.grid.arrays import Field
+from gfmd_cli.physics.observables import QUANTITIES
+from gfmd_cli.study import columns as layout
 from gfmd_cli.study.column import Column, Row
-from gfmd_cli.study.columns import (
-    CONTRACT,
-    DETAILS,
-    HISTOGRAMS,
-    PARAMETER_COLUMNS,
-    PARAMETERS,
-    SCENE,
-    SHELLS,
-    TASK,
-    TASK_GROUPS,
-)
 from gfmd_cli.study.reading import StudyFile, open_study, read_rows, solved_rows
 
 FORMULA = ("=", "+", "-", "@", "\t", "\r")
 """Characters with which a formula of a spreadsheet begins."""
-COORDINATES = tuple(
-    dict.fromkeys(("surface", "elastomer", *(each.column.name for each in PARAMETERS), "p_star"))
-)
+THEORY = (*(f"{name}_persson" for name in QUANTITIES), "p_star_persson_at_u_g")
+_PARAMETER_NAMES = (each.column.name for each in layout.PARAMETERS)
+COORDINATES = tuple(dict.fromkeys(("surface", "elastomer", *_PARAMETER_NAMES, "p_star")))
 """Columns that are coordinates of the data set: labels, parameters and the reduced pressure."""
 
 
@@ -53,10 +46,31 @@ def column_names(rows: list[Row]) -> list[str]:
     """All columns, without the parameters that no row has."""
     parameters = (
         column
-        for column in PARAMETER_COLUMNS
+        for column in layout.PARAMETER_COLUMNS
         if not all(column.is_blank(row[column.name]) for row in rows)
     )
-    return [column.name for column in (*CONTRACT, *DETAILS, *parameters)]
+    return [column.name for column in (*layout.CONTRACT, *layout.DETAILS, *parameters)]
+
+
+def as_records(comparison: Comparison) -> list[dict[str, Any]]:
+    """One record for each solved pressure, as JSON has it; what does not apply is None.
+
+    The keys are the columns of `gfmd export`, then theory and the means over seeds where they
+    apply.
+    """
+    means = {
+        row["task"]: ensemble.means() for ensemble in ensembles(comparison) for row in ensemble.rows
+    }
+    records = []
+    names = column_names([row for curve in comparison.curves for row in curve.rows])
+    for curve in comparison.curves:
+        keys = [*names, *(THEORY if curve.has_theory else ())]
+        if curve.stores(VARIANTS.values()):
+            keys += VARIANTS.values()
+        for row in curve.records:
+            record = {key: plain(row[key]) for key in keys}
+            records.append(record | means.get(row["task"], {}))
+    return records
 
 
 def _cell(value: Any) -> str:
@@ -104,10 +118,10 @@ def _labelled_study(path: Path) -> Any:
     """A study as a data set without an index over parameters."""
     with open_study(path) as study:
         rows = study.rows
-        variables = {c.name: _of_tasks(rows, c) for c in (*study.columns, SCENE)}
-        coordinates: dict[str, Any] = {"task": _of_tasks(rows, TASK)[1]}
+        variables = {c.name: _of_tasks(rows, c) for c in (*study.columns, layout.SCENE)}
+        coordinates: dict[str, Any] = {"task": _of_tasks(rows, layout.TASK)[1]}
         coordinates |= {name: variables.pop(name) for name in COORDINATES if name in variables}
-        for bins in HISTOGRAMS:
+        for bins in layout.HISTOGRAMS:
             if rows and bins.name in rows[0]:
                 variables[bins.name] = _of_tasks(rows, bins.column, bins.axis)
                 about = {"units": "1", "long_name": bins.axis_meaning, "edges": bins.edges}
@@ -139,8 +153,8 @@ def _curves(study: StudyFile) -> dict[str, Any]:
     solved = {row["scene"] for row in solved_rows(study.rows)}
     count = 1 + max((row["scene"] for row in study.rows), default=-1)
     scenes = [vars(study.shells(i)) if i in solved else {} for i in range(count)]
-    variables = _padded("scenes", ("scenes", "shell"), SHELLS, scenes)
-    for group in TASK_GROUPS:
+    variables = _padded("scenes", ("scenes", "shell"), layout.SHELLS, scenes)
+    for group in layout.TASK_GROUPS:
         if group.axis:
             arrays = [study.arrays(group.name, row["task"]) for row in study.rows]
             variables |= _padded(group.name, ("task", group.axis), group.columns, arrays)

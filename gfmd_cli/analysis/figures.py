@@ -15,27 +15,20 @@ from gfmd_cli.units import scaled
 WIDE = 20  # a ratio that varies by more is drawn on a log scale
 ROUNDING = 1e-9  # relative difference of equal values that were computed on different grids
 P_STAR = r"reduced pressure  $p^* = p\,/\,\Delta\sigma$"
-AREA, GAP = r"relative contact area  $a_r$", r"mean gap  $u_g\,/\,h_\mathrm{std}$"
+LABELS = {
+    "a_r": r"relative contact area  $a_r$",
+    "sigma_p": r"stress deviation  $\sigma_p\,/\,\Delta\sigma$",
+    "u_g": r"mean gap  $u_g\,/\,h_\mathrm{std}$",
+}
 RATIO = r"$a_r\,/\,a_r$(Persson)"
-DEVIATION = r"stress deviation  $\sigma_p\,/\,\Delta\sigma$"
 PANELS = (
-    Panel(
-        "contact_area", "a_r", AREA, "Relative contact area over reduced pressure", y_scale="log"
-    ),
-    Panel(
-        "contact_area_ratio", "a_r", RATIO, "Contact area over that of Persson theory", ratio=True
-    ),
-    Panel(
-        "stress_deviation",
-        "sigma_p",
-        DEVIATION,
-        "Standard deviation of the stress over reduced pressure",
-    ),
-    Panel("mean_gap_log", "u_g", GAP, "Mean gap over the logarithm of the reduced pressure"),
+    Panel("contact_area", "a_r", "Relative contact area over reduced pressure", y_scale="log"),
+    Panel("contact_area_ratio", "a_r", "Contact area over that of Persson theory", ratio=True),
+    Panel("stress_deviation", "sigma_p", "Standard deviation of the stress over reduced pressure"),
+    Panel("mean_gap_log", "u_g", "Mean gap over the logarithm of the reduced pressure"),
     Panel(
         "mean_gap_tail",
         "u_g",
-        GAP,
         "Logarithm of the mean gap over the reduced pressure",
         "linear",
         "log",
@@ -81,7 +74,7 @@ def _over_pressure(panel: Panel, items: list[StyledCurve]) -> ColumnFigure | Non
     drawn = [series for series in drawn if series.x.size]
     if not drawn:
         return None
-    plot = ColumnFigure(P_STAR, panel.label)
+    plot = ColumnFigure(P_STAR, RATIO if panel.ratio else LABELS[panel.column])
     for series in drawn:
         series.draw(plot, line=panel.ratio)
     p_star = items[0].p_star

@@ -108,7 +108,9 @@ class LegendFigure:
         self.legend[label] = Line2D([], [], **style)
 
     def _write_legend(self) -> None:
-        """Write the legend above the axes, in as many rows as needed."""
+        """Write the legend, if there is any, above the axes, in as many rows as needed."""
+        if not self.legend:
+            return
         columns, rows = _legend_shape(list(self.legend), self.width / WIDTH)
         self.figure.set_size_inches(self.width, self.height + ROW * rows)
         self.figure.legend(
@@ -125,8 +127,7 @@ class LegendFigure:
 
     def svg(self) -> str:
         """An SVG with outlined text and no background; the same figure gives the same bytes."""
-        if self.legend:
-            self._write_legend()
+        self._write_legend()
         parts: list[Any] = [self.figure, *self.figure.axes]
         for part in parts + [second for axes in parts[1:] for second in axes.child_axes]:
             part.patch.set(facecolor="none", edgecolor="none")
@@ -151,8 +152,7 @@ class LegendFigure:
 
     def _save(self, files: Sequence[Path], dpi: int) -> None:
         """Write files with one layout."""
-        if self.legend:
-            self._write_legend()
+        self._write_legend()
         self.figure.draw_without_rendering()
         self.figure.set_layout_engine("none")
         for file in files:

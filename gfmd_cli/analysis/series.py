@@ -24,8 +24,6 @@ class Panel:
 
     name: str
     column: str
-    label: str
-    """Of the axis."""
     meaning: str
     """What the figure shows, as its caption."""
     x_scale: str = "log"

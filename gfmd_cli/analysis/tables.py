@@ -42,10 +42,6 @@ STATUS = TableColumn("status", "status")
 SCALES = (("Delta_sigma", "delta_sigma", "Pa"), ("h_std", "h_std", "m"), ("L", "length", "m"))
 """Symbol, column and SI unit of the scales of a contact."""
 RESIDUAL = TableColumn("residual", "residual", ".1e")
-BEST = {name: TableColumn(quantity.heading, f"{name}_best", error=f"{name}_best_error")
-        for name, quantity in QUANTITIES.items()}  # fmt: skip
-"""Continuum values where they are known, else values on the grid."""
-
 THEORIES = {"persson": "Persson", "einstein": "closed form"}
 """Headings of predictions, by the suffix of their keys."""
 
@@ -106,14 +102,11 @@ SEEDS = (
     TableColumn("not converged", "failures", optional=True),
 )
 CONTACT_AREA, STRESS_DEVIATION, MEAN_GAP = (
-    (
-        P_STAR,
-        PRESSURE,
-        *_beside_theory(BEST[name], name, unit=quantity.scale, si=quantity.si),
-        STATUS,
-    )
+    (P_STAR, PRESSURE, *_beside_theory(best, name, unit=quantity.scale, si=quantity.si), STATUS)
     for name, quantity in QUANTITIES.items()
+    for best in [TableColumn(quantity.heading, f"{name}_best", error=f"{name}_best_error")]
 )
+"""With continuum values where they are known, else with values on the grid."""
 TRUE_CONTACT = (
     P_STAR,
     AREA,

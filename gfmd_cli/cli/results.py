@@ -37,7 +37,7 @@ def analyze(study: Path, as_json: bool, figures: Path | None, theory: "Theory") 
         gfmd analyze demo.h5 --figures figures
     """
     from gfmd_cli.analysis.compare import compare
-    from gfmd_cli.analysis.records import as_records
+    from gfmd_cli.analysis.export import as_records
     from gfmd_cli.analysis.run_summary import edge_warnings
     from gfmd_cli.units import count
 

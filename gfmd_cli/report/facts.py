@@ -4,11 +4,10 @@ import json
 
 from gfmd_cli.analysis.diff import diff
 from gfmd_cli.analysis.diff_table import NOTHING, diff_lists, diff_table
-from gfmd_cli.analysis.table import Group, Record, Table, TableColumn
+from gfmd_cli.analysis.table import Group, Table, TableColumn
 from gfmd_cli.analysis.tables import P_STAR, RESIDUAL, STATUS
 from gfmd_cli.report.data import ReportData
 from gfmd_cli.report.section import Section
-from gfmd_cli.status import Status
 from gfmd_cli.units import count
 
 MAX_ROWS = 100  # contacts that the table of failures lists
@@ -37,11 +36,6 @@ def failures(data: ReportData) -> Section:
     )
 
 
-def _reason(row: Record) -> str:
-    """Why a contact is not converged; empty for a status that is unknown."""
-    return Status(row["status"]).explain(row) if row["status"] in list(Status) else ""
-
-
 UNCONVERGED_CAPTION = (
     "Contacts that ended above the requested tolerance. Their values are kept; figures show "
     "them as crosses."
@@ -55,7 +49,7 @@ UNCONVERGED = (
     RESIDUAL,
     TableColumn("tolerance", "tolerance", ".1e"),
     TableColumn("steps", "steps", "d"),
-    TableColumn("reason", _reason),
+    TableColumn("reason", lambda row: row["status"].explain(row)),
 )
 
 

@@ -4,20 +4,10 @@ Contact area, mean gap and stress deviation over the pressure, distribution of t
 against error; error bars and optional observables, which are tables alone.
 """
 
+from gfmd_cli.analysis import tables
 from gfmd_cli.analysis.distribution_figure import Density, densities
 from gfmd_cli.analysis.figures import PANELS
 from gfmd_cli.analysis.table import Group, Table, TableColumn, product, ratio
-from gfmd_cli.analysis.tables import (
-    CONTACT_AREA,
-    MEAN_GAP,
-    STRESS_DEVIATION,
-    continuum_table,
-    observables_table,
-    over_pressure,
-    power_laws,
-    seeds_table,
-    true_contact_table,
-)
 from gfmd_cli.bench.figure import bench_figures
 from gfmd_cli.bench.table import bench_table
 from gfmd_cli.report.data import ReportData, item_title
@@ -31,6 +21,7 @@ EXPLANATION = (
 )
 LINES = " Lines: Persson theory of the same spectrum."
 BEHIND = "Table behind the figures"
+TRUE_CONTACT = "Table: Persson theory with the stress over the true contact"
 DISTRIBUTIONS = {
     "stress_distribution": (
         "Distribution of the stress over logarithmic stress, elastomers side by side",
@@ -78,10 +69,8 @@ def contact_area(data: ReportData) -> Section:
         notes=[EXPLANATION + lines],
         drawings=_drawings(data, "a_r"),
         disclosed={
-            BEHIND: over_pressure(CONTACT_AREA, caption, data.curves),
-            "Table: Persson theory with the stress over the true contact": true_contact_table(
-                data.curves
-            ),
+            BEHIND: tables.over_pressure(tables.CONTACT_AREA, caption, data.curves),
+            TRUE_CONTACT: tables.true_contact_table(data.curves),
         },
     )
 
@@ -89,14 +78,14 @@ def contact_area(data: ReportData) -> Section:
 def mean_gap(data: ReportData) -> Section:
     """Mean gap."""
     caption = "Mean gap u_g between the surfaces, over the whole interface."
-    disclosed = {BEHIND: over_pressure(MEAN_GAP, caption, data.curves)}
+    disclosed = {BEHIND: tables.over_pressure(tables.MEAN_GAP, caption, data.curves)}
     return Section("Mean gap", drawings=_drawings(data, "u_g"), disclosed=disclosed)
 
 
 def stress_deviation(data: ReportData) -> Section:
     """Standard deviation of the stress."""
     caption = "Standard deviation sigma_p of the stress over the whole interface."
-    disclosed = {BEHIND: over_pressure(STRESS_DEVIATION, caption, data.curves)}
+    disclosed = {BEHIND: tables.over_pressure(tables.STRESS_DEVIATION, caption, data.curves)}
     return Section("Stress deviation", drawings=_drawings(data, "sigma_p"), disclosed=disclosed)
 
 
@@ -129,7 +118,7 @@ def stress_distribution(data: ReportData) -> Section:
             for name, (label, caption) in DISTRIBUTIONS.items()
             if (figure := data.figures.get(name))
         ],
-        disclosed=disclosed | {"Table: power laws": power_laws(data.comparison)},
+        disclosed=disclosed | {"Table: power laws": tables.power_laws(data.comparison)},
     )
 
 
@@ -145,13 +134,13 @@ def _bins(density: Density) -> Group:
 
 def error_bars(data: ReportData) -> Section:
     """Continuum values with error bars, and means over seeds."""
-    tables = [continuum_table(data.curves), seeds_table(data.comparison)]
-    return Section("Error bars", tables=tables)
+    both = [tables.continuum_table(data.curves), tables.seeds_table(data.comparison)]
+    return Section("Error bars", tables=both)
 
 
 def optional_observables(data: ReportData) -> Section:
     """The observables that keys of [output] have turned on."""
-    return Section("Optional observables", tables=[observables_table(data.curves)])
+    return Section("Optional observables", tables=[tables.observables_table(data.curves)])
 
 
 def work_precision(data: ReportData) -> Section:

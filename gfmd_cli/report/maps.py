@@ -14,16 +14,8 @@ from gfmd_cli.analysis.wording import contact_title, pressure_text
 from gfmd_cli.grid.arrays import Field, Mask
 from gfmd_cli.maps.pictures import block_sums
 from gfmd_cli.physics.observables import contact_points
+from gfmd_cli.report import profiles
 from gfmd_cli.report.data import ReportData
-from gfmd_cli.report.profiles import (
-    HEIGHT_SCALE,
-    LENGTH_SCALE,
-    STRESS_SCALE,
-    Scale,
-    plane,
-    profile_figure,
-    read_profile,
-)
 from gfmd_cli.report.section import Section
 from gfmd_cli.report.svg import drawing
 from gfmd_cli.study.column import Row
@@ -69,7 +61,7 @@ def maps(data: ReportData) -> Section:
         f"{len(contacts)} of {len(rows_with_fields)} contacts with stored fields are shown, "
         f"{MAX_CONTACTS} at most."
     ]
-    if any(plane(row) and max(row["points"], row["points_y"]) > SIDE for row in contacts):
+    if any(profiles.plane(row) and max(row["points"], row["points_y"]) > SIDE for row in contacts):
         notes.append(f"Maps have up to {SIDE} pixels a side, each the mean of some grid points.")
     table = Table(CAPTION, data.shown(SHOWN), [Group("", contacts)])
     return Section(
@@ -93,11 +85,11 @@ def _contact_maps(study: StudyFile, row: Row, prefix: str) -> dict[str, Any]:
     """Title, maps and cross-section of one contact."""
     task = row["task"]
     figures: list[tuple[str, LegendFigure, str]] = [*_map_figures(study, row)]
-    profile = read_profile(study, row)
+    profile = profiles.read_profile(study, row)
     if profile is not None:
         line = f"along {profile.along}{profile.place}"
         what = f"Cross-section {line}: heights above, stress below"
-        figures.append(("section", profile_figure(profile), what))
+        figures.append(("section", profiles.profile_figure(profile), what))
     return {
         "title": f"{pressure_text(row)}, a_r = {row['a_r']:.3g}",
         "drawings": [
@@ -110,7 +102,7 @@ def _contact_maps(study: StudyFile, row: Row, prefix: str) -> dict[str, Any]:
 def _map_figures(study: StudyFile, row: Row) -> list[tuple[str, ColumnFigure, str]]:
     """Maps of contact, stress and gap, as far as the fields for them are stored."""
     points = max(row["points"], row["points_y"])
-    pixels = _thumbnails(study, row["task"], -(-points // SIDE)) if plane(row) else {}
+    pixels = _thumbnails(study, row["task"], -(-points // SIDE)) if profiles.plane(row) else {}
     if "stress" not in pixels:
         return []
     stress, touching = pixels["stress"], pixels.get("contact")
@@ -118,12 +110,13 @@ def _map_figures(study: StudyFile, row: Row) -> list[tuple[str, ColumnFigure, st
     what = f"Stress; black: none, {red.format('contact')}"
     loaded = stress > NOISE * row["pressure"] if touching is None else touching > 0
     label = r"stress $\sigma$"
-    figures = [("stress", _scaled_figure(stress, loaded, row, STRESS_SCALE, label), what)]
+    figures = [("stress", _scaled_figure(stress, loaded, row, profiles.STRESS_SCALE, label), what)]
     if touching is not None:
         gap = pixels["gap"]
         figures.insert(0, ("contact", _contact_figure(touching, row), "Contact"))
         what = f"Gap; black: contact, {red.format('rest')}"
-        figures.append(("gap", _scaled_figure(gap, gap > 0, row, HEIGHT_SCALE, "gap"), what))
+        figure = _scaled_figure(gap, gap > 0, row, profiles.HEIGHT_SCALE, "gap")
+        figures.append(("gap", figure, what))
     return figures
 
 
@@ -152,7 +145,9 @@ def _contact_figure(touching: Field, row: Row) -> ColumnFigure:
     return plot
 
 
-def _scaled_figure(values: Field, shown: Mask, row: Row, scale: Scale, label: str) -> ColumnFigure:
+def _scaled_figure(
+    values: Field, shown: Mask, row: Row, scale: profiles.Scale, label: str
+) -> ColumnFigure:
     """Values in colours up to a percentile: a scale up to the peaks would leave the rest dark."""
     plot, extent = _cell(row)
     top = float(np.percentile(values[shown], PERCENTILE)) if np.any(shown) else 0.0
@@ -175,8 +170,8 @@ def _cell(row: Row) -> tuple[ColumnFigure, tuple[float, float, float, float]]:
     """Axes of the cell, and where it ends in their units."""
     length, length_y = float(row["length"]), float(row["length_y"])
     longest = max(length, length_y)
-    divisor, x = LENGTH_SCALE.axis(row, longest, "x")
-    _, y = LENGTH_SCALE.axis(row, longest, "y")
+    divisor, x = profiles.LENGTH_SCALE.axis(row, longest, "x")
+    _, y = profiles.LENGTH_SCALE.axis(row, longest, "y")
     plot = ColumnFigure(x, y)
     plot.height = min(max(0.85 * length_y / length, MIN_ASPECT), MAX_ASPECT) * WIDTH
     return plot, (0.0, length / divisor, 0.0, length_y / divisor)

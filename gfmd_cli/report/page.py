@@ -9,17 +9,9 @@ from urllib.parse import quote
 from gfmd_cli.analysis.export import csv_text
 from gfmd_cli.analysis.plotting import styled
 from gfmd_cli.bench.file import Trace, read_bench
+from gfmd_cli.report import figures
 from gfmd_cli.report.data import ReportData, read_report_data, side_by_side
 from gfmd_cli.report.facts import difference, failures, provenance
-from gfmd_cli.report.figures import (
-    contact_area,
-    error_bars,
-    mean_gap,
-    optional_observables,
-    stress_deviation,
-    stress_distribution,
-    work_precision,
-)
 from gfmd_cli.report.maps import maps
 from gfmd_cli.report.rendering import policy, render, scripts
 from gfmd_cli.report.section import Section
@@ -31,15 +23,15 @@ OWN, SHARED = True, False
 SECTIONS: tuple[tuple[Callable[[ReportData], Section], bool], ...] = (
     (failures, OWN),
     (measured_surface, OWN),
-    (contact_area, SHARED),
-    (mean_gap, SHARED),
-    (stress_deviation, SHARED),
-    (stress_distribution, SHARED),
-    (error_bars, SHARED),
-    (optional_observables, SHARED),
+    (figures.contact_area, SHARED),
+    (figures.mean_gap, SHARED),
+    (figures.stress_deviation, SHARED),
+    (figures.stress_distribution, SHARED),
+    (figures.error_bars, SHARED),
+    (figures.optional_observables, SHARED),
     (maps, OWN),
     (surface_spectrum, SHARED),
-    (work_precision, SHARED),
+    (figures.work_precision, SHARED),
     (provenance, OWN),
 )
 """In the order of the page; of two studies each has its own, or both share it."""

@@ -3,7 +3,6 @@
 from dataclasses import dataclass, replace
 from functools import partial
 from math import prod
-from typing import Any
 
 import numpy as np
 
@@ -43,8 +42,7 @@ class Resume:
 
     shape: Shape
     """Shape of the whole grid of the state."""
-    values: dict[str, Any]
-    """The attributes of the state by name."""
+    state: State
     moved: bool = False
     """Whether another number of processes saved it, whose indenter differs by rounding."""
 
@@ -75,7 +73,7 @@ def solve_contact(
     while grids:
         fine = grids.pop()
         if isinstance(start, Resume):
-            state = _resumed(fine, solver, start)
+            state = _resumed(fine, start)
             transforms, start = state.coarser_transforms, None
         else:
             state = _begin(solver, fine, coarse, state, start)
@@ -176,7 +174,7 @@ def _begin(
     return solver.begin(fine, u)
 
 
-def _resumed(contact: Contact, solver: Solver, resume: Resume) -> State:
+def _resumed(contact: Contact, resume: Resume) -> State:
     """The stored state; a stress that is claimed to be exact is computed afresh.
 
     That gives the same bits again, and a forged state cannot end a solve.
@@ -185,7 +183,7 @@ def _resumed(contact: Contact, solver: Solver, resume: Resume) -> State:
     indenter, and stop every move. So where the last bits of the indenter have changed, points of
     contact are laid on it again.
     """
-    state = solver.state_type(**resume.values)
+    state = resume.state
     if resume.moved:
         near = SAME_HEIGHT * np.finfo(state.u.dtype).eps
         for rows in row_blocks(state.u):

@@ -15,20 +15,7 @@ from gfmd_cli.errors import InputError
 from gfmd_cli.physics.elastomers import Elastomer
 from gfmd_cli.physics.surfaces import Surface
 from gfmd_cli.solvers.auto import AnySolver
-from gfmd_cli.spec.models import (
-    LOADS,
-    REPEATED,
-    SHAPES,
-    SWEPT,
-    AccuracyTable,
-    GridTable,
-    Ladder,
-    LoadTable,
-    OutputTable,
-    Spec,
-    StudyTable,
-    SweepTable,
-)
+from gfmd_cli.spec import models
 from gfmd_cli.spec_table import SpecTable
 from gfmd_cli.units import left_out
 
@@ -44,15 +31,15 @@ WORDS = {
 }
 """What is allowed, by the type of pydantic's error, where its message is not plain."""
 MODELS: dict[str, Any] = {
-    "study": StudyTable,
+    "study": models.StudyTable,
     "surface": Surface,
     "elastomer": Elastomer,
-    "grid": GridTable,
-    "load": LoadTable,
+    "grid": models.GridTable,
+    "load": models.LoadTable,
     "solver": AnySolver,
-    "output": OutputTable,
-    "accuracy": AccuracyTable,
-    "sweep": SweepTable,
+    "output": models.OutputTable,
+    "accuracy": models.AccuracyTable,
+    "sweep": models.SweepTable,
 }
 """The class of each table, or the union of the classes of its kinds."""
 ADAPTERS: dict[str, TypeAdapter[Any]] = {name: TypeAdapter(MODELS[name]) for name in MODELS}
@@ -114,7 +101,7 @@ class Check:
             more = left_out(len(lines), MAX_PROBLEMS)
             raise InputError("\n".join([*lines[:MAX_PROBLEMS], *more]))
 
-    def spec(self, data: dict[str, Any]) -> Spec:
+    def spec(self, data: dict[str, Any]) -> models.Spec:
         """The spec of these tables. Raises InputError."""
         for name in map(str, data):  # tables from Python may have other keys
             if name not in MODELS:
@@ -127,8 +114,8 @@ class Check:
                 continue
             entries = self.entries(name, data.get(name, {}), _keys_of(name, sweeps))
             choices = [choice for choice, _ in entries]
-            tables[name] = choices if name in SWEPT else next(iter(choices), None)
-            if sweeps and name in SWEPT:
+            tables[name] = choices if name in models.SWEPT else next(iter(choices), None)
+            if sweeps and name in models.SWEPT:
                 tables["places"][name] = [places for _, places in entries]
         load = tables.get("load")
         if sweeps and load is not None:
@@ -140,23 +127,23 @@ class Check:
             tables["accuracy"] = None
         self._compare(tables)
         self.refuse()
-        return Spec(**tables)
+        return models.Spec(**tables)
 
     def entries(self, name: str, given: Any, paired: Sequence[list[str]] = ()) -> list[PlacedTable]:
         """The distinct choices of one table, with their places in the paired lists."""
         entries: list[PlacedTable] = []
-        for table in _alternatives(given) if name in REPEATED else [given]:
+        for table in _alternatives(given) if name in models.REPEATED else [given]:
             if isinstance(table, dict):
                 entries += self._build(name, table, paired)
             else:
                 self.add(name, f"must be a table, got {shortened(repr(table))}")
-        return list(dict.fromkeys(entries)) if name in SWEPT else entries
+        return list(dict.fromkeys(entries)) if name in models.SWEPT else entries
 
     def _build(
         self, name: str, table: dict[str, Any], paired: Sequence[list[str]]
     ) -> list[PlacedTable]:
         """The choices of one table, every combination of its lists."""
-        axes = _axes(table, paired) if name in SWEPT else []
+        axes = _axes(table, paired) if name in models.SWEPT else []
         count = prod(len(table[keys[0]]) for keys in axes)
         if not 0 < count <= MAX_SWEEP:
             self.add(name, f"its lists have {count} combinations; 1 to {MAX_SWEEP} are allowed")
@@ -176,11 +163,11 @@ class Check:
                     self.add(*_problem(name, places, detail))
         return built
 
-    def _sweeps(self, data: dict[str, Any]) -> list[SweepTable]:
+    def _sweeps(self, data: dict[str, Any]) -> list[models.SweepTable]:
         """The valid groups of paired lists."""
-        sweeps: list[SweepTable] = []
+        sweeps: list[models.SweepTable] = []
         for sweep, _ in self.entries("sweep", data["sweep"]) if "sweep" in data else []:
-            assert isinstance(sweep, SweepTable)
+            assert isinstance(sweep, models.SweepTable)
             problems = _problems_of(sweep, data)
             for text in problems:
                 self.add("sweep.paired", text)
@@ -203,7 +190,7 @@ class Check:
                 'with grid.points = "auto" the points along y follow from the sides; give '
                 "surface.length_y",
             )
-        if auto and load is not None and LOADS[load.quantity].searched:
+        if auto and load is not None and models.LOADS[load.quantity].searched:
             self.add(
                 "grid.points",
                 f'"auto" needs load.p_star or load.pressure; load.{load.quantity} is searched on '
@@ -226,7 +213,7 @@ def _alternatives(given: Any) -> list[Any]:
     return given if isinstance(given, list) and given else [given]
 
 
-def _keys_of(table: str, sweeps: list[SweepTable]) -> list[list[str]]:
+def _keys_of(table: str, sweeps: list[models.SweepTable]) -> list[list[str]]:
     """The keys of one table in each group of paired lists."""
     addresses = [[key.partition(".") for key in sweep.paired] for sweep in sweeps]
     return [[key for name, _, key in group if name == table] for group in addresses]
@@ -237,7 +224,7 @@ def _places_of(where: dict[str, int], groups: Sequence[list[str]]) -> Places:
     return tuple(next((where[key] for key in group if key in where), None) for group in groups)
 
 
-def _problems_of(sweep: SweepTable, data: dict[str, Any]) -> list[str]:
+def _problems_of(sweep: models.SweepTable, data: dict[str, Any]) -> list[str]:
     """What is wrong with one group of paired lists."""
     lengths: dict[str, list[int]] = {}
     for address in sweep.paired:
@@ -261,13 +248,13 @@ def _problem(name: str, places: dict[str, int], detail: Any) -> tuple[str, str]:
             return f"{name}.kind", f"is missing (known: {', '.join(kinds)})"
         return f"{name}.kind", _unknown(str(detail["ctx"]["tag"]), kinds, "kind")
     model = kinds[loc.pop(0)] if kinds else MODELS[name]
-    path = [part for part in loc if part not in SHAPES]
+    path = [part for part in loc if part not in models.SHAPES]
     key = name
     for part in path:
         key += f"[{part}]" if isinstance(part, int) else f".{part}"
         key += f"[{places[part]}]" if part in places else ""
     if detail["type"] == "extra_forbidden":
-        within = Ladder if len(path) > 1 else model
+        within = models.Ladder if len(path) > 1 else model
         known = [field.alias or field_name for field_name, field in within.model_fields.items()]
         text = _unknown(str(path[-1]), known, "key")
         owners = [kind for kind, other in kinds.items() if path[-1] in other.model_fields]

@@ -11,7 +11,6 @@ from gfmd_cli.files.regular import open_regular
 from gfmd_cli.physics.file_surface import FileSurface
 from gfmd_cli.spec.check import Check, shortened
 from gfmd_cli.spec.models import LOADS, Spec
-from gfmd_cli.spec_table import SpecTable
 
 MAX_BYTES = 256 * 1024  # of a spec; a few kB are usual
 MAX_DEPTH = 16  # of tables and lists
@@ -60,7 +59,11 @@ def read_tables(data: dict[str, Any]) -> Spec:
 def read_scan(path: Path, overrides: tuple[str, ...]) -> FileSurface:
     """The surface of a height map, with overrides "surface.key=value". Raises InputError."""
     data: dict[str, Any] = {"surface": {"kind": "file", "path": str(path)}}
-    surfaces = _choices("surface", data, path, overrides)
+    for override in overrides:
+        set_override(data, override)
+    check = Check(str(path), overrides=overrides)
+    surfaces = [surface for surface, _ in check.entries("surface", data["surface"])]
+    check.refuse()
     if set(data) != {"surface"} or len(surfaces) != 1:
         raise InputError(
             f"{path}: for a scan, --set takes only keys of the table surface, with one value each"
@@ -69,18 +72,6 @@ def read_scan(path: Path, overrides: tuple[str, ...]) -> FileSurface:
     if not isinstance(surface, FileSurface):
         raise InputError(f'{path}: surface.kind must be "file" for a height map')
     return surface.model_copy(update={"path": path})  # the path as given, for messages
-
-
-def _choices(
-    name: str, data: dict[str, Any], path: Path, overrides: tuple[str, ...]
-) -> list[SpecTable]:
-    """The choices of one table, with overrides applied to `data`. Raises InputError."""
-    for override in overrides:
-        set_override(data, override)
-    check = Check(str(path), overrides=overrides)
-    entries = check.entries(name, data[name])
-    check.refuse()
-    return [choice for choice, _ in entries]
 
 
 def read_text(text: str, path: Path, overrides: tuple[str, ...]) -> Spec:

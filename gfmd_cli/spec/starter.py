@@ -86,7 +86,7 @@ def _render(template: str, file: str, **values: Any) -> str:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    environment.globals["key"] = lambda name, value, comment: _line(name, _json(value), comment)
+    environment.globals["key"] = lambda name, value, comment: _line(name, _as_toml(value), comment)
     name = re.sub(r"[^a-zA-Z0-9._-]+", "-", Path(file).stem).strip("-._")[:100]
     return environment.get_template(template).render(
         file=shlex.quote(file), name=name or "study", **values
@@ -95,11 +95,6 @@ def _render(template: str, file: str, **values: Any) -> str:
 
 def _line(key: str, value: str, comment: str) -> str:
     return f"{f'{key} = {value}':{COLUMN}} # {comment}"
-
-
-def _json(value: Any) -> str:
-    """Strings, numbers and truth values are the same in JSON and TOML."""
-    return json.dumps(value, ensure_ascii=False, default=str)
 
 
 def with_keys(text: str, overrides: tuple[str, ...]) -> str:
@@ -157,4 +152,4 @@ def _as_toml(value: Any) -> str:
         short = f"{value:g}"
         text = short if float(short) == value else repr(value)
         return re.sub(r"e\+?(-?)0*", r"e\1", text)  # 7e10 and not 7e+10
-    return _json(value)
+    return json.dumps(value, ensure_ascii=False, default=str)  # the same in JSON and TOML

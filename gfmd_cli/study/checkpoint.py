@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
 from copy import deepcopy
 from pathlib import Path
-from typing import Literal, NamedTuple, Self
+from typing import Any, Literal, NamedTuple, Self
 
 import numpy as np
 
@@ -29,7 +29,7 @@ from gfmd_cli.solvers.loop import Solver, State
 from gfmd_cli.solvers.nested_grids import Resume, grids_of
 from gfmd_cli.study.notes import Notes
 from gfmd_cli.study.pointer import Part, Scalars, Slot, pointer_text, read_pointer
-from gfmd_cli.study.unfinished_work import set_aside
+from gfmd_cli.study.unfinished_work import delete_checkpoint, set_aside
 
 CHUNK = 2**26  # bytes that a checkpoint maps at a time
 
@@ -173,7 +173,8 @@ class Checkpoint:
         fields = _read_parts(self.folder, slot.parts, level, slot.fields)
         if level.max(float(not all(map(_is_finite, fields.values())))):
             raise StudyError(f"{self.folder}: the saved state holds numbers that are not finite")
-        return Resume(slot.shape, fields | slot.state.model_dump(), len(slot.parts) != size)
+        state = solver.state_type(**slot.state.model_dump(), **dict[str, Any](fields))
+        return Resume(slot.shape, state, len(slot.parts) != size)
 
     @property
     def notes(self) -> Notes:
@@ -183,11 +184,7 @@ class Checkpoint:
     def remove(self) -> None:
         """Forget the state: the task is done."""
         if self.mine and is_root(self.ranks):
-            for path in (self.pointer, self.folder / "lock", *self.folder.glob("[ab]*")):
-                with suppress(OSError):
-                    path.unlink()
-            with suppress(OSError):
-                self.folder.rmdir()
+            delete_checkpoint(self.folder)
 
     def _is_whole(self, part: Part) -> bool:
         """Whether a file of a slot is as it was written."""

@@ -16,23 +16,8 @@ from gfmd_cli.grid.arrays import Field
 from gfmd_cli.maps.pictures import Picture
 from gfmd_cli.physics.persson import Shells
 from gfmd_cli.status import Status
+from gfmd_cli.study import columns as layout
 from gfmd_cli.study.column import Column
-from gfmd_cli.study.columns import (
-    BENCH,
-    HISTOGRAMS,
-    LAYOUT,
-    PICTURES,
-    ROW_COLUMNS,
-    SCENE,
-    SCENE_ID,
-    SHELLS,
-    STATUS,
-    STORED,
-    TASK,
-    TASK_GROUPS,
-    TASK_ID,
-    empty_row,
-)
 from gfmd_cli.study.result import Entry, TaskResult
 
 ATTRIBUTES_SUM = "attributes_sha256"
@@ -78,7 +63,7 @@ class StudyFile:
     def columns(self) -> list[Column]:
         """The columns with one value a task that are stored."""
         names = self._packed or set(self._file)
-        return [column for column in ROW_COLUMNS if column.name in names]
+        return [column for column in layout.ROW_COLUMNS if column.name in names]
 
     @cached_property
     def rows(self) -> list[dict[str, Any]]:
@@ -87,11 +72,11 @@ class StudyFile:
         A column that is not stored is blank.
         """
         size = len(self.task_ids)
-        columns = {column.name: self.values(column) for column in (*self.columns, SCENE)}
-        columns[TASK.name] = list(range(size))
-        columns[TASK_ID.name] = self.task_ids
-        columns[STATUS.name] = self.statuses
-        for histogram in HISTOGRAMS:
+        columns = {column.name: self.values(column) for column in (*self.columns, layout.SCENE)}
+        columns[layout.TASK.name] = list(range(size))
+        columns[layout.TASK_ID.name] = self.task_ids
+        columns[layout.STATUS.name] = self.statuses
+        for histogram in layout.HISTOGRAMS:
             if has(self._file, histogram.name):
                 densities = read_dataset(self._file, histogram.name)
                 if densities.shape[1:] != histogram.middles().shape or densities.dtype.kind != "f":
@@ -100,30 +85,30 @@ class StudyFile:
         for name, values in columns.items():
             if len(values) != size:
                 raise ValueError(f"{name} has {len(values)} rows, not {size}")
-        blank = empty_row()
+        blank = layout.empty_row()
         return [blank | {name: values[i] for name, values in columns.items()} for i in range(size)]
 
     @cached_property
     def task_ids(self) -> list[str]:
         """The id of each task."""
-        return self.values(TASK_ID)
+        return self.values(layout.TASK_ID)
 
     @cached_property
     def scene_ids(self) -> list[str]:
         """The id of the scene of each task."""
-        return self.values(SCENE_ID)
+        return self.values(layout.SCENE_ID)
 
     @cached_property
     def stored(self) -> list[frozenset[str]]:
         """What [output] stored of each task."""
-        if STORED.name not in (self._packed or self._file):  # blank, as in a record without output
+        if layout.STORED.name not in (self._packed or self._file):  # blank in a record
             return [frozenset()] * len(self.task_ids)
-        return [frozenset(text.split()) for text in self.values(STORED)]
+        return [frozenset(text.split()) for text in self.values(layout.STORED)]
 
     @cached_property
     def statuses(self) -> list[Status]:
         """The status of each task."""
-        return [Status(text) for text in self.values(STATUS)]
+        return [Status(text) for text in self.values(layout.STATUS)]
 
     def values(self, column: Column) -> list[Any]:
         """The values of a column, of its kind."""
@@ -151,20 +136,20 @@ class StudyFile:
         group = find(self._file, place)
         if group is None:
             raise KeyError(f"no group {place!r}")
-        arrays = {column.name: read_dataset(group, column.name) for column in SHELLS}
+        arrays = {column.name: read_dataset(group, column.name) for column in layout.SHELLS}
         _check_alike(place, arrays, 1)
         return Shells(**arrays)
 
     def pictures(self, scene: int) -> dict[str, Picture]:
         """The pictures of a measured surface, none of any other."""
-        group = find(self._file, f"scenes/{scene}/{PICTURES}")
+        group = find(self._file, f"scenes/{scene}/{layout.PICTURES}")
         if group is None:
             return {}
         pictures = {}
         for name in ("measured", "prepared"):
             heights, sides = read_dataset(group, name), read_dataset(group, f"{name}_sides")
             if sides.shape != (heights.ndim,) or {heights.dtype.kind, sides.dtype.kind} != {"f"}:
-                raise ValueError(f"{PICTURES}/{name} is not of the shape of its sides")
+                raise ValueError(f"{layout.PICTURES}/{name} is not of the shape of its sides")
             pictures[name] = Picture(heights.astype(np.float64), tuple(map(float, sides)))
         return pictures
 
@@ -194,19 +179,19 @@ class StudyFile:
     def result(self, task: int) -> TaskResult:
         """All that is stored of one task."""
         scene = self.rows[task]["scene"]
-        arrays = {group.name: self.arrays(group.name, task) for group in TASK_GROUPS}
+        arrays = {group.name: self.arrays(group.name, task) for group in layout.TASK_GROUPS}
         return TaskResult(self.entry(task), self.shells(scene), arrays, self.pictures(scene))
 
     def check(self, task: int) -> None:
         """Raise where `result` would, for all but the values of the arrays."""
         self.shells(self.rows[task]["scene"])
         self.pictures(self.rows[task]["scene"])
-        for group in TASK_GROUPS:
+        for group in layout.TASK_GROUPS:
             self._datasets(group.name, task)
 
     def _datasets(self, group: str, task: int) -> dict[str, Any]:
         """The arrays of a task by name, not read yet: numbers, all of the same shape."""
-        place, (declared,) = f"{group}/{task}", (g for g in TASK_GROUPS if g.name == group)
+        place, (declared,) = f"{group}/{task}", (g for g in layout.TASK_GROUPS if g.name == group)
         stored = find(self._file, place)
         if stored is None:
             return {}
@@ -247,16 +232,16 @@ def open_study(source: Path, opened: BinaryIO | None = None) -> Iterator[StudyFi
 
 
 def _check_layout(path: Path, file: Any) -> None:
-    if BENCH in file.attrs:
+    if layout.BENCH in file.attrs:
         raise StudyError(f"{path}: a bench file, not a study; `gfmd bench` prints its table")
-    layout = file.attrs.get("layout")
-    if layout is None:
+    version = file.attrs.get("layout")
+    if version is None:
         raise StudyError(f"{path}: not a study")
-    if int(layout) != LAYOUT:
+    if int(version) != layout.LAYOUT:
         writer = file.attrs.get("software_version", "?")
         raise StudyError(
-            f"{path}: a study of layout {int(layout)}, written by gfmd {writer}; this version "
-            f"reads layout {LAYOUT}"
+            f"{path}: a study of layout {int(version)}, written by gfmd {writer}; this version "
+            f"reads layout {layout.LAYOUT}"
         )
     if file.attrs[ATTRIBUTES_SUM] != attributes_sum(file):
         raise StudyError(f"{path}: damaged study: its attributes are not those written")

@@ -10,15 +10,8 @@ import numpy as np
 from gfmd_cli.errors import InputError
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.grid.ranks import Ranks, broadcast
+from gfmd_cli.physics import discretisation_error
 from gfmd_cli.physics.contact import Contact, Scene
-from gfmd_cli.physics.discretisation_error import (
-    RoughnessScales,
-    Tip,
-    estimate,
-    excess_exponent,
-    local_exponent,
-    roughness_scales,
-)
 from gfmd_cli.physics.error_bounds import ErrorBounds, error_bounds, full_contact_errors
 from gfmd_cli.physics.error_estimates import NO_ERRORS, Estimate, GridValues, Verdict, unknown
 from gfmd_cli.physics.free_contact import SCENES
@@ -260,17 +253,17 @@ def _estimates(task: Task, solved: TaskSolution, grids: list[SolvedGrid]) -> dic
         )
         for grid in grids
     ]
-    exponent = local_exponent(task.elastomer, resolution, length)
-    area_exponent = excess_exponent(task.elastomer, resolution, length)
+    exponent = discretisation_error.local_exponent(task.elastomer, resolution, length)
+    area_exponent = discretisation_error.excess_exponent(task.elastomer, resolution, length)
     has_scales = task.surface.rough and task.boundary == "periodic"
-    return estimate(
+    return discretisation_error.estimate(
         levels,
         exponent,
         scales_of(scene, task.surface.band_limited) if has_scales else None,
         area_exponent,
         band_limited=task.surface.band_limited,
         stepped=task.surface.stepped,
-        tip=Tip(task.surface.tip_exponent, scene.grid.dimension),
+        tip=discretisation_error.Tip(task.surface.tip_exponent, scene.grid.dimension),
         between=_between_points(task, solved),
     )
 
@@ -290,9 +283,9 @@ def _between_points(task: Task, solved: TaskSolution) -> dict[str, float]:
     )
 
 
-def scales_of(scene: Scene, band_limited: bool) -> RoughnessScales:
+def scales_of(scene: Scene, band_limited: bool) -> discretisation_error.RoughnessScales:
     """The scales of a rough surface, as `estimate` needs them."""
-    return roughness_scales(
+    return discretisation_error.roughness_scales(
         scene.shells,
         scene.grid.length,
         anisotropy(scene.grid, scene.height),

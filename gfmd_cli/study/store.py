@@ -10,9 +10,10 @@ time. A result leaves a study only for one of the same task with at least the sa
 
 import json
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -22,25 +23,18 @@ from gfmd_cli.files.hdf5 import new_hdf5
 from gfmd_cli.files.locks import locked
 from gfmd_cli.spec.models import Spec
 from gfmd_cli.status import Status
+from gfmd_cli.study import unfinished_work
 from gfmd_cli.study.measure import task_row
 from gfmd_cli.study.provenance import origin
 from gfmd_cli.study.reading import StudyFile, open_study
 from gfmd_cli.study.result import Entry, Outcome, TaskResult
 from gfmd_cli.study.tasks import Task
-from gfmd_cli.study.unfinished_work import (
-    SUFFIX,
-    check_own,
-    checkpoint_folders,
-    read_record,
-    read_record_entry,
-    remove_parts,
-    set_aside,
-    version_of,
-)
 from gfmd_cli.study.writing import write_study
 
 EARLIER = "earlier_specs"
 """Attribute with the texts of the specs before the last one, as JSON."""
+_Results = dict[str, tuple[Entry, Callable[[], TaskResult]]]
+"""By the id of a task: its entry, and a function that reads the whole result."""
 
 
 class Study:
@@ -67,7 +61,7 @@ class Study:
         Yields what was found damaged, and set aside. The last one to leave removes the folder
         unless something is left to do there. Raises InputError, SpaceError.
         """
-        check_own(self.parts)
+        unfinished_work.check_own(self.parts)
         in_use = self.parts / "in-use"
         with locked(in_use, wait=False) as alone:
             if alone:  # what was being written by a process that was killed
@@ -80,7 +74,7 @@ class Study:
             yield damaged
         with self._collecting(), locked(in_use, wait=False) as alone:
             if alone and self._is_complete(tasks):
-                remove_parts(self.parts)
+                unfinished_work.remove_parts(self.parts)
 
     def outcomes(self) -> dict[str, Outcome]:
         """What is stored of each task that is solved, collected or not, by its id."""
@@ -115,9 +109,9 @@ class Study:
                 file = stack.enter_context(new_hdf5(fresh))
                 attributes = origin(spec, text)
                 attributes[EARLIER] = json.dumps(_earlier_specs(old, text))
-                source = _Sources(records, old)
-                entries = source.entries(tasks)
-                write_study(file, attributes, entries, lambda i: source.load(entries[i].task_id))
+                results = _stored_results(records, old)
+                entries = _entries(tasks, results)
+                write_study(file, attributes, entries, lambda i: results[entries[i].task_id][1]())
             for path in records:
                 path.unlink(missing_ok=True)
             self._entries.clear()
@@ -134,7 +128,7 @@ class Study:
             number += 1
         new_paths = []
         if self.parts.exists():
-            check_own(self.parts)
+            unfinished_work.check_own(self.parts)
             with locked(self.parts / "in-use", wait=False) as alone:
                 if not alone:
                     raise InputError(f"{self.path}: another run works on this study; wait for it")
@@ -157,8 +151,9 @@ class Study:
     def _sound_records(self) -> tuple[dict[Path, Entry], list[str]]:
         """The records by path; a damaged one is set aside, with a message."""
         entries, damaged = self.records()
+        bad = {path: unfinished_work.set_aside(path).name for path in damaged}
         return entries, [
-            f"{error}; set aside as {set_aside(path).name}, its task is solved again"
+            f"{error}; set aside as {bad[path]}, its task is solved again"
             for path, error in damaged.items()
         ]
 
@@ -167,9 +162,9 @@ class Study:
 
         Raises StudyError.
         """
-        version = path, version_of(path)
+        version = path, unfinished_work.version_of(path)
         if version not in self._entries:
-            self._entries[version] = read_record_entry(path)
+            self._entries[version] = unfinished_work.read_record_entry(path)
         return self._entries[version]
 
     def _is_complete(self, tasks: list[Task]) -> bool:
@@ -181,7 +176,8 @@ class Study:
                 return False
         lacking = {task.id for task in without_result(tasks, self.collected())}
         solved = {task.id for task in tasks} - lacking
-        return all(folder.name in solved for folder in checkpoint_folders(self.parts))
+        folders = unfinished_work.checkpoint_folders(self.parts)
+        return all(folder.name in solved for folder in folders)
 
     def damaged_paths(self) -> list[Path]:
         """The damaged files that were set aside."""
@@ -189,7 +185,7 @@ class Study:
 
     def record_paths(self) -> list[Path]:
         """The records that are not collected yet."""
-        return sorted(self.parts.glob(f"*{SUFFIX}"))
+        return sorted(self.parts.glob(f"*{unfinished_work.SUFFIX}"))
 
     def _collecting(self) -> Any:
         """Keep other collectors out."""
@@ -225,37 +221,25 @@ def _earlier_specs(old: StudyFile | None, text: str) -> list[str]:
     return [earlier for earlier in dict.fromkeys(texts) if earlier != text]
 
 
-class _Sources:
-    """Where the results of a new study come from: records, and the study so far."""
+def _stored_results(records: dict[Path, Entry], old: StudyFile | None) -> _Results:
+    """The solved tasks of the records and of the study so far."""
+    results: _Results = {}
+    if old is not None:
+        for index, status in enumerate(old.statuses):
+            if status.is_solved:
+                results[old.task_ids[index]] = old.entry(index), partial(old.result, index)
+    for path, entry in records.items():
+        before = results.get(entry.task_id)
+        if before is None or entry.stored >= before[0].stored:
+            results[entry.task_id] = entry, partial(unfinished_work.read_record, path)
+    return results
 
-    def __init__(self, records: dict[Path, Entry], old: StudyFile | None) -> None:
-        self.old = old
-        self.by_task: dict[str, tuple[Entry, Path | int]] = {}
-        """By task id: its entry, and the record or the index in the study so far."""
-        if old is not None:
-            for index, status in enumerate(old.statuses):
-                if status.is_solved:
-                    self.by_task[old.task_ids[index]] = old.entry(index), index
-        for path, entry in records.items():
-            before = self.by_task.get(entry.task_id)
-            if before is None or entry.stored >= before[0].stored:
-                self.by_task[entry.task_id] = entry, path
 
-    def entries(self, tasks: list[Task]) -> list[Entry]:
-        """The tasks of a spec, solved or not, then all others that are solved."""
-        own = {task.id: self._entry(task) for task in tasks}
-        return [*own.values(), *(e for name, (e, _) in self.by_task.items() if name not in own)]
-
-    def _entry(self, task: Task) -> Entry:
-        """What the spec gives of a task, and what was measured if it is solved."""
+def _entries(tasks: list[Task], results: _Results) -> list[Entry]:
+    """The tasks of a spec, solved or not, as the spec describes them; then the other results."""
+    own: dict[str, Entry] = {}
+    for task in tasks:
         missing = Entry(task.id, task.scene_id, frozenset(), {"status": Status.MISSING})
-        entry, _ = self.by_task.get(task.id, (missing, 0))
-        return entry._replace(row=task_row(task, entry.row))
-
-    def load(self, task_id: str) -> TaskResult:
-        """The whole result of a task."""
-        _, place = self.by_task[task_id]
-        if isinstance(place, Path):
-            return read_record(place)
-        assert self.old is not None
-        return self.old.result(place)
+        entry = results[task.id][0] if task.id in results else missing
+        own[task.id] = entry._replace(row=task_row(task, entry.row))
+    return [*own.values(), *(entry for name, (entry, _) in results.items() if name not in own)]

@@ -12,16 +12,7 @@ from gfmd_cli.physics.indenters import RigidSurface
 from gfmd_cli.physics.linear_elastomer import LinearElastomer
 from gfmd_cli.physics.surfaces import check_resolved
 from gfmd_cli.solvers.auto import AnySolver
-from gfmd_cli.spec.models import (
-    LOADS,
-    SWEPT,
-    AccuracyTable,
-    GridTable,
-    OutputTable,
-    Spec,
-    load_text,
-    with_boundary,
-)
+from gfmd_cli.spec import models
 from gfmd_cli.spec_table import SpecTable
 from gfmd_cli.study import forecast
 
@@ -37,7 +28,7 @@ class Task:
     index: int
     surface: RigidSurface
     elastomer: LinearElastomer
-    grid: GridTable
+    grid: models.GridTable
     points: int
     """Points along x; of an "auto" grid a forecast."""
     points_y: int
@@ -49,8 +40,8 @@ class Task:
     load_tolerance: float
     """Relative distance to it at which a search ends."""
     solver: AnySolver
-    output: OutputTable
-    accuracy: AccuracyTable | None
+    output: models.OutputTable
+    accuracy: models.AccuracyTable | None
     id: str
     """Name of the task by its content, the output left out."""
     scene_id: str
@@ -82,7 +73,7 @@ class Task:
     @property
     def load_label(self) -> str:
         """The load with its symbol."""
-        return load_text(self.quantity, self.load)
+        return models.load_text(self.quantity, self.load)
 
     def p_star(self, delta_sigma: float) -> float:
         """The reduced pressure, where it is known, on a scene with this Delta_sigma [Pa]."""
@@ -129,13 +120,13 @@ class Task:
     @property
     def seconds(self) -> float:
         """Time that the solve is expected to take on one thread, within a factor of about three."""
-        solves = forecast.SEARCH if LOADS[self.quantity].searched else 1.0
+        solves = forecast.SEARCH if models.LOADS[self.quantity].searched else 1.0
         p_star = self.load if self.quantity == "p_star" else forecast.P_STAR
         pairs = forecast.pairs(self.elastomer.exponent, p_star, self.solver.tolerance)
         return 0.01 + solves * forecast.SECONDS_PER_PAIR * self.size * pairs
 
 
-def plan(spec: Spec) -> list[Task]:
+def plan(spec: models.Spec) -> list[Task]:
     """The tasks of a spec, in a fixed order: surface, elastomer, grid, solver, pressure.
 
     Raises InputError where a grid does not resolve its surface or a file is unfit.
@@ -146,11 +137,11 @@ def plan(spec: Spec) -> list[Task]:
         raise InputError(f"{spec.source}: {error}") from error
 
 
-def _tasks(spec: Spec) -> list[Task]:
+def _tasks(spec: models.Spec) -> list[Task]:
     _check(spec)
     resolved = spec.resolved()
-    alternatives = {table: getattr(spec, table) for table in SWEPT}
-    swept_keys = {table: _swept_keys(alternatives[table]) for table in SWEPT}
+    alternatives = {table: getattr(spec, table) for table in models.SWEPT}
+    swept_keys = {table: _swept_keys(alternatives[table]) for table in models.SWEPT}
     tasks: list[Task] = []
     for at, loads in spec.combinations():
         chosen = _chosen(spec, at)
@@ -183,9 +174,9 @@ def _tasks(spec: Spec) -> list[Task]:
     return tasks
 
 
-def _check(spec: Spec) -> None:
+def _check(spec: models.Spec) -> None:
     """Raise InputError for too many tasks, an unfit file, or tables that do not suit each other."""
-    count = prod(len(getattr(spec, table)) for table in SWEPT) * len(spec.load.values())
+    count = prod(len(getattr(spec, table)) for table in models.SWEPT) * len(spec.load.values())
     if spec.sweep and count <= MAX_COMBINATIONS:
         count = sum(len(loads) for _, loads in spec.combinations())
     if count > MAX_TASKS:
@@ -195,8 +186,8 @@ def _check(spec: Spec) -> None:
     combinations = [at for at, _ in spec.combinations()]
     for i, j in dict.fromkeys((at["surface"], at["grid"]) for at in combinations):
         _check_grid(spec.surface[i], spec.grid[j])
-    for places in dict.fromkeys(tuple(at[table] for table in SWEPT) for at in combinations):
-        chosen = _chosen(spec, dict(zip(SWEPT, places, strict=True)))
+    for places in dict.fromkeys(tuple(at[table] for table in models.SWEPT) for at in combinations):
+        chosen = _chosen(spec, dict(zip(models.SWEPT, places, strict=True)))
         elastomer, dimension = chosen["elastomer"], chosen["surface"].dimension
         boundary = chosen["grid"].boundary or "periodic"
         chosen["solver"].check_boundary(boundary)
@@ -206,14 +197,14 @@ def _check(spec: Spec) -> None:
             elastomer.check_displacement_load(boundary, dimension)
 
 
-def _chosen(spec: Spec, at: dict[str, int]) -> dict[str, Any]:
+def _chosen(spec: models.Spec, at: dict[str, int]) -> dict[str, Any]:
     """The entries of the swept tables at these places, with the boundary of the contact."""
     chosen = {table: getattr(spec, table)[i] for table, i in at.items()}
-    surface, grid = with_boundary(**chosen)
+    surface, grid = models.with_boundary(**chosen)
     return chosen | {"surface": surface, "grid": grid}
 
 
-def _check_grid(surface: RigidSurface, grid: GridTable) -> None:
+def _check_grid(surface: RigidSurface, grid: models.GridTable) -> None:
     """Raise InputError for a grid that does not resolve or does not suit its surface."""
     if surface.dimension == 1 and grid.points_y is not None:
         raise InputError(
@@ -226,7 +217,7 @@ def _check_grid(surface: RigidSurface, grid: GridTable) -> None:
         check_resolved(on_cell, points, points_y)
 
 
-def _points(spec: Spec, chosen: dict[str, Any], load: float) -> int:
+def _points(spec: models.Spec, chosen: dict[str, Any], load: float) -> int:
     """Points along x of the cell; of an "auto" grid a forecast."""
     surface, grid = chosen["surface"], chosen["grid"]
     if grid.points != "auto":
@@ -236,11 +227,13 @@ def _points(spec: Spec, chosen: dict[str, Any], load: float) -> int:
     return forecast.last_grid(surface, exponent, p_star, grid.boundary, spec.accuracy)
 
 
-def _task_id(spec: Spec, resolved: dict[str, Any], tables: dict[str, Any], load: float) -> str:
+def _task_id(
+    spec: models.Spec, resolved: dict[str, Any], tables: dict[str, Any], load: float
+) -> str:
     """Name of a task: the digest of everything that its solution depends on."""
     quantity = spec.load.quantity
     content = [tables, quantity == "p_star", f"{load:.{LOAD_DIGITS}g}"]
-    if LOADS[quantity].searched:
+    if models.LOADS[quantity].searched:
         content += [quantity, spec.load.tolerance]
     if spec.accuracy is not None:
         content.append(resolved["accuracy"])

@@ -53,7 +53,7 @@ def remove_parts(parts: Path) -> None:
     for path in _listed(parts):
         if _is_folder(path):
             if OWN_FOLDERS.fullmatch(path.name):
-                _delete_checkpoint(path)
+                delete_checkpoint(path)
         elif path.name not in LOCKS and OWN_FILES.fullmatch(path.name):
             path.unlink(missing_ok=True)
     for name in LOCKS:
@@ -75,9 +75,9 @@ def _is_folder(path: Path) -> bool:
     return path.is_dir() and not path.is_symlink()
 
 
-def _delete_checkpoint(folder: Path) -> None:
-    """Delete the files of a checkpoint, then the folder if it is empty."""
-    for path in _listed(folder):
+def delete_checkpoint(folder: Path) -> None:
+    """Delete the files of a checkpoint, its pointer first, then the folder if it is empty."""
+    for path in (folder / "pointer", *_listed(folder)):
         if IN_CHECKPOINT.fullmatch(path.name):
             with suppress(OSError):
                 path.unlink()

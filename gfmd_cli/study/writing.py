@@ -10,24 +10,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from gfmd_cli.files.hdf5 import as_text, create_dataset, write_checked, write_scale
+from gfmd_cli.study import columns as layout
 from gfmd_cli.study.column import Column
-from gfmd_cli.study.columns import (
-    COLUMNS,
-    HISTOGRAMS,
-    LAYOUT,
-    PARAMETER_COLUMNS,
-    PICTURES,
-    SCENE,
-    SCENE_ID,
-    SHELLS,
-    STORED,
-    TASK,
-    TASK_GROUPS,
-    TASK_ID,
-    WEIGHTS,
-    HistogramColumn,
-    TaskGroup,
-)
 from gfmd_cli.study.reading import ATTRIBUTES_SUM, KINDS, PACKED, attributes_sum
 from gfmd_cli.study.result import Entry, TaskResult
 
@@ -50,24 +34,25 @@ def write_study(
     labelled : whether users open it; without, as in a record, the columns of a kind share a
         dataset and there are no labels: a tenth of the time
     """
-    file.attrs.update({"layout": LAYOUT, **attributes})
+    file.attrs.update({"layout": layout.LAYOUT, **attributes})
     file.attrs[ATTRIBUTES_SUM] = attributes_sum(file)
     rows = [entry.row for entry in entries]
     writer = _Writer(labelled)
-    task = writer.scale(file, TASK.name, np.arange(len(rows)), TASK.units, TASK.meaning)
+    axis = layout.TASK
+    task = writer.scale(file, axis.name, np.arange(len(rows)), axis.units, axis.meaning)
     options = {name.partition(".")[0] for entry in entries for name in entry.stored}
     scenes = {name: i for i, name in enumerate(dict.fromkeys(e.scene_id for e in entries))}
-    weights = [column for name in WEIGHTS if name in options for column in WEIGHTS[name]]
-    values = {column: [row[column.name] for row in rows] for column in (*COLUMNS, *weights)}
-    values[TASK_ID] = [entry.task_id for entry in entries]
-    values[SCENE_ID] = [entry.scene_id for entry in entries]
-    values[STORED] = [" ".join(sorted(entry.stored)) for entry in entries]
-    values[SCENE] = [scenes[entry.scene_id] for entry in entries]
+    weights = [c for name, group in layout.WEIGHTS.items() if name in options for c in group]
+    values = {column: [row[column.name] for row in rows] for column in (*layout.COLUMNS, *weights)}
+    values[layout.TASK_ID] = [entry.task_id for entry in entries]
+    values[layout.SCENE_ID] = [entry.scene_id for entry in entries]
+    values[layout.STORED] = [" ".join(sorted(entry.stored)) for entry in entries]
+    values[layout.SCENE] = [scenes[entry.scene_id] for entry in entries]
     writer.columns(file, values, task)
-    for histogram in HISTOGRAMS:
+    for histogram in layout.HISTOGRAMS:
         if histogram.option in options:
             writer.histogram(file, histogram, task, rows)
-    groups = [group for group in TASK_GROUPS if group.option in options]
+    groups = [group for group in layout.TASK_GROUPS if group.option in options]
     with_arrays = {group.option for group in groups}
     for index, entry in enumerate(entries):
         scene = f"scenes/{scenes[entry.scene_id]}"
@@ -97,7 +82,8 @@ class _Writer(NamedTuple):
         """The columns: a dataset each, or one for all of a kind that are not blank."""
         if self.labelled:
             for column, of_column in values.items():
-                if column not in PARAMETER_COLUMNS or not all(map(column.is_blank, of_column)):
+                is_optional = column in layout.PARAMETER_COLUMNS
+                if not (is_optional and all(map(column.is_blank, of_column))):
                     write_column(file, column, of_column, [task])
             return
         for kind in KINDS:
@@ -111,7 +97,7 @@ class _Writer(NamedTuple):
             create_dataset(group, "values", _array(kind, list(columns.values())))
 
     def histogram(
-        self, file: Any, histogram: HistogramColumn, task: Any, rows: list[Mapping[str, Any]]
+        self, file: Any, histogram: layout.HistogramColumn, task: Any, rows: list[Mapping[str, Any]]
     ) -> None:
         """The densities of all tasks over the bins."""
         edges, middles = histogram.edges, histogram.middles()
@@ -123,16 +109,16 @@ class _Writer(NamedTuple):
         self.column(file, histogram.column, densities, [task, bins])
 
     def result(
-        self, file: Any, index: int, scene: str, groups: list[TaskGroup], result: TaskResult
+        self, file: Any, index: int, scene: str, groups: list[layout.TaskGroup], result: TaskResult
     ) -> None:
         """Spectrum and pictures of the scene, unless they are there, and the arrays of one task."""
         if scene not in file:
             group = file.create_group(scene)
             shell = self.scale(group, "shell", np.arange(result.shells.q.size), "1", "shell")
-            for column in SHELLS:
+            for column in layout.SHELLS:
                 self.column(group, column, getattr(result.shells, column.name), [shell])
             for name, picture in result.pictures.items():
-                shown = group.require_group(PICTURES)
+                shown = group.require_group(layout.PICTURES)
                 write_checked(shown, name, picture.heights.astype(np.float32))
                 write_checked(shown, f"{name}_sides", np.array(picture.sides))
         for declared in groups:
@@ -145,7 +131,7 @@ class _Writer(NamedTuple):
                         self.column(group, column, arrays[column.name], scales)
 
     def _axes(
-        self, group: Any, declared: TaskGroup, shape: tuple[int, ...], row: Mapping[str, Any]
+        self, group: Any, declared: layout.TaskGroup, shape: tuple[int, ...], row: Mapping[str, Any]
     ) -> list[Any]:
         """The axes of the arrays of a group: an index, or positions [m] on the grid."""
         if declared.axis:

@@ -102,11 +102,11 @@ def test_a_damaged_checkpoint_gives_an_older_state_or_none(tmp_path):
                 met["anew"] += 1
                 assert ".bad" in message
             else:
-                step = resume.values["step"]
+                step = resume.state.step
                 met[f"from step {step}"] += 1
                 assert checkpoint.notes.trials[0].pressure == step
                 assert (message is None) == (step == 2)
-                np.testing.assert_array_equal(resume.values["u"], states[step - 1])
+                np.testing.assert_array_equal(resume.state.u, states[step - 1])
             shutil.rmtree(tmp_path / "d")
             for bad_file in tmp_path.glob("*.bad"):
                 bad_file.unlink()
