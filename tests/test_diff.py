@@ -190,6 +190,21 @@ def test_of_several_grids_the_same_ones_belong_together(study_of):
     assert not difference.exceeds(0)
 
 
+def test_a_free_boundary_is_named_and_paired_with_its_like(output_of, study_of):
+    one = study_of("elastomer.n=1", "grid.boundary=['free', 'periodic']")
+    other = study_of("elastomer.n=1", "grid.boundary=['periodic', 'free']")
+    assert not diff(one, other).exceeds(0)
+    headings = output_of("diff", one, other).split("A: ")[0]
+    assert headings.count(", free boundary\n") == 1
+    free, periodic = (study_of("elastomer.n=1", f"grid.boundary={b}") for b in ("free", "periodic"))
+    lines = output_of("diff", free, periodic).splitlines()
+    (heading,) = (line for line in lines if line.startswith("A: "))
+    assert heading.endswith(", free boundary")
+    assert lines[lines.index(heading) + 1] == "B: " + heading[3:].removesuffix(", free boundary")
+    row = json.loads(output_of("diff", free, periodic, "--json"))["rows"][0]
+    assert (row["boundary_a"], row["boundary_b"]) == ("free", "periodic")
+
+
 def test_differences_are_told_in_units_of_the_error_bars(output_of, study_of):
     bars = ("accuracy.mean_gap=0.5", "elastomer.n=1", "load.p_star=0.1")
     one, other = study_of(*bars), study_of(*bars, "grid.points=48")

@@ -84,10 +84,10 @@ class Difference:
 def diff(one: Path, other: Path) -> Difference:
     """Match the rows of two studies by surface, seed, elastomer and load.
 
-    Grids and solvers may differ; of several rows, those of the same grid and solver belong
-    together, then those of the same grid. Where nothing matches and each study presses one
-    elastomer on one surface, rows belong together by their load alone. Raises InputError,
-    StudyError.
+    Boundaries, grids and solvers may differ; of several rows, those of the same boundary, grid and
+    solver belong together, then those that share fewer of these. If no rows match and each study
+    presses one elastomer on one surface, rows belong together by their load alone. Raises
+    InputError, StudyError.
     """
     with open_study(one) as a, open_study(other) as b:
         only = solved_rows(a.rows), solved_rows(b.rows)
@@ -105,10 +105,11 @@ def _contact_of(row: Row) -> tuple[Hashable, ...]:
 
 
 def _matches(one: list[Row], other: list[Row], *keys: Key) -> list[Pair]:
-    """Pairs of the same keys, alike in grid and solver if they can be; taken from both lists."""
+    """Pairs of the same keys, alike in boundary, grid and solver if possible; from both lists."""
     pairs: list[Pair] = []
     paired_ids: set[int] = set()
-    for alike in (("points", "solver", "tolerance"), ("points",), ()):
+    columns = "boundary", "points", "solver", "tolerance"
+    for alike in (columns, columns[:2], columns[:1], columns[1:2], ()):
 
         def key_of(row: Row, alike: tuple[str, ...] = alike) -> Hashable:
             return *(key(row) for key in keys), *(row[name] for name in alike)

@@ -19,7 +19,7 @@ LEGEND = (
 NOTHING = "no contact in common"
 CONTACT = ("surface", "seed", "elastomer", "load", "load_value")
 """Keys that both rows of a pair share, unless the studies are paired by load."""
-ONE_STUDY = (*CONTACT, "points", "p_star")
+ONE_STUDY = (*CONTACT, "boundary", "points", "p_star")
 """Keys of a row that one study alone has."""
 
 
@@ -80,14 +80,19 @@ def diff_json(difference: Difference) -> str:
 
 
 def _title(pair: Pair) -> str:
-    one, other = contact_title(pair.one), contact_title(pair.other)
+    one, other = _contact(pair.one), _contact(pair.other)
     return one if one == other else f"A: {one}\nB: {other}"
+
+
+def _contact(row: Row) -> str:
+    """Elastomer and surface of a contact, and its boundary where that is free."""
+    return contact_title(row) + (", free boundary" if row["boundary"] == "free" else "")
 
 
 def _record(pair: Pair) -> Record:
     """Both values of what is compared, as `a_r_a` and `a_r_b`, their unit, and how far apart."""
     record = {key: pair.one[key] for key in CONTACT}
-    for key in ("points", "p_star"):
+    for key in ("boundary", "points", "p_star"):
         record |= {f"{key}_a": pair.one[key], f"{key}_b": pair.other[key]}
     for name in QUANTITIES:
         a, b = pair.values(name)
@@ -105,7 +110,7 @@ def _json_values(record: Record, *keys: str) -> dict[str, Any]:
 def _loads_by_contact(rows: list[Row]) -> list[str]:
     """Loads grouped by scene, a line for each grid."""
     lines = []
-    for name, scene in grouped(rows, contact_title).items():
+    for name, scene in grouped(rows, _contact).items():
         grids = grouped(scene, lambda row: row["points"])
         loads = {points: ", ".join(map(_load, grid)) for points, grid in grids.items()}
         lines += [f"  {name}", *(f"    {points}: {text}" for points, text in loads.items())]

@@ -145,10 +145,10 @@ def diff(
     """Compare the results of two studies.
 
     The command compares contact area, stress deviation and mean gap. Contacts are paired by
-    surface, seed, elastomer and load; grids and solvers may differ. Contacts of only one study are
-    listed, but not compared. If no contacts match and each study has one surface and one elastomer,
-    contacts are paired by load alone. Differences are relative; if the load is in Pa or m, those of
-    stress and gap are in Pa and m, otherwise in reduced units.
+    surface, seed, elastomer and load; boundaries, grids and solvers may differ. Contacts of only
+    one study are listed, but not compared. If no contacts match and each study has one surface and
+    one elastomer, contacts are paired by load alone. Differences are relative; if the load is in Pa
+    or m, those of stress and gap are in Pa and m, otherwise in reduced units.
 
     Example:
 
