@@ -8,7 +8,7 @@ import numpy as np
 
 from gfmd_cli.analysis.compare import Curve
 from gfmd_cli.analysis.curve_styles import MARKERS, CurveStyle, colours
-from gfmd_cli.analysis.figures import GAP, P_STAR
+from gfmd_cli.analysis.figures import LABELS, P_STAR
 from gfmd_cli.analysis.plotting import ColumnFigure
 from gfmd_cli.grid.arrays import Field
 from paper.claims import Finding, Value
@@ -27,7 +27,7 @@ def _gap_over_pressure(
 ) -> list[Group]:
     """u_g over p* with theory, all exponents but n = 0."""
     ensembles = [group for group in groups(studies, study) if group.n > 0]
-    plot, xs, ys, lines = ColumnFigure(P_STAR, GAP), [], [], []
+    plot, xs, ys, lines = ColumnFigure(P_STAR, LABELS["u_g"]), [], [], []
     for group in ensembles:
         p, u = group.p, group.best("u_g")
         shown = (u.value > TAIL) | (y_scale == "linear")
@@ -144,7 +144,7 @@ def _over(above: Callable[[Field], float], below: Callable[[Field], float], grou
 @needs("small_pressure")
 def small_pressure(studies: StoredStudies, folder: Path) -> list[Finding]:
     """Small pressures: how much the gap falls from decade to decade."""
-    plot, xs, ys, lines, ratios, limits = ColumnFigure(P_STAR, GAP), [], [], [], {}, {}
+    plot, xs, ys, lines, ratios, limits = ColumnFigure(P_STAR, LABELS["u_g"]), [], [], [], {}, {}
     for group in groups(studies, "small_pressure"):
         n, p, u = group.n, group.p, group.column("u_g")
         draw_points(plot, STYLES[n], p, u.value, u.error)
@@ -265,7 +265,7 @@ def fig11(studies: StoredStudies, folder: Path) -> list[Finding]:
         key=lambda group: np.nan_to_num(group.first.rows[0]["thickness"], nan=np.inf),
     )
     x_label = P_STAR.replace("sigma", "sigma_\\mathrm{si}")
-    plot, xs, ys, lines, off = ColumnFigure(x_label, GAP), [], [], [], {}
+    plot, xs, ys, lines, off = ColumnFigure(x_label, LABELS["u_g"]), [], [], [], {}
     for i, (group, colour) in enumerate(zip(ensembles, colours(len(ensembles)), strict=True)):
         t = group.first.rows[0]["thickness"] / DEFAULT_WIDTH
         name = f"t/λᵣ = {t:.2g}" if np.isfinite(t) else "half-space"

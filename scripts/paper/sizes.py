@@ -6,7 +6,7 @@ import numpy as np
 
 from gfmd_cli.analysis.compare import Curve, einstein_prediction
 from gfmd_cli.analysis.curve_styles import MARKERS, CurveStyle, colours
-from gfmd_cli.analysis.figures import GAP, P_STAR
+from gfmd_cli.analysis.figures import LABELS, P_STAR
 from gfmd_cli.analysis.plotting import ColumnFigure
 from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.physics.surfaces import sample
@@ -23,7 +23,7 @@ PARTED = 0.05  # relative difference from the closed form that counts
 @needs("fig12")
 def fig12(studies: StoredStudies, folder: Path) -> list[Finding]:
     """The Einstein foundation in two cells."""
-    plot, xs, ys, ends = ColumnFigure(P_STAR, GAP), [], [], {}
+    plot, xs, ys, ends = ColumnFigure(P_STAR, LABELS["u_g"]), [], [], {}
     ensembles = sorted(groups(studies, "fig12"), key=lambda group: -group.first.rows[0]["rolloff"])
     for group, colour, marker in zip(ensembles, colours(3), "so", strict=False):
         row = group.first.rows[0]
@@ -101,7 +101,7 @@ def _spans(ratio: int) -> tuple[float, float, int]:
 @needs("large_cell_2", "large_cell_4")
 def large_cell(studies: StoredStudies, folder: Path) -> list[Finding]:
     """u_g over p* in cells of several sizes, mean over seeds."""
-    plot, xs, ys, lines = ColumnFigure(P_STAR, GAP), [], [], []
+    plot, xs, ys, lines = ColumnFigure(P_STAR, LABELS["u_g"]), [], [], []
     ratios = [ratio for ratio in SEEDS if studies.has(f"large_cell_{ratio}")]
     means: dict[tuple[float, int], tuple[np.ndarray, np.ndarray]] = {}
     tones = colours(len(ratios))
