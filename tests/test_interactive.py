@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from gfmd_cli.analysis.curve_styles import CurveStyle
-from gfmd_cli.analysis.figures import GAP, P_STAR
+from gfmd_cli.analysis.figures import LABELS, P_STAR
 from gfmd_cli.analysis.plotting import CONFIDENCE, THEORY, UNCONVERGED, ColumnFigure
 from gfmd_cli.report.interactive import interactive
 from gfmd_cli.report.rendering import html_label, plain_label
@@ -20,7 +20,7 @@ Y = np.array([0.5, 2.0, 1 / 3])
 @pytest.fixture
 def figure():
     """Points of which one is not converged and one has an error, a band, a line of theory."""
-    plot = ColumnFigure(P_STAR, GAP)
+    plot = ColumnFigure(P_STAR, LABELS["u_g"])
     converged, error = np.array([True, True, False]), np.array([np.nan, 0.25, np.nan])
     plot.points(STYLE, X, Y, converged, error=error, details=["a < b", "c\nd", "e"])
     plot.band(STYLE, X, Y / 2, 2 * Y)
@@ -94,7 +94,7 @@ def test_axes_have_the_scales_and_ends_of_the_static_figure(figure):
     [
         (P_STAR, "reduced pressure <i>p</i>* = <i>p</i> / Δ<i>σ</i>",
          "reduced pressure p* = p / Δσ"),
-        (GAP, "mean gap <i>u</i><sub>g</sub> / <i>h</i><sub>std</sub>", "mean gap u_g / h_std"),
+        (LABELS["u_g"], "mean gap <i>u</i><sub>g</sub> / <i>h</i><sub>std</sub>", "mean gap u_g / h_std"),
         (r"$C(q)$ (m$^4$)", "<i>C</i>(<i>q</i>) (m⁴)", "C(q) (m⁴)"),
         (r"$q$ (m$^{-1}$)", "<i>q</i> (m⁻¹)", "q (m⁻¹)"),
         (r"a \$ < b", "a $ &lt; b", "a $ < b"),
