@@ -94,7 +94,8 @@ def test_axes_have_the_scales_and_ends_of_the_static_figure(figure):
     [
         (P_STAR, "reduced pressure <i>p</i>* = <i>p</i> / Δ<i>σ</i>",
          "reduced pressure p* = p / Δσ"),
-        (LABELS["u_g"], "mean gap <i>u</i><sub>g</sub> / <i>h</i><sub>std</sub>", "mean gap u_g / h_std"),
+        (LABELS["u_g"], "mean gap <i>u</i><sub>g</sub> / <i>h</i><sub>std</sub>",
+         "mean gap u_g / h_std"),
         (r"$C(q)$ (m$^4$)", "<i>C</i>(<i>q</i>) (m⁴)", "C(q) (m⁴)"),
         (r"$q$ (m$^{-1}$)", "<i>q</i> (m⁻¹)", "q (m⁻¹)"),
         (r"a \$ < b", "a $ &lt; b", "a $ < b"),
