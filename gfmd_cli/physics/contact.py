@@ -273,14 +273,14 @@ def build_scene(
 ) -> Scene:
     """Sample the surface and reduce heights and stiffness to the scales of the resolved surface.
 
+    Raises InputError where the grid does not resolve the surface, the surface is flat, or a scale
+    is out of range.
+
     Parameters
     ----------
     points, points_y : numbers of grid points along x and y; by default the pixels are square
     threads : threads of the transforms and kernels
     ranks : the processes that share large grids
-
-    Raises InputError where the grid does not resolve the surface, the surface is flat, or a scale
-    is out of range.
     """
     grid, height = sample(surface, points, points_y, ranks)
     scene = reduce_scene(replace(grid, threads=threads), height, elastomer)

@@ -52,16 +52,16 @@ def solve_contact(
 ) -> Solution:
     """Solve one contact, nested over grids.
 
+    Returns the displacement, stress and residual on the grid of the contact, in reduced units, and
+    the status that says how the solve ended. Raises InputError where the solver does not support
+    the boundary of the contact.
+
     Parameters
     ----------
     watch : is called with every state on every grid, and with the last state of the coarse grid at
         every step of a start on tiles and for every set of points of a direct one
     start : the state of an unfinished solve, or a start on the grid of the contact; without it the
         solve starts on the coarsest grid
-
-    Returns the displacement, stress and residual on the grid of the contact, in reduced units, and
-    the status that says how the solve ended. Raises InputError where the solver does not support
-    the boundary of the contact.
     """
     solver = solver.for_contact(contact)
     loose = solver.model_copy(update={"tolerance": max(solver.tolerance, COARSE_TOLERANCE)})
