@@ -4,11 +4,13 @@ import numpy as np
 import pytest
 
 from gfmd_cli.grid.fft_grid import Grid
-from gfmd_cli.physics.contact import Contact
+from gfmd_cli.physics.contact import Contact, reduce_scene
 from gfmd_cli.physics.elastomers import Power
 from gfmd_cli.solvers import multigrid_transfer_kernels as kernels
+from gfmd_cli.solvers.auto import Auto
 from gfmd_cli.solvers.contact_state import PRESSED, TENSE
 from gfmd_cli.solvers.multigrid import MAX_GROWTH, Multigrid, level_rows, suits
+from gfmd_cli.solvers.nested_grids import solve_contact
 
 PATTERNS = ("none", "points", "sparse", "dense", "disc", "grooves", "all but one", "corner")
 
@@ -100,6 +102,31 @@ def test_positive_in_its_least_direction(n, kind, shape, length_y):
         force[i] = 1.0
         cycle.apply(-force.reshape(shape), state, PRESSED, change)
         columns.append(cycle.z[:, : shape[1]].ravel()[free])
+    matrix = np.array(columns)
+    assert np.allclose(matrix, matrix.T, rtol=0, atol=1e-5 * np.abs(matrix).max())
+    values = np.linalg.eigvalsh((matrix + matrix.T) / 2)
+    assert values[0] > 1e-6 * values[-1]
+
+
+def line_contact(n, points):
+    grid = Grid(points, 1)
+    k = Power(n=n).stiffness(grid.wavenumber(), grid.length)
+    return Contact(grid, np.zeros(points), k / k.max(), 1.0)
+
+
+@pytest.mark.parametrize("n", [1, 4])
+@pytest.mark.parametrize("points", [32, 45])
+@pytest.mark.parametrize("held", [[], [7], [3, 4, 5, 20], range(28)])
+def test_symmetric_and_positive_on_a_line(n, points, held):
+    """The whole matrix of the cycle, from forces on single points."""
+    case, state = line_contact(n, points), np.zeros((1, points), np.int8)
+    state[0, list(held)] = PRESSED
+    cycle, free = Multigrid(case, case.grid), np.flatnonzero(state[0] < PRESSED)
+    columns = []
+    for force in np.eye(points)[free]:
+        cycle.apply(-force[None], state, PRESSED, np.zeros((1, points), np.float32))
+        assert not cycle.z[0, list(held)].any()
+        columns.append(cycle.z[0, free])
     matrix = np.array(columns)
     assert np.allclose(matrix, matrix.T, rtol=0, atol=1e-5 * np.abs(matrix).max())
     values = np.linalg.eigvalsh((matrix + matrix.T) / 2)
@@ -223,6 +250,11 @@ def test_shapes_of_the_levels(shape, length_y, expected):
     assert [level for level, _ in level_rows(grid)] == expected
 
 
+def test_shapes_of_the_levels_of_a_line():
+    shapes = [level for level, _ in level_rows(Grid(45, 1))]
+    assert shapes == [(1, 45), (1, 24), (1, 12), (1, 6)]
+
+
 def test_same_on_any_number_of_threads():
     points = 512
     state = (2 * (np.random.default_rng(5).random((points, points)) < 0.05)).astype(np.int8)
@@ -239,6 +271,17 @@ def test_other_grids_are_the_same_on_any_number_of_threads(shape, length_y):
     one = applied(3, state, force, length_y=length_y)
     other = applied(3, state, force, threads=3, length_y=length_y)
     assert np.array_equal(other, one)
+
+
+def test_a_steep_line_contact_converges():
+    """With the Green's function, 3000 steps do not suffice."""
+    rng, waves, points = np.random.default_rng(3), np.arange(1, 129), 4096
+    modes = np.zeros(points // 2 + 1, complex)
+    modes[waves] = (rng.normal(size=128) + 1j * rng.normal(size=128)) * waves**-1.3
+    height = np.fft.irfft(modes, points)
+    scene = reduce_scene(Grid(points, 1), height, Power(n=4))
+    solution = solve_contact(scene.contact(0.1), Auto(max_steps=1000))
+    assert solution.status.is_converged
 
 
 def test_knows_what_it_does_not_suit():

@@ -19,7 +19,8 @@ The points of a level need not be half of those of the next finer one. An odd nu
 the even number next to its half, and hats are evaluated at the points of the finer level. On pixels
 far from square, the second differences along y and x have the weights 1 / dy^2 and 1 / dx^2, and
 only the direction of strong coupling is coarsened until the pixels are about square
-(semi-coarsening; Trottenberg, Oosterlee & Schueller, Multigrid, 2001, section 5.1).
+(semi-coarsening; Trottenberg, Oosterlee & Schueller, Multigrid, 2001, section 5.1). A line is one
+row of pixels without coupling along y.
 
 The cycle is symmetric. It is positive as long as the eigenvalues of the damped Jacobi iteration,
 the damping times A over its diagonal, are below 2. Without springs `JACOBI_EIGENVALUE` is the
@@ -82,7 +83,7 @@ def _levels(contact: Contact) -> list[Level]:
     grid, levels = contact.grid, []
     finer = grid.size
     for shape, rows in level_rows(grid):
-        dy, dx = (side / points for side, points in zip(grid.sides, shape, strict=True))
+        dy, dx = (side / points for side, points in zip(_sides(grid), shape, strict=True))
         k_along = contact.k_along_x if dx <= dy else grid.along_y(contact.stiffness)
         points = shape[1] if dx <= dy else shape[0]
         k, k_twice = np.interp([points / 4, points / 2], np.arange(k_along.size), k_along).tolist()
@@ -126,10 +127,11 @@ def level_rows(grid: Grid) -> Iterator[tuple[Shape, LocalRows]]:
     its pixels are far from square, only along their shorter side. A level that several processes
     share is followed only by one of exactly half the points along both.
     """
-    shape, rows = grid.whole_shape, grid.rows
+    shape: Shape = grid.points_y, grid.points
+    rows, sides = grid.rows, _sides(grid)
     while True:
         yield shape, rows
-        axes = list(zip(shape, coarsened_axes(shape, grid.sides), strict=True))
+        axes = list(zip(shape, coarsened_axes(shape, sides), strict=True))
         if any(n // 2 < MIN_LEVEL_POINTS for n, halved in axes if halved):
             return
         coarser = tuple(_half(n) if halved else n for n, halved in axes)
@@ -140,6 +142,11 @@ def level_rows(grid: Grid) -> Iterator[tuple[Shape, LocalRows]]:
         else:
             return
         shape = coarser
+
+
+def _sides(grid: Grid) -> tuple[float, ...]:
+    """Sides of the cell along y and x; a line is a row of pixels that are infinitely high."""
+    return grid.sides if grid.dimension == 2 else (inf, *grid.sides)
 
 
 def coarsened_axes(shape: Shape, sides: tuple[float, ...]) -> list[bool]:
