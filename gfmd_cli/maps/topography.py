@@ -15,6 +15,7 @@ from pydantic import Strict, model_validator
 
 from gfmd_cli.errors import InputError
 from gfmd_cli.grid.arrays import Field, Mask
+from gfmd_cli.maps.esri_grid import SIGNATURE, read_esri_grid
 from gfmd_cli.maps.height_map import (
     MAX_HEIGHT,
     REMEDY,
@@ -158,6 +159,8 @@ def _reader(path: Path) -> Callable[[Path, str | None], HeightMap]:
         signature = file.read(len(np.lib.format.MAGIC_PREFIX))
     if path.suffix.lower() == ".npy" or signature == np.lib.format.MAGIC_PREFIX:
         return read_npy
+    if signature.lower().startswith(SIGNATURE):
+        return read_esri_grid
     from gfmd_cli.files.hdf5 import is_hdf5
 
     if path.suffix.lower() in (".h5", ".hdf5") or is_hdf5(path):
