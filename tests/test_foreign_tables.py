@@ -102,6 +102,23 @@ def test_quoted_decimal_commas_between_commas_are_refused(saved):
         read_topography(saved(matrix(",", '"', ",")))
 
 
+@pytest.mark.parametrize("quote", ["", '"'])
+@pytest.mark.parametrize("separator", [",", ";"])
+def test_an_empty_cell_is_refused_as_such(saved, separator, quote):
+    lines = matrix(separator, quote).splitlines()
+    cells = lines[0].split(separator)
+    cells[1] = 2 * quote
+    with pytest.raises(InputError, match="an empty cell in a row of numbers; write NaN"):
+        read_topography(saved("\n".join([separator.join(cells), *lines[1:]])))
+
+
+def test_a_numbered_profile_has_the_units_of_its_header(saved):
+    rows = "".join(f'"{i + 1}","{0.277 * i:.3f}","{HEIGHTS[0, i]:.6f}"\n' for i in range(300))
+    read = read_topography(saved('"No.","Horz. [um]","Height [nm]"\n' + rows))
+    assert read.heights == pytest.approx(1e-9 * HEIGHTS[0])
+    assert read.spacing == pytest.approx((0.277e-6,))
+
+
 @pytest.mark.parametrize("separator", ["\t", ";"])
 def test_blanks_that_separate_thousands_are_refused(saved, separator):
     """They would double the columns."""
@@ -123,11 +140,13 @@ GRID = "NCOLS 300\nnrows 12\nxllcorner 5.0\nyllcorner 0\ncellsize 0.5\n"
 
 @pytest.mark.parametrize("stated", ["NODATA_value -9999\n", "nodata_value -9999.00\n", ""])
 @pytest.mark.parametrize("decimal", [".", ","])
-def test_an_esri_grid_has_sides_and_no_height_without_data(saved, stated, decimal):
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig"])
+def test_an_esri_grid_has_sides_and_no_height_without_data(saved, stated, decimal, encoding):
     marked = HEIGHTS.copy()
     marked[3, 4] = -9999
     header = (GRID + stated).replace(".", decimal)
-    read = read_topography(saved(header + matrix(" ", decimal=decimal, heights=marked)))
+    text = header + matrix(" ", decimal=decimal, heights=marked)
+    read = read_topography(saved(text, encoding))
     assert np.argwhere(read.missing).tolist() == [[3, 4]]
     assert read.heights[~read.missing] == pytest.approx(np.delete(HEIGHTS.ravel(), 3 * 300 + 4))
     assert (read.spacing, read.metres) == ((0.5, 0.5), False)
@@ -137,9 +156,15 @@ def test_an_esri_grid_has_sides_and_no_height_without_data(saved, stated, decima
     ("old", "new", "reason"),
     [
         ("12", "13", "300 x 12 heights, but the header states 300 x 13"),
-        ("cellsize 0.5\n", "", "states no cellsize"),
+        ("cellsize 0.5\n", "", "has no cellsize"),
     ],
 )
 def test_a_wrong_header_of_an_esri_grid_is_refused(saved, old, new, reason):
     with pytest.raises(InputError, match=reason):
         read_topography(saved(GRID.replace(old, new) + matrix(" ")))
+
+
+@pytest.mark.parametrize("first", ["aBCR-1.0", "aISO-1.0", "DSAA"])
+def test_text_formats_with_scales_that_are_not_read_are_refused(saved, first):
+    with pytest.raises(InputError, match="in text, whose header is not read; save it in binary"):
+        read_topography(saved(f"{first}\nZscale = 1e-9\n*\n" + matrix(" ")))

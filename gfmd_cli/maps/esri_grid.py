@@ -1,5 +1,6 @@
 """ESRI ASCII grids: number and size of the cells in a header, and rows from north to south."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -7,7 +8,7 @@ import numpy as np
 from gfmd_cli.errors import InputError
 from gfmd_cli.maps.height_map import HeightMap, check_layout, extent
 
-SIGNATURE = b"ncols"
+SIGNATURE = re.compile(rb"(\xef\xbb\xbf)?\s*n(cols|rows)\s", re.IGNORECASE)
 NO_DATA = -9999.0  # where the header does not state another value
 
 
@@ -19,14 +20,14 @@ def read_esri_grid(path: Path, dataset: str | None) -> HeightMap:
     with path.open("rb") as file:
         lines = iter(file)
         for line in lines:
-            words = line.decode(errors="replace").lower().replace(",", ".").split()
+            words = line.decode("utf-8-sig", "replace").lower().replace(",", ".").split()
             if len(words) != 2 or not words[0].isidentifier():
                 break
             header[words[0]] = float(words[1])
-        shape = int(header.get("nrows", 0)), int(header["ncols"])
+        if absent := [key for key in ("ncols", "nrows", "cellsize") if key not in header]:
+            raise InputError(f"{path}: the header of an ESRI grid has no {' and no '.join(absent)}")
+        shape = int(header["nrows"]), int(header["ncols"])
         check_layout(path, shape, np.dtype(float))
-        if "cellsize" not in header:
-            raise InputError(f"{path}: the header of an ESRI grid states no cellsize")
         heights = np.loadtxt((each.replace(b",", b".") for each in (line, *lines)), ndmin=2)
     if heights.shape != shape:
         raise InputError(

@@ -37,6 +37,8 @@ from gfmd_cli.maps.text_tables import (
 
 NO_GRID = "three columns that are not the points (x, y, height) of a full grid"
 TABLE_FORMATS = {"xyz", "asc"}  # formats of SurfaceTopography that are tables of numbers
+TEXT_FORMATS = {b"aBCR-": "an SDF file", b"aISO-": "an SDF file", b"DSAA": "a grid of Surfer"}
+"""Formats whose heights a reader of tables would take without their scales."""
 SMALL_FILE = 2**14  # bytes, which the readers of tables parse in a second
 OWN_HEADERS = LATIN_1, b"X;Y;valid"  # of tables whose readers know the length of the header
 SORTED_ROWS = 20  # heights of so many rows are not sorted by chance; a choice
@@ -58,6 +60,13 @@ def read_microscope_file(path: Path, dataset: str | None) -> HeightMap:
                 f"{path}: not .npy or HDF5; other formats need SurfaceTopography: "
                 f"{INSTALL.format('topography')}"
             ) from error
+        for signature, name in TEXT_FORMATS.items():
+            if file.read(len(signature)) == signature:
+                raise InputError(
+                    f"{path}: {name} in text, whose header is not read; save it in binary form, or "
+                    "as a table of x, y and height"
+                )
+            file.seek(0)
         try:
             table, warning = with_blanks(in_utf8(file))
             table = on_even_grid(table)

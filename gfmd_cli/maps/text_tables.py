@@ -32,6 +32,8 @@ UTF_16 = codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE
 QUOTED_COMMAS = re.compile(rb'"[-+\d]*,[\d,.]*"[ \t]*,')  # beside commas between the numbers
 GROUPED = re.compile(rb"[\t;]([-+]?\d{1,3}( \d{3})+([,.]\d*)?)(?=[\t;\r]|$)")
 """A cell such as 1 023 between tabs or semicolons."""
+EMPTY = re.compile(rb"([,;])[ \t]*\1.*\d")
+"""An empty cell between commas or semicolons, with a number in the same row after it."""
 
 
 def is_numeric(line: bytes) -> bool:
@@ -75,7 +77,7 @@ def header(file: BinaryIO, columns: int) -> list[bytes]:
     file.seek(0)
     lines = []
     for line in islice(file, HEADER_LINES + 1):
-        if len(cells(line)) == columns and _counts(line):
+        if len(cells(line)) >= columns and _counts(line):
             break
         lines += [line] if line.strip() else []
     file.seek(0)
@@ -110,9 +112,11 @@ def with_blanks(file: BinaryIO) -> tuple[BinaryIO, str]:
     warning = ""
     start = file.read(WINDOW_BYTES)
     table = start[len(start) // 2 :]  # without most headers
-    rows = filter(is_numeric, table.splitlines())
+    rows = list(filter(is_numeric, start.splitlines()))
     if cell := next(filter(None, map(GROUPED.search, rows)), None):
         raise ValueError(f"{cell[1].decode()}: blanks separate thousands; save the numbers without")
+    if any(map(EMPTY.search, rows)):
+        raise ValueError("an empty cell in a row of numbers; write NaN for a missing height")
     if b"," in table or b";" in table:
         numbers = _columns(file, b" \t;")
         is_decimal = numbers > 1 and re.search(rb"\d,\d", table)
@@ -178,7 +182,7 @@ def in_utf8(file: BinaryIO) -> BinaryIO:
             f"{commas[0].decode()} has a comma in quotes and one as separator; save the numbers "
             "with decimal points, or separate them by semicolons"
         )
-    return BytesIO(re.sub(rb'"([-+.,\deE]+)"', rb"\1", content))
+    return BytesIO(content.replace(b'"', b""))
 
 
 def _columns(file: BinaryIO, separators: bytes) -> int:

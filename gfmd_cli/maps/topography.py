@@ -26,7 +26,7 @@ from gfmd_cli.maps.height_map import (
     read_hdf5,
     read_npy,
 )
-from gfmd_cli.maps.microscope_files import read_microscope_file
+from gfmd_cli.maps.microscope_files import SIGNATURE_BYTES, read_microscope_file
 from gfmd_cli.spec_table import SpecTable
 
 SPACING_TOLERANCE = 1e-6  # relative: files store sides in single precision or with six digits
@@ -156,10 +156,10 @@ def read_topography(
 def _reader(path: Path) -> Callable[[Path, str | None], HeightMap]:
     """The function that reads a file, by its suffix or its first bytes."""
     with path.open("rb") as file:
-        signature = file.read(len(np.lib.format.MAGIC_PREFIX))
-    if path.suffix.lower() == ".npy" or signature == np.lib.format.MAGIC_PREFIX:
+        start = file.read(SIGNATURE_BYTES)
+    if path.suffix.lower() == ".npy" or start.startswith(np.lib.format.MAGIC_PREFIX):
         return read_npy
-    if signature.lower().startswith(SIGNATURE):
+    if SIGNATURE.match(start):
         return read_esri_grid
     from gfmd_cli.files.hdf5 import is_hdf5
 
