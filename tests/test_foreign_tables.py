@@ -135,6 +135,19 @@ def test_units_in_a_header_that_is_not_read_give_a_warning(saved, quote):
     assert "states units (nm, µm), which are not read: set surface.length and" in warning
 
 
+def test_a_time_in_a_header_is_no_unit(saved):
+    path = saved("# measured at 3:15 pm\n" + matrix(" "))
+    assert not any("states units" in each for each in FileSurface(path=path).warnings())
+
+
+@pytest.mark.parametrize("name", ["scan.tif", "scan.tiff"])
+def test_an_image_without_heights_is_refused_as_such(tmp_path, name):
+    image = pytest.importorskip("PIL.Image")
+    image.fromarray(np.arange(4096, dtype=np.uint16).reshape(64, 64)).save(tmp_path / name)
+    with pytest.raises(InputError, match="no height channel, as in an image of grey values"):
+        read_topography(tmp_path / name)
+
+
 GRID = "NCOLS 300\nnrows 12\nxllcorner 5.0\nyllcorner 0\ncellsize 0.5\n"
 
 

@@ -60,13 +60,6 @@ def read_microscope_file(path: Path, dataset: str | None) -> HeightMap:
                 f"{path}: not .npy or HDF5; other formats need SurfaceTopography: "
                 f"{INSTALL.format('topography')}"
             ) from error
-        for signature, name in TEXT_FORMATS.items():
-            if file.read(len(signature)) == signature:
-                raise InputError(
-                    f"{path}: {name} in text, whose header is not read; save it in binary form, or "
-                    "as a table of x, y and height"
-                )
-            file.seek(0)
         try:
             table, warning = with_blanks(in_utf8(file))
             table = on_even_grid(table)
@@ -86,6 +79,12 @@ def _open_scan(path: Path, file: BinaryIO, readers: list[Any]) -> Any:
     Raises InputError where none does, with the reason of the reader that recognises the format.
     """
     start, is_small = file.read(SIGNATURE_BYTES), path.stat().st_size <= SMALL_FILE
+    for signature, name in TEXT_FORMATS.items():
+        if start.startswith(signature):
+            raise InputError(
+                f"{path}: {name} in text, whose header is not read; save it in binary form, or as "
+                "a table of x, y and height"
+            )
     tables = table_formats(file)
     reasons = []
     for reader in readers:
@@ -403,7 +402,7 @@ def _height_channel(path: Path, reader: Any, name: str | None) -> Any:
         name = default if default in channels else next(iter(channels))
     if name not in channels:
         if not channels:
-            raise InputError(f"{path}: no heights; the grey values of an image are none. {REMEDY}")
+            raise InputError(f"{path}: no height channel, as in an image of grey values. {REMEDY}")
         known = ", ".join(channels)
         raise InputError(f"{path}: no height channel {name!r}; its height channels: {known}")
     return channels[name]

@@ -87,7 +87,7 @@ def header(file: BinaryIO, columns: int) -> list[bytes]:
 def unread_units(file: BinaryIO, columns: int) -> str:
     """A warning about units of length in the header of a matrix, or "" if it states none."""
     units = [unit for line in header(file, columns) for unit in _units(line)]
-    if not units:
+    if not set(units) - {"pm"}:  # which ends a time
         return ""
     return (
         f"the header of the table states units ({', '.join(units)}), which are not read: set "
@@ -112,7 +112,7 @@ def with_blanks(file: BinaryIO) -> tuple[BinaryIO, str]:
     warning = ""
     start = file.read(WINDOW_BYTES)
     table = start[len(start) // 2 :]  # without most headers
-    rows = list(filter(is_numeric, start.splitlines()))
+    rows = list(filter(is_numeric, start.splitlines())) if columns(file) else []
     if cell := next(filter(None, map(GROUPED.search, rows)), None):
         raise ValueError(f"{cell[1].decode()}: blanks separate thousands; save the numbers without")
     if any(map(EMPTY.search, rows)):
