@@ -143,6 +143,16 @@ def test_marks_of_missing_heights_are_found_before_units_are_converted(array):
     assert read_topography(array(heights)).holes == 1
 
 
+def test_every_mark_of_missing_heights_counts(array):
+    heights = HEIGHTS.copy()
+    heights[2, 3:5] = -9999, -8888
+
+    def mark(file):
+        file["height"].attrs["missing_value"] = [-9999.0, -8888.0]
+
+    assert read_topography(array(heights, extra=mark)).holes == 2
+
+
 @pytest.mark.parametrize(("number", "size"), [(1, 2**64 - 16), (1, 2**13), (0, 0)])
 def test_a_damaged_list_of_positions_is_refused(array, number, size):
     """With the first and the last of these, HDF5 2.0 looks for the end of the list for ever."""

@@ -119,7 +119,7 @@ def read_hdf5(path: Path, dataset: str | None) -> HeightMap:
             missing = np.asarray(data.attrs[mark])
             if missing.dtype.kind == values.dtype.kind == "f":  # perhaps of another precision
                 missing = missing.astype(values.dtype)
-            values = np.ma.masked_where(values == missing, values)
+            values = np.ma.masked_where(np.isin(values, missing), values)
         bare = HeightMap(values, source=f"HDF5, {name}, {data.dtype}")
         return bare if "spec_text" in file.attrs else _with_coordinates(path, file, data, bare)
 

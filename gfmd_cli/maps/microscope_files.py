@@ -21,6 +21,7 @@ from gfmd_cli.maps.height_map import (
     first_line,
     only_map,
 )
+from gfmd_cli.maps.point_tables import on_even_grid
 from gfmd_cli.maps.text_tables import (
     HEADER_LINES,
     LATIN_1,
@@ -30,11 +31,14 @@ from gfmd_cli.maps.text_tables import (
     in_utf8,
     table_formats,
     units_of_columns,
+    unread_units,
     with_blanks,
 )
 
 NO_GRID = "three columns that are not the points (x, y, height) of a full grid"
 TABLE_FORMATS = {"xyz", "asc"}  # formats of SurfaceTopography that are tables of numbers
+TEXT_FORMATS = {b"aBCR-": "an SDF file", b"aISO-": "an SDF file", b"DSAA": "a grid of Surfer"}
+"""Formats whose heights a reader of tables would take without their scales."""
 SMALL_FILE = 2**14  # bytes, which the readers of tables parse in a second
 OWN_HEADERS = LATIN_1, b"X;Y;valid"  # of tables whose readers know the length of the header
 SORTED_ROWS = 20  # heights of so many rows are not sorted by chance; a choice
@@ -57,13 +61,13 @@ def read_microscope_file(path: Path, dataset: str | None) -> HeightMap:
                 f"{INSTALL.format('topography')}"
             ) from error
         try:
-            table, warning = with_blanks(file)
+            table, warning = with_blanks(in_utf8(file))
+            table = on_even_grid(table)
         except ValueError as error:
             raise InputError(f"{path}: {error}") from error
-        table = in_utf8(table)
         with _open_scan(path, table, readers) as reader:
             height_map = _read_channel(path, table, reader, dataset)
-    return replace(height_map, notes=(warning,) if warning else ())
+    return replace(height_map, notes=(*height_map.notes, *filter(None, [warning])))
 
 
 def _open_scan(path: Path, file: BinaryIO, readers: list[Any]) -> Any:
@@ -75,6 +79,12 @@ def _open_scan(path: Path, file: BinaryIO, readers: list[Any]) -> Any:
     Raises InputError where none does, with the reason of the reader that recognises the format.
     """
     start, is_small = file.read(SIGNATURE_BYTES), path.stat().st_size <= SMALL_FILE
+    for signature, name in TEXT_FORMATS.items():
+        if start.startswith(signature):
+            raise InputError(
+                f"{path}: {name} in text, whose header is not read; save it in binary form, or as "
+                "a table of x, y and height"
+            )
     tables = table_formats(file)
     reasons = []
     for reader in readers:
@@ -91,6 +101,8 @@ def _open_scan(path: Path, file: BinaryIO, readers: list[Any]) -> Any:
             is_likely = answer == "YES" or reader.format() in tables
             if is_likely or path.suffix[1:].lower() in reader.file_extensions():
                 is_scattered = reader.format() == "xyz" and columns(file) == 3
+                if is_scattered:
+                    _check_no_row_in_header(path, file, None)
                 reason = NO_GRID if is_scattered else reader.format()
                 reasons.append(f"{reason}: {first_line(error)}")
     if reasons:
@@ -98,9 +110,9 @@ def _open_scan(path: Path, file: BinaryIO, readers: list[Any]) -> Any:
             f"{path}: SurfaceTopography recognises the format but cannot read the file "
             f"({'; '.join(reasons)}): damaged, or a variant of the format? {REMEDY}"
         )
+    what = NO_GRID if columns(file) == 3 else "not in a known topography format"
     raise InputError(
-        f"{path}: not in a known topography format; .npy, HDF5 and the formats of "
-        f"SurfaceTopography can be read. {REMEDY}"
+        f"{path}: {what}; .npy, HDF5 and the formats of SurfaceTopography can be read. {REMEDY}"
     )
 
 
@@ -138,7 +150,10 @@ def _read_channel(path: Path, file: BinaryIO, reader: Any, dataset: str | None) 
         *along_axes, of_heights = factors
         has_unit, heights = True, of_heights * heights
         sides = tuple(f * side for f, side in zip(along_axes[::-1], sides, strict=True))
+    is_unread = kind == "asc" and unsized and not has_unit and len(shape) == 2
+    note = unread_units(file, shape[1]) if is_unread else ""
     return HeightMap(
+        notes=(note,) if note else (),
         heights=heights,
         sides=None if unsized else metric_sides or sides,
         metres=has_unit or metric_sides is not None,
@@ -326,18 +341,19 @@ def _check_all_rows_read(path: Path, file: BinaryIO, rows: int, columns: int) ->
         if is_row and (len(words) <= columns / 2 or len(set(words)) == 1):
             raise InputError(
                 f"{path}:{number}: {words[0].decode(errors='replace')!r} in a row of the table is "
-                "not a number; write NaN for a missing height, and save text without a byte order "
-                "mark"
+                "not a number; write NaN for a missing height"
             )
 
 
-def _check_no_row_in_header(path: Path, file: BinaryIO) -> None:
+def _check_no_row_in_header(
+    path: Path, file: BinaryIO, lines: int | None = HEADER_LINES + 1
+) -> None:
     """Raise InputError for a line below the first row of a table of positions that is not a row.
 
     The reader would take this line and all rows above it as the header.
     """
     file.seek(0)
-    start = list(islice(file, HEADER_LINES + 1))
+    start = list(islice(file, lines))
     file.seek(0)
     if start and start[0].startswith(OWN_HEADERS):
         return
@@ -385,7 +401,8 @@ def _height_channel(path: Path, reader: Any, name: str | None) -> Any:
         default = reader.default_channel.channel_id
         name = default if default in channels else next(iter(channels))
     if name not in channels:
-        known = ", ".join(channels) or "none"
-        problem = "no height channel" if name is None else f"no height channel {name!r}"
-        raise InputError(f"{path}: {problem}; its height channels: {known}")
+        if not channels:
+            raise InputError(f"{path}: no height channel, as in an image of grey values. {REMEDY}")
+        known = ", ".join(channels)
+        raise InputError(f"{path}: no height channel {name!r}; its height channels: {known}")
     return channels[name]

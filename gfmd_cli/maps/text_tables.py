@@ -5,6 +5,7 @@ table that is not a map would take hours. Here lines are counted in parts of the
 some seconds at most.
 """
 
+import codecs
 import os
 import re
 from collections.abc import Iterator
@@ -25,11 +26,18 @@ GRID_LINES = 20_000  # whose positions are compared; a choice
 MATRIX_COLUMNS = 4  # fewer are positions: the rule of SurfaceTopography
 LATIN_1 = b"Scan Parameters"  # begins a table of Dektak, which its reader takes as Latin-1
 THOUSANDS = re.compile(rb"[-+]?[1-9]\d{0,2}(,\d{3})+(\.\d*)?")
-NUMBER_CHARACTERS = b" \t+-.,;0123456789eEdDinfaINFA"
+NUMBER_CHARACTERS = b' "\t+-.,;0123456789eEdDinfaINFA'
 """Characters of lines without words."""
+UTF_16 = codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE
+QUOTED_COMMAS = re.compile(rb'"[-+\d]*,[\d,.]*"[ \t]*,')  # beside commas between the numbers
+GROUPED = re.compile(rb"[\t;]([-+]?\d{1,3}( \d{3})+([,.]\d*)?)(?=[\t;\r]|$)")
+"""A cell such as 1 023 between tabs or semicolons."""
+EMPTY = re.compile(rb"([,;])[ \t]*\1.*\d")
+"""An empty cell between commas or semicolons, with a number in the same row after it."""
 
 
-def _is_numeric(line: bytes) -> bool:
+def is_numeric(line: bytes) -> bool:
+    """Whether a line has no words."""
     return not line.translate(None, NUMBER_CHARACTERS)
 
 
@@ -60,14 +68,36 @@ def columns(file: BinaryIO) -> int:
 
 def units_of_columns(file: BinaryIO, columns: int) -> list[str]:
     """The known units of length in the line above the first row of a table, as in "x [um]"."""
+    lines = header(file, columns)
+    return _units(lines[-1]) if lines else []
+
+
+def header(file: BinaryIO, columns: int) -> list[bytes]:
+    """The lines above the first row of a table, without empty ones."""
     file.seek(0)
-    above = b""
+    lines = []
     for line in islice(file, HEADER_LINES + 1):
-        if len(cells(line)) == columns and _counts(line):
+        if len(cells(line)) >= columns and _counts(line):
             break
-        above = line.strip() or above
+        lines += [line] if line.strip() else []
     file.seek(0)
-    words = re.split(r"[\s,;:=/_()\[\]\"#]+", above.decode(errors="replace"))
+    return lines
+
+
+def unread_units(file: BinaryIO, columns: int) -> str:
+    """A warning about units of length in the header of a matrix, or "" if it states none."""
+    units = [unit for line in header(file, columns) for unit in _units(line)]
+    if not set(units) - {"pm"}:  # which ends a time
+        return ""
+    return (
+        f"the header of the table states units ({', '.join(units)}), which are not read: set "
+        "surface.length and surface.scale"
+    )
+
+
+def _units(line: bytes) -> list[str]:
+    """The known units of length among the words of a line."""
+    words = re.split(r"[\s,;:=/_()\[\]\"#]+", line.decode(errors="replace"))
     return [word for word in words if in_metres(word) is not None]
 
 
@@ -82,6 +112,11 @@ def with_blanks(file: BinaryIO) -> tuple[BinaryIO, str]:
     warning = ""
     start = file.read(WINDOW_BYTES)
     table = start[len(start) // 2 :]  # without most headers
+    rows = list(filter(is_numeric, start.splitlines())) if columns(file) else []
+    if cell := next(filter(None, map(GROUPED.search, rows)), None):
+        raise ValueError(f"{cell[1].decode()}: blanks separate thousands; save the numbers without")
+    if any(map(EMPTY.search, rows)):
+        raise ValueError("an empty cell in a row of numbers; write NaN for a missing height")
     if b"," in table or b";" in table:
         numbers = _columns(file, b" \t;")
         is_decimal = numbers > 1 and re.search(rb"\d,\d", table)
@@ -103,7 +138,7 @@ def _warning_of_thousands(start: bytes, columns: int) -> str:
     One number such as 0,125 or 1,5 shows that the commas are decimal. Raises ValueError if only
     some of the numbers have such a comma, as where it separates thousands.
     """
-    lines = [line for line in start.splitlines() if _is_numeric(line)]
+    lines = [line for line in start.splitlines() if is_numeric(line)]
     rows = [
         row for line in lines if len(row := re.split(rb"[\s;]+", line.strip(b" \t;"))) == columns
     ]
@@ -122,19 +157,32 @@ def _warning_of_thousands(start: bytes, columns: int) -> str:
 
 
 def in_utf8(file: BinaryIO) -> BinaryIO:
-    """A table whose header or end is in Latin-1 as one in UTF-8; any other file as it is."""
+    """A table in UTF-8 without byte order mark and quotes; any other file as it is.
+
+    Raises ValueError where commas separate the numbers and are also parts of them, in quotes.
+    """
     start = file.read(WINDOW_BYTES)
     file.seek(max(0, file.seek(0, os.SEEK_END) - WINDOW_BYTES))
-    is_ascii = start.isascii() and file.read().isascii()
-    is_table = not is_ascii and not start.startswith(LATIN_1) and columns(file) > 0
+    is_plain = start.isascii() and b'"' not in start and file.read().isascii()
+    is_table = start.startswith(UTF_16)
+    if not (is_plain or is_table or start.startswith(LATIN_1)):
+        is_table = columns(file) > 0
     file.seek(0)
-    content = file.read() if is_table else b""
-    file.seek(0)
+    if not is_table:
+        return file
+    content = file.read().removeprefix(codecs.BOM_UTF8)
+    if start.startswith(UTF_16):
+        content = content.decode("utf-16").encode()
     try:
         content.decode()
     except UnicodeDecodeError:
-        return BytesIO(content.decode("latin-1").encode())
-    return file
+        content = content.decode("latin-1").encode()
+    if commas := QUOTED_COMMAS.search(content):
+        raise ValueError(
+            f"{commas[0].decode()} has a comma in quotes and one as separator; save the numbers "
+            "with decimal points, or separate them by semicolons"
+        )
+    return BytesIO(content.replace(b'"', b""))
 
 
 def _columns(file: BinaryIO, separators: bytes) -> int:
@@ -179,7 +227,7 @@ def _windows(file: BinaryIO) -> Iterator[tuple[int, bytes]]:
 
 def _counts(lines: bytes) -> np.ndarray[Any, np.dtype[np.int64]]:
     """Numbers between blanks in each line, 0 where there are words."""
-    return np.array([len(line.split()) if _is_numeric(line) else 0 for line in lines.splitlines()])
+    return np.array([len(line.split()) if is_numeric(line) else 0 for line in lines.splitlines()])
 
 
 def _is_grid(file: BinaryIO) -> bool:

@@ -15,6 +15,7 @@ from pydantic import Strict, model_validator
 
 from gfmd_cli.errors import InputError
 from gfmd_cli.grid.arrays import Field, Mask
+from gfmd_cli.maps.esri_grid import SIGNATURE, read_esri_grid
 from gfmd_cli.maps.height_map import (
     MAX_HEIGHT,
     REMEDY,
@@ -25,7 +26,7 @@ from gfmd_cli.maps.height_map import (
     read_hdf5,
     read_npy,
 )
-from gfmd_cli.maps.microscope_files import read_microscope_file
+from gfmd_cli.maps.microscope_files import SIGNATURE_BYTES, read_microscope_file
 from gfmd_cli.spec_table import SpecTable
 
 SPACING_TOLERANCE = 1e-6  # relative: files store sides in single precision or with six digits
@@ -155,9 +156,11 @@ def read_topography(
 def _reader(path: Path) -> Callable[[Path, str | None], HeightMap]:
     """The function that reads a file, by its suffix or its first bytes."""
     with path.open("rb") as file:
-        signature = file.read(len(np.lib.format.MAGIC_PREFIX))
-    if path.suffix.lower() == ".npy" or signature == np.lib.format.MAGIC_PREFIX:
+        start = file.read(SIGNATURE_BYTES)
+    if path.suffix.lower() == ".npy" or start.startswith(np.lib.format.MAGIC_PREFIX):
         return read_npy
+    if SIGNATURE.match(start):
+        return read_esri_grid
     from gfmd_cli.files.hdf5 import is_hdf5
 
     if path.suffix.lower() in (".h5", ".hdf5") or is_hdf5(path):

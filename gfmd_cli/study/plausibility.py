@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from math import inf, isfinite
 from typing import Any
 
+from gfmd_cli.physics.elastomers import Layer
 from gfmd_cli.spec.models import LOADS
 from gfmd_cli.status import Status
 from gfmd_cli.study.refinement import TaskSolution, border_share
@@ -21,6 +22,9 @@ SMALL_GAPS = (1e-5, 1e-3)
 probably meant in m; a choice."""
 LOOSE = 0.01  # natural residual; the mean gap of the default surface is then wrong by 0.1 to 1 %
 SMALL_DISPLACEMENT = 1e-4  # [h_std], below which heights have another unit; a choice
+NEARLY_INCOMPRESSIBLE = 0.48
+"""Poisson's ratio of a bonded layer above which a load with a free boundary is wrong by 3 % or more
+if pixels are wider than the layer is thick; measured, see docs/accuracy.md."""
 SEPARATOR = " | "
 """Between the warnings of one contact in a column of text."""
 
@@ -48,6 +52,7 @@ def warnings_of(task: Task, solved: TaskSolution, results: Mapping[str, Any]) ->
         )
     rms_height = scene.h_std if task.surface.rough else 0.0  # else it depends on the cell alone
     warnings += elastomer.warnings(rms_height, scene.shells.q, scene.shells.variance)
+    warnings += _coarse_for_layer(task, max(scene.grid.spacings))
     warnings += _load_in_jump(task, solved.solution.status, results)
     warnings += _contact_at_border(task, solved)
     units = _doubtful_unit(task, solved)
@@ -60,6 +65,20 @@ def warnings_of(task: Task, solved: TaskSolution, results: Mapping[str, Any]) ->
             "the grid; use more points"
         )
     return warnings
+
+
+def _coarse_for_layer(task: Task, spacing: float) -> list[str]:
+    """A warning if pixels are too wide [m] for a bonded layer that is nearly incompressible."""
+    layer = task.elastomer
+    if task.boundary != "free" or not isinstance(layer, Layer) or layer.base != "bonded":
+        return []
+    if spacing <= layer.thickness or (layer.poisson or 0.0) <= NEARLY_INCOMPRESSIBLE:
+        return []
+    return [
+        f"pixels of {spacing:.3g} m are wider than elastomer.thickness, {layer.thickness:.3g} m: "
+        f"with poisson = {layer.poisson:g} and a free boundary the load may be wrong by 3 to 15 %, "
+        "and by more beyond six thicknesses; use more points"
+    ]
 
 
 def _load_in_jump(task: Task, status: Status, results: Mapping[str, Any]) -> list[str]:

@@ -1,0 +1,38 @@
+"""ESRI ASCII grids: number and size of the cells in a header, and rows from north to south."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+
+from gfmd_cli.errors import InputError
+from gfmd_cli.maps.height_map import HeightMap, check_layout, extent
+
+SIGNATURE = re.compile(rb"(\xef\xbb\xbf)?\s*n(cols|rows)\s", re.IGNORECASE)
+NO_DATA = -9999.0  # where the header does not state another value
+
+
+def read_esri_grid(path: Path, dataset: str | None) -> HeightMap:
+    """Read an ESRI ASCII grid, whose lengths have no unit. Raises InputError."""
+    if dataset is not None:
+        raise InputError(f"{path}: an ESRI grid holds one map; leave out dataset {dataset!r}")
+    header: dict[str, float] = {}
+    with path.open("rb") as file:
+        lines = iter(file)
+        for line in lines:
+            words = line.decode("utf-8-sig", "replace").lower().replace(",", ".").split()
+            if len(words) != 2 or not words[0].isidentifier():
+                break
+            header[words[0]] = float(words[1])
+        if absent := [key for key in ("ncols", "nrows", "cellsize") if key not in header]:
+            raise InputError(f"{path}: the header of an ESRI grid has no {' and no '.join(absent)}")
+        shape = int(header["nrows"]), int(header["ncols"])
+        check_layout(path, shape, np.dtype(float))
+        heights = np.loadtxt((each.replace(b",", b".") for each in (line, *lines)), ndmin=2)
+    if heights.shape != shape:
+        raise InputError(
+            f"{path}: {extent(heights.shape)} heights, but the header states {extent(shape)}"
+        )
+    missing = header.get("nodata_value", NO_DATA)
+    sides = tuple(header["cellsize"] * points for points in shape)
+    return HeightMap(np.ma.masked_equal(heights, missing), sides=sides, source="ESRI grid")

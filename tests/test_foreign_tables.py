@@ -1,0 +1,183 @@
+"""Tables as spreadsheets, stages and geographic programs write them: rounded, quoted, marked."""
+
+import numpy as np
+import pytest
+
+from gfmd_cli.errors import InputError
+from gfmd_cli.maps.topography import read_topography
+from gfmd_cli.physics.file_surface import FileSurface
+
+pytest.importorskip("SurfaceTopography")
+HEIGHTS = np.random.default_rng(2).normal(size=(12, 300)).round(6)
+
+
+@pytest.fixture
+def saved(tmp_path):
+    """Writes a file of this content."""
+
+    def write(content, encoding="utf-8"):
+        path = tmp_path / "map.txt"
+        path.write_bytes(content.encode(encoding))
+        return path
+
+    return write
+
+
+def points(along_x, along_y, digits=3, separator=" "):
+    """Points (x, y, height) in text."""
+    rows = (
+        (f"{x:.{digits}f}", f"{y:.{digits}f}", f"{HEIGHTS[j, i]:.6f}")
+        for j, y in enumerate(along_y)
+        for i, x in enumerate(along_x)
+    )
+    return "".join(separator.join(row) + "\n" for row in rows)
+
+
+def matrix(separator=",", quote="", decimal=".", heights=HEIGHTS):
+    rows = (
+        [f"{quote}{value:.6f}{quote}".replace(".", decimal) for value in row] for row in heights
+    )
+    return "".join(separator.join(row) + "\n" for row in rows)
+
+
+@pytest.mark.parametrize("digits", [2, 3, 5])
+@pytest.mark.parametrize("separator", [" ", ";"])
+def test_rounded_positions_are_even(saved, digits, separator):
+    """The first distance, 0.33, is that of no other pair of many points."""
+    text = points(np.arange(300) / 3, 7 + np.arange(12) / 3, digits, separator)
+    read = read_topography(saved("x [um] y [um] z [nm]\n" + text))
+    assert read.heights == pytest.approx(1e-9 * HEIGHTS)
+    assert read.spacing == pytest.approx((1e-6 / 3, 1e-6 / 3), rel=2e-3)
+
+
+def test_positions_of_a_stage_that_jitters_are_even(saved):
+    jitter = np.random.default_rng(1).uniform(-0.02, 0.02, (12, 300, 2))
+    y, x = np.indices(HEIGHTS.shape)
+    table = np.column_stack([(x + jitter[..., 0]).ravel(), (y + jitter[..., 1]).ravel()])
+    rows = np.column_stack([table, HEIGHTS.ravel()])
+    read = read_topography(saved("".join(" ".join(map(str, row)) + "\n" for row in rows)))
+    np.testing.assert_array_equal(read.heights, HEIGHTS)
+    assert read.spacing == pytest.approx((1.0, 1.0), rel=1e-3)
+
+
+def test_many_scattered_points_are_refused_as_such(saved):
+    rows = np.random.default_rng(1).random((30_000, 3)).round(4)
+    with pytest.raises(InputError, match="three columns that are not the points"):
+        read_topography(saved("".join(" ".join(map(str, row)) + "\n" for row in rows)))
+
+
+def test_uneven_positions_are_refused_with_their_deviation(saved):
+    bent = np.arange(40) + 0.1 * np.sin(np.arange(40) / 6)
+    with pytest.raises(InputError, match=r"along x are not evenly.* deviate by up to 0\.\d+ of"):
+        read_topography(saved(points(bent, np.arange(12))))
+    with pytest.raises(InputError, match="positions along y are not evenly spaced"):
+        read_topography(saved(points(np.arange(40), np.arange(12) ** 1.5)))
+
+
+@pytest.mark.parametrize("mark", ["BAD", "***", "No Data"])
+def test_a_mark_far_below_the_first_point_is_named(saved, mark):
+    lines = points(np.arange(300), np.arange(12)).splitlines()
+    lines[1000] = " ".join([*lines[1000].split()[:2], mark])
+    with pytest.raises(InputError, match=r"map\.txt:1001: .*write NaN for a missing height"):
+        read_topography(saved("\n".join(lines)))
+
+
+@pytest.mark.parametrize(
+    ("separator", "decimal"), [(",", "."), (";", "."), (";", ","), ("\t", ",")]
+)
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16"])
+def test_quoted_numbers(saved, separator, decimal, encoding):
+    path = saved(matrix(separator, '"', decimal), encoding)
+    np.testing.assert_array_equal(read_topography(path).heights, HEIGHTS)
+
+
+def test_quoted_positions(saved):
+    text = points(np.arange(300), np.arange(12), separator='","').replace("\n", '"\n"')
+    path = saved('"x [um]","y [um]","z [nm]"\n"' + text.removesuffix('"'), "utf-8-sig")
+    assert read_topography(path).heights == pytest.approx(1e-9 * HEIGHTS)
+
+
+def test_quoted_decimal_commas_between_commas_are_refused(saved):
+    with pytest.raises(InputError, match="has a comma in quotes and one as separator"):
+        read_topography(saved(matrix(",", '"', ",")))
+
+
+@pytest.mark.parametrize("quote", ["", '"'])
+@pytest.mark.parametrize("separator", [",", ";"])
+def test_an_empty_cell_is_refused_as_such(saved, separator, quote):
+    lines = matrix(separator, quote).splitlines()
+    cells = lines[0].split(separator)
+    cells[1] = 2 * quote
+    with pytest.raises(InputError, match="an empty cell in a row of numbers; write NaN"):
+        read_topography(saved("\n".join([separator.join(cells), *lines[1:]])))
+
+
+def test_a_numbered_profile_has_the_units_of_its_header(saved):
+    rows = "".join(f'"{i + 1}","{0.277 * i:.3f}","{HEIGHTS[0, i]:.6f}"\n' for i in range(300))
+    read = read_topography(saved('"No.","Horz. [um]","Height [nm]"\n' + rows))
+    assert read.heights == pytest.approx(1e-9 * HEIGHTS[0])
+    assert read.spacing == pytest.approx((0.277e-6,))
+
+
+@pytest.mark.parametrize("separator", ["\t", ";"])
+def test_blanks_that_separate_thousands_are_refused(saved, separator):
+    """They would double the columns."""
+    rows = ([f"1 {abs(100 * value):03.0f},5" for value in row] for row in HEIGHTS)
+    with pytest.raises(InputError, match=r"1 \d\d\d,5: blanks separate thousands"):
+        read_topography(saved("\n".join(separator.join(row) for row in rows)))
+
+
+@pytest.mark.parametrize("quote", ["", '"'])
+def test_units_in_a_header_that_is_not_read_give_a_warning(saved, quote):
+    header = '"XY calibration","138.5","nm/pixel"\n"Unit","µm"\n"Height"\n'
+    path = saved(header.replace('"', quote) + matrix(",", quote))
+    (warning, *_) = FileSurface(path=path).warnings()
+    assert "states units (nm, µm), which are not read: set surface.length and" in warning
+
+
+def test_a_time_in_a_header_is_no_unit(saved):
+    path = saved("# measured at 3:15 pm\n" + matrix(" "))
+    assert not any("states units" in each for each in FileSurface(path=path).warnings())
+
+
+@pytest.mark.parametrize("name", ["scan.tif", "scan.tiff"])
+def test_an_image_without_heights_is_refused_as_such(tmp_path, name):
+    image = pytest.importorskip("PIL.Image")
+    image.fromarray(np.arange(4096, dtype=np.uint16).reshape(64, 64)).save(tmp_path / name)
+    with pytest.raises(InputError, match="no height channel, as in an image of grey values"):
+        read_topography(tmp_path / name)
+
+
+GRID = "NCOLS 300\nnrows 12\nxllcorner 5.0\nyllcorner 0\ncellsize 0.5\n"
+
+
+@pytest.mark.parametrize("stated", ["NODATA_value -9999\n", "nodata_value -9999.00\n", ""])
+@pytest.mark.parametrize("decimal", [".", ","])
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig"])
+def test_an_esri_grid_has_sides_and_no_height_without_data(saved, stated, decimal, encoding):
+    marked = HEIGHTS.copy()
+    marked[3, 4] = -9999
+    header = (GRID + stated).replace(".", decimal)
+    text = header + matrix(" ", decimal=decimal, heights=marked)
+    read = read_topography(saved(text, encoding))
+    assert np.argwhere(read.missing).tolist() == [[3, 4]]
+    assert read.heights[~read.missing] == pytest.approx(np.delete(HEIGHTS.ravel(), 3 * 300 + 4))
+    assert (read.spacing, read.metres) == ((0.5, 0.5), False)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "reason"),
+    [
+        ("12", "13", "300 x 12 heights, but the header states 300 x 13"),
+        ("cellsize 0.5\n", "", "has no cellsize"),
+    ],
+)
+def test_a_wrong_header_of_an_esri_grid_is_refused(saved, old, new, reason):
+    with pytest.raises(InputError, match=reason):
+        read_topography(saved(GRID.replace(old, new) + matrix(" ")))
+
+
+@pytest.mark.parametrize("first", ["aBCR-1.0", "aISO-1.0", "DSAA"])
+def test_text_formats_with_scales_that_are_not_read_are_refused(saved, first):
+    with pytest.raises(InputError, match="in text, whose header is not read; save it in binary"):
+        read_topography(saved(f"{first}\nZscale = 1e-9\n*\n" + matrix(" ")))
