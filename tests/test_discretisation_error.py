@@ -91,9 +91,11 @@ def test_the_order_of_the_levels_does_not_matter(rough):
 
 @pytest.mark.parametrize("n", [0.0, 1.0, 2.0])
 def test_a_finer_grid_has_smaller_bars(n):
-    coarse, fine = (estimate(sequence(n, (points,)), n, ROUGH) for points in (64, 256))
+    coarse, fine, finest = (estimate(sequence(n, (m,)), n, ROUGH) for m in (64, 1024, 2048))
     for quantity in QUANTITIES:
-        assert 0 < fine[quantity].error < coarse[quantity].error
+        assert 0 < finest[quantity].error < fine[quantity].error < coarse[quantity].error
+    ratio = fine["sigma_p"].error / finest["sigma_p"].error
+    assert ratio == pytest.approx(2 ** min(2.0, 3 - n), rel=0.03)
 
 
 @pytest.mark.parametrize(("n", "verdict"), [(2.5, "regular"), (2.75, "slow"), (3, "diverges")])

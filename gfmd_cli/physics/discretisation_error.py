@@ -56,14 +56,14 @@ MAX_STRESS_EXPONENT = 2.5  # sigma_p converges as spacing^(3 - n): too slow for 
 
 # Typical errors on one grid: power laws and medians by regression; of equally good ones, those that
 # change least when long waves are added to a surface (which only reduce the contact area):
-#   sigma_p, relative:    exp(-7.08 + 2.18 n) (x / a_r)^(3/2) w^(5/4) / (1 - a_r)^(1/2)
+#   sigma_p, relative:    exp(-7.08 + 2.18 n) (x / a_r)^(3/2) w^(5/4) / (1 - a_r)^(1/2), at least
+#                         exp(-7.80 + 2.18 n) (x / a_r)^r, order r of convergence: fine grids
 #   u_g [h_std]:          exp(-6.80 + 0.62 n) (x / a_r)^(1/4) w^(3/2) (b u_g)^(1/2)
-# where the last two use n >= MIN_EXPONENT.
+# with n >= MIN_EXPONENT before the powers. The constant -7.80 is from 36 surfaces, up to 512^2.
 # Error bars on one grid: SINGLE_GRID times that. On two grids: TWO_GRIDS times the root of the sum
 # of the squares of TYPICAL_WEIGHT times the typical error and of the change D from the coarser
-# grid, reduced by the order of convergence. The factors are such that 95.5 to 98.8 of 100 bars hold
-# in the fitted half of the set. Here a_r is that of a single or line contact, with
-# SINGLE_CONTACT_AREA x.
+# grid, reduced by the order of convergence. 98.2 to 100 of 100 bars hold in the fitted half of the
+# set. Here a_r is that of a single or line contact, with SINGLE_CONTACT_AREA x.
 SINGLE_GRID = {"a_r": 4.2, "sigma_p": 4.1, "u_g": 4.2}
 TWO_GRIDS = {"a_r": 0.4, "sigma_p": 1.4, "u_g": 2.2}
 TYPICAL_WEIGHT = {"a_r": 8.0, "sigma_p": 1.2, "u_g": 1.2}
@@ -323,12 +323,12 @@ def _stress(
     if rough is None:
         return _single_stress(fine, coarse, n, tip) if coarse else UNKNOWN
     value, patch = fine.sigma_p, fine.switches_per_point / fine.a_r
-    phase = rough.phase(fine.points)
-    typical = exp(-7.08 + 2.18 * max(n, MIN_EXPONENT)) * patch**1.5 * phase**1.25 * value
-    typical /= sqrt(1 - fine.a_r)
+    phase, order = rough.phase(fine.points), min(2.0, 3 - n)
+    coarse_law = exp(-7.08) * patch**1.5 * phase**1.25 / sqrt(1 - fine.a_r)
+    typical = exp(2.18 * max(n, MIN_EXPONENT)) * max(coarse_law, exp(-7.8) * patch**order) * value
     if coarse is None:
         return _on_grid(value, _bar("sigma_p", typical, None))
-    rest = (value - coarse.sigma_p) / (2 ** min(2.0, 3 - n) - 1)
+    rest = (value - coarse.sigma_p) / (2**order - 1)
     error = _bar("sigma_p", typical, rest)
     if n < 1:
         return _on_grid(value, error)
