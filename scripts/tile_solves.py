@@ -1,4 +1,4 @@
-"""Solves on tiles at any share of tiles and any n: share, steps, prediction, time.
+"""Solves on tiles at any fraction of tiles and any n: fraction, steps, prediction, time.
 
     python scripts/tile_solves.py --points 1024 2048 --exponents 0.25 0.5 1 1.25 \\
         --p-star 0.01 0.02 0.05 0.1 --tolerance 1e-3 --seeds 0 1 2
@@ -46,7 +46,7 @@ class RecordedSolve(local_start.PeriodicSolve):
     def solve(self, tolerance: float) -> tuple[Evaluation, Field]:
         """See `LocalSolve`."""
         RecordedSolve.latest = self
-        self.share = self.tiles.count / self.tiles.used.size
+        self.fraction = self.tiles.count / self.tiles.used.size
         self.evaluations = self.steps = 0
         self.pause = self.count_step
         return super().solve(tolerance)
@@ -82,7 +82,7 @@ def row(contact: Contact, tolerance: float, repeats: int) -> str:
         return "not solved on tiles"
     convolution = least(lambda: solve.map_displacement(solve.s), CONVOLUTIONS) / solve.tiles.count
     return (
-        f"{solve.share:7.3f} {solve.evaluations:11} {solve.steps:6} {solve.predicted:10.1e} "
+        f"{solve.fraction:7.3f} {solve.evaluations:11} {solve.steps:6} {solve.predicted:10.1e} "
         f"{measured / solve.predicted:8.2f} {whole / seconds:11.2f} {1e6 * convolution:6.2f}"
     )
 
@@ -98,10 +98,12 @@ def main() -> None:
     parser.add_argument("--max-steps", type=int, default=local_solve.MAX_STEPS, help="on tiles")
     parser.add_argument("--repeats", type=int, default=2)
     arguments = parser.parse_args()
-    smallest = local_start.LIMITS["periodic"].points
+    smallest = local_start.TILE_LIMITS["periodic"].points
     with (
-        patch.dict(local_start.LIMITS, periodic=local_start.Limits(smallest, 1.0, 0.0, 0.0, 9.0)),
-        patch.dict(local_start.SOLVES, periodic=RecordedSolve),
+        patch.dict(
+            local_start.TILE_LIMITS, periodic=local_start.TileLimits(smallest, 1.0, 0.0, 0.0, 9.0)
+        ),
+        patch.dict(local_start.LOCAL_SOLVES, periodic=RecordedSolve),
         patch.object(local_start, "SMALLEST_EXPONENT", 0.0),
         patch.object(local_solve, "MAX_STEPS", arguments.max_steps),
     ):

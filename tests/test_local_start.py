@@ -19,7 +19,7 @@ from gfmd_cli.solvers.local_start import start_from
 from gfmd_cli.solvers.nested_grids import Resume, solve_contact
 from gfmd_cli.solvers.pcg import ProjectedCG
 from gfmd_cli.solvers.tile_operators import (
-    OPERATORS,
+    TILE_OPERATORS,
     FreeOperators,
     PeriodicOperators,
     convolution,
@@ -115,7 +115,7 @@ def test_the_stiffness_on_tiles_is_that_of_a_point_up_to_its_reach(boundary):
     u = np.zeros(grid.shape)
     u[100, 100] = 1.0
     stress = np.empty(grid.shape)
-    tiles.put(OPERATORS[boundary](contact).stress(tiles)(tiles.take(u)), stress)
+    tiles.put(TILE_OPERATORS[boundary](contact).stress(tiles)(tiles.take(u)), stress)
     near = (slice(92, 109), slice(92, 109))
     exact = np.fft.irfft2(np.fft.rfft2(u) * k)
     assert stress[near] == pytest.approx(exact[near], abs=1e-3 * exact.max())

@@ -79,29 +79,29 @@ def test_each_cgroup_around_the_process_may_limit_its_memory(tmp_path, line, top
 
 def test_many_tasks_run_side_by_side_on_one_thread_each(tasks, machine):
     machine(8)
-    assert resources.share_out(tasks(), None) == (8, 1)
+    assert resources.jobs_and_threads(tasks(), None) == (8, 1)
 
 
 def test_one_large_grid_takes_all_threads(tasks, machine):
     machine(8)
     one = tasks("grid.points=4096", "elastomer.n=1", "load.p_star=0.1")
-    assert resources.share_out(one, None) == (1, 8)
+    assert resources.jobs_and_threads(one, None) == (1, 8)
 
 
 def test_as_many_run_side_by_side_as_the_memory_holds(tasks, machine):
     many = tasks("grid.points=4096")
     machine(8, 2.5 * many[0].bytes / resources.HEADROOM)
-    assert resources.share_out(many, None) == (2, 4)
+    assert resources.jobs_and_threads(many, None) == (2, 4)
 
 
 def test_a_little_work_is_done_in_this_process(tasks, machine):
     machine(8)
-    assert resources.share_out(tasks("elastomer.n=0"), None) == (1, 1)
+    assert resources.jobs_and_threads(tasks("elastomer.n=0"), None) == (1, 1)
 
 
 def test_the_asked_number_of_jobs_is_kept(tasks, machine):
     machine(8)
-    assert resources.share_out(tasks(), 3) == (3, 1)
+    assert resources.jobs_and_threads(tasks(), 3) == (3, 1)
 
 
 def test_a_task_beyond_the_memory_is_refused_with_both_numbers(tasks, machine):

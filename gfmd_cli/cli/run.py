@@ -154,7 +154,7 @@ def _print_results(
 
     stored = read_rows(path) if counts and path.exists() else []
     tasks = plan(spec)
-    indices = {task.id: task.index for task in options.share_of(tasks)}
+    indices = {task.id: task.index for task in options.shard_of(tasks)}
     rows = [row | {"task": indices[row["task_id"]]} for row in stored if row["task_id"] in indices]
     if table := run_text(rows):
         print_text(f"{table}\n")
@@ -177,7 +177,7 @@ def _print_tasks(spec: "Spec", path: Path, options: "RunOptions") -> None:
     from gfmd_cli.study.store import Study, without_result
     from gfmd_cli.study.tasks import plan
 
-    tasks = options.share_of(plan(spec))
+    tasks = options.shard_of(plan(spec))
     outcomes = {} if options.overwrite else Study(path).outcomes()
     missing = without_result(tasks, outcomes)
     if tasks:

@@ -88,7 +88,7 @@ MIN_PATCHES = 10.0
 MAX_ANISOTROPY = 2.0
 """Largest ratio of rms slopes of a calibrated surface; isotropic maps of 32 points have up to 1.3,
 maps stretched by 3, whose bars failed, 2.6 or more."""
-MAX_ASPECT = 1.1
+MAX_SPACING_RATIO = 1.1
 """Largest ratio of grid spacings with the excess of square pixels. With the wider spacing in x, a
 ratio of 2 has 0.7 of it and of 4 half, so that 56 of 100 bars of the corrected area held."""
 HALF_OCTAVE = 0.5 * log(2)  # in ln q: step of the local exponent that the calibration used
@@ -246,7 +246,7 @@ def _estimate_periodic(
     tip: Tip,
 ) -> dict[str, Estimate]:
     """Estimates with a periodic boundary."""
-    oblong = rough is not None and rough.aspect > MAX_ASPECT
+    oblong = rough is not None and rough.aspect > MAX_SPACING_RATIO
     if rough is not None and (fine.patches < MIN_PATCHES or not rough.calibrated):
         estimates = estimate_by_change(fine, coarse, n, is_profile=tip.dimension == 1)
         follows_law = rough.calibrated and not oblong and tip.dimension == 2

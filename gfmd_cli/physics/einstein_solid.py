@@ -12,7 +12,7 @@ from scipy.special import erfc, erfcx, ndtr
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.physics.persson import UNDERFLOW, ierfc
 
-_NEWTON_STEPS = 50  # a bound; at most 6 are taken for pressures from 1e-300 to 1e300
+_MAX_HEIGHT_STEPS = 50  # a bound; at most 6 are taken for pressures from 1e-300 to 1e300
 _LAST_STEP = 1e-8  # relative; the error left behind it is of the order of its square
 _FAR = 3.0  # x from which the continued fraction is used; terms of the closed form cancel as x^4
 _LEVELS = 40  # of the continued fraction: all digits for x >= _FAR
@@ -31,7 +31,7 @@ def non_contact_height(p_star: Field | float) -> Field:
         raise ValueError(f"the pressure must not be negative, got {target.min()}")
     p = np.where(target > 0, target, 1.0)
     z: Field = np.where(p < 1, -np.sqrt(-2 * np.log(np.minimum(p, 1.0))), p)
-    for _ in range(_NEWTON_STEPS):
+    for _ in range(_MAX_HEIGHT_STEPS):
         trial_pressure = pressure(z)
         step = np.log(p / trial_pressure) * trial_pressure / contact_area(z)
         z += step

@@ -25,7 +25,7 @@ _LOWEST, _HIGHEST = 1e-8, 8.0  # pressures of the law [Delta_sigma]
 _CELL, _BEND = 0.06, 0.5  # cells of 6 % of p well below _BEND, of 0.03 Delta_sigma above
 _STEP_FRACTION = 1 / 64  # of the squared height that waves may add in one step
 _STAGE = 1 - np.sqrt(0.5)  # of SDIRK2, of second order and L-stable
-_NEWTON_STEPS = 50  # a bound; 2 to 3 are taken
+_MAX_IMPLICIT_STEPS = 50  # a bound; 2 to 3 are taken
 _CONVERGED = 1e-6  # last Newton step relative to the largest gap; it converges quadratically
 _VANISHED = 1e-12  # relative to the largest gap; rounding below
 _ALPHA = (0.413, 0.609)  # alpha = 0.413 + 0.609 n
@@ -146,7 +146,7 @@ def _implicit(faces: Field, start: Field, guess: Field, k: float, added: float) 
     """
     width, distance = np.diff(faces), np.diff(_centres(faces))
     u = guess
-    for _ in range(_NEWTON_STEPS):
+    for _ in range(_MAX_IMPLICIT_STEPS):
         flattened = 1 / (1 - k * np.diff(u) / distance)
         flow = 0.5 * k * np.concatenate([[0.0], flattened, [1.0]])
         coupling = 0.5 * added * (k * flattened) ** 2 / distance

@@ -23,7 +23,7 @@ from gfmd_cli.study.reading import StudyFile, open_study
 
 MAX_CONTACTS, MAX_CURVES = 12, 3  # contacts that are shown, of at most so many curves
 SIDE = 256  # pixels of a map at the most
-MIN_ASPECT, MAX_ASPECT = 0.35, 1.2  # height of a figure over its width, for oblong cells; a choice
+MIN_FIGURE_ASPECT, MAX_FIGURE_ASPECT = 0.35, 1.2  # height over width, for oblong cells; choices
 NOISE = 1e-3  # of the nominal pressure; where contact is not known, less stress is none
 ROWS = 256  # rows of pixels that are in memory at a time
 TOUCHING = "#0077bb"
@@ -173,5 +173,5 @@ def _cell(row: Row) -> tuple[ColumnFigure, tuple[float, float, float, float]]:
     divisor, x = profiles.LENGTH_SCALE.axis(row, longest, "x")
     _, y = profiles.LENGTH_SCALE.axis(row, longest, "y")
     plot = ColumnFigure(x, y)
-    plot.height = min(max(0.85 * length_y / length, MIN_ASPECT), MAX_ASPECT) * WIDTH
+    plot.height = min(max(0.85 * length_y / length, MIN_FIGURE_ASPECT), MAX_FIGURE_ASPECT) * WIDTH
     return plot, (0.0, length / divisor, 0.0, length_y / divisor)

@@ -60,7 +60,7 @@ class ConstrainedCG(Solver):
             state.residual = contact.residual(u, sigma)
             yield state
             pressed = self._force(contact, state, force)  # [1]
-            self._turn(contact.grid, state, force, pressed)  # [2]
+            self._update_direction(contact.grid, state, force, pressed)  # [2]
             state.force, force = force, state.force
             contact.elasticity(state.direction, out=response)
             state.transforms += 2
@@ -86,7 +86,7 @@ class ConstrainedCG(Solver):
         force[pressed] = 0.0
         return pressed
 
-    def _turn(self, grid: Grid, state: CCGState, force: Field, pressed: Mask) -> None:
+    def _update_direction(self, grid: Grid, state: CCGState, force: Field, pressed: Mask) -> None:
         """d <- f + beta d, beta = f (f - f_old) / (length d K d), where length d K d = f_old d."""
         direction, beta = state.direction, 0.0
         if state.descent > 0:

@@ -35,8 +35,8 @@ from gfmd_cli.physics.free_contact import FreeContact
 from gfmd_cli.solvers.contact_state import FREE, PRESSED
 from gfmd_cli.solvers.preconditioners import create, select
 
-DELAY = 8  # number of last steps whose gain estimates the error
-MIN_GAIN = 1e-9  # ends the iteration: gain of these steps relative to the sum of all gains
+GAIN_STEPS = 8  # number of last steps whose gain estimates the error
+MIN_RELATIVE_GAIN = 1e-9  # ends the iteration: gain of these steps relative to the sum of all gains
 TOLERANCE = 1e-9  # rms of 1 - C t on the contact
 MAX_STEPS = 5000
 
@@ -63,10 +63,10 @@ def _stiffness(contact: Contact, touching: Mask) -> float:
     values, z = (field[:, : grid.points] for field in (grid.as_rows(grid.padded), preconditioner.z))
     stress = np.where(free, -1.0, 0.0)  # K w - 1 = -f
     direction, change = np.zeros_like(stress), np.zeros_like(stress)
-    gains, total, old_slope = deque([np.inf], DELAY), 0.0, np.inf
+    gains, total, old_slope = deque([np.inf], GAIN_STEPS), 0.0, np.inf
     for _ in range(MAX_STEPS):
-        slope, turned = preconditioner.apply(stress, contact_state, PRESSED, change)
-        direction *= max(0.0, -turned / old_slope) if old_slope > 0 else 0.0  # Polak-Ribiere+
+        slope, z_change = preconditioner.apply(stress, contact_state, PRESSED, change)
+        direction *= max(0.0, -z_change / old_slope) if old_slope > 0 else 0.0  # Polak-Ribiere+
         np.add(direction, z, out=direction, where=free)
         descent, old_slope = -float(np.vdot(direction, stress)), slope
         values[...] = direction
@@ -76,7 +76,7 @@ def _stiffness(contact: Contact, touching: Mask) -> float:
         stress += change
         gains.append(descent * length)
         total += gains[-1]
-        if sum(gains) <= MIN_GAIN * total:
+        if sum(gains) <= MIN_RELATIVE_GAIN * total:
             return 1.0 / (total / grid.size)
     return np.nan
 
@@ -95,8 +95,8 @@ def _of_free_contact(contact: FreeContact, touching: Mask) -> float:
             return total / float(rest[~touching].sum())
         free.approximate_stress(force, out=z)
         z *= touching
-        turned = -length * float(np.vdot(z, response))  # z times the change of the force
-        direction *= max(0.0, turned / slope) if slope > 0 else 0.0
+        z_change = -length * float(np.vdot(z, response))  # z times the change of the force
+        direction *= max(0.0, z_change / slope) if slope > 0 else 0.0
         direction += z
         slope = float(np.vdot(z, force))
         free.displacement(direction, out=response)

@@ -28,12 +28,12 @@ from gfmd_cli.physics.contact import Contact
 from gfmd_cli.solvers.contact_state import refined
 from gfmd_cli.solvers.local_start import COARSE_TOLERANCE
 from gfmd_cli.solvers.loop import Start
-from gfmd_cli.solvers.multigrid import STEEP, largest_growth
+from gfmd_cli.solvers.multigrid import MAX_LAPLACIAN_GROWTH, largest_growth
 
-COST = 5000  # largest n^3 per point of a grid; measured: with more, the iteration is faster
-COST_NOT_STEEP = 150  # the same where a V-cycle without squared Laplacians is used
-HEADROOM = 1.3  # largest number of points over that of the first set
-GROWTH = 0.4  # largest share of points that join a set at a time; measured: from 0.3 to 0.6 as good
+MAX_COST = 5000  # n^3 per point of a grid; measured: with more, the iteration is faster
+MAX_COST_WITH_V_CYCLE = 150  # the same where a V-cycle without squared Laplacians is used
+EXPECTED_GROWTH = 1.3  # of the sets: largest number of points over that of the first one; a choice
+MAX_JOINING_FRACTION = 0.4  # of a set, that joins it at a time; measured: 0.3 to 0.6 are as good
 MAX_STALLED_SETS = 3  # in a row, without fewer wrong points
 MAX_SETS = 40
 
@@ -58,7 +58,7 @@ def direct_start(
         if not contact.grid.whole or np.count_nonzero(touching) > largest:
             break
         touching = refined(touching, contact)
-        if HEADROOM * np.count_nonzero(touching) > largest:
+        if EXPECTED_GROWTH * np.count_nonzero(touching) > largest:
             break
         solve = _DirectSolve(contact, touching)
         is_solved = solve.run(largest, 0.0 if contact is last else COARSE_TOLERANCE, pause)
@@ -71,8 +71,8 @@ def direct_start(
 
 def _largest_count(contact: Contact) -> int:
     """Largest number of points in contact for which a direct solve is faster than the iteration."""
-    has_fast_cycle = contact.grid.dimension == 2 and largest_growth(contact) <= STEEP
-    cost = COST_NOT_STEEP if has_fast_cycle else COST
+    has_fast_cycle = contact.grid.dimension == 2 and largest_growth(contact) <= MAX_LAPLACIAN_GROWTH
+    cost = MAX_COST_WITH_V_CYCLE if has_fast_cycle else MAX_COST
     return int((cost * contact.grid.size) ** (1 / 3))
 
 
@@ -120,7 +120,7 @@ class _DirectSolve:
             fewest = min(count, fewest)
             if stalled > MAX_STALLED_SETS:
                 misclassified.ravel()[: np.flatnonzero(misclassified)[-1]] = False
-            self.exchange(misclassified, max(1, int(GROWTH * s.size)))
+            self.exchange(misclassified, max(1, int(MAX_JOINING_FRACTION * s.size)))
         return True
 
     def compare(self, points: Points, s: Field) -> tuple[Mask, float]:

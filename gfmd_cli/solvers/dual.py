@@ -11,10 +11,10 @@ step of the method, with the numbers beside the code lines:
 [3] Compute a Polak-Ribiere+ direction d.
 [4] Project the move of length l on the constraints: s -> a max(s + l d, 0), where a restores the
     mean.
-[5] Go to the point of lowest energy on the straight way to the projected point.
+[5] Go to the point of lowest energy on the straight line to the projected point.
 
 A step applies C once, to the projected move; l is that of the step before, corrected by the ratio
-of the best move to the projected one, as in `pcg`. All points on the way satisfy the constraints
+of the best move to the projected one, as in `pcg`. All points on the line satisfy the constraints
 and the energy never rises. K restricted to the contact is close to the inverse of the restricted C
 for n of about 1 and below; at n = 1.5 the method takes two to four times as many steps.
 """
@@ -30,10 +30,9 @@ from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.physics.contact import Contact
 from gfmd_cli.physics.free_contact import FreeContact
 from gfmd_cli.solvers.loop import Solver, Start, State
-from gfmd_cli.solvers.projected_move import choose
+from gfmd_cli.solvers.projected_move import MAX_HALVINGS, choose
 
-PROPORTION = 0.3  # of the gap on overlapping points to that in contact; as in `pcg`
-MAX_HALVINGS = 60  # of a move along which the energy rises; beyond, it is rounding
+MAX_OVERLAP_RATIO = 0.3  # of the rms gap on overlapping points to that in contact; as in `pcg`
 
 
 @dataclass(kw_only=True)
@@ -116,13 +115,15 @@ class Dual(Solver):
             state.transforms += contact.free.preconditioner_transforms
             z -= contact.grid.mean(z[chosen])
             z[~chosen] = 0.0
-            self._turn(contact.grid, state, z, force, chosen)  # [3]
+            self._update_direction(contact.grid, state, z, force, chosen)  # [3]
             self._advance(contact, state, chosen)  # [4], [5]
             self._assess(contact, state)
             state.exact = False
             state.step += 1
 
-    def _turn(self, grid: Grid, state: DualState, z: Field, force: Field, chosen: Mask) -> None:
+    def _update_direction(
+        self, grid: Grid, state: DualState, z: Field, force: Field, chosen: Mask
+    ) -> None:
         """d <- -z + beta d on the chosen points, with the mean zero."""
         beta = max(0.0, grid.dot(z, state.change) / state.slope) if state.slope > 0 else 0.0
         state.slope = grid.dot(z, force)
@@ -192,7 +193,7 @@ def _chosen(contact: FreeContact, state: DualState) -> Mask:
     touching: Mask = state.sigma > 0
     overlapping: Mask = contact.clear_untouchable(~touching & (state.gap < 0))
     inside, outside = state.gap[touching], state.gap[overlapping]
-    if contact.grid.dot(outside, outside) > PROPORTION**2 * contact.grid.dot(inside, inside):
+    if contact.grid.dot(outside, outside) > MAX_OVERLAP_RATIO**2 * contact.grid.dot(inside, inside):
         touching |= overlapping
     return touching
 

@@ -27,9 +27,9 @@ from gfmd_cli.grid.arrays import Field
 from gfmd_cli.physics.contact import Contact
 from gfmd_cli.solvers.loop import Solver, State
 
-GROWTH = 1.2  # of the time step; fireIncrmt of contMech
-SHRINKAGE = 0.5  # at a stop; fireDecrmt of contMech
-FALLING = 0.999  # smaller growth of the kinetic energy counts as a decrease; contMech
+TIME_STEP_GROWTH = 1.2  # of the time step; fireIncrmt of contMech
+TIME_STEP_SHRINKAGE = 0.5  # at a stop; fireDecrmt of contMech
+KINETIC_FACTOR = 0.999  # of the kinetic energy when it is compared with the last one; contMech
 
 
 @dataclass(kw_only=True)
@@ -86,10 +86,10 @@ class Fire(Solver):
             if change <= 0:  # [3]
                 u[...] = trial
                 sigma[...] = stress
-            if change > 0 or FALLING * kinetic < state.kinetic:  # [4]
+            if change > 0 or KINETIC_FACTOR * kinetic < state.kinetic:  # [4]
                 velocity[...] = 0.0
-                state.time_step, state.kinetic = SHRINKAGE * dt, 0.0
+                state.time_step, state.kinetic = TIME_STEP_SHRINKAGE * dt, 0.0
             else:
-                state.time_step = min(GROWTH * dt, self.time_step)
+                state.time_step = min(TIME_STEP_GROWTH * dt, self.time_step)
                 state.kinetic = float(kinetic)
             state.step += 1

@@ -5,9 +5,9 @@ import numpy as np
 from gfmd_cli.grid.compilation import kernel
 from gfmd_cli.solvers.tiles import SIDE
 
-BATCH = 8  # tiles that are convolved at once: the 8 numbers of a point lie next to each other
-WIDTH = 3 * SIDE * BATCH  # numbers of a row of points in the 3 x 3 tiles around each
-OFFSET = SIDE * BATCH  # numbers between points of neighbouring tiles
+BATCH_SIZE = 8  # tiles that are convolved at once: the 8 numbers of a point lie next to each other
+WINDOW_WIDTH = 3 * SIDE * BATCH_SIZE  # numbers of a row of points in the 3 x 3 tiles around each
+TILE_WIDTH = SIDE * BATCH_SIZE  # numbers between points of neighbouring tiles
 
 
 @kernel
@@ -39,34 +39,34 @@ def convolve(values, neighbours, quadrant, out, a, b):
     `Tiles`. `quadrant` holds the kernel at distances from 0 to 8, shape (9, 9), halved for each
     distance of 0: values at opposite distances are added before they are multiplied.
     """
-    window = np.empty((3 * SIDE, WIDTH), np.float32)
-    pairs = np.empty(WIDTH, np.float32)
-    row = np.empty(OFFSET, np.float32)
-    for first in range(a, b, BATCH):
-        count = min(BATCH, b - first)
+    window = np.empty((3 * SIDE, WINDOW_WIDTH), np.float32)
+    pairs = np.empty(WINDOW_WIDTH, np.float32)
+    row = np.empty(TILE_WIDTH, np.float32)
+    for first in range(a, b, BATCH_SIZE):
+        count = min(BATCH_SIZE, b - first)
         for t in range(count):
             for n in range(9):
                 tile = values[neighbours[first + t, n]]
                 for i in range(SIDE):
                     for j in range(SIDE):
                         column = SIDE * (n % 3) + j
-                        window[SIDE * (n // 3) + i, BATCH * column + t] = tile[SIDE * i + j]
+                        window[SIDE * (n // 3) + i, BATCH_SIZE * column + t] = tile[SIDE * i + j]
         for i in range(SIDE):
             row[:] = 0.0
             for y in range(SIDE + 1):
                 above, below = window[SIDE + i - y], window[SIDE + i + y]
-                for j in range(WIDTH):
+                for j in range(WINDOW_WIDTH):
                     pairs[j] = above[j] + below[j]
                 for x in range(0, SIDE + 1, 3):  # three at a time, which saves loads and stores
                     k0, k1, k2 = quadrant[y, x], quadrant[y, x + 1], quadrant[y, x + 2]
-                    left = pairs[OFFSET - BATCH * (x + 2) :]
-                    right = pairs[OFFSET + BATCH * x :]
-                    for j in range(OFFSET):
+                    left = pairs[TILE_WIDTH - BATCH_SIZE * (x + 2) :]
+                    right = pairs[TILE_WIDTH + BATCH_SIZE * x :]
+                    for j in range(TILE_WIDTH):
                         row[j] += (
-                            k0 * (left[j + 2 * BATCH] + right[j])
-                            + k1 * (left[j + BATCH] + right[j + BATCH])
-                            + k2 * (left[j] + right[j + 2 * BATCH])
+                            k0 * (left[j + 2 * BATCH_SIZE] + right[j])
+                            + k1 * (left[j + BATCH_SIZE] + right[j + BATCH_SIZE])
+                            + k2 * (left[j] + right[j + 2 * BATCH_SIZE])
                         )
             for j in range(SIDE):
                 for t in range(count):
-                    out[first + t, SIDE * i + j] = row[BATCH * j + t]
+                    out[first + t, SIDE * i + j] = row[BATCH_SIZE * j + t]

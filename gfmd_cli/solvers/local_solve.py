@@ -21,18 +21,18 @@ from gfmd_cli.physics.contact import Contact
 from gfmd_cli.solvers.local_kernels import penetration
 from gfmd_cli.solvers.loop import Start
 from gfmd_cli.solvers.projected_move import choose
-from gfmd_cli.solvers.tile_operators import OPERATORS, Indices
+from gfmd_cli.solvers.tile_operators import TILE_OPERATORS, Indices
 from gfmd_cli.solvers.tiles import SIDE, Tiles
 
-FIRST_TOLERANCE = 6e-3  # before the operators on tiles are corrected
-REDUCTION = (1e-3, 0.02)
-"""Smallest and largest factor of the residual that a solve on tiles aims at. The smallest is the
-relative error of their operators; the largest is a choice, because an evaluation at all points
+UNCORRECTED_TOLERANCE = 6e-3  # of the first solve, before the operators are corrected; a choice
+REDUCTION_RANGE = (1e-3, 0.02)
+"""Smallest and largest factor by which a solve on tiles shall reduce the residual. The smallest is
+the relative error of the operators; the largest is a choice, because an evaluation at all points
 takes longer than a few steps on tiles."""
-MARGIN = 0.9  # of the tolerance, for the estimated residual of the start
-AIM = 0.25  # of the tolerance, for that residual after the next solve on the tiles
-MAX_EVALUATIONS = 6  # of the displacement at all points
-MAX_STEPS = 60  # on the same tiles
+ACCEPTED_FRACTION = 0.9  # of the tolerance, for the predicted residual of the start; a choice
+TARGET_FRACTION = 0.25  # of the tolerance, for that residual after the next solve; a choice
+MAX_EVALUATIONS = 6  # of the displacement at all points; a choice
+MAX_STEPS = 60  # on the same tiles; a choice
 
 
 @dataclass
@@ -40,9 +40,9 @@ class Evaluation:
     """C s at all points, compared with the indenter."""
 
     level: float
-    """The level of C s where it is, in the mean, at the indenter in contact."""
+    """Mean of C s - h in contact."""
     gap: Field
-    """Gap on the tiles of the start."""
+    """Gap of the start, on the tiles."""
     residual: float
     """Natural residual of s and C s."""
     start_residual: float
@@ -52,7 +52,7 @@ class Evaluation:
 
 
 class LocalSolve:
-    """The pressure s on tiles of one grid; a subclass provides what the boundary changes.
+    """The pressure s on tiles of one grid; the subclasses are for the two boundaries.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ class LocalSolve:
 
     def __init__(self, contact: Contact, tiles: Tiles, s: Field, pause: Callable[[], None]) -> None:
         self.contact, self.grid, self.pause = contact, contact.grid, pause
-        self.operators = OPERATORS[contact.boundary](contact)
+        self.operators = TILE_OPERATORS[contact.boundary](contact)
         self.transforms = 0.0
         self.place(tiles, s)
 
@@ -92,7 +92,7 @@ class LocalSolve:
         raise NotImplementedError
 
     def lay(self, gap: Field) -> tuple[Field, Field]:
-        """The gap and the stress on the tiles of the start, from the gap of C s."""
+        """The gap and the stress of the start on the tiles, from the gap of C s."""
         return gap, self.s
 
     def start(self, tolerance: float) -> Start:
@@ -106,18 +106,19 @@ class LocalSolve:
         with an error of 1e-3 and may be in single precision, unless the tolerance is so loose that
         it may be the last one.
         """
-        aim = FIRST_TOLERANCE
+        target = UNCORRECTED_TOLERANCE
         for count in range(1, MAX_EVALUATIONS + 1):
-            self.run(aim)
-            in_single_precision = count == 1 and tolerance < FIRST_TOLERANCE
+            self.run(target)
+            in_single_precision = count == 1 and tolerance < UNCORRECTED_TOLERANCE
             displacement = self.compliance_everywhere(in_single_precision=in_single_precision)
             result = self.evaluate(displacement)
-            is_good = result.start_residual < MARGIN * tolerance and not result.entered.any()
-            if (is_good and not in_single_precision) or count == MAX_EVALUATIONS:
+            is_good = result.start_residual < ACCEPTED_FRACTION * tolerance
+            is_final = is_good and not result.entered.any() and not in_single_precision
+            if is_final or count == MAX_EVALUATIONS:
                 break
             if result.start_residual > 0:  # it is zero if a single point is in contact
-                reduction = np.clip(AIM * tolerance / result.start_residual, *REDUCTION)
-                aim = result.residual * float(reduction)
+                factor = TARGET_FRACTION * tolerance / result.start_residual
+                target = result.residual * float(np.clip(factor, *REDUCTION_RANGE))
             self.correct(displacement, result.entered)
         return result, displacement
 

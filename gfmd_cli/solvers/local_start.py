@@ -21,35 +21,35 @@ from gfmd_cli.solvers.loop import Start
 from gfmd_cli.solvers.tiles import SIDE, Tiles
 
 SMALLEST_EXPONENT = 0.2  # of k(q) for which there are tiles; measured from 0.25 on
-REACH = 2  # points by which the contact may grow from a grid to the next
+CONTACT_MARGIN = 2  # points by which the contact may grow from a grid to the next; a choice
 COARSE_TOLERANCE = 0.03  # on grids before the finest; measured: 0.01 to 0.1 differ by 5 %
-RELAXATIONS = 3  # of the displacement on the indenter; 2 to 6 take about as long
-DAMPING = 0.8  # of the relaxation
-LAYING = 2.0  # largest gap that is closed, over the move that takes the stress off this point
+JACOBI_STEPS = 3  # after C s is laid on the indenter; 2 to 6 take about as long
+JACOBI_DAMPING = 0.8  # a choice
+MAX_CLOSED_GAP = 2.0  # over the Jacobi move, which removes the stress of the point; a choice
 
 
-class Limits(NamedTuple):
-    """Where a solve on tiles is faster than one on the whole grid: measured."""
+class TileLimits(NamedTuple):
+    """Contacts for which a solve on tiles is faster than one on the whole grid; measured."""
 
     points: int
     """Smallest number of points per side."""
-    share: float
-    """Largest share of tiles that the contact can reach, for n = 0."""
+    fraction: float
+    """Largest fraction of tiles that the contact can reach, for n = 0."""
     decrease: float
-    """By how much this share decreases with the largest exponent n of k(q)."""
-    least_share: float
-    """The share where this is less."""
+    """By how much this fraction decreases with the largest exponent n of k(q)."""
+    min_fraction: float
+    """Lower limit of this fraction."""
     exponent: float
     """Largest exponent n."""
 
-    def largest_share(self, contact: Contact) -> float:
-        """Largest share of tiles that a contact can reach."""
-        return max(self.share - self.decrease * contact.exponents[1], self.least_share)
+    def max_fraction(self, contact: Contact) -> float:
+        """Largest fraction of tiles that a contact can reach."""
+        return max(self.fraction - self.decrease * contact.exponents[1], self.min_fraction)
 
 
-LIMITS = {
-    "periodic": Limits(512, 0.17, 0.1, 0.012, 2.05),
-    "free": Limits(256, 0.25, 0.0, 0.0, 1.55),
+TILE_LIMITS = {
+    "periodic": TileLimits(512, 0.17, 0.1, 0.012, 2.05),
+    "free": TileLimits(256, 0.25, 0.0, 0.0, 1.55),
 }
 """By the boundary of the contact."""
 
@@ -72,13 +72,13 @@ def start_from(
     doubled = all(b == tuple(2 * n for n in a) for a, b in pairwise(shapes))
     if not doubled or not all(map(tiles_apply, finer)):
         return None
-    solve_on_tiles, limits = SOLVES[last.boundary], LIMITS[last.boundary]
+    solve_on_tiles, limits = LOCAL_SOLVES[last.boundary], TILE_LIMITS[last.boundary]
     for contact in finer:
         tiles = _tiles_in_reach(pressure > 0, is_periodic=contact.boundary == "periodic")
         s = _refined(pressure, tiles)
         if contact.may_touch is not None:
             s *= tiles.take(contact.may_touch)
-        if tiles.count > limits.largest_share(contact) * tiles.used.size or not s.any():
+        if tiles.count > limits.max_fraction(contact) * tiles.used.size or not s.any():
             return None
         solve = solve_on_tiles(contact, tiles, s, pause)
         del pressure, s  # their memory is needed now
@@ -94,7 +94,7 @@ def start_from(
 
 def tiles_apply(contact: Contact) -> bool:
     """Whether the operators on tiles apply, and a solve on tiles can be faster."""
-    grid, limits = contact.grid, LIMITS[contact.boundary]
+    grid, limits = contact.grid, TILE_LIMITS[contact.boundary]
     if grid.dimension == 1 or not grid.whole:
         return False
     if min(grid.shape) < limits.points:
@@ -110,8 +110,8 @@ def _tiles_in_reach(touching: Mask, *, is_periodic: bool) -> Tiles:
     down, right = (2 * points // SIDE for points in touching.shape)
     used = np.zeros((down, right), dtype=np.bool_)
     i, j = np.nonzero(touching)
-    for y in (2 * i - REACH, 2 * i + 1 + REACH):
-        for x in (2 * j - REACH, 2 * j + 1 + REACH):
+    for y in (2 * i - CONTACT_MARGIN, 2 * i + 1 + CONTACT_MARGIN):
+        for x in (2 * j - CONTACT_MARGIN, 2 * j + 1 + CONTACT_MARGIN):
             if is_periodic:
                 used[y // SIDE % down, x // SIDE % right] = True
             else:
@@ -136,7 +136,7 @@ def _refined(field: Field, tiles: Tiles) -> Field:
 
 
 class PeriodicSolve(LocalSolve):
-    """The solve in a periodic cell, from which the iteration on the whole grid takes u."""
+    """The solve in a periodic cell; the iteration on the whole grid starts from u."""
 
     def compliance_everywhere(self, *, in_single_precision: bool) -> Field:
         """C s at all points, in the memory of the transforms."""
@@ -169,16 +169,16 @@ class PeriodicSolve(LocalSolve):
         stiffness = self.contact.point_stiffness
         laid = np.where(self.s > stiffness * gap, 0.0, np.maximum(gap, 0.0))
         stress = self.s + self.map_displacement(laid - gap)
-        for _ in range(RELAXATIONS):
+        for _ in range(JACOBI_STEPS):
             move = stress / stiffness
-            relaxed = np.maximum(laid - DAMPING * move, 0.0)
-            laid = np.where(laid < LAYING * move, 0.0, relaxed)
+            relaxed = np.maximum(laid - JACOBI_DAMPING * move, 0.0)
+            laid = np.where(laid < MAX_CLOSED_GAP * move, 0.0, relaxed)
             stress = self.s + self.map_displacement(laid - gap)
         return laid, stress
 
 
 class FreeSolve(LocalSolve):
-    """The solve with a free boundary, from which the iteration on the whole map takes s."""
+    """The solve with a free boundary; the iteration on the whole map starts from s."""
 
     contact: FreeContact
 
@@ -197,5 +197,5 @@ class FreeSolve(LocalSolve):
         return Start(self.contact, self.transforms, displacement, sigma)
 
 
-SOLVES: dict[str, type[LocalSolve]] = {"periodic": PeriodicSolve, "free": FreeSolve}
+LOCAL_SOLVES: dict[str, type[LocalSolve]] = {"periodic": PeriodicSolve, "free": FreeSolve}
 """The solve on tiles, by the boundary of the contact."""

@@ -14,7 +14,7 @@ from gfmd_cli.spec_table import SpecTable
 from gfmd_cli.status import Status
 
 MAX_MISSES = 5  # one or two occur when sigma has drifted; this many in a row mean that rounding
-PROGRESS = 0.7  # is the limit, if none of them reduces the true residual by this factor
+PROGRESS_FACTOR = 0.7  # is the limit, if none of them reduces the true residual by this factor
 
 
 @dataclass(kw_only=True)
@@ -149,7 +149,7 @@ def solve(contact: Contact, solver: Solver, state: State, watch: Watch = ignore)
         if current.residual < max(solver.tolerance, current.rounding) and not current.exact:
             solver.refresh(contact, current)
             if current.residual >= solver.tolerance:
-                progress = current.residual < PROGRESS * current.best_residual
+                progress = current.residual < PROGRESS_FACTOR * current.best_residual
                 current.misses = 0 if progress else current.misses + 1
                 current.best_residual = min(current.best_residual, current.residual)
         watch(contact, current)

@@ -45,11 +45,11 @@ from gfmd_cli.solvers.contact_state import ContactState
 
 MIN_LEVEL_POINTS = 4  # points along the shorter side on the coarsest level
 MAX_PIXEL_ASPECT = 1.5  # beyond, only the shorter side is coarsened, which leaves 1 / (2 / 1.5)
-STEEP = 5.0  # growth of k(q) above which the Laplacian is squared; n = 2.3; measured
-SPRINGS = 0.125, 0.25  # stiffness over diagonal element and k(2 q) / k(q), without and with square
+MAX_LAPLACIAN_GROWTH = 5.0  # growth of k(q) above which the Laplacian is squared; n = 2.3; measured
+SPRING_STIFFNESS = 0.125, 0.25  # over diagonal element and k(2 q) / k(q): Laplacian, its square
 JACOBI_EIGENVALUE = 1.76  # largest of the damped Jacobi iteration; 1.6 to 1.85 do as well
 MAX_GROWTH = 70.0  # of k(q) between levels, at which the cycle still works; 64 at q^6; measured
-COARSEST_STEPS = 4  # pairs of smoothing steps on the coarsest level
+COARSEST_STEP_PAIRS = 4  # pairs of smoothing steps on the coarsest level
 TIE_UNIT = 1.0 / 64  # of the integers in `ties`
 
 
@@ -109,12 +109,12 @@ def _operator(dy: float, dx: float, growth: float, density: float) -> kernels.Op
     corner = min(y, x) / 6
     centre, along_y, along_x = 2 * (y + x) - 4 * corner, y - 2 * corner, x - 2 * corner
     diagonal, largest = centre, 4 * (y + x) - 16 * corner
-    is_squared = growth > STEEP
+    is_squared = growth > MAX_LAPLACIAN_GROWTH
     if is_squared:
         diagonal = centre**2 + 2 * (along_y**2 + along_x**2) + 4 * corner**2
         largest **= 2
     damping = JACOBI_EIGENVALUE * diagonal / largest
-    spring = TIE_UNIT * SPRINGS[is_squared] * diagonal * growth * density
+    spring = TIE_UNIT * SPRING_STIFFNESS[is_squared] * diagonal * growth * density
     laplacian = map(np.float32, (centre, along_y, along_x, corner))
     damped = map(np.float32, (diagonal / damping, spring, spring / damping))
     return kernels.Operator._make([*laplacian, is_squared, *damped])
@@ -206,23 +206,23 @@ class Multigrid:
     ) -> tuple[float, float]:
         """See `preconditioners.Preconditioner.apply`."""
         self.rows.exchange_halo(contact_state)
-        self.set_ties(contact_state, threshold)  # [1] penalty terms
+        self.set_ties(contact_state, threshold)  # penalty terms
         fields = (self.rows.with_halo(sigma), contact_state, threshold, self.operators[0])
-        # [2] one smoothing step from zero on the finest level, and the restriction of the residual
+        # one smoothing step from zero on the finest level, and the restriction of the residual
         self.restrict(kernels.first_residual, fields, 0)
-        self.descend()  # [3] pre-smoothing
-        for level in range(len(self.coarse_rows) - 2, -1, -1):  # [4] correction, post-smoothing
+        self.descend()  # pre-smoothing
+        for level in range(len(self.coarse_rows) - 2, -1, -1):  # correction, post-smoothing
             x, y, correction = self.x[level], self.y[level], self.correction(level + 1)
             if self.operators[level + 1].is_squared:
                 self.smooth(level, y, x, *correction)
                 self.smooth(level, x, y)
             else:
                 self.smooth(level, None, y, *correction)
-        # [5] correction and one smoothing step on the finest level, and the sums
-        slope, turned = self.rows.sums_with_halo(
+        # correction and one smoothing step on the finest level, and the sums
+        slope, z_change = self.rows.sums_with_halo(
             2, kernels.last_smooth, *fields, *self.correction(0), self.scale, change, self.z
         )
-        return float(slope), float(turned)
+        return float(slope), float(z_change)
 
     def descend(self) -> None:
         """Smooth and restrict, from the finest of the coarse levels to the coarsest."""
@@ -234,7 +234,7 @@ class Multigrid:
             fields = (rhs, operator, self.ties[level], y, not operator.is_squared)
             self.restrict(kernels.residual, fields, level + 1)
         self.smooth(last, None, self.y[last])
-        for _ in range(COARSEST_STEPS):
+        for _ in range(COARSEST_STEP_PAIRS):
             self.smooth(last, self.y[last], self.x[last])
             self.smooth(last, self.x[last], self.y[last])
 

@@ -160,7 +160,7 @@ def last_smooth(
             continue
         source, held, stress = x[i % 5], contact_state[i], sigma[i]
         row, changed = padded[i - halo], change[i - halo]
-        slope = turned = 0.0
+        slope = z_change = 0.0
         for j in range(n):
             c = j + 2
             s = np.float32(stress[j])
@@ -168,8 +168,8 @@ def last_smooth(
             z = ZERO if held[j] >= threshold else z * scale
             row[j] = z
             slope -= z * stress[j]
-            turned += z * changed[j]
-        out[i, 0], out[i, 1] = slope, turned
+            z_change += z * changed[j]
+        out[i, 0], out[i, 1] = slope, z_change
 
 
 @part_of_kernel

@@ -18,7 +18,7 @@ from gfmd_cli.solvers import preconditioner_kernels as kernels
 from gfmd_cli.solvers.contact_state import ContactState
 from gfmd_cli.solvers.multigrid import level_count
 
-COARSEST = 4  # hats per side on the coarsest level; wider hats would overlap themselves
+MIN_LEVEL_HATS = 4  # hats per side on the coarsest level; wider hats would overlap themselves
 
 
 class Multilevel:
@@ -60,8 +60,8 @@ class Multilevel:
             depth = len(self.fields)
         arguments = (self.energies[0], change, self.z)
         if depth == 0:
-            slope, turned = self.rows.sums_with_halo(2, kernels.only_level, *fields, *arguments)
-            return float(slope), float(turned)
+            slope, z_change = self.rows.sums_with_halo(2, kernels.only_level, *fields, *arguments)
+            return float(slope), float(z_change)
         top = depth - 1
         self.fields[top] *= np.where(self.held[top], 0.0, 1.0 / self.energies[depth])
         for level in range(top - 1, -1, -1):
@@ -84,7 +84,7 @@ class Multilevel:
 def hat_energies(contact: Contact) -> list[float]:
     """<phi K phi> of a hat of each level, whose transform is prod_j (1 + cos 2^j q dx)."""
     grid = contact.grid
-    levels = level_count(grid, COARSEST)
+    levels = level_count(grid, MIN_LEVEL_HATS)
     rows, columns = (_squared_hats(points, levels) for points in grid.whole_shape)
     k = contact.stiffness[: rows.shape[1]]  # the other rows mirror these
     energies = grid.total(np.einsum("li,li->l", rows @ k, columns[:, slice(*grid.span)]))

@@ -16,10 +16,10 @@ from gfmd_cli.solvers.loop import Solver, Start, State, Watch, ignore, solve
 from gfmd_cli.solvers.multigrid import coarsened_axes
 from gfmd_cli.status import Status
 
-COARSEST = 64  # points per side of a square; a solve on as many points costs next to nothing
-FEWEST = 8  # points along an axis that is not coarsened; a choice: fewer resolve no contact
-MAX_LAYINGS = 5  # of a good start; points that the first one leaves free may be pressed then
-SAME_HEIGHT = 1000  # units of rounding by which indenters on other numbers of processes differ
+COARSEST_POINTS = 64  # points per side of a square; a solve on as many points costs next to nothing
+MIN_AXIS_POINTS = 8  # with which an axis is not coarsened; a choice: fewer resolve no contact
+MAX_CORRECTIONS = 5  # of a good start: a correction may press points that it left free; a choice
+HEIGHT_ROUNDING = 1000  # units of rounding by which indenters on other numbers of processes differ
 
 
 @dataclass
@@ -33,7 +33,7 @@ class Solution:
     solver: str
     steps: int
     transforms: float
-    """Real transforms of the solved size; those of coarser grids count by their share of points."""
+    """Real transforms, in units of those of the solved grid."""
 
 
 @dataclass
@@ -93,7 +93,7 @@ def solve_contact(
                 while grids[-1] is not start.contact:
                     grids.pop()
     assert state is not None
-    for _ in range(MAX_LAYINGS if contact.boundary == "periodic" else 0):
+    for _ in range(MAX_CORRECTIONS if contact.boundary == "periodic" else 0):
         good_start = status.is_converged and state.step == 0  # no step has laid points yet
         if not good_start or not contact.lay_pressed(state.u, state.sigma, state.residual):
             break
@@ -134,10 +134,10 @@ def levels(shape: Shape, sides: tuple[float, ...]) -> list[Shape]:
 
 def _coarser(shape: Shape, sides: tuple[float, ...]) -> Shape:
     """The next coarser grid, or the same."""
-    if prod(shape) <= COARSEST ** len(shape):
+    if prod(shape) <= COARSEST_POINTS ** len(shape):
         return shape
     return tuple(
-        2 * ((points + 3) // 4) if is_coarsened and points > FEWEST else points
+        2 * ((points + 3) // 4) if is_coarsened and points > MIN_AXIS_POINTS else points
         for points, is_coarsened in zip(shape, coarsened_axes(shape, sides), strict=True)
     )
 
@@ -189,7 +189,7 @@ def _resumed(contact: Contact, resume: Resume) -> State:
     """
     state = resume.state
     if resume.moved:
-        near = SAME_HEIGHT * np.finfo(state.u.dtype).eps
+        near = HEIGHT_ROUNDING * np.finfo(state.u.dtype).eps
         for rows in row_blocks(state.u):
             u, h = state.u[rows], contact.obstacle[rows]
             np.copyto(u, h, where=np.abs(u - h) < near)

@@ -7,7 +7,7 @@ A step of the method, with the numbers beside the code lines:
 [2] Precondition the force on the free points.
 [3] Compute a direction d on the free points, from the preconditioned force and the last direction.
 [4] Project the move of length s on the constraint: u -> max(u + s d, h).
-[5] Go to the point of lowest energy on the straight way to the projected point.
+[5] Go to the point of lowest energy on the straight line to the projected point.
 
 A step applies K once, to the projected move. This is done in single precision, except on lines:
 moves become smaller as the iteration converges, and so does their rounding. White noise of u has
@@ -18,7 +18,7 @@ Ye, SIAM J. Sci. Comput. 22, 835, 2000).
 
 The length s is that of the step before (in the first step, that of the coarser grid), corrected
 by the ratio of the best move to the projected one. The energy never rises, so that the method
-cannot cycle: a move beyond the lowest point is shortened to it (all points on the way are
+cannot cycle: a move beyond the lowest point is shortened to it (all points on the line are
 feasible), and a move along which the energy rises from the start is halved. A scaled gradient that
 is projected on the feasible set decreases the energy for a short enough step if the binding
 constraints are excluded from the scaling (Bertsekas, SIAM J. Control Optim. 20, 221, 1982).
@@ -38,14 +38,13 @@ from gfmd_cli.solvers import pcg_kernels as kernels
 from gfmd_cli.solvers.contact_state import PRESSED, TENSE, refined
 from gfmd_cli.solvers.loop import Solver, State
 from gfmd_cli.solvers.preconditioners import Preconditioner, Selection, create, select
-from gfmd_cli.solvers.projected_move import MoveChoice, choose, conjugation
+from gfmd_cli.solvers.projected_move import MAX_HALVINGS, MoveChoice, choose, conjugation
 
-PROPORTION = 0.3  # of rms tension to rms free force; from 0.1 to 1 within 20 % at n = 1 to 4
-MAX_HALVINGS = 60  # of a move along which the energy rises; beyond, it is rounding
+MAX_TENSION_RATIO = 0.3  # of rms tension to rms free force; from 0.1 to 1 within 20 % at n = 1 to 4
 RIGID_CURVATURE = 1e-12  # curvature over descent below which a direction is a rigid shift
-SELECT_AFTER = 4  # smallest number of steps between two selections of the preconditioner
-SELECT_GROWTH = 1.5  # growth of the number of steps from one selection to the next
-SCREENING_CHANGE = 1.25  # factor in k(q_c) up to which the old value is kept
+MIN_SELECTION_INTERVAL = 4  # smallest number of steps between two selections of the preconditioner
+SELECTION_GROWTH = 1.5  # growth of the number of steps from one selection to the next
+MAX_SCREENING_CHANGE = 1.25  # factor in k(q_c) up to which the old value is kept
 
 
 @dataclass(kw_only=True)
@@ -180,17 +179,17 @@ class _Run:
         later steps.
         """
         state, step = self.state, self.state.step
-        release = state.tension > PROPORTION**2 * state.free
+        release = state.tension > MAX_TENSION_RATIO**2 * state.free
         self.threshold = PRESSED if release else TENSE
         if step < state.select_at:
             return
-        state.select_at = max(step + SELECT_AFTER, int(SELECT_GROWTH * step))
+        state.select_at = max(step + MIN_SELECTION_INTERVAL, int(SELECTION_GROWTH * step))
         selection = select(self.contact, self.contact_state, self.threshold)
         change = state.screening / selection.screening
-        if selection.multilevel != state.multilevel or (
-            not selection.multilevel and not 1 / SCREENING_CHANGE < change < SCREENING_CHANGE
-        ):
-            if selection.multilevel != state.multilevel:
+        is_close = 1 / MAX_SCREENING_CHANGE < change < MAX_SCREENING_CHANGE
+        is_other_kind = selection.multilevel != state.multilevel
+        if is_other_kind or not (selection.multilevel or is_close):
+            if is_other_kind:
                 state.length = 0.0
             state.screening, state.multilevel = selection.screening, selection.multilevel
             state.moved = 0.0
@@ -203,11 +202,11 @@ class _Run:
             selection = Selection(state.screening, state.multilevel)
             self.preconditioner = create(self.contact, selection, self.moves)
         fields = (self.sigma, self.contact_state, self.threshold)
-        slope, turned = self.preconditioner.apply(*fields, self.change)
+        slope, z_change = self.preconditioner.apply(*fields, self.change)
         state.transforms += self.preconditioner.transforms
         if state.moved == 0.0 or slope <= 0.0:
             return 0.0
-        return conjugation(slope, turned, state.moved, state.best_length, state.curvature)
+        return conjugation(slope, z_change, state.moved, state.best_length, state.curvature)
 
     def apply_stiffness(self) -> float:
         """Replace the values in `padded` by K times them; return the sum of their products."""
@@ -217,17 +216,17 @@ class _Run:
     def advance(self, beta: float) -> None:
         """Compute the new direction, and move along it such that the energy does not rise."""
         state, fields = self.state, (self.h, self.u, self.sigma)
-        descent, fall, square, stopped = self.turn(beta)  # [3]
+        descent, fall, square, stopped = self.update_direction(beta)  # [3]
         if descent <= 0:
             self.precondition()
-            descent, fall, square, stopped = self.turn(0.0)
+            descent, fall, square, stopped = self.update_direction(0.0)
         fraction, is_moved = 0.0, state.length > 0
         if not is_moved:
             state.length = self.exact_length(descent)
         for _ in range(MAX_HALVINGS):
             length = state.length
             if not is_moved:  # [4]
-                _, fall, square, stopped = self.turn(0.0, is_kept=True)
+                _, fall, square, stopped = self.update_direction(0.0, is_kept=True)
             curvature = self.apply_stiffness()
             is_finite = isfinite(curvature)  # else the move overflows in single precision
             if fall > 0 and is_finite:
@@ -247,12 +246,12 @@ class _Run:
         rounding = self.roundoff * self.stiffest * fraction * self.contact.as_residual(square)
         state.rounding = hypot(state.rounding, rounding)  # of the moves so far
 
-    def turn(self, beta: float, *, is_kept: bool = False) -> Field:
-        """Compute the direction and the projected move along it; see `pcg_kernels.turn`."""
+    def update_direction(self, beta: float, *, is_kept: bool = False) -> Field:
+        """Compute the direction and the projected move along it; see `pcg_kernels`."""
         assert self.preconditioner is not None
         fields = (self.h, self.u, self.sigma, self.own_state, self.threshold)
-        direction = (self.preconditioner.z, beta, self.direction, is_kept)
-        return self.rows.sums(4, kernels.turn, *fields, *direction, self.state.length, self.padded)
+        direction = (self.preconditioner.z, beta, self.direction, is_kept, self.state.length)
+        return self.rows.sums(4, kernels.update_direction, *fields, *direction, self.padded)
 
     def choose_move(self, best: float, stopped: bool) -> MoveChoice:
         """How much of a move to take if the energy is lowest at the fraction `best`."""

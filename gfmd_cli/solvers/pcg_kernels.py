@@ -32,7 +32,9 @@ def classify(h, u, sigma, contact_state, out, a, b):
 
 
 @kernel
-def turn(h, u, sigma, state, threshold, z, beta, direction, is_kept, length, padded, out, a, b):
+def update_direction(
+    h, u, sigma, state, threshold, z, beta, direction, is_kept, length, padded, out, a, b
+):
     """Set the direction d to z + beta d on the free points, and compute the move along it.
 
     The direction stays where it `is_kept`. The move max(u + length d, h) - u is written to

@@ -35,12 +35,12 @@ def free_force(sigma, contact_state, threshold, padded, a, b):
 def slopes(sigma, contact_state, threshold, change, z, out, a, b):
     """Sums of z times force and of z times change over the free points."""
     for i in range(a, b):
-        slope = turned = 0.0
+        slope = z_change = 0.0
         for j in range(sigma.shape[1]):
             free_z = 0.0 if contact_state[i, j] >= threshold else z[i, j]
             slope -= free_z * sigma[i, j]
-            turned += free_z * change[i, j]
-        out[i, 0], out[i, 1] = slope, turned
+            z_change += free_z * change[i, j]
+        out[i, 0], out[i, 1] = slope, z_change
 
 
 @kernel
@@ -124,14 +124,14 @@ def last_prolongation(coarse, sigma, contact_state, threshold, energy, change, p
         for j in range(m - 1):
             row[2 * j + 1] = 0.5 * (row[2 * j] + row[2 * j + 2])
         row[2 * m - 1] = 0.5 * (row[2 * m - 2] + row[0])
-        slope = turned = 0.0
+        slope = z_change = 0.0
         for j in range(2 * m):
             s = sigma[i, j]
             z = 0.0 if contact_state[i, j] >= threshold else row[j] - s / energy
             padded[i - halo, j] = z
             slope -= z * s
-            turned += z * change[i - halo, j]
-        out[i, 0], out[i, 1] = slope, turned
+            z_change += z * change[i - halo, j]
+        out[i, 0], out[i, 1] = slope, z_change
 
 
 @kernel
@@ -139,11 +139,11 @@ def only_level(sigma, contact_state, threshold, energy, change, padded, out, a, 
     """Write z = -sigma / energy on the free points, if all hats of coarser levels are held."""
     halo = (sigma.shape[0] - change.shape[0]) // 2
     for i in range(a, b):
-        slope = turned = 0.0
+        slope = z_change = 0.0
         for j in range(sigma.shape[1]):
             s = sigma[i, j]
             z = 0.0 if contact_state[i, j] >= threshold else -s / energy
             padded[i - halo, j] = z
             slope -= z * s
-            turned += z * change[i - halo, j]
-        out[i, 0], out[i, 1] = slope, turned
+            z_change += z * change[i - halo, j]
+        out[i, 0], out[i, 1] = slope, z_change

@@ -66,8 +66,8 @@ class GreensFunction:
         factors = (self.stiffness, self.screening, 1.0 / grid.size)
         grid.spectral_rows.run(kernels.apply_greens_function, grid.as_rows(grid.spectrum), *factors)
         grid.transform_back()
-        slope, turned = rows.sums(2, kernels.slopes, *fields, change, self.z)
-        return float(slope), float(turned)
+        slope, z_change = rows.sums(2, kernels.slopes, *fields, change, self.z)
+        return float(slope), float(z_change)
 
 
 @dataclass(frozen=True)

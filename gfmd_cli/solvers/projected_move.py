@@ -1,13 +1,14 @@
-"""How far a solver goes along a move that is projected on its constraint, and where it goes next.
+"""The step length and the direction of the solvers that project their moves on the constraint.
 
 The solvers in u and in sigma share the rule for the length of a move. The energy is a parabola
-along the straight way to the projected point, lowest at the fraction `best` of it; all points on
-the way are feasible.
+along the straight line to the projected point, lowest at the fraction `best` of it; all points on
+the line are feasible.
 """
 
 from typing import NamedTuple
 
-FULL_MOVE = 0.5  # a projected move lowers the energy if its best fraction is above 1/2
+MIN_FULL_MOVE = 0.5  # a full move lowers the energy if its best fraction is above 1/2
+MAX_HALVINGS = 60  # of a move along which the energy rises; beyond, it is rounding
 LENGTH_CHANGE = (0.5, 2.0)  # range of the factor by which a projected move changes the next length
 
 
@@ -23,16 +24,18 @@ class MoveChoice(NamedTuple):
 
 
 def choose(best: float, exact: bool) -> MoveChoice:
-    """The choice for a move; `exact` tells that no point is stopped on the way to `best`."""
+    """The choice for a move; `exact`: no point is stopped before `best`."""
     if exact:
         return MoveChoice(best, best, False)  # the exact step of conjugate gradients
     low, high = LENGTH_CHANGE
-    is_full = best >= FULL_MOVE
+    is_full = best >= MIN_FULL_MOVE
     fraction = 1.0 if is_full else max(best, 0.0)
     return MoveChoice(fraction, min(max(best, low), high), not is_full)
 
 
-def conjugation(slope: float, turned: float, moved: float, best: float, curvature: float) -> float:
+def conjugation(
+    slope: float, z_change: float, moved: float, best: float, curvature: float
+) -> float:
     """The factor beta >= 0 for which z + beta d leads to the lowest energy in the plane of z and d.
 
     z is the preconditioned force f, and d the last direction; f and d are those on the free points.
@@ -40,7 +43,7 @@ def conjugation(slope: float, turned: float, moved: float, best: float, curvatur
     Parameters
     ----------
     slope : z f, positive
-    turned : z times the change of -f by the last move, which is `moved` K d
+    z_change : z times the change of -f by the last move, which is `moved` K d
     moved : length of the last move along d
     best : length along d at which the energy was lowest
     curvature : d K d
@@ -50,6 +53,6 @@ def conjugation(slope: float, turned: float, moved: float, best: float, curvatur
     this is the formula of Hestenes & Stiefel (J. Res. Natl. Bur. Stand. 49, 409, 1952).
     """
     rest = best - moved
-    coupling = turned / (moved * curvature)  # z K d / d K d
-    share = 1.0 - rest * curvature * coupling / slope
-    return max(0.0, (rest / best - coupling) / share) if share > 0.0 else 0.0
+    coupling = z_change / (moved * curvature)  # z K d / d K d
+    denominator = 1.0 - rest * curvature * coupling / slope
+    return max(0.0, (rest / best - coupling) / denominator) if denominator > 0.0 else 0.0

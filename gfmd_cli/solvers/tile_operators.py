@@ -37,14 +37,14 @@ from gfmd_cli.solvers.local_kernels import convolve
 from gfmd_cli.solvers.tiles import SIDE, Tiles
 
 COARSENING = 4  # spacing of the grid of the smooth part, in grid points
-DECAY = 3.0
-"""x^2 at the highest wavenumber of that grid. The error of C s, relative to its standard deviation,
-is then smallest, 7e-4 (default surface, 1024^2, n = 1, p* = 0.01)."""
-ORDER = 4  # of the B-splines: cubic
+DECAY_EXPONENT = 3.0
+"""x^2 at the highest wavenumber of that grid (Q ~ exp(-x^2)). The error of C s, relative to its
+standard deviation, is then smallest, 7e-4 (default surface, 1024^2, n = 1, p* = 0.01)."""
+SPLINE_ORDER = 4  # of the B-splines: cubic
 LARGEST_X = 4.0  # Q is below 1e-6 of its largest value there
-TABLE = 4096  # values of Q: the error of linear interpolation is below 1e-6
-CHUNK = 256  # tiles that a thread convolves at a time
-CELL = 48  # smallest number of points along a side of the cell on which kernels are computed
+TABLE_SIZE = 4096  # values of Q: the error of linear interpolation is below 1e-6
+TILES_PER_CHUNK = 256  # tiles that a thread convolves at a time
+MIN_CELL_POINTS = 48  # per side of the cell on which kernels are computed; a choice
 
 Indices: TypeAlias = NDArray[np.integer[Any]]
 
@@ -64,7 +64,7 @@ class TileOperators:
     first_node: ClassVar[int] = 0
     """Number of the point of the coarse grid at the first point of the grid."""
     transforms: float
-    """Transforms of one displacement, by their share of points."""
+    """Transforms of one displacement, in units of transforms of the whole grid."""
 
     def __init__(
         self, grid: Grid, short_ranged: Field, stiffness: Field, coarse_shape: Shape
@@ -140,16 +140,16 @@ class PeriodicOperators(TileOperators):
 class FreeOperators(TileOperators):
     """The operators of an elastomer of stiffness k_n q^n that extends beyond the map."""
 
-    first_node: ClassVar[int] = ORDER // 2 - 1  # splines beyond the border overlap tiles, too
+    first_node: ClassVar[int] = SPLINE_ORDER // 2 - 1  # splines beyond the border overlap tiles
 
     def __init__(self, contact: FreeContact) -> None:
         grid, free, near = contact.grid, contact.free, (SIDE + 1, SIDE + 1)
         pixel = free.elastomer.free_compliance(near, grid.spacings) * free.unit
         short_ranged = pixel - _smooth_part(contact, near, 1)
-        sides = [CELL * spacing for spacing in grid.spacings]
-        cell = Grid(CELL, points_y=CELL, length=sides[1], length_y=sides[0])
+        sides = [MIN_CELL_POINTS * spacing for spacing in grid.spacings]
+        cell = Grid(MIN_CELL_POINTS, points_y=MIN_CELL_POINTS, length=sides[1], length_y=sides[0])
         k = free.elastomer.stiffness(cell.wavenumber(), grid.length) / free.unit
-        shape = tuple(points // COARSENING + ORDER - 1 for points in grid.shape)
+        shape = tuple(points // COARSENING + SPLINE_ORDER - 1 for points in grid.shape)
         super().__init__(grid, short_ranged, _near_values(k), shape)
         padded = padded_shape(shape, 2.0)
         self.transform = PaddedTransform(shape, padded, "single", len(grid.rows.parts))
@@ -163,7 +163,7 @@ class FreeOperators(TileOperators):
         return self.transform.apply(self.symbol, loads, self.values)
 
 
-OPERATORS: dict[str, Callable[..., TileOperators]] = {
+TILE_OPERATORS: dict[str, Callable[..., TileOperators]] = {
     "periodic": PeriodicOperators,
     "free": FreeOperators,
 }
@@ -185,10 +185,10 @@ def convolution(kernel: Field, tiles: Tiles, pool: ThreadPoolExecutor | None) ->
         out = np.empty(values.shape, np.float32)
 
         def part(start: int) -> None:
-            stop = min(start + CHUNK, tiles.count)
+            stop = min(start + TILES_PER_CHUNK, tiles.count)
             convolve(padded, tiles.neighbours, quadrant, out, start, stop)
 
-        starts = range(0, tiles.count, CHUNK)
+        starts = range(0, tiles.count, TILES_PER_CHUNK)
         list(map(part, starts) if pool is None else pool.map(part, starts))
         return out
 
@@ -198,13 +198,13 @@ def convolution(kernel: Field, tiles: Tiles, pool: ThreadPoolExecutor | None) ->
 @lru_cache(maxsize=1)
 def _table_of_q(order: float) -> tuple[Field, Field]:
     """x and Q(a, x^2), for the orders a of all grids of a contact."""
-    x = np.linspace(0.0, LARGEST_X, TABLE)
+    x = np.linspace(0.0, LARGEST_X, TABLE_SIZE)
     return x, gammaincc(order, x * x)
 
 
 def _alpha(grid: Grid) -> float:
     """The inverse range of the short-ranged part [1/m]."""
-    return float(np.pi / (2 * COARSENING * max(grid.spacings) * np.sqrt(DECAY)))
+    return float(np.pi / (2 * COARSENING * max(grid.spacings) * np.sqrt(DECAY_EXPONENT)))
 
 
 def _smooth_part(contact: FreeContact, shape: Shape, step: int) -> Field:
@@ -219,7 +219,7 @@ def _smooth_part(contact: FreeContact, shape: Shape, step: int) -> Field:
 
 def _nodes_of_tile() -> Indices:
     """Points of the coarse grid whose splines overlap a tile, along one axis from its corner."""
-    return np.arange(SIDE // COARSENING + ORDER - 1) - (ORDER // 2 - 1)
+    return np.arange(SIDE // COARSENING + SPLINE_ORDER - 1) - (SPLINE_ORDER // 2 - 1)
 
 
 def _weights() -> Field:
@@ -231,14 +231,14 @@ def _weights() -> Field:
 
 def _spline_spectrum(y: Field, x: Field) -> Field:
     """Fourier transform of the splines of a grid, at waves with so many periods per spacing."""
-    return np.sinc(y)[:, None] ** ORDER * np.sinc(x) ** ORDER
+    return np.sinc(y)[:, None] ** SPLINE_ORDER * np.sinc(x) ** SPLINE_ORDER
 
 
 def _stiffness_of_small_cell(contact: Contact) -> tuple[Field, Field]:
     """k(q) and |q| of a smaller cell with the same spacings: every so many modes of the contact."""
     grid = contact.grid
     down, right = (
-        max(step for step in range(1, max(points // CELL, 1) + 1) if points % step == 0)
+        max(step for step in range(1, max(points // MIN_CELL_POINTS, 1) + 1) if points % step == 0)
         for points in grid.shape
     )
     x = np.arange(0, grid.points // 2 + 1, right)

@@ -90,7 +90,7 @@ def check_memory(tasks: list[Task], ranks: Ranks | None = None) -> None:
         )
 
 
-def share_out(
+def jobs_and_threads(
     tasks: list[Task],
     jobs: int | None,
     reproducible: bool = False,

@@ -17,7 +17,7 @@ from gfmd_cli.status import Status
 from gfmd_cli.study.context import Progress, Report, SolveContext, WorkerOptions
 from gfmd_cli.study.pool import solve_in_pool
 from gfmd_cli.study.refinement import forget_scene
-from gfmd_cli.study.resources import check_memory, seconds_to_stop, share_out, usable_memory
+from gfmd_cli.study.resources import check_memory, jobs_and_threads, seconds_to_stop, usable_memory
 from gfmd_cli.study.result import Outcome
 from gfmd_cli.study.run_task import attempt
 from gfmd_cli.study.signals import signal_handlers
@@ -54,7 +54,7 @@ class RunOptions:
         if self.jobs is not None and self.jobs < 1:
             raise InputError(f"--jobs {self.jobs}: at least 1 worker process is needed")
 
-    def share_of(self, tasks: list[Task]) -> list[Task]:
+    def shard_of(self, tasks: list[Task]) -> list[Task]:
         """The tasks of the shard."""
         index, shards = self.shard
         return [task for task in tasks if task.index % shards == index]
@@ -88,10 +88,10 @@ def run_study(
         raise InputError(f"output.{names[0]}: takes whole grids; run it without mpiexec")
     moved = _move_aside(study, options) if options.overwrite else []
     outcomes = broadcast(ranks, study.outcomes())
-    share = options.share_of(tasks)
-    pending = without_result(share, outcomes)
+    shard = options.shard_of(tasks)
+    pending = without_result(shard, outcomes)
     to_solve = {task.id for task in pending}
-    counts = Counter(outcomes[task.id].status for task in share if task.id not in to_solve)
+    counts = Counter(outcomes[task.id].status for task in shard if task.id not in to_solve)
     has_records = broadcast(ranks, bool(study.record_paths()))
     if not pending and not has_records:
         if is_root(ranks) and study.parts.exists():  # of a run that was killed as it ended
@@ -99,7 +99,7 @@ def run_study(
                 pass
         return counts
     check_memory(pending, ranks)
-    jobs, threads = share_out(pending, options.jobs, options.reproducible, ranks)
+    jobs, threads = jobs_and_threads(pending, options.jobs, options.reproducible, ranks)
     worker_options = WorkerOptions(
         threads, usable_memory(ranks) / jobs, options.reproducible, options.checkpoint_every
     )
