@@ -133,6 +133,35 @@ def test_a_guess_far_from_the_contact_leads_to_the_solution():
     assert start.u == pytest.approx(solve_contact(contact, WholeGrids()).u, abs=1e-6)
 
 
+@pytest.mark.parametrize("points", [128, 256])
+def test_sets_that_would_recur_lead_to_the_solution_with_falling_energy(points, monkeypatch):
+    """At n = 4: from the second set on that is no better, s C s / 2 - h s falls at each step."""
+    contact = build_scene(SelfAffine(cutoff=0.1, seed=1), Power(n=4), points).contact(0.003)
+    energies, approach = [], module._DirectSolve.approach
+
+    def energy(solve):
+        assert solve.stress.min() >= 0
+        modes = np.fft.rfft2(solve.stress)
+        modes[0, 0] = 0.0
+        u = np.fft.irfft2(modes / np.where(solve.contact.stiffness > 0, solve.contact.stiffness, 1))
+        return 0.5 * np.vdot(solve.stress, u) - np.vdot(solve.stress, solve.obstacle)
+
+    def note_energies(solve, *arguments):
+        energies.append((solve.grid.points, energy(solve)))
+        approach(solve, *arguments)
+        energies.append((solve.grid.points, energy(solve)))
+
+    monkeypatch.setattr(module._DirectSolve, "approach", note_energies)
+    direct = solve_contact(contact, ProjectedCG(tolerance=1e-3))
+    finest = np.array([energy for grid, energy in energies if grid == points])
+    assert finest.size >= 2
+    assert np.all(np.diff(finest) <= 1e-12 * np.abs(finest[0]))
+    assert direct.steps == 0
+    assert direct.residual < 1e-6
+    whole = solve_contact(contact, WholeGrids(tolerance=1e-7))
+    assert direct.u == pytest.approx(whole.u, abs=1e-7)
+
+
 def test_from_the_grid_on_that_has_too_many_points_the_iteration_goes_on(monkeypatch):
     contact = square(Power(n=3))
     whole = solve_contact(contact, WholeGrids(tolerance=1e-6))

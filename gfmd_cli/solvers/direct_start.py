@@ -9,19 +9,29 @@ and the level c of the displacement,
 A is found by the primal-dual active set method (Hintermueller, Ito & Kunisch, SIAM J. Optim. 13,
 865, 2002): after each solution the points with s < 0 leave A, and those that the displacement
 enters join it, the deepest first. Four to ten sets suffice on a grid that starts from the contact
-of the next coarser one, whatever k(q) is. If the number of wrong points does not decrease for some
-sets, as may occur for k(q) steeper than q^2, only the last of them changes, until it does
-(Portugal, Judice & Vicente, Math. Comput. 63, 625, 1994).
+of the next coarser one, whatever k(q) is. For k(q) steeper than q^2 the sets may begin to repeat.
+Therefore, as soon as the number of misclassified points does not decrease, stresses s >= 0 are kept
+from set to set, and none of the steps raises the energy:
 
-A set costs one pair of transforms, which shows the displacement at all points, and n^3 / 3
-operations for n points. The solution is exact: its residual is the rounding.
+[1] Solve for the stresses t of the points A.
+[2] If some are negative, go from s towards t: to t with its negative stresses set to zero if the
+    energy falls, else until the first stress is zero. These points leave A. Back to [1].
+[3] Otherwise s = t, and the points that the displacement enters join A. Back to [1].
+
+Step [2] until the first stress is zero is the inner loop of the active set method of Lawson &
+Hanson (Solving Least Squares Problems, 1974, chapter 23).
+
+A solution costs n^3 / 3 operations for n points, and the displacement at all points a pair of
+transforms. The result is exact: its residual is the rounding.
 """
 
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
+from scipy.linalg.blas import dtrmv
 
 from gfmd_cli.grid.arrays import Field, Mask, row_blocks
 from gfmd_cli.physics.contact import Contact
@@ -30,12 +40,11 @@ from gfmd_cli.solvers.local_start import COARSE_TOLERANCE
 from gfmd_cli.solvers.loop import Start
 from gfmd_cli.solvers.multigrid import MAX_LAPLACIAN_GROWTH, largest_growth
 
-MAX_COST = 5000  # n^3 per point of a grid; measured: with more, the iteration is faster
+MAX_COST = 20000  # n^3 per point of a grid; measured: with more, the iteration is faster
 MAX_COST_WITH_V_CYCLE = 150  # the same where a V-cycle without squared Laplacians is used
 EXPECTED_GROWTH = 1.3  # of the sets: largest number of points over that of the first one; a choice
 MAX_JOINING_FRACTION = 0.4  # of a set, that joins it at a time; measured: 0.3 to 0.6 are as good
-MAX_STALLED_SETS = 3  # in a row, without fewer wrong points
-MAX_SETS = 40
+MAX_SETS = 60  # a choice; 5 to 25 are taken
 
 Points = tuple[Any, ...]
 """Rows and columns of points, as indices of a field."""
@@ -83,10 +92,13 @@ class _DirectSolve:
         self.contact, self.grid, self.touching = contact, contact.grid, touching
         self.obstacle = self.grid.as_rows(contact.obstacle)
         self.values = self.grid.as_rows(self.grid.padded)[:, : self.grid.points]
+        self.stress: Field | None = None
+        """Stresses s >= 0 that are kept from set to set; None before."""
         self.transforms = 0.0
         self.evaluate((0, 0), 1.0)
-        self.compliance = self.values.copy()
-        """Displacement by a unit stress at the first point."""
+        rows, columns = self.values.shape
+        self.compliance = self.values[: rows // 2 + 1, : columns // 2 + 1].copy()
+        """Displacement by a unit stress at the first point: a quarter, as it is even."""
 
     def evaluate(self, points: Points, s: Field | float) -> None:
         """`values` <- C s, without its mean."""
@@ -100,28 +112,55 @@ class _DirectSolve:
 
         The displacement stays in `values`, its level above the indenter in `level`.
         """
-        fewest, stalled = self.grid.size, 0
+        fewest = self.grid.size
         for _ in range(MAX_SETS):
             pause()
             points = np.nonzero(self.touching)
             if not 0 < points[0].size <= largest:
                 return False
             try:
-                s = self.stress(points)
+                t, factor = self.equilibrium(points)  # [1]
             except LinAlgError:  # rounding, at very steep k(q)
                 return False
-            self.evaluate(points, s)
+            has_tension = self.stress is not None and np.any(t < 0)
+            if has_tension:
+                self.approach(points, t, factor)  # [2]
+            del factor  # before the next one, which is as large as some fields
+            if has_tension:
+                continue
+            self.evaluate(points, t)
             self.level = float((self.values[points] - self.obstacle[points]).mean())
-            misclassified, violation = self.compare(points, s)
+            misclassified, violation = self.compare(points, t)
             count = int(np.count_nonzero(misclassified))
             if count == 0 or violation < tolerance:
                 break
-            stalled = 0 if count < fewest else stalled + 1
-            fewest = min(count, fewest)
-            if stalled > MAX_STALLED_SETS:
-                misclassified.ravel()[: np.flatnonzero(misclassified)[-1]] = False
-            self.exchange(misclassified, max(1, int(MAX_JOINING_FRACTION * s.size)))
+            if self.stress is None and count >= fewest:
+                self.stress = np.zeros(self.touching.shape)
+                self.stress[points] = self.without_tension(t)
+                self.touching[points] = t > 0
+                continue
+            if self.stress is not None:
+                self.stress[points] = t
+            fewest = count
+            self.exchange(misclassified, max(1, int(MAX_JOINING_FRACTION * t.size)))  # [3]
         return True
+
+    def approach(self, points: Points, t: Field, factor: Field) -> None:
+        """Go from the stresses s towards t without raising the energy; some points leave A."""
+        assert self.stress is not None
+        s, target = self.stress[points], self.without_tension(t)
+        if _energy(factor, target - t) >= _energy(factor, s - t):
+            lengths = np.divide(s, s - t, out=np.ones_like(s), where=t < 0)
+            length = lengths.min()
+            target = np.where(lengths > length, s + length * (t - s), 0.0)
+        self.stress[points] = target
+        self.touching[points] = (target > 0) | (t >= 0)
+
+    def without_tension(self, t: Field) -> Field:
+        """The stresses t with zero in place of negative ones, and the same sum."""
+        s = np.maximum(t, 0.0)
+        s *= t.sum() / s.sum()
+        return s
 
     def compare(self, points: Points, s: Field) -> tuple[Mask, float]:
         """The points that are in contact or not by mistake, and the natural residual of that."""
@@ -148,19 +187,25 @@ class _DirectSolve:
             misclassified[tuple(places[shallow] for places in entered)] = False
         self.touching ^= misclassified
 
-    def stress(self, points: Points) -> Field:
-        """The stresses of these points. Raises LinAlgError if rounding makes C_AA indefinite."""
+    def equilibrium(self, points: Points) -> tuple[Field, Field]:
+        """The stresses t of the points A, and U of C_AA = U^T U (Cholesky).
+
+        Raises LinAlgError if rounding makes C_AA indefinite.
+        """
         rows, columns = points
         matrix = np.empty((rows.size, rows.size))
         for a in range(rows.size):
             b = slice(a + 1)
-            matrix[a, b] = self.compliance[rows[a] - rows[b], columns[a] - columns[b]]
+            matrix[a, b] = self.compliance[
+                _distance(rows[a] - rows[b], self.values.shape[0]),
+                _distance(columns[a] - columns[b], self.values.shape[1]),
+            ]
         # The lower triangle by rows is the upper one by columns, which LAPACK overwrites.
         factor = cho_factor(matrix.T, overwrite_a=True, check_finite=False)
         sides = np.stack([self.obstacle[points], np.ones(rows.size)], axis=1)
         by_height, by_level = cho_solve(factor, sides, check_finite=False).T
         remaining_load = self.contact.pressure * self.grid.size - by_height.sum()
-        return by_height + by_level * (remaining_load / by_level.sum())
+        return by_height + by_level * (remaining_load / by_level.sum()), factor[0]
 
     def displacement(self) -> Field:
         """The displacement, laid on the indenter in contact."""
@@ -169,3 +214,15 @@ class _DirectSolve:
         gap -= self.level
         self.contact.set_displacement(u, gap, self.touching.reshape(u.shape))
         return u
+
+
+def _distance(difference: NDArray[np.int64], period: int) -> NDArray[np.int64]:
+    """The distance of two places on a circle."""
+    distance = np.abs(difference)
+    return np.minimum(distance, period - distance)
+
+
+def _energy(factor: Field, s: Field) -> float:
+    """Twice the elastic energy s C s of stresses, with the factor U of C = U^T U."""
+    strain = dtrmv(factor, s)
+    return float(np.vdot(strain, strain))
