@@ -168,10 +168,12 @@ class Contact:
         return total / self.grid.size
 
     def set_displacement(self, u: Field, gap: Field, touching: Mask) -> None:
-        """u <- h in contact, else h + gap, where a point that can touch has a gap >= 0."""
-        np.maximum(gap, 0.0, out=u)
-        if self.may_touch is not None:
-            np.copyto(u, gap, where=~self.may_touch)
+        """u <- h in contact, else h + gap, where a point that can touch has a gap >= 0.
+
+        `u` and `gap` may be the same array.
+        """
+        np.copyto(u, gap)
+        np.maximum(u, 0.0, out=u, where=True if self.may_touch is None else self.may_touch)
         u[touching] = 0.0
         u += self.height
 

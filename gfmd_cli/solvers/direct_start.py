@@ -210,9 +210,9 @@ class _DirectSolve:
     def displacement(self) -> Field:
         """The displacement, laid on the indenter in contact."""
         u = self.grid.empty()
-        gap = self.values.reshape(u.shape) - self.contact.height
-        gap -= self.level
-        self.contact.set_displacement(u, gap, self.touching.reshape(u.shape))
+        np.subtract(self.values.reshape(u.shape), self.contact.height, out=u)
+        u -= self.level
+        self.contact.set_displacement(u, u, self.touching.reshape(u.shape))
         return u
 
 
