@@ -161,12 +161,12 @@ def solve(spec: Path | str | Tables, *, heights: Any = None, threads: int = 1) -
         tasks.
     """
     if threads < 1:
-        raise InputError(f"threads = {threads}: one or more are needed")
+        raise InputError(f"threads = {threads}: must be at least 1")
     forget_files()  # they may have changed since the last call
     if heights is None:
         return _solve(spec, threads)
     if not isinstance(spec, Mapping):
-        raise InputError("heights go with a dictionary; a spec in a file has a surface")
+        raise InputError("heights need a dictionary; a spec in a file has a surface")
     with TemporaryDirectory() as folder:
         path = Path(folder) / "heights.h5"
         keys = write_heights(path, heights)
@@ -212,7 +212,7 @@ def _solve(spec: Path | str | Tables, threads: int) -> Result:
     if tasks[0].surface.file or tasks[0].elastomer.file:
         forget_scene()
     if len(tasks) != 1:
-        raise InputError(f"solve takes one contact, the spec has {len(tasks)}; run() takes them")
+        raise InputError(f"solve computes one contact, the spec has {len(tasks)}; use run()")
     context = SolveContext(WorkerOptions(threads, usable_memory()))
     solved = solve_at_load(tasks[0], context, Watcher())
     scene, solution, obstacle = solved.scene, solved.solution, solved.contact.obstacle
@@ -313,7 +313,7 @@ def dataset(study: Path | str) -> Any:
 def _read(spec: Path | str | Tables, overrides: tuple[str, ...] = ()) -> tuple[Spec, str]:
     if isinstance(spec, Mapping):
         if overrides:
-            raise InputError("overrides go with a spec in a file; change the dictionary")
+            raise InputError("overrides need a spec in a file; change the dictionary")
         tables = _without_numpy(spec)
         return read_tables(tables), json.dumps(tables, indent=1, default=str)
     if not isinstance(spec, Path | str):

@@ -50,7 +50,7 @@ def test_an_array_may_be_pressed():
     again = solve(tables | {"surface": {"length": 1e-3}}, heights=alone.height)
     assert again.a_r == alone.a_r
     np.testing.assert_allclose(again.stress, alone.stress, atol=1e-5 * alone.delta_sigma)
-    with pytest.raises(InputError, match="heights go with a dictionary"):
+    with pytest.raises(InputError, match="heights need a dictionary"):
         solve("a.toml", heights=alone.height)
 
 
@@ -86,11 +86,11 @@ def test_a_spec_in_a_file_takes_overrides(tmp_path):
 
 
 def test_what_makes_no_sense_is_refused(tmp_path):
-    with pytest.raises(InputError, match="the spec has 2; run"):
+    with pytest.raises(InputError, match="the spec has 2; use run"):
         solve(TABLES | {"load": {"p_star": [0.1, 1]}})
     with pytest.raises(InputError, match=r"spec: surface.hursts: unknown key 'hursts' - did you"):
         solve(TABLES | {"surface": {"kind": "self-affine", "hursts": 1}})
-    with pytest.raises(InputError, match="overrides go with a spec in a file"):
+    with pytest.raises(InputError, match="overrides need a spec in a file"):
         run(TABLES, tmp_path / "a.h5", overrides=("load.p_star=0.5",))
     with pytest.raises(AttributeError, match="no attribute 'walk'"):
         _ = gfmd_cli.walk

@@ -211,7 +211,7 @@ def test_a_study_without_fields_makes_no_image(output_of, tmp_path):
         "--set", "load.p_star=0.5", "--set", "grid.points=32",
     )  # fmt: skip
     output = output_of("export", tmp_path / "s.h5", "-o", tmp_path / "s.vti", status=2)
-    assert "holds no fields" in output
+    assert "contains no fields" in output
     assert "spectra_q" not in as_dataset(tmp_path / "s.h5")
 
 

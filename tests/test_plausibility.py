@@ -108,7 +108,7 @@ def test_a_modulus_in_pascals_on_a_surface_metres_rough(elastomer):
         ({"pressure": 1e3}, {"kind": "half-space"}, "load.pressure is far above full contact"),
         ({"pressure": 1e3}, {"kind": "power", "n": 1}, "are moduli, heights and load in Pa and m?"),
         ({"p_star": 1e5}, HALF_SPACE, "load.pressure takes Pa"),
-        ({"pressure": 0.1}, HALF_SPACE, "load.pressure is hardly a contact"),
+        ({"pressure": 0.1}, HALF_SPACE, "load.pressure gives hardly any contact"),
         ({"mean_gap": 1e-8}, HALF_SPACE, "is it a length in m?"),
     ],
 )

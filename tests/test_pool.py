@@ -102,7 +102,7 @@ def test_a_task_whose_worker_dies_twice_fails_and_the_others_continue(solve, dea
     outcome, reasons = solve(*["converges", death] * 3, jobs=jobs)
     assert outcome == Counter(converged=3, killed=3)
     assert sorted(reasons) == [1, 3, 5]
-    assert all("as before; call again" in reason for reason in reasons.values())
+    assert all("as before; run again" in reason for reason in reasons.values())
 
 
 @pytest.mark.parametrize("jobs", [1, 2, 3])
@@ -110,7 +110,7 @@ def test_a_task_whose_worker_is_killed_from_outside_is_left_to_the_next_call(sol
     outcome, reasons = solve(*["converges", "SIGKILL", "SIGQUIT"] * 2, jobs=jobs)
     assert outcome == Counter(converged=2)
     assert sorted(reasons) == [1, 2, 4, 5]
-    assert all("call again" in reason for reason in reasons.values())
+    assert all("run again" in reason for reason in reasons.values())
 
 
 @pytest.mark.usefixtures("memory_runs_out")

@@ -354,7 +354,7 @@ def test_max_hours_stop_a_run_as_a_signal_does(run, tmp_path, monkeypatch, secon
     if not stops:
         run(LONG, "study.h5", ("solver.max_steps=20",), **limits)
         return
-    with pytest.raises(Interrupted, match="call again"):
+    with pytest.raises(Interrupted, match="run again"):
         run(LONG, **limits)
     assert list((tmp_path / "study.parts").glob("*/pointer"))
 

@@ -408,7 +408,7 @@ def test_heights_kept_in_other_files_are_refused(hdf5, tmp_path):
         file.create_virtual_dataset("h", layout)
 
     for fill in (external, virtual):
-        with pytest.raises(InputError, match="kept in other files"):
+        with pytest.raises(InputError, match="stored in other files"):
             read_topography(hdf5(fill))
 
 

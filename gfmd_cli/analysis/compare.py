@@ -209,7 +209,7 @@ def compare_open(study: StudyFile, path: Path, theory: Theory = "paper") -> Comp
     solved = solved_rows(rows)
     spectra = {scene: study.shells(scene) for scene in {row["scene"] for row in solved}}
     if not solved:
-        raise InputError(f"{path}: holds no result yet; run it first")
+        raise InputError(f"{path}: contains no result yet; run it first")
     groups = grouped(solved, lambda row: (row["scene"], *solver_of(row)))
     curves = []
     for (scene, *_), group in groups.items():

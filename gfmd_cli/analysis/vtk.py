@@ -40,7 +40,7 @@ def write_image(study: Path, task: int | None, target: Path) -> None:
 def _choose(study: Path, tasks: list[int], task: int | None) -> int:
     """The task to write. Raises InputError where it has no fields, or many do and none is named."""
     if not tasks:
-        raise InputError(f'{study}: holds no fields; ask for them: fields = ["u"] in [output]')
+        raise InputError(f'{study}: contains no fields; store them with fields = ["u"] in [output]')
     allowed = ", ".join(map(str, tasks))
     if task is None and len(tasks) > 1:
         raise InputError(

@@ -120,9 +120,11 @@ def run_bench(spec: Spec, report: Report) -> list[Trace]:
     """
     tasks = plan(spec)
     if LOADS[spec.load.quantity].searched:
-        raise InputError(f"load.{spec.load.quantity}: a bench takes load.p_star or load.pressure")
+        raise InputError(
+            f"load.{spec.load.quantity}: gfmd bench needs load.p_star or load.pressure"
+        )
     if any(task.auto for task in tasks):
-        raise InputError('grid.points: a bench takes a number, not "auto"')
+        raise InputError('grid.points: gfmd bench needs a number, not "auto"')
     check_memory(tasks)
     traces: list[Trace] = []
     for in_scene in grouped(tasks, lambda task: task.scene_id).values():
@@ -138,7 +140,7 @@ def run_bench(spec: Spec, report: Report) -> list[Trace]:
             for solver in solvers_to_compare(spec, task, contact):
                 traces.append(_trace(contact, solver, reference, row, report, len(traces)))
     if not traces:
-        raise InputError("solver.kind: fit for none of the elastomers; take auto, ccg, fire or pcg")
+        raise InputError("solver.kind: suits none of the elastomers; use auto, ccg, fire or pcg")
     return traces
 
 

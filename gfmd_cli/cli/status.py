@@ -50,7 +50,7 @@ def status(
 
     if is_study(path):
         if output is not None or overrides:
-            raise InputError(f"-o and --set go with a spec; {path} is a study")
+            raise InputError(f"-o and --set need a spec; {path} is a study")
         progress, spec = progress_of_study(path), "SPEC"
     else:
         resolved, _ = read_spec(path, overrides)

@@ -87,7 +87,7 @@ def has(group: Any, name: str) -> bool:
     if not links.exists(key):
         return False
     if links.get_info(key).type != h5py.h5l.TYPE_HARD:
-        raise ValueError(f"{name!r} is a link to elsewhere; links do not count")
+        raise ValueError(f"{name!r} is a link to another place; links are not followed")
     return True
 
 
@@ -193,10 +193,10 @@ def _checked(group: Any, path: str, compression: float) -> Any:
         raise ValueError(f"dataset {path!r} is empty")
     storage = dataset.get_create_plist()
     if storage.get_external_count() or storage.get_layout() == h5py.h5d.VIRTUAL:
-        raise ValueError(f"dataset {path!r} is kept in other files; copy it into one")
+        raise ValueError(f"dataset {path!r} is stored in other files; copy it into one file")
     kind = dataset.dtype
     if kind.kind not in PLAIN:
-        raise ValueError(f"dataset {path!r} has type {kind}; numbers or text are read")
+        raise ValueError(f"dataset {path!r} has type {kind}; only numbers and text can be read")
     claimed_bytes = prod(dataset.shape) * kind.itemsize
     stored_bytes = min(dataset.get_storage_size(), h5py.h5i.get_file_id(dataset).get_filesize())
     if claimed_bytes > compression * stored_bytes:

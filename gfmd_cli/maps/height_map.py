@@ -189,7 +189,7 @@ def _dataset_name(path: Path, file: Any, name: str | None) -> str:
         if name.strip("/") in datasets:
             return name.strip("/")
         raise InputError(
-            f"{path}: no dataset {name!r} (links do not count); its height maps: {listed(maps)}"
+            f"{path}: no dataset {name!r} (links are not followed); its height maps: {listed(maps)}"
         )
     if not maps:
         raise InputError(f"{path}: no numeric dataset with one or two dimensions")

@@ -50,7 +50,7 @@ class Region(SpecTable):
         for name in AXES:
             interval = getattr(self, name)
             if interval is not None and not interval[0] < interval[1]:
-                raise ValueError(f"{name} = {list(interval)}: the first position is not the lower")
+                raise ValueError(f"{name} = {list(interval)}: the lower position comes first")
         return self
 
     def __str__(self) -> str:

@@ -135,5 +135,5 @@ def _doubtful_unit(task: Task, solved: TaskSolution) -> str:
         return f"{key} is far above full contact; {unit}: are moduli, heights and load in Pa and m?"
     is_light = task.surface.rough and solved.contact.pressure < low
     if task.quantity == "pressure" and is_light:
-        return f"{key} is hardly a contact; {unit}: are moduli, heights and load in Pa and m?"
+        return f"{key} gives hardly any contact; {unit}: are moduli, heights and load in Pa and m?"
     return ""

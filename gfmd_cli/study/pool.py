@@ -173,13 +173,13 @@ class Pool:
             reason += f"{gib(available_memory())} are available now)"
         self.deaths[task.index] += 1
         if killed_from_outside or self.stop.is_set():
-            self._end(task, Status.INTERRUPTED, f"{reason}; call again to resume the task")
+            self._end(task, Status.INTERRUPTED, f"{reason}; run again to resume the task")
         elif self.deaths[task.index] <= RETRIES:
             self.waiting.append(task)
             self._end(task, None, f"{reason}; the task is tried again at the end")
         else:
             self.counts[Status.KILLED] += 1
-            self._end(task, Status.KILLED, f"{reason}, as before; call again to resume the task")
+            self._end(task, Status.KILLED, f"{reason}, as before; run again to resume the task")
 
     def _memory_ran_out(self) -> bool:
         """Whether the kernel has killed a process for memory since the last look, or is silent."""

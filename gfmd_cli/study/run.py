@@ -167,13 +167,13 @@ def _folder(study: Study, tasks: list[Task], ranks: Ranks | None) -> Iterator[li
 def _check_ended(solved: Counter[Status], pending: int, stop: Event) -> None:
     """Raise SpaceError or Interrupted if that ended the run."""
     if lost := solved[Status.NO_SPACE]:
-        raise SpaceError(f"no space for {count(lost, 'result')}; make some, call again")
+        raise SpaceError(f"no space for {count(lost, 'result')}; free some and run again")
     unsolved = pending - sum(solved.values())
     left = count(unsolved, "task")
     if stop.is_set() and unsolved:
-        raise Interrupted(f"stopped, states saved; {left} left, call again to go on")
+        raise Interrupted(f"stopped, states saved; {left} left; run again to continue")
     if unsolved and not any(status.is_failure for status in solved):
-        raise Interrupted(f"{left} left whose workers were killed; call again to go on")
+        raise Interrupted(f"{left} left whose workers were killed; run again to continue")
 
 
 def _check_output(solved: list[Task], outcomes: dict[str, Outcome]) -> None:
@@ -182,7 +182,7 @@ def _check_output(solved: list[Task], outcomes: dict[str, Outcome]) -> None:
     if lacking:
         raise Interrupted(
             f"another run solved {count(len(lacking), 'task')} at the same time, with other "
-            "output; call again to add the output of this one"
+            "output; run again to add the output of this one"
         )
 
 

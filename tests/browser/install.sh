@@ -7,5 +7,5 @@ sudo=
 $sudo apt-get -qq update &&
   DEBIAN_FRONTEND=noninteractive $sudo apt-get -qq install -y --no-install-recommends chromium chromium-driver >/dev/null &&
   exit 0
-echo "test-browser: no $(echo $missing): install the packages chromium and chromium-driver, then call again" >&2
+echo "test-browser: no $(echo $missing): install the packages chromium and chromium-driver, then run this again" >&2
 exit 1

@@ -64,7 +64,7 @@ def test_a_signal_saves_all_and_the_same_call_goes_on(folder, start, gfmd, name,
         time.sleep(0.01)
     child.signal(SIGNALS[name])
     assert child.wait() == 75, child.said
-    assert "call again" in child.said
+    assert "run again" in child.said
     assert any((folder / "stopped.parts").glob("*/pointer"))
     assert gfmd(folder, *long, "stopped.h5", *big)[0] == 1
     assert_same_bits(folder / "stopped.h5", folder / "unbroken.h5")

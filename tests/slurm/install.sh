@@ -8,5 +8,5 @@ sudo=
 $sudo apt-get -qq update &&
   DEBIAN_FRONTEND=noninteractive $sudo apt-get -qq install -y --no-install-recommends slurm-wlm munge >/dev/null &&
   exit 0
-echo "test-slurm: no $(echo $missing): install the packages slurm-wlm and munge, then call again" >&2
+echo "test-slurm: no $(echo $missing): install the packages slurm-wlm and munge, then run this again" >&2
 exit 1
