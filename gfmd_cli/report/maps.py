@@ -10,7 +10,7 @@ from gfmd_cli.analysis.plotting import WIDTH, ColumnFigure, LegendFigure, shades
 from gfmd_cli.analysis.selection import evenly, grouped
 from gfmd_cli.analysis.table import Group, Table, TableColumn
 from gfmd_cli.analysis.tables import AREA, P_STAR, POINTS, PRESSURE
-from gfmd_cli.analysis.wording import contact_title, pressure_text
+from gfmd_cli.analysis.wording import contact_title, pressure_text, shown
 from gfmd_cli.grid.arrays import Field, Mask
 from gfmd_cli.maps.pictures import block_sums
 from gfmd_cli.physics.observables import contact_points
@@ -63,7 +63,7 @@ def maps(data: ReportData) -> Section:
     ]
     if any(profiles.plane(row) and max(row["points"], row["points_y"]) > SIDE for row in contacts):
         notes.append(f"Maps have up to {SIDE} pixels a side, each the mean of some grid points.")
-    table = Table(CAPTION, data.shown(SHOWN), [Group("", contacts)])
+    table = Table(CAPTION, shown(SHOWN, data.solved), [Group("", contacts)])
     return Section(
         "Maps and cross-sections",
         notes=notes,

@@ -8,7 +8,7 @@ from gfmd_cli.analysis.curve_styles import distinct_labels, distinct_styles, lit
 from gfmd_cli.analysis.plotting import ColumnFigure
 from gfmd_cli.analysis.surface_figure import height_figure, spectrum_labels
 from gfmd_cli.analysis.surface_spectrum import FIT, Spectrum, spectrum
-from gfmd_cli.analysis.table import Group, Table, TableColumn
+from gfmd_cli.analysis.table import Group, Table, TableColumn, records_of
 from gfmd_cli.maps.pictures import Picture
 from gfmd_cli.physics.persson import Shells
 from gfmd_cli.report.data import ReportData
@@ -132,13 +132,7 @@ def _bands(names: list[str], shown: Sequence[Spectrum]) -> Table:
         TableColumn("modes", "modes", ".0f"),
     )
     groups = [
-        Group(
-            name,
-            [
-                {"q": float(q), "density": float(density), "modes": float(modes)}
-                for q, density, modes in zip(curve.q, curve.density, curve.modes, strict=True)
-            ],
-        )
+        Group(name, records_of(q=curve.q, density=curve.density, modes=curve.modes))
         for name, curve in zip(names, shown, strict=True)
     ]
     return Table("Bands of wavenumber.", columns, groups)
