@@ -38,8 +38,7 @@ def in_continuum(row: Mapping[str, Any], name: str) -> bool:
 
 def best(row: Row, name: str) -> tuple[float, float]:
     """A quantity with its error: of the continuum where that is known, else of the grid."""
-    ((value, error),) = best_of_all([row], name)
-    return value, error
+    return best_of_all([row], name)[0]
 
 
 def best_of_all(rows: Sequence[Row], name: str) -> list[tuple[float, float]]:
