@@ -97,7 +97,7 @@ SEEDS = (
     ),
     TableColumn("not converged", "failures", optional=True),
 )
-BEST = {
+BEST_VALUES = {
     name: (P_STAR, PRESSURE, *_beside_theory(best, name, physical=quantity), STATUS)
     for name, quantity in QUANTITIES.items()
     for best in [TableColumn(quantity.heading, f"{name}_best", error=f"{name}_best_error")]

@@ -87,13 +87,12 @@ def stress_deviation(data: ReportData) -> Section:
 
 def _over_pressure(data: ReportData, title: str, name: str, caption: str) -> Section:
     """The figures of a quantity over the pressure that the study has data for, and its table."""
-    panels = ((panel, data.figures.get(panel.name)) for panel in PANELS if panel.column == name)
     drawings = [
         drawing(plot, panel.name, f"{panel.meaning}: {', '.join(plot.legend)}", f"{panel.meaning}.")
-        for panel, plot in panels
-        if plot is not None
+        for panel in PANELS
+        if panel.column == name and (plot := data.figures.get(panel.name))
     ]
-    table = tables.over_pressure(tables.BEST[name], caption, data.curves)
+    table = tables.over_pressure(tables.BEST_VALUES[name], caption, data.curves)
     return Section(title, drawings=drawings, disclosed={BEHIND: table})
 
 
@@ -103,9 +102,9 @@ def stress_distribution(data: ReportData) -> Section:
     if not data.comparison.has_theory:
         lines, thin = "", ""
     bins = shown(BINS, data.solved)
-    caption = "Middle of each bin, density and theory."
+    of_bins = "Middle of each bin, density and theory."
     behind = {
-        name: Table(caption, bins, [_bins(density) for density in contacts])
+        name: Table(of_bins, bins, [_bins(density) for density in contacts])
         for name, contacts in densities(data.items).items()
     }
     behind["stress_distribution_continuum"] = tables.power_laws(data.comparison)
@@ -122,8 +121,7 @@ def stress_distribution(data: ReportData) -> Section:
 
 def _bins(density: Density) -> Group:
     sigma, row = density.sigma, density.row
-    unit = np.full(sigma.size, row["delta_sigma"])
-    theory = density.theory(sigma)
+    theory, unit = density.theory(sigma), np.full(sigma.size, row["delta_sigma"])
     records = records_of(sigma=sigma, density=density.density, theory=theory, delta_sigma=unit)
     return Group(f"{item_title(density.item)}, p* = {row['p_star']:.4g}", records)
 
