@@ -105,3 +105,9 @@ def test_the_pressure_of_a_mean_over_seeds_is_that_of_its_place_on_the_axis(tmp_
     mean = np.mean([row["pressure"] for row in rows])
     assert series.details[0].startswith(f"pressure {quantity(mean, 'Pa')}\n")
     assert mean == pytest.approx(series.x[0] * rows[0]["delta_sigma"], rel=1e-12)
+
+
+def test_a_key_that_one_of_the_solvers_lacks_splits_no_curve(tmp_path, rows_of):
+    rows_of("elastomer.n=1", "surface.seed=0", "solver.kind=['fire', 'ccg']", name="two.h5")
+    curves = compare(tmp_path / "two.h5").curves  # ccg has no time_step: its cells are blank
+    assert [len(curve.rows) for curve in curves] == [3, 3]

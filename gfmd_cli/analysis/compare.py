@@ -38,8 +38,7 @@ def in_continuum(row: Mapping[str, Any], name: str) -> bool:
 
 def best(row: Row, name: str) -> tuple[float, float]:
     """A quantity with its error: of the continuum where that is known, else of the grid."""
-    ((value, error),) = best_of_all([row], name)
-    return value, error
+    return best_of_all([row], name)[0]
 
 
 def best_of_all(rows: Sequence[Row], name: str) -> list[tuple[float, float]]:
@@ -218,15 +217,15 @@ def compare_open(study: StudyFile, path: Path, theory: Theory = "paper") -> Comp
     return Comparison(path, curves, len(rows) - len(solved))
 
 
-def solver_of(row: Row) -> tuple[Any, ...]:
-    """All parameters of the solver of a row."""
-    return tuple(row[each.column.name] for each in PARAMETERS if each.table == "solver")
+def solver_of(row: Row) -> tuple[str, ...]:
+    """All parameters of the solver of a row, as words: a blank cell, NaN, would differ from NaN."""
+    return tuple(each.word(row) for each in PARAMETERS if each.table == "solver")
 
 
 def with_solvers(titles: Iterable[str], rows: Sequence[Row]) -> list[str]:
     """Titles of contacts, followed by the keys of [solver] in which the contacts differ."""
-    words = [[each.word(row) for row in rows] for each in PARAMETERS if each.table == "solver"]
-    differing = [column for column in words if len(set(column)) > 1]
+    columns = zip(*map(solver_of, rows), strict=True)
+    differing = [column for column in columns if len(set(column)) > 1]
     return [
         ", ".join(filter(None, (title, *(column[i] for column in differing))))
         for i, title in enumerate(titles)

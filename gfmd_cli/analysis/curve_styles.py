@@ -61,7 +61,9 @@ def curve_styles(curves: list[Curve]) -> list[CurveStyle]:
     style.
     """
     elastomers = list(dict.fromkeys(curve.elastomer for curve in curves))
-    names = _names({curve.elastomer: curve for curve in curves})
+    names = {curve.elastomer: str(curve.rows[0]["elastomer_short"]) for curve in curves}
+    if len(set(names.values())) < len(names):  # short names that coincide
+        names = {elastomer: elastomer for elastomer in names}
     variants = _variants(curves)
     pairs = [(curve.elastomer, variant) for curve, variant in zip(curves, variants, strict=True)]
     if len(set(pairs)) > MAX_STYLES:
@@ -111,12 +113,6 @@ def rgb(colour: str) -> Colour:
     """The colour #rrggbb."""
     red, green, blue = bytes.fromhex(colour[1:])
     return red / 255, green / 255, blue / 255
-
-
-def _names(elastomers: dict[str, Curve]) -> dict[str, str]:
-    """A short name for each elastomer; the full labels where short names would coincide."""
-    short = {label: str(curve.rows[0]["elastomer_short"]) for label, curve in elastomers.items()}
-    return short if len(set(short.values())) == len(short) else {label: label for label in short}
 
 
 def _variants(curves: list[Curve]) -> list[str]:

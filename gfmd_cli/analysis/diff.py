@@ -18,10 +18,6 @@ SURFACE = ("surface", "surface_sha256", "seed")
 """Columns of a surface: two files may have the same name."""
 
 
-Key = Callable[[Row], tuple[Hashable, ...]]
-"""What rows that belong together have in common."""
-
-
 class Deviation(NamedTuple):
     """How far two values lie apart."""
 
@@ -104,7 +100,7 @@ def _contact_of(row: Row) -> tuple[Hashable, ...]:
     return (*(row[name] for name in SURFACE), row["elastomer"])
 
 
-def _matches(one: list[Row], other: list[Row], *keys: Key) -> list[Pair]:
+def _matches(one: list[Row], other: list[Row], *keys: Callable[[Row], Hashable]) -> list[Pair]:
     """Pairs of the same keys, alike in boundary, grid and solver if possible; from both lists."""
     pairs: list[Pair] = []
     paired_ids: set[int] = set()

@@ -1,16 +1,15 @@
 """Figures of Pr(sigma), on the grids and in the continuum, as the paper's Figs. 7 and 13."""
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from gfmd_cli.analysis.compare import Comparison
-from gfmd_cli.analysis.curve_styles import CurveStyle, colours, curve_styles, order
+from gfmd_cli.analysis.curve_styles import MAX_STYLES, CurveStyle, colours, curve_styles, order
 from gfmd_cli.analysis.distribution import StressDistribution, bin_counts, distributions
 from gfmd_cli.analysis.edge_law import fit_power_law
 from gfmd_cli.analysis.ensemble import by_load
-from gfmd_cli.analysis.plotting import THEORY, ColumnFigure
+from gfmd_cli.analysis.plotting import DASHED, THEORY, ColumnFigure
 from gfmd_cli.analysis.selection import at_one_pressure, evenly, grouped, pressure_label
 from gfmd_cli.analysis.series import StyledCurve, seed_groups
 from gfmd_cli.grid.arrays import Field
@@ -19,7 +18,6 @@ from gfmd_cli.study.columns import BINS, PR_LINEAR, PR_LOGARITHMIC
 
 PRESSURES = 5  # at which the distribution of one elastomer is drawn
 MIN_COUNT = 10  # grid points; a bin with fewer is noise of 30 % and more
-MAX_CONTACTS = 8  # contacts; more cannot be told apart
 EXTENSION = 2.5  # factor that the edge law is drawn beyond the window of its fit
 MIN_DENSITY = 3e-3  # lowest density that is drawn, as a share of the highest
 EDGE_LAW = "edge law"
@@ -151,7 +149,7 @@ def _chosen(stresses: list[StressDistribution]) -> list[StressDistribution]:
     """One distribution of each elastomer on each surface, at about one pressure."""
     ordered = sorted(stresses, key=lambda each: order(each.curve))
     by_title = list(grouped(ordered, lambda each: each.title).values())
-    return at_one_pressure(by_title, lambda each: (each.finest["p_star"], each.a_r))[:MAX_CONTACTS]
+    return at_one_pressure(by_title, lambda each: (each.finest["p_star"], each.a_r))[:MAX_STYLES]
 
 
 def _draw(
@@ -179,7 +177,6 @@ def _edge_law(plot: ColumnFigure, stress: StressDistribution, style: CurveStyle)
         low, high = law.lowest, law.highest
         span = (low / EXTENSION, high) if name == "small" else (low, high * EXTENSION)
         sigma = np.geomspace(*span, 50)
-        dashed: dict[str, Any] = {"ls": (0, (4, 2)), "lw": 0.8, "zorder": 2.5}
         density = law.edge_prefactor * sigma**law.theory
-        plot.unnamed_line((style.label, EDGE_LAW), sigma, density, color=style.colour, **dashed)
-        plot.line(EDGE_LAW, sigma[:0], density[:0], color="0.4", **dashed)
+        plot.unnamed_line((style.label, EDGE_LAW), sigma, density, color=style.colour, **DASHED)
+        plot.line(EDGE_LAW, sigma[:0], density[:0], color="0.4", **DASHED)

@@ -7,7 +7,7 @@ import numpy as np
 from gfmd_cli.analysis.compare import Comparison, einstein_prediction
 from gfmd_cli.analysis.curve_styles import curve_styles, order
 from gfmd_cli.analysis.distribution_figure import continuum_figure, distribution_figures
-from gfmd_cli.analysis.plotting import ColumnFigure, styled
+from gfmd_cli.analysis.plotting import DASHED, ColumnFigure, styled
 from gfmd_cli.analysis.series import Panel, Series, StyledCurve, seed_groups
 from gfmd_cli.analysis.wording import in_si
 from gfmd_cli.units import scaled
@@ -84,8 +84,7 @@ def _over_pressure(panel: Panel, items: list[StyledCurve]) -> ColumnFigure | Non
     plot.theory(lines)
     if panel.column == "u_g" and any(item.curve.n == 0 and item.curve.has_theory for item in items):
         exact = einstein_prediction(p_star).u_g
-        dashed = {"color": "black", "ls": (0, (4, 2)), "lw": 0.8, "zorder": 2.5}
-        plot.line("n = 0, Gaussian", p_star, exact, **dashed)
+        plot.line("n = 0, Gaussian", p_star, exact, color="black", **DASHED)
     x = np.concatenate([series.x for series in drawn])
     plot.scale("x", panel.x_scale, x)
     _add_pascals(plot, items, float(x.max()))

@@ -54,6 +54,8 @@ METADATA: dict[str, dict[str, None]] = {
 """Formats of a figure, with the entries that would make the same figure another file."""
 THEORY, UNCONVERGED, CONFIDENCE = "Persson theory", "not converged", "95 % confidence"
 """Entries of a legend that several curves share."""
+DASHED: dict[str, Any] = {"ls": (0, (4, 2)), "lw": 0.8, "zorder": 2.5}
+"""Style of closed forms and of laws at the edge of a contact."""
 BAND = 0.25  # opacity of a confidence band
 
 
@@ -74,19 +76,12 @@ class PlotLayer:
     width: float = 0.9
     """Of a line [points]."""
     dashed: bool = False
-    error: Field | None = None
-    """Error bars of points, shape (points,), or (2, points) for down and up; NaN: none."""
+    error: Any = None
+    """Lengths of the error bars of points down and up, shape (2, points); NaN: none."""
     high: Field | None = None
     """Upper end of a band."""
     details: Sequence[str] = ()
     """What else is known of each point, a text of some lines."""
-
-    def errors(self) -> tuple[Field, Field] | None:
-        """Lengths of the error bars down and up; None without any."""
-        if self.error is None or not np.any(np.isfinite(self.error)):
-            return None
-        down, up = np.broadcast_to(self.error, (2, self.x.size))
-        return down, up
 
 
 def styled() -> AbstractContextManager[None]:
@@ -178,7 +173,7 @@ class ColumnFigure(LegendFigure):
         y: Field,
         converged: Mask,
         every: Any = 1,
-        error: Field | None = None,
+        error: Field | float = np.nan,
         details: Sequence[str] = (),
     ) -> None:
         """Draw open symbols with error bars, and crosses where a contact has not converged.
@@ -187,13 +182,11 @@ class ColumnFigure(LegendFigure):
         of converged contacts only some are drawn, as `markevery` of matplotlib has it. `details`
         are texts for the points.
         """
-        if error is not None:
-            known = np.isfinite(np.broadcast_to(error, (2, x.size))).all(axis=0)
+        error = np.broadcast_to(error, (2, x.size))
+        known = np.isfinite(error).all(axis=0)
+        if np.any(known):
             bars: dict[str, Any] = {"fmt": "none", "elinewidth": 0.7, "capsize": CAP}
-            if np.any(known):
-                self.axes.errorbar(
-                    x[known], y[known], error[..., known], ecolor=style.colour, **bars
-                )
+            self.axes.errorbar(x[known], y[known], error[:, known], ecolor=style.colour, **bars)
         options: dict[str, Any] = {"ls": "none", "mfc": "none", "color": style.colour, "zorder": 3}
         for mask, names, marker in (
             (converged, (style.label,), style.marker),
@@ -203,8 +196,7 @@ class ColumnFigure(LegendFigure):
             if np.any(mask):
                 layer = PlotLayer("points", names, x[mask], y[mask], to_hex(style.colour), marker)
                 texts = [text for text, c in zip(details, mask, strict=False) if c]
-                part = None if error is None else error[..., mask]
-                self.layers.append(replace(layer, error=part, details=texts))
+                self.layers.append(replace(layer, error=error[:, mask], details=texts))
         self.legend[style.label] = Line2D([], [], marker=style.marker, **options)
         if not np.all(converged):
             self.legend[UNCONVERGED] = Line2D([], [], marker="x", ls="none", color="0.4")

@@ -70,17 +70,16 @@ class Series:
         loads = by_load(record for item in items for record in item.curve.records)
         loads.sort(key=lambda seeds: float(np.mean([record["p_star"] for record in seeds])))
         points = [_point(panel, seeds) for seeds in loads]
-        x, y, error, half_width, converged = (
-            np.array(values) for values in zip(*points, strict=True)
-        )
+        columns = [np.array(values) for values in zip(*points, strict=True)]
+        y = columns[1]
         visible = np.isfinite(y) & ((y > 0) | (panel.y_scale == "linear"))
         details = [_details(seeds) for seeds, s in zip(loads, visible, strict=True) if s]
         style = items[0].style
         if len(items) > 1:
             style = replace(style, label=f"{style.label}, {len(items)} seeds")
         theory = np.mean([getattr(item.theory, panel.column) for item in items], axis=0)
-        x, y, error = x[visible], y[visible], error[visible]
-        return cls(style, x, y, error, half_width[visible], converged[visible], details, theory)
+        x, y, error, half_width, converged = (column[visible] for column in columns)
+        return cls(style, x, y, error, half_width, converged, details, theory)
 
     def draw(self, plot: ColumnFigure, *, line: bool) -> None:
         """Draw points with error bars, the band of several seeds, and a line on request."""

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from gfmd_cli.analysis.surface_spectrum import FIT, Spectrum, spectrum
-from gfmd_cli.analysis.table import Group, Table, TableColumn, plain
+from gfmd_cli.analysis.table import Group, Table, TableColumn, plain, records_of
 from gfmd_cli.maps.height_map import extent
 from gfmd_cli.maps.roughness_parameters import MAP_NAMES, PROFILE_NAMES, roughness_parameters
 from gfmd_cli.physics.contact import Scene, build_scene
@@ -151,12 +151,9 @@ def summary_text(summary: SurfaceSummary) -> str:
 def _predicted(scenes: dict[str, Scene], metres: str) -> list[str]:
     """Persson theory of a half-space, Eqs. (25) and (28), on one spectrum or two."""
     theories = {name: Persson(scene.shells) for name, scene in scenes.items()}
-    pressures = PRESSURES * theories["spectrum"].delta_sigma
-    records = [
-        {"p": float(p), "a_r": float(theories["spectrum"].contact_area(p))}
-        | {name: float(theory.mean_gap(p)) for name, theory in theories.items()}
-        for p in pressures
-    ]
+    p = PRESSURES * theories["spectrum"].delta_sigma
+    gaps = {name: theory.mean_gap(p) for name, theory in theories.items()}
+    records = records_of(p=p, a_r=theories["spectrum"].contact_area(p), **gaps)
     columns = [
         TableColumn("p / E_star", "p", ".3g"),
         TableColumn("a_r", "a_r", ".4f"),

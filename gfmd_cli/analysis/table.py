@@ -55,11 +55,6 @@ class TableColumn:
         error = _value(record, self.error)
         return plus_minus(value, abs(error)) if known(error) else format(value, self.format)
 
-    def is_text(self, records: Sequence[Record]) -> bool:
-        """Whether the column holds words, which are aligned to the left."""
-        values = (_value(record, self.value) for record in records)
-        return any(isinstance(value, str | bool) for value in values)
-
 
 @dataclass(frozen=True)
 class Group:
@@ -69,6 +64,12 @@ class Group:
     records: Sequence[Record]
     notes: Sequence[str] = ()
     """Lines below the title, in the text only."""
+
+
+def records_of(**columns: Any) -> list[Record]:
+    """Records from arrays with their values."""
+    rows = zip(*(values.tolist() for values in columns.values()), strict=True)
+    return [dict(zip(columns, row, strict=True)) for row in rows]
 
 
 def groups_of(titled: Iterable[tuple[str, Record]]) -> list[Group]:
@@ -103,8 +104,9 @@ class Table:
     @property
     def alignments(self) -> list[str]:
         """The side of each column to which its cells are aligned: words left, numbers right."""
-        records = self.records
-        return ["left" if column.is_text(records) else "right" for column in self.columns]
+        cells = ([_value(row, column.value) for row in self.records] for column in self.columns)
+        is_text = (any(isinstance(value, str | bool) for value in values) for values in cells)
+        return ["left" if words else "right" for words in is_text]
 
     def as_text(self) -> str:
         """The table in plain text, group by group; an empty string where there is no record."""

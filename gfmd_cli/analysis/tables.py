@@ -27,7 +27,7 @@ from gfmd_cli.analysis.table import (
     ratio,
 )
 from gfmd_cli.analysis.wording import contact_title, grid_size, in_si, shown
-from gfmd_cli.physics.observables import QUANTITIES
+from gfmd_cli.physics.observables import QUANTITIES, Quantity
 from gfmd_cli.study.observables import OBSERVABLES, Observable
 from gfmd_cli.study.plausibility import SEPARATOR
 from gfmd_cli.units import count
@@ -47,21 +47,17 @@ THEORIES = {"persson": "Persson", "einstein": "closed form"}
 
 
 def _beside_theory(
-    value: TableColumn, name: str, theory: str = "persson", *, unit: str = "", si: str = ""
+    value: TableColumn, name: str, theory: str = "persson", physical: Quantity | None = None
 ) -> list[TableColumn]:
-    """A quantity, its prediction and their ratio; `unit`: a column that gives both in SI units."""
+    """A quantity, its prediction and their ratio; `physical`: both in SI units too."""
     predicted, heading = f"{name}_{theory}", THEORIES[theory]
     columns = [value, TableColumn(heading, predicted, optional=True)]
-    if unit:
-        physical = [
-            TableColumn(name, product(f"{name}_best", unit), unit=si),
-            TableColumn(heading, product(predicted, unit), unit=si, optional=True),
-        ]
-        columns = [value, physical[0], columns[1], physical[1]]
-    return [
-        *columns,
-        TableColumn("ratio", ratio(str(value.value), predicted), ".3f", optional=True),
-    ]
+    if physical and physical.scale:
+        _, unit, si = physical
+        columns.insert(1, TableColumn(name, product(f"{name}_best", unit), unit=si))
+        columns.append(TableColumn(heading, product(predicted, unit), unit=si, optional=True))
+    quotient = ratio(str(value.value), predicted)
+    return [*columns, TableColumn("ratio", quotient, ".3f", optional=True)]
 
 
 def _continuum(record: Record, name: str) -> float | None:
@@ -101,12 +97,12 @@ SEEDS = (
     ),
     TableColumn("not converged", "failures", optional=True),
 )
-CONTACT_AREA, STRESS_DEVIATION, MEAN_GAP = (
-    (P_STAR, PRESSURE, *_beside_theory(best, name, unit=quantity.scale, si=quantity.si), STATUS)
+BEST_VALUES = {
+    name: (P_STAR, PRESSURE, *_beside_theory(best, name, physical=quantity), STATUS)
     for name, quantity in QUANTITIES.items()
     for best in [TableColumn(quantity.heading, f"{name}_best", error=f"{name}_best_error")]
-)
-"""With continuum values where they are known, else with values on the grid."""
+}
+"""Columns by quantity: with continuum values where they are known, else with values on the grid."""
 TRUE_CONTACT = (
     P_STAR,
     AREA,

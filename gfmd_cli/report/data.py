@@ -12,9 +12,8 @@ from gfmd_cli.analysis.curve_styles import without_escapes
 from gfmd_cli.analysis.figures import study_figures, with_styles
 from gfmd_cli.analysis.plotting import ColumnFigure
 from gfmd_cli.analysis.series import StyledCurve
-from gfmd_cli.analysis.table import TableColumn
 from gfmd_cli.analysis.tables import TitledCurves, curve_title
-from gfmd_cli.analysis.wording import in_si, shown
+from gfmd_cli.analysis.wording import in_si
 from gfmd_cli.bench.file import Trace
 from gfmd_cli.study.column import Row
 from gfmd_cli.study.reading import open_study, solved_rows
@@ -83,10 +82,6 @@ class ReportData:
     def in_si(self) -> bool:
         """Whether metres and pascals mean something in some contact."""
         return any(map(in_si, self.solved))
-
-    def shown(self, columns: Sequence[TableColumn]) -> list[TableColumn]:
-        """The columns whose units mean something in this study."""
-        return shown(columns, self.solved)
 
     def json(self, attribute: str) -> dict[str, Any]:
         """An attribute that holds JSON; empty where it holds none."""

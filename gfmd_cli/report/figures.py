@@ -4,14 +4,19 @@ Contact area, mean gap and stress deviation over the pressure, distribution of t
 against error; error bars and optional observables, which are tables alone.
 """
 
+from dataclasses import replace
+
+import numpy as np
+
 from gfmd_cli.analysis import tables
 from gfmd_cli.analysis.distribution_figure import Density, densities
 from gfmd_cli.analysis.figures import PANELS
-from gfmd_cli.analysis.table import Group, Table, TableColumn, product, ratio
+from gfmd_cli.analysis.table import Group, Table, TableColumn, product, ratio, records_of
+from gfmd_cli.analysis.wording import shown
 from gfmd_cli.bench.figure import bench_figures
 from gfmd_cli.bench.table import bench_table
 from gfmd_cli.report.data import ReportData, item_title
-from gfmd_cli.report.section import Drawing, Section
+from gfmd_cli.report.section import Section
 from gfmd_cli.report.svg import drawing
 
 EXPLANATION = (
@@ -27,22 +32,21 @@ DISTRIBUTIONS = {
         "Distribution of the stress over logarithmic stress, elastomers side by side",
         "Pr(sigma) of the elastomers at about one pressure, over logarithmic bins. Symbols: "
         "simulation{lines}. Bins with fewer than ten grid points are left out.",
+        "Table: elastomers at about one pressure",
     ),
     "stress_distribution_pressures": (
         "Distribution of the stress over linear stress, at several pressures",
         "Pr(sigma) of one elastomer at several pressures. Thick: simulation{thin}.",
+        "Table: one elastomer at several pressures",
     ),
     "stress_distribution_continuum": (
         "Distribution of the stress in the continuum, with error bars and edge laws",
         "Pr(sigma) extrapolated over the grids, with error bars; faint: the grids; dashed: power "
         "law of the stress at the edge of a contact.",
+        "Table: power laws",
     ),
 }
-"""Label and caption by the name of the figure; {lines}, {thin}: the legend of the theory."""
-BINS_BEHIND = {
-    "stress_distribution": "Table: elastomers at about one pressure",
-    "stress_distribution_pressures": "Table: one elastomer at several pressures",
-}
+"""Label, caption and title of the table by the name of the figure; {lines}, {thin}: the theory."""
 BINS = (
     TableColumn("sigma / Delta_sigma", "sigma"),
     TableColumn("sigma", product("sigma", "delta_sigma"), unit="Pa"),
@@ -64,39 +68,32 @@ def contact_area(data: ReportData) -> Section:
     if data.comparison.has_theory:
         caption = "Relative contact area a_r and Persson theory; ratio: simulation / theory."
         lines = LINES
-    return Section(
-        "Contact area",
-        notes=[EXPLANATION + lines],
-        drawings=_drawings(data, "a_r"),
-        disclosed={
-            BEHIND: tables.over_pressure(tables.CONTACT_AREA, caption, data.curves),
-            TRUE_CONTACT: tables.true_contact_table(data.curves),
-        },
-    )
+    section = _over_pressure(data, "Contact area", "a_r", caption)
+    more = {TRUE_CONTACT: tables.true_contact_table(data.curves)}
+    return replace(section, notes=[EXPLANATION + lines], disclosed={**section.disclosed, **more})
 
 
 def mean_gap(data: ReportData) -> Section:
     """Mean gap."""
     caption = "Mean gap u_g between the surfaces, over the whole interface."
-    disclosed = {BEHIND: tables.over_pressure(tables.MEAN_GAP, caption, data.curves)}
-    return Section("Mean gap", drawings=_drawings(data, "u_g"), disclosed=disclosed)
+    return _over_pressure(data, "Mean gap", "u_g", caption)
 
 
 def stress_deviation(data: ReportData) -> Section:
     """Standard deviation of the stress."""
     caption = "Standard deviation sigma_p of the stress over the whole interface."
-    disclosed = {BEHIND: tables.over_pressure(tables.STRESS_DEVIATION, caption, data.curves)}
-    return Section("Stress deviation", drawings=_drawings(data, "sigma_p"), disclosed=disclosed)
+    return _over_pressure(data, "Stress deviation", "sigma_p", caption)
 
 
-def _drawings(data: ReportData, column: str) -> list[Drawing]:
-    """The figures of a column over the pressure that the study has data for."""
-    panels = ((panel, data.figures.get(panel.name)) for panel in PANELS if panel.column == column)
-    return [
+def _over_pressure(data: ReportData, title: str, name: str, caption: str) -> Section:
+    """The figures of a quantity over the pressure that the study has data for, and its table."""
+    drawings = [
         drawing(plot, panel.name, f"{panel.meaning}: {', '.join(plot.legend)}", f"{panel.meaning}.")
-        for panel, plot in panels
-        if plot is not None
+        for panel in PANELS
+        if panel.column == name and (plot := data.figures.get(panel.name))
     ]
+    table = tables.over_pressure(tables.BEST_VALUES[name], caption, data.curves)
+    return Section(title, drawings=drawings, disclosed={BEHIND: table})
 
 
 def stress_distribution(data: ReportData) -> Section:
@@ -104,32 +101,29 @@ def stress_distribution(data: ReportData) -> Section:
     lines, thin = "; lines: Persson theory", "; thin: Persson theory"
     if not data.comparison.has_theory:
         lines, thin = "", ""
-    bins = data.shown(BINS)
-    disclosed = {
-        BINS_BEHIND[name]: Table(
-            "Middle of each bin, density and theory.", bins, [_bins(density) for density in shown]
-        )
-        for name, shown in densities(data.items).items()
+    bins = shown(BINS, data.solved)
+    of_bins = "Middle of each bin, density and theory."
+    behind = {
+        name: Table(of_bins, bins, [_bins(density) for density in contacts])
+        for name, contacts in densities(data.items).items()
     }
+    behind["stress_distribution_continuum"] = tables.power_laws(data.comparison)
     return Section(
         "Stress distribution",
         drawings=[
             drawing(figure, name, label, caption.format(lines=lines, thin=thin))
-            for name, (label, caption) in DISTRIBUTIONS.items()
+            for name, (label, caption, _) in DISTRIBUTIONS.items()
             if (figure := data.figures.get(name))
         ],
-        disclosed=disclosed | {"Table: power laws": tables.power_laws(data.comparison)},
+        disclosed={DISTRIBUTIONS[name][2]: table for name, table in behind.items()},
     )
 
 
 def _bins(density: Density) -> Group:
-    unit = float(density.row["delta_sigma"])
-    theory = density.theory(density.sigma)
-    records = [
-        {"sigma": float(s), "density": float(d), "theory": float(t), "delta_sigma": unit}
-        for s, d, t in zip(density.sigma, density.density, theory, strict=True)
-    ]
-    return Group(f"{item_title(density.item)}, p* = {density.row['p_star']:.4g}", records)
+    sigma, row = density.sigma, density.row
+    theory, unit = density.theory(sigma), np.full(sigma.size, row["delta_sigma"])
+    records = records_of(sigma=sigma, density=density.density, theory=theory, delta_sigma=unit)
+    return Group(f"{item_title(density.item)}, p* = {row['p_star']:.4g}", records)
 
 
 def error_bars(data: ReportData) -> Section:

@@ -5,6 +5,8 @@ from collections.abc import Iterable
 from html import escape
 from typing import Any
 
+import numpy as np
+
 from gfmd_cli.analysis.curve_styles import without_escapes
 from gfmd_cli.analysis.plotting import BAND, ColumnFigure, PlotLayer
 from gfmd_cli.analysis.table import known, plus_minus
@@ -26,8 +28,6 @@ SYMBOLS = {
 }
 """Markers by their names in matplotlib: as plotly.js names them, and as a character."""
 LINE, DASHES, PATCH = "—", "┄", "■"
-Errors = tuple[Field, Field] | None
-"""Lengths of error bars down and up, if there are any."""
 PIXELS = 1.6  # of the page for a point of the figure
 DIGITS, LINE_DIGITS = 10, 5  # of the values of points, and of lines, which are only looked at
 DARKER = "#666666"  # of what all curves share
@@ -81,19 +81,17 @@ def _points(layer: PlotLayer, names: tuple[str, str]) -> dict[str, Any]:
     width = 0.9 * PIXELS
     marker = {"symbol": symbol, "color": layer.colour, "size": 8, "line": {"width": width}}
     trace: dict[str, Any] = {"mode": "markers", "marker": marker, "hoverinfo": "text"}
-    errors = layer.errors()
-    if errors is not None:
-        down, up = (_numbers(side, DIGITS) for side in errors)
+    if np.any(np.isfinite(layer.error)):
+        down, up = (_numbers(side, DIGITS) for side in layer.error)
         bars = {"array": up, "color": layer.colour, "thickness": 1.2, "width": 3}
         trace["error_y"] = bars | ({} if down == up else {"symmetric": False, "arrayminus": down})
-    trace["text"] = [_hover(layer, place, names, errors) for place in range(layer.x.size)]
+    trace["text"] = [_hover(layer, place, names) for place in range(layer.x.size)]
     return trace
 
 
-def _hover(layer: PlotLayer, place: int, names: tuple[str, str], errors: Errors) -> str:
+def _hover(layer: PlotLayer, place: int, names: tuple[str, str]) -> str:
     """Text that appears at a point under the pointer: curve, values and details."""
-    x, y = float(layer.x[place]), float(layer.y[place])
-    error = math.nan if errors is None else float(max(side[place] for side in errors))
+    x, y, error = float(layer.x[place]), float(layer.y[place]), float(max(layer.error[:, place]))
     value_text = plus_minus(y, error).replace("+-", "±") if known(error) else f"{y:.4g}"
     details = clean(layer.details[place]).split("\n") if layer.details else []
     lines = [_name(layer.names[0]), f"{names[0]}: {x:.4g}", f"{names[1]}: {value_text}", *details]

@@ -10,7 +10,7 @@ from gfmd_cli.analysis.plotting import WIDTH, ColumnFigure, LegendFigure, shades
 from gfmd_cli.analysis.selection import evenly, grouped
 from gfmd_cli.analysis.table import Group, Table, TableColumn
 from gfmd_cli.analysis.tables import AREA, P_STAR, POINTS, PRESSURE
-from gfmd_cli.analysis.wording import contact_title, pressure_text
+from gfmd_cli.analysis.wording import contact_title, pressure_text, shown
 from gfmd_cli.grid.arrays import Field, Mask
 from gfmd_cli.maps.pictures import block_sums
 from gfmd_cli.physics.observables import contact_points
@@ -25,7 +25,6 @@ MAX_CONTACTS, MAX_CURVES = 12, 3  # contacts that are shown, of at most so many 
 SIDE = 256  # pixels of a map at the most
 MIN_FIGURE_ASPECT, MAX_FIGURE_ASPECT = 0.35, 1.2  # height over width, for oblong cells; choices
 NOISE = 1e-3  # of the nominal pressure; where contact is not known, less stress is none
-ROWS = 256  # rows of pixels that are in memory at a time
 TOUCHING = "#0077bb"
 COLOURS, FAINTEST = "viridis", 0.3
 """Colour map of stress and gap, and where it begins: with a contrast of LEGIBLE to NONE."""
@@ -63,7 +62,7 @@ def maps(data: ReportData) -> Section:
     ]
     if any(profiles.plane(row) and max(row["points"], row["points_y"]) > SIDE for row in contacts):
         notes.append(f"Maps have up to {SIDE} pixels a side, each the mean of some grid points.")
-    table = Table(CAPTION, data.shown(SHOWN), [Group("", contacts)])
+    table = Table(CAPTION, shown(SHOWN, data.solved), [Group("", contacts)])
     return Section(
         "Maps and cross-sections",
         notes=notes,
@@ -123,7 +122,7 @@ def _map_figures(study: StudyFile, row: Row) -> list[tuple[str, ColumnFigure, st
 def _thumbnails(study: StudyFile, task: int, step: int) -> dict[str, Field]:
     """Means over pixels of step^2 points: the stress and, as far as known, contact and gap."""
     rows: dict[str, list[Field]] = defaultdict(list)
-    for block in study.blocks("fields", task, ROWS * step, ("u", "sigma", "height")):
+    for block in study.blocks("fields", task, profiles.ROWS * step, ("u", "sigma", "height")):
         if "sigma" in block:
             rows["stress"].append(_means(block["sigma"], step))
         if {"u", "sigma", "height"} <= block.keys():

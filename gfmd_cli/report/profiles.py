@@ -20,7 +20,7 @@ LINES = {
     "u": ("elastomer u", {"color": "#0077bb", "lw": 0.9}),
 }
 STRESS = "#cc3311"
-ROWS = 256  # of the fields that are in memory at a time
+ROWS = 256  # of fields, or of pixels of a map, that are in memory at a time
 
 
 class Scale(NamedTuple):

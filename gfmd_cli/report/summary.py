@@ -63,6 +63,8 @@ def key_numbers(data: ReportData) -> list[KeyNumber]:
     """The most important numbers, in SI units where those mean something, else reduced."""
     rows = data.solved
     tolerances = span(_column(rows, "tolerance"))
+    seconds = sum(value for value in _column(rows, "seconds") if math.isfinite(value))
+    time = quantity(seconds, "s") if seconds < SECONDS else duration(seconds)
     return [
         *_quantities(data),
         *_theory_numbers(data),
@@ -71,7 +73,7 @@ def key_numbers(data: ReportData) -> list[KeyNumber]:
             pretty(max(_column(rows, "residual"))),
             f"natural residual, tolerance: {tolerances}",
         ),
-        KeyNumber("Time", _time(rows), "solving, summed over contacts"),
+        KeyNumber("Time", time, "solving, summed over contacts"),
     ]
 
 
@@ -80,23 +82,21 @@ def _quantities(data: ReportData) -> list[KeyNumber]:
     rows = data.solved
     p_star = span(_column(rows, "p_star"))
     note = f"a_r, share of the nominal area{_continuum_note(rows, 'a_r')}"
-    quantities = [
-        KeyNumber("Pressure", p_star, "p*, in units of Delta_sigma"),
+    pressure, scales = KeyNumber("Pressure", p_star, "p*, in units of Delta_sigma"), []
+    if data.in_si:
+        pascals, full = (span(_column(rows, name), "Pa") for name in ("pressure", "delta_sigma"))
+        height, side = (span(_column(rows, name), "m") for name in ("h_std", "length"))
+        pressure = KeyNumber("Pressure", pascals, f"p* = {p_star}")
+        scales = [
+            KeyNumber("Stress in full contact", full, "rms Delta_sigma"),
+            KeyNumber("Roughness", height, f"rms height h_std, side {side}"),
+        ]
+    return [
+        pressure,
         KeyNumber("Contact area", span(_best(rows, "a_r")), note),
         _scaled(data, "Mean gap", "u_g"),
         _scaled(data, "Stress deviation", "sigma_p"),
-    ]
-    if not data.in_si:
-        return quantities
-    full, height, side = (
-        span(_column(rows, name), unit)
-        for name, unit in (("delta_sigma", "Pa"), ("h_std", "m"), ("length", "m"))
-    )
-    return [
-        KeyNumber("Pressure", span(_column(rows, "pressure"), "Pa"), f"p* = {p_star}"),
-        *quantities[1:],
-        KeyNumber("Stress in full contact", full, "rms Delta_sigma"),
-        KeyNumber("Roughness", height, f"rms height h_std, side {side}"),
+        *scales,
     ]
 
 
@@ -136,11 +136,6 @@ def _continuum_note(rows: list[Row], name: str) -> str:
     return ", in the continuum" + ("" if all(known) else " where known")
 
 
-def _time(rows: list[Row]) -> str:
-    seconds = sum(value for value in _column(rows, "seconds") if math.isfinite(value))
-    return quantity(seconds, "s") if seconds < SECONDS else duration(seconds)
-
-
 def _ratios(data: ReportData, name: str, limit: float) -> str:
     """Simulation over theory at reduced pressures up to `limit`."""
     return span(
@@ -157,19 +152,13 @@ def _column(rows: list[Row], name: str) -> list[float]:
 
 def warnings(data: ReportData) -> list[str]:
     """Warnings above the results: missing, doubtful and unresolved values, effects of edges."""
-    unsolved = _unsolved(data)
-    return [*unsolved, *warnings_in(data.solved), *_unresolved(data), *edge_warnings(data.solved)]
-
-
-def _unsolved(data: ReportData) -> list[str]:
-    """A line on the contacts that are not converged or missing; none where all are solved."""
-    total = len(data.rows)
-    parts = []
+    total, parts = len(data.rows), []
     if data.failed:
         parts.append(f"{len(data.failed)} of {total} contacts did not reach their tolerance")
     if data.missing:
         parts.append(f"{len(data.missing)} of {total} are not solved yet")
-    return ["; ".join(parts) + "."] if parts else []
+    unsolved = ["; ".join(parts) + "."] if parts else []
+    return [*unsolved, *warnings_in(data.solved), *_unresolved(data), *edge_warnings(data.solved)]
 
 
 def _unresolved(data: ReportData) -> list[str]:

@@ -4,11 +4,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from gfmd_cli.analysis.curve_styles import distinct_labels, distinct_styles, literal
+from gfmd_cli.analysis.curve_styles import MAX_STYLES, distinct_labels, distinct_styles, literal
 from gfmd_cli.analysis.plotting import ColumnFigure
 from gfmd_cli.analysis.surface_figure import height_figure, spectrum_labels
 from gfmd_cli.analysis.surface_spectrum import FIT, Spectrum, spectrum
-from gfmd_cli.analysis.table import Group, Table, TableColumn
+from gfmd_cli.analysis.table import Group, Table, TableColumn, records_of
 from gfmd_cli.maps.pictures import Picture
 from gfmd_cli.physics.persson import Shells
 from gfmd_cli.report.data import ReportData
@@ -19,7 +19,6 @@ from gfmd_cli.study.reading import open_study
 
 MAX_PICTURES = 4  # measured surfaces that are shown; a choice
 MISSING = " Grey: missing heights."
-MAX_SURFACES = 8  # of the figure; more cannot be told apart
 
 
 def measured_surface(data: ReportData) -> Section:
@@ -65,11 +64,11 @@ def surface_spectrum(data: ReportData) -> Section:
     spectra = [(row, each) for row, each in spectra if each.q.size]
     if not spectra:
         return Section("Surface spectrum")
-    rows, drawn = zip(*spectra[:MAX_SURFACES], strict=True)
+    rows, drawn = zip(*spectra[:MAX_STYLES], strict=True)
     names = [str(row["surface"]) for row in rows]
     label = f"Power spectral density of the surface over the wavenumber: {'; '.join(names)}"
-    left_out = len(spectra) > MAX_SURFACES
-    more = f" The first {MAX_SURFACES} of {len(spectra)} are shown." if left_out else ""
+    left_out = len(spectra) > MAX_STYLES
+    more = f" The first {MAX_STYLES} of {len(spectra)} are shown." if left_out else ""
     fits = [
         {"surface": name, "no_rolloff": "none within the cell", **each.fit_record}
         for name, each in zip(names, drawn, strict=True)
@@ -132,13 +131,7 @@ def _bands(names: list[str], shown: Sequence[Spectrum]) -> Table:
         TableColumn("modes", "modes", ".0f"),
     )
     groups = [
-        Group(
-            name,
-            [
-                {"q": float(q), "density": float(density), "modes": float(modes)}
-                for q, density, modes in zip(curve.q, curve.density, curve.modes, strict=True)
-            ],
-        )
+        Group(name, records_of(q=curve.q, density=curve.density, modes=curve.modes))
         for name, curve in zip(names, shown, strict=True)
     ]
     return Table("Bands of wavenumber.", columns, groups)

@@ -24,12 +24,10 @@ def column(rows: list[Row], name: str) -> np.ndarray:
     return np.array([row[name] for row in rows], dtype=float)
 
 
-def draw_points(plot: ColumnFigure, style: CurveStyle, x: Any, y: Any, error: Any = None) -> None:
+def draw_points(plot: ColumnFigure, style: CurveStyle, x: Any, y: Any, error: Any = np.nan) -> None:
     """Open symbols with error bars where the error is known."""
     x, y = np.asarray(x), np.asarray(y)
-    plot.points(
-        style, x, y, np.full(x.size, True), error=None if error is None else np.asarray(error)
-    )
+    plot.points(style, x, y, np.full(x.size, True), error=np.asarray(error))
 
 
 def draw_limits(plot: ColumnFigure, style: CurveStyle, x: Any, y: Any, error: Any) -> np.ndarray:
