@@ -1,5 +1,6 @@
 import re
 import runpy
+import warnings
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -164,6 +165,23 @@ def test_points_and_sides_come_from_the_heights():
     assert measured.length == pytest.approx(1e-5, rel=1e-12)
     assert measured.a_r == result.a_r
     np.testing.assert_allclose(measured.height, result.height, rtol=1e-12)
+
+
+def test_topographies_of_the_library_itself_are_read():
+    """Maps with and without unit, filtered ones, and line scans."""
+    with warnings.catch_warnings(action="ignore", category=ImportWarning):  # without mpi4py
+        import SurfaceTopography as surface_topography
+    heights = rough_map()
+    by_hand = solve({**MATERIAL, "surface": {"length": 1e-5, "periodic": False}}, heights=heights)
+    scan = surface_topography.Topography(1e9 * heights.T, (1e4, 1e4), unit="nm")
+    for each in (scan, scan.to_unit("um"), scan.detrend("center")):
+        result = solve(MATERIAL, heights=each)
+        assert result.length == pytest.approx(1e-5, rel=1e-12)
+        assert result.a_r == by_hand.a_r
+    bare = surface_topography.Topography(heights.T, (1e-5, 1e-5))
+    assert solve(MATERIAL, heights=bare).a_r == by_hand.a_r
+    profile = surface_topography.UniformLineScan(1e9 * heights[0], 1e4, unit="nm")
+    assert solve(MATERIAL, heights=profile).length == pytest.approx(1e-5, rel=1e-12)
 
 
 def test_a_topography_states_both_sides_also_of_a_part():

@@ -102,6 +102,23 @@ def test_a_modulus_in_pascals_on_a_surface_metres_rough(elastomer):
     assert solve(reduced).warnings == ()
 
 
+def test_a_random_surface_in_metres_without_a_side():
+    sideless = {key: value for key, value in SURFACE.items() if key != "length"}
+    assert "a side of 1 m is assumed" in only_warning(tables(sideless, p_star=0.1))
+    assert solve(tables(sideless | {"length": 1.0}, p_star=0.1)).warnings == ()
+
+
+@pytest.mark.parametrize("part", [{"region": {"x": [0, 24]}}, {"crop": True}])
+def test_a_side_that_may_be_that_of_the_whole_map(part):
+    heights = solve(tables()).height[:24]
+    surface = {"length": SURFACE["length"]} | part
+    spec = {"elastomer": HALF_SPACE, "load": {"p_star": 0.1}}
+    warnings = solve(spec | {"surface": surface}, heights=heights).warnings
+    assert any("24 of 32 points; if the whole map has this side" in each for each in warnings)
+    whole = solve(spec | {"surface": {"length": SURFACE["length"]}}, heights=heights).warnings
+    assert not any("whole map" in each for each in whole)
+
+
 @pytest.mark.parametrize(
     ("load", "elastomer", "words"),
     [

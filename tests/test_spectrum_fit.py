@@ -1,10 +1,12 @@
 import numpy as np
 import pytest
 
+from gfmd_cli.analysis.surface_summary import summarise
 from gfmd_cli.errors import InputError
 from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.physics.contact import build_scene, radial_power
 from gfmd_cli.physics.elastomers import HalfSpace
+from gfmd_cli.physics.file_surface import FileSurface
 from gfmd_cli.physics.persson import shells
 from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.physics.spectrum_fit import density, fit, moments
@@ -127,3 +129,28 @@ def test_the_density_is_that_of_single_modes():
 def test_too_narrow_a_spectrum_is_refused():
     with pytest.raises(InputError, match="too narrow for a fit"):
         fit(shells_of(SelfAffine(cutoff=0.4), 32))
+
+
+@pytest.mark.parametrize(("hurst", "wavelength"), [(0.3, 2), (0.5, 4), (0.8, 3), (0.8, 8)])
+def test_a_part_of_a_surface_has_the_exponent_of_the_whole(hurst, wavelength, tmp_path):
+    """Without periodic borders; the wavelength lambda_s is in pixels."""
+    surface = SelfAffine(hurst=hurst, cutoff=wavelength / 512, rolloff=0.1, seed=3)
+    np.save(tmp_path / "part.npy", 1e-8 * surface.heights(512)[:400, :300])
+    part = FileSurface(path=tmp_path / "part.npy", periodic=False, length=3e-6)
+    spectrum = summarise(part).spectrum
+    fitted = spectrum.fit
+    assert fitted.hurst == pytest.approx(hurst, abs=max(0.03, 3 * fitted.hurst_error))
+    assert fitted.hurst_error < 0.06
+    assert fitted.cutoff_wavelength == pytest.approx(wavelength * 1e-8, rel=0.05)
+    assert fitted.rolloff_wavelength == pytest.approx(51.2e-8, rel=0.1)
+    middle = (spectrum.q > 2 * fitted.q_r) & (spectrum.q < 0.8 * fitted.q_s)
+    ratio = spectrum.density[middle] / spectrum.fitted[middle]
+    assert np.median(ratio) == pytest.approx(1, abs=0.1)
+
+
+def test_smooth_heights_with_borders_have_no_fit(tmp_path):
+    surface = SelfAffine(cutoff=1 / 32, rolloff=0.2, seed=3)
+    np.save(tmp_path / "smooth.npy", 1e-8 * surface.heights(512)[:400, :400])
+    spectrum = summarise(FileSurface(path=tmp_path / "smooth.npy", periodic=False)).spectrum
+    assert spectrum.fit is None
+    assert "decreases faster" in spectrum.no_fit

@@ -267,9 +267,11 @@ def test_a_wrong_word_on_a_scan_is_refused(gfmd, tmp_path, pair, message):
 
 
 def test_an_exponent_that_is_no_roughness_is_said_to_be_changed(gfmd, tmp_path):
-    y, x = np.mgrid[:64, :64] * (2 * np.pi / 64)
-    height = sum(np.cos(m * x) * np.cos(m * y) * m**-4.0 for m in range(1, 20))
-    height += 1e-9 * np.random.default_rng(0).normal(size=height.shape)
+    """C(q) ~ q^-5: H = 1.5."""
+    m = np.hypot(np.fft.fftfreq(64, 1 / 64)[:, None], np.fft.rfftfreq(64, 1 / 64))
+    amplitude = np.where((m > 0) & (m < 25), np.maximum(m, 1) ** -2.5, 0)
+    phases = np.exp(2j * np.pi * np.random.default_rng(0).random(m.shape))
+    height = np.fft.irfft2(amplitude * phases)
     np.save(tmp_path / "h.npy", height)
     assert "which is outside 0.01 to 1" in gfmd("surface", "h.npy")
 

@@ -51,7 +51,24 @@ class Spectrum:
         return {str(key): getattr(self.fit, str(key)) for key in keys}
 
 
-def spectrum(shells: Shells, sides: tuple[float, ...], points: tuple[int, ...]) -> Spectrum:
+def nearest_fit(
+    shells: Shells, sides: tuple[float, ...], points: tuple[int, ...]
+) -> tuple[SelfAffineFit | None, str]:
+    """The nearest self-affine surface, or None and why there is none; arguments of `spectrum`."""
+    if len(sides) == 1:
+        return None, "a line has no fit"
+    try:
+        return fit(shells, _nyquist(sides, points)), ""
+    except InputError as error:
+        return None, str(error)
+
+
+def spectrum(
+    shells: Shells,
+    sides: tuple[float, ...],
+    points: tuple[int, ...],
+    best: tuple[SelfAffineFit | None, str] | None = None,
+) -> Spectrum:
     """The spectrum of a surface from the sums over its shells.
 
     Waves shorter than two grid points along a side are left out.
@@ -59,14 +76,10 @@ def spectrum(shells: Shells, sides: tuple[float, ...], points: tuple[int, ...]) 
     Parameters
     ----------
     sides, points : of the cell and of its grid, along y and x or along x alone
+    best : what `nearest_fit` returns; by default for the same shells
     """
-    nyquist = pi / max(side / count for side, count in zip(sides, points, strict=True))
-    nearest, no_fit = None, "a line has no fit"
-    if len(sides) == 2:
-        try:
-            nearest, no_fit = fit(shells, nyquist), ""
-        except InputError as error:  # too narrow
-            no_fit = str(error)
+    nyquist = _nyquist(sides, points)
+    nearest, no_fit = nearest_fit(shells, sides, points) if best is None else best
     edges = _edges(shells.q, nyquist)
     place = np.searchsorted(edges, shells.q) - 1
     inside = (place >= 0) & (place < edges.size - 1)
@@ -79,6 +92,11 @@ def spectrum(shells: Shells, sides: tuple[float, ...], points: tuple[int, ...]) 
     total, moment, modes, fitted = (x[usable] for x in (total, moment, modes, fitted))
     per_mode, q = prod(sides) / modes, moment / total
     return Spectrum(len(sides), q, total * per_mode, modes, nearest, no_fit, fitted * per_mode)
+
+
+def _nyquist(sides: tuple[float, ...], points: tuple[int, ...]) -> float:
+    """The largest wavenumber of which a grid has the waves of all directions [1/m]."""
+    return pi / max(side / count for side, count in zip(sides, points, strict=True))
 
 
 def _edges(q: Field, nyquist: float) -> Field:

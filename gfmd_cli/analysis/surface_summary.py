@@ -3,11 +3,12 @@
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from math import prod
 from typing import Any
 
 import numpy as np
 
-from gfmd_cli.analysis.surface_spectrum import FIT, Spectrum, spectrum
+from gfmd_cli.analysis.surface_spectrum import FIT, Spectrum, nearest_fit, spectrum
 from gfmd_cli.analysis.table import Group, Table, TableColumn, plain, records_of
 from gfmd_cli.maps.height_map import extent
 from gfmd_cli.maps.roughness_parameters import MAP_NAMES, PROFILE_NAMES, roughness_parameters
@@ -38,7 +39,8 @@ class SurfaceSummary:
     moments: Moments
     """Of the cell that is solved."""
     spectrum: Spectrum
-    """Of the cell that is solved."""
+    """Of the cell that is solved; the fit is to a map with tapered edges instead of a mirrored
+    one."""
 
     @property
     def copies(self) -> int:
@@ -83,8 +85,25 @@ def summarise(surface: RigidSurface, points: int = 0) -> SurfaceSummary:
         heights = np.ma.asarray(scene.in_metres(scene.height))
         measured = heights, scene.grid.spacings
     parameters = roughness_parameters(*measured)
-    spectral = spectrum(scene.shells, scene.grid.sides, scene.grid.whole_shape)
+    best = _fit_to_window(surface, scene) if repeated.copies > 1 else None
+    spectral = spectrum(scene.shells, scene.grid.sides, scene.grid.whole_shape, best)
     return SurfaceSummary(surface, scene, parameters, moments(scene.shells), spectral)
+
+
+def _fit_to_window(surface: RigidSurface, mirrored: Scene) -> tuple[SelfAffineFit | None, str]:
+    """The fit for a mirrored map, from the map with tapered edges.
+
+    The kinks of the mirrored map have a spectrum of q^-4 or so, which hides that of short waves.
+    |h(q)|^2 of a mode is inversely proportional to the area of the cell; its rms height is kept.
+    """
+    tapered = surface.model_copy(update={"edges": "window"})
+    scene = build_scene(tapered, HalfSpace(), tapered.smallest_grid())
+    nearest, no_fit = nearest_fit(scene.shells, scene.grid.sides, scene.grid.whole_shape)
+    if nearest is None:
+        return None, no_fit
+    areas = prod(scene.grid.sides) / prod(mirrored.grid.sides)
+    heights = moments(mirrored.shells).height / moments(scene.shells).height
+    return replace(nearest, c_0=nearest.c_0 * areas * heights**2), ""
 
 
 UNITS = dict.fromkeys(("Sq", "Sa", "Sz", "Sal", "Pq", "Pa", "Pt", "Pal"), "m")
@@ -138,7 +157,7 @@ def summary_text(summary: SurfaceSummary) -> str:
         random = ["random surface with the fitted spectrum:", "", "[surface]"]
         random += [f"{key} = {json.dumps(value)}" for key, value in table.items()]
         lines += [
-            *_fit_lines(summary.spectrum.fit, summary.copies, metres),
+            *_fit_lines(summary.spectrum.fit, metres),
             *_predicted(theories, metres),
             *random,
         ]
@@ -163,7 +182,7 @@ def _predicted(scenes: dict[str, Scene], metres: str) -> list[str]:
     return table.as_text().splitlines()
 
 
-def _fit_lines(nearest: SelfAffineFit, copies: int, metres: str) -> list[str]:
+def _fit_lines(nearest: SelfAffineFit, metres: str) -> list[str]:
     """The fit with warnings."""
     wavelength, error = nearest.rolloff_wavelength, nearest.rolloff_error
     rolloff = "no roll-off within the cell"
@@ -173,11 +192,10 @@ def _fit_lines(nearest: SelfAffineFit, copies: int, metres: str) -> list[str]:
         f"fitted spectrum: H = {nearest.hurst:.3f} +- {nearest.hurst_error:.3f}, {rolloff}, "
         f"lambda_s = {nearest.cutoff_wavelength:.3g}{metres} (scatter {nearest.scatter:.3g})"
     ]
-    gaussian = float(copies**2)  # modes (+-q_x, +-q_y) of a mirrored map are alike
-    if nearest.scatter > MAX_SCATTER * gaussian:
+    if nearest.scatter > MAX_SCATTER:
         lines.append(
-            f"The scatter is far above {gaussian:g}: the surface is not self-affine; the surface "
-            "below has the same rms height and gradient only."
+            "The scatter is far above 1: the surface is not self-affine; the surface below has the "
+            "same rms height and gradient only."
         )
     if not MIN_HURST <= nearest.hurst <= 1:
         lines.append(

@@ -32,6 +32,17 @@ def other_side(length: float, stated: float) -> str:
     return f"surface.length = {length:g} m replaces the side of the file, {stated:g} m"
 
 
+def side_of_a_part(length: float, topography: Topography) -> str:
+    """A side [m] of the part of a map that is used, whose file states none."""
+    part, whole = topography.heights.shape[-1], topography.shape[-1]
+    if part == whole:
+        return ""
+    return (
+        f"surface.length = {length:g} m is the side of the part of the map that is used, {part} of "
+        f"{whole} points; if the whole map has this side, set {length * part / whole:g}"
+    )
+
+
 def unknown_unit(topography: Topography, scale: float, length: float) -> str:
     """Positions of unknown unit; a factor of the heights multiplies the side, to `length` [m]."""
     if topography.spacing is None or topography.metres:

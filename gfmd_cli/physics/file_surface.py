@@ -289,6 +289,8 @@ class FileSurface(RigidSurface):
         stated = self.stated_sides()
         if self.length is not None and stated is not None and topography.metres:
             warnings.append(map_warnings.other_side(self.length, stated[-1]))
+        if self.length is not None and stated is None:
+            warnings.append(map_warnings.side_of_a_part(self.length, topography))
         if self.length is None:
             side = self._known_length() or 1.0
             warnings.append(map_warnings.unknown_unit(topography, self.scale, side))

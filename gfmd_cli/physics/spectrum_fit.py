@@ -19,6 +19,7 @@ MIN_RANGE = 3.0  # smallest q_s / q_1 of a fit; a choice
 MIN_SHELLS = 8  # of a fit with two parameters; a choice
 MAX_ITERATIONS = 40  # of fit and cut-off; ten are usual
 HURST_BOUNDS = (0.0, 2.0)  # bounds of the fit: wider than those of a self-affine surface, 0 and 1
+STEEPEST = 0.99 * HURST_BOUNDS[1]  # from which the bound, not the spectrum, determines the fit
 NEGLIGIBLE_GRADIENT = 1e-4  # fraction of its square; a choice: 16 bits leave 1e-5 or less
 DIFFERENCE_STEP = 1e-4  # in H and ln q_r, for second differences: about eps^(1/4)
 ROUNDING_FACTOR = 1 - 1e-9  # factor by which sums may be too small due to rounding
@@ -104,7 +105,7 @@ def fit(shells: Shells, complete: float = inf) -> SelfAffineFit:
     changes. The first fit leaves out the shortest waves if they contribute nearly nothing to the
     rms gradient, as do those of rounded heights.
 
-    Raises InputError where the spectrum is too narrow for a fit.
+    Raises InputError where the spectrum is too narrow for a fit, or decreases too fast.
 
     Parameters
     ----------
@@ -127,6 +128,11 @@ def fit(shells: Shells, complete: float = inf) -> SelfAffineFit:
         before, shell_count = shell_count, _cut_off(shells, isotropic, best)
         if shell_count == before:
             break
+    if best[0] > STEEPEST:
+        raise InputError(
+            "spectrum: decreases faster than that of a self-affine surface: smooth heights, or the "
+            "borders of a map that is not periodic hide its short waves"
+        )
     errors, scatter = _errors(*range_, best)
     q_r = float(np.exp(best[1])) if best.size == 2 else 0.0
     return SelfAffineFit(

@@ -42,7 +42,10 @@ def read_spec(path: Path, overrides: tuple[str, ...] = ()) -> tuple[Spec, str]:
     try:
         text = raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        raise InputError(f"{path}: not UTF-8 text (byte {error.start})") from error
+        raise InputError(
+            f"{path}: not UTF-8 text (byte {error.start}), where a run spec (TOML) is expected; "
+            f"`gfmd init SPEC --from {path}` writes one for a scan"
+        ) from error
     return read_text(text, path, overrides), text
 
 

@@ -5,6 +5,7 @@ from math import inf, isfinite
 from typing import Any
 
 from gfmd_cli.physics.elastomers import Layer
+from gfmd_cli.physics.indenters import RigidSurface
 from gfmd_cli.spec.models import LOADS
 from gfmd_cli.status import Status
 from gfmd_cli.study.refinement import TaskSolution, border_share
@@ -45,6 +46,8 @@ def warnings_of(task: Task, solved: TaskSolution, results: Mapping[str, Any]) ->
             f"a modulus of {elastomer.modulus:.3g} Pa and an rms height of {scene.h_std:.3g} m: "
             "are heights and lengths in metres? Set surface.h_std, surface.length or surface.scale"
         )
+    elif elastomer.modulus > PASCALS and task.surface.rough and _has_default_side(task.surface):
+        warnings.append("surface.length is not given: a side of 1 m is assumed")
     if task.solver.tolerance > LOOSE:
         warnings.append(
             f"solver.tolerance = {task.solver.tolerance:g}: contact area and mean gap may be wrong "
@@ -65,6 +68,11 @@ def warnings_of(task: Task, solved: TaskSolution, results: Mapping[str, Any]) ->
             "the grid; use more points"
         )
     return warnings
+
+
+def _has_default_side(surface: RigidSurface) -> bool:
+    """Whether nobody has stated the side of a random surface."""
+    return not surface.is_map and "length" not in surface.model_fields_set
 
 
 def _coarse_for_layer(task: Task, spacing: float) -> list[str]:
