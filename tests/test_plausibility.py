@@ -108,6 +108,14 @@ def test_a_random_surface_in_metres_without_a_side():
     assert solve(tables(sideless | {"length": 1.0}, p_star=0.1)).warnings == ()
 
 
+@pytest.mark.parametrize(("accuracy", "warned"), [(0.5, False), (0.001, True)])
+def test_a_fixed_grid_that_misses_the_requested_accuracy(accuracy, warned):
+    spec = tables(p_star=0.1) | {"accuracy": {"contact_area": accuracy}}
+    warnings = solve(spec).warnings
+    assert any("a_r" in each and '"auto"' in each for each in warnings) is warned
+    assert len(warnings) == warned
+
+
 @pytest.mark.parametrize("part", [{"region": {"x": [0, 24]}}, {"crop": True}])
 def test_a_side_that_may_be_that_of_the_whole_map(part):
     heights = solve(tables()).height[:24]

@@ -8,7 +8,7 @@ from gfmd_cli.physics.elastomers import Layer
 from gfmd_cli.physics.indenters import RigidSurface
 from gfmd_cli.spec.models import LOADS
 from gfmd_cli.status import Status
-from gfmd_cli.study.refinement import TaskSolution, border_share
+from gfmd_cli.study.refinement import TaskSolution, border_share, inaccurate_columns
 from gfmd_cli.study.tasks import Task
 
 FEW_POINTS = 30  # a choice: the area of a circle of 30 points has an error of its rim of a third
@@ -58,6 +58,11 @@ def warnings_of(task: Task, solved: TaskSolution, results: Mapping[str, Any]) ->
     warnings += _coarse_for_layer(task, max(scene.grid.spacings))
     warnings += _load_in_jump(task, solved.solution.status, results)
     warnings += _contact_at_border(task, solved)
+    if not task.auto and (columns := inaccurate_columns(task, solved)):
+        warnings.append(
+            f"the errors of {', '.join(columns)} are larger than [accuracy] requests, or unknown: "
+            'use grid.points = "auto"'
+        )
     units = _doubtful_unit(task, solved)
     if units:
         return [*warnings, units]  # few points in contact follow from it

@@ -107,7 +107,7 @@ def solve_on_grids(task: Task, context: SolveContext, watcher: Watcher) -> TaskS
     watcher.notes.grids = []
     solution = solved.solution
     solution.transforms = sum(grid.work for grid in grids) / scene.grid.size
-    if task.auto and solution.status.is_converged and _inaccurate(task, solved):
+    if task.auto and solution.status.is_converged and inaccurate_columns(task, solved):
         solution.status = Status.ACCURACY_NOT_REACHED
     return solved
 
@@ -172,7 +172,7 @@ def _continues(task: Task, solved: TaskSolution, grids: int, options: WorkerOpti
     if not task.auto or task.accuracy is None:
         return points != task.points
     finer = _next_points(task, points)
-    inaccurate = [solved.estimates[name] for name in _inaccurate(task, solved)]
+    inaccurate = [solved.estimates[name] for name in inaccurate_columns(task, solved)]
     improvable = any(_is_improvable(each, grids) for each in inaccurate)
     should_refine = improvable and finer <= task.accuracy.max_points
     fits = task.bytes_on(finer) <= options.memory
@@ -190,7 +190,7 @@ def _is_improvable(estimate: Estimate, grids: int) -> bool:
     return estimate.is_too_coarse or not (estimate.verdict.is_final or is_settled)
 
 
-def _inaccurate(task: Task, solved: TaskSolution) -> list[str]:
+def inaccurate_columns(task: Task, solved: TaskSolution) -> list[str]:
     """The columns whose continuum values have larger relative errors than the task requests."""
     if task.accuracy is None:
         return []
