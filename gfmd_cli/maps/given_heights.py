@@ -26,7 +26,7 @@ def write_heights(path: Path, heights: Any) -> dict[str, Any]:
     Returns the keys of the table [surface] that go with the heights. Raises InputError for anything
     but real numbers in rows of equal length, and for an array that xarray cannot write.
     """
-    if hasattr(heights, "to_netcdf") and hasattr(heights, "dims"):
+    if hasattr(heights, "to_netcdf") and hasattr(heights, "dims"):  # topographies have the first
         _write_netcdf(path, heights)
         return {}
     unit, keys = "", dict[str, Any]()

@@ -172,8 +172,8 @@ class Contact:
 
         `u` and `gap` may be the same array.
         """
-        np.copyto(u, gap)
-        np.maximum(u, 0.0, out=u, where=True if self.may_touch is None else self.may_touch)
+        lowest = 0.0 if self.may_touch is None else np.where(self.may_touch, 0.0, -np.inf)
+        np.maximum(gap, lowest, out=u)
         u[touching] = 0.0
         u += self.height
 

@@ -18,6 +18,7 @@ MAX_TABLE_BYTES = 2**20  # a choice, some 40000 rows
 def read_table(path: Path) -> Field:
     """The columns q [1/m] and k [Pa/m], shape (rows, 2). Raises InputError for an invalid table."""
     try:
+        # stat first: it says that there is no such file
         if path.stat().st_size > MAX_TABLE_BYTES or not path.is_file():
             raise ValueError(f"not a regular file of at most {MAX_TABLE_BYTES} bytes")
         with warnings.catch_warnings(action="ignore", category=UserWarning):

@@ -48,8 +48,15 @@ def report(study: Path, bench: Path | None = None, other: Path | None = None) ->
     with styled():
         sections = list(_sections(studies, traces))
     body = render("body.html", name=name, studies=list(map(_top, studies)), sections=sections)
-    head = {"name": name, "policy": policy(), "colours": variables(body)}
-    return f"{render('page.html', body=body, scripts=scripts(), **head)}\n"
+    page = render(
+        "page.html",
+        name=name,
+        policy=policy(),
+        colours=variables(body),
+        body=body,
+        scripts=scripts(),
+    )
+    return f"{page}\n"
 
 
 def _top(data: ReportData) -> dict[str, Any]:

@@ -8,8 +8,8 @@ and the level c of the displacement,
 
 A is found by the primal-dual active set method (Hintermueller, Ito & Kunisch, SIAM J. Optim. 13,
 865, 2002): after each solution the points with s < 0 leave A, and those that the displacement
-enters join it, the deepest first. Four to ten sets suffice on a grid that starts from the contact
-of the next coarser one, whatever k(q) is. For k(q) steeper than q^2 the sets may begin to repeat.
+enters join it, the deepest first. Four to ten sets mostly suffice on a grid that starts from the
+contact of the next coarser one. For k(q) steeper than q^2 the sets may begin to repeat.
 Therefore, as soon as the number of misclassified points does not decrease, stresses s >= 0 are kept
 from set to set, and none of the steps raises the energy:
 

@@ -58,11 +58,7 @@ def warnings_of(task: Task, solved: TaskSolution, results: Mapping[str, Any]) ->
     warnings += _coarse_for_layer(task, max(scene.grid.spacings))
     warnings += _load_in_jump(task, solved.solution.status, results)
     warnings += _contact_at_border(task, solved)
-    if not task.auto and (columns := inaccurate_columns(task, solved)):
-        warnings.append(
-            f"the errors of {', '.join(columns)} are larger than [accuracy] requests, or unknown: "
-            'use grid.points = "auto"'
-        )
+    warnings += _missed_accuracy(task, solved)
     units = _doubtful_unit(task, solved)
     if units:
         return [*warnings, units]  # few points in contact follow from it
@@ -76,7 +72,7 @@ def warnings_of(task: Task, solved: TaskSolution, results: Mapping[str, Any]) ->
 
 
 def _has_default_side(surface: RigidSurface) -> bool:
-    """Whether nobody has stated the side of a random surface."""
+    """Whether the spec leaves the side of a random surface at its default."""
     return not surface.is_map and "length" not in surface.model_fields_set
 
 
@@ -102,6 +98,17 @@ def _load_in_jump(task: Task, status: Status, results: Mapping[str, Any]) -> lis
     if abs(value - task.load) <= task.load_tolerance * task.load:
         return []
     return [f"load.contact_area = {task.load:g} lies in a jump; the nearest value is {value:g}"]
+
+
+def _missed_accuracy(task: Task, solved: TaskSolution) -> list[str]:
+    """A warning if a fixed grid misses the requested accuracy; with "auto" that is a status."""
+    columns = [] if task.auto else inaccurate_columns(task, solved)
+    if not columns:
+        return []
+    return [
+        f"the errors of {', '.join(columns)} are larger than [accuracy] requests, or unknown: "
+        'use grid.points = "auto"'
+    ]
 
 
 def _contact_at_border(task: Task, solved: TaskSolution) -> list[str]:
