@@ -20,10 +20,10 @@ from specs import power_spec
 
 from gfmd_cli.analysis.compare import compare
 from gfmd_cli.analysis.diff import diff
-from gfmd_cli.analysis.surface_spectrum import spectrum
 from gfmd_cli.analysis.table import Group, Table, TableColumn
 from gfmd_cli.analysis.wording import SPACE, quantity, span
 from gfmd_cli.physics.persson import Shells
+from gfmd_cli.physics.surface_spectrum import spectrum
 from gfmd_cli.report import maps, rendering
 from gfmd_cli.report.data import read_report_data
 from gfmd_cli.report.page import report

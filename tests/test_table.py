@@ -71,7 +71,13 @@ def test_json_has_none_for_what_does_not_apply():
 
 @pytest.mark.parametrize(
     ("value", "error", "text"),
-    [(1.0, inf, "1.000 +- inf"), (0.5, 0.0, "0.5"), (1e-9, 1e-15, "0.000000001000 +- 1e-15")],
+    [
+        (1.0, inf, "1.000 +- inf"),
+        (0.5, 0.0, "0.5"),
+        (1e-9, 1e-15, "1.0000000e-09 +- 1e-15"),
+        (4.2123e-6, 4.9e-7, "4.21e-06 +- 4.9e-07"),
+        (-4.2e-6, 5e-5, "-4e-06 +- 5e-05"),
+    ],
 )
 def test_errors_of_any_size_can_be_printed(value, error, text):
     assert plus_minus(value, error) == text

@@ -16,6 +16,7 @@ from gfmd_cli.physics import einstein_solid
 from gfmd_cli.physics.gap_theories import CoarseGrained, FittedWeight
 from gfmd_cli.physics.observables import QUANTITIES
 from gfmd_cli.physics.persson import Persson, Shells
+from gfmd_cli.physics.surface_spectrum import Spectrum
 from gfmd_cli.physics.true_contact import contact_area
 from gfmd_cli.study.column import Row
 from gfmd_cli.study.columns import PARAMETERS
@@ -75,6 +76,8 @@ class Curve:
     rows: list[Row]
     """Rows of the study, pressure rising."""
     persson: Persson
+    map_spectrum: Spectrum | None = None
+    """Spectrum of a map with borders, None of any other surface."""
     study: str = ""
     """Name of the study where several are shown side by side."""
 
@@ -206,14 +209,16 @@ def compare_open(study: StudyFile, path: Path, theory: Theory = "paper") -> Comp
     """As `compare`, of a study that is open already."""
     rows = study.rows
     solved = solved_rows(rows)
-    spectra = {scene: study.shells(scene) for scene in {row["scene"] for row in solved}}
+    scenes = {row["scene"] for row in solved}
+    spectra = {scene: (study.shells(scene), study.map_spectrum(scene)) for scene in scenes}
     if not solved:
         raise InputError(f"{path}: contains no result yet; run it first")
     groups = grouped(solved, lambda row: (row["scene"], *solver_of(row)))
     curves = []
     for (scene, *_), group in groups.items():
-        persson = theory_of(theory, spectra[scene], float(group[0]["n"]))
-        curves.append(Curve(sorted(group, key=lambda row: row["p_star"]), persson))
+        shells, map_spectrum = spectra[scene]
+        persson = theory_of(theory, shells, float(group[0]["n"]))
+        curves.append(Curve(sorted(group, key=lambda row: row["p_star"]), persson, map_spectrum))
     return Comparison(path, curves, len(rows) - len(solved))
 
 

@@ -7,10 +7,10 @@ import numpy as np
 
 from gfmd_cli.analysis.curve_styles import literal
 from gfmd_cli.analysis.plotting import HEIGHT, WIDTH, LegendFigure, shades
-from gfmd_cli.analysis.surface_spectrum import Spectrum
 from gfmd_cli.analysis.surface_summary import SurfaceSummary
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.maps.pictures import Picture
+from gfmd_cli.physics.surface_spectrum import Spectrum
 from gfmd_cli.units import scaled
 
 HEIGHTS, HOLES, HIGHEST = "cividis", "0.85", "#fee838"
@@ -40,7 +40,7 @@ def summary_figure(summaries: Sequence[SurfaceSummary], names: Sequence[str]) ->
             place.set_title(literal(f"{name}: {title}"), fontsize="medium")
         if len(shown) == 1:
             row[1].set_axis_off()
-        _draw_spectrum(row[2], summary.spectrum)
+        _draw_spectrum(row[2], summary.spectrum, summary.scene.grid.dimension)
     return figure
 
 
@@ -102,15 +102,15 @@ def _draw_scale_bar(axes: Any, side: float) -> None:
     axes.text(end + 0.03, -0.05, f"{length / divisor:.3g} {unit}", transform=below, va="center")
 
 
-def spectrum_labels(spectrum: Spectrum) -> tuple[str, str]:
+def spectrum_labels(dimension: int) -> tuple[str, str]:
     """Labels of the axes q and C(q)."""
-    return r"wavenumber  $q$ (m$^{-1}$)", rf"$C(q)$ (m$^{2 + spectrum.dimension}$)"
+    return r"wavenumber  $q$ (m$^{-1}$)", rf"$C(q)$ (m$^{2 + dimension}$)"
 
 
-def _draw_spectrum(axes: Any, spectrum: Spectrum) -> None:
-    """C(q) of the cell that is solved, with the fit."""
+def _draw_spectrum(axes: Any, spectrum: Spectrum, dimension: int) -> None:
+    """C(q) with the fit."""
     axes.loglog(spectrum.q, spectrum.density, ".", ms=3, color="0.4")
     fitted = spectrum.fitted > 0
     axes.loglog(spectrum.q[fitted], spectrum.fitted[fitted], color=LINE)
-    x, y = spectrum_labels(spectrum)
+    x, y = spectrum_labels(dimension)
     axes.set(xlabel=x, ylabel=y)

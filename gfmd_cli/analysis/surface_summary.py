@@ -3,12 +3,10 @@
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import prod
 from typing import Any
 
 import numpy as np
 
-from gfmd_cli.analysis.surface_spectrum import FIT, Spectrum, nearest_fit, spectrum
 from gfmd_cli.analysis.table import Group, Table, TableColumn, plain, records_of
 from gfmd_cli.maps.height_map import extent
 from gfmd_cli.maps.roughness_parameters import MAP_NAMES, PROFILE_NAMES, roughness_parameters
@@ -18,12 +16,20 @@ from gfmd_cli.physics.indenters import RigidSurface
 from gfmd_cli.physics.persson import Persson
 from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.physics.spectrum_fit import Moments, SelfAffineFit, moments
+from gfmd_cli.physics.surface_spectrum import Spectrum, map_spectrum, spectrum
 from gfmd_cli.study.forecast import first_grid
 from gfmd_cli.study.plausibility import METRES
 
 PRESSURES = np.array([0.003, 0.03, 0.3])  # p* of the predictions
 MIN_HURST = 0.01  # of the table [surface] that is suggested
 MAX_SCATTER = 3.0  # per shell, relative to Gaussian roughness; a self-affine surface has less
+FIT = (
+    TableColumn("H", "hurst", ".2f", error="hurst_error", optional=True),
+    TableColumn("lambda_r", "rolloff_wavelength", ".3g", "m", "rolloff_error", "no_rolloff", True),
+    TableColumn("lambda_s", "cutoff_wavelength", ".3g", "m", optional=True),
+    TableColumn("scatter", "scatter", ".3g", optional=True),
+)
+"""Columns of the fit, with the keys of `fit_record`."""
 
 
 @dataclass(frozen=True)
@@ -39,8 +45,7 @@ class SurfaceSummary:
     moments: Moments
     """Of the cell that is solved."""
     spectrum: Spectrum
-    """Of the cell that is solved; the fit is to a map with tapered edges instead of a mirrored
-    one."""
+    """Of the cell that is solved, or of a map with borders, tapered."""
 
     @property
     def copies(self) -> int:
@@ -65,7 +70,7 @@ class SurfaceSummary:
             "gradient": self.moments.gradient,
             "curvature": self.moments.curvature,
             "warnings": self.surface.warnings(),
-            **self.spectrum.fit_record,
+            **fit_record(self.spectrum.fit),
         }
         return {key: plain(value) for key, value in record.items()}
 
@@ -85,25 +90,18 @@ def summarise(surface: RigidSurface, points: int = 0) -> SurfaceSummary:
         heights = np.ma.asarray(scene.in_metres(scene.height))
         measured = heights, scene.grid.spacings
     parameters = roughness_parameters(*measured)
-    best = _fit_to_window(surface, scene) if repeated.copies > 1 else None
-    spectral = spectrum(scene.shells, scene.grid.sides, scene.grid.whole_shape, best)
+    spectral = map_spectrum(surface) or spectrum(
+        scene.shells, scene.grid.sides, scene.grid.whole_shape
+    )
     return SurfaceSummary(surface, scene, parameters, moments(scene.shells), spectral)
 
 
-def _fit_to_window(surface: RigidSurface, mirrored: Scene) -> tuple[SelfAffineFit | None, str]:
-    """The fit for a mirrored map, from the map with tapered edges.
-
-    The kinks of the mirrored map have a spectrum of q^-4 or so, which hides that of short waves.
-    |h(q)|^2 of a mode is inversely proportional to the area of the cell; its rms height is kept.
-    """
-    tapered = surface.model_copy(update={"edges": "window"})
-    scene = build_scene(tapered, HalfSpace(), tapered.smallest_grid())
-    nearest, no_fit = nearest_fit(scene.shells, scene.grid.sides, scene.grid.whole_shape)
+def fit_record(nearest: SelfAffineFit | None) -> dict[str, float | None]:
+    """The parameters of a fit [m], as the columns FIT show them; empty without a fit."""
     if nearest is None:
-        return None, no_fit
-    areas = prod(scene.grid.sides) / prod(mirrored.grid.sides)
-    heights = moments(mirrored.shells).height / moments(scene.shells).height
-    return replace(nearest, c_0=nearest.c_0 * areas * heights**2), ""
+        return {}
+    keys = (key for column in FIT for key in (column.value, column.error) if key)
+    return {str(key): getattr(nearest, str(key)) for key in keys}
 
 
 UNITS = dict.fromkeys(("Sq", "Sa", "Sz", "Sal", "Pq", "Pa", "Pt", "Pal"), "m")
@@ -149,20 +147,18 @@ def summary_text(summary: SurfaceSummary) -> str:
     if grid.dimension == 2:
         lines.append(f"half-space: p* = 1 is p = {0.5 * measured.gradient:.5g} E_star")
     lines += [f"warning: {warning}" for warning in summary.surface.warnings()]
+    nearest = summary.spectrum.fit
     theories = {"spectrum": summary.scene}
-    if summary.spectrum.fit is not None:
-        table = _table(record, grid.length)
+    random: list[str] = []
+    if nearest is not None and nearest.scatter <= MAX_SCATTER:
+        table = _table(nearest, grid.length)
         model = SelfAffine.model_validate(table)
         theories["fit"] = build_scene(model, HalfSpace(), first_grid(model))
         random = ["random surface with the fitted spectrum:", "", "[surface]"]
         random += [f"{key} = {json.dumps(value)}" for key, value in table.items()]
-        lines += [
-            *_fit_lines(summary.spectrum.fit, metres),
-            *_predicted(theories, metres),
-            *random,
-        ]
-    elif grid.dimension == 2:
-        lines += [f"no fit: {summary.spectrum.no_fit}", *_predicted(theories, metres)]
+    if grid.dimension == 2:
+        fitted = _fit_lines(nearest, metres) if nearest else [f"no fit: {summary.spectrum.no_fit}"]
+        lines += [*fitted, *_predicted(theories, metres), *random]
     title = summary.surface.preparation() or summary.surface.label
     return "\n".join([title, *(f"  {line}".rstrip() for line in lines)])
 
@@ -190,14 +186,15 @@ def _fit_lines(nearest: SelfAffineFit, metres: str) -> list[str]:
         rolloff = f"lambda_r = {wavelength:.3g} +- {error:.1g}{metres}"
     lines = [
         f"fitted spectrum: H = {nearest.hurst:.3f} +- {nearest.hurst_error:.3f}, {rolloff}, "
-        f"lambda_s = {nearest.cutoff_wavelength:.3g}{metres} (scatter {nearest.scatter:.3g})"
+        f"lambda_s = {nearest.cutoff_wavelength:.3g}{metres}, rms height "
+        f"{nearest.rms_height:.4g}{metres} (scatter {nearest.scatter:.3g})"
     ]
     if nearest.scatter > MAX_SCATTER:
         lines.append(
-            "The scatter is far above 1: the surface is not self-affine; the surface below has the "
-            "same rms height and gradient only."
+            "The scatter is far above 1: the surface is not self-affine, and no random surface is "
+            "suggested."
         )
-    if not MIN_HURST <= nearest.hurst <= 1:
+    elif not MIN_HURST <= nearest.hurst <= 1:
         lines.append(
             f"The fit gives H = {nearest.hurst:.2g}, which is outside {MIN_HURST:g} to 1. The "
             "table below has the nearest possible exponent; its surface has another rms gradient."
@@ -205,14 +202,14 @@ def _fit_lines(nearest: SelfAffineFit, metres: str) -> list[str]:
     return lines
 
 
-def _table(record: dict[str, Any], length: float) -> dict[str, Any]:
+def _table(nearest: SelfAffineFit, length: float) -> dict[str, Any]:
     """The fit as a table [surface] of a run spec."""
-    rolloff = record["rolloff_wavelength"]
+    rolloff = nearest.rolloff_wavelength
     numbers = {
         "rolloff": rolloff / length if rolloff else 1.0,
-        "hurst": min(max(record["hurst"], MIN_HURST), 1.0),
-        "cutoff": record["cutoff_wavelength"] / length,
-        "h_std": record["h_std"],
+        "hurst": min(max(nearest.hurst, MIN_HURST), 1.0),
+        "cutoff": nearest.cutoff_wavelength / length,
+        "h_std": nearest.rms_height,
         "length": length,
     }
     rounded = {key: float(f"{value:.4g}") for key, value in numbers.items()}

@@ -172,12 +172,18 @@ def plain(value: Any) -> Any:
     return value if known(value) and not infinite else None
 
 
+SMALLEST_DECIMAL = 1e-4  # of a number with an error; smaller ones have a power of ten
+
+
 def plus_minus(value: float, error: float) -> str:
     """A value and its error, rounded to two digits of the error."""
     if not error > 0:
         return f"{value:.6g}"
-    digits = max(0, 1 - math.floor(math.log10(error))) if math.isfinite(error) else 3
-    return f"{value:.{min(digits, 12)}f} +- {error:.2g}"
+    digits = 1 - math.floor(math.log10(error)) if math.isfinite(error) else 3
+    if 0 < abs(value) < SMALLEST_DECIMAL:
+        digits += math.floor(math.log10(abs(value)))
+        return f"{value:.{min(max(digits, 0), 12)}e} +- {error:.2g}"
+    return f"{value:.{min(max(digits, 0), 12)}f} +- {error:.2g}"
 
 
 def ratio(value: str, reference: str) -> Callable[[Record], float]:

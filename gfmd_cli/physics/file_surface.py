@@ -251,6 +251,12 @@ class FileSurface(RigidSurface):
         same = {"interpolation": self.applied_interpolation()}
         return MirroredMap.model_construct(**dict(self) | same | {"edges": "mirror"})
 
+    def tapered_map(self) -> "FileSurface | None":
+        """The map with tapered edges, scaled to its own power; None where it is periodic."""
+        if self.edges != "mirror" and not self._is_reflected():
+            return None
+        return TaperedMap.model_construct(**dict(self) | {"edges": "window"})
+
     def void(self, grid: Grid) -> Mask | None:
         """Points of a grid nearest to a missing height of the map, if these never touch."""
         missing = self._topography().missing
@@ -340,6 +346,15 @@ class MirroredMap(FileSurface):
     """A map with borders, mirrored to find the heights between its points."""
 
     is_centred: ClassVar[bool] = True
+
+
+class TaperedMap(FileSurface):
+    """A map with borders and tapered edges, scaled such that a wave keeps its power."""
+
+    def heights_on(self, grid: Grid) -> Field:
+        """Heights [m] at the points of a grid, over the rms of the window."""
+        rms = np.sqrt(np.mean(window(grid.whole_shape, self.taper) ** 2))
+        return super().heights_on(grid) / rms
 
 
 @lru_cache(maxsize=16)

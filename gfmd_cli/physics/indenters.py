@@ -121,6 +121,10 @@ class RigidSurface(SpecTable):
         """A map that is not periodic, mirrored to twice its sides; None for other surfaces."""
         return None
 
+    def tapered_map(self) -> "RigidSurface | None":
+        """A map that is not periodic, tapered for its spectrum; None for other surfaces."""
+        return None
+
     def void(self, grid: Grid) -> Mask | None:
         """Points of a grid that never touch, as their height is unknown; None where all can."""
         return None

@@ -17,10 +17,12 @@ from gfmd_cli.physics.persson import Shells
 
 MIN_RANGE = 3.0  # smallest q_s / q_1 of a fit; a choice
 MIN_SHELLS = 8  # of a fit with two parameters; a choice
-MAX_ITERATIONS = 40  # of fit and cut-off; ten are usual
-HURST_BOUNDS = (0.0, 2.0)  # bounds of the fit: wider than those of a self-affine surface, 0 and 1
-STEEPEST = 0.99 * HURST_BOUNDS[1]  # from which the bound, not the spectrum, determines the fit
-NEGLIGIBLE_GRADIENT = 1e-4  # fraction of its square; a choice: 16 bits leave 1e-5 or less
+FIRST_SHARE = 0.9  # of the square of the rms gradient: waves of the first fit; a choice
+FIRST_RANGE = 8.0  # smallest q / q_1 at the end of the first fit; a choice
+BLUR = 3.0  # in q_1: a window blurs an abrupt cut-off; with 0, H = 0.3 becomes 0.43 (q_s = 128 q_1)
+START_HURST = 0.8
+HURST_BOUNDS = (-1.0, 2.0)  # bounds of the fit: wider than those of a self-affine surface, 0 and 1
+AT_BOUND = 0.02  # distance from a bound at which it, not the spectrum, determines the fit
 DIFFERENCE_STEP = 1e-4  # in H and ln q_r, for second differences: about eps^(1/4)
 ROUNDING_FACTOR = 1 - 1e-9  # factor by which sums may be too small due to rounding
 
@@ -41,8 +43,8 @@ class Moments:
 class SelfAffineFit:
     """Self-affine spectrum C = C_0 [1 + (q/q_r)^2]^(-1-H) up to q_s, fitted to a surface.
 
-    Paper Eq. (3). H and q_r maximise the likelihood below q_s; q_s is such that the fit has the
-    measured ratio of rms gradient to rms height, which determines the contact area at light load.
+    Paper Eq. (3). H, q_r and C_0 maximise the likelihood of the waves below q_s; q_s gives the fit
+    the rms gradient of the surface, which determines the contact area at light load.
     """
 
     hurst: float
@@ -62,6 +64,9 @@ class SelfAffineFit:
     """C at long wavelengths, or C of the longest wave if there is no roll-off [m^2]."""
     q_1: float
     """Wavenumber of the longest wave [1/m]."""
+    rms_height: float
+    """Rms height of the fit [m]; that of one surface scatters about it, the less the larger L q_r.
+    """
 
     @property
     def rolloff_wavelength(self) -> float | None:
@@ -101,50 +106,72 @@ def moments(shells: Shells) -> Moments:
 def fit(shells: Shells, complete: float = inf) -> SelfAffineFit:
     """Fit a self-affine spectrum to that of a surface in two dimensions.
 
-    The fit below q_s and the choice of q_s from the rms gradient alternate until q_s no longer
-    changes. The first fit leaves out the shortest waves if they contribute nearly nothing to the
-    rms gradient, as do those of rounded heights.
+    The first fit is to waves that have most of the square of the rms gradient. The cut-off q_s at
+    which a fit has all of it is the end of the next fit, from below: waves beyond the cut-off,
+    which have no power but rounding, noise or what a window adds, would make a fit too steep.
 
-    Raises InputError where the spectrum is too narrow for a fit, or decreases too fast.
+    Raises InputError where the spectrum is too narrow to determine a fit, or decreases too fast.
 
     Parameters
     ----------
     shells : the spectrum
     complete : wavenumber up to which the grid has the modes of all directions [1/m]
     """
-    q, count, power = shells.q, shells.modes, density(shells)
-    isotropic = _isotropic(q, count, complete)
-    gradients = np.cumsum(shells.height * q**2)
-    shell_count = int(np.searchsorted(gradients, (1 - NEGLIGIBLE_GRADIENT) * gradients[-1])) + 1
-    best = np.array([0.8, np.log(2 * q[0])])
-    for _ in range(MAX_ITERATIONS):
-        if shell_count < MIN_SHELLS or q[shell_count - 1] < MIN_RANGE * q[0]:
-            raise InputError(
-                f"spectrum: from q = {q[0]:.3g} to {q[shell_count - 1]:.3g} 1/m; too narrow for a "
-                "fit"
-            )
-        range_ = (q[:shell_count], count[:shell_count], power[:shell_count])
-        best = _maximise_likelihood(*range_, best)
-        before, shell_count = shell_count, _cut_off(shells, isotropic, best)
-        if shell_count == before:
+    q, square = shells.q, shells.height * shells.q**2
+    counts = _isotropic(q, shells.modes, complete)
+    first = np.searchsorted(np.cumsum(square), FIRST_SHARE * square.sum()) + 1
+    range_ = max(int(first), int(np.searchsorted(q, FIRST_RANGE * q[0])))
+    best: SelfAffineFit | None = None
+    while True:
+        nearest, cut_off = _fit_below(shells, range_, counts)
+        if best is not None and cut_off < range_:  # this fit has waves beyond the cut-off
             break
-    if best[0] > STEEPEST:
-        raise InputError(
-            "spectrum: decreases faster than that of a self-affine surface: smooth heights, or the "
-            "borders of a map that is not periodic hide its short waves"
-        )
-    errors, scatter = _errors(*range_, best)
+        best = nearest
+        if cut_off <= range_ + 1:
+            break
+        range_ = (range_ + cut_off + 1) // 2
+    if min(abs(best.hurst - bound) for bound in HURST_BOUNDS) < AT_BOUND:
+        raise InputError(f"{_range(q, range_)}: not self-affine there, H = {best.hurst:.2g}")
+    if not np.isfinite([best.hurst_error, best.q_r_error]).all():
+        raise InputError(f"{_range(q, range_)}: too narrow to determine H and q_r")
+    return best
+
+
+def _fit_below(shells: Shells, range_: int, counts: Field) -> tuple[SelfAffineFit, int]:
+    """The fit to the first `range_` shells but BLUR, and the number of shells up to its q_s.
+
+    `counts` are the numbers of modes of a surface whose spectrum depends on |q| alone.
+    """
+    q, power = shells.q, density(shells)
+    used = int(np.searchsorted(q, q[range_ - 1] - BLUR * q[0], side="right"))
+    if used < MIN_SHELLS or q[used - 1] < MIN_RANGE * q[0]:
+        raise InputError(f"{_range(q, range_)}: too narrow for a fit")
+    fitted = (q[:used], shells.modes[:used], power[:used])
+    best = _maximise_likelihood(*fitted, np.array([START_HURST, np.log(2 * q[0])]))
+    c_0 = _scale(best, *fitted)
+    squares = counts * c_0 * _shape(q, best, q[0])
+    gradients = np.cumsum(squares * q**2)
+    measured = moments(shells).gradient ** 2 * ROUNDING_FACTOR
+    cut_off = min(int(np.searchsorted(gradients, measured)) + 1, q.size)
+    errors, scatter = _errors(*fitted, best)
     q_r = float(np.exp(best[1])) if best.size == 2 else 0.0
-    return SelfAffineFit(
+    nearest = SelfAffineFit(
         hurst=float(best[0]),
         hurst_error=errors[0],
         q_r=q_r,
         q_r_error=q_r * errors[-1] if q_r else 0.0,
-        q_s=float(q[shell_count - 1]),
+        q_s=float(q[cut_off - 1]),
         scatter=scatter,
-        c_0=_scale(best, *range_),
+        c_0=c_0,
         q_1=float(q[0]),
+        rms_height=float(np.sqrt(squares[:cut_off].sum())),
     )
+    return nearest, cut_off
+
+
+def _range(q: Field, shells: int) -> str:
+    """The wavenumbers of the first shells, for messages."""
+    return f"spectrum: nearly all slopes are of q = {q[0]:.3g} to {q[shells - 1]:.3g} 1/m"
 
 
 def _shape(q: Field, x: Field, q_1: float) -> Field:
@@ -176,7 +203,7 @@ def _maximise_likelihood(q: Field, count: Field, power: Field, start: Field) -> 
         (q, count, power),
         method="Nelder-Mead",
         bounds=bounds,
-        options={"xatol": 1e-9, "fatol": 1e-9, "maxiter": 4000, "maxfev": 4000},
+        options={"xatol": 1e-8, "fatol": 1e-3, "maxiter": 4000, "maxfev": 4000},
     )
     if start.size == 2 and result.x[1] < np.log(q[0]):
         return _maximise_likelihood(q, count, power, result.x[:1])
@@ -217,15 +244,3 @@ def _isotropic(q: Field, count: Field, complete: float) -> Field:
     edges = np.concatenate([[0.0], 0.5 * (q[1:] + q[:-1]), [q[-1]]])
     rings, inside = np.diff(edges**2), ~beyond
     return np.where(beyond, rings * (count[inside].sum() / rings[inside].sum()), count)
-
-
-def _cut_off(shells: Shells, count: Field, best: Field) -> int:
-    """Number of shells with which the fit has the measured ratio of rms gradient to height.
-
-    `count` are the numbers of modes of a surface whose spectrum depends on |q| alone.
-    """
-    q, power = shells.q, count * _shape(shells.q, best, shells.q[0])
-    ratio = np.sqrt(np.cumsum(q**2 * power) / np.cumsum(power))
-    measured = moments(shells)
-    reached = np.searchsorted(ratio, measured.gradient / measured.height * ROUNDING_FACTOR) + 1
-    return int(np.clip(reached, 1, q.size))

@@ -4,13 +4,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from gfmd_cli.analysis.compare import Curve
 from gfmd_cli.analysis.curve_styles import MAX_STYLES, distinct_labels, distinct_styles, literal
 from gfmd_cli.analysis.plotting import ColumnFigure
 from gfmd_cli.analysis.surface_figure import height_figure, spectrum_labels
-from gfmd_cli.analysis.surface_spectrum import FIT, Spectrum, spectrum
+from gfmd_cli.analysis.surface_summary import FIT, fit_record
 from gfmd_cli.analysis.table import Group, Table, TableColumn, records_of
 from gfmd_cli.maps.pictures import Picture
-from gfmd_cli.physics.persson import Shells
+from gfmd_cli.physics.surface_spectrum import Spectrum, spectrum
 from gfmd_cli.report.data import ReportData
 from gfmd_cli.report.section import Drawing, Section
 from gfmd_cli.report.svg import drawing
@@ -55,62 +56,66 @@ def _drawings(row: Row, pictures: dict[str, Picture], place: str) -> list[Drawin
 
 def surface_spectrum(data: ReportData) -> Section:
     """C(q), double logarithmic."""
-    scenes: dict[tuple[str, str, float], tuple[Row, Shells]] = {}
+    scenes: dict[tuple[str, str, float], Curve] = {}
     for _, curve in data.curves:
         row = curve.rows[0]
         key = (curve.surface, row["preparation"], row["h_std"])  # of two studies the same once
-        scenes.setdefault(key, (row, curve.persson.shells))
-    spectra = [(row, _spectrum(row, shells)) for row, shells in scenes.values() if shells.q.size]
+        scenes.setdefault(key, curve)
+    rough = [curve for curve in scenes.values() if curve.persson.shells.q.size]
+    spectra = [(curve.rows[0], _spectrum(curve)) for curve in rough]
     spectra = [(row, each) for row, each in spectra if each.q.size]
     if not spectra:
         return Section("Surface spectrum")
     rows, drawn = zip(*spectra[:MAX_STYLES], strict=True)
-    names = [str(row["surface"]) for row in rows]
+    names, dimension = [str(row["surface"]) for row in rows], int(rows[0]["dimension"])
     label = f"Power spectral density of the surface over the wavenumber: {'; '.join(names)}"
     left_out = len(spectra) > MAX_STYLES
     more = f" The first {MAX_STYLES} of {len(spectra)} are shown." if left_out else ""
     fits = [
-        {"surface": name, "no_rolloff": "none within the cell", **each.fit_record}
+        {"surface": name, "no_rolloff": "none within the cell", **fit_record(each.fit)}
         for name, each in zip(names, drawn, strict=True)
         if each.fit is not None
     ]
+    figure = _spectrum_figure(names, drawn, dimension)
     return Section(
         "Surface spectrum",
         notes=[str(row["preparation"]) for row in rows if row["preparation"]],
-        drawings=[drawing(_spectrum_figure(names, drawn), "spectrum", label, CAPTION + more)],
+        drawings=[drawing(figure, "spectrum", label, CAPTION + more)],
         disclosed={
             "Self-affine fit": Table(FIT_CAPTION, FITS, [Group("", fits)]),
-            "Table behind the figure": _bands(names, drawn),
+            "Table behind the figure": _bands(names, drawn, dimension),
         },
     )
 
 
-def _spectrum(row: Row, shells: Shells) -> Spectrum:
-    """The spectrum of the surface of a row."""
+def _spectrum(curve: Curve) -> Spectrum:
+    """The spectrum of the surface of a curve."""
+    row = curve.rows[0]
     axes = slice(-row["dimension"], None)
     sides = (row["length_y"], row["length"])[axes]
     points = (row["points_y"], row["points"])[axes]
-    return spectrum(shells, sides, points)
+    return curve.map_spectrum or spectrum(curve.persson.shells, sides, points)
 
 
 CAPTION = (
     "Power spectral density of the surface, C(q) = A ⟨|h(q)|²⟩: the variance of the heights in a "
     "band of wavenumber over the number of its modes, times the area A of the cell (of a line its "
     "length), so that ⟨h²⟩ = ∫ C(q) d²q / (2π)². Waves shorter than two grid points along a side "
-    "are left out. Lines: the self-affine surface nearest to it."
+    "are left out. A map that is not periodic is tapered towards its borders. Lines: the "
+    "self-affine surface nearest to it."
 )
 FITS = (TableColumn("surface", "surface"), *FIT)
 FIT_CAPTION = (
     "Self-affine spectrum C ∝ [1 + (q / q_r)²]^(−1−H) up to q_s, zero above, with the Hurst "
     "exponent H, the roll-off lambda_r = 2π / q_r and the cut-off lambda_s = 2π / q_s. H and q_r "
-    "maximise the likelihood of the spectrum below q_s; q_s gives the fit the ratio of rms "
-    "gradient to rms height of the surface. Scatter: 1 for Gaussian roughness, 0 if only the "
+    "maximise the likelihood of the spectrum below q_s; q_s gives the fit the rms gradient of the "
+    "surface. Scatter: 1 for Gaussian roughness, 0 if only the "
     "phases are random, much larger if the spectrum of the surface has another shape."
 )
 
 
-def _spectrum_figure(names: list[str], shown: Sequence[Spectrum]) -> ColumnFigure:
-    plot = ColumnFigure(*spectrum_labels(shown[0]))
+def _spectrum_figure(names: list[str], shown: Sequence[Spectrum], dimension: int) -> ColumnFigure:
+    plot = ColumnFigure(*spectrum_labels(dimension))
     labels = [literal(name) for name in distinct_labels(names)]
     for curve, style in zip(shown, distinct_styles(labels), strict=True):
         if curve.fit is not None:
@@ -122,12 +127,12 @@ def _spectrum_figure(names: list[str], shown: Sequence[Spectrum]) -> ColumnFigur
     return plot
 
 
-def _bands(names: list[str], shown: Sequence[Spectrum]) -> Table:
+def _bands(names: list[str], shown: Sequence[Spectrum], dimension: int) -> Table:
     """The bands of wavenumber of each surface."""
     columns = (
         TableColumn("q", "q", unit="1/m"),
         TableColumn("wavelength", lambda record: 2 * np.pi / record["q"], unit="m"),
-        TableColumn("C(q)", "density", unit="m³" if shown[0].dimension == 1 else "m⁴"),
+        TableColumn("C(q)", "density", unit="m³" if dimension == 1 else "m⁴"),
         TableColumn("modes", "modes", ".0f"),
     )
     groups = [

@@ -169,6 +169,14 @@ SHELLS = (
     Column("gamma", "weight gamma of the elastic energy in Persson theory"),
     Column("modes", "number of modes in the shell"),
 )
+MAP_SPECTRUM = "map_spectrum"
+"""Group of a scene that holds the spectrum of a map with borders, and its self-affine fit."""
+BANDS = (
+    Column("q", "mean wavenumber of the band", "m-1"),
+    Column("density", "C(q) of the map with tapered edges", "m4"),
+    Column("modes", "number of modes in the band"),
+    Column("fitted", "C(q) of the self-affine fit, zero without a fit", "m4"),
+)
 PICTURES = "pictures"
 """Group of a scene that holds pictures of a measured surface, and the sides of each [m]."""
 FIELDS = (

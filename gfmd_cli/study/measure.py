@@ -6,6 +6,7 @@ of a solved contact, `task_row` both, and `result` everything.
 
 from collections.abc import Callable, Mapping
 from dataclasses import asdict
+from functools import lru_cache
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from gfmd_cli.grid.arrays import Field
 from gfmd_cli.maps.map_preparation import mirror
 from gfmd_cli.physics.approach import approach
 from gfmd_cli.physics.free_contact import doubled_grid
+from gfmd_cli.physics.indenters import RigidSurface
 from gfmd_cli.physics.observables import (
     contact_pressure,
     edge_fractions,
@@ -21,6 +23,7 @@ from gfmd_cli.physics.observables import (
 )
 from gfmd_cli.physics.patches import area_distribution
 from gfmd_cli.physics.power_spectra import autocorrelations, spectra
+from gfmd_cli.physics.surface_spectrum import Spectrum, map_spectrum
 from gfmd_cli.spec.models import SWEPT, OutputTable
 from gfmd_cli.study.column import Row
 from gfmd_cli.study.columns import PARAMETERS, PR_LINEAR, PR_LOGARITHMIC, empty_row
@@ -144,7 +147,14 @@ def result(task: Task, solved: TaskSolution, seconds: float) -> TaskResult:
             name: scene.grid.diagonal(field()) for name, field in physical.items()
         }
     entry = Entry(task.id, task.scene_id, output.names(), row)
-    return TaskResult(entry, scene.shells, arrays, task.surface.pictures())
+    spectrum = _map_spectrum(task.surface, task.surface_sha256)
+    return TaskResult(entry, scene.shells, arrays, task.surface.pictures(), spectrum)
+
+
+@lru_cache(maxsize=4)
+def _map_spectrum(surface: RigidSurface, sha256: str) -> Spectrum | None:
+    """As `map_spectrum`; cached, because all contacts of a scene have the same."""
+    return map_spectrum(surface)
 
 
 def on_request(output: OutputTable, solved: SolvedContact) -> Row:

@@ -15,6 +15,8 @@ from gfmd_cli.files.hdf5 import find, has, open_hdf5, read_dataset, take
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.maps.pictures import Picture
 from gfmd_cli.physics.persson import Shells
+from gfmd_cli.physics.spectrum_fit import SelfAffineFit
+from gfmd_cli.physics.surface_spectrum import Spectrum
 from gfmd_cli.status import Status
 from gfmd_cli.study import columns as layout
 from gfmd_cli.study.column import Column
@@ -140,6 +142,17 @@ class StudyFile:
         _check_alike(place, arrays, 1)
         return Shells(**arrays)
 
+    def map_spectrum(self, scene: int) -> Spectrum | None:
+        """The spectrum of a map with borders, None of any other surface."""
+        place = f"scenes/{scene}/{layout.MAP_SPECTRUM}"
+        group = find(self._file, place)
+        if group is None:
+            return None
+        arrays = {column.name: read_dataset(group, column.name) for column in layout.BANDS}
+        _check_alike(place, arrays, 1)
+        numbers = read_dataset(group, "fit").tolist()
+        return Spectrum(**arrays, fit=SelfAffineFit(*numbers) if numbers else None)
+
     def pictures(self, scene: int) -> dict[str, Picture]:
         """The pictures of a measured surface, none of any other."""
         group = find(self._file, f"scenes/{scene}/{layout.PICTURES}")
@@ -180,12 +193,14 @@ class StudyFile:
         """All that is stored of one task."""
         scene = self.rows[task]["scene"]
         arrays = {group.name: self.arrays(group.name, task) for group in layout.TASK_GROUPS}
-        return TaskResult(self.entry(task), self.shells(scene), arrays, self.pictures(scene))
+        of_scene = self.pictures(scene), self.map_spectrum(scene)
+        return TaskResult(self.entry(task), self.shells(scene), arrays, *of_scene)
 
     def check(self, task: int) -> None:
         """Raise where `result` would, for all but the values of the arrays."""
         self.shells(self.rows[task]["scene"])
         self.pictures(self.rows[task]["scene"])
+        self.map_spectrum(self.rows[task]["scene"])
         for group in layout.TASK_GROUPS:
             self._datasets(group.name, task)
 

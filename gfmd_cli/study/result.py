@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.maps.pictures import Picture
 from gfmd_cli.physics.persson import Shells
+from gfmd_cli.physics.surface_spectrum import Spectrum
 from gfmd_cli.status import Status
 
 
@@ -45,3 +46,5 @@ class TaskResult:
     """Arrays by group (`TASK_GROUPS`) and name."""
     pictures: Mapping[str, Picture] = field(default_factory=dict)
     """Pictures of a measured surface, as "measured" and as "prepared"."""
+    map_spectrum: Spectrum | None = None
+    """Spectrum of a map with borders, None of any other surface."""

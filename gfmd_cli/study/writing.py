@@ -5,6 +5,7 @@ chunk has a checksum.
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import astuple
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -117,6 +118,13 @@ class _Writer(NamedTuple):
             shell = self.scale(group, "shell", np.arange(result.shells.q.size), "1", "shell")
             for column in layout.SHELLS:
                 self.column(group, column, getattr(result.shells, column.name), [shell])
+            if result.map_spectrum:
+                bands = group.create_group(layout.MAP_SPECTRUM)
+                band = self.scale(bands, "band", np.arange(result.map_spectrum.q.size), "1", "band")
+                for column in layout.BANDS:
+                    self.column(bands, column, getattr(result.map_spectrum, column.name), [band])
+                fit = result.map_spectrum.fit
+                write_checked(bands, "fit", np.array(astuple(fit) if fit else []))
             for name, picture in result.pictures.items():
                 shown = group.require_group(layout.PICTURES)
                 write_checked(shown, name, picture.heights.astype(np.float32))

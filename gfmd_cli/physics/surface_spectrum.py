@@ -5,20 +5,15 @@ from math import pi, prod
 
 import numpy as np
 
-from gfmd_cli.analysis.table import TableColumn
 from gfmd_cli.errors import InputError
 from gfmd_cli.grid.arrays import Field
+from gfmd_cli.physics.contact import build_scene
+from gfmd_cli.physics.elastomers import HalfSpace
+from gfmd_cli.physics.indenters import RigidSurface
 from gfmd_cli.physics.persson import Shells
 from gfmd_cli.physics.spectrum_fit import SelfAffineFit, fit
 
 BANDS_PER_DECADE = 10  # a choice
-FIT = (
-    TableColumn("H", "hurst", ".2f", error="hurst_error", optional=True),
-    TableColumn("lambda_r", "rolloff_wavelength", ".3g", "m", "rolloff_error", "no_rolloff", True),
-    TableColumn("lambda_s", "cutoff_wavelength", ".3g", "m", optional=True),
-    TableColumn("scatter", "scatter", ".3g", optional=True),
-)
-"""Columns of the fit, with the keys of `Spectrum.fit_record`."""
 
 
 @dataclass(frozen=True)
@@ -28,47 +23,21 @@ class Spectrum:
     In a line contact, the length of the cell takes the place of its area A.
     """
 
-    dimension: int
     q: Field
     """Mean wavenumber of each band, weighted by |h(q)|^2 [1/m]."""
     density: Field
     """C(q) [m^4], of a line contact [m^3]."""
     modes: Field
     """Number of modes of each band."""
-    fit: SelfAffineFit | None
-    """The nearest self-affine surface; None where there is none."""
-    no_fit: str
-    """Why there is none."""
     fitted: Field
     """C(q) of the fit in the bands, zero beyond its cut-off and without a fit."""
-
-    @property
-    def fit_record(self) -> dict[str, float | None]:
-        """The parameters of the fit [m], as the columns FIT show them; empty without a fit."""
-        if self.fit is None:
-            return {}
-        keys = (key for column in FIT for key in (column.value, column.error) if key)
-        return {str(key): getattr(self.fit, str(key)) for key in keys}
+    fit: SelfAffineFit | None
+    """The nearest self-affine surface; None where there is none."""
+    no_fit: str = ""
+    """Why there is none, where that is known."""
 
 
-def nearest_fit(
-    shells: Shells, sides: tuple[float, ...], points: tuple[int, ...]
-) -> tuple[SelfAffineFit | None, str]:
-    """The nearest self-affine surface, or None and why there is none; arguments of `spectrum`."""
-    if len(sides) == 1:
-        return None, "a line has no fit"
-    try:
-        return fit(shells, _nyquist(sides, points)), ""
-    except InputError as error:
-        return None, str(error)
-
-
-def spectrum(
-    shells: Shells,
-    sides: tuple[float, ...],
-    points: tuple[int, ...],
-    best: tuple[SelfAffineFit | None, str] | None = None,
-) -> Spectrum:
+def spectrum(shells: Shells, sides: tuple[float, ...], points: tuple[int, ...]) -> Spectrum:
     """The spectrum of a surface from the sums over its shells.
 
     Waves shorter than two grid points along a side are left out.
@@ -76,10 +45,14 @@ def spectrum(
     Parameters
     ----------
     sides, points : of the cell and of its grid, along y and x or along x alone
-    best : what `nearest_fit` returns; by default for the same shells
     """
     nyquist = _nyquist(sides, points)
-    nearest, no_fit = nearest_fit(shells, sides, points) if best is None else best
+    nearest, no_fit = None, "a line has no fit"
+    if len(sides) == 2:
+        try:
+            nearest, no_fit = fit(shells, nyquist), ""
+        except InputError as error:
+            no_fit = str(error)
     edges = _edges(shells.q, nyquist)
     place = np.searchsorted(edges, shells.q) - 1
     inside = (place >= 0) & (place < edges.size - 1)
@@ -90,8 +63,20 @@ def spectrum(
     )
     usable = total > 0
     total, moment, modes, fitted = (x[usable] for x in (total, moment, modes, fitted))
-    per_mode, q = prod(sides) / modes, moment / total
-    return Spectrum(len(sides), q, total * per_mode, modes, nearest, no_fit, fitted * per_mode)
+    per_mode = prod(sides) / modes
+    return Spectrum(moment / total, total * per_mode, modes, fitted * per_mode, nearest, no_fit)
+
+
+def map_spectrum(surface: RigidSurface) -> Spectrum | None:
+    """The spectrum of a map with borders, tapered towards them; None for any other surface.
+
+    A mirrored map has kinks, whose spectrum hides that of short waves.
+    """
+    tapered = surface.tapered_map()
+    if tapered is None:
+        return None
+    scene = build_scene(tapered, HalfSpace(), tapered.smallest_grid())
+    return spectrum(scene.shells, scene.grid.sides, scene.grid.whole_shape)
 
 
 def _nyquist(sides: tuple[float, ...], points: tuple[int, ...]) -> float:

@@ -1,0 +1,71 @@
+"""Self-affine fits of scans with borders: parts of Gaussian rough surfaces with a known spectrum.
+
+Prints docs/scans.md's table: mean and standard deviation over seeds of H, lambda_s, lambda_r and
+the rms height of the fit, the last three relative to those of the whole surface, and the median of
+the standard errors of H that the fits state.
+"""
+
+import argparse
+from itertools import product
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from gfmd_cli.physics.file_surface import FileSurface
+from gfmd_cli.physics.surface_spectrum import map_spectrum
+
+POINTS = 512  # of a scan; the surface has twice as many along each side
+COLUMNS = ("L / lambda_r", "pixels", "H", "fit", "error", "lambda_s", "lambda_r", "rms", "scatter")
+
+
+def gaussian_roughness(seed: int, hurst: float, mode_r: float, mode_s: float) -> np.ndarray:
+    """White noise, filtered to C = [1 + (m / m_r)^2]^(-1-H) for modes m up to m_s."""
+    points = 2 * POINTS
+    noise = np.fft.rfft2(np.random.default_rng(seed).standard_normal((points, points)))
+    m = np.hypot(np.fft.fftfreq(points, 1 / points)[:, None], np.arange(points // 2 + 1))
+    noise *= np.where(m <= mode_s, (1 + (m / mode_r) ** 2) ** (-0.5 * (1 + hurst)), 0)
+    noise[0, 0] = 0
+    return np.fft.irfft2(noise)
+
+
+def fits(folder: Path, seeds: range, hurst: float, rolloff: float, pixels: float) -> list[str]:
+    """The cells of one row."""
+    values, failed = [], 0
+    for seed in seeds:
+        heights = gaussian_roughness(seed, hurst, 2 * rolloff, 2 * POINTS / pixels)
+        path = folder / f"{seed}-{hurst}-{rolloff}-{pixels}.npy"
+        np.save(path, heights[:POINTS, :POINTS])
+        fit = map_spectrum(FileSurface(path=path, periodic=False)).fit
+        path.unlink()
+        if fit is None:
+            failed += 1
+            continue
+        cutoff, wavelength = pixels / POINTS, fit.rolloff_wavelength or np.nan
+        relative = fit.cutoff_wavelength / cutoff, wavelength * rolloff
+        values.append((fit.hurst, *relative, fit.rms_height / heights.std(), fit.scatter,
+                       fit.hurst_error))  # fmt: skip
+    if not values:
+        return ["no fit"]
+    mean, deviation = np.nanmean(values, 0), np.nanstd(values, 0)
+    h, s, r, rms, scatter, _ = (f"{m:.3f} ± {d:.3f}" for m, d in zip(mean, deviation, strict=True))
+    note = [f"{failed} without fit"] if failed else []
+    return [h, f"{np.median(values, 0)[-1]:.3f}", s, r, rms, scatter.partition(" ")[0], *note]
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seeds", type=int, default=10)
+    parser.add_argument("--hurst", type=float, nargs="+", default=[0.3, 0.8, 1.0])
+    parser.add_argument("--rolloffs", type=float, nargs="+", default=[20.0, 5.0, 2.0])
+    parser.add_argument("--pixels", type=float, nargs="+", default=[2.0, 4.0, 8.0, 16.0])
+    options = parser.parse_args()
+    print(*COLUMNS, sep=" | ")
+    with TemporaryDirectory() as folder:
+        for rolloff, pixels, hurst in product(options.rolloffs, options.pixels, options.hurst):
+            cells = fits(Path(folder), range(options.seeds), hurst, rolloff, pixels)
+            print(f"{rolloff:g}", f"{pixels:g}", f"{hurst:g}", *cells, sep=" | ", flush=True)
+
+
+if __name__ == "__main__":
+    main()
