@@ -322,6 +322,15 @@ def test_seeds_have_a_mean_and_a_confidence_interval(rows_of, tmp_path, output_o
     assert records[0]["u_g_mean"] == pytest.approx(np.mean(values))
 
 
+def test_seeds_are_not_averaged_where_some_have_a_continuum_value_only():
+    rows = [
+        {"u_g": 1.0, "u_g_error": 0.1, "u_g_verdict": "unknown"},
+        {"u_g": 2.0, "u_g_continuum": 1.8, "u_g_continuum_error": 0.1, "u_g_verdict": "regular"},
+    ]
+    assert np.isnan(Ensemble(rows).spread("u_g").mean)
+    assert Ensemble([rows[1]] * 2).spread("u_g").mean == pytest.approx(1.8)
+
+
 def test_seeds_with_grids_of_their_own_on_an_oblong_cell_are_averaged(rows_of, tmp_path):
     keys = ("surface.seed=[0, 1]", "surface.length_y=0.5", "accuracy={mean_gap=0.01}")
     rows = rows_of(*keys, "surface.cutoff=0.2")

@@ -331,6 +331,18 @@ def test_a_changed_attribute_of_a_study_is_found_out(run):
         read_rows(path)
 
 
+def test_p_star_of_a_single_indenter_on_several_grids_is_warned_of(run):
+    """Delta_sigma of a paraboloid rises with the number of points for n > 1."""
+    spec = power_spec(n=3, points=[16, 32], p_star=0.003)
+    parabola = "surface={kind='parabola'}"
+    path, events, _ = run(spec, overrides=(parabola,))
+    assert "p* is another pressure on every grid" in "".join(e.message for e in events)
+    assert len({row["pressure"] for row in read_rows(path)}) == 2
+    for name, overrides in {"one": ("grid.points=16",), "pressure": ("load={pressure=1}",)}.items():
+        _, events, _ = run(spec, f"{name}.h5", (parabola, *overrides))
+        assert "p* is" not in "".join(e.message for e in events)
+
+
 def test_a_damaged_record_is_said_in_one_line(run, tmp_path):
     (tmp_path / "study.parts").mkdir()
     (tmp_path / "study.parts" / "0000.record").write_bytes(b"nothing")

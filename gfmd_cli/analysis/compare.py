@@ -43,8 +43,14 @@ def best(row: Row, name: str) -> tuple[float, float]:
 
 
 def best_of_all(rows: Sequence[Row], name: str) -> list[tuple[float, float]]:
-    """The same of rows that are averaged: of the continuum only where that is known of all."""
-    value = f"{name}_continuum" if all(in_continuum(row, name) for row in rows) else name
+    """The same of rows that are averaged: of the continuum, NaN where that is known of some only.
+
+    On the grid where no row was to have a continuum value.
+    """
+    known = all(in_continuum(row, name) for row in rows)
+    if len(rows) > 1 and not known and any(row.get(f"{name}_verdict") for row in rows):
+        return [(np.nan, np.nan)] * len(rows)
+    value = f"{name}_continuum" if known else name
     return [(float(row[value]), float(row[f"{value}_error"])) for row in rows]
 
 

@@ -59,7 +59,7 @@ class Ensemble:
         return ", ".join(f"{number} {status}" for status, number in counts.items()) or None
 
     def spread(self, name: str) -> Spread:
-        """Of "a_r", "sigma_p" or "u_g": of the continuum values where all rows have one."""
+        """Of "a_r", "sigma_p" or "u_g": see `best_of_all`."""
         return spread_of([value for value, _ in best_of_all(self.rows, name)])
 
     def means(self) -> dict[str, Any]:

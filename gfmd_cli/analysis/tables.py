@@ -246,7 +246,10 @@ def seeds_table(comparison: Comparison) -> Table:
         )
         for title, ensemble in zip(titles, means, strict=True)
     )
-    caption = "Means over seeds, +- half the width of the 95 % confidence interval (Student's t)."
+    caption = (
+        "Means over seeds, +- half the width of the 95 % confidence interval (Student's t): of "
+        "values in the continuum where [accuracy] asked for them, else on the grid."
+    )
     return Table(caption, SEEDS, groups)
 
 

@@ -6,6 +6,8 @@ u = C sigma + c. For a periodic one the mean displacement under the mean pressur
 <u> - c = p / k(0), with the stiffness k(0) against a uniform displacement.
 """
 
+from collections.abc import Callable
+
 import numpy as np
 
 from gfmd_cli.grid.arrays import Field
@@ -17,9 +19,17 @@ ESTIMATE_PRESSURES = (1e-8, 1e4, 121)  # reduced pressures of the estimate: from
 
 
 def approach(
-    scene: Scene, elastomer: LinearElastomer, contact: Contact, u: Field, sigma: Field
+    scene: Scene,
+    peak: Callable[[], float | None],
+    elastomer: LinearElastomer,
+    contact: Contact,
+    u: Field,
+    sigma: Field,
 ) -> float:
-    """Displacement of the indenter from first touch [m] at a solution; NaN where c is undefined."""
+    """Displacement of the indenter from first touch [m] at a solution; NaN where c is undefined.
+
+    `peak` gives max h [m], or None for the largest height on the grid.
+    """
     if not elastomer.has_level(contact.boundary, scene.grid.dimension):
         return np.nan
     level = contact.reference_level(u, sigma)
@@ -27,10 +37,18 @@ def approach(
         assert elastomer.uniform_stiffness is not None
         uniform = elastomer.uniform_stiffness * scene.h_std / scene.delta_sigma
         level -= contact.pressure / uniform
-    return (scene.highest - level) * scene.h_std
+    return _highest(scene, peak()) - level * scene.h_std
 
 
-def estimated_pressures(scene: Scene, elastomer: LinearElastomer, displacements: Field) -> Field:
+def _highest(scene: Scene, peak: float | None) -> float:
+    """max h above <h> [m]."""
+    on_grid = scene.highest * scene.h_std
+    return on_grid if peak is None else max(on_grid, peak - scene.mean_height)
+
+
+def estimated_pressures(
+    scene: Scene, peak: float | None, elastomer: LinearElastomer, displacements: Field
+) -> Field:
     """Pressures [Pa] of some displacements [m], from the mean gap of Persson theory.
 
     d = max h - <u> + p / k(0). Without k(0), the stiffness at q = 2 / side takes its place: for a
@@ -43,5 +61,5 @@ def estimated_pressures(scene: Scene, elastomer: LinearElastomer, displacements:
         elastomer.stiffness(softest, scene.grid.length)[0]
     )
     gap = Persson(scene.shells).mean_gap(pressure)
-    depth = scene.highest * scene.h_std - gap + pressure / uniform
+    depth = _highest(scene, peak) - gap + pressure / uniform
     return np.exp(np.interp(displacements, depth, np.log(pressure)))

@@ -30,6 +30,7 @@ from gfmd_cli.maps.map_preparation import (
 )
 from gfmd_cli.maps.pictures import Picture, picture
 from gfmd_cli.maps.topography import Region, Topography, read_topography
+from gfmd_cli.physics.highest_point import highest_point
 from gfmd_cli.physics.indenters import SMALLEST_GRID, RigidSurface
 from gfmd_cli.spec_table import FilePath, Positive
 from gfmd_cli.units import count
@@ -251,6 +252,14 @@ class FileSurface(RigidSurface):
         same = {"interpolation": self.applied_interpolation()}
         return MirroredMap.model_construct(**dict(self) | same | {"edges": "mirror"})
 
+    def peak(self) -> float | None:
+        """Height of the highest point [m]: of the map, or of the Fourier series through it."""
+        if self.missing == "void" and self._topography().holes:
+            return None
+        if self._is_reflected() or not self.band_limited:
+            return float(_prepared(self).max())
+        return _peak(self)
+
     def tapered_map(self) -> "FileSurface | None":
         """The map with tapered edges, scaled to its own power; None where it is periodic."""
         if self.edges != "mirror" and not self._is_reflected():
@@ -386,6 +395,12 @@ def _prepared(surface: FileSurface) -> Field:
 
 
 @lru_cache(maxsize=16)
+def _peak(surface: FileSurface) -> float:
+    """Highest point of a Fourier series [m]; cached likewise."""
+    return highest_point(_prepared(surface))
+
+
+@lru_cache(maxsize=16)
 def _smallest_grid(surface: FileSurface) -> int:
     """See `FileSurface.smallest_grid`; cached, because every scene asks for it several times."""
     heights, topography = _prepared(surface), surface._topography()
@@ -417,5 +432,7 @@ def _warnings_on_heights(surface: FileSurface) -> tuple[str, ...]:
 
 def forget_files() -> None:
     """Drop the maps that were read, so that a file that has changed is read again."""
-    for cached in (_read, _prepared, _smallest_grid, _suited_interpolation, _warnings_on_heights):
+    for cached in (
+        _read, _prepared, _peak, _smallest_grid, _suited_interpolation, _warnings_on_heights,
+    ):  # fmt: skip
         cached.cache_clear()

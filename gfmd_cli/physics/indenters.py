@@ -5,6 +5,7 @@ middle of the periodic cell. Equation numbers are those of Mueser, "Elastic cont
 rough surfaces across the spatial dimensions".
 """
 
+from functools import lru_cache
 from math import ceil
 from typing import Annotated, ClassVar, Literal, Self
 
@@ -15,6 +16,7 @@ from pydantic import model_validator
 from gfmd_cli.grid.arrays import Field, Mask, MaskedField
 from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.maps.pictures import Picture
+from gfmd_cli.physics.highest_point import highest_point
 from gfmd_cli.spec_table import Positive, SpecTable
 
 SMALLEST_GRID = 8  # points along an axis; a choice: smaller grids resolve no contact
@@ -121,6 +123,10 @@ class RigidSurface(SpecTable):
         """A map that is not periodic, mirrored to twice its sides; None for other surfaces."""
         return None
 
+    def peak(self) -> float | None:
+        """Height of the highest point [m], between grid points too; None where it is unknown."""
+        return _highest_point(self, 2 * self.smallest_grid()) if self.band_limited else None
+
     def tapered_map(self) -> "RigidSurface | None":
         """A map that is not periodic, tapered for its spectrum; None for other surfaces."""
         return None
@@ -136,6 +142,12 @@ class RigidSurface(SpecTable):
     def warnings(self, boundary: str = "periodic") -> list[str]:
         """Warnings about values that are probably mistakes of the user, for `grid.boundary`."""
         return []
+
+
+@lru_cache(maxsize=16)
+def _highest_point(surface: RigidSurface, points: int) -> float:
+    """Cached: all contacts of a surface have the same."""
+    return highest_point(surface.heights(points))
 
 
 class SingleIndenter(RigidSurface):
@@ -160,6 +172,10 @@ class SingleIndenter(RigidSurface):
             return self._profile(np.abs(x))
         y = (np.arange(grid.points_y) / grid.points_y + self.x_first) * grid.length_y
         return self._profile(np.hypot(y[grid.own, None], x))
+
+    def peak(self) -> float:
+        """Height of the crest [m]."""
+        return float(self._profile(np.zeros(1))[0])
 
     def _profile(self, r: Field) -> Field:
         """Heights [m] at distances r >= 0 from the middle of the cell [m]."""

@@ -158,7 +158,7 @@ def _guess(task: Task, scene: Scene) -> tuple[float, float]:
 def _pressures(task: Task, scene: Scene, loads: Field) -> Field:
     """The pressures [Pa] of some loads in Persson theory."""
     if task.quantity == "displacement":
-        return estimated_pressures(scene, task.elastomer, loads)
+        return estimated_pressures(scene, task.surface.peak(), task.elastomer, loads)
     theory = Persson(scene.shells)
     if task.quantity == "contact_area":
         return theory.pressure_at_area(loads)

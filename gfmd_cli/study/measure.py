@@ -80,7 +80,7 @@ def measured(task: Task, solved: TaskSolution) -> Row:
         "mean_height": scene.mean_height,
         "length": scene.grid.length,
         "mean_gap": solved.observables.u_g * scene.h_std,
-        "displacement": approach(scene, task.elastomer, contact, u, sigma),
+        "displacement": approach(scene, task.surface.peak, task.elastomer, contact, u, sigma),
         "steps": solution.steps,
         "tolerance": task.solver.tolerance,
         **error_columns(solved),

@@ -129,14 +129,11 @@ def _solve_on_grid(
 
 def _check_unit(task: Task) -> None:
     """The unit of p_star must not change from grid to grid where several are compared."""
-    surface = task.surface
-    fixed = surface.band_limited and (task.boundary == "periodic" or surface.mirrored() is not None)
-    if task.accuracy is None or task.quantity != "p_star" or fixed:
-        return
-    raise InputError(
-        f"load.p_star: Delta_sigma of this surface ({surface.kind}) depends on the grid; with "
-        "[accuracy] give load.pressure"
-    )
+    if task.accuracy is not None and not task.has_fixed_unit:
+        raise InputError(
+            f"load.p_star: Delta_sigma of this surface ({task.surface.kind}) depends on the grid; "
+            "with [accuracy] give load.pressure"
+        )
 
 
 def _ended_grids(task: Task, grids: list[SolvedGrid]) -> list[SolvedGrid]:

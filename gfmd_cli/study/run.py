@@ -111,7 +111,7 @@ def run_study(
     context = SolveContext(worker_options, watch, stop, ranks)
     with signal_handlers(stop), _folder(study, tasks, ranks) as damaged:
         unusable = plans.plan_with(study.parts, estimated=options.reproducible)
-        context.warn(*moved, *damaged, *filter(None, [unusable]))
+        context.warn(*moved, *damaged, *filter(None, [unusable, _changing_unit(pending)]))
         try:
             solved = _solve_all(pending, study.parts, jobs, context)
         finally:
@@ -124,6 +124,17 @@ def run_study(
         if not any(status.is_failure for status in solved):
             _check_output(pending, broadcast(ranks, study.outcomes()))
     return counts + solved
+
+
+def _changing_unit(tasks: list[Task]) -> str:
+    """A warning about a p* that is another pressure on every grid; "" where there is none."""
+    changing = [task for task in tasks if not task.has_fixed_unit]
+    if len({task.points for task in changing}) < 2:
+        return ""
+    return (
+        f"load.p_star: Delta_sigma of the surface ({changing[0].surface.kind}) depends on the "
+        "grid, so that p* is another pressure on every grid; give load.pressure to compare grids"
+    )
 
 
 def _until(end: float, stop: Event, report: Report) -> Report:

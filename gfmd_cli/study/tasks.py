@@ -62,6 +62,14 @@ class Task:
         return self.grid.boundary or "periodic"
 
     @property
+    def has_fixed_unit(self) -> bool:
+        """Whether the load is the same pressure on all grids: Delta_sigma may depend on them."""
+        is_fixed = self.surface.band_limited and (
+            self.boundary == "periodic" or self.surface.mirrored() is not None
+        )
+        return is_fixed or self.quantity != "p_star"
+
+    @property
     def label(self) -> str:
         """The task in messages and progress: elastomer, swept keys, points and load."""
         points = "auto" if self.auto else str(self.points)
