@@ -121,7 +121,11 @@ def read_hdf5(path: Path, dataset: str | None) -> HeightMap:
                 missing = missing.astype(values.dtype)
             values = np.ma.masked_where(np.isin(values, missing), values)
         bare = HeightMap(values, source=f"HDF5, {name}, {data.dtype}")
-        return bare if "spec_text" in file.attrs else _with_coordinates(path, file, data, bare)
+        height_map = _with_coordinates(path, file, data, bare)
+        if "spec_text" in file.attrs and name.startswith("fields/"):  # a study
+            boundary = take(file, "boundary")[int(name.split("/")[1])]
+            return replace(height_map, periodic=boundary != b"free")
+        return height_map
 
 
 def _map_shape(shape: tuple[int, ...]) -> tuple[int, ...]:
