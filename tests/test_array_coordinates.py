@@ -98,7 +98,7 @@ def test_units_in_words(array, unit):
 
 @pytest.mark.parametrize("name", ["x", "height"])
 def test_an_unknown_unit_is_refused_by_its_name(array, name):
-    with pytest.raises(InputError, match=rf"{name}' has the unit 'furlong'"):
+    with pytest.raises(InputError, match=rf"{name}' states the unit 'furlong'"):
         read_topography(array(units=UNITS | {name: "furlong"}))
 
 

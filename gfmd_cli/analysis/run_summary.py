@@ -70,9 +70,7 @@ def _contacts_of(tasks: Sequence[Task]) -> list[str]:
     ]
     tell_files_apart(rows)
     swept = [[word for table, word in task.swept if table != "surface"] for task in tasks]
-    return [
-        ", ".join([contact_title(row), *words]) for row, words in zip(rows, swept, strict=True)
-    ]
+    return [", ".join([contact_title(row), *words]) for row, words in zip(rows, swept, strict=True)]
 
 
 def run_text(rows: list[dict[str, Any]]) -> str:

@@ -287,13 +287,13 @@ class FileSurface(RigidSurface):
                 "the file does not state its side in metres; L = 1 m is assumed: set surface.length"
             )
         stated = self.stated_sides()
-        if self.length is not None and stated is not None and topography.metres:
-            warnings.append(map_warnings.other_side(self.length, stated[-1]))
-        if self.length is not None and stated is None:
-            warnings.append(map_warnings.side_of_a_part(self.length, topography))
         if self.length is None:
             side = self._known_length() or 1.0
             warnings.append(map_warnings.unknown_unit(topography, self.scale, side))
+        elif stated is not None and topography.metres:
+            warnings.append(map_warnings.other_side(self.length, stated[-1]))
+        else:
+            warnings.append(map_warnings.side_of_a_part(self.length, topography))
         warnings.append(map_warnings.unit_of_heights(topography, self.scale))
         if "taper" in self.model_fields_set and self.edges != "window":
             warnings.append('surface.taper has no effect without surface.edges = "window"')
