@@ -281,18 +281,26 @@ def _check_all_rows_read(path: Path, file: BinaryIO, rows: int, columns: int) ->
         raise InputError(
             f"{path}:{number}: an empty line in the table: several maps? Save each in its own file"
         )
+    is_one_map = lengths.count(columns) <= rows
     file.seek(0)
-    is_below = False  # the first row
+    rows_above = 0
     for number, line in enumerate(file, 1):
         words = line.split()
         marks = [word for word in words if not (is_number(word) or word.lower() in MISSING)]
-        is_below |= not marks and len(words) == columns
-        if not marks or len(words) < (columns / 2 if is_below else columns):
+        if not marks:
+            rows_above += len(words) == columns
             continue
-        if len(marks) <= len(words) / 2 or (len(words) == columns and len(set(marks)) == 1):
+        if len(words) >= (columns / 2 if rows_above else columns) and (
+            len(marks) <= len(words) / 2 or (len(words) == columns and len(set(marks)) == 1)
+        ):
             raise InputError(
                 f"{path}:{number}: {marks[0].decode(errors='replace')!r} in a row of the table "
                 "is not a number; write NaN for a missing height"
+            )
+        if is_one_map and 0 < rows_above < rows:
+            raise InputError(
+                f"{path}:{number}: words between two rows of the table: several maps? Save each in "
+                "its own file"
             )
 
 

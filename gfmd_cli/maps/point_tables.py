@@ -89,7 +89,7 @@ def _numbers(path: Path, lines: list[bytes], first: int, count: int) -> Field:
 def _rows(path: Path, lines: list[bytes], first: int, count: int) -> Iterator[bytes]:
     """The rows of a table, with NaN in the place of marks. Raises InputError for other lines."""
     for number, line in enumerate(lines[first:], first + 1):
-        words = line.split()
+        words = [] if line.startswith(b"#") else line.split()
         if words and not _is_row(words, count):
             text = b" ".join(words).decode(errors="replace")
             raise InputError(
