@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from gfmd_cli.errors import InputError
-from gfmd_cli.maps.topography import read_topography
+from gfmd_cli.maps.topography import Region, read_topography
 from gfmd_cli.physics.file_surface import FileSurface
 
 pytest.importorskip("SurfaceTopography")
@@ -142,6 +142,32 @@ def test_a_matrix_below_its_size(saved, size):
         read_topography(saved(f"300 13\n{matrix(' ')}"))
 
 
+def test_a_second_matrix_without_a_line_between_is_refused(saved):
+    """The reader would join maps whose headers do not name different channels."""
+    one = f"# Width: 20 um\n# Height: 6 um\n# Value units: nm\n{matrix(' ')}"
+    with pytest.raises(InputError, match=r"map\.txt:16: words between two rows of the table"):
+        read_topography(saved(2 * one))
+    two = f"# Channel: a\n{one}# Channel: b\n{one}"
+    assert read_topography(saved(two)).heights == pytest.approx(1e-9 * HEIGHTS)
+
+
+def test_lines_of_comments_below_the_header_of_positions_are_left_out(saved):
+    """As the last line of Zygo's tables."""
+    read = read_topography(saved(points(np.arange(300), np.arange(12)) + "#\n"))
+    np.testing.assert_array_equal(read.heights, HEIGHTS)
+
+
+def test_the_side_of_a_part_of_positions_without_unit_gives_a_warning(saved):
+    path = saved(points(np.arange(300), np.arange(12)))
+    part = Region.model_validate({"x": [0, 30]})
+    (warning,) = (
+        each
+        for each in FileSurface(path=path, region=part, length=3e-6).warnings()
+        if "surface.length" in each and "part" in each
+    )
+    assert "30 of 300 points; if the whole map has this side, set 3e-07" in warning
+
+
 def test_many_scattered_points_are_refused_as_such(saved):
     rows = np.random.default_rng(1).random((30_000, 3)).round(4)
     with pytest.raises(InputError, match="three columns that are not the points"):
@@ -244,7 +270,7 @@ def test_an_esri_grid_has_sides_and_no_height_without_data(saved, stated, decima
     read = read_topography(saved(text, encoding))
     assert np.argwhere(read.missing).tolist() == [[3, 4]]
     assert read.heights[~read.missing] == pytest.approx(np.delete(HEIGHTS.ravel(), 3 * 300 + 4))
-    assert (read.spacing, read.metres) == ((0.5, 0.5), False)
+    assert (read.spacing, read.metres, read.periodic) == ((0.5, 0.5), False, False)
 
 
 @pytest.mark.parametrize(
