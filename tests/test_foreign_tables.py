@@ -112,6 +112,11 @@ def test_a_header_without_units_states_none(saved, header):
     assert (read.metres, read.spacing) == (False, pytest.approx((1.0, 1.0)))
 
 
+def test_a_profile_of_one_point_is_refused(saved):
+    with pytest.raises(InputError, match="1 points; at least 2 along each axis are needed"):
+        read_topography(saved("1 2\n"))
+
+
 def test_units_of_the_positions_alone_leave_the_heights_to_scale(saved):
     text = points(np.arange(300), np.arange(12))
     surface = FileSurface(path=saved(f"x [um] y [um] z\n{text}"))

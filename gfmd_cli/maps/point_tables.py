@@ -58,7 +58,6 @@ def read_points(path: Path, file: BinaryIO) -> HeightMap | None:
     if not np.isfinite(table[:, :-1]).all():
         raise InputError(f"{path}: a position in the table is missing or infinite")
     heights, sides, note = _grid(path, table) if count == 3 else _profile(path, table)
-    check_layout(path, heights.shape, heights.dtype)
     *of_sides, of_heights = factors or [None] * count
     return HeightMap(
         heights=heights if of_heights is None else of_heights * heights,
@@ -194,6 +193,7 @@ def _grid(path: Path, table: Field) -> tuple[Field, tuple[float, ...], str]:
 
 def _profile(path: Path, table: Field) -> tuple[Field, tuple[float, ...], str]:
     """Heights and length of a profile; interpolated if the distances are not equal."""
+    check_layout(path, table.shape[:1], table.dtype)
     x, heights = table.T if table[0, 0] <= table[-1, 0] else table[::-1].T
     steps = np.diff(x)
     mean = float(steps.mean())
