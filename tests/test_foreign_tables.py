@@ -61,17 +61,16 @@ def test_positions_of_a_stage_that_jitters_are_even(saved):
 
 
 @pytest.mark.parametrize(
-    ("header", "separator"),
+    ("order", "header", "separator"),
     [
-        ("y [mm] x [um] z [nm]", " "),
-        ("z_nm,x_um,y_mm", ","),
-        ("# height (nm)  Y position (mm)  X position (um)", "\t"),
-        ("Y;X;Value\n[mm];[um];[nm]", ";"),
+        ("yxz", "y [mm] x [um] z [nm]", " "),
+        ("zxy", "z_nm,x_um,y_mm", ","),
+        ("zyx", "# height (nm)  Y position (mm)  X position (um)", "\t"),
+        ("yxz", "Y;X;Value\n[mm];[um];[nm]", ";"),
+        ("zxy", "nm um mm\nz x y", " "),
     ],
 )
-def test_the_header_states_the_order_of_the_columns(saved, header, separator):
-    order = [name for name in header.lower().replace("value", "z").replace("height", "z")
-             .replace(" position", "") if name in "xyz"]  # fmt: skip
+def test_the_header_states_the_order_of_the_columns(saved, order, header, separator):
     y, x = np.indices(HEIGHTS.shape)
     columns = {"x": 0.5 * x, "y": 0.25 * y, "z": HEIGHTS}
     rows = zip(*(columns[name].ravel() for name in order), strict=True)
@@ -110,6 +109,11 @@ def test_an_unknown_unit_in_a_header_is_refused(saved, header):
 def test_a_header_without_units_states_none(saved, header):
     read = read_topography(saved(header + points(np.arange(300), np.arange(12))))
     assert (read.metres, read.spacing) == (False, pytest.approx((1.0, 1.0)))
+
+
+def test_a_unit_in_a_sentence_above_a_profile_is_refused(saved):
+    with pytest.raises(InputError, match="not one for each of the 2 columns"):
+        read_topography(saved("# profile of 20 um\n0 1\n1 4\n2 3\n3 1\n"))
 
 
 def test_a_profile_of_one_point_is_refused(saved):

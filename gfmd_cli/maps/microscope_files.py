@@ -23,11 +23,10 @@ from gfmd_cli.maps.height_map import (
 from gfmd_cli.maps.point_tables import NO_GRID, read_points
 from gfmd_cli.maps.text_tables import (
     MATRIX_COLUMNS,
-    MISSING,
     OWN_HEADERS,
     columns,
     in_utf8,
-    is_number,
+    is_height,
     shorter_or_longer_row,
     table_formats,
     unread_units,
@@ -286,7 +285,7 @@ def _check_all_rows_read(path: Path, file: BinaryIO, rows: int, columns: int) ->
     rows_above = 0
     for number, line in enumerate(file, 1):
         words = line.split()
-        marks = [word for word in words if not (is_number(word) or word.lower() in MISSING)]
+        marks = [word for word in words if not is_height(word)]
         if not marks:
             rows_above += len(words) == columns
             continue

@@ -12,9 +12,9 @@ from gfmd_cli.grid.arrays import Field
 from gfmd_cli.maps.array_coordinates import EVEN_TOLERANCE, NO_UNITS, factor, in_metres
 from gfmd_cli.maps.height_map import HEIGHT_NAMES, HeightMap, at_equal_distances, check_layout
 from gfmd_cli.maps.text_tables import (
-    MISSING,
     OWN_HEADERS,
     columns,
+    is_height,
     is_number,
     is_unit,
     states_sides,
@@ -71,16 +71,14 @@ def read_points(path: Path, file: BinaryIO) -> HeightMap | None:
 
 def _is_row(words: list[bytes], count: int) -> bool:
     """Whether the words of a line are a row of a table: numbers, or a mark as height."""
-    if len(words) != count or not all(map(is_number, words[:-1])):
-        return False
-    return is_number(words[-1]) or words[-1].lower() in MISSING
+    return len(words) == count and all(map(is_number, words[:-1])) and is_height(words[-1])
 
 
 def _numbers(path: Path, lines: list[bytes], first: int, count: int) -> Field:
     """The table that begins in a line, NaN where heights are missing."""
     try:
         table = np.loadtxt(lines[first:], comments=None, ndmin=2)
-    except ValueError:
+    except ValueError:  # a mark, or another line
         table = np.loadtxt(_rows(path, lines, first, count), comments=None, ndmin=2)
     return table
 
@@ -114,20 +112,21 @@ def _header(path: Path, lines: list[bytes], count: int) -> tuple[list[int], list
     of the positions have none.
     """
     texts = [line.decode(errors="replace") for line in lines if line.strip()]
-    order, units = list(range(count)), list[str]()
-    for text in texts[-COLUMN_LINES:]:  # the names may stand above the units
+    order, units, is_unclear = list(range(count)), list[str](), False
+    for text in texts[-COLUMN_LINES:]:  # one may have the names, the other the units
         names, of_columns = _columns_in(text, count)
         if names:
             axes = [names.index(axis) for axis in ("x", "y")[: count - 1]]
             order = [*axes, *set(range(count)).difference(axes)]
-        if any(of_columns) and len(of_columns) == count:
-            units = [of_columns[place] for place in order]
-        elif text is texts[-1] and any(in_metres(unit) for unit in of_columns):
-            units = of_columns[:1] + [""] * (count - 1)
-    stated = dict(UNITS_OF_GWYDDION.findall("\n".join(texts)))
-    if stated:
-        units = [stated.get("Lateral", "")] * (count - 1) + [stated.get("Value", "")]
-    if "" in units[:-1]:
+        is_complete = len(of_columns) == count
+        if is_complete and any(of_columns):
+            units = of_columns
+        is_unclear = not is_complete and any(in_metres(unit) for unit in of_columns)
+    units = [units[place] for place in order if units]
+    if stated := dict(UNITS_OF_GWYDDION.findall("\n".join(texts))):
+        units, is_unclear = [stated.get("Lateral", "")] * (count - 1), False
+        units.append(stated.get("Value", ""))
+    if is_unclear or "" in units[:-1]:
         raise InputError(
             f"{path}: the header of the table states units, but not one for each of the {count} "
             "columns, as 'x [um] z [nm]' does: add them, or remove the header"

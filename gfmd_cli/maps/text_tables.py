@@ -83,6 +83,11 @@ def is_number(word: bytes) -> bool:
     return True
 
 
+def is_height(word: bytes) -> bool:
+    """Whether a word is a number, or a known mark of a missing height."""
+    return is_number(word) or word.lower() in MISSING
+
+
 def is_unit(word: str) -> bool:
     """Whether a word of a header is a known unit of length."""
     return in_metres(word) is not None and word not in AMBIGUOUS_UNITS
