@@ -11,6 +11,8 @@ import pytest
 from specs import power_spec
 
 import gfmd_cli
+from gfmd_cli.analysis.compare import compare
+from gfmd_cli.analysis.curve_styles import curve_styles
 from gfmd_cli.cli import main
 from gfmd_cli.study import resources
 
@@ -247,6 +249,10 @@ def test_a_height_array_is_used_as_it_is(gfmd):
         if " on file" in line
     }
     assert all(label in again.output for label in labels)
+    styles = curve_styles(compare(Path("small.h5")).curves)
+    assert {style.label.rpartition(" ")[2] for style in styles} == {
+        label.rpartition(" ")[2] for label in labels
+    }
     Path("other").mkdir()
     np.save("other/h.npy", heights)
     folders = gfmd(
