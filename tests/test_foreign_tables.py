@@ -252,6 +252,12 @@ def test_units_in_a_header_that_is_not_read_give_a_warning(saved, quote):
     assert "states units (nm, µm), which are not read: set surface.length and" in warning
 
 
+def test_the_unit_of_a_single_column_gives_a_warning(saved):
+    """As NanoScope exports heights, one below the other."""
+    path = saved("Height_Sensor(nm)\t\n" + "".join(f"{height}\n" for height in HEIGHTS[0]))
+    assert any("states units (nm), which" in each for each in FileSurface(path=path).warnings())
+
+
 def test_a_time_in_a_header_is_no_unit(saved):
     path = saved("# measured at 3:15 pm\n" + matrix(" "))
     assert not any("states units" in each for each in FileSurface(path=path).warnings())

@@ -141,8 +141,8 @@ def _read_channel(path: Path, file: BinaryIO, reader: Any, dataset: str | None) 
     heights, sides = heights_and_sides(path, scan, rows_along_y)
     has_unit = scan.unit is not None
     metric_sides = None if has_unit or unsized else _sides_with_unit(channel, sides)
-    is_unread = kind == "asc" and unsized and not has_unit and len(shape) == 2
-    note = unread_units(file, shape[1]) if is_unread else ""
+    is_unread = kind == "asc" and unsized and not has_unit
+    note = unread_units(file, (1, *shape[1:])[-1]) if is_unread else ""
     return HeightMap(
         notes=(note,) if note else (),
         heights=heights,
