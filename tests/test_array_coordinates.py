@@ -98,7 +98,7 @@ def test_units_in_words(array, unit):
 
 @pytest.mark.parametrize("name", ["x", "height"])
 def test_an_unknown_unit_is_refused_by_its_name(array, name):
-    with pytest.raises(InputError, match=rf"{name}' has the unit 'furlong'"):
+    with pytest.raises(InputError, match=rf"{name}' states the unit 'furlong'"):
         read_topography(array(units=UNITS | {name: "furlong"}))
 
 
@@ -172,12 +172,22 @@ def test_a_damaged_scale_does_not_end_the_process(array):
     assert read_topography(path).heights.shape == (12, 16)
 
 
-def test_a_study_is_read_as_before(array):
-    """Its fields have positions and units, and are periodic."""
-
-    def mark(file):
-        file.attrs["spec_text"] = ""
-
-    read = read_topography(array(extra=mark))
-    np.testing.assert_array_equal(read.heights, HEIGHTS)
-    assert (read.spacing, read.periodic) == (None, None)
+@pytest.mark.parametrize("boundary", ["periodic", "free"])
+def test_a_field_of_a_study_has_the_sides_and_the_boundary_of_its_contact(
+    boundary, rows_of, tmp_path
+):
+    np.save(tmp_path / "heights.npy", 1e-9 * HEIGHTS)
+    spec = f"""
+        surface = {{ kind = "file", path = "heights.npy", length = 8e-6, length_y = 3e-6 }}
+        elastomer.kind = "half-space"
+        elastomer.E_star = 1e6
+        grid = {{ points = 16, boundary = "{boundary}" }}
+        load.p_star = 0.1
+        output.fields = ["height"]
+    """
+    rows_of(text=spec)
+    read = read_topography(tmp_path / "study.h5")
+    assert np.ptp(read.heights - 1e-9 * HEIGHTS) < 1e-20
+    assert read.spacing == pytest.approx((0.25e-6, 0.5e-6))
+    assert (read.metres, read.metric_heights) == (True, True)
+    assert read.periodic == (boundary == "periodic")

@@ -11,6 +11,8 @@ import pytest
 from specs import power_spec
 
 import gfmd_cli
+from gfmd_cli.analysis.compare import compare
+from gfmd_cli.analysis.curve_styles import curve_styles
 from gfmd_cli.cli import main
 from gfmd_cli.study import resources
 
@@ -237,7 +239,31 @@ def test_a_height_array_is_used_as_it_is(gfmd):
     assert again.exit_code == 0
     assert "the study also contains 2 contacts of other specs" in again.output
     rows = list(csv.DictReader(io.StringIO(gfmd("export", "small.h5").output)))
-    assert len({row["surface_sha256"] for row in rows}) == len({row["h_std"] for row in rows}) == 2
+    checksums = {row["surface_sha256"] for row in rows}
+    assert len(checksums) == len({row["h_std"] for row in rows}) == 2
+    labels = {f"file path=h.npy length=2 m sha256={checksum[:8]}" for checksum in checksums}
+    assert {row["surface"] for row in rows} == labels
+    assert labels == {
+        line.partition(" on ")[2].partition(", ")[0]
+        for line in gfmd("analyze", "small.h5").output.splitlines()
+        if " on file" in line
+    }
+    assert all(label in again.output for label in labels)
+    styles = curve_styles(compare(Path("small.h5")).curves)
+    assert {style.label.rpartition(" ")[2] for style in styles} == {
+        label.rpartition(" ")[2] for label in labels
+    }
+    Path("other").mkdir()
+    np.save("other/h.npy", heights)
+    folders = gfmd(
+        "run", "spec.toml", "--dry-run", "--set", "grid.points=32", "--set",
+        "surface={kind='file', path=['h.npy', 'other/h.npy'], length=2.0}",
+    )  # fmt: skip
+    assert all(label in folders.output for label in labels)
+    only_second = gfmd("run", "spec.toml", "-o", "one.h5", *surface, "--set", "grid.points=32")
+    assert "sha256" not in only_second.output
+    assert only_second.exit_code == 0
+    assert "only in A" in gfmd("diff", "small.h5", "one.h5").output
 
 
 def test_pressures_may_be_given_in_pascal(gfmd):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from gfmd_cli.errors import InputError
-from gfmd_cli.maps.topography import read_topography
+from gfmd_cli.maps.topography import Region, read_topography
 from gfmd_cli.physics.file_surface import FileSurface
 
 pytest.importorskip("SurfaceTopography")
@@ -60,6 +60,123 @@ def test_positions_of_a_stage_that_jitters_are_even(saved):
     assert read.spacing == pytest.approx((1.0, 1.0), rel=1e-3)
 
 
+@pytest.mark.parametrize(
+    ("order", "header", "separator"),
+    [
+        ("yxz", "y [mm] x [um] z [nm]", " "),
+        ("zxy", "z_nm,x_um,y_mm", ","),
+        ("zyx", "# height (nm)  Y position (mm)  X position (um)", "\t"),
+        ("yxz", "Y;X;Value\n[mm];[um];[nm]", ";"),
+        ("zxy", "nm um mm\nz x y", " "),
+    ],
+)
+def test_the_header_states_the_order_of_the_columns(saved, order, header, separator):
+    y, x = np.indices(HEIGHTS.shape)
+    columns = {"x": 0.5 * x, "y": 0.25 * y, "z": HEIGHTS}
+    rows = zip(*(columns[name].ravel() for name in order), strict=True)
+    read = read_topography(
+        saved(f"{header}\n" + "".join(separator.join(map(str, row)) + "\n" for row in rows))
+    )
+    assert read.heights == pytest.approx(1e-9 * HEIGHTS)
+    assert read.spacing == pytest.approx((0.25e-3, 0.5e-6))
+
+
+def test_a_profile_may_begin_with_its_heights(saved):
+    rows = "".join(f"{HEIGHTS[0, i]} {0.5 * i}\n" for i in range(300))
+    read = read_topography(saved("z [nm] x [um]\n" + rows))
+    assert read.heights == pytest.approx(1e-9 * HEIGHTS[0])
+    assert read.spacing == pytest.approx((0.5e-6,))
+
+
+@pytest.mark.parametrize(
+    ("unit", "metres"), [("inch", 0.0254), ("in", 0.0254), ("km", 1e3), ("cm", 1e-2)]
+)
+def test_other_units_of_length_are_converted(saved, unit, metres):
+    text = points(np.arange(300), np.arange(12))
+    read = read_topography(saved(f"x [{unit}] y [{unit}] z [{unit}]\n{text}"))
+    assert read.heights == pytest.approx(metres * HEIGHTS)
+    assert read.spacing == pytest.approx((metres, metres))
+
+
+@pytest.mark.parametrize("header", ["x [foo] y [foo] z [foo]", "# Lateral units: foo"])
+def test_an_unknown_unit_in_a_header_is_refused(saved, header):
+    text = points(np.arange(300), np.arange(12))
+    with pytest.raises(InputError, match="header of the table states the unit 'foo'; known are km"):
+        read_topography(saved(f"{header}\n{text}"))
+
+
+@pytest.mark.parametrize("header", ["", "# version 3 (beta), at 12:30 pm\n", "X Y Z [1]\n"])
+def test_a_header_without_units_states_none(saved, header):
+    read = read_topography(saved(header + points(np.arange(300), np.arange(12))))
+    assert (read.metres, read.spacing) == (False, pytest.approx((1.0, 1.0)))
+
+
+def test_a_unit_in_a_sentence_above_a_profile_is_refused(saved):
+    with pytest.raises(InputError, match="not one for each of the 2 columns"):
+        read_topography(saved("# profile of 20 um\n0 1\n1 4\n2 3\n3 1\n"))
+
+
+def test_a_profile_of_one_point_is_refused(saved):
+    with pytest.raises(InputError, match="1 points; at least 2 along each axis are needed"):
+        read_topography(saved("1 2\n"))
+
+
+def test_units_of_the_positions_alone_leave_the_heights_to_scale(saved):
+    text = points(np.arange(300), np.arange(12))
+    surface = FileSurface(path=saved(f"x [um] y [um] z\n{text}"))
+    assert surface.sides == pytest.approx((12e-6, 300e-6))
+    assert any("but not of its heights" in each for each in surface.warnings())
+
+
+@pytest.mark.parametrize("mark", ["BAD", "nan", "Inf"])
+def test_known_marks_are_missing_heights_in_every_table(saved, mark):
+    number = f"{HEIGHTS[5, 7]:.6f}"
+    for text in (points(np.arange(300), np.arange(12)), matrix(" ")):
+        assert text.count(number) == 1
+        read = read_topography(saved(text.replace(number, mark)))
+        assert np.argwhere(read.missing).tolist() == [[5, 7]]
+
+
+def test_a_mark_of_two_words_in_a_matrix_is_refused(saved):
+    """Its row has a word more than the others."""
+    text = matrix(" ").replace(f"{HEIGHTS[5, 7]:.6f}", "No Data")
+    with pytest.raises(InputError, match=r"map\.txt:6: 'No' in a row of the table"):
+        read_topography(saved(text))
+
+
+@pytest.mark.parametrize("size", ["300 12", "12\t300"])
+def test_a_matrix_below_its_size(saved, size):
+    np.testing.assert_array_equal(read_topography(saved(f"{size}\n{matrix(' ')}")).heights, HEIGHTS)
+    with pytest.raises(InputError, match="line 1 has 2 numbers, the other rows 300"):
+        read_topography(saved(f"300 13\n{matrix(' ')}"))
+
+
+def test_a_second_matrix_without_a_line_between_is_refused(saved):
+    """The reader would join maps whose headers do not name different channels."""
+    one = f"# Width: 20 um\n# Height: 6 um\n# Value units: nm\n{matrix(' ')}"
+    with pytest.raises(InputError, match=r"map\.txt:16: words between two rows of the table"):
+        read_topography(saved(2 * one))
+    two = f"# Channel: a\n{one}# Channel: b\n{one}"
+    assert read_topography(saved(two)).heights == pytest.approx(1e-9 * HEIGHTS)
+
+
+def test_lines_of_comments_below_the_header_of_positions_are_left_out(saved):
+    """As the last line of Zygo's tables."""
+    read = read_topography(saved(points(np.arange(300), np.arange(12)) + "#\n"))
+    np.testing.assert_array_equal(read.heights, HEIGHTS)
+
+
+def test_the_side_of_a_part_of_positions_without_unit_gives_a_warning(saved):
+    path = saved(points(np.arange(300), np.arange(12)))
+    part = Region.model_validate({"x": [0, 30]})
+    (warning,) = (
+        each
+        for each in FileSurface(path=path, region=part, length=3e-6).warnings()
+        if "surface.length" in each and "part" in each
+    )
+    assert "30 of 300 points; if the whole map has this side, set 3e-07" in warning
+
+
 def test_many_scattered_points_are_refused_as_such(saved):
     rows = np.random.default_rng(1).random((30_000, 3)).round(4)
     with pytest.raises(InputError, match="three columns that are not the points"):
@@ -74,7 +191,7 @@ def test_uneven_positions_are_refused_with_their_deviation(saved):
         read_topography(saved(points(np.arange(40), np.arange(12) ** 1.5)))
 
 
-@pytest.mark.parametrize("mark", ["BAD", "***", "No Data"])
+@pytest.mark.parametrize("mark", ["---", "***", "No Data"])
 def test_a_mark_far_below_the_first_point_is_named(saved, mark):
     lines = points(np.arange(300), np.arange(12)).splitlines()
     lines[1000] = " ".join([*lines[1000].split()[:2], mark])
@@ -135,6 +252,12 @@ def test_units_in_a_header_that_is_not_read_give_a_warning(saved, quote):
     assert "states units (nm, µm), which are not read: set surface.length and" in warning
 
 
+def test_the_unit_of_a_single_column_gives_a_warning(saved):
+    """As NanoScope exports heights, one below the other."""
+    path = saved("Height_Sensor(nm)\t\n" + "".join(f"{height}\n" for height in HEIGHTS[0]))
+    assert any("states units (nm), which" in each for each in FileSurface(path=path).warnings())
+
+
 def test_a_time_in_a_header_is_no_unit(saved):
     path = saved("# measured at 3:15 pm\n" + matrix(" "))
     assert not any("states units" in each for each in FileSurface(path=path).warnings())
@@ -162,7 +285,7 @@ def test_an_esri_grid_has_sides_and_no_height_without_data(saved, stated, decima
     read = read_topography(saved(text, encoding))
     assert np.argwhere(read.missing).tolist() == [[3, 4]]
     assert read.heights[~read.missing] == pytest.approx(np.delete(HEIGHTS.ravel(), 3 * 300 + 4))
-    assert (read.spacing, read.metres) == ((0.5, 0.5), False)
+    assert (read.spacing, read.metres, read.periodic) == ((0.5, 0.5), False, False)
 
 
 @pytest.mark.parametrize(

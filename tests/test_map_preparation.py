@@ -158,6 +158,7 @@ def test_lines_are_made_periodic_along_their_axis():
 
 
 PLANE = np.add.outer(3 + np.arange(24) / 7, np.arange(20) / 9)
+NOISE = np.random.default_rng(0).normal(size=PLANE.shape)
 
 
 @pytest.mark.parametrize("heights", [0.3 + 0 * PLANE, PLANE, PLANE.astype(np.float32)])
@@ -184,17 +185,21 @@ def test_roughness_in_single_precision_far_from_zero_is_used(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("heights", "is_flat"),
+    ("heights", "is_rounded"),
     [
         (np.round(PLANE, 1), True),
         (np.round(10 * PLANE).astype(int), True),
         (PLANE.astype(np.float32).astype(float), True),
-        (np.round(PLANE + 0.2 * np.random.default_rng(0).normal(size=PLANE.shape), 1), False),
-        (PLANE + 1e-4 * np.random.default_rng(0).normal(size=PLANE.shape), False),
+        (np.round(100 * PLANE + 0.1 * NOISE, 1), True),
+        ((1e6 * PLANE + 0.1 * NOISE).astype(np.float32), True),
+        ((1e6 * PLANE + 10 * NOISE).astype(np.float32), False),
+        (1e6 * PLANE + 0.1 * NOISE, False),
+        (np.round(PLANE + 0.2 * NOISE, 1), False),
+        (PLANE + 1e-4 * NOISE, False),
     ],
 )
-def test_a_plane_of_rounded_heights_gives_a_warning(tmp_path, heights, is_flat):
+def test_a_tilt_of_rounded_heights_gives_a_warning(tmp_path, heights, is_rounded):
     """It could be meant: the terraces of a vicinal surface."""
     np.save(tmp_path / "h.npy", heights)
     warnings = FileSurface(path=tmp_path / "h.npy", periodic=False, scale=1e-9).warnings()
-    assert any("probably flat and its roughness rounding" in each for each in warnings) == is_flat
+    assert any("part of the roughness is rounding" in each for each in warnings) == is_rounded

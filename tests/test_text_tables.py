@@ -150,7 +150,7 @@ def test_profiles_with_a_header_of_an_instrument(tmp_path, header):
 
 def test_points_on_a_grid_with_gaps_are_refused_with_the_reason(tmp_path):
     (tmp_path / "points.txt").write_bytes(text(np.delete(POINTS, [7, 900], axis=0)))
-    with pytest.raises(InputError, match="does not contain a regular grid"):
+    with pytest.raises(InputError, match="2 of the 50 x 40 points of the grid are missing: add"):
         read_topography(tmp_path / "points.txt")
 
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from gfmd_cli.analysis.compare import Curve
 from gfmd_cli.study.columns import PARAMETERS
+from gfmd_cli.study.reading import FILE_MARK
 
 PALETTE = ("#332288", "#0077bb", "#009988", "#999933", "#ee7733", "#cc3311")
 """Safe for colour-blind readers (P. Tol, Colour schemes, 2021), ordered by hue."""
@@ -142,4 +143,6 @@ def _words(curve: Curve) -> dict[str, str]:
         if each.table != "elastomer" and each.key != "seed"
     }
     points = "" if row["grid"] == "auto" else f"{row['points']} points"
-    return {"study": curve.study} | words | {"solver_kind": row["solver"], "points": points}
+    checksum = "".join(curve.surface.partition(FILE_MARK)[1:]).strip()
+    others = {"checksum": checksum, "solver_kind": row["solver"], "points": points}
+    return {"study": curve.study} | words | others

@@ -12,7 +12,7 @@ from gfmd_cli.physics.observables import QUANTITIES
 from gfmd_cli.spec.differences import differences
 from gfmd_cli.spec.models import LOADS
 from gfmd_cli.study.column import Row
-from gfmd_cli.study.reading import open_study, solved_rows
+from gfmd_cli.study.reading import open_study, solved_rows, tell_files_apart
 
 SURFACE = ("surface", "surface_sha256", "seed")
 """Columns of a surface: two files may have the same name."""
@@ -88,6 +88,7 @@ def diff(one: Path, other: Path) -> Difference:
     with open_study(one) as a, open_study(other) as b:
         only = solved_rows(a.rows), solved_rows(b.rows)
         spec = differences(a.spec, b.spec)
+    tell_files_apart([*only[0], *only[1]])
     pairs, paired = _matches(*only, _contact_of, load_of), ""
     if not pairs and all(len({_contact_of(row) for row in rows}) == 1 for rows in only):
         pairs = _matches(*only, load_of)

@@ -10,7 +10,7 @@ from gfmd_cli.analysis.table import Record, Table, TableColumn, groups_of
 from gfmd_cli.analysis.tables import P_STAR, POINTS, PRESSURE, RESIDUAL, STATUS, warnings_in
 from gfmd_cli.analysis.wording import contact_title, grid_size, shown
 from gfmd_cli.physics.observables import QUANTITIES
-from gfmd_cli.study.reading import solved_rows
+from gfmd_cli.study.reading import solved_rows, tell_files_apart
 from gfmd_cli.study.result import Outcome
 from gfmd_cli.study.tasks import Task
 from gfmd_cli.units import count, left_out
@@ -54,13 +54,23 @@ def task_text(tasks: Sequence[Task], outcomes: Mapping[str, Outcome], missing: s
         }
         for task in tasks
     )
-    return Table("", TASKS, groups_of(zip(map(_contact_of, tasks), records, strict=True))).as_text()
+    return Table("", TASKS, groups_of(zip(_contacts_of(tasks), records, strict=True))).as_text()
 
 
-def _contact_of(task: Task) -> str:
-    """Elastomer and surface of a task, and the swept keys of grid and solver."""
-    swept = [word for table, word in task.swept if table != "surface"]
-    return ", ".join([f"{task.elastomer.label} on {task.surface.label}", *swept])
+def _contacts_of(tasks: Sequence[Task]) -> list[str]:
+    """Elastomer and surface of each task, and the swept keys of grid and solver."""
+    rows = [
+        {
+            "elastomer": task.elastomer.label,
+            "surface": task.surface.label,
+            "ensemble": "",
+            "surface_sha256": task.surface_sha256,
+        }
+        for task in tasks
+    ]
+    tell_files_apart(rows)
+    swept = [[word for table, word in task.swept if table != "surface"] for task in tasks]
+    return [", ".join([contact_title(row), *words]) for row, words in zip(rows, swept, strict=True)]
 
 
 def run_text(rows: list[dict[str, Any]]) -> str:

@@ -78,7 +78,7 @@ def surface(
             names += [each.label for each in spec.surface]
             summaries += [summarise(each, points) for each in spec.surface]
         else:
-            names.append(path.name)
+            names.append(str(path))
             summaries.append(summarise(read_scan(path, overrides)))
     if as_json:
         click.echo(json.dumps([summary.record() for summary in summaries], indent=1))

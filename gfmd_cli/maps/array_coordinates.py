@@ -22,16 +22,20 @@ NO_VARIABLE = b"This is a netCDF dimension but not a netCDF variable"  # begins 
 UNIT_NAMES = ("units", "unit")
 NO_UNITS = ("", "1")
 LENGTHS = {
+    1e3: "km",
     1.0: "m metre metres meter meters",
+    1e-2: "cm",
     1e-3: "mm millimetre millimetres millimeter millimeters",
     1e-6: "um \N{MICRO SIGN}m \N{GREEK SMALL LETTER MU}m micron microns "
     "micrometre micrometres micrometer micrometers",
     1e-9: "nm nanometre nanometres nanometer nanometers",
     1e-10: "\N{ANGSTROM SIGN} \N{LATIN CAPITAL LETTER A WITH RING ABOVE} angstrom Angstrom",
     1e-12: "pm",
+    0.0254: "inch inches in",
 }
 METRES_PER_UNIT = {name: metres for metres, names in LENGTHS.items() for name in names.split()}
 """Metres per unit; Unicode has two letters for micro and two for angstrom."""
+KNOWN_UNITS = [names.split()[0] for names in LENGTHS.values()]
 
 
 class Axis(NamedTuple):
@@ -70,7 +74,7 @@ def factor(path: Path, name: str, unit: str) -> float | None:
     metres = in_metres(unit)
     if unit and metres is None:
         raise InputError(
-            f"{path}: {name!r} has the unit {unit!r}; known are {', '.join(METRES_PER_UNIT)}: "
+            f"{path}: {name} states the unit {unit!r}; known are {', '.join(KNOWN_UNITS)}: "
             "convert it"
         )
     return metres
@@ -104,4 +108,4 @@ def _axis(path: Path, file: Any, dimension: Any) -> Axis:
             f"{path}: the positions {label!r} are not evenly spaced: resample the map, or save it "
             "without them"
         )
-    return Axis(label, step, factor(path, label, stated_unit(scale)))
+    return Axis(label, step, factor(path, repr(label), stated_unit(scale)))

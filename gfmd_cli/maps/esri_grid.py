@@ -35,4 +35,5 @@ def read_esri_grid(path: Path, dataset: str | None) -> HeightMap:
         )
     missing = header.get("nodata_value", NO_DATA)
     sides = tuple(header["cellsize"] * points for points in shape)
-    return HeightMap(np.ma.masked_equal(heights, missing), sides=sides, source="ESRI grid")
+    heights = np.ma.masked_equal(heights, missing)
+    return HeightMap(heights, sides=sides, source="ESRI grid", periodic=False)

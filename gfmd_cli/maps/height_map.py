@@ -121,7 +121,11 @@ def read_hdf5(path: Path, dataset: str | None) -> HeightMap:
                 missing = missing.astype(values.dtype)
             values = np.ma.masked_where(np.isin(values, missing), values)
         bare = HeightMap(values, source=f"HDF5, {name}, {data.dtype}")
-        return bare if "spec_text" in file.attrs else _with_coordinates(path, file, data, bare)
+        height_map = _with_coordinates(path, file, data, bare)
+        if "spec_text" in file.attrs and name.startswith("fields/"):  # a study
+            boundary = take(file, "boundary")[int(name.split("/")[1])]
+            return replace(height_map, periodic=boundary != b"free")
+        return height_map
 
 
 def _map_shape(shape: tuple[int, ...]) -> tuple[int, ...]:
@@ -149,7 +153,7 @@ def _with_coordinates(path: Path, file: Any, data: Any, bare: HeightMap) -> Heig
     forward = tuple(slice(None, None, -1 if step < 0 else None) for step in steps)
     heights = heights[forward]
     sides = [abs(step) * points for step, points in zip(steps, heights.shape, strict=True)]
-    metres = factor(path, data.name, stated_unit(data))
+    metres = factor(path, repr(data.name), stated_unit(data))
     metric = [axis.metres for axis in axes if axis.metres]
     if 0 < len(metric) < len(axes):
         bare_name = next(axis.name for axis in axes if not axis.metres)
@@ -223,8 +227,19 @@ def _maps(datasets: dict[str, Any]) -> list[str]:
     return maps or [key for key, item in numbers.items() if item.ndim == 1]
 
 
-def at_equal_distances(x: Any, heights: Any) -> tuple[Any, tuple[float]]:
-    """Linear interpolation of a line profile at as many points, and the length of their cell."""
+def at_equal_distances(path: Path, x: Any, heights: Any) -> tuple[Any, tuple[float]]:
+    """Linear interpolation of a line profile at as many points, and the length of their cell.
+
+    Raises InputError for positions that neither increase nor decrease.
+    """
+    if x[-1] < x[0]:
+        x, heights = x[::-1], heights[::-1]
+    wrong = np.flatnonzero(np.diff(x) <= 0)
+    if wrong.size:
+        raise InputError(
+            f"{path}: the positions along a profile must increase or decrease; "
+            f"{x[wrong[0]]:.6g} is followed by {x[wrong[0] + 1]:.6g}"
+        )
     points = len(x)
     spacing = float(x[-1] - x[0]) / (points - 1)
     return np.interp(x[0] + spacing * np.arange(points), x, heights), (points * spacing,)

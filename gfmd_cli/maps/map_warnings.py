@@ -13,7 +13,7 @@ MAX_GRADIENT = 3.0  # rms; a choice: surfaces of machined or worn solids have le
 MIN_GRADIENT = 1e-6  # rms; a choice: polished mirrors have about that
 MAX_BORDER_STEP = 5.0  # ratio of the step across the border to that inside; a choice: 1 if periodic
 MAX_TILT = 0.5  # fraction of the variance of the heights that is a tilt; a choice
-MAX_ROUNDING_STEPS = 1.5  # that rounding leaves of a plane: 1, and up to 1.4 on 8 x 8 points
+MIN_ROUNDING_STEP = 0.5  # over the rms difference of neighbours: the gradient is 3 % too large
 SAMPLE_SIZE = 10_000  # heights that exclude most maps; to sort all takes seconds
 SINGLE_EPS = float(np.finfo(np.float32).eps)  # double precision may have been single before
 MAX_EQUAL_NEIGHBOURS = 0.2  # fraction of pairs, at which the gradient is 3 % too large
@@ -169,21 +169,29 @@ def rounded(topography: Topography, scale: float) -> str:
 
 
 def rounded_trend(topography: Topography, levelled: Field, scale: float) -> str:
-    """Levelled heights [m] that are the rounding of what was subtracted."""
+    """Levelled heights [m] that are to a large part the rounding of what was subtracted.
+
+    Equal neighbours do not show it, because the trend makes them different.
+    """
     heights = scale * topography.heights
+    squares = [np.mean(np.diff(levelled, axis=axis) ** 2) for axis in range(levelled.ndim)]
     if topography.missing is not None:
         heights, levelled = heights[~topography.missing], levelled[~topography.missing]
-    left = float(np.ptp(levelled))
+    change, left = float(np.sqrt(max(squares))), float(np.ptp(levelled))
     if not 0 < left < 0.5 * np.ptp(heights):  # the trend has two steps or more
         return ""
-    smallest = SINGLE_EPS * max(heights.max(), -heights.min())
+    stored = topography.heights
+    is_single = np.array_equal(stored.astype(np.float32), stored)  # perhaps converted to double
+    smallest = max(heights.max(), -heights.min()) * (
+        SINGLE_EPS if is_single else topography.precision
+    )
     sample = heights.flat[:: 1 + heights.size // SAMPLE_SIZE]
     for values in (sample, heights):  # no step of a sample is smaller than the smallest of all
         step = max(np.diff(np.unique(values)).min(initial=np.inf), smallest)
-        if left > MAX_ROUNDING_STEPS * step:
+        if step < MIN_ROUNDING_STEP * change:
             return ""
     return (
-        f"levelling leaves heights in a range of {left:.3g} m, and the heights are rounded to "
-        f"{step:.3g} m: the map is probably flat and its roughness rounding; export the heights "
-        "with more digits"
+        f"levelling leaves height differences of {change:.3g} m (rms) between neighbours, and the "
+        f"heights are rounded to {step:.3g} m: part of the roughness is rounding, or all of it; "
+        "export the heights with more digits, or level them before"
     )

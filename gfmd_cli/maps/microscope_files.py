@@ -2,7 +2,6 @@
 
 import warnings
 from dataclasses import replace
-from itertools import islice
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -10,7 +9,7 @@ import numpy as np
 
 from gfmd_cli.errors import INSTALL, InputError
 from gfmd_cli.grid.arrays import Field
-from gfmd_cli.maps.array_coordinates import EVEN_TOLERANCE, METRES_PER_UNIT, in_metres
+from gfmd_cli.maps.array_coordinates import EVEN_TOLERANCE, in_metres
 from gfmd_cli.maps.height_map import (
     MAX_MAP_BYTES,
     REMEDY,
@@ -21,26 +20,24 @@ from gfmd_cli.maps.height_map import (
     first_line,
     only_map,
 )
-from gfmd_cli.maps.point_tables import on_even_grid
+from gfmd_cli.maps.point_tables import NO_GRID, read_points
 from gfmd_cli.maps.text_tables import (
-    HEADER_LINES,
-    LATIN_1,
     MATRIX_COLUMNS,
-    cells,
+    OWN_HEADERS,
     columns,
     in_utf8,
+    is_height,
+    shorter_or_longer_row,
     table_formats,
-    units_of_columns,
     unread_units,
     with_blanks,
+    without_size,
 )
 
-NO_GRID = "three columns that are not the points (x, y, height) of a full grid"
 TABLE_FORMATS = {"xyz", "asc"}  # formats of SurfaceTopography that are tables of numbers
 TEXT_FORMATS = {b"aBCR-": "an SDF file", b"aISO-": "an SDF file", b"DSAA": "a grid of Surfer"}
 """Formats whose heights a reader of tables would take without their scales."""
 SMALL_FILE = 2**14  # bytes, which the readers of tables parse in a second
-OWN_HEADERS = LATIN_1, b"X;Y;valid"  # of tables whose readers know the length of the header
 SORTED_ROWS = 20  # heights of so many rows are not sorted by chance; a choice
 SIGNATURE_BYTES = 512  # at the beginning of a file, by which readers recognise their format
 
@@ -62,11 +59,17 @@ def read_microscope_file(path: Path, dataset: str | None) -> HeightMap:
             ) from error
         try:
             table, warning = with_blanks(in_utf8(file))
-            table = on_even_grid(table)
         except ValueError as error:
             raise InputError(f"{path}: {error}") from error
-        with _open_scan(path, table, readers) as reader:
-            height_map = _read_channel(path, table, reader, dataset)
+        height_map = read_points(path, table)
+        if height_map is None:
+            table = without_size(table)
+            with _open_scan(path, table, readers) as reader:
+                height_map = _read_channel(path, table, reader, dataset)
+        elif dataset is not None:
+            raise InputError(
+                f"{path}: a table of positions holds one map; leave out dataset {dataset!r}"
+            )
     return replace(height_map, notes=(*height_map.notes, *filter(None, [warning])))
 
 
@@ -90,7 +93,8 @@ def _open_scan(path: Path, file: BinaryIO, readers: list[Any]) -> Any:
     for reader in readers:
         answer = reader.can_read(start).name
         is_guess = reader.format() in TABLE_FORMATS - tables
-        if answer == "NO" or (is_guess and not is_small):
+        is_read_here = reader.format() == "xyz" and not start.startswith(OWN_HEADERS)
+        if answer == "NO" or is_read_here or (is_guess and not is_small):
             continue
         file.seek(0)
         try:
@@ -100,11 +104,8 @@ def _open_scan(path: Path, file: BinaryIO, readers: list[Any]) -> Any:
                 continue
             is_likely = answer == "YES" or reader.format() in tables
             if is_likely or path.suffix[1:].lower() in reader.file_extensions():
-                is_scattered = reader.format() == "xyz" and columns(file) == 3
-                if is_scattered:
-                    _check_no_row_in_header(path, file, None)
-                reason = NO_GRID if is_scattered else reader.format()
-                reasons.append(f"{reason}: {first_line(error)}")
+                row = shorter_or_longer_row(file) if reader.format() == "asc" else ""
+                reasons.append(f"{reader.format()}: {row or first_line(error)}")
     if reasons:
         raise InputError(
             f"{path}: SurfaceTopography recognises the format but cannot read the file "
@@ -133,10 +134,6 @@ def _read_channel(path: Path, file: BinaryIO, reader: Any, dataset: str | None) 
     if kind == "nc":
         _check_is_own_netcdf(path, reader)
     scan = channel.topography(physical_sizes=(1.0,) * len(shape) if unsized else None)
-    if kind == "xyz":
-        _check_no_row_in_header(path, file)
-        if len(shape) == 1:
-            scan = _with_positions(reader, scan)
     if scan.unit is not None:
         scan = scan.to_unit("m")
     if kind == "asc" and len(shape) == 2:
@@ -144,14 +141,8 @@ def _read_channel(path: Path, file: BinaryIO, reader: Any, dataset: str | None) 
     heights, sides = heights_and_sides(path, scan, rows_along_y)
     has_unit = scan.unit is not None
     metric_sides = None if has_unit or unsized else _sides_with_unit(channel, sides)
-    is_bare = kind == "xyz" and not has_unit and metric_sides is None
-    factors = _factors(path, file, len(shape) + 1) if is_bare else []
-    if factors:
-        *along_axes, of_heights = factors
-        has_unit, heights = True, of_heights * heights
-        sides = tuple(f * side for f, side in zip(along_axes[::-1], sides, strict=True))
-    is_unread = kind == "asc" and unsized and not has_unit and len(shape) == 2
-    note = unread_units(file, shape[1]) if is_unread else ""
+    is_unread = kind == "asc" and unsized and not has_unit
+    note = unread_units(file, (1, *shape[1:])[-1]) if is_unread else ""
     return HeightMap(
         notes=(note,) if note else (),
         heights=heights,
@@ -171,7 +162,7 @@ def heights_and_sides(path: Path, scan: Any, rows_along_y: bool) -> tuple[Any, t
     increase nor decrease.
     """
     if not getattr(scan, "is_uniform", True):
-        return at_equal_distances(*_increasing(path, *scan.positions_and_heights()))
+        return at_equal_distances(path, *scan.positions_and_heights())
     heights, sides = scan.heights(), tuple(map(float, scan.physical_sizes))[::-1]
     if len(sides) == 1 and sides[0] < 0:  # recorded backwards
         return heights[::-1], (-sides[0],)
@@ -244,49 +235,6 @@ def _sides_with_unit(channel: Any, sides: tuple[float, ...]) -> tuple[float, ...
     return tuple(factor * side for factor, side in zip(factors, sides, strict=True) if factor)
 
 
-def _factors(path: Path, file: BinaryIO, columns: int) -> list[float]:
-    """Metres per unit of each column of a table of positions, by its header; [] without units.
-
-    Raises InputError where only some of the columns have a unit.
-    """
-    units = units_of_columns(file, columns)
-    if units and len(units) != columns:
-        raise InputError(
-            f"{path}: the line above the table states units ({', '.join(units)}), but not one for "
-            f"each of the {columns} columns, as 'x [um] z [nm]' does: add them, or remove the line"
-        )
-    return [METRES_PER_UNIT[unit] for unit in units]
-
-
-def _with_positions(reader: Any, scan: Any) -> Any:
-    """A profile with its positions, unless their distances are equal.
-
-    The reader takes distances as equal that differ by less than 1e-6 in the unit of the file, which
-    is all of a profile in metres.
-    """
-    if not scan.is_uniform:
-        return scan
-    tolerance = EVEN_TOLERANCE * abs(float(scan.physical_sizes[0])) / scan.nb_grid_pts[0]
-    try:
-        again = reader._read(tol=tolerance)
-    except Exception:  # a first column that counts the rows is found by the same tolerance
-        return scan
-    return again if again.dim == 1 else scan
-
-
-def _increasing(path: Path, x: Any, heights: Any) -> tuple[Any, Any]:
-    """Positions that increase, and the heights there. Raises InputError where they do neither."""
-    if x[-1] < x[0]:
-        x, heights = x[::-1], heights[::-1]
-    wrong = np.flatnonzero(np.diff(x) <= 0)
-    if wrong.size:
-        raise InputError(
-            f"{path}: the positions along a profile must increase or decrease; "
-            f"{x[wrong[0]]:.6g} is followed by {x[wrong[0] + 1]:.6g}"
-        )
-    return x, heights
-
-
 def _check_all_are_heights(path: Path, table: Field) -> None:
     """Raise InputError where a row or column of a table seems to be positions or numbers.
 
@@ -332,56 +280,27 @@ def _check_all_rows_read(path: Path, file: BinaryIO, rows: int, columns: int) ->
         raise InputError(
             f"{path}:{number}: an empty line in the table: several maps? Save each in its own file"
         )
-    if lengths.count(columns) <= rows:
-        return
+    is_one_map = lengths.count(columns) <= rows
     file.seek(0)
+    rows_above = 0
     for number, line in enumerate(file, 1):
-        words = [word for word in line.split() if not _is_number(word)]
-        is_row = lengths[number - 1] == columns and words
-        if is_row and (len(words) <= columns / 2 or len(set(words)) == 1):
+        words = line.split()
+        marks = [word for word in words if not is_height(word)]
+        if not marks:
+            rows_above += len(words) == columns
+            continue
+        if len(words) >= (columns / 2 if rows_above else columns) and (
+            len(marks) <= len(words) / 2 or (len(words) == columns and len(set(marks)) == 1)
+        ):
             raise InputError(
-                f"{path}:{number}: {words[0].decode(errors='replace')!r} in a row of the table is "
-                "not a number; write NaN for a missing height"
+                f"{path}:{number}: {marks[0].decode(errors='replace')!r} in a row of the table "
+                "is not a number; write NaN for a missing height"
             )
-
-
-def _check_no_row_in_header(
-    path: Path, file: BinaryIO, lines: int | None = HEADER_LINES + 1
-) -> None:
-    """Raise InputError for a line below the first row of a table of positions that is not a row.
-
-    The reader would take this line and all rows above it as the header.
-    """
-    file.seek(0)
-    start = list(islice(file, lines))
-    file.seek(0)
-    if start and start[0].startswith(OWN_HEADERS):
-        return
-    rows = [cells(line) for line in start]
-    has_numbers_only = [all(map(_is_number, row)) for row in rows]
-    columns_read = next((len(row) for row in reversed(rows) if row != [b""]), 0)
-    is_row = [
-        numeric and len(row) == columns_read
-        for numeric, row in zip(has_numbers_only, rows, strict=True)
-    ]
-    if not any(is_row):
-        return
-    first = is_row.index(True)
-    for number, row in enumerate(rows[first:], first):
-        if row != [b""] and not is_row[number]:
-            text = b" ".join(row).decode(errors="replace")
+        if is_one_map and 0 < rows_above < rows:
             raise InputError(
-                f"{path}:{number + 1}: {text!r} in a table of {columns_read} columns of numbers; "
-                "write NaN for a missing height"
+                f"{path}:{number}: words between two rows of the table: several maps? Save each in "
+                "its own file"
             )
-
-
-def _is_number(word: bytes) -> bool:
-    try:
-        float(word)
-    except ValueError:
-        return False
-    return True
 
 
 def _height_channel(path: Path, reader: Any, name: str | None) -> Any:

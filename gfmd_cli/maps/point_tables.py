@@ -1,76 +1,216 @@
-"""Tables of points (x, y, height) on a full grid, whose positions were rounded."""
+"""Tables of positions and heights: points (x, y, height) on a full grid, profiles (x, height)."""
 
-from io import BytesIO
-from typing import BinaryIO
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, BinaryIO
 
 import numpy as np
 
+from gfmd_cli.errors import InputError
 from gfmd_cli.grid.arrays import Field
-from gfmd_cli.maps.text_tables import cells, columns, is_numeric, table_formats
+from gfmd_cli.maps.array_coordinates import EVEN_TOLERANCE, NO_UNITS, factor, in_metres
+from gfmd_cli.maps.height_map import HEIGHT_NAMES, HeightMap, at_equal_distances, check_layout
+from gfmd_cli.maps.text_tables import (
+    OWN_HEADERS,
+    columns,
+    is_height,
+    is_number,
+    is_unit,
+    states_sides,
+    table_formats,
+)
 
+NO_GRID = "three columns that are not the points (x, y, height) of a full grid"
 MAX_DEVIATION = 0.05  # of positions, over their distance; a choice: 0.015 of 0.33, 0.67, 1.00
-EXACT = 1e-6  # such a deviation of positions that stay as they are: that of six digits
 SAME_POSITION = 0.0, 0.5
 """Gaps between equal positions, over the largest gap: of tables, and of stages that jitter."""
+MIN_PRESENT = 0.5  # fraction of the points of a grid, without which they are scattered; a choice
+NAMES = {"x", "y", *HEIGHT_NAMES}
+COLUMN_LINES = 2  # of a header, that state names and units of columns: the last ones
+WORDS = re.compile(r"[\[(]([^\])]*)[\])]|([^\W_]+)")
+"""The text in brackets, or a word."""
+UNITS_OF_GWYDDION = re.compile(r"(Lateral|Value) units:\s*(\S+)")
 
 
-def on_even_grid(file: BinaryIO) -> BinaryIO:
-    """Points of a full grid with rounded positions as points at equal distances.
+def read_points(path: Path, file: BinaryIO) -> HeightMap | None:
+    """Read a table of positions and heights; None for any other file.
 
-    The reader of points takes the first distance along an axis as that of all. Any other file is
-    returned as it is. Raises ValueError for the positions of a full grid that are not even.
+    The columns are x, y and height, or x and height, unless the header names another order. Raises
+    InputError for points that are not those of a full grid, and for units that are not clear.
     """
-    is_points = columns(file) == 3 and "xyz" in table_formats(file)
+    count = columns(file)
+    is_table = count in (2, 3) and "xyz" in table_formats(file)
     file.seek(0)
-    if not is_points:
-        return file
-    lines = file.read().replace(b",", b" ").replace(b";", b" ").splitlines()
+    content = file.read() if is_table else b""
     file.seek(0)
-    is_row = (is_numeric(line) and len(cells(line)) == 3 for line in lines)
-    first = next(number for number, row in enumerate(is_row) if row)
+    if not content or content.startswith(OWN_HEADERS):
+        return None
+    lines = content.replace(b",", b" ").replace(b";", b" ").splitlines()
+    first = next((i for i, line in enumerate(lines) if _is_row(line.split(), count)), 0)
+    if states_sides(lines[:first]):
+        return None
+    table = _numbers(path, lines, first, count)
+    if count == 3 and _is_numbered(table):
+        table, count = table[:, 1:], 2
+    order, factors = _header(path, lines[:first], count)
+    table = table[:, order]
+    if not np.isfinite(table[:, :-1]).all():
+        raise InputError(f"{path}: a position in the table is missing or infinite")
+    heights, sides, note = _grid(path, table) if count == 3 else _profile(path, table)
+    *of_sides, of_heights = factors or [None] * count
+    return HeightMap(
+        heights=heights if of_heights is None else of_heights * heights,
+        sides=tuple(side * (of or 1.0) for side, of in zip(sides, of_sides[::-1], strict=True)),
+        metres=bool(factors),
+        metric_heights=of_heights is not None,
+        periodic=False,
+        source=f"positions and heights{note}",
+    )
+
+
+def _is_row(words: list[bytes], count: int) -> bool:
+    """Whether the words of a line are a row of a table: numbers, or a mark as height."""
+    return len(words) == count and all(map(is_number, words[:-1])) and is_height(words[-1])
+
+
+def _numbers(path: Path, lines: list[bytes], first: int, count: int) -> Field:
+    """The table that begins in a line, NaN where heights are missing."""
     try:
-        points = np.loadtxt(lines[first:], comments=None, ndmin=2)
-    except ValueError:  # a mark of missing heights, or a number in words
-        return file
-    indices = _on_grid(points[:, :2])
-    if indices is None:
-        return file
-    even, deviation = _even(points[:, :2], indices)
-    if deviation.max() > MAX_DEVIATION:
-        raise ValueError(
-            f"the positions along {'xy'[int(deviation.argmax())]} are not evenly spaced: they "
-            f"deviate by up to {deviation.max():.2g} of their distance, and rounding by at most "
-            f"{MAX_DEVIATION:g}: resample the map"
-        )
-    if deviation.max() < EXACT:
-        return file
-    table = BytesIO()
-    table.writelines(line + b"\n" for line in lines[:first])
-    np.savetxt(table, np.column_stack([even, points[:, 2]]), fmt="%.17g")
-    table.seek(0)
+        table = np.loadtxt(lines[first:], comments=None, ndmin=2)
+    except ValueError:  # a mark, or another line
+        table = np.loadtxt(_rows(path, lines, first, count), comments=None, ndmin=2)
     return table
 
 
-def _on_grid(positions: Field) -> Field | None:
-    """The numbers of columns and rows of points, None where they are not those of a full grid."""
+def _rows(path: Path, lines: list[bytes], first: int, count: int) -> Iterator[bytes]:
+    """The rows of a table, with NaN in the place of marks. Raises InputError for other lines."""
+    for number, line in enumerate(lines[first:], first + 1):
+        words = [] if line.startswith(b"#") else line.split()
+        if words and not _is_row(words, count):
+            text = b" ".join(words).decode(errors="replace")
+            raise InputError(
+                f"{path}:{number}: {text!r} in a table of {count} columns of numbers; write NaN "
+                "for a missing height"
+            )
+        if words:
+            yield b" ".join([*words[:-1], words[-1] if is_number(words[-1]) else b"nan"])
+
+
+def _is_numbered(table: Field) -> bool:
+    """Whether the first of three columns numbers the points of a profile at equal distances."""
+    if len(table) < 3 or not (np.diff(table[:, 0]) == 1).all():
+        return False
+    indices = table[:, :1] - table[0, 0]
+    return bool(np.ptp(table[:, 1]) > 0 and _steps(table[:, 1:2], indices)[1] <= MAX_DEVIATION)
+
+
+def _header(path: Path, lines: list[bytes], count: int) -> tuple[list[int], list[float | None]]:
+    """The places of x, y and height among the columns, and metres per unit of each of these.
+
+    There are no factors if no unit is stated. Raises InputError for an unknown unit, and where some
+    of the positions have none.
+    """
+    texts = [line.decode(errors="replace") for line in lines if line.strip()]
+    order, units, is_unclear = list(range(count)), list[str](), False
+    for text in texts[-COLUMN_LINES:]:  # one may have the names, the other the units
+        names, of_columns = _columns_in(text, count)
+        if names:
+            axes = [names.index(axis) for axis in ("x", "y")[: count - 1]]
+            order = [*axes, *set(range(count)).difference(axes)]
+        is_complete = len(of_columns) == count
+        if is_complete and any(of_columns):
+            units = of_columns
+        is_unclear = not is_complete and any(in_metres(unit) for unit in of_columns)
+    units = [units[place] for place in order if units]
+    if stated := dict(UNITS_OF_GWYDDION.findall("\n".join(texts))):
+        units, is_unclear = [stated.get("Lateral", "")] * (count - 1), False
+        units.append(stated.get("Value", ""))
+    if is_unclear or "" in units[:-1]:
+        raise InputError(
+            f"{path}: the header of the table states units, but not one for each of the {count} "
+            "columns, as 'x [um] z [nm]' does: add them, or remove the header"
+        )
+    return order, [factor(path, "the header of the table", unit) for unit in units]
+
+
+def _columns_in(text: str, count: int) -> tuple[list[str], list[str]]:
+    """Names and units of the columns in a line of a header, "" where a column has no unit.
+
+    Where the line does not name the columns, there are no names, and the units are all that it has.
+    """
+    words: list[tuple[str, bool]] = []  # and whether they are units
+    for bracket, word in WORDS.findall(text):
+        inside = re.findall(r"[^\W_]+", bracket)
+        if word or NAMES.intersection(map(str.lower, inside)):
+            words += [(each, is_unit(each)) for each in inside or [word]]
+        elif bracket.strip() not in NO_UNITS:
+            words.append((bracket.strip(), True))
+    names = [word.lower() for word, of_unit in words if not of_unit]
+    if len(names) != count:
+        names = [name for name in names if name in NAMES]
+    if len(names) != count or any(names.count(axis) != 1 for axis in ("x", "y")[: count - 1]):
+        return [], [word for word, of_unit in words if of_unit]
+    units, place = [""] * count, 0
+    for word, of_unit in words:
+        if of_unit:
+            units[place] = word
+        elif word.lower() in names:
+            place = names.index(word.lower())
+    return names, units
+
+
+def _grid(path: Path, table: Field) -> tuple[Field, tuple[float, ...], str]:
+    """Heights [y, x] and sides of the points of a full grid. Raises InputError for other points."""
+    positions = table[:, :2]
+    candidates = []
     for part in SAME_POSITION:
-        indices = np.column_stack([_index(axis, part) for axis in positions.T])
-        nx, ny = indices.max(axis=0) + 1
-        if min(nx, ny) > 1 and nx * ny == len(indices) == len(np.unique(indices @ [1, nx])):
-            return indices
-    return None
+        indices: Any = np.column_stack([_index(axis, part) for axis in positions.T])
+        nx, ny = (int(last) + 1 for last in indices.max(axis=0))
+        is_distinct = len(np.unique(indices @ [1, nx])) == len(table)
+        if min(nx, ny) > 1 and is_distinct and len(table) >= MIN_PRESENT * nx * ny:
+            candidates.append((nx * ny - len(table), (ny, nx), indices))
+    if not candidates:
+        raise InputError(f"{path}: {NO_GRID}")
+    missing, shape, indices = min(candidates, key=lambda candidate: candidate[0])
+    steps, deviation = _steps(positions, indices)
+    if deviation.max() > MAX_DEVIATION:
+        raise InputError(
+            f"{path}: the positions along {'xy'[int(deviation.argmax())]} are not evenly spaced: "
+            f"they deviate by up to {deviation.max():.2g} of their distance, and rounding by at "
+            f"most {MAX_DEVIATION:g}: resample the map"
+        )
+    if missing:
+        raise InputError(
+            f"{path}: {missing} of the {shape[1]} x {shape[0]} points of the grid are missing: add "
+            "their positions, with NaN as height"
+        )
+    heights = np.empty(shape)
+    heights[indices[:, 1], indices[:, 0]] = table[:, 2]
+    return heights, (float(steps[1] * shape[0]), float(steps[0] * shape[1])), ""
 
 
-def _index(positions: Field, part: float) -> Field:
+def _profile(path: Path, table: Field) -> tuple[Field, tuple[float, ...], str]:
+    """Heights and length of a profile; interpolated if the distances are not equal."""
+    check_layout(path, table.shape[:1], table.dtype)
+    x, heights = table.T if table[0, 0] <= table[-1, 0] else table[::-1].T
+    steps = np.diff(x)
+    mean = float(steps.mean())
+    if mean > 0 and np.abs(steps - mean).max() <= EVEN_TOLERANCE * mean:
+        return heights, (mean * x.size,), ""
+    heights, sides = at_equal_distances(path, x, heights)
+    return heights, sides, ", interpolated at equal distances"
+
+
+def _index(positions: Field, part: float) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
     """The number of each position in increasing order, equal for positions less apart."""
     values, inverse = np.unique(positions, return_inverse=True)
     gaps = np.diff(values)
     return np.append(0, np.cumsum(gaps > part * gaps.max(initial=0.0)))[inverse]
 
 
-def _even(positions: Field, indices: Field) -> tuple[Field, Field]:
-    """The best even positions, from zero, and the largest deviation along each axis from them."""
-    means = indices.mean(axis=0), positions.mean(axis=0)
-    shifted = indices - means[0], positions - means[1]
-    step = (shifted[0] * shifted[1]).sum(axis=0) / (shifted[0] ** 2).sum(axis=0)
-    return step * indices, np.abs(shifted[1] - step * shifted[0]).max(axis=0) / step
+def _steps(positions: Field, indices: Field) -> tuple[Field, Field]:
+    """The best step of even positions along each axis, and the largest deviation in such steps."""
+    from_mean = indices - indices.mean(axis=0), positions - positions.mean(axis=0)
+    steps = (from_mean[0] * from_mean[1]).sum(axis=0) / (from_mean[0] ** 2).sum(axis=0)
+    return steps, np.abs(from_mean[1] - steps * from_mean[0]).max(axis=0) / np.abs(steps)

@@ -16,6 +16,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from gfmd_cli.maps.array_coordinates import in_metres
+from gfmd_cli.units import count
 
 WINDOW_BYTES = 2**21  # bytes read at a time: 32768 heights of 25 digits take less than half of it
 MAX_WINDOWS = 32  # of a file; those of a larger one leave gaps
@@ -23,8 +24,15 @@ HEADER_LINES = 200  # that may differ from the table: as many as SurfaceTopograp
 SAMPLE_BYTES = 2**16  # at the end of each window; a choice
 MIN_DIGIT_FRACTION = 0.2  # of the characters of a table, most of which are digits; a choice
 GRID_LINES = 20_000  # whose positions are compared; a choice
+SIZE_BYTES = 100  # of a line with two numbers
 MATRIX_COLUMNS = 4  # fewer are positions: the rule of SurfaceTopography
 LATIN_1 = b"Scan Parameters"  # begins a table of Dektak, which its reader takes as Latin-1
+OWN_HEADERS = LATIN_1, b"X;Y;valid"  # of profiles that SurfaceTopography knows
+MISSING = b"bad", b"nan", b"inf", b"infinite"
+"""Marks of missing heights, in any case; those of SurfaceTopography."""
+AMBIGUOUS_UNITS = "pm", "in"  # which end a time and begin a phrase
+SIDE = re.compile(rb"#\s*\S+\s*:\s*[\d.]+\s*(\S+)\s*$")
+"""A line such as "# Width: 20 um", in any language."""
 THOUSANDS = re.compile(rb"[-+]?[1-9]\d{0,2}(,\d{3})+(\.\d*)?")
 NUMBER_CHARACTERS = b' "\t+-.,;0123456789eEdDinfaINFA'
 """Characters of lines without words."""
@@ -66,10 +74,29 @@ def columns(file: BinaryIO) -> int:
     return _columns(file, b" \t,;")
 
 
-def units_of_columns(file: BinaryIO, columns: int) -> list[str]:
-    """The known units of length in the line above the first row of a table, as in "x [um]"."""
-    lines = header(file, columns)
-    return _units(lines[-1]) if lines else []
+def is_number(word: bytes) -> bool:
+    """Whether a word is a number, NaN or infinite."""
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True
+
+
+def is_height(word: bytes) -> bool:
+    """Whether a word is a number, or a known mark of a missing height."""
+    return is_number(word) or word.lower() in MISSING
+
+
+def is_unit(word: str) -> bool:
+    """Whether a word of a header is a known unit of length."""
+    return in_metres(word) is not None and word not in AMBIGUOUS_UNITS
+
+
+def states_sides(lines: list[bytes]) -> bool:
+    """Whether a header states two lengths, which are the sides of a matrix."""
+    sides = filter(None, map(SIDE.match, lines))
+    return sum(in_metres(side[1].decode(errors="replace")) is not None for side in sides) == 2
 
 
 def header(file: BinaryIO, columns: int) -> list[bytes]:
@@ -86,8 +113,9 @@ def header(file: BinaryIO, columns: int) -> list[bytes]:
 
 def unread_units(file: BinaryIO, columns: int) -> str:
     """A warning about units of length in the header of a matrix, or "" if it states none."""
-    units = [unit for line in header(file, columns) for unit in _units(line)]
-    if not set(units) - {"pm"}:  # which ends a time
+    lines = b" ".join(header(file, columns)).decode(errors="replace")
+    units = list(filter(is_unit, re.split(r"[\s,;:=/_()\[\]\"#]+", lines)))
+    if not units:
         return ""
     return (
         f"the header of the table states units ({', '.join(units)}), which are not read: set "
@@ -95,10 +123,29 @@ def unread_units(file: BinaryIO, columns: int) -> str:
     )
 
 
-def _units(line: bytes) -> list[str]:
-    """The known units of length among the words of a line."""
-    words = re.split(r"[\s,;:=/_()\[\]\"#]+", line.decode(errors="replace"))
-    return [word for word in words if in_metres(word) is not None]
+def without_size(file: BinaryIO) -> BinaryIO:
+    """A matrix without a first line that states its numbers of rows and columns."""
+    width = _columns(file, b" \t")
+    file.seek(0)
+    size = [int(word) for word in file.readline(SIZE_BYTES).split() if word.isdigit()]
+    if len(size) == 2 and width in size and width >= MATRIX_COLUMNS:
+        content = file.read()
+        rows = sum(len(line.split()) == width for line in content.splitlines())
+        if sorted(size) == sorted((rows, width)):
+            return BytesIO(content)
+    file.seek(0)
+    return file
+
+
+def shorter_or_longer_row(file: BinaryIO) -> str:
+    """The first row of a matrix with another number of heights than the others; "" without one."""
+    width = _columns(file, b" \t")
+    file.seek(0)
+    for number, line in enumerate(file, 1):
+        length = len(line.split()) if is_numeric(line.strip()) else 0
+        if length not in (0, width):
+            return f"line {number} has {count(length, 'number')}, the other rows {width}"
+    return ""
 
 
 def with_blanks(file: BinaryIO) -> tuple[BinaryIO, str]:

@@ -164,17 +164,11 @@ class FileSurface(RigidSurface):
     @property
     def sides(self) -> tuple[float, ...]:
         """Sides of the periodic cell [m]: twice those of the map where it is mirrored."""
-        shape, spacing = self._topography().heights.shape, self._topography().spacing or (1.0, 1.0)
-        length = self._known_length() or 1.0
-        if len(shape) == 1:
-            return (self.copies * length,)
-        ratio = shape[0] * spacing[0] / (shape[1] * spacing[1])
-        return self.copies * (self.length_y or length * ratio), self.copies * length
-
-    def _known_length(self) -> float | None:
-        """Side of the map [m], a side without a unit scaled as the heights; None if unknown."""
         stated = self.stated_sides()
-        return self.length if self.length is not None or stated is None else stated[-1]
+        along_y, along_x = (1.0, *(stated or self._topography().heights.shape))[-2:]
+        length = self.length or (stated[-1] if stated else 1.0)
+        sides = self.length_y or length * (along_y / along_x), length
+        return tuple(self.copies * side for side in sides[-self.dimension :])
 
     def stated_sides(self) -> tuple[float, ...] | None:
         """Sides of the map [m] by its file, scaled as the heights where it states no unit."""
@@ -296,59 +290,58 @@ class FileSurface(RigidSurface):
     def warnings(self, boundary: str = "periodic") -> list[str]:
         """Warnings about the side, the heights, their gradient and borders, and unused keys."""
         topography, heights = self._topography(), _prepared(self)
-        warnings = list(topography.notes)
-        if self._known_length() is None:
-            warnings.append(
-                "the file does not state its side in metres; L = 1 m is assumed: set surface.length"
-            )
-        stated = self.stated_sides()
-        if self.length is not None and stated is not None and topography.metres:
-            warnings.append(map_warnings.other_side(self.length, stated[-1]))
-        if self.length is not None and stated is None:
-            warnings.append(map_warnings.side_of_a_part(self.length, topography))
-        if self.length is None:
-            side = self._known_length() or 1.0
-            warnings.append(map_warnings.unknown_unit(topography, self.scale, side))
-        warnings.append(map_warnings.unit_of_heights(topography, self.scale))
+        warnings = [
+            *topography.notes,
+            *self._warnings_on_sides(),
+            map_warnings.unit_of_heights(topography, self.scale),
+            *_warnings_on_heights(self),
+            map_warnings.unlikely_gradient(heights, self._map_spacing()),
+        ]
         if "taper" in self.model_fields_set and self.edges != "window":
             warnings.append('surface.taper has no effect without surface.edges = "window"')
-        warnings += _warnings_on_heights(self)
         if self.missing == "fill":
             warnings.append(map_warnings.many_filled_in(topography))
-        warnings.append(map_warnings.unlikely_gradient(heights, self._map_spacing()))
         if boundary == "periodic" and not self.has_borders:
             warnings.append(map_warnings.step_at_border(heights))
         if boundary == "free" and self.levelling() == "none":
             warnings.append(map_warnings.tilted(heights))
-        return [warning for warning in warnings if warning]
+        return list(filter(None, warnings))
+
+    def _warnings_on_sides(self) -> list[str]:
+        """Warnings about the side along x, one of them at most."""
+        topography, stated = self._topography(), self.stated_sides()
+        if self.length is not None:
+            if stated is not None and topography.metres:
+                return [map_warnings.other_side(self.length, stated[-1])]
+            return [map_warnings.side_of_a_part(self.length, topography)]
+        if stated is not None:
+            return [map_warnings.unknown_unit(topography, self.scale, stated[-1])]
+        return [
+            "the file does not state its side in metres; L = 1 m is assumed: set surface.length"
+        ]
 
     def preparation(self, boundary: str = "") -> str:
         """Description of how the map was read and prepared for a boundary."""
         topography, levelling = self._topography(), self.levelling()
-        steps = [f"{self.path.name} ({topography.source}): {extent(topography.shape)} points"]
-        if self.region is not None:
-            steps.append(f"region {self.region}")
-        if self.crop and topography.heights.shape != topography.shape:
-            steps.append(f"cropped to {extent(topography.heights.shape)}")
-        if self.flip:
-            steps.append("turned upside down")
-        if topography.holes:
-            treatment = "never touch" if self.missing == "void" else "filled in"
-            steps.append(f"{count(topography.holes, 'missing height')} {treatment}")
-        if levelling != "none":
-            steps.append(f"{levelling} subtracted")
-        if boundary == "free":
-            steps.append("free boundary")
-        elif self.has_borders and not boundary:
-            steps.append("not periodic (free boundary or mirrored)")
-        if self.edges == "window":
-            steps.append(f"edges tapered to the mean height over {self.taper:g} of the side")
-        elif self.edges == "mirror":
-            steps.append("mirrored to twice the side")
-        elif boundary != "free" and not self.has_borders:
-            steps.append("periodic")
-        steps.append(f"interpolation on finer grids: {self.applied_interpolation()}")
-        return ", ".join(steps)
+        holes = count(topography.holes, "missing height") if topography.holes else ""
+        is_free, own_shape = boundary == "free", topography.heights.shape
+        steps = {
+            f"{self.path.name} ({topography.source}): {extent(topography.shape)} points": True,
+            f"region {self.region}": self.region is not None,
+            f"cropped to {extent(own_shape)}": self.crop and own_shape != topography.shape,
+            "turned upside down": self.flip,
+            f"{holes} {'never touch' if self.missing == 'void' else 'filled in'}": bool(holes),
+            f"{levelling} subtracted": levelling != "none",
+            "free boundary": is_free,
+            "not periodic (free boundary or mirrored)": self.has_borders and not boundary,
+            f"edges tapered to the mean height over {self.taper:g} of the side": (
+                self.edges == "window"
+            ),
+            "mirrored to twice the side": self.edges == "mirror",
+            "periodic": self.edges in (None, "none") and not is_free and not self.has_borders,
+            f"interpolation on finer grids: {self.applied_interpolation()}": True,
+        }
+        return ", ".join(step for step, applies in steps.items() if applies)
 
 
 class MirroredMap(FileSurface):

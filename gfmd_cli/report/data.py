@@ -16,7 +16,7 @@ from gfmd_cli.analysis.tables import TitledCurves, curve_title
 from gfmd_cli.analysis.wording import in_si
 from gfmd_cli.bench.file import Trace
 from gfmd_cli.study.column import Row
-from gfmd_cli.study.reading import open_study, solved_rows
+from gfmd_cli.study.reading import open_study, solved_rows, tell_files_apart
 
 
 @dataclass(frozen=True)
@@ -109,6 +109,7 @@ def side_by_side(studies: Sequence[ReportData], traces: list[Trace]) -> ReportDa
     missing = sum(data.comparison.missing for data in studies)
     comparison = replace(first.comparison, curves=curves, missing=missing)
     rows = [row for data in studies for row in data.rows]
+    tell_files_apart(rows)
     return ReportData(comparison, rows, {}, traces)
 
 

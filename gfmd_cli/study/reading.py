@@ -28,6 +28,9 @@ KINDS = {str: "S", int: "i", float: "f"}
 PACKED = "columns"
 """Group of the columns of a record, by kind."""
 MAX_DIMENSIONS = 2
+FILE_MARK = " sha256="
+"""Precedes the checksum in the label of a surface."""
+FILE_DIGITS = 8  # of a checksum in a label
 DAMAGE = (
     KeyError, IndexError, TypeError, AttributeError, ValueError, OverflowError,
     OSError, RuntimeError, MemoryError,
@@ -88,7 +91,9 @@ class StudyFile:
             if len(values) != size:
                 raise ValueError(f"{name} has {len(values)} rows, not {size}")
         blank = layout.empty_row()
-        return [blank | {name: values[i] for name, values in columns.items()} for i in range(size)]
+        rows = [blank | {name: values[i] for name, values in columns.items()} for i in range(size)]
+        tell_files_apart(rows)
+        return rows
 
     @cached_property
     def task_ids(self) -> list[str]:
@@ -272,6 +277,22 @@ def read_rows(path: Path) -> list[dict[str, Any]]:
     """The rows of a study, as `StudyFile.rows`. Raises InputError, StudyError."""
     with open_study(path) as study:
         return study.rows
+
+
+def tell_files_apart(rows: Iterable[dict[str, Any]]) -> None:
+    """Add checksums to the labels of surfaces that different files share, in place.
+
+    Files differ that have one name in two folders, or that have changed between two runs.
+    """
+    files: dict[str, list[dict[str, Any]]] = {}
+    for row in rows:
+        files.setdefault(row["surface"].partition(FILE_MARK)[0], []).append(row)
+    for alike in files.values():
+        differ = len({row["surface_sha256"] for row in alike}) > 1
+        for row in alike:
+            mark = f"{FILE_MARK}{row['surface_sha256'][:FILE_DIGITS]}" if differ else ""
+            for name in ("surface", "ensemble"):
+                row[name] = row[name].partition(FILE_MARK)[0] + mark
 
 
 def solved_rows(rows: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
