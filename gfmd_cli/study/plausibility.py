@@ -105,9 +105,10 @@ def _missed_accuracy(task: Task, solved: TaskSolution) -> list[str]:
     columns = [] if task.auto else inaccurate_columns(task, solved)
     if not columns:
         return []
+    remedy = "more points" if LOADS[task.quantity].searched else 'grid.points = "auto"'
     return [
         f"the errors of {', '.join(columns)} are larger than [accuracy] requests, or unknown: "
-        'use grid.points = "auto"'
+        f"use {remedy}"
     ]
 
 
