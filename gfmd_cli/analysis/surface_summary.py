@@ -27,6 +27,7 @@ FIT = (
     TableColumn("H", "hurst", ".2f", error="hurst_error", optional=True),
     TableColumn("lambda_r", "rolloff_wavelength", ".3g", "m", "rolloff_error", "no_rolloff", True),
     TableColumn("lambda_s", "cutoff_wavelength", ".3g", "m", optional=True),
+    TableColumn("rms of fit", "rms_height", ".3g", "m", optional=True),
     TableColumn("scatter", "scatter", ".3g", optional=True),
 )
 """Columns of the fit, with the keys of `fit_record`."""

@@ -171,7 +171,7 @@ def _fit_below(shells: Shells, range_: int, counts: Field) -> tuple[SelfAffineFi
 
 def _range(q: Field, shells: int) -> str:
     """The wavenumbers of the first shells, for messages."""
-    return f"spectrum: nearly all slopes are of q = {q[0]:.3g} to {q[shells - 1]:.3g} 1/m"
+    return f"spectrum: the slopes are of waves q = {q[0]:.3g} to {q[shells - 1]:.3g} 1/m"
 
 
 def _shape(q: Field, x: Field, q_1: float) -> Field:
