@@ -108,6 +108,11 @@ def test_a_random_surface_in_metres_without_a_side():
     assert solve(tables(sideless | {"length": 1.0}, p_star=0.1)).warnings == ()
 
 
+def test_an_rms_height_in_another_unit_than_the_side():
+    steep = solve(tables(SURFACE | {"length": 1e-6, "h_std": 1e-5}, p_star=0.1))
+    assert "check that surface.h_std and surface.length are in the same unit" in steep.warnings[0]
+
+
 @pytest.mark.parametrize(("accuracy", "warned"), [(0.5, False), (0.001, True)])
 def test_a_fixed_grid_that_misses_the_requested_accuracy(accuracy, warned):
     spec = tables(p_star=0.1) | {"accuracy": {"contact_area": accuracy}}

@@ -4,8 +4,10 @@ from collections.abc import Mapping
 from math import inf, isfinite
 from typing import Any
 
+from gfmd_cli.maps.map_warnings import MAX_GRADIENT
 from gfmd_cli.physics.elastomers import Layer
 from gfmd_cli.physics.indenters import RigidSurface
+from gfmd_cli.physics.spectrum_fit import moments
 from gfmd_cli.spec.models import LOADS
 from gfmd_cli.status import Status
 from gfmd_cli.study.refinement import TaskSolution, border_share, inaccurate_columns
@@ -48,6 +50,12 @@ def warnings_of(task: Task, solved: TaskSolution, results: Mapping[str, Any]) ->
         )
     elif elastomer.modulus > PASCALS and task.surface.rough and _has_default_side(task.surface):
         warnings.append("surface.length is not given: a side of 1 m is assumed")
+    gradient = moments(scene.shells).gradient
+    if {"h_std", "length"} <= task.surface.model_fields_set and gradient > MAX_GRADIENT:
+        warnings.append(
+            f"rms gradient {gradient:.3g}: check that surface.h_std and surface.length are in the "
+            "same unit"
+        )
     if task.solver.tolerance > LOOSE:
         warnings.append(
             f"solver.tolerance = {task.solver.tolerance:g}: contact area and mean gap may be wrong "
