@@ -4,7 +4,7 @@ Equation numbers are those of the paper: Mueser, "Elastic contacts of randomly r
 the spatial dimensions", Sect. 4.1 and 5.2. Sums over q never contain q = 0.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import ClassVar
@@ -253,7 +253,9 @@ class Persson:
         if not energy.size:
             return np.zeros_like(p), np.zeros_like(p)
         v, slope = np.empty(p.size), np.empty(p.size)
-        for part in self._chunks(p.size):
+        rows = max(1, _CHUNK // energy.size)
+        for start in range(0, p.size, rows):
+            part = slice(start, start + rows)
             pressure = p.ravel()[part]
             a, da = _bin_area(pressure, self.shells.variance)
             x = np.minimum(self._reduced(pressure), UNDERFLOW)[:, None]
@@ -262,10 +264,6 @@ class Persson:
             v[part] = w @ energy
             slope[part] = (by_a * da + by_s * ds) @ energy
         return v.reshape(p.shape), slope.reshape(p.shape)
-
-    def _chunks(self, size: int) -> Iterator[slice]:
-        rows = max(1, _CHUNK // max(1, self.shells.variance.size))
-        return (slice(start, start + rows) for start in range(0, size, rows))
 
 
 def _bin_area(p: Field, variance: Field) -> tuple[Field, Field]:

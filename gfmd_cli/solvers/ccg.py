@@ -41,7 +41,6 @@ class ConstrainedCG(Solver):
 
     kind: Literal["ccg"] = "ccg"
     fields_in_memory: ClassVar[float] = 10.5
-    """Fields of double precision at the peak of a solve; scripts/memory.py measures it."""
 
     state_type: ClassVar[type[State]] = CCGState
 

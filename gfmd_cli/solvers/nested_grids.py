@@ -67,7 +67,7 @@ def solve_contact(
     loose = solver.model_copy(update={"tolerance": max(solver.tolerance, COARSE_TOLERANCE)})
     grids = _grids(contact, solver, start)
     transforms = 0.0  # of the size of the finest grid
-    can_touch_everywhere = contact.boundary == "periodic" and contact.may_touch is None
+    can_touch_everywhere = contact.is_periodic and contact.may_touch is None
     if solver.iterative and can_touch_everywhere and not isinstance(start, Resume):
         full, transforms = _full_contact(grids[::-1], solver)
         if full is not None:
@@ -93,7 +93,7 @@ def solve_contact(
                 while grids[-1] is not start.contact:
                     grids.pop()
     assert state is not None
-    for _ in range(MAX_CORRECTIONS if contact.boundary == "periodic" else 0):
+    for _ in range(MAX_CORRECTIONS if contact.is_periodic else 0):
         good_start = status.is_converged and state.step == 0  # no step has laid points yet
         if not good_start or not contact.lay_pressed(state.u, state.sigma, state.residual):
             break
@@ -118,7 +118,7 @@ def _local_start(
     pause = partial(watch, coarse, state)
     if tiles_apply(finer[-1]):
         return start_from(coarse, pressure, finer, tolerance, pause)
-    return direct_start(pressure > 0, finer, pause) if coarse.boundary == "periodic" else None
+    return direct_start(pressure > 0, finer, pause) if coarse.is_periodic else None
 
 
 def levels(shape: Shape, sides: tuple[float, ...]) -> list[Shape]:
