@@ -46,7 +46,7 @@ class Recorder:
     run: int
     label: str
     samples: list[tuple[float, ...]] = field(default_factory=list)
-    begun: float = field(default_factory=time.process_time)
+    begun: float = field(default_factory=lambda: time.process_time())
     own: float = 0.0
     """Seconds spent here, which are not the solver's."""
     a_r: float = np.nan
