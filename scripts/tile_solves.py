@@ -41,13 +41,9 @@ class RecordedSolve(local_start.PeriodicSolve):
     """The solve on tiles, which counts its evaluations and steps on the finest grid."""
 
     max_exponent: ClassVar[float] = 9.0
+    max_fraction: ClassVar[tuple[float, float, float]] = (1.0, 0.0, 0.0)
     latest: ClassVar["RecordedSolve | None"] = None
     """The last solve on a finest grid."""
-
-    @classmethod
-    def max_fraction(cls, exponent: float) -> float:
-        """Any."""
-        return 1.0
 
     def solve(self, tolerance: float) -> tuple[Evaluation, Field]:
         """See `LocalSolve`."""

@@ -67,11 +67,9 @@ class LocalSolve:
     the other limits."""
     max_exponent: ClassVar[float]
     """Largest exponent n of k(q) for which it is."""
-
-    @classmethod
-    def max_fraction(cls, exponent: float) -> float:
-        """Largest fraction of tiles that the contact can reach, by the largest exponent n."""
-        raise NotImplementedError
+    max_fraction: ClassVar[tuple[float, float, float]]
+    """Largest fraction of tiles that the contact can reach: for n = 0, its decrease with the
+    largest exponent n, and its lower limit."""
 
     def __init__(self, contact: Contact, tiles: Tiles, s: Field, pause: Callable[[], None]) -> None:
         self.contact, self.grid, self.pause = contact, contact.grid, pause

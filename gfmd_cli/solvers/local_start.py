@@ -48,13 +48,14 @@ def start_from(
     if not doubled or not all(map(tiles_apply, finer)):
         return None
     solve_on_tiles = LOCAL_SOLVES[last.boundary]
+    highest, decrease, lowest = solve_on_tiles.max_fraction
     for contact in finer:
         tiles = _tiles_in_reach(pressure > 0, is_periodic=contact.is_periodic)
         s = _refined(pressure, tiles)
         if contact.may_touch is not None:
             s *= tiles.take(contact.may_touch)
-        largest = solve_on_tiles.max_fraction(contact.exponents[1])
-        if tiles.count > largest * tiles.used.size or not s.any():
+        fraction = max(highest - decrease * contact.exponents[1], lowest)
+        if tiles.count > fraction * tiles.used.size or not s.any():
             return None
         solve = solve_on_tiles(contact, tiles, s, pause)
         del pressure, s  # their memory is needed now
@@ -117,11 +118,7 @@ class PeriodicSolve(LocalSolve):
     operators_type = PeriodicOperators
     min_points: ClassVar[int] = 512
     max_exponent: ClassVar[float] = 2.05
-
-    @classmethod
-    def max_fraction(cls, exponent: float) -> float:
-        """See `LocalSolve`."""
-        return max(0.17 - 0.1 * exponent, 0.012)
+    max_fraction: ClassVar[tuple[float, float, float]] = (0.17, 0.1, 0.012)
 
     def compliance_everywhere(self, *, in_single_precision: bool) -> Field:
         """C s at all points, in the memory of the transforms."""
@@ -169,11 +166,7 @@ class FreeSolve(LocalSolve):
     operators_type = FreeOperators
     min_points: ClassVar[int] = 256
     max_exponent: ClassVar[float] = 1.55
-
-    @classmethod
-    def max_fraction(cls, exponent: float) -> float:
-        """See `LocalSolve`."""
-        return 0.25
+    max_fraction: ClassVar[tuple[float, float, float]] = (0.25, 0.0, 0.0)
 
     def compliance_everywhere(self, *, in_single_precision: bool) -> Field:
         """C s at all points, always in double precision."""
