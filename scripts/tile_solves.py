@@ -40,6 +40,8 @@ CONVOLUTIONS = 3  # whose fastest is printed
 class RecordedSolve(local_start.PeriodicSolve):
     """The solve on tiles, which counts its evaluations and steps on the finest grid."""
 
+    max_exponent: ClassVar[float] = 9.0
+    max_fraction: ClassVar[tuple[float, float, float]] = (1.0, 0.0, 0.0)
     latest: ClassVar["RecordedSolve | None"] = None
     """The last solve on a finest grid."""
 
@@ -98,11 +100,7 @@ def main() -> None:
     parser.add_argument("--max-steps", type=int, default=local_solve.MAX_STEPS, help="on tiles")
     parser.add_argument("--repeats", type=int, default=2)
     arguments = parser.parse_args()
-    smallest = local_start.TILE_LIMITS["periodic"].points
     with (
-        patch.dict(
-            local_start.TILE_LIMITS, periodic=local_start.TileLimits(smallest, 1.0, 0.0, 0.0, 9.0)
-        ),
         patch.dict(local_start.LOCAL_SOLVES, periodic=RecordedSolve),
         patch.object(local_start, "SMALLEST_EXPONENT", 0.0),
         patch.object(local_solve, "MAX_STEPS", arguments.max_steps),

@@ -38,31 +38,25 @@ def exact_gap(p, n):
 
 
 @pytest.mark.parametrize("n", [0.0, 1.0, 2.5, 4.0])
-def test_energy_and_gap_agree_with_quadrature(n):
+def test_the_gap_agrees_with_quadrature(n):
     theory = two_shells(n)
     for p in (0.02, 0.3, 1.5):
-        assert float(theory.elastic_energy(p)) == pytest.approx(exact_energy(p, n), rel=1e-9)
         assert float(theory.mean_gap(p)) == pytest.approx(exact_gap(p, n), rel=1e-6)
 
 
 @pytest.mark.parametrize("n", np.linspace(0, 4, 9))
-def test_the_weight_rises_to_one_in_full_contact(n):
+def test_the_weight_rises_with_both_areas(n):
     theory = two_shells(n)
     s = np.linspace(0.01, 1, 100)[:, None]
     a = np.stack([np.sqrt(s), s], axis=-1)[:, 0]  # the area decreases with the scale
-    w, by_a, by_s = theory.weight(a, s)
-    assert np.all(w > 0)
+    by_a, by_s = theory.weight_slopes(a, s)
     assert np.all(by_a > 0)
     assert np.all(by_s > 0)
-    assert w[-1] == pytest.approx(np.ones(2), rel=1e-12)
     p = np.geomspace(1e-6, 40, 200)
-    assert float(theory.elastic_energy(40.0)) == pytest.approx(0.5 * sum(ENERGY), rel=1e-12)
     assert np.all(np.diff(theory.mean_gap(p)) <= 0)
-    assert float(theory.elastic_energy(0.0)) == 0
     assert float(theory.mean_gap(0.0)) == np.inf
     flat = FittedWeight(Shells(*np.empty((6, 0))), np.empty(0))
     assert np.all(flat.mean_gap(p) == 0)
-    assert np.all(flat.elastic_energy(p) == 0)
 
 
 def test_springs_have_nearly_their_closed_form():

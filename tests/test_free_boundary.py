@@ -12,23 +12,19 @@ from free_contacts import ELASTOMERS, compliance_matrix, oblong_contact
 from scipy.optimize import nnls
 
 from gfmd_cli import api
-from gfmd_cli.errors import InputError
 from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.physics.contact import build_scene
 from gfmd_cli.physics.elastomers import HalfSpace, Power
 from gfmd_cli.physics.file_surface import FileSurface
-from gfmd_cli.physics.free_contact import (
-    build_free_scene,
-)
+from gfmd_cli.physics.free_contact import build_free_scene
 from gfmd_cli.physics.indenters import LineParabola, Parabola
 from gfmd_cli.physics.observables import contact_line, observe
 from gfmd_cli.physics.patches import contact_patches, open_gap
 from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.solvers.auto import Auto
 from gfmd_cli.solvers.dual import Dual
-from gfmd_cli.solvers.loop import Solver, solve
+from gfmd_cli.solvers.loop import solve
 from gfmd_cli.solvers.nested_grids import Resume, solve_contact
-from gfmd_cli.solvers.pcg import ProjectedCG
 from gfmd_cli.study.observables import SolvedContact
 
 ROUGH = SelfAffine(cutoff=0.05)
@@ -295,14 +291,6 @@ def test_dual_solver_is_for_a_free_boundary(gfmd):
     done = gfmd("run", "spec.toml", "--set", "grid.boundary=periodic", "--set", "solver.kind=dual")
     assert done.exit_code == 2
     assert 'boundary = "free", not "periodic"' in done.output
-
-
-def test_solvers_name_their_boundary():
-    periodic: Solver = ProjectedCG()
-    periodic.check_boundary("periodic")
-    with pytest.raises(InputError, match="auto"):
-        periodic.check_boundary("free")
-    Auto().check_boundary("free")
 
 
 def test_thin_layer_is_planned_and_solved(rows_of):

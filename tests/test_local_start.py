@@ -15,15 +15,10 @@ from gfmd_cli.physics.free_contact import SCENES, build_free_scene
 from gfmd_cli.physics.observables import contact_pressure
 from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.solvers.dual import Dual
-from gfmd_cli.solvers.local_start import start_from
+from gfmd_cli.solvers.local_start import LOCAL_SOLVES, start_from
 from gfmd_cli.solvers.nested_grids import Resume, solve_contact
 from gfmd_cli.solvers.pcg import ProjectedCG
-from gfmd_cli.solvers.tile_operators import (
-    TILE_OPERATORS,
-    FreeOperators,
-    PeriodicOperators,
-    convolution,
-)
+from gfmd_cli.solvers.tile_operators import FreeOperators, PeriodicOperators, convolution
 from gfmd_cli.solvers.tiles import Tiles
 
 SUITED = [*(Power(n=n) for n in (0.25, 0.5, 1, 1.25, 1.5)), HalfSpace(E_star=2e9)]
@@ -115,7 +110,7 @@ def test_the_stiffness_on_tiles_is_that_of_a_point_up_to_its_reach(boundary):
     u = np.zeros(grid.shape)
     u[100, 100] = 1.0
     stress = np.empty(grid.shape)
-    tiles.put(TILE_OPERATORS[boundary](contact).stress(tiles)(tiles.take(u)), stress)
+    tiles.put(LOCAL_SOLVES[boundary].operators_type(contact).stress(tiles)(tiles.take(u)), stress)
     near = (slice(92, 109), slice(92, 109))
     exact = np.fft.irfft2(np.fft.rfft2(u) * k)
     assert stress[near] == pytest.approx(exact[near], abs=1e-3 * exact.max())

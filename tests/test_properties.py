@@ -229,12 +229,6 @@ def test_many_more_specs_are_solved_or_say_why_not(tables):
     check(tables)
 
 
-@pytest.mark.parametrize("n", [0.5, 1, 3])
-def test_sorting_an_elastomer_that_is_not_flat_is_bad_input(n):
-    with pytest.raises(InputError, match="independent of q"):
-        solve(plain_tables(elastomer={"kind": "power", "n": n}, solver={"kind": "sort"}))
-
-
 # --- scales and units -----------------------------------------------------------------------------
 
 SCALED = SelfAffine(cutoff=0.06, h_std=1.0)

@@ -196,11 +196,6 @@ def test_every_transform_is_counted(solver, monkeypatch):
         assert current.transforms == 2 * (pairs - unseen)
 
 
-def test_each_step_of_fire_costs_one_pair():
-    _, state = solved(contact_of(2, 0.1), Fire())
-    assert state.transforms == 2 * (state.step + 1)
-
-
 def test_the_energy_falls_at_every_step_of_fire():
     contact = contact_of(2, 0.1)
     energies = []

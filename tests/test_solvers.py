@@ -21,7 +21,7 @@ from gfmd_cli.physics.indenters import LineParabola, Parabola, Wave
 from gfmd_cli.physics.observables import observe
 from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.solvers.auto import Auto
-from gfmd_cli.solvers.nested_grids import Resume, full_contact, levels, solve_contact
+from gfmd_cli.solvers.nested_grids import Resume, levels, solve_contact
 from gfmd_cli.solvers.pcg import ProjectedCG
 from gfmd_cli.solvers.sort import Sort, is_flat
 
@@ -669,10 +669,6 @@ def test_a_coarser_contact_is_the_same_surface_on_fewer_points():
     assert coarse.stiffness == pytest.approx(k, rel=1e-13)
 
 
-def test_partial_contact_is_not_taken_for_full():
-    assert full_contact(scene(ROUGH, Power(n=1), POINTS).contact(0.1), "pcg") is None
-
-
 def test_giving_up_says_so():
     contact = scene(ROUGH, Power(n=3), POINTS).contact(0.02)
     solution = solve_contact(contact, Auto(tolerance=1e-9, max_steps=5))
@@ -701,9 +697,3 @@ def test_a_stopped_solve_goes_on_bit_by_bit(elastomer, tolerance):
         assert np.array_equal(resumed.u, straight.u)
         assert np.array_equal(resumed.sigma, straight.sigma)
         assert (resumed.steps, resumed.residual) == (straight.steps, straight.residual)
-
-
-def test_sorting_is_one_state():
-    contact = scene(ROUGH, Power(n=0), POINTS).contact(0.1)
-    state = Sort().begin(contact, contact.grid.empty())
-    assert [s.step for s in Sort().iterate(contact, state)] == [0]

@@ -16,6 +16,11 @@ from gfmd_cli.study.reading import open_study, solved_rows, tell_files_apart
 
 SURFACE = ("surface", "surface_sha256", "seed")
 """Columns of a surface: two files may have the same name."""
+ALIKE = (
+    ("boundary", "points", "solver", "tolerance"), ("boundary", "points"),
+    ("boundary",), ("points",), (),
+)  # fmt: skip
+"""Columns in which the rows of a pair are alike, in the order in which they are tried."""
 
 
 class Deviation(NamedTuple):
@@ -105,8 +110,7 @@ def _matches(one: list[Row], other: list[Row], *keys: Callable[[Row], Hashable])
     """Pairs of the same keys, alike in boundary, grid and solver if possible; from both lists."""
     pairs: list[Pair] = []
     paired_ids: set[int] = set()
-    columns = "boundary", "points", "solver", "tolerance"
-    for alike in (columns, columns[:2], columns[:1], columns[1:2], ()):
+    for alike in ALIKE:
 
         def key_of(row: Row, alike: tuple[str, ...] = alike) -> Hashable:
             return *(key(row) for key in keys), *(row[name] for name in alike)

@@ -104,7 +104,7 @@ def solvers_to_compare(spec: Spec, task: Task, contact: Contact) -> list[Solver]
     """
     solvers: list[Solver] = [*spec.solver]
     if len(solvers) == 1 and isinstance(solvers[0], Auto):
-        kinds = COMPARED if contact.boundary == "periodic" else (Auto,)
+        kinds = COMPARED if contact.is_periodic else (Auto,)
         solvers = [kind(**solvers[0].shared_keys()) for kind in kinds]
     n = task.elastomer.exponent
     steepness = np.inf if n is None else n  # unknown: only what suits all elastomers

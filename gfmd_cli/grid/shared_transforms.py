@@ -8,6 +8,7 @@ transforms of 3200^2 took 5 to 50 times as long as on one thread.
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
+from operator import call
 
 import numpy as np
 
@@ -64,8 +65,4 @@ def in_turn(pool: ThreadPoolExecutor | None, *stages: Sequence[Execute]) -> Exec
 
 def side_by_side(pool: ThreadPoolExecutor | None, calls: Sequence[Execute]) -> None:
     """Run calls on the threads of a pool; without one, one after the other."""
-    list(map(_execute, calls) if pool is None else pool.map(_execute, calls))
-
-
-def _execute(call: Execute) -> None:
-    call()
+    list(map(call, calls) if pool is None else pool.map(call, calls))

@@ -33,7 +33,7 @@ def approach(
     if not elastomer.has_level(contact.boundary, scene.grid.dimension):
         return np.nan
     level = contact.reference_level(u, sigma)
-    if contact.boundary == "periodic":
+    if contact.is_periodic:
         assert elastomer.uniform_stiffness is not None
         uniform = elastomer.uniform_stiffness * scene.h_std / scene.delta_sigma
         level -= contact.pressure / uniform

@@ -58,6 +58,11 @@ class Contact:
     may_touch: Mask | None = None
     """Points where the height is known; the others never touch. None where all are known."""
 
+    @property
+    def is_periodic(self) -> bool:
+        """Whether the cell is repeated periodically."""
+        return self.boundary == "periodic"
+
     @cached_property
     def obstacle(self) -> Field:
         """Lower limit of u: the height where it is known, `VOID_HEIGHT` elsewhere."""

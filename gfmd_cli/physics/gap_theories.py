@@ -44,22 +44,6 @@ class CoarseGrained(Persson):
 
     mean_gap_source: ClassVar[str] = "coarse-graining"
 
-    def elastic_energy(self, p: Field | float) -> Field:
-        """Elastic energy per area v, without q = 0: the integral of p over the loss of u_g.
-
-        Paper Eq. (28) as dv = -p du_g.
-        """
-        p = np.asarray(p, dtype=np.float64)
-        if not self.shells.variance.size:
-            return np.zeros_like(p)
-        faces, gap = self._law
-        x, lost = np.log(_centres(faces)), -np.diff(gap)
-        light = np.exp(x[0]) * lost[0] / (x[1] - x[0])  # v is linear in p for a gap linear in ln p
-        v = light + np.append(0.0, np.cumsum(faces[1:-1] * lost))
-        log_p = np.log(np.where(p > 0, p, 1.0))
-        inside = _interpolated(x, v, log_p)
-        return np.where(p > 0, inside * np.exp(np.minimum(log_p - x[0], 0.0)), 0.0)
-
     def mean_gap(self, p: Field | float) -> Field:
         """Mean gap u_g; infinite at p = 0, linear in ln p below the law, zero beyond it.
 
@@ -74,7 +58,7 @@ class CoarseGrained(Persson):
         known = gap > _VANISHED * gap[0]
         x = np.log(_centres(faces)[known])
         log_p = np.log(np.where(p > 0, p, 1.0))
-        inside = _interpolated(x, gap[known], log_p)
+        inside = np.exp(monotone_cubic(x, np.log(gap[known]))(np.clip(log_p, x[0], x[-1])))
         below = np.maximum(x[0] - log_p, 0.0) * (gap[0] - gap[1]) / (x[1] - x[0])
         return np.where(p > 0, np.where(log_p <= x[-1], inside + below, 0.0), np.inf)
 
@@ -107,8 +91,8 @@ class FittedWeight(Persson):
 
     mean_gap_source: ClassVar[str] = "a fitted weight"
 
-    def weight(self, a: Field, s: Field) -> tuple[Field, Field, Field]:
-        """W, dW/da and dW/ds, all of shape (pressures, bins); 0 <= a, s <= 1.
+    def weight_slopes(self, a: Field, s: Field) -> tuple[Field, Field]:
+        """dW/da and dW/ds, both of shape (pressures, bins); 0 <= a, s <= 1.
 
         Parameters
         ----------
@@ -122,15 +106,7 @@ class FittedWeight(Persson):
         power, rest = a**alpha * s**beta, (1 - c) * a * a
         w = power * (c + rest)
         by_a = (alpha * w + 2 * power * rest) / np.maximum(a, _LEAST)
-        return w, by_a, beta * w / np.maximum(s, _LEAST)
-
-
-def _interpolated(x: Field, values: Field, at: Field) -> Field:
-    """Positive values at `at` from those at x, by a monotone cubic of their logarithms.
-
-    Beyond the ends of x they are those at the ends.
-    """
-    return np.exp(monotone_cubic(x, np.log(values))(np.clip(at, x[0], x[-1])))
+        return by_a, beta * w / np.maximum(s, _LEAST)
 
 
 def _centres(faces: Field) -> Field:

@@ -125,7 +125,7 @@ def observe(contact: Contact, u: Field, sigma: Field) -> Observables:
         a_r=int(grid.total(np.count_nonzero(touching))) / grid.size,
         sigma_p=float(np.sqrt(max(square - offset * offset, 0.0))),
         u_g=float(gap),
-        perimeter=contact_line(grid, touching, periodic=contact.boundary == "periodic"),
+        perimeter=contact_line(grid, touching, periodic=contact.is_periodic),
         energy=0.5 * float(twice_energy),
         work=float(lifted - contact.pressure * level),
     )

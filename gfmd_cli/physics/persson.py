@@ -4,7 +4,7 @@ Equation numbers are those of the paper: Mueser, "Elastic contacts of randomly r
 the spatial dimensions", Sect. 4.1 and 5.2. Sums over q never contain q = 0.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import ClassVar
@@ -175,33 +175,26 @@ class Persson:
             return np.zeros_like(p)
         return np.sqrt(_resolved_variance(p, self.delta_sigma**2))
 
-    def weight(self, a: Field, s: Field) -> tuple[Field, Field, Field]:
-        """Weight W = gamma a + (1 - gamma) a^3 of the elastic energy, dW/da and dW/ds.
+    def weight_slopes(self, a: Field, s: Field) -> tuple[Field, Field]:
+        """dW/da and dW/ds of the weight W = gamma a + (1 - gamma) a^3 of the elastic energy.
 
-        Paper Eq. (30), which does not contain s. All of shape (pressures, bins).
+        Paper Eq. (30), which does not contain s. Both of shape (pressures, bins).
 
         Parameters
         ----------
         a : mean contact area of every bin, shape (pressures, bins)
         s : contact area with all waves, shape (pressures, 1)
         """
-        gamma, square = self.shells.gamma, a * a
-        rest = (1 - gamma) * square
-        return a * (gamma + rest), gamma + 3 * rest, np.zeros_like(a)
-
-    def elastic_energy(self, p: Field | float) -> Field:
-        """Elastic energy per area v = sum_q W k C / 2 at pressure p, without q = 0.
-
-        Paper Eqs. (29)-(32).
-        """
-        return self._energy_and_slope(np.asarray(p, dtype=np.float64))[0]
+        gamma = self.shells.gamma
+        return gamma + 3 * ((1 - gamma) * (a * a)), np.zeros_like(a)
 
     def mean_gap(self, p: Field | float) -> Field:
         """Mean gap u_g = int_p^infinity dp' v'(p') / p'; infinite at p = 0.
 
-        Paper Eq. (28), by Gauss-Legendre panels in ln p' shared by all pressures and summed from
-        the top, where the integrand has vanished: all terms are positive, so that u_g keeps its
-        relative accuracy (about 1e-14) while it falls by orders of magnitude.
+        Paper Eq. (28), where v = sum_q W k C / 2 is the elastic energy, Eqs. (29)-(32). The
+        Gauss-Legendre panels in ln p' are shared by all pressures and summed from the top, where
+        the integrand has vanished: all terms are positive, so that u_g keeps its relative accuracy
+        (about 1e-14) while it falls by orders of magnitude.
 
         Parameters
         ----------
@@ -214,7 +207,7 @@ class Persson:
         ends = np.log(edges)[:, None]
         centre, half = 0.5 * (ends[1:] + ends[:-1]), 0.5 * (ends[1:] - ends[:-1])
         node, weight = np.polynomial.legendre.leggauss(8)  # 16 nodes change u_g by < 3e-14
-        slope = self._energy_and_slope(np.exp(centre + half * node))[1]
+        slope = self._energy_slope(np.exp(centre + half * node))
         panels = np.sum(half * weight * slope, axis=1)
         gap = np.append(np.cumsum(panels[::-1])[::-1], 0.0)
         at = np.minimum(np.searchsorted(edges, p), gap.size - 1)
@@ -247,25 +240,20 @@ class Persson:
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.where(np.asarray(p) > 0, p / np.float64(np.sqrt(2) * self.delta_sigma), 0.0)
 
-    def _energy_and_slope(self, p: Field) -> tuple[Field, Field]:
-        """v and dv/dp, both of the shape of p. Paper Eqs. (29) and (30)."""
+    def _energy_slope(self, p: Field) -> Field:
+        """dv/dp, of the shape of p. Paper Eqs. (29) and (30)."""
         energy = 0.5 * self.shells.energy
-        if not energy.size:
-            return np.zeros_like(p), np.zeros_like(p)
-        v, slope = np.empty(p.size), np.empty(p.size)
-        for part in self._chunks(p.size):
+        slope = np.empty(p.size)
+        rows = max(1, _CHUNK // energy.size)
+        for start in range(0, p.size, rows):
+            part = slice(start, start + rows)
             pressure = p.ravel()[part]
             a, da = _bin_area(pressure, self.shells.variance)
             x = np.minimum(self._reduced(pressure), UNDERFLOW)[:, None]
             ds = np.sqrt(2 / np.pi) / self.delta_sigma * np.exp(-x * x)
-            w, by_a, by_s = self.weight(a, erf(x))
-            v[part] = w @ energy
+            by_a, by_s = self.weight_slopes(a, erf(x))
             slope[part] = (by_a * da + by_s * ds) @ energy
-        return v.reshape(p.shape), slope.reshape(p.shape)
-
-    def _chunks(self, size: int) -> Iterator[slice]:
-        rows = max(1, _CHUNK // max(1, self.shells.variance.size))
-        return (slice(start, start + rows) for start in range(0, size, rows))
+        return slope.reshape(p.shape)
 
 
 def _bin_area(p: Field, variance: Field) -> tuple[Field, Field]:

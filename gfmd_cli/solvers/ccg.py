@@ -41,7 +41,6 @@ class ConstrainedCG(Solver):
 
     kind: Literal["ccg"] = "ccg"
     fields_in_memory: ClassVar[float] = 10.5
-    """Fields of double precision at the peak of a solve; scripts/memory.py measures it."""
 
     state_type: ClassVar[type[State]] = CCGState
 
@@ -59,7 +58,9 @@ class ConstrainedCG(Solver):
         while True:
             state.residual = contact.residual(u, sigma)
             yield state
-            pressed = self._force(contact, state, force)  # [1]
+            pressed: Mask = (u == h) & (sigma >= 0)
+            np.multiply(sigma, -1.0, out=force)
+            force[pressed] = 0.0  # [1]
             self._update_direction(contact.grid, state, force, pressed)  # [2]
             state.force, force = force, state.force
             contact.elasticity(state.direction, out=response)
@@ -78,13 +79,6 @@ class ConstrainedCG(Solver):
                 sigma += response
                 state.exact = False
             state.step += 1
-
-    def _force(self, contact: Contact, state: CCGState, force: Field) -> Mask:
-        """Write -sigma to `force`, zero where the indenter presses; return these points."""
-        pressed: Mask = (state.u == contact.obstacle) & (state.sigma >= 0)
-        np.multiply(state.sigma, -1.0, out=force)
-        force[pressed] = 0.0
-        return pressed
 
     def _update_direction(self, grid: Grid, state: CCGState, force: Field, pressed: Mask) -> None:
         """d <- f + beta d, beta = f (f - f_old) / (length d K d), where length d K d = f_old d."""

@@ -34,6 +34,7 @@ from gfmd_cli.physics.contact import Contact
 from gfmd_cli.physics.free_contact import FreeContact
 from gfmd_cli.solvers.contact_state import FREE, PRESSED
 from gfmd_cli.solvers.preconditioners import create, select
+from gfmd_cli.solvers.projected_move import polak_ribiere
 
 GAIN_STEPS = 8  # number of last steps whose gain estimates the error
 MIN_RELATIVE_GAIN = 1e-9  # ends the iteration: gain of these steps relative to the sum of all gains
@@ -66,7 +67,7 @@ def _stiffness(contact: Contact, touching: Mask) -> float:
     gains, total, old_slope = deque([np.inf], GAIN_STEPS), 0.0, np.inf
     for _ in range(MAX_STEPS):
         slope, z_change = preconditioner.apply(stress, contact_state, PRESSED, change)
-        direction *= max(0.0, -z_change / old_slope) if old_slope > 0 else 0.0  # Polak-Ribiere+
+        direction *= polak_ribiere(-z_change, old_slope)
         np.add(direction, z, out=direction, where=free)
         descent, old_slope = -float(np.vdot(direction, stress)), slope
         values[...] = direction
@@ -96,7 +97,7 @@ def _of_free_contact(contact: FreeContact, touching: Mask) -> float:
         free.approximate_stress(force, out=z)
         z *= touching
         z_change = -length * float(np.vdot(z, response))  # z times the change of the force
-        direction *= max(0.0, z_change / slope) if slope > 0 else 0.0
+        direction *= polak_ribiere(z_change, slope)
         direction += z
         slope = float(np.vdot(z, force))
         free.displacement(direction, out=response)

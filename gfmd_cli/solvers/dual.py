@@ -30,7 +30,7 @@ from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.physics.contact import Contact
 from gfmd_cli.physics.free_contact import FreeContact
 from gfmd_cli.solvers.loop import Solver, Start, State
-from gfmd_cli.solvers.projected_move import MAX_HALVINGS, choose
+from gfmd_cli.solvers.projected_move import MAX_HALVINGS, choose, polak_ribiere
 
 MAX_OVERLAP_RATIO = 0.3  # of the rms gap on overlapping points to that in contact; as in `pcg`
 
@@ -55,7 +55,6 @@ class Dual(Solver):
 
     kind: Literal["dual"] = "dual"
     fields_in_memory: ClassVar[float] = 22.0
-    """Fields of double precision at the peak of a solve; scripts/memory.py measures it."""
 
     state_type: ClassVar[type[State]] = DualState
     starts_locally: ClassVar[bool] = True
@@ -125,7 +124,7 @@ class Dual(Solver):
         self, grid: Grid, state: DualState, z: Field, force: Field, chosen: Mask
     ) -> None:
         """d <- -z + beta d on the chosen points, with the mean zero."""
-        beta = max(0.0, grid.dot(z, state.change) / state.slope) if state.slope > 0 else 0.0
+        beta = polak_ribiere(grid.dot(z, state.change), state.slope)
         state.slope = grid.dot(z, force)
         direction = state.direction
         direction *= beta

@@ -13,6 +13,7 @@ corrected in the next solve on the tiles.
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -20,8 +21,8 @@ from gfmd_cli.grid.arrays import Field, Mask
 from gfmd_cli.physics.contact import Contact
 from gfmd_cli.solvers.local_kernels import penetration
 from gfmd_cli.solvers.loop import Start
-from gfmd_cli.solvers.projected_move import choose
-from gfmd_cli.solvers.tile_operators import TILE_OPERATORS, Indices
+from gfmd_cli.solvers.projected_move import choose, polak_ribiere
+from gfmd_cli.solvers.tile_operators import Indices, TileOperators
 from gfmd_cli.solvers.tiles import SIDE, Tiles
 
 UNCORRECTED_TOLERANCE = 6e-3  # of the first solve, before the operators are corrected; a choice
@@ -60,9 +61,19 @@ class LocalSolve:
     pause : is called at every step and may end the solve by an exception
     """
 
+    operators_type: ClassVar[Callable[..., TileOperators]]
+    min_points: ClassVar[int]
+    """Points per side from which the solve is faster than one on the whole grid; measured, as are
+    the other limits."""
+    max_exponent: ClassVar[float]
+    """Largest exponent n of k(q) for which it is."""
+    max_fraction: ClassVar[tuple[float, float, float]]
+    """Largest fraction of tiles that the contact can reach: for n = 0, its decrease with the
+    largest exponent n, and its lower limit."""
+
     def __init__(self, contact: Contact, tiles: Tiles, s: Field, pause: Callable[[], None]) -> None:
         self.contact, self.grid, self.pause = contact, contact.grid, pause
-        self.operators = TILE_OPERATORS[contact.boundary](contact)
+        self.operators = self.operators_type(contact)
         self.transforms = 0.0
         self.place(tiles, s)
 
@@ -172,8 +183,7 @@ class LocalSolve:
             force = _field(active_force, active, s)
             z = _balanced(self.map_displacement(force).ravel()[active])
             old, slope = slope, _dot(z, active_force)
-            # Polak-Ribiere+
-            beta = max(0.0, (slope - _dot(z, last)) / old) if old > 0 else 0.0
+            beta = polak_ribiere(slope - _dot(z, last), old)
             active_direction = _balanced(z + beta * direction.ravel()[active])
             if _dot(active_direction, active_force) <= 0:
                 active_direction = z

@@ -9,7 +9,7 @@ it takes the displacement, which is laid on the indenter before.
 
 from collections.abc import Callable
 from itertools import pairwise
-from typing import NamedTuple
+from typing import ClassVar
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from gfmd_cli.physics.contact import Contact
 from gfmd_cli.physics.free_contact import FreeContact
 from gfmd_cli.solvers.local_solve import LocalSolve
 from gfmd_cli.solvers.loop import Start
+from gfmd_cli.solvers.tile_operators import FreeOperators, PeriodicOperators
 from gfmd_cli.solvers.tiles import SIDE, Tiles
 
 SMALLEST_EXPONENT = 0.2  # of k(q) for which there are tiles; measured from 0.25 on
@@ -26,32 +27,6 @@ COARSE_TOLERANCE = 0.03  # on grids before the finest; measured: 0.01 to 0.1 dif
 JACOBI_STEPS = 3  # after C s is laid on the indenter; 2 to 6 take about as long
 JACOBI_DAMPING = 0.8  # a choice
 MAX_CLOSED_GAP = 2.0  # over the Jacobi move, which removes the stress of the point; a choice
-
-
-class TileLimits(NamedTuple):
-    """Contacts for which a solve on tiles is faster than one on the whole grid; measured."""
-
-    points: int
-    """Smallest number of points per side."""
-    fraction: float
-    """Largest fraction of tiles that the contact can reach, for n = 0."""
-    decrease: float
-    """By how much this fraction decreases with the largest exponent n of k(q)."""
-    min_fraction: float
-    """Lower limit of this fraction."""
-    exponent: float
-    """Largest exponent n."""
-
-    def max_fraction(self, contact: Contact) -> float:
-        """Largest fraction of tiles that a contact can reach."""
-        return max(self.fraction - self.decrease * contact.exponents[1], self.min_fraction)
-
-
-TILE_LIMITS = {
-    "periodic": TileLimits(512, 0.17, 0.1, 0.012, 2.05),
-    "free": TileLimits(256, 0.25, 0.0, 0.0, 1.55),
-}
-"""By the boundary of the contact."""
 
 
 def start_from(
@@ -72,13 +47,15 @@ def start_from(
     doubled = all(b == tuple(2 * n for n in a) for a, b in pairwise(shapes))
     if not doubled or not all(map(tiles_apply, finer)):
         return None
-    solve_on_tiles, limits = LOCAL_SOLVES[last.boundary], TILE_LIMITS[last.boundary]
+    solve_on_tiles = LOCAL_SOLVES[last.boundary]
+    highest, decrease, lowest = solve_on_tiles.max_fraction
     for contact in finer:
-        tiles = _tiles_in_reach(pressure > 0, is_periodic=contact.boundary == "periodic")
+        tiles = _tiles_in_reach(pressure > 0, is_periodic=contact.is_periodic)
         s = _refined(pressure, tiles)
         if contact.may_touch is not None:
             s *= tiles.take(contact.may_touch)
-        if tiles.count > limits.max_fraction(contact) * tiles.used.size or not s.any():
+        fraction = max(highest - decrease * contact.exponents[1], lowest)
+        if tiles.count > fraction * tiles.used.size or not s.any():
             return None
         solve = solve_on_tiles(contact, tiles, s, pause)
         del pressure, s  # their memory is needed now
@@ -94,15 +71,15 @@ def start_from(
 
 def tiles_apply(contact: Contact) -> bool:
     """Whether the operators on tiles apply, and a solve on tiles can be faster."""
-    grid, limits = contact.grid, TILE_LIMITS[contact.boundary]
+    grid, solve_on_tiles = contact.grid, LOCAL_SOLVES[contact.boundary]
     if grid.dimension == 1 or not grid.whole:
         return False
-    if min(grid.shape) < limits.points:
+    if min(grid.shape) < solve_on_tiles.min_points:
         return False
     if any(points % SIDE for points in grid.shape) or min(grid.spacings) < 0.5 * max(grid.spacings):
         return False
     smallest, largest = contact.exponents
-    return smallest >= SMALLEST_EXPONENT and largest <= limits.exponent
+    return smallest >= SMALLEST_EXPONENT and largest <= solve_on_tiles.max_exponent
 
 
 def _tiles_in_reach(touching: Mask, *, is_periodic: bool) -> Tiles:
@@ -137,6 +114,11 @@ def _refined(field: Field, tiles: Tiles) -> Field:
 
 class PeriodicSolve(LocalSolve):
     """The solve in a periodic cell; the iteration on the whole grid starts from u."""
+
+    operators_type = PeriodicOperators
+    min_points: ClassVar[int] = 512
+    max_exponent: ClassVar[float] = 2.05
+    max_fraction: ClassVar[tuple[float, float, float]] = (0.17, 0.1, 0.012)
 
     def compliance_everywhere(self, *, in_single_precision: bool) -> Field:
         """C s at all points, in the memory of the transforms."""
@@ -181,6 +163,10 @@ class FreeSolve(LocalSolve):
     """The solve with a free boundary; the iteration on the whole map starts from s."""
 
     contact: FreeContact
+    operators_type = FreeOperators
+    min_points: ClassVar[int] = 256
+    max_exponent: ClassVar[float] = 1.55
+    max_fraction: ClassVar[tuple[float, float, float]] = (0.25, 0.0, 0.0)
 
     def compliance_everywhere(self, *, in_single_precision: bool) -> Field:
         """C s at all points, always in double precision."""

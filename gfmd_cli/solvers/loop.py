@@ -13,8 +13,9 @@ from gfmd_cli.physics.contact import Contact
 from gfmd_cli.spec_table import SpecTable
 from gfmd_cli.status import Status
 
-MAX_MISSES = 5  # one or two occur when sigma has drifted; this many in a row mean that rounding
-PROGRESS_FACTOR = 0.7  # is the limit, if none of them reduces the true residual by this factor
+MAX_MISSES, PROGRESS_FACTOR = 5, 0.7
+"""One or two misses occur when sigma has drifted. So many in a row, none of which reduces the true
+residual by this factor, mean that rounding is the limit."""
 
 
 @dataclass(kw_only=True)

@@ -46,24 +46,18 @@ class Multilevel:
         """See `preconditioners.Preconditioner.apply`."""
         self.rows.exchange_halo(contact_state)
         fields = (self.rows.with_halo(sigma), contact_state, threshold)
-        depth = 0
-        for depth, rows in enumerate(self.coarse_rows):
-            targets = (self.fields[depth], self.held[depth])
-            if depth == 0:
+        top = 0  # the coarsest level of which some hat is free
+        for level, rows in enumerate(self.coarse_rows):
+            targets = (self.fields[level], self.held[level])
+            if level == 0:
                 rows.run_from_finer(kernels.first_restriction, fields, targets)
             else:
-                finer = (self.fields[depth - 1], self.held[depth - 1])
+                finer = (self.fields[level - 1], self.held[level - 1])
                 rows.run_from_finer(kernels.restriction, finer, targets)
-            if rows.all_true(self.held[depth]):
+            if rows.all_true(self.held[level]):
                 break
-        else:
-            depth = len(self.fields)
-        arguments = (self.energies[0], change, self.z)
-        if depth == 0:
-            slope, z_change = self.rows.sums_with_halo(2, kernels.only_level, *fields, *arguments)
-            return float(slope), float(z_change)
-        top = depth - 1
-        self.fields[top] *= np.where(self.held[top], 0.0, 1.0 / self.energies[depth])
+            top = level
+        self.fields[top] *= np.where(self.held[top], 0.0, 1.0 / self.energies[top + 1])
         for level in range(top - 1, -1, -1):
             coarse, fine = self.coarse(level + 1), self.fields[level]
             energy = self.energies[level + 1]
@@ -71,10 +65,9 @@ class Multilevel:
                 kernels.prolongation, coarse, self.held[level], energy, fine
             )
             self.coarse_rows[level].exchange_halo(fine)
-        sums = self.rows.sums_with_halo(
-            2, kernels.last_prolongation, self.coarse(0), *fields, *arguments
-        )
-        return float(sums[0]), float(sums[1])
+        arguments = (self.coarse(0), *fields, self.energies[0], change, self.z)
+        slope, z_change = self.rows.sums_with_halo(2, kernels.last_prolongation, *arguments)
+        return float(slope), float(z_change)
 
     def coarse(self, level: int) -> Field:
         """The field of a level, aligned with the next finer level."""

@@ -1,6 +1,6 @@
 """Solve a contact on grids from coarse to fine; each starts from the solution of the last one."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from math import prod
 
@@ -67,7 +67,7 @@ def solve_contact(
     loose = solver.model_copy(update={"tolerance": max(solver.tolerance, COARSE_TOLERANCE)})
     grids = _grids(contact, solver, start)
     transforms = 0.0  # of the size of the finest grid
-    can_touch_everywhere = contact.boundary == "periodic" and contact.may_touch is None
+    can_touch_everywhere = contact.is_periodic and contact.may_touch is None
     if solver.iterative and can_touch_everywhere and not isinstance(start, Resume):
         full, transforms = _full_contact(grids[::-1], solver)
         if full is not None:
@@ -93,7 +93,7 @@ def solve_contact(
                 while grids[-1] is not start.contact:
                     grids.pop()
     assert state is not None
-    for _ in range(MAX_CORRECTIONS if contact.boundary == "periodic" else 0):
+    for _ in range(MAX_CORRECTIONS if contact.is_periodic else 0):
         good_start = status.is_converged and state.step == 0  # no step has laid points yet
         if not good_start or not contact.lay_pressed(state.u, state.sigma, state.residual):
             break
@@ -118,7 +118,7 @@ def _local_start(
     pause = partial(watch, coarse, state)
     if tiles_apply(finer[-1]):
         return start_from(coarse, pressure, finer, tolerance, pause)
-    return direct_start(pressure > 0, finer, pause) if coarse.boundary == "periodic" else None
+    return direct_start(pressure > 0, finer, pause) if coarse.is_periodic else None
 
 
 def levels(shape: Shape, sides: tuple[float, ...]) -> list[Shape]:
@@ -199,29 +199,21 @@ def _resumed(contact: Contact, resume: Resume) -> State:
 
 
 def _full_contact(grids: list[Contact], solver: Solver) -> tuple[Solution | None, float]:
-    """The solution on the last of these grids if it is full contact on all; transforms spent.
+    """The solution u = h on the last of these grids if no stress is tensile on any; transforms.
 
     A rough contact that is not full on a coarse grid is not full on a finer one, where the stress
     varies more; elsewhere the iteration finds full contact, too.
     """
     transforms = 0.0
-    full: Solution | None = None
     for contact in grids:
-        full = full_contact(contact, solver.kind)
-        transforms += 2 * contact.grid.size / grids[-1].grid.size
-        if full is None:
+        grid, h = contact.grid, contact.height
+        stress = grid.padded[..., : grid.points]
+        stress[...] = h
+        grid.filter_padded(contact.stiffness)
+        transforms += 2 * grid.size / grids[-1].grid.size
+        if contact.pressure < grid.max(-float(stress.min())):
             return None, transforms
-    return full and replace(full, transforms=transforms), transforms
-
-
-def full_contact(contact: Contact, solver: str) -> Solution | None:
-    """The solution u = h, where the stress is nowhere tensile; else None. Costs two transforms."""
-    grid, h = contact.grid, contact.height
-    stress = grid.padded[..., : grid.points]
-    stress[...] = h
-    grid.filter_padded(contact.stiffness)
-    if contact.pressure < grid.max(-float(stress.min())):
-        return None
-    u, sigma = h.copy(), contact.grid.empty()
+    u, sigma = h.copy(), grid.empty()
     np.add(stress, contact.pressure, out=sigma)
-    return Solution(u, sigma, contact.residual(u, sigma), Status.CONVERGED, solver, 0, 2.0)
+    residual = contact.residual(u, sigma)
+    return Solution(u, sigma, residual, Status.CONVERGED, solver.kind, 0, transforms), transforms

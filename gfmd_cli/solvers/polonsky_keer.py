@@ -52,7 +52,6 @@ class PolonskyKeer(Solver):
 
     kind: Literal["polonsky-keer"] = "polonsky-keer"
     fields_in_memory: ClassVar[float] = 12.5
-    """Fields of double precision at the peak of a solve; scripts/memory.py measures it."""
 
     state_type: ClassVar[type[State]] = PolonskyKeerState
     max_exponent: ClassVar[float] = 1.5

@@ -132,18 +132,3 @@ def last_prolongation(coarse, sigma, contact_state, threshold, energy, change, p
             slope -= z * s
             z_change += z * change[i - halo, j]
         out[i, 0], out[i, 1] = slope, z_change
-
-
-@kernel
-def only_level(sigma, contact_state, threshold, energy, change, padded, out, a, b):
-    """Write z = -sigma / energy on the free points, if all hats of coarser levels are held."""
-    halo = (sigma.shape[0] - change.shape[0]) // 2
-    for i in range(a, b):
-        slope = z_change = 0.0
-        for j in range(sigma.shape[1]):
-            s = sigma[i, j]
-            z = 0.0 if contact_state[i, j] >= threshold else -s / energy
-            padded[i - halo, j] = z
-            slope -= z * s
-            z_change += z * change[i - halo, j]
-        out[i, 0], out[i, 1] = slope, z_change

@@ -33,6 +33,17 @@ def choose(best: float, exact: bool) -> MoveChoice:
     return MoveChoice(fraction, min(max(best, low), high), not is_full)
 
 
+def polak_ribiere(z_change: float, slope: float) -> float:
+    """The factor beta >= 0 of the last direction, by Polak & Ribiere; zero without a last step.
+
+    Parameters
+    ----------
+    z_change : the preconditioned force times the change of the force by the last step
+    slope : the preconditioned force times the force at the last step
+    """
+    return max(0.0, z_change / slope) if slope > 0 else 0.0
+
+
 def conjugation(
     slope: float, z_change: float, moved: float, best: float, curvature: float
 ) -> float:

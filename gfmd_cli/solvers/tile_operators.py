@@ -163,13 +163,6 @@ class FreeOperators(TileOperators):
         return self.transform.apply(self.symbol, loads, self.values)
 
 
-TILE_OPERATORS: dict[str, Callable[..., TileOperators]] = {
-    "periodic": PeriodicOperators,
-    "free": FreeOperators,
-}
-"""The operators, by the boundary of the contact."""
-
-
 def convolution(kernel: Field, tiles: Tiles, pool: ThreadPoolExecutor | None) -> TileMap:
     """The convolution of values on tiles with a kernel, in single precision.
 

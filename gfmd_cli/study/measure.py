@@ -182,7 +182,7 @@ def _curves(solved: TaskSolution) -> dict[str, dict[str, Field]]:
     With a free boundary the spectra are those of the fields mirrored to twice the sides.
     """
     scene, solution = solved.scene, solved.solution
-    grid, periodic = scene.grid, solved.contact.boundary == "periodic"
+    grid, periodic = scene.grid, solved.contact.is_periodic
     fields = {"height": solved.contact.height, "u": solution.u, "sigma": solution.sigma}
     units = {"height": scene.h_std, "u": scene.h_std, "sigma": scene.delta_sigma}
     r, means = autocorrelations(grid, fields, periodic=periodic)

@@ -32,17 +32,12 @@ class SolvedContact:
         """Points in contact."""
         return contact_points(self.contact.obstacle, self.u, self.sigma)
 
-    @property
-    def is_periodic(self) -> bool:
-        """Whether patches continue across the border."""
-        return self.contact.boundary == "periodic"
-
     @cached_property
     def patch_areas(self) -> Field:
         """Areas of the contact patches / L^2; of a line contact, lengths / L."""
         grid = self.contact.grid
         point = grid.area / grid.size / grid.length**grid.dimension
-        return contact_patches(self.touching, periodic=self.is_periodic).sizes * point
+        return contact_patches(self.touching, periodic=self.contact.is_periodic).sizes * point
 
     @cached_property
     def mirrored(self) -> Contact:
@@ -52,13 +47,13 @@ class SolvedContact:
     @cached_property
     def full_contact_stress(self) -> ContactStress:
         """Statistics of the full-contact stress over the points in contact."""
-        touching = self.touching if self.is_periodic else mirror(self.touching)
+        touching = self.touching if self.contact.is_periodic else mirror(self.touching)
         return contact_stress(self.mirrored, touching)
 
     @cached_property
     def percolates(self) -> list[bool]:
         """Whether the gap percolates along x and, if there is a second axis, along y."""
-        return open_gap(self.touching, periodic=self.is_periodic).winds.tolist()[::-1]
+        return open_gap(self.touching, periodic=self.contact.is_periodic).winds.tolist()[::-1]
 
 
 class ReducedUnit(NamedTuple):

@@ -223,7 +223,7 @@ def _solved_grid(solved: TaskSolution) -> SolvedGrid:
 
 def free_border_share(contact: Contact, solution: Solution) -> float | None:
     """Share of the border of the map in contact; None with a periodic boundary."""
-    return None if contact.boundary == "periodic" else border_share(contact, solution)
+    return None if contact.is_periodic else border_share(contact, solution)
 
 
 def border_share(contact: Contact, solution: Solution) -> float:
