@@ -5,7 +5,7 @@ from scipy.optimize import minimize
 
 from gfmd_cli.grid.arrays import Field
 
-CANDIDATES = 4  # grid points from which a maximum is sought: the highest of different peaks
+CANDIDATES = 8  # grid points from which a maximum is sought: the highest of different peaks
 
 
 def highest_point(heights: Field) -> float:

@@ -125,7 +125,9 @@ class RigidSurface(SpecTable):
 
     def peak(self) -> float | None:
         """Height of the highest point [m], between grid points too; None where it is unknown."""
-        return _highest_point(self, 2 * self.smallest_grid()) if self.band_limited else None
+        if not self.band_limited:
+            return None
+        return _highest_point(self, self.smallest_grid() + 2)  # more than two points per wave
 
     def tapered_map(self) -> "RigidSurface | None":
         """A map that is not periodic, tapered for its spectrum; None for other surfaces."""
