@@ -60,7 +60,8 @@ def task_text(tasks: Sequence[Task], outcomes: Mapping[str, Outcome], missing: s
 def _contact_of(task: Task) -> str:
     """Elastomer and surface of a task, and the swept keys of grid and solver."""
     swept = [word for table, word in task.swept if table != "surface"]
-    return ", ".join([f"{task.elastomer.label} on {task.surface.label}", *swept])
+    elastomer = task.elastomer.label_on(task.surface.sides[-1])
+    return ", ".join([f"{elastomer} on {task.surface.label}", *swept])
 
 
 def run_text(rows: list[dict[str, Any]]) -> str:
