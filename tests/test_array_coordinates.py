@@ -178,6 +178,6 @@ def test_a_study_is_read_as_before(array):
     def mark(file):
         file.attrs["spec_text"] = ""
 
-    read = read_topography(array(extra=mark))
+    read = read_topography(array(extra=mark), "height")
     np.testing.assert_array_equal(read.heights, HEIGHTS)
     assert (read.spacing, read.periodic) == (None, None)

@@ -39,12 +39,9 @@ def analyze(study: Path, as_json: bool, figures: Path | None, theory: "Theory") 
     from gfmd_cli.analysis.compare import compare
     from gfmd_cli.analysis.export import as_records
     from gfmd_cli.analysis.run_summary import edge_warnings
-    from gfmd_cli.files.atomic import make_folder
     from gfmd_cli.units import count
 
     comparison = compare(study, theory)
-    if figures is not None:
-        make_folder(figures)
     if as_json:
         click.echo(json.dumps(as_records(comparison), indent=1))
     else:
