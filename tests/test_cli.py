@@ -117,6 +117,9 @@ def test_a_bad_shard_is_refused(gfmd, shard):
         ("run", "spec.toml", "--set", "elastomer.n=9"),
         ("run", "spec.toml", "--set", "surface.cutoff=0.001"),
         ("run", "spec.toml", "--jobs", "0"),
+        ("run", "spec.toml", "-o", "a.h5", "-o", "b.h5"),
+        ("run", "spec.toml", "--set", "elastomer.n=1", "--set", "elastomer.n=2"),
+        ("run", "spec.toml", "--set", "load.p_star=1", "--set", "load.pressure=2"),
         ("run", "spec.toml", "-o", "."),
         ("run", "spec.toml", "-o", ""),
         ("run", "spec.toml", "-o", "small.csv"),
@@ -167,12 +170,29 @@ def test_a_place_that_cannot_be_written_is_status_73(gfmd):
     assert "cannot be written" in result.output
 
 
+def test_a_read_only_study_is_kept(gfmd):
+    gfmd("run", "spec.toml", "-o", "a.h5")
+    Path("a.h5").chmod(0o444)
+    before = Path("a.h5").read_bytes()
+    assert gfmd("run", "spec.toml", "-o", "a.h5").exit_code == 0  # all is done
+    for words in (
+        ("run", "spec.toml", "--set", "load.p_star=0.5", "-o", "a.h5"),
+        ("run", "spec.toml", "--overwrite", "-o", "a.h5"),
+    ):
+        result = gfmd(*words)
+        assert result.exit_code == 73
+        assert "a.h5: cannot be written: it is read-only" in result.output
+    assert set(Path().glob("a*")) == {Path("a.h5")}
+    assert Path("a.h5").read_bytes() == before
+
+
 def test_a_file_that_cannot_be_written_is_told_with_the_reason(gfmd):
     assert gfmd("run", "spec.toml", "-o", "a.h5").exit_code == 0
     Path("file").write_text("")
     for folder, reason in (
         ("/proc", "No such file or directory"),
-        ("file", "Not a directory|File exists"),
+        ("file", "there is no folder file"),
+        ("mistyped", "there is no folder mistyped"),
     ):
         for words in (
             ("report", "a.h5", "-o", f"{folder}/x.html"),
@@ -187,6 +207,7 @@ def test_a_file_that_cannot_be_written_is_told_with_the_reason(gfmd):
             assert result.exit_code == 73, words
             expected = rf"gfmd: {folder}/x\S*: cannot be written: .*({reason})"
             assert re.fullmatch(expected, result.output.splitlines()[-1]), result.output
+    assert not Path("mistyped").exists()
 
 
 def test_a_name_that_is_too_long_is_status_73(gfmd):
@@ -371,7 +392,7 @@ def test_a_study_is_no_height_map_unless_it_holds_heights(gfmd):
     gfmd("run", "spec.toml", "--set", "elastomer.n=0")
     result = gfmd("surface", "small.h5")
     assert result.exit_code == 2
-    assert "choose one by surface.dataset" in result.output
+    assert 'a study that stores no heights; give fields = ["height"]' in result.output
     gfmd("run", "spec.toml", "--set", "elastomer.n=0", "--set", 'output.fields=["u", "height"]')
     result = gfmd("surface", "small.h5")
     assert result.exit_code == 2

@@ -87,7 +87,7 @@ def figure_of(name, comparison):
 
 
 def test_every_figure_is_a_pdf_and_a_png(study, tmp_path):
-    assert drawn(study(), tmp_path / "new" / "folder") == OVER_PRESSURE | DISTRIBUTIONS
+    assert drawn(study(), tmp_path / "new") == OVER_PRESSURE | DISTRIBUTIONS
 
 
 def test_a_single_point_is_drawn(study, tmp_path):

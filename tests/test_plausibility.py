@@ -1,6 +1,7 @@
 """Warnings, and theory where it does not apply."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -77,6 +78,22 @@ def test_waves_that_are_short_for_a_plate(thickness, warned):
 def test_a_layer_thinner_than_the_roughness():
     layer = {"kind": "layer", "base": "sliding", "E_star": 1e6, "thickness": 1e-9}
     assert "is less than the rms height" in only_warning(tables(elastomer=layer))
+
+
+@pytest.mark.parametrize(
+    ("h_std", "thickness", "words"),
+    [
+        (1e-8, 0.1, "^$"),
+        (1e-8, 1e-3, "a slab of 1e-08 m, a thin plate.* divide a thickness in m"),
+        (1e-7, 5e-3, "a slab of 5e-08 m, less than the rms height"),
+    ],
+)
+def test_a_slab_whose_thickness_is_probably_in_metres(h_std, thickness, words):
+    """The shortest wavelength is 1.25 um: for a plate, q t < 0.1, the slab has t / L < 0.002."""
+    slab = {"kind": "slab", "E_star": 1e9, "thickness": thickness}
+    warnings = solve(tables(SURFACE | {"h_std": h_std}, slab, pressure=1e4)).warnings
+    slab_warnings = [each for each in warnings if "elastomer.thickness" in each]
+    assert re.search(words, "".join(slab_warnings))
 
 
 def test_few_points_in_contact():

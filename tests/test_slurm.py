@@ -20,7 +20,8 @@ FAKE = """\
 printf '%s\\n' "$(basename "$0") $*" >> "$CALLS"
 case "$(basename "$0")" in
   squeue) cat "$QUEUE" ;;
-  sbatch) [ -z "$REFUSAL" ] || { echo "sbatch: error: $REFUSAL" >&2; exit 1; }
+  sbatch) [ -n "$REFUSAL" ] && [ "${*#*$REFUSED}" != "$*" ] &&
+            { echo "sbatch: error: $REFUSAL" >&2; exit 1; }
           echo "$(grep -c sbatch "$CALLS");cluster" ;;
 esac
 """
@@ -41,6 +42,7 @@ def gfmd(tmp_path, monkeypatch, invoke):
         (tmp_path / name).write_text("")
         monkeypatch.setenv(name.upper(), str(tmp_path / name))
     monkeypatch.setenv("REFUSAL", "")
+    monkeypatch.setenv("REFUSED", "--parsable")
     Path("spec.toml").write_text(SPEC)
     return invoke
 
@@ -236,6 +238,17 @@ def test_what_sbatch_complains_of_is_told(gfmd, monkeypatch):
     result = gfmd("submit", "spec.toml", "--shards", 2)
     assert result.exit_code == 1
     assert "invalid partition specified: fast" in result.output
+
+
+def test_a_job_without_its_collection_is_told(gfmd, calls, monkeypatch):
+    monkeypatch.setenv("REFUSAL", "Dependency problem")
+    monkeypatch.setenv("REFUSED", "--dependency")
+    result = gfmd("submit", "spec.toml", "--shards", 2)
+    assert result.exit_code == 1
+    assert len(calls()) == 3  # squeue, the shards, the collection
+    assert "Dependency problem" in result.output
+    assert "job 1 is submitted" in result.output
+    assert "run gfmd collect" in result.output
 
 
 def test_a_machine_without_slurm_is_told_and_nothing_written(gfmd, monkeypatch):

@@ -183,6 +183,12 @@ def test_init_replaces_nothing(gfmd, tmp_path):
     assert (tmp_path / "study.toml").read_text() == "mine"
 
 
+@pytest.mark.parametrize("pair", ["foo.bar=1", "elastomer.kind=slab", "load.p_star=-1"])
+def test_init_names_the_option_that_is_wrong(gfmd, pair):
+    """The file is not written, so that none of its lines can be named."""
+    assert gfmd("init", "--set", pair, status=2).startswith(f"gfmd: --set {pair}: ")
+
+
 def test_a_scan_that_will_not_do_is_refused_as_it_is(gfmd, tmp_path):
     np.save(tmp_path / "h.npy", np.full((16, 16), np.nan))
     assert "all of the 256 heights" in gfmd("init", "a.toml", "--from", "h.npy", status=2)

@@ -252,6 +252,21 @@ def test_masked_points_never_touch():
     assert np.array_equal(again.pressure, filled.pressure)
 
 
+def test_a_hole_is_entered_as_deep_as_a_crack_under_pressure():
+    """Mean (8 / 3 pi) a dp / E* for a circle of radius a, which makes the mean gap negative.
+
+    Source: Johnson, Contact Mechanics, 1985, Sect. 3.5: a crack in an infinite solid.
+    """
+    y, x = np.mgrid[:128, :128] / 128 - 0.5
+    hole, radius = np.hypot(y, x) < 0.1, 0.1
+    heights = np.where(hole, np.nan, 1e-6 * np.cos(2 * np.pi * x) * np.cos(2 * np.pi * y))
+    spec = MATERIAL | {"surface": {"missing": "void"}}
+    low, high = (solve(spec | {"load": {"pressure": p}}, heights=heights) for p in (1.0, 2.0))
+    depth = (low.gap - high.gap)[hole].mean()
+    assert depth == pytest.approx(8 / (3 * np.pi) * radius / 2.0, rel=0.05)
+    assert any("the mean gap is negative" in warning for warning in high.warnings)
+
+
 def test_study_says_what_never_touches(square_map, rows_of):
     text = f'''
         [surface]

@@ -10,6 +10,7 @@ from gfmd_cli.analysis.distribution_figure import continuum_figure, distribution
 from gfmd_cli.analysis.plotting import DASHED, ColumnFigure, styled
 from gfmd_cli.analysis.series import Panel, Series, StyledCurve, seed_groups
 from gfmd_cli.analysis.wording import in_si
+from gfmd_cli.files.atomic import make_folder
 from gfmd_cli.units import scaled
 
 WIDE = 20  # a ratio that varies by more is drawn on a log scale
@@ -42,6 +43,7 @@ def draw_all(comparison: Comparison, folder: Path) -> list[Path]:
 
     Raises SpaceError where the folder cannot be written.
     """
+    make_folder(folder)
     with styled():
         drawn = study_figures(comparison, with_styles(comparison))
         return [path for name, plot in drawn.items() for path in plot.write(folder / name)]

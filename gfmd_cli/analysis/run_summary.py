@@ -61,7 +61,7 @@ def _contacts_of(tasks: Sequence[Task]) -> list[str]:
     """Elastomer and surface of each task, and the swept keys of grid and solver."""
     rows = [
         {
-            "elastomer": task.elastomer.label,
+            "elastomer": task.elastomer.label_on(task.surface.sides[-1]),
             "surface": task.surface.label,
             "ensemble": "",
             "surface_sha256": task.surface_sha256,

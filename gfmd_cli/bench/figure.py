@@ -13,6 +13,7 @@ from gfmd_cli.analysis.wording import contact_title
 from gfmd_cli.bench.file import Trace
 from gfmd_cli.bench.run import REFERENCE
 from gfmd_cli.bench.table import contact_of, solver_names
+from gfmd_cli.files.atomic import make_folder
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.status import Status
 
@@ -32,6 +33,7 @@ def draw_bench(traces: list[Trace], folder: Path) -> list[Path]:
 
     Raises SpaceError where the folder cannot be written.
     """
+    make_folder(folder)
     with styled():
         return [
             path

@@ -6,12 +6,12 @@ from pathlib import Path
 import click
 
 from gfmd_cli.cli.messages import print_error, print_text
-from gfmd_cli.cli.options import FILE, overrides_option
+from gfmd_cli.cli.options import FILE, Command, overrides_option
 from gfmd_cli.cli.progress import Reporter
 from gfmd_cli.status import Status
 
 
-@click.command()
+@click.command(cls=Command)
 @click.argument("spec", type=FILE)
 @click.option("-o", "--output", type=FILE, help="File of the results; by default NAME-bench.h5.")
 @overrides_option
@@ -36,11 +36,14 @@ def bench(
     from gfmd_cli.bench.file import check_target, write_bench
     from gfmd_cli.bench.run import run_bench
     from gfmd_cli.bench.table import bench_table
+    from gfmd_cli.files.atomic import make_folder
     from gfmd_cli.spec.parse import read_spec
 
     resolved, text = read_spec(spec, overrides)
     path = output or Path(f"{resolved.study.name}-bench.h5")
     check_target(path, resolved)
+    if figures is not None:
+        make_folder(figures)
     with Reporter(quiet) as report:
         traces = run_bench(resolved, report)
     write_bench(path, resolved, text, traces)

@@ -5,10 +5,12 @@ import json
 import click
 from click.shell_completion import get_completion_class
 
+from gfmd_cli.cli.options import Command
+
 SHELLS = ("bash", "zsh", "fish")
 
 
-@click.command()
+@click.command(cls=Command)
 @click.argument("shell", type=click.Choice(SHELLS))
 def completion(shell: str) -> None:
     """Print shell code that completes commands, options and files.
@@ -24,7 +26,7 @@ def completion(shell: str) -> None:
     click.echo(kind(main, {}, "gfmd", "_GFMD_COMPLETE").source())
 
 
-@click.command()
+@click.command(cls=Command)
 def schema() -> None:
     """Print the JSON Schema of the run spec, for editors.
 

@@ -7,11 +7,11 @@ from pathlib import Path
 import click
 
 from gfmd_cli.cli.messages import print_error, print_text
-from gfmd_cli.cli.options import FILE, overrides_option
+from gfmd_cli.cli.options import FILE, Command, overrides_option
 from gfmd_cli.errors import InputError
 
 
-@click.command()
+@click.command(cls=Command)
 @click.argument("spec", type=FILE, default="study.toml")
 @click.option("--from", "scan", type=FILE, metavar="SCAN", help="Measured height map to use.")
 @overrides_option
@@ -48,7 +48,7 @@ def init(spec: Path, scan: Path | None, overrides: tuple[str, ...]) -> None:
     print_text(f"{spec}: written\nnext: {shlex.join(['gfmd', 'run', str(spec)])}")
 
 
-@click.command()
+@click.command(cls=Command)
 @click.argument("paths", metavar="SPEC|SCAN...", type=FILE, nargs=-1, required=True)
 @click.option("--json", "as_json", is_flag=True, help="Print a list of records in SI units.")
 @click.option("--figure", type=FILE, metavar="OUT", help="Write a figure: OUT.png, .pdf or .svg.")

@@ -1,5 +1,6 @@
 """Options that several commands share."""
 
+from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,11 +15,44 @@ if TYPE_CHECKING:
 
 OF_OTHERS = {".csv", ".nc", ".vti", ".html", ".json", ".toml"}
 """Suffixes of files that other commands write or read."""
+
+
+class Command(click.Command):
+    """A command that refuses an option with two values; click would take the last one."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Parse the words of the command line. Raises click.UsageError."""
+        _, _, order = self.make_parser(ctx).parse_args(list(args))
+        for option, uses in Counter(order).items():
+            takes_one = isinstance(option, click.Option) and not (option.multiple or option.is_flag)
+            if takes_one and uses > 1 and not ctx.resilient_parsing:
+                raise click.UsageError(f"{option.opts[0]}: given {uses} times", ctx)
+        return super().parse_args(ctx, args)
+
+
+def _distinct(
+    context: click.Context, parameter: click.Parameter, overrides: tuple[str, ...]
+) -> tuple[str, ...]:
+    """The values of --set. Raises InputError for two values of one key, and for two loads."""
+    from gfmd_cli.spec.models import LOADS
+
+    given: dict[str, str] = {}
+    for override in overrides:
+        key = override.partition("=")[0].strip()
+        key = "load" if key.removeprefix("load.") in LOADS else key
+        if (earlier := given.setdefault(key, override)) != override:
+            raise InputError(
+                f"--set {override}: takes the place of --set {earlier}; give one of them"
+            )
+    return overrides
+
+
 FILE = click.Path(path_type=Path)
 overrides_option = click.option(
     "--set",
     "overrides",
     multiple=True,
+    callback=_distinct,
     metavar="KEY=VALUE",
     help="Set a key of the run spec; repeatable.",
 )

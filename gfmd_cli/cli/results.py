@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 import click
 
 from gfmd_cli.cli.messages import print_error, print_text
-from gfmd_cli.cli.options import FILE
+from gfmd_cli.cli.options import FILE, Command
 from gfmd_cli.errors import InputError
 
 if TYPE_CHECKING:
     from gfmd_cli.analysis.compare import Theory
 
 
-@click.command()
+@click.command(cls=Command)
 @click.argument("study", type=FILE)
 @click.option("--json", "as_json", is_flag=True, help="Print a list of records instead of tables.")
 @click.option("--figures", type=FILE, metavar="DIR", help="Write figures into this folder.")
@@ -57,7 +57,7 @@ def analyze(study: Path, as_json: bool, figures: Path | None, theory: "Theory") 
             print_error(str(path))
 
 
-@click.command()
+@click.command(cls=Command)
 @click.argument("study", type=FILE)
 @click.argument("other", type=FILE, required=False)
 @click.option("-o", "--output", type=FILE, help="HTML file; default: STUDY[-OTHER].html.")
@@ -92,12 +92,14 @@ def report(study: Path, other: Path | None, output: Path | None, bench: Path | N
     print_text(str(path))
 
 
-@click.command()
+@click.command(cls=Command)
 @click.argument("study", type=FILE)
 @click.option(
     "-o", "--output", type=FILE, help="FILE.csv, .nc or .vti; by default CSV on standard output."
 )
-@click.option("--task", type=int, help="Index of the task whose fields a .vti file contains.")
+@click.option(
+    "--task", metavar="I", type=int, help="Index of the task whose fields a .vti file contains."
+)
 def export(study: Path, output: Path | None, task: int | None) -> None:
     """Export a study as CSV or netCDF, or fields as a VTK image.
 
@@ -129,11 +131,12 @@ def export(study: Path, output: Path | None, task: int | None) -> None:
     print_text(str(output))
 
 
-@click.command()
+@click.command(cls=Command)
 @click.argument("one", type=FILE, metavar="A.h5")
 @click.argument("other", type=FILE, metavar="B.h5")
 @click.option(
     "--tolerance",
+    metavar="X",
     type=click.FloatRange(min=0),
     help="Exit with status 1 if a difference is larger.",
 )

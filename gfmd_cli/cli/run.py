@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from gfmd_cli.cli.messages import print_error, print_text
-from gfmd_cli.cli.options import FILE, counted, output_option, overrides_option, study_path
+from gfmd_cli.cli.options import FILE, Command, counted, output_option, overrides_option, study_path
 from gfmd_cli.cli.progress import Reporter
 from gfmd_cli.errors import InputError
 from gfmd_cli.status import Status
@@ -31,7 +31,7 @@ def _shard(context: click.Context, parameter: click.Parameter, text: str | None)
     return int(index), int(count)
 
 
-@click.command()
+@click.command(cls=Command)
 @click.argument("specs", metavar="SPEC...", type=FILE, nargs=-1, required=True)
 @output_option
 @overrides_option
@@ -39,11 +39,12 @@ def _shard(context: click.Context, parameter: click.Parameter, text: str | None)
     "--shard",
     metavar="I/N",
     callback=_shard,
-    help="Run only shard I of N: the tasks with index I modulo N.",
+    help="Run only one of N parts of the study (shard I): tasks I, I + N, I + 2N, ...",
 )
 @click.option(
     "-j",
     "--jobs",
+    metavar="N",
     type=click.IntRange(1, 1024),
     help="Number of worker processes; by default it follows from cores, memory and tasks.",
 )
@@ -57,22 +58,24 @@ def _shard(context: click.Context, parameter: click.Parameter, text: str | None)
 )
 @click.option(
     "--checkpoint-every",
+    metavar="SECONDS",
     type=click.FloatRange(min=0, min_open=True),
     default=600.0,
     show_default=True,
-    help="Seconds between two checkpoints of a task.",
+    help="Time between two checkpoints of a task.",
 )
 @click.option(
     "--max-hours",
+    metavar="HOURS",
     type=click.FloatRange(min=0, min_open=True),
-    help="Stop before this wall time has passed: save all states, exit with status 75. A task "
-    "that has begun takes at least one step.",
+    help="Stop before this wall time has passed: save all states, exit with status 75. However "
+    "short the time, a call makes at least one step.",
 )
 @click.option(
     "--reproducible",
     is_flag=True,
-    help="Give bit-identical results in every run on one machine, but slower: FFT plans are not "
-    "measured, and each task uses one thread.",
+    help="Give bit-identical results in every run on one machine, but slower: one thread a task, "
+    "and no search for the fastest Fourier transform.",
 )
 @click.option("-q", "--quiet", is_flag=True, help="Print only errors.")
 def run(

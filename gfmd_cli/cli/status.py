@@ -13,6 +13,7 @@ import click
 from gfmd_cli.cli.messages import print_error, print_text
 from gfmd_cli.cli.options import (
     FILE,
+    Command,
     counted,
     output_option,
     overrides_option,
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
     from gfmd_cli.study.progress import StudyProgress
 
 
-@click.command()
+@click.command(cls=Command)
 @click.argument("path", metavar="SPEC|STUDY", type=FILE)
 @output_option
 @overrides_option
@@ -65,7 +66,7 @@ def status(
         print_text("\n".join([*_lines(progress, shards), f"next: {next_command}"]))
 
 
-@click.command()
+@click.command(cls=Command)
 @click.argument("spec", type=FILE)
 @output_option
 @overrides_option

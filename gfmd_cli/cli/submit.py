@@ -8,25 +8,39 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from gfmd_cli.cli.messages import print_text
-from gfmd_cli.cli.options import FILE, output_option, overrides_option, repeated, study_path
-from gfmd_cli.errors import InputError
+from gfmd_cli.cli.options import (
+    FILE,
+    Command,
+    output_option,
+    overrides_option,
+    repeated,
+    study_path,
+)
+from gfmd_cli.errors import GfmdError, InputError
 from gfmd_cli.units import count
 
 if TYPE_CHECKING:
     from gfmd_cli.study.slurm import Batch
 
 
-@click.command()
+@click.command(cls=Command)
 @click.argument("spec", type=FILE)
 @output_option
 @overrides_option
 @click.option("--shards", type=int, metavar="N", help="Divide the tasks into N shards.")
 @click.option("--missing", is_flag=True, help="Submit only shards with missing tasks.")
 @click.option("--dry-run", is_flag=True, help="Print the script and the commands; submit nothing.")
-@click.option("--time", help="Time limit of a shard, such as 12:00:00.")
-@click.option("--mem", help="Memory of a shard; by default the prediction for its largest task.")
+@click.option("--time", metavar="TIME", help="Time limit of a shard, such as 12:00:00.")
 @click.option(
-    "--cpus-per-task", type=click.IntRange(1, 1024), help="Cores of a shard; by default 1."
+    "--mem",
+    metavar="SIZE",
+    help="Memory of a shard; by default the prediction for its largest task.",
+)
+@click.option(
+    "--cpus-per-task",
+    metavar="N",
+    type=click.IntRange(1, 1024),
+    help="Cores of a shard; by default 1.",
 )
 @click.option("--partition", metavar="NAME", help="Partition of the cluster.")
 @click.option("--account", metavar="NAME", help="Account to charge.")
@@ -58,6 +72,7 @@ def submit(
 
         gfmd submit configs/demo.toml --missing
     """
+    from gfmd_cli.files.atomic import check_place
     from gfmd_cli.spec.parse import read_spec
     from gfmd_cli.study.progress import progress_of_spec
     from gfmd_cli.study.slurm import batch
@@ -88,6 +103,7 @@ def submit(
         for call in (job.array_call(), job.collect_call("JOB")):
             print_text(f"# {shlex.join(call)}")
     else:
+        check_place(study)
         _send(job)
         print_text(f"next: gfmd status {words}")
 
@@ -107,5 +123,11 @@ def _send(job: "Batch") -> None:
         write_whole(job.path, job.text.encode())
     number = call(job.array_call()).partition(";")[0]
     print_text(f"job {number}: {len(job.members)} of {count(job.shards, 'shard')}, by {job.path}")
-    collect_job = call(job.collect_call(number)).partition(";")[0]
+    try:
+        collect_job = call(job.collect_call(number)).partition(";")[0]
+    except GfmdError as error:
+        raise GfmdError(
+            f"{error}\njob {number} is submitted, the job that collects its results is not: run "
+            "gfmd collect when it has ended"
+        ) from error
     print_text(f"job {collect_job}: collects when they have ended; logs in {job.logs}")

@@ -12,6 +12,8 @@ from uuid import uuid4
 
 from gfmd_cli.errors import SpaceError
 
+WRITABLE = stat.S_IWUSR | stat.S_IWGRP | stat.S_IWOTH
+
 
 class NewFile(io.FileIO):
     """A new file that keeps its first error: HDF5 crashes at exit if a write fails."""
@@ -40,7 +42,8 @@ def new_file(path: Path, aside: Path | None = None) -> Iterator[NewFile]:
     fresh = (aside or path.parent) / f".{path.name}.{uuid4().hex}"
     file: NewFile | None = None
     try:
-        fresh.parent.mkdir(parents=True, exist_ok=True)
+        _check_target(path)
+        fresh.parent.mkdir(exist_ok=True)
         with NewFile(fresh, "w+b") as file:
             yield file
             if file.error is not None:
@@ -71,19 +74,31 @@ def write_whole(path: Path, content: bytes) -> None:
 
 def check_place(path: Path) -> None:
     """Raise SpaceError where no file can be written at `path`, before the work for it begins."""
-    folder = next(folder for folder in path.absolute().parents if folder.exists())
+    _check_target(path)
     try:
-        TemporaryFile(dir=folder).close()
+        TemporaryFile(dir=path.parent).close()
     except OSError as error:
         raise SpaceError(f"{path}: cannot be written: {error.strerror}") from error
 
 
+def _check_target(path: Path) -> None:
+    """Raise SpaceError for a path in a folder that does not exist, and for a read-only file.
+
+    A file that nobody may write is kept, although it could be replaced, and root could write it.
+    """
+    if not path.parent.is_dir():
+        raise SpaceError(f"{path}: cannot be written: there is no folder {path.parent}")
+    if path.exists() and not path.stat().st_mode & WRITABLE:
+        raise SpaceError(f"{path}: cannot be written: it is read-only (see chmod)")
+
+
 def make_folder(path: Path) -> None:
-    """Make a folder where it is missing. Raises SpaceError."""
+    """Make a folder where it is missing, not the folders around it. Raises SpaceError."""
+    _check_target(path)
     try:
-        path.mkdir(parents=True, exist_ok=True)
+        path.mkdir(exist_ok=True)
     except OSError as error:
-        raise SpaceError(f"{path}: cannot be made: {error.strerror}") from error
+        raise SpaceError(f"{path}: cannot be written: {error.strerror}") from error
 
 
 def _sync_folder(folder: Path) -> None:

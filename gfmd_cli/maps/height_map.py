@@ -188,12 +188,19 @@ def _dataset_name(path: Path, file: Any, name: str | None) -> str:
         datasets = datasets_below(file)
     except ValueError as error:
         raise InputError(f"{path}: {error}; choose one by surface.dataset") from error
+    if is_study := "spec_text" in file.attrs:  # its other arrays are distributions
+        datasets = {key: item for key, item in datasets.items() if key.startswith("fields/")}
     maps = _maps(datasets)
     if name is not None:
         if name.strip("/") in datasets:
             return name.strip("/")
         raise InputError(
             f"{path}: no dataset {name!r} (links are not followed); its height maps: {listed(maps)}"
+        )
+    if is_study and not maps:
+        raise InputError(
+            f'{path}: a study that stores no heights; give fields = ["height"] in [output] of its '
+            "spec, and run that again"
         )
     if not maps:
         raise InputError(f"{path}: no numeric dataset with one or two dimensions")

@@ -25,6 +25,7 @@ from gfmd_cli.physics.stiffness_table import (
     read_table,
 )
 from gfmd_cli.spec_table import FilePath, Positive
+from gfmd_cli.units import labelled
 
 LONG_WAVE = 1e-6  # q t up to which k of a layer is constant: (q t)^2 is below rounding
 DECAY_DISTANCE = 25.0  # thicknesses from which the displacement of a layer is below rounding
@@ -131,6 +132,11 @@ class Slab(LinearElastomer):
     def short_label(self) -> str:
         """The thickness."""
         return f"t/L = {self.thickness:g}"
+
+    def label_on(self, length: float) -> str:
+        """The label with the thickness in metres, except for L = 1 as in reduced units."""
+        metres = labelled(self.thickness * length, "m")
+        return self.label if length == 1 else f"{self.label} (t = {metres})"
 
     def stiffness(self, q: Field, length: float = 1.0) -> Field:
         """k(q) [Pa/m]."""

@@ -42,6 +42,10 @@ class LinearElastomer(SpecTable):
         fraction = Fraction(self.exponent).limit_denominator(4)
         return f"n = {fraction}" if fraction == self.exponent else f"n = {self.exponent:g}"
 
+    def label_on(self, length: float) -> str:
+        """The label on a cell of this side [m]."""
+        return self.label
+
     def stiffness(self, q: Field, length: float = 1.0) -> Field:
         """k(q) [Pa/m], zero at q = 0."""
         raise NotImplementedError

@@ -82,6 +82,8 @@ class Check:
                 self.places.setdefault(table, f"{name}:{number}")
             elif key := re.match(r"\s*([\w.\-]+)\s*=", line):
                 self.places.setdefault(f"{table}.{key[1]}" if table else key[1], f"{name}:{number}")
+        for address, place in list(self.places.items()):  # of a table that the text does not have
+            self.places.setdefault(address.partition(".")[0], place)
 
     def where(self, key: str) -> str:
         """The place of a key, or of the table around it."""
@@ -144,9 +146,11 @@ class Check:
     ) -> list[PlacedTable]:
         """The choices of one table, every combination of its lists."""
         axes = _axes(table, paired) if name in models.SWEPT else []
+        for key in (key for keys in axes for key in keys if not table[key]):
+            self.add(f"{name}.{key}", "must have 1 or more values, got []")
         count = prod(len(table[keys[0]]) for keys in axes)
-        if not 0 < count <= MAX_SWEEP:
-            self.add(name, f"its lists have {count} combinations; 1 to {MAX_SWEEP} are allowed")
+        if count > MAX_SWEEP:
+            self.add(name, f"its lists have {count} combinations; at most {MAX_SWEEP} are allowed")
             return []
         built: list[PlacedTable] = []
         for indices in product(*(range(len(table[keys[0]])) for keys in axes)):
@@ -262,7 +266,7 @@ def _problem(name: str, places: dict[str, int], detail: Any) -> tuple[str, str]:
     elif detail["type"] == "missing":
         text = "is missing"
     else:
-        message = detail["msg"].removeprefix("Value error, ")
+        message = detail["msg"].removeprefix("Value error, ").replace("Input should", "must")
         message = message[:1].lower() + message[1:]
         given = detail["input"]
         if detail["type"] in WORDS:

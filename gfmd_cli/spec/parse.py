@@ -15,6 +15,13 @@ from gfmd_cli.spec.models import LOADS, Spec
 MAX_BYTES = 256 * 1024  # of a spec; a few kB are usual
 MAX_DEPTH = 16  # of tables and lists
 MAX_DOTS = 2000  # in a line; of a dotted key tomllib takes memory with their square
+SYNTAX = {
+    r"^.*(overwrite|twice)": "this key or table was given before; keep one of them",
+    r"=\s*[+-]?\d+,\d": "write numbers with a decimal point, such as 0.1",
+    r"^Invalid value\n.*=[\s\[]*[A-Za-z]": 'write words in quotation marks, such as "auto", '
+    "and true and false in small letters",
+}
+"""What to write instead, by patterns of the message of tomllib and the line after it."""
 
 
 def read_spec(path: Path, overrides: tuple[str, ...] = ()) -> tuple[Spec, str]:
@@ -100,10 +107,21 @@ def _toml(text: str, name: str) -> dict[str, Any]:
     except RecursionError:
         raise InputError(f"{name}: nested deeper than {MAX_DEPTH}") from None
     except ValueError as error:  # TOMLDecodeError is one
-        raise InputError(f"{name}: TOML syntax: {shortened(str(error))}") from error
+        raise InputError(_syntax_error(text, name, str(error))) from error
     if _is_deep(data):
         raise InputError(f"{name}: nested deeper than {MAX_DEPTH}")
     return data
+
+
+def _syntax_error(text: str, name: str, message: str) -> str:
+    """The message of tomllib with the line that it names, and what to write instead."""
+    reason, _, place = message.rpartition(" (at line ")
+    if not reason:
+        return f"{name}: TOML syntax: {shortened(message)}"
+    number = int(place.partition(",")[0])
+    line = text.split("\n")[number - 1].strip()
+    remedies = (SYNTAX[form] for form in SYNTAX if re.search(form, f"{reason}\n{line}"))
+    return f"{name}:{number}: {shortened(line)}: TOML syntax: {next(remedies, reason)}"
 
 
 def _is_deep(data: Any) -> bool:

@@ -14,9 +14,9 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from gfmd_cli.errors import InputError
 from gfmd_cli.physics.contact import build_scene
 from gfmd_cli.physics.file_surface import FileSurface
-from gfmd_cli.spec.check import kinds_of
-from gfmd_cli.spec.models import with_boundary
-from gfmd_cli.spec.parse import read_text, set_override, split_override
+from gfmd_cli.spec.check import Check, kinds_of
+from gfmd_cli.spec.models import Spec, with_boundary
+from gfmd_cli.spec.parse import set_override, split_override
 from gfmd_cli.spec_table import SpecTable
 
 E_STAR = 2e9  # Pa, a stiff polymer
@@ -30,7 +30,7 @@ def starter(path: Path, overrides: tuple[str, ...]) -> str:
     Raises InputError where the result is not a valid spec.
     """
     text = with_keys(_render("study.toml", path.name, warnings=[]), overrides)
-    read_text(text, path, overrides)
+    _checked(text, path, overrides)
     return text
 
 
@@ -69,12 +69,17 @@ def starter_of_scan(
         )
         return with_keys(rendered, overrides)
 
-    elastomers = read_text(text(1.0, 1.0, 1), path, overrides).elastomer
+    elastomers = _checked(text(1.0, 1.0, 1), path, overrides).elastomer
     scene = build_scene(repeated, elastomers[0], repeated.smallest_grid())
     finished = text(scene.h_std, scene.delta_sigma, len(elastomers))
-    spec = read_text(finished, path, overrides)
+    spec = _checked(finished, path, overrides)
     used, grid = with_boundary(spec.surface[0], spec.elastomer[0], spec.grid[0], spec.solver[0])
     return finished, used.preparation(grid.boundary or "")
+
+
+def _checked(text: str, path: Path, overrides: tuple[str, ...]) -> Spec:
+    """The spec of a text with overrides, by which messages name places: no file has it yet."""
+    return Check(str(path), overrides=overrides, folder=path.parent).spec(tomllib.loads(text))
 
 
 def _render(template: str, file: str, **values: Any) -> str:

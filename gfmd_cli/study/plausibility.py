@@ -5,7 +5,8 @@ from math import inf, isfinite
 from typing import Any
 
 from gfmd_cli.maps.map_warnings import MAX_GRADIENT
-from gfmd_cli.physics.elastomers import Layer
+from gfmd_cli.physics.contact import Scene
+from gfmd_cli.physics.elastomers import Layer, Slab
 from gfmd_cli.physics.indenters import RigidSurface
 from gfmd_cli.physics.spectrum_fit import moments
 from gfmd_cli.spec.models import LOADS
@@ -25,6 +26,8 @@ SMALL_GAPS = (1e-5, 1e-3)
 probably meant in m; a choice."""
 LOOSE = 0.01  # natural residual; the mean gap of the default surface is then wrong by 0.1 to 1 %
 SMALL_DISPLACEMENT = 1e-4  # [h_std], below which heights have another unit; a choice
+PLATE = 0.1
+"""Largest q t up to which a slab is a plate; its stiffness is then smaller by 0.2 % or less."""
 NEARLY_INCOMPRESSIBLE = 0.48
 """Poisson's ratio of a bonded layer above which a load with a free boundary is wrong by 3 % or more
 if pixels are wider than the layer is thick; measured, see docs/accuracy.md."""
@@ -66,6 +69,12 @@ def warnings_of(task: Task, solved: TaskSolution, results: Mapping[str, Any]) ->
     warnings += _coarse_for_layer(task, max(scene.grid.spacings))
     warnings += _load_in_jump(task, solved.solution.status, results)
     warnings += _contact_at_border(task, solved)
+    warnings += _thin_slab(task, scene)
+    if scene.may_touch is not None and solved.observables.u_g < 0:
+        warnings.append(
+            "the mean gap is negative: where heights are missing, the elastomer enters the holes "
+            "deeper than the interpolated heights, from which the gap is counted"
+        )
     warnings += _missed_accuracy(task, solved)
     units = _doubtful_unit(task, solved)
     if units:
@@ -95,6 +104,25 @@ def _coarse_for_layer(task: Task, spacing: float) -> list[str]:
         f"pixels of {spacing:.3g} m are wider than elastomer.thickness, {layer.thickness:.3g} m: "
         f"with poisson = {layer.poisson:g} and a free boundary the load may be wrong by 3 to 15 %, "
         "and by more beyond six thicknesses; use more points"
+    ]
+
+
+def _thin_slab(task: Task, scene: Scene) -> list[str]:
+    """A warning if a slab is so thin that its thickness is probably meant in m."""
+    slab, length = task.elastomer, scene.grid.length
+    if not isinstance(slab, Slab):
+        return []
+    thickness = slab.thickness * length
+    if thickness * scene.shells.q.max() <= PLATE:
+        reason = "a thin plate at all wavelengths"
+    elif task.surface.rough and thickness < scene.h_std <= METRES:
+        reason = f"less than the rms height, {scene.h_std:.3g} m"
+    else:
+        return []
+    return [
+        f"elastomer.thickness = {slab.thickness:g} is relative to the side of the cell, "
+        f"{length:.3g} m: a slab of {thickness:.3g} m, {reason}; divide a thickness in m by the "
+        "side"
     ]
 
 

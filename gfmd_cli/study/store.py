@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from gfmd_cli.errors import InputError, SpaceError, StudyError
-from gfmd_cli.files.atomic import new_file
+from gfmd_cli.files.atomic import check_place, new_file
 from gfmd_cli.files.hdf5 import new_hdf5
 from gfmd_cli.files.locks import locked
 from gfmd_cli.spec.models import Spec
@@ -61,6 +61,7 @@ class Study:
         Yields what was found damaged, and set aside. The last one to leave removes the folder
         unless something is left to do there. Raises InputError, SpaceError.
         """
+        check_place(self.path)
         unfinished_work.check_own(self.parts)
         in_use = self.parts / "in-use"
         with locked(in_use, wait=False) as alone:
@@ -120,8 +121,9 @@ class Study:
     def move_aside(self) -> list[Path]:
         """Rename the study and its folder of unfinished work; return their new paths.
 
-        Raises InputError where another run works there.
+        Raises InputError where another run works there, SpaceError for a read-only study.
         """
+        check_place(self.path)
         number, target = 1, self.path
         while target.exists() or Study(target).parts.exists():
             target = self.path.with_name(f"{self.path.stem}.{number}{self.path.suffix}")

@@ -131,11 +131,13 @@ class StoredStudies:
 def run(name: str, folder: Path, quick: bool, jobs: int | None = None) -> None:
     """Run the missing tasks of one study by the command line."""
     study = STUDIES[name]
-    settings = (*study.settings, *(study.quick if quick else ()))
+    settings = {word.partition("=")[0]: word for word in study.settings}
+    if quick:
+        settings |= {word.partition("=")[0]: word for word in study.quick}
     command = [sys.executable, "-P", "-m", "gfmd_cli", "run", CONFIGS / f"{study.config}.toml"]
     command += ["-o", folder / f"{name}.h5", "-q"]
     command += ["-j", jobs] if jobs else []
-    command += [word for setting in settings for word in ("--set", setting)]
+    command += [word for setting in settings.values() for word in ("--set", setting)]
     done = subprocess.run([str(word) for word in command], check=False)
     if done.returncode not in (0, 1):  # 1: some contact missed its tolerance, which its row says
         raise SystemExit(done.returncode)
