@@ -244,6 +244,27 @@ def test_a_height_file_that_will_not_do_is_refused(gfmd, array, words):
     assert not Path("small.h5").exists()
 
 
+def test_tables_of_one_name_are_told_apart(gfmd):
+    """Three seeds of two materials: the means are those of each."""
+    for folder, n in {"a": 1, "b": 2}.items():
+        Path(folder).mkdir()
+        np.savetxt(f"{folder}/k.txt", [[1e-3, 1e-3**n], [1e6, 1e6**n]])
+    elastomers = "elastomer=[{kind='table', path='a/k.txt'}, {kind='table', path='b/k.txt'}]"
+    seeds = ("--set", "surface.seed=[0, 1, 2]", "--set", "load.p_star=0.1")
+    result = gfmd("run", "spec.toml", "--set", elastomers, *seeds, "--set", "grid.points=40")
+    assert result.exit_code == 0, result.output
+    rows = list(csv.DictReader(io.StringIO(gfmd("export", "small.h5").output)))
+    assert {row["elastomer"] for row in rows} == {
+        f"table path=k.txt sha256={row['elastomer_sha256'][:8]}" for row in rows
+    }
+    records = json.loads(gfmd("analyze", "small.h5", "--json").output)
+    for checksum in {row["elastomer_sha256"] for row in rows}:
+        values = [float(row["u_g"]) for row in rows if row["elastomer_sha256"] == checksum]
+        (mean,) = {r["u_g_mean"] for r in records if r["elastomer_sha256"] == checksum}
+        assert len(values) == 3
+        assert mean == pytest.approx(np.mean(values), rel=1e-12)
+
+
 def test_a_height_array_is_used_as_it_is(gfmd):
     heights = np.random.default_rng(5).normal(size=(32, 32))
     np.save("h.npy", heights)

@@ -255,6 +255,22 @@ def test_bad_tables_are_refused(tmp_path, content, complaint):
     assert str(path) in str(caught.value)
 
 
+@pytest.mark.parametrize("digits", ["%.18e", "%.6g"])
+def test_a_rounded_table_is_what_it_was_made_from(tmp_path, digits):
+    """The first rows decide about a free boundary, not the rounding of their numbers."""
+    q = np.geomspace(1e3, 1e9, 100)
+    np.savetxt(tmp_path / "half-space.txt", np.column_stack([q, 5e8 * q]), fmt=digits)
+    half_space = Tabulated(path=tmp_path / "half-space.txt")
+    assert not half_space.decays(1)
+    assert half_space.decays(2)
+    assert half_space.uniform_stiffness is None
+    layer = Layer(thickness=1e-6, base="bonded", poisson=0.4)
+    np.savetxt(tmp_path / "layer.txt", np.column_stack([q, layer.stiffness(q)]), fmt=digits)
+    table = Tabulated(path=tmp_path / "layer.txt")
+    assert table.decays(1)
+    assert table.uniform_stiffness == pytest.approx(layer.uniform_stiffness, rel=1e-3)
+
+
 def test_unreadable_tables_are_refused(tmp_path):
     (tmp_path / "binary").write_bytes(bytes(range(256)))
     (tmp_path / "folder").mkdir()

@@ -67,6 +67,14 @@ def test_a_table_of_stiffness_that_does_not_reach_the_surface(tmp_path):
     assert "100% of the squared stress" in only_warning(tables(elastomer=elastomer))
 
 
+def test_a_table_of_stiffness_that_begins_above_the_longest_waves(tmp_path):
+    """They have most of the height, which determines the gap, and little of the stress."""
+    np.savetxt(tmp_path / "k.txt", [[1.6e6, 1.6e6**3], [1e8, 1e24]])
+    elastomer = {"kind": "table", "path": str(tmp_path / "k.txt")}
+    warning = only_warning(tables(elastomer=elastomer))
+    assert re.search(r"[5-9]\d% of the squared height is at other wavenumbers", warning)
+
+
 @pytest.mark.parametrize(("thickness", "warned"), [(1e-7, False), (1e-6, True)])
 def test_waves_that_are_short_for_a_plate(thickness, warned):
     """The shortest wavelength is 1.25 um, 2 pi t is 0.6 and 6 um."""

@@ -92,7 +92,8 @@ def without_seed(row: Row) -> tuple[Any, ...]:
     """What contacts have in common that differ in seed and load only."""
     auto = row["grid"] == "auto"  # with points of its own for each seed
     keys = {"seed", "points", "points_y"} if auto else {"seed"}
-    return (auto, row["surface_sha256"], *(e.word(row) for e in PARAMETERS if e.key not in keys))
+    files = row["surface_sha256"], row["elastomer_sha256"]
+    return (auto, *files, *(e.word(row) for e in PARAMETERS if e.key not in keys))
 
 
 def by_load(rows: Iterable[Row]) -> list[list[Row]]:

@@ -62,6 +62,8 @@ def _contacts_of(tasks: Sequence[Task]) -> list[str]:
     rows = [
         {
             "elastomer": task.elastomer.label_on(task.surface.sides[-1]),
+            "elastomer_short": "",
+            "elastomer_sha256": task.elastomer_sha256,
             "surface": task.surface.label,
             "ensemble": "",
             "surface_sha256": task.surface_sha256,

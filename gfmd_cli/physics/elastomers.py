@@ -31,7 +31,8 @@ LONG_WAVE = 1e-6  # q t up to which k of a layer is constant: (q t)^2 is below r
 DECAY_DISTANCE = 25.0  # thicknesses from which the displacement of a layer is below rounding
 MAX_SPACING = 16.0  # of a grid, in thicknesses of a layer with a free boundary
 MAX_SHORT_WAVE_STRESS = 0.1  # fraction of the squared stress, for a thin plate; a choice
-MAX_EXTRAPOLATED_STRESS = 0.1  # fraction of the squared stress beyond a table; a choice
+MAX_EXTRAPOLATED = 0.1  # fraction of squared stress or height beyond a table; a choice
+ROUNDED_EXPONENT = 1e-3  # of the first rows of a table, whose numbers may be rounded; a choice
 
 
 class Power(LinearElastomer):
@@ -233,18 +234,22 @@ class Tabulated(LinearElastomer):
     def warnings(self, h_std: float, q: Field, variance: Field) -> list[str]:
         """See `LinearElastomer.warnings`."""
         first, *_, last = read_table(self.path)[:, 0]
-        fraction = _fraction(variance, (q < first) | (q > last))
-        if fraction <= MAX_EXTRAPOLATED_STRESS:
+        beyond = (q < first) | (q > last)
+        of_stress = _fraction(variance, beyond), "squared stress in full contact"
+        of_height = _fraction(variance / self.stiffness(q) ** 2, beyond), "squared height"
+        fraction, what = max(of_stress, of_height)
+        if fraction <= MAX_EXTRAPOLATED:
             return []
         return [
             f"{self.path.name}: k(q) is given for q = {first:.3g} to {last:.3g} 1/m, but "
-            f"{fraction:.0%} of the squared stress in full contact is at other wavenumbers (the "
+            f"{fraction:.0%} of the {what} is at other wavenumbers (the "
             f"surface has {q.min():.3g} to {q.max():.3g} 1/m), where k is extrapolated"
         ]
 
     def decays(self, dimension: int) -> bool:
         """Whether the power law below the table rises less than q^dimension."""
-        return 0 <= end_exponents(read_table(self.path))[0] < dimension
+        exponent = end_exponents(read_table(self.path))[0]
+        return -ROUNDED_EXPONENT <= exponent < dimension - ROUNDED_EXPONENT
 
     def check_free_boundary(self, dimension: int) -> None:
         """Raise InputError for exponents that have no compliance kernel."""
@@ -261,9 +266,9 @@ class Tabulated(LinearElastomer):
 
     @property
     def uniform_stiffness(self) -> float | None:
-        """k of the first rows of the table [Pa/m] if it is constant there, else None."""
-        first, second = read_table(self.path)[:2, 1]
-        return float(first) if first == second else None
+        """k of the first row of the table [Pa/m] if it is constant there, else None."""
+        table = read_table(self.path)
+        return float(table[0, 1]) if abs(end_exponents(table)[0]) < ROUNDED_EXPONENT else None
 
 
 @lru_cache(maxsize=4)

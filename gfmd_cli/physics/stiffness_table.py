@@ -61,4 +61,5 @@ def end_exponents(table: Field) -> tuple[float, float]:
 def compliance_of_table(content: bytes) -> Compliance:
     """1/k(q) from the bytes of a table; cached, because its transforms serve all grids."""
     table = np.frombuffer(content).reshape(-1, 2)
-    return Compliance(interpolated(table), separated(table[:, 0]), end_exponents(table)[0])
+    exponent = max(end_exponents(table)[0], 0.0)  # of rounded numbers it may be negative
+    return Compliance(interpolated(table), separated(table[:, 0]), exponent)

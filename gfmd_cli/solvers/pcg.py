@@ -277,4 +277,4 @@ class _Run:
     def longest(self) -> float:
         """Length at which the point that moves farthest moves by the range of the heights."""
         largest = self.grid.max(float(np.abs(self.direction).max()))
-        return self.contact.height_range / largest
+        return self.contact.height_range / largest if largest else 0.0

@@ -58,6 +58,7 @@ DETAILS = (
     Column("ensemble", "the column surface without the seed, the same for all seeds", "", str),
     Column("elastomer_short", "short name of the elastomer in figures", "", str),
     Column("surface_sha256", "SHA-256 checksum of the file of the surface", "", str),
+    Column("elastomer_sha256", "SHA-256 checksum of the table of the elastomer", "", str),
     Column("mean_gap", "mean gap", "m"),
     Column("displacement", "that of the indenter from first touch; NaN if not defined", "m"),
     Column(

@@ -43,6 +43,7 @@ def planned(task: Task) -> Row:
         "surface": surface.label,
         "ensemble": surface.label_without({"seed"}),
         "surface_sha256": task.surface_sha256,
+        "elastomer_sha256": task.elastomer_sha256,
         "dimension": surface.dimension,
         "x_first": surface.x_first,
         "rough": int(surface.rough),

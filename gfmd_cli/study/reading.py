@@ -29,7 +29,9 @@ PACKED = "columns"
 """Group of the columns of a record, by kind."""
 MAX_DIMENSIONS = 2
 FILE_MARK = " sha256="
-"""Precedes the checksum in the label of a surface."""
+"""Precedes the checksum in a label."""
+FILE_LABELS = {"surface": "ensemble", "elastomer": "elastomer_short"}
+"""Columns with labels of what files describe; each has a second label."""
 FILE_DIGITS = 8  # of a checksum in a label
 DAMAGE = (
     KeyError, IndexError, TypeError, AttributeError, ValueError, OverflowError,
@@ -280,18 +282,19 @@ def read_rows(path: Path) -> list[dict[str, Any]]:
 
 
 def tell_files_apart(rows: Iterable[dict[str, Any]]) -> None:
-    """Add checksums to the labels of surfaces that different files share, in place.
+    """Add checksums to the labels of surfaces and elastomers that different files share, in place.
 
     Files differ that have one name in two folders, or that have changed between two runs.
     """
-    files: dict[str, list[dict[str, Any]]] = {}
+    files: dict[tuple[str, str], list[dict[str, Any]]] = {}
     for row in rows:
-        files.setdefault(row["surface"].partition(FILE_MARK)[0], []).append(row)
-    for alike in files.values():
-        differ = len({row["surface_sha256"] for row in alike}) > 1
+        for kind in FILE_LABELS:
+            files.setdefault((kind, row[kind].partition(FILE_MARK)[0]), []).append(row)
+    for (kind, _), alike in files.items():
+        differ = len({row[f"{kind}_sha256"] for row in alike}) > 1
         for row in alike:
-            mark = f"{FILE_MARK}{row['surface_sha256'][:FILE_DIGITS]}" if differ else ""
-            for name in ("surface", "ensemble"):
+            mark = f"{FILE_MARK}{row[f'{kind}_sha256'][:FILE_DIGITS]}" if differ else ""
+            for name in (kind, FILE_LABELS[kind]):
                 row[name] = row[name].partition(FILE_MARK)[0] + mark
 
 

@@ -48,6 +48,8 @@ class Task:
     """Name of its surface, elastomer and grid by their content."""
     surface_sha256: str
     """Checksum of the file of the surface; "" without a file."""
+    elastomer_sha256: str
+    """Checksum of the table of the elastomer, likewise."""
     swept: tuple[tuple[str, str], ...]
     """Swept keys of surface, grid and solver: the table, and the value as a word of the label."""
 
@@ -175,6 +177,7 @@ def _tasks(spec: models.Spec) -> list[Task]:
                     accuracy=spec.accuracy,
                     id=_task_id(spec, resolved, tables, load),
                     surface_sha256=tables["surface"].get("sha256", ""),
+                    elastomer_sha256=tables["elastomer"].get("sha256", ""),
                     scene_id=digest([tables[name] for name in ("surface", "elastomer", "grid")]),
                     swept=_swept_words(chosen, swept_keys),
                 )
