@@ -63,6 +63,7 @@ OTHERS = {
     "nothing": b"",
     "one line": b"1.0 " * 10**6,
     "one number": b"1" * 10**6,
+    "one column": b"1.0\n" * 10**6,
     "words": b"some words here\n" * 10**5,
     "zeros": bytes(10**6),
     "a line with a number more": ragged(250),
@@ -262,11 +263,3 @@ def test_a_fourth_column_beside_positions_is_refused(tmp_path):
     np.savetxt(path, np.column_stack([x.ravel(), y.ravel(), *values]))
     with pytest.raises(InputError, match="one of 4 columns is sorted"):
         FileSurface(path=path).smallest_grid()
-
-
-@pytest.mark.parametrize("points", [100, 3000])
-def test_one_column_is_a_profile(tmp_path, points):
-    """Also in a file larger than those that every reader tries."""
-    heights = np.random.default_rng(3).normal(size=points)
-    np.savetxt(tmp_path / "profile.txt", heights)
-    np.testing.assert_array_equal(read_topography(tmp_path / "profile.txt").heights, heights)

@@ -57,12 +57,13 @@ def cells(line: bytes) -> list[bytes]:
 def table_formats(file: BinaryIO) -> set[str]:
     """The formats of tables that a file can have.
 
-    "asc" is a matrix of heights between blanks, or one column of them; "xyz" are the positions and
-    heights of a profile or of points on a grid, between blanks, commas or semicolons.
+    "asc" is a matrix of heights between blanks; "xyz" are the positions and heights of a profile or
+    of points on a grid, between blanks, commas or semicolons.
     """
-    formats, positions = set(), columns(file)
-    if positions == 1 or _columns(file, b" \t") >= MATRIX_COLUMNS:
+    formats = set()
+    if _columns(file, b" \t") >= MATRIX_COLUMNS:
         formats.add("asc")
+    positions = columns(file)
     if positions == 2 or (positions == 3 and _is_grid(file)):
         formats.add("xyz")
     return formats

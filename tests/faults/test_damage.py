@@ -56,6 +56,7 @@ def test_damaged_records_are_refused(folder, gfmd):
     stored = OutputTable(fields=["u"], cross_section=True).names()
     entry = result.entry._replace(task_id="copy", stored=stored)
     result = replace(result, entry=entry, arrays=arrays)
+    (folder / "whole").mkdir()
     path = write_record(folder / "whole", result)
     met = count(path, folder / "copy.record", lambda path: vars(read_record(path)))
     assert met == {"refused": CUTS + FLIPS}
