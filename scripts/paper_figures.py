@@ -31,7 +31,8 @@ def main() -> None:
     parser.add_argument("--no-run", action="store_true", help="draw what is there")
     parser.add_argument("--page", type=Path, help="where the page goes, by default with the rest")
     arguments = parser.parse_args()
-    arguments.output.mkdir(parents=True, exist_ok=True)
+    figures = arguments.output / "figures"
+    figures.mkdir(parents=True, exist_ok=True)
     names = arguments.only or [name for name in STUDIES if not (arguments.quick and name in LARGE)]
     for name in () if arguments.no_run else names:
         begun = time.perf_counter()
@@ -42,14 +43,9 @@ def main() -> None:
     with styled():
         for draw in FIGURES:
             if all(studies.has(name) for name in draw.needs):
-                findings += draw(studies, arguments.output / "figures")
+                findings += draw(studies, figures)
     findings.sort(key=lambda finding: list(page.STATEMENTS).index(finding.key))
-    page.write(
-        findings,
-        studies,
-        arguments.output / "figures",
-        arguments.page or arguments.output / "paper.md",
-    )
+    page.write(findings, studies, figures, arguments.page or arguments.output / "paper.md")
     print(page.count(findings))
 
 

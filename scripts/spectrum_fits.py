@@ -19,10 +19,11 @@ POINTS = 512  # of a scan; the surface has twice as many along each side
 COLUMNS = ("L / lambda_r", "pixels", "H", "fit", "error", "lambda_s", "lambda_r", "rms", "scatter")
 
 
-def gaussian_roughness(seed: int, hurst: float, mode_r: float, mode_s: float) -> np.ndarray:
+def gaussian_roughness(
+    draw: np.random.Generator, points: int, hurst: float, mode_r: float, mode_s: float
+) -> np.ndarray:
     """White noise, filtered to C = [1 + (m / m_r)^2]^(-1-H) for modes m up to m_s."""
-    points = 2 * POINTS
-    noise = np.fft.rfft2(np.random.default_rng(seed).standard_normal((points, points)))
+    noise = np.fft.rfft2(draw.standard_normal((points, points)))
     m = np.hypot(np.fft.fftfreq(points, 1 / points)[:, None], np.arange(points // 2 + 1))
     noise *= np.where(m <= mode_s, (1 + (m / mode_r) ** 2) ** (-0.5 * (1 + hurst)), 0)
     noise[0, 0] = 0
@@ -33,7 +34,8 @@ def fits(folder: Path, seeds: range, hurst: float, rolloff: float, pixels: float
     """The cells of one row."""
     values, failed = [], 0
     for seed in seeds:
-        heights = gaussian_roughness(seed, hurst, 2 * rolloff, 2 * POINTS / pixels)
+        draw, points = np.random.default_rng(seed), 2 * POINTS
+        heights = gaussian_roughness(draw, points, hurst, 2 * rolloff, points / pixels)
         path = folder / f"{seed}-{hurst}-{rolloff}-{pixels}.npy"
         np.save(path, heights[:POINTS, :POINTS])
         fit = map_spectrum(FileSurface(path=path, periodic=False)).fit

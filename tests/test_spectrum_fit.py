@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from spectrum_fits import gaussian_roughness
 
 from gfmd_cli.analysis.surface_summary import summarise
 from gfmd_cli.errors import InputError
@@ -54,15 +55,6 @@ def test_a_power_law_shows_no_roll_off():
     assert fitted.q_r == 0
     assert fitted.hurst == pytest.approx(0.7, abs=1e-4)
     assert 2 * np.pi / fitted.q_s == pytest.approx(0.02, rel=5e-3)
-
-
-def gaussian_roughness(draw, points, hurst, mode_r, mode_s):
-    """Amplitudes and phases random: white noise, filtered."""
-    noise = np.fft.rfft2(draw.standard_normal((points, points)))
-    m = np.hypot(np.fft.fftfreq(points, 1 / points)[:, None], np.arange(points // 2 + 1))
-    noise *= np.where(m <= mode_s, (1 + (m / mode_r) ** 2) ** (-0.5 * (1 + hurst)), 0)
-    noise[0, 0] = 0
-    return np.fft.irfft2(noise)
 
 
 def test_standard_errors_hold_on_gaussian_roughness():

@@ -10,6 +10,7 @@ from gfmd_cli.analysis.table import Record, Table, TableColumn, groups_of
 from gfmd_cli.analysis.tables import P_STAR, POINTS, PRESSURE, RESIDUAL, STATUS, warnings_in
 from gfmd_cli.analysis.wording import contact_title, grid_size, shown
 from gfmd_cli.physics.observables import QUANTITIES
+from gfmd_cli.study.measure import planned
 from gfmd_cli.study.reading import solved_rows, tell_files_apart
 from gfmd_cli.study.result import Outcome
 from gfmd_cli.study.tasks import Task
@@ -60,14 +61,7 @@ def task_text(tasks: Sequence[Task], outcomes: Mapping[str, Outcome], missing: s
 def _contacts_of(tasks: Sequence[Task]) -> list[str]:
     """Elastomer and surface of each task, and the swept keys of grid and solver."""
     rows = [
-        {
-            "elastomer": task.elastomer.label_on(task.surface.sides[-1]),
-            "elastomer_short": "",
-            "elastomer_sha256": task.elastomer_sha256,
-            "surface": task.surface.label,
-            "ensemble": "",
-            "surface_sha256": task.surface_sha256,
-        }
+        planned(task) | {"elastomer": task.elastomer.label_on(task.surface.sides[-1])}
         for task in tasks
     ]
     tell_files_apart(rows)

@@ -19,7 +19,7 @@ MIN_RANGE = 3.0  # smallest q_s / q_1 of a fit; a choice
 MIN_SHELLS = 8  # of a fit with two parameters; a choice
 FIRST_SHARE = 0.9  # of the square of the rms gradient: waves of the first fit; a choice
 FIRST_RANGE = 8.0  # smallest q / q_1 at the end of the first fit; a choice
-BLUR = 3.0  # in q_1: a window blurs an abrupt cut-off; with 0, H = 0.3 becomes 0.43 (q_s = 128 q_1)
+BLUR = 3.0  # in q_1: a window blurs an abrupt cut-off; with 0, H = 0.3 becomes 0.35 (q_s = 64 q_1)
 START_HURST = 0.8
 HURST_BOUNDS = (-1.0, 2.0)  # bounds of the fit: wider than those of a self-affine surface, 0 and 1
 AT_BOUND = 0.02  # distance from a bound at which it, not the spectrum, determines the fit
@@ -65,8 +65,7 @@ class SelfAffineFit:
     q_1: float
     """Wavenumber of the longest wave [1/m]."""
     rms_height: float
-    """Rms height of the fit [m]; that of one surface scatters about it, the less the larger L q_r.
-    """
+    """Rms height of the fit [m]; that of a single surface differs, as it has few long waves."""
 
     @property
     def rolloff_wavelength(self) -> float | None:
@@ -106,11 +105,12 @@ def moments(shells: Shells) -> Moments:
 def fit(shells: Shells, complete: float = inf) -> SelfAffineFit:
     """Fit a self-affine spectrum to that of a surface in two dimensions.
 
-    The first fit is to waves that have most of the square of the rms gradient. The cut-off q_s at
-    which a fit has all of it is the end of the next fit, from below: waves beyond the cut-off,
-    which have no power but rounding, noise or what a window adds, would make a fit too steep.
+    The first fit is to the longest waves, those with most of the square of the rms gradient. It
+    predicts the cut-off q_s, up to which the fit has all of it. The next fit is to waves up to half
+    way there, and so on: a fit to waves beyond the cut-off, which have no power but rounding, noise
+    and what a window adds, would be too steep.
 
-    Raises InputError where the spectrum is too narrow to determine a fit, or decreases too fast.
+    Raises InputError where the spectrum is too narrow to determine a fit, or not self-affine.
 
     Parameters
     ----------

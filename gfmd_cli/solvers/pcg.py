@@ -275,6 +275,9 @@ class _Run:
         return self.longest()  # upper limit of a rigid shift
 
     def longest(self) -> float:
-        """Length at which the point that moves farthest moves by the range of the heights."""
+        """Length at which the point that moves farthest moves by the range of the heights.
+
+        Zero where no point moves.
+        """
         largest = self.grid.max(float(np.abs(self.direction).max()))
         return self.contact.height_range / largest if largest else 0.0

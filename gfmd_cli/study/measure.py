@@ -154,7 +154,10 @@ def result(task: Task, solved: TaskSolution, seconds: float) -> TaskResult:
 
 @lru_cache(maxsize=4)
 def _map_spectrum(surface: RigidSurface, sha256: str) -> Spectrum | None:
-    """As `map_spectrum`; cached, because all contacts of a scene have the same."""
+    """As `map_spectrum`; cached, because all contacts of a scene have the same.
+
+    The checksum is a part of the key of the cache: a file may change between two runs.
+    """
     return map_spectrum(surface)
 
 
