@@ -40,7 +40,7 @@ def main() -> None:
     parser.add_argument("--without-v-cycle", action="store_true")
     arguments = parser.parse_args()
     if arguments.without_v_cycle:
-        preconditioners.suits = lambda contact: False
+        preconditioners.has_coarser_level = lambda grid: False
     print("| grid |" + "".join(f" n = {n:g} |" for n in arguments.exponents))
     print("| --- |" + " --- |" * len(arguments.exponents))
     for name, (points, points_y, length_y) in SHAPES.items():

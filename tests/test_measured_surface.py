@@ -47,7 +47,7 @@ def test_a_map_that_is_not_tapered_has_no_such_share(rows_of, tmp_path):
 
 def test_much_contact_at_the_edges_is_told(gfmd, tmp_path):
     np.save(tmp_path / "peak.npy", peak((16, 29)))
-    warning = "of the load are at the edges, where the window has changed the heights"
+    warning = "of the load is at the edges, where the window has changed the heights"
     assert warning in gfmd("run", "spec.toml").output
     assert warning in gfmd("analyze", "study.h5").output
     assert "at the edges" not in gfmd("run", "spec.toml", "--set", "surface.edges=none").output

@@ -4,12 +4,13 @@ import numpy as np
 import pytest
 
 from gfmd_cli.grid.fft_grid import Grid
-from gfmd_cli.physics.contact import Contact, reduce_scene
-from gfmd_cli.physics.elastomers import Power
+from gfmd_cli.physics.contact import Contact, build_scene, reduce_scene
+from gfmd_cli.physics.elastomers import Power, Tabulated
+from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.solvers import multigrid_transfer_kernels as kernels
 from gfmd_cli.solvers.auto import Auto
 from gfmd_cli.solvers.contact_state import PRESSED, TENSE
-from gfmd_cli.solvers.multigrid import MAX_GROWTH, Multigrid, level_rows, suits
+from gfmd_cli.solvers.multigrid import Multigrid, has_coarser_level, level_rows
 from gfmd_cli.solvers.nested_grids import solve_contact
 
 PATTERNS = ("none", "points", "sparse", "dense", "disc", "grooves", "all but one", "corner")
@@ -27,10 +28,16 @@ OTHERS = [
 ]
 
 
+STEP = "q^3 with a step by a factor of 100"
+
+
 def contact(n, shape=64, length_y=1.0, threads=1):
     points_y, points = (shape, shape) if isinstance(shape, int) else shape
     grid = Grid(points, points_y=points_y, length_y=length_y, threads=threads)
-    k = Power(n=n).stiffness(grid.wavenumber(), grid.length)
+    q = grid.wavenumber()
+    k = Power(n=3 if n == STEP else n).stiffness(q, grid.length)
+    if n == STEP:
+        k[q > 0.3 * q.max()] *= 100
     return Contact(grid, np.zeros(grid.shape), k / k.max(), 1.0)
 
 
@@ -67,7 +74,8 @@ def applied(n, state, force, threads=1, threshold=PRESSED, length_y=1.0):
 
 @pytest.mark.parametrize(
     ("n", "shape", "length_y"),
-    [(n, *SQUARE) for n in (1, 2, 3, 4)] + [(n, *other) for n in (1, 4) for other in OTHERS],
+    [(n, *SQUARE) for n in (1, 2, 3, 4, STEP)]
+    + [(n, *other) for n in (1, 4, STEP) for other in OTHERS],
 )
 @pytest.mark.parametrize("kind", PATTERNS)
 def test_symmetric_positive_and_zero_where_held(n, kind, shape, length_y):
@@ -85,7 +93,7 @@ def test_symmetric_positive_and_zero_where_held(n, kind, shape, length_y):
         assert np.vdot(free, applied(n, state, force, length_y=length_y)) > 0
 
 
-@pytest.mark.parametrize("n", [2, 4])
+@pytest.mark.parametrize("n", [2, 4, STEP])
 @pytest.mark.parametrize("kind", PATTERNS)
 @pytest.mark.parametrize(
     ("shape", "length_y"), [((16, 16), 1.0), ((15, 17), 1.0), ((9, 32), 1.0), ((36, 8), 1.0)]
@@ -284,12 +292,22 @@ def test_a_steep_line_contact_converges():
     assert solution.status.is_converged
 
 
-def test_knows_what_it_does_not_suit():
-    assert suits(contact(4))
-    assert suits(contact(1, 10))
-    assert not suits(contact(2, 6))  # no coarser grid
-    steep = contact(4)
-    steep.stiffness[:, 20:] *= MAX_GROWTH
-    assert not suits(steep)
-    steep.stiffness[0, 1] = 0.0
-    assert not suits(steep)
+@pytest.mark.parametrize(
+    ("law", "most"),
+    [(lambda m: m**3 * np.where(m > 16, 100, 1), 150), (lambda m: m**6.5, 1200)],
+    ids=["step", "q^6.5"],
+)
+def test_an_abrupt_and_a_steep_stiffness_converge_in_few_transforms(law, most, tmp_path):
+    """Without the limit on the growth between levels they take several times as many."""
+    m = np.geomspace(1, 256, 4000)
+    np.savetxt(tmp_path / "k.txt", np.c_[2 * np.pi * m, law(m)])
+    scene = build_scene(SelfAffine(cutoff=0.02), Tabulated(path=tmp_path / "k.txt"), 256)
+    solution = solve_contact(scene.contact(0.05), Auto())
+    assert solution.status.is_converged
+    assert solution.transforms < most
+
+
+def test_what_has_a_coarser_level():
+    assert has_coarser_level(contact(4).grid)
+    assert has_coarser_level(contact(1, 10).grid)
+    assert not has_coarser_level(contact(2, 6).grid)

@@ -17,7 +17,6 @@ from gfmd_cli.study.tasks import Task
 from gfmd_cli.units import count, left_out
 
 MAX_ROWS = 40
-MAX_EDGE_SHARE = 0.05  # of contact or load in the tapered zone, without a warning; a choice
 MAX_SCENES = 6  # of other specs that a run names
 TASKS = (
     TableColumn("task", "task", "d"),
@@ -79,17 +78,6 @@ def run_text(rows: list[dict[str, Any]]) -> str:
     warnings = [f"warning: {line}" for line in warnings_in(solved)]
     blocks = [table.as_text(), *left_out(len(solved), MAX_ROWS, "contact"), "\n".join(warnings)]
     return "\n\n".join(filter(None, blocks))
-
-
-def edge_warnings(rows: Sequence[Mapping[str, Any]]) -> list[str]:
-    """A line for each scene that carries much of its load where a window changed the heights."""
-    tapered = [row for row in rows if max(row["edge_contact"], row["edge_load"]) > MAX_EDGE_SHARE]
-    return [  # nothing where the shares are unknown
-        f"{surface}: up to {max(row['edge_contact'] for row in group):.0%} of the contact and "
-        f"{max(row['edge_load'] for row in group):.0%} of the load are at the edges, where the "
-        "window has changed the heights; leave out surface.edges to keep them"
-        for surface, group in grouped(tapered, lambda row: row["surface"]).items()
-    ]
 
 
 def other_tasks(rows: list[dict[str, Any]]) -> list[str]:

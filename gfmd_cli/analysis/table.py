@@ -4,6 +4,7 @@ import math
 import textwrap
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from html import escape
 from typing import Any
 
@@ -86,12 +87,12 @@ class Table:
     declared: Sequence[TableColumn]
     groups: Sequence[Group]
 
-    @property
+    @cached_property
     def records(self) -> list[Record]:
         """The records of all groups."""
         return [record for group in self.groups for record in group.records]
 
-    @property
+    @cached_property
     def columns(self) -> list[TableColumn]:
         """The columns without the optional ones that are blank."""
         return [
@@ -101,7 +102,7 @@ class Table:
             or any(known(_value(record, column.value)) for record in self.records)
         ]
 
-    @property
+    @cached_property
     def alignments(self) -> list[str]:
         """The side of each column to which its cells are aligned: words left, numbers right."""
         cells = ([_value(row, column.value) for row in self.records] for column in self.columns)

@@ -38,7 +38,6 @@ def analyze(study: Path, as_json: bool, figures: Path | None, theory: "Theory") 
     """
     from gfmd_cli.analysis.compare import compare
     from gfmd_cli.analysis.export import as_records
-    from gfmd_cli.analysis.run_summary import edge_warnings
     from gfmd_cli.units import count
 
     comparison = compare(study, theory)
@@ -46,8 +45,6 @@ def analyze(study: Path, as_json: bool, figures: Path | None, theory: "Theory") 
         click.echo(json.dumps(as_records(comparison), indent=1))
     else:
         print_text(str(comparison))
-        for line in edge_warnings([row for curve in comparison.curves for row in curve.rows]):
-            print_text(f"\n{line}")
         if comparison.missing:
             print_text(f"\n{count(comparison.missing, 'task')} not solved yet: run the spec again.")
     if figures is not None:

@@ -146,12 +146,7 @@ def _print_results(
     failed: Mapping[int, str],
 ) -> None:
     """Print the results, the tasks that have not converged, and the next commands."""
-    from gfmd_cli.analysis.run_summary import (
-        edge_warnings,
-        other_tasks,
-        run_text,
-        unconverged,
-    )
+    from gfmd_cli.analysis.run_summary import other_tasks, run_text, unconverged
     from gfmd_cli.study.reading import read_rows
     from gfmd_cli.study.tasks import plan
 
@@ -162,7 +157,7 @@ def _print_results(
     if table := run_text(rows):
         print_text(f"{table}\n")
     print_text(f"{path}: {counted(counts) or 'no tasks in this shard'}")
-    for line in [*unconverged(rows, failed), *edge_warnings(rows)]:
+    for line in unconverged(rows, failed):
         print_text(f"  {line}")
     ids = {task.id for task in tasks}
     for line in other_tasks([row for row in stored if row["task_id"] not in ids]):

@@ -12,7 +12,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from gfmd_cli.grid.arrays import Field, Mask
+from gfmd_cli.grid.arrays import Field
 from gfmd_cli.grid.ranks import Ranks
 from gfmd_cli.grid.rows import Kernel, LocalRows
 
@@ -111,10 +111,6 @@ class DistributedRows(LocalRows):
     def aligned_with_finer(self, array: Any) -> Any:
         """The array with its halo cut to half."""
         return array[EXCHANGED_ROWS:-EXCHANGED_ROWS]
-
-    def all_true(self, mask: Mask) -> bool:
-        """Whether a mask with a halo is true at all points of the grid."""
-        return not self.ranks.total(np.count_nonzero(~self.interior(mask)))
 
 
 class ReplicatedRows(LocalRows):

@@ -12,7 +12,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from gfmd_cli.grid.arrays import Field, Mask
+from gfmd_cli.grid.arrays import Field
 
 MIN_THREADED_ROWS = 256  # smallest number of rows of a coarser level for which a second thread pays
 
@@ -88,7 +88,3 @@ class LocalRows:
     def aligned_with_finer(self, array: Any) -> Any:
         """An array of this level such that row i lies at row 2 i of the next finer level."""
         return array
-
-    def all_true(self, mask: Mask) -> bool:
-        """Whether a mask with a halo is true at all points of the grid."""
-        return bool(mask.all())

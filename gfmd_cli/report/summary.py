@@ -5,7 +5,6 @@ from collections import Counter
 from typing import NamedTuple
 
 from gfmd_cli.analysis.compare import best, in_continuum
-from gfmd_cli.analysis.run_summary import edge_warnings
 from gfmd_cli.analysis.table import known
 from gfmd_cli.analysis.tables import warnings_in
 from gfmd_cli.analysis.wording import enumeration, grid_size, pretty, quantity, span
@@ -151,14 +150,14 @@ def _column(rows: list[Row], name: str) -> list[float]:
 
 
 def warnings(data: ReportData) -> list[str]:
-    """Warnings above the results: missing, doubtful and unresolved values, effects of edges."""
+    """Warnings above the results: missing, doubtful and unresolved values."""
     total, parts = len(data.rows), []
     if data.failed:
         parts.append(f"{len(data.failed)} of {total} contacts did not reach their tolerance")
     if data.missing:
         parts.append(f"{len(data.missing)} of {total} are not solved yet")
     unsolved = ["; ".join(parts) + "."] if parts else []
-    return [*unsolved, *warnings_in(data.solved), *_unresolved(data), *edge_warnings(data.solved)]
+    return [*unsolved, *warnings_in(data.solved), *_unresolved(data)]
 
 
 def _unresolved(data: ReportData) -> list[str]:

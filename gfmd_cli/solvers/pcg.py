@@ -68,8 +68,8 @@ class PCGState(State):
     """Sum of the direction times K times the direction."""
     screening: float = 0.0
     """k(q_c) of the screened Green's function."""
-    multilevel: bool = False
-    """Whether the preconditioner works on levels of grids; else it is the Green's function."""
+    v_cycle: bool = False
+    """Whether the preconditioner is the V-cycle; else it is the Green's function."""
     select_at: int = 0
     """Step of the next selection of the preconditioner."""
     free: float = 0.0
@@ -115,7 +115,7 @@ class ProjectedCG(Solver):
             np.copyto(u, fine.obstacle, where=refined(pressed, fine))
         fresh = self.begin(fine, u)
         fresh.length = state.length
-        fresh.screening, fresh.multilevel = state.screening, state.multilevel
+        fresh.screening, fresh.v_cycle = state.screening, state.v_cycle
         return fresh
 
     def iterate(self, contact: Contact, state: PCGState) -> Iterator[PCGState]:
@@ -187,11 +187,11 @@ class _Run:
         selection = select(self.contact, self.contact_state, self.threshold)
         change = state.screening / selection.screening
         is_close = 1 / MAX_SCREENING_CHANGE < change < MAX_SCREENING_CHANGE
-        is_other_kind = selection.multilevel != state.multilevel
-        if is_other_kind or not (selection.multilevel or is_close):
+        is_other_kind = selection.v_cycle != state.v_cycle
+        if is_other_kind or not (selection.v_cycle or is_close):
             if is_other_kind:
                 state.length = 0.0
-            state.screening, state.multilevel = selection.screening, selection.multilevel
+            state.screening, state.v_cycle = selection.screening, selection.v_cycle
             state.moved = 0.0
             self.preconditioner = None
 
@@ -199,7 +199,7 @@ class _Run:
         """Precondition the force, and return the factor beta of the conjugation."""
         state = self.state
         if self.preconditioner is None:
-            selection = Selection(state.screening, state.multilevel)
+            selection = Selection(state.screening, state.v_cycle)
             self.preconditioner = create(self.contact, selection, self.moves)
         fields = (self.sigma, self.contact_state, self.threshold)
         slope, z_change = self.preconditioner.apply(*fields, self.change)
@@ -235,7 +235,7 @@ class _Run:
                 fraction = choice.fraction
                 restart = choice.restart or curvature <= 0
                 state.moved = 0.0 if restart else fraction * length
-                state.best_length, state.curvature = best * length, curvature / length**2
+                state.best_length, state.curvature = best * length, curvature / length / length
                 break
             state.length = 0.5 * length if is_finite else min(0.5 * length, self.longest())
             state.moved = 0.0

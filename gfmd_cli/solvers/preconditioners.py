@@ -5,7 +5,6 @@
   k(q_c). With the plain Green's function 1 / k(q), the method degrades at n = 2 and fails from
   n = 3 on.
 - The V-cycle of `multigrid` takes the contact points into account and needs no transform.
-- The sum over levels of `multilevel` does too, for k(q) whose growth per level is uneven.
 """
 
 from dataclasses import dataclass
@@ -18,8 +17,7 @@ from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.physics.contact import Contact
 from gfmd_cli.solvers import preconditioner_kernels as kernels
 from gfmd_cli.solvers.contact_state import ContactState
-from gfmd_cli.solvers.multigrid import MIN_LEVEL_POINTS, Multigrid, level_count, suits
-from gfmd_cli.solvers.multilevel import Multilevel
+from gfmd_cli.solvers.multigrid import Multigrid, has_coarser_level
 
 V_CYCLE_EXPONENT = {1: 2.7, 2: 0.7}
 """Exponent of k(q) above which the V-cycle is faster than the Green's function, by the dimension.
@@ -76,8 +74,8 @@ class Selection:
 
     screening: float
     """k(q_c) of the screened Green's function."""
-    multilevel: bool
-    """Whether a preconditioner on levels of grids is faster than the Green's function."""
+    v_cycle: bool
+    """Whether the V-cycle is faster than the Green's function."""
 
 
 def select(contact: Contact, contact_state: ContactState, threshold: int) -> Selection:
@@ -85,28 +83,23 @@ def select(contact: Contact, contact_state: ContactState, threshold: int) -> Sel
     grid = contact.grid
     grid.rows.exchange_halo(contact_state)
     held, changes = grid.rows.sums_with_halo(2, kernels.pattern, contact_state, threshold)
-    screening, chord, exponent = _screening(contact, float(held), float(changes))
-    if suits(contact):
-        return Selection(screening, exponent > V_CYCLE_EXPONENT[grid.dimension])
-    if grid.dimension == 1 or level_count(grid, MIN_LEVEL_POINTS) == 1:
-        return Selection(screening, False)
-    # Measured on the default surface, p* = 0.001 to 1, and a paraboloid, 512^2, CPU seconds: the
-    # sum over levels and the Green's function are equal at n = 1; for n = 2, 3, 4 the sum is faster
-    # from chords of about 10, 20, 30 grid spacings on, 5 times at n = 3 and a chord of 250.
-    return Selection(screening, exponent > 0.75 and chord > 8 * (exponent - 1))
+    screening, exponent = _screening(contact, float(held), float(changes))
+    is_steep = exponent > V_CYCLE_EXPONENT[grid.dimension]
+    return Selection(screening, is_steep and has_coarser_level(grid))
 
 
 def create(contact: Contact, selection: Selection, grid: Grid) -> Preconditioner:
     """The selected preconditioner; `z` is `padded` of `grid`, that of the contact or in single."""
-    if not selection.multilevel:
-        return GreensFunction(contact, selection.screening, grid)
-    return Multigrid(contact, grid) if suits(contact) else Multilevel(contact, grid)
+    if selection.v_cycle:
+        return Multigrid(contact, grid)
+    return GreensFunction(contact, selection.screening, grid)
 
 
-def _screening(contact: Contact, held: float, changes: float) -> tuple[float, float, float]:
-    """Screening stiffness k(q_c), mean free chord l in grid spacings, local exponent n of k(q).
+def _screening(contact: Contact, held: float, changes: float) -> tuple[float, float]:
+    """Screening stiffness k(q_c), and exponent n of k(q).
 
-    `held` is the number of points held, `changes` the number of changes along rows and columns.
+    `held` is the number of points held, `changes` the number of changes along rows and columns. n
+    is the mean from the mean free chord l of the contact to the shortest wave.
 
     q_c = c pi / l with c = 2^((n - 2)(1 - a_r)). Measured on the default surface of the paper at
     512^2, p* = 0.01, 0.1, 1: the smallest number of transforms, within 20 %, was reached at c = 1/2
@@ -119,11 +112,9 @@ def _screening(contact: Contact, held: float, changes: float) -> tuple[float, fl
     length = grid.points_y + grid.points * grid.length_y / grid.length
     chord = 2 * (1 - area) * length / changes if changes > 0 else 1.0  # in units of L
     log_mode = min(float(np.log(0.5 / max(chord, 1e-9))), log_m[-1])
-    step = 0.1  # of log q, for the local exponent
-    centre = min(max(log_mode, log_m[0] + step), log_m[-1] - step)
-    rise = np.diff(np.interp([centre - step, centre + step], log_m, log_k))
-    n = float(rise[0]) / (2 * step)
+    start = min(max(log_mode, log_m[0]), log_m[-1] - 0.1)  # of the exponent
+    n = float((log_k[-1] - np.interp(start, log_m, log_k)) / (log_m[-1] - start))
     log_mode = min(log_mode + float(np.log(2)) * (n - 2) * (1 - area), log_m[-1])
     extrapolation = n * min(log_mode - log_m[0], 0.0)  # power law beyond the longest wave
     screening = float(np.exp(np.interp(log_mode, log_m, log_k) + extrapolation))
-    return screening, chord * grid.length / min(grid.spacings), n
+    return screening, n

@@ -110,12 +110,12 @@ def all_columns(task: Task, solved: TaskSolution) -> Row:
     contact, solution = solved.contact, solved.solution
     u, sigma = solution.u, solution.sigma
     results = measured(task, solved)
+    results |= edge_fractions(task.surface, solved.scene.grid, contact.obstacle, u, sigma)
     return (
         empty_row()
         | planned(task)
         | results
         | {"warnings": SEPARATOR.join(warnings_of(task, solved, results))}
-        | edge_fractions(task.surface, solved.scene.grid, contact.obstacle, u, sigma)
         | on_request(task.output, SolvedContact(contact, u, sigma))
     )
 

@@ -25,6 +25,7 @@ SMALL_GAPS = (1e-5, 1e-3)
 """Mean gaps [h_std]: below the first, or below the second if that is a possible gap in m, they are
 probably meant in m; a choice."""
 LOOSE = 0.01  # natural residual; the mean gap of the default surface is then wrong by 0.1 to 1 %
+MAX_EDGE_SHARE = 0.05  # of contact or load in the tapered zone; a choice
 SMALL_DISPLACEMENT = 1e-4  # [h_std], below which heights have another unit; a choice
 PLATE = 0.1
 """Largest q t up to which a slab is a plate; its stiffness is then smaller by 0.2 % or less."""
@@ -69,6 +70,12 @@ def warnings_of(task: Task, solved: TaskSolution, results: Mapping[str, Any]) ->
     warnings += _coarse_for_layer(task, max(scene.grid.spacings))
     warnings += _load_in_jump(task, solved.solution.status, results)
     warnings += _contact_at_border(task, solved)
+    if max(results.get("edge_contact", 0.0), results.get("edge_load", 0.0)) > MAX_EDGE_SHARE:
+        warnings.append(
+            f"more than {MAX_EDGE_SHARE:.0%} of the contact or of the load is at the edges, where "
+            "the window has changed the heights (see the columns edge_contact and edge_load); "
+            "leave out surface.edges to keep them"
+        )
     warnings += _thin_slab(task, scene)
     if scene.may_touch is not None and solved.observables.u_g < 0:
         warnings.append(

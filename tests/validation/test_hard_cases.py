@@ -27,7 +27,6 @@ _SPEC.loader.exec_module(hard)
 ALL = [str(case) for case in hard.cases(POINTS, Path())]
 BELOW = [name for name in ALL if name.startswith(hard.BELOW_ROUNDING)]
 NAMES = [name for name in ALL if name not in BELOW]
-SLOW = "20 decades, n=table, p*=0.001"  # 15,000 to 26,000 steps, depending on rounding; 4 to 7 s
 
 
 @pytest.fixture(scope="module")
@@ -42,13 +41,11 @@ def solved(tmp_path_factory):
         return known[name].contact(POINTS)
 
     @cache
-    def solve(name, factor=1.0, max_steps=None):
+    def solve(name, factor=1.0, max_steps=20_000):
         contact = scene(name)
         pressed = type(contact)(
             contact.grid, contact.height, contact.stiffness, contact.pressure * factor
         )
-        if max_steps is None:
-            max_steps = 100_000 if name == SLOW else 20_000
         return hard.solve(pressed, seconds=math.inf, max_steps=max_steps)
 
     return solve
@@ -125,7 +122,7 @@ def meets_the_identity(it, residual):
     assert abs(2 * it.observables.energy - it.observables.work) <= allowed + rounding
 
 
-@pytest.mark.parametrize("name", [name for name in NAMES if name != SLOW])
+@pytest.mark.parametrize("name", NAMES)
 def test_the_energy_changes_by_minus_p_times_the_gap(name, solved):
     """v is convex in u_g with slope -p, so a chord's slope lies between those of its ends."""
     it, low, high = (solved(name, factor).observables for factor in (1.0, 1 - STEP, 1 + STEP))

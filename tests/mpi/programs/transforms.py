@@ -16,7 +16,6 @@ from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.physics.surfaces import Cone
 from gfmd_cli.solvers.contact_state import PRESSED
 from gfmd_cli.solvers.multigrid import Multigrid
-from gfmd_cli.solvers.multilevel import Multilevel
 
 sys.path.append(str(Path(__file__).parents[2]))
 from fourier import backward, forward
@@ -112,29 +111,28 @@ def check_surfaces(points):
         np.testing.assert_allclose(many, one, rtol=1e-10)
 
 
-def check_preconditioners(points, n):
-    """Both are the same on row blocks as on one process, for any pattern of contacts."""
+def check_v_cycle(points, n):
+    """The V-cycle is the same on row blocks as on one process, for any pattern of contacts."""
     draw = np.random.default_rng(4)
     force = draw.standard_normal((points, points))
     y, x = np.mgrid[:points, :points]
     for held in (draw.random((points, points)) < 0.02, (x - 9) ** 2 + (y - points + 2) ** 2 < 300):
         state = np.where(held, PRESSED, 0).astype(np.int8)
-        for kind in (Multigrid, Multilevel):
-            results = []
-            for grid in (Grid(points), DistributedGrid(points, ranks=ranks)):
-                k = Power(n=n).stiffness(grid.wavenumber()) / points**n
-                contact = Contact(grid, force[grid.own], k, 1.0)
-                with_halo = grid.rows.empty_with_halo(points, dtype=np.int8)
-                grid.rows.interior(with_halo)[...] = state[grid.own]
-                change = np.ones(grid.shape, np.float32)
-                preconditioner = kind(contact, grid)
-                sums = preconditioner.apply(-force[grid.own], with_halo, PRESSED, change)
-                results.append((preconditioner.z[:, :points], sums))
-            (whole, sums), (mine, others) = results
-            size = np.abs(whole).max()
-            own = grid.own
-            np.testing.assert_allclose(mine, whole[own], rtol=0, atol=2e-6 * size)
-            np.testing.assert_allclose(others, sums, rtol=1e-5, atol=1e-5 * size * points)
+        results = []
+        for grid in (Grid(points), DistributedGrid(points, ranks=ranks)):
+            k = Power(n=n).stiffness(grid.wavenumber()) / points**n
+            contact = Contact(grid, force[grid.own], k, 1.0)
+            with_halo = grid.rows.empty_with_halo(points, dtype=np.int8)
+            grid.rows.interior(with_halo)[...] = state[grid.own]
+            change = np.ones(grid.shape, np.float32)
+            v_cycle = Multigrid(contact, grid)
+            sums = v_cycle.apply(-force[grid.own], with_halo, PRESSED, change)
+            results.append((v_cycle.z[:, :points], sums))
+        (whole, sums), (mine, others) = results
+        size = np.abs(whole).max()
+        own = grid.own
+        np.testing.assert_allclose(mine, whole[own], rtol=0, atol=2e-6 * size)
+        np.testing.assert_allclose(others, sums, rtol=1e-5, atol=1e-5 * size * points)
 
 
 def check_against_mpi4py_fft(points):
@@ -170,6 +168,6 @@ check_other_grids((67, 50), (67, 40))
 for size in (64, 96, 100, 512):
     check_levels(size)
 for size, exponent in ((64, 1), (96, 2), (128, 3), (160, 4), (88, 2)):
-    check_preconditioners(size, exponent)
+    check_v_cycle(size, exponent)
 check_against_mpi4py_fft(64)
 sys.exit(0)
