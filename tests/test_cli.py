@@ -368,7 +368,8 @@ SMALL_SETTINGS = {
 }
 
 
-ROUGH = ("grid.points=64", "surface.cutoff=0.05", "solver.tolerance=1e-4")
+ONE_SEED = ("grid.points=64", "surface.cutoff=0.05", "solver.tolerance=1e-4", "surface.seed=0")
+ROUGH = (*ONE_SEED[:-1], "surface.seed=[0, 1]")
 TWO = "load.p_star=[0.1, 1.0]"
 PAPER_SETTINGS = {
     "fig01": ("grid.points=128", "load.tolerance=0.8"),
@@ -378,17 +379,17 @@ PAPER_SETTINGS = {
     "fig05": ROUGH,
     "fig06": (*ROUGH, TWO),
     "fig07": ROUGH,
-    "fig09b": ROUGH,
+    "fig09b": (*ROUGH, TWO),
     "fig10": (*ROUGH, TWO),
-    "fig10b": ROUGH,
+    "fig10b": (*ROUGH, TWO),
     "fig11": (*ROUGH, TWO),
-    "fig12": ("grid.points=2048", TWO),
+    "fig12": ("grid.points=256", TWO),
     "fig13": ROUGH,
-    "large_cell": (*ROUGH, "surface.seed=0"),
+    "large_cell": ONE_SEED,
     "light": (*ROUGH, TWO),
-    "small_pressure": (*ROUGH, TWO, "surface.seed=0"),
+    "small_pressure": (*ONE_SEED, TWO),
     "cut_off": (*ROUGH, TWO),
-    "weights": (*ROUGH, "surface.seed=0"),
+    "weights": ONE_SEED,
     "plate_map": ROUGH,
     "spacing": ROUGH,
 }

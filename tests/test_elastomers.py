@@ -243,7 +243,8 @@ def test_the_local_exponent_of_a_slab_goes_from_four_to_one():
         ("1 0\n2 2\n", "positive"),
         ("1 nan\n2 2\n", "finite"),
         ("1 1\n2 inf\n", "finite"),
-        ("q k\n1 2\n2 3\n", "cannot be read"),
+        ("q k\n1 2\n2 3\n", "with # before words"),
+        ("1,5 2,5\n2,5 3,5\n", "4 columns"),  # decimal commas
         ("1 2\n2\n", "cannot be read"),
     ],
 )
@@ -253,6 +254,13 @@ def test_bad_tables_are_refused(tmp_path, content, complaint):
     with pytest.raises(InputError, match=complaint) as caught:
         Tabulated(path=path).stiffness(Q)
     assert str(path) in str(caught.value)
+
+
+@pytest.mark.parametrize("separator", [" ", "\t", ",", ", ", ";"])
+def test_columns_of_a_table_are_separated_as_spreadsheets_do(tmp_path, separator):
+    lines = ["# q" + separator + "k", *(f"{q}{separator}{2.5 * q}" for q in (1.0, 10.0, 1e3))]
+    (tmp_path / "k.csv").write_text("\n".join(lines), encoding="utf-8-sig")
+    assert Tabulated(path=tmp_path / "k.csv").stiffness(np.array([7.0])) == pytest.approx(17.5)
 
 
 @pytest.mark.parametrize("digits", ["%.18e", "%.6g"])

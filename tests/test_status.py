@@ -90,6 +90,12 @@ def test_records_and_saved_states_are_seen_before_they_are_collected(gfmd):
     assert everything() == before
 
 
+def test_a_saved_state_of_a_study_is_named_by_elastomer_and_load(gfmd):
+    gfmd("run", "spec.toml", "--shard", "1/3")
+    uncollected(stop_at=2)
+    assert "  task 2 power n=1 p*=0.1: state of step " in gfmd("status", "small.h5").output
+
+
 def test_collecting_brings_the_records_in_and_solves_nothing(gfmd):
     uncollected(stop_at=2)
     assert not Path("small.h5").exists()

@@ -224,7 +224,8 @@ class Tabulated(LinearElastomer):
 
     kind: Literal["table"] = "table"
     path: FilePath
-    """Text file with two columns, q [1/m] and k [Pa/m]: positive numbers, q increasing."""
+    """Text file with two columns, q [1/m] and k [Pa/m]: positive numbers, q increasing. Columns are
+    separated by spaces, tabs, commas or semicolons; lines of words begin with #."""
 
     def stiffness(self, q: Field, length: float = 1.0) -> Field:
         """k(q) [Pa/m]. Raises InputError for an invalid table."""

@@ -13,18 +13,26 @@ from gfmd_cli.maps.interpolation import monotone_cubic
 from gfmd_cli.physics.compliance_transforms import Compliance, separated
 
 MAX_TABLE_BYTES = 2**20  # a choice, some 40000 rows
+SEPARATORS = str.maketrans(",;", "  ")  # of columns, beside spaces and tabs
 
 
 def read_table(path: Path) -> Field:
-    """The columns q [1/m] and k [Pa/m], shape (rows, 2). Raises InputError for an invalid table."""
+    """The columns q [1/m] and k [Pa/m], shape (rows, 2), from a text.
+
+    Between them are spaces, tabs, commas or semicolons. Raises InputError for an invalid table.
+    """
     try:
         # stat first: it says that there is no such file
         if path.stat().st_size > MAX_TABLE_BYTES or not path.is_file():
             raise ValueError(f"not a regular file of at most {MAX_TABLE_BYTES} bytes")
+        lines = path.read_text("utf-8-sig").translate(SEPARATORS).splitlines()
         with warnings.catch_warnings(action="ignore", category=UserWarning):
-            table = np.loadtxt(path, ndmin=2)  # warns of an empty file, refused below
+            table = np.loadtxt(lines, ndmin=2)  # warns of an empty file, refused below
     except (OSError, ValueError) as error:
-        raise InputError(f"{path}: elastomer.path: cannot be read: {error}") from error
+        raise InputError(
+            f"{path}: elastomer.path: cannot be read: {error}; the file must be a text of two "
+            "columns of numbers, q [1/m] and k [Pa/m], with # before words"
+        ) from error
     if table.shape[0] < 2 or table.shape[1] != 2:
         raise InputError(
             f"{path}: elastomer.path: {table.shape[0]} rows, {table.shape[1]} columns; "

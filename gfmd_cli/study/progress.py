@@ -7,7 +7,7 @@ from pathlib import Path
 from gfmd_cli.errors import InputError
 from gfmd_cli.files.hdf5 import MAGIC
 from gfmd_cli.files.regular import open_regular
-from gfmd_cli.spec.models import Spec
+from gfmd_cli.spec.models import Spec, load_text
 from gfmd_cli.status import Status
 from gfmd_cli.study.checkpoint import Checkpoint, SavedProgress
 from gfmd_cli.study.reading import open_study
@@ -68,13 +68,10 @@ def progress_of_spec(spec: Spec, path: Path) -> StudyProgress:
 
 
 def progress_of_study(path: Path) -> StudyProgress:
-    """The progress of a study file; it contains no labels of the tasks that are missing."""
+    """The progress of a study file."""
     with open_study(path) as file:
         ids, rows = file.task_ids, file.rows
-    labels = [
-        f"{row['elastomer']} {row['points']} p*={row['p_star']:.4g}" if row["elastomer"] else ""
-        for row in rows
-    ]
+    labels = [f"{row['elastomer']} {load_text(row['load'], row['load_value'])}" for row in rows]
     return _progress(Study(path), list(zip(ids, labels, strict=True)))
 
 
