@@ -40,8 +40,10 @@ from gfmd_cli.solvers.local_start import COARSE_TOLERANCE
 from gfmd_cli.solvers.loop import Start
 from gfmd_cli.solvers.multigrid import MAX_LAPLACIAN_GROWTH, largest_growth
 
-MAX_COST = 20000  # n^3 per point of a grid; measured: with more, the iteration is faster
-MAX_COST_WITH_V_CYCLE = 150  # the same where a V-cycle without squared Laplacians is used
+MAX_COST = {1: 20000, 2: 6000}
+"""n^3 per point of a grid above which the iteration is faster, by the dimension; measured."""
+MAX_COST_WITH_LAPLACIAN = 150
+"""The same where the V-cycle needs no squared Laplacian."""
 EXPECTED_GROWTH = 1.3  # of the sets: largest number of points over that of the first one; a choice
 MAX_JOINING_FRACTION = 0.4  # of a set, that joins it at a time; measured: 0.3 to 0.6 are as good
 MAX_SETS = 60  # a choice; 5 to 25 are taken
@@ -80,9 +82,10 @@ def direct_start(
 
 def _largest_count(contact: Contact) -> int:
     """Largest number of points in contact for which a direct solve is faster than the iteration."""
-    has_fast_cycle = contact.grid.dimension == 2 and largest_growth(contact) <= MAX_LAPLACIAN_GROWTH
-    cost = MAX_COST_WITH_V_CYCLE if has_fast_cycle else MAX_COST
-    return int((cost * contact.grid.size) ** (1 / 3))
+    grid, cost = contact.grid, MAX_COST[contact.grid.dimension]
+    if grid.dimension == 2 and largest_growth(contact) <= MAX_LAPLACIAN_GROWTH:
+        cost = MAX_COST_WITH_LAPLACIAN
+    return int((cost * grid.size) ** (1 / 3))
 
 
 class _DirectSolve:
