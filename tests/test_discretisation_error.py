@@ -17,10 +17,11 @@ from gfmd_cli.physics.discretisation_error import (
     Tip,
     estimate,
     excess_exponent,
+    has_step,
     local_exponent,
     roughness_scales,
 )
-from gfmd_cli.physics.elastomers import HalfSpace, Layer, Membrane, Power, Slab
+from gfmd_cli.physics.elastomers import HalfSpace, Layer, Membrane, Power, Slab, Tabulated
 from gfmd_cli.physics.error_estimates import GridValues
 from gfmd_cli.physics.indenters import LineParabola, Parabola, Ridge, Wave
 from gfmd_cli.physics.observables import QUANTITIES, observe
@@ -467,3 +468,32 @@ def test_a_rough_surface_on_nested_grids():
     for quantity in QUANTITIES:
         value, exact = getattr(levels[1], quantity), getattr(levels[2], quantity)
         assert abs(value - exact) <= values[quantity].error
+
+
+def test_no_elastomer_has_a_step():
+    layers = [
+        Layer(thickness=t, base=base, poisson=poisson)
+        for t in np.geomspace(1e-4, 10, 11)
+        for base, poisson in (("sliding", None), ("bonded", 0.3), ("bonded", 0.4999))
+    ]
+    slabs = [Slab(thickness=t) for t in np.geomspace(1e-5, 1, 11)]
+    powers = [Power(n=n) for n in (0, 0.5, 1, 2, 3, 4)]
+    assert not any(has_step(it, points, 1.0) for it in layers + slabs + powers for points in GRIDS)
+
+
+def test_a_soft_band_has_errors_only_on_grids_whose_short_waves_are_shorter(tmp_path):
+    """The bars at 64 points would be 2.3 (a_r) and 2.9 times (sigma_p) too small."""
+    rows_of_table = [[1, 1], [10, 10], [30, 30], [35, 1e-3], [60, 1e-3], [65, 65], [200, 200]]
+    np.savetxt(tmp_path / "band.txt", rows_of_table)
+    band = Tabulated(path=tmp_path / "band.txt")
+    assert [has_step(band, points, 1.0) for points in (64, 128, 512)] == [True, True, False]
+    spec = {
+        "surface": {"kind": "self-affine", "cutoff": 0.1, "seed": 5},
+        "elastomer": {"kind": "table", "path": str(tmp_path / "band.txt")},
+        "grid": {"points": 64},
+        "load": {"p_star": 0.03},
+        "accuracy": {"mean_gap": 0.05},
+    }
+    row = solve(spec).columns
+    assert {row[f"{name}_verdict"] for name in QUANTITIES} == {"unknown"}
+    assert "or unknown" in row["warnings"]

@@ -92,6 +92,7 @@ MAX_SPACING_RATIO = 1.1
 """Largest ratio of grid spacings with the excess of square pixels. With the wider spacing in x, a
 ratio of 2 has 0.7 of it and of 4 half, so that 56 of 100 bars of the corrected area held."""
 HALF_OCTAVE = 0.5 * log(2)  # in ln q: step of the local exponent that the calibration used
+CALIBRATED_EXPONENTS = (-2.5, 4.5)  # with a margin: bonded layers have -2, plates 4
 OCTAVES = np.arange(-1, 10)  # from the highest wave of a grid; the last has a weight of 0.002
 EXTRAPOLATED_BAR = 0.8  # bar of the extrapolated sigma_p over that of the value, n >= 1, likewise
 
@@ -165,6 +166,17 @@ def local_exponent(elastomer: LinearElastomer, points: float, length: float) -> 
     """
     highest = np.array(pi * points / length)
     return round(float(elastomer.local_exponent(highest, length, HALF_OCTAVE)), 12)
+
+
+def has_step(elastomer: LinearElastomer, points: float, length: float) -> bool:
+    """Whether k(q) has a step at short waves, which no calibrated elastomer has.
+
+    Short waves are those from an eighth of the highest wavenumber of the grid on.
+    """
+    q = pi * points / length * 2.0 ** np.arange(-3.0, 0.5, 0.5)
+    low, high = CALIBRATED_EXPONENTS
+    exponents = elastomer.local_exponent(q, length, HALF_OCTAVE)
+    return bool(np.any((exponents < low) | (exponents > high)))
 
 
 class ExcessExponent(NamedTuple):

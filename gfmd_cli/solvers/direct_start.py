@@ -40,13 +40,16 @@ from gfmd_cli.solvers.local_start import COARSE_TOLERANCE
 from gfmd_cli.solvers.loop import Start
 from gfmd_cli.solvers.multigrid import MAX_LAPLACIAN_GROWTH, largest_growth
 
-MAX_COST = {1: 20000, 2: 6000}
-"""n^3 per point of a grid above which the iteration is faster, by the dimension; measured."""
-MAX_COST_WITH_LAPLACIAN = 150
-"""The same where the V-cycle needs no squared Laplacian."""
+MAX_COST = 80
+"""n^3 per point of a grid and square of the growth of k(q) per octave, above which the iteration is
+faster; measured."""
+MAX_LINE_COST = 20000  # n^3 per point of a line; measured
+MAX_COST_WITH_LAPLACIAN = (
+    150  # n^3 per point where the V-cycle needs no squared Laplacian; measured
+)
 EXPECTED_GROWTH = 1.3  # of the sets: largest number of points over that of the first one; a choice
 MAX_JOINING_FRACTION = 0.4  # of a set, that joins it at a time; measured: 0.3 to 0.6 are as good
-MAX_SETS = 60  # a choice; 5 to 25 are taken
+MAX_SETS = 60  # of the largest size, or eight times as many of half; a choice; 5 to 60 are taken
 
 Points = tuple[Any, ...]
 """Rows and columns of points, as indices of a field."""
@@ -82,10 +85,13 @@ def direct_start(
 
 def _largest_count(contact: Contact) -> int:
     """Largest number of points in contact for which a direct solve is faster than the iteration."""
-    grid, cost = contact.grid, MAX_COST[contact.grid.dimension]
-    if grid.dimension == 2 and largest_growth(contact) <= MAX_LAPLACIAN_GROWTH:
+    growth = largest_growth(contact)
+    cost = MAX_COST * growth**2
+    if contact.grid.dimension == 1:
+        cost = MAX_LINE_COST
+    elif growth <= MAX_LAPLACIAN_GROWTH:
         cost = MAX_COST_WITH_LAPLACIAN
-    return int((cost * grid.size) ** (1 / 3))
+    return int((cost * contact.grid.size) ** (1 / 3))
 
 
 class _DirectSolve:
@@ -115,12 +121,13 @@ class _DirectSolve:
 
         The displacement stays in `values`, its level above the indenter in `level`.
         """
-        fewest = self.grid.size
-        for _ in range(MAX_SETS):
+        fewest, work = self.grid.size, MAX_SETS * largest**3
+        while work > 0:
             pause()
             points = np.nonzero(self.touching)
             if not 0 < points[0].size <= largest:
                 return False
+            work -= max(points[0].size, largest // 2) ** 3
             try:
                 t, factor = self.equilibrium(points)  # [1]
             except LinAlgError:  # rounding, at very steep k(q)
@@ -149,13 +156,21 @@ class _DirectSolve:
         return True
 
     def approach(self, points: Points, t: Field, factor: Field) -> None:
-        """Go from the stresses s towards t without raising the energy; some points leave A."""
+        """Go from the stresses s towards t without raising the energy; some points leave A.
+
+        All points with t < 0 leave if that lowers the energy; otherwise half of them, a quarter,
+        and so on, those first whose stress vanishes first on the way to t.
+        """
         assert self.stress is not None
-        s, target = self.stress[points], self.without_tension(t)
-        if _energy(factor, target - t) >= _energy(factor, s - t):
-            lengths = np.divide(s, s - t, out=np.ones_like(s), where=t < 0)
-            length = lengths.min()
-            target = np.where(lengths > length, s + length * (t - s), 0.0)
+        s = self.stress[points]
+        lengths = np.divide(s, s - t, out=np.full_like(s, np.inf), where=t < 0)
+        leaving = np.sort(lengths[t < 0])
+        energy, last, target = _energy(factor, s - t), leaving.size, self.without_tension(t)
+        while last > 0 and _energy(factor, target - t) >= energy:
+            last //= 2
+            length = leaving[last]
+            partly = np.where(lengths == length, 0.0, s + length * (t - s))
+            target = self.without_tension(partly)
         self.stress[points] = target
         self.touching[points] = (target > 0) | (t >= 0)
 

@@ -59,9 +59,8 @@ def has_coarser_level(grid: Grid) -> bool:
 
 
 def largest_growth(contact: Contact) -> float:
-    """Largest factor by which k(q) grows between two levels; infinite without a coarser level."""
-    levels = _levels(contact)
-    return max(level.growth for level in levels) if len(levels) > 1 else inf
+    """Largest growth of k(q) per octave on the levels."""
+    return max(level.growth for level in _levels(contact))
 
 
 @dataclass(frozen=True)

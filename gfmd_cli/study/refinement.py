@@ -238,6 +238,8 @@ def _estimates(task: Task, solved: TaskSolution, grids: list[SolvedGrid]) -> dic
     if not solved.solution.residual < UNSOLVED or scene.may_touch is not None:  # voids have no law
         return unknown()
     resolution, length = scene.grid.resolution, scene.grid.length
+    if discretisation_error.has_step(task.elastomer, resolution, length):
+        return unknown()
     levels = [
         GridValues(
             grid.points * (resolution / scene.grid.points),
