@@ -41,12 +41,11 @@ from gfmd_cli.solvers.loop import Start
 from gfmd_cli.solvers.multigrid import MAX_LAPLACIAN_GROWTH, largest_growth
 
 MAX_COST = 80
-"""n^3 per point of a grid and square of the growth of k(q) per octave, above which the iteration is
-faster; measured."""
-MAX_LINE_COST = 20000  # n^3 per point of a line; measured
-MAX_COST_WITH_LAPLACIAN = (
-    150  # n^3 per point where the V-cycle needs no squared Laplacian; measured
-)
+"""Largest n^3 over points of a grid and square of the growth of k(q) per octave, for n points in
+contact; measured: with more, the iteration is faster."""
+MAX_COST_WITH_LAPLACIAN = 150
+"""The same without the growth, where the V-cycle has no squared Laplacian."""
+MAX_LINE_COST = 20000  # the same for lines
 EXPECTED_GROWTH = 1.3  # of the sets: largest number of points over that of the first one; a choice
 MAX_JOINING_FRACTION = 0.4  # of a set, that joins it at a time; measured: 0.3 to 0.6 are as good
 MAX_SETS = 60  # of the largest size, or eight times as many of half; a choice; 5 to 60 are taken
