@@ -6,6 +6,8 @@ PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G",
 PREFIXED = ("m", "Pa", "N/m")
 """Units that take a prefix."""
 DIGITS = 12  # of a number in a label, so that different parameters have different labels
+LARGEST_RMS_HEIGHT = 1e-2
+"""Largest rms height of a rough solid [m]; larger ones are in reduced units. A choice."""
 DURATIONS = (("d", 86400), ("h", 3600), ("min", 60), ("s", 1))
 
 

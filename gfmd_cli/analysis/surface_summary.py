@@ -18,7 +18,7 @@ from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.physics.spectrum_fit import Moments, SelfAffineFit, moments
 from gfmd_cli.physics.surface_spectrum import Spectrum, map_spectrum, spectrum
 from gfmd_cli.study.forecast import first_grid
-from gfmd_cli.study.plausibility import METRES
+from gfmd_cli.units import LARGEST_RMS_HEIGHT
 
 PRESSURES = np.array([0.003, 0.03, 0.3])  # p* of the predictions
 MIN_HURST = 0.01  # of the table [surface] that is suggested
@@ -56,7 +56,7 @@ class SurfaceSummary:
     @property
     def in_si(self) -> bool:
         """Whether lengths are in metres: rms heights of real surfaces are small."""
-        return self.moments.height <= METRES
+        return self.moments.height <= LARGEST_RMS_HEIGHT
 
     def record(self) -> dict[str, Any]:
         """The summary as plain data in SI units."""

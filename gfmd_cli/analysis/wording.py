@@ -8,8 +8,7 @@ import numpy as np
 
 from gfmd_cli.analysis.table import Record, TableColumn
 from gfmd_cli.grid.arrays import Field
-from gfmd_cli.study.plausibility import METRES
-from gfmd_cli.units import scaled
+from gfmd_cli.units import LARGEST_RMS_HEIGHT, scaled
 
 SPACE = "\u00a0"
 """No-break space."""
@@ -26,7 +25,7 @@ def in_si(row: Mapping[str, Any]) -> bool:
 
     They do where the load was given in Pa or the surface has heights of a real one.
     """
-    return bool(row["load"] == "pressure" or row["h_std"] <= METRES)
+    return bool(row["load"] == "pressure" or row["h_std"] <= LARGEST_RMS_HEIGHT)
 
 
 def shown(columns: Sequence[TableColumn], rows: Iterable[Record]) -> list[TableColumn]:

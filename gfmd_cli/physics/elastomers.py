@@ -16,7 +16,7 @@ from gfmd_cli.grid.arrays import Field, Mask
 from gfmd_cli.grid.fft_grid import ALL_ROWS, Shape
 from gfmd_cli.physics.compliance_transforms import Compliance
 from gfmd_cli.physics.free_compliance import Spacings
-from gfmd_cli.physics.linear_elastomer import LinearElastomer
+from gfmd_cli.physics.linear_elastomer import LinearElastomer, Scale
 from gfmd_cli.physics.persson import gamma_slab
 from gfmd_cli.physics.stiffness_table import (
     compliance_of_table,
@@ -25,12 +25,17 @@ from gfmd_cli.physics.stiffness_table import (
     read_table,
 )
 from gfmd_cli.spec_table import FilePath, Positive
-from gfmd_cli.units import labelled
+from gfmd_cli.units import LARGEST_RMS_HEIGHT, labelled
 
 LONG_WAVE = 1e-6  # q t up to which k of a layer is constant: (q t)^2 is below rounding
 DECAY_DISTANCE = 25.0  # thicknesses from which the displacement of a layer is below rounding
 MAX_SPACING = 16.0  # of a grid, in thicknesses of a layer with a free boundary
 MAX_SHORT_WAVE_STRESS = 0.1  # fraction of the squared stress, for a thin plate; a choice
+PLATE = 0.1
+"""Largest q t up to which a slab is a plate; its stiffness is then smaller by 0.2 % or less."""
+NEARLY_INCOMPRESSIBLE = 0.48
+"""Poisson's ratio of a bonded layer above which a load with a free boundary is wrong by 3 % or more
+if pixels are wider than the layer is thick; measured, see docs/accuracy.md."""
 MAX_EXTRAPOLATED = 0.1  # fraction of squared stress or height beyond a table; a choice
 ROUNDED_EXPONENT = 1e-3  # of the first rows of a table, whose numbers may be rounded; a choice
 
@@ -104,9 +109,9 @@ class Plate(LinearElastomer):
         """k(q) [Pa/m]."""
         return self.E_star / 12 * (self.thickness * q) ** 3 * q
 
-    def warnings(self, h_std: float, q: Field, variance: Field) -> list[str]:
+    def warnings(self, scale: Scale) -> list[str]:
         """See `LinearElastomer.warnings`. At q t = 1 a slab is 0.81 times as stiff as a plate."""
-        fraction = _fraction(variance, q * self.thickness > 1)
+        fraction = _fraction(scale.variance, scale.q * self.thickness > 1)
         if fraction <= MAX_SHORT_WAVE_STRESS:
             return []
         return [
@@ -147,6 +152,21 @@ class Slab(LinearElastomer):
         """k(q) [Pa/m] of the half-space with the same contact modulus."""
         return 0.5 * self.E_star * q
 
+    def warnings(self, scale: Scale) -> list[str]:
+        """See `LinearElastomer.warnings`. A thickness may be meant in m."""
+        thickness = self.thickness * scale.length
+        if thickness * scale.q.max() <= PLATE:
+            reason = "a thin plate at all wavelengths"
+        elif thickness < scale.h_std <= LARGEST_RMS_HEIGHT:
+            reason = f"less than the rms height, {scale.h_std:.3g} m"
+        else:
+            return []
+        return [
+            f"elastomer.thickness = {self.thickness:g} is relative to the side of the cell, "
+            f"{scale.length:.3g} m: a slab of {thickness:.3g} m, {reason}; divide a thickness in m "
+            "by the side"
+        ]
+
     def gamma(self, q: Field, length: float = 1.0) -> Field:
         """Weight of the elastic energy in Persson theory. Paper Eq. (42)."""
         return gamma_slab(q * self.thickness * length)
@@ -181,14 +201,22 @@ class Layer(LinearElastomer):
         softening = layer_softening(t, self.poisson if self.base == "bonded" else None)
         return np.where(q > 0, 0.5 * self.E_star * q / softening, 0.0)
 
-    def warnings(self, h_std: float, q: Field, variance: Field) -> list[str]:
+    def warnings(self, scale: Scale) -> list[str]:
         """See `LinearElastomer.warnings`."""
-        if self.thickness > h_std:
-            return []
-        return [
-            f"elastomer.thickness = {self.thickness:g} m is less than the rms height, "
-            f"{h_std:.3g} m: linear elasticity does not hold for such compressions"
-        ]
+        warnings, poisson = [], self.poisson if self.base == "bonded" else None
+        if self.thickness <= scale.h_std:
+            warnings.append(
+                f"elastomer.thickness = {self.thickness:g} m is less than the rms height, "
+                f"{scale.h_std:.3g} m: linear elasticity does not hold for such compressions"
+            )
+        is_thin = scale.boundary == "free" and scale.spacing > self.thickness
+        if is_thin and poisson is not None and poisson > NEARLY_INCOMPRESSIBLE:
+            warnings.append(
+                f"pixels of {scale.spacing:.3g} m are wider than elastomer.thickness, "
+                f"{self.thickness:.3g} m: with poisson = {poisson:g} and a free boundary the load "
+                "may be wrong by 3 to 15 %, and by more beyond six thicknesses; use more points"
+            )
+        return warnings
 
     @property
     def uniform_stiffness(self) -> float:
@@ -232,8 +260,9 @@ class Tabulated(LinearElastomer):
         k = interpolated(read_table(self.path))
         return np.where(q > 0, k(np.where(q > 0, q, 1.0)), 0.0)
 
-    def warnings(self, h_std: float, q: Field, variance: Field) -> list[str]:
+    def warnings(self, scale: Scale) -> list[str]:
         """See `LinearElastomer.warnings`."""
+        q, variance = scale.q, scale.variance
         first, *_, last = read_table(self.path)[:, 0]
         beyond = (q < first) | (q > last)
         of_stress = _fraction(variance, beyond), "squared stress in full contact"

@@ -5,6 +5,7 @@ sum_q k(q) |u(q)|^2 / 2: Eq. (1) of Mueser, "Elastic contacts of randomly rough 
 spatial dimensions". Sums exclude q = 0, where k is zero for every elastomer (load control).
 """
 
+from dataclasses import dataclass
 from fractions import Fraction
 from typing import ClassVar
 
@@ -20,6 +21,24 @@ from gfmd_cli.spec_table import SpecTable
 from gfmd_cli.units import count
 
 EXPONENT_STEP = 1e-3  # of ln q: the truncation error is of order 1e-7, the rounding error 1e-13
+
+
+@dataclass(frozen=True)
+class Scale:
+    """Lengths of a contact, which the warnings of an elastomer depend on."""
+
+    h_std: float
+    """Rms height of a rough surface [m], 0 of a single indenter."""
+    q: Field
+    """Wavenumbers of the surface [1/m]."""
+    variance: Field
+    """The part of the squared stress in full contact at each of them."""
+    length: float
+    """Side of the cell along x [m]."""
+    spacing: float
+    """The wider of the grid spacings [m]."""
+    boundary: str
+    """`grid.boundary`."""
 
 
 class LinearElastomer(SpecTable):
@@ -69,11 +88,8 @@ class LinearElastomer(SpecTable):
         """1/k(q) of an elastomer whose displacement decays and whose k(q) is not a power law."""
         raise NotImplementedError
 
-    def warnings(self, h_std: float, q: Field, variance: Field) -> list[str]:
-        """Warnings on a surface of this rms height [m]; mostly none.
-
-        `variance` is the part of the squared full-contact stress at the wavenumbers q [1/m].
-        """
+    def warnings(self, scale: Scale) -> list[str]:
+        """Warnings about a contact of these lengths; mostly none."""
         return []
 
     def decays(self, dimension: int) -> bool:

@@ -5,18 +5,17 @@ from math import inf, isfinite
 from typing import Any
 
 from gfmd_cli.maps.map_warnings import MAX_GRADIENT
-from gfmd_cli.physics.contact import Scene
-from gfmd_cli.physics.elastomers import Layer, Slab
 from gfmd_cli.physics.indenters import RigidSurface
+from gfmd_cli.physics.linear_elastomer import Scale
 from gfmd_cli.physics.spectrum_fit import moments
 from gfmd_cli.spec.models import LOADS
 from gfmd_cli.status import Status
 from gfmd_cli.study.refinement import TaskSolution, border_share, inaccurate_columns
 from gfmd_cli.study.tasks import Task
+from gfmd_cli.units import LARGEST_RMS_HEIGHT
 
 FEW_POINTS = 30  # a choice: the area of a circle of 30 points has an error of its rim of a third
 PASCALS = 1e3  # modulus above which it is one in Pa; a choice: gels have 1e3 Pa, reduced units 1
-METRES = 1e-2  # rms height above which it is in reduced units; a choice: no rough solid has 1 cm
 REDUCED_PRESSURES = (1e-6, 100.0)
 """Reduced pressures outside of which a load has another unit than was meant; a choice. Rough
 surfaces are in full contact from about 6 on; below, the largest grids have few points in contact.
@@ -27,11 +26,6 @@ probably meant in m; a choice."""
 LOOSE = 0.01  # natural residual; the mean gap of the default surface is then wrong by 0.1 to 1 %
 MAX_EDGE_SHARE = 0.05  # of contact or load in the tapered zone; a choice
 SMALL_DISPLACEMENT = 1e-4  # [h_std], below which heights have another unit; a choice
-PLATE = 0.1
-"""Largest q t up to which a slab is a plate; its stiffness is then smaller by 0.2 % or less."""
-NEARLY_INCOMPRESSIBLE = 0.48
-"""Poisson's ratio of a bonded layer above which a load with a free boundary is wrong by 3 % or more
-if pixels are wider than the layer is thick; measured, see docs/accuracy.md."""
 SEPARATOR = " | "
 """Between the warnings of one contact in a column of text."""
 
@@ -47,7 +41,7 @@ def warnings_of(task: Task, solved: TaskSolution, results: Mapping[str, Any]) ->
     """Reasons to doubt the result of one contact, a sentence each; mostly none."""
     elastomer, scene = task.elastomer, solved.scene
     warnings = task.surface.warnings(task.boundary)
-    if elastomer.modulus > PASCALS and scene.h_std > METRES:
+    if elastomer.modulus > PASCALS and scene.h_std > LARGEST_RMS_HEIGHT:
         warnings.append(
             f"a modulus of {elastomer.modulus:.3g} Pa and an rms height of {scene.h_std:.3g} m: "
             "are heights and lengths in metres? Set surface.h_std, surface.length or surface.scale"
@@ -65,9 +59,15 @@ def warnings_of(task: Task, solved: TaskSolution, results: Mapping[str, Any]) ->
             f"solver.tolerance = {task.solver.tolerance:g}: contact area and mean gap may be wrong "
             f"by several percent; at most {LOOSE:g} is usual"
         )
-    rms_height = scene.h_std if task.surface.rough else 0.0  # else it depends on the cell alone
-    warnings += elastomer.warnings(rms_height, scene.shells.q, scene.shells.variance)
-    warnings += _coarse_for_layer(task, max(scene.grid.spacings))
+    scale = Scale(
+        h_std=scene.h_std if task.surface.rough else 0.0,
+        q=scene.shells.q,
+        variance=scene.shells.variance,
+        length=scene.grid.length,
+        spacing=max(scene.grid.spacings),
+        boundary=task.boundary,
+    )
+    warnings += elastomer.warnings(scale)
     warnings += _load_in_jump(task, solved.solution.status, results)
     warnings += _contact_at_border(task, solved)
     if max(results.get("edge_contact", 0.0), results.get("edge_load", 0.0)) > MAX_EDGE_SHARE:
@@ -76,7 +76,6 @@ def warnings_of(task: Task, solved: TaskSolution, results: Mapping[str, Any]) ->
             "the window has changed the heights (see the columns edge_contact and edge_load); "
             "leave out surface.edges to keep them"
         )
-    warnings += _thin_slab(task, scene)
     if scene.may_touch is not None and solved.observables.u_g < 0:
         warnings.append(
             "the mean gap is negative: where heights are missing, the elastomer enters the holes "
@@ -98,39 +97,6 @@ def warnings_of(task: Task, solved: TaskSolution, results: Mapping[str, Any]) ->
 def _has_default_side(surface: RigidSurface) -> bool:
     """Whether the spec leaves the side of a random surface at its default."""
     return not surface.is_map and "length" not in surface.model_fields_set
-
-
-def _coarse_for_layer(task: Task, spacing: float) -> list[str]:
-    """A warning if pixels are too wide [m] for a bonded layer that is nearly incompressible."""
-    layer = task.elastomer
-    if task.boundary != "free" or not isinstance(layer, Layer) or layer.base != "bonded":
-        return []
-    if spacing <= layer.thickness or (layer.poisson or 0.0) <= NEARLY_INCOMPRESSIBLE:
-        return []
-    return [
-        f"pixels of {spacing:.3g} m are wider than elastomer.thickness, {layer.thickness:.3g} m: "
-        f"with poisson = {layer.poisson:g} and a free boundary the load may be wrong by 3 to 15 %, "
-        "and by more beyond six thicknesses; use more points"
-    ]
-
-
-def _thin_slab(task: Task, scene: Scene) -> list[str]:
-    """A warning if a slab is so thin that its thickness is probably meant in m."""
-    slab, length = task.elastomer, scene.grid.length
-    if not isinstance(slab, Slab):
-        return []
-    thickness = slab.thickness * length
-    if thickness * scene.shells.q.max() <= PLATE:
-        reason = "a thin plate at all wavelengths"
-    elif task.surface.rough and thickness < scene.h_std <= METRES:
-        reason = f"less than the rms height, {scene.h_std:.3g} m"
-    else:
-        return []
-    return [
-        f"elastomer.thickness = {slab.thickness:g} is relative to the side of the cell, "
-        f"{length:.3g} m: a slab of {thickness:.3g} m, {reason}; divide a thickness in m by the "
-        "side"
-    ]
 
 
 def _load_in_jump(task: Task, status: Status, results: Mapping[str, Any]) -> list[str]:
