@@ -44,8 +44,9 @@ def contact_line(grid: Grid, mask: Mask, *, periodic: bool = True) -> float:
         continues = axis == 0 and grid.row_span[1] < grid.points_y
         if periodic or continues:
             counts[axis] += np.count_nonzero(lines[-1:] != following)
-    across = np.divide(1.0, grid.spacings)  # edge length over the area of a point
-    return float(grid.total(counts) @ across) * grid.length / grid.size
+    # side that two points share over the area of the cell, times L
+    edges = np.divide(grid.whole_shape, grid.size) * np.divide(grid.length, grid.sides)
+    return float(grid.total(counts) @ edges)
 
 
 def estimated_patches(perimeter: float, a_r: float, area: float) -> float:
