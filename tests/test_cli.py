@@ -368,8 +368,9 @@ SMALL_SETTINGS = {
 }
 
 
-ONE_SEED = ("grid.points=64", "surface.cutoff=0.05", "solver.tolerance=1e-4", "surface.seed=0")
-ROUGH = (*ONE_SEED[:-1], "surface.seed=[0, 1]")
+COARSE = ("grid.points=64", "surface.cutoff=0.05", "solver.tolerance=1e-4")
+ONE_SEED = (*COARSE, "surface.seed=0")
+ROUGH = (*COARSE, "surface.seed=[0, 1]")
 TWO = "load.p_star=[0.1, 1.0]"
 PAPER_SETTINGS = {
     "fig01": ("grid.points=128", "load.tolerance=0.8"),

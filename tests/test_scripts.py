@@ -28,6 +28,7 @@ SMALL = {
     "rounded_heights.py": "--points 64 --seeds 1",
     "spectrum_fits.py": "--seeds 1 --hurst 0.8 --rolloffs 20 --pixels 4",
     "scan_files.py": f"{ROOT / 'configs' / 'data'} --limit 60",
+    "steep_stiffness.py": "--points 32 --steps 300",
     "small_contacts.py": "--points 64 --cutoff 0.1 --p-star 0.1 --seeds 0 --repeats 1",
     "tile_solves.py": "--points 512 --cutoff 0.02 --p-star 0.001 --repeats 1",
     "time_left.py": f"{ROOT / 'configs' / 'smoke.toml'} --set grid.points=100 --jobs 1",

@@ -25,7 +25,7 @@ EXPONENT_STEP = 1e-3  # of ln q: the truncation error is of order 1e-7, the roun
 
 @dataclass(frozen=True)
 class Scale:
-    """Lengths of a contact, which the warnings of an elastomer depend on."""
+    """What the warnings of an elastomer depend on: the lengths of a contact, and its boundary."""
 
     h_std: float
     """Rms height of a rough surface [m], 0 of a single indenter."""
