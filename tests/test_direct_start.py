@@ -68,6 +68,7 @@ def test_the_solution_is_that_of_the_iteration_and_exact(contact):
     assert direct.status == whole.status == "converged"
     assert direct.steps == 0
     assert direct.residual < 1e-6
+    assert contact.recompute(direct.u, np.empty_like(direct.u)) < 1e-6
     assert direct.u == pytest.approx(whole.u, abs=1e-7)
     held = direct.u == contact.obstacle
     assert np.array_equal(held, whole.u == contact.obstacle)
@@ -188,7 +189,7 @@ def test_a_solve_stopped_on_a_coarse_grid_goes_on_bit_by_bit():
         states.append((current.grid.whole_shape, copy.deepcopy(state)))
 
     straight = solve_contact(contact, ProjectedCG(tolerance=1e-6), keep)
-    assert [shape for shape, _ in states].count((256, 256)) == 1  # after a direct solve
+    assert (256, 256) not in [shape for shape, _ in states]  # a direct solve ends it
     for chosen in (1, len(states) // 2, len(states) - 1):
         shape, state = states[chosen]
         rest = solve_contact(contact, ProjectedCG(tolerance=1e-6), start=Resume(shape, state))

@@ -52,7 +52,8 @@ class Solved:
         solver = Auto(tolerance=tolerance, max_steps=max_steps)
         self.solution = solve_contact(contact, solver)
         assert self.solution.status == "converged"
-        self.u, self.sigma = self.solution.u, self.solution.sigma
+        self.u = self.solution.u
+        self.sigma = contact.stress(self.u, out=contact.grid.empty())  # as a run stores it
         self.gap = self.u - contact.height
         self.observables = observe(contact, self.u, self.sigma)
 
@@ -83,7 +84,9 @@ def test_the_solution_meets_the_conditions_of_contact(elastomer, p_star):
     violation = np.minimum(it.gap, it.stress)
     residual = np.sqrt(np.mean(violation**2)) / min(p_star, 1)
     assert residual < TOLERANCE
-    assert it.solution.residual == pytest.approx(residual, rel=1e-3, abs=1e-13)
+    rounding = it.solution.sigma - it.stress
+    assert np.sqrt(np.mean(rounding**2)) < TOLERANCE / 3 * min(p_star, 1)
+    assert it.solution.residual == pytest.approx(residual, abs=TOLERANCE / 3)
     assert it.gap.min() >= 0
     assert it.stress.min() > -TOLERANCE * POINTS * min(p_star, 1)
     partner = np.sqrt(np.mean(np.maximum(it.gap, it.stress) ** 2))
@@ -643,7 +646,7 @@ def test_the_watch_sees_every_grid_from_coarse_to_fine():
     transforms = [*spent.values(), solution.transforms]
     assert all(before < after for before, after in pairwise(transforms))
     assert [points for points, _ in shapes] == sorted(points for points, _ in shapes)
-    assert shapes[-1] == (256, solution.steps)
+    assert shapes[-1] == (256, solution.steps - 1)  # the last step ends the solve
 
 
 def test_any_start_ends_in_the_same_solution():

@@ -166,6 +166,11 @@ class Contact:
         return sigma > np.maximum(self.point_stiffness * gap, error)
 
     @cached_property
+    def stiffest(self) -> float:
+        """The largest k(q)."""
+        return self.grid.max(float(self.stiffness.max()))
+
+    @cached_property
     def point_stiffness(self) -> float:
         """Stress at a point per displacement of this point alone: the mean of k over all q."""
         by_column = self.stiffness.reshape(-1, self.stiffness.shape[-1]).sum(axis=0)
@@ -194,6 +199,15 @@ class Contact:
     def as_residual(self, violation: float) -> float:
         """Natural residual from the sum of the squares of min(g, sigma)."""
         return sqrt(violation / self.grid.size) / min(self.pressure, 1.0)
+
+    def rounding(self, field: Field) -> float:
+        """Estimate of what the rounding of a displacement adds to the residual of its stress.
+
+        Rounding is white noise, and short waves dominate its stress: k_max times its rms value.
+        """
+        squares = sum(float(np.square(field[rows]).sum()) for rows in row_blocks(field))
+        error = 0.5 * float(np.finfo(field.dtype).eps) * self.stiffest
+        return error * self.as_residual(self.grid.total(squares))
 
     def mirrored(self) -> "Contact":
         """This contact, or with a free boundary the periodic contact of the mirrored map."""

@@ -79,7 +79,7 @@ def direct_start(
         if not is_solved:
             break
         solved, touching = solve, solve.touching
-    return Start(solved.contact, transforms, solved.displacement()) if solved else None
+    return solved.start(transforms) if solved else None
 
 
 def _largest_count(contact: Contact) -> int:
@@ -102,6 +102,8 @@ class _DirectSolve:
         self.values = self.grid.as_rows(self.grid.padded)[:, : self.grid.points]
         self.stress: Field | None = None
         """Stresses s >= 0 that are kept from set to set; None before."""
+        self.solution: tuple[Points, Field] | None = None
+        """Points in contact and their stresses, once they are found without residual."""
         self.transforms = 0.0
         self.evaluate((0, 0), 1.0)
         rows, columns = self.values.shape
@@ -141,6 +143,7 @@ class _DirectSolve:
             self.level = float((self.values[points] - self.obstacle[points]).mean())
             misclassified, violation = self.compare(points, t)
             count = int(np.count_nonzero(misclassified))
+            self.solution = (points, t) if count == 0 else None
             if count == 0 or violation < tolerance:
                 break
             if self.stress is None and count >= fewest:
@@ -224,13 +227,24 @@ class _DirectSolve:
         remaining_load = self.contact.pressure * self.grid.size - by_height.sum()
         return by_height + by_level * (remaining_load / by_level.sum()), factor[0]
 
-    def displacement(self) -> Field:
-        """The displacement, laid on the indenter in contact."""
+    def start(self, transforms: float) -> Start:
+        """The displacement, laid on the indenter in contact; with the stress if that is exact.
+
+        Laying moves points by rounding errors e, whose stress is K e with |K e| <= k_max |e|.
+        """
         u = self.grid.empty()
-        np.subtract(self.values.reshape(u.shape), self.contact.height, out=u)
-        u -= self.level
+        gap = self.grid.as_rows(u)
+        np.subtract(self.values, self.grid.as_rows(self.contact.height), out=gap)
+        gap -= self.level
+        sigma, rounding = None, 0.0
+        if self.solution is not None:
+            points, t = self.solution
+            sigma = np.zeros(u.shape)
+            self.grid.as_rows(sigma)[points] = t
+            moved = float(np.square(gap[points]).sum())
+            rounding = self.contact.stiffest * self.contact.as_residual(moved)
         self.contact.set_displacement(u, u, self.touching.reshape(u.shape))
-        return u
+        return Start(self.contact, transforms, u, sigma, rounding)
 
 
 def _distance(difference: NDArray[np.int64], period: int) -> NDArray[np.int64]:

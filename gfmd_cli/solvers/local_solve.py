@@ -30,7 +30,8 @@ REDUCTION_RANGE = (1e-3, 0.02)
 """Smallest and largest factor by which a solve on tiles shall reduce the residual. The smallest is
 the relative error of the operators; the largest is a choice, because an evaluation at all points
 takes longer than a few steps on tiles."""
-ACCEPTED_FRACTION = 0.9  # of the tolerance, for the predicted residual of the start; a choice
+ACCEPTED_FRACTION = 0.75
+"""Of the tolerance, for the predicted residual of the start, which may be 1.4 times as large."""
 TARGET_FRACTION = 0.25  # of the tolerance, for that residual after the next solve; a choice
 MAX_EVALUATIONS = 6  # of the displacement at all points; a choice
 MAX_STEPS = 60  # on the same tiles; a choice

@@ -13,7 +13,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from gfmd_cli.grid.arrays import Field, Mask
+from gfmd_cli.grid.arrays import Field, Mask, row_blocks
 from gfmd_cli.physics.contact import Contact
 from gfmd_cli.physics.free_contact import FreeContact
 from gfmd_cli.solvers.local_solve import LocalSolve
@@ -130,17 +130,32 @@ class PeriodicSolve(LocalSolve):
         return values
 
     def start(self, tolerance: float) -> Start:
-        """The displacement u >= h, and u = h at the points that are pressed on the indenter."""
+        """The displacement u >= h, and u = h at the points that are pressed on the indenter.
+
+        K C s is s without its mean, so that the stress is s + K (u - C s).
+        """
         result, displacement = self.solve(tolerance)
+        contact, tiles, moves = self.contact, self.tiles, self.grid.in_single()
         u = self.grid.empty()  # only now: the solves on tiles need memory, too
-        np.subtract(displacement, result.level, out=u)
-        np.maximum(u, self.contact.obstacle, out=u)
-        on_tiles = self.obstacle + result.gap
-        if self.contact.may_touch is not None:
-            can_touch = self.tiles.take(self.contact.may_touch)
-            on_tiles = np.where(can_touch, on_tiles, self.tiles.take(u))
-        self.tiles.overwrite(on_tiles, u)
-        return Start(self.contact, self.transforms, u)
+        laid, before = self.obstacle + result.gap, tiles.take(displacement) - result.level
+        if contact.may_touch is not None:
+            laid = np.where(tiles.take(contact.may_touch), laid, before)
+        change = moves.padded[..., : moves.points]  # in the memory of the displacement
+        for rows in row_blocks(u):
+            values = displacement[rows] - result.level
+            np.maximum(values, contact.obstacle[rows], out=u[rows])
+            change[rows] = u[rows] - values
+        tiles.overwrite(laid, u)
+        if result.gap.min() > 0:
+            return Start(contact, self.transforms, u)
+        tiles.overwrite(laid - before, change)
+        rounding = contact.rounding(change)
+        moves.filter_padded(contact.stiffness)
+        self.transforms += moves.pair_count
+        sigma = self.grid.empty()
+        sigma[...] = change
+        tiles.overwrite(self.s + tiles.take(sigma), sigma)
+        return Start(contact, self.transforms, u, sigma, rounding)
 
     def lay(self, gap: Field) -> tuple[Field, Field]:
         """The gap and the stress on the tiles after C s is laid on the indenter.

@@ -12,7 +12,7 @@ from gfmd_cli.physics.contact import Contact
 from gfmd_cli.physics.observables import contact_pressure
 from gfmd_cli.solvers.direct_start import direct_start
 from gfmd_cli.solvers.local_start import COARSE_TOLERANCE, start_from, tiles_apply
-from gfmd_cli.solvers.loop import Solver, Start, State, Watch, ignore, solve
+from gfmd_cli.solvers.loop import Solver, Start, State, Watch, ignore, is_certain, solve
 from gfmd_cli.solvers.multigrid import coarsened_axes
 from gfmd_cli.status import Status
 
@@ -77,7 +77,7 @@ def solve_contact(
     while grids:
         fine = grids.pop()
         if isinstance(start, Resume):
-            state = _resumed(fine, start)
+            state = _resumed(fine, start, solver.tolerance)
             transforms, start = state.coarser_transforms, None
         else:
             state = _begin(solver, fine, coarse, state, start)
@@ -178,10 +178,11 @@ def _begin(
     return solver.begin(fine, u)
 
 
-def _resumed(contact: Contact, resume: Resume) -> State:
+def _resumed(contact: Contact, resume: Resume, tolerance: float) -> State:
     """The stored state; a stress that is claimed to be exact is computed afresh.
 
-    That gives the same bits again, and a forged state cannot end a solve.
+    That gives the same bits again, and a forged state cannot end a solve. Nor can a stress that is
+    claimed to be updated: no state is saved that would end a solve by such a stress.
 
     Contact is u = h to the last bit: a point that is off by rounding would be free, pressed on the
     indenter, and stop every move. So where the last bits of the indenter have changed, points of
@@ -195,6 +196,8 @@ def _resumed(contact: Contact, resume: Resume) -> State:
             np.copyto(u, h, where=np.abs(u - h) < near)
     if state.exact:
         state.residual = contact.recompute(state.u, state.sigma)
+    elif is_certain(contact, state, tolerance):
+        state.rounding = 0.0  # unknown
     return state
 
 
