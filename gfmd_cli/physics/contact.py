@@ -322,11 +322,15 @@ def touchable(void: Mask | None, grid: Grid) -> Mask | None:
 
 def reduce_scene(grid: Grid, height: Field, elastomer: LinearElastomer) -> Scene:
     """Reduce heights [m], which are overwritten, and stiffness to the scales of the surface."""
-    mean = grid.mean(height)
-    height -= mean
-    largest = grid.max(max(float(height.max()), -float(height.min())))
-    height /= largest  # squares of heights of 1e-200 m would vanish
-    squares = sum(float(np.square(height[rows]).sum()) for rows in row_blocks(height))
+    mean, blocks = grid.mean(height), [height[rows] for rows in row_blocks(height)]
+    largest = 0.0
+    for block in blocks:
+        block -= mean
+        largest = max(largest, float(block.max()), -float(block.min()))
+    largest, squares = grid.max(largest), 0.0
+    for block in blocks:
+        block /= largest  # squares of heights of 1e-200 m would vanish
+        squares += float(np.square(block).sum())
     rms = sqrt(grid.total(squares) / grid.size)
     height /= rms
     stiffness, stiffest = _stiffness(grid, elastomer)
@@ -387,7 +391,9 @@ def radial_power(grid: Grid, height: Field) -> tuple[Field, Field, Field]:
     of shape (sums,).
     """
     modes = grid.forward_into_work(height).reshape(grid.points_y, -1)
-    power = grid.gather_columns(_opposite_rows_added(modes) * grid.multiplicity())
+    power = _opposite_rows_added(modes)
+    power *= grid.multiplicity()
+    power = grid.gather_columns(power)
     power[0, 0] = 0.0
     row, column = np.nonzero(power > ROUNDING_POWER * power.max())
     m_y = row * (grid.length / grid.length_y) if grid.dimension == 2 else row
