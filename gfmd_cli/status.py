@@ -39,8 +39,8 @@ class Status(ExplainedEnum):
     DIVERGED = "diverged", 'the solver diverged: use solver.kind = "auto"'
     ACCURACY_NOT_REACHED = (
         "accuracy_not_reached",
-        "the grid of {points} points is the finest that memory or accuracy.max_points allows, "
-        "and its estimated errors are larger than requested",
+        "estimated errors on the grid of {points} points are larger than requested or unknown, and "
+        "memory and accuracy.max_points allow no finer grid, or no finer grid would help",
     )
     LOAD_NOT_REACHED = (
         "load_not_reached",

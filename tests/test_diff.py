@@ -242,4 +242,5 @@ def test_values_that_are_missing_or_zero_do_not_agree_by_chance():
 
 def test_a_study_that_is_not_there_is_bad_input(output_of, study_of, tmp_path):
     assert "no such study" in output_of("diff", study_of(), tmp_path / "none.h5", status=2)
-    output_of("diff", study_of(), study_of(), "--tolerance", "-1", status=2)
+    for wrong in ("-1", "nan"):
+        output_of("diff", study_of(), study_of(), "--tolerance", wrong, status=2)

@@ -257,6 +257,12 @@ def test_a_study_in_pascal_has_both_units(invoke, tmp_path):
     assert "500\xa0MPa" in Page(page).words
 
 
+def test_a_density_of_several_seeds_is_called_their_mean(whole):
+    groups = re.findall(r"<span>(.*): mean of 2 seeds", whole[whole.index("Middle of each bin") :])
+    assert any(group.endswith("</var>* = 0.1") for group in groups)
+    assert not any("seed=" in group for group in groups)
+
+
 def test_two_studies_are_compared_on_one_page(invoke, one, tmp_path):
     options = ("--set", "surface.hurst=0.5", "--set", "output.fields=[]")
     other = solved(invoke, tmp_path, ONE, *options)

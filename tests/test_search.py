@@ -145,6 +145,19 @@ def test_a_share_of_a_flat_top_is_not_reached(rows_of, tmp_path):
     assert row["a_r"] == 16 / 256
 
 
+@pytest.mark.parametrize("boundary", ["periodic", "free"])
+@pytest.mark.parametrize("load", [0.08, 0.12])
+def test_less_than_the_face_of_a_punch_is_not_reached(rows_of, boundary, load):
+    """At the smallest pressures rounding takes points from it."""
+    (row,) = rows_of(
+        "surface={kind='punch', radius=2e-4, depth=1e-4, length=1e-3}", f"grid.boundary={boundary}",
+        "elastomer={kind='half-space', E_star=1e9}", "grid.points=64", f"load.contact_area={load}",
+    )  # fmt: skip
+    assert row["status"] == "load_not_reached"
+    x, y = np.meshgrid(np.arange(64) - 32, np.arange(64) - 32)
+    assert row["a_r"] == np.mean(np.hypot(x, y) <= 0.2 * 64)
+
+
 @pytest.mark.parametrize("solver", [1e-4, 1e-2])
 def test_a_mean_gap_has_no_jumps(rows_of, solver):
     """Next to full contact it falls steeply: pressures nearer than the solver's tolerance count."""
@@ -265,8 +278,10 @@ def check_search(power, first, steps, quantity):
         load_tolerance=1e-5,
         points=64,
         solver=SimpleNamespace(tolerance=1e-6),
+        elastomer=SimpleNamespace(stiffness=lambda q, length: 0.0 * q),  # all pressures resolved
     )
-    scene = SimpleNamespace(grid=SimpleNamespace(points=64, size=10**9), delta_sigma=1.0)
+    grid = SimpleNamespace(points=64, size=10**9, length=1.0)
+    scene = SimpleNamespace(grid=grid, delta_sigma=1.0, h_std=1.0)
     search = _Search(task, scene, math.exp(first), 1.0)
     sign = 1 if quantity == "contact_area" else -1
 

@@ -81,6 +81,58 @@ def test_other_texts_are_no_tables(monkeypatch, case, window):
     assert table_formats(BytesIO(OTHERS[case])) == set()
 
 
+def test_positions_may_stand_after_the_heights(tmp_path, monkeypatch):
+    monkeypatch.setattr(text_tables, "GRID_LINES", 100)
+    path = tmp_path / "map.txt"
+    path.write_bytes(text(POINTS[:, [2, 0, 1]], header=b"z [nm] x [um] y [um]\n"))
+    heights = 1e-9 * POINTS[:, 2].reshape(40, 50)
+    assert read_topography(path).heights == pytest.approx(heights, rel=1e-5, abs=1e-14)
+
+
+@pytest.mark.parametrize("mark", ["1e30", "3.4e38", "-9.97e36"])
+@pytest.mark.parametrize("columns", [2, 3, 40])
+def test_marks_of_missing_heights_are_in_the_unit_of_the_file(tmp_path, columns, mark):
+    table = {2: POINTS[:50, ::2], 3: POINTS, 40: MATRIX}[columns]
+    header = b"# Width: 8 um\n# Height: 60 um\n# Value units: nm\n"
+    header = header if columns == 40 else b"x [um] y [um] z [nm]\n"
+    header = b"x [um] z [nm]\n" if columns == 2 else header
+    lines = text(table, header=header).splitlines(keepends=True)
+    lines[10] = b" ".join([*lines[10].split()[:-1], mark.encode()]) + b"\n"
+    path = tmp_path / "map.txt"
+    path.write_bytes(b"".join(lines))
+    topography = read_topography(path)
+    assert topography.holes == 1
+    assert np.abs(topography.heights).max() < 1e-8
+
+
+def test_missing_points_of_a_profile_are_missing_heights(tmp_path):
+    x = 0.5 * np.arange(200)
+    heights = RNG.normal(size=200)
+    present = np.delete(np.arange(200), [50, 51, 120])
+    path = tmp_path / "profile.txt"
+    path.write_bytes(text(np.column_stack([x, heights])[present], header=b"x [um] z [nm]\n"))
+    topography = read_topography(path)
+    assert np.flatnonzero(topography.missing).tolist() == [50, 51, 120]
+    assert topography.spacing == pytest.approx((5e-7,))
+    expected = 1e-9 * heights[present]
+    assert topography.heights[present] == pytest.approx(expected, rel=1e-5, abs=1e-14)
+
+
+def test_a_point_that_is_given_twice_is_named(tmp_path):
+    path = tmp_path / "map.txt"
+    path.write_bytes(text(np.vstack([POINTS, POINTS[77]])))
+    with pytest.raises(InputError, match=r"the point x = 2\.7, y = 0\.2 is given 2 times"):
+        read_topography(path)
+
+
+def test_a_matrix_that_is_cut_off_in_a_row_is_refused(tmp_path):
+    path = tmp_path / "map.txt"
+    header = b"# Width: 8 um\n# Height: 60 um\n# Value units: nm\n"
+    path.write_bytes(text(MATRIX, header=header).rstrip()[:-100])
+    with pytest.raises(InputError, match=r"(map.txt:303: the last row|line 303) has 2\d "):
+        read_topography(path)
+
+
 SEPARATORS = [(",", "."), (", ", "."), (";", "."), ("; ", "."), ("\t", ".")]
 SEPARATORS += [(" ", ","), ("\t", ","), (";", ","), ("; ", ",")]
 

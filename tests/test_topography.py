@@ -206,6 +206,13 @@ def test_marks_of_missing_heights_and_spikes_give_a_warning(npy, heights, mark):
     assert warning.startswith(f"1 height is exactly {mark:g}, far from all others")
 
 
+@pytest.mark.parametrize("spikes", [(50.0, -50.0), (50.0, 55.0), (-50.0, -51.0, -52.0)])
+def test_a_few_different_spikes_give_a_warning(npy, heights, spikes):
+    heights[3, : len(spikes)] = spikes
+    (warning,) = [r for r in FileSurface(path=npy(heights)).warnings() if "far from" in r]
+    assert warning.startswith(f"{len(spikes)} heights, from {min(spikes):g} to {max(spikes):g}")
+
+
 def test_a_taper_without_a_window_gives_a_warning(npy, heights):
     for edges, count in (("mirror", 1), ("window", 0)):
         warnings = FileSurface(path=npy(heights), periodic=False, edges=edges, taper=0.2).warnings()
@@ -242,6 +249,17 @@ def test_a_side_that_replaces_that_of_the_file_gives_a_warning():
     assert not any("replaces" in warning for warning in FileSurface(path=SCAN).warnings())
     warnings = FileSurface(path=SCAN, length=1e-3).warnings()
     assert any("replaces the side of the file" in warning for warning in warnings)
+
+
+@pytest.mark.parametrize("keys", [{"length_y": 12.8e-6}, {"length": 16e-6, "length_y": 6.4e-6}])
+def test_a_side_along_y_that_replaces_that_of_the_file_gives_a_warning(tmp_path, keys):
+    path = tmp_path / "map.txt"
+    header = "Width: 8 um\nHeight: 6.4 um\nValue units: nm"
+    np.savetxt(path, np.random.default_rng(0).normal(size=(64, 80)), header=header)
+    wrong = "surface.length_y = {length_y:g} m replaces the side of the file".format(**keys)
+    assert any(wrong in warning for warning in FileSurface(path=path, **keys).warnings())
+    for same in ({"length_y": 6.4e-6}, {"length": 16e-6, "length_y": 12.8e-6}):
+        assert not any("length_y" in each for each in FileSurface(path=path, **same).warnings())
 
 
 @pytest.mark.parametrize("mark", [np.float64(-9999.9), np.float64(1e20), np.float32(-9999.9)])

@@ -20,6 +20,7 @@ PRESSURES = 5  # at which the distribution of one elastomer is drawn
 MIN_COUNT = 10  # grid points; a bin with fewer is noise of 30 % and more
 EXTENSION = 2.5  # factor that the edge law is drawn beyond the window of its fit
 MIN_DENSITY = 3e-3  # lowest density that is drawn, as a share of the highest
+MAX_LABEL = 24  # characters of the name of a curve beside the axis
 EDGE_LAW = "edge law"
 STRESS, DENSITY = r"stress  $\sigma\,/\,\Delta\sigma$", r"$\mathrm{Pr}(\sigma)\;\Delta\sigma$"
 
@@ -30,6 +31,9 @@ class Density:
 
     item: StyledCurve
     row: Row
+    """Of the contact; of several seeds, that of the first one with the mean density."""
+    seeds: int
+    """Number of seeds of which this is the mean."""
     sigma: Field
     density: Field
     """Of bins with enough points."""
@@ -63,7 +67,7 @@ def _densities(items: list[StyledCurve], name: str) -> list[list[Density]]:
             rows = [row for row in seeds if name in row and _bins(row, name)[0].size > 2]
             if rows:
                 row = rows[0] | {name: np.mean([row[name] for row in rows], axis=0)}
-                shown.append(Density(group[0], row, *_bins(row, name)))
+                shown.append(Density(group[0], row, len(rows), *_bins(row, name)))
         groups.append(shown)
     return [group for group in groups if group]
 
@@ -101,7 +105,9 @@ def _at_pressure(p_stars: list[float]) -> ColumnFigure:
 
 def _pressures(shown: list[Density]) -> ColumnFigure:
     """Pr(sigma) of one curve at a few pressures."""
-    plot = ColumnFigure(f"{STRESS}  for  {shown[0].item.style.label[:24]}", DENSITY)
+    label = shown[0].item.style.label
+    label = label if len(label) <= MAX_LABEL else f"{label[: MAX_LABEL - 1].rstrip(', ')}\u2026"
+    plot = ColumnFigure(f"{STRESS}  for  {label}", DENSITY)
     for stress, colour in zip(shown, colours(len(shown)), strict=True):
         label = f"p* = {stress.row['p_star']:.3g}"
         plot.line(label, stress.sigma, stress.density, color=colour, lw=1.6)

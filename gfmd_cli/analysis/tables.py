@@ -277,9 +277,9 @@ def _law_records(stress: StressDistribution) -> list[Record]:
     return [record | law for law in laws or [{"law": "too few bins are resolved"}]]
 
 
-def curve_title(curve: Curve) -> str:
-    """Elastomer, surface and grid in words."""
-    text = f"{contact_title(curve.rows[0])}, {grid_size(curve.rows)}"
+def curve_title(curve: Curve, *, of_seeds: bool = False) -> str:
+    """Elastomer, surface and grid in words; `of_seeds`: the surface without its seed."""
+    text = f"{contact_title(curve.rows[0], of_seeds=of_seeds)}, {grid_size(curve.rows)}"
     return of_study(curve.study, text)
 
 

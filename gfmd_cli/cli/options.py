@@ -3,7 +3,7 @@
 from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -15,6 +15,19 @@ if TYPE_CHECKING:
 
 OF_OTHERS = {".csv", ".nc", ".vti", ".html", ".json", ".toml"}
 """Suffixes of files that other commands write or read."""
+
+
+class Number(click.FloatRange):
+    """A number in a range; click would take NaN."""
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> float:
+        """The number. Raises click.BadParameter."""
+        number = float(super().convert(value, param, ctx))
+        if number != number:
+            self.fail(f"{value!r} is not a number", param, ctx)
+        return number
 
 
 class Command(click.Command):

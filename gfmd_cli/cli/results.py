@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from gfmd_cli.cli.messages import print_error, print_text
-from gfmd_cli.cli.options import FILE, Command
+from gfmd_cli.cli.options import FILE, Command, Number
 from gfmd_cli.errors import InputError
 
 if TYPE_CHECKING:
@@ -134,7 +134,7 @@ def export(study: Path, output: Path | None, task: int | None) -> None:
 @click.option(
     "--tolerance",
     metavar="X",
-    type=click.FloatRange(min=0),
+    type=Number(min=0),
     help="Exit with status 1 if a difference is larger.",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print records instead of tables.")

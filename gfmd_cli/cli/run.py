@@ -10,7 +10,15 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from gfmd_cli.cli.messages import print_error, print_text
-from gfmd_cli.cli.options import FILE, Command, counted, output_option, overrides_option, study_path
+from gfmd_cli.cli.options import (
+    FILE,
+    Command,
+    Number,
+    counted,
+    output_option,
+    overrides_option,
+    study_path,
+)
 from gfmd_cli.cli.progress import Reporter
 from gfmd_cli.errors import InputError
 from gfmd_cli.status import Status
@@ -59,7 +67,7 @@ def _shard(context: click.Context, parameter: click.Parameter, text: str | None)
 @click.option(
     "--checkpoint-every",
     metavar="SECONDS",
-    type=click.FloatRange(min=0, min_open=True),
+    type=Number(min=0, min_open=True),
     default=600.0,
     show_default=True,
     help="Time between two checkpoints of a task.",
@@ -67,7 +75,7 @@ def _shard(context: click.Context, parameter: click.Parameter, text: str | None)
 @click.option(
     "--max-hours",
     metavar="HOURS",
-    type=click.FloatRange(min=0, min_open=True),
+    type=Number(min=0, min_open=True),
     help="Stop before this wall time has passed: save all states, exit with status 75. However "
     "short the time, a call makes at least one step.",
 )

@@ -66,8 +66,10 @@ def check_layout(path: Path, shape: tuple[int, ...], dtype: np.dtype[Any]) -> No
             f"{path}: data of shape {shape}; a height map has two dimensions, a line profile one"
         )
     if min(shape) < SMALLEST_MAP:
+        profile = "; save a line profile as an array of one dimension" if len(shape) == 2 else ""
         raise InputError(
             f"{path}: {extent(shape)} points; at least {SMALLEST_MAP} along each axis are needed"
+            f"{profile}"
         )
     needed = math.prod(shape) * np.dtype(np.float64).itemsize
     if needed > MAX_MAP_BYTES:

@@ -20,16 +20,17 @@ MAX_EQUAL_NEIGHBOURS = 0.2  # fraction of pairs, at which the gradient is 3 % to
 MIN_SHOWN_FRACTION = 0.01  # of the heights, from which a warning states the percentage; a choice
 PLATEAU_FRACTION = 0.5  # of the heights: so many equal ones are part of the surface; a choice
 MIN_OTHERS = 8  # other heights, without which one that is apart is no outlier; a choice
+MAX_SPIKES = 16  # on either side; a choice: more are a part of the surface
 CLIPPED_RATIO = 10  # ratio of the numbers of equal heights, highest to second; about 1 if rounded
 SIDE_TOLERANCE = 1e-3  # relative difference, beyond which a side is probably wrong; a choice
 MAX_FILLED = 0.05  # fraction of filled heights; a choice
 
 
-def other_side(length: float, stated: float) -> str:
-    """A side [m] other than the one that the file states."""
+def other_side(key: str, length: float, stated: float) -> str:
+    """A side [m], given by a key of the surface, other than the one that the file states."""
     if abs(length / stated - 1) <= SIDE_TOLERANCE:
         return ""
-    return f"surface.length = {length:g} m replaces the side of the file, {stated:g} m"
+    return f"surface.{key} = {length:g} m replaces the side of the file, {stated:g} m"
 
 
 def side_of_a_part(length: float, topography: Topography) -> str:
@@ -141,7 +142,28 @@ def outliers(topography: Topography) -> str:
                 f"{count} heights{percentage} are exactly the {word}, {extreme:g}: clipped at the "
                 "range of the instrument, or a mark of missing heights? Replace such a mark by NaN"
             )
-    return ""
+    return _spikes(heights)
+
+
+def _spikes(heights: Field) -> str:
+    """A few heights beyond a gap that is wider than the range of all others."""
+    most = min(MAX_SPIKES, heights.size // 4)
+    values = np.partition(heights, (most, -most - 1), axis=None)
+    low, high = np.sort(values[: most + 1])[::-1], np.sort(values[-most - 1 :])
+    bottom, top = float(low[0]), float(high[0])
+    if not bottom < top:
+        return ""
+    for value in high[1:]:
+        top = float(value) if value - top <= top - bottom else top
+    for value in low[1:]:
+        bottom = float(value) if bottom - value <= top - bottom else bottom
+    apart = np.concatenate([low[low < bottom], high[high > top]])
+    if not apart.size:
+        return ""
+    return (
+        f"{apart.size} heights, from {apart.min():g} to {apart.max():g}, are far from all others, "
+        f"{bottom:g} to {top:g}: spikes? Replace them by NaN"
+    )
 
 
 def rounded(topography: Topography, scale: float) -> str:

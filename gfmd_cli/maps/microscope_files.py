@@ -11,6 +11,7 @@ from gfmd_cli.errors import INSTALL, InputError
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.maps.array_coordinates import EVEN_TOLERANCE, in_metres
 from gfmd_cli.maps.height_map import (
+    MAX_HEIGHT,
     MAX_MAP_BYTES,
     REMEDY,
     SMALLEST_MAP,
@@ -134,12 +135,16 @@ def _read_channel(path: Path, file: BinaryIO, reader: Any, dataset: str | None) 
     if kind == "nc":
         _check_is_own_netcdf(path, reader)
     scan = channel.topography(physical_sizes=(1.0,) * len(shape) if unsized else None)
+    in_unit_of_file = scan
     if scan.unit is not None:
         scan = scan.to_unit("m")
     if kind == "asc" and len(shape) == 2:
         _check_matrix(path, file, scan, unsized)
     heights, sides = heights_and_sides(path, scan, rows_along_y)
     has_unit = scan.unit is not None
+    if has_unit and kind in TABLE_FORMATS:
+        stored, _ = heights_and_sides(path, in_unit_of_file, rows_along_y)
+        heights = np.ma.masked_where(np.abs(stored) >= MAX_HEIGHT, heights)
     metric_sides = None if has_unit or unsized else _sides_with_unit(channel, sides)
     is_unread = kind == "asc" and unsized and not has_unit
     note = unread_units(file, (1, *shape[1:])[-1]) if is_unread else ""
@@ -271,7 +276,8 @@ def _check_all_rows_read(path: Path, file: BinaryIO, rows: int, columns: int) ->
     The reader skips lines with words, also in the table, where they would shift all rows below.
     """
     file.seek(0)
-    lengths = [len(line.split()) for line in file]
+    lines = file.readlines()
+    lengths = [len(line.split()) for line in lines]
     first = next((i for i, length in enumerate(lengths) if length == columns), 0)
     last = len(lengths) - next((i for i, length in enumerate(lengths[::-1]) if length), 0)
     empty = lengths[first:last].count(0)
@@ -280,10 +286,16 @@ def _check_all_rows_read(path: Path, file: BinaryIO, rows: int, columns: int) ->
         raise InputError(
             f"{path}:{number}: an empty line in the table: several maps? Save each in its own file"
         )
+    if first + 1 < last and lengths[last - 1] < columns:
+        row = lines[last - 1].split()
+        if all(map(is_height, row)):
+            raise InputError(
+                f"{path}:{last}: the last row has {len(row)} of {columns} heights: is the file "
+                "complete? Remove the row if it is"
+            )
     is_one_map = lengths.count(columns) <= rows
-    file.seek(0)
     rows_above = 0
-    for number, line in enumerate(file, 1):
+    for number, line in enumerate(lines, 1):
         words = line.split()
         marks = [word for word in words if not is_height(word)]
         if not marks:

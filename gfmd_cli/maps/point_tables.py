@@ -9,8 +9,14 @@ import numpy as np
 
 from gfmd_cli.errors import InputError
 from gfmd_cli.grid.arrays import Field
-from gfmd_cli.maps.array_coordinates import EVEN_TOLERANCE, NO_UNITS, factor, in_metres
-from gfmd_cli.maps.height_map import HEIGHT_NAMES, HeightMap, at_equal_distances, check_layout
+from gfmd_cli.maps.array_coordinates import NO_UNITS, factor, in_metres
+from gfmd_cli.maps.height_map import (
+    HEIGHT_NAMES,
+    MAX_HEIGHT,
+    HeightMap,
+    at_equal_distances,
+    check_layout,
+)
 from gfmd_cli.maps.text_tables import (
     OWN_HEADERS,
     columns,
@@ -57,6 +63,7 @@ def read_points(path: Path, file: BinaryIO) -> HeightMap | None:
     table = table[:, order]
     if not np.isfinite(table[:, :-1]).all():
         raise InputError(f"{path}: a position in the table is missing or infinite")
+    table[np.abs(table[:, -1]) >= MAX_HEIGHT, -1] = np.nan  # a mark, in the unit of the file
     heights, sides, note = _grid(path, table) if count == 3 else _profile(path, table)
     *of_sides, of_heights = factors or [None] * count
     return HeightMap(
@@ -171,7 +178,10 @@ def _grid(path: Path, table: Field) -> tuple[Field, tuple[float, ...], str]:
         if min(nx, ny) > 1 and is_distinct and len(table) >= MIN_PRESENT * nx * ny:
             candidates.append((nx * ny - len(table), (ny, nx), indices))
     if not candidates:
-        raise InputError(f"{path}: {NO_GRID}")
+        points, counts = np.unique(positions, axis=0, return_counts=True)
+        x, y = points[counts.argmax()].tolist()
+        times = f": the point x = {x:g}, y = {y:g} is given {counts.max()} times"
+        raise InputError(f"{path}: {NO_GRID}{times if counts.max() > 1 else ''}")
     missing, shape, indices = min(candidates, key=lambda candidate: candidate[0])
     steps, deviation = _steps(positions, indices)
     if deviation.max() > MAX_DEVIATION:
@@ -191,13 +201,21 @@ def _grid(path: Path, table: Field) -> tuple[Field, tuple[float, ...], str]:
 
 
 def _profile(path: Path, table: Field) -> tuple[Field, tuple[float, ...], str]:
-    """Heights and length of a profile; interpolated if the distances are not equal."""
+    """Heights and length of a profile, NaN at points of equal distance that are missing.
+
+    Interpolated if the distances are not equal.
+    """
     check_layout(path, table.shape[:1], table.dtype)
     x, heights = table.T if table[0, 0] <= table[-1, 0] else table[::-1].T
-    steps = np.diff(x)
-    mean = float(steps.mean())
-    if mean > 0 and np.abs(steps - mean).max() <= EVEN_TOLERANCE * mean:
-        return heights, (mean * x.size,), ""
+    gaps = np.diff(x)
+    if gaps.min() > 0:
+        index = np.append(0.0, np.cumsum(np.rint(gaps / np.median(gaps))))
+        points, is_distinct = int(index[-1]) + 1, bool(np.diff(index).all())
+        steps, deviation = _steps(x[:, None], index[:, None])
+        if is_distinct and deviation[0] <= MAX_DEVIATION and x.size >= MIN_PRESENT * points:
+            whole = np.full(points, np.nan)
+            whole[index.astype(np.int64)] = heights
+            return whole, (float(steps[0]) * points,), ""
     heights, sides = at_equal_distances(path, x, heights)
     return heights, sides, ", interpolated at equal distances"
 

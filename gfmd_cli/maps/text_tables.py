@@ -282,10 +282,11 @@ def _is_grid(file: BinaryIO) -> bool:
     size = file.seek(0, os.SEEK_END)
     for position, lines in _windows(file):
         rows = [re.split(rb"[\s,;]+", line.strip()) for line in lines.splitlines()[-GRID_LINES:]]
-        x, y = ({row[axis] for row in rows if len(row) == 3} for axis in (0, 1))
+        values = [{row[axis] for row in rows if len(row) == 3} for axis in range(3)]
+        x, y = sorted(map(len, values))[:2]  # whatever their order
         points = size / len(lines) * lines.count(b"\n" if b"\n" in lines else b"\r")
         if position + len(lines) == size and len(rows) < GRID_LINES:
             return True  # a small file, which is read soon
-        if len(x) * len(y) > 2 * points:
+        if x * y > 2 * points:
             return False
     return True

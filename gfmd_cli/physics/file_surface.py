@@ -308,11 +308,15 @@ class FileSurface(RigidSurface):
         return list(filter(None, warnings))
 
     def _warnings_on_sides(self) -> list[str]:
-        """Warnings about the side along x, one of them at most."""
+        """Warnings about the sides, one of them at most for each."""
         topography, stated = self._topography(), self.stated_sides()
+        if self.length_y is not None and stated is not None:
+            along_y = stated[0] if self.length is None else self.length * (stated[0] / stated[-1])
+            warning = map_warnings.other_side("length_y", self.length_y, along_y)
+            return [warning, *self.model_copy(update={"length_y": None})._warnings_on_sides()]
         if self.length is not None:
             if stated is not None and topography.metres:
-                return [map_warnings.other_side(self.length, stated[-1])]
+                return [map_warnings.other_side("length", self.length, stated[-1])]
             return [map_warnings.side_of_a_part(self.length, topography)]
         if stated is not None:
             return [map_warnings.unknown_unit(topography, self.scale, stated[-1])]

@@ -113,7 +113,8 @@ def side_by_side(studies: Sequence[ReportData], traces: list[Trace]) -> ReportDa
     return ReportData(comparison, rows, {}, traces)
 
 
-def item_title(item: StyledCurve) -> str:
-    """A curve by its name in figures and in full."""
-    short, full = without_escapes(item.style.label), curve_title(item.curve)
+def item_title(item: StyledCurve, *, of_seeds: bool = False) -> str:
+    """A curve by its name in figures and in full; `of_seeds`: the surface without its seed."""
+    short = without_escapes(item.style.label)
+    full = curve_title(item.curve, of_seeds=of_seeds)
     return full if short == item.curve.elastomer else f"{short}: {full}"

@@ -123,7 +123,9 @@ def _bins(density: Density) -> Group:
     sigma, row = density.sigma, density.row
     theory, unit = density.theory(sigma), np.full(sigma.size, row["delta_sigma"])
     records = records_of(sigma=sigma, density=density.density, theory=theory, delta_sigma=unit)
-    return Group(f"{item_title(density.item)}, p* = {row['p_star']:.4g}", records)
+    title, p_star = item_title(density.item, of_seeds=density.seeds > 1), f"{row['p_star']:.4g}"
+    mean = f": mean of {density.seeds} seeds" if density.seeds > 1 else ""
+    return Group(f"{title}, p* = {p_star}{mean}", records)
 
 
 def error_bars(data: ReportData) -> Section:

@@ -66,7 +66,11 @@ DETAILS = (
         "length of the contact line per area times L; in a line contact, number of contact edges",
     ),
     Column("energy", "elastic energy per area / (h_std Delta_sigma)"),
-    Column("work", "(<sigma h> - p <u>) / (h_std Delta_sigma): twice the energy"),
+    Column(
+        "work",
+        "(<sigma h> - p c) / (h_std Delta_sigma) with c = <u>, of a free boundary the rigid "
+        "displacement: twice the energy",
+    ),
     Column("steps", "solver steps on the finest grid", kind=int),
     Column("tolerance", "requested natural residual, solver.tolerance"),
     Column("load", "prescribed quantity, a key of [load]", "", str),

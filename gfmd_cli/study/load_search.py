@@ -40,6 +40,7 @@ STEP = log(8.0)  # of ln p at the most, until the root is enclosed
 NEARBY = 0.95  # of a load, at which the theory gives the slope
 FLATTEST = 1e-3  # slope of ln(value) over ln(p) that a step is made from
 ROUNDING = 1e-13  # width in ln p of the narrowest enclosure: 450 roundings of p
+RESOLVED = 1e-12  # p / k of the longest wave [h_std]; below, rounding decides on contact; a choice
 SMOOTH = 0.01  # of the solver's tolerance in ln p: gaps and displacements have no steps
 TRIALS = 60  # on one grid; 44 halve an interval of STEP down to ROUNDING
 
@@ -165,6 +166,13 @@ def _pressures(task: Task, scene: Scene, loads: Field) -> Field:
     return theory.pressure_at_gap(loads * scene.h_std)
 
 
+def _softest(task: Task, scene: Scene) -> float:
+    """k of the longest wave [Delta_sigma / h_std]."""
+    length = scene.grid.length
+    (k,) = task.elastomer.stiffness(np.array([2 * np.pi / length]), length).tolist()
+    return float(k) * scene.h_std / scene.delta_sigma
+
+
 class _Point(NamedTuple):
     """One trial as the search sees it."""
 
@@ -190,6 +198,8 @@ class _Search:
         apart = (1.0 if is_area else SMOOTH) * task.solver.tolerance
         self.resolution = max(apart, ROUNDING) if is_last else COARSE
         self.quantum = 1 / scene.grid.size if is_area else 0.0
+        self.lowest = max(PRESSURE_RANGE[0], RESOLVED * _softest(task, scene) if is_area else 0.0)
+        """Reduced pressure above which the load is sought."""
         self.points: list[_Point] = []
         """Nearest to the root first; on a plateau (full contact) the innermost."""
 
@@ -197,7 +207,11 @@ class _Search:
         """Take a trial into account."""
         excess = log(trial.value / self.task.load) if trial.value > 0 else -inf
         self.points.append(_Point(log(trial.pressure), self.sign * excess, trial))
-        self.points.sort(key=lambda point: (abs(point.y), point.x if point.y > 0 else -point.x))
+        self.points.sort(key=lambda at: (self._deviation(at), at.x if at.y > 0 else -at.x))
+
+    def _deviation(self, point: _Point) -> float:
+        """Relative difference of the value and the load."""
+        return abs(expm1(self.sign * point.y))
 
     @property
     def nearest(self) -> Trial:
@@ -215,7 +229,7 @@ class _Search:
     @property
     def succeeded(self) -> bool:
         """Whether the nearest trial is within the tolerance, or the contact area jumps there."""
-        within = abs(expm1(self.sign * self.points[0].y)) <= self.tolerance
+        within = self._deviation(self.points[0]) <= self.tolerance
         return within or (self.quantum > 0 and self._exhausted)
 
     @property
@@ -247,4 +261,4 @@ class _Search:
             if not low.x + margin < x < high.x - margin or len(self.points) % 5 == 4:
                 x = 0.5 * (low.x + high.x)
         p = exp(x)
-        return p if PRESSURE_RANGE[0] < p / self.scene.delta_sigma < PRESSURE_RANGE[1] else None
+        return p if self.lowest < p / self.scene.delta_sigma < PRESSURE_RANGE[1] else None
