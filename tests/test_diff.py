@@ -240,6 +240,13 @@ def test_values_that_are_missing_or_zero_do_not_agree_by_chance():
     assert isinstance(apart(1.0, 2.0), Deviation)
 
 
+def test_loads_of_another_key_are_named(output_of, study_of):
+    in_pascal = study_of("elastomer={kind='half-space', E_star=1e9}", "load={pressure=1e8}")
+    reduced = study_of("elastomer={kind='half-space', E_star=1e9}", "load={p_star=0.1}")
+    output = output_of("diff", in_pascal, reduced)
+    assert "loads of A are given by pressure, those of B by p_star" in output
+
+
 def test_a_study_that_is_not_there_is_bad_input(output_of, study_of, tmp_path):
     assert "no such study" in output_of("diff", study_of(), tmp_path / "none.h5", status=2)
     for wrong in ("-1", "nan"):

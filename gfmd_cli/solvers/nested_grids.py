@@ -24,7 +24,10 @@ HEIGHT_ROUNDING = 1000  # units of rounding by which indenters on other numbers 
 
 @dataclass
 class Solution:
-    """A solved contact with its residual."""
+    """A solved contact with its residual, both up to rounding that is far below the tolerance.
+
+    `Contact.recompute` gives the exact stress and residual of u.
+    """
 
     u: Field
     sigma: Field
