@@ -215,6 +215,7 @@ def solve(
     solver = Auto(tolerance=tolerance, max_steps=max_steps)
     try:
         solution = solve_contact(contact, solver, watch)
+        solution.residual = contact.recompute(solution.u, solution.sigma)  # as a run does
         status = solution.status
     except OutOfTimeError:
         contact, state = latest
