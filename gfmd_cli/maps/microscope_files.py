@@ -276,8 +276,7 @@ def _check_all_rows_read(path: Path, file: BinaryIO, rows: int, columns: int) ->
     The reader skips lines with words, also in the table, where they would shift all rows below.
     """
     file.seek(0)
-    lines = file.readlines()
-    lengths = [len(line.split()) for line in lines]
+    lengths = [len(line.split()) for line in file]
     first = next((i for i, length in enumerate(lengths) if length == columns), 0)
     last = len(lengths) - next((i for i, length in enumerate(lengths[::-1]) if length), 0)
     empty = lengths[first:last].count(0)
@@ -286,16 +285,10 @@ def _check_all_rows_read(path: Path, file: BinaryIO, rows: int, columns: int) ->
         raise InputError(
             f"{path}:{number}: an empty line in the table: several maps? Save each in its own file"
         )
-    if first + 1 < last and lengths[last - 1] < columns:
-        row = lines[last - 1].split()
-        if all(map(is_height, row)):
-            raise InputError(
-                f"{path}:{last}: the last row has {len(row)} of {columns} heights: is the file "
-                "complete? Remove the row if it is"
-            )
     is_one_map = lengths.count(columns) <= rows
+    file.seek(0)
     rows_above = 0
-    for number, line in enumerate(lines, 1):
+    for number, line in enumerate(file, 1):
         words = line.split()
         marks = [word for word in words if not is_height(word)]
         if not marks:
