@@ -28,8 +28,7 @@ def of_gfmd(points: int, precision: str, threads: int) -> Callable[[], object]:
     grid = Grid(points, precision=precision, threads=threads)
     field = np.random.default_rng(0).normal(size=grid.shape).astype(grid.real)
     grid.forward_into_work(field)
-    _, forward, backward = grid._workspace
-    return lambda: (forward(), backward())
+    return lambda: (grid.transform(), grid.transform_back())
 
 
 def of_fftw(points: int, precision: str, threads: int) -> Callable[[], object]:

@@ -6,9 +6,8 @@ are never stored padded, so that the memory is that of a field padded along x al
 share a field exchange no zero rows either.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 from math import prod
 
 import numpy as np
@@ -18,17 +17,8 @@ from gfmd_cli.grid import plans
 from gfmd_cli.grid.arrays import Field, Modes, Precision
 from gfmd_cli.grid.ranks import Ranks
 from gfmd_cli.grid.rows import LocalRows
-from gfmd_cli.grid.shared_transforms import (
-    Execute,
-    along_columns,
-    along_rows,
-    in_turn,
-    side_by_side,
-)
+from gfmd_cli.grid.shared_transforms import Columns, ColumnTransforms, RowTransforms
 from gfmd_cli.grid.transposition import Span, Transposition, column_spans
-
-BLOCK_COEFFICIENTS = 2**14  # coefficients of a block of columns: 256 KiB, in the cache of a core
-MIN_BLOCK_COLUMNS = 8  # columns of a block; four make a line of the cache
 
 
 def padded_shape(shape: tuple[int, ...], factor: float) -> tuple[int, ...]:
@@ -55,7 +45,6 @@ class PaddedTransform:
         self.padded_rows, self.padded_columns = (1, *self.padded)[-2:]
         self.real = np.dtype(np.float64 if self.precision == "double" else np.float32)
         self.modes = self.padded_columns // 2 + 1
-        self.width = min(self.modes, max(MIN_BLOCK_COLUMNS, BLOCK_COEFFICIENTS // self.padded_rows))
         local_rows = LocalRows(self.own_rows, self.threads)
         self.pool, self.parts = local_rows.pool, local_rows.parts
 
@@ -90,95 +79,68 @@ class PaddedTransform:
         if self.padded_rows < 2 * self.rows - 1 or self.padded_columns < 2 * self.columns - 1:
             raise ValueError("a convolution needs twice the points")
         kernel = kernel.reshape(self.own_rows, self.columns)
-        lines, values, forward, _ = self._row_plans
+        values, along_rows, along_columns = self._workspace
         values[:, : self.columns] = kernel
         values[:, self.columns :] = 0.0
         values[:, self.padded_columns - self.columns + 1 :] = kernel[:, :0:-1]
-        forward()
-        work = self._to_columns(lines)
-        symbol = np.empty(self.symbol_shape, self.real)
-        block, forward, _ = self._column_plans[0]
-        for part, coefficients in self._blocks(work, block):
-            coefficients[self.padded_rows - self.rows + 1 :] = work[:0:-1, part]
-            forward()
-            symbol[:, part] = coefficients[: len(symbol)].real
+        along_rows.forward()
+        self._to_columns()
+        symbol, work = np.empty(self.symbol_shape, self.real), along_columns.work
+
+        def mirror(columns: Columns) -> None:
+            columns.coefficients[self.padded_rows - self.rows + 1 :] = work[:0:-1, columns.part]
+            columns.forward()
+            symbol[:, columns.part] = columns.coefficients[: len(symbol)].real
+
+        along_columns.run(mirror)
         return symbol
 
     def apply(self, symbol: Field, field: Field, out: Field) -> Field:
         """out <- F^-1 symbol F field; return it. `out` may be `field`."""
-        lines, values, forward, backward = self._row_plans
+        values, along_rows, along_columns = self._workspace
         values[:, : self.columns] = field.reshape(self.own_rows, self.columns)
         values[:, self.columns :] = 0.0
-        forward()
-        if self.padded_rows == 1:
-            lines *= symbol
-        else:
-            work = self._to_columns(lines)
-            self._filter_columns(work, symbol)
-            self._to_lines(work, lines)
-        backward()
+        mirrored = symbol[(self.padded_rows - 1) // 2 : 0 : -1]
+
+        def multiply(columns: Columns) -> float:
+            columns.coefficients[: len(symbol)] *= symbol[:, columns.part]
+            columns.coefficients[len(symbol) :] *= mirrored[:, columns.part]
+            return 0.0
+
+        along_rows.forward()
+        self._to_columns()
+        along_columns.filter(multiply)
+        self._to_lines()
+        along_rows.backward()
         scale = 1.0 / (self.padded_rows * self.padded_columns)
         target = out.reshape(self.own_rows, self.columns)
         np.multiply(values[:, : self.columns], scale, out=target)
         return out
 
-    def _filter_columns(self, work: Modes, symbol: Field) -> None:
-        """Transform the padded columns, multiply them by the symbol and transform back."""
-        upper, lower = slice(len(symbol)), slice(len(symbol), None)
-        mirrored = symbol[(self.padded_rows - 1) // 2 : 0 : -1]
+    def _to_columns(self) -> None:
+        """Exchange coefficients transformed along x for all rows of the columns of `span`."""
 
-        def filter_blocks(thread: int, block: Modes, forward: Execute, backward: Execute) -> None:
-            for part, coefficients in self._blocks(work, block, thread, self.threads):
-                forward()
-                coefficients[upper] *= symbol[:, part]
-                coefficients[lower] *= mirrored[:, part]
-                backward()
-                work[:, part] = coefficients[: self.rows]
-
-        calls = [partial(filter_blocks, i, *own) for i, own in enumerate(self._column_plans)]
-        side_by_side(self.pool, calls)
-
-    def _blocks(
-        self, work: Modes, block: Modes, first: int = 0, step: int = 1
-    ) -> Iterator[tuple[slice, Modes]]:
-        """Columns of `work`, and a padded copy of them in `block`, for every `step`-th block."""
-        count = work.shape[1]
-        for start in range(first * self.width, count, step * self.width):
-            part = slice(start, min(start + self.width, count))
-            coefficients = block[:, : part.stop - part.start]
-            coefficients[: self.rows] = work[:, part]
-            coefficients[self.rows :] = 0.0
-            yield part, coefficients
-
-    def _to_columns(self, lines: Modes) -> Modes:
-        """All rows of the columns of `span`, from the coefficients of the rows."""
-        return lines
-
-    def _to_lines(self, work: Modes, lines: Modes) -> None:
+    def _to_lines(self) -> None:
         """Undo `_to_columns`."""
 
     @cached_property
-    def _row_plans(self) -> tuple[Modes, Field, Execute, Execute]:
-        """Coefficients of the rows, their values in the same memory, and both transforms."""
-        lines = self._empty_lines()
+    def _workspace(self) -> tuple[Field, RowTransforms, ColumnTransforms]:
+        """The values of the padded rows, and the transforms in their memory."""
+        lines, work, _ = self._memory
         values = lines.view(self.real)[:, : self.padded_columns]
-        forward, backward = plans.planned(partial(along_rows, values, lines, self.parts))
-        return lines, values, in_turn(self.pool, forward), in_turn(self.pool, backward)
 
-    def _empty_lines(self) -> Modes:
-        """Memory of the coefficients of the rows."""
-        return self._empty((self.own_rows, self.modes))
+        def make(fftw: plans.Plan) -> tuple[RowTransforms, ColumnTransforms]:
+            along_rows = RowTransforms(values, lines, self.parts, self.pool, fftw)
+            arguments = (work, len(self.parts), self.pool, fftw)
+            return along_rows, ColumnTransforms(*arguments, padded_rows=self.padded_rows)
+
+        return values, *plans.planned(make)
 
     @cached_property
-    def _column_plans(self) -> list[tuple[Modes, Execute, Execute]]:
-        """For each thread a block of padded columns, and both transforms, in place."""
-        blocks = []
-        for _ in range(self.threads):
-            block = self._empty((self.padded_rows, self.width))
-            block[...] = 0.0
-            (forward,), (backward,) = plans.planned(partial(along_columns, block, 1))
-            blocks.append((block, forward, backward))
-        return blocks
+    def _memory(self) -> tuple[Modes, Modes, Modes]:
+        """Coefficients as rows and, in the same memory, as columns; memory for an exchange."""
+        lines = self._empty((self.own_rows, self.modes))
+        return lines, lines, lines
 
     def _empty(self, shape: tuple[int, ...]) -> Modes:
         kind = np.result_type(self.real, np.complex64)
@@ -212,16 +174,12 @@ class DistributedPaddedTransform(PaddedTransform):
         """First wavenumber along x that this process holds, and the one after its last."""
         return self.transposition.spans[self.ranks.rank]
 
-    def _to_columns(self, lines: Modes) -> Modes:
-        _, columns, spare = self._memory
-        self.transposition.to_columns(lines, columns, spare)
-        return columns
+    def _to_columns(self) -> None:
+        self.transposition.to_columns(*self._memory)
 
-    def _to_lines(self, work: Modes, lines: Modes) -> None:
-        self.transposition.to_lines(work, lines, self._memory[2])
-
-    def _empty_lines(self) -> Modes:
-        return self._memory[0]
+    def _to_lines(self) -> None:
+        lines, columns, spare = self._memory
+        self.transposition.to_lines(columns, lines, spare)
 
     @cached_property
     def _memory(self) -> tuple[Modes, Modes, Modes]:

@@ -13,14 +13,11 @@ from typing import Any
 import numpy as np
 import pyfftw
 
-from gfmd_cli.grid import plans
 from gfmd_cli.grid.arrays import Field, Modes, Precision
 from gfmd_cli.grid.convolution import DistributedPaddedTransform, PaddedTransform, padded_shape
 from gfmd_cli.grid.fft_grid import Grid, Shape
-from gfmd_cli.grid.halo import HALO_ROWS, DistributedColumns, DistributedRows, is_distributable
+from gfmd_cli.grid.halo import HALO_ROWS, DistributedRows, is_distributable
 from gfmd_cli.grid.ranks import Ranks, is_root
-from gfmd_cli.grid.rows import LocalRows
-from gfmd_cli.grid.shared_transforms import Execute, Pairs, along_columns, along_rows, side_by_side
 from gfmd_cli.grid.transposition import Span, Transposition, column_spans
 
 
@@ -55,11 +52,6 @@ class DistributedGrid(Grid):
     def rows(self) -> DistributedRows:
         """The rows of this process."""
         return DistributedRows(self.ranks, self.points_y, self._threads, lambda: self._memory[1])
-
-    @cached_property
-    def spectral_rows(self) -> LocalRows:
-        """All rows of the columns of coefficients that this process holds."""
-        return DistributedColumns(self.ranks, self.points_y, self._threads)
 
     @cached_property
     def spans(self) -> list[Span]:
@@ -110,42 +102,18 @@ class DistributedGrid(Grid):
         room = max(size, (rows + 2 * HALO_ROWS) * columns)
         return pyfftw.empty_aligned(size, self._complex), pyfftw.empty_aligned(2 * room, self.real)
 
-    @cached_property
-    def _workspace(self) -> tuple[Modes, Execute, Execute]:
-        shape = self.spectral_shape
-        work = self._memory[0][: shape[0] * shape[1]].reshape(shape)
-        spare = self._memory[1].view(work.dtype)
-        lines = self._lines()
-        real = lines.view(self.real)[:, : self.points]
-        parts, pool = self.rows.parts, self.rows.pool
+    def _to_columns(self) -> None:
+        self._transposition.to_columns(*self._arrays)
 
-        def make(fftw: plans.Plan) -> tuple[Pairs, Pairs]:
-            return along_rows(real, lines, parts, fftw), along_columns(work, len(parts), fftw)
-
-        (along, back_along), (across, back_across) = plans.planned(make, real.size)
-
-        def forward() -> None:
-            side_by_side(pool, along)
-            self._transposition.to_columns(lines, work, spare)
-            side_by_side(pool, across)
-
-        def backward() -> None:
-            side_by_side(pool, back_across)
-            self._transposition.to_lines(work, lines, spare)
-            side_by_side(pool, back_along)
-
-        return work, forward, backward
+    def _to_lines(self) -> None:
+        work, lines, spare = self._arrays[1], self._arrays[0], self._arrays[2]
+        self._transposition.to_lines(work, lines, spare)
 
     @property
-    def padded(self) -> Field:
-        """Real values in the same memory; a row has one or two more than the grid has points."""
-        self.work  # noqa: B018 - planning overwrites the memory and has to be first
-        return self._lines().view(self.real)
-
-    def _lines(self) -> Modes:
-        """Memory of coefficients as rows, transformed along x."""
-        rows, columns = self.rows.count, self.points // 2 + 1
-        return self._memory[0][: rows * columns].reshape(rows, columns)
+    def _arrays(self) -> tuple[Modes, Modes, Modes]:
+        """Coefficients of the rows and of the columns of this process, memory for the exchange."""
+        work, lines, *_ = self._workspace
+        return lines, work, self._memory[1].view(work.dtype)
 
     @cached_property
     def _transposition(self) -> Transposition:

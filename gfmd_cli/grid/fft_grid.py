@@ -4,8 +4,9 @@ h(x) = sum_q h(q) exp(i q x): the forward transform carries 1/size, so that h(q 
 Coefficients are kept for non-negative wavenumbers of the last axis only (real transforms).
 """
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property
 from math import prod
 from typing import Any, TypeVar
 
@@ -18,12 +19,14 @@ from gfmd_cli.grid.convolution import PaddedTransform, padded_shape
 from gfmd_cli.grid.modes import SharedModes, multiplicity, shared_modes
 from gfmd_cli.grid.pixels import average_along_x, average_rows, covered_rows
 from gfmd_cli.grid.rows import LocalRows
-from gfmd_cli.grid.shared_transforms import Execute, in_place
+from gfmd_cli.grid.shared_transforms import Columns, ColumnTransforms, RowTransforms
 from gfmd_cli.grid.transposition import Span
 
 T = TypeVar("T")
 ALL_ROWS = slice(None)
 MIN_THREADED_SIDE = 512  # points per side from which a second thread pays
+Filter = Callable[..., float]
+"""A kernel that multiplies coefficients, see `Grid.filter_by`."""
 Shape = tuple[int, ...]
 """Numbers of points along the axes of a field, (y, x), or (x,) of a line."""
 
@@ -195,15 +198,23 @@ class Grid:
         return grid
 
     @cached_property
-    def _workspace(self) -> tuple[Modes, Execute, Execute]:
-        """Memory that every transform of this grid works in, and the two plans, in place.
+    def _workspace(self) -> tuple[Modes, Modes, RowTransforms, ColumnTransforms]:
+        """Memory of all transforms, as coefficients and as rows of coefficients, and the plans.
 
         Transforms in place need a field less and a third less time than those between two arrays.
-        The plans are made with the array, because measuring a plan overwrites it.
+        The plans are made with the arrays, because measuring a plan overwrites them.
         """
-        work = self._memory[0][: prod(self.spectral_shape)].reshape(self.spectral_shape)
-        real = work.view(self.real)[..., : self.points]
-        return work, *plans.planned(partial(in_place, real, work, self.rows), self.size)
+        memory, columns = self._memory[0], self.points // 2 + 1
+        work = memory[: prod(self.spectral_shape)].reshape(self.spectral_shape)
+        lines = memory[: self.rows.count * columns].reshape(-1, columns)
+        values = lines.view(self.real)[:, : self.points]
+        parts, pool = self.rows.parts, self.rows.pool
+
+        def make(fftw: plans.Plan) -> tuple[RowTransforms, ColumnTransforms]:
+            along_columns = ColumnTransforms(self.as_rows(work), len(parts), pool, fftw)
+            return RowTransforms(values, lines, parts, pool, fftw), along_columns
+
+        return work, lines, *plans.planned(make, values.size)
 
     @property
     def work(self) -> Modes:
@@ -211,22 +222,57 @@ class Grid:
         return self._workspace[0]
 
     @property
-    def spectrum(self) -> Field:
-        """`work` as pairs of real values."""
-        return self.work.view(self.real)
-
-    @property
     def padded(self) -> Field:
         """The same memory as real values; a row has one or two more than the grid has points."""
-        return self.spectrum
+        values = self._workspace[1].view(self.real)
+        return values if self.dimension == 2 else values[0]
 
     def transform(self) -> None:
         """`work` <- coefficients of the values in `padded`, without the factor 1/size."""
-        self._workspace[1]()
+        _, _, along_rows, along_columns = self._workspace
+        along_rows.forward()
+        self._to_columns()
+        along_columns.forward()
 
     def transform_back(self) -> None:
         """`padded` <- values of the coefficients in `work`, without the factor 1/size."""
-        self._workspace[2]()
+        _, _, along_rows, along_columns = self._workspace
+        along_columns.backward()
+        self._to_lines()
+        along_rows.backward()
+
+    def _to_columns(self) -> None:
+        """Exchange coefficients transformed along x for all rows of the columns of `span`."""
+
+    def _to_lines(self) -> None:
+        """Undo `_to_columns`."""
+
+    def filter_by(
+        self, kernel: Filter, symbol: Field, *numbers: float, blocks: Sequence[int] | None = None
+    ) -> float:
+        """`padded` <- values whose coefficients a kernel has multiplied: a pair of transforms.
+
+        Returns the sum over the grid of what the kernel returns.
+
+        Parameters
+        ----------
+        kernel : see `grid.kernels`; its last arguments are the factor 1/size and the `numbers`
+        blocks : numbers of the blocks of 8 rows outside of which all values are zero; the rows
+            there are not transformed
+        """
+        symbol, (_, _, along_rows, along_columns) = self.as_rows(symbol), self._workspace
+
+        def multiply(columns: Columns) -> float:
+            modes, span = columns.array.view(self.real), (columns.part.start, columns.part.stop)
+            factor = 1 / self.size
+            return float(kernel(modes, columns.first, symbol, *span, factor, *numbers))
+
+        along_rows.forward(blocks)
+        self._to_columns()
+        total = along_columns.filter(multiply)
+        self._to_lines()
+        along_rows.backward()
+        return self.total(total)
 
     def forward_into_work(self, field: Field) -> Modes:
         """`work` <- Fourier coefficients of a field, without 1/size."""
@@ -239,23 +285,18 @@ class Grid:
         self.transform_back()
         field[...] = self.padded[..., : self.points]
 
-    def filter_padded(self, symbol: Field) -> float:
+    def filter_padded(self, symbol: Field, blocks: Sequence[int] | None = None) -> float:
         """`padded` <- F^-1 symbol F of the values in it: one pair of transforms, no copy.
 
-        Returns the sum over the grid of the old values times the new ones.
+        Returns the sum over the grid of the old values times the new ones. `blocks` as in
+        `filter_by`.
         """
-        self.transform()
-        arguments = (self.as_rows(self.spectrum), self.as_rows(symbol), 1.0 / self.size, *self.ends)
-        (total,) = self.spectral_rows.sums(1, kernels.apply_symbol, *arguments)
-        self.transform_back()
-        return float(total) / self.size
+        ends = map(float, self.ends)
+        return self.filter_by(kernels.apply_symbol, symbol, *ends, blocks=blocks) / self.size
 
-    def unfilter_padded(self, symbol: Field) -> None:
+    def unfilter_padded(self, symbol: Field, blocks: Sequence[int] | None = None) -> None:
         """`padded` <- F^-1 (1 / symbol) F of the values in it, without the modes of symbol zero."""
-        self.transform()
-        arguments = (self.as_rows(self.spectrum), self.as_rows(symbol), 1.0 / self.size)
-        self.spectral_rows.run(kernels.divide_by_symbol, *arguments)
-        self.transform_back()
+        self.filter_by(kernels.divide_by_symbol, symbol, blocks=blocks)
 
     def apply(self, symbol: Field, field: Field, out: Field, mean: float = 0.0) -> Field:
         """out <- F^-1 symbol F field + `mean`, which is returned: one pair of transforms."""
@@ -268,11 +309,6 @@ class Grid:
     def rows(self) -> LocalRows:
         """The rows of a field that this process holds; runs kernels over them."""
         return LocalRows(self.points_y, self._threads)
-
-    @property
-    def spectral_rows(self) -> LocalRows:
-        """The rows of coefficients that this process holds."""
-        return self.rows
 
     @property
     def span(self) -> Span:
@@ -293,7 +329,7 @@ class Grid:
         """Number of threads; 1 on small grids, for which a second thread is slower."""
         return self.threads if self.size >= MIN_THREADED_SIDE**2 and self.dimension == 2 else 1
 
-    def as_rows(self, field: Field) -> Field:
+    def as_rows(self, field: Any) -> Any:
         """A field, a symbol or `padded` with two axes, in one dimension too."""
         return field if self.dimension == 2 else field.reshape(1, -1)
 

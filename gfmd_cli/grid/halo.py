@@ -136,15 +136,3 @@ class ReplicatedRows(LocalRows):
         """The rows at the block of this process on the finer level, with a halo."""
         rows = np.arange(self.start - EXCHANGED_ROWS, self.stop + EXCHANGED_ROWS)
         return array[rows % self.count]
-
-
-class DistributedColumns(LocalRows):
-    """All rows of coefficients, of which each process holds some columns."""
-
-    def __init__(self, ranks: Ranks, count: int, threads: int) -> None:
-        super().__init__(count, threads)
-        self.ranks = ranks
-
-    def sums(self, count: int, kernel: Kernel, *arguments: Any) -> Field:
-        """Totals over all processes; see `LocalRows.sums`."""
-        return self.ranks.total(super().sums(count, kernel, *arguments))

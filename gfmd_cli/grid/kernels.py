@@ -1,32 +1,43 @@
-"""Compiled kernels between two transforms; see `rows` for how they run."""
+"""Compiled kernels that multiply coefficients between two transforms; see `Grid.filter_by`.
+
+The columns `start` to `stop` of the coefficients are multiplied, which lie in `modes`, as pairs of
+real values, from column `first` on. k is the symbol.
+"""
 
 from gfmd_cli.grid.compilation import kernel
 
 
 @kernel
-def apply_symbol(modes, k, factor, first, final, out, a, b):
-    """Multiply coefficients by factor k(q); sums over q of k(q) |coefficient|^2.
+def apply_symbol(modes, first, k, start, stop, factor, has_zero, has_nyquist):
+    """Multiply coefficients by factor k(q); sum over q of k(q) |coefficient|^2.
 
-    `first` and `final` tell whether a row begins at q_x = 0 and ends at the highest q_x.
+    `has_zero` and `has_nyquist` are 1 if q_x = 0 and the Nyquist wavenumber are the first and the
+    last column of k, and 0 otherwise.
     """
-    last = k.shape[1] - 1
-    for i in range(a, b):
-        total = 0.0
-        ends = first * k[i, 0] * (modes[i, 0] ** 2 + modes[i, 1] ** 2)
-        ends += final * k[i, last] * (modes[i, 2 * last] ** 2 + modes[i, 2 * last + 1] ** 2)
-        for j in range(k.shape[1]):
-            weight, re, im = k[i, j], modes[i, 2 * j], modes[i, 2 * j + 1]
-            total += weight * (re * re + im * im)
-            modes[i, 2 * j] = factor * weight * re
-            modes[i, 2 * j + 1] = factor * weight * im
-        out[i, 0] = 2 * total - ends  # a coefficient stands for q and -q, but at both ends
+    total, last = 0.0, stop - start - 1
+    has_zero *= start == 0
+    has_nyquist *= stop == k.shape[1]
+    for i in range(k.shape[0]):
+        row, weights = modes[i, 2 * first :], k[i, start:stop]
+        ends = has_zero * weights[0] * (row[0] ** 2 + row[1] ** 2)
+        ends += has_nyquist * weights[last] * (row[2 * last] ** 2 + row[2 * last + 1] ** 2)
+        row_total = 0.0
+        for j in range(weights.size):
+            weight, re, im = weights[j], row[2 * j], row[2 * j + 1]
+            row_total += weight * (re * re + im * im)
+            row[2 * j] = factor * weight * re
+            row[2 * j + 1] = factor * weight * im
+        total += 2 * row_total - ends  # a coefficient stands for q and -q, but at both ends
+    return total
 
 
 @kernel
-def divide_by_symbol(modes, k, factor, a, b):
+def divide_by_symbol(modes, first, k, start, stop, factor):
     """Multiply coefficients by factor / k(q), and by zero where k is zero."""
-    for i in range(a, b):
-        for j in range(k.shape[1]):
-            weight = factor / k[i, j] if k[i, j] > 0 else 0.0
-            modes[i, 2 * j] *= weight
-            modes[i, 2 * j + 1] *= weight
+    for i in range(k.shape[0]):
+        row, stiffness = modes[i, 2 * first :], k[i, start:stop]
+        for j in range(stiffness.size):
+            weight = factor / stiffness[j] if stiffness[j] > 0 else 0.0
+            row[2 * j] *= weight
+            row[2 * j + 1] *= weight
+    return 0.0

@@ -1,66 +1,196 @@
-"""Transforms in place that threads share: each takes a part of the rows, then of the columns.
+"""Transforms in place along the rows and the columns of an array, whose parts threads share.
 
-The threads meet twice in a transform. Those of FFTW itself meet up to thousands of times, and wait
-each time until the system runs the last one: with another process on one of two cores, a pair of
-transforms of 3200^2 took 5 to 50 times as long as on one thread.
+The threads meet after the rows and after the columns. Those of FFTW itself meet up to thousands of
+times, and wait each time until the system runs the last one: with another process on one of two
+cores, a pair of transforms of 3200^2 took 5 to 50 times as long as on one thread.
+
+The columns are copied in blocks, which stay in the cache of a core while they are transformed,
+multiplied and transformed back.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from itertools import pairwise
+from dataclasses import dataclass
+from functools import partial
+from itertools import cycle, pairwise
+from math import ceil
 from operator import call
+from typing import Any
 
 import numpy as np
+import pyfftw
 
 from gfmd_cli.grid.arrays import Field, Modes
 from gfmd_cli.grid.plans import Plan
-from gfmd_cli.grid.rows import LocalRows
 from gfmd_cli.grid.transposition import Span
 
+BLOCK_COEFFICIENTS = 2**17  # in a block of columns; 2^16 to 2^18 take as long
+MIN_BLOCK_COLUMNS = 32  # shorter pieces of rows take longer to copy
+MIN_COPIED_BYTES = 24 * 2**20  # of coefficients of which blocks are copied; fewer are in the cache
+BLOCK_ROWS = 8  # rows that are transformed at once where others are zero; they begin aligned
 CACHE_LINE = 8  # complex numbers in single precision in a line of the cache
 
 Execute = Callable[[], None]
-Pair = tuple[Execute, Execute]
-"""A transform and its inverse."""
-Pairs = tuple[list[Execute], list[Execute]]
-"""The same for some parts of an array."""
 
 
-def in_place(real: Field, work: Modes, rows: LocalRows, fftw: Plan) -> Pair:
-    """The transform of real values to coefficients in the same memory, and back, without 1/size."""
-    if rows.pool is None:
-        axes = tuple(range(work.ndim))
-        forward = fftw(real, work, axes, "FFTW_FORWARD")
-        return forward.execute, fftw(work, real, axes, "FFTW_BACKWARD").execute
-    along, back_along = along_rows(real, work, rows.parts, fftw)
-    across, back_across = along_columns(work, len(rows.parts), fftw)
-    return in_turn(rows.pool, along, across), in_turn(rows.pool, back_across, back_along)
+class RowTransforms:
+    """Transforms of real rows to coefficients in the same memory, and back, without a factor.
+
+    Parameters
+    ----------
+    values, lines : the rows as real values and as coefficients
+    parts : the rows that each thread transforms
+    """
+
+    def __init__(
+        self,
+        values: Field,
+        lines: Modes,
+        parts: Sequence[Span],
+        pool: ThreadPoolExecutor | None,
+        fftw: Plan,
+    ) -> None:
+        self.values, self.lines, self.pool = values, lines, pool
+        arrays = [(values[a:b], lines[a:b]) for a, b in parts]
+        self._forward = [fftw(v, c, (1,), "FFTW_FORWARD").execute for v, c in arrays]
+        self._backward = [fftw(c, v, (1,), "FFTW_BACKWARD").execute for v, c in arrays]
+        block = pyfftw.empty_aligned((BLOCK_ROWS, lines.shape[1]), dtype=lines.dtype)
+        real = block.view(values.dtype)[:, : values.shape[1]]
+        has_blocks = len(lines) % BLOCK_ROWS == 0
+        self._of_block = [fftw(real, block, (1,), "FFTW_FORWARD") for _ in parts if has_blocks]
+
+    def forward(self, blocks: Sequence[int] | None = None) -> None:
+        """Transform all rows, or some blocks of `BLOCK_ROWS` rows while the others are zero."""
+        calls, count = self._forward, len(self._of_block)
+        if blocks is not None and count:
+            self.lines.view(self.values.dtype)[:, self.values.shape[1] :] = 0.0
+            shares = [blocks[i::count] for i in range(count)]
+            pairs = zip(self._of_block, shares, strict=True)
+            calls = [partial(self._transform, plan, share) for plan, share in pairs]
+        side_by_side(self.pool, calls)
+
+    def backward(self) -> None:
+        """Transform all rows back."""
+        side_by_side(self.pool, self._backward)
+
+    def _transform(self, plan: Any, blocks: Iterable[int]) -> None:
+        for block in blocks:
+            rows = slice(BLOCK_ROWS * block, BLOCK_ROWS * (block + 1))
+            plan.update_arrays(self.values[rows], self.lines[rows])
+            plan.execute()
 
 
-def along_rows(real: Field, work: Modes, parts: Sequence[Span], fftw: Plan) -> Pairs:
-    """The transforms of some parts of the rows of real values to coefficients, and back."""
-    arrays = [(real[a:b], work[a:b]) for a, b in parts]
-    forward = [fftw(values, modes, (1,), "FFTW_FORWARD").execute for values, modes in arrays]
-    return forward, [fftw(modes, values, (1,), "FFTW_BACKWARD").execute for values, modes in arrays]
+@dataclass
+class Columns:
+    """Some columns of coefficients, in place or copied."""
+
+    part: slice
+    """Which columns of all."""
+    array: Modes
+    """Holds their coefficients, all rows of them."""
+    first: int
+    """The column of `array` with the first of them."""
+    forward: Execute
+    """Transforms them."""
+    backward: Execute
+    """Transforms them back."""
+
+    @property
+    def coefficients(self) -> Modes:
+        """The coefficients of these columns."""
+        return self.array[:, self.first : self.first + self.part.stop - self.part.start]
 
 
-def along_columns(work: Modes, count: int, fftw: Plan) -> Pairs:
-    """The transforms of `count` parts of the columns in place, and back."""
-    lines = np.linspace(0, -(-work.shape[1] // CACHE_LINE), count + 1).astype(int)
-    edges = np.minimum(lines * CACHE_LINE, work.shape[1])
-    parts = [work[:, a:b] for a, b in pairwise(edges) if a < b]
-    forward = [fftw(part, part, (0,), "FFTW_FORWARD").execute for part in parts]
-    return forward, [fftw(part, part, (0,), "FFTW_BACKWARD").execute for part in parts]
+class ColumnTransforms:
+    """Transforms of the columns of coefficients, and back, without a factor.
+
+    Parameters
+    ----------
+    work : the coefficients
+    count : number of threads
+    padded_rows : number of rows to which the columns are padded by zeros; 0 for no padding
+    """
+
+    def __init__(
+        self,
+        work: Modes,
+        count: int,
+        pool: ThreadPoolExecutor | None,
+        fftw: Plan,
+        *,
+        padded_rows: int = 0,
+    ) -> None:
+        self.work, self.pool, columns = work, pool, work.shape[1]
+        rows = padded_rows or len(work)
+        self.is_copied = rows > len(work) or work.nbytes >= MIN_COPIED_BYTES
+
+        def plan(array: Modes) -> tuple[Execute, Execute]:
+            if rows == 1:
+                return _nothing, _nothing
+            directions = ("FFTW_FORWARD", "FFTW_BACKWARD")
+            forward, backward = (fftw(array, array, (0,), way).execute for way in directions)
+            return forward, backward
+
+        if self.is_copied:
+            width = min(max(BLOCK_COEFFICIENTS // rows, MIN_BLOCK_COLUMNS), columns)
+            width = ceil(columns / round(columns / width))
+            parts = [slice(a, min(a + width, columns)) for a in range(0, columns, width)]
+            blocks = [pyfftw.empty_aligned((rows, width), work.dtype) for _ in range(count)]
+            plans = [plan(block) for block in blocks]
+            for block in blocks:
+                block[...] = 0.0
+            of_thread = list(zip(blocks, plans, strict=True))
+            pairs = zip(parts, cycle(of_thread))
+            self.blocks = [Columns(part, block, 0, *both) for part, (block, both) in pairs]
+        else:
+            lines = np.linspace(0, -(-columns // CACHE_LINE), count + 1).astype(int)
+            edges = np.minimum(lines * CACHE_LINE, columns)
+            parts = [slice(int(a), int(b)) for a, b in pairwise(edges) if a < b]
+            self.blocks = [Columns(p, work, p.start, *plan(work[:, p])) for p in parts]
+        self.shares = [range(i, len(self.blocks), count) for i in range(count)]
+
+    def forward(self) -> None:
+        """Transform all columns."""
+        self.run(lambda columns: columns.forward())
+
+    def backward(self) -> None:
+        """Transform all columns back."""
+        self.run(lambda columns: columns.backward())
+
+    def filter(self, multiply: Callable[[Columns], float]) -> float:
+        """Transform the columns, multiply them and transform them back.
+
+        Returns the sum of the numbers that `multiply` returns.
+        """
+
+        def step(columns: Columns) -> float:
+            columns.forward()
+            total = multiply(columns)
+            columns.backward()
+            return total
+
+        return self.run(step)
+
+    def run(self, step: Callable[[Columns], float | None]) -> float:
+        """Call `step` for all columns; return the sum of the numbers that it returns."""
+        totals, rows = np.zeros(len(self.blocks)), len(self.work)
+
+        def share(numbers: range) -> None:
+            for i in numbers:
+                columns = self.blocks[i]
+                if self.is_copied:
+                    columns.coefficients[:rows] = self.work[:, columns.part]
+                    columns.coefficients[rows:] = 0.0
+                totals[i] = step(columns) or 0.0
+                if self.is_copied:
+                    self.work[:, columns.part] = columns.coefficients[:rows]
+
+        side_by_side(self.pool, [partial(share, numbers) for numbers in self.shares])
+        return float(totals.sum())
 
 
-def in_turn(pool: ThreadPoolExecutor | None, *stages: Sequence[Execute]) -> Execute:
-    """A call that runs the stages one after the other, and the parts of a stage side by side."""
-
-    def run() -> None:
-        for stage in stages:
-            side_by_side(pool, stage)
-
-    return run
+def _nothing() -> None:
+    """The transform of columns of one row."""
 
 
 def side_by_side(pool: ThreadPoolExecutor | None, calls: Sequence[Execute]) -> None:

@@ -200,14 +200,17 @@ class Contact:
         """Natural residual from the sum of the squares of min(g, sigma)."""
         return sqrt(violation / self.grid.size) / min(self.pressure, 1.0)
 
-    def rounding(self, field: Field) -> float:
-        """Estimate of what the rounding of a displacement adds to the residual of its stress.
+    def noise(self, kind: "np.dtype[Any]") -> float:
+        """Estimate of the stress by the rounding of displacements of this type, per displacement.
 
-        Rounding is white noise, and short waves dominate its stress: k_max times its rms value.
+        Rounding is white noise, and short waves dominate its stress: eps / 2 times k_max.
         """
+        return 0.5 * float(np.finfo(kind).eps) * self.stiffest
+
+    def rounding(self, field: Field) -> float:
+        """Estimate of what the rounding of a displacement adds to the residual of its stress."""
         squares = sum(float(np.square(field[rows]).sum()) for rows in row_blocks(field))
-        error = 0.5 * float(np.finfo(field.dtype).eps) * self.stiffest
-        return error * self.as_residual(self.grid.total(squares))
+        return self.noise(field.dtype) * self.as_residual(self.grid.total(squares))
 
     def mirrored(self) -> "Contact":
         """This contact, or with a free boundary the periodic contact of the mirrored map."""

@@ -34,6 +34,7 @@ from scipy.linalg import LinAlgError, cho_factor, cho_solve
 from scipy.linalg.blas import dtrmv
 
 from gfmd_cli.grid.arrays import Field, Mask, row_blocks
+from gfmd_cli.grid.shared_transforms import BLOCK_ROWS
 from gfmd_cli.physics.contact import Contact
 from gfmd_cli.solvers.contact_state import refined
 from gfmd_cli.solvers.local_start import COARSE_TOLERANCE
@@ -114,7 +115,8 @@ class _DirectSolve:
         """`values` <- C s, without its mean."""
         self.values[...] = 0.0
         self.values[points] = s
-        self.grid.unfilter_padded(self.contact.stiffness)
+        blocks = np.unique(np.asarray(points[0]) // BLOCK_ROWS)
+        self.grid.unfilter_padded(self.contact.stiffness, blocks.tolist())
         self.transforms += 2
 
     def run(self, largest: int, tolerance: float, pause: Callable[[], None]) -> bool:

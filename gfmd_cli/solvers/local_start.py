@@ -13,7 +13,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from gfmd_cli.grid.arrays import Field, Mask, row_blocks
+from gfmd_cli.grid.arrays import Field, Mask
 from gfmd_cli.physics.contact import Contact
 from gfmd_cli.physics.free_contact import FreeContact
 from gfmd_cli.solvers.local_solve import LocalSolve
@@ -125,7 +125,7 @@ class PeriodicSolve(LocalSolve):
         grid = self.grid.in_single() if in_single_precision else self.grid
         values = grid.padded[..., : grid.points]
         self.tiles.put(self.s, values)
-        grid.unfilter_padded(self.contact.stiffness)
+        grid.unfilter_padded(self.contact.stiffness, self.tiles.blocks)
         self.transforms += grid.pair_count
         return values
 
@@ -140,22 +140,21 @@ class PeriodicSolve(LocalSolve):
         laid, before = self.obstacle + result.gap, tiles.take(displacement) - result.level
         if contact.may_touch is not None:
             laid = np.where(tiles.take(contact.may_touch), laid, before)
-        change = moves.padded[..., : moves.points]  # in the memory of the displacement
-        for rows in row_blocks(u):
-            values = displacement[rows] - result.level
-            np.maximum(values, contact.obstacle[rows], out=u[rows])
-            change[rows] = u[rows] - values
+        np.subtract(displacement, result.level, out=u)
+        if result.entered.any():  # MAX_EVALUATIONS ends here
+            np.maximum(u, contact.obstacle, out=u)
         tiles.overwrite(laid, u)
-        if result.gap.min() > 0:
+        if result.entered.any() or result.gap.min() > 0:
             return Start(contact, self.transforms, u)
-        tiles.overwrite(laid - before, change)
-        rounding = contact.rounding(change)
-        moves.filter_padded(contact.stiffness)
+        change = (laid - before).astype(moves.real)  # zero elsewhere
+        values = moves.padded[..., : moves.points]  # in the memory of the displacement
+        tiles.put(change, values)
+        moves.filter_padded(contact.stiffness, tiles.blocks)
         self.transforms += moves.pair_count
         sigma = self.grid.empty()
-        sigma[...] = change
-        tiles.overwrite(self.s + tiles.take(sigma), sigma)
-        return Start(contact, self.transforms, u, sigma, rounding)
+        sigma[...] = values
+        tiles.overwrite(self.s + tiles.take(values), sigma)
+        return Start(contact, self.transforms, u, sigma, contact.rounding(change))
 
     def lay(self, gap: Field) -> tuple[Field, Field]:
         """The gap and the stress on the tiles after C s is laid on the indenter.

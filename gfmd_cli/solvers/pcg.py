@@ -36,7 +36,7 @@ from gfmd_cli.physics.contact import Contact
 from gfmd_cli.physics.observables import contact_points
 from gfmd_cli.solvers import pcg_kernels as kernels
 from gfmd_cli.solvers.contact_state import PRESSED, TENSE, refined
-from gfmd_cli.solvers.loop import Solver, Start, State, is_certain
+from gfmd_cli.solvers.loop import Solver, Start, State
 from gfmd_cli.solvers.preconditioners import Preconditioner, Selection, create, select
 from gfmd_cli.solvers.projected_move import MAX_HALVINGS, MoveChoice, choose, conjugation
 
@@ -94,15 +94,12 @@ class ProjectedCG(Solver):
         return state
 
     def begin_from(self, start: Start) -> PCGState:
-        """Start with a stress that is known, if it ends the solve; else compute it from u."""
-        if start.sigma is not None:
-            state = _new_state(start.contact, start.u, start.sigma)
-            state.exact, state.rounding = False, start.rounding
-            if is_certain(start.contact, state, self.tolerance):
-                return state
-            del state
-            start.sigma = None  # its memory is needed now
-        return self.begin(start.contact, start.u)
+        """Start with the stress of the start, if it is known; else compute it from u."""
+        if start.sigma is None:
+            return self.begin(start.contact, start.u)
+        state = _new_state(start.contact, start.u, start.sigma)
+        state.exact, state.rounding = False, start.rounding
+        return state
 
     def continue_from(self, coarse: Contact, state: State, fine: Contact) -> PCGState:
         """Start from the interpolated displacement, laid on the indenter in the coarse contact.
@@ -153,7 +150,7 @@ class _Run:
         self.rows = grid.rows
         # Transforms of lines cost nothing, and a line contact at n = 4 needs the digits.
         self.moves = grid.in_single() if grid.dimension == 2 else grid
-        self.noise = 0.5 * float(np.finfo(self.moves.real).eps) * contact.stiffest
+        self.noise = contact.noise(self.moves.real)
         fields = (
             contact.obstacle,
             state.u,

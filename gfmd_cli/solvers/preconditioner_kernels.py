@@ -42,10 +42,12 @@ def slopes(sigma, contact_state, threshold, change, z, out, a, b):
 
 
 @kernel
-def apply_greens_function(modes, k, screening, factor, a, b):
-    """Multiply coefficients by factor / (k(q) + screening)."""
-    for i in range(a, b):
-        for j in range(k.shape[1]):
-            weight = factor / (k[i, j] + screening)
-            modes[i, 2 * j] *= weight
-            modes[i, 2 * j + 1] *= weight
+def apply_greens_function(modes, first, k, start, stop, factor, screening):
+    """Multiply coefficients by factor / (k(q) + screening); see `grid.kernels`."""
+    for i in range(k.shape[0]):
+        row, stiffness = modes[i, 2 * first :], k[i, start:stop]
+        for j in range(stiffness.size):
+            weight = factor / (stiffness[j] + screening)
+            row[2 * j] *= weight
+            row[2 * j + 1] *= weight
+    return 0.0

@@ -60,10 +60,7 @@ class GreensFunction:
         grid, rows = self.grid, self.rows
         fields = (sigma, rows.interior(contact_state), threshold)
         rows.run(kernels.free_force, *fields, self.z)
-        grid.transform()
-        factors = (self.stiffness, self.screening, 1.0 / grid.size)
-        grid.spectral_rows.run(kernels.apply_greens_function, grid.as_rows(grid.spectrum), *factors)
-        grid.transform_back()
+        grid.filter_by(kernels.apply_greens_function, self.stiffness, self.screening)
         slope, z_change = rows.sums(2, kernels.slopes, *fields, change, self.z)
         return float(slope), float(z_change)
 

@@ -6,8 +6,9 @@ from typing import Any
 import numpy as np
 
 from gfmd_cli.grid.arrays import Field, Mask
+from gfmd_cli.grid.shared_transforms import BLOCK_ROWS
 
-SIDE = 8  # points per side of a tile
+SIDE = BLOCK_ROWS  # points per side of a tile
 
 
 class Tiles:
@@ -32,6 +33,11 @@ class Tiles:
             axis=1,
         )
         """Numbers of the tile and the eight around it, shape (tiles, 9)."""
+
+    @property
+    def blocks(self) -> list[int]:
+        """Numbers of the rows of tiles that are used, for `Grid.filter_by`."""
+        return [int(row) for row in np.flatnonzero(self.used.any(axis=1))]
 
     def take(self, field: Any) -> Any:
         """The values of a field or mask of the grid on the tiles."""
