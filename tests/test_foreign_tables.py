@@ -1,9 +1,13 @@
 """Tables as spreadsheets, stages and geographic programs write them: rounded, quoted, marked."""
 
+from pathlib import Path
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from gfmd_cli.errors import InputError
+from gfmd_cli.maps.microscope_files import _height_channel
 from gfmd_cli.maps.topography import Region, read_topography
 from gfmd_cli.physics.file_surface import FileSurface
 
@@ -304,3 +308,115 @@ def test_a_wrong_header_of_an_esri_grid_is_refused(saved, old, new, reason):
 def test_text_formats_with_scales_that_are_not_read_are_refused(saved, first):
     with pytest.raises(InputError, match="in text, whose header is not read; save it in binary"):
         read_topography(saved(f"{first}\nZscale = 1e-9\n*\n" + matrix(" ")))
+
+
+@pytest.mark.parametrize("digits", [2, 3, 4])
+@pytest.mark.parametrize("sides", ["", "# Width: 20 um\n# Height: 12 um\n# Value units: nm\n"])
+@pytest.mark.parametrize("is_row", [True, False])
+def test_rounded_positions_beside_a_matrix_are_refused(saved, digits, sides, is_row):
+    heights = np.random.default_rng(0).normal(size=(40, 40))
+    positions = np.round(np.arange(40) / 25.6, digits)
+    heights[(0, slice(None)) if is_row else (slice(None), -1)] = positions
+    word = "row" if is_row else "column"
+    with pytest.raises(InputError, match=f"a {word} of the table is .* positions or numbers"):
+        read_topography(saved(sides + matrix(" ", heights=heights)))
+
+
+def test_a_smooth_slope_is_not_taken_for_positions(saved):
+    slope = np.arange(40.0) + 0.02 * np.random.default_rng(0).normal(size=(40, 40))
+    assert read_topography(saved(matrix(" ", heights=slope))).heights.shape == (40, 40)
+
+
+def test_points_with_normals_or_colours_are_refused(saved):
+    y, x = np.indices((12, 30))
+    table = np.column_stack([x.ravel(), y.ravel(), np.random.default_rng(0).normal(size=(360, 4))])
+    with pytest.raises(InputError, match="one of 6 columns is sorted"):
+        read_topography(saved(matrix(" ", heights=table)))
+
+
+@pytest.mark.parametrize("line", ["# Max Height: 2.0 um", "# pixel size = 0.25 um"])
+def test_another_line_of_the_header_changes_no_side(saved, line):
+    header = "# Width: 20 um\n# Height: 12 um\n# Value units: nm\n"
+    assert FileSurface(path=saved(header + matrix(" "))).sides == pytest.approx((12e-6, 20e-6))
+    with pytest.raises(InputError, match="another line makes them"):
+        read_topography(saved(header + line + "\n" + matrix(" ")))
+
+
+def test_units_of_sides_that_are_not_read_give_a_warning(saved):
+    header = "# Width [um]: 20\n# Height [um]: 12\n# Value units: nm\n"
+    (note,) = read_topography(saved(header + matrix(" "))).notes
+    assert "states units (um, um), which are not read" in note
+
+
+@pytest.mark.parametrize(
+    ("factor", "unit_y", "words"), [("0.1", "um", "Scale Data = 0.1"), ("1", "nm", "Unit Y")]
+)
+def test_a_header_of_nova_that_is_not_read_is_refused(saved, factor, unit_y, words):
+    def header(factor, unit_y):
+        units = f"Unit X = um\nUnit Y = {unit_y}\nUnit Data = nm\nScale Data = {factor}\n"
+        return f"NX = 300\nNY = 12\n{units}Scale X = 0.1\nScale Y = 0.1\nStart of Data :\n"
+
+    assert read_topography(saved(header("1", "um") + matrix(" "))).heights.shape == (12, 300)
+    with pytest.raises(InputError, match=words):
+        read_topography(saved(header(factor, unit_y) + matrix(" ")))
+
+
+@pytest.mark.parametrize("separator", ["\t", ",", ";"])
+def test_empty_cells_at_the_ends_of_rows_that_drift_are_refused(saved, separator):
+    rows = [separator.join(f"{value:.4f}" for value in row) for row in HEIGHTS]
+    drift = [separator * (i % 3) + row + separator * (2 - i % 3) for i, row in enumerate(rows)]
+    with pytest.raises(InputError, match="an empty cell"):
+        read_topography(saved("\n".join(drift)))
+    margins = "\n".join(row + separator for row in rows)  # the same in every row
+    assert read_topography(saved(margins)).heights.shape == HEIGHTS.shape
+
+
+def test_points_below_a_header_with_two_lengths_are_points(saved):
+    text = points(np.arange(15) / 4, np.arange(12) / 4)
+    header = "# Width: 20 um\n# Distance: 15 mm\nx [um] y [um] z [nm]\n"
+    assert read_topography(saved(header + text)).heights.shape == (12, 15)
+
+
+def test_a_channel_of_a_signal_is_not_taken_as_the_heights():
+    def channels(*names):
+        kind = SimpleNamespace(value="height")
+        return [SimpleNamespace(channel_id=name, data_kind=kind, unit="m") for name in names]
+
+    def chosen(*names, dataset=None):
+        found = channels(*names)
+        reader = SimpleNamespace(channels=found, default_channel=found[0], format=lambda: "gwy")
+        return _height_channel(Path("scan.gwy"), reader, dataset).channel_id
+
+    assert chosen("Deflection Error", "Height") == "Height"
+    assert chosen("Height", "Deflection Error") == "Height"
+    assert chosen("Deflection Error", "Height", dataset="Deflection Error") == "Deflection Error"
+    with pytest.raises(InputError, match="seem to be signals: AmplitudeRetrace, PhaseRetrace"):
+        chosen("AmplitudeRetrace", "PhaseRetrace")
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda h: np.where(np.arange(64) < 10, 0.0, h), "16% of the heights are exactly 0"),
+        (
+            lambda h: h + 1e-6 * (np.arange(h.size).reshape(h.shape) % 137 == 70),
+            "points lie above or below all neighbours",
+        ),
+        (lambda h: h, ""),
+    ],
+)
+def test_unfinished_scans_and_single_points_give_a_warning(tmp_path, change, words):
+    noise = np.random.default_rng(0).normal(size=(64, 64))
+    heights = 1e-9 * np.cumsum(np.cumsum(noise, axis=0), axis=1)
+    np.save(tmp_path / "h.npy", change(heights))
+    warnings = FileSurface(path=tmp_path / "h.npy", length=1e-5, periodic=False).warnings()
+    assert (len(warnings) == 1 and words in warnings[0]) if words else not warnings
+
+
+@pytest.mark.parametrize(("points", "warned"), [(64, True), (1024, False)])
+def test_a_border_step_matters_more_on_few_points(tmp_path, points, warned):
+    """Four times the usual step, as one of 64 or of 1024 steps in each row."""
+    ramp = np.linspace(0, 6, points) + np.random.default_rng(0).normal(size=(points, points))
+    np.save(tmp_path / "h.npy", 1e-9 * ramp)
+    warnings = FileSurface(path=tmp_path / "h.npy", length=1e-5).warnings()
+    assert any("step across the border" in each for each in warnings) is warned

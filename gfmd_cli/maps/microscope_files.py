@@ -1,5 +1,6 @@
 """Files of microscopes and tables of numbers, by the readers of SurfaceTopography."""
 
+import re
 import warnings
 from dataclasses import replace
 from pathlib import Path
@@ -26,9 +27,12 @@ from gfmd_cli.maps.text_tables import (
     MATRIX_COLUMNS,
     OWN_HEADERS,
     columns,
+    header,
     in_utf8,
     is_height,
+    is_number,
     shorter_or_longer_row,
+    sides_in,
     table_formats,
     unread_units,
     with_blanks,
@@ -41,6 +45,13 @@ TEXT_FORMATS = {b"aBCR-": "an SDF file", b"aISO-": "an SDF file", b"DSAA": "a gr
 SMALL_FILE = 2**14  # bytes, which the readers of tables parse in a second
 SORTED_ROWS = 20  # heights of so many rows are not sorted by chance; a choice
 SIGNATURE_BYTES = 512  # at the beginning of a file, by which readers recognise their format
+MAX_POINT_COLUMNS = 10  # of a table of points: x, y, z with colours and normals; a choice
+SIGNALS = re.compile("error|deflection|amplitude|phase", re.IGNORECASE)
+"""Names of channels whose lengths are those of a signal."""
+NOVA = re.compile(rb"^[ \t]*(Scale Data|Unit X|Unit Y)[ \t]*=[ \t]*(\S+)", re.MULTILINE)
+"""Lines of the header of Nova that the reader does not read, and the unit along x."""
+MANY_VALUES = 8  # in a row, for which rounding may make the steps uneven; a choice
+MAX_UNEVENNESS = 0.25  # of rounded positions, over their distance; a choice
 
 
 def read_microscope_file(path: Path, dataset: str | None) -> HeightMap:
@@ -130,6 +141,11 @@ def _read_channel(path: Path, file: BinaryIO, reader: Any, dataset: str | None) 
     shape: tuple[int, ...] = (channel.nb_grid_pts or ())[:: 1 if rows_along_y else -1]
     check_layout(path, shape, np.dtype(float))
     unsized = channel.physical_sizes is None
+    if kind == "ibw" and len(shape) == 1 and len(reader.channels) > 1:
+        raise InputError(
+            f"{path}: an Igor wave of two dimensions with different numbers of points is read as "
+            f"curves, not as a map; save it with a third dimension of 1. {REMEDY}"
+        )
     if len(shape) == 2:
         _check_sides(path, channel)
     if kind == "nc":
@@ -146,12 +162,17 @@ def _read_channel(path: Path, file: BinaryIO, reader: Any, dataset: str | None) 
         stored, _ = heights_and_sides(path, in_unit_of_file, rows_along_y)
         heights = np.ma.masked_where(np.abs(stored) >= MAX_HEIGHT, heights)
     metric_sides = None if has_unit or unsized else _sides_with_unit(channel, sides)
-    is_unread = kind == "asc" and unsized and not has_unit
-    note = unread_units(file, (1, *shape[1:])[-1]) if is_unread else ""
+    note, sides = "", metric_sides or sides
+    if kind == "asc":
+        lines = header(file, (1, *shape[1:])[-1])
+        if unsized:
+            note = unread_units(lines, (str(in_unit_of_file.unit),) if has_unit else ())
+        elif has_unit or metric_sides:
+            _check_stated_sides(path, lines, sides)
     return HeightMap(
         notes=(note,) if note else (),
         heights=heights,
-        sides=None if unsized else metric_sides or sides,
+        sides=None if unsized else sides,
         metres=has_unit or metric_sides is not None,
         periodic=None if rows_along_y else bool(scan.is_periodic),
         source=f"{kind}, {channel.channel_id}"
@@ -183,8 +204,30 @@ def _check_matrix(path: Path, file: BinaryIO, scan: Any, unsized: bool) -> None:
             f"a header that states its sides. {REMEDY}"
         )
     _check_all_rows_read(path, file, rows, columns_read)
-    if unsized:
-        _check_all_are_heights(path, scan.heights().T)
+    _check_all_are_heights(path, scan.heights().T)
+    nova = dict(NOVA.findall(b"".join(header(file, columns_read))))
+    factor, unit_x, unit_y = map(nova.get, (b"Scale Data", b"Unit X", b"Unit Y"))
+    if factor is not None and not (is_number(factor) and float(factor) == 1.0):
+        raise InputError(
+            f"{path}: the header states 'Scale Data = {factor.decode(errors='replace')}', which is "
+            "not applied: are the heights those of the table, or to be multiplied? Save them "
+            "multiplied, with a factor of 1"
+        )
+    if unit_y is not None and unit_y != unit_x:
+        raise InputError(f"{path}: 'Unit Y' is not 'Unit X'; save both sides in the same unit")
+
+
+def _check_stated_sides(path: Path, lines: list[bytes], sides: tuple[float, ...]) -> None:
+    """Raise InputError where the two sides that a header states are not those that were read.
+
+    The reader takes any line that ends in such a word, as "Max Height", as a side.
+    """
+    stated = sides_in(lines)
+    if len(stated) == 2 and not np.allclose(sorted(stated), sorted(sides), rtol=1e-6):
+        raise InputError(
+            f"{path}: the header states two sides, {stated[0]:g} m and {stated[1]:g} m, but "
+            f"another line makes them {sides[-1]:g} m and {sides[0]:g} m; remove that line"
+        )
 
 
 def _header(channel: Any) -> dict[str, Any]:
@@ -246,28 +289,30 @@ def _check_all_are_heights(path: Path, table: Field) -> None:
     The first value of such a row may be that of a corner.
     """
     for word, values in (("row", table), ("column", table.T)):
+        largest = MAX_UNEVENNESS if values.shape[1] > MANY_VALUES else EVEN_TOLERANCE
         for first, second in (values[:2, 1:], values[:-3:-1, 1:]):
-            if _is_evenly_spaced(first) and not _is_evenly_spaced(second):
+            if _unevenness(first) <= largest and _unevenness(second) > 4 * largest:
                 raise InputError(
                     f"{path}: a {word} of the table is ..., {first[0]:g}, {first[1]:g}, "
                     f"{first[2]:g}, ...: positions or numbers, not heights? Remove it from the file"
                 )
-    if table.shape[1] == MATRIX_COLUMNS and len(table) > SORTED_ROWS:
+    if table.shape[1] <= MAX_POINT_COLUMNS and len(table) > SORTED_ROWS:
         steps = np.diff(table, axis=0)
         is_sorted = np.all(steps >= 0, axis=0) | np.all(steps <= 0, axis=0)
         if np.any(is_sorted & np.any(steps, axis=0)):
             raise InputError(
-                f"{path}: one of {MATRIX_COLUMNS} columns is sorted: positions, not heights? Save "
+                f"{path}: one of {table.shape[1]} columns is sorted: positions, not heights? Save "
                 "the columns x, y and height alone, or a matrix of heights"
             )
 
 
-def _is_evenly_spaced(values: Field) -> bool:
-    """Whether all steps from one value to the next are equal, and not zero."""
-    if values.size < 3:
-        return False
-    steps = np.diff(values)
-    return bool(steps[0] != 0 and np.ptp(steps) <= EVEN_TOLERANCE * abs(steps[0]))
+def _unevenness(values: Field) -> float:
+    """Largest deviation of values from a line, over their mean step; infinite without one."""
+    values = np.ma.filled(values, np.nan)
+    if len(values) < 3 or values[0] == values[-1]:
+        return np.inf
+    step = (values[-1] - values[0]) / (len(values) - 1)
+    return float(np.abs(values - values[0] - step * np.arange(len(values))).max() / abs(step))
 
 
 def _check_all_rows_read(path: Path, file: BinaryIO, rows: int, columns: int) -> None:
@@ -322,8 +367,14 @@ def _height_channel(path: Path, reader: Any, name: str | None) -> Any:
         maps = [key for key, item in channels.items() if min(item.nb_grid_pts) >= SMALLEST_MAP]
         name = only_map(path, maps or list(channels))
     elif name is None and channels:
-        default = reader.default_channel.channel_id
-        name = default if default in channels else next(iter(channels))
+        default, maps = reader.default_channel.channel_id, list(channels)
+        maps = [key for key in maps if not SIGNALS.search(key)]
+        if not maps:
+            raise InputError(
+                f"{path}: its channels seem to be signals: {', '.join(channels)}; if one holds "
+                "heights, name it in surface.dataset"
+            )
+        name = default if default in maps else maps[0]
     if name not in channels:
         if not channels:
             raise InputError(f"{path}: no height channel, as in an image of grey values. {REMEDY}")

@@ -23,7 +23,7 @@ from gfmd_cli.maps.text_tables import (
     is_height,
     is_number,
     is_unit,
-    states_sides,
+    sides_in,
     table_formats,
 )
 
@@ -54,9 +54,9 @@ def read_points(path: Path, file: BinaryIO) -> HeightMap | None:
         return None
     lines = content.replace(b",", b" ").replace(b";", b" ").splitlines()
     first = next((i for i, line in enumerate(lines) if _is_row(line.split(), count)), 0)
-    if states_sides(lines[:first]):
-        return None
     table = _numbers(path, lines, first, count)
+    if len(sides_in(lines[:first])) == 2 and not _are_points(path, table):
+        return None
     if count == 3 and _is_numbered(table):
         table, count = table[:, 1:], 2
     order, factors = _header(path, lines[:first], count)
@@ -102,6 +102,18 @@ def _rows(path: Path, lines: list[bytes], first: int, count: int) -> Iterator[by
             )
         if words:
             yield b" ".join([*words[:-1], words[-1] if is_number(words[-1]) else b"nan"])
+
+
+def _are_points(path: Path, table: Field) -> bool:
+    """Whether a table below a header with two sides is one of positions, not a narrow matrix."""
+    if table.shape[1] == 2:
+        steps = np.diff(table[:, 0])
+        return bool(steps.size > 1 and steps[0] > 0 and np.ptp(steps) <= MAX_DEVIATION * steps[0])
+    try:
+        _grid(path, table)
+    except InputError:
+        return False
+    return True
 
 
 def _is_numbered(table: Field) -> bool:

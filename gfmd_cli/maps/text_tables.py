@@ -31,7 +31,7 @@ OWN_HEADERS = LATIN_1, b"X;Y;valid"  # of profiles that SurfaceTopography knows
 MISSING = b"bad", b"nan", b"inf", b"infinite"
 """Marks of missing heights, in any case; those of SurfaceTopography."""
 AMBIGUOUS_UNITS = "pm", "in"  # which end a time and begin a phrase
-SIDE = re.compile(rb"#\s*\S+\s*:\s*[\d.]+\s*(\S+)\s*$")
+SIDE = re.compile(rb"#\s*\S+\s*[:=]\s*([\d.]+(?:[eE][-+]?\d+)?)\s*(\S+)\s*$")
 """A line such as "# Width: 20 um", in any language."""
 THOUSANDS = re.compile(rb"[-+]?[1-9]\d{0,2}(,\d{3})+(\.\d*)?")
 NUMBER_CHARACTERS = b' "\t+-.,;0123456789eEdDinfaINFA'
@@ -42,6 +42,7 @@ GROUPED = re.compile(rb"[\t;]([-+]?\d{1,3}( \d{3})+([,.]\d*)?)(?=[\t;\r]|$)")
 """A cell such as 1 023 between tabs or semicolons."""
 EMPTY = re.compile(rb"([,;])[ \t]*\1.*\d")
 """An empty cell between commas or semicolons, with a number in the same row after it."""
+SEPARATORS = b"\t", b";", b","
 
 
 def is_numeric(line: bytes) -> bool:
@@ -93,10 +94,14 @@ def is_unit(word: str) -> bool:
     return in_metres(word) is not None and word not in AMBIGUOUS_UNITS
 
 
-def states_sides(lines: list[bytes]) -> bool:
-    """Whether a header states two lengths, which are the sides of a matrix."""
-    sides = filter(None, map(SIDE.match, lines))
-    return sum(in_metres(side[1].decode(errors="replace")) is not None for side in sides) == 2
+def sides_in(lines: list[bytes]) -> list[float]:
+    """Lengths [m] that a header states; two of them are the sides of a matrix."""
+    sides = [
+        (side[1], in_metres(side[2].decode(errors="replace")))
+        for side in map(SIDE.match, lines)
+        if side
+    ]
+    return [float(value) * unit for value, unit in sides if is_number(value) and unit is not None]
 
 
 def header(file: BinaryIO, columns: int) -> list[bytes]:
@@ -111,10 +116,10 @@ def header(file: BinaryIO, columns: int) -> list[bytes]:
     return lines
 
 
-def unread_units(file: BinaryIO, columns: int) -> str:
-    """A warning about units of length in the header of a matrix, or "" if it states none."""
-    lines = b" ".join(header(file, columns)).decode(errors="replace")
-    units = list(filter(is_unit, re.split(r"[\s,;:=/_()\[\]\"#]+", lines)))
+def unread_units(lines: list[bytes], known: tuple[str, ...]) -> str:
+    """A warning about units of length in a header, other than known ones; "" without any."""
+    words = re.split(r"[\s,;:=/_()\[\]\"#]+", b" ".join(lines).decode(errors="replace"))
+    units = [word for word in words if is_unit(word) and word not in known]
     if not units:
         return ""
     return (
@@ -159,10 +164,12 @@ def with_blanks(file: BinaryIO) -> tuple[BinaryIO, str]:
     warning = ""
     start = file.read(WINDOW_BYTES)
     table = start[len(start) // 2 :]  # without most headers
-    rows = list(filter(is_numeric, start.splitlines())) if columns(file) else []
+    width = columns(file)
+    rows = list(filter(is_numeric, start.splitlines())) if width else []
     if cell := next(filter(None, map(GROUPED.search, rows)), None):
         raise ValueError(f"{cell[1].decode()}: blanks separate thousands; save the numbers without")
-    if any(map(EMPTY.search, rows)):
+    is_shifted = width >= MATRIX_COLUMNS and any(_has_empty_cells(rows, by) for by in SEPARATORS)
+    if is_shifted or any(map(EMPTY.search, rows)):
         raise ValueError("an empty cell in a row of numbers; write NaN for a missing height")
     if b"," in table or b";" in table:
         numbers = _columns(file, b" \t;")
@@ -177,6 +184,19 @@ def with_blanks(file: BinaryIO) -> tuple[BinaryIO, str]:
             file = BytesIO(text.replace(b",", b"." if is_decimal else b" "))
     file.seek(0)
     return file, warning
+
+
+def _has_empty_cells(rows: list[bytes], separator: bytes) -> bool:
+    """Whether rows differ in which of their cells are empty, so that these are not a margin."""
+    ends = separator, separator + separator
+    if not any(ends[1] in row or row.startswith(separator) for row in rows):
+        return False
+    empty = {
+        tuple(i for i, cell in enumerate(row.rstrip(b"\r\n").split(separator)) if not cell.strip())
+        for row in rows
+        if separator in row
+    }
+    return len(empty) > 1
 
 
 def _warning_of_thousands(start: bytes, columns: int) -> str:
