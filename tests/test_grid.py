@@ -5,6 +5,7 @@ import pyfftw
 import pytest
 from fourier import backward, forward
 
+from gfmd_cli.grid import shared_transforms
 from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.physics.self_affine import SelfAffine
 
@@ -154,6 +155,53 @@ def test_transforms_in_single_precision_work_in_the_same_memory(grid):
     assert values.dtype == np.float32
     assert np.shares_memory(values, grid.padded)
     assert np.array_equal(grid.apply(symbol, field, out=grid.empty()), expected)
+
+
+@pytest.mark.parametrize("precision", ["single", "double"])
+@pytest.mark.parametrize(("shape", "threads"), [((64, 63), 1), ((60, 64), 1), ((512, 512), 2)])
+def test_rows_of_zeros_need_no_transform(shape, precision, threads):
+    """Of 60 rows, which are no whole number of blocks of 8, all are transformed."""
+    size = {"points": shape[1], "points_y": shape[0]}
+    grid = Grid(**size, precision=precision, threads=threads)
+    field, k = np.zeros(shape, grid.real), grid.mode_number()
+    for block in (1, 3, 6):
+        field[8 * block : 8 * block + 8] = np.random.default_rng(block).normal(size=(8, shape[1]))
+    values = grid.padded[:, : shape[1]]
+    for operator in (grid.filter_padded, grid.unfilter_padded):
+        grid.padded[...] = np.nan  # of earlier work
+        values[...] = field
+        operator(k)
+        expected = values.copy()
+        grid.padded[...] = np.nan
+        values[...] = field
+        operator(k, [1, 3, 6])
+        eps = np.finfo(grid.real).eps
+        np.testing.assert_allclose(values, expected, atol=20 * eps * abs(expected).max())
+
+
+@pytest.mark.parametrize("precision", ["single", "double"])
+@pytest.mark.parametrize(("shape", "threads"), [((64, 64), 1), ((45, 50), 1), ((512, 512), 2)])
+def test_columns_may_be_copied_in_blocks(monkeypatch, shape, precision, threads):
+    """The last block of columns is narrower than the others."""
+    size = {"points": shape[1], "points_y": shape[0]}
+    grids = [Grid(**size, precision=precision, threads=threads)]
+    grids[0].work  # noqa: B018 - plans columns in place
+    for name, value in (("MIN_COPIED_BYTES", 0), ("BLOCK_COEFFICIENTS", 100)):
+        monkeypatch.setattr(shared_transforms, name, value)
+    monkeypatch.setattr(shared_transforms, "MIN_BLOCK_COLUMNS", 8)
+    grids.append(Grid(**size, precision=precision, threads=threads))
+    field, k = noise(grids[0]), grids[0].mode_number()
+    results = []
+    for grid in grids:
+        values = grid.padded[:, : shape[1]]
+        values[...] = field
+        energy = grid.filter_padded(k)
+        results.append((energy, values.copy()))
+        eps = float(np.finfo(grid.real).eps)
+        assert energy == pytest.approx(float(np.vdot(field, values)), rel=100 * eps)
+    assert grids[0]._workspace[3].is_copied < grids[1]._workspace[3].is_copied
+    assert len(grids[1]._workspace[3].blocks) > 2
+    np.testing.assert_allclose(results[1][1], results[0][1], atol=50 * eps * abs(values).max())
 
 
 def test_the_operator_on_a_line_is_the_convolution_with_its_kernel():
