@@ -200,15 +200,15 @@ class Contact:
         """Natural residual from the sum of the squares of min(g, sigma)."""
         return sqrt(violation / self.grid.size) / min(self.pressure, 1.0)
 
-    def noise(self, kind: "np.dtype[Any]") -> float:
-        """Estimate of the stress by the rounding of displacements of this type, per displacement.
+    def noise(self, dtype: "np.dtype[Any]") -> float:
+        """Estimated rms error of the stress by rounded displacements, over their rms value.
 
         Rounding is white noise, and short waves dominate its stress: eps / 2 times k_max.
         """
-        return 0.5 * float(np.finfo(kind).eps) * self.stiffest
+        return 0.5 * float(np.finfo(dtype).eps) * self.stiffest
 
     def rounding(self, field: Field) -> float:
-        """Estimate of what the rounding of a displacement adds to the residual of its stress."""
+        """Estimated contribution of the rounding of a displacement to the residual."""
         squares = sum(float(np.square(field[rows]).sum()) for rows in row_blocks(field))
         return self.noise(field.dtype) * self.as_residual(self.grid.total(squares))
 

@@ -191,7 +191,8 @@ class FileSurface(RigidSurface):
     def within(self, boundary: str) -> Self:
         """The map with the treatment of its edges that goes with a boundary by default.
 
-        An array ends at a free boundary, like a scan, but nothing is subtracted from it.
+        With a free boundary an array, too, ends at its borders, but by default no trend is
+        subtracted from it.
         """
         if self.has_borders:
             return self.model_copy(update={"edges": "none" if boundary == "free" else "mirror"})
@@ -239,7 +240,7 @@ class FileSurface(RigidSurface):
     def mirrored(self) -> "FileSurface | None":
         """The map mirrored to twice its sides; None if it is periodic or made so.
 
-        Half of it on a finer grid has the area of the map.
+        A quarter of the mirrored cell (half of a line) is the map itself.
         """
         if not self._is_reflected():
             return None
@@ -355,7 +356,10 @@ class MirroredMap(FileSurface):
 
 
 class TaperedMap(FileSurface):
-    """A map with borders and tapered edges, scaled such that a wave keeps its power."""
+    """A map with borders and tapered edges, divided by the rms of the window.
+
+    The mean power of the waves is then that of the map.
+    """
 
     def heights_on(self, grid: Grid) -> Field:
         """Heights [m] at the points of a grid, over the rms of the window."""
@@ -376,7 +380,7 @@ _read = lru_cache(maxsize=4)(read_topography)
 
 @lru_cache(maxsize=4)
 def _prepared(surface: FileSurface) -> Field:
-    """The periodic heights [m], levelled and filled in; cached likewise."""
+    """The periodic heights [m], levelled and filled in; cached like the file."""
     missing, heights = surface._topography().missing, surface._levelled()
     if missing is not None:
         if surface.missing == "refuse":
@@ -393,7 +397,7 @@ def _prepared(surface: FileSurface) -> Field:
 
 @lru_cache(maxsize=16)
 def _peak(surface: FileSurface) -> float:
-    """Highest point of a Fourier series [m]; cached likewise."""
+    """Highest point of a Fourier series [m]; cached like the file."""
     return highest_point(_prepared(surface))
 
 

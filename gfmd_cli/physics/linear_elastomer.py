@@ -89,7 +89,7 @@ class LinearElastomer(SpecTable):
         raise NotImplementedError
 
     def warnings(self, scale: Scale) -> list[str]:
-        """Warnings about a contact of these lengths; mostly none."""
+        """Warnings about a contact with these length scales; empty by default."""
         return []
 
     def decays(self, dimension: int) -> bool:

@@ -84,7 +84,7 @@ def _stiffness(contact: Contact, touching: Mask) -> float:
 
 @_stiffness.register
 def _of_free_contact(contact: FreeContact, touching: Mask) -> float:
-    """<t> / <1 - C t> likewise."""
+    """<t> / <1 - C t> by the same method; NaN if the iteration does not converge."""
     free = contact.free
     rest = np.ones(contact.grid.shape)  # 1 - C t
     force, z, response = (contact.grid.empty() for _ in range(3))

@@ -45,8 +45,8 @@ class State:
     coarser_transforms: float = 0.0
     """Transforms before this grid was entered, in units of transforms on the finest grid."""
     misses: int = 0
-    """How often in a row the residual missed the tolerance, with little progress, when sigma was
-    computed afresh."""
+    """Number of consecutive computations of sigma from u whose residual missed the tolerance with
+    little progress."""
     best_residual: float = inf
     """Smallest residual measured on a sigma computed afresh."""
 

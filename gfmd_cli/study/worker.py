@@ -19,8 +19,8 @@ READY = "ready"
 def serve(pipe: Connection) -> None:
     """Solve tasks until the other end of the pipe is closed.
 
-    What is sent: every progress event, and a text whenever a task may be given: READY at the start,
-    then the status of each task.
+    Sends every progress event, READY at the start, and the status of each finished task. After
+    READY or a status, the next task can be sent.
     """
     faulthandler.enable(sys.__stderr__ or 2)
     parts, options = pipe.recv()
