@@ -1,6 +1,7 @@
 """`gfmd` and `python -m gfmd_cli`: signals are handled before the slow imports begin."""
 
 import gc
+import io
 import signal
 import sys
 import warnings
@@ -19,6 +20,9 @@ def main() -> None:
     for number in ENDING:
         if signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, _leave)
+    if isinstance(sys.stdout.buffer, io.RawIOBase):  # PYTHONUNBUFFERED: a short write loses text
+        buffer = io.BufferedWriter(sys.stdout.buffer)
+        sys.stdout = io.TextIOWrapper(buffer, sys.stdout.encoding, write_through=True)
     gc.set_threshold(10_000)  # compilation makes many objects, and most of them stay
     warnings.formatwarning = lambda message, *_, **__: f"gfmd: {message}\n"
     from gfmd_cli.cli import main as commands

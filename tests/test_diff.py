@@ -30,11 +30,12 @@ def study_of(output_of, tmp_path_factory):
     (folder / "spec.toml").write_text(SPEC)
     held = {}
 
-    def study(*overrides):
+    def study(*overrides, status=0):
         if overrides not in held:
             held[overrides] = folder / f"{len(held)}.h5"
             options = [word for override in overrides for word in ("--set", override)]
-            output_of("run", folder / "spec.toml", "-o", held[overrides], "-q", "-j", "1", *options)
+            words = ("-o", held[overrides], "-q", "-j", "1", *options)
+            output_of("run", folder / "spec.toml", *words, status=status)
         return held[overrides]
 
     return study
@@ -180,6 +181,16 @@ def test_another_seed_is_another_contact_and_nothing_to_compare_is_no_agreement(
     assert "no contact in common" in output_of(
         "diff", study_of(), other, "--tolerance", 1, status=1
     )
+
+
+def test_contacts_that_have_not_converged_are_named_and_paired_last(output_of, study_of):
+    few_steps = ("solver.max_steps=1", "solver.tolerance=1e-12", "elastomer.n=2")
+    unfinished = study_of(*few_steps, status=1)
+    shown = output_of("diff", study_of("elastomer.n=2"), unfinished)
+    assert "compared, but not converged in B:" in shown
+    assert "not converged in A" not in shown
+    both = study_of("solver.max_steps=[1, 20000]", "elastomer.n=2", status=1)
+    assert all(pair.one["status"].is_converged for pair in diff(both, study_of()).pairs)
 
 
 def test_of_several_grids_the_same_ones_belong_together(study_of):

@@ -56,6 +56,20 @@ def test_equal_entries_of_a_list_are_one_task(read):
     assert len(plan(read(("n = 1", "n = [1, 1.0]"), ("[0.1, 1.0]", "[0.1, 0.1]")))) == 1
 
 
+def test_loads_that_agree_in_fourteen_digits_are_one_task(read):
+    assert len(plan(read(("[0.1, 1.0]", "[0.1, 0.10000000000000002]")))) == 1
+
+
+@pytest.mark.parametrize(("n", "suits"), [("0", True), ("[0, 1]", False)])
+def test_a_solver_for_constant_stiffness_is_refused_for_any_other(read, n, suits):
+    spec = read(("n = 1", f"n = {n}"), ("[study]", '[solver]\nkind = "sort"\n[study]'))
+    if suits:
+        assert len(plan(spec)) == 2
+    else:
+        with pytest.raises(InputError, match="requires a stiffness independent of q"):
+            plan(spec)
+
+
 def test_several_tables_of_one_kind_are_a_sweep_too(read):
     spec = read(
         (
@@ -176,7 +190,7 @@ def test_task_ids_do_not_depend_on_the_output(read):
         (('"base"', '"../x"'), ["study.name", "only letters, digits"]),
         (
             ("[study]", "[solver]\ntolerance = 0\n[study]"),
-            ["solver.tolerance", "greater than or equal to 0.00000"],
+            ["solver.tolerance", "greater than or equal to 1e-16"],
         ),
         (
             ("[study]", '[solver]\nkind = "fire"\ntime_step = 2.0\n[study]'),
@@ -189,6 +203,18 @@ def test_task_ids_do_not_depend_on_the_output(read):
         (
             ("[study]", '[solver]\nkind = "frie"\n[study]'),
             ["solver.kind", "'frie'", "did you mean 'fire'", "polonsky-keer"],
+        ),
+        (
+            ("[study]", f"[solver]\nmax_steps = {2**63}\n[study]"),
+            ["solver.max_steps", "less than 9223372036854775808"],
+        ),
+        (
+            ("[0.1, 1.0]", "{from=0.1, to=1, per_decade=1e-308}"),
+            ["load.p_star.per_decade", "greater than or equal to 0.001", "1e-308"],
+        ),
+        (
+            ("cutoff = 0.05", "length_y = 1e308"),
+            ["surface.length_y: must be between 1e-100 and 1e+100, got 1e+308"],
         ),
         (("[study]", "surface = 3\n[study]"), ["TOML syntax"]),
         (("[study]", "x" + ".x" * 5000 + " = 1\n[study]"), ["5000 dots in a line"]),

@@ -48,6 +48,17 @@ def test_a_run_shows_its_progress_on_a_terminal(tmp_path, jobs):
     assert len(read_rows(tmp_path / "study.h5")) == 27
 
 
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+def test_output_that_is_cut_short_is_an_error(tmp_path, unbuffered):
+    """A file may have at most four blocks of 512 or 1024 bytes; the schema has more."""
+    command = f'ulimit -f 4; "{sys.executable}" -P -m gfmd_cli schema > schema.json'
+    variables = os.environ | {"PYTHONUNBUFFERED": unbuffered}
+    options = {"cwd": tmp_path, "env": variables, "capture_output": True, "text": True}
+    done = subprocess.run(["sh", "-c", command], **options)
+    assert done.returncode == 73
+    assert done.stderr == "gfmd: standard output: cannot be written: File too large\n"
+
+
 def test_a_bench_shows_its_progress_on_a_terminal(tmp_path):
     (tmp_path / "spec.toml").write_text(SPEC)
     short = ("--set", "load.p_star=0.1", "--set", "elastomer.n=1")

@@ -110,6 +110,8 @@ def _matches(one: list[Row], other: list[Row], *keys: Callable[[Row], Hashable])
     """Pairs of the same keys, alike in boundary, grid and solver if possible; from both lists."""
     pairs: list[Pair] = []
     paired_ids: set[int] = set()
+    for rows in (one, other):
+        rows.sort(key=lambda row: not row["status"].is_converged)  # these first
     for alike in ALIKE:
 
         def key_of(row: Row, alike: tuple[str, ...] = alike) -> Hashable:

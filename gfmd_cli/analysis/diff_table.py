@@ -72,6 +72,10 @@ def diff_lists(difference: Difference) -> dict[str, list[str]]:
         f"only in {which}": _loads_by_contact(rows)
         for which, rows in zip("AB", difference.only, strict=True)
     }
+    sides = [pair.one for pair in difference.pairs], [pair.other for pair in difference.pairs]
+    for which, side in zip("AB", sides, strict=True):
+        rows = [row for row in side if not row["status"].is_converged]
+        lists[f"compared, but not converged in {which}"] = _loads_by_contact(rows)
     lists["specs, A -> B"] = [f"  {line}" for line in difference.spec]
     return {title: lines for title, lines in lists.items() if lines}
 

@@ -12,7 +12,7 @@ import gfmd_cli
 from gfmd_cli.cli.bench import bench
 from gfmd_cli.cli.completion import completion, schema
 from gfmd_cli.cli.init import init, surface
-from gfmd_cli.cli.messages import print_error
+from gfmd_cli.cli.messages import discard_output, print_error
 from gfmd_cli.cli.results import analyze, diff, export, report
 from gfmd_cli.cli.run import run
 from gfmd_cli.cli.status import collect, status
@@ -24,6 +24,9 @@ COMMANDS = [
     *(analyze, report, export, diff, bench, schema, completion),
 ]
 """In the order in which a user needs them."""
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+UNWRITABLE = (*FULL, errno.EROFS, errno.ENAMETOOLONG)
+"""Errors of the file system, the first ones where nothing more can be written."""
 
 
 class Commands(click.Group):
@@ -44,9 +47,11 @@ class Commands(click.Group):
         except BrokenPipeError:  # click ends quietly
             raise
         except OSError as error:
-            unwritable = errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.ENAMETOOLONG
-            status = (SpaceError if error.errno in unwritable else StudyError).exit_status
+            status = (SpaceError if error.errno in UNWRITABLE else StudyError).exit_status
             message = str(error)
+            if error.errno in FULL and error.filename is None:
+                discard_output()
+                message = f"standard output: cannot be written: {error.strerror}"
         from gfmd_cli.grid.ranks import is_first
 
         for line in message.splitlines() if is_first() else ():

@@ -170,7 +170,7 @@ def _print_results(
     ids = {task.id for task in tasks}
     for line in other_tasks([row for row in stored if row["task_id"] not in ids]):
         print_text(f"  {line}")
-    if stored:
+    if any(row["status"].is_solved for row in stored):
         quoted = shlex.quote(str(path))
         print_text(f"next: gfmd analyze {quoted}\n      gfmd report {quoted}")
 

@@ -17,7 +17,7 @@ from gfmd_cli.grid.arrays import Field, Mask, MaskedField
 from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.maps.pictures import Picture
 from gfmd_cli.physics.highest_point import highest_point
-from gfmd_cli.spec_table import Positive, SpecTable
+from gfmd_cli.spec_table import Length, Positive, SpecTable
 
 SMALLEST_GRID = 8  # points along an axis; a choice: smaller grids resolve no contact
 POINTS_ROUNDING = 1e-9  # of a number of points that follows from a ratio of sides
@@ -156,7 +156,7 @@ class SingleIndenter(RigidSurface):
     """A single indenter in the middle of the cell, repeated periodically; x counts from there."""
 
     x_first: ClassVar[float] = -0.5
-    length: Positive = 1.0
+    length: Length = 1.0
     """Side of the cell along x, L [m]."""
 
     def smallest_grid(self) -> int:
@@ -187,7 +187,7 @@ class SingleIndenter(RigidSurface):
 class RoundIndenter(SingleIndenter):
     """A single indenter of revolution in the middle of the cell, h(r)."""
 
-    length_y: Positive | None = None
+    length_y: Length | None = None
     """Side of the cell along y [m]; by default the points along y times the spacing along x."""
 
 

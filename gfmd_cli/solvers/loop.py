@@ -73,7 +73,7 @@ class Solver(SpecTable):
     kind: str
     tolerance: Annotated[float, Key(ge=1e-16, lt=1)] = 1e-6
     """Natural residual at which a solution counts as converged."""
-    max_steps: Annotated[int, Key(gt=0)] = 20000
+    max_steps: Annotated[int, Key(gt=0, lt=2**63)] = 20000
     """Largest number of steps on one grid."""
     nested: bool = True
     """Whether to start from the solution on coarser grids."""
@@ -112,6 +112,9 @@ class Solver(SpecTable):
                 f'solver.kind: "{self.kind}" solves contacts with grid.boundary = '
                 f'"{self.boundary}", not "{boundary}"; "auto" takes a solver that does'
             )
+
+    def check_exponent(self, exponent: float | None) -> None:
+        """Raise InputError for k(q) ~ q^n that the solver does not support; None for any other."""
 
     def begin(self, contact: Any, u: Field) -> State:
         """Return the state that starts from displacement `u`, which is overwritten."""

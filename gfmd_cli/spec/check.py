@@ -27,9 +27,12 @@ NUMBER = re.compile(r"\s*[+-]?\d[\d_]*\.?\d*([eE][+-]?\d+)?\s*")
 WORDS = {
     "string_pattern_mismatch": "must begin with a letter or a digit and contain only letters, "
     "digits, '.', '_' and '-', at most 100 of them",
+    "path_type": "must be the name of a file",
+    "model_type": "must be a table",
     "too_short": "must have {min_length} or more values",
 }
 """What is allowed, by the type of pydantic's error, where its message is not plain."""
+LONG_NUMBER = re.compile(r"\d{20,}|0\.0{15,}\d+")
 MODELS: dict[str, Any] = {
     "study": models.StudyTable,
     "surface": Surface,
@@ -156,7 +159,7 @@ class Check:
         for indices in product(*(range(len(table[keys[0]])) for keys in axes)):
             places = {key: i for keys, i in zip(axes, indices, strict=True) for key in keys}
             values = table | {key: table[key][i] for key, i in places.items()}
-            if isinstance(values.get("path"), str):
+            if isinstance(values.get("path"), str) and "\0" not in values["path"]:
                 values = values | {"path": os.path.realpath(self.folder / values["path"])}
             if name in DEFAULT_KINDS:
                 values = {"kind": DEFAULT_KINDS[name]} | values
@@ -268,9 +271,10 @@ def _problem(name: str, places: dict[str, int], detail: Any) -> tuple[str, str]:
     else:
         message = detail["msg"].removeprefix("Value error, ").replace("Input should", "must")
         message = message[:1].lower() + message[1:]
+        message = LONG_NUMBER.sub(lambda number: f"{float(number[0]):g}", message)
         given = detail["input"]
         if detail["type"] in WORDS:
-            message = WORDS[detail["type"]].format(**detail["ctx"])
+            message = WORDS[detail["type"]].format(**detail.get("ctx", {}))
         text = message if isinstance(given, dict) else f"{message}, got {shortened(repr(given))}"
         if isinstance(given, str) and NUMBER.fullmatch(given):
             text += ": write the number without quotation marks"

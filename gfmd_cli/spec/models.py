@@ -115,7 +115,7 @@ class Ladder(SpecTable):
     """First value."""
     to: Positive
     """Upper limit; it is a value only if it belongs to the sequence, up to rounding."""
-    per_decade: Annotated[float, Key(gt=0, le=1000)] = 4
+    per_decade: Annotated[float, Key(ge=1e-3, le=1000)] = 4
     """Values per decade."""
 
     @model_validator(mode="after")

@@ -41,6 +41,8 @@ class TaskWatcher(Watcher):
         self.short = False
         """Whether the stop was requested before a new state was reached."""
         self.resumed = False
+        self.unsaved = False
+        """Whether a state could not be saved, of which the user knows."""
         if (message := checkpoint.restore()) is not None:
             self._warn(message)
         self.notes = checkpoint.notes
@@ -83,7 +85,9 @@ class TaskWatcher(Watcher):
             try:
                 self.checkpoint.save(contact, state, self.notes)
             except SpaceError as error:  # the solve does not need the saved state
-                self._warn(str(error))
+                if not self.unsaved:
+                    self._warn(f"checkpoint: {error}; the solve goes on without")
+                self.unsaved = True
             self.last_save = time.monotonic()
 
     def _report_step(self, contact: Contact, state: State) -> None:

@@ -152,7 +152,7 @@ def _tasks(spec: models.Spec) -> list[Task]:
     resolved = spec.resolved()
     alternatives = {table: getattr(spec, table) for table in models.SWEPT}
     swept_keys = {table: _swept_keys(alternatives[table]) for table in models.SWEPT}
-    tasks: list[Task] = []
+    tasks: dict[str, Task] = {}
     for at, loads in spec.combinations():
         chosen = _chosen(spec, at)
         tables = {table: resolved[table][i] for table, i in at.items()}
@@ -164,25 +164,24 @@ def _tasks(spec: models.Spec) -> list[Task]:
         for load in loads:
             points = _points(spec, chosen, load)
             surface, points_y = chosen["grid"].on_cell(chosen["surface"], points)
-            tasks.append(
-                Task(
-                    index=len(tasks),
-                    **chosen | {"surface": surface},
-                    points=points,
-                    points_y=points_y,
-                    quantity=spec.load.quantity,
-                    load=load,
-                    load_tolerance=spec.load.tolerance,
-                    output=spec.output,
-                    accuracy=spec.accuracy,
-                    id=_task_id(spec, resolved, tables, load),
-                    surface_sha256=tables["surface"].get("sha256", ""),
-                    elastomer_sha256=tables["elastomer"].get("sha256", ""),
-                    scene_id=digest([tables[name] for name in ("surface", "elastomer", "grid")]),
-                    swept=_swept_words(chosen, swept_keys),
-                )
+            task = Task(
+                index=len(tasks),
+                **chosen | {"surface": surface},
+                points=points,
+                points_y=points_y,
+                quantity=spec.load.quantity,
+                load=load,
+                load_tolerance=spec.load.tolerance,
+                output=spec.output,
+                accuracy=spec.accuracy,
+                id=_task_id(spec, resolved, tables, load),
+                surface_sha256=tables["surface"].get("sha256", ""),
+                elastomer_sha256=tables["elastomer"].get("sha256", ""),
+                scene_id=digest([tables[name] for name in ("surface", "elastomer", "grid")]),
+                swept=_swept_words(chosen, swept_keys),
             )
-    return tasks
+            tasks.setdefault(task.id, task)  # loads may agree in all digits that count
+    return list(tasks.values())
 
 
 def _check(spec: models.Spec) -> None:
@@ -202,6 +201,7 @@ def _check(spec: models.Spec) -> None:
         elastomer, dimension = chosen["elastomer"], chosen["surface"].dimension
         boundary = chosen["grid"].boundary or "periodic"
         chosen["solver"].check_boundary(boundary)
+        chosen["solver"].check_exponent(elastomer.exponent)
         if boundary == "free":
             elastomer.check_free_boundary(dimension)
         if spec.load.quantity == "displacement":
