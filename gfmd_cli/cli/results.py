@@ -46,7 +46,10 @@ def analyze(study: Path, as_json: bool, figures: Path | None, theory: "Theory") 
     else:
         print_text(str(comparison))
         if comparison.missing:
-            print_text(f"\n{count(comparison.missing, 'task')} not solved yet: run the spec again.")
+            print_text(
+                f"\n{count(comparison.missing, 'task')} not solved yet, or "
+                "failed: run the spec again, which tells the reason."
+            )
     if figures is not None:
         from gfmd_cli.analysis.figures import draw_all
 
