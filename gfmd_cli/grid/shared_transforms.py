@@ -26,7 +26,7 @@ from gfmd_cli.grid.transposition import Span
 
 BLOCK_COEFFICIENTS = 2**17  # in a block of columns; 2^16 to 2^18 take as long
 MIN_BLOCK_COLUMNS = 32  # shorter pieces of rows take longer to copy
-MIN_COPIED_BYTES = 24 * 2**20  # of coefficients of which blocks are copied; fewer are in the cache
+MIN_COPIED_BYTES = 24 * 2**20  # of coefficients per thread, of which blocks are copied; measured
 BLOCK_ROWS = 8  # rows that are transformed at once where others are zero; they begin aligned
 CACHE_LINE = 8  # complex numbers in single precision in a line of the cache
 
@@ -122,7 +122,7 @@ class ColumnTransforms:
     ) -> None:
         self.work, self.pool, columns = work, pool, work.shape[1]
         rows = padded_rows or len(work)
-        self.is_copied = rows > len(work) or work.nbytes >= MIN_COPIED_BYTES
+        self.is_copied = rows > len(work) or work.nbytes >= MIN_COPIED_BYTES * count
 
         def plan(array: Modes) -> tuple[Execute, Execute]:
             if rows == 1:
