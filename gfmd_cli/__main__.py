@@ -20,9 +20,10 @@ def main() -> None:
     for number in ENDING:
         if signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, _leave)
-    if isinstance(sys.stdout.buffer, io.RawIOBase):  # PYTHONUNBUFFERED: a short write loses text
-        buffer = io.BufferedWriter(sys.stdout.buffer)
-        sys.stdout = io.TextIOWrapper(buffer, sys.stdout.encoding, write_through=True)
+    raw = getattr(sys.stdout, "buffer", None)
+    if isinstance(raw, io.RawIOBase):  # PYTHONUNBUFFERED: a short write would lose text
+        settings = (sys.stdout.encoding, sys.stdout.errors)
+        sys.stdout = io.TextIOWrapper(io.BufferedWriter(raw), *settings, write_through=True)
     gc.set_threshold(10_000)  # compilation makes many objects, and most of them stay
     warnings.formatwarning = lambda message, *_, **__: f"gfmd: {message}\n"
     from gfmd_cli.cli import main as commands

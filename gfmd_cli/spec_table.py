@@ -5,26 +5,13 @@ from collections.abc import Collection
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, Strict
+from pydantic import BaseModel, ConfigDict, Field, Strict
 
 from gfmd_cli.units import labelled
 
 UNIT = re.compile(r" \[(.*?)\]")
 """Unit of a number in the docstring of its key."""
 Positive = Annotated[float, Field(gt=0)]
-LENGTHS = 1e-100, 1e100
-"""Sides of a cell [m], whose squares are in the range of numbers."""
-
-
-def _in_range(length: float) -> float:
-    """The length. Raises ValueError if it is not one of LENGTHS."""
-    low, high = LENGTHS
-    if not low <= length <= high:
-        raise ValueError(f"must be between {low:g} and {high:g}")
-    return length
-
-
-Length = Annotated[float, Field(gt=0), AfterValidator(_in_range)]
 Seed = Annotated[int, Field(ge=0, lt=2**63)]
 FilePath = Annotated[Path, Strict(False)]
 

@@ -310,11 +310,15 @@ def test_text_formats_with_scales_that_are_not_read_are_refused(saved, first):
         read_topography(saved(f"{first}\nZscale = 1e-9\n*\n" + matrix(" ")))
 
 
-@pytest.mark.parametrize("digits", [2, 3, 4])
-@pytest.mark.parametrize("sides", ["", "# Width: 20 um\n# Height: 12 um\n# Value units: nm\n"])
+SIZED = "# Width: 20 um\n# Height: 12 um\n# Value units: nm\n"
+
+
+@pytest.mark.parametrize(("digits", "sides"), [(2, ""), (3, ""), (4, ""), (9, SIZED)])
 @pytest.mark.parametrize("is_row", [True, False])
-def test_rounded_positions_beside_a_matrix_are_refused(saved, digits, sides, is_row):
+def test_positions_beside_a_matrix_are_refused(saved, digits, sides, is_row):
+    """Rounded ones, too, unless the header states the sides; a height beside them is missing."""
     heights = np.random.default_rng(0).normal(size=(40, 40))
+    heights[1, 7] = heights[7, -2] = np.nan
     positions = np.round(np.arange(40) / 25.6, digits)
     heights[(0, slice(None)) if is_row else (slice(None), -1)] = positions
     word = "row" if is_row else "column"
@@ -323,8 +327,18 @@ def test_rounded_positions_beside_a_matrix_are_refused(saved, digits, sides, is_
 
 
 def test_a_smooth_slope_is_not_taken_for_positions(saved):
+    """With a grain of dust beside a border."""
     slope = np.arange(40.0) + 0.02 * np.random.default_rng(0).normal(size=(40, 40))
-    assert read_topography(saved(matrix(" ", heights=slope))).heights.shape == (40, 40)
+    slope[1, 20] += 10
+    for sides in ("", SIZED):
+        assert read_topography(saved(sides + matrix(" ", heights=slope))).heights.shape == (40, 40)
+
+
+def test_a_strip_of_a_slope_is_a_map(saved):
+    """All its columns rise."""
+    slope = np.arange(64.0)[:, None] + 0.1 * np.random.default_rng(0).normal(size=(64, 8))
+    for sides in ("", SIZED):
+        assert read_topography(saved(sides + matrix(" ", heights=slope))).heights.shape == (64, 8)
 
 
 def test_points_with_normals_or_colours_are_refused(saved):
@@ -336,14 +350,15 @@ def test_points_with_normals_or_colours_are_refused(saved):
 
 @pytest.mark.parametrize("line", ["# Max Height: 2.0 um", "# pixel size = 0.25 um"])
 def test_another_line_of_the_header_changes_no_side(saved, line):
-    header = "# Width: 20 um\n# Height: 12 um\n# Value units: nm\n"
-    assert FileSurface(path=saved(header + matrix(" "))).sides == pytest.approx((12e-6, 20e-6))
+    other = SIZED + "# Pixel: 0.1 um\n# Tip: 8 nm\n"
+    for header in (SIZED, other, other.replace("# Width", "# Scan Width")):
+        assert FileSurface(path=saved(header + matrix(" "))).sides == pytest.approx((12e-6, 20e-6))
     with pytest.raises(InputError, match="another line makes them"):
-        read_topography(saved(header + line + "\n" + matrix(" ")))
+        read_topography(saved(SIZED + line + "\n" + matrix(" ")))
 
 
 def test_units_of_sides_that_are_not_read_give_a_warning(saved):
-    header = "# Width [um]: 20\n# Height [um]: 12\n# Value units: nm\n"
+    header = "# Width [um]: 20\n# Height [um]: 12\n# Tip: 8 mm\n# Value units: nm\n"
     (note,) = read_topography(saved(header + matrix(" "))).notes
     assert "states units (um, um), which are not read" in note
 
@@ -356,7 +371,8 @@ def test_a_header_of_nova_that_is_not_read_is_refused(saved, factor, unit_y, wor
         units = f"Unit X = um\nUnit Y = {unit_y}\nUnit Data = nm\nScale Data = {factor}\n"
         return f"NX = 300\nNY = 12\n{units}Scale X = 0.1\nScale Y = 0.1\nStart of Data :\n"
 
-    assert read_topography(saved(header("1", "um") + matrix(" "))).heights.shape == (12, 300)
+    for good in (header("1", "um"), header("1,0", "\u00b5m")):
+        assert read_topography(saved(good + matrix(" "))).heights.shape == (12, 300)
     with pytest.raises(InputError, match=words):
         read_topography(saved(header(factor, unit_y) + matrix(" ")))
 
@@ -367,14 +383,23 @@ def test_empty_cells_at_the_ends_of_rows_that_drift_are_refused(saved, separator
     drift = [separator * (i % 3) + row + separator * (2 - i % 3) for i, row in enumerate(rows)]
     with pytest.raises(InputError, match="an empty cell"):
         read_topography(saved("\n".join(drift)))
-    margins = "\n".join(row + separator for row in rows)  # the same in every row
-    assert read_topography(saved(margins)).heights.shape == HEIGHTS.shape
+    margins = [separator + row + separator for row in rows]  # the same in every row
+    margins[-1] = margins[-1].removesuffix(separator)
+    empty = separator * 300  # as of a spreadsheet
+    for text in ("\n".join(margins), "\n".join([*rows, empty])):
+        assert read_topography(saved(text)).heights.shape == HEIGHTS.shape
 
 
 def test_points_below_a_header_with_two_lengths_are_points(saved):
+    lengths = "# Width: 20 um\n# Distance: 15 mm\n"
     text = points(np.arange(15) / 4, np.arange(12) / 4)
-    header = "# Width: 20 um\n# Distance: 15 mm\nx [um] y [um] z [nm]\n"
-    assert read_topography(saved(header + text)).heights.shape == (12, 15)
+    assert read_topography(saved(f"{lengths}x [um] y [um] z [nm]\n{text}")).heights.shape == (
+        12,
+        15,
+    )
+    x = np.arange(30)[::-1] ** 1.1
+    profile = "".join(f"{a} {b}\n" for a, b in zip(x, HEIGHTS[0], strict=False))
+    assert read_topography(saved(f"{lengths}x [um] z [nm]\n{profile}")).heights.ndim == 1
 
 
 def test_a_channel_of_a_signal_is_not_taken_as_the_heights():
@@ -390,6 +415,8 @@ def test_a_channel_of_a_signal_is_not_taken_as_the_heights():
     assert chosen("Deflection Error", "Height") == "Height"
     assert chosen("Height", "Deflection Error") == "Height"
     assert chosen("Deflection Error", "Height", dataset="Deflection Error") == "Deflection Error"
+    assert chosen("Topography (phase-shift)", "Intensity") == "Topography (phase-shift)"
+    assert chosen("Form error") == "Form error"
     with pytest.raises(InputError, match="seem to be signals: AmplitudeRetrace, PhaseRetrace"):
         chosen("AmplitudeRetrace", "PhaseRetrace")
 

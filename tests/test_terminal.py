@@ -59,6 +59,11 @@ def test_output_that_is_cut_short_is_an_error(tmp_path, unbuffered):
     assert done.stderr == "gfmd: standard output: cannot be written: File too large\n"
 
 
+def test_a_command_runs_without_an_output(tmp_path):
+    command = f'"{sys.executable}" -P -m gfmd_cli schema >&-'
+    assert subprocess.run(["sh", "-c", command], cwd=tmp_path, check=False).returncode == 0
+
+
 def test_a_bench_shows_its_progress_on_a_terminal(tmp_path):
     (tmp_path / "spec.toml").write_text(SPEC)
     short = ("--set", "load.p_star=0.1", "--set", "elastomer.n=1")

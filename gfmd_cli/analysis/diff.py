@@ -110,15 +110,14 @@ def _matches(one: list[Row], other: list[Row], *keys: Callable[[Row], Hashable])
     """Pairs of the same keys, alike in boundary, grid and solver if possible; from both lists."""
     pairs: list[Pair] = []
     paired_ids: set[int] = set()
-    for rows in (one, other):
-        rows.sort(key=lambda row: not row["status"].is_converged)  # these first
+    first, second = (sorted(rows, key=_is_unconverged) for rows in (one, other))
     for alike in ALIKE:
 
         def key_of(row: Row, alike: tuple[str, ...] = alike) -> Hashable:
             return *(key(row) for key in keys), *(row[name] for name in alike)
 
-        waiting = grouped((row for row in other if id(row) not in paired_ids), key_of)
-        for row in one:
+        waiting = grouped((row for row in second if id(row) not in paired_ids), key_of)
+        for row in first:
             if id(row) not in paired_ids and (partners := waiting.get(key_of(row))):
                 partner = partners.pop(0)
                 paired_ids |= {id(row), id(partner)}
@@ -127,6 +126,10 @@ def _matches(one: list[Row], other: list[Row], *keys: Callable[[Row], Hashable])
     for rows in (one, other):
         rows[:] = [row for row in rows if id(row) not in paired_ids]
     return sorted(pairs, key=lambda pair: int(pair.one["task"]))
+
+
+def _is_unconverged(row: Row) -> bool:
+    return not row["status"].is_converged
 
 
 def _pairing_note(pair: Pair) -> str:

@@ -26,7 +26,7 @@ COMMANDS = [
 """In the order in which a user needs them."""
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 UNWRITABLE = (*FULL, errno.EROFS, errno.ENAMETOOLONG)
-"""Errors of the file system, the first ones where nothing more can be written."""
+"""Errors of writing; those in FULL mean that a disk, a quota or a file size is exhausted."""
 
 
 class Commands(click.Group):

@@ -106,7 +106,7 @@ class DistributedGrid(Grid):
         self._transposition.to_columns(*self._arrays)
 
     def _to_lines(self) -> None:
-        work, lines, spare = self._arrays[1], self._arrays[0], self._arrays[2]
+        lines, work, spare = self._arrays
         self._transposition.to_lines(work, lines, spare)
 
     @property

@@ -1,7 +1,7 @@
 """Compiled kernels that multiply coefficients between two transforms; see `Grid.filter_by`.
 
-The columns `start` to `stop` of the coefficients are multiplied, which lie in `modes`, as pairs of
-real values, from column `first` on. k is the symbol.
+A kernel multiplies the columns `start` to `stop` of the coefficients. In `modes` they are pairs of
+real values and begin at column `first`. k is the symbol.
 """
 
 from gfmd_cli.grid.compilation import kernel
@@ -11,8 +11,8 @@ from gfmd_cli.grid.compilation import kernel
 def apply_symbol(modes, first, k, start, stop, factor, has_zero, has_nyquist):
     """Multiply coefficients by factor k(q); sum over q of k(q) |coefficient|^2.
 
-    `has_zero` and `has_nyquist` are 1 if q_x = 0 and the Nyquist wavenumber are the first and the
-    last column of k, and 0 otherwise.
+    `has_zero` is 1 if the first column of k is q_x = 0, and `has_nyquist` is 1 if its last one is
+    the Nyquist wavenumber; otherwise they are 0.
     """
     total, last = 0.0, stop - start - 1
     has_zero *= start == 0

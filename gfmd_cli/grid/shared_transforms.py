@@ -26,8 +26,8 @@ from gfmd_cli.grid.transposition import Span
 
 BLOCK_COEFFICIENTS = 2**17  # in a block of columns; 2^16 to 2^18 take as long
 MIN_BLOCK_COLUMNS = 32  # shorter pieces of rows take longer to copy
-MIN_COPIED_BYTES = 24 * 2**20  # of coefficients per thread, of which blocks are copied; measured
-BLOCK_ROWS = 8  # rows that are transformed at once where others are zero; they begin aligned
+MIN_COPIED_BYTES = 24 * 2**20  # columns are copied where a thread has more coefficients; measured
+BLOCK_ROWS = 8  # rows per call where rows of zeros are skipped; each block begins aligned
 CACHE_LINE = 8  # complex numbers in single precision in a line of the cache
 
 Execute = Callable[[], None]
@@ -56,8 +56,8 @@ class RowTransforms:
         self._backward = [fftw(c, v, (1,), "FFTW_BACKWARD").execute for v, c in arrays]
         block = pyfftw.empty_aligned((BLOCK_ROWS, lines.shape[1]), dtype=lines.dtype)
         real = block.view(values.dtype)[:, : values.shape[1]]
-        has_blocks = len(lines) % BLOCK_ROWS == 0
-        self._of_block = [fftw(real, block, (1,), "FFTW_FORWARD") for _ in parts if has_blocks]
+        count = len(parts) if len(lines) % BLOCK_ROWS == 0 else 0
+        self._of_block = [fftw(real, block, (1,), "FFTW_FORWARD") for _ in range(count)]
 
     def forward(self, blocks: Sequence[int] | None = None) -> None:
         """Transform all rows, or some blocks of `BLOCK_ROWS` rows while the others are zero."""
@@ -122,7 +122,8 @@ class ColumnTransforms:
     ) -> None:
         self.work, self.pool, columns = work, pool, work.shape[1]
         rows = padded_rows or len(work)
-        self.is_copied = rows > len(work) or work.nbytes >= MIN_COPIED_BYTES * count
+        is_large = work.nbytes >= MIN_COPIED_BYTES * count and len(work) > 1
+        self.is_copied = rows > len(work) or is_large
 
         def plan(array: Modes) -> tuple[Execute, Execute]:
             if rows == 1:
@@ -132,8 +133,8 @@ class ColumnTransforms:
             return forward, backward
 
         if self.is_copied:
-            width = min(max(BLOCK_COEFFICIENTS // rows, MIN_BLOCK_COLUMNS), columns)
-            width = ceil(columns / round(columns / width))
+            width = max(BLOCK_COEFFICIENTS // rows, MIN_BLOCK_COLUMNS)
+            width = ceil(columns / (count * max(1, round(columns / width / count))))
             parts = [slice(a, min(a + width, columns)) for a in range(0, columns, width)]
             blocks = [pyfftw.empty_aligned((rows, width), work.dtype) for _ in range(count)]
             plans = [plan(block) for block in blocks]

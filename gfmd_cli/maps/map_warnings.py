@@ -5,7 +5,7 @@ Each function returns a warning about what its docstring describes, or "" if it 
 
 import numpy as np
 
-from gfmd_cli.grid.arrays import Field, row_blocks
+from gfmd_cli.grid.arrays import Field, Mask, row_blocks
 from gfmd_cli.maps.map_preparation import border_step, level
 from gfmd_cli.maps.topography import Topography
 
@@ -13,7 +13,7 @@ MAX_GRADIENT = 3.0  # rms; a choice: surfaces of machined or worn solids have le
 MIN_GRADIENT = 1e-6  # rms; a choice: polished mirrors have about that
 MAX_BORDER_STEP = 5.0  # ratio of the step across the border to that inside; a choice: 1 if periodic
 MIN_BORDER_STEP = 1.5  # such a ratio that may be chance; a choice
-BORDER_SHARE = 0.05  # of the squared gradient, that steps across the border may make up; a choice
+BORDER_SHARE = 0.1  # largest fraction of the squared gradient that the border may have; a choice
 MAX_TILT = 0.5  # fraction of the variance of the heights that is a tilt; a choice
 MIN_ROUNDING_STEP = 0.5  # over the rms difference of neighbours: the gradient is 3 % too large
 SAMPLE_SIZE = 10_000  # heights that exclude most maps; to sort all takes seconds
@@ -22,8 +22,8 @@ MAX_EQUAL_NEIGHBOURS = 0.2  # fraction of pairs, at which the gradient is 3 % to
 MIN_SHOWN_FRACTION = 0.01  # of the heights, from which a warning states the percentage; a choice
 PLATEAU_FRACTION = 0.5  # of the heights: so many equal ones are part of the surface; a choice
 MIN_OTHERS = 8  # other heights, without which one that is apart is no outlier; a choice
-USUAL_PERCENT = 95  # of the differences between neighbours, which are 2 rms values at most
-SPIKE_RATIO = 10.0  # ratio of a spike to such a difference; a choice: 20 rms values
+USUAL_PERCENT = 95  # of the differences between neighbours; of Gaussian ones, below 2 rms values
+SPIKE_RATIO = 10.0  # ratio of a spike to such a difference; a choice
 MAX_SPIKES = 16  # on either side; a choice: more are a part of the surface
 CLIPPED_RATIO = 10  # ratio of the numbers of equal heights, highest to second; about 1 if rounded
 SIDE_TOLERANCE = 1e-3  # relative difference, beyond which a side is probably wrong; a choice
@@ -147,10 +147,7 @@ def outliers(topography: Topography) -> str:
                 f"{count} heights{percentage} are exactly the {word}, {extreme:g}: clipped at the "
                 "range of the instrument, or a mark of missing heights? Replace such a mark by NaN"
             )
-    known = topography.heights
-    if topography.missing is not None:
-        known = np.where(topography.missing, np.nan, known)
-    return _often_equal(heights) or _spikes(heights) or _single_points(known)
+    return _often_equal(heights) or _spikes(heights) or _single_points(topography)
 
 
 def _often_equal(heights: Field) -> str:
@@ -158,11 +155,11 @@ def _often_equal(heights: Field) -> str:
     sample = heights.flat[:: 1 + heights.size // SAMPLE_SIZE]
     values, counts = np.unique(sample, return_counts=True)
     order = np.argsort(counts)
+    if values.size < 2 or counts[order[-1]] <= CLIPPED_RATIO * counts[order[-2]]:
+        return ""
     value = values[order[-1]]
-    second = counts[order[-2]] if len(order) > 1 else counts[order[-1]]
     fraction = np.count_nonzero(heights == value) / heights.size
-    is_usual = counts[order[-1]] <= CLIPPED_RATIO * second
-    if is_usual or not MIN_SHOWN_FRACTION < fraction <= PLATEAU_FRACTION:
+    if not MIN_SHOWN_FRACTION < fraction <= PLATEAU_FRACTION:
         return ""
     return (
         f"{fraction:.0%} of the heights are exactly {value:g}: an unfinished scan, or a mark of "
@@ -170,23 +167,24 @@ def _often_equal(heights: Field) -> str:
     )
 
 
-def _single_points(heights: Field) -> str:
-    """Points that are far above, or far below, all points next to them; NaN is missing."""
-    inside = heights[tuple(slice(1, -1) for _ in heights.shape)]
-    if inside.size < MIN_OTHERS:
-        return ""
-    above, below = np.full(inside.shape, np.inf), np.full(inside.shape, np.inf)
-    usual = 0.0
-    for axis in range(heights.ndim):
-        for shift in (-1, 1):
-            place = [slice(1, -1)] * heights.ndim
-            place[axis] = slice(1 + shift, heights.shape[axis] - 1 + shift)
-            difference = inside - heights[tuple(place)]
-            sizes = np.abs(difference[np.isfinite(difference)])
-            usual = max(usual, float(np.percentile(sizes, USUAL_PERCENT)) if sizes.size else 0.0)
-            np.minimum(above, difference, out=above)
-            np.minimum(below, -difference, out=below)
-    count = int(np.count_nonzero(np.maximum(above, below) > SPIKE_RATIO * usual)) if usual else 0
+def _single_points(topography: Topography) -> str:
+    """Points inside the map that are far above, or far below, all points next to them."""
+    heights, missing = np.atleast_2d(topography.heights), topography.missing
+    missing = None if missing is None else missing.reshape(heights.shape)
+    is_map, count = len(heights) > 1, 0
+    least = SPIKE_RATIO * _usual_difference(heights, missing)
+    for rows in row_blocks(heights) if least else ():
+        around = slice(max(rows.start - is_map, 0), rows.stop + is_map)
+        block = heights[around]
+        if missing is not None:
+            block = np.where(missing[around], np.nan, block)
+        inner = slice(1, -1) if is_map else slice(None)
+        own = block[inner, 1:-1]
+        neighbours = [block[inner, :-2], block[inner, 2:]]
+        neighbours += [block[:-2, 1:-1], block[2:, 1:-1]] if is_map else []
+        above = np.min([own - each for each in neighbours], axis=0)
+        below = np.min([each - own for each in neighbours], axis=0)
+        count += int(np.count_nonzero((above > least) | (below > least)))
     if not count:
         return ""
     what = "1 point lies" if count == 1 else f"{count} points lie"
@@ -194,6 +192,20 @@ def _single_points(heights: Field) -> str:
         f"{what} above or below all neighbours by more than {SPIKE_RATIO:g} times the difference "
         f"that {USUAL_PERCENT} % of neighbouring heights have at most: spikes? Replace them by NaN"
     )
+
+
+def _usual_difference(heights: Field, missing: Mask | None) -> float:
+    """The difference that most neighbours along the rougher axis have at most, from a sample."""
+    step, usual = 1 + heights.size // (10 * SAMPLE_SIZE), 0.0
+    for axis, sample in ((1, np.s_[::step]), (0, np.s_[:, ::step])):
+        known = heights[sample]
+        if missing is not None:
+            known = np.where(missing[sample], np.nan, known)
+        differences = np.abs(np.diff(known, axis=axis))
+        differences = differences[np.isfinite(differences)]
+        if differences.size:
+            usual = max(usual, float(np.percentile(differences, USUAL_PERCENT)))
+    return usual
 
 
 def _spikes(heights: Field) -> str:

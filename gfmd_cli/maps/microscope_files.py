@@ -25,6 +25,7 @@ from gfmd_cli.maps.height_map import (
 from gfmd_cli.maps.point_tables import NO_GRID, read_points
 from gfmd_cli.maps.text_tables import (
     MATRIX_COLUMNS,
+    OF_SIDES,
     OWN_HEADERS,
     columns,
     header,
@@ -48,8 +49,10 @@ SIGNATURE_BYTES = 512  # at the beginning of a file, by which readers recognise 
 MAX_POINT_COLUMNS = 10  # of a table of points: x, y, z with colours and normals; a choice
 SIGNALS = re.compile("error|deflection|amplitude|phase", re.IGNORECASE)
 """Names of channels whose lengths are those of a signal."""
+HEIGHTS = re.compile(r"height|topograph|^z\b", re.IGNORECASE)
+"""Names of channels that hold heights, whatever else they say."""
 NOVA = re.compile(rb"^[ \t]*(Scale Data|Unit X|Unit Y)[ \t]*=[ \t]*(\S+)", re.MULTILINE)
-"""Lines of the header of Nova that the reader does not read, and the unit along x."""
+"""Header lines of Nova: two that the reader ignores, and "Unit X" to compare with."""
 MANY_VALUES = 8  # in a row, for which rounding may make the steps uneven; a choice
 MAX_UNEVENNESS = 0.25  # of rounded positions, over their distance; a choice
 
@@ -166,7 +169,7 @@ def _read_channel(path: Path, file: BinaryIO, reader: Any, dataset: str | None) 
     if kind == "asc":
         lines = header(file, (1, *shape[1:])[-1])
         if unsized:
-            note = unread_units(lines, (str(in_unit_of_file.unit),) if has_unit else ())
+            note = unread_units(lines, of_sides=has_unit)
         elif has_unit or metric_sides:
             _check_stated_sides(path, lines, sides)
     return HeightMap(
@@ -204,25 +207,26 @@ def _check_matrix(path: Path, file: BinaryIO, scan: Any, unsized: bool) -> None:
             f"a header that states its sides. {REMEDY}"
         )
     _check_all_rows_read(path, file, rows, columns_read)
-    _check_all_are_heights(path, scan.heights().T)
+    _check_all_are_heights(path, scan.heights().T, unsized=unsized)
     nova = dict(NOVA.findall(b"".join(header(file, columns_read))))
-    factor, unit_x, unit_y = map(nova.get, (b"Scale Data", b"Unit X", b"Unit Y"))
-    if factor is not None and not (is_number(factor) and float(factor) == 1.0):
+    factor = nova.get(b"Scale Data", b"1").replace(b",", b".")
+    units = [nova[key].decode(errors="replace") for key in (b"Unit X", b"Unit Y") if key in nova]
+    if not (is_number(factor) and float(factor) == 1.0):
         raise InputError(
             f"{path}: the header states 'Scale Data = {factor.decode(errors='replace')}', which is "
             "not applied: are the heights those of the table, or to be multiplied? Save them "
             "multiplied, with a factor of 1"
         )
-    if unit_y is not None and unit_y != unit_x:
+    if len(units) == 2 and units[0] != units[1] and len(set(map(in_metres, units))) > 1:
         raise InputError(f"{path}: 'Unit Y' is not 'Unit X'; save both sides in the same unit")
 
 
 def _check_stated_sides(path: Path, lines: list[bytes], sides: tuple[float, ...]) -> None:
     """Raise InputError where the two sides that a header states are not those that were read.
 
-    The reader takes any line that ends in such a word, as "Max Height", as a side.
+    The reader takes every line with such a word as a side, for example "Max Height".
     """
-    stated = sides_in(lines)
+    stated = sides_in([line for line in lines if OF_SIDES.match(line.decode(errors="replace"))])
     if len(stated) == 2 and not np.allclose(sorted(stated), sorted(sides), rtol=1e-6):
         raise InputError(
             f"{path}: the header states two sides, {stated[0]:g} m and {stated[1]:g} m, but "
@@ -283,22 +287,27 @@ def _sides_with_unit(channel: Any, sides: tuple[float, ...]) -> tuple[float, ...
     return tuple(factor * side for factor, side in zip(factors, sides, strict=True) if factor)
 
 
-def _check_all_are_heights(path: Path, table: Field) -> None:
+def _check_all_are_heights(path: Path, table: Field, *, unsized: bool) -> None:
     """Raise InputError where a row or column of a table seems to be positions or numbers.
 
-    The first value of such a row may be that of a corner.
+    The first value of such a row may be that of a corner. Where the header states the sides, only
+    exact positions count.
     """
+    table = np.ma.filled(table, np.nan)
     for word, values in (("row", table), ("column", table.T)):
-        largest = MAX_UNEVENNESS if values.shape[1] > MANY_VALUES else EVEN_TOLERANCE
+        is_rounded = unsized and values.shape[1] > MANY_VALUES
+        largest = MAX_UNEVENNESS if is_rounded else EVEN_TOLERANCE
         for first, second in (values[:2, 1:], values[:-3:-1, 1:]):
-            if _unevenness(first) <= largest and _unevenness(second) > 4 * largest:
+            if _largest_deviation(first) <= largest and _usual_deviation(second) > 4 * largest:
                 raise InputError(
                     f"{path}: a {word} of the table is ..., {first[0]:g}, {first[1]:g}, "
                     f"{first[2]:g}, ...: positions or numbers, not heights? Remove it from the file"
                 )
-    if table.shape[1] <= MAX_POINT_COLUMNS and len(table) > SORTED_ROWS:
+    if unsized and table.shape[1] <= MAX_POINT_COLUMNS and len(table) > SORTED_ROWS:
         steps = np.diff(table, axis=0)
         is_sorted = np.all(steps >= 0, axis=0) | np.all(steps <= 0, axis=0)
+        if table.shape[1] > MATRIX_COLUMNS:  # lines of points: most steps along y are zero
+            is_sorted &= np.mean(steps == 0, axis=0) > 0.5
         if np.any(is_sorted & np.any(steps, axis=0)):
             raise InputError(
                 f"{path}: one of {table.shape[1]} columns is sorted: positions, not heights? Save "
@@ -306,13 +315,22 @@ def _check_all_are_heights(path: Path, table: Field) -> None:
             )
 
 
-def _unevenness(values: Field) -> float:
-    """Largest deviation of values from a line, over their mean step; infinite without one."""
-    values = np.ma.filled(values, np.nan)
-    if len(values) < 3 or values[0] == values[-1]:
+def _largest_deviation(values: Field) -> float:
+    """Largest deviation of values from even spacing, over the mean step; infinite without one."""
+    if len(values) < 3 or not np.isfinite(values).all() or values[0] == values[-1]:
         return np.inf
     step = (values[-1] - values[0]) / (len(values) - 1)
     return float(np.abs(values - values[0] - step * np.arange(len(values))).max() / abs(step))
+
+
+def _usual_deviation(values: Field) -> float:
+    """Median deviation of the known values from even spacing, over their median step."""
+    place = np.flatnonzero(np.isfinite(values))
+    if len(place) < 3:
+        return np.inf
+    step = float(np.median(np.diff(values[place]) / np.diff(place)))
+    rest = values[place] - step * place
+    return float(np.median(np.abs(rest - np.median(rest))) / abs(step)) if step else np.inf
 
 
 def _check_all_rows_read(path: Path, file: BinaryIO, rows: int, columns: int) -> None:
@@ -368,7 +386,8 @@ def _height_channel(path: Path, reader: Any, name: str | None) -> Any:
         name = only_map(path, maps or list(channels))
     elif name is None and channels:
         default, maps = reader.default_channel.channel_id, list(channels)
-        maps = [key for key in maps if not SIGNALS.search(key)]
+        if len(maps) > 1:
+            maps = [key for key in maps if HEIGHTS.search(key) or not SIGNALS.search(key)]
         if not maps:
             raise InputError(
                 f"{path}: its channels seem to be signals: {', '.join(channels)}; if one holds "

@@ -32,6 +32,7 @@ MAX_DEVIATION = 0.05  # of positions, over their distance; a choice: 0.015 of 0.
 SAME_POSITION = 0.0, 0.5
 """Gaps between equal positions, over the largest gap: of tables, and of stages that jitter."""
 MIN_PRESENT = 0.5  # fraction of the points of a grid, without which they are scattered; a choice
+MIN_STEPS = 8  # all of one sign, that heights do not have by chance; a choice
 NAMES = {"x", "y", *HEIGHT_NAMES}
 COLUMN_LINES = 2  # of a header, that state names and units of columns: the last ones
 WORDS = re.compile(r"[\[(]([^\])]*)[\])]|([^\W_]+)")
@@ -54,8 +55,14 @@ def read_points(path: Path, file: BinaryIO) -> HeightMap | None:
         return None
     lines = content.replace(b",", b" ").replace(b";", b" ").splitlines()
     first = next((i for i, line in enumerate(lines) if _is_row(line.split(), count)), 0)
-    table = _numbers(path, lines, first, count)
-    if len(sides_in(lines[:first])) == 2 and not _are_points(path, table):
+    is_sized = len(sides_in(lines[:first])) == 2
+    try:
+        table = _numbers(path, lines, first, count)
+    except InputError:
+        if is_sized:
+            return None
+        raise
+    if is_sized and not _are_points(path, table):
         return None
     if count == 3 and _is_numbered(table):
         table, count = table[:, 1:], 2
@@ -108,7 +115,7 @@ def _are_points(path: Path, table: Field) -> bool:
     """Whether a table below a header with two sides is one of positions, not a narrow matrix."""
     if table.shape[1] == 2:
         steps = np.diff(table[:, 0])
-        return bool(steps.size > 1 and steps[0] > 0 and np.ptp(steps) <= MAX_DEVIATION * steps[0])
+        return bool(steps.size >= MIN_STEPS and (np.all(steps > 0) or np.all(steps < 0)))
     try:
         _grid(path, table)
     except InputError:

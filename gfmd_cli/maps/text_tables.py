@@ -43,6 +43,13 @@ GROUPED = re.compile(rb"[\t;]([-+]?\d{1,3}( \d{3})+([,.]\d*)?)(?=[\t;\r]|$)")
 EMPTY = re.compile(rb"([,;])[ \t]*\1.*\d")
 """An empty cell between commas or semicolons, with a number in the same row after it."""
 SEPARATORS = b"\t", b";", b","
+"""Of cells; commas are decimal ones beside the others."""
+SIDE_LABELS = (
+    "x-length|Width|Šířka|Breite|Anchura|Largeur|Larghezza|幅|폭|Largura|Ширина|"
+    "y-length|Height|Výška|Höhe|Altura|Hauteur|Altezza|高さ|높이|Высота"
+)
+"""Of the lines of a header that state the sides of a matrix, in all languages of Gwyddion."""
+OF_SIDES = re.compile(rf"^\W*({SIDE_LABELS})\b")
 
 
 def is_numeric(line: bytes) -> bool:
@@ -116,10 +123,12 @@ def header(file: BinaryIO, columns: int) -> list[bytes]:
     return lines
 
 
-def unread_units(lines: list[bytes], known: tuple[str, ...]) -> str:
-    """A warning about units of length in a header, other than known ones; "" without any."""
-    words = re.split(r"[\s,;:=/_()\[\]\"#]+", b" ".join(lines).decode(errors="replace"))
-    units = [word for word in words if is_unit(word) and word not in known]
+def unread_units(lines: list[bytes], *, of_sides: bool) -> str:
+    """A warning about units of length in a header, or only in its lines of sides; "" if none."""
+    texts = [line.decode(errors="replace") for line in lines]
+    if of_sides:
+        texts = list(filter(OF_SIDES.match, texts))
+    units = [word for word in re.split(r"[\s,;:=/_()\[\]\"#]+", " ".join(texts)) if is_unit(word)]
     if not units:
         return ""
     return (
@@ -165,10 +174,12 @@ def with_blanks(file: BinaryIO) -> tuple[BinaryIO, str]:
     start = file.read(WINDOW_BYTES)
     table = start[len(start) // 2 :]  # without most headers
     width = columns(file)
-    rows = list(filter(is_numeric, start.splitlines())) if width else []
+    whole = start.splitlines()[: -1 if len(start) == WINDOW_BYTES else None]
+    rows = list(filter(is_numeric, whole)) if width else []
     if cell := next(filter(None, map(GROUPED.search, rows)), None):
         raise ValueError(f"{cell[1].decode()}: blanks separate thousands; save the numbers without")
-    is_shifted = width >= MATRIX_COLUMNS and any(_has_empty_cells(rows, by) for by in SEPARATORS)
+    by = SEPARATORS if not any(b";" in row or b"\t" in row for row in rows) else SEPARATORS[:-1]
+    is_shifted = width >= MATRIX_COLUMNS and any(_has_empty_cells(rows, each) for each in by)
     if is_shifted or any(map(EMPTY.search, rows)):
         raise ValueError("an empty cell in a row of numbers; write NaN for a missing height")
     if b"," in table or b";" in table:
@@ -187,16 +198,19 @@ def with_blanks(file: BinaryIO) -> tuple[BinaryIO, str]:
 
 
 def _has_empty_cells(rows: list[bytes], separator: bytes) -> bool:
-    """Whether rows differ in which of their cells are empty, so that these are not a margin."""
-    ends = separator, separator + separator
-    if not any(ends[1] in row or row.startswith(separator) for row in rows):
+    """Whether rows differ in which cells before their last number are empty.
+
+    Cells that are empty in all rows are a margin, and those at the ends of rows shift nothing.
+    """
+    if not any(separator * 2 in row or row.startswith(separator) for row in rows):
         return False
-    empty = {
-        tuple(i for i, cell in enumerate(row.rstrip(b"\r\n").split(separator)) if not cell.strip())
-        for row in rows
-        if separator in row
-    }
-    return len(empty) > 1
+    patterns = set()
+    for row in rows:
+        cells = [cell.strip() for cell in row.split(separator)]
+        full = [i for i, cell in enumerate(cells) if cell]
+        if len(full) >= MATRIX_COLUMNS and all(is_number(cells[i]) for i in full):
+            patterns.add(tuple(i for i in range(full[-1]) if not cells[i]))
+    return len(patterns) > 1
 
 
 def _warning_of_thousands(start: bytes, columns: int) -> str:

@@ -201,7 +201,7 @@ class Contact:
         return sqrt(violation / self.grid.size) / min(self.pressure, 1.0)
 
     def noise(self, dtype: "np.dtype[Any]") -> float:
-        """Estimated rms error of the stress by rounded displacements, over their rms value.
+        """Estimated rms error of the stress by rounding, divided by the rms displacement.
 
         Rounding is white noise, and short waves dominate its stress: eps / 2 times k_max.
         """

@@ -32,7 +32,7 @@ from gfmd_cli.maps.pictures import Picture, picture
 from gfmd_cli.maps.topography import Region, Topography, read_topography
 from gfmd_cli.physics.highest_point import highest_point
 from gfmd_cli.physics.indenters import SMALLEST_GRID, RigidSurface
-from gfmd_cli.spec_table import FilePath, Length, Positive
+from gfmd_cli.spec_table import FilePath, Positive
 from gfmd_cli.units import count
 
 
@@ -84,10 +84,10 @@ class FileSurface(RigidSurface):
     of the map."""
     scale: Positive = 1.0
     """Factor from the heights of the file to metres; also for its side if it states no unit."""
-    length: Length | None = None
+    length: Positive | None = None
     """Side of the map along x [m]; with a region or cropped, of the part that is used. By default
     that of the file, or 1 if the file states none."""
-    length_y: Length | None = None
+    length_y: Positive | None = None
     """Side of the map along y [m]; by default that of the file, else the points along y times the
     spacing along x."""
 

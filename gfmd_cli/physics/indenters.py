@@ -13,13 +13,15 @@ import numpy as np
 from pydantic import Field as Key
 from pydantic import model_validator
 
+from gfmd_cli.errors import InputError
 from gfmd_cli.grid.arrays import Field, Mask, MaskedField
 from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.maps.pictures import Picture
 from gfmd_cli.physics.highest_point import highest_point
-from gfmd_cli.spec_table import Length, Positive, SpecTable
+from gfmd_cli.spec_table import Positive, SpecTable
 
 SMALLEST_GRID = 8  # points along an axis; a choice: smaller grids resolve no contact
+MAX_ASPECT_RATIO = 1e9  # side along y over side along x; a choice: no grid has so many points
 POINTS_ROUNDING = 1e-9  # of a number of points that follows from a ratio of sides
 
 
@@ -58,14 +60,24 @@ class RigidSurface(SpecTable):
         """Smallest number of points along y, by default at the same spacing; 1 for a line."""
         if self.dimension == 1:
             return 1
-        length_y, length = self.sides
+        length_y, length = self._checked_sides()
         return max(SMALLEST_GRID, ceil(self.smallest_grid() * length_y / length - POINTS_ROUNDING))
+
+    def _checked_sides(self) -> tuple[float, ...]:
+        """The sides. Raises InputError where no grid has so many points along y."""
+        length_y, length = self.sides
+        if length_y / MAX_ASPECT_RATIO > length:
+            raise InputError(
+                f"surface.length_y = {length_y:g} m is out of range: the side along x has "
+                f"{length:g} m"
+            )
+        return length_y, length
 
     def points_y(self, points: int) -> int:
         """Points along y where a spec gives none: the even number nearest to square pixels."""
         if self.dimension == 1:
             return 1
-        length_y, length = self.sides
+        length_y, length = self._checked_sides()
         return points if length_y == length else 2 * round(points * length_y / length / 2)
 
     def on_cell(self, points: int, points_y: int) -> Self:
@@ -156,7 +168,7 @@ class SingleIndenter(RigidSurface):
     """A single indenter in the middle of the cell, repeated periodically; x counts from there."""
 
     x_first: ClassVar[float] = -0.5
-    length: Length = 1.0
+    length: Positive = 1.0
     """Side of the cell along x, L [m]."""
 
     def smallest_grid(self) -> int:
@@ -187,7 +199,7 @@ class SingleIndenter(RigidSurface):
 class RoundIndenter(SingleIndenter):
     """A single indenter of revolution in the middle of the cell, h(r)."""
 
-    length_y: Length | None = None
+    length_y: Positive | None = None
     """Side of the cell along y [m]; by default the points along y times the spacing along x."""
 
 

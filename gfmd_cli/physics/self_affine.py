@@ -13,7 +13,7 @@ from pydantic import model_validator
 from gfmd_cli.grid.arrays import Field, Modes
 from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.physics.indenters import SMALLEST_GRID, RigidSurface
-from gfmd_cli.spec_table import Length, Positive, Seed
+from gfmd_cli.spec_table import Positive, Seed
 
 
 class SelfAffine(RigidSurface):
@@ -39,9 +39,9 @@ class SelfAffine(RigidSurface):
     """Seed of the random phases."""
     h_std: Positive | None = None
     """Root-mean-square height [m]; by default the prefactor of C is 1 m^2."""
-    length: Length = 1.0
+    length: Positive = 1.0
     """Side of the cell along x, L [m]."""
-    length_y: Length | None = None
+    length_y: Positive | None = None
     """Side of the cell along y [m]; by default the points along y times the spacing along x."""
 
     @model_validator(mode="after")

@@ -111,9 +111,6 @@ class Solver(SpecTable):
                 f'"{self.boundary}", not "{boundary}"; "auto" takes a solver that does'
             )
 
-    def check_exponent(self, exponent: float | None) -> None:
-        """Raise InputError for k(q) ~ q^n that the solver does not support; None for any other."""
-
     def begin(self, contact: Any, u: Field) -> State:
         """Return the state that starts from displacement `u`, which is overwritten."""
         raise NotImplementedError

@@ -12,8 +12,6 @@ from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.physics.contact import Contact
 from gfmd_cli.solvers.loop import Solver, State
 
-NOT_FLAT = 'solver.kind: "sort" requires a stiffness independent of q (n = 0)'
-
 
 class Sort(Solver):
     """Exact solution for constant k = k_0 (n = 0): sigma = k_0 max(h - c, 0), with <sigma> = p.
@@ -27,15 +25,10 @@ class Sort(Solver):
     iterative: ClassVar[bool] = False
     max_exponent: ClassVar[float] = 0.0
 
-    def check_exponent(self, exponent: float | None) -> None:
-        """Raise InputError if k(q) depends on q."""
-        if exponent not in (0.0, None):
-            raise InputError(NOT_FLAT)
-
     def begin(self, contact: Contact, u: Field) -> State:
         """The solution; `u` is overwritten. Raises InputError if k(q) depends on q."""
         if not is_flat(contact):
-            raise InputError(NOT_FLAT)
+            raise InputError('solver.kind: "sort" requires a stiffness independent of q (n = 0)')
         displaced = contact.pressure / float(contact.k_along_x[-1])
         known = contact.height if contact.may_touch is None else contact.height[contact.may_touch]
         level = non_contact_height(contact.grid, known, displaced)

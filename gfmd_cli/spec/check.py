@@ -271,7 +271,8 @@ def _problem(name: str, places: dict[str, int], detail: Any) -> tuple[str, str]:
     else:
         message = detail["msg"].removeprefix("Value error, ").replace("Input should", "must")
         message = message[:1].lower() + message[1:]
-        message = LONG_NUMBER.sub(lambda number: f"{float(number[0]):g}", message)
+        if detail["type"].startswith(("greater_than", "less_than")):
+            message = LONG_NUMBER.sub(lambda number: f"{float(number[0]):g}", message)
         given = detail["input"]
         if detail["type"] in WORDS:
             message = WORDS[detail["type"]].format(**detail.get("ctx", {}))
