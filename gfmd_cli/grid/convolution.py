@@ -102,10 +102,9 @@ class PaddedTransform:
         values[:, self.columns :] = 0.0
         mirrored = symbol[(self.padded_rows - 1) // 2 : 0 : -1]
 
-        def multiply(columns: Columns) -> float:
+        def multiply(columns: Columns) -> None:
             columns.coefficients[: len(symbol)] *= symbol[:, columns.part]
             columns.coefficients[len(symbol) :] *= mirrored[:, columns.part]
-            return 0.0
 
         along_rows.forward()
         self._to_columns()

@@ -25,7 +25,7 @@ from gfmd_cli.grid.transposition import Span
 T = TypeVar("T")
 ALL_ROWS = slice(None)
 MIN_THREADED_SIDE = 512  # points per side from which a second thread pays
-Filter = Callable[..., float]
+Filter = Callable[..., None]
 """A kernel that multiplies coefficients, see `Grid.filter_by`."""
 Shape = tuple[int, ...]
 """Numbers of points along the axes of a field, (y, x), or (x,) of a line."""
@@ -248,31 +248,27 @@ class Grid:
         """Undo `_to_columns`."""
 
     def filter_by(
-        self, kernel: Filter, symbol: Field, *numbers: float, blocks: Sequence[int] | None = None
-    ) -> float:
+        self, kernel: Filter, symbol: Field, *arguments: Any, blocks: Sequence[int] | None = None
+    ) -> None:
         """`padded` <- values whose coefficients a kernel has multiplied: a pair of transforms.
-
-        Returns the sum over the grid of what the kernel returns.
 
         Parameters
         ----------
-        kernel : see `grid.kernels`; its last arguments are the factor 1/size and the `numbers`
+        kernel : see `grid.kernels`; it gets the factor 1/size and the `arguments`
         blocks : numbers of the blocks of 8 rows outside of which all values are zero; the rows
             there are not transformed
         """
         symbol, (_, _, along_rows, along_columns) = self.as_rows(symbol), self._workspace
 
-        def multiply(columns: Columns) -> float:
+        def multiply(columns: Columns) -> None:
             modes, span = columns.array.view(self.real), (columns.part.start, columns.part.stop)
-            factor = 1 / self.size
-            return float(kernel(modes, columns.first, symbol, *span, factor, *numbers))
+            kernel(modes, columns.first, symbol, *span, 1 / self.size, *arguments)
 
         along_rows.forward(blocks)
         self._to_columns()
-        total = along_columns.filter(multiply)
+        along_columns.filter(multiply)
         self._to_lines()
         along_rows.backward()
-        return self.total(total)
 
     def forward_into_work(self, field: Field) -> Modes:
         """`work` <- Fourier coefficients of a field, without 1/size."""
@@ -291,8 +287,10 @@ class Grid:
         Returns the sum over the grid of the old values times the new ones. `blocks` as in
         `filter_by`.
         """
-        ends = map(float, self.ends)
-        return self.filter_by(kernels.apply_symbol, symbol, *ends, blocks=blocks) / self.size
+        energies = np.zeros(self.spectral_shape[-1])
+        self.filter_by(kernels.apply_symbol, symbol, energies, blocks=blocks)
+        energies *= self.multiplicity()
+        return float(self.total(float(energies.sum()))) / self.size
 
     def unfilter_padded(self, symbol: Field, blocks: Sequence[int] | None = None) -> None:
         """`padded` <- F^-1 (1 / symbol) F of the values in it, without the modes of symbol zero."""

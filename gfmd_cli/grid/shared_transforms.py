@@ -158,23 +158,19 @@ class ColumnTransforms:
         """Transform all columns back."""
         self.run(lambda columns: columns.backward())
 
-    def filter(self, multiply: Callable[[Columns], float]) -> float:
-        """Transform the columns, multiply them and transform them back.
+    def filter(self, multiply: Callable[[Columns], None]) -> None:
+        """Transform the columns, multiply them and transform them back."""
 
-        Returns the sum of the numbers that `multiply` returns.
-        """
-
-        def step(columns: Columns) -> float:
+        def step(columns: Columns) -> None:
             columns.forward()
-            total = multiply(columns)
+            multiply(columns)
             columns.backward()
-            return total
 
-        return self.run(step)
+        self.run(step)
 
-    def run(self, step: Callable[[Columns], float | None]) -> float:
-        """Call `step` for all columns; return the sum of the numbers that it returns."""
-        totals, rows = np.zeros(len(self.blocks)), len(self.work)
+    def run(self, step: Callable[[Columns], None]) -> None:
+        """Call `step` for all columns."""
+        rows = len(self.work)
 
         def share(numbers: range) -> None:
             for i in numbers:
@@ -182,12 +178,11 @@ class ColumnTransforms:
                 if self.is_copied:
                     columns.coefficients[:rows] = self.work[:, columns.part]
                     columns.coefficients[rows:] = 0.0
-                totals[i] = step(columns) or 0.0
+                step(columns)
                 if self.is_copied:
                     self.work[:, columns.part] = columns.coefficients[:rows]
 
         side_by_side(self.pool, [partial(share, numbers) for numbers in self.shares])
-        return float(totals.sum())
 
 
 def _nothing() -> None:

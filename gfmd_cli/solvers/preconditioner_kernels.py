@@ -50,4 +50,3 @@ def apply_greens_function(modes, first, k, start, stop, factor, screening):
             weight = factor / (stiffness[j] + screening)
             row[2 * j] *= weight
             row[2 * j + 1] *= weight
-    return 0.0
