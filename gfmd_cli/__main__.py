@@ -2,6 +2,7 @@
 
 import gc
 import io
+import os
 import signal
 import sys
 import warnings
@@ -20,6 +21,8 @@ def main() -> None:
     for number in ENDING:
         if signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, _leave)
+    if sys.stdout is None:  # closed
+        sys.stdout = open(os.devnull, "w", encoding="utf-8")
     raw = getattr(sys.stdout, "buffer", None)
     if isinstance(raw, io.RawIOBase):  # PYTHONUNBUFFERED: a short write would lose text
         settings = (sys.stdout.encoding, sys.stdout.errors)
