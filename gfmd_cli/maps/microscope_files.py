@@ -157,8 +157,10 @@ def _read_channel(path: Path, file: BinaryIO, reader: Any, dataset: str | None) 
     in_unit_of_file = scan
     if scan.unit is not None:
         scan = scan.to_unit("m")
+    lines = header(file, (1, *shape[1:])[-1]) if kind == "asc" else []
     if kind == "asc" and len(shape) == 2:
         _check_matrix(path, file, scan, unsized)
+        _check_nova(path, lines)
     heights, sides = heights_and_sides(path, scan, rows_along_y)
     has_unit = scan.unit is not None
     if has_unit and kind in TABLE_FORMATS:
@@ -167,7 +169,6 @@ def _read_channel(path: Path, file: BinaryIO, reader: Any, dataset: str | None) 
     metric_sides = None if has_unit or unsized else _sides_with_unit(channel, sides)
     note, sides = "", metric_sides or sides
     if kind == "asc":
-        lines = header(file, (1, *shape[1:])[-1])
         if unsized:
             note = unread_units(lines, of_sides=has_unit)
         elif has_unit or metric_sides:
@@ -208,7 +209,11 @@ def _check_matrix(path: Path, file: BinaryIO, scan: Any, unsized: bool) -> None:
         )
     _check_all_rows_read(path, file, rows, columns_read)
     _check_all_are_heights(path, scan.heights().T, unsized=unsized)
-    nova = dict(NOVA.findall(b"".join(header(file, columns_read))))
+
+
+def _check_nova(path: Path, lines: list[bytes]) -> None:
+    """Raise InputError for a header of Nova with a factor, or with different units of the sides."""
+    nova = dict(NOVA.findall(b"".join(lines)))
     factor = nova.get(b"Scale Data", b"1").replace(b",", b".")
     units = [nova[key].decode(errors="replace") for key in (b"Unit X", b"Unit Y") if key in nova]
     if not (is_number(factor) and float(factor) == 1.0):

@@ -43,7 +43,7 @@ GROUPED = re.compile(rb"[\t;]([-+]?\d{1,3}( \d{3})+([,.]\d*)?)(?=[\t;\r]|$)")
 EMPTY = re.compile(rb"([,;])[ \t]*\1.*\d")
 """An empty cell between commas or semicolons, with a number in the same row after it."""
 SEPARATORS = b"\t", b";", b","
-"""Of cells; commas are decimal ones beside the others."""
+"""Separators of cells; a comma beside one of the others is a decimal comma."""
 SIDE_LABELS = (
     "x-length|Width|Šířka|Breite|Anchura|Largeur|Larghezza|幅|폭|Largura|Ширина|"
     "y-length|Height|Výška|Höhe|Altura|Hauteur|Altezza|高さ|높이|Высота"
@@ -178,8 +178,9 @@ def with_blanks(file: BinaryIO) -> tuple[BinaryIO, str]:
     rows = list(filter(is_numeric, whole)) if width else []
     if cell := next(filter(None, map(GROUPED.search, rows)), None):
         raise ValueError(f"{cell[1].decode()}: blanks separate thousands; save the numbers without")
-    by = SEPARATORS if not any(b";" in row or b"\t" in row for row in rows) else SEPARATORS[:-1]
-    is_shifted = width >= MATRIX_COLUMNS and any(_has_empty_cells(rows, each) for each in by)
+    has_others = any(b";" in row or b"\t" in row for row in rows)
+    separators = SEPARATORS[:-1] if has_others else SEPARATORS
+    is_shifted = width >= MATRIX_COLUMNS and any(_has_empty_cells(rows, by) for by in separators)
     if is_shifted or any(map(EMPTY.search, rows)):
         raise ValueError("an empty cell in a row of numbers; write NaN for a missing height")
     if b"," in table or b";" in table:

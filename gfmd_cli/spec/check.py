@@ -33,6 +33,7 @@ WORDS = {
 }
 """What is allowed, by the type of pydantic's error, where its message is not plain."""
 LONG_NUMBER = re.compile(r"\d{20,}|0\.0{15,}\d+")
+"""A limit that pydantic prints with all its zeros."""
 MODELS: dict[str, Any] = {
     "study": models.StudyTable,
     "surface": Surface,

@@ -42,7 +42,7 @@ class TaskWatcher(Watcher):
         """Whether the stop was requested before a new state was reached."""
         self.resumed = False
         self.unsaved = False
-        """Whether a state could not be saved, of which the user knows."""
+        """Whether a state could not be saved and the user was warned."""
         if (message := checkpoint.restore()) is not None:
             self._warn(message)
         self.notes = checkpoint.notes
