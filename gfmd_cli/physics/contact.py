@@ -325,17 +325,16 @@ def touchable(void: Mask | None, grid: Grid) -> Mask | None:
 
 def reduce_scene(grid: Grid, height: Field, elastomer: LinearElastomer) -> Scene:
     """Reduce heights [m], which are overwritten, and stiffness to the scales of the surface."""
-    mean, blocks = grid.mean(height), [height[rows] for rows in row_blocks(height)]
-    largest = 0.0
+    blocks = [height[rows] for rows in row_blocks(height)]
+    sums, highest, lowest = zip(*((b.sum(), b.max(), b.min()) for b in blocks), strict=True)
+    mean = grid.total(float(sum(sums))) / grid.size
+    largest = grid.max(float(max(max(highest) - mean, mean - min(lowest))))
+    # squares of heights of 1e-200 m would vanish
+    squares = sum(float(np.square((block - mean) / largest).sum()) for block in blocks)
+    rms = sqrt(grid.total(squares) / grid.size)
     for block in blocks:
         block -= mean
-        largest = max(largest, float(block.max()), -float(block.min()))
-    largest, squares = grid.max(largest), 0.0
-    for block in blocks:
-        block /= largest  # squares of heights of 1e-200 m would vanish
-        squares += float(np.square(block).sum())
-    rms = sqrt(grid.total(squares) / grid.size)
-    height /= rms
+        block /= largest * rms
     stiffness, stiffest = _stiffness(grid, elastomer)
     m, power, modes = radial_power(grid, height)
     q = m * (2 * np.pi / grid.length)
@@ -373,9 +372,11 @@ def reduce_scene(grid: Grid, height: Field, elastomer: LinearElastomer) -> Scene
 def _stiffness(grid: Grid, elastomer: LinearElastomer) -> tuple[Field, float]:
     """k(q) over the half-spectrum in units of its largest value, and that value."""
     k = np.empty(grid.spectral_shape)
+    count = len(k) // 2 + 1 if grid.dimension == 2 else len(k)  # the rows q_y >= 0
     with np.errstate(over="ignore"):  # refused below
-        for rows in row_blocks(k):
+        for rows in row_blocks(k[:count]):
             k[rows] = elastomer.stiffness(grid.wavenumber(rows), grid.length)
+    k[count:] = k[len(k) - count : 0 : -1]
     stiffest = grid.max(float(k.max()))
     if not (np.isfinite(stiffest) and stiffest > 0):
         raise InputError(f"elastomer: stiffness {stiffest} at the shortest wave is out of range")
