@@ -47,7 +47,7 @@ class Status(ExplainedEnum):
         "no pressure gives load.{load} = {load_value:g} on this grid with this solver.tolerance; "
         "the table has the nearest value",
     )
-    MISSING = "missing", "not solved yet, or failed: run the spec again"
+    MISSING = "missing", "not solved yet, or failed: see `gfmd status`"
 
     # of a run only; such a task has no record
     FAILED = "failed", "an error ended the task"

@@ -193,3 +193,19 @@ def test_a_record_that_is_collected_meanwhile_is_not_missed(gfmd, monkeypatch):
 @pytest.mark.parametrize("status", Status)
 def test_every_status_is_explained_by_the_columns_of_a_row(status):
     assert status.explain(empty_row())
+
+
+def test_the_error_that_ended_a_task_is_told_until_the_study_is_complete(gfmd):
+    Path("spec.toml").write_text(SPEC + '\n[solver]\nkind = "sort"\n')
+    assert gfmd("run", "spec.toml").exit_code == 1
+    (parts,) = Path().glob("*.parts")
+    for path in ("spec.toml", "small.h5"):
+        state = answer(gfmd("status", path, "--json"))
+        assert [failure["task"] for failure in state["failed"]] == [2, 3]
+        assert all("n = 0" in failure["message"] for failure in state["failed"])
+        assert "task 2" in gfmd("status", path).output
+    assert "gfmd status small.h5" in gfmd("analyze", "small.h5").output
+    Path("spec.toml").write_text(SPEC)
+    assert answer(gfmd("status", "spec.toml", "--json"))["failed"] == []
+    assert gfmd("run", "spec.toml").exit_code == 0
+    assert not parts.exists()

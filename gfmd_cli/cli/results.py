@@ -47,8 +47,8 @@ def analyze(study: Path, as_json: bool, figures: Path | None, theory: "Theory") 
         print_text(str(comparison))
         if comparison.missing:
             print_text(
-                f"\n{count(comparison.missing, 'task')} not solved yet, or "
-                "failed: run the spec again, which tells the reason."
+                f"\n{count(comparison.missing, 'task')} not solved yet, or failed; "
+                f"`gfmd status {study}` tells why."
             )
     if figures is not None:
         from gfmd_cli.analysis.figures import draw_all

@@ -40,9 +40,9 @@ def status(
 ) -> None:
     """Show the progress of a study.
 
-    The output is the number of tasks by status, and the next command to type. The command reads the
-    study and its folder of unfinished work and changes nothing, so it can be called at any time. It
-    does not query the batch system. Example:
+    The output is the number of tasks by status, the errors that ended tasks, and the next command
+    to type. The command reads the study and its folder of unfinished work and changes nothing, so
+    it can be called at any time. It does not query the batch system. Example:
 
         gfmd status configs/demo.toml --shards 4
     """
@@ -101,8 +101,10 @@ def _lines(progress: "StudyProgress", shards: int | None) -> list[str]:
     """The state of a study as lines of text."""
     lines = [f"{progress.study}: {count(len(progress.tasks), 'task')}: {counted(progress.counts)}"]
     for task in progress.tasks:
+        name = f"task {task.task} {task.label}".rstrip()
+        if task.failure:
+            lines.append(f"  {name}: failed: {task.failure}")
         if task.saved is not None:
-            name = f"task {task.task} {task.label}".rstrip()
             age = max(0.0, time.time() - task.saved.time)
             lines.append(
                 f"  {name}: state of step {task.saved.step} ({task.saved.points} points), residual "
@@ -151,6 +153,7 @@ def _as_data(progress: "StudyProgress", shards: int | None, next_command: str) -
         "statuses": dict(counts),
         "missing_tasks": progress.missing,
         "saved": [_saved(task.task, task.saved) for task in progress.tasks if task.saved],
+        "failed": [{"task": t.task, "message": t.failure} for t in progress.tasks if t.failure],
         "records": progress.records,
         "others": progress.others,
         "damaged": progress.damaged,

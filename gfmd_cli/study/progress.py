@@ -13,6 +13,7 @@ from gfmd_cli.study.checkpoint import Checkpoint, SavedProgress
 from gfmd_cli.study.reading import open_study
 from gfmd_cli.study.store import Study
 from gfmd_cli.study.tasks import plan
+from gfmd_cli.study.unfinished_work import read_failure
 from gfmd_cli.units import count
 
 
@@ -25,6 +26,8 @@ class TaskProgress:
     status: Status
     saved: SavedProgress | None = None
     """The saved state from which the next run resumes."""
+    failure: str = ""
+    """The error that ended the last run of the task."""
 
 
 @dataclass(frozen=True)
@@ -98,10 +101,11 @@ def _progress(
 ) -> StudyProgress:
     """The progress of these tasks (id, label); a result that lacks some of `output` is missing.
 
-    Checkpoints are read before records, and these before the study, in the order in which a task
-    writes them, so that a task that ends meanwhile is not overlooked.
+    Checkpoints and errors are read before records, and these before the study, in the order in
+    which a task writes them, so that a task that ends meanwhile is not overlooked.
     """
     saved = {name: Checkpoint(study.parts / name).saved() for name, _ in tasks}
+    failures = {name: read_failure(study.parts, name) for name, _ in tasks}
     damaged_files = study.damaged_paths()
     records, damaged = study.records()
     outcomes = study.outcomes()
@@ -114,6 +118,7 @@ def _progress(
             label,
             statuses.get(name, Status.MISSING),
             None if name in statuses else saved[name],
+            "" if name in statuses else failures[name],
         )
         for index, (name, label) in enumerate(tasks)
     ]

@@ -24,6 +24,7 @@ from gfmd_cli.study.signals import signal_handlers
 from gfmd_cli.study.store import Study, without_result
 from gfmd_cli.study.tasks import Task, plan
 from gfmd_cli.study.time_left import RemainingTime
+from gfmd_cli.study.unfinished_work import forget_failure, note_failure
 from gfmd_cli.units import count
 
 
@@ -104,6 +105,8 @@ def run_study(
         threads, usable_memory(ranks) / jobs, options.reproducible, options.checkpoint_every
     )
     stop = Event()
+    if is_root(ranks):
+        report = _noting_failures(report, tasks, study.parts)
     watch = RemainingTime(pending, jobs).with_time_left(report)
     if options.max_seconds is not None and pending:  # early enough to save all and to collect it
         seconds = max(options.max_seconds / 2, options.max_seconds - seconds_to_stop(pending, jobs))
@@ -147,6 +150,19 @@ def _until(end: float, stop: Event, report: Report) -> Report:
         report(progress)
         if progress.task >= 0 and monotonic() > end:
             stop.set()
+
+    return watch
+
+
+def _noting_failures(report: Report, tasks: list[Task], parts: Path) -> Report:
+    """A report that also keeps the error of each task that fails, until the task starts again."""
+
+    def watch(progress: Progress) -> None:
+        report(progress)
+        if progress.event == "start":
+            forget_failure(parts, tasks[progress.task].id)
+        elif progress.status is not None and progress.status.is_failure:
+            note_failure(parts, tasks[progress.task].id, progress.message)
 
     return watch
 

@@ -12,16 +12,20 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from gfmd_cli.errors import InputError, SpaceError, StudyError
-from gfmd_cli.files.atomic import new_file
+from gfmd_cli.files.atomic import new_file, write_whole
 from gfmd_cli.files.checksums import check_seal, digest, seal
 from gfmd_cli.files.hdf5 import new_hdf5
-from gfmd_cli.files.regular import open_regular
+from gfmd_cli.files.regular import open_regular, read_regular
 from gfmd_cli.study.reading import StudyFile, open_study
 from gfmd_cli.study.result import Entry, TaskResult
 from gfmd_cli.study.writing import write_study
 
 SUFFIX = ".record"
-OWN_FILES = re.compile(r"(in-use|collecting|planning)(\..*)?|wisdom-.*\.json|.*\.(record|bad)|\..*")
+FAILURE_SUFFIX = ".failed"
+MAX_FAILURE_BYTES = 2**16  # of a message; a choice
+OWN_FILES = re.compile(
+    r"(in-use|collecting|planning)(\..*)?|wisdom-.*\.json|.*\.(record|bad|failed)|\..*"
+)
 """Files that gfmd makes in the folder."""
 LOCKS = ("in-use", "in-use.owner", "collecting", "collecting.owner")
 """Kept while the rest of the folder is deleted, and then deleted in this order."""
@@ -133,6 +137,27 @@ def read_record(path: Path) -> TaskResult:
     """The whole content of a record. Raises StudyError."""
     with open_record(path) as record:
         return record.result(0)
+
+
+def note_failure(parts: Path, task_id: str, message: str) -> None:
+    """Keep the error that ended a task, for `read_failure`, if there is space for it."""
+    with suppress(SpaceError):
+        write_whole(parts / f"{task_id}{FAILURE_SUFFIX}", message.encode())
+
+
+def forget_failure(parts: Path, task_id: str) -> None:
+    """Delete what `note_failure` has kept of a task."""
+    with suppress(OSError):
+        (parts / f"{task_id}{FAILURE_SUFFIX}").unlink()
+
+
+def read_failure(parts: Path, task_id: str) -> str:
+    """The error that ended the last run of a task; "" where none is known."""
+    try:
+        content = read_regular(parts / f"{task_id}{FAILURE_SUFFIX}", MAX_FAILURE_BYTES)
+    except OSError:
+        return ""
+    return content.decode(errors="replace")
 
 
 def version_of(path: Path) -> tuple[int, ...]:
