@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 
 from gfmd_cli.errors import InputError
+from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.maps.microscope_files import _height_channel
 from gfmd_cli.maps.topography import Region, read_topography
 from gfmd_cli.physics.file_surface import FileSurface
+from gfmd_cli.physics.self_affine import SelfAffine
 
 pytest.importorskip("SurfaceTopography")
 HEIGHTS = np.random.default_rng(2).normal(size=(12, 300)).round(6)
@@ -25,6 +27,12 @@ def saved(tmp_path):
         return path
 
     return write
+
+
+def _rough(hurst, points=128):
+    """A part of a self-affine surface [1e-9 m], without roll-off."""
+    field = SelfAffine(hurst=hurst, cutoff=0.01, rolloff=1.0).heights_on(Grid(4 * points))
+    return 1e-9 * field[:points, :points] / field.std()
 
 
 def points(along_x, along_y, digits=3, separator=" "):
@@ -433,9 +441,7 @@ def test_a_channel_of_a_signal_is_not_taken_as_the_heights():
     ],
 )
 def test_unfinished_scans_and_single_points_give_a_warning(tmp_path, change, words):
-    noise = np.random.default_rng(0).normal(size=(64, 64))
-    heights = 1e-9 * np.cumsum(np.cumsum(noise, axis=0), axis=1)
-    np.save(tmp_path / "h.npy", change(heights))
+    np.save(tmp_path / "h.npy", change(_rough(0.8, 64)))
     warnings = FileSurface(path=tmp_path / "h.npy", length=1e-5, periodic=False).warnings()
     assert (len(warnings) == 1 and words in warnings[0]) if words else not warnings
 
@@ -447,3 +453,31 @@ def test_a_border_step_matters_more_on_few_points(tmp_path, points, warned):
     np.save(tmp_path / "h.npy", 1e-9 * ramp)
     warnings = FileSurface(path=tmp_path / "h.npy", length=1e-5).warnings()
     assert any("step across the border" in each for each in warnings) is warned
+
+
+@pytest.mark.parametrize("hurst", [0.1, 0.8, 1.0])
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda h, x: h, None),
+        (lambda h, x: h + 1e-9 * np.random.default_rng(1).normal(size=(len(h), 1)), "along x are"),
+        (lambda h, x: (h + 1e-9 * np.random.default_rng(1).normal(size=(len(h), 1))).T, "along y"),
+        (lambda h, x: h + 1e-9 * np.sign(np.sin(8 * np.pi * x))[:, None], None),  # grooves
+        (lambda h, x: h + 2e-8 * (x[:, None] ** 2 + x**2), "parabolic form"),
+        (lambda h, x: h - 2e-8 * x**2, "parabolic form"),
+    ],
+)
+def test_shifted_lines_and_a_bow_give_a_warning(tmp_path, hurst, change, words):
+    np.save(tmp_path / "h.npy", change(_rough(hurst), np.linspace(-1, 1, 128)))
+    for map_of in ({"periodic": False}, {"level": "plane", "edges": "mirror"}):
+        surface = FileSurface(path=tmp_path / "h.npy", length=1e-5, **map_of)
+        found = [w for w in surface.warnings() if "shifted" in w or "parabolic" in w]
+        assert (len(found) == 1 and words in found[0]) if words else not found
+    level = surface.model_copy(update={"level": "curvature"})
+    assert not any("parabolic" in w for w in level.warnings())
+
+
+def test_one_wave_in_a_periodic_map_is_no_bow(tmp_path):
+    x = np.linspace(0, 2 * np.pi, 64, endpoint=False)
+    np.save(tmp_path / "h.npy", 1e-7 * (np.cos(x)[:, None] + np.cos(x)))
+    assert not FileSurface(path=tmp_path / "h.npy", length=1e-5).warnings()

@@ -25,9 +25,17 @@ MIN_OTHERS = 8  # other heights, without which one that is apart is no outlier; 
 USUAL_PERCENT = 95  # of the differences between neighbours; of Gaussian ones, below 2 rms values
 SPIKE_RATIO = 10.0  # ratio of a spike to such a difference; a choice
 MAX_SPIKES = 16  # on either side; a choice: more are a part of the surface
+STANDARD_DEVIATION = 1.4826  # over the median absolute deviation, of Gaussian values
 CLIPPED_RATIO = 10  # ratio of the numbers of equal heights, highest to second; about 1 if rounded
 SIDE_TOLERANCE = 1e-3  # relative difference, beyond which a side is probably wrong; a choice
 MAX_FILLED = 0.05  # fraction of filled heights; a choice
+MAX_FORM = 0.85  # fraction of the variance of levelled heights; random surfaces have up to 0.84
+MIN_FORM_KINK = 0.5  # of the kink of a parabola at the border; a choice: 0 if periodic
+FORM_POINTS = 256  # per side, of a sample that shows the form
+END_FRACTION = 20  # of a side, over which the slope at the border is taken; a choice
+MAX_LINE_SHIFT = 0.5  # over the rms difference of neighbours in a line; measured scans: 0 to 0.4
+MAX_LINE_CORRELATION = 0.3  # of the signs of successive shifts; roughness is smoother; a choice
+MIN_LINES = 32  # fewer lines and points per line have such shifts by chance
 
 
 def other_side(key: str, length: float, stated: float) -> str:
@@ -121,6 +129,52 @@ def tilted(heights: Field) -> str:
         f"a tilt makes up {tilt:.0%} of the variance of the heights, and nothing is "
         'subtracted: contact is at one edge first; surface.level = "plane" subtracts it'
     )
+
+
+def curved(heights: Field) -> str:
+    """A parabolic form of levelled heights that are repeated, which has a kink at the borders."""
+    heights = heights[tuple(slice(None, None, 1 + n // FORM_POINTS) for n in heights.shape)]
+    flat = level(heights, "plane")
+    form = flat - level(flat, "curvature")
+    share = float(np.var(form) / (np.var(flat) or 1.0))
+    kinks = [[_kink(field, axis) for field in (form, flat)] for axis in range(heights.ndim)]
+    of_form, of_all = max(kinks, key=lambda kink: abs(kink[0]))
+    if share <= MAX_FORM or of_all * np.sign(of_form) <= MIN_FORM_KINK * abs(of_form):
+        return ""
+    return (
+        f"a parabolic form makes up {share:.0%} of the variance of the heights, so that contact is "
+        'in one part of the map only; surface.level = "curvature" subtracts it'
+    )
+
+
+def _kink(heights: Field, axis: int) -> float:
+    """Change of height over the last points of an axis less that over the first, mean of lines."""
+    mean = np.moveaxis(heights, axis, 0).reshape(heights.shape[axis], -1).mean(axis=1)
+    width = max(1, len(mean) // END_FRACTION)
+    return float(mean[-1] - mean[-1 - width] - (mean[width] - mean[0]))
+
+
+def shifted_lines(topography: Topography) -> str:
+    """Lines of a scan each of which has an offset of its own."""
+    heights = topography.heights
+    if topography.missing is not None or np.atleast_2d(heights).shape[0] < MIN_LINES:
+        return ""
+    for lines, along in ((heights, "x"), (heights.T, "y")):
+        if lines.shape[1] < MIN_LINES:
+            continue
+        step_y, step_x = (1 + points // (4 * FORM_POINTS) for points in lines.shape)
+        inside = float(np.std(np.diff(lines[::step_y], axis=1)))
+        shifts = np.median(np.diff(lines[:, ::step_x], axis=0), axis=1)
+        shifts -= np.median(shifts)
+        shift = STANDARD_DEVIATION * float(np.median(np.abs(shifts)))
+        correlation = float(np.mean(np.sign(shifts[1:] * shifts[:-1])))
+        if shift > MAX_LINE_SHIFT * inside > 0 and correlation < MAX_LINE_CORRELATION:
+            return (
+                f"the lines along {along} are shifted against each other, by {shift / inside:.2g} "
+                "times the rms difference of neighbours in a line, as by a drift or jumps of the "
+                "scan: align them in another program"
+            )
+    return ""
 
 
 def outliers(topography: Topography) -> str:

@@ -295,7 +295,7 @@ class FileSurface(RigidSurface):
             *topography.notes,
             *self._warnings_on_sides(),
             map_warnings.unit_of_heights(topography, self.scale),
-            *_warnings_on_heights(self),
+            *_warnings_on_heights(self, boundary),
             map_warnings.unlikely_gradient(heights, self._map_spacing()),
         ]
         if "taper" in self.model_fields_set and self.edges != "window":
@@ -420,12 +420,14 @@ def _smallest_grid(surface: FileSurface) -> int:
 
 
 @lru_cache(maxsize=16)
-def _warnings_on_heights(surface: FileSurface) -> tuple[str, ...]:
-    """Warnings about outliers and rounding. Cached: every contact of a study has the same."""
+def _warnings_on_heights(surface: FileSurface, boundary: str) -> tuple[str, ...]:
+    """Warnings about artefacts of a scan. Cached: every contact of a study has the same."""
     topography, scale = surface._topography(), surface.scale
     levelled = _prepared(surface)[tuple(map(slice, topography.heights.shape))]  # without copies
     return (
         map_warnings.outliers(topography),
+        map_warnings.shifted_lines(topography),
+        map_warnings.curved(levelled) if boundary == "periodic" else "",
         map_warnings.rounded(topography, scale),
         map_warnings.rounded_trend(topography, levelled, scale),
     )
