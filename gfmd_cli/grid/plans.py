@@ -1,4 +1,4 @@
-"""Plans of Fourier transforms: measured once and stored, or estimated, always the same.
+"""Plans of Fourier transforms: measured once and stored; or estimated, which gives the same plans.
 
 FFTW's wisdom (what it has measured) is stored as text: beside the study of a run, so that a resumed
 run uses the plans of the first one, and in the user's cache for other runs. One process at a time

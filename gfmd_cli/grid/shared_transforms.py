@@ -2,7 +2,7 @@
 
 The threads meet after the rows and after the columns. Those of FFTW itself meet up to thousands of
 times, and wait each time until the system runs the last one: with another process on one of two
-cores, a pair of transforms of 3200^2 took 5 to 50 times as long as on one thread.
+cores, a pair of transforms of 3200^2 took twice as long as on one thread (docs/performance.md).
 
 The columns of a large or padded array are copied in blocks, which stay in the cache of a core while
 they are transformed, multiplied and transformed back.

@@ -8,9 +8,9 @@ adhesion. A step of the method, with the numbers beside the code lines:
 [3] Compute the step length that minimises the energy.
 [4] Project the displacement on u >= h; the conjugation is continued after the projection.
 
-The range of k(q) extends from the distance of the contacts to the grid spacing. The number of steps
-therefore grows as N^(n/2): by 1.4, 2.1 and 2.9 from 256^2 to 512^2 at n = 1, 2 and 3 (p* = 0.1,
-residual 1e-4).
+The values of k(q) that matter are those of wavelengths from the distance of the contacts to the
+grid spacing. The number of steps therefore grows as N^(n/2): by factors of 1.4, 2.1 and 2.9 from
+256^2 to 512^2 at n = 1, 2 and 3 (p* = 0.1, residual 1e-4).
 """
 
 from collections.abc import Iterator

@@ -14,14 +14,15 @@ Therefore, as soon as the number of misclassified points does not decrease, stre
 from set to set, and none of the steps raises the energy:
 
 [1] Solve for the stresses t of the points A.
-[2] If some are negative, go from s towards t: to t with its negative stresses set to zero if the
-    energy falls, else until the first stress is zero. These points leave A. Back to [1].
+[2] If some are negative, go from s towards t. If the energy falls, all points of negative stress
+    leave A; else half of them, a quarter, and so on, those whose stress vanishes first on the way;
+    at last the very first. Back to [1].
 [3] Otherwise s = t, and the points that the displacement enters join A. Back to [1].
 
-Step [2] until the first stress is zero is the inner loop of the active set method of Lawson &
-Hanson (Solving Least Squares Problems, 1974, chapter 23).
+Step [2] with the very first point is the inner loop of the active set method of Lawson & Hanson
+(Solving Least Squares Problems, 1974, chapter 23).
 
-A solution costs n^3 / 3 operations for n points, and the displacement at all points a pair of
+A solution costs m^3 / 3 operations for m points, and the displacement at all points a pair of
 transforms. The result is exact: its residual is the rounding.
 """
 
@@ -42,7 +43,7 @@ from gfmd_cli.solvers.loop import Start
 from gfmd_cli.solvers.multigrid import MAX_LAPLACIAN_GROWTH, largest_growth
 
 MAX_COST = 80
-"""Largest n^3 over points of a grid and square of the growth of k(q) per octave, for n points in
+"""Largest m^3 over points of a grid and square of the growth of k(q) per octave, for m points in
 contact; measured: with more, the iteration is faster."""
 MAX_COST_WITH_LAPLACIAN = 150
 """The same without the growth, where the V-cycle has no squared Laplacian."""

@@ -16,7 +16,7 @@ step of the method, with the numbers beside the code lines:
 A step applies C once, to the projected move; l is that of the step before, corrected by the ratio
 of the best move to the projected one, as in `pcg`. All points on the line satisfy the constraints
 and the energy never rises. K restricted to the contact is close to the inverse of the restricted C
-for n of about 1 and below; at n = 1.5 the method takes two to four times as many steps.
+for n of about 1 and below; at n = 1.5 the method takes two to five times as many steps.
 """
 
 from collections.abc import Iterator

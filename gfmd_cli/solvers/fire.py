@@ -7,7 +7,8 @@ of the method, with the numbers beside the code lines:
 [1] Accelerate: v += dt f / m with f = -(K u + p).
 [2] Move: u -> max(u + dt v, h), with the indenter as a hard wall; the velocity is zero there.
 [3] Accept the move if the energy does not rise.
-[4] Stop (v = 0) and shorten the time step if the kinetic energy falls; otherwise lengthen it.
+[4] Stop (v = 0) and shorten the time step if the move was not accepted or the kinetic energy falls;
+    otherwise lengthen the time step.
 
 The mass m is the same for all q, so that a step is taken in real space, with one application of K.
 The q = 0 mode is subject to -p and, through the wall, to the contacts. A fixed point is at rest and

@@ -4,11 +4,11 @@ On the tiles that the contact can reach
 
     minimise <s C s> / 2 - <s h>  over s >= 0,  <s> = p.
 
-The method is that of Polonsky & Keer, Wear 231, 206 (1999), with the stiffness K restricted to the
-tiles as preconditioner (Vollebregt, Tribol. Int. 78, 40, 2014, uses its transform on the whole
-grid). C s is then evaluated at all points by the exact operator. This shows tiles that the
-displacement enters elsewhere, which are added, and the error of the operators on tiles, which is
-corrected in the next solve on the tiles.
+The method is projected conjugate gradients in the pressure, as in `dual`, with the stiffness K
+restricted to the tiles as preconditioner (Vollebregt, Tribol. Int. 78, 40, 2014, uses its transform
+on the whole grid). C s is then evaluated at all points by the exact operator. This shows tiles that
+the displacement enters elsewhere, which are added, and the error of the operators on tiles, which
+is corrected in the next solve on the tiles.
 """
 
 from collections.abc import Callable

@@ -16,9 +16,9 @@ it does on the finest level. Its square takes two: with one, conjugate gradients
 steps at n = 3 and a quarter more at n = 4.
 
 The points of a level need not be half of those of the next finer one. An odd number is followed by
-the even number next to its half, and hats are evaluated at the points of the finer level. On pixels
-far from square, the second differences along y and x have the weights 1 / dy^2 and 1 / dx^2, and
-only the direction of strong coupling is coarsened until the pixels are about square
+its half, rounded up to an even number, and hats are evaluated at the points of the finer level. On
+pixels far from square, the second differences along y and x have the weights 1 / dy^2 and 1 / dx^2,
+and only the direction of strong coupling is coarsened until the pixels are about square
 (semi-coarsening; Trottenberg, Oosterlee & Schueller, Multigrid, 2001, section 5.1). A line is one
 row of pixels without coupling along y.
 

@@ -125,7 +125,7 @@ def _local_start(
 
 
 def levels(shape: Shape, sides: tuple[float, ...]) -> list[Shape]:
-    """Grids of a cell from coarse to fine, each half as fine (rounded up to even) as the next.
+    """Grids of a cell from coarse to fine, each with half the points (made even) of the next.
 
     Pixels that are far from square are first coarsened along their shorter side only.
     """

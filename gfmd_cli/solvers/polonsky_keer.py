@@ -5,7 +5,7 @@ s >= 0 at the mean pressure p. The gradient is the gap. A step of the method, wi
 beside the code lines:
 
 [1] Compute the gap, with a mean of zero over the contact area.
-[2] Compute the sum G of the squares of the gap in contact.
+[2] Compute the sum of the squares of the gap in contact, for the conjugation.
 [3] Compute the conjugate direction.
 [4] Compute the displacement due to the direction.
 [5] Compute the step length.
