@@ -481,3 +481,65 @@ def test_one_wave_in_a_periodic_map_is_no_bow(tmp_path):
     x = np.linspace(0, 2 * np.pi, 64, endpoint=False)
     np.save(tmp_path / "h.npy", 1e-7 * (np.cos(x)[:, None] + np.cos(x)))
     assert not FileSurface(path=tmp_path / "h.npy", length=1e-5).warnings()
+
+
+def _raised(heights, lines, by=5e-9):
+    heights = heights.copy()
+    heights[lines] += by
+    return heights
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda h: _raised(h, [50]), "lines along x jump at 2 places"),
+        (lambda h: _raised(h, slice(50, None), 2e-9), "lines along x jump at 1 place,"),
+        (lambda h: np.where(h == h[3, 3], np.nan, _raised(h, [50, 90])), "jump at 4 places"),
+        (lambda h: h[np.arange(128) // 2 * 2], "64 of 128 lines along x are equal"),
+        (lambda h: h + 1e-7 * np.arange(128), "subtracts a slope of 1.3, an angle of 52 degrees"),
+        (lambda h: np.minimum(h, np.quantile(h, 0.995)), "heights are exactly the maximum"),
+    ],
+)
+def test_artefacts_of_scans_give_a_warning(tmp_path, change, words):
+    np.save(tmp_path / "h.npy", change(_rough(0.8)))
+    warnings = FileSurface(path=tmp_path / "h.npy", length=1e-5, periodic=False).warnings("free")
+    assert any(words in warning for warning in warnings), warnings
+
+
+@pytest.mark.parametrize("rows", [4, 8])
+@pytest.mark.parametrize("hurst", [0.1, 0.8])
+def test_oblong_pixels_are_no_shifted_lines(tmp_path, rows, hurst):
+    np.save(tmp_path / "h.npy", _rough(hurst, 256)[::rows])
+    surface = FileSurface(path=tmp_path / "h.npy", length=1e-5, length_y=1e-5, periodic=False)
+    assert not any("lines" in warning for warning in surface.warnings())
+
+
+def test_both_sides_of_a_part_are_told(tmp_path):
+    np.save(tmp_path / "h.npy", _rough(0.8))
+    part = {"periodic": False, "region": Region(y=(0, 64))}
+    surface = FileSurface(path=tmp_path / "h.npy", length=1e-5, length_y=1e-5, **part)
+    (warning,) = surface.warnings()
+    assert "surface.length_y = 1e-05 m is the side of the part" in warning
+    assert "64 of 128 points" in warning
+
+
+@pytest.mark.parametrize(
+    ("array", "words"),
+    [
+        (
+            np.stack([np.arange(40.0), np.sin(np.arange(40.0))], axis=1),
+            "an array of 2 x 40 numbers",
+        ),
+        (np.random.default_rng(0).normal(size=(3, 100)), "an array of 100 x 3 numbers"),
+        (np.c_[np.arange(50.0), np.random.default_rng(0).normal(size=(50, 50))], "a column of the"),
+    ],
+)
+def test_an_array_with_positions_is_refused(tmp_path, array, words):
+    np.save(tmp_path / "h.npy", array)
+    with pytest.raises(InputError, match=words):
+        read_topography(tmp_path / "h.npy")
+
+
+def test_line_ends_of_old_programs_are_read(saved):
+    path = saved("# Width: 4 um\r# Height: 4 um\r" + "\r".join(["1 2 3 5", "2 4 1 0"] * 8))
+    assert read_topography(path).heights.shape == (16, 4)

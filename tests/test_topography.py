@@ -758,7 +758,7 @@ def test_sides_keep_their_unit_where_the_heights_have_none(tmp_path, heights, un
     assert surface.sides == pytest.approx((15e-6, 20e-6))
     assert surface.heights(16) == pytest.approx(1e-9 * level(heights, "plane"))
     assert surface.warnings() == []
-    (warning, _) = FileSurface(path=tmp_path / "h.txt").warnings()
+    (warning, *_) = FileSurface(path=tmp_path / "h.txt").warnings()
     assert "not of its heights" in warning
 
 

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 @click.option(
     "--mem",
     metavar="SIZE",
-    help="Memory of a shard; by default the prediction for its largest task.",
+    help="Memory of a shard; by default that of the largest task times the tasks at once.",
 )
 @click.option(
     "--cpus-per-task",

@@ -1,13 +1,16 @@
 """Warnings about probable mistakes in the use of a measured map.
 
-Each function returns a warning about what its docstring describes, or "" if it is not so.
+Each function returns a warning, or "" if what its docstring describes does not occur.
 """
+
+import warnings
 
 import numpy as np
 
 from gfmd_cli.grid.arrays import Field, Mask, row_blocks
 from gfmd_cli.maps.map_preparation import border_step, level
 from gfmd_cli.maps.topography import Topography
+from gfmd_cli.units import count as counted
 
 MAX_GRADIENT = 3.0  # rms; a choice: surfaces of machined or worn solids have less
 MIN_GRADIENT = 1e-6  # rms; a choice: polished mirrors have about that
@@ -29,12 +32,15 @@ STANDARD_DEVIATION = 1.4826  # over the median absolute deviation, of Gaussian v
 CLIPPED_RATIO = 10  # ratio of the numbers of equal heights, highest to second; about 1 if rounded
 SIDE_TOLERANCE = 1e-3  # relative difference, beyond which a side is probably wrong; a choice
 MAX_FILLED = 0.05  # fraction of filled heights; a choice
+MAX_SLOPE = 0.5  # of what levelling subtracts; a choice: 27 degrees, with a cosine of 0.9
 MAX_FORM = 0.85  # fraction of the variance of levelled heights; random surfaces have up to 0.84
 MIN_FORM_KINK = 0.5  # of the kink of a parabola at the border; a choice: 0 if periodic
 FORM_POINTS = 256  # per side, of a sample that shows the form
 END_FRACTION = 20  # of a side, over which the slope at the border is taken; a choice
 MAX_LINE_SHIFT = 0.5  # over the rms difference of neighbours in a line; measured scans: 0 to 0.4
 MAX_LINE_CORRELATION = 0.3  # of the signs of successive shifts; roughness is smoother; a choice
+JUMP_RATIO = 8  # of a jump to the usual difference of lines; a choice: none by chance
+MIN_KNOWN = 8  # heights in half a line, for its median; a choice
 MIN_LINES = 32  # fewer lines and points per line have such shifts by chance
 
 
@@ -45,13 +51,14 @@ def other_side(key: str, length: float, stated: float) -> str:
     return f"surface.{key} = {length:g} m replaces the side of the file, {stated:g} m"
 
 
-def side_of_a_part(length: float, topography: Topography) -> str:
+def side_of_a_part(key: str, length: float, topography: Topography) -> str:
     """A side [m] of the part of a map that is used, whose file states none."""
-    part, whole = topography.heights.shape[-1], topography.shape[-1]
+    axis = 0 if key == "length_y" else -1
+    part, whole = topography.heights.shape[axis], topography.shape[axis]
     if part == whole:
         return ""
     return (
-        f"surface.length = {length:g} m is the side of the part of the map that is used, {part} of "
+        f"surface.{key} = {length:g} m is the side of the part of the map that is used, {part} of "
         f"{whole} points; if the whole map has this side, set {length * part / whole:g}"
     )
 
@@ -132,7 +139,7 @@ def tilted(heights: Field) -> str:
 
 
 def curved(heights: Field) -> str:
-    """A parabolic form of levelled heights that are repeated, which has a kink at the borders."""
+    """A parabolic form, which has a kink at the borders if it is repeated."""
     heights = heights[tuple(slice(None, None, 1 + n // FORM_POINTS) for n in heights.shape)]
     flat = level(heights, "plane")
     form = flat - level(flat, "curvature")
@@ -143,8 +150,40 @@ def curved(heights: Field) -> str:
         return ""
     return (
         f"a parabolic form makes up {share:.0%} of the variance of the heights, so that contact is "
-        'in one part of the map only; surface.level = "curvature" subtracts it'
+        'in one part of the map only; if it is a bow of the scanner, surface.level = "curvature" '
+        "subtracts it"
     )
+
+
+def steep(levelling: str, subtracted: Field, sides: tuple[float, ...]) -> str:
+    """A slope that levelling subtracts, in heights [m] at the corners of a map of these sides [m].
+
+    Heights are then not measured along the normal of the plane.
+    """
+    steps = [np.diff(subtracted, axis=axis).mean() for axis in range(subtracted.ndim)]
+    slope = float(np.hypot.reduce(np.divide(steps, sides)))
+    if slope <= MAX_SLOPE:
+        return ""
+    return (
+        f"levelling ({levelling}) subtracts a slope of {slope:.2g}, an angle of "
+        f"{np.degrees(np.arctan(slope)):.0f} degrees: are heights and side in metres? Heights "
+        "above such a plane are not distances from it; rotate the map in another program"
+    )
+
+
+def repeated_lines(heights: Field) -> str:
+    """Some lines of a map, each equal to the line before it."""
+    for lines, along in ((heights, "x"), (heights.T, "y")) if heights.ndim == 2 else ():
+        equal = 1 + np.flatnonzero((lines[1:] == lines[:-1]).all(axis=1))
+        if not 0 < equal.size < len(lines) - 1:
+            continue
+        varied = [i for i in equal[:MAX_SPIKES] if 2 * np.unique(lines[i]).size > lines.shape[1]]
+        if varied:
+            return (
+                f"{equal.size} of {len(lines)} lines along {along} are equal to the line before: "
+                "repeated by the instrument or a program? Leave them out"
+            )
+    return ""
 
 
 def _kink(heights: Field, axis: int) -> float:
@@ -154,26 +193,46 @@ def _kink(heights: Field, axis: int) -> float:
     return float(mean[-1] - mean[-1 - width] - (mean[width] - mean[0]))
 
 
-def shifted_lines(topography: Topography) -> str:
-    """Lines of a scan each of which has an offset of its own."""
+def shifted_lines(topography: Topography, spacing: tuple[float, ...]) -> str:
+    """Lines of a scan that have offsets of their own, all of them or some.
+
+    `spacing` is that of the map [m]. An offset is the median difference to the line before, where
+    both halves of the line agree on it.
+    """
     heights = topography.heights
-    if topography.missing is not None or np.atleast_2d(heights).shape[0] < MIN_LINES:
+    if heights.ndim == 1 or min(heights.shape) < MIN_LINES:
         return ""
-    for lines, along in ((heights, "x"), (heights.T, "y")):
-        if lines.shape[1] < MIN_LINES:
-            continue
+    if topography.missing is not None:
+        heights = np.where(topography.missing, np.nan, heights)
+    for lines, along, aspect in ((heights, "x", spacing[0] / spacing[1]), (heights.T, "y", 0.0)):
+        lag = max(1, round(aspect or spacing[1] / spacing[0]))  # points as far apart as the lines
         step_y, step_x = (1 + points // (4 * FORM_POINTS) for points in lines.shape)
-        inside = float(np.std(np.diff(lines[::step_y], axis=1)))
-        shifts = np.median(np.diff(lines[:, ::step_x], axis=0), axis=1)
-        shifts -= np.median(shifts)
-        shift = STANDARD_DEVIATION * float(np.median(np.abs(shifts)))
+        inside = float(np.nanstd(lines[::step_y, lag:] - lines[::step_y, :-lag]))
+        halves = np.array_split(np.diff(lines[:, ::step_x], axis=0), 2, axis=1)
+        with warnings.catch_warnings(action="ignore", category=RuntimeWarning):  # all are missing
+            medians = np.array([np.nanmedian(half, axis=1) for half in halves])
+        known = np.array([np.isfinite(half).sum(axis=1) for half in halves])
+        medians[known < MIN_KNOWN] = np.nan
+        if not np.isfinite(medians).any(axis=1).all():
+            continue
+        medians -= np.nanmedian(medians, axis=1, keepdims=True)
+        shifts = np.where(medians.prod(axis=0) > 0, np.abs(medians).min(axis=0), 0.0)
+        shifts *= np.sign(medians[0])
+        usual = STANDARD_DEVIATION * float(np.median(np.abs(shifts)))
+        spread = STANDARD_DEVIATION * float(np.nanmedian(np.abs(medians)))
+        jumps = int(np.count_nonzero(np.abs(shifts) > max(JUMP_RATIO * spread, inside)))
         correlation = float(np.mean(np.sign(shifts[1:] * shifts[:-1])))
-        if shift > MAX_LINE_SHIFT * inside > 0 and correlation < MAX_LINE_CORRELATION:
-            return (
-                f"the lines along {along} are shifted against each other, by {shift / inside:.2g} "
-                "times the rms difference of neighbours in a line, as by a drift or jumps of the "
-                "scan: align them in another program"
-            )
+        if usual > MAX_LINE_SHIFT * inside > 0 and correlation < MAX_LINE_CORRELATION:
+            what = f"are shifted against each other, by {usual / inside:.2g} times"
+        elif jumps and inside:
+            what = f"jump at {counted(jumps, 'place')}, by more than"
+        else:
+            continue
+        return (
+            f"the lines along {along} {what} the rms difference of points of a line as far apart: "
+            "drift or jumps of the scan? Align the lines (median of differences) in another "
+            f"program, unless these are steps or grooves of the surface along {along}"
+        )
     return ""
 
 
@@ -196,7 +255,7 @@ def outliers(topography: Topography) -> str:
                 "heights? Replace it by NaN"
             )
         following = others.min() if word == "minimum" else others.max()
-        if percentage and count > CLIPPED_RATIO * np.count_nonzero(others == following):
+        if count > CLIPPED_RATIO * max(int(np.count_nonzero(others == following)), 1):
             return (
                 f"{count} heights{percentage} are exactly the {word}, {extreme:g}: clipped at the "
                 "range of the instrument, or a mark of missing heights? Replace such a mark by NaN"
@@ -277,10 +336,10 @@ def _spikes(heights: Field) -> str:
     apart = np.concatenate([low[low < bottom], high[high > top]])
     if not apart.size:
         return ""
-    return (
-        f"{apart.size} heights, from {apart.min():g} to {apart.max():g}, are far from all others, "
-        f"{bottom:g} to {top:g}: spikes? Replace them by NaN"
-    )
+    what = f"{apart.size} heights, from {apart.min():g} to {apart.max():g}, are"
+    if apart.size == 1:
+        what = f"1 height, {apart[0]:g}, is"
+    return f"{what} far from all others, {bottom:g} to {top:g}: spikes? Replace them by NaN"
 
 
 def rounded(topography: Topography, scale: float) -> str:

@@ -40,6 +40,7 @@ from gfmd_cli.maps.text_tables import (
     without_size,
 )
 
+COMPRESSED = {".gz", ".bz2", ".xz", ".zst", ".7z"}
 TABLE_FORMATS = {"xyz", "asc"}  # formats of SurfaceTopography that are tables of numbers
 TEXT_FORMATS = {b"aBCR-": "an SDF file", b"aISO-": "an SDF file", b"DSAA": "a grid of Surfer"}
 """Formats whose heights a reader of tables would take without their scales."""
@@ -127,6 +128,8 @@ def _open_scan(path: Path, file: BinaryIO, readers: list[Any]) -> Any:
             f"({'; '.join(reasons)}): damaged, or a variant of the format? {REMEDY}"
         )
     what = NO_GRID if columns(file) == 3 else "not in a known topography format"
+    if path.suffix.lower() in COMPRESSED:
+        what = "a compressed file: unpack it"
     raise InputError(
         f"{path}: {what}; .npy, HDF5 and the formats of SurfaceTopography can be read. {REMEDY}"
     )
@@ -168,6 +171,8 @@ def _read_channel(path: Path, file: BinaryIO, reader: Any, dataset: str | None) 
         heights = np.ma.masked_where(np.abs(stored) >= MAX_HEIGHT, heights)
     metric_sides = None if has_unit or unsized else _sides_with_unit(channel, sides)
     note, sides = "", metric_sides or sides
+    if kind == "gwy" and (masked := int(np.ma.getmaskarray(heights).sum())):
+        note = f"{masked} points are masked in the file; they count as missing heights"
     if kind == "asc":
         if unsized:
             note = unread_units(lines, of_sides=has_unit)
@@ -208,7 +213,7 @@ def _check_matrix(path: Path, file: BinaryIO, scan: Any, unsized: bool) -> None:
             f"a header that states its sides. {REMEDY}"
         )
     _check_all_rows_read(path, file, rows, columns_read)
-    _check_all_are_heights(path, scan.heights().T, unsized=unsized)
+    check_all_are_heights(path, scan.heights().T, unsized=unsized)
 
 
 def _check_nova(path: Path, lines: list[bytes]) -> None:
@@ -292,7 +297,7 @@ def _sides_with_unit(channel: Any, sides: tuple[float, ...]) -> tuple[float, ...
     return tuple(factor * side for factor, side in zip(factors, sides, strict=True) if factor)
 
 
-def _check_all_are_heights(path: Path, table: Field, *, unsized: bool) -> None:
+def check_all_are_heights(path: Path, table: Field, *, unsized: bool) -> None:
     """Raise InputError where a row or column of a table seems to be positions or numbers.
 
     The first value of such a row may be that of a corner. Where the header states the sides, only

@@ -239,13 +239,16 @@ def _warning_of_thousands(start: bytes, columns: int) -> str:
 
 
 def in_utf8(file: BinaryIO) -> BinaryIO:
-    """A table in UTF-8 without byte order mark and quotes; any other file as it is.
+    """A table in UTF-8 with usual line ends, without byte order mark and quotes.
+
+    Any other file as it is.
 
     Raises ValueError where commas separate the numbers and are also parts of them, in quotes.
     """
     start = file.read(WINDOW_BYTES)
     file.seek(max(0, file.seek(0, os.SEEK_END) - WINDOW_BYTES))
     is_plain = start.isascii() and b'"' not in start and file.read().isascii()
+    is_plain = is_plain and not (b"\r" in start and b"\n" not in start)
     is_table = start.startswith(UTF_16)
     if not (is_plain or is_table or start.startswith(LATIN_1)):
         is_table = columns(file) > 0
@@ -264,6 +267,8 @@ def in_utf8(file: BinaryIO) -> BinaryIO:
             f"{commas[0].decode()} has a comma in quotes and one as separator; save the numbers "
             "with decimal points, or separate them by semicolons"
         )
+    if b"\n" not in content:
+        content = content.replace(b"\r", b"\n")
     return BytesIO(content.replace(b'"', b""))
 
 

@@ -22,13 +22,20 @@ from gfmd_cli.maps.height_map import (
     SMALLEST_MAP,
     HeightMap,
     MapMetadata,
+    extent,
     first_line,
     read_hdf5,
     read_npy,
 )
-from gfmd_cli.maps.microscope_files import SIGNATURE_BYTES, read_microscope_file
+from gfmd_cli.maps.microscope_files import (
+    SIGNATURE_BYTES,
+    check_all_are_heights,
+    read_microscope_file,
+)
+from gfmd_cli.maps.text_tables import MATRIX_COLUMNS
 from gfmd_cli.spec_table import SpecTable
 
+MANY_POINTS = 8  # along one axis; a choice: no map has so many beside so few rows or columns
 SPACING_TOLERANCE = 1e-6  # relative: files store sides in single precision or with six digits
 AXES = ("y", "x")
 
@@ -185,6 +192,9 @@ def _checked(
         first = [(points - side) // 2 for points in part.shape]
         part = part[tuple(slice(a, a + side) for a in first)]
     heights = np.ma.filled(np.ma.asarray(part).astype(np.float64), np.nan)
+    if data.sides is None and heights.ndim == 2:
+        _check_is_matrix(path, shape)
+        check_all_are_heights(path, heights, unsized=False)
     missing: Mask = ~(np.abs(heights) < MAX_HEIGHT)
     if missing.all():
         raise InputError(
@@ -197,6 +207,15 @@ def _checked(
     metadata = {each.name: getattr(data, each.name) for each in fields(MapMetadata)}
     mask = missing if missing.any() else None
     return Topography(heights, mask, spacing, shape, precision, **metadata)
+
+
+def _check_is_matrix(path: Path, shape: tuple[int, ...]) -> None:
+    """Raise InputError for an array with so few rows or columns that they are no map."""
+    if min(shape) < MATRIX_COLUMNS <= MANY_POINTS < max(shape):
+        raise InputError(
+            f"{path}: an array of {extent(shape)} numbers: positions and heights, not a map? Save "
+            "the heights as a matrix, or a line profile as an array of one dimension"
+        )
 
 
 def _spacing(path: Path, data: HeightMap, shape: tuple[int, ...]) -> tuple[float, ...] | None:

@@ -1,9 +1,10 @@
 """The Einstein solid (n = 0) on a surface with Gaussian heights, in closed form.
 
 Equation numbers are those of the paper: Mueser, "Elastic contacts of randomly rough surfaces across
-the spatial dimensions", Sect. 4.2. Every function but the first takes z = h_nc / h_std, the height
-of the non-contact zone above the mean height of the indenter, of any shape. Lengths are returned in
-units of h_std, stresses in k_0 h_std (which is Delta_sigma), energies per area in k_0 h_std^2.
+the spatial dimensions", Sect. 4.2. Every function but the first takes an array z = h_nc / h_std of
+any shape: minus the level of the non-contact zone above the mean height, heights being positive
+towards the elastomer, so that z rises with the pressure. Lengths are returned in units of h_std,
+stresses in k_0 h_std (which is Delta_sigma), energies per area in k_0 h_std^2.
 """
 
 import numpy as np

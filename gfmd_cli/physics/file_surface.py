@@ -295,7 +295,7 @@ class FileSurface(RigidSurface):
             *topography.notes,
             *self._warnings_on_sides(),
             map_warnings.unit_of_heights(topography, self.scale),
-            *_warnings_on_heights(self, boundary),
+            *_warnings_on_heights(self),
             map_warnings.unlikely_gradient(heights, self._map_spacing()),
         ]
         if "taper" in self.model_fields_set and self.edges != "window":
@@ -311,14 +311,18 @@ class FileSurface(RigidSurface):
     def _warnings_on_sides(self) -> list[str]:
         """Warnings about the sides, one of them at most for each."""
         topography, stated = self._topography(), self.stated_sides()
-        if self.length_y is not None and stated is not None:
-            along_y = stated[0] if self.length is None else self.length * (stated[0] / stated[-1])
-            warning = map_warnings.other_side("length_y", self.length_y, along_y)
+        if self.length_y is not None:
+            if stated is None:
+                warning = map_warnings.side_of_a_part("length_y", self.length_y, topography)
+            else:
+                along_x = self.length or stated[-1]
+                along_y = along_x * (stated[0] / stated[-1])
+                warning = map_warnings.other_side("length_y", self.length_y, along_y)
             return [warning, *self.model_copy(update={"length_y": None})._warnings_on_sides()]
         if self.length is not None:
             if stated is not None and topography.metres:
                 return [map_warnings.other_side("length", self.length, stated[-1])]
-            return [map_warnings.side_of_a_part(self.length, topography)]
+            return [map_warnings.side_of_a_part("length", self.length, topography)]
         if stated is not None:
             return [map_warnings.unknown_unit(topography, self.scale, stated[-1])]
         return [
@@ -420,14 +424,20 @@ def _smallest_grid(surface: FileSurface) -> int:
 
 
 @lru_cache(maxsize=16)
-def _warnings_on_heights(surface: FileSurface, boundary: str) -> tuple[str, ...]:
+def _warnings_on_heights(surface: FileSurface) -> tuple[str, ...]:
     """Warnings about artefacts of a scan. Cached: every contact of a study has the same."""
     topography, scale = surface._topography(), surface.scale
-    levelled = _prepared(surface)[tuple(map(slice, topography.heights.shape))]  # without copies
+    shape, spacing = topography.heights.shape, surface._map_spacing()
+    levelled = _prepared(surface)[tuple(map(slice, shape))]  # without copies
+    corners = tuple(slice(None, None, n - 1) for n in shape)
+    subtracted = scale * topography.heights[corners] - surface._levelled()[corners]
+    sides = tuple(step * (n - 1) for step, n in zip(spacing, shape, strict=True))
     return (
         map_warnings.outliers(topography),
-        map_warnings.shifted_lines(topography),
-        map_warnings.curved(levelled) if boundary == "periodic" else "",
+        map_warnings.shifted_lines(topography, spacing),
+        map_warnings.curved(levelled),
+        map_warnings.steep(surface.levelling(), subtracted, sides),
+        map_warnings.repeated_lines(topography.heights),
         map_warnings.rounded(topography, scale),
         map_warnings.rounded_trend(topography, levelled, scale),
     )

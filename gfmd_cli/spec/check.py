@@ -279,7 +279,7 @@ def _problem(name: str, places: dict[str, int], detail: Any) -> tuple[str, str]:
             message = WORDS[detail["type"]].format(**detail.get("ctx", {}))
         text = message if isinstance(given, dict) else f"{message}, got {shortened(repr(given))}"
         if isinstance(given, str) and NUMBER.fullmatch(given):
-            text += ": write the number without quotation marks"
+            text += ": write a number as TOML has it, such as 1.0 or 10, without quotation marks"
     return key, text
 
 

@@ -57,8 +57,9 @@ class GridTable(SpecTable):
     """Table [grid]."""
 
     points: Points
-    """Number of grid points along x, or "auto": the coarsest grid that meets [accuracy]. Numbers
-    with many factors of 2 are fastest. The cell of a mirrored map has twice as many points."""
+    """Number of grid points along x, or "auto": the coarsest grid that meets [accuracy], with
+    p_star or pressure as the load, and without points_y. Numbers with many factors of 2 are
+    fastest. The cell of a mirrored map has twice as many points."""
     points_y: Annotated[int, Key(ge=SMALLEST_GRID, le=MAX_POINTS)] | None = None
     """Number of grid points along y. By default the pixels are square, or nearly so; for a map
     the ratio points / points_y is that of the map."""
@@ -193,10 +194,13 @@ def load_text(quantity: str, value: float) -> str:
 
 
 class LoadTable(SpecTable):
-    """Table [load]: one of the quantities below, as a number, a list or a geometric sequence."""
+    """Table [load]: one of the quantities below, as a number, a list or a geometric sequence.
+
+    contact_area takes no sequence.
+    """
 
     p_star: Pressures | None = None
-    """Reduced pressures p / Delta_sigma."""
+    """Reduced pressures p / Delta_sigma, from 1e-30 to 1e6."""
     pressure: Pressures | None = None
     """Pressures [Pa]."""
     contact_area: Areas | None = None
@@ -244,7 +248,7 @@ class LoadTable(SpecTable):
 
 
 class AccuracyTable(SpecTable):
-    """Table [accuracy]: requested accuracy, as errors relative to the continuum value."""
+    """Table [accuracy]: requested errors relative to the continuum value, at least one."""
 
     mean_gap: Share | None = None
     """Relative error of the mean gap u_g."""

@@ -164,6 +164,6 @@ def _doubtful_unit(task: Task, solved: TaskSolution) -> str:
             return f"{key} is far above full contact; {unit}: load.pressure takes Pa"
         return f"{key} is far above full contact; {unit}: are moduli, heights and load in Pa and m?"
     is_light = task.surface.rough and solved.contact.pressure < low
-    if task.quantity == "pressure" and is_light:
+    if task.quantity == "pressure" and is_light and solved.observables.a_r < 1:
         return f"{key} gives hardly any contact; {unit}: are moduli, heights and load in Pa and m?"
     return ""

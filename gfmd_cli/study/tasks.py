@@ -1,4 +1,4 @@
-"""A spec as a list of tasks, one for each pressure, with what each will take."""
+"""A spec as a list of tasks, one for each surface, elastomer, grid, solver and load."""
 
 from dataclasses import dataclass
 from math import prod
