@@ -32,25 +32,27 @@ make paper-quick    # small grids, two seeds, minutes: results/paper-quick/paper
 
 The random phases of the paper are not known, so single numbers of its one realisation cannot be reproduced. Trends,
 exponents, ratios and exact results can. Results on rough surfaces are means over at least eight seeds, apart from the
-cross-sections (Figs. 4 and 5) and the map. Those of Figs. 6, 9, 10 and 11, of the cut-off spectrum and of the contact
-edges have 32 seeds, because statements on them were open with eight. The standard errors contain the scatter of the
-seeds (jackknife) and, for values in the continuum, the error of the grid.
+cross-sections (Figs. 4 and 5), the map, and the height range of surfaces (statement 45: five). Those of Figs. 6, 9,
+10 and 11, of the cut-off spectrum and of the contact edges have 32 seeds, because statements on them were open with
+eight; verdicts near a limit are therefore weaker than two standard errors suggest. The standard errors contain the
+scatter of the seeds (jackknife) and, for values in the continuum, the error of the grid (half of an error bar).
 
 Each statement has criteria: a quantity and the limits between which the statement holds. They are data, in
-`scripts/paper/statements_hertz.py` and `scripts/paper/statements_rough.py`, chosen from what the paper itself says where
-it gives a number, and the verdict follows from them:
+`scripts/paper/statements_hertz.py` and `scripts/paper/statements_rough.py`. The limits come from the paper where it
+gives a number; the others are choices. The verdict follows from them:
 
 - A criterion holds (✓) or fails (✗) if the value with twice its error lies inside or outside of the limits; otherwise
   it is open (?). A value without an error is exact, or that of the one contact or surface named with it.
-- **agrees**: all criteria hold. **disagrees**: all fail. **agrees in part**: some hold and some fail.
+- **agrees**: all criteria hold. **disagrees**: all fail. **agrees in part**: some hold and some fail, whether or
+  not others are open.
 - **misprint**: the content holds, the printed form does not.
-- **not decided here**: a criterion is open, or there is none.
+- **not decided here**: otherwise, if a criterion is open, or there is none.
 """
 
 SIZES = """\
 ## Sizes of the studies
 
-The paper has λᵣ/λₛ = 100 in most studies and grids of up to 32768² points. How the mean gap and the contact area depend
+The paper has λᵣ/λₛ = 100 in most studies and grids of up to 16384² points. How the mean gap and the contact area depend
 on λᵣ/λₛ from 8 to 128 is [measured](theory.md#trend-with-the-range-of-the-spectrum). A study of another size is run with
 other keys, as in `gfmd run configs/paper/fig13.toml -o results/paper/fig13.h5 --set grid.points='[2048, 4096, 8192]'`. Then
 `python scripts/paper_figures.py -o results/paper --no-run --page docs/paper.md` writes the page.
