@@ -7,7 +7,7 @@ rough surfaces across the spatial dimensions".
 
 from functools import lru_cache
 from math import ceil
-from typing import Annotated, ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import Field as Key
@@ -257,8 +257,9 @@ class Punch(RoundIndenter):
     kind: Literal["punch"] = "punch"
     radius: Positive = 0.25
     """Radius of the face [m]."""
-    depth: Positive = 1.0
-    """Depth of the surface around the face [m]; a large value keeps it out of contact."""
+    depth: Positive | None = None
+    """Depth of the surface around the face [m]; a large value keeps it out of contact. By default
+    the side of the cell along x."""
 
     @model_validator(mode="after")
     def _has_rim(self) -> Self:
@@ -269,7 +270,11 @@ class Punch(RoundIndenter):
 
     def _profile(self, r: Field) -> Field:
         rim = self.radius * (1 + 1e-12)  # points on the rim belong to the face, up to rounding
-        return np.where(r <= rim, 0.0, -self.depth)
+        return np.where(r <= rim, 0.0, -(self.depth or self.length))
+
+    def parameters(self) -> dict[str, Any]:
+        """Value of every key, with the default of the depth as it is applied."""
+        return super().parameters() | {"depth": self.depth or self.length}
 
 
 class Ridge(LineIndenter):
