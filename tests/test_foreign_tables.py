@@ -489,12 +489,22 @@ def _raised(heights, lines, by=5e-9):
     return heights
 
 
+def _scarred(heights):
+    """Twenty strokes of eight points along x, 3 nm high."""
+    heights = heights.copy()
+    for row, column in np.random.default_rng(3).integers(2, 118, (20, 2)):
+        heights[row, column : column + 8] += 3e-9
+    return heights
+
+
 @pytest.mark.parametrize(
     ("change", "words"),
     [
         (lambda h: _raised(h, [50]), "lines along x jump at 2 places"),
         (lambda h: _raised(h, slice(50, None), 2e-9), "lines along x jump at 1 place,"),
         (lambda h: np.where(h == h[3, 3], np.nan, _raised(h, [50, 90])), "jump at 4 places"),
+        (lambda h: _scarred(h), "next lines along x by more than 3 times"),
+        (lambda h: _scarred(h.T).T, "next lines along y by more than 3 times"),
         (lambda h: h[np.arange(128) // 2 * 2], "64 of 128 lines along x are equal"),
         (lambda h: h + 1e-7 * np.arange(128), "subtracts a slope of 1.3, an angle of 52 degrees"),
         (lambda h: np.minimum(h, np.quantile(h, 0.995)), "heights are exactly the maximum"),

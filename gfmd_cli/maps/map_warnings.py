@@ -26,6 +26,7 @@ MIN_SHOWN_FRACTION = 0.01  # of the heights, from which a warning states the per
 PLATEAU_FRACTION = 0.5  # of the heights: so many equal ones are part of the surface; a choice
 MIN_OTHERS = 8  # other heights, without which one that is apart is no outlier; a choice
 USUAL_PERCENT = 95  # of the differences between neighbours; of Gaussian ones, below 2 rms values
+SCAR_RATIO = 3.0  # ratio of a scar, a stroke in one line, to such a difference; a choice
 SPIKE_RATIO = 10.0  # ratio of a spike to such a difference; a choice
 MAX_SPIKES = 16  # on either side; a choice: more are a part of the surface
 STANDARD_DEVIATION = 1.4826  # over the median absolute deviation, of Gaussian values
@@ -281,30 +282,40 @@ def _often_equal(heights: Field) -> str:
 
 
 def _single_points(topography: Topography) -> str:
-    """Points inside the map that are far above, or far below, all points next to them."""
+    """Points inside the map far above or below all next to them, or above those along one axis."""
     heights, missing = np.atleast_2d(topography.heights), topography.missing
     missing = None if missing is None else missing.reshape(heights.shape)
-    is_map, count = len(heights) > 1, 0
-    least = SPIKE_RATIO * _usual_difference(heights, missing)
-    for rows in row_blocks(heights) if least else ():
+    is_map, count, strokes = len(heights) > 1, 0, np.zeros(2, int)
+    usual = _usual_difference(heights, missing)
+    for rows in row_blocks(heights) if usual else ():
         around = slice(max(rows.start - is_map, 0), rows.stop + is_map)
         block = heights[around]
         if missing is not None:
             block = np.where(missing[around], np.nan, block)
         inner = slice(1, -1) if is_map else slice(None)
         own = block[inner, 1:-1]
-        neighbours = [block[inner, :-2], block[inner, 2:]]
-        neighbours += [block[:-2, 1:-1], block[2:, 1:-1]] if is_map else []
-        above = np.min([own - each for each in neighbours], axis=0)
-        below = np.min([each - own for each in neighbours], axis=0)
-        count += int(np.count_nonzero((above > least) | (below > least)))
-    if not count:
-        return ""
-    what = "1 point lies" if count == 1 else f"{count} points lie"
-    return (
-        f"{what} above or below all neighbours by more than {SPIKE_RATIO:g} times the difference "
-        f"that {USUAL_PERCENT} % of neighbouring heights have at most: spikes? Replace them by NaN"
-    )
+        axes = [(block[inner, :-2], block[inner, 2:])]
+        axes += [(block[:-2, 1:-1], block[2:, 1:-1])] if is_map else []
+        above = [np.minimum(own - one, own - other) for one, other in axes]
+        below = [np.minimum(one - own, other - own) for one, other in axes]
+        is_single = [np.min(each, axis=0) > SPIKE_RATIO * usual for each in (above, below)]
+        count += int(np.count_nonzero(is_single[0] | is_single[1]))
+        strokes[: len(axes)] += [np.count_nonzero(each > SCAR_RATIO * usual) for each in above]
+    than = f"times the difference that {USUAL_PERCENT} % of neighbouring heights have at most"
+    if count:
+        what = "1 point lies" if count == 1 else f"{count} points lie"
+        return (
+            f"{what} above or below all neighbours by more than {SPIKE_RATIO:g} {than}: spikes? "
+            "Replace them by NaN"
+        )
+    if is_map and strokes.max() > max(MAX_SPIKES, CLIPPED_RATIO * strokes.min()):
+        along = "yx"[int(strokes.argmax())]
+        return (
+            f"{strokes.max()} points lie above both neighbours in the next lines along {along} by "
+            f"more than {SCAR_RATIO:g} {than}, but {strokes.min()} above both in the line: scars "
+            "of the scan? Replace them by NaN"
+        )
+    return ""
 
 
 def _usual_difference(heights: Field, missing: Mask | None) -> float:
