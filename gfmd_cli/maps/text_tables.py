@@ -1,8 +1,8 @@
 """Tables of numbers in text files: what kind of height map a file can be.
 
-The readers of such files parse them to the end, and some try several hundred times, so that a large
-table that is not a map would take hours. Here lines are counted in parts of the file, which takes
-some seconds at most.
+The readers of such files parse them to the end, and some start again several hundred times, so that
+a large table that is not a map would take hours. Here lines are counted in parts of the file, which
+takes some seconds at most.
 """
 
 import codecs

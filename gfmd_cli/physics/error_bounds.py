@@ -12,7 +12,7 @@ to the mean p, and e = sigma - s, the duality gap is
 free of cancellation. J is as curved as K, so <(u - u*) K (u - u*)> <= 2 G, from which
 <(sigma - sigma*)^2> <= 2 G k_max. The contact pressure is sigma at the points in contact and zero
 elsewhere; the rms of the difference is added. The minimum E(p) of J is concave in p with slope
-<u*>, and s q / p is admissible at any other pressure q; the best q gives
+<u*>, and s p'/p is admissible at any other pressure p'; the best p' gives
 
     | <u*> - (<s h> - B) / p | <= sqrt(2 G B) / p,   B = <(s - p) K^-1 (s - p)>.
 

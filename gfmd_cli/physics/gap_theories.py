@@ -3,10 +3,10 @@
 `FittedWeight` has another weight of the elastic energy, with constants that scripts/gap_theories.py
 fits to simulations.
 
-`CoarseGrained` has no constant of its own (docs/physics.md): waves join the law of the interface,
-the shortest first. With all waves shorter than a wavelength the interface has a law
-u_g(p). Under a longer wave it acts as springs of stiffness kappa = -dp/du_g in series with the
-elastomer of stiffness k(q), which flatten the fraction T = kappa / (kappa + k) of the wave. The
+`CoarseGrained` has no constant of its own (docs/physics.md): waves are added to the interface, the
+shortest first. With all waves shorter than a wavelength the interface has a law u_g(p). Under a
+longer wave it acts as springs of stiffness kappa = -dp/du_g in series with the elastomer of
+stiffness k(q), so that the elastomer follows the fraction T = kappa / (kappa + k) of the wave. The
 work F(p), the integral of u_g from 0 to p, increases by T k dC / 2 with waves of squared height dC.
 """
 

@@ -7,8 +7,8 @@ so the gap has four neighbours and the contact has eight.
 A region percolates along an axis if a closed path in it winds around the torus along that axis; the
 path is then infinite in the periodic plane. (A path from edge to edge of one cell may end in the
 next cell.) The method is that of Newman & Ziff, Phys. Rev. E 64, 016706 (2001), Sect. II D, after
-Machta et al.: each region of a union-find tree stores its displacement to the root, and regions
-that meet again with another displacement wind.
+Machta et al.: each region of a union-find tree stores its displacement to the root. A region
+percolates if two of its branches meet with different displacements.
 """
 
 from collections.abc import Iterator
