@@ -397,3 +397,41 @@ def test_the_interval_holds_the_truth_as_often_as_it_says():
 )
 def test_values_have_the_digits_that_their_errors_leave(value, error, text):
     assert plus_minus(value, error) == text
+
+
+def _texture(points):
+    """Eight waves along each side, all alike."""
+    x = 16 * np.pi * np.arange(points) / points
+    return 1e-7 * (np.cos(x)[:, None] + np.cos(x))
+
+
+def _ribbons(points, seed=0):
+    """Minus the square of a Gaussian surface: ridges as high as each other, where that is zero."""
+    q = np.hypot(np.fft.fftfreq(points, 1 / points)[:, None], np.fft.fftfreq(points, 1 / points))
+    power = np.where((q > 0) & (q <= 7), (1 + (0.3 * q) ** 2) ** -0.75, 0.0)
+    noise = np.random.default_rng(seed).standard_normal((points, points))
+    a = np.fft.ifft2(np.fft.fft2(noise) * power).real
+    return -1e-7 * (a / a.std()) ** 2
+
+
+@pytest.mark.parametrize("heights", [_texture(64), _ribbons(64)])
+@pytest.mark.parametrize("n", [0.5, 1])
+def test_bars_hold_for_textures_and_ribbons(heights, n):
+    def solved(points):
+        tables = {
+            "surface": {"length": 1e-4, "periodic": True, "interpolation": "fourier"},
+            "elastomer": {"kind": "power", "n": n},
+            "grid": {"points": points},
+            "load": {"p_star": 0.02},
+            "accuracy": {"mean_gap": 0.1, "contact_area": 0.3, "stress_deviation": 0.1},
+        }
+        return solve(tables, heights=heights).columns
+
+    exact = solved(512)
+    for points in (64, 128, "auto"):
+        found = solved(points)
+        for name in ("a_r", "sigma_p", "u_g"):
+            value, bar = found[f"{name}_continuum"], found[f"{name}_continuum_error"]
+            own = exact[f"{name}_continuum_error"]
+            assert not abs(value - exact[f"{name}_continuum"]) > np.hypot(bar, own)
+    assert exact["u_g_verdict"] == "regular"

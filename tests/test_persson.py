@@ -259,7 +259,11 @@ def test_area_and_gap_give_their_pressure_back(default, n):
     p = np.array([1e-3, 0.02, 0.3, 2.5]) * of_n.delta_sigma
     np.testing.assert_allclose(of_n.pressure_at_area(of_n.contact_area(p)), p, rtol=1e-12)
     np.testing.assert_allclose(of_n.pressure_at_gap(of_n.mean_gap(p)), p, rtol=1e-4)
-    assert np.isnan(of_n.pressure_at_gap(0.0))
+    smallest, largest = of_n.gap_range
+    assert of_n.pressure_at_gap([smallest, largest]) == pytest.approx(
+        [20 * of_n.delta_sigma, 1e-6 * of_n.delta_sigma], rel=1e-6
+    )
+    assert np.isnan(of_n.pressure_at_gap([0.0, 0.99 * smallest, 1.01 * largest])).all()
 
 
 @pytest.mark.parametrize("n", [0, 0.5, 2, 3.7])

@@ -88,6 +88,12 @@ MIN_PATCHES = 10.0
 MAX_ANISOTROPY = 2.0
 """Largest ratio of rms slopes of a calibrated surface; isotropic maps of 32 points have up to 1.3,
 maps stretched by 3, whose bars failed, 2.6 or more."""
+MIN_WAVES = 30.0
+"""Independent waves of the slopes from which patches differ from each other: random surfaces of at
+least four waves per side have 40 and more, textures of one wavelength 4 to 12."""
+MAX_SKEWNESS = 1.0
+"""Largest skewness of calibrated heights: random surfaces have up to 0.8. With -2.8 (h = -a^2 of a
+Gaussian a) contacts are ribbons, and hardly any bar held."""
 MAX_SPACING_RATIO = 1.1
 """Largest ratio of grid spacings with the excess of square pixels. With the wider spacing in x, a
 ratio of 2 has 0.7 of it and of 4 half, so that 56 of 100 bars of the corrected area held."""
@@ -111,11 +117,20 @@ class RoughnessScales:
     """Whether the coarsest grid contains all waves of the surface."""
     aspect: float = 1.0
     """Ratio of the grid spacings along x and y, at least 1."""
+    skewness: float = 0.0
+    """Skewness of the heights."""
+    independent_waves: float = inf
+    """Number of equal waves that have the same mean of their squared powers of the slope."""
 
     @property
     def calibrated(self) -> bool:
-        """Whether the errors are those of isotropic band-limited roughness."""
-        return self.band_limited and self.anisotropy <= MAX_ANISOTROPY
+        """Whether the errors are those of isotropic band-limited roughness, nearly Gaussian."""
+        return (
+            self.band_limited
+            and self.anisotropy <= MAX_ANISOTROPY
+            and abs(self.skewness) <= MAX_SKEWNESS
+            and self.independent_waves >= MIN_WAVES
+        )
 
     def phase(self, points: float) -> float:
         """Phase w of the short waves from one point to the next."""
@@ -150,12 +165,17 @@ def roughness_scales(
     *,
     band_limited: bool = True,
     aspect: float = 1.0,
+    skewness: float = 0.0,
 ) -> RoughnessScales:
     """Scales of a rough surface from its spectrum, for a cell of side `length` [m]."""
     height, q2 = shells.height, np.square(shells.q * length)
     flat, steep, bent = (float(np.sum(height * q2**power)) for power in (0, 1, 2))
     waves, curvature = sqrt(bent / steep) / (2 * pi), sqrt(bent / flat)
-    return RoughnessScales(waves, curvature, anisotropy, band_limited, aspect)
+    slopes = height * q2
+    independent = float(slopes.sum() ** 2 / np.sum(slopes**2 / shells.modes))
+    return RoughnessScales(
+        waves, curvature, anisotropy, band_limited, aspect, skewness, independent
+    )
 
 
 def local_exponent(elastomer: LinearElastomer, points: float, length: float) -> float:

@@ -220,11 +220,20 @@ class Persson:
     def pressure_at_gap(self, u_g: Field | float) -> Field:
         """Pressure at a mean gap, Eq. (28) inverted by a monotone cubic in logarithms.
 
-        Good to 1e-4 for Delta_sigma / 1e6 <= p <= 6 Delta_sigma; NaN for no gap, the ends beyond.
+        Good to 1e-4 for Delta_sigma / 1e6 <= p <= 6 Delta_sigma; NaN outside of `gap_range`.
         """
         rising, table = self._pressures_over_gap
-        log_gap = -np.log(np.where(np.asarray(u_g) > 0, u_g, np.nan))
+        smallest, largest = self.gap_range
+        u_g = np.asarray(u_g)
+        known = (smallest <= u_g) & (u_g <= largest)
+        log_gap = -np.log(np.where(known, u_g, np.nan))
         return np.exp(table(np.clip(log_gap, rising[0], rising[-1])))
+
+    @property
+    def gap_range(self) -> tuple[float, float]:
+        """The smallest and the largest mean gap of which `pressure_at_gap` gives the pressure."""
+        rising, _ = self._pressures_over_gap
+        return float(np.exp(-rising[-1])), float(np.exp(-rising[0]))
 
     @cached_property
     def _pressures_over_gap(self) -> tuple[Field, Callable[[Field], Field]]:

@@ -163,7 +163,7 @@ def _pressures(task: Task, scene: Scene, loads: Field) -> Field:
     theory = Persson(scene.shells)
     if task.quantity == "contact_area":
         return theory.pressure_at_area(loads)
-    return theory.pressure_at_gap(loads * scene.h_std)
+    return theory.pressure_at_gap(np.clip(loads * scene.h_std, *theory.gap_range))
 
 
 def _softest(task: Task, scene: Scene) -> float:
