@@ -575,3 +575,26 @@ def test_a_time_without_end_is_no_limit(run):
     _, events, outcome = run(overrides=("elastomer.n=0",), max_seconds=float("inf"), jobs=1)
     assert outcome.total() == 2
     assert not [event for event in events if event.event == "warning"]
+
+
+def test_a_file_that_changes_during_a_run_fails_the_tasks_that_use_it(tmp_path, monkeypatch):
+    """Its checksum would stand beside results of other heights."""
+    rough = np.random.default_rng(0).normal(size=(64, 64))
+    np.save(tmp_path / "h.npy", rough)
+    (tmp_path / "spec.toml").write_text(
+        '[surface]\nkind = "file"\npath = "h.npy"\nlength = 1.0\n'
+        '[elastomer]\nkind = "half-space"\n[grid]\npoints = 64\n[load]\np_star = [0.1, 0.2]\n'
+    )
+    spec, text = read_spec(tmp_path / "spec.toml", ())
+    events = []
+
+    def report(progress):
+        events.append(progress)
+        if progress.event == "end" and progress.task == 0:
+            np.save(tmp_path / "new.npy", 2 * rough)
+            (tmp_path / "new.npy").replace(tmp_path / "h.npy")
+
+    path = tmp_path / "study.h5"
+    assert run_study(spec, text, path, report, RunOptions(jobs=1)) == {"converged": 1, "failed": 1}
+    assert "h.npy: the file was changed during the run" in events[-1].message
+    assert run_study(spec, text, path, events.append, RunOptions(jobs=1)) == {"converged": 2}

@@ -2,6 +2,7 @@
 
 import json
 import os
+import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -47,8 +48,8 @@ def analyze(study: Path, as_json: bool, figures: Path | None, theory: "Theory") 
         print_text(str(comparison))
         if comparison.missing:
             print_text(
-                f"\n{count(comparison.missing, 'task')} not solved yet, or failed; "
-                f"`gfmd status {study}` tells why."
+                f"\n{count(comparison.missing, 'task')} not solved yet, or failed; `gfmd status "
+                f"{shlex.quote(str(study))}` prints the errors."
             )
     if figures is not None:
         from gfmd_cli.analysis.figures import draw_all

@@ -115,12 +115,13 @@ def run(
         from gfmd_cli.study.run import RunOptions
 
         options = RunOptions(ranks=ranks, max_seconds=max_seconds, **run_options)
-        if options.overwrite and output is not None and len(specs) > 1:
+        read = [read_spec(spec, overrides) for spec in specs]
+        paths = [study_path(spec, output) for spec, _ in read]
+        if options.overwrite and len(set(paths)) < len(paths):
             raise InputError(
-                "--overwrite: not with -o and several specs; each would start a new study"
+                "--overwrite: not with several specs of one study; each would start it anew"
             )
-        for spec, text in [read_spec(spec, overrides) for spec in specs]:
-            path = study_path(spec, output)
+        for (spec, text), path in zip(read, paths, strict=True):
             if dry_run:
                 _print_tasks(spec, path, options)
             else:

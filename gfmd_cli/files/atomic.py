@@ -12,6 +12,7 @@ from uuid import uuid4
 
 from gfmd_cli.errors import SpaceError
 
+TEMPORARY_LETTERS = 34  # that the name of a file that is being written has more than its own
 WRITABLE = stat.S_IWUSR | stat.S_IWGRP | stat.S_IWOTH
 
 
@@ -75,6 +76,8 @@ def write_whole(path: Path, content: bytes) -> None:
 def check_place(path: Path) -> None:
     """Raise SpaceError where no file can be written at `path`, before the work for it begins."""
     _check_target(path)
+    if len(os.fsencode(path.name)) > os.pathconf(path.parent, "PC_NAME_MAX") - TEMPORARY_LETTERS:
+        raise SpaceError(f"{path}: cannot be written: the name is too long")
     try:
         TemporaryFile(dir=path.parent).close()
     except OSError as error:

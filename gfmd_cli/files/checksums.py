@@ -10,6 +10,9 @@ from typing import Any, BinaryIO
 from gfmd_cli.errors import InputError
 from gfmd_cli.files.atomic import NewFile
 
+Stamp = tuple[int, int, int]
+"""What tells a file from one that replaces it, see `file_stamp`."""
+
 SEAL = b"gfmd"  # followed by four bytes, the crc32 of all before
 CHUNK = 2**24  # bytes that are read at a time
 MAX_COMPRESSION = 1032  # of files and data: the limit of deflate, https://zlib.net/zlib_tech.html
@@ -60,6 +63,15 @@ def _sum(file: BinaryIO | NewFile, size: int) -> bytes:
         total = zlib.crc32(chunk, total)
         size -= len(chunk)
     return total.to_bytes(4, "little")
+
+
+def file_stamp(path: Path) -> Stamp | None:
+    """Inode, size and time of change of a file; None where there is none."""
+    try:
+        status = path.stat()
+    except OSError:
+        return None
+    return status.st_ino, status.st_size, status.st_mtime_ns
 
 
 def file_digest(path: Path) -> str:

@@ -34,7 +34,8 @@ def kernel(function: Callable[..., Any]) -> Any:
         if not _take_private_folder():
             return njit(**NUMBA_OPTIONS)(function)
         compiled = njit(cache=True, **NUMBA_OPTIONS)(function)
-    _tolerate_faults(compiled._cache)
+    if hasattr(compiled, "_cache"):  # not with NUMBA_DISABLE_JIT
+        _tolerate_faults(compiled._cache)
     return compiled
 
 

@@ -71,7 +71,7 @@ class Ranks:
         If other ranks do not call this in time, because they wait for data from this one, all
         ranks are aborted.
         """
-        if error is not None and not isinstance(error, EXPECTED_ERRORS):
+        if error is not None and not isinstance(error, (*EXPECTED_ERRORS, SystemExit)):
             log.error("rank %d: unexpected error", self.rank, exc_info=error)
         own = np.array([_status(error)])
         statuses = np.zeros(self.size, own.dtype)
@@ -103,10 +103,10 @@ def shared_errors(ranks: Ranks | None) -> Iterator[None]:
     if ranks is None:
         yield
         return
-    failed: Exception | None = None
+    failed: BaseException | None = None
     try:
         yield
-    except Exception as error:
+    except (Exception, SystemExit) as error:  # a signal that ends the process, too
         failed = error
     ranks.raise_on_all(failed)
 
@@ -122,6 +122,8 @@ def is_root(ranks: Ranks | None) -> bool:
 
 
 def _status(error: BaseException | None) -> int:
+    if isinstance(error, SystemExit):
+        return int(error.code or 0)
     return 0 if error is None else getattr(error, "exit_status", 1)
 
 
@@ -132,7 +134,7 @@ def _text(error: BaseException) -> str:
 
 def _portable(error: BaseException | None, rank: int) -> BaseException | None:
     """The error, or one that can be sent to other ranks."""
-    if error is None or isinstance(error, GfmdError | MemoryError):
+    if error is None or isinstance(error, GfmdError | MemoryError | SystemExit):
         return error
     return GfmdError(f"rank {rank}: {_text(error)}")
 

@@ -122,6 +122,8 @@ def fill_missing(heights: Field, missing: Mask) -> Field:
     """
     known = np.atleast_2d(np.where(missing, 0.0, heights))
     holes = np.atleast_2d(missing)
+    if not holes.any():
+        return known.reshape(heights.shape)
     exact = np.count_nonzero(holes) <= MAX_EXACT
     filled = _harmonic(known, holes) if exact else _smooth(known, holes)
     return filled.reshape(heights.shape)

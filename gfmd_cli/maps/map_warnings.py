@@ -30,13 +30,15 @@ SCAR_RATIO = 3.0  # ratio of a scar, a stroke in one line, to such a difference;
 SPIKE_RATIO = 10.0  # ratio of a spike to such a difference; a choice
 MAX_SPIKES = 16  # on either side; a choice: more are a part of the surface
 STANDARD_DEVIATION = 1.4826  # over the median absolute deviation, of Gaussian values
+CLIPPED_ROUNDING = 1e-9  # relative to the range: heights so close differ by rounding
 CLIPPED_RATIO = 10  # ratio of the numbers of equal heights, highest to second; about 1 if rounded
 SIDE_TOLERANCE = 1e-3  # relative difference, beyond which a side is probably wrong; a choice
 MAX_FILLED = 0.05  # fraction of filled heights; a choice
 MAX_SLOPE = 0.5  # of what levelling subtracts; a choice: 27 degrees, with a cosine of 0.9
-MAX_FORM = 0.85  # fraction of the variance of levelled heights; random surfaces have up to 0.84
+MAX_FORM = 0.85  # fraction of the variance of levelled heights; random maps have up to 0.84
 MIN_FORM_KINK = 0.5  # of the kink of a parabola at the border; a choice: 0 if periodic
 FORM_POINTS = 256  # per side, of a sample that shows the form
+MIN_FORM_POINTS = {1: 256, 2: 16}  # per side, by dimension: fewer have such a form by chance
 END_FRACTION = 20  # of a side, over which the slope at the border is taken; a choice
 MAX_LINE_SHIFT = 0.5  # over the rms difference of neighbours in a line; measured scans: 0 to 0.4
 MAX_LINE_CORRELATION = 0.3  # of the signs of successive shifts; roughness is smoother; a choice
@@ -141,6 +143,8 @@ def tilted(heights: Field) -> str:
 
 def curved(heights: Field) -> str:
     """A parabolic form, which has a kink at the borders if it is repeated."""
+    if min(heights.shape) < MIN_FORM_POINTS[heights.ndim]:
+        return ""
     heights = heights[tuple(slice(None, None, 1 + n // FORM_POINTS) for n in heights.shape)]
     flat = level(heights, "plane")
     form = flat - level(flat, "curvature")
@@ -178,11 +182,13 @@ def repeated_lines(heights: Field) -> str:
         equal = 1 + np.flatnonzero((lines[1:] == lines[:-1]).all(axis=1))
         if not 0 < equal.size < len(lines) - 1:
             continue
-        varied = [i for i in equal[:MAX_SPIKES] if 2 * np.unique(lines[i]).size > lines.shape[1]]
-        if varied:
+        checked = equal[:: 1 + equal.size // MAX_SPIKES]
+        if any(2 * np.unique(lines[i]).size >= lines.shape[1] for i in checked) and not any(
+            np.array_equal(lines[i + 1 : i + 3], lines[i - 3 : i - 1][::-1]) for i in checked
+        ):  # else parts of a designed surface, or a mirrored map
             return (
                 f"{equal.size} of {len(lines)} lines along {along} are equal to the line before: "
-                "repeated by the instrument or a program? Leave them out"
+                "repeated by the instrument or a program? Replace them by NaN"
             )
     return ""
 
@@ -205,34 +211,38 @@ def shifted_lines(topography: Topography, spacing: tuple[float, ...]) -> str:
         return ""
     if topography.missing is not None:
         heights = np.where(topography.missing, np.nan, heights)
-    for lines, along, aspect in ((heights, "x", spacing[0] / spacing[1]), (heights.T, "y", 0.0)):
-        lag = max(1, round(aspect or spacing[1] / spacing[0]))  # points as far apart as the lines
-        step_y, step_x = (1 + points // (4 * FORM_POINTS) for points in lines.shape)
-        inside = float(np.nanstd(lines[::step_y, lag:] - lines[::step_y, :-lag]))
-        halves = np.array_split(np.diff(lines[:, ::step_x], axis=0), 2, axis=1)
-        with warnings.catch_warnings(action="ignore", category=RuntimeWarning):  # all are missing
-            medians = np.array([np.nanmedian(half, axis=1) for half in halves])
-        known = np.array([np.isfinite(half).sum(axis=1) for half in halves])
-        medians[known < MIN_KNOWN] = np.nan
-        if not np.isfinite(medians).any(axis=1).all():
+    dy, dx = spacing
+    for lines, along, ratio in ((heights, "x", dy / dx), (heights.T, "y", dx / dy)):
+        lag = max(1, round(ratio))  # points of a line as far apart as the lines
+        if lag >= lines.shape[1]:
             continue
-        medians -= np.nanmedian(medians, axis=1, keepdims=True)
+        step_y, step_x = (1 + points // (4 * FORM_POINTS) for points in lines.shape)
+        halves = np.array_split(np.diff(lines[:, ::step_x], axis=0), 2, axis=1)
+        known = np.array([np.isfinite(half).sum(axis=1) for half in halves])
+        with warnings.catch_warnings(action="ignore", category=RuntimeWarning):  # all are missing
+            inside = float(np.nanstd(lines[::step_y, lag:] - lines[::step_y, :-lag]))
+            medians = np.array([np.nanmedian(half, axis=1) for half in halves])
+        medians = medians[:, (known >= MIN_KNOWN).all(axis=0)]
+        if not (medians.size and inside > 0):
+            continue
+        medians -= np.median(medians, axis=1, keepdims=True)
         shifts = np.where(medians.prod(axis=0) > 0, np.abs(medians).min(axis=0), 0.0)
         shifts *= np.sign(medians[0])
         usual = STANDARD_DEVIATION * float(np.median(np.abs(shifts)))
-        spread = STANDARD_DEVIATION * float(np.nanmedian(np.abs(medians)))
+        spread = STANDARD_DEVIATION * float(np.median(np.abs(medians)))
         jumps = int(np.count_nonzero(np.abs(shifts) > max(JUMP_RATIO * spread, inside)))
         correlation = float(np.mean(np.sign(shifts[1:] * shifts[:-1])))
-        if usual > MAX_LINE_SHIFT * inside > 0 and correlation < MAX_LINE_CORRELATION:
+        if usual > MAX_LINE_SHIFT * inside and correlation < MAX_LINE_CORRELATION:
             what = f"are shifted against each other, by {usual / inside:.2g} times"
-        elif jumps and inside:
+        elif jumps and spread > 0:  # medians of rounded heights are mostly zero
             what = f"jump at {counted(jumps, 'place')}, by more than"
         else:
             continue
         return (
-            f"the lines along {along} {what} the rms difference of points of a line as far apart: "
-            "drift or jumps of the scan? Align the lines (median of differences) in another "
-            f"program, unless these are steps or grooves of the surface along {along}"
+            f"the lines along {along} {what} the rms difference of two points of a line that are "
+            "as far apart as the lines: drift or jumps of the scan? Align the lines (median of "
+            "differences) in another program, unless these are steps or grooves of the surface "
+            f"along {along}"
         )
     return ""
 
@@ -256,7 +266,9 @@ def outliers(topography: Topography) -> str:
                 "heights? Replace it by NaN"
             )
         following = others.min() if word == "minimum" else others.max()
-        if count > CLIPPED_RATIO * max(int(np.count_nonzero(others == following)), 1):
+        near = abs(others - following) <= CLIPPED_ROUNDING * np.ptp(heights)
+        is_apart = abs(following - extreme) > CLIPPED_ROUNDING * np.ptp(heights)
+        if is_apart and count > CLIPPED_RATIO * int(np.count_nonzero(near)):
             return (
                 f"{count} heights{percentage} are exactly the {word}, {extreme:g}: clipped at the "
                 "range of the instrument, or a mark of missing heights? Replace such a mark by NaN"
@@ -282,10 +294,10 @@ def _often_equal(heights: Field) -> str:
 
 
 def _single_points(topography: Topography) -> str:
-    """Points inside the map far above or below all next to them, or above those along one axis."""
+    """Single points far above or below all their neighbours, or strokes along one axis."""
     heights, missing = np.atleast_2d(topography.heights), topography.missing
     missing = None if missing is None else missing.reshape(heights.shape)
-    is_map, count, strokes = len(heights) > 1, 0, np.zeros(2, int)
+    is_map, count, strokes = len(heights) > 1, 0, np.zeros((2, 2), int)
     usual = _usual_difference(heights, missing)
     for rows in row_blocks(heights) if usual else ():
         around = slice(max(rows.start - is_map, 0), rows.stop + is_map)
@@ -300,7 +312,10 @@ def _single_points(topography: Topography) -> str:
         below = [np.minimum(one - own, other - own) for one, other in axes]
         is_single = [np.min(each, axis=0) > SPIKE_RATIO * usual for each in (above, below)]
         count += int(np.count_nonzero(is_single[0] | is_single[1]))
-        strokes[: len(axes)] += [np.count_nonzero(each > SCAR_RATIO * usual) for each in above]
+        for sign, each in enumerate((above, below)):
+            strokes[sign, : len(axes)] += np.count_nonzero(
+                np.stack(each) > SCAR_RATIO * usual, axis=(1, 2)
+            )
     than = f"times the difference that {USUAL_PERCENT} % of neighbouring heights have at most"
     if count:
         what = "1 point lies" if count == 1 else f"{count} points lie"
@@ -308,13 +323,14 @@ def _single_points(topography: Topography) -> str:
             f"{what} above or below all neighbours by more than {SPIKE_RATIO:g} {than}: spikes? "
             "Replace them by NaN"
         )
-    if is_map and strokes.max() > max(MAX_SPIKES, CLIPPED_RATIO * strokes.min()):
-        along = "yx"[int(strokes.argmax())]
-        return (
-            f"{strokes.max()} points lie above both neighbours in the next lines along {along} by "
-            f"more than {SCAR_RATIO:g} {than}, but {strokes.min()} above both in the line: scars "
-            "of the scan? Replace them by NaN"
-        )
+    for counts, where in zip(strokes, ("above", "below"), strict=True):
+        if is_map and counts.max() > max(MAX_SPIKES, CLIPPED_RATIO * counts.min()):
+            along = "yx"[int(counts.argmax())]
+            return (
+                f"{counts.max()} points lie {where} both neighbours in the next lines along "
+                f"{along} by more than {SCAR_RATIO:g} {than}, but {counts.min()} {where} both in "
+                "the line: scars of the scan? Replace them by NaN"
+            )
     return ""
 
 

@@ -91,9 +91,10 @@ maps stretched by 3, whose bars failed, 2.6 or more."""
 MIN_WAVES = 30.0
 """Independent waves of the slopes from which patches differ from each other: random surfaces of at
 least four waves per side have 40 and more, textures of one wavelength 4 to 12."""
-MAX_SKEWNESS = 1.0
-"""Largest skewness of calibrated heights: random surfaces have up to 0.8. With -2.8 (h = -a^2 of a
-Gaussian a) contacts are ribbons, and hardly any bar held."""
+MIN_HIGHEST = 1.0
+"""Smallest highest point of a calibrated surface, in h_std above the mean: surfaces with pits have
+1.1 and more. With 0.7 to 0.8 (h = -a^2 of a Gaussian a) contacts are ribbons on ridges that are as
+high as each other, and hardly any bar held."""
 MAX_SPACING_RATIO = 1.1
 """Largest ratio of grid spacings with the excess of square pixels. With the wider spacing in x, a
 ratio of 2 has 0.7 of it and of 4 half, so that 56 of 100 bars of the corrected area held."""
@@ -117,18 +118,18 @@ class RoughnessScales:
     """Whether the coarsest grid contains all waves of the surface."""
     aspect: float = 1.0
     """Ratio of the grid spacings along x and y, at least 1."""
-    skewness: float = 0.0
-    """Skewness of the heights."""
+    highest: float = inf
+    """Height of the highest point above the mean [h_std]."""
     independent_waves: float = inf
     """Number of equal waves that have the same mean of their squared powers of the slope."""
 
     @property
     def calibrated(self) -> bool:
-        """Whether the errors are those of isotropic band-limited roughness, nearly Gaussian."""
+        """Whether the errors are those of isotropic band-limited roughness."""
         return (
             self.band_limited
             and self.anisotropy <= MAX_ANISOTROPY
-            and abs(self.skewness) <= MAX_SKEWNESS
+            and self.highest >= MIN_HIGHEST
             and self.independent_waves >= MIN_WAVES
         )
 
@@ -165,7 +166,7 @@ def roughness_scales(
     *,
     band_limited: bool = True,
     aspect: float = 1.0,
-    skewness: float = 0.0,
+    highest: float = inf,
 ) -> RoughnessScales:
     """Scales of a rough surface from its spectrum, for a cell of side `length` [m]."""
     height, q2 = shells.height, np.square(shells.q * length)
@@ -173,9 +174,7 @@ def roughness_scales(
     waves, curvature = sqrt(bent / steep) / (2 * pi), sqrt(bent / flat)
     slopes = height * q2
     independent = float(slopes.sum() ** 2 / np.sum(slopes**2 / shells.modes))
-    return RoughnessScales(
-        waves, curvature, anisotropy, band_limited, aspect, skewness, independent
-    )
+    return RoughnessScales(waves, curvature, anisotropy, band_limited, aspect, highest, independent)
 
 
 def local_exponent(elastomer: LinearElastomer, points: float, length: float) -> float:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from gfmd_cli.errors import InputError
-from gfmd_cli.grid.arrays import Field, row_blocks
+from gfmd_cli.grid.arrays import Field
 from gfmd_cli.grid.ranks import Ranks, broadcast
 from gfmd_cli.physics import discretisation_error
 from gfmd_cli.physics.contact import Contact, Scene
@@ -284,13 +284,12 @@ def _between_points(task: Task, solved: TaskSolution) -> dict[str, float]:
 
 def scales_of(scene: Scene, band_limited: bool) -> discretisation_error.RoughnessScales:
     """The scales of a rough surface, as `estimate` needs them."""
-    grid, height = scene.grid, scene.height
-    cubes = sum(float((height[rows] ** 3).sum()) for rows in row_blocks(height))
+    grid = scene.grid
     return discretisation_error.roughness_scales(
         scene.shells,
         grid.length,
-        anisotropy(grid, height),
+        anisotropy(grid, scene.height),
         band_limited=band_limited,
         aspect=max(grid.spacings) / min(grid.spacings),
-        skewness=grid.total(cubes) / grid.size,
+        highest=scene.highest,
     )

@@ -23,7 +23,7 @@ SECONDS_TO_END = 2.0  # for worker processes and small files
 def available_cores() -> int:
     """Cores that this process may use: Slurm's grant, else the affinity mask."""
     slurm_cpus = os.environ.get("SLURM_CPUS_PER_TASK", "")
-    if slurm_cpus.isdigit() and int(slurm_cpus) > 0:
+    if slurm_cpus.isdecimal() and int(slurm_cpus) > 0:
         return int(slurm_cpus)
     return len(os.sched_getaffinity(0))
 
@@ -37,7 +37,7 @@ def available_memory() -> float:
     grants = (("SLURM_MEM_PER_NODE", 1), ("SLURM_MEM_PER_CPU", available_cores()))
     for name, count in grants:
         megabytes = os.environ.get(name, "")
-        if megabytes.isdigit() and int(megabytes) > 0:
+        if megabytes.isdecimal() and int(megabytes) > 0:
             limits.append(2.0**20 * int(megabytes) * count)
     return min(limits, default=float("inf"))
 

@@ -123,7 +123,8 @@ def run_study(
                 if is_root(ranks) and (options.shard[1] == 1 or not stop.is_set()):
                     context.warn(*study.collect(spec, tasks, text))
             plans.plan_with(None)
-        _check_ended(solved, len(pending), stop)
+        again = "run again without --overwrite" if options.overwrite else "run again"
+        _check_ended(solved, len(pending), stop, again)
         if not any(status.is_failure for status in solved):
             _check_output(pending, broadcast(ranks, study.outcomes()))
     return counts + solved
@@ -191,16 +192,16 @@ def _folder(study: Study, tasks: list[Task], ranks: Ranks | None) -> Iterator[li
         yield damaged
 
 
-def _check_ended(solved: Counter[Status], pending: int, stop: Event) -> None:
-    """Raise SpaceError or Interrupted if that ended the run."""
+def _check_ended(solved: Counter[Status], pending: int, stop: Event, again: str) -> None:
+    """Raise SpaceError or Interrupted if that ended the run; `again` says how to continue."""
     if lost := solved[Status.NO_SPACE]:
-        raise SpaceError(f"no space for {count(lost, 'result')}; free some and run again")
+        raise SpaceError(f"no space for {count(lost, 'result')}; free some and {again}")
     unsolved = pending - sum(solved.values())
     left = count(unsolved, "task")
     if stop.is_set() and unsolved:
-        raise Interrupted(f"stopped, states saved; {left} left; run again to continue")
+        raise Interrupted(f"stopped, states saved; {left} left; {again} to continue")
     if unsolved and not any(status.is_failure for status in solved):
-        raise Interrupted(f"{left} left whose workers were killed; run again to continue")
+        raise Interrupted(f"{left} left whose workers were killed; {again} to continue")
 
 
 def _check_output(solved: list[Task], outcomes: dict[str, Outcome]) -> None:

@@ -4,7 +4,8 @@ import time
 from contextlib import suppress
 from pathlib import Path
 
-from gfmd_cli.errors import GfmdError, Interrupted, SpaceError, StudyError
+from gfmd_cli.errors import GfmdError, InputError, Interrupted, SpaceError, StudyError
+from gfmd_cli.files.checksums import file_stamp
 from gfmd_cli.grid.blas import one_blas_thread
 from gfmd_cli.grid.fft_grid import Shape
 from gfmd_cli.grid.ranks import broadcast, is_root, shared_errors
@@ -148,9 +149,17 @@ def solve_task(task: Task, parts: Path, context: SolveContext) -> Status:
     with Checkpoint.exclusive(parts / task.id, context.ranks) as checkpoint:
         solved = solve_at_load(task, context, TaskWatcher(task, checkpoint, context))
         record = result(task, solved, time.perf_counter() - start)
+        _check_files(task)
         if is_root(context.ranks):
             write_record(parts, record)
         checkpoint.remove()
     numbers = (record.entry.row[name] for name in ("points", "steps", "residual", "a_r", "status"))
     context.report(Progress(task.index, "end", task.label, *numbers))
     return solved.solution.status
+
+
+def _check_files(task: Task) -> None:
+    """Raise InputError where a file is not the one whose checksum the task has."""
+    for path, stamp in task.stamps:
+        if file_stamp(path) not in (stamp, None):
+            raise InputError(f"{path}: the file was changed during the run; run again")

@@ -2,12 +2,13 @@
 
 from dataclasses import dataclass
 from math import prod
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from gfmd_cli.errors import InputError
-from gfmd_cli.files.checksums import digest
+from gfmd_cli.files.checksums import Stamp, digest, file_stamp
 from gfmd_cli.physics.indenters import RigidSurface
 from gfmd_cli.physics.linear_elastomer import LinearElastomer
 from gfmd_cli.physics.surfaces import check_resolved
@@ -52,6 +53,8 @@ class Task:
     """Checksum of the table of the elastomer, likewise."""
     swept: tuple[tuple[str, str], ...]
     """Swept keys of surface, grid and solver: the table, and the value as a word of the label."""
+    stamps: tuple[tuple[Path, Stamp | None], ...] = ()
+    """The files of surface and elastomer, as they were before their checksums were computed."""
 
     @property
     def auto(self) -> bool:
@@ -148,6 +151,8 @@ def plan(spec: models.Spec) -> list[Task]:
 
 
 def _tasks(spec: models.Spec) -> list[Task]:
+    choices = [*spec.surface, *spec.elastomer]
+    stamps = {choice.file: file_stamp(choice.file) for choice in choices if choice.file}
     _check(spec)
     resolved = spec.resolved()
     alternatives = {table: getattr(spec, table) for table in models.SWEPT}
@@ -179,6 +184,11 @@ def _tasks(spec: models.Spec) -> list[Task]:
                 elastomer_sha256=tables["elastomer"].get("sha256", ""),
                 scene_id=digest([tables[name] for name in ("surface", "elastomer", "grid")]),
                 swept=_swept_words(chosen, swept_keys),
+                stamps=tuple(
+                    (file, stamps[file])
+                    for file in (chosen["surface"].file, chosen["elastomer"].file)
+                    if file is not None
+                ),
             )
             tasks.setdefault(task.id, task)  # loads may agree in all digits that count
     return list(tasks.values())

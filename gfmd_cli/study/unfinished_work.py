@@ -142,7 +142,8 @@ def read_record(path: Path) -> TaskResult:
 def note_failure(parts: Path, task_id: str, message: str) -> None:
     """Keep the error that ended a task, for `read_failure`, if there is space for it."""
     with suppress(SpaceError):
-        write_whole(parts / f"{task_id}{FAILURE_SUFFIX}", message.encode())
+        text = message.encode(errors="replace")[:MAX_FAILURE_BYTES]
+        write_whole(parts / f"{task_id}{FAILURE_SUFFIX}", text)
 
 
 def forget_failure(parts: Path, task_id: str) -> None:
@@ -152,12 +153,12 @@ def forget_failure(parts: Path, task_id: str) -> None:
 
 
 def read_failure(parts: Path, task_id: str) -> str:
-    """The error that ended the last run of a task; "" where none is known."""
+    """The error that ended the last run of a task, on one line; "" where none is known."""
     try:
         content = read_regular(parts / f"{task_id}{FAILURE_SUFFIX}", MAX_FAILURE_BYTES)
     except OSError:
         return ""
-    return content.decode(errors="replace")
+    return " ".join(content.decode(errors="replace").split())
 
 
 def version_of(path: Path) -> tuple[int, ...]:
