@@ -161,7 +161,10 @@ def fig06(studies: StoredStudies, folder: Path) -> list[Finding]:
         if group.n == 0:
             springs = einstein_solid.contact_area(einstein_solid.non_contact_height(p))
             exact = np.abs(springs / group.theory.a_r - 1)[p >= HEAVY].max()
-            gaussian = f" Gaussian heights have {exact:.3f} at n = 0 (Eqs. 36, 38)."
+            gaussian = (
+                f" Gaussian heights have {exact:.3f} at n = 0 (Eqs. 36, 38); 1 - a_r itself is 1.7 "
+                "to 2.0 times too large there for p* = 1 to 3."
+            )
         xs, ys = [*xs, p], [*ys, a.value[known]]
     ratio.axes.axhline(1.0, color="black", lw=0.9)
     finish(ratio, folder, "fig06b", "linear", "ratio", np.concatenate(xs), np.concatenate(ys))
