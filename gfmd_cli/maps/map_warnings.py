@@ -223,7 +223,7 @@ def shifted_lines(topography: Topography, spacing: tuple[float, ...]) -> str:
             inside = float(np.nanstd(lines[::step_y, lag:] - lines[::step_y, :-lag]))
             medians = np.array([np.nanmedian(half, axis=1) for half in halves])
         medians = medians[:, (known >= MIN_KNOWN).all(axis=0)]
-        if not (medians.size and inside > 0):
+        if medians.shape[1] < MIN_LINES // 2 or not inside > 0:
             continue
         medians -= np.median(medians, axis=1, keepdims=True)
         shifts = np.where(medians.prod(axis=0) > 0, np.abs(medians).min(axis=0), 0.0)
