@@ -6,7 +6,7 @@ A half-space (E* = 1, the only elastomer that all codes know) under the default 
 runs in a process of its own and starts from the height field in memory: imports, files and a first
 solve on fewer points, which loads what a code loads late, are not timed; the code's own set-up is.
 Before the solve the process writes and frees memory for several fields: a virtual machine gets
-memory from its host when it is first written, which takes about 1.4 ms per MiB, by chance or not.
+memory from its host when it is written for the first time, which takes about 1.4 ms per MiB.
 What it returns is judged here, by the same measures for all, against our solution at natural
 residual 1e-9. Tolerances mean different things in different codes. Each code is therefore run from
 loose to tight, and compared where its mean gap, or its residual, is as good and stays so.

@@ -1,6 +1,7 @@
 """Errors of Persson theory over lambda_r / lambda_s: what a longer spectrum changes.
 
-Reads the study `depth` of scripts/theory_studies.py and prints the table of docs/theory.md.
+Reads the studies `depth` and `resolution` of scripts/theory_studies.py and prints the tables of
+docs/theory.md, and the areas of one spectrum on three grids.
 
 python scripts/depth.py --folder results/theory
 """
@@ -17,7 +18,7 @@ from gfmd_cli.analysis.selection import grouped
 from gfmd_cli.physics.discretisation_error import AREA_EXCESS
 
 Groups = dict[tuple[float, float], list[Curve]]
-"""The curves of all seeds by n and lambda_r / lambda_s."""
+"""The curves of all seeds by n, and lambda_r / lambda_s or points per lambda_s."""
 
 
 def over_theory(curve: Curve, name: str) -> np.ndarray:
@@ -29,8 +30,7 @@ def area_ratio(curve: Curve) -> np.ndarray:
     """Contact area without the excess of the grid (docs/accuracy.md) over that of the theory."""
     n, points = curve.rows[0]["n"], curve.rows[0]["points"]
     excess = AREA_EXCESS * n * curve.column("perimeter") / points
-    counted = curve.column("a_r")
-    return over_theory(curve, "a_r") * (counted - excess) / counted
+    return (curve.column("a_r") - excess) / curve.predict(curve.column("p_star")).a_r
 
 
 def gap_error(curve: Curve) -> np.ndarray:
@@ -54,12 +54,16 @@ def print_trend(title: str, groups: Groups, measure, digits: int) -> None:  # ty
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--folder", type=Path, default=Path("results/theory"))
-    curves = compare(parser.parse_args().folder / "depth.h5").curves
+    folder = parser.parse_args().folder
+    curves = compare(folder / "depth.h5").curves
     groups = grouped(curves, lambda c: (c.rows[0]["n"], c.rows[0]["rolloff"] / c.rows[0]["cutoff"]))
     title = "ln u_g of the theory less that of the simulation, in per cent"
     print_trend(title, groups, gap_error, 1)
     print_trend("a_r over that of the theory", groups, area_ratio, 3)
     print_trend("the same on the grid", groups, lambda c: over_theory(c, "a_r"), 3)
+    curves = compare(folder / "resolution.h5").curves
+    groups = grouped(curves, lambda c: (c.rows[0]["n"], c.rows[0]["points"] * c.rows[0]["cutoff"]))
+    print_trend("a_r over that of the theory, by points per lambda_s", groups, area_ratio, 3)
 
 
 if __name__ == "__main__":

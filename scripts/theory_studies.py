@@ -111,10 +111,17 @@ def depth_specs() -> list[str]:
     return [one + power([0.5, 1, 2, 3]) + table("[grid]", points=points) + paired + rest(LIGHT)]
 
 
+def resolution_specs() -> list[str]:
+    """The shortest spectrum of `depth_specs` on 8, 16 and 32 points per lambda_s."""
+    one = surface("rolloff", 1 / 4, 1 / 32, hurst=0.8, seed=[0, 1])
+    return [one + power([1, 2, 3]) + table("[grid]", points=[256, 512, 1024]) + rest(LIGHT)]
+
+
 STUDIES = {
     "between": between_specs,
     "depth": depth_specs,
     "gamma": gamma_specs,
+    "resolution": resolution_specs,
     "slab": slab_specs,
     "stiffness": stiffness_specs,
     "true-contact": true_contact_specs,

@@ -22,10 +22,9 @@ def milliseconds(points, precision, *, copied, fraction=1.0):
     """The time of a pair of transforms of a field, of which a fraction of the rows is not zero."""
     grid = Grid(points, precision=precision)
     count = points // shared_transforms.BLOCK_ROWS
-    blocks = (
-        None if fraction == 1 else np.unique(np.linspace(0, count - 1, round(fraction * count)))
-    )
-    blocks = None if blocks is None else [int(block) for block in blocks]
+    blocks = None
+    if fraction < 1:
+        blocks = [int(block) for block in np.linspace(0, count - 1, round(fraction * count))]
     symbol = grid.mode_number()
     with patch.object(shared_transforms, "MIN_COPIED_BYTES", 0 if copied else np.inf):
         grid.padded[...] = 0.0  # makes the transforms

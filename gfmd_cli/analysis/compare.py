@@ -144,7 +144,7 @@ class Curve:
         return unit * self.persson.stress_density(sigma * unit, p_star * unit)
 
     def pressure_at_gap(self, u_g: Field) -> Field:
-        """Reduced pressure at which Persson theory has this mean gap; NaN outside 1e-6 to 20."""
+        """Reduced pressure of this mean gap in Persson theory; NaN below 1e-6 and above 20."""
         if not self.has_theory:
             return np.full(np.shape(u_g), np.nan)
         unit, height = self.rows[0]["delta_sigma"], self.rows[0]["h_std"]

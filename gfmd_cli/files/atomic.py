@@ -12,7 +12,6 @@ from uuid import uuid4
 
 from gfmd_cli.errors import SpaceError
 
-TEMPORARY_LETTERS = 34  # that the name of a file that is being written has more than its own
 WRITABLE = stat.S_IWUSR | stat.S_IWGRP | stat.S_IWOTH
 
 
@@ -40,7 +39,7 @@ def new_file(path: Path, aside: Path | None = None) -> Iterator[NewFile]:
     `aside` is the folder to write it in, on the same file system; by default that of `path`.
     Raises SpaceError where it cannot be written.
     """
-    fresh = (aside or path.parent) / f".{path.name}.{uuid4().hex}"
+    fresh = (aside or path.parent) / _temporary_name(path)
     file: NewFile | None = None
     try:
         _check_target(path)
@@ -64,6 +63,11 @@ def new_file(path: Path, aside: Path | None = None) -> Iterator[NewFile]:
             fresh.unlink(missing_ok=True)
 
 
+def _temporary_name(path: Path) -> str:
+    """A name that no other file has, for a file that is being written."""
+    return f".{path.name}.{uuid4().hex}"
+
+
 def write_whole(path: Path, content: bytes) -> None:
     """Write a file so that it appears whole or not at all, even where the power fails.
 
@@ -76,7 +80,7 @@ def write_whole(path: Path, content: bytes) -> None:
 def check_place(path: Path) -> None:
     """Raise SpaceError where no file can be written at `path`, before the work for it begins."""
     _check_target(path)
-    if len(os.fsencode(path.name)) > os.pathconf(path.parent, "PC_NAME_MAX") - TEMPORARY_LETTERS:
+    if len(os.fsencode(_temporary_name(path))) > os.pathconf(path.parent, "PC_NAME_MAX"):
         raise SpaceError(f"{path}: cannot be written: the name is too long")
     try:
         TemporaryFile(dir=path.parent).close()

@@ -10,8 +10,8 @@ from typing import Any, BinaryIO
 from gfmd_cli.errors import InputError
 from gfmd_cli.files.atomic import NewFile
 
-Stamp = tuple[int, int, int]
-"""What tells a file from one that replaces it, see `file_stamp`."""
+Version = tuple[int, ...]
+"""Numbers that tell a file from one that replaces it, see `file_version`."""
 
 SEAL = b"gfmd"  # followed by four bytes, the crc32 of all before
 CHUNK = 2**24  # bytes that are read at a time
@@ -65,13 +65,13 @@ def _sum(file: BinaryIO | NewFile, size: int) -> bytes:
     return total.to_bytes(4, "little")
 
 
-def file_stamp(path: Path) -> Stamp | None:
-    """Inode, size and time of change of a file; None where there is none."""
-    try:
-        status = path.stat()
-    except OSError:
-        return None
-    return status.st_ino, status.st_size, status.st_mtime_ns
+def file_version(path: Path, *, follow: bool = True) -> Version:
+    """Numbers that tell a file from one that replaces it. Raises OSError where there is none.
+
+    `follow` says whether a symbolic link stands for the file that it leads to.
+    """
+    status = path.stat(follow_symlinks=follow)
+    return status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns
 
 
 def file_digest(path: Path) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 from gfmd_cli.grid.arrays import Field, Mask, row_blocks
 from gfmd_cli.maps.map_preparation import border_step, level
 from gfmd_cli.maps.topography import Topography
-from gfmd_cli.units import count as counted
+from gfmd_cli.units import count
 
 MAX_GRADIENT = 3.0  # rms; a choice: surfaces of machined or worn solids have less
 MIN_GRADIENT = 1e-6  # rms; a choice: polished mirrors have about that
@@ -26,6 +26,8 @@ MIN_SHOWN_FRACTION = 0.01  # of the heights, from which a warning states the per
 PLATEAU_FRACTION = 0.5  # of the heights: so many equal ones are part of the surface; a choice
 MIN_OTHERS = 8  # other heights, without which one that is apart is no outlier; a choice
 USUAL_PERCENT = 95  # of the differences between neighbours; of Gaussian ones, below 2 rms values
+AXIS_RATIO = 10  # ratio of the numbers of such points along both axes; a choice: 1 by chance
+MIN_SCARS = 16  # points of scars, of which fewer may be chance; a choice
 SCAR_RATIO = 3.0  # ratio of a scar, a stroke in one line, to such a difference; a choice
 SPIKE_RATIO = 10.0  # ratio of a spike to such a difference; a choice
 MAX_SPIKES = 16  # on either side; a choice: more are a part of the surface
@@ -34,6 +36,7 @@ CLIPPED_ROUNDING = 1e-9  # relative to the range: heights so close differ by rou
 CLIPPED_RATIO = 10  # ratio of the numbers of equal heights, highest to second; about 1 if rounded
 SIDE_TOLERANCE = 1e-3  # relative difference, beyond which a side is probably wrong; a choice
 MAX_FILLED = 0.05  # fraction of filled heights; a choice
+CHECKED_LINES = 16  # of those that are repeated; they are alike
 MAX_SLOPE = 0.5  # of what levelling subtracts; a choice: 27 degrees, with a cosine of 0.9
 MAX_FORM = 0.85  # fraction of the variance of levelled heights; random maps have up to 0.84
 MIN_FORM_KINK = 0.5  # of the kink of a parabola at the border; a choice: 0 if periodic
@@ -182,15 +185,19 @@ def repeated_lines(heights: Field) -> str:
         equal = 1 + np.flatnonzero((lines[1:] == lines[:-1]).all(axis=1))
         if not 0 < equal.size < len(lines) - 1:
             continue
-        checked = equal[:: 1 + equal.size // MAX_SPIKES]
-        if any(2 * np.unique(lines[i]).size >= lines.shape[1] for i in checked) and not any(
-            np.array_equal(lines[i + 1 : i + 3], lines[i - 3 : i - 1][::-1]) for i in checked
-        ):  # else parts of a designed surface, or a mirrored map
+        checked = equal[:: 1 + equal.size // CHECKED_LINES]
+        is_varied = any(2 * np.unique(lines[i]).size >= lines.shape[1] for i in checked)
+        if is_varied and not any(_is_mirror(lines, i) for i in checked):
             return (
                 f"{equal.size} of {len(lines)} lines along {along} are equal to the line before: "
                 "repeated by the instrument or a program? Replace them by NaN"
             )
     return ""
+
+
+def _is_mirror(lines: Field, i: int) -> bool:
+    """Whether a map is mirrored between the lines i - 1 and i."""
+    return np.array_equal(lines[i + 1 : i + 3], lines[i - 3 : i - 1][::-1])
 
 
 def _kink(heights: Field, axis: int) -> float:
@@ -235,7 +242,7 @@ def shifted_lines(topography: Topography, spacing: tuple[float, ...]) -> str:
         if usual > MAX_LINE_SHIFT * inside and correlation < MAX_LINE_CORRELATION:
             what = f"are shifted against each other, by {usual / inside:.2g} times"
         elif jumps and spread > 0:  # medians of rounded heights are mostly zero
-            what = f"jump at {counted(jumps, 'place')}, by more than"
+            what = f"jump at {count(jumps, 'place')}, by more than"
         else:
             continue
         return (
@@ -252,25 +259,27 @@ def outliers(topography: Topography) -> str:
     heights = topography.heights
     if topography.missing is not None:
         heights = heights[~topography.missing]
-    for extreme, word in ((heights.min(), "minimum"), (heights.max(), "maximum")):
+    for nearest, word in ((np.min, "minimum"), (np.max, "maximum")):
+        extreme = nearest(heights)
         others = heights[heights != extreme]
-        count = heights.size - others.size
-        fraction = count / heights.size
+        number = heights.size - others.size
+        fraction = number / heights.size
         if fraction > PLATEAU_FRACTION or others.size < MIN_OTHERS:
             continue
         percentage = f" ({fraction:.0%})" if fraction > MIN_SHOWN_FRACTION else ""
         if min(abs(others.max() - extreme), abs(others.min() - extreme)) > np.ptp(others) > 0:
-            what = "1 height is" if count == 1 else f"{count} heights{percentage} are"
+            what = "1 height is" if number == 1 else f"{number} heights{percentage} are"
             return (
                 f"{what} exactly {extreme:g}, far from all others: a spike or a mark of missing "
                 "heights? Replace it by NaN"
             )
-        following = others.min() if word == "minimum" else others.max()
-        near = abs(others - following) <= CLIPPED_ROUNDING * np.ptp(heights)
-        is_apart = abs(following - extreme) > CLIPPED_ROUNDING * np.ptp(heights)
-        if is_apart and count > CLIPPED_RATIO * int(np.count_nonzero(near)):
+        if number <= CLIPPED_RATIO:
+            continue
+        following, rounding = nearest(others), CLIPPED_ROUNDING * np.ptp(heights)
+        near = int(np.count_nonzero(abs(others - following) <= rounding))
+        if abs(following - extreme) > rounding and number > CLIPPED_RATIO * near:
             return (
-                f"{count} heights{percentage} are exactly the {word}, {extreme:g}: clipped at the "
+                f"{number} heights{percentage} are exactly the {word}, {extreme:g}: clipped at the "
                 "range of the instrument, or a mark of missing heights? Replace such a mark by NaN"
             )
     return _often_equal(heights) or _spikes(heights) or _single_points(topography)
@@ -297,7 +306,7 @@ def _single_points(topography: Topography) -> str:
     """Single points far above or below all their neighbours, or strokes along one axis."""
     heights, missing = np.atleast_2d(topography.heights), topography.missing
     missing = None if missing is None else missing.reshape(heights.shape)
-    is_map, count, strokes = len(heights) > 1, 0, np.zeros((2, 2), int)
+    is_map, singles, strokes = len(heights) > 1, 0, np.zeros((2, 2), int)
     usual = _usual_difference(heights, missing)
     for rows in row_blocks(heights) if usual else ():
         around = slice(max(rows.start - is_map, 0), rows.stop + is_map)
@@ -311,20 +320,20 @@ def _single_points(topography: Topography) -> str:
         above = [np.minimum(own - one, own - other) for one, other in axes]
         below = [np.minimum(one - own, other - own) for one, other in axes]
         is_single = [np.min(each, axis=0) > SPIKE_RATIO * usual for each in (above, below)]
-        count += int(np.count_nonzero(is_single[0] | is_single[1]))
+        singles += int(np.count_nonzero(is_single[0] | is_single[1]))
         for sign, each in enumerate((above, below)):
             strokes[sign, : len(axes)] += np.count_nonzero(
                 np.stack(each) > SCAR_RATIO * usual, axis=(1, 2)
             )
     than = f"times the difference that {USUAL_PERCENT} % of neighbouring heights have at most"
-    if count:
-        what = "1 point lies" if count == 1 else f"{count} points lie"
+    if singles:
+        what = "1 point lies" if singles == 1 else f"{singles} points lie"
         return (
             f"{what} above or below all neighbours by more than {SPIKE_RATIO:g} {than}: spikes? "
             "Replace them by NaN"
         )
     for counts, where in zip(strokes, ("above", "below"), strict=True):
-        if is_map and counts.max() > max(MAX_SPIKES, CLIPPED_RATIO * counts.min()):
+        if is_map and counts.max() > max(MIN_SCARS, AXIS_RATIO * counts.min()):
             along = "yx"[int(counts.argmax())]
             return (
                 f"{counts.max()} points lie {where} both neighbours in the next lines along "

@@ -1,6 +1,7 @@
 """Displacements of an elastomer without borders whose stiffness is not a power law.
 
-The compliance kernel in two dimensions, and its integral over a disc (by 2 pi), are the transforms
+The compliance kernel G in two dimensions, and H, its integral over a disc divided by 2 pi, are the
+Hankel transforms
 
     G(r) = int_0^inf s J_0(s) / k(s / r) ds / (2 pi r^2),
     H(r) = int_0^r G(t) t dt = int_0^inf J_1(s) / k(s / r) ds / (2 pi)

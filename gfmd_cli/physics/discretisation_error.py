@@ -121,7 +121,7 @@ class RoughnessScales:
     highest: float = inf
     """Height of the highest point above the mean [h_std]."""
     independent_waves: float = inf
-    """Number of equal waves that have the same mean of their squared powers of the slope."""
+    """Effective number of waves, (sum s)^2 / sum s^2, with the power s of the slope of a wave."""
 
     @property
     def calibrated(self) -> bool:

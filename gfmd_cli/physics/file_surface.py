@@ -429,16 +429,16 @@ def _warnings_on_heights(surface: FileSurface) -> tuple[str, ...]:
     topography, scale = surface._topography(), surface.scale
     shape, spacing = topography.heights.shape, surface._map_spacing()
     levelled = _prepared(surface)[tuple(map(slice, shape))]  # without copies
+    has_missing = topography.missing is not None
+    is_changed = has_missing or surface.edges == "window"  # filled in, or tapered
+    untapered = surface._levelled() if is_changed else levelled
     corners = tuple(slice(None, None, n - 1) for n in shape)
-    untapered = surface._levelled()
     subtracted = scale * topography.heights[corners] - untapered[corners]
-    if topography.missing is not None:
-        untapered = levelled
     sides = tuple(step * (n - 1) for step, n in zip(spacing, shape, strict=True))
     return (
         map_warnings.outliers(topography),
         map_warnings.shifted_lines(topography, spacing),
-        map_warnings.curved(untapered),
+        map_warnings.curved(levelled if has_missing else untapered),
         map_warnings.steep(surface.levelling(), subtracted, sides),
         map_warnings.repeated_lines(topography.heights),
         map_warnings.rounded(topography, scale),

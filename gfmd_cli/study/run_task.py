@@ -5,7 +5,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from gfmd_cli.errors import GfmdError, InputError, Interrupted, SpaceError, StudyError
-from gfmd_cli.files.checksums import file_stamp
+from gfmd_cli.files.checksums import file_version
 from gfmd_cli.grid.blas import one_blas_thread
 from gfmd_cli.grid.fft_grid import Shape
 from gfmd_cli.grid.ranks import broadcast, is_root, shared_errors
@@ -160,6 +160,7 @@ def solve_task(task: Task, parts: Path, context: SolveContext) -> Status:
 
 def _check_files(task: Task) -> None:
     """Raise InputError where a file is not the one whose checksum the task has."""
-    for path, stamp in task.stamps:
-        if file_stamp(path) not in (stamp, None):
-            raise InputError(f"{path}: the file was changed during the run; run again")
+    for path, version in task.files:
+        with suppress(OSError):  # a file that was deleted after it had been read
+            if file_version(path) != version:
+                raise InputError(f"{path}: the file was changed during the run; run again")

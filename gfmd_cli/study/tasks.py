@@ -1,5 +1,6 @@
 """A spec as a list of tasks, one for each surface, elastomer, grid, solver and load."""
 
+from contextlib import suppress
 from dataclasses import dataclass
 from math import prod
 from pathlib import Path
@@ -8,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from gfmd_cli.errors import InputError
-from gfmd_cli.files.checksums import Stamp, digest, file_stamp
+from gfmd_cli.files.checksums import Version, digest, file_version
 from gfmd_cli.physics.indenters import RigidSurface
 from gfmd_cli.physics.linear_elastomer import LinearElastomer
 from gfmd_cli.physics.surfaces import check_resolved
@@ -53,8 +54,8 @@ class Task:
     """Checksum of the table of the elastomer, likewise."""
     swept: tuple[tuple[str, str], ...]
     """Swept keys of surface, grid and solver: the table, and the value as a word of the label."""
-    stamps: tuple[tuple[Path, Stamp | None], ...] = ()
-    """The files of surface and elastomer, as they were before their checksums were computed."""
+    files: tuple[tuple[Path, Version], ...] = ()
+    """The files of surface and elastomer, and their versions before the checksums were computed."""
 
     @property
     def auto(self) -> bool:
@@ -150,9 +151,18 @@ def plan(spec: models.Spec) -> list[Task]:
         raise InputError(f"{spec.source}: {error}") from error
 
 
+def _versions(spec: models.Spec) -> dict[Path | None, Version]:
+    """The versions of the files that a spec names, of those that are there."""
+    versions: dict[Path | None, Version] = {}
+    for choice in (*spec.surface, *spec.elastomer):
+        if choice.file is not None:
+            with suppress(OSError):  # refused later, with its key
+                versions[choice.file] = file_version(choice.file)
+    return versions
+
+
 def _tasks(spec: models.Spec) -> list[Task]:
-    choices = [*spec.surface, *spec.elastomer]
-    stamps = {choice.file: file_stamp(choice.file) for choice in choices if choice.file}
+    versions = _versions(spec)
     _check(spec)
     resolved = spec.resolved()
     alternatives = {table: getattr(spec, table) for table in models.SWEPT}
@@ -184,10 +194,10 @@ def _tasks(spec: models.Spec) -> list[Task]:
                 elastomer_sha256=tables["elastomer"].get("sha256", ""),
                 scene_id=digest([tables[name] for name in ("surface", "elastomer", "grid")]),
                 swept=_swept_words(chosen, swept_keys),
-                stamps=tuple(
-                    (file, stamps[file])
-                    for file in (chosen["surface"].file, chosen["elastomer"].file)
-                    if file is not None
+                files=tuple(
+                    (path, versions[path])
+                    for path in (chosen["surface"].file, chosen["elastomer"].file)
+                    if path in versions
                 ),
             )
             tasks.setdefault(task.id, task)  # loads may agree in all digits that count

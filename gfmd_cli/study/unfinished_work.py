@@ -13,7 +13,7 @@ from pathlib import Path
 
 from gfmd_cli.errors import InputError, SpaceError, StudyError
 from gfmd_cli.files.atomic import new_file, write_whole
-from gfmd_cli.files.checksums import check_seal, digest, seal
+from gfmd_cli.files.checksums import Version, check_seal, digest, file_version, seal
 from gfmd_cli.files.hdf5 import new_hdf5
 from gfmd_cli.files.regular import open_regular, read_regular
 from gfmd_cli.study.reading import StudyFile, open_study
@@ -161,13 +161,12 @@ def read_failure(parts: Path, task_id: str) -> str:
     return " ".join(content.decode(errors="replace").split())
 
 
-def version_of(path: Path) -> tuple[int, ...]:
-    """Numbers that tell a record from one that replaces it. Raises StudyError where it is gone."""
+def version_of(path: Path) -> Version:
+    """The version of a record. Raises StudyError where it is gone."""
     try:
-        status = path.lstat()
+        return file_version(path, follow=False)
     except OSError as error:
         raise StudyError(f"{path}: damaged record: {error}") from error
-    return status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns
 
 
 def set_aside(path: Path, bad: Path | None = None) -> Path:

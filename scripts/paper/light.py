@@ -169,7 +169,7 @@ def light_deviation(studies: StoredStudies, folder: Path) -> list[Finding]:
                 },
             },
             "n = 3: λᵣ/λₛ = 5; n ≤ 2: the surfaces of Fig. 6, on the grid. Full contact has exactly 1. "
-            "n = 4 is not judged; on 512² three surfaces have 1.8 at p* = 0.3, so that it rises as well.",
+            "n = 4 is not judged; on 512² (seeds 0 to 2) σ_p is 1.8 at p* = 0.3, so that it rises as well.",
         ),
     ]
 
