@@ -20,7 +20,6 @@ from itertools import product
 from typing import ClassVar
 from unittest.mock import patch
 
-import numpy as np
 from small_contacts import WholeGrids
 from timing import least
 
@@ -57,9 +56,9 @@ class RecordedSolve(local_start.PeriodicSolve):
         """Count a step; the test that ends a solve counts as one, too."""
         self.steps += 1
 
-    def evaluate(self, displacement: Field) -> Evaluation:
+    def evaluate(self, displacement: Field, tolerance: float) -> Evaluation:
         """See `LocalSolve`."""
-        result = super().evaluate(displacement)
+        result = super().evaluate(displacement, tolerance)
         self.evaluations += 1
         self.predicted = result.start_residual
         return result
@@ -67,15 +66,15 @@ class RecordedSolve(local_start.PeriodicSolve):
 
 def row(contact: Contact, tolerance: float, repeats: int) -> str:
     """The columns of one contact."""
-    RecordedSolve.latest, measured = None, np.nan
+    RecordedSolve.latest, residuals = None, list[float]()
 
     def watch(current: Contact, state: State) -> None:
-        nonlocal measured
         if current is contact and state.step == 0:
-            measured = state.residual
+            residuals.append(state.residual)
 
     def with_tiles() -> None:
-        solve_contact(contact, ProjectedCG(tolerance=tolerance), watch)
+        solution = solve_contact(contact, ProjectedCG(tolerance=tolerance), watch)
+        residuals.append(solution.residual)  # the first one where the start is the solution
 
     seconds = least(with_tiles, repeats)
     whole = least(lambda: solve_contact(contact, WholeGrids(tolerance=tolerance)), repeats)
@@ -85,7 +84,7 @@ def row(contact: Contact, tolerance: float, repeats: int) -> str:
     convolution = least(lambda: solve.map_displacement(solve.s), CONVOLUTIONS) / solve.tiles.count
     return (
         f"{solve.fraction:7.3f} {solve.evaluations:11} {solve.steps:6} {solve.predicted:10.1e} "
-        f"{measured / solve.predicted:8.2f} {whole / seconds:11.2f} {1e6 * convolution:6.2f}"
+        f"{residuals[0] / solve.predicted:8.2f} {whole / seconds:11.2f} {1e6 * convolution:6.2f}"
     )
 
 

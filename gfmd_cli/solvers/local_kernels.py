@@ -11,24 +11,18 @@ TILE_WIDTH = SIDE * BATCH_SIZE  # numbers between points of neighbouring tiles
 
 
 @kernel
-def penetration(w, level, h, used, entered, out, a, b):
-    """Sums of the squares of h - (w - level) where that is positive, outside the tiles.
-
-    Marks the tiles outside in which it is positive somewhere.
-    """
-    below = np.empty(h.shape[1])
+def mark_entered(w, level, h, used, entered, a, b):
+    """Mark the tiles that are not used in which w - level is below h somewhere."""
+    below = np.empty(h.shape[1], np.bool_)
     for i in range(a, b):
-        total, tile = 0.0, i // SIDE
         for j in range(h.shape[1]):
-            below[j] = max(h[i, j] - (w[i, j] - level), 0.0) ** 2
+            below[j] = w[i, j] - level < h[i, j]
         for block in range(used.shape[1]):
-            outside = 0.0
+            somewhere = False
             for j in range(SIDE * block, SIDE * block + SIDE):
-                outside += below[j]
-            if outside > 0.0 and not used[tile, block]:
-                entered[tile, block] = True
-                total += outside
-        out[i, 0] = total
+                somewhere |= below[j]
+            if somewhere and not used[i // SIDE, block]:
+                entered[i // SIDE, block] = True
 
 
 @kernel

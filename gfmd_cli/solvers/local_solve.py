@@ -19,7 +19,7 @@ import numpy as np
 
 from gfmd_cli.grid.arrays import Field, Mask
 from gfmd_cli.physics.contact import Contact
-from gfmd_cli.solvers.local_kernels import penetration
+from gfmd_cli.solvers.local_kernels import mark_entered
 from gfmd_cli.solvers.loop import Start
 from gfmd_cli.solvers.projected_move import choose, polak_ribiere
 from gfmd_cli.solvers.tile_operators import Indices, TileOperators
@@ -32,8 +32,8 @@ REDUCTION_RANGE = (1e-3, 0.02)
 the relative error of the operators; the largest is a choice, because an evaluation at all points
 takes longer than a few steps on tiles."""
 ACCEPTED_FRACTION = 0.75
-"""Of the tolerance, for the predicted residual of the start, which may be 1.4 times as large."""
-TARGET_FRACTION = 0.25  # of the tolerance, for that residual after the next solve; a choice
+"""Of the tolerance, for the predicted residual of the start; docs/solvers.md compares both."""
+TARGET_FRACTION = 0.5  # of the tolerance, for that residual after the next solve; 0.25 to 0.75
 MAX_EVALUATIONS = 6  # of the displacement at all points; a choice
 MAX_STEPS = 60  # on the same tiles; a choice
 
@@ -50,8 +50,6 @@ class Evaluation:
     """Natural residual of s and C s."""
     start_residual: float
     """Natural residual of the start."""
-    entered: Mask
-    """Other tiles in which C s is below h."""
 
 
 class LocalSolve:
@@ -104,9 +102,17 @@ class LocalSolve:
         """
         raise NotImplementedError
 
-    def lay(self, gap: Field) -> tuple[Field, Field]:
-        """The gap and the stress of the start on the tiles, from the gap of C s."""
-        return gap, self.s
+    def lay(self, gap: Field, tolerance: float) -> tuple[Field, float]:
+        """The gap of the start on the tiles, from the gap of C s, and its natural residual.
+
+        No more work is done than it takes to bring the residual below the tolerance.
+        """
+        return gap, self.residual(gap, self.s)
+
+    def residual(self, gap: Field, stress: Field) -> float:
+        """Natural residual, if it is zero beyond the tiles."""
+        violation = np.minimum(gap, stress)
+        return self.contact.as_residual(_dot(violation, violation))
 
     def start(self, tolerance: float) -> Start:
         """Solve until the start has a residual below the tolerance; return the start."""
@@ -119,47 +125,47 @@ class LocalSolve:
         with an error of 1e-3 and may be in single precision, unless the tolerance is so loose that
         it may be the last one.
         """
-        target = UNCORRECTED_TOLERANCE
+        target, accepted = UNCORRECTED_TOLERANCE, ACCEPTED_FRACTION * tolerance
         for count in range(1, MAX_EVALUATIONS + 1):
             self.run(target)
-            in_single_precision = count == 1 and ACCEPTED_FRACTION * tolerance < FIRST_RESIDUAL
+            in_single_precision = count == 1 and accepted < FIRST_RESIDUAL
             displacement = self.compliance_everywhere(in_single_precision=in_single_precision)
-            result = self.evaluate(displacement)
-            is_good = result.start_residual < ACCEPTED_FRACTION * tolerance
-            is_final = is_good and not result.entered.any() and not in_single_precision
-            if is_final or count == MAX_EVALUATIONS:
+            result = self.evaluate(displacement, accepted)
+            is_good = result.start_residual < accepted
+            if (is_good and not in_single_precision) or count == MAX_EVALUATIONS:
                 break
             if result.start_residual > 0:  # it is zero if a single point is in contact
                 factor = TARGET_FRACTION * tolerance / result.start_residual
                 target = result.residual * float(np.clip(factor, *REDUCTION_RANGE))
-            self.correct(displacement, result.entered)
+            self.correction = self.tiles.take(displacement) - self.compliance(self.s)
         return result, displacement
 
-    def evaluate(self, displacement: Field) -> Evaluation:
-        """Compare C s at all points with the indenter."""
-        contact = self.contact
+    def evaluate(self, displacement: Field, tolerance: float) -> Evaluation:
+        """Compare C s at all points with the indenter, and add the tiles in which it is entered.
+
+        The tolerance is that of the residual of the start.
+        """
         gap = self.tiles.take(displacement) - self.obstacle
         level = float(gap[self.s > 0].mean())
+        if self.add_entered(displacement, level):
+            gap = self.tiles.take(displacement) - self.obstacle
         gap -= level
-        gap_of_start, stress = self.lay(gap)
-        entered = np.zeros(self.tiles.used.shape, dtype=np.bool_)
-        fields = (displacement, level, contact.obstacle, self.tiles.used, entered)
-        (outside,) = self.grid.rows.sums(1, penetration, *fields)
-        residual, start_residual = (
-            contact.as_residual(float(outside) + _dot(violation, violation))
-            for violation in (np.minimum(gap, self.s), np.minimum(gap_of_start, stress))
-        )
-        return Evaluation(level, gap_of_start, residual, start_residual, entered)
+        gap_of_start, start_residual = self.lay(gap, tolerance)
+        return Evaluation(level, gap_of_start, self.residual(gap, self.s), start_residual)
 
-    def correct(self, displacement: Field, entered: Mask) -> None:
-        """Add tiles that were entered, and correct the operator on tiles by the exact C s."""
-        if entered.any():
-            used = self.tiles.used | _with_neighbours(entered)
-            tiles = Tiles(used, is_periodic=self.tiles.is_periodic)
-            s = np.zeros((tiles.count, SIDE * SIDE))
-            s[self.tiles.used[tiles.used]] = self.s
-            self.place(tiles, s)
-        self.correction = self.tiles.take(displacement) - self.compliance(self.s)
+    def add_entered(self, displacement: Field, level: float) -> bool:
+        """Add the tiles in which C s - level is below h, and those around; whether there are any."""
+        entered = np.zeros(self.tiles.used.shape, dtype=np.bool_)
+        fields = (displacement, level, self.contact.obstacle, self.tiles.used, entered)
+        self.grid.rows.run(mark_entered, *fields)
+        if not entered.any():
+            return False
+        used = self.tiles.used | _with_neighbours(entered)
+        tiles = Tiles(used, is_periodic=self.tiles.is_periodic)
+        s = np.zeros((tiles.count, SIDE * SIDE))
+        s[self.tiles.used[tiles.used]] = self.s
+        self.place(tiles, s)
+        return True
 
     def run(self, tolerance: float) -> None:
         """Projected conjugate gradients on the tiles, to a natural residual on them.
@@ -178,8 +184,7 @@ class LocalSolve:
             level = float(gap.ravel()[np.flatnonzero(pressed)].mean())
             active = np.flatnonzero(pressed | (gap < level))
             active_gap, active_s = gap.ravel()[active] - level, s.ravel()[active]
-            violation = np.minimum(active_gap, active_s)
-            if self.contact.as_residual(_dot(violation, violation)) < tolerance:
+            if self.residual(active_gap, active_s) < tolerance:
                 break
             active_force, last = _balanced(-active_gap), force.ravel()[active]
             force = _field(active_force, active, s)

@@ -24,7 +24,8 @@ from gfmd_cli.solvers.tiles import SIDE, Tiles
 SMALLEST_EXPONENT = 0.2  # of k(q) for which there are tiles; measured from 0.25 on
 CONTACT_MARGIN = 2  # points by which the contact may grow from a grid to the next; a choice
 COARSE_TOLERANCE = 0.03  # on grids before the finest; measured: 0.01 to 0.1 differ by 5 %
-JACOBI_STEPS = 3  # after C s is laid on the indenter; 2 to 6 take about as long
+MAX_JACOBI_STEPS = 6  # after C s is laid on the indenter; measured: 5 to 8
+MAX_JACOBI_REDUCTION = 4.0  # of the residual by these steps; measured: 3 to 5
 JACOBI_DAMPING = 0.8  # a choice
 MAX_CLOSED_GAP = 2.0  # over the Jacobi move, which removes the stress of the point; a choice
 
@@ -141,10 +142,8 @@ class PeriodicSolve(LocalSolve):
         if contact.may_touch is not None:
             laid = np.where(tiles.take(contact.may_touch), laid, before)
         np.subtract(displacement, result.level, out=u)
-        if result.entered.any():  # MAX_EVALUATIONS ends here
-            np.maximum(u, contact.obstacle, out=u)
         tiles.overwrite(laid, u)
-        if result.entered.any() or result.gap.min() > 0:
+        if result.gap.min() > 0:
             return Start(contact, self.transforms, u)
         change = (laid - before).astype(moves.real)  # zero elsewhere
         values = moves.padded[..., : moves.points]  # in the memory of the displacement
@@ -156,21 +155,27 @@ class PeriodicSolve(LocalSolve):
         tiles.overwrite(self.s + tiles.take(values), sigma)
         return Start(contact, self.transforms, u, sigma, contact.rounding(change))
 
-    def lay(self, gap: Field) -> tuple[Field, Field]:
-        """The gap and the stress on the tiles after C s is laid on the indenter.
+    def lay(self, gap: Field, tolerance: float) -> tuple[Field, float]:
+        """The gap on the tiles after C s is laid on the indenter, and its natural residual.
 
         With C s the stress is s; K times the change of the gap is added. Laying leaves a residual
-        of short waves, which projected Jacobi steps reduce.
+        of short waves, and points that are pressed but not laid. Projected Jacobi steps reduce both
+        where they can reach the tolerance.
         """
         stiffness = self.contact.point_stiffness
         laid = np.where(self.s > stiffness * gap, 0.0, np.maximum(gap, 0.0))
         stress = self.s + self.map_displacement(laid - gap)
-        for _ in range(JACOBI_STEPS):
+        for _ in range(MAX_JACOBI_STEPS):
             move = stress / stiffness
             relaxed = np.maximum(laid - JACOBI_DAMPING * move, 0.0)
             laid = np.where(laid < MAX_CLOSED_GAP * move, 0.0, relaxed)
             stress = self.s + self.map_displacement(laid - gap)
-        return laid, stress
+            residual = self.residual(laid, stress)
+            if residual > MAX_JACOBI_REDUCTION * tolerance:
+                break
+            if residual < tolerance and not np.any((laid > 0) & (stress > stiffness * laid)):
+                break
+        return laid, residual
 
 
 class FreeSolve(LocalSolve):
