@@ -27,7 +27,6 @@ from gfmd_cli.maps.given_heights import write_heights
 from gfmd_cli.physics.error_estimates import Verdict
 from gfmd_cli.physics.file_surface import FileSurface, forget_files
 from gfmd_cli.physics.indenters import SMALLEST_GRID
-from gfmd_cli.physics.observables import contact_pressure
 from gfmd_cli.spec.models import Spec
 from gfmd_cli.spec.parse import read_spec, read_tables
 from gfmd_cli.status import Status
@@ -215,14 +214,13 @@ def _solve(spec: Path | str | Tables, threads: int) -> Result:
         raise InputError(f"solve computes one contact, the spec has {len(tasks)}; use run()")
     context = SolveContext(WorkerOptions(threads, usable_memory()))
     solved = solve_at_load(tasks[0], context, Watcher())
-    scene, solution, obstacle = solved.scene, solved.solution, solved.contact.obstacle
     row = all_columns(tasks[0], solved)
     x = np.arange(row["points"]) / row["points"] + row["x_first"]
     return Result(
-        height=scene.in_metres(solved.contact.height),
-        displacement=scene.in_metres(solution.u),
-        stress=scene.in_pascals(solution.sigma),
-        pressure=scene.in_pascals(contact_pressure(obstacle, solution.u, solution.sigma)),
+        height=solved.field("height"),
+        displacement=solved.field("u"),
+        stress=solved.field("sigma"),
+        pressure=solved.field("contact_pressure"),
         x=x * row["length"],
         nominal_pressure=row["pressure"],
         warnings=tuple(filter(None, row["warnings"].split(SEPARATOR))),

@@ -12,9 +12,6 @@ from typing import Any, get_args
 from pydantic import TypeAdapter, ValidationError
 
 from gfmd_cli.errors import InputError
-from gfmd_cli.physics.elastomers import Elastomer
-from gfmd_cli.physics.surfaces import Surface
-from gfmd_cli.solvers.auto import AnySolver
 from gfmd_cli.spec import models
 from gfmd_cli.spec_table import SpecTable
 from gfmd_cli.units import left_out
@@ -35,17 +32,11 @@ WORDS = {
 LONG_NUMBER = re.compile(r"\d{20,}|0\.0{15,}\d+")
 """A limit that pydantic prints with all its zeros."""
 MODELS: dict[str, Any] = {
-    "study": models.StudyTable,
-    "surface": Surface,
-    "elastomer": Elastomer,
-    "grid": models.GridTable,
-    "load": models.LoadTable,
-    "solver": AnySolver,
-    "output": models.OutputTable,
-    "accuracy": models.AccuracyTable,
-    "sweep": models.SweepTable,
+    name: next(iter(get_args(field.annotation)), field.annotation)  # of a list, or `| None`
+    for name, field in models.Spec.model_fields.items()
+    if name not in ("source", "places")
 }
-"""The class of each table, or the union of the classes of its kinds."""
+"""The class of each table, or the union of the classes of its kinds, as `Spec` declares them."""
 ADAPTERS: dict[str, TypeAdapter[Any]] = {name: TypeAdapter(MODELS[name]) for name in MODELS}
 DEFAULT_KINDS = {"solver": "auto"}
 """Of the tables whose `kind` may be left out."""

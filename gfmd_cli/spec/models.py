@@ -2,7 +2,8 @@
 
 from collections.abc import Iterable, Iterator
 from itertools import product
-from typing import Annotated, Any, Literal, NamedTuple, Self, get_args
+from math import prod
+from typing import Annotated, Any, Literal, NamedTuple, Self, TypeVar, get_args
 
 import numpy as np
 from pydantic import Discriminator, StrictStr, Tag, model_validator
@@ -135,11 +136,8 @@ class Ladder(SpecTable):
 
     def _value(self, decades: float) -> float:
         """The value `decades` above the first one; infinite beyond the largest number."""
-        value = self.from_
-        while decades > MAX_DECADES:
-            value *= 10.0**MAX_DECADES
-            decades -= MAX_DECADES
-        return float(value * 10.0**decades)
+        times, rest = divmod(decades, MAX_DECADES)
+        return prod([10.0**MAX_DECADES] * int(times), start=self.from_) * float(10.0**rest)
 
 
 def _shape(value: Any) -> str:
@@ -149,22 +147,16 @@ def _shape(value: Any) -> str:
     return "list" if isinstance(value, list) else "number"
 
 
-Pressures = Annotated[
-    Annotated[Positive, Tag("number")]
-    | Annotated[list[Positive], Key(min_length=1, max_length=MAX_LADDER), Tag("list")]
-    | Annotated[Ladder, Tag("ladder")],
-    Discriminator(_shape),
-]
+T = TypeVar("T")
+OneOrMany = (
+    Annotated[T, Tag("number")]
+    | Annotated[list[T], Key(min_length=1, max_length=MAX_LADDER), Tag("list")]
+)
+Share = Annotated[float, Key(gt=0, lt=1)]
+Pressures = Annotated[OneOrMany[Positive] | Annotated[Ladder, Tag("ladder")], Discriminator(_shape)]
+Areas = Annotated[OneOrMany[Share], Discriminator(_shape)]
 SHAPES = ("number", "list", "ladder", "count", "word")
 """Tags of the unions above, which no message should name."""
-
-
-Share = Annotated[float, Key(gt=0, lt=1)]
-Areas = Annotated[
-    Annotated[Share, Tag("number")]
-    | Annotated[list[Share], Key(min_length=1, max_length=MAX_LADDER), Tag("list")],
-    Discriminator(_shape),
-]
 
 
 class Load(NamedTuple):

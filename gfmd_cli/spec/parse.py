@@ -53,7 +53,10 @@ def read_spec(path: Path, overrides: tuple[str, ...] = ()) -> tuple[Spec, str]:
             f"{path}: not UTF-8 text (byte {error.start}), where a run spec (TOML) is expected; "
             f"`gfmd init SPEC --from {path}` writes one for a scan"
         ) from error
-    return read_text(text, path, overrides), text
+    data = _toml(text, str(path))
+    for override in overrides:
+        set_override(data, override)
+    return Check(str(path), text, overrides, path.parent).spec(data), text
 
 
 def read_tables(data: dict[str, Any]) -> Spec:
@@ -82,14 +85,6 @@ def read_scan(path: Path, overrides: tuple[str, ...]) -> FileSurface:
     if not isinstance(surface, FileSurface):
         raise InputError(f'{path}: surface.kind must be "file" for a height map')
     return surface.model_copy(update={"path": path})  # the path as given, for messages
-
-
-def read_text(text: str, path: Path, overrides: tuple[str, ...]) -> Spec:
-    """The spec of a text, for the file `path`, with overrides. Raises InputError for any other."""
-    data = _toml(text, str(path))
-    for override in overrides:
-        set_override(data, override)
-    return Check(str(path), text, overrides, path.parent).spec(data)
 
 
 def _toml(text: str, name: str) -> dict[str, Any]:

@@ -91,15 +91,15 @@ def _render(template: str, file: str, **values: Any) -> str:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    environment.globals["key"] = lambda name, value, comment: _line(name, _as_toml(value), comment)
+    environment.globals["key"] = _line
     name = re.sub(r"[^a-zA-Z0-9._-]+", "-", Path(file).stem).strip("-._")[:100]
     return environment.get_template(template).render(
         file=shlex.quote(file), name=name or "study", **values
     )
 
 
-def _line(key: str, value: str, comment: str) -> str:
-    return f"{f'{key} = {value}':{COLUMN}} # {comment}"
+def _line(key: str, value: Any, comment: str) -> str:
+    return f"{f'{key} = {_as_toml(value)}':{COLUMN}} # {comment}"
 
 
 def with_keys(text: str, overrides: tuple[str, ...]) -> str:
@@ -133,7 +133,7 @@ def _with_values(
     section: str, values: dict[str, Any], given: set[str], kinds: dict[str, type[SpecTable]]
 ) -> str:
     """The lines of a table with its values, those of the given keys in the place of others."""
-    new = {key: _line(key, _as_toml(values[key]), COMMENT) for key in values if key in given}
+    new = {key: _line(key, values[key], COMMENT) for key in values if key in given}
     kind = values.get("kind") if "kind" in given else None
     allowed = kinds[kind].model_fields if isinstance(kind, str) and kind in kinds else values
     lines = []

@@ -4,7 +4,7 @@ The row is built here alone. `planned` gives the columns that follow from the sp
 of a solved contact, `task_row` both, and `result` everything.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict
 from functools import lru_cache
 
@@ -15,18 +15,13 @@ from gfmd_cli.maps.map_preparation import mirror
 from gfmd_cli.physics.approach import approach
 from gfmd_cli.physics.free_contact import doubled_grid
 from gfmd_cli.physics.indenters import RigidSurface
-from gfmd_cli.physics.observables import (
-    contact_pressure,
-    edge_fractions,
-    gap_histogram,
-    stress_histogram,
-)
+from gfmd_cli.physics.observables import edge_fractions, gap_histogram, stress_histogram
 from gfmd_cli.physics.patches import area_distribution
 from gfmd_cli.physics.power_spectra import autocorrelations, spectra
 from gfmd_cli.physics.surface_spectrum import Spectrum, map_spectrum
 from gfmd_cli.spec.models import SWEPT, OutputTable
 from gfmd_cli.study.column import Row
-from gfmd_cli.study.columns import PARAMETERS, PR_LINEAR, PR_LOGARITHMIC, empty_row
+from gfmd_cli.study.columns import FIELDS, PARAMETERS, PR_LINEAR, PR_LOGARITHMIC, empty_row
 from gfmd_cli.study.observables import OBSERVABLES, SolvedContact
 from gfmd_cli.study.plausibility import SEPARATOR, warnings_of
 from gfmd_cli.study.refinement import TaskSolution
@@ -128,24 +123,17 @@ def task_row(task: Task, row: Mapping[str, object]) -> Row:
 
 def result(task: Task, solved: TaskSolution, seconds: float) -> TaskResult:
     """All that a study keeps of one solution, which took `seconds`."""
-    scene, contact, solution = solved.scene, solved.contact, solved.solution
-    u, sigma, output = solution.u, solution.sigma, task.output
+    scene, output = solved.scene, task.output
     row = all_columns(task, solved) | {"seconds": seconds}
-    physical: dict[str, Callable[[], Field]] = {  # of which one at a time takes memory
-        "u": lambda: scene.in_metres(u),
-        "sigma": lambda: scene.in_pascals(sigma),
-        "height": lambda: scene.in_metres(contact.height),
-        "contact_pressure": lambda: scene.in_pascals(contact_pressure(contact.obstacle, u, sigma)),
-    }
     arrays: dict[str, dict[str, Field]] = _curves(solved) if output.spectra else {}
     arrays["fields"] = {
         name: whole
         for name in output.fields
-        if (whole := scene.grid.collect(physical[name]())) is not None
+        if (whole := scene.grid.collect(solved.field(name))) is not None
     }
     if output.cross_section:
         arrays["cross_sections"] = {
-            name: scene.grid.diagonal(field()) for name, field in physical.items()
+            column.name: scene.grid.diagonal(solved.field(column.name)) for column in FIELDS
         }
     entry = Entry(task.id, task.scene_id, output.names(), row)
     spectrum = _map_spectrum(task.surface, task.surface_sha256)

@@ -15,7 +15,13 @@ from gfmd_cli.physics.contact import Contact, Scene
 from gfmd_cli.physics.error_bounds import ErrorBounds, error_bounds, full_contact_errors
 from gfmd_cli.physics.error_estimates import NO_ERRORS, Estimate, GridValues, Verdict, unknown
 from gfmd_cli.physics.free_contact import SCENES
-from gfmd_cli.physics.observables import Observables, border_contact, contact_points, observe
+from gfmd_cli.physics.observables import (
+    Observables,
+    border_contact,
+    contact_points,
+    contact_pressure,
+    observe,
+)
 from gfmd_cli.physics.power_spectra import anisotropy
 from gfmd_cli.solvers.loop import Start
 from gfmd_cli.solvers.nested_grids import Resume, Solution, solve_contact
@@ -45,6 +51,17 @@ class TaskSolution:
         """Estimated error of a column on this grid, from stopping at this residual."""
         assert self.bounds is not None
         return self.bounds.estimated_error(name, self.observables, self.solution.residual)
+
+    def field(self, name: str) -> Field:
+        """One of the fields that [output] can store, in m or Pa."""
+        u, sigma = self.solution.u, self.solution.sigma
+        if name == "u":
+            return self.scene.in_metres(u)
+        if name == "height":
+            return self.scene.in_metres(self.contact.height)
+        if name == "contact_pressure":
+            sigma = contact_pressure(self.contact.obstacle, u, sigma)
+        return self.scene.in_pascals(sigma)
 
 
 @lru_cache(maxsize=1)

@@ -92,12 +92,10 @@ class TaskWatcher(Watcher):
             self.last_save = time.monotonic()
 
     def _report_step(self, contact: Contact, state: State) -> None:
-        points, step = contact.grid.points, state.step
+        grid, task = contact.grid, self.task
         a_r = float(contact_points(contact.obstacle, state.u, state.sigma).mean())
-        label = self.task.label
-        numbers = (points, step, state.residual, a_r)
-        event = Progress(self.task.index, "step", label, *numbers, size=contact.grid.size)
-        self.context.report(event)
+        numbers = grid.points, state.step, state.residual, a_r
+        self.context.report(Progress(task.index, "step", task.label, *numbers, size=grid.size))
 
     def _warn_of_short_call(self) -> None:
         seconds = duration(max(1.0, time.monotonic() - self.begun))

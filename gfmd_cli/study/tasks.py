@@ -1,5 +1,6 @@
 """A spec as a list of tasks, one for each surface, elastomer, grid, solver and load."""
 
+from collections import Counter
 from contextlib import suppress
 from dataclasses import dataclass
 from math import prod
@@ -165,8 +166,7 @@ def _tasks(spec: models.Spec) -> list[Task]:
     versions = _versions(spec)
     _check(spec)
     resolved = spec.resolved()
-    alternatives = {table: getattr(spec, table) for table in models.SWEPT}
-    swept_keys = {table: _swept_keys(alternatives[table]) for table in models.SWEPT}
+    swept_keys = {table: _swept_keys(getattr(spec, table)) for table in models.SWEPT}
     tasks: dict[str, Task] = {}
     for at, loads in spec.combinations():
         chosen = _chosen(spec, at)
@@ -216,8 +216,8 @@ def _check(spec: models.Spec) -> None:
     combinations = [at for at, _ in spec.combinations()]
     for i, j in dict.fromkeys((at["surface"], at["grid"]) for at in combinations):
         _check_grid(spec.surface[i], spec.grid[j])
-    for places in dict.fromkeys(tuple(at[table] for table in models.SWEPT) for at in combinations):
-        chosen = _chosen(spec, dict(zip(models.SWEPT, places, strict=True)))
+    for at in combinations:
+        chosen = _chosen(spec, at)
         elastomer, dimension = chosen["elastomer"], chosen["surface"].dimension
         boundary = chosen["grid"].boundary or "periodic"
         chosen["solver"].check_boundary(boundary)
@@ -272,11 +272,9 @@ def _task_id(
 
 def _swept_keys(alternatives: list[SpecTable]) -> set[str]:
     """The keys whose values differ between the alternatives of a table."""
-    values: dict[str, set[Any]] = {}
-    for choice in alternatives:
-        for key, value in choice:
-            values.setdefault(key, set()).add(value)
-    return {key for key, different in values.items() if len(different) > 1}
+    distinct = {item for choice in alternatives for item in choice}
+    counts = Counter(key for key, _ in distinct)
+    return {key for key, count in counts.items() if count > 1}
 
 
 def _swept_words(

@@ -62,8 +62,10 @@ class RemainingTime:
         for task in tasks:
             self.waiting_seconds[task.elastomer] += task.seconds
         self.running: dict[int, _Running] = {}
-        self.ended_seconds: dict[Any, tuple[float, float]] = {}
-        """Measured and forecast seconds of the ended tasks, by elastomer; None has those of all."""
+        self.measured: dict[Any, float] = defaultdict(float)
+        """Seconds that the ended tasks took, by elastomer; None has those of all."""
+        self.forecast: dict[Any, float] = defaultdict(float)
+        """Forecast seconds of the same tasks."""
 
     def with_time_left(self, report: Report) -> Report:
         """A report that also receives the number of remaining tasks and the remaining time."""
@@ -92,11 +94,8 @@ class RemainingTime:
             state = self.running.pop(index, _Running(now))
             if progress.status is not None and progress.status.is_solved:
                 for elastomer in (self.tasks[index].elastomer, None):
-                    measured, forecast = self.ended_seconds.get(elastomer, (0.0, 0.0))
-                    self.ended_seconds[elastomer] = (
-                        measured + now - state.started,
-                        forecast + self.seconds[index],
-                    )
+                    self.measured[elastomer] += now - state.started
+                    self.forecast[elastomer] += self.seconds[index]
 
     def _stop_waiting(self, index: int) -> None:
         """Remove a task from the waiting ones."""
@@ -114,11 +113,9 @@ class RemainingTime:
         return max([*all_left, (sum(all_left) + waiting) / self.jobs])
 
     def _speed_ratio(self, elastomer: Any) -> float:
-        """Measured over forecast seconds of the ended tasks of an elastomer."""
-        measured, forecast = self.ended_seconds.get(elastomer) or self.ended_seconds.get(
-            None, (1.0, 1.0)
-        )
-        return measured / forecast
+        """Measured over forecast seconds of the ended tasks of an elastomer, or else of all."""
+        ended = elastomer if elastomer in self.forecast else None
+        return self.measured[ended] / self.forecast[ended] if self.forecast else 1.0
 
     def _left_of(self, index: int) -> float:
         """Remaining seconds of a running task."""

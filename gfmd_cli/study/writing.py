@@ -16,6 +16,9 @@ from gfmd_cli.study.column import Column
 from gfmd_cli.study.reading import ATTRIBUTES_SUM, KINDS, PACKED, attributes_sum
 from gfmd_cli.study.result import Entry, TaskResult
 
+AXES = (("y", "length_y"), ("x", "length"))
+"""Axes of a field, with the columns of the sides of the cell."""
+
 
 def write_study(
     file: Any,
@@ -144,18 +147,11 @@ class _Writer(NamedTuple):
         """The axes of the arrays of a group: an index, or positions [m] on the grid."""
         if declared.axis:
             return [self.scale(group, declared.axis, np.arange(*shape), "1", declared.axis)]
-        return [
-            self.scale(
-                group,
-                name,
-                (np.arange(size) / size + row["x_first"]) * row[side],
-                "m",
-                f"position along {name}",
-            )
-            for name, side, size in zip(
-                ("y", "x")[-len(shape) :], ("length_y", "length")[-len(shape) :], shape, strict=True
-            )
-        ]
+        scales = []
+        for (name, side), size in zip(AXES[-len(shape) :], shape, strict=True):
+            positions = (np.arange(size) / size + row["x_first"]) * row[side]
+            scales.append(self.scale(group, name, positions, "m", f"position along {name}"))
+        return scales
 
 
 def write_column(group: Any, column: Column, values: Any, scales: list[Any]) -> None:
