@@ -112,7 +112,7 @@ def error_bounds(contact: Contact, u: Field, sigma: Field) -> ErrorBounds:
     return ErrorBounds(
         gap=duality_gap,
         u_g=abs(mean - centre) + _level_bound(duality_gap, reaction, p),
-        sigma_p=sqrt(2 * duality_gap * grid.max(float(contact.stiffness.max()))) + sqrt(omitted),
+        sigma_p=sqrt(2 * duality_gap * contact.stiffest) + sqrt(omitted),
         a_r=_uncertain_fraction(contact, u, sigma, violated),
     )
 
