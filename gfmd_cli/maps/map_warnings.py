@@ -71,7 +71,7 @@ def side_of_a_part(key: str, length: float, topography: Topography) -> str:
 
 def unknown_unit(topography: Topography, scale: float, length: float) -> str:
     """Positions of unknown unit; a factor of the heights multiplies the side, to `length` [m]."""
-    if topography.spacing is None or topography.metres:
+    if topography.metres:
         return ""
     if scale == 1.0:
         return (
