@@ -39,7 +39,7 @@ def new_file(path: Path, aside: Path | None = None) -> Iterator[NewFile]:
     `aside` is the folder to write it in, on the same file system; by default that of `path`.
     Raises SpaceError where it cannot be written.
     """
-    fresh = (aside or path.parent) / _temporary_name(path)
+    fresh = (aside or path.parent) / temporary_name(path)
     file: NewFile | None = None
     try:
         _check_target(path)
@@ -63,8 +63,8 @@ def new_file(path: Path, aside: Path | None = None) -> Iterator[NewFile]:
             fresh.unlink(missing_ok=True)
 
 
-def _temporary_name(path: Path) -> str:
-    """A name that no other file has, for a file that is being written."""
+def temporary_name(path: Path) -> str:
+    """A name that no other file has, for a file that is being written or removed."""
     return f".{path.name}.{uuid4().hex}"
 
 
@@ -80,7 +80,7 @@ def write_whole(path: Path, content: bytes) -> None:
 def check_place(path: Path) -> None:
     """Raise SpaceError where no file can be written at `path`, before the work for it begins."""
     _check_target(path)
-    if len(os.fsencode(_temporary_name(path))) > os.pathconf(path.parent, "PC_NAME_MAX"):
+    if len(os.fsencode(temporary_name(path))) > os.pathconf(path.parent, "PC_NAME_MAX"):
         raise SpaceError(f"{path}: cannot be written: the name is too long")
     try:
         TemporaryFile(dir=path.parent).close()

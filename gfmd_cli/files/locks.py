@@ -10,9 +10,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
-from uuid import uuid4
 
 from gfmd_cli.errors import SpaceError
+from gfmd_cli.files.atomic import temporary_name
 from gfmd_cli.files.regular import open_regular, read_regular
 
 NO_LOCKS = {errno.ENOLCK, errno.ENOTSUP, errno.EOPNOTSUPP, errno.ENOSYS, errno.EINVAL, 524}
@@ -159,7 +159,7 @@ def _is_dead(owner: dict[str, str | int]) -> bool:
 
 def _remove_stale(path: Path, owner: dict[str, str | int]) -> None:
     """Remove the lock of a dead process, unless another one has just done so."""
-    aside = path.with_name(f".{path.name}.{uuid4().hex}")
+    aside = path.with_name(temporary_name(path))
     with suppress(OSError):
         path.rename(aside)
         if _owner(aside) != owner:  # it is of a process that was faster

@@ -287,9 +287,7 @@ def _check_sides(path: Path, channel: Any) -> None:
 def _sides_with_unit(channel: Any, sides: tuple[float, ...]) -> tuple[float, ...] | None:
     """The sides [m] of a text table whose header states units of them but not of the heights."""
     header = _header(channel)
-    unit_x = header.get("xunit")
-    if not unit_x:
-        return None
+    unit_x = header.get("xunit") or ""
     units = (header.get("yunit") or unit_x, unit_x)[-len(sides) :]
     factors = [in_metres(unit) for unit in units]
     if None in factors:
@@ -391,10 +389,12 @@ def _height_channel(path: Path, reader: Any, name: str | None) -> Any:
         for channel in reader.channels
         if channel.data_kind.value == "height" and not isinstance(channel.unit, tuple)
     }  # a channel with a pair of units holds phases or error signals over lengths
-    if name is None and channels and reader.format() == "mat":  # arrays without a meaning
+    if not channels:
+        raise InputError(f"{path}: no height channel, as in an image of grey values. {REMEDY}")
+    if name is None and reader.format() == "mat":  # arrays without a meaning
         maps = [key for key, item in channels.items() if min(item.nb_grid_pts) >= SMALLEST_MAP]
         name = only_map(path, maps or list(channels))
-    elif name is None and channels:
+    elif name is None:
         default, maps = reader.default_channel.channel_id, list(channels)
         if len(maps) > 1:
             maps = [key for key in maps if HEIGHTS.search(key) or not SIGNALS.search(key)]
@@ -405,8 +405,6 @@ def _height_channel(path: Path, reader: Any, name: str | None) -> Any:
             )
         name = default if default in maps else maps[0]
     if name not in channels:
-        if not channels:
-            raise InputError(f"{path}: no height channel, as in an image of grey values. {REMEDY}")
         known = ", ".join(channels)
         raise InputError(f"{path}: no height channel {name!r}; its height channels: {known}")
     return channels[name]

@@ -91,10 +91,9 @@ def _is_row(words: list[bytes], count: int) -> bool:
 def _numbers(path: Path, lines: list[bytes], first: int, count: int) -> Field:
     """The table that begins in a line, NaN where heights are missing."""
     try:
-        table = np.loadtxt(lines[first:], comments=None, ndmin=2)
+        return np.loadtxt(lines[first:], comments=None, ndmin=2)
     except ValueError:  # a mark, or another line
-        table = np.loadtxt(_rows(path, lines, first, count), comments=None, ndmin=2)
-    return table
+        return np.loadtxt(_rows(path, lines, first, count), comments=None, ndmin=2)
 
 
 def _rows(path: Path, lines: list[bytes], first: int, count: int) -> Iterator[bytes]:

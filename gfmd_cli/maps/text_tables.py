@@ -69,17 +69,12 @@ def table_formats(file: BinaryIO) -> set[str]:
     of points on a grid, between blanks, commas or semicolons.
     """
     formats = set()
-    if _columns(file, b" \t") >= MATRIX_COLUMNS:
+    if columns(file, b" \t") >= MATRIX_COLUMNS:
         formats.add("asc")
     positions = columns(file)
     if positions == 2 or (positions == 3 and _is_grid(file)):
         formats.add("xyz")
     return formats
-
-
-def columns(file: BinaryIO) -> int:
-    """Columns of a table of numbers between any separators, 0 for any other file."""
-    return _columns(file, b" \t,;")
 
 
 def is_number(word: bytes) -> bool:
@@ -111,12 +106,12 @@ def sides_in(lines: list[bytes]) -> list[float]:
     return [float(value) * unit for value, unit in sides if is_number(value) and unit is not None]
 
 
-def header(file: BinaryIO, columns: int) -> list[bytes]:
-    """The lines above the first row of a table, without empty ones."""
+def header(file: BinaryIO, width: int) -> list[bytes]:
+    """The lines above the first row of so many numbers, without empty ones."""
     file.seek(0)
     lines = []
     for line in islice(file, HEADER_LINES + 1):
-        if len(cells(line)) >= columns and _counts(line):
+        if len(cells(line)) >= width and _counts(line):
             break
         lines += [line] if line.strip() else []
     file.seek(0)
@@ -139,7 +134,7 @@ def unread_units(lines: list[bytes], *, of_sides: bool) -> str:
 
 def without_size(file: BinaryIO) -> BinaryIO:
     """A matrix without a first line that states its numbers of rows and columns."""
-    width = _columns(file, b" \t")
+    width = columns(file, b" \t")
     file.seek(0)
     size = [int(word) for word in file.readline(SIZE_BYTES).split() if word.isdigit()]
     if len(size) == 2 and width in size and width >= MATRIX_COLUMNS:
@@ -153,7 +148,7 @@ def without_size(file: BinaryIO) -> BinaryIO:
 
 def shorter_or_longer_row(file: BinaryIO) -> str:
     """The first row of a matrix with another number of heights than the others; "" without one."""
-    width = _columns(file, b" \t")
+    width = columns(file, b" \t")
     file.seek(0)
     for number, line in enumerate(file, 1):
         length = len(line.split()) if is_numeric(line.strip()) else 0
@@ -184,10 +179,10 @@ def with_blanks(file: BinaryIO) -> tuple[BinaryIO, str]:
     if is_shifted or any(map(EMPTY.search, rows)):
         raise ValueError("an empty cell in a row of numbers; write NaN for a missing height")
     if b"," in table or b";" in table:
-        numbers = _columns(file, b" \t;")
+        numbers = columns(file, b" \t;")
         is_decimal = numbers > 1 and re.search(rb"\d,\d", table)
         if numbers == 1:
-            numbers = _columns(file, b",")
+            numbers = columns(file, b",")
         if is_decimal:
             warning = _warning_of_thousands(start, numbers)
         if is_decimal or numbers >= MATRIX_COLUMNS:
@@ -214,17 +209,15 @@ def _has_empty_cells(rows: list[bytes], separator: bytes) -> bool:
     return len(patterns) > 1
 
 
-def _warning_of_thousands(start: bytes, columns: int) -> str:
+def _warning_of_thousands(start: bytes, width: int) -> str:
     """Warning if each number of a table has a comma where it could separate thousands.
 
     One number such as 0,125 or 1,5 shows that the commas are decimal. Raises ValueError if only
     some of the numbers have such a comma, as where it separates thousands.
     """
     lines = [line for line in start.splitlines() if is_numeric(line)]
-    rows = [
-        row for line in lines if len(row := re.split(rb"[\s;]+", line.strip(b" \t;"))) == columns
-    ]
-    numbers = [word for row in rows for word in row if word[-1:].isdigit()]
+    rows = [re.split(rb"[\s;]+", line.strip(b" \t;")) for line in lines]
+    numbers = [word for row in rows if len(row) == width for word in row if word[-1:].isdigit()]
     with_comma = [word for word in numbers if b"," in word]
     if not with_comma or not all(map(THOUSANDS.fullmatch, with_comma)):
         return ""
@@ -272,26 +265,27 @@ def in_utf8(file: BinaryIO) -> BinaryIO:
     return BytesIO(content.replace(b'"', b""))
 
 
-def _columns(file: BinaryIO, separators: bytes) -> int:
-    """Columns of a table of numbers, 0 where the lines do not have the same number of them.
+def columns(file: BinaryIO, separators: bytes = b" \t,;") -> int:
+    """Columns of a table of numbers between separators, 0 for any other file.
 
-    Lines with words, which are headers, are left out, and so is a last line that is cut short.
+    All lines have the same number of them, but for lines with words, which are headers, and a last
+    line that is cut short.
     """
     blanks = bytes.maketrans(separators, b" " * len(separators))
-    columns = 0
+    width = 0
     for position, lines in _windows(file):
         sample = lines[len(lines) // 2 :][-SAMPLE_BYTES:]
         digits = sum(sample.count(b"%d" % digit) for digit in range(10))
         if b"\0" in lines or digits < MIN_DIGIT_FRACTION * len(sample):
             return 0
         counts = _counts(lines.translate(blanks))
-        if not columns:
-            columns = int(counts[counts > 0][-1]) if counts.any() else 0
+        if not width:
+            width = int(counts[counts > 0][-1]) if counts.any() else 0
         if position == 0:
             counts = counts[HEADER_LINES:] if counts.size > HEADER_LINES else counts[-1:]
-        if ((counts != columns) & (counts != 0)).any():
+        if ((counts != width) & (counts != 0)).any():
             return 0
-    return columns
+    return width
 
 
 def _windows(file: BinaryIO) -> Iterator[tuple[int, bytes]]:

@@ -159,22 +159,14 @@ class Tip:
 SMOOTH_TIP = Tip()
 
 
-def roughness_scales(
-    shells: Shells,
-    length: float,
-    anisotropy: float = 1.0,
-    *,
-    band_limited: bool = True,
-    aspect: float = 1.0,
-    highest: float = inf,
-) -> RoughnessScales:
-    """Scales of a rough surface from its spectrum, for a cell of side `length` [m]."""
+def roughness_scales(shells: Shells, length: float) -> RoughnessScales:
+    """What the spectrum of a rough surface says of its scales, for a cell of side `length` [m]."""
     height, q2 = shells.height, np.square(shells.q * length)
     flat, steep, bent = (float(np.sum(height * q2**power)) for power in (0, 1, 2))
     waves, curvature = sqrt(bent / steep) / (2 * pi), sqrt(bent / flat)
     slopes = height * q2
     independent = float(slopes.sum() ** 2 / np.sum(slopes**2 / shells.modes))
-    return RoughnessScales(waves, curvature, anisotropy, band_limited, aspect, highest, independent)
+    return RoughnessScales(waves, curvature, independent_waves=independent)
 
 
 def local_exponent(elastomer: LinearElastomer, points: float, length: float) -> float:

@@ -85,18 +85,17 @@ def error_bounds(contact: Contact, u: Field, sigma: Field) -> ErrorBounds:
     """
     grid, p = contact.grid, contact.pressure
     obstacle = contact.obstacle
-    loaded = grid.total(
-        sum(
-            float(contact.clear_untouchable(np.maximum(sigma[r], 0.0), r).sum())
-            for r in row_blocks(u)
-        )
-    )
+
+    def compressive(rows: slice) -> Field:
+        return contact.clear_untouchable(np.maximum(sigma[rows], 0.0), rows)
+
+    loaded = grid.total(sum(float(compressive(rows).sum()) for rows in row_blocks(u)))
     scale = p * grid.size / loaded
     stress_difference = grid.padded[..., : grid.points]
     sums = np.zeros(7)
     for rows in row_blocks(u):
         v, h = u[rows], contact.height[rows]
-        s = scale * contact.clear_untouchable(np.maximum(sigma[rows], 0.0), rows)
+        s = scale * compressive(rows)
         e = sigma[rows] - s
         stress_difference[rows] = e
         g = v - h
@@ -112,7 +111,7 @@ def error_bounds(contact: Contact, u: Field, sigma: Field) -> ErrorBounds:
     return ErrorBounds(
         gap=duality_gap,
         u_g=abs(mean - centre) + _level_bound(duality_gap, reaction, p),
-        sigma_p=sqrt(2 * duality_gap * grid.max(float(contact.stiffness.max()))) + sqrt(omitted),
+        sigma_p=sqrt(2 * duality_gap * contact.stiffest) + sqrt(omitted),
         a_r=_uncertain_fraction(contact, u, sigma, violated),
     )
 

@@ -143,13 +143,10 @@ def edge_fractions(
     if edge is None:
         return {}
     load = contact_pressure(height, u, sigma)
-    touching = load > 0
-    inside = grid.total(float(np.count_nonzero(touching & edge)))
-    area, carried = grid.total(float(np.count_nonzero(touching))), grid.total(float(load.sum()))
-    return {
-        "edge_contact": inside / area if area else np.nan,
-        "edge_load": grid.total(float(load[edge].sum())) / carried if carried else np.nan,
-    }
+    sums = [[np.count_nonzero(part), part.sum()] for part in (load[edge], load)]
+    at_edges, whole = grid.total(np.array(sums))
+    fractions = np.divide(at_edges, whole, out=np.full(2, np.nan), where=whole > 0)
+    return dict(zip(("edge_contact", "edge_load"), fractions.tolist(), strict=True))
 
 
 @dataclass(frozen=True)

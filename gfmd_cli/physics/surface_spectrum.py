@@ -46,7 +46,8 @@ def spectrum(shells: Shells, sides: tuple[float, ...], points: tuple[int, ...]) 
     ----------
     sides, points : of the cell and of its grid, along y and x or along x alone
     """
-    nyquist = _nyquist(sides, points)
+    # the largest wavenumber of which the grid has the waves of all directions [1/m]
+    nyquist = pi / max(side / count for side, count in zip(sides, points, strict=True))
     nearest, no_fit = None, "a line has no fit"
     if len(sides) == 2:
         try:
@@ -57,12 +58,11 @@ def spectrum(shells: Shells, sides: tuple[float, ...], points: tuple[int, ...]) 
     place = np.searchsorted(edges, shells.q) - 1
     inside = (place >= 0) & (place < edges.size - 1)
     fitted = nearest.density(shells.q) * shells.modes if nearest else np.zeros_like(shells.q)
-    total, moment, modes, fitted = (
-        np.bincount(place[inside], weight[inside], edges.size - 1).astype(float)
-        for weight in (shells.height, shells.height * shells.q, shells.modes, fitted)
+    weights = (shells.height, shells.height * shells.q, shells.modes, fitted)
+    sums = np.array(
+        [np.bincount(place[inside], weight[inside], edges.size - 1) for weight in weights], float
     )
-    usable = total > 0
-    total, moment, modes, fitted = (x[usable] for x in (total, moment, modes, fitted))
+    total, moment, modes, fitted = sums[:, sums[0] > 0]
     per_mode = prod(sides) / modes
     return Spectrum(moment / total, total * per_mode, modes, fitted * per_mode, nearest, no_fit)
 
@@ -77,11 +77,6 @@ def map_spectrum(surface: RigidSurface) -> Spectrum | None:
         return None
     scene = build_scene(tapered, HalfSpace(), tapered.smallest_grid())
     return spectrum(scene.shells, scene.grid.sides, scene.grid.whole_shape)
-
-
-def _nyquist(sides: tuple[float, ...], points: tuple[int, ...]) -> float:
-    """The largest wavenumber of which a grid has the waves of all directions [1/m]."""
-    return pi / max(side / count for side, count in zip(sides, points, strict=True))
 
 
 def _edges(q: Field, nyquist: float) -> Field:

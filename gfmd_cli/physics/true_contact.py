@@ -10,7 +10,6 @@ have the rms value Delta_sigma over the whole surface, but different values over
   as in Eq. (20).
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -38,22 +37,16 @@ def contact_stress(contact: Contact, touching: Mask) -> ContactStress:
     """Compute both moments over the points in contact; `touching` has the shape `grid.shape`."""
     if not np.any(touching):
         return ContactStress(np.nan, np.nan)
-    field = contact.grid.empty()
-    contact.elasticity(contact.height, field)
+    grid, square = contact.grid, 0.0
+    field = contact.elasticity(contact.height, grid.empty())
     deviation = float(field[touching].std())
-    square = sum(float(np.sum(w[touching] ** 2)) for w in _quadratures(contact, field))
-    return ContactStress(deviation, float(np.sqrt(square / np.count_nonzero(touching))))
-
-
-def _quadratures(contact: Contact, out: Field) -> Iterator[Field]:
-    """Yield the components of w, each in `out`."""
-    grid = contact.grid
-    for axis in range(grid.dimension):
+    for axis in range(grid.dimension):  # the components of w
         modes = grid.forward_into_work(contact.height)
         for rows in row_blocks(modes):
             modes[rows] *= 1j / grid.size * contact.stiffness[rows] * direction(grid, axis, rows)
-        grid.backward_into(out)
-        yield out
+        grid.backward_into(field)
+        square += float(np.sum(field[touching] ** 2))
+    return ContactStress(deviation, float(np.sqrt(square / np.count_nonzero(touching))))
 
 
 def direction(grid: Grid, axis: int, rows: slice = ALL_ROWS) -> Field:

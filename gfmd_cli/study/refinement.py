@@ -1,6 +1,6 @@
 """One contact on one grid, or on finer and finer ones until its errors are as requested."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from threading import get_ident
 from typing import Any
@@ -302,10 +302,9 @@ def _between_points(task: Task, solved: TaskSolution) -> dict[str, float]:
 def scales_of(scene: Scene, band_limited: bool) -> discretisation_error.RoughnessScales:
     """The scales of a rough surface, as `estimate` needs them."""
     grid = scene.grid
-    return discretisation_error.roughness_scales(
-        scene.shells,
-        grid.length,
-        anisotropy(grid, scene.height),
+    return replace(
+        discretisation_error.roughness_scales(scene.shells, grid.length),
+        anisotropy=anisotropy(grid, scene.height),
         band_limited=band_limited,
         aspect=max(grid.spacings) / min(grid.spacings),
         highest=scene.highest,
