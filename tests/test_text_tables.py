@@ -125,6 +125,16 @@ def test_a_point_that_is_given_twice_is_named(tmp_path):
         read_topography(path)
 
 
+@pytest.mark.parametrize("row", [5, 250, 299])
+def test_a_row_of_a_matrix_with_another_length_is_named(tmp_path, row):
+    lines = text(MATRIX).splitlines()
+    lines[row] += b" 0.5"
+    path = tmp_path / "map.txt"
+    path.write_bytes(b"\n".join(lines) + b"\n")
+    with pytest.raises(InputError, match=f"line {row + 1} has 41 numbers, the other rows 40"):
+        read_topography(path)
+
+
 def test_a_matrix_that_is_cut_off_in_a_row_is_refused(tmp_path):
     path = tmp_path / "map.txt"
     header = b"# Width: 8 um\n# Height: 60 um\n# Value units: nm\n"

@@ -128,6 +128,8 @@ def _open_scan(path: Path, file: BinaryIO, readers: list[Any]) -> Any:
             f"({'; '.join(reasons)}): damaged, or a variant of the format? {REMEDY}"
         )
     what = NO_GRID if columns(file) == 3 else "not in a known topography format"
+    if b"\0" not in start and (row := shorter_or_longer_row(file)):
+        what = f"a matrix with rows of unequal length: {row}"
     if path.suffix.lower() in COMPRESSED:
         what = "a compressed file: unpack it"
     raise InputError(

@@ -148,13 +148,14 @@ def without_size(file: BinaryIO) -> BinaryIO:
 
 def shorter_or_longer_row(file: BinaryIO) -> str:
     """The first row of a matrix with another number of heights than the others; "" without one."""
-    width = columns(file, b" \t")
     file.seek(0)
-    for number, line in enumerate(file, 1):
-        length = len(line.split()) if is_numeric(line.strip()) else 0
-        if length not in (0, width):
-            return f"line {number} has {count(length, 'number')}, the other rows {width}"
-    return ""
+    counts = _counts(file.read())
+    width = int(np.bincount(counts[counts > 0], minlength=1).argmax())
+    others = np.flatnonzero((counts > 0) & (counts != width))
+    if width < MATRIX_COLUMNS or not others.size:
+        return ""
+    length = count(int(counts[others[0]]), "number")
+    return f"line {others[0] + 1} has {length}, the other rows {width}"
 
 
 def with_blanks(file: BinaryIO) -> tuple[BinaryIO, str]:
