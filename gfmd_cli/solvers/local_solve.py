@@ -154,7 +154,7 @@ class LocalSolve:
         return Evaluation(level, gap_of_start, self.residual(gap, self.s), start_residual)
 
     def add_entered(self, displacement: Field, level: float) -> bool:
-        """Add the tiles in which C s - level is below h, and those around; whether there are any."""
+        """Add tiles in which C s - level is below h, and those around; whether there are any."""
         entered = np.zeros(self.tiles.used.shape, dtype=np.bool_)
         fields = (displacement, level, self.contact.obstacle, self.tiles.used, entered)
         self.grid.rows.run(mark_entered, *fields)
