@@ -215,16 +215,14 @@ def compare_open(study: StudyFile, path: Path, theory: Theory = "paper") -> Comp
     """As `compare`, of a study that is open already."""
     rows = study.rows
     solved = solved_rows(rows)
-    scenes = {row["scene"] for row in solved}
-    spectra = {scene: (study.shells(scene), study.map_spectrum(scene)) for scene in scenes}
     if not solved:
         raise InputError(f"{path}: contains no result yet; run it first")
     groups = grouped(solved, lambda row: (row["scene"], *solver_of(row)))
     curves = []
     for (scene, *_), group in groups.items():
-        shells, map_spectrum = spectra[scene]
-        persson = theory_of(theory, shells, float(group[0]["n"]))
-        curves.append(Curve(sorted(group, key=lambda row: row["p_star"]), persson, map_spectrum))
+        ordered = sorted(group, key=lambda row: row["p_star"])
+        persson = theory_of(theory, study.shells(scene), float(group[0]["n"]))
+        curves.append(Curve(ordered, persson, study.map_spectrum(scene)))
     return Comparison(path, curves, len(rows) - len(solved))
 
 
