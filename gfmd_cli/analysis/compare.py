@@ -37,15 +37,11 @@ def in_continuum(row: Mapping[str, Any], name: str) -> bool:
     return bool(np.all(np.isfinite(values)))
 
 
-def best(row: Row, name: str) -> tuple[float, float]:
-    """A quantity with its error: of the continuum where that is known, else of the grid."""
-    return best_of_all([row], name)[0]
-
-
 def best_of_all(rows: Sequence[Row], name: str) -> list[tuple[float, float]]:
-    """The same of rows that are averaged: of the continuum, NaN where that is known of some only.
+    """A quantity of rows that are averaged, with its error: of the continuum where that is known.
 
-    On the grid where no row was to have a continuum value.
+    NaN where it is known of some rows only; of the grid where no row was to have a continuum value.
+    Of a single row: of the continuum where that is known, else of the grid.
     """
     known = all(in_continuum(row, name) for row in rows)
     if len(rows) > 1 and not known and any(row.get(f"{name}_verdict") for row in rows):
@@ -56,7 +52,7 @@ def best_of_all(rows: Sequence[Row], name: str) -> list[tuple[float, float]]:
 
 def with_best(row: Row) -> Row:
     """A row with the best value of each quantity, as `NAME_best`, and `NAME_best_error`."""
-    pairs = {name: best(row, name) for name in QUANTITIES}
+    pairs = {name: best_of_all([row], name)[0] for name in QUANTITIES}
     values = {f"{name}_best": value for name, (value, _) in pairs.items()}
     return row | values | {f"{name}_best_error": error for name, (_, error) in pairs.items()}
 
@@ -187,6 +183,11 @@ class Comparison:
         """Whether Persson theory applies to any curve."""
         return any(curve.has_theory for curve in self.curves)
 
+    @property
+    def records(self) -> list[Row]:
+        """The records of all curves."""
+        return [record for curve in self.curves for record in curve.records]
+
     def __str__(self) -> str:
         """The tables of `gfmd analyze`."""
         return "\n\n\n".join(table.as_text() for table in self._tables())
@@ -215,16 +216,14 @@ def compare_open(study: StudyFile, path: Path, theory: Theory = "paper") -> Comp
     """As `compare`, of a study that is open already."""
     rows = study.rows
     solved = solved_rows(rows)
-    scenes = {row["scene"] for row in solved}
-    spectra = {scene: (study.shells(scene), study.map_spectrum(scene)) for scene in scenes}
     if not solved:
         raise InputError(f"{path}: contains no result yet; run it first")
     groups = grouped(solved, lambda row: (row["scene"], *solver_of(row)))
     curves = []
     for (scene, *_), group in groups.items():
-        shells, map_spectrum = spectra[scene]
-        persson = theory_of(theory, shells, float(group[0]["n"]))
-        curves.append(Curve(sorted(group, key=lambda row: row["p_star"]), persson, map_spectrum))
+        ordered = sorted(group, key=lambda row: row["p_star"])
+        persson = theory_of(theory, study.shells(scene), float(group[0]["n"]))
+        curves.append(Curve(ordered, persson, study.map_spectrum(scene)))
     return Comparison(path, curves, len(rows) - len(solved))
 
 

@@ -110,7 +110,9 @@ def _matches(one: list[Row], other: list[Row], *keys: Callable[[Row], Hashable])
     """Pairs of the same keys, alike in boundary, grid and solver if possible; from both lists."""
     pairs: list[Pair] = []
     paired_ids: set[int] = set()
-    first, second = (sorted(rows, key=_is_unconverged) for rows in (one, other))
+    first, second = (
+        sorted(rows, key=lambda row: not row["status"].is_converged) for rows in (one, other)
+    )
     for alike in ALIKE:
 
         def key_of(row: Row, alike: tuple[str, ...] = alike) -> Hashable:
@@ -126,10 +128,6 @@ def _matches(one: list[Row], other: list[Row], *keys: Callable[[Row], Hashable])
     for rows in (one, other):
         rows[:] = [row for row in rows if id(row) not in paired_ids]
     return sorted(pairs, key=lambda pair: int(pair.one["task"]))
-
-
-def _is_unconverged(row: Row) -> bool:
-    return not row["status"].is_converged
 
 
 def _pairing_note(pair: Pair) -> str:

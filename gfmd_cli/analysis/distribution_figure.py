@@ -135,18 +135,15 @@ def continuum_figure(comparison: Comparison) -> ColumnFigure | None:
         return None
     plot = _at_pressure([stress.finest["p_star"] for stress in stresses])
     styles = curve_styles([stress.curve for stress in stresses])
-    spans = [_draw(plot, stress, style) for stress, style in zip(stresses, styles, strict=True)]
-    ends = np.array(spans)
+    pairs = list(zip(stresses, styles, strict=True))
+    ends = np.array([_draw(plot, stress, style) for stress, style in pairs])
     plot.scale("x", "log", ends[:, :2])
     plot.scale("y", "log", ends[:, 2:])
     sigma = np.geomspace(*plot.axes.get_xlim(), 400)
     plot.theory(
-        [
-            (style, sigma, f.curve.stress_density(sigma, f.finest["p_star"]))
-            for f, style in zip(stresses, styles, strict=True)
-        ],
+        [(style, sigma, f.curve.stress_density(sigma, f.finest["p_star"])) for f, style in pairs],
     )
-    for stress, style in zip(stresses, styles, strict=True):
+    for stress, style in pairs:
         _edge_law(plot, stress, style)
     return plot
 

@@ -62,7 +62,7 @@ def as_records(comparison: Comparison) -> list[dict[str, Any]]:
         row["task"]: ensemble.means() for ensemble in ensembles(comparison) for row in ensemble.rows
     }
     records = []
-    names = column_names([row for curve in comparison.curves for row in curve.rows])
+    names = column_names(comparison.records)
     for curve in comparison.curves:
         keys = [*names, *(THEORY if curve.has_theory else ())]
         if curve.stores(VARIANTS.values()):

@@ -18,7 +18,8 @@ from gfmd_cli.grid.arrays import Field, Mask
 try:
     from matplotlib import colormaps, rc_context, ticker
     from matplotlib.backends.backend_svg import FigureCanvasSVG
-    from matplotlib.colors import LinearSegmentedColormap, to_hex
+    from matplotlib.colors import LinearSegmentedColormap
+    from matplotlib.colors import to_hex as to_hex  # for other modules, too
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 except ImportError as error:

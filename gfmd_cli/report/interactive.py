@@ -8,11 +8,10 @@ from typing import Any
 import numpy as np
 
 from gfmd_cli.analysis.curve_styles import without_escapes
-from gfmd_cli.analysis.plotting import BAND, ColumnFigure, PlotLayer
+from gfmd_cli.analysis.plotting import BAND, ColumnFigure, PlotLayer, to_hex
 from gfmd_cli.analysis.table import known, plus_minus
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.report.rendering import clean, html_label, plain_label
-from gfmd_cli.report.theme import INK, hex_of
 
 SYMBOLS = {
     "o": ("circle-open", "○"),
@@ -30,7 +29,6 @@ SYMBOLS = {
 LINE, DASHES, PATCH = "—", "┄", "■"
 PIXELS = 1.6  # of the page for a point of the figure
 DIGITS, LINE_DIGITS = 10, 5  # of the values of points, and of lines, which are only looked at
-DARKER = "#666666"  # of what all curves share
 
 
 def interactive(figure: ColumnFigure) -> dict[str, Any] | None:
@@ -105,11 +103,7 @@ def _axis(title: str, scale: str, limits: tuple[float, float]) -> dict[str, Any]
 
 def _entry(label: str, handle: Any) -> dict[str, str]:
     """An entry of the legend: its name, a character for its symbol, its colour."""
-    colour = handle.get_color()
-    if isinstance(colour, tuple):
-        colour = hex_of(*colour)
-    elif not colour.startswith("#"):  # shared by several curves
-        colour = INK if colour == "black" else DARKER
+    colour = to_hex(handle.get_color())
     return {"name": _name(label), "symbol": _symbol(handle), "colour": colour}
 
 

@@ -4,7 +4,7 @@ import math
 from collections import Counter
 from typing import NamedTuple
 
-from gfmd_cli.analysis.compare import best, in_continuum
+from gfmd_cli.analysis.compare import in_continuum
 from gfmd_cli.analysis.table import known
 from gfmd_cli.analysis.tables import warnings_in
 from gfmd_cli.analysis.wording import enumeration, grid_size, pretty, quantity, span
@@ -78,7 +78,7 @@ def key_numbers(data: ReportData) -> list[KeyNumber]:
 
 def _quantities(data: ReportData) -> list[KeyNumber]:
     """Pressure, area, gap and stress; in SI units with the scales behind them, or reduced."""
-    rows = data.solved
+    rows = data.comparison.records
     p_star = span(_column(rows, "p_star"))
     note = f"a_r, share of the nominal area{_continuum_note(rows, 'a_r')}"
     pressure, scales = KeyNumber("Pressure", p_star, "p*, in units of Delta_sigma"), []
@@ -92,7 +92,7 @@ def _quantities(data: ReportData) -> list[KeyNumber]:
         ]
     return [
         pressure,
-        KeyNumber("Contact area", span(_best(rows, "a_r")), note),
+        KeyNumber("Contact area", span(_column(rows, "a_r_best")), note),
         _scaled(data, "Mean gap", "u_g"),
         _scaled(data, "Stress deviation", "sigma_p"),
         *scales,
@@ -102,11 +102,11 @@ def _quantities(data: ReportData) -> list[KeyNumber]:
 def _scaled(data: ReportData, title: str, name: str) -> KeyNumber:
     """A quantity that has a reduced unit; in SI units where those mean something."""
     symbol, scale, unit = QUANTITIES[name]
-    reduced, where = _best(data.solved, name), _continuum_note(data.solved, name)
+    rows = data.comparison.records
+    reduced, where = _column(rows, f"{name}_best"), _continuum_note(rows, name)
     if not data.in_si:
         return KeyNumber(title, span(reduced), f"{symbol}{where}")
-    scales = _column(data.solved, scale)
-    values = [value * scale for value, scale in zip(reduced, scales, strict=True)]
+    values = [value * row[scale] for value, row in zip(reduced, rows, strict=True)]
     return KeyNumber(title, span(values, unit), f"{symbol} = {span(reduced)}{where}")
 
 
@@ -122,11 +122,6 @@ def _theory_numbers(data: ReportData) -> list[KeyNumber]:
     ]
 
 
-def _best(rows: list[Row], name: str) -> list[float]:
-    """A quantity in the continuum where that is known, else on the grid."""
-    return [best(row, name)[0] for row in rows]
-
-
 def _continuum_note(rows: list[Row], name: str) -> str:
     """Whether the values are those of the continuum; empty where none is."""
     known = [in_continuum(row, name) for row in rows]
@@ -139,8 +134,7 @@ def _ratios(data: ReportData, name: str, limit: float) -> str:
     """Simulation over theory at reduced pressures up to `limit`."""
     return span(
         record[f"{name}_best"] / record[f"{name}_persson"]
-        for curve in data.comparison.curves
-        for record in curve.records
+        for record in data.comparison.records
         if record[f"{name}_persson"] > 0 and record["p_star"] <= limit
     )
 
