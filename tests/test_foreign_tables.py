@@ -159,7 +159,7 @@ def test_a_mark_of_two_words_in_a_matrix_is_refused(saved):
 @pytest.mark.parametrize("size", ["300 12", "12\t300"])
 def test_a_matrix_below_its_size(saved, size):
     np.testing.assert_array_equal(read_topography(saved(f"{size}\n{matrix(' ')}")).heights, HEIGHTS)
-    with pytest.raises(InputError, match="line 1 has 2 numbers, the other rows 300"):
+    with pytest.raises(InputError, match="line 1 has 2 numbers, most rows 300"):
         read_topography(saved(f"300 13\n{matrix(' ')}"))
 
 

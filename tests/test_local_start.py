@@ -235,6 +235,21 @@ def test_a_contact_that_the_coarse_grid_misses_is_entered():
     assert np.count_nonzero(touching) == np.count_nonzero(solve(contact, False).u == height)
 
 
+def test_a_start_is_not_predicted_on_tiles_most_of_which_are_new():
+    """The indenter is nearly flat, and enters the whole cell around a pressure on one point."""
+    scene = build_scene(SelfAffine(cutoff=0.05), Power(n=0.5), 512)
+    height = 0.05 * scene.height
+    random = np.random.default_rng(1)
+    for _ in range(30):
+        height[tuple(random.integers(0, 512, 2))] += random.random()
+    contact = Contact(scene.grid, height, scene.stiffness, 1e-3)
+    pressure = np.zeros((256, 256))
+    pressure[10, 10] = contact.pressure * pressure.size
+    start = start_from(contact.coarsen((256, 256)), pressure, [contact], 0.1)
+    assert start is not None
+    assert contact.residual(start.u, contact.stress(start.u, np.empty(height.shape))) < 0.1
+
+
 @pytest.mark.parametrize("has_holes", [False, True])
 @pytest.mark.parametrize("n", [0.5, 1, 2])
 def test_the_stress_of_a_start_is_that_of_its_displacement(n, has_holes):

@@ -131,7 +131,7 @@ def test_a_row_of_a_matrix_with_another_length_is_named(tmp_path, row):
     lines[row] += b" 0.5"
     path = tmp_path / "map.txt"
     path.write_bytes(b"\n".join(lines) + b"\n")
-    with pytest.raises(InputError, match=f"line {row + 1} has 41 numbers, the other rows 40"):
+    with pytest.raises(InputError, match=f"line {row + 1} has 41 numbers, most rows 40"):
         read_topography(path)
 
 
@@ -139,7 +139,7 @@ def test_a_matrix_that_is_cut_off_in_a_row_is_refused(tmp_path):
     path = tmp_path / "map.txt"
     header = b"# Width: 8 um\n# Height: 60 um\n# Value units: nm\n"
     path.write_bytes(text(MATRIX, header=header).rstrip()[:-100])
-    with pytest.raises(InputError, match=r"line 303 has 2\d numbers, the other rows 40"):
+    with pytest.raises(InputError, match=r"line 303 has 2\d numbers, most rows 40"):
         read_topography(path)
 
 

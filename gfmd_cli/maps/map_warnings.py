@@ -7,7 +7,7 @@ import warnings
 
 import numpy as np
 
-from gfmd_cli.grid.arrays import Field, row_blocks
+from gfmd_cli.grid.arrays import Field, Mask, row_blocks
 from gfmd_cli.maps.map_preparation import border_step, level
 from gfmd_cli.maps.topography import Topography
 from gfmd_cli.units import count
@@ -213,9 +213,11 @@ def shifted_lines(topography: Topography, spacing: tuple[float, ...]) -> str:
     `spacing` is that of the map [m]. An offset is the median difference to the line before, where
     both halves of the line agree on it.
     """
-    heights = topography.with_nan()
+    heights = topography.heights
     if heights.ndim == 1 or min(heights.shape) < MIN_LINES:
         return ""
+    if topography.missing is not None:
+        heights = np.where(topography.missing, np.nan, heights)
     dy, dx = spacing
     for lines, along, ratio in ((heights, "x", dy / dx), (heights.T, "y", dx / dy)):
         lag = max(1, round(ratio))  # points of a line as far apart as the lines
@@ -254,7 +256,9 @@ def shifted_lines(topography: Topography, spacing: tuple[float, ...]) -> str:
 
 def outliers(topography: Topography) -> str:
     """Equal heights farther from all others than these are from each other, or many at a limit."""
-    heights = topography.of_known(topography.heights)
+    heights = topography.heights
+    if topography.missing is not None:
+        heights = heights[~topography.missing]
     for nearest, word in ((np.min, "minimum"), (np.max, "maximum")):
         extreme = nearest(heights)
         others = heights[heights != extreme]
@@ -300,11 +304,15 @@ def _often_equal(heights: Field) -> str:
 
 def _single_points(topography: Topography) -> str:
     """Single points far above or below all their neighbours, or strokes along one axis."""
-    heights = np.atleast_2d(topography.with_nan())
+    heights, missing = np.atleast_2d(topography.heights), topography.missing
+    missing = None if missing is None else missing.reshape(heights.shape)
     is_map, singles, strokes = len(heights) > 1, 0, np.zeros((2, 2), int)
-    usual = _usual_difference(heights)
+    usual = _usual_difference(heights, missing)
     for rows in row_blocks(heights) if usual else ():
-        block = heights[max(rows.start - is_map, 0) : rows.stop + is_map]
+        around = slice(max(rows.start - is_map, 0), rows.stop + is_map)
+        block = heights[around]
+        if missing is not None:
+            block = np.where(missing[around], np.nan, block)
         inner = slice(1, -1) if is_map else slice(None)
         own = block[inner, 1:-1]
         axes = [(block[inner, :-2], block[inner, 2:])]
@@ -335,11 +343,14 @@ def _single_points(topography: Topography) -> str:
     return ""
 
 
-def _usual_difference(heights: Field) -> float:
+def _usual_difference(heights: Field, missing: Mask | None) -> float:
     """The difference that most neighbours along the rougher axis have at most, from a sample."""
     step, usual = 1 + heights.size // (10 * SAMPLE_SIZE), 0.0
-    for axis, sample in ((1, heights[::step]), (0, heights[:, ::step])):
-        differences = np.abs(np.diff(sample, axis=axis))
+    for axis, sample in ((1, np.s_[::step]), (0, np.s_[:, ::step])):
+        known = heights[sample]
+        if missing is not None:
+            known = np.where(missing[sample], np.nan, known)
+        differences = np.abs(np.diff(known, axis=axis))
         differences = differences[np.isfinite(differences)]
         if differences.size:
             usual = max(usual, float(np.percentile(differences, USUAL_PERCENT)))
@@ -369,10 +380,12 @@ def _spikes(heights: Field) -> str:
 
 def rounded(topography: Topography, scale: float) -> str:
     """Heights in steps as coarse as the differences of neighbours along the rougher axis."""
-    heights, smallest = topography.with_nan(), np.inf
+    heights, smallest = topography.heights, np.inf
     pairs, changes = np.zeros((2, heights.ndim), int)
     for rows in row_blocks(heights):
         block = heights[rows]
+        if topography.missing is not None:
+            block = np.where(topography.missing[rows], np.nan, block)
         for axis in range(heights.ndim):
             steps = np.abs(np.diff(block, axis=axis))
             pairs[axis] += np.count_nonzero(np.isfinite(steps))
@@ -394,9 +407,11 @@ def rounded_trend(topography: Topography, levelled: Field, scale: float) -> str:
 
     Equal neighbours do not show it, because the trend makes them different.
     """
-    heights = topography.of_known(scale * topography.heights)
+    heights = scale * topography.heights
     squares = [np.mean(np.diff(levelled, axis=axis) ** 2) for axis in range(levelled.ndim)]
-    change, left = float(np.sqrt(max(squares))), float(np.ptp(topography.of_known(levelled)))
+    if topography.missing is not None:
+        heights, levelled = heights[~topography.missing], levelled[~topography.missing]
+    change, left = float(np.sqrt(max(squares))), float(np.ptp(levelled))
     if not 0 < left < 0.5 * np.ptp(heights):  # the trend has two steps or more
         return ""
     stored = topography.heights

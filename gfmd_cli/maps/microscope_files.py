@@ -127,11 +127,13 @@ def _open_scan(path: Path, file: BinaryIO, readers: list[Any]) -> Any:
             f"{path}: SurfaceTopography recognises the format but cannot read the file "
             f"({'; '.join(reasons)}): damaged, or a variant of the format? {REMEDY}"
         )
-    what = NO_GRID if columns(file) == 3 else "not in a known topography format"
-    if b"\0" not in start and (row := shorter_or_longer_row(file)):
-        what = f"a matrix with rows of unequal length: {row}"
     if path.suffix.lower() in COMPRESSED:
         what = "a compressed file: unpack it"
+    elif columns(file) == 3:
+        what = NO_GRID
+    else:
+        row = shorter_or_longer_row(file) if b"\0" not in start else ""
+        what = f"not in a known topography format{f' (as a matrix: {row})' if row else ''}"
     raise InputError(
         f"{path}: {what}; .npy, HDF5 and the formats of SurfaceTopography can be read. {REMEDY}"
     )

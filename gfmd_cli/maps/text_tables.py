@@ -20,6 +20,7 @@ from gfmd_cli.units import count
 
 WINDOW_BYTES = 2**21  # bytes read at a time: 32768 heights of 25 digits take less than half of it
 MAX_WINDOWS = 32  # of a file; those of a larger one leave gaps
+SCANNED_BYTES = 2**26  # in which a row of another length is looked for; a choice
 HEADER_LINES = 200  # that may differ from the table: as many as SurfaceTopography skips
 SAMPLE_BYTES = 2**16  # at the end of each window; a choice
 MIN_DIGIT_FRACTION = 0.2  # of the characters of a table, most of which are digits; a choice
@@ -147,15 +148,19 @@ def without_size(file: BinaryIO) -> BinaryIO:
 
 
 def shorter_or_longer_row(file: BinaryIO) -> str:
-    """The first row of a matrix with another number of heights than the others; "" without one."""
+    """The first row of a matrix that has another number of heights than most; "" without one.
+
+    Only the first `SCANNED_BYTES` are looked at.
+    """
     file.seek(0)
-    counts = _counts(file.read())
-    width = int(np.bincount(counts[counts > 0], minlength=1).argmax())
-    others = np.flatnonzero((counts > 0) & (counts != width))
-    if width < MATRIX_COLUMNS or not others.size:
+    lines = file.read(SCANNED_BYTES)
+    counts = _counts(lines if len(lines) < SCANNED_BYTES else lines[: lines.rfind(b"\n")])
+    rows = counts[counts > 0]
+    width = int(np.bincount(rows[rows >= MATRIX_COLUMNS], minlength=1).argmax())
+    if np.count_nonzero(rows == width) in (rows.size, 0):
         return ""
-    length = count(int(counts[others[0]]), "number")
-    return f"line {others[0] + 1} has {length}, the other rows {width}"
+    first = int(np.argmax((counts > 0) & (counts != width)))
+    return f"line {first + 1} has {count(int(counts[first]), 'number')}, most rows {width}"
 
 
 def with_blanks(file: BinaryIO) -> tuple[BinaryIO, str]:
@@ -309,7 +314,8 @@ def _windows(file: BinaryIO) -> Iterator[tuple[int, bytes]]:
 
 def _counts(lines: bytes) -> np.ndarray[Any, np.dtype[np.int64]]:
     """Numbers between blanks in each line, 0 where there are words."""
-    return np.array([len(line.split()) if is_numeric(line) else 0 for line in lines.splitlines()])
+    counts = [len(line.split()) if is_numeric(line) else 0 for line in lines.splitlines()]
+    return np.array(counts, np.int64)
 
 
 def _is_grid(file: BinaryIO) -> bool:

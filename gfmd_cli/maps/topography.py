@@ -112,16 +112,6 @@ class Topography(MapMetadata):
         """Number of missing heights."""
         return 0 if self.missing is None else int(np.count_nonzero(self.missing))
 
-    def with_nan(self) -> Field:
-        """The heights, NaN where missing."""
-        if self.missing is None:
-            return self.heights
-        return np.where(self.missing, np.nan, self.heights)
-
-    def of_known(self, values: Field) -> Field:
-        """Those of some values where the heights are known, such as the heights themselves."""
-        return values if self.missing is None else values[~self.missing]
-
 
 def read_topography(
     path: Path,

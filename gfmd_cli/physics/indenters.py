@@ -164,6 +164,11 @@ def _highest_point(surface: RigidSurface, points: int) -> float:
     return highest_point(surface.heights(points))
 
 
+def forget_peaks() -> None:
+    """Drop the highest points, whose last bits depend on the plans of the transforms."""
+    _highest_point.cache_clear()
+
+
 class SingleIndenter(RigidSurface):
     """A single indenter in the middle of the cell, repeated periodically; x counts from there."""
 

@@ -32,8 +32,10 @@ REDUCTION_RANGE = (1e-3, 0.02)
 the relative error of the operators; the largest is a choice, because an evaluation at all points
 takes longer than a few steps on tiles."""
 ACCEPTED_FRACTION = 0.75
-"""Of the tolerance, for the predicted residual of the start; docs/solvers.md compares both."""
-TARGET_FRACTION = 0.5  # of the tolerance, for that residual after the next solve; 0.25 to 0.75
+"""Of the tolerance, for the predicted residual of the start. The residual itself may be larger
+(docs/solvers.md)."""
+TARGET_FRACTION = 0.5  # of the tolerance, for that residual after the next solve; a choice
+MAX_GROWTH = 1.5  # of the number of tiles in an evaluation that may be the last one; a choice
 MAX_EVALUATIONS = 6  # of the displacement at all points; a choice
 MAX_STEPS = 60  # on the same tiles; a choice
 
@@ -130,8 +132,10 @@ class LocalSolve:
             self.run(target)
             in_single_precision = count == 1 and accepted < FIRST_RESIDUAL
             displacement = self.compliance_everywhere(in_single_precision=in_single_precision)
+            tiles_before = self.tiles.count
             result = self.evaluate(displacement, accepted)
             is_good = result.start_residual < accepted
+            is_good &= self.tiles.count <= MAX_GROWTH * tiles_before
             if (is_good and not in_single_precision) or count == MAX_EVALUATIONS:
                 break
             if result.start_residual > 0:  # it is zero if a single point is in contact

@@ -24,7 +24,7 @@ from gfmd_cli.solvers.tiles import SIDE, Tiles
 SMALLEST_EXPONENT = 0.2  # of k(q) for which there are tiles; measured from 0.25 on
 CONTACT_MARGIN = 2  # points by which the contact may grow from a grid to the next; a choice
 COARSE_TOLERANCE = 0.03  # on grids before the finest; measured: 0.01 to 0.1 differ by 5 %
-MAX_JACOBI_STEPS = 6  # after C s is laid on the indenter; measured: 5 to 8
+MAX_JACOBI_STEPS = 6  # after C s is laid on the indenter; with 8 the prediction is worse
 MAX_JACOBI_REDUCTION = 4.0  # of the residual by these steps; measured: 3 to 5
 JACOBI_DAMPING = 0.8  # a choice
 MAX_CLOSED_GAP = 2.0  # over the Jacobi move, which removes the stress of the point; a choice

@@ -82,7 +82,6 @@ def run_study(
     """
     ranks = options.ranks
     forget_files()
-    forget_scene()
     study = Study(path)
     tasks = plan(spec)
     if ranks is not None and (names := spec.output.on_request()):
@@ -114,6 +113,7 @@ def run_study(
     context = SolveContext(worker_options, watch, stop, ranks)
     with signal_handlers(stop), _folder(study, tasks, ranks) as damaged:
         unusable = plans.plan_with(study.parts, estimated=options.reproducible)
+        forget_scene()
         context.warn(*moved, *damaged, *filter(None, [unusable, _changing_unit(pending)]))
         try:
             solved = _solve_all(pending, study.parts, jobs, context)
