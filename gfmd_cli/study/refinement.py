@@ -15,7 +15,6 @@ from gfmd_cli.physics.contact import Contact, Scene
 from gfmd_cli.physics.error_bounds import ErrorBounds, error_bounds, full_contact_errors
 from gfmd_cli.physics.error_estimates import NO_ERRORS, Estimate, GridValues, Verdict, unknown
 from gfmd_cli.physics.free_contact import SCENES
-from gfmd_cli.physics.indenters import forget_peaks
 from gfmd_cli.physics.observables import (
     Observables,
     border_contact,
@@ -91,9 +90,8 @@ def task_scene(task: Task, points: int, context: SolveContext) -> Scene:
 
 
 def forget_scene() -> None:
-    """Drop the last scene and what else was computed by transforms as they were planned before."""
+    """Free the memory of the last scene."""
     _scene.cache_clear()
-    forget_peaks()
 
 
 def solve_on_grids(task: Task, context: SolveContext, watcher: Watcher) -> TaskSolution:

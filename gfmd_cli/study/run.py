@@ -12,6 +12,7 @@ from gfmd_cli.errors import InputError, Interrupted, SpaceError
 from gfmd_cli.grid import plans
 from gfmd_cli.grid.ranks import Ranks, broadcast, is_root, shared_errors
 from gfmd_cli.physics.file_surface import forget_files
+from gfmd_cli.physics.indenters import forget_peaks
 from gfmd_cli.spec.models import Spec
 from gfmd_cli.status import Status
 from gfmd_cli.study.context import Progress, Report, SolveContext, WorkerOptions
@@ -82,6 +83,7 @@ def run_study(
     """
     ranks = options.ranks
     forget_files()
+    forget_scene()
     study = Study(path)
     tasks = plan(spec)
     if ranks is not None and (names := spec.output.on_request()):
@@ -113,7 +115,7 @@ def run_study(
     context = SolveContext(worker_options, watch, stop, ranks)
     with signal_handlers(stop), _folder(study, tasks, ranks) as damaged:
         unusable = plans.plan_with(study.parts, estimated=options.reproducible)
-        forget_scene()
+        forget_peaks()
         context.warn(*moved, *damaged, *filter(None, [unusable, _changing_unit(pending)]))
         try:
             solved = _solve_all(pending, study.parts, jobs, context)
