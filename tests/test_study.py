@@ -19,8 +19,8 @@ from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.physics import indenters
 from gfmd_cli.solvers.pcg import PCGState, ProjectedCG
 from gfmd_cli.spec.parse import read_spec
+from gfmd_cli.study import measure, run_task
 from gfmd_cli.study import run as run_module
-from gfmd_cli.study import run_task
 from gfmd_cli.study.checkpoint import Checkpoint
 from gfmd_cli.study.columns import COLUMNS, LAYOUT
 from gfmd_cli.study.notes import Notes, Trial
@@ -386,9 +386,8 @@ def test_plans_are_kept_beside_an_unfinished_study(run, tmp_path, monkeypatch):
     run(shard=(0, 4))
     wisdom = plans.read_wisdom(tmp_path / "study.parts")
     cached = plans.read_wisdom(tmp_path / "cache" / "gfmd")
-    assert [sorted(text.splitlines()) for text in cached] == [
-        sorted(x.splitlines()) for x in wisdom
-    ]
+    for one, other in zip(wisdom, cached, strict=True):
+        assert sorted(one.splitlines()) == sorted(other.splitlines())
     shutil.rmtree(tmp_path / "cache")
     shapes = []
     monkeypatch.setattr(plans, "_import", lambda known: shapes.append(known))
@@ -400,11 +399,13 @@ def test_plans_are_kept_beside_an_unfinished_study(run, tmp_path, monkeypatch):
     assert any("planned anew" in event.message for event in events)
 
 
-def test_no_number_comes_from_transforms_of_an_earlier_run(run, monkeypatch):
-    """Their plans may have been others. The highest point is that of the surface."""
-    found = []
-    search = indenters.highest_point
-    monkeypatch.setattr(indenters, "highest_point", lambda h: found.append(search(h)) or found[-1])
+@pytest.mark.parametrize(
+    ("module", "name"), [(indenters, "highest_point"), (measure, "map_spectrum")]
+)
+def test_no_number_comes_from_transforms_of_an_earlier_run(run, monkeypatch, module, name):
+    """Their plans may have been others."""
+    found, compute = [], getattr(module, name)
+    monkeypatch.setattr(module, name, lambda value: found.append(compute(value)) or found[-1])
     run(jobs=1)
     assert len(found) > 0
     count = len(found)

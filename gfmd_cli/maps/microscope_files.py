@@ -291,7 +291,7 @@ def _check_sides(path: Path, channel: Any) -> None:
 def _sides_with_unit(channel: Any, sides: tuple[float, ...]) -> tuple[float, ...] | None:
     """The sides [m] of a text table whose header states units of them but not of the heights."""
     header = _header(channel)
-    unit_x = header.get("xunit") or ""
+    unit_x = header.get("xunit") or ""  # which is not a known unit
     units = (header.get("yunit") or unit_x, unit_x)[-len(sides) :]
     factors = [in_metres(unit) for unit in units]
     if None in factors:

@@ -157,7 +157,7 @@ def shorter_or_longer_row(file: BinaryIO) -> str:
     counts = _counts(lines if len(lines) < SCANNED_BYTES else lines[: lines.rfind(b"\n")])
     rows = counts[counts > 0]
     width = int(np.bincount(rows[rows >= MATRIX_COLUMNS], minlength=1).argmax())
-    if np.count_nonzero(rows == width) in (rows.size, 0):
+    if width == 0 or (rows == width).all():
         return ""
     first = int(np.argmax((counts > 0) & (counts != width)))
     return f"line {first + 1} has {count(int(counts[first]), 'number')}, most rows {width}"

@@ -132,13 +132,12 @@ class LocalSolve:
             self.run(target)
             in_single_precision = count == 1 and accepted < FIRST_RESIDUAL
             displacement = self.compliance_everywhere(in_single_precision=in_single_precision)
-            tiles_before = self.tiles.count
+            max_tiles = MAX_GROWTH * self.tiles.count
             result = self.evaluate(displacement, accepted)
-            is_good = result.start_residual < accepted
-            is_good &= self.tiles.count <= MAX_GROWTH * tiles_before
-            if (is_good and not in_single_precision) or count == MAX_EVALUATIONS:
+            is_final = not in_single_precision and self.tiles.count <= max_tiles
+            if (is_final and result.start_residual < accepted) or count == MAX_EVALUATIONS:
                 break
-            if result.start_residual > 0:  # it is zero if a single point is in contact
+            if result.start_residual > 0:  # it can be zero: one point in contact, or all
                 factor = TARGET_FRACTION * tolerance / result.start_residual
                 target = result.residual * float(np.clip(factor, *REDUCTION_RANGE))
             self.correction = self.tiles.take(displacement) - self.compliance(self.s)

@@ -135,7 +135,7 @@ class Ladder(SpecTable):
         return [value for value in values if value / self.to - 1 <= rounding]
 
     def _value(self, decades: float) -> float:
-        """The value `decades` >= 0 above the first one; infinite beyond the largest number."""
+        """The value so many decades above the first one, at least 0; infinite where too large."""
         times, rest = divmod(decades, MAX_DECADES)
         return prod([10.0**MAX_DECADES] * int(times), start=self.from_) * float(10.0**rest)
 

@@ -149,6 +149,11 @@ def _map_spectrum(surface: RigidSurface, sha256: str) -> Spectrum | None:
     return map_spectrum(surface)
 
 
+def forget_spectra() -> None:
+    """Drop the spectra of maps, whose last bits depend on the plans of the transforms."""
+    _map_spectrum.cache_clear()
+
+
 def on_request(output: OutputTable, solved: SolvedContact) -> Row:
     """The histograms, with the share of points in no bin, and the observables of [output]."""
     row: Row = {}

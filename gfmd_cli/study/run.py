@@ -16,6 +16,7 @@ from gfmd_cli.physics.indenters import forget_peaks
 from gfmd_cli.spec.models import Spec
 from gfmd_cli.status import Status
 from gfmd_cli.study.context import Progress, Report, SolveContext, WorkerOptions
+from gfmd_cli.study.measure import forget_spectra
 from gfmd_cli.study.pool import solve_in_pool
 from gfmd_cli.study.refinement import forget_scene
 from gfmd_cli.study.resources import check_memory, jobs_and_threads, seconds_to_stop, usable_memory
@@ -116,6 +117,7 @@ def run_study(
     with signal_handlers(stop), _folder(study, tasks, ranks) as damaged:
         unusable = plans.plan_with(study.parts, estimated=options.reproducible)
         forget_peaks()
+        forget_spectra()
         context.warn(*moved, *damaged, *filter(None, [unusable, _changing_unit(pending)]))
         try:
             solved = _solve_all(pending, study.parts, jobs, context)
