@@ -78,7 +78,7 @@ The program uses the corrected equations. Each correction was checked by an inde
 | Eq. 18 | $a_r = \kappa' p R/(k a^{2-n})$ | $\pi \kappa' p R/(k a^{2-n})$ with the printed $\kappa'$ |
 | text to Eq. 21 | $\kappa_{1/2}$ "believed exact" | $\kappa'_n = 2^{1-n} \Gamma(3 - n/2) \Gamma(2 - n/2)/\pi$; the conjecture is 9.6e-5 off |
 | Eq. 24 | two equal exponentials; denominator $\Delta\sigma^2$ | the second has $(\sigma + p)^2$; the denominator is $\Delta\sigma$ |
-| Eq. 32 | $I$ | $-2 I$: $F(s) = (p^2 + s) \mathrm{erf}(p/\sqrt{2s}) + p \sqrt{2s/\pi} e^{-p^2/2s}$, $I = F(s_+) - F(s_-)$ |
+| Eq. 32 | $I$ | $-2 I$ ([formula](physics.md#persson-theory)) |
 | Eq. 33, 38 | $\delta(h - h_{nc})$; $p = k_0 u$ | $\delta(u - h_{nc})$; $p = k_0 \langle u \rangle$ |
 | Eq. 40 | $\Theta(q_s - 1)$; $L/\lambda_s = 5.12$ | $\Theta(q_s - q)$; $L/\lambda_r = 5.12$ |
 | Sect. 2 | $q_s/q_r = 1/100$; $16k = 2^{15}$ | $\lambda_s/\lambda_r = 1/100$; $16k = 2^{14}$ |
