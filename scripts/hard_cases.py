@@ -103,7 +103,7 @@ def cases(points: int, folder: Path) -> Iterator[Case]:
     for n in (3.0, 4.0):
         yield Case("small load", rough, Power(n=n), 1e-3)
     for n in EXPONENTS[1:]:
-        yield Case("one spot", rough, Power(n=n), 1e-5)
+        yield Case("one patch or a few", rough, Power(n=n), 1e-5)
     for n in (1.0, 4.0):
         yield Case(BELOW_ROUNDING, rough, Power(n=n), 1e-9)
     for n in EXPONENTS:

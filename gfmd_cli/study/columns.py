@@ -201,7 +201,7 @@ SPECTRA = (
 )
 AUTOCORRELATIONS = (
     Column("r", "mean distance in the ring", "m"),
-    Column("height", "mean of C(r) / C(0) over the ring, for the height"),
+    Column("height", "autocorrelation of the height over its variance, mean over the ring"),
     Column("u", "the same for the displacement"),
     Column("sigma", "the same for the stress"),
 )
