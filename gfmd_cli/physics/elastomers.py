@@ -184,8 +184,9 @@ class Layer(LinearElastomer):
     """Thickness [m]."""
     E_star: Positive = 1.0
     """Contact modulus E / (1 - nu^2) [Pa]."""
-    poisson: Annotated[float, Key(gt=-1, lt=0.5)] | None = None
-    """Poisson's ratio, required for a bonded layer. A sliding layer depends on E_star alone."""
+    poisson: Annotated[float, Key(gt=-1, le=0.5)] | None = None
+    """Poisson's ratio, required for a bonded layer and less than 0.5 there. A sliding layer depends
+    on E_star alone."""
     base: Literal["bonded", "sliding"] = "bonded"
     """Whether the layer is bonded to the rigid base or slides on it without friction."""
 
@@ -193,6 +194,11 @@ class Layer(LinearElastomer):
     def _has_poisson(self) -> Self:
         if self.base == "bonded" and self.poisson is None:
             raise ValueError('base = "bonded" needs poisson, Poisson\'s ratio')
+        if self.base == "bonded" and self.poisson == 0.5:
+            raise ValueError(
+                'poisson = 0.5 is for base = "sliding"; for a bonded layer, which could not be '
+                "compressed as a whole, it must be less than 0.5"
+            )
         return self
 
     def stiffness(self, q: Field, length: float = 1.0) -> Field:
