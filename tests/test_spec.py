@@ -141,6 +141,10 @@ def test_task_ids_do_not_depend_on_the_output(read):
     ("change", "words"),
     [
         (("cutoff", "cutof"), ["surface.cutof", "unknown key", "did you mean 'cutoff'", ":5"]),
+        (("cutoff = 0.05", "h_rms = 1e-6"), ["surface.h_rms", "did you mean 'h_std'"]),
+        (("cutoff = 0.05", "side = 1e-6"), ["surface.side", "did you mean 'length'"]),
+        (("cutoff = 0.05", "height = 1e-6"), ["unknown key 'height' (known: "]),
+        (("points = 64", "points = 64\npoints_x = 9"), ["points_x", "did you mean 'points'"]),
         (
             ("[grid]", "[gird]"),
             ["unknown table 'gird'", "did you mean 'grid'", "[grid] is missing"],

@@ -29,6 +29,11 @@ WORDS = {
     "too_short": "must have {min_length} or more values",
 }
 """What is allowed, by the type of pydantic's error, where its message is not plain."""
+OTHER_NAMES = {
+    **dict.fromkeys(("rms", "h_rms", "rms_height", "sq"), "h_std"),
+    **dict.fromkeys(("side", "size"), "length"),
+}
+"""Keys by other usual names, in small letters."""
 LONG_NUMBER = re.compile(r"\d{20,}|0\.0{15,}\d+")
 """A limit that pydantic prints with all its zeros."""
 MODELS: dict[str, Any] = {
@@ -275,8 +280,17 @@ def _problem(name: str, places: dict[str, int], detail: Any) -> tuple[str, str]:
 
 
 def _unknown(given: str, known: Iterable[str], what: str) -> str:
-    """Message for a name that is not known, with the nearest known one."""
-    matches = get_close_matches(given[:MAX_SHOWN], known, 1, 0.5)
+    """Message for a name that is not known, with the nearest known one.
+
+    Names that contain the given one, or are part of it, come first: `points` for `points_x`.
+    """
+    meant = OTHER_NAMES.get(given.lower(), given[:MAX_SHOWN])
+    related = [
+        name
+        for name in known
+        if min(len(name), len(meant)) > 2 and (name in meant or meant in name)
+    ]
+    matches = get_close_matches(meant, related or known, 1, 0.0 if related else 0.6)
     hint = f" - did you mean {matches[0]!r}?" if matches else ""
     return f"unknown {what} {shortened(given)!r}{hint} (known: {', '.join(known)})"
 
