@@ -185,6 +185,12 @@ def test_task_ids_do_not_depend_on_the_output(read):
         (("[study]", "[study"), [":1: [study: TOML syntax", "Expected ']'"]),
         (("[0.1, 1.0]", "0,1"), [":12: p_star = 0,1: ", "decimal point"]),
         (('"power"', "power"), [":7: kind = power: ", "in quotation marks"]),
+        (("cutoff = 0.05", r'path = "C:\Users\map.npy"'), [r"5: path = ", "in single quotes"]),
+        (("cutoff = 0.05", r'path = "C:\data\map.npy"'), [r"5: path = ", "in single quotes"]),
+        (
+            ("cutoff = 0.05", r'path = "C:\temp\new.npy"'),
+            [r"5: surface.path: no such file 'C:\temp", "in single quotes"],
+        ),
         (("n = 1", "n = 1\nn = 2"), [":9: n = 2: ", "was given before"]),
         (("[grid]", "[surface]"), [":9: [surface]: ", "was given before"]),
         (('"base"', '"../x"'), ["study.name", "only letters, digits"]),

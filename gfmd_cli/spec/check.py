@@ -29,6 +29,11 @@ WORDS = {
     "too_short": "must have {min_length} or more values",
 }
 """What is allowed, by the type of pydantic's error, where its message is not plain."""
+ESCAPED = re.compile(r"[\b\t\n\f\r]")
+"""Characters that a backslash and a letter stand for in TOML, and that are rare in a path."""
+BACKSLASH = (
+    "a backslash begins an escape such as \\n; write paths in single quotes or with forward slashes"
+)
 OTHER_NAMES = {
     **dict.fromkeys(("rms", "h_rms", "rms_height", "sq"), "h_std"),
     **dict.fromkeys(("side", "size"), "length"),
@@ -156,8 +161,12 @@ class Check:
         for indices in product(*(range(len(table[keys[0]])) for keys in axes)):
             places = {key: i for keys, i in zip(axes, indices, strict=True) for key in keys}
             values = table | {key: table[key][i] for key, i in places.items()}
-            if isinstance(values.get("path"), str) and "\0" not in values["path"]:
-                values = values | {"path": os.path.realpath(self.folder / values["path"])}
+            path = values.get("path")
+            if isinstance(path, str) and "\0" not in path:
+                values = values | {"path": os.path.realpath(self.folder / path)}
+                if ESCAPED.search(path) and not os.path.exists(values["path"]):
+                    self.add(f"{name}.path", f"no such file {shortened(repr(path))}: {BACKSLASH}")
+                    continue
             if name in DEFAULT_KINDS:
                 values = {"kind": DEFAULT_KINDS[name]} | values
             try:

@@ -9,7 +9,7 @@ from gfmd_cli.errors import InputError
 from gfmd_cli.files.hdf5 import MAGIC
 from gfmd_cli.files.regular import open_regular
 from gfmd_cli.physics.file_surface import FileSurface
-from gfmd_cli.spec.check import Check, shortened
+from gfmd_cli.spec.check import BACKSLASH, Check, shortened
 from gfmd_cli.spec.models import LOADS, Spec
 
 MAX_BYTES = 256 * 1024  # of a spec; a few kB are usual
@@ -17,6 +17,7 @@ MAX_DEPTH = 16  # of tables and lists
 MAX_DOTS = 2000  # in a line; of a dotted key tomllib takes memory with their square
 SYNTAX = {
     r"^.*(overwrite|twice)": "this key or table was given before; keep one of them",
+    r'^(Unescaped|Invalid hex|Illegal|Unterminated).*\n.*"[^"]*\\': BACKSLASH,
     r"=\s*[+-]?\d+,\d": "write numbers with a decimal point, such as 0.1",
     r"^Invalid value\n.*=[\s\[]*[A-Za-z]": 'write words in quotation marks, such as "auto", '
     "and true and false in small letters",
