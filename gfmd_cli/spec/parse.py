@@ -5,7 +5,7 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from gfmd_cli.errors import InputError
+from gfmd_cli.errors import InputError, typed
 from gfmd_cli.files.hdf5 import MAGIC
 from gfmd_cli.files.regular import open_regular
 from gfmd_cli.physics.file_surface import FileSurface
@@ -43,7 +43,7 @@ def read_spec(path: Path, overrides: tuple[str, ...] = ()) -> tuple[Spec, str]:
     if raw.startswith(MAGIC):
         raise InputError(
             f"{path}: an HDF5 file such as a study, where a run spec (TOML) is expected; "
-            f"`gfmd analyze {path}` shows the results of a study"
+            f"`gfmd analyze {typed(path)}` shows the results of a study"
         )
     if len(raw) > MAX_BYTES:
         raise InputError(f"{path}: too long; a run spec has at most {MAX_BYTES} bytes")
@@ -52,7 +52,7 @@ def read_spec(path: Path, overrides: tuple[str, ...] = ()) -> tuple[Spec, str]:
     except UnicodeDecodeError as error:
         raise InputError(
             f"{path}: not UTF-8 text (byte {error.start}), where a run spec (TOML) is expected; "
-            f"`gfmd init SPEC --from {path}` writes one for a scan"
+            f"`gfmd init SPEC --from {typed(path)}` writes one for a scan"
         ) from error
     data = _toml(text, str(path))
     for override in overrides:
