@@ -35,9 +35,7 @@ def init(spec: Path, scan: Path | None, overrides: tuple[str, ...]) -> None:
     if scan is None:
         text = starter(spec, overrides)
     else:
-        if any(word.startswith("surface.path=") for word in overrides):
-            raise InputError("--set surface.path: --from names the scan; give it there")
-        of_surface = tuple(word for word in overrides if word.startswith("surface."))
+        of_surface = tuple(word for word in overrides if word.startswith(("surface.", "surface=")))
         surface = read_scan(scan, of_surface)
         text, preparation = starter_of_scan(spec, surface, overrides)
         print_text(preparation)

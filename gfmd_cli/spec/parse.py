@@ -85,6 +85,8 @@ def read_scan(path: Path, overrides: tuple[str, ...]) -> FileSurface:
     surface = surfaces[0]
     if not isinstance(surface, FileSurface):
         raise InputError(f'{path}: surface.kind must be "file" for a height map')
+    if surface.path != path.resolve():
+        raise InputError(f"--set surface.path: the command names the scan, {path}; leave it out")
     return surface.model_copy(update={"path": path})  # the path as given, for messages
 
 
