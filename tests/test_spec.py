@@ -179,6 +179,12 @@ def test_task_ids_do_not_depend_on_the_output(read):
         (("[0.1, 1.0]", "{from=1, to=0.1}"), ["load.p_star", "lies below"]),
         (("[0.1, 1.0]", "{from=1, too=2}"), ["load.p_star.too", "did you mean 'to'"]),
         (
+            ("p_star = [0.1, 1.0]", "contact_area = {from=0.1, to=0.5}"),
+            [":12: load.contact_area: must be a number or a list", "got {'from': 0.1, 'to': 0.5}"],
+        ),
+        (("p_star = [0.1, 1.0]", "contact_area = 50"), ["load.contact_area", "less than 1", "50"]),
+        (("n = 1", "n = {a=1}"), ["elastomer.n: must be a valid number, got {'a': 1}"]),
+        (
             ("[0.1, 1.0]", "0.1\npressure = 1"),
             ["load", "give one of p_star, pressure, contact_area, mean_gap"],
         ),

@@ -282,7 +282,8 @@ def _problem(name: str, places: dict[str, int], detail: Any) -> tuple[str, str]:
         given = detail["input"]
         if detail["type"] in WORDS:
             message = WORDS[detail["type"]].format(**detail.get("ctx", {}))
-        text = message if isinstance(given, dict) else f"{message}, got {shortened(repr(given))}"
+        is_table = detail["type"] == "value_error" and isinstance(given, dict)
+        text = message if is_table else f"{message}, got {shortened(repr(given))}"
         if isinstance(given, str) and NUMBER.fullmatch(given):
             text += ": write a number as TOML has it, such as 1.0 or 10, without quotation marks"
     return key, text
