@@ -1,5 +1,6 @@
 """From a file or text in TOML, with the keys of the command line, to a Spec."""
 
+import os
 import re
 import tomllib
 from pathlib import Path
@@ -85,7 +86,7 @@ def read_scan(path: Path, overrides: tuple[str, ...]) -> FileSurface:
     surface = surfaces[0]
     if not isinstance(surface, FileSurface):
         raise InputError(f'{path}: surface.kind must be "file" for a height map')
-    if surface.path != path.resolve():
+    if str(surface.path) != os.path.realpath(path):
         raise InputError(f"--set surface.path: the command names the scan, {path}; leave it out")
     return surface.model_copy(update={"path": path})  # the path as given, for messages
 
