@@ -85,7 +85,7 @@ def solve_at_load(task: Task, context: SolveContext, watcher: Watcher) -> TaskSo
             solved = None  # frees its memory, which is needed now
             solved = attempt(points, pressure)
             search.add(trials[-1])
-        roots.append(search.root)
+        roots.append(search.root if search.succeeded else log(search.nearest.pressure))
         slope = search.slope
     if solved is None or trials[-1] != search.nearest:
         solved = None
@@ -245,9 +245,12 @@ class _Search:
 
     @property
     def root(self) -> float:
-        """Estimate of ln p at the load, from the nearest trial and the slope."""
+        """Estimate of ln p at the load: a secant step from the nearest trial, in the enclosure."""
         x, y, _ = self.points[0]
-        return x - max(-STEP, min(y / self.slope, STEP))
+        x -= max(-STEP, min(y / self.slope, STEP))
+        low, high = self._enclosure()
+        x = x if low is None else max(low.x, x)
+        return x if high is None else min(x, high.x)
 
     @property
     def succeeded(self) -> bool:
