@@ -1,7 +1,15 @@
-"""The errors that end a command, each with its exit status."""
+"""The errors that end a command, each with its exit status; commands in messages."""
+
+import shlex
+from pathlib import Path
 
 INSTALL = 'pip install ".[{}]" in the source folder of gfmd'
 """How to install the packages of an extra."""
+
+
+def typed(path: Path | str) -> str:
+    """A file as a word of a command to type: not an option, although its name may begin with -."""
+    return shlex.quote(f"./{path}" if str(path).startswith("-") else str(path))
 
 
 class GfmdError(Exception):

@@ -106,6 +106,12 @@ def test_an_auto_grid_ends_where_it_may_not_grow(rows_of):
     assert "next to full contact" not in Status.ACCURACY_NOT_REACHED.explain(row)
 
 
+def test_a_limit_below_the_first_auto_grid_is_refused(spec_of):
+    assert plan(spec_of("accuracy.max_points=64"))
+    with pytest.raises(InputError, match=r"max_points: 63 given, but .* 64 points .* 64 or more"):
+        plan(spec_of("accuracy.max_points=63"))
+
+
 def test_a_grid_that_ends_next_to_full_contact_says_why(rows_of):
     (row,) = rows_of("load.p_star=3.1", "accuracy={mean_gap=1e-3, max_points=128}")
     assert row["status"] == Status.ACCURACY_NOT_REACHED

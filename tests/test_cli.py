@@ -40,6 +40,16 @@ def test_run_then_analyze_then_export(gfmd):
     assert float(rows[3]["residual"]) < 1e-6
 
 
+def test_the_next_commands_take_files_whose_names_begin_with_a_hyphen(gfmd):
+    Path("spec.toml").rename("-x.toml")
+    missing = gfmd("status", "./-x.toml", "-o", "-x.h5").output
+    assert missing.endswith("next: gfmd run ./-x.toml -o -x.h5\n")
+    done = gfmd(*missing.split("next: gfmd ")[1].split()).output
+    for command in re.findall(r"gfmd (\w+ \S+)\n", done):
+        assert gfmd(*command.split()).exit_code == 0
+    assert {"-x.h5", "-x.html"} < {path.name for path in Path().iterdir()}
+
+
 def test_a_second_run_says_that_all_is_done(gfmd):
     gfmd("run", "spec.toml")
     again = gfmd("run", "spec.toml")

@@ -1,9 +1,11 @@
 import errno
 import os
 import socket
+from pathlib import Path
 
 import pytest
 
+from gfmd_cli.files.cache import cache_folder
 from gfmd_cli.files.regular import open_regular, read_regular
 
 READ, WRITE = os.O_RDONLY, os.O_RDWR | os.O_CREAT
@@ -55,3 +57,10 @@ def test_no_more_is_read_than_allowed(tmp_path):
     with pytest.raises(OSError, match="larger than 100 bytes") as caught:
         read_regular(tmp_path / "sparse", 100)
     assert caught.value.errno == errno.EFBIG
+
+
+@pytest.mark.parametrize(("given", "folder"), [("/c", "/c/gfmd"), ("c", "/home/me/.cache/gfmd")])
+def test_a_relative_cache_folder_is_ignored(monkeypatch, given, folder):
+    monkeypatch.setenv("HOME", "/home/me")
+    monkeypatch.setenv("XDG_CACHE_HOME", given)
+    assert cache_folder() == Path(folder)

@@ -75,6 +75,16 @@ def test_a_table_of_stiffness_that_begins_above_the_longest_waves(tmp_path):
     assert re.search(r"[5-9]\d% of the squared height is at other wavenumbers", warning)
 
 
+@pytest.mark.parametrize(("exponent", "warned"), [(-1.0, True), (0.0, False), (1.0, False)])
+def test_a_table_of_stiffness_that_falls(tmp_path, exponent, warned):
+    q = np.logspace(5, 9, 400)
+    np.savetxt(tmp_path / "k.txt", np.column_stack([q, q**exponent]), fmt="%.3g")
+    elastomer = {"kind": "table", "path": str(tmp_path / "k.txt")}
+    warnings = solve(tables(elastomer=elastomer)).warnings
+    assert any("k(q) falls with q" in each for each in warnings) is warned
+    assert len(warnings) == warned
+
+
 @pytest.mark.parametrize(("thickness", "warned"), [(1e-7, False), (1e-6, True)])
 def test_waves_that_are_short_for_a_plate(thickness, warned):
     """The shortest wavelength is 1.25 um, 2 pi t is 0.6 and 6 um."""
@@ -125,6 +135,15 @@ def test_a_modulus_in_pascals_on_a_surface_metres_rough(elastomer):
     assert "are heights and lengths in metres?" in only_warning(tables(metres, elastomer))
     reduced = tables(metres, {"kind": "half-space"})
     assert solve(reduced).warnings == ()
+
+
+@pytest.mark.parametrize(("E_star", "warned"), [(1e2, False), (1.2e12, False), (7e16, True)])
+def test_a_modulus_that_no_material_has(E_star, warned):
+    warnings = solve(tables(elastomer={"kind": "half-space", "E_star": E_star})).warnings
+    assert any("the modulus of diamond" in each for each in warnings) is warned
+    reduced = {key: SURFACE[key] for key in ("kind", "cutoff")}
+    (other,) = solve(tables(reduced, {"kind": "half-space", "E_star": 7e16})).warnings
+    assert "are heights and lengths in metres?" in other
 
 
 def test_a_random_surface_in_metres_without_a_side():

@@ -21,6 +21,7 @@ SMALL = {
     "hard_cases.py": "--points 32 --only cliff --seconds 1",
     "indenter_bars.py": "--points 64 --line-reference 256 --round-reference 128 --exponents 1 "
     "--pressures 1",
+    "load_searches.py": "--points 64 --seeds 10",
     "neighbour_start.py": "--points 512 --p-star 0.001 0.0011",
     "plain_processor.py": "",
     "plate_areas.py": "none.jsonl --no-run",

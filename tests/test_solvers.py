@@ -306,6 +306,24 @@ def test_a_start_that_is_good_enough_touches_where_it_is_pressed(p_bar, toleranc
     )
 
 
+@pytest.mark.parametrize("surface", [ROUGH, Wave()])
+def test_pressed_points_are_laid_on_the_indenter_and_the_stress_follows(surface):
+    contact = scene(surface, HalfSpace(), POINTS).contact(0.05)
+    solution = solve_contact(contact, Auto(tolerance=1e-8))
+    u, touching, tolerance = solution.u, solution.sigma > 0.01, 1e-3
+    lifted = touching & (np.random.default_rng(0).random(u.shape) < 0.3)
+    u[lifted] += 0.1 * tolerance * contact.pressure
+    sigma = contact.stress(u, out=contact.grid.empty())
+    residual = contact.residual(u, sigma)
+    assert 0 < residual < tolerance
+    rounding = contact.lay_pressed(u, sigma, tolerance)
+    assert np.array_equal(u[lifted], contact.height[lifted])
+    error = sigma - contact.stress(u, out=contact.grid.empty())
+    allowed = 5 * np.hypot(rounding, contact.rounding(u))
+    assert 0 < contact.as_residual(np.sum(error**2)) < allowed < 0.1 * residual
+    assert contact.lay_pressed(u, sigma, tolerance) == 0
+
+
 @pytest.mark.parametrize("points", [64, 250, 1024])
 @pytest.mark.parametrize("p", [0.1, 1.0, 10.0])
 def test_the_string_lies_on_its_parabola(p, points):

@@ -141,6 +141,10 @@ def test_task_ids_do_not_depend_on_the_output(read):
     ("change", "words"),
     [
         (("cutoff", "cutof"), ["surface.cutof", "unknown key", "did you mean 'cutoff'", ":5"]),
+        (("cutoff = 0.05", "h_rms = 1e-6"), ["surface.h_rms", "did you mean 'h_std'"]),
+        (("cutoff = 0.05", "side = 1e-6"), ["surface.side", "did you mean 'length'"]),
+        (("cutoff = 0.05", "height = 1e-6"), ["unknown key 'height' (known: "]),
+        (("points = 64", "points = 64\npoints_x = 9"), ["points_x", "did you mean 'points'"]),
         (
             ("[grid]", "[gird]"),
             ["unknown table 'gird'", "did you mean 'grid'", "[grid] is missing"],
@@ -175,12 +179,24 @@ def test_task_ids_do_not_depend_on_the_output(read):
         (("[0.1, 1.0]", "{from=1, to=0.1}"), ["load.p_star", "lies below"]),
         (("[0.1, 1.0]", "{from=1, too=2}"), ["load.p_star.too", "did you mean 'to'"]),
         (
+            ("p_star = [0.1, 1.0]", "contact_area = {from=0.1, to=0.5}"),
+            [":12: load.contact_area: must be a number or a list", "got {'from': 0.1, 'to': 0.5}"],
+        ),
+        (("p_star = [0.1, 1.0]", "contact_area = 50"), ["load.contact_area", "less than 1", "50"]),
+        (("n = 1", "n = {a=1}"), ["elastomer.n: must be a valid number, got {'a': 1}"]),
+        (
             ("[0.1, 1.0]", "0.1\npressure = 1"),
             ["load", "give one of p_star, pressure, contact_area, mean_gap"],
         ),
         (("[study]", "[study"), [":1: [study: TOML syntax", "Expected ']'"]),
         (("[0.1, 1.0]", "0,1"), [":12: p_star = 0,1: ", "decimal point"]),
         (('"power"', "power"), [":7: kind = power: ", "in quotation marks"]),
+        (("cutoff = 0.05", r'path = "C:\Users\map.npy"'), [r"5: path = ", "in single quotes"]),
+        (("cutoff = 0.05", r'path = "C:\data\map.npy"'), [r"5: path = ", "in single quotes"]),
+        (
+            ("cutoff = 0.05", r'path = "C:\temp\new.npy"'),
+            [r"5: surface.path: no such file 'C:\temp", "in single quotes"],
+        ),
         (("n = 1", "n = 1\nn = 2"), [":9: n = 2: ", "was given before"]),
         (("[grid]", "[surface]"), [":9: [surface]: ", "was given before"]),
         (('"base"', '"../x"'), ["study.name", "only letters, digits"]),

@@ -270,11 +270,15 @@ def test_a_scan_in_nanometres_that_does_not_repeat_gives_warnings_and_is_mended(
         ("surface.scael=1", "unknown key 'scael' - did you mean 'scale'"),
         ("surface.scale=[1,2]", "with one value"),
         ("grid.points=64", "takes only keys of the table surface"),
+        ("surface.path=other.npy", "surface.path: the command names the scan, h.npy"),
+        ("surface={kind='file', path='other.npy'}", "the command names the scan, h.npy"),
     ],
 )
 def test_a_wrong_word_on_a_scan_is_refused(gfmd, tmp_path, pair, message):
     np.save(tmp_path / "h.npy", np.random.default_rng(0).normal(size=(16, 16)))
     assert message in gfmd("surface", "h.npy", "--set", pair, status=2)
+    if pair.startswith("surface"):
+        assert message in gfmd("init", "--from", "h.npy", "--set", pair, status=2)
 
 
 def test_an_exponent_that_is_no_roughness_is_said_to_be_changed(gfmd, tmp_path):

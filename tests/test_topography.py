@@ -274,6 +274,30 @@ def test_a_mark_of_another_precision_is_found(hdf5, heights, mark):
     assert list(zip(*np.nonzero(read.missing), strict=True)) == [(1, 2)]
 
 
+@pytest.mark.parametrize(
+    ("attributes", "missing"),
+    [
+        ({"valid_min": -1.0}, [(1, 2)]),
+        ({"valid_max": [2.0]}, [(3, 0)]),
+        ({"valid_range": [-1.0, 2.0]}, [(1, 2), (3, 0)]),
+        ({"valid_min": -1.0, "valid_max": np.float64(0.1)}, [(1, 2), (3, 0)]),
+    ],
+)
+def test_heights_out_of_the_valid_range_of_netcdf_are_missing(hdf5, attributes, missing):
+    heights = np.full((5, 4), 0.1, np.float32)  # which is more than 0.1 in double precision
+    heights[1, 2], heights[3, 0] = -99, 99
+    read = read_topography(hdf5(lambda file: file["h"].attrs.update(attributes), h=heights))
+    assert list(zip(*np.nonzero(read.missing), strict=True)) == missing
+
+
+def test_a_valid_range_that_is_no_range_is_refused(hdf5, heights):
+    def write_range(file):
+        file["h"].attrs["valid_range"] = 1.0
+
+    with pytest.raises(InputError, match=r"valid_range must be 2 numbers, got \[1.0\]"):
+        read_topography(hdf5(write_range, h=heights))
+
+
 def test_packed_netcdf_heights_are_refused(hdf5, heights):
     def pack(file):
         file["h"].attrs["scale_factor"] = 0.5

@@ -1,14 +1,13 @@
 """`gfmd init` and `gfmd surface`: from a scan to a spec."""
 
 import json
-import shlex
 from pathlib import Path
 
 import click
 
 from gfmd_cli.cli.messages import print_error, print_text
 from gfmd_cli.cli.options import FILE, Command, overrides_option
-from gfmd_cli.errors import InputError
+from gfmd_cli.errors import InputError, typed
 
 
 @click.command(cls=Command)
@@ -36,16 +35,14 @@ def init(spec: Path, scan: Path | None, overrides: tuple[str, ...]) -> None:
     if scan is None:
         text = starter(spec, overrides)
     else:
-        if any(word.startswith("surface.path=") for word in overrides):
-            raise InputError("--set surface.path: --from names the scan; give it there")
-        of_surface = tuple(word for word in overrides if word.startswith("surface."))
+        of_surface = tuple(word for word in overrides if word.startswith(("surface.", "surface=")))
         surface = read_scan(scan, of_surface)
         text, preparation = starter_of_scan(spec, surface, overrides)
         print_text(preparation)
         for warning in surface.warnings():
             print_error(f"gfmd: {scan}: {warning}")
     write_whole(spec, text.encode())
-    print_text(f"{spec}: written\nnext: {shlex.join(['gfmd', 'run', str(spec)])}")
+    print_text(f"{spec}: written\nnext: gfmd run {typed(spec)}")
 
 
 @click.command(cls=Command)

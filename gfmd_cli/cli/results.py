@@ -2,7 +2,6 @@
 
 import json
 import os
-import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,7 +9,7 @@ import click
 
 from gfmd_cli.cli.messages import print_error, print_text
 from gfmd_cli.cli.options import FILE, Command, Number
-from gfmd_cli.errors import InputError
+from gfmd_cli.errors import InputError, typed
 
 if TYPE_CHECKING:
     from gfmd_cli.analysis.compare import Theory
@@ -49,7 +48,7 @@ def analyze(study: Path, as_json: bool, figures: Path | None, theory: "Theory") 
         if comparison.missing:
             print_text(
                 f"\n{count(comparison.missing, 'task')} not solved yet, or failed; `gfmd status "
-                f"{shlex.quote(str(study))}` prints the errors."
+                f"{typed(study)}` prints the errors."
             )
     if figures is not None:
         from gfmd_cli.analysis.figures import draw_all

@@ -1,6 +1,5 @@
 """`gfmd run`."""
 
-import shlex
 import sys
 from collections import Counter
 from collections.abc import Mapping
@@ -20,7 +19,7 @@ from gfmd_cli.cli.options import (
     study_path,
 )
 from gfmd_cli.cli.progress import Reporter
-from gfmd_cli.errors import InputError
+from gfmd_cli.errors import InputError, typed
 from gfmd_cli.status import Status
 from gfmd_cli.units import count
 
@@ -172,8 +171,7 @@ def _print_results(
     for line in other_tasks([row for row in stored if row["task_id"] not in ids]):
         print_text(f"  {line}")
     if any(row["status"].is_solved for row in stored):
-        quoted = shlex.quote(str(path))
-        print_text(f"next: gfmd analyze {quoted}\n      gfmd report {quoted}")
+        print_text(f"next: gfmd analyze {typed(path)}\n      gfmd report {typed(path)}")
 
 
 def _print_tasks(spec: "Spec", path: Path, options: "RunOptions") -> None:

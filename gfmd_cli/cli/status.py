@@ -20,7 +20,7 @@ from gfmd_cli.cli.options import (
     repeated,
     study_path,
 )
-from gfmd_cli.errors import InputError
+from gfmd_cli.errors import InputError, typed
 from gfmd_cli.status import Status
 from gfmd_cli.units import count, duration
 
@@ -56,7 +56,7 @@ def status(
     else:
         resolved, _ = read_spec(path, overrides)
         progress = progress_of_spec(resolved, study_path(resolved, output))
-        spec = str(path)
+        spec = typed(path)
     if shards is not None:
         check_shards(shards, len(progress.tasks))
     next_command = _next_command(progress, spec, output if spec != "SPEC" else path, overrides)
@@ -92,7 +92,7 @@ def collect(spec: Path, output: Path | None, overrides: tuple[str, ...]) -> None
         for note in damaged:
             print_error(f"gfmd: {note}")
     progress = progress_of_spec(resolved, study.path)
-    next_command = _next_command(progress, str(spec), output, overrides)
+    next_command = _next_command(progress, typed(spec), output, overrides)
     print_text("\n".join([*_lines(progress, None), f"next: {next_command}"]))
     sys.exit(0 if progress.converged else 1)
 
@@ -123,18 +123,17 @@ def _lines(progress: "StudyProgress", shards: int | None) -> list[str]:
 def _next_command(
     progress: "StudyProgress", spec: str, output: Path | None, overrides: tuple[str, ...]
 ) -> str:
-    """The command to run next."""
+    """The command to run next; `spec` as a word of it."""
     from gfmd_cli.study.slurm import SUFFIX
 
-    words = [spec, *repeated(output, overrides)]
+    words = " ".join([spec, *map(shlex.quote, repeated(output, overrides))])
     if not progress.missing:
         if progress.records:
-            return shlex.join(["gfmd", "collect", *words])
-        return shlex.join(["gfmd", "analyze", str(progress.study)])
+            return f"gfmd collect {words}"
+        return f"gfmd analyze {typed(progress.study)}"
     if progress.study.with_suffix(SUFFIX).exists():
-        again = shlex.join(["gfmd", "submit", *words, "--missing"])
-        return f"{again}    # when its jobs have left the queue"
-    return shlex.join(["gfmd", "run", *words])
+        return f"gfmd submit {words} --missing    # when its jobs have left the queue"
+    return f"gfmd run {words}"
 
 
 def _saved(task: int, saved: "SavedProgress") -> dict[str, Any]:

@@ -16,7 +16,7 @@ from gfmd_cli.cli.options import (
     repeated,
     study_path,
 )
-from gfmd_cli.errors import GfmdError, InputError
+from gfmd_cli.errors import GfmdError, InputError, typed
 from gfmd_cli.units import count
 
 if TYPE_CHECKING:
@@ -95,7 +95,7 @@ def submit(
         },
         sbatch_options=sbatch_options,
     )
-    words = shlex.join([str(spec), *repeated(output, overrides)])
+    words = " ".join([typed(spec), *map(shlex.quote, repeated(output, overrides))])
     if not job.members:
         print_text(f"{study}: nothing is missing\nnext: gfmd collect {words}")
     elif dry_run:

@@ -8,8 +8,11 @@ from pathlib import Path
 
 
 def cache_folder() -> Path:
-    """The user's cache for this program; without a home directory, a temporary folder."""
-    if home := os.environ.get("XDG_CACHE_HOME"):
+    """The user's cache for this program; without a home directory, a temporary folder.
+
+    A relative path in XDG_CACHE_HOME is ignored, as the XDG base directory specification requires.
+    """
+    if os.path.isabs(home := os.environ.get("XDG_CACHE_HOME", "")):
         return Path(home) / "gfmd"
     try:
         return Path.home() / ".cache" / "gfmd"

@@ -416,7 +416,5 @@ class Grid:
 
     def field_of_work(self, size: int) -> Field:
         """The field of the coefficients in `work` of a grid of so many points; `work` is lost."""
-        field = self.empty()
-        self.backward_into(field)
-        field *= 1.0 / size
-        return field
+        self.transform_back()
+        return np.multiply(self.padded[..., : self.points], 1.0 / size, out=self.empty())

@@ -16,11 +16,17 @@ import numpy as np
 from gfmd_cli.errors import InputError
 from gfmd_cli.files.checksums import MAX_COMPRESSION
 from gfmd_cli.maps.array_coordinates import axes_of, factor, is_transposed, stated_unit
-from gfmd_cli.units import left_out
+from gfmd_cli.units import count, left_out
 
 MAX_MAP_BYTES = 2**33  # 32768 x 32768 heights in double precision
 MAX_HEIGHT = 1e30  # in any unit; the usual values for no data are 9.97e36 (netCDF) and 3.4e38
 HEIGHT_NAMES = "h", "height", "heights", "height_map", "z", "topography", "topo", "elevation"
+LIMITS: dict[str, list[np.ufunc]] = {
+    "valid_min": [np.less],
+    "valid_max": [np.greater],
+    "valid_range": [np.less, np.greater],
+}
+"""What lies beyond each limit of an attribute of netCDF."""
 MAX_LISTED = 20  # names in a message
 SMALLEST_MAP = 2  # points per side; fewer have no roughness
 REMEDY = "Heights that other programs read can be saved by numpy.save as a .npy file."
@@ -122,12 +128,34 @@ def read_hdf5(path: Path, dataset: str | None) -> HeightMap:
             if missing.dtype.kind == values.dtype.kind == "f":  # perhaps of another precision
                 missing = missing.astype(values.dtype)
             values = np.ma.masked_where(np.isin(values, missing), values)
+        values = _valid(path, name, data.attrs, values)
         bare = HeightMap(values, source=f"HDF5, {name}, {data.dtype}")
         height_map = _with_coordinates(path, file, data, bare)
         if "spec_text" in file.attrs and name.startswith("fields/"):  # a study
             boundary = take(file, "boundary")[int(name.split("/")[1])]
             return replace(height_map, periodic=boundary != b"free")
         return height_map
+
+
+def _valid(path: Path, name: str, attributes: Any, values: Any) -> Any:
+    """Heights, masked beyond the limits that the netCDF conventions name.
+
+    Raises InputError for limits that are not numbers.
+    """
+    for key, beyond in LIMITS.items():
+        if key not in attributes:
+            continue
+        limits = np.ravel(attributes[key])
+        if limits.dtype.kind not in "iuf" or len(limits) != len(beyond):
+            raise InputError(
+                f"{path}: dataset {name!r}: {key} must be {count(len(beyond), 'number')}, got "
+                f"{limits[:3].tolist()}"
+            )
+        if limits.dtype.kind == values.dtype.kind == "f":  # perhaps of another precision
+            limits = limits.astype(values.dtype)
+        for is_beyond, limit in zip(beyond, limits, strict=True):
+            values = np.ma.masked_where(is_beyond(values, limit), values)
+    return values
 
 
 def _map_shape(shape: tuple[int, ...]) -> tuple[int, ...]:

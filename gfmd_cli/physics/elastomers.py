@@ -37,6 +37,9 @@ NEARLY_INCOMPRESSIBLE = 0.48
 """Poisson's ratio of a bonded layer above which a load with a free boundary is wrong by 3 % or more
 if pixels are wider than the layer is thick; measured, see docs/accuracy.md."""
 MAX_EXTRAPOLATED = 0.1  # fraction of squared stress or height beyond a table; a choice
+MAX_FALLING = 0.5  # fraction of squared stress at waves where the k(q) of a table falls; a choice
+FALLING_EXPONENT = -0.05  # of k(q), over an octave, so that rounded numbers do not count; a choice
+OCTAVE = np.log(2)
 ROUNDED_EXPONENT = 1e-3  # of the first rows of a table, whose numbers may be rounded; a choice
 
 
@@ -184,8 +187,9 @@ class Layer(LinearElastomer):
     """Thickness [m]."""
     E_star: Positive = 1.0
     """Contact modulus E / (1 - nu^2) [Pa]."""
-    poisson: Annotated[float, Key(gt=-1, lt=0.5)] | None = None
-    """Poisson's ratio, required for a bonded layer. A sliding layer depends on E_star alone."""
+    poisson: Annotated[float, Key(gt=-1, le=0.5)] | None = None
+    """Poisson's ratio, required for a bonded layer and less than 0.5 there. A sliding layer depends
+    on E_star alone."""
     base: Literal["bonded", "sliding"] = "bonded"
     """Whether the layer is bonded to the rigid base or slides on it without friction."""
 
@@ -193,6 +197,11 @@ class Layer(LinearElastomer):
     def _has_poisson(self) -> Self:
         if self.base == "bonded" and self.poisson is None:
             raise ValueError('base = "bonded" needs poisson, Poisson\'s ratio')
+        if self.base == "bonded" and self.poisson == 0.5:
+            raise ValueError(
+                'poisson = 0.5 is for base = "sliding"; for a bonded layer, which could not be '
+                "compressed as a whole, it must be less than 0.5"
+            )
         return self
 
     def stiffness(self, q: Field, length: float = 1.0) -> Field:
@@ -268,13 +277,21 @@ class Tabulated(LinearElastomer):
         of_stress = _fraction(variance, beyond), "squared stress in full contact"
         of_height = _fraction(variance / self.stiffness(q) ** 2, beyond), "squared height"
         fraction, what = max(of_stress, of_height)
-        if fraction <= MAX_EXTRAPOLATED:
-            return []
-        return [
-            f"{self.path.name}: k(q) is given for q = {first:.3g} to {last:.3g} 1/m, but "
-            f"{fraction:.0%} of the {what} is at other wavenumbers (the "
-            f"surface has {q.min():.3g} to {q.max():.3g} 1/m), where k is extrapolated"
-        ]
+        warnings = []
+        if fraction > MAX_EXTRAPOLATED:
+            warnings.append(
+                f"{self.path.name}: k(q) is given for q = {first:.3g} to {last:.3g} 1/m, but "
+                f"{fraction:.0%} of the {what} is at other wavenumbers (the "
+                f"surface has {q.min():.3g} to {q.max():.3g} 1/m), where k is extrapolated"
+            )
+        falling = _fraction(variance, self.local_exponent(q, step=OCTAVE / 2) < FALLING_EXPONENT)
+        if falling > MAX_FALLING:
+            warnings.append(
+                f"{self.path.name}: k(q) falls with q at the wavenumbers of {falling:.0%} of the "
+                "squared stress in full contact, but Persson theory assumes that it rises, or is "
+                "constant; is the second column a compliance, 1/k?"
+            )
+        return warnings
 
     def decays(self, dimension: int) -> bool:
         """Whether the power law below the table rises less than q^dimension."""

@@ -12,3 +12,22 @@ def squared_violations(h, u, sigma, out, a, b):
             worst = min(u[i, j] - h[i, j], sigma[i, j])
             violation += worst * worst
         out[i, 0] = violation
+
+
+@kernel
+def lay_pressed(h, u, sigma, change, stiffness, error, out, a, b):
+    """Write the change of u that lays pressed points on the indenter; see `Contact.lay_pressed`.
+
+    Returns, by rows, the number of these points with a gap below the error, and the sum of the
+    squares of the change.
+    """
+    for i in range(a, b):
+        count, square = 0, 0.0
+        for j in range(h.shape[1]):
+            gap = u[i, j] - h[i, j]
+            pressed = sigma[i, j] > max(stiffness * gap, error)
+            move = gap if pressed else 0.0
+            count += 0.0 < move < error
+            square += move * move
+            change[i, j] = -move
+        out[i, 0], out[i, 1] = count, square

@@ -22,7 +22,6 @@ from gfmd_cli.solvers.tile_operators import FreeOperators, PeriodicOperators
 from gfmd_cli.solvers.tiles import SIDE, Tiles
 
 SMALLEST_EXPONENT = 0.2  # of k(q) for which there are tiles; measured from 0.25 on
-CONTACT_MARGIN = 2  # points by which the contact may grow from a grid to the next; a choice
 COARSE_TOLERANCE = 0.03  # on grids before the finest; measured: 0.01 to 0.1 differ by 5 %
 MAX_JACOBI_STEPS = 6  # after C s is laid on the indenter; with 8 the prediction is worse
 MAX_JACOBI_REDUCTION = 4.0  # of the residual by these steps; measured: 3 to 5
@@ -52,11 +51,13 @@ def start_from(
     highest, decrease, lowest = solve_on_tiles.max_fraction
     for contact in finer:
         tiles = _tiles_in_reach(pressure > 0, is_periodic=contact.is_periodic)
+        fraction = max(highest - decrease * contact.exponents[1], lowest)
+        if tiles.count > fraction * tiles.used.size:
+            return None
         s = _refined(pressure, tiles)
         if contact.may_touch is not None:
             s *= tiles.take(contact.may_touch)
-        fraction = max(highest - decrease * contact.exponents[1], lowest)
-        if tiles.count > fraction * tiles.used.size or not s.any():
+        if not s.any():
             return None
         solve = solve_on_tiles(contact, tiles, s, pause)
         del pressure, s  # their memory is needed now
@@ -84,16 +85,18 @@ def tiles_apply(contact: Contact) -> bool:
 
 
 def _tiles_in_reach(touching: Mask, *, is_periodic: bool) -> Tiles:
-    """The tiles of a grid of twice the points that contact on a grid can reach."""
-    down, right = (2 * points // SIDE for points in touching.shape)
-    used = np.zeros((down, right), dtype=np.bool_)
-    i, j = np.nonzero(touching)
-    for y in (2 * i - CONTACT_MARGIN, 2 * i + 1 + CONTACT_MARGIN):
-        for x in (2 * j - CONTACT_MARGIN, 2 * j + 1 + CONTACT_MARGIN):
-            if is_periodic:
-                used[y // SIDE % down, x // SIDE % right] = True
-            else:
-                used[np.clip(y // SIDE, 0, down - 1), np.clip(x // SIDE, 0, right - 1)] = True
+    """The tiles of a grid of twice the points that contact on a grid can reach.
+
+    It may grow by a point of its own grid, a choice.
+    """
+    side, used = SIDE // 2, touching
+    for _ in range(2):  # along y, then along x
+        before, after = used[side - 1 :: side], used[::side]  # the points next to the next blocks
+        inside = used.reshape(-1, side, used.shape[1]).any(axis=1)
+        before, after = np.roll(before, 1, axis=0), np.roll(after, -1, axis=0)
+        if not is_periodic:
+            before[0] = after[-1] = False
+        used = (inside | before | after).T
     return Tiles(used, is_periodic=is_periodic)
 
 
@@ -136,7 +139,7 @@ class PeriodicSolve(LocalSolve):
         K C s is s without its mean, so that the stress is s + K (u - C s).
         """
         result, displacement = self.solve(tolerance)
-        contact, tiles, moves = self.contact, self.tiles, self.grid.in_single()
+        contact, tiles, moves = self.contact, self.tiles, self.contact.grid_of_moves
         u = self.grid.empty()  # only now: the solves on tiles need memory, too
         laid, before = self.obstacle + result.gap, tiles.take(displacement) - result.level
         if contact.may_touch is not None:

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from functools import partial
-from math import prod
+from math import hypot, prod
 
 import numpy as np
 
@@ -97,10 +97,14 @@ def solve_contact(
                     grids.pop()
     assert state is not None
     for _ in range(MAX_CORRECTIONS if contact.is_periodic else 0):
-        good_start = status.is_converged and state.step == 0  # no step has laid points yet
-        if not good_start or not contact.lay_pressed(state.u, state.sigma, state.residual):
+        if not status.is_converged or state.step > 0:  # a step has laid points already
             break
-        state = solver.begin(contact, state.u)
+        rounding = contact.lay_pressed(state.u, state.sigma, state.residual)
+        if rounding == 0:
+            break
+        transforms += contact.grid_of_moves.pair_count
+        rounding = hypot(state.rounding, rounding)
+        state = solver.begin_from(Start(contact, transforms, state.u, state.sigma, rounding))
         state.coarser_transforms = transforms
         status = solve(contact, solver, state, watch)
         transforms += state.transforms

@@ -147,8 +147,7 @@ class _Run:
         self.contact, self.state = contact, state
         self.grid = grid = contact.grid
         self.rows = grid.rows
-        # Transforms of lines cost nothing, and a line contact at n = 4 needs the digits.
-        self.moves = grid.in_single() if grid.dimension == 2 else grid
+        self.moves = contact.grid_of_moves
         self.noise = contact.noise(self.moves.real)
         fields = (
             contact.obstacle,

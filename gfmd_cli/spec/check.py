@@ -29,6 +29,16 @@ WORDS = {
     "too_short": "must have {min_length} or more values",
 }
 """What is allowed, by the type of pydantic's error, where its message is not plain."""
+ESCAPED = re.compile(r"[\b\t\n\f\r]")
+"""Characters that a backslash and a letter stand for in TOML, and that are rare in a path."""
+BACKSLASH = (
+    "a backslash begins an escape such as \\n; write paths in single quotes or with forward slashes"
+)
+OTHER_NAMES = {
+    **dict.fromkeys(("rms", "h_rms", "rms_height", "sq"), "h_std"),
+    **dict.fromkeys(("side", "size"), "length"),
+}
+"""Keys by other usual names, in small letters."""
 LONG_NUMBER = re.compile(r"\d{20,}|0\.0{15,}\d+")
 """A limit that pydantic prints with all its zeros."""
 MODELS: dict[str, Any] = {
@@ -151,8 +161,12 @@ class Check:
         for indices in product(*(range(len(table[keys[0]])) for keys in axes)):
             places = {key: i for keys, i in zip(axes, indices, strict=True) for key in keys}
             values = table | {key: table[key][i] for key, i in places.items()}
-            if isinstance(values.get("path"), str) and "\0" not in values["path"]:
-                values = values | {"path": os.path.realpath(self.folder / values["path"])}
+            path = values.get("path")
+            if isinstance(path, str) and "\0" not in path:
+                values = values | {"path": os.path.realpath(self.folder / path)}
+                if ESCAPED.search(path) and not os.path.exists(values["path"]):
+                    self.add(f"{name}.path", f"no such file {shortened(repr(path))}: {BACKSLASH}")
+                    continue
             if name in DEFAULT_KINDS:
                 values = {"kind": DEFAULT_KINDS[name]} | values
             try:
@@ -268,15 +282,25 @@ def _problem(name: str, places: dict[str, int], detail: Any) -> tuple[str, str]:
         given = detail["input"]
         if detail["type"] in WORDS:
             message = WORDS[detail["type"]].format(**detail.get("ctx", {}))
-        text = message if isinstance(given, dict) else f"{message}, got {shortened(repr(given))}"
+        is_table = detail["type"] == "value_error" and isinstance(given, dict)
+        text = message if is_table else f"{message}, got {shortened(repr(given))}"
         if isinstance(given, str) and NUMBER.fullmatch(given):
             text += ": write a number as TOML has it, such as 1.0 or 10, without quotation marks"
     return key, text
 
 
 def _unknown(given: str, known: Iterable[str], what: str) -> str:
-    """Message for a name that is not known, with the nearest known one."""
-    matches = get_close_matches(given[:MAX_SHOWN], known, 1, 0.5)
+    """Message for a name that is not known, with the nearest known one.
+
+    Names that contain the given one, or are part of it, come first: `points` for `points_x`.
+    """
+    meant = OTHER_NAMES.get(given.lower(), given[:MAX_SHOWN])
+    related = [
+        name
+        for name in known
+        if min(len(name), len(meant)) > 2 and (name in meant or meant in name)
+    ]
+    matches = get_close_matches(meant, related or known, 1, 0.0 if related else 0.6)
     hint = f" - did you mean {matches[0]!r}?" if matches else ""
     return f"unknown {what} {shortened(given)!r}{hint} (known: {', '.join(known)})"
 

@@ -154,7 +154,14 @@ OneOrMany = (
 )
 Share = Annotated[float, Key(gt=0, lt=1)]
 Pressures = Annotated[OneOrMany[Positive] | Annotated[Ladder, Tag("ladder")], Discriminator(_shape)]
-Areas = Annotated[OneOrMany[Share], Discriminator(_shape)]
+Areas = Annotated[
+    OneOrMany[Share],
+    Discriminator(
+        _shape,
+        custom_error_type="areas",
+        custom_error_message="must be a number or a list of numbers, not a geometric sequence",
+    ),
+]
 SHAPES = ("number", "list", "ladder", "count", "word")
 """Tags of the unions above, which no message should name."""
 

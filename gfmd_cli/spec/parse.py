@@ -1,15 +1,16 @@
 """From a file or text in TOML, with the keys of the command line, to a Spec."""
 
+import os
 import re
 import tomllib
 from pathlib import Path
 from typing import Any
 
-from gfmd_cli.errors import InputError
+from gfmd_cli.errors import InputError, typed
 from gfmd_cli.files.hdf5 import MAGIC
 from gfmd_cli.files.regular import open_regular
 from gfmd_cli.physics.file_surface import FileSurface
-from gfmd_cli.spec.check import Check, shortened
+from gfmd_cli.spec.check import BACKSLASH, Check, shortened
 from gfmd_cli.spec.models import LOADS, Spec
 
 MAX_BYTES = 256 * 1024  # of a spec; a few kB are usual
@@ -17,6 +18,7 @@ MAX_DEPTH = 16  # of tables and lists
 MAX_DOTS = 2000  # in a line; of a dotted key tomllib takes memory with their square
 SYNTAX = {
     r"^.*(overwrite|twice)": "this key or table was given before; keep one of them",
+    r'^(Unescaped|Invalid hex|Illegal|Unterminated).*\n.*"[^"]*\\': BACKSLASH,
     r"=\s*[+-]?\d+,\d": "write numbers with a decimal point, such as 0.1",
     r"^Invalid value\n.*=[\s\[]*[A-Za-z]": 'write words in quotation marks, such as "auto", '
     "and true and false in small letters",
@@ -42,7 +44,7 @@ def read_spec(path: Path, overrides: tuple[str, ...] = ()) -> tuple[Spec, str]:
     if raw.startswith(MAGIC):
         raise InputError(
             f"{path}: an HDF5 file such as a study, where a run spec (TOML) is expected; "
-            f"`gfmd analyze {path}` shows the results of a study"
+            f"`gfmd analyze {typed(path)}` shows the results of a study"
         )
     if len(raw) > MAX_BYTES:
         raise InputError(f"{path}: too long; a run spec has at most {MAX_BYTES} bytes")
@@ -51,7 +53,7 @@ def read_spec(path: Path, overrides: tuple[str, ...] = ()) -> tuple[Spec, str]:
     except UnicodeDecodeError as error:
         raise InputError(
             f"{path}: not UTF-8 text (byte {error.start}), where a run spec (TOML) is expected; "
-            f"`gfmd init SPEC --from {path}` writes one for a scan"
+            f"`gfmd init SPEC --from {typed(path)}` writes one for a scan"
         ) from error
     data = _toml(text, str(path))
     for override in overrides:
@@ -84,6 +86,8 @@ def read_scan(path: Path, overrides: tuple[str, ...]) -> FileSurface:
     surface = surfaces[0]
     if not isinstance(surface, FileSurface):
         raise InputError(f'{path}: surface.kind must be "file" for a height map')
+    if str(surface.path) != os.path.realpath(path):
+        raise InputError(f"--set surface.path: the command names the scan, {path}; leave it out")
     return surface.model_copy(update={"path": path})  # the path as given, for messages
 
 

@@ -2,7 +2,6 @@
 
 import json
 import re
-import shlex
 import tomllib
 from math import log10
 from os.path import relpath
@@ -11,7 +10,7 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from gfmd_cli.errors import InputError
+from gfmd_cli.errors import InputError, typed
 from gfmd_cli.physics.contact import build_scene
 from gfmd_cli.physics.file_surface import FileSurface
 from gfmd_cli.spec.check import Check, kinds_of
@@ -94,7 +93,7 @@ def _render(template: str, file: str, **values: Any) -> str:
     environment.globals["key"] = _line
     name = re.sub(r"[^a-zA-Z0-9._-]+", "-", Path(file).stem).strip("-._")[:100]
     return environment.get_template(template).render(
-        file=shlex.quote(file), name=name or "study", **values
+        file=typed(file), name=name or "study", **values
     )
 
 

@@ -16,6 +16,7 @@ from gfmd_cli.units import LARGEST_RMS_HEIGHT
 
 FEW_POINTS = 30  # a choice: the area of a circle of 30 points has an error of its rim of a third
 PASCALS = 1e3  # modulus above which it is one in Pa; a choice: gels have 1e3 Pa, reduced units 1
+STIFFEST = 1.2e13  # modulus that no material has [Pa]: ten times that of diamond
 REDUCED_PRESSURES = (1e-6, 100.0)
 """Reduced pressures outside of which a load has another unit than was meant; a choice. Rough
 surfaces are in full contact from about 6 on; below, the largest grids have few points in contact.
@@ -48,6 +49,11 @@ def warnings_of(task: Task, solved: TaskSolution, results: Mapping[str, Any]) ->
         )
     elif elastomer.modulus > PASCALS and task.surface.rough and _has_default_side(task.surface):
         warnings.append("surface.length is not given: a side of 1 m is assumed")
+    if elastomer.modulus > STIFFEST and scene.h_std <= LARGEST_RMS_HEIGHT:
+        warnings.append(
+            f"elastomer.E_star = {elastomer.modulus:.3g} Pa is more than ten times the modulus of "
+            "diamond, 1.2e12 Pa: is it in Pa?"
+        )
     gradient = moments(scene.shells).gradient
     if {"h_std", "length"} <= task.surface.model_fields_set and gradient > MAX_GRADIENT:
         warnings.append(

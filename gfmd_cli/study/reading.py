@@ -10,7 +10,7 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from gfmd_cli.errors import InputError, StudyError
+from gfmd_cli.errors import InputError, StudyError, typed
 from gfmd_cli.files.hdf5 import find, has, open_hdf5, read_dataset, take
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.maps.pictures import Picture
@@ -240,8 +240,8 @@ def open_study(source: Path, opened: BinaryIO | None = None) -> Iterator[StudyFi
     """
     if source.suffix == ".toml":
         raise InputError(
-            f"{source}: a run spec, where a study (NAME.h5) is expected; `gfmd run {source}` "
-            "makes the study"
+            f"{source}: a run spec, where a study (NAME.h5) is expected; "
+            f"`gfmd run {typed(source)}` makes the study"
         )
     if opened is None and not source.exists():
         raise InputError(f"{source}: no such study")

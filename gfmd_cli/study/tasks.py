@@ -220,6 +220,8 @@ def _check(spec: models.Spec) -> None:
         chosen = _chosen(spec, at)
         elastomer, dimension = chosen["elastomer"], chosen["surface"].dimension
         boundary = chosen["grid"].boundary or "periodic"
+        if chosen["grid"].points == "auto" and spec.accuracy is not None:
+            _check_max_points(spec.accuracy.max_points, forecast.first_grid(chosen["surface"]))
         chosen["solver"].check_boundary(boundary)
         if boundary == "free":
             elastomer.check_free_boundary(dimension)
@@ -245,6 +247,15 @@ def _check_grid(surface: RigidSurface, grid: models.GridTable) -> None:
         points = surface.copies * grid.points
         on_cell, points_y = grid.on_cell(surface, points)
         check_resolved(on_cell, points, points_y)
+
+
+def _check_max_points(max_points: int, first: int) -> None:
+    """Raise InputError where the first of the finer and finer grids has more points."""
+    if max_points < first:
+        raise InputError(
+            f'accuracy.max_points: {max_points} given, but grid.points = "auto" begins with '
+            f"{first} points along x on this surface; give {first} or more"
+        )
 
 
 def _points(spec: models.Spec, chosen: dict[str, Any], load: float) -> int:

@@ -1,0 +1,56 @@
+"""Transforms of a load search relative to those of the solve at the pressure that it finds.
+
+    python scripts/load_searches.py
+
+Default surface with lambda_s / L = 0.02, means over seeds that were not used to choose the search.
+"""
+
+import argparse
+import os
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+import numpy as np
+
+from gfmd_cli.api import solve
+
+LOADS = {"contact_area": (0.01, 0.05, 0.3), "mean_gap": (1.5, 0.5)}
+EXPONENTS = (0.5, 1, 2, 3)
+ROW = "| {} |"
+
+
+def transforms(n: float, load: dict[str, float], points: int, seed: int) -> tuple[float, float]:
+    """Transforms of the whole task, in units of those of its grid, and the pressure p*."""
+    result = solve(
+        {
+            "surface": {"kind": "self-affine", "cutoff": 0.02, "seed": seed},
+            "elastomer": {"kind": "power", "n": n},
+            "load": load,
+            "grid": {"points": points},
+        }
+    )
+    return result.columns["transforms"], result.p_star
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("--points", type=int, default=1024)
+    parser.add_argument("--seeds", type=int, nargs="+", default=[10, 11, 12])
+    arguments = parser.parse_args()
+    print(ROW.format(" | ".join(["load", *(f"n = {n:g}" for n in EXPONENTS)])))
+    print(ROW.format(" | ".join(["---"] * (1 + len(EXPONENTS)))))
+    for name, values in LOADS.items():
+        for value in values:
+            ratios = []
+            for n in EXPONENTS:
+                of_seeds = []
+                for seed in arguments.seeds:
+                    searched, p_star = transforms(n, {name: value}, arguments.points, seed)
+                    alone, _ = transforms(n, {"p_star": p_star}, arguments.points, seed)
+                    of_seeds.append(searched / alone)
+                ratios.append(f"{np.mean(of_seeds):.1f}")
+            print(ROW.format(" | ".join([f"`{name} = {value:g}`", *ratios])), flush=True)
+
+
+if __name__ == "__main__":
+    main()
