@@ -49,7 +49,7 @@ from gfmd_cli.physics.observables import Observables, contact_pressure
 ALGEBRAIC = 2.0
 """Largest measured error of u_g or sigma_p, x, on its grid, over the natural residual times the
 largest of x, sqrt(x) and sqrt(f) / 2, with the fraction f of points that are not in contact or
-uncertain, which matters next to full contact: n = 0.5 to 4, slabs, p* = 0.003 to 4."""
+uncertain, which matters next to full contact: n = 0.5 to 4, slabs, p* = 0.003 to 3."""
 
 
 @dataclass(frozen=True)
