@@ -114,6 +114,15 @@ def test_missing_heights_do_not_hide_the_order_of_lines(tmp_path):
     assert "better in reverse" in _found(tmp_path, _reversed(heights))
 
 
+def test_few_known_heights_give_none(tmp_path):
+    heights = np.full((300, 400), np.nan)
+    heights[1, 100:102] = 1e-9, 2e-9
+    assert not _found(tmp_path, heights)
+    heights[100:110, 100:120] = _scan(0.8)[:10, :20]
+    assert not _found(tmp_path, heights)
+    assert not filled_lines(read_topography(tmp_path / "h.npy"))[0]
+
+
 @pytest.mark.parametrize("value", [0.0, 3e-8, -1e-7])
 def test_filled_lines_give_one_warning(tmp_path, value):
     heights = _scan(0.8)

@@ -234,6 +234,8 @@ def _noise(heights: Field) -> str:
     rows, columns = (_sample(points) for points in heights.shape)
     some = heights[rows, columns]
     values = np.sort(some[np.isfinite(some)])
+    if not values.size:
+        return ""
     low, high = values[values.size // TAIL], values[-1 - values.size // TAIL]
     values = values[:: 1 + values.size // LEVELS].clip(low, high)
     distant = _mean(values - values[:, None])
