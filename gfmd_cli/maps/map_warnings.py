@@ -282,7 +282,7 @@ def outliers(topography: Topography) -> str:
                 f"{number} heights{percentage} are exactly the {word}, {extreme:g}: clipped at the "
                 "range of the instrument, or a mark of missing heights? Replace such a mark by NaN"
             )
-    return _often_equal(heights) or _spikes(heights) or _single_points(topography)
+    return _often_equal(heights) or _spikes(heights)
 
 
 def _often_equal(heights: Field) -> str:
@@ -302,7 +302,7 @@ def _often_equal(heights: Field) -> str:
     )
 
 
-def _single_points(topography: Topography) -> str:
+def single_points(topography: Topography) -> str:
     """Single points far above or below all their neighbours, or strokes along one axis."""
     heights, missing = np.atleast_2d(topography.heights), topography.missing
     missing = None if missing is None else missing.reshape(heights.shape)

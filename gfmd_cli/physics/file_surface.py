@@ -9,7 +9,7 @@ from pydantic import Field as Key
 from gfmd_cli.errors import InputError
 from gfmd_cli.grid.arrays import Field, Mask, MaskedField
 from gfmd_cli.grid.fft_grid import Grid
-from gfmd_cli.maps import map_warnings
+from gfmd_cli.maps import map_warnings, misread
 from gfmd_cli.maps.height_map import extent
 from gfmd_cli.maps.interpolation import (
     Interpolation,
@@ -435,9 +435,14 @@ def _warnings_on_heights(surface: FileSurface) -> tuple[str, ...]:
     corners = tuple(slice(None, None, n - 1) for n in shape)
     subtracted = scale * topography.heights[corners] - untapered[corners]
     sides = tuple(step * (n - 1) for step, n in zip(spacing, shape, strict=True))
+    filled_lines, known = misread.filled_lines(topography)
+    outliers, misread_map = map_warnings.outliers(known), misread.misread(known)
     return (
-        map_warnings.outliers(topography),
-        map_warnings.shifted_lines(topography, spacing),
+        filled_lines,
+        outliers,
+        misread_map,
+        "" if misread_map or outliers else map_warnings.single_points(known),
+        "" if misread_map else map_warnings.shifted_lines(known, spacing),
         map_warnings.curved(levelled if has_missing else untapered),
         map_warnings.steep(surface.levelling(), subtracted, sides),
         map_warnings.repeated_lines(topography.heights),

@@ -1,0 +1,251 @@
+"""Signs of a map whose numbers were read or saved wrongly: type, byte order, order of the lines.
+
+Each function returns a warning, or "" if what its docstring describes does not occur. The limits
+lie between the values of sound and of damaged maps (`docs/scans.md`).
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from gfmd_cli.grid.arrays import Field, row_blocks
+from gfmd_cli.maps.topography import Topography
+from gfmd_cli.units import count
+
+MIN_POINTS = 32  # per side: fewer have such patterns by chance
+SAMPLED_LINES = 128  # of each axis, and points of each, at least; all of smaller maps
+MIN_FILLED = 0.15  # of a line of one height from the mean of the next ones, over that of others
+MAX_COMMON = 0.1  # fraction of the points of the next lines with this height; a choice
+MAX_REVERSED = 0.86  # difference to the next line in reverse over that to the next line
+MIN_ALTERNATION = 1.33  # difference to the next line over that to the next but one
+MAX_INTERLACED = 0.87  # difference to the same line of the other half over that to the next line
+MIN_HALVES_JUMP = 1.5  # difference of the lines where the halves meet, likewise
+MIN_DISTANCE = 4  # lines: those of the halves that are so far apart differ more; a choice
+MIN_SEAM = 1.7  # median difference across the former border over that of neighbours in a line
+MAX_SHEARED = 0.97  # difference to the next line, shifted by one point, over that without a shift
+LEVELS = 256  # heights, evenly distributed over all, that show how different distant ones are
+TAIL = 20  # one of so many heights on either side is clipped, so that spikes matter little
+MIN_NOISE = 0.9  # difference of neighbours over that of distant heights
+MIN_JUMPS = 4  # along one axis; a choice
+MIN_JUMPS_ACROSS = 0.02  # jumps along one axis over those along the other: saw teeth have none
+ROUNDING = 1e-6  # spread at both ends over the range, below which a map has two levels; a choice
+MAX_SINGLE = 0.95  # fraction of the jumps along x to and from single points; spikes have 1
+MAX_WRAP_GAP = 2.3  # median distance of a jump from the whole range over the spread at both ends
+
+
+def filled_lines(topography: Topography) -> tuple[str, Topography]:
+    """A warning of lines within a map that have one height each, and the map without them.
+
+    Lines of a surface that are even, such as those between mesas, have this height in common with
+    the next lines.
+    """
+    heights = _with_gaps(topography)
+    filled = np.zeros(heights.shape, bool)
+    found = ""
+    for lines, along, mask in ((heights, "x", filled), (heights.T, "y", filled.T)):
+        if lines.ndim == 1 or min(lines.shape) < MIN_POINTS:
+            break
+        is_even = lines[:, 0] == lines[:, -1]
+        is_even[is_even] = np.ptp(lines[is_even], axis=1) == 0
+        if 2 * np.count_nonzero(is_even) > len(lines):
+            continue
+        first = _sample(len(lines))
+        own, following, last = (_after(lines, first, later) for later in range(3))
+        usual = _median(following - (own + last) / 2)
+        start, stop = np.flatnonzero(np.diff(is_even, prepend=False, append=False)).reshape(-1, 2).T
+        inside = (start > 0) & (stop < len(lines))
+        is_filled = np.zeros(len(lines), bool)
+        for begin, end in zip(start[inside], stop[inside], strict=True):
+            height, around = lines[begin, 0], lines[[begin - 1, end]]
+            is_filled[begin:end] = (
+                np.ptp(lines[begin:end, 0]) == 0  # no tilt
+                and _median(height - around.mean(axis=0)) > MIN_FILLED * usual
+                and np.mean(around == height) < MAX_COMMON
+            )
+        numbers = np.flatnonzero(is_filled)
+        mask[numbers] = True
+        if numbers.size and not found:
+            found = (
+                f"{count(numbers.size, 'line')} along {along} of equal heights each, first line "
+                f"{numbers[0]} with {lines[numbers[0], 0]:g}: missing lines that were filled with "
+                "a number? Replace them by NaN"
+            )
+    if not found:
+        return "", topography
+    missing = filled if topography.missing is None else filled | topography.missing
+    return found, replace(topography, missing=missing)
+
+
+def _with_gaps(topography: Topography) -> Field:
+    """The heights, NaN where they are missing."""
+    if topography.missing is None:
+        return topography.heights
+    return np.where(topography.missing, np.nan, topography.heights)
+
+
+def misread(topography: Topography) -> str:
+    """The first sign of a map that was read or saved wrongly."""
+    heights = _with_gaps(topography)
+    if heights.ndim == 1 or min(heights.shape) < MIN_POINTS:
+        return ""
+    found = _noise(heights) or _wrapped(heights)
+    for lines, along in ((heights, "x"), (heights.T, "y")):
+        found = found or _disordered(lines, along) or _sheared(lines, along)
+    return found
+
+
+def _mean(differences: Field) -> float:
+    """Mean absolute value of the known differences, NaN if there is none."""
+    known = np.abs(differences[np.isfinite(differences)])
+    return float(known.mean()) if known.size else np.nan
+
+
+def _size(differences: Field) -> float:
+    """Square of the mean root of the known differences, to which spikes matter little."""
+    return _mean(np.sqrt(np.abs(differences))) ** 2
+
+
+def _median(differences: Field) -> float:
+    """Median absolute value of the known differences, NaN if there is none."""
+    known = np.abs(differences[np.isfinite(differences)])
+    return float(np.median(known)) if known.size else np.nan
+
+
+def _sample(lines: int) -> slice:
+    """Some lines, even and odd ones, of all that have two lines after them."""
+    return slice(0, lines - 2, 1 + 2 * (lines // (2 * SAMPLED_LINES)))
+
+
+def _after(lines: Field, first: slice, later: int) -> Field:
+    """The lines that come `later` than some lines."""
+    return lines[first.start + later : first.stop + later : first.step]
+
+
+def _wrapped(heights: Field) -> str:
+    """Jumps by nearly the whole range, between heights that go on at its other end.
+
+    The heights at the jumps of a wrapped map are closer to the ends of the range than others; those
+    at the edges of steps are not.
+    """
+    bottom, top = float(np.nanmin(heights)), float(np.nanmax(heights))
+    jumps, counts, pairs, first = [], np.zeros(2, int), 0, (0, 0)
+    for rows in row_blocks(heights):
+        block = heights[rows.start : rows.stop + 1]
+        for axis in range(2):
+            steps = np.abs(np.diff(block, axis=axis))[: rows.stop - rows.start]
+            is_jump = steps > (top - bottom) / 2
+            number = int(np.count_nonzero(is_jump))
+            if number and not counts.any():
+                row, column = np.argwhere(is_jump)[0]
+                first = int(column), rows.start + int(row)
+            counts[axis] += number
+            jumps.append(steps[is_jump])
+        pairs += int(np.count_nonzero(is_jump[:, 1:] & is_jump[:, :-1]))
+    if counts.max() < MIN_JUMPS or counts.min() < MIN_JUMPS_ACROSS * counts.max():
+        return ""
+    if 2 * pairs > MAX_SINGLE * counts[1]:
+        return ""
+    is_high = heights > (bottom + top) / 2
+    low, high = heights[~is_high & np.isfinite(heights)], heights[is_high]
+    spread = np.sqrt((low.size * low.var() + high.size * high.var()) / (low.size + high.size))
+    gap = top - bottom - float(np.median(np.concatenate(jumps)))
+    if not ROUNDING * (top - bottom) < spread or gap > MAX_WRAP_GAP * spread:
+        return ""
+    return (
+        f"{counts.sum()} neighbouring heights differ by nearly the whole range of the map, "
+        f"{top - bottom:g}, and lie at its ends, first at the point x, y = {first[0]}, {first[1]}: "
+        "wrapped around at the limit of an integer type, or read as another type (int16 as "
+        "uint16)? Save the map with a larger type, or read it with the right one"
+    )
+
+
+def _disordered(lines: Field, along: str) -> str:
+    """Lines in the wrong order, or every second one reversed, or two images line by line."""
+    first, some = _sample(len(lines)), 1 + lines.shape[1] // (2 * SAMPLED_LINES)
+    backwards, lines = lines[:, ::-some], lines[:, ::some]
+    own = lines[first]
+    usual = _mean(_after(lines, first, 1) - own)
+    if not usual > 0:
+        return ""
+    in_reverse = _mean(_after(backwards, first, 1) - own) / usual
+    if in_reverse < MAX_REVERSED:
+        return (
+            f"the lines along {along} fit the next line better in reverse, with {in_reverse:.0%} "
+            "of the difference: was every second line saved backwards? Reverse these lines"
+        )
+    next_one, next_but_one = (_size(_after(lines, first, later) - own) for later in (1, 2))
+    if next_one > MIN_ALTERNATION * next_but_one:
+        return (
+            f"the lines along {along} differ more from the next line than from the next but "
+            "one: two images line by line, or numbers that were read as two each? Read the file "
+            "with the right type, or save every second line"
+        )
+    for half in {len(lines) // 2, -(-len(lines) // 2)}:
+        jump = _mean(lines[half] - lines[half - 1])
+        pairs = slice(0, len(lines) - half - 1, first.step)
+        one, other = lines[pairs], _after(lines, pairs, half)
+        after = min(
+            _mean(one - _after(lines, pairs, half + 1)), _mean(_after(lines, pairs, 1) - other)
+        )
+        between = max(_mean(one - other), after)
+        if jump < MIN_HALVES_JUMP * usual or between > MAX_INTERLACED * usual:
+            continue
+        distant = [
+            _mean(lines[: len(lines) - half - each : first.step] - lines[half + each :: first.step])
+            for each in range(MIN_DISTANCE, len(lines) - half - MIN_DISTANCE)
+        ]
+        if min(distant) > usual:  # else a grating
+            return (
+                f"the lines {half} to {len(lines) - 1} along {along} fit between those before "
+                f"them, with {between / usual:.0%} of the difference of neighbouring lines: an "
+                "interlaced image, all even lines and then all odd ones? Put the lines in order"
+            )
+    return ""
+
+
+def _sheared(lines: Field, along: str) -> str:
+    """Lines that are shifted by one point each: they were read with a wrong number of points.
+
+    The borders of the scan then meet within the map, along a diagonal from a corner.
+    """
+    number, points = lines.shape
+    first, some = _sample(number), _sample(points)
+    own, following = lines[first], _after(lines, first, 1)
+    middle = _after(own.T, some, 1).T
+    usual = _median(middle - own[:, some])
+    shifted = [_median(_after(following.T, some, each).T - middle) for each in range(3)]
+    for wrong, shift in ((1, shifted[0]), (-1, shifted[2])):
+        right = points - wrong
+        row, column = np.arange(number), -wrong * np.arange(number) % right
+        inside = (column > 0) & (column < points)
+        row, column = row[inside], column[inside]
+        seam = _median(lines[row, column] - lines[row, column - 1])
+        if seam > MIN_SEAM * usual > 0 and shift < MAX_SHEARED * shifted[1]:
+            return (
+                f"each line along {along} is shifted by one point against the line before, and "
+                f"steps of {seam / usual:.2g} times the usual difference lie on a diagonal: read "
+                f"the file with {right} instead of {points} points per line"
+            )
+    return ""
+
+
+def _noise(heights: Field) -> str:
+    """Neighbouring heights that have nothing to do with each other."""
+    rows, columns = (_sample(points) for points in heights.shape)
+    some = heights[rows, columns]
+    values = np.sort(some[np.isfinite(some)])
+    if not values.size:
+        return ""
+    low, high = values[values.size // TAIL], values[-1 - values.size // TAIL]
+    values = values[:: 1 + values.size // LEVELS].clip(low, high)
+    distant = _mean(values - values[:, None])
+    along_y = _after(heights, rows, 1)[:, columns]
+    along_x = _after(heights.T, columns, 1)[:, rows].T
+    near = [_mean(each.clip(low, high) - some.clip(low, high)) for each in (along_y, along_x)]
+    if not min(near) > MIN_NOISE * distant > 0:
+        return ""
+    return (
+        f"neighbouring heights differ as much as distant ones, {min(near) / distant:.0%}: read "
+        "with a wrong type or byte order, or roughness that the map does not resolve? Contact then "
+        "depends on the distance of the points"
+    )
