@@ -227,8 +227,9 @@ def _solve_all(
     pending: list[Task], parts: Path, jobs: int, context: SolveContext
 ) -> Counter[Status]:
     """Solve tasks, on worker processes if there are several jobs; the statuses of those ended."""
+    counts: Counter[Status] = Counter()
     if jobs > 1:
-        return solve_in_pool(pending, parts, jobs, context)
-    counts = Counter(attempt(task, parts, context) for task in pending)
+        counts, pending = solve_in_pool(pending, parts, jobs, context)
+    counts.update(attempt(task, parts, context) for task in pending)
     del counts[Status.INTERRUPTED]
     return counts

@@ -29,7 +29,10 @@ def serve(pipe: Connection) -> None:
     context = SolveContext(options, pipe.send)
     handle_signals_in_worker(context.stop)
     tasks: SimpleQueue[Task] = SimpleQueue()
-    Thread(target=_receive, args=(pipe, tasks, context.stop), daemon=True).start()
+    try:
+        Thread(target=_receive, args=(pipe, tasks, context.stop), daemon=True).start()
+    except RuntimeError as error:
+        sys.exit(f"gfmd: a worker process: {error} (see ulimit -u)")
     try:
         with waits_end_at(context.stop, os.getppid()):
             plans.plan_with(parts, estimated=options.reproducible)
