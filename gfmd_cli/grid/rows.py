@@ -28,7 +28,9 @@ def started_pool(threads: int) -> ThreadPoolExecutor | None:
         list(pool.map(lambda _: started.wait(), range(threads)))
     except RuntimeError as error:
         pool.shutdown(wait=False, cancel_futures=True)
-        warnings.warn(f"{error} (see ulimit -u); one thread is used", RuntimeWarning, stacklevel=1)
+        warnings.warn(
+            f"{error} (see ulimit -u, -v); one thread is used", RuntimeWarning, stacklevel=1
+        )
         return None
     finally:
         started.abort()  # else the threads would wait for ever for those that have not started
