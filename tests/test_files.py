@@ -4,6 +4,7 @@ import socket
 
 import pytest
 
+from gfmd_cli.files.atomic import NewFile
 from gfmd_cli.files.regular import open_regular, read_regular
 
 READ, WRITE = os.O_RDONLY, os.O_RDWR | os.O_CREAT
@@ -55,3 +56,15 @@ def test_no_more_is_read_than_allowed(tmp_path):
     with pytest.raises(OSError, match="larger than 100 bytes") as caught:
         read_regular(tmp_path / "sparse", 100)
     assert caught.value.errno == errno.EFBIG
+
+
+def test_after_an_error_what_was_not_written_is_read_as_zeros(tmp_path):
+    """HDF5 reads back what it wrote, and takes the former content of its memory where it cannot."""
+    with NewFile(tmp_path / "file", "w+b") as file:
+        file.write(b"ab")
+        file.error = OSError(errno.ENOSPC, "full")
+        file.write(b"cd")
+        file.seek(0)
+        buffer = bytearray(b"wxyz")
+        file.readinto(buffer)
+    assert buffer == b"ab\0\0"
