@@ -1,8 +1,8 @@
 """gfmd: elastic contact of rough surfaces, for elastomers of any stiffness k(q)."""
 
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
 
+TYPE_CHECKING = False  # that of `typing`, whose import would delay the handlers of signals
 if TYPE_CHECKING:
     from gfmd_cli.api import Result, compare, dataset, rows, run, solve
 
@@ -10,7 +10,7 @@ __all__ = ["Result", "compare", "dataset", "rows", "run", "solve"]
 __version__ = "0.1.0"
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> object:
     """A name of the Python API, imported at its first use so that the command line starts fast."""
     if name in __all__:
         return getattr(import_module("gfmd_cli.api"), name)

@@ -6,13 +6,22 @@ import os
 import signal
 import sys
 import warnings
-from typing import Any
+from types import FrameType
 
 ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGUSR1, signal.SIGUSR2)
+IMPORTING = "<frozen importlib._bootstrap>"  # the file of Python's import system
 
 
-def _leave(number: int, _frame: Any) -> None:
-    """End quietly, as a shell reports a signal; what is open is cleaned up on the way."""
+def _leave(number: int, frame: FrameType | None) -> None:
+    """End quietly, as a shell reports a signal; what is open is cleaned up on the way.
+
+    Compiled modules lose an exception during their import, or turn it into an ImportError: there,
+    the process ends at once.
+    """
+    while frame is not None:
+        if frame.f_code.co_filename == IMPORTING:
+            os._exit(128 + number)
+        frame = frame.f_back
     sys.exit(128 + number)
 
 

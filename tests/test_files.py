@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from gfmd_cli.files.atomic import NewFile
 from gfmd_cli.files.cache import cache_folder
 from gfmd_cli.files.regular import open_regular, read_regular
 
@@ -64,3 +65,15 @@ def test_a_relative_cache_folder_is_ignored(monkeypatch, given, folder):
     monkeypatch.setenv("HOME", "/home/me")
     monkeypatch.setenv("XDG_CACHE_HOME", given)
     assert cache_folder() == Path(folder)
+
+
+def test_after_an_error_what_was_not_written_is_read_as_zeros(tmp_path):
+    """HDF5 reads back what it wrote, and takes the former content of its memory where it cannot."""
+    with NewFile(tmp_path / "file", "w+b") as file:
+        file.write(b"ab")
+        file.error = OSError(errno.ENOSPC, "full")
+        file.write(b"cd")
+        file.seek(0)
+        buffer = bytearray(b"wxyz")
+        file.readinto(buffer)
+    assert buffer == b"ab\0\0"

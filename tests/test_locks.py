@@ -9,13 +9,14 @@ import sys
 import time
 from itertools import count
 from pathlib import Path
+from threading import Event, Timer
 from types import SimpleNamespace
 
 import pytest
 
-from gfmd_cli.errors import SpaceError
+from gfmd_cli.errors import Interrupted, SpaceError
 from gfmd_cli.files import locks
-from gfmd_cli.files.locks import locked
+from gfmd_cli.files.locks import locked, waits_end_at
 from gfmd_cli.grid import plans
 from gfmd_cli.study.reading import read_rows
 
@@ -88,6 +89,34 @@ def test_the_lock_of_a_killed_process_is_free(lock, kind, holder):
     process.wait()
     with locked(lock) as acquired:
         assert acquired
+
+
+def test_a_long_wait_is_announced_once_with_its_owner_and_ends_with_the_run(
+    lock, kind, holder, monkeypatch, caplog
+):
+    monkeypatch.setattr(locks, "NOTE_SECONDS", 0.05)
+    process, stop = holder(kind, "exclusive"), Event()
+    owner = f"process {process.pid} on {socket.gethostname()}"
+    Timer(0.5, stop.set).start()
+    with (
+        waits_end_at(stop),
+        pytest.raises(Interrupted, match=f"in use by {owner}; run again"),
+        locked(lock),
+    ):
+        pass
+    (message,) = caplog.messages
+    assert message.startswith("gfmd: waiting for")
+    assert message.endswith(f", in use by {owner}")
+
+
+def test_a_wait_for_another_worker_of_the_run_is_not_announced(lock, holder, monkeypatch, caplog):
+    monkeypatch.setattr(locks, "NOTE_SECONDS", 0.05)
+    holder("kernel", "exclusive")
+    stop = Event()
+    Timer(0.3, stop.set).start()
+    with waits_end_at(stop, os.getpid()), pytest.raises(Interrupted), locked(lock):
+        pass
+    assert not caplog.messages
 
 
 def test_shared_locks_of_the_kernel_are_held_side_by_side(lock, holder):

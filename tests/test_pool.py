@@ -81,7 +81,8 @@ def solve(monkeypatch, stop, tmp_path):
 
         options = SimpleNamespace()  # real ones would let every worker import the solvers
         context = SolveContext(options, report, stop)
-        return solve_in_pool(tasks, start, jobs, context), reasons
+        outcome, _ = solve_in_pool(tasks, start, jobs, context)
+        return outcome, reasons
 
     return solve
 
@@ -181,20 +182,23 @@ def test_fewer_workers_go_on_where_the_kernel_says_that_memory_ran_out(solve, mo
     assert at_once[2:] in ([], [1])  # one goes on, a new one if it had solved the others before
 
 
-def test_workers_that_cannot_start_fail_the_tasks_and_the_run_ends(solve):
+LEFT = "2 tasks left to the process of the run itself"
+
+
+def test_the_tasks_of_workers_that_cannot_start_are_left_to_the_run(solve):
     outcome, reasons = solve("converges", "converges", start="dies at start")
-    assert outcome == Counter(killed=2)
-    assert reasons == dict.fromkeys((0, 1), "a worker process ended with status 3 as it started")
+    assert outcome == Counter()
+    assert reasons == {-1: f"a worker process ended with status 3 as it started; {LEFT}"}
 
 
-def test_no_processes_left_for_this_user_fails_the_tasks(solve, monkeypatch):
+def test_without_processes_for_this_user_the_tasks_are_left_to_the_run(solve, monkeypatch):
     def refuse(*_, **__):
         raise BlockingIOError(11, "Resource temporarily unavailable")
 
     monkeypatch.setattr(pool.subprocess, "Popen", refuse)
     outcome, reasons = solve("converges", "converges")
-    assert outcome == Counter(killed=2)
-    assert "Resource temporarily unavailable" in reasons[0]
+    assert outcome == Counter()
+    assert reasons[-1].endswith(f"Resource temporarily unavailable; {LEFT}")
 
 
 @pytest.mark.parametrize("others", ["waits for a stop", "dies when stopped"])

@@ -43,6 +43,21 @@ def test_slurm_may_grant_less_memory_than_there_is(monkeypatch):
     assert resources.available_memory() == 100 * 2**20
 
 
+def test_the_limit_of_the_address_space_counts_less_what_is_in_use(monkeypatch):
+    used = int(Path("/proc/self/statm").read_text().split()[0]) * resources.resource.getpagesize()
+    limits = used + 2**24, resources.resource.RLIM_INFINITY
+    monkeypatch.setattr(resources.resource, "getrlimit", lambda _: limits)
+    assert resources.available_memory() == pytest.approx(2**24, abs=2**22)
+
+
+def test_threads_need_address_space_for_their_heaps(tasks, machine, monkeypatch):
+    machine(8)
+    one = tasks("grid.points=4096", "elastomer.n=1", "load.p_star=0.1")
+    for gibibytes, threads in (4, 1), (8, 8):
+        monkeypatch.setattr(resources, "available_addresses", lambda n=gibibytes: n * 2.0**30)
+        assert resources.jobs_and_threads(one, None) == (1, threads)
+
+
 def test_slurm_may_grant_memory_by_the_core(monkeypatch):
     monkeypatch.setenv("SLURM_MEM_PER_CPU", "50")
     monkeypatch.setenv("SLURM_CPUS_PER_TASK", "3")

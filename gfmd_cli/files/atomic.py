@@ -31,6 +31,14 @@ class NewFile(io.FileIO):
             self.error = error
         return size
 
+    def readinto(self, buffer: Any) -> int:
+        """Read; after an error, with zeros for what is not there: HDF5 would take what it gets."""
+        view = memoryview(buffer).cast("B")
+        count = super().readinto(view)
+        if self.error is not None:
+            view[count:] = bytes(len(view) - count)
+        return count
+
 
 @contextmanager
 def new_file(path: Path, aside: Path | None = None) -> Iterator[NewFile]:

@@ -3,25 +3,47 @@
 import errno
 import fcntl
 import json
+import logging
 import os
 import socket
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from threading import Event
 from typing import BinaryIO
 
-from gfmd_cli.errors import SpaceError
+from gfmd_cli.errors import Interrupted, SpaceError
 from gfmd_cli.files.atomic import temporary_name
 from gfmd_cli.files.regular import open_regular, read_regular
 
 NO_LOCKS = {errno.ENOLCK, errno.ENOTSUP, errno.EOPNOTSUPP, errno.ENOSYS, errno.EINVAL, 524}
 """What a file system without locks answers; 524 is the kernel's ENOTSUPP, of NFS and Lustre."""
 ATTEMPTS = 50  # at a file whose folder is removed again and again by other processes
-WAIT_SECONDS = 0.02  # between two attempts
+WAIT_SECONDS = 0.02, 0.5  # between two attempts, at first and after a long time
+NOTE_SECONDS = 2.0  # of waiting before a message says so
 MAX_BYTES = 4096  # of the text in a plain lock
 UNREADABLE_SECONDS = 2.0  # that a plain lock may be without the name of its owner, who writes it
 OWNED_SECONDS = 600.0  # to wait for the owner of a plain lock, who may be dead on another machine
+
+log = logging.getLogger(__name__)
+_stop: Event | None = None
+_run = 0
+
+
+@contextmanager
+def waits_end_at(stop: Event | None, run: int = 0) -> Iterator[None]:
+    """Inside, a process that waits for a lock raises Interrupted once `stop` is set.
+
+    A worker gives the number of the process of its `run`: no wait for another worker is announced.
+    """
+    global _stop, _run
+    before = _stop, _run
+    _stop, _run = stop, run
+    try:
+        yield
+    finally:
+        _stop, _run = before
 
 
 @contextmanager
@@ -30,21 +52,25 @@ def locked(path: Path, *, shared: bool = False, wait: bool = True) -> Iterator[b
 
     The holder may delete the file: a process that waited for it then locks a new one. Yields
     whether the lock was obtained, always true if `wait` is. Raises SpaceError where the file cannot
-    be written.
+    be written, and Interrupted (see `waits_end_at`). A long wait is announced once.
 
     On a file system without locks, the lock is a file beside it with the name of its owner, which
     others respect. It cannot be shared: a second process is refused with a SpaceError, and so is
     one that has waited for `OWNED_SECONDS`. That of a dead process of this machine is removed; two
     that remove it at the same moment may both go on.
     """
-    operation = (fcntl.LOCK_SH if shared else fcntl.LOCK_EX) | (0 if wait else fcntl.LOCK_NB)
+    operation = (fcntl.LOCK_SH if shared else fcntl.LOCK_EX) | fcntl.LOCK_NB
+    waiting = _Wait(path)
     while True:
         with _opened(path) as file:
             try:
                 fcntl.flock(file, operation)
             except BlockingIOError:
-                yield False
-                return
+                if not wait:
+                    yield False
+                    return
+                waiting.pause(_holder(file.fileno()))
+                continue
             except OSError as error:
                 if error.errno not in NO_LOCKS:
                     raise SpaceError(f"{path}: cannot be locked: {error.strerror}") from error
@@ -58,6 +84,39 @@ def locked(path: Path, *, shared: bool = False, wait: bool = True) -> Iterator[b
         return
 
 
+class _Wait:
+    """A wait for a lock, from now on."""
+
+    def __init__(self, path: Path) -> None:
+        self.path, self.since, self.is_announced = path, time.monotonic(), False
+
+    def pause(self, owner: dict[str, str | int] | None) -> None:
+        """Sleep until the next attempt; `owner` has the lock. Raises Interrupted."""
+        by = f"process {owner['pid']} on {owner['host']}" if owner else "another process"
+        if _stop is not None and _stop.is_set():
+            raise Interrupted(f"stopped; {self.path} is in use by {by}; run again to continue")
+        waited = time.monotonic() - self.since
+        if waited > NOTE_SECONDS and not self.is_announced:
+            self.is_announced = True
+            if owner is None or _run == 0 or _parent(int(owner["pid"])) != _run:
+                log.warning("gfmd: waiting for %r, in use by %s", str(self.path), ascii(by)[1:-1])
+        shortest, longest = WAIT_SECONDS
+        time.sleep(min(longest, max(shortest, waited / 10)))
+
+
+def _holder(descriptor: int) -> dict[str, str | int] | None:
+    """The process of this machine that has a lock of the kernel, None where it is not known."""
+    with suppress(OSError, ValueError):
+        status = os.fstat(descriptor)
+        major, minor = os.major(status.st_dev), os.minor(status.st_dev)
+        file = f"{major:02x}:{minor:02x}:{status.st_ino}"
+        for line in Path("/proc/locks").read_text(encoding="ascii").splitlines():
+            words = line.split()
+            if len(words) > 5 and words[1] == "FLOCK" and words[5] == file and int(words[4]) > 0:
+                return {"host": socket.gethostname(), "pid": int(words[4])}
+    return None
+
+
 def _opened(path: Path) -> BinaryIO:
     """A lock file, made where it is missing. Raises SpaceError."""
     reason: str | None = None
@@ -68,7 +127,7 @@ def _opened(path: Path) -> BinaryIO:
         except (FileNotFoundError, FileExistsError) as error:
             # the folder was deleted just now, perhaps while mkdir was running, or cannot be made
             reason = error.strerror
-            time.sleep(WAIT_SECONDS)
+            time.sleep(WAIT_SECONDS[0])
         except OSError as error:
             raise SpaceError(f"{path}: cannot be written: {error.strerror}") from error
     raise SpaceError(f"{path}: cannot be written: its folder cannot be made: {reason}")
@@ -90,6 +149,7 @@ def _owned(path: Path, shared: bool, wait: bool) -> Iterator[bool]:
     for too long, and for a file that is no lock.
     """
     known, since = None, time.monotonic()
+    waiting = _Wait(path)
     while not _claim(path):
         owner, now = _owner(path), time.monotonic()
         if owner != known:  # another process, or one that writes its name just now
@@ -109,7 +169,7 @@ def _owned(path: Path, shared: bool, wait: bool) -> Iterator[bool]:
                 "dead, delete this file)"
             )
         else:
-            time.sleep(WAIT_SECONDS)
+            waiting.pause(owner)
     own_record = _owner(path)
     try:
         yield True
@@ -137,9 +197,21 @@ def _start_time(pid: int) -> str:
     """When a process was started, in ticks of the kernel since the boot named; "" for none."""
     with suppress(OSError, IndexError):
         boot = Path("/proc/sys/kernel/random/boot_id").read_text(encoding="ascii").strip()
-        status = Path(f"/proc/{pid}/stat").read_text(encoding="utf-8", errors="replace")
-        return f"{boot} {status.rpartition(')')[2].split()[19]}"
+        return f"{boot} {_numbers_of(pid)[19]}"
     return ""
+
+
+def _parent(pid: int) -> int:
+    """The parent of a process of this machine; -1 where it has ended."""
+    with suppress(OSError, IndexError):
+        return int(_numbers_of(pid)[1])
+    return -1
+
+
+def _numbers_of(pid: int) -> list[str]:
+    """What the kernel says of a process, after its name. Raises OSError."""
+    status = Path(f"/proc/{pid}/stat").read_text(encoding="utf-8", errors="replace")
+    return status.rpartition(")")[2].split()
 
 
 def _owner(path: Path) -> dict[str, str | int] | None:

@@ -5,9 +5,11 @@ threads can share the rows. A kernel that computes sums writes one set of sums f
 are added in a fixed order. The results therefore do not depend on the number of threads.
 """
 
+import warnings
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
+from threading import Barrier
 from typing import Any, ClassVar
 
 import numpy as np
@@ -17,6 +19,22 @@ from gfmd_cli.grid.arrays import Field
 MIN_THREADED_ROWS = 256  # smallest number of rows of a coarser level for which a second thread pays
 
 Kernel = Callable[..., None]
+
+
+def started_pool(threads: int) -> ThreadPoolExecutor | None:
+    """A pool whose threads have all started; None, with a warning, where the system refuses one."""
+    pool, started = ThreadPoolExecutor(threads), Barrier(threads)
+    try:
+        list(pool.map(lambda _: started.wait(), range(threads)))
+    except RuntimeError as error:
+        pool.shutdown(wait=False, cancel_futures=True)
+        warnings.warn(
+            f"{error} (see ulimit -u, -v); one thread is used", RuntimeWarning, stacklevel=1
+        )
+        return None
+    finally:
+        started.abort()  # else the threads would wait for ever for those that have not started
+    return pool
 
 
 class LocalRows:
@@ -32,7 +50,7 @@ class LocalRows:
 
     def __init__(self, count: int, threads: int) -> None:
         self.count = count
-        self.pool = ThreadPoolExecutor(threads) if threads > 1 else None
+        self.pool = started_pool(threads) if threads > 1 else None
         edges = np.linspace(0, count, threads + 1).astype(int)
         self.parts = [(int(a), int(b)) for a, b in pairwise(edges) if a < b]
 

@@ -16,6 +16,7 @@ from gfmd_cli.study.resources import available_memory, gib, out_of_memory_kills
 from gfmd_cli.study.signals import blocked_signals
 from gfmd_cli.study.tasks import Task
 from gfmd_cli.study.worker import READY
+from gfmd_cli.units import count
 
 POLL_SECONDS = 0.1  # between two looks at whether to stop
 END_SECONDS = 10.0  # that a worker may take to end once its pipe is closed
@@ -97,7 +98,8 @@ class Pool:
     def run(self) -> Counter[Status]:
         """Solve all tasks, or save their states after a signal; return the number by status.
 
-        Tasks that are left to the next call are not counted.
+        Tasks that are left to the next call are not counted. Where no worker can be started, the
+        other tasks stay in `waiting`.
         """
         is_stopping = False
         try:
@@ -193,10 +195,9 @@ class Pool:
             return
         self.jobs = len(self.workers)
         if not self.workers:
-            for task in self.waiting:
-                self.counts[Status.KILLED] += 1
-                self._end(task, Status.KILLED, reason)
-            self.waiting.clear()
+            left = count(len(self.waiting), "task")
+            message = f"{reason}; {left} left to the process of the run itself"
+            self.report(Progress(-1, "warning", "", message=message))
 
     def _end(self, task: Task, status: Status | None, reason: str) -> None:
         """Report why a task has ended, or, without a status, why it will start again."""
@@ -218,6 +219,10 @@ def ending(status: int) -> str:
 
 def solve_in_pool(
     tasks: list[Task], parts: Path, jobs: int, context: SolveContext
-) -> Counter[Status]:
-    """Solve tasks on `jobs` worker processes; return how many have which status."""
-    return Pool(tasks, context, jobs, lambda: Worker(parts, context.options)).run()
+) -> tuple[Counter[Status], list[Task]]:
+    """Solve tasks on `jobs` worker processes.
+
+    Returns how many have which status, and the tasks for which no worker could be started.
+    """
+    pool = Pool(tasks, context, jobs, lambda: Worker(parts, context.options))
+    return pool.run(), list(pool.waiting)

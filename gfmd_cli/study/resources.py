@@ -1,6 +1,7 @@
 """Cores and memory that a run may use on this machine."""
 
 import os
+import resource
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
@@ -12,6 +13,7 @@ from gfmd_cli.study.forecast import BASE_BYTES
 from gfmd_cli.study.tasks import Task
 
 THREADED_POINTS = 1024  # per side of a square; a second thread does not pay below it (measured)
+ADDRESSES_PER_CORE = 2**29  # bytes that the heaps of threads reserve: 8 of 64 MiB a core (glibc)
 HEADROOM = 0.9  # share of the available memory that a run may plan with
 POOL_SECONDS = 3.0  # with less work than this, worker processes do not pay
 DISK_SPEED = 1e8  # bytes a second; slower than most
@@ -29,8 +31,9 @@ def available_cores() -> int:
 
 
 def available_memory() -> float:
-    """Bytes that this process may take: the smallest limit of kernel, cgroups and Slurm."""
-    limits = list(_cgroup_limits(Path("/proc/self/cgroup"), Path("/sys/fs/cgroup")))
+    """Bytes that this process may take: the least of kernel, `ulimit -v`, cgroups and Slurm."""
+    cgroups = _cgroup_limits(Path("/proc/self/cgroup"), Path("/sys/fs/cgroup"))
+    limits = [available_addresses(), *cgroups]
     with suppress(OSError, ValueError, IndexError):
         _, _, rest = Path("/proc/meminfo").read_text(encoding="ascii").partition("MemAvailable:")
         limits.append(1024.0 * int(rest.split()[0]))
@@ -39,7 +42,17 @@ def available_memory() -> float:
         megabytes = os.environ.get(name, "")
         if megabytes.isdecimal() and int(megabytes) > 0:
             limits.append(2.0**20 * int(megabytes) * count)
-    return min(limits, default=float("inf"))
+    return min(limits)
+
+
+def available_addresses() -> float:
+    """Bytes of address space that `ulimit -v` leaves to this process."""
+    limit, _ = resource.getrlimit(resource.RLIMIT_AS)
+    if limit != resource.RLIM_INFINITY:
+        with suppress(OSError, ValueError):
+            pages, *_ = Path("/proc/self/statm").read_text(encoding="ascii").split()
+            return float(limit - int(pages) * resource.getpagesize())
+    return float("inf")
 
 
 def _cgroup_limits(membership: Path, root: Path) -> Iterator[float]:
@@ -100,19 +113,22 @@ def jobs_and_threads(
 
     One process with one thread for each core, as far as the number of tasks and the memory allow.
     If there are fewer tasks than cores, large grids use the remaining cores as threads, unless the
-    run is to be `reproducible`: the number of threads may change the last bits.
+    run is to be `reproducible`: the number of threads may change the last bits. The heaps of
+    threads must fit into the address space.
     """
     if not tasks:
         return 1, 1
     size = max(task.size for task in tasks)
+    largest = max(task.bytes for task in tasks)
     threaded = size >= THREADED_POINTS**2 and not reproducible
+    if available_addresses() < largest + ADDRESSES_PER_CORE * available_cores():
+        threaded = False
     if ranks is not None:
         if jobs not in (None, 1):
             raise InputError(f"--jobs {jobs}: under mpiexec its processes share each task")
         cores, _ = cores_and_processes_on_node(ranks, os.sched_getaffinity(0))
         return 1, min(cores, available_cores()) if threaded else 1
     cores = available_cores()
-    largest = max(task.bytes for task in tasks)
     if jobs is None:
         fitting = max(1, int(usable_memory() // largest))
         jobs = min(cores, len(tasks), fitting)

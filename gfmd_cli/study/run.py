@@ -9,6 +9,7 @@ from threading import Event
 from time import monotonic
 
 from gfmd_cli.errors import InputError, Interrupted, SpaceError
+from gfmd_cli.files.locks import waits_end_at
 from gfmd_cli.grid import plans
 from gfmd_cli.grid.ranks import Ranks, broadcast, is_root, shared_errors
 from gfmd_cli.physics.file_surface import forget_files
@@ -114,7 +115,11 @@ def run_study(
         seconds = max(options.max_seconds / 2, options.max_seconds - seconds_to_stop(pending, jobs))
         watch = _until(monotonic() + seconds, stop, watch)
     context = SolveContext(worker_options, watch, stop, ranks)
-    with signal_handlers(stop), _folder(study, tasks, ranks) as damaged:
+    with (
+        signal_handlers(stop),
+        waits_end_at(stop if ranks is None else None),  # ranks stop together
+        _folder(study, tasks, ranks) as damaged,
+    ):
         unusable = plans.plan_with(study.parts, estimated=options.reproducible)
         forget_peaks()
         forget_spectra()
@@ -222,8 +227,9 @@ def _solve_all(
     pending: list[Task], parts: Path, jobs: int, context: SolveContext
 ) -> Counter[Status]:
     """Solve tasks, on worker processes if there are several jobs; the statuses of those ended."""
+    counts: Counter[Status] = Counter()
     if jobs > 1:
-        return solve_in_pool(pending, parts, jobs, context)
-    counts = Counter(attempt(task, parts, context) for task in pending)
+        counts, pending = solve_in_pool(pending, parts, jobs, context)
+    counts.update(attempt(task, parts, context) for task in pending)
     del counts[Status.INTERRUPTED]
     return counts

@@ -7,6 +7,8 @@ from multiprocessing.connection import Connection
 from queue import SimpleQueue
 from threading import Event, Thread
 
+from gfmd_cli.errors import Interrupted
+from gfmd_cli.files.locks import waits_end_at
 from gfmd_cli.grid import plans
 from gfmd_cli.study.context import SolveContext
 from gfmd_cli.study.run_task import attempt
@@ -27,13 +29,17 @@ def serve(pipe: Connection) -> None:
     context = SolveContext(options, pipe.send)
     handle_signals_in_worker(context.stop)
     tasks: SimpleQueue[Task] = SimpleQueue()
-    Thread(target=_receive, args=(pipe, tasks, context.stop), daemon=True).start()
     try:
-        plans.plan_with(parts, estimated=options.reproducible)
-        pipe.send(READY)
-        while True:
-            pipe.send(attempt(tasks.get(), parts, context))
-    except BrokenPipeError:  # the run has ended
+        Thread(target=_receive, args=(pipe, tasks, context.stop), daemon=True).start()
+    except RuntimeError as error:
+        sys.exit(f"gfmd: a worker process: {error} (see ulimit -u)")
+    try:
+        with waits_end_at(context.stop, os.getppid()):
+            plans.plan_with(parts, estimated=options.reproducible)
+            pipe.send(READY)
+            while True:
+                pipe.send(attempt(tasks.get(), parts, context))
+    except (BrokenPipeError, Interrupted):  # the run has ended, or stops before the first task
         os._exit(1)
 
 

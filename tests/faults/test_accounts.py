@@ -10,12 +10,15 @@ import pytest
 from .conftest import SPEC
 
 NOBODY = "54321"  # a number that no account has
-AS_NOBODY = (
-    "setpriv", "--reuid", NOBODY, "--regid", NOBODY, "--clear-groups",
-    "--inh-caps", "+dac_read_search", "--ambient-caps", "+dac_read_search",
-)  # fmt: skip
-"""It can read the interpreter wherever that is, and write as any other account can."""
-GFMD = (*AS_NOBODY, sys.executable, "-P", "-m", "gfmd_cli")
+GFMD = (sys.executable, "-P", "-m", "gfmd_cli")
+
+
+def as_account(number):
+    """It can read the interpreter wherever that is, and write as any other account can."""
+    return (
+        "setpriv", "--reuid", number, "--regid", number, "--clear-groups",
+        "--inh-caps", "+dac_read_search", "--ambient-caps", "+dac_read_search",
+    )  # fmt: skip
 
 
 @pytest.fixture
@@ -32,11 +35,10 @@ def call(tmp_path):
     names = ("PATH", "PYTHONPATH", "LANG")
     bare = {name: os.environ[name] for name in names if name in os.environ}
 
-    def call(*words, **more):
+    def call(*words, account=NOBODY, limits=(), **more):
         environment = bare | {"TMPDIR": str(temporary)} | more
-        return subprocess.run(
-            [*GFMD, *words], cwd=tmp_path, env=environment, capture_output=True, text=True
-        )
+        words = [*as_account(account), *limits, *GFMD, *words]
+        return subprocess.run(words, cwd=tmp_path, env=environment, capture_output=True, text=True)
 
     return call
 
@@ -72,3 +74,21 @@ def test_other_commands_need_no_home(call, words):
     done = call(*words, TMPDIR="/proc")
     assert done.returncode == 0, done.stderr
     assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("account", "words", "said"),
+    [
+        ("54322", ("--set", "grid.points=1024", "--set", "load.p_star=0.1"), "one thread is used"),
+        ("54323", ("-j", "2"), "left to the process of the run itself"),
+    ],
+)
+def test_an_account_that_may_have_no_further_thread_solves_on_one(call, account, words, said):
+    if len(os.sched_getaffinity(0)) == 1:
+        pytest.skip("a run on one core starts no threads")
+    words = ("run", "spec.toml", "-q", "--set", "elastomer.n=0", *words)
+    done = call(*words, account=account, limits=("prlimit", "--nproc=1"))
+    assert done.returncode == 0, done.stderr
+    cache, message = done.stderr.splitlines()
+    assert "no cache folder can be written" in cache
+    assert message.endswith(said)

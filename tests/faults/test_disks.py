@@ -1,5 +1,6 @@
 """Full disks and folders that cannot be written: one message, and nothing lost."""
 
+import resource
 import shutil
 
 import pytest
@@ -8,7 +9,15 @@ from .conftest import SPEC
 from .equal import assert_same_bits
 
 RUN = ("run", "spec.toml", "-j", "1", "-q", "--checkpoint-every", "1e-3", "-o", "study.h5")
-SIZES = [*range(16, 400, 48), *range(400, 1600, 200)]  # KiB
+SPACES = [
+    *(f"size={size}k" for size in (*range(16, 400, 48), *range(400, 1600, 200))),
+    *(f"nr_inodes={count}" for count in range(2, 22, 4)),
+]
+OUTPUTS = {
+    "netCDF": ("export", "study.h5", "-o", "a.nc"),
+    "VTK": ("export", "study.h5", "-o", "a.vti", "--task", "0"),
+    "report": ("report", "study.h5"),
+}
 
 
 def test_a_full_disk_is_one_message_and_the_run_goes_on_when_there_is_space(
@@ -16,24 +25,43 @@ def test_a_full_disk_is_one_message_and_the_run_goes_on_when_there_is_space(
 ):
     monkeypatch.setenv("XDG_CACHE_HOME", str(folder / "cache"))
     assert gfmd(folder, *RUN[:-1], "unbroken.h5")[0] == 0
-    place, statuses = disk("size=64m"), []
-    for size in SIZES:
+    enough = "size=64m,nr_inodes=1000"
+    place, statuses = disk(enough), []
+    for space in SPACES:
         for path in place.iterdir():
             shutil.rmtree(path) if path.is_dir() else path.unlink()
-        disk(f"size={size}k")
+        disk(space)
         words = ("run", folder / "spec.toml", *RUN[2:])
         status, output = gfmd(place, *words)
         statuses.append(status)
-        assert status in (0, 73), (size, output)
+        assert status in (0, 73), (space, output)
         assert "Traceback" not in output
         assert ("cannot be written" in output) or status == 0
-        disk("size=64m")
+        disk(enough)
         status, output = gfmd(place, *words)
-        assert (status, output) == (0, ""), size
+        assert (status, output) == (0, ""), space
         assert_same_bits(place / "study.h5", folder / "unbroken.h5")
-    print(dict(zip(SIZES, statuses, strict=True)))
+    print(dict(zip(SPACES, statuses, strict=True)))
     assert 73 in statuses
     assert 0 in statuses
+
+
+@pytest.mark.parametrize("name", OUTPUTS)
+def test_an_output_that_cannot_be_written_is_one_message_and_leaves_nothing(folder, gfmd, name):
+    assert gfmd(folder, *RUN)[0] == 0
+    before = sorted(folder.iterdir())
+    for kib in (4, 16, 40, 100):
+
+        def limit(size=1024 * kib):
+            resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
+
+        status, output = gfmd(folder, *OUTPUTS[name], before=limit)
+        if status != 0:
+            assert status == 73, (kib, output)
+            assert "cannot be written: File too large" in output
+            assert len(output.splitlines()) == 1
+            assert sorted(folder.iterdir()) == before
+    assert gfmd(folder, *OUTPUTS[name])[0] == 0
 
 
 def test_a_read_only_folder_is_status_73_and_can_be_read(folder, gfmd, disk):

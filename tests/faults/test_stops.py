@@ -2,6 +2,7 @@
 
 import os
 import random
+import select
 import shutil
 import signal
 import subprocess
@@ -11,10 +12,13 @@ from collections import Counter
 
 import pytest
 
+from gfmd_cli.files.locks import locked
+
 from .conftest import SIGNALS
 from .equal import assert_same_bits
 
 KILLS = 100
+STARTS = 20
 READER = """
 import sys, h5py
 with h5py.File(sys.argv[1], "r") as file:  # with HDF5's own lock
@@ -22,6 +26,20 @@ with h5py.File(sys.argv[1], "r") as file:  # with HDF5's own lock
     input()
     print(set(file["status"].asstr()[()]))
 """
+LOSING = """
+import signal, sys
+from gfmd_cli.__main__ import main
+class Finder:
+    def find_spec(self, name, path, target=None):
+        if name == "gfmd_cli.cli":
+            try:
+                signal.raise_signal(int(sys.argv[1]))
+            except BaseException:
+                raise ImportError("initialization failed")
+sys.meta_path.insert(0, Finder())
+main()
+"""
+"""An import that turns every exception into an ImportError, as those of compiled modules do."""
 RUN = ("run", "spec.toml", "-j", "1", "-q", "--checkpoint-every", "1e-3", "-o")
 
 
@@ -79,6 +97,48 @@ def test_a_second_interrupt_leaves_at_once(folder, start):
     time.sleep(0.05)
     child.signal(signal.SIGINT)
     assert child.wait() in (130, 75)
+
+
+@pytest.mark.parametrize("name", ["SIGTERM", "SIGINT"])
+def test_a_signal_during_an_import_ends_the_command_without_a_message(name):
+    number = SIGNALS[name]
+    words = [sys.executable, "-P", "-c", LOSING, str(int(number))]
+    done = subprocess.run(words, capture_output=True, text=True)
+    assert (done.returncode, done.stdout, done.stderr) == (128 + number, "", "")
+
+
+def test_a_signal_at_any_moment_of_the_start_is_a_quiet_end_or_a_saved_state(folder, command):
+    words, rng, statuses = [*command, *RUN, "study.h5"], random.Random(1), Counter()
+    for _ in range(STARTS):
+        process = subprocess.Popen(words, cwd=folder, stderr=subprocess.PIPE, text=True)
+        time.sleep(rng.uniform(0, 1))
+        process.terminate()
+        said = process.communicate()[1]
+        statuses[process.returncode] += 1
+        assert "Traceback" not in said
+        assert "Exception" not in said
+    print(dict(statuses))
+    assert set(statuses) <= {143, -signal.SIGTERM, 75, 0}
+    assert statuses[143]
+
+
+@pytest.mark.parametrize("name", ["collecting", "planning"])
+def test_a_run_says_that_it_waits_for_another_process_and_is_stopped(folder, command, gfmd, name):
+    with locked(folder / "study.parts" / name):
+        process = subprocess.Popen(
+            [*command, *RUN, "study.h5"], cwd=folder, stderr=subprocess.PIPE, text=True
+        )
+        assert select.select([process.stderr], [], [], 30)[0]
+        first = process.stderr.readline()
+        assert f"waiting for 'study.parts/{name}', in use by process {os.getpid()} on " in first
+        process.terminate()
+        begun = time.monotonic()
+        said = process.communicate()[1]
+        assert time.monotonic() - begun < 5
+        assert process.returncode == 75
+    assert len(said.splitlines()) == 1
+    assert "run again" in said
+    assert gfmd(folder, *RUN, "study.h5") == (0, "")
 
 
 def test_max_hours_ends_in_time_with_all_saved(folder, gfmd):
