@@ -146,8 +146,7 @@ class Dual(Solver):
         for _ in range(MAX_HALVINGS):
             target = np.where(chosen, stress + state.length * state.direction, 0.0)
             clipped = _any_negative(grid, target)
-            np.maximum(target, 0.0, out=target)
-            target *= contact.pressure * grid.size / grid.total(target.sum())  # [4]
+            target[chosen] = _projected(grid, target[chosen], contact.pressure * grid.size)  # [4]
             move = target - stress
             free.displacement(move, out=change)
             state.transforms += free.transforms
@@ -195,6 +194,17 @@ def _chosen(contact: FreeContact, state: DualState) -> Mask:
     if contact.grid.dot(outside, outside) > MAX_OVERLAP_RATIO**2 * contact.grid.dot(inside, inside):
         touching |= overlapping
     return touching
+
+
+def _projected(grid: Grid, values: Field, total: float) -> Field:
+    """max(values - shift, 0) with the shift >= 0 that gives this sum (Michelot 1986)."""
+    shift, count = -np.inf, np.inf
+    while True:
+        kept = values[values > shift]
+        kept_sum, kept_count = grid.total(np.array([kept.sum(), kept.size]))
+        if kept_count >= count:
+            return np.maximum(values - shift, 0.0)
+        shift, count = (kept_sum - total) / kept_count, kept_count
 
 
 def _any_negative(grid: Grid, values: Field) -> bool:
