@@ -30,7 +30,13 @@ from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.physics.contact import Contact
 from gfmd_cli.physics.free_contact import FreeContact
 from gfmd_cli.solvers.loop import Solver, Start, State
-from gfmd_cli.solvers.projected_move import MAX_HALVINGS, choose, polak_ribiere
+from gfmd_cli.solvers.projected_move import (
+    MAX_HALVINGS,
+    choose,
+    feasible,
+    polak_ribiere,
+    projected,
+)
 
 MAX_OVERLAP_RATIO = 0.3  # of the rms gap on overlapping points to that in contact; as in `pcg`
 
@@ -129,10 +135,10 @@ class Dual(Solver):
         direction = state.direction
         direction *= beta
         direction -= z
+        direction[chosen] = feasible(grid, direction[chosen], state.sigma[chosen])
         direction[~chosen] = 0.0
-        direction[chosen] -= grid.mean(direction[chosen])
         if grid.dot(direction, force) >= 0:
-            np.negative(z, out=direction)
+            direction[chosen] = feasible(grid, -z[chosen], state.sigma[chosen])
 
     def _advance(self, contact: FreeContact, state: DualState, chosen: Mask) -> None:
         """Move along the direction such that the energy does not rise."""
@@ -146,7 +152,7 @@ class Dual(Solver):
         for _ in range(MAX_HALVINGS):
             target = np.where(chosen, stress + state.length * state.direction, 0.0)
             clipped = _any_negative(grid, target)
-            target[chosen] = _projected(grid, target[chosen], contact.pressure * grid.size)  # [4]
+            target[chosen] = projected(grid, target[chosen], contact.pressure * grid.size)  # [4]
             move = target - stress
             free.displacement(move, out=change)
             state.transforms += free.transforms
@@ -194,17 +200,6 @@ def _chosen(contact: FreeContact, state: DualState) -> Mask:
     if contact.grid.dot(outside, outside) > MAX_OVERLAP_RATIO**2 * contact.grid.dot(inside, inside):
         touching |= overlapping
     return touching
-
-
-def _projected(grid: Grid, values: Field, total: float) -> Field:
-    """max(values - shift, 0) with the shift >= 0 that gives this sum (Michelot 1986)."""
-    shift, count = -np.inf, np.inf
-    while True:
-        kept = values[values > shift]
-        kept_sum, kept_count = grid.total(np.array([kept.sum(), kept.size]))
-        if kept_count >= count:
-            return np.maximum(values - shift, 0.0)
-        shift, count = (kept_sum - total) / kept_count, kept_count
 
 
 def _any_negative(grid: Grid, values: Field) -> bool:

@@ -7,6 +7,11 @@ the line are feasible.
 
 from typing import NamedTuple
 
+import numpy as np
+
+from gfmd_cli.grid.arrays import Field
+from gfmd_cli.grid.fft_grid import Grid
+
 MIN_FULL_MOVE = 0.5  # a full move lowers the energy if its best fraction is above 1/2
 MAX_HALVINGS = 60  # of a move along which the energy rises; beyond, it is rounding
 LENGTH_CHANGE = (0.5, 2.0)  # range of the factor by which a projected move changes the next length
@@ -31,6 +36,32 @@ def choose(best: float, exact: bool) -> MoveChoice:
     is_full = best >= MIN_FULL_MOVE
     fraction = 1.0 if is_full else max(best, 0.0)
     return MoveChoice(fraction, min(max(best, low), high), not is_full)
+
+
+def feasible(grid: Grid, direction: Field, stress: Field) -> Field:
+    """A direction with the mean zero, and zero where it would make a stress of zero tensile.
+
+    Without such points the energy falls at first along the projected direction (Bertsekas, SIAM J.
+    Control Optim. 20, 221, 1982).
+    """
+    direction = direction - grid.mean(direction)
+    moving = (stress > 0) | (direction > 0)
+    return np.where(moving, direction - grid.mean(direction[moving]), 0.0)
+
+
+def projected(grid: Grid, stress: Field, total: float) -> Field:
+    """The nearest stress >= 0 with this sum: max(stress - shift, 0).
+
+    Michelot, J. Optim. Theory Appl. 50, 195, 1986. The mean gap in contact is zero, so that a small
+    shift does not change the energy; a factor would.
+    """
+    shift, count = -np.inf, np.inf
+    while True:
+        kept = stress[stress > shift]
+        kept_sum, kept_count = grid.total(np.array([kept.sum(), kept.size]))
+        if kept_count >= count:
+            return np.maximum(stress - shift, 0.0)
+        shift, count = (kept_sum - total) / kept_count, kept_count
 
 
 def polak_ribiere(z_change: float, slope: float) -> float:
