@@ -213,6 +213,21 @@ def test_energy_never_rises():
     assert len(energies) > 10
 
 
+@pytest.mark.parametrize(("n", "points", "p_star"), [(1.5, 64, 0.01), (1.5, 256, 0.001)])
+def test_a_spike_does_not_stop_the_solver(n, points, p_star, tmp_path):
+    """It carries much more of the load on coarse grids than on the finest."""
+    rough = build_scene(SelfAffine(cutoff=0.05), HalfSpace(), points).contact(0.1).height
+    rng = np.random.default_rng(1)
+    heights = 0.3 * rough + 0.1 * rng.standard_normal(rough.shape)
+    heights.flat[rng.choice(heights.size)] += 45.0
+    np.save(tmp_path / "map.npy", heights)
+    surface = FileSurface(path=tmp_path / "map.npy", level="none", length=float(points))
+    scene = build_free_scene(surface, Power(n=n), points)
+    solution = solve_contact(scene.contact(p_star), Auto(max_steps=300))
+    assert solution.status == "converged"
+    assert solution.transforms < 3000
+
+
 def average_pixels(values, shape):
     grid, target = (Grid(columns, points_y=rows) for rows, columns in (values.shape, shape))
     return grid.average(values, target)

@@ -8,9 +8,9 @@ step of the method, with the numbers beside the code lines:
     change: those in contact and, by proportioning (Dostal, SIAM J. Optim. 7, 871, 1997), those
     without stress where the bodies overlap.
 [2] Precondition the gap of these points by the stiffness K, and subtract the mean.
-[3] Compute a Polak-Ribiere+ direction d.
-[4] Project the move of length l on the constraints: s -> a max(s + l d, 0), where a restores the
-    mean.
+[3] Compute a Polak-Ribiere+ direction d, zero where it would make a stress of zero tensile.
+[4] Project the move of length l on the constraints: s -> max(s + l d - shift, 0), where the shift
+    restores the mean.
 [5] Go to the point of lowest energy on the straight line to the projected point.
 
 A step applies C once, to the projected move; l is that of the step before, corrected by the ratio

@@ -21,7 +21,7 @@ from gfmd_cli.grid.arrays import Field, Mask
 from gfmd_cli.physics.contact import Contact
 from gfmd_cli.solvers.local_kernels import mark_entered
 from gfmd_cli.solvers.loop import Start
-from gfmd_cli.solvers.projected_move import choose, polak_ribiere
+from gfmd_cli.solvers.projected_move import choose, feasible, polak_ribiere, projected
 from gfmd_cli.solvers.tile_operators import Indices, TileOperators
 from gfmd_cli.solvers.tiles import SIDE, Tiles
 
@@ -194,27 +194,23 @@ class LocalSolve:
             z = _balanced(self.map_displacement(force).ravel()[active])
             old, slope = slope, _dot(z, active_force)
             beta = polak_ribiere(slope - _dot(z, last), old)
-            active_direction = _balanced(z + beta * direction.ravel()[active])
+            active_direction = feasible(self.grid, z + beta * direction.ravel()[active], active_s)
             if _dot(active_direction, active_force) <= 0:
-                active_direction = z
+                active_direction = feasible(self.grid, z, active_s)
             direction = _field(active_direction, active, s)
-            step = length * active_direction
-            move = np.maximum(step, -active_s)
+            target = active_s + length * active_direction
+            clipped = bool((target < 0).any())
+            move = projected(self.grid, target, self.total) - active_s
             change = self.compliance(_field(move, active, s))
             curvature = _dot(move, change.ravel()[active])
             best = -_dot(move, active_gap) / curvature if curvature > 0 else 1.0
-            exact = np.array_equal(step, move) and (
-                best <= 1 or float((active_s + best * move).min()) >= 0
-            )
+            exact = not clipped and (best <= 1 or float((active_s + best * move).min()) >= 0)
             choice = choose(best, exact)
             length *= choice.factor
             if choice.restart:
                 slope = 0.0
-            active_s = np.maximum(active_s + choice.fraction * move, 0.0)
-            scale = self.total / float(active_s.sum())
-            s = _field(scale * active_s, active, s)
+            s = _field(np.maximum(active_s + choice.fraction * move, 0.0), active, s)
             w += choice.fraction * change
-            w *= scale
         self.s = s
 
 
