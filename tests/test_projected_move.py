@@ -53,6 +53,11 @@ def test_a_stress_of_this_sum_is_its_own_projection():
     assert np.array_equal(projected(GRID, stress, 3.0), stress)
 
 
+def test_after_a_huge_move_the_largest_stress_takes_all():
+    stress = np.array([1e30, -1e30, 2e30, 0.0])
+    assert np.array_equal(projected(GRID, stress, 1e-8), [0.0, 0.0, 1e-8, 0.0])
+
+
 def test_a_feasible_direction_has_no_mean_and_takes_no_stress_below_zero():
     rng = np.random.default_rng(1)
     direction, stress = rng.normal(size=64), np.maximum(rng.normal(size=64), 0.0)

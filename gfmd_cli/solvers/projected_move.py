@@ -55,6 +55,7 @@ def projected(grid: Grid, stress: Field, total: float) -> Field:
     Michelot, J. Optim. Theory Appl. 50, 195, 1986. The mean gap in contact is zero, so that a small
     shift does not change the energy; a factor would.
     """
+    stress = stress - grid.max(float(stress.max(initial=-np.inf)))  # so that one is always kept
     shift, count = -np.inf, np.inf
     while True:
         kept = stress[stress > shift]
