@@ -14,14 +14,14 @@ WITH_OPTIONS = [
     if "ArgumentParser(" in path.read_text("utf-8")
 ]
 SMALL = {
-    "accuracy_gain.py": "--max-points 128",
+    "accuracy_gain.py": "--max-points 400",
     "cost.py": "--table-only --points 128 --sizes 128 --repeats 1",
     "economy.py": "--points 400",
     "energy_weights.py": "none.jsonl --no-run",
     "hard_cases.py": "--points 32 --only cliff --seconds 1",
     "indenter_bars.py": "--points 64 --line-reference 256 --round-reference 128 --exponents 1 "
     "--pressures 1",
-    "load_searches.py": "--points 64 --seeds 10",
+    "load_searches.py": "--points 128 --seeds 10",
     "neighbour_start.py": "--points 512 --p-star 0.001 0.0011",
     "plain_processor.py": "",
     "plate_areas.py": "none.jsonl --no-run",
