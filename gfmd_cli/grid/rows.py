@@ -8,6 +8,7 @@ are added in a fixed order. The results therefore do not depend on the number of
 import warnings
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from functools import cache
 from itertools import pairwise
 from threading import Barrier
 from typing import Any, ClassVar
@@ -28,13 +29,17 @@ def started_pool(threads: int) -> ThreadPoolExecutor | None:
         list(pool.map(lambda _: started.wait(), range(threads)))
     except RuntimeError as error:
         pool.shutdown(wait=False, cancel_futures=True)
-        warnings.warn(
-            f"{error} (see ulimit -u, -v); one thread is used", RuntimeWarning, stacklevel=1
-        )
+        _warn_once(f"{error} (see ulimit -u, -v); one thread is used")
         return None
     finally:
         started.abort()  # else the threads would wait for ever for those that have not started
     return pool
+
+
+@cache
+def _warn_once(message: str) -> None:
+    """Give a warning at its first call with this message: every grid has threads."""
+    warnings.warn(message, RuntimeWarning, stacklevel=1)
 
 
 class LocalRows:
