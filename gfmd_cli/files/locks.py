@@ -21,7 +21,7 @@ NO_LOCKS = {errno.ENOLCK, errno.ENOTSUP, errno.EOPNOTSUPP, errno.ENOSYS, errno.E
 """What a file system without locks answers; 524 is the kernel's ENOTSUPP, of NFS and Lustre."""
 ATTEMPTS = 50  # at a file whose folder is removed again and again by other processes
 WAIT_SECONDS = 0.02, 0.5  # between two attempts, at first and after a long time
-NOTE_SECONDS = 2.0  # of waiting before a message says so
+LONG_SECONDS = 2.0  # of waiting, after which a message says so and a signal ends the wait
 MAX_BYTES = 4096  # of the text in a plain lock
 UNREADABLE_SECONDS = 2.0  # that a plain lock may be without the name of its owner, who writes it
 OWNED_SECONDS = 600.0  # to wait for the owner of a plain lock, who may be dead on another machine
@@ -33,7 +33,7 @@ _run = 0
 
 @contextmanager
 def waits_end_at(stop: Event | None, run: int = 0) -> Iterator[None]:
-    """Inside, a process that waits for a lock raises Interrupted once `stop` is set.
+    """Inside, a process that has waited long for a lock raises Interrupted once `stop` is set.
 
     A worker gives the number of the process of its `run`: no wait for another worker is announced.
     """
@@ -91,15 +91,20 @@ class _Wait:
         self.path, self.since, self.is_announced = path, time.monotonic(), False
 
     def pause(self, owner: dict[str, str | int] | None) -> None:
-        """Sleep until the next attempt; `owner` has the lock. Raises Interrupted."""
-        by = f"process {owner['pid']} on {owner['host']}" if owner else "another process"
-        if _stop is not None and _stop.is_set():
-            raise Interrupted(f"stopped; {self.path} is in use by {by}; run again to continue")
+        """Sleep until the next attempt; `owner` has the lock.
+
+        Raises Interrupted after a long wait only: a run that is stopped still solves the tasks that
+        its workers have begun, and these wait for each other.
+        """
         waited = time.monotonic() - self.since
-        if waited > NOTE_SECONDS and not self.is_announced:
-            self.is_announced = True
-            if owner is None or _run == 0 or _parent(int(owner["pid"])) != _run:
+        if waited > LONG_SECONDS:
+            by = f"process {owner['pid']} on {owner['host']}" if owner else "another process"
+            if _stop is not None and _stop.is_set():
+                raise Interrupted(f"stopped; {self.path} is in use by {by}; run again to continue")
+            is_foreign = owner is None or _run == 0 or _parent(int(owner["pid"])) != _run
+            if is_foreign and not self.is_announced:
                 log.warning("gfmd: waiting for %r, in use by %s", str(self.path), ascii(by)[1:-1])
+            self.is_announced = True
         shortest, longest = WAIT_SECONDS
         time.sleep(min(longest, max(shortest, waited / 10)))
 
