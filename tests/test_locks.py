@@ -94,7 +94,7 @@ def test_the_lock_of_a_killed_process_is_free(lock, kind, holder):
 def test_a_long_wait_is_announced_once_with_its_owner_and_ends_with_the_run(
     lock, kind, holder, monkeypatch, caplog
 ):
-    monkeypatch.setattr(locks, "NOTE_SECONDS", 0.05)
+    monkeypatch.setattr(locks, "LONG_SECONDS", 0.05)
     process, stop = holder(kind, "exclusive"), Event()
     owner = f"process {process.pid} on {socket.gethostname()}"
     Timer(0.5, stop.set).start()
@@ -110,7 +110,7 @@ def test_a_long_wait_is_announced_once_with_its_owner_and_ends_with_the_run(
 
 
 def test_a_wait_for_another_worker_of_the_run_is_not_announced(lock, holder, monkeypatch, caplog):
-    monkeypatch.setattr(locks, "NOTE_SECONDS", 0.05)
+    monkeypatch.setattr(locks, "LONG_SECONDS", 0.05)
     holder("kernel", "exclusive")
     stop = Event()
     Timer(0.3, stop.set).start()
