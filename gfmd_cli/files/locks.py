@@ -7,8 +7,9 @@ import logging
 import os
 import socket
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from functools import partial
 from pathlib import Path
 from threading import Event
 from typing import BinaryIO
@@ -69,7 +70,7 @@ def locked(path: Path, *, shared: bool = False, wait: bool = True) -> Iterator[b
                 if not wait:
                     yield False
                     return
-                waiting.pause(_holder(file.fileno()))
+                waiting.pause(partial(_holder, file.fileno()))
                 continue
             except OSError as error:
                 if error.errno not in NO_LOCKS:
@@ -90,14 +91,15 @@ class _Wait:
     def __init__(self, path: Path) -> None:
         self.path, self.since, self.is_announced = path, time.monotonic(), False
 
-    def pause(self, owner: dict[str, str | int] | None) -> None:
-        """Sleep until the next attempt; `owner` has the lock.
+    def pause(self, find_owner: Callable[[], dict[str, str | int] | None]) -> None:
+        """Sleep until the next attempt; after a long wait, find out who has the lock.
 
         Raises Interrupted after a long wait only: a run that is stopped still solves the tasks that
         its workers have begun, and these wait for each other.
         """
         waited = time.monotonic() - self.since
         if waited > LONG_SECONDS:
+            owner = find_owner()
             by = f"process {owner['pid']} on {owner['host']}" if owner else "another process"
             if _stop is not None and _stop.is_set():
                 raise Interrupted(f"stopped; {self.path} is in use by {by}; run again to continue")
@@ -174,7 +176,7 @@ def _owned(path: Path, shared: bool, wait: bool) -> Iterator[bool]:
                 "dead, delete this file)"
             )
         else:
-            waiting.pause(owner)
+            waiting.pause(partial(_owner, path))
     own_record = _owner(path)
     try:
         yield True

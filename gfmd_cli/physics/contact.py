@@ -75,7 +75,7 @@ class Contact:
         """k(q) of the waves along x, from q = 0 on, shape (points/2 + 1,)."""
         return self.grid.along_x(self.stiffness)
 
-    @property
+    @cached_property
     def grid_of_moves(self) -> Grid:
         """The grid for K times a move: in single precision, because moves are small.
 

@@ -102,9 +102,9 @@ def solve_contact(
         rounding = contact.lay_pressed(state.u, state.sigma, state.residual)
         if rounding == 0:
             break
-        transforms += contact.grid_of_moves.pair_count
-        rounding = hypot(state.rounding, rounding)
-        state = solver.begin_from(Start(contact, transforms, state.u, state.sigma, rounding))
+        pair, rounding = contact.grid_of_moves.pair_count, hypot(state.rounding, rounding)
+        state = solver.begin_from(Start(contact, pair, state.u, state.sigma, rounding))
+        transforms += pair
         state.coarser_transforms = transforms
         status = solve(contact, solver, state, watch)
         transforms += state.transforms

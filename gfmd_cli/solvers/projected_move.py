@@ -41,8 +41,8 @@ def choose(best: float, exact: bool) -> MoveChoice:
 def feasible(grid: Grid, direction: Field, stress: Field) -> Field:
     """A direction with the mean zero, and zero where it would make a stress of zero tensile.
 
-    Without such points the energy falls at first along the projected direction (Bertsekas, SIAM J.
-    Control Optim. 20, 221, 1982).
+    With such points the energy may rise along the projected direction, however short the move
+    (Bertsekas, SIAM J. Control Optim. 20, 221, 1982).
     """
     direction = direction - grid.mean(direction)
     moving = (stress > 0) | (direction > 0)
