@@ -250,18 +250,21 @@ def test_a_start_is_not_predicted_on_tiles_most_of_which_are_new():
     assert contact.residual(start.u, contact.stress(start.u, np.empty(height.shape))) < 0.1
 
 
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-5])
 @pytest.mark.parametrize("has_holes", [False, True])
-@pytest.mark.parametrize("n", [0.5, 1, 2])
-def test_the_stress_of_a_start_is_that_of_its_displacement(n, has_holes):
+@pytest.mark.parametrize("n", [0.75, 1, 2])
+def test_the_stress_of_a_start_is_that_of_its_displacement(n, has_holes, tolerance):
+    """Up to the rounding of single precision, if that is far below the tolerance."""
     contact = build_scene(SelfAffine(cutoff=0.05), Power(n=n), 512).contact(3e-4)
     if has_holes:
         known = np.random.default_rng(0).random(contact.grid.shape) > 0.1
         contact = replace(contact, may_touch=known)
-    local = solve(contact, True, 1e-3)
+    local = solve(contact, True, tolerance)
     assert local.steps == 0
     stress = contact.stress(local.u, out=np.empty_like(local.u))
-    assert contact.as_residual(np.sum((local.sigma - stress) ** 2)) < 1e-6
-    assert local.residual == pytest.approx(contact.residual(local.u, stress), abs=1e-6)
+    assert contact.as_residual(np.sum((local.sigma - stress) ** 2)) < 0.2 * tolerance
+    assert local.residual == pytest.approx(contact.residual(local.u, stress), abs=0.05 * tolerance)
+    assert contact.residual(local.u, stress) < tolerance
     assert np.all(local.u >= contact.obstacle)
 
 
@@ -287,7 +290,7 @@ def test_a_solve_stopped_on_a_coarse_grid_goes_on_bit_by_bit(boundary):
         states.append((current.grid.whole_shape, copy.deepcopy(state)))
 
     straight = solve(contact, True, 1e-6, keep)
-    assert states[-1][0] == {"periodic": (256, 256), "free": (512, 512)}[boundary]
+    assert states[-1][0] == {"periodic": (128, 128), "free": (512, 512)}[boundary]
     coarse = [at for at, (shape, _) in enumerate(states) if shape[0] < 512]
     for chosen in (coarse[1], coarse[len(coarse) // 2], coarse[-1], len(states) - 1):
         shape, state = states[chosen]
@@ -311,7 +314,7 @@ def test_a_solve_on_tiles_notices_a_request_to_stop(boundary):
 
     with pytest.raises(KeyboardInterrupt):
         solve(contact, True, 1e-6, stop_at_the_third)
-    assert states[-1][0] == {"periodic": (256, 256), "free": (128, 128)}[boundary]
+    assert states[-1][0] == (128, 128)
 
 
 @pytest.mark.parametrize("boundary", ["periodic", "free"])

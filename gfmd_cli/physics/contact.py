@@ -381,15 +381,16 @@ def _stiffness(grid: Grid, elastomer: LinearElastomer) -> tuple[Field, float]:
     with np.errstate(over="ignore"):  # refused below
         for rows in row_blocks(k[:count]):
             k[rows] = elastomer.stiffness(grid.wavenumber(rows), grid.length)
-    k[count:] = k[len(k) - count : 0 : -1]
-    stiffest = grid.max(float(k.max()))
+    half = k[:count]
+    stiffest = grid.max(float(half.max()))
     if not (np.isfinite(stiffest) and stiffest > 0):
         raise InputError(f"elastomer: stiffness {stiffest} at the shortest wave is out of range")
-    k /= stiffest
-    waves = k.ravel()[1:] if grid.ends[0] else k  # the first is q = 0
+    half /= stiffest
+    waves = half.ravel()[1:] if grid.ends[0] else half  # the first is q = 0
     softest = -grid.max(-float(waves.min()))
     if not softest >= SCALE_RANGE[0]:
         raise InputError(f"elastomer: stiffness falls to {softest:g} of its largest value")
+    k[count:] = k[len(k) - count : 0 : -1]
     return k, stiffest
 
 

@@ -13,6 +13,7 @@ is corrected in the next solve on the tiles.
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from math import sqrt
 from typing import ClassVar
 
 import numpy as np
@@ -20,13 +21,12 @@ import numpy as np
 from gfmd_cli.grid.arrays import Field, Mask
 from gfmd_cli.physics.contact import Contact
 from gfmd_cli.solvers.local_kernels import mark_entered
-from gfmd_cli.solvers.loop import Start
+from gfmd_cli.solvers.loop import ROUNDING_MARGIN, Start
 from gfmd_cli.solvers.projected_move import choose, feasible, polak_ribiere, projected
 from gfmd_cli.solvers.tile_operators import Indices, TileOperators
 from gfmd_cli.solvers.tiles import SIDE, Tiles
 
 UNCORRECTED_TOLERANCE = 6e-3  # of the first solve, before the operators are corrected; a choice
-FIRST_RESIDUAL = 0.01  # of the start after that; measured: 0.007 to 0.1
 REDUCTION_RANGE = (1e-3, 0.02)
 """Smallest and largest factor by which a solve on tiles shall reduce the residual. The smallest is
 the relative error of the operators; the largest is a choice, because an evaluation at all points
@@ -35,6 +35,8 @@ ACCEPTED_FRACTION = 0.75
 """Of the tolerance, for the predicted residual of the start. The residual itself may be larger
 (docs/solvers.md)."""
 TARGET_FRACTION = 0.5  # of the tolerance, for that residual after the next solve; a choice
+MAX_ROUNDING = sqrt(1 - ACCEPTED_FRACTION**2) / ROUNDING_MARGIN
+"""Of the tolerance, for the rounding of an evaluation in single precision that may be the last."""
 MAX_GROWTH = 1.5  # of the number of tiles in an evaluation that may be the last one; a choice
 MAX_EVALUATIONS = 6  # of the displacement at all points; a choice
 MAX_STEPS = 60  # on the same tiles; a choice
@@ -52,6 +54,8 @@ class Evaluation:
     """Natural residual of s and C s."""
     start_residual: float
     """Natural residual of the start."""
+    rounding: float
+    """Estimate of what single precision adds to that residual; 0 in double precision."""
 
 
 class LocalSolve:
@@ -98,7 +102,7 @@ class LocalSolve:
         return self.map_pressure(s)
 
     def compliance_everywhere(self, *, in_single_precision: bool) -> Field:
-        """C s at all points, in single precision if that is allowed and faster.
+        """C s at all points, in single precision if that is allowed and possible.
 
         Valid until the next call.
         """
@@ -124,17 +128,18 @@ class LocalSolve:
         """Solve until the start has a residual below the tolerance, with the exact C in the end.
 
         Returns the last evaluation, and C s at all points. The first evaluation corrects operators
-        with an error of 1e-3 and may be in single precision, unless the tolerance is so loose that
-        it may be the last one.
+        with an error of 1e-3 and is in single precision, the others where that is accurate enough.
         """
         target, accepted = UNCORRECTED_TOLERANCE, ACCEPTED_FRACTION * tolerance
+        in_single_precision = True
         for count in range(1, MAX_EVALUATIONS + 1):
             self.run(target)
-            in_single_precision = count == 1 and accepted < FIRST_RESIDUAL
             displacement = self.compliance_everywhere(in_single_precision=in_single_precision)
             max_tiles = MAX_GROWTH * self.tiles.count
             result = self.evaluate(displacement, accepted)
-            is_final = not in_single_precision and self.tiles.count <= max_tiles
+            is_accurate = result.rounding < MAX_ROUNDING * tolerance
+            in_single_precision &= is_accurate
+            is_final = is_accurate and self.tiles.count <= max_tiles
             if (is_final and result.start_residual < accepted) or count == MAX_EVALUATIONS:
                 break
             if result.start_residual > 0:  # it can be zero: one point in contact, or all
@@ -154,7 +159,9 @@ class LocalSolve:
             gap = self.tiles.take(displacement) - self.obstacle
         gap -= level
         gap_of_start, start_residual = self.lay(gap, tolerance)
-        return Evaluation(level, gap_of_start, self.residual(gap, self.s), start_residual)
+        is_single = displacement.dtype == np.float32
+        rounding = self.contact.rounding(displacement) if is_single else 0.0
+        return Evaluation(level, gap_of_start, self.residual(gap, self.s), start_residual, rounding)
 
     def add_entered(self, displacement: Field, level: float) -> bool:
         """Add tiles in which C s - level is below h, and those around; whether there are any."""

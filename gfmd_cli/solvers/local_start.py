@@ -9,6 +9,7 @@ it takes the displacement, which is laid on the indenter before.
 
 from collections.abc import Callable
 from itertools import pairwise
+from math import hypot
 from typing import ClassVar
 
 import numpy as np
@@ -22,6 +23,7 @@ from gfmd_cli.solvers.tile_operators import FreeOperators, PeriodicOperators
 from gfmd_cli.solvers.tiles import SIDE, Tiles
 
 SMALLEST_EXPONENT = 0.2  # of k(q) for which there are tiles; measured from 0.25 on
+MIN_COARSE_POINTS = 256  # per side, of a grid before the finest; measured: 128 to 512
 COARSE_TOLERANCE = 0.03  # on grids before the finest; measured: 0.01 to 0.1 differ by 5 %
 MAX_JACOBI_STEPS = 6  # after C s is laid on the indenter; with 8 the prediction is worse
 MAX_JACOBI_REDUCTION = 4.0  # of the residual by these steps; measured: 3 to 5
@@ -45,7 +47,8 @@ def start_from(
     last, transforms = finer[-1], 0.0
     shapes = [contact.grid.shape for contact in (coarse, *finer)]
     doubled = all(b == tuple(2 * n for n in a) for a, b in pairwise(shapes))
-    if not doubled or not all(map(tiles_apply, finer)):
+    is_large = min(finer[0].grid.shape) >= MIN_COARSE_POINTS
+    if not (doubled and is_large and all(map(_operators_apply, finer))):
         return None
     solve_on_tiles = LOCAL_SOLVES[last.boundary]
     highest, decrease, lowest = solve_on_tiles.max_fraction
@@ -72,11 +75,15 @@ def start_from(
 
 
 def tiles_apply(contact: Contact) -> bool:
-    """Whether the operators on tiles apply, and a solve on tiles can be faster."""
+    """Whether a start on tiles of this grid is possible, and can be faster."""
+    is_large = min(contact.grid.shape) >= LOCAL_SOLVES[contact.boundary].min_points
+    return is_large and _operators_apply(contact)
+
+
+def _operators_apply(contact: Contact) -> bool:
+    """Whether the operators on tiles apply to a grid, whatever its size."""
     grid, solve_on_tiles = contact.grid, LOCAL_SOLVES[contact.boundary]
     if grid.dimension == 1 or not grid.whole:
-        return False
-    if min(grid.shape) < solve_on_tiles.min_points:
         return False
     if any(points % SIDE for points in grid.shape) or min(grid.spacings) < 0.5 * max(grid.spacings):
         return False
@@ -126,7 +133,7 @@ class PeriodicSolve(LocalSolve):
 
     def compliance_everywhere(self, *, in_single_precision: bool) -> Field:
         """C s at all points, in the memory of the transforms."""
-        grid = self.grid.in_single() if in_single_precision else self.grid
+        grid = self.contact.grid_of_moves if in_single_precision else self.grid
         values = grid.padded[..., : grid.points]
         self.tiles.put(self.s, values)
         grid.unfilter_padded(self.contact.stiffness, self.tiles.blocks)
@@ -141,10 +148,10 @@ class PeriodicSolve(LocalSolve):
         result, displacement = self.solve(tolerance)
         contact, tiles, moves = self.contact, self.tiles, self.contact.grid_of_moves
         u = self.grid.empty()  # only now: the solves on tiles need memory, too
-        laid, before = self.obstacle + result.gap, tiles.take(displacement) - result.level
+        np.subtract(displacement, result.level, out=u, dtype=np.float64)
+        laid, before = self.obstacle + result.gap, tiles.take(u)
         if contact.may_touch is not None:
             laid = np.where(tiles.take(contact.may_touch), laid, before)
-        np.subtract(displacement, result.level, out=u)
         tiles.overwrite(laid, u)
         if result.gap.min() > 0:
             return Start(contact, self.transforms, u)
@@ -156,7 +163,8 @@ class PeriodicSolve(LocalSolve):
         sigma = self.grid.empty()
         sigma[...] = values
         tiles.overwrite(self.s + tiles.take(values), sigma)
-        return Start(contact, self.transforms, u, sigma, contact.rounding(change))
+        rounding = hypot(contact.rounding(change), result.rounding)
+        return Start(contact, self.transforms, u, sigma, rounding)
 
     def lay(self, gap: Field, tolerance: float) -> tuple[Field, float]:
         """The gap on the tiles after C s is laid on the indenter, and its natural residual.

@@ -144,11 +144,14 @@ def ignore(contact: Contact, state: State) -> None:
 
 
 def is_certain(contact: Contact, state: State, tolerance: float) -> bool:
-    """Whether the residual of an updated sigma is below a tolerance despite all rounding."""
-    margin = (tolerance - state.residual) / ROUNDING_MARGIN
-    if not 0 < state.rounding < margin:
+    """Whether the residual of an updated sigma is below a tolerance despite all rounding.
+
+    Squares are added: the errors of the points by rounding do not depend on their violations.
+    """
+    if state.rounding == 0 or hypot(state.residual, ROUNDING_MARGIN * state.rounding) >= tolerance:
         return False
-    return hypot(state.rounding, contact.rounding(state.u)) < margin
+    rounding = hypot(state.rounding, contact.rounding(state.u))
+    return hypot(state.residual, ROUNDING_MARGIN * rounding) < tolerance
 
 
 def solve(contact: Contact, solver: Solver, state: State, watch: Watch = ignore) -> Status:
