@@ -15,7 +15,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from gfmd_cli.errors import InputError
-from gfmd_cli.grid.arrays import Field, Mask, Modes, row_blocks
+from gfmd_cli.grid.arrays import Field, Mask, Modes, dot, row_blocks
 from gfmd_cli.grid.fft_grid import ALL_ROWS, Grid, Shape
 from gfmd_cli.grid.modes import multiplicity
 from gfmd_cli.grid.ranks import Ranks
@@ -214,7 +214,7 @@ class Contact:
 
     def rounding(self, field: Field) -> float:
         """Estimated contribution of the rounding of a displacement to the residual."""
-        squares = sum(float(np.square(field[rows]).sum()) for rows in row_blocks(field))
+        squares = sum(dot(field[rows], field[rows]) for rows in row_blocks(field))
         return self.noise(field.dtype) * self.as_residual(self.grid.total(squares))
 
     def mirrored(self) -> "Contact":
@@ -335,7 +335,8 @@ def reduce_scene(grid: Grid, height: Field, elastomer: LinearElastomer) -> Scene
     mean = grid.total(float(sum(sums))) / grid.size
     largest = grid.max(float(max(max(highest) - mean, mean - min(lowest))))
     # squares of heights of 1e-200 m would vanish
-    squares = sum(float(np.square((block - mean) / largest).sum()) for block in blocks)
+    relative = ((block - mean) / largest for block in blocks)
+    squares = sum(dot(deviation, deviation) for deviation in relative)
     rms = sqrt(grid.total(squares) / grid.size)
     for block in blocks:
         block -= mean

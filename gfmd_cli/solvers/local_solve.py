@@ -18,7 +18,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from gfmd_cli.grid.arrays import Field, Mask
+from gfmd_cli.grid.arrays import Field, Mask, dot
 from gfmd_cli.physics.contact import Contact
 from gfmd_cli.solvers.local_kernels import mark_entered
 from gfmd_cli.solvers.loop import ROUNDING_MARGIN, Start
@@ -118,7 +118,7 @@ class LocalSolve:
     def residual(self, gap: Field, stress: Field) -> float:
         """Natural residual, if it is zero beyond the tiles."""
         violation = np.minimum(gap, stress)
-        return self.contact.as_residual(_dot(violation, violation))
+        return self.contact.as_residual(dot(violation, violation))
 
     def start(self, tolerance: float) -> Start:
         """Solve until the start has a residual below the tolerance; return the start."""
@@ -199,18 +199,18 @@ class LocalSolve:
             active_force, last = _balanced(-active_gap), force.ravel()[active]
             force = _field(active_force, active, s)
             z = _balanced(self.map_displacement(force).ravel()[active])
-            old, slope = slope, _dot(z, active_force)
-            beta = polak_ribiere(slope - _dot(z, last), old)
+            old, slope = slope, dot(z, active_force)
+            beta = polak_ribiere(slope - dot(z, last), old)
             active_direction = feasible(self.grid, z + beta * direction.ravel()[active], active_s)
-            if _dot(active_direction, active_force) <= 0:
+            if dot(active_direction, active_force) <= 0:
                 active_direction = feasible(self.grid, z, active_s)
             direction = _field(active_direction, active, s)
             target = active_s + length * active_direction
             clipped = bool((target < 0).any())
             move = projected(self.grid, target, self.total) - active_s
             change = self.compliance(_field(move, active, s))
-            curvature = _dot(move, change.ravel()[active])
-            best = -_dot(move, active_gap) / curvature if curvature > 0 else 1.0
+            curvature = dot(move, change.ravel()[active])
+            best = -dot(move, active_gap) / curvature if curvature > 0 else 1.0
             exact = not clipped and (best <= 1 or float((active_s + best * move).min()) >= 0)
             choice = choose(best, exact)
             length *= choice.factor
@@ -231,11 +231,6 @@ def _field(values: Field, points: Indices, like: Field) -> Field:
 def _balanced(values: Field) -> Field:
     """The values less their mean."""
     return values - values.mean()
-
-
-def _dot(one: Field, other: Field) -> float:
-    """Sum of products, which does not depend on the threads of BLAS."""
-    return float(np.einsum("i,i->", one.ravel(), other.ravel()))
 
 
 def _with_neighbours(used: Mask) -> Mask:
