@@ -549,19 +549,19 @@ SMALL_CONTACT = power_spec(n=1, points=512, p_star=0.002, cutoff=0.02)
 
 
 def test_calls_that_are_too_short_advance_all_the_same(run, tmp_path, monkeypatch):
-    """Also in the solve on tiles, which follows the grid of 256 points here."""
+    """Also in the solve on tiles, which follows the grid of 128 points here."""
     monkeypatch.setattr(run_task, "REPORT_EVERY", 0.0)
     straight, progress, _ = run(SMALL_CONTACT, "straight.h5", jobs=1, reproducible=True)
     steps = [(event.points, event.step) for event in progress if event.event == "step"]
-    assert steps.count((256, max(step for points, step in steps if points == 256))) > 20
+    assert steps.count((128, max(step for points, step in steps if points == 128))) > 20
 
-    def stop_at_256(event):
-        if event.points == 256:
+    def stop_at_128(event):
+        if event.points == 128:
             signal.raise_signal(signal.SIGTERM)
 
     reached, options = [], {"jobs": 1, "reproducible": True}
     with pytest.raises(Interrupted):
-        run(SMALL_CONTACT, report=stop_at_256, **options)
+        run(SMALL_CONTACT, report=stop_at_128, **options)
     for _ in range(len(steps)):
         events = []
         try:

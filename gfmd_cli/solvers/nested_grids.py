@@ -18,7 +18,6 @@ from gfmd_cli.status import Status
 
 COARSEST_POINTS = 64  # points per side of a square; a solve on as many points costs next to nothing
 MIN_AXIS_POINTS = 8  # with which an axis is not coarsened; a choice: fewer resolve no contact
-MAX_CORRECTIONS = 5  # of a good start: a correction may press points that it left free; a choice
 HEIGHT_ROUNDING = 1000  # units of rounding by which indenters on other numbers of processes differ
 
 
@@ -96,18 +95,15 @@ def solve_contact(
                 while grids[-1] is not start.contact:
                     grids.pop()
     assert state is not None
-    for _ in range(MAX_CORRECTIONS if contact.is_periodic else 0):
-        if not status.is_converged or state.step > 0:  # a step has laid points already
-            break
+    if contact.is_periodic and status.is_converged and state.step == 0:  # no step has laid points
         rounding = contact.lay_pressed(state.u, state.sigma, state.residual)
-        if rounding == 0:
-            break
-        pair, rounding = contact.grid_of_moves.pair_count, hypot(state.rounding, rounding)
-        state = solver.begin_from(Start(contact, pair, state.u, state.sigma, rounding))
-        transforms += pair
-        state.coarser_transforms = transforms
-        status = solve(contact, solver, state, watch)
-        transforms += state.transforms
+        if rounding > 0:
+            pair, rounding = contact.grid_of_moves.pair_count, hypot(state.rounding, rounding)
+            state = solver.begin_from(Start(contact, pair, state.u, state.sigma, rounding))
+            transforms += pair
+            state.coarser_transforms = transforms
+            status = solve(contact, solver, state, watch)
+            transforms += state.transforms
     return Solution(
         state.u, state.sigma, state.residual, status, solver.kind, state.step, transforms
     )
