@@ -117,6 +117,10 @@ class Grid:
         """Maximum over the grid from the maximum over the rows of this process."""
         return value
 
+    def min(self, value: float) -> float:
+        """Minimum over the grid, likewise."""
+        return -self.max(-value)
+
     def dot(self, one: Field, other: Field) -> float:
         """Sum over the grid of the products of two fields."""
         return self.total(float(np.vdot(one, other)))

@@ -133,7 +133,7 @@ class Contact:
     @cached_property
     def height_range(self) -> float:
         """Highest minus lowest height [h_std]."""
-        return self.grid.max(float(self.height.max())) + self.grid.max(-float(self.height.min()))
+        return self.grid.max(float(self.height.max())) - self.grid.min(float(self.height.min()))
 
     def settle(self, u: Field) -> Field:
         """Lift `u` above the indenter and lower it until it touches, in place; return it."""
@@ -141,7 +141,7 @@ class Contact:
         for rows in row_blocks(u):
             np.maximum(u[rows], self.obstacle[rows], out=u[rows])
             nearest = min(nearest, float(np.min(u[rows] - self.obstacle[rows])))
-        nearest = -self.grid.max(-nearest)
+        nearest = self.grid.min(nearest)
         if nearest > 0:
             for rows in row_blocks(u):
                 u[rows] -= nearest
@@ -388,7 +388,7 @@ def _stiffness(grid: Grid, elastomer: LinearElastomer) -> tuple[Field, float]:
         raise InputError(f"elastomer: stiffness {stiffest} at the shortest wave is out of range")
     half /= stiffest
     waves = half.ravel()[1:] if grid.ends[0] else half  # the first is q = 0
-    softest = -grid.max(-float(waves.min()))
+    softest = grid.min(float(waves.min()))
     if not softest >= SCALE_RANGE[0]:
         raise InputError(f"elastomer: stiffness falls to {softest:g} of its largest value")
     k[count:] = k[len(k) - count : 0 : -1]

@@ -131,7 +131,7 @@ def _of_free_contact(contact: FreeContact, u: Field, sigma: Field) -> ErrorBound
     energy, lifted, deflection = mean(s * gap), mean(s * h), mean(gap)
     gap -= h
     touchable = gap if contact.may_touch is None else gap[contact.may_touch]
-    lowest = -grid.max(-float(touchable.min(initial=np.inf)))
+    lowest = grid.min(float(touchable.min(initial=np.inf)))
     duality_gap = mean(s * (gap - lowest))
     centre = deflection + (lifted - energy) / p - mean(h)
     mean_compliance = mean(free.displacement(np.ones_like(s), out=gap))

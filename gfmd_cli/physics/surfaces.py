@@ -68,7 +68,7 @@ def sample(
     grid = create_grid(whole, ranks)
     with np.errstate(over="ignore", invalid="ignore"):  # refused below
         heights = surface.heights_on(grid)
-        range_of_heights = grid.max(float(heights.max())) + grid.max(-float(heights.min()))
+        range_of_heights = grid.max(float(heights.max())) - grid.min(float(heights.min()))
     if not np.isfinite(range_of_heights):
         raise InputError(f"surface: heights overflow (kind {surface.kind!r}); choose other units")
     if range_of_heights == 0:

@@ -217,7 +217,7 @@ def _full_contact(grids: list[Contact], solver: Solver) -> tuple[Solution | None
         stress[...] = h
         grid.filter_padded(contact.stiffness)
         transforms += 2 * grid.size / grids[-1].grid.size
-        if contact.pressure < grid.max(-float(stress.min())):
+        if grid.min(float(stress.min())) < -contact.pressure:
             return None, transforms
     u, sigma = h.copy(), grid.empty()
     np.add(stress, contact.pressure, out=sigma)

@@ -46,7 +46,7 @@ def is_flat(contact: Contact) -> bool:
     """Whether k(q) is constant for all q > 0, up to rounding."""
     grid, k = contact.grid, contact.stiffness.ravel()
     waves = k[1:] if grid.ends[0] else k
-    highest, lowest = grid.max(float(waves.max())), -grid.max(-float(waves.min()))
+    highest, lowest = grid.max(float(waves.max())), grid.min(float(waves.min()))
     return bool(highest - lowest <= 8 * np.finfo(float).eps * lowest)
 
 
