@@ -96,17 +96,25 @@ def solve_contact(
                     grids.pop()
     assert state is not None
     if contact.is_periodic and status.is_converged and state.step == 0:  # no step has laid points
-        rounding = contact.lay_pressed(state.u, state.sigma, state.residual)
-        if rounding > 0:
-            pair, rounding = contact.grid_of_moves.pair_count, hypot(state.rounding, rounding)
-            state = solver.begin_from(Start(contact, pair, state.u, state.sigma, rounding))
-            transforms += pair
-            state.coarser_transforms = transforms
-            status = solve(contact, solver, state, watch)
-            transforms += state.transforms
+        state, status = _with_pressed_laid(contact, solver, state, watch)
+    transforms = state.coarser_transforms + state.transforms
     return Solution(
         state.u, state.sigma, state.residual, status, solver.kind, state.step, transforms
     )
+
+
+def _with_pressed_laid(
+    contact: Contact, solver: Solver, state: State, watch: Watch
+) -> tuple[State, Status]:
+    """A converged state whose pressed points are laid on the indenter, and how its solve ends."""
+    rounding = contact.lay_pressed(state.u, state.sigma, state.residual)
+    if rounding == 0:
+        return state, Status.CONVERGED
+    pair, rounding = contact.grid_of_moves.pair_count, hypot(state.rounding, rounding)
+    transforms = state.coarser_transforms + state.transforms + pair
+    state = solver.begin_from(Start(contact, pair, state.u, state.sigma, rounding))
+    state.coarser_transforms = transforms
+    return state, solve(contact, solver, state, watch)
 
 
 def _local_start(
