@@ -23,7 +23,9 @@ from gfmd_cli.solvers.tile_operators import FreeOperators, PeriodicOperators
 from gfmd_cli.solvers.tiles import SIDE, Tiles
 
 SMALLEST_EXPONENT = 0.2  # of k(q) for which there are tiles; measured from 0.25 on
-MIN_COARSE_POINTS = 256  # per side, of a grid before the finest; measured: 128 to 512
+MIN_COARSE_POINTS = 256
+"""Points per side from which a grid before the finest is solved on tiles. Measured: with 512 most
+solves at 512^2 and 1024^2 take longer; with 128 spots are missed that cost an evaluation later."""
 COARSE_TOLERANCE = 0.03  # on grids before the finest; measured: 0.01 to 0.1 differ by 5 %
 MAX_JACOBI_STEPS = 6  # after C s is laid on the indenter; with 8 the prediction is worse
 MAX_JACOBI_REDUCTION = 4.0  # of the residual by these steps; measured: 3 to 5
