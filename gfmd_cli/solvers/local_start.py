@@ -23,9 +23,9 @@ from gfmd_cli.solvers.tile_operators import FreeOperators, PeriodicOperators
 from gfmd_cli.solvers.tiles import SIDE, Tiles
 
 SMALLEST_EXPONENT = 0.2  # of k(q) for which there are tiles; measured from 0.25 on
-MIN_COARSE_POINTS = 256
-"""Points per side from which a grid before the finest is solved on tiles. Measured: with 512 most
-solves at 512^2 and 1024^2 take longer; with 128 spots are missed that cost an evaluation later."""
+MIN_COARSE_POINTS, MAX_REFINEMENT = 256, 4
+"""Points per side of the first grid on tiles, and of the finest over that; measured: on finer first
+grids the whole grids before take longer, coarser ones miss spots, which costs an evaluation."""
 COARSE_TOLERANCE = 0.03  # on grids before the finest; measured: 0.01 to 0.1 differ by 5 %
 MAX_JACOBI_STEPS = 6  # after C s is laid on the indenter; with 8 the prediction is worse
 MAX_JACOBI_REDUCTION = 4.0  # of the residual by these steps; measured: 3 to 5
@@ -49,7 +49,8 @@ def start_from(
     last, transforms = finer[-1], 0.0
     shapes = [contact.grid.shape for contact in (coarse, *finer)]
     doubled = all(b == tuple(2 * n for n in a) for a, b in pairwise(shapes))
-    is_large = min(finer[0].grid.shape) >= MIN_COARSE_POINTS
+    first = min(finer[0].grid.shape)
+    is_large = first >= max(MIN_COARSE_POINTS, min(last.grid.shape) / MAX_REFINEMENT)
     if not (doubled and is_large and all(map(_operators_apply, finer))):
         return None
     solve_on_tiles = LOCAL_SOLVES[last.boundary]
