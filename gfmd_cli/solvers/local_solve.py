@@ -128,7 +128,8 @@ class LocalSolve:
         """Solve until the start has a residual below the tolerance, with the exact C in the end.
 
         Returns the last evaluation, and C s at all points. The first evaluation corrects operators
-        with an error of 1e-3 and is in single precision, the others where that is accurate enough.
+        with an error of 1e-3 and is in single precision. Where that is accurate enough, it may be
+        the last one, and the others are in single precision, too.
         """
         target, accepted = UNCORRECTED_TOLERANCE, ACCEPTED_FRACTION * tolerance
         in_single_precision = True

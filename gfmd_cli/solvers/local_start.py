@@ -24,8 +24,9 @@ from gfmd_cli.solvers.tiles import SIDE, Tiles
 
 SMALLEST_EXPONENT = 0.2  # of k(q) for which there are tiles; measured from 0.25 on
 MIN_COARSE_POINTS, MAX_REFINEMENT = 256, 4
-"""Points per side of the first grid on tiles, and of the finest over that; measured: on finer first
-grids the whole grids before take longer, coarser ones miss spots, which costs an evaluation."""
+"""Smallest number of points per side of the first grid that is solved on tiles, and largest ratio
+of those of the finest grid to it. Measured: if the first grid is finer, the whole grids before it
+take longer; if it is coarser, spots of contact are missed, which costs an evaluation later."""
 COARSE_TOLERANCE = 0.03  # on grids before the finest; measured: 0.01 to 0.1 differ by 5 %
 MAX_JACOBI_STEPS = 6  # after C s is laid on the indenter; with 8 the prediction is worse
 MAX_JACOBI_REDUCTION = 4.0  # of the residual by these steps; measured: 3 to 5

@@ -146,7 +146,7 @@ def ignore(contact: Contact, state: State) -> None:
 def is_certain(contact: Contact, state: State, tolerance: float) -> bool:
     """Whether the residual of an updated sigma is below a tolerance despite all rounding.
 
-    Squares are added: the errors of the points by rounding do not depend on their violations.
+    Squares are added, as rounding errors are independent of the violations of the conditions.
     """
     if state.rounding == 0 or hypot(state.residual, ROUNDING_MARGIN * state.rounding) >= tolerance:
         return False
