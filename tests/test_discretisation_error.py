@@ -189,6 +189,24 @@ def test_full_contact_on_a_coarse_grid_leaves_a_bar_where_finer_grids_have_gaps(
         assert above[f"{name}_continuum_error"] == pytest.approx(0, abs=1e-4)
 
 
+def test_full_contact_is_not_exact_with_two_points_per_wave(tmp_path):
+    """The waves of the highest wavenumber are then another part of themselves on finer grids."""
+    spec = {
+        "surface": {"kind": "self-affine", "cutoff": 0.1},
+        "elastomer": {"kind": "half-space"},
+        "grid": {"points": [20, 24, 48]},
+        "load": {"pressure": 200.0},
+        "accuracy": {"mean_gap": 0.5},
+    }
+    two_points, resolved, fine = rows(run(spec, tmp_path / "full.h5"))
+    assert two_points["a_r"] == 1
+    assert abs(two_points["delta_sigma"] / fine["delta_sigma"] - 1) > 1e-4
+    assert resolved["delta_sigma"] == pytest.approx(fine["delta_sigma"], rel=1e-12)
+    for name in QUANTITIES:
+        verdicts = [row[f"{name}_verdict"] for row in (two_points, resolved, fine)]
+        assert verdicts == ["unknown", "exact", "exact"]
+
+
 RIDGE, CONE = Tip(1.0, dimension=1), Tip(1.0)
 
 

@@ -8,6 +8,7 @@ from scipy.special import exp1
 
 from gfmd_cli.physics import persson
 from gfmd_cli.physics.elastomers import Slab
+from gfmd_cli.physics.gap_theories import FittedWeight
 from gfmd_cli.physics.persson import (
     Persson,
     Shells,
@@ -279,3 +280,13 @@ def test_the_exponent_of_a_slab_is_read_off_the_shells(default):
     assert exact[0] > 3.5
     assert exact[-1] < 1.01
     assert np.abs(exponents - exact)[1:-1].max() < 0.05
+
+
+def test_one_shell_has_no_exponent_and_no_fitted_gap():
+    one = shells(*(np.array([value]) for value in (6.0, 1.0, 2.0, 0.3, 4.0)))
+    assert np.isnan(one.exponents()).all()
+    fitted = FittedWeight(one, one.exponents())
+    assert np.isnan(fitted.mean_gap([0.1, 1.0])).all()
+    assert np.isnan(fitted.pressure_at_gap([0.1, 1.0])).all()
+    assert np.isnan(fitted.gap_range).all()
+    assert np.isfinite(FittedWeight(one, np.ones(1)).mean_gap([0.1, 1.0])).all()

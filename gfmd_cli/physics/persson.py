@@ -71,9 +71,9 @@ class Shells:
     modes: Field  # number of modes with power, for fits of the spectrum
 
     def exponents(self) -> Field:
-        """d ln k / d ln q, of k = sum of k^2 C / sum of k C in every shell."""
+        """d ln k / d ln q, of k = sum of k^2 C / sum of k C in every shell; NaN for one shell."""
         if self.q.size < 2:
-            return np.zeros_like(self.q)
+            return np.full_like(self.q, np.nan)
         return np.gradient(np.log(self.variance / self.energy), np.log(self.q))
 
 
@@ -237,10 +237,12 @@ class Persson:
 
     @cached_property
     def _pressures_over_gap(self) -> tuple[Field, Callable[[Field], Field]]:
-        """Rising values of -ln u_g, and ln p as a function of them."""
+        """Rising values of -ln u_g, and ln p as a function of them; NaN without a mean gap."""
         p = self.delta_sigma * np.geomspace(*_TABLE_PRESSURES)
         gap = self.mean_gap(p)
         known = gap > 0
+        if not known.any():
+            return np.full(2, np.nan), np.copy  # of NaN, as nothing else is asked
         rising = -np.log(gap[known])
         return rising, monotone_cubic(rising, np.log(p[known]))
 

@@ -14,7 +14,7 @@ import numpy as np
 from gfmd_cli.grid.arrays import BLOCK_POINTS, Field, row_blocks
 from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.maps.roughness_parameters import autocorrelation, distances
-from gfmd_cli.physics.contact import radial_power
+from gfmd_cli.physics.contact import ROUNDING_POWER, radial_power
 from gfmd_cli.physics.free_contact import doubled_grid
 from gfmd_cli.physics.persson import bin_edges
 
@@ -103,3 +103,17 @@ def anisotropy(grid: Grid, height: Field) -> float:
     xx, yy, xy = grid.total(sums)
     middle, half = 0.5 * (xx + yy), sqrt((0.5 * (xx - yy)) ** 2 + xy**2)
     return sqrt((middle + half) / (middle - half)) if middle - half > 1e-12 * middle else inf
+
+
+def has_nyquist_waves(grid: Grid, height: Field) -> bool:
+    """Whether a field has waves of the Nyquist wavenumber of an axis, beyond rounding errors.
+
+    A grid shows only their part that is even about its points: a finer grid has another field. The
+    cost is one transform.
+    """
+    modes = grid.as_rows(grid.forward_into_work(height))
+    largest = grid.max(max(float(np.abs(modes[rows]).max()) for rows in row_blocks(modes)))
+    along_x = modes[:, -1:] if grid.ends[1] else modes[:, :0]
+    along_y = modes[len(modes) // 2] if len(modes) % 2 == 0 else modes[0, :0]
+    highest = max(float(np.abs(waves).max(initial=0.0)) for waves in (along_x, along_y))
+    return grid.max(highest) > sqrt(ROUNDING_POWER) * largest

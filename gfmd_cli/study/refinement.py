@@ -22,7 +22,7 @@ from gfmd_cli.physics.observables import (
     contact_pressure,
     observe,
 )
-from gfmd_cli.physics.power_spectra import anisotropy
+from gfmd_cli.physics.power_spectra import anisotropy, has_nyquist_waves
 from gfmd_cli.solvers.loop import Start
 from gfmd_cli.solvers.nested_grids import Resume, Solution, solve_contact
 from gfmd_cli.status import Status
@@ -277,11 +277,17 @@ def _estimates(task: Task, solved: TaskSolution, grids: list[SolvedGrid]) -> dic
         exponent,
         scales_of(scene, task.surface.band_limited) if has_scales else None,
         area_exponent,
-        band_limited=task.surface.band_limited,
+        band_limited=task.surface.band_limited and not _has_hidden_waves(solved),
         stepped=task.surface.stepped,
         tip=discretisation_error.Tip(task.surface.tip_exponent, scene.grid.dimension),
         between=_between_points(task, solved),
     )
+
+
+def _has_hidden_waves(solved: TaskSolution) -> bool:
+    """Whether a grid in full contact shows only a part of the highest waves of the surface."""
+    scene = solved.scene
+    return solved.observables.a_r == 1 and has_nyquist_waves(scene.grid, scene.height)
 
 
 def _between_points(task: Task, solved: TaskSolution) -> dict[str, float]:
