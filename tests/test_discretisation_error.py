@@ -189,6 +189,26 @@ def test_full_contact_on_a_coarse_grid_leaves_a_bar_where_finer_grids_have_gaps(
         assert above[f"{name}_continuum_error"] == pytest.approx(0, abs=1e-4)
 
 
+def test_errors_do_not_average_out_over_the_copies_of_a_mirrored_map(tmp_path):
+    """A quarter of the edge points of the cell are independent: the bar is at least twice as wide
+    as their random error would be."""
+    surface = SelfAffine(cutoff=1 / 24, rolloff=0.25)
+    heights = build_scene(surface, HalfSpace(), 96).height[:64, :64]
+    np.save(tmp_path / "map.npy", 1e-3 * heights)
+    spec = {
+        "surface": {"kind": "file", "path": str(tmp_path / "map.npy"), "length": 1.0}
+        | {"periodic": False, "edges": "mirror", "interpolation": "fourier"},
+        "elastomer": {"kind": "half-space"},
+        "grid": {"points": 64},
+        "load": {"pressure": 1e-3},
+        "accuracy": {"mean_gap": 0.5},
+    }
+    (row,) = rows(run(spec, tmp_path / "mirrored.h5"))
+    random_error = 0.55 * np.sqrt(row["perimeter"] / row["points"]) / row["points"]
+    assert row["a_r_verdict"] == "regular"
+    assert row["a_r_continuum_error"] > 2 * random_error
+
+
 def test_full_contact_is_not_exact_with_two_points_per_wave(tmp_path):
     """The waves of the highest wavenumber are then another part of themselves on finer grids."""
     spec = {

@@ -53,7 +53,7 @@ class GridValues:
     perimeter: float
     """Contact line per area times L, as in `Observables.perimeter`."""
     area: float = 1.0
-    """Area of the cell / L^2."""
+    """Area of the cell / L^2, of one copy of the map where the cell is made of mirrored ones."""
     border: float | None = None
     """Fraction of the border of the map in contact, with a free boundary; None if periodic."""
 
@@ -64,7 +64,7 @@ class GridValues:
 
     @property
     def patches(self) -> float:
-        """Estimated number of contact patches."""
+        """Estimated number of contact patches that are independent of each other."""
         return estimated_patches(self.perimeter, self.a_r, self.area)
 
 

@@ -264,7 +264,7 @@ def _estimates(task: Task, solved: TaskSolution, grids: list[SolvedGrid]) -> dic
             grid.sigma_p / scene.delta_sigma,
             grid.u_g / scene.h_std,
             grid.perimeter,
-            scene.grid.area / length**scene.grid.dimension,
+            scene.grid.area / (task.surface.copies * length) ** scene.grid.dimension,
             grid.border,
         )
         for grid in grids
