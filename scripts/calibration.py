@@ -328,8 +328,8 @@ def measure(case: Case, tolerance: float = 1e-6) -> dict:
         begun = time.perf_counter()
         solution = solve_contact(contact, Auto(tolerance=tolerance))
         observables = observe(contact, solution.u, solution.sigma)
-        limited = case.surface.band_limited
-        texture = None if case.is_single else asdict(scales_of(scene, limited))
+        of_surface = case.surface.band_limited, case.surface.copies
+        texture = None if case.is_single else asdict(scales_of(scene, *of_surface))
         levels.append(
             {
                 "points": points,
@@ -352,6 +352,7 @@ def measure(case: Case, tolerance: float = 1e-6) -> dict:
         "p_star": case.p_star,
         "single": case.is_single,
         "band_limited": case.surface.band_limited,
+        "area": 1 / case.surface.copies**first.grid.dimension,
         "stepped": case.surface.stepped,
         "levels": levels,
     }
@@ -407,7 +408,11 @@ def scores(records: list[dict]) -> Iterator[Score]:
     for record in records:
         exact = truth(record["levels"])
         levels = [
-            GridValues(*(level[key] for key in KEYS), border=level.get("border"))
+            GridValues(
+                *(level[key] for key in KEYS),
+                area=record.get("area", 1.0),
+                border=level.get("border"),
+            )
             for level in record["levels"]
         ]
         for last in range(len(levels) - int(np.log2(FINER))):

@@ -31,6 +31,10 @@ LADDER = [0.001, 0.003, 0.01, 0.03, 0.1, 0.2, *(0.01 * x for x in range(25, 65, 
 """Reduced pressures up to the percolation of the contact, where the gap stops percolating."""
 
 
+PERCOLATION = [0.01 * x for x in range(34, 68, 2)]
+"""Reduced pressures about the percolation of the gap."""
+
+
 def table(heading: str, **keys: object) -> str:
     lines = [f"{key} = {value!r}" for key, value in keys.items()]
     return "\n".join([f"\n{heading}", *lines, ""])
@@ -111,6 +115,17 @@ def depth_specs() -> list[str]:
     return [one + power([0.5, 1, 2, 3]) + table("[grid]", points=points) + paired + rest(LIGHT)]
 
 
+def percolation_specs() -> list[str]:
+    """Percolation of the gap for n >= 2 on four grids, with contact areas in the continuum."""
+    seeds, grid = grids({points: [*TRAINING][:4] for points in (256, 512, 1024, 2048)})
+    one = surface("rolloff", 1 / 4, 1 / 64, hurst=0.8, seed=seeds)
+    last = table("[accuracy]", mean_gap=0.01)
+    return [
+        one + power(exponents) + grid + last + rest(PERCOLATION[:count], percolation=True)
+        for exponents, count in (([4], 17), ([2, 3], 11))
+    ]
+
+
 def resolution_specs() -> list[str]:
     """The shortest spectrum of `depth_specs` on 8, 16 and 32 points per lambda_s."""
     one = surface("rolloff", 1 / 4, 1 / 32, hurst=0.8, seed=[0, 1])
@@ -121,6 +136,7 @@ STUDIES = {
     "between": between_specs,
     "depth": depth_specs,
     "gamma": gamma_specs,
+    "percolation": percolation_specs,
     "resolution": resolution_specs,
     "slab": slab_specs,
     "stiffness": stiffness_specs,

@@ -1,10 +1,10 @@
-"""The ratio of the slopes along the principal axes."""
+"""The ratio of the slopes along the principal axes, and the copies of a patch."""
 
 import numpy as np
 import pytest
 
 from gfmd_cli.grid.fft_grid import Grid
-from gfmd_cli.physics.power_spectra import anisotropy
+from gfmd_cli.physics.power_spectra import anisotropy, has_nyquist_waves, repetitions
 from gfmd_cli.physics.self_affine import SelfAffine
 
 
@@ -43,3 +43,27 @@ def test_a_side_is_a_length():
     """Waves of one length in a cell twice as long along y."""
     grid = Grid(32, length=1.0, points_y=64, length_y=2.0)
     assert anisotropy(grid, waves(grid, (0, 4, 1.0), (8, 0, 1.0))) == pytest.approx(1.0, rel=1e-12)
+
+
+@pytest.mark.parametrize("cutoff", [1 / 32, 1 / 8, 1 / 4])
+def test_a_random_surface_is_one_patch_and_tiles_of_it_are_copies(cutoff):
+    patch = SelfAffine(cutoff=cutoff, rolloff=0.5).heights(64)
+    assert repetitions(Grid(64), patch) == pytest.approx(1.0, abs=0.3)
+    for copies in (2, 3, 4):
+        tiled = np.tile(patch, (copies, copies))
+        ratio = repetitions(Grid(64 * copies), tiled) / repetitions(Grid(64), patch)
+        assert ratio == pytest.approx(copies**2, rel=0.35)
+    row = np.tile(patch, (1, 3))
+    ratio = repetitions(Grid(192, points_y=64), row) / repetitions(Grid(64), patch)
+    assert ratio == pytest.approx(3, rel=0.35)
+
+
+def test_the_waves_of_two_points_are_found_along_each_axis():
+    for points_y, m_y, m_x in ((32, 16, 3), (32, 2, 16), (33, 0, 16)):
+        grid = Grid(32, points_y=points_y)
+        long = waves(grid, (2, 3, 1.0), (15, 15, 1.0))
+        assert not has_nyquist_waves(grid, long)
+        assert has_nyquist_waves(grid, long + waves(grid, (m_y, m_x, 1e-6)))
+    line = Grid(32, 1)
+    assert has_nyquist_waves(line, (-1.0) ** np.arange(32))
+    assert not has_nyquist_waves(line, np.cos(2 * np.pi * 15 * np.arange(32) / 32))

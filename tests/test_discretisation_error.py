@@ -209,6 +209,29 @@ def test_errors_do_not_average_out_over_the_copies_of_a_mirrored_map(tmp_path):
     assert row["a_r_continuum_error"] > 2 * random_error
 
 
+@pytest.mark.parametrize("width", [1 / 12, 1 / 16])
+def test_bars_hold_for_a_lattice_of_equal_bumps(tmp_path, width):
+    """Their errors do not average out; the lattice is shifted by a part of the spacing."""
+    x = (np.arange(128) + 0.3) / 32
+    bump = sum(np.exp(-(((x + 0.5) % 1 - 0.5 + k) ** 2) / (2 * width**2)) for k in (-1, 0, 1))
+    np.save(tmp_path / "map.npy", 0.01 * np.outer(bump, bump))
+    spec = {
+        "surface": {"kind": "file", "path": str(tmp_path / "map.npy"), "length": 1.0}
+        | {"periodic": True, "interpolation": "fourier"},
+        "elastomer": {"kind": "half-space"},
+        "grid": {"points": [128, 256, 1024]},
+        "load": {"pressure": [0.002, 0.008]},
+        "accuracy": {"mean_gap": 0.5},
+    }
+    found = rows(run(spec, tmp_path / "bumps.h5"))
+    for load in spec["load"]["pressure"]:
+        one, two, reference = (row for row in found if row["load_value"] == load)
+        for name in QUANTITIES:
+            assert one[f"{name}_verdict"] == "unknown"
+            error = two[f"{name}_continuum"] - reference[f"{name}_continuum"]
+            assert 0 < abs(error) < two[f"{name}_continuum_error"]
+
+
 def test_full_contact_is_not_exact_with_two_points_per_wave(tmp_path):
     """The waves of the highest wavenumber are then another part of themselves on finer grids."""
     spec = {

@@ -91,6 +91,10 @@ maps stretched by 3, whose bars failed, 2.6 or more."""
 MIN_WAVES = 30.0
 """Independent waves of the slopes from which patches differ from each other: random surfaces of at
 least four waves per side have 40 and more, textures of one wavelength 4 to 12."""
+MAX_REPETITIONS = 2.0
+"""Copies of one patch that a calibrated surface may resemble. Errors of copies do not average out:
+with 4 x 4 and 8 x 8 equal bumps they were up to 14 times the bar. Random surfaces have 0.8 to 1.6,
+jittered lattices of bumps 1.6 to 60."""
 MIN_HIGHEST = 1.0
 """Smallest highest point of a calibrated surface, in h_std above the mean: surfaces with pits have
 1.1 and more. With 0.7 to 0.8 (h = -a^2 of a Gaussian a) contacts are ribbons on ridges that are as
@@ -122,6 +126,8 @@ class RoughnessScales:
     """Height of the highest point above the mean [h_std]."""
     independent_waves: float = inf
     """Effective number of waves, (sum s)^2 / sum s^2, with the power s of the slope of a wave."""
+    repetitions: float = 1.0
+    """Number of copies of one patch that the surface resembles; see `power_spectra`."""
 
     @property
     def calibrated(self) -> bool:
@@ -131,6 +137,7 @@ class RoughnessScales:
             and self.anisotropy <= MAX_ANISOTROPY
             and self.highest >= MIN_HIGHEST
             and self.independent_waves >= MIN_WAVES
+            and self.repetitions <= MAX_REPETITIONS
         )
 
     def phase(self, points: float) -> float:

@@ -105,6 +105,24 @@ def anisotropy(grid: Grid, height: Field) -> float:
     return sqrt((middle + half) / (middle - half)) if middle - half > 1e-12 * middle else inf
 
 
+def repetitions(grid: Grid, height: Field) -> float:
+    """How many copies of one patch a surface resembles: 1 if it is random, m^2 for m x m copies.
+
+    The slopes of copies are spread over fewer waves: over every m-th along each axis. The number of
+    waves is (sum s)^2 / sum s^2, with the power s of the slope of a wave. It is compared with the
+    number that the same power would have if it were the same for all waves of a half octave. The
+    cost is one transform.
+    """
+    m, power, count = radial_power(grid, height)
+    slopes = power * m**2
+    half_octave = np.rint(2 * np.log2(m)).astype(np.int64)
+    first = int(half_octave.min())
+    sums = np.bincount(half_octave - first, slopes)
+    edges = 2.0 ** (0.5 * (np.arange(sums.size + 1) + first) - 0.25)
+    waves = np.pi * np.diff(edges**2) * (grid.length_y / grid.length)
+    return float(np.sum(slopes**2 / count) / np.sum(sums**2 / waves))
+
+
 def has_nyquist_waves(grid: Grid, height: Field) -> bool:
     """Whether a field has waves of the Nyquist wavenumber of an axis, beyond rounding errors.
 

@@ -22,7 +22,7 @@ from gfmd_cli.physics.observables import (
     contact_pressure,
     observe,
 )
-from gfmd_cli.physics.power_spectra import anisotropy, has_nyquist_waves
+from gfmd_cli.physics.power_spectra import anisotropy, has_nyquist_waves, repetitions
 from gfmd_cli.solvers.loop import Start
 from gfmd_cli.solvers.nested_grids import Resume, Solution, solve_contact
 from gfmd_cli.status import Status
@@ -275,7 +275,7 @@ def _estimates(task: Task, solved: TaskSolution, grids: list[SolvedGrid]) -> dic
     return discretisation_error.estimate(
         levels,
         exponent,
-        scales_of(scene, task.surface.band_limited) if has_scales else None,
+        scales_of(scene, task.surface.band_limited, task.surface.copies) if has_scales else None,
         area_exponent,
         band_limited=task.surface.band_limited and not _has_hidden_waves(solved),
         stepped=task.surface.stepped,
@@ -305,8 +305,14 @@ def _between_points(task: Task, solved: TaskSolution) -> dict[str, float]:
     )
 
 
-def scales_of(scene: Scene, band_limited: bool) -> discretisation_error.RoughnessScales:
-    """The scales of a rough surface, as `estimate` needs them."""
+def scales_of(
+    scene: Scene, band_limited: bool, copies: int = 1
+) -> discretisation_error.RoughnessScales:
+    """The scales of a rough surface, as `estimate` needs them.
+
+    Of a mirrored map (two `copies` along each side) the waves +-q_x, +-q_y have one amplitude, not
+    two: for random ones <s^2> / <s>^2 is 3 in place of 3/2. That is not a repetition.
+    """
     grid = scene.grid
     return replace(
         discretisation_error.roughness_scales(scene.shells, grid.length),
@@ -314,4 +320,5 @@ def scales_of(scene: Scene, band_limited: bool) -> discretisation_error.Roughnes
         band_limited=band_limited,
         aspect=max(grid.spacings) / min(grid.spacings),
         highest=scene.highest,
+        repetitions=repetitions(grid, scene.height) / copies if grid.dimension == 2 else 1.0,
     )
