@@ -1,6 +1,7 @@
 """Contact stiffness over mean gap, and percolation of the gap, for every n: docs/theory.md.
 
-Reads the study `stiffness` of scripts/theory_studies.py, prints tables and draws two figures.
+Reads the studies `stiffness` and `percolation` of scripts/theory_studies.py, prints tables and draws
+two figures.
 
 python scripts/gap_stiffness.py --folder results/theory --figures docs/figures
 """
@@ -154,6 +155,21 @@ def print_percolation(curves: Curves) -> None:
     print_table("Where the gap stops percolating: a_r counted (corrected)", heads, rows)
 
 
+def print_on_four_grids(curves: Curves) -> None:
+    """Where the gap stops percolating on finer and finer grids, mean over seeds and directions."""
+    grids = sorted({points for _, points, _ in curves})
+    rows = []
+    for n in sorted({n for n, _, _ in curves}):
+        for name in ("p_star", "a_r", "a_r_continuum", "a_r_continuum_error", "u_g"):
+            cells = []
+            for points in grids:
+                ends = thresholds(curves, n, points, column(curves, n, name, points))
+                cells.append("{:.3f} ± {:.3f}".format(*spread(ends.mean(axis=1))))
+            rows.append([f"{n:g}", name, *cells])
+    heads = ["n", "", *(f"{points}^2" for points in grids)]
+    print_table("Where the gap stops percolating, 4 seeds", heads, rows)
+
+
 def draw(curves: Curves, folder: Path) -> None:
     with styled():
         plot = ColumnFigure(
@@ -186,6 +202,7 @@ def main() -> None:
     print_stiffness(curves)
     print_differences(curves)
     print_percolation(curves)
+    print_on_four_grids(read(arguments.folder / "percolation.h5"))
     draw(curves, arguments.figures)
 
 
