@@ -1,7 +1,7 @@
 """Contact stiffness over mean gap, and percolation of the gap, for every n: docs/theory.md.
 
-Reads the studies `stiffness` and `percolation` of scripts/theory_studies.py, prints tables and draws
-two figures.
+Reads the studies `stiffness` and `percolation` of scripts/theory_studies.py, prints tables and
+draws two figures.
 
 python scripts/gap_stiffness.py --folder results/theory --figures docs/figures
 """
