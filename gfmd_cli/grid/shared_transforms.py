@@ -13,7 +13,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 from itertools import cycle, pairwise
-from math import ceil
+from math import ceil, prod
 from operator import call
 from typing import Any
 
@@ -21,8 +21,9 @@ import numpy as np
 import pyfftw
 
 from gfmd_cli.grid.arrays import Field, Modes
-from gfmd_cli.grid.plans import Plan
-from gfmd_cli.grid.transposition import Span
+from gfmd_cli.grid.plans import Plan, planned
+from gfmd_cli.grid.rows import LocalRows
+from gfmd_cli.grid.transposition import Span, Transposition
 
 BLOCK_COEFFICIENTS = 2**17  # in a block of columns; 2^16 to 2^18 take as long
 MIN_BLOCK_COLUMNS = 32  # shorter pieces of rows take longer to copy
@@ -183,6 +184,74 @@ class ColumnTransforms:
                     self.work[:, columns.part] = columns.coefficients[:rows]
 
         side_by_side(self.pool, [partial(share, numbers) for numbers in self.shares])
+
+
+class FieldTransforms:
+    """Transforms of a field along both axes and back, in one memory, without a factor.
+
+    Transforms in place need a field less and a third less time than those between two arrays. The
+    plans are made with the arrays, because measuring a plan overwrites them.
+
+    Parameters
+    ----------
+    memory : of the coefficients; for a transposition also spare memory for as many
+    points : number of real values of a row
+    rows : the rows of this process
+    transposition : exchange between the processes that share the field; None for one process
+    padded_rows : number of rows to which the columns are padded by zeros; 0 for no padding
+    """
+
+    def __init__(
+        self,
+        memory: Sequence[Any],
+        points: int,
+        rows: LocalRows,
+        transposition: Transposition | None,
+        *,
+        padded_rows: int = 0,
+    ) -> None:
+        shape = (rows.count, points // 2 + 1)
+        self.lines: Modes = memory[0][: prod(shape)].reshape(shape)
+        """Coefficients transformed along x: all of the rows of this process."""
+        self.work = self.lines
+        """Coefficients of the columns of this process, all rows of them; in the same memory."""
+        if transposition is not None:
+            first, last = transposition.span
+            shape = (transposition.edges[-1], last - first)
+            self.work = memory[0][: prod(shape)].reshape(shape)
+        real = self.lines.real.dtype
+        self.values: Field = self.lines.view(real)[:, :points]
+        """The rows as real values."""
+        self._transposition = transposition
+        self._arrays = self.lines, self.work, memory[-1].view(self.work.dtype)
+
+        def make(fftw: Plan) -> tuple[RowTransforms, ColumnTransforms]:
+            arguments = (self.work, len(rows.parts), rows.pool, fftw)
+            along_columns = ColumnTransforms(*arguments, padded_rows=padded_rows)
+            along_rows = RowTransforms(self.values, self.lines, rows.parts, rows.pool, fftw)
+            return along_rows, along_columns
+
+        self.along_rows, self.along_columns = planned(make, self.values.size)
+
+    def to_columns(self, blocks: Sequence[int] | None = None) -> None:
+        """`work` <- `values` transformed along x; `blocks` as in `RowTransforms.forward`."""
+        self.along_rows.forward(blocks)
+        if self._transposition is not None:
+            self._transposition.to_columns(*self._arrays)
+
+    def to_values(self) -> None:
+        """`values` <- `work` transformed back along x."""
+        if self._transposition is not None:
+            self._transposition.to_lines(*self._arrays)
+        self.along_rows.backward()
+
+    def filter(
+        self, multiply: Callable[[Columns], None], blocks: Sequence[int] | None = None
+    ) -> None:
+        """Transform `values`, multiply the coefficients and transform them back."""
+        self.to_columns(blocks)
+        self.along_columns.filter(multiply)
+        self.to_values()
 
 
 def _nothing() -> None:
