@@ -67,10 +67,6 @@ class DistributedGrid(Grid):
         """First row of this process, and the row after its last."""
         return self.rows.start, self.rows.stop
 
-    def total(self, values: Any) -> Any:
-        """Sum over all processes."""
-        return self.ranks.total(values)
-
     def max(self, value: float) -> float:
         """Maximum over all processes."""
         return float(self.ranks.gather(value).max())
@@ -107,9 +103,7 @@ class DistributedGrid(Grid):
 
     def coarser(self, shape: Shape) -> Grid:
         """A grid of fewer points on the same cell; not distributed if it is too small."""
-        if _suits(shape, self.ranks):
-            return super().coarser(shape)
-        return Grid(**_fields(self)).coarser(shape)
+        return create_grid(Grid(**_fields(self)).coarser(shape), self.ranks)
 
     def cut(self, symbol: Field, target: Grid) -> Field:
         """The values of a symbol at the wavenumbers of a coarser grid."""

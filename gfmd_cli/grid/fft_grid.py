@@ -111,7 +111,7 @@ class Grid:
 
     def total(self, values: T) -> T:
         """Sum over the grid from the sum over the rows of this process."""
-        return values
+        return self.rows.total(values)
 
     def max(self, value: float) -> float:
         """Maximum over the grid from the maximum over the rows of this process."""

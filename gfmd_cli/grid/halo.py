@@ -52,7 +52,7 @@ class DistributedRows(LocalRows):
         self.start, self.stop = self.edges[ranks.rank : ranks.rank + 2]
         super().__init__(self.stop - self.start, threads)
 
-    def total(self, values: Field) -> Field:
+    def total(self, values: Any) -> Any:
         """Sums over all processes."""
         return self.ranks.total(values)
 

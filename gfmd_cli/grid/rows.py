@@ -75,7 +75,7 @@ class LocalRows:
         self.run(kernel, *arguments, row_sums, first=first)
         return self.total(row_sums[first : first + self.count].sum(axis=0))
 
-    def total(self, values: Field) -> Field:
+    def total(self, values: Any) -> Any:
         """Sums over all processes."""
         return values
 
