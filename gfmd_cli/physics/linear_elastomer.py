@@ -5,9 +5,8 @@ sum_q k(q) |u(q)|^2 / 2: Eq. (1) of Mueser, "Elastic contacts of randomly rough 
 spatial dimensions". Sums exclude q = 0, where k is zero for every elastomer (load control).
 """
 
-from dataclasses import dataclass
 from fractions import Fraction
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -20,25 +19,10 @@ from gfmd_cli.physics.persson import gamma_n
 from gfmd_cli.spec_table import SpecTable
 from gfmd_cli.units import count
 
+if TYPE_CHECKING:
+    from gfmd_cli.physics.contact import Scene
+
 EXPONENT_STEP = 1e-3  # of ln q: the truncation error is of order 1e-7, the rounding error 1e-13
-
-
-@dataclass(frozen=True)
-class Scale:
-    """What the warnings of an elastomer depend on: the lengths of a contact, and its boundary."""
-
-    h_std: float
-    """Rms height of a rough surface [m], 0 of a single indenter."""
-    q: Field
-    """Wavenumbers of the surface [1/m]."""
-    variance: Field
-    """The part of the squared stress in full contact at each of them."""
-    length: float
-    """Side of the cell along x [m]."""
-    spacing: float
-    """The wider of the grid spacings [m]."""
-    boundary: str
-    """`grid.boundary`."""
 
 
 class LinearElastomer(SpecTable):
@@ -88,8 +72,11 @@ class LinearElastomer(SpecTable):
         """1/k(q) of an elastomer whose displacement decays and whose k(q) is not a power law."""
         raise NotImplementedError
 
-    def warnings(self, scale: Scale) -> list[str]:
-        """Warnings about a contact with these length scales; empty by default."""
+    def warnings(self, scene: "Scene", boundary: str, *, is_rough: bool) -> list[str]:
+        """Warnings about a scene with this `grid.boundary`; empty by default.
+
+        `is_rough`: whether its rms height is that of a rough surface, not of a single indenter.
+        """
         return []
 
     def decays(self, dimension: int) -> bool:
