@@ -14,7 +14,7 @@ from gfmd_cli.errors import InputError
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.grid.fft_grid import ALL_ROWS, Shape
 from gfmd_cli.physics.compliance_transforms import Compliance
-from gfmd_cli.physics.free_compliance import Spacings, power_law
+from gfmd_cli.physics.free_compliance import Pixels, Spacings, power_law
 from gfmd_cli.physics.persson import gamma_n
 from gfmd_cli.spec_table import SpecTable
 from gfmd_cli.units import count
@@ -63,10 +63,10 @@ class LinearElastomer(SpecTable):
         Raises InputError where the displacement does not decay with the distance.
         """
         self.check_free_boundary(len(shape))
+        pixels = Pixels(shape, spacings, rows)
         if self.exponent is None:
-            return self.compliance().displacements(shape, spacings, rows)
-        prefactor = float(self.stiffness(np.ones(1))[0])
-        return power_law(self.exponent, shape, spacings, rows) / prefactor
+            return self.compliance().displacements(pixels)
+        return power_law(self.exponent, pixels) / float(self.stiffness(np.ones(1))[0])
 
     def compliance(self) -> Compliance:
         """1/k(q) of an elastomer whose displacement decays and whose k(q) is not a power law."""
