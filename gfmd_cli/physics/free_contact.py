@@ -185,8 +185,7 @@ def _mirrored(
     A measured map is mirrored before it is interpolated, so that no height on a finer grid lies
     between those of opposite borders. On its own points no process needs the whole mirrored map.
     """
-    whole = doubled_grid(replace(surface.grid(grid.points, grid.points_y), threads=grid.threads))
-    doubled = create_grid(whole, ranks)
+    doubled = create_grid(doubled_grid(grid), ranks)
     own_points = (surface.smallest_grid_y(), surface.smallest_grid())
     mirrored_surface = surface.mirrored()
     if mirrored_surface is None or own_points == (grid.points_y, grid.points):
