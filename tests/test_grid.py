@@ -199,8 +199,10 @@ def test_columns_may_be_copied_in_blocks(monkeypatch, shape, precision, threads)
         results.append((energy, values.copy()))
         eps = float(np.finfo(grid.real).eps)
         assert energy == pytest.approx(float(np.vdot(field, values)), rel=100 * eps)
-    assert grids[0]._workspace[3].is_copied < grids[1]._workspace[3].is_copied
-    assert len(grids[1]._workspace[3].blocks) > 2
+    assert (
+        grids[0]._transforms.along_columns.is_copied < grids[1]._transforms.along_columns.is_copied
+    )
+    assert len(grids[1]._transforms.along_columns.blocks) > 2
     np.testing.assert_allclose(results[1][1], results[0][1], atol=50 * eps * abs(values).max())
 
 

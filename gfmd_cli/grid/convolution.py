@@ -8,17 +8,15 @@ share a field exchange no zero rows either.
 
 from dataclasses import dataclass
 from functools import cached_property
-from math import prod
 
 import numpy as np
 import pyfftw
 
 from gfmd_cli.grid import plans
-from gfmd_cli.grid.arrays import Field, Modes, Precision
-from gfmd_cli.grid.ranks import Ranks
+from gfmd_cli.grid.arrays import Field, Precision
 from gfmd_cli.grid.rows import LocalRows
-from gfmd_cli.grid.shared_transforms import Columns, ColumnTransforms, RowTransforms
-from gfmd_cli.grid.transposition import Span, Transposition, column_spans
+from gfmd_cli.grid.shared_transforms import Columns, FieldTransforms
+from gfmd_cli.grid.transposition import Transposition
 
 
 def padded_shape(shape: tuple[int, ...], factor: float) -> tuple[int, ...]:
@@ -31,7 +29,10 @@ def padded_shape(shape: tuple[int, ...], factor: float) -> tuple[int, ...]:
 
 @dataclass(eq=False)
 class PaddedTransform:
-    """Maps F^-1 symbol F of real fields of a shape, padded by zeros; symbols are real and even."""
+    """Maps F^-1 symbol F of real fields of a shape, padded by zeros; symbols are real and even.
+
+    Of processes that share the fields each holds some of the rows, and some columns of a symbol.
+    """
 
     shape: tuple[int, ...]
     """Shape of the fields."""
@@ -39,28 +40,21 @@ class PaddedTransform:
     """Shape of the padded fields."""
     precision: Precision = "double"
     threads: int = 1
+    transposition: Transposition | None = None
+    """The exchange between the processes that share the fields; None for one process."""
 
     def __post_init__(self) -> None:
         self.rows, self.columns = (1, *self.shape)[-2:]
         self.padded_rows, self.padded_columns = (1, *self.padded)[-2:]
         self.real = np.dtype(np.float64 if self.precision == "double" else np.float32)
-        self.modes = self.padded_columns // 2 + 1
-        local_rows = LocalRows(self.own_rows, self.threads)
-        self.pool, self.parts = local_rows.pool, local_rows.parts
-
-    @property
-    def own_rows(self) -> int:
-        """Number of rows of a field that this process holds."""
-        return self.rows
-
-    @property
-    def span(self) -> Span:
-        """First wavenumber along x that this process holds, and the one after its last."""
-        return 0, self.modes
+        self.own_rows, self.span = self.rows, (0, self.padded_columns // 2 + 1)
+        if self.transposition is not None:
+            self.own_rows, self.span = self.transposition.row_count, self.transposition.span
+        self.local_rows = LocalRows(self.own_rows, self.threads)
 
     @property
     def symbol_shape(self) -> tuple[int, int]:
-        """Shape of a symbol: q_y >= 0, and q_x >= 0 of `span`; the symbol is even in both."""
+        """Shape of a symbol, even in q_y and q_x: q_y >= 0, and the q_x >= 0 of this process."""
         first, last = self.span
         return self.padded_rows // 2 + 1, last - first
 
@@ -79,25 +73,24 @@ class PaddedTransform:
         if self.padded_rows < 2 * self.rows - 1 or self.padded_columns < 2 * self.columns - 1:
             raise ValueError("a convolution needs twice the points")
         kernel = kernel.reshape(self.own_rows, self.columns)
-        values, along_rows, along_columns = self._workspace
+        transforms, symbol = self._transforms, np.empty(self.symbol_shape, self.real)
+        values, work = transforms.values, transforms.work
         values[:, : self.columns] = kernel
         values[:, self.columns :] = 0.0
         values[:, self.padded_columns - self.columns + 1 :] = kernel[:, :0:-1]
-        along_rows.forward()
-        self._to_columns()
-        symbol, work = np.empty(self.symbol_shape, self.real), along_columns.work
 
         def mirror(columns: Columns) -> None:
             columns.coefficients[self.padded_rows - self.rows + 1 :] = work[:0:-1, columns.part]
             columns.forward()
             symbol[:, columns.part] = columns.coefficients[: len(symbol)].real
 
-        along_columns.run(mirror)
+        transforms.to_columns()
+        transforms.along_columns.run(mirror)
         return symbol
 
     def apply(self, symbol: Field, field: Field, out: Field) -> Field:
         """out <- F^-1 symbol F field; return it. `out` may be `field`."""
-        values, along_rows, along_columns = self._workspace
+        values = self._transforms.values
         values[:, : self.columns] = field.reshape(self.own_rows, self.columns)
         values[:, self.columns :] = 0.0
         mirrored = symbol[(self.padded_rows - 1) // 2 : 0 : -1]
@@ -106,85 +99,25 @@ class PaddedTransform:
             columns.coefficients[: len(symbol)] *= symbol[:, columns.part]
             columns.coefficients[len(symbol) :] *= mirrored[:, columns.part]
 
-        along_rows.forward()
-        self._to_columns()
-        along_columns.filter(multiply)
-        self._to_lines()
-        along_rows.backward()
+        self._transforms.filter(multiply)
         scale = 1.0 / (self.padded_rows * self.padded_columns)
         target = out.reshape(self.own_rows, self.columns)
         np.multiply(values[:, : self.columns], scale, out=target)
         return out
 
-    def _to_columns(self) -> None:
-        """Exchange coefficients transformed along x for all rows of the columns of `span`."""
-
-    def _to_lines(self) -> None:
-        """Undo `_to_columns`."""
-
     @cached_property
-    def _workspace(self) -> tuple[Field, RowTransforms, ColumnTransforms]:
-        """The values of the padded rows, and the transforms in their memory."""
-        lines, work, _ = self._memory
-        values = lines.view(self.real)[:, : self.padded_columns]
-
-        def make(fftw: plans.Plan) -> tuple[RowTransforms, ColumnTransforms]:
-            along_rows = RowTransforms(values, lines, self.parts, self.pool, fftw)
-            arguments = (work, len(self.parts), self.pool, fftw)
-            return along_rows, ColumnTransforms(*arguments, padded_rows=self.padded_rows)
-
-        return values, *plans.planned(make)
-
-    @cached_property
-    def _memory(self) -> tuple[Modes, Modes, Modes]:
-        """Coefficients as rows and, in the same memory, as columns; memory for an exchange."""
-        lines = self._empty((self.own_rows, self.modes))
-        return lines, lines, lines
-
-    def _empty(self, shape: tuple[int, ...]) -> Modes:
+    def _transforms(self) -> FieldTransforms:
+        """The transforms of the padded fields, and their memory."""
+        modes, (first, last) = self.padded_columns // 2 + 1, self.span
+        sizes = self.own_rows * modes, self.rows * (last - first)  # as rows, as columns
         kind = np.result_type(self.real, np.complex64)
-        return pyfftw.empty_aligned(shape, dtype=kind)
-
-
-@dataclass(eq=False, kw_only=True)
-class DistributedPaddedTransform(PaddedTransform):
-    """The same as `PaddedTransform`, for fields and symbols that several processes share.
-
-    A process holds the rows between two `edges` of a field, and some columns of a symbol, and of
-    the coefficients between the transforms along the two axes.
-    """
-
-    ranks: Ranks
-    edges: list[int]
-    """First row of each process, and the number of rows."""
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        spans = column_spans(self.modes, self.ranks.size)
-        self.transposition = Transposition(self.ranks, self.edges, spans)
-
-    @property
-    def own_rows(self) -> int:
-        """Number of rows of a field that this process holds."""
-        return self.edges[self.ranks.rank + 1] - self.edges[self.ranks.rank]
-
-    @property
-    def span(self) -> Span:
-        """First wavenumber along x that this process holds, and the one after its last."""
-        return self.transposition.spans[self.ranks.rank]
-
-    def _to_columns(self) -> None:
-        self.transposition.to_columns(*self._memory)
-
-    def _to_lines(self) -> None:
-        lines, columns, spare = self._memory
-        self.transposition.to_lines(columns, lines, spare)
-
-    @cached_property
-    def _memory(self) -> tuple[Modes, Modes, Modes]:
-        """Coefficients as rows and, in the same memory, as columns; memory for the exchange."""
-        first, last = self.span
-        in_lines, in_columns = (self.own_rows, self.modes), (self.rows, last - first)
-        memory = self._empty((max(prod(in_lines), prod(in_columns)),))
-        lines, columns = (memory[: prod(s)].reshape(s) for s in (in_lines, in_columns))
-        return lines, columns, self._empty((lines.size,))
+        memory = [pyfftw.empty_aligned(max(sizes), kind)]
+        if self.transposition is not None:
+            memory.append(pyfftw.empty_aligned(sizes[0], kind))
+        return FieldTransforms(
+            memory,
+            self.padded_columns,
+            self.local_rows,
+            self.transposition,
+            padded_rows=self.padded_rows,
+        )

@@ -13,8 +13,7 @@ from typing import Any
 import numpy as np
 import pyfftw
 
-from gfmd_cli.grid.arrays import Field, Modes, Precision
-from gfmd_cli.grid.convolution import DistributedPaddedTransform, PaddedTransform, padded_shape
+from gfmd_cli.grid.arrays import Field
 from gfmd_cli.grid.fft_grid import Grid, Shape
 from gfmd_cli.grid.halo import HALO_ROWS, DistributedRows, is_distributable
 from gfmd_cli.grid.ranks import Ranks, is_root
@@ -68,10 +67,6 @@ class DistributedGrid(Grid):
         """First row of this process, and the row after its last."""
         return self.rows.start, self.rows.stop
 
-    def total(self, values: Any) -> Any:
-        """Sum over all processes."""
-        return self.ranks.total(values)
-
     def max(self, value: float) -> float:
         """Maximum over all processes."""
         return float(self.ranks.gather(value).max())
@@ -102,36 +97,13 @@ class DistributedGrid(Grid):
         room = max(size, (rows + 2 * HALO_ROWS) * columns)
         return pyfftw.empty_aligned(size, self._complex), pyfftw.empty_aligned(2 * room, self.real)
 
-    def _to_columns(self) -> None:
-        self._transposition.to_columns(*self._arrays)
-
-    def _to_lines(self) -> None:
-        lines, work, spare = self._arrays
-        self._transposition.to_lines(work, lines, spare)
-
-    @property
-    def _arrays(self) -> tuple[Modes, Modes, Modes]:
-        """Coefficients of the rows and of the columns of this process, memory for the exchange."""
-        work, lines, *_ = self._workspace
-        return lines, work, self._memory[1].view(work.dtype)
-
-    @cached_property
-    def _transposition(self) -> Transposition:
-        return Transposition(self.ranks, self.rows.edges, self.spans)
-
-    def padded_transform(self, factor: float, precision: Precision = "double") -> PaddedTransform:
-        """Transforms of fields that are padded by zeros; see `Grid.padded_transform`."""
-        padded = padded_shape(self.whole_shape, factor)
-        edges = self.rows.edges
-        return DistributedPaddedTransform(
-            self.whole_shape, padded, precision, self.threads, ranks=self.ranks, edges=edges
-        )
+    def _transposition(self, columns: int) -> Transposition:
+        spans = column_spans(columns, self.ranks.size)
+        return Transposition(self.ranks, self.rows.edges, spans)
 
     def coarser(self, shape: Shape) -> Grid:
         """A grid of fewer points on the same cell; not distributed if it is too small."""
-        if _suits(shape, self.ranks):
-            return super().coarser(shape)
-        return Grid(**_fields(self)).coarser(shape)
+        return create_grid(Grid(**_fields(self)).coarser(shape), self.ranks)
 
     def cut(self, symbol: Field, target: Grid) -> Field:
         """The values of a symbol at the wavenumbers of a coarser grid."""

@@ -13,14 +13,14 @@ from typing import Any, TypeVar
 import numpy as np
 import pyfftw
 
-from gfmd_cli.grid import kernels, plans
+from gfmd_cli.grid import kernels
 from gfmd_cli.grid.arrays import Field, Modes, Precision
 from gfmd_cli.grid.convolution import PaddedTransform, padded_shape
 from gfmd_cli.grid.modes import SharedModes, multiplicity, shared_modes
 from gfmd_cli.grid.pixels import average_along_x, average_rows, covered_rows
 from gfmd_cli.grid.rows import LocalRows
-from gfmd_cli.grid.shared_transforms import Columns, ColumnTransforms, RowTransforms
-from gfmd_cli.grid.transposition import Span
+from gfmd_cli.grid.shared_transforms import Columns, FieldTransforms
+from gfmd_cli.grid.transposition import Span, Transposition
 
 T = TypeVar("T")
 ALL_ROWS = slice(None)
@@ -111,7 +111,7 @@ class Grid:
 
     def total(self, values: T) -> T:
         """Sum over the grid from the sum over the rows of this process."""
-        return values
+        return self.rows.total(values)
 
     def max(self, value: float) -> float:
         """Maximum over the grid from the maximum over the rows of this process."""
@@ -201,55 +201,36 @@ class Grid:
         vars(grid)["_memory"] = tuple(part.view(kinds[part.dtype.kind]) for part in self._memory)
         return grid
 
+    def _transposition(self, columns: int) -> Transposition | None:
+        """The exchange of so many columns of coefficients; None for one process."""
+        return None
+
     @cached_property
-    def _workspace(self) -> tuple[Modes, Modes, RowTransforms, ColumnTransforms]:
-        """Memory of all transforms, as coefficients and as rows of coefficients, and the plans.
-
-        Transforms in place need a field less and a third less time than those between two arrays.
-        The plans are made with the arrays, because measuring a plan overwrites them.
-        """
-        memory, columns = self._memory[0], self.points // 2 + 1
-        work = memory[: prod(self.spectral_shape)].reshape(self.spectral_shape)
-        lines = memory[: self.rows.count * columns].reshape(-1, columns)
-        values = lines.view(self.real)[:, : self.points]
-        parts, pool = self.rows.parts, self.rows.pool
-
-        def make(fftw: plans.Plan) -> tuple[RowTransforms, ColumnTransforms]:
-            along_columns = ColumnTransforms(self.as_rows(work), len(parts), pool, fftw)
-            return RowTransforms(values, lines, parts, pool, fftw), along_columns
-
-        return work, lines, *plans.planned(make, values.size)
+    def _transforms(self) -> FieldTransforms:
+        """All transforms of this grid, in one memory."""
+        transposition = self._transposition(self.points // 2 + 1)
+        return FieldTransforms(self._memory, self.points, self.rows, transposition)
 
     @property
     def work(self) -> Modes:
         """Coefficients that every transform of this grid works in."""
-        return self._workspace[0]
+        return self._transforms.work.reshape(self.spectral_shape)
 
     @property
     def padded(self) -> Field:
         """The same memory as real values; a row has one or two more than the grid has points."""
-        values = self._workspace[1].view(self.real)
+        values = self._transforms.lines.view(self.real)
         return values if self.dimension == 2 else values[0]
 
     def transform(self) -> None:
         """`work` <- coefficients of the values in `padded`, without the factor 1/size."""
-        _, _, along_rows, along_columns = self._workspace
-        along_rows.forward()
-        self._to_columns()
-        along_columns.forward()
+        self._transforms.to_columns()
+        self._transforms.along_columns.forward()
 
     def transform_back(self) -> None:
         """`padded` <- values of the coefficients in `work`, without the factor 1/size."""
-        _, _, along_rows, along_columns = self._workspace
-        along_columns.backward()
-        self._to_lines()
-        along_rows.backward()
-
-    def _to_columns(self) -> None:
-        """Exchange coefficients transformed along x for all rows of the columns of `span`."""
-
-    def _to_lines(self) -> None:
-        """Undo `_to_columns`."""
+        self._transforms.along_columns.backward()
+        self._transforms.to_values()
 
     def filter_by(
         self, kernel: Filter, symbol: Field, *arguments: Any, blocks: Sequence[int] | None = None
@@ -262,17 +243,13 @@ class Grid:
         blocks : numbers of the blocks of 8 rows outside of which all values are zero; the rows
             there are not transformed
         """
-        symbol, (_, _, along_rows, along_columns) = self.as_rows(symbol), self._workspace
+        symbol = self.as_rows(symbol)
 
         def multiply(columns: Columns) -> None:
             modes, span = columns.array.view(self.real), (columns.part.start, columns.part.stop)
             kernel(modes, columns.first, symbol, *span, 1 / self.size, *arguments)
 
-        along_rows.forward(blocks)
-        self._to_columns()
-        along_columns.filter(multiply)
-        self._to_lines()
-        along_rows.backward()
+        self._transforms.filter(multiply, blocks)
 
     def forward_into_work(self, field: Field) -> Modes:
         """`work` <- Fourier coefficients of a field, without 1/size."""
@@ -364,7 +341,10 @@ class Grid:
     def padded_transform(self, factor: float, precision: Precision = "double") -> PaddedTransform:
         """Transforms of fields that are padded by zeros to `factor` times the points a side."""
         padded = padded_shape(self.whole_shape, factor)
-        return PaddedTransform(self.whole_shape, padded, precision, self._threads)
+        transposition = self._transposition(padded[-1] // 2 + 1)
+        return PaddedTransform(
+            self.whole_shape, padded, precision, self._threads, transposition=transposition
+        )
 
     def collect(self, field: Field) -> Field | None:
         """All of a field, on the first process; None on the others."""

@@ -41,6 +41,7 @@ def is_distributable(points: int, count: int) -> bool:
 class DistributedRows(LocalRows):
     """The block of rows of this process; `spare` returns memory for one field with a halo."""
 
+    halo: ClassVar[int] = HALO_ROWS
     is_whole: ClassVar[bool] = False
 
     def __init__(
@@ -51,17 +52,9 @@ class DistributedRows(LocalRows):
         self.start, self.stop = self.edges[ranks.rank : ranks.rank + 2]
         super().__init__(self.stop - self.start, threads)
 
-    def sums(self, count: int, kernel: Kernel, *arguments: Any) -> Field:
-        """Totals over all processes; see `LocalRows.sums`."""
-        return self.ranks.total(super().sums(count, kernel, *arguments))
-
-    def empty_with_halo(self, *shape: int, dtype: Any) -> Any:
-        """An array with a halo that is not filled yet."""
-        return np.zeros((self.count + 2 * HALO_ROWS, *shape), dtype)
-
-    def interior(self, array: Any) -> Any:
-        """The rows of an array without its halo."""
-        return array[HALO_ROWS:-HALO_ROWS]
+    def total(self, values: Any) -> Any:
+        """Sums over all processes."""
+        return self.ranks.total(values)
 
     def with_halo(self, field: Field) -> Field:
         """A field with its halo, in the spare memory of the grid."""
@@ -86,31 +79,12 @@ class DistributedRows(LocalRows):
             ]
         self.ranks.wait(*requests)
 
-    def run_with_halo(self, kernel: Kernel, *arguments: Any) -> None:
-        """Run a kernel over arrays with halos."""
-        self.run(kernel, *arguments, first=HALO_ROWS)
-
-    def sums_with_halo(self, count: int, kernel: Kernel, *arguments: Any) -> Field:
-        """Run a kernel over arrays with halos; return its totals over all processes."""
-        row_sums = self.empty_with_halo(count, dtype=np.float64)
-        self.run_with_halo(kernel, *arguments, row_sums)
-        return self.ranks.total(self.interior(row_sums).sum(axis=0))
-
     def coarser(self) -> LocalRows:
         """The rows of the next coarser level, distributed if the level is large enough."""
         points = self.points // 2
         if is_distributable(points, self.ranks.size):
             return DistributedRows(self.ranks, points, len(self.parts))
         return ReplicatedRows(self)
-
-    def run_from_finer(self, kernel: Kernel, fine: Any, coarse: Any) -> None:
-        """Run a kernel from the next finer level to this one, and exchange the halos."""
-        self.run(kernel, *fine, *map(self.aligned_with_finer, coarse), first=EXCHANGED_ROWS)
-        self.exchange_halo(*coarse)
-
-    def aligned_with_finer(self, array: Any) -> Any:
-        """The array with its halo cut to half."""
-        return array[EXCHANGED_ROWS:-EXCHANGED_ROWS]
 
 
 class ReplicatedRows(LocalRows):

@@ -50,6 +50,8 @@ class LocalRows:
     rows above and below the block. On one process the halo is empty.
     """
 
+    halo: ClassVar[int] = 0
+    """Number of rows of a halo above the block, and below it."""
     is_whole: ClassVar[bool] = True
     """Whether this process holds all rows."""
 
@@ -67,19 +69,23 @@ class LocalRows:
             parts = [(first + a, first + b) for a, b in self.parts]
             list(self.pool.map(lambda part: kernel(*arguments, *part), parts))
 
-    def sums(self, count: int, kernel: Kernel, *arguments: Any) -> Field:
+    def sums(self, count: int, kernel: Kernel, *arguments: Any, first: int = 0) -> Field:
         """Run a kernel whose last array receives `count` sums for each row; return the totals."""
-        row_sums = np.zeros((self.count, count))
-        self.run(kernel, *arguments, row_sums)
-        return row_sums.sum(axis=0)
+        row_sums = np.zeros((self.count + 2 * first, count))
+        self.run(kernel, *arguments, row_sums, first=first)
+        return self.total(row_sums[first : first + self.count].sum(axis=0))
+
+    def total(self, values: Any) -> Any:
+        """Sums over all processes."""
+        return values
 
     def empty_with_halo(self, *shape: int, dtype: Any) -> Any:
-        """An array with a halo; `shape` is the shape of one row."""
-        return np.empty((self.count, *shape), dtype)
+        """An array of zeros with a halo; `shape` is the shape of one row."""
+        return np.zeros((self.count + 2 * self.halo, *shape), dtype)
 
     def interior(self, array: Any) -> Any:
         """The rows of an array without its halo."""
-        return array
+        return array[self.halo : self.halo + self.count]
 
     def with_halo(self, field: Field) -> Field:
         """A field with its halo; the values are valid until the next transform."""
@@ -90,11 +96,11 @@ class LocalRows:
 
     def run_with_halo(self, kernel: Kernel, *arguments: Any) -> None:
         """Run a kernel over arrays with halos."""
-        self.run(kernel, *arguments)
+        self.run(kernel, *arguments, first=self.halo)
 
     def sums_with_halo(self, count: int, kernel: Kernel, *arguments: Any) -> Field:
         """Run a kernel over arrays with halos; return the totals of its sums, see `sums`."""
-        return self.sums(count, kernel, *arguments)
+        return self.sums(count, kernel, *arguments, first=self.halo)
 
     def coarser(self) -> "LocalRows":
         """The rows of the next coarser level, which has every other row."""
@@ -105,9 +111,10 @@ class LocalRows:
         return LocalRows(count, len(self.parts) if count >= MIN_THREADED_ROWS else 1)
 
     def run_from_finer(self, kernel: Kernel, fine: Any, coarse: Any) -> None:
-        """Run a kernel that computes arrays of this level from arrays of the next finer level."""
-        self.run(kernel, *fine, *coarse)
+        """Run a kernel from arrays of the next finer level to this one, and exchange the halos."""
+        self.run(kernel, *fine, *map(self.aligned_with_finer, coarse), first=self.halo // 2)
+        self.exchange_halo(*coarse)
 
     def aligned_with_finer(self, array: Any) -> Any:
-        """An array of this level such that row i lies at row 2 i of the next finer level."""
-        return array
+        """An array with half of its halo: row i lies at row 2 i of the next finer level."""
+        return array[self.halo // 2 : len(array) - self.halo // 2]

@@ -13,7 +13,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 from itertools import cycle, pairwise
-from math import ceil
+from math import ceil, prod
 from operator import call
 from typing import Any
 
@@ -21,8 +21,9 @@ import numpy as np
 import pyfftw
 
 from gfmd_cli.grid.arrays import Field, Modes
-from gfmd_cli.grid.plans import Plan
-from gfmd_cli.grid.transposition import Span
+from gfmd_cli.grid.plans import Plan, planned
+from gfmd_cli.grid.rows import LocalRows
+from gfmd_cli.grid.transposition import Transposition
 
 BLOCK_COEFFICIENTS = 2**17  # in a block of columns; 2^16 to 2^18 take as long
 MIN_BLOCK_COLUMNS = 32  # shorter pieces of rows take longer to copy
@@ -39,24 +40,17 @@ class RowTransforms:
     Parameters
     ----------
     values, lines : the rows as real values and as coefficients
-    parts : the rows that each thread transforms
+    rows : the threads, and the rows that each transforms
     """
 
-    def __init__(
-        self,
-        values: Field,
-        lines: Modes,
-        parts: Sequence[Span],
-        pool: ThreadPoolExecutor | None,
-        fftw: Plan,
-    ) -> None:
-        self.values, self.lines, self.pool = values, lines, pool
-        arrays = [(values[a:b], lines[a:b]) for a, b in parts]
+    def __init__(self, values: Field, lines: Modes, rows: LocalRows, fftw: Plan) -> None:
+        self.values, self.lines, self.pool = values, lines, rows.pool
+        arrays = [(values[a:b], lines[a:b]) for a, b in rows.parts]
         self._forward = [fftw(v, c, (1,), "FFTW_FORWARD").execute for v, c in arrays]
         self._backward = [fftw(c, v, (1,), "FFTW_BACKWARD").execute for v, c in arrays]
         block = pyfftw.empty_aligned((BLOCK_ROWS, lines.shape[1]), dtype=lines.dtype)
         real = block.view(values.dtype)[:, : values.shape[1]]
-        count = len(parts) if len(lines) % BLOCK_ROWS == 0 else 0
+        count = len(rows.parts) if len(lines) % BLOCK_ROWS == 0 else 0
         self._of_block = [fftw(real, block, (1,), "FFTW_FORWARD") for _ in range(count)]
 
     def forward(self, blocks: Sequence[int] | None = None) -> None:
@@ -107,36 +101,28 @@ class ColumnTransforms:
     Parameters
     ----------
     work : the coefficients
-    count : number of threads
-    padded_rows : number of rows to which the columns are padded by zeros; 0 for no padding
+    rows : the threads
+    length : number of rows to which the columns are padded by zeros
     """
 
-    def __init__(
-        self,
-        work: Modes,
-        count: int,
-        pool: ThreadPoolExecutor | None,
-        fftw: Plan,
-        *,
-        padded_rows: int = 0,
-    ) -> None:
-        self.work, self.pool, columns = work, pool, work.shape[1]
-        rows = padded_rows or len(work)
+    def __init__(self, work: Modes, rows: LocalRows, fftw: Plan, length: int) -> None:
+        self.work, self.pool = work, rows.pool
+        count, columns = len(rows.parts), work.shape[1]
         is_large = work.nbytes >= MIN_COPIED_BYTES * count and len(work) > 1
-        self.is_copied = rows > len(work) or is_large
+        self.is_copied = length > len(work) or is_large
 
         def plan(array: Modes) -> tuple[Execute, Execute]:
-            if rows == 1:
+            if length == 1:
                 return _nothing, _nothing
             directions = ("FFTW_FORWARD", "FFTW_BACKWARD")
             forward, backward = (fftw(array, array, (0,), way).execute for way in directions)
             return forward, backward
 
         if self.is_copied:
-            width = max(BLOCK_COEFFICIENTS // rows, MIN_BLOCK_COLUMNS)
+            width = max(BLOCK_COEFFICIENTS // length, MIN_BLOCK_COLUMNS)
             width = ceil(columns / (count * max(1, round(columns / width / count))))
             parts = [slice(a, min(a + width, columns)) for a in range(0, columns, width)]
-            blocks = [pyfftw.empty_aligned((rows, width), work.dtype) for _ in range(count)]
+            blocks = [pyfftw.empty_aligned((length, width), work.dtype) for _ in range(count)]
             plans = [plan(block) for block in blocks]
             for block in blocks:
                 block[...] = 0.0
@@ -183,6 +169,73 @@ class ColumnTransforms:
                     self.work[:, columns.part] = columns.coefficients[:rows]
 
         side_by_side(self.pool, [partial(share, numbers) for numbers in self.shares])
+
+
+class FieldTransforms:
+    """Transforms of a field along both axes and back, in one memory, without a factor.
+
+    Transforms in place need a field less and a third less time than those between two arrays. The
+    plans are made with the arrays, because measuring a plan overwrites them.
+
+    Parameters
+    ----------
+    memory : of the coefficients; for a transposition also spare memory for as many
+    points : number of real values of a row
+    rows : the rows of this process
+    transposition : exchange between the processes that share the field; None for one process
+    padded_rows : number of rows to which the columns are padded by zeros; 0 for no padding
+    """
+
+    def __init__(
+        self,
+        memory: Sequence[Any],
+        points: int,
+        rows: LocalRows,
+        transposition: Transposition | None,
+        *,
+        padded_rows: int = 0,
+    ) -> None:
+        shape = (rows.count, points // 2 + 1)
+        self.lines: Modes = memory[0][: prod(shape)].reshape(shape)
+        """Coefficients transformed along x: all of the rows of this process."""
+        self.work = self.lines
+        """Coefficients of the columns of this process, all rows of them; in the same memory."""
+        if transposition is not None:
+            first, last = transposition.span
+            shape = (transposition.edges[-1], last - first)
+            self.work = memory[0][: prod(shape)].reshape(shape)
+        real = self.lines.real.dtype
+        self.values: Field = self.lines.view(real)[:, :points]
+        """The rows as real values."""
+        self._transposition = transposition
+        self._arrays = self.lines, self.work, memory[-1].view(self.work.dtype)
+
+        def make(fftw: Plan) -> tuple[RowTransforms, ColumnTransforms]:
+            length = padded_rows or len(self.work)
+            along_columns = ColumnTransforms(self.work, rows, fftw, length)
+            return RowTransforms(self.values, self.lines, rows, fftw), along_columns
+
+        self.along_rows, self.along_columns = planned(make, self.values.size)
+
+    def to_columns(self, blocks: Sequence[int] | None = None) -> None:
+        """`work` <- `values` transformed along x; `blocks` as in `RowTransforms.forward`."""
+        self.along_rows.forward(blocks)
+        if self._transposition is not None:
+            self._transposition.to_columns(*self._arrays)
+
+    def to_values(self) -> None:
+        """`values` <- `work` transformed back along x."""
+        if self._transposition is not None:
+            self._transposition.to_lines(*self._arrays)
+        self.along_rows.backward()
+
+    def filter(
+        self, multiply: Callable[[Columns], None], blocks: Sequence[int] | None = None
+    ) -> None:
+        """Transform `values`, multiply the coefficients and transform them back."""
+        self.to_columns(blocks)
+        self.along_columns.filter(multiply)
+        self.to_values()
 
 
 def _nothing() -> None:

@@ -36,6 +36,16 @@ class Transposition:
     spans: list[Span]
     """Columns of each process."""
 
+    @property
+    def row_count(self) -> int:
+        """Number of rows of this process."""
+        return self.edges[self.ranks.rank + 1] - self.edges[self.ranks.rank]
+
+    @property
+    def span(self) -> Span:
+        """The columns of this process."""
+        return self.spans[self.ranks.rank]
+
     def to_columns(self, lines: Modes, columns: Modes, spare: Modes) -> None:
         """Fill `columns` from the `lines` of all processes."""
         blocks = self._blocks(lines, spare)
@@ -43,7 +53,7 @@ class Transposition:
             block[...] = lines[:, a:b]
         self._exchange(self._in_blocks(lines, spare), self._in_columns(columns))
 
-    def to_lines(self, columns: Modes, lines: Modes, spare: Modes) -> None:
+    def to_lines(self, lines: Modes, columns: Modes, spare: Modes) -> None:
         """Fill `lines` from the `columns` of all processes."""
         self._exchange(self._in_columns(columns), self._in_blocks(lines, spare))
         for (a, b), block in zip(self.spans, self._blocks(lines, spare), strict=True):

@@ -30,16 +30,7 @@ import numpy as np
 from scipy.special import erfc, j0, j1
 
 from gfmd_cli.grid.arrays import Field
-from gfmd_cli.grid.fft_grid import ALL_ROWS, Shape
-from gfmd_cli.physics import free_compliance
-from gfmd_cli.physics.free_compliance import (
-    Spacings,
-    by_corners,
-    by_edges,
-    near_shape,
-    overwrite,
-    pixel_integrals,
-)
+from gfmd_cli.physics.free_compliance import FAR_NODES, NEAR_SIDES, Pixels, by_edges, overwrite
 
 CUT, CUT_WIDTH = 300.0, 20.0  # radians; the step leaves exp(-CUT_WIDTH^2 / 4) of a wave
 SMALLEST_PHASE = 1e-4  # radians up to which the wave is the first term of its series
@@ -49,7 +40,7 @@ MIN_KNOT_RATIO = 1.01  # ratio to the knot before, below which a knot needs no i
 PER_E_FOLD = 80  # distances at which the transforms are computed; a cubic spline joins them
 SPLINE_MARGIN = 3  # distances beyond the ends of the interval that is needed
 POLAR_SIDES = 5  # sides of a pixel within which the integral over it is taken in polar coordinates
-NEAR_NODES = 8  # of Gauss's rule along each side beyond, within `free_compliance.NEAR_SIDES`
+NEAR_NODES = 8  # of Gauss's rule along each side beyond, within `NEAR_SIDES`
 ANGLE_NODES = 48  # of Gauss's rule within a triangle of a near pixel
 
 WAVES: dict[str, tuple[Callable[[Field], Field], int, int]] = {
@@ -75,25 +66,22 @@ class Compliance:
     known: dict[tuple[str, int], float] = field(default_factory=dict)
     """Transforms that were computed, by wave and PER_E_FOLD ln r."""
 
-    def displacements(self, shape: Shape, spacings: Spacings, rows: slice = ALL_ROWS) -> Field:
+    def displacements(self, pixels: Pixels) -> Field:
         """Displacements indexed by the distance of two pixels, in two dimensions or in one."""
+        shape, spacings = pixels.shape, pixels.spacings
         if len(shape) == 1:
             low, high = 0.5 * spacings[0], (shape[0] - 0.5) * spacings[0]
             return by_edges(self.spline("line", low, high), *shape, *spacings)
-        reached_shape = near_shape(shape, spacings, self.reach / max(spacings) + 1)
-        near = near_shape(shape, spacings, POLAR_SIDES + 1)
-        out = np.zeros((len(range(*rows.indices(shape[0]))), shape[1]))
-        if near != shape:
+        reached = pixels.within(self.reach / max(spacings) + 1)
+        near = pixels.within(POLAR_SIDES + 1)
+        out = np.zeros((len(range(*pixels.rows.indices(shape[0]))), shape[1]))
+        if near != pixels:
             least = max(0.5 * min(spacings), POLAR_SIDES * max(spacings) - hypot(*spacings))
-            kernel = self.spline("point", least, max(least, _diagonal(reached_shape, spacings)))
-            closer = near_shape(reached_shape, spacings, free_compliance.NEAR_SIDES)
-            for part, nodes in ((reached_shape, free_compliance.FAR_NODES), (closer, NEAR_NODES)):
-                values = pixel_integrals(
-                    lambda r: kernel(np.maximum(r, least)), part, spacings, rows, nodes
-                )
-                overwrite(out, values)
-        disc = self.spline("disc", 0.5 * min(spacings), _diagonal(near, spacings))
-        return overwrite(out, by_corners(partial(_corner, disc), near, spacings, rows))
+            kernel = self.spline("point", least, max(least, _diagonal(reached)))
+            for part, nodes in ((reached, FAR_NODES), (reached.within(NEAR_SIDES), NEAR_NODES)):
+                overwrite(out, part.integrals(lambda r: kernel(np.maximum(r, least)), nodes))
+        disc = self.spline("disc", 0.5 * min(spacings), _diagonal(near))
+        return overwrite(out, near.by_corners(partial(_corner, disc)))
 
     def spline(self, wave: str, low: float, high: float) -> Callable[[Field], Field]:
         """A transform as a function of the distance, from `low` to `high` [m]."""
@@ -101,10 +89,10 @@ class Compliance:
 
         first = int(np.floor(PER_E_FOLD * np.log(low))) - SPLINE_MARGIN
         last = int(np.ceil(PER_E_FOLD * np.log(high))) + SPLINE_MARGIN
-        for i in range(first, last + 1):
+        steps = range(first, last + 1)
+        for i in steps:
             if (wave, i) not in self.known:
                 self.known[wave, i] = self.transform(wave, float(np.exp(i / PER_E_FOLD)))
-        steps = range(first, last + 1)
         values = [self.known[wave, i] for i in steps]
         cubic = CubicSpline(np.array(steps) / PER_E_FOLD, values)
         return lambda r: np.asarray(cubic(np.log(r)))
@@ -143,9 +131,9 @@ def _intervals(low: float, high: float) -> Field:
     return np.concatenate([np.geomspace(low, turn, count), wide])
 
 
-def _diagonal(shape: Shape, spacings: Spacings) -> float:
-    """Diagonal of a map of these points [m]."""
-    return hypot(*(m * side for m, side in zip(shape, spacings, strict=True)))
+def _diagonal(pixels: Pixels) -> float:
+    """Diagonal of a map of these pixels [m]."""
+    return hypot(*np.multiply(pixels.shape, pixels.spacings))
 
 
 def _corner(disc: Callable[[Field], Field], y: Field, x: Field) -> Field:

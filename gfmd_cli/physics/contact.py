@@ -7,7 +7,8 @@ Heights, displacements and gaps are in units of h_std, stresses in Delta_sigma, 
 see one scale, whatever the units of a scene; the stiffness is then in Delta_sigma / h_std.
 """
 
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import sqrt
 from typing import Any, ClassVar
@@ -259,8 +260,10 @@ class Scene:
     """Unit of pressure [Pa]: the rms stress in full contact (of the half-space, for a slab)."""
     shells: Shells
     """The spectrum of the resolved surface with its stiffness, in physical units."""
-    may_touch: Mask | None = field(default=None, kw_only=True)
+    may_touch: Mask | None = None
     """Points where the height is known; the others never touch. None where all are known."""
+    contact_type: Callable[..., Contact] = Contact
+    """Makes a contact of the scene from the first fields of `Contact`."""
 
     @property
     def highest(self) -> float:
@@ -278,17 +281,13 @@ class Scene:
 
     def contact(self, p_star: float) -> Contact:
         """The contact at reduced pressure p*. Raises InputError where that is out of range."""
-        self.check_pressure(p_star)
-        return Contact(self.grid, self.height, self.stiffness, p_star, self.may_touch)
-
-    def check_pressure(self, p_star: float) -> None:
-        """Raise InputError where a reduced pressure is out of range."""
         low, high = PRESSURE_RANGE
         if not low <= p_star <= high:
             raise InputError(
                 f"load: p* = {p_star:g} is out of range, {low:g} to {high:g}: p* = 1 is "
                 f"{self.delta_sigma:.3g} Pa here; are moduli, heights and lengths in Pa and m?"
             )
+        return self.contact_type(self.grid, self.height, self.stiffness, p_star, self.may_touch)
 
 
 def build_scene(

@@ -22,11 +22,14 @@ from gfmd_cli.physics.error_estimates import (
     UNKNOWN,
     Estimate,
     GridValues,
+    NestedGrids,
     Verdict,
+    area_estimate,
     border_stress,
     estimate_by_change,
     estimate_free,
     full_contact,
+    on_grid,
     unknown,
 )
 from gfmd_cli.physics.linear_elastomer import LinearElastomer
@@ -245,19 +248,19 @@ def estimate(
     between : errors in full contact, of tensile stress between the points, by quantity
     """
     ordered = sorted(levels, key=lambda level: level.points)
-    fine, coarse = ordered[-1], ordered[-2] if len(ordered) > 1 else None
-    n = max(exponent, 0.0)
+    coarse = ordered[-2] if len(ordered) > 1 else None
+    grids = NestedGrids(ordered[-1], coarse, max(exponent, 0.0))
+    fine, _, n = grids
     if fine.border is not None:
-        estimates = estimate_free(fine, coarse, n, band_limited=band_limited, between=between)
+        estimates = estimate_free(grids, between, band_limited=band_limited)
     elif fine.a_r == 1 and band_limited:
         return full_contact(fine, between)
     elif fine.a_r == 0 or (fine.a_r == 1 and rough is None):
         return unknown()
     else:
-        area_n = area_exponent or ExcessExponent(n)
-        estimates = _estimate_periodic(fine, coarse, n, rough, area_n, tip)
+        estimates = _estimate_periodic(grids, rough, area_exponent or ExcessExponent(n), tip)
     if stepped:
-        return estimates | {"sigma_p": border_stress(fine, coarse, n)}
+        return estimates | {"sigma_p": border_stress(grids)}
     if tip.is_sharp and tip.dimension == 1 and n > MAX_RIDGE_EXPONENT:
         estimates = estimates | {"a_r": UNKNOWN}
     is_undecided = fine.a_r > 0 and estimates["sigma_p"].verdict != Verdict.DIVERGES
@@ -268,27 +271,20 @@ def estimate(
 
 
 def _estimate_periodic(
-    fine: GridValues,
-    coarse: GridValues | None,
-    n: float,
-    rough: RoughnessScales | None,
-    area_n: ExcessExponent,
-    tip: Tip,
+    grids: NestedGrids, rough: RoughnessScales | None, area_n: ExcessExponent, tip: Tip
 ) -> dict[str, Estimate]:
     """Estimates with a periodic boundary."""
     oblong = rough is not None and rough.aspect > MAX_SPACING_RATIO
-    if rough is not None and (fine.patches < MIN_PATCHES or not rough.calibrated):
-        estimates = estimate_by_change(fine, coarse, n, is_profile=tip.dimension == 1)
+    if rough is not None and (grids.fine.patches < MIN_PATCHES or not rough.calibrated):
+        estimates = estimate_by_change(grids, is_profile=tip.dimension == 1)
         follows_law = rough.calibrated and not oblong and tip.dimension == 2
         if follows_law and estimates["a_r"].verdict.has_error:
-            return estimates | {"a_r": _area(fine, coarse, rough, area_n)}
+            return estimates | {"a_r": _area(grids, rough, area_n)}
         return estimates
     return {
-        "a_r": estimate_by_change(fine, coarse, n)["a_r"]
-        if oblong
-        else _area(fine, coarse, rough, area_n),
-        "sigma_p": _stress(fine, coarse, n, rough, tip),
-        "u_g": _gap(fine, coarse, n, rough, tip),
+        "a_r": estimate_by_change(grids)["a_r"] if oblong else _area(grids, rough, area_n),
+        "sigma_p": _stress(grids, rough, tip),
+        "u_g": _gap(grids, rough, tip),
     }
 
 
@@ -299,20 +295,16 @@ def _bar(name: str, typical: float, change: float | None) -> float:
     return TWO_GRIDS[name] * hypot(change, TYPICAL_WEIGHT[name] * typical)
 
 
-def _area(
-    fine: GridValues,
-    coarse: GridValues | None,
-    rough: RoughnessScales | None,
-    excess: ExcessExponent,
-) -> Estimate:
+def _area(grids: NestedGrids, rough: RoughnessScales | None, excess: ExcessExponent) -> Estimate:
     """Relative contact area: the error is of first order in the spacing, as AREA_EXCESS area_n x.
 
     Where the exponent is not that of all short waves, the excess is uncertain.
     """
+    fine, coarse, _ = grids
     area_n, x = excess.value, fine.switches_per_point
     if area_n > MAX_AREA_EXPONENT:
         if rough is not None:
-            return _plate_area(fine, coarse)
+            return _plate_area(grids)
         # the line force at the edge of a plate is, on a grid, a row of points
         return Estimate(min(fine.a_r, x), nan, nan, Verdict.BOUND)
     best = max(0.0, fine.a_r - AREA_EXCESS * area_n * x)
@@ -328,78 +320,71 @@ def _area(
     return _corrected_area(fine.a_r, best, hypot(error, AREA_EXCESS * excess.uncertainty * x))
 
 
-def _plate_area(fine: GridValues, coarse: GridValues | None) -> Estimate:
+def _plate_area(grids: NestedGrids) -> Estimate:
     """Relative contact area of a plate on a rough surface."""
-    if coarse is None:
+    if grids.coarse is None:
         return UNKNOWN
-    step, x = coarse.a_r - fine.a_r, fine.switches_per_point
+    a_r, step, x = grids.fine.a_r, -grids.change("a_r"), grids.fine.switches_per_point
     excess = PLATE_EXCESS - PLATE_EXCESS_SLOPE * step / x
-    best = min(1.0, max(0.0, fine.a_r - min(max(excess, LONE_POINTS), PLATE_EXCESS) * step))
-    return _corrected_area(fine.a_r, best, PLATE_BAR * hypot(step, PLATE_FLOOR * x))
+    best = min(1.0, max(0.0, a_r - min(max(excess, LONE_POINTS), PLATE_EXCESS) * step))
+    return _corrected_area(a_r, best, PLATE_BAR * hypot(step, PLATE_FLOOR * x))
 
 
 def _corrected_area(a_r: float, best: float, error: float) -> Estimate:
-    """The best value of a relative contact area, with bars that do not leave 0 to 1."""
     error = min(error, max(best, 1 - best))
-    return Estimate(min(abs(a_r - best) + error, max(a_r, 1 - a_r)), best, error, Verdict.REGULAR)
+    return area_estimate(a_r, best, abs(a_r - best) + error, error)
 
 
-def _stress(
-    fine: GridValues, coarse: GridValues | None, n: float, rough: RoughnessScales | None, tip: Tip
-) -> Estimate:
+def _stress(grids: NestedGrids, rough: RoughnessScales | None, tip: Tip) -> Estimate:
     """Stress deviation: at the edge of a patch the stress is as (1 - r^2/a^2)^(1 - n/2)."""
+    fine, coarse, n = grids
     if n > MAX_STRESS_EXPONENT:
         return replace(UNKNOWN, verdict=Verdict.DIVERGES if n >= 3 else Verdict.SLOW)
     if rough is None:
-        return _single_stress(fine, coarse, n, tip) if coarse else UNKNOWN
+        return _single_stress(grids, tip) if coarse else UNKNOWN
     value, patch = fine.sigma_p, fine.switches_per_point / fine.a_r
     phase, order = rough.phase(fine.points), min(2.0, 3 - n)
     coarse_law = exp(-7.08) * patch**1.5 * phase**1.25 / sqrt(1 - fine.a_r)
     typical = exp(2.18 * max(n, MIN_EXPONENT)) * max(coarse_law, exp(-7.8) * patch**order) * value
     if coarse is None:
-        return _on_grid(value, _bar("sigma_p", typical, None))
-    rest = (value - coarse.sigma_p) / (2**order - 1)
+        return on_grid(value, _bar("sigma_p", typical, None))
+    rest = grids.change("sigma_p") / (2**order - 1)
     error = _bar("sigma_p", typical, rest)
     if n < 1:
-        return _on_grid(value, error)
+        return on_grid(value, error)
     return Estimate(error, max(0.0, value + rest), EXTRAPOLATED_BAR * error, Verdict.REGULAR)
 
 
-def _single_stress(fine: GridValues, coarse: GridValues, n: float, tip: Tip) -> Estimate:
+def _single_stress(grids: NestedGrids, tip: Tip) -> Estimate:
     """Stress deviation of a single indenter, or of a line contact."""
+    fine, _, n = grids
     value, patch = fine.sigma_p, fine.switches_per_point / fine.a_r
     if patch > MAX_LINE:
         return replace(UNKNOWN, is_too_coarse=True)
     order = min(1.0, 3 - n, max(tip.stress_order(n), MIN_STRESS_ORDER))
-    rest = (value - coarse.sigma_p) / (2**order - 1)
+    rest = grids.change("sigma_p") / (2**order - 1)
     floor = SINGLE_CONTACT_STRESS * max(n, MIN_EXPONENT) * value * patch
-    return _on_grid(value, hypot(SINGLE_CONTACT * abs(rest), floor))
+    return on_grid(value, hypot(SINGLE_CONTACT * abs(rest), floor))
 
 
-def _gap(
-    fine: GridValues, coarse: GridValues | None, n: float, rough: RoughnessScales | None, tip: Tip
-) -> Estimate:
+def _gap(grids: NestedGrids, rough: RoughnessScales | None, tip: Tip) -> Estimate:
     """Mean gap: the error is small and of either sign, so the value is not extrapolated."""
+    fine, coarse, n = grids
     if rough is None:
-        return _single_gap(fine, coarse, tip) if coarse else UNKNOWN
+        return _single_gap(grids, tip) if coarse else UNKNOWN
     value, patch = fine.u_g, fine.switches_per_point / fine.a_r
     phase, bend = rough.phase(fine.points), rough.curvature / fine.points**2
     typical = (
         exp(-6.8 + 0.62 * max(n, MIN_EXPONENT)) * patch**0.25 * phase**1.5 * sqrt(bend * value)
     )
-    change = None if coarse is None else (value - coarse.u_g) / (2**GAP_ORDER - 1)
-    return _on_grid(value, _bar("u_g", typical, change))
+    change = None if coarse is None else grids.change("u_g") / (2**GAP_ORDER - 1)
+    return on_grid(value, _bar("u_g", typical, change))
 
 
-def _single_gap(fine: GridValues, coarse: GridValues, tip: Tip) -> Estimate:
+def _single_gap(grids: NestedGrids, tip: Tip) -> Estimate:
     """Mean gap of a single indenter, or of a line contact."""
-    value, change = fine.u_g, abs(fine.u_g - coarse.u_g)
-    across = value / (fine.points * (1 - fine.a_r)) ** 2  # points across the gap, in one line
+    fine, change = grids.fine, abs(grids.change("u_g"))
+    across = fine.u_g / (fine.points * (1 - fine.a_r)) ** 2  # points across the gap, in one line
     smooth = max(SINGLE_CONTACT * change / 3, SINGLE_CONTACT_GAP * across)
     sharp = max(SHARP_GAP_CHANGE * change, SHARP_GAP * across)
-    return _on_grid(value, sharp if tip.is_sharp else smooth)
-
-
-def _on_grid(value: float, error: float) -> Estimate:
-    """The value on the grid as the best one."""
-    return Estimate(error, value, error, Verdict.REGULAR)
+    return on_grid(fine.u_g, sharp if tip.is_sharp else smooth)

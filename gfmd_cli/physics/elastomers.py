@@ -5,7 +5,7 @@ spatial dimensions".
 """
 
 from functools import lru_cache
-from typing import Annotated, ClassVar, Literal, Self
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import Field as Key
@@ -16,7 +16,7 @@ from gfmd_cli.grid.arrays import Field, Mask
 from gfmd_cli.grid.fft_grid import ALL_ROWS, Shape
 from gfmd_cli.physics.compliance_transforms import Compliance
 from gfmd_cli.physics.free_compliance import Spacings
-from gfmd_cli.physics.linear_elastomer import LinearElastomer, Scale
+from gfmd_cli.physics.linear_elastomer import LinearElastomer
 from gfmd_cli.physics.persson import gamma_slab
 from gfmd_cli.physics.stiffness_table import (
     compliance_of_table,
@@ -26,6 +26,9 @@ from gfmd_cli.physics.stiffness_table import (
 )
 from gfmd_cli.spec_table import FilePath, Positive
 from gfmd_cli.units import LARGEST_RMS_HEIGHT, labelled
+
+if TYPE_CHECKING:
+    from gfmd_cli.physics.contact import Scene
 
 LONG_WAVE = 1e-6  # q t up to which k of a layer is constant: (q t)^2 is below rounding
 DECAY_DISTANCE = 25.0  # thicknesses from which the displacement of a layer is below rounding
@@ -112,9 +115,9 @@ class Plate(LinearElastomer):
         """k(q) [Pa/m]."""
         return self.E_star / 12 * (self.thickness * q) ** 3 * q
 
-    def warnings(self, scale: Scale) -> list[str]:
+    def warnings(self, scene: "Scene", boundary: str, *, is_rough: bool) -> list[str]:
         """See `LinearElastomer.warnings`. At q t = 1 a slab is 0.81 times as stiff as a plate."""
-        fraction = _fraction(scale.variance, scale.q * self.thickness > 1)
+        fraction = _fraction(scene.shells.variance, scene.shells.q * self.thickness > 1)
         if fraction <= MAX_SHORT_WAVE_STRESS:
             return []
         return [
@@ -155,18 +158,19 @@ class Slab(LinearElastomer):
         """k(q) [Pa/m] of the half-space with the same contact modulus."""
         return 0.5 * self.E_star * q
 
-    def warnings(self, scale: Scale) -> list[str]:
+    def warnings(self, scene: "Scene", boundary: str, *, is_rough: bool) -> list[str]:
         """See `LinearElastomer.warnings`. A thickness may be meant in m."""
-        thickness = self.thickness * scale.length
-        if thickness * scale.q.max() <= PLATE:
+        length = scene.grid.length
+        thickness = self.thickness * length
+        if thickness * scene.shells.q.max() <= PLATE:
             reason = "a thin plate at all wavelengths"
-        elif thickness < scale.h_std <= LARGEST_RMS_HEIGHT:
-            reason = f"less than the rms height, {scale.h_std:.3g} m"
+        elif is_rough and thickness < scene.h_std <= LARGEST_RMS_HEIGHT:
+            reason = f"less than the rms height, {scene.h_std:.3g} m"
         else:
             return []
         return [
             f"elastomer.thickness = {self.thickness:g} is relative to the side of the cell, "
-            f"{scale.length:.3g} m: a slab of {thickness:.3g} m, {reason}; divide a thickness in m "
+            f"{length:.3g} m: a slab of {thickness:.3g} m, {reason}; divide a thickness in m "
             "by the side"
         ]
 
@@ -210,18 +214,19 @@ class Layer(LinearElastomer):
         softening = layer_softening(t, self.poisson if self.base == "bonded" else None)
         return np.where(q > 0, 0.5 * self.E_star * q / softening, 0.0)
 
-    def warnings(self, scale: Scale) -> list[str]:
+    def warnings(self, scene: "Scene", boundary: str, *, is_rough: bool) -> list[str]:
         """See `LinearElastomer.warnings`."""
         warnings, poisson = [], self.poisson if self.base == "bonded" else None
-        if self.thickness <= scale.h_std:
+        if is_rough and self.thickness <= scene.h_std:
             warnings.append(
                 f"elastomer.thickness = {self.thickness:g} m is less than the rms height, "
-                f"{scale.h_std:.3g} m: linear elasticity does not hold for such compressions"
+                f"{scene.h_std:.3g} m: linear elasticity does not hold for such compressions"
             )
-        is_thin = scale.boundary == "free" and scale.spacing > self.thickness
+        spacing = max(scene.grid.spacings)
+        is_thin = boundary == "free" and spacing > self.thickness
         if is_thin and poisson is not None and poisson > NEARLY_INCOMPRESSIBLE:
             warnings.append(
-                f"pixels of {scale.spacing:.3g} m are wider than elastomer.thickness, "
+                f"pixels of {spacing:.3g} m are wider than elastomer.thickness, "
                 f"{self.thickness:.3g} m: with poisson = {poisson:g} and a free boundary the load "
                 "may be wrong by 3 to 15 %, and by more beyond six thicknesses; use more points"
             )
@@ -269,9 +274,9 @@ class Tabulated(LinearElastomer):
         k = interpolated(read_table(self.path))
         return np.where(q > 0, k(np.where(q > 0, q, 1.0)), 0.0)
 
-    def warnings(self, scale: Scale) -> list[str]:
+    def warnings(self, scene: "Scene", boundary: str, *, is_rough: bool) -> list[str]:
         """See `LinearElastomer.warnings`."""
-        q, variance = scale.q, scale.variance
+        q, variance = scene.shells.q, scene.shells.variance
         first, *_, last = read_table(self.path)[:, 0]
         beyond = (q < first) | (q > last)
         of_stress = _fraction(variance, beyond), "squared stress in full contact"

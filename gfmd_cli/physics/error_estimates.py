@@ -16,6 +16,7 @@ as spacing^(1 - n), and has no limit for n >= 1.
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from math import hypot, nan
+from typing import NamedTuple
 
 from gfmd_cli.physics.observables import QUANTITIES, estimated_patches
 from gfmd_cli.status import ExplainedEnum
@@ -68,6 +69,21 @@ class GridValues:
         return estimated_patches(self.perimeter, self.a_r, self.area)
 
 
+class NestedGrids(NamedTuple):
+    """One contact on the finest of its grids, and what the errors there follow from."""
+
+    fine: GridValues
+    coarse: GridValues | None
+    """On the next coarser grid, if the contact was solved there."""
+    n: float
+    """Exponent of the stiffness at the highest wavenumber of the finest grid, 0 or more."""
+
+    def change(self, name: str) -> float:
+        """Change of an observable from the coarser to the finer grid."""
+        assert self.coarse is not None
+        return float(getattr(self.fine, name)) - float(getattr(self.coarse, name))
+
+
 class Verdict(ExplainedEnum):
     """What is known of the continuum value of an observable; the explanation follows its name."""
 
@@ -113,6 +129,17 @@ def unknown() -> dict[str, Estimate]:
     return dict.fromkeys(QUANTITIES, UNKNOWN)
 
 
+def on_grid(value: float, error: float, verdict: Verdict = Verdict.REGULAR) -> Estimate:
+    """The value on the grid as the best estimate."""
+    return Estimate(error, value, error, verdict)
+
+
+def area_estimate(a_r: float, best: float, error: float, continuum_error: float) -> Estimate:
+    """The best value of a relative contact area, with bars that do not leave 0 to 1."""
+    whole, part = max(a_r, 1 - a_r), max(best, 1 - best)
+    return Estimate(min(error, whole), best, min(continuum_error, part), Verdict.REGULAR)
+
+
 def full_contact(fine: GridValues, errors: Mapping[str, float]) -> dict[str, Estimate]:
     """Full contact with a surface of which all grids contain the same waves.
 
@@ -120,76 +147,73 @@ def full_contact(fine: GridValues, errors: Mapping[str, float]) -> dict[str, Est
     """
     values = {"a_r": 1.0, "sigma_p": fine.sigma_p, "u_g": 0.0}
     verdict = Verdict.REGULAR if errors["a_r"] > 0 else Verdict.EXACT
-    return {name: Estimate(errors[name], x, errors[name], verdict) for name, x in values.items()}
+    return {name: on_grid(value, errors[name], verdict) for name, value in values.items()}
 
 
-def estimate_by_change(
-    fine: GridValues, coarse: GridValues | None, n: float, *, is_profile: bool = False
-) -> dict[str, Estimate]:
+def estimate_by_change(grids: NestedGrids, *, is_profile: bool = False) -> dict[str, Estimate]:
     """Estimates from two nested grids; unknown from one grid or beyond `MAX_EXPONENT`.
 
     `is_profile`: whether the surface is a line profile.
     """
     estimates = unknown()
-    if n >= DIVERGENT:
+    if grids.n >= DIVERGENT:
         estimates["sigma_p"] = replace(UNKNOWN, verdict=Verdict.DIVERGES)
-    if coarse is None:
+    if grids.coarse is None:
         return estimates
-    by_change = {
-        "a_r": _area(fine, coarse, WIDE_CONTINUUM_FACTOR if is_profile else CONTINUUM_FACTOR),
-        "sigma_p": _on_grid("sigma_p", fine, coarse, FACTOR["sigma_p"]),
-        "u_g": _on_grid("u_g", fine, coarse, FACTOR["u_g"]),
+    continuum_factor = WIDE_CONTINUUM_FACTOR if is_profile else CONTINUUM_FACTOR
+    by_change = _by_change(grids, continuum_factor, FACTOR["u_g"])
+    return estimates | {
+        name: by_change[name] for name in QUANTITIES if grids.n <= MAX_EXPONENT[name]
     }
-    return estimates | {name: by_change[name] for name in QUANTITIES if n <= MAX_EXPONENT[name]}
 
 
 def estimate_free(
-    fine: GridValues,
-    coarse: GridValues | None,
-    n: float,
-    *,
-    band_limited: bool,
-    between: Mapping[str, float] = NO_ERRORS,
+    grids: NestedGrids, between: Mapping[str, float], *, band_limited: bool
 ) -> dict[str, Estimate]:
     """Estimates with a free boundary; unknown from one grid, except a_r and u_g of full contact."""
+    fine, coarse, n = grids
     estimates = unknown()
-    if fine.a_r == 0 or fine.border is None:
+    if fine.a_r == 0:
         return estimates
     if coarse is not None and n <= MAX_FREE_EXPONENT:
-        estimates = {
-            "a_r": _area(fine, coarse, WIDE_CONTINUUM_FACTOR),
-            "sigma_p": _on_grid("sigma_p", fine, coarse, FACTOR["sigma_p"]),
-            "u_g": _on_grid("u_g", fine, coarse, FREE_GAP_FACTOR),
-        }
+        estimates = _by_change(grids, WIDE_CONTINUUM_FACTOR, FREE_GAP_FACTOR)
     if fine.a_r == 1 and band_limited:
         estimates |= {name: full_contact(fine, between)[name] for name in ("a_r", "u_g")}
-    if fine.border > 0:
-        estimates["sigma_p"] = border_stress(fine, coarse, n)
+    if fine.border:
+        estimates["sigma_p"] = border_stress(grids)
     return estimates
 
 
-def border_stress(fine: GridValues, coarse: GridValues | None, n: float) -> Estimate:
+def border_stress(grids: NestedGrids) -> Estimate:
     """Standard deviation of a pressure that is singular at the border of the map, or at a step."""
-    if n > MAX_BORDER_EXPONENT:
-        return replace(UNKNOWN, verdict=Verdict.DIVERGES if n >= 1 else Verdict.SLOW)
-    if coarse is None:
+    if grids.n > MAX_BORDER_EXPONENT:
+        return replace(UNKNOWN, verdict=Verdict.DIVERGES if grids.n >= 1 else Verdict.SLOW)
+    if grids.coarse is None:
         return UNKNOWN
-    return _on_grid("sigma_p", fine, coarse, BORDER_FACTOR / (2 ** (1 - n) - 1))
+    return _value_by_change("sigma_p", grids, BORDER_FACTOR / (2 ** (1 - grids.n) - 1))
 
 
-def _area(fine: GridValues, coarse: GridValues, continuum_factor: float) -> Estimate:
+def _by_change(
+    grids: NestedGrids, continuum_factor: float, gap_factor: float
+) -> dict[str, Estimate]:
+    return {
+        "a_r": _area(grids, continuum_factor),
+        "sigma_p": _value_by_change("sigma_p", grids, FACTOR["sigma_p"]),
+        "u_g": _value_by_change("u_g", grids, gap_factor),
+    }
+
+
+def _area(grids: NestedGrids, continuum_factor: float) -> Estimate:
     """Relative contact area: of first order in the spacing, as contact lines are a point wide."""
-    change = fine.a_r - coarse.a_r
+    fine, change = grids.fine, grids.change("a_r")
     scale = hypot(change, FLOOR["a_r"] * fine.switches_per_point)
     best = min(max(fine.a_r + change, 0.0), 1.0)
-    whole, part = max(fine.a_r, 1 - fine.a_r), max(best, 1 - best)
-    error = min(FACTOR["a_r"] * scale, whole)
-    return Estimate(error, best, min(continuum_factor * scale, part), Verdict.REGULAR)
+    return area_estimate(fine.a_r, best, FACTOR["a_r"] * scale, continuum_factor * scale)
 
 
-def _on_grid(name: str, fine: GridValues, coarse: GridValues, factor: float) -> Estimate:
+def _value_by_change(name: str, grids: NestedGrids, factor: float) -> Estimate:
     """sigma_p or u_g: the value on the grid is the best estimate."""
+    fine = grids.fine
     value: float = getattr(fine, name)
-    change = value - getattr(coarse, name)
-    error = factor * hypot(change, FLOOR[name] * value / fine.a_r * fine.switches_per_point)
-    return Estimate(error, value, error, Verdict.REGULAR)
+    floor = FLOOR[name] * value / fine.a_r * fine.switches_per_point
+    return on_grid(value, factor * hypot(grids.change(name), floor))

@@ -12,16 +12,17 @@ two dimensions, from int_0^inf q^(1-n) J_0(q r) dq (errata of the paper, Eq. 10b
 and in one dimension c_n = Gamma(1 - n) sin(pi n / 2) / pi, from int_0^inf q^(-n) cos(q x) dq.
 
 Shapes and spacings are in the order (y, x). Arrays of displacements are indexed by the distance of
-the two pixels in points, [y, x]. In two dimensions `rows` are the rows of such an array to compute.
+the two pixels in points, [y, x].
 """
 
 from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import gamma, gammainc, hyp2f1, rgamma
 
 from gfmd_cli.grid.arrays import Field
-from gfmd_cli.grid.fft_grid import ALL_ROWS, Shape
+from gfmd_cli.grid.fft_grid import Shape
 
 NEAR_SIDES = 64  # sides of a pixel within which the integral over it is in closed form
 FAR_NODES = 2  # of Gauss's rule along each side beyond: relative error below 1e-9 (tested)
@@ -30,11 +31,49 @@ SMALLEST_ARGUMENT = 1e-12  # (alpha r)^2, below which the smooth part is that at
 Spacings = tuple[float, ...]
 
 
-def power_law(n: float, shape: Shape, spacings: Spacings, rows: slice = ALL_ROWS) -> Field:
+@dataclass(frozen=True)
+class Pixels:
+    """The pixels of a map by their distances from one of them, shape (y, x)."""
+
+    shape: Shape
+    spacings: Spacings
+    rows: slice
+    """The rows to compute, in two dimensions."""
+
+    def within(self, sides: float) -> "Pixels":
+        """The pixels within so many sides of a pixel."""
+        reach = sides * max(self.spacings)
+        pairs = zip(self.shape, self.spacings, strict=True)
+        return replace(self, shape=tuple(int(min(m, np.ceil(reach / side))) for m, side in pairs))
+
+    def integrals(self, kernel: Callable[[Field], Field], nodes_per_side: int = FAR_NODES) -> Field:
+        """Integrals over each pixel of a kernel G(r), by Gauss's rule."""
+        nodes, weights = (0.5 * each for each in np.polynomial.legendre.leggauss(nodes_per_side))
+        dy, dx = self.spacings
+        y, x = np.arange(self.shape[0])[self.rows] * dy, np.arange(self.shape[1]) * dx
+        out = np.zeros((y.size, x.size))
+        for shift_y, weight_y in zip(nodes * dy, weights * dy, strict=True):
+            for shift_x, weight_x in zip(nodes * dx, weights * dx, strict=True):
+                r = np.sqrt(np.add.outer((y + shift_y) ** 2, (x + shift_x) ** 2))
+                out += weight_y * weight_x * kernel(r)
+        return out
+
+    def by_corners(self, corner: Callable[[Field, Field], Field]) -> Field:
+        """Integrals over each pixel, from those over the rectangles from the origin to its corners.
+
+        `corner` has the coordinates y, shape (rows + 1, 1), and x, shape (1, columns + 1).
+        """
+        pairs = zip(self.shape, self.spacings, strict=True)
+        y, x = ((np.arange(m + 1) - 0.5) * side for m, side in pairs)
+        return np.diff(np.diff(corner(y[:, None], x[None, :]), axis=0), axis=1)[self.rows]
+
+
+def power_law(n: float, pixels: Pixels) -> Field:
     """Displacements for k = q^n, 0 <= n < 2; in one dimension 0 <= n <= 1."""
-    if len(shape) == 2:
-        return _plane(n, shape, spacings, rows)
-    return _logarithmic_line(*shape, *spacings) if n == 1 else _line(n, *shape, *spacings)
+    if len(pixels.shape) == 2:
+        return _plane(n, pixels)
+    (points,), (spacing,) = pixels.shape, pixels.spacings
+    return _logarithmic_line(points, spacing) if n == 1 else _line(n, points, spacing)
 
 
 def smooth_part(n: float, alpha: float, r: Field) -> Field:
@@ -54,7 +93,7 @@ def smooth_part(n: float, alpha: float, r: Field) -> Field:
     return values
 
 
-def _plane(n: float, shape: Shape, spacings: Spacings, rows: slice) -> Field:
+def _plane(n: float, pixels: Pixels) -> Field:
     """Displacements for k = q^n, 0 <= n < 2, in two dimensions.
 
     Near pixels: with div(x r^(n-2)) = n r^(n-2), the integral over a rectangle from the origin to
@@ -68,9 +107,8 @@ def _plane(n: float, shape: Shape, spacings: Spacings, rows: slice) -> Field:
     def corner(y: Field, x: Field) -> Field:
         return closed * (_side_integral(n, x, y) + _side_integral(n, y, x))
 
-    out = pixel_integrals(lambda r: far * r ** (n - 2), shape, spacings, rows)
-    near = near_shape(shape, spacings, NEAR_SIDES)
-    return overwrite(out, by_corners(corner, near, spacings, rows))
+    out = pixels.integrals(lambda r: far * r ** (n - 2))
+    return overwrite(out, pixels.within(NEAR_SIDES).by_corners(corner))
 
 
 def _side_integral(n: float, distance: Field, end: Field) -> Field:
@@ -78,44 +116,6 @@ def _side_integral(n: float, distance: Field, end: Field) -> Field:
     ratio = end / distance
     integral = hyp2f1(1 - n / 2, 0.5, 1.5, -(ratio**2))
     return np.sign(distance) * np.abs(distance) ** (n - 1) * end * integral
-
-
-def near_shape(shape: Shape, spacings: Spacings, sides: float) -> Shape:
-    """The pixels within so many sides of a pixel, as a part of an array of displacements."""
-    reach = sides * max(spacings)
-    return tuple(
-        int(min(m, np.ceil(reach / side))) for m, side in zip(shape, spacings, strict=True)
-    )
-
-
-def pixel_integrals(
-    kernel: Callable[[Field], Field],
-    shape: Shape,
-    spacings: Spacings,
-    rows: slice = ALL_ROWS,
-    nodes_per_side: int = FAR_NODES,
-) -> Field:
-    """Integrals over each pixel of a kernel G(r), by Gauss's rule."""
-    nodes, weights = (0.5 * each for each in np.polynomial.legendre.leggauss(nodes_per_side))
-    y, x = (np.arange(m) * side for m, side in zip(shape, spacings, strict=True))
-    y = y[rows]
-    out = np.zeros((y.size, x.size))
-    for shift_y, weight_y in zip(nodes * spacings[0], weights * spacings[0], strict=True):
-        for shift_x, weight_x in zip(nodes * spacings[1], weights * spacings[1], strict=True):
-            r = np.sqrt(np.add.outer((y + shift_y) ** 2, (x + shift_x) ** 2))
-            out += weight_y * weight_x * kernel(r)
-    return out
-
-
-def by_corners(
-    corner: Callable[[Field, Field], Field], shape: Shape, spacings: Spacings, rows: slice
-) -> Field:
-    """Integrals over each pixel, from those over the rectangles from the origin to its corners.
-
-    `corner` has the coordinates y, shape (rows + 1, 1), and x, shape (1, columns + 1).
-    """
-    y, x = ((np.arange(m + 1) - 0.5) * side for m, side in zip(shape, spacings, strict=True))
-    return np.diff(np.diff(corner(y[:, None], x[None, :]), axis=0), axis=1)[rows]
 
 
 def by_edges(integral: Callable[[Field], Field], points: int, spacing: float) -> Field:

@@ -11,8 +11,8 @@ where means are taken over the map. At the solution, g = C sigma + c - h >= 0 an
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from functools import cached_property
-from math import inf
+from functools import cached_property, partial
+from math import inf, prod
 from typing import Any, ClassVar
 
 import numpy as np
@@ -84,14 +84,12 @@ class FreeElasticity:
     @property
     def transforms(self) -> float:
         """Cost of `displacement`, in transforms of the size of the map, by number of points."""
-        transform, _ = self._convolution
-        return 2.0 * transform.padded_rows * transform.padded_columns / self.grid.size
+        return 2.0 * prod(self._convolution[0].padded) / self.grid.size
 
     @property
     def preconditioner_transforms(self) -> float:
         """The same for `approximate_stress`, whose single precision takes half of the time."""
-        transform, _ = self._preconditioner
-        return 1.0 * transform.padded_rows * transform.padded_columns / self.grid.size
+        return 1.0 * prod(self._preconditioner[0].padded) / self.grid.size
 
 
 @dataclass(frozen=True)
@@ -148,19 +146,6 @@ class FreeContact(Contact):
         )
 
 
-@dataclass(frozen=True)
-class FreeScene(Scene):
-    """Surface and elastomer without borders on a grid, independent of the pressure."""
-
-    free: FreeElasticity = field(kw_only=True)
-
-    def contact(self, p_star: float) -> FreeContact:
-        """The contact at reduced pressure p*. Raises InputError where that is out of range."""
-        self.check_pressure(p_star)
-        fields = (self.grid, self.height, self.stiffness)
-        return FreeContact(*fields, p_star, may_touch=self.may_touch, free=self.free)
-
-
 def build_free_scene(
     surface: RigidSurface,
     elastomer: LinearElastomer,
@@ -169,7 +154,7 @@ def build_free_scene(
     ranks: Ranks | None = None,
     *,
     points_y: int = 0,
-) -> FreeScene:
+) -> Scene:
     """As `build_scene`, for a free boundary.
 
     A map that is not periodic has a step at its border. Delta_sigma and the spectrum are therefore
@@ -182,13 +167,14 @@ def build_free_scene(
     doubled, mirrored, void = _mirrored(surface, grid, ranks)
     scene = reduce_scene(doubled, mirrored, elastomer)
     free = FreeElasticity(elastomer, grid, scene.delta_sigma / scene.h_std)
-    on_map = {
-        "grid": grid,
-        "height": _on_map(doubled, scene.height, grid),
-        "stiffness": np.empty(0),
-        "may_touch": touchable(void, grid),
-    }
-    return FreeScene(**(vars(scene) | on_map), free=free)
+    return replace(
+        scene,
+        grid=grid,
+        height=_on_map(doubled, scene.height, grid),
+        stiffness=np.empty(0),
+        may_touch=touchable(void, grid),
+        contact_type=partial(FreeContact, free=free),
+    )
 
 
 def _mirrored(
@@ -199,8 +185,7 @@ def _mirrored(
     A measured map is mirrored before it is interpolated, so that no height on a finer grid lies
     between those of opposite borders. On its own points no process needs the whole mirrored map.
     """
-    whole = doubled_grid(replace(surface.grid(grid.points, grid.points_y), threads=grid.threads))
-    doubled = create_grid(whole, ranks)
+    doubled = create_grid(doubled_grid(grid), ranks)
     own_points = (surface.smallest_grid_y(), surface.smallest_grid())
     mirrored_surface = surface.mirrored()
     if mirrored_surface is None or own_points == (grid.points_y, grid.points):

@@ -39,28 +39,19 @@ class CoarseGrained(Persson):
     """Persson theory of area and stress, with the mean gap by coarse-graining.
 
     The law is solved once, for 1e-8 to 8 Delta_sigma; u_g is good to 2e-4 for p <= Delta_sigma and
-    5e-3 at 3 Delta_sigma.
+    5e-3 at 3 Delta_sigma. It is linear in ln p below the law, and zero beyond it.
     """
 
     mean_gap_source: ClassVar[str] = "coarse-graining"
 
-    def mean_gap(self, p: Field | float) -> Field:
-        """Mean gap u_g; infinite at p = 0, linear in ln p below the law, zero beyond it.
-
-        Parameters
-        ----------
-        p : pressure >= 0, any shape
-        """
-        p = np.asarray(p, dtype=np.float64)
-        if not self.shells.variance.size:
-            return np.zeros_like(p)
+    def _finite_gap(self, p: Field) -> Field:
         faces, gap = self._law
         known = gap > _VANISHED * gap[0]
         x = np.log(_centres(faces)[known])
         log_p = np.log(np.where(p > 0, p, 1.0))
         inside = np.exp(monotone_cubic(x, np.log(gap[known]))(np.clip(log_p, x[0], x[-1])))
         below = np.maximum(x[0] - log_p, 0.0) * (gap[0] - gap[1]) / (x[1] - x[0])
-        return np.where(p > 0, np.where(log_p <= x[-1], inside + below, 0.0), np.inf)
+        return np.where(log_p <= x[-1], inside + below, 0.0)
 
     @cached_property
     def _law(self) -> tuple[Field, Field]:

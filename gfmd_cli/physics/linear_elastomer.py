@@ -5,9 +5,8 @@ sum_q k(q) |u(q)|^2 / 2: Eq. (1) of Mueser, "Elastic contacts of randomly rough 
 spatial dimensions". Sums exclude q = 0, where k is zero for every elastomer (load control).
 """
 
-from dataclasses import dataclass
 from fractions import Fraction
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -15,30 +14,15 @@ from gfmd_cli.errors import InputError
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.grid.fft_grid import ALL_ROWS, Shape
 from gfmd_cli.physics.compliance_transforms import Compliance
-from gfmd_cli.physics.free_compliance import Spacings, power_law
+from gfmd_cli.physics.free_compliance import Pixels, Spacings, power_law
 from gfmd_cli.physics.persson import gamma_n
 from gfmd_cli.spec_table import SpecTable
 from gfmd_cli.units import count
 
+if TYPE_CHECKING:
+    from gfmd_cli.physics.contact import Scene
+
 EXPONENT_STEP = 1e-3  # of ln q: the truncation error is of order 1e-7, the rounding error 1e-13
-
-
-@dataclass(frozen=True)
-class Scale:
-    """What the warnings of an elastomer depend on: the lengths of a contact, and its boundary."""
-
-    h_std: float
-    """Rms height of a rough surface [m], 0 of a single indenter."""
-    q: Field
-    """Wavenumbers of the surface [1/m]."""
-    variance: Field
-    """The part of the squared stress in full contact at each of them."""
-    length: float
-    """Side of the cell along x [m]."""
-    spacing: float
-    """The wider of the grid spacings [m]."""
-    boundary: str
-    """`grid.boundary`."""
 
 
 class LinearElastomer(SpecTable):
@@ -79,17 +63,20 @@ class LinearElastomer(SpecTable):
         Raises InputError where the displacement does not decay with the distance.
         """
         self.check_free_boundary(len(shape))
+        pixels = Pixels(shape, spacings, rows)
         if self.exponent is None:
-            return self.compliance().displacements(shape, spacings, rows)
-        prefactor = float(self.stiffness(np.ones(1))[0])
-        return power_law(self.exponent, shape, spacings, rows) / prefactor
+            return self.compliance().displacements(pixels)
+        return power_law(self.exponent, pixels) / float(self.stiffness(np.ones(1))[0])
 
     def compliance(self) -> Compliance:
         """1/k(q) of an elastomer whose displacement decays and whose k(q) is not a power law."""
         raise NotImplementedError
 
-    def warnings(self, scale: Scale) -> list[str]:
-        """Warnings about a contact with these length scales; empty by default."""
+    def warnings(self, scene: "Scene", boundary: str, *, is_rough: bool) -> list[str]:
+        """Warnings about a scene with this `grid.boundary`; empty by default.
+
+        `is_rough`: whether its rms height is that of a rough surface, not of a single indenter.
+        """
         return []
 
     def decays(self, dimension: int) -> bool:

@@ -203,6 +203,10 @@ class Persson:
         p = np.asarray(p, dtype=np.float64)
         if not self.shells.variance.size:
             return np.zeros_like(p)
+        return np.where(p > 0, self._finite_gap(p), np.inf)
+
+    def _finite_gap(self, p: Field) -> Field:
+        """Mean gap of a rough surface, of any value where p = 0."""
         edges = _panel_edges(p[p > 0], self.delta_sigma)
         ends = np.log(edges)[:, None]
         centre, half = 0.5 * (ends[1:] + ends[:-1]), 0.5 * (ends[1:] - ends[:-1])
@@ -211,7 +215,7 @@ class Persson:
         panels = np.sum(half * weight * slope, axis=1)
         gap = np.append(np.cumsum(panels[::-1])[::-1], 0.0)
         at = np.minimum(np.searchsorted(edges, p), gap.size - 1)
-        return np.where(p > 0, gap[at], np.inf)
+        return gap[at]
 
     def pressure_at_area(self, a_r: Field | float) -> Field:
         """Pressure at a relative contact area, sqrt(2) Delta_sigma erfinv(a_r). Eq. (25)."""

@@ -141,22 +141,20 @@ def _ring(
 
     Returns m_y, m_x and the phases / 2 pi, each of shape (modes,).
     """
-    reach = min(ring, highest_y)
-    side = (ring - reach, ring + reach + 1) if first <= ring < last else (0, 0)
-    columns = [min(x, ring) if ring <= highest_y else 0 for x in (first, max(first, last))]
-    above = tuple(2 * ring + 1 + x for x in columns)
-    below = tuple(3 * ring + max(x, 1) for x in columns)
-    position, phases, indices = 0, [], []
-    for begin, end in (side, above, below):
-        if begin > position:
-            generator.bit_generator.advance(begin - position)  # type: ignore[attr-defined]
-        phases.append(generator.random(end - begin))
-        indices.append(np.arange(begin, end))
-        position = max(position, end)
-    if position < 4 * ring:
-        generator.bit_generator.advance(4 * ring - position)  # type: ignore[attr-defined]
-    index = np.concatenate(indices)
-    on_side, is_above = index <= 2 * ring, index <= 3 * ring
-    y = np.where(on_side, index - ring, np.where(is_above, ring, -ring))
-    x = np.where(on_side, ring, index - np.where(is_above, 2 * ring + 1, 3 * ring))
+    reach, none = min(ring, highest_y), np.arange(0)
+    side = np.arange(-reach, reach + 1) if first <= ring < last else none
+    above = np.arange(first, min(last, ring)) if ring <= highest_y else none
+    below = above[above > 0]
+    parts: list[tuple[int, Any, Any]] = [  # place of the first number, m_y, m_x
+        (ring - reach, side, np.full_like(side, ring)),
+        (2 * ring + 1 + first, np.full_like(above, ring), above),
+        (3 * ring + max(first, 1), np.full_like(below, -ring), below),
+    ]
+    position, phases = 0, []
+    for begin, places, _ in parts:
+        generator.bit_generator.advance(begin - position)  # type: ignore[attr-defined]
+        phases.append(generator.random(places.size))
+        position = begin + places.size
+    generator.bit_generator.advance(4 * ring - position)  # type: ignore[attr-defined]
+    y, x = (np.concatenate([part[axis] for part in parts]) for axis in (1, 2))
     return y, x, np.concatenate(phases)

@@ -6,7 +6,6 @@ from typing import Any
 
 from gfmd_cli.maps.map_warnings import MAX_GRADIENT
 from gfmd_cli.physics.indenters import RigidSurface
-from gfmd_cli.physics.linear_elastomer import Scale
 from gfmd_cli.physics.spectrum_fit import moments
 from gfmd_cli.spec.models import LOADS
 from gfmd_cli.status import Status
@@ -65,15 +64,7 @@ def warnings_of(task: Task, solved: TaskSolution, results: Mapping[str, Any]) ->
             f"solver.tolerance = {task.solver.tolerance:g}: contact area and mean gap may be wrong "
             f"by several percent; at most {LOOSE:g} is usual"
         )
-    scale = Scale(
-        h_std=scene.h_std if task.surface.rough else 0.0,
-        q=scene.shells.q,
-        variance=scene.shells.variance,
-        length=scene.grid.length,
-        spacing=max(scene.grid.spacings),
-        boundary=task.boundary,
-    )
-    warnings += elastomer.warnings(scale)
+    warnings += elastomer.warnings(scene, task.boundary, is_rough=task.surface.rough)
     warnings += _load_in_jump(task, solved.solution.status, results)
     warnings += _contact_at_border(task, solved)
     if max(results.get("edge_contact", 0.0), results.get("edge_load", 0.0)) > MAX_EDGE_SHARE:
