@@ -4,10 +4,11 @@ Each function returns a warning, or "" if what its docstring describes does not 
 """
 
 import warnings
+from typing import Any
 
 import numpy as np
 
-from gfmd_cli.grid.arrays import Field, Mask, row_blocks
+from gfmd_cli.grid.arrays import Field, row_blocks
 from gfmd_cli.maps.map_preparation import border_step, level
 from gfmd_cli.maps.topography import Topography
 from gfmd_cli.units import count
@@ -213,11 +214,9 @@ def shifted_lines(topography: Topography, spacing: tuple[float, ...]) -> str:
     `spacing` is that of the map [m]. An offset is the median difference to the line before, where
     both halves of the line agree on it.
     """
-    heights = topography.heights
+    heights = topography.with_gaps()
     if heights.ndim == 1 or min(heights.shape) < MIN_LINES:
         return ""
-    if topography.missing is not None:
-        heights = np.where(topography.missing, np.nan, heights)
     dy, dx = spacing
     for lines, along, ratio in ((heights, "x", dy / dx), (heights.T, "y", dx / dy)):
         lag = max(1, round(ratio))  # points of a line as far apart as the lines
@@ -304,16 +303,15 @@ def _often_equal(heights: Field) -> str:
 
 def single_points(topography: Topography) -> str:
     """Single points far above or below all their neighbours, or strokes along one axis."""
-    heights, missing = np.atleast_2d(topography.heights), topography.missing
-    missing = None if missing is None else missing.reshape(heights.shape)
-    is_map, singles, strokes = len(heights) > 1, 0, np.zeros((2, 2), int)
-    usual = _usual_difference(heights, missing)
-    for rows in row_blocks(heights) if usual else ():
-        around = slice(max(rows.start - is_map, 0), rows.stop + is_map)
-        block = heights[around]
-        if missing is not None:
-            block = np.where(missing[around], np.nan, block)
-        inner = slice(1, -1) if is_map else slice(None)
+    is_map, singles, strokes = topography.heights.ndim == 2, 0, np.zeros((2, 2), int)
+    parts: list[Any] = [...]
+    if is_map:
+        rows = row_blocks(topography.heights)
+        parts = [slice(max(block.start - 1, 0), block.stop + 1) for block in rows]
+    inner = slice(1, -1) if is_map else slice(None)
+    usual = _usual_difference(topography)
+    for part in parts if usual else ():
+        block = np.atleast_2d(topography.with_gaps(part))
         own = block[inner, 1:-1]
         axes = [(block[inner, :-2], block[inner, 2:])]
         axes += [(block[:-2, 1:-1], block[2:, 1:-1])] if is_map else []
@@ -343,14 +341,12 @@ def single_points(topography: Topography) -> str:
     return ""
 
 
-def _usual_difference(heights: Field, missing: Mask | None) -> float:
+def _usual_difference(topography: Topography) -> float:
     """The difference that most neighbours along the rougher axis have at most, from a sample."""
-    step, usual = 1 + heights.size // (10 * SAMPLE_SIZE), 0.0
-    for axis, sample in ((1, np.s_[::step]), (0, np.s_[:, ::step])):
-        known = heights[sample]
-        if missing is not None:
-            known = np.where(missing[sample], np.nan, known)
-        differences = np.abs(np.diff(known, axis=axis))
+    step, usual = 1 + topography.heights.size // (10 * SAMPLE_SIZE), 0.0
+    samples = ((-1, np.s_[::step]), (0, np.s_[:, ::step]))
+    for axis, sample in samples if topography.heights.ndim == 2 else ((0, ...),):
+        differences = np.abs(np.diff(topography.with_gaps(sample), axis=axis))
         differences = differences[np.isfinite(differences)]
         if differences.size:
             usual = max(usual, float(np.percentile(differences, USUAL_PERCENT)))
@@ -383,9 +379,7 @@ def rounded(topography: Topography, scale: float) -> str:
     heights, smallest = topography.heights, np.inf
     pairs, changes = np.zeros((2, heights.ndim), int)
     for rows in row_blocks(heights):
-        block = heights[rows]
-        if topography.missing is not None:
-            block = np.where(topography.missing[rows], np.nan, block)
+        block = topography.with_gaps(rows)
         for axis in range(heights.ndim):
             steps = np.abs(np.diff(block, axis=axis))
             pairs[axis] += np.count_nonzero(np.isfinite(steps))

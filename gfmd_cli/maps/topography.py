@@ -112,6 +112,11 @@ class Topography(MapMetadata):
         """Number of missing heights."""
         return 0 if self.missing is None else int(np.count_nonzero(self.missing))
 
+    def with_gaps(self, part: Any = ...) -> Field:
+        """The heights of a part of the map, such as a slice of rows, NaN where they are missing."""
+        heights = self.heights[part]
+        return heights if self.missing is None else np.where(self.missing[part], np.nan, heights)
+
 
 def read_topography(
     path: Path,
