@@ -32,6 +32,7 @@ from gfmd_cli.maps.text_tables import (
     in_utf8,
     is_height,
     is_number,
+    part,
     shorter_or_longer_row,
     sides_in,
     table_formats,
@@ -97,7 +98,7 @@ def _open_scan(path: Path, file: BinaryIO, readers: list[Any]) -> Any:
 
     Raises InputError where none does, with the reason of the reader that recognises the format.
     """
-    start, is_small = file.read(SIGNATURE_BYTES), path.stat().st_size <= SMALL_FILE
+    start, is_small = part(file, 0, SIGNATURE_BYTES), path.stat().st_size <= SMALL_FILE
     for signature, name in TEXT_FORMATS.items():
         if start.startswith(signature):
             raise InputError(
@@ -361,8 +362,8 @@ def _check_all_rows_read(path: Path, file: BinaryIO, rows: int, columns: int) ->
             f"{path}:{number}: an empty line in the table: several maps? Save each in its own file"
         )
     is_one_map = lengths.count(columns) <= rows
-    file.seek(0)
     rows_above = 0
+    file.seek(0)
     for number, line in enumerate(file, 1):
         words = line.split()
         marks = [word for word in words if not is_height(word)]

@@ -53,14 +53,15 @@ SIDE_LABELS = (
 OF_SIDES = re.compile(rf"^\W*({SIDE_LABELS})\b")
 
 
+def part(file: BinaryIO, position: int = 0, size: int = -1) -> bytes:
+    """What a file has from a position on, by default all of it."""
+    file.seek(position)
+    return file.read(size)
+
+
 def is_numeric(line: bytes) -> bool:
     """Whether a line has no words."""
     return not line.translate(None, NUMBER_CHARACTERS)
-
-
-def cells(line: bytes) -> list[bytes]:
-    """The parts of a line between blanks, commas and semicolons; [b""] of an empty line."""
-    return re.split(rb"[\s,;]+", line.strip(b" \t\r\n,;"))
 
 
 def table_formats(file: BinaryIO) -> set[str]:
@@ -112,10 +113,9 @@ def header(file: BinaryIO, width: int) -> list[bytes]:
     file.seek(0)
     lines = []
     for line in islice(file, HEADER_LINES + 1):
-        if len(cells(line)) >= width and _counts(line):
+        if len(re.split(rb"[\s,;]+", line.strip(b" \t\r\n,;"))) >= width and _counts(line):
             break
         lines += [line] if line.strip() else []
-    file.seek(0)
     return lines
 
 
@@ -143,7 +143,6 @@ def without_size(file: BinaryIO) -> BinaryIO:
         rows = sum(len(line.split()) == width for line in content.splitlines())
         if sorted(size) == sorted((rows, width)):
             return BytesIO(content)
-    file.seek(0)
     return file
 
 
@@ -152,8 +151,7 @@ def shorter_or_longer_row(file: BinaryIO) -> str:
 
     Only the first `SCANNED_BYTES` are looked at.
     """
-    file.seek(0)
-    lines = file.read(SCANNED_BYTES)
+    lines = part(file, 0, SCANNED_BYTES)
     counts = _counts(lines if len(lines) < SCANNED_BYTES else lines[: lines.rfind(b"\n")])
     rows = counts[counts > 0]
     width = int(np.bincount(rows[rows >= MATRIX_COLUMNS], minlength=1).argmax())
@@ -172,7 +170,7 @@ def with_blanks(file: BinaryIO) -> tuple[BinaryIO, str]:
     Returns the table, and a warning or "". Raises ValueError if the commas can separate thousands.
     """
     warning = ""
-    start = file.read(WINDOW_BYTES)
+    start = part(file, 0, WINDOW_BYTES)
     table = start[len(start) // 2 :]  # without most headers
     width = columns(file)
     whole = start.splitlines()[: -1 if len(start) == WINDOW_BYTES else None]
@@ -192,10 +190,8 @@ def with_blanks(file: BinaryIO) -> tuple[BinaryIO, str]:
         if is_decimal:
             warning = _warning_of_thousands(start, numbers)
         if is_decimal or numbers >= MATRIX_COLUMNS:
-            file.seek(0)
-            text = file.read().replace(b";", b" ")
+            text = part(file).replace(b";", b" ")
             file = BytesIO(text.replace(b",", b"." if is_decimal else b" "))
-    file.seek(0)
     return file, warning
 
 
@@ -244,17 +240,16 @@ def in_utf8(file: BinaryIO) -> BinaryIO:
 
     Raises ValueError where commas separate the numbers and are also parts of them, in quotes.
     """
-    start = file.read(WINDOW_BYTES)
-    file.seek(max(0, file.seek(0, os.SEEK_END) - WINDOW_BYTES))
-    is_plain = start.isascii() and b'"' not in start and file.read().isascii()
+    start = part(file, 0, WINDOW_BYTES)
+    end = part(file, max(0, file.seek(0, os.SEEK_END) - WINDOW_BYTES))
+    is_plain = start.isascii() and b'"' not in start and end.isascii()
     is_plain = is_plain and not (b"\r" in start and b"\n" not in start)
     is_table = start.startswith(UTF_16)
     if not (is_plain or is_table or start.startswith(LATIN_1)):
         is_table = columns(file) > 0
-    file.seek(0)
     if not is_table:
         return file
-    content = file.read().removeprefix(codecs.BOM_UTF8)
+    content = part(file).removeprefix(codecs.BOM_UTF8)
     if start.startswith(UTF_16):
         content = content.decode("utf-16").encode()
     try:
@@ -300,8 +295,7 @@ def _windows(file: BinaryIO) -> Iterator[tuple[int, bytes]]:
     gap = max(0, size // MAX_WINDOWS - WINDOW_BYTES)
     position = 0
     while position < size:
-        file.seek(position)
-        window = file.read(WINDOW_BYTES)
+        window = part(file, position, WINDOW_BYTES)
         begin = len(re.split(rb"[\r\n]", window, maxsplit=1)[0]) + 1 if position and gap else 0
         end = max(window.rfind(b"\n"), window.rfind(b"\r")) + 1
         if end <= begin and position + len(window) < size:
