@@ -352,20 +352,17 @@ class Spec(SpecTable):
     sweep: list[SweepTable] = Key(default_factory=list)
     source: str = ""
     """The file of the spec, for messages."""
-    places: dict[str, list[tuple[int | None, ...]]] = Key(default_factory=dict)
-    """Where each entry of a swept table stands in each group of paired lists; None where the
-    table has no list of the pair."""
+    places: dict[str, list[tuple[int | None, ...]]]
+    """Where each entry of a table, and each load, stands in each group of paired lists; None where
+    the table has no list of the pair."""
 
     def combinations(self) -> Iterator[tuple[dict[str, int], list[float]]]:
         """The entries of the swept tables that go together, by table, and their loads."""
         for entries in product(*(range(len(getattr(self, table))) for table in SWEPT)):
             at = dict(zip(SWEPT, entries, strict=True))
-            places = [self.places[table][i] for table, i in at.items() if self.places]
-            loads = [
-                load
-                for i, load in enumerate(self.load.listed())
-                if _fit([*places, *self.places.get("load", [])[i : i + 1]])
-            ]
+            places = [self.places[table][i] for table, i in at.items()]
+            pairs = zip(self.load.listed(), self.places["load"], strict=True)
+            loads = [load for load, place in pairs if _fit([*places, place])]
             if loads:
                 yield at, list(dict.fromkeys(loads))
 
