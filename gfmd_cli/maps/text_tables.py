@@ -10,7 +10,7 @@ import os
 import re
 from collections.abc import Iterator
 from io import BytesIO
-from itertools import islice
+from itertools import islice, takewhile
 from typing import Any, BinaryIO
 
 import numpy as np
@@ -43,6 +43,7 @@ GROUPED = re.compile(rb"[\t;]([-+]?\d{1,3}( \d{3})+([,.]\d*)?)(?=[\t;\r]|$)")
 """A cell such as 1 023 between tabs or semicolons."""
 EMPTY = re.compile(rb"([,;])[ \t]*\1.*\d")
 """An empty cell between commas or semicolons, with a number in the same row after it."""
+OLD_LINE_END = re.compile(rb"\r(?!\n)")
 SEPARATORS = b"\t", b";", b","
 """Separators of cells; a comma beside one of the others is a decimal comma."""
 SIDE_LABELS = (
@@ -70,13 +71,10 @@ def table_formats(file: BinaryIO) -> set[str]:
     "asc" is a matrix of heights between blanks; "xyz" are the positions and heights of a profile or
     of points on a grid, between blanks, commas or semicolons.
     """
-    formats = set()
-    if columns(file, b" \t") >= MATRIX_COLUMNS:
-        formats.add("asc")
-    positions = columns(file)
-    if positions == 2 or (positions == 3 and _is_grid(file)):
-        formats.add("xyz")
-    return formats
+    width = columns(file)
+    if width >= MATRIX_COLUMNS:
+        return {"asc"}
+    return {"xyz"} if width == 2 or (width == 3 and _is_grid(file)) else set()
 
 
 def is_number(word: bytes) -> bool:
@@ -100,23 +98,21 @@ def is_unit(word: str) -> bool:
 
 def sides_in(lines: list[bytes]) -> list[float]:
     """Lengths [m] that a header states; two of them are the sides of a matrix."""
-    sides = [
-        (side[1], in_metres(side[2].decode(errors="replace")))
-        for side in map(SIDE.match, lines)
-        if side
-    ]
+    found = filter(None, map(SIDE.match, lines))
+    sides = [(side[1], in_metres(side[2].decode(errors="replace"))) for side in found]
     return [float(value) * unit for value, unit in sides if is_number(value) and unit is not None]
 
 
 def header(file: BinaryIO, width: int) -> list[bytes]:
     """The lines above the first row of so many numbers, without empty ones."""
+
+    def is_above(line: bytes) -> bool:
+        cells = re.split(rb"[\s,;]+", line.strip(b" \t\r\n,;"))
+        return len(cells) < width or not _counts(line).any()
+
     file.seek(0)
-    lines = []
-    for line in islice(file, HEADER_LINES + 1):
-        if len(re.split(rb"[\s,;]+", line.strip(b" \t\r\n,;"))) >= width and _counts(line):
-            break
-        lines += [line] if line.strip() else []
-    return lines
+    lines = takewhile(is_above, islice(file, HEADER_LINES + 1))
+    return [line for line in lines if line.strip()]
 
 
 def unread_units(lines: list[bytes], *, of_sides: bool) -> str:
@@ -243,7 +239,7 @@ def in_utf8(file: BinaryIO) -> BinaryIO:
     start = part(file, 0, WINDOW_BYTES)
     end = part(file, max(0, file.seek(0, os.SEEK_END) - WINDOW_BYTES))
     is_plain = start.isascii() and b'"' not in start and end.isascii()
-    is_plain = is_plain and not (b"\r" in start and b"\n" not in start)
+    is_plain = is_plain and not OLD_LINE_END.search(start)
     is_table = start.startswith(UTF_16)
     if not (is_plain or is_table or start.startswith(LATIN_1)):
         is_table = columns(file) > 0
@@ -261,9 +257,7 @@ def in_utf8(file: BinaryIO) -> BinaryIO:
             f"{commas[0].decode()} has a comma in quotes and one as separator; save the numbers "
             "with decimal points, or separate them by semicolons"
         )
-    if b"\n" not in content:
-        content = content.replace(b"\r", b"\n")
-    return BytesIO(content.replace(b'"', b""))
+    return BytesIO(OLD_LINE_END.sub(b"\n", content).replace(b'"', b""))
 
 
 def columns(file: BinaryIO, separators: bytes = b" \t,;") -> int:
