@@ -87,7 +87,7 @@ def read_microscope_file(path: Path, dataset: str | None) -> HeightMap:
             raise InputError(
                 f"{path}: a table of positions holds one map; leave out dataset {dataset!r}"
             )
-    return replace(height_map, notes=(*height_map.notes, *filter(None, [warning])))
+    return replace(height_map, notes=tuple(filter(None, (*height_map.notes, warning))))
 
 
 def _open_scan(path: Path, file: BinaryIO, readers: list[Any]) -> Any:
@@ -161,10 +161,8 @@ def _read_channel(path: Path, file: BinaryIO, reader: Any, dataset: str | None) 
         _check_sides(path, channel)
     if kind == "nc":
         _check_is_own_netcdf(path, reader)
-    scan = channel.topography(physical_sizes=(1.0,) * len(shape) if unsized else None)
-    in_unit_of_file = scan
-    if scan.unit is not None:
-        scan = scan.to_unit("m")
+    stored = channel.topography(physical_sizes=(1.0,) * len(shape) if unsized else None)
+    scan = stored if stored.unit is None else stored.to_unit("m")
     lines = header(file, (1, *shape[1:])[-1]) if kind == "asc" else []
     if kind == "asc" and len(shape) == 2:
         _check_matrix(path, file, scan, unsized)
@@ -172,19 +170,18 @@ def _read_channel(path: Path, file: BinaryIO, reader: Any, dataset: str | None) 
     heights, sides = heights_and_sides(path, scan, rows_along_y)
     has_unit = scan.unit is not None
     if has_unit and kind in TABLE_FORMATS:
-        stored, _ = heights_and_sides(path, in_unit_of_file, rows_along_y)
-        heights = np.ma.masked_where(np.abs(stored) >= MAX_HEIGHT, heights)
+        in_unit_of_file, _ = heights_and_sides(path, stored, rows_along_y)
+        heights = np.ma.masked_where(np.abs(in_unit_of_file) >= MAX_HEIGHT, heights)
     metric_sides = None if has_unit or unsized else _sides_with_unit(channel, sides)
     note, sides = "", metric_sides or sides
     if kind == "gwy" and (masked := int(np.ma.getmaskarray(heights).sum())):
         note = f"{masked} points are masked in the file; they count as missing heights"
-    if kind == "asc":
-        if unsized:
-            note = unread_units(lines, of_sides=has_unit)
-        elif has_unit or metric_sides:
-            _check_stated_sides(path, lines, sides)
+    elif unsized:
+        note = unread_units(lines, of_sides=has_unit)
+    elif has_unit or metric_sides:
+        _check_stated_sides(path, lines, sides)
     return HeightMap(
-        notes=(note,) if note else (),
+        notes=(note,),
         heights=heights,
         sides=None if unsized else sides,
         metres=has_unit or metric_sides is not None,
@@ -211,13 +208,12 @@ def heights_and_sides(path: Path, scan: Any, rows_along_y: bool) -> tuple[Any, t
 
 def _check_matrix(path: Path, file: BinaryIO, scan: Any, unsized: bool) -> None:
     """Raise InputError for a matrix that is not one of heights, or was not read to its end."""
-    columns_read, rows = scan.nb_grid_pts
-    if unsized and columns_read < MATRIX_COLUMNS:
+    if unsized and scan.nb_grid_pts[0] < MATRIX_COLUMNS:
         raise InputError(
             f"{path}: {NO_GRID}; a matrix of heights has at least {MATRIX_COLUMNS} columns, or "
             f"a header that states its sides. {REMEDY}"
         )
-    _check_all_rows_read(path, file, rows, columns_read)
+    _check_all_rows_read(path, file, *scan.nb_grid_pts)
     check_all_are_heights(path, scan.heights().T, unsized=unsized)
 
 
@@ -251,7 +247,7 @@ def _check_stated_sides(path: Path, lines: list[bytes], sides: tuple[float, ...]
 
 def _header(channel: Any) -> dict[str, Any]:
     """The keys and values of the header of a text table."""
-    header = channel.info.get("raw_metadata") if channel.info else None
+    header = (channel.info or {}).get("raw_metadata")
     return header if isinstance(header, dict) else {}
 
 
@@ -346,7 +342,7 @@ def _usual_deviation(values: Field) -> float:
     return float(np.median(np.abs(rest - np.median(rest))) / abs(step)) if step else np.inf
 
 
-def _check_all_rows_read(path: Path, file: BinaryIO, rows: int, columns: int) -> None:
+def _check_all_rows_read(path: Path, file: BinaryIO, columns: int, rows: int) -> None:
     """Raise InputError where a table has more rows than were read, or is two tables.
 
     The reader skips lines with words, also in the table, where they would shift all rows below.
