@@ -51,27 +51,28 @@ MIN_KNOWN = 8  # heights in half a line, for its median; a choice
 MIN_LINES = 32  # fewer lines and points per line have such shifts by chance
 
 
-def other_side(key: str, length: float, stated: float) -> str:
-    """A side [m], given by a key of the surface, other than the one that the file states."""
-    if abs(length / stated - 1) <= SIDE_TOLERANCE:
-        return ""
-    return f"surface.{key} = {length:g} m replaces the side of the file, {stated:g} m"
+def given_side(key: str, length: float, stated: float | None, topography: Topography) -> str:
+    """A side [m], given by a key of the surface, other than the one that the file states.
 
-
-def side_of_a_part(key: str, length: float, topography: Topography) -> str:
-    """A side [m] of the part of a map that is used, whose file states none."""
+    Without a stated one, a side that is that of a part of the map.
+    """
     axis = 0 if key == "length_y" else -1
     part, whole = topography.heights.shape[axis], topography.shape[axis]
-    if part == whole:
+    is_same = part == whole if stated is None else abs(length / stated - 1) <= SIDE_TOLERANCE
+    if is_same:
         return ""
+    if stated is not None:
+        return f"surface.{key} = {length:g} m replaces the side of the file, {stated:g} m"
     return (
         f"surface.{key} = {length:g} m is the side of the part of the map that is used, {part} of "
         f"{whole} points; if the whole map has this side, set {length * part / whole:g}"
     )
 
 
-def unknown_unit(topography: Topography, scale: float, length: float) -> str:
-    """Positions of unknown unit; a factor of the heights multiplies the side, to `length` [m]."""
+def unknown_side(topography: Topography, scale: float, length: float | None) -> str:
+    """No side, or one of unknown unit; a factor of the heights multiplies it, to `length` [m]."""
+    if length is None:
+        return "the file does not state its side in metres; L = 1 m is assumed: set surface.length"
     if topography.metres:
         return ""
     if scale == 1.0:
