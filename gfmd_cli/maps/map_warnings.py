@@ -312,18 +312,14 @@ def single_points(topography: Topography) -> str:
     inner = slice(1, -1) if is_map else slice(None)
     usual = _usual_difference(topography)
     for part in parts if usual else ():
-        block = np.atleast_2d(topography.with_gaps(part))
-        own = block[inner, 1:-1]
-        axes = [(block[inner, :-2], block[inner, 2:])]
-        axes += [(block[:-2, 1:-1], block[2:, 1:-1])] if is_map else []
-        above = [np.minimum(own - one, own - other) for one, other in axes]
-        below = [np.minimum(one - own, other - own) for one, other in axes]
-        is_single = [np.min(each, axis=0) > SPIKE_RATIO * usual for each in (above, below)]
-        singles += int(np.count_nonzero(is_single[0] | is_single[1]))
-        for sign, each in enumerate((above, below)):
-            strokes[sign, : len(axes)] += np.count_nonzero(
-                np.stack(each) > SCAR_RATIO * usual, axis=(1, 2)
-            )
+        heights = np.atleast_2d(topography.with_gaps(part))
+        for block, of_sign in ((heights, strokes[0]), (-heights, strokes[1])):
+            own = block[inner, 1:-1]
+            axes = [(block[inner, :-2], block[inner, 2:])]
+            axes += [(block[:-2, 1:-1], block[2:, 1:-1])] if is_map else []
+            rises = np.stack([np.minimum(own - one, own - other) for one, other in axes])
+            singles += int(np.count_nonzero(rises.min(axis=0) > SPIKE_RATIO * usual))
+            of_sign[: len(axes)] += np.count_nonzero(rises > SCAR_RATIO * usual, axis=(1, 2))
     than = f"times the difference that {USUAL_PERCENT} % of neighbouring heights have at most"
     if singles:
         what = "1 point lies" if singles == 1 else f"{singles} points lie"

@@ -261,12 +261,8 @@ class AccuracyTable(SpecTable):
 
     def tolerances(self) -> dict[str, float]:
         """Requested relative errors, by the name of the column."""
-        tolerances = {
-            "u_g": self.mean_gap,
-            "a_r": self.contact_area,
-            "sigma_p": self.stress_deviation,
-        }
-        return {name: share for name, share in tolerances.items() if share is not None}
+        columns = {"mean_gap": "u_g", "contact_area": "a_r", "stress_deviation": "sigma_p"}
+        return {columns[key]: share for key, share in self if key in columns and share is not None}
 
 
 FieldName = Literal["u", "sigma", "height", "contact_pressure"]
@@ -368,13 +364,9 @@ class Spec(SpecTable):
 
     def resolved(self) -> dict[str, Any]:
         """What determines the results, as plain data: files stand for their content."""
-        data: dict[str, Any] = self.model_dump(
-            mode="json", exclude={"study", "load", "places", "source"}, by_alias=True
-        )
-        if not self.sweep:
-            del data["sweep"]
-        if self.accuracy is None:
-            del data["accuracy"]
+        left_out = {"study", "load", "places", "source"}
+        left_out |= {name for name in ("sweep", "accuracy") if not getattr(self, name)}
+        data: dict[str, Any] = self.model_dump(mode="json", exclude=left_out, by_alias=True)
         for name in set(ON_REQUEST) - set(self.output.on_request()):
             del data["output"][name]  # a new key must not change the identity of other tasks
         for table in ("surface", "elastomer"):
