@@ -187,16 +187,15 @@ def _with_coordinates(path: Path, file: Any, data: Any, bare: HeightMap) -> Heig
     if metres is not None:
         is_height = np.abs(heights) < MAX_HEIGHT  # in the unit of the file
         heights = np.ma.masked_where(~is_height, metres * heights.astype(np.float64))
-    has_metric_sides, has_metric_heights = len(metric) == len(axes), metres is not None
-    if has_metric_sides:
+    if metric:
         sides = [side * metre for side, metre in zip(sides, metric, strict=True)]
     return replace(
         bare,
         heights=heights,
-        sides=tuple(sides) if has_metric_sides or not has_metric_heights else None,
-        metres=has_metric_sides,
-        periodic=False if has_metric_sides and has_metric_heights else None,
-        metric_heights=has_metric_heights,
+        sides=tuple(sides) if metric or metres is None else None,
+        metres=bool(metric),
+        periodic=False if metric and metres is not None else None,
+        metric_heights=metres is not None,
     )
 
 

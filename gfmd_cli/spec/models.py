@@ -1,6 +1,7 @@
 """The models of the run spec, and its sweeps: a list instead of a scalar makes a sweep."""
 
 from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from itertools import product
 from math import prod
 from typing import Annotated, Any, Literal, NamedTuple, Self, TypeVar, get_args
@@ -91,20 +92,13 @@ def with_boundary(
     A map that ends at its borders has a free boundary where elastomer and solver allow it, and is
     mirrored elsewhere. Every other surface is periodic.
     """
-    if grid.boundary is None:
-        free = surface.has_borders and _allows_free(surface.dimension, elastomer, solver)
-        grid = grid.model_copy(update={"boundary": "free" if free else "periodic"})
-    return surface.within(grid.boundary or "periodic"), grid
-
-
-def _allows_free(dimension: int, elastomer: LinearElastomer, solver: AnySolver) -> bool:
-    """Whether contacts of this elastomer and solver can have a free boundary."""
-    try:
-        solver.check_boundary("free")
-        elastomer.check_free_boundary(dimension)
-    except InputError:
-        return False
-    return True
+    boundary: str = grid.boundary or "periodic"
+    if grid.boundary is None and surface.has_borders:
+        with suppress(InputError):
+            solver.check_boundary("free")
+            elastomer.check_free_boundary(surface.dimension)
+            boundary = "free"
+    return surface.within(boundary), grid.model_copy(update={"boundary": boundary})
 
 
 class Ladder(SpecTable):
