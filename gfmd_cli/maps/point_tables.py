@@ -47,11 +47,10 @@ def read_points(path: Path, file: BinaryIO) -> HeightMap | None:
     The columns are x, y and height, or x and height, unless the header names another order. Raises
     InputError for points that are not those of a full grid, and for units that are not clear.
     """
-    count = columns(file)
-    is_table = count in (2, 3) and "xyz" in table_formats(file)
-    content = part(file) if is_table else b""
+    content = part(file) if "xyz" in table_formats(file) else b""
     if not content or content.startswith(OWN_HEADERS):
         return None
+    count = columns(file)
     lines = content.replace(b",", b" ").replace(b";", b" ").splitlines()
     first = next((i for i, line in enumerate(lines) if _is_row(line.split(), count)), 0)
     is_sized = len(sides_in(lines[:first])) == 2

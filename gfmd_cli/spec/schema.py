@@ -51,9 +51,8 @@ def _table(
     schema = model.model_json_schema()
     shared.update(schema.pop("$defs", {}))
     if swept:
-        for name, key in schema["properties"].items():
-            if name != "kind":
-                schema["properties"][name] = _one_or_many(key)
+        for name in schema["properties"].keys() - {"kind"}:
+            schema["properties"][name] = _one_or_many(schema["properties"][name])
     if needs_kind:
         schema["required"] = ["kind", *schema.get("required", [])]
     return schema
