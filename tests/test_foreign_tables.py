@@ -550,6 +550,8 @@ def test_an_array_with_positions_is_refused(tmp_path, array, words):
         read_topography(tmp_path / "h.npy")
 
 
-def test_line_ends_of_old_programs_are_read(saved):
-    path = saved("# Width: 4 um\r# Height: 4 um\r" + "\r".join(["1 2 3 5", "2 4 1 0"] * 8))
+@pytest.mark.parametrize("end", ["\r", "\n"])
+def test_line_ends_of_old_programs_are_read(saved, end):
+    """Below a header with such line ends, or with new ones."""
+    path = saved(f"# Width: 4 um{end}# Height: 4 um{end}" + "\r".join(["1 2 3 5", "2 4 1 0"] * 8))
     assert read_topography(path).heights.shape == (16, 4)

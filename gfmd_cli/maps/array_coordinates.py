@@ -49,11 +49,6 @@ class Axis(NamedTuple):
     """Metres per unit of the positions, None where they state no unit."""
 
 
-def axes_of(path: Path, file: Any, data: Any) -> list[Axis]:
-    """The axes of a dataset. Raises InputError for uneven positions, or an unknown unit."""
-    return [_axis(path, file, dimension) for dimension in data.dims]
-
-
 def stated_unit(data: Any) -> str:
     """The unit that a dataset states, "" where it states none."""
     for name in UNIT_NAMES:
@@ -85,7 +80,8 @@ def is_transposed(axes: Sequence[Axis]) -> bool:
     return [AXIS_NAMES.get(axis.name.lower()) for axis in axes] == ["x", "y"]
 
 
-def _axis(path: Path, file: Any, dimension: Any) -> Axis:
+def axis_of(path: Path, file: Any, dimension: Any) -> Axis:
+    """One axis of a dataset. Raises InputError for uneven positions, or an unknown unit."""
     from gfmd_cli.files.hdf5 import take
 
     if not len(dimension):
@@ -94,12 +90,10 @@ def _axis(path: Path, file: Any, dimension: Any) -> Axis:
     name = scale.name.strip("/")
     label = name.rpartition("/")[-1]
     is_empty = bytes(scale.attrs.get("NAME", b"")).startswith(NO_VARIABLE)
-    if is_empty or scale.dtype.kind not in "iuf" or scale.ndim != 1:
+    if is_empty or scale.dtype.kind not in "iuf" or scale.ndim != 1 or scale.size < 2:
         return Axis(label, None, None)
     stored = take(file, name, MAX_COMPRESSION)[()]
     positions = np.asarray(stored, dtype=np.float64)
-    if positions.size < 2:
-        return Axis(label, None, None)
     steps = np.diff(positions)
     step = float(positions[-1] - positions[0]) / steps.size
     rounding = np.spacing(np.abs(stored).max()) if stored.dtype.kind == "f" else 0.0

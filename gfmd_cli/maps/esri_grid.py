@@ -36,4 +36,4 @@ def read_esri_grid(path: Path, dataset: str | None) -> HeightMap:
     missing = header.get("nodata_value", NO_DATA)
     sides = tuple(header["cellsize"] * points for points in shape)
     heights = np.ma.masked_equal(heights, missing)
-    return HeightMap(heights, sides=sides, source="ESRI grid", periodic=False)
+    return HeightMap(heights=heights, sides=sides, source="ESRI grid", periodic=False)

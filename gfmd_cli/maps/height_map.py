@@ -15,7 +15,7 @@ import numpy as np
 
 from gfmd_cli.errors import InputError
 from gfmd_cli.files.checksums import MAX_COMPRESSION
-from gfmd_cli.maps.array_coordinates import axes_of, factor, is_transposed, stated_unit
+from gfmd_cli.maps.array_coordinates import axis_of, factor, is_transposed, stated_unit
 from gfmd_cli.units import count, left_out
 
 MAX_MAP_BYTES = 2**33  # 32768 x 32768 heights in double precision
@@ -33,9 +33,13 @@ REMEDY = "Heights that other programs read can be saved by numpy.save as a .npy 
 
 
 @dataclass(frozen=True, kw_only=True)
-class MapMetadata:
-    """What a file states about its heights."""
+class HeightMap:
+    """A height map, or the profile along a line, as stored in a file."""
 
+    heights: np.ndarray[Any, Any]
+    """Heights, shape (rows, columns) or (points,), masked where the file marks one as missing."""
+    sides: tuple[float, ...] | None = None
+    """Extent along each axis, None where the file does not state it."""
     source: str
     """Format, and dataset or channel."""
     metres: bool = False
@@ -46,16 +50,6 @@ class MapMetadata:
     """Whether the map is periodic, None where the file does not state it."""
     notes: tuple[str, ...] = ()
     """Warnings about what the file states and the reader does not use."""
-
-
-@dataclass(frozen=True)
-class HeightMap(MapMetadata):
-    """A height map, or the profile along a line, as stored in a file."""
-
-    heights: np.ndarray[Any, Any]
-    """Heights, shape (rows, columns) or (points,), masked where the file marks one as missing."""
-    sides: tuple[float, ...] | None = None
-    """Extent along each axis, None where the file does not state it."""
 
 
 def check_type(path: Path, dtype: np.dtype[Any]) -> None:
@@ -101,7 +95,7 @@ def read_npy(path: Path, dataset: str | None) -> HeightMap:
         raise InputError(f"{path}: a .npy file holds one array; leave out dataset {dataset!r}")
     mapped = np.lib.format.open_memmap(path, mode="r")  # reads neither pickles nor archives
     check_layout(path, mapped.shape, mapped.dtype)
-    return HeightMap(mapped, source=f"npy, {mapped.dtype}")
+    return HeightMap(heights=mapped, source=f"npy, {mapped.dtype}")
 
 
 def read_hdf5(path: Path, dataset: str | None) -> HeightMap:
@@ -129,7 +123,7 @@ def read_hdf5(path: Path, dataset: str | None) -> HeightMap:
                 missing = missing.astype(values.dtype)
             values = np.ma.masked_where(np.isin(values, missing), values)
         values = _valid(path, name, data.attrs, values)
-        bare = HeightMap(values, source=f"HDF5, {name}, {data.dtype}")
+        bare = HeightMap(heights=values, source=f"HDF5, {name}, {data.dtype}")
         height_map = _with_coordinates(path, file, data, bare)
         if "spec_text" in file.attrs and name.startswith("fields/"):  # a study
             boundary = take(file, "boundary")[int(name.split("/")[1])]
@@ -173,7 +167,7 @@ def _with_coordinates(path: Path, file: Any, data: Any, bare: HeightMap) -> Heig
     positions of one axis alone state a unit.
     """
     heights = bare.heights
-    axes = axes_of(path, file, data)[-heights.ndim :]
+    axes = [axis_of(path, file, each) for each in data.dims][-heights.ndim :]
     if is_transposed(axes):
         heights, axes = heights.T, axes[::-1]
     steps = [axis.step for axis in axes if axis.step is not None]
@@ -193,16 +187,15 @@ def _with_coordinates(path: Path, file: Any, data: Any, bare: HeightMap) -> Heig
     if metres is not None:
         is_height = np.abs(heights) < MAX_HEIGHT  # in the unit of the file
         heights = np.ma.masked_where(~is_height, metres * heights.astype(np.float64))
-    has_metric_sides, has_metric_heights = len(metric) == len(axes), metres is not None
-    if has_metric_sides:
+    if metric:
         sides = [side * metre for side, metre in zip(sides, metric, strict=True)]
     return replace(
         bare,
         heights=heights,
-        sides=tuple(sides) if has_metric_sides or not has_metric_heights else None,
-        metres=has_metric_sides,
-        periodic=False if has_metric_sides and has_metric_heights else None,
-        metric_heights=has_metric_heights,
+        sides=tuple(sides) if metric or metres is None else None,
+        metres=bool(metric),
+        periodic=False if metric and metres is not None else None,
+        metric_heights=metres is not None,
     )
 
 
@@ -210,10 +203,11 @@ def _dataset_name(path: Path, file: Any, name: str | None) -> str:
     """Path of the named dataset, or of the only map, or of the only line. Raises InputError."""
     from gfmd_cli.files.hdf5 import datasets_below, take
 
-    if name is not None:
+    chosen = (name or "").strip("/")
+    if chosen:
         with suppress(KeyError, ValueError):
-            take(file, name.strip("/"), MAX_COMPRESSION)
-            return name.strip("/")
+            take(file, chosen, MAX_COMPRESSION)
+            return chosen
     try:
         datasets = datasets_below(file)
     except ValueError as error:
@@ -221,9 +215,9 @@ def _dataset_name(path: Path, file: Any, name: str | None) -> str:
     if is_study := "spec_text" in file.attrs:  # its other arrays are distributions
         datasets = {key: item for key, item in datasets.items() if key.startswith("fields/")}
     maps = _maps(datasets)
+    if chosen in datasets:
+        return chosen
     if name is not None:
-        if name.strip("/") in datasets:
-            return name.strip("/")
         raise InputError(
             f"{path}: no dataset {name!r} (links are not followed); its height maps: {listed(maps)}"
         )

@@ -43,12 +43,9 @@ def suited_interpolation(heights: Field) -> Interpolation:
     """
     if _jumps(heights) > MAX_JUMPS:  # a step along an axis has no waves in the corners
         return "monotone"
-    corners, borders = _short_waves(np.atleast_2d(heights))
-    if heights.ndim == 1:  # a line has no corners
-        return "monotone" if borders > MAX_SHORT_WAVES else "fourier"
-    if corners > MAX_SHORT_WAVES:
-        return "monotone"
-    return "monotone" if borders > MAX_SHORT_WAVES and _ties(heights) > MAX_TIES else "fourier"
+    corners, borders = _short_waves(np.atleast_2d(heights))  # a line has no corners
+    is_short = borders > MAX_SHORT_WAVES and (heights.ndim == 1 or _ties(heights) > MAX_TIES)
+    return "monotone" if is_short or corners > MAX_SHORT_WAVES else "fourier"
 
 
 def _short_waves(heights: Field) -> tuple[float, float]:

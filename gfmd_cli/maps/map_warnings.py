@@ -4,10 +4,11 @@ Each function returns a warning, or "" if what its docstring describes does not 
 """
 
 import warnings
+from typing import Any
 
 import numpy as np
 
-from gfmd_cli.grid.arrays import Field, Mask, row_blocks
+from gfmd_cli.grid.arrays import Field, row_blocks
 from gfmd_cli.maps.map_preparation import border_step, level
 from gfmd_cli.maps.topography import Topography
 from gfmd_cli.units import count
@@ -50,27 +51,28 @@ MIN_KNOWN = 8  # heights in half a line, for its median; a choice
 MIN_LINES = 32  # fewer lines and points per line have such shifts by chance
 
 
-def other_side(key: str, length: float, stated: float) -> str:
-    """A side [m], given by a key of the surface, other than the one that the file states."""
-    if abs(length / stated - 1) <= SIDE_TOLERANCE:
-        return ""
-    return f"surface.{key} = {length:g} m replaces the side of the file, {stated:g} m"
+def given_side(key: str, length: float, stated: float | None, topography: Topography) -> str:
+    """A side [m], given by a key of the surface, other than the one that the file states.
 
-
-def side_of_a_part(key: str, length: float, topography: Topography) -> str:
-    """A side [m] of the part of a map that is used, whose file states none."""
+    Without a stated one, a side that is that of a part of the map.
+    """
     axis = 0 if key == "length_y" else -1
     part, whole = topography.heights.shape[axis], topography.shape[axis]
-    if part == whole:
+    is_same = part == whole if stated is None else abs(length / stated - 1) <= SIDE_TOLERANCE
+    if is_same:
         return ""
+    if stated is not None:
+        return f"surface.{key} = {length:g} m replaces the side of the file, {stated:g} m"
     return (
         f"surface.{key} = {length:g} m is the side of the part of the map that is used, {part} of "
         f"{whole} points; if the whole map has this side, set {length * part / whole:g}"
     )
 
 
-def unknown_unit(topography: Topography, scale: float, length: float) -> str:
-    """Positions of unknown unit; a factor of the heights multiplies the side, to `length` [m]."""
+def unknown_side(topography: Topography, scale: float, length: float | None) -> str:
+    """No side, or one of unknown unit; a factor of the heights multiplies it, to `length` [m]."""
+    if length is None:
+        return "the file does not state its side in metres; L = 1 m is assumed: set surface.length"
     if topography.metres:
         return ""
     if scale == 1.0:
@@ -213,11 +215,9 @@ def shifted_lines(topography: Topography, spacing: tuple[float, ...]) -> str:
     `spacing` is that of the map [m]. An offset is the median difference to the line before, where
     both halves of the line agree on it.
     """
-    heights = topography.heights
+    heights = topography.with_gaps()
     if heights.ndim == 1 or min(heights.shape) < MIN_LINES:
         return ""
-    if topography.missing is not None:
-        heights = np.where(topography.missing, np.nan, heights)
     dy, dx = spacing
     for lines, along, ratio in ((heights, "x", dy / dx), (heights.T, "y", dx / dy)):
         lag = max(1, round(ratio))  # points of a line as far apart as the lines
@@ -304,27 +304,22 @@ def _often_equal(heights: Field) -> str:
 
 def single_points(topography: Topography) -> str:
     """Single points far above or below all their neighbours, or strokes along one axis."""
-    heights, missing = np.atleast_2d(topography.heights), topography.missing
-    missing = None if missing is None else missing.reshape(heights.shape)
-    is_map, singles, strokes = len(heights) > 1, 0, np.zeros((2, 2), int)
-    usual = _usual_difference(heights, missing)
-    for rows in row_blocks(heights) if usual else ():
-        around = slice(max(rows.start - is_map, 0), rows.stop + is_map)
-        block = heights[around]
-        if missing is not None:
-            block = np.where(missing[around], np.nan, block)
-        inner = slice(1, -1) if is_map else slice(None)
-        own = block[inner, 1:-1]
-        axes = [(block[inner, :-2], block[inner, 2:])]
-        axes += [(block[:-2, 1:-1], block[2:, 1:-1])] if is_map else []
-        above = [np.minimum(own - one, own - other) for one, other in axes]
-        below = [np.minimum(one - own, other - own) for one, other in axes]
-        is_single = [np.min(each, axis=0) > SPIKE_RATIO * usual for each in (above, below)]
-        singles += int(np.count_nonzero(is_single[0] | is_single[1]))
-        for sign, each in enumerate((above, below)):
-            strokes[sign, : len(axes)] += np.count_nonzero(
-                np.stack(each) > SCAR_RATIO * usual, axis=(1, 2)
-            )
+    is_map, singles, strokes = topography.heights.ndim == 2, 0, np.zeros((2, 2), int)
+    parts: list[Any] = [...]
+    if is_map:
+        rows = row_blocks(topography.heights)
+        parts = [slice(max(block.start - 1, 0), block.stop + 1) for block in rows]
+    inner = slice(1, -1) if is_map else slice(None)
+    usual = _usual_difference(topography)
+    for part in parts if usual else ():
+        heights = np.atleast_2d(topography.with_gaps(part))
+        for block, of_sign in ((heights, strokes[0]), (-heights, strokes[1])):
+            own = block[inner, 1:-1]
+            axes = [(block[inner, :-2], block[inner, 2:])]
+            axes += [(block[:-2, 1:-1], block[2:, 1:-1])] if is_map else []
+            rises = np.stack([np.minimum(own - one, own - other) for one, other in axes])
+            singles += int(np.count_nonzero(rises.min(axis=0) > SPIKE_RATIO * usual))
+            of_sign[: len(axes)] += np.count_nonzero(rises > SCAR_RATIO * usual, axis=(1, 2))
     than = f"times the difference that {USUAL_PERCENT} % of neighbouring heights have at most"
     if singles:
         what = "1 point lies" if singles == 1 else f"{singles} points lie"
@@ -343,14 +338,12 @@ def single_points(topography: Topography) -> str:
     return ""
 
 
-def _usual_difference(heights: Field, missing: Mask | None) -> float:
+def _usual_difference(topography: Topography) -> float:
     """The difference that most neighbours along the rougher axis have at most, from a sample."""
-    step, usual = 1 + heights.size // (10 * SAMPLE_SIZE), 0.0
-    for axis, sample in ((1, np.s_[::step]), (0, np.s_[:, ::step])):
-        known = heights[sample]
-        if missing is not None:
-            known = np.where(missing[sample], np.nan, known)
-        differences = np.abs(np.diff(known, axis=axis))
+    step, usual = 1 + topography.heights.size // (10 * SAMPLE_SIZE), 0.0
+    samples = ((-1, np.s_[::step]), (0, np.s_[:, ::step]))
+    for axis, sample in samples if topography.heights.ndim == 2 else ((0, ...),):
+        differences = np.abs(np.diff(topography.with_gaps(sample), axis=axis))
         differences = differences[np.isfinite(differences)]
         if differences.size:
             usual = max(usual, float(np.percentile(differences, USUAL_PERCENT)))
@@ -383,9 +376,7 @@ def rounded(topography: Topography, scale: float) -> str:
     heights, smallest = topography.heights, np.inf
     pairs, changes = np.zeros((2, heights.ndim), int)
     for rows in row_blocks(heights):
-        block = heights[rows]
-        if topography.missing is not None:
-            block = np.where(topography.missing[rows], np.nan, block)
+        block = topography.with_gaps(rows)
         for axis in range(heights.ndim):
             steps = np.abs(np.diff(block, axis=axis))
             pairs[axis] += np.count_nonzero(np.isfinite(steps))

@@ -10,6 +10,7 @@ import numpy as np
 
 from gfmd_cli.errors import INSTALL, InputError
 from gfmd_cli.grid.arrays import Field
+from gfmd_cli.maps import text_tables
 from gfmd_cli.maps.array_coordinates import EVEN_TOLERANCE, in_metres
 from gfmd_cli.maps.height_map import (
     MAX_HEIGHT,
@@ -23,22 +24,7 @@ from gfmd_cli.maps.height_map import (
     only_map,
 )
 from gfmd_cli.maps.point_tables import NO_GRID, read_points
-from gfmd_cli.maps.text_tables import (
-    MATRIX_COLUMNS,
-    OF_SIDES,
-    OWN_HEADERS,
-    columns,
-    header,
-    in_utf8,
-    is_height,
-    is_number,
-    shorter_or_longer_row,
-    sides_in,
-    table_formats,
-    unread_units,
-    with_blanks,
-    without_size,
-)
+from gfmd_cli.maps.text_tables import MATRIX_COLUMNS, OF_SIDES, is_height, is_number
 
 COMPRESSED = {".gz", ".bz2", ".xz", ".zst", ".7z"}
 TABLE_FORMATS = {"xyz", "asc"}  # formats of SurfaceTopography that are tables of numbers
@@ -74,19 +60,19 @@ def read_microscope_file(path: Path, dataset: str | None) -> HeightMap:
                 f"{INSTALL.format('topography')}"
             ) from error
         try:
-            table, warning = with_blanks(in_utf8(file))
+            table, warning = text_tables.with_blanks(text_tables.in_utf8(file))
         except ValueError as error:
             raise InputError(f"{path}: {error}") from error
         height_map = read_points(path, table)
         if height_map is None:
-            table = without_size(table)
+            table = text_tables.without_size(table)
             with _open_scan(path, table, readers) as reader:
                 height_map = _read_channel(path, table, reader, dataset)
         elif dataset is not None:
             raise InputError(
                 f"{path}: a table of positions holds one map; leave out dataset {dataset!r}"
             )
-    return replace(height_map, notes=(*height_map.notes, *filter(None, [warning])))
+    return replace(height_map, notes=tuple(filter(None, (*height_map.notes, warning))))
 
 
 def _open_scan(path: Path, file: BinaryIO, readers: list[Any]) -> Any:
@@ -97,19 +83,19 @@ def _open_scan(path: Path, file: BinaryIO, readers: list[Any]) -> Any:
 
     Raises InputError where none does, with the reason of the reader that recognises the format.
     """
-    start, is_small = file.read(SIGNATURE_BYTES), path.stat().st_size <= SMALL_FILE
+    start, is_small = text_tables.part(file, 0, SIGNATURE_BYTES), path.stat().st_size <= SMALL_FILE
     for signature, name in TEXT_FORMATS.items():
         if start.startswith(signature):
             raise InputError(
                 f"{path}: {name} in text, whose header is not read; save it in binary form, or as "
                 "a table of x, y and height"
             )
-    tables = table_formats(file)
+    tables = text_tables.table_formats(file)
     reasons = []
     for reader in readers:
         answer = reader.can_read(start).name
         is_guess = reader.format() in TABLE_FORMATS - tables
-        is_read_here = reader.format() == "xyz" and not start.startswith(OWN_HEADERS)
+        is_read_here = reader.format() == "xyz" and not start.startswith(text_tables.OWN_HEADERS)
         if answer == "NO" or is_read_here or (is_guess and not is_small):
             continue
         file.seek(0)
@@ -120,7 +106,7 @@ def _open_scan(path: Path, file: BinaryIO, readers: list[Any]) -> Any:
                 continue
             is_likely = answer == "YES" or reader.format() in tables
             if is_likely or path.suffix[1:].lower() in reader.file_extensions():
-                row = shorter_or_longer_row(file) if reader.format() == "asc" else ""
+                row = text_tables.shorter_or_longer_row(file) if reader.format() == "asc" else ""
                 reasons.append(f"{reader.format()}: {row or first_line(error)}")
     if reasons:
         raise InputError(
@@ -129,10 +115,10 @@ def _open_scan(path: Path, file: BinaryIO, readers: list[Any]) -> Any:
         )
     if path.suffix.lower() in COMPRESSED:
         what = "a compressed file: unpack it"
-    elif columns(file) == 3:
+    elif text_tables.columns(file) == 3:
         what = NO_GRID
     else:
-        row = shorter_or_longer_row(file) if b"\0" not in start else ""
+        row = text_tables.shorter_or_longer_row(file) if b"\0" not in start else ""
         what = f"not in a known topography format{f' (as a matrix: {row})' if row else ''}"
     raise InputError(
         f"{path}: {what}; .npy, HDF5 and the formats of SurfaceTopography can be read. {REMEDY}"
@@ -160,30 +146,27 @@ def _read_channel(path: Path, file: BinaryIO, reader: Any, dataset: str | None) 
         _check_sides(path, channel)
     if kind == "nc":
         _check_is_own_netcdf(path, reader)
-    scan = channel.topography(physical_sizes=(1.0,) * len(shape) if unsized else None)
-    in_unit_of_file = scan
-    if scan.unit is not None:
-        scan = scan.to_unit("m")
-    lines = header(file, (1, *shape[1:])[-1]) if kind == "asc" else []
+    stored = channel.topography(physical_sizes=(1.0,) * len(shape) if unsized else None)
+    scan = stored if stored.unit is None else stored.to_unit("m")
+    lines = text_tables.header(file, (1, *shape[1:])[-1]) if kind == "asc" else []
     if kind == "asc" and len(shape) == 2:
         _check_matrix(path, file, scan, unsized)
         _check_nova(path, lines)
     heights, sides = heights_and_sides(path, scan, rows_along_y)
     has_unit = scan.unit is not None
     if has_unit and kind in TABLE_FORMATS:
-        stored, _ = heights_and_sides(path, in_unit_of_file, rows_along_y)
-        heights = np.ma.masked_where(np.abs(stored) >= MAX_HEIGHT, heights)
+        in_unit_of_file, _ = heights_and_sides(path, stored, rows_along_y)
+        heights = np.ma.masked_where(np.abs(in_unit_of_file) >= MAX_HEIGHT, heights)
     metric_sides = None if has_unit or unsized else _sides_with_unit(channel, sides)
     note, sides = "", metric_sides or sides
     if kind == "gwy" and (masked := int(np.ma.getmaskarray(heights).sum())):
         note = f"{masked} points are masked in the file; they count as missing heights"
-    if kind == "asc":
-        if unsized:
-            note = unread_units(lines, of_sides=has_unit)
-        elif has_unit or metric_sides:
-            _check_stated_sides(path, lines, sides)
+    elif unsized:
+        note = text_tables.unread_units(lines, of_sides=has_unit)
+    elif has_unit or metric_sides:
+        _check_stated_sides(path, lines, sides)
     return HeightMap(
-        notes=(note,) if note else (),
+        notes=(note,),
         heights=heights,
         sides=None if unsized else sides,
         metres=has_unit or metric_sides is not None,
@@ -210,13 +193,12 @@ def heights_and_sides(path: Path, scan: Any, rows_along_y: bool) -> tuple[Any, t
 
 def _check_matrix(path: Path, file: BinaryIO, scan: Any, unsized: bool) -> None:
     """Raise InputError for a matrix that is not one of heights, or was not read to its end."""
-    columns_read, rows = scan.nb_grid_pts
-    if unsized and columns_read < MATRIX_COLUMNS:
+    if unsized and scan.nb_grid_pts[0] < MATRIX_COLUMNS:
         raise InputError(
             f"{path}: {NO_GRID}; a matrix of heights has at least {MATRIX_COLUMNS} columns, or "
             f"a header that states its sides. {REMEDY}"
         )
-    _check_all_rows_read(path, file, rows, columns_read)
+    _check_all_rows_read(path, file, *scan.nb_grid_pts)
     check_all_are_heights(path, scan.heights().T, unsized=unsized)
 
 
@@ -240,7 +222,8 @@ def _check_stated_sides(path: Path, lines: list[bytes], sides: tuple[float, ...]
 
     The reader takes every line with such a word as a side, for example "Max Height".
     """
-    stated = sides_in([line for line in lines if OF_SIDES.match(line.decode(errors="replace"))])
+    of_sides = [line for line in lines if OF_SIDES.match(line.decode(errors="replace"))]
+    stated = text_tables.sides_in(of_sides)
     if len(stated) == 2 and not np.allclose(sorted(stated), sorted(sides), rtol=1e-6):
         raise InputError(
             f"{path}: the header states two sides, {stated[0]:g} m and {stated[1]:g} m, but "
@@ -250,7 +233,7 @@ def _check_stated_sides(path: Path, lines: list[bytes], sides: tuple[float, ...]
 
 def _header(channel: Any) -> dict[str, Any]:
     """The keys and values of the header of a text table."""
-    header = channel.info.get("raw_metadata") if channel.info else None
+    header = (channel.info or {}).get("raw_metadata")
     return header if isinstance(header, dict) else {}
 
 
@@ -345,7 +328,7 @@ def _usual_deviation(values: Field) -> float:
     return float(np.median(np.abs(rest - np.median(rest))) / abs(step)) if step else np.inf
 
 
-def _check_all_rows_read(path: Path, file: BinaryIO, rows: int, columns: int) -> None:
+def _check_all_rows_read(path: Path, file: BinaryIO, columns: int, rows: int) -> None:
     """Raise InputError where a table has more rows than were read, or is two tables.
 
     The reader skips lines with words, also in the table, where they would shift all rows below.
@@ -361,8 +344,8 @@ def _check_all_rows_read(path: Path, file: BinaryIO, rows: int, columns: int) ->
             f"{path}:{number}: an empty line in the table: several maps? Save each in its own file"
         )
     is_one_map = lengths.count(columns) <= rows
-    file.seek(0)
     rows_above = 0
+    file.seek(0)
     for number, line in enumerate(file, 1):
         words = line.split()
         marks = [word for word in words if not is_height(word)]

@@ -39,7 +39,7 @@ def filled_lines(topography: Topography) -> tuple[str, Topography]:
     Lines of a surface that are even, such as those between mesas, have this height in common with
     the next lines.
     """
-    heights = _with_gaps(topography)
+    heights = topography.with_gaps()
     filled = np.zeros(heights.shape, bool)
     found = ""
     for lines, along, mask in ((heights, "x", filled), (heights.T, "y", filled.T)):
@@ -76,16 +76,9 @@ def filled_lines(topography: Topography) -> tuple[str, Topography]:
     return found, replace(topography, missing=missing)
 
 
-def _with_gaps(topography: Topography) -> Field:
-    """The heights, NaN where they are missing."""
-    if topography.missing is None:
-        return topography.heights
-    return np.where(topography.missing, np.nan, topography.heights)
-
-
 def misread(topography: Topography) -> str:
     """The first sign of a map that was read or saved wrongly."""
-    heights = _with_gaps(topography)
+    heights = topography.with_gaps()
     if heights.ndim == 1 or min(heights.shape) < MIN_POINTS:
         return ""
     found = _noise(heights) or _wrapped(heights)

@@ -23,6 +23,7 @@ from gfmd_cli.maps.text_tables import (
     is_height,
     is_number,
     is_unit,
+    part,
     sides_in,
     table_formats,
 )
@@ -46,13 +47,10 @@ def read_points(path: Path, file: BinaryIO) -> HeightMap | None:
     The columns are x, y and height, or x and height, unless the header names another order. Raises
     InputError for points that are not those of a full grid, and for units that are not clear.
     """
-    count = columns(file)
-    is_table = count in (2, 3) and "xyz" in table_formats(file)
-    file.seek(0)
-    content = file.read() if is_table else b""
-    file.seek(0)
+    content = part(file) if "xyz" in table_formats(file) else b""
     if not content or content.startswith(OWN_HEADERS):
         return None
+    count = columns(file)
     lines = content.replace(b",", b" ").replace(b";", b" ").splitlines()
     first = next((i for i, line in enumerate(lines) if _is_row(line.split(), count)), 0)
     is_sized = len(sides_in(lines[:first])) == 2
@@ -189,8 +187,8 @@ def _grid(path: Path, table: Field) -> tuple[Field, tuple[float, ...], str]:
     """Heights [y, x] and sides of the points of a full grid. Raises InputError for other points."""
     positions = table[:, :2]
     candidates = []
-    for part in SAME_POSITION:
-        indices: Any = np.column_stack([_index(axis, part) for axis in positions.T])
+    for same in SAME_POSITION:
+        indices: Any = np.column_stack([_index(axis, same) for axis in positions.T])
         nx, ny = (int(last) + 1 for last in indices.max(axis=0))
         is_distinct = len(np.unique(indices @ [1, nx])) == len(table)
         if min(nx, ny) > 1 and is_distinct and len(table) >= MIN_PRESENT * nx * ny:

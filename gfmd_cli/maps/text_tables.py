@@ -10,7 +10,7 @@ import os
 import re
 from collections.abc import Iterator
 from io import BytesIO
-from itertools import islice
+from itertools import islice, takewhile
 from typing import Any, BinaryIO
 
 import numpy as np
@@ -43,6 +43,7 @@ GROUPED = re.compile(rb"[\t;]([-+]?\d{1,3}( \d{3})+([,.]\d*)?)(?=[\t;\r]|$)")
 """A cell such as 1 023 between tabs or semicolons."""
 EMPTY = re.compile(rb"([,;])[ \t]*\1.*\d")
 """An empty cell between commas or semicolons, with a number in the same row after it."""
+OLD_LINE_END = re.compile(rb"\r(?!\n)")
 SEPARATORS = b"\t", b";", b","
 """Separators of cells; a comma beside one of the others is a decimal comma."""
 SIDE_LABELS = (
@@ -53,14 +54,15 @@ SIDE_LABELS = (
 OF_SIDES = re.compile(rf"^\W*({SIDE_LABELS})\b")
 
 
+def part(file: BinaryIO, position: int = 0, size: int = -1) -> bytes:
+    """What a file has from a position on, by default all of it."""
+    file.seek(position)
+    return file.read(size)
+
+
 def is_numeric(line: bytes) -> bool:
     """Whether a line has no words."""
     return not line.translate(None, NUMBER_CHARACTERS)
-
-
-def cells(line: bytes) -> list[bytes]:
-    """The parts of a line between blanks, commas and semicolons; [b""] of an empty line."""
-    return re.split(rb"[\s,;]+", line.strip(b" \t\r\n,;"))
 
 
 def table_formats(file: BinaryIO) -> set[str]:
@@ -69,13 +71,10 @@ def table_formats(file: BinaryIO) -> set[str]:
     "asc" is a matrix of heights between blanks; "xyz" are the positions and heights of a profile or
     of points on a grid, between blanks, commas or semicolons.
     """
-    formats = set()
-    if columns(file, b" \t") >= MATRIX_COLUMNS:
-        formats.add("asc")
-    positions = columns(file)
-    if positions == 2 or (positions == 3 and _is_grid(file)):
-        formats.add("xyz")
-    return formats
+    width = columns(file)
+    if width >= MATRIX_COLUMNS:
+        return {"asc"}
+    return {"xyz"} if width == 2 or (width == 3 and _is_grid(file)) else set()
 
 
 def is_number(word: bytes) -> bool:
@@ -99,24 +98,21 @@ def is_unit(word: str) -> bool:
 
 def sides_in(lines: list[bytes]) -> list[float]:
     """Lengths [m] that a header states; two of them are the sides of a matrix."""
-    sides = [
-        (side[1], in_metres(side[2].decode(errors="replace")))
-        for side in map(SIDE.match, lines)
-        if side
-    ]
+    found = filter(None, map(SIDE.match, lines))
+    sides = [(side[1], in_metres(side[2].decode(errors="replace"))) for side in found]
     return [float(value) * unit for value, unit in sides if is_number(value) and unit is not None]
 
 
 def header(file: BinaryIO, width: int) -> list[bytes]:
     """The lines above the first row of so many numbers, without empty ones."""
+
+    def is_above(line: bytes) -> bool:
+        cells = re.split(rb"[\s,;]+", line.strip(b" \t\r\n,;"))
+        return len(cells) < width or not _counts(line).any()
+
     file.seek(0)
-    lines = []
-    for line in islice(file, HEADER_LINES + 1):
-        if len(cells(line)) >= width and _counts(line):
-            break
-        lines += [line] if line.strip() else []
-    file.seek(0)
-    return lines
+    lines = takewhile(is_above, islice(file, HEADER_LINES + 1))
+    return [line for line in lines if line.strip()]
 
 
 def unread_units(lines: list[bytes], *, of_sides: bool) -> str:
@@ -143,7 +139,6 @@ def without_size(file: BinaryIO) -> BinaryIO:
         rows = sum(len(line.split()) == width for line in content.splitlines())
         if sorted(size) == sorted((rows, width)):
             return BytesIO(content)
-    file.seek(0)
     return file
 
 
@@ -152,8 +147,7 @@ def shorter_or_longer_row(file: BinaryIO) -> str:
 
     Only the first `SCANNED_BYTES` are looked at.
     """
-    file.seek(0)
-    lines = file.read(SCANNED_BYTES)
+    lines = part(file, 0, SCANNED_BYTES)
     counts = _counts(lines if len(lines) < SCANNED_BYTES else lines[: lines.rfind(b"\n")])
     rows = counts[counts > 0]
     width = int(np.bincount(rows[rows >= MATRIX_COLUMNS], minlength=1).argmax())
@@ -172,7 +166,7 @@ def with_blanks(file: BinaryIO) -> tuple[BinaryIO, str]:
     Returns the table, and a warning or "". Raises ValueError if the commas can separate thousands.
     """
     warning = ""
-    start = file.read(WINDOW_BYTES)
+    start = part(file, 0, WINDOW_BYTES)
     table = start[len(start) // 2 :]  # without most headers
     width = columns(file)
     whole = start.splitlines()[: -1 if len(start) == WINDOW_BYTES else None]
@@ -192,10 +186,8 @@ def with_blanks(file: BinaryIO) -> tuple[BinaryIO, str]:
         if is_decimal:
             warning = _warning_of_thousands(start, numbers)
         if is_decimal or numbers >= MATRIX_COLUMNS:
-            file.seek(0)
-            text = file.read().replace(b";", b" ")
+            text = part(file).replace(b";", b" ")
             file = BytesIO(text.replace(b",", b"." if is_decimal else b" "))
-    file.seek(0)
     return file, warning
 
 
@@ -244,17 +236,16 @@ def in_utf8(file: BinaryIO) -> BinaryIO:
 
     Raises ValueError where commas separate the numbers and are also parts of them, in quotes.
     """
-    start = file.read(WINDOW_BYTES)
-    file.seek(max(0, file.seek(0, os.SEEK_END) - WINDOW_BYTES))
-    is_plain = start.isascii() and b'"' not in start and file.read().isascii()
-    is_plain = is_plain and not (b"\r" in start and b"\n" not in start)
+    start = part(file, 0, WINDOW_BYTES)
+    end = part(file, max(0, file.seek(0, os.SEEK_END) - WINDOW_BYTES))
+    is_plain = start.isascii() and b'"' not in start and end.isascii()
+    is_plain = is_plain and not OLD_LINE_END.search(start)
     is_table = start.startswith(UTF_16)
     if not (is_plain or is_table or start.startswith(LATIN_1)):
         is_table = columns(file) > 0
-    file.seek(0)
     if not is_table:
         return file
-    content = file.read().removeprefix(codecs.BOM_UTF8)
+    content = part(file).removeprefix(codecs.BOM_UTF8)
     if start.startswith(UTF_16):
         content = content.decode("utf-16").encode()
     try:
@@ -266,9 +257,7 @@ def in_utf8(file: BinaryIO) -> BinaryIO:
             f"{commas[0].decode()} has a comma in quotes and one as separator; save the numbers "
             "with decimal points, or separate them by semicolons"
         )
-    if b"\n" not in content:
-        content = content.replace(b"\r", b"\n")
-    return BytesIO(content.replace(b'"', b""))
+    return BytesIO(OLD_LINE_END.sub(b"\n", content).replace(b'"', b""))
 
 
 def columns(file: BinaryIO, separators: bytes = b" \t,;") -> int:
@@ -300,8 +289,7 @@ def _windows(file: BinaryIO) -> Iterator[tuple[int, bytes]]:
     gap = max(0, size // MAX_WINDOWS - WINDOW_BYTES)
     position = 0
     while position < size:
-        file.seek(position)
-        window = file.read(WINDOW_BYTES)
+        window = part(file, position, WINDOW_BYTES)
         begin = len(re.split(rb"[\r\n]", window, maxsplit=1)[0]) + 1 if position and gap else 0
         end = max(window.rfind(b"\n"), window.rfind(b"\r")) + 1
         if end <= begin and position + len(window) < size:

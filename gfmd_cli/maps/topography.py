@@ -5,7 +5,7 @@ index [i, j] is [y, x].
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -21,7 +21,6 @@ from gfmd_cli.maps.height_map import (
     REMEDY,
     SMALLEST_MAP,
     HeightMap,
-    MapMetadata,
     extent,
     first_line,
     read_hdf5,
@@ -90,8 +89,8 @@ class Region(SpecTable):
         return tuple(parts)
 
 
-@dataclass(frozen=True)
-class Topography(MapMetadata):
+@dataclass(frozen=True, kw_only=True)
+class Topography(HeightMap):
     """A height map or a line profile, with every height checked."""
 
     heights: Field
@@ -111,6 +110,11 @@ class Topography(MapMetadata):
     def holes(self) -> int:
         """Number of missing heights."""
         return 0 if self.missing is None else int(np.count_nonzero(self.missing))
+
+    def with_gaps(self, part: Any = ...) -> Field:
+        """The heights of a part of the map, such as a slice of rows, NaN where they are missing."""
+        heights = self.heights[part]
+        return heights if self.missing is None else np.where(self.missing[part], np.nan, heights)
 
 
 def read_topography(
@@ -204,9 +208,9 @@ def _checked(
     heights.flags.writeable = False
     kind = data.heights.dtype if data.heights.dtype.kind == "f" else float
     precision = float(np.finfo(kind).eps)
-    metadata = {each.name: getattr(data, each.name) for each in fields(MapMetadata)}
-    mask = missing if missing.any() else None
-    return Topography(heights, mask, spacing, shape, precision, **metadata)
+    checked = {"heights": heights, "missing": missing if missing.any() else None}
+    measures = {"spacing": spacing, "shape": shape, "precision": precision}
+    return Topography(**vars(data) | checked | measures)
 
 
 def _check_is_matrix(path: Path, shape: tuple[int, ...]) -> None:

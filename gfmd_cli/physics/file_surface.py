@@ -109,9 +109,8 @@ class FileSurface(RigidSurface):
 
     def own_points(self) -> int:
         """Points of the map itself along x, or a multiple if one side has fewer than any grid."""
-        x, y = self.smallest_grid(), self.smallest_grid_y() if self.dimension == 2 else None
-        least = min(x, y or x) // self.copies
-        return -(-SMALLEST_GRID // least) * x // self.copies
+        least = min(_prepared(self).shape) // self.copies
+        return -(-SMALLEST_GRID // least) * self.smallest_grid() // self.copies
 
     def points_y(self, points: int) -> int:
         """Points along y where a spec gives none: in the ratio of those of the map."""
@@ -310,24 +309,17 @@ class FileSurface(RigidSurface):
 
     def _warnings_on_sides(self) -> list[str]:
         """Warnings about the sides, one of them at most for each."""
-        topography, stated = self._topography(), self.stated_sides()
+        topography, stated, warnings = self._topography(), self.stated_sides(), list[str]()
         if self.length_y is not None:
-            if stated is None:
-                warning = map_warnings.side_of_a_part("length_y", self.length_y, topography)
-            else:
-                along_x = self.length or stated[-1]
-                along_y = along_x * (stated[0] / stated[-1])
-                warning = map_warnings.other_side("length_y", self.length_y, along_y)
-            return [warning, *self.model_copy(update={"length_y": None})._warnings_on_sides()]
+            side = (self.length or stated[-1]) * (stated[0] / stated[-1]) if stated else None
+            warnings.append(map_warnings.given_side("length_y", self.length_y, side, topography))
         if self.length is not None:
-            if stated is not None and topography.metres:
-                return [map_warnings.other_side("length", self.length, stated[-1])]
-            return [map_warnings.side_of_a_part("length", self.length, topography)]
-        if stated is not None:
-            return [map_warnings.unknown_unit(topography, self.scale, stated[-1])]
-        return [
-            "the file does not state its side in metres; L = 1 m is assumed: set surface.length"
-        ]
+            side = stated[-1] if stated and topography.metres else None
+            warnings.append(map_warnings.given_side("length", self.length, side, topography))
+        else:
+            length = stated[-1] if stated else None
+            warnings.append(map_warnings.unknown_side(topography, self.scale, length))
+        return warnings
 
     def preparation(self, boundary: str = "") -> str:
         """Description of how the map was read and prepared for a boundary."""

@@ -122,14 +122,11 @@ class Check:
             entries = self.entries(name, data.get(name, {}), _keys_of(name, sweeps))
             choices = [choice for choice, _ in entries]
             tables[name] = choices if name in models.SWEPT else next(iter(choices), None)
-            if sweeps and name in models.SWEPT:
-                tables["places"][name] = [places for _, places in entries]
-        load = tables.get("load")
-        if sweeps and load is not None:
+            tables["places"][name] = [places for _, places in entries]
+        if load := tables.get("load"):
             groups = _keys_of("load", sweeps)
-            tables["places"]["load"] = [
-                _places_of({load.quantity: i}, groups) for i in range(len(load.listed()))
-            ]
+            places = [_places_of({load.quantity: i}, groups) for i in range(len(load.listed()))]
+            tables["places"]["load"] = places
         if "accuracy" not in data:
             tables["accuracy"] = None
         self._compare(tables)

@@ -1,6 +1,7 @@
 """The models of the run spec, and its sweeps: a list instead of a scalar makes a sweep."""
 
 from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from itertools import product
 from math import prod
 from typing import Annotated, Any, Literal, NamedTuple, Self, TypeVar, get_args
@@ -91,20 +92,13 @@ def with_boundary(
     A map that ends at its borders has a free boundary where elastomer and solver allow it, and is
     mirrored elsewhere. Every other surface is periodic.
     """
-    if grid.boundary is None:
-        free = surface.has_borders and _allows_free(surface.dimension, elastomer, solver)
-        grid = grid.model_copy(update={"boundary": "free" if free else "periodic"})
-    return surface.within(grid.boundary or "periodic"), grid
-
-
-def _allows_free(dimension: int, elastomer: LinearElastomer, solver: AnySolver) -> bool:
-    """Whether contacts of this elastomer and solver can have a free boundary."""
-    try:
-        solver.check_boundary("free")
-        elastomer.check_free_boundary(dimension)
-    except InputError:
-        return False
-    return True
+    boundary: str = grid.boundary or "periodic"
+    if grid.boundary is None and surface.has_borders:
+        with suppress(InputError):
+            solver.check_boundary("free")
+            elastomer.check_free_boundary(surface.dimension)
+            boundary = "free"
+    return surface.within(boundary), grid.model_copy(update={"boundary": boundary})
 
 
 class Ladder(SpecTable):
@@ -261,12 +255,8 @@ class AccuracyTable(SpecTable):
 
     def tolerances(self) -> dict[str, float]:
         """Requested relative errors, by the name of the column."""
-        tolerances = {
-            "u_g": self.mean_gap,
-            "a_r": self.contact_area,
-            "sigma_p": self.stress_deviation,
-        }
-        return {name: share for name, share in tolerances.items() if share is not None}
+        columns = {"mean_gap": "u_g", "contact_area": "a_r", "stress_deviation": "sigma_p"}
+        return {columns[key]: share for key, share in self if key in columns and share is not None}
 
 
 FieldName = Literal["u", "sigma", "height", "contact_pressure"]
@@ -352,32 +342,25 @@ class Spec(SpecTable):
     sweep: list[SweepTable] = Key(default_factory=list)
     source: str = ""
     """The file of the spec, for messages."""
-    places: dict[str, list[tuple[int | None, ...]]] = Key(default_factory=dict)
-    """Where each entry of a swept table stands in each group of paired lists; None where the
-    table has no list of the pair."""
+    places: dict[str, list[tuple[int | None, ...]]]
+    """Where each entry of a table, and each load, stands in each group of paired lists; None where
+    the table has no list of the pair."""
 
     def combinations(self) -> Iterator[tuple[dict[str, int], list[float]]]:
         """The entries of the swept tables that go together, by table, and their loads."""
         for entries in product(*(range(len(getattr(self, table))) for table in SWEPT)):
             at = dict(zip(SWEPT, entries, strict=True))
-            places = [self.places[table][i] for table, i in at.items() if self.places]
-            loads = [
-                load
-                for i, load in enumerate(self.load.listed())
-                if _fit([*places, *self.places.get("load", [])[i : i + 1]])
-            ]
+            places = [self.places[table][i] for table, i in at.items()]
+            pairs = zip(self.load.listed(), self.places["load"], strict=True)
+            loads = [load for load, place in pairs if _fit([*places, place])]
             if loads:
                 yield at, list(dict.fromkeys(loads))
 
     def resolved(self) -> dict[str, Any]:
         """What determines the results, as plain data: files stand for their content."""
-        data: dict[str, Any] = self.model_dump(
-            mode="json", exclude={"study", "load", "places", "source"}, by_alias=True
-        )
-        if not self.sweep:
-            del data["sweep"]
-        if self.accuracy is None:
-            del data["accuracy"]
+        left_out = {"study", "load", "places", "source"}
+        left_out |= {name for name in ("sweep", "accuracy") if not getattr(self, name)}
+        data: dict[str, Any] = self.model_dump(mode="json", exclude=left_out, by_alias=True)
         for name in set(ON_REQUEST) - set(self.output.on_request()):
             del data["output"][name]  # a new key must not change the identity of other tasks
         for table in ("surface", "elastomer"):

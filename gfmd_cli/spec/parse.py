@@ -123,17 +123,12 @@ def _syntax_error(text: str, name: str, message: str) -> str:
     return f"{name}:{number}: {shortened(line)}: TOML syntax: {next(remedies, reason)}"
 
 
-def _is_deep(data: Any) -> bool:
-    """Whether tables and lists lie more than MAX_DEPTH within each other."""
-    level = [data]
-    for _ in range(MAX_DEPTH):
-        level = [
-            inner
-            for outer in level
-            for inner in (outer.values() if isinstance(outer, dict) else outer)
-            if isinstance(inner, dict | list)
-        ]
-    return bool(level)
+def _is_deep(data: Any, depth: int = MAX_DEPTH) -> bool:
+    """Whether tables and lists lie more than `depth` within each other."""
+    if not isinstance(data, dict | list):
+        return False
+    inner = data.values() if isinstance(data, dict) else data
+    return depth == 0 or any(_is_deep(each, depth - 1) for each in inner)
 
 
 def split_override(override: str) -> tuple[list[str], Any]:

@@ -35,8 +35,7 @@ def spec_schema() -> dict[str, Any]:
         "additionalProperties": False,
         "$defs": shared,
     }
-    marked: dict[str, Any] = json.loads(json.dumps(schema), object_hook=_marking_keys)
-    return marked
+    return json.loads(json.dumps(schema), object_hook=_marking_keys)
 
 
 def _marking_keys(schema: dict[str, Any]) -> dict[str, Any]:
@@ -52,9 +51,8 @@ def _table(
     schema = model.model_json_schema()
     shared.update(schema.pop("$defs", {}))
     if swept:
-        for name, key in schema["properties"].items():
-            if name != "kind":
-                schema["properties"][name] = _one_or_many(key)
+        for name in schema["properties"].keys() - {"kind"}:
+            schema["properties"][name] = _one_or_many(schema["properties"][name])
     if needs_kind:
         schema["required"] = ["kind", *schema.get("required", [])]
     return schema
@@ -67,10 +65,11 @@ def _by_kind(forms: list[dict[str, Any]], default: str | None) -> dict[str, Any]
     stand beside the conditions, for editors that complete them.
     """
     kinds = [form["properties"]["kind"]["const"] for form in forms]
-    rules: list[dict[str, Any]] = [
-        {"if": _kind_is(kind, default), "then": form}
-        for kind, form in zip(kinds, forms, strict=True)
-    ]
+    rules: list[dict[str, Any]] = []
+    for kind, form in zip(kinds, forms, strict=True):
+        named = {"properties": {"kind": {"const": kind}}}  # also true without the key
+        is_kind = named if kind == default else named | {"required": ["kind"]}
+        rules.append({"if": is_kind, "then": form})
     of_list = {"properties": {"kind": {"type": "array"}}, "required": ["kind"]}
     rules.append({"if": of_list, "then": _several_kinds(forms) or False})
     several = {"items": {"enum": kinds}, "minItems": 1}
@@ -82,12 +81,6 @@ def _by_kind(forms: list[dict[str, Any]], default: str | None) -> dict[str, Any]
         "required": [] if default else ["kind"],
         "allOf": rules,
     }
-
-
-def _kind_is(kind: str, default: str | None) -> dict[str, Any]:
-    """The condition that a table is of a kind, by default without the key."""
-    named = {"properties": {"kind": {"const": kind}}}
-    return named if kind == default else named | {"required": ["kind"]}
 
 
 def _annotations(key: dict[str, Any]) -> dict[str, Any]:
