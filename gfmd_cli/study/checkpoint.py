@@ -22,7 +22,7 @@ from gfmd_cli.files.locks import locked
 from gfmd_cli.files.regular import open_regular
 from gfmd_cli.grid.arrays import Field, row_blocks
 from gfmd_cli.grid.fft_grid import Grid
-from gfmd_cli.grid.ranks import Ranks, broadcast, is_root, shared_errors
+from gfmd_cli.grid.ranks import Ranks, is_root, on_root, shared_errors
 from gfmd_cli.physics.contact import Contact
 from gfmd_cli.solvers.loop import Solver, State
 from gfmd_cli.solvers.nested_grids import Resume, grids_of
@@ -65,12 +65,9 @@ class Checkpoint:
         """
         if folder.is_symlink():
             raise StudyError(f"{folder}: a link in the place of a checkpoint; remove it")
-        checkpoint = cls(folder, ranks)
+        checkpoint, lock = cls(folder, ranks), locked(folder / "lock", wait=False)
         with ExitStack() as stack:
-            with shared_errors(ranks):
-                if is_root(ranks):
-                    checkpoint.mine = stack.enter_context(locked(folder / "lock", wait=False))
-            checkpoint.mine = broadcast(ranks, checkpoint.mine)
+            checkpoint.mine = on_root(ranks, lambda: stack.enter_context(lock))
             try:
                 yield checkpoint
             finally:
@@ -79,23 +76,22 @@ class Checkpoint:
 
     def restore(self) -> str | None:
         """Read the intact states; return a message on damaged ones, set aside if none is intact."""
-        note = None
-        with shared_errors(self.ranks):
-            if self.mine and is_root(self.ranks):
-                note = self._restore()
-        self.slots = broadcast(self.ranks, self.slots)
+        if not self.mine:
+            return None
+        self.slots, note = on_root(self.ranks, self._restore)
         return note
 
-    def _restore(self) -> str | None:
+    def _restore(self) -> tuple[list[Slot], str | None]:
         if not self.exists():
-            return None
+            return [], None
         slots = read_pointer(self.pointer)
-        self.slots = [slot for slot in slots if all(map(self._is_whole, slot.parts))]
-        if self.slots and self.slots[0] is slots[0]:
-            return None
-        if self.slots:
-            return f"{self.folder}: the newest state is damaged; the one before it is resumed"
-        return self.set_aside()
+        intact = [slot for slot in slots if all(map(self._is_whole, slot.parts))]
+        if not intact:
+            return [], self.set_aside()
+        if intact[0] is slots[0]:
+            return intact, None
+        note = f"{self.folder}: the newest state is damaged; the one before it is resumed"
+        return intact, note
 
     def exists(self) -> bool:
         """Whether a state is saved, whole or not."""
@@ -135,9 +131,7 @@ class Checkpoint:
             fields={name: field.dtype.str for name, field in fields.items()},
         )
         slots = [slot, *(old for old in self.slots[:1] if old.name != name)]
-        with shared_errors(self.ranks):
-            if is_root(self.ranks):
-                write_whole(self.pointer, sealed(pointer_text(slots)))
+        on_root(self.ranks, lambda: write_whole(self.pointer, sealed(pointer_text(slots))))
         self.slots = slots
 
     def _write_part(self, name: str, grid: Grid, fields: dict[str, Field]) -> Part:

@@ -1,7 +1,7 @@
 """One contact on one grid, or on finer and finer ones until its errors are as requested."""
 
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from threading import get_ident
 from typing import Any
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from gfmd_cli.errors import InputError
 from gfmd_cli.grid.arrays import Field
-from gfmd_cli.grid.ranks import Ranks, broadcast
+from gfmd_cli.grid.ranks import Ranks, on_root
 from gfmd_cli.physics import discretisation_error
 from gfmd_cli.physics.contact import Contact, Scene
 from gfmd_cli.physics.error_bounds import ErrorBounds, error_bounds, full_contact_errors
@@ -118,7 +118,8 @@ def solve_on_grids(task: Task, context: SolveContext, watcher: Watcher) -> TaskS
             solution = solved.solution
             solved.bounds = error_bounds(contact, solution.u, solution.sigma)
             solved.estimates = _estimates(task, solved, grids)
-        if not broadcast(context.ranks, _continues(task, solved, len(grids), context.options)):
+        continues = partial(_continues, task, solved, len(grids), context.options)
+        if not on_root(context.ranks, continues):
             break
         points = _next_points(task, points)
     watcher.notes.grids = []

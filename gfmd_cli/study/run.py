@@ -1,8 +1,7 @@
 """Run a spec: solve the tasks that have no result yet, on one or more processes."""
 
 from collections import Counter
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from threading import Event
@@ -11,7 +10,7 @@ from time import monotonic
 from gfmd_cli.errors import InputError, Interrupted, SpaceError
 from gfmd_cli.files.locks import waits_end_at
 from gfmd_cli.grid import plans
-from gfmd_cli.grid.ranks import Ranks, broadcast, is_root, shared_errors
+from gfmd_cli.grid.ranks import Ranks, is_root, on_root, shared_errors
 from gfmd_cli.physics.file_surface import forget_files
 from gfmd_cli.physics.indenters import forget_peaks
 from gfmd_cli.spec.models import Spec
@@ -90,14 +89,13 @@ def run_study(
     tasks = plan(spec)
     if ranks is not None and (names := spec.output.on_request()):
         raise InputError(f"output.{names[0]}: takes whole grids; run it without mpiexec")
-    moved = _move_aside(study, options) if options.overwrite else []
-    outcomes = broadcast(ranks, study.outcomes())
+    moved = on_root(ranks, lambda: _move_aside(study, options)) if options.overwrite else []
+    outcomes = on_root(ranks, study.outcomes)
     shard = options.shard_of(tasks)
     pending = without_result(shard, outcomes)
     to_solve = {task.id for task in pending}
     counts = Counter(outcomes[task.id].status for task in shard if task.id not in to_solve)
-    has_records = broadcast(ranks, bool(study.record_paths()))
-    if not pending and not has_records:
+    if not pending and not on_root(ranks, study.record_paths):
         if is_root(ranks) and study.parts.exists():  # of a run that was killed as it ended
             with study.work(tasks):
                 pass
@@ -118,8 +116,9 @@ def run_study(
     with (
         signal_handlers(stop),
         waits_end_at(stop if ranks is None else None),  # ranks stop together
-        _folder(study, tasks, ranks) as damaged,
+        ExitStack() as work,
     ):
+        damaged = on_root(ranks, lambda: work.enter_context(study.work(tasks)))
         unusable = plans.plan_with(study.parts, estimated=options.reproducible)
         forget_peaks()
         forget_spectra()
@@ -135,7 +134,7 @@ def run_study(
         again = "run again without --overwrite" if options.overwrite else "run again"
         _check_ended(solved, len(pending), stop, again)
         if not any(status.is_failure for status in solved):
-            _check_output(pending, broadcast(ranks, study.outcomes()))
+            _check_output(pending, on_root(ranks, study.outcomes))
     return counts + solved
 
 
@@ -181,24 +180,7 @@ def _move_aside(study: Study, options: RunOptions) -> list[str]:
     """Rename a study that is to be solved anew; say where it is. Raises InputError."""
     if options.shard[1] != 1:
         raise InputError("--overwrite: not with --shard; each shard would start a new study")
-    messages: list[str] = []
-    with shared_errors(options.ranks):
-        if is_root(options.ranks):
-            messages = [
-                f"{study.path}: the old one is kept as {path}" for path in study.move_aside()
-            ]
-    return messages
-
-
-@contextmanager
-def _folder(study: Study, tasks: list[Task], ranks: Ranks | None) -> Iterator[list[str]]:
-    """The folder of unfinished work; where processes share the tasks, the first one holds it."""
-    damaged: list[str] = []
-    with ExitStack() as stack:
-        with shared_errors(ranks):
-            if is_root(ranks):
-                damaged = stack.enter_context(study.work(tasks))
-        yield damaged
+    return [f"{study.path}: the old one is kept as {path}" for path in study.move_aside()]
 
 
 def _check_ended(solved: Counter[Status], pending: int, stop: Event, again: str) -> None:

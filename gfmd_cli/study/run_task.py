@@ -8,7 +8,7 @@ from gfmd_cli.errors import GfmdError, InputError, Interrupted, SpaceError, Stud
 from gfmd_cli.files.checksums import file_version
 from gfmd_cli.grid.blas import one_blas_thread
 from gfmd_cli.grid.fft_grid import Shape
-from gfmd_cli.grid.ranks import broadcast, is_root, shared_errors
+from gfmd_cli.grid.ranks import is_root, on_root, shared_errors
 from gfmd_cli.physics.contact import Contact
 from gfmd_cli.physics.observables import contact_points
 from gfmd_cli.solvers.loop import State
@@ -115,7 +115,7 @@ def attempt(task: Task, parts: Path, context: SolveContext) -> Status:
     """
     if context.should_stop():
         return Status.INTERRUPTED
-    if status := broadcast(context.ranks, _recorded_status(parts, task)):
+    if status := on_root(context.ranks, lambda: _recorded_status(parts, task)):
         return status
     try:
         with shared_errors(context.ranks):
