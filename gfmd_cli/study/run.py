@@ -8,7 +8,7 @@ from threading import Event
 from time import monotonic
 
 from gfmd_cli.errors import InputError, Interrupted, SpaceError
-from gfmd_cli.files.locks import waits_end_at
+from gfmd_cli.files.locks import Waits
 from gfmd_cli.grid import plans
 from gfmd_cli.grid.ranks import Ranks, is_root, on_root, shared_errors
 from gfmd_cli.physics.file_surface import forget_files
@@ -85,7 +85,9 @@ def run_study(
     ranks = options.ranks
     forget_files()
     forget_scene()
-    study = Study(path)
+    stop = Event()
+    waits = Waits(stop if ranks is None else None)  # ranks stop together
+    study = Study(path, waits)
     tasks = plan(spec)
     if ranks is not None and (names := spec.output.on_request()):
         raise InputError(f"output.{names[0]}: takes whole grids; run it without mpiexec")
@@ -105,7 +107,6 @@ def run_study(
     worker_options = WorkerOptions(
         threads, usable_memory(ranks) / jobs, options.reproducible, options.checkpoint_every
     )
-    stop = Event()
     if is_root(ranks):
         report = _noting_failures(report, tasks, study.parts)
     watch = RemainingTime(pending, jobs).with_time_left(report)
@@ -113,13 +114,9 @@ def run_study(
         seconds = max(options.max_seconds / 2, options.max_seconds - seconds_to_stop(pending, jobs))
         watch = _until(monotonic() + seconds, stop, watch)
     context = SolveContext(worker_options, watch, stop, ranks)
-    with (
-        signal_handlers(stop),
-        waits_end_at(stop if ranks is None else None),  # ranks stop together
-        ExitStack() as work,
-    ):
+    with signal_handlers(stop), ExitStack() as work:
         damaged = on_root(ranks, lambda: work.enter_context(study.work(tasks)))
-        unusable = plans.plan_with(study.parts, estimated=options.reproducible)
+        unusable = plans.plan_with(study.parts, estimated=options.reproducible, waits=waits)
         forget_peaks()
         forget_spectra()
         context.warn(*moved, *damaged, *filter(None, [unusable, _changing_unit(pending)]))

@@ -20,7 +20,7 @@ from typing import Any
 from gfmd_cli.errors import InputError, SpaceError, StudyError
 from gfmd_cli.files.atomic import check_place, new_file
 from gfmd_cli.files.hdf5 import new_hdf5
-from gfmd_cli.files.locks import locked
+from gfmd_cli.files.locks import AS_LONG_AS_NEEDED, Waits, locked
 from gfmd_cli.spec.models import Spec
 from gfmd_cli.status import Status
 from gfmd_cli.study import unfinished_work
@@ -43,7 +43,8 @@ class Study:
     Raises InputError for a link to itself and for a path without a name, such as "." or "/".
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, waits: Waits = AS_LONG_AS_NEEDED) -> None:
+        self._waits = waits
         self.path = Path(os.path.realpath(path)) if path.is_symlink() else path
         if self.path.is_symlink():
             raise InputError(f"{path}: a symbolic link that leads to itself")
@@ -69,7 +70,7 @@ class Study:
                 for path in self.parts.glob(".*"):
                     with suppress(OSError):
                         path.unlink()
-        with locked(in_use, shared=True):
+        with locked(in_use, shared=True, waits=self._waits):
             with self._collecting():
                 _, damaged = self._sound_records()
             yield damaged
@@ -191,7 +192,7 @@ class Study:
 
     def _collecting(self) -> Any:
         """Keep other collectors out."""
-        return locked(self.parts / "collecting")
+        return locked(self.parts / "collecting", waits=self._waits)
 
 
 def _renamed(path: Path, target: Path) -> Path:
