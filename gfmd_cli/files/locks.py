@@ -42,6 +42,18 @@ class Waits(NamedTuple):
 AS_LONG_AS_NEEDED = Waits()
 
 
+class _Owner(NamedTuple):
+    """The process that has a lock."""
+
+    host: str
+    pid: int
+    started: str = ""
+    """See `_start_time`."""
+
+    def __str__(self) -> str:
+        return f"process {self.pid} on {self.host}"
+
+
 @contextmanager
 def locked(
     path: Path, *, shared: bool = False, wait: bool = True, waits: Waits = AS_LONG_AS_NEEDED
@@ -89,7 +101,7 @@ class _Wait:
         self.path, self.stop, self.run = path, *waits
         self.since, self.is_announced = time.monotonic(), False
 
-    def pause(self, find_owner: Callable[[], dict[str, str | int] | None]) -> None:
+    def pause(self, find_owner: Callable[[], _Owner | None]) -> None:
         """Sleep until the next attempt; after a long wait, find out who has the lock.
 
         Raises Interrupted after a long wait only: a run that is stopped still solves the tasks that
@@ -98,10 +110,10 @@ class _Wait:
         waited = time.monotonic() - self.since
         if waited > LONG_SECONDS:
             owner = find_owner()
-            by = f"process {owner['pid']} on {owner['host']}" if owner else "another process"
+            by = str(owner or "another process")
             if self.stop is not None and self.stop.is_set():
                 raise Interrupted(f"stopped; {self.path} is in use by {by}; run again to continue")
-            is_foreign = self.run == 0 or owner is None or _parent(int(owner["pid"])) != self.run
+            is_foreign = self.run == 0 or owner is None or _parent(owner.pid) != self.run
             if is_foreign and not self.is_announced:
                 log.warning("gfmd: waiting for %r, in use by %s", str(self.path), ascii(by)[1:-1])
             self.is_announced = True
@@ -109,7 +121,7 @@ class _Wait:
         time.sleep(min(longest, max(shortest, waited / 10)))
 
 
-def _holder(descriptor: int) -> dict[str, str | int] | None:
+def _holder(descriptor: int) -> _Owner | None:
     """The process of this machine that has a lock of the kernel, None where it is not known."""
     with suppress(OSError, ValueError):
         status = os.fstat(descriptor)
@@ -118,7 +130,7 @@ def _holder(descriptor: int) -> dict[str, str | int] | None:
         for line in Path("/proc/locks").read_text(encoding="ascii").splitlines():
             words = line.split()
             if len(words) > 5 and words[1] == "FLOCK" and words[5] == file and int(words[4]) > 0:
-                return {"host": socket.gethostname(), "pid": int(words[4])}
+                return _Owner(socket.gethostname(), int(words[4]))
     return None
 
 
@@ -169,9 +181,8 @@ def _owned(path: Path, shared: bool, wait: bool, waits: Waits) -> Iterator[bool]
             raise SpaceError(f"{path}: not a lock file of gfmd; delete it")
         elif owner is not None and (shared or waited > OWNED_SECONDS):
             raise SpaceError(
-                f"{path}: in use by process {owner['pid']} on {owner['host']}; this file system "
-                "has no locks, so that one process at a time can work here (if that process is "
-                "dead, delete this file)"
+                f"{path}: in use by {owner}; this file system has no locks, so that one process "
+                "at a time can work here (if that process is dead, delete this file)"
             )
         else:
             waiting.pause(partial(_owner, path))
@@ -194,7 +205,7 @@ def _claim(path: Path) -> bool:
         raise SpaceError(f"{path}: cannot be written: {error.strerror}") from error
     with os.fdopen(descriptor, "w") as file:
         pid = os.getpid()
-        json.dump({"host": socket.gethostname(), "pid": pid, "started": _start_time(pid)}, file)
+        json.dump(_Owner(socket.gethostname(), pid, _start_time(pid))._asdict(), file)
     return True
 
 
@@ -219,22 +230,20 @@ def _numbers_of(pid: int) -> list[str]:
     return status.rpartition(")")[2].split()
 
 
-def _owner(path: Path) -> dict[str, str | int] | None:
+def _owner(path: Path) -> _Owner | None:
     """What a lock file says of its owner; None where it is gone or not written yet."""
     with suppress(OSError, ValueError, KeyError, TypeError):
         owner = json.loads(read_regular(path, MAX_BYTES))
-        return {"host": str(owner["host"]), "pid": int(owner["pid"]), "started": owner["started"]}
+        return _Owner(str(owner["host"]), int(owner["pid"]), owner["started"])
     return None
 
 
-def _is_dead(owner: dict[str, str | int]) -> bool:
+def _is_dead(owner: _Owner) -> bool:
     """Whether the owner is a process of this machine that has ended; False for other machines."""
-    if owner["host"] != socket.gethostname():
-        return False
-    return _start_time(int(owner["pid"])) != owner["started"]
+    return owner.host == socket.gethostname() and owner.started != _start_time(owner.pid)
 
 
-def _remove_stale(path: Path, owner: dict[str, str | int]) -> None:
+def _remove_stale(path: Path, owner: _Owner) -> None:
     """Remove the lock of a dead process, unless another one has just done so."""
     aside = path.with_name(temporary_name(path))
     with suppress(OSError):

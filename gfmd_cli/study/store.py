@@ -19,6 +19,7 @@ from typing import Any
 
 from gfmd_cli.errors import InputError, SpaceError, StudyError
 from gfmd_cli.files.atomic import check_place, new_file
+from gfmd_cli.files.checksums import Version, file_version
 from gfmd_cli.files.hdf5 import new_hdf5
 from gfmd_cli.files.locks import AS_LONG_AS_NEEDED, Waits, locked
 from gfmd_cli.spec.models import Spec
@@ -50,7 +51,7 @@ class Study:
             raise InputError(f"{path}: a symbolic link that leads to itself")
         if not self.path.name:
             raise InputError(f"{path}: a folder, where a study file (NAME.h5) is expected")
-        self._entries: dict[tuple[Path, tuple[int, ...]], Entry] = {}
+        self._entries: dict[tuple[Path, Version], Entry] = {}
         """The records read so far, by path and version."""
         is_usual = self.path.suffix == ".h5"
         self.parts = self.path.with_suffix(".parts" if is_usual else f"{self.path.suffix}.parts.d")
@@ -146,8 +147,10 @@ class Study:
         for path in self.record_paths():
             try:
                 entries[path] = self._entry(path)
+            except FileNotFoundError:  # it has just been collected
+                continue
             except StudyError as error:
-                if path.exists():  # else it has just been collected
+                if path.exists():  # likewise
                     damaged[path] = error
         return entries, damaged
 
@@ -163,9 +166,9 @@ class Study:
     def _entry(self, path: Path) -> Entry:
         """All of a record but its arrays; read once, as records are never changed but replaced.
 
-        Raises StudyError.
+        Raises StudyError, and FileNotFoundError where it is gone.
         """
-        version = path, unfinished_work.version_of(path)
+        version = path, file_version(path, follow=False)
         if version not in self._entries:
             self._entries[version] = unfinished_work.read_record_entry(path)
         return self._entries[version]

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from gfmd_cli.errors import InputError, SpaceError, StudyError
 from gfmd_cli.files.atomic import new_file, write_whole
-from gfmd_cli.files.checksums import Version, check_seal, digest, file_version, seal
+from gfmd_cli.files.checksums import check_seal, digest, seal
 from gfmd_cli.files.hdf5 import new_hdf5
 from gfmd_cli.files.regular import open_regular, read_regular
 from gfmd_cli.study.reading import StudyFile, open_study
@@ -159,14 +159,6 @@ def read_failure(parts: Path, task_id: str) -> str:
     except OSError:
         return ""
     return " ".join(content.decode(errors="replace").split())
-
-
-def version_of(path: Path) -> Version:
-    """The version of a record. Raises StudyError where it is gone."""
-    try:
-        return file_version(path, follow=False)
-    except OSError as error:
-        raise StudyError(f"{path}: damaged record: {error}") from error
 
 
 def set_aside(path: Path, bad: Path | None = None) -> Path:
