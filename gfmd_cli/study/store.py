@@ -82,19 +82,17 @@ class Study:
     def outcomes(self) -> dict[str, Outcome]:
         """What is stored of each task that is solved, collected or not, by its id."""
         records, _ = self.records()  # before the study, which may take them in meanwhile
-        outcomes = self.collected()
+        outcomes: dict[str, Outcome] = {}
+        if self.path.exists():
+            with open_study(self.path) as file:
+                tasks = zip(file.task_ids, file.statuses, file.stored, strict=True)
+                outcomes = {
+                    name: Outcome(status, out) for name, status, out in tasks if status.is_solved
+                }
         for entry in records.values():
             if entry.task_id not in outcomes or entry.stored >= outcomes[entry.task_id].stored:
                 outcomes[entry.task_id] = entry.outcome
         return outcomes
-
-    def collected(self) -> dict[str, Outcome]:
-        """What the study file holds of each task that is solved, by its id."""
-        if not self.path.exists():
-            return {}
-        with open_study(self.path) as file:
-            tasks = zip(file.task_ids, file.statuses, file.stored, strict=True)
-            return {n: Outcome(status, out) for n, status, out in tasks if status.is_solved}
 
     def collect(self, spec: Spec, tasks: list[Task], text: str) -> list[str]:
         """Write all records into the study file, then drop them; inside `work`.
@@ -180,10 +178,9 @@ class Study:
         with open_study(self.path) as file:
             if not all(status.is_solved for status in file.statuses):
                 return False
-        lacking = {task.id for task in without_result(tasks, self.collected())}
+        lacking = {task.id for task in without_result(tasks, self.outcomes())}
         solved = {task.id for task in tasks} - lacking
-        folders = unfinished_work.checkpoint_folders(self.parts)
-        return all(folder.name in solved for folder in folders)
+        return set(unfinished_work.checkpoint_ids(self.parts)) <= solved
 
     def damaged_paths(self) -> list[Path]:
         """The damaged files that were set aside."""

@@ -94,9 +94,11 @@ def record_path(parts: Path, task_id: str, stored: Iterable[str]) -> Path:
     return parts / f"{task_id}-{digest(sorted(stored))[:8]}{SUFFIX}"
 
 
-def checkpoint_folders(parts: Path) -> list[Path]:
-    """The checkpoints in the folder, by the ids of their tasks."""
-    return [path for path in parts.glob("*") if OWN_FOLDERS.fullmatch(path.name) and path.is_dir()]
+def checkpoint_ids(parts: Path) -> list[str]:
+    """The ids of the tasks that have a checkpoint in the folder."""
+    return [
+        path.name for path in _listed(parts) if path.is_dir() and OWN_FOLDERS.fullmatch(path.name)
+    ]
 
 
 def write_record(parts: Path, result: TaskResult) -> Path:
