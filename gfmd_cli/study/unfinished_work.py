@@ -131,8 +131,7 @@ def read_record_entry(path: Path) -> Entry:
         status = record.statuses[0]
         if not status.is_solved:
             raise ValueError(f"status {status}")
-        record.check(0)
-        return record.entry(0)
+        return record.result(0, in_memory=False).entry
 
 
 def read_record(path: Path) -> TaskResult:
