@@ -140,11 +140,17 @@ class Study:
         return new_paths
 
     def records(self) -> tuple[dict[Path, Entry], dict[Path, StudyError]]:
-        """The records that are not collected yet, and what is wrong with the damaged ones."""
+        """The records that are not collected yet, and what is wrong with the damaged ones.
+
+        Each is read once: records are never changed, but replaced.
+        """
         entries, damaged = {}, {}
         for path in self.record_paths():
             try:
-                entries[path] = self._entry(path)
+                version = path, file_version(path, follow=False)
+                if version not in self._entries:
+                    self._entries[version] = unfinished_work.read_record_entry(path)
+                entries[path] = self._entries[version]
             except FileNotFoundError:  # it has just been collected
                 continue
             except StudyError as error:
@@ -160,16 +166,6 @@ class Study:
             f"{error}; set aside as {bad[path]}, its task is solved again"
             for path, error in damaged.items()
         ]
-
-    def _entry(self, path: Path) -> Entry:
-        """All of a record but its arrays; read once, as records are never changed but replaced.
-
-        Raises StudyError, and FileNotFoundError where it is gone.
-        """
-        version = path, file_version(path, follow=False)
-        if version not in self._entries:
-            self._entries[version] = unfinished_work.read_record_entry(path)
-        return self._entries[version]
 
     def _is_complete(self, tasks: list[Task]) -> bool:
         """Whether no task is missing, and no record or unfinished checkpoint is left."""
