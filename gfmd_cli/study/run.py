@@ -116,6 +116,7 @@ def run_study(
     context = SolveContext(worker_options, watch, stop, ranks)
     with signal_handlers(stop), ExitStack() as work:
         damaged = on_root(ranks, lambda: work.enter_context(study.work(tasks)))
+        work.callback(plans.plan_with, None)
         unusable = plans.plan_with(study.parts, estimated=options.reproducible, waits=waits)
         forget_peaks()
         forget_spectra()
@@ -127,7 +128,6 @@ def run_study(
                 # a stopped shard ends soon: its records stand, others collect them
                 if is_root(ranks) and (options.shard[1] == 1 or not stop.is_set()):
                     context.warn(*study.collect(spec, tasks, text))
-            plans.plan_with(None)
         again = "run again without --overwrite" if options.overwrite else "run again"
         _check_ended(solved, len(pending), stop, again)
         if not any(status.is_failure for status in solved):

@@ -2,6 +2,7 @@
 
 import time
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 
 from gfmd_cli.errors import GfmdError, InputError, Interrupted, SpaceError, StudyError
@@ -35,6 +36,7 @@ class TaskWatcher(Watcher):
     def __init__(self, task: Task, checkpoint: Checkpoint, context: SolveContext) -> None:
         super().__init__()
         self.task, self.checkpoint, self.context = task, checkpoint, context
+        self._warn = partial(context.warn, task=task.index, label=task.label)
         self.begun = self.last_save = time.monotonic()
         self.last_report = 0.0
         self.first: tuple[Shape, int] | None = None
@@ -103,9 +105,6 @@ class TaskWatcher(Watcher):
             f"{self.task.label}: stopped after its first step, which took {seconds}; a shorter "
             "call makes no progress"
         )
-
-    def _warn(self, message: str) -> None:
-        self.context.warn(message, task=self.task.index, label=self.task.label)
 
 
 def attempt(task: Task, parts: Path, context: SolveContext) -> Status:
