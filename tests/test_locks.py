@@ -16,7 +16,7 @@ import pytest
 
 from gfmd_cli.errors import Interrupted, SpaceError
 from gfmd_cli.files import locks
-from gfmd_cli.files.locks import locked, waits_end_at
+from gfmd_cli.files.locks import Waits, locked
 from gfmd_cli.grid import plans
 from gfmd_cli.study.reading import read_rows
 
@@ -99,9 +99,8 @@ def test_a_long_wait_is_announced_once_with_its_owner_and_ends_with_the_run(
     owner = f"process {process.pid} on {socket.gethostname()}"
     Timer(0.5, stop.set).start()
     with (
-        waits_end_at(stop),
         pytest.raises(Interrupted, match=f"in use by {owner}; run again"),
-        locked(lock),
+        locked(lock, waits=Waits(stop)),
     ):
         pass
     (message,) = caplog.messages
@@ -114,7 +113,7 @@ def test_a_wait_for_another_worker_of_the_run_is_not_announced(lock, holder, mon
     holder("kernel", "exclusive")
     stop = Event()
     Timer(0.3, stop.set).start()
-    with waits_end_at(stop, os.getpid()), pytest.raises(Interrupted), locked(lock):
+    with pytest.raises(Interrupted), locked(lock, waits=Waits(stop, run=os.getpid())):
         pass
     assert not caplog.messages
 

@@ -64,9 +64,7 @@ class Reporter:
             return
         bar = self.bars.get(progress.task)
         if bar is None:
-            positions = {0, *(-bar.pos for bar in self.bars.values())}
-            place = min(set(range(len(positions) + 1)) - positions)
-            bar = tqdm(desc=printable(progress.label), position=place, leave=False, bar_format=TASK)
+            bar = tqdm(desc=printable(progress.label), leave=False, bar_format=TASK)
             self.bars[progress.task] = bar
         if progress.event == "step":
             bar.n = progress.step

@@ -185,8 +185,7 @@ def _print_tasks(spec: "Spec", path: Path, options: "RunOptions") -> None:
     tasks = options.shard_of(plan(spec))
     outcomes = {} if options.overwrite else Study(path).outcomes()
     missing = without_result(tasks, outcomes)
-    if tasks:
-        check_memory(tasks, options.ranks)
+    check_memory(tasks, options.ranks)
     if not is_root(options.ranks):
         return
     if tasks:

@@ -52,14 +52,14 @@ def status(
     if is_study(path):
         if output is not None or overrides:
             raise InputError(f"-o and --set need a spec; {path} is a study")
-        progress, spec = progress_of_study(path), "SPEC"
+        progress, spec, output = progress_of_study(path), "SPEC", path
     else:
         resolved, _ = read_spec(path, overrides)
         progress = progress_of_spec(resolved, study_path(resolved, output))
         spec = typed(path)
     if shards is not None:
         check_shards(shards, len(progress.tasks))
-    next_command = _next_command(progress, spec, output if spec != "SPEC" else path, overrides)
+    next_command = _next_command(progress, spec, output, overrides)
     if as_json:
         click.echo(json.dumps(_as_data(progress, shards, next_command), indent=1))
     else:

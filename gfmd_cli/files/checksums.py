@@ -22,14 +22,18 @@ MIN_BLOCK = 4096  # bytes that a file takes at least; small ones may be stored i
 def seal(file: NewFile) -> None:
     """End a new file with the checksum of its content."""
     file.seek(0)
-    content_sum = _sum(file, os.fstat(file.fileno()).st_size)
+    mark = _mark(crc32(file, os.fstat(file.fileno()).st_size))
     file.seek(0, os.SEEK_END)
-    file.write(SEAL + content_sum)
+    file.write(mark)
 
 
 def sealed(content: bytes) -> bytes:
     """Content with its checksum."""
-    return content + SEAL + zlib.crc32(content).to_bytes(4, "little")
+    return content + _mark(zlib.crc32(content))
+
+
+def _mark(crc: int) -> bytes:
+    return SEAL + crc.to_bytes(4, "little")
 
 
 def check_seal(file: BinaryIO) -> int:
@@ -43,8 +47,8 @@ def check_seal(file: BinaryIO) -> int:
     if size < 0:
         raise ValueError("cut short")
     check_stored(status)
-    content_sum = _sum(file, size)
-    if file.read(len(SEAL) + 5) != SEAL + content_sum:
+    crc = crc32(file, size)
+    if file.read(len(SEAL) + 5) != _mark(crc):
         raise ValueError("its checksum is wrong")
     file.seek(0)
     return size
@@ -56,13 +60,13 @@ def check_stored(status: os.stat_result) -> None:
         raise ValueError("a sparse file")
 
 
-def _sum(file: BinaryIO | NewFile, size: int) -> bytes:
+def crc32(file: BinaryIO | NewFile, size: int) -> int:
     """The crc32 of the next `size` bytes."""
     total = 0
     while size > 0 and (chunk := file.read(min(size, CHUNK))):
         total = zlib.crc32(chunk, total)
         size -= len(chunk)
-    return total.to_bytes(4, "little")
+    return total
 
 
 def file_version(path: Path, *, follow: bool = True) -> Version:

@@ -12,7 +12,7 @@ from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
 from threading import Event
-from typing import BinaryIO
+from typing import BinaryIO, NamedTuple
 
 from gfmd_cli.errors import Interrupted, SpaceError
 from gfmd_cli.files.atomic import temporary_name
@@ -28,32 +28,41 @@ UNREADABLE_SECONDS = 2.0  # that a plain lock may be without the name of its own
 OWNED_SECONDS = 600.0  # to wait for the owner of a plain lock, who may be dead on another machine
 
 log = logging.getLogger(__name__)
-_stop: Event | None = None
-_run = 0
+
+
+class Waits(NamedTuple):
+    """How a process waits for locks."""
+
+    stop: Event | None = None
+    """Once set, a process that has waited long raises Interrupted."""
+    run: int = 0
+    """The process of the run of a worker: no wait for another worker is announced."""
+
+
+AS_LONG_AS_NEEDED = Waits()
+
+
+class _Owner(NamedTuple):
+    """The process that has a lock."""
+
+    host: str
+    pid: int
+    started: str = ""
+    """See `_start_time`."""
+
+    def __str__(self) -> str:
+        return f"process {self.pid} on {self.host}"
 
 
 @contextmanager
-def waits_end_at(stop: Event | None, run: int = 0) -> Iterator[None]:
-    """Inside, a process that has waited long for a lock raises Interrupted once `stop` is set.
-
-    A worker gives the number of the process of its `run`: no wait for another worker is announced.
-    """
-    global _stop, _run
-    before = _stop, _run
-    _stop, _run = stop, run
-    try:
-        yield
-    finally:
-        _stop, _run = before
-
-
-@contextmanager
-def locked(path: Path, *, shared: bool = False, wait: bool = True) -> Iterator[bool]:
+def locked(
+    path: Path, *, shared: bool = False, wait: bool = True, waits: Waits = AS_LONG_AS_NEEDED
+) -> Iterator[bool]:
     """Hold a lock file inside the block; the kernel releases that of a process that dies.
 
     The holder may delete the file: a process that waited for it then locks a new one. Yields
     whether the lock was obtained, always true if `wait` is. Raises SpaceError where the file cannot
-    be written, and Interrupted (see `waits_end_at`). A long wait is announced once.
+    be written, and Interrupted (see `Waits`). A long wait is announced once.
 
     On a file system without locks, the lock is a file beside it with the name of its owner, which
     others respect. It cannot be shared: a second process is refused with a SpaceError, and so is
@@ -61,7 +70,7 @@ def locked(path: Path, *, shared: bool = False, wait: bool = True) -> Iterator[b
     that remove it at the same moment may both go on.
     """
     operation = (fcntl.LOCK_SH if shared else fcntl.LOCK_EX) | fcntl.LOCK_NB
-    waiting = _Wait(path)
+    waiting = _Wait(path, waits)
     while True:
         with _opened(path) as file:
             try:
@@ -80,7 +89,7 @@ def locked(path: Path, *, shared: bool = False, wait: bool = True) -> Iterator[b
                     yield True
                     return
                 continue
-        with _owned(path.with_name(f"{path.name}.owner"), shared, wait) as acquired:
+        with _owned(path.with_name(f"{path.name}.owner"), shared, wait, waits) as acquired:
             yield acquired
         return
 
@@ -88,10 +97,11 @@ def locked(path: Path, *, shared: bool = False, wait: bool = True) -> Iterator[b
 class _Wait:
     """A wait for a lock, from now on."""
 
-    def __init__(self, path: Path) -> None:
-        self.path, self.since, self.is_announced = path, time.monotonic(), False
+    def __init__(self, path: Path, waits: Waits) -> None:
+        self.path, self.stop, self.run = path, *waits
+        self.since, self.is_announced = time.monotonic(), False
 
-    def pause(self, find_owner: Callable[[], dict[str, str | int] | None]) -> None:
+    def pause(self, find_owner: Callable[[], _Owner | None]) -> None:
         """Sleep until the next attempt; after a long wait, find out who has the lock.
 
         Raises Interrupted after a long wait only: a run that is stopped still solves the tasks that
@@ -100,10 +110,10 @@ class _Wait:
         waited = time.monotonic() - self.since
         if waited > LONG_SECONDS:
             owner = find_owner()
-            by = f"process {owner['pid']} on {owner['host']}" if owner else "another process"
-            if _stop is not None and _stop.is_set():
+            by = str(owner or "another process")
+            if self.stop is not None and self.stop.is_set():
                 raise Interrupted(f"stopped; {self.path} is in use by {by}; run again to continue")
-            is_foreign = owner is None or _run == 0 or _parent(int(owner["pid"])) != _run
+            is_foreign = self.run == 0 or owner is None or _parent(owner.pid) != self.run
             if is_foreign and not self.is_announced:
                 log.warning("gfmd: waiting for %r, in use by %s", str(self.path), ascii(by)[1:-1])
             self.is_announced = True
@@ -111,7 +121,7 @@ class _Wait:
         time.sleep(min(longest, max(shortest, waited / 10)))
 
 
-def _holder(descriptor: int) -> dict[str, str | int] | None:
+def _holder(descriptor: int) -> _Owner | None:
     """The process of this machine that has a lock of the kernel, None where it is not known."""
     with suppress(OSError, ValueError):
         status = os.fstat(descriptor)
@@ -120,7 +130,7 @@ def _holder(descriptor: int) -> dict[str, str | int] | None:
         for line in Path("/proc/locks").read_text(encoding="ascii").splitlines():
             words = line.split()
             if len(words) > 5 and words[1] == "FLOCK" and words[5] == file and int(words[4]) > 0:
-                return {"host": socket.gethostname(), "pid": int(words[4])}
+                return _Owner(socket.gethostname(), int(words[4]))
     return None
 
 
@@ -149,14 +159,14 @@ def _is_at(descriptor: int, path: Path) -> bool:
 
 
 @contextmanager
-def _owned(path: Path, shared: bool, wait: bool) -> Iterator[bool]:
+def _owned(path: Path, shared: bool, wait: bool, waits: Waits) -> Iterator[bool]:
     """A lock by a plain file.
 
     Raises SpaceError for a shared one that another process has, for one that another process has
     for too long, and for a file that is no lock.
     """
     known, since = None, time.monotonic()
-    waiting = _Wait(path)
+    waiting = _Wait(path, waits)
     while not _claim(path):
         owner, now = _owner(path), time.monotonic()
         if owner != known:  # another process, or one that writes its name just now
@@ -171,9 +181,8 @@ def _owned(path: Path, shared: bool, wait: bool) -> Iterator[bool]:
             raise SpaceError(f"{path}: not a lock file of gfmd; delete it")
         elif owner is not None and (shared or waited > OWNED_SECONDS):
             raise SpaceError(
-                f"{path}: in use by process {owner['pid']} on {owner['host']}; this file system "
-                "has no locks, so that one process at a time can work here (if that process is "
-                "dead, delete this file)"
+                f"{path}: in use by {owner}; this file system has no locks, so that one process "
+                "at a time can work here (if that process is dead, delete this file)"
             )
         else:
             waiting.pause(partial(_owner, path))
@@ -196,7 +205,7 @@ def _claim(path: Path) -> bool:
         raise SpaceError(f"{path}: cannot be written: {error.strerror}") from error
     with os.fdopen(descriptor, "w") as file:
         pid = os.getpid()
-        json.dump({"host": socket.gethostname(), "pid": pid, "started": _start_time(pid)}, file)
+        json.dump(_Owner(socket.gethostname(), pid, _start_time(pid))._asdict(), file)
     return True
 
 
@@ -221,22 +230,20 @@ def _numbers_of(pid: int) -> list[str]:
     return status.rpartition(")")[2].split()
 
 
-def _owner(path: Path) -> dict[str, str | int] | None:
+def _owner(path: Path) -> _Owner | None:
     """What a lock file says of its owner; None where it is gone or not written yet."""
     with suppress(OSError, ValueError, KeyError, TypeError):
         owner = json.loads(read_regular(path, MAX_BYTES))
-        return {"host": str(owner["host"]), "pid": int(owner["pid"]), "started": owner["started"]}
+        return _Owner(str(owner["host"]), int(owner["pid"]), owner["started"])
     return None
 
 
-def _is_dead(owner: dict[str, str | int]) -> bool:
+def _is_dead(owner: _Owner) -> bool:
     """Whether the owner is a process of this machine that has ended; False for other machines."""
-    if owner["host"] != socket.gethostname():
-        return False
-    return _start_time(int(owner["pid"])) != owner["started"]
+    return owner.host == socket.gethostname() and owner.started != _start_time(owner.pid)
 
 
-def _remove_stale(path: Path, owner: dict[str, str | int]) -> None:
+def _remove_stale(path: Path, owner: _Owner) -> None:
     """Remove the lock of a dead process, unless another one has just done so."""
     aside = path.with_name(temporary_name(path))
     with suppress(OSError):

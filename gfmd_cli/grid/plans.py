@@ -24,7 +24,7 @@ import pyfftw
 from gfmd_cli.errors import SpaceError
 from gfmd_cli.files.atomic import write_whole
 from gfmd_cli.files.cache import cache_folder
-from gfmd_cli.files.locks import locked
+from gfmd_cli.files.locks import AS_LONG_AS_NEEDED, Waits, locked
 from gfmd_cli.files.regular import read_regular
 
 T = TypeVar("T")
@@ -64,19 +64,22 @@ def _here() -> dict[str, str]:
 
 _without_lock: set[Path] = set()  # folders that this process could not lock
 _folder: Path | None = None  # where wisdom is kept; None for the cache
+_waits = AS_LONG_AS_NEEDED  # for other processes that measure
 _planner = Lock()  # all threads share FFTW's wisdom, which FFTW does not protect
 _always_estimated = os.environ.get("GFMD_PLANS") == "estimated"
 _estimated = _always_estimated
 
 
-def plan_with(folder: Path | None, *, estimated: bool = False) -> str | None:
+def plan_with(
+    folder: Path | None, *, estimated: bool = False, waits: Waits = AS_LONG_AS_NEEDED
+) -> str | None:
     """From now on store wisdom in `folder`, which starts with that of the cache, or only estimate.
 
     The process forgets its own wisdom. Returns a warning if the folder's wisdom is damaged.
     """
-    global _folder, _estimated
+    global _folder, _estimated, _waits
     with _planner:
-        _folder, _estimated = folder, estimated or _always_estimated
+        _folder, _estimated, _waits = folder, estimated or _always_estimated, waits
         pyfftw.forget_wisdom()
         _without_lock.clear()
     if folder is None or _estimated:
@@ -184,7 +187,7 @@ def _planning_lock(folder: Path) -> Iterator[None]:
     with ExitStack() as stack:
         if folder not in _without_lock:
             try:
-                stack.enter_context(locked(folder / "planning"))
+                stack.enter_context(locked(folder / "planning", waits=_waits))
             except SpaceError:  # it may have taken minutes: not again
                 _without_lock.add(folder)
         yield

@@ -6,7 +6,7 @@ mpi4py is imported only if the environment variables of a launcher announce more
 import logging
 import os
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, TypeVar
 
@@ -111,9 +111,14 @@ def shared_errors(ranks: Ranks | None) -> Iterator[None]:
     ranks.raise_on_all(failed)
 
 
-def broadcast(ranks: Ranks | None, value: T) -> T:
-    """The value of the first rank, or the value itself without ranks."""
-    return value if ranks is None else ranks.comm.bcast(value)
+def on_root(ranks: Ranks | None, make: Callable[[], T]) -> T:
+    """What `make` returns on the first or only rank, on all ranks; all raise an error of it."""
+    if ranks is None:
+        return make()
+    with shared_errors(ranks):
+        value = make() if is_root(ranks) else None
+    shared: T = ranks.comm.bcast(value)
+    return shared
 
 
 def is_root(ranks: Ranks | None) -> bool:

@@ -1,11 +1,10 @@
 """The state of an unfinished solve on disk: two slots and a pointer that names the newer one first.
 
-A slot holds the fields as they lie in memory (mapped, space reserved first). The pointer holds the
-checksums of both and all scalars, is sealed itself, and is replaced as a whole once a slot is on
-the disk. So whatever happens while one slot is written, the other still stands.
+A slot holds the fields as they lie in memory. The pointer holds the checksums of both and all
+scalars, is sealed itself, and is replaced as a whole once a slot is on the disk. So whatever
+happens while one slot is written, the other still stands.
 """
 
-import mmap
 import os
 import zlib
 from collections.abc import Iterator, Mapping
@@ -18,20 +17,18 @@ import numpy as np
 
 from gfmd_cli.errors import SpaceError, StudyError
 from gfmd_cli.files.atomic import write_whole
-from gfmd_cli.files.checksums import check_stored, sealed
+from gfmd_cli.files.checksums import check_stored, crc32, sealed
 from gfmd_cli.files.locks import locked
 from gfmd_cli.files.regular import open_regular
 from gfmd_cli.grid.arrays import Field, row_blocks
 from gfmd_cli.grid.fft_grid import Grid
-from gfmd_cli.grid.ranks import Ranks, broadcast, is_root, shared_errors
+from gfmd_cli.grid.ranks import Ranks, is_root, on_root, shared_errors
 from gfmd_cli.physics.contact import Contact
 from gfmd_cli.solvers.loop import Solver, State
 from gfmd_cli.solvers.nested_grids import Resume, grids_of
 from gfmd_cli.study.notes import Notes
 from gfmd_cli.study.pointer import Part, Scalars, Slot, pointer_text, read_pointer
 from gfmd_cli.study.unfinished_work import delete_checkpoint, set_aside
-
-CHUNK = 2**26  # bytes that a checkpoint maps at a time
 
 
 class SavedProgress(NamedTuple):
@@ -68,12 +65,9 @@ class Checkpoint:
         """
         if folder.is_symlink():
             raise StudyError(f"{folder}: a link in the place of a checkpoint; remove it")
-        checkpoint = cls(folder, ranks)
+        checkpoint, lock = cls(folder, ranks), locked(folder / "lock", wait=False)
         with ExitStack() as stack:
-            with shared_errors(ranks):
-                if is_root(ranks):
-                    checkpoint.mine = stack.enter_context(locked(folder / "lock", wait=False))
-            checkpoint.mine = broadcast(ranks, checkpoint.mine)
+            checkpoint.mine = on_root(ranks, lambda: stack.enter_context(lock))
             try:
                 yield checkpoint
             finally:
@@ -82,23 +76,22 @@ class Checkpoint:
 
     def restore(self) -> str | None:
         """Read the intact states; return a message on damaged ones, set aside if none is intact."""
-        note = None
-        with shared_errors(self.ranks):
-            if self.mine and is_root(self.ranks):
-                note = self._restore()
-        self.slots = broadcast(self.ranks, self.slots)
+        if not self.mine:
+            return None
+        self.slots, note = on_root(self.ranks, self._restore)
         return note
 
-    def _restore(self) -> str | None:
+    def _restore(self) -> tuple[list[Slot], str | None]:
         if not self.exists():
-            return None
+            return [], None
         slots = read_pointer(self.pointer)
-        self.slots = [slot for slot in slots if all(map(self._is_whole, slot.parts))]
-        if self.slots and self.slots[0] is slots[0]:
-            return None
-        if self.slots:
-            return f"{self.folder}: the newest state is damaged; the one before it is resumed"
-        return self.set_aside()
+        intact = [slot for slot in slots if all(map(self._is_whole, slot.parts))]
+        if not intact:
+            return [], self.set_aside()
+        if intact[0] is slots[0]:
+            return intact, None
+        note = f"{self.folder}: the newest state is damaged; the one before it is resumed"
+        return intact, note
 
     def exists(self) -> bool:
         """Whether a state is saved, whole or not."""
@@ -138,9 +131,7 @@ class Checkpoint:
             fields={name: field.dtype.str for name, field in fields.items()},
         )
         slots = [slot, *(old for old in self.slots[:1] if old.name != name)]
-        with shared_errors(self.ranks):
-            if is_root(self.ranks):
-                write_whole(self.pointer, sealed(pointer_text(slots)))
+        on_root(self.ranks, lambda: write_whole(self.pointer, sealed(pointer_text(slots))))
         self.slots = slots
 
     def _write_part(self, name: str, grid: Grid, fields: dict[str, Field]) -> Part:
@@ -188,38 +179,24 @@ class Checkpoint:
 
     def _is_whole(self, part: Part) -> bool:
         """Whether a file of a slot is as it was written."""
-        total = 0
-        try:
-            with open_regular(self.folder / part.file) as file:
-                status = os.fstat(file.fileno())
-                if status.st_size != part.bytes:
-                    return False
-                check_stored(status)
-                while chunk := file.read(CHUNK):
-                    total = zlib.crc32(chunk, total)
-        except (OSError, ValueError):
-            return False
-        return bool(total == part.crc)
+        with suppress(OSError, ValueError), open_regular(self.folder / part.file) as file:
+            status = os.fstat(file.fileno())
+            check_stored(status)
+            return status.st_size == part.bytes and crc32(file, part.bytes) == part.crc
+        return False
 
 
 def _write_slot(path: Path, fields: list[Field]) -> int:
-    """Write the fields one after the other into a mapped file; return its checksum."""
-    total = offset = 0
-    with open_regular(path, os.O_RDWR | os.O_CREAT) as file:
-        file.truncate(sum(field.nbytes for field in fields))
-        os.posix_fallocate(file.fileno(), 0, sum(field.nbytes for field in fields))
-        with mmap.mmap(file.fileno(), 0) as memory:
-            for field in fields:
-                content = np.ascontiguousarray(field).data.cast("B")
-                for start in range(0, field.nbytes, CHUNK):
-                    chunk = content[start : start + CHUNK]
-                    memory[offset : offset + len(chunk)] = chunk
-                    offset += len(chunk)
-                    total = zlib.crc32(chunk, total)
-                    memory.madvise(mmap.MADV_DONTNEED)  # the chunk is in the file
-            memory.flush()
+    """Write the fields one after the other into a file; return its checksum."""
+    crc = 0
+    with open_regular(path, os.O_WRONLY | os.O_CREAT) as file:
+        for field in fields:
+            content = np.ascontiguousarray(field).data.cast("B")
+            file.write(content)
+            crc = zlib.crc32(content, crc)
+        file.truncate()
         os.fsync(file.fileno())
-    return total
+    return crc
 
 
 def _is_finite(field: Field) -> bool:

@@ -1,6 +1,6 @@
 """Warnings about results that are probably not what the user means."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from math import inf, isfinite
 from typing import Any
 
@@ -37,58 +37,55 @@ def loaded_value(quantity: str, results: Mapping[str, Any]) -> float:
     return continuum if isfinite(continuum) else float(results[name])
 
 
-def warnings_of(task: Task, solved: TaskSolution, results: Mapping[str, Any]) -> list[str]:
+def warnings_of(task: Task, solved: TaskSolution, results: Mapping[str, Any]) -> Iterator[str]:
     """Reasons to doubt the result of one contact, a sentence each; mostly none."""
     elastomer, scene = task.elastomer, solved.scene
-    warnings = task.surface.warnings(task.boundary)
+    yield from task.surface.warnings(task.boundary)
     if elastomer.modulus > PASCALS and scene.h_std > LARGEST_RMS_HEIGHT:
-        warnings.append(
+        yield (
             f"a modulus of {elastomer.modulus:.3g} Pa and an rms height of {scene.h_std:.3g} m: "
             "are heights and lengths in metres? Set surface.h_std, surface.length or surface.scale"
         )
     elif elastomer.modulus > PASCALS and task.surface.rough and _has_default_side(task.surface):
-        warnings.append("surface.length is not given: a side of 1 m is assumed")
+        yield "surface.length is not given: a side of 1 m is assumed"
     if elastomer.modulus > STIFFEST and scene.h_std <= LARGEST_RMS_HEIGHT:
-        warnings.append(
+        yield (
             f"elastomer.E_star = {elastomer.modulus:.3g} Pa is more than ten times the modulus of "
             "diamond, 1.2e12 Pa: is it in Pa?"
         )
     gradient = moments(scene.shells).gradient
     if {"h_std", "length"} <= task.surface.model_fields_set and gradient > MAX_GRADIENT:
-        warnings.append(
+        yield (
             f"rms gradient {gradient:.3g}: check that surface.h_std and surface.length are in the "
             "same unit"
         )
     if task.solver.tolerance > LOOSE:
-        warnings.append(
+        yield (
             f"solver.tolerance = {task.solver.tolerance:g}: contact area and mean gap may be wrong "
             f"by several percent; at most {LOOSE:g} is usual"
         )
-    warnings += elastomer.warnings(scene, task.boundary, is_rough=task.surface.rough)
-    warnings += _load_in_jump(task, solved.solution.status, results)
-    warnings += _contact_at_border(task, solved)
+    yield from elastomer.warnings(scene, task.boundary, is_rough=task.surface.rough)
+    yield from _load_in_jump(task, solved.solution.status, results)
+    yield from _contact_at_border(task, solved)
     if max(results.get("edge_contact", 0.0), results.get("edge_load", 0.0)) > MAX_EDGE_SHARE:
-        warnings.append(
+        yield (
             f"more than {MAX_EDGE_SHARE:.0%} of the contact or of the load is at the edges, where "
             "the window has changed the heights (see the columns edge_contact and edge_load); "
             "leave out surface.edges to keep them"
         )
     if scene.may_touch is not None and solved.observables.u_g < 0:
-        warnings.append(
+        yield (
             "the mean gap is negative: where heights are missing, the elastomer enters the holes "
             "deeper than the interpolated heights, from which the gap is counted"
         )
-    warnings += _missed_accuracy(task, solved)
-    units = _doubtful_unit(task, solved)
-    if units:
-        return [*warnings, units]  # few points in contact follow from it
-    points = round(solved.observables.a_r * scene.grid.size)
-    if points < FEW_POINTS:
-        warnings.append(
+    yield from _missed_accuracy(task, solved)
+    if units := _doubtful_unit(task, solved):
+        yield units
+    elif round(solved.observables.a_r * scene.grid.size) < FEW_POINTS:  # not due to the unit
+        yield (
             f"fewer than {FEW_POINTS} grid points in contact: contact area and stress depend on "
             "the grid; use more points"
         )
-    return warnings
 
 
 def _has_default_side(surface: RigidSurface) -> bool:
@@ -96,46 +93,41 @@ def _has_default_side(surface: RigidSurface) -> bool:
     return not surface.is_map and "length" not in surface.model_fields_set
 
 
-def _load_in_jump(task: Task, status: Status, results: Mapping[str, Any]) -> list[str]:
+def _load_in_jump(task: Task, status: Status, results: Mapping[str, Any]) -> Iterator[str]:
     """A warning if a contact area is farther than the tolerance from the load."""
-    if task.quantity != "contact_area" or status == Status.LOAD_NOT_REACHED:
-        return []
-    value = loaded_value(task.quantity, results)
-    if abs(value - task.load) <= task.load_tolerance * task.load:
-        return []
-    return [f"load.contact_area = {task.load:g} lies in a jump; the nearest value is {value:g}"]
+    if task.quantity == "contact_area" and status != Status.LOAD_NOT_REACHED:
+        value = loaded_value(task.quantity, results)
+        if not abs(value - task.load) <= task.load_tolerance * task.load:
+            nearest = f"the nearest value is {value:g}"
+            yield f"load.contact_area = {task.load:g} lies in a jump; {nearest}"
 
 
-def _missed_accuracy(task: Task, solved: TaskSolution) -> list[str]:
+def _missed_accuracy(task: Task, solved: TaskSolution) -> Iterator[str]:
     """A warning if a fixed grid misses the requested accuracy; with "auto" that is a status."""
-    columns = [] if task.auto else inaccurate_columns(task, solved)
-    if not columns:
-        return []
-    remedy = "more points" if LOADS[task.quantity].searched else 'grid.points = "auto"'
-    return [
-        f"the errors of {', '.join(columns)} are larger than [accuracy] requests, or unknown: "
-        f"use {remedy}"
-    ]
+    if not task.auto and (columns := inaccurate_columns(task, solved)):
+        remedy = "more points" if LOADS[task.quantity].searched else 'grid.points = "auto"'
+        yield (
+            f"the errors of {', '.join(columns)} are larger than [accuracy] requests, or unknown: "
+            f"use {remedy}"
+        )
 
 
-def _contact_at_border(task: Task, solved: TaskSolution) -> list[str]:
+def _contact_at_border(task: Task, solved: TaskSolution) -> Iterator[str]:
     """A warning if the contact of a single indenter reaches the border of its cell.
 
     Lines are left out: a wave or ridge is periodic by nature.
     """
-    if task.surface.rough or task.surface.dimension == 1:
-        return []
-    if not border_share(solved.contact, solved.solution):
-        return []
-    beyond = (
-        "where it meets that of the next periodic copy of the indenter"
-        if task.boundary == "periodic"
-        else "which acts as the edge of a punch"
-    )
-    return [
-        f"the contact reaches the border of the cell, {beyond}: enlarge surface.length for a "
-        "single indenter"
-    ]
+    is_single = not task.surface.rough and task.surface.dimension == 2
+    if is_single and border_share(solved.contact, solved.solution):
+        beyond = (
+            "where it meets that of the next periodic copy of the indenter"
+            if task.boundary == "periodic"
+            else "which acts as the edge of a punch"
+        )
+        yield (
+            f"the contact reaches the border of the cell, {beyond}: enlarge surface.length for a "
+            "single indenter"
+        )
 
 
 def _doubtful_unit(task: Task, solved: TaskSolution) -> str:

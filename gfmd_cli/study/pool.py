@@ -86,7 +86,7 @@ class Pool:
     ) -> None:
         self.waiting = deque(sorted(tasks, key=lambda task: -task.seconds))
         """The longest first, so that none is left over at the end."""
-        self.report, self.stop = context.report, context.stop
+        self.context, self.report, self.stop = context, context.report, context.stop
         self.jobs, self.start = jobs, start
         self.workers: dict[Connection, Worker] = {}
         self.counts: Counter[Status] = Counter()
@@ -196,14 +196,13 @@ class Pool:
         self.jobs = len(self.workers)
         if not self.workers:
             left = count(len(self.waiting), "task")
-            message = f"{reason}; {left} left to the process of the run itself"
-            self.report(Progress(-1, "warning", "", message=message))
+            self.context.warn(f"{reason}; {left} left to the process of the run itself")
 
     def _end(self, task: Task, status: Status | None, reason: str) -> None:
         """Report why a task has ended, or, without a status, why it will start again."""
         if status is None or not status.is_failure:
             message = f"task {task.index} ({task.label}): {reason}"
-            self.report(Progress(task.index, "warning", task.label, message=message))
+            self.context.warn(message, task=task.index, label=task.label)
         if status is not None:
             self.report(Progress(task.index, "end", task.label, status=status, message=reason))
 

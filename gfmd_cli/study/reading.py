@@ -196,20 +196,13 @@ class StudyFile:
         """All that is stored of one task but its arrays."""
         return Entry(self.task_ids[task], self.scene_ids[task], self.stored[task], self.rows[task])
 
-    def result(self, task: int) -> TaskResult:
-        """All that is stored of one task."""
+    def result(self, task: int, *, in_memory: bool = True) -> TaskResult:
+        """All that is stored of one task; its arrays, which are checked, perhaps not read yet."""
         scene = self.rows[task]["scene"]
-        arrays = {group.name: self.arrays(group.name, task) for group in layout.TASK_GROUPS}
+        read = self.arrays if in_memory else self._datasets
+        arrays = {group.name: read(group.name, task) for group in layout.TASK_GROUPS}
         of_scene = self.pictures(scene), self.map_spectrum(scene)
         return TaskResult(self.entry(task), self.shells(scene), arrays, *of_scene)
-
-    def check(self, task: int) -> None:
-        """Raise where `result` would, for all but the values of the arrays."""
-        self.shells(self.rows[task]["scene"])
-        self.pictures(self.rows[task]["scene"])
-        self.map_spectrum(self.rows[task]["scene"])
-        for group in layout.TASK_GROUPS:
-            self._datasets(group.name, task)
 
     def _datasets(self, group: str, task: int) -> dict[str, Any]:
         """The arrays of a task by name, not read yet: numbers, all of the same shape."""

@@ -1,7 +1,7 @@
 """One contact on one grid, or on finer and finer ones until its errors are as requested."""
 
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from threading import get_ident
 from typing import Any
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from gfmd_cli.errors import InputError
 from gfmd_cli.grid.arrays import Field
-from gfmd_cli.grid.ranks import Ranks, broadcast
+from gfmd_cli.grid.ranks import on_root
 from gfmd_cli.physics import discretisation_error
 from gfmd_cli.physics.contact import Contact, Scene
 from gfmd_cli.physics.error_bounds import ErrorBounds, error_bounds, full_contact_errors
@@ -65,28 +65,19 @@ class TaskSolution:
 
 
 @lru_cache(maxsize=1)
-def _scene(
-    surface: Any,
-    elastomer: Any,
-    boundary: str,
-    points: int,
-    points_y: int,
-    threads: int,
-    ranks: Ranks | None,
-    thread: int,
-) -> Scene:
-    """The scene of a task; consecutive tasks mostly share it.
+def _scene(thread: int, boundary: str, *description: Any, points_y: int) -> Scene:
+    """See `SCENES`; consecutive tasks mostly share their scene.
 
     It is kept for one thread only: the transforms of a scene work in one memory.
     """
-    return SCENES[boundary](surface, elastomer, points, threads, ranks, points_y=points_y)
+    return SCENES[boundary](*description, points_y=points_y)
 
 
 def task_scene(task: Task, points: int, context: SolveContext) -> Scene:
     """The scene of a task on a grid of `points` points along x."""
-    grid = task.boundary, points, task.points_y_on(points)
-    shared = context.options.threads, context.ranks
-    return _scene(task.surface, task.elastomer, *grid, *shared, get_ident())
+    description = task.surface, task.elastomer, points, context.options.threads, context.ranks
+    points_y = task.points_y_on(points)
+    return _scene(get_ident(), task.boundary, *description, points_y=points_y)
 
 
 def forget_scene() -> None:
@@ -101,10 +92,10 @@ def solve_on_grids(task: Task, context: SolveContext, watcher: Watcher) -> TaskS
     the watcher raises.
     """
     _check_unit(task)
-    grids = watcher.notes.grids = _ended_grids(task, watcher.notes.grids)
-    points = _next_points(task, grids[-1].points) if grids else _first_points(task)
+    sizes = _sizes(task)
+    grids = watcher.notes.grids = _ended_grids(sizes, watcher.notes.grids)
     solved: TaskSolution | None = None
-    while True:
+    for points in sizes[len(grids) :]:
         scene = task_scene(task, points, context)
         contact = scene.contact(task.p_star(scene.delta_sigma))
         start: Resume | Start | None = watcher.saved_state(contact)
@@ -118,9 +109,10 @@ def solve_on_grids(task: Task, context: SolveContext, watcher: Watcher) -> TaskS
             solution = solved.solution
             solved.bounds = error_bounds(contact, solution.u, solution.sigma)
             solved.estimates = _estimates(task, solved, grids)
-        if not broadcast(context.ranks, _continues(task, solved, len(grids), context.options)):
+        continues = partial(_continues, task, solved, len(grids), context.options)
+        if points == sizes[-1] or not on_root(context.ranks, continues):
             break
-        points = _next_points(task, points)
+    assert solved is not None
     watcher.notes.grids = []
     solution = solved.solution
     solution.transforms = sum(grid.work for grid in grids) / scene.grid.size
@@ -153,49 +145,40 @@ def _check_unit(task: Task) -> None:
         )
 
 
-def _ended_grids(task: Task, grids: list[SolvedGrid]) -> list[SolvedGrid]:
-    """The grids of the notes; none where they are not the first grids of this task."""
-    finest = task.accuracy.max_points if task.auto and task.accuracy else task.points
-    points = _first_points(task)
-    for grid in grids:
-        if grid.points != points or points >= finest:
-            return []
-        points = _next_points(task, points)
-    return grids
-
-
-def _first_points(task: Task) -> int:
-    """Points along x of the coarsest grid that is solved to the end."""
-    if task.auto:
-        return task.least_points
+def _sizes(task: Task) -> list[int]:
+    """Points along x of the grids that may be solved to the end, from coarse to fine."""
+    if task.auto and task.accuracy is not None:
+        sizes = [task.least_points]
+        while 2 * sizes[-1] <= task.accuracy.max_points:
+            sizes.append(2 * sizes[-1])
+        return sizes
     half = task.points // 2
     fits = task.accuracy is not None and half % 2 == 0 and half >= FIRST and task.resolves(half)
-    return half if fits else task.points
+    return [half, task.points] if fits else [task.points]
 
 
-def _next_points(task: Task, points: int) -> int:
-    return 2 * points if task.auto else task.points
+def _ended_grids(sizes: list[int], grids: list[SolvedGrid]) -> list[SolvedGrid]:
+    """The grids of the notes; none where they are not those before the last of these sizes."""
+    return grids if [grid.points for grid in grids] == sizes[:-1][: len(grids)] else []
 
 
 def _continues(task: Task, solved: TaskSolution, grids: int, options: WorkerOptions) -> bool:
-    """Whether a finer grid follows the `grids` before it.
+    """Whether a finer grid follows the `grids` before it, where there is one.
 
     Raises InputError where a reproducible run lacks memory.
     """
+    if not task.auto:
+        return True
     points = solved.contact.grid.points
-    if not task.auto or task.accuracy is None:
-        return points != task.points
-    finer = _next_points(task, points)
     inaccurate = [solved.estimates[name] for name in inaccurate_columns(task, solved)]
     improvable = any(_is_improvable(each, grids) for each in inaccurate)
-    should_refine = improvable and finer <= task.accuracy.max_points
-    fits = task.bytes_on(finer) <= options.memory
-    if should_refine and not fits and options.reproducible:
+    fits = task.bytes_on(2 * points) <= options.memory
+    if improvable and not fits and options.reproducible:
         raise InputError(
-            f"accuracy: needs {finer} points along x, more than memory holds now; with "
+            f"accuracy: needs {2 * points} points along x, more than memory holds now; with "
             f"--reproducible give accuracy.max_points = {points}"
         )
-    return should_refine and fits and solved.solution.status.is_converged
+    return improvable and fits and solved.solution.status.is_converged
 
 
 def _is_improvable(estimate: Estimate, grids: int) -> bool:

@@ -24,25 +24,31 @@ SECONDS_TO_END = 2.0  # for worker processes and small files
 
 def available_cores() -> int:
     """Cores that this process may use: Slurm's grant, else the affinity mask."""
-    slurm_cpus = os.environ.get("SLURM_CPUS_PER_TASK", "")
-    if slurm_cpus.isdecimal() and int(slurm_cpus) > 0:
-        return int(slurm_cpus)
-    return len(os.sched_getaffinity(0))
+    return _granted("SLURM_CPUS_PER_TASK") or len(os.sched_getaffinity(0))
+
+
+def _granted(name: str) -> int:
+    """What Slurm grants by a variable of the environment; 0 where it does not say."""
+    text = os.environ.get(name, "")
+    return int(text) if text.isdecimal() else 0
 
 
 def available_memory() -> float:
     """Bytes that this process may take: the least of kernel, `ulimit -v`, cgroups and Slurm."""
     cgroups = _cgroup_limits(Path("/proc/self/cgroup"), Path("/sys/fs/cgroup"))
     limits = [available_addresses(), *cgroups]
-    with suppress(OSError, ValueError, IndexError):
-        _, _, rest = Path("/proc/meminfo").read_text(encoding="ascii").partition("MemAvailable:")
-        limits.append(1024.0 * int(rest.split()[0]))
-    grants = (("SLURM_MEM_PER_NODE", 1), ("SLURM_MEM_PER_CPU", available_cores()))
-    for name, count in grants:
-        megabytes = os.environ.get(name, "")
-        if megabytes.isdecimal() and int(megabytes) > 0:
-            limits.append(2.0**20 * int(megabytes) * count)
+    if (free := _kernel_number("/proc/meminfo", "MemAvailable:")) is not None:
+        limits.append(1024.0 * free)
+    per_core = available_cores() * _granted("SLURM_MEM_PER_CPU")
+    limits += [2.0**20 * size for size in (_granted("SLURM_MEM_PER_NODE"), per_core) if size]
     return min(limits)
+
+
+def _kernel_number(file: str, name: str) -> int | None:
+    """A number that the kernel gives in a file, after its name; None if it does not tell."""
+    with suppress(OSError, ValueError, IndexError):
+        return int(Path(file).read_text(encoding="ascii").partition(name)[2].split()[0])
+    return None
 
 
 def available_addresses() -> float:
@@ -147,10 +153,7 @@ def seconds_to_stop(tasks: list[Task], jobs: int) -> float:
 
 def out_of_memory_kills() -> int | None:
     """Number of processes that the kernel has killed to free memory; None if it does not tell."""
-    with suppress(OSError, ValueError, IndexError):
-        _, _, rest = Path("/proc/vmstat").read_text(encoding="ascii").partition("\noom_kill ")
-        return int(rest.split()[0])
-    return None
+    return _kernel_number("/proc/vmstat", "\noom_kill ")
 
 
 def gib(count: float) -> str:

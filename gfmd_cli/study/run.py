@@ -1,17 +1,16 @@
 """Run a spec: solve the tasks that have no result yet, on one or more processes."""
 
 from collections import Counter
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from threading import Event
 from time import monotonic
 
 from gfmd_cli.errors import InputError, Interrupted, SpaceError
-from gfmd_cli.files.locks import waits_end_at
+from gfmd_cli.files.locks import Waits
 from gfmd_cli.grid import plans
-from gfmd_cli.grid.ranks import Ranks, broadcast, is_root, shared_errors
+from gfmd_cli.grid.ranks import Ranks, is_root, on_root, shared_errors
 from gfmd_cli.physics.file_surface import forget_files
 from gfmd_cli.physics.indenters import forget_peaks
 from gfmd_cli.spec.models import Spec
@@ -86,18 +85,19 @@ def run_study(
     ranks = options.ranks
     forget_files()
     forget_scene()
-    study = Study(path)
+    stop = Event()
+    waits = Waits(stop if ranks is None else None)  # ranks stop together
+    study = Study(path, waits)
     tasks = plan(spec)
     if ranks is not None and (names := spec.output.on_request()):
         raise InputError(f"output.{names[0]}: takes whole grids; run it without mpiexec")
-    moved = _move_aside(study, options) if options.overwrite else []
-    outcomes = broadcast(ranks, study.outcomes())
+    moved = on_root(ranks, lambda: _move_aside(study, options)) if options.overwrite else []
+    outcomes = on_root(ranks, study.outcomes)
     shard = options.shard_of(tasks)
     pending = without_result(shard, outcomes)
     to_solve = {task.id for task in pending}
     counts = Counter(outcomes[task.id].status for task in shard if task.id not in to_solve)
-    has_records = broadcast(ranks, bool(study.record_paths()))
-    if not pending and not has_records:
+    if not pending and not on_root(ranks, study.record_paths):
         if is_root(ranks) and study.parts.exists():  # of a run that was killed as it ended
             with study.work(tasks):
                 pass
@@ -107,7 +107,6 @@ def run_study(
     worker_options = WorkerOptions(
         threads, usable_memory(ranks) / jobs, options.reproducible, options.checkpoint_every
     )
-    stop = Event()
     if is_root(ranks):
         report = _noting_failures(report, tasks, study.parts)
     watch = RemainingTime(pending, jobs).with_time_left(report)
@@ -115,12 +114,10 @@ def run_study(
         seconds = max(options.max_seconds / 2, options.max_seconds - seconds_to_stop(pending, jobs))
         watch = _until(monotonic() + seconds, stop, watch)
     context = SolveContext(worker_options, watch, stop, ranks)
-    with (
-        signal_handlers(stop),
-        waits_end_at(stop if ranks is None else None),  # ranks stop together
-        _folder(study, tasks, ranks) as damaged,
-    ):
-        unusable = plans.plan_with(study.parts, estimated=options.reproducible)
+    with signal_handlers(stop), ExitStack() as work:
+        damaged = on_root(ranks, lambda: work.enter_context(study.work(tasks)))
+        work.callback(plans.plan_with, None)
+        unusable = plans.plan_with(study.parts, estimated=options.reproducible, waits=waits)
         forget_peaks()
         forget_spectra()
         context.warn(*moved, *damaged, *filter(None, [unusable, _changing_unit(pending)]))
@@ -131,11 +128,10 @@ def run_study(
                 # a stopped shard ends soon: its records stand, others collect them
                 if is_root(ranks) and (options.shard[1] == 1 or not stop.is_set()):
                     context.warn(*study.collect(spec, tasks, text))
-            plans.plan_with(None)
         again = "run again without --overwrite" if options.overwrite else "run again"
         _check_ended(solved, len(pending), stop, again)
         if not any(status.is_failure for status in solved):
-            _check_output(pending, broadcast(ranks, study.outcomes()))
+            _check_output(pending, on_root(ranks, study.outcomes))
     return counts + solved
 
 
@@ -181,24 +177,7 @@ def _move_aside(study: Study, options: RunOptions) -> list[str]:
     """Rename a study that is to be solved anew; say where it is. Raises InputError."""
     if options.shard[1] != 1:
         raise InputError("--overwrite: not with --shard; each shard would start a new study")
-    messages: list[str] = []
-    with shared_errors(options.ranks):
-        if is_root(options.ranks):
-            messages = [
-                f"{study.path}: the old one is kept as {path}" for path in study.move_aside()
-            ]
-    return messages
-
-
-@contextmanager
-def _folder(study: Study, tasks: list[Task], ranks: Ranks | None) -> Iterator[list[str]]:
-    """The folder of unfinished work; where processes share the tasks, the first one holds it."""
-    damaged: list[str] = []
-    with ExitStack() as stack:
-        with shared_errors(ranks):
-            if is_root(ranks):
-                damaged = stack.enter_context(study.work(tasks))
-        yield damaged
+    return [f"{study.path}: the old one is kept as {path}" for path in study.move_aside()]
 
 
 def _check_ended(solved: Counter[Status], pending: int, stop: Event, again: str) -> None:

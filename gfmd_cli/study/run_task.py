@@ -2,13 +2,14 @@
 
 import time
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 
 from gfmd_cli.errors import GfmdError, InputError, Interrupted, SpaceError, StudyError
 from gfmd_cli.files.checksums import file_version
 from gfmd_cli.grid.blas import one_blas_thread
 from gfmd_cli.grid.fft_grid import Shape
-from gfmd_cli.grid.ranks import broadcast, is_root, shared_errors
+from gfmd_cli.grid.ranks import is_root, on_root, shared_errors
 from gfmd_cli.physics.contact import Contact
 from gfmd_cli.physics.observables import contact_points
 from gfmd_cli.solvers.loop import State
@@ -35,6 +36,7 @@ class TaskWatcher(Watcher):
     def __init__(self, task: Task, checkpoint: Checkpoint, context: SolveContext) -> None:
         super().__init__()
         self.task, self.checkpoint, self.context = task, checkpoint, context
+        self._warn = partial(context.warn, task=task.index, label=task.label)
         self.begun = self.last_save = time.monotonic()
         self.last_report = 0.0
         self.first: tuple[Shape, int] | None = None
@@ -104,9 +106,6 @@ class TaskWatcher(Watcher):
             "call makes no progress"
         )
 
-    def _warn(self, message: str) -> None:
-        self.context.warn(message, task=self.task.index, label=self.task.label)
-
 
 def attempt(task: Task, parts: Path, context: SolveContext) -> Status:
     """Solve one task unless it has a record; an error ends this task only.
@@ -115,7 +114,7 @@ def attempt(task: Task, parts: Path, context: SolveContext) -> Status:
     """
     if context.should_stop():
         return Status.INTERRUPTED
-    if status := broadcast(context.ranks, _recorded_status(parts, task)):
+    if status := on_root(context.ranks, lambda: _recorded_status(parts, task)):
         return status
     try:
         with shared_errors(context.ranks):

@@ -19,8 +19,9 @@ from typing import Any
 
 from gfmd_cli.errors import InputError, SpaceError, StudyError
 from gfmd_cli.files.atomic import check_place, new_file
+from gfmd_cli.files.checksums import Version, file_version
 from gfmd_cli.files.hdf5 import new_hdf5
-from gfmd_cli.files.locks import locked
+from gfmd_cli.files.locks import AS_LONG_AS_NEEDED, Waits, locked
 from gfmd_cli.spec.models import Spec
 from gfmd_cli.status import Status
 from gfmd_cli.study import unfinished_work
@@ -43,13 +44,14 @@ class Study:
     Raises InputError for a link to itself and for a path without a name, such as "." or "/".
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, waits: Waits = AS_LONG_AS_NEEDED) -> None:
+        self._waits = waits
         self.path = Path(os.path.realpath(path)) if path.is_symlink() else path
         if self.path.is_symlink():
             raise InputError(f"{path}: a symbolic link that leads to itself")
         if not self.path.name:
             raise InputError(f"{path}: a folder, where a study file (NAME.h5) is expected")
-        self._entries: dict[tuple[Path, tuple[int, ...]], Entry] = {}
+        self._entries: dict[tuple[Path, Version], Entry] = {}
         """The records read so far, by path and version."""
         is_usual = self.path.suffix == ".h5"
         self.parts = self.path.with_suffix(".parts" if is_usual else f"{self.path.suffix}.parts.d")
@@ -69,7 +71,7 @@ class Study:
                 for path in self.parts.glob(".*"):
                     with suppress(OSError):
                         path.unlink()
-        with locked(in_use, shared=True):
+        with locked(in_use, shared=True, waits=self._waits):
             with self._collecting():
                 _, damaged = self._sound_records()
             yield damaged
@@ -80,19 +82,17 @@ class Study:
     def outcomes(self) -> dict[str, Outcome]:
         """What is stored of each task that is solved, collected or not, by its id."""
         records, _ = self.records()  # before the study, which may take them in meanwhile
-        outcomes = self.collected()
+        outcomes: dict[str, Outcome] = {}
+        if self.path.exists():
+            with open_study(self.path) as file:
+                tasks = zip(file.task_ids, file.statuses, file.stored, strict=True)
+                outcomes = {
+                    name: Outcome(status, out) for name, status, out in tasks if status.is_solved
+                }
         for entry in records.values():
             if entry.task_id not in outcomes or entry.stored >= outcomes[entry.task_id].stored:
                 outcomes[entry.task_id] = entry.outcome
         return outcomes
-
-    def collected(self) -> dict[str, Outcome]:
-        """What the study file holds of each task that is solved, by its id."""
-        if not self.path.exists():
-            return {}
-        with open_study(self.path) as file:
-            tasks = zip(file.task_ids, file.statuses, file.stored, strict=True)
-            return {n: Outcome(status, out) for n, status, out in tasks if status.is_solved}
 
     def collect(self, spec: Spec, tasks: list[Task], text: str) -> list[str]:
         """Write all records into the study file, then drop them; inside `work`.
@@ -140,13 +140,21 @@ class Study:
         return new_paths
 
     def records(self) -> tuple[dict[Path, Entry], dict[Path, StudyError]]:
-        """The records that are not collected yet, and what is wrong with the damaged ones."""
+        """The records that are not collected yet, and what is wrong with the damaged ones.
+
+        Each is read once: records are never changed, but replaced.
+        """
         entries, damaged = {}, {}
         for path in self.record_paths():
             try:
-                entries[path] = self._entry(path)
+                version = path, file_version(path, follow=False)
+                if version not in self._entries:
+                    self._entries[version] = unfinished_work.read_record_entry(path)
+                entries[path] = self._entries[version]
+            except FileNotFoundError:  # it has just been collected
+                continue
             except StudyError as error:
-                if path.exists():  # else it has just been collected
+                if path.exists():  # likewise
                     damaged[path] = error
         return entries, damaged
 
@@ -159,16 +167,6 @@ class Study:
             for path, error in damaged.items()
         ]
 
-    def _entry(self, path: Path) -> Entry:
-        """All of a record but its arrays; read once, as records are never changed but replaced.
-
-        Raises StudyError.
-        """
-        version = path, unfinished_work.version_of(path)
-        if version not in self._entries:
-            self._entries[version] = unfinished_work.read_record_entry(path)
-        return self._entries[version]
-
     def _is_complete(self, tasks: list[Task]) -> bool:
         """Whether no task is missing, and no record or unfinished checkpoint is left."""
         if self.damaged_paths() or self.record_paths() or not self.path.exists():
@@ -176,10 +174,9 @@ class Study:
         with open_study(self.path) as file:
             if not all(status.is_solved for status in file.statuses):
                 return False
-        lacking = {task.id for task in without_result(tasks, self.collected())}
+        lacking = {task.id for task in without_result(tasks, self.outcomes())}
         solved = {task.id for task in tasks} - lacking
-        folders = unfinished_work.checkpoint_folders(self.parts)
-        return all(folder.name in solved for folder in folders)
+        return set(unfinished_work.checkpoint_ids(self.parts)) <= solved
 
     def damaged_paths(self) -> list[Path]:
         """The damaged files that were set aside."""
@@ -191,7 +188,7 @@ class Study:
 
     def _collecting(self) -> Any:
         """Keep other collectors out."""
-        return locked(self.parts / "collecting")
+        return locked(self.parts / "collecting", waits=self._waits)
 
 
 def _renamed(path: Path, target: Path) -> Path:

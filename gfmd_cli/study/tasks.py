@@ -1,7 +1,7 @@
 """A spec as a list of tasks, one for each surface, elastomer, grid, solver and load."""
 
+import os
 from collections import Counter
-from contextlib import suppress
 from dataclasses import dataclass
 from math import prod
 from pathlib import Path
@@ -152,19 +152,10 @@ def plan(spec: models.Spec) -> list[Task]:
         raise InputError(f"{spec.source}: {error}") from error
 
 
-def _versions(spec: models.Spec) -> dict[Path | None, Version]:
-    """The versions of the files that a spec names, of those that are there."""
-    versions: dict[Path | None, Version] = {}
-    for choice in (*spec.surface, *spec.elastomer):
-        if choice.file is not None:
-            with suppress(OSError):  # refused later, with its key
-                versions[choice.file] = file_version(choice.file)
-    return versions
-
-
 def _tasks(spec: models.Spec) -> list[Task]:
-    versions = _versions(spec)
-    _check(spec)
+    files = [choice.file for choice in (*spec.surface, *spec.elastomer)]
+    versions = {path: file_version(path) for path in files if path and os.path.exists(path)}
+    _check(spec)  # refuses a missing file, with its key
     resolved = spec.resolved()
     swept_keys = {table: _swept_keys(getattr(spec, table)) for table in models.SWEPT}
     tasks: dict[str, Task] = {}
@@ -221,7 +212,7 @@ def _check(spec: models.Spec) -> None:
         elastomer, dimension = chosen["elastomer"], chosen["surface"].dimension
         boundary = chosen["grid"].boundary or "periodic"
         if chosen["grid"].points == "auto" and spec.accuracy is not None:
-            _check_max_points(spec.accuracy.max_points, forecast.first_grid(chosen["surface"]))
+            _check_max_points(spec.accuracy.max_points, chosen["surface"])
         chosen["solver"].check_boundary(boundary)
         if boundary == "free":
             elastomer.check_free_boundary(dimension)
@@ -249,9 +240,9 @@ def _check_grid(surface: RigidSurface, grid: models.GridTable) -> None:
         check_resolved(on_cell, points, points_y)
 
 
-def _check_max_points(max_points: int, first: int) -> None:
+def _check_max_points(max_points: int, surface: RigidSurface) -> None:
     """Raise InputError where the first of the finer and finer grids has more points."""
-    if max_points < first:
+    if max_points < (first := forecast.first_grid(surface)):
         raise InputError(
             f'accuracy.max_points: {max_points} given, but grid.points = "auto" begins with '
             f"{first} points along x on this surface; give {first} or more"

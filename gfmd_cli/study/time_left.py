@@ -55,7 +55,6 @@ class RemainingTime:
     ) -> None:
         self.tasks = {task.index: task for task in tasks}
         self.jobs, self.now = jobs, now
-        self.seconds = {task.index: task.seconds for task in tasks}
         self.waiting = set(self.tasks)
         self.waiting_seconds: dict[Any, float] = defaultdict(float)
         """Forecast seconds of the waiting tasks, by elastomer."""
@@ -95,13 +94,14 @@ class RemainingTime:
             if progress.status is not None and progress.status.is_solved:
                 for elastomer in (self.tasks[index].elastomer, None):
                     self.measured[elastomer] += now - state.started
-                    self.forecast[elastomer] += self.seconds[index]
+                    self.forecast[elastomer] += self.tasks[index].seconds
 
     def _stop_waiting(self, index: int) -> None:
         """Remove a task from the waiting ones."""
         if index in self.waiting:
             self.waiting.remove(index)
-            self.waiting_seconds[self.tasks[index].elastomer] -= self.seconds[index]
+            task = self.tasks[index]
+            self.waiting_seconds[task.elastomer] -= task.seconds
 
     def left(self) -> float:
         """Seconds until all tasks have ended."""
@@ -120,7 +120,7 @@ class RemainingTime:
     def _left_of(self, index: int) -> float:
         """Remaining seconds of a running task."""
         task, state, now = self.tasks[index], self.running[index], self.now()
-        seconds, spent = self.seconds[index], now - state.started
+        seconds, spent = task.seconds, now - state.started
         forecast = seconds * self._speed_ratio(task.elastomer)
         alone = SECONDS_PER_PAIR * state.done()
         if alone > MEASURED_FROM * seconds:  # use the measured speed of this machine

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from gfmd_cli.errors import InputError, SpaceError, StudyError
 from gfmd_cli.files.atomic import new_file, write_whole
-from gfmd_cli.files.checksums import Version, check_seal, digest, file_version, seal
+from gfmd_cli.files.checksums import check_seal, digest, seal
 from gfmd_cli.files.hdf5 import new_hdf5
 from gfmd_cli.files.regular import open_regular, read_regular
 from gfmd_cli.study.reading import StudyFile, open_study
@@ -94,9 +94,11 @@ def record_path(parts: Path, task_id: str, stored: Iterable[str]) -> Path:
     return parts / f"{task_id}-{digest(sorted(stored))[:8]}{SUFFIX}"
 
 
-def checkpoint_folders(parts: Path) -> list[Path]:
-    """The checkpoints in the folder, by the ids of their tasks."""
-    return [path for path in parts.glob("*") if OWN_FOLDERS.fullmatch(path.name) and path.is_dir()]
+def checkpoint_ids(parts: Path) -> list[str]:
+    """The ids of the tasks that have a checkpoint in the folder."""
+    return [
+        path.name for path in _listed(parts) if path.is_dir() and OWN_FOLDERS.fullmatch(path.name)
+    ]
 
 
 def write_record(parts: Path, result: TaskResult) -> Path:
@@ -129,8 +131,7 @@ def read_record_entry(path: Path) -> Entry:
         status = record.statuses[0]
         if not status.is_solved:
             raise ValueError(f"status {status}")
-        record.check(0)
-        return record.entry(0)
+        return record.result(0, in_memory=False).entry
 
 
 def read_record(path: Path) -> TaskResult:
@@ -159,14 +160,6 @@ def read_failure(parts: Path, task_id: str) -> str:
     except OSError:
         return ""
     return " ".join(content.decode(errors="replace").split())
-
-
-def version_of(path: Path) -> Version:
-    """The version of a record. Raises StudyError where it is gone."""
-    try:
-        return file_version(path, follow=False)
-    except OSError as error:
-        raise StudyError(f"{path}: damaged record: {error}") from error
 
 
 def set_aside(path: Path, bad: Path | None = None) -> Path:

@@ -8,7 +8,7 @@ from queue import SimpleQueue
 from threading import Event, Thread
 
 from gfmd_cli.errors import Interrupted
-from gfmd_cli.files.locks import waits_end_at
+from gfmd_cli.files.locks import Waits
 from gfmd_cli.grid import plans
 from gfmd_cli.study.context import SolveContext
 from gfmd_cli.study.run_task import attempt
@@ -34,11 +34,11 @@ def serve(pipe: Connection) -> None:
     except RuntimeError as error:
         sys.exit(f"gfmd: a worker process: {error} (see ulimit -u)")
     try:
-        with waits_end_at(context.stop, os.getppid()):
-            plans.plan_with(parts, estimated=options.reproducible)
-            pipe.send(READY)
-            while True:
-                pipe.send(attempt(tasks.get(), parts, context))
+        waits = Waits(context.stop, run=os.getppid())
+        plans.plan_with(parts, estimated=options.reproducible, waits=waits)
+        pipe.send(READY)
+        while True:
+            pipe.send(attempt(tasks.get(), parts, context))
     except (BrokenPipeError, Interrupted):  # the run has ended, or stops before the first task
         os._exit(1)
 
