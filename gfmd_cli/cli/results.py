@@ -158,7 +158,7 @@ def diff(
         gfmd diff coarse.h5 fine.h5 --tolerance 0.01
     """
     from gfmd_cli.analysis.diff import diff as diff_studies
-    from gfmd_cli.analysis.diff_table import diff_json, diff_text
+    from gfmd_cli.analysis.diff import diff_json, diff_text
 
     difference = diff_studies(one, other)
     click.echo(diff_json(difference) if as_json else diff_text(difference))

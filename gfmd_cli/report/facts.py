@@ -2,8 +2,7 @@
 
 import json
 
-from gfmd_cli.analysis.diff import diff
-from gfmd_cli.analysis.diff_table import NOTHING, diff_lists, diff_table
+from gfmd_cli.analysis.diff import NOTHING, diff, diff_lists, diff_table
 from gfmd_cli.analysis.table import Group, Table, TableColumn
 from gfmd_cli.analysis.tables import P_STAR, RESIDUAL, STATUS
 from gfmd_cli.report.data import ReportData
