@@ -4,7 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gfmd_cli.analysis.compare import Curve
+from gfmd_cli.analysis.compare import Comparison, Curve, Prediction
+from gfmd_cli.analysis.ensemble import without_seed
+from gfmd_cli.analysis.selection import grouped
+from gfmd_cli.grid.arrays import Field
 from gfmd_cli.study.columns import PARAMETERS
 from gfmd_cli.study.reading import FILE_MARK
 
@@ -25,6 +28,16 @@ class CurveStyle:
     colour: Colour
     marker: str
     label: str
+
+
+@dataclass(frozen=True)
+class StyledCurve:
+    """A curve with its style, and its theory over pressures close enough for a line."""
+
+    curve: Curve
+    style: CurveStyle
+    p_star: Field
+    theory: Prediction
 
 
 def distinct_styles(labels: list[str]) -> list[CurveStyle]:
@@ -53,6 +66,25 @@ def order(curve: Curve) -> tuple[float, float]:
     """Key for sorting: slabs by thickness, then power laws by exponent, then the others."""
     thickness = curve.rows[0]["thickness"] if np.isnan(curve.n) else np.nan
     return float(np.nan_to_num(thickness, nan=np.inf)), float(np.nan_to_num(curve.n, nan=np.inf))
+
+
+def with_styles(comparison: Comparison) -> list[StyledCurve]:
+    """The curves of a study in the order and style of its figures."""
+    curves = sorted(comparison.curves, key=order)
+    pressures = np.concatenate([curve.column("p_star") for curve in curves])
+    low, high = pressures.min() / 3, pressures.max() * 3
+    low = min(low, high / 1000)  # near the left end of a linear axis
+    p_star = np.union1d(np.geomspace(low, high, 200), np.linspace(low, high, 100))
+    return [
+        StyledCurve(curve, style, p_star, curve.predict(p_star))
+        for curve, style in zip(curves, curve_styles(curves), strict=True)
+    ]
+
+
+def seed_groups(items: list[StyledCurve]) -> list[list[StyledCurve]]:
+    """The curves that differ in their seed only, together."""
+    groups = grouped(items, lambda item: (item.curve.study, without_seed(item.curve.rows[0])))
+    return list(groups.values())
 
 
 def curve_styles(curves: list[Curve]) -> list[CurveStyle]:

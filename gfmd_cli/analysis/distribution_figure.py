@@ -5,13 +5,20 @@ from dataclasses import dataclass
 import numpy as np
 
 from gfmd_cli.analysis.compare import Comparison
-from gfmd_cli.analysis.curve_styles import MAX_STYLES, CurveStyle, colours, curve_styles, order
+from gfmd_cli.analysis.curve_styles import (
+    MAX_STYLES,
+    CurveStyle,
+    StyledCurve,
+    colours,
+    curve_styles,
+    order,
+    seed_groups,
+)  # fmt: skip
 from gfmd_cli.analysis.distribution import StressDistribution, bin_counts, distributions
 from gfmd_cli.analysis.edge_law import fit_power_law
 from gfmd_cli.analysis.ensemble import by_load
 from gfmd_cli.analysis.plotting import DASHED, THEORY, ColumnFigure
 from gfmd_cli.analysis.selection import at_one_pressure, evenly, grouped, pressure_label
-from gfmd_cli.analysis.series import StyledCurve, seed_groups
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.study.column import Row
 from gfmd_cli.study.columns import BINS, PR_LINEAR, PR_LOGARITHMIC

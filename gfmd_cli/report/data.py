@@ -8,10 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from gfmd_cli.analysis.compare import Comparison, compare_open
-from gfmd_cli.analysis.curve_styles import without_escapes
-from gfmd_cli.analysis.figures import study_figures, with_styles
+from gfmd_cli.analysis.curve_styles import StyledCurve, with_styles, without_escapes
+from gfmd_cli.analysis.figures import study_figures
 from gfmd_cli.analysis.plotting import ColumnFigure
-from gfmd_cli.analysis.series import StyledCurve
 from gfmd_cli.analysis.tables import TitledCurves, curve_title
 from gfmd_cli.analysis.wording import in_si
 from gfmd_cli.bench.file import Trace
