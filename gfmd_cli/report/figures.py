@@ -16,8 +16,7 @@ from gfmd_cli.analysis.wording import shown
 from gfmd_cli.bench.figure import bench_figures
 from gfmd_cli.bench.table import bench_table
 from gfmd_cli.report.data import ReportData, item_title
-from gfmd_cli.report.section import Section
-from gfmd_cli.report.svg import drawing
+from gfmd_cli.report.section import Section, drawing
 
 EXPLANATION = (
     "In this and the next figures over the pressure, symbols are the simulation: in the continuum "

@@ -16,8 +16,7 @@ from gfmd_cli.maps.pictures import block_sums
 from gfmd_cli.physics.observables import contact_points
 from gfmd_cli.report import profiles
 from gfmd_cli.report.data import ReportData
-from gfmd_cli.report.section import Section
-from gfmd_cli.report.svg import drawing
+from gfmd_cli.report.section import Section, drawing
 from gfmd_cli.study.column import Row
 from gfmd_cli.study.reading import StudyFile, open_study
 

@@ -1,12 +1,24 @@
-"""A section of the page: what a template fills in."""
+"""A section of the page: what a template fills in, its figures as inline SVG."""
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
+from xml.etree import ElementTree
 
 from markupsafe import Markup
 
+from gfmd_cli.analysis.plotting import ColumnFigure, LegendFigure
 from gfmd_cli.analysis.table import Table
+from gfmd_cli.report.interactive import interactive
+from gfmd_cli.report.rendering import clean
+from gfmd_cli.report.theme import variable
+
+COMMENT = re.compile("<!--.*?-->", re.DOTALL)
+COLOUR = re.compile(r"#[0-9a-fA-F]{6}\b")
+NUMBER = re.compile(r"-?\d+\.\d{3,}")
+DROPPED = ("metadata", "style")  # elements; style.css has the rules of the latter
+COORDINATES = {"points", "x", "y", "d"}  # attributes; rounded to a hundredth of a point
 
 
 class Drawing(NamedTuple):
@@ -49,3 +61,55 @@ class Section:
         tables = [*self.tables, *self.disclosed.values()]
         has_records = any(table.records for table in tables)
         return not (self.drawings or has_records or self.content is not None)
+
+
+def drawing(
+    figure: LegendFigure, name: str, label: str, caption: str, *, scrolls: bool = False
+) -> Drawing:
+    """A figure for the page.
+
+    Parameters
+    ----------
+    name : prefix of the identifiers inside the drawing, unique in the page
+    label : alternative text for screen readers
+    scrolls : whether the figure is wider than a phone, and then scrolled by touch and keys
+    """
+    data = interactive(figure) if isinstance(figure, ColumnFigure) else None
+    return Drawing(inline(figure.svg(), name, label), name, caption, data, scrolls)
+
+
+def inline(svg: str, name: str, label: str) -> Markup:
+    """An SVG file as an element of the page, with colours as variables and prefixed identifiers."""
+    svg = COMMENT.sub("", svg)  # they repeat the texts of the figure
+    root = ElementTree.fromstring(svg)
+    used = {value[1:] for part in root.iter() for value in part.attrib.values() if value[:1] == "#"}
+    used |= set(re.findall(r"url\(#([^)]+)\)", svg))
+    for part in root.iter():
+        part.tag = _local(part.tag)
+        for child in [child for child in part if _local(child.tag) in DROPPED]:
+            part.remove(child)
+        attributes = {_local(key): value for key, value in part.attrib.items()}
+        if attributes.get("id") not in used:
+            attributes.pop("id", None)
+        part.attrib.clear()
+        part.attrib.update({key: _rewritten(key, v, name) for key, v in attributes.items()})
+        part.text, part.tail = (part.text or "").strip(), None
+    box = root.attrib["viewBox"]
+    root.attrib.clear()
+    root.attrib.update({"viewBox": box, "role": "img", "aria-label": clean(label)})
+    return Markup(ElementTree.tostring(root, encoding="unicode"))
+
+
+def _rewritten(key: str, value: str, name: str) -> str:
+    if key == "id":
+        return f"{name}-{value}"
+    if key == "href" and value.startswith("#"):
+        return f"#{name}-{value[1:]}"
+    if key in COORDINATES:
+        return NUMBER.sub(lambda number: f"{float(number[0]):.2f}", value).replace("\n", "")
+    value = value.replace("url(#", f"url(#{name}-")
+    return value if key == "href" else COLOUR.sub(lambda f: variable(f[0].lower()), value)
+
+
+def _local(name: str) -> str:
+    return name.rpartition("}")[2]

@@ -13,8 +13,7 @@ from gfmd_cli.analysis.table import Group, Table, TableColumn, records_of
 from gfmd_cli.maps.pictures import Picture
 from gfmd_cli.physics.surface_spectrum import Spectrum, spectrum
 from gfmd_cli.report.data import ReportData
-from gfmd_cli.report.section import Drawing, Section
-from gfmd_cli.report.svg import drawing
+from gfmd_cli.report.section import Drawing, Section, drawing
 from gfmd_cli.study.column import Row
 from gfmd_cli.study.reading import open_study
 
