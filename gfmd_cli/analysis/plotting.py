@@ -45,6 +45,8 @@ STYLE = {
     "xtick.top": True,
     "ytick.right": True,
     "pdf.fonttype": 42,  # TrueType: publishers refuse Type 3
+    "svg.fonttype": "path",
+    "svg.hashsalt": "gfmd",  # the same figure gives the same bytes
 }
 CAP = 2.0  # points, to either side of an error bar
 METADATA: dict[str, dict[str, None]] = {
@@ -122,15 +124,14 @@ class LegendFigure:
         )
 
     def svg(self) -> str:
-        """An SVG with outlined text and no background; the same figure gives the same bytes."""
+        """An SVG with outlined text and no background; to be called inside `styled`."""
         self._write_legend()
         parts: list[Any] = [self.figure, *self.figure.axes]
         for part in parts + [second for axes in parts[1:] for second in axes.child_axes]:
             part.patch.set(facecolor="none", edgecolor="none")
         image = BytesIO()
-        with rc_context({"svg.hashsalt": "gfmd", "svg.fonttype": "path"}):
-            # draws once; `savefig` would draw twice more, to lay out the figure
-            FigureCanvasSVG(self.figure).print_svg(image, metadata={"Date": None})
+        # draws once; `savefig` would draw twice more, to lay out the figure
+        FigureCanvasSVG(self.figure).print_svg(image, metadata=METADATA[".svg"])
         return image.getvalue().decode()
 
     def write(self, path: Path) -> list[Path]:

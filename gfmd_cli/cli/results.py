@@ -115,8 +115,7 @@ def export(study: Path, output: Path | None, task: int | None) -> None:
         raise InputError(f"{output}: unknown suffix {suffix!r}; allowed: .csv, .nc, .vti")
     if task is not None and suffix != ".vti":
         raise InputError("--task: chooses fields, for a .vti file")
-    from gfmd_cli.analysis.export import export_csv, write_netcdf
-    from gfmd_cli.analysis.vtk import write_image
+    from gfmd_cli.analysis.export import export_csv, write_image, write_netcdf
     from gfmd_cli.files.atomic import write_whole
 
     if output is None:

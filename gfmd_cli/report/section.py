@@ -28,10 +28,8 @@ class Drawing(NamedTuple):
     name: str
     """Of its files; also the prefix of the identifiers in it."""
     caption: str
-    data: dict[str, Any] | None = None
+    data: dict[str, Any] | None
     """What scripts draw it from, as `interactive` makes it; None of a picture."""
-    scrolls: bool = False
-    """Whether it is wider than a phone, and then scrolled by touch and keys."""
 
 
 @dataclass(frozen=True)
@@ -63,22 +61,19 @@ class Section:
         return not (self.drawings or has_records or self.content is not None)
 
 
-def drawing(
-    figure: LegendFigure, name: str, label: str, caption: str, *, scrolls: bool = False
-) -> Drawing:
+def drawing(figure: LegendFigure, name: str, label: str, caption: str) -> Drawing:
     """A figure for the page.
 
     Parameters
     ----------
     name : prefix of the identifiers inside the drawing, unique in the page
     label : alternative text for screen readers
-    scrolls : whether the figure is wider than a phone, and then scrolled by touch and keys
     """
     data = interactive(figure) if isinstance(figure, ColumnFigure) else None
-    return Drawing(inline(figure.svg(), name, label), name, caption, data, scrolls)
+    return Drawing(_inline(figure.svg(), name, label), name, caption, data)
 
 
-def inline(svg: str, name: str, label: str) -> Markup:
+def _inline(svg: str, name: str, label: str) -> Markup:
     """An SVG file as an element of the page, with colours as variables and prefixed identifiers."""
     svg = COMMENT.sub("", svg)  # they repeat the texts of the figure
     root = ElementTree.fromstring(svg)

@@ -178,7 +178,7 @@ def work_precision(data: ReportData) -> Section:
         title,
         notes=[f"{MAX_CONTACTS} of {len(figures)} contacts are shown."] if left_out else [],
         drawings=[
-            drawing(figure, f"speed-{place}", BENCH_LABEL, BENCH_CAPTION, scrolls=True)
+            drawing(figure, f"speed-{place}", BENCH_LABEL, BENCH_CAPTION)
             for place, figure in enumerate(figures[:MAX_CONTACTS])
         ],
         disclosed={BEHIND: bench_table(data.traces)},

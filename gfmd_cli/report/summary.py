@@ -6,7 +6,7 @@ from collections import Counter
 from gfmd_cli.analysis.compare import in_continuum
 from gfmd_cli.analysis.table import known
 from gfmd_cli.analysis.tables import warnings_in
-from gfmd_cli.analysis.wording import enumeration, grid_size, pretty, quantity, span
+from gfmd_cli.analysis.wording import grid_size, pretty, quantity, span
 from gfmd_cli.physics.error_estimates import Verdict
 from gfmd_cli.physics.observables import QUANTITIES
 from gfmd_cli.report.data import ReportData
@@ -42,7 +42,8 @@ def headline(data: ReportData) -> str:
 def _names_of(names: list[str], what: str) -> str:
     if len(names) == 1:
         return f"{what} {names[0]}"
-    return count(len(names), what) + (f" ({enumeration(names)})" if len(names) <= MAX_NAMES else "")
+    listed = f" ({', '.join(names[:-1])} and {names[-1]})" if len(names) <= MAX_NAMES else ""
+    return count(len(names), what) + listed
 
 
 def success(data: ReportData) -> str:
