@@ -3,18 +3,14 @@
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
-from urllib.parse import quote
 
-from gfmd_cli.analysis.export import csv_text
 from gfmd_cli.analysis.plotting import styled
 from gfmd_cli.bench.file import Trace, read_bench
-from gfmd_cli.report import sections
+from gfmd_cli.report import sections, summary
 from gfmd_cli.report.data import ReportData, read_report_data, side_by_side
 from gfmd_cli.report.maps import maps
 from gfmd_cli.report.rendering import policy, render, scripts
 from gfmd_cli.report.section import Section
-from gfmd_cli.report.summary import headline, key_numbers, success, warnings
 from gfmd_cli.report.surface import measured_surface, surface_spectrum
 from gfmd_cli.report.theme import variables
 
@@ -34,8 +30,6 @@ SECTIONS: tuple[tuple[Callable[[ReportData], Section], bool], ...] = (
     (sections.provenance, OWN),
 )
 """In the order of the page; of two studies each has its own, or both share it."""
-MAX_CSV = 1_000_000  # bytes of the table of a study in its page; a larger one is for gfmd export
-UNQUOTED = " ,;:()*/=@+"
 
 
 def report(study: Path, bench: Path | None = None, other: Path | None = None) -> str:
@@ -46,7 +40,7 @@ def report(study: Path, bench: Path | None = None, other: Path | None = None) ->
     name = " and ".join(data.name for data in studies)
     with styled():
         content = list(_sections(studies, traces))
-    body = render("body.html", name=name, studies=list(map(_top, studies)), sections=content)
+    body = render("body.html", name=name, studies=studies, summary=summary, sections=content)
     page = render(
         "page.html",
         name=name,
@@ -56,21 +50,6 @@ def report(study: Path, bench: Path | None = None, other: Path | None = None) ->
         scripts=scripts(),
     )
     return f"{page}\n"
-
-
-def _top(data: ReportData) -> dict[str, Any]:
-    """Values of the part of the page above the sections."""
-    csv = csv_text(data.solved)
-    csv = csv if len(csv) < MAX_CSV else ""
-    return {
-        "title": data.title,
-        "headline": headline(data),
-        "warnings": warnings(data),
-        "success": success(data),
-        "key_numbers": key_numbers(data),
-        "csv_name": f"{data.comparison.path.stem}.csv",
-        "csv_address": f"data:text/csv;charset=utf-8,{quote(csv, UNQUOTED)}" if csv else "",
-    }
 
 
 def _sections(studies: list[ReportData], traces: list[Trace]) -> Iterator[Section]:

@@ -2,8 +2,10 @@
 
 import math
 from collections import Counter
+from urllib.parse import quote
 
 from gfmd_cli.analysis.compare import in_continuum
+from gfmd_cli.analysis.export import csv_text
 from gfmd_cli.analysis.table import known
 from gfmd_cli.analysis.tables import warnings_in
 from gfmd_cli.analysis.wording import grid_size, pretty, quantity, span
@@ -15,6 +17,8 @@ from gfmd_cli.units import count, duration
 
 NEARLY_FULL = 0.5  # p*; above, the gap falls by decades, and a ratio of gaps tells little
 SECONDS = 120  # below, a time is given with three digits
+MAX_CSV = 1_000_000  # bytes of the table of a study in its page; a larger one is for gfmd export
+UNQUOTED = " ,;:()*/=@+"
 MAX_NAMES = 3  # elastomers and surfaces that the headline names
 UNRESOLVED = [verdict for verdict in Verdict if not verdict.has_error]
 
@@ -136,6 +140,12 @@ def _column(rows: list[Row], name: str) -> list[float]:
 
 def _span(rows: list[Row], name: str, unit: str = "") -> str:
     return span(_column(rows, name), unit)
+
+
+def csv_address(data: ReportData) -> str:
+    """The table of a study as the address of a link; empty if it is too large for a page."""
+    csv = csv_text(data.solved)
+    return f"data:text/csv;charset=utf-8,{quote(csv, UNQUOTED)}" if len(csv) < MAX_CSV else ""
 
 
 def warnings(data: ReportData) -> list[str]:
