@@ -211,7 +211,7 @@ def difference(one: ReportData, other: ReportData) -> Section:
 
 def provenance(data: ReportData) -> Section:
     """Spec, versions, machine, date, commit."""
-    attributes, machine = data.attributes, data.json("machine")
+    attributes, machine = data.comparison.attributes, data.json("machine")
     software = [attributes.get(name, "") for name in ("software", "software_version")]
     facts = [
         ("Study", data.name),

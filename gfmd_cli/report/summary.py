@@ -36,7 +36,7 @@ def headline(data: ReportData) -> str:
     pascals = _span(rows, "pressure", "Pa")
     pressures = count(max(len(curve.rows) for curve in curves), "pressure")
     return (
-        f"{count(len(data.rows), 'contact')}: {_names_of(elastomers, 'elastomer')}, "
+        f"{count(len(data.comparison.rows), 'contact')}: {_names_of(elastomers, 'elastomer')}, "
         f"{_names_of(surfaces, 'surface')}, {count(seeds, 'seed') + ', ' if seeds > 1 else ''}"
         f"{pressures} from p* = {_span(rows, 'p_star')}"
         f"{f' ({pascals})' if data.in_si else ''}, {grid_size(rows)}."
@@ -54,7 +54,7 @@ def success(data: ReportData) -> str:
     """Statement that all contacts have converged; empty if some have not."""
     if data.failed or data.missing:
         return ""
-    total = len(data.rows)
+    total = len(data.comparison.rows)
     return f"All {total} contacts converged." if total > 1 else "The contact converged."
 
 
@@ -150,7 +150,7 @@ def csv_address(data: ReportData) -> str:
 
 def warnings(data: ReportData) -> list[str]:
     """Warnings above the results: missing, doubtful and unresolved values."""
-    total, parts = len(data.rows), []
+    total, parts = len(data.comparison.rows), []
     if data.failed:
         parts.append(f"{len(data.failed)} of {total} contacts did not reach their tolerance")
     if data.missing:
