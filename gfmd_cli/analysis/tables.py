@@ -34,6 +34,8 @@ from gfmd_cli.units import count
 
 TitledCurves = list[tuple[str, Curve]]
 """Curves with the titles that tables give them."""
+TASK = TableColumn("task", "task", "d")
+ELASTOMER = TableColumn("elastomer", "elastomer")
 P_STAR = TableColumn("p*", "p_star", ".4g")
 PRESSURE = TableColumn("p", "pressure", ".4g", "Pa")
 AREA = TableColumn("a_r", "a_r")

@@ -13,7 +13,7 @@ from gfmd_cli.analysis.curve_styles import CurveStyle, distinct_styles, literal
 from gfmd_cli.analysis.plotting import SMALL, WIDTH, LegendFigure, log_scale, styled
 from gfmd_cli.analysis.selection import grouped
 from gfmd_cli.analysis.table import Group, Record, Table, TableColumn
-from gfmd_cli.analysis.tables import P_STAR, POINTS, RESIDUAL, STATUS
+from gfmd_cli.analysis.tables import ELASTOMER, P_STAR, POINTS, RESIDUAL, STATUS
 from gfmd_cli.analysis.wording import contact_title
 from gfmd_cli.bench.file import Trace
 from gfmd_cli.bench.run import REFERENCE
@@ -45,7 +45,7 @@ def _costs(cost: str, number_format: str) -> list[TableColumn]:
 
 
 BENCH = (
-    TableColumn("elastomer", "elastomer"),
+    ELASTOMER,
     POINTS,
     P_STAR,
     TableColumn("solver", "name"),

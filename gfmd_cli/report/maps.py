@@ -13,8 +13,8 @@ import numpy as np
 from gfmd_cli.analysis.curve_styles import rgb
 from gfmd_cli.analysis.plotting import HEIGHT, WIDTH, ColumnFigure, LegendFigure, shades
 from gfmd_cli.analysis.selection import evenly, grouped
-from gfmd_cli.analysis.table import Group, Table, TableColumn
-from gfmd_cli.analysis.tables import AREA, P_STAR, POINTS, PRESSURE
+from gfmd_cli.analysis.table import Group, Table
+from gfmd_cli.analysis.tables import AREA, ELASTOMER, P_STAR, POINTS, PRESSURE, TASK
 from gfmd_cli.analysis.wording import contact_title, in_si, largest, pressure_text, shown
 from gfmd_cli.grid.arrays import Field, Mask
 from gfmd_cli.maps.pictures import block_sums
@@ -36,14 +36,7 @@ NONE, BEYOND = "black", "#cc3311"
 PERCENTILE = 99  # of the stress in contact and of the gap elsewhere: the end of the colour scale
 STORED = ("fields", "cross_sections")
 CAPTION = "The values are in /fields/TASK and /cross_sections/TASK of the study file."
-SHOWN = (
-    TableColumn("task", "task", "d"),
-    TableColumn("elastomer", "elastomer"),
-    P_STAR,
-    PRESSURE,
-    AREA,
-    POINTS,
-)
+SHOWN = (TASK, ELASTOMER, P_STAR, PRESSURE, AREA, POINTS)
 LINES = {
     "height": ("indenter h", {"color": "black", "lw": 1.2}),
     "u": ("elastomer u", {"color": "#0077bb", "lw": 0.9}),

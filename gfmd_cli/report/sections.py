@@ -15,7 +15,7 @@ from gfmd_cli.analysis.diff import NOTHING, diff, diff_lists, diff_table
 from gfmd_cli.analysis.distribution_figure import Density, densities
 from gfmd_cli.analysis.figures import PANELS
 from gfmd_cli.analysis.table import Group, Table, TableColumn, product, ratio, records_of
-from gfmd_cli.analysis.tables import P_STAR, RESIDUAL, STATUS
+from gfmd_cli.analysis.tables import ELASTOMER, P_STAR, RESIDUAL, STATUS, TASK
 from gfmd_cli.analysis.wording import shown
 from gfmd_cli.bench.results import bench_figures, bench_table
 from gfmd_cli.report.data import ReportData, item_title
@@ -37,8 +37,8 @@ UNCONVERGED_CAPTION = (
     "them as crosses."
 )
 UNCONVERGED = (
-    TableColumn("task", "task", "d"),
-    TableColumn("elastomer", "elastomer"),
+    TASK,
+    ELASTOMER,
     TableColumn("surface", "surface"),
     P_STAR,
     STATUS,
