@@ -76,18 +76,17 @@ def drawing(figure: LegendFigure, name: str, label: str, caption: str) -> Drawin
 def _inline(svg: str, name: str, label: str) -> Markup:
     """An SVG file as an element of the page, with colours as variables and prefixed identifiers."""
     svg = COMMENT.sub("", svg)  # they repeat the texts of the figure
+    svg = svg.replace(' xmlns="http://www.w3.org/2000/svg"', "").replace("xlink:href", "href")
     root = ElementTree.fromstring(svg)
     used = {value[1:] for part in root.iter() for value in part.attrib.values() if value[:1] == "#"}
     used |= set(re.findall(r"url\(#([^)]+)\)", svg))
     for part in root.iter():
-        part.tag = _local(part.tag)
-        for child in [child for child in part if _local(child.tag) in DROPPED]:
+        for child in [child for child in part if child.tag in DROPPED]:
             part.remove(child)
-        attributes = {_local(key): value for key, value in part.attrib.items()}
-        if attributes.get("id") not in used:
-            attributes.pop("id", None)
-        part.attrib.clear()
-        part.attrib.update({key: _rewritten(key, v, name) for key, v in attributes.items()})
+        if part.attrib.get("id") not in used:
+            part.attrib.pop("id", None)
+        for key, value in part.attrib.items():
+            part.attrib[key] = _rewritten(key, value, name)
         part.text, part.tail = (part.text or "").strip(), None
     box = root.attrib["viewBox"]
     root.attrib.clear()
@@ -104,7 +103,3 @@ def _rewritten(key: str, value: str, name: str) -> str:
         return NUMBER.sub(lambda number: f"{float(number[0]):.2f}", value).replace("\n", "")
     value = value.replace("url(#", f"url(#{name}-")
     return value if key == "href" else COLOUR.sub(lambda f: variable(f[0].lower()), value)
-
-
-def _local(name: str) -> str:
-    return name.rpartition("}")[2]
