@@ -31,26 +31,15 @@ COSTS = (
 ROOM = 2.0  # for the symbols at the ends of a curve
 MAX_LABEL = 100  # characters of a title and of a file name
 ERROR = r"relative error of $u_g$"
-LEVELS = (1e-2, 1e-4, 1e-6)
+LEVELS = ("1e-2", "1e-4", "1e-6")
 """Relative errors of the mean gap."""
-
-
-def _costs(cost: str, number_format: str) -> list[TableColumn]:
-    return [
-        TableColumn(
-            f"{cost}\nto {level:.0e}".replace("e-0", "e-"), f"{cost}_{level}", number_format
-        )
-        for level in LEVELS
-    ]
-
-
 BENCH = (
     ELASTOMER,
     POINTS,
     P_STAR,
     TableColumn("solver", "name"),
-    *_costs("transforms", ".0f"),
-    *_costs("seconds", ".3g"),
+    *(TableColumn(f"transforms\nto {level}", f"transforms_{level}", ".0f") for level in LEVELS),
+    *(TableColumn(f"seconds\nto {level}", f"seconds_{level}", ".3g") for level in LEVELS),
     *(TableColumn(f"error of\n{name}", f"{name}_error", ".1e") for name in QUANTITIES),
     RESIDUAL,
     STATUS,
@@ -81,7 +70,7 @@ def bench_table(traces: list[Trace]) -> Table:
 def _record(trace: Trace, name: str) -> Record:
     record = trace.row | {"name": name}
     for level in LEVELS:
-        transforms, seconds = trace.reached("u_g", level) or (None, None)
+        transforms, seconds = trace.reached("u_g", float(level)) or (None, None)
         record |= {f"transforms_{level}": transforms, f"seconds_{level}": seconds}
     errors = {f"{error}_error": float(trace.samples[f"{error}_error"][-1]) for error in QUANTITIES}
     return record | errors
