@@ -5,6 +5,7 @@ Symbols are the points of a curve, or the means over seeds with a confidence ban
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import compress
 from pathlib import Path
 from typing import Self
 
@@ -88,7 +89,7 @@ class Series:
         columns = [np.array(values) for values in zip(*points, strict=True)]
         y = columns[1]
         visible = np.isfinite(y) & ((y > 0) | (panel.y_scale == "linear"))
-        details = [_details(seeds) for seeds, s in zip(loads, visible, strict=True) if s]
+        details = list(map(_details, compress(loads, visible)))
         style = items[0].style
         if len(items) > 1:
             style = replace(style, label=f"{style.label}, {len(items)} seeds")

@@ -5,6 +5,7 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from functools import partial
 from io import BytesIO
+from itertools import compress
 from pathlib import Path
 from typing import Any, Literal
 
@@ -197,7 +198,7 @@ class ColumnFigure(LegendFigure):
             self.axes.plot(x[mask], y[mask], marker=marker, markevery=every, **options)
             if np.any(mask):
                 layer = PlotLayer("points", names, x[mask], y[mask], to_hex(style.colour), marker)
-                texts = [text for text, c in zip(details, mask, strict=False) if c]
+                texts = list(compress(details, mask))
                 self.layers.append(replace(layer, error=error[:, mask], details=texts))
         self.legend[style.label] = Line2D([], [], marker=style.marker, **options)
         if not np.all(converged):

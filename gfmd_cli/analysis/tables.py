@@ -144,7 +144,7 @@ def _columns_of(observable: Observable) -> list[TableColumn]:
     """An observable in reduced and in SI units; the columns that no task has are left out."""
     heading, name, unit = observable.heading, observable.column.name, observable.unit
     if observable.is_flag:
-        return [TableColumn(heading, partial(_flag, name=name), optional=True)]
+        return [TableColumn(heading, lambda r: {0: False, 1: True}.get(r[name]), optional=True)]
     number_format = "d" if observable.column.kind is int else TableColumn.format
     if unit is None:
         return [TableColumn(heading, name, number_format, optional=True)]
@@ -152,10 +152,6 @@ def _columns_of(observable: Observable) -> list[TableColumn]:
         TableColumn(f"{heading}\n/ {unit.symbol}", name, number_format, optional=True),
         TableColumn(f"{heading}\n", lambda r: r[name] * unit.value(r), unit=unit.si, optional=True),
     ]
-
-
-def _flag(record: Record, name: str) -> bool | None:
-    return bool(record[name]) if known(record[name]) else None
 
 
 IN_TABLE = tuple(observable for observable in OBSERVABLES if observable.heading)
