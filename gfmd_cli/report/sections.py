@@ -23,15 +23,7 @@ from gfmd_cli.report.section import Section, drawing
 from gfmd_cli.units import count
 
 MAX_ROWS = 100  # contacts that the table of failures lists
-MACHINE = {
-    "node": "Node",
-    "system": "System",
-    "processor": "Processor",
-    "cores": "Cores",
-    "python": "Python",
-    "slurm_job": "Slurm job",
-    "plans": "FFT plans",
-}
+MACHINE = ("node", "system", "processor", "cores", "python", "slurm_job")
 UNCONVERGED_CAPTION = (
     "Contacts that ended above the requested tolerance. Their values are kept; figures show "
     "them as crosses."
@@ -218,7 +210,8 @@ def provenance(data: ReportData) -> Section:
         ("Written", attributes.get("date", "")),
         ("Software", " ".join(software).strip()),
         ("Git commit", attributes.get("git_commit", "")),
-        *((title, str(machine.get(key, ""))) for key, title in MACHINE.items()),
+        *((key.replace("_", " ").capitalize(), str(machine.get(key, ""))) for key in MACHINE),
+        ("FFT plans", str(machine.get("plans", ""))),
         *data.json("packages").items(),
     ]
     content = {
