@@ -50,11 +50,7 @@ STYLE = {
     "svg.hashsalt": "gfmd",  # the same figure gives the same bytes
 }
 CAP = 2.0  # points, to either side of an error bar
-METADATA: dict[str, dict[str, None]] = {
-    ".png": {},
-    ".pdf": {"CreationDate": None},
-    ".svg": {"Date": None},
-}
+METADATA: dict[str, Any] = {".png": {}, ".pdf": {"CreationDate": None}, ".svg": {"Date": None}}
 """Formats of a figure, with the entries that would make the same figure another file."""
 THEORY, UNCONVERGED, CONFIDENCE = "Persson theory", "not converged", "95 % confidence"
 """Entries of a legend that several curves share."""
