@@ -42,9 +42,9 @@ class StyledCurve:
 
 
 def distinct_styles(labels: list[str]) -> list[CurveStyle]:
-    """A style for each label, colours along the palette."""
+    """A style for each label, which may have dollar signs, colours along the palette."""
     return [
-        CurveStyle(colour, MARKERS[place % len(MARKERS)], label)
+        CurveStyle(colour, MARKERS[place % len(MARKERS)], literal(label))
         for place, (colour, label) in enumerate(zip(colours(len(labels)), labels, strict=True))
     ]
 
@@ -104,7 +104,7 @@ def curve_styles(curves: list[Curve]) -> list[CurveStyle]:
         pairs = [(curve.elastomer, _merged(curve, alike[curve.elastomer])) for curve in curves]
     distinct = list(dict.fromkeys(pairs))
     labels = distinct_labels([_joined((names[elastomer], words)) for elastomer, words in distinct])
-    styles = dict(zip(distinct, distinct_styles(list(map(literal, labels))), strict=True))
+    styles = dict(zip(distinct, distinct_styles(labels), strict=True))
     if len(names) > 1:
         palette = dict(zip(names, colours(len(names)), strict=True))
         styles = {pair: replace(s, colour=palette[pair[0]]) for pair, s in styles.items()}

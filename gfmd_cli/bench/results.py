@@ -115,7 +115,7 @@ def bench_figures(traces: list[Trace]) -> dict[str, LegendFigure]:
     """The figures by name; to be called inside `styled`."""
     names = solver_names(traces)
     solvers = list(dict.fromkeys(names))
-    styles = {style.label: style for style in distinct_styles(solvers)}  # the same in all contacts
+    styles = dict(zip(solvers, distinct_styles(solvers), strict=True))  # the same in all contacts
     pairs = ((trace, styles[name]) for trace, name in zip(traces, names, strict=True))
     rows = list(grouped(pairs, lambda pair: contact_of(pair[0])).values())
     if len(rows) <= MAX_CONTACTS:
