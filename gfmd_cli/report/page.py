@@ -9,7 +9,7 @@ from gfmd_cli.bench.file import Trace, read_bench
 from gfmd_cli.report import sections, summary
 from gfmd_cli.report.data import ReportData, read_report_data, side_by_side
 from gfmd_cli.report.maps import maps
-from gfmd_cli.report.rendering import policy, render, scripts
+from gfmd_cli.report.rendering import render
 from gfmd_cli.report.section import Section
 from gfmd_cli.report.surface import measured_surface, surface_spectrum
 from gfmd_cli.report.theme import variables
@@ -41,15 +41,7 @@ def report(study: Path, bench: Path | None = None, other: Path | None = None) ->
     with styled():
         content = list(_sections(studies, traces))
     body = render("body.html", name=name, studies=studies, summary=summary, sections=content)
-    page = render(
-        "page.html",
-        name=name,
-        policy=policy(),
-        colours=variables(body),
-        body=body,
-        scripts=scripts(),
-    )
-    return f"{page}\n"
+    return f"{render('page.html', name=name, colours=variables(body), body=body)}\n"
 
 
 def _sections(studies: list[ReportData], traces: list[Trace]) -> Iterator[Section]:
