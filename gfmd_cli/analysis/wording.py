@@ -1,4 +1,4 @@
-"""Contacts, values in SI units, sizes of grids and counts in words."""
+"""Contacts, values in SI units and sizes of grids in words."""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence

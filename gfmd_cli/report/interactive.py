@@ -100,8 +100,7 @@ def _axis(axis: Any, label: str, factor: float = 1.0) -> dict[str, Any]:
 
 def _entry(label: str, handle: Any) -> dict[str, str]:
     """An entry of the legend: its name, a character for its symbol, its colour."""
-    colour = to_hex(handle.get_color())
-    return {"name": _name(label), "symbol": _symbol(handle), "colour": colour}
+    return {"name": _name(label), "symbol": _symbol(handle), "colour": to_hex(handle.get_color())}
 
 
 def _symbol(handle: Any) -> str:
