@@ -3,7 +3,6 @@
 from collections import Counter
 from collections.abc import Collection, Sequence
 from dataclasses import replace
-from functools import partial
 
 from gfmd_cli.analysis.compare import (
     VARIANTS,
@@ -62,8 +61,13 @@ def _beside_theory(
     return [*columns, TableColumn("ratio", quotient, ".3f", optional=True)]
 
 
-def _continuum(record: Record, name: str) -> float | None:
-    return record[f"{name}_continuum"] if in_continuum(record, name) else None
+def _continuum(name: str) -> TableColumn:
+    return TableColumn(
+        QUANTITIES[name].heading,
+        lambda record: record[f"{name}_continuum"] if in_continuum(record, name) else None,
+        error=f"{name}_continuum_error",
+        otherwise=f"{name}_verdict",
+    )
 
 
 COMPARISON = (
@@ -78,19 +82,7 @@ EINSTEIN = (
     *(c for q in QUANTITIES for c in _beside_theory(TableColumn(q, q), q, "einstein")),
 )
 EINSTEIN_CAPTION = "Comparison with the closed form for n = 0 and Gaussian heights."
-CONTINUUM = (
-    P_STAR,
-    POINTS,
-    *(
-        TableColumn(
-            quantity.heading,
-            partial(_continuum, name=name),
-            error=f"{name}_continuum_error",
-            otherwise=f"{name}_verdict",
-        )
-        for name, quantity in QUANTITIES.items()
-    ),
-)
+CONTINUUM = (P_STAR, POINTS, *map(_continuum, QUANTITIES))
 SEEDS = (
     replace(P_STAR, error="p_star_confidence"),
     *(
