@@ -26,7 +26,7 @@ from gfmd_cli.analysis.table import (
     ratio,
 )
 from gfmd_cli.analysis.wording import contact_title, grid_size, in_si, shown
-from gfmd_cli.physics.observables import QUANTITIES, Quantity
+from gfmd_cli.physics.observables import QUANTITIES
 from gfmd_cli.study.observables import OBSERVABLES, Observable
 from gfmd_cli.study.plausibility import SEPARATOR
 from gfmd_cli.units import count
@@ -47,18 +47,19 @@ THEORIES = {"persson": "Persson", "einstein": "closed form"}
 """Headings of predictions, by the suffix of their keys."""
 
 
-def _beside_theory(
-    value: TableColumn, name: str, theory: str = "persson", physical: Quantity | None = None
-) -> list[TableColumn]:
-    """A quantity, its prediction and their ratio; `physical`: both in SI units too."""
-    predicted, heading = f"{name}_{theory}", THEORIES[theory]
-    columns = [value, TableColumn(heading, predicted, optional=True)]
-    if physical and physical.scale:
-        _, unit, si = physical
-        columns.insert(1, TableColumn(name, product(f"{name}_best", unit), unit=si))
+def _beside_theory(name: str, theory: str = "persson", *, best: bool = False) -> list[TableColumn]:
+    """A quantity on the grid, or its best value in SI units too, with prediction and ratio."""
+    (symbol, unit, si), heading = QUANTITIES[name], THEORIES[theory]
+    value, predicted = f"{name}_best" if best else name, f"{name}_{theory}"
+    columns = [TableColumn(heading, predicted, optional=True)]
+    if best and unit:
+        columns.insert(0, TableColumn(name, product(value, unit), unit=si))
         columns.append(TableColumn(heading, product(predicted, unit), unit=si, optional=True))
-    quotient = ratio(str(value.value), predicted)
-    return [*columns, TableColumn("ratio", quotient, ".3f", optional=True)]
+    return [
+        TableColumn(symbol, value, error=f"{value}_error") if best else TableColumn(name, name),
+        *columns,
+        TableColumn("ratio", ratio(value, predicted), ".3f", optional=True),
+    ]
 
 
 def _continuum(name: str) -> TableColumn:
@@ -73,14 +74,11 @@ def _continuum(name: str) -> TableColumn:
 COMPARISON = (
     P_STAR,
     PRESSURE,
-    *(c for name in QUANTITIES for c in _beside_theory(TableColumn(name, name), name)),
+    *(column for name in QUANTITIES for column in _beside_theory(name)),
     TableColumn("p ratio", ratio("p_star_persson_at_u_g", "p_star"), ".3f", optional=True),
     STATUS,
 )
-EINSTEIN = (
-    P_STAR,
-    *(c for q in QUANTITIES for c in _beside_theory(TableColumn(q, q), q, "einstein")),
-)
+EINSTEIN = (P_STAR, *(c for name in QUANTITIES for c in _beside_theory(name, "einstein")))
 EINSTEIN_CAPTION = "Comparison with the closed form for n = 0 and Gaussian heights."
 CONTINUUM = (P_STAR, POINTS, *map(_continuum, QUANTITIES))
 SEEDS = (
@@ -92,9 +90,7 @@ SEEDS = (
     TableColumn("not converged", "failures", optional=True),
 )
 BEST_VALUES = {
-    name: (P_STAR, PRESSURE, *_beside_theory(best, name, physical=quantity), STATUS)
-    for name, quantity in QUANTITIES.items()
-    for best in [TableColumn(quantity.heading, f"{name}_best", error=f"{name}_best_error")]
+    name: (P_STAR, PRESSURE, *_beside_theory(name, best=True), STATUS) for name in QUANTITIES
 }
 """Columns by quantity: with continuum values where they are known, else with values on the grid."""
 TRUE_CONTACT = (
