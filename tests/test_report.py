@@ -26,8 +26,8 @@ from gfmd_cli.physics.persson import Shells
 from gfmd_cli.physics.surface_spectrum import spectrum
 from gfmd_cli.report import maps, rendering
 from gfmd_cli.report.data import read_report_data
+from gfmd_cli.report.maps import STRESS_SCALE, read_profile
 from gfmd_cli.report.page import report
-from gfmd_cli.report.profiles import STRESS_SCALE, read_profile
 from gfmd_cli.report.rendering import environment, typeset
 from gfmd_cli.report.summary import headline
 from gfmd_cli.report.theme import DARK, LEGIBLE, LIGHT, PALETTE, contrast, toned

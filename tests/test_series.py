@@ -5,10 +5,10 @@ import pytest
 from scipy import stats
 
 from gfmd_cli.analysis.compare import compare
+from gfmd_cli.analysis.curve_styles import seed_groups, with_styles
 from gfmd_cli.analysis.ensemble import Ensemble, ensembles
-from gfmd_cli.analysis.figures import PANELS, study_figures, with_styles
+from gfmd_cli.analysis.figures import PANELS, Series, _point, study_figures
 from gfmd_cli.analysis.plotting import styled
-from gfmd_cli.analysis.series import Series, _point, seed_groups
 from gfmd_cli.analysis.wording import quantity
 
 SPEC = """\

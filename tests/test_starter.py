@@ -239,7 +239,10 @@ def test_several_surfaces_give_one_table_and_one_figure(gfmd, tmp_path):
     assert float(first[1]) == pytest.approx(records[0]["Sq"], rel=1e-3)
     assert second[1:9] == ["-"] * 8
     assert {"Sq", "Pq"} <= set(header)
-    assert (tmp_path / "both.svg").read_text().count("clipPath") > 3
+    drawn = (tmp_path / "both.svg").read_text()
+    assert drawn.count("clipPath") > 3
+    gfmd("surface", "holed.npy", "line.npy", "--figure", "both.svg")
+    assert (tmp_path / "both.svg").read_text() == drawn
     assert "allowed: .png, .pdf, .svg" in gfmd(
         "surface", "holed.npy", "--figure", "a.jpg", status=2
     )

@@ -20,7 +20,7 @@ from gfmd_cli.physics.surface_spectrum import Spectrum
 from gfmd_cli.physics.true_contact import contact_area
 from gfmd_cli.study.column import Row
 from gfmd_cli.study.columns import PARAMETERS
-from gfmd_cli.study.reading import StudyFile, open_study, solved_rows
+from gfmd_cli.study.reading import open_study, solved_rows
 
 Theory = Literal["paper", "fitted", "coarse-grained"]
 """Of the mean gap: Eq. (30) with gamma of Eqs. (39) and (42), the weight that is fitted in
@@ -175,8 +175,15 @@ class Comparison:
 
     path: Path
     curves: list[Curve]
-    missing: int
-    """Tasks that the study does not hold yet."""
+    rows: list[Row]
+    """One for each task, missing ones too."""
+    attributes: dict[str, str]
+    """Attributes of the study file."""
+
+    @property
+    def missing(self) -> int:
+        """Number of the tasks that the study does not hold yet."""
+        return len(self.rows) - len(solved_rows(self.rows))
 
     @property
     def has_theory(self) -> bool:
@@ -209,22 +216,16 @@ def compare(path: Path, theory: Theory = "paper") -> Comparison:
     is unreadable.
     """
     with open_study(path) as study:
-        return compare_open(study, path, theory)
-
-
-def compare_open(study: StudyFile, path: Path, theory: Theory = "paper") -> Comparison:
-    """As `compare`, of a study that is open already."""
-    rows = study.rows
-    solved = solved_rows(rows)
-    if not solved:
-        raise InputError(f"{path}: contains no result yet; run it first")
-    groups = grouped(solved, lambda row: (row["scene"], *solver_of(row)))
-    curves = []
-    for (scene, *_), group in groups.items():
-        ordered = sorted(group, key=lambda row: row["p_star"])
-        persson = theory_of(theory, study.shells(scene), float(group[0]["n"]))
-        curves.append(Curve(ordered, persson, study.map_spectrum(scene)))
-    return Comparison(path, curves, len(rows) - len(solved))
+        solved = solved_rows(study.rows)
+        if not solved:
+            raise InputError(f"{path}: contains no result yet; run it first")
+        groups = grouped(solved, lambda row: (row["scene"], *solver_of(row)))
+        curves = []
+        for (scene, *_), group in groups.items():
+            ordered = sorted(group, key=lambda row: row["p_star"])
+            persson = theory_of(theory, study.shells(scene), float(group[0]["n"]))
+            curves.append(Curve(ordered, persson, study.map_spectrum(scene)))
+        return Comparison(path, curves, study.rows, study.attributes)
 
 
 def solver_of(row: Row) -> tuple[str, ...]:

@@ -1,10 +1,14 @@
 """Styles of curves: a label that tells the curves apart, colour, marker."""
 
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gfmd_cli.analysis.compare import Curve
+from gfmd_cli.analysis.compare import Comparison, Curve, Prediction
+from gfmd_cli.analysis.ensemble import without_seed
+from gfmd_cli.analysis.selection import grouped
+from gfmd_cli.grid.arrays import Field
 from gfmd_cli.study.columns import PARAMETERS
 from gfmd_cli.study.reading import FILE_MARK
 
@@ -27,10 +31,20 @@ class CurveStyle:
     label: str
 
 
+@dataclass(frozen=True)
+class StyledCurve:
+    """A curve with its style, and its theory over pressures close enough for a line."""
+
+    curve: Curve
+    style: CurveStyle
+    p_star: Field
+    theory: Prediction
+
+
 def distinct_styles(labels: list[str]) -> list[CurveStyle]:
-    """A style for each label, colours along the palette."""
+    """A style for each label, which may have dollar signs, colours along the palette."""
     return [
-        CurveStyle(colour, MARKERS[place % len(MARKERS)], label)
+        CurveStyle(colour, MARKERS[place % len(MARKERS)], literal(label))
         for place, (colour, label) in enumerate(zip(colours(len(labels)), labels, strict=True))
     ]
 
@@ -55,33 +69,46 @@ def order(curve: Curve) -> tuple[float, float]:
     return float(np.nan_to_num(thickness, nan=np.inf)), float(np.nan_to_num(curve.n, nan=np.inf))
 
 
+def with_styles(comparison: Comparison) -> list[StyledCurve]:
+    """The curves of a study in the order and style of its figures."""
+    curves = sorted(comparison.curves, key=order)
+    pressures = np.concatenate([curve.column("p_star") for curve in curves])
+    low, high = pressures.min() / 3, pressures.max() * 3
+    low = min(low, high / 1000)  # near the left end of a linear axis
+    p_star = np.union1d(np.geomspace(low, high, 200), np.linspace(low, high, 100))
+    return [
+        StyledCurve(curve, style, p_star, curve.predict(p_star))
+        for curve, style in zip(curves, curve_styles(curves), strict=True)
+    ]
+
+
+def seed_groups(items: list[StyledCurve]) -> list[list[StyledCurve]]:
+    """The curves that differ in their seed only, together."""
+    groups = grouped(items, lambda item: (item.curve.study, without_seed(item.curve.rows[0])))
+    return list(groups.values())
+
+
 def curve_styles(curves: list[Curve]) -> list[CurveStyle]:
     """Colours along the ordered curves, one per elastomer; markers tell variants apart.
 
     Curves of one elastomer have a colour each. Curves that differ in their seed only have the same
     style.
     """
-    elastomers = list(dict.fromkeys(curve.elastomer for curve in curves))
     names = {curve.elastomer: str(curve.rows[0]["elastomer_short"]) for curve in curves}
     if len(set(names.values())) < len(names):  # short names that coincide
         names = {elastomer: elastomer for elastomer in names}
-    variants = _variants(curves)
-    pairs = [(curve.elastomer, variant) for curve, variant in zip(curves, variants, strict=True)]
+    alike = grouped(curves, lambda curve: curve.elastomer)
+    keys = {elastomer: _differing(group) for elastomer, group in alike.items()}
+    pairs = [(c.elastomer, _joined(map(_words(c).get, keys[c.elastomer]), " ")) for c in curves]
     if len(set(pairs)) > MAX_STYLES:
-        pairs = [(curve.elastomer, _merged(curve, curves)) for curve in curves]
+        pairs = [(curve.elastomer, _merged(curve, alike[curve.elastomer])) for curve in curves]
     distinct = list(dict.fromkeys(pairs))
-    by_variant = len(elastomers) == 1
-    palette = colours(len(distinct) if by_variant else len(elastomers))
-    labels = distinct_labels(
-        [", ".join(filter(None, (names[elastomer], variant))) for elastomer, variant in distinct]
-    )
-    styles = []
-    for elastomer, variant in pairs:
-        place = distinct.index((elastomer, variant))
-        colour = palette[place if by_variant else elastomers.index(elastomer)]
-        marker = MARKERS[place % len(MARKERS)]
-        styles.append(CurveStyle(colour, marker, literal(labels[place])))
-    return styles
+    labels = distinct_labels([_joined((names[elastomer], words)) for elastomer, words in distinct])
+    styles = dict(zip(distinct, distinct_styles(labels), strict=True))
+    if len(names) > 1:
+        palette = dict(zip(names, colours(len(names)), strict=True))
+        styles = {pair: replace(s, colour=palette[pair[0]]) for pair, s in styles.items()}
+    return [styles[pair] for pair in pairs]
 
 
 def distinct_labels(labels: list[str]) -> list[str]:
@@ -116,22 +143,20 @@ def rgb(colour: str) -> Colour:
     return red / 255, green / 255, blue / 255
 
 
-def _variants(curves: list[Curve]) -> list[str]:
-    """The parameters in which curves of one elastomer differ, the seed left out; "" if none."""
-    words = [_words(curve) for curve in curves]
-    variants = []
-    for curve, own in zip(curves, words, strict=True):
-        peers = [w for c, w in zip(curves, words, strict=True) if c.elastomer == curve.elastomer]
-        pieces = [own[key] for key in own if len({peer[key] for peer in peers}) > 1]
-        variants.append(" ".join(filter(None, pieces)))
-    return variants
+def _merged(curve: Curve, alike: list[Curve]) -> str:
+    """The study, and the parameters in which its curves of one elastomer differ."""
+    keys = ", ".join(_differing([each for each in alike if each.study == curve.study]))
+    return _joined((curve.study, keys and f"several {keys}"))
 
 
-def _merged(curve: Curve, curves: list[Curve]) -> str:
-    """The study, and the parameters in which the curves of one style differ."""
-    peers = [_words(c) for c in curves if (c.elastomer, c.study) == (curve.elastomer, curve.study)]
-    keys = [key for key in peers[0] if len({peer[key] for peer in peers}) > 1]
-    return ", ".join(filter(None, (curve.study, ", ".join(keys) and f"several {', '.join(keys)}")))
+def _differing(curves: list[Curve]) -> list[str]:
+    """The parameters in which curves differ, the seed left out."""
+    words = list(map(_words, curves))
+    return [key for key in words[0] if len({each[key] for each in words}) > 1]
+
+
+def _joined(words: Iterable[str | None], separator: str = ", ") -> str:
+    return separator.join(filter(None, words))
 
 
 def _words(curve: Curve) -> dict[str, str]:

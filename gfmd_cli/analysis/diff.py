@@ -1,16 +1,20 @@
 """Two studies side by side: what differs in their specs, and by how much their results do."""
 
+import json
 import math
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
-from gfmd_cli.analysis.compare import load_of
+from gfmd_cli.analysis.compare import load_of, with_solvers
 from gfmd_cli.analysis.selection import grouped
+from gfmd_cli.analysis.table import BLANK, Record, Table, TableColumn, groups_of, known, plain
+from gfmd_cli.analysis.wording import contact_title
 from gfmd_cli.physics.observables import QUANTITIES
 from gfmd_cli.spec.differences import differences
-from gfmd_cli.spec.models import LOADS
+from gfmd_cli.spec.models import LOADS, load_text
 from gfmd_cli.study.column import Row
 from gfmd_cli.study.reading import open_study, solved_rows, tell_files_apart
 
@@ -21,6 +25,14 @@ ALIKE = (
     ("boundary",), ("points",), (),
 )  # fmt: skip
 """Columns in which the rows of a pair are alike, in the order in which they are tried."""
+LEGEND = (
+    "Relative differences (B - A) / max(|A|, |B|); in brackets: in units of the combined error bar."
+)
+NOTHING = "no contact in common"
+CONTACT = ("surface", "seed", "elastomer", "load", "load_value")
+"""Keys that both rows of a pair share, unless the studies are paired by load."""
+OF_EACH = ("boundary", "points", "p_star")
+"""Keys that each row of a pair has for itself."""
 
 
 class Deviation(NamedTuple):
@@ -41,10 +53,6 @@ class Pair:
     physical: bool = False
     """Whether stress and gap are compared in Pa and m: where the load is in SI units."""
 
-    def unit(self, name: str) -> str:
-        """Unit in which a quantity is compared."""
-        return (self.physical and QUANTITIES[name].si) or "1"
-
     def values(self, name: str, suffix: str = "") -> tuple[float, float]:
         """A quantity in both studies, in the unit in which it is compared; "_error": its error."""
         scale = QUANTITIES[name].scale if self.physical else ""
@@ -62,6 +70,20 @@ class Pair:
         error = math.hypot(*self.values(name, "_error"))
         in_errors = (b - a) / error if error > 0 else math.nan
         return Deviation((b - a) / max(abs(a), abs(b)) if a != b else 0.0, in_errors)
+
+    @property
+    def record(self) -> Record:
+        """Both values of what is compared, as `a_r_a` and `a_r_b`, their unit, how far apart."""
+        record = {key: self.one[key] for key in CONTACT}
+        for key in OF_EACH:
+            record |= {f"{key}_a": self.one[key], f"{key}_b": self.other[key]}
+        for name, quantity in QUANTITIES.items():
+            a, b = self.values(name)
+            unit = (self.physical and quantity.si) or "1"
+            record |= {f"{name}_a": a, f"{name}_b": b, f"{name}_unit": unit}
+            relative, in_errors = self.deviation(name)
+            record |= {f"{name}_relative": relative, f"{name}_in_errors": in_errors}
+        return record
 
 
 @dataclass(frozen=True)
@@ -140,3 +162,97 @@ def _pairing_note(pair: Pair) -> str:
     load = LOADS[pair.one["load"]].words
     units = "sigma_p in Pa, u_g in m" if pair.physical else "values in reduced units"
     return f"{' and '.join(differing)} differ: paired by {load}, {units}"
+
+
+def _load(record: Record) -> str:
+    return load_text(record["load"], record["load_value"])
+
+
+def _deviation(record: Record, name: str) -> str:
+    relative, in_errors = record[f"{name}_relative"], record[f"{name}_in_errors"]
+    bars = f" ({in_errors:+.1f})" if known(in_errors) else ""
+    return (f"{relative:+.2e}" if known(relative) else BLANK) + bars
+
+
+DIFFERENCES = (
+    TableColumn("load", _load),
+    TableColumn("points", lambda record: f"{record['points_a']} -> {record['points_b']}"),
+    *(TableColumn(name, partial(_deviation, name=name)) for name in QUANTITIES),
+)
+
+
+def diff_table(difference: Difference) -> Table:
+    """The pairs of contacts, grouped by what is compared."""
+    pairs = difference.pairs
+    titles = with_solvers(map(_title, pairs), [pair.one for pair in pairs])
+    groups = groups_of(zip(titles, (pair.record for pair in pairs), strict=True))
+    caption = f"{difference.paired}. {LEGEND}" if difference.paired else LEGEND
+    return Table(caption, DIFFERENCES, groups)
+
+
+def diff_text(difference: Difference) -> str:
+    """The table, the rows of one study only, and the keys of the specs that differ."""
+    lists = ("\n".join([f"{title}:", *lines]) for title, lines in diff_lists(difference).items())
+    return "\n\n".join([diff_table(difference).as_text() or _nothing(difference), *lists])
+
+
+def _nothing(difference: Difference) -> str:
+    """That there is no pair, and the kinds of loads if they differ."""
+    one, other = (sorted({str(row["load"]) for row in rows}) for rows in difference.only)
+    if set(one) & set(other) or not (one and other):
+        return NOTHING
+    return (
+        f"{NOTHING}: the loads of A are given by {', '.join(one)}, those of B by "
+        f"{', '.join(other)}, and only loads of the same key are compared"
+    )
+
+
+def diff_lists(difference: Difference) -> dict[str, list[str]]:
+    """Rows that one study alone has, and the keys of the specs that differ: lines by title."""
+    lists = {
+        f"only in {which}": _loads_by_contact(rows)
+        for which, rows in zip("AB", difference.only, strict=True)
+    }
+    sides = [pair.one for pair in difference.pairs], [pair.other for pair in difference.pairs]
+    for which, side in zip("AB", sides, strict=True):
+        rows = [row for row in side if not row["status"].is_converged]
+        lists[f"compared, but not converged in {which}"] = _loads_by_contact(rows)
+    lists["specs, A -> B"] = [f"  {line}" for line in difference.spec]
+    return {title: lines for title, lines in lists.items() if lines}
+
+
+def diff_json(difference: Difference) -> str:
+    """The same as JSON; what does not apply is null."""
+    keys = (*CONTACT, *OF_EACH)
+    only_a, only_b = (
+        [{key: plain(row[key]) for key in keys} for row in rows] for rows in difference.only
+    )
+    records = [pair.record for pair in difference.pairs]
+    content = {
+        "rows": [{key: plain(value) for key, value in record.items()} for record in records],
+        "only_a": only_a,
+        "only_b": only_b,
+        "spec": difference.spec,
+        "paired": difference.paired,
+    }
+    return json.dumps(content, indent=1)
+
+
+def _title(pair: Pair) -> str:
+    one, other = _contact(pair.one), _contact(pair.other)
+    return one if one == other else f"A: {one}\nB: {other}"
+
+
+def _contact(row: Row) -> str:
+    """Elastomer and surface of a contact, and its boundary where that is free."""
+    return contact_title(row) + (", free boundary" if row["boundary"] == "free" else "")
+
+
+def _loads_by_contact(rows: list[Row]) -> list[str]:
+    """Loads grouped by scene, a line for each grid."""
+    lines = []
+    for name, scene in grouped(rows, _contact).items():
+        grids = grouped(scene, lambda row: row["points"])
+        loads = {points: ", ".join(map(_load, grid)) for points, grid in grids.items()}
+        lines += [f"  {name}", *(f"    {points}: {text}" for points, text in loads.items())]
+    return lines

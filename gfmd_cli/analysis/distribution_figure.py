@@ -1,21 +1,31 @@
 """Figures of Pr(sigma), on the grids and in the continuum, as the paper's Figs. 7 and 13."""
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from gfmd_cli.analysis.compare import Comparison
-from gfmd_cli.analysis.curve_styles import MAX_STYLES, CurveStyle, colours, curve_styles, order
+from gfmd_cli.analysis.curve_styles import (
+    MAX_STYLES,
+    CurveStyle,
+    StyledCurve,
+    colours,
+    curve_styles,
+    order,
+    seed_groups,
+)  # fmt: skip
 from gfmd_cli.analysis.distribution import StressDistribution, bin_counts, distributions
 from gfmd_cli.analysis.edge_law import fit_power_law
 from gfmd_cli.analysis.ensemble import by_load
 from gfmd_cli.analysis.plotting import DASHED, THEORY, ColumnFigure
-from gfmd_cli.analysis.selection import at_one_pressure, evenly, grouped, pressure_label
-from gfmd_cli.analysis.series import StyledCurve, seed_groups
+from gfmd_cli.analysis.selection import T, evenly, grouped
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.study.column import Row
 from gfmd_cli.study.columns import BINS, PR_LINEAR, PR_LOGARITHMIC
 
+TYPICAL_AREA = 0.1  # relative contact area of the paper's Fig. 7
+NEAR = 1.5  # pressures that differ by a smaller factor are shown side by side
 PRESSURES = 5  # at which the distribution of one elastomer is drawn
 MIN_COUNT = 10  # grid points; a bin with fewer is noise of 30 % and more
 EXTENSION = 2.5  # factor that the edge law is drawn beyond the window of its fit
@@ -56,6 +66,30 @@ def densities(items: list[StyledCurve]) -> dict[str, list[Density]]:
         "stress_distribution": side_by_side,
         "stress_distribution_pressures": evenly(several[0], PRESSURES) if several else [],
     }
+
+
+def at_one_pressure(
+    groups: Sequence[Sequence[T]], load: Callable[[T], tuple[float, float]]
+) -> list[T]:
+    """One contact of each group at about one pressure, of the groups that have it.
+
+    The pressure is that of most groups; among several, that at which the contact areas are nearest
+    to TYPICAL_AREA. `load` gives p* and a_r of a contact.
+    """
+
+    def near(p_star: float) -> list[T]:
+        nearest = [
+            min(group, key=lambda contact: abs(np.log(load(contact)[0] / p_star)))
+            for group in groups
+        ]
+        return [contact for contact in nearest if 1 / NEAR < load(contact)[0] / p_star < NEAR]
+
+    def rank(p_star: float) -> tuple[int, float]:
+        areas = np.array([load(contact)[1] for contact in near(p_star)])
+        return -areas.size, float(np.sum(np.abs(np.log(areas / TYPICAL_AREA))))
+
+    pressures = sorted({load(contact)[0] for group in groups for contact in group})
+    return near(min(pressures, key=rank)) if pressures else []
 
 
 def _densities(items: list[StyledCurve], name: str) -> list[list[Density]]:
@@ -100,7 +134,10 @@ def _side_by_side(shown: list[Density]) -> ColumnFigure:
 
 
 def _at_pressure(p_stars: list[float]) -> ColumnFigure:
-    return ColumnFigure(f"{STRESS}  at  {pressure_label(p_stars)}", DENSITY)
+    """A figure with the reduced pressure, or its range, in the label of its axis."""
+    low, high = min(p_stars), max(p_stars)
+    between = f"{low:.3g}" if high < 1.001 * low else rf"{low:.3g}\;\mathrm{{to}}\;{high:.3g}"
+    return ColumnFigure(f"{STRESS}  at  $p^* = {between}$", DENSITY)
 
 
 def _pressures(shown: list[Density]) -> ColumnFigure:

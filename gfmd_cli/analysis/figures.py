@@ -1,18 +1,28 @@
-"""Figures of a comparison, each as wide as a printed column: symbols simulation, lines theory."""
+"""Figures of a comparison, each as wide as a printed column: symbols simulation, lines theory.
 
+Symbols are the points of a curve, or the means over seeds with a confidence band.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import compress
 from pathlib import Path
+from typing import Self
 
 import numpy as np
 
-from gfmd_cli.analysis.compare import Comparison, einstein_prediction
-from gfmd_cli.analysis.curve_styles import curve_styles, order
+from gfmd_cli.analysis.compare import Comparison, best_of_all, einstein_prediction
+from gfmd_cli.analysis.curve_styles import CurveStyle, StyledCurve, seed_groups, with_styles
 from gfmd_cli.analysis.distribution_figure import continuum_figure, distribution_figures
+from gfmd_cli.analysis.ensemble import by_load, spread_of
 from gfmd_cli.analysis.plotting import DASHED, ColumnFigure, styled
-from gfmd_cli.analysis.series import Panel, Series, StyledCurve, seed_groups
-from gfmd_cli.analysis.wording import in_si
+from gfmd_cli.analysis.wording import contact_title, grid_size, in_si, quantity
 from gfmd_cli.files.atomic import make_folder
+from gfmd_cli.grid.arrays import Field, Mask
+from gfmd_cli.study.column import Row
 from gfmd_cli.units import scaled
 
+LOWEST = 1e-3  # of a mean: lower end of its band on a logarithmic axis
 WIDE = 20  # a ratio that varies by more is drawn on a log scale
 ROUNDING = 1e-9  # relative difference of equal values that were computed on different grids
 P_STAR = r"reduced pressure  $p^* = p\,/\,\Delta\sigma$"
@@ -22,6 +32,21 @@ LABELS = {
     "u_g": r"mean gap  $u_g\,/\,h_\mathrm{std}$",
 }
 RATIO = r"$a_r\,/\,a_r$(Persson)"
+
+
+@dataclass(frozen=True)
+class Panel:
+    """A quantity over the reduced pressure."""
+
+    name: str
+    column: str
+    meaning: str
+    """What the figure shows, as its caption."""
+    x_scale: str = "log"
+    y_scale: str = "linear"
+    ratio: bool = False
+
+
 PANELS = (
     Panel("contact_area", "a_r", "Relative contact area over reduced pressure", y_scale="log"),
     Panel("contact_area_ratio", "a_r", "Contact area over that of Persson theory", ratio=True),
@@ -36,6 +61,84 @@ PANELS = (
     ),
 )
 """The figures over the pressure."""
+
+
+@dataclass(frozen=True)
+class Series:
+    """A quantity over the pressure, of one curve or as the mean over seeds."""
+
+    style: CurveStyle
+    x: Field
+    y: Field
+    error: Field
+    """Estimated error, of several seeds the mean of their errors; NaN where it is unknown."""
+    half_width: Field
+    """Of the 95 % confidence interval of the mean over seeds; NaN of a single seed."""
+    converged: Mask
+    details: Sequence[str]
+    """Load, status and parameters of each point, a text of some lines."""
+    theory: Field
+    """Theory at `StyledCurve.p_star`, the mean over seeds."""
+
+    @classmethod
+    def of(cls, panel: Panel, items: list[StyledCurve]) -> Self:
+        """The series of curves that differ in their seed only: what its scale can show."""
+        loads = by_load(record for item in items for record in item.curve.records)
+        loads.sort(key=lambda seeds: float(np.mean([record["p_star"] for record in seeds])))
+        points = [_point(panel, seeds) for seeds in loads]
+        columns = [np.array(values) for values in zip(*points, strict=True)]
+        y = columns[1]
+        visible = np.isfinite(y) & ((y > 0) | (panel.y_scale == "linear"))
+        details = list(map(_details, compress(loads, visible)))
+        style = items[0].style
+        if len(items) > 1:
+            style = replace(style, label=f"{style.label}, {len(items)} seeds")
+        theory = np.mean([getattr(item.theory, panel.column) for item in items], axis=0)
+        x, y, error, half_width, converged = (column[visible] for column in columns)
+        return cls(style, x, y, error, half_width, converged, details, theory)
+
+    def draw(self, plot: ColumnFigure, *, line: bool) -> None:
+        """Draw points with error bars, the band of several seeds, and a line on request."""
+        if line:
+            plot.unnamed_line((self.style.label,), self.x, self.y, color=self.style.colour, lw=0.6)
+        plot.points(
+            self.style, self.x, self.y, self.converged, error=self.error, details=self.details
+        )
+        known = np.isfinite(self.half_width)
+        if np.any(known):
+            x, y, wide = self.x[known], self.y[known], self.half_width[known]
+            plot.band(self.style, x, np.maximum(y - wide, LOWEST * y), y + wide)
+
+    def extent(self) -> Field:
+        """The values that the scale of a figure must hold."""
+        return np.concatenate([self.y, self.y + np.nan_to_num(self.half_width)])
+
+
+def _point(panel: Panel, records: list[Row]) -> tuple[float, float, float, float, bool]:
+    """p*, value, error, half width of the confidence interval, and whether all converged."""
+    name = panel.column
+    units = np.array([r[f"{name}_persson"] if panel.ratio else 1.0 for r in records])
+    values, errors = np.transpose(best_of_all(records, name)) / units
+    half_width = spread_of(values).half_width if len(records) > 1 else np.nan
+    converged = all(record["status"].is_converged for record in records)
+    p_star = np.mean([record["p_star"] for record in records])
+    return float(p_star), float(values.mean()), float(np.abs(errors).mean()), half_width, converged
+
+
+def _details(rows: list[Row]) -> str:
+    """Load, status and parameters of a point, a line each."""
+    first = rows[0]
+    pressure = float(np.mean([row["pressure"] for row in rows]))
+    lines = [
+        *([f"pressure {quantity(pressure, 'Pa')}"] if in_si(first) else []),
+        contact_title(first, of_seeds=len(rows) > 1),
+        f"{grid_size(rows)}, solver {first['solver']}",
+    ]
+    if len(rows) > 1:
+        statuses = sorted({str(row["status"]) for row in rows})
+        return "\n".join([*lines, f"mean of {len(rows)} seeds: {', '.join(statuses)}"])
+    residual, tolerance = first["residual"], first["tolerance"]
+    return "\n".join([*lines, f"{first['status']}: residual {residual:.1e} of {tolerance:.1e}"])
 
 
 def draw_all(comparison: Comparison, folder: Path) -> list[Path]:
@@ -55,19 +158,6 @@ def study_figures(comparison: Comparison, items: list[StyledCurve]) -> dict[str,
     figures |= distribution_figures(items)
     figures["stress_distribution_continuum"] = continuum_figure(comparison)
     return {name: plot for name, plot in figures.items() if plot is not None}
-
-
-def with_styles(comparison: Comparison) -> list[StyledCurve]:
-    """The curves of a study in the order and style of its figures."""
-    curves = sorted(comparison.curves, key=order)
-    pressures = np.concatenate([curve.column("p_star") for curve in curves])
-    low, high = pressures.min() / 3, pressures.max() * 3
-    low = min(low, high / 1000)  # near the left end of a linear axis
-    p_star = np.union1d(np.geomspace(low, high, 200), np.linspace(low, high, 100))
-    return [
-        StyledCurve(curve, style, p_star, curve.predict(p_star))
-        for curve, style in zip(curves, curve_styles(curves), strict=True)
-    ]
 
 
 def _over_pressure(panel: Panel, items: list[StyledCurve]) -> ColumnFigure | None:

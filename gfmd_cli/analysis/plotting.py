@@ -5,6 +5,7 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from functools import partial
 from io import BytesIO
+from itertools import compress
 from pathlib import Path
 from typing import Any, Literal
 
@@ -45,13 +46,11 @@ STYLE = {
     "xtick.top": True,
     "ytick.right": True,
     "pdf.fonttype": 42,  # TrueType: publishers refuse Type 3
+    "svg.fonttype": "path",
+    "svg.hashsalt": "gfmd",  # the same figure gives the same bytes
 }
 CAP = 2.0  # points, to either side of an error bar
-METADATA: dict[str, dict[str, None]] = {
-    ".png": {},
-    ".pdf": {"CreationDate": None},
-    ".svg": {"Date": None},
-}
+METADATA: dict[str, Any] = {".png": {}, ".pdf": {"CreationDate": None}, ".svg": {"Date": None}}
 """Formats of a figure, with the entries that would make the same figure another file."""
 THEORY, UNCONVERGED, CONFIDENCE = "Persson theory", "not converged", "95 % confidence"
 """Entries of a legend that several curves share."""
@@ -122,15 +121,14 @@ class LegendFigure:
         )
 
     def svg(self) -> str:
-        """An SVG with outlined text and no background; the same figure gives the same bytes."""
+        """An SVG with outlined text and no background; to be called inside `styled`."""
         self._write_legend()
         parts: list[Any] = [self.figure, *self.figure.axes]
         for part in parts + [second for axes in parts[1:] for second in axes.child_axes]:
             part.patch.set(facecolor="none", edgecolor="none")
         image = BytesIO()
-        with rc_context({"svg.hashsalt": "gfmd", "svg.fonttype": "path"}):
-            # draws once; `savefig` would draw twice more, to lay out the figure
-            FigureCanvasSVG(self.figure).print_svg(image, metadata={"Date": None})
+        # draws once; `savefig` would draw twice more, to lay out the figure
+        FigureCanvasSVG(self.figure).print_svg(image, metadata=METADATA[".svg"])
         return image.getvalue().decode()
 
     def write(self, path: Path) -> list[Path]:
@@ -196,7 +194,7 @@ class ColumnFigure(LegendFigure):
             self.axes.plot(x[mask], y[mask], marker=marker, markevery=every, **options)
             if np.any(mask):
                 layer = PlotLayer("points", names, x[mask], y[mask], to_hex(style.colour), marker)
-                texts = [text for text, c in zip(details, mask, strict=False) if c]
+                texts = list(compress(details, mask))
                 self.layers.append(replace(layer, error=error[:, mask], details=texts))
         self.legend[style.label] = Line2D([], [], marker=style.marker, **options)
         if not np.all(converged):

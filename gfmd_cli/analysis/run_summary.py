@@ -7,7 +7,7 @@ from typing import Any
 from gfmd_cli.analysis.compare import with_best, with_solvers
 from gfmd_cli.analysis.selection import grouped
 from gfmd_cli.analysis.table import Record, Table, TableColumn, groups_of
-from gfmd_cli.analysis.tables import P_STAR, POINTS, PRESSURE, RESIDUAL, STATUS, warnings_in
+from gfmd_cli.analysis.tables import P_STAR, POINTS, PRESSURE, RESIDUAL, STATUS, TASK, warnings_in
 from gfmd_cli.analysis.wording import contact_title, grid_size, shown
 from gfmd_cli.physics.observables import QUANTITIES
 from gfmd_cli.study.measure import planned
@@ -19,7 +19,7 @@ from gfmd_cli.units import count, left_out
 MAX_ROWS = 40
 MAX_SCENES = 6  # of other specs that a run names
 TASKS = (
-    TableColumn("task", "task", "d"),
+    TASK,
     POINTS,
     TableColumn("load", "load"),
     TableColumn("MiB", "memory", ".0f"),

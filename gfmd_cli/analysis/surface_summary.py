@@ -49,23 +49,18 @@ class SurfaceSummary:
     """Of the cell that is solved, or of a map with borders, tapered."""
 
     @property
-    def copies(self) -> int:
-        """Copies of the surface along each side of the cell of the scene."""
-        return self.surface.within("periodic").copies
-
-    @property
     def in_si(self) -> bool:
         """Whether lengths are in metres: rms heights of real surfaces are small."""
         return self.moments.height <= LARGEST_RMS_HEIGHT
 
     def record(self) -> dict[str, Any]:
         """The summary as plain data in SI units."""
-        grid = self.scene.grid
+        grid, copies = self.scene.grid, self.surface.within("periodic").copies
         record: dict[str, Any] = {
             "surface": self.surface.label,
             "preparation": self.surface.preparation(),
-            "sides": [side / self.copies for side in grid.sides[::-1]],
-            "points": [points // self.copies for points in grid.whole_shape[::-1]],
+            "sides": [side / copies for side in grid.sides[::-1]],
+            "points": [points // copies for points in grid.whole_shape[::-1]],
             **self.parameters,
             "h_std": self.moments.height,
             "gradient": self.moments.gradient,

@@ -3,7 +3,6 @@
 from collections import Counter
 from collections.abc import Collection, Sequence
 from dataclasses import replace
-from functools import partial
 
 from gfmd_cli.analysis.compare import (
     VARIANTS,
@@ -27,13 +26,15 @@ from gfmd_cli.analysis.table import (
     ratio,
 )
 from gfmd_cli.analysis.wording import contact_title, grid_size, in_si, shown
-from gfmd_cli.physics.observables import QUANTITIES, Quantity
+from gfmd_cli.physics.observables import QUANTITIES
 from gfmd_cli.study.observables import OBSERVABLES, Observable
 from gfmd_cli.study.plausibility import SEPARATOR
 from gfmd_cli.units import count
 
 TitledCurves = list[tuple[str, Curve]]
 """Curves with the titles that tables give them."""
+TASK = TableColumn("task", "task", "d")
+ELASTOMER = TableColumn("elastomer", "elastomer")
 P_STAR = TableColumn("p*", "p_star", ".4g")
 PRESSURE = TableColumn("p", "pressure", ".4g", "Pa")
 AREA = TableColumn("a_r", "a_r")
@@ -46,49 +47,40 @@ THEORIES = {"persson": "Persson", "einstein": "closed form"}
 """Headings of predictions, by the suffix of their keys."""
 
 
-def _beside_theory(
-    value: TableColumn, name: str, theory: str = "persson", physical: Quantity | None = None
-) -> list[TableColumn]:
-    """A quantity, its prediction and their ratio; `physical`: both in SI units too."""
-    predicted, heading = f"{name}_{theory}", THEORIES[theory]
-    columns = [value, TableColumn(heading, predicted, optional=True)]
-    if physical and physical.scale:
-        _, unit, si = physical
-        columns.insert(1, TableColumn(name, product(f"{name}_best", unit), unit=si))
+def _beside_theory(name: str, theory: str = "persson", *, best: bool = False) -> list[TableColumn]:
+    """A quantity on the grid, or its best value in SI units too, with prediction and ratio."""
+    (symbol, unit, si), heading = QUANTITIES[name], THEORIES[theory]
+    value, predicted = f"{name}_best" if best else name, f"{name}_{theory}"
+    columns = [TableColumn(heading, predicted, optional=True)]
+    if best and unit:
+        columns.insert(0, TableColumn(name, product(value, unit), unit=si))
         columns.append(TableColumn(heading, product(predicted, unit), unit=si, optional=True))
-    quotient = ratio(str(value.value), predicted)
-    return [*columns, TableColumn("ratio", quotient, ".3f", optional=True)]
+    return [
+        TableColumn(symbol, value, error=f"{value}_error") if best else TableColumn(name, name),
+        *columns,
+        TableColumn("ratio", ratio(value, predicted), ".3f", optional=True),
+    ]
 
 
-def _continuum(record: Record, name: str) -> float | None:
-    return record[f"{name}_continuum"] if in_continuum(record, name) else None
+def _continuum(name: str) -> TableColumn:
+    return TableColumn(
+        QUANTITIES[name].heading,
+        lambda record: record[f"{name}_continuum"] if in_continuum(record, name) else None,
+        error=f"{name}_continuum_error",
+        otherwise=f"{name}_verdict",
+    )
 
 
 COMPARISON = (
     P_STAR,
     PRESSURE,
-    *(c for name in QUANTITIES for c in _beside_theory(TableColumn(name, name), name)),
+    *(column for name in QUANTITIES for column in _beside_theory(name)),
     TableColumn("p ratio", ratio("p_star_persson_at_u_g", "p_star"), ".3f", optional=True),
     STATUS,
 )
-EINSTEIN = (
-    P_STAR,
-    *(c for q in QUANTITIES for c in _beside_theory(TableColumn(q, q), q, "einstein")),
-)
+EINSTEIN = (P_STAR, *(c for name in QUANTITIES for c in _beside_theory(name, "einstein")))
 EINSTEIN_CAPTION = "Comparison with the closed form for n = 0 and Gaussian heights."
-CONTINUUM = (
-    P_STAR,
-    POINTS,
-    *(
-        TableColumn(
-            quantity.heading,
-            partial(_continuum, name=name),
-            error=f"{name}_continuum_error",
-            otherwise=f"{name}_verdict",
-        )
-        for name, quantity in QUANTITIES.items()
-    ),
-)
+CONTINUUM = (P_STAR, POINTS, *map(_continuum, QUANTITIES))
 SEEDS = (
     replace(P_STAR, error="p_star_confidence"),
     *(
@@ -98,9 +90,7 @@ SEEDS = (
     TableColumn("not converged", "failures", optional=True),
 )
 BEST_VALUES = {
-    name: (P_STAR, PRESSURE, *_beside_theory(best, name, physical=quantity), STATUS)
-    for name, quantity in QUANTITIES.items()
-    for best in [TableColumn(quantity.heading, f"{name}_best", error=f"{name}_best_error")]
+    name: (P_STAR, PRESSURE, *_beside_theory(name, best=True), STATUS) for name in QUANTITIES
 }
 """Columns by quantity: with continuum values where they are known, else with values on the grid."""
 TRUE_CONTACT = (
@@ -142,7 +132,7 @@ def _columns_of(observable: Observable) -> list[TableColumn]:
     """An observable in reduced and in SI units; the columns that no task has are left out."""
     heading, name, unit = observable.heading, observable.column.name, observable.unit
     if observable.is_flag:
-        return [TableColumn(heading, partial(_flag, name=name), optional=True)]
+        return [TableColumn(heading, lambda r: {0: False, 1: True}.get(r[name]), optional=True)]
     number_format = "d" if observable.column.kind is int else TableColumn.format
     if unit is None:
         return [TableColumn(heading, name, number_format, optional=True)]
@@ -150,10 +140,6 @@ def _columns_of(observable: Observable) -> list[TableColumn]:
         TableColumn(f"{heading}\n/ {unit.symbol}", name, number_format, optional=True),
         TableColumn(f"{heading}\n", lambda r: r[name] * unit.value(r), unit=unit.si, optional=True),
     ]
-
-
-def _flag(record: Record, name: str) -> bool | None:
-    return bool(record[name]) if known(record[name]) else None
 
 
 IN_TABLE = tuple(observable for observable in OBSERVABLES if observable.heading)

@@ -1,4 +1,4 @@
-"""Contacts, values in SI units, sizes of grids and counts in words."""
+"""Contacts, values in SI units and sizes of grids in words."""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -87,8 +87,3 @@ def grid_size(rows: Sequence[Mapping[str, Any]]) -> str:
     size = texts[0] if len(texts) == 1 else f"{texts[0]} to {texts[-1]}"
     free = "free boundary, " if all(row.get("boundary") == "free" for row in rows) else ""
     return f"{free}{size} points{' a side' if is_square else ''}"
-
-
-def enumeration(words: list[str]) -> str:
-    """Words as a sentence lists them."""
-    return words[0] if len(words) == 1 else ", ".join(words[:-1]) + " and " + words[-1]

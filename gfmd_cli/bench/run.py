@@ -162,15 +162,12 @@ def _trace(
     recorder.end(solution)
     points, residual, status = contact.grid.points, solution.residual, solution.status
     report(Progress(run, "end", label, points, solution.steps, residual, recorder.a_r, status))
-    return Trace.of(
-        row
-        | {
-            "solver": solver.kind,
-            "tolerance": solver.tolerance,
-            "nested": solver.nested,
-            "steps": solution.steps,
-            "residual": residual,
-            "status": str(status),
-        },
-        recorder.samples,
-    )
+    outcome = {
+        "solver": solver.kind,
+        "tolerance": solver.tolerance,
+        "nested": solver.nested,
+        "steps": solution.steps,
+        "residual": residual,
+        "status": str(status),
+    }
+    return Trace.of(row | outcome, recorder.samples)

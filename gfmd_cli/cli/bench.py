@@ -32,10 +32,9 @@ def bench(
 
         gfmd bench configs/bench.toml --figures figures
     """
-    from gfmd_cli.bench.figure import draw_bench
     from gfmd_cli.bench.file import check_target, write_bench
+    from gfmd_cli.bench.results import bench_table, draw_bench
     from gfmd_cli.bench.run import run_bench
-    from gfmd_cli.bench.table import bench_table
     from gfmd_cli.files.atomic import make_folder
     from gfmd_cli.spec.parse import read_spec
 

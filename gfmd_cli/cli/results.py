@@ -115,8 +115,7 @@ def export(study: Path, output: Path | None, task: int | None) -> None:
         raise InputError(f"{output}: unknown suffix {suffix!r}; allowed: .csv, .nc, .vti")
     if task is not None and suffix != ".vti":
         raise InputError("--task: chooses fields, for a .vti file")
-    from gfmd_cli.analysis.export import export_csv, write_netcdf
-    from gfmd_cli.analysis.vtk import write_image
+    from gfmd_cli.analysis.export import export_csv, write_image, write_netcdf
     from gfmd_cli.files.atomic import write_whole
 
     if output is None:
@@ -158,7 +157,7 @@ def diff(
         gfmd diff coarse.h5 fine.h5 --tolerance 0.01
     """
     from gfmd_cli.analysis.diff import diff as diff_studies
-    from gfmd_cli.analysis.diff_table import diff_json, diff_text
+    from gfmd_cli.analysis.diff import diff_json, diff_text
 
     difference = diff_studies(one, other)
     click.echo(diff_json(difference) if as_json else diff_text(difference))

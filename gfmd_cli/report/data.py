@@ -7,16 +7,15 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from gfmd_cli.analysis.compare import Comparison, compare_open
-from gfmd_cli.analysis.curve_styles import without_escapes
-from gfmd_cli.analysis.figures import study_figures, with_styles
+from gfmd_cli.analysis.compare import Comparison, compare
+from gfmd_cli.analysis.curve_styles import StyledCurve, with_styles, without_escapes
+from gfmd_cli.analysis.figures import study_figures
 from gfmd_cli.analysis.plotting import ColumnFigure
-from gfmd_cli.analysis.series import StyledCurve
 from gfmd_cli.analysis.tables import TitledCurves, curve_title
 from gfmd_cli.analysis.wording import in_si
 from gfmd_cli.bench.file import Trace
 from gfmd_cli.study.column import Row
-from gfmd_cli.study.reading import open_study, solved_rows, tell_files_apart
+from gfmd_cli.study.reading import solved_rows, tell_files_apart
 
 
 @dataclass(frozen=True)
@@ -24,10 +23,6 @@ class ReportData:
     """What the sections are made from."""
 
     comparison: Comparison
-    rows: list[Row]
-    """One for each task, missing ones too."""
-    attributes: dict[str, str]
-    """Attributes of the study file."""
     traces: list[Trace] = field(default_factory=list)
     """Traces of the bench; none where no bench is given."""
     letter: str = ""
@@ -51,7 +46,7 @@ class ReportData:
     @property
     def solved(self) -> list[Row]:
         """The rows that hold a result."""
-        return solved_rows(self.rows)
+        return solved_rows(self.comparison.rows)
 
     @property
     def failed(self) -> list[Row]:
@@ -61,12 +56,13 @@ class ReportData:
     @property
     def missing(self) -> list[str]:
         """The tasks that are not solved yet."""
-        return [str(row["task"]) for row in self.rows if not row["status"].is_solved]
+        return [str(row["task"]) for row in self.comparison.rows if not row["status"].is_solved]
 
     @property
     def name(self) -> str:
         """Name of the study; of two studies, which may share it, that of the file."""
-        return self.comparison.path.name if self.letter else self.attributes.get("title", "study")
+        study = self.comparison
+        return study.path.name if self.letter else study.attributes.get("title", "study")
 
     @property
     def title(self) -> str:
@@ -86,7 +82,7 @@ class ReportData:
     def json(self, attribute: str) -> dict[str, Any]:
         """An attribute that holds JSON; empty where it holds none."""
         try:
-            data = json.loads(self.attributes.get(attribute, ""))
+            data = json.loads(self.comparison.attributes.get(attribute, ""))
         except (ValueError, RecursionError):
             return {}
         return data if isinstance(data, dict) else {}
@@ -94,23 +90,18 @@ class ReportData:
 
 def read_report_data(study: Path, letter: str) -> ReportData:
     """Read a study; `letter` as in `ReportData`. Raises InputError, StudyError."""
-    with open_study(study) as file:
-        comparison, rows, attributes = compare_open(file, study), file.rows, file.attributes
+    comparison = compare(study)
     curves = [replace(curve, study=letter) for curve in comparison.curves]
-    return ReportData(replace(comparison, curves=curves), rows, attributes, letter=letter)
+    return ReportData(replace(comparison, curves=curves), letter=letter)
 
 
 def side_by_side(studies: Sequence[ReportData], traces: list[Trace]) -> ReportData:
     """The curves and rows of one study or of two together, and the traces of a bench."""
-    first = studies[0]
-    if len(studies) == 1:
-        return replace(first, traces=traces)
-    curves = [curve for data in studies for curve in data.comparison.curves]
-    missing = sum(data.comparison.missing for data in studies)
-    comparison = replace(first.comparison, curves=curves, missing=missing)
-    rows = [row for data in studies for row in data.rows]
+    comparisons = [data.comparison for data in studies]
+    curves = [curve for each in comparisons for curve in each.curves]
+    rows = [row for each in comparisons for row in each.rows]
     tell_files_apart(rows)
-    return ReportData(comparison, rows, {}, traces)
+    return ReportData(replace(comparisons[0], curves=curves, rows=rows), traces)
 
 
 def item_title(item: StyledCurve, *, of_seeds: bool = False) -> str:

@@ -38,21 +38,16 @@ def interactive(figure: ColumnFigure) -> dict[str, Any] | None:
     """
     if not figure.layers:
         return None
-    x, y = figure.axes.get_xlabel(), figure.axes.get_ylabel()
-    names = plain_label(x), plain_label(y)
-    layout = {
-        "xaxis": _axis(html_label(x), figure.axes.get_xscale(), figure.axes.get_xlim()),
-        "yaxis": _axis(html_label(y), figure.axes.get_yscale(), figure.axes.get_ylim()),
-    }
-    if figure.second is not None:
-        label, factor = figure.second
-        low, high = figure.axes.get_xlim()
-        scaled = _axis(html_label(label), figure.axes.get_xscale(), (low * factor, high * factor))
-        layout["xaxis2"] = scaled | {"overlaying": "x", "side": "top"}
+    x, y = figure.axes.xaxis, figure.axes.yaxis
+    names = plain_label(x.get_label_text()), plain_label(y.get_label_text())
+    layout = {"xaxis": _axis(x, x.get_label_text()), "yaxis": _axis(y, y.get_label_text())}
+    label, factor = figure.second or ("", None)
+    if factor is not None:
+        layout["xaxis2"] = _axis(x, label, factor) | {"overlaying": "x", "side": "top"}
     return {
         "data": [_trace(layer, names) for layer in figure.layers],
         "layout": layout,
-        "factor": None if figure.second is None else figure.second[1],
+        "factor": factor,
         "legend": [_entry(label, handle) for label, handle in figure.legend.items()],
         "names": names,
     }
@@ -96,15 +91,16 @@ def _hover(layer: PlotLayer, place: int, names: tuple[str, str]) -> str:
     return "<br>".join(escape(line, quote=False) for line in lines)
 
 
-def _axis(title: str, scale: str, limits: tuple[float, float]) -> dict[str, Any]:
-    ends = [math.log10(end) if scale == "log" else end for end in limits]
-    return {"title": {"text": title}, "type": scale, "range": _numbers(ends, DIGITS)}
+def _axis(axis: Any, label: str, factor: float = 1.0) -> dict[str, Any]:
+    """The range of an axis times a factor, with a label."""
+    ends, scale = factor * axis.get_view_interval(), axis.get_scale()
+    ends = np.log10(ends) if scale == "log" else ends
+    return {"title": {"text": html_label(label)}, "type": scale, "range": _numbers(ends, DIGITS)}
 
 
 def _entry(label: str, handle: Any) -> dict[str, str]:
     """An entry of the legend: its name, a character for its symbol, its colour."""
-    colour = to_hex(handle.get_color())
-    return {"name": _name(label), "symbol": _symbol(handle), "colour": colour}
+    return {"name": _name(label), "symbol": _symbol(handle), "colour": to_hex(handle.get_color())}
 
 
 def _symbol(handle: Any) -> str:

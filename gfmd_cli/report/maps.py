@@ -1,25 +1,29 @@
-"""Section: maps of contact, stress and gap, and cross-sections, of some contacts."""
+"""Section: maps of contact, stress and gap, and cross-sections, of some contacts.
+
+Cross-sections show the heights of indenter and elastomer, and the stress. Axes are in SI units
+where these mean something, else reduced.
+"""
 
 from collections import defaultdict
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from gfmd_cli.analysis.curve_styles import rgb
-from gfmd_cli.analysis.plotting import WIDTH, ColumnFigure, LegendFigure, shades
+from gfmd_cli.analysis.plotting import HEIGHT, WIDTH, ColumnFigure, LegendFigure, shades
 from gfmd_cli.analysis.selection import evenly, grouped
-from gfmd_cli.analysis.table import Group, Table, TableColumn
-from gfmd_cli.analysis.tables import AREA, P_STAR, POINTS, PRESSURE
-from gfmd_cli.analysis.wording import contact_title, pressure_text, shown
+from gfmd_cli.analysis.table import Group, Table
+from gfmd_cli.analysis.tables import AREA, ELASTOMER, P_STAR, POINTS, PRESSURE, TASK
+from gfmd_cli.analysis.wording import contact_title, in_si, largest, pressure_text, shown
 from gfmd_cli.grid.arrays import Field, Mask
 from gfmd_cli.maps.pictures import block_sums
 from gfmd_cli.physics.observables import contact_points
-from gfmd_cli.report import profiles
 from gfmd_cli.report.data import ReportData
-from gfmd_cli.report.section import Section
-from gfmd_cli.report.svg import drawing
+from gfmd_cli.report.section import Section, drawing
 from gfmd_cli.study.column import Row
 from gfmd_cli.study.reading import StudyFile, open_study
+from gfmd_cli.units import scaled
 
 MAX_CONTACTS, MAX_CURVES = 12, 3  # contacts that are shown, of at most so many curves
 SIDE = 256  # pixels of a map at the most
@@ -32,14 +36,34 @@ NONE, BEYOND = "black", "#cc3311"
 PERCENTILE = 99  # of the stress in contact and of the gap elsewhere: the end of the colour scale
 STORED = ("fields", "cross_sections")
 CAPTION = "The values are in /fields/TASK and /cross_sections/TASK of the study file."
-SHOWN = (
-    TableColumn("task", "task", "d"),
-    TableColumn("elastomer", "elastomer"),
-    P_STAR,
-    PRESSURE,
-    AREA,
-    POINTS,
-)
+SHOWN = (TASK, ELASTOMER, P_STAR, PRESSURE, AREA, POINTS)
+LINES = {
+    "height": ("indenter h", {"color": "black", "lw": 1.2}),
+    "u": ("elastomer u", {"color": "#0077bb", "lw": 0.9}),
+}
+STRESS = "#cc3311"
+ROWS = 256  # of fields, or of pixels of a map, that are in memory at a time
+
+
+class Scale(NamedTuple):
+    """Units of a quantity on axes."""
+
+    si: str
+    column: str
+    """Column of a row that holds the reduced unit."""
+    symbol: str
+
+    def axis(self, row: Row, largest_value: float, label: str) -> tuple[float, str]:
+        """A divisor for values up to `largest_value`, and the label with its unit."""
+        if in_si(row):
+            divisor, unit = scaled(largest_value, self.si)
+            return divisor, f"{label} ({unit})"
+        return float(row[self.column]), f"{label} / {self.symbol}"
+
+
+LENGTH_SCALE = Scale("m", "length", "L")
+HEIGHT_SCALE = Scale("m", "h_std", r"$h_\mathrm{std}$")
+STRESS_SCALE = Scale("Pa", "delta_sigma", r"$\Delta\sigma$")
 
 
 def maps(data: ReportData) -> Section:
@@ -60,7 +84,7 @@ def maps(data: ReportData) -> Section:
         f"{len(contacts)} of {len(rows_with_fields)} contacts with stored fields are shown, "
         f"{MAX_CONTACTS} at most."
     ]
-    if any(profiles.plane(row) and max(row["points"], row["points_y"]) > SIDE for row in contacts):
+    if any(plane(row) and max(row["points"], row["points_y"]) > SIDE for row in contacts):
         notes.append(f"Maps have up to {SIDE} pixels a side, each the mean of some grid points.")
     table = Table(CAPTION, shown(SHOWN, data.solved), [Group("", contacts)])
     return Section(
@@ -84,11 +108,11 @@ def _contact_maps(study: StudyFile, row: Row, prefix: str) -> dict[str, Any]:
     """Title, maps and cross-section of one contact."""
     task = row["task"]
     figures: list[tuple[str, LegendFigure, str]] = [*_map_figures(study, row)]
-    profile = profiles.read_profile(study, row)
+    profile = read_profile(study, row)
     if profile is not None:
         line = f"along {profile.along}{profile.place}"
         what = f"Cross-section {line}: heights above, stress below"
-        figures.append(("section", profiles.profile_figure(profile), what))
+        figures.append(("section", profile_figure(profile), what))
     return {
         "title": f"{pressure_text(row)}, a_r = {row['a_r']:.3g}",
         "drawings": [
@@ -101,7 +125,7 @@ def _contact_maps(study: StudyFile, row: Row, prefix: str) -> dict[str, Any]:
 def _map_figures(study: StudyFile, row: Row) -> list[tuple[str, ColumnFigure, str]]:
     """Maps of contact, stress and gap, as far as the fields for them are stored."""
     points = max(row["points"], row["points_y"])
-    pixels = _thumbnails(study, row["task"], -(-points // SIDE)) if profiles.plane(row) else {}
+    pixels = _thumbnails(study, row["task"], -(-points // SIDE)) if plane(row) else {}
     if "stress" not in pixels:
         return []
     stress, touching = pixels["stress"], pixels.get("contact")
@@ -109,12 +133,12 @@ def _map_figures(study: StudyFile, row: Row) -> list[tuple[str, ColumnFigure, st
     what = f"Stress; black: none, {red.format('contact')}"
     loaded = stress > NOISE * row["pressure"] if touching is None else touching > 0
     label = r"stress $\sigma$"
-    figures = [("stress", _scaled_figure(stress, loaded, row, profiles.STRESS_SCALE, label), what)]
+    figures = [("stress", _scaled_figure(stress, loaded, row, STRESS_SCALE, label), what)]
     if touching is not None:
         gap = pixels["gap"]
         figures.insert(0, ("contact", _contact_figure(touching, row), "Contact"))
         what = f"Gap; black: contact, {red.format('rest')}"
-        figure = _scaled_figure(gap, gap > 0, row, profiles.HEIGHT_SCALE, "gap")
+        figure = _scaled_figure(gap, gap > 0, row, HEIGHT_SCALE, "gap")
         figures.append(("gap", figure, what))
     return figures
 
@@ -122,7 +146,7 @@ def _map_figures(study: StudyFile, row: Row) -> list[tuple[str, ColumnFigure, st
 def _thumbnails(study: StudyFile, task: int, step: int) -> dict[str, Field]:
     """Means over pixels of step^2 points: the stress and, as far as known, contact and gap."""
     rows: dict[str, list[Field]] = defaultdict(list)
-    for block in study.blocks("fields", task, profiles.ROWS * step, ("u", "sigma", "height")):
+    for block in study.blocks("fields", task, ROWS * step, ("u", "sigma", "height")):
         if "sigma" in block:
             rows["stress"].append(_means(block["sigma"], step))
         if {"u", "sigma", "height"} <= block.keys():
@@ -144,9 +168,7 @@ def _contact_figure(touching: Field, row: Row) -> ColumnFigure:
     return plot
 
 
-def _scaled_figure(
-    values: Field, shown: Mask, row: Row, scale: profiles.Scale, label: str
-) -> ColumnFigure:
+def _scaled_figure(values: Field, shown: Mask, row: Row, scale: Scale, label: str) -> ColumnFigure:
     """Values in colours up to a percentile: a scale up to the peaks would leave the rest dark."""
     plot, extent = _cell(row)
     top = float(np.percentile(values[shown], PERCENTILE)) if np.any(shown) else 0.0
@@ -169,8 +191,102 @@ def _cell(row: Row) -> tuple[ColumnFigure, tuple[float, float, float, float]]:
     """Axes of the cell, and where it ends in their units."""
     length, length_y = float(row["length"]), float(row["length_y"])
     longest = max(length, length_y)
-    divisor, x = profiles.LENGTH_SCALE.axis(row, longest, "x")
-    _, y = profiles.LENGTH_SCALE.axis(row, longest, "y")
+    divisor, x = LENGTH_SCALE.axis(row, longest, "x")
+    _, y = LENGTH_SCALE.axis(row, longest, "y")
     plot = ColumnFigure(x, y)
     plot.height = min(max(0.85 * length_y / length, MIN_FIGURE_ASPECT), MAX_FIGURE_ASPECT) * WIDTH
     return plot, (0.0, length / divisor, 0.0, length_y / divisor)
+
+
+@dataclass(frozen=True)
+class Profile:
+    """Values along a line through the cell."""
+
+    values: dict[str, Field]
+    """Stored ones of u [m], height [m] and sigma [Pa], each of shape (points,)."""
+    position: Field
+    """Distance along the line [m], shape (points,)."""
+    along: str
+    """Name of the line."""
+    row: Row
+    """The contact; stresses far below its nominal pressure are rounding."""
+    place: str = ""
+    """Where the line lies in the cell, in words."""
+
+
+def read_profile(study: StudyFile, row: Row) -> Profile | None:
+    """The cross-section of a contact; a line contact may have stored it as its fields.
+
+    Where the fields of a cell are stored, the row of the grid that carries most load; the diagonal,
+    which can miss all contacts, only where that alone is stored.
+    """
+    line = not plane(row)
+    if not line and (profile := _most_loaded(study, row)):
+        return profile
+    values = study.arrays("cross_sections", row["task"])
+    if line and not values:
+        values = study.arrays("fields", row["task"])
+    if not values:
+        return None
+    size = next(iter(values.values())).size
+    length = float(row["length"])
+    step = (length if line else float(np.hypot(length, row["length_y"]))) / size
+    position = (np.arange(size) + size * row["x_first"]) * step
+    return Profile(values, position, "the cell" if line else "the diagonal", row)
+
+
+def _most_loaded(study: StudyFile, row: Row) -> Profile | None:
+    """The row of the grid that carries most load; None where not all fields are stored."""
+    loads, values = np.empty(0), {}
+    for block in study.blocks("fields", row["task"], ROWS, (*LINES, "sigma")):
+        if len(block) <= len(LINES):
+            return None
+        of_block = np.nan_to_num(np.maximum(block["sigma"], 0.0)).sum(axis=1)
+        if of_block.max() > loads.max(initial=-1.0):
+            values = {name: data[np.argmax(of_block)].copy() for name, data in block.items()}
+        loads = np.append(loads, of_block)
+    if not values:
+        return None
+    y, size = int(np.argmax(loads)), values["sigma"].size
+    position = (np.arange(size) / size + row["x_first"]) * float(row["length"])
+    place = f" through the row that carries most load (y = {y / loads.size:.2f} of the side)"
+    return Profile(values, position, "x", row, place)
+
+
+def plane(row: Row) -> bool:
+    """Whether a contact has maps; a line contact has none."""
+    return int(row["dimension"]) == 2
+
+
+def profile_figure(profile: Profile) -> LegendFigure:
+    """Heights above, stress below, over one position."""
+    plot = LegendFigure(WIDTH, 1.5 * HEIGHT)
+    length = float(np.ptp(profile.position))
+    divisor, label = LENGTH_SCALE.axis(profile.row, length, f"position along {profile.along}")
+    x = profile.position / divisor
+    upper, lower = plot.figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
+    _draw_heights(plot, upper, x, profile)
+    _draw_stress(lower, x, profile)
+    lower.set(xlabel=label, xlim=(x[0], x[-1]))
+    return plot
+
+
+def _draw_heights(plot: LegendFigure, axes: Any, x: Field, profile: Profile) -> None:
+    heights = {name: profile.values[name] for name in LINES if name in profile.values}
+    highest = max((largest(np.abs(y)) for y in heights.values()), default=0.0)
+    divisor, axis = HEIGHT_SCALE.axis(profile.row, highest, "height")
+    for name, y in heights.items():
+        label, style = LINES[name]
+        plot.legend[label] = axes.plot(x, y / divisor, **style)[0]  # of either sign
+    axes.set_ylabel(axis)
+
+
+def _draw_stress(axes: Any, x: Field, profile: Profile) -> None:
+    if "sigma" not in profile.values:
+        return
+    sigma = profile.values["sigma"]
+    top = max(largest(sigma), profile.row["pressure"])
+    divisor, label = STRESS_SCALE.axis(profile.row, top, r"$\sigma$")
+    axes.plot(x, sigma / divisor, color=STRESS, lw=0.9)
+    axes.set_ylabel(label)
+    axes.set_ylim(-0.05 * top / divisor, 1.1 * top / divisor)

@@ -3,40 +3,33 @@
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
-from urllib.parse import quote
 
-from gfmd_cli.analysis.export import csv_text
 from gfmd_cli.analysis.plotting import styled
 from gfmd_cli.bench.file import Trace, read_bench
-from gfmd_cli.report import figures
+from gfmd_cli.report import sections, summary
 from gfmd_cli.report.data import ReportData, read_report_data, side_by_side
-from gfmd_cli.report.facts import difference, failures, provenance
 from gfmd_cli.report.maps import maps
-from gfmd_cli.report.rendering import policy, render, scripts
+from gfmd_cli.report.rendering import render
 from gfmd_cli.report.section import Section
-from gfmd_cli.report.summary import headline, key_numbers, success, warnings
 from gfmd_cli.report.surface import measured_surface, surface_spectrum
 from gfmd_cli.report.theme import variables
 
 OWN, SHARED = True, False
 SECTIONS: tuple[tuple[Callable[[ReportData], Section], bool], ...] = (
-    (failures, OWN),
+    (sections.failures, OWN),
     (measured_surface, OWN),
-    (figures.contact_area, SHARED),
-    (figures.mean_gap, SHARED),
-    (figures.stress_deviation, SHARED),
-    (figures.stress_distribution, SHARED),
-    (figures.error_bars, SHARED),
-    (figures.optional_observables, SHARED),
+    (sections.contact_area, SHARED),
+    (sections.mean_gap, SHARED),
+    (sections.stress_deviation, SHARED),
+    (sections.stress_distribution, SHARED),
+    (sections.error_bars, SHARED),
+    (sections.optional_observables, SHARED),
     (maps, OWN),
     (surface_spectrum, SHARED),
-    (figures.work_precision, SHARED),
-    (provenance, OWN),
+    (sections.work_precision, SHARED),
+    (sections.provenance, OWN),
 )
 """In the order of the page; of two studies each has its own, or both share it."""
-MAX_CSV = 1_000_000  # bytes of the table of a study in its page; a larger one is for gfmd export
-UNQUOTED = " ,;:()*/=@+"
 
 
 def report(study: Path, bench: Path | None = None, other: Path | None = None) -> str:
@@ -46,38 +39,15 @@ def report(study: Path, bench: Path | None = None, other: Path | None = None) ->
     traces = [] if bench is None else read_bench(bench)
     name = " and ".join(data.name for data in studies)
     with styled():
-        sections = list(_sections(studies, traces))
-    body = render("body.html", name=name, studies=list(map(_top, studies)), sections=sections)
-    page = render(
-        "page.html",
-        name=name,
-        policy=policy(),
-        colours=variables(body),
-        body=body,
-        scripts=scripts(),
-    )
-    return f"{page}\n"
-
-
-def _top(data: ReportData) -> dict[str, Any]:
-    """Values of the part of the page above the sections."""
-    csv = csv_text(data.solved)
-    csv = csv if len(csv) < MAX_CSV else ""
-    return {
-        "title": data.title,
-        "headline": headline(data),
-        "warnings": warnings(data),
-        "success": success(data),
-        "key_numbers": key_numbers(data),
-        "csv_name": f"{data.comparison.path.stem}.csv",
-        "csv_address": f"data:text/csv;charset=utf-8,{quote(csv, UNQUOTED)}" if csv else "",
-    }
+        content = list(_sections(studies, traces))
+    body = render("body.html", name=name, studies=studies, summary=summary, sections=content)
+    return f"{render('page.html', name=name, colours=variables(body), body=body)}\n"
 
 
 def _sections(studies: list[ReportData], traces: list[Trace]) -> Iterator[Section]:
     """The sections that the studies have data for."""
     if len(studies) == 2:
-        yield difference(*studies)
+        yield sections.difference(*studies)
     shared = side_by_side(studies, traces)
     for make, own in SECTIONS:
         for data in studies if own else [shared]:

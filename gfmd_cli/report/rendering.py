@@ -99,6 +99,7 @@ def environment() -> Environment:
     )
     result.policies["json.dumps_kwargs"] = {"separators": (",", ":")}
     result.filters |= {"typeset": typeset, "table": table}
+    result.globals |= {"policy": policy, "scripts": scripts}
     return result
 
 

@@ -2,12 +2,13 @@
 
 import math
 from collections import Counter
-from typing import NamedTuple
+from urllib.parse import quote
 
 from gfmd_cli.analysis.compare import in_continuum
+from gfmd_cli.analysis.export import csv_text
 from gfmd_cli.analysis.table import known
 from gfmd_cli.analysis.tables import warnings_in
-from gfmd_cli.analysis.wording import enumeration, grid_size, pretty, quantity, span
+from gfmd_cli.analysis.wording import grid_size, pretty, quantity, span
 from gfmd_cli.physics.error_estimates import Verdict
 from gfmd_cli.physics.observables import QUANTITIES
 from gfmd_cli.report.data import ReportData
@@ -16,16 +17,14 @@ from gfmd_cli.units import count, duration
 
 NEARLY_FULL = 0.5  # p*; above, the gap falls by decades, and a ratio of gaps tells little
 SECONDS = 120  # below, a time is given with three digits
+MAX_CSV = 1_000_000  # bytes of the table of a study in its page; a larger one is for gfmd export
+UNQUOTED = " ,;:()*/=@+"
 MAX_NAMES = 3  # elastomers and surfaces that the headline names
 UNRESOLVED = [verdict for verdict in Verdict if not verdict.has_error]
 
 
-class KeyNumber(NamedTuple):
-    """One number of the summary."""
-
-    name: str
-    value: str
-    note: str
+KeyNumber = tuple[str, str, str]
+"""Name, value and note of one number."""
 
 
 def headline(data: ReportData) -> str:
@@ -34,12 +33,12 @@ def headline(data: ReportData) -> str:
     surfaces = list(dict.fromkeys(str(row["ensemble"]) for row in rows))
     elastomers = list(dict.fromkeys(str(row["elastomer"]) for row in rows))
     seeds = len({row["seed"] for row in rows if known(row["seed"])})
-    pascals = span(_column(rows, "pressure"), "Pa")
+    pascals = _span(rows, "pressure", "Pa")
     pressures = count(max(len(curve.rows) for curve in curves), "pressure")
     return (
-        f"{count(len(data.rows), 'contact')}: {_names_of(elastomers, 'elastomer')}, "
+        f"{count(len(data.comparison.rows), 'contact')}: {_names_of(elastomers, 'elastomer')}, "
         f"{_names_of(surfaces, 'surface')}, {count(seeds, 'seed') + ', ' if seeds > 1 else ''}"
-        f"{pressures} from p* = {span(_column(rows, 'p_star'))}"
+        f"{pressures} from p* = {_span(rows, 'p_star')}"
         f"{f' ({pascals})' if data.in_si else ''}, {grid_size(rows)}."
     )
 
@@ -47,52 +46,48 @@ def headline(data: ReportData) -> str:
 def _names_of(names: list[str], what: str) -> str:
     if len(names) == 1:
         return f"{what} {names[0]}"
-    return count(len(names), what) + (f" ({enumeration(names)})" if len(names) <= MAX_NAMES else "")
+    listed = f" ({', '.join(names[:-1])} and {names[-1]})" if len(names) <= MAX_NAMES else ""
+    return count(len(names), what) + listed
 
 
 def success(data: ReportData) -> str:
     """Statement that all contacts have converged; empty if some have not."""
     if data.failed or data.missing:
         return ""
-    total = len(data.rows)
+    total = len(data.comparison.rows)
     return f"All {total} contacts converged." if total > 1 else "The contact converged."
 
 
 def key_numbers(data: ReportData) -> list[KeyNumber]:
     """The most important numbers, in SI units where those mean something, else reduced."""
     rows = data.solved
-    tolerances = span(_column(rows, "tolerance"))
+    tolerances = f"natural residual, tolerance: {_span(rows, 'tolerance')}"
     seconds = sum(value for value in _column(rows, "seconds") if math.isfinite(value))
     time = quantity(seconds, "s") if seconds < SECONDS else duration(seconds)
     return [
         *_quantities(data),
         *_theory_numbers(data),
-        KeyNumber(
-            "Largest residual",
-            pretty(max(_column(rows, "residual"))),
-            f"natural residual, tolerance: {tolerances}",
-        ),
-        KeyNumber("Time", time, "solving, summed over contacts"),
+        ("Largest residual", pretty(max(_column(rows, "residual"))), tolerances),
+        ("Time", time, "solving, summed over contacts"),
     ]
 
 
 def _quantities(data: ReportData) -> list[KeyNumber]:
     """Pressure, area, gap and stress; in SI units with the scales behind them, or reduced."""
     rows = data.comparison.records
-    p_star = span(_column(rows, "p_star"))
+    p_star = _span(rows, "p_star")
     note = f"a_r, share of the nominal area{_continuum_note(rows, 'a_r')}"
-    pressure, scales = KeyNumber("Pressure", p_star, "p*, in units of Delta_sigma"), []
+    pressure, scales = ("Pressure", p_star, "p*, in units of Delta_sigma"), []
     if data.in_si:
-        pascals, full = (span(_column(rows, name), "Pa") for name in ("pressure", "delta_sigma"))
-        height, side = (span(_column(rows, name), "m") for name in ("h_std", "length"))
-        pressure = KeyNumber("Pressure", pascals, f"p* = {p_star}")
+        pressure = ("Pressure", _span(rows, "pressure", "Pa"), f"p* = {p_star}")
+        side = f"rms height h_std, side {_span(rows, 'length', 'm')}"
         scales = [
-            KeyNumber("Stress in full contact", full, "rms Delta_sigma"),
-            KeyNumber("Roughness", height, f"rms height h_std, side {side}"),
+            ("Stress in full contact", _span(rows, "delta_sigma", "Pa"), "rms Delta_sigma"),
+            ("Roughness", _span(rows, "h_std", "m"), side),
         ]
     return [
         pressure,
-        KeyNumber("Contact area", span(_column(rows, "a_r_best")), note),
+        ("Contact area", _span(rows, "a_r_best"), note),
         _scaled(data, "Mean gap", "u_g"),
         _scaled(data, "Stress deviation", "sigma_p"),
         *scales,
@@ -105,9 +100,9 @@ def _scaled(data: ReportData, title: str, name: str) -> KeyNumber:
     rows = data.comparison.records
     reduced, where = _column(rows, f"{name}_best"), _continuum_note(rows, name)
     if not data.in_si:
-        return KeyNumber(title, span(reduced), f"{symbol}{where}")
+        return title, span(reduced), f"{symbol}{where}"
     values = [value * row[scale] for value, row in zip(reduced, rows, strict=True)]
-    return KeyNumber(title, span(values, unit), f"{symbol} = {span(reduced)}{where}")
+    return title, span(values, unit), f"{symbol} = {span(reduced)}{where}"
 
 
 def _theory_numbers(data: ReportData) -> list[KeyNumber]:
@@ -117,8 +112,8 @@ def _theory_numbers(data: ReportData) -> list[KeyNumber]:
     area, gap = (_continuum_note(data.solved, name) for name in ("a_r", "u_g"))
     up_to = f"u_g up to p* = {NEARLY_FULL}{gap}"
     return [
-        KeyNumber("Area / Persson theory", _ratios(data, "a_r", math.inf), f"a_r{area}"),
-        KeyNumber("Gap / Persson theory", _ratios(data, "u_g", NEARLY_FULL), up_to),
+        ("Area / Persson theory", _ratios(data, "a_r", math.inf), f"a_r{area}"),
+        ("Gap / Persson theory", _ratios(data, "u_g", NEARLY_FULL), up_to),
     ]
 
 
@@ -143,9 +138,19 @@ def _column(rows: list[Row], name: str) -> list[float]:
     return [float(row[name]) for row in rows]
 
 
+def _span(rows: list[Row], name: str, unit: str = "") -> str:
+    return span(_column(rows, name), unit)
+
+
+def csv_address(data: ReportData) -> str:
+    """The table of a study as the address of a link; empty if it is too large for a page."""
+    csv = csv_text(data.solved)
+    return f"data:text/csv;charset=utf-8,{quote(csv, UNQUOTED)}" if len(csv) < MAX_CSV else ""
+
+
 def warnings(data: ReportData) -> list[str]:
     """Warnings above the results: missing, doubtful and unresolved values."""
-    total, parts = len(data.rows), []
+    total, parts = len(data.comparison.rows), []
     if data.failed:
         parts.append(f"{len(data.failed)} of {total} contacts did not reach their tolerance")
     if data.missing:

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from gfmd_cli.analysis.compare import Curve
-from gfmd_cli.analysis.curve_styles import MAX_STYLES, distinct_labels, distinct_styles, literal
+from gfmd_cli.analysis.curve_styles import MAX_STYLES, distinct_labels, distinct_styles
 from gfmd_cli.analysis.plotting import ColumnFigure
 from gfmd_cli.analysis.surface_figure import height_figure, spectrum_labels
 from gfmd_cli.analysis.surface_summary import FIT, fit_record
@@ -13,8 +13,7 @@ from gfmd_cli.analysis.table import Group, Table, TableColumn, records_of
 from gfmd_cli.maps.pictures import Picture
 from gfmd_cli.physics.surface_spectrum import Spectrum, spectrum
 from gfmd_cli.report.data import ReportData
-from gfmd_cli.report.section import Drawing, Section
-from gfmd_cli.report.svg import drawing
+from gfmd_cli.report.section import Drawing, Section, drawing
 from gfmd_cli.study.column import Row
 from gfmd_cli.study.reading import open_study
 
@@ -116,8 +115,7 @@ FIT_CAPTION = (
 
 def _spectrum_figure(names: list[str], shown: Sequence[Spectrum], dimension: int) -> ColumnFigure:
     plot = ColumnFigure(*spectrum_labels(dimension))
-    labels = [literal(name) for name in distinct_labels(names)]
-    for curve, style in zip(shown, distinct_styles(labels), strict=True):
+    for curve, style in zip(shown, distinct_styles(distinct_labels(names)), strict=True):
         if curve.fit is not None:
             line = {"color": style.colour, "lw": 0.7}
             plot.unnamed_line((style.label,), curve.q, curve.fitted, **line)

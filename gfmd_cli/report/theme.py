@@ -50,7 +50,8 @@ def toned(colour: str, paper: str) -> str:
     away = 1.0 if _luminance(paper) < 0.2 else 0.0
     for step in range(101):
         moved = lightness + (away - lightness) * step / 100
-        candidate = hex_of(*colorsys.hls_to_rgb(hue, moved, saturation))
+        parts = colorsys.hls_to_rgb(hue, moved, saturation)
+        candidate = "#" + bytes(round(255 * part) for part in parts).hex()
         if contrast(candidate, paper) >= LEGIBLE:
             break
     return candidate
@@ -67,8 +68,3 @@ def _luminance(colour: str) -> float:
         part / 12.92 if part <= 0.04045 else ((part + 0.055) / 1.055) ** 2.4 for part in rgb(colour)
     )
     return 0.2126 * red + 0.7152 * green + 0.0722 * blue
-
-
-def hex_of(*parts: float) -> str:
-    """Red, green, blue from 0 to 1 as #rrggbb."""
-    return "#" + bytes(round(255 * part) for part in parts).hex()

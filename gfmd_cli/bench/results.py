@@ -1,4 +1,7 @@
-"""Work-precision diagrams of a bench: error of the mean gap over transforms and seconds."""
+"""What a bench has measured: the cost of each solver as a table, and work-precision diagrams.
+
+The diagrams show the error of the mean gap over transforms and seconds.
+"""
 
 import re
 from pathlib import Path
@@ -9,12 +12,14 @@ import numpy as np
 from gfmd_cli.analysis.curve_styles import CurveStyle, distinct_styles, literal
 from gfmd_cli.analysis.plotting import SMALL, WIDTH, LegendFigure, log_scale, styled
 from gfmd_cli.analysis.selection import grouped
+from gfmd_cli.analysis.table import Group, Record, Table, TableColumn
+from gfmd_cli.analysis.tables import ELASTOMER, P_STAR, POINTS, RESIDUAL, STATUS
 from gfmd_cli.analysis.wording import contact_title
 from gfmd_cli.bench.file import Trace
 from gfmd_cli.bench.run import REFERENCE
-from gfmd_cli.bench.table import contact_of, solver_names
 from gfmd_cli.files.atomic import make_folder
 from gfmd_cli.grid.arrays import Field
+from gfmd_cli.physics.observables import QUANTITIES
 from gfmd_cli.status import Status
 
 FULL_WIDTH, ROW_HEIGHT = 2.09 * WIDTH, 2.0  # inches: a page of 180 mm; a row of panels
@@ -26,6 +31,70 @@ COSTS = (
 ROOM = 2.0  # for the symbols at the ends of a curve
 MAX_LABEL = 100  # characters of a title and of a file name
 ERROR = r"relative error of $u_g$"
+LEVELS = ("1e-2", "1e-4", "1e-6")
+"""Relative errors of the mean gap."""
+BENCH = (
+    ELASTOMER,
+    POINTS,
+    P_STAR,
+    TableColumn("solver", "name"),
+    *(TableColumn(f"transforms\nto {level}", f"transforms_{level}", ".0f") for level in LEVELS),
+    *(TableColumn(f"seconds\nto {level}", f"seconds_{level}", ".3g") for level in LEVELS),
+    *(TableColumn(f"error of\n{name}", f"{name}_error", ".1e") for name in QUANTITIES),
+    RESIDUAL,
+    STATUS,
+)
+
+
+def bench_table(traces: list[Trace]) -> Table:
+    """One record for each solver, grid and pressure.
+
+    Transforms and seconds until the error of the mean gap falls below a level for good; the errors
+    and the residual at the end. The surface is a column where there are several.
+    """
+    surfaces = list(dict.fromkeys(trace.row["surface"] for trace in traces))
+    title, columns = surfaces[0], BENCH
+    if len(surfaces) > 1:
+        title, columns = "", (*BENCH, TableColumn("surface", "surface"))
+    worst = max(trace.row["reference_residual"] for trace in traces)
+    caption = (
+        "Cost until the error of the mean gap stays below a level: Fourier transforms, in units of "
+        "one on the final grid, and seconds of processor time on one thread, without the "
+        f"recording. Errors are relative to a reference with a residual of {worst:.0e} or less."
+    )
+    names = solver_names(traces)
+    records = [_record(trace, name) for trace, name in zip(traces, names, strict=True)]
+    return Table(caption, columns, [Group(title, records)])
+
+
+def _record(trace: Trace, name: str) -> Record:
+    record = trace.row | {"name": name}
+    for level in LEVELS:
+        transforms, seconds = trace.reached("u_g", float(level)) or (None, None)
+        record |= {f"transforms_{level}": transforms, f"seconds_{level}": seconds}
+    errors = {f"{error}_error": float(trace.samples[f"{error}_error"][-1]) for error in QUANTITIES}
+    return record | errors
+
+
+def contact_of(trace: Trace) -> tuple[Any, ...]:
+    """Values that identify the contact of a trace."""
+    keys = ("surface", "seed", "elastomer", "boundary", "points", "p_star")
+    return tuple(trace.row.get(key) for key in keys)
+
+
+def solver_names(traces: list[Trace]) -> list[str]:
+    """Each solver, with its tolerance and its start where these are not the same for all."""
+    tolerances = {trace.row["tolerance"] for trace in traces}
+    starts = {trace.row["nested"] for trace in traces}
+    names = []
+    for trace in traces:
+        name = str(trace.row["solver"])
+        if len(tolerances) > 1:
+            name += f" {trace.row['tolerance']:g}"
+        if len(starts) > 1 and not trace.row["nested"]:
+            name += " not nested"
+        names.append(name)
+    return names
 
 
 def draw_bench(traces: list[Trace], folder: Path) -> list[Path]:
@@ -46,7 +115,7 @@ def bench_figures(traces: list[Trace]) -> dict[str, LegendFigure]:
     """The figures by name; to be called inside `styled`."""
     names = solver_names(traces)
     solvers = list(dict.fromkeys(names))
-    styles = {style.label: style for style in distinct_styles(solvers)}  # the same in all contacts
+    styles = dict(zip(solvers, distinct_styles(solvers), strict=True))  # the same in all contacts
     pairs = ((trace, styles[name]) for trace, name in zip(traces, names, strict=True))
     rows = list(grouped(pairs, lambda pair: contact_of(pair[0])).values())
     if len(rows) <= MAX_CONTACTS:

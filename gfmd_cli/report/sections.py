@@ -1,24 +1,44 @@
-"""Sections whose figures are those of `gfmd analyze` and `gfmd bench`, with the tables behind them.
+"""Sections: the figures of `gfmd analyze` and `gfmd bench`, with the tables behind them.
 
 Contact area, mean gap and stress deviation over the pressure, distribution of the stress, speed
-against error; error bars and optional observables, which are tables alone.
+against error; error bars and optional observables, which are tables alone; what failed, how two
+studies differ, where a study comes from.
 """
 
+import json
 from dataclasses import replace
 
 import numpy as np
 
 from gfmd_cli.analysis import tables
+from gfmd_cli.analysis.diff import NOTHING, diff, diff_lists, diff_table
 from gfmd_cli.analysis.distribution_figure import Density, densities
 from gfmd_cli.analysis.figures import PANELS
 from gfmd_cli.analysis.table import Group, Table, TableColumn, product, ratio, records_of
+from gfmd_cli.analysis.tables import ELASTOMER, P_STAR, RESIDUAL, STATUS, TASK
 from gfmd_cli.analysis.wording import shown
-from gfmd_cli.bench.figure import bench_figures
-from gfmd_cli.bench.table import bench_table
+from gfmd_cli.bench.results import bench_figures, bench_table
 from gfmd_cli.report.data import ReportData, item_title
-from gfmd_cli.report.section import Section
-from gfmd_cli.report.svg import drawing
+from gfmd_cli.report.section import Section, drawing
+from gfmd_cli.units import count
 
+MAX_ROWS = 100  # contacts that the table of failures lists
+MACHINE = ("node", "system", "processor", "cores", "python", "slurm_job")
+UNCONVERGED_CAPTION = (
+    "Contacts that ended above the requested tolerance. Their values are kept; figures show "
+    "them as crosses."
+)
+UNCONVERGED = (
+    TASK,
+    ELASTOMER,
+    TableColumn("surface", "surface"),
+    P_STAR,
+    STATUS,
+    RESIDUAL,
+    TableColumn("tolerance", "tolerance", ".1e"),
+    TableColumn("steps", "steps", "d"),
+    TableColumn("reason", lambda row: row["status"].explain(row)),
+)
 EXPLANATION = (
     "In this and the next figures over the pressure, symbols are the simulation: in the continuum "
     "with its error where that is known, else on the grid. Bars: estimated distance to the "
@@ -150,9 +170,53 @@ def work_precision(data: ReportData) -> Section:
         title,
         notes=[f"{MAX_CONTACTS} of {len(figures)} contacts are shown."] if left_out else [],
         drawings=[
-            drawing(figure, f"speed-{place}", BENCH_LABEL, BENCH_CAPTION, scrolls=True)
+            drawing(figure, f"speed-{place}", BENCH_LABEL, BENCH_CAPTION)
             for place, figure in enumerate(figures[:MAX_CONTACTS])
         ],
         disclosed={BEHIND: bench_table(data.traces)},
         template="work_precision.html",
     )
+
+
+def failures(data: ReportData) -> Section:
+    """Contacts that are not converged or missing."""
+    failed, missing = data.failed, data.missing
+    tasks = ", ".join(missing[:MAX_ROWS]) + (", ..." if len(missing) > MAX_ROWS else "")
+    left_out = len(failed) > MAX_ROWS
+    return Section(
+        "What failed or is missing",
+        notes=[f"The first {MAX_ROWS} of {len(failed)} are listed."] if left_out else [],
+        tables=[Table(UNCONVERGED_CAPTION, UNCONVERGED, [Group("", failed[:MAX_ROWS])])],
+        template="failures.html",
+        content={"count": count(len(missing), "contact"), "tasks": tasks} if missing else None,
+    )
+
+
+def difference(one: ReportData, other: ReportData) -> Section:
+    """What `gfmd diff` writes: pairs of contacts, rows of one study only, keys that differ."""
+    differences = diff(one.comparison.path, other.comparison.path)
+    notes = [] if differences.pairs else [f"{NOTHING.capitalize()}."]
+    lists = diff_lists(differences)
+    tables = [diff_table(differences)]
+    return Section("Difference", notes, tables, template="difference.html", content=lists)
+
+
+def provenance(data: ReportData) -> Section:
+    """Spec, versions, machine, date, commit."""
+    attributes, machine = data.comparison.attributes, data.json("machine")
+    software = [attributes.get(name, "") for name in ("software", "software_version")]
+    facts = [
+        ("Study", data.name),
+        ("Written", attributes.get("date", "")),
+        ("Software", " ".join(software).strip()),
+        ("Git commit", attributes.get("git_commit", "")),
+        *((key.replace("_", " ").capitalize(), str(machine.get(key, ""))) for key in MACHINE),
+        ("FFT plans", str(machine.get("plans", ""))),
+        *data.json("packages").items(),
+    ]
+    content = {
+        "spec_text": attributes.get("spec_text", ""),
+        "resolved": json.dumps(data.json("spec"), indent=1),
+        "facts": facts,
+    }
+    return Section("Provenance", template="provenance.html", content=content)
