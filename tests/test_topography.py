@@ -796,6 +796,14 @@ def test_a_header_with_one_side_is_refused(tmp_path, heights, stated, other, uni
         read_topography(tmp_path / "h.txt")
 
 
+def test_a_profile_with_two_sides_is_refused(tmp_path, heights):
+    pytest.importorskip("SurfaceTopography")
+    column = "\n".join(map(str, heights.ravel()))
+    (tmp_path / "h.txt").write_text(f"# Width: 20 um\n# Height: 12 um\n{column}\n")
+    with pytest.raises(InputError, match=r"h\.txt: .* two sides, but the table has one column"):
+        read_topography(tmp_path / "h.txt")
+
+
 @pytest.mark.parametrize("mark", ["NA", "No data", "1.#QNAN", ""])
 @pytest.mark.parametrize("by_rows", [True, False, None])
 def test_positions_beside_a_mark_are_refused(tmp_path, heights, mark, by_rows):

@@ -144,6 +144,11 @@ def _read_channel(path: Path, file: BinaryIO, reader: Any, dataset: str | None) 
         )
     if len(shape) == 2:
         _check_sides(path, channel)
+    elif len(channel.physical_sizes or ()) > len(shape):
+        raise InputError(
+            f"{path}: the header states two sides, but the table has one column, which is read as "
+            "the profile along a line; remove the second side, or save the rows of a map"
+        )
     if kind == "nc":
         _check_is_own_netcdf(path, reader)
     stored = channel.topography(physical_sizes=(1.0,) * len(shape) if unsized else None)
