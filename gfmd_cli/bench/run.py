@@ -80,8 +80,7 @@ class Recorder:
         points, seconds = contact.grid.points, now - self.begun - self.own
         self.samples.append((transforms, seconds, points, state.residual, *errors))
         step = state.step if isinstance(state, State) else state.steps
-        event = Progress(self.run, "step", self.label, points, step, state.residual, self.a_r)
-        self.report(event)
+        self.report(Progress(self.run, "step", self.label, points, step, state.residual, self.a_r))
 
 
 def _distance(observables: Observables, reference: Observables, name: str) -> float:

@@ -130,17 +130,15 @@ def _map_figures(study: StudyFile, row: Row) -> list[tuple[str, ColumnFigure, st
         return []
     stress, touching = pixels["stress"], pixels.get("contact")
     red = f"red: the {100 - PERCENTILE} % of the {{}} above the scale"
-    what = f"Stress; black: none, {red.format('contact')}"
     loaded = stress > NOISE * row["pressure"] if touching is None else touching > 0
-    label = r"stress $\sigma$"
-    figures = [("stress", _scaled_figure(stress, loaded, row, STRESS_SCALE, label), what)]
-    if touching is not None:
-        gap = pixels["gap"]
-        figures.insert(0, ("contact", _contact_figure(touching, row), "Contact"))
-        what = f"Gap; black: contact, {red.format('rest')}"
-        figure = _scaled_figure(gap, gap > 0, row, HEIGHT_SCALE, "gap")
-        figures.append(("gap", figure, what))
-    return figures
+    plot = _scaled_figure(stress, loaded, row, STRESS_SCALE, r"stress $\sigma$")
+    of_stress = ("stress", plot, f"Stress; black: none, {red.format('contact')}")
+    if touching is None:
+        return [of_stress]
+    gap = pixels["gap"]
+    plot = _scaled_figure(gap, gap > 0, row, HEIGHT_SCALE, "gap")
+    of_gap = ("gap", plot, f"Gap; black: contact, {red.format('rest')}")
+    return [("contact", _contact_figure(touching, row), "Contact"), of_stress, of_gap]
 
 
 def _thumbnails(study: StudyFile, task: int, step: int) -> dict[str, Field]:
