@@ -1,10 +1,11 @@
 """The state of an unfinished solve on disk: two slots and a pointer that names the newer one first.
 
-A slot holds the fields as they lie in memory. The pointer holds the checksums of both and all
-scalars, is sealed itself, and is replaced as a whole once a slot is on the disk. So whatever
-happens while one slot is written, the other still stands.
+A slot holds the fields as they lie in memory (mapped, space reserved first). The pointer holds the
+checksums of both and all scalars, is sealed itself, and is replaced as a whole once a slot is on
+the disk. So whatever happens while one slot is written, the other still stands.
 """
 
+import mmap
 import os
 import zlib
 from collections.abc import Iterator, Mapping
@@ -29,6 +30,8 @@ from gfmd_cli.solvers.nested_grids import Resume, grids_of
 from gfmd_cli.study.notes import Notes
 from gfmd_cli.study.pointer import Part, Scalars, Slot, pointer_text, read_pointer
 from gfmd_cli.study.unfinished_work import delete_checkpoint, set_aside
+
+CHUNK = 2**26  # bytes that a checkpoint maps at a time
 
 
 class SavedProgress(NamedTuple):
@@ -187,16 +190,23 @@ class Checkpoint:
 
 
 def _write_slot(path: Path, fields: list[Field]) -> int:
-    """Write the fields one after the other into a file; return its checksum."""
-    crc = 0
-    with open_regular(path, os.O_WRONLY | os.O_CREAT) as file:
-        for field in fields:
-            content = np.ascontiguousarray(field).data.cast("B")
-            file.write(content)
-            crc = zlib.crc32(content, crc)
-        file.truncate()
+    """Write the fields one after the other into a mapped file; return its checksum."""
+    total = offset = 0
+    with open_regular(path, os.O_RDWR | os.O_CREAT) as file:
+        file.truncate(sum(field.nbytes for field in fields))
+        os.posix_fallocate(file.fileno(), 0, sum(field.nbytes for field in fields))
+        with mmap.mmap(file.fileno(), 0) as memory:
+            for field in fields:
+                content = np.ascontiguousarray(field).data.cast("B")
+                for start in range(0, field.nbytes, CHUNK):
+                    chunk = content[start : start + CHUNK]
+                    memory[offset : offset + len(chunk)] = chunk
+                    offset += len(chunk)
+                    total = zlib.crc32(chunk, total)
+                    memory.madvise(mmap.MADV_DONTNEED)  # the chunk is in the file
+            memory.flush()
         os.fsync(file.fileno())
-    return crc
+    return total
 
 
 def _is_finite(field: Field) -> bool:
