@@ -28,6 +28,7 @@ from gfmd_cli.physics.observables import QUANTITIES, observe
 from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.solvers.auto import Auto
 from gfmd_cli.solvers.nested_grids import solve_contact
+from gfmd_cli.study.refinement import scales_of
 
 ROUGH = RoughnessScales(waves=20.0, curvature=2e3)
 GRIDS = (64, 128, 256)
@@ -207,6 +208,31 @@ def test_errors_do_not_average_out_over_the_copies_of_a_mirrored_map(tmp_path):
     random_error = 0.55 * np.sqrt(row["perimeter"] / row["points"]) / row["points"]
     assert row["a_r_verdict"] == "regular"
     assert row["a_r_continuum_error"] > 2 * random_error
+
+
+def test_laws_of_random_surfaces_leave_out_plateaus_copies_and_the_gap_of_high_peaks():
+    levels = sequence(1.0)
+    for scales in (replace(ROUGH, plateau=0.12), replace(ROUGH, repetitions=6.0)):
+        one, several = estimate(levels[-1:], 1.0, scales), estimate(levels, 1.0, scales)
+        assert {each.verdict for each in one.values()} == {"unknown"}
+        assert several == estimate(levels, 1.0, replace(ROUGH, anisotropy=3.0))
+    peaks = replace(ROUGH, highest=6.0)
+    one, several = estimate(levels[-1:], 1.0, peaks), estimate(levels, 1.0, peaks)
+    by_law, by_change = estimate(levels, 1.0, ROUGH), estimate(levels, 1.0, scales)
+    assert one["u_g"].verdict == "unknown"
+    assert several["u_g"] == by_change["u_g"] != by_law["u_g"]
+    for name in ("a_r", "sigma_p"):
+        assert one[name] == estimate(levels[-1:], 1.0, ROUGH)[name]
+        assert several[name] == by_law[name]
+
+
+def test_the_share_of_a_plateau_is_counted():
+    surface = SelfAffine(cutoff=0.1)
+    scene = build_scene(surface, HalfSpace(), 64)
+    cut = replace(scene, height=np.minimum(scene.height, 1.0))
+    assert scales_of(scene, True).plateau < 0.05
+    assert scales_of(cut, True).plateau == np.mean(cut.height > 0.6)
+    assert scales_of(cut, True).plateau > 0.15
 
 
 @pytest.mark.parametrize("width", [1 / 12, 1 / 16])

@@ -33,6 +33,7 @@ SMALL = {
     "steep_stiffness.py": "--points 32 --steps 300",
     "small_contacts.py": "--points 64 --cutoff 0.1 --p-star 0.1 --seeds 0 --repeats 1",
     "tile_solves.py": "--points 512 --cutoff 0.02 --p-star 0.001 --repeats 1",
+    "surface_classes.py": "bumps random --count 1 --finest 4",
     "transform_work.py": "--points 64",
     "time_left.py": f"{ROOT / 'configs' / 'smoke.toml'} --set grid.points=100 --jobs 1",
 }

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from gfmd_cli.errors import InputError
-from gfmd_cli.grid.arrays import Field
+from gfmd_cli.grid.arrays import Field, row_blocks
 from gfmd_cli.grid.ranks import on_root
 from gfmd_cli.physics import discretisation_error
 from gfmd_cli.physics.contact import Contact, Scene
@@ -303,5 +303,14 @@ def scales_of(
         band_limited=band_limited,
         aspect=max(grid.spacings) / min(grid.spacings),
         highest=scene.highest,
+        plateau=_share_above(scene, scene.highest - discretisation_error.PLATEAU_DEPTH),
         repetitions=repetitions(grid, scene.height) / copies if grid.dimension == 2 else 1.0,
     )
+
+
+def _share_above(scene: Scene, level: float) -> float:
+    """Share of the points of a surface above a level [h_std]."""
+    above = sum(
+        int(np.count_nonzero(scene.height[rows] > level)) for rows in row_blocks(scene.height)
+    )
+    return float(scene.grid.total(above)) / scene.grid.size
