@@ -210,20 +210,21 @@ def test_errors_do_not_average_out_over_the_copies_of_a_mirrored_map(tmp_path):
     assert row["a_r_continuum_error"] > 2 * random_error
 
 
-def test_laws_of_random_surfaces_leave_out_plateaus_copies_and_the_gap_of_high_peaks():
+def test_laws_of_random_surfaces_leave_out_copies_plateaus_and_the_gap_of_high_peaks():
     levels = sequence(1.0)
-    for scales in (replace(ROUGH, plateau=0.12), replace(ROUGH, repetitions=6.0)):
-        one, several = estimate(levels[-1:], 1.0, scales), estimate(levels, 1.0, scales)
-        assert {each.verdict for each in one.values()} == {"unknown"}
-        assert several == estimate(levels, 1.0, replace(ROUGH, anisotropy=3.0))
-    peaks = replace(ROUGH, highest=6.0)
-    one, several = estimate(levels[-1:], 1.0, peaks), estimate(levels, 1.0, peaks)
-    by_law, by_change = estimate(levels, 1.0, ROUGH), estimate(levels, 1.0, scales)
-    assert one["u_g"].verdict == "unknown"
-    assert several["u_g"] == by_change["u_g"] != by_law["u_g"]
-    for name in ("a_r", "sigma_p"):
-        assert one[name] == estimate(levels[-1:], 1.0, ROUGH)[name]
-        assert several[name] == by_law[name]
+    by_law = estimate(levels[-1:], 1.0, ROUGH), estimate(levels, 1.0, ROUGH)
+
+    def estimates(**scales):
+        rough = replace(ROUGH, **scales)
+        return estimate(levels[-1:], 1.0, rough), estimate(levels, 1.0, rough)
+
+    copies, plateau, peaks = estimates(repetitions=6), estimates(plateau=0.12), estimates(highest=6)
+    assert copies == estimates(anisotropy=3)
+    assert {each.verdict for each in (copies[0] | plateau[0]).values()} == {"unknown"}
+    assert plateau[1] == by_law[1]
+    for grids in (0, 1):
+        assert peaks[grids] == by_law[grids] | {"u_g": copies[grids]["u_g"]}
+        assert peaks[grids] != by_law[grids]
 
 
 def test_the_share_of_a_plateau_is_counted():
