@@ -124,11 +124,11 @@ def main() -> None:
     parser.add_argument("--finest", type=int, default=16, help="points over those of the maps")
     parser.add_argument("--seed", type=int, default=0)
     arguments = parser.parse_args()
-    draw = np.random.default_rng(arguments.seed)
     heads = [f"{grids}: {name}" for grids in (1, 2) for name in QUANTITIES]
     print("bars that hold of those given, largest error over its bar")
     print(f"| kind | {' | '.join(heads)} |\n{'| --- ' * (len(heads) + 1)}|")
     for kind in arguments.kinds or KINDS:
+        draw = np.random.default_rng([arguments.seed, list(KINDS).index(kind)])
         ratios = defaultdict(list)
         with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings(action="ignore"):
             for _ in range(arguments.count):
