@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from gfmd_cli.grid.fft_grid import Grid
+from gfmd_cli.physics.discretisation_error import MAX_REPETITIONS
 from gfmd_cli.physics.power_spectra import anisotropy, has_nyquist_waves, repetitions
 from gfmd_cli.physics.self_affine import SelfAffine
 
@@ -56,6 +57,15 @@ def test_a_random_surface_is_one_patch_and_tiles_of_it_are_copies(cutoff):
     row = np.tile(patch, (1, 3))
     ratio = repetitions(Grid(192, points_y=64), row) / repetitions(Grid(64), patch)
     assert ratio == pytest.approx(3, rel=0.35)
+
+
+def test_gaussian_maps_are_below_the_limit_of_copies_and_tiles_above():
+    m = np.hypot(np.fft.fftfreq(64, 1 / 64)[:, None], np.fft.rfftfreq(64, 1 / 64))
+    for seed in range(50):
+        noise = np.fft.rfft2(np.random.default_rng(seed).normal(size=(64, 64)))
+        patch = np.fft.irfft2(noise * (m <= 14) * (1 + (m / 4) ** 2) ** -0.9, (64, 64))
+        assert 0.7 < repetitions(Grid(64), patch) < 2.6 < MAX_REPETITIONS
+        assert repetitions(Grid(192), np.tile(patch, (3, 3))) > MAX_REPETITIONS
 
 
 def test_the_waves_of_two_points_are_found_along_each_axis():

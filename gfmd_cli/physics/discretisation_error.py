@@ -96,21 +96,20 @@ MIN_WAVES = 30.0
 least four waves per side have 40 and more, textures of one wavelength 4 to 12."""
 MAX_REPETITIONS = 5.0
 """Copies of one patch that a calibrated surface may resemble. Errors of copies do not average out:
-with 4 x 4 and 8 x 8 equal bumps they were up to 14 times the bar. Random surfaces have 0.7 to 2.6,
-and up to 4 if half of their waves are missing; 2 x 2 copies of them have 2.7 to 7, 3 x 3 6 to 12,
-lattices of equal bumps 12 to 60."""
+with 4 x 4 equal bumps they were up to 14 times the bar. Random surfaces have 0.7 to 2.6, and up to
+4 if half of their waves are missing; 2 x 2 copies of them have 2.7 to 7, equal bumps 12 to 60."""
 MIN_HIGHEST = 1.0
 """Smallest highest point of a calibrated surface, in h_std above the mean: surfaces with pits have
 1.1 and more. With 0.7 to 0.8 (h = -a^2 of a Gaussian a) contacts are ribbons on ridges that are as
 high as each other, and hardly any bar held."""
 PLATEAU_DEPTH, MAX_PLATEAU = 0.4, 0.1
 """Largest share of a surface within so many h_std of its highest point with which one grid gives an
-error. Of surfaces whose peaks are cut off (0.12 to 0.4), 65 to 85 of 100 bars of sigma_p held on
+error. Of surfaces whose peaks are cut off (0.12 to 0.4), 70 to 83 of 100 bars of sigma_p held on
 one grid, but 98 on two. Random surfaces have up to 0.05, surfaces with pits 0.03 to 0.5."""
 MAX_HIGHEST = 5.0
 """Highest point, in h_std above the mean, up to which the law of u_g holds. Of lattices of jittered
-bumps (5.7 to 6.3) 74 of 100 bars on one grid held and 92 on two, of Gaussian surfaces with peaks
-(5 to 16) 89 and 94."""
+bumps (5.7 to 6.3) 83 of 100 bars held on one grid and 93 on two, of surfaces with peaks (5 to 16)
+96 and 92. `scripts/surface_classes.py --laws` repeats these shares."""
 MAX_SPACING_RATIO = 1.1
 """Largest ratio of grid spacings with the excess of square pixels. With the wider spacing in x, a
 ratio of 2 has 0.7 of it and of 4 half, so that 56 of 100 bars of the corrected area held."""
@@ -135,7 +134,7 @@ class RoughnessScales:
     aspect: float = 1.0
     """Ratio of the grid spacings along x and y, at least 1."""
     highest: float = 3.0
-    """Height of the highest point above the mean [h_std]."""
+    """Height of the highest point above the mean [h_std]; by default that of a Gaussian surface."""
     plateau: float = 0.0
     """Share of the surface within `PLATEAU_DEPTH` of the highest point."""
     independent_waves: float = inf
