@@ -41,9 +41,9 @@ ONE_THREAD = {f"{name}_NUM_THREADS": "1" for name in ("OMP", "OPENBLAS", "MKL")}
 
 
 def gfmd(job, height):
-    from gfmd_cli.physics.contact import build_scene
     from gfmd_cli.physics.elastomers import HalfSpace
     from gfmd_cli.physics.file_surface import FileSurface
+    from gfmd_cli.physics.scenes import build_scene
     from gfmd_cli.solvers.auto import Auto
     from gfmd_cli.solvers.nested_grids import solve_contact
 
@@ -252,9 +252,9 @@ def reach(rows, name, target):
 
 def compare(points, p_star, pythons, options):
     """All codes at one size and pressure: every run, then seconds at equal error."""
-    from gfmd_cli.physics.contact import build_scene
     from gfmd_cli.physics.elastomers import HalfSpace
     from gfmd_cli.physics.observables import observe
+    from gfmd_cli.physics.scenes import build_scene
     from gfmd_cli.physics.self_affine import SelfAffine
     from gfmd_cli.solvers.auto import Auto
     from gfmd_cli.solvers.nested_grids import solve_contact

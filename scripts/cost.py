@@ -25,8 +25,9 @@ from gfmd_cli.analysis.curve_styles import MARKERS, CurveStyle, colours
 from gfmd_cli.analysis.figures import P_STAR
 from gfmd_cli.analysis.plotting import ColumnFigure, styled
 from gfmd_cli.grid.fft_grid import Grid
-from gfmd_cli.physics.contact import Scene, build_scene
+from gfmd_cli.physics.contact import Scene
 from gfmd_cli.physics.elastomers import Power
+from gfmd_cli.physics.scenes import build_scene
 from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.solvers.auto import Auto
 from gfmd_cli.solvers.nested_grids import solve_contact

@@ -11,11 +11,12 @@ from pathlib import Path
 import numpy as np
 from timing import least
 
-from gfmd_cli.physics.contact import Contact, build_scene
+from gfmd_cli.physics.contact import Contact
 from gfmd_cli.physics.elastomers import HalfSpace, Power
 from gfmd_cli.physics.file_surface import FileSurface
 from gfmd_cli.physics.indenters import LineParabola
 from gfmd_cli.physics.observables import observe, stress_histogram
+from gfmd_cli.physics.scenes import build_scene
 from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.solvers.auto import Auto
 from gfmd_cli.solvers.nested_grids import solve_contact

@@ -15,10 +15,12 @@ from typing import Any
 import numpy as np
 from scipy.special import erf
 
-from gfmd_cli.physics.contact import Scene, build_scene, radial_power
+from gfmd_cli.physics.contact import Scene
 from gfmd_cli.physics.elastomers import Power
 from gfmd_cli.physics.persson import gamma_n
+from gfmd_cli.physics.scenes import build_scene
 from gfmd_cli.physics.self_affine import SelfAffine
+from gfmd_cli.physics.waves import radial_power
 from gfmd_cli.solvers.auto import Auto
 from gfmd_cli.solvers.nested_grids import solve_contact
 

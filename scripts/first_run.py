@@ -10,8 +10,8 @@ from typing import Any
 
 from numba.core.dispatcher import Dispatcher
 
-from gfmd_cli.physics.contact import build_scene
 from gfmd_cli.physics.elastomers import Power
+from gfmd_cli.physics.scenes import build_scene
 from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.solvers.auto import Auto
 from gfmd_cli.solvers.nested_grids import solve_contact

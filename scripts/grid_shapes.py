@@ -14,8 +14,8 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import time
 
-from gfmd_cli.physics.contact import build_scene
 from gfmd_cli.physics.elastomers import Power
+from gfmd_cli.physics.scenes import build_scene
 from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.solvers import preconditioners
 from gfmd_cli.solvers.auto import Auto

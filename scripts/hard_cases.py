@@ -27,11 +27,12 @@ from pathlib import Path
 import exact_solutions as reference
 import numpy as np
 
-from gfmd_cli.physics.contact import Contact, build_scene
+from gfmd_cli.physics.contact import Contact
 from gfmd_cli.physics.elastomers import Elastomer, Power, Slab, Tabulated
 from gfmd_cli.physics.file_surface import FileSurface
 from gfmd_cli.physics.indenters import LineParabola, Parabola, Punch
 from gfmd_cli.physics.observables import Observables, observe
+from gfmd_cli.physics.scenes import build_scene
 from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.physics.surfaces import Surface
 from gfmd_cli.solvers.auto import Auto

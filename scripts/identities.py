@@ -8,9 +8,9 @@ import sys
 
 import numpy as np
 
-from gfmd_cli.physics.contact import build_scene
 from gfmd_cli.physics.elastomers import Power
 from gfmd_cli.physics.observables import observe
+from gfmd_cli.physics.scenes import build_scene
 from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.solvers.auto import Auto
 from gfmd_cli.solvers.nested_grids import solve_contact

@@ -15,8 +15,8 @@ import numpy as np
 
 from gfmd_cli.grid.ranks import mpi_ranks
 from gfmd_cli.grid.transposition import Transposition
-from gfmd_cli.physics.contact import build_scene
 from gfmd_cli.physics.elastomers import Power
+from gfmd_cli.physics.scenes import build_scene
 from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.solvers.auto import Auto
 from gfmd_cli.solvers.contact_state import PRESSED

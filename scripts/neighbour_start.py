@@ -17,9 +17,10 @@ import numpy as np
 from timing import least
 
 from gfmd_cli.grid.arrays import Field
-from gfmd_cli.physics.contact import Contact, Scene, build_scene
+from gfmd_cli.physics.contact import Contact, Scene
 from gfmd_cli.physics.elastomers import Power
 from gfmd_cli.physics.observables import contact_pressure
+from gfmd_cli.physics.scenes import build_scene
 from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.solvers.local_start import start_from
 from gfmd_cli.solvers.loop import solve

@@ -11,9 +11,10 @@ import argparse
 import numpy as np
 
 from gfmd_cli.grid.arrays import Field
-from gfmd_cli.physics.contact import Scene, build_scene, reduce_scene
+from gfmd_cli.physics.contact import Scene
 from gfmd_cli.physics.elastomers import HalfSpace
 from gfmd_cli.physics.observables import observe
+from gfmd_cli.physics.scenes import build_scene, reduce_scene
 from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.solvers.auto import Auto
 from gfmd_cli.solvers.nested_grids import solve_contact

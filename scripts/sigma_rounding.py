@@ -17,8 +17,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from gfmd_cli.physics.contact import Contact, build_scene
+from gfmd_cli.physics.contact import Contact
 from gfmd_cli.physics.elastomers import Power
+from gfmd_cli.physics.scenes import build_scene
 from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.solvers.loop import Start, State, solve
 from gfmd_cli.solvers.nested_grids import solve_contact

@@ -18,8 +18,8 @@ from unittest.mock import patch
 
 import numpy as np
 
-from gfmd_cli.physics.contact import build_scene
 from gfmd_cli.physics.elastomers import Tabulated
+from gfmd_cli.physics.scenes import build_scene
 from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.solvers import direct_start, multigrid, preconditioners
 from gfmd_cli.solvers.auto import Auto

@@ -24,8 +24,9 @@ from small_contacts import WholeGrids
 from timing import least
 
 from gfmd_cli.grid.arrays import Field
-from gfmd_cli.physics.contact import Contact, build_scene
+from gfmd_cli.physics.contact import Contact
 from gfmd_cli.physics.elastomers import Power
+from gfmd_cli.physics.scenes import build_scene
 from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.solvers import local_solve, local_start
 from gfmd_cli.solvers.local_solve import Evaluation

@@ -15,10 +15,11 @@ from gfmd_cli.analysis.table import plus_minus
 from gfmd_cli.analysis.tables import seeds_table, study_tables
 from gfmd_cli.bench.run import run_bench
 from gfmd_cli.errors import InputError
-from gfmd_cli.physics.contact import build_scene
 from gfmd_cli.physics.elastomers import Power, Slab
 from gfmd_cli.physics.error_bounds import error_bounds
+from gfmd_cli.physics.free_contact import SCENES
 from gfmd_cli.physics.observables import observe
+from gfmd_cli.physics.scenes import build_scene
 from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.solvers.auto import Auto
 from gfmd_cli.solvers.nested_grids import solve_contact
@@ -164,6 +165,25 @@ def test_a_given_grid_gets_errors_where_they_are_asked_for(rows_of):
     assert [other[name] for name in QUANTITIES] == pytest.approx(
         [row[name] for name in QUANTITIES], rel=1e-5
     )
+
+
+def test_pressures_share_the_scene_of_the_finest_grid(rows_of, monkeypatch):
+    """That of the coarser grid is built anew: both would take more memory than predicted."""
+    built = []
+
+    def build(surface, elastomer, points, *shared, points_y):
+        built.append(points)
+        return build_scene(surface, elastomer, points, *shared, points_y=points_y)
+
+    monkeypatch.setitem(SCENES, "periodic", build)
+    together = rows_of("grid.points=128", "load.p_star=[0.05,0.1,0.2]")
+    assert built == [64, 128, 64, 64]
+    built.clear()
+    rows_of("grid.points=[130,128]", "surface.seed=[1,2]", name="others.h5")
+    assert built == [130, 64, 128] * 2  # 65 points are odd
+    alone = [rows_of("grid.points=128", f"load.p_star={p}", name=f"{p}.h5") for p in (0.05, 0.2)]
+    for (row,), shared in zip(alone, together[::2], strict=True):
+        assert [row[name] for name in QUANTITIES] == [shared[name] for name in QUANTITIES]
 
 
 def test_nearly_full_contact_on_a_second_grid_is_contact(rows_of):

@@ -10,9 +10,9 @@ from gfmd_cli.bench import run as bench
 from gfmd_cli.bench.file import Trace, read_bench, write_bench
 from gfmd_cli.bench.results import bench_table, contact_of, draw_bench, solver_names
 from gfmd_cli.bench.run import GROWTH, REFERENCE, run_bench, solve_reference, solvers_to_compare
-from gfmd_cli.physics.contact import build_scene
 from gfmd_cli.physics.free_contact import build_free_scene
 from gfmd_cli.physics.observables import QUANTITIES, observe
+from gfmd_cli.physics.scenes import build_scene
 from gfmd_cli.solvers.dual import Dual
 from gfmd_cli.solvers.nested_grids import solve_contact
 from gfmd_cli.study.tasks import plan

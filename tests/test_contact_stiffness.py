@@ -5,10 +5,11 @@ import pytest
 from exact_solutions import hertz_radius
 
 from gfmd_cli.grid.fft_grid import Grid
-from gfmd_cli.physics.contact import Contact, build_scene
+from gfmd_cli.physics.contact import Contact
 from gfmd_cli.physics.elastomers import Power, Slab
 from gfmd_cli.physics.indenters import LineParabola, Parabola
 from gfmd_cli.physics.observables import contact_points, observe
+from gfmd_cli.physics.scenes import build_scene
 from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.solvers.auto import Auto
 from gfmd_cli.solvers.contact_stiffness import contact_stiffness

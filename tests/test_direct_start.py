@@ -6,9 +6,10 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from gfmd_cli.physics.contact import Contact, build_scene
+from gfmd_cli.physics.contact import Contact
 from gfmd_cli.physics.elastomers import Power, Slab
 from gfmd_cli.physics.indenters import LineParabola
+from gfmd_cli.physics.scenes import build_scene
 from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.solvers import direct_start as module
 from gfmd_cli.solvers.contact_state import refined

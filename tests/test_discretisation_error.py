@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from gfmd_cli import rows, run, solve
-from gfmd_cli.physics.contact import build_scene
 from gfmd_cli.physics.discretisation_error import (
     AREA_EXCESS,
     MAX_AREA_EXPONENT,
@@ -25,6 +24,7 @@ from gfmd_cli.physics.elastomers import HalfSpace, Layer, Membrane, Power, Slab,
 from gfmd_cli.physics.error_estimates import GridValues
 from gfmd_cli.physics.indenters import LineParabola, Parabola, Ridge, Wave
 from gfmd_cli.physics.observables import QUANTITIES, observe
+from gfmd_cli.physics.scenes import build_scene
 from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.solvers.auto import Auto
 from gfmd_cli.solvers.nested_grids import solve_contact

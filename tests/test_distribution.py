@@ -10,10 +10,10 @@ from gfmd_cli.analysis.distribution import StressDistribution, distributions, ex
 from gfmd_cli.analysis.distribution_figure import continuum_figure
 from gfmd_cli.analysis.edge_law import edge_exponent, fit_power_law, straight_line
 from gfmd_cli.analysis.tables import power_laws
-from gfmd_cli.physics.contact import build_scene
 from gfmd_cli.physics.elastomers import Power
 from gfmd_cli.physics.indenters import Parabola
 from gfmd_cli.physics.observables import LOGARITHMIC_EDGES, contact_points, observe
+from gfmd_cli.physics.scenes import build_scene
 from gfmd_cli.solvers.auto import Auto
 from gfmd_cli.solvers.nested_grids import solve_contact
 from gfmd_cli.spec.parse import read_spec

@@ -8,7 +8,6 @@ import pytest
 from pydantic import TypeAdapter, ValidationError
 
 from gfmd_cli.errors import InputError
-from gfmd_cli.physics.contact import build_scene
 from gfmd_cli.physics.elastomers import (
     Elastomer,
     HalfSpace,
@@ -21,6 +20,7 @@ from gfmd_cli.physics.elastomers import (
     slab_factor,
 )
 from gfmd_cli.physics.persson import Persson, gamma_n, gamma_slab
+from gfmd_cli.physics.scenes import build_scene
 from gfmd_cli.physics.self_affine import SelfAffine
 
 Q = np.concatenate([[0.0], np.logspace(-6, 6, 61)])

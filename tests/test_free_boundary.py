@@ -13,13 +13,13 @@ from scipy.optimize import nnls
 
 from gfmd_cli import api
 from gfmd_cli.grid.fft_grid import Grid
-from gfmd_cli.physics.contact import build_scene
 from gfmd_cli.physics.elastomers import HalfSpace, Power
 from gfmd_cli.physics.file_surface import FileSurface
 from gfmd_cli.physics.free_contact import build_free_scene
 from gfmd_cli.physics.indenters import LineParabola, Parabola
 from gfmd_cli.physics.observables import contact_line, observe
 from gfmd_cli.physics.patches import contact_patches, open_gap
+from gfmd_cli.physics.scenes import build_scene
 from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.solvers.auto import Auto
 from gfmd_cli.solvers.dual import Dual

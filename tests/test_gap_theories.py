@@ -9,10 +9,10 @@ from scipy.integrate import trapezoid
 from gfmd_cli import solve
 from gfmd_cli.analysis.compare import einstein_prediction
 from gfmd_cli.physics import einstein_solid
-from gfmd_cli.physics.contact import build_scene
 from gfmd_cli.physics.elastomers import Power
 from gfmd_cli.physics.gap_theories import CoarseGrained
 from gfmd_cli.physics.persson import Shells
+from gfmd_cli.physics.scenes import build_scene
 from gfmd_cli.physics.self_affine import SelfAffine
 
 P_STAR = np.array([1e-7, 1e-4, 0.01, 0.1, 0.3, 1.0])

@@ -9,10 +9,11 @@ import pytest
 import scipy.signal
 
 from gfmd_cli.grid.fft_grid import Grid
-from gfmd_cli.physics.contact import Contact, build_scene
+from gfmd_cli.physics.contact import Contact
 from gfmd_cli.physics.elastomers import HalfSpace, Power, Slab
 from gfmd_cli.physics.free_contact import SCENES, build_free_scene
 from gfmd_cli.physics.observables import contact_pressure
+from gfmd_cli.physics.scenes import build_scene
 from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.solvers.dual import Dual
 from gfmd_cli.solvers.local_start import LOCAL_SOLVES, start_from

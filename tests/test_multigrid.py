@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from gfmd_cli.grid.fft_grid import Grid
-from gfmd_cli.physics.contact import Contact, build_scene, reduce_scene
+from gfmd_cli.physics.contact import Contact
 from gfmd_cli.physics.elastomers import Power, Tabulated
+from gfmd_cli.physics.scenes import build_scene, reduce_scene
 from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.solvers import direct_start
 from gfmd_cli.solvers import multigrid_transfer_kernels as kernels

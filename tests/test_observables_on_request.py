@@ -9,10 +9,10 @@ import pytest
 from specs import power_spec
 
 from gfmd_cli.errors import InputError
-from gfmd_cli.physics.contact import build_scene
 from gfmd_cli.physics.elastomers import Power
 from gfmd_cli.physics.observables import LINEAR_EDGES, LOGARITHMIC_EDGES
 from gfmd_cli.physics.patches import AREA_EDGES
+from gfmd_cli.physics.scenes import build_scene
 from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.spec.models import ON_REQUEST, OutputTable
 from gfmd_cli.spec.parse import read_spec

@@ -16,12 +16,13 @@ from hypothesis import strategies as st
 
 from gfmd_cli.errors import GfmdError, InputError
 from gfmd_cli.physics import einstein_solid
-from gfmd_cli.physics.contact import PRESSURE_RANGE, build_scene
+from gfmd_cli.physics.contact import PRESSURE_RANGE
 from gfmd_cli.physics.elastomers import Plate, Power, Slab, Tabulated, slab_factor
 from gfmd_cli.physics.error_bounds import error_bounds
 from gfmd_cli.physics.indenters import Parabola, PowerLawIndenter, Punch, Ridge
 from gfmd_cli.physics.observables import QUANTITIES, contact_pressure, observe
 from gfmd_cli.physics.persson import Persson, Shells
+from gfmd_cli.physics.scenes import build_scene
 from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.solvers.auto import Auto
 from gfmd_cli.solvers.nested_grids import solve_contact

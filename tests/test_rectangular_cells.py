@@ -5,11 +5,11 @@ import pytest
 
 from gfmd_cli.errors import InputError
 from gfmd_cli.grid.fft_grid import Grid
-from gfmd_cli.physics.contact import build_scene
 from gfmd_cli.physics.elastomers import HalfSpace, Power, Slab
 from gfmd_cli.physics.indenters import Cone, Parabola, Punch, RigidSurface
 from gfmd_cli.physics.observables import observe
 from gfmd_cli.physics.persson import Persson
+from gfmd_cli.physics.scenes import build_scene
 from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.physics.surfaces import sample
 from gfmd_cli.solvers.auto import Auto

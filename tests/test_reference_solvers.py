@@ -9,10 +9,10 @@ import pytest
 from pydantic import ValidationError
 
 from gfmd_cli.grid.fft_grid import Grid
-from gfmd_cli.physics.contact import build_scene
 from gfmd_cli.physics.elastomers import HalfSpace, Power
 from gfmd_cli.physics.indenters import Wave
 from gfmd_cli.physics.observables import observe
+from gfmd_cli.physics.scenes import build_scene
 from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.solvers.ccg import ConstrainedCG
 from gfmd_cli.solvers.fire import Fire

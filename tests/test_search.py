@@ -12,7 +12,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from gfmd_cli.errors import InputError, Interrupted
-from gfmd_cli.physics.contact import build_scene
+from gfmd_cli.physics.scenes import build_scene
 from gfmd_cli.status import Status
 from gfmd_cli.study import run_task
 from gfmd_cli.study.load_search import TRIALS, Trial, _Search

@@ -15,10 +15,11 @@ from scipy.special import gamma, hyp2f1, zeta
 
 from gfmd_cli.errors import InputError
 from gfmd_cli.grid.fft_grid import Grid
-from gfmd_cli.physics.contact import Contact, build_scene
+from gfmd_cli.physics.contact import Contact
 from gfmd_cli.physics.elastomers import HalfSpace, Power, Slab
 from gfmd_cli.physics.indenters import LineParabola, Parabola, Wave
 from gfmd_cli.physics.observables import observe
+from gfmd_cli.physics.scenes import build_scene
 from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.solvers.auto import Auto
 from gfmd_cli.solvers.nested_grids import Resume, levels, solve_contact

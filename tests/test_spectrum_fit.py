@@ -5,12 +5,13 @@ from spectrum_fits import gaussian_roughness
 from gfmd_cli.analysis.surface_summary import summarise
 from gfmd_cli.errors import InputError
 from gfmd_cli.grid.fft_grid import Grid
-from gfmd_cli.physics.contact import build_scene, radial_power
 from gfmd_cli.physics.elastomers import HalfSpace
 from gfmd_cli.physics.file_surface import FileSurface
 from gfmd_cli.physics.persson import shells
+from gfmd_cli.physics.scenes import build_scene
 from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.physics.spectrum_fit import density, fit, moments
+from gfmd_cli.physics.waves import radial_power
 
 
 def shells_of(surface, points):

@@ -7,7 +7,7 @@ import h5py
 import numpy as np
 import pytest
 
-from gfmd_cli.physics.contact import build_scene
+from gfmd_cli.physics.scenes import build_scene
 from gfmd_cli.spec.parse import read_spec
 from gfmd_cli.study.reading import read_rows
 from gfmd_cli.study.tasks import plan

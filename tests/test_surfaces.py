@@ -8,7 +8,6 @@ from scipy.stats import kstest
 
 from gfmd_cli.errors import InputError
 from gfmd_cli.grid.fft_grid import Grid
-from gfmd_cli.physics.contact import build_scene
 from gfmd_cli.physics.elastomers import HalfSpace, Plate, Power, Slab
 from gfmd_cli.physics.file_surface import FileSurface
 from gfmd_cli.physics.indenters import (
@@ -20,6 +19,7 @@ from gfmd_cli.physics.indenters import (
     Ridge,
     Wave,
 )
+from gfmd_cli.physics.scenes import build_scene
 from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.physics.surfaces import sample
 

@@ -15,9 +15,9 @@ from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.maps import height_map, microscope_files
 from gfmd_cli.maps.map_preparation import level
 from gfmd_cli.maps.topography import Region, read_topography
-from gfmd_cli.physics.contact import build_scene
 from gfmd_cli.physics.elastomers import HalfSpace
 from gfmd_cli.physics.file_surface import FileSurface
+from gfmd_cli.physics.scenes import build_scene
 from gfmd_cli.physics.self_affine import SelfAffine
 
 SCAN = Path(__file__).parents[1] / "configs" / "data" / "di-3.di"

@@ -10,9 +10,10 @@ from specs import power_spec
 
 from gfmd_cli.analysis.compare import einstein_prediction
 from gfmd_cli.grid.fft_grid import Grid
-from gfmd_cli.physics.contact import Contact, build_scene
+from gfmd_cli.physics.contact import Contact
 from gfmd_cli.physics.elastomers import HalfSpace, Power
 from gfmd_cli.physics.indenters import LineParabola, Parabola, Ridge
+from gfmd_cli.physics.scenes import build_scene
 from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.physics.true_contact import Bearing, bearing, contact_area, contact_stress
 

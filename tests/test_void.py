@@ -9,13 +9,13 @@ from gfmd_cli import solve
 from gfmd_cli.errors import InputError
 from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.maps.interpolation import nearest
-from gfmd_cli.physics.contact import build_scene
 from gfmd_cli.physics.elastomers import HalfSpace, Layer, Power
 from gfmd_cli.physics.error_bounds import error_bounds
 from gfmd_cli.physics.file_surface import FileSurface
 from gfmd_cli.physics.free_contact import SCENES
 from gfmd_cli.physics.indenters import Punch
 from gfmd_cli.physics.observables import contact_points, gap_histogram, observe, stress_histogram
+from gfmd_cli.physics.scenes import build_scene
 from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.solvers.auto import Auto
 from gfmd_cli.solvers.ccg import ConstrainedCG

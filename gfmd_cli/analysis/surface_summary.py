@@ -10,10 +10,11 @@ import numpy as np
 from gfmd_cli.analysis.table import Group, Table, TableColumn, plain, records_of
 from gfmd_cli.maps.height_map import extent
 from gfmd_cli.maps.roughness_parameters import MAP_NAMES, PROFILE_NAMES, roughness_parameters
-from gfmd_cli.physics.contact import Scene, build_scene
+from gfmd_cli.physics.contact import Scene
 from gfmd_cli.physics.elastomers import HalfSpace
 from gfmd_cli.physics.indenters import RigidSurface
 from gfmd_cli.physics.persson import Persson
+from gfmd_cli.physics.scenes import build_scene
 from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.physics.spectrum_fit import Moments, SelfAffineFit, moments
 from gfmd_cli.physics.surface_spectrum import Spectrum, map_spectrum, spectrum

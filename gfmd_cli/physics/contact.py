@@ -8,7 +8,7 @@ see one scale, whatever the units of a scene; the stiffness is then in Delta_sig
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from math import sqrt
 from typing import Any, ClassVar
@@ -16,18 +16,12 @@ from typing import Any, ClassVar
 import numpy as np
 
 from gfmd_cli.errors import InputError
-from gfmd_cli.grid.arrays import Field, Mask, Modes, dot, row_blocks
+from gfmd_cli.grid.arrays import Field, Mask, dot, row_blocks
 from gfmd_cli.grid.fft_grid import ALL_ROWS, Grid, Shape
-from gfmd_cli.grid.modes import multiplicity
-from gfmd_cli.grid.ranks import Ranks
 from gfmd_cli.physics import kernels
-from gfmd_cli.physics.indenters import RigidSurface
-from gfmd_cli.physics.linear_elastomer import LinearElastomer
-from gfmd_cli.physics.persson import Shells, shells
-from gfmd_cli.physics.surfaces import sample
+from gfmd_cli.physics.persson import Shells
+from gfmd_cli.physics.waves import Texture, texture
 
-ROUNDING_POWER = 1e-28  # |h(q)|^2 of a mode that only rounding has excited, relative to the largest
-SCALE_RANGE = (1e-100, 1e100)  # [m, Pa]: squared, over all of the spectrum, still normal numbers
 PRESSURE_RANGE = (1e-30, 1e6)
 """Reduced pressures that are solved. Above 2^17 every grid is in full contact, as no peak exceeds
 its rms times the points per side; sigma - p then only loses digits. Far below the lower limit
@@ -271,6 +265,11 @@ class Scene:
         known = self.height if self.may_touch is None else self.height[self.may_touch]
         return self.grid.max(float(known.max(initial=-np.inf)))  # a process may have none
 
+    @cached_property
+    def texture(self) -> Texture:
+        """How the waves of the surface are distributed; one transform, once."""
+        return texture(self.grid, self.height)
+
     def in_metres(self, field: Field) -> Field:
         """A height or displacement in metres, from the level of the given surface."""
         return field * self.h_std + self.mean_height
@@ -288,139 +287,3 @@ class Scene:
                 f"{self.delta_sigma:.3g} Pa here; are moduli, heights and lengths in Pa and m?"
             )
         return self.contact_type(self.grid, self.height, self.stiffness, p_star, self.may_touch)
-
-
-def build_scene(
-    surface: RigidSurface,
-    elastomer: LinearElastomer,
-    points: int,
-    threads: int = 1,
-    ranks: Ranks | None = None,
-    *,
-    points_y: int = 0,
-) -> Scene:
-    """Sample the surface and reduce heights and stiffness to the scales of the resolved surface.
-
-    Raises InputError where the grid does not resolve the surface, the surface is flat, or a scale
-    is out of range.
-
-    Parameters
-    ----------
-    points, points_y : numbers of grid points along x and y; by default the pixels are square
-    threads : threads of the transforms and kernels
-    ranks : the processes that share large grids
-    """
-    grid, height = sample(surface, points, points_y, ranks)
-    scene = reduce_scene(replace(grid, threads=threads), height, elastomer)
-    return replace(scene, may_touch=touchable(surface.void(scene.grid), scene.grid))
-
-
-def touchable(void: Mask | None, grid: Grid) -> Mask | None:
-    """The points of a grid that can touch, where some cannot; None where all can.
-
-    Raises InputError where no point can.
-    """
-    if void is None:
-        return None
-    if not grid.total(int(np.count_nonzero(~void))):
-        raise InputError('surface.missing: "void" leaves no point that can touch')
-    return ~void
-
-
-def reduce_scene(grid: Grid, height: Field, elastomer: LinearElastomer) -> Scene:
-    """Reduce heights [m], which are overwritten, and stiffness to the scales of the surface."""
-    blocks = [height[rows] for rows in row_blocks(height)]
-    sums, highest, lowest = zip(*((b.sum(), b.max(), b.min()) for b in blocks), strict=True)
-    mean = grid.total(float(sum(sums))) / grid.size
-    largest = grid.max(float(max(max(highest) - mean, mean - min(lowest))))
-    # squares of heights of 1e-200 m would vanish
-    relative = ((block - mean) / largest for block in blocks)
-    squares = sum(dot(deviation, deviation) for deviation in relative)
-    rms = sqrt(grid.total(squares) / grid.size)
-    for block in blocks:
-        block -= mean
-        block /= largest * rms
-    stiffness, stiffest = _stiffness(grid, elastomer)
-    m, power, modes = radial_power(grid, height)
-    q = m * (2 * np.pi / grid.length)
-    k = elastomer.stiffness(q, grid.length)
-    unit = elastomer.unit_stiffness(q, grid.length)
-    with np.errstate(over="ignore"):  # refused below
-        reduced = float(np.sqrt(np.sum(power * (unit / stiffest) ** 2)))  # Eq. (23)
-    h_std = largest * rms
-    delta_sigma = reduced * stiffest * h_std
-    scales = {
-        "L": max(grid.sides),
-        "the spacing of the grid": min(grid.spacings),
-        "h_std": h_std,
-        "h_std times the largest k(q)": stiffest * h_std,
-        "Delta_sigma": delta_sigma,
-    }
-    for name, scale in scales.items():
-        if not SCALE_RANGE[0] <= scale <= SCALE_RANGE[1]:
-            raise InputError(
-                f"surface, elastomer: {name} = {scale:g} is out of range, "
-                f"{SCALE_RANGE[0]:g} to {SCALE_RANGE[1]:g}: choose other units"
-            )
-    stiffness /= reduced
-    return Scene(
-        grid=grid,
-        height=height,
-        stiffness=stiffness,
-        mean_height=mean,
-        h_std=h_std,
-        delta_sigma=delta_sigma,
-        shells=shells(q, power * h_std**2, k, elastomer.gamma(q, grid.length), modes),
-    )
-
-
-def _stiffness(grid: Grid, elastomer: LinearElastomer) -> tuple[Field, float]:
-    """k(q) over the half-spectrum in units of its largest value, and that value."""
-    k = np.empty(grid.spectral_shape)
-    count = len(k) // 2 + 1 if grid.dimension == 2 else len(k)  # the rows q_y >= 0
-    with np.errstate(over="ignore"):  # refused below
-        for rows in row_blocks(k[:count]):
-            k[rows] = elastomer.stiffness(grid.wavenumber(rows), grid.length)
-    half = k[:count]
-    stiffest = grid.max(float(half.max()))
-    if not (np.isfinite(stiffest) and stiffest > 0):
-        raise InputError(f"elastomer: stiffness {stiffest} at the shortest wave is out of range")
-    half /= stiffest
-    waves = half.ravel()[1:] if grid.ends[0] else half  # the first is q = 0
-    softest = grid.min(float(waves.min()))
-    if not softest >= SCALE_RANGE[0]:
-        raise InputError(f"elastomer: stiffness falls to {softest:g} of its largest value")
-    k[count:] = k[len(k) - count : 0 : -1]
-    return k, stiffest
-
-
-def radial_power(grid: Grid, height: Field) -> tuple[Field, Field, Field]:
-    """Sums of |h(q)|^2 over the modes (+-q_x, +-q_y), where they exceed rounding errors.
-
-    Returns |q| L / 2 pi, where L is the side along x, the sums, and their numbers of modes, each
-    of shape (sums,).
-    """
-    modes = grid.forward_into_work(height).reshape(grid.points_y, -1)
-    power = _opposite_rows_added(modes)
-    power *= grid.multiplicity()
-    power = grid.gather_columns(power)
-    power[0, 0] = 0.0
-    row, column = np.nonzero(power > ROUNDING_POWER * power.max())
-    m_y = row * (grid.length / grid.length_y) if grid.dimension == 2 else row
-    count = multiplicity(grid.points_y)[row] * multiplicity(grid.points)[column]
-    return np.sqrt(m_y**2 + column**2), power[row, column] / float(grid.size) ** 2, count
-
-
-def _opposite_rows_added(modes: Modes) -> Field:
-    """Sums of |h|^2 over q_y and -q_y, for q_y >= 0."""
-    count = len(modes)
-    power = np.zeros((count // 2 + 1, modes.shape[1]))
-    with_opposite, opposite = power[1 : (count + 1) // 2], modes[: count // 2 : -1]
-    for rows in row_blocks(power):
-        power[rows] += _squared(modes[: len(power)][rows])
-        with_opposite[rows] += _squared(opposite[rows])
-    return power
-
-
-def _squared(modes: Modes) -> Field:
-    return np.square(modes.real) + np.square(modes.imag)

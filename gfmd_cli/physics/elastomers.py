@@ -5,7 +5,7 @@ spatial dimensions".
 """
 
 from functools import lru_cache
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self
+from typing import Annotated, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import Field as Key
@@ -15,6 +15,7 @@ from gfmd_cli.errors import InputError
 from gfmd_cli.grid.arrays import Field, Mask
 from gfmd_cli.grid.fft_grid import ALL_ROWS, Shape
 from gfmd_cli.physics.compliance_transforms import Compliance
+from gfmd_cli.physics.contact import Scene
 from gfmd_cli.physics.free_compliance import Spacings
 from gfmd_cli.physics.linear_elastomer import LinearElastomer
 from gfmd_cli.physics.persson import gamma_slab
@@ -26,9 +27,6 @@ from gfmd_cli.physics.stiffness_table import (
 )
 from gfmd_cli.spec_table import FilePath, Positive
 from gfmd_cli.units import LARGEST_RMS_HEIGHT, labelled
-
-if TYPE_CHECKING:
-    from gfmd_cli.physics.contact import Scene
 
 LONG_WAVE = 1e-6  # q t up to which k of a layer is constant: (q t)^2 is below rounding
 DECAY_DISTANCE = 25.0  # thicknesses from which the displacement of a layer is below rounding
@@ -115,7 +113,7 @@ class Plate(LinearElastomer):
         """k(q) [Pa/m]."""
         return self.E_star / 12 * (self.thickness * q) ** 3 * q
 
-    def warnings(self, scene: "Scene", boundary: str, *, is_rough: bool) -> list[str]:
+    def warnings(self, scene: Scene, boundary: str, *, is_rough: bool) -> list[str]:
         """See `LinearElastomer.warnings`. At q t = 1 a slab is 0.81 times as stiff as a plate."""
         fraction = _fraction(scene.shells.variance, scene.shells.q * self.thickness > 1)
         if fraction <= MAX_SHORT_WAVE_STRESS:
@@ -158,7 +156,7 @@ class Slab(LinearElastomer):
         """k(q) [Pa/m] of the half-space with the same contact modulus."""
         return 0.5 * self.E_star * q
 
-    def warnings(self, scene: "Scene", boundary: str, *, is_rough: bool) -> list[str]:
+    def warnings(self, scene: Scene, boundary: str, *, is_rough: bool) -> list[str]:
         """See `LinearElastomer.warnings`. A thickness may be meant in m."""
         length = scene.grid.length
         thickness = self.thickness * length
@@ -214,7 +212,7 @@ class Layer(LinearElastomer):
         softening = layer_softening(t, self.poisson if self.base == "bonded" else None)
         return np.where(q > 0, 0.5 * self.E_star * q / softening, 0.0)
 
-    def warnings(self, scene: "Scene", boundary: str, *, is_rough: bool) -> list[str]:
+    def warnings(self, scene: Scene, boundary: str, *, is_rough: bool) -> list[str]:
         """See `LinearElastomer.warnings`."""
         warnings, poisson = [], self.poisson if self.base == "bonded" else None
         if is_rough and self.thickness <= scene.h_std:
@@ -274,7 +272,7 @@ class Tabulated(LinearElastomer):
         k = interpolated(read_table(self.path))
         return np.where(q > 0, k(np.where(q > 0, q, 1.0)), 0.0)
 
-    def warnings(self, scene: "Scene", boundary: str, *, is_rough: bool) -> list[str]:
+    def warnings(self, scene: Scene, boundary: str, *, is_rough: bool) -> list[str]:
         """See `LinearElastomer.warnings`."""
         q, variance = scene.shells.q, scene.shells.variance
         first, *_, last = read_table(self.path)[:, 0]

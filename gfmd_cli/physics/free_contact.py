@@ -24,9 +24,10 @@ from gfmd_cli.grid.distributed import create_grid
 from gfmd_cli.grid.fft_grid import Grid, Shape
 from gfmd_cli.grid.ranks import Ranks
 from gfmd_cli.maps.map_preparation import mirror
-from gfmd_cli.physics.contact import Contact, Scene, build_scene, reduce_scene, touchable
+from gfmd_cli.physics.contact import Contact, Scene
 from gfmd_cli.physics.indenters import RigidSurface
 from gfmd_cli.physics.linear_elastomer import LinearElastomer
+from gfmd_cli.physics.scenes import build_scene, reduce_scene, touchable
 from gfmd_cli.physics.surfaces import sample
 
 PRECONDITIONER_PADDING = 1.25

@@ -6,7 +6,7 @@ spatial dimensions". Sums exclude q = 0, where k is zero for every elastomer (lo
 """
 
 from fractions import Fraction
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -14,13 +14,11 @@ from gfmd_cli.errors import InputError
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.grid.fft_grid import ALL_ROWS, Shape
 from gfmd_cli.physics.compliance_transforms import Compliance
+from gfmd_cli.physics.contact import Scene
 from gfmd_cli.physics.free_compliance import Pixels, Spacings, power_law
 from gfmd_cli.physics.persson import gamma_n
 from gfmd_cli.spec_table import SpecTable
 from gfmd_cli.units import count
-
-if TYPE_CHECKING:
-    from gfmd_cli.physics.contact import Scene
 
 EXPONENT_STEP = 1e-3  # of ln q: the truncation error is of order 1e-7, the rounding error 1e-13
 
@@ -72,7 +70,7 @@ class LinearElastomer(SpecTable):
         """1/k(q) of an elastomer whose displacement decays and whose k(q) is not a power law."""
         raise NotImplementedError
 
-    def warnings(self, scene: "Scene", boundary: str, *, is_rough: bool) -> list[str]:
+    def warnings(self, scene: Scene, boundary: str, *, is_rough: bool) -> list[str]:
         """Warnings about a scene with this `grid.boundary`; empty by default.
 
         `is_rough`: whether its rms height is that of a rough surface, not of a single indenter.

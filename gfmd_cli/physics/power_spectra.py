@@ -1,4 +1,4 @@
-"""Power spectra and autocorrelations of fields, averaged over directions, and their anisotropy.
+"""Power spectra and autocorrelations of fields, averaged over directions.
 
 The shells are those of Persson theory, Mueser, "Elastic contacts of randomly rough surfaces across
 the spatial dimensions", Sect. 4.1.1: exact shells at long waves, then logarithmic bins. They
@@ -7,16 +7,15 @@ By Parseval's theorem the sum over the shells of a field is its variance.
 """
 
 from collections.abc import Mapping
-from math import inf, sqrt
 
 import numpy as np
 
-from gfmd_cli.grid.arrays import BLOCK_POINTS, Field, row_blocks
+from gfmd_cli.grid.arrays import Field, row_blocks
 from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.maps.roughness_parameters import autocorrelation, distances
-from gfmd_cli.physics.contact import ROUNDING_POWER, radial_power
 from gfmd_cli.physics.free_contact import doubled_grid
 from gfmd_cli.physics.persson import bin_edges
+from gfmd_cli.physics.waves import radial_power
 
 
 def spectra(grid: Grid, fields: Mapping[str, Field]) -> tuple[Field, Field, dict[str, Field]]:
@@ -80,58 +79,3 @@ def correlation(grid: Grid, field: Field) -> Field:
     grid.backward_into(products)
     variance = float(products.flat[0])
     return np.divide(products, variance if variance > 0 else np.nan, out=products)
-
-
-def anisotropy(grid: Grid, height: Field) -> float:
-    """Ratio of the rms slopes along the principal axes: 1 if isotropic, infinite for a line.
-
-    From the eigenvalues of the tensor <grad h grad h>, summed over the waves of the surface. The
-    cost is one transform.
-    """
-    if grid.dimension == 1:
-        return inf
-    modes = grid.forward_into_work(height)
-    x = np.arange(*grid.span, dtype=np.float64)
-    weight = grid.multiplicity()
-    sums = np.zeros(3)
-    for rows in row_blocks(modes, max(modes.size // 16, BLOCK_POINTS)):
-        y = grid.mode_number_y(rows)[:, None]
-        power = weight * np.abs(modes[rows]) ** 2
-        # the waves with the highest q_y of an even number of points have both signs of q_y
-        mixed = np.where(np.abs(y) * grid.length_y < 0.5 * grid.points_y * grid.length, x * y, 0.0)
-        sums += [float(np.sum(power * term)) for term in (x * x, y * y, mixed)]
-    xx, yy, xy = grid.total(sums)
-    middle, half = 0.5 * (xx + yy), sqrt((0.5 * (xx - yy)) ** 2 + xy**2)
-    return sqrt((middle + half) / (middle - half)) if middle - half > 1e-12 * middle else inf
-
-
-def repetitions(grid: Grid, height: Field) -> float:
-    """How many copies of one patch a surface resembles: 1 if it is random, m^2 for m x m copies.
-
-    The slopes of copies are spread over fewer waves: over every m-th along each axis. The number of
-    waves is (sum s)^2 / sum s^2, with the power s of the slope of a wave. It is compared with the
-    number that the same power would have if it were the same for all waves of a half octave. The
-    cost is one transform.
-    """
-    m, power, count = radial_power(grid, height)
-    slopes = power * m**2
-    half_octave = np.rint(2 * np.log2(m)).astype(np.int64)
-    first = int(half_octave.min())
-    sums = np.bincount(half_octave - first, slopes)
-    edges = 2.0 ** (0.5 * (np.arange(sums.size + 1) + first) - 0.25)
-    waves = np.pi * np.diff(edges**2) * (grid.length_y / grid.length)
-    return float(np.sum(slopes**2 / count) / np.sum(sums**2 / waves))
-
-
-def has_nyquist_waves(grid: Grid, height: Field) -> bool:
-    """Whether a field has waves of the Nyquist wavenumber of an axis, beyond rounding errors.
-
-    A grid shows only their part that is even about its points: a finer grid has another field. The
-    cost is one transform.
-    """
-    modes = grid.as_rows(grid.forward_into_work(height))
-    largest = grid.max(max(float(np.abs(modes[rows]).max()) for rows in row_blocks(modes)))
-    along_x = modes[:, -1:] if grid.ends[1] else modes[:, :0]
-    along_y = modes[len(modes) // 2] if len(modes) % 2 == 0 else modes[0, :0]
-    highest = max(float(np.abs(waves).max(initial=0.0)) for waves in (along_x, along_y))
-    return grid.max(highest) > sqrt(ROUNDING_POWER) * largest

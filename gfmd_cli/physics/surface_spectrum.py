@@ -7,10 +7,10 @@ import numpy as np
 
 from gfmd_cli.errors import InputError
 from gfmd_cli.grid.arrays import Field
-from gfmd_cli.physics.contact import build_scene
 from gfmd_cli.physics.elastomers import HalfSpace
 from gfmd_cli.physics.indenters import RigidSurface
 from gfmd_cli.physics.persson import Shells
+from gfmd_cli.physics.scenes import build_scene
 from gfmd_cli.physics.spectrum_fit import SelfAffineFit, fit
 
 BANDS_PER_DECADE = 10  # a choice

@@ -11,8 +11,8 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from gfmd_cli.errors import InputError, typed
-from gfmd_cli.physics.contact import build_scene
 from gfmd_cli.physics.file_surface import FileSurface
+from gfmd_cli.physics.scenes import build_scene
 from gfmd_cli.spec.check import Check, kinds_of
 from gfmd_cli.spec.models import Spec, with_boundary
 from gfmd_cli.spec.parse import set_override, split_override

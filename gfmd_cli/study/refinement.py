@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field, replace
 from functools import lru_cache, partial
+from math import prod
 from threading import get_ident
 from typing import Any
 
@@ -9,6 +10,7 @@ import numpy as np
 
 from gfmd_cli.errors import InputError
 from gfmd_cli.grid.arrays import Field, row_blocks
+from gfmd_cli.grid.fft_grid import Shape
 from gfmd_cli.grid.ranks import on_root
 from gfmd_cli.physics import discretisation_error
 from gfmd_cli.physics.contact import Contact, Scene
@@ -22,7 +24,6 @@ from gfmd_cli.physics.observables import (
     contact_pressure,
     observe,
 )
-from gfmd_cli.physics.power_spectra import anisotropy, has_nyquist_waves, repetitions
 from gfmd_cli.solvers.loop import Start
 from gfmd_cli.solvers.nested_grids import Resume, Solution, solve_contact
 from gfmd_cli.status import Status
@@ -65,24 +66,36 @@ class TaskSolution:
 
 
 @lru_cache(maxsize=1)
-def _scene(thread: int, boundary: str, *description: Any, points_y: int) -> Scene:
-    """See `SCENES`; consecutive tasks mostly share their scene.
+def _scenes(thread: int, *description: Any) -> dict[Shape, Scene]:
+    """The scenes of one surface and elastomer by shape of the grid, see `task_scene`.
 
-    It is kept for one thread only: the transforms of a scene work in one memory.
+    They are kept for one thread only: the transforms of a scene work in one memory.
     """
-    return SCENES[boundary](*description, points_y=points_y)
+    return {}
 
 
 def task_scene(task: Task, points: int, context: SolveContext) -> Scene:
-    """The scene of a task on a grid of `points` points along x."""
-    description = task.surface, task.elastomer, points, context.options.threads, context.ranks
-    points_y = task.points_y_on(points)
-    return _scene(get_ident(), task.boundary, *description, points_y=points_y)
+    """The scene of a task on a grid of `points` points along x.
+
+    Consecutive tasks mostly share their scenes. Those of grids with at least four times the points
+    are kept: together with a solve they take less memory than a solve on their grid.
+    """
+    description = task.surface, task.elastomer, context.options.threads, context.ranks
+    scenes = _scenes(get_ident(), task.boundary, *description)
+    shape = task.points_y_on(points), points
+    for other in set(scenes) - {shape}:
+        if prod(other) < 4 * prod(shape):
+            del scenes[other]
+    if shape not in scenes:
+        surface, elastomer, *shared = description
+        build = SCENES[task.boundary]
+        scenes[shape] = build(surface, elastomer, points, *shared, points_y=shape[0])
+    return scenes[shape]
 
 
 def forget_scene() -> None:
-    """Free the memory of the last scene."""
-    _scene.cache_clear()
+    """Free the memory of the last scenes."""
+    _scenes.cache_clear()
 
 
 def solve_on_grids(task: Task, context: SolveContext, watcher: Watcher) -> TaskSolution:
@@ -105,7 +118,7 @@ def solve_on_grids(task: Task, context: SolveContext, watcher: Watcher) -> TaskS
         solved = _solve_on_grid(task, scene, contact, watcher, start)
         start = None
         grids.append(_solved_grid(solved))
-        if task.accuracy is not None:
+        if task.accuracy is not None and (task.auto or points == sizes[-1]):
             solution = solved.solution
             solved.bounds = error_bounds(contact, solution.u, solution.sigma)
             solved.estimates = _estimates(task, solved, grids)
@@ -255,22 +268,18 @@ def _estimates(task: Task, solved: TaskSolution, grids: list[SolvedGrid]) -> dic
     exponent = discretisation_error.local_exponent(task.elastomer, resolution, length)
     area_exponent = discretisation_error.excess_exponent(task.elastomer, resolution, length)
     has_scales = task.surface.rough and task.boundary == "periodic"
+    # a grid in full contact shows only a part of these waves
+    has_hidden_waves = solved.observables.a_r == 1 and scene.texture.has_nyquist_waves
     return discretisation_error.estimate(
         levels,
         exponent,
         scales_of(scene, task.surface.band_limited, task.surface.copies) if has_scales else None,
         area_exponent,
-        band_limited=task.surface.band_limited and not _has_hidden_waves(solved),
+        band_limited=task.surface.band_limited and not has_hidden_waves,
         stepped=task.surface.stepped,
         tip=discretisation_error.Tip(task.surface.tip_exponent, scene.grid.dimension),
         between=_between_points(task, solved),
     )
-
-
-def _has_hidden_waves(solved: TaskSolution) -> bool:
-    """Whether a grid in full contact shows only a part of the highest waves of the surface."""
-    scene = solved.scene
-    return solved.observables.a_r == 1 and has_nyquist_waves(scene.grid, scene.height)
 
 
 def _between_points(task: Task, solved: TaskSolution) -> dict[str, float]:
@@ -296,15 +305,15 @@ def scales_of(
     Of a mirrored map (two `copies` along each side) the waves +-q_x, +-q_y have one amplitude, not
     two: for random ones <s^2> / <s>^2 is 3 in place of 3/2. That is not a repetition.
     """
-    grid = scene.grid
+    grid, texture = scene.grid, scene.texture
     return replace(
         discretisation_error.roughness_scales(scene.shells, grid.length),
-        anisotropy=anisotropy(grid, scene.height),
+        anisotropy=texture.anisotropy,
         band_limited=band_limited,
         aspect=max(grid.spacings) / min(grid.spacings),
         highest=scene.highest,
         plateau=_share_above(scene, scene.highest - discretisation_error.PLATEAU_DEPTH),
-        repetitions=repetitions(grid, scene.height) / copies if grid.dimension == 2 else 1.0,
+        repetitions=texture.repetitions / copies,
     )
 
 

@@ -8,11 +8,11 @@ import pytest
 from scipy.integrate import simpson
 from scipy.special import gamma, zeta
 
-from gfmd_cli.physics.contact import build_scene
 from gfmd_cli.physics.elastomers import Power
 from gfmd_cli.physics.indenters import Parabola
 from gfmd_cli.physics.observables import observe
 from gfmd_cli.physics.persson import Persson
+from gfmd_cli.physics.scenes import build_scene
 from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.solvers.auto import Auto
 from gfmd_cli.solvers.nested_grids import solve_contact

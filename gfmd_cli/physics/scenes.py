@@ -1,0 +1,123 @@
+"""Scenes: a surface and an elastomer on a grid, in the units of the surface."""
+
+from dataclasses import replace
+from math import sqrt
+
+import numpy as np
+
+from gfmd_cli.errors import InputError
+from gfmd_cli.grid.arrays import Field, Mask, dot, row_blocks
+from gfmd_cli.grid.fft_grid import Grid
+from gfmd_cli.grid.ranks import Ranks
+from gfmd_cli.physics.contact import Scene
+from gfmd_cli.physics.indenters import RigidSurface
+from gfmd_cli.physics.linear_elastomer import LinearElastomer
+from gfmd_cli.physics.persson import shells
+from gfmd_cli.physics.surfaces import sample
+from gfmd_cli.physics.waves import radial_power
+
+SCALE_RANGE = (1e-100, 1e100)  # [m, Pa]: squared, over all of the spectrum, still normal numbers
+
+
+def build_scene(
+    surface: RigidSurface,
+    elastomer: LinearElastomer,
+    points: int,
+    threads: int = 1,
+    ranks: Ranks | None = None,
+    *,
+    points_y: int = 0,
+) -> Scene:
+    """Sample the surface and reduce heights and stiffness to the scales of the resolved surface.
+
+    Raises InputError where the grid does not resolve the surface, the surface is flat, or a scale
+    is out of range.
+
+    Parameters
+    ----------
+    points, points_y : numbers of grid points along x and y; by default the pixels are square
+    threads : threads of the transforms and kernels
+    ranks : the processes that share large grids
+    """
+    grid, height = sample(surface, points, points_y, ranks)
+    scene = reduce_scene(replace(grid, threads=threads), height, elastomer)
+    return replace(scene, may_touch=touchable(surface.void(scene.grid), scene.grid))
+
+
+def touchable(void: Mask | None, grid: Grid) -> Mask | None:
+    """The points of a grid that can touch, where some cannot; None where all can.
+
+    Raises InputError where no point can.
+    """
+    if void is None:
+        return None
+    if not grid.total(int(np.count_nonzero(~void))):
+        raise InputError('surface.missing: "void" leaves no point that can touch')
+    return ~void
+
+
+def reduce_scene(grid: Grid, height: Field, elastomer: LinearElastomer) -> Scene:
+    """Reduce heights [m], which are overwritten, and stiffness to the scales of the surface."""
+    blocks = [height[rows] for rows in row_blocks(height)]
+    sums, highest, lowest = zip(*((b.sum(), b.max(), b.min()) for b in blocks), strict=True)
+    mean = grid.total(float(sum(sums))) / grid.size
+    largest = grid.max(float(max(max(highest) - mean, mean - min(lowest))))
+    # squares of heights of 1e-200 m would vanish
+    relative = ((block - mean) / largest for block in blocks)
+    squares = sum(dot(deviation, deviation) for deviation in relative)
+    rms = sqrt(grid.total(squares) / grid.size)
+    for block in blocks:
+        block -= mean
+        block /= largest * rms
+    stiffness, stiffest = _stiffness(grid, elastomer)
+    m, power, modes = radial_power(grid, height)
+    q = m * (2 * np.pi / grid.length)
+    k = elastomer.stiffness(q, grid.length)
+    unit = elastomer.unit_stiffness(q, grid.length)
+    with np.errstate(over="ignore"):  # refused below
+        reduced = float(np.sqrt(np.sum(power * (unit / stiffest) ** 2)))  # Eq. (23)
+    h_std = largest * rms
+    delta_sigma = reduced * stiffest * h_std
+    scales = {
+        "L": max(grid.sides),
+        "the spacing of the grid": min(grid.spacings),
+        "h_std": h_std,
+        "h_std times the largest k(q)": stiffest * h_std,
+        "Delta_sigma": delta_sigma,
+    }
+    for name, scale in scales.items():
+        if not SCALE_RANGE[0] <= scale <= SCALE_RANGE[1]:
+            raise InputError(
+                f"surface, elastomer: {name} = {scale:g} is out of range, "
+                f"{SCALE_RANGE[0]:g} to {SCALE_RANGE[1]:g}: choose other units"
+            )
+    stiffness /= reduced
+    return Scene(
+        grid=grid,
+        height=height,
+        stiffness=stiffness,
+        mean_height=mean,
+        h_std=h_std,
+        delta_sigma=delta_sigma,
+        shells=shells(q, power * h_std**2, k, elastomer.gamma(q, grid.length), modes),
+    )
+
+
+def _stiffness(grid: Grid, elastomer: LinearElastomer) -> tuple[Field, float]:
+    """k(q) over the half-spectrum in units of its largest value, and that value."""
+    k = np.empty(grid.spectral_shape)
+    count = len(k) // 2 + 1 if grid.dimension == 2 else len(k)  # the rows q_y >= 0
+    with np.errstate(over="ignore"):  # refused below
+        for rows in row_blocks(k[:count]):
+            k[rows] = elastomer.stiffness(grid.wavenumber(rows), grid.length)
+    half = k[:count]
+    stiffest = grid.max(float(half.max()))
+    if not (np.isfinite(stiffest) and stiffest > 0):
+        raise InputError(f"elastomer: stiffness {stiffest} at the shortest wave is out of range")
+    half /= stiffest
+    waves = half.ravel()[1:] if grid.ends[0] else half  # the first is q = 0
+    softest = grid.min(float(waves.min()))
+    if not softest >= SCALE_RANGE[0]:
+        raise InputError(f"elastomer: stiffness falls to {softest:g} of its largest value")
+    k[count:] = k[len(k) - count : 0 : -1]
+    return k, stiffest

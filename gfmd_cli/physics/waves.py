@@ -1,0 +1,112 @@
+"""The waves of a field: their power by wavenumber, and what it says of the texture of a surface."""
+
+from math import inf, sqrt
+from typing import NamedTuple
+
+import numpy as np
+
+from gfmd_cli.grid.arrays import BLOCK_POINTS, Field, Modes, row_blocks
+from gfmd_cli.grid.fft_grid import Grid
+from gfmd_cli.grid.modes import multiplicity
+
+ROUNDING_POWER = 1e-28  # |h(q)|^2 of a mode that only rounding has excited, relative to the largest
+
+
+class Texture(NamedTuple):
+    """How the waves of a surface are distributed."""
+
+    anisotropy: float
+    """Ratio of the rms slopes along the principal axes: 1 if isotropic, infinite for a line."""
+    repetitions: float
+    """How many copies of one patch a surface resembles: 1 if it is random, m^2 for m x m copies."""
+    has_nyquist_waves: bool
+    """Whether it has waves of the Nyquist wavenumber of an axis, beyond rounding errors.
+
+    A grid shows only their part that is even about its points: a finer grid has another field."""
+
+
+def texture(grid: Grid, height: Field) -> Texture:
+    """The texture of a surface. The cost is one transform."""
+    modes = grid.forward_into_work(height)
+    if grid.dimension == 1:
+        return Texture(inf, 1.0, _has_nyquist_waves(grid, modes))
+    anisotropy, repetitions = _anisotropy(grid, modes), _repetitions(*_radial(grid, modes), grid)
+    return Texture(anisotropy, repetitions, _has_nyquist_waves(grid, modes))
+
+
+def radial_power(grid: Grid, height: Field) -> tuple[Field, Field, Field]:
+    """Sums of |h(q)|^2 over the modes (+-q_x, +-q_y), where they exceed rounding errors.
+
+    Returns |q| L / 2 pi, where L is the side along x, the sums, and their numbers of modes, each
+    of shape (sums,).
+    """
+    return _radial(grid, grid.forward_into_work(height))
+
+
+def _radial(grid: Grid, modes: Modes) -> tuple[Field, Field, Field]:
+    """See `radial_power`, from the coefficients without 1/size."""
+    power = _opposite_rows_added(modes.reshape(grid.points_y, -1))
+    power *= grid.multiplicity()
+    power = grid.gather_columns(power)
+    power[0, 0] = 0.0
+    row, column = np.nonzero(power > ROUNDING_POWER * power.max())
+    m_y = row * (grid.length / grid.length_y) if grid.dimension == 2 else row
+    count = multiplicity(grid.points_y)[row] * multiplicity(grid.points)[column]
+    return np.sqrt(m_y**2 + column**2), power[row, column] / float(grid.size) ** 2, count
+
+
+def _opposite_rows_added(modes: Modes) -> Field:
+    """Sums of |h|^2 over q_y and -q_y, for q_y >= 0."""
+    count = len(modes)
+    power = np.zeros((count // 2 + 1, modes.shape[1]))
+    with_opposite, opposite = power[1 : (count + 1) // 2], modes[: count // 2 : -1]
+    for rows in row_blocks(power):
+        power[rows] += _squared(modes[: len(power)][rows])
+        with_opposite[rows] += _squared(opposite[rows])
+    return power
+
+
+def _squared(modes: Modes) -> Field:
+    return np.square(modes.real) + np.square(modes.imag)
+
+
+def _anisotropy(grid: Grid, modes: Modes) -> float:
+    """From the eigenvalues of the tensor <grad h grad h>, summed over the waves of the surface."""
+    x = np.arange(*grid.span, dtype=np.float64)
+    weight = grid.multiplicity()
+    sums = np.zeros(3)
+    for rows in row_blocks(modes, max(modes.size // 16, BLOCK_POINTS)):
+        y = grid.mode_number_y(rows)[:, None]
+        power = weight * np.abs(modes[rows]) ** 2
+        # the waves with the highest q_y of an even number of points have both signs of q_y
+        mixed = np.where(np.abs(y) * grid.length_y < 0.5 * grid.points_y * grid.length, x * y, 0.0)
+        sums += [float(np.sum(power * term)) for term in (x * x, y * y, mixed)]
+    xx, yy, xy = grid.total(sums)
+    middle, half = 0.5 * (xx + yy), sqrt((0.5 * (xx - yy)) ** 2 + xy**2)
+    return sqrt((middle + half) / (middle - half)) if middle - half > 1e-12 * middle else inf
+
+
+def _repetitions(m: Field, power: Field, count: Field, grid: Grid) -> float:
+    """From the number of waves over which the slopes are spread.
+
+    The slopes of copies are spread over fewer waves: over every m-th along each axis. The number of
+    waves is (sum s)^2 / sum s^2, with the power s of the slope of a wave. It is compared with the
+    number that the same power would have if it were the same for all waves of a half octave.
+    """
+    slopes = power * m**2
+    half_octave = np.rint(2 * np.log2(m)).astype(np.int64)
+    first = int(half_octave.min())
+    sums = np.bincount(half_octave - first, slopes)
+    edges = 2.0 ** (0.5 * (np.arange(sums.size + 1) + first) - 0.25)
+    waves = np.pi * np.diff(edges**2) * (grid.length_y / grid.length)
+    return float(np.sum(slopes**2 / count) / np.sum(sums**2 / waves))
+
+
+def _has_nyquist_waves(grid: Grid, modes: Modes) -> bool:
+    """See `Texture`."""
+    modes = grid.as_rows(modes)
+    largest = grid.max(max(float(np.abs(modes[rows]).max()) for rows in row_blocks(modes)))
+    along_x = modes[:, -1:] if grid.ends[1] else modes[:, :0]
+    along_y = modes[len(modes) // 2] if len(modes) % 2 == 0 else modes[0, :0]
+    highest = max(float(np.abs(waves).max(initial=0.0)) for waves in (along_x, along_y))
+    return grid.max(highest) > sqrt(ROUNDING_POWER) * largest
