@@ -70,6 +70,18 @@ def cut_off(draw: Draw, level: float) -> np.ndarray:
     return limited(plateau + 0.05 * gaussian(draw, 20, hurst=0))
 
 
+def copies(draw: Draw) -> np.ndarray:
+    """2 x 2 copies of a random map."""
+    return np.tile(gaussian(draw)[::2, ::2], (2, 2))
+
+
+def mirrored(draw: Draw) -> np.ndarray:
+    """A random map beside, above and diagonal to its mirror images."""
+    h = gaussian(draw, 12)
+    h = h + h[::-1]
+    return standard(h + h[:, ::-1])
+
+
 KINDS: dict[str, Callable[[Draw], np.ndarray]] = {
     "random": gaussian,
     "white noise": lambda draw: gaussian(draw, 31, hurst=-1),
@@ -90,6 +102,8 @@ KINDS: dict[str, Callable[[Draw], np.ndarray]] = {
     "rough stripes": lambda draw: limited(
         np.cos(8 * np.pi * np.arange(POINTS) / POINTS) + 0.4 * gaussian(draw, 20, hurst=0.3)
     ),
+    "2 x 2 copies": copies,
+    "mirrored": mirrored,
 }
 
 

@@ -53,25 +53,52 @@ def test_a_side_is_a_length():
 
 
 @pytest.mark.parametrize("cutoff", [1 / 32, 1 / 8, 1 / 4])
-def test_a_random_surface_is_one_patch_and_tiles_of_it_are_copies(cutoff):
+def test_tiles_are_counted_and_copies_that_differ_are_found(cutoff):
     patch = SelfAffine(cutoff=cutoff, rolloff=0.5).heights(64)
-    assert texture(Grid(64), patch).repetitions == pytest.approx(1.0, abs=0.3)
-    for copies in (2, 3, 4):
-        tiled = np.tile(patch, (copies, copies))
-        ratio = texture(Grid(64 * copies), tiled).repetitions / texture(Grid(64), patch).repetitions
-        assert ratio == pytest.approx(copies**2, rel=0.35)
-    row = np.tile(patch, (1, 3))
-    ratio = texture(Grid(192, points_y=64), row).repetitions / texture(Grid(64), patch).repetitions
-    assert ratio == pytest.approx(3, rel=0.35)
+    noise = 1e-6 * np.random.default_rng(0).normal(size=(256, 256))
+    alone = texture(Grid(64), patch)
+    assert (alone.copies, alone.tiles, alone.mirrors) == (1, 1, 0)
+    assert alone.repetitions == pytest.approx(1.0, abs=0.3)
+    for down, right in ((2, 2), (3, 3), (4, 4), (1, 3)):
+        grid = Grid(64 * right, points_y=64 * down)
+        tiled = np.tile(patch, (down, right))
+        equal, nearly = (
+            texture(grid, h) for h in (tiled, tiled + noise[: grid.points_y, : grid.points])
+        )
+        assert (equal.copies, equal.tiles, nearly.tiles) == (down * right, down * right, 1)
+        assert equal.repetitions == pytest.approx(alone.repetitions, rel=0.35)  # half octaves
+        assert nearly.repetitions == pytest.approx(equal.tiles * equal.repetitions, rel=1e-3)
 
 
-def test_gaussian_maps_are_below_the_limit_of_copies_and_tiles_above():
-    m = np.hypot(np.fft.fftfreq(64, 1 / 64)[:, None], np.fft.rfftfreq(64, 1 / 64))
+def _random(seed, points=64):
+    """Gaussian heights."""
+    m = np.hypot(np.fft.fftfreq(points, 1 / points)[:, None], np.fft.rfftfreq(points, 1 / points))
+    noise = np.fft.rfft2(np.random.default_rng(seed).normal(size=(points, points)))
+    return np.fft.irfft2(noise * (m <= 14) * (1 + (m / 4) ** 2) ** -0.9, (points, points))
+
+
+def test_mirror_images_are_counted_along_each_axis():
+    """Wherever the axis is; two mirrors are not one inversion, which changes no amplitude."""
+    patch = _random(0)
+    for seed, (by_x, by_y) in enumerate([(0, 0), (1, 0), (0, 1), (1, 1)]):
+        h = np.hstack([patch, patch[:, ::-1]]) if by_x else patch
+        h = np.vstack([h, h[::-1]]) if by_y else h
+        h = np.roll(h, np.random.default_rng(seed).integers(64, size=2), axis=(0, 1))
+        measured = texture(Grid(h.shape[1], points_y=h.shape[0]), h)
+        assert (measured.mirrors, measured.copies) == (by_x + by_y, 2 ** (by_x + by_y))
+    inverted = patch + patch[::-1, ::-1]
+    assert texture(Grid(64), inverted).mirrors == 0
+
+
+def test_gaussian_maps_are_below_the_limit_of_copies_also_mirrored():
     for seed in range(50):
-        noise = np.fft.rfft2(np.random.default_rng(seed).normal(size=(64, 64)))
-        patch = np.fft.irfft2(noise * (m <= 14) * (1 + (m / 4) ** 2) ** -0.9, (64, 64))
-        assert 0.7 < texture(Grid(64), patch).repetitions < 2.6 < MAX_REPETITIONS
-        assert texture(Grid(192), np.tile(patch, (3, 3))).repetitions > MAX_REPETITIONS
+        patch = _random(seed)
+        whole = np.hstack([patch, patch[:, ::-1]])
+        for h in (patch, whole, np.vstack([whole, whole[::-1]])):
+            grid = Grid(h.shape[1], points_y=h.shape[0])
+            assert 0.7 < texture(grid, h).repetitions < 2.6 < MAX_REPETITIONS
+        noise = 1e-3 * patch.std() * np.random.default_rng(seed).normal(size=(192, 192))
+        assert texture(Grid(192), np.tile(patch, (3, 3)) + noise).repetitions > MAX_REPETITIONS
 
 
 def test_the_waves_of_two_points_are_found_along_each_axis():

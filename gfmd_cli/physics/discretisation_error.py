@@ -95,9 +95,10 @@ MIN_WAVES = 30.0
 """Independent waves of the slopes from which patches differ from each other: random surfaces of at
 least four waves per side have 40 and more, textures of one wavelength 4 to 12."""
 MAX_REPETITIONS = 5.0
-"""Copies of one patch that a calibrated surface may resemble. Errors of copies do not average out:
-with 4 x 4 equal bumps they were up to 14 times the bar. Random surfaces have 0.7 to 2.6, and up to
-4 if half of their waves are missing; 2 x 2 copies of them have 2.7 to 7, equal bumps 12 to 60."""
+"""Copies of one patch that a calibrated surface may resemble, beside equal tiles and mirror images,
+which count as one. Errors of copies do not average out: with 4 x 4 equal bumps they were up to 14
+times the bar. Random surfaces have 0.7 to 2.6, and up to 4 if half of their waves are missing;
+2 x 2 copies of them that differ slightly have 2.7 to 7, rough bumps 12 to 60."""
 MIN_HIGHEST = 1.0
 """Smallest highest point of a calibrated surface, in h_std above the mean: surfaces with pits have
 1.1 and more. With 0.7 to 0.8 (h = -a^2 of a Gaussian a) contacts are ribbons on ridges that are as
@@ -140,7 +141,7 @@ class RoughnessScales:
     independent_waves: float = inf
     """Effective number of waves, (sum s)^2 / sum s^2, with the power s of the slope of a wave."""
     repetitions: float = 1.0
-    """Number of copies of one patch that the surface resembles; see `power_spectra`."""
+    """Number of copies of one patch that the surface resembles; see `waves.Texture`."""
 
     @property
     def calibrated(self) -> bool:

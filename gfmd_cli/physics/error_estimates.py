@@ -54,7 +54,7 @@ class GridValues:
     perimeter: float
     """Contact line per area times L, as in `Observables.perimeter`."""
     area: float = 1.0
-    """Area of the cell / L^2, of one copy of the map where the cell is made of mirrored ones."""
+    """Area of the cell / L^2, of one copy where it consists of equal tiles or mirror images."""
     border: float | None = None
     """Fraction of the border of the map in contact, with a free boundary; None if periodic."""
 

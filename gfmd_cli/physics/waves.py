@@ -1,15 +1,18 @@
 """The waves of a field: their power by wavenumber, and what it says of the texture of a surface."""
 
-from math import inf, sqrt
+from math import inf, prod, sqrt
 from typing import NamedTuple
 
 import numpy as np
 
-from gfmd_cli.grid.arrays import BLOCK_POINTS, Field, Modes, row_blocks
+from gfmd_cli.grid.arrays import BLOCK_POINTS, Field, Mask, Modes, row_blocks
 from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.grid.modes import multiplicity
 
 ROUNDING_POWER = 1e-28  # |h(q)|^2 of a mode that only rounding has excited, relative to the largest
+ROUNDED = 1e-9  # relative error by rounding of a sum over all waves; a choice
+MIRRORED_CONCENTRATION = (1, 4 / 3, 2)
+"""<s^2> / <s>^2 of the power s of random waves +-q_x, +-q_y, over 3/2, by number of mirrors."""
 
 
 class Texture(NamedTuple):
@@ -17,21 +20,35 @@ class Texture(NamedTuple):
 
     anisotropy: float
     """Ratio of the rms slopes along the principal axes: 1 if isotropic, infinite for a line."""
+    tiles: int
+    """Number of equal tiles that the cell consists of, along both axes together."""
+    mirrors: int
+    """Number of axes along which the surface is its own mirror image: two of a mirrored map."""
     repetitions: float
-    """How many copies of one patch a surface resembles: 1 if it is random, m^2 for m x m copies."""
+    """How many copies of one patch a tile resembles: 1 if it is random, m^2 for m x m copies."""
     has_nyquist_waves: bool
     """Whether it has waves of the Nyquist wavenumber of an axis, beyond rounding errors.
 
     A grid shows only their part that is even about its points: a finer grid has another field."""
 
+    @property
+    def copies(self) -> int:
+        """Number of parts of the cell with the same contacts."""
+        return int(self.tiles * 2**self.mirrors)
+
 
 def texture(grid: Grid, height: Field) -> Texture:
     """The texture of a surface. The cost is one transform."""
     modes = grid.forward_into_work(height)
+    has_nyquist_waves = _has_nyquist_waves(grid, modes)
     if grid.dimension == 1:
-        return Texture(inf, 1.0, _has_nyquist_waves(grid, modes))
-    anisotropy, repetitions = _anisotropy(grid, modes), _repetitions(*_radial(grid, modes), grid)
-    return Texture(anisotropy, repetitions, _has_nyquist_waves(grid, modes))
+        return Texture(inf, 1, 0, 1.0, has_nyquist_waves)
+    power, mirrors = _power(grid, modes), _mirrors(grid, modes)
+    # of m tiles along an axis, only every m-th mode is not zero
+    modes_along = [np.flatnonzero(_occupied(power).any(axis=axis)) for axis in range(2)]
+    tiles = prod(max(int(np.gcd.reduce(numbers)), 1) for numbers in modes_along)
+    repetitions = _concentration(grid, power) / (tiles * MIRRORED_CONCENTRATION[mirrors])
+    return Texture(_anisotropy(grid, modes), tiles, mirrors, repetitions, has_nyquist_waves)
 
 
 def radial_power(grid: Grid, height: Field) -> tuple[Field, Field, Field]:
@@ -40,16 +57,26 @@ def radial_power(grid: Grid, height: Field) -> tuple[Field, Field, Field]:
     Returns |q| L / 2 pi, where L is the side along x, the sums, and their numbers of modes, each
     of shape (sums,).
     """
-    return _radial(grid, grid.forward_into_work(height))
+    return _by_wavenumber(grid, _power(grid, grid.forward_into_work(height)))
 
 
-def _radial(grid: Grid, modes: Modes) -> tuple[Field, Field, Field]:
-    """See `radial_power`, from the coefficients without 1/size."""
+def _power(grid: Grid, modes: Modes) -> Field:
+    """Sums of |h|^2 over the modes (+-q_x, +-q_y), zero for q = 0."""
     power = _opposite_rows_added(modes.reshape(grid.points_y, -1))
     power *= grid.multiplicity()
     power = grid.gather_columns(power)
     power[0, 0] = 0.0
-    row, column = np.nonzero(power > ROUNDING_POWER * power.max())
+    return power
+
+
+def _occupied(power: Field) -> Mask:
+    """Where power exceeds rounding errors."""
+    return power > ROUNDING_POWER * power.max()
+
+
+def _by_wavenumber(grid: Grid, power: Field) -> tuple[Field, Field, Field]:
+    """See `radial_power`."""
+    row, column = np.nonzero(_occupied(power))
     m_y = row * (grid.length / grid.length_y) if grid.dimension == 2 else row
     count = multiplicity(grid.points_y)[row] * multiplicity(grid.points)[column]
     return np.sqrt(m_y**2 + column**2), power[row, column] / float(grid.size) ** 2, count
@@ -86,13 +113,14 @@ def _anisotropy(grid: Grid, modes: Modes) -> float:
     return sqrt((middle + half) / (middle - half)) if middle - half > 1e-12 * middle else inf
 
 
-def _repetitions(m: Field, power: Field, count: Field, grid: Grid) -> float:
-    """From the number of waves over which the slopes are spread.
+def _concentration(grid: Grid, power: Field) -> float:
+    """Number of waves over which the slopes would be spread, over that of those which have them.
 
     The slopes of copies are spread over fewer waves: over every m-th along each axis. The number of
     waves is (sum s)^2 / sum s^2, with the power s of the slope of a wave. It is compared with the
     number that the same power would have if it were the same for all waves of a half octave.
     """
+    m, power, count = _by_wavenumber(grid, power)
     slopes = power * m**2
     half_octave = np.rint(2 * np.log2(m)).astype(np.int64)
     first = int(half_octave.min())
@@ -100,6 +128,27 @@ def _repetitions(m: Field, power: Field, count: Field, grid: Grid) -> float:
     edges = 2.0 ** (0.5 * (np.arange(sums.size + 1) + first) - 0.25)
     waves = np.pi * np.diff(edges**2) * (grid.length_y / grid.length)
     return float(np.sum(slopes**2 / count) / np.sum(sums**2 / waves))
+
+
+def _mirrors(grid: Grid, modes: Modes) -> int:
+    """Number of axes along which a surface is its own mirror image.
+
+    h(x, y) = h(2 a - x, y) if h(q_x, q_y) h(q_x, -q_y) has the phase -2 q_x a at all q_y: the
+    absolute value of its sum over q_y is then the sum of the absolute values. Along y it is the sum
+    over q_x of h(q_x, q_y) h(q_x, -q_y)*.
+    """
+    count = len(modes)
+    waves, opposite = modes[1 : (count + 1) // 2], modes[: count // 2 : -1]
+    along_x, along_y = np.zeros(modes.shape[1], modes.dtype), np.zeros(len(waves), modes.dtype)
+    largest = 0.0
+    for rows in row_blocks(waves):
+        products = waves[rows] * opposite[rows]
+        along_x += products.sum(axis=0)
+        largest += float(np.abs(products).sum())
+        along_y[rows] = (waves[rows] * opposite[rows].conj()).sum(axis=1)
+    x, largest = grid.total(np.array([np.abs(along_x).sum(), largest]))
+    y = np.abs(grid.total(along_y)).sum()
+    return sum(bool(value >= (1 - ROUNDED) * largest > 0) for value in (x, y))
 
 
 def _has_nyquist_waves(grid: Grid, modes: Modes) -> bool:

@@ -253,6 +253,8 @@ def _estimates(task: Task, solved: TaskSolution, grids: list[SolvedGrid]) -> dic
     resolution, length = scene.grid.resolution, scene.grid.length
     if discretisation_error.has_step(task.elastomer, resolution, length):
         return unknown()
+    has_scales = task.surface.rough and task.boundary == "periodic"
+    copies = scene.texture.copies if has_scales else 1
     levels = [
         GridValues(
             grid.points * (resolution / scene.grid.points),
@@ -260,20 +262,19 @@ def _estimates(task: Task, solved: TaskSolution, grids: list[SolvedGrid]) -> dic
             grid.sigma_p / scene.delta_sigma,
             grid.u_g / scene.h_std,
             grid.perimeter,
-            scene.grid.area / (task.surface.copies * length) ** scene.grid.dimension,
+            scene.grid.area / (copies * length**scene.grid.dimension),
             grid.border,
         )
         for grid in grids
     ]
     exponent = discretisation_error.local_exponent(task.elastomer, resolution, length)
     area_exponent = discretisation_error.excess_exponent(task.elastomer, resolution, length)
-    has_scales = task.surface.rough and task.boundary == "periodic"
     # a grid in full contact shows only a part of these waves
     has_hidden_waves = solved.observables.a_r == 1 and scene.texture.has_nyquist_waves
     return discretisation_error.estimate(
         levels,
         exponent,
-        scales_of(scene, task.surface.band_limited, task.surface.copies) if has_scales else None,
+        scales_of(scene, task.surface.band_limited) if has_scales else None,
         area_exponent,
         band_limited=task.surface.band_limited and not has_hidden_waves,
         stepped=task.surface.stepped,
@@ -297,14 +298,8 @@ def _between_points(task: Task, solved: TaskSolution) -> dict[str, float]:
     )
 
 
-def scales_of(
-    scene: Scene, band_limited: bool, copies: int = 1
-) -> discretisation_error.RoughnessScales:
-    """The scales of a rough surface, as `estimate` needs them.
-
-    Of a mirrored map (two `copies` along each side) the waves +-q_x, +-q_y have one amplitude, not
-    two: for random ones <s^2> / <s>^2 is 3 in place of 3/2. That is not a repetition.
-    """
+def scales_of(scene: Scene, band_limited: bool) -> discretisation_error.RoughnessScales:
+    """The scales of a rough surface, as `estimate` needs them."""
     grid, texture = scene.grid, scene.texture
     return replace(
         discretisation_error.roughness_scales(scene.shells, grid.length),
@@ -313,7 +308,7 @@ def scales_of(
         aspect=max(grid.spacings) / min(grid.spacings),
         highest=scene.highest,
         plateau=_share_above(scene, scene.highest - discretisation_error.PLATEAU_DEPTH),
-        repetitions=texture.repetitions / copies,
+        repetitions=texture.repetitions,
     )
 
 
