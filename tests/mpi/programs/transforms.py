@@ -15,6 +15,7 @@ from gfmd_cli.physics.elastomers import Power
 from gfmd_cli.physics.scenes import build_scene
 from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.physics.surfaces import Cone
+from gfmd_cli.physics.waves import texture
 from gfmd_cli.solvers.contact_state import PRESSED
 from gfmd_cli.solvers.multigrid import Multigrid
 
@@ -156,6 +157,22 @@ def check_against_mpi4py_fft(points):
     print("mpi4py-fft agrees")
 
 
+def check_textures(points, tiles, mirrors):
+    """Of a map that consists of tiles and mirror images."""
+    patch = np.random.default_rng(points).standard_normal((points, points))
+    if mirrors > 0:
+        patch = np.hstack([patch, patch[:, ::-1]])
+    if mirrors > 1:
+        patch = np.vstack([patch, patch[::-1]])
+    height = np.tile(patch, (tiles, 1))
+    points_y, points = height.shape
+    whole = Grid(points, points_y=points_y)
+    grid = DistributedGrid(points, points_y=points_y, ranks=ranks)
+    expected, own = texture(whole, height), texture(grid, height[grid.own])
+    assert (expected.tiles, expected.mirrors) == (own.tiles, own.mirrors) == (tiles, mirrors)
+    np.testing.assert_allclose(own, expected, rtol=1e-12)
+
+
 for size in (64, 96, 100, 128):
     check_transforms(size, size)
     check_surfaces(size)
@@ -168,6 +185,8 @@ check_other_grids((72, 33), (97, 64))
 check_other_grids((67, 50), (67, 40))
 for size in (64, 96, 100, 512):
     check_levels(size)
+for tiling in ((64, 1, 0), (33, 1, 1), (50, 2, 0), (40, 1, 2), (32, 3, 2)):
+    check_textures(*tiling)
 for size, exponent in ((64, 1), (96, 2), (128, 3), (160, 4), (88, 2)):
     check_v_cycle(size, exponent)
 check_against_mpi4py_fft(64)
