@@ -96,9 +96,9 @@ MIN_WAVES = 30.0
 least four waves per side have 40 and more, textures of one wavelength 4 to 12."""
 MAX_REPETITIONS = 5.0
 """Copies of one patch that a calibrated surface may resemble, beside equal tiles and mirror images,
-which count as one. Errors of copies do not average out: with 4 x 4 equal bumps they were up to 14
+which count as one. Errors of copies do not average out: with 4 x 4 rough bumps they were up to 13
 times the bar. Random surfaces have 0.7 to 2.6, and up to 4 if half of their waves are missing;
-2 x 2 copies of them that differ slightly have 2.7 to 7, rough bumps 12 to 60."""
+2 x 2 copies of them that differ slightly have 2.7 to 7, bumps that are rough or differ 11 to 13."""
 MIN_HIGHEST = 1.0
 """Smallest highest point of a calibrated surface, in h_std above the mean: surfaces with pits have
 1.1 and more. With 0.7 to 0.8 (h = -a^2 of a Gaussian a) contacts are ribbons on ridges that are as
