@@ -22,7 +22,7 @@ from gfmd_cli.grid.arrays import Field, Mask, dot
 from gfmd_cli.physics.contact import Contact
 from gfmd_cli.solvers.local_kernels import mark_entered
 from gfmd_cli.solvers.loop import ROUNDING_MARGIN, Start
-from gfmd_cli.solvers.projected_move import choose, feasible, polak_ribiere, projected
+from gfmd_cli.solvers.projected_move import choose, new_direction, polak_ribiere, projected
 from gfmd_cli.solvers.tile_operators import Indices, TileOperators
 from gfmd_cli.solvers.tiles import SIDE, Tiles
 
@@ -202,9 +202,8 @@ class LocalSolve:
             z = _balanced(self.map_displacement(force).ravel()[active])
             old, slope = slope, dot(z, active_force)
             beta = polak_ribiere(slope - dot(z, last), old)
-            active_direction = feasible(self.grid, z + beta * direction.ravel()[active], active_s)
-            if dot(active_direction, active_force) <= 0:
-                active_direction = feasible(self.grid, z, active_s)
+            last_direction = beta * direction.ravel()[active]
+            active_direction = new_direction(self.grid, z, last_direction, active_s, active_force)
             direction = _field(active_direction, active, s)
             target = active_s + length * active_direction
             clipped = bool((target < 0).any())
