@@ -17,8 +17,9 @@ from math import sqrt
 from typing import ClassVar
 
 import numpy as np
+from scipy.ndimage import maximum_filter
 
-from gfmd_cli.grid.arrays import Field, Mask, dot
+from gfmd_cli.grid.arrays import Field, dot
 from gfmd_cli.physics.contact import Contact
 from gfmd_cli.solvers.local_kernels import mark_entered
 from gfmd_cli.solvers.loop import ROUNDING_MARGIN, Start
@@ -171,7 +172,7 @@ class LocalSolve:
         self.grid.rows.run(mark_entered, *fields)
         if not entered.any():
             return False
-        used = self.tiles.used | _with_neighbours(entered)
+        used = self.tiles.used | maximum_filter(entered, 3, mode="wrap")
         tiles = Tiles(used, is_periodic=self.tiles.is_periodic)
         s = np.zeros((tiles.count, SIDE * SIDE))
         s[self.tiles.used[tiles.used]] = self.s
@@ -231,10 +232,3 @@ def _field(values: Field, points: Indices, like: Field) -> Field:
 def _balanced(values: Field) -> Field:
     """The values less their mean."""
     return values - values.mean()
-
-
-def _with_neighbours(used: Mask) -> Mask:
-    """Tiles and the eight around each."""
-    for axis in range(2):
-        used = used | np.roll(used, 1, axis) | np.roll(used, -1, axis)
-    return used
