@@ -113,13 +113,9 @@ def _progress(
     names = [path.name for path in (*damaged_files, *damaged)]
     others = outcomes.keys() - {name for name, _ in tasks}
     each = [
-        TaskProgress(
-            index,
-            label,
-            statuses.get(name, Status.MISSING),
-            None if name in statuses else saved[name],
-            "" if name in statuses else failures[name],
-        )
+        TaskProgress(index, label, statuses[name])
+        if name in statuses
+        else TaskProgress(index, label, Status.MISSING, saved[name], failures[name])
         for index, (name, label) in enumerate(tasks)
     ]
     return StudyProgress(study.path, each, len(records), names, len(others))
