@@ -195,22 +195,22 @@ class LocalSolve:
             pressed = s > 0
             level = float(gap.ravel()[np.flatnonzero(pressed)].mean())
             active = np.flatnonzero(pressed | (gap < level))
-            active_gap, active_s = gap.ravel()[active] - level, s.ravel()[active]
+            active_gap, active_s = gap.take(active) - level, s.take(active)
             if self.residual(active_gap, active_s) < tolerance:
                 break
-            active_force, last = _balanced(-active_gap), force.ravel()[active]
+            active_force, last = _balanced(-active_gap), force.take(active)
             force = _field(active_force, active, s)
-            z = _balanced(self.map_displacement(force).ravel()[active])
+            z = _balanced(self.map_displacement(force).take(active))
             old, slope = slope, dot(z, active_force)
             beta = polak_ribiere(slope - dot(z, last), old)
-            last_direction = beta * direction.ravel()[active]
+            last_direction = beta * direction.take(active)
             active_direction = new_direction(self.grid, z, last_direction, active_s, active_force)
             direction = _field(active_direction, active, s)
             target = active_s + length * active_direction
             clipped = bool((target < 0).any())
             move = projected(self.grid, target, self.total) - active_s
             change = self.compliance(_field(move, active, s))
-            curvature = dot(move, change.ravel()[active])
+            curvature = dot(move, change.take(active))
             best = -dot(move, active_gap) / curvature if curvature > 0 else 1.0
             exact = not clipped and (best <= 1 or float((active_s + best * move).min()) >= 0)
             choice = choose(best, exact)

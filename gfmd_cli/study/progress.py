@@ -65,9 +65,8 @@ class StudyProgress:
 
 def progress_of_spec(spec: Spec, path: Path) -> StudyProgress:
     """The progress of the tasks of a spec in the study file `path`."""
-    tasks = plan(spec)
-    output = frozenset(spec.output.names())
-    return _progress(Study(path), [(task.id, task.label) for task in tasks], output)
+    tasks = [(task.id, task.label) for task in plan(spec)]
+    return _progress(Study(path), tasks, spec.output.names())
 
 
 def progress_of_study(path: Path) -> StudyProgress:
