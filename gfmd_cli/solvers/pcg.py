@@ -204,8 +204,7 @@ class _Run:
         """Precondition the force, and return the factor beta of the conjugation."""
         state = self.state
         if self.preconditioner is None:
-            kind = (state.screening, state.v_cycle)
-            self.preconditioner = create(self.contact, self.moves, *kind)
+            self.preconditioner = create(self.contact, self.moves, state.screening, state.v_cycle)
         fields = (self.sigma, self.contact_state, self.threshold)
         slope, z_change = self.preconditioner.apply(*fields, self.change)
         state.transforms += self.preconditioner.transforms
