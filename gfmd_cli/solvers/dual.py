@@ -33,7 +33,7 @@ from gfmd_cli.solvers.loop import Solver, Start, State
 from gfmd_cli.solvers.projected_move import (
     MAX_HALVINGS,
     choose,
-    feasible,
+    new_direction,
     polak_ribiere,
     projected,
 )
@@ -80,7 +80,8 @@ class Dual(Solver):
         assert start.sigma is not None
         assert isinstance(start.contact, FreeContact)
         state = _new_state(start.contact.grid.empty(), start.sigma, start.u)
-        self._compare(start.contact, state)
+        state.gap -= start.contact.height
+        self._assess(start.contact, state)
         return state
 
     def _begin_with(self, contact: FreeContact, u: Field, stress: Field) -> DualState:
@@ -95,10 +96,6 @@ class Dual(Solver):
         """Compute the gap, u and the residual from the stress."""
         contact.free.displacement(state.sigma, out=state.gap)
         state.transforms += contact.free.transforms
-        self._compare(contact, state)
-
-    def _compare(self, contact: FreeContact, state: DualState) -> None:
-        """Compute the gap from the displacement in its place, then u and the residual."""
         state.gap -= contact.height
         state.exact = True
         self._assess(contact, state)
@@ -120,25 +117,16 @@ class Dual(Solver):
             state.transforms += contact.free.preconditioner_transforms
             z -= contact.grid.mean(z[chosen])
             z[~chosen] = 0.0
-            self._update_direction(contact.grid, state, z, force, chosen)  # [3]
+            beta = polak_ribiere(contact.grid.dot(z, state.change), state.slope)
+            state.slope = contact.grid.dot(z, force)
+            last, stress = beta * state.direction[chosen], state.sigma[chosen]
+            direction = new_direction(contact.grid, -z[chosen], last, stress, -force[chosen])
+            state.direction[...] = 0.0
+            state.direction[chosen] = direction  # [3]
             self._advance(contact, state, chosen)  # [4], [5]
             self._assess(contact, state)
             state.exact = False
             state.step += 1
-
-    def _update_direction(
-        self, grid: Grid, state: DualState, z: Field, force: Field, chosen: Mask
-    ) -> None:
-        """d <- -z + beta d on the chosen points, with the mean zero."""
-        beta = polak_ribiere(grid.dot(z, state.change), state.slope)
-        state.slope = grid.dot(z, force)
-        direction = state.direction
-        direction *= beta
-        direction -= z
-        direction[chosen] = feasible(grid, direction[chosen], state.sigma[chosen])
-        direction[~chosen] = 0.0
-        if grid.dot(direction, force) >= 0:
-            direction[chosen] = feasible(grid, -z[chosen], state.sigma[chosen])
 
     def _advance(self, contact: FreeContact, state: DualState, chosen: Mask) -> None:
         """Move along the direction such that the energy does not rise."""

@@ -17,12 +17,13 @@ from math import sqrt
 from typing import ClassVar
 
 import numpy as np
+from scipy.ndimage import maximum_filter
 
-from gfmd_cli.grid.arrays import Field, Mask, dot
+from gfmd_cli.grid.arrays import Field, dot
 from gfmd_cli.physics.contact import Contact
 from gfmd_cli.solvers.local_kernels import mark_entered
 from gfmd_cli.solvers.loop import ROUNDING_MARGIN, Start
-from gfmd_cli.solvers.projected_move import choose, feasible, polak_ribiere, projected
+from gfmd_cli.solvers.projected_move import choose, new_direction, polak_ribiere, projected
 from gfmd_cli.solvers.tile_operators import Indices, TileOperators
 from gfmd_cli.solvers.tiles import SIDE, Tiles
 
@@ -171,7 +172,7 @@ class LocalSolve:
         self.grid.rows.run(mark_entered, *fields)
         if not entered.any():
             return False
-        used = self.tiles.used | _with_neighbours(entered)
+        used = self.tiles.used | maximum_filter(entered, 3, mode="wrap")
         tiles = Tiles(used, is_periodic=self.tiles.is_periodic)
         s = np.zeros((tiles.count, SIDE * SIDE))
         s[self.tiles.used[tiles.used]] = self.s
@@ -194,23 +195,22 @@ class LocalSolve:
             pressed = s > 0
             level = float(gap.ravel()[np.flatnonzero(pressed)].mean())
             active = np.flatnonzero(pressed | (gap < level))
-            active_gap, active_s = gap.ravel()[active] - level, s.ravel()[active]
+            active_gap, active_s = gap.take(active) - level, s.take(active)
             if self.residual(active_gap, active_s) < tolerance:
                 break
-            active_force, last = _balanced(-active_gap), force.ravel()[active]
+            active_force, last = _balanced(-active_gap), force.take(active)
             force = _field(active_force, active, s)
-            z = _balanced(self.map_displacement(force).ravel()[active])
+            z = _balanced(self.map_displacement(force).take(active))
             old, slope = slope, dot(z, active_force)
             beta = polak_ribiere(slope - dot(z, last), old)
-            active_direction = feasible(self.grid, z + beta * direction.ravel()[active], active_s)
-            if dot(active_direction, active_force) <= 0:
-                active_direction = feasible(self.grid, z, active_s)
+            last_direction = beta * direction.take(active)
+            active_direction = new_direction(self.grid, z, last_direction, active_s, active_force)
             direction = _field(active_direction, active, s)
             target = active_s + length * active_direction
             clipped = bool((target < 0).any())
             move = projected(self.grid, target, self.total) - active_s
             change = self.compliance(_field(move, active, s))
-            curvature = dot(move, change.ravel()[active])
+            curvature = dot(move, change.take(active))
             best = -dot(move, active_gap) / curvature if curvature > 0 else 1.0
             exact = not clipped and (best <= 1 or float((active_s + best * move).min()) >= 0)
             choice = choose(best, exact)
@@ -232,10 +232,3 @@ def _field(values: Field, points: Indices, like: Field) -> Field:
 def _balanced(values: Field) -> Field:
     """The values less their mean."""
     return values - values.mean()
-
-
-def _with_neighbours(used: Mask) -> Mask:
-    """Tiles and the eight around each."""
-    for axis in range(2):
-        used = used | np.roll(used, 1, axis) | np.roll(used, -1, axis)
-    return used

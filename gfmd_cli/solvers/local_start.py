@@ -10,9 +10,10 @@ it takes the displacement, which is laid on the indenter before.
 from collections.abc import Callable
 from itertools import pairwise
 from math import hypot
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from gfmd_cli.grid.arrays import Field, Mask
 from gfmd_cli.physics.contact import Contact
@@ -100,14 +101,10 @@ def _tiles_in_reach(touching: Mask, *, is_periodic: bool) -> Tiles:
 
     It may grow by a point of its own grid, a choice.
     """
-    side, used = SIDE // 2, touching
+    side = SIDE // 2
+    used: Any = np.pad(touching, 1, "wrap" if is_periodic else "constant")
     for _ in range(2):  # along y, then along x
-        before, after = used[side - 1 :: side], used[::side]  # the points next to the next blocks
-        inside = used.reshape(-1, side, used.shape[1]).any(axis=1)
-        before, after = np.roll(before, 1, axis=0), np.roll(after, -1, axis=0)
-        if not is_periodic:
-            before[0] = after[-1] = False
-        used = (inside | before | after).T
+        used = sliding_window_view(used, side + 2, axis=0)[::side].any(axis=-1).T
     return Tiles(used, is_periodic=is_periodic)
 
 

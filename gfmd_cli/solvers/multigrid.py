@@ -29,7 +29,7 @@ largest. Springs do not increase it, because they act on waves for which the ope
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import pairwise, starmap
 from math import inf, prod
 from typing import Any
 
@@ -176,6 +176,63 @@ def _is_half(coarse: Shape, fine: Shape) -> bool:
     return all(2 * few == many for few, many in zip(coarse, fine, strict=True))
 
 
+class _CoarseLevel:
+    """The fields of a level below the finest one, and the steps of the cycle on it."""
+
+    def __init__(self, finer: Level, level: Level) -> None:
+        self.operator, self.rows, self.finer_rows = level.operator, level.rows, finer.rows
+        self.ratio = np.float32(finer.scale / level.scale)
+        # Needed where the points are not exactly halved: the residual of the finer level, later P
+        # times the result on this one. Elsewhere kernels do both on the way.
+        is_half = _is_half(level.shape, finer.shape)
+        self.between = None if is_half else np.empty(finer.shape, np.float32)
+        zeros, n = level.rows.empty_with_halo, level.shape[1]
+        self.rhs, self.x, self.y = (zeros(n, dtype=np.float32) for _ in range(3))
+        self.weights = zeros(n, dtype=np.int8)
+        self.ties = zeros(4, n + 1, dtype=np.uint8)
+
+    def set_ties(self, finer: ContactState, threshold: int, weighted: int) -> None:
+        """Compute the penalty terms from the points held, or the weights, of the finer level."""
+        kernel = transfer.compute_ties if self.between is None else transfer.compute_any_ties
+        self.rows.run_from_finer(kernel, (finer, threshold, weighted), (self.ties, self.weights))
+
+    def restrict(self, kernel: Kernel, *fields: Any) -> None:
+        """Restrict the residual that a kernel computes on the finer level."""
+        if self.between is None:
+            self.rows.run_from_finer(kernel, fields, (self.rhs,))
+        else:
+            self.finer_rows.run(kernel, *fields, self.between)
+            self.rows.run(transfer.restrict, self.between, self.rhs)
+
+    def correction(self) -> tuple[SingleField, np.float32]:
+        """The result as the kernel `_interpolate` takes it, and the ratio of the scales."""
+        if self.between is None:
+            return self.rows.aligned_with_finer(self.y), self.ratio
+        self.finer_rows.run(transfer.interpolate, self.y, self.between)
+        return self.between, self.ratio
+
+    def smooth(
+        self, old: SingleField | None, new: SingleField, coarser: "_CoarseLevel | None" = None
+    ) -> None:
+        """Write the result of a smoothing step on `old`, plus the correction, to `new`.
+
+        Without `old`, the result of a smoothing step from zero takes its place.
+        """
+        matrix = (self.rhs, self.operator, self.ties)
+        start = (self.rhs if old is None else old, old is None)
+        correction = coarser.correction() if coarser else (self.rhs, kernels.ZERO)
+        self.rows.run_with_halo(kernels.smooth, *matrix, *start, *correction, new)
+        self.rows.exchange_halo(new)
+
+    def post_smooth(self, coarser: "_CoarseLevel") -> None:
+        """Add the correction, and smooth the result."""
+        if self.operator.is_squared:
+            self.smooth(self.y, self.x, coarser)
+            self.smooth(self.x, self.y)
+        else:
+            self.smooth(None, self.y, coarser)
+
+
 class Multigrid:
     """The preconditioner of one contact."""
 
@@ -184,107 +241,42 @@ class Multigrid:
     def __init__(self, contact: Contact, grid: Grid) -> None:
         self.z = grid.as_rows(grid.padded)
         levels = _levels(contact)
-        self.operators = [level.operator for level in levels]
-        self.scale = np.float32(1.0 / levels[0].scale)
-        self.ratios = [np.float32(fine.scale / coarse.scale) for fine, coarse in pairwise(levels)]
-        self.rows, *self.coarse_rows = (level.rows for level in levels)
-        # Fields between two levels whose points are not exactly halved: the residual of the finer
-        # one, later P times the result on the coarser one. Elsewhere kernels do both on the way.
-        self.between = [
-            None if _is_half(coarse.shape, fine.shape) else np.empty(fine.shape, np.float32)
-            for fine, coarse in pairwise(levels)
-        ]
-        sizes = [(level.rows, level.shape[1]) for level in levels[1:]]
-        self.rhs, self.x, self.y = (
-            [rows.empty_with_halo(n, dtype=np.float32) for rows, n in sizes] for _ in range(3)
-        )
-        self.weights = [rows.empty_with_halo(n, dtype=np.int8) for rows, n in sizes]
-        self.ties = [rows.empty_with_halo(4, n + 1, dtype=np.uint8) for rows, n in sizes]
+        finest = levels[0]
+        self.rows, self.operator = finest.rows, finest.operator
+        self.scale = np.float32(1.0 / finest.scale)
+        self.coarse = list(starmap(_CoarseLevel, pairwise(levels)))
 
     def apply(
         self, sigma: Field, contact_state: ContactState, threshold: int, change: Field
     ) -> tuple[float, float]:
         """See `preconditioners.Preconditioner.apply`."""
+        first = self.coarse[0]
         self.rows.exchange_halo(contact_state)
-        self.set_ties(contact_state, threshold)  # penalty terms
-        fields = (self.rows.with_halo(sigma), contact_state, threshold, self.operators[0])
+        first.set_ties(contact_state, threshold, 0)  # penalty terms
+        for finer, level in pairwise(self.coarse):
+            level.set_ties(finer.weights, transfer.WHOLE_WEIGHT, 1)
+        fields = (self.rows.with_halo(sigma), contact_state, threshold, self.operator)
         # one smoothing step from zero on the finest level, and the restriction of the residual
-        self.restrict(kernels.first_residual, fields, 0)
+        first.restrict(kernels.first_residual, *fields)
         self.descend()  # pre-smoothing
-        for level in range(len(self.coarse_rows) - 2, -1, -1):  # correction, post-smoothing
-            x, y, correction = self.x[level], self.y[level], self.correction(level + 1)
-            if self.operators[level + 1].is_squared:
-                self.smooth(level, y, x, *correction)
-                self.smooth(level, x, y)
-            else:
-                self.smooth(level, None, y, *correction)
+        for coarser, level in pairwise(self.coarse[::-1]):
+            level.post_smooth(coarser)
         # correction and one smoothing step on the finest level, and the sums
         slope, z_change = self.rows.sums_with_halo(
-            2, kernels.last_smooth, *fields, *self.correction(0), self.scale, change, self.z
+            2, kernels.last_smooth, *fields, *first.correction(), self.scale, change, self.z
         )
         return float(slope), float(z_change)
 
     def descend(self) -> None:
         """Smooth and restrict, from the finest of the coarse levels to the coarsest."""
-        last = len(self.coarse_rows) - 1
-        for level, rhs in enumerate(self.rhs[:last]):
-            operator, y = self.operators[level + 1], self.y[level]
-            if operator.is_squared:
-                self.smooth(level, None, y)
-            fields = (rhs, operator, self.ties[level], y, not operator.is_squared)
-            self.restrict(kernels.residual, fields, level + 1)
-        self.smooth(last, None, self.y[last])
+        for finer, level in pairwise(self.coarse):
+            is_squared = finer.operator.is_squared
+            if is_squared:
+                finer.smooth(None, finer.y)
+            fields = (finer.rhs, finer.operator, finer.ties, finer.y, not is_squared)
+            level.restrict(kernels.residual, *fields)
+        last = self.coarse[-1]
+        last.smooth(None, last.y)
         for _ in range(COARSEST_STEP_PAIRS):
-            self.smooth(last, self.y[last], self.x[last])
-            self.smooth(last, self.x[last], self.y[last])
-
-    def restrict(self, kernel: Kernel, fields: tuple[Any, ...], level: int) -> None:
-        """Restrict the residual that a kernel computes on the next finer level to `level`."""
-        residual, rows = self.between[level], self.coarse_rows[level]
-        if residual is None:
-            rows.run_from_finer(kernel, fields, self.rhs[level : level + 1])
-        else:
-            self.finer_rows(level).run(kernel, *fields, residual)
-            rows.run(transfer.restrict, residual, self.rhs[level])
-
-    def correction(self, level: int) -> tuple[SingleField, np.float32]:
-        """The result on a level as `_interpolate` takes it, and the ratio of the scales."""
-        interpolated, y = self.between[level], self.y[level]
-        if interpolated is None:
-            return self.coarse_rows[level].aligned_with_finer(y), self.ratios[level]
-        self.finer_rows(level).run(transfer.interpolate, y, interpolated)
-        return interpolated, self.ratios[level]
-
-    def finer_rows(self, level: int) -> LocalRows:
-        """The rows of the next finer level."""
-        return self.coarse_rows[level - 1] if level > 0 else self.rows
-
-    def smooth(
-        self,
-        level: int,
-        old: SingleField | None,
-        new: SingleField,
-        coarse: SingleField | None = None,
-        ratio: np.float32 = kernels.ZERO,
-    ) -> None:
-        """Write the result of a smoothing step on `old` plus P coarse to `new`.
-
-        Without `old`, the result of a smoothing step from zero takes its place.
-        """
-        rhs, rows = self.rhs[level], self.coarse_rows[level]
-        matrix = (rhs, self.operators[level + 1], self.ties[level])
-        start = (rhs if old is None else old, old is None, rhs if coarse is None else coarse, ratio)
-        rows.run_with_halo(kernels.smooth, *matrix, *start, new)
-        rows.exchange_halo(new)
-
-    def set_ties(self, contact_state: ContactState, threshold: int) -> None:
-        """Compute the penalty terms of the coarse levels from the points held."""
-        for level, rows in enumerate(self.coarse_rows):
-            targets = (self.ties[level], self.weights[level])
-            if level == 0:
-                source = (contact_state, threshold, 0)
-            else:
-                source = (self.weights[level - 1], transfer.WHOLE_WEIGHT, 1)
-            halved = self.between[level] is None
-            kernel = transfer.compute_ties if halved else transfer.compute_any_ties
-            rows.run_from_finer(kernel, source, targets)
+            last.smooth(last.y, last.x)
+            last.smooth(last.x, last.y)

@@ -78,6 +78,18 @@ def _restrict(up, mid, down, coarse):
 
 
 @part_of_kernel
+def _pass_on(i, a, ratio, defect, coarse):
+    """Restrict the residual down to its row i, or write the row to a field that is as wide."""
+    row = defect[i % 3]
+    row[0] = row[-1]
+    if ratio == 1:
+        for j in range(row.size - 1):
+            coarse[i, j] = row[j + 1]
+    elif i % 2 == 1 and i > 2 * a:
+        _restrict(defect[(i - 2) % 3], defect[(i - 1) % 3], row, coarse[i // 2])
+
+
+@part_of_kernel
 def _interpolate(coarse, k, ratio, out):
     """Write ratio times row k of P coarse to a row of a ring buffer.
 
@@ -127,12 +139,7 @@ def first_residual(sigma, contact_state, threshold, operator, coarse, a, b):
             c = j + 2
             pull = _laplacian(up, mid, down, operator, c)
             row[j + 1] = ZERO if held[j] >= threshold else source[c] - step * pull
-        row[0] = row[n]
-        if ratio == 1:
-            for j in range(n):
-                coarse[i, j] = row[j + 1]
-        elif i % 2 == 1 and i > 2 * a:
-            _restrict(defect[(i - 2) % 3], defect[(i - 1) % 3], defect[i % 3], coarse[i // 2])
+        _pass_on(i, a, ratio, defect, coarse)
 
 
 @kernel
@@ -262,9 +269,4 @@ def residual(rhs, operator, ties, y, is_zero, coarse, a, b):
             continue
         row = defect[i % 3]
         _residual_row(i, x, rows, operator, ties, rhs, row)
-        row[0] = row[n]
-        if ratio == 1:
-            for j in range(n):
-                coarse[i, j] = row[j + 1]
-        elif i % 2 == 1 and i > 2 * a:
-            _restrict(defect[(i - 2) % 3], defect[(i - 1) % 3], row, coarse[i // 2])
+        _pass_on(i, a, ratio, defect, coarse)

@@ -36,7 +36,7 @@ from gfmd_cli.physics.observables import contact_points
 from gfmd_cli.solvers import pcg_kernels as kernels
 from gfmd_cli.solvers.contact_state import PRESSED, TENSE, refined
 from gfmd_cli.solvers.loop import Solver, Start, State
-from gfmd_cli.solvers.preconditioners import Preconditioner, Selection, create, select
+from gfmd_cli.solvers.preconditioners import Preconditioner, create, select
 from gfmd_cli.solvers.projected_move import MAX_HALVINGS, MoveChoice, choose, conjugation
 
 MAX_TENSION_RATIO = 0.3  # of rms tension to rms free force; from 0.1 to 1 within 20 % at n = 1 to 4
@@ -189,14 +189,14 @@ class _Run:
         if step < state.select_at:
             return
         state.select_at = max(step + MIN_SELECTION_INTERVAL, int(SELECTION_GROWTH * step))
-        selection = select(self.contact, self.contact_state, self.threshold)
-        change = state.screening / selection.screening
+        screening, v_cycle = select(self.contact, self.contact_state, self.threshold)
+        change = state.screening / screening
         is_close = 1 / MAX_SCREENING_CHANGE < change < MAX_SCREENING_CHANGE
-        is_other_kind = selection.v_cycle != state.v_cycle
-        if is_other_kind or not (selection.v_cycle or is_close):
+        is_other_kind = v_cycle != state.v_cycle
+        if is_other_kind or not (v_cycle or is_close):
             if is_other_kind:
                 state.length = 0.0
-            state.screening, state.v_cycle = selection.screening, selection.v_cycle
+            state.screening, state.v_cycle = screening, v_cycle
             state.moved = 0.0
             self.preconditioner = None
 
@@ -204,8 +204,7 @@ class _Run:
         """Precondition the force, and return the factor beta of the conjugation."""
         state = self.state
         if self.preconditioner is None:
-            selection = Selection(state.screening, state.v_cycle)
-            self.preconditioner = create(self.contact, selection, self.moves)
+            self.preconditioner = create(self.contact, self.moves, state.screening, state.v_cycle)
         fields = (self.sigma, self.contact_state, self.threshold)
         slope, z_change = self.preconditioner.apply(*fields, self.change)
         state.transforms += self.preconditioner.transforms

@@ -7,7 +7,6 @@
 - The V-cycle of `multigrid` takes the contact points into account and needs no transform.
 """
 
-from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
@@ -65,31 +64,22 @@ class GreensFunction:
         return float(slope), float(z_change)
 
 
-@dataclass(frozen=True)
-class Selection:
-    """The preconditioner that suits a contact pattern."""
+def select(contact: Contact, contact_state: ContactState, threshold: int) -> tuple[float, bool]:
+    """k(q_c) of the Green's function for the points held, and whether the V-cycle is faster.
 
-    screening: float
-    """k(q_c) of the screened Green's function."""
-    v_cycle: bool
-    """Whether the V-cycle is faster than the Green's function."""
-
-
-def select(contact: Contact, contact_state: ContactState, threshold: int) -> Selection:
-    """Select a preconditioner for the points held; `contact_state` has a halo."""
+    `contact_state` has a halo.
+    """
     grid = contact.grid
     grid.rows.exchange_halo(contact_state)
     held, changes = grid.rows.sums_with_halo(2, kernels.pattern, contact_state, threshold)
     screening, exponent = _screening(contact, float(held), float(changes))
     is_steep = exponent > V_CYCLE_EXPONENT[grid.dimension]
-    return Selection(screening, is_steep and has_coarser_level(grid))
+    return screening, is_steep and has_coarser_level(grid)
 
 
-def create(contact: Contact, selection: Selection, grid: Grid) -> Preconditioner:
+def create(contact: Contact, grid: Grid, screening: float, v_cycle: bool) -> Preconditioner:
     """The selected preconditioner; `z` is `padded` of `grid`, that of the contact or in single."""
-    if selection.v_cycle:
-        return Multigrid(contact, grid)
-    return GreensFunction(contact, selection.screening, grid)
+    return Multigrid(contact, grid) if v_cycle else GreensFunction(contact, screening, grid)
 
 
 def _screening(contact: Contact, held: float, changes: float) -> tuple[float, float]:

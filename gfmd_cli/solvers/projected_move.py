@@ -49,6 +49,15 @@ def feasible(grid: Grid, direction: Field, stress: Field) -> Field:
     return np.where(moving, direction - grid.mean(direction[moving]), 0.0)
 
 
+def new_direction(grid: Grid, z: Field, last: Field, stress: Field, force: Field) -> Field:
+    """The feasible direction of z + last, or of z alone where that raises the energy.
+
+    z is the preconditioned force, `last` the last direction times beta.
+    """
+    direction = feasible(grid, z + last, stress)
+    return direction if grid.dot(direction, force) > 0 else feasible(grid, z, stress)
+
+
 def projected(grid: Grid, stress: Field, total: float) -> Field:
     """The nearest stress >= 0 with this sum: max(stress - shift, 0).
 

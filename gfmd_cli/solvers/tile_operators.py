@@ -19,7 +19,8 @@ With a free boundary k ~ q^n, and both parts are known in real space: the smooth
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
-from functools import lru_cache
+from functools import lru_cache, partial
+from itertools import pairwise
 from math import prod
 from typing import Any, ClassVar, TypeAlias
 
@@ -30,6 +31,7 @@ from scipy.special import gammainc, gammaincc
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.grid.convolution import PaddedTransform, padded_shape
 from gfmd_cli.grid.fft_grid import Grid, Shape
+from gfmd_cli.grid.shared_transforms import side_by_side
 from gfmd_cli.physics.contact import Contact
 from gfmd_cli.physics.free_compliance import smooth_part
 from gfmd_cli.physics.free_contact import FreeContact
@@ -172,17 +174,13 @@ def convolution(kernel: Field, tiles: Tiles, pool: ThreadPoolExecutor | None) ->
     quadrant[0] /= 2
     quadrant[:, 0] /= 2
     padded = np.zeros((tiles.count + 1, SIDE * SIDE), np.float32)  # unused tiles are the last one
+    chunks = list(pairwise([*range(0, tiles.count, TILES_PER_CHUNK), tiles.count]))
 
     def apply(values: Field) -> Field:
         padded[:-1] = values
         out = np.empty(values.shape, np.float32)
-
-        def part(start: int) -> None:
-            stop = min(start + TILES_PER_CHUNK, tiles.count)
-            convolve(padded, tiles.neighbours, quadrant, out, start, stop)
-
-        starts = range(0, tiles.count, TILES_PER_CHUNK)
-        list(map(part, starts) if pool is None else pool.map(part, starts))
+        arrays = (padded, tiles.neighbours, quadrant, out)
+        side_by_side(pool, [partial(convolve, *arrays, *chunk) for chunk in chunks])
         return out
 
     return apply

@@ -203,6 +203,9 @@ class _Point(NamedTuple):
     trial: Trial
 
 
+UNBOUNDED = tuple(_Point(x, x, Trial(0, 0.0, x, 0.0)) for x in (-inf, inf))  # not enclosed yet
+
+
 class _Search:
     """The search on one grid.
 
@@ -252,8 +255,7 @@ class _Search:
         x, y, _ = self.points[0]
         x -= max(-STEP, min(y / self.slope, STEP))
         low, high = self._enclosure()
-        x = x if low is None else max(low.x, x)
-        return x if high is None else min(x, high.x)
+        return min(max(low.x, x), high.x)
 
     @property
     def succeeded(self) -> bool:
@@ -265,15 +267,13 @@ class _Search:
     def _exhausted(self) -> bool:
         """Whether the solver tells no pressures apart that come nearer."""
         low, high = self._enclosure()
-        if low is None or high is None:
-            return False
         step = abs(high.trial.value - low.trial.value)
         return high.x - low.x < self.resolution or step < 1.5 * self.quantum
 
-    def _enclosure(self) -> tuple[_Point | None, _Point | None]:
+    def _enclosure(self) -> tuple[_Point, _Point]:
         """The highest pressure known to be too low, and the lowest known to be too high."""
-        low = max((point for point in self.points if point.y < 0), default=None)
-        high = min((point for point in self.points if point.y > 0), default=None)
+        low = max((point for point in self.points if point.y < 0), default=UNBOUNDED[0])
+        high = min((point for point in self.points if point.y > 0), default=UNBOUNDED[1])
         return low, high
 
     def next(self) -> float | None:
@@ -283,7 +283,7 @@ class _Search:
         if self.succeeded or self._exhausted or len(self.points) >= TRIALS:
             return None
         x, (low, high) = self.root, self._enclosure()
-        if low is not None and high is not None:
+        if isfinite(high.x - low.x):
             margin = 0.5 * self.resolution
             if not low.x + margin < x < high.x - margin or len(self.points) % 5 == 4:
                 x = 0.5 * (low.x + high.x)

@@ -65,9 +65,8 @@ class StudyProgress:
 
 def progress_of_spec(spec: Spec, path: Path) -> StudyProgress:
     """The progress of the tasks of a spec in the study file `path`."""
-    tasks = plan(spec)
-    output = frozenset(spec.output.names())
-    return _progress(Study(path), [(task.id, task.label) for task in tasks], output)
+    tasks = [(task.id, task.label) for task in plan(spec)]
+    return _progress(Study(path), tasks, spec.output.names())
 
 
 def progress_of_study(path: Path) -> StudyProgress:
@@ -113,13 +112,9 @@ def _progress(
     names = [path.name for path in (*damaged_files, *damaged)]
     others = outcomes.keys() - {name for name, _ in tasks}
     each = [
-        TaskProgress(
-            index,
-            label,
-            statuses.get(name, Status.MISSING),
-            None if name in statuses else saved[name],
-            "" if name in statuses else failures[name],
-        )
+        TaskProgress(index, label, statuses[name])
+        if name in statuses
+        else TaskProgress(index, label, Status.MISSING, saved[name], failures[name])
         for index, (name, label) in enumerate(tasks)
     ]
     return StudyProgress(study.path, each, len(records), names, len(others))

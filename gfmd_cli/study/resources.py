@@ -124,23 +124,19 @@ def jobs_and_threads(
     """
     if not tasks:
         return 1, 1
-    size = max(task.size for task in tasks)
-    largest = max(task.bytes for task in tasks)
-    threaded = size >= THREADED_POINTS**2 and not reproducible
-    if available_addresses() < largest + ADDRESSES_PER_CORE * available_cores():
-        threaded = False
+    cores, largest = available_cores(), max(task.bytes for task in tasks)
+    is_large = max(task.size for task in tasks) >= THREADED_POINTS**2
+    has_addresses = available_addresses() >= largest + ADDRESSES_PER_CORE * cores
     if ranks is not None:
         if jobs not in (None, 1):
             raise InputError(f"--jobs {jobs}: under mpiexec its processes share each task")
-        cores, _ = cores_and_processes_on_node(ranks, os.sched_getaffinity(0))
-        return 1, min(cores, available_cores()) if threaded else 1
-    cores = available_cores()
-    if jobs is None:
+        jobs, on_node = 1, cores_and_processes_on_node(ranks, os.sched_getaffinity(0))
+        cores = min(cores, on_node[0])
+    elif jobs is None:
+        is_short = sum(task.seconds for task in tasks) < POOL_SECONDS
         fitting = max(1, int(usable_memory() // largest))
-        jobs = min(cores, len(tasks), fitting)
-        if sum(task.seconds for task in tasks) < POOL_SECONDS:
-            jobs = 1
-    return jobs, max(1, cores // jobs) if threaded else 1
+        jobs = 1 if is_short else min(cores, len(tasks), fitting)
+    return jobs, max(1, cores // jobs) if is_large and has_addresses and not reproducible else 1
 
 
 def seconds_to_stop(tasks: list[Task], jobs: int) -> float:
