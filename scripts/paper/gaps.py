@@ -157,6 +157,8 @@ def small_pressure(studies: StoredStudies, folder: Path) -> list[Finding]:
     plot.theory(lines)
     finish(plot, folder, "small_pressure", "log", "linear", np.concatenate(xs), [0, 3.7])
     limits_text = ", ".join(f"{limit:.2g} at {label(n)}" for n, limit in limits.items())
+    missing = ", ".join(label(n) for n in limits if label(n) not in ratios)
+    left_out = f" Not judged, with less than two decades below it: {missing}." if missing else ""
     quantity = (
         "fall of u_g over one decade of p* over that of the decade above, below the pressure at which the "
         "long waves are in contact"
@@ -166,7 +168,7 @@ def small_pressure(studies: StoredStudies, folder: Path) -> list[Finding]:
             "quasi_logarithmic",
             {quantity: ratios},
             f"1 means a logarithm. The pressures, at which p is the rms stress of the waves up to 2 qᵣ, are "
-            f"p* = {limits_text}: the range shrinks as n rises. {sample(studies, 'small_pressure')}",
+            f"p* = {limits_text}: the range shrinks as n rises.{left_out} {sample(studies, 'small_pressure')}",
         )
     ]
 
