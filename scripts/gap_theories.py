@@ -308,12 +308,17 @@ def print_slabs(path: Path) -> None:
         simulated = np.log(curve.column("u_g_continuum"))
         differences = [log_gap(name, shells, np.nan, p) - simulated for name in THEORIES]
         by_thickness[row["thickness"]].append(differences)
-    rows = [
-        [f"{t:g}", name, *signed(np.mean(errors, axis=0)[i])]
-        for t, errors in by_thickness.items()
-        for i, name in enumerate(THEORIES.values())
-    ]
-    print_table("Slabs, per cent", ["t/L", "", *(f"p* = {p:g}" for p in P_STAR)], rows)
+    rows = []
+    for t, errors in by_thickness.items():
+        for i, name in enumerate(THEORIES.values()):
+            rows.append([f"{t:g}", name, *signed(np.mean(errors, axis=0)[i])])
+        bars = np.transpose([one[0] for one in errors])
+        rows.append([f"{t:g}", "±", *(f"{100 * spread(list(one))[1]:.1f}" for one in bars)])
+    print_table(
+        "Slabs, per cent (standard errors in the last lines)",
+        ["t/L", "", *(f"p* = {p:g}" for p in P_STAR)],
+        rows,
+    )
     every = np.array([one for errors in by_thickness.values() for one in errors])
     ends = zip(THEORIES.values(), np.moveaxis(every, 1, 0), strict=True)
     print("\nrms:", *(f"{name} {100 * rms(list(errors)):.1f}" for name, errors in ends))

@@ -117,9 +117,7 @@ def slab_specs() -> list[str]:
     """Slabs from nearly a plate to nearly a half-space; u_g to 1 %."""
     thickness = table("[elastomer]", kind="slab", thickness=[0.005, 0.02, 0.05, 0.2])
     grid = table("[grid]", points="auto") + table("[accuracy]", mean_gap=0.01, max_points=800)
-    return [
-        surface("cutoff", 0.2, 0.02, seed=[200, 201, 202, 203]) + thickness + grid + rest(LIGHT)
-    ]
+    return [surface("cutoff", 0.2, 0.02, seed=[*range(200, 216)]) + thickness + grid + rest(LIGHT)]
 
 
 def true_contact_specs() -> list[str]:
