@@ -1,7 +1,7 @@
 """Contact stiffness over mean gap, and percolation of the gap, for every n: docs/theory.md.
 
-Reads the studies `stiffness`, `surfaces` and `percolation` of scripts/theory_studies.py, prints
-tables and draws two figures.
+Reads the studies `stiffness`, `surfaces`, `percolation` and `thresholds` of
+scripts/theory_studies.py, prints tables and draws two figures.
 
 python scripts/gap_stiffness.py --folder results/theory --figures docs/figures
 """
@@ -16,6 +16,7 @@ from theory_studies import EXPONENTS, LADDER, SHOWN, TRAINING, run_with_studies
 from gfmd_cli.analysis.compare import Curve, compare
 from gfmd_cli.analysis.curve_styles import MARKERS, CurveStyle, colours
 from gfmd_cli.analysis.plotting import ColumnFigure, styled
+from gfmd_cli.analysis.selection import grouped
 from gfmd_cli.physics import einstein_solid
 from gfmd_cli.physics.discretisation_error import AREA_EXCESS, MAX_AREA_EXPONENT
 from gfmd_cli.physics.persson import Shells, gamma_n
@@ -189,6 +190,24 @@ def print_on_four_grids(curves: Curves) -> None:
     print_table("Where the gap stops percolating, 4 seeds", heads, rows)
 
 
+def print_on_surfaces(path: Path) -> None:
+    """Where the gap stops percolating on several surfaces, mean over seeds and directions."""
+    rows = []
+    by_surface = grouped(
+        compare(path).curves, lambda c: (c.rows[0]["spectrum"], c.rows[0]["hurst"])
+    )
+    for key, held in by_surface.items():
+        curves = {(c.n, int(c.rows[0]["points"]), int(c.rows[0]["seed"])): c for c in held}
+        for n in sorted({c.n for c in held}):
+            cells = [f"{one}" for one in (*key, n, sum(c.n == n for c in held))]
+            for values in (areas(curves, n, GRID), column(curves, n, "p_star")):
+                ends = thresholds(curves, n, GRID, values).mean(axis=1)
+                cells.append("{:.3f} ± {:.3f}".format(*spread(ends)))
+            rows.append(cells)
+    heads = ["spectrum", "H", "n", "seeds", "a_r", "p*"]
+    print_table("Where the gap stops percolating, other surfaces and seeds, 512^2", heads, rows)
+
+
 def draw(curves: Curves, folder: Path) -> None:
     with styled():
         plot = ColumnFigure(
@@ -223,6 +242,7 @@ def main() -> None:
     print_differences(curves)
     print_percolation(curves)
     print_on_four_grids(read(arguments.folder / "percolation.h5"))
+    print_on_surfaces(arguments.folder / "thresholds.h5")
     draw(curves, arguments.figures)
 
 

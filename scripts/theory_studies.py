@@ -148,6 +148,19 @@ def percolation_specs() -> list[str]:
     ]
 
 
+def thresholds_specs() -> list[str]:
+    """Percolation of the gap at n = 1 and 2 on three surfaces, seeds of their own."""
+    specs = []
+    for n, seeds, pressures in ((1, FURTHER, range(30, 64, 2)), (2, FURTHER[:8], range(34, 56, 2))):
+        texts = [
+            surface(kind, 1 / 4, 1 / 64, hurst=hurst, seed=seeds)
+            for kind, hurst in (("rolloff", 0.8), ("rolloff", 0.3), ("cutoff", 0.8))
+        ]
+        last = table("[grid]", points=512) + rest([0.01 * x for x in pressures], percolation=True)
+        specs.append("".join(texts) + power([n]) + last)
+    return specs
+
+
 def resolution_specs() -> list[str]:
     """The shortest spectrum of `depth_specs` on 8, 16 and 32 points per lambda_s."""
     one = surface("rolloff", 1 / 4, 1 / 32, hurst=0.8, seed=[0, 1])
@@ -164,6 +177,7 @@ STUDIES = {
     "slab": slab_specs,
     "stiffness": stiffness_specs,
     "surfaces": surfaces_specs,
+    "thresholds": thresholds_specs,
     "true-contact": true_contact_specs,
 }
 
