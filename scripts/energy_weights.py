@@ -29,14 +29,14 @@ KINDS = {"roll-off, H = 0.8": (0.8, "rolloff"), "roll-off, H = 0.3": (0.3, "roll
          "cut-off, H = 0.8": (0.8, "cutoff")}  # fmt: skip
 EXPONENTS = (0.5, 1.0, 2.0, 3.0)
 PRESSURES = (0.01, 0.03, 0.1, 0.3, 1.0)
-SEEDS = range(8)
+SEEDS = 8
 GROUPS = 6  # of shells, equally wide in ln q
 
 
 Record = dict[str, Any]
 
 
-def scene_of(kind: str, n: float, seed: int) -> Scene:
+def scene_of(kind: str, n: float, seed: int, points: int = POINTS) -> Scene:
     hurst, spectrum = KINDS[kind]
     cut = spectrum == "cutoff"
     surface = SelfAffine(
@@ -46,12 +46,12 @@ def scene_of(kind: str, n: float, seed: int) -> Scene:
         spectrum="cutoff" if cut else "rolloff",
         seed=seed,
     )
-    return build_scene(surface, Power(n=n), POINTS)
+    return build_scene(surface, Power(n=n), points)
 
 
-def measure(kind: str, n: float, seed: int) -> Record:
+def measure(kind: str, n: float, seed: int, points: int) -> Record:
     """Weights and energies of one surface over the pressures."""
-    scene = scene_of(kind, n, seed)
+    scene = scene_of(kind, n, seed, points)
     record: Record = {"kind": kind, "n": n, "seed": seed, "weight": [], "beyond": []}
     for p in PRESSURES:
         contact = scene.contact(p)
@@ -117,12 +117,14 @@ def print_weights(records: list[Record]) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("cache", type=Path, help="file of the measured surfaces, one a line")
+    parser.add_argument("--points", type=int, default=POINTS)
+    parser.add_argument("--seeds", type=int, default=SEEDS, help="seeds, from 0 on")
     parser.add_argument("--no-run", action="store_true", help="use what is there")
     arguments = parser.parse_args()
     lines = arguments.cache.read_text().splitlines() if arguments.cache.exists() else []
-    cases = list(product(SEEDS, KINDS, EXPONENTS))
+    cases = list(product(range(arguments.seeds), KINDS, EXPONENTS))
     for seed, kind, n in [] if arguments.no_run else cases[len(lines) :]:
-        lines.append(json.dumps(measure(kind, n, seed)))
+        lines.append(json.dumps(measure(kind, n, seed, arguments.points)))
         arguments.cache.write_text("\n".join(lines) + "\n")
     records = [json.loads(line) for line in lines]
     print_weights(records)

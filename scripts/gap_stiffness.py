@@ -1,7 +1,7 @@
 """Contact stiffness over mean gap, and percolation of the gap, for every n: docs/theory.md.
 
-Reads the studies `stiffness` and `percolation` of scripts/theory_studies.py, prints tables and
-draws two figures.
+Reads the studies `stiffness`, `surfaces`, `percolation` and `thresholds` of
+scripts/theory_studies.py, prints tables and draws two figures.
 
 python scripts/gap_stiffness.py --folder results/theory --figures docs/figures
 """
@@ -11,11 +11,12 @@ from pathlib import Path
 
 import numpy as np
 from gamma_fit import GAMMA, mean_gap, print_table, smooth, spread
-from theory_studies import EXPONENTS, LADDER, TRAINING, run_with_studies
+from theory_studies import EXPONENTS, LADDER, SHOWN, TRAINING, run_with_studies
 
 from gfmd_cli.analysis.compare import Curve, compare
 from gfmd_cli.analysis.curve_styles import MARKERS, CurveStyle, colours
 from gfmd_cli.analysis.plotting import ColumnFigure, styled
+from gfmd_cli.analysis.selection import grouped
 from gfmd_cli.physics import einstein_solid
 from gfmd_cli.physics.discretisation_error import AREA_EXCESS, MAX_AREA_EXPONENT
 from gfmd_cli.physics.persson import Shells, gamma_n
@@ -23,7 +24,6 @@ from gfmd_cli.physics.persson import Shells, gamma_n
 GRIDS = (256, 512, 1024)
 GRID = 512
 P_STAR = np.array(LADDER)
-SHOWN = (0.001, 0.003, 0.01, 0.03, 0.1, 0.3, 1.0)
 ALL_EXPONENTS = [0.0, *EXPONENTS]
 Curves = dict[tuple[float, int, int], Curve]
 """By n, points a side and seed."""
@@ -45,9 +45,9 @@ def compliance(curves: Curves, n: float, points: int = GRID) -> np.ndarray:
     return P_STAR / column(curves, n, "stiffness", points)
 
 
-def theory_compliance(shells: Shells, gamma: float) -> np.ndarray:
+def theory_compliance(shells: Shells, gamma: float, p_star: np.ndarray = P_STAR) -> np.ndarray:
     step = 1e-3
-    ends = [mean_gap(shells, gamma, P_STAR * np.exp(sign * step)) for sign in (1, -1)]
+    ends = [mean_gap(shells, gamma, p_star * np.exp(sign * step)) for sign in (1, -1)]
     return (ends[1] - ends[0]) / (2 * step)
 
 
@@ -98,6 +98,26 @@ def print_stiffness(curves: Curves) -> None:
         "exact",
     ]
     print_table("Mean gap [h_std] and u_0 = p / kappa [h_std]", heads, rows)
+
+
+def print_surfaces(path: Path) -> None:
+    """u_0 of two more surfaces, and the error of Eq. (39) in brackets."""
+    by_key: dict[tuple, list[Curve]] = {}
+    for curve in compare(path).curves:
+        row = curve.rows[0]
+        by_key.setdefault((row["spectrum"], row["hurst"], curve.n), []).append(curve)
+    rows = []
+    for key, held in sorted(by_key.items()):
+        p_star, shells = held[0].column("p_star"), held[0].persson.shells
+        u_0 = np.array([p_star / curve.column("stiffness") for curve in held])
+        theory = theory_compliance(shells, float(np.squeeze(gamma_n(key[2]))), p_star)
+        cells = [
+            "{:.3f} ± {:.3f}".format(*spread(u_0[:, i])) + f" ({100 * (ratio - 1):+.0f} %)"
+            for i, ratio in enumerate(theory / u_0.mean(axis=0))
+        ]
+        rows.append([*(f"{one}" for one in key), *cells])
+    heads = ["spectrum", "H", "n", *(f"p* = {p:g}" for p in SHOWN)]
+    print_table("u_0 [h_std] of other surfaces (error of Eq. (39))", heads, rows)
 
 
 def print_differences(curves: Curves) -> None:
@@ -170,6 +190,24 @@ def print_on_four_grids(curves: Curves) -> None:
     print_table("Where the gap stops percolating, 4 seeds", heads, rows)
 
 
+def print_on_surfaces(path: Path) -> None:
+    """Where the gap stops percolating on several surfaces, mean over seeds and directions."""
+    rows = []
+    by_surface = grouped(
+        compare(path).curves, lambda c: (c.rows[0]["spectrum"], c.rows[0]["hurst"])
+    )
+    for key, held in by_surface.items():
+        curves = {(c.n, int(c.rows[0]["points"]), int(c.rows[0]["seed"])): c for c in held}
+        for n in sorted({c.n for c in held}):
+            cells = [f"{one}" for one in (*key, n, sum(c.n == n for c in held))]
+            for values in (areas(curves, n, GRID), column(curves, n, "p_star")):
+                ends = thresholds(curves, n, GRID, values).mean(axis=1)
+                cells.append("{:.3f} ± {:.3f}".format(*spread(ends)))
+            rows.append(cells)
+    heads = ["spectrum", "H", "n", "seeds", "a_r", "p*"]
+    print_table("Where the gap stops percolating, other surfaces and seeds, 512^2", heads, rows)
+
+
 def draw(curves: Curves, folder: Path) -> None:
     with styled():
         plot = ColumnFigure(
@@ -200,9 +238,11 @@ def main() -> None:
     arguments = parser.parse_args()
     curves = read(arguments.folder / "stiffness.h5")
     print_stiffness(curves)
+    print_surfaces(arguments.folder / "surfaces.h5")
     print_differences(curves)
     print_percolation(curves)
     print_on_four_grids(read(arguments.folder / "percolation.h5"))
+    print_on_surfaces(arguments.folder / "thresholds.h5")
     draw(curves, arguments.figures)
 
 

@@ -1,9 +1,9 @@
 """Theories of the mean gap on surfaces that no constant was fitted to.
 
 Compares Eq. (39), the fitted gamma(n), weights W of two contact areas, and coarse-graining. Prints
-the constants of gfmd_cli/physics/gap_theories.py. Reads the studies `gamma`, `between`,
-`stiffness`, `depth` and `slab` of scripts/theory_studies.py, and the weights by shell of
-scripts/energy_weights.py.
+the constants of gfmd_cli/physics/gap_theories.py. Reads the studies `gamma`, `further`,
+`between`, `stiffness`, `surfaces`, `depth` and `slab` of scripts/theory_studies.py, and the
+weights by shell of scripts/energy_weights.py.
 
 python scripts/gap_theories.py --folder results/theory --weights results/energy_weights.jsonl
 """
@@ -11,7 +11,7 @@ python scripts/gap_theories.py --folder results/theory --weights results/energy_
 import argparse
 import json
 from collections import defaultdict
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
@@ -31,11 +31,12 @@ from gamma_fit import (
     read,
     rms,
     spectrum_of,
+    spread,
 )
 from gamma_fit import smooth as gamma
 from scipy.optimize import least_squares
 from scipy.special import erf
-from theory_studies import EXPONENTS, HURST, SPECTRA, run_with_studies
+from theory_studies import EXPONENTS, HURST, SHOWN, SPECTRA, run_with_studies
 
 from gfmd_cli.analysis.compare import Curve, Theory, compare, einstein_prediction, theory_of
 from gfmd_cli.physics.persson import Shells, gamma_n
@@ -218,13 +219,36 @@ def print_spectra(fits: Fits) -> None:
     print_table("Coarse-graining, all seeds, range over the spectra, per cent", heads, rows)
 
 
+def print_further(path: Path) -> None:
+    """Coarse-graining on seeds of their own: errors and standard errors over the spectra."""
+    by_key = defaultdict(list)
+    for curve in compare(path).curves:
+        key = curve.n, spectrum_of(curve.rows[0]), curve.rows[0]["hurst"]
+        theory = log_gap("coarse-grained", curve.persson.shells, curve.n, P_STAR)
+        by_key[key].append(theory - np.log(curve.column("u_g")))
+    rows = []
+    for n in sorted({key[0] for key in by_key}):
+        held = [np.array(errors) for key, errors in by_key.items() if key[0] == n]
+        means = np.array([errors.mean(axis=0) for errors in held])
+        bars = np.array([errors.std(axis=0, ddof=1) / len(errors) ** 0.5 for errors in held])
+        ends = [signed(one) for one in (means.min(axis=0), means.max(axis=0))]
+        ends += [[f"{100 * x:.1f}" for x in one] for one in (bars.min(axis=0), bars.max(axis=0))]
+        ends += [[f"{x:.1f}" for x in np.max(np.abs(means) / bars, axis=0)]]
+        cells = zip(*ends, strict=True)
+        rows.append([f"{n:g}", *("{} to {} (± {} to {}; {})".format(*cell) for cell in cells)])
+    heads = ["n", *(f"p* = {p:g}" for p in P_STAR)]
+    title = "Coarse-graining, further seeds on 512^2, per cent (standard errors; largest ratio)"
+    print_table(title, heads, rows)
+
+
 def means(path: Path, points: int | None = None) -> Iterator[tuple[list[Curve], np.ndarray]]:
     """Curves of one surface and elastomer, and the mean of their ln u_g over the seeds."""
     by_key = defaultdict(list)
     for curve in compare(path).curves:
+        row = curve.rows[0]
         if points in (None, curve.points):
-            by_key[curve.n, curve.rows[0]["cutoff"]].append(curve)
-    for _, curves in sorted(by_key.items(), key=lambda item: (item[0][0], -item[0][1])):
+            by_key[curve.n, -row["cutoff"], row["spectrum"], row["hurst"]].append(curve)
+    for _, curves in sorted(by_key.items()):
         yield curves, np.mean([np.log(curve.column("u_g")) for curve in curves], axis=0)
 
 
@@ -247,15 +271,20 @@ def print_between(path: Path) -> None:
     print_table("Exponents between those of the fit, test seeds, per cent", heads, rows)
 
 
-def print_other(path: Path) -> None:
-    """Other pressures, on the grid of 512^2."""
+def print_other(path: Path, pressures: Sequence[float]) -> None:
+    """Other pressures, on the grid of 512^2; the last line is the standard error of the mean."""
     rows = []
     for curves, simulated in means(path, GRID):
-        n, p, shells = curves[0].n, curves[0].column("p_star"), curves[0].persson.shells
-        at = np.array([np.argmin(np.abs(p - one)) for one in OTHER])
+        n, p, row = curves[0].n, curves[0].column("p_star"), curves[0].rows[0]
+        at = np.array([np.argmin(np.abs(p - one)) for one in pressures])
+        first = f"{n:g}", f"{row['spectrum']}, H = {row['hurst']}"
         for name, head in THEORIES.items():
-            rows.append([f"{n:g}", head, *signed(log_gap(name, shells, n, p[at]) - simulated[at])])
-    print_table("Other pressures, per cent", ["n", "", *(f"p* = {p:g}" for p in OTHER)], rows)
+            theory = log_gap(name, curves[0].persson.shells, n, p[at])
+            rows.append([*first, head, *signed(theory - simulated[at])])
+        bars = np.transpose([np.log(curve.column("u_g")) for curve in curves])[at]
+        rows.append([*first, "±", *(f"{100 * spread(list(one))[1]:.1f}" for one in bars)])
+    heads = ["n", "surface", "", *(f"p* = {p:g}" for p in pressures)]
+    print_table("Other pressures, per cent", heads, rows)
 
 
 def print_depth(path: Path) -> None:
@@ -279,12 +308,17 @@ def print_slabs(path: Path) -> None:
         simulated = np.log(curve.column("u_g_continuum"))
         differences = [log_gap(name, shells, np.nan, p) - simulated for name in THEORIES]
         by_thickness[row["thickness"]].append(differences)
-    rows = [
-        [f"{t:g}", name, *signed(np.mean(errors, axis=0)[i])]
-        for t, errors in by_thickness.items()
-        for i, name in enumerate(THEORIES.values())
-    ]
-    print_table("Slabs, per cent", ["t/L", "", *(f"p* = {p:g}" for p in P_STAR)], rows)
+    rows = []
+    for t, errors in by_thickness.items():
+        for i, name in enumerate(THEORIES.values()):
+            rows.append([f"{t:g}", name, *signed(np.mean(errors, axis=0)[i])])
+        bars = np.transpose([one[0] for one in errors])
+        rows.append([f"{t:g}", "±", *(f"{100 * spread(list(one))[1]:.1f}" for one in bars)])
+    print_table(
+        "Slabs, per cent (standard errors in the last lines)",
+        ["t/L", "", *(f"p* = {p:g}" for p in P_STAR)],
+        rows,
+    )
     every = np.array([one for errors in by_thickness.values() for one in errors])
     ends = zip(THEORIES.values(), np.moveaxis(every, 1, 0), strict=True)
     print("\nrms:", *(f"{name} {100 * rms(list(errors)):.1f}" for name, errors in ends))
@@ -323,8 +357,10 @@ def main() -> None:
     fits = Fits(read(arguments.folder / "gamma.h5"))
     print_errors(fits)
     print_spectra(fits)
+    print_further(arguments.folder / "further.h5")
     print_between(arguments.folder / "between.h5")
-    print_other(arguments.folder / "stiffness.h5")
+    print_other(arguments.folder / "stiffness.h5", OTHER)
+    print_other(arguments.folder / "surfaces.h5", SHOWN)
     print_depth(arguments.folder / "depth.h5")
     print_slabs(arguments.folder / "slab.h5")
     lines = arguments.weights.read_text().splitlines()

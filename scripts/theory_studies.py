@@ -18,6 +18,8 @@ from gfmd_cli.study.run import RunOptions, run_study
 
 TRAINING, TEST = range(100, 108), range(200, 208)
 """Disjoint sets of seeds: constants are fitted to the first and tested on the second."""
+FURTHER = [*range(300, 316)]
+"""Seeds that no form of a theory was chosen with."""
 HURST = [0.3, 0.5, 0.8]
 SPECTRA = {
     "roll-off, L/8": ("rolloff", 1 / 8),
@@ -29,6 +31,8 @@ EXPONENTS = [0.5, 1, 2, 3, 4]
 LIGHT = [0.01, 0.03, 0.1, 0.3]
 LADDER = [0.001, 0.003, 0.01, 0.03, 0.1, 0.2, *(0.01 * x for x in range(25, 65, 5)), 0.7, 0.8, 1.0]
 """Reduced pressures up to the percolation of the contact, where the gap stops percolating."""
+SHOWN = [0.001, 0.003, 0.01, 0.03, 0.1, 0.3, 1.0]
+"""Those of the tables of the contact stiffness."""
 
 
 PERCOLATION = [0.01 * x for x in range(34, 68, 2)]
@@ -73,12 +77,23 @@ def gamma_specs() -> list[str]:
     ]
 
 
+def further_specs() -> list[str]:
+    """The nine spectra with seeds of their own, for n <= 1, where 512^2 is fine enough."""
+    spectra = [surface(*which, 1 / 128, hurst=HURST, seed=FURTHER) for which in SPECTRA.values()]
+    return ["".join(spectra) + power([0.5, 1]) + table("[grid]", points=512) + rest(LIGHT)]
+
+
 def between_specs() -> list[str]:
-    """Exponents between those of the fits, the test seeds on 512^2 and one on 1024^2."""
-    seeds, grid = grids({512: [*TEST], 1024: [TEST[0]]})
-    one = surface(*SPECTRA["roll-off, L/8"], 1 / 128, hurst=0.3, seed=seeds)
-    other = surface(*SPECTRA["roll-off, L/4"], 1 / 128, hurst=0.8, seed=seeds)
-    return [one + other + power([1.5, 2.5, 3.5]) + grid + rest(LIGHT)]
+    """Exponents between those of the fits, eight seeds on 512^2 and one on 1024^2."""
+    exponents, specs = power([1.5, 2.5, 3.5]), []
+    for held, surfaces in (
+        ([*TEST], (("roll-off, L/8", 0.3), ("roll-off, L/4", 0.8))),
+        (FURTHER[:8], (("cut-off, L/8", 0.3), ("cut-off, L/8", 0.8))),
+    ):
+        seeds, grid = grids({512: held, 1024: held[:1]})
+        texts = [surface(*SPECTRA[name], 1 / 128, hurst=h, seed=seeds) for name, h in surfaces]
+        specs.append("".join(texts) + exponents + grid + rest(LIGHT))
+    return specs
 
 
 def stiffness_specs() -> list[str]:
@@ -89,20 +104,27 @@ def stiffness_specs() -> list[str]:
     return [one + every + grid + rest(LADDER, stiffness=True, percolation=True)]
 
 
+def surfaces_specs() -> list[str]:
+    """Contact stiffness of two more surfaces, seeds of their own."""
+    ends = 1 / 4, 1 / 64
+    small = surface("rolloff", *ends, hurst=0.3, seed=FURTHER[:8])
+    cut = surface("cutoff", *ends, hurst=0.8, seed=FURTHER[:8])
+    grid = table("[grid]", points=512)
+    return [small + cut + power([0, *EXPONENTS]) + grid + rest(SHOWN, stiffness=True)]
+
+
 def slab_specs() -> list[str]:
     """Slabs from nearly a plate to nearly a half-space; u_g to 1 %."""
     thickness = table("[elastomer]", kind="slab", thickness=[0.005, 0.02, 0.05, 0.2])
     grid = table("[grid]", points="auto") + table("[accuracy]", mean_gap=0.01, max_points=800)
-    return [
-        surface("cutoff", 0.2, 0.02, seed=[200, 201, 202, 203]) + thickness + grid + rest(LIGHT)
-    ]
+    return [surface("cutoff", 0.2, 0.02, seed=[*range(200, 216)]) + thickness + grid + rest(LIGHT)]
 
 
 def true_contact_specs() -> list[str]:
     """Delta_sigma over the true contact, with areas in the continuum."""
     grid = table("[grid]", points=400) + table("[accuracy]", mean_gap=0.01)
     exponents = power([0, 0.5, 1, 1.5, 2, 2.5, 3])
-    one = surface("rolloff", 0.5, 0.02, seed=[0, 1, 2])
+    one = surface("rolloff", 0.5, 0.02, seed=[*range(24)])
     return [one + exponents + grid + rest([0.003, 0.03, 0.3], true_contact=True)]
 
 
@@ -126,6 +148,19 @@ def percolation_specs() -> list[str]:
     ]
 
 
+def thresholds_specs() -> list[str]:
+    """Percolation of the gap at n = 1 and 2 on three surfaces, seeds of their own."""
+    specs = []
+    for n, seeds, pressures in ((1, FURTHER, range(30, 64, 2)), (2, FURTHER[:8], range(34, 56, 2))):
+        texts = [
+            surface(kind, 1 / 4, 1 / 64, hurst=hurst, seed=seeds)
+            for kind, hurst in (("rolloff", 0.8), ("rolloff", 0.3), ("cutoff", 0.8))
+        ]
+        last = table("[grid]", points=512) + rest([0.01 * x for x in pressures], percolation=True)
+        specs.append("".join(texts) + power([n]) + last)
+    return specs
+
+
 def resolution_specs() -> list[str]:
     """The shortest spectrum of `depth_specs` on 8, 16 and 32 points per lambda_s."""
     one = surface("rolloff", 1 / 4, 1 / 32, hurst=0.8, seed=[0, 1])
@@ -135,11 +170,14 @@ def resolution_specs() -> list[str]:
 STUDIES = {
     "between": between_specs,
     "depth": depth_specs,
+    "further": further_specs,
     "gamma": gamma_specs,
     "percolation": percolation_specs,
     "resolution": resolution_specs,
     "slab": slab_specs,
     "stiffness": stiffness_specs,
+    "surfaces": surfaces_specs,
+    "thresholds": thresholds_specs,
     "true-contact": true_contact_specs,
 }
 

@@ -17,7 +17,7 @@ SMALL = {
     "accuracy_gain.py": "--max-points 400",
     "cost.py": "--table-only --points 128 --sizes 128 --repeats 1",
     "economy.py": "--points 400",
-    "energy_weights.py": "none.jsonl --no-run",
+    "energy_weights.py": "weights.jsonl --points 128 --seeds 2",
     "hard_cases.py": "--points 32 --only cliff --seconds 1",
     "indenter_bars.py": "--points 64 --line-reference 256 --round-reference 128 --exponents 1 "
     "--pressures 1",

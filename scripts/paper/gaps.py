@@ -144,7 +144,8 @@ def _over(above: Callable[[Field], float], below: Callable[[Field], float], grou
 @needs("small_pressure")
 def small_pressure(studies: StoredStudies, folder: Path) -> list[Finding]:
     """Small pressures: how much the gap falls from decade to decade."""
-    plot, xs, ys, lines, ratios, limits = ColumnFigure(P_STAR, LABELS["u_g"]), [], [], [], {}, {}
+    plot, xs, ys, lines = ColumnFigure(P_STAR, LABELS["u_g"]), [], [], []
+    ratios, limits, lower = {}, {}, []
     for group in groups(studies, "small_pressure"):
         n, p, u = group.n, group.p, group.column("u_g")
         draw_points(plot, STYLES[n], p, u.value, u.error)
@@ -154,9 +155,21 @@ def small_pressure(studies: StoredStudies, folder: Path) -> list[Finding]:
         limits[n] = min(float(p.max()), _long_waves(group.first))
         if limits[n] >= 100 * p.min() * 0.999:
             ratios[label(n)] = estimate(_falls(p, limits[n]), u)
+            steps = _decades(p, limits[n], u.value)
+            if len(steps) > 2:
+                below = ", ".join(f"{step:.2f}" for step in steps[2:] / steps[0])
+                lower.append(f"{below} at {label(n)}")
     plot.theory(lines)
     finish(plot, folder, "small_pressure", "log", "linear", np.concatenate(xs), [0, 3.7])
     limits_text = ", ".join(f"{limit:.2g} at {label(n)}" for n, limit in limits.items())
+    missing = ", ".join(label(n) for n in limits if label(n) not in ratios)
+    left_out = f" Not judged, with less than two decades below it: {missing}." if missing else ""
+    further = (
+        f" In the decades below these two the fall, over that of the first, is {'; '.join(lower)}: a "
+        "finite surface has a highest point."
+        if lower
+        else ""
+    )
     quantity = (
         "fall of u_g over one decade of p* over that of the decade above, below the pressure at which the "
         "long waves are in contact"
@@ -166,7 +179,8 @@ def small_pressure(studies: StoredStudies, folder: Path) -> list[Finding]:
             "quasi_logarithmic",
             {quantity: ratios},
             f"1 means a logarithm. The pressures, at which p is the rms stress of the waves up to 2 qᵣ, are "
-            f"p* = {limits_text}: the range shrinks as n rises. {sample(studies, 'small_pressure')}",
+            f"p* = {limits_text}: the range shrinks as n rises.{left_out}{further} "
+            f"{sample(studies, 'small_pressure')}",
         )
     ]
 
@@ -175,12 +189,17 @@ def _falls(p: Field, limit: float) -> Callable[[Field], float]:
     """Fall of u_g over the second decade below a pressure over that of the first one."""
 
     def of(u: Field) -> float:
-        high, middle, low = (
-            np.interp(np.log(limit) - k * np.log(10), np.log(p), u) for k in (0, 1, 2)
-        )
-        return float((low - middle) / (middle - high))
+        first, second = _decades(p, limit, u)[:2]
+        return float(second / first)
 
     return of
+
+
+def _decades(p: Field, limit: float, u: Field) -> Field:
+    """Fall of u_g over each decade below a pressure."""
+    count = int(np.log10(limit / p.min()) + 1e-3)
+    ends = np.log(limit) - np.log(10) * np.arange(count + 1)
+    return np.diff(np.interp(ends, np.log(p), u))
 
 
 def _long_waves(curve: Curve) -> float:

@@ -15,7 +15,7 @@ from gfmd_cli.grid.arrays import Field
 from gfmd_cli.physics.observables import LOGARITHMIC_EDGES, geometric_middles
 from paper.claims import Finding, Value
 from paper.drawing import STYLES, dense, draw_points, finish, label, slope
-from paper.ensembles import Mean, estimate, groups, sample
+from paper.ensembles import Group, Mean, estimate, groups, sample
 from paper.studies import StoredStudies, needs
 
 LOWEST = 0.02  # stress [Delta_sigma] that is drawn
@@ -124,6 +124,7 @@ def fig13(studies: StoredStudies, folder: Path) -> list[Finding]:
     change = abs(finest.value - coarser.value)  # what the grid leaves open
     mean = mean_stress(middle, distribution.counts[:, -1])
     tails_text = ", ".join(f"{exponent} at {name}" for name, exponent in tails.items())
+    factors = ", ".join(f"{factor}" for factor in increment_factors(groups(studies, "fig13")))
     return [
         Finding(
             "tail",
@@ -135,9 +136,19 @@ def fig13(studies: StoredStudies, folder: Path) -> list[Finding]:
             },
             f"Its error includes the change from the coarser grid: {tails_text}; p* = {distribution.finest['p_star']:g}. "
             f"The mean stress in contact is {mean:.2g} Δσ; [other windows](theory.md#tail-of-the-stress-"
-            f"distribution-at-n-3). {sample(studies, 'fig13')} The edge implies σ^−3, with which σ_p diverges logarithmically, as it "
-            "does on the grids; with σ^−2.6 it would diverge as a power.",
+            f"distribution-at-n-3). {sample(studies, 'fig13')} The edge implies σ^−3, with which σ_p diverges logarithmically; "
+            "with σ^−2.6 it would diverge as a power. From each increment of σ_p² at a doubling of the grid to the "
+            f"next the factor is {factors}; it is 1 for σ^−3 and 1.15 for σ^−2.6.",
         )
+    ]
+
+
+def increment_factors(grids: list[Group]) -> list[Value]:
+    """Increment of sigma_p^2 at a doubling of the grid over the one before, at the first pressure."""
+    squares = [Mean(group.column("sigma_p").each ** 2) for group in grids]
+    return [
+        estimate(lambda a, b, c: float((c[0] - b[0]) / (b[0] - a[0])), *three)
+        for three in zip(squares, squares[1:], squares[2:], strict=False)
     ]
 
 
