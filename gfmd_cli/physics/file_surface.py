@@ -262,8 +262,16 @@ class FileSurface(RigidSurface):
 
     def void(self, grid: Grid) -> Mask | None:
         """Points of a grid nearest to a missing height of the map, if these never touch."""
+        return self._missing_on(grid) if self.missing == "void" else None
+
+    def filled(self, grid: Grid) -> Mask | None:
+        """Points of a grid nearest to a missing height of the map, if these are filled in."""
+        return self._missing_on(grid) if self.missing == "fill" else None
+
+    def _missing_on(self, grid: Grid) -> Mask | None:
+        """Points of a grid nearest to a missing height of the map; None without one."""
         missing = self._topography().missing
-        if self.missing != "void" or missing is None:
+        if missing is None:
             return None
         if self.edges == "mirror":
             missing = mirror(missing)
