@@ -185,6 +185,12 @@ def _fit_lines(nearest: SelfAffineFit, metres: str) -> list[str]:
         f"lambda_s = {nearest.cutoff_wavelength:.3g}{metres}, rms height "
         f"{nearest.rms_height:.4g}{metres} (scatter {nearest.scatter:.3g})"
     ]
+    if np.isfinite(nearest.hurst_of_long_waves):
+        lines.append(
+            f"H depends on the waves: it is {nearest.hurst_of_long_waves:.2g} without the shorter "
+            "half of the wavenumbers; the error of H contains the difference. Noise, blur or a "
+            "filter?"
+        )
     if nearest.scatter > MAX_SCATTER:
         lines.append(
             "The scatter is far above 1: the surface is not self-affine, and no random surface is "
