@@ -334,8 +334,11 @@ class FileSurface(RigidSurface):
         topography, levelling = self._topography(), self.levelling()
         holes = count(topography.holes, "missing height") if topography.holes else ""
         is_free, own_shape = boundary == "free", topography.heights.shape
+        size = f"{extent(topography.shape)} points"
+        if self.dimension == 1:
+            size = f"profile of {size}, the same at all y (line contact)"
         steps = {
-            f"{self.path.name} ({topography.source}): {extent(topography.shape)} points": True,
+            f"{self.path.name} ({topography.source}): {size}": True,
             f"region {self.region}": self.region is not None,
             f"cropped to {extent(own_shape)}": self.crop and own_shape != topography.shape,
             "turned upside down": self.flip,
