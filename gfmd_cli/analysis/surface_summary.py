@@ -110,7 +110,7 @@ COLUMNS = (
         )
         for name in (*MAP_NAMES, *PROFILE_NAMES)
     ),
-    *(replace(column, error="") for column in FIT if column.value != "scatter"),
+    *FIT,
 )
 
 
