@@ -34,6 +34,7 @@ def test_the_fit_of_a_self_affine_surface_gives_what_it_was_made_from(keys):
     assert 2 * np.pi / fitted.q_r == pytest.approx(surface.rolloff * surface.length, rel=1e-4)
     assert 2 * np.pi / fitted.q_s == pytest.approx(surface.cutoff * surface.length, rel=5e-3)
     assert fitted.scatter < 1e-8
+    assert np.isnan(fitted.hurst_of_long_waves)
 
 
 @pytest.mark.parametrize("digits", [np.float32, "counts of 16 bits"])
@@ -46,6 +47,7 @@ def test_rounding_of_the_heights_does_not_change_the_fit(digits):
     m, power, modes = radial_power(Grid(256), rounded.astype(float))
     fitted = fit(shells(2 * np.pi * m, power, m, m, modes))
     assert fitted.hurst == pytest.approx(0.8, abs=0.02)
+    assert np.isnan(fitted.hurst_of_long_waves)
     assert 2 * np.pi / fitted.q_r == pytest.approx(0.25, rel=0.02)
     assert 2 * np.pi / fitted.q_s == pytest.approx(0.04, rel=0.02)
 

@@ -196,7 +196,7 @@ def _fit_lines(nearest: SelfAffineFit, metres: str) -> list[str]:
             "The scatter is far above 1: the surface is not self-affine, and no random surface is "
             "suggested."
         )
-    elif not MIN_HURST <= nearest.hurst <= 1:
+    elif not MIN_HURST <= round(nearest.hurst, 2) <= 1:  # as shown
         lines.append(
             f"The fit gives H = {nearest.hurst:.2g}, which is outside {MIN_HURST:g} to 1. The "
             "table below has the nearest possible exponent; its surface has another rms gradient."

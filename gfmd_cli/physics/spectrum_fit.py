@@ -28,6 +28,7 @@ AT_BOUND = 0.02  # distance from a bound at which it, not the spectrum, determin
 DIFFERENCE_STEP = 1e-4  # in H and ln q_r, for second differences: about eps^(1/4)
 ROUNDING_FACTOR = 1 - 1e-9  # factor by which sums may be too small due to rounding
 LONG_WAVES = 0.5  # of the highest wavenumber of the fit: range of a second fit
+MIN_CHANGE = 0.01  # of H between both fits; a choice: a surface of random phases has tiny errors
 MAX_CHANGE = 4.0
 """Largest change of H between both fits, over the root of the sum of the squares of their errors.
 Measured: at most 2.8 of 309 parts of self-affine surfaces with 64 to 512 points per side; at least
@@ -159,10 +160,11 @@ def _with_change(
     except InputError:  # too few waves
         return best
     change = abs(longer.hurst - best.hurst)
-    if not change > MAX_CHANGE * np.hypot(longer.hurst_error, best.hurst_error):
+    error = np.hypot(longer.hurst_error, best.hurst_error)
+    if not change > max(MIN_CHANGE, MAX_CHANGE * error):
         return best
-    error = float(np.hypot(best.hurst_error, change))
-    return replace(best, hurst_error=error, hurst_of_long_waves=longer.hurst)
+    whole = float(np.hypot(best.hurst_error, change))
+    return replace(best, hurst_error=whole, hurst_of_long_waves=longer.hurst)
 
 
 def _fit_below(shells: Shells, range_: int, counts: Field) -> tuple[SelfAffineFit, int]:
