@@ -372,6 +372,9 @@ def test_a_comparison_shows_its_tables(tmp_path):
     comparison = compare(run(TABLES, tmp_path / "a.h5"))
     assert "Comparison with Persson theory" in str(comparison)
     assert comparison._repr_html_().count("<tbody>") == str(comparison).count("points a side")
+    assert "no borders" not in str(comparison)
+    free = TABLES | {"grid": TABLES["grid"] | {"boundary": "free"}}
+    assert "no borders" in str(compare(run(free, tmp_path / "free.h5")))
 
 
 def test_the_package_lists_its_names():

@@ -385,6 +385,33 @@ def test_a_header_of_nova_that_is_not_read_is_refused(saved, factor, unit_y, wor
         read_topography(saved(header(factor, unit_y) + matrix(" ")))
 
 
+def wyko(is_in_nm, *blocks):
+    """A Wyko table: 12 positions along its x, with 300 heights each, and pixels of 2 um."""
+    sizes = f"Wyko ASCII Data File Format 0\t{is_in_nm}\t1\nX Size\t12\nY Size\t300\n"
+    header = ["Block Name\tType\tLength\tValue", "Pixel_size\t7\t4\t0.002", *blocks]
+    return sizes + "\n".join([*header, "RAW_DATA\t3\t48\t", ""]) + matrix("\t")
+
+
+@pytest.mark.parametrize(
+    "blocks",
+    [
+        (),
+        ("Wavelength\t7\t4\t600",),
+        ("Mult\t7\t4\t2",),
+        ("Wavelength\t7\t4\t600", "Mult\t6\t2\t2"),
+    ],
+)
+def test_heights_in_wavelengths_that_are_not_converted_are_refused(saved, blocks):
+    """They would be 300 times too small."""
+    good = read_topography(saved(wyko(0, "Wavelength\t7\t4\t600", "Mult\t7\t4\t2")))
+    np.testing.assert_allclose(good.heights, 300e-9 * HEIGHTS, rtol=1e-12)
+    assert good.spacing == pytest.approx((2e-6, 2e-6))
+    in_nm = read_topography(saved(wyko(1, *blocks)))
+    np.testing.assert_allclose(in_nm.heights, 1e-9 * HEIGHTS, rtol=1e-12)
+    with pytest.raises(InputError, match="in units of the wavelength"):
+        read_topography(saved(wyko(0, *blocks)))
+
+
 @pytest.mark.parametrize("separator", ["\t", ",", ";"])
 def test_empty_cells_at_the_ends_of_rows_that_drift_are_refused(saved, separator):
     rows = [separator.join(f"{value:.4f}" for value in row) for row in HEIGHTS]
@@ -422,6 +449,7 @@ def test_a_channel_of_a_signal_is_not_taken_as_the_heights():
 
     assert chosen("Deflection Error", "Height") == "Height"
     assert chosen("Height", "Deflection Error") == "Height"
+    assert chosen("Intensity", "RAW_DATA") == "RAW_DATA"
     assert chosen("Deflection Error", "Height", dataset="Deflection Error") == "Deflection Error"
     assert chosen("Topography (phase-shift)", "Intensity") == "Topography (phase-shift)"
     assert chosen("Form error") == "Form error"

@@ -1,10 +1,12 @@
-"""What a study keeps of a measured surface: pictures, and the share of its tapered edges."""
+"""What a study keeps of a measured surface: pictures, and the contact on changed heights."""
 
 import numpy as np
 import pytest
 
 from gfmd_cli import solve
+from gfmd_cli.maps.map_preparation import mirror
 from gfmd_cli.maps.pictures import MAP_PIXELS, picture
+from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.study.reading import open_study
 
 SPEC = """\
@@ -51,6 +53,58 @@ def test_much_contact_at_the_edges_is_told(gfmd, tmp_path):
     assert warning in gfmd("run", "spec.toml").output
     assert warning in gfmd("analyze", "study.h5").output
     assert "at the edges" not in gfmd("run", "spec.toml", "--set", "surface.edges=none").output
+
+
+def rough_map(missing):
+    """A random surface [m], without the heights that `missing` marks."""
+    heights = 1e-8 * SelfAffine(cutoff=1 / 16).heights(128)
+    heights[missing(heights)] = np.nan
+    return heights
+
+
+def highest(heights):
+    return heights > np.quantile(heights, 0.99)
+
+
+def at_random(heights):
+    return np.random.default_rng(3).random(heights.shape) < 0.02
+
+
+@pytest.mark.parametrize("edges", ["none", "mirror"])
+def test_much_contact_on_heights_that_were_filled_in_is_told(edges):
+    """One in a hundred is missing: the contact area is wrong where these are the highest."""
+    spec = {
+        "surface": {"length": 1e-4, "periodic": edges != "mirror", "edges": edges},
+        "elastomer": {"kind": "half-space"},
+        "load": {"pressure": 1e-5},
+    }
+    known = solve(spec, heights=rough_map(lambda heights: heights > np.inf))
+    told = solve(spec, heights=rough_map(highest))
+    silent = solve(spec, heights=rough_map(at_random))
+    assert np.isnan(known.columns["filled_contact"])
+    assert told.a_r > 1.2 * known.a_r
+    filled = np.isnan(rough_map(highest))
+    if edges == "mirror":
+        filled = mirror(filled)
+    share = np.count_nonzero(told.contact & filled) / np.count_nonzero(told.contact)
+    load = told.pressure[filled].sum() / told.pressure.sum()
+    assert told.columns["filled_contact"] == pytest.approx(share, rel=1e-12)
+    assert told.columns["filled_load"] == pytest.approx(load, rel=1e-12)
+    assert share > 0.1
+    warning = "of the load is where heights are missing and were filled in"
+    assert warning in "".join(told.warnings)
+    assert silent.a_r == pytest.approx(known.a_r, rel=0.02)
+    assert silent.columns["filled_contact"] < 0.05
+    assert warning not in "".join(silent.warnings)
+
+
+def test_heights_that_never_touch_are_not_filled_in():
+    spec = {
+        "surface": {"length": 1e-4, "missing": "void"},
+        "elastomer": {"kind": "half-space"},
+        "load": {"pressure": 1e-5},
+    }
+    assert np.isnan(solve(spec, heights=rough_map(highest)).columns["filled_contact"])
 
 
 def test_a_study_keeps_the_map_as_measured_and_as_prepared(rows_of, tmp_path):

@@ -75,6 +75,17 @@ def test_a_sound_scan_gives_none(tmp_path, points, hurst, cutoff):
             assert not filled_lines(read_topography(tmp_path / "h.npy"))[0]
 
 
+@pytest.mark.parametrize("hurst", [0.3, 0.9])
+@pytest.mark.parametrize("points", [4, 6, 8, 12, 24])
+def test_lines_that_were_broken_give_one_warning(tmp_path, hurst, points):
+    """As in a file with at most so many numbers in a line."""
+    heights = _scan(hurst)
+    words = f"the lines of {points} heights go on in the next line"
+    assert words in _found(tmp_path, heights.reshape(-1, points))
+    for sound in (heights[:, :points], heights.T[:, :points], -heights[:, -points:]):
+        assert not _found(tmp_path, sound)
+
+
 STRUCTURES = {
     "grating": np.floor(16 * X) % 2,
     "oblique grating": np.floor(16 * (X + Y)) % 2,

@@ -1,12 +1,13 @@
 import numpy as np
 import pytest
+from scipy.ndimage import grey_dilation
 from spectrum_fits import gaussian_roughness
 
-from gfmd_cli.analysis.surface_summary import summarise
+from gfmd_cli.analysis.surface_summary import summarise, summary_text
 from gfmd_cli.errors import InputError
 from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.physics.elastomers import HalfSpace
-from gfmd_cli.physics.file_surface import FileSurface
+from gfmd_cli.physics.file_surface import FileSurface, forget_files
 from gfmd_cli.physics.persson import shells
 from gfmd_cli.physics.scenes import build_scene
 from gfmd_cli.physics.self_affine import SelfAffine
@@ -34,6 +35,7 @@ def test_the_fit_of_a_self_affine_surface_gives_what_it_was_made_from(keys):
     assert 2 * np.pi / fitted.q_r == pytest.approx(surface.rolloff * surface.length, rel=1e-4)
     assert 2 * np.pi / fitted.q_s == pytest.approx(surface.cutoff * surface.length, rel=5e-3)
     assert fitted.scatter < 1e-8
+    assert np.isnan(fitted.hurst_of_long_waves)
 
 
 @pytest.mark.parametrize("digits", [np.float32, "counts of 16 bits"])
@@ -46,6 +48,7 @@ def test_rounding_of_the_heights_does_not_change_the_fit(digits):
     m, power, modes = radial_power(Grid(256), rounded.astype(float))
     fitted = fit(shells(2 * np.pi * m, power, m, m, modes))
     assert fitted.hurst == pytest.approx(0.8, abs=0.02)
+    assert np.isnan(fitted.hurst_of_long_waves)
     assert 2 * np.pi / fitted.q_r == pytest.approx(0.25, rel=0.02)
     assert 2 * np.pi / fitted.q_s == pytest.approx(0.04, rel=0.02)
 
@@ -92,6 +95,69 @@ def test_the_fit_has_the_gradient_of_a_surface_whose_spectrum_fills_the_grid(hur
     assert spectrum.q_s > 2 * np.pi * 64
     gradient = moments(shells_of(fitted, 2 * fitted.smallest_grid())).gradient
     assert gradient == pytest.approx(expected, rel=0.01)
+
+
+def fit_of_map(heights, tmp_path, pixel=1e-6):
+    """The summary of a map with borders and an rms height of 0.1 um."""
+    heights = 1e-7 * heights / heights.std()
+    np.save(tmp_path / "map.npy", heights)
+    forget_files()
+    side = pixel * heights.shape[1]
+    return summarise(FileSurface(path=tmp_path / "map.npy", periodic=False, length=side))
+
+
+def part_of_roughness(seed, rolloff=2.0, hurst=0.8):
+    draw = np.random.default_rng(seed)
+    return gaussian_roughness(draw, 512, hurst, 2 * rolloff, 256.0)[:256, :256]
+
+
+def with_noise(heights, share, seed=11):
+    """White noise of a share of the rms difference of neighbours."""
+    noise = np.random.default_rng(seed).standard_normal(heights.shape)
+    return heights + share * np.diff(heights).std() * noise
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("share", [0.3, 0.5, 1.0])
+def test_the_error_of_h_contains_the_effect_of_noise(seed, share, tmp_path):
+    summary = fit_of_map(with_noise(part_of_roughness(seed), share), tmp_path)
+    fitted = summary.spectrum.fit
+    assert fitted.hurst < 0.7
+    assert fitted.hurst_of_long_waves > fitted.hurst
+    assert fitted.hurst + 2 * fitted.hurst_error > 0.8
+    assert "H depends on the waves" in summary_text(summary)
+
+
+@pytest.mark.parametrize("hurst", [0.3, 0.8, 1.0])
+def test_h_does_not_depend_on_the_waves_of_a_self_affine_surface(hurst, tmp_path):
+    for seed in range(6):
+        for rolloff in (2.0, 5.0, 20.0):
+            summary = fit_of_map(part_of_roughness(seed, rolloff, hurst), tmp_path)
+            assert np.isnan(summary.spectrum.fit.hurst_of_long_waves)
+            assert summary.spectrum.fit.hurst_error < 0.03
+
+
+@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize(("rolloff", "hurst"), [(1.0, 1.0), (2.0, 1.0), (20.0, 0.3)])
+def test_the_fit_does_not_depend_on_the_unit_of_length(seed, rolloff, hurst, tmp_path):
+    heights = part_of_roughness(seed, rolloff, hurst)
+    fits = [fit_of_map(heights, tmp_path, pixel).spectrum.fit for pixel in (1e-2, 1e-6, 1e-8)]
+    assert fits[0].q_r > 0
+    for fitted in fits[1:]:
+        assert fitted.hurst == pytest.approx(fits[0].hurst, abs=1e-6)
+        assert fitted.q_r / fitted.q_1 == pytest.approx(fits[0].q_r / fits[0].q_1, rel=1e-5)
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_the_fit_of_a_surface_that_a_round_tip_has_scanned(seed, tmp_path):
+    """The fit has the gradient of the map up to a likely q_s, not in its longest waves alone."""
+    heights = part_of_roughness(seed)
+    y, x = np.mgrid[-8:9, -8:9]
+    tip = -0.075 * np.diff(heights).std() * (x**2 + y**2)
+    fitted = fit_of_map(grey_dilation(heights, structure=tip), tmp_path).spectrum.fit
+    assert fitted.cutoff_wavelength < 5e-6
+    assert fitted.rms_height == pytest.approx(1e-7, rel=0.5)
+    assert np.isfinite(fitted.hurst_of_long_waves)
 
 
 def test_moments_are_those_of_the_heights():

@@ -6,6 +6,7 @@ import tomllib
 import h5py
 import numpy as np
 import pytest
+from spectrum_fits import gaussian_roughness
 
 from gfmd_cli.physics.scenes import build_scene
 from gfmd_cli.spec.parse import read_spec
@@ -246,6 +247,23 @@ def test_several_surfaces_give_one_table_and_one_figure(gfmd, tmp_path):
     assert "allowed: .png, .pdf, .svg" in gfmd(
         "surface", "holed.npy", "--figure", "a.jpg", status=2
     )
+
+
+def test_the_table_of_several_surfaces_shows_whether_a_fit_is_good(gfmd, tmp_path):
+    """One surface is self-affine, the other one has noise, in lines that are a part of it."""
+    draw = np.random.default_rng(3)
+    good = gaussian_roughness(draw, 256, 0.8, 10.0, 64.0)[:128, :128]
+    np.save(tmp_path / "good.npy", good)
+    np.save(tmp_path / "bad.npy", good + 0.2 * good.std() * draw.normal(size=(128, 1)))
+    words = ("good.npy", "bad.npy", "--set", "surface.periodic=false")
+    header, *lines = gfmd("surface", *words).splitlines()[:3]
+    fits = [json.loads(gfmd("surface", *words, "--json"))[i] for i in (0, 1)]
+    for line, fit in zip(lines, fits, strict=True):
+        assert header.split()[-1] == "scatter"
+        assert float(line.split()[-1]) == pytest.approx(fit["scatter"], rel=0.01)
+        assert "+-" in line
+    assert fits[0]["scatter"] < 1.5
+    assert fits[1]["scatter"] > 3
 
 
 def test_a_scan_in_nanometres_that_does_not_repeat_gives_warnings_and_is_mended(gfmd, tmp_path):

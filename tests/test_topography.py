@@ -187,6 +187,15 @@ def test_marks_and_clipped_heights_at_many_points_give_a_warning(npy, is_mark, w
     assert re.search(words, "\n".join(FileSurface(path=npy(heights)).warnings()))
 
 
+def test_a_mark_at_most_points_gives_a_warning(npy):
+    """A round sample in a square frame, with a mark around it."""
+    y, x = np.mgrid[:60, :60]
+    heights = np.random.default_rng(4).normal(size=(60, 60))
+    heights[np.hypot(y - 30, x - 30) > 20] = -9999.0
+    (warning,) = [r for r in FileSurface(path=npy(heights)).warnings() if "far from" in r]
+    assert re.match(r"\d+ heights \(6\d%\) are exactly -9999, far from all others", warning)
+
+
 @pytest.mark.parametrize("case", ["rounded", "wave", "flat with bumps"])
 def test_other_equal_heights_are_not_clipped(npy, case):
     heights = np.random.default_rng(5).normal(size=(40, 40))

@@ -111,7 +111,7 @@ COLUMNS = (
         )
         for name in (*MAP_NAMES, *PROFILE_NAMES)
     ),
-    *(replace(column, error="") for column in FIT if column.value != "scatter"),
+    *FIT,
 )
 
 
@@ -186,12 +186,18 @@ def _fit_lines(nearest: SelfAffineFit, metres: str) -> list[str]:
         f"lambda_s = {nearest.cutoff_wavelength:.3g}{metres}, rms height "
         f"{nearest.rms_height:.4g}{metres} (scatter {nearest.scatter:.3g})"
     ]
+    if np.isfinite(nearest.hurst_of_long_waves):
+        lines.append(
+            f"H depends on the waves: it is {nearest.hurst_of_long_waves:.2g} without the shorter "
+            "half of the wavenumbers; the error of H contains the difference. Noise, blur or a "
+            "filter?"
+        )
     if nearest.scatter > MAX_SCATTER:
         lines.append(
             "The scatter is far above 1: the surface is not self-affine, and no random surface is "
             "suggested."
         )
-    elif not MIN_HURST <= nearest.hurst <= 1:
+    elif not MIN_HURST <= round(nearest.hurst, 2) <= 1:  # as shown
         lines.append(
             f"The fit gives H = {nearest.hurst:.2g}, which is outside {MIN_HURST:g} to 1. The "
             "table below has the nearest possible exponent; its surface has another rms gradient."

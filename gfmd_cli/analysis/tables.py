@@ -178,12 +178,18 @@ def comparison_table(curves: TitledCurves) -> Table:
         source = curves[0][1].persson.mean_gap_source
         of_gap = f", mean gap by {source}" if source else ""
         caption = (
-            f"Comparison with Persson theory{of_gap}. The theory assumes Gaussian heights. Values "
-            "on the grid, not extrapolated. p ratio: pressure at which the theory gives the "
-            "simulated mean gap / simulated pressure."
+            f"Comparison with Persson theory{of_gap}. The theory assumes Gaussian heights."
+            f"{border_note(curves)} Values on the grid, not extrapolated. p ratio: pressure at "
+            "which the theory gives the simulated mean gap / simulated pressure."
         )
     rows = [record for group in groups for record in group.records]
     return Table(caption, shown(COMPARISON, rows), groups)
+
+
+def border_note(curves: TitledCurves) -> str:
+    """A sentence on what the theory leaves out of contacts with a free boundary; else ""."""
+    is_free = any(row["boundary"] == "free" for _, curve in curves for row in curve.rows)
+    return " It has no borders, unlike a contact with a free boundary." if is_free else ""
 
 
 def over_pressure(

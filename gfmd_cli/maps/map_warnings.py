@@ -264,7 +264,7 @@ def outliers(topography: Topography) -> str:
         others = heights[heights != extreme]
         number = heights.size - others.size
         fraction = number / heights.size
-        if fraction > PLATEAU_FRACTION or others.size < MIN_OTHERS:
+        if others.size < MIN_OTHERS:
             continue
         percentage = f" ({fraction:.0%})" if fraction > MIN_SHOWN_FRACTION else ""
         if min(abs(others.max() - extreme), abs(others.min() - extreme)) > np.ptp(others) > 0:
@@ -273,7 +273,7 @@ def outliers(topography: Topography) -> str:
                 f"{what} exactly {extreme:g}, far from all others: a spike or a mark of missing "
                 "heights? Replace it by NaN"
             )
-        if number <= CLIPPED_RATIO:
+        if number <= CLIPPED_RATIO or fraction > PLATEAU_FRACTION:
             continue
         following, rounding = nearest(others), CLIPPED_ROUNDING * np.ptp(heights)
         near = int(np.count_nonzero(abs(others - following) <= rounding))

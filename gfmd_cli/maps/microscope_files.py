@@ -34,7 +34,7 @@ SMALL_FILE = 2**14  # bytes, which the readers of tables parse in a second
 SORTED_ROWS = 20  # heights of so many rows are not sorted by chance; a choice
 SIGNATURE_BYTES = 512  # at the beginning of a file, by which readers recognise their format
 MAX_POINT_COLUMNS = 10  # of a table of points: x, y, z with colours and normals; a choice
-SIGNALS = re.compile("error|deflection|amplitude|phase", re.IGNORECASE)
+SIGNALS = re.compile("error|deflection|amplitude|phase|intensity", re.IGNORECASE)
 """Names of channels whose lengths are those of a signal."""
 HEIGHTS = re.compile(r"height|topograph|^z\b", re.IGNORECASE)
 """Names of channels that hold heights, whatever else they say."""
@@ -157,6 +157,7 @@ def _read_channel(path: Path, file: BinaryIO, reader: Any, dataset: str | None) 
     if kind == "asc" and len(shape) == 2:
         _check_matrix(path, file, scan, unsized)
         _check_nova(path, lines)
+        _check_wyko(path, _header(channel))
     heights, sides = heights_and_sides(path, scan, rows_along_y)
     has_unit = scan.unit is not None
     if has_unit and kind in TABLE_FORMATS:
@@ -220,6 +221,20 @@ def _check_nova(path: Path, lines: list[bytes]) -> None:
         )
     if len(units) == 2 and units[0] != units[1] and len(set(map(in_metres, units))) > 1:
         raise InputError(f"{path}: 'Unit Y' is not 'Unit X'; save both sides in the same unit")
+
+
+def _check_wyko(path: Path, header: dict[str, Any]) -> None:
+    """Raise InputError for a Wyko table of heights in wavelengths that are not converted.
+
+    The reader takes them as nm unless it finds "Wavelength" and "Mult", both of type 7.
+    """
+    is_wyko = header.get("format_flavor") == "wyko" and not header.get("wyko_real_units")
+    if is_wyko and not {"wyko_wavelength", "wyko_mult"} <= header.keys():
+        raise InputError(
+            f"{path}: the heights of this Wyko table are in units of the wavelength, and its "
+            "header has no 'Wavelength' or no 'Mult' of type 7, so that they are not converted; "
+            "export the heights in nm"
+        )
 
 
 def _check_stated_sides(path: Path, lines: list[bytes], sides: tuple[float, ...]) -> None:

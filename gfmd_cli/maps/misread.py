@@ -21,6 +21,9 @@ MIN_ALTERNATION = 1.33  # difference to the next line over that to the next but 
 MAX_INTERLACED = 0.87  # difference to the same line of the other half over that to the next line
 MIN_HALVES_JUMP = 1.5  # difference of the lines where the halves meet, likewise
 MIN_DISTANCE = 4  # lines: those of the halves that are so far apart differ more; a choice
+MAX_CONTINUED = 0.63  # difference from the end of a line to the next begin, over that of the lines
+MIN_BROKEN_LINES = 64  # fewer go on in each other by chance
+NARROW = 4  # least ratio of lines to points per line of a map with broken lines; a choice
 MIN_SEAM = 1.7  # median difference across the former border over that of neighbours in a line
 MAX_SHEARED = 0.97  # difference to the next line, shifted by one point, over that without a shift
 LEVELS = 256  # heights, evenly distributed over all, that show how different distant ones are
@@ -79,8 +82,11 @@ def filled_lines(topography: Topography) -> tuple[str, Topography]:
 def misread(topography: Topography) -> str:
     """The first sign of a map that was read or saved wrongly."""
     heights = topography.with_gaps()
-    if heights.ndim == 1 or min(heights.shape) < MIN_POINTS:
+    if heights.ndim == 1:
         return ""
+    found = _broken(heights)
+    if found or min(heights.shape) < MIN_POINTS:
+        return found
     found = _noise(heights) or _wrapped(heights)
     for lines, along in ((heights, "x"), (heights.T, "y")):
         found = found or _disordered(lines, along) or _sheared(lines, along)
@@ -194,6 +200,22 @@ def _disordered(lines: Field, along: str) -> str:
                 "interlaced image, all even lines and then all odd ones? Put the lines in order"
             )
     return ""
+
+
+def _broken(heights: Field) -> str:
+    """Short lines, each of which goes on in the next one."""
+    number, points = heights.shape
+    if number < max(MIN_BROKEN_LINES, NARROW * points):
+        return ""
+    on = _median(heights[1:, 0] - heights[:-1, -1])
+    usual = _median(np.diff(heights, axis=0))
+    if not on < MAX_CONTINUED * usual:
+        return ""
+    return (
+        f"the lines of {points} heights go on in the next line, with {on / usual:.0%} of the "
+        "difference of neighbouring lines: was each line of the map saved in several lines? Save "
+        "it in one"
+    )
 
 
 def _sheared(lines: Field, along: str) -> str:

@@ -262,8 +262,16 @@ class FileSurface(RigidSurface):
 
     def void(self, grid: Grid) -> Mask | None:
         """Points of a grid nearest to a missing height of the map, if these never touch."""
+        return self._missing_on(grid) if self.missing == "void" else None
+
+    def filled(self, grid: Grid) -> Mask | None:
+        """Points of a grid nearest to a missing height of the map, if these are filled in."""
+        return self._missing_on(grid) if self.missing == "fill" else None
+
+    def _missing_on(self, grid: Grid) -> Mask | None:
+        """Points of a grid nearest to a missing height of the map; None without one."""
         missing = self._topography().missing
-        if self.missing != "void" or missing is None:
+        if missing is None:
             return None
         if self.edges == "mirror":
             missing = mirror(missing)
@@ -326,8 +334,11 @@ class FileSurface(RigidSurface):
         topography, levelling = self._topography(), self.levelling()
         holes = count(topography.holes, "missing height") if topography.holes else ""
         is_free, own_shape = boundary == "free", topography.heights.shape
+        size = f"{extent(topography.shape)} points"
+        if self.dimension == 1:
+            size = f"profile of {size}, the same at all y (line contact)"
         steps = {
-            f"{self.path.name} ({topography.source}): {extent(topography.shape)} points": True,
+            f"{self.path.name} ({topography.source}): {size}": True,
             f"region {self.region}": self.region is not None,
             f"cropped to {extent(own_shape)}": self.crop and own_shape != topography.shape,
             "turned upside down": self.flip,

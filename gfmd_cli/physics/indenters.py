@@ -131,6 +131,10 @@ class RigidSurface(SpecTable):
         """Points of a grid whose heights a window has changed; None where no window is used."""
         return None
 
+    def filled(self, grid: Grid) -> Mask | None:
+        """Points of a grid whose heights were filled in, and can touch; None where none were."""
+        return None
+
     def mirrored(self) -> "RigidSurface | None":
         """A map that is not periodic, mirrored to twice its sides; None for other surfaces."""
         return None

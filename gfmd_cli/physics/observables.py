@@ -132,21 +132,25 @@ def observe(contact: Contact, u: Field, sigma: Field) -> Observables:
     )
 
 
-def edge_fractions(
+def changed_fractions(
     surface: RigidSurface, grid: Grid, height: Field, u: Field, sigma: Field
 ) -> dict[str, float]:
-    """Fractions of the contact area and of the load in the tapered zone at the edges.
+    """Fractions of the contact area and of the load where the heights are not those measured.
 
-    Columns `edge_contact` and `edge_load`; none where the surface has no such zone.
+    Columns `edge_contact` and `edge_load` of the tapered zone, `filled_contact` and `filled_load`
+    of heights that were filled in; none where the surface has no such points.
     """
-    edge = surface.tapered(grid)
-    if edge is None:
-        return {}
-    load = contact_pressure(height, u, sigma)
-    sums = [[np.count_nonzero(part), part.sum()] for part in (load[edge], load)]
-    at_edges, whole = grid.total(np.array(sums))
-    fractions = np.divide(at_edges, whole, out=np.full(2, np.nan), where=whole > 0)
-    return dict(zip(("edge_contact", "edge_load"), fractions.tolist(), strict=True))
+    zones = {"edge": surface.tapered(grid), "filled": surface.filled(grid)}
+    fractions: dict[str, float] = {}
+    for name, zone in zones.items():
+        if zone is None:
+            continue
+        load = contact_pressure(height, u, sigma)
+        sums = [[np.count_nonzero(part), part.sum()] for part in (load[zone], load)]
+        inside, whole = grid.total(np.array(sums))
+        shares = np.divide(inside, whole, out=np.full(2, np.nan), where=whole > 0).tolist()
+        fractions |= {f"{name}_contact": shares[0], f"{name}_load": shares[1]}
+    return fractions
 
 
 @dataclass(frozen=True)

@@ -25,8 +25,8 @@ from gfmd_cli.units import count
 MAX_ROWS = 100  # contacts that the table of failures lists
 MACHINE = ("node", "system", "processor", "cores", "python", "slurm_job")
 UNCONVERGED_CAPTION = (
-    "Contacts that ended above the requested tolerance. Their values are kept; figures show "
-    "them as crosses."
+    "Contacts that missed the requested tolerance, accuracy or load, see the reasons. Their values "
+    "are kept; figures show them as crosses."
 )
 UNCONVERGED = (
     TASK,
@@ -42,9 +42,9 @@ UNCONVERGED = (
 EXPLANATION = (
     "In this and the next figures over the pressure, symbols are the simulation: in the continuum "
     "with its error where that is known, else on the grid. Bars: estimated distance to the "
-    "continuum; crosses: not converged."
+    "continuum; crosses: not converged, or less accurate than requested."
 )
-LINES = " Lines: Persson theory of the same spectrum."
+LINES = " Lines: Persson theory with the same spectrum."
 BEHIND = "Table behind the figures"
 TRUE_CONTACT = "Table: Persson theory with the stress over the true contact"
 DISTRIBUTIONS = {
@@ -87,7 +87,7 @@ def contact_area(data: ReportData) -> Section:
     caption, lines = "Relative contact area a_r.", ""
     if data.comparison.has_theory:
         caption = "Relative contact area a_r and Persson theory; ratio: simulation / theory."
-        lines = LINES
+        lines = LINES + tables.border_note(data.curves)
     section = _over_pressure(data, "Contact area", "a_r", caption)
     more = {TRUE_CONTACT: tables.true_contact_table(data.curves)}
     return replace(section, notes=[EXPLANATION + lines], disclosed={**section.disclosed, **more})

@@ -152,7 +152,8 @@ def warnings(data: ReportData) -> list[str]:
     """Warnings above the results: missing, doubtful and unresolved values."""
     total, parts = len(data.comparison.rows), []
     if data.failed:
-        parts.append(f"{len(data.failed)} of {total} contacts did not reach their tolerance")
+        missed = "missed the requested tolerance, accuracy or load"
+        parts.append(f"{len(data.failed)} of {total} contacts {missed}")
     if data.missing:
         parts.append(f"{len(data.missing)} of {total} are not solved yet")
     unsolved = ["; ".join(parts) + "."] if parts else []

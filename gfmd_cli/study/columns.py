@@ -96,6 +96,8 @@ DETAILS = (
     Column("u_g_bound", "proven bound of the error of u_g due to the residual"),
     Column("edge_contact", "fraction of the contact in the tapered zone at the edges"),
     Column("edge_load", "fraction of the load there; NaN without a window"),
+    Column("filled_contact", "fraction of the contact at heights that were filled in"),
+    Column("filled_load", "fraction of the load there; NaN if no height was filled in"),
     *(observable.column for observable in OBSERVABLES),
 )
 PARAMETERS = parameters((*CONTRACT, *DETAILS))

@@ -15,7 +15,7 @@ from gfmd_cli.maps.map_preparation import mirror
 from gfmd_cli.physics.approach import approach
 from gfmd_cli.physics.free_contact import doubled_grid
 from gfmd_cli.physics.indenters import RigidSurface
-from gfmd_cli.physics.observables import edge_fractions, gap_histogram, stress_histogram
+from gfmd_cli.physics.observables import changed_fractions, gap_histogram, stress_histogram
 from gfmd_cli.physics.patches import area_distribution
 from gfmd_cli.physics.power_spectra import autocorrelations, spectra
 from gfmd_cli.physics.surface_spectrum import Spectrum, map_spectrum
@@ -105,7 +105,7 @@ def all_columns(task: Task, solved: TaskSolution) -> Row:
     contact, solution = solved.contact, solved.solution
     u, sigma = solution.u, solution.sigma
     results = measured(task, solved)
-    results |= edge_fractions(task.surface, solved.scene.grid, contact.obstacle, u, sigma)
+    results |= changed_fractions(task.surface, solved.scene.grid, contact.obstacle, u, sigma)
     return (
         empty_row()
         | planned(task)

@@ -24,7 +24,7 @@ SMALL_GAPS = (1e-5, 1e-3)
 """Mean gaps [h_std]: below the first, or below the second if that is a possible gap in m, they are
 probably meant in m; a choice."""
 LOOSE = 0.01  # natural residual; the mean gap of the default surface is then wrong by 0.1 to 1 %
-MAX_EDGE_SHARE = 0.05  # of contact or load in the tapered zone; a choice
+MAX_CHANGED_SHARE = 0.05  # of contact or load where heights are not those measured; a choice
 SMALL_DISPLACEMENT = 1e-4  # [h_std], below which heights have another unit; a choice
 SEPARATOR = " | "
 """Between the warnings of one contact in a column of text."""
@@ -67,11 +67,17 @@ def warnings_of(task: Task, solved: TaskSolution, results: Mapping[str, Any]) ->
     yield from elastomer.warnings(scene, task.boundary, is_rough=task.surface.rough)
     yield from _load_in_jump(task, solved.solution.status, results)
     yield from _contact_at_border(task, solved)
-    if max(results.get("edge_contact", 0.0), results.get("edge_load", 0.0)) > MAX_EDGE_SHARE:
+    if max(results.get("edge_contact", 0.0), results.get("edge_load", 0.0)) > MAX_CHANGED_SHARE:
         yield (
-            f"more than {MAX_EDGE_SHARE:.0%} of the contact or of the load is at the edges, where "
-            "the window has changed the heights (see the columns edge_contact and edge_load); "
-            "leave out surface.edges to keep them"
+            f"more than {MAX_CHANGED_SHARE:.0%} of the contact or of the load is at the edges, "
+            "where the window has changed the heights (see the columns edge_contact and "
+            "edge_load); leave out surface.edges to keep them"
+        )
+    if max(results.get("filled_contact", 0.0), results.get("filled_load", 0.0)) > MAX_CHANGED_SHARE:
+        yield (
+            f"more than {MAX_CHANGED_SHARE:.0%} of the contact or of the load is where heights are "
+            "missing and were filled in (see the columns filled_contact and filled_load): do the "
+            "highest points lack a height? Contact area, stress and gap are then uncertain"
         )
     if scene.may_touch is not None and solved.observables.u_g < 0:
         yield (
