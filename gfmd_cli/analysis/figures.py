@@ -119,7 +119,7 @@ def _point(panel: Panel, records: list[Row]) -> tuple[float, float, float, float
     name = panel.column
     units = np.array([r[f"{name}_persson"] if panel.ratio else 1.0 for r in records])
     values, errors = np.transpose(best_of_all(records, name)) / units
-    half_width = spread_of(values).half_width if len(records) > 1 else np.nan
+    half_width = spread_of(values, errors).half_width if len(records) > 1 else np.nan
     converged = all(record["status"].is_converged for record in records)
     p_star = np.mean([record["p_star"] for record in records])
     return float(p_star), float(values.mean()), float(np.abs(errors).mean()), half_width, converged
