@@ -401,6 +401,13 @@ def test_seeds_with_grids_of_their_own_on_an_oblong_cell_are_averaged(rows_of, t
     assert len(ensemble.rows) == 2
 
 
+def test_means_of_a_free_boundary_are_told_apart_on_auto_grids(rows_of, tmp_path):
+    rows_of("surface.seed=[0, 1]", "grid.boundary=['periodic', 'free']", "surface.cutoff=0.2",
+            "load={pressure=50}", "accuracy={mean_gap=0.2}")  # fmt: skip
+    titles = [group.title for group in seeds_table(compare(tmp_path / "study.h5")).groups]
+    assert [", free boundary" in title for title in titles] == [False, True]
+
+
 def test_contacts_of_several_tolerances_have_titles_of_their_own(rows_of, tmp_path, output_of):
     plain = SPEC.partition("[accuracy]")[0].replace('points = "auto"', "points = 32")
     seeds, tolerances = "surface.seed=[0, 1]", "solver.tolerance=[1e-6, 1e-8]"

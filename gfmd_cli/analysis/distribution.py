@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from gfmd_cli.analysis.compare import Comparison, Curve, of_study, solver_of
-from gfmd_cli.analysis.wording import contact_title
+from gfmd_cli.analysis.wording import contact_and_boundary
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.physics.observables import LOGARITHMIC_EDGES, estimated_patches
 from gfmd_cli.study.column import Row
@@ -131,7 +131,7 @@ class StressDistribution:
     @property
     def title(self) -> str:
         """Elastomer and surface, without its seed where there are several."""
-        title = contact_title(self.finest, of_seeds=len(self.seeds) > 1)
+        title = contact_and_boundary(self.finest, of_seeds=len(self.seeds) > 1)
         return of_study(self.curve.study, title)
 
     @cached_property

@@ -11,7 +11,7 @@ from scipy.special import stdtrit
 
 from gfmd_cli.analysis.compare import Comparison, best_of_all, load_of, of_study
 from gfmd_cli.analysis.selection import grouped
-from gfmd_cli.analysis.wording import contact_title, grid_size
+from gfmd_cli.analysis.wording import contact_and_boundary, contact_title, grid_size
 from gfmd_cli.physics.observables import QUANTITIES
 from gfmd_cli.spec.models import LOADS
 from gfmd_cli.study.column import Row
@@ -45,8 +45,9 @@ class Ensemble:
     def title(self) -> str:
         """Elastomer, surface without its seed, and the grid where that was given."""
         row = self.rows[0]
-        grid = "" if row.get("grid") == "auto" else f", {grid_size([row])}"
-        return of_study(self.study, contact_title(row, of_seeds=True) + grid)
+        if row.get("grid") == "auto":
+            return of_study(self.study, contact_and_boundary(row, of_seeds=True))
+        return of_study(self.study, f"{contact_title(row, of_seeds=True)}, {grid_size([row])}")
 
     @property
     def p_star(self) -> float:
