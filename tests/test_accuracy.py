@@ -208,6 +208,27 @@ def test_full_contact_with_white_noise_has_a_bar_of_the_stress(tmp_path):
     assert 0 < abs(finer[1] - finer[0]) <= error < 0.05 * finer[0]
 
 
+@pytest.mark.parametrize(("boundary", "n"), [("periodic", 1.0), ("free", 0.9)])
+def test_full_contact_of_a_map_with_kinks_holds_the_gap_between_its_points(boundary, n):
+    """Both grids are in full contact, so that their change is zero; a finer grid is not."""
+    heights = np.random.default_rng(5).normal(size=(32, 32))
+    accuracy = {"accuracy": {"contact_area": 0.1}}
+
+    def solved(points, pressure, **more):
+        tables = {"elastomer": {"kind": "power", "n": n}, "load": {"pressure": pressure}, **more}
+        grid = {"points": points, "boundary": boundary}
+        return solve(tables | {"grid": grid}, heights=heights)
+
+    low, high = 10.0, 1e4
+    while high > 1.003 * low:
+        middle = np.sqrt(low * high)
+        low, high = (low, middle) if solved(128, middle).a_r == 1 else (middle, high)
+    coarse, fine = solved(128, high, **accuracy), solved(512, high)
+    assert fine.a_r < coarse.a_r == 1
+    assert 0 < 1 - fine.a_r <= coarse.columns["a_r_error"] < 0.01
+    assert 0 < fine.u_g <= coarse.columns["u_g_error"] < 1e-3
+
+
 def test_theory_has_the_units_of_its_spectrum_where_they_depend_on_the_grid(rows_of, tmp_path):
     heights = np.random.default_rng(1).normal(size=(64, 64)) > 0
     np.save(tmp_path / "steps.npy", heights.astype(float))
@@ -443,6 +464,8 @@ def test_means_over_seeds_name_the_contacts_that_have_not_converged(rows_of, tmp
     table = seeds_table(compare(tmp_path / "study.h5")).as_text()
     assert "not converged" in table
     assert table.endswith("2 max_steps")
+    (ensemble,) = ensembles(compare(tmp_path / "study.h5"))
+    assert ensemble.means()["seeds_not_converged"] == 2
 
 
 def test_the_interval_holds_the_truth_as_often_as_it_says():

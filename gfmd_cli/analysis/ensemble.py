@@ -65,11 +65,12 @@ class Ensemble:
         return spread_of(*zip(*best_of_all(self.rows, name), strict=True))
 
     def means(self) -> dict[str, Any]:
-        """Number of seeds, and the spread of each quantity, as the records of a study have them.
+        """Numbers of seeds, and the spread of each quantity, as the records of a study have them.
 
         The pressure is one of them where it was searched.
         """
-        record: dict[str, Any] = {"seeds": len(self.rows)}
+        failed = sum(not row["status"].is_converged for row in self.rows)
+        record: dict[str, Any] = {"seeds": len(self.rows), "seeds_not_converged": failed}
         spreads = {name: self.spread(name) for name in QUANTITIES}
         if LOADS[self.rows[0]["load"]].searched:
             spreads["p_star"] = spread_of([row["p_star"] for row in self.rows])
