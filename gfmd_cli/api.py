@@ -19,7 +19,7 @@ import tabulate
 from gfmd_cli.analysis.compare import Comparison
 from gfmd_cli.analysis.compare import compare as compare_study
 from gfmd_cli.analysis.export import as_dataset
-from gfmd_cli.analysis.table import Group, Table, TableColumn
+from gfmd_cli.analysis.table import Group, Table, TableColumn, plus_minus
 from gfmd_cli.errors import InputError
 from gfmd_cli.grid.arrays import Field, Mask
 from gfmd_cli.grid.blas import one_blas_thread
@@ -120,7 +120,7 @@ class Result:
         for name, symbol in {"contact area": "a_r", "mean gap": "u_g"}.items():
             if self.columns.get(f"{symbol}_verdict") == Verdict.REGULAR:
                 value, error = (self.columns[f"{symbol}_continuum{end}"] for end in ("", "_error"))
-                numbers[f"{name} in the continuum"] = f"{symbol} = {value:.5g} +- {error:.1g}"
+                numbers[f"{name} in the continuum"] = f"{symbol} = {plus_minus(value, error)}"
         return numbers | ({"warnings": "; ".join(self.warnings)} if self.warnings else {})
 
     def __str__(self) -> str:

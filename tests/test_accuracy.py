@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 from scipy import stats
+from scipy.special import erf
 from specs import power_spec
 
 from gfmd_cli import solve
@@ -227,6 +228,42 @@ def test_full_contact_with_white_noise_has_a_bar_of_the_stress(tmp_path):
     assert 0 < abs(finer[1] - finer[0]) <= error < 0.05 * finer[0]
 
 
+@pytest.mark.parametrize(("boundary", "n"), [("periodic", 1.0), ("free", 0.9)])
+def test_full_contact_of_a_map_with_kinks_holds_the_gap_between_its_points(boundary, n):
+    """Both grids are in full contact, so that their change is zero; a finer grid is not."""
+    heights = np.random.default_rng(5).normal(size=(32, 32))
+    accuracy = {"accuracy": {"contact_area": 0.1}}
+
+    def solved(points, pressure, **more):
+        tables = {"elastomer": {"kind": "power", "n": n}, "load": {"pressure": pressure}, **more}
+        grid = {"points": points, "boundary": boundary}
+        return solve(tables | {"grid": grid}, heights=heights)
+
+    low, high = 10.0, 1e4
+    while high > 1.003 * low:
+        middle = np.sqrt(low * high)
+        low, high = (low, middle) if solved(128, middle).a_r == 1 else (middle, high)
+    coarse, fine = solved(128, high, **accuracy), solved(512, high)
+    assert fine.a_r < coarse.a_r == 1
+    assert 0 < 1 - fine.a_r <= coarse.columns["a_r_error"] < 0.01
+    assert 0 < fine.u_g <= coarse.columns["u_g_error"] < 1e-3
+
+
+def test_theory_has_the_units_of_its_spectrum_where_they_depend_on_the_grid(rows_of, tmp_path):
+    heights = np.random.default_rng(1).normal(size=(64, 64)) > 0
+    np.save(tmp_path / "steps.npy", heights.astype(float))
+    keys = ("elastomer.n=1.5", "load={pressure=[1000, 10]}", "accuracy={mean_gap=0.1}")
+    surface = f"surface={{kind='file', path='{tmp_path}/steps.npy'}}"
+    rows = rows_of(surface, *keys)
+    assert rows[0]["delta_sigma"] > 1.01 * rows[1]["delta_sigma"]
+    comparison = compare(tmp_path / "study.h5")
+    for record in comparison.records:
+        assert record["a_r_persson"] == pytest.approx(erf(record["p_star"] / np.sqrt(2)), rel=1e-9)
+    assert f"Delta_sigma = {rows[1]['delta_sigma']:.6g} to {rows[0]['delta_sigma']:.6g}" in str(
+        comparison
+    )
+
+
 def test_an_interrupted_auto_grid_goes_on_bit_for_bit(goes_on_bit_for_bit):
     row, reports = goes_on_bit_for_bit("accuracy.mean_gap=1e-3", "elastomer.n=2")
     assert reports > 50
@@ -357,12 +394,59 @@ def test_seeds_are_not_averaged_where_some_have_a_continuum_value_only():
     assert Ensemble([rows[1]] * 2).spread("u_g").mean == pytest.approx(1.8)
 
 
+def test_the_interval_of_a_mean_holds_the_error_that_all_seeds_share(rows_of, tmp_path, output_of):
+    """On 64 points sigma_p of n = 2 is too small for every seed, by several of Student's widths."""
+    keys = ("surface.seed=[0, 1, 2, 3]", "elastomer.n=2", "load.p_star=0.02")
+    means = {}
+    for points in (64, 512):
+        rows_of(*keys, f"grid.points={points}", name=f"{points}.h5")
+        (ensemble,) = ensembles(compare(tmp_path / f"{points}.h5"))
+        means[points] = ensemble.spread("sigma_p")
+    missed = abs(means[64].mean - means[512].mean)
+    assert stats.t.ppf(0.975, 3) * means[64].standard_error < missed < means[64].half_width
+
+
+def test_the_errors_of_equal_values_remain_in_their_mean():
+    row = {"a_r": 0.01, "a_r_error": 0.01, "a_r_continuum": 0.0, "a_r_continuum_error": 0.002}
+    assert Ensemble([row, row]).spread("a_r").half_width == pytest.approx(0.002)
+    assert spread_of([1.0, 3.0], [0.4, 0.2]).half_width == pytest.approx(
+        np.hypot(spread_of([1.0, 3.0]).half_width, 0.3)
+    )
+    assert spread_of([1.0, 3.0], [np.nan, 0.2]) == spread_of([1.0, 3.0])
+
+
+@pytest.mark.parametrize("first", [0, 1])
+def test_means_are_of_the_rows_with_errors_where_both_are_stored(rows_of, tmp_path, first):
+    plain = SPEC.partition("[accuracy]")[0]
+    keys = ("surface.seed=[0, 1]", "grid.points=64", "load.p_star=0.1")
+    rows_of(*keys, text=(plain, SPEC)[first])
+    rows = rows_of(*keys, text=(SPEC, plain)[first])
+    known = [row["a_r_continuum"] for row in rows if row["a_r_verdict"]]
+    assert (len(rows), len(known)) == (4, 2)
+    (ensemble,) = ensembles(compare(tmp_path / "study.h5"))
+    assert ensemble.spread("a_r").mean == pytest.approx(np.mean(known))
+
+
+def test_an_unknown_mean_over_seeds_is_null_in_json(rows_of, tmp_path, output_of):
+    rows_of("surface.seed=[0, 1]", "grid.points=64", "load.p_star=0.001")
+    text = output_of("analyze", tmp_path / "study.h5", "--json")
+    records = json.loads(text, parse_constant=pytest.fail)
+    assert [record["a_r_mean"] for record in records] == [None, None]
+
+
 def test_seeds_with_grids_of_their_own_on_an_oblong_cell_are_averaged(rows_of, tmp_path):
     keys = ("surface.seed=[0, 1]", "surface.length_y=0.5", "accuracy={mean_gap=0.01}")
     rows = rows_of(*keys, "surface.cutoff=0.2")
     assert len({(row["points"], row["points_y"]) for row in rows}) == 2
     (ensemble,) = ensembles(compare(tmp_path / "study.h5"))
     assert len(ensemble.rows) == 2
+
+
+def test_means_of_a_free_boundary_are_told_apart_on_auto_grids(rows_of, tmp_path):
+    rows_of("surface.seed=[0, 1]", "grid.boundary=['periodic', 'free']", "surface.cutoff=0.2",
+            "load={pressure=50}", "accuracy={mean_gap=0.2}")  # fmt: skip
+    titles = [group.title for group in seeds_table(compare(tmp_path / "study.h5")).groups]
+    assert [", free boundary" in title for title in titles] == [False, True]
 
 
 def test_contacts_of_several_tolerances_have_titles_of_their_own(rows_of, tmp_path, output_of):
@@ -400,6 +484,8 @@ def test_means_over_seeds_name_the_contacts_that_have_not_converged(rows_of, tmp
     table = seeds_table(compare(tmp_path / "study.h5")).as_text()
     assert "not converged" in table
     assert table.endswith("2 max_steps")
+    (ensemble,) = ensembles(compare(tmp_path / "study.h5"))
+    assert ensemble.means()["seeds_not_converged"] == 2
 
 
 def test_the_interval_holds_the_truth_as_often_as_it_says():

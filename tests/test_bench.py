@@ -153,6 +153,21 @@ def test_names_tell_runs_of_one_solver_apart():
     traces = [made_up([1.0], tolerance=1e-3), made_up([1.0]), made_up([1.0], nested=False)]
     assert solver_names(traces) == ["a 0.001", "a 1e-06", "a 1e-06 not nested"]
     assert solver_names(traces[1:2]) == ["a"]
+    traces = [made_up([1.0], time_step=step, max_steps=9) for step in (0.5, 1.2)]
+    other = made_up([1.0], solver="b", max_steps=7)
+    assert solver_names([*traces, other]) == ["a time_step=0.5", "a time_step=1.2", "b"]
+
+
+def test_the_keys_of_each_solver_are_stored_with_its_trace(spec_of):
+    spec = spec_of("solver=[{kind='fire', time_step=0.5}, {kind='fire', time_step=1.2}]")
+    steps = [trace.row["time_step"] for trace in run_bench(spec, ignore)]
+    assert set(steps) == {0.5, 1.2}
+
+
+def test_boundaries_are_a_column_where_there_are_several():
+    traces = [made_up([1e-3], boundary=name) for name in ("periodic", "free")]
+    assert "boundary" in bench_table(traces).as_text()
+    assert "boundary" not in bench_table(traces[:1]).as_text()
 
 
 def test_a_bench_is_stored_with_labels_and_read_back(spec_of, tmp_path):

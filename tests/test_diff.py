@@ -201,6 +201,18 @@ def test_of_several_grids_the_same_ones_belong_together(study_of):
     assert not difference.exceeds(0)
 
 
+def test_oblong_grids_of_the_same_points_are_paired_and_named(output_of, study_of):
+    keys = ("surface.length_y=2.0", "elastomer.n=1", "load.p_star=0.1")
+    one = study_of(*keys, "grid.points_y=[64, 128]")
+    other = study_of(*keys, "grid.points_y=[128, 64]")
+    difference = diff(one, other)
+    assert [(p.one["points_y"], p.other["points_y"]) for p in difference.pairs] == [
+        (64, 64), (128, 128),
+    ]  # fmt: skip
+    assert not difference.exceeds(0)
+    assert "32 x 128 -> 32 x 128" in output_of("diff", one, other)
+
+
 def test_a_free_boundary_is_named_and_paired_with_its_like(output_of, study_of):
     one = study_of("elastomer.n=1", "grid.boundary=['free', 'periodic']")
     other = study_of("elastomer.n=1", "grid.boundary=['periodic', 'free']")

@@ -7,7 +7,7 @@ from specs import power_spec
 
 from gfmd_cli.analysis.compare import Curve, compare
 from gfmd_cli.analysis.distribution import StressDistribution, distributions, extrapolate
-from gfmd_cli.analysis.distribution_figure import continuum_figure
+from gfmd_cli.analysis.distribution_figure import continuum_figure, mean_density
 from gfmd_cli.analysis.edge_law import edge_exponent, fit_power_law, straight_line
 from gfmd_cli.analysis.tables import power_laws
 from gfmd_cli.physics.elastomers import Power
@@ -17,6 +17,7 @@ from gfmd_cli.physics.scenes import build_scene
 from gfmd_cli.solvers.auto import Auto
 from gfmd_cli.solvers.nested_grids import solve_contact
 from gfmd_cli.spec.parse import read_spec
+from gfmd_cli.status import Status
 from gfmd_cli.study.run import RunOptions, run_study
 
 EDGES = LOGARITHMIC_EDGES
@@ -104,6 +105,29 @@ def test_the_exponent_of_hertz_is_found_within_its_error(n, law):
     exact = hertz_density(n, 1.0, 2 - n / 2, np.pi * 0.09) if n < 2 else None
     if exact:
         assert fitted.edge_prefactor == pytest.approx(float(exact), rel=0.1)
+
+
+def test_seeds_without_histogram_are_left_out(study):
+    study("surface.seed=0")
+    path = study("surface.seed=1", "output.histogram=false")
+    (merged,) = distributions(compare(path))
+    assert len(merged.seeds) == 1
+    shares = (merged.grids * WIDTH).sum(axis=1)
+    np.testing.assert_allclose(shares, [row["a_r"] for row in merged.seeds[0]], rtol=1e-12)
+
+
+def test_a_mean_density_holds_all_seeds_and_marks_one_that_has_not_converged():
+    """A seed with few points in contact belongs to the mean, too."""
+    rows = [
+        row(1, 64, np.full(MIDDLE.size, count), 0.1, 1.0, seed) | {"status": status}
+        for seed, (count, status) in enumerate(
+            [(60.0, Status.CONVERGED), (0.0, Status.CONVERGED), (60.0, Status.MAX_STEPS)]
+        )
+    ]
+    density = mean_density(None, rows[:2], "pr_sigma_log")
+    assert (density.seeds, density.remark) == (2, "")
+    np.testing.assert_allclose(density.density * WIDTH * 64**2, 30.0)
+    assert mean_density(None, rows, "pr_sigma_log").remark == ", not converged"
 
 
 def test_first_order_errors_of_a_grid_are_taken_off():

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from specs import power_spec
 
+from gfmd_cli import solve
 from gfmd_cli.errors import InputError
 from gfmd_cli.physics.elastomers import Power
 from gfmd_cli.physics.observables import LINEAR_EDGES, LOGARITHMIC_EDGES
@@ -61,6 +62,20 @@ def test_patches_make_up_the_contact_area(study):
         assert row["patches"] * row["patch_area_mean"] == pytest.approx(row["a_r"], rel=1e-12)
         assert row["patch_area_mean"] <= row["patch_area_largest"] <= row["a_r"] * (1 + 1e-12)
         assert row["pr_patch_area"] @ np.diff(AREA_EDGES) == pytest.approx(1, rel=1e-12)
+
+
+@pytest.mark.parametrize(("p_star", "beyond"), [(0.1, 0), (50, 1)])
+def test_patches_larger_than_the_bins_are_counted_beside_them(p_star, beyond):
+    row = solve({
+        "surface": {"kind": "self-affine", "cutoff": 0.2, "length_y": 2.0},
+        "elastomer": {"kind": "power", "n": 1},
+        "grid": {"points": 32},
+        "load": {"p_star": p_star},
+        "output": {"patches": True},
+    }).columns  # fmt: skip
+    assert row["pr_patch_beyond"] == beyond
+    share = row["pr_patch_area"] @ np.diff(AREA_EDGES)
+    assert share + row["pr_patch_beyond"] == pytest.approx(1, rel=1e-12)
 
 
 def test_full_contact_is_one_rigid_patch_that_seals(study):
@@ -232,4 +247,4 @@ def test_without_contact_there_is_no_area_of_a_patch():
     output = OutputTable(patches=True, histogram=False)
     row = on_request(output, SolvedContact(contact, u, np.zeros_like(u)))
     assert row.pop("pr_patch_area").sum() == 0
-    assert row == {"patches": 0}
+    assert row == {"patches": 0, "pr_patch_beyond": 0}

@@ -73,6 +73,15 @@ def test_a_figure_has_one_curve_for_all_seeds(comparison):
     assert [line.get_xydata().shape for line in drawn.axes.lines][:2] == [(3, 2), (0, 2)]
 
 
+def test_figures_of_the_mean_gap_name_another_theory(comparison):
+    for theory, label in (("paper", "Persson theory"), ("fitted", "theory by a fitted weight")):
+        study = compare(comparison.path, theory)
+        with styled():
+            figures = study_figures(study, with_styles(study))
+        assert label in figures["mean_gap_log"].legend
+        assert "Persson theory" in figures["contact_area"].legend
+
+
 def test_seeds_with_other_loads_are_averaged_where_they_agree(tmp_path, rows_of):
     rows_of()
     rows_of("surface.seed=[0, 1]", "load.p_star=[0.2]", "elastomer.n=1")

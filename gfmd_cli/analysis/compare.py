@@ -82,6 +82,9 @@ class Curve:
     """Spectrum of a map with borders, None of any other surface."""
     study: str = ""
     """Name of the study where several are shown side by side."""
+    spectrum_row: Row | None = None
+    """A contact on the grid of the spectrum, on which h_std and Delta_sigma of a map may depend; by
+    default the first."""
 
     @property
     def elastomer(self) -> str:
@@ -108,6 +111,12 @@ class Curve:
         return np.array([row[name] for row in self.rows], dtype=np.float64)
 
     @property
+    def units(self) -> tuple[float, float]:
+        """Delta_sigma [Pa] and h_std [m] of the spectrum."""
+        row = self.spectrum_row or self.rows[0]
+        return row["delta_sigma"], row["h_std"]
+
+    @property
     def has_theory(self) -> bool:
         """Whether Persson theory applies: it describes rough surfaces, not single indenters."""
         return bool(self.rows[0]["rough"])
@@ -119,7 +128,7 @@ class Curve:
         """
         if not self.has_theory:
             return Prediction(*(np.full(np.shape(p_star), np.nan) for _ in range(3)))
-        unit, height = self.rows[0]["delta_sigma"], self.rows[0]["h_std"]
+        unit, height = self.units
         pressure = np.asarray(p_star) * unit
         return Prediction(
             a_r=self.persson.contact_area(pressure),
@@ -136,14 +145,14 @@ class Curve:
         """Pr(sigma) Delta_sigma of Persson theory over sigma / Delta_sigma. Paper Eq. (24)."""
         if not self.has_theory:
             return np.full(np.shape(sigma), np.nan)
-        unit = self.rows[0]["delta_sigma"]
+        unit, _ = self.units
         return unit * self.persson.stress_density(sigma * unit, p_star * unit)
 
     def pressure_at_gap(self, u_g: Field) -> Field:
         """Reduced pressure of this mean gap in Persson theory; NaN below 1e-6 and above 20."""
         if not self.has_theory:
             return np.full(np.shape(u_g), np.nan)
-        unit, height = self.rows[0]["delta_sigma"], self.rows[0]["h_std"]
+        unit, height = self.units
         return self.persson.pressure_at_gap(np.asarray(u_g) * height) / unit
 
     @cached_property
@@ -219,12 +228,16 @@ def compare(path: Path, theory: Theory = "paper") -> Comparison:
         solved = solved_rows(study.rows)
         if not solved:
             raise InputError(f"{path}: contains no result yet; run it first")
+        by_scene = grouped(solved, lambda row: row["scene"])
         groups = grouped(solved, lambda row: (row["scene"], *solver_of(row)))
         curves = []
         for (scene, *_), group in groups.items():
             ordered = sorted(group, key=lambda row: row["p_star"])
-            persson = theory_of(theory, study.shells(scene), float(group[0]["n"]))
-            curves.append(Curve(ordered, persson, study.map_spectrum(scene)))
+            spectrum = study.shells(scene)
+            persson = theory_of(theory, spectrum, float(group[0]["n"]))
+            height = np.sqrt(spectrum.height.sum())
+            nearest = min(by_scene[scene], key=lambda row: abs(row["h_std"] - height))
+            curves.append(Curve(ordered, persson, study.map_spectrum(scene), spectrum_row=nearest))
         return Comparison(path, curves, study.rows, study.attributes)
 
 

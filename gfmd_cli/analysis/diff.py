@@ -11,7 +11,7 @@ from typing import NamedTuple
 from gfmd_cli.analysis.compare import load_of, with_solvers
 from gfmd_cli.analysis.selection import grouped
 from gfmd_cli.analysis.table import BLANK, Record, Table, TableColumn, groups_of, known, plain
-from gfmd_cli.analysis.wording import contact_title
+from gfmd_cli.analysis.wording import contact_and_boundary, points_text
 from gfmd_cli.physics.observables import QUANTITIES
 from gfmd_cli.spec.differences import differences
 from gfmd_cli.spec.models import LOADS, load_text
@@ -21,8 +21,8 @@ from gfmd_cli.study.reading import open_study, solved_rows, tell_files_apart
 SURFACE = ("surface", "surface_sha256", "seed")
 """Columns of a surface: two files may have the same name."""
 ALIKE = (
-    ("boundary", "points", "solver", "tolerance"), ("boundary", "points"),
-    ("boundary",), ("points",), (),
+    ("boundary", "points", "points_y", "solver", "tolerance"),
+    ("boundary", "points", "points_y"), ("boundary", "points"), ("boundary",), ("points",), (),
 )  # fmt: skip
 """Columns in which the rows of a pair are alike, in the order in which they are tried."""
 LEGEND = (
@@ -31,7 +31,7 @@ LEGEND = (
 NOTHING = "no contact in common"
 CONTACT = ("surface", "seed", "elastomer", "load", "load_value")
 """Keys that both rows of a pair share, unless the studies are paired by load."""
-OF_EACH = ("boundary", "points", "p_star")
+OF_EACH = ("boundary", "points", "points_y", "p_star")
 """Keys that each row of a pair has for itself."""
 
 
@@ -168,6 +168,10 @@ def _load(record: Record) -> str:
     return load_text(record["load"], record["load_value"])
 
 
+def _grids(record: Record) -> str:
+    return " -> ".join(points_text(record[f"points_{s}"], record[f"points_y_{s}"]) for s in "ab")
+
+
 def _deviation(record: Record, name: str) -> str:
     relative, in_errors = record[f"{name}_relative"], record[f"{name}_in_errors"]
     bars = f" ({in_errors:+.1f})" if known(in_errors) else ""
@@ -176,7 +180,7 @@ def _deviation(record: Record, name: str) -> str:
 
 DIFFERENCES = (
     TableColumn("load", _load),
-    TableColumn("points", lambda record: f"{record['points_a']} -> {record['points_b']}"),
+    TableColumn("points", _grids),
     *(TableColumn(name, partial(_deviation, name=name)) for name in QUANTITIES),
 )
 
@@ -239,20 +243,15 @@ def diff_json(difference: Difference) -> str:
 
 
 def _title(pair: Pair) -> str:
-    one, other = _contact(pair.one), _contact(pair.other)
+    one, other = contact_and_boundary(pair.one), contact_and_boundary(pair.other)
     return one if one == other else f"A: {one}\nB: {other}"
-
-
-def _contact(row: Row) -> str:
-    """Elastomer and surface of a contact, and its boundary where that is free."""
-    return contact_title(row) + (", free boundary" if row["boundary"] == "free" else "")
 
 
 def _loads_by_contact(rows: list[Row]) -> list[str]:
     """Loads grouped by scene, a line for each grid."""
     lines = []
-    for name, scene in grouped(rows, _contact).items():
-        grids = grouped(scene, lambda row: row["points"])
+    for name, scene in grouped(rows, contact_and_boundary).items():
+        grids = grouped(scene, lambda row: points_text(row["points"], row["points_y"]))
         loads = {points: ", ".join(map(_load, grid)) for points, grid in grids.items()}
         lines += [f"  {name}", *(f"    {points}: {text}" for points, text in loads.items())]
     return lines

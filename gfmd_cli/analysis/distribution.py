@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from gfmd_cli.analysis.compare import Comparison, Curve, of_study, solver_of
-from gfmd_cli.analysis.wording import contact_title
+from gfmd_cli.analysis.wording import contact_and_boundary
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.physics.observables import LOGARITHMIC_EDGES, estimated_patches
 from gfmd_cli.study.column import Row
@@ -33,10 +33,14 @@ PRIOR_SEEDS = 4.0  # weight of the expected spread beside the measured one; a ch
 MIN_DEPTH = 0.75  # spacings from the edge below which a bin is not resolved; a choice
 
 
+def has_histogram(row: Row, name: str = PR_LOGARITHMIC) -> bool:
+    """Whether Pr(sigma) of a row is stored; otherwise its bins are NaN where other rows have it."""
+    return name in row and bool(np.isfinite(row[name]).all())
+
+
 def bin_counts(row: Row, name: str = PR_LOGARITHMIC) -> Field:
     """Grid points in each bin of Pr(sigma): density times width times the points of the cell."""
-    widths = np.diff(BINS[name].edges)
-    return np.nan_to_num(row[name]) * widths * row["points"] * row["points_y"]
+    return row[name] * np.diff(BINS[name].edges) * row["points"] * row["points_y"]
 
 
 @dataclass(frozen=True)
@@ -127,7 +131,7 @@ class StressDistribution:
     @property
     def title(self) -> str:
         """Elastomer and surface, without its seed where there are several."""
-        title = contact_title(self.finest, of_seeds=len(self.seeds) > 1)
+        title = contact_and_boundary(self.finest, of_seeds=len(self.seeds) > 1)
         return of_study(self.curve.study, title)
 
     @cached_property
@@ -215,7 +219,7 @@ def distributions(comparison: Comparison) -> list[StressDistribution]:
     by_contact: dict[tuple[Any, ...], dict[int, dict[int, tuple[Curve, Row]]]] = {}
     for curve in comparison.curves:
         for row in curve.rows:
-            if PR_LOGARITHMIC not in row or not (row["a_r"] > 0 and row["status"].is_converged):
+            if not (has_histogram(row) and row["a_r"] > 0 and row["status"].is_converged):
                 continue
             units = (f"{row['pressure']:.6g}", f"{row['delta_sigma']:.6g}")
             same = row["elastomer"], row["ensemble"], row["boundary"], _pixel_shape(row)

@@ -15,10 +15,15 @@ from gfmd_cli.analysis.curve_styles import (
     order,
     seed_groups,
 )  # fmt: skip
-from gfmd_cli.analysis.distribution import StressDistribution, bin_counts, distributions
+from gfmd_cli.analysis.distribution import (
+    StressDistribution,
+    bin_counts,
+    distributions,
+    has_histogram,
+)
 from gfmd_cli.analysis.edge_law import fit_power_law
 from gfmd_cli.analysis.ensemble import by_load
-from gfmd_cli.analysis.plotting import DASHED, THEORY, ColumnFigure
+from gfmd_cli.analysis.plotting import DASHED, THEORY, UNCONVERGED, ColumnFigure
 from gfmd_cli.analysis.selection import T, evenly, grouped
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.study.column import Row
@@ -41,12 +46,18 @@ class Density:
 
     item: StyledCurve
     row: Row
-    """Of the contact; of several seeds, that of the first one with the mean density."""
+    """Of the contact; of several seeds, that of one with mean density and pressure, which has not
+    converged if any of them has not."""
     seeds: int
     """Number of seeds of which this is the mean."""
     sigma: Field
     density: Field
     """Of bins with enough points."""
+
+    @property
+    def remark(self) -> str:
+        """That the contact, or one of several seeds, has not converged; empty if all have."""
+        return "" if self.row["status"].is_converged else f", {UNCONVERGED}"
 
     def theory(self, sigma: Field) -> Field:
         """Persson theory. Paper Eq. (24)."""
@@ -96,20 +107,19 @@ def _densities(items: list[StyledCurve], name: str) -> list[list[Density]]:
     """The contacts of each curve that have enough bins for a line; of seeds the mean of all."""
     groups = []
     for group in seed_groups(items):
-        shown = []
-        for seeds in by_load(row for item in group for row in item.curve.rows):
-            rows = [row for row in seeds if name in row and _bins(row, name)[0].size > 2]
-            if rows:
-                row = rows[0] | {name: np.mean([row[name] for row in rows], axis=0)}
-                shown.append(Density(group[0], row, len(rows), *_bins(row, name)))
-        groups.append(shown)
+        loads = by_load(row for item in group for row in item.curve.rows)
+        stored = ([row for row in seeds if has_histogram(row, name)] for seeds in loads)
+        shown = [mean_density(group[0], rows, name) for rows in stored if rows]
+        groups.append([density for density in shown if density.sigma.size > 2])
     return [group for group in groups if group]
 
 
-def _bins(row: Row, name: str) -> tuple[Field, Field]:
-    """Pr(sigma) Delta_sigma over sigma / Delta_sigma, in bins of MIN_COUNT points or more."""
+def mean_density(item: StyledCurve, rows: list[Row], name: str) -> Density:
+    """Pr(sigma) of one seed or the mean of several, in bins of MIN_COUNT points or more."""
+    row = min(rows, key=lambda row: row["status"].is_converged)
+    row = row | {key: np.mean([row[key] for row in rows], axis=0) for key in (name, "p_star")}
     frequent = bin_counts(row, name) > MIN_COUNT - 0.5
-    return BINS[name].middles()[frequent], np.nan_to_num(row[name])[frequent]
+    return Density(item, row, len(rows), BINS[name].middles()[frequent], row[name][frequent])
 
 
 def distribution_figures(items: list[StyledCurve]) -> dict[str, ColumnFigure | None]:
@@ -146,7 +156,7 @@ def _pressures(shown: list[Density]) -> ColumnFigure:
     label = label if len(label) <= MAX_LABEL else f"{label[: MAX_LABEL - 1].rstrip(', ')}\u2026"
     plot = ColumnFigure(f"{STRESS}  for  {label}", DENSITY)
     for stress, colour in zip(shown, colours(len(shown)), strict=True):
-        label = f"p* = {stress.row['p_star']:.3g}"
+        label = f"p* = {stress.row['p_star']:.3g}{stress.remark}"
         plot.line(label, stress.sigma, stress.density, color=colour, lw=1.6)
     _scale(plot, "linear", shown)
     sigma = np.linspace(0.0, plot.axes.get_xlim()[1], 400)

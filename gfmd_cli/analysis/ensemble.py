@@ -3,7 +3,7 @@
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from math import sqrt
+from math import hypot, isnan, sqrt
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,7 @@ from scipy.special import stdtrit
 
 from gfmd_cli.analysis.compare import Comparison, best_of_all, load_of, of_study
 from gfmd_cli.analysis.selection import grouped
-from gfmd_cli.analysis.wording import contact_title, grid_size
+from gfmd_cli.analysis.wording import contact_and_boundary, contact_title, grid_size
 from gfmd_cli.physics.observables import QUANTITIES
 from gfmd_cli.spec.models import LOADS
 from gfmd_cli.study.column import Row
@@ -26,9 +26,10 @@ class Spread:
 
     mean: float
     standard_error: float
-    """Of the mean: standard deviation (n - 1) over sqrt(n)."""
+    """Of the mean over seeds: standard deviation (n - 1) over sqrt(n)."""
     half_width: float
-    """The mean of all seeds lies within mean +- half_width with 95 % confidence (Student's t)."""
+    """The mean of all seeds lies within mean +- half_width with 95 % confidence: Student's t, and
+    the mean error of the single values, in the root of the sum of the squares."""
 
 
 @dataclass(frozen=True)
@@ -44,8 +45,9 @@ class Ensemble:
     def title(self) -> str:
         """Elastomer, surface without its seed, and the grid where that was given."""
         row = self.rows[0]
-        grid = "" if row.get("grid") == "auto" else f", {grid_size([row])}"
-        return of_study(self.study, contact_title(row, of_seeds=True) + grid)
+        if row.get("grid") == "auto":
+            return of_study(self.study, contact_and_boundary(row, of_seeds=True))
+        return of_study(self.study, f"{contact_title(row, of_seeds=True)}, {grid_size([row])}")
 
     @property
     def p_star(self) -> float:
@@ -60,14 +62,15 @@ class Ensemble:
 
     def spread(self, name: str) -> Spread:
         """Of "a_r", "sigma_p" or "u_g": see `best_of_all`."""
-        return spread_of([value for value, _ in best_of_all(self.rows, name)])
+        return spread_of(*zip(*best_of_all(self.rows, name), strict=True))
 
     def means(self) -> dict[str, Any]:
-        """Number of seeds, and the spread of each quantity, as the records of a study have them.
+        """Numbers of seeds, and the spread of each quantity, as the records of a study have them.
 
         The pressure is one of them where it was searched.
         """
-        record: dict[str, Any] = {"seeds": len(self.rows)}
+        failed = sum(not row["status"].is_converged for row in self.rows)
+        record: dict[str, Any] = {"seeds": len(self.rows), "seeds_not_converged": failed}
         spreads = {name: self.spread(name) for name in QUANTITIES}
         if LOADS[self.rows[0]["load"]].searched:
             spreads["p_star"] = spread_of([row["p_star"] for row in self.rows])
@@ -80,12 +83,18 @@ class Ensemble:
         return record
 
 
-def spread_of(values: Sequence[float]) -> Spread:
-    """Statistics of two values or more."""
+def spread_of(values: Sequence[float], errors: Sequence[float] = ()) -> Spread:
+    """Statistics of two values or more.
+
+    `errors` are those of the single values, NaN where unknown. They do not average out: on the same
+    grid they may have the same sign for all seeds.
+    """
     numbers = np.asarray(values, np.float64)
     error = float(np.std(numbers, ddof=1)) / sqrt(numbers.size)
     t_factor = float(stdtrit(numbers.size - 1, 0.5 + 0.5 * CONFIDENCE))
-    return Spread(float(numbers.mean()), error, t_factor * error)
+    shared = float(np.abs(errors).sum() / numbers.size)
+    half_width = hypot(t_factor * error, 0.0 if isnan(shared) else shared)
+    return Spread(float(numbers.mean()), error, half_width)
 
 
 def without_seed(row: Row) -> tuple[Any, ...]:
@@ -97,9 +106,15 @@ def without_seed(row: Row) -> tuple[Any, ...]:
 
 
 def by_load(rows: Iterable[Row]) -> list[list[Row]]:
-    """The rows of each load, one a seed."""
-    groups = grouped(rows, load_of)
-    return [[*{row["seed"]: row for row in group}.values()] for group in groups.values()]
+    """The rows of each load, one a seed: of several, one with errors and converged if possible."""
+    groups = (sorted(group, key=_preference) for group in grouped(rows, load_of).values())
+    return [[*{row["seed"]: row for row in group}.values()] for group in groups]
+
+
+def _preference(row: Row) -> tuple[bool, bool]:
+    """Larger for the better one of two rows of a contact, which differ in [accuracy] alone."""
+    has_errors = any(row.get(f"{name}_verdict") for name in QUANTITIES)
+    return has_errors, row["status"].is_converged
 
 
 def ensembles(comparison: Comparison) -> list[Ensemble]:

@@ -66,7 +66,9 @@ def as_records(comparison: Comparison) -> list[dict[str, Any]]:
     apply.
     """
     means = {
-        row["task"]: ensemble.means() for ensemble in ensembles(comparison) for row in ensemble.rows
+        row["task"]: {key: plain(value) for key, value in ensemble.means().items()}
+        for ensemble in ensembles(comparison)
+        for row in ensemble.rows
     }
     records = []
     names = column_names(comparison.records)

@@ -15,7 +15,7 @@ from gfmd_cli.analysis.compare import Comparison, best_of_all, einstein_predicti
 from gfmd_cli.analysis.curve_styles import CurveStyle, StyledCurve, seed_groups, with_styles
 from gfmd_cli.analysis.distribution_figure import continuum_figure, distribution_figures
 from gfmd_cli.analysis.ensemble import by_load, spread_of
-from gfmd_cli.analysis.plotting import DASHED, ColumnFigure, styled
+from gfmd_cli.analysis.plotting import DASHED, THEORY, ColumnFigure, styled
 from gfmd_cli.analysis.wording import contact_title, grid_size, in_si, quantity
 from gfmd_cli.files.atomic import make_folder
 from gfmd_cli.grid.arrays import Field, Mask
@@ -119,7 +119,7 @@ def _point(panel: Panel, records: list[Row]) -> tuple[float, float, float, float
     name = panel.column
     units = np.array([r[f"{name}_persson"] if panel.ratio else 1.0 for r in records])
     values, errors = np.transpose(best_of_all(records, name)) / units
-    half_width = spread_of(values).half_width if len(records) > 1 else np.nan
+    half_width = spread_of(values, errors).half_width if len(records) > 1 else np.nan
     converged = all(record["status"].is_converged for record in records)
     p_star = np.mean([record["p_star"] for record in records])
     return float(p_star), float(values.mean()), float(np.abs(errors).mean()), half_width, converged
@@ -173,7 +173,8 @@ def _over_pressure(panel: Panel, items: list[StyledCurve]) -> ColumnFigure | Non
     lines = [(series.style, p_star, series.theory) for series in drawn]
     if panel.ratio:
         lines = [(drawn[0].style, p_star, np.ones_like(p_star))]
-    plot.theory(lines)
+    source = items[0].curve.persson.mean_gap_source if panel.column == "u_g" else ""
+    plot.theory(lines, f"theory by {source}" if source else THEORY)
     if panel.column == "u_g" and any(item.curve.n == 0 and item.curve.has_theory for item in items):
         exact = einstein_prediction(p_star).u_g
         plot.line("n = 0, Gaussian", p_star, exact, color="black", **DASHED)

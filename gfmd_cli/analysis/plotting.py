@@ -222,16 +222,16 @@ class ColumnFigure(LegendFigure):
             layer = PlotLayer("line", names, x, y, colour, width=width, dashed="ls" in style)
             self.layers.append(layer)
 
-    def theory(self, lines: list[tuple[CurveStyle, Field, Field]]) -> None:
+    def theory(self, lines: list[tuple[CurveStyle, Field, Field]], label: str = THEORY) -> None:
         """Draw one black line if the theory is the same for all curves, else one in each colour."""
         lines = [line for line in lines if np.any(np.isfinite(line[2]))]
         if not lines:
             return
         one = all(np.allclose(y, lines[0][2], rtol=1e-9, atol=0) for *_, y in lines)
         for style, x, y in lines[:1] if one else lines:
-            names = (THEORY,) if one else (style.label, THEORY)
+            names = (label,) if one else (style.label, label)
             self.unnamed_line(names, x, y, color="black" if one else style.colour, zorder=2)
-        self.legend[THEORY] = Line2D([], [], color="black" if one else "0.4")
+        self.legend[label] = Line2D([], [], color="black" if one else "0.4")
 
     def second_x(self, label: str, factor: float) -> None:
         """Add an axis at the top for x times a factor; to be called after `scale`."""

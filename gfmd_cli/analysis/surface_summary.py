@@ -180,7 +180,7 @@ def _fit_lines(nearest: SelfAffineFit, metres: str) -> list[str]:
     wavelength, error = nearest.rolloff_wavelength, nearest.rolloff_error
     rolloff = "no roll-off within the cell"
     if wavelength is not None:
-        rolloff = f"lambda_r = {wavelength:.3g} +- {error:.1g}{metres}"
+        rolloff = f"lambda_r = {wavelength:.3g} +- {error:.2g}{metres}"
     lines = [
         f"fitted spectrum: H = {nearest.hurst:.3f} +- {nearest.hurst_error:.3f}, {rolloff}, "
         f"lambda_s = {nearest.cutoff_wavelength:.3g}{metres}, rms height "

@@ -26,6 +26,7 @@ from gfmd_cli.analysis.table import (
     ratio,
 )
 from gfmd_cli.analysis.wording import contact_title, grid_size, in_si, shown
+from gfmd_cli.grid.arrays import Field
 from gfmd_cli.physics.observables import QUANTITIES
 from gfmd_cli.study.observables import OBSERVABLES, Observable
 from gfmd_cli.study.plausibility import SEPARATOR
@@ -240,7 +241,8 @@ def seeds_table(comparison: Comparison) -> Table:
     )
     caption = (
         "Means over seeds, +- half the width of the 95 % confidence interval (Student's t): of "
-        "values in the continuum where [accuracy] asked for them, else on the grid."
+        "values in the continuum, with their mean error, where [accuracy] asked for them, else on "
+        "the grid."
     )
     return Table(caption, SEEDS, groups)
 
@@ -275,11 +277,16 @@ def curve_title(curve: Curve, *, of_seeds: bool = False) -> str:
     return of_study(curve.study, text)
 
 
+def _ends(values: Field) -> str:
+    """The smallest and the largest value: those of a map may depend on the grid."""
+    return " to ".join(dict.fromkeys(f"{end:.6g}" for end in (values.min(), values.max())))
+
+
 def _scales(curve: Curve) -> list[str]:
     row = curve.rows[0]
     physical = in_si(row)
     scales = ", ".join(
-        f"{symbol} = {row[name]:.6g}{f' {unit}' if physical else ''}"
+        f"{symbol} = {_ends(curve.column(name))}{f' {unit}' if physical else ''}"
         for symbol, name, unit in SCALES
     )
     warnings = [f"warning: {line}" for line in warnings_in(curve.rows)]

@@ -74,6 +74,17 @@ def contact_title(row: Mapping[str, Any], *, of_seeds: bool = False) -> str:
     return f"{row['elastomer']} on {row['ensemble' if of_seeds else 'surface']}"
 
 
+def contact_and_boundary(row: Mapping[str, Any], *, of_seeds: bool = False) -> str:
+    """A contact as `contact_title` names it, and its boundary where that is free."""
+    free = ", free boundary" if row.get("boundary") == "free" else ""
+    return contact_title(row, of_seeds=of_seeds) + free
+
+
+def points_text(points: int, points_y: int) -> str:
+    """Points of a grid: "256", or "256 x 128" along x and y; of a line those along x."""
+    return str(points) if points_y in (1, points) else f"{points} x {points_y}"
+
+
 def grid_size(rows: Sequence[Mapping[str, Any]]) -> str:
     """Points of the grids of some rows, from the coarsest to the finest.
 

@@ -14,7 +14,7 @@ from gfmd_cli.analysis.plotting import SMALL, WIDTH, LegendFigure, log_scale, st
 from gfmd_cli.analysis.selection import grouped
 from gfmd_cli.analysis.table import Group, Record, Table, TableColumn
 from gfmd_cli.analysis.tables import ELASTOMER, P_STAR, POINTS, RESIDUAL, STATUS
-from gfmd_cli.analysis.wording import contact_title
+from gfmd_cli.analysis.wording import contact_and_boundary, points_text
 from gfmd_cli.bench.file import Trace
 from gfmd_cli.bench.run import REFERENCE
 from gfmd_cli.files.atomic import make_folder
@@ -30,6 +30,8 @@ COSTS = (
 )
 ROOM = 2.0  # for the symbols at the ends of a curve
 MAX_LABEL = 100  # characters of a title and of a file name
+OWN_KEYS = ("max_steps", "time_step")
+"""Keys of [solver] that solvers of one kind may differ in, besides tolerance and start."""
 ERROR = r"relative error of $u_g$"
 LEVELS = ("1e-2", "1e-4", "1e-6")
 """Relative errors of the mean gap."""
@@ -50,17 +52,20 @@ def bench_table(traces: list[Trace]) -> Table:
     """One record for each solver, grid and pressure.
 
     Transforms and seconds until the error of the mean gap falls below a level for good; the errors
-    and the residual at the end. The surface is a column where there are several.
+    and the residual at the end. Surface and boundary are columns where there are several.
     """
     surfaces = list(dict.fromkeys(trace.row["surface"] for trace in traces))
     title, columns = surfaces[0], BENCH
+    if len({trace.row.get("boundary") for trace in traces}) > 1:
+        columns = (*columns, TableColumn("boundary", "boundary"))
     if len(surfaces) > 1:
-        title, columns = "", (*BENCH, TableColumn("surface", "surface"))
+        title, columns = "", (*columns, TableColumn("surface", "surface"))
     worst = max(trace.row["reference_residual"] for trace in traces)
     caption = (
         "Cost until the error of the mean gap stays below a level: Fourier transforms, in units of "
         "one on the final grid, and seconds of processor time on one thread, without the "
-        f"recording. Errors are relative to a reference with a residual of {worst:.0e} or less."
+        "recording. Errors are relative to a reference; the largest residual of one is "
+        f"{worst:.1e}."
     )
     names = solver_names(traces)
     records = [_record(trace, name) for trace, name in zip(traces, names, strict=True)]
@@ -78,12 +83,15 @@ def _record(trace: Trace, name: str) -> Record:
 
 def contact_of(trace: Trace) -> tuple[Any, ...]:
     """Values that identify the contact of a trace."""
-    keys = ("surface", "seed", "elastomer", "boundary", "points", "p_star")
+    keys = ("surface", "seed", "elastomer", "boundary", "points", "points_y", "p_star")
     return tuple(trace.row.get(key) for key in keys)
 
 
 def solver_names(traces: list[Trace]) -> list[str]:
-    """Each solver, with its tolerance and its start where these are not the same for all."""
+    """Each solver, with its tolerance and its start where these are not the same for all.
+
+    Other keys of [solver] follow where solvers of the same kind differ in them.
+    """
     tolerances = {trace.row["tolerance"] for trace in traces}
     starts = {trace.row["nested"] for trace in traces}
     names = []
@@ -93,6 +101,10 @@ def solver_names(traces: list[Trace]) -> list[str]:
             name += f" {trace.row['tolerance']:g}"
         if len(starts) > 1 and not trace.row["nested"]:
             name += " not nested"
+        for key in OWN_KEYS:
+            values = {t.row.get(key) for t in traces if t.row["solver"] == trace.row["solver"]}
+            if len(values) > 1 and key in trace.row:
+                name += f" {key}={trace.row[key]:g}"
         names.append(name)
     return names
 
@@ -174,8 +186,9 @@ def _curve(
 
 def _title(trace: Trace) -> str:
     row = trace.row
-    contact = contact_title(row)[:MAX_LABEL]
-    return f"{literal(contact)}, {row['points']} points, p* = {row['p_star']:.4g}"
+    contact = contact_and_boundary(row)[:MAX_LABEL]
+    points = points_text(row["points"], row.get("points_y", 1))
+    return f"{literal(contact)}, {points} points, p* = {row['p_star']:.4g}"
 
 
 def _slug(text: str) -> str:

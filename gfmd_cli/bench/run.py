@@ -25,6 +25,7 @@ from gfmd_cli.solvers.loop import Solver, State
 from gfmd_cli.solvers.nested_grids import Solution, solve_contact
 from gfmd_cli.solvers.polonsky_keer import PolonskyKeer
 from gfmd_cli.spec.models import LOADS, Spec
+from gfmd_cli.study.columns import PARAMETERS
 from gfmd_cli.study.context import Progress, Report
 from gfmd_cli.study.measure import planned
 from gfmd_cli.study.resources import check_memory
@@ -161,7 +162,9 @@ def _trace(
     recorder.end(solution)
     points, residual, status = contact.grid.points, solution.residual, solution.status
     report(Progress(run, "end", label, points, solution.steps, residual, recorder.a_r, status))
+    values = solver.parameters()
     outcome = {
+        **{each.column.name: each.cell(values) for each in PARAMETERS if each.table == "solver"},
         "solver": solver.kind,
         "tolerance": solver.tolerance,
         "nested": solver.nested,

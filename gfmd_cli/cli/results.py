@@ -45,11 +45,15 @@ def analyze(study: Path, as_json: bool, figures: Path | None, theory: "Theory") 
         click.echo(json.dumps(as_records(comparison), indent=1))
     else:
         print_text(str(comparison))
-        if comparison.missing:
-            print_text(
-                f"\n{count(comparison.missing, 'task')} not solved yet, or failed; `gfmd status "
-                f"{typed(study)}` prints the errors."
-            )
+    if comparison.missing:
+        note = (
+            f"{count(comparison.missing, 'task')} not solved yet, or failed; `gfmd status "
+            f"{typed(study)}` prints the errors."
+        )
+        if as_json:
+            print_error(note)
+        else:
+            print_text(f"\n{note}")
     if figures is not None:
         from gfmd_cli.analysis.figures import draw_all
 

@@ -134,6 +134,12 @@ def on_grid(value: float, error: float, verdict: Verdict = Verdict.REGULAR) -> E
     return Estimate(error, value, error, verdict)
 
 
+def widened(estimate: Estimate, error: float) -> Estimate:
+    """An estimate with another error, independent of its own."""
+    errors = hypot(estimate.error, error), hypot(estimate.continuum_error, error)
+    return replace(estimate, error=errors[0], continuum_error=errors[1])
+
+
 def area_estimate(a_r: float, best: float, error: float, continuum_error: float) -> Estimate:
     """The best value of a relative contact area, with bars that do not leave 0 to 1."""
     whole, part = max(a_r, 1 - a_r), max(best, 1 - best)

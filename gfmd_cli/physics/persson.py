@@ -224,7 +224,7 @@ class Persson:
     def pressure_at_gap(self, u_g: Field | float) -> Field:
         """Pressure at a mean gap, Eq. (28) inverted by a monotone cubic in logarithms.
 
-        Good to 1e-4 for Delta_sigma / 1e6 <= p <= 6 Delta_sigma; NaN outside of `gap_range`.
+        Good to 2e-4 for Delta_sigma / 1e6 <= p <= 6 Delta_sigma; NaN outside of `gap_range`.
         """
         rising, table = self._pressures_over_gap
         smallest, largest = self.gap_range

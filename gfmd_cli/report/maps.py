@@ -15,7 +15,7 @@ from gfmd_cli.analysis.plotting import HEIGHT, WIDTH, ColumnFigure, LegendFigure
 from gfmd_cli.analysis.selection import evenly, grouped
 from gfmd_cli.analysis.table import Group, Table
 from gfmd_cli.analysis.tables import AREA, ELASTOMER, P_STAR, POINTS, PRESSURE, TASK
-from gfmd_cli.analysis.wording import contact_title, in_si, largest, pressure_text, shown
+from gfmd_cli.analysis.wording import contact_and_boundary, in_si, largest, pressure_text, shown
 from gfmd_cli.grid.arrays import Field, Mask
 from gfmd_cli.maps.pictures import block_sums
 from gfmd_cli.physics.observables import contact_points
@@ -75,7 +75,7 @@ def maps(data: ReportData) -> Section:
         contacts = [row for rows in contacts_by_curve for row in rows]
         series = [
             {
-                "title": contact_title(rows[0]),
+                "title": contact_and_boundary(rows[0]),
                 "contacts": [_contact_maps(study, row, data.prefix) for row in rows],
             }
             for rows in contacts_by_curve

@@ -145,7 +145,7 @@ def _bins(density: Density) -> Group:
     records = records_of(sigma=sigma, density=density.density, theory=theory, delta_sigma=unit)
     title, p_star = item_title(density.item, of_seeds=density.seeds > 1), f"{row['p_star']:.4g}"
     mean = f": mean of {density.seeds} seeds" if density.seeds > 1 else ""
-    return Group(f"{title}, p* = {p_star}{mean}", records)
+    return Group(f"{title}, p* = {p_star}{mean}{density.remark}", records)
 
 
 def error_bars(data: ReportData) -> Section:

@@ -158,8 +158,11 @@ WEIGHTS = {
         Column("pr_gap_beyond", "fraction of points beyond the linear bins of Pr(g)"),
         Column("pr_gap_below", "fraction of points below the logarithmic bins"),
     ),
+    "patches": (
+        Column("pr_patch_beyond", "fraction of patches larger than L^2, beyond the bins of Pr(A)"),
+    ),
 }
-"""Fractions of points in no bin, by the key of [output] that turns the histogram on."""
+"""Fractions of points or patches in no bin, by the key of [output] that turns the histogram on."""
 WEIGHT_COLUMNS = tuple(column for columns in WEIGHTS.values() for column in columns)
 ROW_COLUMNS = (*COLUMNS, *WEIGHT_COLUMNS)
 """All columns with one value a task."""
