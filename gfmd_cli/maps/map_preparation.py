@@ -90,10 +90,14 @@ def mirror(values: np.ndarray[Any, Any]) -> Any:
 
 
 def window(shape: tuple[int, ...], taper: float) -> Field:
-    """Tukey window: rises as a cosine from 0 at the border to 1 at `taper` of each side."""
+    """Tukey window: rises as a cosine from 0 at the border to 1 at `taper` of each side.
+
+    Its values are those in the middle of the pixels, so that it is the same from all sides.
+    """
     weight: Field = np.ones(())
     for points in shape:
-        border = np.minimum(np.arange(points), points - np.arange(points)) / points
+        middles = (np.arange(points) + 0.5) / points
+        border = np.minimum(middles, 1 - middles)
         along = 0.5 - 0.5 * np.cos(np.pi * np.minimum(border / taper, 1.0))
         weight = np.multiply.outer(weight, along)
     return weight

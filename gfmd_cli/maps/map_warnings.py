@@ -123,16 +123,16 @@ def unlikely_gradient(heights: Field, spacing: tuple[float, ...]) -> str:
     )
 
 
-def step_at_border(heights: Field) -> str:
+def step_at_border(heights: Field, *, is_tapered: bool) -> str:
     """Opposite borders of a repeated map that do not fit."""
     cliff = border_step(heights)
     limit = np.sqrt(BORDER_SHARE * max(heights.shape))  # one of so many steps is at the border
     if cliff <= np.clip(limit, MIN_BORDER_STEP, MAX_BORDER_STEP):
         return ""
-    return (
-        f"the height step across the border is {cliff:.3g} times that inside the map: if "
-        "the map is not periodic, set surface.periodic = false"
-    )
+    remedy = "if the map is not periodic, set surface.periodic = false"
+    if is_tapered:
+        remedy = "the tapered zone is too narrow; raise surface.taper"
+    return f"the height step across the border is {cliff:.3g} times that inside the map: {remedy}"
 
 
 def tilted(heights: Field) -> str:

@@ -310,7 +310,8 @@ class FileSurface(RigidSurface):
         if self.missing == "fill":
             warnings.append(map_warnings.many_filled_in(topography))
         if boundary == "periodic" and not self.has_borders:
-            warnings.append(map_warnings.step_at_border(heights))
+            is_tapered = self.edges == "window"
+            warnings.append(map_warnings.step_at_border(heights, is_tapered=is_tapered))
         if boundary == "free" and self.levelling() == "none":
             warnings.append(map_warnings.tilted(heights))
         return list(filter(None, warnings))
