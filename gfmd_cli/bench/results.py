@@ -21,6 +21,7 @@ from gfmd_cli.files.atomic import make_folder
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.physics.observables import QUANTITIES
 from gfmd_cli.status import Status
+from gfmd_cli.study.columns import PARAMETERS
 
 FULL_WIDTH, ROW_HEIGHT = 2.09 * WIDTH, 2.0  # inches: a page of 180 mm; a row of panels
 MAX_CONTACTS = 4  # rows of panels that a page holds
@@ -30,8 +31,12 @@ COSTS = (
 )
 ROOM = 2.0  # for the symbols at the ends of a curve
 MAX_LABEL = 100  # characters of a title and of a file name
-OWN_KEYS = ("max_steps", "time_step")
-"""Keys of [solver] that solvers of one kind may differ in, besides tolerance and start."""
+NAMED_KEYS = ("solver_kind", "tolerance", "nested")  # of [solver], in words of their own
+OTHER_KEYS = [
+    each.column.name
+    for each in PARAMETERS
+    if each.table == "solver" and each.column.name not in NAMED_KEYS
+]
 ERROR = r"relative error of $u_g$"
 LEVELS = ("1e-2", "1e-4", "1e-6")
 """Relative errors of the mean gap."""
@@ -101,10 +106,10 @@ def solver_names(traces: list[Trace]) -> list[str]:
             name += f" {trace.row['tolerance']:g}"
         if len(starts) > 1 and not trace.row["nested"]:
             name += " not nested"
-        for key in OWN_KEYS:
+        for key in OTHER_KEYS:
             values = {t.row.get(key) for t in traces if t.row["solver"] == trace.row["solver"]}
             if len(values) > 1 and key in trace.row:
-                name += f" {key}={trace.row[key]:g}"
+                name += f" {key}={trace.row[key]}"
         names.append(name)
     return names
 
