@@ -328,8 +328,8 @@ def measure(case: Case, tolerance: float = 1e-6) -> dict:
         begun = time.perf_counter()
         solution = solve_contact(contact, Auto(tolerance=tolerance))
         observables = observe(contact, solution.u, solution.sigma)
-        of_surface = case.surface.band_limited, case.surface.copies
-        texture = None if case.is_single else asdict(scales_of(scene, *of_surface))
+        band_limited = case.surface.band_limited
+        texture = None if case.is_single else asdict(scales_of(scene, band_limited))
         levels.append(
             {
                 "points": points,
@@ -346,13 +346,14 @@ def measure(case: Case, tolerance: float = 1e-6) -> dict:
                 "seconds": round(time.perf_counter() - begun, 3),
             }
         )
+    has_copies = case.boundary == "periodic" and not case.is_single
     return {
         "name": case.name,
         "fit": case.fit,
         "p_star": case.p_star,
         "single": case.is_single,
         "band_limited": case.surface.band_limited,
-        "area": 1 / case.surface.copies**first.grid.dimension,
+        "area": 1 / (first.texture.copies if has_copies else 1),
         "stepped": case.surface.stepped,
         "levels": levels,
     }
