@@ -180,6 +180,9 @@ def test_topographies_of_the_library_itself_are_read():
         assert result.a_r == by_hand.a_r
     bare = surface_topography.Topography(heights.T, (1e-5, 1e-5))
     assert solve(MATERIAL, heights=bare).a_r == by_hand.a_r
+    for unit in ("V", "furlong"):
+        with pytest.raises(InputError, match=f"^heights: .*'{unit}'"):
+            solve(MATERIAL, heights=surface_topography.Topography(heights.T, (1, 1), unit=unit))
     profile = surface_topography.UniformLineScan(1e9 * heights[0], 1e4, unit="nm")
     assert solve(MATERIAL, heights=profile).length == pytest.approx(1e-5, rel=1e-12)
 

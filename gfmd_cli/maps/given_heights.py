@@ -36,10 +36,12 @@ def write_heights(path: Path, heights: Any) -> dict[str, Any]:
     sides: tuple[float, ...] = ()
     if hasattr(heights, "physical_sizes"):
         keys["periodic"] = bool(heights.is_periodic)
-        if heights.unit is not None:
-            unit = "m"
-            heights = heights.to_unit(unit)
-        heights, sides = heights_and_sides(Path("heights"), heights, rows_along_y=False)
+        unit = "" if heights.unit is None else "m"
+        try:
+            scan = heights.to_unit(unit) if unit else heights
+            heights, sides = heights_and_sides(Path("heights"), scan, rows_along_y=False)
+        except ValueError as error:  # the unit is unknown, or not one of lengths
+            raise InputError(f"heights: {first_line(error)}") from error
     for name in UNIT_NAMES:  # a quantity of pint or astropy, whose unit NumPy drops
         if hasattr(heights, name):
             raise InputError(
