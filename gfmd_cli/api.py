@@ -66,7 +66,7 @@ class Result:
     pressure: Field
     """Contact pressure: the stress in contact, exactly zero off contact."""
     x: Field
-    """Positions of the grid points along x; for indenters counted from the crest."""
+    """Positions of the grid points along x from the first one; for indenters from the crest."""
     nominal_pressure: float
     """Nominal pressure: load per area of the cell."""
     length: float

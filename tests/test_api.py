@@ -406,6 +406,20 @@ def test_x_counts_from_the_crest(kind, tmp_path):
         np.testing.assert_array_equal(stored["contact_pressure"][()] > 0, result.contact)
 
 
+def test_positions_on_a_finer_grid_with_a_free_boundary_exceed_those_on_the_map():
+    """By (1/N - 1/M) L / 2, as docs/scans.md says."""
+    x = np.arange(20) / 20
+    bump = np.exp(-100 * ((x - 0.3) ** 2 + (x[:, None] - 0.7) ** 2))
+    spec = {"elastomer": {"kind": "half-space"}, "load": {"pressure": 1e-2}}
+    for points in (20, 40, 60):
+        surface = {"length": 1.0, "periodic": False, "level": "none", "interpolation": "fourier"}
+        tables = spec | {"surface": surface, "grid": {"points": points}}
+        result = solve(tables, heights=bump)
+        weight = np.clip(result.height - 0.3, 0, None).sum(axis=0)
+        middle = (weight * result.x).sum() / weight.sum()
+        assert middle == pytest.approx(0.3 + (1 / 20 - 1 / points) / 2, abs=5e-4)
+
+
 def test_a_result_shows_itself():
     result = solve(TABLES)
     for shown in (str(result), repr(result), result._repr_html_()):
