@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
+from warnings import warn
 
 import numpy as np
 import tabulate
@@ -29,8 +30,8 @@ from gfmd_cli.physics.file_surface import FileSurface, forget_files
 from gfmd_cli.physics.indenters import SMALLEST_GRID
 from gfmd_cli.spec.models import Spec
 from gfmd_cli.spec.parse import read_spec, read_tables
-from gfmd_cli.status import Status
-from gfmd_cli.study.context import Report, SolveContext, Watcher, WorkerOptions, ignore
+from gfmd_cli.status import Status, counted
+from gfmd_cli.study.context import Progress, Report, SolveContext, Watcher, WorkerOptions, ignore
 from gfmd_cli.study.load_search import solve_at_load
 from gfmd_cli.study.measure import all_columns
 from gfmd_cli.study.plausibility import SEPARATOR
@@ -48,9 +49,12 @@ NUMBERS = (
 """Attributes of a result that are columns of a study under the same name."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Result:
-    """One solved contact, in physical units [m, Pa]; fields are indexed [y, x]."""
+    """One solved contact, in physical units [m, Pa]; fields are indexed [y, x].
+
+    Two results are equal only if they are the same object.
+    """
 
     height: Field
     """Height of the indenter, filled in where it is masked; shape (points_y, points), for a line
@@ -62,7 +66,7 @@ class Result:
     pressure: Field
     """Contact pressure: the stress in contact, exactly zero off contact."""
     x: Field
-    """Positions of the grid points along x; for indenters counted from the crest."""
+    """Positions of the grid points along x from the first one; for indenters from the crest."""
     nominal_pressure: float
     """Nominal pressure: load per area of the cell."""
     length: float
@@ -241,6 +245,9 @@ def run(
 
     In the main thread the function handles signals: it saves all states before it ends.
 
+    A task that fails, or misses its tolerance, does not end the run. The function then gives a
+    Python warning at the end, and one for each warning that `gfmd run` prints.
+
     Parameters
     ----------
     spec
@@ -265,12 +272,27 @@ def run(
     """
     resolved, text = _read(spec, overrides)
     path = Path(study if study is not None else f"{resolved.study.name}.h5")
-    run_study(resolved, text, path, report, RunOptions(jobs=jobs))
+    messages: list[str] = []
+
+    def watch(progress: Progress) -> None:
+        report(progress)
+        if progress.status is not None and progress.status.is_failure:
+            messages.append(f"task {progress.task} ({progress.label}): {progress.message}")
+        elif progress.event == "warning":
+            messages.append(progress.message)
+
+    counts = run_study(resolved, text, path, watch, RunOptions(jobs=jobs))
+    if counts.keys() - {Status.CONVERGED}:
+        messages.append(f"{path}: {counted(counts)}")
+    for message in messages:
+        warn(message, stacklevel=2)
     return path
 
 
 def rows(study: Path | str) -> list[dict[str, Any]]:
     """Read a study: one dictionary per solved task, with the columns of `gfmd export`.
+
+    A task is solved if it has a result, converged or not; see the column `status`.
 
     Raises
     ------
@@ -297,6 +319,9 @@ def compare(study: Path | str) -> Comparison:
 
 def dataset(study: Path | str) -> Any:
     """Read a study as an `xarray.Dataset`, without the fields on the grid.
+
+    Tasks are selected by their parameters, as `data.sel(hurst=0.8)`; the parameter `tolerance`,
+    whose name is an argument of `sel` itself, only as `data.sel({"tolerance": 1e-8})`.
 
     Raises
     ------

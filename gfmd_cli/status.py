@@ -80,3 +80,8 @@ class Status(ExplainedEnum):
     def is_failure(self) -> bool:
         """Whether an error ended the task, so that it has no result."""
         return self in (Status.FAILED, Status.NO_SPACE, Status.KILLED)
+
+
+def counted(counts: Mapping[Status, int]) -> str:
+    """The counts as text, such as "2 converged, 1 missing"."""
+    return ", ".join(f"{count} {what}" for what, count in sorted(counts.items()))

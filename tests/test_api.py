@@ -180,6 +180,9 @@ def test_topographies_of_the_library_itself_are_read():
         assert result.a_r == by_hand.a_r
     bare = surface_topography.Topography(heights.T, (1e-5, 1e-5))
     assert solve(MATERIAL, heights=bare).a_r == by_hand.a_r
+    for unit in ("V", "furlong"):
+        with pytest.raises(InputError, match=f"^heights: .*'{unit}'"):
+            solve(MATERIAL, heights=surface_topography.Topography(heights.T, (1, 1), unit=unit))
     profile = surface_topography.UniformLineScan(1e9 * heights[0], 1e4, unit="nm")
     assert solve(MATERIAL, heights=profile).length == pytest.approx(1e-5, rel=1e-12)
 
@@ -250,6 +253,50 @@ def test_positions_of_xarray_without_a_unit_leave_the_side_to_the_spec():
             solve(spec, heights=wrong)
     with pytest.raises(InputError, match=r"^heights: "):
         solve(spec, heights=array.stack(both=("y", "x")))
+
+
+@pytest.mark.parametrize(
+    "marks",
+    [
+        {"_FillValue": -9999},
+        {"missing_value": -9999.0},
+        {"valid_min": -1.0},
+        {"valid_range": (-1, 1)},
+    ],
+)
+def test_marks_of_missing_heights_of_xarray_count(marks):
+    """As rioxarray leaves them in the attributes."""
+    xarray = pytest.importorskip("xarray")
+    pytest.importorskip("h5netcdf")
+    heights = rough_map()
+    marked, unknown = heights.copy(), heights.copy()
+    marked[3, 4:9], unknown[3, 4:9] = -9999, np.nan
+    array = xarray.DataArray(marked[None], dims=("band", "y", "x"), attrs=marks)
+    spec = {**MATERIAL, "surface": {"length": 1e-5}}
+    np.testing.assert_array_equal(
+        solve(spec, heights=array).height, solve(spec, heights=unknown).height
+    )
+    packed = array.assign_attrs(scale_factor=0.1)
+    with pytest.raises(InputError, match=r"^heights: .* packed"):
+        solve(spec, heights=packed)
+
+
+def test_a_quantity_with_a_unit_is_refused():
+    class Quantity(np.ndarray):
+        unit = "nm"
+
+    with pytest.raises(InputError, match=r"^heights: an array with the unit nm; give plain"):
+        solve(MATERIAL, heights=np.eye(16).view(Quantity))
+
+
+def test_masked_rows_in_a_list_are_a_masked_array():
+    heights = np.ma.masked_greater(rough_map(), 1e-8)
+    whole, rows_of_it = (
+        solve({**MATERIAL, "surface": {"length": 1e-5}}, heights=given)
+        for given in (heights, list(heights))
+    )
+    assert not whole.contact[heights.mask].any()
+    np.testing.assert_array_equal(rows_of_it.stress, whole.stress)
 
 
 def test_a_line_scan_at_unequal_distances_is_interpolated():
@@ -360,6 +407,20 @@ def test_x_counts_from_the_crest(kind, tmp_path):
         np.testing.assert_array_equal(stored["contact_pressure"][()] > 0, result.contact)
 
 
+def test_positions_on_a_finer_grid_with_a_free_boundary_exceed_those_on_the_map():
+    """By (1/N - 1/M) L / 2, as docs/scans.md says."""
+    x = np.arange(20) / 20
+    bump = np.exp(-100 * ((x - 0.3) ** 2 + (x[:, None] - 0.7) ** 2))
+    spec = {"elastomer": {"kind": "half-space"}, "load": {"pressure": 1e-2}}
+    for points in (20, 40, 60):
+        surface = {"length": 1.0, "periodic": False, "level": "none", "interpolation": "fourier"}
+        tables = spec | {"surface": surface, "grid": {"points": points}}
+        result = solve(tables, heights=bump)
+        weight = np.clip(result.height - 0.3, 0, None).sum(axis=0)
+        middle = (weight * result.x).sum() / weight.sum()
+        assert middle == pytest.approx(0.3 + (1 / 20 - 1 / points) / 2, abs=5e-4)
+
+
 def test_a_result_shows_itself():
     result = solve(TABLES)
     for shown in (str(result), repr(result), result._repr_html_()):
@@ -367,6 +428,35 @@ def test_a_result_shows_itself():
         assert f"{result.a_r:.5g}" in shown
     assert len(str(result).splitlines()) < 12
     assert result._repr_html_().startswith("<table>")
+
+
+def test_results_can_be_compared_and_collected():
+    one, other = solve(TABLES), solve(TABLES)
+    assert one in [other, one]
+    assert one != other
+    assert len({one, other}) == 2
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_a_run_warns_of_tasks_without_a_result(tmp_path, jobs):
+    tables = TABLES | {"load": {"mean_gap": [0.5, 1e9]}}
+    with pytest.warns(UserWarning, match=r"never reached|1 failed") as caught:
+        study = run(tables, tmp_path / "a.h5", jobs=jobs)
+    reason, counts = (str(one.message) for one in caught)
+    assert reason.startswith("task 1 (")
+    assert "1e+09 h_std are never reached" in reason
+    assert counts == f"{study}: 1 converged, 1 failed"
+    assert len(rows(study)) == 1
+
+
+def test_a_run_warns_of_contacts_that_have_not_converged(tmp_path):
+    tables = TABLES | {"solver": {"max_steps": 1, "nested": False}}
+    for _ in range(2):  # the second finds the result
+        with pytest.warns(UserWarning, match=r"a.h5: 1 max_steps$"):
+            run(tables, tmp_path / "a.h5")
+    tables = TABLES | {"surface": {"kind": "ridge"}, "grid": {"points": [16, 32]}}
+    with pytest.warns(UserWarning, match="another pressure on every grid"):
+        run(tables | {"load": {"p_star": 0.5}}, tmp_path / "b.h5")
 
 
 def test_a_comparison_shows_its_tables(tmp_path):

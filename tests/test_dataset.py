@@ -2,7 +2,9 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
+import xarray
 
 from gfmd_cli import dataset
 from gfmd_cli.errors import InputError
@@ -75,6 +77,39 @@ def test_a_selection_can_be_sorted_and_grouped(data):
     assert (curve.diff("task") > 0).all()
     means = data.sel(n=[0, 1]).a_r.groupby("n").mean()
     assert means.sel(n=1) < means.sel(n=0)
+
+
+def selected(values, label, method=None):
+    from gfmd_cli.analysis.parameter_index import ParameterIndex
+
+    variable = ParameterIndex({"a": xarray.Variable("task", values)})
+    return variable.sel({"a": label}, method=method).dim_indexers["task"].tolist()
+
+
+def test_the_ends_of_a_range_are_compared_up_to_rounding():
+    loads = np.array([0.07, 0.7000000000000001, 0.8])
+    assert selected(loads, slice(None, 0.7)) == [0, 1]
+    assert selected(np.array([0.1, 0.7 - 1e-16]), slice(0.7, None)) == [1]
+
+
+def test_whole_numbers_are_compared_exactly():
+    seeds = np.array([1700000000, 1700000001, 1700000002])
+    assert selected(seeds, 1700000001) == [1]
+    assert selected(seeds, slice(1700000001, None)) == [1, 2]
+
+
+def test_blank_parameters_are_in_no_range_and_are_not_the_nearest():
+    assert selected(np.array([-1, 3, 7]), slice(None, 5)) == [1]
+    assert selected(np.array([-1, 3, 7]), 0, "nearest") == [1]
+    assert selected(np.array([np.nan, 3.0]), 0, "nearest") == [1]
+    assert selected(np.array([-1, 3]), -1) == [0]
+    with pytest.raises(KeyError):
+        selected(np.array([np.nan, np.nan]), 0, "nearest")
+
+
+def test_a_range_with_a_step_is_refused(data):
+    with pytest.raises(ValueError, match="has no step"):
+        data.sel(hurst=slice(0.1, 0.9, 2))
 
 
 def test_only_known_ways_of_selecting_are_accepted(data):

@@ -18,7 +18,8 @@ class ParameterIndex(xarray.Index):  # type: ignore[misc]
     """Index over all parameters together: `data.sel(hurst=0.8, n=[1, 2])` keeps the tasks that fit.
 
     A label is a value, a list of values or a slice with both ends included. With
-    `method="nearest"` a number stands for the nearest one that is there.
+    `method="nearest"` a number stands for the nearest one that is there. Floating-point numbers
+    are compared up to their rounding, also at the ends of a slice.
     """
 
     def __init__(self, variables: Mapping[Any, xarray.Variable]) -> None:
@@ -52,7 +53,10 @@ class ParameterIndex(xarray.Index):  # type: ignore[misc]
     def sel(self, labels: Labels, method: Any = None, tolerance: Any = None) -> IndexSelResult:
         """The tasks whose parameters are those given. Raises KeyError where there is none."""
         if method not in (None, "nearest") or tolerance is not None:
-            raise ValueError(f"method={method!r}, tolerance={tolerance!r}: only method='nearest'")
+            raise ValueError(
+                f"method={method!r}, tolerance={tolerance!r}: only method='nearest'; the "
+                "parameter of the same name is selected by sel({'tolerance': ...})"
+            )
         fits = [_fits(self.variables[n].values, label, method) for n, label in labels.items()]
         places = np.flatnonzero(np.logical_and.reduce(fits))
         if places.size == 0:
@@ -61,15 +65,26 @@ class ParameterIndex(xarray.Index):  # type: ignore[misc]
 
 
 def _fits(values: Any, label: Any, method: Literal["nearest"] | None) -> Mask:
-    """Which values are those of a label."""
+    """Which values are those of a label; blank ones neither lie in a range nor are nearest."""
+    blank = {"f": np.nan, "i": -1}.get(values.dtype.kind, "")  # as in `Column.blank`
+    given = (values != blank) & (values == values)
     if isinstance(label, slice):
-        low, high = (-np.inf if label.start is None else label.start), label.stop
-        return (values >= low) & (values <= (np.inf if high is None else high))
+        if label.step is not None:
+            raise ValueError(f"{label}: a range of parameters has no step")
+        if label.start is not None:
+            given &= (values >= label.start) | _equal(values, label.start)
+        if label.stop is not None:
+            given &= (values <= label.stop) | _equal(values, label.stop)
+        return given
+    if method == "nearest" and values.dtype.kind in "if" and given.any():
+        known, labels = values[given], np.atleast_1d(np.asarray(label))
+        label = known[np.abs(known - labels[:, np.newaxis]).argmin(axis=1)]
+    return _equal(values, label)
+
+
+def _equal(values: Any, label: Any) -> Mask:
+    """Which values are one of those of a label; floating-point numbers but for rounding."""
     labels = np.atleast_1d(np.asarray(label))
-    if values.dtype.kind not in "if":
+    if values.dtype.kind != "f":
         return np.isin(values, labels)
-    if method == "nearest":
-        distance = np.abs(values - labels[:, np.newaxis])
-        labels = values[np.nanargmin(distance, axis=1)]
-    close = np.isclose(values, labels[:, np.newaxis], rtol=ROUNDING, atol=0.0)
-    return close.any(axis=0)
+    return np.isclose(values, labels[:, np.newaxis], rtol=ROUNDING, atol=0.0).any(axis=0)

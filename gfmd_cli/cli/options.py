@@ -1,14 +1,12 @@
 """Options that several commands share."""
 
 from collections import Counter
-from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from gfmd_cli.errors import InputError
-from gfmd_cli.status import Status
 
 if TYPE_CHECKING:
     from gfmd_cli.spec.models import Spec
@@ -83,11 +81,6 @@ def study_path(spec: "Spec", output: Path | None) -> Path:
             "CSV, netCDF and VTK, gfmd report HTML"
         )
     return output or Path(f"{spec.study.name}.h5")
-
-
-def counted(counts: Mapping[Status, int]) -> str:
-    """The counts as text, such as "2 converged, 1 missing"."""
-    return ", ".join(f"{count} {what}" for what, count in sorted(counts.items()))
 
 
 def repeated(output: Path | None, overrides: tuple[str, ...]) -> list[str]:

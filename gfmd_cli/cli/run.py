@@ -13,14 +13,13 @@ from gfmd_cli.cli.options import (
     FILE,
     Command,
     Number,
-    counted,
     output_option,
     overrides_option,
     study_path,
 )
 from gfmd_cli.cli.progress import Reporter
 from gfmd_cli.errors import InputError, typed
-from gfmd_cli.status import Status
+from gfmd_cli.status import Status, counted
 from gfmd_cli.units import count
 
 if TYPE_CHECKING:

@@ -14,14 +14,13 @@ from gfmd_cli.cli.messages import print_error, print_text
 from gfmd_cli.cli.options import (
     FILE,
     Command,
-    counted,
     output_option,
     overrides_option,
     repeated,
     study_path,
 )
 from gfmd_cli.errors import InputError, typed
-from gfmd_cli.status import Status
+from gfmd_cli.status import Status, counted
 from gfmd_cli.units import count, duration
 
 if TYPE_CHECKING:

@@ -9,9 +9,12 @@ from gfmd_cli.errors import INSTALL, InputError
 from gfmd_cli.files.atomic import new_file
 from gfmd_cli.files.hdf5 import new_hdf5, write_scale
 from gfmd_cli.maps.array_coordinates import UNIT_NAMES
-from gfmd_cli.maps.height_map import check_layout, check_type, first_line
+from gfmd_cli.maps.height_map import CODING, LIMITS, MARKS, check_layout, check_type, first_line
 from gfmd_cli.maps.microscope_files import heights_and_sides
 from gfmd_cli.maps.topography import AXES
+
+READ = *UNIT_NAMES, *MARKS, *LIMITS, *CODING
+"""Attributes of an array of xarray that the reader of netCDF files understands."""
 
 
 def write_heights(path: Path, heights: Any) -> dict[str, Any]:
@@ -33,16 +36,24 @@ def write_heights(path: Path, heights: Any) -> dict[str, Any]:
     sides: tuple[float, ...] = ()
     if hasattr(heights, "physical_sizes"):
         keys["periodic"] = bool(heights.is_periodic)
-        if heights.unit is not None:
-            unit = "m"
-            heights = heights.to_unit(unit)
-        heights, sides = heights_and_sides(Path("heights"), heights, rows_along_y=False)
-    if np.ma.is_masked(heights):
-        keys["missing"] = "void"
+        unit = "" if heights.unit is None else "m"
+        try:
+            scan = heights.to_unit(unit) if unit else heights
+            heights, sides = heights_and_sides(Path("heights"), scan, rows_along_y=False)
+        except ValueError as error:  # the unit is unknown, or not one of lengths
+            raise InputError(f"heights: {first_line(error)}") from error
+    for name in UNIT_NAMES:  # a quantity of pint or astropy, whose unit NumPy drops
+        if hasattr(heights, name):
+            raise InputError(
+                f"heights: an array with the unit {getattr(heights, name)}; give plain numbers, "
+                "in metres unless surface.scale states the unit"
+            )
     try:
         values = np.ma.asarray(heights)
     except ValueError as error:
         raise InputError(f"heights: rows of different lengths ({error})") from error
+    if np.ma.is_masked(values):
+        keys["missing"] = "void"
     check_layout(Path("heights"), values.shape, values.dtype)
     with new_file(path) as fresh, new_hdf5(fresh) as file:
         data = file.create_dataset("heights", data=np.ma.filled(values.astype(float), np.nan))
@@ -63,7 +74,7 @@ def _write_netcdf(path: Path, array: Any) -> None:
     try:
         bare = array.astype(np.float64).reset_coords(drop=True).drop_encoding().rename("heights")
         for each in (bare, *bare.coords.values()):
-            each.attrs = {name: unit for name, unit in each.attrs.items() if name in UNIT_NAMES}
+            each.attrs = {name: each.attrs[name] for name in READ if name in each.attrs}
         bare.to_netcdf(path, engine="h5netcdf")
     except ImportError as error:
         raise InputError(f"heights: {first_line(error)}; {INSTALL.format('export')}") from error

@@ -21,6 +21,10 @@ from gfmd_cli.units import count, left_out
 MAX_MAP_BYTES = 2**33  # 32768 x 32768 heights in double precision
 MAX_HEIGHT = 1e30  # in any unit; the usual values for no data are 9.97e36 (netCDF) and 3.4e38
 HEIGHT_NAMES = "h", "height", "heights", "height_map", "z", "topography", "topo", "elevation"
+MARKS = "_FillValue", "missing_value"
+"""Attributes of netCDF whose values are missing heights."""
+CODING = {"scale_factor": 1, "add_offset": 0}
+"""Attributes of packed numbers, with the values that change nothing."""
 LIMITS: dict[str, list[np.ufunc]] = {
     "valid_min": [np.less],
     "valid_max": [np.greater],
@@ -107,8 +111,7 @@ def read_hdf5(path: Path, dataset: str | None) -> HeightMap:
         shape = _map_shape(file[name].shape or ())
         check_layout(path, shape, file[name].dtype)
         data = take(file, name, MAX_COMPRESSION)
-        neutral = {"scale_factor": 1, "add_offset": 0}
-        packed = {key for key in neutral.keys() & data.attrs if data.attrs[key] != neutral[key]}
+        packed = {key for key in CODING.keys() & data.attrs if data.attrs[key] != CODING[key]}
         if packed:
             raise InputError(
                 f"{path}: dataset {name!r} is packed ({', '.join(sorted(packed))}); "
@@ -117,7 +120,7 @@ def read_hdf5(path: Path, dataset: str | None) -> HeightMap:
         values = np.ma.asarray(data[()]).reshape(shape)
         if "MATLAB_class" in data.attrs:  # columns first; MATLAB plots rows along y
             values = values.T
-        for mark in {"_FillValue", "missing_value"} & set(data.attrs):
+        for mark in set(MARKS) & set(data.attrs):
             missing = np.asarray(data.attrs[mark])
             if missing.dtype.kind == values.dtype.kind == "f":  # perhaps of another precision
                 missing = missing.astype(values.dtype)
