@@ -107,6 +107,27 @@ def test_the_highest_point_of_a_random_surface(hurst):
         assert surface.peak() == pytest.approx(highest, rel=2e-3)
 
 
+@pytest.mark.parametrize(
+    "keys",
+    [
+        {"cutoff": 0.02, "rolloff": 0.02, "hurst": 0.3, "seed": 103466},
+        {"cutoff": 0.02, "rolloff": 0.02, "hurst": 0.3, "seed": 43050},
+        {"cutoff": 0.05, "rolloff": 0.1, "hurst": 0.05, "seed": 675385, "length_y": 2.0},
+        {"cutoff": 0.1, "rolloff": 0.1, "hurst": 0.05, "seed": 169784, "length_y": 0.3},
+    ],
+    ids=lambda keys: f"seed {keys['seed']}",
+)
+def test_the_highest_peak_can_lie_between_low_grid_points(keys):
+    """Short waves alone: on two points per wave many other points are higher than those next to it.
+
+    In the last case square pixels have only two points per wave along y.
+    """
+    surface = SelfAffine(**keys)
+    highest = surface.heights(16 * surface.smallest_grid()).max()
+    assert highest <= surface.peak() * (1 + 1e-12)
+    assert surface.peak() == pytest.approx(highest, rel=1e-2)
+
+
 @pytest.mark.parametrize("points", [64, 65])
 def test_a_cone_is_pressed_from_its_tip_on_every_grid(rows_of, points):
     """p L^2 = 2 E* d^2 / (pi s) (Sneddon 1965); the tip lies between points if they are odd."""
