@@ -115,6 +115,16 @@ def test_analyze_tells_the_columns_in_a_table_and_in_records(output_of, study):
         assert {name: record[name] for name in COLUMNS} == expected
 
 
+def test_patches_of_a_line_are_lengths(output_of, tmp_path):
+    line = "surface={kind='wave', amplitude=1e-8, length=2e-6}"
+    study = study_of(output_of, tmp_path, line, "output={patches=true}", "elastomer.n=1")
+    text = output_of("analyze", study)
+    assert "/ L " in text
+    assert "[m]" in text
+    assert "L^2 " not in text.partition("\n\n")[2].partition("Observables")[2].partition("\n\n")[2]
+    assert "[m^2]" not in text
+
+
 def test_nothing_is_there_that_was_not_asked_for(output_of, tmp_path):
     plain = study_of(output_of, tmp_path)
     with h5py.File(plain) as file:
