@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
+from scipy.ndimage import gaussian_filter
 from scipy.special import gamma
 
+from gfmd_cli import solve
 from gfmd_cli.physics.elastomers import Layer
 from gfmd_cli.physics.highest_point import highest_point
 from gfmd_cli.physics.self_affine import SelfAffine
@@ -126,6 +128,20 @@ def test_the_highest_peak_can_lie_between_low_grid_points(keys):
     highest = surface.heights(16 * surface.smallest_grid()).max()
     assert highest <= surface.peak() * (1 + 1e-12)
     assert surface.peak() == pytest.approx(highest, rel=1e-2)
+
+
+def test_a_map_with_borders_is_pressed_from_between_its_points():
+    """One displacement on its own points and on finer ones, where the series is higher."""
+    heights = 1e-8 * gaussian_filter(np.random.default_rng(1).normal(size=(40, 40)), 1.5)
+    spec = {
+        "surface": {"length": 1e-5, "periodic": False},
+        "elastomer": {"kind": "half-space", "E_star": 1e9},
+        "load": {"pressure": 1e4},
+    }
+    coarse, fine = (solve(spec | {"grid": {"points": n}}, heights=heights) for n in (40, 160))
+    displacement = fine.columns["displacement"]
+    assert fine.height.max() - coarse.height.max() > 0.1 * displacement
+    assert coarse.columns["displacement"] == pytest.approx(displacement, rel=1e-2)
 
 
 @pytest.mark.parametrize("points", [64, 65])
