@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
+from scipy.ndimage import gaussian_filter
 from scipy.special import gamma
 
+from gfmd_cli import solve
 from gfmd_cli.physics.elastomers import Layer
 from gfmd_cli.physics.highest_point import highest_point
 from gfmd_cli.physics.self_affine import SelfAffine
@@ -105,6 +107,41 @@ def test_the_highest_point_of_a_random_surface(hurst):
         highest = surface.heights(640).max()
         assert highest <= surface.peak() * (1 + 1e-12)
         assert surface.peak() == pytest.approx(highest, rel=2e-3)
+
+
+@pytest.mark.parametrize(
+    "keys",
+    [
+        {"cutoff": 0.02, "rolloff": 0.02, "hurst": 0.3, "seed": 103466},
+        {"cutoff": 0.02, "rolloff": 0.02, "hurst": 0.3, "seed": 43050},
+        {"cutoff": 0.05, "rolloff": 0.1, "hurst": 0.05, "seed": 675385, "length_y": 2.0},
+        {"cutoff": 0.1, "rolloff": 0.1, "hurst": 0.05, "seed": 169784, "length_y": 0.3},
+    ],
+    ids=lambda keys: f"seed {keys['seed']}",
+)
+def test_the_highest_peak_can_lie_between_low_grid_points(keys):
+    """Short waves alone: on two points per wave many other points are higher than those next to it.
+
+    In the last case square pixels have only two points per wave along y.
+    """
+    surface = SelfAffine(**keys)
+    highest = surface.heights(16 * surface.smallest_grid()).max()
+    assert highest <= surface.peak() * (1 + 1e-12)
+    assert surface.peak() == pytest.approx(highest, rel=1e-2)
+
+
+def test_a_map_with_borders_is_pressed_from_between_its_points():
+    """One displacement on its own points and on finer ones, where the series is higher."""
+    heights = 1e-8 * gaussian_filter(np.random.default_rng(1).normal(size=(40, 40)), 1.5)
+    spec = {
+        "surface": {"length": 1e-5, "periodic": False},
+        "elastomer": {"kind": "half-space", "E_star": 1e9},
+        "load": {"pressure": 1e4},
+    }
+    coarse, fine = (solve(spec | {"grid": {"points": n}}, heights=heights) for n in (40, 160))
+    displacement = fine.columns["displacement"]
+    assert fine.height.max() - coarse.height.max() > 0.1 * displacement
+    assert coarse.columns["displacement"] == pytest.approx(displacement, rel=1e-2)
 
 
 @pytest.mark.parametrize("points", [64, 65])

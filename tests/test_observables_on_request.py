@@ -64,8 +64,8 @@ def test_patches_make_up_the_contact_area(study):
         assert row["pr_patch_area"] @ np.diff(AREA_EDGES) == pytest.approx(1, rel=1e-12)
 
 
-@pytest.mark.parametrize(("p_star", "beyond"), [(0.1, 0), (50, 1)])
-def test_patches_larger_than_the_bins_are_counted_beside_them(p_star, beyond):
+@pytest.mark.parametrize("p_star", [0.1, 50])
+def test_patches_larger_than_the_bins_are_counted_in_the_last_one(p_star):
     row = solve({
         "surface": {"kind": "self-affine", "cutoff": 0.2, "length_y": 2.0},
         "elastomer": {"kind": "power", "n": 1},
@@ -73,9 +73,8 @@ def test_patches_larger_than_the_bins_are_counted_beside_them(p_star, beyond):
         "load": {"p_star": p_star},
         "output": {"patches": True},
     }).columns  # fmt: skip
-    assert row["pr_patch_beyond"] == beyond
-    share = row["pr_patch_area"] @ np.diff(AREA_EDGES)
-    assert share + row["pr_patch_beyond"] == pytest.approx(1, rel=1e-12)
+    assert row["pr_patch_area"] @ np.diff(AREA_EDGES) == pytest.approx(1, rel=1e-12)
+    assert (row["pr_patch_area"][-1] > 0) == (row["patch_area_largest"] == 2) == (p_star == 50)
 
 
 def test_full_contact_is_one_rigid_patch_that_seals(study):
@@ -128,6 +127,16 @@ def test_analyze_tells_the_columns_in_a_table_and_in_records(output_of, study):
     for record, row in zip(records, read_rows(study), strict=True):
         expected = {name: row[name] if np.isfinite(row[name]) else None for name in COLUMNS}
         assert {name: record[name] for name in COLUMNS} == expected
+
+
+def test_patches_of_a_line_are_lengths(output_of, tmp_path):
+    line = "surface={kind='wave', amplitude=1e-8, length=2e-6}"
+    study = study_of(output_of, tmp_path, line, "output={patches=true}", "elastomer.n=1")
+    text = output_of("analyze", study)
+    assert "/ L " in text
+    assert "[m]" in text
+    assert "L^2 " not in text.partition("\n\n")[2].partition("Observables")[2].partition("\n\n")[2]
+    assert "[m^2]" not in text
 
 
 def test_nothing_is_there_that_was_not_asked_for(output_of, tmp_path):
@@ -247,4 +256,4 @@ def test_without_contact_there_is_no_area_of_a_patch():
     output = OutputTable(patches=True, histogram=False)
     row = on_request(output, SolvedContact(contact, u, np.zeros_like(u)))
     assert row.pop("pr_patch_area").sum() == 0
-    assert row == {"patches": 0, "pr_patch_beyond": 0}
+    assert row == {"patches": 0}

@@ -160,3 +160,10 @@ def test_the_distribution_of_areas_is_normalised():
     density = area_distribution(shares)
     assert np.sum(density * np.diff(AREA_EDGES)) == pytest.approx(1, rel=1e-14)
     assert not area_distribution(np.empty(0)).any()
+
+
+def test_the_last_bin_counts_patches_larger_than_the_square_of_the_side():
+    """Of a cell that is longer along y, and of full contact, whose area is rounded."""
+    for areas in ([3.5], [1 + 2**-52], [3.5, 0.9]):
+        density = area_distribution(np.array(areas))
+        assert density[-1] * np.diff(AREA_EDGES)[-1] == pytest.approx(1, rel=1e-14)

@@ -74,6 +74,17 @@ def test_without_contact_there_is_none():
     assert np.isnan(stress.quadrature)
 
 
+@pytest.mark.parametrize("count", [1, 9, 10])
+def test_few_points_have_no_deviation(count):
+    """Over one point it is zero, for which the theory gives full contact at any load."""
+    contact = rough(1)
+    touching = np.full(contact.grid.shape, False)
+    touching.flat[:count] = True
+    stress = contact_stress(contact, touching)
+    assert np.isnan(stress.deviation) == (count < 10)
+    assert stress.quadrature > 0
+
+
 def test_a_paraboloid_on_a_half_space_has_the_quadrature_of_the_paper():
     """Eq. (21) at n = 1: k a / (sqrt(2) R); 0.833 against Persson's 0.798 by Eq. (19)."""
     scene = build_scene(Parabola(radius=R), Power(n=1), POINTS)

@@ -44,6 +44,17 @@ def test_a_random_surface_is_isotropic_up_to_two_points_per_wave(cutoff):
     assert texture(Grid(32), surface.heights(32)).anisotropy == pytest.approx(1.0, abs=0.1)
 
 
+@pytest.mark.parametrize("length_y", [0.2135, 0.333, 0.9630815953297361, 1.9])
+def test_mirrored_fields_have_the_same_anisotropy_on_oblong_cells(length_y):
+    """The highest wave along y has both signs of q_y, whichever of them the transform stores."""
+    draw = np.random.default_rng(0)
+    for points, points_y in ((27, 14), (16, 36), (28, 26), (8, 30)):
+        field = draw.normal(size=(points_y, points))
+        grid = Grid(points, points_y=points_y, length_y=length_y)
+        one, other = (texture(grid, f).anisotropy for f in (field, field[:, ::-1].copy()))
+        assert other == pytest.approx(one, rel=1e-12)
+
+
 def test_a_side_is_a_length():
     """Waves of one length in a cell twice as long along y."""
     grid = Grid(32, length=1.0, points_y=64, length_y=2.0)

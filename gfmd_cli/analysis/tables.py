@@ -1,8 +1,9 @@
 """The tables of a study: their columns, and the records that fill them."""
 
 from collections import Counter
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
+from typing import Any
 
 from gfmd_cli.analysis.compare import (
     VARIANTS,
@@ -20,6 +21,7 @@ from gfmd_cli.analysis.table import (
     Record,
     Table,
     TableColumn,
+    Value,
     groups_of,
     known,
     product,
@@ -132,6 +134,12 @@ POWER_LAWS_CAPTION = (
 def _columns_of(observable: Observable) -> list[TableColumn]:
     """An observable in reduced and in SI units; the columns that no task has are left out."""
     heading, name, unit = observable.heading, observable.column.name, observable.unit
+    if unit is not None and observable.line_unit is not None:
+        return [
+            replace(column, value=_of_dimension(dimension, column.value))
+            for dimension, of_it in ((2, unit), (1, observable.line_unit))
+            for column in _columns_of(observable._replace(unit=of_it, line_unit=None))
+        ]
     if observable.is_flag:
         return [TableColumn(heading, lambda r: {0: False, 1: True}.get(r[name]), optional=True)]
     number_format = "d" if observable.column.kind is int else TableColumn.format
@@ -141,6 +149,17 @@ def _columns_of(observable: Observable) -> list[TableColumn]:
         TableColumn(f"{heading}\n/ {unit.symbol}", name, number_format, optional=True),
         TableColumn(f"{heading}\n", lambda r: r[name] * unit.value(r), unit=unit.si, optional=True),
     ]
+
+
+def _of_dimension(dimension: int, value: Value) -> Callable[[Record], Any]:
+    """A value of the contacts of one dimension; None of the others."""
+
+    def of_record(record: Record) -> Any:
+        if record["dimension"] != dimension:
+            return None
+        return record[value] if isinstance(value, str) else value(record)
+
+    return of_record
 
 
 IN_TABLE = tuple(observable for observable in OBSERVABLES if observable.heading)

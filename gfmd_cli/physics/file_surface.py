@@ -250,7 +250,7 @@ class FileSurface(RigidSurface):
         """Height of the highest point [m]: of the map, or of the Fourier series through it."""
         if self.missing == "void" and self._topography().holes:
             return None
-        if self._is_reflected() or not self.band_limited:
+        if not self.band_limited:
             return float(_prepared(self).max())
         return _peak(self)
 
@@ -406,7 +406,8 @@ def _prepared(surface: FileSurface) -> Field:
 @lru_cache(maxsize=16)
 def _peak(surface: FileSurface) -> float:
     """Highest point of a Fourier series [m]; cached like the file."""
-    return highest_point(_prepared(surface))
+    heights = _prepared(surface)
+    return highest_point(mirror(heights) if surface._is_reflected() else heights)
 
 
 @lru_cache(maxsize=16)

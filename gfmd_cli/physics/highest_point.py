@@ -1,11 +1,15 @@
 """The highest point of a surface that is a Fourier series, which lies between grid points."""
 
+from itertools import product
+
 import numpy as np
 from scipy.optimize import minimize
 
 from gfmd_cli.grid.arrays import Field
 
-CANDIDATES = 8  # grid points from which a maximum is sought: the highest of different peaks
+CANDIDATES = 8  # points from which a maximum is sought: the highest of different peaks
+SUBDIVISION = 4  # of the spacing along each axis for these points: with two grid points per wave,
+# the grid points next to the highest peak can be lower than those of many others
 
 
 def highest_point(heights: Field) -> float:
@@ -17,9 +21,18 @@ def highest_point(heights: Field) -> float:
     """
     whole = heights.reshape(-1, heights.shape[-1])
     count_y, count_x = whole.shape
-    modes = np.fft.rfft2(whole) / whole.size
-    modes[:, 1 : (count_x + 1) // 2] *= 2.0  # with their opposites
+    modes = np.fft.rfft2(whole)
     k_y, k_x = 2j * np.pi * np.fft.fftfreq(count_y), 2j * np.pi * np.fft.rfftfreq(count_x)
+    best = float(whole.max())
+    scale = float(np.ptp(whole)) or 1.0  # the tolerances of the search are absolute
+    modes /= scale
+    highest = []
+    parts = np.arange(SUBDIVISION) / SUBDIVISION
+    for y, x in product(parts if count_y > 1 else [0.0], parts):
+        moved = np.fft.irfft2(modes * np.exp(k_y * y)[:, None] * np.exp(k_x * x), whole.shape)
+        highest += _highest(moved, (y, x))
+    modes /= whole.size
+    modes[:, 1 : (count_x + 1) // 2] *= 2.0  # with their opposites
 
     def depth(place: Field) -> tuple[float, Field]:
         """-h and its gradient; places and slopes are in points."""
@@ -28,23 +41,28 @@ def highest_point(heights: Field) -> float:
         slopes = (k_y * e_y) @ along_x, e_y @ (modes @ (k_x * e_x))
         return -float((e_y @ along_x).real), -np.real(slopes)
 
-    best = float(whole.max())
-    scale = float(np.ptp(whole)) or 1.0  # the tolerances of the search are absolute
-    modes /= scale
-    for place in _peaks(whole):
+    for place in _peaks(highest):
         bounds = [(x - 1.0, x + 1.0) for x in place]
         found = minimize(depth, place, jac=True, method="L-BFGS-B", bounds=bounds)
         best = max(best, -scale * float(found.fun))
     return best
 
 
-def _peaks(heights: Field) -> list[tuple[int, ...]]:
-    """The highest grid points, none the neighbour of a higher one."""
+def _highest(heights: Field, shift: tuple[float, float]) -> list[tuple[float, float, float]]:
+    """The highest points of a grid that is shifted: their heights and places in points."""
     count = min(16 * CANDIDATES, heights.size)
-    highest = np.argpartition(heights.ravel(), -count)[-count:]
-    ordered = highest[np.argsort(heights.ravel()[highest])[::-1]]
-    chosen: list[tuple[int, ...]] = []
-    for place in zip(*np.unravel_index(ordered, heights.shape), strict=True):
-        if all(max(abs(a - b) for a, b in zip(place, other, strict=True)) > 1 for other in chosen):
-            chosen.append(tuple(map(int, place)))
-    return chosen[:CANDIDATES]
+    points = np.argpartition(heights.ravel(), -count)[-count:]
+    places = np.unravel_index(points, heights.shape)
+    along_y, along_x = (place + by for place, by in zip(places, shift, strict=True))
+    return list(zip(heights.ravel()[points].tolist(), along_y, along_x, strict=True))
+
+
+def _peaks(highest: list[tuple[float, float, float]]) -> list[tuple[float, float]]:
+    """The highest places, none within a point of a higher one."""
+    chosen: list[tuple[float, float]] = []
+    for _, y, x in sorted(highest, reverse=True):
+        if all(max(abs(y - a), abs(x - b)) > 1 for a, b in chosen):
+            chosen.append((y, x))
+        if len(chosen) == CANDIDATES:
+            break
+    return chosen

@@ -143,7 +143,7 @@ class RigidSurface(SpecTable):
         """Height of the highest point [m], between grid points too; None where it is unknown."""
         if not self.band_limited:
             return None
-        return _highest_point(self, self.smallest_grid() + 2)  # more than two points per wave
+        return _highest_point(self)
 
     def tapered_map(self) -> "RigidSurface | None":
         """A map that is not periodic, tapered for its spectrum; None for other surfaces."""
@@ -163,9 +163,11 @@ class RigidSurface(SpecTable):
 
 
 @lru_cache(maxsize=16)
-def _highest_point(surface: RigidSurface, points: int) -> float:
+def _highest_point(surface: RigidSurface) -> float:
     """Cached: all contacts of a surface have the same."""
-    return highest_point(surface.heights(points))
+    points_y = surface.smallest_grid_y() + 2 if surface.dimension == 2 else 1
+    # more than two points per wave along both axes
+    return highest_point(surface.heights(surface.smallest_grid() + 2, points_y))
 
 
 def forget_peaks() -> None:

@@ -24,7 +24,9 @@ from gfmd_cli.grid.arrays import Field, Mask
 Integers = NDArray[np.signedinteger[Any]]
 """Integers: labels, counts, displacements in cells with one number per axis."""
 AREA_EDGES = np.logspace(-11.0, 0.0, 111)
-"""Edges of the bins of patch areas [L^2, or L in a line contact]: ten per decade to 1."""
+"""Edges of the bins of patch areas [L^2, or L in a line contact]: ten per decade to 1.
+
+The last bin has the larger patches, too: on a cell that is longer along y."""
 
 
 @dataclass(frozen=True)
@@ -120,5 +122,5 @@ class _Tree:
 
 def area_distribution(areas: Field) -> Field:
     """Pr(A): fraction of the patches per area in the bins of `AREA_EDGES`; zero without any."""
-    counts = np.histogram(areas, AREA_EDGES)[0]
+    counts = np.histogram(np.minimum(areas, AREA_EDGES[-1]), AREA_EDGES)[0]
     return counts / (max(areas.size, 1) * np.diff(AREA_EDGES))

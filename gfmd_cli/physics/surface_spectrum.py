@@ -20,6 +20,7 @@ BANDS_PER_DECADE = 10  # a choice
 class Spectrum:
     """C(q) = A <|h(q)|^2>: the mean over the modes of a band, times the area of the cell.
 
+    Modes that the surface lacks are left out: of equal tiles, C(q) is too large by their number.
     In a line contact, the length of the cell takes the place of its area A.
     """
 
@@ -28,7 +29,7 @@ class Spectrum:
     density: Field
     """C(q) [m^4], of a line contact [m^3]."""
     modes: Field
-    """Number of modes of each band."""
+    """Number of modes of each band that the surface has."""
     fitted: Field
     """C(q) of the fit in the bands, zero beyond its cut-off and without a fit."""
     fit: SelfAffineFit | None

@@ -28,7 +28,7 @@ class ContactStress:
     """Moments of the stress of full contact over the true contact [Delta_sigma]."""
 
     deviation: float
-    """Standard deviation of s = K h; NaN without contact."""
+    """Standard deviation of s = K h; NaN with fewer than `MIN_POINTS` points in contact."""
     quadrature: float
     """Root mean square of w; NaN without contact."""
 
@@ -39,7 +39,8 @@ def contact_stress(contact: Contact, touching: Mask) -> ContactStress:
         return ContactStress(np.nan, np.nan)
     grid, square = contact.grid, 0.0
     field = contact.elasticity(contact.height, grid.empty())
-    deviation = float(field[touching].std())
+    known = np.count_nonzero(touching) >= MIN_POINTS
+    deviation = float(field[touching].std()) if known else np.nan
     for axis in range(grid.dimension):  # the components of w
         modes = grid.forward_into_work(contact.height)
         for rows in row_blocks(modes):

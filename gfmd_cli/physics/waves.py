@@ -105,8 +105,9 @@ def _anisotropy(grid: Grid, modes: Modes) -> float:
     for rows in row_blocks(modes, max(modes.size // 16, BLOCK_POINTS)):
         y = grid.mode_number_y(rows)[:, None]
         power = weight * np.abs(modes[rows]) ** 2
+        mixed = x * y
         # the waves with the highest q_y of an even number of points have both signs of q_y
-        mixed = np.where(np.abs(y) * grid.length_y < 0.5 * grid.points_y * grid.length, x * y, 0.0)
+        mixed[2 * np.arange(grid.points_y)[rows] == grid.points_y] = 0.0
         sums += [float(np.sum(power * term)) for term in (x * x, y * y, mixed)]
     xx, yy, xy = grid.total(sums)
     middle, half = 0.5 * (xx + yy), sqrt((0.5 * (xx - yy)) ** 2 + xy**2)

@@ -136,7 +136,11 @@ class HistogramColumn(NamedTuple):
 PR_LINEAR, PR_LOGARITHMIC = "pr_sigma", "pr_sigma_log"
 _STRESS = ("middle of the stress bin / Delta_sigma", "Pr(sigma) Delta_sigma")
 _GAP = ("middle of the gap bin / h_std", "Pr(g) h_std")
-_AREA = ("middle of the area bin / L^2; for a line contact, / L", "Pr(A) L^2, by number of patches")
+_AREA = (
+    "middle of the area bin / L^2; for a line contact, / L",
+    "Pr(A) L^2, for a line contact Pr(A) L, by number of patches; larger patches are in the last "
+    "bin",
+)
 HISTOGRAMS = (
     HistogramColumn("histogram", PR_LINEAR, "sigma", *_STRESS, LINEAR_EDGES, logarithmic=False),
     HistogramColumn("histogram", PR_LOGARITHMIC, "sigma_log", *_STRESS, LOGARITHMIC_EDGES),
@@ -158,11 +162,8 @@ WEIGHTS = {
         Column("pr_gap_beyond", "fraction of points beyond the linear bins of Pr(g)"),
         Column("pr_gap_below", "fraction of points below the logarithmic bins"),
     ),
-    "patches": (
-        Column("pr_patch_beyond", "fraction of patches larger than L^2, beyond the bins of Pr(A)"),
-    ),
 }
-"""Fractions of points or patches in no bin, by the key of [output] that turns the histogram on."""
+"""Fractions of points in no bin, by the key of [output] that turns the histogram on."""
 WEIGHT_COLUMNS = tuple(column for columns in WEIGHTS.values() for column in columns)
 ROW_COLUMNS = (*COLUMNS, *WEIGHT_COLUMNS)
 """All columns with one value a task."""

@@ -16,7 +16,7 @@ from gfmd_cli.physics.approach import approach
 from gfmd_cli.physics.free_contact import doubled_grid
 from gfmd_cli.physics.indenters import RigidSurface
 from gfmd_cli.physics.observables import changed_fractions, gap_histogram, stress_histogram
-from gfmd_cli.physics.patches import AREA_EDGES, area_distribution
+from gfmd_cli.physics.patches import area_distribution
 from gfmd_cli.physics.power_spectra import autocorrelations, spectra
 from gfmd_cli.physics.surface_spectrum import Spectrum, map_spectrum
 from gfmd_cli.spec.models import SWEPT, OutputTable
@@ -169,9 +169,7 @@ def on_request(output: OutputTable, solved: SolvedContact) -> Row:
         if getattr(output, option) and (value := measure(solved)) is not None:
             row[column.name] = column.kind(value)
     if output.patches:
-        areas = solved.patch_areas
-        beyond = np.count_nonzero(areas > AREA_EDGES[-1]) / max(areas.size, 1)
-        row |= {"pr_patch_area": area_distribution(areas), "pr_patch_beyond": beyond}
+        row["pr_patch_area"] = area_distribution(solved.patch_areas)
     return row
 
 

@@ -79,11 +79,14 @@ class Observable(NamedTuple):
     """Short heading in tables; empty if a table of its own shows it."""
     unit: ReducedUnit | None = None
     """Its unit; None for a pure number. Tables then have a second column in SI units."""
+    line_unit: ReducedUnit | None = None
+    """Its unit in a line contact, where that is another one."""
     is_flag: bool = False
     """Whether the values 0 and 1 mean no and yes."""
 
 
-PATCH_AREA = ReducedUnit("L^2", "m^2", lambda row: float(row["length"] ** row["dimension"]))
+PATCH_AREA = ReducedUnit("L^2", "m^2", lambda row: float(row["length"] ** 2))
+PATCH_LENGTH = ReducedUnit("L", "m", lambda row: float(row["length"]))
 STIFFNESS = ReducedUnit(
     "(Delta_sigma / h_std)", "Pa/m", lambda row: float(row["delta_sigma"] / row["h_std"])
 )
@@ -93,7 +96,8 @@ OBSERVABLES = (
         "true_contact",
         Column(
             "deviation_c",
-            "standard deviation of the full-contact stress K h over the true contact / Delta_sigma",
+            "standard deviation of the full-contact stress K h over the true contact / "
+            "Delta_sigma; NaN with fewer than 10 points in contact",
         ),
         lambda solved: solved.full_contact_stress.deviation,
     ),
@@ -123,6 +127,7 @@ OBSERVABLES = (
         lambda solved: solved.patch_areas.mean() if solved.patch_areas.size else None,
         "mean patch",
         PATCH_AREA,
+        PATCH_LENGTH,
     ),
     Observable(
         "patches",
@@ -130,6 +135,7 @@ OBSERVABLES = (
         lambda solved: solved.patch_areas.max() if solved.patch_areas.size else None,
         "largest patch",
         PATCH_AREA,
+        PATCH_LENGTH,
     ),
     Observable(
         "stiffness",
