@@ -95,7 +95,7 @@ def _has_default_side(surface: RigidSurface) -> bool:
 
 def _load_in_jump(task: Task, status: Status, results: Mapping[str, Any]) -> Iterator[str]:
     """A warning if a contact area is farther than the tolerance from the load."""
-    if task.quantity == "contact_area" and status != Status.LOAD_NOT_REACHED:
+    if task.quantity == "contact_area" and status in (Status.CONVERGED, Status.ROUNDING):
         value = loaded_value(task.quantity, results)
         if not abs(value - task.load) <= task.load_tolerance * task.load:
             nearest = f"the nearest value is {value:g}"
