@@ -21,6 +21,7 @@ from gfmd_cli.physics.highest_point import highest_point
 from gfmd_cli.spec_table import Positive, SpecTable
 
 SMALLEST_GRID = 8  # points along an axis; a choice: smaller grids resolve no contact
+MAX_POINTS = 2**17  # along an axis; upper limit, guards against typing errors
 MAX_ASPECT_RATIO = 1e9  # side along y over side along x; a choice: no grid has so many points
 POINTS_ROUNDING = 1e-9  # of a number of points that follows from a ratio of sides
 
@@ -118,6 +119,10 @@ class RigidSurface(SpecTable):
     def resolution(self) -> str:
         """Reason for the smallest grid, as text for messages."""
         return f"kind {self.kind!r}"
+
+    def coarsening(self) -> str:
+        """What makes the smallest grid smaller, as text for messages."""
+        return "the side along y is surface.length_y"
 
     def preparation(self, boundary: str = "") -> str:
         """Description of how a map was read and prepared for a boundary; "" for other surfaces."""
