@@ -49,9 +49,11 @@ def test_a_single_indenter_has_no_height_to_compare_with():
     """Its rms height follows from the cell, and that of a punch from its depth."""
     layer = {"kind": "layer", "base": "sliding", "E_star": 1e6, "thickness": 2e-4}
     ball = {"kind": "parabola", "radius": 0.005, "length": 0.01}
-    result = solve(tables(ball, layer, p_star=0.01))
+    result = solve(tables(ball, layer, p_star=0.003))
     assert result.warnings == ()
     assert result.h_std > 2e-4
+    deep = {"kind": "punch", "radius": 2e-3, "length": 0.01, "depth": 1.0}
+    assert solve(tables(deep, HALF_SPACE, pressure=1e5)).warnings == ()
     punch = {"kind": "punch", "depth": 100.0}
     assert solve(tables(punch, {"kind": "half-space"}, pressure=1e-5)).warnings == ()
 
@@ -124,6 +126,43 @@ def test_few_points_in_contact():
     assert result.warnings[0] in str(result)
 
 
+@pytest.mark.parametrize(
+    ("surface", "pressure", "words"),
+    [
+        ({"kind": "parabola", "radius": 1e-3}, 1e8, "Set surface.length or surface.radius"),
+        ({"kind": "parabola", "radius": 5.0, "length": 10.0}, 1e8, "Set surface.length or"),
+        ({"kind": "parabola", "length": 1e-3}, 1e4, "surface.radius is not given: 1 m is assumed"),
+        ({"kind": "wave", "length": 1e-3}, 1e8, "Set surface.amplitude or surface.length"),
+        ({"kind": "cone", "slope": 10.0, "length": 1e-3}, 1e9, "slope of 10 .* surface.slope"),
+        ({"kind": "ridge", "slope": 10.0, "length": 1e-3}, 1e9, "slope of 10 .* surface.slope"),
+        ({"kind": "parabola", "radius": 1e-4, "length": 4e-3}, 1e9, "slope of .* surface.radius"),
+        ({"kind": "parabola", "radius": 1.0, "length": 0.5}, 3e6, "^$"),  # a wheel
+        ({"kind": "parabola", "radius": 5e-3, "length": 0.04}, 3e7, "^$"),
+        ({"kind": "cone", "slope": 0.5, "length": 1e-3}, 3e7, "^$"),
+    ],
+)
+def test_a_single_indenter_in_other_units_than_its_modulus(surface, pressure, words):
+    warnings = solve(tables(surface, pressure=pressure)).warnings
+    others = ("fewer than 30", "reaches the border")
+    found = [each for each in warnings if not any(other in each for other in others)]
+    assert re.search(words, " ".join(found))
+    reduced = solve(tables(surface, {"kind": "half-space"}, pressure=pressure / 2e9)).warnings
+    assert set(reduced) == set(warnings) - set(found)
+
+
+@pytest.mark.parametrize("surface", [SURFACE, {"kind": "parabola", "radius": 1e-3, "length": 1e-3}])
+@pytest.mark.parametrize("boundary", ["periodic", "free"])
+@pytest.mark.parametrize(("moved", "warned"), [(0.5, False), (1.5, True)])
+def test_a_layer_that_is_compressed_by_more_than_its_thickness(surface, boundary, moved, warned):
+    thickness = 10 * surface.get("h_std", 1e-6)
+    layer = {"kind": "layer", "base": "sliding", "E_star": 1e7, "thickness": thickness}
+    spec = tables(surface, layer, displacement=moved * thickness)
+    spec["grid"]["boundary"] = boundary
+    warnings = [each for each in solve(spec).warnings if "such compressions" in each]
+    assert bool(warnings) is warned
+    assert all("elastomer.thickness is" in each for each in warnings)
+
+
 def test_a_cutoff_above_the_rolloff():
     surface = SURFACE | {"cutoff": 0.5, "rolloff": 0.2}
     assert "cutoff = 0.5 is above surface.rolloff = 0.2" in only_warning(tables(surface))
@@ -148,7 +187,9 @@ def test_a_modulus_that_no_material_has(E_star, warned):
 
 def test_a_random_surface_in_metres_without_a_side():
     sideless = {key: value for key, value in SURFACE.items() if key != "length"}
-    assert "a side of 1 m is assumed" in only_warning(tables(sideless, p_star=0.1))
+    assert "surface.length is not given: 1 m is assumed" in only_warning(
+        tables(sideless, p_star=0.1)
+    )
     assert solve(tables(sideless | {"length": 1.0}, p_star=0.1)).warnings == ()
 
 

@@ -23,6 +23,7 @@ from gfmd_cli.spec_table import Positive, SpecTable
 SMALLEST_GRID = 8  # points along an axis; a choice: smaller grids resolve no contact
 MAX_POINTS = 2**17  # along an axis; upper limit, guards against typing errors
 MAX_ASPECT_RATIO = 1e9  # side along y over side along x; a choice: no grid has so many points
+SLOPE_STEP = 1e-3  # of a distance from the middle, over which a slope is taken
 POINTS_ROUNDING = 1e-9  # of a number of points that follows from a ratio of sides
 
 
@@ -201,6 +202,11 @@ class SingleIndenter(RigidSurface):
         """Height of the crest [m]."""
         return float(self._profile(np.zeros(1))[0])
 
+    def slope_at(self, r: float) -> float:
+        """Slope |dh/dr| at a distance r > 0 from the middle of the cell [m], by differences."""
+        inner, outer = self._profile(r * np.array([1 - SLOPE_STEP, 1 + SLOPE_STEP])).tolist()
+        return float(abs(outer - inner) / (2 * SLOPE_STEP * r))
+
     def _profile(self, r: Field) -> Field:
         """Heights [m] at distances r >= 0 from the middle of the cell [m]."""
         raise NotImplementedError
@@ -254,7 +260,7 @@ class Cone(RoundIndenter):
     tip_exponent: ClassVar[float] = 1.0
     kind: Literal["cone"] = "cone"
     slope: Positive = 1.0
-    """Slope of the flanks."""
+    """Slope of the flanks, the tangent of their angle to the plane."""
 
     def _profile(self, r: Field) -> Field:
         return -self.slope * r
@@ -296,7 +302,7 @@ class Ridge(LineIndenter):
     tip_exponent: ClassVar[float] = 1.0
     kind: Literal["ridge"] = "ridge"
     slope: Positive = 1.0
-    """Slope of the flanks."""
+    """Slope of the flanks, the tangent of their angle to the plane."""
     width: Annotated[float, Key(gt=0, le=1)] = 1.0
     """Width of the ridge at its foot / L; the rest of the cell is flat."""
 
