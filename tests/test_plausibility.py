@@ -8,6 +8,7 @@ import pytest
 
 from gfmd_cli import compare, rows, run, solve
 from gfmd_cli.analysis.export import as_records
+from gfmd_cli.errors import InputError
 from gfmd_cli.physics.file_surface import FileSurface
 from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.report.page import report
@@ -204,6 +205,22 @@ def test_a_fixed_grid_that_misses_the_requested_accuracy(accuracy, warned):
     warnings = solve(spec).warnings
     assert any("a_r" in each and '"auto"' in each for each in warnings) is warned
     assert len(warnings) == warned
+
+
+def test_an_accuracy_that_no_grid_meets():
+    spec = tables(elastomer={"kind": "power", "n": 3}) | {"accuracy": {"stress_deviation": 0.1}}
+    assert only_warning(spec) == (
+        "[accuracy] is met on no grid: sigma_p has no value in the continuum"
+    )
+    heights = solve(tables()).height.copy()
+    heights[3:6, 3:6] = np.nan
+    holes = {"length": SURFACE["length"], "missing": "void"}
+    spec = tables(holes) | {"accuracy": {"contact_area": 0.1}}
+    warning = '[accuracy]: no error of a_r is known with surface.missing = "void", on any grid'
+    assert warning in solve(spec, heights=heights).warnings
+    searched = spec | {"load": {"contact_area": 0.2}}
+    with pytest.raises(InputError, match="no continuum value is known with"):
+        solve(searched, heights=heights)
 
 
 @pytest.mark.parametrize("part", [{"region": {"x": [0, 24]}}, {"crop": True}])

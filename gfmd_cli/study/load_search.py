@@ -29,7 +29,13 @@ from gfmd_cli.study.forecast import FIRST
 from gfmd_cli.study.measure import measured
 from gfmd_cli.study.notes import Trial
 from gfmd_cli.study.plausibility import loaded_value
-from gfmd_cli.study.refinement import TaskSolution, solve_on_grids, task_scene
+from gfmd_cli.study.refinement import (
+    TaskSolution,
+    is_final,
+    solve_on_grids,
+    task_scene,
+    without_law,
+)
 from gfmd_cli.study.tasks import Task
 
 # Choices, which change the number of trials (one to three on a grid) and hardly the result:
@@ -107,12 +113,21 @@ def solve_at_load(task: Task, context: SolveContext, watcher: Watcher) -> TaskSo
 
 def _check_known(task: Task, solved: TaskSolution) -> None:
     """Raise InputError where [accuracy] asks for a continuum value that cannot be given."""
-    name = LOADS[task.quantity].searched
-    if name in solved.estimates and not isfinite(solved.estimates[name].continuum):
+    estimate = solved.estimates.get(LOADS[task.quantity].searched)
+    if estimate is None or isfinite(estimate.continuum):
+        return
+    case, remedy = without_law(task, solved.scene), "leave out [accuracy] for the value on the grid"
+    if case:
+        raise InputError(f"load.{task.quantity}: no continuum value is known {case}; {remedy}")
+    if is_final(estimate):
         raise InputError(
-            f"load.{task.quantity}: the continuum value is not known on a grid of {task.points} "
-            "points per side; give a finer grid, or leave out [accuracy] for the value on the grid"
+            f"load.{task.quantity}: {LOADS[task.quantity].words} {estimate.verdict.explanation}; "
+            f"{remedy}"
         )
+    raise InputError(
+        f"load.{task.quantity}: the continuum value is not known on a grid of {task.points} "
+        f"points per side; give a finer grid, or {remedy}"
+    )
 
 
 def _grids(task: Task) -> list[int]:

@@ -12,7 +12,13 @@ from gfmd_cli.physics.indenters import RigidSurface, SingleIndenter
 from gfmd_cli.physics.spectrum_fit import moments
 from gfmd_cli.spec.models import LOADS
 from gfmd_cli.status import Status
-from gfmd_cli.study.refinement import TaskSolution, border_share, inaccurate_columns
+from gfmd_cli.study.refinement import (
+    TaskSolution,
+    border_share,
+    inaccurate_columns,
+    is_final,
+    without_law,
+)
 from gfmd_cli.study.tasks import Task
 from gfmd_cli.units import LARGEST_RMS_HEIGHT
 
@@ -155,11 +161,18 @@ def _load_in_jump(task: Task, status: Status, results: Mapping[str, Any]) -> Ite
 
 
 def _missed_accuracy(task: Task, solved: TaskSolution) -> Iterator[str]:
-    """A warning if a fixed grid misses the requested accuracy; with "auto" that is a status."""
-    if not task.auto and (columns := inaccurate_columns(task, solved)):
+    """Warnings if a fixed grid misses the requested accuracy; with "auto" that is a status."""
+    columns = [] if task.auto else inaccurate_columns(task, solved)
+    if columns and (case := without_law(task, solved.scene)):
+        yield f"[accuracy]: no error of {', '.join(columns)} is known {case}, on any grid"
+        return
+    final = [name for name in columns if is_final(solved.estimates[name])]
+    for name in final:
+        yield f"[accuracy] is met on no grid: {name} {solved.estimates[name].verdict.explanation}"
+    if others := [name for name in columns if name not in final]:
         remedy = "more points" if LOADS[task.quantity].searched else 'grid.points = "auto"'
         yield (
-            f"the errors of {', '.join(columns)} are larger than [accuracy] requests, or unknown: "
+            f"the errors of {', '.join(others)} are larger than [accuracy] requests, or unknown: "
             f"use {remedy}"
         )
 

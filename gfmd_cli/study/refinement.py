@@ -197,7 +197,12 @@ def _continues(task: Task, solved: TaskSolution, grids: int, options: WorkerOpti
 def _is_improvable(estimate: Estimate, grids: int) -> bool:
     """Whether a grid finer than the `grids` so far may give a smaller error."""
     is_settled = estimate.verdict is Verdict.UNKNOWN and grids >= ENOUGH
-    return estimate.is_too_coarse or not (estimate.verdict.is_final or is_settled)
+    return not (is_final(estimate) or (is_settled and not estimate.is_too_coarse))
+
+
+def is_final(estimate: Estimate) -> bool:
+    """Whether no finer grid gives a smaller error."""
+    return estimate.verdict.is_final and not estimate.is_too_coarse
 
 
 def inaccurate_columns(task: Task, solved: TaskSolution) -> list[str]:
@@ -248,10 +253,8 @@ def border_share(contact: Contact, solution: Solution) -> float:
 def _estimates(task: Task, solved: TaskSolution, grids: list[SolvedGrid]) -> dict[str, Estimate]:
     """Distance of the finest grid to the continuum, in the units of its scene."""
     scene = solved.scene
-    if not solved.solution.residual < UNSOLVED or scene.may_touch is not None:  # voids have no law
-        return unknown()
     resolution, length = scene.grid.resolution, scene.grid.length
-    if discretisation_error.has_step(task.elastomer, resolution, length):
+    if not solved.solution.residual < UNSOLVED or without_law(task, scene):
         return unknown()
     has_scales = task.surface.rough and task.boundary == "periodic"
     copies = scene.texture.copies if has_scales else 1
@@ -296,6 +299,15 @@ def _between_points(task: Task, solved: TaskSolution) -> dict[str, float]:
     return full_contact_errors(
         solved.contact, sigma, curvature, reduced, solved.observables.sigma_p
     )
+
+
+def without_law(task: Task, scene: Scene) -> str:
+    """Why no law of the errors is known on any grid, as text for messages; "" where one is."""
+    if scene.may_touch is not None:
+        return 'with surface.missing = "void"'
+    if discretisation_error.has_step(task.elastomer, scene.grid.resolution, scene.grid.length):
+        return "for a k(q) with a step at short waves, as in elastomer.path"
+    return ""
 
 
 def scales_of(scene: Scene, band_limited: bool) -> discretisation_error.RoughnessScales:
