@@ -107,6 +107,8 @@ def test_a_layer_thinner_than_the_roughness():
         (1e-8, 0.1, "^$"),
         (1e-8, 1e-3, "a slab of 1e-08 m, a thin plate.* divide a thickness in m"),
         (1e-7, 5e-3, "a slab of 5e-08 m, less than the rms height"),
+        (1e-8, 2.0, "^$"),
+        (1e-8, 50.0, "a slab of 0.0005 m, a half-space at all wavelengths"),
     ],
 )
 def test_a_slab_whose_thickness_is_probably_in_metres(h_std, thickness, words):
@@ -149,6 +151,14 @@ def test_a_single_indenter_in_other_units_than_its_modulus(surface, pressure, wo
     assert re.search(words, " ".join(found))
     reduced = solve(tables(surface, {"kind": "half-space"}, pressure=pressure / 2e9)).warnings
     assert set(reduced) == set(warnings) - set(found)
+
+
+@pytest.mark.parametrize(("thickness", "warned"), [(1e-3, False), (0.1, True)])
+def test_a_layer_whose_thickness_is_probably_not_in_metres(thickness, warned):
+    layer = {"kind": "layer", "poisson": 0.3, "E_star": 2e9, "thickness": thickness}
+    result, half_space = solve(tables(elastomer=layer)), solve(tables())
+    assert any("times the side of the cell" in each for each in result.warnings) is warned
+    assert result.a_r == half_space.a_r
 
 
 @pytest.mark.parametrize("surface", [SURFACE, {"kind": "parabola", "radius": 1e-3, "length": 1e-3}])
@@ -378,3 +388,11 @@ def test_pixels_too_wide_for_a_layer_that_is_nearly_incompressible(
         )
         loads[each] = result.nominal_pressure
     assert (abs(loads[boundary] / loads["periodic"] - 1) > 0.03) is warned
+
+
+def test_full_contact_with_a_slab_too_thin_to_carry_stress(recwarn):
+    """The waves of its stress are below the smallest number."""
+    slab = {"kind": "slab", "thickness": 1e-11}
+    spec = tables({"kind": "ridge"}, slab, pressure=10.0) | {"accuracy": {"stress_deviation": 0.1}}
+    assert solve(spec).a_r == 1
+    assert not recwarn

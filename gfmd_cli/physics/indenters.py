@@ -306,6 +306,18 @@ class Ridge(LineIndenter):
     width: Annotated[float, Key(gt=0, le=1)] = 1.0
     """Width of the ridge at its foot / L; the rest of the cell is flat."""
 
+    def smallest_grid(self) -> int:
+        """Smallest number of points: the foot is a spacing or more away from the crest."""
+        return max(SMALLEST_GRID, ceil(2 / self.width - POINTS_ROUNDING))
+
+    def resolution(self) -> str:
+        """Reason for the smallest grid: the width."""
+        return f"kind {self.kind!r}, width = {self.width:g}: two spacings or more"
+
+    def coarsening(self) -> str:
+        """A larger width, which may have been given in metres."""
+        return "surface.width is relative to surface.length"
+
     def _profile(self, r: Field) -> Field:
         return -self.slope * np.minimum(r, 0.5 * self.width * self.length)
 
