@@ -183,7 +183,7 @@ class SingleIndenter(RigidSurface):
     """Side of the cell along x, L [m]."""
 
     def smallest_grid(self) -> int:
-        """Smallest number of points along x; any grid resolves a single indenter."""
+        """Smallest number of points along x; any grid resolves most of them."""
         return SMALLEST_GRID
 
     def smallest_grid_y(self) -> int:
@@ -304,7 +304,7 @@ class Ridge(LineIndenter):
     slope: Positive = 1.0
     """Slope of the flanks, the tangent of their angle to the plane."""
     width: Annotated[float, Key(gt=0, le=1)] = 1.0
-    """Width of the ridge at its foot / L; the rest of the cell is flat."""
+    """Width of the ridge at its foot / L, two grid spacings or more; the rest of the cell is flat."""
 
     def smallest_grid(self) -> int:
         """Smallest number of points: the foot is a spacing or more away from the crest."""
