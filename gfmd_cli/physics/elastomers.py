@@ -32,9 +32,7 @@ LONG_WAVE = 1e-6  # q t up to which k of a layer is constant: (q t)^2 is below r
 DECAY_DISTANCE = 25.0  # thicknesses from which the displacement of a layer is below rounding
 MAX_SPACING = 16.0  # of a grid, in thicknesses of a layer with a free boundary
 MAX_SHORT_WAVE_STRESS = 0.1  # fraction of the squared stress, for a thin plate; a choice
-THICK_SLAB = (
-    10.0  # thickness / L, from which it is probably not relative; a choice: 2 has no effect
-)
+THICK_SLAB = 10.0  # thickness / L, probably not relative; a choice: 2 changes k by 1e-8
 THICK_LAYER = 1000.0  # thickness / L, from which it is probably not in m; a choice
 PLATE = 0.1
 """Largest q t up to which a slab is a plate; its stiffness is then smaller by 0.2 % or less."""

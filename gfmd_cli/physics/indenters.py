@@ -304,7 +304,7 @@ class Ridge(LineIndenter):
     slope: Positive = 1.0
     """Slope of the flanks, the tangent of their angle to the plane."""
     width: Annotated[float, Key(gt=0, le=1)] = 1.0
-    """Width of the ridge at its foot / L, two grid spacings or more; the rest of the cell is flat."""
+    """Width of the ridge at its foot / L, at least two grid spacings; the rest is flat."""
 
     def smallest_grid(self) -> int:
         """Smallest number of points: the foot is a spacing or more away from the crest."""
