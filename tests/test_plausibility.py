@@ -226,7 +226,7 @@ def test_an_accuracy_that_no_grid_meets():
     heights[3:6, 3:6] = np.nan
     holes = {"length": SURFACE["length"], "missing": "void"}
     spec = tables(holes) | {"accuracy": {"contact_area": 0.1}}
-    warning = '[accuracy]: no error of a_r is known with surface.missing = "void", on any grid'
+    warning = '[accuracy]: no error of a_r is known on any grid with surface.missing = "void"'
     assert warning in solve(spec, heights=heights).warnings
     searched = spec | {"load": {"contact_area": 0.2}}
     with pytest.raises(InputError, match="no continuum value is known with"):

@@ -31,10 +31,10 @@ from gfmd_cli.study.notes import Trial
 from gfmd_cli.study.plausibility import loaded_value
 from gfmd_cli.study.refinement import (
     TaskSolution,
+    has_voids,
     is_final,
     solve_on_grids,
     task_scene,
-    without_law,
 )
 from gfmd_cli.study.tasks import Task
 
@@ -116,9 +116,12 @@ def _check_known(task: Task, solved: TaskSolution) -> None:
     estimate = solved.estimates.get(LOADS[task.quantity].searched)
     if estimate is None or isfinite(estimate.continuum):
         return
-    case, remedy = without_law(task, solved.scene), "leave out [accuracy] for the value on the grid"
-    if case:
-        raise InputError(f"load.{task.quantity}: no continuum value is known {case}; {remedy}")
+    remedy = "leave out [accuracy] for the value on the grid"
+    if has_voids(solved.scene):
+        raise InputError(
+            f"load.{task.quantity}: no continuum value is known with surface.missing = "
+            f'"void"; {remedy}'
+        )
     if is_final(estimate):
         raise InputError(
             f"load.{task.quantity}: {LOADS[task.quantity].words} {estimate.verdict.explanation}; "

@@ -15,9 +15,9 @@ from gfmd_cli.status import Status
 from gfmd_cli.study.refinement import (
     TaskSolution,
     border_share,
+    has_voids,
     inaccurate_columns,
     is_final,
-    without_law,
 )
 from gfmd_cli.study.tasks import Task
 from gfmd_cli.units import LARGEST_RMS_HEIGHT
@@ -163,8 +163,11 @@ def _load_in_jump(task: Task, status: Status, results: Mapping[str, Any]) -> Ite
 def _missed_accuracy(task: Task, solved: TaskSolution) -> Iterator[str]:
     """Warnings if a fixed grid misses the requested accuracy; with "auto" that is a status."""
     columns = [] if task.auto else inaccurate_columns(task, solved)
-    if columns and (case := without_law(task, solved.scene)):
-        yield f"[accuracy]: no error of {', '.join(columns)} is known {case}, on any grid"
+    if columns and has_voids(solved.scene):
+        yield (
+            f"[accuracy]: no error of {', '.join(columns)} is known on any grid with "
+            'surface.missing = "void"'
+        )
         return
     final = [name for name in columns if is_final(solved.estimates[name])]
     for name in final:

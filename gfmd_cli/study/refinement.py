@@ -253,8 +253,10 @@ def border_share(contact: Contact, solution: Solution) -> float:
 def _estimates(task: Task, solved: TaskSolution, grids: list[SolvedGrid]) -> dict[str, Estimate]:
     """Distance of the finest grid to the continuum, in the units of its scene."""
     scene = solved.scene
+    if not solved.solution.residual < UNSOLVED or has_voids(scene):
+        return unknown()
     resolution, length = scene.grid.resolution, scene.grid.length
-    if not solved.solution.residual < UNSOLVED or without_law(task, scene):
+    if discretisation_error.has_step(task.elastomer, resolution, length):
         return unknown()
     has_scales = task.surface.rough and task.boundary == "periodic"
     copies = scene.texture.copies if has_scales else 1
@@ -301,13 +303,9 @@ def _between_points(task: Task, solved: TaskSolution) -> dict[str, float]:
     )
 
 
-def without_law(task: Task, scene: Scene) -> str:
-    """Why no law of the errors is known on any grid, as text for messages; "" where one is."""
-    if scene.may_touch is not None:
-        return 'with surface.missing = "void"'
-    if discretisation_error.has_step(task.elastomer, scene.grid.resolution, scene.grid.length):
-        return "for a k(q) with a step at short waves, as in elastomer.path"
-    return ""
+def has_voids(scene: Scene) -> bool:
+    """Whether points never touch, for which no law of the errors is known on any grid."""
+    return scene.may_touch is not None
 
 
 def scales_of(scene: Scene, band_limited: bool) -> discretisation_error.RoughnessScales:
