@@ -8,6 +8,7 @@ import pytest
 
 from gfmd_cli import compare, rows, run, solve
 from gfmd_cli.analysis.export import as_records
+from gfmd_cli.errors import InputError
 from gfmd_cli.physics.file_surface import FileSurface
 from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.report.page import report
@@ -49,9 +50,11 @@ def test_a_single_indenter_has_no_height_to_compare_with():
     """Its rms height follows from the cell, and that of a punch from its depth."""
     layer = {"kind": "layer", "base": "sliding", "E_star": 1e6, "thickness": 2e-4}
     ball = {"kind": "parabola", "radius": 0.005, "length": 0.01}
-    result = solve(tables(ball, layer, p_star=0.01))
+    result = solve(tables(ball, layer, p_star=0.003))
     assert result.warnings == ()
     assert result.h_std > 2e-4
+    deep = {"kind": "punch", "radius": 2e-3, "length": 0.01, "depth": 1.0}
+    assert solve(tables(deep, HALF_SPACE, pressure=1e5)).warnings == ()
     punch = {"kind": "punch", "depth": 100.0}
     assert solve(tables(punch, {"kind": "half-space"}, pressure=1e-5)).warnings == ()
 
@@ -104,6 +107,8 @@ def test_a_layer_thinner_than_the_roughness():
         (1e-8, 0.1, "^$"),
         (1e-8, 1e-3, "a slab of 1e-08 m, a thin plate.* divide a thickness in m"),
         (1e-7, 5e-3, "a slab of 5e-08 m, less than the rms height"),
+        (1e-8, 2.0, "^$"),
+        (1e-8, 50.0, "a slab of 0.0005 m, a half-space at all wavelengths"),
     ],
 )
 def test_a_slab_whose_thickness_is_probably_in_metres(h_std, thickness, words):
@@ -122,6 +127,51 @@ def test_few_points_in_contact():
         "use more points",
     )
     assert result.warnings[0] in str(result)
+
+
+@pytest.mark.parametrize(
+    ("surface", "pressure", "words"),
+    [
+        ({"kind": "parabola", "radius": 1e-3}, 1e8, "Set surface.length or surface.radius"),
+        ({"kind": "parabola", "radius": 5.0, "length": 10.0}, 1e8, "Set surface.length or"),
+        ({"kind": "parabola", "length": 1e-3}, 1e4, "surface.radius is not given: 1 m is assumed"),
+        ({"kind": "wave", "length": 1e-3}, 1e8, "Set surface.amplitude or surface.length"),
+        ({"kind": "cone", "slope": 10.0, "length": 1e-3}, 1e9, "slope of 10 .* surface.slope"),
+        ({"kind": "ridge", "slope": 10.0, "length": 1e-3}, 1e9, "slope of 10 .* surface.slope"),
+        ({"kind": "parabola", "radius": 1e-4, "length": 4e-3}, 1e9, "slope of .* surface.radius"),
+        ({"kind": "parabola", "radius": 1.0, "length": 0.5}, 3e6, "^$"),  # a wheel
+        ({"kind": "parabola", "radius": 5e-3, "length": 0.04}, 3e7, "^$"),
+        ({"kind": "cone", "slope": 0.5, "length": 1e-3}, 3e7, "^$"),
+    ],
+)
+def test_a_single_indenter_in_other_units_than_its_modulus(surface, pressure, words):
+    warnings = solve(tables(surface, pressure=pressure)).warnings
+    others = ("fewer than 30", "reaches the border")
+    found = [each for each in warnings if not any(other in each for other in others)]
+    assert re.search(words, " ".join(found))
+    reduced = solve(tables(surface, {"kind": "half-space"}, pressure=pressure / 2e9)).warnings
+    assert set(reduced) == set(warnings) - set(found)
+
+
+@pytest.mark.parametrize(("thickness", "warned"), [(1e-3, False), (0.1, True)])
+def test_a_layer_whose_thickness_is_probably_not_in_metres(thickness, warned):
+    layer = {"kind": "layer", "poisson": 0.3, "E_star": 2e9, "thickness": thickness}
+    result, half_space = solve(tables(elastomer=layer)), solve(tables())
+    assert any("times the side of the cell" in each for each in result.warnings) is warned
+    assert result.a_r == half_space.a_r
+
+
+@pytest.mark.parametrize("surface", [SURFACE, {"kind": "parabola", "radius": 1e-3, "length": 1e-3}])
+@pytest.mark.parametrize("boundary", ["periodic", "free"])
+@pytest.mark.parametrize(("moved", "warned"), [(0.5, False), (1.5, True)])
+def test_a_layer_that_is_compressed_by_more_than_its_thickness(surface, boundary, moved, warned):
+    thickness = 10 * surface.get("h_std", 1e-6)
+    layer = {"kind": "layer", "base": "sliding", "E_star": 1e7, "thickness": thickness}
+    spec = tables(surface, layer, displacement=moved * thickness)
+    spec["grid"]["boundary"] = boundary
+    warnings = [each for each in solve(spec).warnings if "such compressions" in each]
+    assert bool(warnings) is warned
+    assert all("elastomer.thickness is" in each for each in warnings)
 
 
 def test_a_cutoff_above_the_rolloff():
@@ -148,7 +198,9 @@ def test_a_modulus_that_no_material_has(E_star, warned):
 
 def test_a_random_surface_in_metres_without_a_side():
     sideless = {key: value for key, value in SURFACE.items() if key != "length"}
-    assert "a side of 1 m is assumed" in only_warning(tables(sideless, p_star=0.1))
+    assert "surface.length is not given: 1 m is assumed" in only_warning(
+        tables(sideless, p_star=0.1)
+    )
     assert solve(tables(sideless | {"length": 1.0}, p_star=0.1)).warnings == ()
 
 
@@ -163,6 +215,22 @@ def test_a_fixed_grid_that_misses_the_requested_accuracy(accuracy, warned):
     warnings = solve(spec).warnings
     assert any("a_r" in each and '"auto"' in each for each in warnings) is warned
     assert len(warnings) == warned
+
+
+def test_an_accuracy_that_no_grid_meets():
+    spec = tables(elastomer={"kind": "power", "n": 3}) | {"accuracy": {"stress_deviation": 0.1}}
+    assert only_warning(spec) == (
+        "[accuracy] is met on no grid: sigma_p has no value in the continuum"
+    )
+    heights = solve(tables()).height.copy()
+    heights[3:6, 3:6] = np.nan
+    holes = {"length": SURFACE["length"], "missing": "void"}
+    spec = tables(holes) | {"accuracy": {"contact_area": 0.1}}
+    warning = '[accuracy]: no error of a_r is known on any grid with surface.missing = "void"'
+    assert warning in solve(spec, heights=heights).warnings
+    searched = spec | {"load": {"contact_area": 0.2}}
+    with pytest.raises(InputError, match="no continuum value is known with"):
+        solve(searched, heights=heights)
 
 
 @pytest.mark.parametrize("part", [{"region": {"x": [0, 24]}}, {"crop": True}])
@@ -320,3 +388,11 @@ def test_pixels_too_wide_for_a_layer_that_is_nearly_incompressible(
         )
         loads[each] = result.nominal_pressure
     assert (abs(loads[boundary] / loads["periodic"] - 1) > 0.03) is warned
+
+
+def test_full_contact_with_a_slab_too_thin_to_carry_stress(recwarn):
+    """The waves of its stress are below the smallest number."""
+    slab = {"kind": "slab", "thickness": 1e-11}
+    spec = tables({"kind": "ridge"}, slab, pressure=10.0) | {"accuracy": {"stress_deviation": 0.1}}
+    assert solve(spec).a_r == 1
+    assert not recwarn

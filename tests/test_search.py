@@ -187,6 +187,25 @@ def test_a_load_in_a_jump_of_the_area_is_warned_of(gfmd):
             assert text.count(warning) == warned
 
 
+def test_a_solve_that_ended_early_is_not_called_a_jump(rows_of):
+    (row,) = rows_of("grid.points=64", "solver.max_steps=2", "load={contact_area=0.1}")
+    assert row["status"] == "max_steps"
+    assert "jump" not in row["warnings"]
+
+
+@pytest.mark.parametrize("seed", [0, 3])
+def test_a_mean_gap_above_those_of_coarser_grids_is_found(rows_of, spec_of, seed):
+    """Without load the gap is the highest point, which is lower on a coarser grid."""
+    words = (f"surface.seed={seed}", "grid.points=128", "load.mean_gap=1")
+    (task,) = plan(spec_of(*words))
+    coarse, fine = (build_scene(task.surface, task.elastomer, n).highest for n in (64, 128))
+    load = 0.5 * (coarse + fine)
+    assert coarse < load < fine
+    (row,) = rows_of(*words, f"load.mean_gap={load}")
+    assert row["status"] == "converged"
+    assert row["u_g"] == pytest.approx(load, rel=1e-3)
+
+
 @pytest.mark.parametrize(
     ("overrides", "message"),
     [

@@ -267,6 +267,15 @@ def test_an_unresolved_cutoff_names_the_grid_that_would_do(read):
     assert plan(read(("0.05", "0.02"), ("points = 64", "points = 100")))
 
 
+def test_a_cutoff_that_no_grid_resolves_names_its_unit(read):
+    """Mostly it was given in metres."""
+    words = r"takes 2000000, but at most 131072 are allowed: surface.cutoff is relative to"
+    changes = ("0.05", "1e-6"), ("points = 64", 'points = "auto"')
+    for changed, key in ((changes[:1], r"grid\.points"), (changes, r"accuracy\.max_points")):
+        with pytest.raises(InputError, match=f"{key}: .*{words}"):
+            plan(read(*changed, overrides=("accuracy.mean_gap=0.1",)))
+
+
 @pytest.mark.parametrize("content", [b"\xff\xfe\x00", b"#" * 300_000])
 def test_a_file_that_is_no_spec_is_refused(tmp_path, content):
     path = tmp_path / "spec.toml"

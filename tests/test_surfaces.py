@@ -274,6 +274,16 @@ def test_the_punch_has_its_face():
     assert np.mean(h == 0) == pytest.approx(np.pi / 16, rel=2e-3)  # circle problem: ~ N^(-4/3)
 
 
+def test_a_ridge_has_a_grid_point_on_its_flanks_or_foot():
+    ridge = Ridge(width=0.02)
+    assert ridge.smallest_grid() == 100
+    assert np.count_nonzero(ridge.heights(100) > ridge.heights(100).min()) == 1
+    with pytest.raises(InputError, match=r"width = 0\.02: two spacings or more.*use 100 or more"):
+        sample(ridge, 98)
+    with pytest.raises(InputError, match=r"surface\.width is relative to surface\.length"):
+        sample(Ridge(width=1e-6), 98)
+
+
 def test_the_ridge_has_its_width_and_slope():
     h = Ridge(slope=0.5, width=0.5, length=2.0).heights(16)
     assert h[8:] == pytest.approx([0, -1 / 16, -1 / 8, -3 / 16, *[-1 / 4] * 4])

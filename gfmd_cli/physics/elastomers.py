@@ -32,6 +32,8 @@ LONG_WAVE = 1e-6  # q t up to which k of a layer is constant: (q t)^2 is below r
 DECAY_DISTANCE = 25.0  # thicknesses from which the displacement of a layer is below rounding
 MAX_SPACING = 16.0  # of a grid, in thicknesses of a layer with a free boundary
 MAX_SHORT_WAVE_STRESS = 0.1  # fraction of the squared stress, for a thin plate; a choice
+THICK_SLAB = 10.0  # thickness / L, probably not relative; a choice: 2 changes k by 1e-8
+THICK_LAYER = 1000.0  # thickness / L, from which it is probably not in m; a choice
 PLATE = 0.1
 """Largest q t up to which a slab is a plate; its stiffness is then smaller by 0.2 % or less."""
 NEARLY_INCOMPRESSIBLE = 0.48
@@ -164,6 +166,8 @@ class Slab(LinearElastomer):
             reason = "a thin plate at all wavelengths"
         elif is_rough and thickness < scene.h_std <= LARGEST_RMS_HEIGHT:
             reason = f"less than the rms height, {scene.h_std:.3g} m"
+        elif self.thickness >= THICK_SLAB:
+            reason = "a half-space at all wavelengths"
         else:
             return []
         return [
@@ -219,6 +223,12 @@ class Layer(LinearElastomer):
             warnings.append(
                 f"elastomer.thickness = {self.thickness:g} m is less than the rms height, "
                 f"{scene.h_std:.3g} m: linear elasticity does not hold for such compressions"
+            )
+        if self.thickness >= THICK_LAYER * scene.grid.length:
+            warnings.append(
+                f"elastomer.thickness = {self.thickness:g} m is "
+                f"{self.thickness / scene.grid.length:.3g} times the side of the cell: the layer "
+                "is a half-space at all wavelengths; is the thickness in m?"
             )
         spacing = max(scene.grid.spacings)
         is_thin = boundary == "free" and spacing > self.thickness

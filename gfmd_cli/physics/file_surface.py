@@ -151,6 +151,10 @@ class FileSurface(RigidSurface):
         """Reason for the smallest grid: the points of the map."""
         return f"a map of {extent(self._topography().heights.shape)} points"
 
+    def coarsening(self) -> str:
+        """A part of the map."""
+        return "surface.region takes a part of the map"
+
     def parameters(self) -> dict[str, Any]:
         """Value of every key, with the defaults that depend on the file as they are applied."""
         return super().parameters() | {

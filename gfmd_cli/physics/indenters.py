@@ -21,7 +21,9 @@ from gfmd_cli.physics.highest_point import highest_point
 from gfmd_cli.spec_table import Positive, SpecTable
 
 SMALLEST_GRID = 8  # points along an axis; a choice: smaller grids resolve no contact
+MAX_POINTS = 2**17  # along an axis; upper limit, guards against typing errors
 MAX_ASPECT_RATIO = 1e9  # side along y over side along x; a choice: no grid has so many points
+SLOPE_STEP = 1e-3  # of a distance from the middle, over which a slope is taken
 POINTS_ROUNDING = 1e-9  # of a number of points that follows from a ratio of sides
 
 
@@ -119,6 +121,10 @@ class RigidSurface(SpecTable):
         """Reason for the smallest grid, as text for messages."""
         return f"kind {self.kind!r}"
 
+    def coarsening(self) -> str:
+        """What makes the smallest grid smaller, as text for messages."""
+        return "the side along y is surface.length_y"
+
     def preparation(self, boundary: str = "") -> str:
         """Description of how a map was read and prepared for a boundary; "" for other surfaces."""
         return ""
@@ -183,7 +189,7 @@ class SingleIndenter(RigidSurface):
     """Side of the cell along x, L [m]."""
 
     def smallest_grid(self) -> int:
-        """Smallest number of points along x; any grid resolves a single indenter."""
+        """Smallest number of points along x; any grid resolves most of them."""
         return SMALLEST_GRID
 
     def smallest_grid_y(self) -> int:
@@ -201,6 +207,11 @@ class SingleIndenter(RigidSurface):
     def peak(self) -> float:
         """Height of the crest [m]."""
         return float(self._profile(np.zeros(1))[0])
+
+    def slope_at(self, r: float) -> float:
+        """Slope |dh/dr| at a distance r > 0 from the middle of the cell [m], by differences."""
+        inner, outer = self._profile(r * np.array([1 - SLOPE_STEP, 1 + SLOPE_STEP])).tolist()
+        return float(abs(outer - inner) / (2 * SLOPE_STEP * r))
 
     def _profile(self, r: Field) -> Field:
         """Heights [m] at distances r >= 0 from the middle of the cell [m]."""
@@ -255,7 +266,7 @@ class Cone(RoundIndenter):
     tip_exponent: ClassVar[float] = 1.0
     kind: Literal["cone"] = "cone"
     slope: Positive = 1.0
-    """Slope of the flanks."""
+    """Slope of the flanks, the tangent of their angle to the plane."""
 
     def _profile(self, r: Field) -> Field:
         return -self.slope * r
@@ -297,9 +308,21 @@ class Ridge(LineIndenter):
     tip_exponent: ClassVar[float] = 1.0
     kind: Literal["ridge"] = "ridge"
     slope: Positive = 1.0
-    """Slope of the flanks."""
+    """Slope of the flanks, the tangent of their angle to the plane."""
     width: Annotated[float, Key(gt=0, le=1)] = 1.0
-    """Width of the ridge at its foot / L; the rest of the cell is flat."""
+    """Width of the ridge at its foot / L, at least two grid spacings; the rest is flat."""
+
+    def smallest_grid(self) -> int:
+        """Smallest number of points: the foot is a spacing or more away from the crest."""
+        return max(SMALLEST_GRID, ceil(2 / self.width - POINTS_ROUNDING))
+
+    def resolution(self) -> str:
+        """Reason for the smallest grid: the width."""
+        return f"kind {self.kind!r}, width = {self.width:g}: two spacings or more"
+
+    def coarsening(self) -> str:
+        """A larger width, which may have been given in metres."""
+        return "surface.width is relative to surface.length"
 
     def _profile(self, r: Field) -> Field:
         return -self.slope * np.minimum(r, 0.5 * self.width * self.length)

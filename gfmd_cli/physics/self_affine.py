@@ -71,6 +71,10 @@ class SelfAffine(RigidSurface):
         """Reason for the smallest grid: the cut-off needs two points per lambda_s."""
         return f"kind {self.kind!r}, cutoff = {self.cutoff:g}: two points per lambda_s"
 
+    def coarsening(self) -> str:
+        """A larger cut-off, which may have been given in metres."""
+        return "surface.cutoff is relative to surface.length"
+
     def warnings(self, boundary: str = "periodic") -> list[str]:
         """A warning about a spectrum without a self-affine part."""
         if self.cutoff <= self.rolloff:

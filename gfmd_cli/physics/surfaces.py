@@ -15,6 +15,7 @@ from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.grid.ranks import Ranks
 from gfmd_cli.physics.file_surface import FileSurface
 from gfmd_cli.physics.indenters import (
+    MAX_POINTS,
     Cone,
     LineParabola,
     Parabola,
@@ -48,8 +49,15 @@ def check_resolved(surface: RigidSurface, points: int, points_y: int) -> None:
         if count < least:
             raise InputError(
                 f"grid.{key}: {count // surface.copies} points along {axis} do not resolve "
-                f"the surface ({surface.resolution()}); use {least // surface.copies} or more"
+                f"the surface ({surface.resolution()}); {remedy(surface, least // surface.copies)}"
             )
+
+
+def remedy(surface: RigidSurface, needed: int) -> str:
+    """What to do where a surface needs so many points along an axis, or more."""
+    if needed <= MAX_POINTS:
+        return f"use {needed} or more"
+    return f"it takes {needed}, but at most {MAX_POINTS} are allowed: {surface.coarsening()}"
 
 
 def sample(

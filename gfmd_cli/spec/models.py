@@ -14,7 +14,7 @@ from gfmd_cli.errors import InputError
 from gfmd_cli.files.checksums import file_digest
 from gfmd_cli.physics.contact import PRESSURE_RANGE
 from gfmd_cli.physics.elastomers import Elastomer
-from gfmd_cli.physics.indenters import SMALLEST_GRID, RigidSurface
+from gfmd_cli.physics.indenters import MAX_POINTS, SMALLEST_GRID, RigidSurface
 from gfmd_cli.physics.linear_elastomer import LinearElastomer
 from gfmd_cli.physics.surfaces import Surface
 from gfmd_cli.solvers.auto import AnySolver
@@ -32,9 +32,6 @@ class StudyTable(SpecTable):
 
     name: Annotated[StrictStr, Key(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,99}$")] = "study"
     """Name of the study. The study file is NAME.h5 in the working directory."""
-
-
-MAX_POINTS = 2**17
 
 
 def _points_form(value: Any) -> str | None:

@@ -29,7 +29,13 @@ from gfmd_cli.study.forecast import FIRST
 from gfmd_cli.study.measure import measured
 from gfmd_cli.study.notes import Trial
 from gfmd_cli.study.plausibility import loaded_value
-from gfmd_cli.study.refinement import TaskSolution, solve_on_grids, task_scene
+from gfmd_cli.study.refinement import (
+    TaskSolution,
+    has_voids,
+    is_final,
+    solve_on_grids,
+    task_scene,
+)
 from gfmd_cli.study.tasks import Task
 
 # Choices, which change the number of trials (one to three on a grid) and hardly the result:
@@ -76,6 +82,10 @@ def solve_at_load(task: Task, context: SolveContext, watcher: Watcher) -> TaskSo
     roots: list[float] = []
     for points in _grids(task):
         scene = task_scene(task, points, context)
+        if not _is_in_reach(task, scene):
+            if points == task.points:
+                raise _out_of_reach(task, scene)
+            continue  # on a coarser grid
         if roots:
             first = exp(roots[-1] + _shift(task, roots))
         else:
@@ -103,26 +113,35 @@ def solve_at_load(task: Task, context: SolveContext, watcher: Watcher) -> TaskSo
 
 def _check_known(task: Task, solved: TaskSolution) -> None:
     """Raise InputError where [accuracy] asks for a continuum value that cannot be given."""
-    name = LOADS[task.quantity].searched
-    if name in solved.estimates and not isfinite(solved.estimates[name].continuum):
+    estimate = solved.estimates.get(LOADS[task.quantity].searched)
+    if estimate is None or isfinite(estimate.continuum):
+        return
+    remedy = "leave out [accuracy] for the value on the grid"
+    if has_voids(solved.scene):
         raise InputError(
-            f"load.{task.quantity}: the continuum value is not known on a grid of {task.points} "
-            "points per side; give a finer grid, or leave out [accuracy] for the value on the grid"
+            f"load.{task.quantity}: no continuum value is known with surface.missing = "
+            f'"void"; {remedy}'
         )
+    if is_final(estimate):
+        raise InputError(
+            f"load.{task.quantity}: {LOADS[task.quantity].words} {estimate.verdict.explanation}; "
+            f"{remedy}"
+        )
+    raise InputError(
+        f"load.{task.quantity}: the continuum value is not known on a grid of {task.points} "
+        f"points per side; give a finer grid, or {remedy}"
+    )
 
 
 def _grids(task: Task) -> list[int]:
     """Points along x of the grids to search on, the task's own the last.
 
-    On the coarser ones the surface is resolved, and the contact area is one point or more.
+    The coarser ones resolve the surface, but may not have the load: see `_is_in_reach`.
     """
     grids = [task.points]
     while len(grids) <= COARSER and grids[0] % 4 == 0:
         half = grids[0] // 2
-        size = half * task.points_y_on(half)
         if half < FIRST or not task.resolves(half):
-            break
-        if task.quantity == "contact_area" and task.load * size < 1:
             break
         grids.insert(0, half)
     return grids
@@ -145,21 +164,28 @@ def _at(task: Task, points: int, pressure: float) -> Task:
     )
 
 
-def _guess(task: Task, scene: Scene) -> tuple[float, float]:
-    """The pressure [Pa] of Persson theory, and the slope of ln(value) over ln(p) there.
+def _is_in_reach(task: Task, scene: Scene) -> bool:
+    """Whether a grid can have the contact area or the mean gap of the load."""
+    if task.quantity == "mean_gap":
+        return task.load < scene.highest
+    return task.quantity != "contact_area" or task.load * scene.grid.size >= 1
 
-    Raises InputError for a load that no pressure has.
-    """
-    highest = scene.highest
-    if task.quantity == "contact_area" and task.load * scene.grid.size < 1:
-        raise InputError(
+
+def _out_of_reach(task: Task, scene: Scene) -> InputError:
+    """The error of a load that no pressure has on the grid of its task."""
+    if task.quantity == "contact_area":
+        return InputError(
             f"load.contact_area: {task.load:g} is less than one of the {scene.grid.size} "
             "points of the grid"
         )
-    if task.quantity == "mean_gap" and task.load >= highest:
-        raise InputError(
-            f"load.mean_gap: {task.load:g} h_std are never reached: without load it is {highest:g}"
-        )
+    return InputError(
+        f"load.mean_gap: {task.load:g} h_std are never reached: without load it is "
+        f"{scene.highest:g}"
+    )
+
+
+def _guess(task: Task, scene: Scene) -> tuple[float, float]:
+    """The pressure [Pa] of Persson theory, and the slope of ln(value) over ln(p) there."""
     p, nearby = _pressures(task, scene, np.array([task.load, NEARBY * task.load])).tolist()
     return p, max(abs(log(NEARBY) / log(nearby / p)), FLATTEST) if nearby != p else 1.0
 

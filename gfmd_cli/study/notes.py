@@ -6,7 +6,7 @@ from typing import Annotated
 from pydantic import ConfigDict, Strict, with_config
 from pydantic import Field as Key
 
-from gfmd_cli.spec.models import MAX_POINTS
+from gfmd_cli.physics.indenters import MAX_POINTS
 
 PointCount = Annotated[int, Strict(), Key(ge=1, le=MAX_POINTS)]
 """Number of points along an axis."""

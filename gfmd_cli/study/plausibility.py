@@ -4,12 +4,21 @@ from collections.abc import Iterator, Mapping
 from math import inf, isfinite
 from typing import Any
 
+import numpy as np
+
 from gfmd_cli.maps.map_warnings import MAX_GRADIENT
-from gfmd_cli.physics.indenters import RigidSurface
+from gfmd_cli.physics.elastomers import Layer
+from gfmd_cli.physics.indenters import RigidSurface, SingleIndenter
 from gfmd_cli.physics.spectrum_fit import moments
 from gfmd_cli.spec.models import LOADS
 from gfmd_cli.status import Status
-from gfmd_cli.study.refinement import TaskSolution, border_share, inaccurate_columns
+from gfmd_cli.study.refinement import (
+    TaskSolution,
+    border_share,
+    has_voids,
+    inaccurate_columns,
+    is_final,
+)
 from gfmd_cli.study.tasks import Task
 from gfmd_cli.units import LARGEST_RMS_HEIGHT
 
@@ -24,6 +33,10 @@ SMALL_GAPS = (1e-5, 1e-3)
 """Mean gaps [h_std]: below the first, or below the second if that is a possible gap in m, they are
 probably meant in m; a choice."""
 LOOSE = 0.01  # natural residual; the mean gap of the default surface is then wrong by 0.1 to 1 %
+LARGEST_INDENTER = 0.1
+"""Rms height of the cell of a single indenter [m], above which it is in other units; a choice: that
+of a wheel of 1 m radius in a cell of 1 m is 0.05 m."""
+MAX_EDGE_SLOPE = 1.0  # of a single indenter at the edge of its contact; a choice: 45 degrees
 MAX_CHANGED_SHARE = 0.05  # of contact or load where heights are not those measured; a choice
 SMALL_DISPLACEMENT = 1e-4  # [h_std], below which heights have another unit; a choice
 SEPARATOR = " | "
@@ -41,13 +54,9 @@ def warnings_of(task: Task, solved: TaskSolution, results: Mapping[str, Any]) ->
     """Reasons to doubt the result of one contact, a sentence each; mostly none."""
     elastomer, scene = task.elastomer, solved.scene
     yield from task.surface.warnings(task.boundary)
-    if elastomer.modulus > PASCALS and scene.h_std > LARGEST_RMS_HEIGHT:
-        yield (
-            f"a modulus of {elastomer.modulus:.3g} Pa and an rms height of {scene.h_std:.3g} m: "
-            "are heights and lengths in metres? Set surface.h_std, surface.length or surface.scale"
-        )
-    elif elastomer.modulus > PASCALS and task.surface.rough and _has_default_side(task.surface):
-        yield "surface.length is not given: a side of 1 m is assumed"
+    if elastomer.modulus > PASCALS:
+        yield from _doubtful_lengths(task.surface, scene.h_std, elastomer.modulus)
+        yield from _steep_contact(task.surface, solved)
     if elastomer.modulus > STIFFEST and scene.h_std <= LARGEST_RMS_HEIGHT:
         yield (
             f"elastomer.E_star = {elastomer.modulus:.3g} Pa is more than ten times the modulus of "
@@ -65,6 +74,7 @@ def warnings_of(task: Task, solved: TaskSolution, results: Mapping[str, Any]) ->
             f"by several percent; at most {LOOSE:g} is usual"
         )
     yield from elastomer.warnings(scene, task.boundary, is_rough=task.surface.rough)
+    yield from _compressed_layer(task, scene.h_std, results["displacement"])
     yield from _load_in_jump(task, solved.solution.status, results)
     yield from _contact_at_border(task, solved)
     if max(results.get("edge_contact", 0.0), results.get("edge_load", 0.0)) > MAX_CHANGED_SHARE:
@@ -94,14 +104,62 @@ def warnings_of(task: Task, solved: TaskSolution, results: Mapping[str, Any]) ->
         )
 
 
-def _has_default_side(surface: RigidSurface) -> bool:
-    """Whether the spec leaves the side of a random surface at its default."""
-    return not surface.is_map and "length" not in surface.model_fields_set
+def _doubtful_lengths(surface: RigidSurface, h_std: float, modulus: float) -> Iterator[str]:
+    """Warnings about lengths that are not in metres, or not given, beside a modulus in Pa."""
+    lengths = {
+        key: value
+        for key, value in surface
+        if surface.unit_of(key) == "m" and key not in ("length_y", "depth")
+    }
+    largest = LARGEST_RMS_HEIGHT if surface.rough else LARGEST_INDENTER
+    if h_std > largest and not surface.stepped:  # the depth of a punch may have any value
+        keys = ["length", "scale"] if surface.is_map else sorted(lengths)
+        yield (
+            f"a modulus of {modulus:.3g} Pa and an rms height of {h_std:.3g} m: are heights and "
+            f"lengths in metres? Set {' or '.join(f'surface.{key}' for key in keys)}"
+        )
+        return
+    for key, value in lengths.items():
+        if value is not None and key not in surface.model_fields_set:
+            yield f"surface.{key} is not given: {value:g} m is assumed"
+
+
+def _steep_contact(surface: RigidSurface, solved: TaskSolution) -> Iterator[str]:
+    """A warning about a single indenter in metres that is steep where its contact ends."""
+    if not isinstance(surface, SingleIndenter) or surface.stepped:
+        return
+    grid, a_r = solved.scene.grid, solved.observables.a_r
+    r = 0.5 * a_r * grid.length if grid.dimension == 1 else (a_r * grid.area / np.pi) ** 0.5
+    slope = surface.slope_at(r) if r > 0 else 0.0
+    if slope > MAX_EDGE_SLOPE:
+        key = next(key for key in ("radius", "slope", "amplitude") if key in dict(surface))
+        yield (
+            f"the indenter has a slope of {slope:.3g} at the edge of the contact, {r:.3g} m from "
+            f"its middle, but linear elasticity needs small slopes: check surface.{key} and the "
+            "load"
+        )
+
+
+def _compressed_layer(task: Task, h_std: float, displacement: float) -> Iterator[str]:
+    """A warning about a layer that is compressed by more than its thickness.
+
+    A single indenter counts only with a modulus in Pa: in reduced units its height has any factor.
+    """
+    layer, is_rough = task.elastomer, task.surface.rough
+    if not isinstance(layer, Layer) or not (is_rough or layer.modulus > PASCALS):
+        return
+    is_said = is_rough and layer.thickness <= h_std  # by the warnings of the layer
+    if displacement > layer.thickness and not is_said:
+        yield (
+            f"the indenter has moved by {displacement:.3g} m since first touch, but "
+            f"elastomer.thickness is {layer.thickness:g} m: linear elasticity does not hold for "
+            f"such compressions; check load.{task.quantity}, elastomer.E_star and thickness"
+        )
 
 
 def _load_in_jump(task: Task, status: Status, results: Mapping[str, Any]) -> Iterator[str]:
     """A warning if a contact area is farther than the tolerance from the load."""
-    if task.quantity == "contact_area" and status != Status.LOAD_NOT_REACHED:
+    if task.quantity == "contact_area" and status in (Status.CONVERGED, Status.ROUNDING):
         value = loaded_value(task.quantity, results)
         if not abs(value - task.load) <= task.load_tolerance * task.load:
             nearest = f"the nearest value is {value:g}"
@@ -109,11 +167,21 @@ def _load_in_jump(task: Task, status: Status, results: Mapping[str, Any]) -> Ite
 
 
 def _missed_accuracy(task: Task, solved: TaskSolution) -> Iterator[str]:
-    """A warning if a fixed grid misses the requested accuracy; with "auto" that is a status."""
-    if not task.auto and (columns := inaccurate_columns(task, solved)):
+    """Warnings if a fixed grid misses the requested accuracy; with "auto" that is a status."""
+    columns = [] if task.auto else inaccurate_columns(task, solved)
+    if columns and has_voids(solved.scene):
+        yield (
+            f"[accuracy]: no error of {', '.join(columns)} is known on any grid with "
+            'surface.missing = "void"'
+        )
+        return
+    final = [name for name in columns if is_final(solved.estimates[name])]
+    for name in final:
+        yield f"[accuracy] is met on no grid: {name} {solved.estimates[name].verdict.explanation}"
+    if others := [name for name in columns if name not in final]:
         remedy = "more points" if LOADS[task.quantity].searched else 'grid.points = "auto"'
         yield (
-            f"the errors of {', '.join(columns)} are larger than [accuracy] requests, or unknown: "
+            f"the errors of {', '.join(others)} are larger than [accuracy] requests, or unknown: "
             f"use {remedy}"
         )
 

@@ -197,7 +197,12 @@ def _continues(task: Task, solved: TaskSolution, grids: int, options: WorkerOpti
 def _is_improvable(estimate: Estimate, grids: int) -> bool:
     """Whether a grid finer than the `grids` so far may give a smaller error."""
     is_settled = estimate.verdict is Verdict.UNKNOWN and grids >= ENOUGH
-    return estimate.is_too_coarse or not (estimate.verdict.is_final or is_settled)
+    return not (is_final(estimate) or (is_settled and not estimate.is_too_coarse))
+
+
+def is_final(estimate: Estimate) -> bool:
+    """Whether no finer grid gives a smaller error."""
+    return estimate.verdict.is_final and not estimate.is_too_coarse
 
 
 def inaccurate_columns(task: Task, solved: TaskSolution) -> list[str]:
@@ -248,7 +253,7 @@ def border_share(contact: Contact, solution: Solution) -> float:
 def _estimates(task: Task, solved: TaskSolution, grids: list[SolvedGrid]) -> dict[str, Estimate]:
     """Distance of the finest grid to the continuum, in the units of its scene."""
     scene = solved.scene
-    if not solved.solution.residual < UNSOLVED or scene.may_touch is not None:  # voids have no law
+    if not solved.solution.residual < UNSOLVED or has_voids(scene):
         return unknown()
     resolution, length = scene.grid.resolution, scene.grid.length
     if discretisation_error.has_step(task.elastomer, resolution, length):
@@ -296,6 +301,11 @@ def _between_points(task: Task, solved: TaskSolution) -> dict[str, float]:
     return full_contact_errors(
         solved.contact, sigma, curvature, reduced, solved.observables.sigma_p
     )
+
+
+def has_voids(scene: Scene) -> bool:
+    """Whether points never touch, for which no law of the errors is known on any grid."""
+    return scene.may_touch is not None
 
 
 def scales_of(scene: Scene, band_limited: bool) -> discretisation_error.RoughnessScales:

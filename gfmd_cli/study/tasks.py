@@ -13,7 +13,7 @@ from gfmd_cli.errors import InputError
 from gfmd_cli.files.checksums import Version, digest, file_version
 from gfmd_cli.physics.indenters import RigidSurface
 from gfmd_cli.physics.linear_elastomer import LinearElastomer
-from gfmd_cli.physics.surfaces import check_resolved
+from gfmd_cli.physics.surfaces import check_resolved, remedy
 from gfmd_cli.solvers.auto import AnySolver
 from gfmd_cli.spec import models
 from gfmd_cli.spec_table import SpecTable
@@ -245,7 +245,7 @@ def _check_max_points(max_points: int, surface: RigidSurface) -> None:
     if max_points < (first := forecast.first_grid(surface)):
         raise InputError(
             f'accuracy.max_points: {max_points} given, but grid.points = "auto" begins with '
-            f"{first} points along x on this surface; give {first} or more"
+            f"{first} points along x on this surface; {remedy(surface, first)}"
         )
 
 
