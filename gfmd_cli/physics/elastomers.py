@@ -248,6 +248,11 @@ class Layer(LinearElastomer):
         nu = self.poisson
         return self.E_star * (1 - nu) ** 2 / ((1 - 2 * nu) * self.thickness)
 
+    @property
+    def largest_displacement(self) -> float:
+        """The thickness."""
+        return self.thickness
+
     def decays(self, dimension: int) -> bool:
         """True: displacements decay exponentially, over the thickness."""
         return True

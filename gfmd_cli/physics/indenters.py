@@ -121,6 +121,10 @@ class RigidSurface(SpecTable):
         """Reason for the smallest grid, as text for messages."""
         return f"kind {self.kind!r}"
 
+    def slope_at(self, r: float) -> float:
+        """Slope |dh/dr| of a single indenter at a distance r > 0 from its middle; else 0."""
+        return 0.0
+
     def coarsening(self) -> str:
         """What makes the smallest grid smaller, as text for messages."""
         return "the side along y is surface.length_y"

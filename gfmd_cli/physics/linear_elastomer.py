@@ -6,6 +6,7 @@ spatial dimensions". Sums exclude q = 0, where k is zero for every elastomer (lo
 """
 
 from fractions import Fraction
+from math import inf
 from typing import ClassVar
 
 import numpy as np
@@ -134,6 +135,11 @@ class LinearElastomer(SpecTable):
     def modulus(self) -> float:
         """Elastic modulus [Pa], 0 where the elastomer has none."""
         return float(dict(self).get("E_star", 0.0))
+
+    @property
+    def largest_displacement(self) -> float:
+        """Displacement from first touch beyond which linear elasticity does not hold [m]."""
+        return inf
 
     def local_exponent(self, q: Field, length: float = 1.0, step: float = EXPONENT_STEP) -> Field:
         """n(q) = d ln k / d ln q, by central differences over +-step; zero where k is zero."""

@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 
 from gfmd_cli.maps.map_warnings import MAX_GRADIENT
-from gfmd_cli.physics.elastomers import Layer
-from gfmd_cli.physics.indenters import RigidSurface, SingleIndenter
+from gfmd_cli.physics.indenters import RigidSurface
 from gfmd_cli.physics.spectrum_fit import moments
 from gfmd_cli.spec.models import LOADS
 from gfmd_cli.status import Status
@@ -74,7 +73,7 @@ def warnings_of(task: Task, solved: TaskSolution, results: Mapping[str, Any]) ->
             f"by several percent; at most {LOOSE:g} is usual"
         )
     yield from elastomer.warnings(scene, task.boundary, is_rough=task.surface.rough)
-    yield from _compressed_layer(task, scene.h_std, results["displacement"])
+    yield from _compressed(task, scene.h_std, results["displacement"])
     yield from _load_in_jump(task, solved.solution.status, results)
     yield from _contact_at_border(task, solved)
     if max(results.get("edge_contact", 0.0), results.get("edge_load", 0.0)) > MAX_CHANGED_SHARE:
@@ -126,7 +125,7 @@ def _doubtful_lengths(surface: RigidSurface, h_std: float, modulus: float) -> It
 
 def _steep_contact(surface: RigidSurface, solved: TaskSolution) -> Iterator[str]:
     """A warning about a single indenter in metres that is steep where its contact ends."""
-    if not isinstance(surface, SingleIndenter) or surface.stepped:
+    if surface.rough or surface.stepped:
         return
     grid, a_r = solved.scene.grid, solved.observables.a_r
     r = 0.5 * a_r * grid.length if grid.dimension == 1 else (a_r * grid.area / np.pi) ** 0.5
@@ -140,19 +139,18 @@ def _steep_contact(surface: RigidSurface, solved: TaskSolution) -> Iterator[str]
         )
 
 
-def _compressed_layer(task: Task, h_std: float, displacement: float) -> Iterator[str]:
+def _compressed(task: Task, h_std: float, displacement: float) -> Iterator[str]:
     """A warning about a layer that is compressed by more than its thickness.
 
     A single indenter counts only with a modulus in Pa: in reduced units its height has any factor.
     """
-    layer, is_rough = task.elastomer, task.surface.rough
-    if not isinstance(layer, Layer) or not (is_rough or layer.modulus > PASCALS):
-        return
-    is_said = is_rough and layer.thickness <= h_std  # by the warnings of the layer
-    if displacement > layer.thickness and not is_said:
+    largest, is_rough = task.elastomer.largest_displacement, task.surface.rough
+    is_said = is_rough and largest <= h_std  # by the warnings of the elastomer
+    is_judged = is_rough or task.elastomer.modulus > PASCALS
+    if displacement > largest and is_judged and not is_said:
         yield (
             f"the indenter has moved by {displacement:.3g} m since first touch, but "
-            f"elastomer.thickness is {layer.thickness:g} m: linear elasticity does not hold for "
+            f"elastomer.thickness is {largest:g} m: linear elasticity does not hold for "
             f"such compressions; check load.{task.quantity}, elastomer.E_star and thickness"
         )
 
