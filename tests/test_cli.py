@@ -107,7 +107,7 @@ def test_a_quiet_run_says_why_its_exit_status_is_not_zero(gfmd):
 def test_a_shard_takes_its_share(gfmd):
     assert gfmd("run", "spec.toml", "--shard", "0/2").exit_code == 0
     assert "2 tasks not solved yet" in gfmd("analyze", "small.h5").output
-    assert "2 tasks not solved yet" in gfmd("analyze", "small.h5", "--json").stderr
+    assert "2 tasks not solved yet" in gfmd("analyze", "small.h5", "--json").output
     assert len(gfmd("export", "small.h5").output.splitlines()) == 3
     assert gfmd("run", "spec.toml", "--shard", "1/2").exit_code == 0
     assert len(gfmd("export", "small.h5").output.splitlines()) == 5

@@ -80,7 +80,7 @@ def test_a_sound_scan_gives_none(tmp_path, points, hurst, cutoff):
 def test_lines_that_were_broken_give_one_warning(tmp_path, hurst, points):
     """As in a file with at most so many numbers in a line."""
     heights = _scan(hurst)
-    words = f"the lines of {points} heights go on in the next line"
+    words = f"each line of {points} heights seems to continue in the next one"
     assert words in _found(tmp_path, heights.reshape(-1, points))
     for sound in (heights[:, :points], heights.T[:, :points], -heights[:, -points:]):
         assert not _found(tmp_path, sound)

@@ -222,7 +222,10 @@ def test_what_makes_no_sense_is_refused(spec_of, overrides, message):
 
 @pytest.mark.parametrize(
     ("load", "reason"),
-    [("mean_gap=20", "without load it is"), ("contact_area=6e-5", "less than one of the 16384")],
+    [
+        ("mean_gap=20", "without load the mean gap is"),
+        ("contact_area=6e-5", "less than one of the 16384"),
+    ],
 )
 def test_a_load_that_no_pressure_has_fails_and_says_so(rows_of, load, reason):
     reports = []

@@ -269,7 +269,7 @@ def test_an_unresolved_cutoff_names_the_grid_that_would_do(read):
 
 def test_a_cutoff_that_no_grid_resolves_names_its_unit(read):
     """Mostly it was given in metres."""
-    words = r"takes 2000000, but at most 131072 are allowed: surface.cutoff is relative to"
+    words = r"takes 2000000, but at most 131072 are allowed; check: surface.cutoff is relative to"
     changes = ("0.05", "1e-6"), ("points = 64", 'points = "auto"')
     for changed, key in ((changes[:1], r"grid\.points"), (changes, r"accuracy\.max_points")):
         with pytest.raises(InputError, match=f"{key}: .*{words}"):

@@ -125,7 +125,7 @@ def test_the_error_of_h_contains_the_effect_of_noise(seed, share, tmp_path):
     assert fitted.hurst < 0.7
     assert fitted.hurst_of_long_waves > fitted.hurst
     assert fitted.hurst + 2 * fitted.hurst_error > 0.8
-    assert "H depends on the waves" in summary_text(summary)
+    assert "H depends on the wavenumber" in summary_text(summary)
 
 
 @pytest.mark.parametrize("hurst", [0.3, 0.8, 1.0])

@@ -54,8 +54,8 @@ class ParameterIndex(xarray.Index):  # type: ignore[misc]
         """The tasks whose parameters are those given. Raises KeyError where there is none."""
         if method not in (None, "nearest") or tolerance is not None:
             raise ValueError(
-                f"method={method!r}, tolerance={tolerance!r}: only method='nearest'; the "
-                "parameter of the same name is selected by sel({'tolerance': ...})"
+                f"method={method!r}, tolerance={tolerance!r}: only method='nearest' is "
+                "available; select the parameter `tolerance` by sel({'tolerance': ...})"
             )
         fits = [_fits(self.variables[n].values, label, method) for n, label in labels.items()]
         places = np.flatnonzero(np.logical_and.reduce(fits))

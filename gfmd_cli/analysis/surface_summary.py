@@ -188,9 +188,9 @@ def _fit_lines(nearest: SelfAffineFit, metres: str) -> list[str]:
     ]
     if np.isfinite(nearest.hurst_of_long_waves):
         lines.append(
-            f"H depends on the waves: it is {nearest.hurst_of_long_waves:.2g} without the shorter "
-            "half of the wavenumbers; the error of H contains the difference. Noise, blur or a "
-            "filter?"
+            "H depends on the wavenumber: below half of the largest wavenumber of the fit it is "
+            f"{nearest.hurst_of_long_waves:.2g}; the error of H contains the difference. Check the "
+            "map for noise, blur or a filter"
         )
     if nearest.scatter > MAX_SCATTER:
         lines.append(

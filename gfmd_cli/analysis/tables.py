@@ -209,7 +209,11 @@ def comparison_table(curves: TitledCurves) -> Table:
 def border_note(curves: TitledCurves) -> str:
     """A sentence on what the theory leaves out of contacts with a free boundary; else ""."""
     is_free = any(row["boundary"] == "free" for _, curve in curves for row in curve.rows)
-    return " It has no borders, unlike a contact with a free boundary." if is_free else ""
+    return (
+        " It is that of a periodic surface, without the borders of a free boundary."
+        if is_free
+        else ""
+    )
 
 
 def over_pressure(
@@ -259,9 +263,9 @@ def seeds_table(comparison: Comparison) -> Table:
         for title, ensemble in zip(titles, means, strict=True)
     )
     caption = (
-        "Means over seeds, +- half the width of the 95 % confidence interval (Student's t): of "
-        "values in the continuum, with their mean error, where [accuracy] asked for them, else on "
-        "the grid."
+        "Means over seeds, +- half the width of the 95 % confidence interval (Student's t). "
+        "With [accuracy] the values are those in the continuum, and the interval includes their "
+        "mean error; otherwise they are those on the grid."
     )
     return Table(caption, SEEDS, groups)
 

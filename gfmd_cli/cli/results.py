@@ -47,7 +47,7 @@ def analyze(study: Path, as_json: bool, figures: Path | None, theory: "Theory") 
         print_text(str(comparison))
     if comparison.missing:
         note = (
-            f"{count(comparison.missing, 'task')} not solved yet, or failed; `gfmd status "
+            f"{count(comparison.missing, 'task')} not solved yet or failed; `gfmd status "
             f"{typed(study)}` prints the errors."
         )
         if as_json:

@@ -45,7 +45,7 @@ def write_heights(path: Path, heights: Any) -> dict[str, Any]:
     for name in UNIT_NAMES:  # a quantity of pint or astropy, whose unit NumPy drops
         if hasattr(heights, name):
             raise InputError(
-                f"heights: an array with the unit {getattr(heights, name)}; give plain numbers, "
+                f"heights: the array has the unit {getattr(heights, name)}; give plain numbers, "
                 "in metres unless surface.scale states the unit"
             )
     try:

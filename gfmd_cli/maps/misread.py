@@ -212,9 +212,9 @@ def _broken(heights: Field) -> str:
     if not on < MAX_CONTINUED * usual:
         return ""
     return (
-        f"the lines of {points} heights go on in the next line, with {on / usual:.0%} of the "
-        "difference of neighbouring lines: was each line of the map saved in several lines? Save "
-        "it in one"
+        f"each line of {points} heights seems to continue in the next one: the step from its end "
+        f"to the next beginning is {on / usual:.0%} of the usual difference of neighbouring lines; "
+        "if each line of the map was saved in several lines, save it in one"
     )
 
 

@@ -99,10 +99,10 @@ def _spectrum(curve: Curve) -> Spectrum:
 CAPTION = (
     "Power spectral density of the surface, C(q) = A ⟨|h(q)|²⟩: the variance of the heights in a "
     "band of wavenumber over the number of its modes, times the area A of the cell (of a line its "
-    "length), so that ⟨h²⟩ = ∫ C(q) d²q / (2π)² (of a line ∫ C(q) dq / 2π). Modes that the surface "
-    "lacks, as one of equal tiles or of grooves does, are not counted. Waves shorter than two grid "
-    "points along a side are left out. A map that is not periodic is tapered towards its borders. "
-    "Lines: the self-affine surface nearest to it."
+    "length), so that ⟨h²⟩ = ∫ C(q) d²q / (2π)² (of a line ∫ C(q) dq / 2π). Modes with zero "
+    "amplitude, as in a surface of equal tiles or grooves, are not counted. Waves shorter than two "
+    "grid points along a side are left out. A map that is not periodic is tapered towards its "
+    "borders. Lines: the self-affine surface nearest to it."
 )
 FITS = (TableColumn("surface", "surface"), *FIT)
 FIT_CAPTION = (

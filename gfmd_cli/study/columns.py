@@ -138,8 +138,8 @@ _STRESS = ("middle of the stress bin / Delta_sigma", "Pr(sigma) Delta_sigma")
 _GAP = ("middle of the gap bin / h_std", "Pr(g) h_std")
 _AREA = (
     "middle of the area bin / L^2; for a line contact, / L",
-    "Pr(A) L^2, for a line contact Pr(A) L, by number of patches; larger patches are in the last "
-    "bin",
+    "Pr(A) L^2, for a line contact Pr(A) L, by number of patches; the last bin includes larger "
+    "ones",
 )
 HISTOGRAMS = (
     HistogramColumn("histogram", PR_LINEAR, "sigma", *_STRESS, LINEAR_EDGES, logarithmic=False),

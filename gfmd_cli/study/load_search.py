@@ -179,8 +179,8 @@ def _out_of_reach(task: Task, scene: Scene) -> InputError:
             "points of the grid"
         )
     return InputError(
-        f"load.mean_gap: {task.load:g} h_std are never reached: without load it is "
-        f"{scene.highest:g}"
+        f"load.mean_gap = {task.load:g} h_std is not reached: without load the mean gap is "
+        f"{scene.highest:g} h_std"
     )
 
 

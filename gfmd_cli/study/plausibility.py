@@ -85,8 +85,8 @@ def warnings_of(task: Task, solved: TaskSolution, results: Mapping[str, Any]) ->
     if max(results.get("filled_contact", 0.0), results.get("filled_load", 0.0)) > MAX_CHANGED_SHARE:
         yield (
             f"more than {MAX_CHANGED_SHARE:.0%} of the contact or of the load is where heights are "
-            "missing and were filled in (see the columns filled_contact and filled_load): do the "
-            "highest points lack a height? Contact area, stress and gap are then uncertain"
+            "missing and were filled in (see the columns filled_contact and filled_load): if the "
+            "highest points lack a height, contact area, stress and gap are uncertain"
         )
     if scene.may_touch is not None and solved.observables.u_g < 0:
         yield (

@@ -163,10 +163,14 @@ def small_pressure(studies: StoredStudies, folder: Path) -> list[Finding]:
     finish(plot, folder, "small_pressure", "log", "linear", np.concatenate(xs), [0, 3.7])
     limits_text = ", ".join(f"{limit:.2g} at {label(n)}" for n, limit in limits.items())
     missing = ", ".join(label(n) for n in limits if label(n) not in ratios)
-    left_out = f" Not judged, with less than two decades below it: {missing}." if missing else ""
+    left_out = (
+        f" Less than two decades of the studied range are below this pressure, so that they are not judged: {missing}."
+        if missing
+        else ""
+    )
     further = (
-        f" In the decades below these two the fall, over that of the first, is {'; '.join(lower)}: a "
-        "finite surface has a highest point."
+        f" In the decades below these two the fall over that of the first decade is {'; '.join(lower)}, "
+        "because a finite surface has a highest point."
         if lower
         else ""
     )

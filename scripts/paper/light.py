@@ -160,8 +160,8 @@ def light_deviation(studies: StoredStudies, folder: Path) -> list[Finding]:
                 },
             },
             f"Equal increments mean a logarithm; {_spacings(grids)} points per λₛ: {cases}. "
-            f"{sample(studies, 'light')} On 2048² (102 points per λₛ, seeds 0 to 3) the next ratios are "
-            "1.03 ± 0.02, 1.03 ± 0.01 and 1.00 ± 0.01.",
+            f"{sample(studies, 'light')} On 2048² (102 points per λₛ, seeds 0 to 3) the next ratios, "
+            "at p* = 0.3, 0.5 and 1, are 1.03 ± 0.02, 1.03 ± 0.01 and 1.00 ± 0.01.",
         ),
         Finding(
             "rise",
