@@ -36,7 +36,7 @@ from gfmd_cli.study.load_search import solve_at_load
 from gfmd_cli.study.measure import all_columns
 from gfmd_cli.study.plausibility import SEPARATOR
 from gfmd_cli.study.reading import read_rows, solved_rows
-from gfmd_cli.study.refinement import forget_scene
+from gfmd_cli.study.refinement import forget_scenes
 from gfmd_cli.study.resources import usable_memory
 from gfmd_cli.study.run import RunOptions, run_study
 from gfmd_cli.study.tasks import plan
@@ -213,7 +213,7 @@ def _with_map(tables: Tables, path: Path, keys: Tables) -> Tables:
 def _solve(spec: Path | str | Tables, threads: int) -> Result:
     tasks = plan(_read(spec)[0])
     if tasks[0].surface.file or tasks[0].elastomer.file:
-        forget_scene()
+        forget_scenes()
     if len(tasks) != 1:
         raise InputError(f"solve computes one contact, the spec has {len(tasks)}; use run()")
     context = SolveContext(WorkerOptions(threads, usable_memory()))

@@ -113,8 +113,13 @@ class Curve:
     @property
     def units(self) -> tuple[float, float]:
         """Delta_sigma [Pa] and h_std [m] of the spectrum."""
-        row = self.spectrum_row or self.rows[0]
+        row = self.row_of_spectrum
         return row["delta_sigma"], row["h_std"]
+
+    @property
+    def row_of_spectrum(self) -> Row:
+        """A contact on the grid of the spectrum."""
+        return self.spectrum_row or self.rows[0]
 
     @property
     def has_theory(self) -> bool:

@@ -46,14 +46,14 @@ class TableColumn:
 
     def cell(self, record: Record) -> str:
         """The value of a record as it is printed."""
-        value = _value(record, self.value)
+        value = value_in(record, self.value)
         if not known(value):
             return str(record.get(self.otherwise) or BLANK)
         if isinstance(value, bool):
             return "yes" if value else "no"
         if isinstance(value, str):
             return value
-        error = _value(record, self.error)
+        error = value_in(record, self.error)
         return plus_minus(value, abs(error)) if known(error) else format(value, self.format)
 
 
@@ -99,13 +99,13 @@ class Table:
             column
             for column in self.declared
             if not column.optional
-            or any(known(_value(record, column.value)) for record in self.records)
+            or any(known(value_in(record, column.value)) for record in self.records)
         ]
 
     @cached_property
     def alignments(self) -> list[str]:
         """The side of each column to which its cells are aligned: words left, numbers right."""
-        cells = ([_value(row, column.value) for row in self.records] for column in self.columns)
+        cells = ([value_in(row, column.value) for row in self.records] for column in self.columns)
         is_text = (any(isinstance(value, str | bool) for value in values) for values in cells)
         return ["left" if words else "right" for words in is_text]
 
@@ -156,7 +156,8 @@ def _html_cell(text: str) -> str:
     return "–" if text == BLANK else escape(text.replace("+-", "±"))
 
 
-def _value(record: Record, value: Value) -> Any:
+def value_in(record: Record, value: Value) -> Any:
+    """The value of a record: that of a key, or that of a function of the record."""
     return value(record) if callable(value) else record.get(value)
 
 

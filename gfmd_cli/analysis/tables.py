@@ -26,6 +26,7 @@ from gfmd_cli.analysis.table import (
     known,
     product,
     ratio,
+    value_in,
 )
 from gfmd_cli.analysis.wording import contact_title, grid_size, in_si, shown
 from gfmd_cli.grid.arrays import Field
@@ -153,13 +154,7 @@ def _columns_of(observable: Observable) -> list[TableColumn]:
 
 def _of_dimension(dimension: int, value: Value) -> Callable[[Record], Any]:
     """A value of the contacts of one dimension; None of the others."""
-
-    def of_record(record: Record) -> Any:
-        if record["dimension"] != dimension:
-            return None
-        return record[value] if isinstance(value, str) else value(record)
-
-    return of_record
+    return lambda record: value_in(record, value) if record["dimension"] == dimension else None
 
 
 IN_TABLE = tuple(observable for observable in OBSERVABLES if observable.heading)

@@ -260,6 +260,11 @@ class Scene:
     """Makes a contact of the scene from the first fields of `Contact`."""
 
     @property
+    def has_voids(self) -> bool:
+        """Whether some points never touch."""
+        return self.may_touch is not None
+
+    @property
     def highest(self) -> float:
         """Largest height that can touch [h_std]: the mean gap without load."""
         known = self.height if self.may_touch is None else self.height[self.may_touch]

@@ -119,6 +119,11 @@ class Estimate:
     is_too_coarse: bool = False
     """Whether a single contact has too few points for an error of sigma_p: a finer grid helps."""
 
+    @property
+    def is_final(self) -> bool:
+        """Whether no finer grid gives a smaller error."""
+        return self.verdict.is_final and not self.is_too_coarse
+
 
 UNKNOWN = Estimate(nan, nan, nan, Verdict.UNKNOWN)
 NO_ERRORS = dict.fromkeys(QUANTITIES, 0.0)

@@ -141,11 +141,10 @@ def changed_fractions(
     of heights that were filled in; none where the surface has no such points.
     """
     zones = {"edge": surface.tapered(grid), "filled": surface.filled(grid)}
+    known = {name: zone for name, zone in zones.items() if zone is not None}
     fractions: dict[str, float] = {}
-    for name, zone in zones.items():
-        if zone is None:
-            continue
-        load = contact_pressure(height, u, sigma)
+    load = contact_pressure(height, u, sigma) if known else sigma
+    for name, zone in known.items():
         sums = [[np.count_nonzero(part), part.sum()] for part in (load[zone], load)]
         inside, whole = grid.total(np.array(sums))
         shares = np.divide(inside, whole, out=np.full(2, np.nan), where=whole > 0).tolist()

@@ -89,7 +89,7 @@ def surface_spectrum(data: ReportData) -> Section:
 
 def _spectrum(curve: Curve) -> Spectrum:
     """The spectrum of the surface of a curve."""
-    row = curve.spectrum_row or curve.rows[0]
+    row = curve.row_of_spectrum
     axes = slice(-row["dimension"], None)
     sides = (row["length_y"], row["length"])[axes]
     points = (row["points_y"], row["points"])[axes]

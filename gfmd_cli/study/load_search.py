@@ -29,13 +29,7 @@ from gfmd_cli.study.forecast import FIRST
 from gfmd_cli.study.measure import measured
 from gfmd_cli.study.notes import Trial
 from gfmd_cli.study.plausibility import loaded_value
-from gfmd_cli.study.refinement import (
-    TaskSolution,
-    has_voids,
-    is_final,
-    solve_on_grids,
-    task_scene,
-)
+from gfmd_cli.study.refinement import TaskSolution, solve_on_grids, task_scene
 from gfmd_cli.study.tasks import Task
 
 # Choices, which change the number of trials (one to three on a grid) and hardly the result:
@@ -117,12 +111,12 @@ def _check_known(task: Task, solved: TaskSolution) -> None:
     if estimate is None or isfinite(estimate.continuum):
         return
     remedy = "leave out [accuracy] for the value on the grid"
-    if has_voids(solved.scene):
+    if solved.scene.has_voids:
         raise InputError(
             f"load.{task.quantity}: no continuum value is known with surface.missing = "
             f'"void"; {remedy}'
         )
-    if is_final(estimate):
+    if estimate.is_final:
         raise InputError(
             f"load.{task.quantity}: {LOADS[task.quantity].words} {estimate.verdict.explanation}; "
             f"{remedy}"

@@ -11,13 +11,7 @@ from gfmd_cli.physics.indenters import RigidSurface
 from gfmd_cli.physics.spectrum_fit import moments
 from gfmd_cli.spec.models import LOADS
 from gfmd_cli.status import Status
-from gfmd_cli.study.refinement import (
-    TaskSolution,
-    border_share,
-    has_voids,
-    inaccurate_columns,
-    is_final,
-)
+from gfmd_cli.study.refinement import TaskSolution, border_share, inaccurate_columns
 from gfmd_cli.study.tasks import Task
 from gfmd_cli.units import LARGEST_RMS_HEIGHT
 
@@ -88,7 +82,7 @@ def warnings_of(task: Task, solved: TaskSolution, results: Mapping[str, Any]) ->
             "missing and were filled in (see the columns filled_contact and filled_load): if the "
             "highest points lack a height, contact area, stress and gap are uncertain"
         )
-    if scene.may_touch is not None and solved.observables.u_g < 0:
+    if scene.has_voids and solved.observables.u_g < 0:
         yield (
             "the mean gap is negative: where heights are missing, the elastomer enters the holes "
             "deeper than the interpolated heights, from which the gap is counted"
@@ -167,13 +161,13 @@ def _load_in_jump(task: Task, status: Status, results: Mapping[str, Any]) -> Ite
 def _missed_accuracy(task: Task, solved: TaskSolution) -> Iterator[str]:
     """Warnings if a fixed grid misses the requested accuracy; with "auto" that is a status."""
     columns = [] if task.auto else inaccurate_columns(task, solved)
-    if columns and has_voids(solved.scene):
+    if columns and solved.scene.has_voids:
         yield (
             f"[accuracy]: no error of {', '.join(columns)} is known on any grid with "
             'surface.missing = "void"'
         )
         return
-    final = [name for name in columns if is_final(solved.estimates[name])]
+    final = [name for name in columns if solved.estimates[name].is_final]
     for name in final:
         yield f"[accuracy] is met on no grid: {name} {solved.estimates[name].verdict.explanation}"
     if others := [name for name in columns if name not in final]:

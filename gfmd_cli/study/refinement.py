@@ -80,20 +80,19 @@ def task_scene(task: Task, points: int, context: SolveContext) -> Scene:
     Consecutive tasks mostly share their scenes. Those of grids with at least four times the points
     are kept: together with a solve they take less memory than a solve on their grid.
     """
-    description = task.surface, task.elastomer, context.options.threads, context.ranks
-    scenes = _scenes(get_ident(), task.boundary, *description)
+    shared = context.options.threads, context.ranks
+    scenes = _scenes(get_ident(), task.boundary, task.surface, task.elastomer, *shared)
     shape = task.points_y_on(points), points
     for other in set(scenes) - {shape}:
         if prod(other) < 4 * prod(shape):
             del scenes[other]
     if shape not in scenes:
-        surface, elastomer, *shared = description
         build = SCENES[task.boundary]
-        scenes[shape] = build(surface, elastomer, points, *shared, points_y=shape[0])
+        scenes[shape] = build(task.surface, task.elastomer, points, *shared, points_y=shape[0])
     return scenes[shape]
 
 
-def forget_scene() -> None:
+def forget_scenes() -> None:
     """Free the memory of the last scenes."""
     _scenes.cache_clear()
 
@@ -197,12 +196,7 @@ def _continues(task: Task, solved: TaskSolution, grids: int, options: WorkerOpti
 def _is_improvable(estimate: Estimate, grids: int) -> bool:
     """Whether a grid finer than the `grids` so far may give a smaller error."""
     is_settled = estimate.verdict is Verdict.UNKNOWN and grids >= ENOUGH
-    return not (is_final(estimate) or (is_settled and not estimate.is_too_coarse))
-
-
-def is_final(estimate: Estimate) -> bool:
-    """Whether no finer grid gives a smaller error."""
-    return estimate.verdict.is_final and not estimate.is_too_coarse
+    return not (estimate.is_final or (is_settled and not estimate.is_too_coarse))
 
 
 def inaccurate_columns(task: Task, solved: TaskSolution) -> list[str]:
@@ -253,7 +247,7 @@ def border_share(contact: Contact, solution: Solution) -> float:
 def _estimates(task: Task, solved: TaskSolution, grids: list[SolvedGrid]) -> dict[str, Estimate]:
     """Distance of the finest grid to the continuum, in the units of its scene."""
     scene = solved.scene
-    if not solved.solution.residual < UNSOLVED or has_voids(scene):
+    if not solved.solution.residual < UNSOLVED or scene.has_voids:  # voids have no law
         return unknown()
     resolution, length = scene.grid.resolution, scene.grid.length
     if discretisation_error.has_step(task.elastomer, resolution, length):
@@ -301,11 +295,6 @@ def _between_points(task: Task, solved: TaskSolution) -> dict[str, float]:
     return full_contact_errors(
         solved.contact, sigma, curvature, reduced, solved.observables.sigma_p
     )
-
-
-def has_voids(scene: Scene) -> bool:
-    """Whether points never touch, for which no law of the errors is known on any grid."""
-    return scene.may_touch is not None
 
 
 def scales_of(scene: Scene, band_limited: bool) -> discretisation_error.RoughnessScales:

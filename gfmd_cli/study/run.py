@@ -18,7 +18,7 @@ from gfmd_cli.status import Status
 from gfmd_cli.study.context import Progress, Report, SolveContext, WorkerOptions
 from gfmd_cli.study.measure import forget_spectra
 from gfmd_cli.study.pool import solve_in_pool
-from gfmd_cli.study.refinement import forget_scene
+from gfmd_cli.study.refinement import forget_scenes
 from gfmd_cli.study.resources import check_memory, jobs_and_threads, seconds_to_stop, usable_memory
 from gfmd_cli.study.result import Outcome
 from gfmd_cli.study.run_task import attempt
@@ -84,7 +84,7 @@ def run_study(
     """
     ranks = options.ranks
     forget_files()
-    forget_scene()
+    forget_scenes()
     stop = Event()
     waits = Waits(stop if ranks is None else None)  # ranks stop together
     study = Study(path, waits)

@@ -114,7 +114,7 @@ def _plates(studies: StoredStudies, grids: list[Group]) -> list[Finding]:
         Finding(
             "plate_limit",
             {quantity: ratios},
-            f"a_r from grid to grid: {steps}. On 2048² (seeds 0 and 1) the next ratios are 0.41, 0.34 and "
+            f"a_r from grid to grid: {steps}. On 2048² (`configs/paper/light.toml`, seeds 0 and 1) the next ratios are 0.41, 0.34 and "
             "0.45 at p* = 0.3, 0.5 and 1.",
         ),
     ]
@@ -160,7 +160,7 @@ def light_deviation(studies: StoredStudies, folder: Path) -> list[Finding]:
                 },
             },
             f"Equal increments mean a logarithm; {_spacings(grids)} points per λₛ: {cases}. "
-            f"{sample(studies, 'light')} On 2048² (102 points per λₛ, seeds 0 to 3) the next ratios, "
+            f"{sample(studies, 'light')} On 2048² (`configs/paper/light.toml`, 102 points per λₛ, seeds 0 to 3) the next ratios, "
             "at p* = 0.3, 0.5 and 1, are 1.03 ± 0.02, 1.03 ± 0.01 and 1.00 ± 0.01.",
         ),
         Finding(
