@@ -1,5 +1,6 @@
 # Two commands on a fresh machine: `make demo` and `make test`.
 VENV := .venv
+PYTHON := python3
 LOWEST := .venv-lowest
 BIN := $(VENV)/bin
 RESULTS := results
@@ -8,7 +9,7 @@ export PYTHONDONTWRITEBYTECODE := # empty: without bytecode every process of the
 .PHONY: demo test test-portable test-lowest test-faults test-kills test-mpi test-slurm test-browser check validate docs wheel smoke memory paper paper-quick clean
 
 $(VENV)/.core: pyproject.toml
-	python3 -m venv $(VENV)
+	$(PYTHON) -m venv $(VENV)
 	$(BIN)/pip install --quiet --disable-pip-version-check -e ".[plot]"
 	touch $@
 
