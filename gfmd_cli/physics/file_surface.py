@@ -30,8 +30,7 @@ from gfmd_cli.maps.map_preparation import (
 )
 from gfmd_cli.maps.pictures import Picture, picture
 from gfmd_cli.maps.topography import Region, Topography, read_topography
-from gfmd_cli.physics.highest_point import highest_point
-from gfmd_cli.physics.indenters import SMALLEST_GRID, RigidSurface
+from gfmd_cli.physics.indenters import SMALLEST_GRID, RigidSurface, forget_peaks
 from gfmd_cli.spec_table import FilePath, Positive
 from gfmd_cli.units import count
 
@@ -254,9 +253,12 @@ class FileSurface(RigidSurface):
         """Height of the highest point [m]: of the map, or of the Fourier series through it."""
         if self.missing == "void" and self._topography().holes:
             return None
-        if not self.band_limited:
-            return float(_prepared(self).max())
-        return _peak(self)
+        return super().peak() if self.band_limited else float(_prepared(self).max())
+
+    def resolved_heights(self) -> Field:
+        """Heights [m] at the points of the map, reflected at its borders if it has any."""
+        heights = _prepared(self)
+        return mirror(heights) if self._is_reflected() else heights
 
     def tapered_map(self) -> "FileSurface | None":
         """The map with tapered edges, scaled to its own power; None where it is periodic."""
@@ -382,8 +384,7 @@ class TaperedMap(FileSurface):
 @lru_cache(maxsize=16)
 def _suited_interpolation(surface: FileSurface) -> Interpolation:
     """The interpolation that suits a map; cached, because it needs a transform."""
-    heights = _prepared(surface)
-    return suited_interpolation(mirror(heights) if surface._is_reflected() else heights)
+    return suited_interpolation(surface.resolved_heights())
 
 
 _read = lru_cache(maxsize=4)(read_topography)
@@ -405,13 +406,6 @@ def _prepared(surface: FileSurface) -> Field:
             )
         heights = fill_missing(heights, missing)
     return make_periodic(heights, surface.edges or "none", surface.taper)
-
-
-@lru_cache(maxsize=16)
-def _peak(surface: FileSurface) -> float:
-    """Highest point of a Fourier series [m]; cached like the file."""
-    heights = _prepared(surface)
-    return highest_point(mirror(heights) if surface._is_reflected() else heights)
 
 
 @lru_cache(maxsize=16)
@@ -462,7 +456,6 @@ def _warnings_on_heights(surface: FileSurface) -> tuple[str, ...]:
 
 def forget_files() -> None:
     """Drop the maps that were read, so that a file that has changed is read again."""
-    for cached in (
-        _read, _prepared, _peak, _smallest_grid, _suited_interpolation, _warnings_on_heights,
-    ):  # fmt: skip
+    forget_peaks()
+    for cached in (_read, _prepared, _smallest_grid, _suited_interpolation, _warnings_on_heights):
         cached.cache_clear()

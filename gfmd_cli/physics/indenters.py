@@ -155,6 +155,11 @@ class RigidSurface(SpecTable):
             return None
         return _highest_point(self)
 
+    def resolved_heights(self) -> Field:
+        """Heights [m] of a band-limited surface, with more than two points per wave."""
+        points_y = self.smallest_grid_y() + 2 if self.dimension == 2 else 1
+        return self.heights(self.smallest_grid() + 2, points_y)
+
     def tapered_map(self) -> "RigidSurface | None":
         """A map that is not periodic, tapered for its spectrum; None for other surfaces."""
         return None
@@ -175,9 +180,7 @@ class RigidSurface(SpecTable):
 @lru_cache(maxsize=16)
 def _highest_point(surface: RigidSurface) -> float:
     """Cached: all contacts of a surface have the same."""
-    points_y = surface.smallest_grid_y() + 2 if surface.dimension == 2 else 1
-    # more than two points per wave along both axes
-    return highest_point(surface.heights(surface.smallest_grid() + 2, points_y))
+    return highest_point(surface.resolved_heights())
 
 
 def forget_peaks() -> None:
