@@ -65,7 +65,7 @@ class Power(LinearElastomer):
         return self.k_n * np.where(q > 0, np.power(np.where(q > 0, q, 1.0), self.n), 0.0)
 
     @property
-    def uniform_stiffness(self) -> float | None:
+    def uniform_stiffness(self) -> float | None:  # type: ignore[override]
         """k_0 of springs, n = 0."""
         return self.k_n if self.n == 0 else None
 
@@ -241,7 +241,7 @@ class Layer(LinearElastomer):
         return warnings
 
     @property
-    def uniform_stiffness(self) -> float:
+    def uniform_stiffness(self) -> float:  # type: ignore[override]
         """E* / t of a sliding layer, E (1 - nu) / (1 + nu) (1 - 2 nu) t of a bonded one [Pa/m]."""
         if self.base == "sliding" or self.poisson is None:
             return self.E_star / self.thickness
@@ -249,7 +249,7 @@ class Layer(LinearElastomer):
         return self.E_star * (1 - nu) ** 2 / ((1 - 2 * nu) * self.thickness)
 
     @property
-    def largest_displacement(self) -> float:
+    def largest_displacement(self) -> float:  # type: ignore[override]
         """The thickness."""
         return self.thickness
 
@@ -330,7 +330,7 @@ class Tabulated(LinearElastomer):
         return compliance_of_table(read_table(self.path).tobytes())
 
     @property
-    def uniform_stiffness(self) -> float | None:
+    def uniform_stiffness(self) -> float | None:  # type: ignore[override]
         """k of the first row of the table [Pa/m] if it is constant there, else None."""
         table = read_table(self.path)
         return float(table[0, 1]) if abs(end_exponents(table)[0]) < ROUNDED_EXPONENT else None
