@@ -46,6 +46,7 @@ class FileSurface(RigidSurface):
 
     rough: ClassVar[bool] = True
     is_map: ClassVar[bool] = True
+    coarsening: ClassVar[str] = "surface.region takes a part of the map"
     is_centred: ClassVar[bool] = False
     """Where the points of finer grids lie, see `interpolation.positions`."""
     kind: Literal["file"] = "file"
@@ -150,10 +151,6 @@ class FileSurface(RigidSurface):
         """Reason for the smallest grid: the points of the map."""
         return f"a map of {extent(self._topography().heights.shape)} points"
 
-    def coarsening(self) -> str:
-        """A part of the map."""
-        return "surface.region takes a part of the map"
-
     def parameters(self) -> dict[str, Any]:
         """Value of every key, with the defaults that depend on the file as they are applied."""
         return super().parameters() | {
@@ -233,11 +230,13 @@ class FileSurface(RigidSurface):
             heights = self.scale * heights
         return level(heights, self.levelling(), known)
 
-    def tapered(self, grid: Grid) -> Mask | None:
-        """Points of a grid whose heights the window has changed."""
-        if self.edges != "window":
-            return None
-        return window(grid.whole_shape, self.taper)[grid.own] < 1.0
+    def changed(self, grid: Grid) -> dict[str, Mask]:
+        """Points of a grid that the window has changed, and nearest to heights filled in."""
+        zones = {}
+        if self.edges == "window":
+            zones["edge"] = window(grid.whole_shape, self.taper)[grid.own] < 1.0
+        filled = self._missing_on(grid) if self.missing == "fill" else None
+        return zones if filled is None else zones | {"filled": filled}
 
     def mirrored(self) -> "FileSurface | None":
         """The map mirrored to twice its sides; None if it is periodic or made so.
@@ -269,10 +268,6 @@ class FileSurface(RigidSurface):
     def void(self, grid: Grid) -> Mask | None:
         """Points of a grid nearest to a missing height of the map, if these never touch."""
         return self._missing_on(grid) if self.missing == "void" else None
-
-    def filled(self, grid: Grid) -> Mask | None:
-        """Points of a grid nearest to a missing height of the map, if these are filled in."""
-        return self._missing_on(grid) if self.missing == "fill" else None
 
     def _missing_on(self, grid: Grid) -> Mask | None:
         """Points of a grid nearest to a missing height of the map; None without one."""
