@@ -4,7 +4,6 @@ A dimension scale of HDF5, which is a coordinate variable of netCDF, has the pos
 along one axis. An array without scales is a bare one.
 """
 
-from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -71,11 +70,6 @@ def factor(name: str, unit: str) -> float | None:
             f"{name} states the unit {unit!r}; known are {', '.join(KNOWN_UNITS)}: convert it"
         )
     return metres
-
-
-def is_transposed(axes: Sequence[Axis]) -> bool:
-    """Whether an array is indexed [x, y], by the names of its axes."""
-    return [AXIS_NAMES.get(axis.name.lower()) for axis in axes] == ["x", "y"]
 
 
 def axis_of(file: Any, dimension: Any) -> Axis:

@@ -15,7 +15,7 @@ import numpy as np
 
 from gfmd_cli.errors import InputError
 from gfmd_cli.files.checksums import MAX_COMPRESSION
-from gfmd_cli.maps.array_coordinates import axis_of, factor, is_transposed, stated_unit
+from gfmd_cli.maps.array_coordinates import AXIS_NAMES, axis_of, factor, stated_unit
 from gfmd_cli.units import count, left_out
 
 MAX_MAP_BYTES = 2**33  # 32768 x 32768 heights in double precision
@@ -170,7 +170,7 @@ def _with_coordinates(file: Any, data: Any, bare: HeightMap) -> HeightMap:
     """
     heights = bare.heights
     axes = [axis_of(file, each) for each in data.dims][-heights.ndim :]
-    if is_transposed(axes):
+    if [AXIS_NAMES.get(axis.name.lower()) for axis in axes] == ["x", "y"]:
         heights, axes = heights.T, axes[::-1]
     steps = [axis.step for axis in axes if axis.step is not None]
     if len(steps) < len(axes):
