@@ -4,11 +4,11 @@ Equation numbers are those of Mueser, "Elastic contacts of randomly rough surfac
 spatial dimensions".
 """
 
-import warnings
 from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, ClassVar, Literal, Self
+from warnings import catch_warnings
 
 import numpy as np
 from pydantic import Field as Key
@@ -352,16 +352,13 @@ def _compliance_of_table(content: bytes) -> Compliance:
 
 
 def _read_table(path: Path) -> Field:
-    """The columns q [1/m] and k [Pa/m], shape (rows, 2), from a text.
-
-    Between them are spaces, tabs, commas or semicolons. Raises InputError for an invalid table.
-    """
+    """The columns q [1/m] and k [Pa/m], shape (rows, 2). Raises InputError for an invalid table."""
     try:
         # stat first: it says that there is no such file
         if path.stat().st_size > MAX_TABLE_BYTES or not path.is_file():
             raise ValueError(f"not a regular file of at most {MAX_TABLE_BYTES} bytes")
         lines = path.read_text("utf-8-sig").translate(SEPARATORS).splitlines()
-        with warnings.catch_warnings(action="ignore", category=UserWarning):
+        with catch_warnings(action="ignore", category=UserWarning):
             table = np.loadtxt(lines, ndmin=2)  # warns of an empty file, refused below
     except (OSError, ValueError) as error:
         raise InputError(
@@ -373,8 +370,8 @@ def _read_table(path: Path) -> Field:
             f"{path}: elastomer.path: {table.shape[0]} rows, {table.shape[1]} columns; "
             "at least two rows of two columns, q and k, are needed"
         )
-    is_positive = np.all(np.isfinite(table)) and np.all(table > 0)
-    if not (is_positive and np.all(np.diff(table[:, 0]) > 0)):
+    is_positive = np.isfinite(table) & (table > 0)
+    if not (is_positive.all() and np.all(np.diff(table[:, 0]) > 0)):
         raise InputError(
             f"{path}: elastomer.path: q and k must be finite and positive; q must increase"
         )
