@@ -1,6 +1,5 @@
 """Tables as spreadsheets, stages and geographic programs write them: rounded, quoted, marked."""
 
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -445,7 +444,7 @@ def test_a_channel_of_a_signal_is_not_taken_as_the_heights():
     def chosen(*names, dataset=None):
         found = channels(*names)
         reader = SimpleNamespace(channels=found, default_channel=found[0], format=lambda: "gwy")
-        return _height_channel(Path("scan.gwy"), reader, dataset).channel_id
+        return _height_channel(reader, dataset).channel_id
 
     assert chosen("Deflection Error", "Height") == "Height"
     assert chosen("Height", "Deflection Error") == "Height"

@@ -87,8 +87,8 @@ def other_tasks(rows: list[dict[str, Any]]) -> list[str]:
         return []
     lines = [f"the study also contains {count(len(rows), 'contact')} of other specs:"]
     for scene, group in list(scenes.items())[:MAX_SCENES]:
-        loads = sorted({row["p_star"] for row in group})
-        ends = " to ".join(f"{load:.4g}" for load in dict.fromkeys([loads[0], loads[-1]]))
+        loads = [row["p_star"] for row in group]
+        ends = " to ".join(dict.fromkeys(f"{end:.4g}" for end in (min(loads), max(loads))))
         lines.append(f"  {len(group)} with {scene}, p* = {ends}")
     return [*lines, *(f"  {line}" for line in left_out(len(scenes), MAX_SCENES, "scene"))]
 

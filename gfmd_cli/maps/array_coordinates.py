@@ -4,8 +4,6 @@ A dimension scale of HDF5, which is a coordinate variable of netCDF, has the pos
 along one axis. An array without scales is a bare one.
 """
 
-from collections.abc import Sequence
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -64,23 +62,17 @@ def in_metres(unit: str) -> float | None:
     return METRES_PER_UNIT.get(unit.strip().strip("[]()").strip())
 
 
-def factor(path: Path, name: str, unit: str) -> float | None:
+def factor(name: str, unit: str) -> float | None:
     """Metres per unit, None without a unit. Raises InputError for an unknown one."""
     metres = in_metres(unit)
     if unit and metres is None:
         raise InputError(
-            f"{path}: {name} states the unit {unit!r}; known are {', '.join(KNOWN_UNITS)}: "
-            "convert it"
+            f"{name} states the unit {unit!r}; known are {', '.join(KNOWN_UNITS)}: convert it"
         )
     return metres
 
 
-def is_transposed(axes: Sequence[Axis]) -> bool:
-    """Whether an array is indexed [x, y], by the names of its axes."""
-    return [AXIS_NAMES.get(axis.name.lower()) for axis in axes] == ["x", "y"]
-
-
-def axis_of(path: Path, file: Any, dimension: Any) -> Axis:
+def axis_of(file: Any, dimension: Any) -> Axis:
     """One axis of a dataset. Raises InputError for uneven positions, or an unknown unit."""
     from gfmd_cli.files.hdf5 import take
 
@@ -99,7 +91,7 @@ def axis_of(path: Path, file: Any, dimension: Any) -> Axis:
     rounding = np.spacing(np.abs(stored).max()) if stored.dtype.kind == "f" else 0.0
     if not (np.abs(steps - step) <= EVEN_TOLERANCE * abs(step) + rounding).all() or step == 0:
         raise InputError(
-            f"{path}: the positions {label!r} are not evenly spaced: resample the map, or save it "
+            f"the positions {label!r} are not evenly spaced: resample the map, or save it "
             "without them"
         )
-    return Axis(label, step, factor(path, repr(label), stated_unit(scale)))
+    return Axis(label, step, factor(repr(label), stated_unit(scale)))

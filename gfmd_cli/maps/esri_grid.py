@@ -15,7 +15,7 @@ NO_DATA = -9999.0  # where the header does not state another value
 def read_esri_grid(path: Path, dataset: str | None) -> HeightMap:
     """Read an ESRI ASCII grid, whose lengths have no unit. Raises InputError."""
     if dataset is not None:
-        raise InputError(f"{path}: an ESRI grid holds one map; leave out dataset {dataset!r}")
+        raise InputError(f"an ESRI grid holds one map; leave out dataset {dataset!r}")
     header: dict[str, float] = {}
     with path.open("rb") as file:
         lines = iter(file)
@@ -25,14 +25,12 @@ def read_esri_grid(path: Path, dataset: str | None) -> HeightMap:
                 break
             header[words[0]] = float(words[1])
         if absent := [key for key in ("ncols", "nrows", "cellsize") if key not in header]:
-            raise InputError(f"{path}: the header of an ESRI grid has no {' and no '.join(absent)}")
+            raise InputError(f"the header of an ESRI grid has no {' and no '.join(absent)}")
         shape = int(header["nrows"]), int(header["ncols"])
-        check_layout(path, shape, np.dtype(float))
+        check_layout(shape, np.dtype(float))
         heights = np.loadtxt((each.replace(b",", b".") for each in (line, *lines)), ndmin=2)
     if heights.shape != shape:
-        raise InputError(
-            f"{path}: {extent(heights.shape)} heights, but the header states {extent(shape)}"
-        )
+        raise InputError(f"{extent(heights.shape)} heights, but the header states {extent(shape)}")
     missing = header.get("nodata_value", NO_DATA)
     sides = tuple(header["cellsize"] * points for points in shape)
     heights = np.ma.masked_equal(heights, missing)

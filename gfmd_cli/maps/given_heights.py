@@ -29,9 +29,16 @@ def write_heights(path: Path, heights: Any) -> dict[str, Any]:
     Returns the keys of the table [surface] that go with the heights. Raises InputError for anything
     but real numbers in rows of equal length, and for an array that xarray cannot write.
     """
-    if hasattr(heights, "to_netcdf") and hasattr(heights, "dims"):  # topographies have the first
-        _write_netcdf(path, heights)
-        return {}
+    # topographies have to_netcdf, too
+    is_labelled = hasattr(heights, "to_netcdf") and hasattr(heights, "dims")
+    try:
+        return (_write_netcdf if is_labelled else _write_array)(path, heights)
+    except InputError as error:
+        raise InputError(f"heights: {error}") from error
+
+
+def _write_array(path: Path, heights: Any) -> dict[str, Any]:
+    """Write an array or a topography; see `write_heights`."""
     unit, keys = "", dict[str, Any]()
     sides: tuple[float, ...] = ()
     if hasattr(heights, "physical_sizes"):
@@ -39,22 +46,22 @@ def write_heights(path: Path, heights: Any) -> dict[str, Any]:
         unit = "" if heights.unit is None else "m"
         try:
             scan = heights.to_unit(unit) if unit else heights
-            heights, sides = heights_and_sides(Path("heights"), scan, rows_along_y=False)
+            heights, sides = heights_and_sides(scan, rows_along_y=False)
         except ValueError as error:  # the unit is unknown, or not one of lengths
-            raise InputError(f"heights: {first_line(error)}") from error
+            raise InputError(first_line(error)) from error
     for name in UNIT_NAMES:  # a quantity of pint or astropy, whose unit NumPy drops
         if hasattr(heights, name):
             raise InputError(
-                f"heights: the array has the unit {getattr(heights, name)}; give plain numbers, "
+                f"the array has the unit {getattr(heights, name)}; give plain numbers, "
                 "in metres unless surface.scale states the unit"
             )
     try:
         values = np.ma.asarray(heights)
     except ValueError as error:
-        raise InputError(f"heights: rows of different lengths ({error})") from error
+        raise InputError(f"rows of different lengths ({error})") from error
     if np.ma.is_masked(values):
         keys["missing"] = "void"
-    check_layout(Path("heights"), values.shape, values.dtype)
+    check_layout(values.shape, values.dtype)
     with new_file(path) as fresh, new_hdf5(fresh) as file:
         data = file.create_dataset("heights", data=np.ma.filled(values.astype(float), np.nan))
         data.attrs["units"] = unit
@@ -66,19 +73,19 @@ def write_heights(path: Path, heights: Any) -> dict[str, Any]:
     return keys
 
 
-def _write_netcdf(path: Path, array: Any) -> None:
+def _write_netcdf(path: Path, array: Any) -> dict[str, Any]:
     """Write an array of xarray with its axes and units as netCDF, which is HDF5."""
     if not hasattr(array, "dtype"):
-        raise InputError("heights: a data set of xarray; choose one of its arrays")
-    check_type(Path("heights"), array.dtype)
+        raise InputError("a data set of xarray; choose one of its arrays")
+    check_type(array.dtype)
     try:
         bare = array.astype(np.float64).reset_coords(drop=True).drop_encoding().rename("heights")
         for each in (bare, *bare.coords.values()):
             each.attrs = {name: each.attrs[name] for name in READ if name in each.attrs}
         bare.to_netcdf(path, engine="h5netcdf")
     except ImportError as error:
-        raise InputError(f"heights: {first_line(error)}; {INSTALL.format('export')}") from error
+        raise InputError(f"{first_line(error)}; {INSTALL.format('export')}") from error
     except (NotImplementedError, TypeError, ValueError) as error:
-        raise InputError(
-            f"heights: an array of xarray is read as a netCDF file: {first_line(error)}"
-        ) from error
+        message = f"an array of xarray is read as a netCDF file: {first_line(error)}"
+        raise InputError(message) from error
+    return {}

@@ -15,7 +15,7 @@ import numpy as np
 
 from gfmd_cli.errors import InputError
 from gfmd_cli.files.checksums import MAX_COMPRESSION
-from gfmd_cli.maps.array_coordinates import axis_of, factor, is_transposed, stated_unit
+from gfmd_cli.maps.array_coordinates import AXIS_NAMES, axis_of, factor, stated_unit
 from gfmd_cli.units import count, left_out
 
 MAX_MAP_BYTES = 2**33  # 32768 x 32768 heights in double precision
@@ -56,29 +56,28 @@ class HeightMap:
     """Warnings about what the file states and the reader does not use."""
 
 
-def check_type(path: Path, dtype: np.dtype[Any]) -> None:
+def check_type(dtype: np.dtype[Any]) -> None:
     """Raise InputError for anything but real numbers."""
     if dtype.kind not in "iuf":
-        raise InputError(f"{path}: data of type {dtype}; heights are real numbers (int or float)")
+        raise InputError(f"data of type {dtype}; heights are real numbers (int or float)")
 
 
-def check_layout(path: Path, shape: tuple[int, ...], dtype: np.dtype[Any]) -> None:
+def check_layout(shape: tuple[int, ...], dtype: np.dtype[Any]) -> None:
     """Raise InputError for anything but real numbers on a map or a line, within the limits."""
-    check_type(path, dtype)
+    check_type(dtype)
     if len(shape) not in (1, 2):
         raise InputError(
-            f"{path}: data of shape {shape}; a height map has two dimensions, a line profile one"
+            f"data of shape {shape}; a height map has two dimensions, a line profile one"
         )
     if min(shape) < SMALLEST_MAP:
         profile = "; save a line profile as an array of one dimension" if len(shape) == 2 else ""
         raise InputError(
-            f"{path}: {extent(shape)} points; at least {SMALLEST_MAP} along each axis are needed"
-            f"{profile}"
+            f"{extent(shape)} points; at least {SMALLEST_MAP} along each axis are needed{profile}"
         )
     needed = math.prod(shape) * np.dtype(np.float64).itemsize
     if needed > MAX_MAP_BYTES:
         raise InputError(
-            f"{path}: {extent(shape)} heights take {needed} bytes; at most {MAX_MAP_BYTES} are "
+            f"{extent(shape)} heights take {needed} bytes; at most {MAX_MAP_BYTES} are "
             "allowed: resample the map, or save a part of it"
         )
 
@@ -96,9 +95,9 @@ def first_line(error: Exception) -> str:
 def read_npy(path: Path, dataset: str | None) -> HeightMap:
     """Map a `.npy` array into memory, which fails where the header states more than is stored."""
     if dataset is not None:
-        raise InputError(f"{path}: a .npy file holds one array; leave out dataset {dataset!r}")
+        raise InputError(f"a .npy file holds one array; leave out dataset {dataset!r}")
     mapped = np.lib.format.open_memmap(path, mode="r")  # reads neither pickles nor archives
-    check_layout(path, mapped.shape, mapped.dtype)
+    check_layout(mapped.shape, mapped.dtype)
     return HeightMap(heights=mapped, source=f"npy, {mapped.dtype}")
 
 
@@ -107,14 +106,14 @@ def read_hdf5(path: Path, dataset: str | None) -> HeightMap:
     from gfmd_cli.files.hdf5 import open_hdf5, take
 
     with open_hdf5(path) as file:
-        name = _dataset_name(path, file, dataset)
+        name = _dataset_name(file, dataset)
         shape = _map_shape(file[name].shape or ())
-        check_layout(path, shape, file[name].dtype)
+        check_layout(shape, file[name].dtype)
         data = take(file, name, MAX_COMPRESSION)
         packed = {key for key in CODING.keys() & data.attrs if data.attrs[key] != CODING[key]}
         if packed:
             raise InputError(
-                f"{path}: dataset {name!r} is packed ({', '.join(sorted(packed))}); "
+                f"dataset {name!r} is packed ({', '.join(sorted(packed))}); "
                 "store the heights themselves"
             )
         values = np.ma.asarray(data[()]).reshape(shape)
@@ -125,16 +124,16 @@ def read_hdf5(path: Path, dataset: str | None) -> HeightMap:
             if missing.dtype.kind == values.dtype.kind == "f":  # perhaps of another precision
                 missing = missing.astype(values.dtype)
             values = np.ma.masked_where(np.isin(values, missing), values)
-        values = _valid(path, name, data.attrs, values)
+        values = _valid(name, data.attrs, values)
         bare = HeightMap(heights=values, source=f"HDF5, {name}, {data.dtype}")
-        height_map = _with_coordinates(path, file, data, bare)
+        height_map = _with_coordinates(file, data, bare)
         if "spec_text" in file.attrs and name.startswith("fields/"):  # a study
             boundary = take(file, "boundary")[int(name.split("/")[1])]
             return replace(height_map, periodic=boundary != b"free")
         return height_map
 
 
-def _valid(path: Path, name: str, attributes: Any, values: Any) -> Any:
+def _valid(name: str, attributes: Any, values: Any) -> Any:
     """Heights, masked beyond the limits that the netCDF conventions name.
 
     Raises InputError for limits that are not numbers.
@@ -145,7 +144,7 @@ def _valid(path: Path, name: str, attributes: Any, values: Any) -> Any:
         limits = np.ravel(attributes[key])
         if limits.dtype.kind not in "iuf" or len(limits) != len(beyond):
             raise InputError(
-                f"{path}: dataset {name!r}: {key} must be {count(len(beyond), 'number')}, got "
+                f"dataset {name!r}: {key} must be {count(len(beyond), 'number')}, got "
                 f"{limits[:3].tolist()}"
             )
         if limits.dtype.kind == values.dtype.kind == "f":  # perhaps of another precision
@@ -162,7 +161,7 @@ def _map_shape(shape: tuple[int, ...]) -> tuple[int, ...]:
     return shape
 
 
-def _with_coordinates(path: Path, file: Any, data: Any, bare: HeightMap) -> HeightMap:
+def _with_coordinates(file: Any, data: Any, bare: HeightMap) -> HeightMap:
     """A map with the order of its axes, sides and units by its dimension scales.
 
     With units of heights and positions it is in metres and not periodic, as a microscope scan.
@@ -170,8 +169,8 @@ def _with_coordinates(path: Path, file: Any, data: Any, bare: HeightMap) -> Heig
     positions of one axis alone state a unit.
     """
     heights = bare.heights
-    axes = [axis_of(path, file, each) for each in data.dims][-heights.ndim :]
-    if is_transposed(axes):
+    axes = [axis_of(file, each) for each in data.dims][-heights.ndim :]
+    if [AXIS_NAMES.get(axis.name.lower()) for axis in axes] == ["x", "y"]:
         heights, axes = heights.T, axes[::-1]
     steps = [axis.step for axis in axes if axis.step is not None]
     if len(steps) < len(axes):
@@ -180,12 +179,12 @@ def _with_coordinates(path: Path, file: Any, data: Any, bare: HeightMap) -> Heig
     forward = tuple(slice(None, None, -1 if step < 0 else None) for step in steps)
     heights = heights[forward]
     sides = [abs(step) * points for step, points in zip(steps, heights.shape, strict=True)]
-    metres = factor(path, repr(data.name), stated_unit(data))
+    metres = factor(repr(data.name), stated_unit(data))
     metric = [axis.metres for axis in axes if axis.metres]
     if 0 < len(metric) < len(axes):
         bare_name = next(axis.name for axis in axes if not axis.metres)
         raise InputError(
-            f"{path}: the positions {bare_name!r} state no unit, those of the other axis do: add it"
+            f"the positions {bare_name!r} state no unit, those of the other axis do: add it"
         )
     if metres is not None:
         is_height = np.abs(heights) < MAX_HEIGHT  # in the unit of the file
@@ -202,7 +201,7 @@ def _with_coordinates(path: Path, file: Any, data: Any, bare: HeightMap) -> Heig
     )
 
 
-def _dataset_name(path: Path, file: Any, name: str | None) -> str:
+def _dataset_name(file: Any, name: str | None) -> str:
     """Path of the named dataset, or of the only map, or of the only line. Raises InputError."""
     from gfmd_cli.files.hdf5 import datasets_below, take
 
@@ -214,7 +213,7 @@ def _dataset_name(path: Path, file: Any, name: str | None) -> str:
     try:
         datasets = datasets_below(file)
     except ValueError as error:
-        raise InputError(f"{path}: {error}; choose one by surface.dataset") from error
+        raise InputError(f"{error}; choose one by surface.dataset") from error
     if is_study := "spec_text" in file.attrs:  # its other arrays are distributions
         datasets = {key: item for key, item in datasets.items() if key.startswith("fields/")}
     maps = _maps(datasets)
@@ -222,25 +221,25 @@ def _dataset_name(path: Path, file: Any, name: str | None) -> str:
         return chosen
     if name is not None:
         raise InputError(
-            f"{path}: no dataset {name!r} (links are not followed); its height maps: {listed(maps)}"
+            f"no dataset {name!r} (links are not followed); its height maps: {listed(maps)}"
         )
     if is_study and not maps:
         raise InputError(
-            f'{path}: a study that stores no heights; give fields = ["height"] in [output] of its '
+            'a study that stores no heights; give fields = ["height"] in [output] of its '
             "spec, and run that again"
         )
     if not maps:
-        raise InputError(f"{path}: no numeric dataset with one or two dimensions")
-    return only_map(path, maps)
+        raise InputError("no numeric dataset with one or two dimensions")
+    return only_map(maps)
 
 
-def only_map(path: Path, names: Sequence[str]) -> str:
+def only_map(names: Sequence[str]) -> str:
     """The only name, or the only one that means heights. Raises InputError if there are several."""
     heights = [name for name in names if name.rpartition("/")[-1].lower() in HEIGHT_NAMES]
     if len(names) == 1 or len(heights) == 1:
         return (heights or names)[0]
     raise InputError(
-        f"{path}: several datasets: choose one by surface.dataset; its height maps: "
+        "several datasets: choose one by surface.dataset; its height maps: "
         f"{listed(heights or names)}"
     )
 
@@ -261,7 +260,7 @@ def _maps(datasets: dict[str, Any]) -> list[str]:
     return maps or [key for key, item in numbers.items() if item.ndim == 1]
 
 
-def at_equal_distances(path: Path, x: Any, heights: Any) -> tuple[Any, tuple[float]]:
+def at_equal_distances(x: Any, heights: Any) -> tuple[Any, tuple[float]]:
     """Linear interpolation of a line profile at as many points, and the length of their cell.
 
     Raises InputError for positions that neither increase nor decrease.
@@ -271,7 +270,7 @@ def at_equal_distances(path: Path, x: Any, heights: Any) -> tuple[Any, tuple[flo
     wrong = np.flatnonzero(np.diff(x) <= 0)
     if wrong.size:
         raise InputError(
-            f"{path}: the positions along a profile must increase or decrease; "
+            "the positions along a profile must increase or decrease; "
             f"{x[wrong[0]]:.6g} is followed by {x[wrong[0] + 1]:.6g}"
         )
     points = len(x)

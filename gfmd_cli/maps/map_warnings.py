@@ -104,9 +104,8 @@ def many_filled_in(topography: Topography) -> str:
     if fraction <= MAX_FILLED:
         return ""
     return (
-        f"{fraction:.0%} of the heights are missing and were filled in: contact there was "
-        'not measured; set surface.region, or surface.missing = "void" where nothing can '
-        "touch"
+        f"{fraction:.0%} of the heights are missing and were filled in: contact there was not "
+        'measured; set surface.region, or surface.missing = "void" where nothing can touch'
     )
 
 
@@ -117,9 +116,8 @@ def unlikely_gradient(heights: Field, spacing: tuple[float, ...]) -> str:
     if not (gradient > MAX_GRADIENT or 0 < gradient < MIN_GRADIENT):
         return ""
     return (
-        f"rms gradient {gradient:.3g}: check that heights and side are in metres; "
-        "surface.scale is the factor from the heights of the file to metres, "
-        "surface.length the side"
+        f"rms gradient {gradient:.3g}: check that heights and side are in metres; surface.scale is "
+        "the factor from the heights of the file to metres, surface.length the side"
     )
 
 

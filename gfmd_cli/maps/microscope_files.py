@@ -47,7 +47,7 @@ MAX_UNEVENNESS = 0.25  # of rounded positions, over their distance; a choice
 def read_microscope_file(path: Path, dataset: str | None) -> HeightMap:
     """Read a microscope file by SurfaceTopography."""
     if path.stat().st_size > MAX_MAP_BYTES:
-        raise InputError(f"{path}: {path.stat().st_size} bytes; at most {MAX_MAP_BYTES} are read")
+        raise InputError(f"{path.stat().st_size} bytes; at most {MAX_MAP_BYTES} are read")
     with path.open("rb") as file, warnings.catch_warnings():
         ignored = (DeprecationWarning, FutureWarning, ImportWarning, RuntimeWarning)
         for category in ignored:  # of other packages
@@ -56,22 +56,17 @@ def read_microscope_file(path: Path, dataset: str | None) -> HeightMap:
             from SurfaceTopography.IO import readers
         except ImportError as error:
             raise InputError(
-                f"{path}: not .npy or HDF5; other formats need SurfaceTopography: "
+                "not .npy or HDF5; other formats need SurfaceTopography: "
                 f"{INSTALL.format('topography')}"
             ) from error
-        try:
-            table, warning = text_tables.with_blanks(text_tables.in_utf8(file))
-        except ValueError as error:
-            raise InputError(f"{path}: {error}") from error
-        height_map = read_points(path, table)
+        table, warning = text_tables.with_blanks(text_tables.in_utf8(file))
+        height_map = read_points(table)
         if height_map is None:
             table = text_tables.without_size(table)
             with _open_scan(path, table, readers) as reader:
                 height_map = _read_channel(path, table, reader, dataset)
         elif dataset is not None:
-            raise InputError(
-                f"{path}: a table of positions holds one map; leave out dataset {dataset!r}"
-            )
+            raise InputError(f"a table of positions holds one map; leave out dataset {dataset!r}")
     return replace(height_map, notes=tuple(filter(None, (*height_map.notes, warning))))
 
 
@@ -87,7 +82,7 @@ def _open_scan(path: Path, file: BinaryIO, readers: list[Any]) -> Any:
     for signature, name in TEXT_FORMATS.items():
         if start.startswith(signature):
             raise InputError(
-                f"{path}: {name} in text, whose header is not read; save it in binary form, or as "
+                f"{name} in text, whose header is not read; save it in binary form, or as "
                 "a table of x, y and height"
             )
     tables = text_tables.table_formats(file)
@@ -110,7 +105,7 @@ def _open_scan(path: Path, file: BinaryIO, readers: list[Any]) -> Any:
                 reasons.append(f"{reader.format()}: {row or first_line(error)}")
     if reasons:
         raise InputError(
-            f"{path}: SurfaceTopography recognises the format but cannot read the file "
+            "SurfaceTopography recognises the format but cannot read the file "
             f"({'; '.join(reasons)}): damaged, or a variant of the format? {REMEDY}"
         )
     if path.suffix.lower() in COMPRESSED:
@@ -121,7 +116,7 @@ def _open_scan(path: Path, file: BinaryIO, readers: list[Any]) -> Any:
         row = text_tables.shorter_or_longer_row(file) if b"\0" not in start else ""
         what = f"not in a known topography format{f' (as a matrix: {row})' if row else ''}"
     raise InputError(
-        f"{path}: {what}; .npy, HDF5 and the formats of SurfaceTopography can be read. {REMEDY}"
+        f"{what}; .npy, HDF5 and the formats of SurfaceTopography can be read. {REMEDY}"
     )
 
 
@@ -129,39 +124,39 @@ def _read_channel(path: Path, file: BinaryIO, reader: Any, dataset: str | None) 
     """Read one height channel of an open microscope file, in metres."""
     kind = reader.format()
     if kind == "hgt" and path.suffix.lower() != ".hgt":  # accepts any 2 n^2 bytes
-        raise InputError(f"{path}: not in a known topography format")
+        raise InputError("not in a known topography format")
     if kind == "npz":
-        raise InputError(f"{path}: an archive of NumPy arrays; save the map as a .npy file")
-    channel = _height_channel(path, reader, dataset)
+        raise InputError("an archive of NumPy arrays; save the map as a .npy file")
+    channel = _height_channel(reader, dataset)
     rows_along_y = kind == "mat"  # bare arrays; those of all other formats are [x, y]
     shape: tuple[int, ...] = (channel.nb_grid_pts or ())[:: 1 if rows_along_y else -1]
-    check_layout(path, shape, np.dtype(float))
+    check_layout(shape, np.dtype(float))
     unsized = channel.physical_sizes is None
     if kind == "ibw" and len(shape) == 1 and len(reader.channels) > 1:
         raise InputError(
-            f"{path}: an Igor wave of two dimensions with different numbers of points is read as "
+            "an Igor wave of two dimensions with different numbers of points is read as "
             f"curves, not as a map; save it with a third dimension of 1. {REMEDY}"
         )
     if len(shape) == 2:
-        _check_sides(path, channel)
+        _check_sides(channel)
     elif len(channel.physical_sizes or ()) > len(shape):
         raise InputError(
-            f"{path}: the header states two sides, but the table has one column, which is read as "
+            "the header states two sides, but the table has one column, which is read as "
             "the profile along a line; remove the second side, or save the rows of a map"
         )
     if kind == "nc":
-        _check_is_own_netcdf(path, reader)
+        _check_is_own_netcdf(reader)
     stored = channel.topography(physical_sizes=(1.0,) * len(shape) if unsized else None)
     scan = stored if stored.unit is None else stored.to_unit("m")
     lines = text_tables.header(file, (1, *shape[1:])[-1]) if kind == "asc" else []
     if kind == "asc" and len(shape) == 2:
-        _check_matrix(path, file, scan, unsized)
-        _check_nova(path, lines)
-        _check_wyko(path, _header(channel))
-    heights, sides = heights_and_sides(path, scan, rows_along_y)
+        _check_matrix(file, scan, unsized)
+        _check_nova(lines)
+        _check_wyko(_header(channel))
+    heights, sides = heights_and_sides(scan, rows_along_y)
     has_unit = scan.unit is not None
     if has_unit and kind in TABLE_FORMATS:
-        in_unit_of_file, _ = heights_and_sides(path, stored, rows_along_y)
+        in_unit_of_file, _ = heights_and_sides(stored, rows_along_y)
         heights = np.ma.masked_where(np.abs(in_unit_of_file) >= MAX_HEIGHT, heights)
     metric_sides = None if has_unit or unsized else _sides_with_unit(channel, sides)
     note, sides = "", metric_sides or sides
@@ -170,7 +165,7 @@ def _read_channel(path: Path, file: BinaryIO, reader: Any, dataset: str | None) 
     elif unsized:
         note = text_tables.unread_units(lines, of_sides=has_unit)
     elif has_unit or metric_sides:
-        _check_stated_sides(path, lines, sides)
+        _check_stated_sides(lines, sides)
     return HeightMap(
         notes=(note,),
         heights=heights,
@@ -183,47 +178,47 @@ def _read_channel(path: Path, file: BinaryIO, reader: Any, dataset: str | None) 
     )
 
 
-def heights_and_sides(path: Path, scan: Any, rows_along_y: bool) -> tuple[Any, tuple[float, ...]]:
+def heights_and_sides(scan: Any, rows_along_y: bool) -> tuple[Any, tuple[float, ...]]:
     """Heights and sides, indexed [y, x], of a topography; `rows_along_y` if its heights are.
 
     A profile with uneven distances is interpolated. Raises InputError for positions that neither
     increase nor decrease.
     """
     if not getattr(scan, "is_uniform", True):
-        return at_equal_distances(path, *scan.positions_and_heights())
+        return at_equal_distances(*scan.positions_and_heights())
     heights, sides = scan.heights(), tuple(map(float, scan.physical_sizes))[::-1]
     if len(sides) == 1 and sides[0] < 0:  # recorded backwards
         return heights[::-1], (-sides[0],)
     return heights if rows_along_y else heights.T, sides
 
 
-def _check_matrix(path: Path, file: BinaryIO, scan: Any, unsized: bool) -> None:
+def _check_matrix(file: BinaryIO, scan: Any, unsized: bool) -> None:
     """Raise InputError for a matrix that is not one of heights, or was not read to its end."""
     if unsized and scan.nb_grid_pts[0] < MATRIX_COLUMNS:
         raise InputError(
-            f"{path}: {NO_GRID}; a matrix of heights has at least {MATRIX_COLUMNS} columns, or "
+            f"{NO_GRID}; a matrix of heights has at least {MATRIX_COLUMNS} columns, or "
             f"a header that states its sides. {REMEDY}"
         )
-    _check_all_rows_read(path, file, *scan.nb_grid_pts)
-    check_all_are_heights(path, scan.heights().T, unsized=unsized)
+    _check_all_rows_read(file, *scan.nb_grid_pts)
+    check_all_are_heights(scan.heights().T, unsized=unsized)
 
 
-def _check_nova(path: Path, lines: list[bytes]) -> None:
+def _check_nova(lines: list[bytes]) -> None:
     """Raise InputError for a header of Nova with a factor, or with different units of the sides."""
     nova = dict(NOVA.findall(b"".join(lines)))
     factor = nova.get(b"Scale Data", b"1").replace(b",", b".")
     units = [nova[key].decode(errors="replace") for key in (b"Unit X", b"Unit Y") if key in nova]
     if not (is_number(factor) and float(factor) == 1.0):
         raise InputError(
-            f"{path}: the header states 'Scale Data = {factor.decode(errors='replace')}', which is "
+            f"the header states 'Scale Data = {factor.decode(errors='replace')}', which is "
             "not applied: are the heights those of the table, or to be multiplied? Save them "
             "multiplied, with a factor of 1"
         )
     if len(units) == 2 and units[0] != units[1] and len(set(map(in_metres, units))) > 1:
-        raise InputError(f"{path}: 'Unit Y' is not 'Unit X'; save both sides in the same unit")
+        raise InputError("'Unit Y' is not 'Unit X'; save both sides in the same unit")
 
 
-def _check_wyko(path: Path, header: dict[str, Any]) -> None:
+def _check_wyko(header: dict[str, Any]) -> None:
     """Raise InputError for a Wyko table of heights in wavelengths that are not converted.
 
     The reader takes them as nm unless it finds "Wavelength" and "Mult", both of type 7.
@@ -231,13 +226,13 @@ def _check_wyko(path: Path, header: dict[str, Any]) -> None:
     is_wyko = header.get("format_flavor") == "wyko" and not header.get("wyko_real_units")
     if is_wyko and not {"wyko_wavelength", "wyko_mult"} <= header.keys():
         raise InputError(
-            f"{path}: the heights of this Wyko table are in units of the wavelength, and its "
+            "the heights of this Wyko table are in units of the wavelength, and its "
             "header has no 'Wavelength' or no 'Mult' of type 7, so that they are not converted; "
             "export the heights in nm"
         )
 
 
-def _check_stated_sides(path: Path, lines: list[bytes], sides: tuple[float, ...]) -> None:
+def _check_stated_sides(lines: list[bytes], sides: tuple[float, ...]) -> None:
     """Raise InputError where the two sides that a header states are not those that were read.
 
     The reader takes every line with such a word as a side, for example "Max Height".
@@ -246,7 +241,7 @@ def _check_stated_sides(path: Path, lines: list[bytes], sides: tuple[float, ...]
     stated = text_tables.sides_in(of_sides)
     if len(stated) == 2 and not np.allclose(sorted(stated), sorted(sides), rtol=1e-6):
         raise InputError(
-            f"{path}: the header states two sides, {stated[0]:g} m and {stated[1]:g} m, but "
+            f"the header states two sides, {stated[0]:g} m and {stated[1]:g} m, but "
             f"another line makes them {sides[-1]:g} m and {sides[0]:g} m; remove that line"
         )
 
@@ -257,7 +252,7 @@ def _header(channel: Any) -> dict[str, Any]:
     return header if isinstance(header, dict) else {}
 
 
-def _check_is_own_netcdf(path: Path, reader: Any) -> None:
+def _check_is_own_netcdf(reader: Any) -> None:
     """Raise InputError for a classic netCDF file that SurfaceTopography has not written.
 
     The reader takes any map as [x, y], and reads neither positions nor the attribute `units`.
@@ -266,12 +261,12 @@ def _check_is_own_netcdf(path: Path, reader: Any) -> None:
     dimensions = variables[0].dimensions
     if dimensions == ("y", "x") or any(hasattr(each, "units") for each in variables):
         raise InputError(
-            f"{path}: a classic netCDF file (version 3), whose units and order of axes are not "
+            "a classic netCDF file (version 3), whose units and order of axes are not "
             "read; save it as netCDF 4"
         )
 
 
-def _check_sides(path: Path, channel: Any) -> None:
+def _check_sides(channel: Any) -> None:
     """Raise InputError where the header of a table states only one side, or sides without unit.
 
     The reader takes the unit of the heights as that of the sides, which is seldom true.
@@ -280,13 +275,13 @@ def _check_sides(path: Path, channel: Any) -> None:
     is_bare = "xunit" in header and not header["xunit"] and not header.get("yunit")
     if len(sides) == 2 and is_bare and header.get("zunit"):
         raise InputError(
-            f"{path}: the header states the unit of the heights, {header['zunit']}, but not of the "
+            f"the header states the unit of the heights, {header['zunit']}, but not of the "
             "sides; add it, as in '# Width: 20 um', or remove them and set surface.length"
         )
     if len(sides) == 1 or (not sides and "physical_size_y" in header):
         stated, other = ("Width", "Height") if sides else ("Height", "Width")
         raise InputError(
-            f"{path}: the header states the side along {'x' if sides else 'y'} ({stated}) alone; "
+            f"the header states the side along {'x' if sides else 'y'} ({stated}) alone; "
             f"add a line such as '# {other}: 20 um', or remove both and set surface.length"
         )
 
@@ -302,7 +297,7 @@ def _sides_with_unit(channel: Any, sides: tuple[float, ...]) -> tuple[float, ...
     return tuple(factor * side for factor, side in zip(factors, sides, strict=True) if factor)
 
 
-def check_all_are_heights(path: Path, table: Field, *, unsized: bool) -> None:
+def check_all_are_heights(table: Field, *, unsized: bool) -> None:
     """Raise InputError where a row or column of a table seems to be positions or numbers.
 
     The first value of such a row may be that of a corner. Where the header states the sides, only
@@ -315,7 +310,7 @@ def check_all_are_heights(path: Path, table: Field, *, unsized: bool) -> None:
         for first, second in (values[:2, 1:], values[:-3:-1, 1:]):
             if _largest_deviation(first) <= largest and _usual_deviation(second) > 4 * largest:
                 raise InputError(
-                    f"{path}: a {word} of the table is ..., {first[0]:g}, {first[1]:g}, "
+                    f"a {word} of the table is ..., {first[0]:g}, {first[1]:g}, "
                     f"{first[2]:g}, ...: positions or numbers, not heights? Remove it from the file"
                 )
     if unsized and table.shape[1] <= MAX_POINT_COLUMNS and len(table) > SORTED_ROWS:
@@ -325,7 +320,7 @@ def check_all_are_heights(path: Path, table: Field, *, unsized: bool) -> None:
             is_sorted &= np.mean(steps == 0, axis=0) > 0.5
         if np.any(is_sorted & np.any(steps, axis=0)):
             raise InputError(
-                f"{path}: one of {table.shape[1]} columns is sorted: positions, not heights? Save "
+                f"one of {table.shape[1]} columns is sorted: positions, not heights? Save "
                 "the columns x, y and height alone, or a matrix of heights"
             )
 
@@ -348,7 +343,7 @@ def _usual_deviation(values: Field) -> float:
     return float(np.median(np.abs(rest - np.median(rest))) / abs(step)) if step else np.inf
 
 
-def _check_all_rows_read(path: Path, file: BinaryIO, columns: int, rows: int) -> None:
+def _check_all_rows_read(file: BinaryIO, columns: int, rows: int) -> None:
     """Raise InputError where a table has more rows than were read, or is two tables.
 
     The reader skips lines with words, also in the table, where they would shift all rows below.
@@ -361,7 +356,7 @@ def _check_all_rows_read(path: Path, file: BinaryIO, columns: int, rows: int) ->
     if 0 < empty < rows - 1:
         number = lengths.index(0, first) + 1
         raise InputError(
-            f"{path}:{number}: an empty line in the table: several maps? Save each in its own file"
+            f":{number}: an empty line in the table: several maps? Save each in its own file"
         )
     is_one_map = lengths.count(columns) <= rows
     rows_above = 0
@@ -376,17 +371,17 @@ def _check_all_rows_read(path: Path, file: BinaryIO, columns: int, rows: int) ->
             len(marks) <= len(words) / 2 or (len(words) == columns and len(set(marks)) == 1)
         ):
             raise InputError(
-                f"{path}:{number}: {marks[0].decode(errors='replace')!r} in a row of the table "
+                f":{number}: {marks[0].decode(errors='replace')!r} in a row of the table "
                 "is not a number; write NaN for a missing height"
             )
         if is_one_map and 0 < rows_above < rows:
             raise InputError(
-                f"{path}:{number}: words between two rows of the table: several maps? Save each in "
+                f":{number}: words between two rows of the table: several maps? Save each in "
                 "its own file"
             )
 
 
-def _height_channel(path: Path, reader: Any, name: str | None) -> Any:
+def _height_channel(reader: Any, name: str | None) -> Any:
     """The named height channel of an open file, or its default one.
 
     Where the default channel holds no heights, the first one that does. Raises InputError.
@@ -397,21 +392,21 @@ def _height_channel(path: Path, reader: Any, name: str | None) -> Any:
         if channel.data_kind.value == "height" and not isinstance(channel.unit, tuple)
     }  # a channel with a pair of units holds phases or error signals over lengths
     if not channels:
-        raise InputError(f"{path}: no height channel, as in an image of grey values. {REMEDY}")
+        raise InputError(f"no height channel, as in an image of grey values. {REMEDY}")
     if name is None and reader.format() == "mat":  # arrays without a meaning
         maps = [key for key, item in channels.items() if min(item.nb_grid_pts) >= SMALLEST_MAP]
-        name = only_map(path, maps or list(channels))
+        name = only_map(maps or list(channels))
     elif name is None:
         default, maps = reader.default_channel.channel_id, list(channels)
         if len(maps) > 1:
             maps = [key for key in maps if HEIGHTS.search(key) or not SIGNALS.search(key)]
         if not maps:
             raise InputError(
-                f"{path}: its channels seem to be signals: {', '.join(channels)}; if one holds "
+                f"its channels seem to be signals: {', '.join(channels)}; if one holds "
                 "heights, name it in surface.dataset"
             )
         name = default if default in maps else maps[0]
     if name not in channels:
         known = ", ".join(channels)
-        raise InputError(f"{path}: no height channel {name!r}; its height channels: {known}")
+        raise InputError(f"no height channel {name!r}; its height channels: {known}")
     return channels[name]

@@ -2,7 +2,6 @@
 
 import re
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
@@ -41,7 +40,7 @@ WORDS = re.compile(r"[\[(]([^\])]*)[\])]|([^\W_]+)")
 UNITS_OF_GWYDDION = re.compile(r"(Lateral|Value) units:\s*(\S+)")
 
 
-def read_points(path: Path, file: BinaryIO) -> HeightMap | None:
+def read_points(file: BinaryIO) -> HeightMap | None:
     """Read a table of positions and heights; None for any other file.
 
     The columns are x, y and height, or x and height, unless the header names another order. Raises
@@ -55,21 +54,21 @@ def read_points(path: Path, file: BinaryIO) -> HeightMap | None:
     first = next((i for i, line in enumerate(lines) if _is_row(line.split(), count)), 0)
     is_sized = len(sides_in(lines[:first])) == 2
     try:
-        table = _numbers(path, lines, first, count)
+        table = _numbers(lines, first, count)
     except InputError:
         if is_sized:
             return None
         raise
-    if is_sized and not _are_points(path, table):
+    if is_sized and not _are_points(table):
         return None
     if count == 3 and _is_numbered(table):
         table, count = table[:, 1:], 2
-    order, factors = _header(path, lines[:first], count)
+    order, factors = _header(lines[:first], count)
     table = table[:, order]
     if not np.isfinite(table[:, :-1]).all():
-        raise InputError(f"{path}: a position in the table is missing or infinite")
+        raise InputError("a position in the table is missing or infinite")
     table[np.abs(table[:, -1]) >= MAX_HEIGHT, -1] = np.nan  # a mark, in the unit of the file
-    heights, sides, note = _grid(path, table) if count == 3 else _profile(path, table)
+    heights, sides, note = _grid(table) if count == 3 else _profile(table)
     *of_sides, of_heights = factors or [None] * count
     return HeightMap(
         heights=heights if of_heights is None else of_heights * heights,
@@ -86,35 +85,35 @@ def _is_row(words: list[bytes], count: int) -> bool:
     return len(words) == count and all(map(is_number, words[:-1])) and is_height(words[-1])
 
 
-def _numbers(path: Path, lines: list[bytes], first: int, count: int) -> Field:
+def _numbers(lines: list[bytes], first: int, count: int) -> Field:
     """The table that begins in a line, NaN where heights are missing."""
     try:
         return np.loadtxt(lines[first:], comments=None, ndmin=2)
     except ValueError:  # a mark, or another line
-        return np.loadtxt(_rows(path, lines, first, count), comments=None, ndmin=2)
+        return np.loadtxt(_rows(lines, first, count), comments=None, ndmin=2)
 
 
-def _rows(path: Path, lines: list[bytes], first: int, count: int) -> Iterator[bytes]:
+def _rows(lines: list[bytes], first: int, count: int) -> Iterator[bytes]:
     """The rows of a table, with NaN in the place of marks. Raises InputError for other lines."""
     for number, line in enumerate(lines[first:], first + 1):
         words = [] if line.startswith(b"#") else line.split()
         if words and not _is_row(words, count):
             text = b" ".join(words).decode(errors="replace")
             raise InputError(
-                f"{path}:{number}: {text!r} in a table of {count} columns of numbers; write NaN "
+                f":{number}: {text!r} in a table of {count} columns of numbers; write NaN "
                 "for a missing height"
             )
         if words:
             yield b" ".join([*words[:-1], words[-1] if is_number(words[-1]) else b"nan"])
 
 
-def _are_points(path: Path, table: Field) -> bool:
+def _are_points(table: Field) -> bool:
     """Whether a table below a header with two sides is one of positions, not a narrow matrix."""
     if table.shape[1] == 2:
         steps = np.diff(table[:, 0])
         return bool(steps.size >= MIN_STEPS and (np.all(steps > 0) or np.all(steps < 0)))
     try:
-        _grid(path, table)
+        _grid(table)
     except InputError:
         return False
     return True
@@ -128,7 +127,7 @@ def _is_numbered(table: Field) -> bool:
     return bool(np.ptp(table[:, 1]) > 0 and _steps(table[:, 1:2], indices)[1] <= MAX_DEVIATION)
 
 
-def _header(path: Path, lines: list[bytes], count: int) -> tuple[list[int], list[float | None]]:
+def _header(lines: list[bytes], count: int) -> tuple[list[int], list[float | None]]:
     """The places of x, y and height among the columns, and metres per unit of each of these.
 
     There are no factors if no unit is stated. Raises InputError for an unknown unit, and where some
@@ -151,10 +150,10 @@ def _header(path: Path, lines: list[bytes], count: int) -> tuple[list[int], list
         units.append(stated.get("Value", ""))
     if is_unclear or "" in units[:-1]:
         raise InputError(
-            f"{path}: the header of the table states units, but not one for each of the {count} "
+            f"the header of the table states units, but not one for each of the {count} "
             "columns, as 'x [um] z [nm]' does: add them, or remove the header"
         )
-    return order, [factor(path, "the header of the table", unit) for unit in units]
+    return order, [factor("the header of the table", unit) for unit in units]
 
 
 def _columns_in(text: str, count: int) -> tuple[list[str], list[str]]:
@@ -183,7 +182,7 @@ def _columns_in(text: str, count: int) -> tuple[list[str], list[str]]:
     return names, units
 
 
-def _grid(path: Path, table: Field) -> tuple[Field, tuple[float, ...], str]:
+def _grid(table: Field) -> tuple[Field, tuple[float, ...], str]:
     """Heights [y, x] and sides of the points of a full grid. Raises InputError for other points."""
     positions = table[:, :2]
     candidates = []
@@ -197,18 +196,18 @@ def _grid(path: Path, table: Field) -> tuple[Field, tuple[float, ...], str]:
         points, counts = np.unique(positions, axis=0, return_counts=True)
         x, y = points[counts.argmax()].tolist()
         times = f": the point x = {x:g}, y = {y:g} is given {counts.max()} times"
-        raise InputError(f"{path}: {NO_GRID}{times if counts.max() > 1 else ''}")
+        raise InputError(f"{NO_GRID}{times if counts.max() > 1 else ''}")
     missing, shape, indices = min(candidates, key=lambda candidate: candidate[0])
     steps, deviation = _steps(positions, indices)
     if deviation.max() > MAX_DEVIATION:
         raise InputError(
-            f"{path}: the positions along {'xy'[int(deviation.argmax())]} are not evenly spaced: "
+            f"the positions along {'xy'[int(deviation.argmax())]} are not evenly spaced: "
             f"they deviate by up to {deviation.max():.2g} of their distance, and rounding by at "
             f"most {MAX_DEVIATION:g}: resample the map"
         )
     if missing:
         raise InputError(
-            f"{path}: {missing} of the {shape[1]} x {shape[0]} points of the grid are missing: add "
+            f"{missing} of the {shape[1]} x {shape[0]} points of the grid are missing: add "
             "their positions, with NaN as height"
         )
     heights = np.empty(shape)
@@ -216,12 +215,12 @@ def _grid(path: Path, table: Field) -> tuple[Field, tuple[float, ...], str]:
     return heights, (float(steps[1] * shape[0]), float(steps[0] * shape[1])), ""
 
 
-def _profile(path: Path, table: Field) -> tuple[Field, tuple[float, ...], str]:
+def _profile(table: Field) -> tuple[Field, tuple[float, ...], str]:
     """Heights and length of a profile, NaN at points of equal distance that are missing.
 
     Interpolated if the distances are not equal.
     """
-    check_layout(path, table.shape[:1], table.dtype)
+    check_layout(table.shape[:1], table.dtype)
     x, heights = table.T if table[0, 0] <= table[-1, 0] else table[::-1].T
     gaps = np.diff(x)
     if gaps.min() > 0:
@@ -232,7 +231,7 @@ def _profile(path: Path, table: Field) -> tuple[Field, tuple[float, ...], str]:
             whole = np.full(points, np.nan)
             whole[index.astype(np.int64)] = heights
             return whole, (float(steps[0]) * points,), ""
-    heights, sides = at_equal_distances(path, x, heights)
+    heights, sides = at_equal_distances(x, heights)
     return heights, sides, ", interpolated at equal distances"
 
 

@@ -15,6 +15,7 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
+from gfmd_cli.errors import InputError
 from gfmd_cli.maps.array_coordinates import in_metres
 from gfmd_cli.units import count
 
@@ -163,7 +164,7 @@ def with_blanks(file: BinaryIO) -> tuple[BinaryIO, str]:
     A comma between two digits is a decimal one where blanks or semicolons separate the numbers.
     Any other file is returned as it is: the readers of positions know commas and semicolons.
 
-    Returns the table, and a warning or "". Raises ValueError if the commas can separate thousands.
+    Returns the table, and a warning or "". Raises InputError if the commas can separate thousands.
     """
     warning = ""
     start = part(file, 0, WINDOW_BYTES)
@@ -172,12 +173,12 @@ def with_blanks(file: BinaryIO) -> tuple[BinaryIO, str]:
     whole = start.splitlines()[: -1 if len(start) == WINDOW_BYTES else None]
     rows = list(filter(is_numeric, whole)) if width else []
     if cell := next(filter(None, map(GROUPED.search, rows)), None):
-        raise ValueError(f"{cell[1].decode()}: blanks separate thousands; save the numbers without")
+        raise InputError(f"{cell[1].decode()}: blanks separate thousands; save the numbers without")
     has_others = any(b";" in row or b"\t" in row for row in rows)
     separators = SEPARATORS[:-1] if has_others else SEPARATORS
     is_shifted = width >= MATRIX_COLUMNS and any(_has_empty_cells(rows, by) for by in separators)
     if is_shifted or any(map(EMPTY.search, rows)):
-        raise ValueError("an empty cell in a row of numbers; write NaN for a missing height")
+        raise InputError("an empty cell in a row of numbers; write NaN for a missing height")
     if b"," in table or b";" in table:
         numbers = columns(file, b" \t;")
         is_decimal = numbers > 1 and re.search(rb"\d,\d", table)
@@ -210,7 +211,7 @@ def _has_empty_cells(rows: list[bytes], separator: bytes) -> bool:
 def _warning_of_thousands(start: bytes, width: int) -> str:
     """Warning if each number of a table has a comma where it could separate thousands.
 
-    One number such as 0,125 or 1,5 shows that the commas are decimal. Raises ValueError if only
+    One number such as 0,125 or 1,5 shows that the commas are decimal. Raises InputError if only
     some of the numbers have such a comma, as where it separates thousands.
     """
     lines = [line for line in start.splitlines() if is_numeric(line)]
@@ -222,7 +223,7 @@ def _warning_of_thousands(start: bytes, width: int) -> str:
     first = with_comma[0].decode()
     others = [word for word in numbers if word.count(b",") != 1 or b"." in word]
     if others:
-        raise ValueError(
+        raise InputError(
             f"{first} beside {others[0].decode()}: does the comma separate thousands or decimals? "
             "Save the numbers with decimal points and without separators of thousands"
         )
@@ -234,7 +235,7 @@ def in_utf8(file: BinaryIO) -> BinaryIO:
 
     Any other file as it is.
 
-    Raises ValueError where commas separate the numbers and are also parts of them, in quotes.
+    Raises InputError where commas separate the numbers and are also parts of them, in quotes.
     """
     start = part(file, 0, WINDOW_BYTES)
     end = part(file, max(0, file.seek(0, os.SEEK_END) - WINDOW_BYTES))
@@ -253,7 +254,7 @@ def in_utf8(file: BinaryIO) -> BinaryIO:
     except UnicodeDecodeError:
         content = content.decode("latin-1").encode()
     if commas := QUOTED_COMMAS.search(content):
-        raise ValueError(
+        raise InputError(
             f"{commas[0].decode()} has a comma in quotes and one as separator; save the numbers "
             "with decimal points, or separate them by semicolons"
         )

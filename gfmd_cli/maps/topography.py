@@ -143,17 +143,11 @@ def read_topography(
 
     Raises InputError, which states the file, its content, and what is needed.
     """
-    if not path.exists():
-        raise InputError(f"{path}: no such file")
-    if not path.is_file():
-        kind = "a directory" if path.is_dir() else "not a regular file"
-        raise InputError(f"{path}: {kind}; a height map file is needed")
-    if path.stat().st_size == 0:
-        raise InputError(f"{path}: the file is empty")
     try:
-        return _checked(path, _reader(path)(path, dataset), region, flip, crop)
-    except InputError:
-        raise
+        return _checked(_reader(path)(path, dataset), region, flip, crop)
+    except InputError as error:
+        where = path if str(error).startswith(":") else f"{path}: "  # ":12: ..." names a line
+        raise InputError(f"{where}{error}") from error
     except MemoryError as error:
         raise InputError(f"{path}: too large for the memory that is available") from error
     except OSError as error:
@@ -165,7 +159,14 @@ def read_topography(
 
 
 def _reader(path: Path) -> Callable[[Path, str | None], HeightMap]:
-    """The function that reads a file, by its suffix or its first bytes."""
+    """The function that reads a file, by its suffix or its first bytes. Raises InputError."""
+    if not path.exists():
+        raise InputError("no such file")
+    if not path.is_file():
+        kind = "a directory" if path.is_dir() else "not a regular file"
+        raise InputError(f"{kind}; a height map file is needed")
+    if path.stat().st_size == 0:
+        raise InputError("the file is empty")
     with path.open("rb") as file:
         start = file.read(SIGNATURE_BYTES)
     if path.suffix.lower() == ".npy" or start.startswith(np.lib.format.MAGIC_PREFIX):
@@ -179,30 +180,28 @@ def _reader(path: Path) -> Callable[[Path, str | None], HeightMap]:
     return read_microscope_file
 
 
-def _checked(
-    path: Path, data: HeightMap, region: Region | None, flip: bool, crop: bool
-) -> Topography:
+def _checked(data: HeightMap, region: Region | None, flip: bool, crop: bool) -> Topography:
     """The chosen part of a map, with every height checked. Raises InputError."""
     shape = tuple(map(int, data.heights.shape))
-    spacing = _spacing(path, data, shape)
+    spacing = _spacing(data, shape)
     part = data.heights
     if region is not None:
         try:
             part = part[region.slices(shape, spacing if data.metres else None)]
         except ValueError as error:
-            raise InputError(f"{path}: surface.region: {error}") from error
+            raise InputError(f"surface.region: {error}") from error
     if crop and part.ndim == 2:
         side = min(part.shape) // 2 * 2
         first = [(points - side) // 2 for points in part.shape]
         part = part[tuple(slice(a, a + side) for a in first)]
     heights = np.ma.filled(np.ma.asarray(part).astype(np.float64), np.nan)
     if data.sides is None and heights.ndim == 2:
-        _check_is_matrix(path, shape)
-        check_all_are_heights(path, heights, unsized=False)
+        _check_is_matrix(shape)
+        check_all_are_heights(heights, unsized=False)
     missing: Mask = ~(np.abs(heights) < MAX_HEIGHT)
     if missing.all():
         raise InputError(
-            f"{path}: all of the {missing.size} heights are NaN, infinite or marked as missing"
+            f"all of the {missing.size} heights are NaN, infinite or marked as missing"
         )
     heights = np.ascontiguousarray(np.where(missing, 0.0, -heights if flip else heights))
     heights.flags.writeable = False
@@ -213,16 +212,16 @@ def _checked(
     return Topography(**vars(data) | checked | measures)
 
 
-def _check_is_matrix(path: Path, shape: tuple[int, ...]) -> None:
+def _check_is_matrix(shape: tuple[int, ...]) -> None:
     """Raise InputError for an array with so few rows or columns that they are no map."""
     if min(shape) < MATRIX_COLUMNS <= MANY_POINTS < max(shape):
         raise InputError(
-            f"{path}: an array of {extent(shape)} numbers: positions and heights, not a map? Save "
+            f"an array of {extent(shape)} numbers: positions and heights, not a map? Save "
             "the heights as a matrix, or a line profile as an array of one dimension"
         )
 
 
-def _spacing(path: Path, data: HeightMap, shape: tuple[int, ...]) -> tuple[float, ...] | None:
+def _spacing(data: HeightMap, shape: tuple[int, ...]) -> tuple[float, ...] | None:
     """Distance between neighbouring points along each axis, None where the file does not state it.
 
     Raises InputError where it is not positive.
@@ -231,7 +230,7 @@ def _spacing(path: Path, data: HeightMap, shape: tuple[int, ...]) -> tuple[float
         return None
     steps = [side / points for side, points in zip(data.sides, shape, strict=True)]
     if not all(np.isfinite(step) and step > 0 for step in steps):
-        raise InputError(f"{path}: the sides of the map are {data.sides}; they must be positive")
+        raise InputError(f"the sides of the map are {data.sides}; they must be positive")
     if max(steps) - min(steps) <= SPACING_TOLERANCE * max(steps):
         steps = [steps[-1]] * len(steps)
     return tuple(map(float, steps))

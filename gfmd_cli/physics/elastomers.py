@@ -4,8 +4,11 @@ Equation numbers are those of Mueser, "Elastic contacts of randomly rough surfac
 spatial dimensions".
 """
 
+from collections.abc import Callable
 from functools import lru_cache
+from pathlib import Path
 from typing import Annotated, ClassVar, Literal, Self
+from warnings import catch_warnings
 
 import numpy as np
 from pydantic import Field as Key
@@ -14,17 +17,12 @@ from pydantic import model_validator
 from gfmd_cli.errors import InputError
 from gfmd_cli.grid.arrays import Field, Mask
 from gfmd_cli.grid.fft_grid import ALL_ROWS, Shape
-from gfmd_cli.physics.compliance_transforms import Compliance
+from gfmd_cli.maps.interpolation import monotone_cubic
+from gfmd_cli.physics.compliance_transforms import Compliance, separated
 from gfmd_cli.physics.contact import Scene
 from gfmd_cli.physics.free_compliance import Spacings
 from gfmd_cli.physics.linear_elastomer import LinearElastomer
 from gfmd_cli.physics.persson import gamma_slab
-from gfmd_cli.physics.stiffness_table import (
-    compliance_of_table,
-    end_exponents,
-    interpolated,
-    read_table,
-)
 from gfmd_cli.spec_table import FilePath, Positive
 from gfmd_cli.units import LARGEST_RMS_HEIGHT, labelled
 
@@ -43,6 +41,8 @@ MAX_EXTRAPOLATED = 0.1  # fraction of squared stress or height beyond a table; a
 MAX_FALLING = 0.5  # fraction of squared stress at waves where the k(q) of a table falls; a choice
 FALLING_EXPONENT = -0.05  # of k(q), over an octave, so that rounded numbers do not count; a choice
 OCTAVE = np.log(2)
+MAX_TABLE_BYTES = 2**20  # a choice, some 40000 rows
+SEPARATORS = str.maketrans(",;", "  ")  # of columns, beside spaces and tabs
 ROUNDED_EXPONENT = 1e-3  # of the first rows of a table, whose numbers may be rounded; a choice
 
 
@@ -65,7 +65,7 @@ class Power(LinearElastomer):
         return self.k_n * np.where(q > 0, np.power(np.where(q > 0, q, 1.0), self.n), 0.0)
 
     @property
-    def uniform_stiffness(self) -> float | None:
+    def uniform_stiffness(self) -> float | None:  # type: ignore[override]
         """k_0 of springs, n = 0."""
         return self.k_n if self.n == 0 else None
 
@@ -241,7 +241,7 @@ class Layer(LinearElastomer):
         return warnings
 
     @property
-    def uniform_stiffness(self) -> float:
+    def uniform_stiffness(self) -> float:  # type: ignore[override]
         """E* / t of a sliding layer, E (1 - nu) / (1 + nu) (1 - 2 nu) t of a bonded one [Pa/m]."""
         if self.base == "sliding" or self.poisson is None:
             return self.E_star / self.thickness
@@ -249,7 +249,7 @@ class Layer(LinearElastomer):
         return self.E_star * (1 - nu) ** 2 / ((1 - 2 * nu) * self.thickness)
 
     @property
-    def largest_displacement(self) -> float:
+    def largest_displacement(self) -> float:  # type: ignore[override]
         """The thickness."""
         return self.thickness
 
@@ -284,13 +284,13 @@ class Tabulated(LinearElastomer):
 
     def stiffness(self, q: Field, length: float = 1.0) -> Field:
         """k(q) [Pa/m]. Raises InputError for an invalid table."""
-        k = interpolated(read_table(self.path))
+        k = _interpolated(_read_table(self.path))
         return np.where(q > 0, k(np.where(q > 0, q, 1.0)), 0.0)
 
     def warnings(self, scene: Scene, boundary: str, *, is_rough: bool) -> list[str]:
         """See `LinearElastomer.warnings`."""
         q, variance = scene.shells.q, scene.shells.variance
-        first, *_, last = read_table(self.path)[:, 0]
+        first, *_, last = _read_table(self.path)[:, 0]
         beyond = (q < first) | (q > last)
         of_stress = _fraction(variance, beyond), "squared stress in full contact"
         of_height = _fraction(variance / self.stiffness(q) ** 2, beyond), "squared height"
@@ -313,13 +313,13 @@ class Tabulated(LinearElastomer):
 
     def decays(self, dimension: int) -> bool:
         """Whether the power law below the table rises less than q^dimension."""
-        exponent = end_exponents(read_table(self.path))[0]
+        exponent = _end_exponents(_read_table(self.path))[0]
         return -ROUNDED_EXPONENT <= exponent < dimension - ROUNDED_EXPONENT
 
     def check_free_boundary(self, dimension: int) -> None:
         """Raise InputError for exponents that have no compliance kernel."""
         super().check_free_boundary(dimension)
-        if not end_exponents(read_table(self.path))[1] > 0:
+        if not _end_exponents(_read_table(self.path))[1] > 0:
             raise InputError(
                 'grid.boundary: "free" needs a table k(q) that rises at its upper end; the '
                 'compliance of this one has no kernel: use "periodic"'
@@ -327,13 +327,13 @@ class Tabulated(LinearElastomer):
 
     def compliance(self) -> Compliance:
         """1/k(q) between the rows of the table and beyond."""
-        return compliance_of_table(read_table(self.path).tobytes())
+        return _compliance_of_table(_read_table(self.path).tobytes())
 
     @property
-    def uniform_stiffness(self) -> float | None:
+    def uniform_stiffness(self) -> float | None:  # type: ignore[override]
         """k of the first row of the table [Pa/m] if it is constant there, else None."""
-        table = read_table(self.path)
-        return float(table[0, 1]) if abs(end_exponents(table)[0]) < ROUNDED_EXPONENT else None
+        table = _read_table(self.path)
+        return float(table[0, 1]) if abs(_end_exponents(table)[0]) < ROUNDED_EXPONENT else None
 
 
 @lru_cache(maxsize=4)
@@ -341,6 +341,60 @@ def _compliance_of_layer(layer: Layer) -> Compliance:
     """The compliance of a layer; cached, because its transforms serve all grids."""
     t = layer.thickness
     return Compliance(layer.stiffness, np.array([LONG_WAVE / t]), 0.0, reach=DECAY_DISTANCE * t)
+
+
+@lru_cache(maxsize=4)
+def _compliance_of_table(content: bytes) -> Compliance:
+    """1/k(q) from the bytes of a table; cached, because its transforms serve all grids."""
+    table = np.frombuffer(content).reshape(-1, 2)
+    exponent = max(_end_exponents(table)[0], 0.0)  # of rounded numbers it may be negative
+    return Compliance(_interpolated(table), separated(table[:, 0]), exponent)
+
+
+def _read_table(path: Path) -> Field:
+    """The columns q [1/m] and k [Pa/m], shape (rows, 2). Raises InputError for an invalid table."""
+    try:
+        # stat first: it says that there is no such file
+        if path.stat().st_size > MAX_TABLE_BYTES or not path.is_file():
+            raise ValueError(f"not a regular file of at most {MAX_TABLE_BYTES} bytes")
+        lines = path.read_text("utf-8-sig").translate(SEPARATORS).splitlines()
+        with catch_warnings(action="ignore", category=UserWarning):
+            table = np.loadtxt(lines, ndmin=2)  # warns of an empty file, refused below
+    except (OSError, ValueError) as error:
+        raise InputError(
+            f"{path}: elastomer.path: cannot be read: {error}; the file must be a text of two "
+            "columns of numbers, q [1/m] and k [Pa/m], with # before words"
+        ) from error
+    if table.shape[0] < 2 or table.shape[1] != 2:
+        raise InputError(
+            f"{path}: elastomer.path: {table.shape[0]} rows, {table.shape[1]} columns; "
+            "at least two rows of two columns, q and k, are needed"
+        )
+    is_positive = np.isfinite(table) & (table > 0)
+    if not (is_positive.all() and np.all(np.diff(table[:, 0]) > 0)):
+        raise InputError(
+            f"{path}: elastomer.path: q and k must be finite and positive; q must increase"
+        )
+    return table
+
+
+def _interpolated(table: Field) -> Callable[[Field], Field]:
+    """k(q) [Pa/m] for q > 0 from the rows q, k of a table."""
+    (x, y), (low, high) = np.log(table).T, _end_exponents(table)
+    cubic = monotone_cubic(x, y)
+
+    def stiffness(q: Field) -> Field:
+        log_q = np.log(q)
+        beyond = low * np.minimum(log_q - x[0], 0.0) + high * np.maximum(log_q - x[-1], 0.0)
+        return np.exp(cubic(np.clip(log_q, x[0], x[-1])) + beyond)
+
+    return stiffness
+
+
+def _end_exponents(table: Field) -> tuple[float, float]:
+    """Exponents of the power laws below and above a table."""
+    slopes = np.diff(np.log(table[[0, 1, -2, -1]]), axis=0)
+    return float(slopes[0, 1] / slopes[0, 0]), float(slopes[2, 1] / slopes[2, 0])
 
 
 def _fraction(variance: Field, chosen: Mask) -> float:

@@ -99,11 +99,6 @@ class Verdict(ExplainedEnum):
         """Whether the error on the grid is known."""
         return self in (Verdict.REGULAR, Verdict.EXACT, Verdict.BOUND)
 
-    @property
-    def is_final(self) -> bool:
-        """Whether no finer grid changes it."""
-        return self in (Verdict.BOUND, Verdict.SLOW, Verdict.DIVERGES)
-
 
 @dataclass(frozen=True)
 class Estimate:
@@ -122,7 +117,8 @@ class Estimate:
     @property
     def is_final(self) -> bool:
         """Whether no finer grid gives a smaller error."""
-        return self.verdict.is_final and not self.is_too_coarse
+        is_fixed = self.verdict in (Verdict.BOUND, Verdict.SLOW, Verdict.DIVERGES)
+        return is_fixed and not self.is_too_coarse
 
 
 UNKNOWN = Estimate(nan, nan, nan, Verdict.UNKNOWN)

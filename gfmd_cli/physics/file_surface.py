@@ -30,8 +30,7 @@ from gfmd_cli.maps.map_preparation import (
 )
 from gfmd_cli.maps.pictures import Picture, picture
 from gfmd_cli.maps.topography import Region, Topography, read_topography
-from gfmd_cli.physics.highest_point import highest_point
-from gfmd_cli.physics.indenters import SMALLEST_GRID, RigidSurface
+from gfmd_cli.physics.indenters import SMALLEST_GRID, RigidSurface, forget_peaks
 from gfmd_cli.spec_table import FilePath, Positive
 from gfmd_cli.units import count
 
@@ -47,6 +46,7 @@ class FileSurface(RigidSurface):
 
     rough: ClassVar[bool] = True
     is_map: ClassVar[bool] = True
+    coarsening: ClassVar[str] = "surface.region takes a part of the map"
     is_centred: ClassVar[bool] = False
     """Where the points of finer grids lie, see `interpolation.positions`."""
     kind: Literal["file"] = "file"
@@ -151,10 +151,6 @@ class FileSurface(RigidSurface):
         """Reason for the smallest grid: the points of the map."""
         return f"a map of {extent(self._topography().heights.shape)} points"
 
-    def coarsening(self) -> str:
-        """A part of the map."""
-        return "surface.region takes a part of the map"
-
     def parameters(self) -> dict[str, Any]:
         """Value of every key, with the defaults that depend on the file as they are applied."""
         return super().parameters() | {
@@ -234,11 +230,13 @@ class FileSurface(RigidSurface):
             heights = self.scale * heights
         return level(heights, self.levelling(), known)
 
-    def tapered(self, grid: Grid) -> Mask | None:
-        """Points of a grid whose heights the window has changed."""
-        if self.edges != "window":
-            return None
-        return window(grid.whole_shape, self.taper)[grid.own] < 1.0
+    def changed(self, grid: Grid) -> dict[str, Mask]:
+        """Points of a grid that the window has changed, and nearest to heights filled in."""
+        zones = {}
+        if self.edges == "window":
+            zones["edge"] = window(grid.whole_shape, self.taper)[grid.own] < 1.0
+        filled = self._missing_on(grid) if self.missing == "fill" else None
+        return zones if filled is None else zones | {"filled": filled}
 
     def mirrored(self) -> "FileSurface | None":
         """The map mirrored to twice its sides; None if it is periodic or made so.
@@ -254,9 +252,12 @@ class FileSurface(RigidSurface):
         """Height of the highest point [m]: of the map, or of the Fourier series through it."""
         if self.missing == "void" and self._topography().holes:
             return None
-        if not self.band_limited:
-            return float(_prepared(self).max())
-        return _peak(self)
+        return super().peak() if self.band_limited else float(_prepared(self).max())
+
+    def resolved_heights(self) -> Field:
+        """Heights [m] at the points of the map, reflected at its borders if it has any."""
+        heights = _prepared(self)
+        return mirror(heights) if self._is_reflected() else heights
 
     def tapered_map(self) -> "FileSurface | None":
         """The map with tapered edges, scaled to its own power; None where it is periodic."""
@@ -267,10 +268,6 @@ class FileSurface(RigidSurface):
     def void(self, grid: Grid) -> Mask | None:
         """Points of a grid nearest to a missing height of the map, if these never touch."""
         return self._missing_on(grid) if self.missing == "void" else None
-
-    def filled(self, grid: Grid) -> Mask | None:
-        """Points of a grid nearest to a missing height of the map, if these are filled in."""
-        return self._missing_on(grid) if self.missing == "fill" else None
 
     def _missing_on(self, grid: Grid) -> Mask | None:
         """Points of a grid nearest to a missing height of the map; None without one."""
@@ -382,8 +379,7 @@ class TaperedMap(FileSurface):
 @lru_cache(maxsize=16)
 def _suited_interpolation(surface: FileSurface) -> Interpolation:
     """The interpolation that suits a map; cached, because it needs a transform."""
-    heights = _prepared(surface)
-    return suited_interpolation(mirror(heights) if surface._is_reflected() else heights)
+    return suited_interpolation(surface.resolved_heights())
 
 
 _read = lru_cache(maxsize=4)(read_topography)
@@ -405,13 +401,6 @@ def _prepared(surface: FileSurface) -> Field:
             )
         heights = fill_missing(heights, missing)
     return make_periodic(heights, surface.edges or "none", surface.taper)
-
-
-@lru_cache(maxsize=16)
-def _peak(surface: FileSurface) -> float:
-    """Highest point of a Fourier series [m]; cached like the file."""
-    heights = _prepared(surface)
-    return highest_point(mirror(heights) if surface._is_reflected() else heights)
 
 
 @lru_cache(maxsize=16)
@@ -462,7 +451,6 @@ def _warnings_on_heights(surface: FileSurface) -> tuple[str, ...]:
 
 def forget_files() -> None:
     """Drop the maps that were read, so that a file that has changed is read again."""
-    for cached in (
-        _read, _prepared, _peak, _smallest_grid, _suited_interpolation, _warnings_on_heights,
-    ):  # fmt: skip
+    forget_peaks()
+    for cached in (_read, _prepared, _smallest_grid, _suited_interpolation, _warnings_on_heights):
         cached.cache_clear()

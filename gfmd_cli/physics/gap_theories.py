@@ -83,13 +83,7 @@ class FittedWeight(Persson):
     mean_gap_source: ClassVar[str] = "a fitted weight"
 
     def weight_slopes(self, a: Field, s: Field) -> tuple[Field, Field]:
-        """dW/da and dW/ds, both of shape (pressures, bins); 0 <= a, s <= 1.
-
-        Parameters
-        ----------
-        a : mean contact area of every bin, shape (pressures, bins)
-        s : contact area with all waves, shape (pressures, 1)
-        """
+        """See `Persson.weight_slopes`; 0 <= a, s <= 1."""
         n = np.clip(self.n, 0.0, 4.0)
         alpha = _ALPHA[0] + _ALPHA[1] * n
         beta = _BETA[0] * np.exp(-n / _BETA[1])

@@ -52,6 +52,8 @@ class RigidSurface(SpecTable):
     """Whether the surface ends at its borders, and the spec does not make it periodic."""
     copies: ClassVar[int] = 1
     """Copies of the surface along each side of its cell."""
+    coarsening: ClassVar[str] = "the side along y is surface.length_y"
+    """What makes the smallest grid smaller, for messages; lengths may have been given in metres."""
     kind: str
 
     def smallest_grid(self) -> int:
@@ -125,10 +127,6 @@ class RigidSurface(SpecTable):
         """Slope |dh/dr| of a single indenter at a distance r > 0 from its middle; else 0."""
         return 0.0
 
-    def coarsening(self) -> str:
-        """What makes the smallest grid smaller, as text for messages."""
-        return "the side along y is surface.length_y"
-
     def preparation(self, boundary: str = "") -> str:
         """Description of how a map was read and prepared for a boundary; "" for other surfaces."""
         return ""
@@ -137,13 +135,12 @@ class RigidSurface(SpecTable):
         """Levelled heights [m] as measured, and their spacing [m]; None where nothing was."""
         return None
 
-    def tapered(self, grid: Grid) -> Mask | None:
-        """Points of a grid whose heights a window has changed; None where no window is used."""
-        return None
+    def changed(self, grid: Grid) -> dict[str, Mask]:
+        """Points of a grid that can touch, but whose heights are not those measured, by reason.
 
-    def filled(self, grid: Grid) -> Mask | None:
-        """Points of a grid whose heights were filled in, and can touch; None where none were."""
-        return None
+        "edge": a window has changed them; "filled": they were filled in.
+        """
+        return {}
 
     def mirrored(self) -> "RigidSurface | None":
         """A map that is not periodic, mirrored to twice its sides; None for other surfaces."""
@@ -154,6 +151,11 @@ class RigidSurface(SpecTable):
         if not self.band_limited:
             return None
         return _highest_point(self)
+
+    def resolved_heights(self) -> Field:
+        """Heights [m] of a band-limited surface, with more than two points per wave."""
+        points_y = self.smallest_grid_y() + 2 if self.dimension == 2 else 1
+        return self.heights(self.smallest_grid() + 2, points_y)
 
     def tapered_map(self) -> "RigidSurface | None":
         """A map that is not periodic, tapered for its spectrum; None for other surfaces."""
@@ -175,9 +177,7 @@ class RigidSurface(SpecTable):
 @lru_cache(maxsize=16)
 def _highest_point(surface: RigidSurface) -> float:
     """Cached: all contacts of a surface have the same."""
-    points_y = surface.smallest_grid_y() + 2 if surface.dimension == 2 else 1
-    # more than two points per wave along both axes
-    return highest_point(surface.heights(surface.smallest_grid() + 2, points_y))
+    return highest_point(surface.resolved_heights())
 
 
 def forget_peaks() -> None:
@@ -310,6 +310,7 @@ class Ridge(LineIndenter):
     """
 
     tip_exponent: ClassVar[float] = 1.0
+    coarsening: ClassVar[str] = "surface.width is relative to surface.length"
     kind: Literal["ridge"] = "ridge"
     slope: Positive = 1.0
     """Slope of the flanks, the tangent of their angle to the plane."""
@@ -323,10 +324,6 @@ class Ridge(LineIndenter):
     def resolution(self) -> str:
         """Reason for the smallest grid: the width."""
         return f"kind {self.kind!r}, width = {self.width:g}: two spacings or more"
-
-    def coarsening(self) -> str:
-        """A larger width, which may have been given in metres."""
-        return "surface.width is relative to surface.length"
 
     def _profile(self, r: Field) -> Field:
         return -self.slope * np.minimum(r, 0.5 * self.width * self.length)

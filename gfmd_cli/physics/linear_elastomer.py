@@ -34,6 +34,12 @@ class LinearElastomer(SpecTable):
 
     exponent: ClassVar[float | None] = None
     """Exponent n where the stiffness is a power law k = k_n q^n, else None."""
+    uniform_stiffness: ClassVar[float | None] = None
+    """Limit of k(q) for q -> 0 [Pa/m], where it is finite and not zero, else None.
+
+    It determines the mean displacement, which the solution under a given load does not need."""
+    largest_displacement: ClassVar[float] = inf
+    """Displacement from first touch beyond which linear elasticity does not hold [m]."""
     kind: str
 
     @property
@@ -96,14 +102,6 @@ class LinearElastomer(SpecTable):
                 f'{count(dimension, "dimension")} does not: use "periodic"'
             )
 
-    @property
-    def uniform_stiffness(self) -> float | None:
-        """Limit of k(q) for q -> 0 [Pa/m], where it is finite and not zero, else None.
-
-        It determines the mean displacement, which the solution under a given load does not need.
-        """
-        return None
-
     def has_level(self, boundary: str, dimension: int) -> bool:
         """Whether displacements count from the level of the undeformed surface.
 
@@ -135,11 +133,6 @@ class LinearElastomer(SpecTable):
     def modulus(self) -> float:
         """Elastic modulus [Pa], 0 where the elastomer has none."""
         return float(dict(self).get("E_star", 0.0))
-
-    @property
-    def largest_displacement(self) -> float:
-        """Displacement from first touch beyond which linear elasticity does not hold [m]."""
-        return inf
 
     def local_exponent(self, q: Field, length: float = 1.0, step: float = EXPONENT_STEP) -> Field:
         """n(q) = d ln k / d ln q, by central differences over +-step; zero where k is zero."""

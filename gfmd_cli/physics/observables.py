@@ -140,11 +140,10 @@ def changed_fractions(
     Columns `edge_contact` and `edge_load` of the tapered zone, `filled_contact` and `filled_load`
     of heights that were filled in; none where the surface has no such points.
     """
-    zones = {"edge": surface.tapered(grid), "filled": surface.filled(grid)}
-    known = {name: zone for name, zone in zones.items() if zone is not None}
+    zones = surface.changed(grid)
     fractions: dict[str, float] = {}
-    load = contact_pressure(height, u, sigma) if known else sigma
-    for name, zone in known.items():
+    load = contact_pressure(height, u, sigma) if zones else sigma
+    for name, zone in zones.items():
         sums = [[np.count_nonzero(part), part.sum()] for part in (load[zone], load)]
         inside, whole = grid.total(np.array(sums))
         shares = np.divide(inside, whole, out=np.full(2, np.nan), where=whole > 0).tolist()

@@ -25,6 +25,7 @@ class SelfAffine(RigidSurface):
 
     rough: ClassVar[bool] = True
     band_limited: ClassVar[bool] = True
+    coarsening: ClassVar[str] = "surface.cutoff is relative to surface.length"
     kind: Literal["self-affine"] = "self-affine"
     hurst: Annotated[float, Key(gt=0, le=1)] = 0.8
     """Hurst exponent H, 0 < H <= 1."""
@@ -70,10 +71,6 @@ class SelfAffine(RigidSurface):
     def resolution(self) -> str:
         """Reason for the smallest grid: the cut-off needs two points per lambda_s."""
         return f"kind {self.kind!r}, cutoff = {self.cutoff:g}: two points per lambda_s"
-
-    def coarsening(self) -> str:
-        """A larger cut-off, which may have been given in metres."""
-        return "surface.cutoff is relative to surface.length"
 
     def warnings(self, boundary: str = "periodic") -> list[str]:
         """A warning about a spectrum without a self-affine part."""

@@ -132,16 +132,14 @@ def fit(shells: Shells, complete: float = inf) -> SelfAffineFit:
     q, square = shells.q, shells.height * shells.q**2
     counts = _isotropic(q, shells.modes, complete)
     first = np.searchsorted(np.cumsum(square), FIRST_SHARE * square.sum()) + 1
-    range_ = next_range = max(int(first), int(np.searchsorted(q, FIRST_RANGE * q[0])))
-    best: SelfAffineFit | None = None
-    while True:
-        nearest, cut_off = _fit_below(shells, next_range, counts)
-        if best is not None and cut_off < next_range:  # this fit has waves beyond the cut-off
+    range_ = max(int(first), int(np.searchsorted(q, FIRST_RANGE * q[0])))
+    best, cut_off = _fit_below(shells, range_, counts)
+    while cut_off > range_ + 1:
+        further = (range_ + cut_off + 1) // 2
+        nearest, cut_off = _fit_below(shells, further, counts)
+        if cut_off < further:  # this fit has waves beyond the cut-off
             break
-        best, range_ = nearest, next_range
-        if cut_off <= range_ + 1:
-            break
-        next_range = (range_ + cut_off + 1) // 2
+        best, range_ = nearest, further
     if min(abs(best.hurst - bound) for bound in HURST_BOUNDS) < AT_BOUND:
         raise InputError(f"{_range(q, range_)}: not self-affine there, H = {best.hurst:.2g}")
     if not np.isfinite([best.hurst_error, best.q_r_error]).all():

@@ -57,7 +57,7 @@ def remedy(surface: RigidSurface, needed: int) -> str:
     """What to do where a surface needs so many points along an axis, or more."""
     if needed <= MAX_POINTS:
         return f"use {needed} or more"
-    return f"it takes {needed}, but at most {MAX_POINTS} are allowed; check: {surface.coarsening()}"
+    return f"it takes {needed}, but at most {MAX_POINTS} are allowed; check: {surface.coarsening}"
 
 
 def sample(

@@ -16,7 +16,7 @@ import numpy as np
 from scipy.special import erf, erfinv
 
 from gfmd_cli.grid.arrays import Field, Mask, row_blocks
-from gfmd_cli.grid.fft_grid import ALL_ROWS, Grid
+from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.physics.contact import Contact
 
 HEIGHT_BINS = 1 << 14  # of height, of width 1e-3 h_std or less for heights within +-8 h_std
@@ -50,7 +50,7 @@ def contact_stress(contact: Contact, touching: Mask) -> ContactStress:
     return ContactStress(deviation, float(np.sqrt(square / np.count_nonzero(touching))))
 
 
-def direction(grid: Grid, axis: int, rows: slice = ALL_ROWS) -> Field:
+def direction(grid: Grid, axis: int, rows: slice) -> Field:
     """Component of q / |q| along an axis for rows of `grid.spectral_shape`; zero at q = 0.
 
     Also zero where the component is the highest wavenumber of the grid, which has no sign.
