@@ -177,13 +177,24 @@ def examples() -> str:
     return table(("spec", "content"), rows)
 
 
+KINDS = {str: "text", int: "whole number", float: "number"}
+
+
 def columns(listed: Iterable[Column]) -> str:
     """Columns with their units."""
-    kinds = {str: "text", int: "whole number", float: "number"}
     rows = [
-        (f"`{c.name}`", kinds[c.kind], escaped(c.units or "-"), escaped(c.meaning)) for c in listed
+        (f"`{c.name}`", KINDS[c.kind], escaped(c.units or "-"), escaped(c.meaning)) for c in listed
     ]
     return table(("name", "type", "unit", "meaning"), rows)
+
+
+def parameters() -> str:
+    """The columns of keys of a run spec, with these keys."""
+    rows = [
+        (f"`{c.name}`", KINDS[c.kind], escaped(c.units or "-"), f"`{c.meaning.partition(':')[0]}`")
+        for c in PARAMETER_COLUMNS
+    ]
+    return table(("name", "type", "unit", "key"), rows)
 
 
 def distributions() -> str:
@@ -204,7 +215,7 @@ MAKERS = {
     "commands": commands,
     "contract": lambda: columns(CONTRACT),
     "details": lambda: columns(DETAILS),
-    "parameters": lambda: columns(PARAMETER_COLUMNS),
+    "parameters": parameters,
     "distributions": distributions,
     "scenes": lambda: columns(SHELLS),
     "fields": lambda: columns(FIELDS),

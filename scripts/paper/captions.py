@@ -35,7 +35,7 @@ CAPTIONS = {
     "large_cell": "Mean gap in cells of several sizes, mean and standard error over seeds. n = 1/2: filled symbols, "
     "shifted to the right by 30 %; n = 1: open symbols.",
     "fig13": "Fig. 13: distribution of the stress at n = 3 from grid to grid, mean over the seeds.",
-    "weights": "Weight of the elastic energy by wave number at p* = 0.1 (symbols, mean over the seeds with standard errors) "
+    "weights": "Weight of the elastic energy by wavenumber at p* = 0.1 (symbols, mean over the seeds with standard errors) "
     "and Eq. 30 (lines).",
     "plate_map": "Contact (red) and gap on a quarter of the default surface at p* = 0.1.",
 }
