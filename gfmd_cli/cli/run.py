@@ -167,9 +167,10 @@ def _print_results(
     for line in unconverged(rows, failed):
         print_text(f"  {line}")
     ids = {task.id for task in tasks}
-    for line in other_tasks([row for row in stored if row["task_id"] not in ids]):
+    solved = [row for row in stored if row["status"].is_solved]
+    for line in other_tasks([row for row in solved if row["task_id"] not in ids]):
         print_text(f"  {line}")
-    if any(row["status"].is_solved for row in stored):
+    if solved:
         print_text(f"next: gfmd analyze {typed(path)}\n      gfmd report {typed(path)}")
 
 

@@ -6,7 +6,7 @@ from functools import partial
 from pathlib import Path
 
 from gfmd_cli.errors import GfmdError, InputError, Interrupted, SpaceError, StudyError
-from gfmd_cli.files.checksums import file_version
+from gfmd_cli.files.checksums import file_digest, file_version
 from gfmd_cli.grid.blas import one_blas_thread
 from gfmd_cli.grid.fft_grid import Shape
 from gfmd_cli.grid.ranks import is_root, on_root, shared_errors
@@ -142,6 +142,7 @@ def solve_task(task: Task, parts: Path, context: SolveContext) -> Status:
     Raises Interrupted after the state was saved, InputError, SpaceError.
     """
     context.report(Progress(task.index, "start", task.label))
+    _check_files(task)  # before the work for it begins
     start = time.perf_counter()
     with Checkpoint.exclusive(parts / task.id, context.ranks) as checkpoint:
         solved = solve_at_load(task, context, TaskWatcher(task, checkpoint, context))
@@ -156,8 +157,11 @@ def solve_task(task: Task, parts: Path, context: SolveContext) -> Status:
 
 
 def _check_files(task: Task) -> None:
-    """Raise InputError where a file is not the one whose checksum the task has."""
-    for path, version in task.files:
+    """Raise InputError where a file is not the one whose checksum the task has.
+
+    Its content is read only if its version has changed, as by `touch` or a copy of the same file.
+    """
+    for path, version, checksum in task.files:
         with suppress(OSError):  # a file that was deleted after it had been read
-            if file_version(path) != version:
+            if file_version(path) != version and file_digest(path) != checksum:
                 raise InputError(f"{path}: the file was changed during the run; run again")
