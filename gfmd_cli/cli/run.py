@@ -112,7 +112,7 @@ def run(
         from gfmd_cli.spec.parse import read_spec
         from gfmd_cli.study.run import RunOptions
 
-        options = RunOptions(ranks=ranks, max_seconds=max_seconds, **run_options)
+        options = RunOptions(ranks=ranks, max_seconds=max_seconds, may_exit=True, **run_options)
         read = [read_spec(spec, overrides) for spec in specs]
         paths = [study_path(spec, output) for spec, _ in read]
         if options.overwrite and len(set(paths)) < len(paths):

@@ -19,6 +19,7 @@ from gfmd_cli.study.checkpoint import Checkpoint
 from gfmd_cli.study.context import Progress, SolveContext, Watcher
 from gfmd_cli.study.load_search import solve_at_load
 from gfmd_cli.study.measure import result
+from gfmd_cli.study.signals import interruptible
 from gfmd_cli.study.tasks import Task
 from gfmd_cli.study.unfinished_work import read_record_entry, record_path, write_record
 from gfmd_cli.units import duration
@@ -145,7 +146,8 @@ def solve_task(task: Task, parts: Path, context: SolveContext) -> Status:
     _check_files(task)  # before the work for it begins
     start = time.perf_counter()
     with Checkpoint.exclusive(parts / task.id, context.ranks) as checkpoint:
-        solved = solve_at_load(task, context, TaskWatcher(task, checkpoint, context))
+        with interruptible():
+            solved = solve_at_load(task, context, TaskWatcher(task, checkpoint, context))
         record = result(task, solved, time.perf_counter() - start)
         _check_files(task)
         if is_root(context.ranks):
