@@ -549,3 +549,31 @@ def test_a_second_ctrl_c_does_not_end_the_process_of_a_notebook(tmp_path, jobs):
     assert 0 < before < 6
     assert (before + solved, stored) == (6, 6)
     assert not (tmp_path / "study.parts").exists()
+
+
+FORKED = """
+import multiprocessing
+from gfmd_cli import solve
+
+SPEC = {
+    "surface": {"kind": "self-affine", "cutoff": 0.05},
+    "elastomer": {"kind": "half-space"},
+    "grid": {"points": 512},
+    "load": {"p_star": 0.1},
+}
+a_r = solve(SPEC, threads=2).a_r
+child = multiprocessing.get_context("fork").Process(
+    target=lambda: print(solve(SPEC, threads=2).a_r == a_r)
+)
+child.start()
+child.join(120)
+child.kill()
+"""
+
+
+def test_a_forked_process_solves_with_threads_of_its_own(tmp_path):
+    """Those of the grids of its parent are not there: it would wait for them without end."""
+    (tmp_path / "script.py").write_text(FORKED)
+    words = [sys.executable, "script.py"]
+    completed = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert completed.stdout.splitlines() == ["True"], completed.stderr
