@@ -30,13 +30,14 @@ _interruptible = False  # whether the main thread may be interrupted now
 def interruptible() -> Iterator[None]:
     """Inside, a second SIGINT may raise KeyboardInterrupt: nothing that others need is written."""
     global _interruptible
-    is_main, before = current_thread() is main_thread(), _interruptible
-    _interruptible = before or is_main
+    if current_thread() is not main_thread():
+        yield
+        return
+    _interruptible = True
     try:
         yield
     finally:
-        if is_main:
-            _interruptible = before
+        _interruptible = False
 
 
 @contextmanager
