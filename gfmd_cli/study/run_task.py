@@ -19,6 +19,7 @@ from gfmd_cli.study.checkpoint import Checkpoint
 from gfmd_cli.study.context import Progress, SolveContext, Watcher
 from gfmd_cli.study.load_search import solve_at_load
 from gfmd_cli.study.measure import result
+from gfmd_cli.study.provenance import gfmd_version
 from gfmd_cli.study.signals import interruptible
 from gfmd_cli.study.tasks import Task
 from gfmd_cli.study.unfinished_work import read_record_entry, record_path, write_record
@@ -144,6 +145,7 @@ def solve_task(task: Task, parts: Path, context: SolveContext) -> Status:
     """
     context.report(Progress(task.index, "start", task.label))
     _check_files(task)  # before the work for it begins
+    gfmd_version()  # kept from now on: the source tree may be updated during the solve
     start = time.perf_counter()
     with Checkpoint.exclusive(parts / task.id, context.ranks) as checkpoint:
         with interruptible():
