@@ -5,6 +5,7 @@ import re
 import signal
 import sys
 import threading
+from collections import Counter
 from pathlib import Path
 
 import h5py
@@ -12,10 +13,12 @@ import numpy as np
 import pytest
 
 import gfmd_cli
+from gfmd_cli.cli.run import _print_results
 from gfmd_cli.errors import InputError, Interrupted
 from gfmd_cli.files.locks import locked
 from gfmd_cli.report.page import report
 from gfmd_cli.spec.parse import read_spec
+from gfmd_cli.status import Status
 from gfmd_cli.study import columns as layout
 from gfmd_cli.study.columns import COLUMNS
 from gfmd_cli.study.reading import open_study, read_rows
@@ -334,3 +337,13 @@ def test_a_study_without_versions_grows(run, monkeypatch):
         run("surface.seed=0")
     path, *_ = run("surface.seed=[0, 1]")
     assert [bool(row["gfmd_version"]) for row in read_rows(path)] == [False] * 6 + [True] * 6
+
+
+def test_tasks_without_a_result_are_no_contacts_of_other_specs(run, capsys):
+    """A spec means other tasks at the end of a run where its map was replaced meanwhile."""
+    path, *_ = run(shard=(0, 3))
+    replaced, _ = read_spec(Path("spec.toml"), ("surface.seed=9",))
+    _print_results(replaced, path, RunOptions(), Counter({Status.CONVERGED: 4}), {})
+    said = capsys.readouterr().out
+    assert "also contains 4 contacts of other specs" in said
+    assert "nan" not in said
