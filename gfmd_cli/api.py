@@ -269,6 +269,9 @@ def run(
         If the disk is full or a file cannot be created.
     Interrupted
         If a signal stopped the run.
+    KeyboardInterrupt
+        After a second SIGINT (Ctrl-C): the tasks at work go on from their last checkpoints in the
+        next call.
     """
     resolved, text = _read(spec, overrides)
     path = Path(study if study is not None else f"{resolved.study.name}.h5")

@@ -1,5 +1,7 @@
 import re
 import runpy
+import subprocess
+import sys
 import warnings
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -493,3 +495,85 @@ def test_no_worker_at_all_is_refused(tmp_path, jobs):
         run(spec, tmp_path / "a.h5", jobs=jobs)
     with pytest.raises(InputError, match="unknown table '3'"):
         run(spec | {3: 4}, tmp_path / "a.h5")
+
+
+INTERRUPTED = """
+import os, signal, sys, threading
+from gfmd_cli import rows, run
+from gfmd_cli.errors import Interrupted
+
+SPEC = {
+    "surface": {"kind": "self-affine", "cutoff": 0.02},
+    "elastomer": {"kind": "power", "n": 2},
+    "grid": {"points": 256},
+    "load": {"p_star": [0.01, 0.02, 0.03, 0.04, 0.05, 0.06]},
+    "solver": {"kind": "fire", "tolerance": 1e-9},
+}
+ended, begun = threading.Event(), threading.Event()
+
+def press():
+    begun.wait()
+    while not ended.wait(0.005):
+        os.kill(os.getpid(), signal.SIGINT)
+
+def watch(progress):
+    if progress.event == "end":
+        begun.set()
+
+signal.signal(signal.SIGINT, lambda *_: None)  # outside of the run
+keys = threading.Thread(target=press)
+keys.start()
+try:
+    run(SPEC, "study.h5", jobs=int(sys.argv[1]), report=watch)
+except (KeyboardInterrupt, Interrupted) as error:
+    ended.set()
+    print(type(error).__name__)
+keys.join()
+before = [row["p_star"] for row in rows("study.h5")]
+solved = []
+run(SPEC, "study.h5", report=lambda p: solved.append(p.task) if p.event == "end" else None)
+print(len(before), len(solved), len(rows("study.h5")))
+"""
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_a_second_ctrl_c_does_not_end_the_process_of_a_notebook(tmp_path, jobs):
+    """Finished tasks are stored, and the next call solves the others."""
+    (tmp_path / "script.py").write_text(INTERRUPTED)
+    words = [sys.executable, "script.py", str(jobs)]
+    completed = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert completed.returncode == 0, completed.stderr
+    how, numbers = completed.stdout.splitlines()
+    before, solved, stored = map(int, numbers.split())
+    assert how == "KeyboardInterrupt" or jobs == 2  # which may have saved all before the second
+    assert 0 < before < 6
+    assert (before + solved, stored) == (6, 6)
+    assert not (tmp_path / "study.parts").exists()
+
+
+FORKED = """
+import multiprocessing
+from gfmd_cli import solve
+
+SPEC = {
+    "surface": {"kind": "self-affine", "cutoff": 0.05},
+    "elastomer": {"kind": "half-space"},
+    "grid": {"points": 512},
+    "load": {"p_star": 0.1},
+}
+a_r = solve(SPEC, threads=2).a_r
+child = multiprocessing.get_context("fork").Process(
+    target=lambda: print(solve(SPEC, threads=2).a_r == a_r)
+)
+child.start()
+child.join(120)
+child.kill()
+"""
+
+
+def test_a_forked_process_solves_with_threads_of_its_own(tmp_path):
+    """Those of the grids of its parent are not there: it would wait for them without end."""
+    (tmp_path / "script.py").write_text(FORKED)
+    words = [sys.executable, "script.py"]
+    completed = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert completed.stdout.splitlines() == ["True"], completed.stderr

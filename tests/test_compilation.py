@@ -41,3 +41,43 @@ def test_kernels_from_the_cache_give_the_bits_of_those_just_compiled(tmp_path):
     ]
     assert len(results[0].split()) == 2
     assert results[0] == results[1]
+
+
+KERNEL = """
+import numpy as np
+from gfmd_cli.grid.compilation import kernel, part_of_kernel
+from other import STATE
+
+@part_of_kernel
+def part(x):
+    return x + 1
+
+@kernel
+def fill(out):
+    for i in range(out.size):
+        out[i] = part(10 * STATE)
+
+out = np.zeros(2)
+fill(out)
+print(int(out[0]), len(fill.stats.cache_hits))
+"""
+
+
+def test_an_upgrade_that_changes_a_number_or_a_part_is_compiled_anew(tmp_path):
+    """Numba compares date and size of the file with the kernel: here they stay the same."""
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+
+    def output(state, source):
+        (tmp_path / "other.py").write_text(f"STATE = {state}\n")
+        (tmp_path / "kernels.py").write_text(source)
+        os.utime(tmp_path / "kernels.py", (10**9, 10**9))
+        words = [sys.executable, "-B", "kernels.py"]
+        completed = subprocess.run(
+            words, cwd=tmp_path, env=environment, capture_output=True, text=True, check=True
+        )
+        return completed.stdout.split()
+
+    assert output(1, KERNEL) == ["11", "0"]
+    assert output(1, KERNEL) == ["11", "1"]
+    assert output(2, KERNEL) == ["21", "0"]
+    assert output(2, KERNEL.replace("x + 1", "x + 2")) == ["22", "0"]

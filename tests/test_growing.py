@@ -1,18 +1,25 @@
 """A study grows task by task: nothing that it holds is lost, and nothing is solved twice."""
 
 import json
+import re
 import signal
 import sys
 import threading
+from collections import Counter
 from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
 
+import gfmd_cli
+from gfmd_cli.cli.run import _print_results
 from gfmd_cli.errors import InputError, Interrupted
 from gfmd_cli.files.locks import locked
+from gfmd_cli.report.page import report
 from gfmd_cli.spec.parse import read_spec
+from gfmd_cli.status import Status
+from gfmd_cli.study import columns as layout
 from gfmd_cli.study.columns import COLUMNS
 from gfmd_cli.study.reading import open_study, read_rows
 from gfmd_cli.study.run import RunOptions, run_study
@@ -308,3 +315,35 @@ def test_a_record_with_less_output_replaces_nothing(run):
     assert run(*other)[1] == 1
     with open_study(path) as full:
         assert set(full.arrays("fields", 0)) == {"u", "sigma"}
+
+
+def test_a_result_keeps_the_version_that_solved_it(run, monkeypatch):
+    """Also where an upgraded program adds contacts; before, studies had no such column."""
+    monkeypatch.setattr(gfmd_cli, "__version__", "0.0.8")
+    run("surface.seed=0")
+    monkeypatch.setattr(gfmd_cli, "__version__", "0.0.9")
+    path, solved, _ = run("surface.seed=[0, 1]")
+    versions = {row["seed"]: row["gfmd_version"].split()[0] for row in read_rows(path)}
+    assert versions == {0: "0.0.8", 1: "0.0.9"}
+    page = report(path)
+    assert "Contacts by version that solved them" in page
+    assert re.search(rf"0\.0\.8[^;]*: {solved}; 0\.0\.9[^;]*: {solved}", page)
+
+
+def test_a_study_without_versions_grows(run, monkeypatch):
+    columns = [column for column in COLUMNS if column.name != "gfmd_version"]
+    with monkeypatch.context() as older:
+        older.setattr(layout, "COLUMNS", tuple(columns))
+        run("surface.seed=0")
+    path, *_ = run("surface.seed=[0, 1]")
+    assert [bool(row["gfmd_version"]) for row in read_rows(path)] == [False] * 6 + [True] * 6
+
+
+def test_tasks_without_a_result_are_no_contacts_of_other_specs(run, capsys):
+    """A spec means other tasks at the end of a run where its map was replaced meanwhile."""
+    path, *_ = run(shard=(0, 3))
+    replaced, _ = read_spec(Path("spec.toml"), ("surface.seed=9",))
+    _print_results(replaced, path, RunOptions(), Counter({Status.CONVERGED: 4}), {})
+    said = capsys.readouterr().out
+    assert "also contains 4 contacts of other specs" in said
+    assert "nan" not in said

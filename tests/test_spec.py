@@ -408,3 +408,11 @@ def test_the_schema_accepts_the_same_solvers_as_the_models(solver, valid):
     assert jsonschema.Draft202012Validator(spec_schema()).is_valid(data) == valid
     with nullcontext() if valid else pytest.raises(InputError):
         read_tables(data)
+
+
+@pytest.mark.parametrize("encoding", ["utf-16", "latin-1"])
+def test_a_spec_in_another_encoding_says_how_to_save_it(tmp_path, encoding):
+    path = tmp_path / "spec.toml"
+    path.write_text("# 5 µm\n[study]\n", encoding=encoding)
+    with pytest.raises(InputError, match=r"not UTF-8 text .*: save a spec as UTF-8"):
+        read_spec(path)

@@ -594,24 +594,50 @@ def test_a_time_without_end_is_no_limit(run):
     assert not [event for event in events if event.event == "warning"]
 
 
-def test_a_file_that_changes_during_a_run_fails_the_tasks_that_use_it(tmp_path, monkeypatch):
-    """Its checksum would stand beside results of other heights."""
-    rough = np.random.default_rng(0).normal(size=(64, 64))
-    np.save(tmp_path / "h.npy", rough)
+@pytest.fixture
+def run_on_map(tmp_path):
+    """Runs a spec of three loads on a map; calls `change` with its path as an event is reported."""
+    np.save(tmp_path / "h.npy", np.random.default_rng(0).normal(size=(64, 64)))
     (tmp_path / "spec.toml").write_text(
         '[surface]\nkind = "file"\npath = "h.npy"\nlength = 1.0\n'
-        '[elastomer]\nkind = "half-space"\n[grid]\npoints = 64\n[load]\np_star = [0.1, 0.2]\n'
+        '[elastomer]\nkind = "half-space"\n[grid]\npoints = 64\n[load]\np_star = [0.1, 0.2, 0.3]\n'
     )
     spec, text = read_spec(tmp_path / "spec.toml", ())
-    events = []
 
-    def report(progress):
-        events.append(progress)
-        if progress.event == "end" and progress.task == 0:
-            np.save(tmp_path / "new.npy", 2 * rough)
-            (tmp_path / "new.npy").replace(tmp_path / "h.npy")
+    def run(change=lambda path, event: None):
+        events = []
 
-    path = tmp_path / "study.h5"
-    assert run_study(spec, text, path, report, RunOptions(jobs=1)) == {"converged": 1, "failed": 1}
-    assert "h.npy: the file was changed during the run" in events[-1].message
-    assert run_study(spec, text, path, events.append, RunOptions(jobs=1)) == {"converged": 2}
+        def report(event):
+            events.append(event)
+            change(tmp_path / "h.npy", event)
+
+        return run_study(spec, text, tmp_path / "study.h5", report, RunOptions(jobs=1)), events
+
+    return run
+
+
+def test_a_file_that_changes_during_a_run_fails_the_tasks_that_use_it(run_on_map):
+    """Its checksum would stand beside results of other heights."""
+
+    def replace(path, event):
+        if (event.task, event.event) == (1, "step"):
+            np.save(path.with_name("new.npy"), 2 * np.load(path))
+            path.with_name("new.npy").replace(path)
+
+    counts, events = run_on_map(replace)
+    assert counts == {"converged": 1, "failed": 2}
+    errors = [event.message for event in events if event.status == "failed"]
+    assert all("h.npy: the file was changed during the run" in error for error in errors)
+    assert not [event for event in events if event.task == 2 and event.event == "step"]
+    assert run_on_map()[0] == {"converged": 3}
+
+
+def test_a_file_that_is_touched_during_a_run_has_no_effect(run_on_map):
+    """Backups, copies and `touch` change its date and its place on the disk, not its content."""
+
+    def copy(path, event):
+        if event.event == "end" and event.task == 0:
+            path.with_name("same.npy").write_bytes(path.read_bytes())
+            path.with_name("same.npy").replace(path)
+
+    assert run_on_map(copy)[0] == {"converged": 3}

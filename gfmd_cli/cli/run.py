@@ -112,7 +112,7 @@ def run(
         from gfmd_cli.spec.parse import read_spec
         from gfmd_cli.study.run import RunOptions
 
-        options = RunOptions(ranks=ranks, max_seconds=max_seconds, **run_options)
+        options = RunOptions(ranks=ranks, max_seconds=max_seconds, may_exit=True, **run_options)
         read = [read_spec(spec, overrides) for spec in specs]
         paths = [study_path(spec, output) for spec, _ in read]
         if options.overwrite and len(set(paths)) < len(paths):
@@ -167,9 +167,10 @@ def _print_results(
     for line in unconverged(rows, failed):
         print_text(f"  {line}")
     ids = {task.id for task in tasks}
-    for line in other_tasks([row for row in stored if row["task_id"] not in ids]):
+    solved = [row for row in stored if row["status"].is_solved]
+    for line in other_tasks([row for row in solved if row["task_id"] not in ids]):
         print_text(f"  {line}")
-    if any(row["status"].is_solved for row in stored):
+    if solved:
         print_text(f"next: gfmd analyze {typed(path)}\n      gfmd report {typed(path)}")
 
 

@@ -5,6 +5,7 @@ import os
 import stat
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from glob import escape
 from pathlib import Path
 from tempfile import TemporaryFile
 from typing import Any
@@ -74,6 +75,13 @@ def new_file(path: Path, aside: Path | None = None) -> Iterator[NewFile]:
 def temporary_name(path: Path) -> str:
     """A name that no other file has, for a file that is being written or removed."""
     return f".{path.name}.{uuid4().hex}"
+
+
+def remove_temporary(path: Path) -> None:
+    """Remove what killed processes were writing for `path`; no other process may write there."""
+    for old in path.parent.glob(f".{escape(path.name)}.*"):
+        with suppress(OSError):
+            old.unlink()
 
 
 def write_whole(path: Path, content: bytes) -> None:

@@ -5,12 +5,15 @@ import warnings
 from collections.abc import Callable
 from contextlib import suppress
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numba
+import numpy as np
 from numba import njit
 
 from gfmd_cli.files.cache import private_folder
+from gfmd_cli.files.checksums import digest
 
 NUMBA_OPTIONS: dict[str, Any] = {
     "nogil": True,
@@ -35,6 +38,8 @@ def kernel(function: Callable[..., Any]) -> Any:
             return njit(**NUMBA_OPTIONS)(function)
         compiled = njit(cache=True, **NUMBA_OPTIONS)(function)
     if hasattr(compiled, "_cache"):  # not with NUMBA_DISABLE_JIT
+        with suppress(OSError):  # the source may be in a zip file
+            compiled._cache._cache_file._source_stamp = _stamp(function)
         _tolerate_faults(compiled._cache)
     return compiled
 
@@ -52,6 +57,30 @@ def _is_cache_known() -> bool:
     """Whether there is a cache of the user; without a home, Numba would make a folder "~" here."""
     named = "NUMBA_CACHE_DIR" in os.environ or "XDG_CACHE_HOME" in os.environ
     return named or os.path.expanduser("~") != "~"
+
+
+def _stamp(function: Callable[..., Any]) -> str:
+    """What the machine code of a kernel follows from: code of another stamp is compiled anew.
+
+    Numba itself compares date and size of the file. But a kernel also contains numbers from other
+    files, which an upgrade may change alone, and some installers give all files the same date.
+    """
+    numbers = {
+        name: repr(value)
+        for name, value in function.__globals__.items()
+        if isinstance(value, int | float | np.generic)
+    }
+    options = {
+        name: sorted(value) if isinstance(value, set) else value
+        for name, value in NUMBA_OPTIONS.items()
+    }
+    return digest([_text(function.__code__.co_filename), numbers, options])
+
+
+@cache
+def _text(file: str) -> str:
+    """The content of a source file."""
+    return Path(file).read_text(encoding="utf-8")
 
 
 @cache

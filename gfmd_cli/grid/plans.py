@@ -22,7 +22,7 @@ from typing import Any, TypeVar
 import pyfftw
 
 from gfmd_cli.errors import SpaceError
-from gfmd_cli.files.atomic import write_whole
+from gfmd_cli.files.atomic import remove_temporary, write_whole
 from gfmd_cli.files.cache import cache_folder
 from gfmd_cli.files.locks import AS_LONG_AS_NEEDED, Waits, locked
 from gfmd_cli.files.regular import read_regular
@@ -34,6 +34,7 @@ Wisdom = list[str]
 """Text in double and in single precision."""
 PLANNING_SECONDS = (30.0, 1e-6)  # seconds at most to look for a plan, at all and per grid point
 MAX_WISDOM_BYTES = 2**24  # of a file of wisdom
+MAX_CACHED_LINES = 2000  # in each precision; a new size adds some 20 and reads and writes all
 WISDOM = re.compile(
     r"\([\w. -]+( #x[0-9a-f]{1,8}){4}\n"
     r"(  \(\w+ \d{1,4}( #x[0-9a-f]{1,5}){2} #x1?[0-9a-f]{1,2}( #x[0-9a-f]{1,8}){4}\)\n)*"
@@ -117,16 +118,26 @@ def planned(make: Callable[[Plan], T], size: int = 0) -> T:
 def _measured(make: Callable[[Plan], T], fftw: Plan) -> T:
     """The transforms that `make` plans, measured unless another process has measured them."""
     folder = _folder or cache_folder()
-    with _planning_lock(folder):
+    with _planning_lock(folder) as alone:
         _import(read_wisdom(folder))
         before = _export()
         transforms = make(fftw)
-        if _export() != before:
+        is_new = _export() != before
+        if is_new and _folder is not None:
             _write(folder, _export())
-    if _folder is not None:
-        with _planning_lock(cache_folder()):
-            _write(cache_folder(), _joined(read_wisdom(cache_folder()), _export()))
+        elif is_new:
+            _add_to_cache(alone)
+    if is_new and _folder is not None:
+        with _planning_lock(cache_folder()) as alone:
+            _add_to_cache(alone)
     return transforms
+
+
+def _add_to_cache(alone: bool) -> None:
+    """Store what this process knows in the cache; `alone` says whether the cache is locked."""
+    if alone:
+        remove_temporary(_path(cache_folder()))
+    _write(cache_folder(), _newest(_joined(read_wisdom(cache_folder()), _export())))
 
 
 def read_wisdom(folder: Path) -> Wisdom | None:
@@ -167,6 +178,15 @@ def _joined(wisdom: Wisdom | None, more: Wisdom) -> Wisdom:
     return joined
 
 
+def _newest(wisdom: Wisdom) -> Wisdom:
+    """The lines that were added last: every new size takes a time that grows with their number."""
+    texts = []
+    for text in wisdom:
+        first, *lines, last = text.splitlines()
+        texts.append("\n".join([first, *lines[-MAX_CACHED_LINES:], last]) + "\n")
+    return texts
+
+
 def _import(wisdom: Wisdom | None) -> None:
     """Add what other processes measured to the wisdom of this one."""
     if wisdom is not None:
@@ -182,12 +202,12 @@ def _write(folder: Path, wisdom: Wisdom) -> None:
 
 
 @contextmanager
-def _planning_lock(folder: Path) -> Iterator[None]:
-    """Keep other processes from planning inside the block, where the folder can be locked."""
+def _planning_lock(folder: Path) -> Iterator[bool]:
+    """Keep other processes from planning inside the block; yields whether the folder is locked."""
     with ExitStack() as stack:
         if folder not in _without_lock:
             try:
                 stack.enter_context(locked(folder / "planning", waits=_waits))
             except SpaceError:  # it may have taken minutes: not again
                 _without_lock.add(folder)
-        yield
+        yield folder not in _without_lock

@@ -6,6 +6,7 @@ studies differ, where a study comes from.
 """
 
 import json
+from collections import Counter
 from dataclasses import replace
 
 import numpy as np
@@ -202,7 +203,7 @@ def difference(one: ReportData, other: ReportData) -> Section:
 
 
 def provenance(data: ReportData) -> Section:
-    """Spec, versions, machine, date, commit."""
+    """Spec, versions, machine, date, commit; these are of the last call that added results."""
     attributes, machine = data.comparison.attributes, data.json("machine")
     software = [attributes.get(name, "") for name in ("software", "software_version")]
     facts = [
@@ -214,6 +215,10 @@ def provenance(data: ReportData) -> Section:
         ("FFT plans", str(machine.get("plans", ""))),
         *data.json("packages").items(),
     ]
+    by_version = Counter(row["gfmd_version"] or "unknown" for row in data.solved)
+    if len(by_version) > 1:
+        each = "; ".join(f"{name}: {n}" for name, n in sorted(by_version.items()))
+        facts.insert(3, ("Contacts by version that solved them", each))
     content = {
         "spec_text": attributes.get("spec_text", ""),
         "resolved": json.dumps(data.json("spec"), indent=1),

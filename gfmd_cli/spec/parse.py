@@ -52,8 +52,9 @@ def read_spec(path: Path, overrides: tuple[str, ...] = ()) -> tuple[Spec, str]:
         text = raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise InputError(
-            f"{path}: not UTF-8 text (byte {error.start}), where a run spec (TOML) is expected; "
-            f"`gfmd init SPEC --from {typed(path)}` writes one for a scan"
+            f"{path}: not UTF-8 text (byte {error.start}), where a run spec (TOML) is expected: "
+            "save a spec as UTF-8 in the editor; for a scan, "
+            f"`gfmd init SPEC --from {typed(path)}` writes a spec"
         ) from error
     data = _toml(text, str(path))
     for override in overrides:

@@ -54,6 +54,7 @@ DETAILS = (
     Column("dimension", "1 for a line contact, otherwise 2", kind=int),
     Column("rough", "1 for random and measured roughness, 0 for a single indenter", kind=int),
     Column("warnings", "reasons to doubt the result", "", str),
+    Column("gfmd_version", "version that solved the contact, and its Git commit if known", "", str),
     Column("x_first", "x / L of the first grid point; -0.5 if x = 0 is the crest of an indenter"),
     Column("ensemble", "the column surface without the seed, the same for all seeds", "", str),
     Column("elastomer_short", "short name of the elastomer in figures", "", str),

@@ -24,6 +24,7 @@ from gfmd_cli.study.column import Row
 from gfmd_cli.study.columns import FIELDS, PARAMETERS, PR_LINEAR, PR_LOGARITHMIC, empty_row
 from gfmd_cli.study.observables import OBSERVABLES, SolvedContact
 from gfmd_cli.study.plausibility import SEPARATOR, warnings_of
+from gfmd_cli.study.provenance import gfmd_version
 from gfmd_cli.study.refinement import TaskSolution
 from gfmd_cli.study.result import Entry, TaskResult
 from gfmd_cli.study.tasks import Task
@@ -78,6 +79,7 @@ def measured(task: Task, solved: TaskSolution) -> Row:
         "mean_gap": solved.observables.u_g * scene.h_std,
         "displacement": approach(scene, task.surface.peak, task.elastomer, contact, u, sigma),
         "steps": solution.steps,
+        "gfmd_version": gfmd_version(),
         "tolerance": task.solver.tolerance,
         **error_columns(solved),
     }

@@ -13,7 +13,7 @@ from pathlib import Path
 from gfmd_cli.status import Status
 from gfmd_cli.study.context import Progress, SolveContext, WorkerOptions
 from gfmd_cli.study.resources import available_memory, gib, out_of_memory_kills
-from gfmd_cli.study.signals import blocked_signals
+from gfmd_cli.study.signals import blocked_signals, interruptible
 from gfmd_cli.study.tasks import Task
 from gfmd_cli.study.worker import READY
 from gfmd_cli.units import count
@@ -112,7 +112,9 @@ class Pool:
                 self._assign_tasks()
                 if not self.workers:
                     return self.counts
-                for pipe in wait(list(self.workers), POLL_SECONDS):
+                with interruptible():
+                    ready = wait(list(self.workers), POLL_SECONDS)
+                for pipe in ready:
                     self._receive(self.workers[pipe])  # type: ignore[index]
         finally:
             for worker in self.workers.values():

@@ -59,6 +59,11 @@ def git_commit() -> str:
     return ""
 
 
+def gfmd_version() -> str:
+    """The version of this program, and its Git commit where that is known."""
+    return f"{gfmd_cli.__version__} {git_commit()}".strip()
+
+
 def _version(package: str) -> str:
     try:
         return version(package)

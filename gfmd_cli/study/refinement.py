@@ -1,5 +1,6 @@
 """One contact on one grid, or on finer and finer ones until its errors are as requested."""
 
+import os
 from dataclasses import dataclass, field, replace
 from functools import lru_cache, partial
 from math import prod
@@ -95,6 +96,10 @@ def task_scene(task: Task, points: int, context: SolveContext) -> Scene:
 def forget_scenes() -> None:
     """Free the memory of the last scenes."""
     _scenes.cache_clear()
+
+
+os.register_at_fork(after_in_child=forget_scenes)
+"""A process that is forked, as by `multiprocessing`, has none of the threads of their grids."""
 
 
 def solve_on_grids(task: Task, context: SolveContext, watcher: Watcher) -> TaskSolution:

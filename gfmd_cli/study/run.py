@@ -48,6 +48,8 @@ class RunOptions:
     """Whether to plan transforms without measuring, with one thread a task."""
     ranks: Ranks | None = None
     """The processes of an MPI run, which share every task."""
+    may_exit: bool = False
+    """Whether a second SIGINT ends the process at once; otherwise it raises KeyboardInterrupt."""
 
     def __post_init__(self) -> None:
         for name in ("checkpoint_every", "max_seconds"):
@@ -114,7 +116,7 @@ def run_study(
         seconds = max(options.max_seconds / 2, options.max_seconds - seconds_to_stop(pending, jobs))
         watch = _until(monotonic() + seconds, stop, watch)
     context = SolveContext(worker_options, watch, stop, ranks)
-    with signal_handlers(stop), ExitStack() as work:
+    with signal_handlers(stop, may_exit=options.may_exit), ExitStack() as work:
         damaged = on_root(ranks, lambda: work.enter_context(study.work(tasks)))
         work.callback(plans.plan_with, None)
         unusable = plans.plan_with(study.parts, estimated=options.reproducible, waits=waits)

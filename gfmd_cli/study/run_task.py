@@ -6,7 +6,7 @@ from functools import partial
 from pathlib import Path
 
 from gfmd_cli.errors import GfmdError, InputError, Interrupted, SpaceError, StudyError
-from gfmd_cli.files.checksums import file_version
+from gfmd_cli.files.checksums import file_digest, file_version
 from gfmd_cli.grid.blas import one_blas_thread
 from gfmd_cli.grid.fft_grid import Shape
 from gfmd_cli.grid.ranks import is_root, on_root, shared_errors
@@ -19,6 +19,8 @@ from gfmd_cli.study.checkpoint import Checkpoint
 from gfmd_cli.study.context import Progress, SolveContext, Watcher
 from gfmd_cli.study.load_search import solve_at_load
 from gfmd_cli.study.measure import result
+from gfmd_cli.study.provenance import gfmd_version
+from gfmd_cli.study.signals import interruptible
 from gfmd_cli.study.tasks import Task
 from gfmd_cli.study.unfinished_work import read_record_entry, record_path, write_record
 from gfmd_cli.units import duration
@@ -142,9 +144,12 @@ def solve_task(task: Task, parts: Path, context: SolveContext) -> Status:
     Raises Interrupted after the state was saved, InputError, SpaceError.
     """
     context.report(Progress(task.index, "start", task.label))
+    _check_files(task)  # before the work for it begins
+    gfmd_version()  # kept from now on: the source tree may be updated during the solve
     start = time.perf_counter()
     with Checkpoint.exclusive(parts / task.id, context.ranks) as checkpoint:
-        solved = solve_at_load(task, context, TaskWatcher(task, checkpoint, context))
+        with interruptible():
+            solved = solve_at_load(task, context, TaskWatcher(task, checkpoint, context))
         record = result(task, solved, time.perf_counter() - start)
         _check_files(task)
         if is_root(context.ranks):
@@ -156,8 +161,11 @@ def solve_task(task: Task, parts: Path, context: SolveContext) -> Status:
 
 
 def _check_files(task: Task) -> None:
-    """Raise InputError where a file is not the one whose checksum the task has."""
-    for path, version in task.files:
+    """Raise InputError where a file is not the one whose checksum the task has.
+
+    Its content is read only if its version has changed, as by `touch` or a copy of the same file.
+    """
+    for path, version, checksum in task.files:
         with suppress(OSError):  # a file that was deleted after it had been read
-            if file_version(path) != version:
+            if file_version(path) != version and file_digest(path) != checksum:
                 raise InputError(f"{path}: the file was changed during the run; run again")

@@ -23,11 +23,30 @@ def _handled_signals() -> list[signal.Signals]:
     return [number for number in SIGNALS if signal.getsignal(number) is not signal.SIG_IGN]
 
 
-@contextmanager
-def signal_handlers(stop: Event) -> Iterator[None]:
-    """Inside, a signal sets `stop`; a second SIGINT leaves at once.
+_interruptible = False  # whether the main thread may be interrupted now
 
-    Only the main thread of a program can take signals; in another they stay what they are.
+
+@contextmanager
+def interruptible() -> Iterator[None]:
+    """Inside, a second SIGINT may raise KeyboardInterrupt: nothing that others need is written."""
+    global _interruptible
+    if current_thread() is not main_thread():
+        yield
+        return
+    _interruptible = True
+    try:
+        yield
+    finally:
+        _interruptible = False
+
+
+@contextmanager
+def signal_handlers(stop: Event, *, may_exit: bool) -> Iterator[None]:
+    """Inside, a signal sets `stop`.
+
+    A second SIGINT ends the process at once if it `may_exit`; otherwise, as in a notebook, it
+    raises KeyboardInterrupt where the run is `interruptible`. Only the main thread of a program can
+    take signals; in another they stay what they are.
     """
     if current_thread() is not main_thread():
         yield
@@ -35,7 +54,10 @@ def signal_handlers(stop: Event) -> Iterator[None]:
 
     def handle(number: int, _frame: Any) -> None:
         if number == signal.SIGINT and stop.is_set():
-            os._exit(130)
+            if may_exit:
+                os._exit(130)
+            if _interruptible:
+                raise KeyboardInterrupt
         stop.set()
 
     before = {number: signal.signal(number, handle) for number in _handled_signals()}

@@ -55,8 +55,9 @@ class Task:
     """Checksum of the table of the elastomer, likewise."""
     swept: tuple[tuple[str, str], ...]
     """Swept keys of surface, grid and solver: the table, and the value as a word of the label."""
-    files: tuple[tuple[Path, Version], ...] = ()
-    """The files of surface and elastomer, and their versions before the checksums were computed."""
+    files: tuple[tuple[Path, Version, str], ...] = ()
+    """The files of surface and elastomer with their checksums, and their versions before these
+    were computed."""
 
     @property
     def auto(self) -> bool:
@@ -186,9 +187,9 @@ def _tasks(spec: models.Spec) -> list[Task]:
                 scene_id=digest([tables[name] for name in ("surface", "elastomer", "grid")]),
                 swept=_swept_words(chosen, swept_keys),
                 files=tuple(
-                    (path, versions[path])
-                    for path in (chosen["surface"].file, chosen["elastomer"].file)
-                    if path in versions
+                    (path, versions[path], tables[table]["sha256"])
+                    for table in ("surface", "elastomer")
+                    if (path := chosen[table].file) in versions
                 ),
             )
             tasks.setdefault(task.id, task)  # loads may agree in all digits that count
