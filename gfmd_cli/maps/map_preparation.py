@@ -8,6 +8,7 @@ from typing import Any, Literal
 import numpy as np
 
 from gfmd_cli.grid.arrays import Field, Mask
+from gfmd_cli.maps.interpolation import positions
 from gfmd_cli.maps.pictures import block_sums
 
 Levelling = Literal["none", "mean", "plane", "curvature"]
@@ -89,15 +90,16 @@ def mirror(values: np.ndarray[Any, Any]) -> Any:
     return np.pad(values, [(0, points) for points in values.shape], mode="symmetric")
 
 
-def window(shape: tuple[int, ...], taper: float) -> Field:
+def window(shape: tuple[int, ...], taper: float, finer: tuple[int, ...] | None = None) -> Field:
     """Tukey window: rises as a cosine from 0 at the border to 1 at `taper` of each side.
 
-    Its values are those in the middle of the pixels, so that it is the same from all sides.
+    Its values are those in the middle of the pixels of a map of this shape, so that it is the same
+    from all sides; with `finer`, those at the points of a finer grid of the same cell.
     """
     weight: Field = np.ones(())
-    for points in shape:
-        middles = (np.arange(points) + 0.5) / points
-        border = np.minimum(middles, 1 - middles)
+    for points, new in zip(shape, finer or shape, strict=True):
+        middles = (positions(points, new) + 0.5) / points
+        border = np.minimum(middles, np.abs(1 - middles))  # the last may lie beyond the border
         along = 0.5 - 0.5 * np.cos(np.pi * np.minimum(border / taper, 1.0))
         weight = np.multiply.outer(weight, along)
     return weight

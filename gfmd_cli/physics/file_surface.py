@@ -238,7 +238,8 @@ class FileSurface(RigidSurface):
         """Points of a grid whose heights the window has changed."""
         if self.edges != "window":
             return None
-        return window(grid.whole_shape, self.taper)[grid.own] < 1.0
+        own_shape = self._topography().heights.shape
+        return window(own_shape, self.taper, grid.whole_shape)[grid.own] < 1.0
 
     def mirrored(self) -> "FileSurface | None":
         """The map mirrored to twice its sides; None if it is periodic or made so.
@@ -266,20 +267,24 @@ class FileSurface(RigidSurface):
 
     def void(self, grid: Grid) -> Mask | None:
         """Points of a grid nearest to a missing height of the map, if these never touch."""
-        return self._missing_on(grid) if self.missing == "void" else None
+        return self._missing_on(grid, self.is_centred) if self.missing == "void" else None
 
-    def filled(self, grid: Grid) -> Mask | None:
-        """Points of a grid nearest to a missing height of the map, if these are filled in."""
-        return self._missing_on(grid) if self.missing == "fill" else None
+    def filled(self, grid: Grid, *, is_periodic: bool = True) -> Mask | None:
+        """Points of a grid nearest to a missing height of the map, if these are filled in.
 
-    def _missing_on(self, grid: Grid) -> Mask | None:
+        With a free boundary the points of a finer grid are centred, see `mirrored`.
+        """
+        is_centred = not is_periodic and self._is_reflected()
+        return self._missing_on(grid, is_centred) if self.missing == "fill" else None
+
+    def _missing_on(self, grid: Grid, is_centred: bool) -> Mask | None:
         """Points of a grid nearest to a missing height of the map; None without one."""
         missing = self._topography().missing
         if missing is None:
             return None
         if self.edges == "mirror":
             missing = mirror(missing)
-        return nearest(missing, grid.whole_shape, centred=self.is_centred)[grid.own]
+        return nearest(missing, grid.whole_shape, centred=is_centred)[grid.own]
 
     def holes(self) -> int:
         """Number of missing heights of the map."""

@@ -141,8 +141,11 @@ class RigidSurface(SpecTable):
         """Points of a grid whose heights a window has changed; None where no window is used."""
         return None
 
-    def filled(self, grid: Grid) -> Mask | None:
-        """Points of a grid whose heights were filled in, and can touch; None where none were."""
+    def filled(self, grid: Grid, *, is_periodic: bool = True) -> Mask | None:
+        """Points of a grid whose heights were filled in, and can touch; None where none were.
+
+        `is_periodic`: whether the boundary of the contact is.
+        """
         return None
 
     def mirrored(self) -> "RigidSurface | None":

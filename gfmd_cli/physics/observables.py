@@ -133,17 +133,19 @@ def observe(contact: Contact, u: Field, sigma: Field) -> Observables:
 
 
 def changed_fractions(
-    surface: RigidSurface, grid: Grid, height: Field, u: Field, sigma: Field
+    surface: RigidSurface, contact: Contact, u: Field, sigma: Field
 ) -> dict[str, float]:
     """Fractions of the contact area and of the load where the heights are not those measured.
 
     Columns `edge_contact` and `edge_load` of the tapered zone, `filled_contact` and `filled_load`
     of heights that were filled in; none where the surface has no such points.
     """
-    zones = {"edge": surface.tapered(grid), "filled": surface.filled(grid)}
+    grid = contact.grid
+    filled = surface.filled(grid, is_periodic=contact.is_periodic)
+    zones = {"edge": surface.tapered(grid), "filled": filled}
     known = {name: zone for name, zone in zones.items() if zone is not None}
     fractions: dict[str, float] = {}
-    load = contact_pressure(height, u, sigma) if known else sigma
+    load = contact_pressure(contact.obstacle, u, sigma) if known else sigma
     for name, zone in known.items():
         sums = [[np.count_nonzero(part), part.sum()] for part in (load[zone], load)]
         inside, whole = grid.total(np.array(sums))
