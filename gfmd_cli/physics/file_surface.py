@@ -408,7 +408,8 @@ def _prepared(surface: FileSurface) -> Field:
                 f"{', '.join(f'{axis} = {index}' for axis, index in first)}; "
                 'surface.missing = "fill" fills them in, "void" keeps them out of contact'
             )
-        heights = fill_missing(heights, missing)
+        is_repeated = surface._is_periodic() and surface.edges in (None, "none")
+        heights = fill_missing(heights, missing, periodic=is_repeated)
     return make_periodic(heights, surface.edges or "none", surface.taper)
 
 
