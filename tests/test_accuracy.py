@@ -168,6 +168,27 @@ def test_a_given_grid_gets_errors_where_they_are_asked_for(rows_of):
     )
 
 
+@pytest.mark.parametrize("boundary", ["periodic", "free"])
+def test_a_turned_map_has_the_error_bars_of_the_map(boundary):
+    """On a second grid, too, which only one of the numbers of points is large enough for."""
+    heights = np.maximum(SelfAffine(cutoff=1 / 12, length_y=0.75).heights(64, 48), -0.5)
+    spec = {
+        "surface": {"length": 1.0},
+        "elastomer": {"kind": "half-space"},
+        "grid": {"points": 128, "boundary": boundary},
+        "load": {"pressure": 1.0},
+        "solver": {"tolerance": 1e-10},
+        "accuracy": {"mean_gap": 0.5},
+    }
+    turned = spec | {"surface": {"length": 0.75}, "grid": {"points": 96, "boundary": boundary}}
+    ends = ("", "_error", "_continuum", "_continuum_error")
+    names = [f"{name}{end}" for name in ("a_r", "u_g") for end in ends]
+    one = solve(spec, heights=heights).columns
+    other = solve(turned, heights=np.rot90(heights)).columns
+    assert one["a_r_verdict"] == one["u_g_verdict"] == "regular"
+    assert [other[name] for name in names] == pytest.approx([one[name] for name in names], rel=1e-6)
+
+
 def test_pressures_share_the_scene_of_the_finest_grid(rows_of, monkeypatch):
     """That of the coarser grid is built anew: both would take more memory than predicted."""
     built = []

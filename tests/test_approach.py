@@ -6,6 +6,7 @@ from scipy.ndimage import gaussian_filter
 from scipy.special import gamma
 
 from gfmd_cli import solve
+from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.physics.elastomers import Layer
 from gfmd_cli.physics.highest_point import highest_point
 from gfmd_cli.physics.self_affine import SelfAffine
@@ -97,6 +98,20 @@ def test_the_highest_point_lies_between_grid_points(dimension, points):
     assert highest_point(on_coarse) == pytest.approx(on_fine.max(), rel=5e-4)
     assert highest_point(on_coarse) >= on_fine.max()
     assert on_coarse.max() < 0.9995 * on_fine.max()
+
+
+@pytest.mark.parametrize("shape", [(16, 16), (15, 16), (16, 20), (16,)], ids=str)
+def test_the_highest_point_of_a_map_with_nyquist_waves_is_that_of_finer_grids(shape):
+    """Seen from all sides: a Nyquist wave stands for +q and -q alike."""
+    grid = Grid(shape[-1], len(shape), points_y=shape[0])
+    fine = Grid(32 * shape[-1], len(shape), points_y=32 * shape[0])
+    for seed in range(8):
+        heights = gaussian_filter(np.random.default_rng(seed).normal(size=shape), 0.4, mode="wrap")
+        highest = highest_point(heights)
+        above = highest - grid.resample(heights, fine).max()
+        assert -1e-9 < above < 5e-3 * heights.std()
+        for turned in (heights[::-1], heights[..., ::-1], heights.T):
+            assert highest_point(turned) == pytest.approx(highest, rel=1e-7)
 
 
 @pytest.mark.parametrize("hurst", [0.1, 0.8])

@@ -336,6 +336,17 @@ def test_a_change_that_is_small_by_accident_leaves_a_bar(n):
     assert sharp["u_g"].error == pytest.approx(20 * 0.01 / (128 * 0.1) ** 2)
 
 
+@pytest.mark.parametrize("tip", [Tip(2.0), Tip(1.0)], ids=str)
+def test_the_bars_of_a_turned_cell_are_those_of_the_cell(tip):
+    """A cell of 4:1 whose contact leaves a gap at its border, with L along either side."""
+    levels = [GridValues(N, 0.9, 0.5, 0.01, 2.0, area=0.25) for N in (128, 256)]
+    turned = [
+        replace(level, points=level.points / 4, perimeter=level.perimeter / 4, area=4.0)
+        for level in levels
+    ]
+    assert estimate(turned, 1.0, tip=tip) == estimate(levels, 1.0, tip=tip)
+
+
 @pytest.mark.parametrize("shape", [Ridge(), Ridge(width=0.3), LineParabola()])
 @pytest.mark.parametrize("n", [0.0, 0.5, 1.0, 1.5, 2.0])
 def test_bars_of_line_contacts_hold(shape, n):

@@ -3,11 +3,13 @@
 import numpy as np
 import pytest
 
+from gfmd_cli import solve
 from gfmd_cli.errors import InputError
 from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.maps import map_preparation
 from gfmd_cli.maps.map_preparation import fill_missing, level, make_periodic
 from gfmd_cli.physics.file_surface import FileSurface
+from gfmd_cli.physics.self_affine import SelfAffine
 
 
 @pytest.fixture
@@ -152,10 +154,43 @@ def test_a_large_hole_is_filled_smoothly(monkeypatch, heights):
     assert filled.max() <= exact[~missing].max()
 
 
+@pytest.mark.parametrize("largest", [200, 10**6])
+def test_a_hole_across_the_border_of_a_periodic_map_is_filled_as_inside(monkeypatch, largest):
+    monkeypatch.setattr(map_preparation, "MAX_EXACT", largest)
+    heights = SelfAffine(cutoff=1 / 8).heights(32)
+    missing = np.zeros(heights.shape, dtype=bool)
+    missing[6:24, 4:26] = missing[28, 28] = True
+    inside = fill_missing(heights, missing, periodic=True)
+    np.testing.assert_allclose(inside, fill_missing(heights, missing), atol=1e-12)
+    for shift in ((16, 0), (0, 16), (16, 16)):
+        moved = (np.roll(field, shift, (0, 1)) for field in (heights, missing))
+        filled = fill_missing(*moved, periodic=True)
+        np.testing.assert_allclose(filled, np.roll(inside, shift, (0, 1)), atol=1e-12)
+
+
 def test_a_line_is_filled_by_straight_segments():
     heights = np.array([0.0, np.nan, np.nan, 3.0, 1.0, np.nan])
     filled = fill_missing(heights, np.isnan(heights))
     np.testing.assert_allclose(filled, [0, 1, 2, 3, 1, 1], atol=1e-14)
+    filled = fill_missing(heights, np.isnan(heights), periodic=True)
+    np.testing.assert_allclose(filled, [0, 1, 2, 3, 1, 0.5], atol=1e-14)
+
+
+@pytest.mark.parametrize("missing", ["fill", "void"])
+def test_a_periodic_map_with_a_hole_across_its_border_has_the_contact_of_the_moved_map(missing):
+    heights = SelfAffine(cutoff=1 / 8).heights(32)
+    heights[10:18, 8:20] = np.nan
+    spec = {
+        "surface": {"missing": missing},
+        "elastomer": {"kind": "half-space"},
+        "load": {"p_star": 0.2},
+        "solver": {"tolerance": 1e-10},
+    }
+    names = ("a_r", "sigma_p", "u_g", "h_std", "delta_sigma")
+    inside, across = (
+        solve(spec, heights=each).columns for each in (heights, np.roll(heights, (17, 19), (0, 1)))
+    )
+    assert [across[key] for key in names] == pytest.approx([inside[key] for key in names], rel=1e-8)
 
 
 def test_lines_are_made_periodic_along_their_axis():

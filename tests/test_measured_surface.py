@@ -47,6 +47,25 @@ def test_a_map_that_is_not_tapered_has_no_such_share(rows_of, tmp_path):
     assert np.isnan(row["edge_contact"])
 
 
+@pytest.mark.parametrize("points", [32, 64, 96, 128])
+def test_the_share_of_the_tapered_edges_is_the_same_from_all_sides(points):
+    heights = SelfAffine(cutoff=1 / 16, seed=3).heights(32)
+    spec = {
+        "surface": {"edges": "window", "periodic": False, "taper": 0.2},
+        "elastomer": {"kind": "half-space"},
+        "grid": {"points": points},
+        "load": {"p_star": 0.2},
+        "solver": {"tolerance": 1e-10},
+    }
+    turned = [heights, heights[::-1], heights[:, ::-1], heights.T[::-1, ::-1]]
+    shares = [
+        [solve(spec, heights=each).columns[f"edge_{name}"] for name in ("contact", "load")]
+        for each in turned
+    ]
+    assert shares[0][0] > 0.01
+    assert shares[1:] == [pytest.approx(shares[0], rel=1e-7)] * 3
+
+
 def test_much_contact_at_the_edges_is_told(gfmd, tmp_path):
     np.save(tmp_path / "peak.npy", peak((16, 29)))
     warning = "of the load is at the edges, where the window has changed the heights"
@@ -68,6 +87,25 @@ def highest(heights):
 
 def at_random(heights):
     return np.random.default_rng(3).random(heights.shape) < 0.02
+
+
+@pytest.mark.parametrize("factor", [1, 2, 3])
+def test_filled_points_of_a_finer_grid_with_a_free_boundary_lie_where_their_heights_do(factor):
+    """Every part of a pixel whose height was missing is filled in, and no part of another."""
+    heights = rough_map(at_random)[:32, :48]
+    spec = {
+        "surface": {"length": 1e-4, "periodic": False},
+        "elastomer": {"kind": "half-space"},
+        "grid": {"points": 48 * factor, "boundary": "free"},
+        "load": {"p_star": 0.2},
+    }
+    solved = solve(spec, heights=heights)
+    filled = np.isnan(heights).repeat(factor, 0).repeat(factor, 1)
+    share = np.count_nonzero(solved.contact & filled) / np.count_nonzero(solved.contact)
+    load = solved.pressure[filled].sum() / solved.pressure.sum()
+    assert 0 < share < 0.5
+    assert solved.columns["filled_contact"] == pytest.approx(share, rel=1e-12)
+    assert solved.columns["filled_load"] == pytest.approx(load, rel=1e-12)
 
 
 @pytest.mark.parametrize("edges", ["none", "mirror"])

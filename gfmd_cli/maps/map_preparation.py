@@ -8,6 +8,7 @@ from typing import Any, Literal
 import numpy as np
 
 from gfmd_cli.grid.arrays import Field, Mask
+from gfmd_cli.maps.interpolation import positions
 from gfmd_cli.maps.pictures import block_sums
 
 Levelling = Literal["none", "mean", "plane", "curvature"]
@@ -89,15 +90,16 @@ def mirror(values: np.ndarray[Any, Any]) -> Any:
     return np.pad(values, [(0, points) for points in values.shape], mode="symmetric")
 
 
-def window(shape: tuple[int, ...], taper: float) -> Field:
+def window(shape: tuple[int, ...], taper: float, finer: tuple[int, ...] | None = None) -> Field:
     """Tukey window: rises as a cosine from 0 at the border to 1 at `taper` of each side.
 
-    Its values are those in the middle of the pixels, so that it is the same from all sides.
+    Its values are those in the middle of the pixels of a map of this shape, so that it is the same
+    from all sides; with `finer`, those at the points of a finer grid of the same cell.
     """
     weight: Field = np.ones(())
-    for points in shape:
-        middles = (np.arange(points) + 0.5) / points
-        border = np.minimum(middles, 1 - middles)
+    for points, new in zip(shape, finer or shape, strict=True):
+        middles = (positions(points, new) + 0.5) / points
+        border = np.minimum(middles, np.abs(1 - middles))  # the last may lie beyond the border
         along = 0.5 - 0.5 * np.cos(np.pi * np.minimum(border / taper, 1.0))
         weight = np.multiply.outer(weight, along)
     return weight
@@ -111,11 +113,12 @@ def border_step(heights: Field) -> float:
     return float(np.sqrt(np.mean(across**2) / inside)) if inside > 0 else 1.0
 
 
-def fill_missing(heights: Field, missing: Mask) -> Field:
+def fill_missing(heights: Field, missing: Mask, *, periodic: bool = False) -> Field:
     """Fill missing heights in by the solution of the discrete Laplace equation.
 
-    Each missing height is the mean of its neighbours (fewer than four at the edge of the map), so
-    that the filling has no maximum or minimum of its own. Known heights are the boundary values.
+    Each missing height is the mean of its neighbours (fewer than four at the edge of the map,
+    unless it is periodic), so that the filling has no maximum or minimum of its own. Known heights
+    are the boundary values.
     Beyond `MAX_EXACT` missing heights, `JACOBI_STEPS` steps of the Jacobi iteration smooth the
     solution of a map of half the resolution, without solving the equation exactly.
 
@@ -123,31 +126,32 @@ def fill_missing(heights: Field, missing: Mask) -> Field:
     ----------
     heights : shape (rows, columns) or (points,), any value where missing
     missing : mask of the missing heights, of the same shape; at least one height is known
+    periodic : whether points at opposite edges are neighbours
     """
     known = np.atleast_2d(np.where(missing, 0.0, heights))
     holes = np.atleast_2d(missing)
     if not holes.any():
         return known.reshape(heights.shape)
     exact = np.count_nonzero(holes) <= MAX_EXACT
-    filled = _harmonic(known, holes) if exact else _smooth(known, holes)
+    filled = (_harmonic if exact else _smooth)(known, holes, periodic)
     return filled.reshape(heights.shape)
 
 
-def _smooth(known: Field, missing: Mask) -> Field:
+def _smooth(known: Field, missing: Mask, periodic: bool) -> Field:
     """Filling from a map of half the resolution; `known` is zero where missing."""
     count, total = block_sums((~missing).astype(np.float64), 2), block_sums(known, 2)
-    coarse = fill_missing(total / np.maximum(count, 1.0), count == 0)
+    coarse = fill_missing(total / np.maximum(count, 1.0), count == 0, periodic=periodic)
     for axis in (0, 1):
         coarse = coarse.repeat(2, axis)
     filled = np.where(missing, coarse[: known.shape[0], : known.shape[1]], known)
     for _ in range(JACOBI_STEPS):
-        around = np.pad(filled, 1, mode="edge")
+        around = np.pad(filled, 1, mode="wrap" if periodic else "edge")
         mean = around[:-2, 1:-1] + around[2:, 1:-1] + around[1:-1, :-2] + around[1:-1, 2:]
         np.copyto(filled, 0.25 * mean, where=missing)
     return filled
 
 
-def _harmonic(known: Field, missing: Mask) -> Field:
+def _harmonic(known: Field, missing: Mask, periodic: bool) -> Field:
     """Filling by the sparse linear system; `known` is zero where missing."""
     from scipy.sparse import coo_array  # a tenth of a second that most processes save
     from scipy.sparse.linalg import spsolve
@@ -158,7 +162,7 @@ def _harmonic(known: Field, missing: Mask) -> Field:
     counts, right = np.zeros((2, len(points)))
     pairs = []
     for step in ((1, 0), (-1, 0), (0, 1), (0, -1)):
-        neighbours = points + step
+        neighbours = (points + step) % missing.shape if periodic else points + step
         inside = np.flatnonzero(np.all((neighbours >= 0) & (neighbours < missing.shape), axis=1))
         indices = tuple(neighbours[inside].T)
         counts[inside] += 1.0

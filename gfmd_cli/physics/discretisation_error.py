@@ -407,7 +407,8 @@ def _gap(grids: NestedGrids, rough: RoughnessScales | None, tip: Tip) -> Estimat
 def _single_gap(grids: NestedGrids, tip: Tip) -> Estimate:
     """Mean gap of a single indenter, or of a line contact."""
     fine, change = grids.fine, abs(grids.change("u_g"))
-    across = fine.u_g / (fine.points * (1 - fine.a_r)) ** 2  # points across the gap, in one line
+    points = fine.points * min(1.0, fine.area)  # along the shorter side
+    across = fine.u_g / (points * (1 - fine.a_r)) ** 2  # points across the gap, in one line
     smooth = max(SINGLE_CONTACT * change / 3, SINGLE_CONTACT_GAP * across)
     sharp = max(SHARP_GAP_CHANGE * change, SHARP_GAP * across)
     return on_grid(fine.u_g, sharp if tip.is_sharp else smooth)

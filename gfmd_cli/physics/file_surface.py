@@ -230,12 +230,17 @@ class FileSurface(RigidSurface):
             heights = self.scale * heights
         return level(heights, self.levelling(), known)
 
-    def changed(self, grid: Grid) -> dict[str, Mask]:
-        """Points of a grid that the window has changed, and nearest to heights filled in."""
+    def changed(self, grid: Grid, *, is_periodic: bool = True) -> dict[str, Mask]:
+        """Points of a grid that the window has changed, and nearest to heights filled in.
+
+        With a free boundary the points of a finer grid are centred, see `mirrored`.
+        """
         zones = {}
         if self.edges == "window":
-            zones["edge"] = window(grid.whole_shape, self.taper)[grid.own] < 1.0
-        filled = self._missing_on(grid) if self.missing == "fill" else None
+            own_shape = self._topography().heights.shape
+            zones["edge"] = window(own_shape, self.taper, grid.whole_shape)[grid.own] < 1.0
+        is_centred = not is_periodic and self._is_reflected()
+        filled = self._missing_on(grid, is_centred) if self.missing == "fill" else None
         return zones if filled is None else zones | {"filled": filled}
 
     def mirrored(self) -> "FileSurface | None":
@@ -267,16 +272,16 @@ class FileSurface(RigidSurface):
 
     def void(self, grid: Grid) -> Mask | None:
         """Points of a grid nearest to a missing height of the map, if these never touch."""
-        return self._missing_on(grid) if self.missing == "void" else None
+        return self._missing_on(grid, self.is_centred) if self.missing == "void" else None
 
-    def _missing_on(self, grid: Grid) -> Mask | None:
+    def _missing_on(self, grid: Grid, is_centred: bool) -> Mask | None:
         """Points of a grid nearest to a missing height of the map; None without one."""
         missing = self._topography().missing
         if missing is None:
             return None
         if self.edges == "mirror":
             missing = mirror(missing)
-        return nearest(missing, grid.whole_shape, centred=self.is_centred)[grid.own]
+        return nearest(missing, grid.whole_shape, centred=is_centred)[grid.own]
 
     def holes(self) -> int:
         """Number of missing heights of the map."""
@@ -399,7 +404,8 @@ def _prepared(surface: FileSurface) -> Field:
                 f"{', '.join(f'{axis} = {index}' for axis, index in first)}; "
                 'surface.missing = "fill" fills them in, "void" keeps them out of contact'
             )
-        heights = fill_missing(heights, missing)
+        is_repeated = surface._is_periodic() and surface.edges in (None, "none")
+        heights = fill_missing(heights, missing, periodic=is_repeated)
     return make_periodic(heights, surface.edges or "none", surface.taper)
 
 

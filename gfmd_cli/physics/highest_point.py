@@ -5,7 +5,7 @@ from itertools import product
 import numpy as np
 from scipy.optimize import minimize
 
-from gfmd_cli.grid.arrays import Field
+from gfmd_cli.grid.arrays import Field, Modes
 
 CANDIDATES = 8  # points from which a maximum is sought: the highest of different peaks
 SUBDIVISION = 4  # of the spacing along each axis for these points: with two grid points per wave,
@@ -29,16 +29,17 @@ def highest_point(heights: Field) -> float:
     highest = []
     parts = np.arange(SUBDIVISION) / SUBDIVISION
     for y, x in product(parts if count_y > 1 else [0.0], parts):
-        moved = np.fft.irfft2(modes * np.exp(k_y * y)[:, None] * np.exp(k_x * x), whole.shape)
+        (along_y, _), (along_x, _) = _waves(k_y, y), _waves(k_x, x)
+        moved = np.fft.irfft2(modes * along_y[:, None] * along_x, whole.shape)
         highest += _highest(moved, (y, x))
     modes /= whole.size
     modes[:, 1 : (count_x + 1) // 2] *= 2.0  # with their opposites
 
     def depth(place: Field) -> tuple[float, Field]:
         """-h and its gradient; places and slopes are in points."""
-        e_y, e_x = np.exp(k_y * place[0]), np.exp(k_x * place[1])
+        (e_y, slope_y), (e_x, slope_x) = _waves(k_y, place[0]), _waves(k_x, place[1])
         along_x = modes @ e_x
-        slopes = (k_y * e_y) @ along_x, e_y @ (modes @ (k_x * e_x))
+        slopes = slope_y @ along_x, e_y @ (modes @ slope_x)
         return -float((e_y @ along_x).real), -np.real(slopes)
 
     for place in _peaks(highest):
@@ -46,6 +47,19 @@ def highest_point(heights: Field) -> float:
         found = minimize(depth, place, jac=True, method="L-BFGS-B", bounds=bounds)
         best = max(best, -scale * float(found.fun))
     return best
+
+
+def _waves(k: Modes, place: float) -> tuple[Modes, Modes]:
+    """exp(k x) at a place, and its derivative by x.
+
+    The Nyquist wave is half a wave of +q and half one of -q, as where a grid is refined.
+    """
+    wave = np.exp(k * place)
+    slope = k * wave
+    is_nyquist = np.abs(k.imag) == np.pi
+    for values in (wave, slope):
+        np.copyto(values, values.real, where=is_nyquist)
+    return wave, slope
 
 
 def _highest(heights: Field, shift: tuple[float, float]) -> list[tuple[float, float, float]]:

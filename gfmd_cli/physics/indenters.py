@@ -135,10 +135,11 @@ class RigidSurface(SpecTable):
         """Levelled heights [m] as measured, and their spacing [m]; None where nothing was."""
         return None
 
-    def changed(self, grid: Grid) -> dict[str, Mask]:
+    def changed(self, grid: Grid, *, is_periodic: bool = True) -> dict[str, Mask]:
         """Points of a grid that can touch, but whose heights are not those measured, by reason.
 
-        "edge": a window has changed them; "filled": they were filled in.
+        "edge": a window has changed them; "filled": they were filled in. `is_periodic`: whether the
+        boundary of the contact is.
         """
         return {}
 

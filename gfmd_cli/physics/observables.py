@@ -133,16 +133,17 @@ def observe(contact: Contact, u: Field, sigma: Field) -> Observables:
 
 
 def changed_fractions(
-    surface: RigidSurface, grid: Grid, height: Field, u: Field, sigma: Field
+    surface: RigidSurface, contact: Contact, u: Field, sigma: Field
 ) -> dict[str, float]:
     """Fractions of the contact area and of the load where the heights are not those measured.
 
     Columns `edge_contact` and `edge_load` of the tapered zone, `filled_contact` and `filled_load`
     of heights that were filled in; none where the surface has no such points.
     """
-    zones = surface.changed(grid)
+    grid = contact.grid
+    zones = surface.changed(grid, is_periodic=contact.is_periodic)
     fractions: dict[str, float] = {}
-    load = contact_pressure(height, u, sigma) if zones else sigma
+    load = contact_pressure(contact.obstacle, u, sigma) if zones else sigma
     for name, zone in zones.items():
         sums = [[np.count_nonzero(part), part.sum()] for part in (load[zone], load)]
         inside, whole = grid.total(np.array(sums))

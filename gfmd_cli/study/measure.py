@@ -107,7 +107,7 @@ def all_columns(task: Task, solved: TaskSolution) -> Row:
     contact, solution = solved.contact, solved.solution
     u, sigma = solution.u, solution.sigma
     results = measured(task, solved)
-    results |= changed_fractions(task.surface, solved.scene.grid, contact.obstacle, u, sigma)
+    results |= changed_fractions(task.surface, contact, u, sigma)
     return (
         empty_row()
         | planned(task)

@@ -170,8 +170,10 @@ def _sizes(task: Task) -> list[int]:
             sizes.append(2 * sizes[-1])
         return sizes
     half = task.points // 2
-    fits = task.accuracy is not None and half % 2 == 0 and half >= FIRST and task.resolves(half)
-    return [half, task.points] if fits else [task.points]
+    # of a turned map as of the map itself
+    enough = any(n % 4 == 0 and n >= 2 * FIRST for n in (task.points, task.points_y))
+    fits = enough and task.points % 2 == 0 and task.resolves(half)
+    return [half, task.points] if fits and task.accuracy is not None else [task.points]
 
 
 def _ended_grids(sizes: list[int], grids: list[SolvedGrid]) -> list[SolvedGrid]:
