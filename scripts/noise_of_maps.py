@@ -110,10 +110,7 @@ def surfaces(points: int, seed: int) -> Iterator[tuple[str, Field]]:
         steps = np.floor(random.choice([3, 7]) * x + random.choice([0, 2]) * y)
         pillars = (np.floor(8 * x) % 2) * (np.floor(8 * y) % 2)
         yield "random", rough
-        yield (
-            "every second point of a random one",
-            scan(2 * points, hurst, rolloff, 2, seed)[::2, ::2],
-        )
+        yield "points of a finer surface", scan(4 * points, hurst, 2, 2, seed)[::4, ::4]
         yield "mean of 2 x 2 points", uniform_filter(rough, 2)
         yield "seen with a round tip", grey_dilation(rough, structure=tip)
         yield "on a sphere", rough - 20 * ((x - 0.5) ** 2 + (y - 0.5) ** 2)
