@@ -22,6 +22,7 @@ SMALL = {
     "indenter_bars.py": "--points 64 --line-reference 256 --round-reference 128 --exponents 1 "
     "--pressures 1",
     "load_searches.py": "--points 128 --seeds 10",
+    "noise_of_maps.py": "--points 128 --seeds 1",
     "neighbour_start.py": "--points 512 --p-star 0.001 0.0011",
     "plain_processor.py": "",
     "plate_areas.py": "none.jsonl --no-run",

@@ -1,5 +1,6 @@
 """Which text files can be tables of heights, found out in a few seconds whatever their length."""
 
+import re
 import time
 from io import BytesIO
 
@@ -192,6 +193,24 @@ def test_three_digits_after_each_comma_are_decimals(tmp_path, separator, offset)
     assert read.heights == pytest.approx(1e-3 * (heights + offset))
     warnings = FileSurface(path=tmp_path / "h.txt").warnings()
     assert any("are they thousands?" in each for each in warnings) == bool(offset)
+
+
+def test_points_that_separate_thousands_give_a_warning(tmp_path):
+    """But not three decimals of all numbers, nor numbers without the zeros at their ends."""
+    heights, table = in_nm("\t", (20, 30))
+    path = tmp_path / "h.txt"
+    for word, is_suspect in (
+        (lambda nm: f"{nm:,}".replace(",", "."), True),
+        (lambda nm: f"{1e-3 * nm:.3f}", False),
+        (lambda nm: f"{1e-3 * nm:.4g}", False),
+        (str, False),
+    ):
+        path.write_text(table(word))
+        notes = read_topography(path).notes
+        assert any(re.search(r"1\.\d\d\d beside 9\d\d was", each) for each in notes) == is_suspect
+    pairs = zip(range(100), heights.ravel(), strict=False)
+    path.write_text("".join(f"{x} {1e-3 * height + 1:.3f}\n" for x, height in pairs))
+    assert not any("beside" in each for each in read_topography(path).notes)
 
 
 HEADERS = {

@@ -36,6 +36,9 @@ AMBIGUOUS_UNITS = "pm", "in"  # which end a time and begin a phrase
 SIDE = re.compile(rb"#\s*\S+\s*[:=]\s*([\d.]+(?:[eE][-+]?\d+)?)\s*(\S+)\s*$")
 """A line such as "# Width: 20 um", in any language."""
 THOUSANDS = re.compile(rb"[-+]?[1-9]\d{0,2}(,\d{3})+(\.\d*)?")
+POINTED = re.compile(rb"[-+]?[1-9]\d{0,2}\.\d{3}")
+WHOLE = re.compile(rb"[-+]?\d{1,3}")
+MIN_POINTED = 50  # numbers such as 1.023: of fewer, all may have three decimals by chance
 NUMBER_CHARACTERS = b' "\t+-.,;0123456789eEdDinfaINFA'
 """Characters of lines without words."""
 UTF_16 = codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE
@@ -189,6 +192,8 @@ def with_blanks(file: BinaryIO) -> tuple[BinaryIO, str]:
         if is_decimal or numbers >= MATRIX_COLUMNS:
             text = part(file).replace(b";", b" ")
             file = BytesIO(text.replace(b",", b"." if is_decimal else b" "))
+    else:
+        warning = _warning_of_points(rows)
     return file, warning
 
 
@@ -228,6 +233,29 @@ def _warning_of_thousands(start: bytes, width: int) -> str:
             "Save the numbers with decimal points and without separators of thousands"
         )
     return f"{first} and all other numbers were read with decimal commas; are they thousands?"
+
+
+def _warning_of_points(rows: list[bytes]) -> str:
+    """Warning if points seem to separate thousands: 1.023 beside 998, in one column.
+
+    Where they are decimal, some number has another number of decimals.
+    """
+    words = [row.split() for row in rows] or [[]]
+    columns = zip(*(row for row in words if len(row) == len(words[-1])), strict=True)
+    pointed, whole = [], []
+    for column in columns:
+        with_point = [word for word in column if b"." in word]
+        if 0 < len(with_point) < len(column):
+            pointed += with_point
+            whole += [word for word in column if b"." not in word]
+    if len(pointed) < MIN_POINTED or not all(map(POINTED.fullmatch, pointed)):
+        return ""
+    if not all(map(WHOLE.fullmatch, whole)):
+        return ""
+    return (
+        f"{pointed[0].decode()} beside {whole[0].decode()} was read with a decimal point; if the "
+        "points separate thousands, save the numbers without them"
+    )
 
 
 def in_utf8(file: BinaryIO) -> BinaryIO:

@@ -28,6 +28,7 @@ from gfmd_cli.maps.map_preparation import (
     mirror,
     window,
 )
+from gfmd_cli.maps.noise import noisy
 from gfmd_cli.maps.pictures import Picture, picture
 from gfmd_cli.maps.topography import Region, Topography, read_topography
 from gfmd_cli.physics.indenters import SMALLEST_GRID, RigidSurface, forget_peaks
@@ -441,17 +442,23 @@ def _warnings_on_heights(surface: FileSurface) -> tuple[str, ...]:
     sides = tuple(step * (n - 1) for step, n in zip(spacing, shape, strict=True))
     filled_lines, known = misread.filled_lines(topography)
     outliers, misread_map = map_warnings.outliers(known), misread.misread(known)
+    points = "" if misread_map or outliers else map_warnings.single_points(known)
+    lines = "" if misread_map else map_warnings.shifted_lines(known, spacing)
+    rounded = map_warnings.rounded(topography, scale)
+    rounded_trend = map_warnings.rounded_trend(topography, levelled, scale)
+    is_explained = any((outliers, misread_map, points, lines, rounded, rounded_trend))
     return (
         filled_lines,
         outliers,
         misread_map,
-        "" if misread_map or outliers else map_warnings.single_points(known),
-        "" if misread_map else map_warnings.shifted_lines(known, spacing),
+        points,
+        lines,
+        "" if is_explained else noisy(known, spacing, scale),
         map_warnings.curved(levelled if has_missing else untapered),
         map_warnings.steep(surface.levelling(), subtracted, sides),
         map_warnings.repeated_lines(topography.heights),
-        map_warnings.rounded(topography, scale),
-        map_warnings.rounded_trend(topography, levelled, scale),
+        rounded,
+        rounded_trend,
     )
 
 
