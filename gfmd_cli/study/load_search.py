@@ -5,14 +5,15 @@ sought: on coarser grids first, where a trial costs little, then on the grid its
 the coarser grids predict the first pressure there. Each trial is a solve of its own.
 
 With `[accuracy]` a contact area or mean gap is that in the continuum on the last grid, and that of
-the grid on the coarser ones, which only give a first pressure.
+the grid on the coarser ones, which give a first pressure, and the slope from which the error of
+the pressure follows.
 
 The contact area of a grid has steps. Where the requested area lies between two attainable ones, the
 search ends with the nearest contact, at a pressure that may depend on rounding errors.
 """
 
 from dataclasses import replace
-from math import exp, expm1, inf, isfinite, log
+from math import exp, expm1, inf, isfinite, log, nan
 from typing import NamedTuple
 
 import numpy as np
@@ -47,6 +48,9 @@ AREA_RATIO = 0.5
 area is proportional to the spacing. 0.37 to 0.67 on 256^2, 512^2 and 1024^2 (n = 0.5 to 3, areas of
 0.01 to 0.3, two seeds), except for one shift that was a 50th of the next."""
 TRIALS = 60  # on one grid; 44 halve an interval of STEP down to ROUNDING
+NEIGHBOUR = 1.25
+"""Pressure of the trial that gives the slope at the root, over that of the root. A choice: a chord
+to a higher pressure is less steep than the slopes of area and gap, so that it widens the error."""
 
 
 def solve_at_load(task: Task, context: SolveContext, watcher: Watcher) -> TaskSolution:
@@ -64,17 +68,21 @@ def solve_at_load(task: Task, context: SolveContext, watcher: Watcher) -> TaskSo
         return solve_on_grids(task, context, watcher)
     trials = watcher.notes.trials
 
-    def attempt(points: int, pressure: float) -> TaskSolution:
+    def attempt(points: int, pressure: float, *, is_neighbour: bool = False) -> TaskSolution:
         solved = solve_on_grids(_at(task, points, pressure), context, watcher)
         value = loaded_value(task.quantity, measured(task, solved))
         work = solved.solution.transforms * solved.contact.grid.size
-        trials.append(Trial(points, pressure, value, work))
+        trials.append(Trial(points, pressure, value, work, is_neighbour))
         return solved
 
     solved: TaskSolution | None = None
     first = slope = 0.0
     roots: list[float] = []
-    for points in _grids(task):
+    chord = nan
+    grids = _grids(task)
+    has_error = task.accuracy is not None and task.quantity != "displacement"
+    measured_on = grids[max(len(grids) - 2, 0)] if has_error else 0
+    for points in grids:
         scene = task_scene(task, points, context)
         if not _is_in_reach(task, scene):
             if points == task.points:
@@ -86,12 +94,19 @@ def solve_at_load(task: Task, context: SolveContext, watcher: Watcher) -> TaskSo
             first, slope = _guess(task, scene)
         search = _Search(task, scene, first, slope)
         for trial in trials:
-            if trial.points == points:
+            if trial.points == points and not trial.is_neighbour:
                 search.add(trial)
         while (pressure := search.next()) is not None:
             solved = None  # frees its memory, which is needed now
             solved = attempt(points, pressure)
             search.add(trials[-1])
+        if points == measured_on and search.succeeded:
+            higher = NEIGHBOUR * search.nearest.pressure
+            is_missing = not any(trial.is_neighbour for trial in trials)
+            if is_missing and higher < PRESSURE_RANGE[1] * scene.delta_sigma:
+                solved = None
+                solved = attempt(points, higher, is_neighbour=True)
+            chord = _chord(search.nearest, trials)
         roots.append(search.root if search.succeeded else log(search.nearest.pressure))
         slope = search.slope
     if solved is None or trials[-1] != search.nearest:
@@ -99,10 +114,35 @@ def solve_at_load(task: Task, context: SolveContext, watcher: Watcher) -> TaskSo
         solved = attempt(task.points, search.nearest.pressure)
     solved.solution.transforms = sum(trial.work for trial in trials) / solved.contact.grid.size
     _check_known(task, solved)
+    if search.succeeded:
+        solved.pressure_error = _pressure_error(task, solved, chord)
     solver_ended = solved.solution.status in (Status.CONVERGED, Status.ROUNDING)
     if solver_ended and not search.succeeded:
         solved.solution.status = Status.LOAD_NOT_REACHED
     return solved
+
+
+def _chord(root: Trial, trials: list[Trial]) -> float:
+    """Relative change of the value over that of the pressure, to the neighbour; NaN without one."""
+    values = [trial.value for trial in trials if trial.is_neighbour]
+    return abs(values[0] / root.value - 1) / (NEIGHBOUR - 1) if values and root.value else nan
+
+
+def _pressure_error(task: Task, solved: TaskSolution, chord: float) -> float:
+    """Relative error of a pressure that was searched; NaN where it is unknown.
+
+    At the pressure of the continuum with the load, the value of this contact differs from the load
+    by less than its error. `chord` is the relative change of the value over that of the pressure.
+    Beyond the pressure to which the chord reaches, it says nothing.
+    """
+    if not chord > 0:
+        return nan
+    name = LOADS[task.quantity].searched
+    estimate = solved.estimates[name]
+    distance = estimate.continuum_error + solved.algebraic(name)
+    distance += abs(estimate.continuum - task.load)
+    error = distance / (estimate.continuum * chord)
+    return error if error < NEIGHBOUR - 1 else nan
 
 
 def _check_known(task: Task, solved: TaskSolution) -> None:

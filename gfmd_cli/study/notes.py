@@ -41,6 +41,8 @@ class Trial:
     """Contact area or mean gap of the solution."""
     work: float
     """Transforms times grid points."""
+    is_neighbour: bool = False
+    """Whether the trial is not one of the search, but gives the slope at its root."""
 
 
 @with_config(ConfigDict(strict=True, extra="forbid"))
