@@ -1,9 +1,9 @@
-"""How often the error bars of searched pressures hold, on random loads and surfaces.
+"""How often the error bars at a load that was searched hold, on random loads and surfaces.
 
-Each case has a contact area or a mean gap as the load. It is solved with [accuracy] on N and 2 N
-points per side, and on `--finer` N points, whose pressure is the reference. A line for each kind of
-case says how many error bars hold of those that are given, how many are "unknown", and the median
-of bar over error: docs/accuracy.md.
+Each case has a contact area or a mean gap as the load. It is solved with [accuracy] on 64 and 128
+points per side, and on `--finer` times 64 points, whose results are the reference. A line for each
+kind of case and quantity says how many error bars hold of those that are given, how many are
+"unknown", and the median of bar over error: docs/accuracy.md.
 
     python scripts/searched_pressures.py --count 240 --seed 1
 """
@@ -23,11 +23,13 @@ from calibration import IRREGULAR, irregular_map
 
 from gfmd_cli.api import solve
 from gfmd_cli.errors import InputError
+from gfmd_cli.physics.observables import QUANTITIES
 
 AREAS = (0.003, 0.95)
 GAPS = (0.01, 2.0)
 EXPONENTS = (0.5, 1.0, 1.5, 2.0, 2.5, 3.0)
 BASE = 64
+SEARCHED = {"contact_area": "a_r", "mean_gap": "u_g"}
 
 
 @dataclass(frozen=True)
@@ -91,14 +93,16 @@ def columns(case: Case, points: int, tolerance: float) -> dict[str, Any] | None:
     return row if row["status"].is_converged else None
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("--count", type=int, default=240)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--finer", type=int, default=16, help="finest grid over the coarsest")
-    parser.add_argument("--verbose", action="store_true", help="print each case")
-    arguments = parser.parse_args()
-    results: list[tuple[Case, int, float, float]] = []
+def values(row: dict[str, Any], name: str) -> tuple[float, float]:
+    """The best value of a quantity in SI units, and its error bar."""
+    if name == "pressure":
+        return row["pressure"], row["p_star_error"] * row["delta_sigma"]
+    unit = {"a_r": 1.0, "sigma_p": row["delta_sigma"], "u_g": row["h_std"]}[name]
+    return row[f"{name}_continuum"] * unit, row[f"{name}_continuum_error"] * unit
+
+
+def results(arguments: argparse.Namespace) -> Iterator[tuple[str, str, int, float, float]]:
+    """Kind of case, load and quantity, number of grids, error and bar, relative to the value."""
     with tempfile.TemporaryDirectory() as folder:
         for case in cases(Path(folder), arguments.count, arguments.seed):
             reference = columns(case, arguments.finer * BASE, 1e-5)
@@ -108,31 +112,35 @@ def main() -> None:
                 row = columns(case, points, 1e-3)
                 if row is None:
                     continue
-                error = abs(row["pressure"] / reference["pressure"] - 1)
-                bar = row["p_star_error"] / row["p_star"]
-                results.append((case, grids, error, bar))
-                if arguments.verbose:
-                    load = case.tables["load"]
-                    words = f"{case.kind} n={case.n} {load} {points}: {error:.2g} {bar:.2g}"
-                    print(words, "" if bar >= error else "<", flush=True)
-    print("| kind | load | grids | held | unknown | bar/error |")
+                for name in ("pressure", *QUANTITIES):
+                    exact = values(reference, name)[0]
+                    value, bar = values(row, name)
+                    if name != SEARCHED[case.quantity] and np.isfinite(exact):
+                        title = f"{case.quantity}: {name}"
+                        error, bar = abs(value / exact - 1), bar / exact
+                        if arguments.verbose:
+                            load = case.tables["load"][case.quantity]
+                            words = f"{case.kind} n={case.n} {title} {load:.3g} {points}:"
+                            print(words, f"{error:.2g} {bar:.2g}", flush=True)
+                        yield case.kind, title, grids, error, bar
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("--count", type=int, default=240)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--finer", type=int, default=16, help="finest grid over the coarsest")
+    parser.add_argument("--verbose", action="store_true", help="print each case")
+    found = list(results(parser.parse_args()))
+    print("| kind | load: quantity | grids | held | unknown | bar/error |")
     print("| --- | --- | --- | --- | --- | --- |")
-    for kind in ("random", "maps", "single"):
-        for quantity in ("contact_area", "mean_gap"):
-            for grids in (1, 2):
-                chosen = [
-                    (error, bar)
-                    for case, used, error, bar in results
-                    if (case.kind, case.quantity, used) == (kind, quantity, grids)
-                ]
-                given = [(error, bar) for error, bar in chosen if np.isfinite(bar)]
-                if not chosen:
-                    continue
-                held = sum(error <= bar for error, bar in given)
-                ratio = np.median([bar / max(error, 1e-12) for error, bar in given] or [np.nan])
-                cells = [kind, f"`{quantity}`", grids, f"{held}/{len(given)}"]
-                cells += [len(chosen) - len(given), f"{ratio:.1f}"]
-                print(f"| {' | '.join(map(str, cells))} |")
+    for group in sorted({entry[:3] for entry in found}):
+        bars = [(error, bar) for *key, error, bar in found if tuple(key) == group]
+        given = [(error, bar) for error, bar in bars if np.isfinite(bar)]
+        held = sum(error <= bar for error, bar in given)
+        ratio = np.median([bar / max(error, 1e-12) for error, bar in given] or [np.nan])
+        counts = f"{held}/{len(given)}", len(bars) - len(given), f"{ratio:.1f}"
+        print(f"| {' | '.join(map(str, (*group, *counts)))} |")
 
 
 if __name__ == "__main__":
