@@ -150,17 +150,19 @@ def _with_errors_at_load(
 ) -> None:
     """Set the error of a pressure that was searched, and those of the other quantities at the load.
 
-    `jump` is the part of a change of the searched quantity that may be due to the grid.
+    `jump` is the part of a change of the searched quantity that may be due to the grid. Where it is
+    more than half, the slope is not known.
 
     At the pressure of the continuum with the load, the value of this contact differs from the load
     by less than its error. The other quantities change from this pressure to that one.
     """
     name = LOADS[task.quantity].searched
     estimate = solved.estimates[name]
-    slope = slopes.get(name, 0.0) - jump / (NEIGHBOUR - 1)
+    uncertain = jump / (NEIGHBOUR - 1)
+    slope = slopes.get(name, 0.0) - uncertain
     distance = estimate.continuum_error + solved.algebraic(name)
     distance += abs(estimate.continuum - task.load)
-    if slope > 0 and distance < LARGEST_ERROR * slope:
+    if slope > uncertain and distance < LARGEST_ERROR * slope:
         solved.pressure_error = distance / slope
     for other in solved.estimates.keys() - {name}:
         change = slopes.get(other, nan) * solved.pressure_error
