@@ -145,6 +145,16 @@ def test_results_at_a_searched_load_agree_with_those_of_finer_grids_within_their
                 assert error <= coarse[f"{name}_continuum_error"]
 
 
+def test_an_area_that_is_smaller_than_its_error_leaves_the_pressure_unknown(rows_of):
+    (row,) = rows_of(
+        "surface={kind='self-affine', rolloff=1.0, hurst=0.5, cutoff=0.042, seed=966460}",
+        "elastomer.n=3", "load={contact_area=0.0032}", "grid.points=64", "accuracy.mean_gap=0.5",
+    )  # fmt: skip
+    assert row["a_r_continuum_error"] > row["a_r_continuum"]
+    assert np.isnan(row["p_star_error"])
+    assert row["u_g_verdict"] == row["sigma_p_verdict"].replace("diverges", "unknown") == "unknown"
+
+
 def test_a_displacement_that_was_searched_leaves_the_error_of_the_pressure_unknown(rows_of):
     layer = "elastomer={kind='layer', base='sliding', thickness=1}"
     (row,) = rows_of(layer, "load={displacement=2}", "accuracy.mean_gap=0.1")

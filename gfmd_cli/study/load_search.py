@@ -80,6 +80,7 @@ def solve_at_load(task: Task, context: SolveContext, watcher: Watcher) -> TaskSo
         value = loaded_value(task.quantity, row)
         work = solved.solution.transforms * solved.contact.grid.size
         observables = {name: float(row[name]) for name in QUANTITIES}
+        observables[LOADS[task.quantity].searched] = value
         trials.append(Trial(points, pressure, value, work, observables, is_neighbour))
         return solved
 
@@ -139,7 +140,7 @@ def _slopes(root: Trial, trials: list[Trial]) -> dict[str, float]:
     """
     neighbours = [trial.observables for trial in trials if trial.is_neighbour]
     return {
-        name: abs(value - root.observables[name]) / (NEIGHBOUR - 1)
+        name: abs(value - root.observables.get(name, nan)) / (NEIGHBOUR - 1)
         for observables in neighbours
         for name, value in observables.items()
     }
