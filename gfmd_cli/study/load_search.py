@@ -56,7 +56,7 @@ NEIGHBOUR = 1.25
 to a higher pressure is less steep than the slopes of area and gap, so that it widens the error."""
 JUMP = {1: 2, 2: 8}
 """Points that enter contact together on a symmetric surface, by its dimension."""
-LARGEST_ERROR = 0.5  # of a pressure, relative, above which it is unknown; a choice
+LARGEST_ERROR = 0.5  # of load and pressure, relative, above which it is unknown; a choice
 
 
 def solve_at_load(task: Task, context: SolveContext, watcher: Watcher) -> TaskSolution:
@@ -163,7 +163,8 @@ def _with_errors_at_load(
     slope = slopes.get(name, 0.0) - uncertain
     distance = estimate.continuum_error + solved.algebraic(name)
     distance += abs(estimate.continuum - task.load)
-    if slope > uncertain and distance < LARGEST_ERROR * slope:
+    is_known = slope > uncertain and distance < LARGEST_ERROR * estimate.continuum
+    if is_known and distance < LARGEST_ERROR * slope:
         solved.pressure_error = distance / slope
     for other in solved.estimates.keys() - {name}:
         change = slopes.get(other, nan) * solved.pressure_error
