@@ -315,9 +315,8 @@ def test_a_bench_takes_no_auto_grid(spec_of):
 
 def test_reduced_pressures_of_a_kinked_cell_are_refused(rows_of):
     text = SPEC.replace('kind = "self-affine"\ncutoff = 0.06', 'kind = "parabola"\nradius = 1.0')
-    messages = []
-    rows_of(text=text, report=messages.append)
-    assert any("load.pressure" in progress.message for progress in messages)
+    with pytest.raises(InputError, match=r"load\.p_star: .* give load\.pressure"):
+        rows_of(text=text)
 
 
 def test_the_forecast_of_grids_is_right_within_a_factor_of_four(spec_of, rows_of):
@@ -491,11 +490,27 @@ def test_a_pressure_that_was_searched_has_an_interval_and_a_given_one_is_exact(r
         f"{spread.mean:.3f} +- {spread.half_width:.2g}"
         in seeds_table(compare(tmp_path / "study.h5")).as_text()
     )
+    (row,) = rows_of("load={mean_gap=0.5}", "accuracy.mean_gap=0.5", text=plain, name="error.h5")
+    assert f"{row['p_star']:.4f} +- {row['p_star_error']:.2g}" in run_text([row])
     half_space = 'elastomer={kind="half-space", E_star=1e9}'
     keys = (seeds, "load={pressure=[1e6, 3.7e6]}", "surface.h_std=1e-6", half_space)
     rows = rows_of(*keys, text=plain, name="pa.h5")
     assert {row["pressure"] for row in rows} == {1e6, 3.7e6}
     assert "p_star_confidence" not in ensembles(compare(tmp_path / "pa.h5"))[0].means()
+
+
+def test_the_interval_of_a_searched_pressure_holds_the_error_that_all_seeds_share(
+    rows_of, tmp_path
+):
+    keys = ("surface.seed=[0, 1, 2, 3]", "grid.points=64", "accuracy.mean_gap=0.5")
+    rows = rows_of(*keys, "elastomer.n=2", "load={contact_area=0.2}")
+    (ensemble,) = ensembles(compare(tmp_path / "study.h5"))
+    student = spread_of([row["p_star"] for row in rows]).half_width
+    shared = np.mean([row["p_star_error"] for row in rows])
+    assert ensemble.pressure_spread().half_width == pytest.approx(np.hypot(student, shared))
+    unknown = Ensemble([*rows[1:], rows[0] | {"p_star_error": np.nan}]).pressure_spread()
+    assert unknown.mean == pytest.approx(ensemble.pressure_spread().mean)
+    assert np.isnan(unknown.half_width)
 
 
 def test_means_over_seeds_name_the_contacts_that_have_not_converged(rows_of, tmp_path):

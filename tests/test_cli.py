@@ -372,7 +372,7 @@ SMALL_SETTINGS = {
     "demo": ("surface.cutoff=0.05", "grid.points=64", "load.p_star=[0.1,1.0]"),
     "slab": ("surface.cutoff=0.05", "grid.points=64", "load.p_star=[0.01,0.1]"),
     "ridge": ("grid.points=128",),
-    "hertz": ("grid.points=64", "load.p_star=1e-3"),
+    "hertz": ("grid.points=64", "load.pressure=1e-3"),
     "accuracy": ("surface.seed=[0,1]", "load.p_star=0.3"),
     "stress-distribution": ("grid.points=[32,64]", "elastomer.n=[1,3]", "surface.seed=[0,1]"),
     "afm-scan": ("grid.points=256", "load.pressure=1e6"),

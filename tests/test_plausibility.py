@@ -190,10 +190,34 @@ def test_a_modulus_in_pascals_on_a_surface_metres_rough(elastomer):
 @pytest.mark.parametrize(("E_star", "warned"), [(1e2, False), (1.2e12, False), (7e16, True)])
 def test_a_modulus_that_no_material_has(E_star, warned):
     warnings = solve(tables(elastomer={"kind": "half-space", "E_star": E_star})).warnings
-    assert any("the modulus of diamond" in each for each in warnings) is warned
+    assert (
+        any("times that of diamond, 1.2e12 Pa: is elastomer.E_star" in w for w in warnings)
+        is warned
+    )
+    power = {"kind": "power", "n": 1, "k_n": 0.5 * E_star}
+    of_power = solve(tables(elastomer=power)).warnings
+    assert of_power == tuple(each.replace("E_star", "k_n") for each in warnings)
     reduced = {key: SURFACE[key] for key in ("kind", "cutoff")}
     (other,) = solve(tables(reduced, {"kind": "half-space", "E_star": 7e16})).warnings
     assert "are heights and lengths in metres?" in other
+
+
+@pytest.mark.parametrize(
+    ("surface", "n", "load", "warned"),
+    [
+        ("parabola", 2, {"p_star": 0.01}, True),
+        ("punch", 1, {"p_star": 0.01}, True),
+        ("parabola", 1, {"p_star": 0.01}, False),
+        ("wave", 2, {"p_star": 0.01}, False),
+        ("parabola", 2, {"pressure": 1.0}, False),
+    ],
+)
+def test_a_reduced_pressure_whose_unit_grows_with_the_grid(surface, n, load, warned):
+    spec = tables({"kind": surface}, {"kind": "power", "n": n}, **load)
+    rows = [solve(spec | {"grid": {"points": points}}).columns for points in (64, 128)]
+    words = "p* is another pressure on another grid; give load.pressure"
+    assert [words in row["warnings"] for row in rows] == [warned] * 2
+    assert (rows[1]["pressure"] > 1.04 * rows[0]["pressure"]) is warned
 
 
 def test_a_random_surface_in_metres_without_a_side():

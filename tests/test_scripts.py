@@ -32,6 +32,7 @@ SMALL = {
     "spectrum_fits.py": "--seeds 1 --hurst 0.8 --rolloffs 20 --pixels 4",
     "scan_files.py": f"{ROOT / 'configs' / 'data'} --limit 60",
     "steep_stiffness.py": "--points 32 --steps 300",
+    "searched_pressures.py": "--count 1 --finer 2",
     "small_contacts.py": "--points 64 --cutoff 0.1 --p-star 0.1 --seeds 0 --repeats 1",
     "tile_solves.py": "--points 512 --cutoff 0.02 --p-star 0.001 --repeats 1",
     "surface_classes.py": "bumps random --count 1 --finest 4",

@@ -113,6 +113,55 @@ def test_errors_come_with_a_load_that_was_searched(rows_of):
     assert row["a_r_continuum"] < row["a_r"]
 
 
+@pytest.mark.parametrize("gap", [0.05, 0.3, 0.8])
+def test_the_error_of_a_searched_pressure_contains_the_exact_one(rows_of, gap):
+    keys = "surface={kind='line-parabola'}", "elastomer.n=2", f"load={{mean_gap={gap}}}"
+    for points in (128, 256):
+        words = (*keys, "accuracy={mean_gap=0.1}", f"grid.points={points}")
+        (row,) = rows_of(*words, name=f"{points}.h5")
+        a_r = 1 - math.sqrt(24 * gap / math.sqrt(720))  # of a parabola h_std = 1 / sqrt(720)
+        error = abs(row["pressure"] * (1 - a_r) / a_r - 1)
+        assert 0 < error <= row["p_star_error"] / row["p_star"] < 0.1
+    (row,) = rows_of(*keys, "grid.points=256")
+    assert np.isnan(row["p_star_error"])
+
+
+@pytest.mark.parametrize("load", ["contact_area=0.03", "contact_area=0.5", "mean_gap=0.3"])
+@pytest.mark.parametrize("n", [1, 2])
+def test_results_at_a_searched_load_agree_with_those_of_finer_grids_within_their_errors(
+    rows_of, load, n
+):
+    """Those at the pressure that was found do not: it is another one on the finer grid."""
+    searched = {"contact_area": "a_r", "mean_gap": "u_g"}[load.partition("=")[0]]
+    keys = ("surface.seed=[5, 6]", f"elastomer.n={n}", f"load={{{load}}}", "accuracy.mean_gap=0.5")
+    fine = rows_of(*keys, "grid.points=512", name="fine.h5")
+    for points in (64, 128):
+        rows = rows_of(*keys, f"grid.points={points}", name=f"{points}.h5")
+        for coarse, exact in zip(rows, fine, strict=True):
+            assert abs(coarse["p_star"] - exact["p_star"]) <= coarse["p_star_error"]
+            assert exact["p_star_error"] < 0.5 * coarse["p_star_error"]
+            for name in {"a_r", "sigma_p", "u_g"} - {searched}:
+                error = abs(coarse[f"{name}_continuum"] - exact[f"{name}_continuum"])
+                assert error <= coarse[f"{name}_continuum_error"]
+
+
+def test_an_area_that_is_smaller_than_its_error_leaves_the_pressure_unknown(rows_of):
+    (row,) = rows_of(
+        "surface={kind='self-affine', rolloff=1.0, hurst=0.5, cutoff=0.042, seed=966460}",
+        "elastomer.n=3", "load={contact_area=0.0032}", "grid.points=64", "accuracy.mean_gap=0.5",
+    )  # fmt: skip
+    assert row["a_r_continuum_error"] > row["a_r_continuum"]
+    assert np.isnan(row["p_star_error"])
+    assert row["u_g_verdict"] == row["sigma_p_verdict"].replace("diverges", "unknown") == "unknown"
+
+
+def test_a_displacement_that_was_searched_leaves_the_error_of_the_pressure_unknown(rows_of):
+    layer = "elastomer={kind='layer', base='sliding', thickness=1}"
+    (row,) = rows_of(layer, "load={displacement=2}", "accuracy.mean_gap=0.1")
+    assert row["status"] == "converged"
+    assert np.isnan(row["p_star_error"])
+
+
 @pytest.mark.parametrize(("area", "count"), [(409.6 / 64**2, 410), (409.4 / 64**2, 409)])
 def test_a_share_between_two_points_gives_the_nearer(rows_of, area, count):
     (row,) = rows_of("grid.points=64", f"load={{contact_area={area}, tolerance=1e-6}}")
@@ -264,7 +313,8 @@ def test_a_search_stopped_again_and_again_ends_bit_for_bit(rows_of, steps, overr
     finally:
         run_task.REPORT_EVERY = before
     assert 5 < stops < 500
-    for name in ("pressure", "a_r", "u_g", "sigma_p", "residual", "transforms", "u_g_error"):
+    errors = ("u_g_error", "p_star_error")
+    for name in ("pressure", "a_r", "u_g", "sigma_p", "residual", "transforms", *errors):
         np.testing.assert_array_equal(broken[name], unbroken[name], name)
 
 

@@ -267,6 +267,33 @@ def test_an_unresolved_cutoff_names_the_grid_that_would_do(read):
     assert plan(read(("0.05", "0.02"), ("points = 64", "points = 100")))
 
 
+def test_a_punch_narrower_than_a_spacing_is_refused(read):
+    punch = "surface={kind='punch', radius=0.02}"
+    with pytest.raises(InputError, match=r"grid\.points: 40 points .*a spacing or more\); use 50"):
+        plan(read(overrides=(punch, "grid.points=40")))
+    oblong = "surface={kind='punch', radius=0.02, length_y=2}"
+    with pytest.raises(InputError, match=r"grid\.points_y: 64 points .*; use 100 or more"):
+        plan(read(overrides=(oblong, "grid={points=64, points_y=64}")))
+    assert plan(read(overrides=(punch, "grid.points=50")))
+
+
+def test_a_limit_of_points_below_those_that_are_given_is_refused(read):
+    accuracy = "accuracy={mean_gap=0.1, max_points=32}"
+    with pytest.raises(InputError, match=r"accuracy\.max_points: 32 given, but grid.points = 64"):
+        read(overrides=(accuracy,))
+    assert read(overrides=(accuracy.replace("32", "64"),))
+
+
+def test_an_accuracy_needs_a_pressure_that_does_not_change_with_the_grid(read):
+    accuracy = "accuracy={mean_gap=0.1}"
+    for surface in ("{kind='parabola'}", "{kind='cone'}"):
+        words = (f"surface={surface}", accuracy)
+        with pytest.raises(InputError, match=r"spec\.toml: load\.p_star: .* give load\.pressure"):
+            plan(read(overrides=words))
+        assert plan(read(overrides=(*words, "load={pressure=0.1}")))
+    assert plan(read(overrides=("surface={kind='wave'}", accuracy)))
+
+
 def test_a_cutoff_that_no_grid_resolves_names_its_unit(read):
     """Mostly it was given in metres."""
     words = r"takes 2000000, but at most 131072 are allowed; check: surface.cutoff is relative to"

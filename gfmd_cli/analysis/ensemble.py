@@ -2,8 +2,8 @@
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
-from math import hypot, isnan, sqrt
+from dataclasses import dataclass, replace
+from math import hypot, isnan, nan, sqrt
 from typing import Any
 
 import numpy as np
@@ -64,6 +64,13 @@ class Ensemble:
         """Of "a_r", "sigma_p" or "u_g": see `best_of_all`."""
         return spread_of(*zip(*best_of_all(self.rows, name), strict=True))
 
+    def pressure_spread(self) -> Spread:
+        """Of pressures that were searched; no interval if one has an unknown error."""
+        errors = [row["p_star_error"] for row in self.rows]
+        spread = spread_of([row["p_star"] for row in self.rows], errors)
+        has_unknown = any(map(isnan, errors)) and any(map(_has_errors, self.rows))
+        return replace(spread, half_width=nan) if has_unknown else spread
+
     def means(self) -> dict[str, Any]:
         """Numbers of seeds, and the spread of each quantity, as the records of a study have them.
 
@@ -73,7 +80,7 @@ class Ensemble:
         record: dict[str, Any] = {"seeds": len(self.rows), "seeds_not_converged": failed}
         spreads = {name: self.spread(name) for name in QUANTITIES}
         if LOADS[self.rows[0]["load"]].searched:
-            spreads["p_star"] = spread_of([row["p_star"] for row in self.rows])
+            spreads["p_star"] = self.pressure_spread()
         for name, spread in spreads.items():
             record |= {
                 f"{name}_mean": spread.mean,
@@ -113,8 +120,12 @@ def by_load(rows: Iterable[Row]) -> list[list[Row]]:
 
 def _preference(row: Row) -> tuple[bool, bool]:
     """Larger for the better one of two rows of a contact, which differ in [accuracy] alone."""
-    has_errors = any(row.get(f"{name}_verdict") for name in QUANTITIES)
-    return has_errors, row["status"].is_converged
+    return _has_errors(row), row["status"].is_converged
+
+
+def _has_errors(row: Row) -> bool:
+    """Whether a row is one with [accuracy]."""
+    return any(row.get(f"{name}_verdict") for name in QUANTITIES)
 
 
 def ensembles(comparison: Comparison) -> list[Ensemble]:

@@ -27,7 +27,7 @@ TASKS = (
     replace(STATUS, optional=True),
 )
 RUN = (
-    P_STAR,
+    replace(P_STAR, error="p_star_error"),
     PRESSURE,
     *(TableColumn(name, f"{name}_best", ".5g", error=f"{name}_best_error") for name in QUANTITIES),
     TableColumn("gap", "mean_gap", ".3g", "m"),

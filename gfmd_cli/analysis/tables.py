@@ -84,7 +84,7 @@ COMPARISON = (
 )
 EINSTEIN = (P_STAR, *(c for name in QUANTITIES for c in _beside_theory(name, "einstein")))
 EINSTEIN_CAPTION = "Comparison with the closed form for n = 0 and Gaussian heights."
-CONTINUUM = (P_STAR, POINTS, *map(_continuum, QUANTITIES))
+CONTINUUM = (replace(P_STAR, error="p_star_error"), POINTS, *map(_continuum, QUANTITIES))
 SEEDS = (
     replace(P_STAR, error="p_star_confidence"),
     *(

@@ -15,7 +15,7 @@ as spacing^(1 - n), and has no limit for n >= 1.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from math import hypot, nan
+from math import hypot, isnan, nan
 from typing import NamedTuple
 
 from gfmd_cli.physics.observables import QUANTITIES, estimated_patches
@@ -138,6 +138,14 @@ def on_grid(value: float, error: float, verdict: Verdict = Verdict.REGULAR) -> E
 def widened(estimate: Estimate, error: float) -> Estimate:
     """An estimate with another error, independent of its own."""
     errors = hypot(estimate.error, error), hypot(estimate.continuum_error, error)
+    return replace(estimate, error=errors[0], continuum_error=errors[1])
+
+
+def shifted(estimate: Estimate, change: float) -> Estimate:
+    """An estimate of a value that may be shifted by a change; unknown where that is NaN."""
+    if isnan(change) and estimate.verdict.has_error:
+        return UNKNOWN
+    errors = estimate.error + change, estimate.continuum_error + change
     return replace(estimate, error=errors[0], continuum_error=errors[1])
 
 

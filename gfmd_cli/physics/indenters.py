@@ -283,7 +283,7 @@ class Punch(RoundIndenter):
     stepped: ClassVar[bool] = True
     kind: Literal["punch"] = "punch"
     radius: Positive = 0.25
-    """Radius of the face [m]."""
+    """Radius of the face [m], a grid spacing or more."""
     depth: Positive | None = None
     """Depth of the surface around the face [m]; a large value keeps it out of contact. By default
     the side of the cell along x."""
@@ -294,6 +294,22 @@ class Punch(RoundIndenter):
         if self.radius >= side / 2:
             raise ValueError(f"radius = {self.radius:g} leaves no rim in a cell of {side:g}")
         return self
+
+    def smallest_grid(self) -> int:
+        """Smallest number of points along x: the radius is a spacing or more."""
+        return max(SMALLEST_GRID, ceil(self.length / self.radius - POINTS_ROUNDING))
+
+    def smallest_grid_y(self) -> int:
+        """Smallest number of points along y, likewise."""
+        return max(SMALLEST_GRID, ceil(self.sides[0] / self.radius - POINTS_ROUNDING))
+
+    def resolution(self) -> str:
+        """Reason for the smallest grid: the radius."""
+        return f"kind {self.kind!r}, radius = {self.radius:g}: a spacing or more"
+
+    def coarsening(self) -> str:
+        """A larger face, or a smaller cell."""
+        return "surface.radius and surface.length have one unit"
 
     def _profile(self, r: Field) -> Field:
         rim = self.radius * (1 + 1e-12)  # points on the rim belong to the face, up to rounding

@@ -206,6 +206,13 @@ class Check:
                 f'"auto" needs load.p_star or load.pressure; load.{load.quantity} is searched on '
                 "a given grid",
             )
+        given = [grid.points for grid in tables.get("grid", []) if grid.points != "auto"]
+        if accuracy is not None and max(given, default=0) > accuracy.max_points:
+            self.add(
+                "accuracy.max_points",
+                f"{accuracy.max_points} given, but grid.points = {max(given)}: it limits "
+                '"auto" alone; leave it out, or make it at least as large',
+            )
         if accuracy is not None and not accuracy.tolerances():
             self.add("accuracy", "give mean_gap, contact_area or stress_deviation")
 

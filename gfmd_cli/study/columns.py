@@ -60,6 +60,10 @@ DETAILS = (
     Column("elastomer_short", "short name of the elastomer in figures", "", str),
     Column("surface_sha256", "SHA-256 checksum of the file of the surface", "", str),
     Column("elastomer_sha256", "SHA-256 checksum of the table of the elastomer", "", str),
+    Column(
+        "p_star_error",
+        "estimated error of p_star where it was searched with [accuracy]; NaN if unknown",
+    ),
     Column("mean_gap", "mean gap", "m"),
     Column("displacement", "that of the indenter from first touch; NaN if not defined", "m"),
     Column(

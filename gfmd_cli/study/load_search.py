@@ -5,14 +5,16 @@ sought: on coarser grids first, where a trial costs little, then on the grid its
 the coarser grids predict the first pressure there. Each trial is a solve of its own.
 
 With `[accuracy]` a contact area or mean gap is that in the continuum on the last grid, and that of
-the grid on the coarser ones, which only give a first pressure.
+the grid on the coarser ones, which give a first pressure, and the slope from which the error of
+the pressure follows.
 
 The contact area of a grid has steps. Where the requested area lies between two attainable ones, the
 search ends with the nearest contact, at a pressure that may depend on rounding errors.
 """
 
+from collections.abc import Mapping
 from dataclasses import replace
-from math import exp, expm1, inf, isfinite, log
+from math import exp, expm1, inf, isfinite, log, nan
 from typing import NamedTuple
 
 import numpy as np
@@ -21,6 +23,8 @@ from gfmd_cli.errors import InputError
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.physics.approach import estimated_pressures
 from gfmd_cli.physics.contact import PRESSURE_RANGE, Scene
+from gfmd_cli.physics.error_estimates import shifted
+from gfmd_cli.physics.observables import QUANTITIES
 from gfmd_cli.physics.persson import Persson
 from gfmd_cli.spec.models import LOADS
 from gfmd_cli.status import Status
@@ -47,6 +51,12 @@ AREA_RATIO = 0.5
 area is proportional to the spacing. 0.37 to 0.67 on 256^2, 512^2 and 1024^2 (n = 0.5 to 3, areas of
 0.01 to 0.3, two seeds), except for one shift that was a 50th of the next."""
 TRIALS = 60  # on one grid; 44 halve an interval of STEP down to ROUNDING
+NEIGHBOUR = 1.25
+"""Pressure of the trial that gives the slopes at the root, over that of the root. A choice: a chord
+to a higher pressure is less steep than the slopes of area and gap, so that it widens the error."""
+JUMP = {1: 2, 2: 8}
+"""Points that enter contact together on a symmetric surface, by its dimension."""
+LARGEST_ERROR = 0.5  # of load and pressure, relative, above which it is unknown; a choice
 
 
 def solve_at_load(task: Task, context: SolveContext, watcher: Watcher) -> TaskSolution:
@@ -64,17 +74,25 @@ def solve_at_load(task: Task, context: SolveContext, watcher: Watcher) -> TaskSo
         return solve_on_grids(task, context, watcher)
     trials = watcher.notes.trials
 
-    def attempt(points: int, pressure: float) -> TaskSolution:
+    def attempt(points: int, pressure: float, *, is_neighbour: bool = False) -> TaskSolution:
         solved = solve_on_grids(_at(task, points, pressure), context, watcher)
-        value = loaded_value(task.quantity, measured(task, solved))
+        row = measured(task, solved)
+        value = loaded_value(task.quantity, row)
         work = solved.solution.transforms * solved.contact.grid.size
-        trials.append(Trial(points, pressure, value, work))
+        observables = {name: float(row[name]) for name in QUANTITIES}
+        observables[LOADS[task.quantity].searched] = value
+        trials.append(Trial(points, pressure, value, work, observables, is_neighbour))
         return solved
 
     solved: TaskSolution | None = None
     first = slope = 0.0
     roots: list[float] = []
-    for points in _grids(task):
+    slopes: dict[str, float] = {}
+    jump = 0.0
+    grids = _grids(task)
+    has_error = task.accuracy is not None and task.quantity != "displacement"
+    measured_on = grids[max(len(grids) - 2, 0)] if has_error else 0
+    for points in grids:
         scene = task_scene(task, points, context)
         if not _is_in_reach(task, scene):
             if points == task.points:
@@ -86,12 +104,20 @@ def solve_at_load(task: Task, context: SolveContext, watcher: Watcher) -> TaskSo
             first, slope = _guess(task, scene)
         search = _Search(task, scene, first, slope)
         for trial in trials:
-            if trial.points == points:
+            if trial.points == points and not trial.is_neighbour:
                 search.add(trial)
         while (pressure := search.next()) is not None:
             solved = None  # frees its memory, which is needed now
             solved = attempt(points, pressure)
             search.add(trials[-1])
+        if points == measured_on:
+            higher = NEIGHBOUR * search.nearest.pressure
+            is_missing = not any(trial.is_neighbour for trial in trials)
+            if is_missing and higher < PRESSURE_RANGE[1] * scene.delta_sigma:
+                solved = None
+                solved = attempt(points, higher, is_neighbour=True)
+            slopes = _slopes(search.nearest, trials)
+            jump = JUMP[scene.grid.dimension] * search.quantum
         roots.append(search.root if search.succeeded else log(search.nearest.pressure))
         slope = search.slope
     if solved is None or trials[-1] != search.nearest:
@@ -99,10 +125,50 @@ def solve_at_load(task: Task, context: SolveContext, watcher: Watcher) -> TaskSo
         solved = attempt(task.points, search.nearest.pressure)
     solved.solution.transforms = sum(trial.work for trial in trials) / solved.contact.grid.size
     _check_known(task, solved)
+    if has_error:
+        _with_errors_at_load(task, solved, slopes if search.succeeded else {}, jump)
     solver_ended = solved.solution.status in (Status.CONVERGED, Status.ROUNDING)
     if solver_ended and not search.succeeded:
         solved.solution.status = Status.LOAD_NOT_REACHED
     return solved
+
+
+def _slopes(root: Trial, trials: list[Trial]) -> dict[str, float]:
+    """Absolute change of each quantity over the relative change of the pressure, at the root.
+
+    Empty without a neighbour.
+    """
+    neighbours = [trial.observables for trial in trials if trial.is_neighbour]
+    return {
+        name: abs(value - root.observables.get(name, nan)) / (NEIGHBOUR - 1)
+        for observables in neighbours
+        for name, value in observables.items()
+    }
+
+
+def _with_errors_at_load(
+    task: Task, solved: TaskSolution, slopes: Mapping[str, float], jump: float
+) -> None:
+    """Set the error of a pressure that was searched, and those of the other quantities at the load.
+
+    `jump` is the part of a change of the searched quantity that may be due to the grid. Where it is
+    more than half, the slope is not known.
+
+    At the pressure of the continuum with the load, the value of this contact differs from the load
+    by less than its error. The other quantities change from this pressure to that one.
+    """
+    name = LOADS[task.quantity].searched
+    estimate = solved.estimates[name]
+    uncertain = jump / (NEIGHBOUR - 1)
+    slope = slopes.get(name, 0.0) - uncertain
+    distance = estimate.continuum_error + solved.algebraic(name)
+    distance += abs(estimate.continuum - task.load)
+    is_known = slope > uncertain and distance < LARGEST_ERROR * estimate.continuum
+    if is_known and distance < LARGEST_ERROR * slope:
+        solved.pressure_error = distance / slope
+    for other in solved.estimates.keys() - {name}:
+        change = slopes.get(other, nan) * solved.pressure_error
+        solved.estimates[other] = shifted(solved.estimates[other], change)
 
 
 def _check_known(task: Task, solved: TaskSolution) -> None:

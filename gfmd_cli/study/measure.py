@@ -67,6 +67,7 @@ def measured(task: Task, solved: TaskSolution) -> Row:
         "points": scene.grid.points,
         "points_y": scene.grid.points_y,
         "p_star": contact.pressure,
+        "p_star_error": solved.pressure_error * contact.pressure,
         "residual": solution.residual,
         "solver": solution.solver,
         "transforms": solution.transforms,

@@ -41,6 +41,10 @@ class Trial:
     """Contact area or mean gap of the solution."""
     work: float
     """Transforms times grid points."""
+    observables: dict[str, _Finite] = field(default_factory=dict)
+    """a_r, sigma_p and u_g on the grid; that of the load is `value`."""
+    is_neighbour: bool = False
+    """Whether the trial is not one of the search, but gives the slopes at its root."""
 
 
 @with_config(ConfigDict(strict=True, extra="forbid"))

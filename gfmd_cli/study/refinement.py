@@ -3,7 +3,7 @@
 import os
 from dataclasses import dataclass, field, replace
 from functools import lru_cache, partial
-from math import prod
+from math import nan, prod
 from threading import get_ident
 from typing import Any
 
@@ -48,6 +48,8 @@ class TaskSolution:
     bounds: ErrorBounds | None = None
     estimates: dict[str, Estimate] = field(default_factory=dict)
     """Errors and continuum values by column; empty unless an accuracy is requested."""
+    pressure_error: float = nan
+    """Relative error of a pressure that was searched; NaN if unknown, or if it was given."""
 
     def algebraic(self, name: str) -> float:
         """Estimated error of a column on this grid, from stopping at this residual."""
@@ -108,7 +110,6 @@ def solve_on_grids(task: Task, context: SolveContext, watcher: Watcher) -> TaskS
     The notes of the watcher name the grids that an earlier run solved. Raises InputError, and what
     the watcher raises.
     """
-    _check_unit(task)
     sizes = _sizes(task)
     grids = watcher.notes.grids = _ended_grids(sizes, watcher.notes.grids)
     solved: TaskSolution | None = None
@@ -151,15 +152,6 @@ def _solve_on_grid(
     if solution.status.is_converged and not solution.residual < task.solver.tolerance:
         solution.status = Status.ROUNDING
     return TaskSolution(scene, contact, solution, observe(contact, solution.u, solution.sigma))
-
-
-def _check_unit(task: Task) -> None:
-    """The unit of p_star must not change from grid to grid where several are compared."""
-    if task.accuracy is not None and not task.has_fixed_unit:
-        raise InputError(
-            f"load.p_star: Delta_sigma of this surface ({task.surface.kind}) depends on the grid; "
-            "with [accuracy] give load.pressure"
-        )
 
 
 def _sizes(task: Task) -> list[int]:

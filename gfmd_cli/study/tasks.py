@@ -192,6 +192,7 @@ def _tasks(spec: models.Spec) -> list[Task]:
                     if (path := chosen[table].file) in versions
                 ),
             )
+            _check_unit(task)
             tasks.setdefault(task.id, task)  # loads may agree in all digits that count
     return list(tasks.values())
 
@@ -219,6 +220,15 @@ def _check(spec: models.Spec) -> None:
             elastomer.check_free_boundary(dimension)
         if spec.load.quantity == "displacement":
             elastomer.check_displacement_load(boundary, dimension)
+
+
+def _check_unit(task: Task) -> None:
+    """Raise InputError where p_star is another pressure on each of the grids to compare."""
+    if task.accuracy is not None and not task.has_fixed_unit:
+        raise InputError(
+            f"load.p_star: {task.load:g} given, but Delta_sigma of this surface "
+            f"({task.surface.kind}) depends on the grid; with [accuracy] give load.pressure"
+        )
 
 
 def _chosen(spec: models.Spec, at: dict[str, int]) -> dict[str, Any]:
