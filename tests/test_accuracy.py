@@ -380,6 +380,7 @@ def test_seeds_have_a_mean_and_a_confidence_interval(rows_of, tmp_path, output_o
     )
     assert "mean of 4 seeds" in seeds_table(comparison).as_text()
     assert "missed its target" not in seeds_table(comparison).as_text()
+    assert "of some seed is unknown" not in seeds_table(comparison).as_text()
     records = json.loads(output_of("analyze", tmp_path / "study.h5", "--json"))
     assert len(records) == 8
     assert records[0]["u_g_mean"] == pytest.approx(np.mean(values))

@@ -17,6 +17,7 @@ from gfmd_cli.analysis.distribution import StressDistribution, distributions
 from gfmd_cli.analysis.edge_law import fit_power_law
 from gfmd_cli.analysis.ensemble import ensembles
 from gfmd_cli.analysis.table import (
+    BLANK,
     Group,
     Record,
     Table,
@@ -273,9 +274,16 @@ def seeds_table(comparison: Comparison) -> Table:
     caption = (
         "Means over seeds, +- half the width of the 95 % confidence interval (Student's t). "
         "With [accuracy] the values are those in the continuum, and the interval includes their "
-        "mean error; otherwise they are those on the grid. -: of some seed, the continuum value is "
-        "unknown."
+        "mean error; otherwise they are those on the grid."
     )
+    means_shown = (
+        record[f"{name}_mean"]
+        for group in groups
+        for record in group.records
+        for name in QUANTITIES
+    )
+    if not all(map(known, means_shown)):
+        caption += f" {BLANK}: the continuum value of some seed is unknown."
     return Table(caption, SEEDS, groups)
 
 

@@ -42,8 +42,8 @@ UNCONVERGED = (
 EXPLANATION = (
     "In this and the next figures over the pressure, symbols are the simulation: in the continuum "
     "with its error where that is known, else on the grid; a mean over seeds is left out where the "
-    "continuum value was requested, but is unknown of some seed. Bars: estimated distance to the "
-    "continuum; ×, ☆, ✚: the contact missed the requested tolerance, accuracy or load."
+    "continuum value was requested, but that of some seed is unknown. Bars: estimated distance to "
+    "the continuum; ×, ☆, ✚: the contact missed the requested tolerance, accuracy or load."
 )
 LINES = " Lines: Persson theory with the same spectrum."
 BEHIND = "Table behind the figures"
