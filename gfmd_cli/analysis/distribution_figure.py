@@ -29,7 +29,7 @@ from gfmd_cli.analysis.plotting import DASHED, THEORY, ColumnFigure
 from gfmd_cli.analysis.selection import T, evenly, grouped
 from gfmd_cli.analysis.tables import curve_title
 from gfmd_cli.grid.arrays import Field
-from gfmd_cli.status import Status, worst
+from gfmd_cli.status import worst
 from gfmd_cli.study.column import Row
 from gfmd_cli.study.columns import BINS, PR_LINEAR, PR_LOGARITHMIC
 
@@ -220,7 +220,7 @@ def _draw(
     known = np.isfinite(stress.density) & np.isfinite(stress.error)
     x, y, error = sigma[known], stress.density[known], stress.error[known]
     bars = np.array([y * -np.expm1(-error), y * np.expm1(error)])  # of ln Pr
-    plot.points(style, x, y, [Status.CONVERGED] * x.size, error=bars)
+    plot.points(style, x, y, error=bars)
     visible = y > MIN_DENSITY * y.max()
     return float(x[visible].min()), float(x[visible].max()), float(y[visible].min()), float(y.max())
 

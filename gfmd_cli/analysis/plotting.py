@@ -182,13 +182,14 @@ class ColumnFigure(LegendFigure):
         style: CurveStyle,
         x: Field,
         y: Field,
-        statuses: Sequence[Status],
+        statuses: Sequence[Status] = (),
         every: Any = 1,
         error: Field | float = np.nan,
         details: Sequence[str] = (),
     ) -> None:
         """Draw open symbols with error bars, and others where a contact has missed something.
 
+        Without `statuses` all are converged.
         `error` has shape (points,), or (2, points) for down and up, NaN for none. Of the symbols
         of converged contacts only some are drawn, as `markevery` of matplotlib has it. `details`
         are texts for the points.
@@ -199,7 +200,7 @@ class ColumnFigure(LegendFigure):
             bars: dict[str, Any] = {"fmt": "none", "elinewidth": 0.7, "capsize": CAP}
             self.axes.errorbar(x[known], y[known], error[:, known], ecolor=style.colour, **bars)
         options: dict[str, Any] = {"ls": "none", "mfc": "none", "color": style.colour, "zorder": 3}
-        shortfalls = np.array([status.shortfall for status in statuses])
+        shortfalls = np.array([each.shortfall for each in statuses or [Status.CONVERGED] * x.size])
         for missed, marker in {"": style.marker, **SHORTFALL_MARKERS}.items():
             mask = shortfalls == missed
             names = (style.label, missed) if missed else (style.label,)

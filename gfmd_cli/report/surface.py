@@ -14,7 +14,6 @@ from gfmd_cli.maps.pictures import Picture
 from gfmd_cli.physics.surface_spectrum import Spectrum, spectrum
 from gfmd_cli.report.data import ReportData
 from gfmd_cli.report.section import Drawing, Section, drawing
-from gfmd_cli.status import Status
 from gfmd_cli.study.column import Row
 from gfmd_cli.study.reading import open_study
 
@@ -121,7 +120,7 @@ def _spectrum_figure(names: list[str], shown: Sequence[Spectrum], dimension: int
         if curve.fit is not None:
             line = {"color": style.colour, "lw": 0.7}
             plot.unnamed_line((style.label,), curve.q, curve.fitted, **line)
-        plot.points(style, curve.q, curve.density, [Status.CONVERGED] * curve.q.size)
+        plot.points(style, curve.q, curve.density)
     plot.scale("x", "log", np.concatenate([curve.q for curve in shown]))
     plot.scale("y", "log", np.concatenate([curve.density for curve in shown]))
     return plot
