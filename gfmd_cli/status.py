@@ -1,6 +1,6 @@
 """The statuses of a task, each with its explanation."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from enum import StrEnum
 from typing import Any, Self
 
@@ -77,6 +77,13 @@ class Status(ExplainedEnum):
         return self is Status.CONVERGED
 
     @property
+    def shortfall(self) -> str:
+        """What a solved task has missed, in words; empty of one that is converged."""
+        if self is Status.CONVERGED:
+            return ""
+        return SHORTFALLS.get(self, UNCONVERGED)
+
+    @property
     def is_solved(self) -> bool:
         """Whether the task has a result, converged or not."""
         return not (self.is_failure or self in (Status.MISSING, Status.INTERRUPTED))
@@ -85,6 +92,20 @@ class Status(ExplainedEnum):
     def is_failure(self) -> bool:
         """Whether an error ended the task, so that it has no result."""
         return self in (Status.FAILED, Status.NO_SPACE, Status.KILLED)
+
+
+UNCONVERGED = "not converged"
+SHORTFALLS = {
+    Status.ACCURACY_NOT_REACHED: "accuracy not reached",
+    Status.LOAD_NOT_REACHED: "load not reached",
+}
+"""What tasks have missed whose contact is solved to its tolerance."""
+
+
+def worst(statuses: Iterable[Status]) -> Status:
+    """The status of several tasks: of one that is not converged, if there is any."""
+    order = (Status.CONVERGED, *SHORTFALLS)
+    return max(statuses, key=lambda each: order.index(each) if each in order else len(order))
 
 
 def counted(counts: Mapping[Status, int]) -> str:

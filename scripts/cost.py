@@ -111,7 +111,7 @@ def draw(label, curves, x, limit, path: Path) -> None:  # type: ignore[no-untype
         for place, (name, (at, values)) in enumerate(curves.items()):
             style = CurveStyle(colours(len(curves))[place], MARKERS[place], name)
             plot.axes.plot(at, values, color=style.colour, lw=0.7)
-            plot.points(style, at, values, np.full(at.size, True))
+            plot.points(style, at, values)
             print(f"{name}: " + ", ".join(f"{value:.1f}" for value in values), flush=True)
         name = "preparation and one pair"
         plot.line(name, x, limit, color="0.4", ls=(0, (4, 2)), lw=0.9)

@@ -259,7 +259,7 @@ def draw(surfaces: dict[Key, Surface], fitted: np.ndarray, path: Path) -> None:
             )
             bars = {"fmt": "none", "ecolor": style.colour, "elinewidth": 0.7, "capsize": 1.5}
             plot.axes.errorbar(x, y, 2 * error, **bars)
-            plot.points(style, x, y, np.full(x.size, True))
+            plot.points(style, x, y)
         plot.line("Eq. (39)", n, gamma_n(n), color="0.4", ls=(0, (4, 2)), lw=0.9)
         plot.line("fitted", n, smooth(n, *fitted), color="black", lw=1.1)
         plot.axes.set(xlim=(-0.2, 4.2), ylim=(0, None))

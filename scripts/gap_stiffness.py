@@ -216,7 +216,7 @@ def draw(curves: Curves, folder: Path) -> None:
         for place, n in enumerate(ALL_EXPONENTS):
             style = CurveStyle(colours(6)[place], MARKERS[place], f"n = {n:g}")
             u_g, kappa = (column(curves, n, name).mean(axis=0) for name in ("u_g", "stiffness"))
-            plot.points(style, u_g, kappa, np.full(u_g.size, True))
+            plot.points(style, u_g, kappa)
             plot.axes.plot(u_g, kappa, color=style.colour, lw=0.8)
         plot.axes.set(yscale="log", xlim=(0, None))
         plot.write(folder / "gap_stiffness")[0].unlink()  # docs show the PNG
@@ -225,7 +225,7 @@ def draw(curves: Curves, folder: Path) -> None:
             style = CurveStyle(colours(6)[place], MARKERS[place], f"n = {n:g}")
             share = np.mean([column(curves, n, f"percolates_{axis}") for axis in "xy"], axis=(0, 1))
             a_r = areas(curves, n, GRID).mean(axis=0)
-            plot.points(style, a_r, share, np.full(a_r.size, True))
+            plot.points(style, a_r, share)
             plot.axes.plot(a_r, share, color=style.colour, lw=0.8)
         plot.axes.set(xlim=(0.15, 0.7), ylim=(-0.05, 1.05))
         plot.write(folder / "gap_percolation")[0].unlink()

@@ -88,7 +88,7 @@ def draw(groups: dict[float, list[Curve]], path: Path) -> None:
             value, error = (part[low] for part in over_seeds([needed(c) for c in curves]))
             bars = {"fmt": "none", "ecolor": style.colour, "elinewidth": 0.7, "capsize": 2}
             plot.axes.errorbar(p_star[low], value, 2 * error, **bars)
-            plot.points(style, p_star[low], value, np.full(value.size, True))
+            plot.points(style, p_star[low], value)
             line = over_seeds([measured(c, "deviation_bearing") for c in curves])[0][low]
             plot.axes.plot(p_star[low], line, color=style.colour)
         plot.line("highest points", p_star[:0], p_star[:0], color="0.4")

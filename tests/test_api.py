@@ -325,8 +325,9 @@ def test_a_result_has_the_columns_of_a_study():
     result = solve(TABLES | accuracy | {"output": {"patches": True}})
     assert result.columns["a_r_verdict"] == "regular"
     assert abs(result.columns["a_r_continuum"] - result.a_r) < 0.2 * result.a_r
-    error = result.columns["a_r_continuum_error"]  # one digit would make it up to a third smaller
-    assert result.summary()["contact area in the continuum"].endswith(f" +- {error:.2g}")
+    error = result.columns["a_r_continuum_error"]
+    shown = result.summary()["contact area in the continuum"].rpartition(" +- ")[2]
+    assert float(shown) == pytest.approx(error, rel=0.05)  # one digit would be up to a third off
     assert result.columns["patches"] > 0
     assert result.columns["pr_sigma_log"].sum() > 0
 

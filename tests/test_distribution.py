@@ -128,6 +128,8 @@ def test_a_mean_density_holds_all_seeds_and_marks_one_that_has_not_converged():
     assert (density.seeds, density.remark) == (2, "")
     np.testing.assert_allclose(density.density * WIDTH * 64**2, 30.0)
     assert mean_density(None, rows, "pr_sigma_log").remark == ", not converged"
+    rows[2]["status"] = Status.ACCURACY_NOT_REACHED
+    assert mean_density(None, rows, "pr_sigma_log").remark == ", accuracy not reached"
 
 
 def test_first_order_errors_of_a_grid_are_taken_off():

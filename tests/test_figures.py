@@ -10,7 +10,7 @@ from gfmd_cli.analysis import figures
 from gfmd_cli.analysis.compare import Curve, compare
 from gfmd_cli.analysis.curve_styles import MAX_LABEL, curve_styles, distinct_labels
 from gfmd_cli.analysis.figures import PANELS, draw_all, study_figures, with_styles
-from gfmd_cli.analysis.plotting import styled
+from gfmd_cli.analysis.plotting import ColumnFigure, styled
 from gfmd_cli.errors import InputError, SpaceError
 from gfmd_cli.spec.parse import read_spec
 from gfmd_cli.status import Status
@@ -150,6 +150,13 @@ def test_what_is_not_converged_is_a_cross_and_known_errors_are_bars(study):
     assert len(plot.axes.containers) == 1
 
 
+def test_a_missed_accuracy_is_not_said_to_be_a_missing_convergence(study):
+    states = [{"status": Status.ACCURACY_NOT_REACHED}, {"status": Status.LOAD_NOT_REACHED}, {}]
+    plot = figure_of("mean_gap_log", marked(study(), states))
+    assert {"accuracy not reached", "load not reached"} < plot.legend.keys()
+    assert "not converged" not in plot.legend
+
+
 def test_symbols_stand_at_the_continuum_value_where_it_is_known(study):
     known = {"a_r_continuum": 0.04, "a_r_continuum_error": 0.01, "a_r_error": 0.02}
     unknown = {"a_r_continuum": np.nan, "a_r_continuum_error": np.nan, "a_r_error": 0.03}
@@ -246,9 +253,59 @@ def test_a_study_in_reduced_units_has_no_second_axis(study):
     assert plot.axes.child_axes == []
 
 
-def test_elastomers_of_one_exponent_keep_their_full_names(study):
-    curves = study(ROUGH.replace("n = [0, 1]", "n = 1\nk_n = [1.0, 2.0]")).curves
-    assert [style.label for style in curve_styles(curves)] == ["power n=1 k_n=1", "power n=1 k_n=2"]
+@pytest.mark.parametrize(
+    ("elastomer", "labels"),
+    [
+        ("{kind='power', n=1, k_n=[1.0, 2.0]}", ["n = 1 k_n=1", "n = 1 k_n=2"]),
+        (
+            "{kind='layer', thickness=[1e-5, 2e-5], E_star=1e9, poisson=0.3}",
+            ["layer thickness=10 µm", "layer thickness=20 µm"],
+        ),
+    ],
+)
+def test_elastomers_are_named_by_what_they_differ_in(study, elastomer, labels):
+    few = ("load.p_star=0.3", "output.histogram=false")
+    curves = study(ROUGH, f"elastomer={elastomer}", *few).curves
+    assert [style.label for style in curve_styles(curves)] == labels
+
+
+def test_grids_are_named_once(study):
+    few = ("elastomer.n=1", "load.p_star=0.3", "output.histogram=false")
+    curves = study(ROUGH, "grid.points=[64, 96]", *few).curves
+    labels = [style.label for style in curve_styles(curves)]
+    assert labels == ["n = 1, 64 points", "n = 1, 96 points"]
+
+
+def test_the_stress_at_several_pressures_names_its_curve_in_full(study):
+    """Curves with one style, "several hurst", are not told apart by its label."""
+    hurst = ", ".join(f"0.{digit}" for digit in range(1, 10))
+    keys = ("elastomer.n=1", f"surface.hurst=[{hurst}]", "load.p_star=[0.3, 1.5]")
+    plot = figure_of("stress_distribution_pressures", study(ROUGH, *keys))
+    label = " ".join(plot.axes.get_xlabel().split())
+    assert "several" not in label
+    assert "hurst=0.1" in label
+    assert "64 points a side" in label
+
+
+def test_a_logarithmic_axis_of_many_decades_has_few_ticks():
+    plot = ColumnFigure("x", "y")
+    plot.scale("x", "log", np.array([1e-30, 1e-6]))
+    assert len(plot.axes.get_xticks(minor=True)) < 30
+    low, high = plot.axes.get_xlim()
+    assert sum(low <= tick <= high for tick in plot.axes.get_xticks()) <= 5
+
+
+def test_values_that_are_nearly_the_same_need_no_offset_on_their_axis():
+    plot = ColumnFigure("x", "y")
+    plot.scale("y", "linear", np.array([1.0, 1.0 + 6e-7]), zero=False)
+    plot.figure.draw_without_rendering()
+    assert plot.axes.yaxis.get_offset_text().get_text() == ""
+
+
+def test_entries_that_curves_share_follow_the_curves(study):
+    seeds = ("surface.seed=[0, 1]", "load.p_star=[0.1, 0.3]", "output.histogram=false")
+    entries = [*figure_of("contact_area", study(ROUGH, *seeds)).entries]
+    assert entries == ["n = 0, 2 seeds", "n = 1, 2 seeds", "Persson theory", "95 % confidence"]
 
 
 def test_a_folder_that_cannot_be_written_is_told(study, tmp_path):

@@ -8,9 +8,10 @@ import pytest
 
 from gfmd_cli.analysis.curve_styles import CurveStyle
 from gfmd_cli.analysis.figures import LABELS, P_STAR
-from gfmd_cli.analysis.plotting import CONFIDENCE, THEORY, UNCONVERGED, ColumnFigure
+from gfmd_cli.analysis.plotting import CONFIDENCE, THEORY, ColumnFigure
 from gfmd_cli.report.interactive import interactive
 from gfmd_cli.report.rendering import html_label, plain_label
+from gfmd_cli.status import UNCONVERGED, Status
 
 STYLE = CurveStyle((0.0, 0.0, 1.0), "s", r"n = 1 \$<b>")
 X = np.array([0.1, 1.0, 10.0])
@@ -21,8 +22,9 @@ Y = np.array([0.5, 2.0, 1 / 3])
 def figure():
     """Points of which one is not converged and one has an error, a band, a line of theory."""
     plot = ColumnFigure(P_STAR, LABELS["u_g"])
-    converged, error = np.array([True, True, False]), np.array([np.nan, 0.25, np.nan])
-    plot.points(STYLE, X, Y, converged, error=error, details=["a < b", "c\nd", "e"])
+    statuses = [Status.CONVERGED, Status.CONVERGED, Status.MAX_STEPS]
+    error = np.array([np.nan, 0.25, np.nan])
+    plot.points(STYLE, X, Y, statuses, error=error, details=["a < b", "c\nd", "e"])
     plot.band(STYLE, X, Y / 2, 2 * Y)
     plot.theory([(STYLE, X, Y), (STYLE, X, np.array([3.0, 0.0, 2.0]))])
     plot.scale("x", "log", X)

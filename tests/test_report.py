@@ -371,7 +371,7 @@ def test_a_table_is_rendered_with_escaped_texts_and_scopes():
     assert "<<" not in table
     assert '<th scope="row" class="t">&lt;</th>' in table
     assert '<th scope="col"><var>a</var><sub>r</sub></th>' in table
-    assert "<td>0.10 ± 0.2</td>" in table
+    assert "<td>0.10 ± 0.20</td>" in table
 
 
 @pytest.mark.parametrize(
@@ -388,12 +388,19 @@ def test_symbols_are_typeset(text, expected):
     assert typeset(text) == expected
 
 
+def test_the_unit_of_stress_of_a_slab_is_not_its_stress_in_full_contact(invoke, tmp_path):
+    text = ONE.replace('kind = "power"\nn = 1', 'kind = "slab"\nthickness = [0.01, 0.1]')
+    text = text.replace("cutoff = 0.1", "cutoff = 0.1\nh_std = 1e-6\nlength = 1e-3")
+    words = "".join(Page(report(solved(invoke, tmp_path, text))).words)
+    assert "rms stress in full contact; of a slab that of the half-space" in words
+
+
 def test_what_failed_or_is_missing_is_told(invoke, tmp_path):
     text = SPEC.replace("seed = [0, 1]", "").replace("p_star = [0.1, 1.0]", "p_star = [0.1, 0.3]")
     text = text.replace('fields = ["u", "sigma", "height"]\ncross_section = true', "")
     study = solved(invoke, tmp_path, text + "[solver]\nmax_steps = 1\n", "--shard", "0/2")
     words = "".join(Page(report(study)).words)
-    assert "1 of 4 contacts missed the requested tolerance, accuracy or load; 2 of 4 are" in words
+    assert "1 of 4 contacts: not converged; 2 of 4 are" in words
     assert "max_steps" in words
     assert "What failed or is missing" in words
     assert "cross_section = true" in words  # how to get it

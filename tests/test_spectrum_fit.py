@@ -53,6 +53,18 @@ def test_rounding_of_the_heights_does_not_change_the_fit(digits):
     assert 2 * np.pi / fitted.q_s == pytest.approx(0.04, rel=0.02)
 
 
+def test_standard_errors_hold_on_surfaces_that_the_fit_describes_exactly():
+    """Random phases alone: no scatter, so that the error of the search is all there is."""
+    draw = np.random.default_rng(0)
+    for seed in range(12):
+        hurst, rolloff = draw.uniform(0.05, 1.0), draw.uniform(0.15, 0.9)
+        fitted = fit(
+            shells_of(SelfAffine(hurst=hurst, rolloff=rolloff, cutoff=0.05, seed=seed), 64)
+        )
+        assert abs(fitted.hurst - hurst) < 3 * fitted.hurst_error < 1e-4
+        assert abs(fitted.q_r - 2 * np.pi / rolloff) < 3 * fitted.q_r_error
+
+
 def test_a_power_law_shows_no_roll_off():
     surface = SelfAffine(spectrum="cutoff", rolloff=1.0, cutoff=0.02, hurst=0.7)
     fitted = fit(shells_of(surface, 128))

@@ -28,8 +28,15 @@ def test_a_cell_has_the_format_of_its_column():
 
 
 def test_a_value_is_printed_with_its_error_where_that_is_known():
-    assert cells(gap_error=0.1)[1] == "2.00 +- 0.1"
+    assert cells(gap_error=0.1)[1] == "2.00 +- 0.10"
     assert cells(gap_error=nan)[1] == "2.000"
+
+
+def test_a_remark_follows_a_value_without_error():
+    column = TableColumn("gap", "gap", ".3g", error="error", remark=lambda row: row["remark"])
+    assert column.cell({"gap": 2.0, "error": nan, "remark": " (grid)"}) == "2 (grid)"
+    assert column.cell({"gap": 2.0, "error": 0.1, "remark": " (grid)"}) == "2.00 +- 0.10"
+    assert column.cell({"gap": 2.0, "error": nan, "remark": ""}) == "2"
 
 
 def test_an_unknown_value_is_a_dash_or_the_reason():
@@ -74,9 +81,14 @@ def test_json_has_none_for_what_does_not_apply():
     [
         (1.0, inf, "1.000 +- inf"),
         (0.5, 0.0, "0.5"),
-        (1e-9, 1e-15, "1.0000000e-09 +- 1e-15"),
+        (1e-9, 1e-15, "1.0000000e-09 +- 1.0e-15"),
         (4.2123e-6, 4.9e-7, "4.21e-06 +- 4.9e-07"),
-        (-4.2e-6, 5e-5, "-4e-06 +- 5e-05"),
+        (-4.2e-6, 5e-5, "-4e-06 +- 5.0e-05"),
+        (0.0354, 0.008, "0.0354 +- 0.0080"),
+        (0.1, 0.00996, "0.100 +- 0.010"),  # rounded up to another power of ten
+        (12345.6, 150.0, "12346 +- 150"),
+        (1234567.0, 1500.0, "1.2346e+06 +- 1.5e+03"),
+        (0.3, 2e7, "0 +- 2.0e+07"),
     ],
 )
 def test_errors_of_any_size_can_be_printed(value, error, text):

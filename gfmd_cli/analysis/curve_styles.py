@@ -2,13 +2,17 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from itertools import compress
 
 import numpy as np
 
 from gfmd_cli.analysis.compare import Comparison, Curve, Prediction
 from gfmd_cli.analysis.ensemble import without_seed
 from gfmd_cli.analysis.selection import grouped
+from gfmd_cli.analysis.wording import points_text
 from gfmd_cli.grid.arrays import Field
+from gfmd_cli.spec_table import as_text
+from gfmd_cli.study.column import Row
 from gfmd_cli.study.columns import PARAMETERS
 from gfmd_cli.study.reading import FILE_MARK
 
@@ -17,6 +21,7 @@ PALETTE = ("#332288", "#0077bb", "#009988", "#999933", "#ee7733", "#cc3311")
 MARKERS = "os^Dv<p>h"
 MAX_LABEL = 46  # characters
 TAILS = (20, 30, 8)  # characters after the part that is left out of a long label, tried in turn
+OF_ELASTOMER = tuple(each for each in PARAMETERS if each.table == "elastomer")
 MAX_STYLES = 8  # more styles cannot be told apart
 Colour = tuple[float, float, float]
 """Red, green, blue from 0 to 1."""
@@ -94,9 +99,7 @@ def curve_styles(curves: list[Curve]) -> list[CurveStyle]:
     Curves of one elastomer have a colour each. Curves that differ in their seed only have the same
     style.
     """
-    names = {curve.elastomer: str(curve.rows[0]["elastomer_short"]) for curve in curves}
-    if len(set(names.values())) < len(names):  # short names that coincide
-        names = {elastomer: elastomer for elastomer in names}
+    names = _elastomer_names(curves)
     alike = grouped(curves, lambda curve: curve.elastomer)
     keys = {elastomer: _differing(group) for elastomer, group in alike.items()}
     pairs = [(c.elastomer, _joined(map(_words(c).get, keys[c.elastomer]), " ")) for c in curves]
@@ -109,6 +112,36 @@ def curve_styles(curves: list[Curve]) -> list[CurveStyle]:
         palette = dict(zip(names, colours(len(names)), strict=True))
         styles = {pair: replace(s, colour=palette[pair[0]]) for pair, s in styles.items()}
     return [styles[pair] for pair in pairs]
+
+
+def _elastomer_names(curves: list[Curve]) -> dict[str, str]:
+    """Short names of elastomers; those of one kind, by the parameters in which they differ."""
+    rows = {curve.elastomer: curve.rows[0] for curve in curves}
+    short = {name: str(row["elastomer_short"]) for name, row in rows.items()}
+
+    def kind(name: str) -> str:
+        return short[name] if short[name] != name else str(rows[name]["elastomer_kind"])
+
+    names = dict(short)
+    for base, alike in grouped(rows, kind).items():
+        words = [_elastomer_words(rows[name]) for name in alike]
+        differing = [len(set(column)) > 1 for column in zip(*words, strict=True)]
+        if any(differing):
+            labels = (_joined((base, *compress(each, differing)), " ") for each in words)
+            names |= dict(zip(alike, labels, strict=True))
+    if len(set(names.values())) < len(names):  # names that coincide
+        return {elastomer: elastomer for elastomer in names}
+    return names
+
+
+def _elastomer_words(row: Row) -> list[str]:
+    """The parameters of an elastomer; the thickness is a length, except of a slab."""
+    is_length = row["elastomer_kind"] != "slab" and not np.isnan(row["thickness"])
+    thickness = f"thickness={as_text(row['thickness'], 'm')}" if is_length else None
+    return [
+        thickness if thickness and each.key == "thickness" else each.word(row)
+        for each in OF_ELASTOMER
+    ]
 
 
 def distinct_labels(labels: list[str]) -> list[str]:
@@ -167,7 +200,8 @@ def _words(curve: Curve) -> dict[str, str]:
         for each in PARAMETERS
         if each.table != "elastomer" and each.key != "seed"
     }
-    points = "" if row["grid"] == "auto" else f"{row['points']} points"
+    size = points_text(int(row["points"]), int(row["points_y"]))
+    points = "" if row["grid"] == "auto" else f"{size} points"
     checksum = "".join(curve.surface.partition(FILE_MARK)[1:]).strip()
-    others = {"checksum": checksum, "solver_kind": row["solver"], "points": points}
+    others = {"checksum": checksum, "solver_kind": row["solver"], "points": points, "points_y": ""}
     return {"study": curve.study} | words | others

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from textwrap import wrap
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from gfmd_cli.analysis.curve_styles import (
     StyledCurve,
     colours,
     curve_styles,
+    literal,
     order,
     seed_groups,
 )  # fmt: skip
@@ -23,9 +25,11 @@ from gfmd_cli.analysis.distribution import (
 )
 from gfmd_cli.analysis.edge_law import fit_power_law
 from gfmd_cli.analysis.ensemble import by_load
-from gfmd_cli.analysis.plotting import DASHED, THEORY, UNCONVERGED, ColumnFigure
+from gfmd_cli.analysis.plotting import DASHED, THEORY, ColumnFigure
 from gfmd_cli.analysis.selection import T, evenly, grouped
+from gfmd_cli.analysis.tables import curve_title
 from gfmd_cli.grid.arrays import Field
+from gfmd_cli.status import worst
 from gfmd_cli.study.column import Row
 from gfmd_cli.study.columns import BINS, PR_LINEAR, PR_LOGARITHMIC
 
@@ -35,7 +39,7 @@ PRESSURES = 5  # at which the distribution of one elastomer is drawn
 MIN_COUNT = 10  # grid points; a bin with fewer is noise of 30 % and more
 EXTENSION = 2.5  # factor that the edge law is drawn beyond the window of its fit
 MIN_DENSITY = 3e-3  # lowest density that is drawn, as a share of the highest
-MAX_LABEL = 24  # characters of the name of a curve beside the axis
+LINE, MAX_LINES = 38, 4  # characters of a line of the name of a curve below the axis, and lines
 EDGE_LAW = "edge law"
 STRESS, DENSITY = r"stress  $\sigma\,/\,\Delta\sigma$", r"$\mathrm{Pr}(\sigma)\;\Delta\sigma$"
 
@@ -46,8 +50,8 @@ class Density:
 
     item: StyledCurve
     row: Row
-    """Of the contact; of several seeds, that of one with mean density and pressure, which has not
-    converged if any of them has not."""
+    """Of the contact; of several seeds, that of one with mean density and pressure, with the worst
+    status of all."""
     seeds: int
     """Number of seeds of which this is the mean."""
     sigma: Field
@@ -56,8 +60,9 @@ class Density:
 
     @property
     def remark(self) -> str:
-        """That the contact, or one of several seeds, has not converged; empty if all have."""
-        return "" if self.row["status"].is_converged else f", {UNCONVERGED}"
+        """What the contact, or one of several seeds, has missed; empty if all are converged."""
+        missed = self.row["status"].shortfall
+        return f", {missed}" if missed else ""
 
     def theory(self, sigma: Field) -> Field:
         """Persson theory. Paper Eq. (24)."""
@@ -116,8 +121,8 @@ def _densities(items: list[StyledCurve], name: str) -> list[list[Density]]:
 
 def mean_density(item: StyledCurve, rows: list[Row], name: str) -> Density:
     """Pr(sigma) of one seed or the mean of several, in bins of MIN_COUNT points or more."""
-    row = min(rows, key=lambda row: row["status"].is_converged)
-    row = row | {key: np.mean([row[key] for row in rows], axis=0) for key in (name, "p_star")}
+    row = rows[0] | {"status": worst(row["status"] for row in rows)}
+    row |= {key: np.mean([row[key] for row in rows], axis=0) for key in (name, "p_star")}
     frequent = bin_counts(row, name) > MIN_COUNT - 0.5
     return Density(item, row, len(rows), BINS[name].middles()[frequent], row[name][frequent])
 
@@ -135,8 +140,8 @@ def _side_by_side(shown: list[Density]) -> ColumnFigure:
     for place, stress in enumerate(shown):
         style, x, y = stress.item.style, stress.sigma, stress.density
         plot.unnamed_line((style.label,), x, y, color=style.colour, lw=0.7)
-        converged = np.full(x.size, stress.row["status"].is_converged)
-        plot.points(style, x, y, converged, every=(place % 3, 3) if len(shown) > 1 else 1)
+        statuses = [stress.row["status"]] * x.size
+        plot.points(style, x, y, statuses, every=(place % 3, 3) if len(shown) > 1 else 1)
     _scale(plot, "log", shown)
     sigma = np.geomspace(*plot.axes.get_xlim(), 400)
     plot.theory([(stress.item.style, sigma, stress.theory(sigma)) for stress in shown])
@@ -152,9 +157,11 @@ def _at_pressure(p_stars: list[float]) -> ColumnFigure:
 
 def _pressures(shown: list[Density]) -> ColumnFigure:
     """Pr(sigma) of one curve at a few pressures."""
-    label = shown[0].item.style.label
-    label = label if len(label) <= MAX_LABEL else f"{label[: MAX_LABEL - 1].rstrip(', ')}\u2026"
-    plot = ColumnFigure(f"{STRESS}  for  {label}", DENSITY)
+    title = curve_title(shown[0].item.curve, of_seeds=shown[0].seeds > 1)
+    lines = wrap(
+        literal(title), LINE, max_lines=MAX_LINES, placeholder="\u2026", break_on_hyphens=False
+    )
+    plot = ColumnFigure("\n".join([STRESS, *lines]), DENSITY)
     for stress, colour in zip(shown, colours(len(shown)), strict=True):
         label = f"p* = {stress.row['p_star']:.3g}{stress.remark}"
         plot.line(label, stress.sigma, stress.density, color=colour, lw=1.6)
@@ -213,7 +220,7 @@ def _draw(
     known = np.isfinite(stress.density) & np.isfinite(stress.error)
     x, y, error = sigma[known], stress.density[known], stress.error[known]
     bars = np.array([y * -np.expm1(-error), y * np.expm1(error)])  # of ln Pr
-    plot.points(style, x, y, np.full(x.size, True), error=bars)
+    plot.points(style, x, y, error=bars)
     visible = y > MIN_DENSITY * y.max()
     return float(x[visible].min()), float(x[visible].max()), float(y[visible].min()), float(y.max())
 

@@ -18,7 +18,8 @@ from gfmd_cli.analysis.ensemble import by_load, spread_of
 from gfmd_cli.analysis.plotting import DASHED, THEORY, ColumnFigure, styled
 from gfmd_cli.analysis.wording import contact_title, grid_size, in_si, quantity
 from gfmd_cli.files.atomic import make_folder
-from gfmd_cli.grid.arrays import Field, Mask
+from gfmd_cli.grid.arrays import Field
+from gfmd_cli.status import Status, worst
 from gfmd_cli.study.column import Row
 from gfmd_cli.units import scaled
 
@@ -74,7 +75,7 @@ class Series:
     """Estimated error, of several seeds the mean of their errors; NaN where it is unknown."""
     half_width: Field
     """Of the 95 % confidence interval of the mean over seeds; NaN of a single seed."""
-    converged: Mask
+    statuses: Sequence[Status]
     details: Sequence[str]
     """Load, status and parameters of each point, a text of some lines."""
     theory: Field
@@ -87,6 +88,7 @@ class Series:
         loads.sort(key=lambda seeds: float(np.mean([record["p_star"] for record in seeds])))
         points = [_point(panel, seeds) for seeds in loads]
         columns = [np.array(values) for values in zip(*points, strict=True)]
+        statuses = [worst(record["status"] for record in seeds) for seeds in loads]
         y = columns[1]
         visible = np.isfinite(y) & ((y > 0) | (panel.y_scale == "linear"))
         details = list(map(_details, compress(loads, visible)))
@@ -94,15 +96,16 @@ class Series:
         if len(items) > 1:
             style = replace(style, label=f"{style.label}, {len(items)} seeds")
         theory = np.mean([getattr(item.theory, panel.column) for item in items], axis=0)
-        x, y, error, half_width, converged = (column[visible] for column in columns)
-        return cls(style, x, y, error, half_width, converged, details, theory)
+        x, y, error, half_width = (column[visible] for column in columns)
+        seen = list(compress(statuses, visible))
+        return cls(style, x, y, error, half_width, seen, details, theory)
 
     def draw(self, plot: ColumnFigure, *, line: bool) -> None:
         """Draw points with error bars, the band of several seeds, and a line on request."""
         if line:
             plot.unnamed_line((self.style.label,), self.x, self.y, color=self.style.colour, lw=0.6)
         plot.points(
-            self.style, self.x, self.y, self.converged, error=self.error, details=self.details
+            self.style, self.x, self.y, self.statuses, error=self.error, details=self.details
         )
         known = np.isfinite(self.half_width)
         if np.any(known):
@@ -114,15 +117,14 @@ class Series:
         return np.concatenate([self.y, self.y + np.nan_to_num(self.half_width)])
 
 
-def _point(panel: Panel, records: list[Row]) -> tuple[float, float, float, float, bool]:
-    """p*, value, error, half width of the confidence interval, and whether all converged."""
+def _point(panel: Panel, records: list[Row]) -> tuple[float, float, float, float]:
+    """p*, value, error, half width of the confidence interval."""
     name = panel.column
     units = np.array([r[f"{name}_persson"] if panel.ratio else 1.0 for r in records])
     values, errors = np.transpose(best_of_all(records, name)) / units
     half_width = spread_of(values, errors).half_width if len(records) > 1 else np.nan
-    converged = all(record["status"].is_converged for record in records)
     p_star = np.mean([record["p_star"] for record in records])
-    return float(p_star), float(values.mean()), float(np.abs(errors).mean()), half_width, converged
+    return float(p_star), float(values.mean()), float(np.abs(errors).mean()), half_width
 
 
 def _details(rows: list[Row]) -> str:

@@ -14,7 +14,8 @@ import numpy as np
 from gfmd_cli.analysis.curve_styles import CurveStyle
 from gfmd_cli.errors import INSTALL, InputError
 from gfmd_cli.files.atomic import write_whole
-from gfmd_cli.grid.arrays import Field, Mask
+from gfmd_cli.grid.arrays import Field
+from gfmd_cli.status import SHORTFALLS, UNCONVERGED, Status
 
 try:
     from matplotlib import colormaps, rc_context, ticker
@@ -49,11 +50,15 @@ STYLE = {
     "svg.fonttype": "path",
     "svg.hashsalt": "gfmd",  # the same figure gives the same bytes
 }
+LEAST_SPAN = 0.02  # of a linear axis, relative to its values: its labels need no offset such as +1
+MANY_DECADES = 10  # of a logarithmic axis: minor ticks are decades, and fewer have a label
 CAP = 2.0  # points, to either side of an error bar
 METADATA: dict[str, Any] = {".png": {}, ".pdf": {"CreationDate": None}, ".svg": {"Date": None}}
 """Formats of a figure, with the entries that would make the same figure another file."""
-THEORY, UNCONVERGED, CONFIDENCE = "Persson theory", "not converged", "95 % confidence"
+THEORY, CONFIDENCE = "Persson theory", "95 % confidence"
 """Entries of a legend that several curves share."""
+SHORTFALL_MARKERS = dict(zip((UNCONVERGED, *SHORTFALLS.values()), "x*P", strict=True))
+"""Markers of contacts that have missed something, by what that is."""
 DASHED: dict[str, Any] = {"ls": (0, (4, 2)), "lw": 0.8, "zorder": 2.5}
 """Style of closed forms and of laws at the edge of a contact."""
 BAND = 0.25  # opacity of a confidence band
@@ -102,15 +107,22 @@ class LegendFigure:
         axes.plot(x, np.where(y > 0, y, np.nan), **style)
         self.legend[label] = Line2D([], [], **style)
 
+    @property
+    def entries(self) -> dict[str, Any]:
+        """The entries of the legend, those that several curves share after the curves."""
+        shared = {CONFIDENCE, *SHORTFALL_MARKERS}
+        return dict(sorted(self.legend.items(), key=lambda entry: entry[0] in shared))
+
     def _write_legend(self) -> None:
         """Write the legend, if there is any, above the axes, in as many rows as needed."""
-        if not self.legend:
+        entries = self.entries
+        if not entries:
             return
-        columns, rows = _legend_shape(list(self.legend), self.width / WIDTH)
+        columns, rows = _legend_shape(list(entries), self.width / WIDTH)
         self.figure.set_size_inches(self.width, self.height + ROW * rows)
         self.figure.legend(
-            self.legend.values(),
-            self.legend.keys(),
+            entries.values(),
+            entries.keys(),
             loc="outside upper center",
             ncols=columns,
             borderpad=0,
@@ -170,13 +182,14 @@ class ColumnFigure(LegendFigure):
         style: CurveStyle,
         x: Field,
         y: Field,
-        converged: Mask,
+        statuses: Sequence[Status] = (),
         every: Any = 1,
         error: Field | float = np.nan,
         details: Sequence[str] = (),
     ) -> None:
-        """Draw open symbols with error bars, and crosses where a contact has not converged.
+        """Draw open symbols with error bars, and others where a contact has missed something.
 
+        Without `statuses` all are converged.
         `error` has shape (points,), or (2, points) for down and up, NaN for none. Of the symbols
         of converged contacts only some are drawn, as `markevery` of matplotlib has it. `details`
         are texts for the points.
@@ -187,18 +200,19 @@ class ColumnFigure(LegendFigure):
             bars: dict[str, Any] = {"fmt": "none", "elinewidth": 0.7, "capsize": CAP}
             self.axes.errorbar(x[known], y[known], error[:, known], ecolor=style.colour, **bars)
         options: dict[str, Any] = {"ls": "none", "mfc": "none", "color": style.colour, "zorder": 3}
-        for mask, names, marker in (
-            (converged, (style.label,), style.marker),
-            (~converged, (style.label, UNCONVERGED), "x"),
-        ):
+        shortfalls = np.array([each.shortfall for each in statuses or [Status.CONVERGED] * x.size])
+        for missed, marker in {"": style.marker, **SHORTFALL_MARKERS}.items():
+            mask = shortfalls == missed
+            names = (style.label, missed) if missed else (style.label,)
             self.axes.plot(x[mask], y[mask], marker=marker, markevery=every, **options)
             if np.any(mask):
                 layer = PlotLayer("points", names, x[mask], y[mask], to_hex(style.colour), marker)
                 texts = list(compress(details, mask))
                 self.layers.append(replace(layer, error=error[:, mask], details=texts))
         self.legend[style.label] = Line2D([], [], marker=style.marker, **options)
-        if not np.all(converged):
-            self.legend[UNCONVERGED] = Line2D([], [], marker="x", ls="none", color="0.4")
+        for missed, marker in SHORTFALL_MARKERS.items():
+            if missed in shortfalls:
+                self.legend[missed] = Line2D([], [], **options | {"marker": marker, "color": "0.4"})
 
     def band(self, style: CurveStyle, x: Field, low: Field, high: Field) -> None:
         """Draw the confidence band of a mean."""
@@ -251,7 +265,7 @@ class ColumnFigure(LegendFigure):
             log_scale(self.axes, name, low, high)
             return
         low = 0.0 if zero else low
-        pad = (high - low) or abs(high) or 1.0
+        pad = max(high - low, LEAST_SPAN * abs(high)) or 1.0
         span = (low - (0.03 if zero else 0.1) * pad, high + 0.1 * pad)
         self.axes.set(**{f"{name}scale": scale, f"{name}lim": span})
 
@@ -283,12 +297,14 @@ def _tick(axis: Any, low: float, high: float) -> None:
     """Set the ticks of a log axis: whole decades, or 1, 2, 5 if there are fewer than two."""
     decades = np.floor(np.log10(high)) - np.ceil(np.log10(low)) + 1
     plain = low > 5e-4 and high < 5e4
-    axis.set_major_locator(ticker.LogLocator(subs=(1, 2, 5) if decades < 2 else (1,), numticks=8))
+    many = decades > MANY_DECADES
+    subs = (1, 2, 5) if decades < 2 else (1,)
+    axis.set_major_locator(ticker.LogLocator(subs=subs, numticks=5 if many else 8))
     axis.set_major_formatter(
         ticker.StrMethodFormatter("{x:g}")
         if plain
         else ticker.LogFormatterSciNotation(minor_thresholds=(np.inf, np.inf))
     )
-    axis.set_minor_locator(ticker.LogLocator(subs=range(2, 10), numticks=99))
+    axis.set_minor_locator(ticker.LogLocator(subs=(1,) if many else range(2, 10), numticks=99))
     axis.set_minor_formatter(ticker.NullFormatter())
     axis.set_tick_params(labelsize=SMALL if plain else SCRIPTED)

@@ -7,7 +7,16 @@ from typing import Any
 from gfmd_cli.analysis.compare import with_best, with_solvers
 from gfmd_cli.analysis.selection import grouped
 from gfmd_cli.analysis.table import Record, Table, TableColumn, groups_of
-from gfmd_cli.analysis.tables import P_STAR, POINTS, PRESSURE, RESIDUAL, STATUS, TASK, warnings_in
+from gfmd_cli.analysis.tables import (
+    P_STAR,
+    POINTS,
+    PRESSURE,
+    RESIDUAL,
+    STATUS,
+    TASK,
+    best_value,
+    warnings_in,
+)
 from gfmd_cli.analysis.wording import contact_title, grid_size, shown
 from gfmd_cli.physics.observables import QUANTITIES
 from gfmd_cli.study.measure import planned
@@ -29,7 +38,7 @@ TASKS = (
 RUN = (
     replace(P_STAR, error="p_star_error"),
     PRESSURE,
-    *(TableColumn(name, f"{name}_best", ".5g", error=f"{name}_best_error") for name in QUANTITIES),
+    *(best_value(name, name, ".5g") for name in QUANTITIES),
     TableColumn("gap", "mean_gap", ".3g", "m"),
     RESIDUAL,
     STATUS,

@@ -35,6 +35,8 @@ class TableColumn:
     """Key of the text that stands in the place of an unknown value."""
     optional: bool = False
     """Whether the column is left out of a table where no record has a value."""
+    remark: Value = ""
+    """What is printed after a value whose error is not known."""
 
     @property
     def title(self) -> str:
@@ -54,7 +56,9 @@ class TableColumn:
         if isinstance(value, str):
             return value
         error = value_in(record, self.error)
-        return plus_minus(value, abs(error)) if known(error) else format(value, self.format)
+        if known(error):
+            return plus_minus(value, abs(error))
+        return f"{value:{self.format}}{value_in(record, self.remark) or ''}"
 
 
 @dataclass(frozen=True)
@@ -174,18 +178,27 @@ def plain(value: Any) -> Any:
     return value if known(value) and not infinite else None
 
 
-SMALLEST_DECIMAL = 1e-4  # of a number with an error; smaller ones have a power of ten
+DECIMAL = 1e-4, 1e6
+"""Absolute values from which and up to which a number with an error has no power of ten."""
 
 
 def plus_minus(value: float, error: float) -> str:
-    """A value and its error, rounded to two digits of the error."""
+    """A value and its error, both down to the second digit of the error."""
     if not error > 0:
         return f"{value:.6g}"
-    digits = 1 - math.floor(math.log10(error)) if math.isfinite(error) else 3
-    if 0 < abs(value) < SMALLEST_DECIMAL:
-        digits += math.floor(math.log10(abs(value)))
-        return f"{value:.{min(max(digits, 0), 12)}e} +- {error:.2g}"
-    return f"{value:.{min(max(digits, 0), 12)}f} +- {error:.2g}"
+    digits = 1 - math.floor(math.log10(float(f"{error:.1e}"))) if math.isfinite(error) else 3
+    least, largest = DECIMAL
+    if value == 0 or least <= abs(value) < largest:
+        digits = min(max(digits, 0), 12)
+        return f"{value:.{digits}f} +- {_decimal(error, digits)}"
+    digits += math.floor(math.log10(abs(value)))
+    return f"{value:.{min(max(digits, 0), 12)}e} +- {error:.1e}"
+
+
+def _decimal(error: float, digits: int) -> str:
+    """An error with some decimals; one that is far smaller or larger, with a power of ten."""
+    least, largest = DECIMAL
+    return f"{error:.{digits}f}" if least <= error < largest else f"{error:.1e}"
 
 
 def ratio(value: str, reference: str) -> Callable[[Record], float]:

@@ -17,6 +17,7 @@ from gfmd_cli.analysis.distribution import StressDistribution, distributions
 from gfmd_cli.analysis.edge_law import fit_power_law
 from gfmd_cli.analysis.ensemble import ensembles
 from gfmd_cli.analysis.table import (
+    BLANK,
     Group,
     Record,
     Table,
@@ -28,7 +29,7 @@ from gfmd_cli.analysis.table import (
     ratio,
     value_in,
 )
-from gfmd_cli.analysis.wording import contact_title, grid_size, in_si, shown
+from gfmd_cli.analysis.wording import SPACE, contact_title, grid_size, in_si, shown
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.physics.observables import QUANTITIES
 from gfmd_cli.study.observables import OBSERVABLES, Observable
@@ -47,6 +48,8 @@ STATUS = TableColumn("status", "status")
 SCALES = (("Delta_sigma", "delta_sigma", "Pa"), ("h_std", "h_std", "m"), ("L", "length", "m"))
 """Symbol, column and SI unit of the scales of a contact."""
 RESIDUAL = TableColumn("residual", "residual", ".1e")
+ON_GRID = " (grid)"
+"""What follows a value on the grid whose continuum value was requested, but is unknown."""
 THEORIES = {"persson": "Persson", "einstein": "closed form"}
 """Headings of predictions, by the suffix of their keys."""
 
@@ -60,10 +63,21 @@ def _beside_theory(name: str, theory: str = "persson", *, best: bool = False) ->
         columns.insert(0, TableColumn(name, product(value, unit), unit=si))
         columns.append(TableColumn(heading, product(predicted, unit), unit=si, optional=True))
     return [
-        TableColumn(symbol, value, error=f"{value}_error") if best else TableColumn(name, name),
+        best_value(name, symbol) if best else TableColumn(name, name),
         *columns,
         TableColumn("ratio", ratio(value, predicted), ".3f", optional=True),
     ]
+
+
+def best_value(name: str, heading: str, number_format: str = TableColumn.format) -> TableColumn:
+    """The value of a quantity in the continuum with its error; that of the grid says so."""
+    return TableColumn(
+        heading,
+        f"{name}_best",
+        number_format,
+        error=f"{name}_best_error",
+        remark=lambda record: ON_GRID if record.get(f"{name}_verdict") else "",
+    )
 
 
 def _continuum(name: str) -> TableColumn:
@@ -91,7 +105,7 @@ SEEDS = (
         TableColumn(quantity.heading, f"{name}_mean", error=f"{name}_confidence")
         for name, quantity in QUANTITIES.items()
     ),
-    TableColumn("not converged", "failures", optional=True),
+    TableColumn("missed its target", "failures", optional=True),
 )
 BEST_VALUES = {
     name: (P_STAR, PRESSURE, *_beside_theory(name, best=True), STATUS) for name in QUANTITIES
@@ -128,7 +142,7 @@ POWER_LAWS = (
 POWER_LAWS_CAPTION = (
     "Power laws of Pr(sigma) in the continuum. exponent: fit between the two stresses; at the "
     "edge: fit with the first correction to the power law; theory: exponent at the edge of a "
-    "contact, n / (2 - n)."
+    f"contact, n{SPACE}/{SPACE}(2{SPACE}-{SPACE}n)."
 )
 
 
@@ -262,6 +276,14 @@ def seeds_table(comparison: Comparison) -> Table:
         "With [accuracy] the values are those in the continuum, and the interval includes their "
         "mean error; otherwise they are those on the grid."
     )
+    means_shown = (
+        record[f"{name}_mean"]
+        for group in groups
+        for record in group.records
+        for name in QUANTITIES
+    )
+    if not all(map(known, means_shown)):
+        caption += f" {BLANK}: the continuum value of some seed is unknown."
     return Table(caption, SEEDS, groups)
 
 

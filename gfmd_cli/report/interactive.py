@@ -24,6 +24,8 @@ SYMBOLS = {
     ">": ("triangle-right-open", "▷"),
     "h": ("hexagon-open", "⬡"),
     "x": ("x-thin-open", "×"),
+    "P": ("cross-open", "✚"),
+    "*": ("star-open", "☆"),
 }
 """Markers by their names in matplotlib: as plotly.js names them, and as a character."""
 LINE, DASHES, PATCH = "—", "┄", "■"
@@ -48,7 +50,7 @@ def interactive(figure: ColumnFigure) -> dict[str, Any] | None:
         "data": [_trace(layer, names) for layer in figure.layers],
         "layout": layout,
         "factor": factor,
-        "legend": [_entry(label, handle) for label, handle in figure.legend.items()],
+        "legend": [_entry(label, handle) for label, handle in figure.entries.items()],
         "names": names,
     }
 

@@ -69,7 +69,11 @@ def typeset(text: object) -> Markup:
 
 def html_label(label: str) -> str:
     """A label that matplotlib typesets, in the few elements of HTML that plotly.js knows."""
-    text = label.replace(r"\Delta\sigma", "Delta_sigma").replace("^*", "*")
+    return "<br>".join(map(_html_line, label.split("\n")))
+
+
+def _html_line(line: str) -> str:
+    text = line.replace(r"\Delta\sigma", "Delta_sigma").replace("^*", "*")
     text = re.sub(r"\^\{?(-?\d)\}?", lambda power: power[1].translate(RAISED), text)
     text = re.sub(r"\\[,;]|\s+", " ", re.sub(r"\\mathrm\{(.*?)\}", r"\1", text))
     text = re.sub(r"(?<!\\)\$|\\(?=[$A-Za-z])", "", text)  # delimiters, and begins of names
@@ -77,8 +81,9 @@ def html_label(label: str) -> str:
 
 
 def plain_label(label: str) -> str:
-    """A label without any markup; subscripts follow an underscore."""
-    return unescape(re.sub("<[^>]+>", "", html_label(label).replace("<sub>", "_")))
+    """A label in one line without any markup; subscripts follow an underscore."""
+    line = label.replace("\n", " ")
+    return unescape(re.sub("<[^>]+>", "", html_label(line).replace("<sub>", "_")))
 
 
 def table(content: Table) -> Markup:

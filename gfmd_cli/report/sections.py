@@ -27,7 +27,7 @@ MAX_ROWS = 100  # contacts that the table of failures lists
 MACHINE = ("node", "system", "processor", "cores", "python", "slurm_job")
 UNCONVERGED_CAPTION = (
     "Contacts that missed the requested tolerance, accuracy or load, see the reasons. Their values "
-    "are kept; figures show them as crosses."
+    "are kept; figures show them as ×, ☆ or ✚."
 )
 UNCONVERGED = (
     TASK,
@@ -42,8 +42,9 @@ UNCONVERGED = (
 )
 EXPLANATION = (
     "In this and the next figures over the pressure, symbols are the simulation: in the continuum "
-    "with its error where that is known, else on the grid. Bars: estimated distance to the "
-    "continuum; crosses: not converged, or less accurate than requested."
+    "with its error where that is known, else on the grid; a mean over seeds is left out where the "
+    "continuum value was requested, but that of some seed is unknown. Bars: estimated distance to "
+    "the continuum; ×, ☆, ✚: the contact missed the requested tolerance, accuracy or load."
 )
 LINES = " Lines: Persson theory with the same spectrum."
 BEHIND = "Table behind the figures"

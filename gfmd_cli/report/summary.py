@@ -82,7 +82,7 @@ def _quantities(data: ReportData) -> list[KeyNumber]:
         pressure = ("Pressure", _span(rows, "pressure", "Pa"), f"p* = {p_star}")
         side = f"rms height h_std, side {_span(rows, 'length', 'm')}"
         scales = [
-            ("Stress in full contact", _span(rows, "delta_sigma", "Pa"), "rms Delta_sigma"),
+            ("Unit of stress", _span(rows, "delta_sigma", "Pa"), _unit_note(rows)),
             ("Roughness", _span(rows, "h_std", "m"), side),
         ]
     return [
@@ -92,6 +92,13 @@ def _quantities(data: ReportData) -> list[KeyNumber]:
         _scaled(data, "Stress deviation", "sigma_p"),
         *scales,
     ]
+
+
+def _unit_note(rows: list[Row]) -> str:
+    """What Delta_sigma is: of a slab it is that of the half-space with the same modulus."""
+    note = "Delta_sigma, rms stress in full contact"
+    slabs = any(row["elastomer_kind"] == "slab" for row in rows)
+    return f"{note}; of a slab that of the half-space" if slabs else note
 
 
 def _scaled(data: ReportData, title: str, name: str) -> KeyNumber:
@@ -152,8 +159,8 @@ def warnings(data: ReportData) -> list[str]:
     """Warnings above the results: missing, doubtful and unresolved values."""
     total, parts = len(data.comparison.rows), []
     if data.failed:
-        missed = "missed the requested tolerance, accuracy or load"
-        parts.append(f"{len(data.failed)} of {total} contacts {missed}")
+        missed = Counter(row["status"].shortfall for row in data.failed)
+        parts += [f"{number} of {total} contacts: {what}" for what, number in missed.items()]
     if data.missing:
         parts.append(f"{len(data.missing)} of {total} are not solved yet")
     unsolved = ["; ".join(parts) + "."] if parts else []

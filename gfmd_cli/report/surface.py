@@ -120,7 +120,7 @@ def _spectrum_figure(names: list[str], shown: Sequence[Spectrum], dimension: int
         if curve.fit is not None:
             line = {"color": style.colour, "lw": 0.7}
             plot.unnamed_line((style.label,), curve.q, curve.fitted, **line)
-        plot.points(style, curve.q, curve.density, np.full(curve.q.size, True))
+        plot.points(style, curve.q, curve.density)
     plot.scale("x", "log", np.concatenate([curve.q for curve in shown]))
     plot.scale("y", "log", np.concatenate([curve.density for curve in shown]))
     return plot

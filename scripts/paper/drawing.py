@@ -27,7 +27,7 @@ def column(rows: list[Row], name: str) -> np.ndarray:
 def draw_points(plot: ColumnFigure, style: CurveStyle, x: Any, y: Any, error: Any = np.nan) -> None:
     """Open symbols with error bars where the error is known."""
     x, y = np.asarray(x), np.asarray(y)
-    plot.points(style, x, y, np.full(x.size, True), error=np.asarray(error))
+    plot.points(style, x, y, error=np.asarray(error))
 
 
 def draw_limits(plot: ColumnFigure, style: CurveStyle, x: Any, y: Any, error: Any) -> np.ndarray:

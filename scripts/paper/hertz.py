@@ -38,7 +38,7 @@ def fig01(studies: StoredStudies, folder: Path) -> list[Finding]:
             theory = (line - line.min()) / np.ptp(line)
         every = slice(points // SHOWN // 2, None, points // SHOWN)
         style = style_of(row["n"], exponents)
-        plot.points(style, x[every], shown[every], np.ones(shown[every].size, bool))
+        plot.points(style, x[every], shown[every])
         plot.line("line force", x, np.minimum(theory, 1.3), **THIN)
         outside = np.abs(x) > 1.5 * touched
         off[f"n = {row['n']:g}"] = Value(np.abs(shown - theory)[outside].max())
@@ -103,7 +103,7 @@ def fig02(studies: StoredStudies, folder: Path) -> list[Finding]:
         sigma = sigma / sigma[0]
         inside = np.flatnonzero(tip.r < 1.1 * a)[:: max(1, int(a / tip.spacing / 25))]
         style = style_of(tip.n, exponents)
-        plot.points(style, tip.r[inside] / a, sigma[inside], np.ones(inside.size, bool))
+        plot.points(style, tip.r[inside] / a, sigma[inside])
         line = reference.hertz_profile(tip.n, rho, 1.0) if tip.n < 4 else np.ones_like(rho)
         plot.line("exact", rho, line, **THIN)
     plot.axes.set(xlim=(0, 1.1), ylim=(0, 3))
@@ -161,7 +161,7 @@ def fig03(studies: StoredStudies, folder: Path) -> list[Finding]:
         every = np.flatnonzero(rho < 5.2)[:: max(1, int(0.18 * a / tip.spacing))]
         u = (tip.u - top) / unit
         style = style_of(tip.n, exponents)
-        plot.points(style, rho[every], u[every], np.ones(every.size, bool))
+        plot.points(style, rho[every], u[every])
         far = np.full(u.size, -0.5) if tip.n == 0 else (tip.point() - top) / unit
         far = far + (u - far)[-1]
         drawn = np.where(far < 0.3, far, np.nan)
@@ -247,7 +247,7 @@ def fig03b(studies: StoredStudies, folder: Path) -> list[Finding]:
         d, gap = tip.r / a.value - 1, tip.gap / a.value**2
         shown = np.flatnonzero((d > 2 * tip.spacing / a.value) & (d < 1))
         sample = shown[np.unique(np.geomspace(1, shown.size, 22).astype(int) - 1)]
-        plot.points(style_of(tip.n, exponents), d[sample], gap[sample], np.ones(sample.size, bool))
+        plot.points(style_of(tip.n, exponents), d[sample], gap[sample])
         x = np.geomspace(0.01, 1, 100)
         if tip.n < 4:
             exact = (1 + x) ** 2 / 2 - reference.hertz_sag(tip.n, 1.0, 1.0, 1 + x)

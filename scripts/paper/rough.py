@@ -111,12 +111,7 @@ def fig05(studies: StoredStudies, folder: Path) -> list[Finding]:
         name = style.label + (" (half the stress)" if n == 3 else "")
         plot.axes.plot(x, sigma, color=style.colour, lw=0.5, zorder=2)
         shown = slice(None, None, max(1, half // 12))
-        plot.points(
-            type(style)(style.colour, style.marker, name),
-            x[shown],
-            sigma[shown],
-            np.ones(x[shown].size, bool),
-        )
+        plot.points(type(style)(style.colour, style.marker, name), x[shown], sigma[shown])
         highest = max(highest, float(sigma.max()))
     finish(plot, folder, "fig05", "ratio", "linear", x, [0, highest])
     others = ", ".join(
