@@ -348,8 +348,7 @@ def layered_stiffness(q, thickness, poisson, base):
 )
 def test_a_layer_is_as_stiff_as_the_equations_of_elasticity_say(base, poisson):
     q, thickness = np.array([1e-4, 0.01, 0.3, 1.0, 3.0, 10.0, 40.0]), 0.7
-    keys = {"thickness": thickness, "E_star": 1 / (1 - poisson**2), "base": base}
-    layer = Layer(**keys | ({"poisson": poisson} if base == "bonded" else {}))
+    layer = Layer(thickness=thickness, E_star=1 / (1 - poisson**2), poisson=poisson, base=base)
     with mp.workdps(50):
         exact = [float(layered_stiffness(mp.mpf(x), thickness, poisson, base)) for x in q]
     assert np.allclose(layer.stiffness(q), exact, rtol=1e-13)
@@ -365,12 +364,10 @@ def test_a_bonded_layer_is_softer_at_waves_of_its_thickness_if_hardly_compressib
 def test_a_bonded_layer_needs_poissons_ratio():
     with pytest.raises(ValidationError, match="needs poisson"):
         Layer(thickness=1.0)
-    with pytest.raises(ValidationError, match=r"less than 0\.5 .*\"sliding\" leave it out"):
+    with pytest.raises(ValidationError, match=r"\"sliding\".* less than 0\.5"):
         Layer(thickness=1.0, poisson=0.5)
     with pytest.raises(ValidationError, match=r"less than or equal to 0\.5"):
-        Layer(thickness=1.0, poisson=0.6)
-    with pytest.raises(ValidationError, match=r"poisson = 0\.3 has no effect"):
-        Layer(thickness=1.0, poisson=0.3, base="sliding")
+        Layer(thickness=1.0, poisson=0.6, base="sliding")
 
 
 def test_a_power_law_of_exponent_1_has_the_modulus_of_its_half_space():

@@ -199,8 +199,8 @@ class Layer(LinearElastomer):
     E_star: Positive = 1.0
     """Contact modulus E / (1 - nu^2) [Pa]."""
     poisson: Annotated[float, Key(gt=-1, le=0.5)] | None = None
-    """Poisson's ratio, less than 0.5. Required for a bonded layer; a sliding layer depends on
-    E_star alone and does not take it."""
+    """Poisson's ratio, required for a bonded layer and less than 0.5 there. A sliding layer depends
+    on E_star alone."""
     base: Literal["bonded", "sliding"] = "bonded"
     """Whether the layer is bonded to the rigid base or slides on it without friction."""
 
@@ -210,13 +210,8 @@ class Layer(LinearElastomer):
             raise ValueError('base = "bonded" needs poisson, Poisson\'s ratio')
         if self.base == "bonded" and self.poisson == 0.5:
             raise ValueError(
-                "poisson must be less than 0.5 for a bonded layer, which could not be compressed "
-                'as a whole; with base = "sliding" leave it out'
-            )
-        if self.base == "sliding" and self.poisson is not None:
-            raise ValueError(
-                f'poisson = {self.poisson:g} has no effect with base = "sliding", which depends on '
-                "E_star = E / (1 - nu^2) alone; leave it out"
+                'poisson = 0.5 is for base = "sliding"; for a bonded layer, which could not be '
+                "compressed as a whole, it must be less than 0.5"
             )
         return self
 

@@ -281,6 +281,7 @@ class Punch(RoundIndenter):
     """Flat cylindrical punch: h = 0 for r <= radius, -depth beyond."""
 
     stepped: ClassVar[bool] = True
+    coarsening: ClassVar[str] = "surface.radius and surface.length have one unit"
     kind: Literal["punch"] = "punch"
     radius: Positive = 0.25
     """Radius of the face [m], a grid spacing or more."""
@@ -306,10 +307,6 @@ class Punch(RoundIndenter):
     def resolution(self) -> str:
         """Reason for the smallest grid: the radius."""
         return f"kind {self.kind!r}, radius = {self.radius:g}: a spacing or more"
-
-    def coarsening(self) -> str:
-        """A larger face, or a smaller cell."""
-        return "surface.radius and surface.length have one unit"
 
     def _profile(self, r: Field) -> Field:
         rim = self.radius * (1 + 1e-12)  # points on the rim belong to the face, up to rounding
