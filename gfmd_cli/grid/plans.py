@@ -34,7 +34,7 @@ Wisdom = list[str]
 """Text in double and in single precision."""
 PLANNING_SECONDS = (30.0, 1e-6)  # seconds at most to look for a plan, at all and per grid point
 MAX_WISDOM_BYTES = 2**24  # of a file of wisdom
-MAX_CACHED_LINES = 2000  # in each precision; a new size adds some 20 and reads and writes all
+MAX_CACHED_LINES = 10000  # in each precision; a new size adds some 20 and reads and writes all
 WISDOM = re.compile(
     r"\([\w. -]+( #x[0-9a-f]{1,8}){4}\n"
     r"(  \(\w+ \d{1,4}( #x[0-9a-f]{1,5}){2} #x1?[0-9a-f]{1,2}( #x[0-9a-f]{1,8}){4}\)\n)*"
