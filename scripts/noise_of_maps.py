@@ -26,7 +26,7 @@ from gfmd_cli.physics.self_affine import SelfAffine
 LEVELS = (0.3, 0.5, 0.7, 1.0, 2.0, 3.0, 10.0)
 """Difference of neighbours due to noise, over that of the surface, both rms along x."""
 HURST = (0.1, 0.3, 0.5, 0.8, 1.0)
-NOISE = ("white noise",)
+NOISE = ("white noise of", "random offsets of")
 ALL = (*NOISE, "as much as distant ones", "lines along x are shifted")
 """Words of the warnings about noise; the last two are those of noise that is stronger still."""
 NESTING = 5  # points: nesting index of the filter

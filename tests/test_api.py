@@ -543,6 +543,7 @@ try:
 except (KeyboardInterrupt, Interrupted) as error:
     ended.set()
     print(type(error).__name__)
+ended.set()
 keys.join()
 before = [row["p_star"] for row in rows("study.h5")]
 solved = []

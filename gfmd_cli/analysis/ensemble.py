@@ -65,10 +65,14 @@ class Ensemble:
         return spread_of(*zip(*best_of_all(self.rows, name), strict=True))
 
     def pressure_spread(self) -> Spread:
-        """Of pressures that were searched; no interval if one has an unknown error."""
+        """Of pressures that were searched. No interval if the error of one is unknown."""
         errors = [row["p_star_error"] for row in self.rows]
         spread = spread_of([row["p_star"] for row in self.rows], errors)
-        has_unknown = any(map(isnan, errors)) and any(map(_has_errors, self.rows))
+        # those of a displacement, which is prescribed on the grid, have none
+        is_of_continuum = self.rows[0]["load"] != "displacement" and any(
+            map(_has_errors, self.rows)
+        )
+        has_unknown = is_of_continuum and any(map(isnan, errors))
         return replace(spread, half_width=nan) if has_unknown else spread
 
     def means(self) -> dict[str, Any]:

@@ -38,7 +38,7 @@ def kernel(function: Callable[..., Any]) -> Any:
             return njit(**NUMBA_OPTIONS)(function)
         compiled = njit(cache=True, **NUMBA_OPTIONS)(function)
     if hasattr(compiled, "_cache"):  # not with NUMBA_DISABLE_JIT
-        with suppress(OSError):  # the source may be in a zip file
+        with suppress(OSError, AttributeError):  # a source in a zip file; another Numba
             compiled._cache._cache_file._source_stamp = _stamp(function)
         _tolerate_faults(compiled._cache)
     return compiled

@@ -50,17 +50,17 @@ def noisy(topography: Topography, spacing: tuple[float, ...], scale: float) -> s
         return ""
     lines, across = sorted(along, key=lambda axis: along[axis].noise)
     noise = along[across].noise
-    what, remedy = "neighbouring heights differ by", "average several scans"
+    rms = f"{scale * np.sqrt(noise):.2g} m (rms)"
+    what, remedy = f"white noise of {rms} in the heights", "average several scans"
     if along[lines].noise < MIN_COMMON * noise:
-        what = f"the lines along {lines} differ from the next ones along {across} by"
-        remedy = "align the lines"
+        what, remedy = f"random offsets of {rms} of the lines along {lines}", "align the lines"
     excess = np.sqrt(whole / left) if left > 0 else np.inf
     many = f"{excess:.2g}" if excess < MAX_EXCESS else f"more than {MAX_EXCESS}"
     return (
-        f"{what} white noise of {scale * np.sqrt(noise):.2g} m (rms), or by roughness that the map "
-        f"does not resolve: the rms gradient is {many} times that of the longer waves, and "
-        "the contact area at light load is too small by up to this factor if this is noise; "
-        f"{remedy}, or remove the shortest waves (S-filter of ISO 25178-3), in another program"
+        f"{what}, or roughness that the map does not resolve: the rms gradient is {many} times "
+        "that of the longer waves; if this is noise, the contact area at light load is too small "
+        f"by up to this factor: {remedy}, or remove the shortest waves with a Gaussian filter (ISO "
+        "16610-61), in another program"
     )
 
 

@@ -146,7 +146,8 @@ def shifted(estimate: Estimate, change: float) -> Estimate:
     if isnan(change) and estimate.verdict.has_error:
         return UNKNOWN
     errors = estimate.error + change, estimate.continuum_error + change
-    return replace(estimate, error=errors[0], continuum_error=errors[1])
+    verdict = Verdict.REGULAR if estimate.verdict is Verdict.EXACT and change else estimate.verdict
+    return replace(estimate, error=errors[0], continuum_error=errors[1], verdict=verdict)
 
 
 def area_estimate(a_r: float, best: float, error: float, continuum_error: float) -> Estimate:

@@ -206,12 +206,12 @@ class Check:
                 f'"auto" needs load.p_star or load.pressure; load.{load.quantity} is searched on '
                 "a given grid",
             )
-        given = [grid.points for grid in tables.get("grid", []) if grid.points != "auto"]
-        if accuracy is not None and max(given, default=0) > accuracy.max_points:
+        given = [grid.points for grid in tables.get("grid", [])]
+        if accuracy is not None and given and not auto and min(given) > accuracy.max_points:
             self.add(
                 "accuracy.max_points",
-                f"{accuracy.max_points} given, but grid.points = {max(given)}: it limits "
-                '"auto" alone; leave it out, or make it at least as large',
+                f"{accuracy.max_points} given, but grid.points = {min(given)}: it has "
+                'an effect only with grid.points = "auto"; leave it out, or make it as large',
             )
         if accuracy is not None and not accuracy.tolerances():
             self.add("accuracy", "give mean_gap, contact_area or stress_deviation")

@@ -12,9 +12,8 @@ The contact area of a grid has steps. Where the requested area lies between two 
 search ends with the nearest contact, at a pressure that may depend on rounding errors.
 """
 
-from collections.abc import Mapping
 from dataclasses import replace
-from math import exp, expm1, inf, isfinite, log, nan
+from math import copysign, exp, expm1, inf, isfinite, log, log1p, nan
 from typing import NamedTuple
 
 import numpy as np
@@ -29,11 +28,15 @@ from gfmd_cli.physics.persson import Persson
 from gfmd_cli.spec.models import LOADS
 from gfmd_cli.status import Status
 from gfmd_cli.study.context import SolveContext, Watcher
-from gfmd_cli.study.forecast import FIRST
 from gfmd_cli.study.measure import measured
 from gfmd_cli.study.notes import Trial
 from gfmd_cli.study.plausibility import loaded_value
-from gfmd_cli.study.refinement import TaskSolution, solve_on_grids, task_scene
+from gfmd_cli.study.refinement import (
+    TaskSolution,
+    has_coarser_grid,
+    solve_on_grids,
+    task_scene,
+)
 from gfmd_cli.study.tasks import Task
 
 # Choices, which change the number of trials (one to three on a grid) and hardly the result:
@@ -51,12 +54,13 @@ AREA_RATIO = 0.5
 area is proportional to the spacing. 0.37 to 0.67 on 256^2, 512^2 and 1024^2 (n = 0.5 to 3, areas of
 0.01 to 0.3, two seeds), except for one shift that was a 50th of the next."""
 TRIALS = 60  # on one grid; 44 halve an interval of STEP down to ROUNDING
-NEIGHBOUR = 1.25
-"""Pressure of the trial that gives the slopes at the root, over that of the root. A choice: a chord
-to a higher pressure is less steep than the slopes of area and gap, so that it widens the error."""
+NEIGHBOURS = (1.25, 0.8)
+"""Pressures of the trials that give the slopes at the root, over that of the root; a choice. One of
+the two chords is less steep than the curve, the other one steeper."""
 JUMP = {1: 2, 2: 8}
 """Points that enter contact together on a symmetric surface, by its dimension."""
 LARGEST_ERROR = 0.5  # of load and pressure, relative, above which it is unknown; a choice
+SOLVED = (Status.CONVERGED, Status.ROUNDING)  # how a solve ends
 
 
 def solve_at_load(task: Task, context: SolveContext, watcher: Watcher) -> TaskSolution:
@@ -79,15 +83,17 @@ def solve_at_load(task: Task, context: SolveContext, watcher: Watcher) -> TaskSo
         row = measured(task, solved)
         value = loaded_value(task.quantity, row)
         work = solved.solution.transforms * solved.contact.grid.size
-        observables = {name: float(row[name]) for name in QUANTITIES}
-        observables[LOADS[task.quantity].searched] = value
+        units, observables = _units(solved.scene), dict[str, float]()
+        if solved.solution.status in SOLVED:
+            values = row | {LOADS[task.quantity].searched: value}
+            observables = {name: float(values[name]) * units[name] for name in QUANTITIES}
         trials.append(Trial(points, pressure, value, work, observables, is_neighbour))
         return solved
 
     solved: TaskSolution | None = None
     first = slope = 0.0
     roots: list[float] = []
-    slopes: dict[str, float] = {}
+    slopes: list[dict[str, float]] = []
     jump = 0.0
     grids = _grids(task)
     has_error = task.accuracy is not None and task.quantity != "displacement"
@@ -110,12 +116,11 @@ def solve_at_load(task: Task, context: SolveContext, watcher: Watcher) -> TaskSo
             solved = None  # frees its memory, which is needed now
             solved = attempt(points, pressure)
             search.add(trials[-1])
-        if points == measured_on:
-            higher = NEIGHBOUR * search.nearest.pressure
-            is_missing = not any(trial.is_neighbour for trial in trials)
-            if is_missing and higher < PRESSURE_RANGE[1] * scene.delta_sigma:
+        if has_error and points == measured_on and search.succeeded:
+            ended = sum(trial.is_neighbour for trial in trials)
+            for ratio in NEIGHBOURS[ended:]:
                 solved = None
-                solved = attempt(points, higher, is_neighbour=True)
+                solved = attempt(points, ratio * search.nearest.pressure, is_neighbour=True)
             slopes = _slopes(search.nearest, trials)
             jump = JUMP[scene.grid.dimension] * search.quantum
         roots.append(search.root if search.succeeded else log(search.nearest.pressure))
@@ -126,48 +131,57 @@ def solve_at_load(task: Task, context: SolveContext, watcher: Watcher) -> TaskSo
     solved.solution.transforms = sum(trial.work for trial in trials) / solved.contact.grid.size
     _check_known(task, solved)
     if has_error:
-        _with_errors_at_load(task, solved, slopes if search.succeeded else {}, jump)
-    solver_ended = solved.solution.status in (Status.CONVERGED, Status.ROUNDING)
-    if solver_ended and not search.succeeded:
+        _with_errors_at_load(task, solved, slopes if search.succeeded else [], jump)
+    if solved.solution.status in SOLVED and not search.succeeded:
         solved.solution.status = Status.LOAD_NOT_REACHED
     return solved
 
 
-def _slopes(root: Trial, trials: list[Trial]) -> dict[str, float]:
-    """Absolute change of each quantity over the relative change of the pressure, at the root.
+def _units(scene: Scene) -> dict[str, float]:
+    """The units of the quantities of a scene, which may depend on the grid [1, Pa, m]."""
+    return {"a_r": 1.0, "sigma_p": scene.delta_sigma, "u_g": scene.h_std}
 
-    Empty without a neighbour.
+
+def _slopes(root: Trial, trials: list[Trial]) -> list[dict[str, float]]:
+    """Absolute changes of the quantities over ln p from the root to its neighbours [1, Pa, m].
+
+    Empty if a solve has not converged.
     """
-    neighbours = [trial.observables for trial in trials if trial.is_neighbour]
-    return {
-        name: abs(value - root.observables.get(name, nan)) / (NEIGHBOUR - 1)
-        for observables in neighbours
-        for name, value in observables.items()
-    }
+    neighbours = [trial for trial in trials if trial.is_neighbour]
+    if not all(trial.observables for trial in (root, *neighbours)):
+        return []
+    return [
+        {
+            name: abs(value - root.observables[name]) / abs(log(trial.pressure / root.pressure))
+            for name, value in trial.observables.items()
+        }
+        for trial in neighbours
+    ]
 
 
 def _with_errors_at_load(
-    task: Task, solved: TaskSolution, slopes: Mapping[str, float], jump: float
+    task: Task, solved: TaskSolution, slopes: list[dict[str, float]], jump: float
 ) -> None:
     """Set the error of a pressure that was searched, and those of the other quantities at the load.
 
     `jump` is the part of a change of the searched quantity that may be due to the grid. Where it is
     more than half, the slope is not known.
 
-    At the pressure of the continuum with the load, the value of this contact differs from the load
-    by less than its error. The other quantities change from this pressure to that one.
+    The continuum has the load at another pressure than the one that was found. The difference is at
+    most the error of the pressure, and the other quantities change over it.
     """
-    name = LOADS[task.quantity].searched
+    name, units = LOADS[task.quantity].searched, _units(solved.scene)
     estimate = solved.estimates[name]
-    uncertain = jump / (NEIGHBOUR - 1)
-    slope = slopes.get(name, 0.0) - uncertain
+    uncertain = jump / log(max(NEIGHBOURS))
+    slope = min((each[name] for each in slopes), default=0.0) / units[name] - uncertain
     distance = estimate.continuum_error + solved.algebraic(name)
     distance += abs(estimate.continuum - task.load)
     is_known = slope > uncertain and distance < LARGEST_ERROR * estimate.continuum
-    if is_known and distance < LARGEST_ERROR * slope:
-        solved.pressure_error = distance / slope
+    if is_known and distance < log1p(LARGEST_ERROR) * slope:
+        solved.pressure_error = expm1(distance / slope)
     for other in solved.estimates.keys() - {name}:
-        change = slopes.get(other, nan) * solved.pressure_error
+        steepest = max((each[other] for each in slopes), default=nan) / units[other]
+        change = steepest * -log1p(-solved.pressure_error)
         solved.estimates[other] = shifted(solved.estimates[other], change)
 
 
@@ -199,11 +213,8 @@ def _grids(task: Task) -> list[int]:
     The coarser ones resolve the surface, but may not have the load: see `_is_in_reach`.
     """
     grids = [task.points]
-    while len(grids) <= COARSER and grids[0] % 4 == 0:
-        half = grids[0] // 2
-        if half < FIRST or not task.resolves(half):
-            break
-        grids.insert(0, half)
+    while len(grids) <= COARSER and has_coarser_grid(task, grids[0]):
+        grids.insert(0, grids[0] // 2)
     return grids
 
 
@@ -373,5 +384,7 @@ class _Search:
             margin = 0.5 * self.resolution
             if not low.x + margin < x < high.x - margin or len(self.points) % 5 == 4:
                 x = 0.5 * (low.x + high.x)
+        elif abs(x - self.points[0].x) < self.resolution:  # the slope is that of a jump
+            x = self.points[0].x - copysign(self.resolution, self.points[0].y)
         p = exp(x)
         return p if self.lowest < p / self.scene.delta_sigma < PRESSURE_RANGE[1] else None

@@ -42,7 +42,7 @@ class Trial:
     work: float
     """Transforms times grid points."""
     observables: dict[str, _Finite] = field(default_factory=dict)
-    """a_r, sigma_p and u_g on the grid; that of the load is `value`."""
+    """a_r, sigma_p [Pa] and u_g [m]; that of the load is `value`. None without convergence."""
     is_neighbour: bool = False
     """Whether the trial is not one of the search, but gives the slopes at its root."""
 

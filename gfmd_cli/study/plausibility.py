@@ -157,8 +157,8 @@ def _compressed(task: Task, h_std: float, displacement: float) -> Iterator[str]:
 
 
 def _unit_of_grid(task: Task, scene: Scene) -> Iterator[str]:
-    """A warning about a p* that is quite another pressure on a finer grid."""
-    if task.has_fixed_unit:
+    """A warning about a p* of a single indenter that is another pressure on a finer grid."""
+    if task.has_fixed_unit or task.surface.rough:
         return
     q, variance = scene.shells.q, scene.shells.variance
     share = float(variance[q > 0.5 * np.pi / max(scene.grid.spacings)].sum() / variance.sum())

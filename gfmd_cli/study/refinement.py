@@ -161,11 +161,20 @@ def _sizes(task: Task) -> list[int]:
         while 2 * sizes[-1] <= task.accuracy.max_points:
             sizes.append(2 * sizes[-1])
         return sizes
-    half = task.points // 2
-    # of a turned map as of the map itself
-    enough = any(n % 4 == 0 and n >= 2 * FIRST for n in (task.points, task.points_y))
-    fits = enough and task.points % 2 == 0 and task.resolves(half)
-    return [half, task.points] if fits and task.accuracy is not None else [task.points]
+    if task.accuracy is not None and has_coarser_grid(task, task.points):
+        return [task.points // 2, task.points]
+    return [task.points]
+
+
+def has_coarser_grid(task: Task, points: int) -> bool:
+    """Whether half of so many points along x, and of those along y, are a grid to solve on.
+
+    The answer is the same for a map that is turned.
+    """
+    is_line = task.surface.dimension == 1
+    numbers = (points,) if is_line else (points, points * task.points_y // task.points)
+    enough = any(n % 4 == 0 and n >= 2 * FIRST for n in numbers)
+    return enough and all(n % 2 == 0 for n in numbers) and task.resolves(points // 2)
 
 
 def _ended_grids(sizes: list[int], grids: list[SolvedGrid]) -> list[SolvedGrid]:

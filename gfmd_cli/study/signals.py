@@ -28,7 +28,7 @@ _interruptible = False  # whether the main thread may be interrupted now
 
 @contextmanager
 def interruptible() -> Iterator[None]:
-    """Inside, a second SIGINT may raise KeyboardInterrupt: nothing that others need is written."""
+    """Inside, a second SIGINT may raise KeyboardInterrupt: files appear whole or not at all."""
     global _interruptible
     if current_thread() is not main_thread():
         yield
