@@ -492,7 +492,7 @@ def test_a_pressure_that_was_searched_has_an_interval_and_a_given_one_is_exact(r
         in seeds_table(compare(tmp_path / "study.h5")).as_text()
     )
     (row,) = rows_of("load={mean_gap=0.5}", "accuracy.mean_gap=0.5", text=plain, name="error.h5")
-    assert f"{row['p_star']:.4f} +- {row['p_star_error']:.2g}" in run_text([row])
+    assert plus_minus(row["p_star"], row["p_star_error"]) in run_text([row])
     half_space = 'elastomer={kind="half-space", E_star=1e9}'
     keys = (seeds, "load={pressure=[1e6, 3.7e6]}", "surface.h_std=1e-6", half_space)
     rows = rows_of(*keys, text=plain, name="pa.h5")

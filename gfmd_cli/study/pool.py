@@ -117,6 +117,8 @@ class Pool:
                 for pipe in ready:
                     self._receive(self.workers[pipe])  # type: ignore[index]
         finally:
+            for pipe in self.workers:
+                pipe.close()  # which ends all of them at the same time
             for worker in self.workers.values():
                 worker.dismiss()
 
