@@ -68,11 +68,9 @@ class Ensemble:
         """Of pressures that were searched. No interval if the error of one is unknown."""
         errors = [row["p_star_error"] for row in self.rows]
         spread = spread_of([row["p_star"] for row in self.rows], errors)
-        # those of a displacement, which is prescribed on the grid, have none
-        is_of_continuum = self.rows[0]["load"] != "displacement" and any(
-            map(_has_errors, self.rows)
-        )
-        has_unknown = is_of_continuum and any(map(isnan, errors))
+        if self.rows[0]["load"] == "displacement":  # is prescribed on the grid: has no errors
+            return spread
+        has_unknown = any(map(isnan, errors)) and any(map(_has_errors, self.rows))
         return replace(spread, half_width=nan) if has_unknown else spread
 
     def means(self) -> dict[str, Any]:

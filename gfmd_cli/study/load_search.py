@@ -118,9 +118,10 @@ def solve_at_load(task: Task, context: SolveContext, watcher: Watcher) -> TaskSo
             search.add(trials[-1])
         if has_error and points == measured_on and search.succeeded:
             ended = sum(trial.is_neighbour for trial in trials)
-            for ratio in NEIGHBOURS[ended:]:
-                solved = None
-                solved = attempt(points, ratio * search.nearest.pressure, is_neighbour=True)
+            for pressure in (ratio * search.nearest.pressure for ratio in NEIGHBOURS[ended:]):
+                if search.lowest < pressure / scene.delta_sigma < PRESSURE_RANGE[1]:
+                    solved = None
+                    solved = attempt(points, pressure, is_neighbour=True)
             slopes = _slopes(search.nearest, trials)
             jump = JUMP[scene.grid.dimension] * search.quantum
         roots.append(search.root if search.succeeded else log(search.nearest.pressure))
@@ -145,10 +146,11 @@ def _units(scene: Scene) -> dict[str, float]:
 def _slopes(root: Trial, trials: list[Trial]) -> list[dict[str, float]]:
     """Absolute changes of the quantities over ln p from the root to its neighbours [1, Pa, m].
 
-    Empty if a solve has not converged.
+    Empty if a solve has not converged, or a neighbour is out of the range of pressures.
     """
     neighbours = [trial for trial in trials if trial.is_neighbour]
-    if not all(trial.observables for trial in (root, *neighbours)):
+    is_complete = len(neighbours) == len(NEIGHBOURS)
+    if not (is_complete and all(trial.observables for trial in (root, *neighbours))):
         return []
     return [
         {

@@ -191,7 +191,9 @@ def _missed_accuracy(task: Task, solved: TaskSolution) -> Iterator[str]:
     for name in final:
         yield f"[accuracy] is met on no grid: {name} {solved.estimates[name].verdict.explanation}"
     if others := [name for name in columns if name not in final]:
-        remedy = "more points" if LOADS[task.quantity].searched else 'grid.points = "auto"'
+        remedy = "more points"
+        if not LOADS[task.quantity].searched:
+            remedy = 'grid.points = "auto"; accuracy.max_points limits it'
         yield (
             f"the errors of {', '.join(others)} are larger than [accuracy] requests, or unknown: "
             f"use {remedy}"
