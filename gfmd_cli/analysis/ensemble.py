@@ -68,7 +68,7 @@ class Ensemble:
         """Of pressures that were searched. No interval if the error of one is unknown."""
         errors = [row["p_star_error"] for row in self.rows]
         spread = spread_of([row["p_star"] for row in self.rows], errors)
-        if self.rows[0]["load"] == "displacement":  # is prescribed on the grid: has no errors
+        if LOADS[self.rows[0]["load"]].searched not in QUANTITIES:  # the load has no errors
             return spread
         has_unknown = any(map(isnan, errors)) and any(map(_has_errors, self.rows))
         return replace(spread, half_width=nan) if has_unknown else spread

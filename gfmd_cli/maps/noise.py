@@ -9,13 +9,14 @@ from gfmd_cli.maps.topography import Topography
 
 RATIOS = (2, 3)  # of distances; a choice: gratings resemble noise at one of them only
 TOLERANCE = 0.15  # relative, of white noise at these distances; roughness grows by 0.25 for H = 0.1
-MIN_GROWTH = 0.1  # of longer waves beyond them; a choice: without them, roughness is this short
-MIN_COMMON = 0.5  # noise of points: along one axis over that along the other, both mean squares
-FAR = 4  # such waves: over this fraction of a line; a choice
+FAR = 4  # a quarter of a line is a distance at which longer waves are seen; a choice
+MIN_GROWTH = 0.1  # relative, of the mean square at this distance; a choice: without longer waves
+# the roughness itself is as short as the noise
+MIN_COMMON = 0.5  # variance of the noise along one axis over that along the other; below, of lines
 MIN_POINTS = 128  # per side: fewer, and profiles, have such differences by chance
 MIN_PAIRS = 100  # of known differences, likewise
 SAMPLED_LINES = 128  # of each axis, at least; all of smaller maps
-MAX_EXCESS = 10  # above, the estimate of what is left is uncertain; a choice
+MAX_EXCESS = 10  # larger ratios are not stated: the gradient without noise is uncertain; a choice
 MIN_EXCESS = 1.1  # rms gradient over that without noise; sound maps have up to 1.06
 
 
@@ -67,10 +68,10 @@ def noisy(topography: Topography, spacing: tuple[float, ...], scale: float) -> s
 def _differences(lines: Field) -> _Differences:
     """Differences along the lines of a map, and their noise (the nugget of a variogram).
 
-    The mean square of h(x + l) - 2 h(x) + h(x - l) is 6 s^2 + A l^(2 H) for a self-affine
-    surface with white noise of the mean square s^2 (with first differences: Matheron 1963). Three
-    distances l, each a multiple of the one before, give s^2. The mean square grows less with l
-    beyond a roll-off, and more below a cut-off: the result is then too small, or negative.
+    The mean square of h(x + r) - 2 h(x) + h(x - r) is 6 V plus a multiple of r^(2 H) for a
+    self-affine surface with white noise of the variance V (with first differences: Matheron 1963).
+    Three distances r, each the same multiple of the one before, give V. The mean square grows less
+    with r beyond a roll-off, and more below a cut-off: the result is then too small, or negative.
     """
     lines = lines[:: 1 + len(lines) // (2 * SAMPLED_LINES)]
     steps = np.diff(lines)

@@ -96,7 +96,7 @@ def solve_at_load(task: Task, context: SolveContext, watcher: Watcher) -> TaskSo
     slopes: list[dict[str, float]] = []
     jump = 0.0
     grids = _grids(task)
-    has_error = task.accuracy is not None and task.quantity != "displacement"
+    has_error = task.accuracy is not None and LOADS[task.quantity].searched in QUANTITIES
     measured_on = grids[max(len(grids) - 2, 0)] if has_error else 0
     for points in grids:
         scene = task_scene(task, points, context)

@@ -2,11 +2,11 @@
 
 import time
 from contextlib import suppress
-from functools import partial
+from functools import lru_cache, partial
 from pathlib import Path
 
 from gfmd_cli.errors import GfmdError, InputError, Interrupted, SpaceError, StudyError
-from gfmd_cli.files.checksums import file_digest, file_version
+from gfmd_cli.files.checksums import Version, file_digest, file_version
 from gfmd_cli.grid.blas import one_blas_thread
 from gfmd_cli.grid.fft_grid import Shape
 from gfmd_cli.grid.ranks import is_root, on_root, shared_errors
@@ -167,5 +167,12 @@ def _check_files(task: Task) -> None:
     """
     for path, version, checksum in task.files:
         with suppress(OSError):  # a file that was deleted after it had been read
-            if file_version(path) != version and file_digest(path) != checksum:
+            now = file_version(path)
+            if now != version and _digest(path, now) != checksum:
                 raise InputError(f"{path}: the file was changed during the run; run again")
+
+
+@lru_cache(maxsize=16)
+def _digest(path: Path, version: Version) -> str:
+    """The checksum of a file in this version; cached, because every task asks for it twice."""
+    return file_digest(path)
