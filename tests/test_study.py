@@ -13,6 +13,7 @@ import pytest
 import xarray
 from specs import power_spec
 
+from gfmd_cli.analysis.compare import compare
 from gfmd_cli.errors import Interrupted, StudyError
 from gfmd_cli.grid import plans
 from gfmd_cli.grid.fft_grid import Grid
@@ -96,6 +97,37 @@ def test_a_second_call_finds_everything_done(run):
     assert events == []
     assert outcome == {"converged": 4}
     assert path.read_bytes() == before
+
+
+PARABOLA_AUTO = """\
+[surface]
+kind = "parabola"
+[elastomer]
+kind = "half-space"
+[grid]
+points = "auto"
+[load]
+pressure = [0.03, 0.002]
+[accuracy]
+contact_area = 0.2
+max_points = 128
+"""
+
+
+@pytest.mark.parametrize(
+    "pressures", [("[0.03, 0.002]",), ("[0.002, 0.03]",), ("0.03", "0.002"), ("0.002", "0.03")]
+)
+def test_the_spectrum_of_a_scene_of_several_grids_is_that_of_the_finest(run, pressures):
+    """Whichever load comes first; Delta_sigma of an indenter depends on the grid."""
+    for pressure in pressures:
+        path, _, _ = run(PARABOLA_AUTO, overrides=[f"load.pressure={pressure}"])
+    coarse, fine = sorted(read_rows(path), key=lambda row: row["points"])
+    assert coarse["points"] < fine["points"]
+    assert abs(coarse["delta_sigma"] / fine["delta_sigma"] - 1) > 1e-3
+    (curve,) = compare(path).curves
+    variance = curve.persson.shells.variance.sum()
+    assert variance == pytest.approx(fine["delta_sigma"] ** 2, rel=1e-12)
+    assert curve.units[0] == fine["delta_sigma"]
 
 
 def test_shards_make_up_the_whole(run):

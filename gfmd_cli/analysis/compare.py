@@ -240,9 +240,8 @@ def compare(path: Path, theory: Theory = "paper") -> Comparison:
             ordered = sorted(group, key=lambda row: row["p_star"])
             spectrum = study.shells(scene)
             persson = theory_of(theory, spectrum, float(group[0]["n"]))
-            height = np.sqrt(spectrum.height.sum())
-            nearest = min(by_scene[scene], key=lambda row: abs(row["h_std"] - height))
-            curves.append(Curve(ordered, persson, study.map_spectrum(scene), spectrum_row=nearest))
+            finest = max(by_scene[scene], key=lambda row: row["points"])
+            curves.append(Curve(ordered, persson, study.map_spectrum(scene), spectrum_row=finest))
         return Comparison(path, curves, study.rows, study.attributes)
 
 

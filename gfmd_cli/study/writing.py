@@ -58,12 +58,29 @@ def write_study(
             writer.histogram(file, histogram, task, rows)
     groups = [group for group in layout.TASK_GROUPS if group.option in options]
     with_arrays = {group.option for group in groups}
+    described = _on_finest_grids(entries)
     for index, entry in enumerate(entries):
-        scene = f"scenes/{scenes[entry.scene_id]}"
-        if any(name.partition(".")[0] in with_arrays for name in entry.stored) or (
-            scene not in file and entry.row["status"].is_solved
-        ):
-            writer.result(file, index, scene, groups, load(index))
+        describes = described.get(entry.scene_id) == index
+        if describes or any(name.partition(".")[0] in with_arrays for name in entry.stored):
+            result = load(index)
+            if describes:
+                writer.scene(file, f"scenes/{scenes[entry.scene_id]}", result)
+            writer.arrays(file, index, groups, result)
+
+
+def _on_finest_grids(entries: Sequence[Entry]) -> dict[str, int]:
+    """The task that describes each scene: the first one on the finest of its grids.
+
+    The tasks of a scene have several grids if its grid is "auto". The choice depends neither on
+    their order nor on when they were solved.
+    """
+    finest: dict[str, int] = {}
+    for index, entry in enumerate(entries):
+        if entry.row["status"].is_solved:
+            best = finest.setdefault(entry.scene_id, index)
+            if entry.row["points"] > entries[best].row["points"]:
+                finest[entry.scene_id] = index
+    return finest
 
 
 class _Writer(NamedTuple):
@@ -112,26 +129,28 @@ class _Writer(NamedTuple):
         densities = np.array([row.get(histogram.name, blank) for row in rows])
         self.column(file, histogram.column, densities, [task, bins])
 
-    def result(
-        self, file: Any, index: int, scene: str, groups: list[layout.TaskGroup], result: TaskResult
+    def scene(self, file: Any, name: str, result: TaskResult) -> None:
+        """Spectrum and pictures of a scene."""
+        group = file.create_group(name)
+        shell = self.scale(group, "shell", np.arange(result.shells.q.size), "1", "shell")
+        for column in layout.SHELLS:
+            self.column(group, column, getattr(result.shells, column.name), [shell])
+        if result.map_spectrum:
+            bands = group.create_group(layout.MAP_SPECTRUM)
+            band = self.scale(bands, "band", np.arange(result.map_spectrum.q.size), "1", "band")
+            for column in layout.BANDS:
+                self.column(bands, column, getattr(result.map_spectrum, column.name), [band])
+            fit = result.map_spectrum.fit
+            write_checked(bands, "fit", np.array(astuple(fit) if fit else []))
+        for kind, picture in result.pictures.items():
+            shown = group.require_group(layout.PICTURES)
+            write_checked(shown, kind, picture.heights.astype(np.float32))
+            write_checked(shown, f"{kind}_sides", np.array(picture.sides))
+
+    def arrays(
+        self, file: Any, index: int, groups: list[layout.TaskGroup], result: TaskResult
     ) -> None:
-        """Spectrum and pictures of the scene, unless they are there, and the arrays of one task."""
-        if scene not in file:
-            group = file.create_group(scene)
-            shell = self.scale(group, "shell", np.arange(result.shells.q.size), "1", "shell")
-            for column in layout.SHELLS:
-                self.column(group, column, getattr(result.shells, column.name), [shell])
-            if result.map_spectrum:
-                bands = group.create_group(layout.MAP_SPECTRUM)
-                band = self.scale(bands, "band", np.arange(result.map_spectrum.q.size), "1", "band")
-                for column in layout.BANDS:
-                    self.column(bands, column, getattr(result.map_spectrum, column.name), [band])
-                fit = result.map_spectrum.fit
-                write_checked(bands, "fit", np.array(astuple(fit) if fit else []))
-            for name, picture in result.pictures.items():
-                shown = group.require_group(layout.PICTURES)
-                write_checked(shown, name, picture.heights.astype(np.float32))
-                write_checked(shown, f"{name}_sides", np.array(picture.sides))
+        """The arrays of one task."""
         for declared in groups:
             if arrays := result.arrays.get(declared.name):
                 group = file.create_group(f"{declared.name}/{index}")
