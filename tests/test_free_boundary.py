@@ -282,6 +282,7 @@ def test_what_a_free_boundary_does_not_allow(gfmd, override, message):
     ("rows", "message"),
     [
         ([[1.0, 1.0], [10.0, 100.0]], "decays with the distance"),
+        ([[1.0, 1.0], [10.0, 0.9], [100.0, 9.0]], "begins with k ~ q^-0.046: add rows at smaller"),
         ([[1.0, 1.0], [10.0, 10.0], [100.0, 10.0]], "rises at its upper end"),
     ],
 )

@@ -1,4 +1,5 @@
-"""Properties of every run: random specs, scales and units, and the ends of the number range.
+"""Properties of every run: random specs, scales and units, one contact in two descriptions, and the
+ends of the number range.
 
 `hypothesis` draws the specs, always the same ones; `make validate` draws many more.
 """
@@ -14,6 +15,7 @@ import pytest
 from hypothesis import HealthCheck, given, note, settings
 from hypothesis import strategies as st
 
+import gfmd_cli
 from gfmd_cli.errors import GfmdError, InputError
 from gfmd_cli.physics import einstein_solid
 from gfmd_cli.physics.contact import PRESSURE_RANGE
@@ -305,6 +307,67 @@ def test_units_of_all_kinds_at_once_drop_out(n, scale):
     other, other_bars, _ = numbers(n, modulus=1 / scale, h_std=scale / 7, length=5 * scale)
     assert other == pytest.approx(values, rel=1e-12)
     assert other_bars == pytest.approx(bars, rel=1e-8, nan_ok=True)
+
+
+# --- one contact in two descriptions --------------------------------------------------------------
+
+LAYER = {"kind": "layer", "thickness": 0.1, "poisson": 0.4}
+OF_QUANTITIES = [f"{name}_{what}" for name in QUANTITIES for what in ("continuum", "error")]
+REDUCED = ["u_g", "a_r", "sigma_p", "energy", "stiffness", "perimeter", *OF_QUANTITIES]
+
+
+def reduced(elastomer, pressure, heights=None, **changes):
+    """Reduced results and error bars of a contact at a pressure [Pa]; NaN where there are none."""
+    tables = plain_tables(elastomer=elastomer, load={"pressure": pressure}, **changes)
+    tables["output"] = {"stiffness": True}
+    columns = gfmd_cli.solve(tables, heights=heights).columns
+    return np.array([columns[name] for name in REDUCED])
+
+
+@pytest.mark.parametrize(
+    "elastomer", [elastomer_table(0.5), elastomer_table(2), elastomer_table("slab"), LAYER]
+)
+def test_a_map_that_varies_along_x_only_is_the_line_contact(elastomer):
+    x = 2 * np.pi * np.arange(64) / 64
+    profile = np.cos(x) + 0.3 * np.cos(5 * x + 1) + 0.1 * np.sin(9 * x)
+    line = reduced(elastomer, 1.0, profile, surface={}, grid={})
+    assert 0 < line[1] < 1
+    for rows, length_y in ((64, 1.0), (8, 0.3)):
+        surface = {"length_y": length_y}
+        plane = reduced(elastomer, 1.0, np.tile(profile, (rows, 1)), surface=surface, grid={})
+        assert plane == pytest.approx(line, rel=1e-7, nan_ok=True)
+
+
+@pytest.mark.parametrize("boundary", ["periodic", "free"])
+@pytest.mark.parametrize(
+    "surface", [{"kind": "parabola"}, {"kind": "cone"}, {"kind": "punch", "depth": 0.01}]
+)
+def test_a_cell_that_is_turned_has_the_same_contact(surface, boundary):
+    """Cell and pixels are oblong. The contact line is stored times the side along x."""
+    results = [
+        reduced(
+            LAYER,
+            0.02,
+            surface=surface | {"length": length, "length_y": length_y},
+            grid={"points": points, "points_y": points_y, "boundary": boundary},
+        )
+        / np.where(np.array(REDUCED) == "perimeter", length, 1.0)
+        for length, length_y, points, points_y in ((1.0, 1.7, 48, 64), (1.7, 1.0, 64, 48))
+    ]
+    assert 0 < results[0][1] < 1
+    assert results[1] == pytest.approx(results[0], rel=1e-7, nan_ok=True)
+
+
+def test_the_gap_of_a_thin_slab_is_that_of_a_plate_up_to_the_square_of_its_thickness():
+    """At the same pressure and bending stiffness: S(t) = t^3/6 (1 - 3 t^2/10 ...)."""
+    pressure = 1e5
+    u_g, a_r, *_ = reduced({"kind": "plate", "thickness": 1.0}, pressure)
+    assert 0.01 < a_r < 1
+    thicknesses = 0.001, 0.0005, 0.00025
+    slabs = [{"kind": "slab", "thickness": t, "E_star": t**-3} for t in thicknesses]
+    first, second, third = (reduced(slab, pressure)[0] - u_g for slab in slabs)
+    assert first / second == pytest.approx(4, rel=0.01)
+    assert second / third == pytest.approx(4, rel=0.01)
 
 
 # --- the ends of the number range -----------------------------------------------------------------

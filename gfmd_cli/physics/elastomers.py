@@ -323,8 +323,15 @@ class Tabulated(LinearElastomer):
 
     def check_free_boundary(self, dimension: int) -> None:
         """Raise InputError for exponents that have no compliance kernel."""
+        first, last = _end_exponents(_read_table(self.path))
+        if first < -ROUNDED_EXPONENT:
+            raise InputError(
+                'grid.boundary: "free" needs a table k(q) that is constant or rises at its lower '
+                f"end, but {self.path.name} begins with k ~ q^{first:.2g}: add rows at smaller q, "
+                'or use "periodic"'
+            )
         super().check_free_boundary(dimension)
-        if not _end_exponents(_read_table(self.path))[1] > 0:
+        if not last > 0:
             raise InputError(
                 'grid.boundary: "free" needs a table k(q) that rises at its upper end; the '
                 'compliance of this one has no kernel: use "periodic"'
