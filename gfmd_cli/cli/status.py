@@ -113,8 +113,8 @@ def _lines(progress: "StudyProgress", shards: int | None) -> list[str]:
     if progress.others:
         lines.append(f"  the study also contains {count(progress.others, 'task')} of other specs")
     lines += [f"  damaged, to be solved again: {name}" for name in progress.damaged]
-    for index in range(shards or 0):
-        lines.append(f"  shard {index}/{shards}: {counted(progress.shard(index, shards or 1))}")
+    for index, counts in enumerate(progress.of_shards(shards or 0)):
+        lines.append(f"  shard {index}/{shards}: {counted(counts)}")
     return lines
 
 
@@ -154,5 +154,5 @@ def _as_data(progress: "StudyProgress", shards: int | None, next_command: str) -
         "next": next_command,
     }
     if shards is not None:
-        data["shards"] = [dict(progress.shard(index, shards)) for index in range(shards)]
+        data["shards"] = [dict(counts) for counts in progress.of_shards(shards)]
     return data
