@@ -12,7 +12,6 @@ from gfmd_cli.files.locks import Waits
 from gfmd_cli.grid import plans
 from gfmd_cli.grid.ranks import Ranks, is_root, on_root, shared_errors
 from gfmd_cli.physics.file_surface import forget_files
-from gfmd_cli.physics.indenters import forget_peaks
 from gfmd_cli.spec.models import Spec
 from gfmd_cli.status import Status
 from gfmd_cli.study.context import Progress, Report, SolveContext, WorkerOptions
@@ -85,6 +84,7 @@ def run_study(
     ranks = options.ranks
     forget_files()
     forget_scenes()
+    forget_spectra()
     stop = Event()
     waits = Waits(stop if ranks is None else None)  # ranks stop together
     study = Study(path, waits)
@@ -118,8 +118,6 @@ def run_study(
         damaged = on_root(ranks, lambda: work.enter_context(study.work(tasks)))
         work.callback(plans.plan_with, None)
         unusable = plans.plan_with(study.parts, estimated=options.reproducible, waits=waits)
-        forget_peaks()
-        forget_spectra()
         context.warn(*(f"{study.path}: the old one is kept as {new}" for new in moved))
         context.warn(*damaged, *filter(None, [unusable, _changing_unit(pending)]))
         try:
