@@ -114,7 +114,7 @@ def all_columns(task: Task, solved: TaskSolution) -> Row:
         | planned(task)
         | results
         | {"warnings": SEPARATOR.join(warnings_of(task, solved, results))}
-        | on_request(task.output, SolvedContact(contact, u, sigma))
+        | optional_columns(task.output, SolvedContact(contact, u, sigma))
     )
 
 
@@ -154,7 +154,7 @@ def forget_spectra() -> None:
     _map_spectrum.cache_clear()
 
 
-def on_request(output: OutputTable, solved: SolvedContact) -> Row:
+def optional_columns(output: OutputTable, solved: SolvedContact) -> Row:
     """The histograms, with the share of points in no bin, and the observables of [output]."""
     row: Row = {}
     if output.histogram:
