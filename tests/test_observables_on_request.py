@@ -19,7 +19,7 @@ from gfmd_cli.spec.models import ON_REQUEST, OutputTable
 from gfmd_cli.spec.parse import read_spec
 from gfmd_cli.study.columns import COLUMNS as COLUMNS_OF_A_STUDY
 from gfmd_cli.study.columns import HISTOGRAMS, TASK_GROUPS
-from gfmd_cli.study.measure import on_request
+from gfmd_cli.study.measure import optional_columns
 from gfmd_cli.study.observables import OBSERVABLES, SolvedContact
 from gfmd_cli.study.reading import open_study, read_rows
 from gfmd_cli.study.run import RunOptions, run_study
@@ -254,6 +254,6 @@ def test_without_contact_there_is_no_area_of_a_patch():
     contact = build_scene(SelfAffine(cutoff=0.1), Power(n=1), 48).contact(0.1)
     u = np.full(contact.grid.shape, contact.height.max() + 1)
     output = OutputTable(patches=True, histogram=False)
-    row = on_request(output, SolvedContact(contact, u, np.zeros_like(u)))
+    row = optional_columns(output, SolvedContact(contact, u, np.zeros_like(u)))
     assert row.pop("pr_patch_area").sum() == 0
     assert row == {"patches": 0}

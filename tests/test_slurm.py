@@ -285,7 +285,7 @@ def test_what_a_shard_asks_for_grows_with_its_tasks(gfmd):
     def needs_of(points, cpus=1, limit=None):
         overrides = (f"grid.points={points}", "elastomer.n=1")
         tasks = plan(read_spec(Path("spec.toml"), overrides)[0])
-        needs = slurm.resources(tasks, 2, cpus, limit)
+        needs = slurm.requirements(tasks, 2, cpus, limit)
         return int(needs["mem"][:-1]), int(needs["signal"].partition("@")[2])
 
     memory, notice = needs_of(64)

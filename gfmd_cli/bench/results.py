@@ -25,10 +25,10 @@ from gfmd_cli.study.columns import PARAMETERS
 
 FULL_WIDTH, ROW_HEIGHT = 2.09 * WIDTH, 2.0  # inches: a page of 180 mm; a row of panels
 MAX_CONTACTS = 4  # rows of panels that a page holds
-COSTS = (
-    ("transforms", "transforms of the solved size"),
-    ("seconds", "processor time on one thread (s)"),
-)
+COST_LABELS = {
+    "transforms": "transforms of the solved size",
+    "seconds": "processor time on one thread (s)",
+}
 ROOM = 2.0  # for the symbols at the ends of a curve
 MAX_LABEL = 100  # characters of a title and of a file name
 NAMED_KEYS = ("solver_kind", "tolerance", "nested")  # of [solver], in words of their own
@@ -145,11 +145,11 @@ def bench_figures(traces: list[Trace]) -> dict[str, LegendFigure]:
 def _draw(contacts: list[list[tuple[Trace, CurveStyle]]]) -> LegendFigure:
     """A row of two panels for each contact."""
     plot = LegendFigure(FULL_WIDTH, ROW_HEIGHT * len(contacts))
-    grid = plot.figure.subplots(len(contacts), len(COSTS), sharey="row", squeeze=False)
+    grid = plot.figure.subplots(len(contacts), len(COST_LABELS), sharey="row", squeeze=False)
     for solves, panels in zip(contacts, grid, strict=True):
         errors = np.concatenate([_errors(trace) for trace, _ in solves])
         errors = errors[np.isfinite(errors)]
-        for axes, (cost, label) in zip(panels, COSTS, strict=True):
+        for axes, (cost, label) in zip(panels, COST_LABELS.items(), strict=True):
             spans = [_curve(plot, axes, trace, style, cost) for trace, style in solves]
             log_scale(axes, "x", min(s[0] for s in spans), max(s[1] for s in spans))
             if errors.size:

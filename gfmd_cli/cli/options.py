@@ -1,12 +1,13 @@
 """Options that several commands share."""
 
+import shlex
 from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from gfmd_cli.errors import InputError
+from gfmd_cli.errors import InputError, typed
 
 if TYPE_CHECKING:
     from gfmd_cli.spec.models import Spec
@@ -84,6 +85,11 @@ def study_path(spec: "Spec", output: Path | None) -> Path:
 
 
 def repeated(output: Path | None, overrides: tuple[str, ...]) -> list[str]:
-    """The options -o and --set as given, for the next command to type."""
+    """The options -o and --set as given, for another command."""
     words = [] if output is None else ["-o", str(output)]
     return [*words, *(word for override in overrides for word in ("--set", override))]
+
+
+def to_type(spec: Path, output: Path | None, overrides: tuple[str, ...]) -> str:
+    """The spec and its options as given, for the next command to type."""
+    return " ".join([typed(spec), *map(shlex.quote, repeated(output, overrides))])

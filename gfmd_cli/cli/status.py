@@ -1,7 +1,6 @@
 """`gfmd status` and `gfmd collect`: progress of a study; collection of its records."""
 
 import json
-import shlex
 import sys
 import time
 from math import isfinite
@@ -16,8 +15,8 @@ from gfmd_cli.cli.options import (
     Command,
     output_option,
     overrides_option,
-    repeated,
     study_path,
+    to_type,
 )
 from gfmd_cli.errors import InputError, typed
 from gfmd_cli.status import Status, counted
@@ -51,14 +50,14 @@ def status(
     if is_study(path):
         if output is not None or overrides:
             raise InputError(f"-o and --set need a spec; {path} is a study")
-        progress, spec, output = progress_of_study(path), "SPEC", path
+        progress, words = progress_of_study(path), to_type(Path("SPEC"), path, ())
     else:
         resolved, _ = read_spec(path, overrides)
         progress = progress_of_spec(resolved, study_path(resolved, output))
-        spec = typed(path)
+        words = to_type(path, output, overrides)
     if shards is not None:
         check_shards(shards, len(progress.tasks))
-    next_command = _next_command(progress, spec, output, overrides)
+    next_command = _next_command(progress, words)
     if as_json:
         click.echo(json.dumps(_as_data(progress, shards, next_command), indent=1))
     else:
@@ -91,7 +90,7 @@ def collect(spec: Path, output: Path | None, overrides: tuple[str, ...]) -> None
         for note in damaged:
             print_error(f"gfmd: {note}")
     progress = progress_of_spec(resolved, study.path)
-    next_command = _next_command(progress, typed(spec), output, overrides)
+    next_command = _next_command(progress, to_type(spec, output, overrides))
     print_text("\n".join([*_lines(progress, None), f"next: {next_command}"]))
     sys.exit(0 if progress.converged else 1)
 
@@ -114,18 +113,15 @@ def _lines(progress: "StudyProgress", shards: int | None) -> list[str]:
     if progress.others:
         lines.append(f"  the study also contains {count(progress.others, 'task')} of other specs")
     lines += [f"  damaged, to be solved again: {name}" for name in progress.damaged]
-    for index in range(shards or 0):
-        lines.append(f"  shard {index}/{shards}: {counted(progress.shard(index, shards or 1))}")
+    for index, counts in enumerate(progress.of_shards(shards or 0)):
+        lines.append(f"  shard {index}/{shards}: {counted(counts)}")
     return lines
 
 
-def _next_command(
-    progress: "StudyProgress", spec: str, output: Path | None, overrides: tuple[str, ...]
-) -> str:
-    """The command to run next; `spec` as a word of it."""
+def _next_command(progress: "StudyProgress", words: str) -> str:
+    """The command to run next; `words` are the spec and its options."""
     from gfmd_cli.study.slurm import SUFFIX
 
-    words = " ".join([spec, *map(shlex.quote, repeated(output, overrides))])
     if not progress.missing:
         if progress.records:
             return f"gfmd collect {words}"
@@ -158,5 +154,5 @@ def _as_data(progress: "StudyProgress", shards: int | None, next_command: str) -
         "next": next_command,
     }
     if shards is not None:
-        data["shards"] = [dict(progress.shard(index, shards)) for index in range(shards)]
+        data["shards"] = [dict(counts) for counts in progress.of_shards(shards)]
     return data

@@ -15,8 +15,9 @@ from gfmd_cli.cli.options import (
     overrides_option,
     repeated,
     study_path,
+    to_type,
 )
-from gfmd_cli.errors import GfmdError, InputError, typed
+from gfmd_cli.errors import GfmdError, InputError
 from gfmd_cli.units import count
 
 if TYPE_CHECKING:
@@ -95,7 +96,7 @@ def submit(
         },
         sbatch_options=sbatch_options,
     )
-    words = " ".join([typed(spec), *map(shlex.quote, repeated(output, overrides))])
+    words = to_type(spec, output, overrides)
     if not job.members:
         print_text(f"{study}: nothing is missing\nnext: gfmd collect {words}")
     elif dry_run:

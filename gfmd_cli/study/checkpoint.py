@@ -17,8 +17,7 @@ from typing import Any, Literal, NamedTuple, Self
 import numpy as np
 
 from gfmd_cli.errors import SpaceError, StudyError
-from gfmd_cli.files.atomic import write_whole
-from gfmd_cli.files.checksums import check_stored, crc32, sealed
+from gfmd_cli.files.checksums import check_stored, crc32
 from gfmd_cli.files.locks import locked
 from gfmd_cli.files.regular import open_regular
 from gfmd_cli.grid.arrays import Field, row_blocks
@@ -28,7 +27,7 @@ from gfmd_cli.physics.contact import Contact
 from gfmd_cli.solvers.loop import Solver, State
 from gfmd_cli.solvers.nested_grids import Resume, grids_of
 from gfmd_cli.study.notes import Notes
-from gfmd_cli.study.pointer import Part, Scalars, Slot, pointer_text, read_pointer
+from gfmd_cli.study.pointer import Part, Scalars, Slot, read_pointer, write_pointer
 from gfmd_cli.study.unfinished_work import delete_checkpoint, set_aside
 
 CHUNK = 2**26  # bytes that a checkpoint maps at a time
@@ -134,7 +133,7 @@ class Checkpoint:
             fields={name: field.dtype.str for name, field in fields.items()},
         )
         slots = [slot, *(old for old in self.slots[:1] if old.name != name)]
-        on_root(self.ranks, lambda: write_whole(self.pointer, sealed(pointer_text(slots))))
+        on_root(self.ranks, lambda: write_pointer(self.pointer, slots))
         self.slots = slots
 
     def _write_part(self, name: str, grid: Grid, fields: dict[str, Field]) -> Part:

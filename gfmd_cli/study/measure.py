@@ -114,7 +114,7 @@ def all_columns(task: Task, solved: TaskSolution) -> Row:
         | planned(task)
         | results
         | {"warnings": SEPARATOR.join(warnings_of(task, solved, results))}
-        | on_request(task.output, SolvedContact(contact, u, sigma))
+        | optional_columns(task.output, SolvedContact(contact, u, sigma))
     )
 
 
@@ -139,25 +139,22 @@ def result(task: Task, solved: TaskSolution, seconds: float) -> TaskResult:
             column.name: scene.grid.diagonal(solved.field(column.name)) for column in FIELDS
         }
     entry = Entry(task.id, task.scene_id, output.names(), row)
-    spectrum = _map_spectrum(task.surface, task.surface_sha256)
+    spectrum = _map_spectrum(task.surface)
     return TaskResult(entry, scene.shells, arrays, task.surface.pictures(), spectrum)
 
 
 @lru_cache(maxsize=4)
-def _map_spectrum(surface: RigidSurface, sha256: str) -> Spectrum | None:
-    """As `map_spectrum`; cached, because all contacts of a scene have the same.
-
-    The checksum is a part of the key of the cache: a file may change between two runs.
-    """
+def _map_spectrum(surface: RigidSurface) -> Spectrum | None:
+    """As `map_spectrum`; cached, because all contacts of a scene have the same."""
     return map_spectrum(surface)
 
 
 def forget_spectra() -> None:
-    """Drop the spectra of maps, whose last bits depend on the plans of the transforms."""
+    """Drop the spectra of maps: files may have changed, and plans give other last bits."""
     _map_spectrum.cache_clear()
 
 
-def on_request(output: OutputTable, solved: SolvedContact) -> Row:
+def optional_columns(output: OutputTable, solved: SolvedContact) -> Row:
     """The histograms, with the share of points in no bin, and the observables of [output]."""
     row: Row = {}
     if output.histogram:

@@ -14,7 +14,8 @@ from typing import Annotated, Literal, Self, get_type_hints
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, Strict, model_validator
 
-from gfmd_cli.files.checksums import check_seal
+from gfmd_cli.files.atomic import write_whole
+from gfmd_cli.files.checksums import check_seal, sealed
 from gfmd_cli.files.regular import open_regular
 from gfmd_cli.grid import arrays
 from gfmd_cli.solvers.loop import State
@@ -99,9 +100,10 @@ class _Pointer(_Checked):
     slots: Annotated[list[Slot], Field(min_length=1, max_length=2)]
 
 
-def pointer_text(slots: list[Slot]) -> bytes:
-    """The content of a pointer to these slots, the newer one first."""
-    return json.dumps({"layout": LAYOUT, "slots": [slot.model_dump() for slot in slots]}).encode()
+def write_pointer(path: Path, slots: list[Slot]) -> None:
+    """Write a pointer to these slots, the newer one first. Raises SpaceError."""
+    content = {"layout": LAYOUT, "slots": [slot.model_dump() for slot in slots]}
+    write_whole(path, sealed(json.dumps(content).encode()))
 
 
 def read_pointer(path: Path) -> list[Slot]:

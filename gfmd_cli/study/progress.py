@@ -58,9 +58,9 @@ class StudyProgress:
         """Whether every task is solved to its tolerance."""
         return all(task.status.is_converged for task in self.tasks)
 
-    def shard(self, index: int, shards: int) -> Counter[Status]:
-        """How many tasks of one shard have which status."""
-        return Counter(task.status for task in self.tasks if task.task % shards == index)
+    def of_shards(self, shards: int) -> list[Counter[Status]]:
+        """How many tasks of each shard have which status."""
+        return [Counter(task.status for task in self.tasks[i::shards]) for i in range(shards)]
 
 
 def progress_of_spec(spec: Spec, path: Path) -> StudyProgress:

@@ -110,8 +110,6 @@ class StudyFile:
     @cached_property
     def stored(self) -> list[frozenset[str]]:
         """What [output] stored of each task."""
-        if layout.STORED.name not in (self._packed or self._file):  # blank in a record
-            return [frozenset()] * len(self.task_ids)
         return [frozenset(text.split()) for text in self.values(layout.STORED)]
 
     @cached_property

@@ -12,7 +12,6 @@ from gfmd_cli.files.locks import Waits
 from gfmd_cli.grid import plans
 from gfmd_cli.grid.ranks import Ranks, is_root, on_root, shared_errors
 from gfmd_cli.physics.file_surface import forget_files
-from gfmd_cli.physics.indenters import forget_peaks
 from gfmd_cli.spec.models import Spec
 from gfmd_cli.status import Status
 from gfmd_cli.study.context import Progress, Report, SolveContext, WorkerOptions
@@ -32,7 +31,7 @@ from gfmd_cli.units import count
 
 @dataclass(frozen=True)
 class RunOptions:
-    """How the tasks of a spec are run. Raises InputError for a value out of range."""
+    """How the tasks of a spec are run. Raises InputError where that cannot be done."""
 
     shard: tuple[int, int] = (0, 1)
     """(i, n) takes the tasks with index i modulo n."""
@@ -52,12 +51,10 @@ class RunOptions:
     """Whether a second SIGINT ends the process at once; otherwise it raises KeyboardInterrupt."""
 
     def __post_init__(self) -> None:
-        for name in ("checkpoint_every", "max_seconds"):
-            seconds = getattr(self, name)
-            if seconds is not None and not seconds >= 0:
-                raise InputError(f"{name}: must be 0 or a positive number, got {seconds:g}")
         if self.jobs is not None and self.jobs < 1:
             raise InputError(f"--jobs {self.jobs}: at least 1 worker process is needed")
+        if self.overwrite and self.shard[1] != 1:
+            raise InputError("--overwrite: not with --shard; each shard would start a new study")
 
     def shard_of(self, tasks: list[Task]) -> list[Task]:
         """The tasks of the shard."""
@@ -87,13 +84,14 @@ def run_study(
     ranks = options.ranks
     forget_files()
     forget_scenes()
+    forget_spectra()
     stop = Event()
     waits = Waits(stop if ranks is None else None)  # ranks stop together
     study = Study(path, waits)
     tasks = plan(spec)
     if ranks is not None and (names := spec.output.on_request()):
         raise InputError(f"output.{names[0]}: takes whole grids; run it without mpiexec")
-    moved = on_root(ranks, lambda: _move_aside(study, options)) if options.overwrite else []
+    moved = on_root(ranks, study.move_aside) if options.overwrite else []
     outcomes = on_root(ranks, study.outcomes)
     shard = options.shard_of(tasks)
     pending = without_result(shard, outcomes)
@@ -120,9 +118,8 @@ def run_study(
         damaged = on_root(ranks, lambda: work.enter_context(study.work(tasks)))
         work.callback(plans.plan_with, None)
         unusable = plans.plan_with(study.parts, estimated=options.reproducible, waits=waits)
-        forget_peaks()
-        forget_spectra()
-        context.warn(*moved, *damaged, *filter(None, [unusable, _changing_unit(pending)]))
+        context.warn(*(f"{study.path}: the old one is kept as {new}" for new in moved))
+        context.warn(*damaged, *filter(None, [unusable, _changing_unit(pending)]))
         try:
             solved = _solve_all(pending, study.parts, jobs, context)
         finally:
@@ -173,13 +170,6 @@ def _noting_failures(report: Report, tasks: list[Task], parts: Path) -> Report:
             note_failure(parts, tasks[progress.task].id, progress.message)
 
     return watch
-
-
-def _move_aside(study: Study, options: RunOptions) -> list[str]:
-    """Rename a study that is to be solved anew; say where it is. Raises InputError."""
-    if options.shard[1] != 1:
-        raise InputError("--overwrite: not with --shard; each shard would start a new study")
-    return [f"{study.path}: the old one is kept as {path}" for path in study.move_aside()]
 
 
 def _check_ended(solved: Counter[Status], pending: int, stop: Event, again: str) -> None:

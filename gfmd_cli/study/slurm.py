@@ -122,7 +122,7 @@ def batch(
         shards = int(SHARDS.findall(text)[0])
     else:
         check_shards(shards, len(tasks))
-        own = resources(tasks, shards, int(named_options.get("cpus-per-task", 1)), limit)
+        own = requirements(tasks, shards, int(named_options.get("cpus-per-task", 1)), limit)
         named = [f"--{name}={value}" for name, value in own.items() if name not in named_options]
         text, options = script(progress.study, words, shards, [*named, *options]), []
     members = {task % shards for task in progress.missing} if missing else range(shards)
@@ -170,7 +170,7 @@ def _stored(path: Path, words: list[str]) -> str:
     return text
 
 
-def resources(tasks: list[Task], shards: int, cpus: int, limit: float | None) -> dict[str, str]:
+def requirements(tasks: list[Task], shards: int, cpus: int, limit: float | None) -> dict[str, str]:
     """What one shard needs, as options of sbatch by name.
 
     The memory is that of the largest task times the number of tasks that run at the same time. The

@@ -212,7 +212,7 @@ def _check(spec: models.Spec) -> None:
     for at in combinations:
         chosen = _chosen(spec, at)
         elastomer, dimension = chosen["elastomer"], chosen["surface"].dimension
-        boundary = chosen["grid"].boundary or "periodic"
+        boundary = chosen["grid"].boundary
         if chosen["grid"].points == "auto" and spec.accuracy is not None:
             _check_max_points(spec.accuracy.max_points, chosen["surface"])
         chosen["solver"].check_boundary(boundary)

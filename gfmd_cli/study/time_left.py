@@ -79,8 +79,10 @@ class RemainingTime:
     def update(self, progress: Progress) -> None:
         """Update the estimate by one progress event of a task."""
         index, now = progress.task, self.now()
+        if progress.event in ("start", "end") and index in self.waiting:
+            self.waiting.remove(index)
+            self.waiting_seconds[self.tasks[index].elastomer] -= self.tasks[index].seconds
         if progress.event == "start":
-            self._stop_waiting(index)
             self.running[index] = _Running(now)
         elif progress.event == "step" and index in self.running:
             state = self.running[index]
@@ -89,19 +91,11 @@ class RemainingTime:
                 state.size, state.grid_started, state.first = progress.size, now, progress.residual
             state.last, state.step = progress.residual, progress.step
         elif progress.event == "end":
-            self._stop_waiting(index)
             state = self.running.pop(index, _Running(now))
             if progress.status is not None and progress.status.is_solved:
                 for elastomer in (self.tasks[index].elastomer, None):
                     self.measured[elastomer] += now - state.started
                     self.forecast[elastomer] += self.tasks[index].seconds
-
-    def _stop_waiting(self, index: int) -> None:
-        """Remove a task from the waiting ones."""
-        if index in self.waiting:
-            self.waiting.remove(index)
-            task = self.tasks[index]
-            self.waiting_seconds[task.elastomer] -= task.seconds
 
     def left(self) -> float:
         """Seconds until all tasks have ended."""

@@ -100,22 +100,21 @@ class _Writer(NamedTuple):
             create_dataset(group, column.name, _array(column.kind, values))
 
     def columns(self, file: Any, values: Mapping[Column, list[Any]], task: Any) -> None:
-        """The columns: a dataset each, or one for all of a kind that are not blank."""
+        """The columns: a dataset each, or one for all of a kind; no parameters that no task has."""
+        columns = {
+            column: of_column
+            for column, of_column in values.items()
+            if column not in layout.PARAMETER_COLUMNS or not all(map(column.is_blank, of_column))
+        }
         if self.labelled:
-            for column, of_column in values.items():
-                is_optional = column in layout.PARAMETER_COLUMNS
-                if not (is_optional and all(map(column.is_blank, of_column))):
-                    write_column(file, column, of_column, [task])
+            for column, of_column in columns.items():
+                write_column(file, column, of_column, [task])
             return
         for kind in KINDS:
-            columns = {
-                column: of_column
-                for column, of_column in values.items()
-                if column.kind is kind and not all(map(column.is_blank, of_column))
-            }
+            of_kind = [column for column in columns if column.kind is kind]
             group = file.create_group(f"{PACKED}/{kind.__name__}")
-            create_dataset(group, "names", _array(str, [column.name for column in columns]))
-            create_dataset(group, "values", _array(kind, list(columns.values())))
+            create_dataset(group, "names", _array(str, [column.name for column in of_kind]))
+            create_dataset(group, "values", _array(kind, [columns[column] for column in of_kind]))
 
     def histogram(
         self, file: Any, histogram: layout.HistogramColumn, task: Any, rows: list[Mapping[str, Any]]
