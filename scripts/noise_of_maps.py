@@ -1,12 +1,15 @@
 """Noise in measured maps: its effect on a contact, and which maps the program warns of.
 
-    python scripts/noise_of_maps.py [contacts | sound | noisy]
+    python scripts/noise_of_maps.py [contacts | filters | sound | noisy]
 
-"contacts": errors of contacts on the half-space, as `rounded_heights.py`. "sound": random and
-structured surfaces without noise. "noisy": random surfaces with noise. The tables of docs/scans.md.
+"contacts": errors of contacts on the half-space, as `rounded_heights.py`. "filters": contact areas
+of noisy maps with the S-filter that the warning names. "sound": random and structured surfaces
+without noise. "noisy": random surfaces with noise. The tables of docs/scans.md.
 """
 
 import argparse
+import re
+import warnings
 from collections.abc import Iterator
 from functools import partial
 from itertools import product
@@ -15,9 +18,11 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 from rounded_heights import POINTS_PER_WAVE, results
-from scipy.ndimage import gaussian_filter, gaussian_filter1d, grey_dilation, uniform_filter
+from scipy.ndimage import gaussian_filter1d, grey_dilation, uniform_filter
 
+from gfmd_cli.api import Result, solve
 from gfmd_cli.grid.arrays import Field
+from gfmd_cli.maps.gaussian_filter import gaussian_filter
 from gfmd_cli.physics.elastomers import HalfSpace
 from gfmd_cli.physics.file_surface import FileSurface
 from gfmd_cli.physics.scenes import build_scene
@@ -29,8 +34,9 @@ HURST = (0.1, 0.3, 0.5, 0.8, 1.0)
 NOISE = ("white noise of", "random offsets of")
 ALL = (*NOISE, "as much as distant ones", "lines along x are shifted")
 """Words of the warnings about noise; the last two are those of noise that is stronger still."""
-NESTING = 5  # points: nesting index of the filter
-ALPHA = np.sqrt(np.log(2) / np.pi)  # of ISO 16610-61
+CUTOFF = 5  # points: cut-off wavelength of the S-filter
+FACTORS = (1.0, 1.5)  # of the cut-off wavelength that the warning names
+P_STAR = 0.03  # of the map without noise
 CORRELATED = 20  # points along a line: noise of low frequency
 
 
@@ -67,18 +73,20 @@ def noise_like(heights: Field, level: float) -> float:
 NOISES = {"white": white, "offsets of lines": of_lines, f"over {CORRELATED} points": slow}
 
 
-def warned(heights: Field, folder: Path, words: tuple[str, ...]) -> bool:
-    """Whether a warning about a map has one of these words."""
+def warning_about(heights: Field, folder: Path) -> str:
+    """The warnings about a map with a spacing of 1 m."""
     path = folder / f"{abs(hash(heights.tobytes()))}.npy"
     np.save(path, heights)
-    found = " ".join(FileSurface(path=path, length=1.0, periodic=False).warnings())
+    surface = FileSurface(path=path, length=float(heights.shape[-1]), periodic=False)
+    found = " ".join(surface.warnings())
     path.unlink()
+    return found
+
+
+def warned(heights: Field, folder: Path, words: tuple[str, ...]) -> bool:
+    """Whether a warning about a map has one of these words."""
+    found = warning_about(heights, folder)
     return any(each in found for each in words)
-
-
-def filtered(heights: Field) -> Field:
-    """Periodic heights without the shortest waves, by the Gaussian filter of ISO 16610-61."""
-    return np.array(gaussian_filter(heights, ALPHA / np.sqrt(2 * np.pi) * NESTING, mode="wrap"))
 
 
 def contacts(seeds: int, sizes: list[int]) -> None:
@@ -92,10 +100,55 @@ def contacts(seeds: int, sizes: list[int]) -> None:
             exact, random = results(scene, scene.height), np.random.default_rng(seed)
             for level in (0.0, *LEVELS):
                 noisy = white(scene.height, level, random)
-                rows.append([results(scene, each) / exact for each in (noisy, filtered(noisy))])
+                filtered = gaussian_filter(noisy, (1.0, 1.0), CUTOFF, periodic=True)
+                rows.append([results(scene, each) / exact for each in (noisy, filtered)])
         means = np.mean(np.reshape(rows, (seeds, 1 + len(LEVELS), 8)), axis=0) - 1
         for level, mean in zip((0.0, *LEVELS), means, strict=True):
             print(f"{level:5.1f}" + "".join(f"{value:8.1%}" for value in mean))
+
+
+def pressed(heights: Field, load: dict[str, float], s_filter: float | None = None) -> Result:
+    """The contact of a scan with a spacing of 1 m."""
+    tables = {
+        "surface": {"length": float(heights.shape[-1]), "periodic": False, "s_filter": s_filter},
+        "elastomer": {"kind": "half-space"},
+        "solver": {"kind": "dual", "tolerance": 1e-4},
+        "load": load,
+    }
+    with warnings.catch_warnings(action="ignore"):
+        return solve(tables, heights=heights)
+
+
+def filters(seeds: int, sizes: list[int], folder: Path) -> None:
+    """Errors of the contact area with and without the filter that the warning names."""
+    for points in sizes:
+        print(
+            f"{points}^2: H, lambda_s in points, level, noticed, cut-off in points; errors of a_r"
+        )
+        print(f"without a filter, and with {FACTORS} of the cut-off: mean, and largest; between")
+        for hurst, cutoff, level in product((0.3, 0.5, 0.8), (2, 4, 8), (1.0, 2.0, 3.0)):
+            rows = []
+            for seed in range(seeds):
+                sound = 1e-3 * scan(points, hurst, 0.5, cutoff, seed)
+                noisy = white(sound, level, np.random.default_rng(seed))
+                stated = re.search(r"s_filter = (\S+) or more", warning_about(noisy, folder))
+                if not stated:
+                    continue
+                s_filter = float(stated[1])
+                exact = pressed(sound, {"p_star": P_STAR})
+                load = {"pressure": exact.nominal_pressure}
+                used = (None, *(factor * s_filter for factor in FACTORS))
+                areas = [pressed(noisy, load, each).a_r for each in used]
+                rows.append([s_filter, *(np.array(areas) / exact.a_r - 1)])
+            text = f"{hurst:5}{cutoff:4}{level:5}{len(rows):4}"
+            if rows:
+                stated, *errors = np.array(rows).T
+                between = np.mean((errors[1] < 0) & (errors[2] > 0))
+                text += f"{stated.mean():6.1f}" + "".join(
+                    f"{each.mean():8.0%}{each[np.abs(each).argmax()]:6.0%}" for each in errors
+                )
+                text += f"{between:7.0%}"
+            print(text, flush=True)
 
 
 def surfaces(points: int, seed: int) -> Iterator[tuple[str, Field]]:
@@ -155,7 +208,7 @@ def with_noise(seeds: int, sizes: list[int], folder: Path) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("tables", nargs="*", default=["contacts", "sound", "noisy"])
+    parser.add_argument("tables", nargs="*", default=["contacts", "filters", "sound", "noisy"])
     parser.add_argument("--points", type=int, nargs="+", default=[128, 256])
     parser.add_argument("--seeds", type=int, default=8)
     arguments = parser.parse_args()
@@ -164,7 +217,7 @@ def main() -> None:
             if table == "contacts":
                 contacts(arguments.seeds, arguments.points)
             else:
-                {"sound": sound, "noisy": with_noise}[table](
+                {"filters": filters, "sound": sound, "noisy": with_noise}[table](
                     arguments.seeds, arguments.points, Path(folder)
                 )
 

@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gfmd_cli.grid.arrays import Field
+from gfmd_cli.maps.gaussian_filter import MIN_SPACINGS, transmission
 from gfmd_cli.maps.topography import Topography
 
 RATIOS = (2, 3)  # of distances; a choice: gratings resemble noise at one of them only
@@ -16,6 +17,9 @@ MIN_COMMON = 0.5  # variance of the noise along one axis over that along the oth
 MIN_POINTS = 128  # per side: fewer, and profiles, have such differences by chance
 MIN_PAIRS = 100  # of known differences, likewise
 SAMPLED_LINES = 128  # of each axis, at least; all of smaller maps
+FILTERED_POINTS = 512  # per side, of the part that shows what a filter does; all of smaller maps
+HALVINGS = 12  # of the interval of cut-offs; a choice: two digits of them are stated
+ROUNDED_UP = 1.05  # two digits of this multiple are no less than the number
 MAX_EXCESS = 10  # larger ratios are not stated: the gradient without noise is uncertain; a choice
 MIN_EXCESS = 1.1  # rms gradient over that without noise; sound maps have up to 1.06
 
@@ -29,12 +33,14 @@ class _Differences(NamedTuple):
     """White noise of the heights; 0 if there is no sign of it."""
 
 
-def noisy(topography: Topography, spacing: tuple[float, ...], scale: float) -> str:
+def noisy(
+    topography: Topography, spacing: tuple[float, ...], scale: float, cutoff: float = 0.0
+) -> str:
     """A warning of white noise that is a large part of the gradient, "" without it.
 
-    `spacing` is that of the map [m], `scale` the factor to metres. Roughness that is as short as
-    the distance of the points, beside longer waves, looks the same. The limits are calibrated in
-    docs/scans.md.
+    `spacing` is that of the map [m], `scale` the factor to metres, `cutoff` that of the S-filter
+    [m]. Roughness that is as short as the distance of the points, beside longer waves, looks the
+    same. The limits are calibrated in docs/scans.md.
     """
     heights = topography.with_gaps()
     if heights.ndim == 1 or min(heights.shape) < MIN_POINTS:
@@ -49,20 +55,62 @@ def noisy(topography: Topography, spacing: tuple[float, ...], scale: float) -> s
     )
     if not whole > MIN_EXCESS**2 * left:
         return ""
+    gradient = _Gradient(heights, spacing)
+    kept = gradient.kept(cutoff) if cutoff else 1.0
+    if not whole * kept > MIN_EXCESS**2 * left:
+        return ""
     lines, across = sorted(along, key=lambda axis: along[axis].noise)
     noise = along[across].noise
     rms = f"{scale * np.sqrt(noise):.2g} m (rms)"
+    excess = np.sqrt(whole * kept / left) if left > 0 else np.inf
     what, remedy = f"white noise of {rms} in the heights", "average several scans"
     if along[lines].noise < MIN_COMMON * noise:
         what, remedy = f"random offsets of {rms} of the lines along {lines}", "align the lines"
-    excess = np.sqrt(whole / left) if left > 0 else np.inf
+    elif excess < MAX_EXCESS:
+        shortest = ROUNDED_UP * gradient.cutoff(left / whole)
+        remedy += f", or filter the map: surface.s_filter = {shortest:.2g} or more"
     many = f"{excess:.2g}" if excess < MAX_EXCESS else f"more than {MAX_EXCESS}"
+    filtered = "after the S-filter " if cutoff else ""
     return (
-        f"{what}, or roughness that the map does not resolve: the rms gradient is {many} times "
-        "that of the longer waves; if this is noise, the contact area at light load is too small "
-        f"by up to this factor: {remedy}, or remove the shortest waves with a Gaussian filter (ISO "
-        "16610-61), in another program"
+        f"{what}, or roughness that the map does not resolve: the rms gradient {filtered}is {many} "
+        "times that of the longer waves; if this is noise, the contact area at light load is too "
+        f"small by up to this factor: {remedy}"
     )
+
+
+class _Gradient:
+    """Power spectrum of the differences of neighbours in the middle of a map, less that of a tilt.
+
+    Zero where heights are missing.
+    """
+
+    def __init__(self, heights: Field, spacing: tuple[float, ...]) -> None:
+        first = [max(0, points - FILTERED_POINTS) // 2 for points in heights.shape]
+        part = heights[tuple(slice(each, each + FILTERED_POINTS) for each in first)]
+        self.spacing, self.shape = spacing, tuple(points - 1 for points in part.shape)
+        steps = np.diff(part, axis=0)[:, 1:] / spacing[0], np.diff(part, axis=1)[1:] / spacing[1]
+        self.power = (np.abs(np.fft.fft2(np.nan_to_num(np.stack(steps)))) ** 2).sum(axis=0)
+        self.power[0, 0] = 0.0
+
+    def kept(self, cutoff: float) -> float:
+        """Fraction of the mean square that the S-filter of this cut-off wavelength leaves."""
+        along_y, along_x = (
+            transmission(np.fft.fftfreq(points, step), cutoff) ** 2
+            for points, step in zip(self.shape, self.spacing, strict=True)
+        )
+        return float(along_y @ self.power @ along_x / (self.power.sum() or 1.0))
+
+    def cutoff(self, share: float) -> float:
+        """The shortest cut-off wavelength that leaves this share of the mean square, or less."""
+        shortest = MIN_SPACINGS * min(self.spacing)
+        longest = min(n * step for n, step in zip(self.shape, self.spacing, strict=True))
+        for _ in range(HALVINGS):
+            middle = np.sqrt(shortest * longest)
+            if self.kept(middle) > share:
+                shortest = middle
+            else:
+                longest = middle
+        return float(longest)
 
 
 def _differences(lines: Field) -> _Differences:

@@ -10,6 +10,7 @@ from gfmd_cli.errors import InputError
 from gfmd_cli.grid.arrays import Field, Mask, MaskedField
 from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.maps import map_warnings, misread
+from gfmd_cli.maps.gaussian_filter import MIN_SPACINGS, gaussian_filter
 from gfmd_cli.maps.height_map import extent
 from gfmd_cli.maps.interpolation import (
     Interpolation,
@@ -31,9 +32,14 @@ from gfmd_cli.maps.map_preparation import (
 from gfmd_cli.maps.noise import noisy
 from gfmd_cli.maps.pictures import Picture, picture
 from gfmd_cli.maps.topography import Region, Topography, read_topography
-from gfmd_cli.physics.indenters import SMALLEST_GRID, RigidSurface, forget_peaks
+from gfmd_cli.physics.indenters import (
+    POINTS_ROUNDING,
+    SMALLEST_GRID,
+    RigidSurface,
+    forget_peaks,
+)
 from gfmd_cli.spec_table import FilePath, Positive
-from gfmd_cli.units import count
+from gfmd_cli.units import count, labelled
 
 
 class FileSurface(RigidSurface):
@@ -73,6 +79,9 @@ class FileSurface(RigidSurface):
     level: Levelling | None = None
     """Trend that is subtracted first: "none", "mean", "plane" or "curvature"; by default "plane"
     for scans and with surface.periodic = false, otherwise "none"."""
+    s_filter: Positive | None = None
+    """Cut-off wavelength of the S-filter [m], a Gaussian low-pass filter (ISO 16610-61) against
+    noise: it halves waves of this length and removes shorter ones. By default no filter."""
     edges: Edges | None = None
     """How the map is made periodic: "window" tapers the heights near the border to their mean,
     "mirror" reflects the map to twice its sides, "none" changes nothing. By default "none" for a
@@ -213,14 +222,18 @@ class FileSurface(RigidSurface):
     def _is_periodic(self) -> bool:
         return self._stated_periodic() is not False
 
+    def _is_repeated(self) -> bool:
+        """Whether the map itself is repeated, so that opposite borders are neighbours."""
+        return self._is_periodic() and self.edges in (None, "none")
+
     def measured_map(self) -> tuple[MaskedField, tuple[float, ...]]:
-        """Levelled heights [m] as measured, masked where missing, and their spacing [m].
+        """Levelled and filtered heights [m], masked where missing, and their spacing [m].
 
         Nothing is subtracted from a map that is taken as periodic, unless `level` says so.
         """
         missing = self._topography().missing
         mask = np.ma.nomask if missing is None else missing
-        return np.ma.masked_array(self._levelled(), mask), self._map_spacing()
+        return np.ma.masked_array(_filtered(self), mask), self._map_spacing()
 
     def _levelled(self) -> Field:
         """The heights [m] less the trend of the known ones, any value where missing."""
@@ -352,6 +365,7 @@ class FileSurface(RigidSurface):
             "turned upside down": self.flip,
             f"{holes} {'never touch' if self.missing == 'void' else 'filled in'}": bool(holes),
             f"{levelling} subtracted": levelling != "none",
+            f"S-filter {labelled(self.s_filter or 0, 'm')}": self.s_filter is not None,
             "free boundary": is_free,
             "not periodic (free boundary or mirrored)": self.has_borders and not boundary,
             f"edges tapered to the mean height over {self.taper:g} of the side": (
@@ -394,20 +408,44 @@ _read = lru_cache(maxsize=4)(read_topography)
 
 @lru_cache(maxsize=4)
 def _prepared(surface: FileSurface) -> Field:
-    """The periodic heights [m], levelled and filled in; cached like the file."""
+    """The periodic heights [m], levelled, filled in and filtered; cached like the file."""
+    return make_periodic(_filtered(surface), surface.edges or "none", surface.taper)
+
+
+def _filtered(surface: FileSurface) -> Field:
+    """The heights [m], levelled, filled in and filtered, before their edges are changed.
+
+    Raises InputError for a cut-off wavelength that the map does not resolve or contain.
+    """
+    heights, cutoff, spacing = _filled(surface), surface.s_filter, surface._map_spacing()
+    if cutoff is None:
+        return heights
+    shortest = MIN_SPACINGS * min(spacing)
+    longest = min(n * step for n, step in zip(heights.shape, spacing, strict=True))
+    if not (1 - POINTS_ROUNDING) * shortest <= cutoff <= longest:
+        raise InputError(
+            f"{surface.path}: surface.s_filter = {cutoff:g} m: the cut-off wavelength must lie "
+            f"between {MIN_SPACINGS} spacings of the map, {shortest:.3g} m, and its side, "
+            f"{longest:.3g} m"
+        )
+    return gaussian_filter(heights, spacing, cutoff, periodic=surface._is_repeated())
+
+
+@lru_cache(maxsize=4)
+def _filled(surface: FileSurface) -> Field:
+    """The levelled heights [m], with the missing ones filled in; cached like the file."""
     missing, heights = surface._topography().missing, surface._levelled()
-    if missing is not None:
-        if surface.missing == "refuse":
-            first = zip(("x", "y"), np.argwhere(missing)[0][::-1], strict=False)
-            raise InputError(
-                f"{surface.path}: {np.count_nonzero(missing)} of {missing.size} heights are NaN, "
-                "infinite or marked as missing, the first at "
-                f"{', '.join(f'{axis} = {index}' for axis, index in first)}; "
-                'surface.missing = "fill" fills them in, "void" keeps them out of contact'
-            )
-        is_repeated = surface._is_periodic() and surface.edges in (None, "none")
-        heights = fill_missing(heights, missing, periodic=is_repeated)
-    return make_periodic(heights, surface.edges or "none", surface.taper)
+    if missing is None:
+        return heights
+    if surface.missing == "refuse":
+        first = zip(("x", "y"), np.argwhere(missing)[0][::-1], strict=False)
+        raise InputError(
+            f"{surface.path}: {np.count_nonzero(missing)} of {missing.size} heights are NaN, "
+            "infinite or marked as missing, the first at "
+            f"{', '.join(f'{axis} = {index}' for axis, index in first)}; "
+            'surface.missing = "fill" fills them in, "void" keeps them out of contact'
+        )
+    return fill_missing(heights, missing, periodic=surface._is_repeated())
 
 
 @lru_cache(maxsize=16)
@@ -433,12 +471,10 @@ def _warnings_on_heights(surface: FileSurface) -> tuple[str, ...]:
     """Warnings about artefacts of a scan. Cached: every contact of a study has the same."""
     topography, scale = surface._topography(), surface.scale
     shape, spacing = topography.heights.shape, surface._map_spacing()
-    levelled = _prepared(surface)[tuple(map(slice, shape))]  # without copies
-    has_missing = topography.missing is not None
-    is_changed = has_missing or surface.edges == "window"  # filled in, or tapered
-    untapered = surface._levelled() if is_changed else levelled
+    levelled = _filled(surface)
     corners = tuple(slice(None, None, n - 1) for n in shape)
-    subtracted = scale * topography.heights[corners] - untapered[corners]
+    unfilled = levelled if topography.missing is None else surface._levelled()
+    subtracted = scale * topography.heights[corners] - unfilled[corners]
     sides = tuple(step * (n - 1) for step, n in zip(spacing, shape, strict=True))
     filled_lines, known = misread.filled_lines(topography)
     outliers, misread_map = map_warnings.outliers(known), misread.misread(known)
@@ -453,8 +489,8 @@ def _warnings_on_heights(surface: FileSurface) -> tuple[str, ...]:
         misread_map,
         points,
         lines,
-        "" if is_explained else noisy(known, spacing, scale),
-        map_warnings.curved(levelled if has_missing else untapered),
+        "" if is_explained else noisy(known, spacing, scale, surface.s_filter or 0.0),
+        map_warnings.curved(levelled),
         map_warnings.steep(surface.levelling(), subtracted, sides),
         map_warnings.repeated_lines(topography.heights),
         rounded,
@@ -465,5 +501,12 @@ def _warnings_on_heights(surface: FileSurface) -> tuple[str, ...]:
 def forget_files() -> None:
     """Drop the maps that were read, so that a file that has changed is read again."""
     forget_peaks()
-    for cached in (_read, _prepared, _smallest_grid, _suited_interpolation, _warnings_on_heights):
+    for cached in (
+        _read,
+        _filled,
+        _prepared,
+        _smallest_grid,
+        _suited_interpolation,
+        _warnings_on_heights,
+    ):
         cached.cache_clear()
