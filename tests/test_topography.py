@@ -596,6 +596,21 @@ def test_a_compressed_file_is_refused_as_such(tmp_path, heights, name, content, 
         read_topography(tmp_path / name)
 
 
+@pytest.mark.parametrize("mark", [-3.4028235e38, 3.4028235e38, np.nan])
+def test_marks_of_missing_heights_in_an_sdf_file_in_nanometres_are_found(tmp_path, heights, mark):
+    """In metres the mark is 3.4e29, less than a mark in the unit of a file."""
+    pytest.importorskip("SurfaceTopography")
+    in_nm = heights[:12].astype("<f4")
+    in_nm[3, 4] = mark
+    header = b"bISO-1.0" + b"instrument" + 2 * b"010120261200"
+    header += struct.pack("<HHddddBBB", 16, 12, 1e-6, 2e-6, 1e-9, -1.0, 0, 3, 0)
+    (tmp_path / "h.sdf").write_bytes(header + in_nm.tobytes())
+    read = read_topography(tmp_path / "h.sdf")
+    assert np.argwhere(read.missing).tolist() == [[3, 4]]
+    assert read.spacing == pytest.approx((2e-6, 1e-6))
+    assert read.heights[~read.missing] == pytest.approx(1e-9 * np.delete(in_nm, 3 * 16 + 4))
+
+
 def test_the_distances_of_a_nanofocus_file_are_nanometres(tmp_path):
     pytest.importorskip("SurfaceTopography")
     levels = np.arange(16 * 12, dtype="<u2").reshape(12, 16) ** 2

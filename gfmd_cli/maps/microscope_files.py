@@ -173,7 +173,7 @@ def _read_channel(path: Path, file: BinaryIO, reader: Any, dataset: str | None) 
     if kind == "nms":
         sides = _nanofocus_sides(file, shape)
     has_unit = scan.unit is not None
-    if has_unit and kind in TABLE_FORMATS:
+    if has_unit:  # a mark can be a height in metres, -3.4e38 in nm
         in_unit_of_file, _ = heights_and_sides(stored, rows_along_y)
         heights = np.ma.masked_where(np.abs(in_unit_of_file) >= MAX_HEIGHT, heights)
     metric_sides = None if has_unit or unsized else _sides_with_unit(channel, sides)
