@@ -311,10 +311,19 @@ def test_a_wrong_header_of_an_esri_grid_is_refused(saved, old, new, reason):
         read_topography(saved(GRID.replace(old, new) + matrix(" ")))
 
 
-@pytest.mark.parametrize("first", ["aBCR-1.0", "aISO-1.0", "DSAA"])
+@pytest.mark.parametrize(
+    "first", ["aBCR-1.0", "aISO-1.0", "aNIST-1.0", "DSAA", "Zygo XYZ Data File - Format 1"]
+)
 def test_text_formats_with_scales_that_are_not_read_are_refused(saved, first):
     with pytest.raises(InputError, match="in text, whose header is not read; save it in binary"):
         read_topography(saved(f"{first}\nZscale = 1e-9\n*\n" + matrix(" ")))
+
+
+def test_points_of_zygo_with_pixels_and_micrometres_are_refused_as_such(saved):
+    """Positions are numbers of pixels, heights are in um, and the header has the distance in m."""
+    header = "Zygo XYZ Data File - Format 1\n0 0 0 0\n0 0.5 6.328e-07 0 1 0 5.067e-05 0\n#\n"
+    with pytest.raises(InputError, match="a file of Zygo in text, whose header is not read"):
+        read_topography(saved(header + points(np.arange(300), np.arange(12), 0) + "#\n"))
 
 
 SIZED = "# Width: 20 um\n# Height: 12 um\n# Value units: nm\n"

@@ -1,9 +1,11 @@
 """Height maps read from files, and what is refused before it is read."""
 
 import re
+import struct
 import subprocess
 import sys
 from pathlib import Path
+from zipfile import ZipFile
 
 import h5py
 import numpy as np
@@ -463,6 +465,19 @@ def test_heights_kept_in_other_files_are_refused(hdf5, tmp_path):
             read_topography(hdf5(fill))
 
 
+@pytest.mark.parametrize("values", [1, 4])
+def test_points_in_the_order_of_their_measurement_are_no_map(hdf5, values):
+    """Files of JPK and pycroscopy have one row of values for each point of a scan."""
+
+    def fill(file):
+        file["Position_Indices"] = np.indices((16, 16)).reshape(2, -1).T
+        file["Height"] = np.zeros((256, values))
+        file["Height"].attrs["Position_Indices"] = file["Position_Indices"].ref
+
+    with pytest.raises(InputError, match="'Height' has points in the order of their measurement"):
+        read_topography(hdf5(fill), dataset="Height")
+
+
 def test_a_dataset_that_claims_more_than_is_stored_is_refused(hdf5):
     def claim(file):
         file.create_dataset("h", (4096, 4096), "f8", chunks=(64, 64))
@@ -561,6 +576,52 @@ def test_an_array_is_known_by_its_content(npy, heights):
     path = npy()
     read = read_topography(path.rename(path.with_suffix(".dat")))
     np.testing.assert_array_equal(read.heights, heights)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "message"),
+    [
+        ("h.sur", b"DSCOMPRESSED" + bytes(500), "compressed file of MountainsMap; save it without"),
+        ("h.zip", None, "a compressed file: unpack it"),
+    ],
+)
+def test_a_compressed_file_is_refused_as_such(tmp_path, heights, name, content, message):
+    pytest.importorskip("SurfaceTopography")
+    if content is None:
+        with ZipFile(tmp_path / name, "w") as archive:
+            archive.writestr("scan.txt", str(heights.tolist()))
+    else:
+        (tmp_path / name).write_bytes(content)
+    with pytest.raises(InputError, match=message):
+        read_topography(tmp_path / name)
+
+
+@pytest.mark.parametrize("mark", [-3.4028235e38, 3.4028235e38, np.nan])
+def test_marks_of_missing_heights_in_an_sdf_file_in_nanometres_are_found(tmp_path, heights, mark):
+    """In metres the mark is 3.4e29, less than a mark in the unit of a file."""
+    pytest.importorskip("SurfaceTopography")
+    in_nm = heights[:12].astype("<f4")
+    in_nm[3, 4] = mark
+    header = b"bISO-1.0" + b"instrument" + 2 * b"010120261200"
+    header += struct.pack("<HHddddBBB", 16, 12, 1e-6, 2e-6, 1e-9, -1.0, 0, 3, 0)
+    (tmp_path / "h.sdf").write_bytes(header + in_nm.tobytes())
+    read = read_topography(tmp_path / "h.sdf")
+    assert np.argwhere(read.missing).tolist() == [[3, 4]]
+    assert read.spacing == pytest.approx((2e-6, 1e-6))
+    assert read.heights[~read.missing] == pytest.approx(1e-9 * np.delete(in_nm, 3 * 16 + 4))
+
+
+def test_the_distances_of_a_nanofocus_file_are_nanometres(tmp_path):
+    pytest.importorskip("SurfaceTopography")
+    levels = np.arange(16 * 12, dtype="<u2").reshape(12, 16) ** 2
+    header = bytearray(3468)
+    struct.pack_into("<2d", header, 16, 2.0, 3.0)  # of the heights, in um
+    struct.pack_into("<2I2d", header, 1368, 16, 12, 312.5, 250.0)
+    (tmp_path / "h.nms").write_bytes(bytes(header) + levels.tobytes())
+    read = read_topography(tmp_path / "h.nms")
+    assert read.spacing == pytest.approx((250e-9, 312.5e-9))
+    assert (read.metres, read.periodic) == (True, False)
+    assert read.heights == pytest.approx(1e-6 * (2 + levels / 65535), abs=1e-10)
 
 
 def test_an_archive_of_arrays_is_refused(tmp_path, heights):

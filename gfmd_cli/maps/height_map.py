@@ -23,6 +23,8 @@ MAX_HEIGHT = 1e30  # in any unit; the usual values for no data are 9.97e36 (netC
 HEIGHT_NAMES = "h", "height", "heights", "height_map", "z", "topography", "topo", "elevation"
 MARKS = "_FillValue", "missing_value"
 """Attributes of netCDF whose values are missing heights."""
+POINT_LIST = "Position_Indices"
+"""Attribute of a dataset of USID, the format of pycroscopy, whose rows belong to single points."""
 CODING = {"scale_factor": 1, "add_offset": 0}
 """Attributes of packed numbers, with the values that change nothing."""
 LIMITS: dict[str, list[np.ufunc]] = {
@@ -107,6 +109,12 @@ def read_hdf5(path: Path, dataset: str | None) -> HeightMap:
 
     with open_hdf5(path) as file:
         name = _dataset_name(file, dataset)
+        if POINT_LIST in file[name].attrs:
+            raise InputError(
+                f"dataset {name!r} has points in the order of their measurement, each with a row "
+                f"of values (attribute {POINT_LIST}), as files of JPK and pycroscopy have; save "
+                "the map as an array [y, x]"
+            )
         shape = _map_shape(file[name].shape or ())
         check_layout(shape, file[name].dtype)
         data = take(file, name, MAX_COMPRESSION)

@@ -1,6 +1,7 @@
 """Files of microscopes and tables of numbers, by the readers of SurfaceTopography."""
 
 import re
+import struct
 import warnings
 from dataclasses import replace
 from pathlib import Path
@@ -26,10 +27,22 @@ from gfmd_cli.maps.height_map import (
 from gfmd_cli.maps.point_tables import NO_GRID, read_points
 from gfmd_cli.maps.text_tables import MATRIX_COLUMNS, OF_SIDES, is_height, is_number
 
-COMPRESSED = {".gz", ".bz2", ".xz", ".zst", ".7z"}
+COMPRESSED = {".gz", ".bz2", ".xz", ".zst", ".7z", ".zip"}
 TABLE_FORMATS = {"xyz", "asc"}  # formats of SurfaceTopography that are tables of numbers
-TEXT_FORMATS = {b"aBCR-": "an SDF file", b"aISO-": "an SDF file", b"DSAA": "a grid of Surfer"}
-"""Formats whose heights a reader of tables would take without their scales."""
+IN_TEXT = (
+    "in text, whose header is not read; save it in binary form, or as a table of x, y and height"
+)
+REFUSED = {
+    b"aBCR-": f"an SDF file {IN_TEXT}",
+    b"aISO-": f"an SDF file {IN_TEXT}",
+    b"aNIST-": f"an SDF file {IN_TEXT}",
+    b"DSAA": f"a grid of Surfer {IN_TEXT}",
+    b"Zygo XYZ Data File": f"a file of Zygo {IN_TEXT}",
+    b"Zygo ASCII Data File": f"a file of Zygo {IN_TEXT}",
+    b"DSCOMPRESSED": "a compressed file of MountainsMap; save it without compression",
+}
+"""Files by their first bytes; the readers of tables would take heights without their scales."""
+NANOFOCUS_DISTANCES = 1376  # byte of a file of NanoFocus, where its two distances of points begin
 SMALL_FILE = 2**14  # bytes, which the readers of tables parse in a second
 SORTED_ROWS = 20  # heights of so many rows are not sorted by chance; a choice
 SIGNATURE_BYTES = 512  # at the beginning of a file, by which readers recognise their format
@@ -59,6 +72,7 @@ def read_microscope_file(path: Path, dataset: str | None) -> HeightMap:
                 "not .npy or HDF5; other formats need SurfaceTopography: "
                 f"{INSTALL.format('topography')}"
             ) from error
+        _check_first_bytes(text_tables.part(file, 0, SIGNATURE_BYTES))
         table, warning = text_tables.with_blanks(text_tables.in_utf8(file))
         height_map = read_points(table)
         if height_map is None:
@@ -70,6 +84,13 @@ def read_microscope_file(path: Path, dataset: str | None) -> HeightMap:
     return replace(height_map, notes=tuple(filter(None, (*height_map.notes, warning))))
 
 
+def _check_first_bytes(start: bytes) -> None:
+    """Raise InputError for a known format that is not read."""
+    for signature, what in REFUSED.items():
+        if start.startswith(signature):
+            raise InputError(what)
+
+
 def _open_scan(path: Path, file: BinaryIO, readers: list[Any]) -> Any:
     """Open a file by the first reader that accepts it.
 
@@ -79,12 +100,6 @@ def _open_scan(path: Path, file: BinaryIO, readers: list[Any]) -> Any:
     Raises InputError where none does, with the reason of the reader that recognises the format.
     """
     start, is_small = text_tables.part(file, 0, SIGNATURE_BYTES), path.stat().st_size <= SMALL_FILE
-    for signature, name in TEXT_FORMATS.items():
-        if start.startswith(signature):
-            raise InputError(
-                f"{name} in text, whose header is not read; save it in binary form, or as "
-                "a table of x, y and height"
-            )
     tables = text_tables.table_formats(file)
     reasons = []
     for reader in readers:
@@ -103,12 +118,13 @@ def _open_scan(path: Path, file: BinaryIO, readers: list[Any]) -> Any:
             if is_likely or path.suffix[1:].lower() in reader.file_extensions():
                 row = text_tables.shorter_or_longer_row(file) if reader.format() == "asc" else ""
                 reasons.append(f"{reader.format()}: {row or first_line(error)}")
-    if reasons:
+    is_compressed = path.suffix.lower() in COMPRESSED
+    if reasons and not is_compressed:
         raise InputError(
             "SurfaceTopography recognises the format but cannot read the file "
             f"({'; '.join(reasons)}): damaged, or a variant of the format? {REMEDY}"
         )
-    if path.suffix.lower() in COMPRESSED:
+    if is_compressed:
         what = "a compressed file: unpack it"
     elif text_tables.columns(file) == 3:
         what = NO_GRID
@@ -154,8 +170,10 @@ def _read_channel(path: Path, file: BinaryIO, reader: Any, dataset: str | None) 
         _check_nova(lines)
         _check_wyko(_header(channel))
     heights, sides = heights_and_sides(scan, rows_along_y)
+    if kind == "nms":
+        sides = _nanofocus_sides(file, shape)
     has_unit = scan.unit is not None
-    if has_unit and kind in TABLE_FORMATS:
+    if has_unit:  # a mark can be a height in metres, -3.4e38 in nm
         in_unit_of_file, _ = heights_and_sides(stored, rows_along_y)
         heights = np.ma.masked_where(np.abs(in_unit_of_file) >= MAX_HEIGHT, heights)
     metric_sides = None if has_unit or unsized else _sides_with_unit(channel, sides)
@@ -190,6 +208,16 @@ def heights_and_sides(scan: Any, rows_along_y: bool) -> tuple[Any, tuple[float, 
     if len(sides) == 1 and sides[0] < 0:  # recorded backwards
         return heights[::-1], (-sides[0],)
     return heights if rows_along_y else heights.T, sides
+
+
+def _nanofocus_sides(file: BinaryIO, shape: tuple[int, ...]) -> tuple[float, ...]:
+    """Sides [m] along y and x of a file of NanoFocus, which has the distances of points in nm.
+
+    The reader takes them as mm, so that a side of 160 um becomes 160 m. The unit follows from two
+    files of 512 x 512 points and a distance of 312.5, which cannot be mm; surfalize 0.19.2 agrees.
+    """
+    along_x, along_y = struct.unpack("<2d", text_tables.part(file, NANOFOCUS_DISTANCES, 16))
+    return 1e-9 * along_y * shape[0], 1e-9 * along_x * shape[1]
 
 
 def _check_matrix(file: BinaryIO, scan: Any, unsized: bool) -> None:
