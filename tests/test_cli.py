@@ -255,6 +255,22 @@ def test_a_height_file_that_will_not_do_is_refused(gfmd, array, words):
     assert not Path("small.h5").exists()
 
 
+@pytest.mark.parametrize(
+    ("surface", "elastomer", "key"),
+    [
+        ('kind = "file", path = "none.txt"', 'kind = "half-space"', "surface.path"),
+        ('kind = "parabola"', 'kind = "table", path = "none.txt"', "elastomer.path"),
+    ],
+)
+def test_a_file_that_is_not_there_is_refused_with_its_key(gfmd, surface, elastomer, key):
+    tables = f"surface = {{ {surface} }}\nelastomer = {{ {elastomer} }}\n"
+    Path("spec.toml").write_text(f"{tables}grid.points = 16\nload.p_star = 0.1\n")
+    result = gfmd("run", "spec.toml")
+    assert result.exit_code == 2
+    place = Path("none.txt").resolve()
+    assert result.output == f"gfmd: spec.toml: {key}: {place}: No such file or directory\n"
+
+
 def test_tables_of_one_name_are_told_apart(gfmd):
     """Three seeds of two materials: the means are those of each."""
     for folder, n in {"a": 1, "b": 2}.items():

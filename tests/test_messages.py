@@ -1,9 +1,17 @@
 import os
 import subprocess
 
+import numpy as np
 import pytest
 
 from gfmd_cli.cli.messages import printable
+
+MAP = """
+surface = { kind = "file", path = "\\u001b[31m.npy" }
+elastomer = { kind = "half-space" }
+grid = { points = 8 }
+load = { p_star = 0.1 }
+"""
 
 
 def test_control_characters_are_spelled_out():
@@ -16,6 +24,30 @@ def test_escapes_in_a_file_name_do_not_reach_the_terminal(tmp_path, command):
     done = subprocess.run(words, cwd=tmp_path, capture_output=True)
     assert done.returncode == 2
     assert b"\x1b" not in done.stderr + done.stdout
+
+
+def test_a_table_shows_no_escapes_of_the_name_of_a_map(tmp_path, invoke):
+    np.save(tmp_path / "\x1b[31m.npy", np.random.default_rng(1).normal(size=(8, 8)))
+    (tmp_path / "spec.toml").write_text(MAP)
+    assert invoke("run", tmp_path / "spec.toml", "-o", tmp_path / "study.h5", "-q").exit_code == 0
+    for words in (("analyze",), ("diff", tmp_path / "study.h5")):
+        output = invoke(*words, tmp_path / "study.h5").output
+        assert r"\x1b[31m.npy" in output
+        assert "\x1b" not in output
+
+
+@pytest.mark.parametrize(
+    "words", [("schema",), ("status", "spec.toml", "--json"), ("export", "study.h5")], ids=" ".join
+)
+@pytest.mark.usefixtures("springs")
+def test_a_reader_that_has_enough_is_no_error(tmp_path, invoke, command, words):
+    """As in `gfmd schema | head -1`, where exit status 1 would mean that a task failed."""
+    invoke("run", tmp_path / "spec.toml", "-o", tmp_path / "study.h5", "-q", "-j", "1")
+    read, write = os.pipe()
+    os.close(read)
+    done = subprocess.run([*command, *words], cwd=tmp_path, stdout=write, stderr=subprocess.PIPE)
+    os.close(write)
+    assert (done.returncode, done.stderr) == (0, b"")
 
 
 @pytest.mark.parametrize("closed", ["stderr", "stdout"])

@@ -198,6 +198,7 @@ def test_task_ids_do_not_depend_on_the_output(read):
             [r"5: surface.path: no such file 'C:\temp", "in single quotes"],
         ),
         (("n = 1", "n = 1\nn = 2"), [":9: n = 2: ", "was given before"]),
+        (("\n", "\r"), [":1: [study]: TOML syntax: its lines end in a carriage return alone"]),
         (("[grid]", "[surface]"), [":9: [surface]: ", "was given before"]),
         (('"base"', '"../x"'), ["study.name", "only letters, digits"]),
         (

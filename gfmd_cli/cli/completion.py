@@ -5,6 +5,7 @@ import json
 import click
 from click.shell_completion import get_completion_class
 
+from gfmd_cli.cli.messages import print_data
 from gfmd_cli.cli.options import Command
 
 SHELLS = ("bash", "zsh", "fish")
@@ -23,7 +24,7 @@ def completion(shell: str) -> None:
 
     kind = get_completion_class(shell)
     assert kind is not None
-    click.echo(kind(main, {}, "gfmd", "_GFMD_COMPLETE").source())
+    print_data(kind(main, {}, "gfmd", "_GFMD_COMPLETE").source() + "\n")
 
 
 @click.command(cls=Command)
@@ -37,4 +38,4 @@ def schema() -> None:
     """
     from gfmd_cli.spec.schema import spec_schema
 
-    click.echo(json.dumps(spec_schema(), indent=2))
+    print_data(json.dumps(spec_schema(), indent=2) + "\n")

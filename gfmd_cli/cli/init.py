@@ -5,7 +5,7 @@ from pathlib import Path
 
 import click
 
-from gfmd_cli.cli.messages import print_error, print_text
+from gfmd_cli.cli.messages import print_data, print_error, print_text
 from gfmd_cli.cli.options import FILE, Command, overrides_option
 from gfmd_cli.errors import InputError, typed
 
@@ -78,7 +78,7 @@ def surface(
             names.append(str(path))
             summaries.append(summarise(read_scan(path, overrides)))
     if as_json:
-        click.echo(json.dumps([summary.record() for summary in summaries], indent=1))
+        print_data(json.dumps([summary.record() for summary in summaries], indent=1) + "\n")
     elif len(summaries) == 1:
         print_text(summary_text(summaries[0]))
     else:

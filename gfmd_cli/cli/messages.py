@@ -23,8 +23,13 @@ def print_error(text: str) -> None:
 
 def print_text(text: str) -> None:
     """Print on stdout; if the reader has closed the pipe, the rest is discarded."""
+    print_data(f"{printable(text)}\n")
+
+
+def print_data(text: str) -> None:
+    """Print text for other programs on stdout, unchanged; a closed pipe is treated as above."""
     try:
-        click.echo(printable(text))
+        click.echo(text, nl=False)
     except BrokenPipeError:
         discard_output()
 

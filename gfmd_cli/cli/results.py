@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from gfmd_cli.cli.messages import print_error, print_text
+from gfmd_cli.cli.messages import print_data, print_error, print_text
 from gfmd_cli.cli.options import FILE, Command, Number
 from gfmd_cli.errors import InputError, typed
 
@@ -42,7 +42,7 @@ def analyze(study: Path, as_json: bool, figures: Path | None, theory: "Theory") 
 
     comparison = compare(study, theory)
     if as_json:
-        click.echo(json.dumps(as_records(comparison), indent=1))
+        print_data(json.dumps(as_records(comparison), indent=1) + "\n")
     else:
         print_text(str(comparison))
     if comparison.missing:
@@ -123,7 +123,7 @@ def export(study: Path, output: Path | None, task: int | None) -> None:
     from gfmd_cli.files.atomic import write_whole
 
     if output is None:
-        click.echo(export_csv(study), nl=False)
+        print_data(export_csv(study))
         return
     if suffix == ".csv":
         write_whole(output, export_csv(study).encode())
@@ -164,6 +164,9 @@ def diff(
     from gfmd_cli.analysis.diff import diff_json, diff_text
 
     difference = diff_studies(one, other)
-    click.echo(diff_json(difference) if as_json else diff_text(difference))
+    if as_json:
+        print_data(diff_json(difference) + "\n")
+    else:
+        print_text(diff_text(difference))
     if tolerance is not None and difference.exceeds(tolerance):
         context.exit(1)

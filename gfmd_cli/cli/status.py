@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from gfmd_cli.cli.messages import print_error, print_text
+from gfmd_cli.cli.messages import print_data, print_error, print_text
 from gfmd_cli.cli.options import (
     FILE,
     Command,
@@ -59,7 +59,7 @@ def status(
         check_shards(shards, len(progress.tasks))
     next_command = _next_command(progress, words)
     if as_json:
-        click.echo(json.dumps(_as_data(progress, shards, next_command), indent=1))
+        print_data(json.dumps(_as_data(progress, shards, next_command), indent=1) + "\n")
     else:
         print_text("\n".join([*_lines(progress, shards), f"next: {next_command}"]))
 

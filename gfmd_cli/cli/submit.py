@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from gfmd_cli.cli.messages import print_text
+from gfmd_cli.cli.messages import print_data, print_text
 from gfmd_cli.cli.options import (
     FILE,
     Command,
@@ -100,7 +100,7 @@ def submit(
     if not job.members:
         print_text(f"{study}: nothing is missing\nnext: gfmd collect {words}")
     elif dry_run:
-        click.echo(job.text, nl=False)
+        print_data(job.text)
         for call in (job.array_call(), job.collect_call("JOB")):
             print_text(f"# {shlex.join(call)}")
     else:

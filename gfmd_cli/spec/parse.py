@@ -17,6 +17,7 @@ MAX_BYTES = 256 * 1024  # of a spec; a few kB are usual
 MAX_DEPTH = 16  # of tables and lists
 MAX_DOTS = 2000  # in a line; of a dotted key tomllib takes memory with their square
 SYNTAX = {
+    r"\r": "its lines end in a carriage return alone; save the spec with line feeds",
     r"^.*(overwrite|twice)": "this key or table was given before; keep one of them",
     r'^(Unescaped|Invalid hex|Illegal|Unterminated).*\n.*"[^"]*\\': BACKSLASH,
     r"=\s*[+-]?\d+,\d": "write numbers with a decimal point, such as 0.1",
@@ -121,7 +122,8 @@ def _syntax_error(text: str, name: str, message: str) -> str:
     number = int(place.partition(",")[0])
     line = text.split("\n")[number - 1].strip()
     remedies = (SYNTAX[form] for form in SYNTAX if re.search(form, f"{reason}\n{line}"))
-    return f"{name}:{number}: {shortened(line)}: TOML syntax: {next(remedies, reason)}"
+    shown = shortened(line.partition("\r")[0])
+    return f"{name}:{number}: {shown}: TOML syntax: {next(remedies, reason)}"
 
 
 def _is_deep(data: Any, depth: int = MAX_DEPTH) -> bool:

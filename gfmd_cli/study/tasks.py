@@ -1,6 +1,5 @@
 """A spec as a list of tasks, one for each surface, elastomer, grid, solver and load."""
 
-import os
 from collections import Counter
 from dataclasses import dataclass
 from math import prod
@@ -154,9 +153,8 @@ def plan(spec: models.Spec) -> list[Task]:
 
 
 def _tasks(spec: models.Spec) -> list[Task]:
-    files = [choice.file for choice in (*spec.surface, *spec.elastomer)]
-    versions = {path: file_version(path) for path in files if path and os.path.exists(path)}
-    _check(spec)  # refuses a missing file, with its key
+    versions = _file_versions(spec)
+    _check(spec)
     resolved = spec.resolved()
     swept_keys = {table: _swept_keys(getattr(spec, table)) for table in models.SWEPT}
     tasks: dict[str, Task] = {}
@@ -189,12 +187,24 @@ def _tasks(spec: models.Spec) -> list[Task]:
                 files=tuple(
                     (path, versions[path], tables[table]["sha256"])
                     for table in ("surface", "elastomer")
-                    if (path := chosen[table].file) in versions
+                    if (path := chosen[table].file) is not None
                 ),
             )
             _check_unit(task)
             tasks.setdefault(task.id, task)  # loads may agree in all digits that count
     return list(tasks.values())
+
+
+def _file_versions(spec: models.Spec) -> dict[Path, Version]:
+    """The versions of the files of surfaces and elastomers. Raises InputError, with the key."""
+    versions = {}
+    for table in ("surface", "elastomer"):
+        for path in filter(None, (choice.file for choice in getattr(spec, table))):
+            try:
+                versions[path] = file_version(path)
+            except OSError as error:
+                raise InputError(f"{table}.path: {path}: {error.strerror}") from error
+    return versions
 
 
 def _check(spec: models.Spec) -> None:
