@@ -324,11 +324,11 @@ def _ends(values: Field) -> str:
 
 def _scales(curve: Curve) -> list[str]:
     row = curve.rows[0]
-    physical = in_si(row)
+    units = [unit if in_si(row, unit) else "" for *_, unit in SCALES]
     scales = ", ".join(
-        f"{symbol} = {_ends(curve.column(name))}{f' {unit}' if physical else ''}"
-        for symbol, name, unit in SCALES
+        f"{symbol} = {_ends(curve.column(name))} {unit}".rstrip()
+        for (symbol, name, _), unit in zip(SCALES, units, strict=True)
     )
     warnings = [f"warning: {line}" for line in warnings_in(curve.rows)]
-    scales += "" if physical else " (reduced units)"
+    scales += "" if any(units) else " (reduced units)"
     return [scales, *filter(None, [row.get("preparation")]), *warnings]
