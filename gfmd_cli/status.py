@@ -8,9 +8,6 @@ NEARLY_FULL = 0.99
 """Relative contact area above which the mean gap needs fine grids: the 11 contacts that ended at
 2048 points (n = 0.5 to 3, p* = 2.6 to 3.3, accuracy.mean_gap = 0.01) had 0.997 and more."""
 
-CHOSEN_BY_AUTO = ("pcg", "sort", "dual")
-"""Kinds of solver that the kind "auto" chooses from."""
-
 
 class ExplainedEnum(StrEnum):
     """Members with an explanation; the value of a member is its text in files and tables."""
@@ -32,7 +29,7 @@ class Status(ExplainedEnum):
     MAX_STEPS = (
         "max_steps",
         "residual {residual:.1e} after {steps} steps, tolerance {tolerance:.1e}: raise "
-        "solver.max_steps",
+        'solver.max_steps; the fastest solver.kind is "auto"',
     )
     ROUNDING = (
         "rounding",
@@ -67,8 +64,6 @@ class Status(ExplainedEnum):
                 "relative error needs fine grids: loosen accuracy.mean_gap, or solve this load on "
                 "a fixed grid"
             )
-        if self is Status.MAX_STEPS and row["solver"] not in CHOSEN_BY_AUTO:
-            text += ', or use solver.kind = "auto"'
         return text
 
     @property
