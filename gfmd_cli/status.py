@@ -68,7 +68,7 @@ class Status(ExplainedEnum):
 
     @property
     def is_converged(self) -> bool:
-        """Whether the task met its tolerances."""
+        """Whether the task met its tolerance, accuracy and load."""
         return self is Status.CONVERGED
 
     @property
@@ -76,7 +76,7 @@ class Status(ExplainedEnum):
         """What a solved task has missed, in words; empty of one that is converged."""
         if self is Status.CONVERGED:
             return ""
-        return SHORTFALLS.get(self, UNCONVERGED)
+        return SHORTFALLS.get(self, TOLERANCE_NOT_REACHED)
 
     @property
     def is_solved(self) -> bool:
@@ -89,7 +89,7 @@ class Status(ExplainedEnum):
         return self in (Status.FAILED, Status.NO_SPACE, Status.KILLED)
 
 
-UNCONVERGED = "not converged"
+TOLERANCE_NOT_REACHED = "tolerance not reached"
 SHORTFALLS = {
     Status.ACCURACY_NOT_REACHED: "accuracy not reached",
     Status.LOAD_NOT_REACHED: "load not reached",

@@ -127,7 +127,7 @@ def test_a_mean_density_holds_all_seeds_and_marks_one_that_has_not_converged():
     density = mean_density(None, rows[:2], "pr_sigma_log")
     assert (density.seeds, density.remark) == (2, "")
     np.testing.assert_allclose(density.density * WIDTH * 64**2, 30.0)
-    assert mean_density(None, rows, "pr_sigma_log").remark == ", not converged"
+    assert mean_density(None, rows, "pr_sigma_log").remark == ", tolerance not reached"
     rows[2]["status"] = Status.ACCURACY_NOT_REACHED
     assert mean_density(None, rows, "pr_sigma_log").remark == ", accuracy not reached"
 

@@ -142,11 +142,11 @@ def test_the_closed_form_belongs_to_n_0_alone(study):
 
 def test_what_is_not_converged_is_a_cross_and_known_errors_are_bars(study):
     comparison = study()
-    assert "not converged" not in figure_of("mean_gap_log", comparison).legend
+    assert "tolerance not reached" not in figure_of("mean_gap_log", comparison).legend
     assert not figure_of("mean_gap_log", comparison).axes.containers
     states = [{"status": Status.MAX_STEPS}, {"u_g_error": 0.1}, {}]
     plot = figure_of("mean_gap_log", marked(comparison, states))
-    assert "not converged" in plot.legend
+    assert "tolerance not reached" in plot.legend
     assert len(plot.axes.containers) == 1
 
 
@@ -154,7 +154,7 @@ def test_a_missed_accuracy_is_not_said_to_be_a_missing_convergence(study):
     states = [{"status": Status.ACCURACY_NOT_REACHED}, {"status": Status.LOAD_NOT_REACHED}, {}]
     plot = figure_of("mean_gap_log", marked(study(), states))
     assert {"accuracy not reached", "load not reached"} < plot.legend.keys()
-    assert "not converged" not in plot.legend
+    assert "tolerance not reached" not in plot.legend
 
 
 def test_symbols_stand_at_the_continuum_value_where_it_is_known(study):
@@ -184,7 +184,7 @@ def test_values_that_are_not_finite_are_left_out(study):
     nothing = dict.fromkeys(("a_r", "sigma_p", "u_g"), np.nan) | {"status": Status.DIVERGED}
     comparison = marked(study(), [nothing, {}, {}])
     for name in OVER_PRESSURE:
-        assert "not converged" not in figure_of(name, comparison).legend
+        assert "tolerance not reached" not in figure_of(name, comparison).legend
 
 
 def test_curves_that_differ_by_their_seed_alone_share_a_style(study):

@@ -413,9 +413,9 @@ def test_what_failed_or_is_missing_is_told(invoke, tmp_path):
     text = text.replace('fields = ["u", "sigma", "height"]\ncross_section = true', "")
     study = solved(invoke, tmp_path, text + "[solver]\nmax_steps = 1\n", "--shard", "0/2")
     words = "".join(Page(report(study)).words)
-    assert "1 of 4 contacts: not converged; 2 of 4 are" in words
+    assert "1 of 4 contacts: tolerance not reached; 2 of 4 are" in words
     assert "max_steps" in words
-    assert "What failed or is missing" in words
+    assert "Not converged or missing" in words
     assert "cross_section = true" in words  # how to get it
 
 

@@ -15,7 +15,7 @@ from gfmd_cli.analysis.curve_styles import CurveStyle
 from gfmd_cli.errors import INSTALL, InputError
 from gfmd_cli.files.atomic import write_whole
 from gfmd_cli.grid.arrays import Field
-from gfmd_cli.status import SHORTFALLS, UNCONVERGED, Status
+from gfmd_cli.status import SHORTFALLS, TOLERANCE_NOT_REACHED, Status
 
 try:
     from matplotlib import colormaps, rc_context, ticker
@@ -57,7 +57,7 @@ METADATA: dict[str, Any] = {".png": {}, ".pdf": {"CreationDate": None}, ".svg": 
 """Formats of a figure, with the entries that would make the same figure another file."""
 THEORY, CONFIDENCE = "Persson theory", "95 % confidence"
 """Entries of a legend that several curves share."""
-SHORTFALL_MARKERS = dict(zip((UNCONVERGED, *SHORTFALLS.values()), "x*P", strict=True))
+SHORTFALL_MARKERS = dict(zip((TOLERANCE_NOT_REACHED, *SHORTFALLS.values()), "x*P", strict=True))
 """Markers of contacts that have missed something, by what that is."""
 DASHED: dict[str, Any] = {"ls": (0, (4, 2)), "lw": 0.8, "zorder": 2.5}
 """Style of closed forms and of laws at the edge of a contact."""

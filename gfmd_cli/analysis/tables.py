@@ -105,7 +105,7 @@ SEEDS = (
         TableColumn(quantity.heading, f"{name}_mean", error=f"{name}_confidence")
         for name, quantity in QUANTITIES.items()
     ),
-    TableColumn("missed its target", "failures", optional=True),
+    TableColumn("not converged", "not_converged", optional=True),
 )
 BEST_VALUES = {
     name: (P_STAR, PRESSURE, *_beside_theory(name, best=True), STATUS) for name in QUANTITIES
@@ -267,7 +267,11 @@ def seeds_table(comparison: Comparison) -> Table:
     groups = groups_of(
         (
             f"{title}: mean of {len(ensemble.rows)} seeds",
-            {"p_star": ensemble.p_star, "failures": ensemble.failures, **ensemble.means()},
+            {
+                "p_star": ensemble.p_star,
+                "not_converged": ensemble.not_converged,
+                **ensemble.means(),
+            },
         )
         for title, ensemble in zip(titles, means, strict=True)
     )

@@ -49,8 +49,8 @@ class ReportData:
         return solved_rows(self.comparison.rows)
 
     @property
-    def failed(self) -> list[Row]:
-        """The rows whose contact is solved, but not to its tolerance."""
+    def not_converged(self) -> list[Row]:
+        """The rows whose contact is solved, but missed its tolerance, accuracy or load."""
         return [row for row in self.solved if not row["status"].is_converged]
 
     @property

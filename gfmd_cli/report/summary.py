@@ -52,7 +52,7 @@ def _names_of(names: list[str], what: str) -> str:
 
 def success(data: ReportData) -> str:
     """Statement that all contacts have converged; empty if some have not."""
-    if data.failed or data.missing:
+    if data.not_converged or data.missing:
         return ""
     total = len(data.comparison.rows)
     return f"All {total} contacts converged." if total > 1 else "The contact converged."
@@ -158,8 +158,8 @@ def csv_address(data: ReportData) -> str:
 def warnings(data: ReportData) -> list[str]:
     """Warnings above the results: missing, doubtful and unresolved values."""
     total, parts = len(data.comparison.rows), []
-    if data.failed:
-        missed = Counter(row["status"].shortfall for row in data.failed)
+    if data.not_converged:
+        missed = Counter(row["status"].shortfall for row in data.not_converged)
         parts += [f"{number} of {total} contacts: {what}" for what, number in missed.items()]
     if data.missing:
         parts.append(f"{len(data.missing)} of {total} are not solved yet")
