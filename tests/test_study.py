@@ -329,16 +329,27 @@ def test_a_changed_attribute_of_a_study_is_found_out(run):
         read_rows(path)
 
 
-def test_p_star_of_a_single_indenter_on_several_grids_is_warned_of(run):
-    """Delta_sigma of a paraboloid rises with the number of points for n > 1."""
-    spec = power_spec(n=3, points=[16, 32], p_star=0.003)
-    parabola = "surface={kind='parabola'}"
-    path, events, _ = run(spec, overrides=(parabola,))
-    assert "p* is another pressure on every grid" in "".join(e.message for e in events)
-    assert len({row["pressure"] for row in read_rows(path)}) == 2
-    for name, overrides in {"one": ("grid.points=16",), "pressure": ("load={pressure=1}",)}.items():
-        _, events, _ = run(spec, f"{name}.h5", (parabola, *overrides))
-        assert "p* is" not in "".join(e.message for e in events)
+def test_p_star_whose_unit_depends_on_the_grid_is_warned_of_once(run):
+    """With a free boundary Delta_sigma is that of the mirrored heights, which have a kink."""
+    spec = power_spec(n=0.5, points=[32, 64], p_star=0.1)
+    spec = spec.replace("[load]", 'boundary = "free"\n[load]')
+    for name, overrides, count in [
+        ("free", (), 1),
+        ("one", ("grid.points=32",), 0),
+        ("pressure", ("load={pressure=1}",), 0),
+    ]:
+        path, events, _ = run(spec, f"{name}.h5", overrides)
+        stored = "".join(row["warnings"] for row in read_rows(path))
+        said = stored + "".join(event.message for event in events)
+        assert said.count("p* is another pressure on another grid") == count
+    path, events, _ = run(
+        power_spec(n=3, points=[16, 32], p_star=0.003),
+        "parabola.h5",
+        ("surface={kind='parabola'}",),
+    )
+    assert "p* is" not in "".join(event.message for event in events)
+    for row in read_rows(path):
+        assert row["warnings"].count("p* is another pressure on another grid") == 1
 
 
 def test_a_damaged_record_is_said_in_one_line(run, tmp_path):

@@ -1,6 +1,6 @@
 """Warnings about results that are probably not what the user means."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from math import inf, isfinite
 from typing import Any
 
@@ -37,6 +37,7 @@ MAX_FINEST_SHARE = 0.2
 """Share of the squared Delta_sigma at waves of two to four spacings, from which it depends on the
 grid; a choice. On 64 to 512 points of single indenters, Delta_sigma changed by 4 % or more from a
 grid to the next above this share, and by 1.1 % or less below."""
+OTHER_UNIT = "so that p* is another pressure on another grid; give load.pressure"
 SEPARATOR = " | "
 """Between the warnings of one contact in a column of text."""
 
@@ -156,8 +157,21 @@ def _compressed(task: Task, h_std: float, displacement: float) -> Iterator[str]:
         )
 
 
+def unit_of_grids(tasks: Sequence[Task]) -> str:
+    """A warning about a p* on several grids of rough surfaces whose unit depends on them, else "".
+
+    That of single indenters is told contact by contact, from `MAX_FINEST_SHARE` on. Interpolated
+    maps have too little of Delta_sigma at the shortest waves of their own grid to show the change.
+    """
+    changing = [task for task in tasks if task.surface.rough and not task.has_fixed_unit]
+    if len({task.points for task in changing}) < 2:
+        return ""
+    kind = changing[0].surface.kind
+    return f"load.p_star: Delta_sigma of the surface ({kind}) depends on the grid, {OTHER_UNIT}"
+
+
 def _unit_of_grid(task: Task, scene: Scene) -> Iterator[str]:
-    """A warning about a p* of a single indenter that is another pressure on a finer grid."""
+    """The same of a single indenter, on one grid, too."""
     if task.has_fixed_unit or task.surface.rough:
         return
     q, variance = scene.shells.q, scene.shells.variance
@@ -165,7 +179,7 @@ def _unit_of_grid(task: Task, scene: Scene) -> Iterator[str]:
     if share > MAX_FINEST_SHARE:
         yield (
             f"load.p_star: {share:.0%} of the square of Delta_sigma is at waves of two to four "
-            "grid spacings, so that p* is another pressure on another grid; give load.pressure"
+            f"grid spacings, {OTHER_UNIT}"
         )
 
 

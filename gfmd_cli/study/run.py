@@ -17,6 +17,7 @@ from gfmd_cli.spec.models import Spec
 from gfmd_cli.status import Status
 from gfmd_cli.study.context import Progress, Report, SolveContext, WorkerOptions
 from gfmd_cli.study.measure import forget_spectra
+from gfmd_cli.study.plausibility import unit_of_grids
 from gfmd_cli.study.pool import solve_in_pool
 from gfmd_cli.study.refinement import forget_scenes
 from gfmd_cli.study.resources import check_memory, jobs_and_threads, seconds_to_stop, usable_memory
@@ -122,7 +123,7 @@ def run_study(
         unusable = plans.plan_with(study.parts, estimated=options.reproducible, waits=waits)
         forget_peaks()
         forget_spectra()
-        context.warn(*moved, *damaged, *filter(None, [unusable, _changing_unit(pending)]))
+        context.warn(*moved, *damaged, *filter(None, [unusable, unit_of_grids(pending)]))
         try:
             solved = _solve_all(pending, study.parts, jobs, context)
         finally:
@@ -135,17 +136,6 @@ def run_study(
         if not any(status.is_failure for status in solved):
             _check_output(pending, on_root(ranks, study.outcomes))
     return counts + solved
-
-
-def _changing_unit(tasks: list[Task]) -> str:
-    """A warning about a p* that is another pressure on every grid; "" where there is none."""
-    changing = [task for task in tasks if not task.has_fixed_unit]
-    if len({task.points for task in changing}) < 2:
-        return ""
-    return (
-        f"load.p_star: Delta_sigma of the surface ({changing[0].surface.kind}) depends on the "
-        "grid, so that p* is another pressure on every grid; give load.pressure to compare grids"
-    )
 
 
 def _until(end: float, stop: Event, report: Report) -> Report:
