@@ -232,6 +232,17 @@ def test_a_half_space_is_called_so(study):
     assert [style.label for style in curve_styles([curve])] == ["half-space"]
 
 
+def test_lines_of_the_theory_go_on_where_they_underflow(study):
+    """u_g = 0 in double precision from p* = 39 on, where exp(-p*^2 / 2) is below 5e-324."""
+    comparison = study(ROUGH, "load.p_star=[0.3, 100.0]")
+    with styled():
+        plot = study_figures(comparison, with_styles(comparison))["mean_gap_log"]
+    lines = [layer for layer in plot.layers if layer.kind == "line"]
+    assert len(lines) == 3  # of two elastomers, and the exact one of n = 0
+    for line in lines:
+        assert np.all(line.y[line.x > 50] == 0.0)
+
+
 def test_a_study_in_pascals_has_them_on_a_second_axis(study):
     pressures = "load={pressure=[1e6, 1e7, 1e8]}"
     comparison = study(ROUGH, 'elastomer={kind="half-space", E_star=2e9}', pressures)

@@ -223,13 +223,16 @@ class ColumnFigure(LegendFigure):
         self.layers.append(PlotLayer("band", names, x, low, to_hex(colour), high=high))
 
     def line(self, label: str, x: Field, y: Field, **style: Any) -> None:
-        """Draw a line where y > 0, with an entry of the legend."""
+        """Draw a line where y >= 0, with an entry of the legend."""
         self.unnamed_line((label,), x, y, **style)
         self.legend[label] = Line2D([], [], **style)
 
     def unnamed_line(self, names: tuple[str, ...], x: Field, y: Field, **style: Any) -> None:
-        """Draw a line where y > 0 that belongs to entries of the legend and adds none."""
-        y = np.where(y > 0, y, np.nan)
+        """Draw a line where y >= 0 that belongs to entries of the legend and adds none.
+
+        A zero is drawn, for theories underflow: at zero of a linear axis, below a logarithmic one.
+        """
+        y = np.where(y >= 0, y, np.nan)
         self.axes.plot(x, y, **style)
         if x.size:
             colour, width = to_hex(style["color"]), style.get("lw", STYLE["lines.linewidth"])
