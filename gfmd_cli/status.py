@@ -72,6 +72,11 @@ class Status(ExplainedEnum):
         return self is Status.CONVERGED
 
     @property
+    def is_within_tolerance(self) -> bool:
+        """Whether the contact is solved to its tolerance, whatever else the task has missed."""
+        return self is Status.CONVERGED or self in SHORTFALLS
+
+    @property
     def shortfall(self) -> str:
         """What a solved task has missed, in words; empty of one that is converged."""
         if self is Status.CONVERGED:
@@ -94,7 +99,7 @@ SHORTFALLS = {
     Status.ACCURACY_NOT_REACHED: "accuracy not reached",
     Status.LOAD_NOT_REACHED: "load not reached",
 }
-"""What tasks have missed whose contact is solved to its tolerance."""
+"""What tasks have missed that are within tolerance."""
 
 
 def worst(statuses: Iterable[Status]) -> Status:
