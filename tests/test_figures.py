@@ -8,7 +8,7 @@ from specs import power_spec
 
 from gfmd_cli.analysis import figures
 from gfmd_cli.analysis.compare import Curve, compare
-from gfmd_cli.analysis.curve_styles import MAX_LABEL, curve_styles, distinct_labels
+from gfmd_cli.analysis.curve_styles import MAX_LABEL, colours, curve_styles, distinct_labels
 from gfmd_cli.analysis.figures import PANELS, draw_all, study_figures, with_styles
 from gfmd_cli.analysis.plotting import ColumnFigure, styled
 from gfmd_cli.errors import InputError, SpaceError
@@ -349,9 +349,22 @@ def test_long_labels_that_end_differently_stay_different(names):
     assert distinct_labels(["x" * 90] * 2)[0] == distinct_labels(["x" * 90] * 2)[1]
 
 
+def hurst_sweep(study, values):
+    """One elastomer on surfaces of several H, from the rows of one contact."""
+    comparison = study(ROUGH, "elastomer.n=1", "load.p_star=0.3", "output.histogram=false")
+    (curve,) = comparison.curves
+    rows = [curve.rows[0] | {"hurst": hurst} for hurst in values]
+    return replace(comparison, curves=[Curve([row], curve.persson) for row in rows])
+
+
+def test_colours_go_along_a_long_sweep_of_one_parameter(study):
+    values = [0.9, 0.05, *np.linspace(0.1, 0.8, 15)]
+    items = with_styles(hurst_sweep(study, values))
+    assert [item.style.label for item in items] == [f"hurst={h:.12g}" for h in sorted(values)]
+    assert [item.style.colour for item in items] == colours(17)
+
+
 def test_curves_that_share_a_style_say_what_differs(study):
-    comparison = study(
-        ROUGH, "elastomer.n=1", "surface.hurst=[0.1,0.2,0.3,0.4,0.5,0.6,0.7,0.8,0.9]"
-    )
+    comparison = hurst_sweep(study, np.linspace(0.1, 0.9, 21))
     (label,) = {style.label for style in curve_styles(comparison.curves)}
     assert label == "n = 1, several hurst"
