@@ -13,7 +13,7 @@ import pytest
 import xarray
 from specs import power_spec
 
-from gfmd_cli.errors import Interrupted, StudyError
+from gfmd_cli.errors import Interrupted, SpaceError, StudyError
 from gfmd_cli.grid import plans
 from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.physics import indenters
@@ -603,6 +603,36 @@ def test_a_time_without_end_is_no_limit(run):
     _, events, outcome = run(overrides=("elastomer.n=0",), max_seconds=float("inf"), jobs=1)
     assert outcome.total() == 2
     assert not [event for event in events if event.event == "warning"]
+
+
+def test_a_study_whose_folder_is_renamed_during_a_run_does_not_begin_anew(run, tmp_path):
+    """The run ends with an error; with its name back, the study goes on with what was solved."""
+    folder, aside = tmp_path / "results", tmp_path / "renamed"
+    folder.mkdir()
+
+    def rename(event):
+        if event.event == "end" and folder.exists():
+            folder.rename(aside)
+
+    with pytest.raises(SpaceError, match=r"study\.parts: renamed or deleted during the run"):
+        run(name="results/study.h5", report=rename, jobs=2)
+    assert not folder.exists()
+    aside.rename(folder)
+    path, events, _ = run(name="results/study.h5")
+    assert sum(event.event == "start" for event in events) < 4
+    assert {row["status"] for row in read_rows(path)} == {"converged"}
+
+
+def test_unfinished_work_that_is_deleted_during_a_run_is_told_and_not_made_anew(run, tmp_path):
+    parts = tmp_path / "study.parts"
+
+    def delete(event):
+        if event.event == "end" and parts.exists():
+            shutil.rmtree(parts)
+
+    with pytest.raises(SpaceError, match="renamed or deleted during the run"):
+        run(report=delete, jobs=1)
+    assert not list(tmp_path.glob("study*"))
 
 
 @pytest.fixture

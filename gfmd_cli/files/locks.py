@@ -135,11 +135,14 @@ def _holder(descriptor: int) -> _Owner | None:
 
 
 def _opened(path: Path) -> BinaryIO:
-    """A lock file, made where it is missing. Raises SpaceError."""
+    """A lock file, made with its folder where it is missing. Raises SpaceError.
+
+    The folders around that are not made: a study whose folder was renamed does not begin anew.
+    """
     reason: str | None = None
     for _ in range(ATTEMPTS):
         try:
-            path.parent.mkdir(parents=True, exist_ok=True)
+            path.parent.mkdir(exist_ok=True)
             return open_regular(path, os.O_RDWR | os.O_CREAT)  # NFS needs both
         except (FileNotFoundError, FileExistsError) as error:
             # the folder was deleted just now, perhaps while mkdir was running, or cannot be made

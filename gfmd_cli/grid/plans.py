@@ -203,11 +203,19 @@ def _write(folder: Path, wisdom: Wisdom) -> None:
 
 @contextmanager
 def _planning_lock(folder: Path) -> Iterator[bool]:
-    """Keep other processes from planning inside the block; yields whether the folder is locked."""
+    """Keep other processes from planning inside the block; yields whether the folder is locked.
+
+    The cache is made where it is missing, the folder beside a study is not.
+    """
     with ExitStack() as stack:
-        if folder not in _without_lock:
+        if folder != _folder:
+            with suppress(OSError):
+                folder.mkdir(parents=True, exist_ok=True)
+        is_locked = folder.is_dir() and folder not in _without_lock
+        if is_locked:
             try:
                 stack.enter_context(locked(folder / "planning", waits=_waits))
             except SpaceError:  # it may have taken minutes: not again
                 _without_lock.add(folder)
-        yield folder not in _without_lock
+                is_locked = False
+        yield is_locked

@@ -143,6 +143,8 @@ def solve_task(task: Task, parts: Path, context: SolveContext) -> Status:
 
     Raises Interrupted after the state was saved, InputError, SpaceError.
     """
+    if not parts.is_dir():
+        raise SpaceError(f"{parts}: renamed or deleted during the run")
     context.report(Progress(task.index, "start", task.label))
     _check_files(task)  # before the work for it begins
     gfmd_version()  # kept from now on: the source tree may be updated during the solve
