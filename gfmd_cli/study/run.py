@@ -3,12 +3,13 @@
 from collections import Counter
 from contextlib import ExitStack
 from dataclasses import dataclass
+from math import inf
 from pathlib import Path
 from threading import Event
 from time import monotonic
 
 from gfmd_cli.errors import InputError, Interrupted, SpaceError
-from gfmd_cli.files.locks import Waits
+from gfmd_cli.files.locks import AS_LONG_AS_NEEDED, Waits
 from gfmd_cli.grid import plans
 from gfmd_cli.grid.ranks import Ranks, is_root, on_root, shared_errors
 from gfmd_cli.physics.file_surface import forget_files
@@ -44,7 +45,8 @@ class RunOptions:
     checkpoint_every: float = 600.0
     """Time between two saves of the state of a solve [s]."""
     max_seconds: float | None = None
-    """Wall time before which the run saves all states and stops, as after a signal."""
+    """Wall time before which the run saves all states and stops, as after a signal; a wait for
+    another process ends with it."""
     reproducible: bool = False
     """Whether to plan transforms without measuring, with one thread a task."""
     ranks: Ranks | None = None
@@ -89,7 +91,8 @@ def run_study(
     forget_files()
     forget_scenes()
     stop = Event()
-    waits = Waits(stop if ranks is None else None)  # ranks stop together
+    end = monotonic() + (inf if options.max_seconds is None else options.max_seconds)
+    waits = Waits(stop, end) if ranks is None else AS_LONG_AS_NEEDED  # ranks stop together
     study = Study(path, waits)
     tasks = plan(spec)
     if ranks is not None and (names := spec.output.on_request()):
@@ -108,7 +111,7 @@ def run_study(
     check_memory(pending, ranks)
     jobs, threads = jobs_and_threads(pending, options.jobs, options.reproducible, ranks)
     worker_options = WorkerOptions(
-        threads, usable_memory(ranks) / jobs, options.reproducible, options.checkpoint_every
+        threads, usable_memory(ranks) / jobs, options.reproducible, options.checkpoint_every, end
     )
     if is_root(ranks):
         report = _noting_failures(report, tasks, study.parts)

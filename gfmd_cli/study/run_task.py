@@ -122,6 +122,7 @@ def attempt(task: Task, parts: Path, context: SolveContext) -> Status:
         with shared_errors(context.ranks):
             return solve_task(task, parts, context)
     except Interrupted:
+        context.stop.set()  # where the time of the run has ended in a wait for a lock
         status, message = Status.INTERRUPTED, ""
     except (GfmdError, MemoryError, ArithmeticError, OSError) as error:
         status = Status.NO_SPACE if isinstance(error, SpaceError) else Status.FAILED
