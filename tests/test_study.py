@@ -6,6 +6,7 @@ import subprocess
 import sys
 import time
 from contextlib import suppress
+from threading import Thread
 
 import h5py
 import numpy as np
@@ -408,6 +409,25 @@ def test_plans_are_kept_beside_an_unfinished_study(run, tmp_path, monkeypatch):
     flip(file, 8 * 300)
     _, events, _ = run(shard=(2, 4))
     assert any("planned anew" in event.message for event in events)
+
+
+def test_runs_in_two_threads_keep_their_plans_apart(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.setattr(plans, "_always_estimated", False)  # under `make test-portable` too
+    one, other = tmp_path / "one", tmp_path / "other"
+    values = np.zeros(97, dtype=complex)
+    for folder in (one, other):
+        folder.mkdir()
+    try:
+        plans.plan_with(one)
+        thread = Thread(target=plans.plan_with, args=(other,))
+        thread.start()
+        thread.join()
+        plans.planned(lambda fftw: fftw(values, values.copy()))
+    finally:
+        plans.plan_with(None)
+    assert plans.read_wisdom(one)
+    assert plans.read_wisdom(other) is None
 
 
 @pytest.mark.parametrize(
