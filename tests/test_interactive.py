@@ -26,7 +26,7 @@ def figure():
     error = np.array([np.nan, 0.25, np.nan])
     plot.points(STYLE, X, Y, statuses, error=error, details=["a < b", "c\nd", "e"])
     plot.band(STYLE, X, Y / 2, 2 * Y)
-    plot.theory([(STYLE, X, Y), (STYLE, X, np.array([3.0, 0.0, 2.0]))])
+    plot.theory([(STYLE, X, Y), (STYLE, X, np.array([3.0, np.nan, 2.0]))])
     plot.scale("x", "log", X)
     plot.scale("y", "linear", Y)
     return plot
