@@ -245,7 +245,7 @@ def run(
 
     In the main thread the function handles signals: it saves all states before it ends.
 
-    A task that fails, or misses its tolerance, does not end the run. The function then gives a
+    A task that fails, or does not converge, does not end the run. The function then gives a
     Python warning at the end, and one for each warning that `gfmd run` prints.
 
     Parameters

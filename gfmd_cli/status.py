@@ -8,9 +8,6 @@ NEARLY_FULL = 0.99
 """Relative contact area above which the mean gap needs fine grids: the 11 contacts that ended at
 2048 points (n = 0.5 to 3, p* = 2.6 to 3.3, accuracy.mean_gap = 0.01) had 0.997 and more."""
 
-CHOSEN_BY_AUTO = ("pcg", "sort", "dual")
-"""Kinds of solver that the kind "auto" chooses from."""
-
 
 class ExplainedEnum(StrEnum):
     """Members with an explanation; the value of a member is its text in files and tables."""
@@ -32,7 +29,7 @@ class Status(ExplainedEnum):
     MAX_STEPS = (
         "max_steps",
         "residual {residual:.1e} after {steps} steps, tolerance {tolerance:.1e}: raise "
-        "solver.max_steps",
+        'solver.max_steps; the fastest solver.kind is "auto"',
     )
     ROUNDING = (
         "rounding",
@@ -67,21 +64,24 @@ class Status(ExplainedEnum):
                 "relative error needs fine grids: loosen accuracy.mean_gap, or solve this load on "
                 "a fixed grid"
             )
-        if self is Status.MAX_STEPS and row["solver"] not in CHOSEN_BY_AUTO:
-            text += ', or use solver.kind = "auto"'
         return text
 
     @property
     def is_converged(self) -> bool:
-        """Whether the task met its tolerances."""
+        """Whether the task met its tolerance, accuracy and load."""
         return self is Status.CONVERGED
+
+    @property
+    def is_within_tolerance(self) -> bool:
+        """Whether the contact is solved to its tolerance, whatever else the task has missed."""
+        return self is Status.CONVERGED or self in SHORTFALLS
 
     @property
     def shortfall(self) -> str:
         """What a solved task has missed, in words; empty of one that is converged."""
         if self is Status.CONVERGED:
             return ""
-        return SHORTFALLS.get(self, UNCONVERGED)
+        return SHORTFALLS.get(self, TOLERANCE_NOT_REACHED)
 
     @property
     def is_solved(self) -> bool:
@@ -94,12 +94,12 @@ class Status(ExplainedEnum):
         return self in (Status.FAILED, Status.NO_SPACE, Status.KILLED)
 
 
-UNCONVERGED = "not converged"
+TOLERANCE_NOT_REACHED = "tolerance not reached"
 SHORTFALLS = {
     Status.ACCURACY_NOT_REACHED: "accuracy not reached",
     Status.LOAD_NOT_REACHED: "load not reached",
 }
-"""What tasks have missed whose contact is solved to its tolerance."""
+"""What tasks have missed that are within tolerance."""
 
 
 def worst(statuses: Iterable[Status]) -> Status:

@@ -18,6 +18,7 @@ from gfmd_cli.solvers.auto import Auto
 from gfmd_cli.solvers.nested_grids import solve_contact
 from gfmd_cli.spec.parse import read_spec
 from gfmd_cli.status import Status
+from gfmd_cli.study.reading import read_rows
 from gfmd_cli.study.run import RunOptions, run_study
 
 EDGES = LOGARITHMIC_EDGES
@@ -127,7 +128,7 @@ def test_a_mean_density_holds_all_seeds_and_marks_one_that_has_not_converged():
     density = mean_density(None, rows[:2], "pr_sigma_log")
     assert (density.seeds, density.remark) == (2, "")
     np.testing.assert_allclose(density.density * WIDTH * 64**2, 30.0)
-    assert mean_density(None, rows, "pr_sigma_log").remark == ", not converged"
+    assert mean_density(None, rows, "pr_sigma_log").remark == ", tolerance not reached"
     rows[2]["status"] = Status.ACCURACY_NOT_REACHED
     assert mean_density(None, rows, "pr_sigma_log").remark == ", accuracy not reached"
 
@@ -212,6 +213,15 @@ def test_one_grid_has_no_distribution_table_nor_figure(study):
 
 def test_grids_that_are_not_nested_are_not_compared(study):
     assert distributions(compare(study("grid.points=[64, 96]"))) == []
+
+
+def test_a_grid_that_missed_its_accuracy_is_extrapolated_from_too(study):
+    """Its stress is solved to the tolerance."""
+    study("grid.points=64")
+    path = study('grid.points="auto"', "accuracy={contact_area=1e-4, max_points=128}")
+    assert {row["status"] for row in read_rows(path)} == {"converged", "accuracy_not_reached"}
+    (stress,) = distributions(compare(path))
+    assert stress.points == [64, 128]
 
 
 def test_without_a_histogram_there_is_nothing_to_extrapolate(study):

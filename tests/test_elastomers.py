@@ -281,6 +281,18 @@ def test_a_rounded_table_is_what_it_was_made_from(tmp_path, digits):
     assert table.uniform_stiffness == pytest.approx(layer.uniform_stiffness, rel=1e-3)
 
 
+def test_a_table_is_read_once_until_its_file_is_replaced(tmp_path, monkeypatch):
+    """The grid asks for k(q) block by block of its rows."""
+    elastomer = table(tmp_path / "k.txt", Q[1:], Q[1:])
+    read, loadtxt = [], np.loadtxt
+    monkeypatch.setattr(np, "loadtxt", lambda *a, **keys: read.append(a) or loadtxt(*a, **keys))
+    for block in np.array_split(Q, 8):
+        assert elastomer.stiffness(block) == pytest.approx(block)
+    assert len(read) == 1
+    table(tmp_path / "k.txt", Q[2:], 2 * Q[2:])
+    assert elastomer.stiffness(Q) == pytest.approx(2 * Q)
+
+
 def test_unreadable_tables_are_refused(tmp_path):
     (tmp_path / "binary").write_bytes(bytes(range(256)))
     (tmp_path / "folder").mkdir()

@@ -8,7 +8,7 @@ from specs import power_spec
 
 from gfmd_cli.analysis import figures
 from gfmd_cli.analysis.compare import Curve, compare
-from gfmd_cli.analysis.curve_styles import MAX_LABEL, curve_styles, distinct_labels
+from gfmd_cli.analysis.curve_styles import MAX_LABEL, colours, curve_styles, distinct_labels
 from gfmd_cli.analysis.figures import PANELS, draw_all, study_figures, with_styles
 from gfmd_cli.analysis.plotting import ColumnFigure, styled
 from gfmd_cli.errors import InputError, SpaceError
@@ -142,11 +142,11 @@ def test_the_closed_form_belongs_to_n_0_alone(study):
 
 def test_what_is_not_converged_is_a_cross_and_known_errors_are_bars(study):
     comparison = study()
-    assert "not converged" not in figure_of("mean_gap_log", comparison).legend
+    assert "tolerance not reached" not in figure_of("mean_gap_log", comparison).legend
     assert not figure_of("mean_gap_log", comparison).axes.containers
     states = [{"status": Status.MAX_STEPS}, {"u_g_error": 0.1}, {}]
     plot = figure_of("mean_gap_log", marked(comparison, states))
-    assert "not converged" in plot.legend
+    assert "tolerance not reached" in plot.legend
     assert len(plot.axes.containers) == 1
 
 
@@ -154,7 +154,7 @@ def test_a_missed_accuracy_is_not_said_to_be_a_missing_convergence(study):
     states = [{"status": Status.ACCURACY_NOT_REACHED}, {"status": Status.LOAD_NOT_REACHED}, {}]
     plot = figure_of("mean_gap_log", marked(study(), states))
     assert {"accuracy not reached", "load not reached"} < plot.legend.keys()
-    assert "not converged" not in plot.legend
+    assert "tolerance not reached" not in plot.legend
 
 
 def test_symbols_stand_at_the_continuum_value_where_it_is_known(study):
@@ -184,7 +184,7 @@ def test_values_that_are_not_finite_are_left_out(study):
     nothing = dict.fromkeys(("a_r", "sigma_p", "u_g"), np.nan) | {"status": Status.DIVERGED}
     comparison = marked(study(), [nothing, {}, {}])
     for name in OVER_PRESSURE:
-        assert "not converged" not in figure_of(name, comparison).legend
+        assert "tolerance not reached" not in figure_of(name, comparison).legend
 
 
 def test_curves_that_differ_by_their_seed_alone_share_a_style(study):
@@ -230,6 +230,17 @@ def test_names_of_elastomers_are_short_where_they_can_be(study):
 def test_a_half_space_is_called_so(study):
     (curve,) = study(ROUGH, 'elastomer={kind="half-space", E_star=2e9}').curves
     assert [style.label for style in curve_styles([curve])] == ["half-space"]
+
+
+def test_lines_of_the_theory_go_on_where_they_underflow(study):
+    """u_g = 0 in double precision from p* = 39 on, where exp(-p*^2 / 2) is below 5e-324."""
+    comparison = study(ROUGH, "load.p_star=[0.3, 100.0]")
+    with styled():
+        plot = study_figures(comparison, with_styles(comparison))["mean_gap_log"]
+    lines = [layer for layer in plot.layers if layer.kind == "line"]
+    assert len(lines) == 3  # of two elastomers, and the exact one of n = 0
+    for line in lines:
+        assert np.all(line.y[line.x > 50] == 0.0)
 
 
 def test_a_study_in_pascals_has_them_on_a_second_axis(study):
@@ -338,9 +349,22 @@ def test_long_labels_that_end_differently_stay_different(names):
     assert distinct_labels(["x" * 90] * 2)[0] == distinct_labels(["x" * 90] * 2)[1]
 
 
+def hurst_sweep(study, values):
+    """One elastomer on surfaces of several H, from the rows of one contact."""
+    comparison = study(ROUGH, "elastomer.n=1", "load.p_star=0.3", "output.histogram=false")
+    (curve,) = comparison.curves
+    rows = [curve.rows[0] | {"hurst": hurst} for hurst in values]
+    return replace(comparison, curves=[Curve([row], curve.persson) for row in rows])
+
+
+def test_colours_go_along_a_long_sweep_of_one_parameter(study):
+    values = [0.9, 0.05, *np.linspace(0.1, 0.8, 15)]
+    items = with_styles(hurst_sweep(study, values))
+    assert [item.style.label for item in items] == [f"hurst={h:.12g}" for h in sorted(values)]
+    assert [item.style.colour for item in items] == colours(17)
+
+
 def test_curves_that_share_a_style_say_what_differs(study):
-    comparison = study(
-        ROUGH, "elastomer.n=1", "surface.hurst=[0.1,0.2,0.3,0.4,0.5,0.6,0.7,0.8,0.9]"
-    )
+    comparison = hurst_sweep(study, np.linspace(0.1, 0.9, 21))
     (label,) = {style.label for style in curve_styles(comparison.curves)}
     assert label == "n = 1, several hurst"

@@ -11,7 +11,7 @@ from gfmd_cli.analysis.figures import LABELS, P_STAR
 from gfmd_cli.analysis.plotting import CONFIDENCE, THEORY, ColumnFigure
 from gfmd_cli.report.interactive import interactive
 from gfmd_cli.report.rendering import html_label, plain_label
-from gfmd_cli.status import UNCONVERGED, Status
+from gfmd_cli.status import TOLERANCE_NOT_REACHED, Status
 
 STYLE = CurveStyle((0.0, 0.0, 1.0), "s", r"n = 1 \$<b>")
 X = np.array([0.1, 1.0, 10.0])
@@ -26,7 +26,7 @@ def figure():
     error = np.array([np.nan, 0.25, np.nan])
     plot.points(STYLE, X, Y, statuses, error=error, details=["a < b", "c\nd", "e"])
     plot.band(STYLE, X, Y / 2, 2 * Y)
-    plot.theory([(STYLE, X, Y), (STYLE, X, np.array([3.0, 0.0, 2.0]))])
+    plot.theory([(STYLE, X, Y), (STYLE, X, np.array([3.0, np.nan, 2.0]))])
     plot.scale("x", "log", X)
     plot.scale("y", "linear", Y)
     return plot
@@ -44,7 +44,7 @@ def test_points_have_the_values_that_are_drawn_with_their_errors(figure):
     assert converged["error_y"]["array"] == [None, 0.25]
     assert other["y"] == [pytest.approx(1 / 3, rel=1e-9)]
     assert other["marker"]["symbol"] == "x-thin-open"
-    assert other["meta"] == ["n = 1 $<b>", UNCONVERGED]
+    assert other["meta"] == ["n = 1 $<b>", TOLERANCE_NOT_REACHED]
     assert "error_y" not in other
 
 
@@ -77,7 +77,7 @@ def test_every_curve_belongs_to_an_entry_of_the_legend(figure):
     entries = {entry["name"]: entry["symbol"] for entry in data["legend"]}
     assert {name for trace in data["data"] for name in trace["meta"]} == set(entries)
     assert entries["n = 1 $<b>"] == "□"
-    assert entries[UNCONVERGED] == "×"
+    assert entries[TOLERANCE_NOT_REACHED] == "×"
     assert entries[THEORY] == "—"
     assert data["legend"][0]["colour"] == "#0000ff"
 

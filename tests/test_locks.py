@@ -108,6 +108,30 @@ def test_a_long_wait_is_announced_once_with_its_owner_and_ends_with_the_run(
     assert message.endswith(f", in use by {owner}")
 
 
+def test_a_wait_ends_with_the_time_of_the_run(lock, kind, holder, monkeypatch):
+    monkeypatch.setattr(locks, "LONG_SECONDS", 0.05)
+    holder(kind, "exclusive")
+    waits = Waits(Event(), until=time.monotonic() + 0.3)
+    with pytest.raises(Interrupted, match="run again"), locked(lock, waits=waits):
+        pass
+
+
+@pytest.mark.usefixtures("springs")
+@pytest.mark.parametrize("name", ["collecting", "planning"])
+def test_a_run_with_a_time_limit_does_not_wait_longer_for_another(
+    tmp_path, monkeypatch, invoke, name
+):
+    monkeypatch.setattr(locks, "LONG_SECONDS", 0.05)
+    monkeypatch.setattr(plans, "_always_estimated", False)  # under `make test-portable` too
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "springs.parts").mkdir()
+    limit = ("-o", "springs.h5", "--max-hours", 1e-4)
+    with locked(tmp_path / "springs.parts" / name):
+        done = invoke("run", "spec.toml", "-j", "1", "-q", *limit)
+    assert done.exit_code == 75
+    assert f"{name} is in use by" in done.output
+
+
 def test_a_wait_for_another_worker_of_the_run_is_not_announced(lock, holder, monkeypatch, caplog):
     monkeypatch.setattr(locks, "LONG_SECONDS", 0.05)
     holder("kernel", "exclusive")

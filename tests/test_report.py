@@ -257,6 +257,18 @@ def test_a_study_in_pascal_has_both_units(invoke, tmp_path):
     assert "500\xa0MPa" in Page(page).words
 
 
+def test_heights_in_metres_without_a_modulus_show_metres_and_no_pascal(invoke, tmp_path):
+    """At given p* the gap follows from the heights alone, but no stress in Pa does."""
+    text = ONE.replace('kind = "power"\nn = 1', 'kind = "half-space"')
+    path = solved(invoke, tmp_path, text.replace("cutoff = 0.1", "cutoff = 0.1\nh_std = 1e-6"))
+    results = re.sub("<[^>]+>", "", report(path).partition('id="surface-spectrum"')[0])
+    printed = invoke("analyze", path).output
+    assert "h_std = 1e-06 m" in printed
+    assert re.search(r"\d.?[µn]m\b", results)
+    for shown in (results, printed):
+        assert not re.search(r"\d.?[kMGmµn]?Pa\b|\[Pa\]", shown)
+
+
 def test_a_density_of_several_seeds_is_called_their_mean(whole):
     groups = re.findall(r"<span>(.*): mean of 2 seeds", whole[whole.index("Middle of each bin") :])
     assert any(group.endswith("</var>* = 0.1") for group in groups)
@@ -389,7 +401,8 @@ def test_symbols_are_typeset(text, expected):
 
 
 def test_the_unit_of_stress_of_a_slab_is_not_its_stress_in_full_contact(invoke, tmp_path):
-    text = ONE.replace('kind = "power"\nn = 1', 'kind = "slab"\nthickness = [0.01, 0.1]')
+    slabs = 'kind = "slab"\nE_star = 2e9\nthickness = [0.01, 0.1]'
+    text = ONE.replace('kind = "power"\nn = 1', slabs)
     text = text.replace("cutoff = 0.1", "cutoff = 0.1\nh_std = 1e-6\nlength = 1e-3")
     words = "".join(Page(report(solved(invoke, tmp_path, text))).words)
     assert "rms stress in full contact; of a slab that of the half-space" in words
@@ -400,9 +413,9 @@ def test_what_failed_or_is_missing_is_told(invoke, tmp_path):
     text = text.replace('fields = ["u", "sigma", "height"]\ncross_section = true', "")
     study = solved(invoke, tmp_path, text + "[solver]\nmax_steps = 1\n", "--shard", "0/2")
     words = "".join(Page(report(study)).words)
-    assert "1 of 4 contacts: not converged; 2 of 4 are" in words
+    assert "1 of 4 contacts: tolerance not reached; 2 of 4 are" in words
     assert "max_steps" in words
-    assert "What failed or is missing" in words
+    assert "Not converged or missing" in words
     assert "cross_section = true" in words  # how to get it
 
 

@@ -40,6 +40,11 @@ SMALL = {
     "time_left.py": f"{ROOT / 'configs' / 'smoke.toml'} --set grid.points=100 --jobs 1",
 }
 """Arguments with which a script takes seconds."""
+CONSTANTS = [
+    ("indenter_bars.py", "--units --points 64 128 --exponents 1"),
+    ("spectrum_fits.py", "--search --seeds 1 --hurst 0.8"),
+]
+"""Options with which scripts measure constants of the program, on small sizes."""
 
 
 def run(name, arguments, monkeypatch):
@@ -70,3 +75,8 @@ def test_a_script_without_its_study_ends_with_one_message(monkeypatch, tmp_path)
 def test_a_script_runs_on_small_sizes(name, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
     run(name, SMALL[name].split(), monkeypatch)
+
+
+@pytest.mark.parametrize(("name", "arguments"), CONSTANTS)
+def test_a_constant_is_measured_on_small_sizes(name, arguments, monkeypatch):
+    run(name, arguments.split(), monkeypatch)

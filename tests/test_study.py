@@ -6,6 +6,7 @@ import subprocess
 import sys
 import time
 from contextlib import suppress
+from threading import Thread
 
 import h5py
 import numpy as np
@@ -14,7 +15,7 @@ import xarray
 from specs import power_spec
 
 from gfmd_cli.analysis.compare import compare
-from gfmd_cli.errors import Interrupted, StudyError
+from gfmd_cli.errors import Interrupted, SpaceError, StudyError
 from gfmd_cli.grid import plans
 from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.physics import indenters
@@ -361,16 +362,27 @@ def test_a_changed_attribute_of_a_study_is_found_out(run):
         read_rows(path)
 
 
-def test_p_star_of_a_single_indenter_on_several_grids_is_warned_of(run):
-    """Delta_sigma of a paraboloid rises with the number of points for n > 1."""
-    spec = power_spec(n=3, points=[16, 32], p_star=0.003)
-    parabola = "surface={kind='parabola'}"
-    path, events, _ = run(spec, overrides=(parabola,))
-    assert "p* is another pressure on every grid" in "".join(e.message for e in events)
-    assert len({row["pressure"] for row in read_rows(path)}) == 2
-    for name, overrides in {"one": ("grid.points=16",), "pressure": ("load={pressure=1}",)}.items():
-        _, events, _ = run(spec, f"{name}.h5", (parabola, *overrides))
-        assert "p* is" not in "".join(e.message for e in events)
+def test_p_star_whose_unit_depends_on_the_grid_is_warned_of_once(run):
+    """With a free boundary Delta_sigma is that of the mirrored heights, which have a kink."""
+    spec = power_spec(n=0.5, points=[32, 64], p_star=0.1)
+    spec = spec.replace("[load]", 'boundary = "free"\n[load]')
+    for name, overrides, count in [
+        ("free", (), 1),
+        ("one", ("grid.points=32",), 0),
+        ("pressure", ("load={pressure=1}",), 0),
+    ]:
+        path, events, _ = run(spec, f"{name}.h5", overrides)
+        stored = "".join(row["warnings"] for row in read_rows(path))
+        said = stored + "".join(event.message for event in events)
+        assert said.count("p* is another pressure on another grid") == count
+    path, events, _ = run(
+        power_spec(n=3, points=[16, 32], p_star=0.003),
+        "parabola.h5",
+        ("surface={kind='parabola'}",),
+    )
+    assert "p* is" not in "".join(event.message for event in events)
+    for row in read_rows(path):
+        assert row["warnings"].count("p* is another pressure on another grid") == 1
 
 
 def test_a_damaged_record_is_said_in_one_line(run, tmp_path):
@@ -429,6 +441,25 @@ def test_plans_are_kept_beside_an_unfinished_study(run, tmp_path, monkeypatch):
     flip(file, 8 * 300)
     _, events, _ = run(shard=(2, 4))
     assert any("planned anew" in event.message for event in events)
+
+
+def test_runs_in_two_threads_keep_their_plans_apart(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.setattr(plans, "_always_estimated", False)  # under `make test-portable` too
+    one, other = tmp_path / "one", tmp_path / "other"
+    values = np.zeros(97, dtype=complex)
+    for folder in (one, other):
+        folder.mkdir()
+    try:
+        plans.plan_with(one)
+        thread = Thread(target=plans.plan_with, args=(other,))
+        thread.start()
+        thread.join()
+        plans.planned(lambda fftw: fftw(values, values.copy()))
+    finally:
+        plans.plan_with(None)
+    assert plans.read_wisdom(one)
+    assert plans.read_wisdom(other) is None
 
 
 @pytest.mark.parametrize(
@@ -624,6 +655,36 @@ def test_a_time_without_end_is_no_limit(run):
     _, events, outcome = run(overrides=("elastomer.n=0",), max_seconds=float("inf"), jobs=1)
     assert outcome.total() == 2
     assert not [event for event in events if event.event == "warning"]
+
+
+def test_a_study_whose_folder_is_renamed_during_a_run_does_not_begin_anew(run, tmp_path):
+    """The run ends with an error; with its name back, the study goes on with what was solved."""
+    folder, aside = tmp_path / "results", tmp_path / "renamed"
+    folder.mkdir()
+
+    def rename(event):
+        if event.event == "end" and folder.exists():
+            folder.rename(aside)
+
+    with pytest.raises(SpaceError, match=r"study\.parts: renamed or deleted during the run"):
+        run(name="results/study.h5", report=rename, jobs=2)
+    assert not folder.exists()
+    aside.rename(folder)
+    path, events, _ = run(name="results/study.h5")
+    assert sum(event.event == "start" for event in events) < 4
+    assert {row["status"] for row in read_rows(path)} == {"converged"}
+
+
+def test_unfinished_work_that_is_deleted_during_a_run_is_told_and_not_made_anew(run, tmp_path):
+    parts = tmp_path / "study.parts"
+
+    def delete(event):
+        if event.event == "end" and parts.exists():
+            shutil.rmtree(parts)
+
+    with pytest.raises(SpaceError, match="renamed or deleted during the run"):
+        run(report=delete, jobs=1)
+    assert not list(tmp_path.glob("study*"))
 
 
 @pytest.fixture

@@ -22,7 +22,8 @@ MARKERS = "os^Dv<p>h"
 MAX_LABEL = 46  # characters
 TAILS = (20, 30, 8)  # characters after the part that is left out of a long label, tried in turn
 OF_ELASTOMER = tuple(each for each in PARAMETERS if each.table == "elastomer")
-MAX_STYLES = 8  # more styles cannot be told apart
+MAX_STYLES = 8  # more markers of one colour cannot be told apart
+MAX_SWEEP = 20  # values of one parameter, a colour each; a choice: the legend has seven rows
 Colour = tuple[float, float, float]
 """Red, green, blue from 0 to 1."""
 
@@ -68,10 +69,15 @@ def without_escapes(label: str) -> str:
     return label.replace(r"\$", "$")
 
 
-def order(curve: Curve) -> tuple[float, float]:
-    """Key for sorting: slabs by thickness, then power laws by exponent, then the others."""
-    thickness = curve.rows[0]["thickness"] if np.isnan(curve.n) else np.nan
-    return float(np.nan_to_num(thickness, nan=np.inf)), float(np.nan_to_num(curve.n, nan=np.inf))
+def order(curve: Curve) -> tuple[float, ...]:
+    """Key for sorting: slabs by thickness, then power laws by exponent, then the others.
+
+    Among equal ones the numbers in the spec decide, so that colours go along a sweep.
+    """
+    row = curve.rows[0]
+    numbers = [row[each.column.name] for each in PARAMETERS if each.column.kind is not str]
+    slab = row["thickness"] if np.isnan(curve.n) else np.nan
+    return tuple(np.nan_to_num([slab, curve.n, *numbers], nan=np.inf).tolist())
 
 
 def with_styles(comparison: Comparison) -> list[StyledCurve]:
@@ -97,13 +103,18 @@ def curve_styles(curves: list[Curve]) -> list[CurveStyle]:
     """Colours along the ordered curves, one per elastomer; markers tell variants apart.
 
     Curves of one elastomer have a colour each. Curves that differ in their seed only have the same
-    style.
+    style, and so have curves of one elastomer where there are too many: more than MAX_STYLES, or
+    more than MAX_SWEEP of a single elastomer that differ in one parameter.
     """
     names = _elastomer_names(curves)
     alike = grouped(curves, lambda curve: curve.elastomer)
     keys = {elastomer: _differing(group) for elastomer, group in alike.items()}
     pairs = [(c.elastomer, _joined(map(_words(c).get, keys[c.elastomer]), " ")) for c in curves]
-    if len(set(pairs)) > MAX_STYLES:
+    count = len(set(pairs))
+    is_sweep = len(alike) == 1 and len(keys[curves[0].elastomer]) == 1
+    if is_sweep and MAX_STYLES < count <= MAX_SWEEP:
+        names = dict.fromkeys(names, "")  # labels of one parameter fit into several columns
+    elif count > MAX_STYLES:
         pairs = [(curve.elastomer, _merged(curve, alike[curve.elastomer])) for curve in curves]
     distinct = list(dict.fromkeys(pairs))
     labels = distinct_labels([_joined((names[elastomer], words)) for elastomer, words in distinct])

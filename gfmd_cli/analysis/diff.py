@@ -220,7 +220,7 @@ def diff_lists(difference: Difference) -> dict[str, list[str]]:
     sides = [pair.one for pair in difference.pairs], [pair.other for pair in difference.pairs]
     for which, side in zip("AB", sides, strict=True):
         rows = [row for row in side if not row["status"].is_converged]
-        lists[f"compared, but not as requested in {which}"] = _loads_by_contact(rows)
+        lists[f"compared, but not converged in {which}"] = _loads_by_contact(rows)
     lists["specs, A -> B"] = [f"  {line}" for line in difference.spec]
     return {title: lines for title, lines in lists.items() if lines}
 

@@ -214,7 +214,7 @@ def _draw(
 ) -> tuple[float, float, float, float]:
     """Symbols with error bars over the faint lines of the grids; return the span of the symbols."""
     sigma = BINS[PR_LOGARITHMIC].middles()
-    for density in stress.grids:
+    for density in np.where(stress.grids > 0, stress.grids, np.nan):
         faint = {"color": style.colour, "lw": 0.4, "alpha": 0.45}
         plot.unnamed_line((style.label,), sigma, density, **faint)
     known = np.isfinite(stress.density) & np.isfinite(stress.error)

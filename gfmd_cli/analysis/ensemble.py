@@ -55,7 +55,7 @@ class Ensemble:
         return float(np.mean([row["p_star"] for row in self.rows]))
 
     @property
-    def failures(self) -> str | None:
+    def not_converged(self) -> str | None:
         """The statuses of the rows that have not converged, with their numbers; None without."""
         counts = Counter(row["status"] for row in self.rows if not row["status"].is_converged)
         return ", ".join(f"{number} {status}" for status, number in counts.items()) or None

@@ -132,7 +132,7 @@ def _details(rows: list[Row]) -> str:
     first = rows[0]
     pressure = float(np.mean([row["pressure"] for row in rows]))
     lines = [
-        *([f"pressure {quantity(pressure, 'Pa')}"] if in_si(first) else []),
+        *([f"pressure {quantity(pressure, 'Pa')}"] if in_si(first, "Pa") else []),
         contact_title(first, of_seeds=len(rows) > 1),
         f"{grid_size(rows)}, solver {first['solver']}",
     ]
@@ -195,9 +195,10 @@ def _over_pressure(panel: Panel, items: list[StyledCurve]) -> ColumnFigure | Non
 
 
 def _add_pascals(plot: ColumnFigure, items: list[StyledCurve], largest: float) -> None:
-    """Add an axis in Pa, if the study has SI units and one Delta_sigma for all curves."""
+    """Add an axis in Pa, if that means something and all curves have one Delta_sigma."""
     rows = [row for item in items for row in item.curve.rows]
     units = [float(row["delta_sigma"]) for row in rows]
-    if all(map(in_si, rows)) and np.allclose(units, units[0], rtol=ROUNDING, atol=0):
+    is_one = np.allclose(units, units[0], rtol=ROUNDING, atol=0)
+    if is_one and all(in_si(row, "Pa") for row in rows):
         divisor, unit = scaled(largest * units[0], "Pa")
         plot.second_x(f"pressure  $p$ ({unit})", units[0] / divisor)

@@ -15,7 +15,7 @@ from gfmd_cli.analysis.curve_styles import CurveStyle
 from gfmd_cli.errors import INSTALL, InputError
 from gfmd_cli.files.atomic import write_whole
 from gfmd_cli.grid.arrays import Field
-from gfmd_cli.status import SHORTFALLS, UNCONVERGED, Status
+from gfmd_cli.status import SHORTFALLS, TOLERANCE_NOT_REACHED, Status
 
 try:
     from matplotlib import colormaps, rc_context, ticker
@@ -57,7 +57,7 @@ METADATA: dict[str, Any] = {".png": {}, ".pdf": {"CreationDate": None}, ".svg": 
 """Formats of a figure, with the entries that would make the same figure another file."""
 THEORY, CONFIDENCE = "Persson theory", "95 % confidence"
 """Entries of a legend that several curves share."""
-SHORTFALL_MARKERS = dict(zip((UNCONVERGED, *SHORTFALLS.values()), "x*P", strict=True))
+SHORTFALL_MARKERS = dict(zip((TOLERANCE_NOT_REACHED, *SHORTFALLS.values()), "x*P", strict=True))
 """Markers of contacts that have missed something, by what that is."""
 DASHED: dict[str, Any] = {"ls": (0, (4, 2)), "lw": 0.8, "zorder": 2.5}
 """Style of closed forms and of laws at the edge of a contact."""
@@ -223,13 +223,16 @@ class ColumnFigure(LegendFigure):
         self.layers.append(PlotLayer("band", names, x, low, to_hex(colour), high=high))
 
     def line(self, label: str, x: Field, y: Field, **style: Any) -> None:
-        """Draw a line where y > 0, with an entry of the legend."""
+        """Draw a line where y >= 0, with an entry of the legend."""
         self.unnamed_line((label,), x, y, **style)
         self.legend[label] = Line2D([], [], **style)
 
     def unnamed_line(self, names: tuple[str, ...], x: Field, y: Field, **style: Any) -> None:
-        """Draw a line where y > 0 that belongs to entries of the legend and adds none."""
-        y = np.where(y > 0, y, np.nan)
+        """Draw a line where y >= 0 that belongs to entries of the legend and adds none.
+
+        A zero is drawn, for theories underflow: at zero of a linear axis, below a logarithmic one.
+        """
+        y = np.where(y >= 0, y, np.nan)
         self.axes.plot(x, y, **style)
         if x.size:
             colour, width = to_hex(style["color"]), style.get("lw", STYLE["lines.linewidth"])

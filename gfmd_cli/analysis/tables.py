@@ -105,7 +105,7 @@ SEEDS = (
         TableColumn(quantity.heading, f"{name}_mean", error=f"{name}_confidence")
         for name, quantity in QUANTITIES.items()
     ),
-    TableColumn("missed its target", "failures", optional=True),
+    TableColumn("not converged", "not_converged", optional=True),
 )
 BEST_VALUES = {
     name: (P_STAR, PRESSURE, *_beside_theory(name, best=True), STATUS) for name in QUANTITIES
@@ -267,7 +267,11 @@ def seeds_table(comparison: Comparison) -> Table:
     groups = groups_of(
         (
             f"{title}: mean of {len(ensemble.rows)} seeds",
-            {"p_star": ensemble.p_star, "failures": ensemble.failures, **ensemble.means()},
+            {
+                "p_star": ensemble.p_star,
+                "not_converged": ensemble.not_converged,
+                **ensemble.means(),
+            },
         )
         for title, ensemble in zip(titles, means, strict=True)
     )
@@ -324,11 +328,11 @@ def _ends(values: Field) -> str:
 
 def _scales(curve: Curve) -> list[str]:
     row = curve.rows[0]
-    physical = in_si(row)
+    units = [unit if in_si(row, unit) else "" for *_, unit in SCALES]
     scales = ", ".join(
-        f"{symbol} = {_ends(curve.column(name))}{f' {unit}' if physical else ''}"
-        for symbol, name, unit in SCALES
+        f"{symbol} = {_ends(curve.column(name))} {unit}".rstrip()
+        for (symbol, name, _), unit in zip(SCALES, units, strict=True)
     )
     warnings = [f"warning: {line}" for line in warnings_in(curve.rows)]
-    scales += "" if physical else " (reduced units)"
+    scales += "" if any(units) else " (reduced units)"
     return [scales, *filter(None, [row.get("preparation")]), *warnings]

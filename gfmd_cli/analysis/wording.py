@@ -12,6 +12,8 @@ from gfmd_cli.units import LARGEST_RMS_HEIGHT, scaled
 
 SPACE = "\u00a0"
 """No-break space."""
+STIFFNESSES = ("E_star", "k_n", "tension")
+"""Columns of what makes an elastomer stiff; 1 by default. Tables of k(q) have none of them."""
 RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
@@ -20,24 +22,32 @@ def largest(values: Field) -> float:
     return float(np.max(values, initial=0.0, where=np.isfinite(values)))
 
 
-def in_si(row: Mapping[str, Any]) -> bool:
-    """Whether metres and pascals of a contact mean something, and not reduced units alone.
+def in_si(row: Mapping[str, Any], unit: str) -> bool:
+    """Whether values of a contact in this unit mean something, and not reduced units alone.
 
-    They do where the load was given in Pa or the surface has heights of a real one.
+    They do where the load was given in Pa or the surface has heights of a real one; with Pa in the
+    unit, the elastomer needs a stiffness that was given, too: the default of 1 is that of none.
     """
-    return bool(row["load"] == "pressure" or row["h_std"] <= LARGEST_RMS_HEIGHT)
+    if row["load"] == "pressure":
+        return True
+    has_stiffness = all(row.get(key) != 1.0 for key in STIFFNESSES)
+    return bool(row["h_std"] <= LARGEST_RMS_HEIGHT and (has_stiffness or "Pa" not in unit))
 
 
 def shown(columns: Sequence[TableColumn], rows: Iterable[Record]) -> list[TableColumn]:
     """The columns without those in SI units where these mean nothing in any row."""
-    physical = any(map(in_si, rows))
-    return [column for column in columns if physical or not column.unit]
+    rows = list(rows)
+    return [
+        column
+        for column in columns
+        if not column.unit or any(in_si(row, column.unit) for row in rows)
+    ]
 
 
 def pressure_text(row: Mapping[str, Any]) -> str:
     """The pressure of a contact, reduced and, where that means something, in Pa."""
     return f"p* = {row['p_star']:.4g}" + (
-        f" ({quantity(row['pressure'], 'Pa')})" if in_si(row) else ""
+        f" ({quantity(row['pressure'], 'Pa')})" if in_si(row, "Pa") else ""
     )
 
 

@@ -10,6 +10,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from functools import partial
+from math import inf
 from pathlib import Path
 from threading import Event
 from typing import BinaryIO, NamedTuple
@@ -35,6 +36,8 @@ class Waits(NamedTuple):
 
     stop: Event | None = None
     """Once set, a process that has waited long raises Interrupted."""
+    until: float = inf
+    """Time of the monotonic clock after which it does so, too [s]."""
     run: int = 0
     """The process of the run of a worker: no wait for another worker is announced."""
 
@@ -98,7 +101,7 @@ class _Wait:
     """A wait for a lock, from now on."""
 
     def __init__(self, path: Path, waits: Waits) -> None:
-        self.path, self.stop, self.run = path, *waits
+        self.path, self.waits = path, waits
         self.since, self.is_announced = time.monotonic(), False
 
     def pause(self, find_owner: Callable[[], _Owner | None]) -> None:
@@ -111,9 +114,10 @@ class _Wait:
         if waited > LONG_SECONDS:
             owner = find_owner()
             by = str(owner or "another process")
-            if self.stop is not None and self.stop.is_set():
+            stop, until, run = self.waits
+            if (stop is not None and stop.is_set()) or time.monotonic() > until:
                 raise Interrupted(f"stopped; {self.path} is in use by {by}; run again to continue")
-            is_foreign = self.run == 0 or owner is None or _parent(owner.pid) != self.run
+            is_foreign = run == 0 or owner is None or _parent(owner.pid) != run
             if is_foreign and not self.is_announced:
                 log.warning("gfmd: waiting for %r, in use by %s", str(self.path), ascii(by)[1:-1])
             self.is_announced = True
@@ -135,11 +139,14 @@ def _holder(descriptor: int) -> _Owner | None:
 
 
 def _opened(path: Path) -> BinaryIO:
-    """A lock file, made where it is missing. Raises SpaceError."""
+    """A lock file, made with its folder where it is missing. Raises SpaceError.
+
+    The folders around that are not made: a study whose folder was renamed does not begin anew.
+    """
     reason: str | None = None
     for _ in range(ATTEMPTS):
         try:
-            path.parent.mkdir(parents=True, exist_ok=True)
+            path.parent.mkdir(exist_ok=True)
             return open_regular(path, os.O_RDWR | os.O_CREAT)  # NFS needs both
         except (FileNotFoundError, FileExistsError) as error:
             # the folder was deleted just now, perhaps while mkdir was running, or cannot be made

@@ -13,11 +13,12 @@ import platform
 import re
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
+from contextvars import ContextVar
 from functools import cache, partial
 from math import ceil
 from pathlib import Path
 from threading import Lock
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import pyfftw
 
@@ -64,11 +65,23 @@ def _here() -> dict[str, str]:
 
 
 _without_lock: set[Path] = set()  # folders that this process could not lock
-_folder: Path | None = None  # where wisdom is kept; None for the cache
-_waits = AS_LONG_AS_NEEDED  # for other processes that measure
 _planner = Lock()  # all threads share FFTW's wisdom, which FFTW does not protect
 _always_estimated = os.environ.get("GFMD_PLANS") == "estimated"
-_estimated = _always_estimated
+
+
+class _Planning(NamedTuple):
+    """How the run of a thread plans."""
+
+    folder: Path | None = None
+    """Where wisdom is kept; None for the cache."""
+    estimated: bool = False
+    waits: Waits = AS_LONG_AS_NEEDED
+    """For other processes that measure."""
+
+
+_CACHED = _Planning()
+_planning: ContextVar[_Planning] = ContextVar("planning", default=_CACHED)
+"""Of the present thread: a process may run several studies side by side."""
 
 
 def plan_with(
@@ -76,14 +89,14 @@ def plan_with(
 ) -> str | None:
     """From now on store wisdom in `folder`, which starts with that of the cache, or only estimate.
 
-    The process forgets its own wisdom. Returns a warning if the folder's wisdom is damaged.
+    This holds for the calling thread. The process forgets its own wisdom. Returns a warning if the
+    folder's wisdom is damaged.
     """
-    global _folder, _estimated, _waits
+    _planning.set(_Planning(folder, estimated, waits))
     with _planner:
-        _folder, _estimated, _waits = folder, estimated or _always_estimated, waits
         pyfftw.forget_wisdom()
         _without_lock.clear()
-    if folder is None or _estimated:
+    if folder is None or _is_estimated():
         return None
     with _planning_lock(folder):
         wisdom = read_wisdom(folder)
@@ -95,10 +108,16 @@ def plan_with(
     return f"{_path(folder)}: damaged; transforms are planned anew, last bits may differ"
 
 
+def _is_estimated() -> bool:
+    return _planning.get().estimated or _always_estimated
+
+
 def plans() -> str:
     """How this run plans: "estimated", or "measured" with the digest of its wisdom."""
-    known = None if _estimated else read_wisdom(_folder or cache_folder())
-    return "estimated" if _estimated else f"measured {_digest(known) if known else ''}".strip()
+    if _is_estimated():
+        return "estimated"
+    known = read_wisdom(_planning.get().folder or cache_folder())
+    return f"measured {_digest(known) if known else ''}".strip()
 
 
 def planned(make: Callable[[Plan], T], size: int = 0) -> T:
@@ -108,7 +127,7 @@ def planned(make: Callable[[Plan], T], size: int = 0) -> T:
     """
     fftw = partial(pyfftw.FFTW, planning_timelimit=PLANNING_SECONDS[0] + PLANNING_SECONDS[1] * size)
     with _planner:
-        if _estimated:
+        if _is_estimated():
             return make(partial(fftw, flags=("FFTW_ESTIMATE",)))
         with suppress(RuntimeError):  # not known
             return make(partial(fftw, flags=("FFTW_MEASURE", "FFTW_WISDOM_ONLY")))
@@ -117,17 +136,18 @@ def planned(make: Callable[[Plan], T], size: int = 0) -> T:
 
 def _measured(make: Callable[[Plan], T], fftw: Plan) -> T:
     """The transforms that `make` plans, measured unless another process has measured them."""
-    folder = _folder or cache_folder()
+    of_study = _planning.get().folder
+    folder = of_study or cache_folder()
     with _planning_lock(folder) as alone:
         _import(read_wisdom(folder))
         before = _export()
         transforms = make(fftw)
         is_new = _export() != before
-        if is_new and _folder is not None:
+        if is_new and of_study is not None:
             _write(folder, _export())
         elif is_new:
             _add_to_cache(alone)
-    if is_new and _folder is not None:
+    if is_new and of_study is not None:
         with _planning_lock(cache_folder()) as alone:
             _add_to_cache(alone)
     return transforms
@@ -203,11 +223,19 @@ def _write(folder: Path, wisdom: Wisdom) -> None:
 
 @contextmanager
 def _planning_lock(folder: Path) -> Iterator[bool]:
-    """Keep other processes from planning inside the block; yields whether the folder is locked."""
+    """Keep other processes from planning inside the block; yields whether the folder is locked.
+
+    The cache is made where it is missing, the folder beside a study is not.
+    """
     with ExitStack() as stack:
-        if folder not in _without_lock:
+        if folder != _planning.get().folder:
+            with suppress(OSError):
+                folder.mkdir(parents=True, exist_ok=True)
+        is_locked = folder.is_dir() and folder not in _without_lock
+        if is_locked:
             try:
-                stack.enter_context(locked(folder / "planning", waits=_waits))
+                stack.enter_context(locked(folder / "planning", waits=_planning.get().waits))
             except SpaceError:  # it may have taken minutes: not again
                 _without_lock.add(folder)
-        yield folder not in _without_lock
+                is_locked = False
+        yield is_locked

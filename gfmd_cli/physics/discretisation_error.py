@@ -31,7 +31,7 @@ from gfmd_cli.physics.error_estimates import (
     full_contact,
     on_grid,
     unknown,
-    widened,
+    with_independent_error,
 )
 from gfmd_cli.physics.linear_elastomer import LinearElastomer
 from gfmd_cli.physics.persson import Shells
@@ -272,7 +272,9 @@ def estimate(
     else:
         estimates = _estimate_periodic(grids, rough, area_exponent or ExcessExponent(n), tip)
     if fine.a_r == 1 and not band_limited:  # the grids agree and have no contact line
-        estimates = {name: widened(each, between[name]) for name, each in estimates.items()}
+        estimates = {
+            name: with_independent_error(each, between[name]) for name, each in estimates.items()
+        }
     if stepped:
         return estimates | {"sigma_p": border_stress(grids)}
     if tip.is_sharp and tip.dimension == 1 and n > MAX_RIDGE_EXPONENT:

@@ -15,6 +15,7 @@ from pydantic import Field as Key
 from pydantic import model_validator
 
 from gfmd_cli.errors import InputError
+from gfmd_cli.files.checksums import Version, file_version
 from gfmd_cli.grid.arrays import Field, Mask
 from gfmd_cli.grid.fft_grid import ALL_ROWS, Shape
 from gfmd_cli.maps.interpolation import monotone_cubic
@@ -289,7 +290,7 @@ class Tabulated(LinearElastomer):
 
     def stiffness(self, q: Field, length: float = 1.0) -> Field:
         """k(q) [Pa/m]. Raises InputError for an invalid table."""
-        k = _interpolated(_read_table(self.path))
+        k = _interpolated(_read_table(self.path).tobytes())
         return np.where(q > 0, k(np.where(q > 0, q, 1.0)), 0.0)
 
     def warnings(self, scene: Scene, boundary: str, *, is_rough: bool) -> list[str]:
@@ -360,23 +361,29 @@ def _compliance_of_table(content: bytes) -> Compliance:
     """1/k(q) from the bytes of a table; cached, because its transforms serve all grids."""
     table = np.frombuffer(content).reshape(-1, 2)
     exponent = max(_end_exponents(table)[0], 0.0)  # of rounded numbers it may be negative
-    return Compliance(_interpolated(table), separated(table[:, 0]), exponent)
+    return Compliance(_interpolated(content), separated(table[:, 0]), exponent)
 
 
 def _read_table(path: Path) -> Field:
     """The columns q [1/m] and k [Pa/m], shape (rows, 2). Raises InputError for an invalid table."""
     try:
-        # stat first: it says that there is no such file
+        version = file_version(path)
+    except OSError as error:
+        raise _unreadable(path, error) from error
+    return _table(path, version)
+
+
+@lru_cache(maxsize=4)
+def _table(path: Path, version: Version) -> Field:
+    """The columns of a table in this version; cached, because every block of rows asks for k."""
+    try:
         if path.stat().st_size > MAX_TABLE_BYTES or not path.is_file():
             raise ValueError(f"not a regular file of at most {MAX_TABLE_BYTES} bytes")
         lines = path.read_text("utf-8-sig").translate(SEPARATORS).splitlines()
         with catch_warnings(action="ignore", category=UserWarning):
             table = np.loadtxt(lines, ndmin=2)  # warns of an empty file, refused below
     except (OSError, ValueError) as error:
-        raise InputError(
-            f"{path}: elastomer.path: cannot be read: {error}; the file must be a text of two "
-            "columns of numbers, q [1/m] and k [Pa/m], with # before words"
-        ) from error
+        raise _unreadable(path, error) from error
     if table.shape[0] < 2 or table.shape[1] != 2:
         raise InputError(
             f"{path}: elastomer.path: {table.shape[0]} rows, {table.shape[1]} columns; "
@@ -387,11 +394,21 @@ def _read_table(path: Path) -> Field:
         raise InputError(
             f"{path}: elastomer.path: q and k must be finite and positive; q must increase"
         )
+    table.flags.writeable = False
     return table
 
 
-def _interpolated(table: Field) -> Callable[[Field], Field]:
-    """k(q) [Pa/m] for q > 0 from the rows q, k of a table."""
+def _unreadable(path: Path, error: Exception) -> InputError:
+    return InputError(
+        f"{path}: elastomer.path: cannot be read: {error}; the file must be a text of two "
+        "columns of numbers, q [1/m] and k [Pa/m], with # before words"
+    )
+
+
+@lru_cache(maxsize=4)
+def _interpolated(content: bytes) -> Callable[[Field], Field]:
+    """k(q) [Pa/m] for q > 0 from the bytes of a table, rows q and k."""
+    table = np.frombuffer(content).reshape(-1, 2)
     (x, y), (low, high) = np.log(table).T, _end_exponents(table)
     cubic = monotone_cubic(x, y)
 

@@ -135,14 +135,17 @@ def on_grid(value: float, error: float, verdict: Verdict = Verdict.REGULAR) -> E
     return Estimate(error, value, error, verdict)
 
 
-def widened(estimate: Estimate, error: float) -> Estimate:
-    """An estimate with another error, independent of its own."""
+def with_independent_error(estimate: Estimate, error: float) -> Estimate:
+    """An estimate with a further error, independent of its own: the squares add."""
     errors = hypot(estimate.error, error), hypot(estimate.continuum_error, error)
     return replace(estimate, error=errors[0], continuum_error=errors[1])
 
 
-def shifted(estimate: Estimate, change: float) -> Estimate:
-    """An estimate of a value that may be shifted by a change; unknown where that is NaN."""
+def with_shift(estimate: Estimate, change: float) -> Estimate:
+    """An estimate of a value that may be shifted by up to a change, which adds to the errors.
+
+    Unknown where the change is NaN.
+    """
     if isnan(change) and estimate.verdict.has_error:
         return UNKNOWN
     errors = estimate.error + change, estimate.continuum_error + change

@@ -49,8 +49,8 @@ class ReportData:
         return solved_rows(self.comparison.rows)
 
     @property
-    def failed(self) -> list[Row]:
-        """The rows whose contact is solved, but not to its tolerance."""
+    def not_converged(self) -> list[Row]:
+        """The rows whose contact is solved, but missed its tolerance, accuracy or load."""
         return [row for row in self.solved if not row["status"].is_converged]
 
     @property
@@ -74,10 +74,9 @@ class ReportData:
         """Prefix of the names of figures that each of two studies has."""
         return f"{self.letter}-" if self.letter else ""
 
-    @property
-    def in_si(self) -> bool:
-        """Whether metres and pascals mean something in some contact."""
-        return any(map(in_si, self.solved))
+    def in_si(self, unit: str) -> bool:
+        """Whether values in this unit mean something in some contact."""
+        return any(in_si(row, unit) for row in self.solved)
 
     def json(self, attribute: str) -> dict[str, Any]:
         """An attribute that holds JSON; empty where it holds none."""

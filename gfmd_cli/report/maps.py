@@ -55,7 +55,7 @@ class Scale(NamedTuple):
 
     def axis(self, row: Row, largest_value: float, label: str) -> tuple[float, str]:
         """A divisor for values up to `largest_value`, and the label with its unit."""
-        if in_si(row):
+        if in_si(row, self.si):
             divisor, unit = scaled(largest_value, self.si)
             return divisor, f"{label} ({unit})"
         return float(row[self.column]), f"{label} / {self.symbol}"

@@ -16,7 +16,7 @@ from gfmd_cli.report.theme import variables
 
 OWN, SHARED = True, False
 SECTIONS: tuple[tuple[Callable[[ReportData], Section], bool], ...] = (
-    (sections.failures, OWN),
+    (sections.not_converged, OWN),
     (measured_surface, OWN),
     (sections.contact_area, SHARED),
     (sections.mean_gap, SHARED),

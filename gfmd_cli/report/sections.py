@@ -1,8 +1,8 @@
 """Sections: the figures of `gfmd analyze` and `gfmd bench`, with the tables behind them.
 
 Contact area, mean gap and stress deviation over the pressure, distribution of the stress, speed
-against error; error bars and optional observables, which are tables alone; what failed, how two
-studies differ, where a study comes from.
+against error; error bars and optional observables, which are tables alone; what has not converged,
+how two studies differ, where a study comes from.
 """
 
 import json
@@ -23,13 +23,13 @@ from gfmd_cli.report.data import ReportData, item_title
 from gfmd_cli.report.section import Section, drawing
 from gfmd_cli.units import count
 
-MAX_ROWS = 100  # contacts that the table of failures lists
+MAX_ROWS = 100  # contacts that the table of contacts that have not converged lists
 MACHINE = ("node", "system", "processor", "cores", "python", "slurm_job")
-UNCONVERGED_CAPTION = (
+NOT_CONVERGED_CAPTION = (
     "Contacts that missed the requested tolerance, accuracy or load, see the reasons. Their values "
     "are kept; figures show them as ×, ☆ or ✚."
 )
-UNCONVERGED = (
+NOT_CONVERGED = (
     TASK,
     ELASTOMER,
     TableColumn("surface", "surface"),
@@ -180,16 +180,16 @@ def work_precision(data: ReportData) -> Section:
     )
 
 
-def failures(data: ReportData) -> Section:
+def not_converged(data: ReportData) -> Section:
     """Contacts that are not converged or missing."""
-    failed, missing = data.failed, data.missing
+    not_converged, missing = data.not_converged, data.missing
     tasks = ", ".join(missing[:MAX_ROWS]) + (", ..." if len(missing) > MAX_ROWS else "")
-    left_out = len(failed) > MAX_ROWS
+    left_out = len(not_converged) > MAX_ROWS
     return Section(
-        "What failed or is missing",
-        notes=[f"The first {MAX_ROWS} of {len(failed)} are listed."] if left_out else [],
-        tables=[Table(UNCONVERGED_CAPTION, UNCONVERGED, [Group("", failed[:MAX_ROWS])])],
-        template="failures.html",
+        "Not converged or missing",
+        notes=[f"The first {MAX_ROWS} of {len(not_converged)} are listed."] if left_out else [],
+        tables=[Table(NOT_CONVERGED_CAPTION, NOT_CONVERGED, [Group("", not_converged[:MAX_ROWS])])],
+        template="not_converged.html",
         content={"count": count(len(missing), "contact"), "tasks": tasks} if missing else None,
     )
 

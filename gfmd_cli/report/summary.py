@@ -39,7 +39,7 @@ def headline(data: ReportData) -> str:
         f"{count(len(data.comparison.rows), 'contact')}: {_names_of(elastomers, 'elastomer')}, "
         f"{_names_of(surfaces, 'surface')}, {count(seeds, 'seed') + ', ' if seeds > 1 else ''}"
         f"{pressures} from p* = {_span(rows, 'p_star')}"
-        f"{f' ({pascals})' if data.in_si else ''}, {grid_size(rows)}."
+        f"{f' ({pascals})' if data.in_si('Pa') else ''}, {grid_size(rows)}."
     )
 
 
@@ -52,7 +52,7 @@ def _names_of(names: list[str], what: str) -> str:
 
 def success(data: ReportData) -> str:
     """Statement that all contacts have converged; empty if some have not."""
-    if data.failed or data.missing:
+    if data.not_converged or data.missing:
         return ""
     total = len(data.comparison.rows)
     return f"All {total} contacts converged." if total > 1 else "The contact converged."
@@ -77,14 +77,14 @@ def _quantities(data: ReportData) -> list[KeyNumber]:
     rows = data.comparison.records
     p_star = _span(rows, "p_star")
     note = f"a_r, share of the nominal area{_continuum_note(rows, 'a_r')}"
-    pressure, scales = ("Pressure", p_star, "p*, in units of Delta_sigma"), []
-    if data.in_si:
+    pressure = ("Pressure", p_star, "p*, in units of Delta_sigma")
+    scales: list[KeyNumber] = []
+    if data.in_si("Pa"):
         pressure = ("Pressure", _span(rows, "pressure", "Pa"), f"p* = {p_star}")
+        scales = [("Unit of stress", _span(rows, "delta_sigma", "Pa"), _unit_note(rows))]
+    if data.in_si("m"):
         side = f"rms height h_std, side {_span(rows, 'length', 'm')}"
-        scales = [
-            ("Unit of stress", _span(rows, "delta_sigma", "Pa"), _unit_note(rows)),
-            ("Roughness", _span(rows, "h_std", "m"), side),
-        ]
+        scales.append(("Roughness", _span(rows, "h_std", "m"), side))
     return [
         pressure,
         ("Contact area", _span(rows, "a_r_best"), note),
@@ -106,7 +106,7 @@ def _scaled(data: ReportData, title: str, name: str) -> KeyNumber:
     symbol, scale, unit = QUANTITIES[name]
     rows = data.comparison.records
     reduced, where = _column(rows, f"{name}_best"), _continuum_note(rows, name)
-    if not data.in_si:
+    if not data.in_si(unit):
         return title, span(reduced), f"{symbol}{where}"
     values = [value * row[scale] for value, row in zip(reduced, rows, strict=True)]
     return title, span(values, unit), f"{symbol} = {span(reduced)}{where}"
@@ -158,8 +158,8 @@ def csv_address(data: ReportData) -> str:
 def warnings(data: ReportData) -> list[str]:
     """Warnings above the results: missing, doubtful and unresolved values."""
     total, parts = len(data.comparison.rows), []
-    if data.failed:
-        missed = Counter(row["status"].shortfall for row in data.failed)
+    if data.not_converged:
+        missed = Counter(row["status"].shortfall for row in data.not_converged)
         parts += [f"{number} of {total} contacts: {what}" for what, number in missed.items()]
     if data.missing:
         parts.append(f"{len(data.missing)} of {total} are not solved yet")

@@ -119,7 +119,8 @@ def _spectrum_figure(names: list[str], shown: Sequence[Spectrum], dimension: int
     for curve, style in zip(shown, distinct_styles(distinct_labels(names)), strict=True):
         if curve.fit is not None:
             line = {"color": style.colour, "lw": 0.7}
-            plot.unnamed_line((style.label,), curve.q, curve.fitted, **line)
+            fitted = np.where(curve.fitted > 0, curve.fitted, np.nan)  # it ends at q_s
+            plot.unnamed_line((style.label,), curve.q, fitted, **line)
         plot.points(style, curve.q, curve.density)
     plot.scale("x", "log", np.concatenate([curve.q for curve in shown]))
     plot.scale("y", "log", np.concatenate([curve.density for curve in shown]))

@@ -141,7 +141,7 @@ class Checkpoint:
         first = grid.own.start or 0
         file = name if grid.whole else f"{name}{first}"
         try:
-            self.folder.mkdir(parents=True, exist_ok=True)
+            self.folder.mkdir(exist_ok=True)
             crc = _write_slot(self.folder / file, list(fields.values()))
         except OSError as error:
             raise SpaceError(f"{self.folder}: cannot be written: {error.strerror}") from error

@@ -55,6 +55,8 @@ class WorkerOptions:
     """Whether results must not depend on the machine: to reach `memory` is an error then."""
     checkpoint_every: float = inf
     """Time between two saves of the state of a solve [s]."""
+    wait_until: float = inf
+    """Time of the monotonic clock after which no lock is waited for any longer [s]."""
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,7 @@ from gfmd_cli.errors import InputError
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.physics.approach import estimated_pressures
 from gfmd_cli.physics.contact import PRESSURE_RANGE, Scene
-from gfmd_cli.physics.error_estimates import shifted
+from gfmd_cli.physics.error_estimates import with_shift
 from gfmd_cli.physics.observables import QUANTITIES
 from gfmd_cli.physics.persson import Persson
 from gfmd_cli.spec.models import LOADS
@@ -184,7 +184,7 @@ def _with_errors_at_load(
     for other in solved.estimates.keys() - {name}:
         steepest = max((each[other] for each in slopes), default=nan) / units[other]
         change = steepest * -log1p(-solved.pressure_error)
-        solved.estimates[other] = shifted(solved.estimates[other], change)
+        solved.estimates[other] = with_shift(solved.estimates[other], change)
 
 
 def _check_known(task: Task, solved: TaskSolution) -> None:

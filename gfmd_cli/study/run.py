@@ -3,12 +3,13 @@
 from collections import Counter
 from contextlib import ExitStack
 from dataclasses import dataclass
+from math import inf
 from pathlib import Path
 from threading import Event
 from time import monotonic
 
 from gfmd_cli.errors import InputError, Interrupted, SpaceError
-from gfmd_cli.files.locks import Waits
+from gfmd_cli.files.locks import AS_LONG_AS_NEEDED, Waits
 from gfmd_cli.grid import plans
 from gfmd_cli.grid.ranks import Ranks, is_root, on_root, shared_errors
 from gfmd_cli.physics.file_surface import forget_files
@@ -16,6 +17,7 @@ from gfmd_cli.spec.models import Spec
 from gfmd_cli.status import Status
 from gfmd_cli.study.context import Progress, Report, SolveContext, WorkerOptions
 from gfmd_cli.study.measure import forget_spectra
+from gfmd_cli.study.plausibility import unit_of_grids
 from gfmd_cli.study.pool import solve_in_pool
 from gfmd_cli.study.refinement import forget_scenes
 from gfmd_cli.study.resources import check_memory, jobs_and_threads, seconds_to_stop, usable_memory
@@ -42,7 +44,8 @@ class RunOptions:
     checkpoint_every: float = 600.0
     """Time between two saves of the state of a solve [s]."""
     max_seconds: float | None = None
-    """Wall time before which the run saves all states and stops, as after a signal."""
+    """Wall time before which the run saves all states and stops, as after a signal; a wait for
+    another process ends with it."""
     reproducible: bool = False
     """Whether to plan transforms without measuring, with one thread a task."""
     ranks: Ranks | None = None
@@ -86,7 +89,8 @@ def run_study(
     forget_scenes()
     forget_spectra()
     stop = Event()
-    waits = Waits(stop if ranks is None else None)  # ranks stop together
+    end = monotonic() + (inf if options.max_seconds is None else options.max_seconds)
+    waits = Waits(stop, end) if ranks is None else AS_LONG_AS_NEEDED  # ranks stop together
     study = Study(path, waits)
     tasks = plan(spec)
     if ranks is not None and (names := spec.output.on_request()):
@@ -105,7 +109,7 @@ def run_study(
     check_memory(pending, ranks)
     jobs, threads = jobs_and_threads(pending, options.jobs, options.reproducible, ranks)
     worker_options = WorkerOptions(
-        threads, usable_memory(ranks) / jobs, options.reproducible, options.checkpoint_every
+        threads, usable_memory(ranks) / jobs, options.reproducible, options.checkpoint_every, end
     )
     if is_root(ranks):
         report = _noting_failures(report, tasks, study.parts)
@@ -119,7 +123,7 @@ def run_study(
         work.callback(plans.plan_with, None)
         unusable = plans.plan_with(study.parts, estimated=options.reproducible, waits=waits)
         context.warn(*(f"{study.path}: the old one is kept as {new}" for new in moved))
-        context.warn(*damaged, *filter(None, [unusable, _changing_unit(pending)]))
+        context.warn(*damaged, *filter(None, [unusable, unit_of_grids(pending)]))
         try:
             solved = _solve_all(pending, study.parts, jobs, context)
         finally:
@@ -132,17 +136,6 @@ def run_study(
         if not any(status.is_failure for status in solved):
             _check_output(pending, on_root(ranks, study.outcomes))
     return counts + solved
-
-
-def _changing_unit(tasks: list[Task]) -> str:
-    """A warning about a p* that is another pressure on every grid; "" where there is none."""
-    changing = [task for task in tasks if not task.has_fixed_unit]
-    if len({task.points for task in changing}) < 2:
-        return ""
-    return (
-        f"load.p_star: Delta_sigma of the surface ({changing[0].surface.kind}) depends on the "
-        "grid, so that p* is another pressure on every grid; give load.pressure to compare grids"
-    )
 
 
 def _until(end: float, stop: Event, report: Report) -> Report:

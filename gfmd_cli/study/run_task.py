@@ -122,6 +122,7 @@ def attempt(task: Task, parts: Path, context: SolveContext) -> Status:
         with shared_errors(context.ranks):
             return solve_task(task, parts, context)
     except Interrupted:
+        context.stop.set()  # where the time of the run has ended in a wait for a lock
         status, message = Status.INTERRUPTED, ""
     except (GfmdError, MemoryError, ArithmeticError, OSError) as error:
         status = Status.NO_SPACE if isinstance(error, SpaceError) else Status.FAILED
@@ -143,6 +144,8 @@ def solve_task(task: Task, parts: Path, context: SolveContext) -> Status:
 
     Raises Interrupted after the state was saved, InputError, SpaceError.
     """
+    if not parts.is_dir():
+        raise SpaceError(f"{parts}: renamed or deleted during the run")
     context.report(Progress(task.index, "start", task.label))
     _check_files(task)  # before the work for it begins
     gfmd_version()  # kept from now on: the source tree may be updated during the solve

@@ -53,6 +53,8 @@ class Study:
             raise InputError(f"{path}: a folder, where a study file (NAME.h5) is expected")
         self._entries: dict[tuple[Path, Version], Entry] = {}
         """The records read so far, by path and version."""
+        self._held: os.stat_result | None = None
+        """The lock in the folder of unfinished work that this process has, inside `work`."""
         is_usual = self.path.suffix == ".h5"
         self.parts = self.path.with_suffix(".parts" if is_usual else f"{self.path.suffix}.parts.d")
 
@@ -61,7 +63,8 @@ class Study:
         """The folder of unfinished work; others may work in it as well, also on other tasks.
 
         Yields what was found damaged, and set aside. The last one to leave removes the folder
-        unless something is left to do there. Raises InputError, SpaceError.
+        unless something is left to do there. Raises InputError, and SpaceError, also where the
+        folder was renamed or deleted meanwhile.
         """
         check_place(self.path)
         unfinished_work.check_own(self.parts)
@@ -72,9 +75,12 @@ class Study:
                     with suppress(OSError):
                         path.unlink()
         with locked(in_use, shared=True, waits=self._waits):
+            self._held = in_use.stat()
             with self._collecting():
                 _, damaged = self._sound_records()
             yield damaged
+            self._check_held()
+            self._held = None
         with self._collecting(), locked(in_use, wait=False) as alone:
             if alone and self._is_complete(tasks):
                 unfinished_work.remove_parts(self.parts)
@@ -102,6 +108,7 @@ class Study:
         Returns what was found damaged; its task is solved again by the next run. Raises
         SpaceError, StudyError where the study itself is damaged.
         """
+        self._check_held()
         with self._collecting():
             records, damaged = self._sound_records()
             with ExitStack() as stack:
@@ -185,6 +192,17 @@ class Study:
     def record_paths(self) -> list[Path]:
         """The records that are not collected yet."""
         return sorted(self.parts.glob(f"*{unfinished_work.SUFFIX}"))
+
+    def _check_held(self) -> None:
+        """Raise SpaceError where the folder of unfinished work is no longer that of `work`."""
+        lock: os.stat_result | None = None
+        with suppress(FileNotFoundError):
+            lock = (self.parts / "in-use").stat()
+        if self._held and not (lock and os.path.samestat(lock, self._held)):
+            raise SpaceError(
+                f"{self.parts}: renamed or deleted during the run, with all results that were not "
+                "collected yet; give it back its name and run again"
+            )
 
     def _collecting(self) -> Any:
         """Keep other collectors out."""

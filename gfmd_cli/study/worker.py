@@ -3,6 +3,7 @@
 import faulthandler
 import os
 import sys
+from contextlib import suppress
 from multiprocessing.connection import Connection
 from queue import SimpleQueue
 from threading import Event, Thread
@@ -10,6 +11,7 @@ from threading import Event, Thread
 from gfmd_cli.errors import Interrupted
 from gfmd_cli.files.locks import Waits
 from gfmd_cli.grid import plans
+from gfmd_cli.status import Status
 from gfmd_cli.study.context import SolveContext
 from gfmd_cli.study.run_task import attempt
 from gfmd_cli.study.signals import handle_signals_in_worker
@@ -34,12 +36,16 @@ def serve(pipe: Connection) -> None:
     except RuntimeError as error:
         sys.exit(f"gfmd: a worker process: {error} (see ulimit -u)")
     try:
-        waits = Waits(context.stop, run=os.getppid())
+        waits = Waits(context.stop, options.wait_until, run=os.getppid())
         plans.plan_with(parts, estimated=options.reproducible, waits=waits)
         pipe.send(READY)
         while True:
             pipe.send(attempt(tasks.get(), parts, context))
-    except (BrokenPipeError, Interrupted):  # the run has ended, or stops before the first task
+    except BrokenPipeError:  # the run has ended
+        os._exit(1)
+    except Interrupted:  # no plans before the end of the run: it stops before the first task
+        with suppress(OSError):
+            pipe.send(Status.INTERRUPTED)
         os._exit(1)
 
 

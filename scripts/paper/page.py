@@ -138,7 +138,7 @@ def _wavelengths(rows: list[dict[str, Any]]) -> tuple[str, str]:
 def sizes(studies: StoredStudies) -> str:
     """The studies of the page as a Markdown table, beside their full size where one is smaller."""
     heads = ["study", "L/λᵣ", "λᵣ/λₛ", "grids (points per side)", "surfaces", "contacts"]
-    heads += ["missed their tolerance", "`make paper`"]
+    heads += ["not converged", "`make paper`"]
     lines = []
     for name in (name for name in STUDIES if studies.has(name)):
         rows = studies.rows(name)

@@ -139,7 +139,7 @@ def run(name: str, folder: Path, quick: bool, jobs: int | None = None) -> None:
     command += ["-j", jobs] if jobs else []
     command += [word for setting in settings.values() for word in ("--set", setting)]
     done = subprocess.run([str(word) for word in command], check=False)
-    if done.returncode not in (0, 1):  # 1: some contact missed its tolerance, which its row says
+    if done.returncode not in (0, 1):  # 1: some contact has not converged, which its row says
         raise SystemExit(done.returncode)
 
 
