@@ -3,7 +3,8 @@
     python scripts/noise_of_maps.py [contacts | sound | noisy]
 
 "contacts": errors of contacts on the half-space, as `rounded_heights.py`. "sound": random and
-structured surfaces without noise. "noisy": random surfaces with noise. The tables of docs/scans.md.
+structured surfaces without noise. "noisy": random surfaces with noise. The tables of
+docs/map_evidence.md.
 """
 
 import argparse

@@ -34,7 +34,7 @@ def noisy(topography: Topography, spacing: tuple[float, ...], scale: float) -> s
 
     `spacing` is that of the map [m], `scale` the factor to metres. Roughness that is as short as
     the distance of the points, beside longer waves, looks the same. The limits are calibrated in
-    docs/scans.md.
+    docs/map_evidence.md.
     """
     heights = topography.with_gaps()
     if heights.ndim == 1 or min(heights.shape) < MIN_POINTS:
