@@ -59,8 +59,8 @@ other keys, as in `gfmd run configs/paper/fig13.toml -o results/paper/fig13.h5 -
 """
 
 THEORY = """\
-[Theory beyond the paper](theory.md) examines whether one smooth $\\gamma(n)$ is sufficient (Eq. 39), and what
-$\\Delta\\sigma$ over the true contact predicts (Sects. 6, 7).
+[Weights of the elastic energy](energy_weights.md) examines whether one smooth $\\gamma(n)$ is sufficient (Eq. 39), and
+[Full-contact stress over the contact](true_contact.md) what $\\Delta\\sigma$ over the true contact predicts (Sects. 6, 7).
 """
 
 MISPRINTS = r"""
