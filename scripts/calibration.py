@@ -43,7 +43,7 @@ PRESSURES = np.geomspace(0.003, 3.0, 9)
 WIDE = (0.0, 0.5, 1.0, 1.0, 1.5, 2.0, 2.5, 3.0)
 MAP_EXPONENTS = (0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0)
 IRREGULAR = ("clipped", "worn", "steps", "stripes", "stretched", "turned")
-"""Kinds of maps; in docs/accuracy.md worn ones are "polished", stripes "two levels", turned ones
+"""Kinds of maps; in docs/calibration.md worn ones are "polished", stripes "two levels", turned ones
 "stretched at an angle"."""
 FREE_EXPONENTS = (0.0, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 1.75)
 """Exponents of an elastomer with a free boundary."""

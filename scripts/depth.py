@@ -1,7 +1,7 @@
 """Errors of Persson theory over lambda_r / lambda_s: what a longer spectrum changes.
 
 Reads the studies `depth` and `resolution` of scripts/theory_studies.py and prints the tables of
-docs/theory.md, and the areas of one spectrum on three grids.
+docs/mean_gap.md, and the areas of one spectrum on three grids.
 
 python scripts/depth.py --folder results/theory
 """
@@ -27,7 +27,7 @@ def over_theory(curve: Curve, name: str) -> np.ndarray:
 
 
 def area_ratio(curve: Curve) -> np.ndarray:
-    """Contact area without the excess of the grid (docs/accuracy.md) over that of the theory."""
+    """Contact area without the excess of the grid (docs/error_estimates.md) over the theory."""
     n, points = curve.rows[0]["n"], curve.rows[0]["points"]
     excess = AREA_EXCESS * n * curve.column("perimeter") / points
     return (curve.column("a_r") - excess) / curve.predict(curve.column("p_star")).a_r

@@ -33,8 +33,8 @@ def power_law_force(n: float, m: float, k: float, R: float, a: Field | float) ->
     """Force that makes a contact of radius a with h = -r^m / (m R^(m-1)), a << L.
 
     F = pi 2^(n-1) Gamma(m/2 + 1) k a^(m+2-n) / [Gamma(2 - n/2) Gamma(m/2 + 2 - n/2) R^(m-1)], see
-    docs/physics.md. For m > 0 and 0 <= n <= 2; for 2 < n < 4 the stress is compressive everywhere
-    only for n - 2 < m <= 2.
+    docs/verification.md. For m > 0 and 0 <= n <= 2; for 2 < n < 4 the stress is compressive
+    everywhere only for n - 2 < m <= 2.
     """
     valid = m > 0 and (0 <= n <= 2 or (n < 4 and n - 2 < m <= 2))
     _require(valid, f"no disc of contact for this exponent, got n = {n}, m = {m}")

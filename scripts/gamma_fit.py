@@ -1,8 +1,8 @@
 """The weight gamma of Persson theory, from simulated mean gaps, and what it predicts elsewhere.
 
 Reads the studies `gamma` and `slab` of scripts/theory_studies.py, prints the tables of
-docs/theory.md, and draws its figure. Constants are fitted to the training seeds, and errors are
-those on the test seeds.
+docs/energy_weights.md, and draws its figure. Constants are fitted to the training seeds, and errors
+are those on the test seeds.
 
 python scripts/gamma_fit.py --folder results/theory --figure docs/figures/gamma
 """
@@ -28,7 +28,7 @@ SEEDS = [*TRAINING, *TEST]
 FITTED, HELD_OUT = slice(0, len(TRAINING)), slice(len(TRAINING), None)  # of SEEDS
 GRID, FINER = 512, 1024
 GAMMA = (0.2900, 0.7950, 0.2219)
-"""What `fit` finds for all spectra: the curve "fitted" of docs/theory.md."""
+"""What `fit` finds for all spectra: the curve "fitted" of docs/energy_weights.md."""
 Gamma = Callable[[np.ndarray], np.ndarray]
 Key = tuple[str, float, float]
 """Name of the spectrum, Hurst exponent, n."""

@@ -1,4 +1,4 @@
-"""Contact stiffness over mean gap, and percolation of the gap, for every n: docs/theory.md.
+"""Contact stiffness over mean gap, and percolation of the gap: docs/contact_stiffness.md.
 
 Reads the studies `stiffness`, `surfaces`, `percolation` and `thresholds` of
 scripts/theory_studies.py, prints tables and draws two figures.
@@ -137,7 +137,7 @@ def print_differences(curves: Curves) -> None:
 
 
 def areas(curves: Curves, n: float, points: int) -> np.ndarray:
-    """Contact areas without the excess of the grid (docs/accuracy.md) where that is known."""
+    """Contact areas without the excess of the grid (docs/error_estimates.md), where it is known."""
     counted = column(curves, n, "a_r", points)
     if n > MAX_AREA_EXPONENT:
         return counted

@@ -4,7 +4,7 @@
 
 "contacts": errors of contacts on the half-space, as `rounded_heights.py`. "filters": contact areas
 of noisy maps with the S-filter that the warning names. "sound": random and structured surfaces
-without noise. "noisy": random surfaces with noise. The tables of docs/scans.md.
+without noise. "noisy": random surfaces with noise. The tables of docs/map_evidence.md.
 """
 
 import argparse

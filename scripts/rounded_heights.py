@@ -1,4 +1,4 @@
-"""Errors of a contact if the heights of its map are rounded: the table of docs/scans.md.
+"""Errors of a contact if the heights of its map are rounded: the table of docs/map_evidence.md.
 
     python scripts/rounded_heights.py
 

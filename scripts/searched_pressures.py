@@ -3,7 +3,7 @@
 Each case has a contact area or a mean gap as the load. It is solved with [accuracy] on 64 and 128
 points per side, and on `--finer` times 64 points, whose results are the reference. A line for each
 kind of case and quantity says how many error bars hold of those that are given, how many are
-"unknown", and the median of bar over error: docs/accuracy.md.
+"unknown", and the median of bar over error: docs/calibration.md.
 
     python scripts/searched_pressures.py --count 240 --seed 1
 """

@@ -1,8 +1,8 @@
 """Self-affine fits of scans with borders: parts of Gaussian rough surfaces with a known spectrum.
 
-Prints docs/scans.md's table: mean and standard deviation over seeds of H, lambda_s, lambda_r and
-the rms height of the fit, the last three relative to those of the whole surface, and the median of
-the standard errors of H that the fits state.
+Prints the table of docs/map_evidence.md: mean and standard deviation over seeds of H, lambda_s,
+lambda_r and the rms height of the fit, the last three relative to those of the whole surface, and
+the median of the standard errors of H that the fits state.
 
 With --search: the errors of fits to periodic surfaces of random phases, of which the fit is exact,
 so that they are those of the search for the largest likelihood (`SEARCH_ERROR`).

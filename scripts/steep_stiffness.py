@@ -1,6 +1,8 @@
 """Transforms for tabulated k(q) that are steep or have a step: what the limit of the levels saves.
 
-    python scripts/steep_stiffness.py     # the numbers of docs/solvers.md and docs/hard_cases.md
+    python scripts/steep_stiffness.py
+
+The numbers of docs/solver_measurements.md and docs/hard_cases.md.
 
 Self-affine surface, seed 0, natural residual 1e-6, no direct solves. Prints a Markdown table of
 transforms: with the limit on the growth of k(q) between levels, without it, and with the Green's

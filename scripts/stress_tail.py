@@ -1,7 +1,7 @@
 """Exponent of the tail of Pr(sigma) at n = 3, by window of stress and by grid.
 
-Reads the study of configs/paper/fig13.toml and prints the table of docs/theory.md, and from grid to
-grid the increments of sigma_p^2 and the length of the contact line.
+Reads the study of configs/paper/fig13.toml and prints the table of docs/stress_distribution.md, and
+from grid to grid the increments of sigma_p^2 and the length of the contact line.
 
 python scripts/stress_tail.py --study results/paper/fig13.h5
 """

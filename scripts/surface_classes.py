@@ -2,7 +2,7 @@
 
 Each map has 64^2 points and Fourier interpolation; n = 0.5, 1, 2 and p* = 0.02, 0.1, 0.4. Contacts
 on 64^2 (one grid) and 128^2 points (two grids) are compared with 1024^2. A line for each kind says
-how many bars hold, of those that are given: docs/accuracy.md.
+how many bars hold, of those that are given: docs/calibration.md.
 
 python scripts/surface_classes.py --count 8
 python scripts/surface_classes.py --count 8 --laws      # the laws of random surfaces for all kinds

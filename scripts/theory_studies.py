@@ -1,4 +1,4 @@
-"""The studies that docs/theory.md is made from: written as specs and solved, one after another.
+"""The studies of the pages that docs/theory.md names, written as specs and solved one by one.
 
 Each study is one study file, and a second call resumes a stopped run. All together take about an
 hour on one core.

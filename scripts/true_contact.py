@@ -1,4 +1,4 @@
-"""Persson theory with Delta_sigma over the contact: tables and figure of docs/theory.md.
+"""Persson theory with Delta_sigma over the contact: tables and figure of docs/true_contact.md.
 
 Reads the study `true-contact` of scripts/theory_studies.py.
 

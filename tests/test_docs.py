@@ -48,6 +48,7 @@ PATHS = re.compile(
     r"|bench|grid|files|cli)/[\w./-]*[\w/])"
 )
 """Names of files and folders in the running text of a page."""
+LINK = re.compile(r"\]\((?!https?:)([^)#\s]*)(?:#([^)\s]*))?\)")
 LAST_DIGITS = 3  # in units of the last one that the page has
 RELATIVE = 2e-3  # or this, where rounding sends two solves different ways
 SMALL = 1e-5  # below it, numbers of two digits are residuals: as large as they happen to be
@@ -320,6 +321,27 @@ def test_every_file_that_the_page_names_exists(page):
     named = {path for text in quoted for path in PATHS.findall(text)}
     folders = (ROOT, ROOT / "gfmd_cli")
     assert {path for path in named if not any((f / path).exists() for f in folders)} == set()
+
+
+def anchors(page: Path) -> set[str]:
+    """The anchors of the headings of a page, as GitHub forms them; mkdocs checks its own."""
+    titles = re.findall(r"^#+ (.*)$", FENCE.sub("", page.read_text(encoding="utf-8")), re.M)
+    return {re.sub(r"[^a-z0-9_ -]", "", title.lower()).replace(" ", "-") for title in titles}
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name)
+def test_every_link_of_the_page_leads_to_a_file_and_a_heading(page):
+    for path, anchor in LINK.findall(FENCE.sub("", page.read_text(encoding="utf-8"))):
+        file = page.parent / path if path else page
+        assert file.exists(), path
+        assert not anchor or anchor in anchors(file), f"{path}#{anchor}"
+
+
+def test_every_page_that_the_code_names_exists():
+    code = [*(ROOT / "gfmd_cli").rglob("*.py"), *SCRIPTS, *(ROOT / "tests").rglob("*.py")]
+    texts = [file.read_text(encoding="utf-8") for file in code]
+    named = {page for text in texts for page in re.findall(r"\bdocs/[\w-]+\.md\b", text)}
+    assert {page for page in named if not (ROOT / page).exists()} == set()
 
 
 def test_every_test_file_that_the_makefile_names_exists():

@@ -45,10 +45,10 @@ def pages_with(query: str, index) -> set[str]:
     ("query", "pages"),
     [
         ("AFM", {"index.html", "gallery.html", "tutorial.html"}),
-        ("leak", {"gallery.html", "physics.html", "tutorial.html"}),
+        ("leak", {"gallery.html", "observables.html", "tutorial.html"}),
         ("stiffness", {"gallery.html", "physics.html", "study-file.html", "symbols.html"}),
-        ("conductance", {"gallery.html", "physics.html"}),
-        ("percolates_x", {"physics.html", "study-file.html"}),
+        ("conductance", {"gallery.html", "observables.html"}),
+        ("percolates_x", {"observables.html", "study-file.html"}),
         ("p_star", {"configuration.html", "symbols.html"}),
         ("tamaas", {"coming_from.html"}),
     ],

@@ -1,7 +1,7 @@
 """Signs of a map whose numbers were read or saved wrongly: type, byte order, order of the lines.
 
 Each function returns a warning, or "" if what its docstring describes does not occur. The limits
-lie between the values of sound and of damaged maps (`docs/scans.md`).
+lie between the values of sound and of damaged maps (`docs/map_evidence.md`).
 """
 
 from dataclasses import replace

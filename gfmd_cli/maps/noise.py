@@ -40,7 +40,7 @@ def noisy(
 
     `spacing` is that of the map [m], `scale` the factor to metres, `cutoff` that of the S-filter
     [m]. Roughness that is as short as the distance of the points, beside longer waves, looks the
-    same. The limits are calibrated in docs/scans.md.
+    same. The limits are calibrated in docs/map_evidence.md.
     """
     heights = topography.with_gaps()
     if heights.ndim == 1 or min(heights.shape) < MIN_POINTS:

@@ -1,7 +1,7 @@
 """Discretisation errors of the observables on a grid, and estimates of their continuum values.
 
 Most constants were fitted to one half of the calibration set of `scripts/calibration.py` and
-checked on the other (docs/accuracy.md names the exceptions): elastomers of n = 0 to 4 and slabs,
+checked on the other (docs/calibration.md names the exceptions): elastomers of n = 0 to 4 and slabs,
 random and simple surfaces, each on up to six nested grids. Contacts of few patches and surfaces
 that are not isotropic or not band-limited are left to `error_estimates`. Symbols: x = contact line
 per area times spacing, that is contact switches per point; n = exponent of the stiffness k(q); w =

@@ -37,7 +37,7 @@ PLATE = 0.1
 """Largest q t up to which a slab is a plate; its stiffness is then smaller by 0.2 % or less."""
 NEARLY_INCOMPRESSIBLE = 0.48
 """Poisson's ratio of a bonded layer above which a load with a free boundary is wrong by 3 % or more
-if pixels are wider than the layer is thick; measured, see docs/accuracy.md."""
+if pixels are wider than the layer is thick; measured, see docs/calibration.md."""
 MAX_EXTRAPOLATED = 0.1  # fraction of squared stress or height beyond a table; a choice
 MAX_FALLING = 0.5  # fraction of squared stress at waves where the k(q) of a table falls; a choice
 FALLING_EXPONENT = -0.05  # of k(q), over an octave, so that rounded numbers do not count; a choice

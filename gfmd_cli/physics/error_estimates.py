@@ -4,9 +4,9 @@ These are contacts of few patches (except for a_r on isotropic band-limited surf
 clipped, stepped, anisotropic or measured, and contacts with a free boundary. One grid gives no
 error. Most constants were fitted to one half of the calibration set (`scripts/calibration.py`:
 maps, and random surfaces with less than six patches; with `--free` for a free boundary) and checked
-on the other (docs/accuracy.md names the exceptions). Each factor is the largest that any class of
-surface needs for 95 of 100 bars. Symbols: D = change of an observable from the coarser to the finer
-grid, x = contact line times spacing.
+on the other (docs/calibration.md names the exceptions). Each factor is the largest that any class
+of surface needs for 95 of 100 bars. Symbols: D = change of an observable from the coarser to the
+finer grid, x = contact line times spacing.
 
 With a free boundary some bars are wider. Where contact reaches the border of the map, the stress
 has the singularity of a punch: s^(-n/2) at the distance s from the border. Then <sigma^2> converges

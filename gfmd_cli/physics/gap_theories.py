@@ -1,9 +1,9 @@
-"""Two theories of the mean gap that are not in the paper; docs/theory.md compares them.
+"""Two theories of the mean gap that are not in the paper; docs/mean_gap.md compares them.
 
 `FittedWeight` has another weight of the elastic energy, with constants that scripts/gap_theories.py
 fits to simulations.
 
-`CoarseGrained` has no constant of its own (docs/physics.md): waves are added to the interface, the
+`CoarseGrained` has no constant of its own (docs/theory.md): waves are added to the interface, the
 shortest first. With all waves shorter than a wavelength the interface has a law u_g(p). Under a
 longer wave it acts as springs of stiffness kappa = -dp/du_g in series with the elastomer of
 stiffness k(q), so that the elastomer follows the fraction T = kappa / (kappa + k) of the wave. The

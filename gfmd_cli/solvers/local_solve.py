@@ -34,7 +34,7 @@ the relative error of the operators; the largest is a choice, because an evaluat
 takes longer than a few steps on tiles."""
 ACCEPTED_FRACTION = 0.75
 """Of the tolerance, for the predicted residual of the start. The residual itself may be larger
-(docs/solvers.md)."""
+(docs/solver_measurements.md)."""
 TARGET_FRACTION = 0.5  # of the tolerance, for that residual after the next solve; a choice
 MAX_ROUNDING = sqrt(1 - ACCEPTED_FRACTION**2) / ROUNDING_MARGIN
 """Of the tolerance, for the rounding of an evaluation in single precision that may be the last."""

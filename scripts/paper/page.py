@@ -53,14 +53,14 @@ SIZES = """\
 ## Sizes of the studies
 
 The paper has λᵣ/λₛ = 100 in most studies and grids of up to 16384² points. How the mean gap and the contact area depend
-on λᵣ/λₛ from 8 to 128 is [measured](theory.md#trend-with-the-range-of-the-spectrum). A study of another size is run with
+on λᵣ/λₛ from 8 to 128 is [measured](mean_gap.md#trend-with-the-range-of-the-spectrum). A study of another size is run with
 other keys, as in `gfmd run configs/paper/fig13.toml -o results/paper/fig13.h5 --set grid.points='[2048, 4096, 8192]'`. Then
 `python scripts/paper_figures.py -o results/paper --no-run --page docs/paper.md` writes the page.
 """
 
 THEORY = """\
-[Theory beyond the paper](theory.md) examines whether one smooth $\\gamma(n)$ is sufficient (Eq. 39), and what
-$\\Delta\\sigma$ over the true contact predicts (Sects. 6, 7).
+[Weights of the elastic energy](energy_weights.md) examines whether one smooth $\\gamma(n)$ is sufficient (Eq. 39), and
+[Full-contact stress over the contact](true_contact.md) what $\\Delta\\sigma$ over the true contact predicts (Sects. 6, 7).
 """
 
 MISPRINTS = r"""
@@ -78,7 +78,7 @@ The program uses the corrected equations. Each correction was checked by an inde
 | Eq. 18 | $a_r = \kappa' p R/(k a^{2-n})$ | $\pi \kappa' p R/(k a^{2-n})$ with the printed $\kappa'$ |
 | text to Eq. 21 | $\kappa_{1/2}$ "believed exact" | $\kappa'_n = 2^{1-n} \Gamma(3 - n/2) \Gamma(2 - n/2)/\pi$; the conjecture is 9.6e-5 off |
 | Eq. 24 | two equal exponentials; denominator $\Delta\sigma^2$ | the second has $(\sigma + p)^2$; the denominator is $\Delta\sigma$ |
-| Eq. 32 | $I$ | $-2 I$ ([formula](physics.md#persson-theory)) |
+| Eq. 32 | $I$ | $-2 I$ ([formula](theory.md#persson-theory)) |
 | Eq. 33, 38 | $\delta(h - h_{nc})$; $p = k_0 u$ | $\delta(u - h_{nc})$; $p = k_0 \langle u \rangle$ |
 | Eq. 40 | $\Theta(q_s - 1)$; $L/\lambda_s = 5.12$ | $\Theta(q_s - q)$; $L/\lambda_r = 5.12$ |
 | Sect. 2 | $q_s/q_r = 1/100$; $16k = 2^{15}$ | $\lambda_s/\lambda_r = 1/100$; $16k = 2^{14}$ |

@@ -135,8 +135,8 @@ def fig13(studies: StoredStudies, folder: Path) -> list[Finding]:
                 "exponent of the law of the contact edge": Value(edge_exponent(3.0)),
             },
             f"Its error includes the change from the coarser grid: {tails_text}; p* = {distribution.finest['p_star']:g}. "
-            f"The mean stress in contact is {mean:.2g} Δσ; [other windows](theory.md#tail-of-the-stress-"
-            f"distribution-at-n-3). {sample(studies, 'fig13')} The edge implies σ^−3, with which σ_p diverges logarithmically; "
+            f"The mean stress in contact is {mean:.2g} Δσ; [other windows](stress_distribution.md#tail-at-"
+            f"large-stress). {sample(studies, 'fig13')} The edge implies σ^−3, with which σ_p diverges logarithmically; "
             "with σ^−2.6 it would diverge as a power. Each doubling of the grid increases σ_p². The ratio of "
             f"successive increments is {factors}; it would be 1 for σ^−3 and 1.15 for σ^−2.6.",
         )

@@ -53,7 +53,7 @@ def weights(studies: StoredStudies, folder: Path) -> list[Finding]:
                 "measured W over Eq. (30), shortest octave of waves": octaves[SHORTEST],
             },
             f"p* = {SHOWN:g}. {sample(studies, 'weights')} W = |u(q)|²/|h(q)|² weighted with k C. The errors of the "
-            "energy cancel in u_g ([measured](theory.md#the-weight-w-measured)).",
+            "energy cancel in u_g ([measured](energy_weights.md#the-weight-w-measured)).",
         ),
         Finding("exact_order", {}, "The program solves hard-wall contact only."),
         *_sampling(studies),
@@ -105,7 +105,7 @@ def _sampling(studies: StoredStudies) -> list[Finding]:
                 "standard deviation of K h, n = 2 over n = 1/2": ratio("deviation_c"),
             },
             f"Over the true contact at p* = {SHOWN:g}, in Δσ; a_r = {areas}. Both readings of Eq. (20) have "
-            "the mean square Δσ² over the whole surface ([theory](theory.md#full-contact-stress-over-the-contact)).",
+            "the mean square Δσ² over the whole surface ([theory](true_contact.md)).",
         ),
         Finding(
             "percentile",
