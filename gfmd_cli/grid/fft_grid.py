@@ -16,7 +16,7 @@ import pyfftw
 from gfmd_cli.grid import kernels
 from gfmd_cli.grid.arrays import Field, Modes, Precision
 from gfmd_cli.grid.convolution import PaddedTransform, padded_shape
-from gfmd_cli.grid.modes import SharedModes, multiplicity, shared_modes
+from gfmd_cli.grid.modes import multiplicity, shared_modes
 from gfmd_cli.grid.pixels import average_along_x, average_rows, covered_rows
 from gfmd_cli.grid.rows import LocalRows
 from gfmd_cli.grid.shared_transforms import Columns, FieldTransforms
@@ -174,7 +174,8 @@ class Grid:
 
     def along_y(self, symbol: Field) -> Field:
         """The values of a symbol along y, from q = 0 to the highest wavenumber."""
-        return symbol[: self.points_y // 2 + 1, 0]
+        column = symbol[: self.points_y // 2 + 1, 0]
+        return self.total(column if self.ends[0] else np.zeros_like(column))
 
     def multiplicity(self) -> Field:
         """How often a coefficient counts in a sum over all q, a row of them."""
@@ -257,10 +258,10 @@ class Grid:
         self.transform()
         return self.work
 
-    def backward_into(self, field: Field) -> None:
-        """field <- the field of the coefficients in `work`, which are lost; without 1/size."""
+    def field_of_work(self, factor: float = 1.0) -> Field:
+        """The field of the coefficients in `work`, which are lost, times a factor."""
         self.transform_back()
-        field[...] = self.padded[..., : self.points]
+        return np.multiply(self.padded[..., : self.points], factor, out=self.empty())
 
     def filter_padded(self, symbol: Field, blocks: Sequence[int] | None = None) -> float:
         """`padded` <- F^-1 symbol F of the values in it: one pair of transforms, no copy.
@@ -318,11 +319,17 @@ class Grid:
 
     def cut(self, symbol: Field, target: "Grid") -> Field:
         """The values of a symbol at the wavenumbers of a coarser grid."""
-        symbol = symbol[..., : target.points // 2 + 1]
-        if self.dimension == 1:
-            return symbol
-        half = target.points_y // 2
-        return np.concatenate([symbol[: target.points_y - half], symbol[-half:]])
+        m_y = np.fft.ifftshift(np.arange(target.points_y) - target.points_y // 2)
+        kept = self.pass_on(self.as_rows(symbol), m_y, target.points // 2 + 1, self, target)
+        return kept.reshape(target.spectral_shape)
+
+    def pass_on(self, values: Any, m_y: Any, kept: int, source: "Grid", target: "Grid") -> Any:
+        """Values at some wavenumbers, from the processes of one grid to those of another.
+
+        These wavenumbers are `m_y` along y and the first `kept` along x. `self` is one of the two
+        grids, that which processes share if only one is shared.
+        """
+        return values[m_y, :kept]
 
     def gather_rows(self, values: Any, span: Span) -> Any:
         """The rows `span` of the grid from the rows of all processes."""
@@ -355,13 +362,17 @@ class Grid:
 
         On an oblong grid, the point next to the diagonal in each row or column, whichever are more.
         """
-        return field[self.diagonal_points()] if self.dimension == 2 else field.copy()
-
-    def diagonal_points(self) -> tuple[Any, Any]:
-        """Row and column of the points along the diagonal."""
+        if self.dimension == 1:
+            return field.copy()
         step = np.arange(max(self.whole_shape))
-        rows, columns = ((2 * step * n + step.size) // (2 * step.size) for n in self.whole_shape)
-        return rows % self.points_y, columns % self.points
+        rows, columns = (
+            (2 * step * n + step.size) // (2 * step.size) % n for n in self.whole_shape
+        )
+        first, last = self.row_span
+        own = (first <= rows) & (rows < last)
+        values = np.zeros(step.size, field.dtype)
+        values[own] = field[rows[own] - first, columns[own]]
+        return self.total(values)
 
     def resample(self, field: Field, target: "Grid") -> Field:
         """The same trigonometric polynomial on another grid of the same cell.
@@ -369,36 +380,15 @@ class Grid:
         A finer grid interpolates; a coarser one loses what it does not resolve, its own highest
         mode included.
         """
-        return target.take(self, field)
-
-    def take(self, source: "Grid", field: Field) -> Field:
-        """A field of another grid, see `resample`."""
-        modes, rows, columns = source.modes_for(self, field)
-        out, kept = self.work, columns.positive
-        out[...] = 0.0
-        if self.dimension == 1:
-            out[:kept] = modes[:kept]
-        else:
-            for part in rows.slices:
-                out[part, :kept] = modes[part, :kept]
-        return self.field_of_work(source.size)
-
-    def modes_for(self, target: "Grid", field: Field) -> "tuple[Modes, SharedModes, SharedModes]":
-        """Coefficients of a field, without 1/size, for another grid, in `work`.
-
-        At the Nyquist wavenumbers they are halved if that grid has +q and -q. Also returned are the
-        wavenumbers along y and along x that both grids have.
-        """
-        modes = self.forward_into_work(field)
-        rows = shared_modes(self.points_y, target.points_y)
-        columns = shared_modes(self.points, target.points)
-        if rows.halved:
-            modes[rows.positive - 1] *= 0.5
-        if columns.halved and self.ends[1]:
-            modes[..., -1] *= 0.5
-        return modes, rows, columns
-
-    def field_of_work(self, size: int) -> Field:
-        """The field of the coefficients in `work` of a grid of so many points; `work` is lost."""
-        self.transform_back()
-        return np.multiply(self.padded[..., : self.points], 1.0 / size, out=self.empty())
+        modes = self.as_rows(self.forward_into_work(field))
+        m_y, halved_y = shared_modes(self.points_y, target.points_y)
+        m_x, halved_x = shared_modes(self.points, target.points)
+        if halved_y:
+            modes[m_y[-1]] *= 0.5
+        if halved_x and self.ends[1]:
+            modes[:, -1] *= 0.5
+        grid = target if self.whole else self
+        modes = grid.pass_on(modes, m_y, m_x[-1] + 1, self, target)
+        target.work[...] = 0.0
+        target.as_rows(target.work)[m_y, : modes.shape[1]] = modes
+        return target.field_of_work(1.0 / self.size)
