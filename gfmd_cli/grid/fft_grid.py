@@ -4,7 +4,7 @@ h(x) = sum_q h(q) exp(i q x): the forward transform carries 1/size, so that h(q 
 Coefficients are kept for non-negative wavenumbers of the last axis only (real transforms).
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import prod
@@ -14,7 +14,7 @@ import numpy as np
 import pyfftw
 
 from gfmd_cli.grid import kernels
-from gfmd_cli.grid.arrays import Field, Modes, Precision
+from gfmd_cli.grid.arrays import Field, Mask, Modes, Precision
 from gfmd_cli.grid.convolution import PaddedTransform, padded_shape
 from gfmd_cli.grid.modes import multiplicity, shared_modes
 from gfmd_cli.grid.pixels import average_along_x, average_rows, covered_rows
@@ -25,8 +25,6 @@ from gfmd_cli.grid.transposition import Span, Transposition
 T = TypeVar("T")
 ALL_ROWS = slice(None)
 MIN_THREADED_SIDE = 512  # points per side from which a second thread pays
-Filter = Callable[..., None]
-"""A kernel that multiplies coefficients, see `Grid.filter_by`."""
 Shape = tuple[int, ...]
 """Numbers of points along the axes of a field, (y, x), or (x,) of a line."""
 
@@ -120,6 +118,10 @@ class Grid:
     def min(self, value: float) -> float:
         """Minimum over the grid, likewise."""
         return -self.max(-value)
+
+    def any(self, mask: Mask) -> bool:
+        """Whether a mask is true somewhere on the grid."""
+        return self.max(float(np.any(mask))) > 0
 
     def dot(self, one: Field, other: Field) -> float:
         """Sum over the grid of the products of two fields."""
@@ -233,16 +235,12 @@ class Grid:
         self._transforms.along_columns.backward()
         self._transforms.to_values()
 
-    def filter_by(
-        self, kernel: Filter, symbol: Field, *arguments: Any, blocks: Sequence[int] | None = None
+    def _filter_by(
+        self, kernel: Any, symbol: Field, *arguments: Any, blocks: Sequence[int] | None
     ) -> None:
         """`padded` <- values whose coefficients a kernel has multiplied: a pair of transforms.
 
-        Parameters
-        ----------
-        kernel : see `grid.kernels`; it gets the factor 1/size and the `arguments`
-        blocks : numbers of the blocks of 8 rows outside of which all values are zero; the rows
-            there are not transformed
+        The kernel, of `grid.kernels`, gets the factor 1/size and the `arguments`.
         """
         symbol = self.as_rows(symbol)
 
@@ -266,17 +264,23 @@ class Grid:
     def filter_padded(self, symbol: Field, blocks: Sequence[int] | None = None) -> float:
         """`padded` <- F^-1 symbol F of the values in it: one pair of transforms, no copy.
 
-        Returns the sum over the grid of the old values times the new ones. `blocks` as in
-        `filter_by`.
+        Returns the sum over the grid of the old values times the new ones. `blocks` are numbers of
+        the blocks of 8 rows outside of which all values are zero; the rows there are not
+        transformed.
         """
         energies = np.zeros(self.spectral_shape[-1])
-        self.filter_by(kernels.apply_symbol, symbol, energies, blocks=blocks)
+        self._filter_by(kernels.apply_symbol, symbol, energies, blocks=blocks)
         energies *= self.multiplicity()
         return float(self.total(float(energies.sum()))) / self.size
 
-    def unfilter_padded(self, symbol: Field, blocks: Sequence[int] | None = None) -> None:
-        """`padded` <- F^-1 (1 / symbol) F of the values in it, without the modes of symbol zero."""
-        self.filter_by(kernels.divide_by_symbol, symbol, blocks=blocks)
+    def unfilter_padded(
+        self, symbol: Field, blocks: Sequence[int] | None = None, *, shift: float = 0.0
+    ) -> None:
+        """`padded` <- F^-1 1 / (symbol + shift) F of the values in it, without modes of sum zero.
+
+        `blocks` as in `filter_padded`.
+        """
+        self._filter_by(kernels.divide_by_symbol, symbol, shift, blocks=blocks)
 
     def apply(self, symbol: Field, field: Field, out: Field, mean: float = 0.0) -> Field:
         """out <- F^-1 symbol F field + `mean`, which is returned: one pair of transforms."""

@@ -139,7 +139,7 @@ class Dual(Solver):
             state.length = descent / curvature if curvature > 0 else 1.0
         for _ in range(MAX_HALVINGS):
             target = np.where(chosen, stress + state.length * state.direction, 0.0)
-            clipped = _any_negative(grid, target)
+            clipped = grid.any(target < 0)
             target[chosen] = projected(grid, target[chosen], contact.pressure * grid.size)  # [4]
             move = target - stress
             free.displacement(move, out=change)
@@ -164,8 +164,7 @@ class Dual(Solver):
     def _fraction(self, grid: Grid, state: DualState, best: float, clipped: bool) -> float:
         """Fraction of a move to take if the energy is lowest at the fraction `best`."""
         exact = not clipped and (
-            best <= 1
-            or not _any_negative(grid, state.sigma + best * state.length * state.direction)
+            best <= 1 or not grid.any(state.sigma + best * state.length * state.direction < 0)
         )
         choice = choose(best, exact)
         state.length *= choice.factor
@@ -188,8 +187,3 @@ def _chosen(contact: FreeContact, state: DualState) -> Mask:
     if contact.grid.dot(outside, outside) > MAX_OVERLAP_RATIO**2 * contact.grid.dot(inside, inside):
         touching |= overlapping
     return touching
-
-
-def _any_negative(grid: Grid, values: Field) -> bool:
-    """Whether a field is negative at some point of the grid."""
-    return grid.max(float(np.any(values < 0))) > 0

@@ -146,13 +146,9 @@ def level_rows(grid: Grid) -> Iterator[tuple[Shape, LocalRows]]:
         if any(n // 2 < MIN_LEVEL_POINTS for n, halved in axes if halved):
             return
         coarser = tuple(_half(n) if halved else n for n, halved in axes)
-        if _is_half(coarser, shape):
-            rows = rows.coarser()
-        elif rows.is_whole:
-            rows = rows.with_count(coarser[0])
-        else:
+        if not (rows.is_whole or _is_half(coarser, shape)):
             return
-        shape = coarser
+        shape, rows = coarser, rows.coarser(coarser[0])
 
 
 def _sides(grid: Grid) -> tuple[float, ...]:
@@ -221,7 +217,8 @@ class _CoarseLevel:
         matrix = (self.rhs, self.operator, self.ties)
         start = (self.rhs if old is None else old, old is None)
         correction = coarser.correction() if coarser else (self.rhs, kernels.ZERO)
-        self.rows.run_with_halo(kernels.smooth, *matrix, *start, *correction, new)
+        arrays = (*matrix, *start, *correction, new)
+        self.rows.run(kernels.smooth, *arrays, first=self.rows.halo)
         self.rows.exchange_halo(new)
 
     def post_smooth(self, coarser: "_CoarseLevel") -> None:
@@ -262,9 +259,8 @@ class Multigrid:
         for coarser, level in pairwise(self.coarse[::-1]):
             level.post_smooth(coarser)
         # correction and one smoothing step on the finest level, and the sums
-        slope, z_change = self.rows.sums_with_halo(
-            2, kernels.last_smooth, *fields, *first.correction(), self.scale, change, self.z
-        )
+        arrays = (*fields, *first.correction(), self.scale, change, self.z)
+        slope, z_change = self.rows.sums(2, kernels.last_smooth, *arrays, first=self.rows.halo)
         return float(slope), float(z_change)
 
     def descend(self) -> None:

@@ -48,7 +48,7 @@ class GreensFunction:
 
     def __init__(self, contact: Contact, screening: float, grid: Grid) -> None:
         self.grid, self.rows = grid, contact.grid.rows
-        self.stiffness, self.screening = grid.as_rows(contact.stiffness), screening
+        self.stiffness, self.screening = contact.stiffness, screening
         self.z = grid.as_rows(grid.padded)
         self.transforms = grid.pair_count
 
@@ -59,7 +59,7 @@ class GreensFunction:
         grid, rows = self.grid, self.rows
         fields = (sigma, rows.interior(contact_state), threshold)
         rows.run(kernels.free_force, *fields, self.z)
-        grid.filter_by(kernels.apply_greens_function, self.stiffness, self.screening)
+        grid.unfilter_padded(self.stiffness, shift=self.screening)
         slope, z_change = rows.sums(2, kernels.slopes, *fields, change, self.z)
         return float(slope), float(z_change)
 
@@ -71,7 +71,8 @@ def select(contact: Contact, contact_state: ContactState, threshold: int) -> tup
     """
     grid = contact.grid
     grid.rows.exchange_halo(contact_state)
-    held, changes = grid.rows.sums_with_halo(2, kernels.pattern, contact_state, threshold)
+    fields = (contact_state, threshold)
+    held, changes = grid.rows.sums(2, kernels.pattern, *fields, first=grid.rows.halo)
     screening, exponent = _screening(contact, float(held), float(changes))
     is_steep = exponent > V_CYCLE_EXPONENT[grid.dimension]
     return screening, is_steep and has_coarser_level(grid)
