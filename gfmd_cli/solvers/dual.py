@@ -26,7 +26,6 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from gfmd_cli.grid.arrays import Field, Mask
-from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.physics.contact import Contact
 from gfmd_cli.physics.free_contact import FreeContact
 from gfmd_cli.solvers.loop import Solver, Start, State
@@ -142,35 +141,29 @@ class Dual(Solver):
             clipped = grid.any(target < 0)
             target[chosen] = projected(grid, target[chosen], contact.pressure * grid.size)  # [4]
             move = target - stress
-            free.displacement(move, out=change)
-            state.transforms += free.transforms
             fall = -grid.dot(move, state.gap)
             if fall > 0:
                 break
             state.length, state.slope = 0.5 * state.length, 0.0
         else:
-            change *= 0.0
+            change[...] = 0.0
             return
+        free.displacement(move, out=change)
+        state.transforms += free.transforms
         curvature = grid.dot(move, change)
         best = fall / curvature if curvature > 0 else 1.0
-        fraction = self._fraction(grid, state, best, clipped)
-        if fraction == 1.0:  # [5]
-            stress[...] = target
-        else:
-            np.maximum(stress + fraction * move, 0.0, out=stress)
-        change *= fraction
-        state.gap += change
-
-    def _fraction(self, grid: Grid, state: DualState, best: float, clipped: bool) -> float:
-        """Fraction of a move to take if the energy is lowest at the fraction `best`."""
-        exact = not clipped and (
-            best <= 1 or not grid.any(state.sigma + best * state.length * state.direction < 0)
-        )
+        length = best * state.length
+        exact = not clipped and (best <= 1 or not grid.any(stress + length * state.direction < 0))
         choice = choose(best, exact)
         state.length *= choice.factor
         if choice.restart:
             state.slope = 0.0
-        return choice.fraction
+        if choice.fraction == 1.0:  # [5]
+            stress[...] = target
+        else:
+            np.maximum(stress + choice.fraction * move, 0.0, out=stress)
+        change *= choice.fraction
+        state.gap += change
 
 
 def _new_state(u: Field, stress: Field, gap: Field) -> DualState:

@@ -149,17 +149,9 @@ class _Run:
         self.rows = grid.rows
         self.moves = contact.grid_of_moves
         self.noise = contact.noise(self.moves.real)
-        fields = (
-            contact.obstacle,
-            state.u,
-            state.sigma,
-            state.direction,
-            state.change,
-            self.moves.padded,
-        )
-        self.h, self.u, self.sigma, self.direction, self.change, self.padded = map(
-            grid.as_rows, fields
-        )
+        self.h, self.padded = grid.as_rows(contact.obstacle), grid.as_rows(self.moves.padded)
+        self.u, self.sigma = grid.as_rows(state.u), grid.as_rows(state.sigma)
+        self.direction, self.change = map(grid.as_rows, (state.direction, state.change))
         self.contact_state = self.rows.empty_with_halo(self.h.shape[1], dtype=np.int8)
         self.own_state = self.rows.interior(self.contact_state)
         self.threshold = PRESSED

@@ -61,8 +61,7 @@ class PolonskyKeer(Solver):
         sigma = contact.stress(u, out=contact.grid.empty())
         pressure = contact.clear_untouchable(np.maximum(sigma, 0.0))
         pressure *= contact.pressure / contact.grid.mean(pressure)
-        compute_displacement = partial(contact.grid.apply, compliance(contact))
-        response = compute_displacement(pressure, out=contact.grid.empty())
+        response = contact.grid.apply(compliance(contact), pressure, out=contact.grid.empty())
         return PolonskyKeerState(
             u=u,
             sigma=sigma,
