@@ -45,11 +45,14 @@ from gfmd_cli.solvers.contact_state import ContactState
 
 MIN_LEVEL_POINTS = 4  # points along the shorter side on the coarsest level
 MAX_PIXEL_ASPECT = 1.5  # beyond, only the shorter side is coarsened, which leaves 1 / (2 / 1.5)
-MAX_LAPLACIAN_GROWTH = 5.0  # growth of k(q) above which the Laplacian is squared; n = 2.3; measured
+# Other values of the next two, and of the number of steps below: scripts/solver_constants.py.
+MAX_LAPLACIAN_GROWTH = 5.0  # growth of k(q) above which the Laplacian is squared; n = 2.3
+"""Measured: up to a tenth more transforms if it is squared at n = 2, or is not at n = 2.5."""
 SPRING_STIFFNESS = 0.125, 0.25  # over diagonal element and k(2 q) / k(q): Laplacian, its square
+"""Measured: half takes up to a fifth more transforms (n = 2), double a tenth (n = 2 to 4)."""
 JACOBI_EIGENVALUE = 1.76  # largest of the damped Jacobi iteration; 1.6 to 1.85 do as well
 STEEPEST = 4.5  # exponent above which the levels limit the growth of k(q); measured, see below
-COARSEST_STEP_PAIRS = 4  # pairs of smoothing steps on the coarsest level
+COARSEST_STEP_PAIRS = 4  # of smoothing steps on the coarsest level; 1 to 8 are the same within 4 %
 TIE_UNIT = 1.0 / 64  # of the integers in `ties`
 
 

@@ -64,8 +64,8 @@ class GreensFunction:
         return float(slope), float(z_change)
 
 
-def select(contact: Contact, contact_state: ContactState, threshold: int) -> tuple[float, bool]:
-    """k(q_c) of the Green's function for the points held, and whether the V-cycle is faster.
+def select(contact: Contact, contact_state: ContactState, threshold: int) -> float:
+    """k(q_c) of the Green's function for the points held; 0 where the V-cycle is faster.
 
     `contact_state` has a halo.
     """
@@ -75,12 +75,12 @@ def select(contact: Contact, contact_state: ContactState, threshold: int) -> tup
     held, changes = grid.rows.sums(2, kernels.pattern, *fields, first=grid.rows.halo)
     screening, exponent = _screening(contact, float(held), float(changes))
     is_steep = exponent > V_CYCLE_EXPONENT[grid.dimension]
-    return screening, is_steep and has_coarser_level(grid)
+    return 0.0 if is_steep and has_coarser_level(grid) else screening
 
 
-def create(contact: Contact, grid: Grid, screening: float, v_cycle: bool) -> Preconditioner:
+def create(contact: Contact, grid: Grid, screening: float) -> Preconditioner:
     """The selected preconditioner; `z` is `padded` of `grid`, that of the contact or in single."""
-    return Multigrid(contact, grid) if v_cycle else GreensFunction(contact, screening, grid)
+    return GreensFunction(contact, screening, grid) if screening else Multigrid(contact, grid)
 
 
 def _screening(contact: Contact, held: float, changes: float) -> tuple[float, float]:
