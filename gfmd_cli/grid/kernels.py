@@ -30,6 +30,7 @@ def divide_by_symbol(modes, first, k, start, stop, factor, shift):
         row, symbol = modes[i, 2 * first :], k[i, start:stop]
         for j in range(symbol.size):
             shifted = symbol[j] + shift
-            weight = factor / shifted if shifted > 0 else 0.0
+            weight = factor / shifted  # first, as the compiler vectorises no division in a branch
+            weight = weight if shifted > 0 else 0.0
             row[2 * j] *= weight
             row[2 * j + 1] *= weight

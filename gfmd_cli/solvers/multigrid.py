@@ -47,8 +47,8 @@ MIN_LEVEL_POINTS = 4  # points along the shorter side on the coarsest level
 MAX_PIXEL_ASPECT = 1.5  # beyond, only the shorter side is coarsened, which leaves 1 / (2 / 1.5)
 # Other values of the next two, and of the number of steps below: scripts/solver_constants.py.
 MAX_LAPLACIAN_GROWTH = 5.0  # growth of k(q) above which the Laplacian is squared; n = 2.3
-"""Measured: 5 to 9 % more transforms if it is squared at n = 2; 8 to 14 % at n = 2.5, and 19 to 30 %
-at n = 3, if it is not. At n = 2.2 both are the same within 3 %."""
+"""Measured: 5 to 9 % more transforms if it is squared at n = 2; 8 to 14 % at n = 2.5 and 19 to
+30 % at n = 3 if it is not. At n = 2.2 both are the same within 3 %."""
 SPRING_STIFFNESS = 0.125, 0.25  # over diagonal element and k(2 q) / k(q): Laplacian, its square
 """Measured: half takes up to a fifth more transforms (n = 2), double a tenth (n = 2 to 4)."""
 JACOBI_EIGENVALUE = 1.76  # largest of the damped Jacobi iteration; 1.6 to 1.85 do as well
