@@ -119,7 +119,7 @@ def test_sides_follow_from_the_points_and_one_spacing():
 @pytest.mark.parametrize("shape", [(8, 8), (8, 12), (9, 27), (40, 15)])
 def test_the_diagonal_passes_from_corner_to_corner(shape):
     grid = Grid(shape[1], points_y=shape[0])
-    rows, columns = grid.diagonal_points()
+    rows, columns = (grid.diagonal(index) for index in np.indices(shape))
     steps = max(shape)
     for index, points in ((rows, shape[0]), (columns, shape[1])):
         away = index / points - np.arange(steps) / steps

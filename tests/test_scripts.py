@@ -29,6 +29,7 @@ SMALL = {
     "reference_pages.py": "--check",
     "rounded_heights.py": "--points 64 --seeds 1",
     "sigma_rounding.py": "--points 128 --exponents 1 --p-star 0.1",
+    "solver_constants.py": "pcg.SELECTION_GROWTH 2 --points 32 --exponents 1 --seeds 3",
     "spectrum_fits.py": "--seeds 1 --hurst 0.8 --rolloffs 20 --pixels 4",
     "scan_files.py": f"{ROOT / 'configs' / 'data'} --limit 60",
     "steep_stiffness.py": "--points 32 --steps 300",

@@ -295,7 +295,7 @@ def test_checkpoints_come_back_as_they_were(tmp_path):
         u=u, sigma=sigma, direction=np.float32(direction), change=np.float32(change), moved=1 / 3
     )
     state.exact, state.residual, state.step, state.transforms = False, 0.1, 7, 9
-    state.misses, state.v_cycle, state.coarser_transforms = 2, True, 12.5
+    state.misses, state.screening, state.coarser_transforms = 2, 0.3, 12.5
     with Checkpoint.exclusive(tmp_path / "c") as checkpoint:
         assert checkpoint.restore() is None
         assert checkpoint.load(grid, SOLVER) is None

@@ -17,7 +17,7 @@ from gfmd_cli.grid.arrays import Field
 from gfmd_cli.grid.fft_grid import Grid, Shape
 from gfmd_cli.grid.halo import HALO_ROWS, DistributedRows, is_distributable
 from gfmd_cli.grid.ranks import Ranks, is_root
-from gfmd_cli.grid.transposition import Span, Transposition, column_spans
+from gfmd_cli.grid.transposition import Span, Transposition
 
 
 def create_grid(grid: Grid, ranks: Ranks | None) -> Grid:
@@ -55,7 +55,7 @@ class DistributedGrid(Grid):
     @cached_property
     def spans(self) -> list[Span]:
         """First column of each process, and the column after its last."""
-        return column_spans(self.points // 2 + 1, self.ranks.size)
+        return self._transposition(self.points // 2 + 1).spans
 
     @property
     def span(self) -> Span:
@@ -71,23 +71,13 @@ class DistributedGrid(Grid):
         """Maximum over all processes."""
         return float(self.ranks.gather(value).max())
 
-    def along_y(self, symbol: Field) -> Field:
-        """The values of a symbol along y, which the first process holds."""
-        counts = [self.points_y // 2 + 1, *[0] * (self.ranks.size - 1)]
-        return self._gathered(symbol[: counts[self.ranks.rank], 0], counts)
-
     def gather_columns(self, values: Field) -> Field:
         """Values over rows and the columns of `span`, of all columns, on every process."""
         counts = [len(values) * (last - first) for first, last in self.spans]
-        return self._gathered(values.T, counts).reshape(-1, len(values)).T
-
-    def _gathered(self, values: Field, counts: Any) -> Field:
-        """The concatenated values of all processes."""
-        gathered = np.empty(sum(counts), values.dtype)
-        self.ranks.wait(
-            self.ranks.comm.Iallgatherv(np.ascontiguousarray(values), [gathered, counts])
-        )
-        return gathered
+        own = np.ascontiguousarray(values.T)
+        gathered = np.empty((sum(counts) // len(values), len(values)), values.dtype)
+        self.ranks.wait(self.ranks.comm.Iallgatherv(own, [gathered, counts]))
+        return gathered.T
 
     @cached_property
     def _memory(self) -> tuple[Any, Field]:
@@ -98,40 +88,15 @@ class DistributedGrid(Grid):
         return pyfftw.empty_aligned(size, self._complex), pyfftw.empty_aligned(2 * room, self.real)
 
     def _transposition(self, columns: int) -> Transposition:
-        spans = column_spans(columns, self.ranks.size)
-        return Transposition(self.ranks, self.rows.edges, spans)
+        return Transposition(self.ranks, self.rows.edges, columns)
 
     def coarser(self, shape: Shape) -> Grid:
         """A grid of fewer points on the same cell; not distributed if it is too small."""
         return create_grid(Grid(**_fields(self)).coarser(shape), self.ranks)
 
-    def cut(self, symbol: Field, target: Grid) -> Field:
-        """The values of a symbol at the wavenumbers of a coarser grid."""
-        half = target.points_y // 2
-        rows = np.concatenate([symbol[: target.points_y - half], symbol[-half:]])
-        return self._redistributed(rows, self, target, target.points // 2 + 1)
-
-    def resample(self, field: Field, target: Grid) -> Field:
-        """The same trigonometric polynomial on another grid; see `Grid.resample`."""
-        return self._resampled(self, field, target)
-
-    def take(self, source: Grid, field: Field) -> Field:
-        """Resample a field of a grid that is not distributed, as the first process holds it."""
-        return self._resampled(source, field, self)
-
-    def _resampled(self, source: Grid, field: Field, target: Grid) -> Field:
-        modes, shared, columns = source.modes_for(target, field)
-        rows = np.concatenate([modes[part] for part in shared.slices])
-        rows = self._redistributed(rows, source, target, columns.positive)
-        out, width, (positive, negative) = target.work, rows.shape[1], shared.slices
-        out[...] = 0.0
-        out[positive, :width] = rows[: shared.positive]
-        out[negative, :width] = rows[shared.positive :]
-        return target.field_of_work(source.size)
-
-    def _redistributed(self, rows: Any, source: Grid, target: Grid, kept: int) -> Any:
-        """The columns below `kept`, redistributed from the processes of one grid to another's."""
-        rank, count = self.ranks.rank, self.ranks.size
+    def pass_on(self, values: Any, m_y: Any, kept: int, source: Grid, target: Grid) -> Any:
+        """The values at some wavenumbers, from the processes of one grid to those of another."""
+        rows, rank, count = values[m_y], self.ranks.rank, self.ranks.size
         source_spans = _spans(source, [(0, kept), *[(0, 0)] * (count - 1)], kept)
         target_spans = _spans(target, [(0, kept)] * count, kept)
         own, wanted = source_spans[rank], target_spans[rank]
@@ -164,17 +129,6 @@ class DistributedGrid(Grid):
         target = None if gathered is None else [gathered, counts]
         self.ranks.wait(self.ranks.comm.Igatherv(np.ascontiguousarray(field), target))
         return gathered
-
-    def diagonal(self, field: Field) -> Field:
-        """Values along the diagonal of the cell, of all processes."""
-        rows, columns = self.diagonal_points()
-        owner = np.searchsorted(self.rows.edges, rows, side="right") - 1
-        mine = owner == self.ranks.rank
-        order = np.argsort(owner, kind="stable")
-        own = field[rows[mine] - self.rows.start, columns[mine]]
-        values = np.empty(rows.size)
-        values[order] = self._gathered(own, np.bincount(owner, minlength=self.ranks.size))
-        return values
 
 
 def _spans(grid: Grid, whole: list[Span], kept: int) -> list[Span]:

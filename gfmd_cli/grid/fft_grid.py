@@ -4,7 +4,7 @@ h(x) = sum_q h(q) exp(i q x): the forward transform carries 1/size, so that h(q 
 Coefficients are kept for non-negative wavenumbers of the last axis only (real transforms).
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import prod
@@ -14,9 +14,9 @@ import numpy as np
 import pyfftw
 
 from gfmd_cli.grid import kernels
-from gfmd_cli.grid.arrays import Field, Modes, Precision
+from gfmd_cli.grid.arrays import Field, Mask, Modes, Precision
 from gfmd_cli.grid.convolution import PaddedTransform, padded_shape
-from gfmd_cli.grid.modes import SharedModes, multiplicity, shared_modes
+from gfmd_cli.grid.modes import multiplicity, shared_modes
 from gfmd_cli.grid.pixels import average_along_x, average_rows, covered_rows
 from gfmd_cli.grid.rows import LocalRows
 from gfmd_cli.grid.shared_transforms import Columns, FieldTransforms
@@ -25,8 +25,6 @@ from gfmd_cli.grid.transposition import Span, Transposition
 T = TypeVar("T")
 ALL_ROWS = slice(None)
 MIN_THREADED_SIDE = 512  # points per side from which a second thread pays
-Filter = Callable[..., None]
-"""A kernel that multiplies coefficients, see `Grid.filter_by`."""
 Shape = tuple[int, ...]
 """Numbers of points along the axes of a field, (y, x), or (x,) of a line."""
 
@@ -121,6 +119,10 @@ class Grid:
         """Minimum over the grid, likewise."""
         return -self.max(-value)
 
+    def any(self, mask: Mask) -> bool:
+        """Whether a mask is true somewhere on the grid."""
+        return self.max(float(np.any(mask))) > 0
+
     def dot(self, one: Field, other: Field) -> float:
         """Sum over the grid of the products of two fields."""
         return self.total(float(np.vdot(one, other)))
@@ -174,7 +176,8 @@ class Grid:
 
     def along_y(self, symbol: Field) -> Field:
         """The values of a symbol along y, from q = 0 to the highest wavenumber."""
-        return symbol[: self.points_y // 2 + 1, 0]
+        column = symbol[: self.points_y // 2 + 1, 0]
+        return self.total(column if self.ends[0] else np.zeros_like(column))
 
     def multiplicity(self) -> Field:
         """How often a coefficient counts in a sum over all q, a row of them."""
@@ -232,16 +235,12 @@ class Grid:
         self._transforms.along_columns.backward()
         self._transforms.to_values()
 
-    def filter_by(
-        self, kernel: Filter, symbol: Field, *arguments: Any, blocks: Sequence[int] | None = None
+    def _filter_by(
+        self, kernel: Any, symbol: Field, *arguments: Any, blocks: Sequence[int] | None
     ) -> None:
         """`padded` <- values whose coefficients a kernel has multiplied: a pair of transforms.
 
-        Parameters
-        ----------
-        kernel : see `grid.kernels`; it gets the factor 1/size and the `arguments`
-        blocks : numbers of the blocks of 8 rows outside of which all values are zero; the rows
-            there are not transformed
+        The kernel, of `grid.kernels`, gets the factor 1/size and the `arguments`.
         """
         symbol = self.as_rows(symbol)
 
@@ -257,25 +256,31 @@ class Grid:
         self.transform()
         return self.work
 
-    def backward_into(self, field: Field) -> None:
-        """field <- the field of the coefficients in `work`, which are lost; without 1/size."""
+    def field_of_work(self, factor: float = 1.0) -> Field:
+        """The field of the coefficients in `work`, which are lost, times a factor."""
         self.transform_back()
-        field[...] = self.padded[..., : self.points]
+        return np.multiply(self.padded[..., : self.points], factor, out=self.empty())
 
     def filter_padded(self, symbol: Field, blocks: Sequence[int] | None = None) -> float:
         """`padded` <- F^-1 symbol F of the values in it: one pair of transforms, no copy.
 
-        Returns the sum over the grid of the old values times the new ones. `blocks` as in
-        `filter_by`.
+        Returns the sum over the grid of the old values times the new ones. `blocks` are numbers of
+        the blocks of 8 rows outside of which all values are zero; the rows there are not
+        transformed.
         """
         energies = np.zeros(self.spectral_shape[-1])
-        self.filter_by(kernels.apply_symbol, symbol, energies, blocks=blocks)
+        self._filter_by(kernels.apply_symbol, symbol, energies, blocks=blocks)
         energies *= self.multiplicity()
         return float(self.total(float(energies.sum()))) / self.size
 
-    def unfilter_padded(self, symbol: Field, blocks: Sequence[int] | None = None) -> None:
-        """`padded` <- F^-1 (1 / symbol) F of the values in it, without the modes of symbol zero."""
-        self.filter_by(kernels.divide_by_symbol, symbol, blocks=blocks)
+    def unfilter_padded(
+        self, symbol: Field, blocks: Sequence[int] | None = None, *, shift: float = 0.0
+    ) -> None:
+        """`padded` <- F^-1 1 / (symbol + shift) F of the values in it, without modes of sum zero.
+
+        `blocks` as in `filter_padded`.
+        """
+        self._filter_by(kernels.divide_by_symbol, symbol, shift, blocks=blocks)
 
     def apply(self, symbol: Field, field: Field, out: Field, mean: float = 0.0) -> Field:
         """out <- F^-1 symbol F field + `mean`, which is returned: one pair of transforms."""
@@ -318,11 +323,17 @@ class Grid:
 
     def cut(self, symbol: Field, target: "Grid") -> Field:
         """The values of a symbol at the wavenumbers of a coarser grid."""
-        symbol = symbol[..., : target.points // 2 + 1]
-        if self.dimension == 1:
-            return symbol
-        half = target.points_y // 2
-        return np.concatenate([symbol[: target.points_y - half], symbol[-half:]])
+        m_y = np.fft.ifftshift(np.arange(target.points_y) - target.points_y // 2)
+        kept = self.pass_on(self.as_rows(symbol), m_y, target.points // 2 + 1, self, target)
+        return kept.reshape(target.spectral_shape)
+
+    def pass_on(self, values: Any, m_y: Any, kept: int, source: "Grid", target: "Grid") -> Any:
+        """Values at some wavenumbers, from the processes of one grid to those of another.
+
+        These wavenumbers are `m_y` along y and the first `kept` along x. `self` is one of the two
+        grids, that which processes share if only one is shared.
+        """
+        return values[m_y, :kept]
 
     def gather_rows(self, values: Any, span: Span) -> Any:
         """The rows `span` of the grid from the rows of all processes."""
@@ -355,13 +366,17 @@ class Grid:
 
         On an oblong grid, the point next to the diagonal in each row or column, whichever are more.
         """
-        return field[self.diagonal_points()] if self.dimension == 2 else field.copy()
-
-    def diagonal_points(self) -> tuple[Any, Any]:
-        """Row and column of the points along the diagonal."""
+        if self.dimension == 1:
+            return field.copy()
         step = np.arange(max(self.whole_shape))
-        rows, columns = ((2 * step * n + step.size) // (2 * step.size) for n in self.whole_shape)
-        return rows % self.points_y, columns % self.points
+        rows, columns = (
+            (2 * step * n + step.size) // (2 * step.size) % n for n in self.whole_shape
+        )
+        first, last = self.row_span
+        own = (first <= rows) & (rows < last)
+        values = np.zeros(step.size, field.dtype)
+        values[own] = field[rows[own] - first, columns[own]]
+        return self.total(values)
 
     def resample(self, field: Field, target: "Grid") -> Field:
         """The same trigonometric polynomial on another grid of the same cell.
@@ -369,36 +384,15 @@ class Grid:
         A finer grid interpolates; a coarser one loses what it does not resolve, its own highest
         mode included.
         """
-        return target.take(self, field)
-
-    def take(self, source: "Grid", field: Field) -> Field:
-        """A field of another grid, see `resample`."""
-        modes, rows, columns = source.modes_for(self, field)
-        out, kept = self.work, columns.positive
-        out[...] = 0.0
-        if self.dimension == 1:
-            out[:kept] = modes[:kept]
-        else:
-            for part in rows.slices:
-                out[part, :kept] = modes[part, :kept]
-        return self.field_of_work(source.size)
-
-    def modes_for(self, target: "Grid", field: Field) -> "tuple[Modes, SharedModes, SharedModes]":
-        """Coefficients of a field, without 1/size, for another grid, in `work`.
-
-        At the Nyquist wavenumbers they are halved if that grid has +q and -q. Also returned are the
-        wavenumbers along y and along x that both grids have.
-        """
-        modes = self.forward_into_work(field)
-        rows = shared_modes(self.points_y, target.points_y)
-        columns = shared_modes(self.points, target.points)
-        if rows.halved:
-            modes[rows.positive - 1] *= 0.5
-        if columns.halved and self.ends[1]:
-            modes[..., -1] *= 0.5
-        return modes, rows, columns
-
-    def field_of_work(self, size: int) -> Field:
-        """The field of the coefficients in `work` of a grid of so many points; `work` is lost."""
-        self.transform_back()
-        return np.multiply(self.padded[..., : self.points], 1.0 / size, out=self.empty())
+        modes = self.as_rows(self.forward_into_work(field))
+        m_y, halved_y = shared_modes(self.points_y, target.points_y)
+        m_x, halved_x = shared_modes(self.points, target.points)
+        if halved_y:
+            modes[m_y[-1]] *= 0.5
+        if halved_x and self.ends[1]:
+            modes[:, -1] *= 0.5
+        grid = target if self.whole else self
+        modes = grid.pass_on(modes, m_y, m_x[-1] + 1, self, target)
+        target.work[...] = 0.0
+        target.as_rows(target.work)[m_y, : modes.shape[1]] = modes
+        return target.field_of_work(1.0 / self.size)

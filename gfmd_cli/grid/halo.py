@@ -79,11 +79,10 @@ class DistributedRows(LocalRows):
             ]
         self.ranks.wait(*requests)
 
-    def coarser(self) -> LocalRows:
-        """The rows of the next coarser level, distributed if the level is large enough."""
-        points = self.points // 2
-        if is_distributable(points, self.ranks.size):
-            return DistributedRows(self.ranks, points, len(self.parts))
+    def coarser(self, count: int) -> LocalRows:
+        """The half of the rows of the next coarser level, distributed if it is large enough."""
+        if is_distributable(count, self.ranks.size):
+            return DistributedRows(self.ranks, count, len(self.parts))
         return ReplicatedRows(self)
 
 

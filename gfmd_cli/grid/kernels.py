@@ -1,4 +1,4 @@
-"""Compiled kernels that multiply coefficients between two transforms; see `Grid.filter_by`.
+"""Compiled kernels that multiply coefficients between two transforms.
 
 A kernel multiplies the columns `start` to `stop` of the coefficients. In `modes` they are pairs of
 real values and begin at column `first`. k is the symbol.
@@ -24,11 +24,13 @@ def apply_symbol(modes, first, k, start, stop, factor, energies):
 
 
 @kernel
-def divide_by_symbol(modes, first, k, start, stop, factor):
-    """Multiply coefficients by factor / k(q), and by zero where k is zero."""
+def divide_by_symbol(modes, first, k, start, stop, factor, shift):
+    """Multiply coefficients by factor / (k(q) + shift), and by zero where that sum is zero."""
     for i in range(k.shape[0]):
-        row, stiffness = modes[i, 2 * first :], k[i, start:stop]
-        for j in range(stiffness.size):
-            weight = factor / stiffness[j] if stiffness[j] > 0 else 0.0
+        row, symbol = modes[i, 2 * first :], k[i, start:stop]
+        for j in range(symbol.size):
+            shifted = symbol[j] + shift
+            weight = factor / shifted  # first, as the compiler vectorises no division in a branch
+            weight = weight if shifted > 0 else 0.0
             row[2 * j] *= weight
             row[2 * j + 1] *= weight

@@ -1,8 +1,7 @@
 """Modes of a real field along one axis: how often each counts, and which of them two grids have."""
 
-from dataclasses import dataclass
-
 import numpy as np
+from numpy.typing import NDArray
 
 from gfmd_cli.grid.arrays import Field
 
@@ -16,25 +15,13 @@ def multiplicity(points: int) -> Field:
     return count
 
 
-@dataclass(frozen=True)
-class SharedModes:
-    """Wavenumbers along an axis that a field keeps on a grid of another number of points."""
+def shared_modes(source: int, target: int) -> tuple[NDArray[np.int64], bool]:
+    """Numbers m of the modes that a field of `source` points keeps on `target` points, rising.
 
-    positive: int
-    """Number of wavenumbers q >= 0."""
-    negative: int
-    """Number of wavenumbers q < 0."""
-    halved: bool
-    """Whether the last of both is the Nyquist wavenumber, which stands for +q and -q alike."""
-
-    @property
-    def slices(self) -> tuple[slice, slice]:
-        """Their places in the order of a transform."""
-        return slice(self.positive), slice(-self.negative, None)
-
-
-def shared_modes(source: int, target: int) -> SharedModes:
-    """The modes of `source` points; if `target` is less, those below its Nyquist wavenumber."""
+    These are all modes, or those below the Nyquist wavenumber of fewer points. Also returned is
+    whether both ends are +q and -q of the Nyquist wavenumber, for which `source` points have only
+    one coefficient. As an index, m is the place of a mode in the order of a transform.
+    """
     if target < source:
-        return SharedModes((target + 1) // 2, (target - 1) // 2, False)
-    return SharedModes(source // 2 + 1, source // 2, target > source and source % 2 == 0)
+        return np.arange(-((target - 1) // 2), (target + 1) // 2), False
+    return np.arange(-(source // 2), source // 2 + 1), target > source and source % 2 == 0

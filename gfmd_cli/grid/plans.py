@@ -157,7 +157,7 @@ def _add_to_cache(alone: bool) -> None:
     """Store what this process knows in the cache; `alone` says whether the cache is locked."""
     if alone:
         remove_temporary(_path(cache_folder()))
-    _write(cache_folder(), _newest(_joined(read_wisdom(cache_folder()), _export())))
+    _write(cache_folder(), _joined(read_wisdom(cache_folder()), _export()))
 
 
 def read_wisdom(folder: Path) -> Wisdom | None:
@@ -185,26 +185,17 @@ def _export() -> Wisdom:
 
 
 def _joined(wisdom: Wisdom | None, more: Wisdom) -> Wisdom:
-    """Both; of two plans for one problem (a line each, flags and problem from word 3) the first."""
-    if wisdom is None:
-        return more
+    """Both, up to `MAX_CACHED_LINES`, those that were added last.
+
+    Of two plans for one problem (a line each, flags and problem from word 3) the first is kept.
+    """
     joined = []
-    for old, new in zip(wisdom, more, strict=True):
-        known = {tuple(line.split()[2:]) for line in old.splitlines()[1:-1]}
-        new_lines = [
-            line for line in new.splitlines()[1:-1] if tuple(line.split()[2:]) not in known
-        ]
-        joined.append("\n".join([*old.splitlines()[:-1], *new_lines, ")"]) + "\n")
+    for old, new in zip(wisdom or more, more, strict=True):
+        first, *lines, last = old.splitlines()
+        known = {tuple(line.split()[2:]) for line in lines}
+        lines += [line for line in new.splitlines()[1:-1] if tuple(line.split()[2:]) not in known]
+        joined.append("\n".join([first, *lines[-MAX_CACHED_LINES:], last]) + "\n")
     return joined
-
-
-def _newest(wisdom: Wisdom) -> Wisdom:
-    """The lines that were added last: every new size takes a time that grows with their number."""
-    texts = []
-    for text in wisdom:
-        first, *lines, last = text.splitlines()
-        texts.append("\n".join([first, *lines[-MAX_CACHED_LINES:], last]) + "\n")
-    return texts
 
 
 def _import(wisdom: Wisdom | None) -> None:

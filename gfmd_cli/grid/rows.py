@@ -62,7 +62,10 @@ class LocalRows:
         self.parts = [(int(a), int(b)) for a, b in pairwise(edges) if a < b]
 
     def run(self, kernel: Kernel, *arguments: Any, first: int = 0) -> None:
-        """Run a kernel over the rows, which begin at index `first` of its arrays."""
+        """Run a kernel over the rows, which begin at index `first` of its arrays.
+
+        That is `halo` for arrays with a halo.
+        """
         if self.pool is None or len(self.parts) == 1:
             kernel(*arguments, first, first + self.count)
         else:
@@ -94,20 +97,8 @@ class LocalRows:
     def exchange_halo(self, *arrays: Any) -> None:
         """Fill the halos of arrays with the rows of the neighbouring processes."""
 
-    def run_with_halo(self, kernel: Kernel, *arguments: Any) -> None:
-        """Run a kernel over arrays with halos."""
-        self.run(kernel, *arguments, first=self.halo)
-
-    def sums_with_halo(self, count: int, kernel: Kernel, *arguments: Any) -> Field:
-        """Run a kernel over arrays with halos; return the totals of its sums, see `sums`."""
-        return self.sums(count, kernel, *arguments, first=self.halo)
-
-    def coarser(self) -> "LocalRows":
-        """The rows of the next coarser level, which has every other row."""
-        return self.with_count(self.count // 2)
-
-    def with_count(self, count: int) -> "LocalRows":
-        """The rows of a coarser level that has any number of rows."""
+    def coarser(self, count: int) -> "LocalRows":
+        """The rows of the next coarser level, which has so many."""
         return LocalRows(count, len(self.parts) if count >= MIN_THREADED_ROWS else 1)
 
     def run_from_finer(self, kernel: Kernel, fine: Any, coarse: Any) -> None:

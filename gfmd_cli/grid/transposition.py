@@ -4,6 +4,7 @@ A transform along x needs whole rows of a field, and one along y whole columns.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 from typing import Any
 
@@ -14,11 +15,6 @@ from gfmd_cli.grid.ranks import LONG_SPIN_SECONDS, Ranks
 
 Span = tuple[int, int]
 """First index of a range, and the index after its last."""
-
-
-def column_spans(columns: int, count: int) -> list[Span]:
-    """The columns of each of `count` processes."""
-    return list(pairwise(columns * rank // count for rank in range(count + 1)))
 
 
 @dataclass(frozen=True)
@@ -33,8 +29,14 @@ class Transposition:
     ranks: Ranks
     edges: list[int]
     """First row of each process, and the number of rows."""
-    spans: list[Span]
-    """Columns of each process."""
+    columns: int
+    """Number of columns."""
+
+    @cached_property
+    def spans(self) -> list[Span]:
+        """The columns of each process."""
+        count = self.ranks.size
+        return list(pairwise(self.columns * rank // count for rank in range(count + 1)))
 
     @property
     def row_count(self) -> int:

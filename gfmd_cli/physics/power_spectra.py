@@ -75,7 +75,6 @@ def correlation(grid: Grid, field: Field) -> Field:
     for rows in row_blocks(modes):
         modes[rows] *= modes[rows].conj()
     modes.flat[0] = 0.0
-    products = grid.empty()
-    grid.backward_into(products)
+    products = grid.field_of_work()
     variance = float(products.flat[0])
     return np.divide(products, variance if variance > 0 else np.nan, out=products)

@@ -51,7 +51,7 @@ def touchable(void: Mask | None, grid: Grid) -> Mask | None:
     """
     if void is None:
         return None
-    if not grid.total(int(np.count_nonzero(~void))):
+    if not grid.any(~void):
         raise InputError('surface.missing: "void" leaves no point that can touch')
     return ~void
 

@@ -84,9 +84,7 @@ class SelfAffine(RigidSurface):
     def heights_on(self, grid: Grid) -> Field:
         """Heights [m] at the points of a grid that this process holds."""
         self._write_modes(grid)
-        height = grid.empty()
-        grid.backward_into(height)
-        return height
+        return grid.field_of_work()
 
     def _amplitude(self, m: Field) -> Field:
         """sqrt(C(q)) at |q| = 2 pi m / L, zero beyond the cut-off. Paper Eqs. (3), (40)."""

@@ -45,7 +45,7 @@ def contact_stress(contact: Contact, touching: Mask) -> ContactStress:
         modes = grid.forward_into_work(contact.height)
         for rows in row_blocks(modes):
             modes[rows] *= 1j / grid.size * contact.stiffness[rows] * direction(grid, axis, rows)
-        grid.backward_into(field)
+        field = grid.field_of_work()
         square += float(np.sum(field[touching] ** 2))
     return ContactStress(deviation, float(np.sqrt(square / np.count_nonzero(touching))))
 

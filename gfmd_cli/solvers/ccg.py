@@ -69,7 +69,7 @@ class ConstrainedCG(Solver):
             np.multiply(state.direction, length, out=force)
             u += force
             below = u < h
-            if contact.grid.total(np.count_nonzero(below)):
+            if contact.grid.any(below):
                 u[below] = h[below]  # [4]
                 contact.stress(u, out=sigma)
                 state.transforms += 2
@@ -89,7 +89,7 @@ class ConstrainedCG(Solver):
         direction *= beta
         direction += force
         direction[pressed] = 0.0
-        state.descent = grid.total(float(np.vdot(force, direction)))
+        state.descent = grid.dot(force, direction)
 
     def _length(self, contact: Contact, state: CCGState, response: Field) -> float:
         """Length that minimises the energy along the direction d; `response` is K d.
@@ -99,7 +99,7 @@ class ConstrainedCG(Solver):
         """
         grid = contact.grid
         direction, descent = state.direction, state.descent
-        curvature = grid.total(float(np.vdot(direction, response)))
+        curvature = grid.dot(direction, response)
         reach = contact.height_range
         reach /= max(grid.max(float(np.abs(direction).max())), 1e-300)
         return descent / curvature if curvature * reach > abs(descent) else reach

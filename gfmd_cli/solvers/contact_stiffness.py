@@ -60,7 +60,7 @@ def _stiffness(contact: Contact, touching: Mask) -> float:
     grid = contact.grid
     free = ~np.atleast_2d(touching)
     contact_state = np.where(free, FREE, PRESSED).astype(np.int8)
-    preconditioner = create(contact, grid, *select(contact, contact_state, PRESSED))
+    preconditioner = create(contact, grid, select(contact, contact_state, PRESSED))
     values, z = (field[:, : grid.points] for field in (grid.as_rows(grid.padded), preconditioner.z))
     stress = np.where(free, -1.0, 0.0)  # K w - 1 = -f
     direction, change = np.zeros_like(stress), np.zeros_like(stress)

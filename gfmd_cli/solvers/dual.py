@@ -26,7 +26,6 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from gfmd_cli.grid.arrays import Field, Mask
-from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.physics.contact import Contact
 from gfmd_cli.physics.free_contact import FreeContact
 from gfmd_cli.solvers.loop import Solver, Start, State
@@ -139,39 +138,32 @@ class Dual(Solver):
             state.length = descent / curvature if curvature > 0 else 1.0
         for _ in range(MAX_HALVINGS):
             target = np.where(chosen, stress + state.length * state.direction, 0.0)
-            clipped = _any_negative(grid, target)
+            clipped = grid.any(target < 0)
             target[chosen] = projected(grid, target[chosen], contact.pressure * grid.size)  # [4]
             move = target - stress
-            free.displacement(move, out=change)
-            state.transforms += free.transforms
             fall = -grid.dot(move, state.gap)
             if fall > 0:
                 break
             state.length, state.slope = 0.5 * state.length, 0.0
         else:
-            change *= 0.0
+            change[...] = 0.0
             return
+        free.displacement(move, out=change)
+        state.transforms += free.transforms
         curvature = grid.dot(move, change)
         best = fall / curvature if curvature > 0 else 1.0
-        fraction = self._fraction(grid, state, best, clipped)
-        if fraction == 1.0:  # [5]
-            stress[...] = target
-        else:
-            np.maximum(stress + fraction * move, 0.0, out=stress)
-        change *= fraction
-        state.gap += change
-
-    def _fraction(self, grid: Grid, state: DualState, best: float, clipped: bool) -> float:
-        """Fraction of a move to take if the energy is lowest at the fraction `best`."""
-        exact = not clipped and (
-            best <= 1
-            or not _any_negative(grid, state.sigma + best * state.length * state.direction)
-        )
+        length = best * state.length
+        exact = not clipped and (best <= 1 or not grid.any(stress + length * state.direction < 0))
         choice = choose(best, exact)
         state.length *= choice.factor
         if choice.restart:
             state.slope = 0.0
-        return choice.fraction
+        if choice.fraction == 1.0:  # [5]
+            stress[...] = target
+        else:
+            np.maximum(stress + choice.fraction * move, 0.0, out=stress)
+        change *= choice.fraction
+        state.gap += change
 
 
 def _new_state(u: Field, stress: Field, gap: Field) -> DualState:
@@ -188,8 +180,3 @@ def _chosen(contact: FreeContact, state: DualState) -> Mask:
     if contact.grid.dot(outside, outside) > MAX_OVERLAP_RATIO**2 * contact.grid.dot(inside, inside):
         touching |= overlapping
     return touching
-
-
-def _any_negative(grid: Grid, values: Field) -> bool:
-    """Whether a field is negative at some point of the grid."""
-    return grid.max(float(np.any(values < 0))) > 0

@@ -45,11 +45,15 @@ from gfmd_cli.solvers.contact_state import ContactState
 
 MIN_LEVEL_POINTS = 4  # points along the shorter side on the coarsest level
 MAX_PIXEL_ASPECT = 1.5  # beyond, only the shorter side is coarsened, which leaves 1 / (2 / 1.5)
-MAX_LAPLACIAN_GROWTH = 5.0  # growth of k(q) above which the Laplacian is squared; n = 2.3; measured
+# Other values of the next two, and of the number of steps below: scripts/solver_constants.py.
+MAX_LAPLACIAN_GROWTH = 5.0  # growth of k(q) above which the Laplacian is squared; n = 2.3
+"""Measured: 5 to 9 % more transforms if it is squared at n = 2; 8 to 14 % at n = 2.5 and 19 to
+30 % at n = 3 if it is not. At n = 2.2 both are the same within 3 %."""
 SPRING_STIFFNESS = 0.125, 0.25  # over diagonal element and k(2 q) / k(q): Laplacian, its square
+"""Measured: half takes up to a fifth more transforms (n = 2), double a tenth (n = 2 to 4)."""
 JACOBI_EIGENVALUE = 1.76  # largest of the damped Jacobi iteration; 1.6 to 1.85 do as well
 STEEPEST = 4.5  # exponent above which the levels limit the growth of k(q); measured, see below
-COARSEST_STEP_PAIRS = 4  # pairs of smoothing steps on the coarsest level
+COARSEST_STEP_PAIRS = 4  # of smoothing steps on the coarsest level; 1 to 8 are the same within 4 %
 TIE_UNIT = 1.0 / 64  # of the integers in `ties`
 
 
@@ -146,13 +150,9 @@ def level_rows(grid: Grid) -> Iterator[tuple[Shape, LocalRows]]:
         if any(n // 2 < MIN_LEVEL_POINTS for n, halved in axes if halved):
             return
         coarser = tuple(_half(n) if halved else n for n, halved in axes)
-        if _is_half(coarser, shape):
-            rows = rows.coarser()
-        elif rows.is_whole:
-            rows = rows.with_count(coarser[0])
-        else:
+        if not (rows.is_whole or _is_half(coarser, shape)):
             return
-        shape = coarser
+        shape, rows = coarser, rows.coarser(coarser[0])
 
 
 def _sides(grid: Grid) -> tuple[float, ...]:
@@ -221,7 +221,8 @@ class _CoarseLevel:
         matrix = (self.rhs, self.operator, self.ties)
         start = (self.rhs if old is None else old, old is None)
         correction = coarser.correction() if coarser else (self.rhs, kernels.ZERO)
-        self.rows.run_with_halo(kernels.smooth, *matrix, *start, *correction, new)
+        arrays = (*matrix, *start, *correction, new)
+        self.rows.run(kernels.smooth, *arrays, first=self.rows.halo)
         self.rows.exchange_halo(new)
 
     def post_smooth(self, coarser: "_CoarseLevel") -> None:
@@ -262,9 +263,8 @@ class Multigrid:
         for coarser, level in pairwise(self.coarse[::-1]):
             level.post_smooth(coarser)
         # correction and one smoothing step on the finest level, and the sums
-        slope, z_change = self.rows.sums_with_halo(
-            2, kernels.last_smooth, *fields, *first.correction(), self.scale, change, self.z
-        )
+        arrays = (*fields, *first.correction(), self.scale, change, self.z)
+        slope, z_change = self.rows.sums(2, kernels.last_smooth, *arrays, first=self.rows.halo)
         return float(slope), float(z_change)
 
     def descend(self) -> None:

@@ -61,8 +61,7 @@ class PolonskyKeer(Solver):
         sigma = contact.stress(u, out=contact.grid.empty())
         pressure = contact.clear_untouchable(np.maximum(sigma, 0.0))
         pressure *= contact.pressure / contact.grid.mean(pressure)
-        compute_displacement = partial(contact.grid.apply, compliance(contact))
-        response = compute_displacement(pressure, out=contact.grid.empty())
+        response = contact.grid.apply(compliance(contact), pressure, out=contact.grid.empty())
         return PolonskyKeerState(
             u=u,
             sigma=sigma,
@@ -90,22 +89,22 @@ class PolonskyKeer(Solver):
             state.residual = contact.residual(state.u, state.sigma)
             yield state
             inside = gap[touching]
-            norm = grid.total(float(inside @ inside))  # [2]
+            norm = grid.dot(inside, inside)  # [2]
             t *= state.conjugate * norm / state.norm
             t += gap
             t[~touching] = 0.0  # [3]
             state.norm = max(norm, 1e-300)
             compute_displacement(t, out=displacement)
             displacement -= grid.mean(displacement[touching])  # [4]
-            curvature = grid.total(float(np.vdot(displacement, t)))
-            descent = grid.total(float(np.vdot(gap, t)))
+            curvature = grid.dot(displacement, t)
+            descent = grid.dot(gap, t)
             length = descent / curvature if curvature > 0 else 0.0  # [5]
             s -= length * t
-            cut = grid.total(np.count_nonzero(s < 0)) > 0
+            cut = grid.any(s < 0)
             np.maximum(s, 0.0, out=s)  # [6]
             overlap = contact.clear_untouchable((s == 0) & (gap < 0))
             s[overlap] -= length * gap[overlap]  # [7]
-            state.conjugate = bool(grid.total(np.count_nonzero(overlap)) == 0)
+            state.conjugate = not grid.any(overlap)
             scale = contact.pressure / grid.mean(s)
             s *= scale  # [8]
             state.transforms += 2

@@ -39,14 +39,3 @@ def slopes(sigma, contact_state, threshold, change, z, out, a, b):
             slope -= free_z * sigma[i, j]
             z_change += free_z * change[i, j]
         out[i, 0], out[i, 1] = slope, z_change
-
-
-@kernel
-def apply_greens_function(modes, first, k, start, stop, factor, screening):
-    """Multiply coefficients by factor / (k(q) + screening); see `grid.kernels`."""
-    for i in range(k.shape[0]):
-        row, stiffness = modes[i, 2 * first :], k[i, start:stop]
-        for j in range(stiffness.size):
-            weight = factor / (stiffness[j] + screening)
-            row[2 * j] *= weight
-            row[2 * j + 1] *= weight

@@ -48,7 +48,7 @@ class GreensFunction:
 
     def __init__(self, contact: Contact, screening: float, grid: Grid) -> None:
         self.grid, self.rows = grid, contact.grid.rows
-        self.stiffness, self.screening = grid.as_rows(contact.stiffness), screening
+        self.stiffness, self.screening = contact.stiffness, screening
         self.z = grid.as_rows(grid.padded)
         self.transforms = grid.pair_count
 
@@ -59,27 +59,28 @@ class GreensFunction:
         grid, rows = self.grid, self.rows
         fields = (sigma, rows.interior(contact_state), threshold)
         rows.run(kernels.free_force, *fields, self.z)
-        grid.filter_by(kernels.apply_greens_function, self.stiffness, self.screening)
+        grid.unfilter_padded(self.stiffness, shift=self.screening)
         slope, z_change = rows.sums(2, kernels.slopes, *fields, change, self.z)
         return float(slope), float(z_change)
 
 
-def select(contact: Contact, contact_state: ContactState, threshold: int) -> tuple[float, bool]:
-    """k(q_c) of the Green's function for the points held, and whether the V-cycle is faster.
+def select(contact: Contact, contact_state: ContactState, threshold: int) -> float:
+    """k(q_c) of the Green's function for the points held; 0 where the V-cycle is faster.
 
     `contact_state` has a halo.
     """
     grid = contact.grid
     grid.rows.exchange_halo(contact_state)
-    held, changes = grid.rows.sums_with_halo(2, kernels.pattern, contact_state, threshold)
+    fields = (contact_state, threshold)
+    held, changes = grid.rows.sums(2, kernels.pattern, *fields, first=grid.rows.halo)
     screening, exponent = _screening(contact, float(held), float(changes))
     is_steep = exponent > V_CYCLE_EXPONENT[grid.dimension]
-    return screening, is_steep and has_coarser_level(grid)
+    return 0.0 if is_steep and has_coarser_level(grid) else screening
 
 
-def create(contact: Contact, grid: Grid, screening: float, v_cycle: bool) -> Preconditioner:
+def create(contact: Contact, grid: Grid, screening: float) -> Preconditioner:
     """The selected preconditioner; `z` is `padded` of `grid`, that of the contact or in single."""
-    return Multigrid(contact, grid) if v_cycle else GreensFunction(contact, screening, grid)
+    return GreensFunction(contact, screening, grid) if screening else Multigrid(contact, grid)
 
 
 def _screening(contact: Contact, held: float, changes: float) -> tuple[float, float]:

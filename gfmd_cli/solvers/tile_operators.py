@@ -18,7 +18,6 @@ With a free boundary k ~ q^n, and both parts are known in real space: the smooth
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
 from functools import lru_cache, partial
 from itertools import pairwise
 from math import prod
@@ -60,33 +59,38 @@ class TileOperators:
     Parameters
     ----------
     short_ranged, stiffness : kernels of P / k and of k, as for `convolution`
-    coarse_shape : shape of the grid of the smooth part
+    transform, symbol : transform of the grid of the smooth part, and its symbol Q / k
     """
 
     first_node: ClassVar[int] = 0
     """Number of the point of the coarse grid at the first point of the grid."""
-    transforms: float
-    """Transforms of one displacement, in units of transforms of the whole grid."""
 
     def __init__(
-        self, grid: Grid, short_ranged: Field, stiffness: Field, coarse_shape: Shape
+        self,
+        grid: Grid,
+        short_ranged: Field,
+        stiffness: Field,
+        transform: PaddedTransform,
+        symbol: Field,
     ) -> None:
-        self.grid = grid
+        self.grid, self.transform = grid, transform
         self.short_ranged, self.stiffness = short_ranged, stiffness
-        self.coarse_shape = coarse_shape
+        y, x = (np.arange(points // 2 + 1) / points for points in transform.padded)
+        self.symbol = (symbol / _spline_spectrum(y, x) ** 2).astype(np.float32)
         self.weights = _weights().astype(np.float32)
+        self.transforms = prod(transform.padded) / grid.size
+        """Transforms of one displacement, in units of transforms of the whole grid."""
 
     def displacement(self, tiles: Tiles) -> TileMap:
         """The map s -> C s on these tiles, up to a rigid displacement."""
-        nodes = self._nodes(tiles)
-        size = prod(self.coarse_shape)
-        rows, columns = np.unravel_index(nodes, self.coarse_shape)
+        nodes, values = self._nodes(tiles), np.empty(self.transform.shape, np.float32)
+        rows, columns = np.unravel_index(nodes, values.shape)
         near = convolution(self.short_ranged, tiles, self.grid.rows.pool)
 
         def map_pressure(s: Field) -> Field:
             s = s.astype(np.float32)
-            loads: Any = np.bincount(nodes.ravel(), (s @ self.weights).ravel(), size)
-            values = self._smooth(loads.reshape(self.coarse_shape))
+            loads: Any = np.bincount(nodes.ravel(), (s @ self.weights).ravel(), values.size)
+            self.transform.apply(self.symbol, loads, out=values)
             w: Field = values[rows, columns] @ self.weights.T
             w += near(s)
             return w
@@ -97,13 +101,9 @@ class TileOperators:
         """The map u -> K u on these tiles, with the kernel of K cut off at 8 points."""
         return convolution(self.stiffness, tiles, self.grid.rows.pool)
 
-    def _smooth(self, loads: Field) -> Field:
-        """The smooth part of the displacement by loads, as coefficients of the splines."""
-        raise NotImplementedError
-
     def _nodes(self, tiles: Tiles) -> Indices:
         """Numbers of the points of the coarse grid around each tile, shape (tiles, 25)."""
-        down, right = self.coarse_shape
+        down, right = self.transform.shape
         nodes = _nodes_of_tile() + self.first_node
         i = (tiles.rows[:, None] * (SIDE // COARSENING) + nodes) % down
         j = (tiles.columns[:, None] * (SIDE // COARSENING) + nodes) % right
@@ -121,22 +121,13 @@ class PeriodicOperators(TileOperators):
         q[0, 0], k[0, 0] = 2 * np.pi / grid.length, k_along_x[1]  # P / k is constant at small q
         short_ranged = _near_values(gammainc(order, (q / (2 * alpha)) ** 2) / k)
         shape = tuple(points // COARSENING for points in grid.shape)
-        super().__init__(grid, short_ranged, stiffness, shape)
-        self.coarse = replace(grid.coarser(shape), precision="single")
-        q = self.coarse.wavenumber()
-        symbol: Field = np.interp(q / (2 * alpha), *_table_of_q(order))
-        k = grid.cut(contact.stiffness, self.coarse)
+        coarse, half = grid.coarser(shape), slice(shape[0] // 2 + 1)  # q_y >= 0
+        symbol: Field = np.interp(coarse.wavenumber(half) / (2 * alpha), *_table_of_q(order))
+        k = grid.cut(contact.stiffness, coarse)[half] * COARSENING**2
         np.divide(symbol, k, out=symbol, where=k > 0)
         symbol[0, 0] = 0.0
-        splines = _spline_spectrum(np.fft.fftfreq(shape[0]), np.fft.rfftfreq(shape[1]))
-        self.symbol = symbol / (splines**2 * COARSENING**2)
-        self.transforms = self.coarse.pair_count * self.coarse.size / grid.size
-
-    def _smooth(self, loads: Field) -> Field:
-        values = self.coarse.padded[..., : self.coarse.points]
-        values[...] = loads
-        self.coarse.filter_padded(self.symbol)
-        return values
+        transform = PaddedTransform(shape, shape, "single", len(coarse.rows.parts))
+        super().__init__(grid, short_ranged, stiffness, transform, symbol)
 
 
 class FreeOperators(TileOperators):
@@ -152,17 +143,10 @@ class FreeOperators(TileOperators):
         cell = Grid(MIN_CELL_POINTS, points_y=MIN_CELL_POINTS, length=sides[1], length_y=sides[0])
         k = free.elastomer.stiffness(cell.wavenumber(), grid.length) / free.unit
         shape = tuple(points // COARSENING + SPLINE_ORDER - 1 for points in grid.shape)
-        super().__init__(grid, short_ranged, _near_values(k), shape)
         padded = padded_shape(shape, 2.0)
-        self.transform = PaddedTransform(shape, padded, "single", len(grid.rows.parts))
-        y, x = (np.arange(points // 2 + 1) / points for points in padded)
-        symbol = self.transform.symbol_of(_smooth_part(contact, shape, COARSENING))
-        self.symbol = (symbol / _spline_spectrum(y, x) ** 2).astype(np.float32)
-        self.values = np.empty(shape, np.float32)
-        self.transforms = padded[0] * padded[1] / grid.size
-
-    def _smooth(self, loads: Field) -> Field:
-        return self.transform.apply(self.symbol, loads, self.values)
+        transform = PaddedTransform(shape, padded, "single", len(grid.rows.parts))
+        symbol = transform.symbol_of(_smooth_part(contact, shape, COARSENING))
+        super().__init__(grid, short_ranged, _near_values(k), transform, symbol)
 
 
 def convolution(kernel: Field, tiles: Tiles, pool: ThreadPoolExecutor | None) -> TileMap:

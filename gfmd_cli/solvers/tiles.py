@@ -36,7 +36,7 @@ class Tiles:
 
     @property
     def blocks(self) -> list[int]:
-        """Numbers of the rows of tiles that are used, for `Grid.filter_by`."""
+        """Numbers of the rows of tiles that are used, for `Grid.filter_padded`."""
         return [int(row) for row in np.flatnonzero(self.used.any(axis=1))]
 
     def take(self, field: Any) -> Any:

@@ -88,7 +88,7 @@ def check_levels(points):
     with_halo, whole = rows.with_halo(field[rows.start : rows.stop]), field
     while points % 2 == 0 and points >= 8:
         points //= 2
-        rows, coarse = rows.coarser(), np.empty((points, COLUMNS))
+        rows, coarse = rows.coarser(points), np.empty((points, COLUMNS))
         target = rows.empty_with_halo(COLUMNS, dtype=np.float64)
         rows.run_from_finer(number_three, (with_halo,), (target,))
         number_three(whole, coarse, 0, points)
