@@ -201,8 +201,13 @@ class FileSurface(RigidSurface):
         """The map with the treatment of its edges that goes with a boundary by default.
 
         With a free boundary an array, too, ends at its borders, but by default no trend is
-        subtracted from it.
+        subtracted from it. Raises InputError for a mirrored map with a free boundary.
         """
+        if boundary == "free" and self.edges == "mirror":
+            raise InputError(
+                'surface.edges = "mirror" makes a map periodic, and grid.boundary = "free" lets it '
+                "end at its borders: leave out one of them"
+            )
         if self.has_borders:
             return self.model_copy(update={"edges": "none" if boundary == "free" else "mirror"})
         if boundary == "periodic" or self.edges or self._stated_periodic() is not None:
