@@ -222,7 +222,7 @@ def _planning_lock(folder: Path) -> Iterator[bool]:
         if folder != _planning.get().folder:
             with suppress(OSError):
                 folder.mkdir(parents=True, exist_ok=True)
-        is_locked = folder.is_dir() and folder not in _without_lock
+        is_locked = os.path.isdir(folder) and folder not in _without_lock  # Path.is_dir can raise
         if is_locked:
             try:
                 stack.enter_context(locked(folder / "planning", waits=_planning.get().waits))
