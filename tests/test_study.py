@@ -682,15 +682,20 @@ def test_a_study_whose_folder_is_renamed_during_a_run_does_not_begin_anew(run, t
     assert {row["status"] for row in read_rows(path)} == {"converged"}
 
 
-def test_unfinished_work_that_is_deleted_during_a_run_is_told_and_not_made_anew(run, tmp_path):
-    parts = tmp_path / "study.parts"
+@pytest.mark.parametrize("shard", [(0, 1), (0, 2)])
+def test_unfinished_work_that_is_deleted_ends_the_run_and_is_not_made_anew(run, tmp_path, shard):
+    """Also that of a shard, which leaves collecting to the others; no other task is begun."""
+    parts, begun = tmp_path / "study.parts", []
 
     def delete(event):
-        if event.event == "end" and parts.exists():
+        if event.event == "start":
+            begun.append(event.task)
+        elif event.event == "end" and parts.exists():
             shutil.rmtree(parts)
 
     with pytest.raises(SpaceError, match="renamed or deleted during the run"):
-        run(report=delete, jobs=1)
+        run(report=delete, jobs=1, shard=shard)
+    assert len(begun) == 1
     assert not list(tmp_path.glob("study*"))
 
 
