@@ -106,8 +106,10 @@ def test_continuum_values_are_averaged_if_all_seeds_have_one(comparison):
 
 
 def test_the_pressure_of_a_mean_over_seeds_is_that_of_its_place_on_the_axis(tmp_path, rows_of):
-    keys = ("elastomer.n=1", "surface.h_std=1e-6", "load={mean_gap=0.5}", "surface.seed=[0, 1]")
-    rows = rows_of(*keys, name="gap.h5")
+    in_metres_and_pascals = ("surface.h_std=1e-6", "elastomer={kind='power', n=1, k_n=1e9}")
+    rows = rows_of(
+        *in_metres_and_pascals, "load={mean_gap=0.5}", "surface.seed=[0, 1]", name="gap.h5"
+    )
     assert rows[0]["pressure"] != pytest.approx(rows[1]["pressure"], rel=0.01)
     (group,) = seed_groups(with_styles(compare(tmp_path / "gap.h5")))
     series = Series.of(AREA, group)

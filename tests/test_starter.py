@@ -99,6 +99,24 @@ def test_a_scan_is_free_where_that_is_available_and_else_mirrored(
         assert settings == [(boundary, edges, points)]
 
 
+def test_a_mirrored_map_has_no_free_boundary(gfmd, tmp_path):
+    holed(tmp_path / "h.npy", (16, 16))
+    keys = ("--set", "surface.edges=mirror", "--set", "grid.boundary=free")
+    message = gfmd("init", "new.toml", "--from", "h.npy", *keys, status=2)
+    assert "leave out one of them" in message
+    assert not (tmp_path / "new.toml").exists()
+
+
+@pytest.mark.parametrize("boundary", ["free", "periodic"])
+def test_init_warns_of_the_map_as_its_runs_use_it(gfmd, tmp_path, boundary):
+    """A step at the border matters in a periodic cell, a tilt if the map ends at its borders."""
+    np.save(tmp_path / "h.npy", np.add.outer(np.sin(np.arange(64)), 3.0 * np.arange(64)))
+    printed = gfmd("init", "new.toml", "--from", "h.npy", "--set", f"grid.boundary={boundary}")
+    for text in (printed, (tmp_path / "new.toml").read_text()):
+        assert ("step across the border" in text) == (boundary == "periodic")
+        assert ("a tilt makes up" in text) == (boundary == "free")
+
+
 @pytest.mark.parametrize("words", [(), ("--from", "scan.di")])
 def test_each_key_that_is_commented_out_is_valid(gfmd, tmp_path, words):
     pytest.importorskip("SurfaceTopography")

@@ -72,7 +72,7 @@ def without_escapes(label: str) -> str:
 def order(curve: Curve) -> tuple[float, ...]:
     """Key for sorting: slabs by thickness, then power laws by exponent, then the others.
 
-    Among equal ones the numbers in the spec decide, so that colours go along a sweep.
+    Among curves that are equal in this, the numbers in the spec decide: colours go along a sweep.
     """
     row = curve.rows[0]
     numbers = [row[each.column.name] for each in PARAMETERS if each.column.kind is not str]

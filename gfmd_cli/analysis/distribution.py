@@ -214,7 +214,7 @@ def distributions(comparison: Comparison) -> list[StressDistribution]:
 
     Rows are one contact where surface, elastomer, boundary, solver, tolerance and pressure are the
     same, and so are the unit of stress and the shape of the pixels; surfaces that differ in their
-    seed only are averaged. Contacts that missed their accuracy or load are solved all the same.
+    seed only are averaged. Contacts that missed only their accuracy or load are included.
     """
     by_contact: dict[tuple[Any, ...], dict[int, dict[int, tuple[Curve, Row]]]] = {}
     for curve in comparison.curves:

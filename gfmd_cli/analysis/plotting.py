@@ -230,7 +230,7 @@ class ColumnFigure(LegendFigure):
     def unnamed_line(self, names: tuple[str, ...], x: Field, y: Field, **style: Any) -> None:
         """Draw a line where y >= 0 that belongs to entries of the legend and adds none.
 
-        A zero is drawn, for theories underflow: at zero of a linear axis, below a logarithmic one.
+        A zero is drawn, because theories underflow: at 0 on a linear axis, below a logarithmic one.
         """
         y = np.where(y >= 0, y, np.nan)
         self.axes.plot(x, y, **style)

@@ -13,7 +13,7 @@ from gfmd_cli.units import LARGEST_RMS_HEIGHT, scaled
 SPACE = "\u00a0"
 """No-break space."""
 STIFFNESSES = ("E_star", "k_n", "tension")
-"""Columns of what makes an elastomer stiff; 1 by default. Tables of k(q) have none of them."""
+"""Columns of the stiffness of an elastomer, 1 by default. Tables of k(q) have none of them."""
 RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
@@ -25,8 +25,8 @@ def largest(values: Field) -> float:
 def in_si(row: Mapping[str, Any], unit: str) -> bool:
     """Whether values of a contact in this unit mean something, and not reduced units alone.
 
-    They do where the load was given in Pa or the surface has heights of a real one; with Pa in the
-    unit, the elastomer needs a stiffness that was given, too: the default of 1 is that of none.
+    They do where the load was given in Pa, or where the surface has heights of a real one. In the
+    second case, a unit with Pa also needs a given stiffness of the elastomer, other than 1.
     """
     if row["load"] == "pressure":
         return True

@@ -37,9 +37,9 @@ def init(spec: Path, scan: Path | None, overrides: tuple[str, ...]) -> None:
     else:
         of_surface = tuple(word for word in overrides if word.startswith(("surface.", "surface=")))
         surface = read_scan(scan, of_surface)
-        text, preparation = starter_of_scan(spec, surface, overrides)
+        text, preparation, warnings = starter_of_scan(spec, surface, overrides)
         print_text(preparation)
-        for warning in surface.warnings():
+        for warning in warnings:
             print_error(f"gfmd: {scan}: {warning}")
     write_whole(spec, text.encode())
     print_text(f"{spec}: written\nnext: gfmd run {typed(spec)}")

@@ -37,7 +37,7 @@ class Waits(NamedTuple):
     stop: Event | None = None
     """Once set, a process that has waited long raises Interrupted."""
     until: float = inf
-    """Time of the monotonic clock after which it does so, too [s]."""
+    """Time of the monotonic clock after which such a process does so, too [s]."""
     run: int = 0
     """The process of the run of a worker: no wait for another worker is announced."""
 

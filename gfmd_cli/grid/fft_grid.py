@@ -276,9 +276,9 @@ class Grid:
     def unfilter_padded(
         self, symbol: Field, blocks: Sequence[int] | None = None, *, shift: float = 0.0
     ) -> None:
-        """`padded` <- F^-1 1 / (symbol + shift) F of the values in it, without modes of sum zero.
+        """`padded` <- F^-1 1 / (symbol + shift) F of the values in it.
 
-        `blocks` as in `filter_padded`.
+        Modes at which symbol + shift is zero are set to zero. `blocks` as in `filter_padded`.
         """
         self._filter_by(kernels.divide_by_symbol, symbol, shift, blocks=blocks)
 
@@ -331,7 +331,7 @@ class Grid:
         """Values at some wavenumbers, from the processes of one grid to those of another.
 
         These wavenumbers are `m_y` along y and the first `kept` along x. `self` is one of the two
-        grids, that which processes share if only one is shared.
+        grids; if processes share only one of them, it is that one.
         """
         return values[m_y, :kept]
 

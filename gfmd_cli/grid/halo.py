@@ -80,7 +80,7 @@ class DistributedRows(LocalRows):
         self.ranks.wait(*requests)
 
     def coarser(self, count: int) -> LocalRows:
-        """The half of the rows of the next coarser level, distributed if it is large enough."""
+        """The rows of the next coarser level, half as many; distributed if these are enough."""
         if is_distributable(count, self.ranks.size):
             return DistributedRows(self.ranks, count, len(self.parts))
         return ReplicatedRows(self)

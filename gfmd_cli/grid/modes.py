@@ -16,11 +16,11 @@ def multiplicity(points: int) -> Field:
 
 
 def shared_modes(source: int, target: int) -> tuple[NDArray[np.int64], bool]:
-    """Numbers m of the modes that a field of `source` points keeps on `target` points, rising.
+    """Numbers m, in rising order, of the modes that a field keeps on another number of points.
 
-    These are all modes, or those below the Nyquist wavenumber of fewer points. Also returned is
-    whether both ends are +q and -q of the Nyquist wavenumber, for which `source` points have only
-    one coefficient. As an index, m is the place of a mode in the order of a transform.
+    On more points these are all modes, on fewer those below their Nyquist wavenumber. Also returned
+    is whether the first and the last are -q and +q of the Nyquist wavenumber, for which `source`
+    points have only one coefficient. As an index, m is the place of a mode in a transform.
     """
     if target < source:
         return np.arange(-((target - 1) // 2), (target + 1) // 2), False

@@ -70,7 +70,7 @@ _always_estimated = os.environ.get("GFMD_PLANS") == "estimated"
 
 
 class _Planning(NamedTuple):
-    """How the run of a thread plans."""
+    """How the run in a thread plans its transforms."""
 
     folder: Path | None = None
     """Where wisdom is kept; None for the cache."""
@@ -195,9 +195,9 @@ def _export() -> Wisdom:
 
 
 def _joined(wisdom: Wisdom | None, more: Wisdom) -> Wisdom:
-    """Both, up to `MAX_CACHED_LINES`, those that were added last.
+    """Both; if they have more than `MAX_CACHED_LINES`, those lines that were added last.
 
-    Of two plans for one problem (a line each, flags and problem from word 3) the first is kept.
+    A plan is a line, with flags and problem from word 3. Of two for one problem the first is kept.
     """
     joined = []
     for old, new in zip(wisdom or more, more, strict=True):

@@ -64,7 +64,7 @@ class LocalRows:
     def run(self, kernel: Kernel, *arguments: Any, first: int = 0) -> None:
         """Run a kernel over the rows, which begin at index `first` of its arrays.
 
-        That is `halo` for arrays with a halo.
+        For arrays with a halo, `first` is `halo`.
         """
         if self.pool is None or len(self.parts) == 1:
             kernel(*arguments, first, first + self.count)
@@ -98,7 +98,7 @@ class LocalRows:
         """Fill the halos of arrays with the rows of the neighbouring processes."""
 
     def coarser(self, count: int) -> "LocalRows":
-        """The rows of the next coarser level, which has so many."""
+        """The rows of the next coarser level, `count` of them."""
         return LocalRows(count, len(self.parts) if count >= MIN_THREADED_ROWS else 1)
 
     def run_from_finer(self, kernel: Kernel, fine: Any, coarse: Any) -> None:

@@ -5,9 +5,9 @@ import numpy as np
 from gfmd_cli.grid.arrays import Field
 
 MIN_SPACINGS = 3
-"""In a cut-off wavelength, at least: ISO 25178-3 for optical instruments."""
+"""Fewest spacings of the map in a cut-off wavelength: ISO 25178-3 for optical instruments."""
 REACH = 1.6
-"""Of the weights, over the cut-off wavelength: farther ones are below the rounding of 1."""
+"""Largest distance with a weight, in cut-off wavelengths; beyond, weights are below rounding."""
 
 
 def gaussian_filter(
@@ -17,11 +17,11 @@ def gaussian_filter(
 
     The weights exp(-pi r^2 / (alpha cutoff)^2) with alpha = sqrt(ln 2 / pi) (ISO 16610-21 and -61)
     leave the fraction `transmission` of a wave. A periodic map is multiplied by it in Fourier
-    space. In a map with borders each height is the value of a line that is fitted to all heights
-    with these weights, along x and then along y: this keeps planes up to the borders (their
-    moments 0 and 1, ISO 16610-28), and is the weighted mean away from them. The sum over points
-    instead of the integral makes a wave of the cut-off wavelength keep 0.5019 of its amplitude if
-    the cut-off is 4 spacings, 0.560 if it is 3.
+    space. In a map with borders a straight line is fitted to the heights around each point with
+    these weights, along x and then along y; its value there is the new height. Far from the
+    borders this is the weighted mean; at the borders it keeps planes (the moments 0 and 1 of the
+    weights, ISO 16610-28). A sum over points is not the integral: a wave of the cut-off wavelength
+    keeps 0.5019 of its amplitude if the cut-off is 4 spacings, 0.560 if it is 3.
 
     Parameters
     ----------

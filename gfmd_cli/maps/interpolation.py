@@ -135,8 +135,8 @@ def nearest(mask: Mask, shape: tuple[int, ...], *, centred: bool = False) -> Mas
     """A periodic mask on another grid of the same cell: that of the nearest point.
 
     Of two points that are equally near, that with the larger coordinate counts, so that a void
-    keeps its area. A rule that treats both alike would widen or narrow it by half a spacing, on
-    grids with an even multiple of the points alone: contact areas would jump from grid to grid.
+    keeps its area. A rule that treats both alike would widen or narrow it by half a spacing, but
+    only on grids with an even multiple of the points: contact areas would jump from grid to grid.
 
     `centred` tells where the points of the other grid lie, see `positions`.
     """

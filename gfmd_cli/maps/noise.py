@@ -17,7 +17,7 @@ MIN_COMMON = 0.5  # variance of the noise along one axis over that along the oth
 MIN_POINTS = 128  # per side: fewer, and profiles, have such differences by chance
 MIN_PAIRS = 100  # of known differences, likewise
 SAMPLED_LINES = 128  # of each axis, at least; all of smaller maps
-FILTERED_POINTS = 512  # per side, of the part that shows what a filter does; all of smaller maps
+FILTERED_POINTS = 512  # per side of the part on which a filter is tried; all of smaller maps
 HALVINGS = 12  # of the interval of cut-offs; a choice: two digits of them are stated
 ROUNDED_UP = 1.05  # two digits of this multiple are no less than the number
 MAX_EXCESS = 10  # larger ratios are not stated: the gradient without noise is uncertain; a choice
@@ -79,9 +79,9 @@ def noisy(
 
 
 class _Gradient:
-    """Power spectrum of the differences of neighbours in the middle of a map, less that of a tilt.
+    """Power spectrum of the differences of neighbours in the middle of a map, without their mean.
 
-    Zero where heights are missing.
+    Differences are zero where heights are missing.
     """
 
     def __init__(self, heights: Field, spacing: tuple[float, ...]) -> None:

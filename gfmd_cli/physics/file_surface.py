@@ -81,7 +81,7 @@ class FileSurface(RigidSurface):
     for scans and with surface.periodic = false, otherwise "none"."""
     s_filter: Positive | None = None
     """Cut-off wavelength of the S-filter [m], a Gaussian low-pass filter (ISO 16610-61) against
-    noise: it halves waves of this length and removes shorter ones. By default no filter."""
+    noise: it halves waves of this wavelength and damps shorter ones more. By default no filter."""
     edges: Edges | None = None
     """How the map is made periodic: "window" tapers the heights near the border to their mean,
     "mirror" reflects the map to twice its sides, "none" changes nothing. By default "none" for a
@@ -201,8 +201,13 @@ class FileSurface(RigidSurface):
         """The map with the treatment of its edges that goes with a boundary by default.
 
         With a free boundary an array, too, ends at its borders, but by default no trend is
-        subtracted from it.
+        subtracted from it. Raises InputError for a mirrored map with a free boundary.
         """
+        if boundary == "free" and self.edges == "mirror":
+            raise InputError(
+                'surface.edges = "mirror" makes a map periodic, and grid.boundary = "free" lets it '
+                "end at its borders: leave out one of them"
+            )
         if self.has_borders:
             return self.model_copy(update={"edges": "none" if boundary == "free" else "mirror"})
         if boundary == "periodic" or self.edges or self._stated_periodic() is not None:
@@ -425,7 +430,7 @@ def _filtered(surface: FileSurface) -> Field:
     if not (1 - POINTS_ROUNDING) * shortest <= cutoff <= longest:
         raise InputError(
             f"{surface.path}: surface.s_filter = {cutoff:g} m: the cut-off wavelength must lie "
-            f"between {MIN_SPACINGS} spacings of the map, {shortest:.3g} m, and its side, "
+            f"between {MIN_SPACINGS} spacings of the map, {shortest:.3g} m, and its shorter side, "
             f"{longest:.3g} m"
         )
     return gaussian_filter(heights, spacing, cutoff, periodic=surface._is_repeated())

@@ -35,16 +35,17 @@ def starter(path: Path, overrides: tuple[str, ...]) -> str:
 
 def starter_of_scan(
     path: Path, surface: FileSurface, overrides: tuple[str, ...]
-) -> tuple[str, str]:
-    """The spec of a measured surface, for the file `path`, and how the map is prepared.
+) -> tuple[str, str, list[str]]:
+    """The spec of a measured surface, for the file `path`.
 
-    The pressures run from p* = 0.003 to 0.3. Raises InputError if the scan cannot be used.
+    Also returned are how its runs prepare the map, and their warnings about it. The pressures run
+    from p* = 0.003 to 0.3. Raises InputError if the scan cannot be used.
     """
     repeated = surface.within("periodic")
     sides = dict.fromkeys(f"{side / surface.copies:.4g}" for side in reversed(surface.sides))
     points = surface.own_points()
 
-    def text(h_std: float, delta_sigma: float, elastomers: int) -> str:
+    def text(h_std: float, delta_sigma: float, elastomers: int, warnings: list[str]) -> str:
         low, high = (round(log10(p_star * delta_sigma)) for p_star in (0.003, 0.3))
         rendered = _render(
             "scan.toml",
@@ -64,16 +65,18 @@ def starter_of_scan(
             is_finer=points > surface.smallest_grid() // surface.copies,
             low=low,
             high=high,
-            warnings=surface.warnings(),
+            warnings=warnings,
         )
         return with_keys(rendered, overrides)
 
-    elastomers = _checked(text(1.0, 1.0, 1), path, overrides).elastomer
-    scene = build_scene(repeated, elastomers[0], repeated.smallest_grid())
-    finished = text(scene.h_std, scene.delta_sigma, len(elastomers))
-    spec = _checked(finished, path, overrides)
+    spec = _checked(text(1.0, 1.0, 1, []), path, overrides)
     used, grid = with_boundary(spec.surface[0], spec.elastomer[0], spec.grid[0], spec.solver[0])
-    return finished, used.preparation(grid.boundary or "")
+    assert grid.boundary is not None
+    warnings = used.warnings(grid.boundary)
+    scene = build_scene(repeated, spec.elastomer[0], repeated.smallest_grid())
+    finished = text(scene.h_std, scene.delta_sigma, len(spec.elastomer), warnings)
+    _checked(finished, path, overrides)
+    return finished, used.preparation(grid.boundary), warnings
 
 
 def _checked(text: str, path: Path, overrides: tuple[str, ...]) -> Spec:

@@ -56,7 +56,7 @@ class WorkerOptions:
     checkpoint_every: float = inf
     """Time between two saves of the state of a solve [s]."""
     wait_until: float = inf
-    """Time of the monotonic clock after which no lock is waited for any longer [s]."""
+    """Time of the monotonic clock at which waits for locks end [s]."""
 
 
 @dataclass(frozen=True)

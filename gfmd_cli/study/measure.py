@@ -150,7 +150,7 @@ def _map_spectrum(surface: RigidSurface) -> Spectrum | None:
 
 
 def forget_spectra() -> None:
-    """Drop the spectra of maps: files may have changed, and plans give other last bits."""
+    """Drop the spectra of maps: files may have changed, and other plans change the last bits."""
     _map_spectrum.cache_clear()
 
 

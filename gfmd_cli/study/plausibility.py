@@ -160,10 +160,10 @@ def _compressed(task: Task, h_std: float, displacement: float) -> Iterator[str]:
 
 
 def unit_of_grids(tasks: Sequence[Task]) -> str:
-    """A warning about a p* on several grids of rough surfaces whose unit depends on them, else "".
+    """A warning if p* of rough surfaces has another unit on each of several grids, else "".
 
-    That of single indenters is told contact by contact, from `MAX_FINEST_SHARE` on. Interpolated
-    maps have too little of Delta_sigma at the shortest waves of their own grid to show the change.
+    Single indenters are warned of contact by contact, see `MAX_FINEST_SHARE`. Interpolated maps
+    have too little of Delta_sigma at the shortest waves of their own grid to show the change.
     """
     changing = [task for task in tasks if task.surface.rough and not task.has_fixed_unit]
     if len({task.points for task in changing}) < 2:
@@ -179,7 +179,7 @@ def finest_share(scene: Scene) -> float:
 
 
 def _unit_of_grid(task: Task, scene: Scene) -> Iterator[str]:
-    """The same of a single indenter, on one grid, too."""
+    """The same warning for a single indenter, also if it has one grid only."""
     if task.has_fixed_unit or task.surface.rough:
         return
     if (share := finest_share(scene)) > MAX_FINEST_SHARE:

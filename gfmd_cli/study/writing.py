@@ -100,7 +100,7 @@ class _Writer(NamedTuple):
             create_dataset(group, column.name, _array(column.kind, values))
 
     def columns(self, file: Any, values: Mapping[Column, list[Any]], task: Any) -> None:
-        """The columns: a dataset each, or one for all of a kind; no parameters that no task has."""
+        """The columns: a dataset each, or one for all of a kind; none for parameters all blank."""
         columns = {
             column: of_column
             for column, of_column in values.items()
