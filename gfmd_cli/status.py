@@ -29,7 +29,7 @@ class Status(ExplainedEnum):
     MAX_STEPS = (
         "max_steps",
         "residual {residual:.1e} after {steps} steps, tolerance {tolerance:.1e}: raise "
-        'solver.max_steps; the fastest solver.kind is "auto"',
+        "solver.max_steps",
     )
     ROUNDING = (
         "rounding",
@@ -64,6 +64,8 @@ class Status(ExplainedEnum):
                 "relative error needs fine grids: loosen accuracy.mean_gap, or solve this load on "
                 "a fixed grid"
             )
+        if self is Status.MAX_STEPS and row["solver_kind"] != "auto":
+            text += ', or use solver.kind = "auto"'
         return text
 
     @property

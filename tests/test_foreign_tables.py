@@ -311,12 +311,14 @@ def test_a_wrong_header_of_an_esri_grid_is_refused(saved, old, new, reason):
         read_topography(saved(GRID.replace(old, new) + matrix(" ")))
 
 
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig"])
 @pytest.mark.parametrize(
     "first", ["aBCR-1.0", "aISO-1.0", "aNIST-1.0", "DSAA", "Zygo XYZ Data File - Format 1"]
 )
-def test_text_formats_with_scales_that_are_not_read_are_refused(saved, first):
+def test_text_formats_with_scales_that_are_not_read_are_refused(saved, first, encoding):
+    content = f"{first}\nZscale = 1e-9\n*\n" + matrix(" ")
     with pytest.raises(InputError, match="in text, whose header is not read; save it in binary"):
-        read_topography(saved(f"{first}\nZscale = 1e-9\n*\n" + matrix(" ")))
+        read_topography(saved(content, encoding))
 
 
 def test_points_of_zygo_with_pixels_and_micrometres_are_refused_as_such(saved):

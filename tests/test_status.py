@@ -195,6 +195,13 @@ def test_every_status_is_explained_by_the_columns_of_a_row(status):
     assert status.explain(empty_row())
 
 
+@pytest.mark.parametrize(("kind", "other"), [("auto", False), ("fire", True)])
+def test_another_solver_is_advised_only_to_those_who_chose_one(kind, other):
+    text = Status.MAX_STEPS.explain(empty_row() | {"solver_kind": kind})
+    assert "raise solver.max_steps" in text
+    assert ('solver.kind = "auto"' in text) is other
+
+
 def test_the_error_that_ended_a_task_is_told_until_the_study_is_complete(gfmd):
     Path("spec.toml").write_text(SPEC + '\n[solver]\nkind = "sort"\n')
     assert gfmd("run", "spec.toml").exit_code == 1

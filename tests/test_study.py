@@ -444,22 +444,29 @@ def test_plans_are_kept_beside_an_unfinished_study(run, tmp_path, monkeypatch):
 
 
 def test_runs_in_two_threads_keep_their_plans_apart(tmp_path, monkeypatch):
+    """Each stores its plans beside its own study, although FFTW knows those of the other."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     monkeypatch.setattr(plans, "_always_estimated", False)  # under `make test-portable` too
     one, other = tmp_path / "one", tmp_path / "other"
     values = np.zeros(97, dtype=complex)
     for folder in (one, other):
         folder.mkdir()
+
+    def plan_in_other():
+        plans.plan_with(other)
+        plans.planned(lambda fftw: fftw(values, values.copy()))
+
     try:
         plans.plan_with(one)
-        thread = Thread(target=plans.plan_with, args=(other,))
+        thread = Thread(target=plan_in_other)
         thread.start()
         thread.join()
+        assert plans.read_wisdom(one) is None
+        assert plans.read_wisdom(other)
         plans.planned(lambda fftw: fftw(values, values.copy()))
     finally:
         plans.plan_with(None)
     assert plans.read_wisdom(one)
-    assert plans.read_wisdom(other) is None
 
 
 @pytest.mark.parametrize(
@@ -675,15 +682,20 @@ def test_a_study_whose_folder_is_renamed_during_a_run_does_not_begin_anew(run, t
     assert {row["status"] for row in read_rows(path)} == {"converged"}
 
 
-def test_unfinished_work_that_is_deleted_during_a_run_is_told_and_not_made_anew(run, tmp_path):
-    parts = tmp_path / "study.parts"
+@pytest.mark.parametrize("shard", [(0, 1), (0, 2)])
+def test_unfinished_work_that_is_deleted_ends_the_run_and_is_not_made_anew(run, tmp_path, shard):
+    """Also that of a shard, which leaves collecting to the others; no other task is begun."""
+    parts, begun = tmp_path / "study.parts", []
 
     def delete(event):
-        if event.event == "end" and parts.exists():
+        if event.event == "start":
+            begun.append(event.task)
+        elif event.event == "end" and parts.exists():
             shutil.rmtree(parts)
 
     with pytest.raises(SpaceError, match="renamed or deleted during the run"):
-        run(report=delete, jobs=1)
+        run(report=delete, jobs=1, shard=shard)
+    assert len(begun) == 1
     assert not list(tmp_path.glob("study*"))
 
 

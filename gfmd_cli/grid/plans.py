@@ -65,7 +65,7 @@ def _here() -> dict[str, str]:
 
 
 _without_lock: set[Path] = set()  # folders that this process could not lock
-_planner = Lock()  # all threads share FFTW's wisdom, which FFTW does not protect
+_planner = Lock()  # FFTW does not protect its wisdom, which all threads share
 _always_estimated = os.environ.get("GFMD_PLANS") == "estimated"
 
 
@@ -82,6 +82,7 @@ class _Planning(NamedTuple):
 _CACHED = _Planning()
 _planning: ContextVar[_Planning] = ContextVar("planning", default=_CACHED)
 """Of the present thread: a process may run several studies side by side."""
+_wisdom_of = _CACHED  # the run whose plans FFTW knows; those of another one may differ
 
 
 def plan_with(
@@ -94,7 +95,7 @@ def plan_with(
     """
     _planning.set(_Planning(folder, estimated, waits))
     with _planner:
-        pyfftw.forget_wisdom()
+        _forget_wisdom()
         _without_lock.clear()
     if folder is None or _is_estimated():
         return None
@@ -106,6 +107,13 @@ def plan_with(
     if not damaged:
         return None
     return f"{_path(folder)}: damaged; transforms are planned anew, last bits may differ"
+
+
+def _forget_wisdom() -> None:
+    """Forget all that FFTW knows, from now on for the run of this thread."""
+    global _wisdom_of
+    pyfftw.forget_wisdom()
+    _wisdom_of = _planning.get()
 
 
 def _is_estimated() -> bool:
@@ -127,6 +135,8 @@ def planned(make: Callable[[Plan], T], size: int = 0) -> T:
     """
     fftw = partial(pyfftw.FFTW, planning_timelimit=PLANNING_SECONDS[0] + PLANNING_SECONDS[1] * size)
     with _planner:
+        if _wisdom_of != _planning.get():  # a run in another thread has planned since
+            _forget_wisdom()
         if _is_estimated():
             return make(partial(fftw, flags=("FFTW_ESTIMATE",)))
         with suppress(RuntimeError):  # not known

@@ -3,6 +3,7 @@
 import re
 import struct
 import warnings
+from codecs import BOM_UTF8
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -87,7 +88,7 @@ def read_microscope_file(path: Path, dataset: str | None) -> HeightMap:
 def _check_first_bytes(start: bytes) -> None:
     """Raise InputError for a known format that is not read."""
     for signature, what in REFUSED.items():
-        if start.startswith(signature):
+        if start.removeprefix(BOM_UTF8).startswith(signature):
             raise InputError(what)
 
 

@@ -55,7 +55,7 @@ class StudyProgress:
 
     @property
     def converged(self) -> bool:
-        """Whether every task is solved to its tolerance."""
+        """Whether every task has met its tolerance, accuracy and load."""
         return all(task.status.is_converged for task in self.tasks)
 
     def of_shards(self, shards: int) -> list[Counter[Status]]:

@@ -122,7 +122,7 @@ def attempt(task: Task, parts: Path, context: SolveContext) -> Status:
         with shared_errors(context.ranks):
             return solve_task(task, parts, context)
     except Interrupted:
-        context.stop.set()  # where the time of the run has ended in a wait for a lock
+        context.stop.set()  # also where a wait for a lock was too long, or the folder is gone
         status, message = Status.INTERRUPTED, ""
     except (GfmdError, MemoryError, ArithmeticError, OSError) as error:
         status = Status.NO_SPACE if isinstance(error, SpaceError) else Status.FAILED
@@ -142,10 +142,11 @@ def _recorded_status(parts: Path, task: Task) -> Status | None:
 def solve_task(task: Task, parts: Path, context: SolveContext) -> Status:
     """Solve one task and commit its record; return its status.
 
-    Raises Interrupted after the state was saved, InputError, SpaceError.
+    Raises Interrupted after the state was saved, and where `parts` was renamed or deleted, which
+    ends the run; InputError, SpaceError.
     """
     if not parts.is_dir():
-        raise SpaceError(f"{parts}: renamed or deleted during the run")
+        raise Interrupted(f"{parts}: renamed or deleted during the run")
     context.report(Progress(task.index, "start", task.label))
     _check_files(task)  # before the work for it begins
     gfmd_version()  # kept from now on: the source tree may be updated during the solve

@@ -78,9 +78,11 @@ class Study:
             self._held = in_use.stat()
             with self._collecting():
                 _, damaged = self._sound_records()
-            yield damaged
-            self._check_held()
-            self._held = None
+            try:
+                yield damaged
+            finally:  # which folder is gone says more than what became of the tasks
+                self._check_held()
+                self._held = None
         with self._collecting(), locked(in_use, wait=False) as alone:
             if alone and self._is_complete(tasks):
                 unfinished_work.remove_parts(self.parts)
