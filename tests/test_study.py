@@ -682,6 +682,19 @@ def test_a_study_whose_folder_is_renamed_during_a_run_does_not_begin_anew(run, t
     assert {row["status"] for row in read_rows(path)} == {"converged"}
 
 
+def test_a_file_in_place_of_unfinished_work_ends_the_run(run, tmp_path):
+    parts = tmp_path / "study.parts"
+
+    def replace(event):
+        if event.event == "end" and parts.is_dir():
+            shutil.rmtree(parts)
+            parts.write_text("mine")
+
+    with pytest.raises(SpaceError, match="renamed or deleted during the run"):
+        run(report=replace, jobs=1)
+    assert parts.read_text() == "mine"
+
+
 @pytest.mark.parametrize("shard", [(0, 1), (0, 2)])
 def test_unfinished_work_that_is_deleted_ends_the_run_and_is_not_made_anew(run, tmp_path, shard):
     """Also that of a shard, which leaves collecting to the others; no other task is begun."""

@@ -198,7 +198,7 @@ class Study:
     def _check_held(self) -> None:
         """Raise SpaceError where the folder of unfinished work is no longer that of `work`."""
         lock: os.stat_result | None = None
-        with suppress(FileNotFoundError):
+        with suppress(OSError):  # also a file in place of the folder, or a stale handle of NFS
             lock = (self.parts / "in-use").stat()
         if self._held and not (lock and os.path.samestat(lock, self._held)):
             raise SpaceError(
