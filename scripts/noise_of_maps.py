@@ -73,20 +73,20 @@ def noise_like(heights: Field, level: float) -> float:
 NOISES = {"white": white, "offsets of lines": of_lines, f"over {CORRELATED} points": slow}
 
 
-def warning_about(heights: Field, folder: Path) -> str:
-    """The warnings about a map with a spacing of 1 m."""
+def warnings_about(heights: Field, folder: Path) -> str:
+    """The warnings about a map with a spacing of 1 m, one after the other."""
     path = folder / f"{abs(hash(heights.tobytes()))}.npy"
     np.save(path, heights)
     surface = FileSurface(path=path, length=float(heights.shape[-1]), periodic=False)
-    found = " ".join(surface.warnings())
+    text = " ".join(surface.warnings())
     path.unlink()
-    return found
+    return text
 
 
 def warned(heights: Field, folder: Path, words: tuple[str, ...]) -> bool:
     """Whether a warning about a map has one of these words."""
-    found = warning_about(heights, folder)
-    return any(each in found for each in words)
+    text = warnings_about(heights, folder)
+    return any(each in text for each in words)
 
 
 def contacts(seeds: int, sizes: list[int]) -> None:
@@ -131,7 +131,7 @@ def filters(seeds: int, sizes: list[int], folder: Path) -> None:
             for seed in range(seeds):
                 sound = 1e-3 * scan(points, hurst, 0.5, cutoff, seed)
                 noisy = white(sound, level, np.random.default_rng(seed))
-                stated = re.search(r"s_filter = (\S+) or more", warning_about(noisy, folder))
+                stated = re.search(r"s_filter = (\S+) or more", warnings_about(noisy, folder))
                 if not stated:
                     continue
                 s_filter = float(stated[1])

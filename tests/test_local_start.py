@@ -187,9 +187,8 @@ def test_the_solution_with_holes_is_that_of_the_whole_grid(boundary, p_star):
 def test_the_start_has_the_residual_that_the_solve_asks_for(elastomer):
     """Measured with transforms: the steps on tiles end by their own estimate of it.
 
-    For n = 0.5 the estimate may be too small by a factor of two
-    (docs/solver_measurements.md). On this surface the residual stays below 3/4 of the tolerance, so
-    that rounding does not decide.
+    For n = 0.5 the estimate may be too small by a factor of two (docs/solver_measurements.md). On
+    this surface the residual stays below 3/4 of the tolerance, so that rounding does not decide.
     """
     contact = build_scene(SelfAffine(cutoff=0.02, seed=3), elastomer, 512).contact(0.01)
     coarse = contact.coarsen((256, 256))

@@ -90,6 +90,6 @@ def repeated(output: Path | None, overrides: tuple[str, ...]) -> list[str]:
     return [*words, *(word for override in overrides for word in ("--set", override))]
 
 
-def to_type(spec: Path, output: Path | None, overrides: tuple[str, ...]) -> str:
+def arguments_as_given(spec: Path, output: Path | None, overrides: tuple[str, ...]) -> str:
     """The spec and its options as given, for the next command to type."""
     return " ".join([typed(spec), *map(shlex.quote, repeated(output, overrides))])

@@ -13,10 +13,10 @@ from gfmd_cli.cli.messages import print_data, print_error, print_text
 from gfmd_cli.cli.options import (
     FILE,
     Command,
+    arguments_as_given,
     output_option,
     overrides_option,
     study_path,
-    to_type,
 )
 from gfmd_cli.errors import InputError, typed
 from gfmd_cli.status import Status, counted
@@ -50,11 +50,11 @@ def status(
     if is_study(path):
         if output is not None or overrides:
             raise InputError(f"-o and --set need a spec; {path} is a study")
-        progress, words = progress_of_study(path), to_type(Path("SPEC"), path, ())
+        progress, words = progress_of_study(path), arguments_as_given(Path("SPEC"), path, ())
     else:
         resolved, _ = read_spec(path, overrides)
         progress = progress_of_spec(resolved, study_path(resolved, output))
-        words = to_type(path, output, overrides)
+        words = arguments_as_given(path, output, overrides)
     if shards is not None:
         check_shards(shards, len(progress.tasks))
     next_command = _next_command(progress, words)
@@ -90,7 +90,7 @@ def collect(spec: Path, output: Path | None, overrides: tuple[str, ...]) -> None
         for note in damaged:
             print_error(f"gfmd: {note}")
     progress = progress_of_spec(resolved, study.path)
-    next_command = _next_command(progress, to_type(spec, output, overrides))
+    next_command = _next_command(progress, arguments_as_given(spec, output, overrides))
     print_text("\n".join([*_lines(progress, None), f"next: {next_command}"]))
     sys.exit(0 if progress.converged else 1)
 

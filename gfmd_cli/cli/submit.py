@@ -11,11 +11,11 @@ from gfmd_cli.cli.messages import print_data, print_text
 from gfmd_cli.cli.options import (
     FILE,
     Command,
+    arguments_as_given,
     output_option,
     overrides_option,
     repeated,
     study_path,
-    to_type,
 )
 from gfmd_cli.errors import GfmdError, InputError
 from gfmd_cli.units import count
@@ -96,7 +96,7 @@ def submit(
         },
         sbatch_options=sbatch_options,
     )
-    words = to_type(spec, output, overrides)
+    words = arguments_as_given(spec, output, overrides)
     if not job.members:
         print_text(f"{study}: nothing is missing\nnext: gfmd collect {words}")
     elif dry_run:

@@ -11,8 +11,9 @@ from gfmd_cli.maps.topography import Topography
 RATIOS = (2, 3)  # of distances; a choice: gratings resemble noise at one of them only
 TOLERANCE = 0.15  # relative, of white noise at these distances; roughness grows by 0.25 for H = 0.1
 FAR = 4  # a quarter of a line is a distance at which longer waves are seen; a choice
-MIN_GROWTH = 0.1  # relative, of the mean square at this distance; a choice: without longer waves
-# the roughness itself is as short as the noise
+MIN_GROWTH = 0.1
+"""Relative growth of the mean square up to this distance; a choice. Without longer waves, the
+roughness itself is as short as the noise."""
 MIN_COMMON = 0.5  # variance of the noise along one axis over that along the other; below, of lines
 MIN_POINTS = 128  # per side: fewer, and profiles, have such differences by chance
 MIN_PAIRS = 100  # of known differences, likewise

@@ -417,10 +417,12 @@ def _prepared(surface: FileSurface) -> Field:
     return make_periodic(_filtered(surface), surface.edges or "none", surface.taper)
 
 
+@lru_cache(maxsize=4)
 def _filtered(surface: FileSurface) -> Field:
     """The heights [m], levelled, filled in and filtered, before their edges are changed.
 
-    Raises InputError for a cut-off wavelength that the map does not resolve or contain.
+    Cached, because the spectrum needs them, too. Raises InputError for a cut-off wavelength that
+    the map does not resolve or contain.
     """
     heights, cutoff, spacing = _filled(surface), surface.s_filter, surface._map_spacing()
     if cutoff is None:
@@ -509,6 +511,7 @@ def forget_files() -> None:
     for cached in (
         _read,
         _filled,
+        _filtered,
         _prepared,
         _smallest_grid,
         _suited_interpolation,
