@@ -353,7 +353,7 @@ def test_the_bounds_hold_the_distance_to_the_solution(elastomer, p_star, toleran
     )
     assert (
         observables.energy + p_star * observables.u_g - exact.energy - p_star * exact.u_g
-        <= bounds.gap + 1e-12
+        <= bounds.duality_gap + 1e-12
     )
     for name in ("u_g", "sigma_p"):
         error = bounds.estimated_error(name, observables, approximate.residual)

@@ -140,7 +140,7 @@ def test_a_leading_axis_of_one_point_is_dropped(array):
 def test_marks_of_missing_heights_are_found_before_units_are_converted(array):
     heights = HEIGHTS.copy()
     heights[2, 3] = 9.97e36
-    assert read_topography(array(heights)).holes == 1
+    assert read_topography(array(heights)).missing_count == 1
 
 
 def test_every_mark_of_missing_heights_counts(array):
@@ -150,7 +150,7 @@ def test_every_mark_of_missing_heights_counts(array):
     def mark(file):
         file["height"].attrs["missing_value"] = [-9999.0, -8888.0]
 
-    assert read_topography(array(heights, extra=mark)).holes == 2
+    assert read_topography(array(heights, extra=mark)).missing_count == 2
 
 
 @pytest.mark.parametrize(("number", "size"), [(1, 2**64 - 16), (1, 2**13), (0, 0)])

@@ -79,7 +79,7 @@ def test_hertz_line_contact_has_no_images():
 
 @pytest.mark.parametrize("n", [0.5, 1.5])
 def test_generalised_hertz_contact_has_no_images(n):
-    """sigma_0 = 2^(n-1) k a^(2-n) / R Gamma(2-n/2)^2, depth a^2 / (2-n) R; errata of the paper."""
+    """sigma_0 = 2^(n-1) k a^(2-n) / [R Gamma(2-n/2)^2], depth a^2 / [(2-n) R]: exact results."""
     from scipy.special import gamma
 
     a, points = 0.3, 128

@@ -206,7 +206,7 @@ def check_conditions(contact, solution, tolerance):
 def check_bounds(contact, solution, observables):
     """The bounds hold the distance to a solution at 1e-10, which has bounds of its own."""
     bounds = error_bounds(contact, solution.u, solution.sigma)
-    assert bounds.gap >= 0
+    assert bounds.duality_gap >= 0
     close = solve_contact(contact, Auto(tolerance=1e-10, max_steps=3000))
     contact.stress(close.u, out=close.sigma)
     best = error_bounds(contact, close.u, close.sigma)

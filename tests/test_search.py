@@ -15,7 +15,7 @@ from gfmd_cli.errors import InputError, Interrupted
 from gfmd_cli.physics.scenes import build_scene
 from gfmd_cli.status import Status
 from gfmd_cli.study import run_task
-from gfmd_cli.study.load_search import TRIALS, Trial, _Search
+from gfmd_cli.study.load_search import MAX_TRIALS, Trial, _Search
 from gfmd_cli.study.reading import read_rows
 from gfmd_cli.study.tasks import plan
 
@@ -372,7 +372,7 @@ def check_search(power, first, steps, quantity):
     while (p := search.next()) is not None:
         search.add(Trial(64, p, value(p), 0.0))
         trials += 1
-    assert 0 < trials < TRIALS
+    assert 0 < trials < MAX_TRIALS
     assert search.succeeded == (steps == 0 or quantity == "contact_area")  # gaps have no steps
     count = min(range(1, steps + 1), key=lambda k: abs(math.log(k / steps / 0.1)), default=0)
     nearest = count / steps if steps else pytest.approx(0.1, rel=1e-5)

@@ -102,7 +102,7 @@ def test_marks_of_missing_heights_are_in_the_unit_of_the_file(tmp_path, columns,
     path = tmp_path / "map.txt"
     path.write_bytes(b"".join(lines))
     topography = read_topography(path)
-    assert topography.holes == 1
+    assert topography.missing_count == 1
     assert np.abs(topography.heights).max() < 1e-8
 
 

@@ -1,14 +1,14 @@
 """Power laws of Pr(sigma): theory at the edge of a contact, and fits to a study.
 
-At a distance s inside the edge of a contact the stress is sigma = A s^(1 - n/2) (paper Eqs. (5) and
-(6), corrected), on rough surfaces too (paper Sect. 5.1). A contact line of length l per area then
-holds the share l ds of points between sigma and sigma + dsigma, so that for every n but 2
+At a distance zeta inside the edge of a contact the stress is sigma = J zeta^(1 - n/2) (paper Eqs.
+(5) and (6), corrected), on rough surfaces too (paper Sect. 5). A contact line of length l per area
+then holds the share l dzeta of points between sigma and sigma + dsigma, so that for every n but 2
 
-    Pr(sigma) = l <A^(-2/(2-n))> 2 / |2 - n| sigma^(n/(2-n)),
+    Pr(sigma) = l <J^(-2/(2-n))> 2 / |2 - n| sigma^(n/(2-n)),
 
 for n < 2 at small stress (n = 1/2: 1/3; n = 1: 1), for 2 < n < 4 at large stress (n = 3: -3, so
 that the variance diverges with the logarithm of the spacing). A paraboloid has this law at all its
-stresses; other contacts depart from it in proportion to s over their size, that is to
+stresses; other contacts depart from it in proportion to zeta over their size, that is to
 sigma^(2/(2-n)). At n = 2 the stress at the edge is finite and differs from edge to edge: no law
 follows; at n = 4 the edge carries a line force. Persson theory is linear at small stress for all n.
 """

@@ -97,8 +97,8 @@ class Series:
             style = replace(style, label=f"{style.label}, {len(items)} seeds")
         theory = np.mean([getattr(item.theory, panel.column) for item in items], axis=0)
         x, y, error, half_width = (column[visible] for column in columns)
-        seen = list(compress(statuses, visible))
-        return cls(style, x, y, error, half_width, seen, details, theory)
+        visible_statuses = list(compress(statuses, visible))
+        return cls(style, x, y, error, half_width, visible_statuses, details, theory)
 
     def draw(self, plot: ColumnFigure, *, line: bool) -> None:
         """Draw points with error bars, the band of several seeds, and a line on request."""

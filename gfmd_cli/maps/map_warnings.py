@@ -100,7 +100,7 @@ def unit_of_heights(topography: Topography, scale: float) -> str:
 
 def many_filled_in(topography: Topography) -> str:
     """Many missing heights, all of them filled in."""
-    fraction = topography.holes / topography.heights.size
+    fraction = topography.missing_count / topography.heights.size
     if fraction <= MAX_FILLED:
         return ""
     return (

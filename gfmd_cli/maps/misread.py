@@ -44,7 +44,7 @@ def filled_lines(topography: Topography) -> tuple[str, Topography]:
     """
     heights = topography.with_gaps()
     filled = np.zeros(heights.shape, bool)
-    found = ""
+    warning = ""
     for lines, along, mask in ((heights, "x", filled), (heights.T, "y", filled.T)):
         if lines.ndim == 1 or min(lines.shape) < MIN_POINTS:
             break
@@ -67,16 +67,16 @@ def filled_lines(topography: Topography) -> tuple[str, Topography]:
             )
         numbers = np.flatnonzero(is_filled)
         mask[numbers] = True
-        if numbers.size and not found:
-            found = (
+        if numbers.size and not warning:
+            warning = (
                 f"{count(numbers.size, 'line')} along {along} of equal heights each, first line "
                 f"{numbers[0]} with {lines[numbers[0], 0]:g}: missing lines that were filled with "
                 "a number? Replace them by NaN"
             )
-    if not found:
+    if not warning:
         return "", topography
     missing = filled if topography.missing is None else filled | topography.missing
-    return found, replace(topography, missing=missing)
+    return warning, replace(topography, missing=missing)
 
 
 def misread(topography: Topography) -> str:
@@ -84,13 +84,13 @@ def misread(topography: Topography) -> str:
     heights = topography.with_gaps()
     if heights.ndim == 1:
         return ""
-    found = _broken(heights)
-    if found or min(heights.shape) < MIN_POINTS:
-        return found
-    found = _noise(heights) or _wrapped(heights)
+    warning = _broken(heights)
+    if warning or min(heights.shape) < MIN_POINTS:
+        return warning
+    warning = _noise(heights) or _wrapped(heights)
     for lines, along in ((heights, "x"), (heights.T, "y")):
-        found = found or _disordered(lines, along) or _sheared(lines, along)
-    return found
+        warning = warning or _disordered(lines, along) or _sheared(lines, along)
+    return warning
 
 
 def _mean(differences: Field) -> float:

@@ -102,8 +102,8 @@ def is_unit(word: str) -> bool:
 
 def sides_in(lines: list[bytes]) -> list[float]:
     """Lengths [m] that a header states; two of them are the sides of a matrix."""
-    found = filter(None, map(SIDE.match, lines))
-    sides = [(side[1], in_metres(side[2].decode(errors="replace"))) for side in found]
+    matches = filter(None, map(SIDE.match, lines))
+    sides = [(side[1], in_metres(side[2].decode(errors="replace"))) for side in matches]
     return [float(value) * unit for value, unit in sides if is_number(value) and unit is not None]
 
 

@@ -107,7 +107,7 @@ class Topography(HeightMap):
     """Distance of the numbers next to 1 in the type of the heights in the file."""
 
     @property
-    def holes(self) -> int:
+    def missing_count(self) -> int:
         """Number of missing heights."""
         return 0 if self.missing is None else int(np.count_nonzero(self.missing))
 

@@ -28,7 +28,8 @@ def approach(
 ) -> float:
     """Displacement of the indenter from first touch [m] at a solution; NaN where c is undefined.
 
-    `peak` gives max h [m], or None for the largest height on the grid.
+    `peak` gives max h [m], or None for the largest height on the grid. `u` and `sigma` are in
+    reduced units, of shape `grid.shape`.
     """
     if not elastomer.has_level(contact.boundary, scene.grid.dimension):
         return np.nan

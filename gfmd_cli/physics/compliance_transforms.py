@@ -1,22 +1,22 @@
 """Displacements of an elastomer without borders whose stiffness is not a power law.
 
-The compliance kernel G in two dimensions, and H, its integral over a disc divided by 2 pi, are the
+The compliance kernel G in two dimensions, and I, its integral over a disc divided by 2 pi, are the
 Hankel transforms
 
-    G(r) = int_0^inf s J_0(s) / k(s / r) ds / (2 pi r^2),
-    H(r) = int_0^r G(t) t dt = int_0^inf J_1(s) / k(s / r) ds / (2 pi)
+    G(r) = int_0^inf phi J_0(phi) / k(phi / r) dphi / (2 pi r^2),
+    I(r) = int_0^r G(r') r' dr' = int_0^inf J_1(phi) / k(phi / r) dphi / (2 pi)
 
-of the compliance, with s = q r and d[t J_1(t)]/dt = t J_0(t). In one dimension
+of the compliance, with phi = q r and d[phi J_1(phi)]/dphi = phi J_0(phi). In one dimension
 
-    H(x) = int_0^x G(t) dt = int_0^inf sin(s) / [s k(s / x)] ds / pi.
+    I(x) = int_0^x G(x') dx' = int_0^inf sin(phi) / [phi k(phi / x)] dphi / pi.
 
-The integrals over s end at about CUT radians, where a smooth step turns the wave off (Abel's
+The integrals over phi end at about CUT radians, where a smooth step turns the wave off (Abel's
 summation): a smooth compliance adds nothing beyond. Each integral is Gauss's rule on intervals
 that end at the knots of the stiffness, where its derivatives jump; below the first knot k is a
 power law. The integral of G over the triangle between the x-axis, the line x = X and the direction
-to the corner (X, Y) is that of H over the angle; with the distance X cosh(v) on this line it is
+to the corner (X, Y) is that of I over the angle; with the distance X cosh(v) on this line it is
 
-    int_0^asinh(Y/X) H(X cosh v) / cosh v dv,
+    int_0^asinh(Y/X) I(X cosh v) / cosh v dv,
 
 and a second triangle makes the rectangle from the origin to the corner.
 """
@@ -45,10 +45,10 @@ ANGLE_NODES = 48  # of Gauss's rule within a triangle of a near pixel
 
 WAVES: dict[str, tuple[Callable[[Field], Field], int, int]] = {
     "disc": (j1, 1, 0),
-    "point": (lambda s: s * j0(s), 1, -2),
-    "line": (lambda s: 2 * np.sinc(s / np.pi), 0, 0),
+    "point": (lambda phi: phi * j0(phi), 1, -2),
+    "line": (lambda phi: 2 * np.sinc(phi / np.pi), 0, 0),
 }
-"""The wave of a transform, the power of s that it begins with, and the power of r in front."""
+"""The wave of a transform, the power of phi that it begins with, and the power of r in front."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,16 +98,16 @@ class Compliance:
         return lambda r: np.asarray(cubic(np.log(r)))
 
     def transform(self, name: str, r: float) -> float:
-        """r^m int_0^inf wave(s) / k(s / r) ds / 2 pi for one of the waves."""
+        """r^m int_0^inf wave(phi) / k(phi / r) dphi / 2 pi, with the power m of `WAVES`."""
         wave, power, in_front = WAVES[name]
         knots, end = self.knots * r, CUT + 6 * CUT_WIDTH
         begin = min(SMALLEST_PHASE, knots[0])
         ends = np.unique([*_intervals(begin, end), *knots[(knots > begin) & (knots < end)]])
         nodes, weights = np.polynomial.legendre.leggauss(INTERVAL_NODES)
         half = 0.5 * np.diff(ends)
-        s = (ends[:-1] + half)[:, None] + np.multiply.outer(half, nodes)
-        values = wave(s) * (0.5 * erfc((s - CUT) / CUT_WIDTH)) / self.stiffness(s / r)
-        first = np.array(begin)  # below, wave / k is s^(power - n)
+        phi = (ends[:-1] + half)[:, None] + np.multiply.outer(half, nodes)
+        values = wave(phi) * (0.5 * erfc((phi - CUT) / CUT_WIDTH)) / self.stiffness(phi / r)
+        first = np.array(begin)  # below, wave / k is phi^(power - n)
         series = wave(first) * first / self.stiffness(first / r)
         total = half @ (values @ weights) + series / (1 + power - self.lowest_exponent)
         return float(total * r**in_front / (2 * np.pi))

@@ -23,11 +23,12 @@ from gfmd_cli.physics.persson import Shells
 from gfmd_cli.physics.waves import Texture, texture
 
 PRESSURE_RANGE = (1e-30, 1e6)
-"""Reduced pressures that are solved. Above 2^17 every grid is in full contact, as no peak exceeds
-its rms times the points per side; sigma - p then only loses digits. Far below the lower limit
-squares of p* underflow; rounding errors of sigma exceed p* much earlier."""
+"""Reduced pressures that are solved. Above 2^17, the largest number of points per side, every grid
+is in full contact, as |K h| exceeds its rms value by that factor at most; sigma - p then only loses
+digits. Far below the lower limit squares of p* underflow; rounding errors of sigma exceed p* much
+earlier."""
 UNCERTAINTY_FACTOR = 2.0
-"""Factor of the rms violation below which gaps and stresses may be errors.
+"""Factor of the rms of min(g, sigma) below which gaps and stresses may be errors.
 
 The contact state of a point with such a gap and such a stress is uncertain. Measured for n = 0.5 to
 4 and slabs at residuals of 1e-2 to 1e-4 (128^2): the area was wrong by at most three points more
@@ -166,8 +167,8 @@ class Contact:
         return self.noise(moves.real) * self.as_residual(squares)
 
     @cached_property
-    def stiffest(self) -> float:
-        """The largest k(q)."""
+    def largest_stiffness(self) -> float:
+        """k_max, the largest k(q)."""
         return self.grid.max(float(self.stiffness.max()))
 
     @cached_property
@@ -196,16 +197,16 @@ class Contact:
         (total,) = self.grid.rows.sums(1, kernels.squared_violations, *fields)
         return self.as_residual(total)
 
-    def as_residual(self, violation: float) -> float:
+    def as_residual(self, squares: float) -> float:
         """Natural residual from the sum of the squares of min(g, sigma)."""
-        return sqrt(violation / self.grid.size) / min(self.pressure, 1.0)
+        return sqrt(squares / self.grid.size) / min(self.pressure, 1.0)
 
     def noise(self, dtype: "np.dtype[Any]") -> float:
         """Estimated rms error of the stress by rounding, divided by the rms displacement.
 
         Rounding is white noise, and short waves dominate its stress: eps / 2 times k_max.
         """
-        return 0.5 * float(np.finfo(dtype).eps) * self.stiffest
+        return 0.5 * float(np.finfo(dtype).eps) * self.largest_stiffness
 
     def rounding(self, field: Field) -> float:
         """Estimated contribution of the rounding of a displacement to the residual."""

@@ -3,10 +3,11 @@
 Most constants were fitted to one half of the calibration set of `scripts/calibration.py` and
 checked on the other (docs/calibration.md names the exceptions): elastomers of n = 0 to 4 and slabs,
 random and simple surfaces, each on up to six nested grids. Contacts of few patches and surfaces
-that are not isotropic or not band-limited are left to `error_estimates`. Symbols: x = contact line
-per area times spacing, that is contact switches per point; n = exponent of the stiffness k(q); w =
-2 pi waves / points, the phase of the short waves from one point to the next (pi at most); b =
-curvature / points^2, the height [h_std] by which the surface bends from one point to the next.
+that are not isotropic or not band-limited are left to `error_estimates`. Symbols: xi = contact line
+per area times spacing, that is contact switches per point; n = exponent of the stiffness k(q); phi
+= 2 pi waves / points, the phase of the short waves from one point to the next (pi at most); b =
+curvature / points^2, the height [h_std] by which the surface bends from one point to the next; D =
+change of an observable from the coarser to the finer grid.
 """
 
 from collections.abc import Mapping, Sequence
@@ -36,23 +37,24 @@ from gfmd_cli.physics.error_estimates import (
 from gfmd_cli.physics.linear_elastomer import LinearElastomer
 from gfmd_cli.physics.persson import Shells
 
-# Excess of the counted area: AREA_EXCESS n x. Measured: 0.00, 0.05, 0.10, 0.15, 0.21, 0.26, 0.31,
-# 0.36 of x at n = 0, 0.5, ... 3.5 on all grids that resolve the surface. Yastrebov et al. (2017)
+# Excess of the counted area: AREA_EXCESS n xi. Measured: 0.00, 0.05, 0.10, 0.15, 0.21, 0.26, 0.31,
+# 0.36 of xi at n = 0, 0.5, ... 3.5 on all grids that resolve the surface. Yastrebov et al. (2017)
 # derive (pi - 1 + ln 2)/24 = 0.118 for n = 1. At n = 4 the ratio is not constant: 0.3 to 0.9.
 AREA_EXCESS = 0.104
-MAX_AREA_EXPONENT = 3.5  # n up to which that holds; beyond, the error is below x and below a_r
+MAX_AREA_EXPONENT = 3.5  # n up to which that holds; beyond, the error is below xi and below a_r
 
-# For n > 3.5 the excess is a multiple c of the decrease D from the coarser of two grids. Measured
+# For n > 3.5 the excess is a multiple of -D, the decrease from the coarser of two grids. Measured
 # (`scripts/plate_areas.py`, n = 3.6, 3.75 and 4): 0.4 in light contacts, of lone points, whose area
-# falls with the square of the spacing (c = 1/3), 0.75 at p* = 0.2, and 1 to 1.6 in broad contacts,
-# whose edge is a ragged line (first order: c = 1). D / x tells them apart: c = 1.78 - 1.99 D / x
-# leaves a scatter of 0.1 to 0.16. The bar is 0.6 times the root of D^2 + (0.2 x)^2.
+# falls with the square of the spacing (factor 1/3), 0.75 at p* = 0.2, 1 to 1.6 in broad contacts,
+# whose edge is a ragged line (first order: factor 1). D / xi tells them apart: the factor
+# 1.78 + 1.99 D / xi leaves a scatter of 0.1 to 0.16. The bar is the root of D^2 + (0.2 xi)^2
+# times 0.6.
 PLATE_EXCESS, PLATE_EXCESS_SLOPE, LONE_POINTS = 1.78, 1.99, 1 / 3
 PLATE_BAR, PLATE_FLOOR = 0.6, 0.2
 # Bar of a_r on rough surfaces, once corrected: root of the sum of the squares of
-#   AREA_CHANCE (1 + n / 10) (x / A)^(1/2) / N independent errors of A N^2 x points
-#   AREA_LAW (n + 1) x w                       the law itself, where few points resolve a wave
-#   AREA_CHANGE D                              what neither explains, D from the coarser grid
+#   AREA_CHANCE (1 + n / 10) (xi / A)^(1/2) / N independent errors of A N^2 xi points
+#   AREA_LAW (n + 1) xi phi                        the law itself, where few points resolve a wave
+#   AREA_CHANGE D                                  what neither explains; D of the corrected values
 # A = area / L^2, N = points per L. Chosen on seeds 20 and 47 (full), 11 (--quick --shift 1.37).
 AREA_CHANCE, AREA_LAW, AREA_CHANGE = 0.5, 0.01, 0.3
 EXPONENT_CHANGE = 0.6  # of its change with q is uncertain; chosen on --layers, seeds 1 and 2
@@ -60,23 +62,23 @@ MAX_STRESS_EXPONENT = 2.5  # sigma_p converges as spacing^(3 - n): too slow for 
 
 # Typical errors on one grid: power laws and medians by regression; of equally good ones, those that
 # change least when long waves are added to a surface (which only reduce the contact area):
-#   sigma_p, relative:    exp(-7.08 + 2.18 n) (x / a_r)^(3/2) w^(5/4) / (1 - a_r)^(1/2), at least
-#                         exp(-7.80 + 2.18 n) (x / a_r)^r, order r of convergence: fine grids
-#   u_g [h_std]:          exp(-6.80 + 0.62 n) (x / a_r)^(1/4) w^(3/2) (b u_g)^(1/2)
+#   sigma_p, relative:    exp(-7.08 + 2.18 n) (xi / a_r)^(3/2) phi^(5/4) / (1 - a_r)^(1/2), at least
+#                         exp(-7.80 + 2.18 n) (xi / a_r)^r, order r of convergence: fine grids
+#   u_g [h_std]:          exp(-6.80 + 0.62 n) (xi / a_r)^(1/4) phi^(3/2) (b u_g)^(1/2)
 # with n >= MIN_EXPONENT before the powers. The constant -7.80 is from 36 surfaces, up to 512^2.
 # Error bars on one grid: SINGLE_GRID times that. On two grids: TWO_GRIDS times the root of the sum
 # of the squares of TYPICAL_WEIGHT times the typical error and of the change D from the coarser
 # grid, reduced by the order of convergence. 98.2 to 100 of 100 bars hold in the fitted half of the
-# set. Here a_r is that of a single or line contact, with SINGLE_CONTACT_AREA x.
+# set. Here a_r is that of a single or line contact, with SINGLE_CONTACT_AREA xi.
 SINGLE_GRID = {"a_r": 4.2, "sigma_p": 4.1, "u_g": 4.2}
 TWO_GRIDS = {"a_r": 0.4, "sigma_p": 1.4, "u_g": 2.2}
 TYPICAL_WEIGHT = {"a_r": 8.0, "sigma_p": 1.2, "u_g": 1.2}
 GAP_ORDER = 3.0  # of u_g on a rough surface; sigma_p: 3 - n, at most 2; a_r: D as it is
 MIN_EXPONENT = 0.5  # n below which bars no longer decrease: the error at n = 0 is random
 SINGLE_CONTACT = 2.5  # times the change: bar of a single indenter, from the calibration set
-SINGLE_CONTACT_AREA = 0.2  # error of a corrected a_r in x, of a single or line contact, likewise
-SINGLE_CONTACT_STRESS = 0.07  # in n sigma_p x / a_r: waves at n = 2 have up to 0.07 where D = 0
-MAX_LINE = 1.5  # x / a_r from which a single contact is of too few points for a bar of sigma_p
+SINGLE_CONTACT_AREA = 0.2  # error of a corrected a_r in xi, of a single or line contact, likewise
+SINGLE_CONTACT_STRESS = 0.07  # in n sigma_p xi / a_r: waves at n = 2 have up to 0.07 where D = 0
+MAX_EDGE_RATIO = 1.5  # xi / a_r of a single contact beyond which sigma_p has no bar: few points
 SINGLE_CONTACT_GAP = 5.0  # in u_g / [points (1 - a_r)]^2: smooth indenters have 3.8 at most
 
 # A tip -r^m has the stress r^(m - n) around it, so that <sigma^2> converges as spacing^(2 (M - n))
@@ -156,7 +158,7 @@ class RoughnessScales:
         )
 
     def phase(self, points: float) -> float:
-        """Phase w of the short waves from one point to the next."""
+        """Phase phi of the short waves from one point to the next."""
         return 2 * pi * self.waves / points
 
 
@@ -213,7 +215,7 @@ def has_step(elastomer: LinearElastomer, points: float, length: float) -> bool:
 
 
 class ExcessExponent(NamedTuple):
-    """Exponent n of the excess AREA_EXCESS n x of the contact area on a grid."""
+    """Exponent n of the excess AREA_EXCESS n xi of the contact area on a grid."""
 
     value: float
     uncertainty: float = 0.0
@@ -222,8 +224,8 @@ class ExcessExponent(NamedTuple):
 def excess_exponent(elastomer: LinearElastomer, points: float, length: float) -> ExcessExponent:
     """Exponent of the excess of the contact area where the local exponent depends on q.
 
-    From a grid to the next finer one, x halves, and the excess decreases by n x / 2 with the local
-    exponent at this scale. Hence the mean over this and all finer grids, weighted 1/2, 1/4, ...
+    From a grid to the next finer one, xi halves, and the excess decreases by AREA_EXCESS n xi / 2
+    with the local exponent at this scale. Hence the mean over all scales, weighted 1/2, 1/4, ...
     Its uncertainty is the difference from the exponent on the next coarser scale.
     """
     highest = pi * points / length * 2.0**OCTAVES
@@ -319,38 +321,38 @@ def _bar(name: str, typical: float, change: float | None) -> float:
 
 
 def _area(grids: NestedGrids, rough: RoughnessScales | None, excess: ExcessExponent) -> Estimate:
-    """Relative contact area: the error is of first order in the spacing, as AREA_EXCESS area_n x.
+    """Relative contact area: the error is of first order in the spacing, as AREA_EXCESS area_n xi.
 
     Where the exponent is not that of all short waves, the excess is uncertain.
     """
     fine, coarse, _ = grids
-    area_n, x = excess.value, fine.switches_per_point
+    area_n, xi = excess.value, fine.switches_per_point
     if area_n > MAX_AREA_EXPONENT:
         if rough is not None:
             return _plate_area(grids)
         # the line force at the edge of a plate is, on a grid, a row of points
-        return Estimate(min(fine.a_r, x), nan, nan, Verdict.BOUND)
-    best = max(0.0, fine.a_r - AREA_EXCESS * area_n * x)
+        return Estimate(min(fine.a_r, xi), nan, nan, Verdict.BOUND)
+    best = max(0.0, fine.a_r - AREA_EXCESS * area_n * xi)
     change = None
     if coarse is not None:
         change = best - max(0.0, coarse.a_r - AREA_EXCESS * area_n * coarse.switches_per_point)
     if rough is None:
-        error = _bar("a_r", SINGLE_CONTACT_AREA * x, change)
+        error = _bar("a_r", SINGLE_CONTACT_AREA * xi, change)
     else:
-        chance = AREA_CHANCE * (1 + area_n / 10) * sqrt(x / fine.area) / fine.points
-        law = AREA_LAW * (area_n + 1) * x * rough.phase(fine.points)
+        chance = AREA_CHANCE * (1 + area_n / 10) * sqrt(xi / fine.area) / fine.points
+        law = AREA_LAW * (area_n + 1) * xi * rough.phase(fine.points)
         error = hypot(chance, law, AREA_CHANGE * (change or 0.0))
-    return _corrected_area(fine.a_r, best, hypot(error, AREA_EXCESS * excess.uncertainty * x))
+    return _corrected_area(fine.a_r, best, hypot(error, AREA_EXCESS * excess.uncertainty * xi))
 
 
 def _plate_area(grids: NestedGrids) -> Estimate:
     """Relative contact area of a plate on a rough surface."""
     if grids.coarse is None:
         return UNKNOWN
-    a_r, step, x = grids.fine.a_r, -grids.change("a_r"), grids.fine.switches_per_point
-    excess = PLATE_EXCESS - PLATE_EXCESS_SLOPE * step / x
+    a_r, step, xi = grids.fine.a_r, -grids.change("a_r"), grids.fine.switches_per_point
+    excess = PLATE_EXCESS - PLATE_EXCESS_SLOPE * step / xi
     best = min(1.0, max(0.0, a_r - min(max(excess, LONE_POINTS), PLATE_EXCESS) * step))
-    return _corrected_area(a_r, best, PLATE_BAR * hypot(step, PLATE_FLOOR * x))
+    return _corrected_area(a_r, best, PLATE_BAR * hypot(step, PLATE_FLOOR * xi))
 
 
 def _corrected_area(a_r: float, best: float, error: float) -> Estimate:
@@ -365,10 +367,11 @@ def _stress(grids: NestedGrids, rough: RoughnessScales | None, tip: Tip) -> Esti
         return replace(UNKNOWN, verdict=Verdict.DIVERGES if n >= 3 else Verdict.SLOW)
     if rough is None:
         return _single_stress(grids, tip) if coarse else UNKNOWN
-    value, patch = fine.sigma_p, fine.switches_per_point / fine.a_r
+    value, edge_ratio = fine.sigma_p, fine.switches_per_point / fine.a_r
     phase, order = rough.phase(fine.points), min(2.0, 3 - n)
-    coarse_law = exp(-7.08) * patch**1.5 * phase**1.25 / sqrt(1 - fine.a_r)
-    typical = exp(2.18 * max(n, MIN_EXPONENT)) * max(coarse_law, exp(-7.8) * patch**order) * value
+    coarse_law = exp(-7.08) * edge_ratio**1.5 * phase**1.25 / sqrt(1 - fine.a_r)
+    fine_law = exp(-7.8) * edge_ratio**order
+    typical = exp(2.18 * max(n, MIN_EXPONENT)) * max(coarse_law, fine_law) * value
     if coarse is None:
         return on_grid(value, _bar("sigma_p", typical, None))
     rest = grids.change("sigma_p") / (2**order - 1)
@@ -381,12 +384,12 @@ def _stress(grids: NestedGrids, rough: RoughnessScales | None, tip: Tip) -> Esti
 def _single_stress(grids: NestedGrids, tip: Tip) -> Estimate:
     """Stress deviation of a single indenter, or of a line contact."""
     fine, _, n = grids
-    value, patch = fine.sigma_p, fine.switches_per_point / fine.a_r
-    if patch > MAX_LINE:
+    value, edge_ratio = fine.sigma_p, fine.switches_per_point / fine.a_r
+    if edge_ratio > MAX_EDGE_RATIO:
         return replace(UNKNOWN, is_too_coarse=True)
     order = min(1.0, 3 - n, max(tip.stress_order(n), MIN_STRESS_ORDER))
     rest = grids.change("sigma_p") / (2**order - 1)
-    floor = SINGLE_CONTACT_STRESS * max(n, MIN_EXPONENT) * value * patch
+    floor = SINGLE_CONTACT_STRESS * max(n, MIN_EXPONENT) * value * edge_ratio
     return on_grid(value, hypot(SINGLE_CONTACT * abs(rest), floor))
 
 
@@ -397,11 +400,10 @@ def _gap(grids: NestedGrids, rough: RoughnessScales | None, tip: Tip) -> Estimat
         return _single_gap(grids, tip) if coarse else UNKNOWN
     if rough.highest > MAX_HIGHEST:
         return estimate_by_change(grids)["u_g"]
-    value, patch = fine.u_g, fine.switches_per_point / fine.a_r
+    value, edge_ratio = fine.u_g, fine.switches_per_point / fine.a_r
     phase, bend = rough.phase(fine.points), rough.curvature / fine.points**2
-    typical = (
-        exp(-6.8 + 0.62 * max(n, MIN_EXPONENT)) * patch**0.25 * phase**1.5 * sqrt(bend * value)
-    )
+    typical = exp(-6.8 + 0.62 * max(n, MIN_EXPONENT)) * edge_ratio**0.25
+    typical *= phase**1.5 * sqrt(bend * value)
     change = None if coarse is None else grids.change("u_g") / (2**GAP_ORDER - 1)
     return on_grid(value, _bar("u_g", typical, change))
 

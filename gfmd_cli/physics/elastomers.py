@@ -33,8 +33,8 @@ MAX_SPACING = 16.0  # of a grid, in thicknesses of a layer with a free boundary
 MAX_SHORT_WAVE_STRESS = 0.1  # fraction of the squared stress, for a thin plate; a choice
 THICK_SLAB = 10.0  # thickness / L, probably not relative; a choice: 2 changes k by 1e-8
 THICK_LAYER = 1000.0  # thickness / L, from which it is probably not in m; a choice
-PLATE = 0.1
-"""Largest q t up to which a slab is a plate; its stiffness is then smaller by 0.2 % or less."""
+MAX_PLATE_PHASE = 0.1
+"""Largest q t at which a slab counts as a plate; its stiffness is smaller by 0.2 % or less."""
 NEARLY_INCOMPRESSIBLE = 0.48
 """Poisson's ratio of a bonded layer above which a load with a free boundary is wrong by 3 % or more
 if pixels are wider than the layer is thick; measured, see docs/calibration.md."""
@@ -168,7 +168,7 @@ class Slab(LinearElastomer):
         """See `LinearElastomer.warnings`. A thickness may be meant in m."""
         length = scene.grid.length
         thickness = self.thickness * length
-        if thickness * scene.shells.q.max() <= PLATE:
+        if thickness * scene.shells.q.max() <= MAX_PLATE_PHASE:
             reason = "a thin plate at all wavelengths"
         elif is_rough and thickness < scene.h_std <= LARGEST_RMS_HEIGHT:
             reason = f"less than the rms height, {scene.h_std:.3g} m"
@@ -188,9 +188,9 @@ class Slab(LinearElastomer):
 
 
 class Layer(LinearElastomer):
-    """Elastic layer of finite thickness t on a rigid base, k = E* q / (2 c(q t)).
+    """Elastic layer of finite thickness t on a rigid base, k = E* q / (2 chi(q t)).
 
-    c(q t) is the compliance relative to that of the half-space: c = 1 for q t >> 1, and k has
+    chi(q t) is the compliance relative to that of the half-space: chi = 1 for q t >> 1, and k has
     a limit above zero for q -> 0.
     """
 
@@ -218,9 +218,9 @@ class Layer(LinearElastomer):
 
     def stiffness(self, q: Field, length: float = 1.0) -> Field:
         """k(q) [Pa/m], zero at q = 0."""
-        t = np.where(q > 0, q, 1.0) * self.thickness
-        softening = layer_softening(t, self.poisson if self.base == "bonded" else None)
-        return np.where(q > 0, 0.5 * self.E_star * q / softening, 0.0)
+        phase = np.where(q > 0, q, 1.0) * self.thickness
+        chi = layer_softening(phase, self.poisson if self.base == "bonded" else None)
+        return np.where(q > 0, 0.5 * self.E_star * q / chi, 0.0)
 
     def warnings(self, scene: Scene, boundary: str, *, is_rough: bool) -> list[str]:
         """See `LinearElastomer.warnings`."""
@@ -248,7 +248,7 @@ class Layer(LinearElastomer):
 
     @property
     def uniform_stiffness(self) -> float:  # type: ignore[override]
-        """E* / t of a sliding layer, E (1 - nu) / (1 + nu) (1 - 2 nu) t of a bonded one [Pa/m]."""
+        """E* / t of a sliding layer, E* (1 - nu)^2 / [(1 - 2 nu) t] of a bonded one [Pa/m]."""
         if self.base == "sliding" or self.poisson is None:
             return self.E_star / self.thickness
         nu = self.poisson
@@ -318,7 +318,7 @@ class Tabulated(LinearElastomer):
         return warnings
 
     def decays(self, dimension: int) -> bool:
-        """Whether the power law below the table rises less than q^dimension."""
+        """Whether k below the table is constant, or rises less than q^dimension."""
         exponent = _end_exponents(_read_table(self.path))[0]
         return -ROUNDED_EXPONENT <= exponent < dimension - ROUNDED_EXPONENT
 
@@ -436,38 +436,38 @@ Elastomer = Annotated[
 ]
 
 
-def layer_softening(t: Field, poisson: float | None) -> Field:
-    """Compliance c(t) of a layer on a rigid base relative to the half-space, at t = q thickness.
+def layer_softening(phi: Field, poisson: float | None) -> Field:
+    """Compliance chi(phi) of a layer on a rigid base over that of the half-space, at phi = q t.
 
-    Sliding (`poisson` None): c = (cosh 2t - 1) / (sinh 2t + 2t), half of a layer of twice the
-    thickness that is loaded from both sides. Bonded, with kappa = 3 - 4 nu (Johnson, Contact
+    Sliding (`poisson` None): chi = (cosh 2phi - 1) / (sinh 2phi + 2phi), half of a layer of twice
+    the thickness that is loaded from both sides. Bonded, with kappa = 3 - 4 nu (Johnson, Contact
     Mechanics, 1985, Sect. 5.8):
 
-        c = (kappa sinh 2t - 2t) / [kappa cosh 2t + 2t^2 + (1 + kappa^2) / 2].
+        chi = (kappa sinh 2phi - 2phi) / [kappa cosh 2phi + 2phi^2 + (1 + kappa^2) / 2].
 
-    Both are evaluated with exp(-2t), so that nothing overflows.
+    Both are evaluated with exp(-2phi), so that nothing overflows.
     """
-    decay = np.exp(-2 * t)
+    decay = np.exp(-2 * phi)
     if poisson is None:
-        return np.expm1(-2 * t) ** 2 / (4 * t * decay - np.expm1(-4 * t))
+        return np.expm1(-2 * phi) ** 2 / (4 * phi * decay - np.expm1(-4 * phi))
     kappa = 3 - 4 * poisson
-    numerator = -kappa * np.expm1(-4 * t) - 4 * t * decay
-    return numerator / (kappa * (1 + decay**2) + (4 * t**2 + 1 + kappa**2) * decay)
+    numerator = -kappa * np.expm1(-4 * phi) - 4 * phi * decay
+    return numerator / (kappa * (1 + decay**2) + (4 * phi**2 + 1 + kappa**2) * decay)
 
 
-def slab_factor(t: Field) -> Field:
-    """S(t) = (cosh 2t - 2t^2 - 1) / (sinh 2t + 2t) for t >= 0, accurate to a few roundings.
+def slab_factor(phi: Field) -> Field:
+    """S(phi) = (cosh 2phi - 2phi^2 - 1) / (sinh 2phi + 2phi) at phi = q t >= 0, to a few roundings.
 
-    Paper Eq. (41), which as printed cancels at small t and overflows at t = 355. Here both factors
-    of S = (sinh t - t)(sinh t + t) / (sinh t cosh t + t) have 2 exp(-t), so that nothing overflows,
-    and sinh t - t is a series below t = 1.
+    Paper Eq. (41), which as printed cancels at small phi and overflows at phi = 355. Here numerator
+    and denominator of S = (sinh phi - phi)(sinh phi + phi) / (sinh phi cosh phi + phi) are
+    multiplied by 4 exp(-2phi), so that nothing overflows; sinh phi - phi is a series below phi = 1.
     """
-    t = np.asarray(t, dtype=np.float64)
-    decay, rising = np.exp(-t), -np.expm1(-2 * t)  # 2 exp(-t) sinh t
-    small = np.minimum(t, 1.0)
-    tail = np.ones_like(t)  # sinh t - t = t^3/6 (1 + t^2/20 (1 + t^2/42 (...)))
+    phi = np.asarray(phi, dtype=np.float64)
+    decay, rising = np.exp(-phi), -np.expm1(-2 * phi)  # 2 exp(-phi) sinh phi
+    small = np.minimum(phi, 1.0)
+    tail = np.ones_like(phi)  # sinh x - x = x^3/6 (1 + x^2/20 (1 + x^2/42 (...)))
     for divisor in (272.0, 210.0, 156.0, 110.0, 72.0, 42.0, 20.0):  # 17*16, 15*14, ..., 5*4
         tail = 1.0 + small**2 / divisor * tail
-    difference = np.where(t < 1, small**3 / 3 * decay * tail, rising - 2 * t * decay)
-    denominator = np.maximum(4 * t * decay**2 - np.expm1(-4 * t), 1e-300)  # not zero at t = 0
-    return difference * ((rising + 2 * t * decay) / denominator)
+    difference = np.where(phi < 1, small**3 / 3 * decay * tail, rising - 2 * phi * decay)
+    denominator = np.maximum(4 * phi * decay**2 - np.expm1(-4 * phi), 1e-300)  # not 0 at phi = 0
+    return difference * ((rising + 2 * phi * decay) / denominator)

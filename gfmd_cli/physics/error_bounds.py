@@ -1,38 +1,40 @@
 """Proven bounds of the distance between an approximate and the exact solution on a grid.
 
-For any stress s >= 0 with <s> = p, the energy of a periodic contact lies between the dual value
+The exact solution on the grid is u*, sigma*. For any stress s >= 0 with <s> = p, the energy of a
+periodic contact lies between -E(s), with
 
-    D(s) = <s h> - <(s - p) K^-1 (s - p)> / 2
+    E(s) = <(s - p) K^-1 (s - p)> / 2 - <s h>,
 
 and J(u) = <u K u> / 2 + p <u> of any u >= h. With s the compressive part of sigma = K u + p, scaled
 to the mean p, and e = sigma - s, the duality gap is
 
-    G = J(u) - D(s) = <s g> + <e K^-1 e> / 2,
+    eta = J(u) + E(s) = <s g> + <e K^-1 e> / 2,
 
-free of cancellation. J is as curved as K, so <(u - u*) K (u - u*)> <= 2 G, from which
-<(sigma - sigma*)^2> <= 2 G k_max. The contact pressure is sigma at the points in contact and zero
-elsewhere; the rms of the difference is added. The minimum E(p) of J is concave in p with slope
-<u*>, and s p'/p is admissible at any other pressure p'; the best p' gives
+free of cancellation. J is quadratic with the operator K, so <(u - u*) K (u - u*)> <= 2 eta, from
+which <(sigma - sigma*)^2> <= 2 eta k_max. The contact pressure is sigma at the points in contact
+and zero elsewhere; the rms of the difference is added. The minimum of J is a concave function of p
+with slope <u*>, and s p'/p is admissible at any other pressure p'; the best p' gives
 
-    | <u*> - (<s h> - B) / p | <= sqrt(2 G B) / p,   B = <(s - p) K^-1 (s - p)>.
+    | <u*> - (<s h> - B) / p | <= sqrt(2 eta B) / p,   B = <(s - p) K^-1 (s - p)>.
 
 With a free boundary the contact minimises E(s) = <s C s> / 2 - <s h> over stresses s >= 0 with the
 mean p, where means are over the map. Let s* be the solution, d = s - s*, and
 g = C s - h - min(C s - h), the gap at the level at which the bodies just touch. E is quadratic with
 the gradient C s - h, and <d> = 0, so
 
-    E(s) - E(s*) = <g d> - <d C d> / 2 <= <s g> = G,      <d C d> <= <g d> <= G,
+    E(s) - E(s*) = <g d> - <d C d> / 2 <= <s g> = eta,      <d C d> <= <g d> <= eta,
 
 because <d C d> / 2 <= E(s) - E(s*) at a minimum. C is a principal submatrix of the circulant matrix
 of the kernel reflected about the borders of its array, so that its eigenvalues are not below the
-smallest of that matrix, l, and <d^2> <= G / l. The gap of the solution is C s* + c* - h with
+smallest of that matrix, C_min, and <d^2> <= eta / C_min. The gap of the solution is C s* + c* - h
+with
 
-    | <C s> - <C s*> | <= sqrt(<1 C 1> G)
+    | <C s> - <C s*> | <= sqrt(<1 C 1> eta)
 
-by the inequality of Cauchy and Schwarz. The minimum E(p) is convex in p with slope -c*, and s q / p
-is admissible at any other pressure q; the best q gives, with A = <s C s>,
+by the inequality of Cauchy and Schwarz. The minimum of E is a convex function of p with slope -c*,
+and s p'/p is admissible at any other pressure p'; the best p' gives, with A = <s C s>,
 
-    | c* - (<s h> - A) / p | <= sqrt(2 A G) / p.
+    | c* - (<s h> - A) / p | <= sqrt(2 A eta) / p.
 """
 
 from dataclasses import dataclass
@@ -56,8 +58,8 @@ uncertain, which matters next to full contact: n = 0.5 to 4, slabs, p* = 0.003 t
 class ErrorBounds:
     """Bounds of the errors of an approximate solution on its grid, in reduced units."""
 
-    gap: float
-    """Duality gap G [h_std Delta_sigma]."""
+    duality_gap: float
+    """Duality gap eta [h_std Delta_sigma]."""
     u_g: float
     """Upper bound of the error of the mean gap [h_std]."""
     sigma_p: float
@@ -109,9 +111,9 @@ def error_bounds(contact: Contact, u: Field, sigma: Field) -> ErrorBounds:
     reaction = max(twice_energy - 2 * mixed + remainder, 0.0)  # B, as s - p = K u - e
     centre = (lifted - reaction) / p
     return ErrorBounds(
-        gap=duality_gap,
+        duality_gap=duality_gap,
         u_g=abs(mean - centre) + _level_bound(duality_gap, reaction, p),
-        sigma_p=sqrt(2 * duality_gap * contact.stiffest) + sqrt(omitted),
+        sigma_p=sqrt(2 * duality_gap * contact.largest_stiffness) + sqrt(omitted),
         a_r=_uncertain_fraction(contact, u, sigma, violated),
     )
 
@@ -139,7 +141,7 @@ def _of_free_contact(contact: FreeContact, u: Field, sigma: Field) -> ErrorBound
     omitted = sqrt(mean((contact_pressure(contact.obstacle, u, sigma) - s) ** 2))
     violation = np.minimum(u - contact.obstacle, sigma)
     return ErrorBounds(
-        gap=duality_gap,
+        duality_gap=duality_gap,
         u_g=abs(mean(u - h) - centre)
         + sqrt(mean_compliance * duality_gap)
         + _level_bound(duality_gap, energy, p),
@@ -176,9 +178,9 @@ def full_contact_errors(
 
 
 def _level_bound(duality_gap: float, reaction: float, p: float) -> float:
-    """(t B / 2 + G / t) / p at t = |q - p| / p = sqrt(2 G / B), where it is sqrt(2 G B) / p.
+    """(t B / 2 + eta / t) / p at t = |p' - p| / p = sqrt(2 eta / B), where it is sqrt(2 eta B) / p.
 
-    With t at most 1, as q >= 0.
+    With t at most 1, as p' >= 0. With a free boundary A takes the place of B.
     """
     t = min(sqrt(2 * duality_gap / reaction), 1.0) if reaction > 0 else 1.0
     return (0.5 * t * reaction + (duality_gap / t if t > 0 else 0.0)) / p
@@ -187,7 +189,7 @@ def _level_bound(duality_gap: float, reaction: float, p: float) -> float:
 def _uncertain_fraction(contact: Contact, u: Field, sigma: Field, violated: float) -> float:
     """Fraction of the points with a gap and a stress below the error of both.
 
-    The error is `UNCERTAINTY_FACTOR` times the rms violation, where `violated` is the mean of
+    The error is `UNCERTAINTY_FACTOR` times the rms of min(g, sigma); `violated` is the mean of
     min(g, sigma)^2. Points with such a gap count at any compressive stress: they should touch, but
     do not.
     """

@@ -6,11 +6,11 @@ error. Most constants were fitted to one half of the calibration set (`scripts/c
 maps, and random surfaces with less than six patches; with `--free` for a free boundary) and checked
 on the other (docs/calibration.md names the exceptions). Each factor is the largest that any class
 of surface needs for 95 of 100 bars. Symbols: D = change of an observable from the coarser to the
-finer grid, x = contact line times spacing.
+finer grid, xi = contact line per area times spacing.
 
 With a free boundary some bars are wider. Where contact reaches the border of the map, the stress
-has the singularity of a punch: s^(-n/2) at the distance s from the border. Then <sigma^2> converges
-as spacing^(1 - n), and has no limit for n >= 1.
+has the singularity of a punch: zeta^(-n/2) at the distance zeta from the border. Then <sigma^2>
+converges as spacing^(1 - n), and has no limit for n >= 1.
 """
 
 from collections.abc import Mapping
@@ -22,7 +22,7 @@ from gfmd_cli.physics.observables import QUANTITIES, estimated_patches
 from gfmd_cli.status import ExplainedEnum
 
 # Error bars: FACTOR times the root of the sum of the squares of D and FLOOR times
-#   a_r: x          sigma_p: sigma_p x / a_r          u_g: u_g x / a_r
+#   a_r: xi          sigma_p: sigma_p xi / a_r          u_g: u_g xi / a_r
 FLOOR = {"a_r": 0.3, "sigma_p": 0.05, "u_g": 0.02}
 FACTOR = {"a_r": 1.6, "sigma_p": 2.2, "u_g": 1.5}
 CONTINUUM_FACTOR = 1.35  # of the area, extrapolated with first order in the spacing
@@ -31,7 +31,7 @@ MAX_EXPONENT = {"a_r": 2.5, "sigma_p": 1.0, "u_g": 3.0}
 
 DIVERGENT = 3.0  # exponent n from which the stress has no finite variance
 WIDE_CONTINUUM_FACTOR = 1.8
-"""The same with a free boundary or of line profiles: with 1.35, 91 to 93 of 100 bars held."""
+"""The factor with a free boundary or of line profiles: with 1.35, 91 to 93 of 100 bars held."""
 FREE_GAP_FACTOR = 1.8
 """Factor of the mean gap with a free boundary: with 1.5, 94 of 100 bars of maps in steps held."""
 BORDER_FACTOR = 2.0  # times what is left of a change D at the order 1 - n: D / (2^(1 - n) - 1)

@@ -53,7 +53,7 @@ class FileSurface(RigidSurface):
 
     rough: ClassVar[bool] = True
     is_map: ClassVar[bool] = True
-    coarsening: ClassVar[str] = "surface.region takes a part of the map"
+    size_hint: ClassVar[str] = "surface.region takes a part of the map"
     is_centred: ClassVar[bool] = False
     """Where the points of finer grids lie, see `interpolation.positions`."""
     kind: Literal["file"] = "file"
@@ -157,7 +157,7 @@ class FileSurface(RigidSurface):
         """The interpolation that is used on grids finer than the map."""
         return self.interpolation or _suited_interpolation(self)
 
-    def resolution(self) -> str:
+    def smallest_grid_reason(self) -> str:
         """Reason for the smallest grid: the points of the map."""
         return f"a map of {extent(self._topography().heights.shape)} points"
 
@@ -274,7 +274,7 @@ class FileSurface(RigidSurface):
 
     def peak(self) -> float | None:
         """Height of the highest point [m]: of the map, or of the Fourier series through it."""
-        if self.missing == "void" and self._topography().holes:
+        if self.missing == "void" and self._topography().missing_count:
             return None
         return super().peak() if self.band_limited else float(_prepared(self).max())
 
@@ -302,9 +302,9 @@ class FileSurface(RigidSurface):
             missing = mirror(missing)
         return nearest(missing, grid.whole_shape, centred=is_centred)[grid.own]
 
-    def holes(self) -> int:
+    def missing_count(self) -> int:
         """Number of missing heights of the map."""
-        return self._topography().holes
+        return self._topography().missing_count
 
     def pictures(self) -> dict[str, Picture]:
         """The map as it is in the file, and as it is solved."""
@@ -358,7 +358,7 @@ class FileSurface(RigidSurface):
     def preparation(self, boundary: str = "") -> str:
         """Description of how the map was read and prepared for a boundary."""
         topography, levelling = self._topography(), self.levelling()
-        holes = count(topography.holes, "missing height") if topography.holes else ""
+        missing = count(topography.missing_count, "missing height")
         is_free, own_shape = boundary == "free", topography.heights.shape
         size = f"{extent(topography.shape)} points"
         if self.dimension == 1:
@@ -368,7 +368,9 @@ class FileSurface(RigidSurface):
             f"region {self.region}": self.region is not None,
             f"cropped to {extent(own_shape)}": self.crop and own_shape != topography.shape,
             "turned upside down": self.flip,
-            f"{holes} {'never touch' if self.missing == 'void' else 'filled in'}": bool(holes),
+            f"{missing} {'never touch' if self.missing == 'void' else 'filled in'}": bool(
+                topography.missing_count
+            ),
             f"{levelling} subtracted": levelling != "none",
             f"S-filter {labelled(self.s_filter or 0, 'm')}": self.s_filter is not None,
             "free boundary": is_free,

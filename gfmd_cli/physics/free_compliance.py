@@ -5,7 +5,7 @@ at the middle of a pixel, due to unit pressure on another pixel, is the integral
 pixel (Love, Phil. Trans. R. Soc. A 228, 377, 1929, for the half-space).
 
 For k = k_n q^n, G is the Riesz kernel c_n r^(n-d) / k_n in d dimensions; G decays for 0 < n < d. In
-two dimensions, from int_0^inf q^(1-n) J_0(q r) dq (errata of the paper, Eq. 10b),
+two dimensions, from int_0^inf q^(1-n) J_0(q r) dq (paper Eq. (10b), which holds for 0 < n < 2),
 
     c_n = 2^(1-n) Gamma(1 - n/2) / (2 pi Gamma(n/2)),
 
@@ -79,7 +79,7 @@ def power_law(n: float, pixels: Pixels) -> Field:
 def smooth_part(n: float, alpha: float, r: Field) -> Field:
     """The part of G(r) whose transform is Q(n/2, q^2 / 4 alpha^2) / q^n, for 0 < n < 2.
 
-    Q is the regularised incomplete gamma function. With q^(-n) as the integral of
+    Q is the regularised upper incomplete gamma function. With q^(-n) as the integral of
     t^(n/2-1) exp(-q^2 t) / Gamma(n/2), this is the part t > 1 / 4 alpha^2, in two dimensions
 
         c_n r^(n-2) P(1 - n/2, alpha^2 r^2),    P = 1 - Q,

@@ -6,8 +6,8 @@ fits to simulations.
 `CoarseGrained` has no constant of its own (docs/theory.md): waves are added to the interface, the
 shortest first. With all waves shorter than a wavelength the interface has a law u_g(p). Under a
 longer wave it acts as springs of stiffness kappa = -dp/du_g in series with the elastomer of
-stiffness k(q), so that the elastomer follows the fraction T = kappa / (kappa + k) of the wave. The
-work F(p), the integral of u_g from 0 to p, increases by T k dC / 2 with waves of squared height dC.
+stiffness k(q), so that the elastomer follows the fraction T = kappa / (kappa + k) of the wave.
+Phi(p), the integral of u_g from 0 to p, increases by T k dC / 2 with waves of squared height dC.
 """
 
 from dataclasses import dataclass
@@ -31,7 +31,7 @@ _VANISHED = 1e-12  # relative to the largest gap; rounding below
 _ALPHA = (0.413, 0.609)  # alpha = 0.413 + 0.609 n
 _BETA = (0.623, 0.874)  # beta = 0.623 exp(-n / 0.874)
 _C = (0.921, -0.304, 0.144)  # c = 0.921 - 0.304 n + 0.144 n^2
-_LEAST = 1e-300  # contact area: below, the slopes count as zero
+_MIN_AREA = 1e-300  # below, the slopes count as zero
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,10 +71,10 @@ class CoarseGrained(Persson):
 
 @dataclass(frozen=True, eq=False)
 class FittedWeight(Persson):
-    """Persson theory with W = a^alpha s^beta [c + (1 - c) a^2] of two contact areas.
+    """Persson theory with W = a_q^alpha a_s^beta [c + (1 - c) a_q^2] of two contact areas.
 
-    a is the contact area at the scale q, as in Eq. (30), s that with all waves. Fitted at p* = 0.01
-    to 0.3 on nine spectra with lambda_r / lambda_s = 16 and 32 for n = 0 to 4.
+    a_q is the contact area at the scale q, as in Eq. (30), a_s that with all waves. Fitted at
+    p* = 0.01 to 0.3 on nine spectra with lambda_r / lambda_s = 16 and 32 for n = 0 to 4.
     """
 
     n: Field
@@ -82,16 +82,16 @@ class FittedWeight(Persson):
 
     mean_gap_source: ClassVar[str] = "a fitted weight"
 
-    def weight_slopes(self, a: Field, s: Field) -> tuple[Field, Field]:
-        """See `Persson.weight_slopes`; 0 <= a, s <= 1."""
+    def weight_slopes(self, a_q: Field, a_s: Field) -> tuple[Field, Field]:
+        """See `Persson.weight_slopes`; 0 <= a_q, a_s <= 1."""
         n = np.clip(self.n, 0.0, 4.0)
         alpha = _ALPHA[0] + _ALPHA[1] * n
         beta = _BETA[0] * np.exp(-n / _BETA[1])
         c = _C[0] + _C[1] * n + _C[2] * n * n
-        power, rest = a**alpha * s**beta, (1 - c) * a * a
-        w = power * (c + rest)
-        by_a = (alpha * w + 2 * power * rest) / np.maximum(a, _LEAST)
-        return by_a, beta * w / np.maximum(s, _LEAST)
+        power, rest = a_q**alpha * a_s**beta, (1 - c) * a_q * a_q
+        weight = power * (c + rest)
+        by_q = (alpha * weight + 2 * power * rest) / np.maximum(a_q, _MIN_AREA)
+        return by_q, beta * weight / np.maximum(a_s, _MIN_AREA)
 
 
 def _centres(faces: Field) -> Field:

@@ -44,8 +44,8 @@ def highest_point(heights: Field) -> float:
 
     for place in _peaks(highest):
         bounds = [(x - 1.0, x + 1.0) for x in place]
-        found = minimize(depth, place, jac=True, method="L-BFGS-B", bounds=bounds)
-        best = max(best, -scale * float(found.fun))
+        result = minimize(depth, place, jac=True, method="L-BFGS-B", bounds=bounds)
+        best = max(best, -scale * float(result.fun))
     return best
 
 

@@ -52,8 +52,8 @@ class RigidSurface(SpecTable):
     """Whether the surface ends at its borders, and the spec does not make it periodic."""
     copies: ClassVar[int] = 1
     """Copies of the surface along each side of its cell."""
-    coarsening: ClassVar[str] = "the side along y is surface.length_y"
-    """What makes the smallest grid smaller, for messages; lengths may have been given in metres."""
+    size_hint: ClassVar[str] = "the side along y is surface.length_y"
+    """What to check where the smallest grid has too many points, for messages."""
     kind: str
 
     def smallest_grid(self) -> int:
@@ -119,7 +119,7 @@ class RigidSurface(SpecTable):
         """The surface with the treatment of its edges that goes with a boundary by default."""
         return self
 
-    def resolution(self) -> str:
+    def smallest_grid_reason(self) -> str:
         """Reason for the smallest grid, as text for messages."""
         return f"kind {self.kind!r}"
 
@@ -281,7 +281,7 @@ class Punch(RoundIndenter):
     """Flat cylindrical punch: h = 0 for r <= radius, -depth beyond."""
 
     stepped: ClassVar[bool] = True
-    coarsening: ClassVar[str] = "surface.radius and surface.length have one unit"
+    size_hint: ClassVar[str] = "surface.radius and surface.length have one unit"
     kind: Literal["punch"] = "punch"
     radius: Positive = 0.25
     """Radius of the face [m], a grid spacing or more."""
@@ -304,7 +304,7 @@ class Punch(RoundIndenter):
         """Smallest number of points along y, likewise."""
         return max(SMALLEST_GRID, ceil(self.sides[0] / self.radius - POINTS_ROUNDING))
 
-    def resolution(self) -> str:
+    def smallest_grid_reason(self) -> str:
         """Reason for the smallest grid: the radius."""
         return f"kind {self.kind!r}, radius = {self.radius:g}: a spacing or more"
 
@@ -324,7 +324,7 @@ class Ridge(LineIndenter):
     """
 
     tip_exponent: ClassVar[float] = 1.0
-    coarsening: ClassVar[str] = "surface.width is relative to surface.length"
+    size_hint: ClassVar[str] = "surface.width is relative to surface.length"
     kind: Literal["ridge"] = "ridge"
     slope: Positive = 1.0
     """Slope of the flanks, the tangent of their angle to the plane."""
@@ -335,7 +335,7 @@ class Ridge(LineIndenter):
         """Smallest number of points: the foot is a spacing or more away from the crest."""
         return max(SMALLEST_GRID, ceil(2 / self.width - POINTS_ROUNDING))
 
-    def resolution(self) -> str:
+    def smallest_grid_reason(self) -> str:
         """Reason for the smallest grid: the width."""
         return f"kind {self.kind!r}, width = {self.width:g}: two spacings or more"
 

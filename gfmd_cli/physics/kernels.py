@@ -7,11 +7,11 @@ from gfmd_cli.grid.compilation import kernel
 def squared_violations(h, u, sigma, out, a, b):
     """Sums of the squares of min(g, sigma), by rows."""
     for i in range(a, b):
-        violation = 0.0
+        square = 0.0
         for j in range(h.shape[1]):
-            worst = min(u[i, j] - h[i, j], sigma[i, j])
-            violation += worst * worst
-        out[i, 0] = violation
+            violation = min(u[i, j] - h[i, j], sigma[i, j])
+            square += violation * violation
+        out[i, 0] = square
 
 
 @kernel

@@ -131,7 +131,7 @@ class LinearElastomer(SpecTable):
 
     @property
     def modulus(self) -> float:
-        """Elastic modulus [Pa], 0 where the elastomer has none."""
+        """Contact modulus E* [Pa], 0 where the elastomer has none."""
         return float(dict(self).get("E_star", 0.0))
 
     def local_exponent(self, q: Field, length: float = 1.0, step: float = EXPONENT_STEP) -> Field:

@@ -151,8 +151,8 @@ class Persson:
     def stress_density(self, sigma: Field | float, p: Field | float) -> Field:
         """Continuous part of the stress distribution Pr(sigma); zero for sigma <= 0.
 
-        Paper Eq. (24), corrected: [exp{-(sigma-p)^2/2s} - exp{-(sigma+p)^2/2s}] / sqrt(2 pi s) with
-        s = Delta_sigma^2 (printed: the same exponential twice and Delta_sigma^2 below the line).
+        Paper Eq. (24), corrected: [exp{-(sigma-p)^2/2V} - exp{-(sigma+p)^2/2V}] / sqrt(2 pi V) with
+        V = Delta_sigma^2 (printed: the same exponential twice, over sqrt(2 pi) Delta_sigma^2).
 
         Parameters
         ----------
@@ -168,25 +168,25 @@ class Persson:
     def stress_deviation(self, p: Field | float) -> Field:
         """Standard deviation sigma_p of the stress under pressure p, in the unit of p.
 
-        Paper Eq. (26) times Delta_sigma^2, which is the integral of a_r over the variance.
+        Its square, paper Eq. (26) times Delta_sigma^2, is the integral of a_r over the variance.
         """
         p = np.asarray(p, dtype=np.float64)
         if not self.shells.variance.size:
             return np.zeros_like(p)
         return np.sqrt(_resolved_variance(p, self.delta_sigma**2))
 
-    def weight_slopes(self, a: Field, s: Field) -> tuple[Field, Field]:
-        """dW/da and dW/ds of the weight W = gamma a + (1 - gamma) a^3 of the elastic energy.
+    def weight_slopes(self, a_q: Field, a_s: Field) -> tuple[Field, Field]:
+        """Derivatives by a_q and a_s of W = gamma a_q + (1 - gamma) a_q^3, weight of the energy.
 
-        Paper Eq. (30), which does not contain s. Both of shape (pressures, bins).
+        Paper Eq. (30), which does not contain a_s. Both of shape (pressures, bins).
 
         Parameters
         ----------
-        a : mean contact area of every bin, shape (pressures, bins)
-        s : contact area with all waves, shape (pressures, 1)
+        a_q : mean contact area of every bin, shape (pressures, bins)
+        a_s : contact area with all waves, shape (pressures, 1)
         """
         gamma = self.shells.gamma
-        return gamma + 3 * ((1 - gamma) * (a * a)), np.zeros_like(a)
+        return gamma + 3 * ((1 - gamma) * (a_q * a_q)), np.zeros_like(a_q)
 
     def mean_gap(self, p: Field | float) -> Field:
         """Mean gap u_g = int_p^infinity dp' v'(p') / p'; infinite at p = 0.
@@ -263,37 +263,37 @@ class Persson:
         for start in range(0, p.size, rows):
             part = slice(start, start + rows)
             pressure = p.ravel()[part]
-            a, da = _bin_area(pressure, self.shells.variance)
+            a_q, slope_q = _bin_area(pressure, self.shells.variance)
             x = np.minimum(self._reduced(pressure), UNDERFLOW)[:, None]
-            ds = np.sqrt(2 / np.pi) / self.delta_sigma * np.exp(-x * x)
-            by_a, by_s = self.weight_slopes(a, erf(x))
-            slope[part] = (by_a * da + by_s * ds) @ energy
+            slope_s = np.sqrt(2 / np.pi) / self.delta_sigma * np.exp(-x * x)
+            by_q, by_s = self.weight_slopes(a_q, erf(x))
+            slope[part] = (by_q * slope_q + by_s * slope_s) @ energy
         return slope.reshape(p.shape)
 
 
 def _bin_area(p: Field, variance: Field) -> tuple[Field, Field]:
     """Mean contact area of every bin and its slope in p, both of shape (pressures, bins).
 
-    Paper Eq. (31) and Eq. (32), corrected: I = F(s+) - F(s-) with
-    F = (p^2 + s) erf(p/sqrt(2s)) + p sqrt(2s/pi) exp(-p^2/2s) (printed: -I/2).
+    Paper Eq. (31) and Eq. (32), corrected: I = Psi(V+) - Psi(V-) with
+    Psi = (p^2 + V) erf(p/sqrt(2V)) + p sqrt(2V/pi) exp(-p^2/2V) (printed: -I/2).
     """
-    s, p = np.cumsum(variance), p[:, None]
-    narrow = variance < _NARROW * s
+    v, p = np.cumsum(variance), p[:, None]
+    narrow = variance < _NARROW * v
     width = np.where(narrow, 1.0, variance)
-    area = np.diff(_resolved_variance(p, s), prepend=0.0) / width
-    slope = np.diff(2 * np.sqrt(2 * s) * ierfc(p / np.sqrt(2 * s)), prepend=0.0) / width
+    area = np.diff(_resolved_variance(p, v), prepend=0.0) / width
+    slope = np.diff(2 * np.sqrt(2 * v) * ierfc(p / np.sqrt(2 * v)), prepend=0.0) / width
     if np.any(narrow):  # the mid point instead of a difference that cancels
-        scale = np.sqrt(2 * s - variance)[narrow]
+        scale = np.sqrt(2 * v - variance)[narrow]
         x = np.minimum(p / scale, UNDERFLOW)
         area[:, narrow] = erf(x)
         slope[:, narrow] = 2 / np.sqrt(np.pi) * np.exp(-x * x) / scale
     return area, slope
 
 
-def _resolved_variance(p: Field, s: Field | float) -> Field:
-    """int_0^s ds' erf(p/sqrt(2s')) = F(s) - F(0) in Eq. (32), as a sum of positive terms."""
-    x = p / np.sqrt(2 * s)
-    return s * erf(x) + p * np.sqrt(2 * s) * ierfc(x)
+def _resolved_variance(p: Field, v: Field | float) -> Field:
+    """int_0^V dV' erf(p/sqrt(2V')) = Psi(V) - Psi(0) in Eq. (32), as a sum of positive terms."""
+    x = p / np.sqrt(2 * v)
+    return v * erf(x) + p * np.sqrt(2 * v) * ierfc(x)
 
 
 def _panel_edges(p: Field, delta_sigma: float) -> Field:

@@ -25,7 +25,7 @@ class SelfAffine(RigidSurface):
 
     rough: ClassVar[bool] = True
     band_limited: ClassVar[bool] = True
-    coarsening: ClassVar[str] = "surface.cutoff is relative to surface.length"
+    size_hint: ClassVar[str] = "surface.cutoff is relative to surface.length"
     kind: Literal["self-affine"] = "self-affine"
     hurst: Annotated[float, Key(gt=0, le=1)] = 0.8
     """Hurst exponent H, 0 < H <= 1."""
@@ -68,7 +68,7 @@ class SelfAffine(RigidSurface):
         """Smallest number of points along y, likewise."""
         return max(SMALLEST_GRID, 2 * self.highest_modes[0])
 
-    def resolution(self) -> str:
+    def smallest_grid_reason(self) -> str:
         """Reason for the smallest grid: the cut-off needs two points per lambda_s."""
         return f"kind {self.kind!r}, cutoff = {self.cutoff:g}: two points per lambda_s"
 

@@ -108,7 +108,7 @@ class SelfAffineFit:
 def density(shells: Shells) -> Field:
     """C(q) = <|h(q)|^2> of the modes of every shell [m^2].
 
-    C(q) L^2 is the isotropic power spectral density in the usual convention [m^4].
+    Times the area of the cell it is the power spectral density in the usual convention [m^4].
     """
     return shells.height / shells.modes
 
@@ -171,7 +171,7 @@ def _with_change(
 
 
 def _fit_below(shells: Shells, range_: int, counts: Field) -> tuple[SelfAffineFit, int]:
-    """The fit to the first `range_` shells but BLUR, and the number of shells up to its q_s.
+    """The fit to shells that end BLUR q_1 below the last of `range_`, and the number up to its q_s.
 
     `counts` are the numbers of modes of a surface whose spectrum depends on |q| alone.
     """
@@ -251,8 +251,8 @@ def _maximise_likelihood(q: Field, count: Field, power: Field) -> Field:
             },
         )  # fmt: skip
 
-    found = [search([START_HURST, float(np.log(ratio))]) for ratio in START_ROLL_OFFS]
-    best: Field = min(found, key=lambda result: float(result.fun)).x
+    results = [search([START_HURST, float(np.log(ratio))]) for ratio in START_ROLL_OFFS]
+    best: Field = min(results, key=lambda result: float(result.fun)).x
     return search([float(best[0])]).x if best[1] < 0 else best
 
 

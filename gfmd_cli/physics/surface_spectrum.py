@@ -1,4 +1,4 @@
-"""Power spectral density C(q) of a surface in bands of wavenumber, with the self-affine fit."""
+"""Power spectral density of a surface in bands of wavenumber, with the self-affine fit."""
 
 from dataclasses import dataclass
 from math import pi, prod
@@ -18,10 +18,10 @@ BANDS_PER_DECADE = 10  # a choice
 
 @dataclass(frozen=True)
 class Spectrum:
-    """C(q) = A <|h(q)|^2>: the mean over the modes of a band, times the area of the cell.
+    """A <|h(q)|^2>, which figures call C(q): the mean over a band, times the area A of the cell.
 
-    Modes that the surface lacks are left out: of equal tiles, C(q) is too large by their number.
-    In a line contact, the length of the cell takes the place of its area A.
+    Modes that the surface lacks are left out: of equal tiles, it is too large by their number. In a
+    line contact, the length of the cell takes the place of its area.
     """
 
     q: Field

@@ -49,7 +49,8 @@ def check_resolved(surface: RigidSurface, points: int, points_y: int) -> None:
         if count < least:
             raise InputError(
                 f"grid.{key}: {count // surface.copies} points along {axis} do not resolve "
-                f"the surface ({surface.resolution()}); {remedy(surface, least // surface.copies)}"
+                f"the surface ({surface.smallest_grid_reason()}); "
+                f"{remedy(surface, least // surface.copies)}"
             )
 
 
@@ -57,7 +58,7 @@ def remedy(surface: RigidSurface, needed: int) -> str:
     """What to do where a surface needs so many points along an axis, or more."""
     if needed <= MAX_POINTS:
         return f"use {needed} or more"
-    return f"it takes {needed}, but at most {MAX_POINTS} are allowed; check: {surface.coarsening}"
+    return f"it takes {needed}, but at most {MAX_POINTS} are allowed; check: {surface.size_hint}"
 
 
 def sample(

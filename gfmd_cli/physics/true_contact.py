@@ -4,10 +4,10 @@ Mueser, "Elastic contacts of randomly rough surfaces across the spatial dimensio
 Sects. 4.1.2, 6, 7: a_r = erf(p / sqrt(2) Delta_sigma_c) (Sect. 6 prints no sqrt(2)). Two fields
 have the rms value Delta_sigma over the whole surface, but different values over the contact:
 
-- s = K h, the stress of full contact without p. Contact is more likely at its maxima, so its mean
-  over the contact is not zero, and its standard deviation is used.
-- w(q) = i (q / |q|) s(q), a vector along q: Eq. (22) with its factor i. For n = 1, w = k_1 grad h,
-  as in Eq. (20).
+- sigma_h = K h, the stress of full contact without p. Contact is more likely at its maxima, so its
+  mean over the contact is not zero, and its standard deviation is used.
+- Its quadrature i (q / |q|) sigma_h(q), a vector along q: Eq. (22) with its factor i. Each wave is
+  shifted by a quarter of a wavelength. For n = 1 it is k_1 grad h, as in Eq. (20).
 """
 
 from dataclasses import dataclass
@@ -28,9 +28,9 @@ class ContactStress:
     """Moments of the stress of full contact over the true contact [Delta_sigma]."""
 
     deviation: float
-    """Standard deviation of s = K h; NaN with fewer than `MIN_POINTS` points in contact."""
+    """Standard deviation of sigma_h = K h; NaN with fewer than `MIN_POINTS` points in contact."""
     quadrature: float
-    """Root mean square of w; NaN without contact."""
+    """Root mean square of its quadrature; NaN without contact."""
 
 
 def contact_stress(contact: Contact, touching: Mask) -> ContactStress:
@@ -41,7 +41,7 @@ def contact_stress(contact: Contact, touching: Mask) -> ContactStress:
     field = contact.elasticity(contact.height, grid.empty())
     known = np.count_nonzero(touching) >= MIN_POINTS
     deviation = float(field[touching].std()) if known else np.nan
-    for axis in range(grid.dimension):  # the components of w
+    for axis in range(grid.dimension):  # the components of the quadrature
         modes = grid.forward_into_work(contact.height)
         for rows in row_blocks(modes):
             modes[rows] *= 1j / grid.size * contact.stiffness[rows] * direction(grid, axis, rows)
@@ -67,12 +67,12 @@ def direction(grid: Grid, axis: int, rows: slice) -> Field:
 
 @dataclass(frozen=True)
 class Bearing:
-    """Standard deviation of s over the highest points, as a function of their fraction."""
+    """Standard deviation of sigma_h over the highest points, as a function of their fraction."""
 
     area: Field
     """Fraction of the points that are above a height, increasing."""
     deviation: Field
-    """Standard deviation of s over these points [Delta_sigma]."""
+    """Standard deviation of sigma_h over these points [Delta_sigma]."""
 
     def delta_sigma_c(self, p_star: Field | float) -> Field:
         """Delta_sigma_c [Delta_sigma] that is consistent with its contact area. Paper Sect. 7.

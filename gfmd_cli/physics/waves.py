@@ -12,7 +12,8 @@ from gfmd_cli.grid.modes import multiplicity
 ROUNDING_POWER = 1e-28  # |h(q)|^2 of a mode that only rounding has excited, relative to the largest
 ROUNDED = 1e-9  # relative error by rounding of a sum over all waves; a choice
 MIRRORED_CONCENTRATION = (1, 4 / 3, 2)
-"""<s^2> / <s>^2 of the power s of random waves +-q_x, +-q_y, over 3/2, by number of mirrors."""
+"""<s^2> / <s>^2 of the power s of random waves +-q_x, +-q_y over that without mirrors, 3/2, by the
+number of mirrors."""
 
 
 class Texture(NamedTuple):

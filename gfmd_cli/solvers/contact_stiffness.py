@@ -14,14 +14,15 @@ Electron. Trans. Numer. Anal. 13, 56, 2002). The field w itself is not needed.
 
 Free boundary: on the contact u = C sigma + c = h, elsewhere sigma = 0. If the load grows by a
 little, the contact area stays the same to first order, and the level c of the undeformed surface
-falls by dd. With t from (C t)_contact = 1 and t = 0 elsewhere, dsigma = t dd. The mean pressure
-grows by <t> dd, and the mean gap falls by <1 - C t> dd, to which the contact adds nothing. Hence
+falls by dd. With sigma_1 from (C sigma_1)_contact = 1 and sigma_1 = 0 elsewhere, dsigma =
+sigma_1 dd. The mean pressure grows by <sigma_1> dd, and the mean gap falls by <1 - C sigma_1> dd,
+to which the contact adds nothing. Hence
 
-    -dp/du_g = <t> / <1 - C t>.
+    -dp/du_g = <sigma_1> / <1 - C sigma_1>.
 
-t is the pressure of a flat punch of the shape of the contact. C is positive definite, and conjugate
-gradients find t, preconditioned by the stiffness as in `dual`, with the Polak-Ribiere formula, as
-the preconditioner has single precision.
+sigma_1 is the pressure, per displacement, under a flat punch of the shape of the contact. C is
+positive definite, and conjugate gradients find sigma_1, preconditioned by the stiffness as in
+`dual`, with the Polak-Ribiere formula, as the preconditioner has single precision.
 """
 
 from collections import deque
@@ -38,7 +39,7 @@ from gfmd_cli.solvers.projected_move import polak_ribiere
 
 GAIN_STEPS = 8  # number of last steps whose gain estimates the error
 MIN_RELATIVE_GAIN = 1e-9  # ends the iteration: gain of these steps relative to the sum of all gains
-TOLERANCE = 1e-9  # rms of 1 - C t on the contact
+TOLERANCE = 1e-9  # rms of 1 - C sigma_1 on the contact
 MAX_STEPS = 5000
 
 
@@ -84,9 +85,9 @@ def _stiffness(contact: Contact, touching: Mask) -> float:
 
 @_stiffness.register
 def _of_free_contact(contact: FreeContact, touching: Mask) -> float:
-    """<t> / <1 - C t> by the same method; NaN if the iteration does not converge."""
+    """<sigma_1> / <1 - C sigma_1> by the same method; NaN if the iteration does not converge."""
     free = contact.free
-    rest = np.ones(contact.grid.shape)  # 1 - C t
+    rest = np.ones(contact.grid.shape)  # 1 - C sigma_1
     force, z, response = (contact.grid.empty() for _ in range(3))
     direction = np.zeros_like(rest)
     total, slope, length = 0.0, 0.0, 0.0

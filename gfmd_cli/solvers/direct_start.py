@@ -245,7 +245,7 @@ class _DirectSolve:
             sigma = np.zeros(u.shape)
             self.grid.as_rows(sigma)[points] = t
             moved = float(np.square(gap[points]).sum())
-            rounding = self.contact.stiffest * self.contact.as_residual(moved)
+            rounding = self.contact.largest_stiffness * self.contact.as_residual(moved)
         self.contact.set_displacement(u, u, self.touching.reshape(u.shape))
         return Start(self.contact, transforms, u, sigma, rounding)
 

@@ -66,7 +66,7 @@ class Fire(Solver):
     def iterate(self, contact: Contact, state: FireState) -> Iterator[FireState]:
         """Advance `state` in place by Verlet steps, one pair of transforms each."""
         h, u, sigma, velocity = contact.obstacle, state.u, state.sigma, state.velocity
-        grid, k_max = contact.grid, contact.stiffest
+        grid, k_max = contact.grid, contact.largest_stiffness
         trial, stress, move = (grid.empty() for _ in range(3))
         while True:
             state.residual = contact.residual(u, sigma)

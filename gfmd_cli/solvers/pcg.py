@@ -6,7 +6,7 @@ A step of the method, with the numbers beside the code lines:
     1997), and a preconditioner that suits their pattern (see `preconditioners`).
 [2] Precondition the force on the free points.
 [3] Compute a direction d on the free points, from the preconditioned force and the last direction.
-[4] Project the move of length s on the constraint: u -> max(u + s d, h).
+[4] Project the move of length l on the constraint: u -> max(u + l d, h).
 [5] Go to the point of lowest energy on the straight line to the projected point.
 
 A step applies K once, to the projected move. This is done in single precision, except on lines:
@@ -15,7 +15,7 @@ the stress k_max times as large, which gives an estimate of the rounding of sigm
 afresh in double precision where the residual falls below it (residual replacement; van der Vorst &
 Ye, SIAM J. Sci. Comput. 22, 835, 2000).
 
-The length s is that of the step before (in the first step, that of the coarser grid), corrected
+The length l is that of the step before (in the first step, that of the coarser grid), corrected
 by the ratio of the best move to the projected one. The energy never rises, so that the method
 cannot cycle: a move beyond the lowest point is shortened to it (all points on the line are
 feasible), and a move along which the energy rises from the start is halved. A scaled gradient that

@@ -53,7 +53,7 @@ def starter_of_scan(
             scan="".join(c if c.isprintable() else "?" for c in surface.path.name),  # one line
             path=relpath(surface.path, path.parent),
             dataset=surface.dataset,
-            holes=surface.holes(),
+            missing_count=surface.missing_count(),
             missing=surface.missing,
             level=surface.level or (None if surface.levelling() == "none" else surface.levelling()),
             sides=" x ".join(sides),

@@ -21,10 +21,10 @@ OBLONG_FIELDS, ODD_FIELDS = 4.5, 0.5
 and where an odd number of points is, by peak memory."""
 BASE_BYTES = 240e6
 """Memory of the interpreter and its libraries."""
-FIRST = 64  # points along x that "auto" begins with at the least; such a solve costs nothing
-LAST = {"a_r": MAX_AREA_EXPONENT, "u_g": 4.0, "sigma_p": MAX_STRESS_EXPONENT}
-"""Exponents n up to which a quantity has a continuum value to come near to."""
-SEARCH = 3.5  # solves that a search of the pressure takes, those on coarser grids included
+MIN_FIRST_POINTS = 64  # along x, on the first grid of "auto"; such a solve costs nothing
+MAX_EXPONENT = {"a_r": MAX_AREA_EXPONENT, "u_g": 4.0, "sigma_p": MAX_STRESS_EXPONENT}
+"""Exponents n up to which finer grids approach a continuum value."""
+SOLVES_PER_SEARCH = 3.5  # of the pressure, those on coarser grids included
 SECONDS_PER_PAIR = 1.7e-8
 """Per grid point and pair of transforms, with all work between two of them, on one thread."""
 P_STAR = 0.1  # reduced pressure of a forecast where the load is another quantity; a choice
@@ -84,7 +84,7 @@ def first_grid(surface: RigidSurface) -> int:
     needed = surface.smallest_grid()
     if surface.is_map:
         return needed
-    return 2 * fast_length(max(needed, FIRST) / 2)
+    return 2 * fast_length(max(needed, MIN_FIRST_POINTS) / 2)
 
 
 def last_grid(
@@ -111,7 +111,7 @@ def last_grid(
     doublings = [1 if boundary == "free" else 0]  # one grid gives no error there
     for name, share in (accuracy.tolerances() if accuracy is not None else {}).items():
         error, order = typical[name]
-        if n <= LAST[name]:
+        if n <= MAX_EXPONENT[name]:
             doublings.append(int(np.ceil((np.log2(error) - np.log2(share)) / order)))
     points = first_grid(surface) * int(2 ** min(max(doublings), 20))
     return points if accuracy is None else min(points, accuracy.max_points)

@@ -40,12 +40,12 @@ from gfmd_cli.study.refinement import (
 from gfmd_cli.study.tasks import Task
 
 # Choices, which change the number of trials (one to three on a grid) and hardly the result:
-COARSER = 2  # grids, each of half the points, on which the search begins
-COARSE = 0.02  # relative distance to the load, or of two pressures, that is good enough on them
+COARSER_GRIDS = 2  # each of half the points, on which the search begins
+COARSE_DISTANCE = 0.02  # relative, to the load or of two pressures, at which a search on them ends
 COARSE_RESIDUAL = 1e-3  # natural residual of a solve on them
-STEP = log(8.0)  # of ln p at the most, until the root is enclosed
+MAX_STEP = log(8.0)  # of ln p, until the root is enclosed
 NEARBY = 0.95  # of a load, at which the theory gives the slope
-FLATTEST = 1e-3  # slope of ln(value) over ln(p) that a step is made from
+MIN_SLOPE = 1e-3  # of ln(value) over ln(p), from which a step is made
 ROUNDING = 1e-13  # width in ln p of the narrowest enclosure: 450 roundings of p
 RESOLVED = 1e-12  # p / k of the longest wave [h_std]; below, rounding decides on contact; a choice
 SMOOTH = 0.01  # of the solver's tolerance in ln p: gaps and displacements have no steps
@@ -53,7 +53,7 @@ AREA_RATIO = 0.5
 """Shift of ln p at one contact area from a grid to the next, over that before: the error of the
 area is proportional to the spacing. 0.37 to 0.67 on 256^2, 512^2 and 1024^2 (n = 0.5 to 3, areas of
 0.01 to 0.3, two seeds), except for one shift that was a 50th of the next."""
-TRIALS = 60  # on one grid; 44 halve an interval of STEP down to ROUNDING
+MAX_TRIALS = 60  # on one grid; 44 halve an interval of MAX_STEP down to ROUNDING
 NEIGHBOURS = (1.25, 0.8)
 """Pressures of the trials that give the slopes at the root, over that of the root; a choice. One of
 the two chords is less steep than the curve, the other one steeper."""
@@ -215,7 +215,7 @@ def _grids(task: Task) -> list[int]:
     The coarser ones resolve the surface, but may not have the load: see `_is_in_reach`.
     """
     grids = [task.points]
-    while len(grids) <= COARSER and has_coarser_grid(task, grids[0]):
+    while len(grids) <= COARSER_GRIDS and has_coarser_grid(task, grids[0]):
         grids.insert(0, grids[0] // 2)
     return grids
 
@@ -260,7 +260,7 @@ def _out_of_reach(task: Task, scene: Scene) -> InputError:
 def _guess(task: Task, scene: Scene) -> tuple[float, float]:
     """The pressure [Pa] of Persson theory, and the slope of ln(value) over ln(p) there."""
     p, nearby = _pressures(task, scene, np.array([task.load, NEARBY * task.load])).tolist()
-    return p, max(abs(log(NEARBY) / log(nearby / p)), FLATTEST) if nearby != p else 1.0
+    return p, max(abs(log(NEARBY) / log(nearby / p)), MIN_SLOPE) if nearby != p else 1.0
 
 
 def _pressures(task: Task, scene: Scene, loads: Field) -> Field:
@@ -316,9 +316,9 @@ class _Search:
         self.task, self.scene, self.first, self._slope = task, scene, first, slope
         is_area, is_last = task.quantity == "contact_area", scene.grid.points == task.points
         self.sign = -1 if task.quantity == "mean_gap" else 1
-        self.tolerance = task.load_tolerance if is_last else COARSE
+        self.tolerance = task.load_tolerance if is_last else COARSE_DISTANCE
         apart = (1.0 if is_area else SMOOTH) * task.solver.tolerance
-        self.resolution = max(apart, ROUNDING) if is_last else COARSE
+        self.resolution = max(apart, ROUNDING) if is_last else COARSE_DISTANCE
         self.quantum = 1 / scene.grid.size if is_area else 0.0
         self.lowest = max(PRESSURE_RANGE[0], RESOLVED * _softest(task, scene) if is_area else 0.0)
         """Reduced pressure above which the load is sought."""
@@ -346,13 +346,13 @@ class _Search:
         if len(self.points) < 2 or abs(self.points[1].y) == inf:
             return self._slope
         (x, y, _), (x_2, y_2, _) = self.points[:2]
-        return max((y_2 - y) / (x_2 - x), FLATTEST)
+        return max((y_2 - y) / (x_2 - x), MIN_SLOPE)
 
     @property
     def root(self) -> float:
         """Estimate of ln p at the load: a secant step from the nearest trial, in the enclosure."""
         x, y, _ = self.points[0]
-        x -= max(-STEP, min(y / self.slope, STEP))
+        x -= max(-MAX_STEP, min(y / self.slope, MAX_STEP))
         low, high = self._enclosure()
         return min(max(low.x, x), high.x)
 
@@ -379,7 +379,7 @@ class _Search:
         """The pressure to try next, None where the search has ended."""
         if not self.points:
             return self.first
-        if self.succeeded or self._exhausted or len(self.points) >= TRIALS:
+        if self.succeeded or self._exhausted or len(self.points) >= MAX_TRIALS:
             return None
         x, (low, high) = self.root, self._enclosure()
         if isfinite(high.x - low.x):

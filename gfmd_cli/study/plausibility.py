@@ -17,8 +17,8 @@ from gfmd_cli.study.tasks import Task
 from gfmd_cli.units import LARGEST_RMS_HEIGHT
 
 FEW_POINTS = 30  # a choice: the area of a circle of 30 points has an error of its rim of a third
-PASCALS = 1e3  # modulus above which it is one in Pa; a choice: gels have 1e3 Pa, reduced units 1
-STIFFEST = 1.2e13  # modulus that no material has [Pa]: ten times that of diamond
+MIN_MODULUS_IN_PA = 1e3  # a choice: gels have 1e3 Pa, moduli in reduced units mostly are 1
+MAX_MODULUS = 1.2e13  # [Pa]: ten times that of diamond; no material has more
 REDUCED_PRESSURES = (1e-6, 100.0)
 """Reduced pressures outside of which a load has another unit than was meant; a choice. Rough
 surfaces are in full contact from about 6 on; below, the largest grids have few points in contact.
@@ -26,7 +26,7 @@ surfaces are in full contact from about 6 on; below, the largest grids have few 
 SMALL_GAPS = (1e-5, 1e-3)
 """Mean gaps [h_std]: below the first, or below the second if that is a possible gap in m, they are
 probably meant in m; a choice."""
-LOOSE = 0.01  # natural residual; the mean gap of the default surface is then wrong by 0.1 to 1 %
+MAX_TOLERANCE = 0.01  # the mean gap of the default surface is then wrong by 0.1 to 1 %
 LARGEST_INDENTER = 0.1
 """Rms height of the cell of a single indenter [m], above which it is in other units; a choice: that
 of a wheel of 1 m radius in a cell of 1 m is 0.05 m."""
@@ -55,10 +55,10 @@ def warnings_of(task: Task, solved: TaskSolution, results: Mapping[str, Any]) ->
     """Reasons to doubt the result of one contact, a sentence each; mostly none."""
     elastomer, scene = task.elastomer, solved.scene
     yield from task.surface.warnings(task.boundary)
-    if elastomer.modulus > PASCALS:
+    if elastomer.modulus > MIN_MODULUS_IN_PA:
         yield from _doubtful_lengths(task.surface, scene.h_std, elastomer.modulus)
         yield from _steep_contact(task.surface, solved)
-    if elastomer.modulus > STIFFEST and scene.h_std <= LARGEST_RMS_HEIGHT:
+    if elastomer.modulus > MAX_MODULUS and scene.h_std <= LARGEST_RMS_HEIGHT:
         key = "k_n" if elastomer.kind == "power" else "E_star"
         yield (
             f"the contact modulus, {elastomer.modulus:.3g} Pa, is more than ten times that of "
@@ -70,10 +70,10 @@ def warnings_of(task: Task, solved: TaskSolution, results: Mapping[str, Any]) ->
             f"rms gradient {gradient:.3g}: check that surface.h_std and surface.length are in the "
             "same unit"
         )
-    if task.solver.tolerance > LOOSE:
+    if task.solver.tolerance > MAX_TOLERANCE:
         yield (
             f"solver.tolerance = {task.solver.tolerance:g}: contact area and mean gap may be wrong "
-            f"by several percent; at most {LOOSE:g} is usual"
+            f"by several percent; at most {MAX_TOLERANCE:g} is usual"
         )
     yield from elastomer.warnings(scene, task.boundary, is_rough=task.surface.rough)
     yield from _compressed(task, scene.h_std, results["displacement"])
@@ -150,7 +150,7 @@ def _compressed(task: Task, h_std: float, displacement: float) -> Iterator[str]:
     """
     largest, is_rough = task.elastomer.largest_displacement, task.surface.rough
     is_said = is_rough and largest <= h_std  # by the warnings of the elastomer
-    is_judged = is_rough or task.elastomer.modulus > PASCALS
+    is_judged = is_rough or task.elastomer.modulus > MIN_MODULUS_IN_PA
     if displacement > largest and is_judged and not is_said:
         yield (
             f"the indenter has moved by {displacement:.3g} m since first touch, but "

@@ -29,12 +29,12 @@ from gfmd_cli.solvers.loop import Start
 from gfmd_cli.solvers.nested_grids import Resume, Solution, solve_contact
 from gfmd_cli.status import Status
 from gfmd_cli.study.context import SolveContext, Watcher, WorkerOptions
-from gfmd_cli.study.forecast import FIRST
+from gfmd_cli.study.forecast import MIN_FIRST_POINTS
 from gfmd_cli.study.notes import SolvedGrid
 from gfmd_cli.study.tasks import Task
 
-ENOUGH = 3  # grids after which an unknown error stays unknown: two give all that is calibrated
-UNSOLVED = 0.1  # natural residual from which nothing is said of the continuum
+MAX_UNKNOWN_GRIDS = 3  # after which an unknown error stays so: two give all that is calibrated
+MAX_RESIDUAL = 0.1  # natural residual from which no continuum value is estimated
 
 
 @dataclass
@@ -173,7 +173,7 @@ def has_coarser_grid(task: Task, points: int) -> bool:
     """
     is_line = task.surface.dimension == 1
     numbers = (points,) if is_line else (points, points * task.points_y // task.points)
-    enough = any(n % 4 == 0 and n >= 2 * FIRST for n in numbers)
+    enough = any(n % 4 == 0 and n >= 2 * MIN_FIRST_POINTS for n in numbers)
     return enough and all(n % 2 == 0 for n in numbers) and task.resolves(points // 2)
 
 
@@ -203,7 +203,7 @@ def _continues(task: Task, solved: TaskSolution, grids: int, options: WorkerOpti
 
 def _is_improvable(estimate: Estimate, grids: int) -> bool:
     """Whether a grid finer than the `grids` so far may give a smaller error."""
-    is_settled = estimate.verdict is Verdict.UNKNOWN and grids >= ENOUGH
+    is_settled = estimate.verdict is Verdict.UNKNOWN and grids >= MAX_UNKNOWN_GRIDS
     return not (estimate.is_final or (is_settled and not estimate.is_too_coarse))
 
 
@@ -255,7 +255,7 @@ def border_share(contact: Contact, solution: Solution) -> float:
 def _estimates(task: Task, solved: TaskSolution, grids: list[SolvedGrid]) -> dict[str, Estimate]:
     """Distance of the finest grid to the continuum, in the units of its scene."""
     scene = solved.scene
-    if not solved.solution.residual < UNSOLVED or scene.has_voids:  # voids have no law
+    if not solved.solution.residual < MAX_RESIDUAL or scene.has_voids:  # voids have no law
         return unknown()
     resolution, length = scene.grid.resolution, scene.grid.length
     if discretisation_error.has_step(task.elastomer, resolution, length):

@@ -18,7 +18,7 @@ HEADROOM = 0.9  # share of the available memory that a run may plan with
 POOL_SECONDS = 3.0  # with less work than this, worker processes do not pay
 DISK_SPEED = 1e8  # bytes a second; slower than most
 STATE_FIELDS = 4  # u, sigma and the other fields of a solver's state
-STEP = 1e-7  # upper limit of the seconds per grid point of a step, on one thread
+SECONDS_PER_STEP = 1e-7  # and grid point, on one thread; an upper limit
 SECONDS_TO_END = 2.0  # for worker processes and small files
 
 
@@ -144,7 +144,7 @@ def seconds_to_stop(tasks: list[Task], jobs: int) -> float:
     largest = max(tasks, key=lambda task: task.size)
     state = 8.0 * largest.size * STATE_FIELDS * jobs
     collected = 8.0 * sum(task.size * len(task.output.fields) for task in tasks)
-    return SECONDS_TO_END + STEP * largest.size + (state + collected) / DISK_SPEED
+    return SECONDS_TO_END + SECONDS_PER_STEP * largest.size + (state + collected) / DISK_SPEED
 
 
 def out_of_memory_kills() -> int | None:
