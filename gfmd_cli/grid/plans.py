@@ -33,7 +33,7 @@ Plan = Callable[..., Any]
 """Makes a plan on one thread from source, target, axes and direction."""
 Wisdom = list[str]
 """Text in double and in single precision."""
-PLANNING_SECONDS = (30.0, 1e-6)  # seconds at most to look for a plan, at all and per grid point
+PLANNING_SECONDS = (30.0, 1e-6)  # time limit of a search for a plan: constant, and per grid point
 MAX_WISDOM_BYTES = 2**24  # of a file of wisdom
 MAX_CACHED_LINES = 10000  # in each precision; a new size adds some 20 and reads and writes all
 WISDOM = re.compile(

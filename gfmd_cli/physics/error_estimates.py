@@ -92,7 +92,7 @@ class Verdict(ExplainedEnum):
     BOUND = "bound", "is known only within an interval"
     SLOW = "slow", "converges too slowly with the grid for a value in the continuum"
     DIVERGES = "diverges", "has no value in the continuum"
-    UNKNOWN = "unknown", "has no error bar: the grids are too coarse for one"
+    UNKNOWN = "unknown", "has no error bar: none is known to hold on these grids"
 
     @property
     def has_error(self) -> bool:

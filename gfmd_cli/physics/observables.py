@@ -103,10 +103,11 @@ class Observables:
     """Contact line per area times L, from the switches between neighbours, each as long as the
     side that two points share; for a line contact the number of contact edges."""
     energy: float
-    """Elastic energy per area v = <u K u> / 2 [h_std Delta_sigma]."""
+    """Elastic energy per area [h_std Delta_sigma]: v = <u K u> / 2; for a free boundary
+    <sigma C sigma> / 2."""
     work: float
-    """<sigma h> - p <u> [h_std Delta_sigma], equal to 2 v at the solution; for a free boundary u
-    counts from the level of the undeformed surface."""
+    """<sigma h> - p <u> [h_std Delta_sigma], equal to 2 v at the solution; for a free boundary the
+    level c of the undeformed surface takes the place of <u>."""
 
 
 def observe(contact: Contact, u: Field, sigma: Field) -> Observables:

@@ -213,7 +213,7 @@ def _resumed(contact: Contact, resume: Resume, tolerance: float) -> State:
 
 
 def _full_contact(grids: list[Contact], solver: Solver) -> tuple[Solution | None, float]:
-    """The solution u = h on the last of these grids if no stress is tensile on any; transforms.
+    """The solution u = h on the last grid if no stress is tensile on any, and transforms taken.
 
     A rough contact that is not full on a coarse grid is not full on a finer one, where the stress
     varies more; elsewhere the iteration finds full contact, too.

@@ -65,7 +65,9 @@ DETAILS = (
         "estimated error of p_star where it was searched with [accuracy]; NaN if unknown",
     ),
     Column("mean_gap", "mean gap", "m"),
-    Column("displacement", "that of the indenter from first touch; NaN if not defined", "m"),
+    Column(
+        "displacement", "displacement of the indenter from first touch; NaN if not defined", "m"
+    ),
     Column(
         "perimeter",
         "length of the contact line per area times L; in a line contact, number of contact edges",
@@ -73,8 +75,8 @@ DETAILS = (
     Column("energy", "elastic energy per area / (h_std Delta_sigma)"),
     Column(
         "work",
-        "(<sigma h> - p c) / (h_std Delta_sigma) with c = <u>, of a free boundary the rigid "
-        "displacement: twice the energy",
+        "(<sigma h> - p <u>) / (h_std Delta_sigma), twice the energy; with a free boundary the "
+        "level c of the undeformed surface takes the place of <u>",
     ),
     Column("steps", "solver steps on the finest grid", kind=int),
     Column("tolerance", "requested natural residual, solver.tolerance"),

@@ -16,7 +16,7 @@ from gfmd_cli.study.refinement import TaskSolution, border_share, inaccurate_col
 from gfmd_cli.study.tasks import Task
 from gfmd_cli.units import LARGEST_RMS_HEIGHT
 
-FEW_POINTS = 30  # a choice: the area of a circle of 30 points has an error of its rim of a third
+FEW_POINTS = 30  # a choice: the area of a circle of 30 points is uncertain by a third, by its rim
 MIN_MODULUS_IN_PA = 1e3  # a choice: gels have 1e3 Pa, moduli in reduced units mostly are 1
 MAX_MODULUS = 1.2e13  # [Pa]: ten times that of diamond; no material has more
 REDUCED_PRESSURES = (1e-6, 100.0)
@@ -28,8 +28,8 @@ SMALL_GAPS = (1e-5, 1e-3)
 probably meant in m; a choice."""
 MAX_TOLERANCE = 0.01  # the mean gap of the default surface is then wrong by 0.1 to 1 %
 LARGEST_INDENTER = 0.1
-"""Rms height of the cell of a single indenter [m], above which it is in other units; a choice: that
-of a wheel of 1 m radius in a cell of 1 m is 0.05 m."""
+"""Rms height of the cell of a single indenter [m] above which its unit is not the metre; a choice:
+that of a wheel of 1 m radius in a cell of 1 m is 0.05 m."""
 MAX_EDGE_SLOPE = 1.0  # of a single indenter at the edge of its contact; a choice: 45 degrees
 MAX_CHANGED_SHARE = 0.05  # of contact or load where heights are not those measured; a choice
 SMALL_DISPLACEMENT = 1e-4  # [h_std], below which heights have another unit; a choice
