@@ -454,7 +454,7 @@ def test_runs_in_two_threads_keep_their_plans_apart(tmp_path, monkeypatch):
 
     def plan_in_other():
         plans.plan_with(other)
-        plans.planned(lambda fftw: fftw(values, values.copy()))
+        plans.planned_transforms(lambda fftw: fftw(values, values.copy()))
 
     try:
         plans.plan_with(one)
@@ -463,7 +463,7 @@ def test_runs_in_two_threads_keep_their_plans_apart(tmp_path, monkeypatch):
         thread.join()
         assert plans.read_wisdom(one) is None
         assert plans.read_wisdom(other)
-        plans.planned(lambda fftw: fftw(values, values.copy()))
+        plans.planned_transforms(lambda fftw: fftw(values, values.copy()))
     finally:
         plans.plan_with(None)
     assert plans.read_wisdom(one)

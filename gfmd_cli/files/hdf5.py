@@ -153,7 +153,7 @@ def read_dataset(group: Any, path: str) -> Any:
     return values
 
 
-def as_text(values: Any) -> Any:
+def as_utf8(values: Any) -> Any:
     """Text as it is stored: UTF-8 of a fixed length."""
     encoded = np.char.encode(np.asarray(values, str), "utf-8")
     return encoded.astype(h5py.string_dtype("utf-8", max(encoded.itemsize, 1)))

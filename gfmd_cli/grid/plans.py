@@ -128,7 +128,7 @@ def plans() -> str:
     return f"measured {_digest(known) if known else ''}".strip()
 
 
-def planned(make: Callable[[Plan], T], size: int = 0) -> T:
+def planned_transforms(make: Callable[[Plan], T], size: int = 0) -> T:
     """The transforms that `make` plans. Plans that are not known yet are measured and stored.
 
     The time limit of a measurement increases with the number of grid points, `size`.

@@ -21,7 +21,7 @@ import numpy as np
 import pyfftw
 
 from gfmd_cli.grid.arrays import Field, Modes
-from gfmd_cli.grid.plans import Plan, planned
+from gfmd_cli.grid.plans import Plan, planned_transforms
 from gfmd_cli.grid.rows import LocalRows
 from gfmd_cli.grid.transposition import Transposition
 
@@ -215,7 +215,8 @@ class FieldTransforms:
             along_columns = ColumnTransforms(self.work, rows, fftw, length)
             return RowTransforms(self.values, self.lines, rows, fftw), along_columns
 
-        self.along_rows, self.along_columns = planned(make, self.values.size)
+        transforms = planned_transforms(make, self.values.size)
+        self.along_rows, self.along_columns = transforms
 
     def to_columns(self, blocks: Sequence[int] | None = None) -> None:
         """`work` <- `values` transformed along x; `blocks` as in `RowTransforms.forward`."""

@@ -94,7 +94,7 @@ def read_report_data(study: Path, letter: str) -> ReportData:
     return ReportData(replace(comparison, curves=curves), letter=letter)
 
 
-def side_by_side(studies: Sequence[ReportData], traces: list[Trace]) -> ReportData:
+def merged(studies: Sequence[ReportData], traces: list[Trace]) -> ReportData:
     """The curves and rows of one study or of two together, and the traces of a bench."""
     comparisons = [data.comparison for data in studies]
     curves = [curve for each in comparisons for curve in each.curves]

@@ -7,7 +7,7 @@ from pathlib import Path
 from gfmd_cli.analysis.plotting import styled
 from gfmd_cli.bench.file import Trace, read_bench
 from gfmd_cli.report import sections, summary
-from gfmd_cli.report.data import ReportData, read_report_data, side_by_side
+from gfmd_cli.report.data import ReportData, merged, read_report_data
 from gfmd_cli.report.maps import maps
 from gfmd_cli.report.rendering import render
 from gfmd_cli.report.section import Section
@@ -48,7 +48,7 @@ def _sections(studies: list[ReportData], traces: list[Trace]) -> Iterator[Sectio
     """The sections that the studies have data for."""
     if len(studies) == 2:
         yield sections.difference(*studies)
-    shared = side_by_side(studies, traces)
+    shared = merged(studies, traces)
     for make, own in SECTIONS:
         for data in studies if own else [shared]:
             section = make(data)

@@ -15,7 +15,7 @@ from gfmd_cli.report.data import ReportData
 from gfmd_cli.study.column import Row
 from gfmd_cli.units import count, duration
 
-NEARLY_FULL = 0.5  # p*; above, the gap falls by decades, and a ratio of gaps tells little
+MAX_GAP_RATIO_P_STAR = 0.5  # above, the gap falls by decades, and a ratio of gaps tells little
 SECONDS = 120  # below, a time is given with three digits
 MAX_CSV = 1_000_000  # bytes of the table of a study in its page; a larger one is for gfmd export
 UNQUOTED = " ,;:()*/=@+"
@@ -117,10 +117,10 @@ def _theory_numbers(data: ReportData) -> list[KeyNumber]:
     if not data.comparison.has_theory:
         return []
     area, gap = (_continuum_note(data.solved, name) for name in ("a_r", "u_g"))
-    up_to = f"u_g up to p* = {NEARLY_FULL}{gap}"
+    up_to = f"u_g up to p* = {MAX_GAP_RATIO_P_STAR}{gap}"
     return [
         ("Area / Persson theory", _ratios(data, "a_r", math.inf), f"a_r{area}"),
-        ("Gap / Persson theory", _ratios(data, "u_g", NEARLY_FULL), up_to),
+        ("Gap / Persson theory", _ratios(data, "u_g", MAX_GAP_RATIO_P_STAR), up_to),
     ]
 
 

@@ -22,7 +22,7 @@ and where an odd number of points is, by peak memory."""
 BASE_BYTES = 240e6
 """Memory of the interpreter and its libraries."""
 MIN_FIRST_POINTS = 64  # along x, on the first grid of "auto"; such a solve costs nothing
-MAX_EXPONENT = {"a_r": MAX_AREA_EXPONENT, "u_g": 4.0, "sigma_p": MAX_STRESS_EXPONENT}
+MAX_CONVERGENT_EXPONENT = {"a_r": MAX_AREA_EXPONENT, "u_g": 4.0, "sigma_p": MAX_STRESS_EXPONENT}
 """Exponents n up to which finer grids approach a continuum value."""
 SOLVES_PER_SEARCH = 3.5  # of the pressure, those on coarser grids included
 SECONDS_PER_PAIR = 1.7e-8
@@ -111,7 +111,7 @@ def last_grid(
     doublings = [1 if boundary == "free" else 0]  # one grid gives no error there
     for name, share in (accuracy.tolerances() if accuracy is not None else {}).items():
         error, order = typical[name]
-        if n <= MAX_EXPONENT[name]:
+        if n <= MAX_CONVERGENT_EXPONENT[name]:
             doublings.append(int(np.ceil((np.log2(error) - np.log2(share)) / order)))
     points = first_grid(surface) * int(2 ** min(max(doublings), 20))
     return points if accuracy is None else min(points, accuracy.max_points)

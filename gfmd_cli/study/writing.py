@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from gfmd_cli.files.hdf5 import as_text, create_dataset, write_checked, write_scale
+from gfmd_cli.files.hdf5 import as_utf8, create_dataset, write_checked, write_scale
 from gfmd_cli.study import columns as layout
 from gfmd_cli.study.column import Column
 from gfmd_cli.study.reading import ATTRIBUTES_SUM, KINDS, PACKED, attributes_sum
@@ -186,4 +186,4 @@ def write_column(group: Any, column: Column, values: Any, scales: list[Any]) -> 
 
 def _array(kind: type, values: Any) -> Any:
     """The values as they are stored: numbers, or text in UTF-8 of a fixed length."""
-    return as_text(values) if kind is str else np.asarray(values, kind)
+    return as_utf8(values) if kind is str else np.asarray(values, kind)
