@@ -88,7 +88,7 @@ class Result:
     status: Status
     """"converged", or the reason why the tolerance was missed."""
     warnings: tuple[str, ...] = ()
-    """What makes the numbers doubtful."""
+    """Reasons to doubt the result."""
     columns: Mapping[str, Any] = field(default_factory=dict)
     """All columns that a study would have of the contact, such as "a_r_continuum" where the table
     [accuracy] requests errors, "patches" where [output] requests them, and histograms."""

@@ -101,7 +101,7 @@ SHORTFALLS = {
     Status.ACCURACY_NOT_REACHED: "accuracy not reached",
     Status.LOAD_NOT_REACHED: "load not reached",
 }
-"""What tasks have missed that are within tolerance."""
+"""What tasks within tolerance have missed."""
 
 
 def worst(statuses: Iterable[Status]) -> Status:

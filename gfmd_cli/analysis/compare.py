@@ -23,7 +23,7 @@ from gfmd_cli.study.columns import PARAMETERS
 from gfmd_cli.study.reading import open_study, solved_rows
 
 Theory = Literal["paper", "fitted", "coarse-grained"]
-"""Of the mean gap: Eq. (30) with gamma of Eqs. (39) and (42), the weight that is fitted in
+"""Theory of the mean gap: Eq. (30) with gamma of Eqs. (39) and (42), the weight that is fitted in
 docs/energy_weights.md, or coarse-graining without any constant."""
 VARIANTS = {
     name: f"a_r_persson_{name}" for name in ("deviation_bearing", "deviation_c", "quadrature_c")

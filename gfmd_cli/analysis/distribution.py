@@ -104,7 +104,7 @@ class StressDistribution:
     """One contact at one pressure on several grids, for one seed or more."""
 
     curve: Curve
-    """Of the finest grid of the first seed."""
+    """Curve of the finest grid of the first seed."""
     seeds: list[list[Row]]
     """Rows of each seed, grids rising."""
 

@@ -50,13 +50,13 @@ class Density:
 
     item: StyledCurve
     row: Row
-    """Of the contact; of several seeds, that of one with mean density and pressure, with the worst
+    """Row of the contact; of several seeds, that of one with mean density and pressure, with the worst
     status of all."""
     seeds: int
     """Number of seeds of which this is the mean."""
     sigma: Field
     density: Field
-    """Of bins with enough points."""
+    """Pr(sigma) in the bins with enough points."""
 
     @property
     def remark(self) -> str:

@@ -45,7 +45,7 @@ class PowerLaw:
     highest: float
     """Upper edge of the last bin."""
     exponent: float
-    """Of a straight line through ln Pr(ln sigma): that of the window, not of the limit."""
+    """Slope of a straight line through ln Pr(ln sigma): that of the window, not of the limit."""
     error: float
     """Its standard error: of the bins, of discretisation, of the choice of window."""
     prefactor: float

@@ -26,7 +26,7 @@ class Spread:
 
     mean: float
     standard_error: float
-    """Of the mean over seeds: standard deviation (n - 1) over sqrt(n)."""
+    """Standard error of the mean over n seeds: standard deviation (n - 1) over sqrt(n)."""
     half_width: float
     """The mean of all seeds lies within mean +- half_width with 95 % confidence: Student's t, and
     the mean error of the single values, in the root of the sum of the squares."""
@@ -61,11 +61,11 @@ class Ensemble:
         return ", ".join(f"{number} {status}" for status, number in counts.items()) or None
 
     def spread(self, name: str) -> Spread:
-        """Of "a_r", "sigma_p" or "u_g": see `best_of_all`."""
+        """Spread of "a_r", "sigma_p" or "u_g", of the values of `best_of_all`."""
         return spread_of(*zip(*best_of_all(self.rows, name), strict=True))
 
     def pressure_spread(self) -> Spread:
-        """Of pressures that were searched. No interval if the error of one is unknown."""
+        """Spread of pressures that were searched. No interval if the error of one is unknown."""
         errors = [row["p_star_error"] for row in self.rows]
         spread = spread_of([row["p_star"] for row in self.rows], errors)
         if LOADS[self.rows[0]["load"]].searched not in QUANTITIES:  # the load has no errors

@@ -74,7 +74,7 @@ class Series:
     error: Field
     """Estimated error, of several seeds the mean of their errors; NaN where it is unknown."""
     half_width: Field
-    """Of the 95 % confidence interval of the mean over seeds; NaN of a single seed."""
+    """Half width of the 95 % confidence interval of the mean over seeds; NaN of a single seed."""
     statuses: Sequence[Status]
     details: Sequence[str]
     """Load, status and parameters of each point, a text of some lines."""

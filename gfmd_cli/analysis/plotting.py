@@ -73,13 +73,13 @@ class PlotLayer:
     """Entries of the legend that the layer belongs to, that of its curve first."""
     x: Field
     y: Field
-    """Of a band its lower end."""
+    """Values; of a band its lower end."""
     colour: str
     """As #rrggbb."""
     marker: str = ""
-    """Of points, as matplotlib names it."""
+    """Marker of points, as matplotlib names it."""
     width: float = 0.9
-    """Of a line [points]."""
+    """Width of a line [points]."""
     dashed: bool = False
     error: Any = None
     """Lengths of the error bars of points down and up, shape (2, points); NaN: none."""

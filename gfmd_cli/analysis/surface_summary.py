@@ -43,11 +43,11 @@ class SurfaceSummary:
     """The surface on its own points or those of a spec, mirrored if it has borders, under a
     half-space of unit modulus."""
     parameters: dict[str, float | None]
-    """Of the measured part of a map, levelled, before its edges are treated; else of the cell."""
+    """Roughness parameters of the levelled map before its edges are treated; else of the cell."""
     moments: Moments
-    """Of the cell that is solved."""
+    """Moments of the spectrum of the cell that is solved."""
     spectrum: Spectrum
-    """Of the cell that is solved, or of a map with borders, tapered."""
+    """Spectrum of the cell that is solved, or of a map with borders, tapered."""
 
     @property
     def in_si(self) -> bool:

@@ -30,7 +30,7 @@ SAMPLES = (
     Column("sigma_p_error", "relative distance of the stress deviation to it"),
     Column("u_g_error", "relative distance of the mean gap to it"),
 )
-"""Over `sample`. The errors are NaN on the coarser grids, absolute where the reference is zero."""
+"""Columns over `sample`. Errors are NaN on coarser grids, absolute where the reference is zero."""
 COSTS = ("transforms", "seconds")
 """Samples that are finite and not negative."""
 ROW = {

@@ -51,7 +51,7 @@ class Recorder:
     own: float = 0.0
     """Seconds spent here, which are not the solver's."""
     a_r: float = np.nan
-    """Of the last sample."""
+    """Contact area of the last sample."""
 
     def __call__(self, contact: Contact, state: State) -> None:
         """Take a sample of the first state of each grid, and where one is due."""

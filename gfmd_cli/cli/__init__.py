@@ -23,7 +23,7 @@ COMMANDS = [
     *(init, surface, run, submit, status, collect),
     *(analyze, report, export, diff, bench, schema, completion),
 ]
-"""In the order in which a user needs them."""
+"""Commands in the order in which a user needs them."""
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 UNWRITABLE = (*FULL, errno.EROFS, errno.ENAMETOOLONG)
 """Errors of writing; those in FULL mean that a disk, a quota or a file size is exhausted."""

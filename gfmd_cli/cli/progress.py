@@ -22,7 +22,7 @@ class Reporter:
 
     def __init__(self, quiet: bool) -> None:
         self.bars: dict[int | None, Any] = {}
-        """By task; that of the run is under None."""
+        """Bars by task; that of the run is under None."""
         self.last_line = time.monotonic()
         self.quiet = quiet
         self.terminal = sys.stderr.isatty()

@@ -40,7 +40,7 @@ class Grid:
     """Side of the cell along x [m]."""
     threads: int = 1
     precision: Precision = "double"
-    """Of fields and transforms."""
+    """Precision of fields and transforms."""
     points_y: int = 0
     """Number of points along y; 0 stands for as many as along x. A line has one."""
     length_y: float = 0.0
@@ -180,7 +180,7 @@ class Grid:
         return self.total(column if self.ends[0] else np.zeros_like(column))
 
     def multiplicity(self) -> Field:
-        """How often a coefficient counts in a sum over all q, a row of them."""
+        """How often each coefficient of a row counts in a sum over all q."""
         return multiplicity(self.points)[slice(*self.span)]
 
     def gather_columns(self, values: Field) -> Field:

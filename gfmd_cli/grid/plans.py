@@ -81,7 +81,7 @@ class _Planning(NamedTuple):
 
 _CACHED = _Planning()
 _planning: ContextVar[_Planning] = ContextVar("planning", default=_CACHED)
-"""Of the present thread: a process may run several studies side by side."""
+"""Planning of the present thread: a process may run several studies side by side."""
 _wisdom_of = _CACHED  # the run whose plans FFTW knows; those of another one may differ
 
 

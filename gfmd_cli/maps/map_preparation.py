@@ -17,8 +17,8 @@ Edges = Literal["none", "window", "mirror"]
 MAX_EXACT = 100_000  # missing heights; the sparse solution of more takes seconds
 JACOBI_STEPS = 30  # a choice: the filling is then smooth over several points
 LEVELLING_ROUNDING = 256 * float(np.finfo(float).eps)
-"""Of `level`, over the largest height: up to 92 eps in planes of 16 to 3000 points a side, with
-and without missing heights."""
+"""Largest rounding error of `level`, over the largest height: measured up to 92 eps in planes of 16
+to 3000 points a side, with and without missing heights."""
 DEGREES: dict[Levelling, int] = {"mean": 0, "plane": 1, "curvature": 2}
 
 

@@ -54,7 +54,7 @@ SIDE_LABELS = (
     "x-length|Width|Šířka|Breite|Anchura|Largeur|Larghezza|幅|폭|Largura|Ширина|"
     "y-length|Height|Výška|Höhe|Altura|Hauteur|Altezza|高さ|높이|Высота"
 )
-"""Of the lines of a header that state the sides of a matrix, in all languages of Gwyddion."""
+"""Labels of the sides of a matrix in a header, in all languages of Gwyddion."""
 OF_SIDES = re.compile(rf"^\W*({SIDE_LABELS})\b")
 
 

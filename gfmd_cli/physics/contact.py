@@ -273,7 +273,7 @@ class Scene:
 
     @cached_property
     def texture(self) -> Texture:
-        """How the waves of the surface are distributed; one transform, once."""
+        """Texture of the surface; computed once, by one transform."""
         return texture(self.grid, self.height)
 
     def in_metres(self, field: Field) -> Field:

@@ -184,7 +184,7 @@ SMOOTH_TIP = Tip()
 
 
 def roughness_scales(shells: Shells, length: float) -> RoughnessScales:
-    """What the spectrum of a rough surface says of its scales, for a cell of side `length` [m]."""
+    """Scales of a rough surface by its spectrum, for a cell of side `length` [m]."""
     height, q2 = shells.height, np.square(shells.q * length)
     flat, steep, bent = (float(np.sum(height * q2**power)) for power in (0, 1, 2))
     waves, curvature = sqrt(bent / steep) / (2 * pi), sqrt(bent / flat)

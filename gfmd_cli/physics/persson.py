@@ -137,7 +137,7 @@ class Persson:
     shells: Shells
 
     mean_gap_source: ClassVar[str] = ""
-    """Where the mean gap comes from, unless from the paper."""
+    """Source of the mean gap where it is not the paper."""
 
     @property
     def delta_sigma(self) -> float:

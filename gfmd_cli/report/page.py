@@ -29,7 +29,7 @@ SECTIONS: tuple[tuple[Callable[[ReportData], Section], bool], ...] = (
     (sections.work_precision, SHARED),
     (sections.provenance, OWN),
 )
-"""In the order of the page; of two studies each has its own, or both share it."""
+"""Sections in their order; of two studies each has its own, or both share it."""
 
 
 def report(study: Path, bench: Path | None = None, other: Path | None = None) -> str:

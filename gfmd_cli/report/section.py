@@ -26,10 +26,10 @@ class Drawing(NamedTuple):
 
     svg: Markup
     name: str
-    """Of its files; also the prefix of the identifiers in it."""
+    """Name of its files and prefix of the identifiers in it."""
     caption: str
     data: dict[str, Any] | None
-    """What scripts draw it from, as `interactive` makes it; None of a picture."""
+    """Data from which scripts draw it, see `interactive`; None for a picture."""
 
 
 @dataclass(frozen=True)

@@ -46,7 +46,7 @@ MAX_COST = 80
 """Largest m^3 over points of a grid and square of the growth of k(q) per octave, for m points in
 contact; measured: with more, the iteration is faster."""
 MAX_COST_WITH_LAPLACIAN = 150
-"""The same without the growth, where the V-cycle has no squared Laplacian."""
+"""Largest m^3 over points of a grid where the V-cycle has the Laplacian, not its square."""
 MAX_LINE_COST = 20000  # the same for lines
 EXPECTED_GROWTH = 1.3  # of the sets: largest number of points over that of the first one; a choice
 MAX_JOINING_FRACTION = 0.4  # of a set, that joins it at a time; measured: 0.3 to 0.6 are as good

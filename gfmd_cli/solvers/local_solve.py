@@ -33,11 +33,11 @@ REDUCTION_RANGE = (1e-3, 0.02)
 the relative error of the operators; the largest is a choice, because an evaluation at all points
 takes longer than a few steps on tiles."""
 ACCEPTED_FRACTION = 0.75
-"""Of the tolerance, for the predicted residual of the start. The residual itself may be larger
-(docs/solver_measurements.md)."""
+"""Fraction of the tolerance below which the predicted residual of the start is accepted. The
+residual itself may be larger (docs/solver_measurements.md)."""
 TARGET_FRACTION = 0.5  # of the tolerance, for that residual after the next solve; a choice
 MAX_ROUNDING = sqrt(1 - ACCEPTED_FRACTION**2) / ROUNDING_MARGIN
-"""Of the tolerance, for the rounding of an evaluation in single precision that may be the last."""
+"""Fraction of the tolerance: largest rounding of the last evaluation, in single precision."""
 MAX_GROWTH = 1.5  # of the number of tiles in an evaluation that may be the last one; a choice
 MAX_EVALUATIONS = 6  # of the displacement at all points; a choice
 MAX_STEPS = 60  # on the same tiles; a choice

@@ -33,7 +33,7 @@ class Operator(NamedTuple):
     spring: np.float32
     """Stiffness of a spring per unit of the ties."""
     damped_spring: np.float32
-    """The same, divided by the damping."""
+    """`spring` divided by the damping."""
 
 
 @part_of_kernel

@@ -49,7 +49,7 @@ MODELS: dict[str, Any] = {
 """The class of each table, or the union of the classes of its kinds, as `Spec` declares them."""
 ADAPTERS: dict[str, TypeAdapter[Any]] = {name: TypeAdapter(MODELS[name]) for name in MODELS}
 DEFAULT_KINDS = {"solver": "auto"}
-"""Of the tables whose `kind` may be left out."""
+"""Kinds of the tables whose `kind` may be left out."""
 REQUIRED = ("surface", "elastomer", "grid", "load")
 
 

@@ -13,7 +13,7 @@ class Column(NamedTuple):
     name: str
     meaning: str
     units: str = "1"
-    """As in CF conventions; "1" for a pure number, "" for text and mixed units."""
+    """Unit as in the CF conventions; "1" for a pure number, "" for text and mixed units."""
     kind: type = float
     """`str`, `int` or `float`."""
 

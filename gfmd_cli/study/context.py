@@ -26,7 +26,7 @@ class Progress(NamedTuple):
     residual: float = float("nan")
     a_r: float = float("nan")
     status: Status | None = None
-    """Of a task that has ended."""
+    """Status of a task that has ended."""
     message: str = ""
     """The error that ended the task, or the text of a warning."""
     tasks_left: int | None = None

@@ -342,7 +342,7 @@ class _Search:
 
     @property
     def slope(self) -> float:
-        """Of ln(value) over ln(p), as far as known."""
+        """Slope of ln(value) over ln(p), as far as known."""
         if len(self.points) < 2 or abs(self.points[1].y) == inf:
             return self._slope
         (x, y, _), (x_2, y_2, _) = self.points[:2]

@@ -26,7 +26,7 @@ class Entry(NamedTuple):
     scene_id: str
     """Tasks of one scene share surface, elastomer and grid."""
     stored: frozenset[str]
-    """As in `Outcome`; nothing of a task that is not solved yet."""
+    """Output that is stored, as in `Outcome`; nothing of a task that is not solved yet."""
     row: Mapping[str, Any]
     """Columns and histograms by name."""
 

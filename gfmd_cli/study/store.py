@@ -35,7 +35,7 @@ from gfmd_cli.study.writing import write_study
 EARLIER = "earlier_specs"
 """Attribute with the texts of the specs before the last one, as JSON."""
 _Results = dict[str, tuple[Entry, Callable[[], TaskResult]]]
-"""By the id of a task: its entry, and a function that reads the whole result."""
+"""Entry, and a function that reads the whole result, by the id of the task."""
 
 
 class Study:
