@@ -144,10 +144,10 @@ class _DirectSolve:
                 continue
             self.evaluate(points, t)
             self.level = float((self.values[points] - self.obstacle[points]).mean())
-            misclassified, violation = self.compare(points, t)
+            misclassified, residual = self.compare(points, t)
             count = int(np.count_nonzero(misclassified))
             self.solution = (points, t) if count == 0 else None
-            if count == 0 or violation < tolerance:
+            if count == 0 or residual < tolerance:
                 break
             if self.stress is None and count >= fewest:
                 self.stress = np.zeros(self.touching.shape)
@@ -188,15 +188,15 @@ class _DirectSolve:
     def compare(self, points: Points, s: Field) -> tuple[Mask, float]:
         """The points that are in contact or not by mistake, and the natural residual of that."""
         misclassified = np.empty(self.touching.shape, dtype=np.bool_)
-        violation = 0.0
+        squares = 0.0
         for rows in row_blocks(self.values):
             gap = self.values[rows] - self.obstacle[rows]
             np.less(gap, self.level, out=misclassified[rows])
             misclassified[rows] &= ~self.touching[rows]
-            violation += float(np.square(gap[misclassified[rows]] - self.level).sum())
+            squares += float(np.square(gap[misclassified[rows]] - self.level).sum())
         misclassified[points] = s < 0
-        violation += float(np.square(s[s < 0]).sum())
-        return misclassified, self.contact.as_residual(violation)
+        squares += float(np.square(s[s < 0]).sum())
+        return misclassified, self.contact.as_residual(squares)
 
     def exchange(self, misclassified: Mask, limit: int) -> None:
         """Change whether these points are in contact; up to `limit` of those entered join.
