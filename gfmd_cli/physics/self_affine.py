@@ -87,7 +87,10 @@ class SelfAffine(RigidSurface):
         return grid.field_of_work()
 
     def _amplitude(self, m: Field) -> Field:
-        """sqrt(C(q)) at |q| = 2 pi m / L, zero beyond the cut-off. Paper Eqs. (3), (40)."""
+        """sqrt(C(q)) at |q| = 2 pi m / L, zero beyond the cut-off.
+
+        Paper Eqs. (3) and (40), corrected: Theta(q_s - q) (printed: Theta(q_s - 1)).
+        """
         reduced = m * self.rolloff  # q / q_r
         present = (m > 0) & (m * self.cutoff <= 1 + 1e-12)
         if self.spectrum == "rolloff":
