@@ -50,8 +50,8 @@ class Density:
 
     item: StyledCurve
     row: Row
-    """Row of the contact; of several seeds, that of one, with mean density and pressure and the worst
-    status of all."""
+    """Row of the contact; of several seeds, that of one, with mean density and pressure, and with
+    the worst status of all."""
     seeds: int
     """Number of seeds of which this is the mean."""
     sigma: Field
