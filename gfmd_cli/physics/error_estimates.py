@@ -92,7 +92,7 @@ class Verdict(ExplainedEnum):
     BOUND = "bound", "is known only within an interval"
     SLOW = "slow", "converges too slowly with the grid for a value in the continuum"
     DIVERGES = "diverges", "has no value in the continuum"
-    UNKNOWN = "unknown", "has no error bar: none is known to hold on these grids"
+    UNKNOWN = "unknown", "has no error bar that is known to hold: see docs/accuracy.md"
 
     @property
     def has_error(self) -> bool:

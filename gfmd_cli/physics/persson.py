@@ -277,23 +277,23 @@ def _bin_area(p: Field, variance: Field) -> tuple[Field, Field]:
     Paper Eq. (31) and Eq. (32), corrected: I = Psi(V+) - Psi(V-) with
     Psi = (p^2 + V) erf(p/sqrt(2V)) + p sqrt(2V/pi) exp(-p^2/2V) (printed: -I/2).
     """
-    v, p = np.cumsum(variance), p[:, None]
-    narrow = variance < _NARROW * v
+    total, p = np.cumsum(variance), p[:, None]
+    narrow = variance < _NARROW * total
     width = np.where(narrow, 1.0, variance)
-    area = np.diff(_resolved_variance(p, v), prepend=0.0) / width
-    slope = np.diff(2 * np.sqrt(2 * v) * ierfc(p / np.sqrt(2 * v)), prepend=0.0) / width
+    area = np.diff(_resolved_variance(p, total), prepend=0.0) / width
+    slope = np.diff(2 * np.sqrt(2 * total) * ierfc(p / np.sqrt(2 * total)), prepend=0.0) / width
     if np.any(narrow):  # the mid point instead of a difference that cancels
-        scale = np.sqrt(2 * v - variance)[narrow]
+        scale = np.sqrt(2 * total - variance)[narrow]
         x = np.minimum(p / scale, UNDERFLOW)
         area[:, narrow] = erf(x)
         slope[:, narrow] = 2 / np.sqrt(np.pi) * np.exp(-x * x) / scale
     return area, slope
 
 
-def _resolved_variance(p: Field, v: Field | float) -> Field:
+def _resolved_variance(p: Field, variance: Field | float) -> Field:
     """int_0^V dV' erf(p/sqrt(2V')) = Psi(V) - Psi(0) in Eq. (32), as a sum of positive terms."""
-    x = p / np.sqrt(2 * v)
-    return v * erf(x) + p * np.sqrt(2 * v) * ierfc(x)
+    x = p / np.sqrt(2 * variance)
+    return variance * erf(x) + p * np.sqrt(2 * variance) * ierfc(x)
 
 
 def _panel_edges(p: Field, delta_sigma: float) -> Field:
