@@ -254,8 +254,8 @@ def test_patches_end_at_a_free_border():
     assert contact_line(grid, touching) == pytest.approx(6 * 8 / 48)
     assert contact_line(grid, touching, periodic=False) == pytest.approx(6 * 8 / 48)
     touching[:, 4] = True
-    assert open_gap(touching, periodic=False).winds.tolist() == [True, False]
-    assert open_gap(~touching, periodic=False).winds.tolist() == [True, False]
+    assert open_gap(touching, periodic=False).percolates.tolist() == [True, False]
+    assert open_gap(~touching, periodic=False).percolates.tolist() == [True, False]
 
 
 def test_run_stores_the_boundary(rows_of):

@@ -21,7 +21,7 @@ I, J = np.indices((N, N))
 
 def winds(touching):
     """Whether the gap percolates along y and along x."""
-    return tuple(open_gap(touching).winds.tolist())
+    return tuple(open_gap(touching).percolates.tolist())
 
 
 def blocks(*corners, side=2):
@@ -98,9 +98,9 @@ def test_patches_join_across_edges_and_corners_of_the_cell():
 
 def test_on_a_line_scene_the_gap_is_parted_by_any_contact():
     line = np.zeros(16, dtype=bool)
-    assert open_gap(line).winds.tolist() == [True]
+    assert open_gap(line).percolates.tolist() == [True]
     line[[0, 1, 7, 15]] = True
-    assert open_gap(line).winds.tolist() == [False]
+    assert open_gap(line).percolates.tolist() == [False]
     assert sorted(contact_patches(line).sizes) == [1, 3]
 
 
@@ -123,7 +123,7 @@ def test_random_masks_percolate_as_their_tiled_copies_do(corners):
     results = []
     for _ in range(400):
         mask = random.random((6, 6)) < random.uniform(0.3, 0.8)
-        directions = tuple(regions(mask, corners=corners).winds.tolist())
+        directions = tuple(regions(mask, corners=corners).percolates.tolist())
         assert directions == tiled_winds(mask, corners)
         results.append(directions)
     assert len(set(results)) == 4  # along none, one, the other, both
@@ -133,7 +133,7 @@ def test_random_masks_percolate_as_their_tiled_copies_do(corners):
 @settings(max_examples=200)
 def test_contact_percolates_where_the_gap_leaves_it_a_way(touching):
     """Duality on a torus: one of both alone winds, in all directions, or both do in one."""
-    gap, contact = open_gap(touching).winds, contact_patches(touching).winds
+    gap, contact = open_gap(touching).percolates, contact_patches(touching).percolates
     if not gap.any():
         assert contact.all()
     if not contact.any():
@@ -149,9 +149,9 @@ def test_regions_do_not_depend_on_where_the_cell_is_cut(mask, i, j):
         one = regions(mask, corners=corners)
         other = regions(np.roll(mask, (i, j), axis=(0, 1)), corners=corners)
         assert sorted(one.sizes) == sorted(other.sizes)
-        assert one.winds.tolist() == other.winds.tolist()
+        assert one.percolates.tolist() == other.percolates.tolist()
         turned = regions(mask.T, corners=corners)
-        assert turned.winds.tolist() == one.winds.tolist()[::-1]
+        assert turned.percolates.tolist() == one.percolates.tolist()[::-1]
         assert one.sizes.sum() == mask.sum()
 
 

@@ -35,8 +35,8 @@ class Regions:
 
     sizes: Integers
     """Number of points of each region."""
-    winds: Mask
-    """Whether a region percolates, for each axis of the mask."""
+    percolates: Mask
+    """Whether any of the regions percolates, for each axis of the mask."""
 
 
 def contact_patches(touching: Mask, *, periodic: bool = True) -> Regions:
@@ -59,14 +59,14 @@ def regions(mask: Mask, *, corners: bool, periodic: bool = True) -> Regions:
     if not periodic:
         return Regions(np.bincount(labels.ravel(), minlength=count + 1)[1:], _spans(labels))
     tree = _Tree(list(range(count + 1)), np.zeros((count + 1, mask.ndim), dtype=np.int64))
-    winds = np.zeros(mask.ndim, dtype=bool)
+    percolates = np.zeros(mask.ndim, dtype=bool)
     for one, other, *cells in _bonds(labels, structure):
-        winds |= tree.join(one, other, np.array(cells)) != 0
+        percolates |= tree.join(one, other, np.array(cells)) != 0
     roots = [up if up == label else tree.find(label)[0] for label, up in enumerate(tree.parent)]
     points = np.zeros(count + 1, dtype=np.int64)
     np.add.at(points, roots, np.bincount(labels.ravel(), minlength=count + 1))
     sizes = points[1:]  # the first is the number of points outside the mask
-    return Regions(sizes[sizes > 0], winds)
+    return Regions(sizes[sizes > 0], percolates)
 
 
 def _spans(labels: Integers) -> Mask:

@@ -101,9 +101,9 @@ class SelfAffine(RigidSurface):
     def _write_modes(self, grid: Grid) -> None:
         """Set `grid.work` to the Fourier coefficients on a grid that resolves the surface.
 
-        Phases are drawn in square rings |m|_max = 1, 2, ..., for one of q and -q. On a cell of
-        another aspect ratio |h(q)|^2 is C L / L_y, so that modes of any number per area give the
-        same density of height variance.
+        Phases are drawn in square rings |m|_max = 1, 2, ..., for one of q and -q. On an oblong cell
+        |h(q)|^2 is C L / L_y: the modes are L_y / L times as dense in the plane of q, so that their
+        variance per area of this plane is the same.
         """
         modes, (first, last) = grid.work, grid.span
         modes[...] = 0.0

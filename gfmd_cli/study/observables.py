@@ -53,7 +53,8 @@ class SolvedContact:
     @cached_property
     def percolates(self) -> list[bool]:
         """Whether the gap percolates along x and, if there is a second axis, along y."""
-        return open_gap(self.touching, periodic=self.contact.is_periodic).winds.tolist()[::-1]
+        gap = open_gap(self.touching, periodic=self.contact.is_periodic)
+        return gap.percolates.tolist()[::-1]
 
 
 class ReducedUnit(NamedTuple):
