@@ -19,7 +19,7 @@ with slope <u*>, and s p'/p is admissible at any other pressure p'; the best p' 
 
 With a free boundary the contact minimises E(s) = <s C s> / 2 - <s h> over stresses s >= 0 with the
 mean p, where means are over the map. Let s* be the solution, d = s - s*, and
-g = C s - h - min(C s - h), the gap at the level at which the bodies just touch. E is quadratic with
+g = C s - h - min(C s - h), the gap at the level of first touch. E is quadratic with
 the gradient C s - h, and <d> = 0, so
 
     E(s) - E(s*) = <g d> - <d C d> / 2 <= <s g> = eta,      <d C d> <= <g d> <= eta,

@@ -6,7 +6,7 @@ step of the method, with the numbers beside the code lines:
 
 [1] Set the level such that the mean gap in contact is zero. Choose the points whose stress may
     change: those in contact and, by proportioning (Dostal, SIAM J. Optim. 7, 871, 1997), those
-    without stress where the bodies overlap.
+    without stress where indenter and elastomer overlap.
 [2] Precondition the gap of these points by the stiffness K, and subtract the mean.
 [3] Compute a Polak-Ribiere+ direction d, zero where it would make a stress of zero tensile.
 [4] Project the move of length l on the constraints: s -> max(s + l d - shift, 0), where the shift

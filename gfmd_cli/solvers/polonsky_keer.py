@@ -10,7 +10,7 @@ beside the code lines:
 [4] Compute the displacement due to the direction.
 [5] Compute the step length.
 [6] Set negative pressures to zero.
-[7] Increase the pressure at points without pressure where the bodies overlap; then restart.
+[7] Increase the pressure at points without pressure where indenter and elastomer overlap; restart.
 [8] Scale to the mean pressure.
 
 The method is suitable for n of about 1 and below. For larger n, step [7] presses on points without
