@@ -225,7 +225,8 @@ def excess_exponent(elastomer: LinearElastomer, points: float, length: float) ->
     """Exponent of the excess of the contact area where the local exponent depends on q.
 
     From a grid to the next finer one, xi halves, and the excess decreases by AREA_EXCESS n xi / 2
-    with the local exponent at this scale. Hence the mean over all scales, weighted 1/2, 1/4, ...
+    with the local exponent n at this scale. Hence the mean over this and all finer scales, weighted
+    1/2, 1/4, ...
     Its uncertainty is the difference from the exponent on the next coarser scale.
     """
     highest = pi * points / length * 2.0**OCTAVES

@@ -17,7 +17,7 @@ from gfmd_cli.study.tasks import Task
 from gfmd_cli.units import LARGEST_RMS_HEIGHT
 
 FEW_POINTS = 30  # a choice: the area of a circle of 30 points is uncertain by a third, by its rim
-MIN_MODULUS_IN_PA = 1e3  # a choice: gels have 1e3 Pa, moduli in reduced units mostly are 1
+MIN_MODULUS_IN_PA = 1e3  # a choice: gels have 1e3 Pa, reduced moduli are mostly 1
 MAX_MODULUS = 1.2e13  # [Pa]: ten times that of diamond; no material has more
 REDUCED_PRESSURES = (1e-6, 100.0)
 """Reduced pressures outside of which a load has another unit than was meant; a choice. Rough
