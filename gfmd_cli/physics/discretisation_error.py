@@ -226,8 +226,8 @@ def excess_exponent(elastomer: LinearElastomer, points: float, length: float) ->
 
     From a grid to the next finer one, xi halves, and the excess decreases by AREA_EXCESS n xi / 2
     with the local exponent n at this scale. Hence the mean over this and all finer scales, weighted
-    1/2, 1/4, ...
-    Its uncertainty is the difference from the exponent on the next coarser scale.
+    1/2, 1/4, ... Its uncertainty is EXPONENT_CHANGE times the difference from the exponent on the
+    next coarser scale.
     """
     highest = pi * points / length * 2.0**OCTAVES
     exponents = np.maximum(elastomer.local_exponent(highest, length, HALF_OCTAVE), 0.0)
