@@ -75,7 +75,7 @@ TWO_GRIDS = {"a_r": 0.4, "sigma_p": 1.4, "u_g": 2.2}
 TYPICAL_WEIGHT = {"a_r": 8.0, "sigma_p": 1.2, "u_g": 1.2}
 GAP_ORDER = 3.0  # of u_g on a rough surface; sigma_p: 3 - n, at most 2; a_r: D as it is
 MIN_EXPONENT = 0.5  # n below which bars no longer decrease: the error at n = 0 is random
-SINGLE_CONTACT = 2.5  # times the change: bar of a single indenter, from the calibration set
+SINGLE_CONTACT = 2.5  # bar of a single indenter over D / (2^order - 1), from the calibration set
 SINGLE_CONTACT_AREA = 0.2  # error of a corrected a_r in xi, of a single or line contact, likewise
 SINGLE_CONTACT_STRESS = 0.07  # in n sigma_p xi / a_r: waves at n = 2 have up to 0.07 where D = 0
 MAX_EDGE_RATIO = 1.5  # xi / a_r of a single contact beyond which sigma_p has no bar: few points
@@ -414,6 +414,6 @@ def _single_gap(grids: NestedGrids, tip: Tip) -> Estimate:
     fine, change = grids.fine, abs(grids.change("u_g"))
     points = fine.points * min(1.0, fine.area)  # along the shorter side
     across = fine.u_g / (points * (1 - fine.a_r)) ** 2  # points across the gap, in one line
-    smooth = max(SINGLE_CONTACT * change / 3, SINGLE_CONTACT_GAP * across)
+    smooth = max(SINGLE_CONTACT * change / 3, SINGLE_CONTACT_GAP * across)  # 3: second order
     sharp = max(SHARP_GAP_CHANGE * change, SHARP_GAP * across)
     return on_grid(fine.u_g, sharp if tip.is_sharp else smooth)
