@@ -239,7 +239,7 @@ def excess_exponent(elastomer: LinearElastomer, points: float, length: float) ->
 def estimate(
     levels: Sequence[GridValues],
     exponent: float,
-    rough: RoughnessScales | None = None,
+    scales: RoughnessScales | None = None,
     area_exponent: ExcessExponent | None = None,
     *,
     band_limited: bool = True,
@@ -254,7 +254,7 @@ def estimate(
     levels : one contact at one pressure on grids N, N/2, ... in any order, all of which resolve the
         surface; the two finest are used
     exponent : local exponent of the stiffness at the highest wavenumber of the finest grid
-    rough : scales of a rough surface. None for a single indenter or a line contact: errors of many
+    scales : scales of a rough surface. None for a single indenter or a line contact: errors of many
         patches then do not average out, and one grid gives no error of sigma_p and u_g
     area_exponent : exponent of the excess of the area, see `excess_exponent`; by default `exponent`
     band_limited : whether all grids contain the same waves, so that full contact is exact
@@ -270,10 +270,10 @@ def estimate(
         estimates = estimate_free(grids, between, band_limited=band_limited)
     elif fine.a_r == 1 and band_limited:
         return full_contact(fine, between)
-    elif fine.a_r == 0 or (fine.a_r == 1 and rough is None):
+    elif fine.a_r == 0 or (fine.a_r == 1 and scales is None):
         return unknown()
     else:
-        estimates = _estimate_periodic(grids, rough, area_exponent or ExcessExponent(n), tip)
+        estimates = _estimate_periodic(grids, scales, area_exponent or ExcessExponent(n), tip)
     if fine.a_r == 1 and not band_limited:  # the grids agree and have no contact line
         estimates = {
             name: with_independent_error(each, between[name]) for name, each in estimates.items()
@@ -290,28 +290,28 @@ def estimate(
 
 
 def _estimate_periodic(
-    grids: NestedGrids, rough: RoughnessScales | None, area_n: ExcessExponent, tip: Tip
+    grids: NestedGrids, scales: RoughnessScales | None, excess: ExcessExponent, tip: Tip
 ) -> dict[str, Estimate]:
     """Estimates with a periodic boundary."""
-    oblong = rough is not None and rough.aspect > MAX_SPACING_RATIO
-    if rough is not None and not _laws_hold(grids, rough):
+    oblong = scales is not None and scales.aspect > MAX_SPACING_RATIO
+    if scales is not None and not _laws_hold(grids, scales):
         estimates = estimate_by_change(grids, is_profile=tip.dimension == 1)
-        follows_law = rough.calibrated and not oblong and tip.dimension == 2
+        follows_law = scales.calibrated and not oblong and tip.dimension == 2
         if follows_law and estimates["a_r"].verdict.has_error:
-            return estimates | {"a_r": _area(grids, rough, area_n)}
+            return estimates | {"a_r": _area(grids, scales, excess)}
         return estimates
     return {
-        "a_r": estimate_by_change(grids)["a_r"] if oblong else _area(grids, rough, area_n),
-        "sigma_p": _stress(grids, rough, tip),
-        "u_g": _gap(grids, rough, tip),
+        "a_r": estimate_by_change(grids)["a_r"] if oblong else _area(grids, scales, excess),
+        "sigma_p": _stress(grids, scales, tip),
+        "u_g": _gap(grids, scales, tip),
     }
 
 
-def _laws_hold(grids: NestedGrids, rough: RoughnessScales) -> bool:
+def _laws_hold(grids: NestedGrids, scales: RoughnessScales) -> bool:
     """Whether the laws of many patches hold for a contact on a rough surface."""
-    if grids.coarse is None and rough.plateau > MAX_PLATEAU:
+    if grids.coarse is None and scales.plateau > MAX_PLATEAU:
         return False
-    return grids.fine.patches >= MIN_PATCHES and rough.calibrated
+    return grids.fine.patches >= MIN_PATCHES and scales.calibrated
 
 
 def _bar(name: str, typical: float, change: float | None) -> float:
@@ -321,7 +321,7 @@ def _bar(name: str, typical: float, change: float | None) -> float:
     return TWO_GRIDS[name] * hypot(change, TYPICAL_WEIGHT[name] * typical)
 
 
-def _area(grids: NestedGrids, rough: RoughnessScales | None, excess: ExcessExponent) -> Estimate:
+def _area(grids: NestedGrids, scales: RoughnessScales | None, excess: ExcessExponent) -> Estimate:
     """Relative contact area: the error is of first order in the spacing, as AREA_EXCESS area_n xi.
 
     Where the exponent is not that of all short waves, the excess is uncertain.
@@ -329,7 +329,7 @@ def _area(grids: NestedGrids, rough: RoughnessScales | None, excess: ExcessExpon
     fine, coarse, _ = grids
     area_n, xi = excess.value, fine.switches_per_point
     if area_n > MAX_AREA_EXPONENT:
-        if rough is not None:
+        if scales is not None:
             return _plate_area(grids)
         # the line force at the edge of a plate is, on a grid, a row of points
         return Estimate(min(fine.a_r, xi), nan, nan, Verdict.BOUND)
@@ -337,11 +337,11 @@ def _area(grids: NestedGrids, rough: RoughnessScales | None, excess: ExcessExpon
     change = None
     if coarse is not None:
         change = best - max(0.0, coarse.a_r - AREA_EXCESS * area_n * coarse.switches_per_point)
-    if rough is None:
+    if scales is None:
         error = _bar("a_r", SINGLE_CONTACT_AREA * xi, change)
     else:
         chance = AREA_CHANCE * (1 + area_n / 10) * sqrt(xi / fine.area) / fine.points
-        law = AREA_LAW * (area_n + 1) * xi * rough.phase(fine.points)
+        law = AREA_LAW * (area_n + 1) * xi * scales.phase(fine.points)
         error = hypot(chance, law, AREA_CHANGE * (change or 0.0))
     return _corrected_area(fine.a_r, best, hypot(error, AREA_EXCESS * excess.uncertainty * xi))
 
@@ -361,15 +361,15 @@ def _corrected_area(a_r: float, best: float, error: float) -> Estimate:
     return area_estimate(a_r, best, abs(a_r - best) + error, error)
 
 
-def _stress(grids: NestedGrids, rough: RoughnessScales | None, tip: Tip) -> Estimate:
+def _stress(grids: NestedGrids, scales: RoughnessScales | None, tip: Tip) -> Estimate:
     """Stress deviation: at the edge of a patch the stress is as (1 - r^2/a^2)^(1 - n/2)."""
     fine, coarse, n = grids
     if n > MAX_STRESS_EXPONENT:
         return replace(UNKNOWN, verdict=Verdict.DIVERGES if n >= 3 else Verdict.SLOW)
-    if rough is None:
+    if scales is None:
         return _single_stress(grids, tip) if coarse else UNKNOWN
     value, edge_ratio = fine.sigma_p, fine.switches_per_point / fine.a_r
-    phase, order = rough.phase(fine.points), min(2.0, 3 - n)
+    phase, order = scales.phase(fine.points), min(2.0, 3 - n)
     coarse_law = exp(-7.08) * edge_ratio**1.5 * phase**1.25 / sqrt(1 - fine.a_r)
     fine_law = exp(-7.8) * edge_ratio**order
     typical = exp(2.18 * max(n, MIN_EXPONENT)) * max(coarse_law, fine_law) * value
@@ -394,15 +394,15 @@ def _single_stress(grids: NestedGrids, tip: Tip) -> Estimate:
     return on_grid(value, hypot(SINGLE_CONTACT * abs(rest), floor))
 
 
-def _gap(grids: NestedGrids, rough: RoughnessScales | None, tip: Tip) -> Estimate:
+def _gap(grids: NestedGrids, scales: RoughnessScales | None, tip: Tip) -> Estimate:
     """Mean gap: the error is small and of either sign, so the value is not extrapolated."""
     fine, coarse, n = grids
-    if rough is None:
+    if scales is None:
         return _single_gap(grids, tip) if coarse else UNKNOWN
-    if rough.highest > MAX_HIGHEST:
+    if scales.highest > MAX_HIGHEST:
         return estimate_by_change(grids)["u_g"]
     value, edge_ratio = fine.u_g, fine.switches_per_point / fine.a_r
-    phase, bend = rough.phase(fine.points), rough.curvature / fine.points**2
+    phase, bend = scales.phase(fine.points), scales.curvature / fine.points**2
     typical = exp(-6.8 + 0.62 * max(n, MIN_EXPONENT)) * edge_ratio**0.25
     typical *= phase**1.5 * sqrt(bend * value)
     change = None if coarse is None else grids.change("u_g") / (2**GAP_ORDER - 1)
