@@ -62,12 +62,13 @@ def reduce_scene(grid: Grid, height: Field, elastomer: LinearElastomer) -> Scene
     sums, highest, lowest = zip(*((b.sum(), b.max(), b.min()) for b in blocks), strict=True)
     mean = grid.total(float(sum(sums))) / grid.size
     largest = grid.max(float(max(max(highest) - mean, mean - min(lowest))))
-    # squares of heights of 1e-200 m would vanish
-    relative = ((block - mean) / largest for block in blocks)
-    squares = sum(dot(deviation, deviation) for deviation in relative)
-    rms = sqrt(grid.total(squares) / grid.size)
+    squares = 0.0
     for block in blocks:
         block -= mean
+        relative = block / largest  # squares of heights of 1e-200 m would vanish
+        squares += dot(relative, relative)
+    rms = sqrt(grid.total(squares) / grid.size)
+    for block in blocks:
         block /= largest * rms
     stiffness, stiffest = _stiffness(grid, elastomer)
     m, power, modes = radial_power(grid, height)

@@ -77,7 +77,7 @@ def _occupied(power: Field) -> Mask:
 
 def _by_wavenumber(grid: Grid, power: Field) -> tuple[Field, Field, Field]:
     """See `radial_power`."""
-    row, column = np.nonzero(_occupied(power))
+    row, column = np.divmod(np.flatnonzero(_occupied(power)), power.shape[1])
     m_y = row * (grid.length / grid.length_y) if grid.dimension == 2 else row
     count = multiplicity(grid.points_y)[row] * multiplicity(grid.points)[column]
     return np.sqrt(m_y**2 + column**2), power[row, column] / float(grid.size) ** 2, count
