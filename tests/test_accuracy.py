@@ -369,6 +369,28 @@ def test_a_bad_solution_gets_wide_bounds():
     assert bounds.u_g >= float(np.mean(u - exact.u)) > 0.5
 
 
+@pytest.mark.parametrize("p_star", [0.1, 10.0])
+def test_the_bounds_of_any_displacement_are_those_of_the_energies(p_star):
+    """J(u) - D(s) of two energies, and the level of the best admissible mean q = (1 +- t) p."""
+    contact = build_scene(SelfAffine(cutoff=0.2), Slab(thickness=0.1), 32).contact(p_star)
+    h, p = contact.height, contact.pressure
+    u = contact.settle(h + np.random.default_rng(0).exponential(size=h.shape))
+    sigma = contact.stress(u, out=contact.grid.empty())
+    bounds = error_bounds(contact, u, sigma)
+
+    s = np.maximum(sigma, 0.0)
+    s *= p / s.mean()
+    k = contact.stiffness.copy()
+    k[0, 0] = np.inf
+    b = np.mean((s - p) * np.fft.irfft2(np.fft.rfft2(s - p) / k, h.shape))
+    gap = np.mean(u * (sigma - p)) / 2 + p * u.mean() - (np.mean(s * h) - b / 2)
+    level = (np.mean(s * h) - b) / p
+    t = min(np.sqrt(2 * gap / b), 1.0)
+    level_bound = (t * b / 2 + gap / t) / p
+    assert bounds.gap == pytest.approx(gap, rel=1e-9)
+    assert bounds.u_g == pytest.approx(abs(u.mean() - level) + level_bound, rel=1e-9)
+
+
 def test_the_table_says_that_its_values_are_counted_where_those_of_the_continuum_follow(
     rows_of, tmp_path
 ):
