@@ -225,6 +225,7 @@ def test_nearly_full_contact_on_a_second_grid_is_contact(rows_of):
 def test_full_contact_is_exact(rows_of):
     (row,) = rows_of("load.p_star=30")
     assert (row["a_r"], row["a_r_error"], row["u_g_error"]) == (1, 0, 0)
+    assert [row[f"{name}_continuum"] for name in ("a_r", "u_g")] == [1, 0]
     assert row["status"] == "converged"
 
 
