@@ -55,6 +55,15 @@ def test_the_bands_of_the_spectrum_add_up_to_the_height_and_its_moment():
     assert bands.fitted[whole] == pytest.approx(bands.density[whole], rel=1e-3)
 
 
+def test_a_periodic_map_is_not_tapered(tmp_path):
+    """A wave of the cell stays the only one."""
+    wave = np.cos(2 * np.pi * np.arange(64) / 8)
+    np.save(tmp_path / "wave.npy", 1e-8 * np.add.outer(wave, wave))
+    summary = summarise(FileSurface(path=tmp_path / "wave.npy", length=1e-6))
+    assert summary.spectrum.q == pytest.approx([2 * np.pi * 8 / 1e-6])
+    assert summary.spectrum.modes.tolist() == [4]
+
+
 @pytest.mark.parametrize("digits", [np.float32, "counts of 16 bits"])
 def test_rounding_of_the_heights_does_not_change_the_fit(digits):
     """White noise of the rounding lies far below C(q), but has as many shells beyond q_s."""
