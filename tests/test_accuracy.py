@@ -11,7 +11,7 @@ from specs import power_spec
 from gfmd_cli import solve
 from gfmd_cli.analysis.compare import compare
 from gfmd_cli.analysis.ensemble import Ensemble, ensembles, spread_of
-from gfmd_cli.analysis.run_summary import run_text
+from gfmd_cli.analysis.run_summary import MAX_ROWS, run_text
 from gfmd_cli.analysis.table import plus_minus
 from gfmd_cli.analysis.tables import seeds_table, study_tables
 from gfmd_cli.bench.run import run_bench
@@ -507,6 +507,14 @@ def test_contacts_of_several_tolerances_have_titles_of_their_own(rows_of, tmp_pa
     for text in (*tables, run_text(rows)):
         assert text.count("points a side, tolerance=1e-06") == (1 if "mean of" in text else 2)
         assert text.count("points a side, tolerance=1e-08") == (1 if "mean of" in text else 2)
+
+
+def test_a_long_table_of_a_run_is_cut(rows_of):
+    rows = rows_of(
+        "surface.cutoff=0.2", text=SPEC.partition("[accuracy]")[0].replace('"auto"', "32")
+    )
+    whole, cut = (run_text(rows * count).splitlines() for count in (MAX_ROWS, MAX_ROWS + 2))
+    assert cut == [*whole, "", "and 2 more contacts"]
 
 
 def test_a_pressure_that_was_searched_has_an_interval_and_a_given_one_is_exact(rows_of, tmp_path):
