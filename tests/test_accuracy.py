@@ -11,7 +11,7 @@ from specs import power_spec
 from gfmd_cli import solve
 from gfmd_cli.analysis.compare import compare
 from gfmd_cli.analysis.ensemble import Ensemble, ensembles, spread_of
-from gfmd_cli.analysis.run_summary import run_text
+from gfmd_cli.analysis.run_summary import MAX_ROWS, run_text
 from gfmd_cli.analysis.table import plus_minus
 from gfmd_cli.analysis.tables import seeds_table, study_tables
 from gfmd_cli.bench.run import run_bench
@@ -225,6 +225,7 @@ def test_nearly_full_contact_on_a_second_grid_is_contact(rows_of):
 def test_full_contact_is_exact(rows_of):
     (row,) = rows_of("load.p_star=30")
     assert (row["a_r"], row["a_r_error"], row["u_g_error"]) == (1, 0, 0)
+    assert [row[f"{name}_continuum"] for name in ("a_r", "u_g")] == [1, 0]
     assert row["status"] == "converged"
 
 
@@ -369,6 +370,34 @@ def test_a_bad_solution_gets_wide_bounds():
     assert bounds.u_g >= float(np.mean(u - exact.u)) > 0.5
 
 
+@pytest.mark.parametrize("p_star", [0.1, 10.0])
+def test_the_bounds_of_any_displacement_are_those_of_the_energies(p_star):
+    """J(u) - D(s) of two energies, and the level of the best admissible mean q = (1 +- t) p."""
+    contact = build_scene(SelfAffine(cutoff=0.2), Slab(thickness=0.1), 32).contact(p_star)
+    h, p = contact.height, contact.pressure
+    draw = np.random.default_rng(0)
+    u = h + np.maximum(draw.normal(size=h.shape), 0.0)
+    sigma = contact.stress(u, out=contact.grid.empty())
+    bounds = error_bounds(contact, u, sigma)
+
+    s = np.maximum(sigma, 0.0)
+    s *= p / s.mean()
+    k = contact.stiffness.copy()
+    k[0, 0] = np.inf
+    b = np.mean((s - p) * np.fft.irfft2(np.fft.rfft2(s - p) / k, h.shape))
+    gap = np.mean(u * (sigma - p)) / 2 + p * u.mean() - (np.mean(s * h) - b / 2)
+    level = (np.mean(s * h) - b) / p
+    t = min(np.sqrt(2 * gap / b), 1.0)
+    level_bound = (t * b / 2 + gap / t) / p
+    assert bounds.gap == pytest.approx(gap, rel=1e-9)
+    assert bounds.u_g == pytest.approx(abs(u.mean() - level) + level_bound, rel=1e-9)
+    pressure = sigma * ((u == h) & (sigma > 0))
+    omitted = np.sqrt(np.mean((sigma - pressure) ** 2))
+    assert omitted > 0
+    stress_bound = np.sqrt(2 * gap * contact.stiffness.max()) + omitted
+    assert bounds.sigma_p == pytest.approx(stress_bound, rel=1e-9)
+
+
 def test_the_table_says_that_its_values_are_counted_where_those_of_the_continuum_follow(
     rows_of, tmp_path
 ):
@@ -478,6 +507,14 @@ def test_contacts_of_several_tolerances_have_titles_of_their_own(rows_of, tmp_pa
     for text in (*tables, run_text(rows)):
         assert text.count("points a side, tolerance=1e-06") == (1 if "mean of" in text else 2)
         assert text.count("points a side, tolerance=1e-08") == (1 if "mean of" in text else 2)
+
+
+def test_a_long_table_of_a_run_is_cut(rows_of):
+    rows = rows_of(
+        "surface.cutoff=0.2", text=SPEC.partition("[accuracy]")[0].replace('"auto"', "32")
+    )
+    whole, cut = (run_text(rows * count).splitlines() for count in (MAX_ROWS, MAX_ROWS + 2))
+    assert cut == [*whole, "", "and 2 more contacts"]
 
 
 def test_a_pressure_that_was_searched_has_an_interval_and_a_given_one_is_exact(rows_of, tmp_path):

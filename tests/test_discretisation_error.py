@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from math import isnan, pi
+from types import SimpleNamespace
 
 import exact_solutions as reference
 import numpy as np
@@ -28,7 +29,7 @@ from gfmd_cli.physics.scenes import build_scene
 from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.solvers.auto import Auto
 from gfmd_cli.solvers.nested_grids import solve_contact
-from gfmd_cli.study.refinement import scales_of
+from gfmd_cli.study.refinement import has_coarser_grid, scales_of
 
 ROUGH = RoughnessScales(waves=20.0, curvature=2e3)
 GRIDS = (64, 128, 256)
@@ -596,3 +597,26 @@ def test_a_soft_band_has_errors_only_on_grids_whose_short_waves_are_shorter(tmp_
     row = solve(spec).columns
     assert {row[f"{name}_verdict"] for name in QUANTITIES} == {"unknown"}
     assert "or unknown" in row["warnings"]
+
+
+@pytest.mark.parametrize(
+    ("shape", "resolved", "has_coarser"),
+    [
+        ((128, 128), 64, True),
+        ((128, 128), 65, False),
+        ((64, 64), 16, False),  # half of them are fewer than the first grid of "auto" has
+        ((64, 128), 16, True),
+        ((128, 64), 16, True),
+        ((130, 130), 16, False),  # half of them is odd
+        ((129, 256), 16, False),
+    ],
+)
+def test_a_second_grid_has_half_the_points_along_both_axes(shape, resolved, has_coarser):
+    points_y, points = shape
+    task = SimpleNamespace(
+        surface=SimpleNamespace(dimension=2),
+        points=points,
+        points_y=points_y,
+        resolves=lambda points: points >= resolved,
+    )
+    assert has_coarser_grid(task, points) is has_coarser

@@ -153,6 +153,15 @@ def test_irregular_changes_are_not_extrapolated():
     assert np.all(np.abs(limit.discretisation) > 0.1)
 
 
+def test_counting_errors_are_the_scatter_of_independent_counts():
+    draw = np.random.default_rng(3)
+    cells, counts = [64**2, 128**2], np.array([[1000.0], [4000.0]]) * np.ones(100)
+    limits = [extrapolate(draw.poisson(counts).astype(float), cells) for _ in range(20)]
+    scatter = np.std([limit.log_density[5:95] for limit in limits], axis=0)
+    ratios = scatter**2 / np.mean([limit.counting[5:95] ** 2 for limit in limits], axis=0)
+    assert 0.8**2 < ratios.mean() < 1.25**2
+
+
 def test_a_bin_that_changes_too_much_is_not_resolved():
     limit = extrapolate(np.array([100 * np.ones(100), 200 * np.ones(100)]), [64**2, 128**2])
     assert np.all(np.isnan(limit.log_density))  # by ln 2

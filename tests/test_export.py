@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import xarray
 
-from gfmd_cli.analysis.export import _cell, as_dataset
+from gfmd_cli.analysis.export import _cell, _padded, as_dataset
 from gfmd_cli.study.columns import COLUMNS, CONTRACT, DETAILS
 from gfmd_cli.study.reading import open_study, read_rows
 
@@ -229,3 +229,10 @@ def test_text_that_looks_like_a_formula_is_quoted_in_csv(text):
     assert _cell(text) == f"'{text}"
     assert _cell("half-space") == "half-space"
     assert _cell(-1.5) == "-1.5"
+
+
+def test_curves_of_unequal_length_are_padded():
+    column = next(column for column in COLUMNS if column.name == "u_g")
+    curves = [{"u_g": np.array([1.0, 2.0, 3.0])}, {"u_g": np.array([4.0])}, {}]
+    (padded,) = _padded("curve", ("task", "q"), (column,), curves).values()
+    np.testing.assert_array_equal(padded[1], [[1, 2, 3], [4, np.nan, np.nan], [np.nan] * 3])

@@ -127,6 +127,12 @@ def test_no_axis_is_preferred():
     )
 
 
+def test_a_line_is_interpolated_as_a_map_of_equal_rows():
+    line = np.random.default_rng(9).normal(size=32)
+    rows = monotone(np.tile(line, (4, 1)), (4, 96))
+    np.testing.assert_allclose(rows, np.tile(monotone(line, (96,)), (4, 1)), atol=1e-14)
+
+
 def test_the_monotone_surface_is_periodic_and_the_same_on_every_grid():
     heights = np.random.default_rng(7).normal(size=(32, 32))
     moved = monotone(np.roll(heights, (5, 9), (0, 1)), (96, 96))

@@ -28,7 +28,7 @@ from gfmd_cli.study.columns import (
     TASK_GROUPS,
     TASK_ID,
 )
-from gfmd_cli.study.reading import read_rows
+from gfmd_cli.study.reading import read_rows, tell_files_apart
 from gfmd_cli.study.run import RunOptions, run_study
 from gfmd_cli.study.tasks import plan
 
@@ -207,3 +207,20 @@ def test_parameters_are_coordinates_in_netcdf(gfmd):
     with xarray.open_dataset("s.nc", engine="h5netcdf") as data:
         assert {"hurst", "E_star", "surface", "spectrum"} <= set(data.coords)
         assert data.E_star.attrs["units"] == "Pa"
+
+
+@pytest.mark.parametrize(
+    ("contents", "marked"), [("aba", [False] * 3), ("aab", [True, False, True])]
+)
+def test_files_of_one_name_and_other_contents_are_told_apart(contents, marked):
+    """Files x, y and x again with these contents; twice, as an older study has marks already."""
+    rows = [
+        {"surface": name, "ensemble": name, "surface_sha256": 64 * content}
+        | {"elastomer": "springs", "elastomer_short": "springs", "elastomer_sha256": ""}
+        for name, content in zip("xyx", contents, strict=True)
+    ]
+    for _ in range(2):
+        tell_files_apart(rows)
+        for name, content, row, is_marked in zip("xyx", contents, rows, marked, strict=True):
+            label = f"{name} sha256={8 * content}" if is_marked else name
+            assert (row["surface"], row["ensemble"], row["elastomer"]) == (label, label, "springs")

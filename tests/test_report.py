@@ -209,18 +209,22 @@ percolation = true
 """
 
 
-def test_optional_observables_are_a_table_in_si_units(invoke, tmp_path):
+def test_optional_observables_are_a_table_in_si_units(output_of, tmp_path):
     (tmp_path / "spec.toml").write_text(OBSERVABLES)
     study = tmp_path / "s.h5"
-    invoke("run", tmp_path / "spec.toml", "-o", study, "-q")
+    output_of("run", tmp_path / "spec.toml", "-o", study, "-q")
     first = read_rows(study)[0]
     page = report(study)
     assert "Optional observables" in Page(page).words
-    cells = re.findall(r"<td[^>]*>([^<]*)</td>", page.partition("Observables:")[2])
+    table = page.partition("Observables:")[2]
+    cells = re.findall(r"<td[^>]*>([^<]*)</td>", table)
     assert str(first["patches"]) in cells
     assert f"{first['patch_area_mean'] * 4e-6:#.4g}" in cells
     assert f"{first['stiffness'] * first['delta_sigma'] / 1e-6:#.4g}" in cells
     assert "yes" in cells
+    headings = re.sub("<[^>]+>", "", table)
+    assert "mean patch\n/ L²" in headings
+    assert "mean patch\n[m²]" in headings
 
 
 def test_a_fit_stands_beside_the_spectrum(whole):

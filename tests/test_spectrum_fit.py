@@ -12,6 +12,7 @@ from gfmd_cli.physics.persson import shells
 from gfmd_cli.physics.scenes import build_scene
 from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.physics.spectrum_fit import density, fit, moments
+from gfmd_cli.physics.surface_spectrum import spectrum
 from gfmd_cli.physics.waves import radial_power
 
 
@@ -36,6 +37,31 @@ def test_the_fit_of_a_self_affine_surface_gives_what_it_was_made_from(keys):
     assert 2 * np.pi / fitted.q_s == pytest.approx(surface.cutoff * surface.length, rel=5e-3)
     assert fitted.scatter < 1e-8
     assert np.isnan(fitted.hurst_of_long_waves)
+
+
+def test_the_bands_of_the_spectrum_add_up_to_the_height_and_its_moment():
+    """sum of C(q) modes / A = <h^2>; the fit has the same C(q), as the phases alone are random."""
+    surface, points = SelfAffine(cutoff=0.05, length=1e-5, h_std=1e-8, seed=3), 96
+    scene = build_scene(surface, HalfSpace(), points)
+    bands = spectrum(scene.shells, scene.grid.sides, scene.grid.whole_shape)
+    heights = bands.density * bands.modes / surface.length**2
+    power = np.abs(np.fft.fft2(surface.heights(points)) / points**2) ** 2
+    m = np.fft.fftfreq(points, 1 / points)
+    q = 2 * np.pi / surface.length * np.hypot(m, m[:, None])
+    assert heights.sum() == pytest.approx(surface.h_std**2)
+    assert heights @ bands.q == pytest.approx(np.sum(power * q))
+    assert bands.modes.sum() == np.count_nonzero(power > 1e-9 * power.max())
+    whole = bands.q < 0.9 * 2 * np.pi / (surface.cutoff * surface.length)
+    assert bands.fitted[whole] == pytest.approx(bands.density[whole], rel=1e-3)
+
+
+def test_a_periodic_map_is_not_tapered(tmp_path):
+    """A wave of the cell stays the only one."""
+    wave = np.cos(2 * np.pi * np.arange(64) / 8)
+    np.save(tmp_path / "wave.npy", 1e-8 * np.add.outer(wave, wave))
+    summary = summarise(FileSurface(path=tmp_path / "wave.npy", length=1e-6))
+    assert summary.spectrum.q == pytest.approx([2 * np.pi * 8 / 1e-6])
+    assert summary.spectrum.modes.tolist() == [4]
 
 
 @pytest.mark.parametrize("digits", [np.float32, "counts of 16 bits"])
@@ -63,6 +89,8 @@ def test_standard_errors_hold_on_surfaces_that_the_fit_describes_exactly():
         )
         assert abs(fitted.hurst - hurst) < 3 * fitted.hurst_error < 1e-4
         assert abs(fitted.q_r - 2 * np.pi / rolloff) < 3 * fitted.q_r_error
+        relative_error = fitted.rolloff_error / fitted.rolloff_wavelength
+        assert relative_error == pytest.approx(fitted.q_r_error / fitted.q_r)
 
 
 def test_a_power_law_shows_no_roll_off():

@@ -4,7 +4,10 @@ from math import inf, nan
 
 import pytest
 
+from gfmd_cli.analysis.run_summary import MAX_ROWS, unconverged
 from gfmd_cli.analysis.table import Group, Table, TableColumn, plain, plus_minus, ratio
+from gfmd_cli.analysis.wording import shown
+from gfmd_cli.status import Status
 
 COLUMNS = (
     TableColumn("p*", "p_star", ".4g"),
@@ -68,6 +71,21 @@ def test_the_text_has_caption_groups_and_aligned_columns():
 
 def test_a_table_without_records_is_no_text():
     assert Table("About gaps.", COLUMNS, [Group("empty", [])]).as_text() == ""
+
+
+def test_a_column_in_si_units_is_shown_where_it_means_something_in_one_row():
+    columns = [TableColumn("p*", "p_star"), TableColumn("p", "pressure", unit="Pa")]
+    reduced = {"load": "p_star", "h_std": 1.0}
+    assert shown(columns, [reduced, reduced]) == columns[:1]
+    assert shown(columns, [reduced, reduced | {"load": "pressure"}]) == columns
+
+
+def test_a_long_list_of_failed_tasks_is_cut():
+    rows = [{"task": task, "status": Status.FAILED} for task in range(MAX_ROWS + 2)]
+    lines = unconverged(rows, {1: "a reason"})
+    assert lines[:2] == ["task 0: an error ended the task", "task 1: a reason"]
+    assert lines[MAX_ROWS:] == ["and 2 more tasks"]
+    assert len(unconverged(rows[:MAX_ROWS], {})) == MAX_ROWS
 
 
 def test_json_has_none_for_what_does_not_apply():
