@@ -100,6 +100,14 @@ def test_the_highest_point_lies_between_grid_points(dimension, points):
     assert on_coarse.max() < 0.9995 * on_fine.max()
 
 
+@pytest.mark.parametrize("row", [10.3, 231.6, 299.7])
+def test_the_highest_point_of_a_bump_is_its_top_wherever_it_lies(row):
+    """In every block of rows. exp(20 cos x) has no waves beyond those of the grid but rounding."""
+    y, x = (np.arange(n) - place for n, place in ((300, row), (280, 70.8)))
+    bump = np.exp(20 * (np.cos(2 * np.pi * y[:, None] / 300) + np.cos(2 * np.pi * x / 280) - 2))
+    assert highest_point(3.0 * bump) == pytest.approx(3.0, rel=1e-9)
+
+
 @pytest.mark.parametrize("shape", [(16, 16), (15, 16), (16, 20), (16,)], ids=str)
 def test_the_highest_point_of_a_map_with_nyquist_waves_is_that_of_finer_grids(shape):
     """Seen from all sides: a Nyquist wave stands for +q and -q alike."""

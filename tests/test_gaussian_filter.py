@@ -94,13 +94,23 @@ def test_a_constant_stays(periodic):
     np.testing.assert_allclose(gaussian_filter(heights, SQUARE, 6, periodic=periodic), 5, 1e-12)
 
 
-def test_the_height_at_a_border_is_a_weighted_least_squares_fit():
-    heights, cutoff = _noise(30), 6.0
-    x = np.arange(30)
-    weight = np.exp(-(((np.pi * x / cutoff) ** 2) / np.log(2)))  # distances from the first point
-    fit = np.polyfit(x, heights, 1, w=np.sqrt(weight))
+@pytest.mark.parametrize("cutoff", [4.0, 11.0, 40.0])
+def test_every_height_is_a_weighted_least_squares_fit(cutoff):
+    heights, x = _noise(40), np.arange(40)
     filtered = gaussian_filter(heights, (1.0,), cutoff, periodic=False)
-    assert filtered[0] == pytest.approx(np.polyval(fit, 0), abs=1e-10)
+    for place, value in enumerate(filtered):
+        weight = np.exp(-((np.pi * (x - place) / cutoff) ** 2) / np.log(2))
+        fit = np.polyfit(x - place, heights, 1, w=np.sqrt(weight))
+        assert value == pytest.approx(fit[1], abs=1e-9)
+
+
+@BOTH
+def test_a_product_of_profiles_is_filtered_as_the_profiles(periodic):
+    """The weights are products; with more points than a block of rows has."""
+    along_y, along_x = _noise(2, 250)
+    y, x = (gaussian_filter(line, (1.0,), 20, periodic=periodic) for line in (along_y, along_x))
+    filtered = gaussian_filter(np.outer(along_y, along_x), SQUARE, 20, periodic=periodic)
+    np.testing.assert_allclose(filtered, np.outer(y, x), atol=1e-13)
 
 
 @BOTH

@@ -32,6 +32,14 @@ def test_a_plane_has_its_own_slope_and_area(spacing):
     assert tilted["Sdr"] == pytest.approx(np.sqrt(1.25) - 1, rel=1e-12)
 
 
+@pytest.mark.parametrize("row", [1, 100, 163, 164, 165, 399])
+def test_every_step_has_the_same_gradient(row):
+    """Also where a block of rows ends: one of 399 rows of triangles has a slope of 6."""
+    heights = np.zeros((400, 200))
+    heights[row:] = 3.0
+    assert parameters(heights, 0.5, 1.0)["Sdq"] == pytest.approx(6 / np.sqrt(399), rel=1e-12)
+
+
 def test_the_area_of_gentle_slopes_is_half_their_square():
     heights = 1e-9 * np.random.default_rng(0).normal(size=(40, 50))
     gentle = parameters(heights, 1.0, 1.0)
@@ -78,8 +86,10 @@ def test_a_cosine_decorrelates_at_the_arc_cosine(shape):
     assert exact <= length <= exact + 0.1
 
 
-def test_the_autocorrelation_is_the_mean_over_pairs():
-    heights = np.ma.masked_less(np.random.default_rng(4).normal(size=(6, 7)), -1)
+@pytest.mark.parametrize("lowest", [-1, -9])
+def test_the_autocorrelation_is_the_mean_over_pairs(lowest):
+    """With missing heights and without."""
+    heights = np.ma.masked_less(np.random.default_rng(4).normal(size=(6, 7)), lowest)
     z = heights - heights.mean()
     correlation = autocorrelation(heights)
     for dy, dx in ((0, 0), (1, 2), (3, -1)):

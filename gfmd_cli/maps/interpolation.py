@@ -9,7 +9,7 @@ from typing import Literal
 
 import numpy as np
 
-from gfmd_cli.grid.arrays import Field, Mask
+from gfmd_cli.grid.arrays import Field, Mask, row_blocks
 from gfmd_cli.grid.modes import multiplicity
 
 Interpolation = Literal["fourier", "monotone"]
@@ -54,10 +54,14 @@ def _short_waves(heights: Field) -> tuple[float, float]:
     modes = np.fft.rfft2(heights - heights.mean())
     y = np.fft.fftfreq(rows, 0.5)[:, None]  # relative to the highest wavenumber of the grid
     x = np.fft.rfftfreq(columns, 0.5)
-    slope = multiplicity(columns) * np.abs(modes) ** 2 * (y**2 + x**2)
-    total = float(slope.sum()) or 1.0
-    corners = float(slope[y**2 + x**2 > 1 + 1e-9].sum()) / total
-    return corners, float(slope[np.maximum(np.abs(y), x) > SHORT_WAVE].sum()) / total
+    sums = np.zeros(3)
+    for block in row_blocks(modes):
+        square = y[block] ** 2 + x**2
+        slope = multiplicity(columns) * np.abs(modes[block]) ** 2 * square
+        is_short = np.maximum(np.abs(y[block]), x) > SHORT_WAVE
+        sums += slope.sum(), slope[square > 1 + 1e-9].sum(), slope[is_short].sum()
+    total = float(sums[0]) or 1.0
+    return float(sums[1]) / total, float(sums[2]) / total
 
 
 def _ties(heights: Field) -> float:
@@ -71,14 +75,21 @@ def _jumps(heights: Field) -> float:
     A jump is isolated where it is `ISOLATED_RATIO` times larger than the two differences before it
     and the two after it.
     """
-    fractions = [0.0]
-    for axis in range(heights.ndim):
-        steps = np.abs(heights - np.roll(heights, 1, axis))
-        around = np.maximum.reduce([np.roll(steps, shift, axis) for shift in (-2, -1, 1, 2)])
-        squares = np.square(steps, out=steps)
-        isolated = squares > ISOLATED_RATIO**2 * np.square(around, out=around)
-        fractions.append(float(squares[isolated].sum() / (squares.sum() or 1.0)))
-    return max(fractions)
+    rows = np.atleast_2d(heights)
+    return max(_jumps_along(lines) for lines in (rows, rows.T)[: heights.ndim])
+
+
+def _jumps_along(lines: Field) -> float:
+    """See `_jumps`; along the last axis."""
+    total = isolated = 0.0
+    for block in row_blocks(lines):
+        steps = np.abs(np.diff(np.pad(lines[block], ((0, 0), (3, 2)), mode="wrap")))
+        around = [steps[:, shift : shift + lines.shape[1]] for shift in (0, 1, 3, 4)]
+        own = steps[:, 2:-2]
+        jumps = own[own > ISOLATED_RATIO * np.maximum.reduce(around)]
+        total += float(np.sum(own**2))
+        isolated += float(np.sum(jumps**2))
+    return isolated / (total or 1.0)
 
 
 def positions(old: int, new: int, centred: bool = False) -> Field:

@@ -1,11 +1,9 @@
 """The highest point of a surface that is a Fourier series, which lies between grid points."""
 
-from itertools import product
-
 import numpy as np
 from scipy.optimize import minimize
 
-from gfmd_cli.grid.arrays import Field, Modes
+from gfmd_cli.grid.arrays import Field, Modes, row_blocks
 
 CANDIDATES = 8  # points from which a maximum is sought: the highest of different peaks
 SUBDIVISION = 4  # of the spacing along each axis for these points: with two grid points per wave,
@@ -26,12 +24,12 @@ def highest_point(heights: Field) -> float:
     best = float(whole.max())
     scale = float(np.ptp(whole)) or 1.0  # the tolerances of the search are absolute
     modes /= scale
-    highest = []
+    highest: list[tuple[float, float, float]] = []
     parts = np.arange(SUBDIVISION) / SUBDIVISION
-    for y, x in product(parts if count_y > 1 else [0.0], parts):
-        (along_y, _), (along_x, _) = _waves(k_y, y), _waves(k_x, x)
-        moved = np.fft.irfft2(modes * along_y[:, None] * along_x, whole.shape)
-        highest += _highest(moved, (y, x))
+    for y in parts if count_y > 1 else [0.0]:
+        lines = np.fft.ifft(modes * _waves(k_y, y)[0][:, None], axis=0)
+        for x in parts:
+            highest += _highest(lines, _waves(k_x, x)[0], count_x, (y, x))
     modes /= whole.size
     modes[:, 1 : (count_x + 1) // 2] *= 2.0  # with their opposites
 
@@ -62,13 +60,26 @@ def _waves(k: Modes, place: float) -> tuple[Modes, Modes]:
     return wave, slope
 
 
-def _highest(heights: Field, shift: tuple[float, float]) -> list[tuple[float, float, float]]:
-    """The highest points of a grid that is shifted: their heights and places in points."""
-    count = min(16 * CANDIDATES, heights.size)
-    points = np.argpartition(heights.ravel(), -count)[-count:]
-    places = np.unravel_index(points, heights.shape)
-    along_y, along_x = (place + by for place, by in zip(places, shift, strict=True))
-    return list(zip(heights.ravel()[points].tolist(), along_y, along_x, strict=True))
+def _highest(
+    lines: Modes, along_x: Modes, count_x: int, shift: tuple[float, float]
+) -> list[tuple[float, float, float]]:
+    """The highest points of a grid that is shifted: their heights and places in points.
+
+    `lines` are the waves along x of each of its rows, not shifted along x.
+    """
+    count = 16 * CANDIDATES
+    heights, points = np.empty(0), np.empty(0, np.int64)
+    for rows in row_blocks(lines):
+        block = np.fft.irfft(lines[rows] * along_x, count_x).ravel()
+        lowest = heights.min() if heights.size == count else -np.inf
+        higher = np.flatnonzero(block > lowest)
+        heights = np.append(heights, block[higher])
+        points = np.append(points, higher + rows.start * count_x)
+        if heights.size > count:
+            kept = np.argpartition(heights, -count)[-count:]
+            heights, points = heights[kept], points[kept]
+    row, column = divmod(points, count_x)
+    return list(zip(heights.tolist(), row + shift[0], column + shift[1], strict=True))
 
 
 def _peaks(highest: list[tuple[float, float, float]]) -> list[tuple[float, float]]:
