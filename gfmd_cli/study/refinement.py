@@ -111,7 +111,9 @@ def solve_on_grids(task: Task, context: SolveContext, watcher: Watcher) -> TaskS
     the watcher raises.
     """
     sizes = _sizes(task)
-    grids = watcher.notes.grids = _ended_grids(sizes, watcher.notes.grids)
+    grids = watcher.notes.grids
+    if [grid.points for grid in grids] != sizes[:-1][: len(grids)]:  # not before the last of these
+        grids = watcher.notes.grids = []
     solved: TaskSolution | None = None
     for points in sizes[len(grids) :]:
         scene = task_scene(task, points, context)
@@ -175,11 +177,6 @@ def has_coarser_grid(task: Task, points: int) -> bool:
     numbers = (points,) if is_line else (points, points * task.points_y // task.points)
     enough = any(n % 4 == 0 and n >= 2 * FIRST for n in numbers)
     return enough and all(n % 2 == 0 for n in numbers) and task.resolves(points // 2)
-
-
-def _ended_grids(sizes: list[int], grids: list[SolvedGrid]) -> list[SolvedGrid]:
-    """The grids of the notes; none where they are not those before the last of these sizes."""
-    return grids if [grid.points for grid in grids] == sizes[:-1][: len(grids)] else []
 
 
 def _continues(task: Task, solved: TaskSolution, grids: int, options: WorkerOptions) -> bool:
