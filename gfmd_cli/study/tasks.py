@@ -224,7 +224,12 @@ def _check(spec: models.Spec) -> None:
         elastomer, dimension = chosen["elastomer"], chosen["surface"].dimension
         boundary = chosen["grid"].boundary
         if chosen["grid"].points == "auto" and spec.accuracy is not None:
-            _check_max_points(spec.accuracy.max_points, chosen["surface"])
+            first, most = forecast.first_grid(chosen["surface"]), spec.accuracy.max_points
+            if most < first:
+                raise InputError(
+                    f'accuracy.max_points: {most} given, but grid.points = "auto" begins with '
+                    f"{first} points along x on this surface; {remedy(chosen['surface'], first)}"
+                )
         chosen["solver"].check_boundary(boundary)
         if boundary == "free":
             elastomer.check_free_boundary(dimension)
@@ -259,15 +264,6 @@ def _check_grid(surface: RigidSurface, grid: models.GridTable) -> None:
         points = surface.copies * grid.points
         on_cell, points_y = grid.on_cell(surface, points)
         check_resolved(on_cell, points, points_y)
-
-
-def _check_max_points(max_points: int, surface: RigidSurface) -> None:
-    """Raise InputError where the first of the finer and finer grids has more points."""
-    if max_points < (first := forecast.first_grid(surface)):
-        raise InputError(
-            f'accuracy.max_points: {max_points} given, but grid.points = "auto" begins with '
-            f"{first} points along x on this surface; {remedy(surface, first)}"
-        )
 
 
 def _points(spec: models.Spec, chosen: dict[str, Any], load: float) -> int:
