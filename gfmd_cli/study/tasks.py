@@ -105,13 +105,6 @@ class Task:
             return 1
         return max(1, round(points * self.points_y / self.points))
 
-    def resolves(self, points: int) -> bool:
-        """Whether the surface is resolved by a grid of `points` points along x."""
-        return (
-            points >= self.surface.smallest_grid()
-            and self.points_y_on(points) >= self.surface.smallest_grid_y()
-        )
-
     @property
     def bytes(self) -> float:
         """Memory that the solve takes, with its process."""
