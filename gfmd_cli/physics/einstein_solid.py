@@ -84,6 +84,6 @@ def elastic_energy_with_mean(z: Field | float) -> Field:
     bounded = np.maximum(pressed, -UNDERFLOW)
     closed = (0.5 + pressed**2) * erfc(pressed)
     closed -= bounded * np.exp(-(bounded**2)) / np.sqrt(np.pi)
-    # for x > 0 its terms cancel; Abramowitz & Stegun 7.2.13 has a parabolic cylinder function
+    # for x > 0, where its terms cancel: Abramowitz & Stegun, Eq. 7.2.13, with D_-3(sqrt(2) x)
     product = np.sqrt(2 / np.pi) * np.exp(-0.5 * light**2) * pbdv(-3, np.sqrt(2) * light)[0]
     return 0.5 * np.where(x > 0, product, closed)
