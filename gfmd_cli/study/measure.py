@@ -14,10 +14,11 @@ from gfmd_cli.grid.arrays import Field
 from gfmd_cli.maps.map_preparation import mirror
 from gfmd_cli.physics.approach import approach
 from gfmd_cli.physics.free_contact import doubled_grid
+from gfmd_cli.physics.indenters import RigidSurface
 from gfmd_cli.physics.observables import changed_fractions, gap_histogram, stress_histogram
 from gfmd_cli.physics.patches import area_distribution
 from gfmd_cli.physics.power_spectra import autocorrelations, spectra
-from gfmd_cli.physics.surface_spectrum import map_spectrum
+from gfmd_cli.physics.surface_spectrum import Spectrum, map_spectrum
 from gfmd_cli.spec.models import SWEPT, OutputTable
 from gfmd_cli.study.column import Row
 from gfmd_cli.study.columns import FIELDS, PARAMETERS, PR_LINEAR, PR_LOGARITHMIC, empty_row
@@ -142,8 +143,10 @@ def result(task: Task, solved: TaskSolution, seconds: float) -> TaskResult:
     return TaskResult(entry, scene.shells, arrays, task.surface.pictures(), spectrum)
 
 
-_map_spectrum = lru_cache(maxsize=4)(map_spectrum)
-"""Cached, because all contacts of a scene have the same."""
+@lru_cache(maxsize=4)
+def _map_spectrum(surface: RigidSurface) -> Spectrum | None:
+    """As `map_spectrum`; cached, because all contacts of a scene have the same."""
+    return map_spectrum(surface)
 
 
 def forget_spectra() -> None:
