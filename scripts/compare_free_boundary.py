@@ -112,7 +112,7 @@ def compare(name, surface, points, points_y, p_star, pythons):
     scene = build_free_scene(surface, HalfSpace(E_star=MODULUS), points, points_y=points_y)
     contact = scene.contact(p_star)
     solution = solve_contact(contact, Auto(tolerance=TOLERANCE))
-    stress = scene.in_pascals(contact_pressure(contact.height, solution.u, solution.sigma))
+    stress = contact_pressure(contact.height, solution.u, solution.sigma) * scene.delta_sigma
     gap = (solution.u - contact.height) * scene.h_std
     shape = f"{points} x {points_y}"
     touching = stress > 0

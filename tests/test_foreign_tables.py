@@ -194,6 +194,13 @@ def test_many_scattered_points_are_refused_as_such(saved):
         read_topography(saved("".join(" ".join(map(str, row)) + "\n" for row in rows)))
 
 
+@pytest.mark.parametrize("position", ["nan", "inf"])
+def test_a_position_that_is_not_finite_is_refused(saved, position):
+    table = f"{position} 0 1\n{points(np.arange(20), np.arange(12))}"
+    with pytest.raises(InputError, match="a position in the table is missing or infinite"):
+        read_topography(saved(table))
+
+
 def test_uneven_positions_are_refused_with_their_deviation(saved):
     bent = np.arange(40) + 0.1 * np.sin(np.arange(40) / 6)
     with pytest.raises(InputError, match=r"along x are not evenly.* deviate by up to 0\.\d+ of"):

@@ -154,6 +154,16 @@ def test_a_large_hole_is_filled_smoothly(monkeypatch, heights):
     assert filled.max() <= exact[~missing].max()
 
 
+def test_many_lone_missing_heights_are_the_means_of_their_neighbours(monkeypatch):
+    """The map of half the resolution has no holes then."""
+    monkeypatch.setattr(map_preparation, "MAX_EXACT", 200)
+    y, x = np.mgrid[:40, :40]
+    missing = np.zeros(x.shape, dtype=bool)
+    missing[1:-1:2, 1:-1:2] = True
+    filled = fill_missing(np.where(missing, np.nan, 3 * x - y), missing)
+    np.testing.assert_allclose(filled, 3 * x - y, atol=1e-12)
+
+
 @pytest.mark.parametrize("largest", [200, 10**6])
 def test_a_hole_across_the_border_of_a_periodic_map_is_filled_as_inside(monkeypatch, largest):
     monkeypatch.setattr(map_preparation, "MAX_EXACT", largest)

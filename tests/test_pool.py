@@ -11,7 +11,7 @@ import pytest
 
 from gfmd_cli.study import pool
 from gfmd_cli.study.context import SolveContext
-from gfmd_cli.study.pool import ending, solve_in_pool
+from gfmd_cli.study.pool import ending
 
 WORKER = """
 import os, signal, sys, time
@@ -81,8 +81,8 @@ def solve(monkeypatch, stop, tmp_path):
 
         options = SimpleNamespace()  # real ones would let every worker import the solvers
         context = SolveContext(options, report, stop)
-        outcome, _ = solve_in_pool(tasks, start, jobs, context)
-        return outcome, reasons
+        workers = pool.Pool(tasks, context, jobs, lambda: pool.Worker(start, options))
+        return workers.run(), reasons
 
     return solve
 

@@ -374,6 +374,23 @@ def test_an_array_file_takes_no_dataset_name(npy):
         read_topography(npy(), "h")
 
 
+def test_a_text_of_one_map_takes_no_dataset_name(tmp_path):
+    pytest.importorskip("SurfaceTopography")
+    path = tmp_path / "h.txt"
+    grid = "ncols 4\nnrows 3\ncellsize 1\n" + "1 2 3 5\n" * 3
+    points = "".join(f"{x} {y} {x * y % 5}\n" for y in range(6) for x in range(6))
+    for text, what in ((grid, "ESRI grid"), (points, "table of positions")):
+        path.write_text(text)
+        read_topography(path)
+        with pytest.raises(InputError, match=f"{what} holds one map; leave out dataset 'h'"):
+            read_topography(path, "h")
+
+
+def test_a_file_of_words_alone_has_no_map(hdf5):
+    with pytest.raises(InputError, match="no numeric dataset with one or two dimensions"):
+        read_topography(hdf5(operator="somebody"))
+
+
 def test_two_maps_and_an_unknown_name_list_the_candidates(hdf5, heights):
     path = hdf5(a=heights, b=heights, x=np.arange(16.0))
     for dataset, message in ((None, "several datasets"), ("c", "no dataset 'c'")):
@@ -702,6 +719,12 @@ def test_a_region_beyond_the_map_is_refused(npy, region, message):
     path = npy(np.zeros((9, 13)))
     with pytest.raises(InputError, match=f"h.npy: surface.region: .*{message}"):
         read_topography(path, region=Region.model_validate(region))
+
+
+def test_a_region_of_a_profile_has_no_y(npy):
+    region = Region.model_validate({"x": [2, 6], "y": [0, 2]})
+    with pytest.raises(InputError, match=r"surface\.region: a line profile has no y"):
+        read_topography(npy(np.arange(9.0)), region=region)
 
 
 def test_a_map_upside_down_has_the_opposite_heights(npy, heights):

@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from scipy.special import spherical_in
 
 from gfmd_cli.analysis.distribution import PRIOR_SEEDS, StressDistribution
 from gfmd_cli.grid.arrays import Field
@@ -181,7 +182,6 @@ def _line(
 
 def _bending(exponent: float) -> float:
     """ln of the mean of sigma^exponent over a bin over its value in the (geometric) middle."""
-    node, weight = np.polynomial.legendre.leggauss(5)
-    ratio = np.sqrt(LOGARITHMIC_EDGES[1] / LOGARITHMIC_EDGES[0])
-    sigma = 0.5 * (ratio + 1 / ratio) + 0.5 * (ratio - 1 / ratio) * node
-    return float(np.log(0.5 * weight @ sigma**exponent))
+    half = 0.5 * np.log(LOGARITHMIC_EDGES[1] / LOGARITHMIC_EDGES[0])
+    mean, width = spherical_in(0, [half * abs(exponent + 1), half])  # sinh(x) / x
+    return float(np.log(mean / width))

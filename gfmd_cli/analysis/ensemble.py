@@ -116,13 +116,12 @@ def without_seed(row: Row) -> tuple[Any, ...]:
 
 def by_load(rows: Iterable[Row]) -> list[list[Row]]:
     """The rows of each load, one a seed: of several, one with errors and converged if possible."""
-    groups = (sorted(group, key=_preference) for group in grouped(rows, load_of).values())
+
+    def preference(row: Row) -> tuple[bool, bool]:
+        return _has_errors(row), row["status"].is_converged
+
+    groups = (sorted(group, key=preference) for group in grouped(rows, load_of).values())
     return [[*{row["seed"]: row for row in group}.values()] for group in groups]
-
-
-def _preference(row: Row) -> tuple[bool, bool]:
-    """Larger for the better one of two rows of a contact, which differ in [accuracy] alone."""
-    return _has_errors(row), row["status"].is_converged
 
 
 def _has_errors(row: Row) -> bool:

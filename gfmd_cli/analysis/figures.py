@@ -112,10 +112,6 @@ class Series:
             x, y, wide = self.x[known], self.y[known], self.half_width[known]
             plot.band(self.style, x, np.maximum(y - wide, LOWEST * y), y + wide)
 
-    def extent(self) -> Field:
-        """The values that the scale of a figure must hold."""
-        return np.concatenate([self.y, self.y + np.nan_to_num(self.half_width)])
-
 
 def _point(panel: Panel, records: list[Row]) -> tuple[float, float, float, float]:
     """p*, value, error, half width of the confidence interval."""
@@ -183,7 +179,7 @@ def _over_pressure(panel: Panel, items: list[StyledCurve]) -> ColumnFigure | Non
     x = np.concatenate([series.x for series in drawn])
     plot.scale("x", panel.x_scale, x)
     _add_pascals(plot, items, float(x.max()))
-    ys = [series.extent() for series in drawn]
+    ys = [each.y + width for each in drawn for width in (0, np.nan_to_num(each.half_width))]
     if panel.y_scale == "linear":
         low, high = plot.axes.get_xlim()
         ys += [y[(p_star >= low) & (p_star <= high)] for *_, y in lines]

@@ -34,9 +34,8 @@ def in_si(row: Mapping[str, Any], unit: str) -> bool:
     return bool(row["h_std"] <= LARGEST_RMS_HEIGHT and (has_stiffness or "Pa" not in unit))
 
 
-def shown(columns: Sequence[TableColumn], rows: Iterable[Record]) -> list[TableColumn]:
+def shown(columns: Sequence[TableColumn], rows: Sequence[Record]) -> list[TableColumn]:
     """The columns without those in SI units where these mean nothing in any row."""
-    rows = list(rows)
     return [
         column
         for column in columns

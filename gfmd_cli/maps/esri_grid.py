@@ -18,8 +18,7 @@ def read_esri_grid(path: Path, dataset: str | None) -> HeightMap:
         raise InputError(f"an ESRI grid holds one map; leave out dataset {dataset!r}")
     header: dict[str, float] = {}
     with path.open("rb") as file:
-        lines = iter(file)
-        for line in lines:
+        for line in file:
             words = line.decode("utf-8-sig", "replace").lower().replace(",", ".").split()
             if len(words) != 2 or not words[0].isidentifier():
                 break
@@ -28,7 +27,7 @@ def read_esri_grid(path: Path, dataset: str | None) -> HeightMap:
             raise InputError(f"the header of an ESRI grid has no {' and no '.join(absent)}")
         shape = int(header["nrows"]), int(header["ncols"])
         check_layout(shape, np.dtype(float))
-        heights = np.loadtxt((each.replace(b",", b".") for each in (line, *lines)), ndmin=2)
+        heights = np.loadtxt((each.replace(b",", b".") for each in (line, *file)), ndmin=2)
     if heights.shape != shape:
         raise InputError(f"{extent(heights.shape)} heights, but the header states {extent(shape)}")
     missing = header.get("nodata_value", NO_DATA)

@@ -105,14 +105,6 @@ def window(shape: tuple[int, ...], taper: float, finer: tuple[int, ...] | None =
     return weight
 
 
-def border_step(heights: Field) -> float:
-    """Ratio of the rms step across the border to that inside; 1 for a periodic map."""
-    ends = (heights.take(0, axis) - heights.take(-1, axis) for axis in range(heights.ndim))
-    across = np.concatenate([np.ravel(step) for step in ends])
-    inside = np.mean([np.mean(np.diff(heights, axis=axis) ** 2) for axis in range(heights.ndim)])
-    return float(np.sqrt(np.mean(across**2) / inside)) if inside > 0 else 1.0
-
-
 def fill_missing(heights: Field, missing: Mask, *, periodic: bool = False) -> Field:
     """Fill missing heights in by the solution of the discrete Laplace equation.
 

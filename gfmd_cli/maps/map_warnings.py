@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from gfmd_cli.grid.arrays import Field, row_blocks
-from gfmd_cli.maps.map_preparation import border_step, level
+from gfmd_cli.maps.map_preparation import level
 from gfmd_cli.maps.topography import Topography
 from gfmd_cli.units import count
 
@@ -123,7 +123,10 @@ def unlikely_gradient(heights: Field, spacing: tuple[float, ...]) -> str:
 
 def step_at_border(heights: Field, *, is_tapered: bool) -> str:
     """Opposite borders of a repeated map that do not fit."""
-    cliff = border_step(heights)
+    axes = range(heights.ndim)
+    ends = [np.ravel(heights.take(0, axis) - heights.take(-1, axis)) for axis in axes]
+    inside = np.mean([np.mean(np.diff(heights, axis=axis) ** 2) for axis in axes])
+    cliff = np.sqrt(np.mean(np.concatenate(ends) ** 2) / inside) if inside > 0 else 1.0
     limit = np.sqrt(BORDER_SHARE * max(heights.shape))  # one of so many steps is at the border
     if cliff <= np.clip(limit, MIN_BORDER_STEP, MAX_BORDER_STEP):
         return ""

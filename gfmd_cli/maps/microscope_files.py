@@ -73,7 +73,10 @@ def read_microscope_file(path: Path, dataset: str | None) -> HeightMap:
                 "not .npy or HDF5; other formats need SurfaceTopography: "
                 f"{INSTALL.format('topography')}"
             ) from error
-        _check_first_bytes(text_tables.part(file, 0, SIGNATURE_BYTES))
+        start = text_tables.part(file, 0, SIGNATURE_BYTES).removeprefix(BOM_UTF8)
+        for signature, what in REFUSED.items():
+            if start.startswith(signature):
+                raise InputError(what)
         table, warning = text_tables.with_blanks(text_tables.in_utf8(file))
         height_map = read_points(table)
         if height_map is None:
@@ -83,13 +86,6 @@ def read_microscope_file(path: Path, dataset: str | None) -> HeightMap:
         elif dataset is not None:
             raise InputError(f"a table of positions holds one map; leave out dataset {dataset!r}")
     return replace(height_map, notes=tuple(filter(None, (*height_map.notes, warning))))
-
-
-def _check_first_bytes(start: bytes) -> None:
-    """Raise InputError for a known format that is not read."""
-    for signature, what in REFUSED.items():
-        if start.removeprefix(BOM_UTF8).startswith(signature):
-            raise InputError(what)
 
 
 def _open_scan(path: Path, file: BinaryIO, readers: list[Any]) -> Any:

@@ -196,7 +196,11 @@ def _checked(data: HeightMap, region: Region | None, flip: bool, crop: bool) -> 
         part = part[tuple(slice(a, a + side) for a in first)]
     heights = np.ma.filled(np.ma.asarray(part).astype(np.float64), np.nan)
     if data.sides is None and heights.ndim == 2:
-        _check_is_matrix(shape)
+        if min(shape) < MATRIX_COLUMNS <= MANY_POINTS < max(shape):
+            raise InputError(
+                f"an array of {extent(shape)} numbers: positions and heights, not a map? Save "
+                "the heights as a matrix, or a line profile as an array of one dimension"
+            )
         check_all_are_heights(heights, unsized=False)
     missing: Mask = ~(np.abs(heights) < MAX_HEIGHT)
     if missing.all():
@@ -210,15 +214,6 @@ def _checked(data: HeightMap, region: Region | None, flip: bool, crop: bool) -> 
     checked = {"heights": heights, "missing": missing if missing.any() else None}
     measures = {"spacing": spacing, "shape": shape, "precision": precision}
     return Topography(**vars(data) | checked | measures)
-
-
-def _check_is_matrix(shape: tuple[int, ...]) -> None:
-    """Raise InputError for an array with so few rows or columns that they are no map."""
-    if min(shape) < MATRIX_COLUMNS <= MANY_POINTS < max(shape):
-        raise InputError(
-            f"an array of {extent(shape)} numbers: positions and heights, not a map? Save "
-            "the heights as a matrix, or a line profile as an array of one dimension"
-        )
 
 
 def _spacing(data: HeightMap, shape: tuple[int, ...]) -> tuple[float, ...] | None:

@@ -280,10 +280,6 @@ class Scene:
         """A height or displacement in metres, from the level of the given surface."""
         return field * self.h_std + self.mean_height
 
-    def in_pascals(self, field: Field) -> Field:
-        """A stress in Pa."""
-        return field * self.delta_sigma
-
     def contact(self, p_star: float) -> Contact:
         """The contact at reduced pressure p*. Raises InputError where that is out of range."""
         low, high = PRESSURE_RANGE

@@ -8,15 +8,13 @@ stresses in k_0 h_std (which is Delta_sigma), energies per area in k_0 h_std^2.
 """
 
 import numpy as np
-from scipy.special import erfc, erfcx, ndtr
+from scipy.special import erfc, ndtr, pbdv
 
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.physics.persson import UNDERFLOW, ierfc
 
 _MAX_HEIGHT_STEPS = 50  # a bound; at most 6 are taken for pressures from 1e-300 to 1e300
 _LAST_STEP = 1e-8  # relative; the error left behind it is of the order of its square
-_FAR = 3.0  # x from which the continued fraction is used; terms of the closed form cancel as x^4
-_LEVELS = 40  # of the continued fraction: all digits for x >= _FAR
 
 
 def non_contact_height(p_star: Field | float) -> Field:
@@ -82,20 +80,10 @@ def elastic_energy_with_mean(z: Field | float) -> Field:
     Paper Eq. (36c).
     """
     x = -np.asarray(z, dtype=np.float64) / np.sqrt(2)
-    near, far = np.minimum(x, _FAR), np.clip(x, _FAR, UNDERFLOW)
-    bounded = np.maximum(near, -UNDERFLOW)
-    closed = (0.5 + near**2) * erfc(near) - bounded * np.exp(-(bounded**2)) / np.sqrt(np.pi)
-    return 0.5 * np.where(x > _FAR, 2 * _i2erfc(far), closed)
-
-
-def _i2erfc(x: Field) -> Field:
-    """Integral of ierfc from x >= _FAR to infinity, without cancellation.
-
-    The recurrence 2m i^m erfc = i^(m-2) erfc - 2x i^(m-1) erfc makes the ratio of neighbours
-    r_m = i^m erfc / i^(m-1) erfc the continued fraction r_m = 1 / (2x + 2(m+1) r_(m+1)).
-    """
-    ratio = np.zeros_like(x)
-    for level in range(_LEVELS, 1, -1):
-        ratio = 1 / (2 * x + 2 * (level + 1) * ratio)
-    first = 1 / (2 * x + 4 * ratio)
-    return ratio * first * erfcx(x) * np.exp(-x * x)
+    pressed, light = np.minimum(x, 0.0), np.clip(x, 0.0, UNDERFLOW)
+    bounded = np.maximum(pressed, -UNDERFLOW)
+    closed = (0.5 + pressed**2) * erfc(pressed)
+    closed -= bounded * np.exp(-(bounded**2)) / np.sqrt(np.pi)
+    # for x > 0, where its terms cancel: Abramowitz & Stegun, Eq. 7.2.13, with D_-3(sqrt(2) x)
+    product = np.sqrt(2 / np.pi) * np.exp(-0.5 * light**2) * pbdv(-3, np.sqrt(2) * light)[0]
+    return 0.5 * np.where(x > 0, product, closed)

@@ -69,11 +69,19 @@ class Pixels:
 
 
 def power_law(n: float, pixels: Pixels) -> Field:
-    """Displacements for k = q^n, 0 <= n < 2; in one dimension 0 <= n <= 1."""
+    """Displacements for k = q^n, 0 <= n < 2; in one dimension 0 <= n <= 1.
+
+    There, G = -ln(|x| / L) / pi at n = 1 is known up to a constant, the level of reference: here it
+    is the displacement at the distance of the length L of the line.
+    """
     if len(pixels.shape) == 2:
         return _plane(n, pixels)
     (points,), (spacing,) = pixels.shape, pixels.spacings
-    return _logarithmic_line(points, spacing) if n == 1 else _line(n, points, spacing)
+    if n == 1:
+        length = points * spacing
+        return by_edges(lambda x: x * (1 - np.log(x / length)) / np.pi, points, spacing)
+    prefactor = gamma(1 - n) * np.sinc(n / 2) / 2  # sin(pi n / 2) / (pi n), also at n = 0
+    return by_edges(lambda x: prefactor * x**n, points, spacing)
 
 
 def smooth_part(n: float, alpha: float, r: Field) -> Field:
@@ -128,20 +136,3 @@ def overwrite(values: Field, nearer: Field) -> Field:
     """The displacements with those of the nearer pixels written over them, in place."""
     values[: nearer.shape[0], : nearer.shape[1]] = nearer
     return values
-
-
-def _line(n: float, points: int, spacing: float) -> Field:
-    """Displacements for k = q^n, 0 <= n < 1, in one dimension."""
-    prefactor = gamma(1 - n) * np.sinc(n / 2) / 2  # sin(pi n / 2) / (pi n), also at n = 0
-    return by_edges(lambda x: prefactor * x**n, points, spacing)
-
-
-def _logarithmic_line(points: int, spacing: float) -> Field:
-    """Displacements for k = q in one dimension, G = -ln(|x| / L) / pi, zero at x = L.
-
-    G is known up to a constant, the level of reference. Here it is the displacement at the distance
-    of the length L = points * spacing of the line.
-    """
-    edges = (np.arange(points + 1) - 0.5) / points
-    antiderivative = edges * (1 - np.log(np.abs(edges)))
-    return np.diff(antiderivative) * points * spacing / np.pi

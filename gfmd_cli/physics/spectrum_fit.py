@@ -105,14 +105,6 @@ class SelfAffineFit:
         return np.where(q <= self.q_s, self.c_0 * _shape(q, np.array(x), self.q_1), 0.0)
 
 
-def density(shells: Shells) -> Field:
-    """C(q) = <|h(q)|^2> of the modes of every shell [m^2].
-
-    Times the area of the cell it is the power spectral density in the usual convention [m^4].
-    """
-    return shells.height / shells.modes
-
-
 def moments(shells: Shells) -> Moments:
     """Rms height, gradient and curvature, from sums of C, q^2 C and q^4 C / 4 over all modes."""
     sums = [float(np.sum(shells.height * shells.q**power)) for power in (0, 2, 4)]
@@ -175,7 +167,7 @@ def _fit_below(shells: Shells, range_: int, counts: Field) -> tuple[SelfAffineFi
 
     `counts` are the numbers of modes of a surface whose spectrum depends on |q| alone.
     """
-    q, power = shells.q, density(shells)
+    q, power = shells.q, shells.height / shells.modes  # C(q) [m^2]
     used = int(np.searchsorted(q, q[range_ - 1] - BLUR * q[0], side="right"))
     if used < MIN_SHELLS or q[used - 1] < MIN_RANGE * q[0]:
         raise InputError(f"{_range(q, range_)}: too narrow for a fit")

@@ -50,7 +50,10 @@ def interactive(figure: ColumnFigure) -> dict[str, Any] | None:
         "data": [_trace(layer, names) for layer in figure.layers],
         "layout": layout,
         "factor": factor,
-        "legend": [_entry(label, handle) for label, handle in figure.entries.items()],
+        "legend": [
+            {"name": _name(label), "symbol": _symbol(handle), "colour": to_hex(handle.get_color())}
+            for label, handle in figure.entries.items()
+        ],
         "names": names,
     }
 
@@ -100,12 +103,8 @@ def _axis(axis: Any, label: str, factor: float = 1.0) -> dict[str, Any]:
     return {"title": {"text": html_label(label)}, "type": scale, "range": _numbers(ends, DIGITS)}
 
 
-def _entry(label: str, handle: Any) -> dict[str, str]:
-    """An entry of the legend: its name, a character for its symbol, its colour."""
-    return {"name": _name(label), "symbol": _symbol(handle), "colour": to_hex(handle.get_color())}
-
-
 def _symbol(handle: Any) -> str:
+    """A character for the symbol of an entry of the legend."""
     if handle.get_marker() in SYMBOLS:
         return SYMBOLS[handle.get_marker()][1]
     if handle.get_linewidth() > 4:

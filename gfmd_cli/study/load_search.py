@@ -100,9 +100,9 @@ def solve_at_load(task: Task, context: SolveContext, watcher: Watcher) -> TaskSo
     measured_on = grids[max(len(grids) - 2, 0)] if has_error else 0
     for points in grids:
         scene = task_scene(task, points, context)
-        if not _is_in_reach(task, scene):
+        if reason := _out_of_reach(task, scene):
             if points == task.points:
-                raise _out_of_reach(task, scene)
+                raise InputError(reason)
             continue  # on a coarser grid
         if roots:
             first = exp(roots[-1] + _shift(task, roots))
@@ -212,7 +212,7 @@ def _check_known(task: Task, solved: TaskSolution) -> None:
 def _grids(task: Task) -> list[int]:
     """Points along x of the grids to search on, the task's own the last.
 
-    The coarser ones resolve the surface, but may not have the load: see `_is_in_reach`.
+    The coarser ones resolve the surface, but may not have the load: see `_out_of_reach`.
     """
     grids = [task.points]
     while len(grids) <= COARSER_GRIDS and has_coarser_grid(task, grids[0]):
@@ -237,24 +237,19 @@ def _at(task: Task, points: int, pressure: float) -> Task:
     )
 
 
-def _is_in_reach(task: Task, scene: Scene) -> bool:
-    """Whether a grid can have the contact area or the mean gap of the load."""
-    if task.quantity == "mean_gap":
-        return task.load < scene.highest
-    return task.quantity != "contact_area" or task.load * scene.grid.size >= 1
-
-
-def _out_of_reach(task: Task, scene: Scene) -> InputError:
-    """The error of a load that no pressure has on the grid of its task."""
-    if task.quantity == "contact_area":
-        return InputError(
+def _out_of_reach(task: Task, scene: Scene) -> str:
+    """Why no pressure gives the load on a grid; "" if one does."""
+    if task.quantity == "contact_area" and task.load * scene.grid.size < 1:
+        return (
             f"load.contact_area: {task.load:g} is less than one of the {scene.grid.size} "
             "points of the grid"
         )
-    return InputError(
-        f"load.mean_gap = {task.load:g} h_std is not reached: without load the mean gap is "
-        f"{scene.highest:g} h_std"
-    )
+    if task.quantity == "mean_gap" and task.load >= scene.highest:
+        return (
+            f"load.mean_gap = {task.load:g} h_std is not reached: without load the mean gap is "
+            f"{scene.highest:g} h_std"
+        )
+    return ""
 
 
 def _guess(task: Task, scene: Scene) -> tuple[float, float]:

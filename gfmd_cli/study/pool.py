@@ -218,14 +218,3 @@ def ending(status: int) -> str:
     with suppress(ValueError):
         return f"was killed by {signal.Signals(-status).name}"
     return f"was killed by signal {-status}"
-
-
-def solve_in_pool(
-    tasks: list[Task], parts: Path, jobs: int, context: SolveContext
-) -> tuple[Counter[Status], list[Task]]:
-    """Solve tasks on `jobs` worker processes.
-
-    Returns how many have which status, and the tasks for which no worker could be started.
-    """
-    pool = Pool(tasks, context, jobs, lambda: Worker(parts, context.options))
-    return pool.run(), list(pool.waiting)

@@ -1,12 +1,12 @@
 """The progress of a study, read from its files; writes no file and takes no lock."""
 
+import os
 from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
 from gfmd_cli.errors import InputError
-from gfmd_cli.files.hdf5 import MAGIC
-from gfmd_cli.files.regular import open_regular
+from gfmd_cli.files.hdf5 import is_hdf5
 from gfmd_cli.spec.models import Spec, load_text
 from gfmd_cli.status import Status
 from gfmd_cli.study.checkpoint import Checkpoint, SavedProgress
@@ -79,13 +79,7 @@ def progress_of_study(path: Path) -> StudyProgress:
 
 def is_study(path: Path) -> bool:
     """Whether a path is meant as a study rather than as a spec."""
-    if path.suffix == ".h5":
-        return True
-    try:
-        with open_regular(path, follow=True) as file:
-            return file.read(len(MAGIC)) == MAGIC
-    except OSError:
-        return False
+    return path.suffix == ".h5" or (os.path.isfile(path) and is_hdf5(path))
 
 
 def check_shards(shards: int, tasks: int) -> None:

@@ -140,10 +140,7 @@ class StudyFile:
     def shells(self, scene: int) -> Shells:
         """The binned spectrum of one scene."""
         place = f"scenes/{scene}"
-        group = find(self._file, place)
-        if group is None:
-            raise KeyError(f"no group {place!r}")
-        arrays = {column.name: read_dataset(group, column.name) for column in layout.SHELLS}
+        arrays = {c.name: read_dataset(self._file, f"{place}/{c.name}") for c in layout.SHELLS}
         _check_alike(place, arrays, 1)
         return Shells(**arrays)
 

@@ -65,7 +65,7 @@ class TaskSolution:
             return self.scene.in_metres(self.contact.height)
         if name == "contact_pressure":
             sigma = contact_pressure(self.contact.obstacle, u, sigma)
-        return self.scene.in_pascals(sigma)
+        return sigma * self.scene.delta_sigma
 
 
 @lru_cache(maxsize=1)
@@ -111,7 +111,9 @@ def solve_on_grids(task: Task, context: SolveContext, watcher: Watcher) -> TaskS
     the watcher raises.
     """
     sizes = _sizes(task)
-    grids = watcher.notes.grids = _ended_grids(sizes, watcher.notes.grids)
+    grids = watcher.notes.grids
+    if [grid.points for grid in grids] != sizes[:-1][: len(grids)]:  # of other grids
+        grids = watcher.notes.grids = []
     solved: TaskSolution | None = None
     for points in sizes[len(grids) :]:
         scene = task_scene(task, points, context)
@@ -174,12 +176,9 @@ def has_coarser_grid(task: Task, points: int) -> bool:
     is_line = task.surface.dimension == 1
     numbers = (points,) if is_line else (points, points * task.points_y // task.points)
     enough = any(n % 4 == 0 and n >= 2 * MIN_FIRST_POINTS for n in numbers)
-    return enough and all(n % 2 == 0 for n in numbers) and task.resolves(points // 2)
-
-
-def _ended_grids(sizes: list[int], grids: list[SolvedGrid]) -> list[SolvedGrid]:
-    """The grids of the notes; none where they are not those before the last of these sizes."""
-    return grids if [grid.points for grid in grids] == sizes[:-1][: len(grids)] else []
+    least = task.surface.smallest_grid(), task.surface.smallest_grid_y()
+    is_resolved = points // 2 >= least[0] and task.points_y_on(points // 2) >= least[1]
+    return enough and all(n % 2 == 0 for n in numbers) and is_resolved
 
 
 def _continues(task: Task, solved: TaskSolution, grids: int, options: WorkerOptions) -> bool:

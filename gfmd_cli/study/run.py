@@ -18,7 +18,7 @@ from gfmd_cli.status import Status
 from gfmd_cli.study.context import Progress, Report, SolveContext, WorkerOptions
 from gfmd_cli.study.measure import forget_spectra
 from gfmd_cli.study.plausibility import unit_of_grids
-from gfmd_cli.study.pool import solve_in_pool
+from gfmd_cli.study.pool import Pool, Worker
 from gfmd_cli.study.refinement import forget_scenes
 from gfmd_cli.study.resources import check_memory, jobs_and_threads, seconds_to_stop, usable_memory
 from gfmd_cli.study.result import Outcome
@@ -193,7 +193,8 @@ def _solve_all(
     """Solve tasks, on worker processes if there are several jobs; the statuses of those ended."""
     counts: Counter[Status] = Counter()
     if jobs > 1:
-        counts, pending = solve_in_pool(pending, parts, jobs, context)
+        pool = Pool(pending, context, jobs, lambda: Worker(parts, context.options))
+        counts, pending = pool.run(), list(pool.waiting)  # for which no worker could be started
     counts.update(attempt(task, parts, context) for task in pending)
     del counts[Status.INTERRUPTED]
     return counts

@@ -12,7 +12,7 @@ from gfmd_cli.errors import GfmdError, InputError
 from gfmd_cli.files.regular import read_regular
 from gfmd_cli.study.forecast import BASE_BYTES, SECONDS_PER_PAIR
 from gfmd_cli.study.progress import StudyProgress, check_shards
-from gfmd_cli.study.resources import HEADROOM, THREADED_POINTS
+from gfmd_cli.study.resources import DISK_SPEED, HEADROOM, THREADED_POINTS
 from gfmd_cli.study.tasks import Task
 
 SUFFIX = ".sbatch"
@@ -21,7 +21,6 @@ SBATCH = ("sbatch", "--parsable")
 RESERVED = ("array", "parsable", "wait", "wrap")  # options of sbatch that --sbatch may not take
 MAX_REQUEUES = 100  # of one shard; a study that needs more has too short a time limit
 NOTICE = 120  # seconds before the time limit at which a small run has to save its state
-SAVE_RATE = 1e8  # bytes per second, a low estimate of the rate at which a state is written
 
 SCRIPT = """\
 #!/bin/bash
@@ -179,7 +178,7 @@ def requirements(tasks: list[Task], shards: int, cpus: int, limit: float | None)
     largest = max(tasks, key=lambda task: task.bytes)
     side_by_side = 1 if largest.size >= THREADED_POINTS**2 else min(cpus, ceil(len(tasks) / shards))
     memory = side_by_side * largest.bytes / HEADROOM + BASE_BYTES
-    notice = NOTICE + largest.bytes / SAVE_RATE + 4 * SECONDS_PER_PAIR * largest.size
+    notice = NOTICE + largest.bytes / DISK_SPEED + 4 * SECONDS_PER_PAIR * largest.size
     if limit is not None:
         notice = min(notice, limit / 4)
     return {

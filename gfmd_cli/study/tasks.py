@@ -105,13 +105,6 @@ class Task:
             return 1
         return max(1, round(points * self.points_y / self.points))
 
-    def resolves(self, points: int) -> bool:
-        """Whether the surface is resolved by a grid of `points` points along x."""
-        return (
-            points >= self.surface.smallest_grid()
-            and self.points_y_on(points) >= self.surface.smallest_grid_y()
-        )
-
     @property
     def bytes(self) -> float:
         """Memory that the solve takes, with its process."""
@@ -224,7 +217,12 @@ def _check(spec: models.Spec) -> None:
         elastomer, dimension = chosen["elastomer"], chosen["surface"].dimension
         boundary = chosen["grid"].boundary
         if chosen["grid"].points == "auto" and spec.accuracy is not None:
-            _check_max_points(spec.accuracy.max_points, chosen["surface"])
+            first, most = forecast.first_grid(chosen["surface"]), spec.accuracy.max_points
+            if most < first:
+                raise InputError(
+                    f'accuracy.max_points: {most} given, but grid.points = "auto" begins with '
+                    f"{first} points along x on this surface; {remedy(chosen['surface'], first)}"
+                )
         chosen["solver"].check_boundary(boundary)
         if boundary == "free":
             elastomer.check_free_boundary(dimension)
@@ -259,15 +257,6 @@ def _check_grid(surface: RigidSurface, grid: models.GridTable) -> None:
         points = surface.copies * grid.points
         on_cell, points_y = grid.on_cell(surface, points)
         check_resolved(on_cell, points, points_y)
-
-
-def _check_max_points(max_points: int, surface: RigidSurface) -> None:
-    """Raise InputError where the first of the finer and finer grids has more points."""
-    if max_points < (first := forecast.first_grid(surface)):
-        raise InputError(
-            f'accuracy.max_points: {max_points} given, but grid.points = "auto" begins with '
-            f"{first} points along x on this surface; {remedy(surface, first)}"
-        )
 
 
 def _points(spec: models.Spec, chosen: dict[str, Any], load: float) -> int:
