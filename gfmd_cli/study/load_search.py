@@ -2,9 +2,9 @@
 
 Contact area and displacement rise and the mean gap falls with the pressure. One root is sought: on
 coarser grids first, where a trial costs little, then on the grid itself. The results of the coarser
-grids predict the first pressure there. Each trial is a solve of its own. For n > 2 the contact area
-may also fall, as that of a paraboloid on a plate does; then there may be several roots, of which the
-search finds one.
+grids predict the first pressure there. Each trial is a solve of its own. The contact area of a plate
+(n = 4) may also fall, as that under a paraboloid does: of several roots the search finds one, or it
+ends in a jump where another pressure has the area.
 
 With `[accuracy]` a contact area or mean gap is that in the continuum on the last grid, and that of
 the grid on the coarser ones, which give a first pressure, and the slope from which the error of
@@ -69,10 +69,11 @@ def solve_at_load(task: Task, context: SolveContext, watcher: Watcher) -> TaskSo
     """Solve a task, searching its pressure if that is not given; else as `solve_on_grids`.
 
     The search returns the nearest contact that it met. It succeeds where that is within
-    `task.load_tolerance` of the load, and also, with a warning, where a contact area jumps there:
-    it is a whole number of grid points, several of which may enter contact together. A jump is a
-    difference of one grid point, or two pressures that the solver cannot tell apart, as they differ
-    by less than its tolerance. Otherwise the status is "load_not_reached".
+    `task.load_tolerance` of the load. A contact area is a whole number of grid points, several of
+    which may enter contact together. Therefore a search of an area also succeeds, with a warning,
+    within half a grid point of the load, and where the area jumps there. A jump is a difference of
+    one grid point, or two pressures that the solver cannot tell apart, as they differ by less than
+    its tolerance. Otherwise the status is "load_not_reached".
 
     Raises InputError for a mean gap that no pressure has, and an area below one grid point.
     """
