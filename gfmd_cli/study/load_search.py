@@ -2,9 +2,9 @@
 
 Contact area and displacement rise and the mean gap falls with the pressure. One root is sought: on
 coarser grids first, where a trial costs little, then on the grid itself. The results of the coarser
-grids predict the first pressure there. Each trial is a solve of its own. The contact area of a plate
-(n = 4) may also fall, as that under a paraboloid does: of several roots the search finds one, or it
-ends in a jump where another pressure has the area.
+grids predict the first pressure there. Each trial is a solve of its own. The contact area of a
+plate (n = 4) may also fall, as that under a paraboloid does: of several roots the search finds one,
+or it ends in a jump where another pressure has the area.
 
 With `[accuracy]` a contact area or mean gap is that in the continuum on the last grid, and that of
 the grid on the coarser ones, which give a first pressure, and the slope from which the error of
@@ -312,9 +312,9 @@ class _Search:
     """The search on one grid.
 
     Secant steps from the two nearest trials of different values, held within the enclosure of the
-    root; the middle of the enclosure where such a step leaves it or hardly shrinks it. Where several
-    trials have the same value, as areas between two steps have, a step is at least as long as the
-    interval of these trials.
+    root; the middle of the enclosure where such a step leaves it or hardly shrinks it. Where
+    several trials have the same value, as areas between two steps have, a step is at least as long
+    as the interval of these trials.
     """
 
     def __init__(self, task: Task, scene: Scene, first: float, slope: float) -> None:
