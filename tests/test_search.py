@@ -155,6 +155,29 @@ def test_a_slope_of_a_jump_moves_the_search_on():
     assert search.next() < math.exp(-1.0)
 
 
+def test_two_areas_of_the_same_points_give_no_slope():
+    """The next trial is near: the area between two steps is a plateau."""
+    search = a_search(1.0, "contact_area", slope=1.0, size=10_000)
+    for p, points in ((1.0, 500), (1.9, 998), (1.902, 998)):
+        search.add(Trial(64, p, points / 10_000, 0.0))
+    assert 1.902 < search.next() < 1.92
+
+
+@pytest.mark.parametrize(("points", "ends"), [(999, False), (1000, True), (1001, False)])
+def test_a_search_ends_with_the_number_of_points_nearest_to_the_load(points, ends):
+    search = a_search(1.0, "contact_area", slope=1.0, size=10_000, load=0.10004)
+    search.add(Trial(64, 1.0, points / 10_000, 0.0))
+    assert search.succeeded == ends
+    assert (search.next() is None) == ends
+
+
+def test_a_search_goes_on_where_the_area_falls():
+    search = a_search(1.0, "contact_area", slope=1.0)
+    while (p := search.next()) is not None:
+        search.add(Trial(64, p, 0.09 if p < 1.05 else max(0.05, 2e-3 * p), 0.0))
+    assert search.nearest.pressure == pytest.approx(50.0, rel=1e-5)
+
+
 @pytest.mark.parametrize("load", ["contact_area=0.03", "contact_area=0.5", "mean_gap=0.3"])
 @pytest.mark.parametrize("n", [1, 2])
 def test_results_at_a_searched_load_agree_with_those_of_finer_grids_within_their_errors(
@@ -259,7 +282,7 @@ def test_a_load_in_a_jump_of_the_area_is_warned_of(gfmd):
     for area, warned in ((0.5, 0), (0.7, 1)):
         done = gfmd(*words, "-o", f"{area}.h5", "--set", f"load={{contact_area={area}}}")
         assert done.exit_code == 0
-        warning = f"load.contact_area = {area} lies in a jump; the nearest value is"
+        warning = f"load.contact_area = {area} lies in a jump; the nearest value found is"
         (row,) = read_rows(Path(f"{area}.h5"))
         for text in (done.output, row["warnings"], gfmd("analyze", f"{area}.h5").output):
             assert text.count(warning) == warned
@@ -391,16 +414,16 @@ def check_search(power, first, steps, quantity):
     assert search.nearest.value == nearest
 
 
-def a_search(first, quantity, slope):
-    """A search of the value 0.1."""
+def a_search(first, quantity, slope, size=10**9, load=0.1):
+    """A search of a value on a grid of `size` points."""
     task = SimpleNamespace(
         quantity=quantity,
-        load=0.1,
+        load=load,
         load_tolerance=1e-5,
         points=64,
         solver=SimpleNamespace(tolerance=1e-6),
         elastomer=SimpleNamespace(stiffness=lambda q, length: 0.0 * q),  # all pressures resolved
     )
-    grid = SimpleNamespace(points=64, size=10**9, length=1.0)
+    grid = SimpleNamespace(points=64, size=size, length=1.0)
     scene = SimpleNamespace(grid=grid, delta_sigma=1.0, h_std=1.0)
     return _Search(task, scene, first, slope)

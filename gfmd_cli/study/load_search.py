@@ -1,8 +1,10 @@
 """The pressure at which a contact has the contact area, mean gap or displacement asked for.
 
-Contact area and displacement rise and the mean gap falls with the pressure, so that one root is
-sought: on coarser grids first, where a trial costs little, then on the grid itself. The results of
-the coarser grids predict the first pressure there. Each trial is a solve of its own.
+Contact area and displacement rise and the mean gap falls with the pressure. One root is sought: on
+coarser grids first, where a trial costs little, then on the grid itself. The results of the coarser
+grids predict the first pressure there. Each trial is a solve of its own. The contact area of a
+plate (n = 4) may also fall, as that under a paraboloid does: of several roots the search finds one,
+or it ends in a jump where another pressure has the area.
 
 With `[accuracy]` a contact area or mean gap is that in the continuum on the last grid, and that of
 the grid on the coarser ones, which give a first pressure, and the slope from which the error of
@@ -67,10 +69,11 @@ def solve_at_load(task: Task, context: SolveContext, watcher: Watcher) -> TaskSo
     """Solve a task, searching its pressure if that is not given; else as `solve_on_grids`.
 
     The search returns the nearest contact that it met. It succeeds where that is within
-    `task.load_tolerance` of the load, and also, with a warning, where a contact area jumps there:
-    it is a whole number of grid points, several of which may enter contact together. A jump is a
-    difference of one grid point, or two pressures that the solver cannot tell apart, as they differ
-    by less than its tolerance. Otherwise the status is "load_not_reached".
+    `task.load_tolerance` of the load. A contact area is a whole number of grid points, several of
+    which may enter contact together. Therefore a search of an area also succeeds, with a warning,
+    within half a grid point of the load, and where the area jumps there. A jump is a difference of
+    one grid point, or two pressures that the solver cannot tell apart, as they differ by less than
+    its tolerance. Otherwise the status is "load_not_reached".
 
     Raises InputError for a mean gap that no pressure has, and an area below one grid point.
     """
@@ -303,18 +306,21 @@ UNBOUNDED = tuple(_Point(x, x, Trial(0, 0.0, x, 0.0)) for x in (-inf, inf))  # n
 class _Search:
     """The search on one grid.
 
-    Secant steps from the two nearest trials, held within the enclosure of the root; the middle of
-    the enclosure where such a step leaves it or hardly shrinks it.
+    Secant steps from the two nearest trials of different values, held within the enclosure of the
+    root; the middle of the enclosure where such a step leaves it or hardly shrinks it. Where
+    several trials have the same value, as areas between two steps have, a step is at least as long
+    as the interval of these trials.
     """
 
     def __init__(self, task: Task, scene: Scene, first: float, slope: float) -> None:
         self.task, self.scene, self.first, self._slope = task, scene, first, slope
         is_area, is_last = task.quantity == "contact_area", scene.grid.points == task.points
         self.sign = -1 if task.quantity == "mean_gap" else 1
-        self.tolerance = task.load_tolerance if is_last else COARSE_DISTANCE
+        self.quantum = 1 / scene.grid.size if is_area else 0.0
+        tolerance = task.load_tolerance if is_last else COARSE_DISTANCE
+        self.tolerance = max(tolerance, 0.5 * self.quantum / task.load)  # no area is nearer
         apart = (1.0 if is_area else SMOOTH) * task.solver.tolerance
         self.resolution = max(apart, ROUNDING) if is_last else COARSE_DISTANCE
-        self.quantum = 1 / scene.grid.size if is_area else 0.0
         self.lowest = max(PRESSURE_RANGE[0], RESOLVED * _softest(task, scene) if is_area else 0.0)
         """Reduced pressure above which the load is sought."""
         self.points: list[_Point] = []
@@ -337,11 +343,16 @@ class _Search:
 
     @property
     def slope(self) -> float:
-        """Slope of ln(value) over ln(p), as far as known."""
-        if len(self.points) < 2 or abs(self.points[1].y) == inf:
-            return self._slope
-        (x, y, _), (x_2, y_2, _) = self.points[:2]
-        return max((y_2 - y) / (x_2 - x), MIN_SLOPE)
+        """Slope of ln(value) over ln(p), from the nearest trial and the next one of another value."""
+        nearest = self.points[0]
+        for other in self.points[1:]:
+            if isfinite(other.y - nearest.y) and not self._are_same(nearest, other):
+                return max((other.y - nearest.y) / (other.x - nearest.x), MIN_SLOPE)
+        return self._slope
+
+    def _are_same(self, one: _Point, other: _Point) -> bool:
+        """Whether two trials have the same value: for an area, the same number of points."""
+        return abs(one.trial.value - other.trial.value) <= 0.5 * self.quantum
 
     @property
     def root(self) -> float:
@@ -376,12 +387,16 @@ class _Search:
             return self.first
         if self.succeeded or self._exhausted or len(self.points) >= MAX_TRIALS:
             return None
-        x, (low, high) = self.root, self._enclosure()
-        if isfinite(high.x - low.x):
-            margin = 0.5 * self.resolution
-            if not low.x + margin < x < high.x - margin or len(self.points) % 5 == 4:
-                x = 0.5 * (low.x + high.x)
-        elif abs(x - self.points[0].x) < self.resolution:  # the slope is that of a jump
-            x = self.points[0].x - copysign(self.resolution, self.points[0].y)
+        start, (low, high) = self.points[0], self._enclosure()
+        is_enclosed = isfinite(high.x - low.x)
+        if not is_enclosed:
+            start = low if start.y < 0 else high
+        plateau = max(abs(at.x - start.x) for at in self.points if self._are_same(at, start))
+        step = max(abs(start.y) / self.slope, plateau, self.resolution)  # of a jump it is zero
+        x = start.x - copysign(min(step, MAX_STEP), start.y)
+        margin = 0.5 * self.resolution
+        is_inside = low.x + margin < x < high.x - margin
+        if is_enclosed and (not is_inside or len(self.points) % 5 == 4):
+            x = 0.5 * (low.x + high.x)
         p = exp(x)
         return p if self.lowest < p / self.scene.delta_sigma < PRESSURE_RANGE[1] else None

@@ -194,7 +194,7 @@ def _load_in_jump(task: Task, status: Status, results: Mapping[str, Any]) -> Ite
     if task.quantity == "contact_area" and status in (Status.CONVERGED, Status.ROUNDING):
         value = loaded_value(task.quantity, results)
         if not abs(value - task.load) <= task.load_tolerance * task.load:
-            nearest = f"the nearest value is {value:g}"
+            nearest = f"the nearest value found is {value:g}"
             yield f"load.contact_area = {task.load:g} lies in a jump; {nearest}"
 
 

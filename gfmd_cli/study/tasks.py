@@ -128,7 +128,11 @@ class Task:
     @property
     def seconds(self) -> float:
         """Time that the solve is expected to take on one thread, within a factor of about three."""
-        solves = forecast.SOLVES_PER_SEARCH if models.LOADS[self.quantity].searched else 1.0
+        solves = 1.0
+        if models.LOADS[self.quantity].searched:
+            solves = forecast.SOLVES_PER_SEARCH
+            if self.accuracy is not None:
+                solves = forecast.SOLVES_PER_ACCURATE_SEARCH
         p_star = self.load if self.quantity == "p_star" else forecast.P_STAR
         pairs = forecast.pairs(self.elastomer.exponent, p_star, self.solver.tolerance)
         return 0.01 + solves * forecast.SECONDS_PER_PAIR * self.size * pairs
