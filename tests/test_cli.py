@@ -304,6 +304,15 @@ def test_sort_solves_every_stiffness_that_is_constant(gfmd, elastomer):
     assert result.exit_code == 0, result.output
 
 
+@pytest.mark.parametrize("key", [", E_star=1.0", ", E_star=2.0", ""])
+def test_pressures_in_pa_are_shown_where_the_stiffness_is_given(gfmd, key):
+    keys = ("surface.h_std=1e-6", f"elastomer={{kind='half-space'{key}}}", "grid.points=64")
+    done = gfmd("run", "spec.toml", *(word for key in keys for word in ("--set", key)))
+    assert done.exit_code == 0, done.output
+    for output in (done.output, gfmd("analyze", "small.h5").output):
+        assert ("p [Pa]" in output) == bool(key)
+
+
 def test_tables_of_one_name_are_told_apart(gfmd):
     """Three seeds of two materials: the means are those of each."""
     for folder, n in {"a": 1, "b": 2}.items():
