@@ -94,7 +94,7 @@ class DistributedGrid(Grid):
         """A grid of fewer points on the same cell; not distributed if it is too small."""
         return create_grid(Grid(**_fields(self)).coarser(shape), self.ranks)
 
-    def pass_on(self, values: Any, m_y: Any, kept: int, source: Grid, target: Grid) -> Any:
+    def redistribute(self, values: Any, m_y: Any, kept: int, source: Grid, target: Grid) -> Any:
         """The values at some wavenumbers, from the processes of one grid to those of another."""
         rows, rank, count = values[m_y], self.ranks.rank, self.ranks.size
         source_spans = _spans(source, [(0, kept), *[(0, 0)] * (count - 1)], kept)

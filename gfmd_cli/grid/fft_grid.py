@@ -324,10 +324,10 @@ class Grid:
     def cut(self, symbol: Field, target: "Grid") -> Field:
         """The values of a symbol at the wavenumbers of a coarser grid."""
         m_y = np.fft.ifftshift(np.arange(target.points_y) - target.points_y // 2)
-        kept = self.pass_on(self.as_rows(symbol), m_y, target.points // 2 + 1, self, target)
+        kept = self.redistribute(self.as_rows(symbol), m_y, target.points // 2 + 1, self, target)
         return kept.reshape(target.spectral_shape)
 
-    def pass_on(self, values: Any, m_y: Any, kept: int, source: "Grid", target: "Grid") -> Any:
+    def redistribute(self, values: Any, m_y: Any, kept: int, source: "Grid", target: "Grid") -> Any:
         """Values at some wavenumbers, from the processes of one grid to those of another.
 
         These wavenumbers are `m_y` along y and the first `kept` along x. `self` is one of the two
@@ -392,7 +392,7 @@ class Grid:
         if halved_x and self.ends[1]:
             modes[:, -1] *= 0.5
         grid = target if self.whole else self
-        modes = grid.pass_on(modes, m_y, m_x[-1] + 1, self, target)
+        modes = grid.redistribute(modes, m_y, m_x[-1] + 1, self, target)
         target.work[...] = 0.0
         target.as_rows(target.work)[m_y, : modes.shape[1]] = modes
         return target.field_of_work(1.0 / self.size)
