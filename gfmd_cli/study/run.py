@@ -128,9 +128,14 @@ def run_study(
             solved = _solve_all(pending, study.parts, jobs, context)
         finally:
             with shared_errors(ranks):
-                # a stopped shard ends soon: its records stand, others collect them
-                if is_root(ranks) and (options.shard[1] == 1 or not stop.is_set()):
-                    context.warn(*study.collect(spec, tasks, text))
+                # a stopped shard ends soon: its records are kept, others collect them
+                is_shard = options.shard[1] > 1
+                if is_root(ranks) and not (is_shard and stop.is_set()):
+                    try:
+                        context.warn(*study.collect(spec, tasks, text))
+                    except Interrupted:  # another process collects for too long
+                        if not is_shard:
+                            raise
         again = "run again without --overwrite" if options.overwrite else "run again"
         _check_ended(solved, len(pending), stop, again)
         if not any(status.is_failure for status in solved):
