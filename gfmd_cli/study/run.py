@@ -139,7 +139,7 @@ def run_study(
         again = "run again without --overwrite" if options.overwrite else "run again"
         _check_ended(solved, len(pending), stop, again)
         if not any(status.is_failure for status in solved):
-            _check_output(pending, on_root(ranks, study.outcomes))
+            _check_stored([*shard, *pending], on_root(ranks, study.outcomes), study.path)
     return counts + solved
 
 
@@ -182,13 +182,21 @@ def _check_ended(solved: Counter[Status], pending: int, stop: Event, again: str)
         raise Interrupted(f"{left} left whose workers were killed; {again} to continue")
 
 
-def _check_output(solved: list[Task], outcomes: dict[str, Outcome]) -> None:
-    """Raise Interrupted where another run of the same tasks, with other output, came first."""
-    lacking = [task for task in without_result(solved, outcomes) if task.id in outcomes]
+def _check_stored(solved: list[Task], outcomes: dict[str, Outcome], path: Path) -> None:
+    """Raise Interrupted where results are missing: another process has deleted the study.
+
+    Also where another run of the same tasks, with other output, came first.
+    """
+    lacking = without_result(solved, outcomes)
+    if lost := {task.id for task in lacking} - set(outcomes):
+        raise Interrupted(
+            f"{path}: deleted or replaced during the run, with {count(len(lost), 'result')}; run "
+            "again to solve what is missing"
+        )
     if lacking:
         raise Interrupted(
-            f"another run solved {count(len(lacking), 'task')} at the same time, with other "
-            "output; run again to add the output of this one"
+            f"another run solved {count(len({task.id for task in lacking}), 'task')} at the same "
+            "time, with other output; run again to add the output of this one"
         )
 
 
