@@ -192,7 +192,7 @@ def test_full_contact_on_a_coarse_grid_leaves_a_bar_where_finer_grids_have_gaps(
 
 @pytest.mark.parametrize("ratio", [4, 17])
 def test_full_contact_on_oblong_pixels_has_narrow_bars_that_hold(tmp_path, ratio):
-    """A map stretched along x; the pressure is that at which the contact on its own points fills."""
+    """A map stretched along x, at the pressure at which its own points are just all in contact."""
     points = 24
     heights = 1e-3 * build_scene(SelfAffine(cutoff=0.1), HalfSpace(), points).height
     np.save(tmp_path / "map.npy", heights)

@@ -155,8 +155,9 @@ def full_contact_errors(
 
     Around a minimum of a Gaussian stress the curvature along an axis is on average p <q_i^2>, so
     that between points of spacings d_i the stress is lower by up to m = p sum <q_i^2> d_i^2 / 8.
-    Points with sigma < m may lose contact. The errors are their fraction, their mean deficit m - sigma over the
-    stiffness of the shortest wave, and the change of the variance, as the change of sigma_p.
+    Points with sigma < m may lose contact. The errors are their fraction, their mean deficit
+    m - sigma over the stiffness of the shortest wave, and the change of the variance, as the change
+    of sigma_p.
 
     Parameters
     ----------
