@@ -271,6 +271,48 @@ def test_a_file_that_is_not_there_is_refused_with_its_key(gfmd, surface, elastom
     assert result.output == f"gfmd: spec.toml: {key}: {place}: No such file or directory\n"
 
 
+@pytest.mark.parametrize("command", [("run",), ("run", "--dry-run")])
+@pytest.mark.parametrize(
+    ("elastomer", "label"),
+    [
+        ("kind='power', n=[0, 1e-3]", "power n=0.001"),
+        ("kind='layer', thickness=1e-3, base='sliding'", "layer thickness=1 mm base=sliding"),
+        ("kind='slab', thickness=10.0", "slab thickness=10"),
+        ("kind='table', path='rising.txt'", "table path=rising.txt"),
+    ],
+)
+def test_sort_is_refused_where_the_stiffness_depends_on_the_wavenumber(
+    gfmd, command, elastomer, label
+):
+    Path("rising.txt").write_text("1 1\n2 1\n4 1.001\n")
+    result = gfmd(
+        *command, "spec.toml", "--set", "solver.kind=sort", "--set", f"elastomer={{{elastomer}}}"
+    )
+    assert result.exit_code == 2
+    assert result.output == (
+        f'gfmd: spec.toml: solver.kind: "sort" given, but the stiffness of {label} depends on the '
+        'wavenumber; "sort" is for n = 0, "auto" for every elastomer\n'
+    )
+    assert {path.name for path in Path().iterdir()} == {"spec.toml", "rising.txt"}
+
+
+@pytest.mark.parametrize("elastomer", ["kind='power', n=0", "kind='table', path='flat.txt'"])
+def test_sort_solves_every_stiffness_that_is_constant(gfmd, elastomer):
+    Path("flat.txt").write_text("1 3e10\n5 3e10\n7 3e10\n")
+    words = ("--set", "solver.kind=sort", "--set", f"elastomer={{{elastomer}}}")
+    result = gfmd("run", "spec.toml", *words)
+    assert result.exit_code == 0, result.output
+
+
+@pytest.mark.parametrize("key", [", E_star=1.0", ", E_star=2.0", ""])
+def test_pressures_in_pa_are_shown_where_the_stiffness_is_given(gfmd, key):
+    keys = ("surface.h_std=1e-6", f"elastomer={{kind='half-space'{key}}}", "grid.points=64")
+    done = gfmd("run", "spec.toml", *(word for key in keys for word in ("--set", key)))
+    assert done.exit_code == 0, done.output
+    for output in (done.output, gfmd("analyze", "small.h5").output):
+        assert ("p [Pa]" in output) == bool(key)
+
+
 def test_tables_of_one_name_are_told_apart(gfmd):
     """Three seeds of two materials: the means are those of each."""
     for folder, n in {"a": 1, "b": 2}.items():

@@ -191,6 +191,28 @@ def test_full_contact_on_a_coarse_grid_leaves_a_bar_where_finer_grids_have_gaps(
         assert above[f"{name}_continuum_error"] == pytest.approx(0, abs=1e-4)
 
 
+@pytest.mark.parametrize("ratio", [4, 17])
+def test_full_contact_on_oblong_pixels_has_narrow_bars_that_hold(tmp_path, ratio):
+    """A map stretched along x, at the pressure at which its own points are just all in contact."""
+    points = 24
+    heights = 1e-3 * build_scene(SelfAffine(cutoff=0.1), HalfSpace(), points).height
+    np.save(tmp_path / "map.npy", heights)
+    q = 2 * pi * np.fft.fftfreq(points, 1 / points)
+    stress = np.fft.ifft2(np.hypot(q, ratio * q[:, None]) * np.fft.fft2(heights)).real
+    surface = {"kind": "file", "path": str(tmp_path / "map.npy"), "interpolation": "fourier"}
+    spec = {
+        "surface": surface | {"length": 1.0, "length_y": 1 / ratio},
+        "elastomer": {"kind": "half-space"},
+        "grid": {"points": [points, 4 * points]},
+        "load": {"p_star": float(-1.002 * stress.min() / stress.std())},
+        "accuracy": {"mean_gap": 0.5},
+    }
+    coarse, fine = rows(run(spec, tmp_path / "full.h5"))
+    assert coarse["a_r"] == 1 > fine["a_r"]
+    for name in QUANTITIES:
+        assert abs(coarse[name] - fine[name]) <= coarse[f"{name}_error"] < 0.1
+
+
 def test_errors_do_not_average_out_over_the_copies_of_a_mirrored_map(tmp_path):
     """A quarter of the edge points of the cell are independent: the bar is at least twice as wide
     as their random error would be."""

@@ -329,6 +329,25 @@ def test_elastomers_out_of_range_are_refused(keys):
         TypeAdapter(Elastomer).validate_python(keys)
 
 
+@pytest.mark.parametrize(
+    ("keys", "stiffness"),
+    [
+        ({"kind": "power", "n": 1}, "k_n"),
+        ({"kind": "half-space"}, "E_star"),
+        ({"kind": "membrane"}, "tension"),
+        ({"kind": "plate", "thickness": 1e-6}, "E_star"),
+        ({"kind": "slab", "thickness": 0.1}, "E_star"),
+        ({"kind": "layer", "thickness": 1e-6, "base": "sliding"}, "E_star"),
+        ({"kind": "table", "path": "k.txt"}, None),
+    ],
+)
+def test_a_stiffness_given_as_1_is_given(keys, stiffness):
+    read = TypeAdapter(Elastomer).validate_python
+    assert read(keys).stiffness_given == (stiffness is None)
+    if stiffness is not None:
+        assert read(keys | {stiffness: 1.0}).stiffness_given
+
+
 def layered_stiffness(q, thickness, poisson, base):
     """Pressure over displacement of a layer, E = 1, by integration of the equations of elasticity.
 

@@ -12,6 +12,7 @@ from gfmd_cli.analysis.curve_styles import MAX_LABEL, colours, curve_styles, dis
 from gfmd_cli.analysis.figures import PANELS, draw_all, study_figures, with_styles
 from gfmd_cli.analysis.plotting import ColumnFigure, styled
 from gfmd_cli.errors import InputError, SpaceError
+from gfmd_cli.report.interactive import interactive
 from gfmd_cli.spec.parse import read_spec
 from gfmd_cli.status import Status
 from gfmd_cli.study.run import RunOptions, run_study
@@ -362,6 +363,19 @@ def test_colours_go_along_a_long_sweep_of_one_parameter(study):
     items = with_styles(hurst_sweep(study, values))
     assert [item.style.label for item in items] == [f"hurst={h:.12g}" for h in sorted(values)]
     assert [item.style.colour for item in items] == colours(17)
+
+
+@pytest.mark.parametrize(("count", "heading"), [(8, ""), (9, "n = 1"), (20, "n = 1"), (21, "")])
+def test_a_figure_of_a_long_sweep_names_its_elastomer_above_the_legend(study, count, heading):
+    comparison = hurst_sweep(study, np.linspace(0.1, 0.9, count))
+    with styled():
+        plot = study_figures(comparison, with_styles(comparison))["contact_area"]
+        plot.svg()
+    (legend,) = plot.figure.legends
+    texts = [legend.get_title().get_text(), *(text.get_text() for text in legend.get_texts())]
+    assert texts[0] == heading
+    assert interactive(plot)["heading"] == heading
+    assert any("n = 1" in text for text in texts)
 
 
 def test_curves_that_share_a_style_say_what_differs(study):

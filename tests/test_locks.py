@@ -7,6 +7,7 @@ import socket
 import subprocess
 import sys
 import time
+from contextlib import ExitStack
 from itertools import count
 from pathlib import Path
 from threading import Event, Timer
@@ -19,6 +20,7 @@ from gfmd_cli.files import locks
 from gfmd_cli.files.locks import Waits, locked
 from gfmd_cli.grid import plans
 from gfmd_cli.study.reading import read_rows
+from gfmd_cli.study.store import Study
 
 HOLD = """
 import sys
@@ -130,6 +132,36 @@ def test_a_run_with_a_time_limit_does_not_wait_longer_for_another(
         done = invoke("run", "spec.toml", "-j", "1", "-q", *limit)
     assert done.exit_code == 75
     assert f"{name} is in use by" in done.output
+
+
+@pytest.mark.usefixtures("springs")
+@pytest.mark.parametrize(
+    ("collected", "words", "status"),
+    [(True, (), 0), (False, ("--shard", "0/2"), 0), (False, (), 75)],
+)
+def test_a_run_that_is_stopped_as_another_one_collects_ends_by_what_it_has_left_to_do(
+    tmp_path, monkeypatch, invoke, collected, words, status
+):
+    """After its own collection nothing is left, and a shard leaves its records to others."""
+    monkeypatch.setattr(locks, "LONG_SECONDS", 0.05)
+    monkeypatch.chdir(tmp_path)
+    collect = Study.collect
+    with ExitStack() as other:
+
+        def stopped(study, *rest):
+            damaged = collect(study, *rest) if collected else []
+            other.enter_context(locked(study.parts / "collecting"))
+            signal.raise_signal(signal.SIGTERM)
+            return damaged if collected else collect(study, *rest)
+
+        monkeypatch.setattr(Study, "collect", stopped)
+        done = invoke("run", "spec.toml", "-o", "springs.h5", "-j", "1", *words)
+    assert done.exit_code == status, done.output
+    monkeypatch.setattr(Study, "collect", collect)
+    again = invoke("run", "spec.toml", "-o", "springs.h5", "-j", "1")
+    assert again.exit_code == 0
+    assert [row["status"] for row in read_rows(tmp_path / "springs.h5")] == ["converged"] * 2
+    assert not (tmp_path / "springs.parts").exists()
 
 
 def test_a_wait_for_another_worker_of_the_run_is_not_announced(lock, holder, monkeypatch, caplog):

@@ -243,6 +243,8 @@ def test_surface_summarises_a_line(gfmd, tmp_path):
     )
     (record,) = json.loads(gfmd("surface", "wave.toml", "--json"))
     assert (record["Pq"], record["Pt"], record["Pku"]) == pytest.approx((0.5**0.5, 2, 1.5))
+    assert record["q"] == pytest.approx([2 * np.pi])
+    assert record["spectrum"] == pytest.approx([0.25])  # L |h(q)|^2
     text = gfmd("surface", "wave.toml")  # in reduced units
     assert "Pq 0.70711, " in text
     assert not re.search(r"\d m\b|1/m|\[m\]", text)

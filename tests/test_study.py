@@ -712,6 +712,22 @@ def test_unfinished_work_that_is_deleted_ends_the_run_and_is_not_made_anew(run, 
     assert not list(tmp_path.glob("study*"))
 
 
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_a_study_that_is_deleted_during_a_run_is_said_to_lack_its_results(run, tmp_path, jobs):
+    path, *_ = run(overrides=("elastomer.n=0",))
+    stored = len(read_rows(path))
+
+    def delete(event):
+        if event.event == "end":
+            path.unlink(missing_ok=True)
+
+    with pytest.raises(Interrupted, match=rf"study\.h5: deleted .* with {stored} results"):
+        run(report=delete, jobs=jobs)
+    path, _, outcome = run()
+    assert set(outcome) == {"converged"}
+    assert {row["status"] for row in read_rows(path)} == {"converged"}
+
+
 @pytest.fixture
 def run_on_map(tmp_path):
     """Runs a spec of three loads on a map; calls `change` with its path as an event is reported."""

@@ -641,6 +641,75 @@ def test_the_distances_of_a_nanofocus_file_are_nanometres(tmp_path):
     assert read.heights == pytest.approx(1e-6 * (2 + levels / 65535), abs=1e-10)
 
 
+@pytest.mark.parametrize(
+    "comment", [b"", b"hello", b"Created by TrueMap v6\r\n", b"Created by another program 1.2\r\n"]
+)
+def test_a_truemap_file_has_a_comment_of_any_length(tmp_path, heights, comment):
+    pytest.importorskip("SurfaceTopography")
+    in_mm = 1e-3 * heights[:12].astype("<f4")
+    magic = b"Binary TrueMap Data File v2.0\r\n\0"
+    header = struct.pack("<2I4f", 16, 12, 1.6, 2.4, 0.0, 0.0)
+    (tmp_path / "h.tmd").write_bytes(magic + comment + b"\0" + header + in_mm.tobytes())
+    read = read_topography(tmp_path / "h.tmd")
+    assert read.spacing == pytest.approx((2e-4, 1e-4))
+    assert read.heights == pytest.approx(1e-3 * in_mm)
+
+
+def test_a_truemap_file_of_the_first_version_is_refused_as_such(tmp_path):
+    pytest.importorskip("SurfaceTopography")
+    (tmp_path / "h.tmd").write_bytes(b"Binary TrueMap Data File\r\n\0" + bytes(900))
+    with pytest.raises(InputError, match=r"TrueMap before version 2\.0"):
+        read_topography(tmp_path / "h.tmd")
+
+
+def mountains_map(unit, levels):
+    """A file of MountainsMap: points 0.1 and 0.2 apart, levels of 0.001, all in a unit."""
+    rows, columns = levels.shape
+    header = bytearray(512)
+    header[:12] = b"DIGITAL SURF"
+    struct.pack_into("<Hii", header, 98, 32, int(levels.min()), int(levels.max()))
+    struct.pack_into("<iiI3f", header, 108, columns, rows, levels.size, 0.1, 0.2, 1e-3)
+    for place in range(180, 276, 16):
+        header[place : place + len(unit)] = unit
+    return bytes(header) + levels.astype("<i4").tobytes()
+
+
+@pytest.mark.parametrize("unit", [b"um", b"\xb5m", b"\xe6m", b"\xc2\xb5m", b"\xce\xbcm", b"\xecm"])
+def test_micrometres_of_mountainsmap_are_read_in_every_encoding(tmp_path, unit):
+    pytest.importorskip("SurfaceTopography")
+    levels = np.arange(12 * 16).reshape(12, 16) ** 2
+    (tmp_path / "h.sur").write_bytes(mountains_map(unit, levels))
+    read = read_topography(tmp_path / "h.sur")
+    assert read.spacing == pytest.approx((2e-7, 1e-7))
+    assert read.heights == pytest.approx(1e-9 * levels)
+
+
+def test_a_unit_that_is_not_known_is_the_reason_of_the_refusal(tmp_path):
+    pytest.importorskip("SurfaceTopography")
+    (tmp_path / "h.sur").write_bytes(mountains_map(b"inch", np.eye(16, dtype=int)))
+    with pytest.raises(
+        InputError, match=r"Unknown unit 'inch'.*save it with lengths in m, um or nm"
+    ):
+        read_topography(tmp_path / "h.sur")
+
+
+def test_an_x3p_file_with_its_heights_in_its_index_is_refused_as_such(tmp_path):
+    pytest.importorskip("SurfaceTopography")
+    lateral = "<AxisType>I</AxisType><DataType>D</DataType><Increment>1e-7</Increment>"
+    axes = f"<CX>{lateral}</CX><CY>{lateral}</CY><CZ><AxisType>A</AxisType></CZ>"
+    record = "<Revision>ISO5436 - 2000</Revision><FeatureType>SUR</FeatureType>"
+    size = "<SizeX>16</SizeX><SizeY>16</SizeY><SizeZ>1</SizeZ>"
+    heights = "<DataList>" + 256 * "<Datum>0;0;1e-7</Datum>" + "</DataList>"
+    with ZipFile(tmp_path / "h.x3p", "w") as archive:
+        archive.writestr(
+            "main.xml",
+            f"<ISO5436_2><Record1>{record}<Axes>{axes}</Axes></Record1><Record3>"
+            f"<MatrixDimension>{size}</MatrixDimension>{heights}</Record3></ISO5436_2>",
+        )
+    with pytest.raises(InputError, match=r"heights in main\.xml, which are not read"):
+        read_topography(tmp_path / "h.x3p")
+
+
 def test_an_archive_of_arrays_is_refused(tmp_path, heights):
     pytest.importorskip("SurfaceTopography")
     np.savez(tmp_path / "h.npz", heights)

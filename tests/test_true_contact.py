@@ -12,7 +12,7 @@ from gfmd_cli.analysis.compare import einstein_prediction
 from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.physics.contact import Contact
 from gfmd_cli.physics.elastomers import HalfSpace, Power
-from gfmd_cli.physics.indenters import LineParabola, Parabola, Ridge
+from gfmd_cli.physics.indenters import LineParabola, Parabola, Punch, Ridge
 from gfmd_cli.physics.scenes import build_scene
 from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.physics.true_contact import Bearing, bearing, contact_area, contact_stress
@@ -138,6 +138,13 @@ def test_a_deviation_that_is_delta_sigma_gives_back_persson_theory():
 def test_a_bearing_without_a_known_share_has_no_deviation():
     scene = build_scene(Ridge(width=0.05), HalfSpace(), 64)
     assert np.isnan(bearing(scene.contact(0.01)).delta_sigma_c(0.01))
+
+
+@pytest.mark.parametrize("points", [32, 64, 250, 512])
+def test_the_face_of_a_punch_on_springs_has_no_deviation(points):
+    """s = k_0 (h - <h>) is the same at all its points, up to rounding."""
+    scene = build_scene(Punch(radius=0.2), Power(n=0), points)
+    assert np.isnan(bearing(scene.contact(0.1)).delta_sigma_c(0.1))
 
 
 def test_the_area_obeys_its_own_equation():

@@ -38,6 +38,14 @@ def test_stripes_and_lines_are_infinitely_anisotropic():
     assert texture(Grid(32, 1), np.sin(np.arange(32.0))).anisotropy == np.inf
 
 
+@pytest.mark.parametrize(
+    ("length_y", "along_x"), [(1.0, 16 / 25), (0.5, 16 / 52), (4.0, 256 / 265)]
+)
+def test_the_share_of_the_slopes_along_x_is_that_of_the_wave_vector(length_y, along_x):
+    grid = Grid(32, length_y=length_y, points_y=32)
+    assert texture(grid, waves(grid, (3, 4, 1.0))).along_x == pytest.approx(along_x, rel=1e-12)
+
+
 @pytest.mark.parametrize("cutoff", [1 / 16, 1 / 8])
 def test_a_random_surface_is_isotropic_up_to_two_points_per_wave(cutoff):
     surface = SelfAffine(cutoff=cutoff)

@@ -23,7 +23,7 @@ MAX_LABEL = 46  # characters
 TAILS = (20, 30, 8)  # characters after the part that is left out of a long label, tried in turn
 OF_ELASTOMER = tuple(each for each in PARAMETERS if each.table == "elastomer")
 MAX_STYLES = 8  # more markers of one colour cannot be told apart
-MAX_SWEEP = 20  # values of one parameter, a colour each; a choice: the legend has seven rows
+MAX_SWEEP = 20  # values of one parameter, a colour each; a choice: the legend has eight rows
 Colour = tuple[float, float, float]
 """Red, green, blue from 0 to 1."""
 
@@ -35,6 +35,8 @@ class CurveStyle:
     colour: Colour
     marker: str
     label: str
+    heading: str = ""
+    """What the curves of a figure share and their labels leave out; the heading of its legend."""
 
 
 @dataclass(frozen=True)
@@ -112,7 +114,9 @@ def curve_styles(curves: list[Curve]) -> list[CurveStyle]:
     pairs = [(c.elastomer, _joined(map(_words(c).get, keys[c.elastomer]), " ")) for c in curves]
     count = len(set(pairs))
     is_sweep = len(alike) == 1 and len(keys[curves[0].elastomer]) == 1
+    heading = ""
     if is_sweep and MAX_STYLES < count <= MAX_SWEEP:
+        (heading,) = distinct_labels([*names.values()])
         names = dict.fromkeys(names, "")  # labels of one parameter fit into several columns
     elif count > MAX_STYLES:
         pairs = [(curve.elastomer, _merged(curve, alike[curve.elastomer])) for curve in curves]
@@ -122,7 +126,7 @@ def curve_styles(curves: list[Curve]) -> list[CurveStyle]:
     if len(names) > 1:
         palette = dict(zip(names, colours(len(names)), strict=True))
         styles = {pair: replace(s, colour=palette[pair[0]]) for pair, s in styles.items()}
-    return [styles[pair] for pair in pairs]
+    return [replace(styles[pair], heading=literal(heading)) for pair in pairs]
 
 
 def _elastomer_names(curves: list[Curve]) -> dict[str, str]:

@@ -101,6 +101,8 @@ class LegendFigure:
         self.width, self.height = width, height  # inches, without the legend
         self.figure = Figure(figsize=(width, height), layout="constrained")
         self.legend: dict[str, Any] = {}
+        self.heading = ""
+        """Heading of the legend."""
 
     def line_on(self, axes: Any, label: str, x: Field, y: Field, **style: Any) -> None:
         """Draw a line where y > 0 on some axes, with an entry of the legend."""
@@ -119,10 +121,14 @@ class LegendFigure:
         if not entries:
             return
         columns, rows = _legend_shape(list(entries), self.width / WIDTH)
+        rows += bool(self.heading)
         self.figure.set_size_inches(self.width, self.height + ROW * rows)
         self.figure.legend(
             entries.values(),
             entries.keys(),
+            title=self.heading or None,
+            title_fontsize=SMALL,
+            alignment="left",
             loc="outside upper center",
             ncols=columns,
             borderpad=0,
@@ -210,6 +216,7 @@ class ColumnFigure(LegendFigure):
                 texts = list(compress(details, mask))
                 self.layers.append(replace(layer, error=error[:, mask], details=texts))
         self.legend[style.label] = Line2D([], [], marker=style.marker, **options)
+        self.heading = style.heading
         for missed, marker in SHORTFALL_MARKERS.items():
             if missed in shortfalls:
                 self.legend[missed] = Line2D([], [], **options | {"marker": marker, "color": "0.4"})

@@ -69,7 +69,8 @@ class SurfaceSummary:
             "warnings": self.surface.warnings(),
             **fit_record(self.spectrum.fit),
         }
-        return {key: plain(value) for key, value in record.items()}
+        curves = {"q": self.spectrum.q.tolist(), "spectrum": self.spectrum.density.tolist()}
+        return {key: plain(value) for key, value in record.items()} | curves
 
 
 def summarise(surface: RigidSurface, points: int = 0) -> SurfaceSummary:

@@ -12,8 +12,6 @@ from gfmd_cli.units import LARGEST_RMS_HEIGHT, scaled
 
 SPACE = "\u00a0"
 """No-break space."""
-STIFFNESSES = ("E_star", "k_n", "tension")
-"""Columns of the stiffness of an elastomer, 1 by default. Tables of k(q) have none of them."""
 RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
@@ -26,12 +24,12 @@ def in_si(row: Mapping[str, Any], unit: str) -> bool:
     """Whether values of a contact in this unit mean something, and not reduced units alone.
 
     They do where the load was given in Pa, or where the surface has heights of a real one. In the
-    second case, a unit with Pa also needs a given stiffness of the elastomer, other than 1.
+    second case, a unit with Pa also needs an elastomer whose stiffness the spec gives.
     """
     if row["load"] == "pressure":
         return True
-    has_stiffness = all(row.get(key) != 1.0 for key in STIFFNESSES)
-    return bool(row["h_std"] <= LARGEST_RMS_HEIGHT and (has_stiffness or "Pa" not in unit))
+    is_given = row["stiffness_given"] == 1
+    return bool(row["h_std"] <= LARGEST_RMS_HEIGHT and (is_given or "Pa" not in unit))
 
 
 def shown(columns: Sequence[TableColumn], rows: Sequence[Record]) -> list[TableColumn]:

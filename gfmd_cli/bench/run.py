@@ -118,7 +118,7 @@ def run_bench(spec: Spec, report: Report) -> list[Trace]:
     Raises InputError where the spec does not fit the machine or names no grid, or no solver suits
     an elastomer.
     """
-    tasks = plan(spec)
+    tasks = plan(spec, suited=False)  # `solvers_to_compare` leaves out those that do not suit
     if LOADS[spec.load.quantity].searched:
         raise InputError(
             f"load.{spec.load.quantity}: gfmd bench needs load.p_star or load.pressure"

@@ -53,12 +53,13 @@ def init(spec: Path, scan: Path | None, overrides: tuple[str, ...]) -> None:
 def surface(
     paths: tuple[Path, ...], as_json: bool, figure: Path | None, overrides: tuple[str, ...]
 ) -> None:
-    """Print size, roughness parameters and spectrum of surfaces.
+    """Print size, roughness and fitted spectrum of surfaces.
 
     The parameters are those of ISO 25178 (Sq, Sa, Ssk, Sku, Sz, Sdq, Sdr, Sal), for a line profile
     those of ISO 21920. For one surface, a self-affine spectrum is fitted and also printed as a
-    table [surface] for a run spec. For several surfaces, the results are one table. A scan is read
-    and prepared as by `gfmd init --from`. Examples:
+    table [surface] for a run spec. For several surfaces, the results are one table. The
+    power spectrum C(q) is part of --json and --figure. A scan is read and prepared as by `gfmd init
+    --from`. Examples:
 
     \b
         gfmd surface scan.di --figure scan.png

@@ -5,6 +5,7 @@ import struct
 import warnings
 from codecs import BOM_UTF8
 from dataclasses import replace
+from io import BytesIO
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -41,8 +42,17 @@ REFUSED = {
     b"Zygo XYZ Data File": f"a file of Zygo {IN_TEXT}",
     b"Zygo ASCII Data File": f"a file of Zygo {IN_TEXT}",
     b"DSCOMPRESSED": "a compressed file of MountainsMap; save it without compression",
+    b"Binary TrueMap Data File\r": "a file of TrueMap before version 2.0; save it in version 2.0",
 }
 """Files by their first bytes; the readers of tables would take heights without their scales."""
+REASONS = {
+    "x3p: KeyError: 'DataLink'": "an X3P file with its heights in main.xml, which are not read; "
+    "save them in a binary part (DataLink)",
+}
+"""What is not read, by the errors of readers that do not say it."""
+TRUEMAP, TRUEMAP_MAGIC_BYTES, TRUEMAP_COMMENT_BYTES = b"Binary TrueMap Data File v2.0", 32, 24
+MOUNTAINSMAP, MICROMETRES = b"DIGITAL SURF", re.compile(rb"(?:\xc2\xb5|\xce\xbc|\xec)m\0")
+"""Micrometres in the header of MountainsMap: in UTF-8, and with the Greek letter of Windows."""
 NANOFOCUS_DISTANCES = 1376  # byte of a file of NanoFocus, where its two distances of points begin
 SMALL_FILE = 2**14  # bytes, which the readers of tables parse in a second
 SORTED_ROWS = 20  # heights of so many rows are not sorted by chance; a choice
@@ -97,6 +107,7 @@ def _open_scan(path: Path, file: BinaryIO, readers: list[Any]) -> Any:
     Raises InputError where none does, with the reason of the reader that recognises the format.
     """
     start, is_small = text_tables.part(file, 0, SIGNATURE_BYTES), path.stat().st_size <= SMALL_FILE
+    file = _in_known_form(file, start)
     tables = text_tables.table_formats(file)
     reasons = []
     for reader in readers:
@@ -114,7 +125,10 @@ def _open_scan(path: Path, file: BinaryIO, readers: list[Any]) -> Any:
             is_likely = answer == "YES" or reader.format() in tables
             if is_likely or path.suffix[1:].lower() in reader.file_extensions():
                 row = text_tables.shorter_or_longer_row(file) if reader.format() == "asc" else ""
-                reasons.append(f"{reader.format()}: {row or first_line(error)}")
+                reason = f"{reader.format()}: {row or first_line(error)}"
+                if reason in REASONS:
+                    raise InputError(f"{REASONS[reason]}. {REMEDY}") from error
+                reasons.append(reason)
     is_compressed = path.suffix.lower() in COMPRESSED
     if reasons and not is_compressed:
         raise InputError(
@@ -131,6 +145,22 @@ def _open_scan(path: Path, file: BinaryIO, readers: list[Any]) -> Any:
     raise InputError(
         f"{what}; .npy, HDF5 and the formats of SurfaceTopography can be read. {REMEDY}"
     )
+
+
+def _in_known_form(file: BinaryIO, start: bytes) -> BinaryIO:
+    """A file of TrueMap or MountainsMap in the form that its reader knows; others as they are.
+
+    The comment of TrueMap ends with a zero, but the reader takes one of 24 bytes for granted.
+    """
+    file.seek(0)
+    if start.startswith(TRUEMAP) and (end := start.find(b"\0", TRUEMAP_MAGIC_BYTES) + 1):
+        rest = file.read()[end:]
+        return BytesIO(start[:TRUEMAP_MAGIC_BYTES] + bytes(TRUEMAP_COMMENT_BYTES) + rest)
+    if start.startswith(MOUNTAINSMAP) and MICROMETRES.search(start):
+        content = file.read()
+        header = MICROMETRES.sub(lambda unit: b"\xb5m".ljust(len(unit[0]), b"\0"), start)
+        return BytesIO(header + content[len(start) :])
+    return file
 
 
 def _read_channel(path: Path, file: BinaryIO, reader: Any, dataset: str | None) -> HeightMap:

@@ -153,8 +153,12 @@ def read_topography(
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error}") from error
     except Exception as error:  # the reader of a damaged file can raise any exception
+        is_unit = str(error).startswith("Unknown unit")
+        what = (
+            "save it with lengths in m, um or nm." if is_unit else "damaged, or not a height map?"
+        )
         raise InputError(
-            f"{path}: cannot be read ({first_line(error)}): damaged, or not a height map? {REMEDY}"
+            f"{path}: cannot be read ({first_line(error)}): {what} {REMEDY}"
         ) from error
 
 

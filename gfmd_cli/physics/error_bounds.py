@@ -151,22 +151,23 @@ def _of_free_contact(contact: FreeContact, u: Field, sigma: Field) -> ErrorBound
 
 
 def full_contact_errors(
-    contact: Contact, sigma: Field, curvature: float, stiffness: float, sigma_p: float
+    contact: Contact, sigma: Field, bend: float, stiffness: float, sigma_p: float
 ) -> dict[str, float]:
     """Errors in full contact, where the stress can be tensile between the points of the grid.
 
-    Around a minimum of a Gaussian stress the curvature is on average `curvature` p, so that between
-    points of spacing d the stress is lower by up to m = p curvature d^2 / 8. Points with
-    sigma < m may lose contact. The errors are their fraction, their mean deficit m - sigma over the
-    stiffness of the shortest wave, and the change of the variance, as the change of sigma_p.
+    Around a minimum of a Gaussian stress the curvature along an axis is on average p <q_i^2>, so
+    that between points of spacings d_i the stress is lower by up to m = p sum <q_i^2> d_i^2 / 8.
+    Points with sigma < m may lose contact. The errors are their fraction, their mean deficit
+    m - sigma over the stiffness of the shortest wave, and the change of the variance, as the change
+    of sigma_p.
 
     Parameters
     ----------
-    curvature : mean of q^2, weighted with the variance of the stress [1/m^2]
+    bend : sum of <q_i^2> d_i^2 over the axes, the means weighted with the variance of the stress
     stiffness : k(q) of the shortest wave along an axis, in reduced units
     """
     grid = contact.grid
-    margin = contact.pressure * curvature * max(grid.spacings) ** 2 / 8
+    margin = contact.pressure * bend / 8
     sums = np.zeros(3)
     for rows in row_blocks(sigma):
         deficit = np.maximum(margin - sigma[rows], 0.0)

@@ -50,6 +50,12 @@ class LinearElastomer(SpecTable):
         fraction = Fraction(self.exponent).limit_denominator(4)
         return f"n = {fraction}" if fraction == self.exponent else f"n = {self.exponent:g}"
 
+    @property
+    def stiffness_given(self) -> bool:
+        """Whether the spec gives every key that has a unit; without, k(q) is in arbitrary units."""
+        fields = type(self).model_fields
+        return all(key in self.model_fields_set for key in fields if self.unit_of(key))
+
     def label_on(self, length: float) -> str:
         """The label on a cell of this side [m]."""
         return self.label

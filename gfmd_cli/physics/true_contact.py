@@ -21,6 +21,7 @@ from gfmd_cli.physics.contact import Contact
 
 HEIGHT_BINS = 1 << 14  # of height, of width 1e-3 h_std or less for heights within +-8 h_std
 MIN_POINTS = 10  # for a standard deviation; a choice
+ROUNDING = 1e-10  # Delta_sigma; a smaller deviation of s is that of its rounding
 
 
 @dataclass(frozen=True)
@@ -98,9 +99,13 @@ def contact_area(delta_sigma_c: Field | float, p_star: Field | float) -> Field:
 
 
 def bearing(contact: Contact) -> Bearing:
-    """Compute the bearing of an indenter from its points, sorted by height in fine bins."""
+    """Compute the bearing of an indenter from its points, sorted by height in fine bins.
+
+    Fractions over which s is constant, as under a flat punch on springs, are left out.
+    """
     height = contact.height
     stress = contact.elasticity(contact.height, contact.grid.empty())
+    stress -= stress.flat[height.argmax()]  # so that a flat top has no stress
     low, high = float(height.min()), float(height.max())
     sums = np.zeros((3, HEIGHT_BINS))
     for rows in row_blocks(height):
@@ -112,5 +117,5 @@ def bearing(contact: Contact) -> Bearing:
     usable = (count >= MIN_POINTS) & (count < height.size) & (sums[0] > 0)
     mean = total[usable] / count[usable]
     variance = np.maximum(square[usable] / count[usable] - mean**2, 0.0)
-    known = variance > 0
+    known = variance > ROUNDING**2
     return Bearing((count[usable] / height.size)[known], np.sqrt(variance[known]))

@@ -21,6 +21,8 @@ class Texture(NamedTuple):
 
     anisotropy: float
     """Ratio of the rms slopes along the principal axes: 1 if isotropic, infinite for a line."""
+    along_x: float
+    """Share of the squared slope that is along x: 1/2 if isotropic, 1 for a line."""
     tiles: int
     """Number of equal tiles that the cell consists of, along both axes together."""
     mirrors: int
@@ -43,13 +45,13 @@ def texture(grid: Grid, height: Field) -> Texture:
     modes = grid.forward_into_work(height)
     has_nyquist_waves = _has_nyquist_waves(grid, modes)
     if grid.dimension == 1:
-        return Texture(inf, 1, 0, 1.0, has_nyquist_waves)
-    power, mirrors = _power(grid, modes), _mirrors(grid, modes)
+        return Texture(inf, 1.0, 1, 0, 1.0, has_nyquist_waves)
+    power, mirrors, directions = _power(grid, modes), _mirrors(grid, modes), _slopes(grid, modes)
     # of m tiles along an axis, only every m-th mode is not zero
     modes_along = [np.flatnonzero(_occupied(power).any(axis=axis)) for axis in range(2)]
     tiles = prod(max(int(np.gcd.reduce(numbers)), 1) for numbers in modes_along)
     repetitions = _concentration(grid, power) / (tiles * MIRRORED_CONCENTRATION[mirrors])
-    return Texture(_anisotropy(grid, modes), tiles, mirrors, repetitions, has_nyquist_waves)
+    return Texture(*directions, tiles, mirrors, repetitions, has_nyquist_waves)
 
 
 def radial_power(grid: Grid, height: Field) -> tuple[Field, Field, Field]:
@@ -98,8 +100,8 @@ def _squared(modes: Modes) -> Field:
     return np.square(modes.real) + np.square(modes.imag)
 
 
-def _anisotropy(grid: Grid, modes: Modes) -> float:
-    """From the eigenvalues of the tensor <grad h grad h>, summed over the waves of the surface."""
+def _slopes(grid: Grid, modes: Modes) -> tuple[float, float]:
+    """Anisotropy and share along x, from the tensor <grad h grad h> of the waves of the surface."""
     x = np.arange(*grid.span, dtype=np.float64)
     weight = grid.multiplicity()
     sums = np.zeros(3)
@@ -112,7 +114,9 @@ def _anisotropy(grid: Grid, modes: Modes) -> float:
         sums += [float(np.sum(power * term)) for term in (x * x, y * y, mixed)]
     xx, yy, xy = grid.total(sums)
     middle, half = 0.5 * (xx + yy), sqrt((0.5 * (xx - yy)) ** 2 + xy**2)
-    return sqrt((middle + half) / (middle - half)) if middle - half > 1e-12 * middle else inf
+    is_line = not middle - half > 1e-12 * middle
+    anisotropy = inf if is_line else sqrt((middle + half) / (middle - half))
+    return anisotropy, 0.5 * float(xx / middle) if middle > 0 else 1.0
 
 
 def _concentration(grid: Grid, power: Field) -> float:

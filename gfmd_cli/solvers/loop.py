@@ -10,6 +10,7 @@ from pydantic import Field as Key
 from gfmd_cli.errors import InputError
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.physics.contact import Contact
+from gfmd_cli.physics.linear_elastomer import LinearElastomer
 from gfmd_cli.spec_table import SpecTable
 from gfmd_cli.status import Status
 
@@ -110,6 +111,9 @@ class Solver(SpecTable):
                 f'solver.kind: "{self.kind}" solves contacts with grid.boundary = '
                 f'"{self.boundary}", not "{boundary}"; "auto" takes a solver that does'
             )
+
+    def check_elastomer(self, elastomer: LinearElastomer) -> None:
+        """Raise InputError for an elastomer that the solver does not support."""
 
     def begin(self, contact: Any, u: Field) -> State:
         """Return the state that starts from displacement `u`, which is overwritten."""

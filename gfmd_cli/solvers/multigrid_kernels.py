@@ -78,7 +78,7 @@ def _restrict(up, mid, down, coarse):
 
 
 @part_of_kernel
-def _pass_on(i, a, ratio, defect, coarse):
+def _restrict_or_copy(i, a, ratio, defect, coarse):
     """Restrict the residual down to its row i, or write the row to a field that is as wide."""
     row = defect[i % 3]
     row[0] = row[-1]
@@ -139,7 +139,7 @@ def first_residual(sigma, contact_state, threshold, operator, coarse, a, b):
             c = j + 2
             pull = _laplacian(up, mid, down, operator, c)
             row[j + 1] = ZERO if held[j] >= threshold else source[c] - step * pull
-        _pass_on(i, a, ratio, defect, coarse)
+        _restrict_or_copy(i, a, ratio, defect, coarse)
 
 
 @kernel
@@ -269,4 +269,4 @@ def residual(rhs, operator, ties, y, is_zero, coarse, a, b):
             continue
         row = defect[i % 3]
         _residual_row(i, x, rows, operator, ties, rhs, row)
-        _pass_on(i, a, ratio, defect, coarse)
+        _restrict_or_copy(i, a, ratio, defect, coarse)

@@ -10,7 +10,11 @@ from gfmd_cli.errors import InputError
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.physics.contact import Contact
+from gfmd_cli.physics.linear_elastomer import LinearElastomer
 from gfmd_cli.solvers.loop import Solver, State
+
+WAVENUMBERS = np.logspace(-3, 12, 46)
+"""Those of the surfaces of practice [1/m], at which k(q) of an elastomer is compared."""
 
 
 class Sort(Solver):
@@ -25,10 +29,18 @@ class Sort(Solver):
     iterative: ClassVar[bool] = False
     max_exponent: ClassVar[float] = 0.0
 
+    def check_elastomer(self, elastomer: LinearElastomer) -> None:
+        """Raise InputError for a stiffness that depends on q."""
+        if not is_constant(elastomer.stiffness(WAVENUMBERS)):
+            raise InputError(
+                f'solver.kind: "sort" given, but the stiffness of {elastomer.label} depends on the '
+                'wavenumber; "sort" is for n = 0, "auto" for every elastomer'
+            )
+
     def begin(self, contact: Contact, u: Field) -> State:
         """The solution; `u` is overwritten. Raises InputError if k(q) depends on q."""
         if not is_flat(contact):
-            raise InputError('solver.kind: "sort" requires a stiffness independent of q (n = 0)')
+            raise InputError('solver.kind: "sort" needs a stiffness that does not depend on q')
         displaced = contact.pressure / float(contact.k_along_x[-1])
         known = contact.height if contact.may_touch is None else contact.height[contact.may_touch]
         level = non_contact_height(contact.grid, known, displaced)
@@ -46,8 +58,12 @@ def is_flat(contact: Contact) -> bool:
     """Whether k(q) is constant for all q > 0, up to rounding."""
     grid, k = contact.grid, contact.stiffness.ravel()
     waves = k[1:] if grid.ends[0] else k
-    highest, lowest = grid.max(float(waves.max())), grid.min(float(waves.min()))
-    return bool(highest - lowest <= 8 * np.finfo(float).eps * lowest)
+    return is_constant(np.array([grid.min(float(waves.min())), grid.max(float(waves.max()))]))
+
+
+def is_constant(k: Field) -> bool:
+    """Whether all values are the same, up to rounding."""
+    return bool(np.ptp(k) <= 8 * np.finfo(float).eps * k.min())
 
 
 def non_contact_height(grid: Grid, h: Field, displaced: float) -> float:

@@ -58,6 +58,11 @@ DETAILS = (
     Column("x_first", "x / L of the first grid point; -0.5 if x = 0 is the crest of an indenter"),
     Column("ensemble", "the column surface without the seed, the same for all seeds", "", str),
     Column("elastomer_short", "short name of the elastomer in figures", "", str),
+    Column(
+        "stiffness_given",
+        "1 if the spec gives the stiffness of the elastomer, 0 if it is in units of 1 Pa",
+        kind=int,
+    ),
     Column("surface_sha256", "SHA-256 checksum of the file of the surface", "", str),
     Column("elastomer_sha256", "SHA-256 checksum of the table of the elastomer", "", str),
     Column(

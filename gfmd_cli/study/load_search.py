@@ -343,7 +343,7 @@ class _Search:
 
     @property
     def slope(self) -> float:
-        """Slope of ln(value) over ln(p), from the nearest trial and the next one of another value."""
+        """Slope of ln(value) over ln(p), by the nearest trial and the next one of another value."""
         nearest = self.points[0]
         for other in self.points[1:]:
             if isfinite(other.y - nearest.y) and not self._are_same(nearest, other):

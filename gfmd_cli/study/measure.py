@@ -46,6 +46,7 @@ def planned(task: Task) -> Row:
         "preparation": surface.preparation(task.boundary),
         "elastomer": elastomer.label,
         "elastomer_short": elastomer.short_label,
+        "stiffness_given": int(elastomer.stiffness_given),
         "points_y": task.points_y,
         "length_y": surface.sides[0] if surface.dimension == 2 else np.nan,
         "n": np.nan if elastomer.exponent is None else elastomer.exponent,

@@ -296,12 +296,12 @@ def _between_points(task: Task, solved: TaskSolution) -> dict[str, float]:
     if solved.observables.a_r < 1 or not variance.any():
         return NO_ERRORS
     curvature = float(variance @ scene.shells.q**2 / variance.sum())
+    shares = (1 - scene.texture.along_x, scene.texture.along_x)[-scene.grid.dimension :]
+    bend = curvature * float(np.square(scene.grid.spacings) @ shares)
     shortest = np.array(np.pi / min(scene.grid.spacings))
     stiffness = task.elastomer.stiffness(shortest, scene.grid.length)
     reduced = float(stiffness) * scene.h_std / scene.delta_sigma
-    return full_contact_errors(
-        solved.contact, sigma, curvature, reduced, solved.observables.sigma_p
-    )
+    return full_contact_errors(solved.contact, sigma, bend, reduced, solved.observables.sigma_p)
 
 
 def scales_of(scene: Scene, band_limited: bool) -> discretisation_error.RoughnessScales:

@@ -128,13 +128,18 @@ def run_study(
             solved = _solve_all(pending, study.parts, jobs, context)
         finally:
             with shared_errors(ranks):
-                # a stopped shard ends soon: its records stand, others collect them
-                if is_root(ranks) and (options.shard[1] == 1 or not stop.is_set()):
-                    context.warn(*study.collect(spec, tasks, text))
+                # a stopped shard ends soon: its records are kept, others collect them
+                is_shard = options.shard[1] > 1
+                if is_root(ranks) and not (is_shard and stop.is_set()):
+                    try:
+                        context.warn(*study.collect(spec, tasks, text))
+                    except Interrupted:  # another process collects for too long
+                        if not is_shard:
+                            raise
         again = "run again without --overwrite" if options.overwrite else "run again"
         _check_ended(solved, len(pending), stop, again)
         if not any(status.is_failure for status in solved):
-            _check_output(pending, on_root(ranks, study.outcomes))
+            _check_stored([*shard, *pending], on_root(ranks, study.outcomes), study.path)
     return counts + solved
 
 
@@ -177,13 +182,21 @@ def _check_ended(solved: Counter[Status], pending: int, stop: Event, again: str)
         raise Interrupted(f"{left} left whose workers were killed; {again} to continue")
 
 
-def _check_output(solved: list[Task], outcomes: dict[str, Outcome]) -> None:
-    """Raise Interrupted where another run of the same tasks, with other output, came first."""
-    lacking = [task for task in without_result(solved, outcomes) if task.id in outcomes]
+def _check_stored(solved: list[Task], outcomes: dict[str, Outcome], path: Path) -> None:
+    """Raise Interrupted where results are missing: another process has deleted the study.
+
+    Also where another run of the same tasks, with other output, came first.
+    """
+    lacking = without_result(solved, outcomes)
+    if lost := {task.id for task in lacking} - set(outcomes):
+        raise Interrupted(
+            f"{path}: deleted or replaced during the run, with {count(len(lost), 'result')}; run "
+            "again to solve what is missing"
+        )
     if lacking:
         raise Interrupted(
-            f"another run solved {count(len(lacking), 'task')} at the same time, with other "
-            "output; run again to add the output of this one"
+            f"another run solved {count(len({task.id for task in lacking}), 'task')} at the same "
+            "time, with other output; run again to add the output of this one"
         )
 
 

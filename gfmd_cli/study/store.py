@@ -17,7 +17,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from gfmd_cli.errors import InputError, SpaceError, StudyError
+from gfmd_cli.errors import InputError, Interrupted, SpaceError, StudyError
 from gfmd_cli.files.atomic import check_place, new_file
 from gfmd_cli.files.checksums import Version, file_version
 from gfmd_cli.files.hdf5 import new_hdf5
@@ -83,7 +83,8 @@ class Study:
             finally:  # which folder is gone says more than what became of the tasks
                 self._check_held()
                 self._held = None
-        with self._collecting(), locked(in_use, wait=False) as alone:
+        # whoever collects for too long leaves later, and removes the folder
+        with suppress(Interrupted), self._collecting(), locked(in_use, wait=False) as alone:
             if alone and self._is_complete(tasks):
                 unfinished_work.remove_parts(self.parts)
 

@@ -138,20 +138,21 @@ class Task:
         return 0.01 + solves * forecast.SECONDS_PER_PAIR * self.size * pairs
 
 
-def plan(spec: models.Spec) -> list[Task]:
+def plan(spec: models.Spec, *, suited: bool = True) -> list[Task]:
     """The tasks of a spec, in a fixed order: surface, elastomer, grid, solver, pressure.
 
-    Raises InputError where a grid does not resolve its surface or a file is unfit.
+    Raises InputError where a grid does not resolve its surface, a file is unfit or, if `suited`, a
+    solver does not support its elastomer.
     """
     try:
-        return _tasks(spec)
+        return _tasks(spec, suited=suited)
     except InputError as error:
         raise InputError(f"{spec.source}: {error}") from error
 
 
-def _tasks(spec: models.Spec) -> list[Task]:
+def _tasks(spec: models.Spec, *, suited: bool) -> list[Task]:
     versions = _file_versions(spec)
-    _check(spec)
+    _check(spec, suited=suited)
     resolved = spec.resolved()
     swept_keys = {table: _swept_keys(getattr(spec, table)) for table in models.SWEPT}
     tasks: dict[str, Task] = {}
@@ -204,7 +205,7 @@ def _file_versions(spec: models.Spec) -> dict[Path, Version]:
     return versions
 
 
-def _check(spec: models.Spec) -> None:
+def _check(spec: models.Spec, *, suited: bool) -> None:
     """Raise InputError for too many tasks, an unfit file, or tables that do not suit each other."""
     count = prod(len(getattr(spec, table)) for table in models.SWEPT) * len(spec.load.values())
     if spec.sweep and count <= MAX_COMBINATIONS:
@@ -228,6 +229,8 @@ def _check(spec: models.Spec) -> None:
                     f"{first} points along x on this surface; {remedy(chosen['surface'], first)}"
                 )
         chosen["solver"].check_boundary(boundary)
+        if suited:
+            chosen["solver"].check_elastomer(elastomer)
         if boundary == "free":
             elastomer.check_free_boundary(dimension)
         if spec.load.quantity == "displacement":

@@ -100,7 +100,7 @@ class Figure {
       }
       return entry
     })
-    const list = create("div", { className: "legend" }, ...entries)
+    const list = create("div", { className: "legend" }, this.data.heading, ...entries)
     list.setAttribute("role", "group")
     list.setAttribute("aria-label", "Curves")
     return list
@@ -194,7 +194,8 @@ class Figure {
     Object.assign(layout.xaxis, { range: xaxis.range })
     Object.assign(layout.yaxis, { range: yaxis.range })
     if (layout.xaxis2) layout.xaxis2.range = this.above(xaxis.range)
-    Object.assign(layout, { showlegend: true, legend: { orientation: "h", y: 1.02, yanchor: "bottom" } })
+    const title = { text: this.data.heading }
+    Object.assign(layout, { showlegend: true, legend: { orientation: "h", y: 1.02, yanchor: "bottom", title } })
     const named = new Set()
     for (const trace of data.filter(trace => trace.meta)) {
       trace.name = trace.meta.at(-1)
