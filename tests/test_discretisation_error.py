@@ -1,16 +1,18 @@
 """Error bars and continuum values: sequences of known limit, exact contacts, verdicts."""
 
 from dataclasses import replace
-from math import isnan, pi
+from math import inf, isnan, pi
 from types import SimpleNamespace
 
 import exact_solutions as reference
 import numpy as np
 import pytest
+from scipy.integrate import quad
 
 from gfmd_cli import rows, run, solve
 from gfmd_cli.physics.discretisation_error import (
     AREA_EXCESS,
+    LINE_EXCESS,
     MAX_AREA_EXPONENT,
     ExcessExponent,
     RoughnessScales,
@@ -544,6 +546,89 @@ def test_westergaards_wave(p_bar):
     ):
         assert abs(getattr(levels[-1], quantity) - exact) <= values[quantity].error
         assert abs(values[quantity].continuum - exact) <= values[quantity].continuum_error
+
+
+def test_the_excess_of_a_line_contact_is_that_of_the_wiener_hopf_equation():
+    def integrand(phi):
+        half = phi / 2
+        return np.log(half / np.sin(half)) / np.sin(half) ** 2
+
+    integral, _ = quad(integrand, 1e-4, pi)  # 1/6 below
+    assert pytest.approx(0.25 - (integral + 1e-4 / 6) / (4 * pi), abs=1e-5) == LINE_EXCESS
+
+
+@pytest.mark.parametrize(
+    ("n", "pressure"),
+    [
+        (1.0, lambda a: 2 * pi * np.sin(pi * a / 2) ** 2),  # Westergaard
+        (2.0, lambda a: (2 * pi) ** 2 * reference.string_wave_pressure(a)),
+    ],
+)
+def test_the_excess_of_exact_line_contacts(n, pressure):
+    """Mean over contacts whose edges are everywhere between two points; the error is uniform."""
+    points = 256
+    areas = 0.3 + 2 * np.arange(100) * 0.29 / points
+    lines = [measured(Wave(), Power(n=n), float(pressure(a)), points) for a in areas]
+    excess = np.array([line.a_r for line in lines]) - areas
+    assert excess.mean() == pytest.approx(LINE_EXCESS * n * 2 / points, rel=0.1)
+    assert excess.std() * points / 2 == pytest.approx(12**-0.5, rel=0.1)
+
+
+def random_line(seed, copies=1):
+    """A periodic profile of 14 waves, equal parts side by side."""
+    m = np.arange(33)
+    amplitude = (1 + (m / 4.0) ** 2) ** -0.65 * ((m > 0) & (m <= 14))
+    phases = np.random.default_rng(seed).uniform(0, 2 * pi, m.size)
+    return np.tile(np.fft.irfft(amplitude * np.exp(1j * phases), 64), copies)
+
+
+@pytest.mark.parametrize("n", [1.0, 2.0])
+def test_bars_of_line_profiles_hold(n):
+    held = []
+    for seed in range(8):
+        for p_star in (0.05, 0.3, 1.0):
+            spec = {
+                "surface": {"interpolation": "fourier"},
+                "elastomer": {"kind": "power", "n": n},
+                "load": {"p_star": p_star},
+            }
+            coarse = {"grid": {"points": 256}, "accuracy": {"mean_gap": 0.5}}
+            exact = solve(spec | {"grid": {"points": 4096}}, heights=random_line(seed))
+            columns = solve(spec | coarse, heights=random_line(seed)).columns
+            for name in ("a_r", "u_g"):
+                error = columns[f"{name}_continuum_error"]
+                held.append(abs(columns[f"{name}_continuum"] - exact.columns[name]) <= error)
+    assert np.mean(held) > 0.9
+
+
+def test_equal_parts_of_a_line_profile_have_the_same_errors():
+    spec = {
+        "surface": {"interpolation": "fourier"},
+        "elastomer": {"kind": "power", "n": 1},
+        "load": {"p_star": 0.3},
+        "accuracy": {"mean_gap": 0.5},
+    }
+    one, four = (
+        solve(spec | {"grid": {"points": 128 * k}}, heights=random_line(0, k)).columns
+        for k in (1, 4)
+    )
+    assert four["perimeter"] == 4 * one["perimeter"]
+    for name in ("a_r_continuum", "a_r_continuum_error", "u_g_error"):
+        assert four[name] == pytest.approx(one[name], rel=1e-3)
+
+
+def test_the_gaps_of_a_line_profile_have_an_error_where_grids_agree_by_chance():
+    levels = [GridValues(N, 0.9, 0.5, 0.01, 4.0) for N in (64, 128)]  # two gaps of 6.4 points
+    line = RoughnessScales(waves=20.0, curvature=2e3, anisotropy=inf)
+    gap = estimate(levels, 1.0, line, tip=Tip(2.0, 1))["u_g"]
+    assert gap.error == pytest.approx(1.5 * 0.01 / 6.4**2 / 2**0.5, rel=0.01)
+
+
+def test_a_profile_with_plateaus_does_not_follow_the_law_of_the_excess():
+    levels = sequence(1.0, grids=(64, 128), line=2.0)
+    flat = RoughnessScales(waves=20.0, curvature=2e3, anisotropy=inf, plateau=0.2)
+    area = estimate(levels, 1.0, flat, tip=Tip(2.0, 1))["a_r"]
+    assert area.continuum == pytest.approx(2 * levels[1].a_r - levels[0].a_r)
 
 
 @pytest.mark.parametrize("points", [64, 100, 256, 2048])

@@ -21,6 +21,7 @@ SMALL = {
     "hard_cases.py": "--points 32 --only cliff --seconds 1",
     "indenter_bars.py": "--points 64 --line-reference 256 --round-reference 128 --exponents 1 "
     "--pressures 1",
+    "line_bars.py": "--seeds 1 --exponents 1 --finest 512",
     "load_searches.py": "--points 128 --seeds 10",
     "noise_of_maps.py": "--points 128 --seeds 1",
     "neighbour_start.py": "--points 512 --p-star 0.001 0.0011",

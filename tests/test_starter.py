@@ -247,6 +247,7 @@ def test_surface_summarises_a_line(gfmd, tmp_path):
     assert record["spectrum"] == pytest.approx([0.25])  # L |h(q)|^2
     text = gfmd("surface", "wave.toml")  # in reduced units
     assert "Pq 0.70711, " in text
+    assert "half-space: p* = 1 is p = 2.2214 E_star" in text  # q / (2 sqrt 2)
     assert not re.search(r"\d m\b|1/m|\[m\]", text)
 
 

@@ -833,6 +833,12 @@ def test_an_array_of_one_dimension_is_a_line_profile(npy):
     np.testing.assert_array_equal(surface.heights(20), line)
 
 
+def test_a_line_profile_has_no_side_along_y(npy):
+    surface = FileSurface(path=npy(np.arange(20.0) % 7), length_y=1e-6)
+    with pytest.raises(InputError, match=r"surface\.length_y = 1e-06: a line profile has no side"):
+        _ = surface.sides
+
+
 def test_the_only_line_of_an_hdf5_file_needs_no_name(hdf5):
     line = np.arange(16.0)
     np.testing.assert_array_equal(read_topography(hdf5(h=line)).heights, line)

@@ -89,6 +89,24 @@ def test_tiles_are_counted_and_copies_that_differ_are_found(cutoff):
         assert nearly.repetitions == pytest.approx(equal.tiles * equal.repetitions, rel=1e-3)
 
 
+@pytest.mark.parametrize("points", [64, 65])
+def test_copies_of_a_line_are_counted(points):
+    m = np.arange(points // 2 + 1)
+    phases = np.exp(2j * np.pi * np.random.default_rng(0).random(m.size))
+    line = np.fft.irfft(((m > 0) & (m < 20)) * phases, points)
+    mirrored = np.roll(np.append(line, line[::-1]), 7)
+    inverted = np.append(line, -line[::-1])
+    for h, tiles, mirrors in (
+        (line, 1, 0),
+        (np.tile(line, 3), 3, 0),
+        (mirrored, 1, 1),
+        (np.tile(mirrored, 2), 2, 1),
+        (inverted, 1, 0),
+    ):
+        measured = texture(Grid(h.size, 1), h)
+        assert (measured.tiles, measured.mirrors) == (tiles, mirrors)
+
+
 def _random(seed, points=64):
     """Gaussian heights."""
     m = np.hypot(np.fft.fftfreq(points, 1 / points)[:, None], np.fft.rfftfreq(points, 1 / points))

@@ -141,9 +141,8 @@ def summary_text(summary: SurfaceSummary) -> str:
         ", ".join(words[5:]),
         f"spectral: rms height {measured.height:.6g}{metres}, "
         f"rms gradient {measured.gradient:.5g}, rms curvature {measured.curvature:.5g}{per_metre}",
+        f"half-space: p* = 1 is p = {0.5 * measured.gradient:.5g} E_star",
     ]
-    if grid.dimension == 2:
-        lines.append(f"half-space: p* = 1 is p = {0.5 * measured.gradient:.5g} E_star")
     lines += [f"warning: {warning}" for warning in summary.surface.warnings()]
     nearest = summary.spectrum.fit
     theories = {"spectrum": summary.scene}

@@ -42,6 +42,11 @@ from gfmd_cli.physics.persson import Shells
 # derive (pi - 1 + ln 2)/24 = 0.118 for n = 1. At n = 4 the ratio is not constant: 0.3 to 0.9.
 AREA_EXCESS = 0.104
 MAX_AREA_EXPONENT = 3.5  # n up to which that holds; beyond, the error is below xi and below a_r
+# Of a line contact: LINE_EXCESS n xi, by the Wiener-Hopf equation of the half-space of grid points
+# next to an edge, whose stiffness is |q|^n up to the Nyquist wavenumber (docs/error_estimates.md):
+#   1/4 - int_0^pi ln[phi / (2 sin(phi/2))] / sin^2(phi/2) dphi / 4 pi
+# The place of the edge between two points adds an error that is uniform within a spacing.
+LINE_EXCESS = 0.19001
 
 # For n > 3.5 the excess is a multiple of -D, the decrease from the coarser of two grids. Measured
 # (`scripts/plate_areas.py`, n = 3.6, 3.75 and 4): 0.4 in light contacts, of lone points, whose area
@@ -57,6 +62,10 @@ PLATE_BAR, PLATE_FLOOR = 0.6, 0.2
 #   AREA_CHANGE D                                  what neither explains; D of the corrected values
 # A = area / L^2, N = points per L. Chosen on seeds 20 and 47 (full), 11 (--quick --shift 1.37).
 AREA_CHANCE, AREA_LAW, AREA_CHANGE = 0.5, 0.01, 0.3
+# Of a line profile it is LINE_CHANCE xi over the root of the A N x edges, or of the number of
+# independent waves if less; the standard deviation is 12^(-1/2) = 0.29. A gap of w points has the
+# error LINE_GAP u_g / w^2 in u_g, over the root of the number of gaps (`scripts/line_bars.py`).
+LINE_CHANCE, LINE_GAP = 0.75, 1.5
 EXPONENT_CHANGE = 0.6  # of its change with q is uncertain; chosen on --layers, seeds 1 and 2
 MAX_STRESS_EXPONENT = 2.5  # sigma_p converges as spacing^(3 - n): too slow for larger n
 
@@ -295,13 +304,18 @@ def _estimate_periodic(
     """Estimates with a periodic boundary."""
     oblong = scales is not None and scales.aspect > MAX_SPACING_RATIO
     if scales is not None and not _laws_hold(grids, scales):
-        estimates = estimate_by_change(grids, is_profile=tip.dimension == 1)
-        follows_law = scales.calibrated and not oblong and tip.dimension == 2
+        is_line = tip.dimension == 1
+        estimates = estimate_by_change(grids, is_profile=is_line)
+        is_smooth_line = is_line and scales.band_limited and scales.plateau <= MAX_PLATEAU
+        follows_law = is_smooth_line or (scales.calibrated and not oblong)
         if follows_law and estimates["a_r"].verdict.has_error:
-            return estimates | {"a_r": _area(grids, scales, excess)}
+            estimates |= {"a_r": _area(grids, scales, excess, tip)}
+        if is_line and estimates["u_g"].verdict.has_error:
+            error = _error_of_gaps(grids.fine)
+            estimates |= {"u_g": with_independent_error(estimates["u_g"], error)}
         return estimates
     return {
-        "a_r": estimate_by_change(grids)["a_r"] if oblong else _area(grids, scales, excess),
+        "a_r": estimate_by_change(grids)["a_r"] if oblong else _area(grids, scales, excess, tip),
         "sigma_p": _stress(grids, scales, tip),
         "u_g": _gap(grids, scales, tip),
     }
@@ -321,8 +335,12 @@ def _bar(name: str, typical: float, change: float | None) -> float:
     return TWO_GRIDS[name] * hypot(change, TYPICAL_WEIGHT[name] * typical)
 
 
-def _area(grids: NestedGrids, scales: RoughnessScales | None, excess: ExcessExponent) -> Estimate:
-    """Relative contact area: the error is of first order in the spacing, as AREA_EXCESS area_n xi.
+def _area(
+    grids: NestedGrids, scales: RoughnessScales | None, excess: ExcessExponent, tip: Tip
+) -> Estimate:
+    """Relative contact area: the error is of first order in the spacing, AREA_EXCESS area_n xi.
+
+    In a line contact it is LINE_EXCESS area_n xi.
 
     Where the exponent is not that of all short waves, the excess is uncertain.
     """
@@ -333,17 +351,23 @@ def _area(grids: NestedGrids, scales: RoughnessScales | None, excess: ExcessExpo
             return _plate_area(grids)
         # the line force at the edge of a plate is, on a grid, a row of points
         return Estimate(min(fine.a_r, xi), nan, nan, Verdict.BOUND)
-    best = max(0.0, fine.a_r - AREA_EXCESS * area_n * xi)
+    per_exponent = LINE_EXCESS if tip.dimension == 1 else AREA_EXCESS
+    law = per_exponent * area_n
+    best = max(0.0, fine.a_r - law * xi)
     change = None
     if coarse is not None:
-        change = best - max(0.0, coarse.a_r - AREA_EXCESS * area_n * coarse.switches_per_point)
+        change = best - max(0.0, coarse.a_r - law * coarse.switches_per_point)
     if scales is None:
         error = _bar("a_r", SINGLE_CONTACT_AREA * xi, change)
+    elif tip.dimension == 1:
+        edges = min(xi * fine.area * fine.points, scales.independent_waves)
+        chance = LINE_CHANCE * xi / sqrt(edges)
+        error = hypot(chance, AREA_CHANGE * (change or 0.0))
     else:
         chance = AREA_CHANCE * (1 + area_n / 10) * sqrt(xi / fine.area) / fine.points
-        law = AREA_LAW * (area_n + 1) * xi * scales.phase(fine.points)
-        error = hypot(chance, law, AREA_CHANGE * (change or 0.0))
-    return _corrected_area(fine.a_r, best, hypot(error, AREA_EXCESS * excess.uncertainty * xi))
+        unresolved = AREA_LAW * (area_n + 1) * xi * scales.phase(fine.points)
+        error = hypot(chance, unresolved, AREA_CHANGE * (change or 0.0))
+    return _corrected_area(fine.a_r, best, hypot(error, per_exponent * excess.uncertainty * xi))
 
 
 def _plate_area(grids: NestedGrids) -> Estimate:
@@ -407,6 +431,18 @@ def _gap(grids: NestedGrids, scales: RoughnessScales | None, tip: Tip) -> Estima
     typical *= phase**1.5 * sqrt(bend * value)
     change = None if coarse is None else grids.change("u_g") / (2**GAP_ORDER - 1)
     return on_grid(value, _bar("u_g", typical, change))
+
+
+def _error_of_gaps(fine: GridValues) -> float:
+    """Error of u_g of a line profile, by the few points across its gaps.
+
+    It matters near full contact, where u_g may by chance hardly change from grid to grid.
+    """
+    x = fine.switches_per_point
+    if not x:
+        return 0.0
+    gaps, points = 0.5 * x * fine.area * fine.points, 2 * (1 - fine.a_r) / x
+    return LINE_GAP * fine.u_g / points**2 / sqrt(gaps)
 
 
 def _single_gap(grids: NestedGrids, tip: Tip) -> Estimate:

@@ -172,7 +172,15 @@ class FileSurface(RigidSurface):
 
     @property
     def sides(self) -> tuple[float, ...]:
-        """Sides of the periodic cell [m]: twice those of the map where it is mirrored."""
+        """Sides of the periodic cell [m]: twice those of the map where it is mirrored.
+
+        Raises InputError for a side along y of a line profile.
+        """
+        if self.length_y is not None and self.dimension == 1:
+            raise InputError(
+                f"{self.path}: surface.length_y = {self.length_y:g}: a line profile has no side "
+                "along y; leave surface.length_y out"
+            )
         stated = self.stated_sides()
         along_y, along_x = (1.0, *(stated or self._topography().heights.shape))[-2:]
         length = self.length or (stated[-1] if stated else 1.0)

@@ -45,7 +45,9 @@ def texture(grid: Grid, height: Field) -> Texture:
     modes = grid.forward_into_work(height)
     has_nyquist_waves = _has_nyquist_waves(grid, modes)
     if grid.dimension == 1:
-        return Texture(inf, 1.0, 1, 0, 1.0, has_nyquist_waves)
+        numbers = np.flatnonzero(_occupied(_power(grid, modes)))
+        tiles = max(int(np.gcd.reduce(numbers)), 1)
+        return Texture(inf, 1.0, tiles, _line_mirrors(grid, modes), 1.0, has_nyquist_waves)
     power, mirrors, directions = _power(grid, modes), _mirrors(grid, modes), _slopes(grid, modes)
     # of m tiles along an axis, only every m-th mode is not zero
     modes_along = [np.flatnonzero(_occupied(power).any(axis=axis)) for axis in range(2)]
@@ -155,6 +157,17 @@ def _mirrors(grid: Grid, modes: Modes) -> int:
     x, largest = grid.total(np.array([np.abs(along_x).sum(), largest]))
     y = np.abs(grid.total(along_y)).sum()
     return sum(bool(value >= (1 - ROUNDED) * largest > 0) for value in (x, y))
+
+
+def _line_mirrors(grid: Grid, modes: Modes) -> int:
+    """1 if a line is its own mirror image, h(x) = h(2 a - x); overwrites the modes.
+
+    The integral of h(x) h(2 a - x), the transform of h(q)^2, is then that of h^2 at some a.
+    """
+    modes[0] = 0.0
+    power = float(grid.multiplicity() @ _squared(modes))
+    modes *= modes
+    return int(grid.field_of_work().max() >= (1 - ROUNDED) * power > 0)
 
 
 def _has_nyquist_waves(grid: Grid, modes: Modes) -> bool:

@@ -1,0 +1,96 @@
+"""How often the error bars of random line profiles hold, and the excess of their contact area.
+
+Self-affine profiles of 64 points, periodic, with a roll-off at a quarter of the cell and the Hurst
+exponents 0.3 and 0.8; 7, 14 or 25 waves in the cell; p* from 0.01 to 1. Contacts on 128 and 256
+points, each with its error bars from two grids, are compared with 4096 points.
+
+python scripts/line_bars.py --seeds 20
+"""
+
+import argparse
+import tempfile
+import warnings
+from collections import defaultdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gfmd_cli import rows, run
+from gfmd_cli.physics.observables import QUANTITIES
+
+POINTS, ROLLOFF = 64, 4
+PRESSURES = [0.01, 0.03, 0.1, 0.3, 1.0]
+Row = dict[str, Any]
+
+
+def profile(draw: np.random.Generator, hurst: float, highest: int) -> np.ndarray:
+    """A self-affine profile with the spectrum C(q) ~ [1 + (q / q_r)^2]^(-1/2 - H)."""
+    m = np.arange(POINTS // 2 + 1)
+    amplitude = (1 + (m / ROLLOFF) ** 2) ** (-(1 + 2 * hurst) / 4) * ((m > 0) & (m <= highest))
+    h = np.fft.irfft(amplitude * np.exp(2j * np.pi * draw.random(m.size)), POINTS)
+    return h / h.std()
+
+
+def contacts(path: Path, exponents: list[float], finest: int) -> tuple[list[Row], list[Row]]:
+    """The contacts of a profile on coarse grids, with error bars, and on the finest one."""
+    base = {
+        "surface": {"kind": "file", "path": str(path), "interpolation": "fourier"},
+        "elastomer": {"kind": "power", "n": exponents},
+        "load": {"p_star": PRESSURES},
+    }
+    coarse = {"grid": {"points": [2 * POINTS, 4 * POINTS]}, "accuracy": {"mean_gap": 0.5}}
+    fine = {"grid": {"points": finest}, "solver": {"tolerance": 1e-5}}
+    coarse_rows, fine_rows = (
+        rows(run(base | each, path.with_name(f"{name}.h5")))
+        for name, each in (("coarse", coarse), ("fine", fine))
+    )
+    return coarse_rows, fine_rows
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--seeds", type=int, default=20)
+    parser.add_argument("--first", type=int, default=0, help="first seed")
+    parser.add_argument("--exponents", type=float, nargs="+", default=[0.5, 1, 1.5, 2, 2.5, 3])
+    parser.add_argument("--finest", type=int, default=4096)
+    arguments = parser.parse_args()
+    warnings.simplefilter("ignore")
+    held, excess = defaultdict(list), defaultdict(list)
+    for seed in range(arguments.first, arguments.first + arguments.seeds):
+        for hurst in (0.3, 0.8):
+            draw = np.random.default_rng([seed, round(10 * hurst)])
+            with tempfile.TemporaryDirectory() as folder:
+                path = Path(folder) / "profile.npy"
+                np.save(path, profile(draw, hurst, int(draw.choice([7, 14, 25]))))
+                coarse, fine = contacts(path, arguments.exponents, arguments.finest)
+            exact = {(row["n"], row["p_star"]): row for row in fine}
+            for row in coarse:
+                true = exact[row["n"], row["p_star"]]
+                if 0 < row["a_r"] < 1:
+                    x, finest_x = (r["perimeter"] / r["points"] for r in (row, true))
+                    excess[row["n"]].append((row["a_r"] - true["a_r"]) / (x - finest_x))
+                for name in QUANTITIES:
+                    if row[f"{name}_verdict"] == "regular":
+                        value, error = (row[f"{name}_continuum{e}"] for e in ("", "_error"))
+                        ratios = (
+                            abs(value - true[name]) / error,
+                            abs(row[name] - true[name]) / row[f"{name}_error"],
+                        )
+                        held[name, row["n"]].append(ratios)
+                        held[name, f"p* = {row['p_star']:g}"].append(ratios)
+    print("quantity  case       held of continuum value, value   bars  error/bar: median largest")
+    for (name, case), pairs in held.items():
+        ratios = np.array(pairs)
+        shares = 100 * np.mean(ratios <= 1, axis=0)
+        median, largest = np.median(ratios[:, 0]), ratios[:, 0].max()
+        print(
+            f"{name:9} {case!s:10} {shares[0]:6.1f} % {shares[1]:6.1f} % {len(ratios):6d} "
+            f"{median:6.2f} {largest:6.2f}"
+        )
+    for n, values in sorted(excess.items()):
+        print(f"n = {n:g}: excess of a_r = ({np.mean(values):.3f} +- {np.std(values):.3f}) x")
+
+
+if __name__ == "__main__":
+    main()
