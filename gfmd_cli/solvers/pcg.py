@@ -43,7 +43,6 @@ MAX_TENSION_RATIO = 0.3  # of rms tension to rms free force
 """With 0.1 the transforms are 0.97 to 1.05 times as many, with 1 1.03 to 1.16 times (n = 1 to 4,
 64^2 to 256^2, seeds 3 to 5):
 `scripts/solver_constants.py pcg.MAX_TENSION_RATIO 0.1 1 --exponents 1 2 3 4`."""
-RIGID_CURVATURE = 1e-12  # curvature over descent below which a direction is a rigid shift
 MIN_SELECTION_INTERVAL = 4  # smallest number of steps between two selections of the preconditioner
 MAX_SCREENING_CHANGE = 1.25  # factor in k(q_c) up to which the old value is kept
 """With 1 the transforms are 0.98 to 1.08 times as many (n = 0.25 to 0.7, 64^2 to 256^2, seeds 3 to
@@ -267,7 +266,7 @@ class _Run:
         """Length that minimises the energy along the direction without constraints."""
         self.padded[:, : self.h.shape[1]] = self.direction
         curvature = self.apply_stiffness()
-        if curvature > RIGID_CURVATURE * descent:
+        if curvature > 0:
             return float(descent) / curvature
         return self.longest()  # upper limit of a rigid shift
 
