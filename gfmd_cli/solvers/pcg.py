@@ -188,8 +188,6 @@ class _Run:
         screening = select(self.contact, self.contact_state, self.threshold)
         low, high = sorted((screening, state.screening))
         if high > MAX_SCREENING_CHANGE * low:
-            if low == 0:  # the other kind of preconditioner
-                state.length = 0.0
             state.screening, state.moved, self.preconditioner = screening, 0.0, None
 
     def precondition(self) -> float:
