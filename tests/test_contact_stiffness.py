@@ -45,6 +45,20 @@ def test_it_is_the_slope_of_pressure_over_mean_gap(elastomer, p_star):
     assert stiffness == pytest.approx(by_difference(scene, p_star, tolerance), rel=1e-5)
 
 
+@pytest.mark.parametrize("n", [0.5, 1, 2, 3, 4])
+def test_it_is_that_of_a_dense_solve(n):
+    """1 / <w> with K as a matrix: K w = 1 on the free points, w = 0 on the contact."""
+    scene = build_scene(SelfAffine(cutoff=0.1), Power(n=n), 24)
+    contact = scene.contact(0.2)
+    touching, _ = solved(scene, 0.2, 1e-6)
+    units = np.eye(contact.grid.size).reshape(-1, *contact.grid.shape)
+    matrix = [contact.elasticity(unit, out=np.empty_like(unit)).ravel() for unit in units]
+    free = ~touching.ravel()
+    w = np.linalg.solve(np.array(matrix)[np.ix_(free, free)], np.ones(free.sum()))
+    exact = contact.grid.size / w.sum()
+    assert contact_stiffness(contact, touching) == pytest.approx(exact, rel=1e-8)
+
+
 @pytest.mark.parametrize("points", [50, 96])
 def test_it_is_so_on_grids_that_no_power_of_two_divides(points):
     scene = build_scene(SelfAffine(cutoff=0.05), Power(n=1), points)

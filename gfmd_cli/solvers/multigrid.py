@@ -45,8 +45,8 @@ from gfmd_cli.solvers.contact_state import ContactState
 
 MIN_LEVEL_POINTS = 4  # points along the shorter side on the coarsest level
 MAX_PIXEL_ASPECT = 1.5  # beyond, only the shorter side is coarsened, which leaves 1 / (2 / 1.5)
-# Transforms with other values of the next two, and of the number of steps below, on 64^2 to 256^2,
-# seeds 3 to 5: scripts/solver_constants.py with the arguments that stand there.
+# Transforms with other values of the next three, and of the number of steps below, on 64^2 to
+# 256^2, seeds 3 to 5: scripts/solver_constants.py with the arguments that stand there.
 MAX_LAPLACIAN_GROWTH = 5.0  # growth of k(q) above which the Laplacian is squared; n = 2.3
 """3 to 7 % more if it is squared at n = 2; 8 to 14 % at n = 2.5 and 18 to 31 % at n = 3 if it is
 not. At n = 2.2 both are the same within 4 %:
@@ -54,7 +54,9 @@ not. At n = 2.2 both are the same within 4 %:
 SPRING_STIFFNESS = 0.125, 0.25  # over diagonal element and k(2 q) / k(q): Laplacian, its square
 """Half: 1 % fewer to 17 % more (most at n = 2); double: 4 % fewer to 35 % more (most at n = 3):
 `multigrid.SPRING_STIFFNESS "(0.0625, 0.125)" "(0.25, 0.5)" --exponents 1 2 3 4`."""
-JACOBI_EIGENVALUE = 1.76  # largest of the damped Jacobi iteration; 1.6 to 1.85 do as well
+JACOBI_EIGENVALUE = 1.76  # largest of the damped Jacobi iteration
+"""With 1.6 the transforms are 0.83 to 1.13 times as many (0.83 to 0.93 at n = 1, more at n >= 2),
+with 1.85 0.94 to 1.15 times: `multigrid.JACOBI_EIGENVALUE 1.6 1.85 --exponents 1 2 3 4`."""
 STEEPEST = 4.5  # exponent above which the levels limit the growth of k(q); measured, see below
 COARSEST_STEP_PAIRS = 4  # of smoothing steps on the coarsest level
 """1, 2 and 8 are the same within 4 %: `multigrid.COARSEST_STEP_PAIRS 1 2 8 --exponents 1 2 3 4`."""
