@@ -23,7 +23,7 @@ and only the direction of strong coupling is coarsened until the pixels are abou
 row of pixels without coupling along y.
 
 The cycle is symmetric. It is positive as long as the eigenvalues of the damped Jacobi iteration,
-the damping times A over its diagonal, are below 2. Without springs `JACOBI_EIGENVALUE` is the
+the damping times A over its diagonal, are below 2. Without springs `JACOBI_EIGENVALUE` gives the
 largest. Springs do not increase it, because they act on waves for which the operator is soft.
 """
 
@@ -54,9 +54,12 @@ not. At n = 2.2 both are the same within 4 %:
 SPRING_STIFFNESS = 0.125, 0.25  # over diagonal element and k(2 q) / k(q): Laplacian, its square
 """Half: 1 % fewer to 17 % more (most at n = 2); double: 4 % fewer to 35 % more (most at n = 3):
 `multigrid.SPRING_STIFFNESS "(0.0625, 0.125)" "(0.25, 0.5)" --exponents 1 2 3 4`."""
-JACOBI_EIGENVALUE = 1.76  # largest of the damped Jacobi iteration
-"""With 1.6 the transforms are 0.83 to 1.13 times as many (0.83 to 0.93 at n = 1, more at n >= 2),
-with 1.85 0.94 to 1.15 times: `multigrid.JACOBI_EIGENVALUE 1.6 1.85 --exponents 1 2 3 4`."""
+JACOBI_EIGENVALUE = 1.04, 0.18, 1.76
+"""The largest of the damped Jacobi iteration is a + b k(2 q) / k(q), at most c. With 1.76 for all k
+the transforms are 1.13 to 1.35 times as many at n = 0.75 and 1, the same from n = 1.5 on; with
+c = 1.6 1.03 to 1.13 times and with c = 1.85 0.94 to 1.01 times at n = 2 to 4:
+`multigrid.JACOBI_EIGENVALUE "(1.76, 0, 1.76)" "(1.04, 0.18, 1.6)" "(1.04, 0.18, 1.85)"
+--exponents 0.75 1 1.5 2 3 4`."""
 STEEPEST = 4.5  # exponent above which the levels limit the growth of k(q); measured, see below
 COARSEST_STEP_PAIRS = 4  # of smoothing steps on the coarsest level
 """1, 2 and 8 are the same within 4 %: `multigrid.COARSEST_STEP_PAIRS 1 2 8 --exponents 1 2 3 4`."""
@@ -134,7 +137,8 @@ def _operator(dy: float, dx: float, growth: float, density: float) -> kernels.Op
     if is_squared:
         diagonal = centre**2 + 2 * (along_y**2 + along_x**2) + 4 * corner**2
         largest **= 2
-    damping = JACOBI_EIGENVALUE * diagonal / largest
+    lowest, slope, highest = JACOBI_EIGENVALUE
+    damping = min(lowest + slope * growth, highest) * diagonal / largest
     spring = TIE_UNIT * SPRING_STIFFNESS[is_squared] * diagonal * growth * density
     laplacian = map(np.float32, (centre, along_y, along_x, corner))
     damped = map(np.float32, (diagonal / damping, spring, spring / damping))
