@@ -68,8 +68,8 @@ def main() -> None:
             for row in coarse:
                 true = exact[row["n"], row["p_star"]]
                 if 0 < row["a_r"] < 1:
-                    x, finest_x = (r["perimeter"] / r["points"] for r in (row, true))
-                    excess[row["n"]].append((row["a_r"] - true["a_r"]) / (x - finest_x))
+                    xi, finest_xi = (r["perimeter"] / r["points"] for r in (row, true))
+                    excess[row["n"]].append((row["a_r"] - true["a_r"]) / (xi - finest_xi))
                 for name in QUANTITIES:
                     if row[f"{name}_verdict"] == "regular":
                         value, error = (row[f"{name}_continuum{e}"] for e in ("", "_error"))
@@ -89,7 +89,7 @@ def main() -> None:
             f"{median:6.2f} {largest:6.2f}"
         )
     for n, values in sorted(excess.items()):
-        print(f"n = {n:g}: excess of a_r = ({np.mean(values):.3f} +- {np.std(values):.3f}) x")
+        print(f"n = {n:g}: excess of a_r = ({np.mean(values):.3f} +- {np.std(values):.3f}) xi")
 
 
 if __name__ == "__main__":

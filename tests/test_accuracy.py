@@ -372,7 +372,7 @@ def test_a_bad_solution_gets_wide_bounds():
 
 @pytest.mark.parametrize("p_star", [0.1, 10.0])
 def test_the_bounds_of_any_displacement_are_those_of_the_energies(p_star):
-    """J(u) - D(s) of two energies, and the level of the best admissible mean q = (1 +- t) p."""
+    """J(u) + E(s) of two energies, and the level of the best admissible mean p' = (1 +- t) p."""
     contact = build_scene(SelfAffine(cutoff=0.2), Slab(thickness=0.1), 32).contact(p_star)
     h, p = contact.height, contact.pressure
     draw = np.random.default_rng(0)
@@ -389,7 +389,7 @@ def test_the_bounds_of_any_displacement_are_those_of_the_energies(p_star):
     level = (np.mean(s * h) - b) / p
     t = min(np.sqrt(2 * gap / b), 1.0)
     level_bound = (t * b / 2 + gap / t) / p
-    assert bounds.gap == pytest.approx(gap, rel=1e-9)
+    assert bounds.duality_gap == pytest.approx(gap, rel=1e-9)
     assert bounds.u_g == pytest.approx(abs(u.mean() - level) + level_bound, rel=1e-9)
     pressure = sigma * ((u == h) & (sigma > 0))
     omitted = np.sqrt(np.mean((sigma - pressure) ** 2))

@@ -291,7 +291,7 @@ def test_sort_is_refused_where_the_stiffness_depends_on_the_wavenumber(
     assert result.exit_code == 2
     assert result.output == (
         f'gfmd: spec.toml: solver.kind: "sort" given, but the stiffness of {label} depends on the '
-        'wavenumber; "sort" is for n = 0, "auto" for every elastomer\n'
+        'wavenumber (1e-3 to 1e12 1/m); "sort" is for n = 0, "auto" for every elastomer\n'
     )
     assert {path.name for path in Path().iterdir()} == {"spec.toml", "rising.txt"}
 

@@ -47,10 +47,10 @@ def test_the_gap_agrees_with_quadrature(n):
 @pytest.mark.parametrize("n", np.linspace(0, 4, 9))
 def test_the_weight_rises_with_both_areas(n):
     theory = two_shells(n)
-    s = np.linspace(0.01, 1, 100)[:, None]
-    a = np.stack([np.sqrt(s), s], axis=-1)[:, 0]  # the area decreases with the scale
-    by_a, by_s = theory.weight_slopes(a, s)
-    assert np.all(by_a > 0)
+    a_s = np.linspace(0.01, 1, 100)[:, None]
+    a_q = np.stack([np.sqrt(a_s), a_s], axis=-1)[:, 0]  # the area decreases with the scale
+    by_q, by_s = theory.weight_slopes(a_q, a_s)
+    assert np.all(by_q > 0)
     assert np.all(by_s > 0)
     p = np.geomspace(1e-6, 40, 200)
     assert np.all(np.diff(theory.mean_gap(p)) <= 0)

@@ -19,7 +19,7 @@ N = 12
 I, J = np.indices((N, N))
 
 
-def winds(touching):
+def percolates(touching):
     """Whether the gap percolates along y and along x."""
     return tuple(open_gap(touching).percolates.tolist())
 
@@ -33,58 +33,58 @@ def blocks(*corners, side=2):
 
 def test_without_contact_the_gap_percolates_and_there_is_no_patch():
     nothing = np.zeros((N, N), dtype=bool)
-    assert winds(nothing) == (True, True)
+    assert percolates(nothing) == (True, True)
     assert contact_patches(nothing).sizes.size == 0
 
 
 def test_in_full_contact_nothing_leaks_and_one_patch_is_all():
     full = np.ones((N, N), dtype=bool)
-    assert winds(full) == (False, False)
+    assert percolates(full) == (False, False)
     assert contact_patches(full).sizes.tolist() == [N * N]
 
 
 def test_stripes_of_contact_leave_a_way_along_them():
-    assert winds(I == 3) == (False, True)
-    assert winds(J == 0) == (True, False)
-    assert winds((I == 3) | (J == 0)) == (False, False)
+    assert percolates(I == 3) == (False, True)
+    assert percolates(J == 0) == (True, False)
+    assert percolates((I == 3) | (J == 0)) == (False, False)
 
 
 def test_a_spot_of_contact_or_many_let_fluid_through_both_ways():
-    assert winds(blocks((4, 4))) == (True, True)
-    assert winds(blocks((0, 0), (4, 4), (N - 1, 7))) == (True, True)
+    assert percolates(blocks((4, 4))) == (True, True)
+    assert percolates(blocks((0, 0), (4, 4), (N - 1, 7))) == (True, True)
 
 
 def test_a_single_open_spot_does_not_percolate():
-    assert winds(~blocks((4, 4))) == (False, False)
-    assert winds(~blocks((N - 1, N - 1))) == (False, False)  # it lies across the corner
+    assert percolates(~blocks((4, 4))) == (False, False)
+    assert percolates(~blocks((N - 1, N - 1))) == (False, False)  # it lies across the corner
 
 
 def test_a_checkerboard_of_contact_is_one_patch_that_seals():
     board = (I + J) % 2 == 0
     assert contact_patches(board).sizes.tolist() == [N * N // 2]
-    assert winds(board) == (False, False)
+    assert percolates(board) == (False, False)
     assert open_gap(board).sizes.tolist() == [1] * (N * N // 2)
 
 
 def test_a_diagonal_channel_leaks_along_both_axes():
-    assert winds(~((I - J) % N < 2)) == (True, True)
+    assert percolates(~((I - J) % N < 2)) == (True, True)
 
 
 def test_a_channel_that_closes_after_two_cells_percolates_though_it_spans_none_alone():
     """It steps down half a cell for each cell along x."""
     channel = (I - J // 2) % (N // 2) < 2
-    assert winds(~channel) == (True, True)
+    assert percolates(~channel) == (True, True)
     steep = channel.T
-    assert winds(~steep) == (True, True)
+    assert percolates(~steep) == (True, True)
 
 
 def test_to_span_the_cell_is_not_to_percolate():
     """The channel reaches from edge to edge but meets contact in the next cell."""
     open_cells = np.zeros((N, N), dtype=bool)
     open_cells[2, :6] = open_cells[2:9, 5] = open_cells[8, 5:] = True
-    assert winds(~open_cells) == (False, False)
+    assert percolates(~open_cells) == (False, False)
     open_cells[2:9, 0] = True
-    assert winds(~open_cells) == (False, True)
+    assert percolates(~open_cells) == (False, True)
 
 
 def test_patches_join_across_edges_and_corners_of_the_cell():
@@ -104,7 +104,7 @@ def test_on_a_line_scene_the_gap_is_parted_by_any_contact():
     assert sorted(contact_patches(line).sizes) == [1, 3]
 
 
-def tiled_winds(mask, corners, copies=7):
+def tiled_percolates(mask, corners, copies=7):
     """Whether a region of a tiled plane holds a point of the middle cell and its image."""
     n = len(mask)
     structure = np.ones((3, 3)) if corners else None
@@ -124,7 +124,7 @@ def test_random_masks_percolate_as_their_tiled_copies_do(corners):
     for _ in range(400):
         mask = random.random((6, 6)) < random.uniform(0.3, 0.8)
         directions = tuple(regions(mask, corners=corners).percolates.tolist())
-        assert directions == tiled_winds(mask, corners)
+        assert directions == tiled_percolates(mask, corners)
         results.append(directions)
     assert len(set(results)) == 4  # along none, one, the other, both
 
@@ -132,7 +132,7 @@ def test_random_masks_percolate_as_their_tiled_copies_do(corners):
 @given(arrays(bool, st.tuples(st.integers(3, 9), st.integers(3, 9))))
 @settings(max_examples=200)
 def test_contact_percolates_where_the_gap_leaves_it_a_way(touching):
-    """Duality on a torus: one of both alone winds, in all directions, or both do in one."""
+    """Duality on a torus: one of both alone percolates, in all directions, or both do in one."""
     gap, contact = open_gap(touching).percolates, contact_patches(touching).percolates
     if not gap.any():
         assert contact.all()

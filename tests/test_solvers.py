@@ -264,7 +264,7 @@ def test_springs_are_solved_without_iteration_and_by_iteration_alike():
 def test_sorting_refuses_what_is_not_flat():
     contact = scene(ROUGH, Power(n=0.5), POINTS).contact(0.1)
     assert not is_flat(contact)
-    with pytest.raises(InputError, match="independent of q"):
+    with pytest.raises(InputError, match="does not depend on q"):
         solve_contact(contact, Sort())
 
 

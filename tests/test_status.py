@@ -203,14 +203,14 @@ def test_another_solver_is_advised_only_to_those_who_chose_one(kind, other):
 
 
 def test_the_error_that_ended_a_task_is_told_until_the_study_is_complete(gfmd):
-    Path("spec.toml").write_text(SPEC + '\n[solver]\nkind = "sort"\n')
+    Path("spec.toml").write_text(SPEC.replace("p_star = [0.1, 1.0]", "contact_area = [0.1, 1e-4]"))
     assert gfmd("run", "spec.toml").exit_code == 1
     (parts,) = Path().glob("*.parts")
     for path in ("spec.toml", "small.h5"):
         state = answer(gfmd("status", path, "--json"))
-        assert [failure["task"] for failure in state["failed"]] == [2, 3]
-        assert all("n = 0" in failure["message"] for failure in state["failed"])
-        assert "task 2" in gfmd("status", path).output
+        assert [failure["task"] for failure in state["failed"]] == [1, 3]
+        assert all("load.contact_area" in failure["message"] for failure in state["failed"])
+        assert "task 1" in gfmd("status", path).output
     assert "gfmd status small.h5" in gfmd("analyze", "small.h5").output
     Path("spec.toml").write_text(SPEC)
     assert answer(gfmd("status", "spec.toml", "--json"))["failed"] == []

@@ -75,7 +75,7 @@ def test_a_table_without_records_is_no_text():
 
 def test_a_column_in_si_units_is_shown_where_it_means_something_in_one_row():
     columns = [TableColumn("p*", "p_star"), TableColumn("p", "pressure", unit="Pa")]
-    reduced = {"load": "p_star", "h_std": 1.0}
+    reduced = {"load": "p_star", "h_std": 1.0, "stiffness_given": 0}
     assert shown(columns, [reduced, reduced]) == columns[:1]
     assert shown(columns, [reduced, reduced | {"load": "pressure"}]) == columns
 

@@ -142,7 +142,7 @@ def test_a_bearing_without_a_known_share_has_no_deviation():
 
 @pytest.mark.parametrize("points", [32, 64, 250, 512])
 def test_the_face_of_a_punch_on_springs_has_no_deviation(points):
-    """s = k_0 (h - <h>) is the same at all its points, up to rounding."""
+    """sigma_h = k_0 (h - <h>) is the same at all its points, up to rounding."""
     scene = build_scene(Punch(radius=0.2), Power(n=0), points)
     assert np.isnan(bearing(scene.contact(0.1)).delta_sigma_c(0.1))
 

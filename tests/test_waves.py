@@ -100,6 +100,7 @@ def test_copies_of_a_line_are_counted(points):
         (line, 1, 0),
         (np.tile(line, 3), 3, 0),
         (mirrored, 1, 1),
+        (np.fft.irfft(np.fft.rfft(mirrored)[:-1], 3 * points) * 1.5, 1, 1),  # axis off the points
         (np.tile(mirrored, 2), 2, 1),
         (inverted, 1, 0),
     ):

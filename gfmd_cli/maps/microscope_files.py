@@ -49,7 +49,7 @@ REASONS = {
     "x3p: KeyError: 'DataLink'": "an X3P file with its heights in main.xml, which are not read; "
     "save them in a binary part (DataLink)",
 }
-"""What is not read, by the errors of readers that do not say it."""
+"""Reasons of refusals, by the error of the reader, which does not say them."""
 TRUEMAP, TRUEMAP_MAGIC_BYTES, TRUEMAP_COMMENT_BYTES = b"Binary TrueMap Data File v2.0", 32, 24
 MOUNTAINSMAP, MICROMETRES = b"DIGITAL SURF", re.compile(rb"(?:\xc2\xb5|\xce\xbc|\xec)m\0")
 """Micrometres in the header of MountainsMap: in UTF-8, and with the Greek letter of Windows."""

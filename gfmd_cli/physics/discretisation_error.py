@@ -62,9 +62,9 @@ PLATE_BAR, PLATE_FLOOR = 0.6, 0.2
 #   AREA_CHANGE D                                  what neither explains; D of the corrected values
 # A = area / L^2, N = points per L. Chosen on seeds 20 and 47 (full), 11 (--quick --shift 1.37).
 AREA_CHANCE, AREA_LAW, AREA_CHANGE = 0.5, 0.01, 0.3
-# Of a line profile it is LINE_CHANCE xi over the root of the A N x edges, or of the number of
-# independent waves if less; the standard deviation is 12^(-1/2) = 0.29. A gap of w points has the
-# error LINE_GAP u_g / w^2 in u_g, over the root of the number of gaps (`scripts/line_bars.py`).
+# Of a line profile it is LINE_CHANCE xi over the root of the A N xi edges, or of the number of
+# independent waves if less; the standard deviation is 12^(-1/2) = 0.29. A gap of w_g points has the
+# error LINE_GAP u_g / w_g^2 in u_g, over the root of the number of gaps (`scripts/line_bars.py`).
 LINE_CHANCE, LINE_GAP = 0.75, 1.5
 EXPONENT_CHANGE = 0.6  # of its change with q is uncertain; chosen on --layers, seeds 1 and 2
 MAX_STRESS_EXPONENT = 2.5  # sigma_p converges as spacing^(3 - n): too slow for larger n
@@ -263,7 +263,7 @@ def estimate(
     levels : one contact at one pressure on grids N, N/2, ... in any order, all of which resolve the
         surface; the two finest are used
     exponent : local exponent of the stiffness at the highest wavenumber of the finest grid
-    scales : scales of a rough surface. None for a single indenter or a line contact: errors of many
+    scales : scales of a rough surface. None for a single indenter: the errors of many
         patches then do not average out, and one grid gives no error of sigma_p and u_g
     area_exponent : exponent of the excess of the area, see `excess_exponent`; by default `exponent`
     band_limited : whether all grids contain the same waves, so that full contact is exact
@@ -361,7 +361,7 @@ def _area(
         error = _bar("a_r", SINGLE_CONTACT_AREA * xi, change)
     elif tip.dimension == 1:
         edges = min(xi * fine.area * fine.points, scales.independent_waves)
-        chance = LINE_CHANCE * xi / sqrt(edges)
+        chance = LINE_CHANCE * xi / sqrt(edges) if edges > 0 else 0.0
         error = hypot(chance, AREA_CHANGE * (change or 0.0))
     else:
         chance = AREA_CHANCE * (1 + area_n / 10) * sqrt(xi / fine.area) / fine.points
@@ -438,10 +438,10 @@ def _error_of_gaps(fine: GridValues) -> float:
 
     It matters near full contact, where u_g may by chance hardly change from grid to grid.
     """
-    x = fine.switches_per_point
-    if not x:
+    xi = fine.switches_per_point
+    if not xi:
         return 0.0
-    gaps, points = 0.5 * x * fine.area * fine.points, 2 * (1 - fine.a_r) / x
+    gaps, points = 0.5 * xi * fine.area * fine.points, 2 * (1 - fine.a_r) / xi
     return LINE_GAP * fine.u_g / points**2 / sqrt(gaps)
 
 

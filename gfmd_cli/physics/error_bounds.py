@@ -179,12 +179,12 @@ def full_contact_errors(
 
 
 def _level_bound(duality_gap: float, reaction: float, p: float) -> float:
-    """(t B / 2 + eta / t) / p at t = |p' - p| / p = sqrt(2 eta / B), where it is sqrt(2 eta B) / p.
+    """(r B / 2 + eta / r) / p at r = |p' - p| / p = sqrt(2 eta / B), where it is sqrt(2 eta B) / p.
 
-    With t at most 1, as p' >= 0. With a free boundary A takes the place of B.
+    With r at most 1, as p' >= 0. With a free boundary A takes the place of B.
     """
-    t = min(sqrt(2 * duality_gap / reaction), 1.0) if reaction > 0 else 1.0
-    return (0.5 * t * reaction + (duality_gap / t if t > 0 else 0.0)) / p
+    r = min(sqrt(2 * duality_gap / reaction), 1.0) if reaction > 0 else 1.0
+    return (0.5 * r * reaction + (duality_gap / r if r > 0 else 0.0)) / p
 
 
 def _uncertain_fraction(contact: Contact, u: Field, sigma: Field, violated: float) -> float:

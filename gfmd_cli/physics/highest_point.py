@@ -65,7 +65,7 @@ def _highest(
 ) -> list[tuple[float, float, float]]:
     """The highest points of a grid that is shifted: their heights and places in points.
 
-    `lines` are the waves along x of each of its rows, not shifted along x.
+    `lines`: Fourier coefficients along x of each row, not yet shifted along x.
     """
     count = 16 * CANDIDATES
     heights, points = np.empty(0), np.empty(0, np.int64)

@@ -64,8 +64,8 @@ class SelfAffineFit:
     hurst: float
     """Hurst exponent H."""
     hurst_error: float
-    """Standard error of H from the curvature of the likelihood, its square times the scatter; the
-    same holds for `q_r`. It includes the change of H where the longer waves have another one."""
+    """Standard error of H from the curvature of the likelihood and the scatter, as that of `q_r`.
+    It includes the change of H where the longer waves have another one."""
     q_r: float
     """Roll-off wavenumber [1/m]; 0 if the spectrum has none: C is then a power law."""
     q_r_error: float

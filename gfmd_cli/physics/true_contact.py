@@ -21,7 +21,7 @@ from gfmd_cli.physics.contact import Contact
 
 HEIGHT_BINS = 1 << 14  # of height, of width 1e-3 h_std or less for heights within +-8 h_std
 MIN_POINTS = 10  # for a standard deviation; a choice
-ROUNDING = 1e-10  # Delta_sigma; a smaller deviation of s is that of its rounding
+ROUNDING = 1e-10  # Delta_sigma; a smaller deviation of sigma_h is rounding
 
 
 @dataclass(frozen=True)
@@ -101,7 +101,7 @@ def contact_area(delta_sigma_c: Field | float, p_star: Field | float) -> Field:
 def bearing(contact: Contact) -> Bearing:
     """Compute the bearing of an indenter from its points, sorted by height in fine bins.
 
-    Fractions over which s is constant, as under a flat punch on springs, are left out.
+    Fractions over which sigma_h is constant, as under a flat punch on springs, are left out.
     """
     height = contact.height
     stress = contact.elasticity(contact.height, contact.grid.empty())

@@ -8,6 +8,7 @@ import numpy as np
 from gfmd_cli.grid.arrays import BLOCK_POINTS, Field, Mask, Modes, row_blocks
 from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.grid.modes import multiplicity
+from gfmd_cli.physics.highest_point import highest_point
 
 ROUNDING_POWER = 1e-28  # |h(q)|^2 of a mode that only rounding has excited, relative to the largest
 ROUNDED = 1e-9  # relative error by rounding of a sum over all waves; a choice
@@ -162,12 +163,13 @@ def _mirrors(grid: Grid, modes: Modes) -> int:
 def _line_mirrors(grid: Grid, modes: Modes) -> int:
     """1 if a line is its own mirror image, h(x) = h(2 a - x); overwrites the modes.
 
-    The integral of h(x) h(2 a - x), the transform of h(q)^2, is then that of h^2 at some a.
+    The integral of h(x) h(2 a - x), the transform of h(q)^2, is then that of h^2 at some a, which
+    may lie between two points.
     """
     modes[0] = 0.0
     power = float(grid.multiplicity() @ _squared(modes))
     modes *= modes
-    return int(grid.field_of_work().max() >= (1 - ROUNDED) * power > 0)
+    return int(highest_point(grid.field_of_work()) >= (1 - ROUNDED) * power > 0)
 
 
 def _has_nyquist_waves(grid: Grid, modes: Modes) -> bool:

@@ -57,7 +57,7 @@ SPRING_STIFFNESS = 0.125, 0.25  # over diagonal element and k(2 q) / k(q): Lapla
 JACOBI_EIGENVALUE = 1.04, 0.18, 1.76
 """The largest of the damped Jacobi iteration is a + b k(2 q) / k(q), at most c. With 1.76 for all k
 the transforms are 1.13 to 1.35 times as many at n = 0.75 and 1, the same from n = 1.5 on; with
-c = 1.6 1.03 to 1.13 times and with c = 1.85 0.94 to 1.01 times at n = 2 to 4:
+c = 1.6: 1.03 to 1.13 times, with c = 1.85: 0.94 to 1.01 times at n = 2 to 4:
 `multigrid.JACOBI_EIGENVALUE "(1.76, 0, 1.76)" "(1.04, 0.18, 1.6)" "(1.04, 0.18, 1.85)"
 --exponents 0.75 1 1.5 2 3 4`."""
 STEEPEST = 4.5  # exponent above which the levels limit the growth of k(q); measured, see below

@@ -40,7 +40,7 @@ from gfmd_cli.solvers.preconditioners import Preconditioner, create, select
 from gfmd_cli.solvers.projected_move import MAX_HALVINGS, MoveChoice, choose, conjugation
 
 MAX_TENSION_RATIO = 0.3  # of rms tension to rms free force
-"""With 0.1 the transforms are 0.97 to 1.05 times as many, with 1 1.03 to 1.16 times (n = 1 to 4,
+"""With 0.1 the transforms are 0.97 to 1.05 times as many, with 1: 1.03 to 1.16 times (n = 1 to 4,
 64^2 to 256^2, seeds 3 to 5):
 `scripts/solver_constants.py pcg.MAX_TENSION_RATIO 0.1 1 --exponents 1 2 3 4`."""
 MIN_SELECTION_INTERVAL = 4  # smallest number of steps between two selections of the preconditioner

@@ -14,7 +14,7 @@ from gfmd_cli.physics.linear_elastomer import LinearElastomer
 from gfmd_cli.solvers.loop import Solver, State
 
 WAVENUMBERS = np.logspace(-3, 12, 46)
-"""Those of the surfaces of practice [1/m], at which k(q) of an elastomer is compared."""
+"""Wavenumbers of real surfaces [1/m], at which k(q) of an elastomer is compared."""
 
 
 class Sort(Solver):
@@ -34,7 +34,7 @@ class Sort(Solver):
         if not is_constant(elastomer.stiffness(WAVENUMBERS)):
             raise InputError(
                 f'solver.kind: "sort" given, but the stiffness of {elastomer.label} depends on the '
-                'wavenumber; "sort" is for n = 0, "auto" for every elastomer'
+                'wavenumber (1e-3 to 1e12 1/m); "sort" is for n = 0, "auto" for every elastomer'
             )
 
     def begin(self, contact: Contact, u: Field) -> State:

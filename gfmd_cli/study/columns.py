@@ -60,7 +60,7 @@ DETAILS = (
     Column("elastomer_short", "short name of the elastomer in figures", "", str),
     Column(
         "stiffness_given",
-        "1 if the spec gives the stiffness of the elastomer, 0 if it is in units of 1 Pa",
+        "1 if the spec gives the stiffness of the elastomer, 0 if it has the default value 1",
         kind=int,
     ),
     Column("surface_sha256", "SHA-256 checksum of the file of the surface", "", str),

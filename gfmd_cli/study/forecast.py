@@ -27,8 +27,8 @@ MAX_CONVERGENT_EXPONENT = {"a_r": MAX_AREA_EXPONENT, "u_g": 4.0, "sigma_p": MAX_
 SOLVES_PER_SEARCH, SOLVES_PER_ACCURATE_SEARCH = 3.5, 5.5
 """Solves that a search of the pressure takes, those on coarser grids included, without and with
 [accuracy]: then each trial has two grids, and two more contacts give the slopes. The means over the
-tables of `scripts/load_searches.py --points 256` and of the same with `--accuracy` are 3.3 and 5.6;
-with finer grids they are smaller."""
+tables of `scripts/load_searches.py --points 256` and of the same with `--accuracy` are 3.3 and 5.6,
+here to the nearest half; with finer grids they are smaller."""
 SECONDS_PER_PAIR = 1.7e-8
 """Per grid point and pair of transforms, with all work between two of them, on one thread."""
 P_STAR = 0.1  # reduced pressure of a forecast where the load is another quantity; a choice

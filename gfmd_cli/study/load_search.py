@@ -308,7 +308,7 @@ class _Search:
 
     Secant steps from the two nearest trials of different values, held within the enclosure of the
     root; the middle of the enclosure where such a step leaves it or hardly shrinks it. Where
-    several trials have the same value, as areas between two steps have, a step is at least as long
+    several trials have the same value, as areas between two jumps have, a step is at least as long
     as the interval of these trials.
     """
 
@@ -392,7 +392,8 @@ class _Search:
         if not is_enclosed:
             start = low if start.y < 0 else high
         plateau = max(abs(at.x - start.x) for at in self.points if self._are_same(at, start))
-        step = max(abs(start.y) / self.slope, plateau, self.resolution)  # of a jump it is zero
+        by_slope = abs(start.y) / self.slope  # about zero at a jump
+        step = max(by_slope, plateau, self.resolution)
         x = start.x - copysign(min(step, MAX_STEP), start.y)
         margin = 0.5 * self.resolution
         is_inside = low.x + margin < x < high.x - margin
