@@ -351,12 +351,11 @@ def _area(
             return _plate_area(grids)
         # the line force at the edge of a plate is, on a grid, a row of points
         return Estimate(min(fine.a_r, xi), nan, nan, Verdict.BOUND)
-    per_exponent = LINE_EXCESS if tip.dimension == 1 else AREA_EXCESS
-    law = per_exponent * area_n
-    best = max(0.0, fine.a_r - law * xi)
+    factor = LINE_EXCESS if tip.dimension == 1 else AREA_EXCESS
+    best = max(0.0, fine.a_r - factor * area_n * xi)
     change = None
     if coarse is not None:
-        change = best - max(0.0, coarse.a_r - law * coarse.switches_per_point)
+        change = best - max(0.0, coarse.a_r - factor * area_n * coarse.switches_per_point)
     if scales is None:
         error = _bar("a_r", SINGLE_CONTACT_AREA * xi, change)
     elif tip.dimension == 1:
@@ -367,7 +366,7 @@ def _area(
         chance = AREA_CHANCE * (1 + area_n / 10) * sqrt(xi / fine.area) / fine.points
         unresolved = AREA_LAW * (area_n + 1) * xi * scales.phase(fine.points)
         error = hypot(chance, unresolved, AREA_CHANGE * (change or 0.0))
-    return _corrected_area(fine.a_r, best, hypot(error, per_exponent * excess.uncertainty * xi))
+    return _corrected_area(fine.a_r, best, hypot(error, factor * excess.uncertainty * xi))
 
 
 def _plate_area(grids: NestedGrids) -> Estimate:

@@ -49,12 +49,12 @@ def texture(grid: Grid, height: Field) -> Texture:
         numbers = np.flatnonzero(_occupied(_power(grid, modes)))
         tiles = max(int(np.gcd.reduce(numbers)), 1)
         return Texture(inf, 1.0, tiles, _line_mirrors(grid, modes), 1.0, has_nyquist_waves)
-    power, mirrors, directions = _power(grid, modes), _mirrors(grid, modes), _slopes(grid, modes)
+    power, mirrors = _power(grid, modes), _mirrors(grid, modes)
     # of m tiles along an axis, only every m-th mode is not zero
     modes_along = [np.flatnonzero(_occupied(power).any(axis=axis)) for axis in range(2)]
     tiles = prod(max(int(np.gcd.reduce(numbers)), 1) for numbers in modes_along)
     repetitions = _concentration(grid, power) / (tiles * MIRRORED_CONCENTRATION[mirrors])
-    return Texture(*directions, tiles, mirrors, repetitions, has_nyquist_waves)
+    return Texture(*_directions(grid, modes), tiles, mirrors, repetitions, has_nyquist_waves)
 
 
 def radial_power(grid: Grid, height: Field) -> tuple[Field, Field, Field]:
@@ -103,7 +103,7 @@ def _squared(modes: Modes) -> Field:
     return np.square(modes.real) + np.square(modes.imag)
 
 
-def _slopes(grid: Grid, modes: Modes) -> tuple[float, float]:
+def _directions(grid: Grid, modes: Modes) -> tuple[float, float]:
     """Anisotropy and share along x, from the tensor <grad h grad h> of the waves of the surface."""
     x = np.arange(*grid.span, dtype=np.float64)
     weight = grid.multiplicity()

@@ -52,7 +52,7 @@ MAX_LAPLACIAN_GROWTH = 5.0  # growth of k(q) above which the Laplacian is square
 not. At n = 2.2 both are the same within 4 %:
 `multigrid.MAX_LAPLACIAN_GROWTH 3 20 --exponents 2 2.2 2.5 3`."""
 SPRING_STIFFNESS = 0.125, 0.25  # over diagonal element and k(2 q) / k(q): Laplacian, its square
-"""Half: 1 % fewer to 17 % more (most at n = 2); double: 4 % fewer to 35 % more (most at n = 3):
+"""Half: 1 % fewer to 18 % more (most at n = 1 and 2); double: 2 % fewer to 35 % more (n = 3):
 `multigrid.SPRING_STIFFNESS "(0.0625, 0.125)" "(0.25, 0.5)" --exponents 1 2 3 4`."""
 JACOBI_EIGENVALUE = 1.04, 0.18, 1.76
 """The largest of the damped Jacobi iteration is a + b k(2 q) / k(q), at most c. With 1.76 for all k

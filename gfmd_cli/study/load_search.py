@@ -357,10 +357,13 @@ class _Search:
     @property
     def root(self) -> float:
         """Estimate of ln p at the load: a secant step from the nearest trial, in the enclosure."""
-        x, y, _ = self.points[0]
-        x -= max(-MAX_STEP, min(y / self.slope, MAX_STEP))
         low, high = self._enclosure()
-        return min(max(low.x, x), high.x)
+        return min(max(low.x, self._secant(self.points[0])), high.x)
+
+    def _secant(self, start: _Point, least: float = 0.0) -> float:
+        """ln p after a secant step from a trial, at least `least` and at most MAX_STEP long."""
+        step = max(abs(start.y) / self.slope, least)
+        return start.x - copysign(min(step, MAX_STEP), start.y)
 
     @property
     def succeeded(self) -> bool:
@@ -392,9 +395,7 @@ class _Search:
         if not is_enclosed:
             start = low if start.y < 0 else high
         plateau = max(abs(at.x - start.x) for at in self.points if self._are_same(at, start))
-        by_slope = abs(start.y) / self.slope  # about zero at a jump
-        step = max(by_slope, plateau, self.resolution)
-        x = start.x - copysign(min(step, MAX_STEP), start.y)
+        x = self._secant(start, max(plateau, self.resolution))  # its length is about 0 at a jump
         margin = 0.5 * self.resolution
         is_inside = low.x + margin < x < high.x - margin
         if is_enclosed and (not is_inside or len(self.points) % 5 == 4):

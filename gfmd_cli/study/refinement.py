@@ -112,7 +112,7 @@ def solve_on_grids(task: Task, context: SolveContext, watcher: Watcher) -> TaskS
     """
     sizes = _sizes(task)
     grids = watcher.notes.grids
-    if [grid.points for grid in grids] != sizes[:-1][: len(grids)]:  # of other grids
+    if [grid.points for grid in grids] != sizes[:-1][: len(grids)]:  # the notes are of other sizes
         grids = watcher.notes.grids = []
     solved: TaskSolution | None = None
     for points in sizes[len(grids) :]:
