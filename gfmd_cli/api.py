@@ -270,8 +270,8 @@ def run(
     Interrupted
         If a signal stopped the run.
     KeyboardInterrupt
-        After a second SIGINT (Ctrl-C): the tasks at work go on from their last checkpoints in the
-        next call.
+        After a second SIGINT (Ctrl-C). The next call resumes unfinished tasks from their last
+        checkpoints.
     """
     resolved, text = _read(spec, overrides)
     path = Path(study if study is not None else f"{resolved.study.name}.h5")
