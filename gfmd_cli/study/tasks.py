@@ -292,9 +292,7 @@ def _swept_keys(alternatives: list[SpecTable]) -> set[str]:
     return {key for key, count in counts.items() if count > 1}
 
 
-def _swept_words(
-    chosen: dict[str, SpecTable], swept_keys: dict[str, set[str]]
-) -> tuple[str, ...]:
+def _swept_words(chosen: dict[str, SpecTable], swept_keys: dict[str, set[str]]) -> tuple[str, ...]:
     """The swept keys of surface, grid and solver, as words; the label has the others already."""
     words: list[str] = []
     for table in ("surface", "grid", "solver"):
