@@ -236,7 +236,9 @@ def test_what_is_no_bench_is_not_replaced(gfmd):
     Path("notes.h5").write_text("dear diary")
     with h5py.File("study.h5", "w") as file:
         file.attrs["layout"] = 1
-    for name in ("notes.h5", "study.h5"):
+    with h5py.File("damaged.h5", "w") as file:
+        file.attrs.update({"bench_layout": 1, "spec": [1.0, 2.0]})
+    for name in ("notes.h5", "study.h5", "damaged.h5"):
         before = Path(name).read_bytes()
         result = gfmd("bench", "spec.toml", "-o", name)
         assert result.exit_code == 2

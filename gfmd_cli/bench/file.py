@@ -81,7 +81,7 @@ def check_target(path: Path, spec: Spec) -> None:
     try:
         with open_hdf5(path) as file:
             old_spec = json.loads(file.attrs["spec"]) if BENCH in file.attrs else None
-    except (OSError, KeyError, ValueError):
+    except DAMAGE:
         old_spec = None
     if old_spec is None:
         raise InputError(f"{path}: exists and is not a bench file; take another name (-o)")
