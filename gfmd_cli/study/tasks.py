@@ -160,12 +160,23 @@ def _tasks(spec: models.Spec, *, suited: bool) -> list[Task]:
             for table, key in (("surface", "edges"), ("grid", "boundary"))
             if key in tables[table]
         }
+        shared = chosen | {
+            "surface_sha256": tables["surface"].get("sha256", ""),
+            "elastomer_sha256": tables["elastomer"].get("sha256", ""),
+            "scene_id": digest([tables[name] for name in ("surface", "elastomer", "grid")]),
+            "swept": _swept_words(chosen, swept_keys),
+            "files": tuple(
+                (path, versions[path], tables[table]["sha256"])
+                for table in ("surface", "elastomer")
+                if (path := chosen[table].file) is not None
+            ),
+        }
         for load in loads:
             points = _points(spec, chosen, load)
             surface, points_y = chosen["grid"].on_cell(chosen["surface"], points)
             task = Task(
                 index=len(tasks),
-                **chosen | {"surface": surface},
+                **shared | {"surface": surface},
                 points=points,
                 points_y=points_y,
                 quantity=spec.load.quantity,
@@ -174,15 +185,6 @@ def _tasks(spec: models.Spec, *, suited: bool) -> list[Task]:
                 output=spec.output,
                 accuracy=spec.accuracy,
                 id=_task_id(spec, resolved, tables, load),
-                surface_sha256=tables["surface"].get("sha256", ""),
-                elastomer_sha256=tables["elastomer"].get("sha256", ""),
-                scene_id=digest([tables[name] for name in ("surface", "elastomer", "grid")]),
-                swept=_swept_words(chosen, swept_keys),
-                files=tuple(
-                    (path, versions[path], tables[table]["sha256"])
-                    for table in ("surface", "elastomer")
-                    if (path := chosen[table].file) is not None
-                ),
             )
             _check_unit(task)
             tasks.setdefault(task.id, task)  # loads may agree in all digits that count
