@@ -151,11 +151,17 @@ def test_the_table_has_a_dash_where_an_error_is_never_reached():
 
 def test_names_tell_runs_of_one_solver_apart():
     traces = [made_up([1.0], tolerance=1e-3), made_up([1.0]), made_up([1.0], nested=False)]
-    assert solver_names(traces) == ["a 0.001", "a 1e-06", "a 1e-06 not nested"]
+    assert solver_names(traces) == [
+        "a, tolerance=0.001, nested=True",
+        "a, tolerance=1e-06, nested=True",
+        "a, tolerance=1e-06, nested=False",
+    ]
     assert solver_names(traces[1:2]) == ["a"]
     traces = [made_up([1.0], time_step=step, max_steps=9) for step in (0.5, 1.2)]
     other = made_up([1.0], solver="b", max_steps=7)
-    assert solver_names([*traces, other]) == ["a time_step=0.5", "a time_step=1.2", "b"]
+    assert solver_names([*traces, other]) == [
+        "a, max_steps=9, time_step=0.5", "a, max_steps=9, time_step=1.2", "b, max_steps=7",
+    ]  # fmt: skip
 
 
 def test_the_keys_of_each_solver_are_stored_with_its_trace(spec_of):
@@ -230,7 +236,9 @@ def test_what_is_no_bench_is_not_replaced(gfmd):
     Path("notes.h5").write_text("dear diary")
     with h5py.File("study.h5", "w") as file:
         file.attrs["layout"] = 1
-    for name in ("notes.h5", "study.h5"):
+    with h5py.File("damaged.h5", "w") as file:
+        file.attrs.update({"bench_layout": 1, "spec": [1.0, 2.0]})
+    for name in ("notes.h5", "study.h5", "damaged.h5"):
         before = Path(name).read_bytes()
         result = gfmd("bench", "spec.toml", "-o", name)
         assert result.exit_code == 2

@@ -84,6 +84,14 @@ def test_a_column_that_lies_in_another_file_is_refused(report, tmp_path, how):
     assert refused(report(move_out), "seconds", "other files")
 
 
+@pytest.mark.parametrize("name", ["solver", "time_step", "boundary"])
+def test_a_list_in_the_place_of_a_value_is_refused(report, name):
+    def change(file):
+        file["runs/0"].attrs[name] = [1.0, 2.0]
+
+    assert refused(report(change), name)
+
+
 @settings(max_examples=EXAMPLES)
 @given(data=st.data())
 def test_a_changed_bench_is_drawn_or_refused(report, data):

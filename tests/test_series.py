@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from gfmd_cli.analysis.compare import compare
+from gfmd_cli.analysis.compare import compare, with_solvers
 from gfmd_cli.analysis.curve_styles import seed_groups, with_styles
 from gfmd_cli.analysis.ensemble import Ensemble, ensembles
 from gfmd_cli.analysis.figures import PANELS, Series, _point, study_figures
@@ -122,3 +122,5 @@ def test_a_key_that_one_of_the_solvers_lacks_splits_no_curve(tmp_path, rows_of):
     rows_of("elastomer.n=1", "surface.seed=0", "solver.kind=['fire', 'ccg']", name="two.h5")
     curves = compare(tmp_path / "two.h5").curves  # ccg has no time_step: its cells are blank
     assert [len(curve.rows) for curve in curves] == [3, 3]
+    titles = with_solvers(["a", "b"], [curve.rows[0] for curve in curves])
+    assert titles == ["a, fire", "b, ccg"]

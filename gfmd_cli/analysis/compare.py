@@ -251,9 +251,12 @@ def solver_of(row: Row) -> tuple[str, ...]:
 
 
 def with_solvers(titles: Iterable[str], rows: Sequence[Row]) -> list[str]:
-    """Titles of contacts, followed by the keys of [solver] in which the contacts differ."""
+    """Titles of contacts, followed by the keys of [solver] in which the contacts differ.
+
+    A key that only some kinds of solvers have counts if these differ in it.
+    """
     columns = zip(*map(solver_of, rows), strict=True)
-    differing = [column for column in columns if len(set(column)) > 1]
+    differing = [column for column in columns if len(set(column) - {""}) > 1]
     return [
         ", ".join(filter(None, (title, *(column[i] for column in differing))))
         for i, title in enumerate(titles)

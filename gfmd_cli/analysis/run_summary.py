@@ -17,7 +17,7 @@ from gfmd_cli.analysis.tables import (
     best_value,
     warnings_in,
 )
-from gfmd_cli.analysis.wording import contact_title, grid_size, shown
+from gfmd_cli.analysis.wording import contact_and_boundary, contact_title, grid_size, shown
 from gfmd_cli.physics.observables import QUANTITIES
 from gfmd_cli.study.measure import planned
 from gfmd_cli.study.reading import solved_rows, tell_files_apart
@@ -67,14 +67,13 @@ def task_text(tasks: Sequence[Task], outcomes: Mapping[str, Outcome], missing: s
 
 
 def _contacts_of(tasks: Sequence[Task]) -> list[str]:
-    """Elastomer and surface of each task, and the swept keys of grid and solver."""
+    """Elastomer, surface and boundary of each task, and the keys of the solver that differ."""
     rows = [
         planned(task) | {"elastomer": task.elastomer.label_on(task.surface.sides[-1])}
         for task in tasks
     ]
     tell_files_apart(rows)
-    swept = [[word for table, word in task.swept if table != "surface"] for task in tasks]
-    return [", ".join([contact_title(row), *words]) for row, words in zip(rows, swept, strict=True)]
+    return with_solvers(map(contact_and_boundary, rows), rows)
 
 
 def run_text(rows: list[dict[str, Any]]) -> str:

@@ -81,7 +81,7 @@ def check_target(path: Path, spec: Spec) -> None:
     try:
         with open_hdf5(path) as file:
             old_spec = json.loads(file.attrs["spec"]) if BENCH in file.attrs else None
-    except (OSError, KeyError, ValueError):
+    except DAMAGE:
         old_spec = None
     if old_spec is None:
         raise InputError(f"{path}: exists and is not a bench file; take another name (-o)")
@@ -129,6 +129,9 @@ def _read_trace(group: Any) -> Trace:
         name: value.item() if isinstance(value, np.generic) else value
         for name, value in group.attrs.items()
     }
+    for name, value in row.items():
+        if not isinstance(value, str | int | float):
+            raise ValueError(f"{name} is not a single value")
     for name, kind in ROW.items():
         if type(row[name]) is not kind:
             raise ValueError(f"{name} is {row[name]!r}, not of type {kind.__name__}")

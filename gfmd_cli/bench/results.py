@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from gfmd_cli.analysis.compare import with_solvers
 from gfmd_cli.analysis.curve_styles import CurveStyle, distinct_styles, literal
 from gfmd_cli.analysis.plotting import SMALL, WIDTH, LegendFigure, log_scale, styled
 from gfmd_cli.analysis.selection import grouped
@@ -31,12 +32,8 @@ COST_LABELS = {
 }
 ROOM = 2.0  # for the symbols at the ends of a curve
 MAX_LABEL = 100  # characters of a title and of a file name
-NAMED_KEYS = ("solver_kind", "tolerance", "nested")  # of [solver], in words of their own
-OTHER_KEYS = [
-    each.column.name
-    for each in PARAMETERS
-    if each.table == "solver" and each.column.name not in NAMED_KEYS
-]
+SOLVER_KEYS = {each.column.name: each.column.blank for each in PARAMETERS if each.table == "solver"}
+"""Columns of [solver], and the blank value of each."""
 ERROR = r"relative error of $u_g$"
 LEVELS = ("1e-2", "1e-4", "1e-6")
 """Relative errors of the mean gap."""
@@ -93,25 +90,9 @@ def contact_of(trace: Trace) -> tuple[Any, ...]:
 
 
 def solver_names(traces: list[Trace]) -> list[str]:
-    """Each solver, with its tolerance and its start where these are not the same for all.
-
-    Other keys of [solver] follow where solvers of the same kind differ in them.
-    """
-    tolerances = {trace.row["tolerance"] for trace in traces}
-    starts = {trace.row["nested"] for trace in traces}
-    names = []
-    for trace in traces:
-        name = str(trace.row["solver"])
-        if len(tolerances) > 1:
-            name += f" {trace.row['tolerance']:g}"
-        if len(starts) > 1 and not trace.row["nested"]:
-            name += " not nested"
-        for key in OTHER_KEYS:
-            values = {t.row.get(key) for t in traces if t.row["solver"] == trace.row["solver"]}
-            if len(values) > 1 and key in trace.row:
-                name += f" {key}={trace.row[key]}"
-        names.append(name)
-    return names
+    """Each solver, with the other keys of [solver] in which the traces differ."""
+    rows = [SOLVER_KEYS | trace.row | {"solver_kind": ""} for trace in traces]
+    return with_solvers((trace.row["solver"] for trace in traces), rows)
 
 
 def draw_bench(traces: list[Trace], folder: Path) -> list[Path]:

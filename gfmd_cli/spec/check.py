@@ -77,25 +77,26 @@ class Check:
     ) -> None:
         self.name, self.folder = name, folder
         self.problems: list[str] = []
-        self.places = {
+        self.given_at = {
             override.partition("=")[0].strip(): f"--set {override}" for override in overrides
         }
         table = ""
         for number, line in enumerate(text.splitlines(), 1):
+            place = f"{name}:{number}"
             if header := re.match(r"\s*\[+\s*([\w.\-]+)\s*\]+", line):
                 table = header[1]
-                self.places.setdefault(table, f"{name}:{number}")
+                self.given_at.setdefault(table, place)
             elif key := re.match(r"\s*([\w.\-]+)\s*=", line):
-                self.places.setdefault(f"{table}.{key[1]}" if table else key[1], f"{name}:{number}")
-        for address, place in list(self.places.items()):  # of a table that the text does not have
-            self.places.setdefault(address.partition(".")[0], place)
+                self.given_at.setdefault(f"{table}.{key[1]}" if table else key[1], place)
+        for address, place in list(self.given_at.items()):  # of a table that the text does not have
+            self.given_at.setdefault(address.partition(".")[0], place)
 
     def where(self, key: str) -> str:
         """The place of a key, or of the table around it."""
         plain = re.sub(r"\[\d+\]", "", key)
-        while plain and plain not in self.places:
+        while plain and plain not in self.given_at:
             plain = plain.rpartition(".")[0]
-        return self.places.get(plain, self.name)
+        return self.given_at.get(plain, self.name)
 
     def add(self, key: str, text: str) -> None:
         """Note what is wrong with a key."""
@@ -275,22 +276,27 @@ def _problem(name: str, places: dict[str, int], detail: Any) -> tuple[str, str]:
         known = [field.alias or field_name for field_name, field in within.model_fields.items()]
         text = _unknown(str(path[-1]), known, "key")
         owners = [kind for kind, other in kinds.items() if path[-1] in other.model_fields]
-        text += f"; kind {' or '.join(owners)} has it" if owners else ""
-    elif detail["type"] == "missing":
-        text = "is missing"
-    else:
-        message = detail["msg"].removeprefix("Value error, ").replace("Input should", "must")
-        message = message[:1].lower() + message[1:]
-        if detail["type"].startswith(("greater_than", "less_than")):
-            message = LONG_NUMBER.sub(lambda number: f"{float(number[0]):g}", message)
-        given = detail["input"]
-        if detail["type"] in WORDS:
-            message = WORDS[detail["type"]].format(**detail.get("ctx", {}))
-        is_table = detail["type"] == "value_error" and isinstance(given, dict)
-        text = message if is_table else f"{message}, got {shortened(repr(given))}"
-        if isinstance(given, str) and NUMBER.fullmatch(given):
-            text += ": write a number as TOML has it, such as 1.0 or 10, without quotation marks"
-    return key, text
+        return key, text + (f"; kind {' or '.join(owners)} has it" if owners else "")
+    return key, _refusal(detail)
+
+
+def _refusal(detail: Any) -> str:
+    """What is allowed and what was given, of a value that pydantic refuses."""
+    error, given, message = detail["type"], detail["input"], detail["msg"]
+    if error == "missing":
+        return "is missing"
+    message = message.removeprefix("Value error, ").replace("Input should", "must")
+    message = message[:1].lower() + message[1:]
+    if error.startswith(("greater_than", "less_than")):
+        message = LONG_NUMBER.sub(lambda number: f"{float(number[0]):g}", message)
+    if error in WORDS:
+        message = WORDS[error].format(**detail.get("ctx", {}))
+    if error == "value_error" and isinstance(given, dict):  # of a whole table
+        return str(message)
+    text = f"{message}, got {shortened(repr(given))}"
+    if isinstance(given, str) and NUMBER.fullmatch(given):
+        text += ": write a number as TOML has it, such as 1.0 or 10, without quotation marks"
+    return text
 
 
 def _unknown(given: str, known: Iterable[str], what: str) -> str:

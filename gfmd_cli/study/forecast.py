@@ -66,6 +66,13 @@ def fields_of_levels(shape: tuple[int, int], sides: tuple[float, ...]) -> float:
     return ODD_FIELDS if any(count % 2 for count in shape) else 0.0
 
 
+def solves(is_searched: bool, is_accurate: bool) -> float:
+    """Solves of a task whose pressure is searched or given, with [accuracy] or without."""
+    if not is_searched:
+        return 1.0
+    return SOLVES_PER_ACCURATE_SEARCH if is_accurate else SOLVES_PER_SEARCH
+
+
 def pairs(exponent: float | None, p_star: float, tolerance: float) -> float:
     """Time of a solve over that of a pair of transforms."""
     if exponent == 0:

@@ -71,42 +71,46 @@ class TaskWatcher(Watcher):
             self._report_step(contact, state)
         if self.context.ranks is not None and contact.grid.whole:
             return  # a small grid, which each process solves on its own
-        reached = contact.grid.whole_shape, state.step
-        self.first = self.first or reached
+        self.first = self.first or (contact.grid.whole_shape, state.step)
         request = SAVE if now - self.last_save > self.context.options.checkpoint_every else 0.0
         if self.context.stop.is_set():
             request = STOP
         request = contact.grid.max(request)
         if request == STOP:
-            self.context.stop.set()
-            if reached == self.first:  # else calls with too little time would never get further
-                self.short = True
-                return
+            self._stop(contact, state)
+        elif request == SAVE:
+            self._save(contact, state)
+
+    def _stop(self, contact: Contact, state: State) -> None:
+        """Save the state and raise Interrupted, unless it is the first one of this call."""
+        self.context.stop.set()
+        if self.first == (contact.grid.whole_shape, state.step):
+            self.short = True  # else calls with too little time would never get further
+            return
+        self.checkpoint.save(contact, state, self.notes)
+        if self.short:
+            seconds = duration(max(1.0, time.monotonic() - self.begun))
+            self._warn(
+                f"{self.task.label}: stopped after its first step, which took {seconds}; a shorter "
+                "call makes no progress"
+            )
+        raise Interrupted(f"{self.task.label}: stopped, state saved")
+
+    def _save(self, contact: Contact, state: State) -> None:
+        """Save the state if that is possible: the solve does not need it."""
+        try:
             self.checkpoint.save(contact, state, self.notes)
-            if self.short:
-                self._warn_of_short_call()
-            raise Interrupted(f"{self.task.label}: stopped, state saved")
-        if request == SAVE:
-            try:
-                self.checkpoint.save(contact, state, self.notes)
-            except SpaceError as error:  # the solve does not need the saved state
-                if not self.unsaved:
-                    self._warn(f"checkpoint: {error}; the solve goes on without")
-                self.unsaved = True
-            self.last_save = time.monotonic()
+        except SpaceError as error:
+            if not self.unsaved:
+                self._warn(f"checkpoint: {error}; the solve goes on without")
+            self.unsaved = True
+        self.last_save = time.monotonic()
 
     def _report_step(self, contact: Contact, state: State) -> None:
         grid, task = contact.grid, self.task
         a_r = float(contact_points(contact.obstacle, state.u, state.sigma).mean())
         numbers = grid.points, state.step, state.residual, a_r
         self.context.report(Progress(task.index, "step", task.label, *numbers, size=grid.size))
-
-    def _warn_of_short_call(self) -> None:
-        seconds = duration(max(1.0, time.monotonic() - self.begun))
-        self._warn(
-            f"{self.task.label}: stopped after its first step, which took {seconds}; a shorter "
-            "call makes no progress"
-        )
 
 
 def attempt(task: Task, parts: Path, context: SolveContext) -> Status:

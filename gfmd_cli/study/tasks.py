@@ -52,8 +52,8 @@ class Task:
     """Checksum of the file of the surface; "" without a file."""
     elastomer_sha256: str
     """Checksum of the table of the elastomer, likewise."""
-    swept: tuple[tuple[str, str], ...]
-    """Swept keys of surface, grid and solver: the table, and the value as a word of the label."""
+    swept: tuple[str, ...]
+    """Swept keys of surface, grid and solver, as words of the label."""
     files: tuple[tuple[Path, Version, str], ...] = ()
     """The files of surface and elastomer with their checksums, and their versions before these
     were computed."""
@@ -82,8 +82,7 @@ class Task:
         points = "auto" if self.auto else str(self.points)
         if not self.auto and self.points_y not in (1, self.points):
             points += f"x{self.points_y}"
-        swept = (word for _, word in self.swept)
-        return " ".join([self.elastomer.label, *swept, points, self.load_label])
+        return " ".join([self.elastomer.label, *self.swept, points, self.load_label])
 
     @property
     def load_label(self) -> str:
@@ -128,11 +127,8 @@ class Task:
     @property
     def seconds(self) -> float:
         """Time that the solve is expected to take on one thread, within a factor of about three."""
-        solves = 1.0
-        if models.LOADS[self.quantity].searched:
-            solves = forecast.SOLVES_PER_SEARCH
-            if self.accuracy is not None:
-                solves = forecast.SOLVES_PER_ACCURATE_SEARCH
+        is_searched = bool(models.LOADS[self.quantity].searched)
+        solves = forecast.solves(is_searched, self.accuracy is not None)
         p_star = self.load if self.quantity == "p_star" else forecast.P_STAR
         pairs = forecast.pairs(self.elastomer.exponent, p_star, self.solver.tolerance)
         return 0.01 + solves * forecast.SECONDS_PER_PAIR * self.size * pairs
@@ -164,12 +160,23 @@ def _tasks(spec: models.Spec, *, suited: bool) -> list[Task]:
             for table, key in (("surface", "edges"), ("grid", "boundary"))
             if key in tables[table]
         }
+        shared = chosen | {
+            "surface_sha256": tables["surface"].get("sha256", ""),
+            "elastomer_sha256": tables["elastomer"].get("sha256", ""),
+            "scene_id": digest([tables[name] for name in ("surface", "elastomer", "grid")]),
+            "swept": _swept_words(chosen, swept_keys),
+            "files": tuple(
+                (path, versions[path], tables[table]["sha256"])
+                for table in ("surface", "elastomer")
+                if (path := chosen[table].file) is not None
+            ),
+        }
         for load in loads:
             points = _points(spec, chosen, load)
             surface, points_y = chosen["grid"].on_cell(chosen["surface"], points)
             task = Task(
                 index=len(tasks),
-                **chosen | {"surface": surface},
+                **shared | {"surface": surface},
                 points=points,
                 points_y=points_y,
                 quantity=spec.load.quantity,
@@ -178,15 +185,6 @@ def _tasks(spec: models.Spec, *, suited: bool) -> list[Task]:
                 output=spec.output,
                 accuracy=spec.accuracy,
                 id=_task_id(spec, resolved, tables, load),
-                surface_sha256=tables["surface"].get("sha256", ""),
-                elastomer_sha256=tables["elastomer"].get("sha256", ""),
-                scene_id=digest([tables[name] for name in ("surface", "elastomer", "grid")]),
-                swept=_swept_words(chosen, swept_keys),
-                files=tuple(
-                    (path, versions[path], tables[table]["sha256"])
-                    for table in ("surface", "elastomer")
-                    if (path := chosen[table].file) is not None
-                ),
             )
             _check_unit(task)
             tasks.setdefault(task.id, task)  # loads may agree in all digits that count
@@ -296,12 +294,10 @@ def _swept_keys(alternatives: list[SpecTable]) -> set[str]:
     return {key for key, count in counts.items() if count > 1}
 
 
-def _swept_words(
-    chosen: dict[str, SpecTable], swept_keys: dict[str, set[str]]
-) -> tuple[tuple[str, str], ...]:
+def _swept_words(chosen: dict[str, SpecTable], swept_keys: dict[str, set[str]]) -> tuple[str, ...]:
     """The swept keys of surface, grid and solver, as words; the label has the others already."""
-    words: list[tuple[str, str]] = []
+    words: list[str] = []
     for table in ("surface", "grid", "solver"):
         given = {"kind", *chosen[table].model_fields_set} - {"points", "points_y"}
-        words += [(table, word) for word in chosen[table].words(given & swept_keys[table])]
+        words += chosen[table].words(given & swept_keys[table])
     return tuple(words)

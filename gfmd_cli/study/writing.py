@@ -24,7 +24,7 @@ def write_study(
     file: Any,
     attributes: Mapping[str, str],
     entries: Sequence[Entry],
-    load: Callable[[int], TaskResult],
+    result_of: Callable[[int], TaskResult],
     *,
     labelled: bool = True,
 ) -> None:
@@ -34,7 +34,7 @@ def write_study(
     ----------
     file : the new HDF5 file
     entries : the tasks in order
-    load : the result of a solved task by its index; one is held at a time
+    result_of : the result of a solved task by its index; one is held at a time
     labelled : whether users open it; without, as in a record, the columns of a kind share a
         dataset and there are no labels: a tenth of the time
     """
@@ -62,7 +62,7 @@ def write_study(
     for index, entry in enumerate(entries):
         describes = described.get(entry.scene_id) == index
         if describes or any(name.partition(".")[0] in with_arrays for name in entry.stored):
-            result = load(index)
+            result = result_of(index)
             if describes:
                 writer.scene(file, f"scenes/{scenes[entry.scene_id]}", result)
             writer.arrays(file, index, groups, result)
