@@ -365,7 +365,7 @@ def test_colours_go_along_a_long_sweep_of_one_parameter(study):
     assert [item.style.colour for item in items] == colours(17)
 
 
-@pytest.mark.parametrize(("count", "heading"), [(8, ""), (9, "n = 1"), (20, "n = 1"), (21, "")])
+@pytest.mark.parametrize(("count", "heading"), [(8, ""), (9, "n = 1"), (20, "n = 1")])
 def test_a_figure_of_a_long_sweep_names_its_elastomer_above_the_legend(study, count, heading):
     comparison = hurst_sweep(study, np.linspace(0.1, 0.9, count))
     with styled():
@@ -378,7 +378,22 @@ def test_a_figure_of_a_long_sweep_names_its_elastomer_above_the_legend(study, co
     assert any("n = 1" in text for text in texts)
 
 
+def test_the_legend_of_very_many_curves_names_a_few_of_them(study):
+    """Each curve keeps a colour of its own, along the sweep; the legend says what it leaves out."""
+    values = np.linspace(0.1, 0.9, 33)
+    items = with_styles(hurst_sweep(study, values))
+    assert len({item.style.colour for item in items}) == values.size
+    with styled():
+        plot = study_figures(hurst_sweep(study, values), items)["contact_area"]
+    named = [f"hurst={hurst:.12g}" for hurst in values[::4]]
+    assert [*plot.entries] == [*named, "Persson theory"]
+    assert plot.heading == "n = 1, 9 of 33 curves are named"
+    assert [entry["name"] for entry in interactive(plot)["legend"]] == [*plot.entries]
+
+
 def test_curves_that_share_a_style_say_what_differs(study):
-    comparison = hurst_sweep(study, np.linspace(0.1, 0.9, 21))
-    (label,) = {style.label for style in curve_styles(comparison.curves)}
-    assert label == "n = 1, several hurst"
+    curves = hurst_sweep(study, np.linspace(0.1, 0.9, 21)).curves
+    rows = [curve.rows[0] | {"cutoff": 0.1 + 0.001 * i} for i, curve in enumerate(curves)]
+    both = [replace(curve, rows=[row]) for curve, row in zip(curves, rows, strict=True)]
+    (label,) = {style.label for style in curve_styles(both)}
+    assert label == "n = 1, several hurst, cutoff"
