@@ -307,6 +307,32 @@ def test_a_logarithmic_axis_of_many_decades_has_few_ticks():
     assert 2 <= sum(low <= tick <= high for tick in plot.axes.get_xticks()) <= 5
 
 
+@pytest.mark.parametrize(("decades", "ticks"), [(0.9, 5), (1.2, 3), (1.6, 5)])
+def test_labels_of_a_short_logarithmic_axis_do_not_overlap_on_the_page(decades, ticks):
+    """At five ticks, plotly.js labels all of 2 to 9 on an axis of 1 to 1.5 decades."""
+    plot = ColumnFigure("x", "y")
+    plot.line("a line", np.array([0.0, 1.0]), np.array([1.0, 2.0]), color="black")
+    plot.axes.set(yscale="log", ylim=(1.0, 10.0**decades))
+    layout = interactive(plot)["layout"]
+    assert layout["yaxis"]["nticks"] == ticks
+    assert layout["xaxis"]["nticks"] == 5
+
+
+def test_error_bars_up_to_half_of_their_value_are_within_the_axes(study):
+    keys = ("elastomer.n=1", "accuracy={contact_area=1e-9, mean_gap=1e-9}")
+    comparison = study(ROUGH, *keys, "output.histogram=false")
+    for name in ("contact_area_ratio", "mean_gap_tail"):
+        plot = figure_of(name, comparison)
+        low, high = plot.axes.get_ylim()
+        points = [layer for layer in plot.layers if layer.kind == "points"]
+        bars = [np.minimum(layer.error, layer.y / 2) for layer in points]
+        assert any(np.any(bar > 0) for bar in bars)
+        for layer, (down, up) in zip(points, bars, strict=True):
+            known = np.isfinite(down)
+            assert np.all((layer.y - down)[known] >= low)
+            assert np.all((layer.y + up)[known] <= high)
+
+
 def test_values_that_are_nearly_the_same_need_no_offset_on_their_axis():
     plot = ColumnFigure("x", "y")
     plot.scale("y", "linear", np.array([1.0, 1.0 + 6e-7]), zero=False)
