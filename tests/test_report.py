@@ -453,6 +453,13 @@ def test_a_line_scene_shows_its_fields_as_a_cross_section(invoke, tmp_path):
     assert not any(label.startswith("Map of") for label in labels)
 
 
+def test_only_rough_surfaces_have_a_spectrum(invoke, tmp_path, whole):
+    """The self-affine surface nearest to a single indenter means nothing."""
+    anchor = 'id="surface-spectrum"'
+    assert anchor in whole
+    assert anchor not in report(solved(invoke, tmp_path, LINE))
+
+
 def test_the_command_writes_beside_the_study_and_says_so(invoke, copied):
     done = invoke("report", copied)
     assert done.exit_code == 0

@@ -55,13 +55,13 @@ def _drawings(row: Row, pictures: dict[str, Picture], place: str) -> list[Drawin
 
 
 def surface_spectrum(data: ReportData) -> Section:
-    """C(q), double logarithmic."""
+    """C(q), double logarithmic, of rough surfaces; a blank section without one."""
     scenes: dict[tuple[str, str, float], Curve] = {}
     for _, curve in data.curves:
         row = curve.rows[0]
         key = (curve.surface, row["preparation"], row["h_std"])  # of two studies the same once
         scenes.setdefault(key, curve)
-    rough = [curve for curve in scenes.values() if curve.persson.shells.q.size]
+    rough = [curve for curve in scenes.values() if curve.has_theory and curve.persson.shells.q.size]
     spectra = [(curve.rows[0], _spectrum(curve)) for curve in rough]
     spectra = [(row, each) for row, each in spectra if each.q.size]
     if not spectra:
