@@ -436,11 +436,28 @@ def test_the_cross_section_passes_through_the_row_with_most_load(study):
     assert profile.position[1] == pytest.approx(row["length"] / loads.size)
 
 
+def test_alternative_texts_name_curves_and_contacts(whole):
+    """Pictures of two contacts, and figures of two quantities, differ in their texts."""
+    labels = [drawing["aria-label"] for drawing in Page(whole).all("svg")]
+    (pressures,) = (label for label in labels if "over linear stress" in label)
+    assert ": p* = " in pressures
+    maps = [label for label in labels if label.startswith("Map of the")]
+    assert len(set(maps)) == len(maps) > 0
+    assert all("power n=" in label and "a_r = " in label for label in maps)
+
+
 def test_a_line_scene_shows_its_fields_as_a_cross_section(invoke, tmp_path):
     page = Page(report(solved(invoke, tmp_path, LINE)))
     labels = [drawing["aria-label"] for drawing in page.all("svg")]
     assert any(label.startswith("Cross-section along the cell") for label in labels)
-    assert not any(label.startswith("Contact,") for label in labels)
+    assert not any(label.startswith("Map of") for label in labels)
+
+
+def test_only_rough_surfaces_have_a_spectrum(invoke, tmp_path, whole):
+    """The self-affine surface nearest to a single indenter means nothing."""
+    anchor = 'id="surface-spectrum"'
+    assert anchor in whole
+    assert anchor not in report(solved(invoke, tmp_path, LINE))
 
 
 def test_the_command_writes_beside_the_study_and_says_so(invoke, copied):
@@ -561,7 +578,7 @@ def test_fields_without_a_finite_stress_are_drawn(copied, value):
     with h5py.File(copied, "r+") as file:
         for place in ("fields/0", "cross_sections/0"):
             file[place]["sigma"][...] = value
-    assert "Stress; black: none" in report(copied)
+    assert "Map of the stress; black: none" in report(copied)
 
 
 def test_key_numbers_and_tables_are_of_the_continuum_where_that_is_known(invoke, tmp_path):
@@ -591,7 +608,8 @@ def test_two_grids_of_one_contact_add_the_continuum(invoke, tmp_path):
     text = ONE.replace("points = 64", "points = [64, 128]")
     page = Page(report(solved(invoke, tmp_path, text)))
     labels = [drawing["aria-label"] for drawing in page.all("svg")]
-    assert "Distribution of the stress in the continuum, with error bars and edge laws" in labels
+    in_continuum = "Distribution of the stress in the continuum, with error bars and edge laws: "
+    assert any(label.startswith(in_continuum) for label in labels)
 
 
 def test_the_headline_does_not_count_an_indenter_as_a_seed(rows_of, tmp_path):

@@ -23,7 +23,6 @@ MAX_LABEL = 46  # characters
 TAILS = (20, 30, 8)  # characters after the part that is left out of a long label, tried in turn
 OF_ELASTOMER = tuple(each for each in PARAMETERS if each.table == "elastomer")
 MAX_STYLES = 8  # more markers of one colour cannot be told apart
-MAX_SWEEP = 20  # values of one parameter, a colour each; a choice: the legend has eight rows
 Colour = tuple[float, float, float]
 """Red, green, blue from 0 to 1."""
 
@@ -88,7 +87,7 @@ def with_styles(comparison: Comparison) -> list[StyledCurve]:
     pressures = np.concatenate([curve.column("p_star") for curve in curves])
     low, high = pressures.min() / 3, pressures.max() * 3
     low = min(low, high / 1000)  # near the left end of a linear axis
-    p_star = np.union1d(np.geomspace(low, high, 200), np.linspace(low, high, 100))
+    p_star = np.union1d(np.geomspace(low, high, 100), np.linspace(low, high, 50))
     return [
         StyledCurve(curve, style, p_star, curve.predict(p_star))
         for curve, style in zip(curves, curve_styles(curves), strict=True)
@@ -105,8 +104,8 @@ def curve_styles(curves: list[Curve]) -> list[CurveStyle]:
     """Colours along the ordered curves, one per elastomer; markers tell variants apart.
 
     Curves of one elastomer have a colour each. Curves that differ in their seed only have the same
-    style, and so have curves of one elastomer where there are too many: more than MAX_STYLES, or
-    more than MAX_SWEEP of a single elastomer that differ in one parameter.
+    style, and so have more than MAX_STYLES curves of one elastomer, unless there is no other
+    elastomer and they differ in one parameter: then colours go along its values.
     """
     names = _elastomer_names(curves)
     alike = grouped(curves, lambda curve: curve.elastomer)
@@ -115,7 +114,7 @@ def curve_styles(curves: list[Curve]) -> list[CurveStyle]:
     count = len(set(pairs))
     is_sweep = len(alike) == 1 and len(keys[curves[0].elastomer]) == 1
     heading = ""
-    if is_sweep and MAX_STYLES < count <= MAX_SWEEP:
+    if is_sweep and count > MAX_STYLES:
         (heading,) = distinct_labels([*names.values()])
         names = dict.fromkeys(names, "")  # labels of one parameter fit into several columns
     elif count > MAX_STYLES:

@@ -24,6 +24,7 @@ from gfmd_cli.study.column import Row
 from gfmd_cli.units import scaled
 
 LOWEST = 1e-3  # of a mean: lower end of its band on a logarithmic axis
+MAX_BAR = 0.5  # of its value; the limits of an axis hold error bars up to this length
 WIDE = 20  # a ratio that varies by more is drawn on a log scale
 ROUNDING = 1e-9  # relative difference of equal values that were computed on different grids
 P_STAR = r"reduced pressure  $p^* = p\,/\,\Delta\sigma$"
@@ -180,6 +181,9 @@ def _over_pressure(panel: Panel, items: list[StyledCurve]) -> ColumnFigure | Non
     plot.scale("x", panel.x_scale, x)
     _add_pascals(plot, items, float(x.max()))
     ys = [each.y + width for each in drawn for width in (0, np.nan_to_num(each.half_width))]
+    for each in drawn:
+        bars = np.minimum(np.nan_to_num(each.error), MAX_BAR * each.y)
+        ys += [each.y - bars, each.y + bars]
     if panel.y_scale == "linear":
         low, high = plot.axes.get_xlim()
         ys += [y[(p_star >= low) & (p_star <= high)] for *_, y in lines]

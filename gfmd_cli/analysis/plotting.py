@@ -12,6 +12,7 @@ from typing import Any, Literal
 import numpy as np
 
 from gfmd_cli.analysis.curve_styles import CurveStyle
+from gfmd_cli.analysis.selection import evenly
 from gfmd_cli.errors import INSTALL, InputError
 from gfmd_cli.files.atomic import write_whole
 from gfmd_cli.grid.arrays import Field
@@ -31,6 +32,7 @@ WIDTH, HEIGHT, ROW = 3.39, 2.35, 0.145  # inches: a column of 86 mm; a row of th
 SMALL = 8.0  # points
 COLUMN = 54  # characters and symbols that a row of the legend holds
 SYMBOL = 6  # characters that a symbol and the space around it take
+MAX_NAMED, NAMED = 20, 9  # curves that a legend names all; of more curves it names a few; a choice
 SCRIPTED = 9.3  # points: sub- and superscripts are printed at 0.7 of it, 6.5 points
 STYLE = {
     "font.family": "DejaVu Sans",
@@ -101,13 +103,18 @@ class LegendFigure:
         self.width, self.height = width, height  # inches, without the legend
         self.figure = Figure(figsize=(width, height), layout="constrained")
         self.legend: dict[str, Any] = {}
-        self.heading = ""
-        """Heading of the legend."""
+        self.shared_name = ""
+        """What the labels of the curves leave out."""
 
     def line_on(self, axes: Any, label: str, x: Field, y: Field, **style: Any) -> None:
         """Draw a line where y > 0 on some axes, with an entry of the legend."""
         axes.plot(x, np.where(y > 0, y, np.nan), **style)
         self.legend[label] = Line2D([], [], **style)
+
+    @property
+    def heading(self) -> str:
+        """Heading of the legend."""
+        return self.shared_name
 
     @property
     def entries(self) -> dict[str, Any]:
@@ -183,6 +190,26 @@ class ColumnFigure(LegendFigure):
         self.second: tuple[str, float] | None = None
         """Label of an axis at the top, and its values over those of x."""
 
+    @property
+    def curves(self) -> list[str]:
+        """The names of the curves, in their order."""
+        points = (layer for layer in self.layers if layer.kind == "points")
+        return list(dict.fromkeys(layer.names[0] for layer in points))
+
+    @property
+    def heading(self) -> str:
+        """Heading of the legend; it says how many curves the legend leaves out."""
+        curves = self.curves
+        named = f"{NAMED} of {len(curves)} curves are named" if len(curves) > MAX_NAMED else ""
+        return ", ".join(filter(None, (self.shared_name, named)))
+
+    @property
+    def entries(self) -> dict[str, Any]:
+        """The entries of the legend; of more than MAX_NAMED curves NAMED, the ends among them."""
+        entries, curves = super().entries, self.curves
+        left_out = set(curves) - set(evenly(curves, NAMED)) if len(curves) > MAX_NAMED else set()
+        return {name: handle for name, handle in entries.items() if name not in left_out}
+
     def points(
         self,
         style: CurveStyle,
@@ -216,7 +243,7 @@ class ColumnFigure(LegendFigure):
                 texts = list(compress(details, mask))
                 self.layers.append(replace(layer, error=error[:, mask], details=texts))
         self.legend[style.label] = Line2D([], [], marker=style.marker, **options)
-        self.heading = style.heading
+        self.shared_name = style.heading
         for missed, marker in SHORTFALL_MARKERS.items():
             if missed in shortfalls:
                 self.legend[missed] = Line2D([], [], **options | {"marker": marker, "color": "0.4"})

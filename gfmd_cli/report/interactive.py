@@ -29,6 +29,7 @@ SYMBOLS = {
 }
 """Markers by their names in matplotlib: as plotly.js names them, and as a character."""
 LINE, DASHES, PATCH = "—", "┄", "■"
+DECADES = 1.5  # of a logarithmic axis; at 5 ticks, plotly.js would label all of 2 to 9 below it
 PIXELS = 1.6  # of the page for a point of the figure
 DIGITS, LINE_DIGITS = 10, 5  # of the values of points, and of lines, which are only looked at
 
@@ -101,7 +102,13 @@ def _axis(axis: Any, label: str, factor: float = 1.0) -> dict[str, Any]:
     """The range of an axis times a factor, with a label."""
     ends, scale = factor * axis.get_view_interval(), axis.get_scale()
     ends = np.log10(ends) if scale == "log" else ends
-    return {"title": {"text": html_label(label)}, "type": scale, "range": _numbers(ends, DIGITS)}
+    few = scale == "log" and 1 <= np.ptp(ends) < DECADES
+    return {
+        "title": {"text": html_label(label)},
+        "type": scale,
+        "range": _numbers(ends, DIGITS),
+        "nticks": 3 if few else 5,
+    }
 
 
 def _symbol(handle: Any) -> str:

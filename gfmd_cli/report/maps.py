@@ -113,10 +113,16 @@ def _contact_maps(study: StudyFile, row: Row, prefix: str) -> dict[str, Any]:
         line = f"along {profile.along}{profile.place}"
         what = f"Cross-section {line}: heights above, stress below"
         figures.append(("section", profile_figure(profile), what))
+    title = f"{pressure_text(row)}, a_r = {row['a_r']:.3g}"
     return {
-        "title": f"{pressure_text(row)}, a_r = {row['a_r']:.3g}",
+        "title": title,
         "drawings": [
-            drawing(figure, f"{prefix}{name}-{task}", f"{what}, task {task}", f"{what}.")
+            drawing(
+                figure,
+                f"{prefix}{name}-{task}",
+                f"{what}; {contact_and_boundary(row)}, {title}, task {task}",
+                f"{what}.",
+            )
             for name, figure, what in figures
         ],
     }
@@ -132,13 +138,13 @@ def _map_figures(study: StudyFile, row: Row) -> list[tuple[str, ColumnFigure, st
     red = f"red: the {100 - PERCENTILE} % of the {{}} above the scale"
     loaded = stress > NOISE * row["pressure"] if touching is None else touching > 0
     plot = _scaled_figure(stress, loaded, row, STRESS_SCALE, r"stress $\sigma$")
-    of_stress = ("stress", plot, f"Stress; black: none, {red.format('contact')}")
+    of_stress = ("stress", plot, f"Map of the stress; black: none, {red.format('contact')}")
     if touching is None:
         return [of_stress]
     gap = pixels["gap"]
     plot = _scaled_figure(gap, gap > 0, row, HEIGHT_SCALE, "gap")
-    of_gap = ("gap", plot, f"Gap; black: contact, {red.format('rest')}")
-    return [("contact", _contact_figure(touching, row), "Contact"), of_stress, of_gap]
+    of_gap = ("gap", plot, f"Map of the gap; black: contact, {red.format('rest')}")
+    return [("contact", _contact_figure(touching, row), "Map of the contact"), of_stress, of_gap]
 
 
 def _thumbnails(study: StudyFile, task: int, step: int) -> dict[str, Field]:

@@ -8,6 +8,7 @@ from xml.etree import ElementTree
 
 from markupsafe import Markup
 
+from gfmd_cli.analysis.curve_styles import without_escapes
 from gfmd_cli.analysis.plotting import ColumnFigure, LegendFigure
 from gfmd_cli.analysis.table import Table
 from gfmd_cli.report.interactive import interactive
@@ -59,6 +60,12 @@ class Section:
         tables = [*self.tables, *self.disclosed.values()]
         has_records = any(table.records for table in tables)
         return not (self.drawings or has_records or self.content is not None)
+
+
+def with_curves(label: str, figure: ColumnFigure) -> str:
+    """An alternative text followed by the legend of the figure."""
+    entries = map(without_escapes, filter(None, (figure.heading, *figure.entries)))
+    return f"{label}: {', '.join(entries)}"
 
 
 def drawing(figure: LegendFigure, name: str, label: str, caption: str) -> Drawing:

@@ -20,7 +20,7 @@ from gfmd_cli.analysis.tables import ELASTOMER, P_STAR, RESIDUAL, STATUS, TASK
 from gfmd_cli.analysis.wording import shown
 from gfmd_cli.bench.results import bench_figures, bench_table
 from gfmd_cli.report.data import ReportData, item_title
-from gfmd_cli.report.section import Section, drawing
+from gfmd_cli.report.section import Section, drawing, with_curves
 from gfmd_cli.units import count
 
 MAX_ROWS = 100  # contacts that the table of contacts that have not converged lists
@@ -110,7 +110,7 @@ def stress_deviation(data: ReportData) -> Section:
 def _over_pressure(data: ReportData, title: str, name: str, caption: str) -> Section:
     """The figures of a quantity over the pressure that the study has data for, and its table."""
     drawings = [
-        drawing(plot, panel.name, f"{panel.meaning}: {', '.join(plot.legend)}", f"{panel.meaning}.")
+        drawing(plot, panel.name, with_curves(panel.meaning, plot), f"{panel.meaning}.")
         for panel in PANELS
         if panel.column == name and (plot := data.figures.get(panel.name))
     ]
@@ -133,7 +133,9 @@ def stress_distribution(data: ReportData) -> Section:
     return Section(
         "Stress distribution",
         drawings=[
-            drawing(figure, name, label, caption.format(lines=lines, thin=thin))
+            drawing(
+                figure, name, with_curves(label, figure), caption.format(lines=lines, thin=thin)
+            )
             for name, (label, caption, _) in DISTRIBUTIONS.items()
             if (figure := data.figures.get(name))
         ],

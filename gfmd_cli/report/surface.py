@@ -7,6 +7,7 @@ import numpy as np
 from gfmd_cli.analysis.compare import Curve
 from gfmd_cli.analysis.curve_styles import MAX_STYLES, distinct_labels, distinct_styles
 from gfmd_cli.analysis.plotting import ColumnFigure
+from gfmd_cli.analysis.selection import evenly
 from gfmd_cli.analysis.surface_figure import height_figure, spectrum_labels
 from gfmd_cli.analysis.surface_summary import FIT, fit_record
 from gfmd_cli.analysis.table import Group, Table, TableColumn, records_of
@@ -54,22 +55,22 @@ def _drawings(row: Row, pictures: dict[str, Picture], place: str) -> list[Drawin
 
 
 def surface_spectrum(data: ReportData) -> Section:
-    """C(q), double logarithmic."""
+    """C(q), double logarithmic, of rough surfaces; a blank section without one."""
     scenes: dict[tuple[str, str, float], Curve] = {}
     for _, curve in data.curves:
         row = curve.rows[0]
         key = (curve.surface, row["preparation"], row["h_std"])  # of two studies the same once
         scenes.setdefault(key, curve)
-    rough = [curve for curve in scenes.values() if curve.persson.shells.q.size]
+    rough = [curve for curve in scenes.values() if curve.has_theory and curve.persson.shells.q.size]
     spectra = [(curve.rows[0], _spectrum(curve)) for curve in rough]
     spectra = [(row, each) for row, each in spectra if each.q.size]
     if not spectra:
         return Section("Surface spectrum")
-    rows, drawn = zip(*spectra[:MAX_STYLES], strict=True)
+    rows, drawn = zip(*evenly(spectra, MAX_STYLES), strict=True)
     names, dimension = [str(row["surface"]) for row in rows], int(rows[0]["dimension"])
     label = f"Power spectral density of the surface over the wavenumber: {'; '.join(names)}"
     left_out = len(spectra) > MAX_STYLES
-    more = f" The first {MAX_STYLES} of {len(spectra)} are shown." if left_out else ""
+    more = f" {MAX_STYLES} of {len(spectra)} surfaces are shown." if left_out else ""
     fits = [
         {"surface": name, "no_rolloff": "none within the cell", **fit_record(each.fit)}
         for name, each in zip(names, drawn, strict=True)

@@ -114,7 +114,7 @@ class Figure {
   content(colour) {
     const { layout } = this.data
     const axis = { showline: true, mirror: true, ticks: "inside", linecolor: "#000000", tickcolor: "#000000",
-                   gridcolor: "#d5d9df", griddash: "dot", zeroline: false, exponentformat: "power", automargin: true, nticks: 5 }
+                   gridcolor: "#d5d9df", griddash: "dot", zeroline: false, exponentformat: "power", automargin: true }
     const text = {
       data: this.shown(),
       layout: {
