@@ -1,13 +1,14 @@
-"""How often errors of means over seeds hold: confidence intervals, and errors of Pr(sigma).
+r"""How often errors of means over seeds hold: confidence intervals, and errors of Pr(sigma).
 
 Reads a study of one contact on many seeds, on four nested grids with histograms (or several files
 with some of its seeds). Groups of seeds are compared with all others: the 95 % confidence interval
 of the mean on the finest grid, and the standard error of ln Pr that is extrapolated from the three
 coarser grids, with the finest three of the others. The difference is reduced by the share that the
-others have in its scatter. "worst": the bin with the lowest share, of those with ten errors.
+others have in its scatter. "worst" is the lowest share of a bin that half of the groups resolve.
 
 gfmd run configs/stress-distribution.toml -o study.h5 --set "surface.seed=[0, ..., 39]" \
-    --set surface.cutoff=0.1 --set "elastomer.n=[1,2,3]" --set "grid.points=[128,256,512,1024]"
+    --set surface.cutoff=0.1 --set "elastomer.n=[1,2,3]" --set solver.tolerance=1e-5 \
+    --set "grid.points=[128,256,512,1024]"
 python scripts/seed_coverage.py study.h5
 """
 
@@ -34,18 +35,20 @@ def distribution(seeds: Seeds, grids: slice) -> StressDistribution:
     return StressDistribution(Curve(seeds[0], None), [rows[grids] for rows in seeds])
 
 
-def ratios(group: Seeds, others: Seeds) -> dict[str, Any]:
-    """Errors over bars: of the mean of each quantity, and of ln Pr by bin."""
+def held(group: Seeds, others: Seeds) -> dict[str, Any]:
+    """Whether the interval of each quantity holds, and by bin the error of ln Pr; NaN without."""
     share = sqrt(len(others) / (len(others) + len(group)))
     density, reference = distribution(group, slice(-1)), distribution(others, slice(1, None))
-    change = density.extrapolated.log_density - reference.extrapolated.log_density
-    found: dict[str, Any] = {"Pr": share * np.abs(change) / density.error}
+    change = np.abs(density.extrapolated.log_density - reference.extrapolated.log_density)
+    answers: dict[str, Any] = {
+        "Pr": np.where(np.isfinite(change), share * change <= density.error, np.nan)
+    }
     if len(group) > 1:
         for name in QUANTITIES:
             spread = spread_of([rows[-1][name] for rows in group])
-            change = spread.mean - np.mean([rows[-1][name] for rows in others])
-            found[name] = share * abs(change) / spread.half_width
-    return found
+            change = abs(spread.mean - np.mean([rows[-1][name] for rows in others]))
+            answers[name] = share * change <= spread.half_width
+    return answers
 
 
 def main() -> None:
@@ -61,34 +64,24 @@ def main() -> None:
     for (n, p_star), by_seed in contacts.items():
         seeds = [sorted(each, key=lambda row: row["points"]) for each in by_seed.values()]
         for size in SIZES:
-            found = defaultdict(list)
-            for _ in range(GROUPINGS):
+            answers = defaultdict(list)
+            for _ in range(GROUPINGS if size > 1 else 1):
                 order = draw.permutation(len(seeds))
                 for first in range(0, len(seeds) - size + 1, size):
                     chosen = set(order[first : first + size].tolist())
                     group = [seeds[i] for i in chosen]
                     others = [each for i, each in enumerate(seeds) if i not in chosen]
-                    for name, ratio in ratios(group, others).items():
-                        found[name].append(ratio)
-                if size == 1:  # all groupings are the same
-                    break
-            bins = np.array(found.pop("Pr"))
+                    for name, answer in held(group, others).items():
+                        answers[name].append(answer)
+            bins = np.array(answers.pop("Pr"))
+            cells = [f"{np.mean(answers[q]):.0%}" if q in answers else "–" for q in QUANTITIES]
             known = np.isfinite(bins)
-            shares = {
-                f"{np.mean(bins[known[:, i], i] <= 1):.0%} at {sigma[i]:.2g}": np.mean(
-                    bins[known[:, i], i] <= 1
-                )
-                for i in np.flatnonzero(known.sum(axis=0) >= 10)
-            }
-            cells = [
-                f"{np.mean(np.array(found[q]) <= 1):.0%}" if q in found else "–" for q in QUANTITIES
-            ]
-            held = f"{np.mean(bins[known] <= 1):.0%}" if known.any() else "–"
-            worst = min(shares, key=lambda share: shares[share], default="–")
-            print(
-                f"| {n:g} | {p_star:g} | {size} | {' | '.join(cells)} | {held} | {worst} |",
-                flush=True,
-            )
+            resolved = np.flatnonzero(known.mean(axis=0) >= 0.5)
+            density = worst = "–"
+            if resolved.size:
+                density, shares = f"{np.nanmean(bins):.0%}", np.nanmean(bins[:, resolved], axis=0)
+                worst = f"{shares.min():.0%} at {sigma[resolved[shares.argmin()]]:.2g}"
+            print(f"| {n:g} | {p_star:g} | {size} | {' | '.join(cells)} | {density} | {worst} |")
 
 
 if __name__ == "__main__":
