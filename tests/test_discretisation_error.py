@@ -13,6 +13,7 @@ from gfmd_cli import rows, run, solve
 from gfmd_cli.physics.discretisation_error import (
     AREA_EXCESS,
     LINE_EXCESS,
+    LINE_GAP,
     MAX_AREA_EXPONENT,
     ExcessExponent,
     RoughnessScales,
@@ -617,11 +618,12 @@ def test_equal_parts_of_a_line_profile_have_the_same_errors():
         assert four[name] == pytest.approx(one[name], rel=1e-3)
 
 
-def test_the_gaps_of_a_line_profile_have_an_error_where_grids_agree_by_chance():
-    levels = [GridValues(N, 0.9, 0.5, 0.01, 4.0) for N in (64, 128)]  # two gaps of 6.4 points
+@pytest.mark.parametrize("border", [None, 0.0])
+def test_the_gaps_of_a_line_profile_have_an_error_where_grids_agree_by_chance(border):
+    levels = [GridValues(N, 0.9, 0.5, 0.01, 4.0, border=border) for N in (64, 128)]
     line = RoughnessScales(waves=20.0, curvature=2e3, anisotropy=inf)
-    gap = estimate(levels, 1.0, line, tip=Tip(2.0, 1))["u_g"]
-    assert gap.error == pytest.approx(1.5 * 0.01 / 6.4**2 / 2**0.5, rel=0.01)
+    gap = estimate(levels, 1.0, line if border is None else None, tip=Tip(2.0, 1))["u_g"]
+    assert gap.error == pytest.approx(LINE_GAP * 0.01 / 6.4**2 / 2**0.5, rel=0.01)  # two gaps
 
 
 def test_a_profile_with_plateaus_does_not_follow_the_law_of_the_excess():

@@ -6,7 +6,12 @@ from exact_solutions import hertz_force, hertz_profile
 from specs import power_spec
 
 from gfmd_cli.analysis.compare import Curve, compare
-from gfmd_cli.analysis.distribution import StressDistribution, distributions, extrapolate
+from gfmd_cli.analysis.distribution import (
+    PATCH_SCATTER,
+    StressDistribution,
+    distributions,
+    extrapolate,
+)
 from gfmd_cli.analysis.distribution_figure import continuum_figure, mean_density
 from gfmd_cli.analysis.edge_law import edge_exponent, fit_power_law, straight_line
 from gfmd_cli.analysis.tables import power_laws
@@ -156,10 +161,23 @@ def test_irregular_changes_are_not_extrapolated():
 def test_counting_errors_are_the_scatter_of_independent_counts():
     draw = np.random.default_rng(3)
     cells, counts = [64**2, 128**2], np.array([[1000.0], [4000.0]]) * np.ones(100)
-    limits = [extrapolate(draw.poisson(counts).astype(float), cells) for _ in range(20)]
+    limits = [extrapolate(draw.poisson(counts).astype(float), cells) for _ in range(200)]
     scatter = np.std([limit.log_density[5:95] for limit in limits], axis=0)
     ratios = scatter**2 / np.mean([limit.counting[5:95] ** 2 for limit in limits], axis=0)
-    assert 0.8**2 < ratios.mean() < 1.25**2
+    assert ratios.mean() == pytest.approx(1.0, abs=0.08)  # 1.2 without the covariance
+
+
+@pytest.mark.parametrize("slope", [0.0, -4.0])
+def test_sampling_errors_are_the_scatter_of_patches_of_different_stress(slope):
+    """The number of patches is that of a Poisson process; the logarithm of a stress is normal."""
+    draw, mean = np.random.default_rng(6), 50
+    numbers = draw.poisson(mean, 20_000)
+    weights = np.exp(slope * PATCH_SCATTER * draw.standard_normal(numbers.sum()))
+    sums = np.bincount(np.repeat(np.arange(numbers.size), numbers), weights)
+    counts = 1e6 * (MIDDLE / MIDDLE[50]) ** slope
+    contact = row(1, 64, counts, 0.1, np.sqrt(mean * 64 * 0.1 / np.pi))
+    sampling = distribution([contact, contact]).sampling
+    assert sampling[50] == pytest.approx(np.std(sums) / np.mean(sums), rel=0.05)
 
 
 def test_a_bin_that_changes_too_much_is_not_resolved():

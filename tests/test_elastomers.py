@@ -367,7 +367,7 @@ def layered_stiffness(q, thickness, poisson, base):
         ]
     )
     carried = mp.expm(derivative * thickness)
-    free = (2, 3) if base == "bonded" else (0, 2)  # of the state at the base
+    free = {"bonded": (2, 3), "sliding": (0, 2), "stress": (0, 1)}[base]  # of the state at the base
     system = mp.matrix([[carried[row, column] for column in free] for row in (2, 3)])
     at_base = mp.lu_solve(system, mp.matrix([-1, 0]))
     return -1 / sum(carried[1, column] * at_base[i] for i, column in enumerate(free))

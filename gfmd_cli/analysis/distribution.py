@@ -23,7 +23,7 @@ import numpy as np
 from gfmd_cli.analysis.compare import Comparison, Curve, of_study, solver_of
 from gfmd_cli.analysis.wording import contact_and_boundary
 from gfmd_cli.grid.arrays import Field
-from gfmd_cli.physics.observables import LOGARITHMIC_EDGES, estimated_patches
+from gfmd_cli.physics.observables import LOGARITHMIC_EDGES, estimated_patches, geometric_middles
 from gfmd_cli.study.column import Row
 from gfmd_cli.study.columns import BINS, PR_LOGARITHMIC
 
@@ -31,6 +31,7 @@ MAX_CHANGE = 0.35  # of ln Pr between grids; a bin with more is not resolved; a 
 NEIGHBOURS = 2  # bins to each side in the mean of the change between grids; a choice
 PRIOR_SEEDS = 4.0  # weight of the expected spread beside the measured one; a choice
 MIN_DEPTH = 0.75  # spacings from the edge below which a bin is not resolved; a choice
+PATCH_SCATTER = 0.2  # of ln stress between patches; `scripts/seed_coverage.py`, seeds 0 to 39
 
 
 def has_histogram(row: Row, name: str = PR_LOGARITHMIC) -> bool:
@@ -53,7 +54,9 @@ class Extrapolated:
     """What extrapolation has added to ln Pr, or the change it could not be based on: taken as a
     standard error that all bins share, with its sign."""
     counting: Field
-    """Standard error of ln Pr by the number of points in the bins, each drawn by itself."""
+    """Standard error of ln Pr by the number of points in the bins, each drawn by itself.
+
+    Grids of one surface have less where they resolve the stress well."""
 
 
 def extrapolate(counts: Field, cells: Sequence[int]) -> Extrapolated:
@@ -75,6 +78,7 @@ def extrapolate(counts: Field, cells: Sequence[int]) -> Extrapolated:
             _averaged(fine - coarse, a + b)
             for (coarse, fine), (b, a) in zip(pairwise(log), pairwise(noise), strict=True)
         ]
+        share = noise[-1] / (noise[-1] + noise[-2])
     change, error = steps[-1]
     change = np.where(np.abs(change) < MAX_CHANGE, change, np.nan)
     correction, discretisation = change, change
@@ -85,7 +89,9 @@ def extrapolate(counts: Field, cells: Sequence[int]) -> Extrapolated:
         grows = np.abs(change) > np.abs(before) + 2 * np.hypot(error, unsure)
         correction = np.where(turns | grows, 0.0, change)
         discretisation = np.where(turns | grows, np.copysign(larger, change), change)
-    return Extrapolated(log[-1] + correction, discretisation, np.sqrt(noise[-1] + error**2))
+    # var(f + D) = var f + var D + 2 cov(f, D), with the weight error^2 / var(f - c) of f - c in D
+    counting = np.sqrt(noise[-1] + error**2 * (1 + 2 * share))
+    return Extrapolated(log[-1] + correction, discretisation, counting)
 
 
 def _averaged(values: Field, variance: Field) -> tuple[Field, Field]:
@@ -175,14 +181,21 @@ class StressDistribution:
     def sampling(self) -> Field:
         """Relative standard error of the mean over surfaces, for the few patches that one holds.
 
-        All points of a bin in one patch are one draw. The spread over seeds is weighed against it
-        as PRIOR_SEEDS further seeds would be.
+        All points of a bin in one patch are one draw. If the stress of patches differs by a factor
+        whose logarithm is normal, of standard deviation s, and the counts are as sigma^g, the
+        weights of N patches are as many as N exp(-g^2 s^2) equal ones. The spread over seeds is
+        weighed against it as PRIOR_SEEDS further seeds would be.
         """
         count, fine = len(self.seeds), self.counts[:, -1]
         if self.finest["seed"] < 0:  # nothing random
             return np.zeros(fine.shape[-1])
+        points = fine.sum(axis=0)
+        slope = np.gradient(
+            np.log(np.maximum(points, 1.0)), np.log(geometric_middles(LOGARITHMIC_EDGES))
+        )
         patches = sum(_patches(rows[-1]) for rows in self.seeds)
-        expected = 1 / np.maximum(np.minimum(patches, fine.sum(axis=0)), 1.0)
+        patches = patches * np.exp(-((slope * PATCH_SCATTER) ** 2))
+        expected = 1 / np.maximum(np.minimum(patches, points), 1.0)
         if count == 1:
             return np.sqrt(expected)
         with np.errstate(divide="ignore", invalid="ignore"):
