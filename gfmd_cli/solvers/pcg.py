@@ -43,6 +43,7 @@ MAX_TENSION_RATIO = 0.3  # of rms tension to rms free force
 """With 0.1 the transforms are 0.95 to 1.05 times as many, with 1: 0.99 to 1.16 times (n = 1 to 4,
 64^2 to 256^2, seeds 3 to 5):
 `scripts/solver_constants.py pcg.MAX_TENSION_RATIO 0.1 1 --exponents 1 2 3 4`."""
+MAX_OVERLAP = 0.3
 MIN_SELECTION_INTERVAL = 4  # smallest number of steps between two selections of the preconditioner
 MAX_SCREENING_CHANGE = 1.25  # factor in k(q_c) up to which the old value is kept
 """With 1 the transforms are 0.96 to 1.08 times as many (n = 0.25 to 0.7, 64^2 to 256^2, seeds 3 to
@@ -198,7 +199,8 @@ class _Run:
         fields = (self.sigma, self.contact_state, self.threshold)
         slope, z_change = self.preconditioner.apply(*fields, self.change)
         state.transforms += self.preconditioner.transforms
-        if state.moved == 0.0 or slope <= 0.0:
+        overlap = abs(slope + z_change)  # of z with the force before the last move
+        if state.moved == 0.0 or slope <= 0.0 or overlap > MAX_OVERLAP * slope:
             return 0.0
         return conjugation(slope, z_change, state.moved, state.best_length, state.curvature)
 
