@@ -50,8 +50,8 @@ MAX_OVERLAP = 0.3  # of z with the force before the last move, over that with th
 0.3 by 4 % at most: `scripts/solver_constants.py pcg.MAX_OVERLAP 0.1 0.5 1e9 --exponents 0.5 1 2 3`.
 The gain is larger at small pressure."""
 MAX_SOFT_GROWTH = 3.0  # of k(q) per octave, up to which the conjugation restarts after any move
-"""With 0 the transforms are 1.02 to 1.08 times as many at n = 1, the same within 1 % at n = 1.5; with
-99: 1.01 to 1.02 times at n = 2, 1.03 to 1.05 times on 256^2 and 512^2 (seeds 20 and 21):
+"""With 0 the transforms are 1.02 to 1.08 times as many at n = 1, the same within 1 % at n = 1.5;
+with 99: 1.01 to 1.02 times at n = 2, 1.03 to 1.05 times on 256^2 and 512^2 (seeds 20 and 21):
 `scripts/solver_constants.py pcg.MAX_SOFT_GROWTH 0 99 --exponents 1 1.5 2 3`."""
 MIN_SELECTION_INTERVAL = 4  # smallest number of steps between two selections of the preconditioner
 MAX_SCREENING_CHANGE = 1.25  # factor in k(q_c) up to which the old value is kept
