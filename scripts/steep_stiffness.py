@@ -67,7 +67,7 @@ def transforms(law: str, points: int, cutoff: float, p_star: float, steps: int) 
         path = Path(folder) / "k.txt"
         write_table(path, law, points)
         scene = build_scene(SelfAffine(cutoff=cutoff), Tabulated(path=path), points)
-    with patch.multiple(direct_start, MAX_COST=0, MAX_COST_WITH_LAPLACIAN=0):
+    with patch.object(direct_start, "MAX_COST", 0):
         solution = solve_contact(scene.contact(p_star), Auto(max_steps=steps))
     return f"{solution.transforms:.0f}" if solution.status.is_converged else "-"
 

@@ -167,31 +167,31 @@ def test_hats_of_any_numbers_of_points(fine, coarse):
 
 @pytest.mark.parametrize(("fine", "coarse"), TRANSFERS)
 @pytest.mark.parametrize("weighted", [0, 1])
-def test_springs_between_hats_of_any_numbers_of_points(fine, coarse, weighted):
-    """P^T w P in units of 1/64, for the neighbours that `compute_ties` names."""
+def test_the_penalty_on_hats_of_any_numbers_of_points(fine, coarse, weighted):
+    """P^T w P in units of 1/64, for the neighbours that `compute_penalty` names."""
     values = np.random.default_rng(8).integers(0, 4, size=fine).astype(np.int8)
     threshold = 4 if weighted else PRESSED
     w = values / 4 if weighted else 1.0 * (values >= PRESSED)
     along_y, along_x = (hats(*numbers) for numbers in zip(fine, coarse, strict=True))
     next_y, next_x = (np.roll(axis, -1, axis=1) for axis in (along_y, along_x))
-    ties, weights = np.zeros((coarse[0], 4, coarse[1] + 1), np.uint8), np.zeros(coarse, np.int8)
-    kernels.compute_any_ties(values, threshold, weighted, ties, weights, 0, coarse[0])
+    penalty, weights = np.zeros((coarse[0], 4, coarse[1] + 1), np.uint8), np.zeros(coarse, np.int8)
+    kernels.compute_any_penalty(values, threshold, weighted, penalty, weights, 0, coarse[0])
     pairs = ((along_y, along_x), (along_y, next_x), (next_y, along_x), (next_y, next_x))
     for kind, (other_y, other_x) in enumerate(pairs):
         expected = 64 * (along_y * other_y).T @ w @ (along_x * other_x)
-        assert np.abs(ties[:, kind, 1:] - expected).max() <= 0.501
-    assert np.array_equal(ties[:, :, 0], ties[:, :, -1])
+        assert np.abs(penalty[:, kind, 1:] - expected).max() <= 0.501
+    assert np.array_equal(penalty[:, :, 0], penalty[:, :, -1])
     expected = np.minimum(4, 4 * along_y.T @ w @ along_x)
     assert np.abs(weights - expected).max() <= 0.501
 
 
-def test_springs_of_exactly_half_the_points_are_the_same():
+def test_the_penalty_of_exactly_half_the_points_is_the_same():
     state = pattern("sparse")
     results = []
-    for kernel in (kernels.compute_ties, kernels.compute_any_ties):
-        ties, weights = np.zeros((32, 4, 33), np.uint8), np.zeros((32, 32), np.int8)
-        kernel(state, PRESSED, 0, ties, weights, 0, 32)
-        results.append((ties, weights))
+    for kernel in (kernels.compute_penalty, kernels.compute_any_penalty):
+        penalty, weights = np.zeros((32, 4, 33), np.uint8), np.zeros((32, 32), np.int8)
+        kernel(state, PRESSED, 0, penalty, weights, 0, 32)
+        results.append((penalty, weights))
     assert np.array_equal(results[0][0], results[1][0])
 
 

@@ -35,23 +35,25 @@ from scipy.linalg import LinAlgError, cho_factor, cho_solve
 from scipy.linalg.blas import dtrmv
 
 from gfmd_cli.grid.arrays import Field, Mask, row_blocks
+from gfmd_cli.grid.compilation import kernel
 from gfmd_cli.grid.shared_transforms import BLOCK_ROWS
 from gfmd_cli.physics.contact import Contact
 from gfmd_cli.solvers.contact_state import refined
 from gfmd_cli.solvers.local_start import COARSE_TOLERANCE
 from gfmd_cli.solvers.loop import Start
-from gfmd_cli.solvers.multigrid import MAX_LAPLACIAN_GROWTH, largest_growth
+from gfmd_cli.solvers.multigrid import largest_growth
 
 MAX_COST = 80
 """Largest m^3 over points of a grid and square of the growth of k(q) per octave, for m points in
-contact; measured: with more, the iteration is faster."""
-MAX_COST_WITH_LAPLACIAN = 150
-"""Largest m^3 over points of a grid where the V-cycle has the Laplacian, not its square."""
+contact; measured: with more, the iteration is faster. At n = 1.5 and 2 the direct solution takes
+0.54 to 0.72 of the processor time near m^3 / N = 140 to 510 and 0.77 to 0.80 near 1100 to 1400
+(128^2 and 256^2, whole solves to 1e-6; the limit is at 640 and 1280)."""
 MAX_LINE_COST = 20000  # the same for lines
 EXPECTED_GROWTH = 1.3  # of the sets: largest number of points over that of the first one; a choice
 MAX_JOINING_FRACTION = 0.4  # of a set, that joins it at a time; measured: 0.3 to 0.6 are as good
 MAX_SETS = 60  # of the largest size, or eight times as many of half; a choice; 5 to 60 are taken
 
+Indices = NDArray[np.int64]
 Points = tuple[Any, ...]
 """Rows and columns of points, as indices of a field."""
 
@@ -86,12 +88,8 @@ def direct_start(
 
 def _largest_count(contact: Contact) -> int:
     """Largest number of points in contact for which a direct solve is faster than the iteration."""
-    growth = largest_growth(contact)
-    cost = MAX_COST * growth**2
-    if contact.grid.dimension == 1:
-        cost = MAX_LINE_COST
-    elif growth <= MAX_LAPLACIAN_GROWTH:
-        cost = MAX_COST_WITH_LAPLACIAN
+    is_line = contact.grid.dimension == 1
+    cost = MAX_LINE_COST if is_line else MAX_COST * largest_growth(contact) ** 2
     return int((cost * contact.grid.size) ** (1 / 3))
 
 
@@ -217,12 +215,7 @@ class _DirectSolve:
         """
         rows, columns = points
         matrix = np.empty((rows.size, rows.size))
-        for a in range(rows.size):
-            b = slice(a + 1)
-            matrix[a, b] = self.compliance[
-                _distance(rows[a] - rows[b], self.values.shape[0]),
-                _distance(columns[a] - columns[b], self.values.shape[1]),
-            ]
+        _fill_lower_triangle(matrix, rows, columns, self.compliance, *self.values.shape)
         # The lower triangle by rows is the upper one by columns, which LAPACK overwrites.
         factor = cho_factor(matrix.T, overwrite_a=True, check_finite=False)
         sides = np.stack([self.obstacle[points], np.ones(rows.size)], axis=1)
@@ -250,10 +243,15 @@ class _DirectSolve:
         return Start(self.contact, transforms, u, sigma, rounding)
 
 
-def _distance(difference: NDArray[np.int64], period: int) -> NDArray[np.int64]:
-    """The distance of two places on a circle."""
-    distance = np.abs(difference)
-    return np.minimum(distance, period - distance)
+@kernel
+def _fill_lower_triangle(
+    matrix: Field, rows: Indices, columns: Indices, compliance: Field, height: int, width: int
+) -> None:
+    """Write the displacements at points by unit stresses at the points before them."""
+    for a in range(rows.size):
+        for b in range(a + 1):
+            y, x = abs(rows[a] - rows[b]), abs(columns[a] - columns[b])
+            matrix[a, b] = compliance[min(y, height - y), min(x, width - x)]
 
 
 def _energy(factor: Field, s: Field) -> float:

@@ -7,7 +7,7 @@ so that any k(q) is possible.
 On the finest level the points of contact are held. As in truncated multigrid (Kornhuber, Numer.
 Math. 69, 167, 1994), the hat functions of coarser levels are truncated at these points, so that no
 hat is lost because a contact lies under it. The energy of the truncation is not computed, but
-approximated by a penalty: springs tie the coarse hats to zero at the points held, as stiff as the
+approximated by a penalty on coarse hats that are not zero at the points held, as stiff as the
 operator of the level itself. This takes four bytes per coarse point, less than Galerkin stencils,
 and the levels are not too stiff, as bilinear hats would be for a plate.
 
@@ -23,8 +23,9 @@ and only the direction of strong coupling is coarsened until the pixels are abou
 row of pixels without coupling along y.
 
 The cycle is symmetric. It is positive as long as the eigenvalues of the damped Jacobi iteration,
-the damping times A over its diagonal, are below 2. Without springs `JACOBI_EIGENVALUE` gives the
-largest. Springs do not increase it, because they act on waves for which the operator is soft.
+the damping times A over its diagonal, are below 2. Without a penalty `JACOBI_EIGENVALUE` gives the
+largest. The penalty does not increase it, because it acts on waves for which the operator is soft.
+The weight of a correction may be any positive number.
 """
 
 from collections.abc import Iterator
@@ -51,19 +52,24 @@ MAX_LAPLACIAN_GROWTH = 5.0  # growth of k(q) above which the Laplacian is square
 """3 to 7 % more if it is squared at n = 2; 8 to 14 % at n = 2.5 and 18 to 31 % at n = 3 if it is
 not. At n = 2.2 both are the same within 4 %:
 `multigrid.MAX_LAPLACIAN_GROWTH 3 20 --exponents 2 2.2 2.5 3`."""
-SPRING_STIFFNESS = 0.125, 0.25  # over diagonal element and k(2 q) / k(q): Laplacian, its square
+PENALTY_STIFFNESS = 0.125, 0.25  # over diagonal element and k(2 q) / k(q): Laplacian, its square
 """Half: 1 % fewer to 18 % more (most at n = 1 and 2); double: 2 % fewer to 35 % more (n = 3):
-`multigrid.SPRING_STIFFNESS "(0.0625, 0.125)" "(0.25, 0.5)" --exponents 1 2 3 4`."""
-JACOBI_EIGENVALUE = 1.04, 0.18, 1.76
-"""The largest of the damped Jacobi iteration is a + b k(2 q) / k(q), at most c. With 1.76 for all k
-the transforms are 1.13 to 1.35 times as many at n = 0.75 and 1, the same from n = 1.5 on; with
-c = 1.6: 1.03 to 1.13 times, with c = 1.85: 0.94 to 1.01 times at n = 2 to 4:
-`multigrid.JACOBI_EIGENVALUE "(1.76, 0, 1.76)" "(1.04, 0.18, 1.6)" "(1.04, 0.18, 1.85)"
---exponents 0.75 1 1.5 2 3 4`."""
+`multigrid.PENALTY_STIFFNESS "(0.0625, 0.125)" "(0.25, 0.5)" --exponents 1 2 3 4`."""
+JACOBI_EIGENVALUE = (1.04, 0.18), (1.76, 0.0)
+"""The largest of the damped Jacobi iteration: a + b k(2 q) / k(q), the least of both. With 1.76 for
+all k the transforms are 1.13 to 1.35 times as many at n = 0.75 and 1, the same from n = 1.5 on;
+with 1.6 in place of 1.76: 1.03 to 1.13 times, with 1.85: 0.94 to 1.01 times at n = 2 to 4:
+`multigrid.JACOBI_EIGENVALUE "((1.76, 0),)" "((1.04, 0.18), (1.6, 0))" "((1.04, 0.18), (1.85, 0))"
+--exponents 0.75 1 1.5 2 3 4`, measured with all weights 1."""
+COARSE_WEIGHT = (0.55, 0.19), (1.16, -0.01)
+"""Of the correction by the next coarser level: a + b k(2 q) / k(q), the least of both. With the
+weight 1 the transforms are 1.04 to 1.10 times as many at n = 0.75 and 0.98 to 1.05 times at n = 1
+to 2: `multigrid.COARSE_WEIGHT "((1, 0),)" --exponents 0.75 1 1.5 2`. Smoother surfaces and smaller
+pressures gain more. At n = 4 the weight is 1: with 1.12 there are 4 % more."""
 STEEPEST = 4.5  # exponent above which the levels limit the growth of k(q); measured, see below
 COARSEST_STEP_PAIRS = 4  # of smoothing steps on the coarsest level
 """1, 2 and 8 are the same within 4 %: `multigrid.COARSEST_STEP_PAIRS 1 2 8 --exponents 1 2 3 4`."""
-TIE_UNIT = 1.0 / 64  # of the integers in `ties`
+PENALTY_UNIT = 1.0 / 64  # of the integers in `_CoarseLevel.penalty`
 
 
 def has_coarser_level(grid: Grid) -> bool:
@@ -121,7 +127,7 @@ def _with_limited_growth(k: Field) -> tuple[Field, Field]:
 
 
 def _operator(dy: float, dx: float, growth: float, density: float) -> kernels.Operator:
-    """The operator of a level with pixels of dy x dx, and the stiffness of its springs.
+    """The operator of a level with pixels of dy x dx, and the stiffness of its penalty.
 
     The operator is A(q) = y l_y + x l_x - c l_y l_x with l = 2 - 2 cos(q d) along either axis, the
     weights y = 1 / dy^2 and x = 1 / dx^2, the larger of which is 1, and c = min(y, x) / 6; or its
@@ -137,12 +143,16 @@ def _operator(dy: float, dx: float, growth: float, density: float) -> kernels.Op
     if is_squared:
         diagonal = centre**2 + 2 * (along_y**2 + along_x**2) + 4 * corner**2
         largest **= 2
-    lowest, slope, highest = JACOBI_EIGENVALUE
-    damping = min(lowest + slope * growth, highest) * diagonal / largest
-    spring = TIE_UNIT * SPRING_STIFFNESS[is_squared] * diagonal * growth * density
+    damping = _at_growth(JACOBI_EIGENVALUE, growth) * diagonal / largest
+    penalty = PENALTY_UNIT * PENALTY_STIFFNESS[is_squared] * diagonal * growth * density
     laplacian = map(np.float32, (centre, along_y, along_x, corner))
-    damped = map(np.float32, (diagonal / damping, spring, spring / damping))
+    damped = map(np.float32, (diagonal / damping, penalty, penalty / damping))
     return kernels.Operator._make([*laplacian, is_squared, *damped])
+
+
+def _at_growth(lines: tuple[tuple[float, float], ...], growth: float) -> float:
+    """The least a + b growth of some lines (a, b)."""
+    return min(a + b * growth for a, b in lines)
 
 
 def level_rows(grid: Grid) -> Iterator[tuple[Shape, LocalRows]]:
@@ -191,7 +201,8 @@ class _CoarseLevel:
 
     def __init__(self, finer: Level, level: Level) -> None:
         self.operator, self.rows, self.finer_rows = level.operator, level.rows, finer.rows
-        self.ratio = np.float32(finer.scale / level.scale)
+        weight = _at_growth(COARSE_WEIGHT, finer.growth)
+        self.ratio = np.float32(weight * finer.scale / level.scale)
         # Needed where the points are not exactly halved: the residual of the finer level, later P
         # times the result on this one. Elsewhere kernels do both on the way.
         is_half = _is_half(level.shape, finer.shape)
@@ -199,12 +210,12 @@ class _CoarseLevel:
         zeros, n = level.rows.empty_with_halo, level.shape[1]
         self.rhs, self.x, self.y = (zeros(n, dtype=np.float32) for _ in range(3))
         self.weights = zeros(n, dtype=np.int8)
-        self.ties = zeros(4, n + 1, dtype=np.uint8)
+        self.penalty = zeros(4, n + 1, dtype=np.uint8)
 
-    def set_ties(self, finer: ContactState, threshold: int, weighted: int) -> None:
-        """Compute the penalty terms from the points held, or the weights, of the finer level."""
-        kernel = transfer.compute_ties if self.between is None else transfer.compute_any_ties
-        self.rows.run_from_finer(kernel, (finer, threshold, weighted), (self.ties, self.weights))
+    def set_penalty(self, finer: ContactState, threshold: int, weighted: int) -> None:
+        """Compute the penalty from the points held, or the weights, of the finer level."""
+        kernel = transfer.compute_penalty if self.between is None else transfer.compute_any_penalty
+        self.rows.run_from_finer(kernel, (finer, threshold, weighted), (self.penalty, self.weights))
 
     def restrict(self, kernel: Kernel, *fields: Any) -> None:
         """Restrict the residual that a kernel computes on the finer level."""
@@ -228,7 +239,7 @@ class _CoarseLevel:
 
         Without `old`, the result of a smoothing step from zero takes its place.
         """
-        matrix = (self.rhs, self.operator, self.ties)
+        matrix = (self.rhs, self.operator, self.penalty)
         start = (self.rhs if old is None else old, old is None)
         correction = coarser.correction() if coarser else (self.rhs, kernels.ZERO)
         arrays = (*matrix, *start, *correction, new)
@@ -263,9 +274,9 @@ class Multigrid:
         """See `preconditioners.Preconditioner.apply`."""
         first = self.coarse[0]
         self.rows.exchange_halo(contact_state)
-        first.set_ties(contact_state, threshold, 0)  # penalty terms
+        first.set_penalty(contact_state, threshold, 0)
         for finer, level in pairwise(self.coarse):
-            level.set_ties(finer.weights, transfer.WHOLE_WEIGHT, 1)
+            level.set_penalty(finer.weights, transfer.WHOLE_WEIGHT, 1)
         fields = (self.rows.with_halo(sigma), contact_state, threshold, self.operator)
         # one smoothing step from zero on the finest level, and the restriction of the residual
         first.restrict(kernels.first_residual, *fields)
@@ -283,7 +294,7 @@ class Multigrid:
             is_squared = finer.operator.is_squared
             if is_squared:
                 finer.smooth(None, finer.y)
-            fields = (finer.rhs, finer.operator, finer.ties, finer.y, not is_squared)
+            fields = (finer.rhs, finer.operator, finer.penalty, finer.y, not is_squared)
             level.restrict(kernels.residual, *fields)
         last = self.coarse[-1]
         last.smooth(None, last.y)

@@ -30,10 +30,10 @@ class Operator(NamedTuple):
     """Whether the operator is the square of the Laplacian."""
     damped_diagonal: np.float32
     """Diagonal element of the operator, divided by the damping of the Jacobi iteration."""
-    spring: np.float32
-    """Stiffness of a spring per unit of the ties."""
-    damped_spring: np.float32
-    """`spring` divided by the damping."""
+    penalty_scale: np.float32
+    """Stiffness per unit of the penalty."""
+    damped_penalty_scale: np.float32
+    """`penalty_scale` divided by the damping."""
 
 
 @part_of_kernel
@@ -180,62 +180,62 @@ def last_smooth(
 
 
 @part_of_kernel
-def _residual_row(i, x, rows, operator, ties, rhs, out):
+def _residual_row(i, x, rows, operator, penalty, rhs, out):
     """Write row i of the residual rhs - A x to `out`; see `_inner_rows`."""
     height, n = rhs.shape
     xu, xm, xd = x[(i - 1) % 5], x[i % 5], x[(i + 1) % 5]
     up, mid, down = rows
-    spring = operator.spring
+    scale = operator.penalty_scale
     k = i % height
     above = k - 1 if k > 0 else height - 1
-    own, east, south, cross = ties[k, 0], ties[k, 1], ties[k, 2], ties[k, 3]
-    north, past, b = ties[above, 2], ties[above, 3], rhs[k]
+    own, east, south, cross = penalty[k, 0], penalty[k, 1], penalty[k, 2], penalty[k, 3]
+    north, past, b = penalty[above, 2], penalty[above, 3], rhs[k]
     # Four loops, because the compiler does not vectorise one loop over as many arrays.
     for j in range(n):
         out[j + 1] = b[j] - _laplacian(up, mid, down, operator, j + 2)
     for j in range(n):
         c, t = j + 2, j + 1
-        springs = np.float32(own[t]) * xm[c]
-        springs += np.float32(east[t]) * xm[c + 1] + np.float32(east[t - 1]) * xm[c - 1]
-        out[t] -= spring * springs
+        terms = np.float32(own[t]) * xm[c]
+        terms += np.float32(east[t]) * xm[c + 1] + np.float32(east[t - 1]) * xm[c - 1]
+        out[t] -= scale * terms
     for j in range(n):
         c, t = j + 2, j + 1
-        out[t] -= spring * (np.float32(south[t]) * xd[c] + np.float32(north[t]) * xu[c])
+        out[t] -= scale * (np.float32(south[t]) * xd[c] + np.float32(north[t]) * xu[c])
     for j in range(n):
         c, t = j + 2, j + 1
-        springs = np.float32(cross[t]) * xd[c + 1] + np.float32(cross[t - 1]) * xd[c - 1]
-        springs += np.float32(past[t]) * xu[c + 1] + np.float32(past[t - 1]) * xu[c - 1]
-        out[t] -= spring * springs
+        terms = np.float32(cross[t]) * xd[c + 1] + np.float32(cross[t - 1]) * xd[c - 1]
+        terms += np.float32(past[t]) * xu[c + 1] + np.float32(past[t - 1]) * xu[c - 1]
+        out[t] -= scale * terms
 
 
 @part_of_kernel
-def _start_row(rhs, operator, ties, old, is_zero, k, row):
+def _start_row(rhs, operator, penalty, old, is_zero, k, row):
     """Write row k of `old`, or of the result of a smoothing step from zero, to a ring buffer."""
-    force, own, source = rhs[k], ties[k, 0], old[k]
+    force, own, source = rhs[k], penalty[k, 0], old[k]
     if is_zero:
         for j in range(force.size):
-            tied = operator.damped_diagonal + operator.damped_spring * np.float32(own[j + 1])
-            row[j + 2] = force[j] / tied
+            added = operator.damped_penalty_scale * np.float32(own[j + 1])
+            row[j + 2] = force[j] / (operator.damped_diagonal + added)
     else:
         for j in range(force.size):
             row[j + 2] = source[j]
 
 
 @kernel
-def smooth(rhs, operator, ties, old, is_zero, coarse, ratio, y, a, b):
+def smooth(rhs, operator, penalty, old, is_zero, coarse, ratio, y, a, b):
     """Write the result of one smoothing step (damped Jacobi) on x to `y`.
 
     x is the result of a smoothing step from zero where `is_zero`, else `old`, plus P coarse where
     the ratio of the scales is positive.
     """
     height, n = rhs.shape
-    diagonal, spring = operator.damped_diagonal, operator.damped_spring
+    diagonal, scale = operator.damped_diagonal, operator.damped_penalty_scale
     x, laplacian = np.empty((5, n + 4), np.float32), np.empty((3, n + 4), np.float32)
     defect, correction = np.empty(n + 1, np.float32), np.empty(n + 4, np.float32)
     for i in range(a - 4, b):
         k = (i + 2) % height
         new = x[(i + 2) % 5]
-        _start_row(rhs, operator, ties, old, is_zero, k, new)
+        _start_row(rhs, operator, penalty, old, is_zero, k, new)
         if ratio > 0:
             _interpolate(coarse, k, ratio, correction)
             for j in range(2, n + 2):
@@ -243,15 +243,15 @@ def smooth(rhs, operator, ties, old, is_zero, coarse, ratio, y, a, b):
         _wrap(new)
         rows = _inner_rows(i, x, laplacian, operator)
         if i >= a:
-            _residual_row(i, x, rows, operator, ties, rhs, defect)
-            own, source, target = ties[i, 0], x[i % 5], y[i]
+            _residual_row(i, x, rows, operator, penalty, rhs, defect)
+            own, source, target = penalty[i, 0], x[i % 5], y[i]
             for j in range(n):
-                tied = diagonal + spring * np.float32(own[j + 1])
-                target[j] = source[j + 2] + defect[j + 1] / tied
+                stiffened = diagonal + scale * np.float32(own[j + 1])
+                target[j] = source[j + 2] + defect[j + 1] / stiffened
 
 
 @kernel
-def residual(rhs, operator, ties, y, is_zero, coarse, a, b):
+def residual(rhs, operator, penalty, y, is_zero, coarse, a, b):
     """Restrict the residual of y to `coarse`, or write it to a field as wide as `rhs`.
 
     Where `is_zero`, the result of a smoothing step from zero takes the place of y.
@@ -262,11 +262,11 @@ def residual(rhs, operator, ties, y, is_zero, coarse, a, b):
     ratio = 1 if coarse.shape[1] == n else 2
     for i in range(ratio * a - ratio - 3, ratio * b):
         new = x[(i + 2) % 5]
-        _start_row(rhs, operator, ties, y, is_zero, (i + 2) % height, new)
+        _start_row(rhs, operator, penalty, y, is_zero, (i + 2) % height, new)
         _wrap(new)
         rows = _inner_rows(i, x, laplacian, operator)
         if i < ratio * (a - 1) + 1:
             continue
         row = defect[i % 3]
-        _residual_row(i, x, rows, operator, ties, rhs, row)
+        _residual_row(i, x, rows, operator, penalty, rhs, row)
         _restrict_or_copy(i, a, ratio, defect, coarse)

@@ -1,6 +1,6 @@
 """Compiled kernels between two levels of the multigrid cycle; see `multigrid`.
 
-They compute the penalty terms of a level, and restrict and interpolate between levels of any
+They compute the penalty of a level, and restrict and interpolate between levels of any
 numbers of points. `multigrid_kernels` does the latter without a field of its own where a level has
 exactly half the points of the next finer one.
 """
@@ -11,41 +11,41 @@ from gfmd_cli.grid.compilation import kernel, part_of_kernel
 from gfmd_cli.solvers.multigrid_kernels import HALF, ONE, ZERO
 
 WHOLE_WEIGHT = 4  # weight of a point held, in quarters
-TIES_PER_QUARTER = 16  # units of the ties per unit of the weights
+UNITS_PER_QUARTER = 16  # units of the penalty per unit of the weights
 
 
 @part_of_kernel
 def _weight(value, threshold, weighted):
-    """Weight of a fine point in quarters; see `compute_ties`."""
+    """Weight of a fine point in quarters; see `compute_penalty`."""
     return WHOLE_WEIGHT if value >= threshold else weighted * value
 
 
 @kernel
-def compute_ties(fine, threshold, weighted, ties, weights, a, b):
-    """Springs that tie bilinear hats to zero at the points held, and the weights of the hats.
+def compute_penalty(fine, threshold, weighted, penalty, weights, a, b):
+    """The penalty on bilinear hats at the points held, and the weights of the hats.
 
-    The ties are P^T w P in units of 1/64 for a point itself, its right neighbour, its lower
+    The penalty is P^T w P in units of 1/64 for a point itself, its right neighbour, its lower
     neighbour and its lower right neighbour, where w is the weight of the finer points in quarters:
     4 where `fine` reaches the threshold, else `fine` if these are weights (`weighted` is 1) and 0
     if they are contact states (0). The weight of a hat is P^T w, at most 1.
     """
     (height, n), m = fine.shape, weights.shape[1]
     rows = np.empty((3, n), np.int32)
-    down, tied, loaded = rows[0], rows[1], rows[2]  # columns weighted by 0 0 1, 1 4 1, 1 2 1
+    down, squared, loaded = rows[0], rows[1], rows[2]  # columns weighted by 0 0 1, 1 4 1, 1 2 1
     for i in range(a, b):
         above, here, below = fine[(2 * i - 1) % height], fine[2 * i], fine[2 * i + 1]
         for j in range(n):
             middle = 2 * _weight(here[j], threshold, weighted)
             down[j] = _weight(below[j], threshold, weighted)
             loaded[j] = _weight(above[j], threshold, weighted) + middle + down[j]
-            tied[j] = loaded[j] + middle
-        own, east, south, cross = ties[i, 0], ties[i, 1], ties[i, 2], ties[i, 3]
+            squared[j] = loaded[j] + middle
+        own, east, south, cross = penalty[i, 0], penalty[i, 1], penalty[i, 2], penalty[i, 3]
         weight = weights[i]
         for j in range(m):
             e, o = 2 * j, 2 * j + 1
             w = o - 2 if j > 0 else n - 1
-            own[j + 1] = tied[w] + 4 * tied[e] + tied[o]
-            east[j + 1] = tied[o]
+            own[j + 1] = squared[w] + 4 * squared[e] + squared[o]
+            east[j + 1] = squared[o]
             south[j + 1] = down[w] + 4 * down[e] + down[o]
             cross[j + 1] = down[o]
             weight[j] = min(WHOLE_WEIGHT, (loaded[w] + 2 * loaded[e] + loaded[o] + 2) >> 2)
@@ -107,12 +107,12 @@ def interpolate(coarse, fine, a, b):
 
 
 @kernel
-def compute_any_ties(fine, threshold, weighted, ties, weights, a, b):
-    """The same as `compute_ties`, rounded, for any numbers of points."""
+def compute_any_penalty(fine, threshold, weighted, penalty, weights, a, b):
+    """The same as `compute_penalty`, rounded, for any numbers of points."""
     (height, n), (rows, m) = fine.shape, weights.shape
     left, right, fraction = _hats(n, m)
     columns, sums = np.empty((3, n), np.float32), np.empty((5, m), np.float32)
-    down, tied, loaded = columns[0], columns[1], columns[2]
+    down, squared, loaded = columns[0], columns[1], columns[2]
     own, east, south, cross, weight = sums[0], sums[1], sums[2], sums[3], sums[4]
     for k in range(a, b):
         columns[:] = ZERO
@@ -125,22 +125,22 @@ def compute_any_ties(fine, threshold, weighted, ties, weights, a, b):
             for j in range(n):
                 w = np.float32(_weight(row[j], threshold, weighted)) * value
                 loaded[j] += w
-                tied[j] += value * w
+                squared[j] += value * w
                 down[j] += below * w
         for j in range(n):
             e, o, t = left[j], right[j], fraction[j]
             s = ONE - t
             weight[e] += s * loaded[j]
             weight[o] += t * loaded[j]
-            own[e] += s * s * tied[j]
-            own[o] += t * t * tied[j]
-            east[e] += s * t * tied[j]
+            own[e] += s * s * squared[j]
+            own[o] += t * t * squared[j]
+            east[e] += s * t * squared[j]
             south[e] += s * s * down[j]
             south[o] += t * t * down[j]
             cross[e] += s * t * down[j]
         for j in range(m):
             weights[k, j] = min(WHOLE_WEIGHT, int(weight[j] + HALF))
             for kind in range(4):
-                ties[k, kind, j + 1] = int(np.float32(TIES_PER_QUARTER) * sums[kind, j] + HALF)
+                penalty[k, kind, j + 1] = int(np.float32(UNITS_PER_QUARTER) * sums[kind, j] + HALF)
         for kind in range(4):
-            ties[k, kind, 0] = ties[k, kind, m]
+            penalty[k, kind, 0] = penalty[k, kind, m]
