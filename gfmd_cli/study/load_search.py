@@ -126,7 +126,8 @@ def solve_at_load(task: Task, context: SolveContext, watcher: Watcher) -> TaskSo
             solved = None  # frees its memory, which is needed now
             solved = attempt(points, pressure)
             search.add(trials[-1])
-        if has_error and points == measured_on and search.succeeded:
+        ended_near = search.succeeded or search.is_exhausted
+        if has_error and points == measured_on and ended_near:
             jump = JUMP[scene.grid.dimension] * search.quantum
             ratio = min(max(NEIGHBOURS[0], 1 + JUMPS * jump / task.load), NEIGHBOURS[1])
             ended = sum(trial.is_neighbour for trial in trials)
@@ -381,10 +382,10 @@ class _Search:
     def succeeded(self) -> bool:
         """Whether the nearest trial is within the tolerance, or the contact area jumps there."""
         within = self._deviation(self.points[0]) <= self.tolerance
-        return within or (self.quantum > 0 and self._exhausted)
+        return within or (self.quantum > 0 and self.is_exhausted)
 
     @property
-    def _exhausted(self) -> bool:
+    def is_exhausted(self) -> bool:
         """Whether no pressures between come nearer, or the solver does not tell them apart."""
         low, high = self._enclosure()
         step = abs(high.trial.value - low.trial.value)
@@ -400,7 +401,7 @@ class _Search:
         """The pressure to try next, None where the search has ended."""
         if not self.points:
             return self.first
-        if self.succeeded or self._exhausted or len(self.points) >= MAX_TRIALS:
+        if self.succeeded or self.is_exhausted or len(self.points) >= MAX_TRIALS:
             return None
         start, (low, high) = self.points[0], self._enclosure()
         is_enclosed = isfinite(high.x - low.x)
