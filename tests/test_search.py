@@ -246,19 +246,26 @@ def test_a_share_of_a_flat_top_is_not_reached(rows_of, tmp_path):
     assert row["a_r"] == 16 / 256
 
 
-@pytest.mark.parametrize("points", [64, 128])
 @pytest.mark.parametrize("boundary", ["periodic", "free"])
-@pytest.mark.parametrize("load", [0.05, 0.08, 0.12])
-def test_less_than_the_face_of_a_punch_is_not_reached(rows_of, boundary, load, points):
+@pytest.mark.parametrize("load", [0.08, 0.12])
+def test_less_than_the_face_of_a_punch_is_not_reached(rows_of, boundary, load):
     """At the smallest pressures rounding takes points from it."""
     (row,) = rows_of(
         "surface={kind='punch', radius=2e-4, depth=1e-4, length=1e-3}", f"grid.boundary={boundary}",
-        "elastomer={kind='half-space', E_star=1e9}", f"grid.points={points}",
-        f"load.contact_area={load}",
+        "elastomer={kind='half-space', E_star=1e9}", "grid.points=64", f"load.contact_area={load}",
     )  # fmt: skip
     assert row["status"] == "load_not_reached"
-    x, y = np.meshgrid(*[np.arange(points) - points // 2] * 2)
-    assert row["a_r"] == np.mean(np.hypot(x, y) <= 0.2 * points)
+    x, y = np.meshgrid(np.arange(64) - 32, np.arange(64) - 32)
+    assert row["a_r"] == np.mean(np.hypot(x, y) <= 0.2 * 64)
+
+
+def test_the_face_of_a_punch_on_a_membrane_does_not_vanish_at_small_pressures(rows_of):
+    """The stiffness of the shortest waves is 30000 times that of the longest."""
+    keys = "surface={kind='punch', radius=0.2, depth=0.1}", "elastomer.n=2", "grid.points=256"
+    (row,) = rows_of(*keys, "load.contact_area=0.05")
+    (resolved,) = rows_of(*keys, "load={p_star=1e-8}", name="resolved.h5")
+    assert (row["status"], resolved["status"]) == ("load_not_reached", "converged")
+    assert row["a_r"] == resolved["a_r"] > 0.05
 
 
 @pytest.mark.parametrize("n", [2, 3])
