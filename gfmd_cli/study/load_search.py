@@ -6,9 +6,9 @@ grids predict the first pressure there. Each trial is a solve of its own. The co
 plate (n = 4) may also fall, as that under a paraboloid does: of several roots the search finds one,
 or it ends in a jump where another pressure has the area.
 
-With `[accuracy]` a contact area or mean gap is that in the continuum on the last grid, and that of
-the grid on the coarser ones, which give a first pressure, and the slope from which the error of
-the pressure follows.
+With `[accuracy]` a contact area or mean gap is that in the continuum, also on a coarser grid if its
+continuum value is known. A coarser grid gives the slope from which the error of the pressure
+follows.
 
 The contact area of a grid has steps. Where the requested area lies between two attainable ones, the
 search ends with the nearest contact, at a pressure that may depend on rounding errors.
@@ -49,19 +49,25 @@ MAX_STEP = log(8.0)  # of ln p, until the root is enclosed
 NEARBY = 0.95  # of a load, at which the theory gives the slope
 MIN_SLOPE = 1e-3  # of ln(value) over ln(p), from which a step is made
 ROUNDING = 1e-13  # width in ln p of the narrowest enclosure: 450 roundings of p
-RESOLVED = 1e-12  # p / k of the longest wave [h_std]; below, rounding decides on contact; a choice
+RESOLVED = 1e-12
+"""p / k of the stiffest wave [h_std], below which rounding may decide on contact. The contact of
+a punch on 64^2 to 256^2 points has all its points down to 8e-13 (n = 0.5), 6e-15 (1) and 3e-15 (2),
+and loses some at a tenth of that."""
 SMOOTH = 0.01  # of the solver's tolerance in ln p: gaps and displacements have no steps
 AREA_RATIO = 0.5
 """Shift of ln p at one contact area from a grid to the next, over that before: the error of the
 area is proportional to the spacing. 0.37 to 0.67 on 256^2, 512^2 and 1024^2 (n = 0.5 to 3, areas of
 0.01 to 0.3, two seeds), except for one shift that was a 50th of the next."""
 MAX_TRIALS = 60  # on one grid; 44 halve an interval of MAX_STEP down to ROUNDING
-NEIGHBOURS = (1.25, 0.8)
-"""Pressures of the trials that give the slopes at the root, over that of the root; a choice. One of
-the two chords is less steep than the curve, the other one steeper."""
+NEIGHBOURS = (1.25, 2.0)
+"""Least and largest ratio of the pressures of the root and of two trials, above and below it, that
+give the slopes there; a choice. One of the chords is less steep than the curve, the other steeper.
+"""
 JUMP = {1: 2, 2: 8}
 """Points that enter contact together on a symmetric surface, by its dimension."""
-LARGEST_ERROR = 0.5  # of load and pressure, relative, above which it is unknown; a choice
+JUMPS = 6  # of the area, by which it is to change from the root to a neighbour; a choice
+LARGEST_ERROR = 1.0  # of a pressure, relative, above which it is unknown; a choice
+ENTERING = 0.05  # points expected to enter contact within the narrowest enclosure; a choice
 SOLVED = (Status.CONVERGED, Status.ROUNDING)  # how a solve ends
 
 
@@ -72,8 +78,9 @@ def solve_at_load(task: Task, context: SolveContext, watcher: Watcher) -> TaskSo
     `task.load_tolerance` of the load. A contact area is a whole number of grid points, several of
     which may enter contact together. Therefore a search of an area also succeeds, with a warning,
     within half a grid point of the load, and where the area jumps there. A jump is a difference of
-    one grid point, or two pressures that the solver cannot tell apart, as they differ by less than
-    its tolerance. Otherwise the status is "load_not_reached".
+    one grid point, or of two pressures so close that hardly one point is expected to enter contact
+    between them, or that the solver cannot tell apart, as they differ by less than its tolerance.
+    Otherwise the status is "load_not_reached".
 
     Raises InputError for a mean gap that no pressure has, and an area below one grid point.
     """
@@ -97,7 +104,7 @@ def solve_at_load(task: Task, context: SolveContext, watcher: Watcher) -> TaskSo
     first = slope = 0.0
     roots: list[float] = []
     slopes: list[dict[str, float]] = []
-    jump = 0.0
+    uncertain = 0.0
     grids = _grids(task)
     has_error = task.accuracy is not None and LOADS[task.quantity].searched in QUANTITIES
     measured_on = grids[max(len(grids) - 2, 0)] if has_error else 0
@@ -119,14 +126,17 @@ def solve_at_load(task: Task, context: SolveContext, watcher: Watcher) -> TaskSo
             solved = None  # frees its memory, which is needed now
             solved = attempt(points, pressure)
             search.add(trials[-1])
-        if has_error and points == measured_on and search.succeeded:
+        ended_near = search.succeeded or search.is_exhausted
+        if has_error and points == measured_on and ended_near:
+            jump = JUMP[scene.grid.dimension] * search.quantum
+            ratio = min(max(NEIGHBOURS[0], 1 + JUMPS * jump / task.load), NEIGHBOURS[1])
             ended = sum(trial.is_neighbour for trial in trials)
-            for pressure in (ratio * search.nearest.pressure for ratio in NEIGHBOURS[ended:]):
+            for pressure in (step * search.nearest.pressure for step in (ratio, 1 / ratio)[ended:]):
                 if search.lowest < pressure / scene.delta_sigma < PRESSURE_RANGE[1]:
                     solved = None
                     solved = attempt(points, pressure, is_neighbour=True)
             slopes = _slopes(search.nearest, trials)
-            jump = JUMP[scene.grid.dimension] * search.quantum
+            uncertain = jump / log(ratio)
         roots.append(search.root if search.succeeded else log(search.nearest.pressure))
         slope = search.slope
     if solved is None or trials[-1] != search.nearest:
@@ -135,7 +145,7 @@ def solve_at_load(task: Task, context: SolveContext, watcher: Watcher) -> TaskSo
     solved.solution.transforms = sum(trial.work for trial in trials) / solved.contact.grid.size
     _check_known(task, solved)
     if has_error:
-        _with_errors_at_load(task, solved, slopes if search.succeeded else [], jump)
+        _with_errors_at_load(task, solved, slopes if search.succeeded else [], uncertain)
     if solved.solution.status in SOLVED and not search.succeeded:
         solved.solution.status = Status.LOAD_NOT_REACHED
     return solved
@@ -152,7 +162,7 @@ def _slopes(root: Trial, trials: list[Trial]) -> list[dict[str, float]]:
     Empty if a solve has not converged, or a neighbour is out of the range of pressures.
     """
     neighbours = [trial for trial in trials if trial.is_neighbour]
-    is_complete = len(neighbours) == len(NEIGHBOURS)
+    is_complete = len(neighbours) == 2
     if not (is_complete and all(trial.observables for trial in (root, *neighbours))):
         return []
     return [
@@ -165,29 +175,30 @@ def _slopes(root: Trial, trials: list[Trial]) -> list[dict[str, float]]:
 
 
 def _with_errors_at_load(
-    task: Task, solved: TaskSolution, slopes: list[dict[str, float]], jump: float
+    task: Task, solved: TaskSolution, slopes: list[dict[str, float]], uncertain: float
 ) -> None:
     """Set the error of a pressure that was searched, and those of the other quantities at the load.
 
-    `jump` is the part of a change of the searched quantity that may be due to the grid. Where it is
-    more than half, the slope is not known.
+    `uncertain` is the part of a slope of the searched quantity that may be due to the grid. Where
+    it is more than half, the slope is not known.
 
-    The continuum has the load at another pressure than the one that was found. The difference is at
-    most the error of the pressure, and the other quantities change over it.
+    The continuum has the load at another pressure than the one that was found. Where the value is
+    lower by its error, so is the slope of a power law: the error of ln p is the logarithm of their
+    ratio over the exponent. The other quantities change over it, at most in proportion to p.
     """
     name, units = LOADS[task.quantity].searched, _units(solved.scene)
     estimate = solved.estimates[name]
-    uncertain = jump / log(max(NEIGHBOURS))
     slope = min((each[name] for each in slopes), default=0.0) / units[name] - uncertain
-    distance = estimate.continuum_error + solved.algebraic(name)
-    distance += abs(estimate.continuum - task.load)
-    is_known = slope > uncertain and distance < LARGEST_ERROR * estimate.continuum
-    if is_known and distance < log1p(LARGEST_ERROR) * slope:
-        solved.pressure_error = expm1(distance / slope)
+    value = estimate.continuum
+    distance = estimate.continuum_error + solved.algebraic(name) + abs(value - task.load)
+    if slope > uncertain and distance < value:
+        error = -log1p(-distance / value) * value / slope  # of ln p
+        if error < log1p(LARGEST_ERROR):
+            solved.pressure_error = expm1(error)
     for other in solved.estimates.keys() - {name}:
         steepest = max((each[other] for each in slopes), default=nan) / units[other]
-        change = steepest * -log1p(-solved.pressure_error)
-        solved.estimates[other] = with_shift(solved.estimates[other], change)
+        estimates = solved.estimates
+        estimates[other] = with_shift(estimates[other], steepest * solved.pressure_error)
 
 
 def _check_known(task: Task, solved: TaskSolution) -> None:
@@ -228,7 +239,8 @@ def _at(task: Task, points: int, pressure: float) -> Task:
     solver, accuracy = task.solver, task.accuracy
     if points != task.points:
         tolerance = max(solver.tolerance, COARSE_RESIDUAL)
-        solver, accuracy = solver.model_copy(update={"tolerance": tolerance}), None
+        solver = solver.model_copy(update={"tolerance": tolerance})
+        accuracy = accuracy if task.quantity == "contact_area" else None  # others hardly change
     return replace(
         task,
         solver=solver,
@@ -274,20 +286,20 @@ def _pressures(task: Task, scene: Scene, loads: Field) -> Field:
 def _shift(task: Task, roots: list[float]) -> float:
     """Expected shift of ln p from the last of these grids to the next one, at the same load.
 
-    The error of a contact area is about proportional to the grid spacing. Mean gaps and
-    displacements hardly depend on the grid.
+    The error of a contact area on the grid is about proportional to the spacing. Continuum values,
+    mean gaps and displacements hardly depend on the grid.
     """
-    if task.quantity != "contact_area" or len(roots) < 2:
+    if task.quantity != "contact_area" or task.accuracy is not None or len(roots) < 2:
         return 0.0
-    to_next = roots[-1] - roots[-2]
-    return to_next * (AREA_RATIO if task.accuracy is None else AREA_RATIO / (1 - AREA_RATIO))
+    return AREA_RATIO * (roots[-1] - roots[-2])
 
 
-def _softest(task: Task, scene: Scene) -> float:
-    """k of the longest wave [Delta_sigma / h_std]."""
+def _stiffest(task: Task, scene: Scene) -> float:
+    """The larger k of the longest and the shortest wave along an axis [Delta_sigma / h_std]."""
     length = scene.grid.length
-    (k,) = task.elastomer.stiffness(np.array([2 * np.pi / length]), length).tolist()
-    return float(k) * scene.h_std / scene.delta_sigma
+    q = np.array([2 * np.pi / length, np.pi / min(scene.grid.spacings)])
+    k = float(task.elastomer.stiffness(q, length).max())
+    return k * scene.h_std / scene.delta_sigma
 
 
 class _Point(NamedTuple):
@@ -320,8 +332,9 @@ class _Search:
         tolerance = task.load_tolerance if is_last else COARSE_DISTANCE
         self.tolerance = max(tolerance, 0.5 * self.quantum / task.load)  # no area is nearer
         apart = (1.0 if is_area else SMOOTH) * task.solver.tolerance
-        self.resolution = max(apart, ROUNDING) if is_last else COARSE_DISTANCE
-        self.lowest = max(PRESSURE_RANGE[0], RESOLVED * _softest(task, scene) if is_area else 0.0)
+        apart = max(apart, ENTERING * self.quantum / task.load, ROUNDING)
+        self.resolution = apart if is_last else COARSE_DISTANCE
+        self.lowest = max(PRESSURE_RANGE[0], RESOLVED * _stiffest(task, scene) if is_area else 0.0)
         """Reduced pressure above which the load is sought."""
         self.points: list[_Point] = []
         """Nearest to the root first; on a plateau (full contact) the innermost."""
@@ -369,11 +382,11 @@ class _Search:
     def succeeded(self) -> bool:
         """Whether the nearest trial is within the tolerance, or the contact area jumps there."""
         within = self._deviation(self.points[0]) <= self.tolerance
-        return within or (self.quantum > 0 and self._exhausted)
+        return within or (self.quantum > 0 and self.is_exhausted)
 
     @property
-    def _exhausted(self) -> bool:
-        """Whether the solver tells no pressures apart that come nearer."""
+    def is_exhausted(self) -> bool:
+        """Whether no pressures between come nearer, or the solver does not tell them apart."""
         low, high = self._enclosure()
         step = abs(high.trial.value - low.trial.value)
         return high.x - low.x < self.resolution or step < 1.5 * self.quantum
@@ -388,7 +401,7 @@ class _Search:
         """The pressure to try next, None where the search has ended."""
         if not self.points:
             return self.first
-        if self.succeeded or self._exhausted or len(self.points) >= MAX_TRIALS:
+        if self.succeeded or self.is_exhausted or len(self.points) >= MAX_TRIALS:
             return None
         start, (low, high) = self.points[0], self._enclosure()
         is_enclosed = isfinite(high.x - low.x)
