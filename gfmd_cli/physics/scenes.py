@@ -65,11 +65,11 @@ def reduce_scene(grid: Grid, height: Field, elastomer: LinearElastomer) -> Scene
     squares = 0.0
     for block in blocks:
         block -= mean
-        relative = block / largest  # squares of heights of 1e-200 m would vanish
-        squares += dot(relative, relative)
+        block /= largest  # squares of heights of 1e-200 m would vanish
+        squares += dot(block, block)
     rms = sqrt(grid.total(squares) / grid.size)
     for block in blocks:
-        block /= largest * rms
+        block *= 1 / rms
     stiffness, stiffest = _stiffness(grid, elastomer)
     m, power, modes = radial_power(grid, height)
     q = m * (2 * np.pi / grid.length)

@@ -11,12 +11,18 @@ TILE_WIDTH = SIDE * BATCH_SIZE  # numbers between points of neighbouring tiles
 
 
 @kernel
-def mark_entered(w, level, h, used, entered, a, b):
-    """Mark the tiles that are not used in which w - level is below h somewhere."""
+def mark_entered(w, level, h, used, entered, sums, a, b):
+    """Mark the tiles that are not used in which w - level is below h somewhere.
+
+    `sums` receives the sum of w^2 of each row.
+    """
     below = np.empty(h.shape[1], np.bool_)
     for i in range(a, b):
+        squares = 0.0
         for j in range(h.shape[1]):
             below[j] = w[i, j] - level < h[i, j]
+            squares += w[i, j] * w[i, j]
+        sums[i, 0] = squares
         for block in range(used.shape[1]):
             somewhere = False
             for j in range(SIDE * block, SIDE * block + SIDE):

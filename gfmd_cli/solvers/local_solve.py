@@ -157,27 +157,30 @@ class LocalSolve:
         """
         gap = self.tiles.take(displacement) - self.obstacle
         level = float(gap[self.s > 0].mean())
-        if self.add_entered(displacement, level):
-            gap = self.tiles.take(displacement) - self.obstacle
-        gap -= level
+        squares = self.add_entered(displacement, level)
+        gap = self.tiles.take(displacement) - self.obstacle - level
         gap_of_start, start_residual = self.lay(gap, tolerance)
-        is_single = displacement.dtype == np.float32
-        rounding = self.contact.rounding(displacement) if is_single else 0.0
+        rounding = 0.0
+        if displacement.dtype == np.float32:
+            rounding = self.contact.noise(displacement.dtype) * self.contact.as_residual(squares)
         return Evaluation(level, gap_of_start, self.residual(gap, self.s), start_residual, rounding)
 
-    def add_entered(self, displacement: Field, level: float) -> bool:
-        """Add tiles in which C s - level is below h, and those around; whether there are any."""
+    def add_entered(self, displacement: Field, level: float) -> float:
+        """Add tiles in which C s - level is below h, and those around.
+
+        Returns the sum of the squares of C s over the grid.
+        """
         entered = np.zeros(self.tiles.used.shape, dtype=np.bool_)
         fields = (displacement, level, self.contact.obstacle, self.tiles.used, entered)
-        self.grid.rows.run(mark_entered, *fields)
+        squares = float(self.grid.rows.sums(1, mark_entered, *fields)[0])
         if not entered.any():
-            return False
+            return squares
         used = self.tiles.used | maximum_filter(entered, 3, mode="wrap")
         tiles = Tiles(used, is_periodic=self.tiles.is_periodic)
         s = np.zeros((tiles.count, SIDE * SIDE))
         s[self.tiles.used[tiles.used]] = self.s
         self.place(tiles, s)
-        return True
+        return squares
 
     def run(self, tolerance: float) -> None:
         """Projected conjugate gradients on the tiles, to a natural residual on them.
