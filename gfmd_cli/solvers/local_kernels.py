@@ -70,3 +70,110 @@ def convolve(values, neighbours, quadrant, out, a, b):
             for j in range(SIDE):
                 for t in range(count):
                     out[first + t, SIDE * i + j] = row[BATCH_SIZE * j + t]
+
+
+@kernel
+def balance(s, gap, active, force):
+    """Subtract the mean gap under pressure from the gap; return the sum of min(gap, s)^2.
+
+    Active are the points with s > 0 or a negative gap. The force on them is minus the gap, with
+    the mean zero.
+    """
+    s, gap, active, force = s.ravel(), gap.ravel(), active.ravel(), force.ravel()
+    total, count = 0.0, 0
+    for i in range(s.size):
+        if s[i] > 0:
+            total += gap[i]
+            count += 1
+    level = total / count
+    total, count, squares = 0.0, 0, 0.0
+    for i in range(s.size):
+        gap[i] -= level
+        active[i] = s[i] > 0 or gap[i] < 0
+        if active[i]:
+            squares += min(gap[i], s[i]) ** 2
+            total += gap[i]
+            count += 1
+    mean = total / count
+    for i in range(s.size):
+        force[i] = mean - gap[i] if active[i] else 0.0
+    return squares
+
+
+@kernel
+def products(z, active, force, last_force):
+    """Balance z on the active points, and set it to zero elsewhere; return z force, z last_force."""
+    z, active = z.ravel(), active.ravel()
+    force, last_force = force.ravel(), last_force.ravel()
+    total, count = 0.0, 0
+    for i in range(z.size):
+        if active[i]:
+            total += z[i]
+            count += 1
+    mean = np.float32(total / count)
+    product, last_product = 0.0, 0.0
+    for i in range(z.size):
+        z[i] = z[i] - mean if active[i] else 0.0
+        product += z[i] * force[i]
+        last_product += z[i] * last_force[i]
+    return product, last_product
+
+
+@kernel
+def find_direction(z, beta, last, s, active, force, direction):
+    """The feasible direction of z + beta last (see `projected_move.feasible`); return its descent.
+
+    It is zero where points are not active.
+    """
+    z, last, s, active = z.ravel(), last.ravel(), s.ravel(), active.ravel()
+    force, direction = force.ravel(), direction.ravel()
+    total, count = 0.0, 0
+    for i in range(s.size):
+        direction[i] = z[i] + beta * last[i]
+        if active[i]:
+            total += direction[i]
+            count += 1
+    mean = total / count
+    total, count = 0.0, 0
+    for i in range(s.size):
+        if active[i] and (s[i] > 0 or direction[i] > mean):
+            total += direction[i]
+            count += 1
+    mean_of_moving = total / count
+    descent = 0.0
+    for i in range(s.size):
+        is_moving = active[i] and (s[i] > 0 or direction[i] > mean)
+        direction[i] = direction[i] - mean_of_moving if is_moving else 0.0
+        descent += direction[i] * force[i]
+    return descent
+
+
+@kernel
+def find_move(s, direction, length, active, total, move):
+    """The move to s + length direction, projected on stresses >= 0 with this sum.
+
+    See `projected_move.projected`. Returns whether the projection clips a stress.
+    """
+    s, direction, active, move = s.ravel(), direction.ravel(), active.ravel(), move.ravel()
+    count, highest, is_clipped = 0, -np.inf, False
+    for i in range(s.size):
+        if active[i]:
+            target = s[i] + length * direction[i]
+            move[count] = target
+            count += 1
+            highest = max(highest, target)
+            is_clipped |= target < 0
+    last_count = s.size + 1
+    while count < last_count:
+        last_count, count, kept_sum = count, 0, 0.0
+        for i in range(last_count):
+            kept_sum += move[i] - highest
+        shift = (kept_sum - total) / last_count
+        for i in range(last_count):
+            if move[i] - highest > shift:  # one is always kept
+                move[count] = move[i]
+                count += 1
+    for i in range(s.size):
+        target = s[i] + length * direction[i]
+        move[i] = max(target - highest - shift, 0.0) - s[i] if active[i] else 0.0
+    return is_clipped

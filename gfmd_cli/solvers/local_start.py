@@ -102,7 +102,7 @@ def _tiles_in_reach(touching: Mask, *, is_periodic: bool) -> Tiles:
     """
     side = SIDE // 2
     used = np.zeros([points // side for points in touching.shape], dtype=np.bool_)
-    rows, columns = np.nonzero(touching)
+    rows, columns = np.divmod(np.flatnonzero(touching), touching.shape[1])
     mode = "wrap" if is_periodic else "clip"
     for i, j in product((rows - 1, rows + 1), (columns - 1, columns + 1)):
         used.ravel()[np.ravel_multi_index((i // side, j // side), used.shape, mode=mode)] = True
