@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from gfmd_cli.grid.compilation import kernel
+from gfmd_cli.grid.compilation import kernel, part_of_kernel
 from gfmd_cli.solvers.tiles import SIDE
 
 BATCH_SIZE = 8  # tiles that are convolved at once: the 8 numbers of a point lie next to each other
@@ -101,10 +101,26 @@ def balance(s, gap, active, force):
 
 
 @kernel
-def products(z, active, force, last_force):
-    """Balance z on the active points, and set it to zero elsewhere; return z force, z last_force."""
-    z, active = z.ravel(), active.ravel()
+def find_move(z, s, active, force, last_force, last, direction, move, old_slope, length, total):
+    """The direction from the preconditioned force z, and the projected move of this length.
+
+    Points that are not active do not move. `last` is the last direction; z force was `old_slope`
+    then. `total` is the sum of s. Returns z force, and whether the projection clips a stress. The
+    formulas are those of `projected_move`.
+    """
+    z, s, active, move = z.ravel(), s.ravel(), active.ravel(), move.ravel()
     force, last_force = force.ravel(), last_force.ravel()
+    last, direction = last.ravel(), direction.ravel()
+    slope, last_slope = _products(z, active, force, last_force)
+    beta = max(0.0, (slope - last_slope) / old_slope) if old_slope > 0 else 0.0
+    if _find_direction(z, beta, last, s, active, force, direction) <= 0:
+        _find_direction(z, 0.0, last, s, active, force, direction)
+    return slope, _project(s, direction, length, active, total, move)
+
+
+@part_of_kernel
+def _products(z, active, force, last_force):
+    """Balance z on the active points, with zeros elsewhere; return z force and z last_force."""
     total, count = 0.0, 0
     for i in range(z.size):
         if active[i]:
@@ -119,14 +135,9 @@ def products(z, active, force, last_force):
     return product, last_product
 
 
-@kernel
-def find_direction(z, beta, last, s, active, force, direction):
-    """The feasible direction of z + beta last (see `projected_move.feasible`); return its descent.
-
-    It is zero where points are not active.
-    """
-    z, last, s, active = z.ravel(), last.ravel(), s.ravel(), active.ravel()
-    force, direction = force.ravel(), direction.ravel()
+@part_of_kernel
+def _find_direction(z, beta, last, s, active, force, direction):
+    """`direction` <- the feasible direction of z + beta last; return its product with the force."""
     total, count = 0.0, 0
     for i in range(s.size):
         direction[i] = z[i] + beta * last[i]
@@ -148,13 +159,12 @@ def find_direction(z, beta, last, s, active, force, direction):
     return descent
 
 
-@kernel
-def find_move(s, direction, length, active, total, move):
-    """The move to s + length direction, projected on stresses >= 0 with this sum.
+@part_of_kernel
+def _project(s, direction, length, active, total, move):
+    """`move` <- that to s + length direction, projected on stresses >= 0 with this sum.
 
-    See `projected_move.projected`. Returns whether the projection clips a stress.
+    The first numbers of `move` are the targets of the points that the projection keeps.
     """
-    s, direction, active, move = s.ravel(), direction.ravel(), active.ravel(), move.ravel()
     count, highest, is_clipped = 0, -np.inf, False
     for i in range(s.size):
         if active[i]:

@@ -23,7 +23,7 @@ from gfmd_cli.grid.arrays import Field, dot
 from gfmd_cli.physics.contact import Contact
 from gfmd_cli.solvers import local_kernels as kernels
 from gfmd_cli.solvers.loop import ROUNDING_MARGIN, Start
-from gfmd_cli.solvers.projected_move import choose, polak_ribiere
+from gfmd_cli.solvers.projected_move import choose
 from gfmd_cli.solvers.tile_operators import TileOperators
 from gfmd_cli.solvers.tiles import SIDE, Tiles
 
@@ -200,18 +200,14 @@ class LocalSolve:
             squares = kernels.balance(s, gap, active, force)
             if self.contact.as_residual(squares) < tolerance:
                 break
-            z, old = self.map_displacement(force), slope
-            slope, last_slope = kernels.products(z, active, force, last_force)
-            beta = polak_ribiere(slope - last_slope, old)
+            z = self.map_displacement(force)
             direction, last_direction = last_direction, direction
-            fields = (last_direction, s, active, force, direction)
-            if kernels.find_direction(z, beta, *fields) <= 0:
-                kernels.find_direction(z, 0.0, *fields)
-            clipped = kernels.find_move(s, direction, length, active, self.total, move)
+            fields = (s, active, force, last_force, last_direction, direction, move)
+            slope, is_clipped = kernels.find_move(z, *fields, slope, length, self.total)
             change = self.compliance(move)
             curvature = dot(move, change)
             best = -dot(move, gap) / curvature if curvature > 0 else 1.0
-            exact = not clipped and (best <= 1 or float((s + best * move).min()) >= 0)
+            exact = not is_clipped and (best <= 1 or float((s + best * move).min()) >= 0)
             choice = choose(best, exact)
             length *= choice.factor
             if choice.restart:

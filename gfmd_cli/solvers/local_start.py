@@ -10,7 +10,7 @@ it takes the displacement, which is laid on the indenter before.
 from collections.abc import Callable
 from itertools import pairwise, product
 from math import hypot
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -103,7 +103,7 @@ def _tiles_in_reach(touching: Mask, *, is_periodic: bool) -> Tiles:
     side = SIDE // 2
     used = np.zeros([points // side for points in touching.shape], dtype=np.bool_)
     rows, columns = np.divmod(np.flatnonzero(touching), touching.shape[1])
-    mode = "wrap" if is_periodic else "clip"
+    mode: Any = "wrap" if is_periodic else "clip"
     for i, j in product((rows - 1, rows + 1), (columns - 1, columns + 1)):
         used.ravel()[np.ravel_multi_index((i // side, j // side), used.shape, mode=mode)] = True
     return Tiles(used, is_periodic=is_periodic)
