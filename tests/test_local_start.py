@@ -15,10 +15,12 @@ from gfmd_cli.physics.free_contact import SCENES, build_free_scene
 from gfmd_cli.physics.observables import contact_pressure
 from gfmd_cli.physics.scenes import build_scene
 from gfmd_cli.physics.self_affine import SelfAffine
+from gfmd_cli.solvers import local_kernels
 from gfmd_cli.solvers.dual import Dual
 from gfmd_cli.solvers.local_start import LOCAL_SOLVES, start_from
 from gfmd_cli.solvers.nested_grids import Resume, solve_contact
 from gfmd_cli.solvers.pcg import ProjectedCG
+from gfmd_cli.solvers.projected_move import new_direction, polak_ribiere, projected
 from gfmd_cli.solvers.tile_operators import FreeOperators, PeriodicOperators, convolution
 from gfmd_cli.solvers.tiles import Tiles
 
@@ -60,6 +62,35 @@ def test_a_convolution_on_tiles_is_that_of_the_grid(boundary):
     expected = scipy.signal.convolve2d(field, kernel, mode="same", boundary=boundary)
     convolved = convolution(quadrant, tiles, None)(values)
     assert convolved == pytest.approx(tiles.take(expected), abs=2e-4)
+
+
+def test_the_compiled_move_on_tiles_is_that_of_the_formulas():
+    """On the points that are active, and zero elsewhere."""
+    random = np.random.default_rng(3)
+    s = np.maximum(random.standard_normal((9, 64)), 0.0)
+    gap, z = random.standard_normal((2, *s.shape))
+    last_force, last = random.standard_normal((2, *s.shape))
+    active, (force, direction, move) = np.zeros(s.shape, dtype=bool), np.empty((3, *s.shape))
+    chosen = (s > 0) | (gap < gap[s > 0].mean())
+    last_force[~chosen] = last[~chosen] = 0.0
+    expected = -(gap[chosen] - gap[chosen].mean())
+    squares = np.square(np.minimum(gap - gap[s > 0].mean(), s)[chosen]).sum()
+    assert local_kernels.balance(s, gap, active, force) == pytest.approx(squares)
+    assert np.array_equal(active, chosen)
+    assert force[chosen] == pytest.approx(expected)
+    z = z.astype(np.float32)
+    balanced = z[chosen] - z[chosen].mean()
+    fields = (active, force, last_force, last, direction, move)
+    slope, is_clipped = local_kernels.find_move(z, s, *fields, 2.0, 0.7, s.sum())
+    assert slope == pytest.approx(balanced @ force[chosen], rel=1e-4)
+    beta = polak_ribiere(slope - balanced @ last_force[chosen], 2.0)
+    grid, previous = Grid(8), beta * last[chosen]
+    expected = new_direction(grid, balanced, previous, s[chosen], force[chosen])
+    assert direction[chosen] == pytest.approx(expected, abs=1e-4)
+    target = s[chosen] + 0.7 * direction[chosen]
+    assert move[chosen] == pytest.approx(projected(grid, target, s.sum()) - s[chosen])
+    assert is_clipped == bool((target < 0).any())
+    assert not any(field[~chosen].any() for field in (force, direction, move))
 
 
 GRIDS = [Grid(256), Grid(320, points_y=128), Grid(192, points_y=128, length_y=0.8)]

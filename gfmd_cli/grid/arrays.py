@@ -1,8 +1,10 @@
 """Array types shared by the whole package, how to walk over an array, and sums of products."""
 
+from math import prod
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
+import pyfftw
 from numpy.typing import NDArray
 
 Field: TypeAlias = NDArray[np.floating[Any]]
@@ -23,6 +25,20 @@ MaskedField: TypeAlias = "np.ma.MaskedArray[Any, Any]"
 Precision = Literal["double", "single"]
 
 BLOCK_POINTS = 2**15  # points of a block of rows: it and its temporaries stay in the cache
+
+
+HUGE_PAGE = 2**21  # bytes; Linux gives such pages to large arrays, if it may
+
+
+def aligned(shape: int | tuple[int, ...], dtype: Any) -> Any:
+    """An array that is aligned for transforms, values undefined.
+
+    A large one begins at a huge page. Elsewhere its ends would lie on up to 512 small pages, each
+    of which the system provides at the first access.
+    """
+    count = shape if isinstance(shape, int) else prod(shape)
+    is_large = count * np.dtype(dtype).itemsize >= HUGE_PAGE
+    return pyfftw.empty_aligned(shape, dtype, n=HUGE_PAGE if is_large else None)
 
 
 def row_blocks(field: Field | Modes, block: int = BLOCK_POINTS) -> list[slice]:

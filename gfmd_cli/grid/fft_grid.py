@@ -11,10 +11,9 @@ from math import prod
 from typing import Any, TypeVar
 
 import numpy as np
-import pyfftw
 
 from gfmd_cli.grid import kernels
-from gfmd_cli.grid.arrays import Field, Mask, Modes, Precision
+from gfmd_cli.grid.arrays import Field, Mask, Modes, Precision, aligned
 from gfmd_cli.grid.convolution import PaddedTransform, padded_shape
 from gfmd_cli.grid.modes import multiplicity, shared_modes
 from gfmd_cli.grid.pixels import average_along_x, average_rows, covered_rows
@@ -149,7 +148,7 @@ class Grid:
 
     def empty(self) -> Field:
         """A real field, aligned for the transforms, values undefined."""
-        return pyfftw.empty_aligned(self.shape, dtype=self.real)
+        return aligned(self.shape, self.real)
 
     def mode_number(self, rows: slice = ALL_ROWS) -> Field:
         """|q| L / 2 pi of every coefficient, shape `spectral_shape` (or of some of its rows).
@@ -195,7 +194,7 @@ class Grid:
     @cached_property
     def _memory(self) -> tuple[Any, ...]:
         """Memory that transforms work in, of one axis."""
-        return (pyfftw.empty_aligned(prod(self.spectral_shape), self._complex),)
+        return (aligned(prod(self.spectral_shape), self._complex),)
 
     def in_single(self) -> "Grid":
         """The same grid in single precision; its transforms work in the memory of this one's."""

@@ -6,7 +6,7 @@ from math import sqrt
 import numpy as np
 
 from gfmd_cli.errors import InputError
-from gfmd_cli.grid.arrays import Field, Mask, dot, row_blocks
+from gfmd_cli.grid.arrays import Field, Mask, aligned, dot, row_blocks
 from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.grid.ranks import Ranks
 from gfmd_cli.physics.contact import Scene
@@ -65,11 +65,11 @@ def reduce_scene(grid: Grid, height: Field, elastomer: LinearElastomer) -> Scene
     squares = 0.0
     for block in blocks:
         block -= mean
-        relative = block / largest  # squares of heights of 1e-200 m would vanish
-        squares += dot(relative, relative)
+        block /= largest  # squares of heights of 1e-200 m would vanish
+        squares += dot(block, block)
     rms = sqrt(grid.total(squares) / grid.size)
     for block in blocks:
-        block /= largest * rms
+        block *= 1 / rms
     stiffness, stiffest = _stiffness(grid, elastomer)
     m, power, modes = radial_power(grid, height)
     q = m * (2 * np.pi / grid.length)
@@ -106,7 +106,7 @@ def reduce_scene(grid: Grid, height: Field, elastomer: LinearElastomer) -> Scene
 
 def _stiffness(grid: Grid, elastomer: LinearElastomer) -> tuple[Field, float]:
     """k(q) over the half-spectrum in units of its largest value, and that value."""
-    k = np.empty(grid.spectral_shape)
+    k = aligned(grid.spectral_shape, np.float64)
     count = len(k) // 2 + 1 if grid.dimension == 2 else len(k)  # the rows q_y >= 0
     with np.errstate(over="ignore"):  # refused below
         for rows in row_blocks(k[:count]):

@@ -21,10 +21,10 @@ from scipy.ndimage import maximum_filter
 
 from gfmd_cli.grid.arrays import Field, dot
 from gfmd_cli.physics.contact import Contact
-from gfmd_cli.solvers.local_kernels import mark_entered
+from gfmd_cli.solvers import local_kernels as kernels
 from gfmd_cli.solvers.loop import ROUNDING_MARGIN, Start
-from gfmd_cli.solvers.projected_move import choose, new_direction, polak_ribiere, projected
-from gfmd_cli.solvers.tile_operators import Indices, TileOperators
+from gfmd_cli.solvers.projected_move import choose
+from gfmd_cli.solvers.tile_operators import TileOperators
 from gfmd_cli.solvers.tiles import SIDE, Tiles
 
 UNCORRECTED_TOLERANCE = 6e-3  # of the first solve, before the operators are corrected; a choice
@@ -157,27 +157,30 @@ class LocalSolve:
         """
         gap = self.tiles.take(displacement) - self.obstacle
         level = float(gap[self.s > 0].mean())
-        if self.add_entered(displacement, level):
-            gap = self.tiles.take(displacement) - self.obstacle
-        gap -= level
+        squares = self.add_entered(displacement, level)
+        gap = self.tiles.take(displacement) - self.obstacle - level
         gap_of_start, start_residual = self.lay(gap, tolerance)
-        is_single = displacement.dtype == np.float32
-        rounding = self.contact.rounding(displacement) if is_single else 0.0
+        rounding = 0.0
+        if displacement.dtype == np.float32:
+            rounding = self.contact.noise(displacement.dtype) * self.contact.as_residual(squares)
         return Evaluation(level, gap_of_start, self.residual(gap, self.s), start_residual, rounding)
 
-    def add_entered(self, displacement: Field, level: float) -> bool:
-        """Add tiles in which C s - level is below h, and those around; whether there are any."""
+    def add_entered(self, displacement: Field, level: float) -> float:
+        """Add tiles in which C s - level is below h, and those around.
+
+        Returns the sum of the squares of C s over the grid.
+        """
         entered = np.zeros(self.tiles.used.shape, dtype=np.bool_)
         fields = (displacement, level, self.contact.obstacle, self.tiles.used, entered)
-        self.grid.rows.run(mark_entered, *fields)
+        squares = float(self.grid.rows.sums(1, kernels.mark_entered, *fields)[0])
         if not entered.any():
-            return False
+            return squares
         used = self.tiles.used | maximum_filter(entered, 3, mode="wrap")
         tiles = Tiles(used, is_periodic=self.tiles.is_periodic)
         s = np.zeros((tiles.count, SIDE * SIDE))
         s[self.tiles.used[tiles.used]] = self.s
         self.place(tiles, s)
-        return True
+        return squares
 
     def run(self, tolerance: float) -> None:
         """Projected conjugate gradients on the tiles, to a natural residual on them.
@@ -187,48 +190,28 @@ class LocalSolve:
         """
         s, height = self.s, self.obstacle - self.correction
         w = self.compliance(s).astype(np.float64)
-        direction, force = np.zeros_like(s), np.zeros_like(s)
+        active = np.zeros(s.shape, dtype=np.bool_)
+        force, last_force, direction, last_direction, move = (np.zeros_like(s) for _ in range(5))
         slope, length = 0.0, 1.0  # K preconditions well: the natural length of a move is 1
         for _ in range(MAX_STEPS):
             self.pause()
             gap = w - height
-            pressed = s > 0
-            level = float(gap.ravel()[np.flatnonzero(pressed)].mean())
-            active = np.flatnonzero(pressed | (gap < level))
-            active_gap, active_s = gap.take(active) - level, s.take(active)
-            if self.residual(active_gap, active_s) < tolerance:
+            force, last_force = last_force, force
+            squares = kernels.balance(s, gap, active, force)
+            if self.contact.as_residual(squares) < tolerance:
                 break
-            active_force, last = _balanced(-active_gap), force.take(active)
-            force = _field(active_force, active, s)
-            z = _balanced(self.map_displacement(force).take(active))
-            old, slope = slope, dot(z, active_force)
-            beta = polak_ribiere(slope - dot(z, last), old)
-            last_direction = beta * direction.take(active)
-            active_direction = new_direction(self.grid, z, last_direction, active_s, active_force)
-            direction = _field(active_direction, active, s)
-            target = active_s + length * active_direction
-            clipped = bool((target < 0).any())
-            move = projected(self.grid, target, self.total) - active_s
-            change = self.compliance(_field(move, active, s))
-            curvature = dot(move, change.take(active))
-            best = -dot(move, active_gap) / curvature if curvature > 0 else 1.0
-            exact = not clipped and (best <= 1 or float((active_s + best * move).min()) >= 0)
+            z = self.map_displacement(force)
+            direction, last_direction = last_direction, direction
+            fields = (s, active, force, last_force, last_direction, direction, move)
+            slope, is_clipped = kernels.find_move(z, *fields, slope, length, self.total)
+            change = self.compliance(move)
+            curvature = dot(move, change)
+            best = -dot(move, gap) / curvature if curvature > 0 else 1.0
+            exact = not is_clipped and (best <= 1 or float((s + best * move).min()) >= 0)
             choice = choose(best, exact)
             length *= choice.factor
             if choice.restart:
                 slope = 0.0
-            s = _field(np.maximum(active_s + choice.fraction * move, 0.0), active, s)
+            s = np.maximum(s + choice.fraction * move, 0.0)
             w += choice.fraction * change
         self.s = s
-
-
-def _field(values: Field, points: Indices, like: Field) -> Field:
-    """A field on tiles with these values at some points, and zero at the others."""
-    field = np.zeros_like(like)
-    field.ravel()[points] = values
-    return field
-
-
-def _balanced(values: Field) -> Field:
-    """The values less their mean."""
-    return values - values.mean()

@@ -8,12 +8,11 @@ it takes the displacement, which is laid on the indenter before.
 """
 
 from collections.abc import Callable
-from itertools import pairwise
+from itertools import pairwise, product
 from math import hypot
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 
 from gfmd_cli.grid.arrays import Field, Mask
 from gfmd_cli.physics.contact import Contact
@@ -102,9 +101,11 @@ def _tiles_in_reach(touching: Mask, *, is_periodic: bool) -> Tiles:
     It may grow by a point of its own grid, a choice.
     """
     side = SIDE // 2
-    used: Any = np.pad(touching, 1, "wrap" if is_periodic else "constant")
-    for _ in range(2):  # along y, then along x
-        used = sliding_window_view(used, side + 2, axis=0)[::side].any(axis=-1).T
+    used = np.zeros([points // side for points in touching.shape], dtype=np.bool_)
+    rows, columns = np.divmod(np.flatnonzero(touching), touching.shape[1])
+    mode: Any = "wrap" if is_periodic else "clip"
+    for i, j in product((rows - 1, rows + 1), (columns - 1, columns + 1)):
+        used.ravel()[np.ravel_multi_index((i // side, j // side), used.shape, mode=mode)] = True
     return Tiles(used, is_periodic=is_periodic)
 
 
