@@ -352,8 +352,8 @@ def _usual_difference(topography: Topography) -> float:
 
 
 def _spikes(heights: Field) -> str:
-    """A few heights beyond a gap that is wider than the range of all others."""
-    most = min(MAX_SPIKES, heights.size // 4)
+    """A few heights beyond a gap wider than the range of all others, `MIN_OTHERS` or more."""
+    most = max(0, min(MAX_SPIKES, heights.size // 4, heights.size - MIN_OTHERS))
     values = np.partition(heights, (most, -most - 1), axis=None)
     low, high = np.sort(values[: most + 1])[::-1], np.sort(values[-most - 1 :])
     bottom, top = float(low[0]), float(high[0])

@@ -31,7 +31,7 @@ from gfmd_cli.maps.microscope_files import (
     check_all_are_heights,
     read_microscope_file,
 )
-from gfmd_cli.maps.text_tables import MATRIX_COLUMNS
+from gfmd_cli.maps.text_tables import MATRIX_COLUMNS, UTF_16
 from gfmd_cli.spec_table import SpecTable
 
 MANY_POINTS = 8  # along one axis; a choice: no map has so many beside so few rows or columns
@@ -175,6 +175,8 @@ def _reader(path: Path) -> Callable[[Path, str | None], HeightMap]:
         start = file.read(SIGNATURE_BYTES)
     if path.suffix.lower() == ".npy" or start.startswith(np.lib.format.MAGIC_PREFIX):
         return read_npy
+    if start.startswith(UTF_16):
+        start = start.decode("utf-16", "replace").encode()
     if SIGNATURE.match(start):
         return read_esri_grid
     from gfmd_cli.files.hdf5 import is_hdf5
