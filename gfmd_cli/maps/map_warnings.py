@@ -10,7 +10,7 @@ import numpy as np
 
 from gfmd_cli.grid.arrays import Field, row_blocks
 from gfmd_cli.maps.map_preparation import level
-from gfmd_cli.maps.topography import Topography
+from gfmd_cli.maps.topography import Topography, ends_without_heights
 from gfmd_cli.units import count
 
 MAX_GRADIENT = 3.0  # rms; a choice: surfaces of machined or worn solids have less
@@ -106,6 +106,19 @@ def many_filled_in(topography: Topography) -> str:
     return (
         f"{fraction:.0%} of the heights are missing and were filled in: contact there was not "
         'measured; set surface.region, or surface.missing = "void" where nothing can touch'
+    )
+
+
+def missing_ends(topography: Topography) -> str:
+    """Ends of a line profile that are missing, and have no height on one side to fill them in."""
+    if topography.missing is None or topography.heights.ndim == 2:
+        return ""
+    first, last = (int(np.argmin(ends)) for ends in (topography.missing, topography.missing[::-1]))
+    if not first + last:
+        return ""
+    return (
+        f"{ends_without_heights(first, last)}: they get the height of the next known one; "
+        "surface.region leaves them out"
     )
 
 

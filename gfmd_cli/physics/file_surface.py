@@ -342,6 +342,8 @@ class FileSurface(RigidSurface):
             warnings.append('surface.taper has no effect without surface.edges = "window"')
         if self.missing == "fill":
             warnings.append(map_warnings.many_filled_in(topography))
+            if not self._is_repeated():
+                warnings.append(map_warnings.missing_ends(topography))
         if boundary == "periodic" and not self.has_borders:
             is_tapered = self.edges == "window"
             warnings.append(map_warnings.step_at_border(heights, is_tapered=is_tapered))
