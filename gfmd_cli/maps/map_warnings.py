@@ -47,6 +47,9 @@ END_FRACTION = 20  # of a side, over which the slope at the border is taken; a c
 MAX_LINE_SHIFT = 0.5  # over the rms difference of neighbours in a line; measured scans: 0 to 0.4
 MAX_LINE_CORRELATION = 0.3  # of the signs of successive shifts; roughness is smoother; a choice
 JUMP_RATIO = 8  # of a jump to the usual difference of lines; a choice: none by chance
+MIN_SEAM = 0.5  # of a step between tiles of a scan, over that rms difference; a choice
+SEAMS = 3  # between tiles, at most; a choice: more steps are a part of the surface
+SEAM_RATIO = 3.0  # of a seam to the next largest step; calibrated by `scripts/seams_of_maps.py`
 MIN_KNOWN = 8  # heights in half a line, for its median; a choice
 MIN_LINES = 32  # fewer lines and points per line have such shifts by chance
 
@@ -257,6 +260,8 @@ def shifted_lines(topography: Topography, spacing: tuple[float, ...]) -> str:
             what = f"are shifted against each other, by {usual / inside:.2g} times"
         elif jumps and spread > 0:  # medians of rounded heights are mostly zero
             what = f"jump at {count(jumps, 'place')}, by more than"
+        elif (seam := _seam(medians)) > MIN_SEAM * inside:
+            what = f"jump at one place or more, as between tiles, by {seam / inside:.2g} times"
         else:
             continue
         return (
@@ -266,6 +271,22 @@ def shifted_lines(topography: Topography, spacing: tuple[float, ...]) -> str:
             f"along {along}"
         )
     return ""
+
+
+def _seam(medians: Field) -> float:
+    """The largest step between lines, 0 if more than `SEAMS` are about as large.
+
+    A step is the distance of a median difference from the range of the two before it and the two
+    after it, and the smaller one of both halves of the lines counts.
+    """
+    own, last = medians[:, 2:-2], medians.shape[1] - 4
+    around = np.stack([medians[:, shift : shift + last] for shift in (0, 1, 3, 4)])
+    beyond = np.maximum(own - around.max(axis=0), around.min(axis=0) - own)
+    steps = np.sort(beyond.min(axis=0))
+    changes = own - around[1:3].mean(axis=0)
+    usual = STANDARD_DEVIATION * np.median(np.abs(changes), axis=1)
+    is_seam = steps[-1] > SEAM_RATIO * max(steps[-1 - SEAMS], usual.max())
+    return float(steps[-1]) if is_seam and usual.min() > 0 else 0.0  # medians of rounded heights
 
 
 def outliers(topography: Topography) -> str:
