@@ -220,7 +220,7 @@ def profiles(points: int, random: np.random.Generator) -> Iterator[tuple[str, Fi
 
 
 def of_profiles(seeds: int, sizes: list[int], folder: Path) -> None:
-    """Numbers of profiles without noise, and of warnings; fractions of noisy ones with a warning."""
+    """Numbers of sound profiles, and of those with a warning; fraction of noisy ones with one."""
     for points in sizes:
         random, counts = np.random.default_rng(points), dict[str, list[bool]]()
         for _ in range(seeds):

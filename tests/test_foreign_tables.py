@@ -595,6 +595,19 @@ def test_artefacts_of_scans_give_a_warning(tmp_path, change, words):
     assert any(words in warning for warning in warnings), warnings
 
 
+@pytest.mark.parametrize("hurst", [0.3, 0.8])
+@pytest.mark.parametrize("turned", [False, True])
+def test_tiles_of_a_stitched_scan_give_a_warning(tmp_path, hurst, turned):
+    """Their offset is twice the rms difference of neighbours."""
+    sound = _rough(hurst)
+    for offset in (0.0, 2.0 * np.diff(sound, axis=0).std()):
+        stitched = _raised(sound, slice(50, None), offset)
+        np.save(tmp_path / f"{offset}.npy", stitched.T if turned else stitched)
+        surface = FileSurface(path=tmp_path / f"{offset}.npy", length=1e-5, periodic=False)
+        words = f"the lines along {'xy'[turned]} jump at"
+        assert any(words in warning for warning in surface.warnings()) == (offset > 0)
+
+
 @pytest.mark.parametrize("rows", [4, 8])
 @pytest.mark.parametrize("hurst", [0.1, 0.8])
 def test_oblong_pixels_are_no_shifted_lines(tmp_path, rows, hurst):

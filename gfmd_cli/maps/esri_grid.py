@@ -37,6 +37,4 @@ def read_esri_grid(path: Path, dataset: str | None) -> HeightMap:
     sides = tuple(header["cellsize"] * points for points in shape)
     heights = np.ma.masked_equal(heights, missing)
     notes = (warning,) if warning else ()
-    return HeightMap(
-        heights=heights, sides=sides, source="ESRI grid", periodic=False, notes=notes
-    )
+    return HeightMap(heights=heights, sides=sides, source="ESRI grid", periodic=False, notes=notes)

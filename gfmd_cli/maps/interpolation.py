@@ -79,8 +79,9 @@ def _short_waves(heights: Field, mirrored: bool) -> tuple[float, float]:
 def _ties(heights: Field, mirrored: bool) -> float:
     """Fraction of the pairs of neighbours with the same height."""
     mode: Any = "symmetric" if mirrored else "wrap"
-    before = [np.pad(lines, ((1, 0), (0, 0)), mode=mode)[:-1] for lines in (heights, heights.T)]
-    return float(np.mean([np.mean(heights == before[0]), np.mean(heights.T == before[1])]))
+    before = (np.pad(lines, ((1, 0), (0, 0)), mode=mode)[:-1] for lines in (heights, heights.T))
+    pairs = zip((heights, heights.T), before, strict=True)
+    return float(np.mean([np.mean(lines == others) for lines, others in pairs]))
 
 
 def _jumps(heights: Field, mirrored: bool) -> float:

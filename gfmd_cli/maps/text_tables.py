@@ -213,10 +213,10 @@ def _check_is_not_divided(rows: list[bytes], separators: bytes) -> None:
     padded = next(filter(PADDED.fullmatch, chain(*words)), None)
     cells = [row.split(b",") for row in rows] if b"," in separators else []
     decimals = [cell for row in cells for cell in row[1::2]]
-    if padded is None and len(cells[0] if cells else ()) >= MATRIX_COLUMNS:
-        if all(map(bytes.isdigit, decimals)) and len(set(map(len, decimals))) == 1:
-            padded = decimals[0]
-            words = [row[::2] for row in cells]
+    is_wide = bool(cells) and len(cells[0]) >= MATRIX_COLUMNS
+    is_regular = len(set(map(len, decimals))) == 1 and all(map(bytes.isdigit, decimals))
+    if padded is None and is_wide and is_regular:
+        padded, words = decimals[0], [row[::2] for row in cells]
     if padded is not None and len(set(map(len, chain(*words)))) > 1:
         raise InputError(
             f"{padded.decode()} beside numbers of another length: part of a number that a comma "
