@@ -1,10 +1,11 @@
 """Noise in measured maps: its effect on a contact, and which maps the program warns of.
 
-    python scripts/noise_of_maps.py [contacts | filters | sound | noisy]
+    python scripts/noise_of_maps.py [contacts | filters | sound | noisy | profiles]
 
 "contacts": errors of contacts on the half-space, as `rounded_heights.py`. "filters": contact areas
 of noisy maps with the S-filter that the warning names. "sound": random and structured surfaces
-without noise. "noisy": random surfaces with noise. The tables of docs/map_evidence.md.
+without noise. "noisy": random surfaces with noise. "profiles": line profiles without and with
+noise. The tables of docs/map_evidence.md.
 """
 
 import argparse
@@ -188,6 +189,55 @@ def sound(seeds: int, sizes: list[int], folder: Path) -> None:
         print(f"{name:36}{number:6}{found:6}")
 
 
+def random_profile(
+    points: int, hurst: float, rolloff: float, cutoff: float, random: np.random.Generator
+) -> Field:
+    """Half of a periodic random profile, with wavelengths as in `scan`."""
+    q = np.fft.rfftfreq(2 * points)
+    amplitude = np.maximum(q, 1 / (rolloff * points)) ** (-0.5 - hurst) * (q <= 1 / cutoff)
+    modes = amplitude * (random.normal(size=q.size) + 1j * random.normal(size=q.size))
+    heights: Field = np.fft.irfft(modes, 2 * points)[:points]
+    return (heights - heights.mean()) / heights.std()
+
+
+def profiles(points: int, random: np.random.Generator) -> Iterator[tuple[str, Field]]:
+    """Line profiles without noise."""
+    x, tip = np.arange(points) / points, -0.02 * np.arange(-3, 4) ** 2
+    for hurst in HURST:
+        rolloff, cutoff = random.choice([1, 0.5, 0.2]), random.choice([2, 3, 4, 8, 16])
+        rough = random_profile(points, hurst, rolloff, cutoff, random)
+        grooves = ((np.arange(points) / random.choice([6, 10, 25, 60]) + 0.3) % 1 - 0.5) ** 2
+        yield "random", rough
+        yield "points of a finer profile", random_profile(8 * points, hurst, 2, 2, random)[::8]
+        yield "mean of 2 points", uniform_filter(rough, 2)
+        yield "seen with a round tip", grey_dilation(rough, structure=tip)
+        yield "on a bow", rough - 20 * (x - 0.5) ** 2
+        yield "on waves", rough + random.choice([3, 10, 50]) * np.sin(20 * x)
+        yield "on steps", rough + random.choice([3, 30]) * np.floor(random.choice([3, 7]) * x)
+        yield "worn", rough.clip(max=random.choice([0, 0.5, 1]))
+        yield "turned", 3 * grooves + random.choice([0.05, 0.3]) * rough
+        yield "plateau-honed", np.where(rough < -1, 3 * rough, 0.1 * rough)
+
+
+def of_profiles(seeds: int, sizes: list[int], folder: Path) -> None:
+    """Numbers of sound profiles, and of those with a warning; fraction of noisy ones with one."""
+    for points in sizes:
+        random, counts = np.random.default_rng(points), dict[str, list[bool]]()
+        for _ in range(seeds):
+            for name, heights in profiles(points, random):
+                counts.setdefault(name, []).append(warned(heights, folder, NOISE))
+        print(f"{points} points without noise")
+        for name, each in counts.items():
+            print(f"{name:36}{len(each):6}{sum(each):6}")
+        for level in LEVELS:
+            found = []
+            for _, hurst in product(range(seeds), HURST[1:]):
+                sound = random_profile(points, hurst, 0.5, 8, random)
+                noise = noise_like(sound[None], level) * random.normal(size=points)
+                found.append(warned(sound + noise, folder, NOISE))
+            print(f"noise {level:5}: {np.mean(found):.0%}", flush=True)
+
+
 def with_noise(seeds: int, sizes: list[int], folder: Path) -> None:
     """Fraction of noisy maps with a warning."""
     for (name, add), points in product(NOISES.items(), sizes):
@@ -217,9 +267,12 @@ def main() -> None:
             if table == "contacts":
                 contacts(arguments.seeds, arguments.points)
             else:
-                {"filters": filters, "sound": sound, "noisy": with_noise}[table](
-                    arguments.seeds, arguments.points, Path(folder)
-                )
+                {
+                    "filters": filters,
+                    "sound": sound,
+                    "noisy": with_noise,
+                    "profiles": of_profiles,
+                }[table](arguments.seeds, arguments.points, Path(folder))
 
 
 if __name__ == "__main__":

@@ -8,7 +8,7 @@ from scipy.special import gamma
 from gfmd_cli import solve
 from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.physics.elastomers import Layer
-from gfmd_cli.physics.highest_point import highest_point
+from gfmd_cli.physics.highest_point import highest_point, highest_point_of_mirrored
 from gfmd_cli.physics.self_affine import SelfAffine
 
 SPEC = """\
@@ -120,6 +120,15 @@ def test_the_highest_point_of_a_map_with_nyquist_waves_is_that_of_finer_grids(sh
         assert -1e-9 < above < 5e-3 * heights.std()
         for turned in (heights[::-1], heights[..., ::-1], heights.T):
             assert highest_point(turned) == pytest.approx(highest, rel=1e-7)
+
+
+@pytest.mark.parametrize("shape", [(24, 24), (20, 33), (9, 8), (75,)])
+def test_the_highest_point_of_a_mirrored_map_is_that_of_its_cell(shape):
+    for seed in range(4):
+        heights = np.random.default_rng(seed).normal(size=shape)
+        whole = np.pad(heights, [(0, points) for points in shape], mode="symmetric")
+        highest = highest_point(whole)
+        assert highest_point_of_mirrored(heights) == pytest.approx(highest, rel=1e-6)
 
 
 @pytest.mark.parametrize("hurst", [0.1, 0.8])

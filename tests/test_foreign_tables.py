@@ -289,12 +289,46 @@ def test_an_image_without_heights_is_refused_as_such(tmp_path, name):
         read_topography(tmp_path / name)
 
 
+@pytest.mark.parametrize("digits", [1, 2, 4])
+@pytest.mark.parametrize("thousands", ["", "."])
+def test_decimal_commas_between_commas_are_refused(saved, digits, thousands):
+    """123,4,-5,6 are two numbers; as four they would be a map of twice the width."""
+    rows = (
+        ",".join(f"{value:,.{digits}f}".translate({44: thousands, 46: ","}) for value in row)
+        for row in 3000 * HEIGHTS
+    )
+    with pytest.raises(InputError, match="that a comma or blank has divided"):
+        read_topography(saved("\n".join(rows)))
+
+
+@pytest.mark.parametrize("decimals", ["", ".20", ",20"])
+def test_blanks_that_separate_thousands_beside_commas_are_refused(saved, decimals):
+    """1,6 045.20 is not the height 45.2 at x = 1.6."""
+    heights = (5000 + 900 * HEIGHTS[0]).clip(1000)
+    rows = (f"{i},{height:_.0f}{decimals}" for i, height in enumerate(heights))
+    with pytest.raises(InputError, match="that a comma or blank has divided"):
+        read_topography(saved("\n".join(rows).replace("_", " ")))
+
+
+def test_numbers_of_one_length_may_begin_with_zeros(saved):
+    heights = np.random.default_rng(3).integers(1000, size=(12, 40))
+    text = "\n".join(",".join(f"{value:04d}" for value in row) for row in heights)
+    assert np.array_equal(read_topography(saved(text)).heights, heights)
+
+
+def test_a_byte_order_mark_hides_no_point(saved):
+    """Positions such as 2 and 1,5 have no constant number of columns between commas."""
+    rows = (f"{i / 2:g} {height:.6f}\n" for i, height in enumerate(HEIGHTS[0]))
+    read = read_topography(saved("".join(rows).replace(".", ","), "utf-8-sig"))
+    assert read.heights == pytest.approx(HEIGHTS[0])
+
+
 GRID = "NCOLS 300\nnrows 12\nxllcorner 5.0\nyllcorner 0\ncellsize 0.5\n"
 
 
 @pytest.mark.parametrize("stated", ["NODATA_value -9999\n", "nodata_value -9999.00\n", ""])
 @pytest.mark.parametrize("decimal", [".", ","])
-@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig"])
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16"])
 def test_an_esri_grid_has_sides_and_no_height_without_data(saved, stated, decimal, encoding):
     marked = HEIGHTS.copy()
     marked[3, 4] = -9999
@@ -559,6 +593,19 @@ def test_artefacts_of_scans_give_a_warning(tmp_path, change, words):
     np.save(tmp_path / "h.npy", change(_rough(0.8)))
     warnings = FileSurface(path=tmp_path / "h.npy", length=1e-5, periodic=False).warnings("free")
     assert any(words in warning for warning in warnings), warnings
+
+
+@pytest.mark.parametrize("hurst", [0.3, 0.8])
+@pytest.mark.parametrize("turned", [False, True])
+def test_tiles_of_a_stitched_scan_give_a_warning(tmp_path, hurst, turned):
+    """Their offset is twice the rms difference of neighbours."""
+    sound = _rough(hurst)
+    for offset in (0.0, 2.0 * np.diff(sound, axis=0).std()):
+        stitched = _raised(sound, slice(50, None), offset)
+        np.save(tmp_path / f"{offset}.npy", stitched.T if turned else stitched)
+        surface = FileSurface(path=tmp_path / f"{offset}.npy", length=1e-5, periodic=False)
+        words = f"the lines along {'xy'[turned]} jump at"
+        assert any(words in warning for warning in surface.warnings()) == (offset > 0)
 
 
 @pytest.mark.parametrize("rows", [4, 8])

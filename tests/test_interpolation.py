@@ -4,7 +4,13 @@ import numpy as np
 import pytest
 
 from gfmd_cli import solve
-from gfmd_cli.maps.interpolation import monotone, suited_interpolation
+from gfmd_cli.maps.interpolation import (
+    _jumps,
+    _short_waves,
+    _ties,
+    monotone,
+    suited_interpolation,
+)
 from gfmd_cli.physics.file_surface import FileSurface
 from gfmd_cli.physics.self_affine import SelfAffine
 
@@ -64,6 +70,16 @@ def test_jumps_of_roughness_are_not_steps(points):
     for seed in range(50):
         heights = rough(2, seed, points)
         assert suited_interpolation(heights) == "fourier"
+
+
+@pytest.mark.parametrize("shape", [(32, 32), (21, 40), (60,)])
+def test_the_measures_of_a_mirrored_map_are_those_of_its_cell(shape):
+    rows = np.random.default_rng(4).normal(size=shape)
+    for heights in (rows, np.cumsum(rows, axis=-1), np.round(rows), np.sign(rows) + 0.01 * rows):
+        cell = np.pad(heights, [(0, points) for points in shape], mode="symmetric")
+        for measure in (_jumps, _ties, lambda h, m: _short_waves(np.atleast_2d(h), m)):
+            if len(shape) == 2 or measure is _jumps:
+                assert measure(heights, True) == pytest.approx(measure(cell, False), abs=1e-12)
 
 
 def test_contact_on_a_mesa_is_not_on_ripples(tmp_path):

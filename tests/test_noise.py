@@ -76,12 +76,37 @@ def test_the_noise_beside_missing_heights_is_named(tmp_path):
     assert noise == pytest.approx(2e-10, rel=0.1)
 
 
-def test_profiles_and_small_maps_give_none(tmp_path):
+def test_short_profiles_and_small_maps_give_none(tmp_path):
     """Self-affine ones without a roll-off resemble noise by chance."""
     heights = _scan() + _noise(POINTS, POINTS)
-    assert _found(tmp_path, heights)
-    assert not _found(tmp_path, heights[:127])
-    assert not _found(tmp_path, heights.ravel(), (SPACING,))
+    assert _found(tmp_path, heights[:64])
+    assert not _found(tmp_path, heights[:63])
+    profile = np.sin(np.arange(4096) / 100) + 0.1 * _noise(4096)
+    assert _found(tmp_path, profile, (SPACING,))
+    assert not _found(tmp_path, profile[:1023], (SPACING,))
+
+
+@pytest.mark.parametrize("missing", [0, 300])
+def test_the_noise_of_a_profile_is_named_with_its_size(tmp_path, missing):
+    """White noise of 0.1 nm on a wave."""
+    profile = np.sin(np.arange(4096) / 100) + 0.1 * _noise(4096)
+    profile[1000 : 1000 + missing] = np.nan
+    warning = _found(tmp_path, profile, (SPACING,))
+    noise = float(re.search(r"^white noise of (\S+) m \(rms\) in the heights", warning)[1])
+    assert noise == pytest.approx(1e-10, rel=0.1)
+
+
+def test_the_filter_of_a_profile_takes_its_noise(tmp_path):
+    """After the filter that the warning names, the gradient is that of the wave or less."""
+    wave = np.sin(np.arange(4096) / 20)
+    np.save(tmp_path / "profile.npy", wave + 0.1 * _noise(4096))
+    surface = FileSurface(path=tmp_path / "profile.npy", length=4096.0, periodic=False)
+    (warning,) = [each for each in surface.warnings() if "white noise" in each]
+    cutoff = float(re.search(r"s_filter = (\S+) or more", warning)[1])
+    filtered = surface.model_copy(update={"s_filter": cutoff})
+    assert not any("white noise" in each for each in filtered.warnings())
+    changes = (np.diff(each).std() for each in (filtered.measured_map()[0], wave))
+    assert next(changes) < 1.1 * next(changes)
 
 
 def test_few_known_heights_give_none(tmp_path):

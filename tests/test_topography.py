@@ -217,6 +217,13 @@ def test_marks_of_missing_heights_and_spikes_give_a_warning(npy, heights, mark):
     assert warning.startswith(f"1 height is exactly {mark:g}, far from all others")
 
 
+@pytest.mark.parametrize(("others", "is_spike"), [(7, False), (8, True)])
+def test_a_spike_needs_eight_other_heights(npy, others, is_spike):
+    heights = np.append(np.random.default_rng(6).normal(size=others), 50.0)
+    warnings = FileSurface(path=npy(heights)).warnings()
+    assert any("far from" in warning for warning in warnings) == is_spike
+
+
 @pytest.mark.parametrize("spikes", [(50.0, -50.0), (50.0, 55.0), (-50.0, -51.0, -52.0)])
 def test_a_few_different_spikes_give_a_warning(npy, heights, spikes):
     heights[3, : len(spikes)] = spikes
@@ -842,6 +849,29 @@ def test_a_line_profile_has_no_side_along_y(npy):
 def test_the_only_line_of_an_hdf5_file_needs_no_name(hdf5):
     line = np.arange(16.0)
     np.testing.assert_array_equal(read_topography(hdf5(h=line)).heights, line)
+
+
+def test_a_profile_ends_at_its_last_known_heights(tmp_path):
+    heights = np.random.default_rng(7).normal(size=40)
+    heights[17] = np.nan
+    path, values = tmp_path / "profile.txt", np.pad(heights, (3, 7), constant_values=np.nan)
+    path.write_text("".join(f"{0.5 * i:g} {value}\n" for i, value in enumerate(values)))
+    surface = FileSurface(path=path)
+    assert surface.sides == pytest.approx((20.0,))
+    assert surface.measured_map()[0].size == 40
+    assert surface.missing_count() == 1
+    (warning,) = [each for each in surface.warnings("free") if "missing" in each]
+    assert warning.startswith("the first 3 and the last 7 heights of the profile are missing: only")
+
+
+@pytest.mark.parametrize("periodic", [True, False])
+def test_filled_ends_of_an_array_give_a_warning(npy, periodic):
+    """In a periodic profile they lie between known heights."""
+    heights = np.random.default_rng(8).normal(size=200)
+    heights[-4:] = np.nan
+    warnings = FileSurface(path=npy(heights), periodic=periodic).warnings()
+    ends = [each for each in warnings if "first 0 and the last 4 heights" in each]
+    assert len(ends) == (not periodic)
 
 
 def test_two_columns_are_positions_and_heights(tmp_path):

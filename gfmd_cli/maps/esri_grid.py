@@ -7,6 +7,7 @@ import numpy as np
 
 from gfmd_cli.errors import InputError
 from gfmd_cli.maps.height_map import HeightMap, check_layout, extent
+from gfmd_cli.maps.text_tables import in_utf8, with_blanks
 
 SIGNATURE = re.compile(rb"(\xef\xbb\xbf)?\s*n(cols|rows)\s", re.IGNORECASE)
 NO_DATA = -9999.0  # where the header does not state another value
@@ -17,9 +18,11 @@ def read_esri_grid(path: Path, dataset: str | None) -> HeightMap:
     if dataset is not None:
         raise InputError(f"an ESRI grid holds one map; leave out dataset {dataset!r}")
     header: dict[str, float] = {}
-    with path.open("rb") as file:
+    with path.open("rb") as binary:
+        file, warning = with_blanks(in_utf8(binary))
+        file.seek(0)
         for line in file:
-            words = line.decode("utf-8-sig", "replace").lower().replace(",", ".").split()
+            words = line.decode(errors="replace").lower().replace(",", ".").split()
             if len(words) != 2 or not words[0].isidentifier():
                 break
             header[words[0]] = float(words[1])
@@ -27,10 +30,11 @@ def read_esri_grid(path: Path, dataset: str | None) -> HeightMap:
             raise InputError(f"the header of an ESRI grid has no {' and no '.join(absent)}")
         shape = int(header["nrows"]), int(header["ncols"])
         check_layout(shape, np.dtype(float))
-        heights = np.loadtxt((each.replace(b",", b".") for each in (line, *file)), ndmin=2)
+        heights = np.loadtxt((line, *file), ndmin=2)
     if heights.shape != shape:
         raise InputError(f"{extent(heights.shape)} heights, but the header states {extent(shape)}")
     missing = header.get("nodata_value", NO_DATA)
     sides = tuple(header["cellsize"] * points for points in shape)
     heights = np.ma.masked_equal(heights, missing)
-    return HeightMap(heights=heights, sides=sides, source="ESRI grid", periodic=False)
+    notes = (warning,) if warning else ()
+    return HeightMap(heights=heights, sides=sides, source="ESRI grid", periodic=False, notes=notes)

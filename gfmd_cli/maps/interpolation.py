@@ -5,7 +5,7 @@ map it overshoots: a plateau gets ripples, and contact then takes place on the r
 """
 
 from collections.abc import Callable
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -33,57 +33,73 @@ SHORT_WAVE = 0.9  # of the highest wavenumber of the grid: beyond, a wave is one
 CUBIC_MARGIN = 4  # points beyond the border of the cell that the slopes of the monotone cubics need
 
 
-def suited_interpolation(heights: Field) -> Interpolation:
+def suited_interpolation(heights: Field, *, mirrored: bool = False) -> Interpolation:
     """The interpolation that suits a periodic map: "fourier" only if it is band-limited.
+
+    `mirrored`: the map is the heights mirrored at their borders, to twice their sides.
 
     A band-limited map has no waves in the corners of its spectrum, |q| above the highest
     wavenumber along one axis. Waves at the highest wavenumbers along the axes are allowed without
     plateaus only: a random surface sampled at two points per shortest wave has both properties.
     Both tests do not see a step along an axis of a rough map, so that jumps are counted as well.
     """
-    if _jumps(heights) > MAX_JUMPS:  # a step along an axis has no waves in the corners
+    if _jumps(heights, mirrored) > MAX_JUMPS:  # a step along an axis has no waves in the corners
         return "monotone"
-    corners, borders = _short_waves(np.atleast_2d(heights))  # a line has no corners
-    is_short = borders > MAX_SHORT_WAVES and (heights.ndim == 1 or _ties(heights) > MAX_TIES)
+    corners, borders = _short_waves(np.atleast_2d(heights), mirrored)  # a line has no corners
+    is_short = borders > MAX_SHORT_WAVES and (
+        heights.ndim == 1 or _ties(heights, mirrored) > MAX_TIES
+    )
     return "monotone" if is_short or corners > MAX_SHORT_WAVES else "fourier"
 
 
-def _short_waves(heights: Field) -> tuple[float, float]:
+def _short_waves(heights: Field, mirrored: bool) -> tuple[float, float]:
     """Fractions of the squared slope in the corners and along the borders of the spectrum."""
     rows, columns = heights.shape
-    modes = np.fft.rfft2(heights - heights.mean())
-    y = np.fft.fftfreq(rows, 0.5)[:, None]  # relative to the highest wavenumber of the grid
-    x = np.fft.rfftfreq(columns, 0.5)
+    if mirrored:  # the modes of the mirrored map are those of the cosine transform, and a phase
+        from scipy.fft import dctn
+
+        modes = dctn(heights - heights.mean())
+        y, x = np.arange(rows)[:, None] / rows, np.arange(columns) / columns
+        of_y, of_x = 1 + (y > 0), 1 + (x > 0)  # with the opposite waves
+    else:
+        modes = np.fft.rfft2(heights - heights.mean())
+        y = np.fft.fftfreq(rows, 0.5)[:, None]  # relative to the highest wavenumber of the grid
+        x = np.fft.rfftfreq(columns, 0.5)
+        of_y, of_x = np.ones((rows, 1)), multiplicity(columns)
     sums = np.zeros(3)
     for block in row_blocks(modes):
         square = y[block] ** 2 + x**2
-        slope = multiplicity(columns) * np.abs(modes[block]) ** 2 * square
+        slope = of_y[block] * of_x * np.abs(modes[block]) ** 2 * square
         is_short = np.maximum(np.abs(y[block]), x) > SHORT_WAVE
         sums += slope.sum(), slope[square > 1 + 1e-9].sum(), slope[is_short].sum()
     total = float(sums[0]) or 1.0
     return float(sums[1]) / total, float(sums[2]) / total
 
 
-def _ties(heights: Field) -> float:
+def _ties(heights: Field, mirrored: bool) -> float:
     """Fraction of the pairs of neighbours with the same height."""
-    return float(np.mean([np.mean(heights == np.roll(heights, 1, axis)) for axis in (0, 1)]))
+    mode: Any = "symmetric" if mirrored else "wrap"
+    before = (np.pad(lines, ((1, 0), (0, 0)), mode=mode)[:-1] for lines in (heights, heights.T))
+    pairs = zip((heights, heights.T), before, strict=True)
+    return float(np.mean([np.mean(lines == others) for lines, others in pairs]))
 
 
-def _jumps(heights: Field) -> float:
+def _jumps(heights: Field, mirrored: bool) -> float:
     """Fraction of the squared differences of neighbours in isolated jumps, on the worse axis.
 
     A jump is isolated where it is `ISOLATED_RATIO` times larger than the two differences before it
     and the two after it.
     """
     rows = np.atleast_2d(heights)
-    return max(_jumps_along(lines) for lines in (rows, rows.T)[: heights.ndim])
+    return max(_jumps_along(lines, mirrored) for lines in (rows, rows.T)[: heights.ndim])
 
 
-def _jumps_along(lines: Field) -> float:
+def _jumps_along(lines: Field, mirrored: bool) -> float:
     """See `_jumps`; along the last axis."""
+    mode: Any = "symmetric" if mirrored else "wrap"
     total = isolated = 0.0
     for block in row_blocks(lines):
-        steps = np.abs(np.diff(np.pad(lines[block], ((0, 0), (3, 2)), mode="wrap")))
+        steps = np.abs(np.diff(np.pad(lines[block], ((0, 0), (3, 2)), mode=mode)))
         around = [steps[:, shift : shift + lines.shape[1]] for shift in (0, 1, 3, 4)]
         own = steps[:, 2:-2]
         jumps = own[own > ISOLATED_RATIO * np.maximum.reduce(around)]

@@ -10,7 +10,7 @@ import numpy as np
 
 from gfmd_cli.grid.arrays import Field, row_blocks
 from gfmd_cli.maps.map_preparation import level
-from gfmd_cli.maps.topography import Topography
+from gfmd_cli.maps.topography import Topography, ends_without_heights
 from gfmd_cli.units import count
 
 MAX_GRADIENT = 3.0  # rms; a choice: surfaces of machined or worn solids have less
@@ -47,6 +47,9 @@ END_FRACTION = 20  # of a side, over which the slope at the border is taken; a c
 MAX_LINE_SHIFT = 0.5  # over the rms difference of neighbours in a line; measured scans: 0 to 0.4
 MAX_LINE_CORRELATION = 0.3  # of the signs of successive shifts; roughness is smoother; a choice
 JUMP_RATIO = 8  # of a jump to the usual difference of lines; a choice: none by chance
+MIN_SEAM = 0.5  # of a step between tiles of a scan, over that rms difference; a choice
+SEAMS = 3  # between tiles, at most; a choice: more steps are a part of the surface
+SEAM_RATIO = 3.0  # of a seam to the next largest step; calibrated by `scripts/seams_of_maps.py`
 MIN_KNOWN = 8  # heights in half a line, for its median; a choice
 MIN_LINES = 32  # fewer lines and points per line have such shifts by chance
 
@@ -106,6 +109,19 @@ def many_filled_in(topography: Topography) -> str:
     return (
         f"{fraction:.0%} of the heights are missing and were filled in: contact there was not "
         'measured; set surface.region, or surface.missing = "void" where nothing can touch'
+    )
+
+
+def missing_ends(topography: Topography) -> str:
+    """Ends of a line profile that are missing, and have no height on one side to fill them in."""
+    if topography.missing is None or topography.heights.ndim == 2:
+        return ""
+    first, last = (int(np.argmin(ends)) for ends in (topography.missing, topography.missing[::-1]))
+    if not first + last:
+        return ""
+    return (
+        f"{ends_without_heights(first, last)}: they get the height of the next known one; "
+        "surface.region leaves them out"
     )
 
 
@@ -244,6 +260,8 @@ def shifted_lines(topography: Topography, spacing: tuple[float, ...]) -> str:
             what = f"are shifted against each other, by {usual / inside:.2g} times"
         elif jumps and spread > 0:  # medians of rounded heights are mostly zero
             what = f"jump at {count(jumps, 'place')}, by more than"
+        elif (seam := _seam(medians)) > MIN_SEAM * inside:
+            what = f"jump at one place or more, as between tiles, by {seam / inside:.2g} times"
         else:
             continue
         return (
@@ -253,6 +271,22 @@ def shifted_lines(topography: Topography, spacing: tuple[float, ...]) -> str:
             f"along {along}"
         )
     return ""
+
+
+def _seam(medians: Field) -> float:
+    """The largest step between lines, 0 if more than `SEAMS` are about as large.
+
+    A step is the distance of a median difference from the range of the two before it and the two
+    after it, and the smaller one of both halves of the lines counts.
+    """
+    own, last = medians[:, 2:-2], medians.shape[1] - 4
+    around = np.stack([medians[:, shift : shift + last] for shift in (0, 1, 3, 4)])
+    beyond = np.maximum(own - around.max(axis=0), around.min(axis=0) - own)
+    steps = np.sort(beyond.min(axis=0))
+    changes = own - around[1:3].mean(axis=0)
+    usual = STANDARD_DEVIATION * np.median(np.abs(changes), axis=1)
+    is_seam = steps[-1] > SEAM_RATIO * max(steps[-1 - SEAMS], usual.max())
+    return float(steps[-1]) if is_seam and usual.min() > 0 else 0.0  # medians of rounded heights
 
 
 def outliers(topography: Topography) -> str:
@@ -352,8 +386,8 @@ def _usual_difference(topography: Topography) -> float:
 
 
 def _spikes(heights: Field) -> str:
-    """A few heights beyond a gap that is wider than the range of all others."""
-    most = min(MAX_SPIKES, heights.size // 4)
+    """A few heights beyond a gap wider than the range of all others, `MIN_OTHERS` or more."""
+    most = max(0, min(MAX_SPIKES, heights.size // 4, heights.size - MIN_OTHERS))
     values = np.partition(heights, (most, -most - 1), axis=None)
     low, high = np.sort(values[: most + 1])[::-1], np.sort(values[-most - 1 :])
     bottom, top = float(low[0]), float(high[0])

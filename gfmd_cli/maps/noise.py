@@ -15,10 +15,11 @@ MIN_GROWTH = 0.1
 """Relative growth of the mean square up to this distance; a choice. Without longer waves, the
 roughness itself is as short as the noise."""
 MIN_COMMON = 0.5  # variance of the noise along one axis over that along the other; below, of lines
-MIN_POINTS = 128  # per side: fewer, and profiles, have such differences by chance
+MIN_POINTS = {1: 1024, 2: 64}  # per side, by dimension: fewer have such differences by chance
 MIN_PAIRS = 100  # of known differences, likewise
 SAMPLED_LINES = 128  # of each axis, at least; all of smaller maps
-FILTERED_POINTS = 512  # per side of the part on which a filter is tried; all of smaller maps
+FILTERED_POINTS = {1: 2**18, 2: 512}
+"""Per side of the part on which a filter is tried, by dimension; all of smaller maps."""
 HALVINGS = 12  # of the interval of cut-offs; a choice: two digits of them are stated
 ROUNDED_UP = 1.05  # two digits of this multiple are no less than the number
 MAX_EXCESS = 10  # larger ratios are not stated: the gradient without noise is uncertain; a choice
@@ -44,9 +45,11 @@ def noisy(
     same. The limits are calibrated in docs/map_evidence.md.
     """
     heights = topography.with_gaps()
-    if heights.ndim == 1 or min(heights.shape) < MIN_POINTS:
+    if min(heights.shape) < MIN_POINTS[heights.ndim]:
         return ""
-    along = {"x": _differences(heights), "y": _differences(heights.T)}
+    rows = np.atleast_2d(heights)
+    lines_along = {"x": rows, "y": rows.T} if heights.ndim == 2 else {"x": rows}
+    along = {axis: _differences(lines) for axis, lines in lines_along.items()}
     whole, left = (
         sum(
             (each.neighbours - share * each.noise) / step**2
@@ -60,7 +63,7 @@ def noisy(
     kept = gradient.kept(cutoff) if cutoff else 1.0
     if not whole * kept > MIN_EXCESS**2 * left:
         return ""
-    lines, across = sorted(along, key=lambda axis: along[axis].noise)
+    lines, across = (extreme(along, key=lambda axis: along[axis].noise) for extreme in (min, max))
     noise = along[across].noise
     rms = f"{scale * np.sqrt(noise):.2g} m (rms)"
     excess = np.sqrt(whole * kept / left) if left > 0 else np.inf
@@ -86,20 +89,22 @@ class _Gradient:
     """
 
     def __init__(self, heights: Field, spacing: tuple[float, ...]) -> None:
-        first = [max(0, points - FILTERED_POINTS) // 2 for points in heights.shape]
-        part = heights[tuple(slice(each, each + FILTERED_POINTS) for each in first)]
+        most = FILTERED_POINTS[heights.ndim]
+        first = [max(0, points - most) // 2 for points in heights.shape]
+        part = heights[tuple(slice(each, each + most) for each in first)]
         self.spacing, self.shape = spacing, tuple(points - 1 for points in part.shape)
-        steps = np.diff(part, axis=0)[:, 1:] / spacing[0], np.diff(part, axis=1)[1:] / spacing[1]
-        self.power = (np.abs(np.fft.fft2(np.nan_to_num(np.stack(steps)))) ** 2).sum(axis=0)
-        self.power[0, 0] = 0.0
+        self.power = np.zeros(self.shape)
+        for axis, step in enumerate(spacing):
+            steps = np.diff(part, axis=axis)[tuple(slice(-n, None) for n in self.shape)] / step
+            self.power += np.abs(np.fft.fftn(np.nan_to_num(steps))) ** 2
+        self.power.flat[0] = 0.0
 
     def kept(self, cutoff: float) -> float:
         """Fraction of the mean square that the S-filter of this cut-off wavelength leaves."""
-        along_y, along_x = (
-            transmission(np.fft.fftfreq(points, step), cutoff) ** 2
-            for points, step in zip(self.shape, self.spacing, strict=True)
-        )
-        return float(along_y @ self.power @ along_x / (self.power.sum() or 1.0))
+        power = self.power
+        for points, step in zip(self.shape, self.spacing, strict=True):
+            power = transmission(np.fft.fftfreq(points, step), cutoff) ** 2 @ power
+        return float(power / (self.power.sum() or 1.0))
 
     def cutoff(self, share: float) -> float:
         """The shortest cut-off wavelength that leaves this share of the mean square, or less."""

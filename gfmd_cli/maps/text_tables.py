@@ -10,7 +10,7 @@ import os
 import re
 from collections.abc import Iterator
 from io import BytesIO
-from itertools import islice, takewhile
+from itertools import chain, islice, takewhile
 from typing import Any, BinaryIO
 
 import numpy as np
@@ -45,6 +45,8 @@ UTF_16 = codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE
 QUOTED_COMMAS = re.compile(rb'"[-+\d]*,[\d,.]*"[ \t]*,')  # beside commas between the numbers
 GROUPED = re.compile(rb"[\t;]([-+]?\d{1,3}( \d{3})+([,.]\d*)?)(?=[\t;\r]|$)")
 """A cell such as 1 023 between tabs or semicolons."""
+PADDED = re.compile(rb"[-+]?0\d+([,.]\d*)?")
+"""A number with zeros before it: what is left of 12,0345 or 12 034 where it was divided."""
 EMPTY = re.compile(rb"([,;])[ \t]*\1.*\d")
 """An empty cell between commas or semicolons, with a number in the same row after it."""
 OLD_LINE_END = re.compile(rb"\r(?!\n)")
@@ -182,19 +184,45 @@ def with_blanks(file: BinaryIO) -> tuple[BinaryIO, str]:
     is_shifted = width >= MATRIX_COLUMNS and any(_has_empty_cells(rows, by) for by in separators)
     if is_shifted or any(map(EMPTY.search, rows)):
         raise InputError("an empty cell in a row of numbers; write NaN for a missing height")
+    is_decimal = False
     if b"," in table or b";" in table:
         numbers = columns(file, b" \t;")
-        is_decimal = numbers > 1 and re.search(rb"\d,\d", table)
+        is_decimal = numbers > 1 and re.search(rb"\d,\d", table) is not None
         if numbers == 1:
             numbers = columns(file, b",")
         if is_decimal:
+            rows = list(filter(is_numeric, whole))
             warning = _warning_of_thousands(start, numbers)
         if is_decimal or numbers >= MATRIX_COLUMNS:
             text = part(file).replace(b";", b" ")
             file = BytesIO(text.replace(b",", b"." if is_decimal else b" "))
     else:
         warning = _warning_of_points(rows)
+    _check_is_not_divided(rows, b" \t;" if is_decimal else b" \t;,")
     return file, warning
+
+
+def _check_is_not_divided(rows: list[bytes], separators: bytes) -> None:
+    """Raise InputError where a decimal comma or a blank has divided the numbers of a table.
+
+    Then some numbers begin with zeros, beside others of another length, or every second cell
+    between commas has the same number of digits and no sign, the decimals of the cell before.
+    """
+    blanks = bytes.maketrans(separators, b" " * len(separators))
+    words = [row.translate(blanks).split() for row in rows]
+    padded = next(filter(PADDED.fullmatch, chain(*words)), None)
+    cells = [row.split(b",") for row in rows] if b"," in separators else []
+    decimals = [cell for row in cells for cell in row[1::2]]
+    is_wide = bool(cells) and len(cells[0]) >= MATRIX_COLUMNS
+    is_regular = len(set(map(len, decimals))) == 1 and all(map(bytes.isdigit, decimals))
+    if padded is None and is_wide and is_regular:
+        padded, words = decimals[0], [row[::2] for row in cells]
+    if padded is not None and len(set(map(len, chain(*words)))) > 1:
+        raise InputError(
+            f"{padded.decode()} beside numbers of another length: part of a number that a comma "
+            "or blank has divided? Save the numbers with decimal points, and without separators "
+            "of thousands"
+        )
 
 
 def _has_empty_cells(rows: list[bytes], separator: bytes) -> bool:
@@ -269,9 +297,9 @@ def in_utf8(file: BinaryIO) -> BinaryIO:
     end = part(file, max(0, file.seek(0, os.SEEK_END) - WINDOW_BYTES))
     is_plain = start.isascii() and b'"' not in start and end.isascii()
     is_plain = is_plain and not OLD_LINE_END.search(start)
-    is_table = start.startswith(UTF_16)
+    is_table = start.startswith((*UTF_16, codecs.BOM_UTF8))
     if not (is_plain or is_table or start.startswith(LATIN_1)):
-        is_table = columns(file) > 0
+        is_table = columns(file) > 0 or columns(file, b" \t;") > 0  # also with decimal commas
     if not is_table:
         return file
     content = part(file).removeprefix(codecs.BOM_UTF8)

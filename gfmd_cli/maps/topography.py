@@ -31,7 +31,7 @@ from gfmd_cli.maps.microscope_files import (
     check_all_are_heights,
     read_microscope_file,
 )
-from gfmd_cli.maps.text_tables import MATRIX_COLUMNS
+from gfmd_cli.maps.text_tables import MATRIX_COLUMNS, UTF_16
 from gfmd_cli.spec_table import SpecTable
 
 MANY_POINTS = 8  # along one axis; a choice: no map has so many beside so few rows or columns
@@ -175,6 +175,8 @@ def _reader(path: Path) -> Callable[[Path, str | None], HeightMap]:
         start = file.read(SIGNATURE_BYTES)
     if path.suffix.lower() == ".npy" or start.startswith(np.lib.format.MAGIC_PREFIX):
         return read_npy
+    if start.startswith(UTF_16):
+        start = start.decode("utf-16", "replace").encode()
     if SIGNATURE.match(start):
         return read_esri_grid
     from gfmd_cli.files.hdf5 import is_hdf5
@@ -211,13 +213,29 @@ def _checked(data: HeightMap, region: Region | None, flip: bool, crop: bool) -> 
         raise InputError(
             f"all of the {missing.size} heights are NaN, infinite or marked as missing"
         )
+    notes = data.notes
+    if heights.ndim == 1 and data.sides is not None and data.periodic is False:
+        first, last = np.flatnonzero(~missing)[[0, -1]]
+        if SMALLEST_MAP <= last + 1 - first < heights.size:
+            ends = first, heights.size - 1 - last
+            heights, missing = heights[first : last + 1], missing[first : last + 1]
+            notes += (f"{ends_without_heights(*ends)}: only the {heights.size} between are used",)
     heights = np.ascontiguousarray(np.where(missing, 0.0, -heights if flip else heights))
     heights.flags.writeable = False
     kind = data.heights.dtype if data.heights.dtype.kind == "f" else float
     precision = float(np.finfo(kind).eps)
-    checked = {"heights": heights, "missing": missing if missing.any() else None}
+    checked = {
+        "heights": heights,
+        "missing": missing if missing.any() else None,
+        "notes": notes,
+    }
     measures = {"spacing": spacing, "shape": shape, "precision": precision}
     return Topography(**vars(data) | checked | measures)
+
+
+def ends_without_heights(first: int, last: int) -> str:
+    """The numbers of missing heights at both ends of a profile, in words."""
+    return f"the first {first} and the last {last} heights of the profile are missing"
 
 
 def _spacing(data: HeightMap, shape: tuple[int, ...]) -> tuple[float, ...] | None:

@@ -286,10 +286,14 @@ class FileSurface(RigidSurface):
             return None
         return super().peak() if self.band_limited else float(_prepared(self).max())
 
+    @property
+    def is_mirrored(self) -> bool:
+        """Whether the map is mirrored, in its cell or for the interpolation only."""
+        return self.edges == "mirror" or self._is_reflected()
+
     def resolved_heights(self) -> Field:
-        """Heights [m] at the points of the map, reflected at its borders if it has any."""
-        heights = _prepared(self)
-        return mirror(heights) if self._is_reflected() else heights
+        """Heights [m] at the points of the map."""
+        return _filtered(self) if self.edges == "mirror" else _prepared(self)
 
     def tapered_map(self) -> "FileSurface | None":
         """The map with tapered edges, scaled to its own power; None where it is periodic."""
@@ -342,6 +346,8 @@ class FileSurface(RigidSurface):
             warnings.append('surface.taper has no effect without surface.edges = "window"')
         if self.missing == "fill":
             warnings.append(map_warnings.many_filled_in(topography))
+            if not self._is_repeated():
+                warnings.append(map_warnings.missing_ends(topography))
         if boundary == "periodic" and not self.has_borders:
             is_tapered = self.edges == "window"
             warnings.append(map_warnings.step_at_border(heights, is_tapered=is_tapered))
@@ -414,7 +420,7 @@ class TaperedMap(FileSurface):
 @lru_cache(maxsize=16)
 def _suited_interpolation(surface: FileSurface) -> Interpolation:
     """The interpolation that suits a map; cached, because it needs a transform."""
-    return suited_interpolation(surface.resolved_heights())
+    return suited_interpolation(surface.resolved_heights(), mirrored=surface.is_mirrored)
 
 
 _read = lru_cache(maxsize=4)(read_topography)

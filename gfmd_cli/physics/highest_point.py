@@ -1,6 +1,9 @@
 """The highest point of a surface that is a Fourier series, which lies between grid points."""
 
+from collections.abc import Callable, Iterable
+
 import numpy as np
+from scipy.fft import dctn, idct
 from scipy.optimize import minimize
 
 from gfmd_cli.grid.arrays import Field, Modes, row_blocks
@@ -29,7 +32,11 @@ def highest_point(heights: Field) -> float:
     for y in parts if count_y > 1 else [0.0]:
         lines = np.fft.ifft(modes * _waves(k_y, y)[0][:, None], axis=0)
         for x in parts:
-            highest += _highest(lines, _waves(k_x, x)[0], count_x, (y, x))
+            along_x = _waves(k_x, x)[0]
+            blocks = (np.fft.irfft(lines[rows] * along_x, count_x) for rows in row_blocks(lines))
+            heights, points = _highest(blocks, 16 * CANDIDATES)
+            row, column = divmod(points, count_x)
+            highest += zip(heights.tolist(), row + y, column + x, strict=True)
     modes /= whole.size
     modes[:, 1 : (count_x + 1) // 2] *= 2.0  # with their opposites
 
@@ -40,10 +47,61 @@ def highest_point(heights: Field) -> float:
         slopes = slope_y @ along_x, e_y @ (modes @ slope_x)
         return -float((e_y @ along_x).real), -np.real(slopes)
 
+    return max(best, scale * _refined(depth, highest))
+
+
+def highest_point_of_mirrored(heights: Field) -> float:
+    """Maximum of the Fourier series through a map, or a line, that is mirrored at its borders.
+
+    The series is one of cosines, by the discrete cosine transform (type 2) of the map.
+
+    Parameters
+    ----------
+    heights : a quarter of the mirrored map, or half of the line, as for `highest_point`
+    """
+    whole = heights.reshape(-1, heights.shape[-1])
+    count_y, count_x = whole.shape
+    best = float(whole.max())
+    scale = float(np.ptp(whole)) or 1.0
+    modes = dctn(whole)
+    modes /= 4 * scale * whole.size
+    modes[1:] *= 2.0
+    modes[:, 1:] *= 2.0
+    k_y, k_x = np.pi * np.arange(count_y) / count_y, np.pi * np.arange(count_x) / count_x
+    lines = _finer(modes, SUBDIVISION if count_y > 1 else 1, 0)
+    blocks = (_finer(lines[rows], SUBDIVISION, 1) for rows in row_blocks(lines))
+    values, points = _highest(blocks, 16 * CANDIDATES * SUBDIVISION**2)
+    row, column = divmod(points, SUBDIVISION * count_x)
+    y, x = (row + 0.5) * (count_y / len(lines)) - 0.5, (column + 0.5) / SUBDIVISION - 0.5
+
+    def depth(place: Field) -> tuple[float, Field]:
+        """-h and its gradient; places and slopes are in points, the first point is 0."""
+        angle_y, angle_x = k_y * (place[0] + 0.5), k_x * (place[1] + 0.5)
+        along_x, cos_y = modes @ np.cos(angle_x), np.cos(angle_y)
+        slopes = (k_y * np.sin(angle_y)) @ along_x, cos_y @ (modes @ (k_x * np.sin(angle_x)))
+        return -float(cos_y @ along_x), np.array(slopes)
+
+    return max(best, scale * _refined(depth, list(zip(values.tolist(), y, x, strict=True))))
+
+
+def _finer(modes: Field, factor: int, axis: int) -> Field:
+    """Sums of cosines along an axis, at the middles of equal parts of the pixels of a map."""
+    points = factor * modes.shape[axis]
+    amplitudes = points * modes
+    amplitudes[(slice(None),) * axis + (slice(1),)] *= 2.0
+    values: Field = idct(amplitudes, n=points, axis=axis)
+    return values
+
+
+def _refined(
+    depth: Callable[[Field], tuple[float, Field]], highest: list[tuple[float, float, float]]
+) -> float:
+    """The largest height near the highest points, of a function -h with its gradient."""
+    best = -np.inf
     for place in _peaks(highest):
         bounds = [(x - 1.0, x + 1.0) for x in place]
         result = minimize(depth, place, jac=True, method="L-BFGS-B", bounds=bounds)
-        best = max(best, -scale * float(result.fun))
+        best = max(best, -float(result.fun))
     return best
 
 
@@ -61,25 +119,20 @@ def _waves(k: Modes, place: float) -> tuple[Modes, Modes]:
 
 
 def _highest(
-    lines: Modes, along_x: Modes, count_x: int, shift: tuple[float, float]
-) -> list[tuple[float, float, float]]:
-    """The highest points of a grid that is shifted: their heights and places in points.
-
-    `lines`: Fourier coefficients along x of each row, not yet shifted along x.
-    """
-    count = 16 * CANDIDATES
-    heights, points = np.empty(0), np.empty(0, np.int64)
-    for rows in row_blocks(lines):
-        block = np.fft.irfft(lines[rows] * along_x, count_x).ravel()
+    blocks: Iterable[Field], count: int
+) -> tuple[Field, np.ndarray[tuple[int], np.dtype[np.int64]]]:
+    """The highest points of a field in blocks of rows: their heights, and numbers in the field."""
+    heights, points, first = np.empty(0), np.empty(0, np.int64), 0
+    for block in blocks:
         lowest = heights.min() if heights.size == count else -np.inf
         higher = np.flatnonzero(block > lowest)
-        heights = np.append(heights, block[higher])
-        points = np.append(points, higher + rows.start * count_x)
+        heights = np.append(heights, block.ravel()[higher])
+        points = np.append(points, higher + first)
+        first += block.size
         if heights.size > count:
             kept = np.argpartition(heights, -count)[-count:]
             heights, points = heights[kept], points[kept]
-    row, column = divmod(points, count_x)
-    return list(zip(heights.tolist(), row + shift[0], column + shift[1], strict=True))
+    return heights, points
 
 
 def _peaks(highest: list[tuple[float, float, float]]) -> list[tuple[float, float]]:

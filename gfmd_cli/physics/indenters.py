@@ -17,7 +17,7 @@ from gfmd_cli.errors import InputError
 from gfmd_cli.grid.arrays import Field, Mask, MaskedField
 from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.maps.pictures import Picture
-from gfmd_cli.physics.highest_point import highest_point
+from gfmd_cli.physics.highest_point import highest_point, highest_point_of_mirrored
 from gfmd_cli.spec_table import Positive, SpecTable
 
 SMALLEST_GRID = 8  # points along an axis; a choice: smaller grids resolve no contact
@@ -153,6 +153,11 @@ class RigidSurface(SpecTable):
             return None
         return _highest_point(self)
 
+    @property
+    def is_mirrored(self) -> bool:
+        """Whether `resolved_heights` are mirrored at their borders, and then repeated."""
+        return False
+
     def resolved_heights(self) -> Field:
         """Heights [m] of a band-limited surface, with more than two points per wave."""
         points_y = self.smallest_grid_y() + 2 if self.dimension == 2 else 1
@@ -178,7 +183,8 @@ class RigidSurface(SpecTable):
 @lru_cache(maxsize=16)
 def _highest_point(surface: RigidSurface) -> float:
     """Cached: all contacts of a surface have the same."""
-    return highest_point(surface.resolved_heights())
+    find = highest_point_of_mirrored if surface.is_mirrored else highest_point
+    return find(surface.resolved_heights())
 
 
 def forget_peaks() -> None:
