@@ -1,5 +1,6 @@
 """Tables as spreadsheets, stages and geographic programs write them: rounded, quoted, marked."""
 
+from itertools import product
 from types import SimpleNamespace
 
 import numpy as np
@@ -289,12 +290,12 @@ def test_an_image_without_heights_is_refused_as_such(tmp_path, name):
         read_topography(tmp_path / name)
 
 
-@pytest.mark.parametrize("digits", [1, 2, 4])
+@pytest.mark.parametrize("digits", [".1f", ".2f", ".4f", ".4e"])
 @pytest.mark.parametrize("thousands", ["", "."])
 def test_decimal_commas_between_commas_are_refused(saved, digits, thousands):
     """123,4,-5,6 are two numbers; as four they would be a map of twice the width."""
     rows = (
-        ",".join(f"{value:,.{digits}f}".translate({44: thousands, 46: ","}) for value in row)
+        ",".join(f"{value:,{digits}}".translate({44: thousands, 46: ","}) for value in row)
         for row in 3000 * HEIGHTS
     )
     with pytest.raises(InputError, match="that a comma or blank has divided"):
@@ -314,6 +315,28 @@ def test_numbers_of_one_length_may_begin_with_zeros(saved):
     heights = np.random.default_rng(3).integers(1000, size=(12, 40))
     text = "\n".join(",".join(f"{value:04d}" for value in row) for row in heights)
     assert np.array_equal(read_topography(saved(text)).heights, heights)
+
+
+def test_grey_values_of_three_digits_in_every_second_column_are_heights(saved):
+    heights = np.random.default_rng(3).integers(100, 256, size=(12, 40))
+    heights[4, 6] = 98
+    text = "\n".join(",".join(map(str, row)) for row in heights)
+    assert np.array_equal(read_topography(saved(text)).heights, heights)
+
+
+@pytest.mark.parametrize("separator", [" ", ","])
+@pytest.mark.parametrize("is_profile", [False, True])
+def test_numbers_of_points_may_begin_with_zeros(saved, separator, is_profile):
+    rows, columns = (1, 200) if is_profile else (12, 40)
+    heights = HEIGHTS[:rows, :columns]
+    places = product(range(rows), range(columns))
+    words = ([f"{j:03d}", f"{i:03d}"][: 2 - is_profile] for i, j in places)
+    lines = (
+        separator.join([*place, f"{height:.6f}"])
+        for place, height in zip(words, heights.ravel(), strict=True)
+    )
+    read = read_topography(saved("\n".join(lines)))
+    assert read.heights == pytest.approx(heights.squeeze(), abs=1e-6)
 
 
 def test_a_byte_order_mark_hides_no_point(saved):

@@ -10,7 +10,7 @@ import os
 import re
 from collections.abc import Iterator
 from io import BytesIO
-from itertools import chain, islice, takewhile
+from itertools import chain, dropwhile, islice, takewhile, zip_longest
 from typing import Any, BinaryIO
 
 import numpy as np
@@ -45,7 +45,7 @@ UTF_16 = codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE
 QUOTED_COMMAS = re.compile(rb'"[-+\d]*,[\d,.]*"[ \t]*,')  # beside commas between the numbers
 GROUPED = re.compile(rb"[\t;]([-+]?\d{1,3}( \d{3})+([,.]\d*)?)(?=[\t;\r]|$)")
 """A cell such as 1 023 between tabs or semicolons."""
-PADDED = re.compile(rb"[-+]?0\d+([,.]\d*)?")
+PADDED = re.compile(rb"[-+]?0\d+([,.]\d*)?([eE][-+]?\d+)?")
 """A number with zeros before it: what is left of 12,0345 or 12 034 where it was divided."""
 EMPTY = re.compile(rb"([,;])[ \t]*\1.*\d")
 """An empty cell between commas or semicolons, with a number in the same row after it."""
@@ -206,18 +206,21 @@ def _check_is_not_divided(rows: list[bytes], separators: bytes) -> None:
     """Raise InputError where a decimal comma or a blank has divided the numbers of a table.
 
     Then some numbers begin with zeros, beside others of another length, or every second cell
-    between commas has the same number of digits and no sign, the decimals of the cell before.
+    between commas is one digit, the decimal of the cell before; of more digits, some begin with
+    zeros. In the first columns such numbers have no number before them: they are indices as 007.
     """
     blanks = bytes.maketrans(separators, b" " * len(separators))
-    words = [row.translate(blanks).split() for row in rows]
-    padded = next(filter(PADDED.fullmatch, chain(*words)), None)
+    table = zip_longest(*(row.translate(blanks).split() for row in rows), fillvalue=b"")
+    parts = dropwhile(lambda column: any(map(PADDED.fullmatch, column)), table)
+    words = list(filter(None, chain(*parts)))
+    padded = next(filter(PADDED.fullmatch, words), None)
     cells = [row.split(b",") for row in rows] if b"," in separators else []
     decimals = [cell for row in cells for cell in row[1::2]]
     is_wide = bool(cells) and len(cells[0]) >= MATRIX_COLUMNS
-    is_regular = len(set(map(len, decimals))) == 1 and all(map(bytes.isdigit, decimals))
+    is_regular = all(len(cell) == 1 and cell.isdigit() for cell in decimals)
     if padded is None and is_wide and is_regular:
-        padded, words = decimals[0], [row[::2] for row in cells]
-    if padded is not None and len(set(map(len, chain(*words)))) > 1:
+        padded, words = decimals[0], [cell for row in cells for cell in row[::2]]
+    if padded is not None and len(set(map(len, words))) > 1:
         raise InputError(
             f"{padded.decode()} beside numbers of another length: part of a number that a comma "
             "or blank has divided? Save the numbers with decimal points, and without separators "
