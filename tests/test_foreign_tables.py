@@ -315,6 +315,8 @@ def test_numbers_of_one_length_may_begin_with_zeros(saved):
     heights = np.random.default_rng(3).integers(1000, size=(12, 40))
     text = "\n".join(",".join(f"{value:04d}" for value in row) for row in heights)
     assert np.array_equal(read_topography(saved(text)).heights, heights)
+    marked = read_topography(saved(text.replace(f"{heights[2, 3]:04d}", "NaN")))
+    assert np.array_equal(marked.missing, heights == heights[2, 3])
 
 
 def test_grey_values_of_three_digits_in_every_second_column_are_heights(saved):

@@ -212,7 +212,7 @@ def _check_is_not_divided(rows: list[bytes], separators: bytes) -> None:
     blanks = bytes.maketrans(separators, b" " * len(separators))
     table = zip_longest(*(row.translate(blanks).split() for row in rows), fillvalue=b"")
     parts = dropwhile(lambda column: any(map(PADDED.fullmatch, column)), table)
-    words = list(filter(None, chain(*parts)))
+    words = [word for word in chain(*parts) if word and not word[-1:].isalpha()]  # no NaN
     padded = next(filter(PADDED.fullmatch, words), None)
     cells = [row.split(b",") for row in rows] if b"," in separators else []
     decimals = [cell for row in cells for cell in row[1::2]]
