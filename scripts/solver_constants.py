@@ -3,9 +3,9 @@
     python scripts/solver_constants.py multigrid.COARSEST_STEP_PAIRS 1 2 8
     python scripts/solver_constants.py projected_move.LENGTH_CHANGE "(0.25, 4)" "(0.67, 1.5)"
 
-Self-affine surfaces with lambda_s four times the spacing, whole grids (no tiles, no direct solves),
-natural residual 1e-6. Prints a Markdown table: for each grid and exponent n, the geometric mean of
-the ratios over the pressures and seeds. A dash stands for a solve that has not converged.
+Self-affine surfaces with lambda_s four times the larger spacing, whole grids (no tiles, no direct
+solves), natural residual 1e-6. Prints a Markdown table: for each grid and exponent n, the geometric
+mean of the ratios over the pressures and seeds. A dash stands for a solve that has not converged.
 """
 
 import argparse
@@ -34,10 +34,11 @@ class WholeGrids(ProjectedCG):
     starts_locally: ClassVar[bool] = False
 
 
-def transforms(points: int, n: float, p_star: float, seed: int) -> float:
+def transforms(shape: tuple[int, int], n: float, p_star: float, seed: int) -> float:
     """Number of transforms of a solve; infinite if it does not converge."""
-    surface = SelfAffine(cutoff=4 / points, seed=seed)
-    contact = build_scene(surface, Power(n=n), points).contact(p_star)
+    points, points_y = shape
+    surface = SelfAffine(cutoff=4 / points_y, seed=seed)
+    contact = build_scene(surface, Power(n=n), points, points_y=points_y).contact(p_star)
     solution = solve_contact(contact, WholeGrids(max_steps=3000))
     return solution.transforms if solution.status.is_converged else inf
 
@@ -50,6 +51,7 @@ def main() -> None:
     parser.add_argument("--exponents", type=float, nargs="+", default=[0.5, 1, 2, 3, 4])
     parser.add_argument("--p-star", type=float, nargs="+", default=[0.01, 0.1, 1.0])
     parser.add_argument("--seeds", type=int, nargs="+", default=[3, 4, 5])
+    parser.add_argument("--aspect", type=float, default=1, help="of the pixels, of a square cell")
     arguments = parser.parse_args()
     module_name, name = arguments.constant.split(".")
     module = import_module(f"gfmd_cli.solvers.{module_name}")
@@ -57,17 +59,17 @@ def main() -> None:
     print(f"| points | n | {' | '.join(map(str, arguments.values))} | present: {present} |")
     print("| --- " * (len(arguments.values) + 3) + "|")
     for points in arguments.points:
+        shape = points, round(points / arguments.aspect)
         for n in arguments.exponents:
-            cases = [(points, n, p, seed) for p in arguments.p_star for seed in arguments.seeds]
+            cases = [(shape, n, p, seed) for p in arguments.p_star for seed in arguments.seeds]
             counts = []
             for value in (present, *arguments.values):
                 with patch.object(module, name, value):
                     counts.append(np.array([transforms(*case) for case in cases]))
             ratios = [float(np.exp(np.mean(np.log(count / counts[0])))) for count in counts[1:]]
             cells = [f"{ratio:.2f}" if isfinite(ratio) else "-" for ratio in ratios]
-            print(
-                f"| {points}² | {n:g} | {' | '.join(cells)} | {counts[0].mean():.0f} |", flush=True
-            )
+            grid = f"{points} × {shape[1]}"
+            print(f"| {grid} | {n:g} | {' | '.join(cells)} | {counts[0].mean():.0f} |", flush=True)
 
 
 if __name__ == "__main__":

@@ -44,31 +44,39 @@ from gfmd_cli.solvers import multigrid_kernels as kernels
 from gfmd_cli.solvers import multigrid_transfer_kernels as transfer
 from gfmd_cli.solvers.contact_state import ContactState
 
+# Transforms with other values of the constants, on 64^2 to 256^2, seeds 3 to 5:
+# scripts/solver_constants.py with the arguments that stand beside them.
 MIN_LEVEL_POINTS = 4  # points along the shorter side on the coarsest level
+"""With 2 and 8 the transforms are 0.96 to 1.06 times as many, with 16: 0.97 to 1.15 times:
+`multigrid.MIN_LEVEL_POINTS 2 8 16 --exponents 1 2 3 4`."""
 MAX_PIXEL_ASPECT = 1.5  # beyond, only the shorter side is coarsened, which leaves 1 / (2 / 1.5)
-# Transforms with other values of the next three, and of the number of steps below, on 64^2 to
-# 256^2, seeds 3 to 5: scripts/solver_constants.py with the arguments that stand there.
+"""On pixels of 3 : 4 the transforms are 1.08 to 1.21 times as many with 1.1 or 1.3, the same with
+2.5: `multigrid.MAX_PIXEL_ASPECT 1.1 1.3 2.5 --aspect 1.3333 --points 96 192 --exponents 1 2 3`. On
+pixels of 1 : 2 with 2.5: 0.91 to 0.98 times at n = 1, 1.02 to 1.13 times at n = 2, 1.41 to 1.64
+times at n = 3: `multigrid.MAX_PIXEL_ASPECT 2.5 --aspect 2 --exponents 1 2 3`."""
 MAX_LAPLACIAN_GROWTH = 5.0  # growth of k(q) above which the Laplacian is squared; n = 2.3
-"""3 to 7 % more if it is squared at n = 2; 8 to 14 % at n = 2.5 and 18 to 31 % at n = 3 if it is
-not. At n = 2.2 both are the same within 4 %:
+"""If it is squared: 2 % fewer to 2 % more at n = 2, 4 to 7 % fewer at n = 2.2, where a step takes
+longer by as much; if it is not: 8 to 12 % more at n = 2.5, 18 to 38 % more at n = 3:
 `multigrid.MAX_LAPLACIAN_GROWTH 3 20 --exponents 2 2.2 2.5 3`."""
 PENALTY_STIFFNESS = 0.125, 0.25  # over diagonal element and k(2 q) / k(q): Laplacian, its square
-"""Half: 1 % fewer to 18 % more (most at n = 1 and 2); double: 2 % fewer to 35 % more (n = 3):
+"""Half: 3 % fewer to 39 % more (n = 2); double: the same to 23 % more (n = 4):
 `multigrid.PENALTY_STIFFNESS "(0.0625, 0.125)" "(0.25, 0.5)" --exponents 1 2 3 4`."""
 JACOBI_EIGENVALUE = (1.04, 0.18), (1.76, 0.0)
 """The largest of the damped Jacobi iteration: a + b k(2 q) / k(q), the least of both. With 1.76 for
-all k the transforms are 1.13 to 1.35 times as many at n = 0.75 and 1, the same from n = 1.5 on;
-with 1.6 in place of 1.76: 1.03 to 1.13 times, with 1.85: 0.94 to 1.01 times at n = 2 to 4:
+all k the transforms are 1.19 to 1.48 times as many at n = 0.75 and 1, 1.00 to 1.02 times from
+n = 1.5 on; with 1.6 in place of 1.76: 1.02 to 1.11 times from n = 2 on, with 1.85: 0.93 to 1.00:
 `multigrid.JACOBI_EIGENVALUE "((1.76, 0),)" "((1.04, 0.18), (1.6, 0))" "((1.04, 0.18), (1.85, 0))"
---exponents 0.75 1 1.5 2 3 4`, measured with all weights 1."""
+--exponents 0.75 1 1.5 2 3 4`."""
 COARSE_WEIGHT = (0.55, 0.19), (1.16, -0.01)
 """Of the correction by the next coarser level: a + b k(2 q) / k(q), the least of both. With the
-weight 1 the transforms are 1.04 to 1.10 times as many at n = 0.75 and 0.98 to 1.05 times at n = 1
-to 2: `multigrid.COARSE_WEIGHT "((1, 0),)" --exponents 0.75 1 1.5 2`. Smoother surfaces and smaller
-pressures gain more. At n = 4 the weight is 1: with 1.12 there are 4 % more."""
+weight 1 the transforms are 1.04 to 1.10 times as many at n = 0.75, 0.98 to 1.05 times at n = 1 to
+2: `multigrid.COARSE_WEIGHT "((1, 0),)" --exponents 0.75 1 1.5 2`; at p* = 0.001 and 0.003, 0.92 to
+1.15 times (`--p-star 0.001 0.003`); at n = 3, 0.99 to 1.02 times. At n = 4 the weight is 1; with
+1.12, 0.97 to 1.00 times: `"((1, 0),)" "((0.55, 0.19), (1.12, 0))" --exponents 3 4`."""
 STEEPEST = 4.5  # exponent above which the levels limit the growth of k(q); measured, see below
 COARSEST_STEP_PAIRS = 4  # of smoothing steps on the coarsest level
-"""1, 2 and 8 are the same within 4 %: `multigrid.COARSEST_STEP_PAIRS 1 2 8 --exponents 1 2 3 4`."""
+"""With 1, 2 and 8, 4 % fewer to 5 % more:
+`multigrid.COARSEST_STEP_PAIRS 1 2 8 --exponents 1 2 3 4`."""
 PENALTY_UNIT = 1.0 / 64  # of the integers in `_CoarseLevel.penalty`
 
 
