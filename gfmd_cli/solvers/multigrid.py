@@ -56,15 +56,15 @@ PENALTY_STIFFNESS = 0.125, 0.25  # over diagonal element and k(2 q) / k(q): Lapl
 """Half: 1 % fewer to 18 % more (most at n = 1 and 2); double: 2 % fewer to 35 % more (n = 3):
 `multigrid.PENALTY_STIFFNESS "(0.0625, 0.125)" "(0.25, 0.5)" --exponents 1 2 3 4`."""
 JACOBI_EIGENVALUE = (1.04, 0.18), (1.76, 0.0)
-"""The largest of the damped Jacobi iteration: a + b k(2 q) / k(q), the least of both. With 1.76 for
-all k the transforms are 1.13 to 1.35 times as many at n = 0.75 and 1, the same from n = 1.5 on;
-with 1.6 in place of 1.76: 1.03 to 1.13 times, with 1.85: 0.94 to 1.01 times at n = 2 to 4:
+"""The largest of the damped Jacobi iteration: the smaller a + b k(2 q) / k(q). With 1.76 for all
+k the transforms are 1.13 to 1.35 times as many at n = 0.75 and 1, the same from n = 1.5 on; with
+1.6 in place of 1.76: 1.03 to 1.13 times, with 1.85: 0.94 to 1.01 times at n = 2 to 4:
 `multigrid.JACOBI_EIGENVALUE "((1.76, 0),)" "((1.04, 0.18), (1.6, 0))" "((1.04, 0.18), (1.85, 0))"
 --exponents 0.75 1 1.5 2 3 4`, measured with all weights 1."""
 COARSE_WEIGHT = (0.55, 0.19), (1.16, -0.01)
-"""Of the correction by the next coarser level: a + b k(2 q) / k(q), the least of both. With the
-weight 1 the transforms are 1.04 to 1.10 times as many at n = 0.75 and 0.98 to 1.05 times at n = 1
-to 2: `multigrid.COARSE_WEIGHT "((1, 0),)" --exponents 0.75 1 1.5 2`. Smoother surfaces and smaller
+"""Of the correction by the next coarser level: the smaller a + b k(2 q) / k(q). With the weight
+1 the transforms are 1.04 to 1.10 times as many at n = 0.75 and 0.98 to 1.05 times at n = 1 to 2:
+`multigrid.COARSE_WEIGHT "((1, 0),)" --exponents 0.75 1 1.5 2`. Smoother surfaces and smaller
 pressures gain more. At n = 4 the weight is 1: with 1.12 there are 4 % more."""
 STEEPEST = 4.5  # exponent above which the levels limit the growth of k(q); measured, see below
 COARSEST_STEP_PAIRS = 4  # of smoothing steps on the coarsest level
@@ -151,7 +151,7 @@ def _operator(dy: float, dx: float, growth: float, density: float) -> kernels.Op
 
 
 def _at_growth(lines: tuple[tuple[float, float], ...], growth: float) -> float:
-    """The least a + b growth of some lines (a, b)."""
+    """The smallest a + b growth of some lines (a, b)."""
     return min(a + b * growth for a, b in lines)
 
 
