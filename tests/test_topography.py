@@ -870,7 +870,7 @@ def test_filled_ends_of_an_array_give_a_warning(npy, periodic):
     heights = np.random.default_rng(8).normal(size=200)
     heights[-4:] = np.nan
     warnings = FileSurface(path=npy(heights), periodic=periodic).warnings()
-    ends = [each for each in warnings if "first 0 and the last 4 heights" in each]
+    ends = [each for each in warnings if "the last 4 heights of the profile" in each]
     assert len(ends) == (not periodic)
 
 

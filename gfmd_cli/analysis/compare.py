@@ -253,7 +253,7 @@ def solver_of(row: Row) -> tuple[str, ...]:
 def with_solvers(titles: Iterable[str], rows: Sequence[Row]) -> list[str]:
     """Titles of contacts, followed by the keys of [solver] in which the contacts differ.
 
-    A key that only some kinds of solvers have counts if these differ in it.
+    A key that only some kinds of solvers have is named only if its values differ.
     """
     columns = zip(*map(solver_of, rows), strict=True)
     differing = [column for column in columns if len(set(column) - {""}) > 1]

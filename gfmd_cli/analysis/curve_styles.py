@@ -104,8 +104,8 @@ def curve_styles(curves: list[Curve]) -> list[CurveStyle]:
     """Colours along the ordered curves, one per elastomer; markers tell variants apart.
 
     Curves of one elastomer have a colour each. Curves that differ in their seed only have the same
-    style, and so have more than MAX_STYLES curves of one elastomer, unless there is no other
-    elastomer and they differ in one parameter: then colours go along its values.
+    style, and so have more than MAX_STYLES curves of one elastomer. If there is no other elastomer
+    and they differ in one parameter, each of its values has a colour instead, in their order.
     """
     names = _elastomer_names(curves)
     alike = grouped(curves, lambda curve: curve.elastomer)

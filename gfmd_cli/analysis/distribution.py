@@ -54,9 +54,9 @@ class Extrapolated:
     """What extrapolation has added to ln Pr, or the change it could not be based on: taken as a
     standard error that all bins share, with its sign."""
     counting: Field
-    """Standard error of ln Pr by the number of points in the bins, each drawn by itself.
+    """Standard error of ln Pr by the number of points in the bins, as if drawn independently.
 
-    Grids of one surface have less where they resolve the stress well."""
+    Counts on grids of one surface scatter less where the grids resolve the stress."""
 
 
 def extrapolate(counts: Field, cells: Sequence[int]) -> Extrapolated:
@@ -182,9 +182,9 @@ class StressDistribution:
         """Relative standard error of the mean over surfaces, for the few patches that one holds.
 
         All points of a bin in one patch are one draw. If the stress of patches differs by a factor
-        whose logarithm is normal, of standard deviation s, and the counts are as sigma^g, the
-        weights of N patches are as many as N exp(-g^2 s^2) equal ones. The spread over seeds is
-        weighed against it as PRIOR_SEEDS further seeds would be.
+        whose logarithm is normal with the standard deviation s, and the counts are as sigma^g,
+        N patches count as N exp(-g^2 s^2). This expected variance is averaged with that over the
+        seeds, with the weight of PRIOR_SEEDS further seeds.
         """
         count, fine = len(self.seeds), self.counts[:, -1]
         if self.finest["seed"] < 0:  # nothing random

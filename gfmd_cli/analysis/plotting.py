@@ -32,7 +32,7 @@ WIDTH, HEIGHT, ROW = 3.39, 2.35, 0.145  # inches: a column of 86 mm; a row of th
 SMALL = 8.0  # points
 COLUMN = 54  # characters and symbols that a row of the legend holds
 SYMBOL = 6  # characters that a symbol and the space around it take
-MAX_NAMED, NAMED = 20, 9  # curves that a legend names all; of more curves it names a few; a choice
+MAX_NAMED, NAMED = 20, 9  # a legend names up to 20 curves; if there are more, 9; a choice
 SCRIPTED = 9.3  # points: sub- and superscripts are printed at 0.7 of it, 6.5 points
 STYLE = {
     "font.family": "DejaVu Sans",
@@ -104,7 +104,7 @@ class LegendFigure:
         self.figure = Figure(figsize=(width, height), layout="constrained")
         self.legend: dict[str, Any] = {}
         self.shared_name = ""
-        """What the labels of the curves leave out."""
+        """The part of the names of all curves that their labels leave out."""
 
     def line_on(self, axes: Any, label: str, x: Field, y: Field, **style: Any) -> None:
         """Draw a line where y > 0 on some axes, with an entry of the legend."""

@@ -27,14 +27,14 @@ Precision = Literal["double", "single"]
 BLOCK_POINTS = 2**15  # points of a block of rows: it and its temporaries stay in the cache
 
 
-HUGE_PAGE = 2**21  # bytes; Linux gives such pages to large arrays, if it may
+HUGE_PAGE = 2**21  # bytes; Linux can use pages of this size for large arrays
 
 
 def aligned(shape: int | tuple[int, ...], dtype: Any) -> Any:
     """An array that is aligned for transforms, values undefined.
 
-    A large one begins at a huge page. Elsewhere its ends would lie on up to 512 small pages, each
-    of which the system provides at the first access.
+    A large array begins at the start of a huge page. Otherwise its ends would lie on up to 512
+    small pages, and the system has to provide each of them at the first access.
     """
     count = shape if isinstance(shape, int) else prod(shape)
     is_large = count * np.dtype(dtype).itemsize >= HUGE_PAGE

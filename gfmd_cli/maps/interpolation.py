@@ -36,7 +36,7 @@ CUBIC_MARGIN = 4  # points beyond the border of the cell that the slopes of the 
 def suited_interpolation(heights: Field, *, mirrored: bool = False) -> Interpolation:
     """The interpolation that suits a periodic map: "fourier" only if it is band-limited.
 
-    `mirrored`: the map is the heights mirrored at their borders, to twice their sides.
+    `mirrored`: whether the map is these heights mirrored at their borders, with twice the sides.
 
     A band-limited map has no waves in the corners of its spectrum, |q| above the highest
     wavenumber along one axis. Waves at the highest wavenumbers along the axes are allowed without

@@ -120,7 +120,7 @@ def missing_ends(topography: Topography) -> str:
     if not first + last:
         return ""
     return (
-        f"{ends_without_heights(first, last)}: they get the height of the next known one; "
+        f"{ends_without_heights(first, last)}: they get the height of the nearest known one; "
         "surface.region leaves them out"
     )
 
@@ -277,7 +277,7 @@ def _seam(medians: Field) -> float:
     """The largest step between lines, 0 if more than `SEAMS` are about as large.
 
     A step is the distance of a median difference from the range of the two before it and the two
-    after it, and the smaller one of both halves of the lines counts.
+    after it. Of the steps in the two halves of the lines the smaller one counts.
     """
     own, last = medians[:, 2:-2], medians.shape[1] - 4
     around = np.stack([medians[:, shift : shift + last] for shift in (0, 1, 3, 4)])
@@ -386,7 +386,7 @@ def _usual_difference(topography: Topography) -> float:
 
 
 def _spikes(heights: Field) -> str:
-    """A few heights beyond a gap wider than the range of all others, `MIN_OTHERS` or more."""
+    """A few heights beyond a gap wider than the range of the others, at least `MIN_OTHERS`."""
     most = max(0, min(MAX_SPIKES, heights.size // 4, heights.size - MIN_OTHERS))
     values = np.partition(heights, (most, -most - 1), axis=None)
     low, high = np.sort(values[: most + 1])[::-1], np.sort(values[-most - 1 :])

@@ -46,7 +46,7 @@ QUOTED_COMMAS = re.compile(rb'"[-+\d]*,[\d,.]*"[ \t]*,')  # beside commas betwee
 GROUPED = re.compile(rb"[\t;]([-+]?\d{1,3}( \d{3})+([,.]\d*)?)(?=[\t;\r]|$)")
 """A cell such as 1 023 between tabs or semicolons."""
 PADDED = re.compile(rb"[-+]?0\d+([,.]\d*)?([eE][-+]?\d+)?")
-"""A number with zeros before it: what is left of 12,0345 or 12 034 where it was divided."""
+"""A number that begins with a zero, such as the second part of a divided 12,0345 or 12 034."""
 EMPTY = re.compile(rb"([,;])[ \t]*\1.*\d")
 """An empty cell between commas or semicolons, with a number in the same row after it."""
 OLD_LINE_END = re.compile(rb"\r(?!\n)")

@@ -219,7 +219,7 @@ def _checked(data: HeightMap, region: Region | None, flip: bool, crop: bool) -> 
         if SMALLEST_MAP <= last + 1 - first < heights.size:
             ends = first, heights.size - 1 - last
             heights, missing = heights[first : last + 1], missing[first : last + 1]
-            notes += (f"{ends_without_heights(*ends)}: only the {heights.size} between are used",)
+            notes += (f"{ends_without_heights(*ends)}: only the other {heights.size} are used",)
     heights = np.ascontiguousarray(np.where(missing, 0.0, -heights if flip else heights))
     heights.flags.writeable = False
     kind = data.heights.dtype if data.heights.dtype.kind == "f" else float
@@ -235,7 +235,8 @@ def _checked(data: HeightMap, region: Region | None, flip: bool, crop: bool) -> 
 
 def ends_without_heights(first: int, last: int) -> str:
     """The numbers of missing heights at both ends of a profile, in words."""
-    return f"the first {first} and the last {last} heights of the profile are missing"
+    ends = (f"the {end} {number}" for end, number in (("first", first), ("last", last)) if number)
+    return f"{' and '.join(ends)} heights of the profile are missing"
 
 
 def _spacing(data: HeightMap, shape: tuple[int, ...]) -> tuple[float, ...] | None:

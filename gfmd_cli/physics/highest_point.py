@@ -85,7 +85,7 @@ def highest_point_of_mirrored(heights: Field) -> float:
 
 
 def _finer(modes: Field, factor: int, axis: int) -> Field:
-    """Sums of cosines along an axis, at the middles of equal parts of the pixels of a map."""
+    """Sums of cosines along an axis, at the middles of `factor` equal parts of each pixel."""
     points = factor * modes.shape[axis]
     amplitudes = points * modes
     amplitudes[(slice(None),) * axis + (slice(1),)] *= 2.0
@@ -96,7 +96,7 @@ def _finer(modes: Field, factor: int, axis: int) -> Field:
 def _refined(
     depth: Callable[[Field], tuple[float, Field]], highest: list[tuple[float, float, float]]
 ) -> float:
-    """The largest height near the highest points, of a function -h with its gradient."""
+    """The largest height h near these points; `depth` returns -h and its gradient."""
     best = -np.inf
     for place in _peaks(highest):
         bounds = [(x - 1.0, x + 1.0) for x in place]
@@ -121,7 +121,7 @@ def _waves(k: Modes, place: float) -> tuple[Modes, Modes]:
 def _highest(
     blocks: Iterable[Field], count: int
 ) -> tuple[Field, np.ndarray[tuple[int], np.dtype[np.int64]]]:
-    """The highest points of a field in blocks of rows: their heights, and numbers in the field."""
+    """The highest points of a field in blocks of rows: heights, and indices of the flat field."""
     heights, points, first = np.empty(0), np.empty(0, np.int64), 0
     for block in blocks:
         lowest = heights.min() if heights.size == count else -np.inf

@@ -29,7 +29,7 @@ SYMBOLS = {
 }
 """Markers by their names in matplotlib: as plotly.js names them, and as a character."""
 LINE, DASHES, PATCH = "—", "┄", "■"
-DECADES = 1.5  # of a logarithmic axis; at 5 ticks, plotly.js would label all of 2 to 9 below it
+DECADES = 1.5  # on shorter logarithmic axes plotly.js labels all of 2 to 9 if it may set 5 ticks
 PIXELS = 1.6  # of the page for a point of the figure
 DIGITS, LINE_DIGITS = 10, 5  # of the values of points, and of lines, which are only looked at
 

@@ -55,7 +55,7 @@ def _drawings(row: Row, pictures: dict[str, Picture], place: str) -> list[Drawin
 
 
 def surface_spectrum(data: ReportData) -> Section:
-    """C(q), double logarithmic, of rough surfaces; a blank section without one."""
+    """C(q), double logarithmic, of rough surfaces; an empty section without them."""
     scenes: dict[tuple[str, str, float], Curve] = {}
     for _, curve in data.curves:
         row = curve.rows[0]

@@ -247,7 +247,7 @@ class _DirectSolve:
 def _fill_lower_triangle(
     matrix: Field, rows: Indices, columns: Indices, compliance: Field, height: int, width: int
 ) -> None:
-    """Write the displacements at points by unit stresses at the points before them."""
+    """Write the displacement at each point by a unit stress at it and at each point before it."""
     for a in range(rows.size):
         for b in range(a + 1):
             y, x = abs(rows[a] - rows[b]), abs(columns[a] - columns[b])

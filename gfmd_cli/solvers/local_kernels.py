@@ -104,9 +104,9 @@ def balance(s, gap, active, force):
 def find_move(z, s, active, force, last_force, last, direction, move, old_slope, length, total):
     """The direction from the preconditioned force z, and the projected move of this length.
 
-    Points that are not active do not move. `last` is the last direction; z force was `old_slope`
-    then. `total` is the sum of s. Returns z force, and whether the projection clips a stress. The
-    formulas are those of `projected_move`.
+    Points that are not active do not move. `last` is the last direction, `old_slope` the product
+    z force of that step. `total` is the sum of s. Returns z force, and whether the projection clips
+    a stress. The formulas are those of `projected_move`.
     """
     z, s, active, move = z.ravel(), s.ravel(), active.ravel(), move.ravel()
     force, last_force = force.ravel(), last_force.ravel()
@@ -163,7 +163,7 @@ def _find_direction(z, beta, last, s, active, force, direction):
 def _project(s, direction, length, active, total, move):
     """`move` <- that to s + length direction, projected on stresses >= 0 with this sum.
 
-    The first numbers of `move` are the targets of the points that the projection keeps.
+    Until the end, the first numbers of `move` are the targets of the points that are kept.
     """
     count, highest, is_clipped = 0, -np.inf, False
     for i in range(s.size):

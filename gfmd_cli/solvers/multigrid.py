@@ -62,13 +62,13 @@ PENALTY_STIFFNESS = 0.125, 0.25  # over diagonal element and k(2 q) / k(q): Lapl
 """Half: 3 % fewer to 39 % more (n = 2); double: the same to 23 % more (n = 4):
 `multigrid.PENALTY_STIFFNESS "(0.0625, 0.125)" "(0.25, 0.5)" --exponents 1 2 3 4`."""
 JACOBI_EIGENVALUE = (1.04, 0.18), (1.76, 0.0)
-"""The largest of the damped Jacobi iteration: a + b k(2 q) / k(q), the least of both. With 1.76 for
+"""The largest of the damped Jacobi iteration: a + b k(2 q) / k(q), the smaller one. With 1.76 for
 all k the transforms are 1.19 to 1.48 times as many at n = 0.75 and 1, 1.00 to 1.02 times from
 n = 1.5 on; with 1.6 in place of 1.76: 1.02 to 1.11 times from n = 2 on, with 1.85: 0.93 to 1.00:
 `multigrid.JACOBI_EIGENVALUE "((1.76, 0),)" "((1.04, 0.18), (1.6, 0))" "((1.04, 0.18), (1.85, 0))"
 --exponents 0.75 1 1.5 2 3 4`."""
 COARSE_WEIGHT = (0.55, 0.19), (1.16, -0.01)
-"""Of the correction by the next coarser level: a + b k(2 q) / k(q), the least of both. With the
+"""Of the correction by the next coarser level: a + b k(2 q) / k(q), the smaller one. With the
 weight 1 the transforms are 1.04 to 1.10 times as many at n = 0.75, 0.98 to 1.05 times at n = 1 to
 2: `multigrid.COARSE_WEIGHT "((1, 0),)" --exponents 0.75 1 1.5 2`; at p* = 0.001 and 0.003, 0.92 to
 1.15 times (`--p-star 0.001 0.003`); at n = 3, 0.99 to 1.02 times. At n = 4 the weight is 1; with
@@ -159,7 +159,7 @@ def _operator(dy: float, dx: float, growth: float, density: float) -> kernels.Op
 
 
 def _at_growth(lines: tuple[tuple[float, float], ...], growth: float) -> float:
-    """The least a + b growth of some lines (a, b)."""
+    """The smallest a + b growth of some lines (a, b)."""
     return min(a + b * growth for a, b in lines)
 
 

@@ -1,8 +1,8 @@
 """Compiled kernels between two levels of the multigrid cycle; see `multigrid`.
 
-They compute the penalty of a level, and restrict and interpolate between levels of any
-numbers of points. `multigrid_kernels` does the latter without a field of its own where a level has
-exactly half the points of the next finer one.
+They compute the penalty of a level, and restrict and interpolate between levels of any numbers of
+points. `multigrid_kernels` does the latter without a field of its own where a level has exactly
+half the points of the next finer one.
 """
 
 import numpy as np

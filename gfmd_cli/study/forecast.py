@@ -67,7 +67,7 @@ def fields_of_levels(shape: tuple[int, int], sides: tuple[float, ...]) -> float:
 
 
 def solves(is_searched: bool, is_accurate: bool) -> float:
-    """Solves of a task whose pressure is searched or given, with [accuracy] or without."""
+    """Number of solves of a task: its pressure is searched or given, with [accuracy] or without."""
     if not is_searched:
         return 1.0
     return SOLVES_PER_ACCURATE_SEARCH if is_accurate else SOLVES_PER_SEARCH

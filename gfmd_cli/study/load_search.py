@@ -6,9 +6,9 @@ grids predict the first pressure there. Each trial is a solve of its own. The co
 plate (n = 4) may also fall, as that under a paraboloid does: of several roots the search finds one,
 or it ends in a jump where another pressure has the area.
 
-With `[accuracy]` a contact area or mean gap is that in the continuum, also on a coarser grid if its
-continuum value is known. A coarser grid gives the slope from which the error of the pressure
-follows.
+With `[accuracy]` a contact area or mean gap is that in the continuum on the last grid; on a coarser
+grid a contact area is, where its continuum value is known. A coarser grid also gives the slope from
+which the error of the pressure follows.
 
 The contact area of a grid has steps. Where the requested area lies between two attainable ones, the
 search ends with the nearest contact, at a pressure that may depend on rounding errors.
@@ -60,12 +60,12 @@ area is proportional to the spacing. 0.37 to 0.67 on 256^2, 512^2 and 1024^2 (n 
 0.01 to 0.3, two seeds), except for one shift that was a 50th of the next."""
 MAX_TRIALS = 60  # on one grid; 44 halve an interval of MAX_STEP down to ROUNDING
 NEIGHBOURS = (1.25, 2.0)
-"""Least and largest ratio of the pressures of the root and of two trials, above and below it, that
+"""Limits of the ratio of pressures between the root and two trials, one above and one below, that
 give the slopes there; a choice. One of the chords is less steep than the curve, the other steeper.
 """
 JUMP = {1: 2, 2: 8}
 """Points that enter contact together on a symmetric surface, by its dimension."""
-JUMPS = 6  # of the area, by which it is to change from the root to a neighbour; a choice
+JUMPS = 6  # by so many jumps the area should change from the root to a neighbour; a choice
 LARGEST_ERROR = 1.0  # of a pressure, relative, above which it is unknown; a choice
 ENTERING = 0.05  # points expected to enter contact within the narrowest enclosure; a choice
 SOLVED = (Status.CONVERGED, Status.ROUNDING)  # how a solve ends
@@ -77,10 +77,10 @@ def solve_at_load(task: Task, context: SolveContext, watcher: Watcher) -> TaskSo
     The search returns the nearest contact that it met. It succeeds where that is within
     `task.load_tolerance` of the load. A contact area is a whole number of grid points, several of
     which may enter contact together. Therefore a search of an area also succeeds, with a warning,
-    within half a grid point of the load, and where the area jumps there. A jump is a difference of
-    one grid point, or of two pressures so close that hardly one point is expected to enter contact
-    between them, or that the solver cannot tell apart, as they differ by less than its tolerance.
-    Otherwise the status is "load_not_reached".
+    within half a grid point of the load, and where the area jumps there: the areas on either side
+    of the load differ by one grid point, or the pressures so little that hardly one point is
+    expected to enter contact between them, or by less than the tolerance of the solver, which then
+    cannot tell them apart. Otherwise the status is "load_not_reached".
 
     Raises InputError for a mean gap that no pressure has, and an area below one grid point.
     """
@@ -182,9 +182,9 @@ def _with_errors_at_load(
     `uncertain` is the part of a slope of the searched quantity that may be due to the grid. Where
     it is more than half, the slope is not known.
 
-    The continuum has the load at another pressure than the one that was found. Where the value is
-    lower by its error, so is the slope of a power law: the error of ln p is the logarithm of their
-    ratio over the exponent. The other quantities change over it, at most in proportion to p.
+    The continuum has the load at another pressure than the one that was found. By a power law the
+    error of ln p is the logarithm of the value over the value less its error, over the exponent.
+    The other quantities change over it, at most in proportion to p.
     """
     name, units = LOADS[task.quantity].searched, _units(solved.scene)
     estimate = solved.estimates[name]
@@ -386,7 +386,7 @@ class _Search:
 
     @property
     def is_exhausted(self) -> bool:
-        """Whether no pressures between come nearer, or the solver does not tell them apart."""
+        """Whether no pressure between comes nearer, or the solver cannot tell them apart."""
         low, high = self._enclosure()
         step = abs(high.trial.value - low.trial.value)
         return high.x - low.x < self.resolution or step < 1.5 * self.quantum

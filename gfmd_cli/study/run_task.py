@@ -97,7 +97,7 @@ class TaskWatcher(Watcher):
         raise Interrupted(f"{self.task.label}: stopped, state saved")
 
     def _save(self, contact: Contact, state: State) -> None:
-        """Save the state if that is possible: the solve does not need it."""
+        """Save the state if there is space; the solve goes on without it."""
         try:
             self.checkpoint.save(contact, state, self.notes)
         except SpaceError as error:
