@@ -14,6 +14,7 @@ import os
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
+from contextlib import AbstractContextManager
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from unittest.mock import patch
@@ -47,7 +48,6 @@ def main() -> None:
     parser.add_argument("--points", type=int, help="of all grids; default: those of the cases")
     parser.add_argument("--steps", type=int, default=4000)
     arguments = parser.parse_args()
-    without_limit = patch.object(multigrid, "STEEPEST", NO_LIMIT)
     without_cycle = patch.object(preconditioners, "has_coarser_level", lambda grid: False)
     print("| k(q) | points | lambda_s / L | p* | with the limit | without | Green's function |")
     print("| --- | --- | --- | --- | --- | --- | --- |")
@@ -55,10 +55,20 @@ def main() -> None:
         points = arguments.points or usual
         case = law, points, max(cutoff, 2 / points), p_star, arguments.steps
         numbers = [transforms(*case)]
-        for change in (without_limit, without_cycle):
+        for change in (without_limit(), without_cycle):
             with change:
                 numbers.append(transforms(*case))
         print(f"| {law} | {points}² | {case[2]:g} | {p_star:g} |", " | ".join(numbers), "|")
+
+
+def without_limit() -> AbstractContextManager[object]:
+    """No limit on the growth of k(q); weights and damping keep their values at the limit."""
+    largest, at_growth = 2**multigrid.STEEPEST, multigrid._at_growth
+    changes = {
+        "STEEPEST": NO_LIMIT,
+        "_at_growth": lambda lines, growth: at_growth(lines, min(growth, largest)),
+    }
+    return patch.multiple(multigrid, **changes)
 
 
 def transforms(law: str, points: int, cutoff: float, p_star: float, steps: int) -> str:

@@ -304,7 +304,11 @@ def test_a_steep_line_contact_converges():
     ids=["step-0.05", "step-0.001", "q^6.5"],
 )
 def test_an_abrupt_and_a_steep_stiffness_converge(law, p_star, most, tmp_path, monkeypatch):
-    """In 44, 312 and 384 transforms; without the limit on the levels in 72, 2038 and 1088."""
+    """In 40, 283 and 423 transforms; without the limit on k(q) of the levels in 58, 382 and 821.
+
+    There the weights of the corrections keep their values at the limit (`without_limit` of
+    scripts/steep_stiffness.py); with weights that fall further it is 45, 297 and 532.
+    """
     monkeypatch.setattr(direct_start, "MAX_COST", 0)
     m = np.geomspace(1, 256, 4000)
     np.savetxt(tmp_path / "k.txt", np.c_[2 * np.pi * m, law(m)])

@@ -17,7 +17,7 @@ from gfmd_cli.status import Status
 MAX_MISSES, PROGRESS_FACTOR = 5, 0.7
 """One or two misses occur when sigma has drifted. So many in a row, none of which reduces the true
 residual by this factor, mean that rounding is the limit."""
-ROUNDING_MARGIN = 3.0  # over the estimate of the rounding; the error was 0.4 to 1.6 times it
+ROUNDING_MARGIN = 3.0  # over the estimate of the rounding; the error was 0.4 to 1.8 times it
 
 
 @dataclass(kw_only=True)
