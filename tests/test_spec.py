@@ -444,3 +444,10 @@ def test_a_spec_in_another_encoding_says_how_to_save_it(tmp_path, encoding):
     path.write_text("# 5 µm\n[study]\n", encoding=encoding)
     with pytest.raises(InputError, match=r"not UTF-8 text .*: save a spec as UTF-8"):
         read_spec(path)
+
+
+def test_a_large_scan_in_place_of_a_spec_is_told_from_it(tmp_path):
+    scan = tmp_path / "scan.csv"
+    scan.write_text(2**18 * "1.0,")
+    with pytest.raises(InputError, match=r"too long; .*`gfmd init SPEC --from .*scan\.csv`"):
+        read_spec(scan)

@@ -10,7 +10,7 @@ import numpy as np
 
 from gfmd_cli.analysis.selection import grouped
 from gfmd_cli.analysis.table import known
-from gfmd_cli.errors import InputError
+from gfmd_cli.errors import InputError, typed
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.physics import einstein_solid
 from gfmd_cli.physics.gap_theories import CoarseGrained, FittedWeight
@@ -232,7 +232,9 @@ def compare(path: Path, theory: Theory = "paper") -> Comparison:
     with open_study(path) as study:
         solved = solved_rows(study.rows)
         if not solved:
-            raise InputError(f"{path}: contains no result yet; run it first")
+            raise InputError(
+                f"{path}: contains no result yet; `gfmd status {typed(path)}` shows its tasks"
+            )
         by_scene = grouped(solved, lambda row: row["scene"])
         groups = grouped(solved, lambda row: (row["scene"], *solver_of(row)))
         curves = []

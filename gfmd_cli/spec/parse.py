@@ -48,7 +48,10 @@ def read_spec(path: Path, overrides: tuple[str, ...] = ()) -> tuple[Spec, str]:
             f"`gfmd analyze {typed(path)}` shows the results of a study"
         )
     if len(raw) > MAX_BYTES:
-        raise InputError(f"{path}: too long; a run spec has at most {MAX_BYTES} bytes")
+        raise InputError(
+            f"{path}: too long; a run spec has at most {MAX_BYTES} bytes; for a scan, "
+            f"`gfmd init SPEC --from {typed(path)}` writes a spec"
+        )
     try:
         text = raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:
