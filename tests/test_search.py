@@ -418,6 +418,18 @@ def test_a_search_stopped_again_and_again_ends_bit_for_bit(rows_of, steps, overr
         np.testing.assert_array_equal(broken[name], unbroken[name], name)
 
 
+def test_a_pressure_without_contact_is_no_side_of_a_jump():
+    """Any pressure has contact: where a solve finds none, rounding has taken it."""
+    search = a_search(1e-3, "contact_area", 1.0)
+    trials = 0
+    while (p := search.next()) is not None:
+        search.add(Trial(64, p, 0.2 if p > 1e-7 else 0.0, 0.0))
+        trials += 1
+    assert not search.succeeded
+    assert search.nearest.value == 0.2
+    assert trials < 10
+
+
 curves = given(
     power=st.floats(0.05, 6.0),
     first=st.floats(-12.0, 12.0),
@@ -449,7 +461,7 @@ def check_search(power, first, steps, quantity):
 
     def value(p):
         exact = 1 / (1 + 9 * p ** (-sign * power))
-        return math.floor(exact * steps) / steps if steps else exact
+        return max(math.floor(exact * steps), 1) / steps if steps else exact  # a point at least
 
     trials = 0
     while (p := search.next()) is not None:

@@ -49,10 +49,7 @@ MAX_STEP = log(8.0)  # of ln p, until the root is enclosed
 NEARBY = 0.95  # of a load, at which the theory gives the slope
 MIN_SLOPE = 1e-3  # of ln(value) over ln(p), from which a step is made
 ROUNDING = 1e-13  # width in ln p of the narrowest enclosure: 450 roundings of p
-RESOLVED = 1e-12
-"""p / k of the stiffest wave [h_std], below which rounding may decide on contact. The contact of
-a punch on 64^2 to 256^2 points has all its points down to 8e-13 (n = 0.5), 6e-15 (1) and 3e-15 (2),
-and loses some at a tenth of that."""
+RESOLVED = 1e-12  # p / k of the stiffest wave [h_std], below which none is tried; a choice
 SMOOTH = 0.01  # of the solver's tolerance in ln p: gaps and displacements have no steps
 AREA_RATIO = 0.5
 """Shift of ln p at one contact area from a grid to the next, over that before: the error of the
@@ -340,7 +337,13 @@ class _Search:
         """Nearest to the root first; on a plateau (full contact) the innermost."""
 
     def add(self, trial: Trial) -> None:
-        """Take a trial into account."""
+        """Take a trial into account.
+
+        Where a pressure has no contact, rounding has taken it: lower ones are not tried.
+        """
+        if self.points and self.quantum > 0 and trial.value == 0:
+            self.lowest = max(self.lowest, trial.pressure / self.scene.delta_sigma)
+            return
         excess = log(trial.value / self.task.load) if trial.value > 0 else -inf
         self.points.append(_Point(log(trial.pressure), self.sign * excess, trial))
         self.points.sort(key=lambda at: (self._deviation(at), at.x if at.y > 0 else -at.x))
