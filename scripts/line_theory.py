@@ -28,7 +28,7 @@ def profile(seed: int, rolloff: int, highest: int) -> np.ndarray:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seeds", type=int, default=20)
-    parser.add_argument("--points", type=int, default=16, help="per shortest wave")
+    parser.add_argument("--points", type=int, default=32, help="per shortest wave")
     arguments = parser.parse_args()
     warnings.simplefilter("ignore")
     print(f"| λr/λs, L/λr | n | {' | '.join(f'p* = {p:g}' for p in PRESSURES)} |")
