@@ -77,9 +77,10 @@ def test_the_measures_of_a_mirrored_map_are_those_of_its_cell(shape):
     rows = np.random.default_rng(4).normal(size=shape)
     for heights in (rows, np.cumsum(rows, axis=-1), np.round(rows), np.sign(rows) + 0.01 * rows):
         cell = np.pad(heights, [(0, points) for points in shape], mode="symmetric")
-        for measure in (_jumps, _ties, lambda h, m: _short_waves(np.atleast_2d(h), m)):
+        for measure in (_jumps, _ties, lambda h, at: _short_waves(np.atleast_2d(h), at)):
             if len(shape) == 2 or measure is _jumps:
-                assert measure(heights, True) == pytest.approx(measure(cell, False), abs=1e-12)
+                of_cell = measure(cell, "wrap")
+                assert measure(heights, "symmetric") == pytest.approx(of_cell, abs=1e-12)
 
 
 def test_contact_on_a_mesa_is_not_on_ripples(tmp_path):

@@ -5,15 +5,18 @@ map it overshoots: a plateau gets ripples, and contact then takes place on the r
 """
 
 from collections.abc import Callable
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
+from scipy.fft import dctn
 
 from gfmd_cli.grid.arrays import Field, Mask, row_blocks
 from gfmd_cli.grid.modes import multiplicity
 
 Interpolation = Literal["fourier", "monotone"]
 """How heights between the points of a map are obtained."""
+Beyond = Literal["wrap", "symmetric"]
+"""How heights go on beyond the border of a map: repeated, or mirrored; modes of `numpy.pad`."""
 
 MAX_SHORT_WAVES = 2e-3
 """Fraction of the squared slope in the shortest waves up to which a map is band-limited. Measured:
@@ -43,21 +46,20 @@ def suited_interpolation(heights: Field, *, mirrored: bool = False) -> Interpola
     plateaus only: a random surface sampled at two points per shortest wave has both properties.
     Both tests do not see a step along an axis of a rough map, so that jumps are counted as well.
     """
-    if _jumps(heights, mirrored) > MAX_JUMPS:  # a step along an axis has no waves in the corners
+    beyond: Beyond = "symmetric" if mirrored else "wrap"
+    if _jumps(heights, beyond) > MAX_JUMPS:  # a step along an axis has no waves in the corners
         return "monotone"
-    corners, borders = _short_waves(np.atleast_2d(heights), mirrored)  # a line has no corners
+    corners, borders = _short_waves(np.atleast_2d(heights), beyond)  # a line has no corners
     is_short = borders > MAX_SHORT_WAVES and (
-        heights.ndim == 1 or _ties(heights, mirrored) > MAX_TIES
+        heights.ndim == 1 or _ties(heights, beyond) > MAX_TIES
     )
     return "monotone" if is_short or corners > MAX_SHORT_WAVES else "fourier"
 
 
-def _short_waves(heights: Field, mirrored: bool) -> tuple[float, float]:
+def _short_waves(heights: Field, beyond: Beyond) -> tuple[float, float]:
     """Fractions of the squared slope in the corners and along the borders of the spectrum."""
     rows, columns = heights.shape
-    if mirrored:  # the modes of the mirrored map are those of the cosine transform, and a phase
-        from scipy.fft import dctn
-
+    if beyond == "symmetric":  # modes of the mirrored map: of the cosine transform, and a phase
         modes = dctn(heights - heights.mean())
         y, x = np.arange(rows)[:, None] / rows, np.arange(columns) / columns
         of_y, of_x = 1 + (y > 0), 1 + (x > 0)  # with the opposite waves
@@ -76,30 +78,28 @@ def _short_waves(heights: Field, mirrored: bool) -> tuple[float, float]:
     return float(sums[1]) / total, float(sums[2]) / total
 
 
-def _ties(heights: Field, mirrored: bool) -> float:
+def _ties(heights: Field, beyond: Beyond) -> float:
     """Fraction of the pairs of neighbours with the same height."""
-    mode: Any = "symmetric" if mirrored else "wrap"
-    before = (np.pad(lines, ((1, 0), (0, 0)), mode=mode)[:-1] for lines in (heights, heights.T))
+    before = (np.pad(lines, ((1, 0), (0, 0)), mode=beyond)[:-1] for lines in (heights, heights.T))
     pairs = zip((heights, heights.T), before, strict=True)
     return float(np.mean([np.mean(lines == others) for lines, others in pairs]))
 
 
-def _jumps(heights: Field, mirrored: bool) -> float:
+def _jumps(heights: Field, beyond: Beyond) -> float:
     """Fraction of the squared differences of neighbours in isolated jumps, on the worse axis.
 
     A jump is isolated where it is `ISOLATED_RATIO` times larger than the two differences before it
     and the two after it.
     """
     rows = np.atleast_2d(heights)
-    return max(_jumps_along(lines, mirrored) for lines in (rows, rows.T)[: heights.ndim])
+    return max(_jumps_along(lines, beyond) for lines in (rows, rows.T)[: heights.ndim])
 
 
-def _jumps_along(lines: Field, mirrored: bool) -> float:
+def _jumps_along(lines: Field, beyond: Beyond) -> float:
     """See `_jumps`; along the last axis."""
-    mode: Any = "symmetric" if mirrored else "wrap"
     total = isolated = 0.0
     for block in row_blocks(lines):
-        steps = np.abs(np.diff(np.pad(lines[block], ((0, 0), (3, 2)), mode=mode)))
+        steps = np.abs(np.diff(np.pad(lines[block], ((0, 0), (3, 2)), mode=beyond)))
         around = [steps[:, shift : shift + lines.shape[1]] for shift in (0, 1, 3, 4)]
         own = steps[:, 2:-2]
         jumps = own[own > ISOLATED_RATIO * np.maximum.reduce(around)]
