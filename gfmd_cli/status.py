@@ -64,6 +64,11 @@ class Status(ExplainedEnum):
                 "relative error needs fine grids: loosen accuracy.mean_gap, or solve this load on "
                 "a fixed grid"
             )
+        if self is Status.ROUNDING and row["residual"] >= 1:  # no tolerance is so large
+            text = (
+                f"residual {row['residual']:.1e}: the rounding of the stress exceeds the pressure; "
+                "give a larger one"
+            )
         if self is Status.MAX_STEPS and row["solver_kind"] != "auto":
             text += ', or use solver.kind = "auto"'
         return text

@@ -49,7 +49,9 @@ def test_a_study_does_not_differ_from_itself(output_of, study_of):
     assert all(pair.deviation("u_g") == (0.0, pytest.approx(nan, nan_ok=True))
                for pair in difference.pairs)  # fmt: skip
     assert not difference.exceeds(0)
-    assert "+0.00e+00" in output_of("diff", study_of(), study_of(), "--tolerance", 0)
+    text = output_of("diff", study_of(), study_of(), "--tolerance", 0)
+    assert "+0.00e+00" in text
+    assert "Largest (pairs: 4): a_r 0.0e+00, sigma_p 0.0e+00, u_g 0.0e+00." in text
 
 
 def test_other_grids_are_compared_and_the_keys_that_differ_are_told(output_of, study_of):
@@ -249,6 +251,16 @@ def test_json_holds_rows_and_keys(output_of, study_of):
     expected = (row["a_r_b"] - row["a_r_a"]) / max(row["a_r_a"], row["a_r_b"])
     assert row["a_r_relative"] == pytest.approx(expected)
     assert row["a_r_in_errors"] is None
+
+
+def test_the_largest_differences_come_first(output_of, study_of):
+    one, other = study_of(), study_of("grid.points=64")
+    rows = json.loads(output_of("diff", one, other, "--json"))["rows"]
+    largest = {
+        name: max(abs(row[f"{name}_relative"]) for row in rows) for name in ("a_r", "sigma_p", "u_g")
+    }
+    words = ", ".join(f"{name} {value:.1e}" for name, value in largest.items())
+    assert output_of("diff", one, other).splitlines()[1] == f"Largest (pairs: {len(rows)}): {words}."
 
 
 def test_values_that_are_missing_or_zero_do_not_agree_by_chance():

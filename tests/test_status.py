@@ -195,6 +195,12 @@ def test_every_status_is_explained_by_the_columns_of_a_row(status):
     assert status.explain(empty_row())
 
 
+@pytest.mark.parametrize(("residual", "advice"), [(1e-5, "solver.tolerance"), (5.0, "pressure")])
+def test_a_looser_tolerance_is_advised_only_where_one_can_help(residual, advice):
+    text = Status.ROUNDING.explain(empty_row() | {"residual": residual})
+    assert [word for word in ("solver.tolerance", "pressure") if word in text] == [advice]
+
+
 @pytest.mark.parametrize(("kind", "other"), [("auto", False), ("fire", True)])
 def test_another_solver_is_advised_only_to_those_who_chose_one(kind, other):
     text = Status.MAX_STEPS.explain(empty_row() | {"solver_kind": kind})

@@ -861,7 +861,7 @@ def test_a_profile_ends_at_its_last_known_heights(tmp_path):
     assert surface.measured_map()[0].size == 40
     assert surface.missing_count() == 1
     (warning,) = [each for each in surface.warnings("free") if "missing" in each]
-    assert warning.startswith("the first 3 and the last 7 heights of the profile are missing: only")
+    assert warning.startswith("heights of the profile are missing, 3 at the start and 7 at the end: only")
 
 
 @pytest.mark.parametrize("periodic", [True, False])
@@ -870,7 +870,7 @@ def test_filled_ends_of_an_array_give_a_warning(npy, periodic):
     heights = np.random.default_rng(8).normal(size=200)
     heights[-4:] = np.nan
     warnings = FileSurface(path=npy(heights), periodic=periodic).warnings()
-    ends = [each for each in warnings if "the last 4 heights of the profile" in each]
+    ends = [each for each in warnings if "heights of the profile are missing, 4 at the end" in each]
     assert len(ends) == (not periodic)
 
 

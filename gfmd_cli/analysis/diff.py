@@ -98,10 +98,17 @@ class Difference:
     paired: str = ""
     """By what rows of different surfaces or elastomers are paired; empty where contacts match."""
 
+    @property
+    def largest(self) -> dict[str, float]:
+        """The largest relative difference of each quantity; zero where nothing can be compared."""
+        differing = {
+            name: [abs(pair.deviation(name).relative) for pair in self.pairs] for name in QUANTITIES
+        }
+        return {name: max(filter(known, all_), default=0.0) for name, all_ in differing.items()}
+
     def exceeds(self, tolerance: float) -> bool:
         """Whether some relative difference is larger; also where nothing can be compared."""
-        differing = (abs(p.deviation(name).relative) for p in self.pairs for name in QUANTITIES)
-        return not self.pairs or any(value > tolerance for value in differing)
+        return not self.pairs or max(self.largest.values()) > tolerance
 
 
 def diff(one: Path, other: Path) -> Difference:
@@ -190,7 +197,10 @@ def diff_table(difference: Difference) -> Table:
     pairs = difference.pairs
     titles = with_solvers(map(_title, pairs), [pair.one for pair in pairs])
     groups = groups_of(zip(titles, (pair.record for pair in pairs), strict=True))
-    caption = f"{difference.paired}. {LEGEND}" if difference.paired else LEGEND
+    largest = ", ".join(f"{name} {value:.1e}" for name, value in difference.largest.items())
+    caption = f"{LEGEND} Largest (pairs: {len(pairs)}): {largest}."
+    if difference.paired:
+        caption = f"{difference.paired}. {caption}"
     return Table(caption, DIFFERENCES, groups)
 
 

@@ -235,8 +235,8 @@ def _checked(data: HeightMap, region: Region | None, flip: bool, crop: bool) -> 
 
 def ends_without_heights(first: int, last: int) -> str:
     """The numbers of missing heights at both ends of a profile, in words."""
-    ends = (f"the {end} {number}" for end, number in (("first", first), ("last", last)) if number)
-    return f"{' and '.join(ends)} heights of the profile are missing"
+    ends = (f"{number} at the {end}" for end, number in (("start", first), ("end", last)) if number)
+    return f"heights of the profile are missing, {' and '.join(ends)}"
 
 
 def _spacing(data: HeightMap, shape: tuple[int, ...]) -> tuple[float, ...] | None:
