@@ -256,11 +256,11 @@ def test_json_holds_rows_and_keys(output_of, study_of):
 def test_the_largest_differences_come_first(output_of, study_of):
     one, other = study_of(), study_of("grid.points=64")
     rows = json.loads(output_of("diff", one, other, "--json"))["rows"]
-    largest = {
-        name: max(abs(row[f"{name}_relative"]) for row in rows) for name in ("a_r", "sigma_p", "u_g")
-    }
+    names = "a_r", "sigma_p", "u_g"
+    largest = {name: max(abs(row[f"{name}_relative"]) for row in rows) for name in names}
     words = ", ".join(f"{name} {value:.1e}" for name, value in largest.items())
-    assert output_of("diff", one, other).splitlines()[1] == f"Largest (pairs: {len(rows)}): {words}."
+    line = output_of("diff", one, other).splitlines()[1]
+    assert line == f"Largest (pairs: {len(rows)}): {words}."
 
 
 def test_values_that_are_missing_or_zero_do_not_agree_by_chance():

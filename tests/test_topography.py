@@ -861,7 +861,8 @@ def test_a_profile_ends_at_its_last_known_heights(tmp_path):
     assert surface.measured_map()[0].size == 40
     assert surface.missing_count() == 1
     (warning,) = [each for each in surface.warnings("free") if "missing" in each]
-    assert warning.startswith("heights of the profile are missing, 3 at the start and 7 at the end: only")
+    expected = "heights of the profile are missing, 3 at the start and 7 at the end: only"
+    assert warning.startswith(expected)
 
 
 @pytest.mark.parametrize("periodic", [True, False])
