@@ -192,7 +192,7 @@ def test_a_solve_stopped_on_a_coarse_grid_goes_on_bit_by_bit():
     assert (256, 256) not in [shape for shape, _ in states]  # a direct solve ends it
     for chosen in (1, len(states) // 2, len(states) - 1):
         shape, state = states[chosen]
-        rest = solve_contact(contact, ProjectedCG(tolerance=1e-6), start=Resume(shape, state))
+        rest = solve_contact(contact, ProjectedCG(tolerance=1e-6), resume=Resume(shape, state))
         assert np.array_equal(rest.u, straight.u)
         assert np.array_equal(rest.sigma, straight.sigma)
 

@@ -192,7 +192,7 @@ def test_resumed_solve_is_bit_identical(stop_at):
             saved.append(copy.deepcopy(state))
 
     straight = solve_contact(contact, solver, watch)
-    resumed = solve_contact(contact, solver, start=Resume((128, 128), saved[0]))
+    resumed = solve_contact(contact, solver, resume=Resume((128, 128), saved[0]))
     assert np.array_equal(resumed.sigma, straight.sigma)
     assert np.array_equal(resumed.u, straight.u)
     assert resumed.transforms == straight.transforms

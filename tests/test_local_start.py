@@ -349,7 +349,7 @@ def test_a_solve_stopped_on_a_coarse_grid_goes_on_bit_by_bit(boundary):
     for chosen in (coarse[1], coarse[len(coarse) // 2], coarse[-1], len(states) - 1):
         shape, state = states[chosen]
         resumed = solve_contact(
-            contact, KINDS[boundary](tolerance=1e-6), start=Resume(shape, state)
+            contact, KINDS[boundary](tolerance=1e-6), resume=Resume(shape, state)
         )
         assert np.array_equal(resumed.u, straight.u)
         assert np.array_equal(resumed.sigma, straight.sigma)

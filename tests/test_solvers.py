@@ -676,7 +676,7 @@ def test_any_start_ends_in_the_same_solution():
         u = contact.grid.empty()
         u[...] = start
         state = ProjectedCG().begin(contact, u)
-        resumed = solve_contact(contact, Auto(tolerance=1e-10), start=Resume((128, 128), state))
+        resumed = solve_contact(contact, Auto(tolerance=1e-10), resume=Resume((128, 128), state))
         assert resumed.status == "converged"
         assert resumed.u == pytest.approx(expected.u, abs=1e-8)
 
@@ -715,7 +715,7 @@ def test_a_stopped_solve_goes_on_bit_by_bit(elastomer, tolerance):
     assert 0 < finest < len(states) - 1
     for chosen in {1, finest - 1, finest, finest + 1, (finest + len(states)) // 2, len(states) - 1}:
         shape, state = states[chosen]
-        resumed = solve_contact(contact, solver, start=Resume(shape, copy.deepcopy(state)))
+        resumed = solve_contact(contact, solver, resume=Resume(shape, copy.deepcopy(state)))
         assert np.array_equal(resumed.u, straight.u)
         assert np.array_equal(resumed.sigma, straight.sigma)
         assert (resumed.steps, resumed.residual) == (straight.steps, straight.residual)

@@ -50,7 +50,7 @@ class Resume:
 
 
 def solve_contact(
-    contact: Contact, solver: Solver, watch: Watch = ignore, start: Resume | Start | None = None
+    contact: Contact, solver: Solver, watch: Watch = ignore, resume: Resume | None = None
 ) -> Solution:
     """Solve one contact, nested over grids.
 
@@ -62,25 +62,25 @@ def solve_contact(
     ----------
     watch : is called with every state on every grid, and with the last state of the coarse grid at
         every step of a start on tiles and for every set of points of a direct one
-    start : the state of an unfinished solve, or a start on the grid of the contact; without it the
-        solve starts on the coarsest grid
+    resume : the state of an unfinished solve; without it the solve starts on the coarsest grid
     """
     solver = solver.for_contact(contact)
     loose = solver.model_copy(update={"tolerance": max(solver.tolerance, COARSE_TOLERANCE)})
-    grids = _grids(contact, solver, start)
+    grids = _grids(contact, solver, resume)
     transforms = 0.0  # of the size of the finest grid
     can_touch_everywhere = contact.is_periodic and contact.may_touch is None
-    if solver.iterative and can_touch_everywhere and not isinstance(start, Resume):
+    if solver.iterative and can_touch_everywhere and resume is None:
         full, transforms = _full_contact(grids[::-1], solver)
         if full is not None:
             return full
     coarse: Contact | None = None
     state: State | None = None
+    start: Start | None = None
     while grids:
         fine = grids.pop()
-        if isinstance(start, Resume):
-            state = _resumed(fine, start, solver.tolerance)
-            transforms, start = state.coarser_transforms, None
+        if resume is not None:
+            state = _resumed(fine, resume, solver.tolerance)
+            transforms, resume = state.coarser_transforms, None
         else:
             state = _begin(solver, fine, coarse, state, start)
             coarse = start = None  # frees their memory, which is needed now
@@ -159,16 +159,15 @@ def grids_of(solver: Solver, grid: Grid) -> list[Shape]:
     return levels(grid.whole_shape, grid.sides) if nested else [grid.whole_shape]
 
 
-def _grids(contact: Contact, solver: Solver, start: Resume | Start | None) -> list[Contact]:
+def _grids(contact: Contact, solver: Solver, resume: Resume | None) -> list[Contact]:
     """The contact on all grids that are to be solved, the finest first.
 
     Where a small contact will be solved on tiles, heights at every other point of a grid predict
     the contact as well as filtered ones (docs/solvers.md), and need no transform.
     """
-    starts_here = isinstance(start, Start)
-    chain = [contact.grid.whole_shape] if starts_here else grids_of(solver, contact.grid)
-    if isinstance(start, Resume):
-        chain = chain[chain.index(start.shape) :]
+    chain = grids_of(solver, contact.grid)
+    if resume is not None:
+        chain = chain[chain.index(resume.shape) :]
     contacts = [contact]
     is_sampled = solver.starts_locally and tiles_apply(contact)
     for shape in chain[-2::-1]:

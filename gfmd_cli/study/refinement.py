@@ -25,8 +25,7 @@ from gfmd_cli.physics.observables import (
     contact_pressure,
     observe,
 )
-from gfmd_cli.solvers.loop import Start
-from gfmd_cli.solvers.nested_grids import Resume, Solution, solve_contact
+from gfmd_cli.solvers.nested_grids import Solution, solve_contact
 from gfmd_cli.status import Status
 from gfmd_cli.study.context import SolveContext, Watcher, WorkerOptions
 from gfmd_cli.study.forecast import MIN_FIRST_POINTS
@@ -118,12 +117,8 @@ def solve_on_grids(task: Task, context: SolveContext, watcher: Watcher) -> TaskS
     for points in sizes[len(grids) :]:
         scene = task_scene(task, points, context)
         contact = scene.contact(task.p_star(scene.delta_sigma))
-        start: Resume | Start | None = watcher.saved_state(contact)
-        if start is None and solved is not None and task.boundary == "periodic":
-            start = Start(contact, 0.0, _interpolate(solved, scene))  # free: a stress, not u
         solved = None  # frees its memory, which is needed now
-        solved = _solve_on_grid(task, scene, contact, watcher, start)
-        start = None
+        solved = _solve_on_grid(task, scene, contact, watcher)
         grids.append(_solved_grid(solved))
         if task.accuracy is not None and (task.auto or points == sizes[-1]):
             solution = solved.solution
@@ -141,15 +136,13 @@ def solve_on_grids(task: Task, context: SolveContext, watcher: Watcher) -> TaskS
     return solved
 
 
-def _solve_on_grid(
-    task: Task,
-    scene: Scene,
-    contact: Contact,
-    watcher: Watcher,
-    start: Resume | Start | None,
-) -> TaskSolution:
-    """Solve a contact; its stress and residual are measured on the displacement that is stored."""
-    solution = solve_contact(contact, task.solver, watcher, start)
+def _solve_on_grid(task: Task, scene: Scene, contact: Contact, watcher: Watcher) -> TaskSolution:
+    """Solve a contact; its stress and residual are measured on the displacement that is stored.
+
+    The solve does not start from the solution on the grid before: interpolated, that would lead to
+    neither tiles nor direct solutions, which make small contacts fast.
+    """
+    solution = solve_contact(contact, task.solver, watcher, watcher.saved_state(contact))
     solution.residual = contact.recompute(solution.u, solution.sigma)
     if solution.status.is_converged and not solution.residual < task.solver.tolerance:
         solution.status = Status.ROUNDING
@@ -216,15 +209,6 @@ def inaccurate_columns(task: Task, solved: TaskSolution) -> list[str]:
         if not solved.estimates[name].continuum_error + solved.algebraic(name)
         <= share * abs(solved.estimates[name].continuum)
     ]
-
-
-def _interpolate(solved: TaskSolution, scene: Scene) -> Field:
-    """The displacement on a coarser grid, on the grid and in the units of a finer scene."""
-    coarse = solved.scene
-    u = coarse.grid.resample(solved.solution.u, scene.grid)
-    u *= coarse.h_std / scene.h_std
-    u += (coarse.mean_height - scene.mean_height) / scene.h_std
-    return u
 
 
 def _solved_grid(solved: TaskSolution) -> SolvedGrid:
