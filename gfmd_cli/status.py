@@ -66,8 +66,8 @@ class Status(ExplainedEnum):
             )
         if self is Status.ROUNDING and row["residual"] >= 1:  # no tolerance is so large
             text = (
-                f"residual {row['residual']:.1e}: the rounding of the stress exceeds the pressure; "
-                "give a larger one"
+                f"residual {row['residual']:.1e}: the rounding of the stress exceeds the pressure "
+                "or, if that is less, Delta_sigma; give a larger pressure or fewer points"
             )
         if self is Status.MAX_STEPS and row["solver_kind"] != "auto":
             text += ', or use solver.kind = "auto"'

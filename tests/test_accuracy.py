@@ -189,6 +189,19 @@ def test_a_turned_map_has_the_error_bars_of_the_map(boundary):
     assert [other[name] for name in names] == pytest.approx([one[name] for name in names], rel=1e-6)
 
 
+def test_the_finest_grid_of_a_small_contact_is_solved_on_tiles():
+    """As without [accuracy]: both grids take as many transforms as two solves of their own."""
+
+    def transforms(points, **tables):
+        surface = {"kind": "self-affine", "cutoff": 0.05}
+        half_space = {"kind": "power", "n": 1}
+        spec = {"surface": surface, "elastomer": half_space, "grid": {"points": points}}
+        return solve(spec | {"load": {"p_star": 0.003}} | tables).columns["transforms"]
+
+    expected = transforms(512) + transforms(256) / 4
+    assert transforms(512, accuracy={"mean_gap": 0.1}) == pytest.approx(expected)
+
+
 def test_pressures_share_the_scene_of_the_finest_grid(rows_of, monkeypatch):
     """That of the coarser grid is built anew: both would take more memory than predicted."""
     built = []

@@ -51,7 +51,7 @@ def test_a_study_does_not_differ_from_itself(output_of, study_of):
     assert not difference.exceeds(0)
     text = output_of("diff", study_of(), study_of(), "--tolerance", 0)
     assert "+0.00e+00" in text
-    assert "Largest (pairs: 4): a_r 0.0e+00, sigma_p 0.0e+00, u_g 0.0e+00." in text
+    assert "Largest of 4 pairs: a_r 0.0e+00, sigma_p 0.0e+00, u_g 0.0e+00." in text
 
 
 def test_other_grids_are_compared_and_the_keys_that_differ_are_told(output_of, study_of):
@@ -260,7 +260,7 @@ def test_the_largest_differences_come_first(output_of, study_of):
     largest = {name: max(abs(row[f"{name}_relative"]) for row in rows) for name in names}
     words = ", ".join(f"{name} {value:.1e}" for name, value in largest.items())
     line = output_of("diff", one, other).splitlines()[1]
-    assert line == f"Largest (pairs: {len(rows)}): {words}."
+    assert line == f"Largest of {len(rows)} pairs: {words}."
 
 
 def test_values_that_are_missing_or_zero_do_not_agree_by_chance():

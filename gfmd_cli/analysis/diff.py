@@ -17,6 +17,7 @@ from gfmd_cli.spec.differences import differences
 from gfmd_cli.spec.models import LOADS, load_text
 from gfmd_cli.study.column import Row
 from gfmd_cli.study.reading import open_study, solved_rows, tell_files_apart
+from gfmd_cli.units import count
 
 SURFACE = ("surface", "surface_sha256", "seed")
 """Columns of a surface: two files may have the same name."""
@@ -104,7 +105,7 @@ class Difference:
         differing = {
             name: [abs(pair.deviation(name).relative) for pair in self.pairs] for name in QUANTITIES
         }
-        return {name: max(filter(known, all_), default=0.0) for name, all_ in differing.items()}
+        return {name: max(filter(known, values), default=0.0) for name, values in differing.items()}
 
     def exceeds(self, tolerance: float) -> bool:
         """Whether some relative difference is larger; also where nothing can be compared."""
@@ -198,7 +199,7 @@ def diff_table(difference: Difference) -> Table:
     titles = with_solvers(map(_title, pairs), [pair.one for pair in pairs])
     groups = groups_of(zip(titles, (pair.record for pair in pairs), strict=True))
     largest = ", ".join(f"{name} {value:.1e}" for name, value in difference.largest.items())
-    caption = f"{LEGEND} Largest (pairs: {len(pairs)}): {largest}."
+    caption = f"{LEGEND} Largest of {count(len(pairs), 'pair')}: {largest}."
     if difference.paired:
         caption = f"{difference.paired}. {caption}"
     return Table(caption, DIFFERENCES, groups)

@@ -24,10 +24,10 @@ BASE_BYTES = 240e6
 MIN_FIRST_POINTS = 64  # along x, on the first grid of "auto"; such a solve costs nothing
 MAX_CONVERGENT_EXPONENT = {"a_r": MAX_AREA_EXPONENT, "u_g": 4.0, "sigma_p": MAX_STRESS_EXPONENT}
 """Exponents n up to which finer grids approach a continuum value."""
-SOLVES_PER_SEARCH, SOLVES_PER_ACCURATE_SEARCH = 3.5, 5.0
+SOLVES_PER_SEARCH, SOLVES_PER_ACCURATE_SEARCH = 3.5, 4.5
 """Solves that a search of the pressure takes, those on coarser grids included, without and with
 [accuracy]: then each trial has two grids, and two more contacts give the slopes. The means over the
-tables of `scripts/load_searches.py --points 256` and of the same with `--accuracy` are 3.4 and 4.9,
+tables of `scripts/load_searches.py --points 256` and of the same with `--accuracy` are 3.4 and 4.3,
 here to the nearest half; with finer grids they are smaller."""
 SECONDS_PER_PAIR = 1.7e-8
 """Per grid point and pair of transforms, with all work between two of them, on one thread."""

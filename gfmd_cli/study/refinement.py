@@ -115,9 +115,9 @@ def solve_on_grids(task: Task, context: SolveContext, watcher: Watcher) -> TaskS
         grids = watcher.notes.grids = []
     solved: TaskSolution | None = None
     for points in sizes[len(grids) :]:
+        solved = None  # frees its memory, which is needed now
         scene = task_scene(task, points, context)
         contact = scene.contact(task.p_star(scene.delta_sigma))
-        solved = None  # frees its memory, which is needed now
         solved = _solve_on_grid(task, scene, contact, watcher)
         grids.append(_solved_grid(solved))
         if task.accuracy is not None and (task.auto or points == sizes[-1]):
