@@ -25,7 +25,7 @@ from gfmd_cli.physics.discretisation_error import (
     roughness_scales,
 )
 from gfmd_cli.physics.elastomers import HalfSpace, Layer, Membrane, Power, Slab, Tabulated
-from gfmd_cli.physics.error_estimates import GridValues
+from gfmd_cli.physics.error_estimates import CONTINUUM_FACTOR, FLOOR, GridValues
 from gfmd_cli.physics.indenters import LineParabola, Parabola, Ridge, Wave
 from gfmd_cli.physics.observables import QUANTITIES, observe
 from gfmd_cli.physics.scenes import build_scene
@@ -399,12 +399,12 @@ def test_bars_of_line_contacts_hold(shape, n):
     assert np.mean(held["sigma_p"] or [1.0]) > 0.8
 
 
-def test_the_area_of_a_line_profile_has_a_wider_bar():
+def test_the_area_of_a_kinked_profile_is_extrapolated_from_the_change_alone():
     levels = sequence(1.0, grids=(64, 128), line=2.0)
-    few = RoughnessScales(waves=20.0, curvature=2e3, band_limited=False)
-    plane, line = (estimate(levels, 1.0, few, tip=Tip(2.0, d))["a_r"] for d in (2, 1))
-    assert line.continuum_error == pytest.approx(1.8 / 1.35 * plane.continuum_error)
-    assert line.error == plane.error
+    kinked = RoughnessScales(waves=20.0, curvature=2e3, band_limited=False)
+    plane, line = (estimate(levels, 1.0, kinked, tip=Tip(2.0, d))["a_r"] for d in (2, 1))
+    assert line.continuum == 2 * levels[-1].a_r - levels[-2].a_r
+    assert line.continuum_error > plane.continuum_error
 
 
 def test_no_contact_is_unknown():
@@ -460,7 +460,7 @@ def test_an_irregular_surface_on_two_grids_has_bars_of_its_own(rough):
         assert irregular[name].verdict == "regular"
         assert irregular[name].error > 0.8 * abs(change)
         assert irregular[name].continuum_error > calm[name].continuum_error
-    assert irregular["a_r"].continuum == pytest.approx(2 * levels[-1].a_r - levels[-2].a_r)
+    assert irregular["a_r"].continuum == pytest.approx(0.2, rel=1e-12)
 
 
 @pytest.mark.parametrize(("n", "known"), [(1.0, 3), (1.5, 2), (2.5, 2), (2.75, 1), (3.25, 0)])
@@ -477,7 +477,90 @@ def test_the_area_on_oblong_pixels_has_the_bars_of_an_irregular_surface():
         assert area["a_r"].verdict == verdict
         assert area["u_g"] == estimate(sequence(1.0, (64,)), 1.0, ROUGH)["u_g"]
     area = estimate(sequence(1.0), 1.0, rough)["a_r"]
-    assert area == estimate(sequence(1.0), 1.0, IRREGULAR[0])["a_r"]
+    kinked = replace(ROUGH, band_limited=False)
+    assert area == estimate(sequence(1.0), 1.0, kinked)["a_r"]
+
+
+@pytest.mark.parametrize("n", [0.0, 0.5, 1.0, 2.0])
+@pytest.mark.parametrize(
+    ("rough", "border"),
+    [
+        (replace(ROUGH, anisotropy=6.0), None),
+        (replace(ROUGH, independent_waves=8.0), None),
+        (ROUGH, 0.0),
+        (ROUGH, 0.2),
+    ],
+)
+def test_other_smooth_surfaces_have_the_excess_of_isotropic_ones(n, rough, border):
+    """From two grids: anisotropic ones, those of few waves, and with a free boundary."""
+    levels = [replace(level, border=border) for level in sequence(n)]
+    area, calm = estimate(levels, n, rough)["a_r"], estimate(sequence(n), n, ROUGH)["a_r"]
+    assert area.continuum == pytest.approx(0.2, rel=1e-12)
+    assert area.continuum_error > calm.continuum_error
+    assert isnan(estimate(levels[-1:], n, rough)["a_r"].error)
+    # the excess of straight edges along the rows: that of a line contact
+    xi = levels[-1].switches_per_point
+    assert area.continuum_error > 0.3 * (LINE_EXCESS - AREA_EXCESS) * n * xi
+
+
+@pytest.mark.parametrize(("n", "verdict"), [(2.0, "regular"), (2.25, "unknown")])
+def test_the_area_of_a_kinked_surface_is_unknown_where_no_bars_were_calibrated(n, verdict):
+    kinked = replace(ROUGH, band_limited=False)
+    assert estimate(sequence(n), n, kinked)["a_r"].verdict == verdict
+    assert estimate(sequence(n), n, IRREGULAR[0])["a_r"].verdict == "regular"
+
+
+@pytest.mark.parametrize("border", [None, 0.0])
+def test_steep_flat_tops_widen_the_error_of_the_stress(border):
+    """For n > 0.5: the stress at their edges still grows from grid to grid."""
+    flat, other = (replace(ROUGH, band_limited=False, plateau=share) for share in (0.3, 0.05))
+    for n, widens in ((0.5, False), (1.0, True)):
+        levels = [replace(level, border=border) for level in sequence(n)]
+        of_flat, of_other = (estimate(levels, n, each)["sigma_p"] for each in (flat, other))
+        assert (of_flat.error > 1.5 * of_other.error) is widens
+        assert of_flat.error >= of_other.error > 0
+    assert estimate(levels, n, flat)["u_g"] == estimate(levels, n, other)["u_g"]
+
+
+def test_ribbons_along_an_axis_have_bars_from_the_change_alone():
+    levels = sequence(1.0)
+    ribbed, calm = (
+        estimate(levels, 1.0, replace(ROUGH, anisotropy=ratio))["a_r"] for ratio in (9.0, 3.0)
+    )
+    assert ribbed.continuum == pytest.approx(2 * levels[-1].a_r - levels[-2].a_r)
+    assert ribbed.continuum_error > 2 * calm.continuum_error
+
+
+@pytest.mark.parametrize("boundary", ["periodic", "free"])
+@pytest.mark.parametrize("n", [0.5, 1.0, 1.75])
+def test_the_area_of_a_stretched_map_agrees_with_a_finer_grid(n, boundary, tmp_path):
+    draw = np.random.default_rng(5)
+    m = np.fft.fftfreq(32, 1 / 32)
+    radius = np.hypot(3 * m[:, None], m)
+    amplitude = np.where((radius > 0) & (radius < 12), (1 + radius**2) ** -0.9, 0.0)
+    np.save(
+        tmp_path / "map.npy",
+        1e-3 * np.fft.ifft2(np.fft.fft2(draw.normal(size=(32, 32))) * amplitude).real,
+    )
+    spec = {
+        "surface": {"kind": "file", "path": str(tmp_path / "map.npy"), "length": 1.0},
+        "elastomer": {"kind": "power", "n": n},
+        "grid": {"points": [128, 256, 512], "boundary": boundary},
+        "load": {"p_star": [0.05, 0.3]},
+        "accuracy": {"mean_gap": 0.1},
+    }
+    spec["surface"] |= {"periodic": boundary == "periodic", "interpolation": "fourier"}
+    run(spec, tmp_path / "study.h5")
+    by_load = {}
+    for row in sorted(rows(tmp_path / "study.h5"), key=lambda row: row["points"]):
+        by_load.setdefault(row["load_value"], []).append(row)
+    for coarse, fine, finest in by_load.values():
+        exact = 2 * finest["a_r"] - fine["a_r"]  # first order in the spacing, whatever the factor
+        assert abs(coarse["a_r_continuum"] - exact) <= coarse["a_r_continuum_error"]
+        assert abs(coarse["a_r"] - exact) <= coarse["a_r_error"]
+        # narrower than the smallest bar from the change between two grids alone
+        by_change = CONTINUUM_FACTOR * FLOOR["a_r"] * coarse["perimeter"] / 128
+        assert coarse["a_r_continuum_error"] < by_change
 
 
 def test_few_contact_patches_on_one_grid_are_unknown():

@@ -243,8 +243,8 @@ def _estimates(task: Task, solved: TaskSolution, grids: list[SolvedGrid]) -> dic
     resolution, length = scene.grid.resolution, scene.grid.length
     if discretisation_error.has_step(task.elastomer, resolution, length):
         return unknown()
-    has_scales = task.surface.rough and task.boundary == "periodic"
-    copies = scene.texture.copies if has_scales else 1
+    is_rough = task.surface.rough
+    copies = scene.texture.copies if is_rough and task.boundary == "periodic" else 1
     levels = [
         GridValues(
             grid.points * (resolution / scene.grid.points),
@@ -264,7 +264,7 @@ def _estimates(task: Task, solved: TaskSolution, grids: list[SolvedGrid]) -> dic
     return discretisation_error.estimate(
         levels,
         exponent,
-        scales_of(scene, task.surface.band_limited) if has_scales else None,
+        scales_of(scene, task.surface.band_limited) if is_rough else None,
         area_exponent,
         band_limited=task.surface.band_limited and not has_hidden_waves,
         stepped=task.surface.stepped,
