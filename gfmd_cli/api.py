@@ -170,6 +170,8 @@ def solve(spec: Path | str | Tables, *, heights: Any = None, threads: int = 1) -
         return _solve(spec, threads)
     if not isinstance(spec, Mapping):
         raise InputError("heights need a dictionary; a spec in a file has a surface")
+    if isinstance(heights, Path | str):
+        raise InputError("heights: an array is needed, not a path; name a file in surface.path")
     with TemporaryDirectory() as folder:
         path = Path(folder) / "heights.h5"
         keys = write_heights(path, heights)

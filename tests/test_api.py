@@ -58,6 +58,9 @@ def test_an_array_may_be_pressed():
     np.testing.assert_allclose(again.stress, alone.stress, atol=1e-5 * alone.delta_sigma)
     with pytest.raises(InputError, match="heights need a dictionary"):
         solve("a.toml", heights=alone.height)
+    for path in ("a.npy", Path("a.npy")):
+        with pytest.raises(InputError, match=r"needed, not a path; name a file in surface\.path"):
+            solve(tables, heights=path)
 
 
 def test_files_that_have_changed_are_read_again(tmp_path):

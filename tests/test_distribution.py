@@ -276,6 +276,12 @@ def test_seeds_are_averaged_with_their_spread(study):
     plot.figure.draw_without_rendering()
 
 
+def test_the_figure_in_the_continuum_shows_all_curves(study):
+    exponents = [0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.2, 1.3]
+    path = study(f"elastomer.n={exponents}")
+    assert len(continuum_figure(compare(path)).curves) == 9
+
+
 def test_line_scenes_and_slabs_are_taken(study):
     path = study('surface={kind="wave"}', "elastomer={kind='slab', thickness=0.1}")
     (stresses,) = distributions(compare(path))

@@ -417,9 +417,11 @@ def test_the_legend_of_very_many_curves_names_a_few_of_them(study):
     assert [entry["name"] for entry in interactive(plot)["legend"]] == [*plot.entries]
 
 
-def test_curves_that_share_a_style_say_what_differs(study):
+def test_curves_of_a_long_sweep_of_two_parameters_differ_in_colour_and_label(study):
     curves = hurst_sweep(study, np.linspace(0.1, 0.9, 21)).curves
     rows = [curve.rows[0] | {"cutoff": 0.1 + 0.001 * i} for i, curve in enumerate(curves)]
     both = [replace(curve, rows=[row]) for curve, row in zip(curves, rows, strict=True)]
-    (label,) = {style.label for style in curve_styles(both)}
-    assert label == "n = 1, several hurst, cutoff"
+    styles = curve_styles(both)
+    assert [style.colour for style in styles] == colours(21)
+    assert styles[0].label == "hurst=0.1 cutoff=0.1"
+    assert len({style.label for style in styles}) == 21

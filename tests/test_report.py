@@ -436,6 +436,24 @@ def test_the_cross_section_passes_through_the_row_with_most_load(study):
     assert profile.position[1] == pytest.approx(row["length"] / loads.size)
 
 
+def test_at_a_free_border_the_cross_section_avoids_rows_near_it(invoke, tmp_path):
+    """A summit at the border carries most load; at the lower load it alone touches."""
+    y, x = np.mgrid[:32, :32] / 32
+    at_border, inside = (np.hypot(x - 0.5, y - summit) for summit in (0.0, 0.6))
+    heights = np.maximum(0.6 - 8 * at_border, 0.3 - inside)
+    np.save(tmp_path / "scan.npy", 1e-6 * np.maximum(heights, 0.0))
+    text = ONE.replace('"self-affine"\ncutoff = 0.1', '"file"\npath = "scan.npy"\nlevel = "none"')
+    text = text.replace("[elastomer]", "length = 1e-4\nperiodic = false\n[elastomer]")
+    study = solved(invoke, tmp_path, text.replace("p_star = 0.3", "p_star = [1e-3, 1.0]"))
+    with open_study(study) as file:
+        alone, both = (read_profile(file, row) for row in read_rows(study))
+        loads = np.maximum(file.arrays("fields", 1)["sigma"], 0.0).sum(axis=1)
+    assert loads.argmax() == 0
+    assert loads[19] > 0
+    assert "away from the borders that carries most load (y = 0.59 of" in both.place
+    assert "the row that carries most load (y = 0.00 of" in alone.place
+
+
 def test_alternative_texts_name_curves_and_contacts(whole):
     """Pictures of two contacts, and figures of two quantities, differ in their texts."""
     labels = [drawing["aria-label"] for drawing in Page(whole).all("svg")]

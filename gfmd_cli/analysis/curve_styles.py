@@ -104,19 +104,18 @@ def curve_styles(curves: list[Curve]) -> list[CurveStyle]:
     """Colours along the ordered curves, one per elastomer; markers tell variants apart.
 
     Curves of one elastomer have a colour each. Curves that differ in their seed only have the same
-    style, and so have more than MAX_STYLES curves of one elastomer. If there is no other elastomer
-    and they differ in one parameter, each of its values has a colour instead, in their order.
+    style, and so have more than MAX_STYLES curves of one elastomer among others. If there is no
+    other elastomer, each of them has a colour instead, in their order.
     """
     names = _elastomer_names(curves)
     alike = grouped(curves, lambda curve: curve.elastomer)
     keys = {elastomer: _differing(group) for elastomer, group in alike.items()}
     pairs = [(c.elastomer, _joined(map(_words(c).get, keys[c.elastomer]), " ")) for c in curves]
     count = len(set(pairs))
-    is_sweep = len(alike) == 1 and len(keys[curves[0].elastomer]) == 1
     heading = ""
-    if is_sweep and count > MAX_STYLES:
+    if len(alike) == 1 and count > MAX_STYLES:
         (heading,) = distinct_labels([*names.values()])
-        names = dict.fromkeys(names, "")  # labels of one parameter fit into several columns
+        names = dict.fromkeys(names, "")  # labels of the parameters alone fit into several columns
     elif count > MAX_STYLES:
         pairs = [(curve.elastomer, _merged(curve, alike[curve.elastomer])) for curve in curves]
     distinct = list(dict.fromkeys(pairs))

@@ -8,7 +8,6 @@ import numpy as np
 
 from gfmd_cli.analysis.compare import Comparison
 from gfmd_cli.analysis.curve_styles import (
-    MAX_STYLES,
     CurveStyle,
     StyledCurve,
     colours,
@@ -206,7 +205,7 @@ def _chosen(stresses: list[StressDistribution]) -> list[StressDistribution]:
     """One distribution of each elastomer on each surface, at about one pressure."""
     ordered = sorted(stresses, key=lambda each: order(each.curve))
     by_title = list(grouped(ordered, lambda each: each.title).values())
-    return at_one_pressure(by_title, lambda each: (each.finest["p_star"], each.a_r))[:MAX_STYLES]
+    return at_one_pressure(by_title, lambda each: (each.finest["p_star"], each.a_r))
 
 
 def _draw(

@@ -28,6 +28,7 @@ from gfmd_cli.units import scaled
 MAX_CONTACTS, MAX_CURVES = 12, 3  # contacts that are shown, of at most so many curves
 SIDE = 256  # pixels of a map at the most
 MIN_FIGURE_ASPECT, MAX_FIGURE_ASPECT = 0.35, 1.2  # height over width, for oblong cells; choices
+BORDER = 0.1  # of the side; a cross-section at a free boundary avoids it; a choice
 NOISE = 1e-3  # of the nominal pressure; where contact is not known, less stress is none
 TOUCHING = "#0077bb"
 COLOURS, FAINTEST = "viridis", 0.3
@@ -221,8 +222,8 @@ class Profile:
 def read_profile(study: StudyFile, row: Row) -> Profile | None:
     """The cross-section of a contact; a line contact may have stored it as its fields.
 
-    Where the fields of a cell are stored, the row of the grid that carries most load; the diagonal,
-    which can miss all contacts, only where that alone is stored.
+    Where the fields of a cell are stored, the row of `_most_loaded`; the diagonal, which can miss
+    all contacts, only where that alone is stored.
     """
     line = not plane(row)
     if not line and (profile := _most_loaded(study, row)):
@@ -240,20 +241,29 @@ def read_profile(study: StudyFile, row: Row) -> Profile | None:
 
 
 def _most_loaded(study: StudyFile, row: Row) -> Profile | None:
-    """The row of the grid that carries most load; None where not all fields are stored."""
+    """The row of the grid that carries most load; None where not all fields are stored.
+
+    At a free boundary, where stress is concentrated, a row near it only where no other touches.
+    """
     loads, values = np.empty(0), {}
+    border = int(BORDER * row["points_y"]) if row["boundary"] == "free" else 0
     for block in study.blocks("fields", row["task"], ROWS, (*LINES, "sigma")):
         if len(block) <= len(LINES):
             return None
         of_block = np.nan_to_num(np.maximum(block["sigma"], 0.0)).sum(axis=1)
+        y = loads.size + np.arange(of_block.size)
+        of_block[np.minimum(y, row["points_y"] - 1 - y) < border] *= NOISE
         if of_block.max() > loads.max(initial=-1.0):
             values = {name: data[np.argmax(of_block)].copy() for name, data in block.items()}
         loads = np.append(loads, of_block)
     if not values:
         return None
-    y, size = int(np.argmax(loads)), values["sigma"].size
+    top, size = int(np.argmax(loads)), values["sigma"].size
     position = (np.arange(size) / size + row["x_first"]) * float(row["length"])
-    place = f" through the row that carries most load (y = {y / loads.size:.2f} of the side)"
+    inside = " away from the borders" if 0 < border <= top < loads.size - border else ""
+    place = (
+        f" through the row{inside} that carries most load (y = {top / loads.size:.2f} of the side)"
+    )
     return Profile(values, position, "x", row, place)
 
 
