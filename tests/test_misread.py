@@ -35,6 +35,12 @@ def _reversed(heights):
     return heights
 
 
+def _displaced(heights, by):
+    heights = heights.copy()
+    heights[1::2] = np.roll(heights[1::2], by, axis=1)
+    return heights
+
+
 def _reshaped(heights, points):
     """The map as it is read with another number of points per line."""
     rows = heights.size // points
@@ -46,6 +52,8 @@ DAMAGES = [
     (lambda h: np.round(h / h.std() * 20).astype(np.int16).astype(np.uint16), "wrapped around"),
     (_reversed, "lines along x fit the next line better in reverse"),
     (lambda h: _reversed(h.T), "lines along x fit the next line better in reverse"),
+    (lambda h: _displaced(h, 1), "every second line along x is displaced"),
+    (lambda h: _displaced(h, -1), "every second line along x is displaced"),
     (lambda h: np.concatenate([h[::2], h[1::2]]), "lines 64 to 127 along x fit between"),
     (lambda h: np.concatenate([h[1::2], h[::2]]), "lines 64 to 127 along x fit between"),
     (lambda h: _reshaped(h, POINTS + 17), "with 144 instead of 145 points per line"),
