@@ -156,6 +156,30 @@ def test_filled_lines_give_one_warning(tmp_path, value):
     assert found == [warning]
 
 
+@pytest.mark.parametrize("hurst", [0.3, 0.9])
+@pytest.mark.parametrize(("where", "number"), [(slice(1), 0), (slice(-3, None), 125)])
+def test_filled_lines_at_the_border(tmp_path, where, number, hurst):
+    heights = _scan(hurst)
+    for lines, along in ((heights, "x"), (heights.T, "y")):
+        for value in (heights.mean(), heights.max() + 1e-9):
+            damaged = lines.copy()
+            damaged[where][:] = value
+            np.save(tmp_path / "h.npy", damaged if along == "x" else damaged.T)
+            warning, _ = filled_lines(read_topography(tmp_path / "h.npy"))
+            first = number + len(lines) - POINTS if number else 0
+            assert f"along {along} of equal heights each, first line {first} with" in warning
+
+
+def test_a_frame_and_a_window_have_lines_of_one_height(tmp_path):
+    """Opposite borders with the same height, to which the map falls at once, or in ten points."""
+    heights = _scan(0.8)[:POINTS, :POINTS]
+    ramp = np.clip(np.arange(POINTS) / 10, 0, 1) * np.clip(np.arange(POINTS)[::-1] / 10, 0, 1)
+    weight = 0.5 - 0.5 * np.cos(np.pi * ramp)
+    for sound in (np.pad(heights, 1), heights * np.outer(weight, weight)):
+        np.save(tmp_path / "h.npy", sound)
+        assert not filled_lines(read_topography(tmp_path / "h.npy"))[0]
+
+
 @pytest.mark.parametrize(("damage", "words"), DAMAGES)
 def test_a_misread_map_has_no_other_warning_about_lines_or_points(tmp_path, damage, words):
     np.save(tmp_path / "h.npy", damage(_scan(0.8)))

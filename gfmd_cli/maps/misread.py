@@ -38,10 +38,10 @@ MAX_WRAP_GAP = 2.3  # median distance of a jump from the whole range over the sp
 
 
 def filled_lines(topography: Topography) -> tuple[str, Topography]:
-    """A warning of lines within a map that have one height each, and the map without them.
+    """A warning of lines of a map that have one height each, and the map without them.
 
     Lines of a surface that are even, such as those between mesas, have this height in common with
-    the next lines.
+    the next lines, and those of a frame with the opposite border.
     """
     heights = topography.with_gaps()
     filled = np.zeros(heights.shape, bool)
@@ -57,13 +57,16 @@ def filled_lines(topography: Topography) -> tuple[str, Topography]:
         own, following, last = (_after(lines, first, later) for later in range(3))
         usual = _median(following - (own + last) / 2)
         start, stop = np.flatnonzero(np.diff(is_even, prepend=False, append=False)).reshape(-1, 2).T
-        inside = (start > 0) & (stop < len(lines))
         is_filled = np.zeros(len(lines), bool)
-        for begin, end in zip(start[inside], stop[inside], strict=True):
-            height, around = lines[begin, 0], lines[[begin - 1, end]]
+        for begin, end in zip(start, stop, strict=True):
+            height, around = lines[begin, 0], lines[[begin - 1, end % len(lines)]]
+            distance = _median(height - around.mean(axis=0))  # at the border of a periodic map
+            if begin == 0 or end == len(lines):  # or where the next two lines do not lead to it
+                one, other = lines[[end, end + 1]] if begin == 0 else lines[[begin - 1, begin - 2]]
+                distance = min(distance, _median(one - (height + other) / 2))
             is_filled[begin:end] = (
                 np.ptp(lines[begin:end, 0]) == 0  # no tilt
-                and _median(height - around.mean(axis=0)) > MIN_FILLED * usual
+                and distance > MIN_FILLED * usual
                 and np.mean(around == height) < MAX_COMMON
             )
         numbers = np.flatnonzero(is_filled)
