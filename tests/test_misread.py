@@ -35,6 +35,12 @@ def _reversed(heights):
     return heights
 
 
+def _displaced(heights, by):
+    heights = heights.copy()
+    heights[1::2] = np.roll(heights[1::2], by, axis=1)
+    return heights
+
+
 def _reshaped(heights, points):
     """The map as it is read with another number of points per line."""
     rows = heights.size // points
@@ -46,6 +52,8 @@ DAMAGES = [
     (lambda h: np.round(h / h.std() * 20).astype(np.int16).astype(np.uint16), "wrapped around"),
     (_reversed, "lines along x fit the next line better in reverse"),
     (lambda h: _reversed(h.T), "lines along x fit the next line better in reverse"),
+    (lambda h: _displaced(h, 1), "every second line along x is displaced"),
+    (lambda h: _displaced(h, -1), "every second line along x is displaced"),
     (lambda h: np.concatenate([h[::2], h[1::2]]), "lines 64 to 127 along x fit between"),
     (lambda h: np.concatenate([h[1::2], h[::2]]), "lines 64 to 127 along x fit between"),
     (lambda h: _reshaped(h, POINTS + 17), "with 144 instead of 145 points per line"),
@@ -146,6 +154,30 @@ def test_filled_lines_give_one_warning(tmp_path, value):
     surface = FileSurface(path=tmp_path / "h.npy", length=1e-5, periodic=False)
     found = [each for each in surface.warnings() if "gradient" not in each]
     assert found == [warning]
+
+
+@pytest.mark.parametrize("hurst", [0.3, 0.9])
+@pytest.mark.parametrize(("where", "number"), [(slice(1), 0), (slice(-3, None), 125)])
+def test_filled_lines_at_the_border(tmp_path, where, number, hurst):
+    heights = _scan(hurst)
+    for lines, along in ((heights, "x"), (heights.T, "y")):
+        for value in (heights.mean(), heights.max() + 1e-9):
+            damaged = lines.copy()
+            damaged[where][:] = value
+            np.save(tmp_path / "h.npy", damaged if along == "x" else damaged.T)
+            warning, _ = filled_lines(read_topography(tmp_path / "h.npy"))
+            first = number + len(lines) - POINTS if number else 0
+            assert f"along {along} of equal heights each, first line {first} with" in warning
+
+
+def test_a_frame_and_a_window_have_lines_of_one_height(tmp_path):
+    """Opposite borders with the same height, to which the map falls at once, or in ten points."""
+    heights = _scan(0.8)[:POINTS, :POINTS]
+    ramp = np.clip(np.arange(POINTS) / 10, 0, 1) * np.clip(np.arange(POINTS)[::-1] / 10, 0, 1)
+    weight = 0.5 - 0.5 * np.cos(np.pi * ramp)
+    for sound in (np.pad(heights, 1), heights * np.outer(weight, weight)):
+        np.save(tmp_path / "h.npy", sound)
+        assert not filled_lines(read_topography(tmp_path / "h.npy"))[0]
 
 
 @pytest.mark.parametrize(("damage", "words"), DAMAGES)

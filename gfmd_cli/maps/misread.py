@@ -25,6 +25,7 @@ MAX_CONTINUED = 0.63  # step from the end of a line to the next beginning, over 
 MIN_BROKEN_LINES = 64  # fewer can seem to continue in each other by chance
 NARROW = 4  # least ratio of lines to points per line of a map with broken lines; a choice
 MIN_SEAM = 1.7  # median difference across the former border over that of neighbours in a line
+MAX_DISPLACED = 0.93  # difference to the next line, displaced by one point, over that without
 MAX_SHEARED = 0.97  # difference to the next line, shifted by one point, over that without a shift
 LEVELS = 256  # heights, evenly distributed over all, that show how different distant ones are
 TAIL = 20  # one of so many heights on either side is clipped, so that spikes matter little
@@ -37,10 +38,10 @@ MAX_WRAP_GAP = 2.3  # median distance of a jump from the whole range over the sp
 
 
 def filled_lines(topography: Topography) -> tuple[str, Topography]:
-    """A warning of lines within a map that have one height each, and the map without them.
+    """A warning of lines of a map that have one height each, and the map without them.
 
     Lines of a surface that are even, such as those between mesas, have this height in common with
-    the next lines.
+    the next lines, and those of a frame with the opposite border.
     """
     heights = topography.with_gaps()
     filled = np.zeros(heights.shape, bool)
@@ -56,13 +57,16 @@ def filled_lines(topography: Topography) -> tuple[str, Topography]:
         own, following, last = (_after(lines, first, later) for later in range(3))
         usual = _median(following - (own + last) / 2)
         start, stop = np.flatnonzero(np.diff(is_even, prepend=False, append=False)).reshape(-1, 2).T
-        inside = (start > 0) & (stop < len(lines))
         is_filled = np.zeros(len(lines), bool)
-        for begin, end in zip(start[inside], stop[inside], strict=True):
-            height, around = lines[begin, 0], lines[[begin - 1, end]]
+        for begin, end in zip(start, stop, strict=True):
+            height, around = lines[begin, 0], lines[[begin - 1, end % len(lines)]]
+            distance = _median(height - around.mean(axis=0))  # at the border of a periodic map
+            if begin == 0 or end == len(lines):  # or where the next two lines do not lead to it
+                one, other = lines[[end, end + 1]] if begin == 0 else lines[[begin - 1, begin - 2]]
+                distance = min(distance, _median(one - (height + other) / 2))
             is_filled[begin:end] = (
                 np.ptp(lines[begin:end, 0]) == 0  # no tilt
-                and _median(height - around.mean(axis=0)) > MIN_FILLED * usual
+                and distance > MIN_FILLED * usual
                 and np.mean(around == height) < MAX_COMMON
             )
         numbers = np.flatnonzero(is_filled)
@@ -89,7 +93,8 @@ def misread(topography: Topography) -> str:
         return warning
     warning = _noise(heights) or _wrapped(heights)
     for lines, along in ((heights, "x"), (heights.T, "y")):
-        warning = warning or _disordered(lines, along) or _sheared(lines, along)
+        warning = warning or _disordered(lines, along) or _displaced(lines, along)
+        warning = warning or _sheared(lines, along)
     return warning
 
 
@@ -200,6 +205,26 @@ def _disordered(lines: Field, along: str) -> str:
                 "interlaced image, all even lines and then all odd ones? Put the lines in order"
             )
     return ""
+
+
+def _displaced(lines: Field, along: str) -> str:
+    """Every second line displaced along itself, as where both directions of a scan are mixed.
+
+    The other lines then fit their next lines better displaced by one point in opposite directions.
+    """
+    first, points = _sample(len(lines)), lines.shape[1] - 2
+    own, following = lines[first, 1:-1], _after(lines, first, 1)
+    back, same, on = (following[:, shift : shift + points] - own for shift in range(3))
+    usual = _mean(same)
+    alternating = (np.vstack([one[::2], other[1::2]]) for one, other in ((back, on), (on, back)))
+    fitted = min(map(_mean, alternating))
+    if not fitted < MAX_DISPLACED * usual:
+        return ""
+    return (
+        f"every second line along {along} is displaced: displaced back by one point it fits the "
+        f"lines beside it with {fitted / usual:.0%} of the difference; are both directions of the "
+        "scan mixed? Align the lines, or use one direction"
+    )
 
 
 def _broken(heights: Field) -> str:
