@@ -1,13 +1,15 @@
-"""Offsets between the tiles of a stitched scan: how many sound and damaged maps give a warning.
+"""Stitched scans and displaced lines: how many sound and damaged maps give a warning.
 
     python scripts/seams_of_maps.py [--points 64 128 256] [--seeds 20]
 
-The surfaces are self-affine, plateau-honed, worn, turned, ground and noisy. Without an offset only
-the warning of seams counts, with one also the others about lines.
+The surfaces are self-affine, plateau-honed, worn, turned, ground and noisy. Maps are stitched of
+two tiles with an offset (without one only the warning of seams counts, with one also the others
+about lines), or every second line is displaced by some points (only the warning of this counts).
 """
 
 import argparse
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -19,6 +21,7 @@ from gfmd_cli.grid.arrays import Field
 OFFSETS = (0.5, 1.0, 2.0, 3.0, 4.0)  # over the rms difference of neighbours
 SEAM, ANY = ("as between tiles",), ("the lines along",)
 """Words of the warning that sound maps must not have, and of those about lines of stitched maps."""
+DISPLACED = ("every second line along",)
 
 
 def sound(points: int, random: np.random.Generator) -> Iterator[tuple[str, Field]]:
@@ -51,12 +54,26 @@ def sound(points: int, random: np.random.Generator) -> Iterator[tuple[str, Field
         yield "noisy", white(rough(hurst, (0.5,), (8,)), random.choice([0.5, 1, 3]), random)
 
 
-def stitched(heights: Field, offset: float, random: np.random.Generator) -> Field:
+def stitched(heights: Field, random: np.random.Generator, offset: float) -> Field:
     """A map of two tiles."""
     seam = random.integers(len(heights) // 4, 3 * len(heights) // 4)
     shifted = heights.copy()
     shifted[seam:] += offset * np.diff(heights, axis=0).std()
     return shifted
+
+
+def displaced(heights: Field, random: np.random.Generator, by: int) -> Field:
+    """A map of which every second line is displaced along itself."""
+    shifted = heights.copy()
+    shifted[1::2] = np.roll(heights[1::2], by, axis=1)
+    return shifted
+
+
+DAMAGES = [
+    (f"offset {offset}", partial(stitched, offset=offset), ANY if offset else SEAM)
+    for offset in (0.0, *OFFSETS)
+] + [(f"displaced by {by}", partial(displaced, by=by), DISPLACED) for by in (0, 1, 2)]
+"""Name, what makes a damaged map of a sound one, and the words of the warnings that count."""
 
 
 def main() -> None:
@@ -67,17 +84,16 @@ def main() -> None:
     arguments = parser.parse_args()
     with TemporaryDirectory() as folder:
         for points in arguments.points:
-            for offset in (0.0, *OFFSETS):
+            for damage, damaged, words in DAMAGES:
                 found: dict[str, list[bool]] = {}
                 for seed in range(arguments.seeds):
                     random = np.random.default_rng([points, seed])
                     for name, heights in sound(points, random):
-                        damaged = stitched(heights, offset, random)
-                        is_warned = warned(damaged, Path(folder), ANY if offset else SEAM)
+                        is_warned = warned(damaged(heights, random=random), Path(folder), words)
                         found.setdefault(name, []).append(is_warned)
                 kinds = ", ".join(f"{name} {np.mean(each):.1%}" for name, each in found.items())
                 every = np.concatenate(list(found.values()))
-                print(f"{points}^2, {offset}: {np.mean(every):.1%} of {len(every)}; {kinds}")
+                print(f"{points}^2, {damage}: {np.mean(every):.1%} of {len(every)}; {kinds}")
 
 
 if __name__ == "__main__":
