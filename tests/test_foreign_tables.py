@@ -441,6 +441,18 @@ def test_another_line_of_the_header_changes_no_side(saved, line):
         read_topography(saved(SIZED + line + "\n" + matrix(" ")))
 
 
+@pytest.mark.parametrize(
+    ("rows", "is_cut_off"), [(96, False), (70, True), (92, True), (48, False), (24, False)]
+)
+def test_a_table_with_fewer_rows_than_its_sides_may_be_cut_off(saved, rows, is_cut_off):
+    """A scan may have a half or a quarter of the lines."""
+    heights = np.random.default_rng(0).normal(size=(rows, 96))
+    sides = "# Width: 96 um\n# Height: 96 um\n# Value units: nm\n"
+    notes = read_topography(saved(sides + matrix(" ", heights=heights))).notes
+    expected = f"96 x {rows} heights make pixels of 1e-06 m x {96e-6 / rows:.3g} m: is the table"
+    assert [expected in note for note in notes] == [True] * is_cut_off
+
+
 def test_units_of_sides_that_are_not_read_give_a_warning(saved):
     header = "# Width [um]: 20\n# Height [um]: 12\n# Tip: 8 mm\n# Value units: nm\n"
     (note,) = read_topography(saved(header + matrix(" "))).notes

@@ -6,6 +6,7 @@ import warnings
 from codecs import BOM_UTF8
 from dataclasses import replace
 from io import BytesIO
+from math import log2
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -23,6 +24,7 @@ from gfmd_cli.maps.height_map import (
     HeightMap,
     at_equal_distances,
     check_layout,
+    extent,
     first_line,
     only_map,
 )
@@ -66,6 +68,7 @@ NOVA = re.compile(rb"^[ \t]*(Scale Data|Unit X|Unit Y)[ \t]*=[ \t]*(\S+)", re.MU
 """Header lines of Nova: two that the reader ignores, and "Unit X" to compare with."""
 MANY_VALUES = 8  # in a row, for which rounding may make the steps uneven; a choice
 MAX_UNEVENNESS = 0.25  # of rounded positions, over their distance; a choice
+MAX_OFF_SQUARE = 0.02  # octaves by which pixels differ from square or 2:1, 4:1, ...; a choice
 
 
 def read_microscope_file(path: Path, dataset: str | None) -> HeightMap:
@@ -211,6 +214,7 @@ def _read_channel(path: Path, file: BinaryIO, reader: Any, dataset: str | None) 
         note = text_tables.unread_units(lines, of_sides=has_unit)
     elif has_unit or metric_sides:
         _check_stated_sides(lines, sides)
+        note = _cut_off(heights.shape, sides) if kind == "asc" and len(shape) == 2 else ""
     return HeightMap(
         notes=(note,),
         heights=heights,
@@ -299,6 +303,21 @@ def _check_stated_sides(lines: list[bytes], sides: tuple[float, ...]) -> None:
             f"the header states two sides, {stated[0]:g} m and {stated[1]:g} m, but "
             f"another line makes them {sides[-1]:g} m and {sides[0]:g} m; remove that line"
         )
+
+
+def _cut_off(shape: tuple[int, ...], sides: tuple[float, ...]) -> str:
+    """A warning where a table has not as many lines as its stated sides have square pixels.
+
+    Scans with fewer lines than points per line have a half, a quarter, ... of them.
+    """
+    along_y, along_x = (side / points for side, points in zip(sides, shape, strict=True))
+    octaves = log2(along_y / along_x)
+    if abs(octaves - round(octaves)) < MAX_OFF_SQUARE:
+        return ""
+    return (
+        f"the sides in the header and {extent(shape)} heights make pixels of {along_x:.3g} m x "
+        f"{along_y:.3g} m: is the table cut off?"
+    )
 
 
 def _header(channel: Any) -> dict[str, Any]:
