@@ -548,7 +548,11 @@ def test_a_channel_of_a_signal_is_not_taken_as_the_heights():
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        (lambda h: np.where(np.arange(64) < 10, 0.0, h), "16% of the heights are exactly 0"),
+        (lambda h: np.where(np.arange(64) < 10, 0.0, h), "10 lines along y of equal heights each"),
+        (
+            lambda h: np.where(np.add.outer(np.arange(64), np.arange(64)) < 36, 0.0, h),
+            "16% of the heights are exactly 0",
+        ),
         (
             lambda h: h + 1e-6 * (np.arange(h.size).reshape(h.shape) % 137 == 70),
             "points lie above or below all neighbours",

@@ -167,6 +167,14 @@ def test_each_can_be_asked_for_alone(output_of, tmp_path, name):
     output_of("analyze", path)
 
 
+def assert_same(value, expected, name):
+    """Equal but for the rounding of other FFT plans, such as those that a busy machine chooses."""
+    if np.issubdtype(np.asarray(value).dtype, np.floating):
+        np.testing.assert_allclose(value, expected, rtol=1e-9, atol=1e-12, err_msg=name)
+    else:
+        np.testing.assert_array_equal(value, expected, err_msg=name)
+
+
 def test_what_was_collected_first_is_kept_when_more_is_added(output_of, tmp_path, study):
     """Rows, distributions and curves pass from the old study file to the new one."""
     spec, target = tmp_path / "spec.toml", tmp_path / "s.h5"
@@ -176,7 +184,7 @@ def test_what_was_collected_first_is_kept_when_more_is_added(output_of, tmp_path
         output_of("run", spec, "-o", target, "-q", "-j", "1", "--shard", shard, *options)
     for row, expected in zip(read_rows(target), read_rows(study), strict=True):
         for name in set(row) - {"seconds"}:
-            np.testing.assert_array_equal(row[name], expected[name], err_msg=name)
+            assert_same(row[name], expected[name], name)
     with open_study(target) as file, open_study(study) as whole:
         for group in TASK_GROUPS[2:]:
             for task in range(6):
@@ -184,7 +192,7 @@ def test_what_was_collected_first_is_kept_when_more_is_added(output_of, tmp_path
                 expected = whole.arrays(group.name, task)
                 assert list(arrays) == [column.name for column in group.columns]
                 for name, values in expected.items():
-                    np.testing.assert_array_equal(arrays[name], values)
+                    assert_same(arrays[name], values, name)
 
 
 def test_line_scenes_have_them_but_for_a_second_axis(output_of, tmp_path):
