@@ -40,8 +40,8 @@ MAX_WRAP_GAP = 2.3  # median distance of a jump from the whole range over the sp
 def filled_lines(topography: Topography) -> tuple[str, Topography]:
     """A warning of lines of a map that have one height each, and the map without them.
 
-    Lines of a surface that are even, such as those between mesas, have this height in common with
-    the next lines, and those of a frame with the opposite border.
+    Lines of a surface that are even, such as those between mesas, share this height with the next
+    lines; lines of a frame share it with the opposite border.
     """
     heights = topography.with_gaps()
     filled = np.zeros(heights.shape, bool)
@@ -221,9 +221,9 @@ def _displaced(lines: Field, along: str) -> str:
     if not fitted < MAX_DISPLACED * usual:
         return ""
     return (
-        f"every second line along {along} is displaced: displaced back by one point it fits the "
-        f"lines beside it with {fitted / usual:.0%} of the difference; are both directions of the "
-        "scan mixed? Align the lines, or use one direction"
+        f"every second line along {along} is displaced: shifted back by one point, it differs from "
+        f"the lines beside it by {fitted / usual:.0%} of the present difference; are both "
+        "directions of the scan mixed? Align the lines, or use one direction"
     )
 
 

@@ -62,14 +62,16 @@ PLATE_BAR, PLATE_FLOOR = 0.6, 0.2
 #   AREA_CHANGE D                                  what neither explains; D of the corrected values
 # A = area / L^2, N = points per L. Chosen on seeds 20 and 47 (full), 11 (--quick --shift 1.37).
 AREA_CHANCE, AREA_LAW, AREA_CHANGE = 0.5, 0.01, 0.3
-# Of other surfaces, from two grids, the last two terms are IRREGULAR_AREA_LAW (n + 1) xi, with the
-# second number for surfaces that are not band-limited and for oblong pixels, and
-# IRREGULAR_AREA_CHANGE D. The ratio of the excess to n xi is there between 0.05 and LINE_EXCESS,
-# which it has where edges run along rows or columns. Chosen on --maps 20, 101, 102, 103, --free 20,
-# 101, --shapes 20 and --maps 300 with scans; checked on other seeds (docs/calibration.md).
-IRREGULAR_AREA_LAW, IRREGULAR_AREA_CHANGE = (0.04, 0.08), 1.5
+# Of other surfaces, from two grids, the last two terms are SMOOTH_AREA_LAW (n + 1) xi, for surfaces
+# that are not band-limited and for oblong pixels KINKED_AREA_LAW (n + 1) xi, and
+# IRREGULAR_AREA_CHANGE D. On these surfaces the ratio of the excess to n xi is between 0.05 and
+# LINE_EXCESS, which it has where edges run along rows or columns. Chosen on --maps 20, 101, 102,
+# 103, --free 20, 101, --shapes 20 and --maps 300 with scans; checked on other seeds
+# (docs/calibration.md).
+SMOOTH_AREA_LAW, KINKED_AREA_LAW, IRREGULAR_AREA_CHANGE = 0.04, 0.08, 1.5
 MAX_EXCESS_ANISOTROPY = 8.0
-"""Ratio of rms slopes up to which that holds: beyond 25, 77 of 100 bars of a_r held."""
+"""Ratio of rms slopes up to which that holds. Beyond it 98 of 100 bars would hold, but 94 of them
+at n = 1.5 and 77 beyond a ratio of 25."""
 MAX_KINKED_EXPONENT = 2.0
 """Exponent n up to which that holds for surfaces that are not band-limited: at 2.5, 70 of 100 bars
 of scans held, and 80 of those from the change alone."""
@@ -303,9 +305,10 @@ def estimate(
     elif fine.a_r == 0 or (fine.a_r == 1 and scales is None):
         return unknown()
     else:
-        estimates = _estimate_periodic(grids, scales, excess, tip)
-    if scales is not None and fine.a_r < 1 and estimates["a_r"].verdict.has_error:
-        estimates = estimates | {"a_r": _rough_area(estimates["a_r"], grids, scales, excess, tip)}
+        estimates = _estimate_periodic(grids, scales, tip)
+    if scales is not None or fine.border is None:
+        area = _area_of_any_surface(estimates["a_r"], grids, scales, excess, tip)
+        estimates = estimates | {"a_r": area}
     is_rough_or_free = scales is not None or fine.border is not None
     if tip.dimension == 1 and is_rough_or_free and estimates["u_g"].verdict.has_error:
         error = _error_of_gaps(fine)
@@ -326,14 +329,12 @@ def estimate(
 
 
 def _estimate_periodic(
-    grids: NestedGrids, scales: RoughnessScales | None, excess: ExcessExponent, tip: Tip
+    grids: NestedGrids, scales: RoughnessScales | None, tip: Tip
 ) -> dict[str, Estimate]:
-    """Estimates with a periodic boundary."""
-    oblong = scales is not None and scales.aspect > MAX_SPACING_RATIO
+    """Estimates with a periodic boundary; that of the area is from the change alone."""
     if scales is not None and not _laws_hold(grids, scales):
         return estimate_by_change(grids, has_flat_top=scales.has_steep_flat_top)
-    return {
-        "a_r": estimate_by_change(grids)["a_r"] if oblong else _area(grids, scales, excess, tip),
+    return estimate_by_change(grids) | {
         "sigma_p": _stress(grids, scales, tip),
         "u_g": _gap(grids, scales, tip),
     }
@@ -346,22 +347,33 @@ def _laws_hold(grids: NestedGrids, scales: RoughnessScales) -> bool:
     return grids.fine.patches >= MIN_PATCHES and scales.calibrated
 
 
-def _rough_area(
+def _area_of_any_surface(
     by_change: Estimate,
     grids: NestedGrids,
-    scales: RoughnessScales,
+    scales: RoughnessScales | None,
     excess: ExcessExponent,
     tip: Tip,
 ) -> Estimate:
-    """The area on a rough surface from its excess, where that is known, or from the change."""
+    """The area from its excess, where that is known, or as estimated from the change alone."""
+    fine = grids.fine
+    if scales is None or (_laws_hold(grids, scales) and _has_area_law(fine, scales)):
+        return _area(grids, scales, excess, tip)
+    if fine.a_r == 1 or not by_change.verdict.has_error:
+        return by_change
     if tip.dimension == 1:
         is_smooth = scales.band_limited and scales.plateau <= MAX_PLATEAU
-        has_excess = is_smooth and grids.fine.border is None
+        has_excess = is_smooth and fine.border is None
     elif not scales.band_limited and grids.n > MAX_KINKED_EXPONENT:
         return UNKNOWN
     else:
         has_excess = scales.anisotropy <= MAX_EXCESS_ANISOTROPY
     return _area(grids, scales, excess, tip) if has_excess else by_change
+
+
+def _has_area_law(fine: GridValues, scales: RoughnessScales) -> bool:
+    """Whether the area has the narrow bars of isotropic band-limited roughness."""
+    is_square = scales.aspect <= MAX_SPACING_RATIO
+    return scales.calibrated and is_square and fine.border is None
 
 
 def _bar(name: str, typical: float, change: float | None) -> float:
@@ -400,10 +412,12 @@ def _area(
         error = hypot(chance, AREA_CHANGE * (change or 0.0))
     else:
         chance = AREA_CHANCE * (1 + area_n / 10) * sqrt(xi / fine.area) / fine.points
-        is_smooth = scales.band_limited and scales.aspect <= MAX_SPACING_RATIO
-        law, weight = IRREGULAR_AREA_LAW[0 if is_smooth else 1], IRREGULAR_AREA_CHANGE
-        if is_smooth and scales.calibrated and fine.border is None:
+        if _has_area_law(fine, scales):
             law, weight = AREA_LAW * scales.phase(fine.points), AREA_CHANGE
+        else:
+            is_kinked = not scales.band_limited or scales.aspect > MAX_SPACING_RATIO
+            law = KINKED_AREA_LAW if is_kinked else SMOOTH_AREA_LAW
+            weight = IRREGULAR_AREA_CHANGE
         error = hypot(chance, law * (area_n + 1) * xi, weight * (change or 0.0))
     return _corrected_area(fine.a_r, best, hypot(error, factor * excess.uncertainty * xi))
 

@@ -26,7 +26,7 @@ from gfmd_cli.status import ExplainedEnum
 FLOOR = {"a_r": 0.3, "sigma_p": 0.05, "u_g": 0.02}
 FACTOR = {"a_r": 1.6, "sigma_p": 2.2, "u_g": 1.5}
 MAX_EXPONENT = {"a_r": 2.5, "sigma_p": 1.0, "u_g": 3.0}
-"""Exponents n up to which 95 of 100 bars of every class hold."""
+"""Exponents n up to which 95 of 100 bars of every class hold; a_r: see `MAX_KINKED_EXPONENT`."""
 
 DIVERGENT = 3.0  # exponent n from which the stress has no finite variance
 FLAT_TOP_FACTOR, MAX_FLAT_TOP_EXPONENT = 4.0, 0.5
