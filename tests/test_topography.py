@@ -974,11 +974,11 @@ def test_a_factor_of_the_heights_that_also_multiplies_the_sides_is_a_warning(tmp
 @pytest.mark.parametrize("unit", ["\N{MICRO SIGN}m", "um", "\N{GREEK SMALL LETTER MU}m"])
 def test_sides_keep_their_unit_where_the_heights_have_none(tmp_path, heights, unit):
     pytest.importorskip("SurfaceTopography")
-    header = f"# Width: 20.00 {unit}\n# Height: 15.00 {unit}\n"
+    header = f"# Width: 20.00 {unit}\n# Height: 10.00 {unit}\n"
     rows = (" ".join(map(str, row)) for row in heights)
     (tmp_path / "h.txt").write_text(header + "\n".join(rows), encoding="utf-8")
     surface = FileSurface(path=tmp_path / "h.txt", scale=1e-9)
-    assert surface.sides == pytest.approx((15e-6, 20e-6))
+    assert surface.sides == pytest.approx((10e-6, 20e-6))
     assert surface.heights(16) == pytest.approx(1e-9 * level(heights, "plane"))
     assert surface.warnings() == []
     (warning, *_) = FileSurface(path=tmp_path / "h.txt").warnings()
