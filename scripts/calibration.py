@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
+from gfmd_cli.physics import discretisation_error
 from gfmd_cli.physics.contact import Scene
 from gfmd_cli.physics.discretisation_error import (
     MAX_AREA_EXPONENT,
@@ -572,8 +573,12 @@ def main() -> None:
     parser.add_argument("--free", action="store_true", help="maps with a free boundary instead")
     parser.add_argument("--shapes", action="store_true", help="oblong pixels and holes instead")
     parser.add_argument("--layers", action="store_true", help="slabs and layers alone instead")
+    parser.add_argument("--beyond", action="store_true", help="the excess of a_r beyond its limits")
     parser.add_argument("--scans", type=Path, help="with --maps: folder of maps of 64 x 64 points")
     chosen = parser.parse_args()
+    if chosen.beyond:
+        discretisation_error.MAX_EXCESS_ANISOTROPY = np.inf
+        discretisation_error.MAX_KINKED_EXPONENT = np.inf
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         if chosen.free:

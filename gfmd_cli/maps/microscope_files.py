@@ -306,9 +306,9 @@ def _check_stated_sides(lines: list[bytes], sides: tuple[float, ...]) -> None:
 
 
 def _cut_off(shape: tuple[int, ...], sides: tuple[float, ...]) -> str:
-    """A warning where a table has not as many lines as its stated sides have square pixels.
+    """A warning where the stated sides make pixels that are not square: lines may be missing.
 
-    Scans with fewer lines than points per line have a half, a quarter, ... of them.
+    Scans may have fewer lines than points per line, but then a half, a quarter, ... of them.
     """
     along_y, along_x = (side / points for side, points in zip(sides, shape, strict=True))
     octaves = log2(along_y / along_x)

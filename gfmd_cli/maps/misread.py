@@ -60,8 +60,9 @@ def filled_lines(topography: Topography) -> tuple[str, Topography]:
         is_filled = np.zeros(len(lines), bool)
         for begin, end in zip(start, stop, strict=True):
             height, around = lines[begin, 0], lines[[begin - 1, end % len(lines)]]
-            distance = _median(height - around.mean(axis=0))  # at the border of a periodic map
-            if begin == 0 or end == len(lines):  # or where the next two lines do not lead to it
+            distance = _median(height - around.mean(axis=0))
+            if begin == 0 or end == len(lines):  # `around` has a line of the opposite border:
+                # the lines are sound where these two fit them, or the next two lines lead to them
                 one, other = lines[[end, end + 1]] if begin == 0 else lines[[begin - 1, begin - 2]]
                 distance = min(distance, _median(one - (height + other) / 2))
             is_filled[begin:end] = (

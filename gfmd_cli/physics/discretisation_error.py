@@ -70,11 +70,11 @@ AREA_CHANCE, AREA_LAW, AREA_CHANGE = 0.5, 0.01, 0.3
 # (docs/calibration.md).
 SMOOTH_AREA_LAW, KINKED_AREA_LAW, IRREGULAR_AREA_CHANGE = 0.04, 0.08, 1.5
 MAX_EXCESS_ANISOTROPY = 8.0
-"""Ratio of rms slopes up to which that holds. Beyond it 98 of 100 bars would hold, but 94 of them
-at n = 1.5 and 77 beyond a ratio of 25."""
+"""Ratio of rms slopes up to which that holds. Beyond it 98 of 100 bars would hold, but only 84
+beyond a ratio of 25 (`scripts/calibration.py --beyond`)."""
 MAX_KINKED_EXPONENT = 2.0
-"""Exponent n up to which that holds for surfaces that are not band-limited: at 2.5, 70 of 100 bars
-of scans held, and 80 of those from the change alone."""
+"""Exponent n up to which that holds for surfaces that are not band-limited: at 2.5, 80 of 100 bars
+of scans would hold, and errors are up to 8 times the bar (`--beyond`)."""
 # Of a line profile it is LINE_CHANCE xi over the root of the A N xi edges, or of the number of
 # independent waves if less; the standard deviation is 12^(-1/2) = 0.29. A gap of w_g points has the
 # error LINE_GAP u_g / w_g^2 in u_g, over the root of the number of gaps; also with a free boundary.

@@ -34,8 +34,7 @@ def irregular(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def scores(records):
-    """Of all but the maps of white noise, which are interpolated by monotone cubics."""
-    return list(calibration.scores([each for each in records if "white" not in each["name"]]))
+    return list(calibration.scores(records))
 
 
 def test_the_set_is_large_and_solved(records):
@@ -47,12 +46,17 @@ def test_the_set_is_large_and_solved(records):
 
 @pytest.mark.parametrize("quantity", calibration.QUANTITIES)
 def test_bars_hold_and_are_not_too_wide(scores, quantity):
-    """In 95 of 100 cases; half of the bars are less than five times the error."""
+    """In 95 of 100 cases; half of the bars are less than five times the error.
+
+    Those of white noise, which is interpolated by monotone cubics, only have to hold.
+    """
     chosen = [score for score in scores if score.quantity == quantity]
-    count, held, ratio, _, held_too, ratio_too = calibration.summary(chosen)
+    count, held, _, _, held_too, _ = calibration.summary(chosen)
     assert count >= 200
     assert held >= 0.95
     assert held_too >= 0.95
+    random = [score for score in chosen if "white" not in score.name]
+    _, _, ratio, _, _, ratio_too = calibration.summary(random)
     assert ratio <= 5
     assert ratio_too <= 5
 
