@@ -24,6 +24,7 @@ points = 32
 [load]
 p_star = 1e-2
 """
+ACCURACY = "accuracy.contact_area=0.5"
 
 
 def peak(place, size=32):
@@ -143,6 +144,54 @@ def test_heights_that_never_touch_are_not_filled_in():
         "load": {"pressure": 1e-5},
     }
     assert np.isnan(solve(spec, heights=rough_map(highest)).columns["filled_contact"])
+
+
+def two_waves(points, amplitude):
+    """A wave of eight points along x, one of three along y with its gradient times `amplitude`."""
+    y, x = 2 * np.pi * np.mgrid[:points, :points]
+    return 1e-3 * (8 * np.sin(x / 8) + amplitude * 3 * np.sin(y / 3))
+
+
+@pytest.mark.parametrize("points", [48, 96])
+@pytest.mark.parametrize("n", [0.5, 1, 2])
+@pytest.mark.parametrize("amplitude", [0, 0.3, 2])
+def test_the_factor_of_short_waves_is_that_of_the_waves_below_four_points(points, n, amplitude):
+    """Delta_sigma^2 = sum of k^2 |h(q)|^2 with k = q^n, Eq. (23)."""
+    spec = {"elastomer": {"kind": "power", "n": n}, "load": {"p_star": 0.1}}
+    solved = solve(spec | {"grid": {"points": points}}, heights=two_waves(48, amplitude))
+    expected = np.hypot(1, amplitude * (8 / 3) ** (n - 1))
+    assert solved.columns["short_wave_factor"] == pytest.approx(expected, rel=1e-9)
+
+
+def test_without_longer_waves_or_a_map_there_is_no_such_factor():
+    spec = {"elastomer": {"kind": "half-space"}, "load": {"p_star": 0.1}}
+    short = two_waves(48, 1) - two_waves(48, 0)
+    assert np.isnan(solve(spec, heights=short).columns["short_wave_factor"])
+    random = {"surface": {"kind": "self-affine", "cutoff": 0.1}, "grid": {"points": 32}}
+    assert np.isnan(solve(spec | random).columns["short_wave_factor"])
+
+
+@pytest.mark.parametrize(("wavelength", "is_resolved"), [(4, True), (2, False)])
+def test_who_requests_an_accuracy_is_told_that_a_map_does_not_resolve_its_roughness(
+    gfmd, tmp_path, wavelength, is_resolved
+):
+    """A part of a random surface, with shortest waves of so many points."""
+    whole = 1e-8 * SelfAffine(cutoff=wavelength / 256, seed=1).heights(256)
+    np.save(tmp_path / "peak.npy", whole[:128, :96])
+    of_scan = ["--set", "surface.edges=mirror", "--set", "surface.level=plane"]
+    words = [*of_scan, "--set", "load={pressure = 1e-4}"]
+    warning = "the waves of 2 to 4 points of the map increase Delta_sigma"
+    plain = gfmd("run", "spec.toml", *words, "--set", "grid.points=96")
+    assert plain.exit_code == 0
+    assert warning not in plain.output
+    told = gfmd("run", "spec.toml", *words, "--set", "grid.points=192", "--set", ACCURACY)
+    assert (warning not in told.output) is is_resolved
+    assert (warning not in gfmd("surface", "spec.toml", *words).output) is is_resolved
+    written = gfmd("init", "scan.toml", "--from", "peak.npy", *of_scan)
+    assert (warning not in written.output) is is_resolved
+    gfmd("report", "study.h5")
+    report = (tmp_path / "study.html").read_text("utf-8")
+    assert ("Resolution: the waves of 2 to 4 points" not in report) is is_resolved
 
 
 def test_a_study_keeps_the_map_as_measured_and_as_prepared(rows_of, tmp_path):

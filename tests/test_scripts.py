@@ -41,6 +41,7 @@ SMALL = {
     "surface_classes.py": "bumps random --count 1 --finest 4",
     "transform_work.py": "--points 64",
     "time_left.py": f"{ROOT / 'configs' / 'smoke.toml'} --set grid.points=100 --jobs 1",
+    "unresolved_roughness.py": "--points 512 --seeds 1 --hurst 0.8",
 }
 """Arguments with which a script takes seconds."""
 CONSTANTS = [

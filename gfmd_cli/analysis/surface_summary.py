@@ -3,12 +3,14 @@
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from gfmd_cli.analysis.table import Group, Table, TableColumn, plain, records_of
 from gfmd_cli.maps.height_map import extent
+from gfmd_cli.maps.map_warnings import unresolved
 from gfmd_cli.maps.roughness_parameters import MAP_NAMES, PROFILE_NAMES, roughness_parameters
 from gfmd_cli.physics.contact import Scene
 from gfmd_cli.physics.elastomers import HalfSpace
@@ -17,7 +19,7 @@ from gfmd_cli.physics.persson import Persson
 from gfmd_cli.physics.scenes import build_scene
 from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.physics.spectrum_fit import Moments, SelfAffineFit, moments
-from gfmd_cli.physics.surface_spectrum import Spectrum, map_spectrum, spectrum
+from gfmd_cli.physics.surface_spectrum import Spectrum, map_spectrum, short_wave_factor, spectrum
 from gfmd_cli.study.forecast import first_grid
 from gfmd_cli.units import LARGEST_RMS_HEIGHT
 
@@ -49,6 +51,16 @@ class SurfaceSummary:
     spectrum: Spectrum
     """Spectrum of the cell that is solved, or of a map with borders, tapered."""
 
+    @cached_property
+    def short_wave_factor(self) -> float:
+        """See `surface_spectrum.short_wave_factor`; of a half-space, that of the rms gradient."""
+        return short_wave_factor(self.surface, HalfSpace())
+
+    def warnings(self) -> list[str]:
+        """Probable mistakes, and whether a map resolves its roughness."""
+        unresolved_waves = unresolved(self.short_wave_factor)
+        return [*self.surface.warnings(), *filter(None, [unresolved_waves])]
+
     @property
     def in_si(self) -> bool:
         """Whether lengths are in metres: rms heights of real surfaces are small."""
@@ -66,7 +78,8 @@ class SurfaceSummary:
             "h_std": self.moments.height,
             "gradient": self.moments.gradient,
             "curvature": self.moments.curvature,
-            "warnings": self.surface.warnings(),
+            "short_wave_factor": self.short_wave_factor,
+            "warnings": self.warnings(),
             **fit_record(self.spectrum.fit),
         }
         curves = {"q": self.spectrum.q.tolist(), "spectrum": self.spectrum.density.tolist()}
@@ -143,7 +156,7 @@ def summary_text(summary: SurfaceSummary) -> str:
         f"rms gradient {measured.gradient:.5g}, rms curvature {measured.curvature:.5g}{per_metre}",
         f"half-space: p* = 1 is p = {0.5 * measured.gradient:.5g} E_star",
     ]
-    lines += [f"warning: {warning}" for warning in summary.surface.warnings()]
+    lines += [f"warning: {warning}" for warning in summary.warnings()]
     nearest = summary.spectrum.fit
     theories = {"spectrum": summary.scene}
     random: list[str] = []

@@ -85,7 +85,7 @@ def surface(
     else:
         print_text(summary_table(summaries, names).as_text())
         for summary, name in zip(summaries, names, strict=True):
-            for warning in summary.surface.warnings():
+            for warning in summary.warnings():
                 print_error(f"gfmd: {name}: {warning}")
     if figure is not None:
         from gfmd_cli.analysis.plotting import styled

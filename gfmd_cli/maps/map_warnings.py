@@ -15,6 +15,7 @@ from gfmd_cli.units import count
 
 MAX_GRADIENT = 3.0  # rms; a choice: surfaces of machined or worn solids have less
 MIN_GRADIENT = 1e-6  # rms; a choice: polished mirrors have about that
+MAX_SHORT_WAVE_FACTOR = 1.1  # a choice: 1.0 for surfaces that are resolved
 MAX_BORDER_STEP = 5.0  # ratio of the step across the border to that inside; a choice: 1 if periodic
 MIN_BORDER_STEP = 1.5  # such a ratio that may be chance; a choice
 BORDER_SHARE = 0.1  # largest fraction of the squared gradient that the border may have; a choice
@@ -134,6 +135,18 @@ def unlikely_gradient(heights: Field, spacing: tuple[float, ...]) -> str:
     return (
         f"rms gradient {gradient:.3g}: check that heights and side are in metres; surface.scale is "
         "the factor from the heights of the file to metres, surface.length the side"
+    )
+
+
+def unresolved(factor: float) -> str:
+    """Roughness that goes on below the pixels; from `surface_spectrum.short_wave_factor`."""
+    if not factor > MAX_SHORT_WAVE_FACTOR:
+        return ""
+    return (
+        "the waves of 2 to 4 points of the map increase Delta_sigma, the rms stress in full "
+        f"contact, by a factor of {factor:.2f}: if they are roughness, not noise, and the surface "
+        "has shorter waves, too, the contact area at light load is too large, by about this factor "
+        "for each halving of the shortest wavelength; error bars do not include this"
     )
 
 

@@ -99,8 +99,31 @@ class RigidSurface(SpecTable):
         raise NotImplementedError
 
     def heights(self, points: int, points_y: int = 0) -> Field:
-        """Heights h [m] on a grid of so many points, indexed [y, x], for a line contact [x]."""
-        return self.heights_on(self.grid(points, points_y))
+        """Heights h [m] on a grid of so many points, indexed [y, x], for a line contact [x].
+
+        Raises InputError where the grid does not resolve the surface.
+        """
+        grid = self.grid(points, points_y)
+        self.check_resolved(points, grid.points_y)
+        return self.heights_on(grid)
+
+    def check_resolved(self, points: int, points_y: int) -> None:
+        """Raise InputError where a grid of so many points along x and y is too coarse."""
+        along_x = ("points", "x", points, self.smallest_grid())
+        along_y = ("points_y", "y", points_y, self.smallest_grid_y())
+        for key, axis, count, least in (along_x, along_y):
+            if count < least:
+                raise InputError(
+                    f"grid.{key}: {count // self.copies} points along {axis} do not resolve "
+                    f"the surface ({self.smallest_grid_reason()}); "
+                    f"{self.remedy(least // self.copies)}"
+                )
+
+    def remedy(self, needed: int) -> str:
+        """What to do where the surface needs so many points along an axis, or more."""
+        if needed <= MAX_POINTS:
+            return f"use {needed} or more"
+        return f"it takes {needed}, but at most {MAX_POINTS} are allowed; check: {self.size_hint}"
 
     def grid(self, points: int, points_y: int = 0) -> Grid:
         """The grid of so many points on the cell; by default with `points_y(points)` along y."""

@@ -1,19 +1,23 @@
 """Power spectral density of a surface in bands of wavenumber, with the self-affine fit."""
 
 from dataclasses import dataclass
-from math import pi, prod
+from functools import lru_cache
+from math import nan, pi, prod
 
 import numpy as np
 
 from gfmd_cli.errors import InputError
-from gfmd_cli.grid.arrays import Field
+from gfmd_cli.grid.arrays import Field, row_blocks
+from gfmd_cli.grid.modes import multiplicity
 from gfmd_cli.physics.elastomers import HalfSpace
 from gfmd_cli.physics.indenters import RigidSurface
+from gfmd_cli.physics.linear_elastomer import LinearElastomer
 from gfmd_cli.physics.persson import Shells
 from gfmd_cli.physics.scenes import build_scene
 from gfmd_cli.physics.spectrum_fit import SelfAffineFit, fit
 
 BANDS_PER_DECADE = 10  # a choice
+ROUNDING = 1e-9  # of a wavenumber, and of the power of a map, relative
 
 
 @dataclass(frozen=True)
@@ -78,6 +82,31 @@ def map_spectrum(surface: RigidSurface) -> Spectrum | None:
         return None
     scene = build_scene(tapered, HalfSpace(), tapered.smallest_grid())
     return spectrum(scene.shells, scene.grid.sides, scene.grid.whole_shape)
+
+
+@lru_cache(maxsize=4)
+def short_wave_factor(surface: RigidSurface, elastomer: LinearElastomer) -> float:
+    """Factor by which the waves of two to four points of a map increase Delta_sigma, Eq. (23).
+
+    1 if the map has no such waves; NaN if it has no longer ones, and for any other surface. Waves
+    shorter than two points along a side are left out, and a map with borders is tapered.
+    """
+    if not surface.is_map:
+        return nan
+    used = surface.tapered_map() or surface
+    heights = np.atleast_2d(used.resolved_heights())
+    modes = np.fft.rfft2(heights)
+    steps = [side / n for side, n in zip(used.sides[::-1], heights.shape[::-1], strict=False)]
+    x = 2 * pi * np.fft.rfftfreq(heights.shape[1], steps[0])
+    y = 2 * pi * np.fft.fftfreq(heights.shape[0], steps[-1])[:, None]
+    ends = np.array([1.0, 0.5]) * (1 + ROUNDING) * pi / max(steps)
+    sums = np.zeros(2)
+    for block in row_blocks(modes):
+        q = np.hypot(y[block], x)
+        power = np.square(modes[block].real) + np.square(modes[block].imag)
+        power *= multiplicity(heights.shape[1]) * elastomer.stiffness(q, surface.sides[-1]) ** 2
+        sums += [power[q <= end].sum() for end in ends]
+    return float(np.sqrt(sums[0] / sums[1])) if sums[1] > ROUNDING * sums[0] else nan
 
 
 def _edges(q: Field, nyquist: float) -> Field:

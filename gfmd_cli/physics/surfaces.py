@@ -15,7 +15,6 @@ from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.grid.ranks import Ranks
 from gfmd_cli.physics.file_surface import FileSurface
 from gfmd_cli.physics.indenters import (
-    MAX_POINTS,
     Cone,
     LineParabola,
     Parabola,
@@ -41,26 +40,6 @@ Surface = Annotated[
 ]
 
 
-def check_resolved(surface: RigidSurface, points: int, points_y: int) -> None:
-    """Raise InputError where a grid of so many points along x and y does not resolve a surface."""
-    along_x = ("points", "x", points, surface.smallest_grid())
-    along_y = ("points_y", "y", points_y, surface.smallest_grid_y())
-    for key, axis, count, least in (along_x, along_y):
-        if count < least:
-            raise InputError(
-                f"grid.{key}: {count // surface.copies} points along {axis} do not resolve "
-                f"the surface ({surface.smallest_grid_reason()}); "
-                f"{remedy(surface, least // surface.copies)}"
-            )
-
-
-def remedy(surface: RigidSurface, needed: int) -> str:
-    """What to do where a surface needs so many points along an axis, or more."""
-    if needed <= MAX_POINTS:
-        return f"use {needed} or more"
-    return f"it takes {needed}, but at most {MAX_POINTS} are allowed; check: {surface.size_hint}"
-
-
 def sample(
     surface: RigidSurface, points: int, points_y: int = 0, ranks: Ranks | None = None
 ) -> tuple[Grid, Field]:
@@ -73,7 +52,7 @@ def sample(
     heights overflow.
     """
     whole = surface.grid(points, points_y)
-    check_resolved(surface, points, whole.points_y)
+    surface.check_resolved(points, whole.points_y)
     grid = create_grid(whole, ranks)
     with np.errstate(over="ignore", invalid="ignore"):  # refused below
         heights = surface.heights_on(grid)

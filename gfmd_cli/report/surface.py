@@ -11,6 +11,7 @@ from gfmd_cli.analysis.selection import evenly
 from gfmd_cli.analysis.surface_figure import height_figure, spectrum_labels
 from gfmd_cli.analysis.surface_summary import FIT, fit_record
 from gfmd_cli.analysis.table import Group, Table, TableColumn, records_of
+from gfmd_cli.maps.map_warnings import unresolved
 from gfmd_cli.maps.pictures import Picture
 from gfmd_cli.physics.surface_spectrum import Spectrum, spectrum
 from gfmd_cli.report.data import ReportData
@@ -34,6 +35,8 @@ def measured_surface(data: ReportData) -> Section:
                 rows.append(row)
                 drawings += _drawings(row, pictures, f"{data.prefix}{len(rows)}")
     notes = [str(row["preparation"]) for row in rows]
+    factors = [row["short_wave_factor"] for row in rows]
+    notes += [f"Resolution: {note}." for note in map(unresolved, factors) if note]
     return Section("Measured surface", notes=notes, drawings=drawings)
 
 

@@ -11,8 +11,10 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from gfmd_cli.errors import InputError, typed
+from gfmd_cli.maps.map_warnings import unresolved
 from gfmd_cli.physics.file_surface import FileSurface
 from gfmd_cli.physics.scenes import build_scene
+from gfmd_cli.physics.surface_spectrum import short_wave_factor
 from gfmd_cli.spec.check import Check, kinds_of
 from gfmd_cli.spec.models import Spec, with_boundary
 from gfmd_cli.spec.parse import set_override, split_override
@@ -73,6 +75,7 @@ def starter_of_scan(
     used, grid = with_boundary(spec.surface[0], spec.elastomer[0], spec.grid[0], spec.solver[0])
     assert grid.boundary is not None
     warnings = used.warnings(grid.boundary)
+    warnings += filter(None, [unresolved(short_wave_factor(used, spec.elastomer[0]))])
     scene = build_scene(repeated, spec.elastomer[0], repeated.smallest_grid())
     finished = text(scene.h_std, scene.delta_sigma, len(spec.elastomer), warnings)
     _checked(finished, path, overrides)

@@ -110,6 +110,11 @@ DETAILS = (
     Column("edge_load", "fraction of the load there; NaN without a window"),
     Column("filled_contact", "fraction of the contact at heights that were filled in"),
     Column("filled_load", "fraction of the load there; NaN if no height was filled in"),
+    Column(
+        "short_wave_factor",
+        "factor by which the waves of 2 to 4 points of a map increase Delta_sigma; NaN for other "
+        "surfaces",
+    ),
     *(observable.column for observable in OBSERVABLES),
 )
 PARAMETERS = parameters((*CONTRACT, *DETAILS))

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from gfmd_cli.maps.map_warnings import MAX_GRADIENT
+from gfmd_cli.maps.map_warnings import MAX_GRADIENT, unresolved
 from gfmd_cli.physics.contact import Scene
 from gfmd_cli.physics.indenters import RigidSurface
 from gfmd_cli.physics.spectrum_fit import moments
@@ -92,6 +92,8 @@ def warnings_of(task: Task, solved: TaskSolution, results: Mapping[str, Any]) ->
             "missing and were filled in (see the columns filled_contact and filled_load): if the "
             "highest points lack a height, contact area, stress and gap are uncertain"
         )
+    if task.accuracy is not None and (warning := unresolved(results["short_wave_factor"])):
+        yield warning
     if scene.has_voids and solved.observables.u_g < 0:
         yield (
             "the mean gap is negative: where heights are missing, the elastomer enters the holes "

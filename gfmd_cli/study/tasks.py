@@ -12,7 +12,6 @@ from gfmd_cli.errors import InputError
 from gfmd_cli.files.checksums import Version, digest, file_version
 from gfmd_cli.physics.indenters import RigidSurface
 from gfmd_cli.physics.linear_elastomer import LinearElastomer
-from gfmd_cli.physics.surfaces import check_resolved, remedy
 from gfmd_cli.solvers.auto import AnySolver
 from gfmd_cli.spec import models
 from gfmd_cli.spec_table import SpecTable
@@ -224,7 +223,7 @@ def _check(spec: models.Spec, *, suited: bool) -> None:
             if most < first:
                 raise InputError(
                     f'accuracy.max_points: {most} given, but grid.points = "auto" begins with '
-                    f"{first} points along x on this surface; {remedy(chosen['surface'], first)}"
+                    f"{first} points along x on this surface; {chosen['surface'].remedy(first)}"
                 )
         chosen["solver"].check_boundary(boundary)
         if suited:
@@ -261,7 +260,7 @@ def _check_grid(surface: RigidSurface, grid: models.GridTable) -> None:
     if grid.points != "auto":
         points = surface.copies * grid.points
         on_cell, points_y = grid.on_cell(surface, points)
-        check_resolved(on_cell, points, points_y)
+        on_cell.check_resolved(points, points_y)
 
 
 def _points(spec: models.Spec, chosen: dict[str, Any], load: float) -> int:
