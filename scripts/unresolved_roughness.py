@@ -1,6 +1,6 @@
 """Contact of maps that do not resolve their roughness: the table of docs/map_evidence.md.
 
-    python scripts/unresolved_roughness.py [--points 1024 2048 4096] [--seeds 4] [--n 0.5 1 2]
+    python scripts/unresolved_roughness.py [--points 1024] [--seeds 4] [--n 1]
 
 Self-affine surfaces on an elastomer k = q^n, whose shortest waves have one point of the map (a
 halving of the shortest waves of the map, two points) or half a point (two halvings). The map has
@@ -9,21 +9,31 @@ the waves of two points and more ("sharp"), the means over its pixels, or the he
 at the pressure that is a given p* for the true surface. Printed are the mean over seeds of
 `short_wave_factor`, of the ratio of Delta_sigma and, for each p*, of the ratios of contact area and
 mean gap, of the map to the true surface; in brackets the standard deviation in the last digits.
+
+    python scripts/unresolved_roughness.py --scans FOLDER
+
+The same for parts of scans of 256 x 256 points with a free boundary: the map has the means of 2 x 2
+points. Scans with missing heights or with warnings are left out.
 """
 
 import argparse
+from collections.abc import Sequence
 from itertools import product
+from pathlib import Path
 
 import numpy as np
 
-from gfmd_cli.api import Result, solve
+from gfmd_cli.api import Result, Tables, solve
+from gfmd_cli.errors import InputError
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.physics.self_affine import SelfAffine
+from gfmd_cli.spec.parse import read_scan
 
 HURST = (0.3, 0.5, 0.8, 1.0)
 P_STARS = (0.003, 0.03, 0.3)
 ROLLOFF, SHORTEST = 1 / 4, 1 / 256  # of the side
 HALVINGS = (1, 2)
+SCANNED = 256  # points per side of the part of a scan
 
 
 def sharp(heights: Field, points: int) -> Field:
@@ -47,56 +57,95 @@ def sampled(heights: Field, points: int) -> Field:
     return np.ascontiguousarray(heights[::step, ::step])
 
 
-def contacts(heights: Field, n: float, pressures: list[float], points: int) -> list[Result]:
-    """The contacts of a map of unit side on a grid."""
-    spec = {
+def contacts(heights: Field, spec: Tables, pressures: Sequence[float]) -> list[Result]:
+    """The contacts of a map at some pressures [Pa]."""
+    loads = ({"load": {"pressure": pressure}} for pressure in pressures)
+    return [solve({**spec, **load}, heights=heights) for load in loads]
+
+
+def pressures(heights: Field, spec: Tables, p_stars: Sequence[float]) -> list[float]:
+    """Reduced pressures on a map in Pa."""
+    (contact,) = contacts(heights, spec, [1.0])
+    return [p_star * contact.columns["delta_sigma"] for p_star in p_stars]
+
+
+def ratios(of_map: Sequence[Result], true: Sequence[Result]) -> list[float]:
+    """Factor of the map, and its Delta_sigma, contact areas and mean gaps over the true ones."""
+    names = ("a_r", "mean_gap")
+    pairs = [(a.columns, b.columns) for a, b in zip(of_map, true, strict=True)]
+    first, exact = pairs[0]
+    return [
+        first["short_wave_factor"],
+        first["delta_sigma"] / exact["delta_sigma"],
+        *(a[name] / b[name] for a, b in pairs for name in names),
+    ]
+
+
+def random_surfaces(n: float, points: int, hurst: float, seeds: int) -> None:
+    """Print the ratios for random surfaces, all waves of which are known."""
+    rows: dict[tuple[str, int], list[list[float]]] = {}
+    spec: dict[str, dict[str, object]] = {
         "elastomer": {"kind": "power", "n": n},
         "surface": {"length": 1.0},
         "grid": {"points": points},
     }
-    loads = ({"load": {"pressure": pressure}} for pressure in pressures)
-    return [solve(spec | load, heights=heights) for load in loads]
+    for seed in range(seeds):
+        surface = SelfAffine(cutoff=SHORTEST, rolloff=ROLLOFF, hurst=hurst, h_std=1e-3, seed=seed)
+        heights = surface.heights(points)
+        loads = pressures(heights, spec, P_STARS)
+        true = contacts(heights, spec, loads)
+        for instrument, halvings in product((sharp, means, sampled), HALVINGS):
+            seen = instrument(heights, round(2 / SHORTEST) >> halvings)
+            row = ratios(contacts(seen, spec, loads), true)
+            rows.setdefault((instrument.__name__, halvings), []).append(row)
+    for (name, halvings), values in rows.items():
+        mean, deviation = np.mean(values, axis=0), np.std(values, axis=0)
+        texts = (f"{m:.2f} ({100 * d:.0f})" for m, d in zip(mean, deviation, strict=True))
+        print(f"{hurst:3g} {name:8} {halvings}", *texts, flush=True)
 
 
-def ratios(of_map: Result, true: Result) -> list[float]:
-    """Ratios of contact areas and mean gaps."""
-    return [of_map.a_r / true.a_r, of_map.columns["mean_gap"] / true.columns["mean_gap"]]
+def scan(path: Path) -> str:
+    """The ratios for the middle of a scan without warnings, from the means of 2 x 2 pixels."""
+    surface = read_scan(path, ())
+    measured, spacing = surface.measured_map() or (np.ma.zeros(0), (0.0,))
+    about = [each for each in surface.warnings("free") if "length" not in each]
+    if measured.ndim != 2 or min(measured.shape) < SCANNED or measured.mask.any() or about:
+        return "left out"
+    middle = tuple(slice((n - SCANNED) // 2, (n + SCANNED) // 2) for n in measured.shape)
+    heights = np.array(measured[middle])
+    length = SCANNED * spacing[-1]
+    spec: dict[str, dict[str, object]] = {
+        "elastomer": {"kind": "half-space"},
+        "surface": {"length": length, "periodic": False, "level": "plane"},
+        "grid": {"points": SCANNED},
+    }
+    loads = pressures(heights, spec, P_STARS)
+    halved = contacts(means(heights, SCANNED // 2), spec, loads)
+    return " ".join(f"{ratio:.2f}" for ratio in ratios(halved, contacts(heights, spec, loads)))
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("--points", type=int, nargs="+", default=[2048])
+    parser.add_argument("--points", type=int, nargs="+", default=[1024])
     parser.add_argument("--seeds", type=int, default=4)
     parser.add_argument("--hurst", type=float, nargs="+", default=HURST)
     parser.add_argument("--n", type=float, nargs="+", default=[1.0])
+    parser.add_argument("--scans", type=Path, help="a folder of microscope files instead")
     arguments = parser.parse_args()
+    if arguments.scans is not None:
+        for path in sorted(arguments.scans.iterdir()):
+            try:
+                print(path.name, scan(path), flush=True)
+            except InputError as error:
+                print(path.name, error)
+        return
     for n, points in product(arguments.n, arguments.points):
         print(
             f"n = {n:g}, {points}^2: H, map, halvings: factor, ratios of Delta_sigma, a_r and gap"
         )
         print("p* =".rjust(30), *(f"{p_star:15g}" for p_star in P_STARS), flush=True)
         for hurst in arguments.hurst:
-            rows: dict[tuple[str, int], list[list[float]]] = {}
-            for seed in range(arguments.seeds):
-                surface = SelfAffine(
-                    cutoff=SHORTEST, rolloff=ROLLOFF, hurst=hurst, h_std=1e-3, seed=seed
-                )
-                heights = surface.heights(points)
-                unit = contacts(heights, n, [1.0], points)[0].columns["delta_sigma"]
-                pressures = [p_star * unit for p_star in P_STARS]
-                true = contacts(heights, n, pressures, points)
-                for instrument, halvings in product((sharp, means, sampled), HALVINGS):
-                    seen = instrument(heights, round(2 / SHORTEST) >> halvings)
-                    of_map = contacts(seen, n, pressures, points)
-                    columns = of_map[0].columns
-                    row = [columns["short_wave_factor"], columns["delta_sigma"] / unit]
-                    for pair in zip(of_map, true, strict=True):
-                        row += ratios(*pair)
-                    rows.setdefault((instrument.__name__, halvings), []).append(row)
-            for (name, halvings), values in rows.items():
-                mean, deviation = np.mean(values, axis=0), np.std(values, axis=0)
-                texts = (f"{m:.2f} ({100 * d:.0f})" for m, d in zip(mean, deviation, strict=True))
-                print(f"{hurst:3g} {name:8} {halvings}", *texts, flush=True)
+            random_surfaces(n, points, hurst, arguments.seeds)
 
 
 if __name__ == "__main__":

@@ -9,6 +9,7 @@ import pytest
 from spectrum_fits import gaussian_roughness
 
 from gfmd_cli.physics.scenes import build_scene
+from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.spec.parse import read_spec
 from gfmd_cli.study.reading import read_rows
 from gfmd_cli.study.tasks import plan
@@ -289,7 +290,7 @@ def test_the_table_of_several_surfaces_shows_whether_a_fit_is_good(gfmd, tmp_pat
 
 def test_a_scan_in_nanometres_that_does_not_repeat_gives_warnings_and_is_mended(gfmd, tmp_path):
     """Tilted by 300 nm, 2 nm rough, 1 um wide."""
-    rough = np.random.default_rng(0).normal(size=(32, 32)) * 2
+    rough = 2 * SelfAffine(cutoff=1 / 8).heights(32)
     np.save(tmp_path / "nm.npy", rough + np.linspace(0, 300, 32))
     result = gfmd("surface", "nm.npy")
     warnings = ("does not state its side", "heights and side are in metres", "across the border")

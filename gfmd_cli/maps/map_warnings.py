@@ -144,9 +144,9 @@ def unresolved(factor: float) -> str:
         return ""
     return (
         "the waves of 2 to 4 points of the map increase Delta_sigma, the rms stress in full "
-        f"contact, by a factor of {factor:.2f}: if they are roughness, not noise, and the surface "
-        "has shorter waves, too, the contact area at light load is too large, by about this factor "
-        "for each halving of the shortest wavelength; error bars do not include this"
+        f"contact, by a factor of {factor:.2f}: the roughness probably continues below the pixels. "
+        "Each halving of the shortest wavelength then divides the contact area at light load by "
+        "about this factor; error bars do not include this"
     )
 
 

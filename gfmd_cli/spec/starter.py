@@ -75,11 +75,11 @@ def starter_of_scan(
     used, grid = with_boundary(spec.surface[0], spec.elastomer[0], spec.grid[0], spec.solver[0])
     assert grid.boundary is not None
     warnings = used.warnings(grid.boundary)
-    warnings += filter(None, [unresolved(short_wave_factor(used, spec.elastomer[0]))])
     scene = build_scene(repeated, spec.elastomer[0], repeated.smallest_grid())
     finished = text(scene.h_std, scene.delta_sigma, len(spec.elastomer), warnings)
     _checked(finished, path, overrides)
-    return finished, used.preparation(grid.boundary), warnings
+    short_waves = unresolved(short_wave_factor(used, spec.elastomer[0]))
+    return finished, used.preparation(grid.boundary), [*warnings, *filter(None, [short_waves])]
 
 
 def _checked(text: str, path: Path, overrides: tuple[str, ...]) -> Spec:
