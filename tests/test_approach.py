@@ -6,10 +6,12 @@ from scipy.ndimage import gaussian_filter
 from scipy.special import gamma
 
 from gfmd_cli import solve
+from gfmd_cli.errors import InputError
 from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.physics.elastomers import Layer
 from gfmd_cli.physics.highest_point import highest_point, highest_point_of_mirrored
 from gfmd_cli.physics.self_affine import SelfAffine
+from gfmd_cli.study import load_search
 
 SPEC = """\
 [surface]
@@ -183,6 +185,31 @@ def test_a_cone_is_pressed_from_its_tip_on_every_grid(rows_of, points):
         "surface={kind='cone', slope=0.1}", f"grid.points={points}", "load={displacement=0.03}"
     )
     assert row["pressure"] == pytest.approx(2 * 3.0 * 0.03**2 / (np.pi * 0.1), rel=0.01)
+
+
+def test_a_displacement_at_which_no_grid_point_touches_is_refused():
+    """The four points around the tip of a cone touch together."""
+    spec = {"surface": {"kind": "cone", "slope": 0.1}, "elastomer": {"kind": "half-space"},
+            "grid": {"points": 65, "boundary": "free"}}  # fmt: skip
+    first = 0.1 * np.sqrt(0.5) / 65
+    with pytest.raises(InputError, match=rf"touches at {first:.6g} m"):
+        solve(spec | {"load": {"displacement": 0.99 * first}})
+    result = solve(spec | {"load": {"displacement": 1.01 * first}})
+    assert (result.status, result.contact.sum()) == ("converged", 4)
+
+
+def test_a_coarser_grid_that_touches_later_is_left_out(monkeypatch):
+    """The tip of a cone is a point of 66^2, not of 33^2."""
+    points = []
+    at = load_search._at
+    monkeypatch.setattr(load_search, "_at", lambda task, *trial: points.append(trial[0]) or at(task, *trial))
+    result = solve({
+        "surface": {"kind": "cone", "slope": 0.1}, "elastomer": {"kind": "half-space"},
+        "grid": {"points": 66, "boundary": "free"},
+        "load": {"displacement": 0.05 * np.sqrt(0.5) / 33},
+    })  # fmt: skip
+    assert result.status == "converged"
+    assert set(points) == {66}
 
 
 def test_a_displacement_means_the_same_on_every_grid(rows_of):

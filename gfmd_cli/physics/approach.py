@@ -47,6 +47,11 @@ def _highest(scene: Scene, peak: float | None) -> float:
     return on_grid if peak is None else max(on_grid, peak - scene.mean_height)
 
 
+def touching_displacement(scene: Scene, peak: float | None) -> float:
+    """Displacement [m] at which the highest grid point touches, if max h lies between points."""
+    return _highest(scene, peak) - scene.highest * scene.h_std
+
+
 def estimated_pressures(
     scene: Scene, peak: float | None, elastomer: LinearElastomer, displacements: Field
 ) -> Field:

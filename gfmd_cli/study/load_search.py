@@ -22,7 +22,7 @@ import numpy as np
 
 from gfmd_cli.errors import InputError
 from gfmd_cli.grid.arrays import Field
-from gfmd_cli.physics.approach import estimated_pressures
+from gfmd_cli.physics.approach import estimated_pressures, touching_displacement
 from gfmd_cli.physics.contact import PRESSURE_RANGE, Scene
 from gfmd_cli.physics.error_estimates import with_shift
 from gfmd_cli.physics.observables import QUANTITIES
@@ -79,7 +79,8 @@ def solve_at_load(task: Task, context: SolveContext, watcher: Watcher) -> TaskSo
     expected to enter contact between them, or by less than the tolerance of the solver, which then
     cannot tell them apart. Otherwise the status is "load_not_reached".
 
-    Raises InputError for a mean gap that no pressure has, and an area below one grid point.
+    Raises InputError for a mean gap or displacement that no pressure has, and an area below one
+    grid point.
     """
     if not LOADS[task.quantity].searched:
         return solve_on_grids(task, context, watcher)
@@ -261,6 +262,14 @@ def _out_of_reach(task: Task, scene: Scene) -> str:
             f"load.mean_gap = {task.load:g} h_std is not reached: without load the mean gap is "
             f"{scene.highest:g} h_std"
         )
+    if task.quantity == "displacement":
+        smallest = touching_displacement(scene, task.surface.peak())
+        if task.load <= smallest:
+            return (
+                f"load.displacement = {task.load:g} m is not reached: the highest grid point first "
+                f"touches at {smallest:g} m, because the highest point of the surface lies between "
+                "grid points; use more points"
+            )
     return ""
 
 
