@@ -22,8 +22,10 @@ from gfmd_cli.physics.observables import observe
 from gfmd_cli.physics.scenes import build_scene
 from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.solvers.auto import Auto
+from gfmd_cli.solvers.contact_state import PRESSED
 from gfmd_cli.solvers.nested_grids import Resume, levels, solve_contact
 from gfmd_cli.solvers.pcg import ProjectedCG
+from gfmd_cli.solvers.preconditioners import select
 from gfmd_cli.solvers.sort import Sort, is_flat
 
 TOLERANCE = 1e-9
@@ -689,6 +691,17 @@ def test_a_coarser_contact_is_the_same_surface_on_fewer_points():
     assert coarse.pressure == fine.pressure
     k = Power(n=1.5).stiffness(Grid(64).wavenumber()) * case.h_std / case.delta_sigma
     assert coarse.stiffness == pytest.approx(k, rel=1e-13)
+
+
+def test_a_soft_short_wave_limits_the_screening():
+    """Where k(q) falls, the screened Green's function is within a factor of two of 1/k(q)."""
+    grid, points = Grid(32), np.arange(32)
+    mode = np.hypot(np.minimum(points, 32 - points)[:, None], points[:17])
+    k = np.where(mode > 0, np.maximum(mode, 1.0) ** -0.5, 0.0)
+    contact_state = grid.rows.empty_with_halo(32, dtype=np.int8)
+    grid.rows.interior(contact_state)[::8, ::8] = PRESSED
+    screening = select(Contact(grid, grid.empty(), k, 0.01), contact_state, PRESSED)
+    assert screening == pytest.approx(k[0, 1:].min())
 
 
 def test_giving_up_says_so():

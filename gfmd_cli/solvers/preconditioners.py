@@ -95,6 +95,7 @@ def _screening(contact: Contact, held: float, changes: float) -> tuple[float, fl
     contact.
     """
     grid, (log_m, log_k) = contact.grid, map(np.log, contact.dispersion)
+    log_k = np.minimum.accumulate(log_k[::-1])[::-1]  # the softest of the shorter waves
     area = held / grid.size
     # Rows and columns that the changes are counted along have this length together, in units of L.
     length = grid.points_y + grid.points * grid.length_y / grid.length
