@@ -202,7 +202,9 @@ def test_a_coarser_grid_that_touches_later_is_left_out(monkeypatch):
     """The tip of a cone is a point of 66^2, not of 33^2."""
     points = []
     at = load_search._at
-    monkeypatch.setattr(load_search, "_at", lambda task, *trial: points.append(trial[0]) or at(task, *trial))
+    monkeypatch.setattr(
+        load_search, "_at", lambda task, *trial: points.append(trial[0]) or at(task, *trial)
+    )
     result = solve({
         "surface": {"kind": "cone", "slope": 0.1}, "elastomer": {"kind": "half-space"},
         "grid": {"points": 66, "boundary": "free"},

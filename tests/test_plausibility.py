@@ -284,8 +284,7 @@ def test_a_load_in_another_unit(load, elastomer, words):
 
 @pytest.mark.parametrize("displacement", [1e-8, 1e-7])
 def test_a_displacement_in_metres_on_reduced_heights(displacement):
-    surface = {key: SURFACE[key] for key in ("kind", "cutoff")}
-    spec = tables(surface, {"kind": "half-space"}, displacement=displacement)
+    spec = tables({"kind": "parabola"}, {"kind": "half-space"}, displacement=displacement)
     spec["grid"]["boundary"] = "free"
     assert "are heights and lengths in m?" in only_warning(spec)
 

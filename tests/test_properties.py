@@ -386,6 +386,13 @@ def test_pressures_at_both_ends_say_what_was_reached(n, p_star):
     assert reached == (p_star > 1)
     if p_star < 1e-15:  # the stress of a single point is below the rounding of sigma
         assert {e.verdict for e in solved.estimates.values()} == {"unknown"}
+        assert solved.solution.status == "rounding"
+        assert solved.solution.transforms < 200
+        reason = solved.solution.status.explain(
+            {"residual": solved.solution.residual, "tolerance": 1e-6}
+        )
+        assert "give a larger pressure" in reason
+        assert "loosen" not in reason
     if p_star > 1:
         assert solved.observables.a_r == 1
         assert solved.observables.sigma_p == pytest.approx(1, rel=64 * EPS * p_star)

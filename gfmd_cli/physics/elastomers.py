@@ -389,10 +389,13 @@ def _table(path: Path, version: Version) -> Field:
             f"{path}: elastomer.path: {table.shape[0]} rows, {table.shape[1]} columns; "
             "at least two rows of two columns, q and k, are needed"
         )
-    is_positive = np.isfinite(table) & (table > 0)
-    if not (is_positive.all() and np.all(np.diff(table[:, 0]) > 0)):
+    is_valid = np.all(np.isfinite(table) & (table > 0), axis=1)
+    is_valid[1:] &= np.diff(table[:, 0]) > 0
+    if not is_valid.all():
+        row = int(np.argmin(is_valid))
         raise InputError(
-            f"{path}: elastomer.path: q and k must be finite and positive; q must increase"
+            f"{path}: elastomer.path: row {row + 1} is {table[row, 0]:g}, {table[row, 1]:g}: q and "
+            "k must be finite and positive; q must increase"
         )
     table.flags.writeable = False
     return table

@@ -139,6 +139,8 @@ class ProjectedCG(Solver):
     def iterate(self, contact: Contact, state: PCGState) -> Iterator[PCGState]:
         """Advance `state` in place by conjugate-gradient steps."""
         yield state  # a start that is good enough needs no working memory
+        if contact.rounding(state.u) > 1:  # the rounding of the stress exceeds the pressure
+            return
         run = _Run(contact, state)
         while True:
             if state.exact:

@@ -11,7 +11,7 @@ from gfmd_cli.physics.contact import Scene
 from gfmd_cli.physics.indenters import RigidSurface
 from gfmd_cli.physics.spectrum_fit import moments
 from gfmd_cli.spec.models import LOADS
-from gfmd_cli.status import Status
+from gfmd_cli.status import LARGEST_TOLERANCE, Status
 from gfmd_cli.study.refinement import TaskSolution, border_share, inaccurate_columns
 from gfmd_cli.study.tasks import Task
 from gfmd_cli.units import LARGEST_RMS_HEIGHT
@@ -26,7 +26,6 @@ surfaces are in full contact from about 6 on; below, the largest grids have few 
 SMALL_GAPS = (1e-5, 1e-3)
 """Mean gaps [h_std]: below the first, or below the second if that is a possible gap in m, they are
 probably meant in m; a choice."""
-MAX_TOLERANCE = 0.01  # the mean gap of the default surface is then wrong by 0.1 to 1 %
 LARGEST_INDENTER = 0.1
 """Rms height of the cell of a single indenter [m] above which its unit is not the metre; a choice:
 that of a wheel of 1 m radius in a cell of 1 m is 0.05 m."""
@@ -70,10 +69,10 @@ def warnings_of(task: Task, solved: TaskSolution, results: Mapping[str, Any]) ->
             f"rms gradient {gradient:.3g}: check that surface.h_std and surface.length are in the "
             "same unit"
         )
-    if task.solver.tolerance > MAX_TOLERANCE:
+    if task.solver.tolerance > LARGEST_TOLERANCE:
         yield (
             f"solver.tolerance = {task.solver.tolerance:g}: contact area and mean gap may be wrong "
-            f"by several percent; at most {MAX_TOLERANCE:g} is usual"
+            f"by several percent; at most {LARGEST_TOLERANCE:g} is usual"
         )
     yield from elastomer.warnings(scene, task.boundary, is_rough=task.surface.rough)
     yield from _compressed(task, scene.h_std, results["displacement"])
