@@ -267,7 +267,7 @@ def _out_of_reach(task: Task, scene: Scene) -> str:
         if task.load <= smallest:
             return (
                 f"load.displacement = {task.load:g} m is not reached: the highest grid point first "
-                f"touches at {smallest:.6g} m, because the highest point of the surface lies between "
+                f"touches at {smallest:.6g} m, as the highest point of the surface lies between "
                 "grid points; use more points, or check that heights and lengths are in m"
             )
     return ""
