@@ -1,4 +1,4 @@
-"""Conjugate gradients restart after a direction that is not theirs."""
+"""Conjugate gradients restart after a direction that is not theirs, and only then."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ from gfmd_cli.physics.scenes import build_scene
 from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.solvers.loop import Start, solve
 from gfmd_cli.solvers.nested_grids import solve_contact
-from gfmd_cli.solvers.pcg import ProjectedCG
+from gfmd_cli.solvers.pcg import ProjectedCG, _Run
 
 
 def steps_to_the_solution(contact, u, direction=None):
@@ -33,3 +33,23 @@ def test_a_foreign_direction_costs_no_steps(seed):
     u, noise = solution.u + 0.3 * gap, np.random.default_rng(seed).random(gap.shape)
     foreign = steps_to_the_solution(contact, u, 0.3 * gap * (1 + noise))
     assert foreign <= steps_to_the_solution(contact, u) + 4
+
+
+@pytest.mark.parametrize("n", [0.3, 1])
+@pytest.mark.parametrize("share", [0.25, 0.5])
+def test_the_direction_of_a_move_that_ends_early_is_kept(n, share):
+    """The rest of the move is still worth making; its force is not orthogonal to the last one."""
+    contact = build_scene(SelfAffine(cutoff=0.0625), Power(n=n), 64).contact(0.001)
+    solution = solve_contact(contact, ProjectedCG(tolerance=1e-10))
+    u = solution.u + 0.3 * (solution.u - contact.obstacle)
+    state = ProjectedCG().begin_from(Start(contact, 0.0, u, contact.stress(u, np.empty_like(u))))
+    run = _Run(contact, state)
+    run.assess(run.classify())
+    run.select()
+    run.precondition()
+    descent = run.update_direction(0.0)[0]
+    state.length = share * run.exact_length(descent)
+    run.crosses = lambda length: True
+    run.advance(run.precondition())
+    assert state.moved == pytest.approx(share * state.best_length, rel=1e-3)
+    assert run.precondition() > 0
