@@ -40,7 +40,7 @@ from gfmd_cli.solvers.preconditioners import Preconditioner, create, select
 from gfmd_cli.solvers.projected_move import MAX_HALVINGS, MoveChoice, choose, conjugation
 
 MAX_TENSION_RATIO = 0.3  # of rms tension to rms free force
-"""With 0.1 the transforms are 0.98 to 1.05 times as many, with 1: 1.04 to 1.16 times (n = 1 to 4,
+"""With 0.1 the transforms are 0.96 to 1.02 times as many, with 1: 1.03 to 1.13 times (n = 1 to 4,
 64^2 to 256^2, seeds 3 to 5):
 `scripts/solver_constants.py pcg.MAX_TENSION_RATIO 0.1 1 --exponents 1 2 3 4`."""
 MAX_OVERLAP = 0.3  # of z with the force before the last move, over that with the force itself
@@ -51,10 +51,10 @@ and 0.003 without restarts: 0.83 to 1.21 times, with 0.1: 0.93 to 1.26, with 0.5
 (`--p-star 0.001 0.003`)."""
 MIN_SELECTION_INTERVAL = 4  # smallest number of steps between two selections of the preconditioner
 MAX_SCREENING_CHANGE = 1.25  # factor in k(q_c) up to which the old value is kept
-"""With 1 the transforms are 0.98 to 1.12 times as many (n = 0.25 to 0.7, 64^2 to 256^2, seeds 3 to
+"""With 1 the transforms are 0.99 to 1.08 times as many (n = 0.25 to 0.7, 64^2 to 256^2, seeds 3 to
 5 and 6 to 8): `scripts/solver_constants.py pcg.MAX_SCREENING_CHANGE 1 --exponents 0.25 0.5 0.7`."""
 SELECTION_GROWTH = 1.5  # growth of the number of steps from one selection to the next
-"""With one selection per grid the transforms are 0.88 to 1.07 times as many, in the mean 0.99 (n
+"""With one selection per grid the transforms are 0.89 to 1.04 times as many, in the mean 0.98 (n
 and grids as above, seeds 3 to 5): `scripts/solver_constants.py pcg.SELECTION_GROWTH 1e9 --exponents
 0.25 0.5 0.7`. Larger n select the V-cycle once and for all."""
 
