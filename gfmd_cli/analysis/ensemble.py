@@ -29,7 +29,8 @@ class Spread:
     """Standard error of the mean over n seeds: standard deviation (n - 1) over sqrt(n)."""
     half_width: float
     """The mean of all seeds lies within mean +- half_width with 95 % confidence: Student's t, and
-    the mean error of the single values, in the root of the sum of the squares."""
+    the mean error of the single values, in the root of the sum of the squares. NaN where that is
+    zero: equal values, such as the same number of points in contact, do not show their scatter."""
 
 
 @dataclass(frozen=True)
@@ -102,8 +103,8 @@ def spread_of(values: Sequence[float], errors: Sequence[float] = ()) -> Spread:
     error = float(np.std(numbers, ddof=1)) / sqrt(numbers.size)
     t_factor = float(stdtrit(numbers.size - 1, 0.5 + 0.5 * CONFIDENCE))
     shared = float(np.abs(errors).sum() / numbers.size)
-    half_width = hypot(t_factor * error, 0.0 if isnan(shared) else shared)
-    return Spread(float(numbers.mean()), error, half_width)
+    half_width = hypot(t_factor * error * (np.ptp(numbers) > 0), 0.0 if isnan(shared) else shared)
+    return Spread(float(numbers.mean()), error, half_width or nan)
 
 
 def without_seed(row: Row) -> tuple[Any, ...]:
