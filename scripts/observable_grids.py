@@ -1,8 +1,8 @@
 """How the optional observables, the energy and the contact line change with the grid.
 
-Random surfaces (lambda_r = L/4, lambda_s = L/32) are solved on grids of 128^2 to 1024^2 points, 4 to
-32 per lambda_s. The table shows values over those on the finest grid: the smallest and the largest
-ratio of all pressures and seeds.
+Random surfaces (lambda_r = L/4, lambda_s = L/32) are solved on grids of 128^2 to 1024^2 points, 4
+to 32 per lambda_s. The table shows values over those on the finest grid: the smallest and the
+largest ratio of all pressures and seeds.
 
 python scripts/observable_grids.py            # docs/observables.md
 """

@@ -1,10 +1,11 @@
 r"""How often errors of means over seeds hold: confidence intervals, and errors of Pr(sigma).
 
 Reads a study of one contact on many seeds, on four nested grids with histograms (or several files
-with some of its seeds). From a study of one grid, only the intervals are tested. Groups of seeds are compared with all others: the 95 % confidence interval
-of the mean on the finest grid, and the standard error of ln Pr that is extrapolated from the three
-coarser grids, with the finest three of the others. The difference is reduced by the share that the
-others have in its scatter. "worst" is the lowest share of a bin that half of the groups resolve.
+with some of its seeds). From a study of one grid, only the intervals are tested. Groups of seeds
+are compared with all others: the 95 % confidence interval of the mean on the finest grid, and the
+standard error of ln Pr that is extrapolated from the three coarser grids, with the finest three of
+the others. The difference is reduced by the share that the others have in its scatter. "worst" is
+the lowest share of a bin that half of the groups resolve.
 
 gfmd run configs/stress-distribution.toml -o study.h5 --set "surface.seed=[0, ..., 39]" \
     --set surface.cutoff=0.1 --set "elastomer.n=[1,2,3]" --set solver.tolerance=1e-5 \

@@ -479,7 +479,7 @@ def test_the_errors_of_equal_values_remain_in_their_mean():
 
 
 def test_equal_values_without_errors_have_no_interval():
-    """Three contacts of two points: their scatter is unknown, not zero, also where it is rounded."""
+    """Their scatter is unknown, not zero, also where it is rounded."""
     row = {"p_star": 0.1, "status": Status.CONVERGED, "load": "p_star", "a_r": 0.1}
     row |= {"sigma_p": 1.0, "u_g": 0.7} | {f"{name}_error": np.nan for name in QUANTITIES}
     assert np.std([0.1] * 3) != 0
