@@ -101,9 +101,10 @@ def spread_of(values: Sequence[float], errors: Sequence[float] = ()) -> Spread:
     """
     numbers = np.asarray(values, np.float64)
     error = float(np.std(numbers, ddof=1)) / sqrt(numbers.size)
-    t_factor = float(stdtrit(numbers.size - 1, 0.5 + 0.5 * CONFIDENCE))
+    is_equal = np.ptp(numbers) <= 1e-12 * np.max(np.abs(numbers))  # but for rounding
+    t_factor = 0.0 if is_equal else float(stdtrit(numbers.size - 1, 0.5 + 0.5 * CONFIDENCE))
     shared = float(np.abs(errors).sum() / numbers.size)
-    half_width = hypot(t_factor * error * (np.ptp(numbers) > 0), 0.0 if isnan(shared) else shared)
+    half_width = hypot(t_factor * error, 0.0 if isnan(shared) else shared)
     return Spread(float(numbers.mean()), error, half_width or nan)
 
 
