@@ -478,6 +478,16 @@ def test_the_errors_of_equal_values_remain_in_their_mean():
     assert spread_of([1.0, 3.0], [np.nan, 0.2]) == spread_of([1.0, 3.0])
 
 
+def test_equal_values_without_errors_have_no_interval():
+    """Their scatter is unknown, not zero, also where it is rounded."""
+    row = {"p_star": 0.1, "status": Status.CONVERGED, "load": "p_star", "a_r": 0.1}
+    row |= {"sigma_p": 1.0, "u_g": 0.7} | {f"{name}_error": np.nan for name in QUANTITIES}
+    assert np.std([0.1] * 3) != 0
+    means = Ensemble([row] * 3).means()
+    assert all(np.isnan(means[f"{name}_confidence"]) for name in QUANTITIES)
+    assert means["a_r_mean"] == pytest.approx(0.1)
+
+
 @pytest.mark.parametrize("first", [0, 1])
 def test_means_are_of_the_rows_with_errors_where_both_are_stored(rows_of, tmp_path, first):
     plain = SPEC.partition("[accuracy]")[0]

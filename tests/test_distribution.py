@@ -266,6 +266,7 @@ def test_seeds_are_averaged_with_their_spread(study):
     assert len(stresses.seeds) == 3
     assert "seed" not in stresses.title
     table = power_laws(compare(path)).as_text()
+    assert "n / (2 - n)" in table
     assert "power n=1 on self-affine cutoff=0.1" in table
     assert stresses.points == [64, 128, 256]
     known = np.isfinite(stresses.density)

@@ -8,10 +8,12 @@ from scipy.special import beta
 from gfmd_cli.errors import InputError
 from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.physics.discretisation_error import estimate
-from gfmd_cli.physics.elastomers import HalfSpace
+from gfmd_cli.physics.elastomers import HalfSpace, Power
 from gfmd_cli.physics.error_bounds import error_bounds
 from gfmd_cli.physics.error_estimates import GridValues
+from gfmd_cli.physics.free_contact import SCENES
 from gfmd_cli.physics.observables import border_contact, observe
+from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.solvers.auto import Auto
 from gfmd_cli.solvers.nested_grids import solve_contact
 
@@ -78,6 +80,20 @@ def test_the_bounds_hold_the_distance_to_the_solution(elastomer, void, pressure,
         return -observables.energy - (observables.work - 2 * observables.energy)
 
     assert energy(inexact) - energy(exact) <= bounds.duality_gap + rounding
+
+
+@pytest.mark.parametrize("n", [0.5, 1, 1.5])
+def test_the_uncertain_points_hold_the_error_of_the_area(n):
+    """As for a periodic boundary, within three points."""
+    contact = SCENES["free"](SelfAffine(cutoff=0.1), Power(n=n), 64).contact(1.0)
+    exact, approximate = (
+        solve_contact(contact, Auto(tolerance=tolerance, nested=False))
+        for tolerance in (1e-10, 1e-2)
+    )
+    bounds = error_bounds(contact, approximate.u, approximate.sigma)
+    areas = [observe(contact, each.u, each.sigma).a_r for each in (exact, approximate)]
+    assert 0.3 < areas[0] < 0.9
+    assert abs(areas[1] - areas[0]) <= bounds.a_r + 3 / contact.grid.size < 0.1
 
 
 def test_a_bad_solution_gets_wide_bounds():

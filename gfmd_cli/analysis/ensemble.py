@@ -29,7 +29,8 @@ class Spread:
     """Standard error of the mean over n seeds: standard deviation (n - 1) over sqrt(n)."""
     half_width: float
     """The mean of all seeds lies within mean +- half_width with 95 % confidence: Student's t, and
-    the mean error of the single values, in the root of the sum of the squares."""
+    the mean error of the single values, in the root of the sum of the squares. NaN where that is
+    zero: equal values, such as the same number of points in contact, do not show their scatter."""
 
 
 @dataclass(frozen=True)
@@ -100,10 +101,11 @@ def spread_of(values: Sequence[float], errors: Sequence[float] = ()) -> Spread:
     """
     numbers = np.asarray(values, np.float64)
     error = float(np.std(numbers, ddof=1)) / sqrt(numbers.size)
-    t_factor = float(stdtrit(numbers.size - 1, 0.5 + 0.5 * CONFIDENCE))
+    is_equal = np.ptp(numbers) <= 1e-12 * np.max(np.abs(numbers))  # but for rounding
+    t_factor = 0.0 if is_equal else float(stdtrit(numbers.size - 1, 0.5 + 0.5 * CONFIDENCE))
     shared = float(np.abs(errors).sum() / numbers.size)
     half_width = hypot(t_factor * error, 0.0 if isnan(shared) else shared)
-    return Spread(float(numbers.mean()), error, half_width)
+    return Spread(float(numbers.mean()), error, half_width or nan)
 
 
 def without_seed(row: Row) -> tuple[Any, ...]:

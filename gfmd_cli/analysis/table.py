@@ -116,7 +116,7 @@ class Table:
     def as_text(self) -> str:
         """The table in plain text, group by group; an empty string where there is no record."""
         blocks = [self._block(group) for group in self.groups if group.records]
-        caption = textwrap.fill(self.caption, WIDTH)
+        caption = textwrap.fill(self.caption, WIDTH).replace("\u00a0", " ")  # after the lines break
         return "\n\n".join([caption, *blocks] if caption and blocks else blocks)
 
     def as_html(self, typeset: Callable[[str], str] = escape) -> str:

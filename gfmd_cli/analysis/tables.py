@@ -97,7 +97,8 @@ COMPARISON = (
     STATUS,
 )
 EINSTEIN = (P_STAR, *(c for name in QUANTITIES for c in _beside_theory(name, "einstein")))
-EINSTEIN_CAPTION = "Comparison with the closed form for n = 0 and Gaussian heights."
+ON_GRIDS = "Values on the grid, not extrapolated."
+EINSTEIN_CAPTION = f"Comparison with the closed form for n = 0 and Gaussian heights. {ON_GRIDS}"
 CONTINUUM = (replace(P_STAR, error="p_star_error"), POINTS, *map(_continuum, QUANTITIES))
 SEEDS = (
     replace(P_STAR, error="p_star_confidence"),
@@ -202,14 +203,14 @@ def study_tables(comparison: Comparison) -> list[Table]:
 def comparison_table(curves: TitledCurves) -> Table:
     """Simulation beside Persson theory, with the values on the grid."""
     groups = [Group(title, curve.records, _scales(curve)) for title, curve in curves]
-    caption = "Values on the grid, not extrapolated."
+    caption = ON_GRIDS
     if any(curve.has_theory for _, curve in curves):
         source = curves[0][1].persson.mean_gap_source
         of_gap = f", mean gap by {source}" if source else ""
         caption = (
             f"Comparison with Persson theory{of_gap}. The theory assumes Gaussian heights."
-            f"{border_note(curves)} Values on the grid, not extrapolated. p ratio: pressure at "
-            "which the theory gives the simulated mean gap / simulated pressure."
+            f"{border_note(curves)} {ON_GRIDS} p ratio: pressure at which the "
+            "theory gives the simulated mean gap / simulated pressure."
         )
     rows = [record for group in groups for record in group.records]
     return Table(caption, shown(COMPARISON, rows), groups)
@@ -244,8 +245,8 @@ def continuum_table(curves: TitledCurves) -> Table:
 
 def true_contact_table(curves: TitledCurves) -> Table:
     """Persson theory with Delta_sigma over the contact."""
-    caption = "Persson theory with Delta_sigma over the contact instead of over the whole surface."
-    return over_pressure(TRUE_CONTACT, caption, curves, VARIANTS.values())
+    caption = "Persson theory with Delta_sigma over the contact instead of over the whole surface. "
+    return over_pressure(TRUE_CONTACT, caption + ON_GRIDS, curves, VARIANTS.values())
 
 
 def observables_table(curves: TitledCurves) -> Table:
@@ -257,7 +258,7 @@ def observables_table(curves: TitledCurves) -> Table:
         for column in columns
         if any(known(record[column.name]) for record in table.records)
     ]
-    return replace(table, caption=f"Observables: {'. '.join(meanings)}.")
+    return replace(table, caption=f"Observables: {'. '.join(meanings)}. {ON_GRIDS}")
 
 
 def seeds_table(comparison: Comparison) -> Table:

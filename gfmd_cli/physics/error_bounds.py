@@ -136,17 +136,20 @@ def _of_free_contact(contact: FreeContact, u: Field, sigma: Field) -> ErrorBound
     lowest = grid.min(float(touchable.min(initial=np.inf)))
     duality_gap = mean(s * (gap - lowest))
     centre = deflection + (lifted - energy) / p - mean(h)
+    gap -= mean(gap[s > 0])  # that of u is exactly zero in contact, and nowhere negative
+    violation = contact.clear_untouchable(np.minimum(gap, s))
+    limit = UNCERTAINTY_FACTOR * sqrt(mean(violation**2))
+    uncertain = contact.clear_untouchable(np.where(s > 0, s, gap) < limit)
     mean_compliance = mean(free.displacement(np.ones_like(s), out=gap))
     smallest = free.smallest_compliance
     omitted = sqrt(mean((contact_pressure(contact.obstacle, u, sigma) - s) ** 2))
-    violation = np.minimum(u - contact.obstacle, sigma)
     return ErrorBounds(
         duality_gap=duality_gap,
         u_g=abs(mean(u - h) - centre)
         + sqrt(mean_compliance * duality_gap)
         + _level_bound(duality_gap, energy, p),
         sigma_p=sqrt(duality_gap / smallest) + omitted if smallest > 0 else nan,
-        a_r=_uncertain_fraction(contact, u, sigma, mean(violation**2)),
+        a_r=mean(uncertain),
     )
 
 
