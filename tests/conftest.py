@@ -102,6 +102,8 @@ def goes_on_bit_for_bit(rows_of, tmp_path, monkeypatch):
 
     def goes_on_bit_for_bit(*overrides):
         monkeypatch.setattr(run_task, "REPORT_EVERY", 0.0)
+        # Both studies have the plans of this cache: others may add to the usual one in between.
+        monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
         (straight,) = rows_of(*overrides)
         states = []
 

@@ -144,9 +144,10 @@ def unresolved(factor: float) -> str:
         return ""
     return (
         "the waves of 2 to 4 points of the map increase Delta_sigma, the rms stress in full "
-        f"contact, by a factor of {factor:.2f}: the roughness probably continues below the pixels. "
-        "Each halving of the shortest wavelength then divides the contact area at light load by "
-        "about this factor; error bars do not include this"
+        f"contact, by a factor of {factor:.2f}: unless this is noise, the roughness probably "
+        "continues below the pixels. If it does, the next halving of its shortest wavelength "
+        "divides the contact area at light load by roughly this factor. Error bars do not include "
+        "this"
     )
 
 
