@@ -13,12 +13,12 @@ from gfmd_cli.grid.arrays import Field
 from gfmd_cli.grid.fft_grid import Grid
 
 MIN_FULL_MOVE = 0.5  # a full move lowers the energy if its best fraction is above 1/2
-"""With 0.7 the transforms are 0.97 to 1.14 times as many, with 1: 1.00 to 1.37 times (n = 0.5 to 4,
+"""With 0.7 the transforms are 0.98 to 1.21 times as many, with 1: 1.00 to 1.23 times (n = 0.5 to 4,
 64^2 to 256^2, seeds 3 to 5): `scripts/solver_constants.py projected_move.MIN_FULL_MOVE 0.7 1`."""
 MAX_HALVINGS = 60  # of a move along which the energy rises; beyond, it is rounding
 LENGTH_CHANGE = (0.5, 2.0)  # range of the factor by which a projected move changes the next length
-"""Transforms with 1/4 to 4 are 0.95 to 1.04 times as many (n = 0.5 to 4, 64^2 to 256^2, seeds 3 to
-5), with 2/3 to 3/2 0.97 to 1.13 times:
+"""Transforms with 1/4 to 4 are 0.95 to 1.01 times as many (n = 0.5 to 4, 64^2 to 256^2, seeds 3 to
+5), with 2/3 to 3/2 1.00 to 1.13 times:
 `scripts/solver_constants.py projected_move.LENGTH_CHANGE "(0.25, 4)" "(0.67, 1.5)"`."""
 
 
