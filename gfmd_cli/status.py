@@ -9,8 +9,7 @@ NEARLY_FULL = 0.99
 2048 points (n = 0.5 to 3, p* = 2.6 to 3.3, accuracy.mean_gap = 0.01) had 0.997 and more."""
 
 LARGEST_TOLERANCE = 0.01
-"""Natural residual above which a solution is of little use; the mean gap of the default surface is
-then wrong by 0.1 to 1 %."""
+"""Largest usual natural residual: the mean gap of the default surface is wrong by 0.1 to 1 %."""
 
 
 class ExplainedEnum(StrEnum):

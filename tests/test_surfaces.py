@@ -333,3 +333,11 @@ def test_a_mirrored_map_has_a_cell_of_twice_the_side(tmp_path):
     grid, h = sample(mirrored, 128)
     assert (grid.points, grid.length) == (128, 6.0)
     assert np.array_equal(h, h[::-1, ::-1])
+
+
+@pytest.mark.parametrize("points", [4, 31])
+def test_heights_on_too_few_points_are_refused(points):
+    """Two points per lambda_s take 32."""
+    assert SelfAffine(cutoff=1 / 16).heights(32).shape == (32, 32)
+    with pytest.raises(InputError, match=f"{points} points along x do not resolve the surface"):
+        SelfAffine(cutoff=1 / 16).heights(points)

@@ -58,8 +58,8 @@ class SurfaceSummary:
 
     def warnings(self) -> list[str]:
         """Probable mistakes, and whether a map resolves its roughness."""
-        unresolved_waves = unresolved(self.short_wave_factor)
-        return [*self.surface.warnings(), *filter(None, [unresolved_waves])]
+        warnings = [*self.surface.warnings(), unresolved(self.short_wave_factor)]
+        return list(filter(None, warnings))
 
     @property
     def in_si(self) -> bool:

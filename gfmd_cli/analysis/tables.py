@@ -245,8 +245,8 @@ def continuum_table(curves: TitledCurves) -> Table:
 
 def true_contact_table(curves: TitledCurves) -> Table:
     """Persson theory with Delta_sigma over the contact."""
-    caption = "Persson theory with Delta_sigma over the contact instead of over the whole surface. "
-    return over_pressure(TRUE_CONTACT, caption + ON_GRIDS, curves, VARIANTS.values())
+    caption = "Persson theory with Delta_sigma over the contact instead of over the whole surface."
+    return over_pressure(TRUE_CONTACT, f"{caption} {ON_GRIDS}", curves, VARIANTS.values())
 
 
 def observables_table(curves: TitledCurves) -> Table:

@@ -34,9 +34,11 @@ def measured_surface(data: ReportData) -> Section:
             if pictures and len(rows) < MAX_PICTURES:
                 rows.append(row)
                 drawings += _drawings(row, pictures, f"{data.prefix}{len(rows)}")
-    notes = [str(row["preparation"]) for row in rows]
-    factors = [row["short_wave_factor"] for row in rows]
-    notes += [f"Resolution: {note}." for note in map(unresolved, factors) if note]
+    notes: list[str] = []
+    for row in rows:
+        notes.append(str(row["preparation"]))
+        if note := unresolved(row["short_wave_factor"]):
+            notes.append(f"Resolution: {note}.")
     return Section("Measured surface", notes=notes, drawings=drawings)
 
 

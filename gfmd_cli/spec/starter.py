@@ -78,8 +78,8 @@ def starter_of_scan(
     scene = build_scene(repeated, spec.elastomer[0], repeated.smallest_grid())
     finished = text(scene.h_std, scene.delta_sigma, len(spec.elastomer), warnings)
     _checked(finished, path, overrides)
-    short_waves = unresolved(short_wave_factor(used, spec.elastomer[0]))
-    return finished, used.preparation(grid.boundary), [*warnings, *filter(None, [short_waves])]
+    warnings = [*warnings, unresolved(short_wave_factor(used, spec.elastomer[0]))]
+    return finished, used.preparation(grid.boundary), list(filter(None, warnings))
 
 
 def _checked(text: str, path: Path, overrides: tuple[str, ...]) -> Spec:

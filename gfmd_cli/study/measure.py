@@ -18,11 +18,7 @@ from gfmd_cli.physics.indenters import RigidSurface
 from gfmd_cli.physics.observables import changed_fractions, gap_histogram, stress_histogram
 from gfmd_cli.physics.patches import area_distribution
 from gfmd_cli.physics.power_spectra import autocorrelations, spectra
-from gfmd_cli.physics.surface_spectrum import (
-    Spectrum,
-    map_spectrum,
-    short_wave_factor,
-)
+from gfmd_cli.physics.surface_spectrum import Spectrum, map_spectrum, short_wave_factor
 from gfmd_cli.spec.models import SWEPT, OutputTable
 from gfmd_cli.study.column import Row
 from gfmd_cli.study.columns import FIELDS, PARAMETERS, PR_LINEAR, PR_LOGARITHMIC, empty_row
@@ -156,7 +152,7 @@ def _map_spectrum(surface: RigidSurface) -> Spectrum | None:
 
 
 def forget_spectra() -> None:
-    """Drop the spectra of maps: files may have changed, and other plans change the last bits."""
+    """Drop what was computed from maps: files and the last bits, with other plans, may change."""
     _map_spectrum.cache_clear()
     short_wave_factor.cache_clear()
 
