@@ -1,8 +1,8 @@
-"""How right the time left is that a run tells: the estimate over the truth, as the run goes on.
+"""The remaining time that a run prints, divided by the true remaining time.
 
     python scripts/time_left.py configs/demo.toml [--set key=value]
 
-One line a tenth of the run's wall time.
+At each tenth of the wall time of the run, the estimate that is nearest in time.
 """
 
 import argparse
@@ -32,10 +32,10 @@ def main():
         )
     end = estimates[-1][0]
     print(f"{arguments.spec} {' '.join(arguments.set)}: {end:.1f} s")
+    earlier = [estimate for estimate in estimates if estimate[0] < end]
     for tenth in range(1, 10):
-        when, left = min(estimates, key=lambda word: abs(word[0] - tenth * end / 10))
-        print(f"  {when / end:5.0%}  told {left:8.1f} s  true {end - when:8.1f} s  "
-              f"ratio {left / (end - when):5.2f}")  # fmt: skip
+        when, left = min(earlier, key=lambda estimate: abs(estimate[0] - tenth * end / 10))
+        print(f"{10 * tenth} %: {left / (end - when):.2f}", end="\n" if tenth == 9 else ", ")
 
 
 if __name__ == "__main__":

@@ -34,19 +34,21 @@ SECONDS_PER_PAIR = 1.7e-8
 P_STAR = 0.1  # reduced pressure of a forecast where the load is another quantity; a choice
 DECADES = -4, -3, -2, -1, 0
 PAIRS = {
-    0.1: (19, 32, 33, 15, 13),
-    0.25: (7, 7, 9, 15, 11),
-    0.5: (8, 5, 7, 20, 15),
-    1.0: (7, 7, 12, 15, 16),
-    1.5: (9, 22, 20, 15, 13),
-    2.0: (8, 21, 19, 18, 14),
-    2.5: (9, 23, 26, 23, 17),
-    3.0: (11, 33, 40, 33, 23),
-    3.5: (17, 65, 61, 50, 24),
-    4.0: (48, 97, 70, 51, 33),
+    0.1: (13, 13, 12, 9, 7),
+    0.25: (3, 2, 3, 10, 9),
+    0.5: (3, 3, 4, 13, 12),
+    1.0: (3, 3, 6, 11, 9),
+    1.5: (4, 6, 12, 11, 9),
+    2.0: (7, 17, 16, 15, 11),
+    2.5: (7, 20, 24, 21, 15),
+    3.0: (8, 21, 32, 25, 18),
+    3.5: (11, 44, 48, 39, 23),
+    4.0: (30, 120, 72, 54, 31),
 }
-"""Time of a solve over that of a pair of transforms, by n, at p* of these powers of ten. Measured
-on the default surface, 1024^2, residual 1e-6; at 2048^2 the ratio is 0.7 to 1.4 times as large."""
+"""Time of a solve in units of SECONDS_PER_PAIR times grid points, by n, at p* of these powers of
+ten: `scripts/forecast_pairs.py`. At 1024^2 and 2048^2 it is 0.73 to 1.36 times as large."""
+OTHER_PAIRS = 4.0
+"""The same for the preparation of the surface and the storing of the result, at 4096^2."""
 
 
 def fields_of_output(output: OutputTable, boundary: str) -> float:
@@ -74,7 +76,7 @@ def solves(is_searched: bool, is_accurate: bool) -> float:
 
 
 def pairs(exponent: float | None, p_star: float, tolerance: float) -> float:
-    """Time of a solve over that of a pair of transforms."""
+    """Time of a solve in units of SECONDS_PER_PAIR times grid points."""
     if exponent == 0:
         return 1.0
     tightness = 1 - 0.1 * float(np.log10(max(tolerance, 1e-14) / 1e-6))

@@ -125,12 +125,13 @@ class Task:
 
     @property
     def seconds(self) -> float:
-        """Time that the solve is expected to take on one thread, within a factor of about three."""
+        """Time that the task is expected to take on one thread, within a factor of about three."""
         is_searched = bool(models.LOADS[self.quantity].searched)
         solves = forecast.solves(is_searched, self.accuracy is not None)
         p_star = self.load if self.quantity == "p_star" else forecast.P_STAR
         pairs = forecast.pairs(self.elastomer.exponent, p_star, self.solver.tolerance)
-        return 0.01 + solves * forecast.SECONDS_PER_PAIR * self.size * pairs
+        pairs = solves * pairs + forecast.OTHER_PAIRS
+        return 0.01 + forecast.SECONDS_PER_PAIR * self.size * pairs
 
 
 def plan(spec: models.Spec, *, suited: bool = True) -> list[Task]:

@@ -12,9 +12,8 @@ from gfmd_cli.study.forecast import SECONDS_PER_PAIR
 from gfmd_cli.study.tasks import Task
 
 # Choices; scripts/time_left.py compares the estimates with the true times.
-MIN_REMAINING_SHARE = 0.5  # smallest remaining time by the forecast alone, over the elapsed time
-MEASURED_FROM = 0.1  # share of the forecast work after which the measured speed is used
-FINAL_PAIRS = 2.0  # pairs of transforms after the last step, which show and store the result
+MIN_REMAINING_SHARE = 0.3  # smallest remaining time by the forecast alone, over the elapsed time
+FINAL_PAIRS = 1.5  # pairs of transforms after the last step, which show and store the result
 RATE_FROM = 0.05  # share of the decrease of ln(residual) after which its rate predicts the rest
 
 
@@ -30,24 +29,15 @@ class _Running:
     first: float = float("nan")
     """First residual on that grid."""
     last: float = float("nan")
-    work: float = 0.0
-    """Steps times grid points, summed over the earlier grids."""
-    step: int = 0
-    first_step_at: float = 0.0
-    """Time of the first step of the task."""
-
-    def done(self) -> float:
-        """Steps times grid points that the task has done."""
-        return self.work + self.step * float(self.size)
 
 
 class RemainingTime:
     """The remaining time of a run, updated as its tasks start, step and end.
 
     The estimate for a waiting task is its forecast times the ratio of measured to forecast time of
-    the ended tasks of the same elastomer. A running task is assumed to continue at its present
-    speed. On its finest grid the rate at which ln(residual) decreases is used as well, with a
-    weight that increases with the decrease reached so far.
+    the ended tasks of the same elastomer, and that for a running task the same less the elapsed
+    time. On its finest grid the rate at which ln(residual) decreases is used as well, with a weight
+    that increases with the decrease reached so far.
     """
 
     def __init__(
@@ -87,9 +77,8 @@ class RemainingTime:
         elif progress.event == "step" and index in self.running:
             state = self.running[index]
             if progress.size != state.size:
-                state.work, state.first_step_at = state.done(), state.first_step_at or now
                 state.size, state.grid_started, state.first = progress.size, now, progress.residual
-            state.last, state.step = progress.residual, progress.step
+            state.last = progress.residual
         elif progress.event == "end":
             state = self.running.pop(index, _Running(now))
             if progress.status is not None and progress.status.is_solved:
@@ -114,12 +103,8 @@ class RemainingTime:
     def _left_of(self, index: int) -> float:
         """Remaining seconds of a running task."""
         task, state, now = self.tasks[index], self.running[index], self.now()
-        seconds, spent = task.seconds, now - state.started
-        forecast = seconds * self._speed_ratio(task.elastomer)
-        alone = SECONDS_PER_PAIR * state.done()
-        if alone > MEASURED_FROM * seconds:  # use the measured speed of this machine
-            prepared = state.first_step_at - state.started
-            forecast = prepared + seconds * (spent - prepared) / alone
+        spent = now - state.started
+        forecast = task.seconds * self._speed_ratio(task.elastomer)
         left = max(forecast - spent, MIN_REMAINING_SHARE * spent)
         if state.size == task.size and isfinite(state.first) and state.last > 0:
             total_decrease = log(max(state.first / task.solver.tolerance, 1.0))
@@ -128,10 +113,8 @@ class RemainingTime:
             if decrease >= total_decrease:
                 return ending
             if decrease > RATE_FROM * total_decrease:
-                by_residual = (now - state.grid_started) * (total_decrease - decrease) / decrease
-                return float(
-                    ending
-                    + by_residual ** (decrease / total_decrease)
-                    * left ** (1 - decrease / total_decrease)
-                )
+                to_decrease = total_decrease - decrease
+                by_residual = ending + (now - state.grid_started) * to_decrease / decrease
+                weight = decrease / total_decrease
+                return float(by_residual**weight * left ** (1 - weight))
         return left
