@@ -33,10 +33,10 @@ READING = """\
   not others are open. "misprint": the content holds, the printed form does not. "not decided here": otherwise, if a
   criterion is open, or there is none.
 - **Errors.** Results on rough surfaces are means over the seeds of the named study, at least eight, apart from the
-  cross-sections (Figs. 4 and 5), the map, and the height range of surfaces (statement 45: five). The standard errors contain
-  the scatter of the seeds (jackknife) and, for values in the continuum, the error of the grid (half of an error bar). Studies
-  have 32 seeds if statements on them were open with eight; verdicts near a limit are therefore weaker than two standard
-  errors suggest.
+  cross-sections (Figs. 4 and 5), the map, and the height range of surfaces (statement 45: five). The standard errors
+  contain the scatter of the seeds (jackknife) and, for values in the continuum, the error of the grid (half of an error
+  bar). Studies have 32 seeds if statements on them were open with eight; verdicts near a limit are therefore weaker than
+  two standard errors suggest.
 - **Limits.** The random phases of the paper are not known, so single numbers of its one realisation cannot be reproduced.
   Trends, exponents, ratios and exact results can.
 """
