@@ -150,13 +150,3 @@ def groups(studies: Any, name: str) -> list[Group]:
         map(Group, by_key.values()),
         key=lambda group: (np.nan_to_num(group.n, nan=9.0), group.first.points),
     )
-
-
-def sample(studies: Any, name: str) -> str:
-    """The surfaces of a study in words: seeds, size of the cell and range of the spectrum."""
-    row = studies.rows(name)[0]
-    seeds = len({row["seed"] for row in studies.rows(name)})
-    return (
-        f"Mean of {seeds} seeds, L = {1 / row['rolloff']:g} λᵣ, "
-        f"λᵣ/λₛ = {row['rolloff'] / row['cutoff']:g}."
-    )

@@ -13,7 +13,7 @@ from gfmd_cli.analysis.plotting import ColumnFigure
 from gfmd_cli.grid.arrays import Field
 from paper.claims import Finding, Value
 from paper.drawing import STYLES, dense, draw_points, finish, label
-from paper.ensembles import Group, Mean, estimate, groups, sample
+from paper.ensembles import Group, Mean, estimate, groups
 from paper.studies import StoredStudies, needs
 
 TAIL = 3e-4  # least gap of the logarithmic representation
@@ -86,7 +86,7 @@ def fig09a(studies: StoredStudies, folder: Path) -> list[Finding]:
                 "median error of u_g, p* ≤ 1": _cases(gaps, np.median),
                 "median error of p, p* ≥ 1": _cases(pressures, np.median),
             },
-            f"Continuum values. {sample(studies, 'fig06')} Largest errors of u_g: {largest}.",
+            f"Continuum values of `fig06` (u_g) and `fig09b` (p). Largest errors of u_g: {largest}.",
         ),
         Finding(
             "twenty_percent",
@@ -124,7 +124,7 @@ def fig09b(studies: StoredStudies, folder: Path) -> list[Finding]:
                 "d ln u_g/d p* at p* = 1.75 over that at 1.25": first,
                 "d ln u_g/d p* at p* = 2.75 over that at 1.25": second,
             },
-            f"n = 1: {slopes_text} at p* = {at}. {sample(studies, 'fig09b')} In theory the tail is Gaussian, "
+            f"n = 1: {slopes_text} at p* = {at}. Study `fig09b`. In theory the tail is Gaussian, "
             "and a finite surface has no gap beyond a finite pressure.",
         )
     ]
@@ -184,7 +184,7 @@ def small_pressure(studies: StoredStudies, folder: Path) -> list[Finding]:
             {quantity: ratios},
             f"1 means a logarithm. The pressures, at which p is the rms stress of the waves up to 2 qᵣ, are "
             f"p* = {limits_text}: the range shrinks as n rises.{left_out}{further} "
-            f"{sample(studies, 'small_pressure')}",
+            "Study `small_pressure`.",
         )
     ]
 
@@ -218,17 +218,19 @@ def fig10(studies: StoredStudies, folder: Path) -> list[Finding]:
     """H = 0.3."""
     _gap_over_pressure(studies, folder, "fig10b", "fig10b", "linear", "log")
     ensembles = _gap_over_pressure(studies, folder, "fig10", "fig10a", "log", "linear")
-    return [_transfer(studies, ensembles, "hurst", "H = 0.3 over H = 0.8")]
+    return [_transfer(studies, "fig10", ensembles, "hurst", "H = 0.3 over H = 0.8")]
 
 
 @needs("fig06", "cut_off")
 def cut_off(studies: StoredStudies, folder: Path) -> list[Finding]:
     """A cut-off spectrum."""
     ensembles = _gap_over_pressure(studies, folder, "cut_off", "cut_off", "log", "linear")
-    return [_transfer(studies, ensembles, "cut_off", "cut-off over roll-off")]
+    return [_transfer(studies, "cut_off", ensembles, "cut_off", "cut-off over roll-off")]
 
 
-def _transfer(studies: StoredStudies, ensembles: list[Group], key: str, ratio: str) -> Finding:
+def _transfer(
+    studies: StoredStudies, study: str, ensembles: list[Group], key: str, ratio: str
+) -> Finding:
     """Errors of theory on other surfaces over those on the default ones, all exponents together."""
     default = {group.n: _gap_errors(group, 1.0) for group in groups(studies, "fig06")}
     first = [_gap_errors(group, 1.0) for group in ensembles]
@@ -253,7 +255,7 @@ def _transfer(studies: StoredStudies, ensembles: list[Group], key: str, ratio: s
             f"{name} error of u_g over all n, {ratio}": over(of)
             for name, of in (("median", np.median), ("largest", np.max))
         },
-        f"p* ≤ 1. {sample(studies, 'fig06')} Largest errors: {each}.",
+        f"p* ≤ 1. Studies `{study}` and `fig06`. Largest errors: {each}.",
     )
 
 
@@ -275,7 +277,7 @@ def spacing(studies: StoredStudies, folder: Path) -> list[Finding]:
         Finding(
             "spacing",
             {"distance of u_g from the continuum": off},
-            f"p* = 0.1; u_g is too small on the grid for n ≥ 1. {sample(studies, 'spacing')}",
+            "p* = 0.1; u_g is too small on the grid for n ≥ 1. Study `spacing`.",
         )
     ]
 
@@ -312,8 +314,7 @@ def fig11(studies: StoredStudies, folder: Path) -> list[Finding]:
                     off["half-space"],
                 ),
             },
-            f"{sample(studies, 'fig11')} Eq. 42 as printed gives γ₄ for qt → 0 and γ₁ for qt → ∞, which is "
-            "correct; the conclusions interchange the two limits.",
+            "Study `fig11`.",
         )
     ]
 

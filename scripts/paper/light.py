@@ -9,7 +9,7 @@ from gfmd_cli.analysis.figures import P_STAR
 from gfmd_cli.analysis.plotting import ColumnFigure
 from paper.claims import SIGMAS, Finding, Value
 from paper.drawing import STYLES, dense, draw_limits, draw_points, finish
-from paper.ensembles import Group, Mean, estimate, groups, power, sample
+from paper.ensembles import Group, Mean, estimate, groups, power
 from paper.studies import StoredStudies, needs
 
 LIGHTEST, POWER, PLATES = 0.02, 0.17, 0.1
@@ -40,7 +40,7 @@ def light_area(studies: StoredStudies, folder: Path) -> list[Finding]:
         Finding(
             "other_power",
             {f"d ln a_r/d ln p* in the continuum, p* ≤ {POWER - 0.01:g}": slopes},
-            f"{sample(studies, 'light')} {_spacings(_grids(ensembles, 3.0))} points per λₛ. The area on the grid "
+            f"Study `light`, {_spacings(_grids(ensembles, 3.0))} points per λₛ. The area on the grid "
             f"itself has the slope {_power(finest, finest.column('a_r'))} on {finest.first.points}².",
         ),
         *_plates(studies, _grids(ensembles, 4.0)),
@@ -107,7 +107,7 @@ def _plates(studies: StoredStudies, grids: list[Group]) -> list[Finding]:
                     SIGMAS * a.error[nearest] / a.value[nearest]
                 )
             },
-            f"Two standard errors. {sample(studies, 'light')} Up to {_spacings(grids[-1:])} points per λₛ; "
+            f"Two standard errors. Study `light`, up to {_spacings(grids[-1:])} points per λₛ; "
             f"continuum values: {cases}. {missed} contacts missed the residual of 1e-5; the slowest took "
             f"{max(row['seconds'] for row in rows):.0f} s.",
         ),
@@ -160,7 +160,7 @@ def light_deviation(studies: StoredStudies, folder: Path) -> list[Finding]:
                 },
             },
             f"Equal increments mean a logarithm; {_spacings(grids)} points per λₛ: {cases}. "
-            f"{sample(studies, 'light')} On 2048² (`configs/paper/light.toml`, 102 points per λₛ, seeds 0 to 3) the next ratios, "
+            "Study `light`. On 2048² (`configs/paper/light.toml`, 102 points per λₛ, seeds 0 to 3) the next ratios, "
             "at p* = 0.3, 0.5 and 1, are 1.03 ± 0.02, 1.03 ± 0.01 and 1.00 ± 0.01.",
         ),
         Finding(

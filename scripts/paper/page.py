@@ -19,38 +19,39 @@ STATEMENTS: dict[str, Statement] = HERTZ | ROUGH
 INTRODUCTION = """\
 # The paper, claim by claim
 
-This page checks M. H. Müser, *Elastic contacts of randomly rough surfaces across the spatial dimensions*. Each figure
-of the paper has a spec in `configs/paper/`. The table lists each statement of the paper that can be checked, with the
-result of this program, from studies of [these sizes](#sizes-of-the-studies). The first command writes this page, the
-second one a page like it from smaller studies:
+This page checks M. H. Müser, *Elastic contacts of randomly rough surfaces across the spatial dimensions*: each statement
+that can be checked, with the result of this program. [Sizes of the studies](#sizes-of-the-studies) has the commands.
+"""
+
+READING = """\
+- **Criteria.** Each statement has criteria: a quantity and the limits between which the statement holds. They are data, in
+  `scripts/paper/statements_hertz.py` and `scripts/paper/statements_rough.py`. The limits come from the paper where it
+  gives a number; the others are choices. A criterion holds (✓) or fails (✗) if the value with twice its error lies inside
+  or outside of the limits; otherwise it is open (?). A value without an error is exact, or that of the one contact or
+  surface named with it.
+- **Verdicts.** "agrees": all criteria hold. "disagrees": all fail. "agrees in part": some hold and some fail, whether or
+  not others are open. "misprint": the content holds, the printed form does not. "not decided here": otherwise, if a
+  criterion is open, or there is none.
+- **Errors.** Results on rough surfaces are means over the seeds of the named study, at least eight, apart from the
+  cross-sections (Figs. 4 and 5), the map, and the height range of surfaces (statement 45: five). The standard errors
+  contain the scatter of the seeds (jackknife) and, for values in the continuum, the error of the grid (half of an error
+  bar). Studies have 32 seeds if statements on them were open with eight; verdicts near a limit are therefore weaker than
+  two standard errors suggest.
+- **Limits.** The random phases of the paper are not known, so single numbers of its one realisation cannot be reproduced.
+  Trends, exponents, ratios and exact results can.
+"""
+
+SIZES = """\
+## Sizes of the studies
+
+Each figure of the paper has a spec in `configs/paper/`. The first command writes this page, the second one a page like it
+from smaller studies:
 
 <!-- not run: takes two hours, and minutes -->
 ```bash
 make paper          # about two hours on one core: docs/paper.md
 make paper-quick    # small grids, two seeds, minutes: results/paper-quick/paper.md
 ```
-
-The random phases of the paper are not known, so single numbers of its one realisation cannot be reproduced. Trends,
-exponents, ratios and exact results can. Results on rough surfaces are means over at least eight seeds, apart from the
-cross-sections (Figs. 4 and 5), the map, and the height range of surfaces (statement 45: five). Those of Figs. 6, 9,
-10 and 11, of the cut-off spectrum and of the contact edges have 32 seeds, because statements on them were open with
-eight; verdicts near a limit are therefore weaker than two standard errors suggest. The standard errors contain the
-scatter of the seeds (jackknife) and, for values in the continuum, the error of the grid (half of an error bar).
-
-Each statement has criteria: a quantity and the limits between which the statement holds. They are data, in
-`scripts/paper/statements_hertz.py` and `scripts/paper/statements_rough.py`. The limits come from the paper where it
-gives a number; the others are choices. The verdict follows from them:
-
-- A criterion holds (✓) or fails (✗) if the value with twice its error lies inside or outside of the limits; otherwise
-  it is open (?). A value without an error is exact, or that of the one contact or surface named with it.
-- **agrees**: all criteria hold. **disagrees**: all fail. **agrees in part**: some hold and some fail, whether or
-  not others are open.
-- **misprint**: the content holds, the printed form does not.
-- **not decided here**: otherwise, if a criterion is open, or there is none.
-"""
-
-SIZES = """\
-## Sizes of the studies
 
 The paper has λᵣ/λₛ = 100 in most studies and grids of up to 16384² points. How the mean gap and the contact area depend
 on λᵣ/λₛ from 8 to 128 is [measured](mean_gap.md#trend-with-the-range-of-the-spectrum). A study of another size is run with
@@ -87,6 +88,13 @@ The program uses the corrected equations. Each correction was checked by an inde
 | Fig. 13 | $\lambda_r/\Delta a = 2 \ldots 64$ | $\lambda_s/\Delta a$ |
 """
 
+GALLERY = """\
+## Figures
+
+From Fig. 6 on, symbols are means over the seeds, with standard errors except in Fig. 13. In Figs. 9 to 11 and for the
+cut-off spectrum they are continuum values, and lines are Persson theory with Eq. 39.
+"""
+
 
 def table(findings: list[Finding]) -> str:
     """The statements as a Markdown table, numbered."""
@@ -109,9 +117,14 @@ def table(findings: list[Finding]) -> str:
 
 
 def count(findings: list[Finding]) -> str:
-    """Number of statements by verdict."""
-    verdicts = sorted(verdict(STATEMENTS[finding.key], finding) for finding in findings)
-    counts = ", ".join(f"{verdicts.count(v)} {v}" for v in dict.fromkeys(verdicts))
+    """Number of statements by verdict, with the rows of those that do not agree."""
+    rows: dict[str, list[str]] = {}
+    for number, finding in enumerate(findings, 1):
+        rows.setdefault(verdict(STATEMENTS[finding.key], finding), []).append(str(number))
+    counts = "; ".join(
+        f'"{name}" {len(which)}' + (f" ({', '.join(which)})" if name != "agrees" else "")
+        for name, which in sorted(rows.items())
+    )
     return f"{len(findings)} statements: {counts}"
 
 
@@ -167,13 +180,14 @@ def write(findings: list[Finding], studies: StoredStudies, figures: Path, target
     )
     parts = (
         INTRODUCTION,
-        f"{count(findings)}.",
+        fill(f"{count(findings)}.", WIDTH),
+        READING,
         table(findings),
         THEORY,
         SIZES,
         sizes(studies),
         MISPRINTS,
-        "## Figures",
+        GALLERY,
         gallery,
     )
     target.write_text("\n\n".join(part.strip() for part in parts) + "\n", encoding="utf-8")

@@ -56,7 +56,7 @@ def fig12(studies: StoredStudies, folder: Path) -> list[Finding]:
         Finding(
             "size_effect",
             {"gap at which they differ by 5 %, over Δh/2": ends},
-            f"Each surface with its own Δh. Mean of {len(ensembles[0].curves)} seeds, λᵣ/λₛ = 16.",
+            f"Each surface with its own Δh. Study `fig12`, {len(ensembles[0].curves)} seeds in each cell.",
         ),
         Finding(
             "einstein",
@@ -128,15 +128,13 @@ def large_cell(studies: StoredStudies, folder: Path) -> list[Finding]:
             at = int(np.abs(mean - first).argmax())
             difference = Value(abs(mean - first)[at], float(np.hypot(error[at], spread[at])))
             changes[f"{label(n)}, L/λᵣ = {ratio}"] = difference
-    seeds = ", ".join(
-        str(len({row["seed"] for row in studies.rows(f"large_cell_{ratio}")})) for ratio in ratios
-    )
+    names = ", ".join(f"`large_cell_{ratio}`" for ratio in ratios)
     quantity = "largest change of u_g against L = 2 λᵣ, in h_std (a symbol of Fig. 9a: 0.1)"
     return [
         Finding(
             "large_cell",
             {quantity: changes},
-            f"Means over {seeds} seeds, λᵣ/λₛ = 32. u_g/h_std at p* = {p[0]:g}: {', '.join(cases)}.",
+            f"Studies {names}. u_g/h_std at p* = {p[0]:g}: {', '.join(cases)}.",
         )
     ]
 

@@ -15,7 +15,7 @@ from gfmd_cli.grid.arrays import Field
 from gfmd_cli.physics.observables import LOGARITHMIC_EDGES, geometric_middles
 from paper.claims import Finding, Value
 from paper.drawing import STYLES, dense, draw_points, finish, label, slope
-from paper.ensembles import Group, Mean, estimate, groups, sample
+from paper.ensembles import Group, Mean, estimate, groups
 from paper.studies import StoredStudies, needs
 
 LOWEST = 0.02  # stress [Delta_sigma] that is drawn
@@ -69,9 +69,8 @@ def _small_stress(studies: StoredStudies) -> list[Finding]:
                 law: {label(n): Value(edge_exponent(n) - mu) for n, mu in paper.items()},
                 **({f"{half}, n = 1/2": exponents[0.5]} if 0.5 in exponents else {}),
             },
-            f"{'; '.join(cases)}. {sample(studies, 'edges')} Up to {points:.0f} points per λₛ: finer surfaces "
-            "are not resolved. σ ∝ d^(1−n/2) at an edge implies n/(2 − n) for n < 2; for n = 2 "
-            "the stress at the edge is finite and no law follows.",
+            f"{'; '.join(cases)}. Study `edges`, up to {points:.0f} points per λₛ: finer surfaces "
+            "are not resolved. [Law of the contact edge](stress_distribution.md#law-of-the-contact-edge).",
         ),
         Finding("small_stress_bulk", rises),
     ]
@@ -136,9 +135,8 @@ def fig13(studies: StoredStudies, folder: Path) -> list[Finding]:
             },
             f"Its error includes the change from the coarser grid: {tails_text}; p* = {distribution.finest['p_star']:g}. "
             f"The mean stress in contact is {mean:.2g} Δσ; [other windows](stress_distribution.md#tail-at-"
-            f"large-stress). {sample(studies, 'fig13')} The edge implies σ^−3, with which σ_p diverges logarithmically; "
-            "with σ^−2.6 it would diverge as a power. Each doubling of the grid increases σ_p². The ratio of "
-            f"successive increments is {factors}; it would be 1 for σ^−3 and 1.15 for σ^−2.6.",
+            f"large-stress). Study `fig13`. The ratio of successive increments of σ_p² is "
+            f"{factors}; it would be 1 for σ^−3 and 1.15 for σ^−2.6.",
         )
     ]
 

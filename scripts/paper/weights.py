@@ -11,7 +11,7 @@ from gfmd_cli.analysis.plotting import ColumnFigure
 from gfmd_cli.physics.persson import gamma_n
 from paper.claims import Finding, Value
 from paper.drawing import STYLES, column, draw_points, finish, label
-from paper.ensembles import Mean, estimate, groups, sample
+from paper.ensembles import Mean, estimate, groups
 from paper.studies import StoredStudies, needs
 
 SHOWN = 0.1  # p* of the figure and of the comparison
@@ -52,7 +52,7 @@ def weights(studies: StoredStudies, folder: Path) -> list[Finding]:
                 "measured W over Eq. (30), longest octave of waves": octaves[LONGEST],
                 "measured W over Eq. (30), shortest octave of waves": octaves[SHORTEST],
             },
-            f"p* = {SHOWN:g}. {sample(studies, 'weights')} W = |u(q)|²/|h(q)|² weighted with k C. The errors of the "
+            f"p* = {SHOWN:g}. Study `weights`. W = |u(q)|²/|h(q)|² weighted with k C. The errors of the "
             "energy cancel in u_g ([measured](energy_weights.md#the-weight-w-measured)).",
         ),
         Finding("exact_order", {}, "The program solves hard-wall contact only."),
@@ -110,7 +110,7 @@ def _sampling(studies: StoredStudies) -> list[Finding]:
         Finding(
             "percentile",
             {"predicted over computed a_r at p* = 0.01": light},
-            f"a_r in the continuum. {sample(studies, 'weights')}",
+            "a_r in the continuum. Study `weights`.",
         ),
     ]
 
