@@ -4,7 +4,21 @@ import pytest
 
 from gfmd_cli.status import Status
 from gfmd_cli.study.context import Progress
+from gfmd_cli.study.tasks import plan
 from gfmd_cli.study.time_left import RemainingTime
+
+SPEC = """
+[surface]
+kind = "self-affine"
+cutoff = 0.02
+[elastomer]
+kind = "power"
+n = 1
+[grid]
+points = 512
+[load]
+p_star = 0.1
+"""
 
 
 def task(index, seconds, elastomer="a"):
@@ -96,3 +110,10 @@ def test_failed_tasks_do_not_correct_forecasts(time):
     time.now = 50.0
     clock.update(word(0, "end", status=Status.FAILED))
     assert clock.left() == 1.0
+
+
+def test_slower_methods_are_forecast_to_take_longer(spec_of):
+    auto, ccg, fire = (
+        plan(spec_of(f"solver.kind={kind}"))[0].seconds for kind in ("auto", "ccg", "fire")
+    )
+    assert 2 * auto < ccg < fire

@@ -41,6 +41,7 @@ class ConstrainedCG(Solver):
 
     kind: Literal["ccg"] = "ccg"
     fields_in_memory: ClassVar[float] = 10.5
+    relative_time: ClassVar[float] = 5.0
 
     state_type: ClassVar[type[State]] = CCGState
 

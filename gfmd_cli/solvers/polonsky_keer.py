@@ -52,6 +52,7 @@ class PolonskyKeer(Solver):
 
     kind: Literal["polonsky-keer"] = "polonsky-keer"
     fields_in_memory: ClassVar[float] = 12.5
+    relative_time: ClassVar[float] = 13.0
 
     state_type: ClassVar[type[State]] = PolonskyKeerState
     max_exponent: ClassVar[float] = 1.5

@@ -130,7 +130,7 @@ class Task:
         solves = forecast.solves(is_searched, self.accuracy is not None)
         p_star = self.load if self.quantity == "p_star" else forecast.P_STAR
         pairs = forecast.pairs(self.elastomer.exponent, p_star, self.solver.tolerance)
-        pairs = solves * pairs + forecast.OTHER_PAIRS
+        pairs = solves * pairs * self.solver.relative_time + forecast.OTHER_PAIRS
         return 0.01 + forecast.SECONDS_PER_PAIR * self.size * pairs
 
 
