@@ -1,6 +1,7 @@
-"""Measure `forecast.PAIRS`: the time of a solve by n and p*, in units of `SECONDS_PER_PAIR`.
+"""Measure the tables of `forecast`: the time of a solve by n and p*, over `SECONDS_PER_PAIR`.
 
     python scripts/forecast_pairs.py --points 1024 2048
+    python scripts/forecast_pairs.py --boundary free --points 512 1024 --exponents 0.5 1 1.5
     python scripts/forecast_pairs.py --solver fire --points 512 --exponents 1 --p-star 0.01 0.1 1
 
 With another solver than `auto`, each entry is the ratio of its time to that of `auto`.
@@ -10,6 +11,7 @@ Each entry is the geometric mean over the grids; the last line shows its largest
 
 import argparse
 import os
+from functools import partial
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
@@ -18,7 +20,7 @@ from pydantic import TypeAdapter
 from timing import least
 
 from gfmd_cli.physics.elastomers import Power
-from gfmd_cli.physics.scenes import build_scene
+from gfmd_cli.physics.free_contact import SCENES
 from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.solvers.auto import AnySolver
 from gfmd_cli.solvers.nested_grids import solve_contact
@@ -27,14 +29,14 @@ from gfmd_cli.study.forecast import DECADES, PAIRS, SECONDS_PER_PAIR
 TOLERANCE = 1e-6
 
 
-def pairs(
-    kind: str, surface: SelfAffine, n: float, points: int, p_star: list[float], repeats: int
-) -> np.ndarray:
+def pairs(kind: str, options: argparse.Namespace, n: float, points: int) -> np.ndarray:
     """The time of a solve at each pressure, in units of `SECONDS_PER_PAIR` times grid points."""
-    scene = build_scene(surface, Power(n=n), points)
+    scene = SCENES[options.boundary](SelfAffine(cutoff=options.cutoff), Power(n=n), points)
     solver = TypeAdapter(AnySolver).validate_python({"kind": kind, "tolerance": TOLERANCE})
-    contacts = [scene.contact(p) for p in p_star]
-    times = [least(lambda: solve_contact(c, solver), repeats) for c in contacts]  # noqa: B023
+    times = []
+    for p_star in options.p_star:
+        solve = partial(solve_contact, scene.contact(p_star), solver)
+        times.append(least(solve, options.repeats))
     return np.array(times) / (SECONDS_PER_PAIR * points**2)
 
 
@@ -43,17 +45,16 @@ def main() -> None:
     parser.add_argument("--points", type=int, nargs="+", default=[1024, 2048])
     parser.add_argument("--exponents", type=float, nargs="+", default=list(PAIRS))
     parser.add_argument("--p-star", type=float, nargs="+", default=[10.0**d for d in DECADES])
+    parser.add_argument("--boundary", choices=list(SCENES), default="periodic")
     parser.add_argument("--solver", default="auto")
     parser.add_argument("--cutoff", type=float, default=SelfAffine().cutoff)
     parser.add_argument("--repeats", type=int, default=2)
     arguments = parser.parse_args()
-    surface, largest, ratios = SelfAffine(cutoff=arguments.cutoff), 1.0, []
+    kind, largest, ratios = arguments.solver, 1.0, []
     for n in arguments.exponents:
-        common = arguments.p_star, arguments.repeats
-        cases = [(surface, n, points, *common) for points in arguments.points]
-        grids = np.array([pairs(arguments.solver, *case) for case in cases])
-        if arguments.solver != "auto":
-            grids /= np.array([pairs("auto", *case) for case in cases])
+        grids = np.array([pairs(kind, arguments, n, points) for points in arguments.points])
+        if kind != "auto":
+            grids /= [pairs("auto", arguments, n, points) for points in arguments.points]
             ratios.append(grids)
         mean = np.exp(np.log(grids).mean(axis=0))
         largest = max(largest, float(np.exp(np.abs(np.log(grids / mean)).max())))

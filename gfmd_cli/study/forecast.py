@@ -47,6 +47,14 @@ PAIRS = {
 }
 """Time of a solve in units of SECONDS_PER_PAIR times grid points, by n, at p* of these powers of
 ten: `scripts/forecast_pairs.py`. At 1024^2 and 2048^2 it is 0.73 to 1.36 times as large."""
+FREE_PAIRS = {
+    0.5: (26, 12, 11, 29, 53),
+    1.0: (16, 13, 15, 64, 160),
+    1.5: (18, 17, 56, 450, 1100),
+    1.75: (120, 130, 270, 800, 5900),
+}
+"""The same with a free boundary: `scripts/forecast_pairs.py --boundary free --points 512 1024
+--cutoff 0.01 --exponents 0.5 1 1.5`; the last row is that of 512^2."""
 OTHER_PAIRS = 4.0
 """The same for the preparation of the surface and the storing of the result, at 4096^2."""
 
@@ -75,19 +83,25 @@ def solves(is_searched: bool, is_accurate: bool) -> float:
     return SOLVES_PER_ACCURATE_SEARCH if is_accurate else SOLVES_PER_SEARCH
 
 
-def pairs(exponent: float | None, p_star: float, tolerance: float) -> float:
-    """Time of a solve in units of SECONDS_PER_PAIR times grid points."""
+def pairs(exponent: float | None, p_star: float, tolerance: float, boundary: str) -> float:
+    """Time of a solve in units of SECONDS_PER_PAIR times grid points.
+
+    k(q) that is no power law is taken as q^2, with a free boundary as q: that of short waves.
+    """
     if exponent == 0:
         return 1.0
+    is_free = boundary == "free"
+    n = (1.0 if is_free else 2.0) if exponent is None else exponent
     tightness = 1 - 0.1 * float(np.log10(max(tolerance, 1e-14) / 1e-6))
-    return tightness * _measured_pairs(2.0 if exponent is None else exponent, p_star)
+    return tightness * _measured_pairs(n, p_star, is_free)
 
 
 @lru_cache(maxsize=1024)
-def _measured_pairs(n: float, p_star: float) -> float:
-    """See `PAIRS`, interpolated."""
+def _measured_pairs(n: float, p_star: float, is_free: bool) -> float:
+    """See `PAIRS` and `FREE_PAIRS`, interpolated."""
+    table = FREE_PAIRS if is_free else PAIRS
     by_pressure = [
-        np.interp(n, list(PAIRS), ratios) for ratios in zip(*PAIRS.values(), strict=True)
+        np.interp(n, list(table), ratios) for ratios in zip(*table.values(), strict=True)
     ]
     return float(np.interp(np.log10(max(p_star, 1e-14)), DECADES, by_pressure))
 

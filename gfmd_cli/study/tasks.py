@@ -129,7 +129,8 @@ class Task:
         is_searched = bool(models.LOADS[self.quantity].searched)
         solves = forecast.solves(is_searched, self.accuracy is not None)
         p_star = self.load if self.quantity == "p_star" else forecast.P_STAR
-        pairs = forecast.pairs(self.elastomer.exponent, p_star, self.solver.tolerance)
+        exponent, tolerance = self.elastomer.exponent, self.solver.tolerance
+        pairs = forecast.pairs(exponent, p_star, tolerance, self.boundary)
         pairs = solves * pairs * self.solver.relative_time + forecast.OTHER_PAIRS
         return 0.01 + forecast.SECONDS_PER_PAIR * self.size * pairs
 

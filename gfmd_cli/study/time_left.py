@@ -12,7 +12,7 @@ from gfmd_cli.study.forecast import SECONDS_PER_PAIR
 from gfmd_cli.study.tasks import Task
 
 # Choices; scripts/time_left.py compares the estimates with the true times.
-MIN_REMAINING_SHARE = 0.3  # smallest remaining time by the forecast alone, over the elapsed time
+MIN_REMAINING_SHARE = 0.5  # smallest remaining time by the forecast alone, over the elapsed time
 FINAL_PAIRS = 1.5  # pairs of transforms after the last step, which show and store the result
 RATE_FROM = 0.05  # share of the decrease of ln(residual) after which its rate predicts the rest
 
