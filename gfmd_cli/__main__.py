@@ -25,11 +25,22 @@ def _leave(number: int, frame: FrameType | None) -> None:
     sys.exit(128 + number)
 
 
+def _leave_at_once(ignored: "sys.UnraisableHookArgs") -> None:
+    """End the process where Python ignores the exception of `_leave`: in destructors, for example.
+
+    Another exception there is reported, as Python does.
+    """
+    if isinstance(ignored.exc_value, SystemExit) and isinstance(ignored.exc_value.code, int):
+        os._exit(ignored.exc_value.code)
+    sys.__unraisablehook__(ignored)
+
+
 def main() -> None:
     """Call the command line. While `gfmd run` solves, it takes signals itself."""
     for number in ENDING:
         if signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, _leave)
+    sys.unraisablehook = _leave_at_once
     for name in ("stdout", "stderr"):
         if getattr(sys, name) is None:  # closed
             setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115 - to the end

@@ -40,6 +40,17 @@ sys.meta_path.insert(0, Finder())
 main()
 """
 """An import that turns every exception into an ImportError, as those of compiled modules do."""
+IGNORING = """
+import signal, sys, types
+from gfmd_cli.__main__ import main
+class Command:
+    def __del__(self):
+        signal.raise_signal(int(sys.argv[1]))
+sys.modules["gfmd_cli.cli"] = types.SimpleNamespace(main=Command)
+main()
+print("still alive")
+"""
+"""A command whose destructor receives the signal: Python ignores exceptions there."""
 RUN = ("run", "spec.toml", "-j", "1", "-q", "--checkpoint-every", "1e-3", "-o")
 
 
@@ -99,10 +110,11 @@ def test_a_second_interrupt_leaves_at_once(folder, start):
     assert child.wait() in (130, 75)
 
 
+@pytest.mark.parametrize("program", [LOSING, IGNORING])
 @pytest.mark.parametrize("name", ["SIGTERM", "SIGINT"])
-def test_a_signal_during_an_import_ends_the_command_without_a_message(name):
+def test_a_signal_that_would_be_lost_ends_the_command_without_a_message(name, program):
     number = SIGNALS[name]
-    words = [sys.executable, "-P", "-c", LOSING, str(int(number))]
+    words = [sys.executable, "-P", "-c", program, str(int(number))]
     done = subprocess.run(words, capture_output=True, text=True)
     assert (done.returncode, done.stdout, done.stderr) == (128 + number, "", "")
 
