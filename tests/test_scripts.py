@@ -46,6 +46,7 @@ SMALL = {
 }
 """Arguments with which a script takes seconds."""
 CONSTANTS = [
+    ("forecast_pairs.py", "--boundary free --solver dual --points 64 --exponents 1 --cutoff 0.1"),
     ("indenter_bars.py", "--units --points 64 128 --exponents 1"),
     ("spectrum_fits.py", "--search --seeds 1 --hurst 0.8"),
 ]

@@ -117,3 +117,10 @@ def test_slower_methods_are_forecast_to_take_longer(spec_of):
         plan(spec_of(f"solver.kind={kind}"))[0].seconds for kind in ("auto", "ccg", "fire")
     )
     assert 2 * auto < ccg < fire
+
+
+def test_a_free_boundary_is_forecast_to_take_longer(spec_of):
+    periodic, free = (
+        plan(spec_of(f"grid.boundary={boundary}"))[0].seconds for boundary in ("periodic", "free")
+    )
+    assert free > 2 * periodic

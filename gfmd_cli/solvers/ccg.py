@@ -41,7 +41,7 @@ class ConstrainedCG(Solver):
 
     kind: Literal["ccg"] = "ccg"
     fields_in_memory: ClassVar[float] = 10.5
-    relative_time: ClassVar[float] = 5.0
+    relative_time: ClassVar[float] = 5.0  # 2 to 27 at n = 0.5, 1 and 3
 
     state_type: ClassVar[type[State]] = CCGState
 

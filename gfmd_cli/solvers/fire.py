@@ -50,7 +50,7 @@ class Fire(Solver):
 
     kind: Literal["fire"] = "fire"
     fields_in_memory: ClassVar[float] = 9.2
-    relative_time: ClassVar[float] = 8.0
+    relative_time: ClassVar[float] = 8.0  # 3.5 to 25 at n = 0.5, 1 and 3
     time_step: Annotated[float, Key(gt=0, lt=2)] = 1.9
     """Largest time step in units of (m / k_max)^(1/2). The Verlet algorithm is stable below 2. The
     program contMech uses 0.5, which needs 2 to 4 times as many steps (256^2, n = 0.5 to 4)."""

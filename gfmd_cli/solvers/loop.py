@@ -87,10 +87,8 @@ class Solver(SpecTable):
     """Fields of double precision at the peak of a solve: h, u, sigma, work; at half the size
     direction, change, k(q); contact marks, coarse levels. scripts/memory.py measures it."""
     relative_time: ClassVar[float] = 1.0
-    """Time of a solve over that of `auto`, for forecasts. Geometric means on 512^2, p* = 0.01 to 1:
-    8 (3.5 to 25) for `fire`, 5 (2 to 27) for `ccg`, at n = 0.5, 1 and 3, and 13 (4 to 150)
-    for `polonsky-keer` at n = 0.5 and 1: `scripts/forecast_pairs.py --solver fire --points 512
-    --exponents 0.5 1 3 --p-star 0.01 0.1 1`."""
+    """Time of a solve over that of `auto`, for forecasts: the geometric mean at p* = 0.01 to 1 on
+    512^2, which scripts/forecast_pairs.py measures."""
     boundary: ClassVar[str] = "periodic"
     """The boundary of the contacts that the solver solves."""
     max_exponent: ClassVar[float] = inf

@@ -52,7 +52,7 @@ class PolonskyKeer(Solver):
 
     kind: Literal["polonsky-keer"] = "polonsky-keer"
     fields_in_memory: ClassVar[float] = 12.5
-    relative_time: ClassVar[float] = 13.0
+    relative_time: ClassVar[float] = 13.0  # 4 to 150 at n = 0.5 and 1
 
     state_type: ClassVar[type[State]] = PolonskyKeerState
     max_exponent: ClassVar[float] = 1.5

@@ -34,30 +34,33 @@ SECONDS_PER_PAIR = 1.7e-8
 P_STAR = 0.1  # reduced pressure of a forecast where the load is another quantity; a choice
 DECADES = -4, -3, -2, -1, 0
 PAIRS = {
-    0.1: (13, 13, 12, 9, 7),
-    0.25: (3, 2, 3, 10, 9),
-    0.5: (3, 3, 4, 13, 12),
-    1.0: (3, 3, 6, 11, 9),
-    1.5: (4, 6, 12, 11, 9),
-    2.0: (7, 17, 16, 15, 11),
-    2.5: (7, 20, 24, 21, 15),
-    3.0: (8, 21, 32, 25, 18),
-    3.5: (11, 44, 48, 39, 23),
-    4.0: (30, 120, 72, 54, 31),
+    "periodic": {
+        0.1: (13, 13, 12, 9, 7),
+        0.25: (3, 2, 3, 10, 9),
+        0.5: (3, 3, 4, 13, 12),
+        1.0: (3, 3, 6, 11, 9),
+        1.5: (4, 6, 12, 11, 9),
+        2.0: (7, 17, 16, 15, 11),
+        2.5: (7, 20, 24, 21, 15),
+        3.0: (8, 21, 32, 25, 18),
+        3.5: (11, 44, 48, 39, 23),
+        4.0: (30, 120, 72, 54, 31),
+    },
+    "free": {
+        0.5: (12, 12, 11, 30, 52),
+        1.0: (13, 14, 15, 66, 170),
+        1.5: (14, 17, 56, 430, 1100),
+        1.75: (97, 140, 280, 850, 5800),
+    },
 }
-"""Time of a solve in units of SECONDS_PER_PAIR times grid points, by n, at p* of these powers of
-ten: `scripts/forecast_pairs.py`. At 1024^2 and 2048^2 it is 0.73 to 1.36 times as large."""
-FREE_PAIRS = {
-    0.5: (26, 12, 11, 29, 53),
-    1.0: (16, 13, 15, 64, 160),
-    1.5: (18, 17, 56, 450, 1100),
-    1.75: (120, 130, 270, 800, 5900),
-}
-"""The same with a free boundary: `scripts/forecast_pairs.py --boundary free --points 512 1024
---cutoff 0.01 --exponents 0.5 1 1.5`; the last row with `--points 512 --exponents 1.75`. At 512^2
-and 1024^2 it is 0.54 to 1.84 times as large."""
+"""Time of a solve in units of SECONDS_PER_PAIR times grid points, by boundary and n, at p* of these
+powers of ten. Means of 1024^2 and 2048^2, each at most 1.4 times larger or smaller:
+`scripts/forecast_pairs.py`; with a free boundary of 512^2 and 1024^2, at most 1.5 times:
+`--boundary free --points 512 1024 --cutoff 0.01`, the last row of 512^2 alone."""
+UNKNOWN_EXPONENT = {"periodic": 2.0, "free": 1.0}
+"""The n of k(q) that is no power law, by boundary; a choice."""
 OTHER_PAIRS = 4.0
-"""The same for the preparation of the surface and the storing of the result, at 4096^2."""
+"""The same for the preparation of the surface and the storing of the result; a choice."""
 
 
 def fields_of_output(output: OutputTable, boundary: str) -> float:
@@ -85,22 +88,18 @@ def solves(is_searched: bool, is_accurate: bool) -> float:
 
 
 def pairs(exponent: float | None, p_star: float, tolerance: float, boundary: str) -> float:
-    """Time of a solve in units of SECONDS_PER_PAIR times grid points.
-
-    k(q) that is no power law is taken as q^2, with a free boundary as q: that of short waves.
-    """
+    """Time of a solve in units of SECONDS_PER_PAIR times grid points."""
     if exponent == 0:
         return 1.0
-    is_free = boundary == "free"
-    n = (1.0 if is_free else 2.0) if exponent is None else exponent
+    n = UNKNOWN_EXPONENT[boundary] if exponent is None else exponent
     tightness = 1 - 0.1 * float(np.log10(max(tolerance, 1e-14) / 1e-6))
-    return tightness * _measured_pairs(n, p_star, is_free)
+    return tightness * _measured_pairs(boundary, n, p_star)
 
 
 @lru_cache(maxsize=1024)
-def _measured_pairs(n: float, p_star: float, is_free: bool) -> float:
-    """See `PAIRS` and `FREE_PAIRS`, interpolated."""
-    table = FREE_PAIRS if is_free else PAIRS
+def _measured_pairs(boundary: str, n: float, p_star: float) -> float:
+    """See `PAIRS`, interpolated."""
+    table = PAIRS[boundary]
     by_pressure = [
         np.interp(n, list(table), ratios) for ratios in zip(*table.values(), strict=True)
     ]
