@@ -82,6 +82,58 @@ def test_a_line_contact_is_that_of_the_iteration():
     assert direct.u == pytest.approx(solve_contact(contact, WholeGrids()).u, abs=1e-6)
 
 
+def single_grid():
+    return square(Power(n=4), points=64, p_star=1e-12)
+
+
+BELOW_ROUNDING = {
+    "n=4": lambda: square(Power(n=4), p_star=1e-4),
+    "n=4, one point": lambda: square(Power(n=4), p_star=1e-8),
+    "n=3": lambda: square(Power(n=3), p_star=1e-5),
+    "tiles": lambda: square(Power(n=2), points=512, p_star=1e-6),
+    "odd": lambda: square(Power(n=4), points=181, p_star=1e-5),
+    "single grid": single_grid,
+    "line": lambda: build_scene(LineParabola(radius=1.0), Power(n=3), 1024).contact(1e-7),
+}
+
+
+@pytest.mark.parametrize("make", BELOW_ROUNDING.values(), ids=BELOW_ROUNDING)
+def test_a_contact_is_solved_although_the_stress_of_a_rounded_displacement_is_not_known(make):
+    """K u misses the tolerance, whatever the solver; the displacement of sigma reaches it."""
+    contact = make()
+    solution = solve_contact(contact, ProjectedCG(tolerance=1e-6))
+    assert contact.recompute(solution.u, np.empty_like(solution.u)) > 2e-7
+    assert solution.status == "converged"
+    assert solution.is_direct
+    assert solution.residual < 1e-9
+    sigma, axes = solution.sigma, tuple(range(solution.u.ndim))
+    modes = np.fft.rfftn(sigma, axes=axes)
+    modes.flat[0] = 0.0
+    modes /= np.where(contact.stiffness > 0, contact.stiffness, 1.0)
+    gap = np.fft.irfftn(modes, sigma.shape, axes=axes) - contact.height
+    gap -= gap[sigma > 0].mean()
+    violations = np.minimum(gap, sigma)  # in two codes
+    assert np.sqrt(np.mean(violations**2)) < 1e-9 * contact.pressure + 1e-15
+    assert sigma.mean() == pytest.approx(contact.pressure, rel=1e-12)
+    assert solution.u - contact.height == pytest.approx(np.where(sigma > 0, 0.0, gap), abs=1e-12)
+
+
+def test_a_solve_stopped_in_a_direct_solution_of_its_last_grid_goes_on_bit_by_bit():
+    contact, states = BELOW_ROUNDING["tiles"](), []
+
+    def keep(current, state):
+        states.append((current.grid.whole_shape, copy.deepcopy(state)))
+
+    straight = solve_contact(contact, ProjectedCG(tolerance=1e-6), keep)
+    shape, state = states[-1]
+    assert shape == (512, 512)
+    rest = solve_contact(contact, ProjectedCG(tolerance=1e-6), resume=Resume(shape, state))
+    assert rest.is_direct
+    assert np.array_equal(rest.u, straight.u)
+    assert np.array_equal(rest.sigma, straight.sigma)
+    assert rest.transforms == straight.transforms
+
+
 @pytest.mark.parametrize(("points", "coarse"), [(64, 32), (66, 34), (61, 32)])
 def test_points_in_contact_are_refined_to_those_nearest_and_between(points, coarse):
     contact = square(Power(n=2), points)

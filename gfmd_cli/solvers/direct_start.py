@@ -23,10 +23,14 @@ Step [2] with the very first point is the inner loop of the active set method of
 (Solving Least Squares Problems, 1974, chapter 23).
 
 A solution costs m^3 / 3 operations for m points, and the displacement at all points a pair of
-transforms. The result is exact: its residual is the rounding.
+transforms. The stress is the unknown, and the displacement C s + c follows from it without loss of
+digits: the residual is the rounding of the displacement. To compute K u from the displacement
+instead would multiply its rounding by k_max, which exceeds the pressure in small contacts of stiff
+elastomers.
 """
 
 from collections.abc import Callable
+from math import inf
 from typing import Any
 
 import numpy as np
@@ -102,8 +106,8 @@ class _DirectSolve:
         self.values = self.grid.as_rows(self.grid.padded)[:, : self.grid.points]
         self.stress: Field | None = None
         """Stresses s >= 0 that are kept from set to set; None before."""
-        self.solution: tuple[Points, Field] | None = None
-        """Points in contact and their stresses, once they are found without residual."""
+        self.solution: tuple[Points, Field, float] | None = None
+        """Points in contact, their stresses and the residual, once no point is misclassified."""
         self.transforms = 0.0
         self.evaluate((0, 0), 1.0)
         rows, columns = self.values.shape
@@ -137,16 +141,18 @@ class _DirectSolve:
             has_tension = self.stress is not None and np.any(t < 0)
             if has_tension:
                 self.approach(points, t, factor)  # [2]
-            del factor  # before the next one, which is as large as some fields
-            if has_tension:
+                del factor  # before the next one, which is as large as some fields
                 continue
             self.evaluate(points, t)
-            self.level = float((self.values[points] - self.obstacle[points]).mean())
+            gap = self.values[points] - self.obstacle[points]
+            self.level = float(gap.mean())
             misclassified, residual = self.compare(points, t)
             count = int(np.count_nonzero(misclassified))
-            self.solution = (points, t) if count == 0 else None
+            if count == 0:
+                self.solution = (points, t, self.rounding(gap - self.level, factor))
             if count == 0 or residual < tolerance:
                 break
+            del factor
             if self.stress is None and count >= fewest:
                 self.stress = np.zeros(self.touching.shape)
                 self.stress[points] = self.without_tension(t)
@@ -183,6 +189,11 @@ class _DirectSolve:
         s *= t.sum() / s.sum()
         return s
 
+    def rounding(self, gap: Field, factor: Field) -> float:
+        """Natural residual by rounding: of the gaps in contact and the stresses that close them."""
+        change = _balanced(factor, -gap, 0.0)
+        return self.contact.as_residual(float(np.square(gap).sum() + np.square(change).sum()))
+
     def compare(self, points: Points, s: Field) -> tuple[Mask, float]:
         """The points that are in contact or not by mistake, and the natural residual of that."""
         misclassified = np.empty(self.touching.shape, dtype=np.bool_)
@@ -217,30 +228,23 @@ class _DirectSolve:
         matrix = np.empty((rows.size, rows.size))
         _fill_lower_triangle(matrix, rows, columns, self.compliance, *self.values.shape)
         # The lower triangle by rows is the upper one by columns, which LAPACK overwrites.
-        factor = cho_factor(matrix.T, overwrite_a=True, check_finite=False)
-        sides = np.stack([self.obstacle[points], np.ones(rows.size)], axis=1)
-        by_height, by_level = cho_solve(factor, sides, check_finite=False).T
-        remaining_load = self.contact.pressure * self.grid.size - by_height.sum()
-        return by_height + by_level * (remaining_load / by_level.sum()), factor[0]
+        factor, _ = cho_factor(matrix.T, overwrite_a=True, check_finite=False)
+        load = self.contact.pressure * self.grid.size
+        return _balanced(factor, self.obstacle[points], load), factor
 
     def start(self, transforms: float) -> Start:
-        """The displacement, laid on the indenter in contact; with the stress if that is exact.
-
-        Laying moves points by rounding errors e, whose stress is K e with |K e| <= k_max |e|.
-        """
+        """The displacement, laid on the indenter in contact; with the stress if that is exact."""
         u = self.grid.empty()
         gap = self.grid.as_rows(u)
         np.subtract(self.values, self.grid.as_rows(self.contact.height), out=gap)
         gap -= self.level
-        sigma, rounding = None, 0.0
+        sigma, residual = None, inf
         if self.solution is not None:
-            points, t = self.solution
+            points, t, residual = self.solution
             sigma = np.zeros(u.shape)
             self.grid.as_rows(sigma)[points] = t
-            moved = float(np.square(gap[points]).sum())
-            rounding = self.contact.largest_stiffness * self.contact.as_residual(moved)
         self.contact.set_displacement(u, u, self.touching.reshape(u.shape))
-        return Start(self.contact, transforms, u, sigma, rounding)
+        return Start(self.contact, transforms, u, sigma, residual=residual)
 
 
 @kernel
@@ -252,6 +256,19 @@ def _fill_lower_triangle(
         for b in range(a + 1):
             y, x = abs(rows[a] - rows[b]), abs(columns[a] - columns[b])
             matrix[a, b] = compliance[min(y, height - y), min(x, width - x)]
+
+
+def _balanced(factor: Field, h: Field, load: float) -> Field:
+    """The stresses s with C s + c = h for some level c, and the sum `load`; C = U^T U.
+
+    The level is that of all h first, so that the stresses are small. The load is balanced twice,
+    as the first time rounding of larger stresses remains.
+    """
+    sides = np.stack([h - h.mean(), np.ones(h.size)], axis=1)
+    s, by_level = cho_solve((factor, False), sides, check_finite=False).T
+    for _ in range(2):
+        s = s + by_level * ((load - s.sum()) / by_level.sum())
+    return s
 
 
 def _energy(factor: Field, s: Field) -> float:

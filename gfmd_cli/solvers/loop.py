@@ -64,6 +64,9 @@ class Start:
     """Stress, if it is known; always with a free boundary."""
     rounding: float = 0.0
     """Estimate of what the rounding of sigma adds to the residual; 0 if unknown."""
+    residual: float = inf
+    """Natural residual of sigma and of the displacement that was computed from it, where sigma was
+    solved for; else infinite."""
 
 
 class Solver(SpecTable):

@@ -2,15 +2,16 @@
 
 from dataclasses import dataclass
 from functools import partial
-from math import hypot, prod
+from math import hypot, inf, prod
 
 import numpy as np
 
 from gfmd_cli.grid.arrays import Field, row_blocks
 from gfmd_cli.grid.fft_grid import Grid, Shape
 from gfmd_cli.physics.contact import Contact
-from gfmd_cli.physics.observables import contact_pressure
+from gfmd_cli.physics.observables import contact_points, contact_pressure
 from gfmd_cli.solvers.direct_start import direct_start
+from gfmd_cli.solvers.local_solve import MAX_ROUNDING
 from gfmd_cli.solvers.local_start import COARSE_TOLERANCE, start_from, tiles_apply
 from gfmd_cli.solvers.loop import Solver, Start, State, Watch, ignore, is_certain, solve
 from gfmd_cli.solvers.multigrid import coarsened_axes
@@ -23,10 +24,7 @@ HEIGHT_ROUNDING = 1000  # units of rounding by which indenters on other numbers 
 
 @dataclass
 class Solution:
-    """A solved contact with its residual, both up to rounding that is far below the tolerance.
-
-    `Contact.recompute` gives the exact stress and residual of u.
-    """
+    """A solved contact with its residual, both up to rounding that is far below the tolerance."""
 
     u: Field
     sigma: Field
@@ -36,6 +34,13 @@ class Solution:
     steps: int
     transforms: float
     """Real transforms, in units of those of the solved grid."""
+    is_direct: bool = False
+    """Whether sigma was solved for directly, and u follows from it."""
+
+    def recompute(self, contact: Contact) -> None:
+        """Compute sigma and the residual from u. Of a direct solution both are exact already."""
+        if not self.is_direct:
+            self.residual = contact.recompute(self.u, self.sigma)
 
 
 @dataclass
@@ -76,8 +81,11 @@ def solve_contact(
     coarse: Contact | None = None
     state: State | None = None
     start: Start | None = None
+    direct: State | None = None
     while grids:
         fine = grids.pop()
+        current = solver if fine is contact else loose
+        residual = inf if start is None else start.residual
         if resume is not None:
             state = _resumed(fine, resume, solver.tolerance)
             transforms, resume = state.coarser_transforms, None
@@ -85,7 +93,13 @@ def solve_contact(
             state = _begin(solver, fine, coarse, state, start)
             coarse = start = None  # frees their memory, which is needed now
             state.coarser_transforms = transforms
-        status = solve(fine, solver if fine is contact else loose, state, watch)
+        direct = _direct_solution(fine, current, state, residual, watch)
+        if direct is None:
+            status = solve(fine, current, state, watch)
+        else:
+            state, status = direct, Status.CONVERGED
+            if state.residual >= current.tolerance:
+                status = Status.ROUNDING
         transforms += state.transforms * fine.grid.size / contact.grid.size
         coarse = fine
         if grids and solver.starts_locally:
@@ -95,12 +109,12 @@ def solve_contact(
                 while grids[-1] is not start.contact:
                     grids.pop()
     assert state is not None
-    if contact.is_periodic and status.is_converged and state.step == 0:  # no step has laid points
+    has_laid = direct is not None or state.step > 0
+    if contact.is_periodic and status.is_converged and not has_laid:
         state, status = _with_pressed_laid(contact, solver, state, watch)
     transforms = state.coarser_transforms + state.transforms
-    return Solution(
-        state.u, state.sigma, state.residual, status, solver.kind, state.step, transforms
-    )
+    fields, work = (state.u, state.sigma, state.residual), (state.step, transforms)
+    return Solution(*fields, status, solver.kind, *work, direct is not None)
 
 
 def _with_pressed_laid(
@@ -130,6 +144,35 @@ def _local_start(
     if tiles_apply(finer[-1]):
         return start_from(coarse, pressure, finer, tolerance, pause)
     return direct_start(pressure > 0, finer, pause) if coarse.is_periodic else None
+
+
+def _direct_solution(
+    contact: Contact, solver: Solver, state: State, residual: float, watch: Watch
+) -> State | None:
+    """The state, if it was solved directly; or a direct solution, where rounding of u requires one.
+
+    That is where an iteration, whose stress is K u + p, cannot reach its tolerance. None elsewhere,
+    where too many points are in contact, and where the iteration can reach a smaller residual.
+
+    Parameters
+    ----------
+    residual : natural residual if the state was solved directly, else infinite
+    watch : is called with the state before its first step, from which a stopped solve goes on
+    """
+    if not (solver.starts_locally and contact.is_periodic) or state.step > 0:
+        return None
+    rounding = contact.rounding(state.u)
+    if residual == inf and rounding >= MAX_ROUNDING * solver.tolerance:
+        touching = contact_points(contact.obstacle, state.u, state.sigma)
+        start = direct_start(touching, [contact], partial(watch, contact, state))
+        if start is not None and start.residual < inf:
+            spent, before = state.transforms + start.transforms, state.coarser_transforms
+            state, residual = solver.begin_from(start), start.residual
+            state.transforms, state.coarser_transforms = spent, before
+    if residual >= max(solver.tolerance, rounding):
+        return None
+    state.residual = residual
+    return state
 
 
 def levels(shape: Shape, sides: tuple[float, ...]) -> list[Shape]:

@@ -137,13 +137,13 @@ def solve_on_grids(task: Task, context: SolveContext, watcher: Watcher) -> TaskS
 
 
 def _solve_on_grid(task: Task, scene: Scene, contact: Contact, watcher: Watcher) -> TaskSolution:
-    """Solve a contact; its stress and residual are measured on the displacement that is stored.
+    """Solve a contact; its stress and residual are those of the displacement that is stored.
 
     The solve does not start from the solution on the grid before: interpolated, that would lead to
     neither tiles nor direct solutions, which make small contacts fast.
     """
     solution = solve_contact(contact, task.solver, watcher, watcher.saved_state(contact))
-    solution.residual = contact.recompute(solution.u, solution.sigma)
+    solution.recompute(contact)
     if solution.status.is_converged and not solution.residual < task.solver.tolerance:
         solution.status = Status.ROUNDING
     return TaskSolution(scene, contact, solution, observe(contact, solution.u, solution.sigma))
