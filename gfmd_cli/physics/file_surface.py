@@ -1,6 +1,5 @@
 """Height maps and line profiles from files as surfaces: reading, preparation, heights on grids."""
 
-from functools import lru_cache
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
@@ -36,7 +35,7 @@ from gfmd_cli.physics.indenters import (
     POINTS_ROUNDING,
     SMALLEST_GRID,
     RigidSurface,
-    forget_peaks,
+    surface_cache,
 )
 from gfmd_cli.spec_table import FilePath, Positive
 from gfmd_cli.units import count, labelled
@@ -417,23 +416,23 @@ class TaperedMap(FileSurface):
         return super().heights_on(grid) / rms
 
 
-@lru_cache(maxsize=16)
+@surface_cache(maxsize=16)
 def _suited_interpolation(surface: FileSurface) -> Interpolation:
     """The interpolation that suits a map; cached, because it needs a transform."""
     return suited_interpolation(surface.resolved_heights(), mirrored=surface.is_mirrored)
 
 
-_read = lru_cache(maxsize=4)(read_topography)
+_read = surface_cache(maxsize=4)(read_topography)
 """Cached, because the same surface is sampled on several grids."""
 
 
-@lru_cache(maxsize=4)
+@surface_cache(maxsize=4)
 def _prepared(surface: FileSurface) -> Field:
     """The periodic heights [m], levelled, filled in and filtered; cached like the file."""
     return make_periodic(_filtered(surface), surface.edges or "none", surface.taper)
 
 
-@lru_cache(maxsize=4)
+@surface_cache(maxsize=4)
 def _filtered(surface: FileSurface) -> Field:
     """The heights [m], levelled, filled in and filtered, before their edges are changed.
 
@@ -454,7 +453,7 @@ def _filtered(surface: FileSurface) -> Field:
     return gaussian_filter(heights, spacing, cutoff, periodic=surface._is_repeated())
 
 
-@lru_cache(maxsize=4)
+@surface_cache(maxsize=4)
 def _filled(surface: FileSurface) -> Field:
     """The levelled heights [m], with the missing ones filled in; cached like the file."""
     missing, heights = surface._topography().missing, surface._levelled()
@@ -471,7 +470,7 @@ def _filled(surface: FileSurface) -> Field:
     return fill_missing(heights, missing, periodic=surface._is_repeated())
 
 
-@lru_cache(maxsize=16)
+@surface_cache(maxsize=16)
 def _smallest_grid(surface: FileSurface) -> int:
     """See `FileSurface.smallest_grid`; cached, because every scene asks for it several times."""
     heights, topography = _prepared(surface), surface._topography()
@@ -489,7 +488,7 @@ def _smallest_grid(surface: FileSurface) -> int:
     return int(heights.shape[-1])
 
 
-@lru_cache(maxsize=16)
+@surface_cache(maxsize=16)
 def _warnings_on_heights(surface: FileSurface) -> tuple[str, ...]:
     """Warnings about artefacts of a scan. Cached: every contact of a study has the same."""
     topography, scale = surface._topography(), surface.scale
@@ -519,18 +518,3 @@ def _warnings_on_heights(surface: FileSurface) -> tuple[str, ...]:
         rounded,
         rounded_trend,
     )
-
-
-def forget_files() -> None:
-    """Drop the maps that were read, so that a file that has changed is read again."""
-    forget_peaks()
-    for cached in (
-        _read,
-        _filled,
-        _filtered,
-        _prepared,
-        _smallest_grid,
-        _suited_interpolation,
-        _warnings_on_heights,
-    ):
-        cached.cache_clear()

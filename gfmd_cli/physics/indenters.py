@@ -5,9 +5,10 @@ middle of the periodic cell. Equation numbers are those of Mueser, "Elastic cont
 rough surfaces across the spatial dimensions".
 """
 
+from collections.abc import Callable
 from functools import lru_cache
 from math import ceil
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self, TypeVar
 
 import numpy as np
 from pydantic import Field as Key
@@ -25,6 +26,8 @@ MAX_POINTS = 2**17  # along an axis; upper limit, guards against typing errors
 MAX_ASPECT_RATIO = 1e9  # side along y over side along x; a choice: no grid has so many points
 SLOPE_STEP = 1e-3  # of a distance from the middle, over which a slope is taken
 POINTS_ROUNDING = 1e-9  # of a number of points that follows from a ratio of sides
+Function = TypeVar("Function", bound=Callable[..., Any])
+_caches: list[Any] = []
 
 
 class RigidSurface(SpecTable):
@@ -203,16 +206,28 @@ class RigidSurface(SpecTable):
         return []
 
 
-@lru_cache(maxsize=16)
+def surface_cache(maxsize: int) -> Callable[[Function], Function]:
+    """Cache the results of a function of surfaces until `forget_files` is called."""
+
+    def cached(function: Function) -> Function:
+        wrapper: Any = lru_cache(maxsize)(function)
+        _caches.append(wrapper)
+        return wrapper
+
+    return cached
+
+
+def forget_files() -> None:
+    """Drop all that follows from surfaces: files may change, and last bits with other plans."""
+    for cache in _caches:
+        cache.cache_clear()
+
+
+@surface_cache(maxsize=16)
 def _highest_point(surface: RigidSurface) -> float:
     """Cached: all contacts of a surface have the same."""
     find = highest_point_of_mirrored if surface.is_mirrored else highest_point
     return find(surface.resolved_heights())
-
-
-def forget_peaks() -> None:
-    """Drop the highest points, whose last bits depend on the plans of the transforms."""
-    _highest_point.cache_clear()
 
 
 class SingleIndenter(RigidSurface):

@@ -12,11 +12,10 @@ from gfmd_cli.errors import InputError, Interrupted, SpaceError
 from gfmd_cli.files.locks import AS_LONG_AS_NEEDED, Waits
 from gfmd_cli.grid import plans
 from gfmd_cli.grid.ranks import Ranks, is_root, on_root, shared_errors
-from gfmd_cli.physics.file_surface import forget_files
+from gfmd_cli.physics.indenters import forget_files
 from gfmd_cli.spec.models import Spec
 from gfmd_cli.status import Status
 from gfmd_cli.study.context import Progress, Report, SolveContext, WorkerOptions
-from gfmd_cli.study.measure import forget_spectra
 from gfmd_cli.study.plausibility import unit_of_grids
 from gfmd_cli.study.pool import Pool, Worker
 from gfmd_cli.study.refinement import forget_scenes
@@ -87,7 +86,6 @@ def run_study(
     ranks = options.ranks
     forget_files()
     forget_scenes()
-    forget_spectra()
     stop = Event()
     end = monotonic() + (inf if options.max_seconds is None else options.max_seconds)
     waits = Waits(stop, end) if ranks is None else AS_LONG_AS_NEEDED  # ranks stop together
