@@ -105,12 +105,25 @@ class FileSurface(RigidSurface):
         """1 for a line profile, 2 for a map."""
         return self._topography().heights.ndim
 
+    @surface_cache(maxsize=16)
     def smallest_grid(self) -> int:
-        """Number of points of the map along x.
+        """Number of points of the map along x; cached, because scenes ask for it several times.
 
         Raises InputError for a flat map, also where levelling leaves the rounding of its heights.
         """
-        return _smallest_grid(self)
+        heights, topography = _prepared(self), self._topography()
+        largest = self.scale * float(max(topography.heights.max(), -topography.heights.min()))
+        left = float(np.ptp(heights))
+        if left <= (LEVELLING_ROUNDING + 2 * topography.precision) * largest:
+            rounding = (
+                f' with surface.level = "{self.levelling()}": what is left, {left:.2g} m, is the '
+                f"rounding of heights of up to {largest:.3g} m"
+            )
+            raise InputError(
+                f"{self.path}: surface.path: the map is flat{rounding if left else ''}; roughness "
+                "is needed"
+            )
+        return int(heights.shape[-1])
 
     def smallest_grid_y(self) -> int:
         """Number of points of the map along y."""
@@ -152,11 +165,15 @@ class FileSurface(RigidSurface):
         """Whether the map is interpolated by a Fourier series."""
         return self.applied_interpolation() == "fourier"
 
+    @surface_cache(maxsize=16)
     def applied_interpolation(self) -> Interpolation:
-        """The interpolation that is used on grids finer than the map."""
-        return self.interpolation or _suited_interpolation(self)
+        """The interpolation on grids finer than the map; cached, as it may need a transform."""
+        if self.interpolation is not None:
+            return self.interpolation
+        return suited_interpolation(self.resolved_heights(), mirrored=self.is_mirrored)
 
-    def smallest_grid_reason(self) -> str:
+    @property
+    def grid_reason(self) -> str:  # type: ignore[override]
         """Reason for the smallest grid: the points of the map."""
         return f"a map of {extent(self._topography().heights.shape)} points"
 
@@ -416,12 +433,6 @@ class TaperedMap(FileSurface):
         return super().heights_on(grid) / rms
 
 
-@surface_cache(maxsize=16)
-def _suited_interpolation(surface: FileSurface) -> Interpolation:
-    """The interpolation that suits a map; cached, because it needs a transform."""
-    return suited_interpolation(surface.resolved_heights(), mirrored=surface.is_mirrored)
-
-
 _read = surface_cache(maxsize=4)(read_topography)
 """Cached, because the same surface is sampled on several grids."""
 
@@ -468,24 +479,6 @@ def _filled(surface: FileSurface) -> Field:
             'surface.missing = "fill" fills them in, "void" keeps them out of contact'
         )
     return fill_missing(heights, missing, periodic=surface._is_repeated())
-
-
-@surface_cache(maxsize=16)
-def _smallest_grid(surface: FileSurface) -> int:
-    """See `FileSurface.smallest_grid`; cached, because every scene asks for it several times."""
-    heights, topography = _prepared(surface), surface._topography()
-    largest = surface.scale * float(max(topography.heights.max(), -topography.heights.min()))
-    left = float(np.ptp(heights))
-    if left <= (LEVELLING_ROUNDING + 2 * topography.precision) * largest:
-        rounding = (
-            f' with surface.level = "{surface.levelling()}": what is left, {left:.2g} m, is the '
-            f"rounding of heights of up to {largest:.3g} m"
-        )
-        raise InputError(
-            f"{surface.path}: surface.path: the map is flat{rounding if left else ''}; roughness "
-            "is needed"
-        )
-    return int(heights.shape[-1])
 
 
 @surface_cache(maxsize=16)
