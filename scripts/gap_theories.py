@@ -246,7 +246,7 @@ def means(path: Path, points: int | None = None) -> Iterator[tuple[list[Curve], 
     by_key = defaultdict(list)
     for curve in compare(path).curves:
         row = curve.rows[0]
-        if points in (None, curve.rows[0]["points"]):
+        if points in (None, row["points"]):
             by_key[curve.n, -row["cutoff"], row["spectrum"], row["hurst"]].append(curve)
     for _, curves in sorted(by_key.items()):
         yield curves, np.mean([np.log(curve.column("u_g")) for curve in curves], axis=0)
