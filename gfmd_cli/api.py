@@ -26,8 +26,8 @@ from gfmd_cli.grid.arrays import Field, Mask
 from gfmd_cli.grid.blas import one_blas_thread
 from gfmd_cli.maps.given_heights import write_heights
 from gfmd_cli.physics.error_estimates import Verdict
-from gfmd_cli.physics.file_surface import FileSurface, forget_files
-from gfmd_cli.physics.indenters import SMALLEST_GRID
+from gfmd_cli.physics.file_surface import FileSurface
+from gfmd_cli.physics.indenters import SMALLEST_GRID, forget_files
 from gfmd_cli.spec.models import Spec
 from gfmd_cli.spec.parse import read_spec, read_tables
 from gfmd_cli.status import Status, counted

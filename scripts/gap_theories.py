@@ -246,7 +246,7 @@ def means(path: Path, points: int | None = None) -> Iterator[tuple[list[Curve], 
     by_key = defaultdict(list)
     for curve in compare(path).curves:
         row = curve.rows[0]
-        if points in (None, curve.points):
+        if points in (None, row["points"]):
             by_key[curve.n, -row["cutoff"], row["spectrum"], row["hurst"]].append(curve)
     for _, curves in sorted(by_key.items()):
         yield curves, np.mean([np.log(curve.column("u_g")) for curve in curves], axis=0)
@@ -259,7 +259,7 @@ def print_between(path: Path) -> None:
     shells = {}
     for curve in sorted(compare(path).curves, key=lambda one: one.rows[0]["seed"]):
         key = curve.n, spectrum_of(curve.rows[0]), curve.rows[0]["hurst"]
-        by_key[key][curve.points].append(np.log(curve.column("u_g")))
+        by_key[key][curve.rows[0]["points"]].append(np.log(curve.column("u_g")))
         shells[key] = curve.persson.shells
     for key, grids in sorted(by_key.items()):
         finer = 4 / 3 * (grids[FINER][0] - grids[GRID][0])

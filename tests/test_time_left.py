@@ -95,12 +95,11 @@ def test_the_longest_task_bounds_the_end_of_the_run(time):
 
 
 def test_words_are_passed_on_with_what_is_left(time):
-    words = []
-    tell = clock_of(time, task(0, 2.0), task(1, 2.0)).with_time_left(words.append)
-    tell(word(0, "start"))
+    clock = clock_of(time, task(0, 2.0), task(1, 2.0))
+    words = [clock.with_time_left(word(0, "start"))]
     time.now = 1.0
-    tell(word(0, "end", status=Status.CONVERGED))
-    tell(word(-1, "warning"))
+    words.append(clock.with_time_left(word(0, "end", status=Status.CONVERGED)))
+    words.append(clock.with_time_left(word(-1, "warning")))
     assert [(w.tasks_left, w.seconds_left) for w in words] == [(2, 4.0), (1, 1.0), (1, 1.0)]
 
 

@@ -43,12 +43,7 @@ def _warn_once(message: str) -> None:
 
 
 class LocalRows:
-    """The rows of a field that this process holds, here all of them.
-
-    In a slab decomposition (`halo.DistributedRows`) a process holds a block of consecutive rows.
-    An array of a kernel whose stencil needs rows of other processes then has a halo, which are some
-    rows above and below the block. On one process the halo is empty.
-    """
+    """The rows of a field that this process holds, here all; `halo.DistributedRows` has a block."""
 
     halo: ClassVar[int] = 0
     """Number of rows of a halo above the block, and below it."""

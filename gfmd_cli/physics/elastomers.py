@@ -367,23 +367,22 @@ def _compliance_of_table(content: bytes) -> Compliance:
 def _read_table(path: Path) -> Field:
     """The columns q [1/m] and k [Pa/m], shape (rows, 2). Raises InputError for an invalid table."""
     try:
-        version = file_version(path)
-    except OSError as error:
-        raise _unreadable(path, error) from error
-    return _table(path, version)
+        return _table(path, file_version(path))
+    except (OSError, ValueError) as error:
+        raise InputError(
+            f"{path}: elastomer.path: cannot be read: {error}; the file must be a text of two "
+            "columns of numbers, q [1/m] and k [Pa/m], with # before words"
+        ) from error
 
 
 @lru_cache(maxsize=4)
 def _table(path: Path, version: Version) -> Field:
     """The columns of a table in this version; cached, because every block of rows asks for k."""
-    try:
-        if path.stat().st_size > MAX_TABLE_BYTES or not path.is_file():
-            raise ValueError(f"not a regular file of at most {MAX_TABLE_BYTES} bytes")
-        lines = path.read_text("utf-8-sig").translate(SEPARATORS).splitlines()
-        with catch_warnings(action="ignore", category=UserWarning):
-            table = np.loadtxt(lines, ndmin=2)  # warns of an empty file, refused below
-    except (OSError, ValueError) as error:
-        raise _unreadable(path, error) from error
+    if path.stat().st_size > MAX_TABLE_BYTES or not path.is_file():
+        raise ValueError(f"not a regular file of at most {MAX_TABLE_BYTES} bytes")
+    lines = path.read_text("utf-8-sig").translate(SEPARATORS).splitlines()
+    with catch_warnings(action="ignore", category=UserWarning):
+        table = np.loadtxt(lines, ndmin=2)  # warns of an empty file, refused below
     if table.shape[0] < 2 or table.shape[1] != 2:
         raise InputError(
             f"{path}: elastomer.path: {table.shape[0]} rows, {table.shape[1]} columns; "
@@ -399,13 +398,6 @@ def _table(path: Path, version: Version) -> Field:
         )
     table.flags.writeable = False
     return table
-
-
-def _unreadable(path: Path, error: Exception) -> InputError:
-    return InputError(
-        f"{path}: elastomer.path: cannot be read: {error}; the file must be a text of two "
-        "columns of numbers, q [1/m] and k [Pa/m], with # before words"
-    )
 
 
 @lru_cache(maxsize=4)

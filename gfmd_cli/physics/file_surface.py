@@ -1,6 +1,5 @@
 """Height maps and line profiles from files as surfaces: reading, preparation, heights on grids."""
 
-from functools import lru_cache
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
@@ -36,7 +35,7 @@ from gfmd_cli.physics.indenters import (
     POINTS_ROUNDING,
     SMALLEST_GRID,
     RigidSurface,
-    forget_peaks,
+    surface_cache,
 )
 from gfmd_cli.spec_table import FilePath, Positive
 from gfmd_cli.units import count, labelled
@@ -106,12 +105,25 @@ class FileSurface(RigidSurface):
         """1 for a line profile, 2 for a map."""
         return self._topography().heights.ndim
 
+    @surface_cache(maxsize=16)
     def smallest_grid(self) -> int:
-        """Number of points of the map along x.
+        """Number of points of the map along x; cached, because scenes ask for it several times.
 
         Raises InputError for a flat map, also where levelling leaves the rounding of its heights.
         """
-        return _smallest_grid(self)
+        heights, topography = _prepared(self), self._topography()
+        largest = self.scale * float(max(topography.heights.max(), -topography.heights.min()))
+        left = float(np.ptp(heights))
+        if left <= (LEVELLING_ROUNDING + 2 * topography.precision) * largest:
+            rounding = (
+                f' with surface.level = "{self.levelling()}": what is left, {left:.2g} m, is the '
+                f"rounding of heights of up to {largest:.3g} m"
+            )
+            raise InputError(
+                f"{self.path}: surface.path: the map is flat{rounding if left else ''}; roughness "
+                "is needed"
+            )
+        return int(heights.shape[-1])
 
     def smallest_grid_y(self) -> int:
         """Number of points of the map along y."""
@@ -153,11 +165,15 @@ class FileSurface(RigidSurface):
         """Whether the map is interpolated by a Fourier series."""
         return self.applied_interpolation() == "fourier"
 
+    @surface_cache(maxsize=16)
     def applied_interpolation(self) -> Interpolation:
-        """The interpolation that is used on grids finer than the map."""
-        return self.interpolation or _suited_interpolation(self)
+        """The interpolation on grids finer than the map; cached, as it may need a transform."""
+        if self.interpolation is not None:
+            return self.interpolation
+        return suited_interpolation(self.resolved_heights(), mirrored=self.is_mirrored)
 
-    def smallest_grid_reason(self) -> str:
+    @property
+    def grid_reason(self) -> str:  # type: ignore[override]
         """Reason for the smallest grid: the points of the map."""
         return f"a map of {extent(self._topography().heights.shape)} points"
 
@@ -417,23 +433,17 @@ class TaperedMap(FileSurface):
         return super().heights_on(grid) / rms
 
 
-@lru_cache(maxsize=16)
-def _suited_interpolation(surface: FileSurface) -> Interpolation:
-    """The interpolation that suits a map; cached, because it needs a transform."""
-    return suited_interpolation(surface.resolved_heights(), mirrored=surface.is_mirrored)
-
-
-_read = lru_cache(maxsize=4)(read_topography)
+_read = surface_cache(maxsize=4)(read_topography)
 """Cached, because the same surface is sampled on several grids."""
 
 
-@lru_cache(maxsize=4)
+@surface_cache(maxsize=4)
 def _prepared(surface: FileSurface) -> Field:
     """The periodic heights [m], levelled, filled in and filtered; cached like the file."""
     return make_periodic(_filtered(surface), surface.edges or "none", surface.taper)
 
 
-@lru_cache(maxsize=4)
+@surface_cache(maxsize=4)
 def _filtered(surface: FileSurface) -> Field:
     """The heights [m], levelled, filled in and filtered, before their edges are changed.
 
@@ -454,7 +464,7 @@ def _filtered(surface: FileSurface) -> Field:
     return gaussian_filter(heights, spacing, cutoff, periodic=surface._is_repeated())
 
 
-@lru_cache(maxsize=4)
+@surface_cache(maxsize=4)
 def _filled(surface: FileSurface) -> Field:
     """The levelled heights [m], with the missing ones filled in; cached like the file."""
     missing, heights = surface._topography().missing, surface._levelled()
@@ -471,25 +481,7 @@ def _filled(surface: FileSurface) -> Field:
     return fill_missing(heights, missing, periodic=surface._is_repeated())
 
 
-@lru_cache(maxsize=16)
-def _smallest_grid(surface: FileSurface) -> int:
-    """See `FileSurface.smallest_grid`; cached, because every scene asks for it several times."""
-    heights, topography = _prepared(surface), surface._topography()
-    largest = surface.scale * float(max(topography.heights.max(), -topography.heights.min()))
-    left = float(np.ptp(heights))
-    if left <= (LEVELLING_ROUNDING + 2 * topography.precision) * largest:
-        rounding = (
-            f' with surface.level = "{surface.levelling()}": what is left, {left:.2g} m, is the '
-            f"rounding of heights of up to {largest:.3g} m"
-        )
-        raise InputError(
-            f"{surface.path}: surface.path: the map is flat{rounding if left else ''}; roughness "
-            "is needed"
-        )
-    return int(heights.shape[-1])
-
-
-@lru_cache(maxsize=16)
+@surface_cache(maxsize=16)
 def _warnings_on_heights(surface: FileSurface) -> tuple[str, ...]:
     """Warnings about artefacts of a scan. Cached: every contact of a study has the same."""
     topography, scale = surface._topography(), surface.scale
@@ -519,18 +511,3 @@ def _warnings_on_heights(surface: FileSurface) -> tuple[str, ...]:
         rounded,
         rounded_trend,
     )
-
-
-def forget_files() -> None:
-    """Drop the maps that were read, so that a file that has changed is read again."""
-    forget_peaks()
-    for cached in (
-        _read,
-        _filled,
-        _filtered,
-        _prepared,
-        _smallest_grid,
-        _suited_interpolation,
-        _warnings_on_heights,
-    ):
-        cached.cache_clear()

@@ -5,9 +5,10 @@ middle of the periodic cell. Equation numbers are those of Mueser, "Elastic cont
 rough surfaces across the spatial dimensions".
 """
 
-from functools import lru_cache
+from collections.abc import Callable
+from functools import lru_cache, wraps
 from math import ceil
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self, TypeVar, cast
 
 import numpy as np
 from pydantic import Field as Key
@@ -25,6 +26,30 @@ MAX_POINTS = 2**17  # along an axis; upper limit, guards against typing errors
 MAX_ASPECT_RATIO = 1e9  # side along y over side along x; a choice: no grid has so many points
 SLOPE_STEP = 1e-3  # of a distance from the middle, over which a slope is taken
 POINTS_ROUNDING = 1e-9  # of a number of points that follows from a ratio of sides
+Function = TypeVar("Function", bound=Callable[..., Any])
+_caches: list[Any] = []
+
+
+def surface_cache(maxsize: int) -> Callable[[Function], Function]:
+    """Cache the results of a function or method of surfaces until `forget_files` is called."""
+
+    def cached(function: Function) -> Function:
+        keep = lru_cache(maxsize)(function)
+        _caches.append(keep)
+
+        @wraps(function)
+        def call(*arguments: Any, **options: Any) -> Any:
+            return keep(*arguments, **options)
+
+        return cast(Function, call)
+
+    return cached
+
+
+def forget_files() -> None:
+    """Drop all that follows from surfaces: files may change, and last bits with other plans."""
+    for cache in _caches:
+        cache.cache_clear()
 
 
 class RigidSurface(SpecTable):
@@ -54,6 +79,8 @@ class RigidSurface(SpecTable):
     """Copies of the surface along each side of its cell."""
     size_hint: ClassVar[str] = "the side along y is surface.length_y"
     """What to check where the smallest grid has too many points, for messages."""
+    grid_reason: ClassVar[str] = "kind {kind!r}"
+    """Reason for the smallest grid, likewise, with the values of keys."""
     kind: str
 
     def smallest_grid(self) -> int:
@@ -115,7 +142,7 @@ class RigidSurface(SpecTable):
             if count < least:
                 raise InputError(
                     f"grid.{key}: {count // self.copies} points along {axis} do not resolve "
-                    f"the surface ({self.smallest_grid_reason()}); "
+                    f"the surface ({self.grid_reason.format(**dict(self))}); "
                     f"{self.remedy(least // self.copies)}"
                 )
 
@@ -142,10 +169,6 @@ class RigidSurface(SpecTable):
         """The surface with the treatment of its edges that goes with a boundary by default."""
         return self
 
-    def smallest_grid_reason(self) -> str:
-        """Reason for the smallest grid, as text for messages."""
-        return f"kind {self.kind!r}"
-
     def slope_at(self, r: float) -> float:
         """Slope |dh/dr| of a single indenter at a distance r > 0 from its middle; else 0."""
         return 0.0
@@ -170,11 +193,13 @@ class RigidSurface(SpecTable):
         """A map that is not periodic, mirrored to twice its sides; None for other surfaces."""
         return None
 
+    @surface_cache(maxsize=16)
     def peak(self) -> float | None:
         """Height of the highest point [m], between grid points too; None where it is unknown."""
         if not self.band_limited:
             return None
-        return _highest_point(self)
+        find = highest_point_of_mirrored if self.is_mirrored else highest_point
+        return find(self.resolved_heights())
 
     @property
     def is_mirrored(self) -> bool:
@@ -201,18 +226,6 @@ class RigidSurface(SpecTable):
     def warnings(self, boundary: str = "periodic") -> list[str]:
         """Warnings about values that are probably mistakes of the user, for `grid.boundary`."""
         return []
-
-
-@lru_cache(maxsize=16)
-def _highest_point(surface: RigidSurface) -> float:
-    """Cached: all contacts of a surface have the same."""
-    find = highest_point_of_mirrored if surface.is_mirrored else highest_point
-    return find(surface.resolved_heights())
-
-
-def forget_peaks() -> None:
-    """Drop the highest points, whose last bits depend on the plans of the transforms."""
-    _highest_point.cache_clear()
 
 
 class SingleIndenter(RigidSurface):
@@ -311,6 +324,7 @@ class Punch(RoundIndenter):
 
     stepped: ClassVar[bool] = True
     size_hint: ClassVar[str] = "surface.radius and surface.length have one unit"
+    grid_reason: ClassVar[str] = "kind {kind!r}, radius = {radius:g}: a spacing or more"
     kind: Literal["punch"] = "punch"
     radius: Positive = 0.25
     """Radius of the face [m], a grid spacing or more."""
@@ -333,10 +347,6 @@ class Punch(RoundIndenter):
         """Smallest number of points along y, likewise."""
         return max(SMALLEST_GRID, ceil(self.sides[0] / self.radius - POINTS_ROUNDING))
 
-    def smallest_grid_reason(self) -> str:
-        """Reason for the smallest grid: the radius."""
-        return f"kind {self.kind!r}, radius = {self.radius:g}: a spacing or more"
-
     def _profile(self, r: Field) -> Field:
         rim = self.radius * (1 + 1e-12)  # points on the rim belong to the face, up to rounding
         return np.where(r <= rim, 0.0, -(self.depth or self.length))
@@ -354,6 +364,7 @@ class Ridge(LineIndenter):
 
     tip_exponent: ClassVar[float] = 1.0
     size_hint: ClassVar[str] = "surface.width is relative to surface.length"
+    grid_reason: ClassVar[str] = "kind {kind!r}, width = {width:g}: two spacings or more"
     kind: Literal["ridge"] = "ridge"
     slope: Positive = 1.0
     """Slope of the flanks, the tangent of their angle to the plane."""
@@ -363,10 +374,6 @@ class Ridge(LineIndenter):
     def smallest_grid(self) -> int:
         """Smallest number of points: the foot is a spacing or more away from the crest."""
         return max(SMALLEST_GRID, ceil(2 / self.width - POINTS_ROUNDING))
-
-    def smallest_grid_reason(self) -> str:
-        """Reason for the smallest grid: the width."""
-        return f"kind {self.kind!r}, width = {self.width:g}: two spacings or more"
 
     def _profile(self, r: Field) -> Field:
         return -self.slope * np.minimum(r, 0.5 * self.width * self.length)

@@ -26,6 +26,7 @@ class SelfAffine(RigidSurface):
     rough: ClassVar[bool] = True
     band_limited: ClassVar[bool] = True
     size_hint: ClassVar[str] = "surface.cutoff is relative to surface.length"
+    grid_reason: ClassVar[str] = "kind {kind!r}, cutoff = {cutoff:g}: two points per lambda_s"
     kind: Literal["self-affine"] = "self-affine"
     hurst: Annotated[float, Key(gt=0, le=1)] = 0.8
     """Hurst exponent H, 0 < H <= 1."""
@@ -67,10 +68,6 @@ class SelfAffine(RigidSurface):
     def smallest_grid_y(self) -> int:
         """Smallest number of points along y, likewise."""
         return max(SMALLEST_GRID, 2 * self.highest_modes[0])
-
-    def smallest_grid_reason(self) -> str:
-        """Reason for the smallest grid: the cut-off needs two points per lambda_s."""
-        return f"kind {self.kind!r}, cutoff = {self.cutoff:g}: two points per lambda_s"
 
     def warnings(self, boundary: str = "periodic") -> list[str]:
         """A warning about a spectrum without a self-affine part."""

@@ -1,7 +1,6 @@
 """Power spectral density of a surface in bands of wavenumber, with the self-affine fit."""
 
 from dataclasses import dataclass
-from functools import lru_cache
 from math import nan, pi, prod
 
 import numpy as np
@@ -10,7 +9,7 @@ from gfmd_cli.errors import InputError
 from gfmd_cli.grid.arrays import Field, row_blocks
 from gfmd_cli.grid.modes import multiplicity
 from gfmd_cli.physics.elastomers import HalfSpace
-from gfmd_cli.physics.indenters import RigidSurface
+from gfmd_cli.physics.indenters import RigidSurface, surface_cache
 from gfmd_cli.physics.linear_elastomer import LinearElastomer
 from gfmd_cli.physics.persson import Shells
 from gfmd_cli.physics.scenes import build_scene
@@ -72,10 +71,12 @@ def spectrum(shells: Shells, sides: tuple[float, ...], points: tuple[int, ...]) 
     return Spectrum(moment / total, total * per_mode, modes, fitted * per_mode, nearest, no_fit)
 
 
+@surface_cache(maxsize=4)
 def map_spectrum(surface: RigidSurface) -> Spectrum | None:
     """The spectrum of a map with borders, tapered towards them; None for any other surface.
 
-    A mirrored map has kinks, whose spectrum hides that of short waves.
+    A mirrored map has kinks, whose spectrum hides that of short waves. Cached: all contacts of a
+    surface have the same.
     """
     tapered = surface.tapered_map()
     if tapered is None:
@@ -84,7 +85,7 @@ def map_spectrum(surface: RigidSurface) -> Spectrum | None:
     return spectrum(scene.shells, scene.grid.sides, scene.grid.whole_shape)
 
 
-@lru_cache(maxsize=4)
+@surface_cache(maxsize=4)
 def short_wave_factor(surface: RigidSurface, elastomer: LinearElastomer) -> float:
     """Factor by which the waves of two to four points of a map increase Delta_sigma, Eq. (23).
 

@@ -6,7 +6,6 @@ of a solved contact, `task_row` both, and `result` everything.
 
 from collections.abc import Mapping
 from dataclasses import asdict
-from functools import lru_cache
 
 import numpy as np
 
@@ -14,11 +13,10 @@ from gfmd_cli.grid.arrays import Field
 from gfmd_cli.maps.map_preparation import mirror
 from gfmd_cli.physics.approach import approach
 from gfmd_cli.physics.free_contact import doubled_grid
-from gfmd_cli.physics.indenters import RigidSurface
 from gfmd_cli.physics.observables import changed_fractions, gap_histogram, stress_histogram
 from gfmd_cli.physics.patches import area_distribution
 from gfmd_cli.physics.power_spectra import autocorrelations, spectra
-from gfmd_cli.physics.surface_spectrum import Spectrum, map_spectrum, short_wave_factor
+from gfmd_cli.physics.surface_spectrum import map_spectrum, short_wave_factor
 from gfmd_cli.spec.models import SWEPT, OutputTable
 from gfmd_cli.study.column import Row
 from gfmd_cli.study.columns import FIELDS, PARAMETERS, PR_LINEAR, PR_LOGARITHMIC, empty_row
@@ -141,20 +139,8 @@ def result(task: Task, solved: TaskSolution, seconds: float) -> TaskResult:
             column.name: scene.grid.diagonal(solved.field(column.name)) for column in FIELDS
         }
     entry = Entry(task.id, task.scene_id, output.names(), row)
-    spectrum = _map_spectrum(task.surface)
+    spectrum = map_spectrum(task.surface)
     return TaskResult(entry, scene.shells, arrays, task.surface.pictures(), spectrum)
-
-
-@lru_cache(maxsize=4)
-def _map_spectrum(surface: RigidSurface) -> Spectrum | None:
-    """As `map_spectrum`; cached, because all contacts of a scene have the same."""
-    return map_spectrum(surface)
-
-
-def forget_spectra() -> None:
-    """Drop what was computed from maps: files and the last bits, with other plans, may change."""
-    _map_spectrum.cache_clear()
-    short_wave_factor.cache_clear()
 
 
 def optional_columns(output: OutputTable, solved: SolvedContact) -> Row:

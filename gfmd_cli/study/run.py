@@ -12,11 +12,10 @@ from gfmd_cli.errors import InputError, Interrupted, SpaceError
 from gfmd_cli.files.locks import AS_LONG_AS_NEEDED, Waits
 from gfmd_cli.grid import plans
 from gfmd_cli.grid.ranks import Ranks, is_root, on_root, shared_errors
-from gfmd_cli.physics.file_surface import forget_files
+from gfmd_cli.physics.indenters import forget_files
 from gfmd_cli.spec.models import Spec
 from gfmd_cli.status import Status
 from gfmd_cli.study.context import Progress, Report, SolveContext, WorkerOptions
-from gfmd_cli.study.measure import forget_spectra
 from gfmd_cli.study.plausibility import unit_of_grids
 from gfmd_cli.study.pool import Pool, Worker
 from gfmd_cli.study.refinement import forget_scenes
@@ -87,7 +86,6 @@ def run_study(
     ranks = options.ranks
     forget_files()
     forget_scenes()
-    forget_spectra()
     stop = Event()
     end = monotonic() + (inf if options.max_seconds is None else options.max_seconds)
     waits = Waits(stop, end) if ranks is None else AS_LONG_AS_NEEDED  # ranks stop together
@@ -111,12 +109,18 @@ def run_study(
     worker_options = WorkerOptions(
         threads, usable_memory(ranks) / jobs, options.reproducible, options.checkpoint_every, end
     )
-    if is_root(ranks):
-        report = _noting_failures(report, tasks, study.parts)
-    watch = RemainingTime(pending, jobs).with_time_left(report)
+    remaining, last = RemainingTime(pending, jobs), inf
     if options.max_seconds is not None and pending:  # early enough to save all and to collect it
         seconds = max(options.max_seconds / 2, options.max_seconds - seconds_to_stop(pending, jobs))
-        watch = _until(monotonic() + seconds, stop, watch)
+        last = monotonic() + seconds
+
+    def watch(progress: Progress) -> None:
+        report(remaining.with_time_left(progress))
+        if is_root(ranks):
+            _keep_failure(progress, tasks, study.parts)
+        if progress.task >= 0 and monotonic() > last:  # every call advances a task before it stops
+            stop.set()
+
     context = SolveContext(worker_options, watch, stop, ranks)
     with signal_handlers(stop, may_exit=options.may_exit), ExitStack() as work:
         damaged = on_root(ranks, lambda: work.enter_context(study.work(tasks)))
@@ -143,31 +147,12 @@ def run_study(
     return counts + solved
 
 
-def _until(end: float, stop: Event, report: Report) -> Report:
-    """A report that also sets `stop` at the first event of a task after `end` [s, monotonic clock].
-
-    Each call of a run therefore advances at least one task, however short its time.
-    """
-
-    def watch(progress: Progress) -> None:
-        report(progress)
-        if progress.task >= 0 and monotonic() > end:
-            stop.set()
-
-    return watch
-
-
-def _noting_failures(report: Report, tasks: list[Task], parts: Path) -> Report:
-    """A report that also keeps the error of each task that fails, until the task starts again."""
-
-    def watch(progress: Progress) -> None:
-        report(progress)
-        if progress.event == "start":
-            forget_failure(parts, tasks[progress.task].id)
-        elif progress.status is not None and progress.status.is_failure:
-            note_failure(parts, tasks[progress.task].id, progress.message)
-
-    return watch
+def _keep_failure(progress: Progress, tasks: list[Task], parts: Path) -> None:
+    """Keep the error of a task that has failed, until the task starts again."""
+    if progress.event == "start":
+        forget_failure(parts, tasks[progress.task].id)
+    elif progress.status is not None and progress.status.is_failure:
+        note_failure(parts, tasks[progress.task].id, progress.message)
 
 
 def _check_ended(solved: Counter[Status], pending: int, stop: Event, again: str) -> None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from math import isfinite, log
 from typing import Any
 
-from gfmd_cli.study.context import Progress, Report
+from gfmd_cli.study.context import Progress
 from gfmd_cli.study.forecast import SECONDS_PER_PAIR
 from gfmd_cli.study.tasks import Task
 
@@ -56,15 +56,11 @@ class RemainingTime:
         self.forecast: dict[Any, float] = defaultdict(float)
         """Forecast seconds of the same tasks."""
 
-    def with_time_left(self, report: Report) -> Report:
-        """A report that also receives the number of remaining tasks and the remaining time."""
-
-        def report_with_time(progress: Progress) -> None:
-            self.update(progress)
-            left = len(self.waiting) + len(self.running)
-            report(progress._replace(tasks_left=left, seconds_left=self.left()))
-
-        return report_with_time
+    def with_time_left(self, progress: Progress) -> Progress:
+        """An event, by which the estimate is updated, with the tasks that remain and their time."""
+        self.update(progress)
+        left = len(self.waiting) + len(self.running)
+        return progress._replace(tasks_left=left, seconds_left=self.left())
 
     def update(self, progress: Progress) -> None:
         """Update the estimate by one progress event of a task."""
