@@ -173,9 +173,10 @@ def with_holes(contact):
     return replace(contact, may_touch=may_touch)
 
 
-def check_solution(contact, share=0.6):
+def check_solution(contact, share=0.6, tolerance=1e-8):
     """That the solution by tiles is that of the whole grid, with this share of its transforms."""
-    local, whole = solve(contact, True), solve(contact, False)
+    local, whole = (solve(contact, locally, tolerance) for locally in (True, False))
+    assert not local.is_direct
     assert local.status == whole.status == "converged"
     assert local.transforms < share * whole.transforms
     assert local.u == pytest.approx(whole.u, abs=1e-7)
@@ -210,7 +211,8 @@ def test_the_solution_is_that_of_the_whole_grid(elastomer, p_star, share, bounda
 def test_the_solution_of_a_stiffer_elastomer_is_that_of_the_whole_grid(boundary, n, points):
     """From n = 1.5 on only smaller contacts are solved on tiles, and less is saved."""
     scene = SCENES[boundary](SelfAffine(cutoff=0.02), Power(n=n), points)
-    check_solution(scene.contact(1e-4), share=0.9)
+    tolerance = 2e-8 if n == 2 else 1e-8  # below, rounding would require a direct solution
+    check_solution(scene.contact(1e-4), 0.9, tolerance)
 
 
 @pytest.mark.parametrize("p_star", [1e-4, 0.01])
