@@ -1,6 +1,7 @@
 """Height maps and line profiles from files as surfaces: reading, preparation, heights on grids."""
 
 from functools import lru_cache
+from math import comb
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
@@ -20,6 +21,7 @@ from gfmd_cli.maps.interpolation import (
     suited_interpolation,
 )
 from gfmd_cli.maps.map_preparation import (
+    DEGREES,
     LEVELLING_ROUNDING,
     Edges,
     Levelling,
@@ -109,7 +111,8 @@ class FileSurface(RigidSurface):
     def smallest_grid(self) -> int:
         """Number of points of the map along x.
 
-        Raises InputError for a flat map, also where levelling leaves the rounding of its heights.
+        Raises InputError for a flat map, also where levelling leaves the rounding of its heights,
+        as it does where too few of them are known.
         """
         return _smallest_grid(self)
 
@@ -478,6 +481,15 @@ def _smallest_grid(surface: FileSurface) -> int:
     largest = surface.scale * float(max(topography.heights.max(), -topography.heights.min()))
     left = float(np.ptp(heights))
     if left <= (LEVELLING_ROUNDING + 2 * topography.precision) * largest:
+        known = topography.heights.size - topography.missing_count
+        degree = DEGREES.get(surface.levelling(), 0)
+        least = comb(degree + surface.dimension, degree) + 1  # more than the terms of the trend
+        if topography.missing is not None and known < least:
+            raise InputError(
+                f"{surface.path}: surface.path: the map has {count(known, 'known height')} at "
+                f"{topography.heights.size} points, the others are missing; with surface.level = "
+                f'"{surface.levelling()}" it needs {least} or more'
+            )
         rounding = (
             f' with surface.level = "{surface.levelling()}": what is left, {left:.2g} m, is the '
             f"rounding of heights of up to {largest:.3g} m"
