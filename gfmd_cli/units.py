@@ -36,6 +36,13 @@ def duration(seconds: float) -> str:
     return f"{seconds / size:.0f} {unit}"
 
 
+def percent(fraction: float) -> str:
+    """A fraction in percent: "100%" only if it is 1 or more, "0%" only if it is 0 or less."""
+    if 0.995 <= fraction < 1:
+        return "over 99%"
+    return "under 1%" if 0 < fraction < 0.005 else f"{fraction:.0%}"
+
+
 def left_out(length: int, limit: int, what: str = "") -> list[str]:
     """A line on how many things a list of at most `limit` leaves out, if any."""
     more = count(length - limit, f"more {what}") if what else f"{length - limit} more"

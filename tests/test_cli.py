@@ -255,6 +255,18 @@ def test_a_height_file_that_will_not_do_is_refused(gfmd, array, words):
     assert not Path("small.h5").exists()
 
 
+@pytest.mark.parametrize("points", ["64", "'auto'"])
+def test_a_surface_without_any_wave_is_refused_with_its_key(gfmd, points):
+    band = "spectrum='cutoff', rolloff=0.43, cutoff=0.41"
+    result = gfmd(
+        "run", "spec.toml", "--set", f"surface={{kind='self-affine', {band}}}", "--set",
+        f"grid.points={points}", "--set", "accuracy.contact_area=0.1",
+    )  # fmt: skip
+    assert result.exit_code == 2
+    assert "spec.toml: surface.rolloff: 0.43 given with cutoff = 0.41" in result.output
+    assert not Path("small.h5").exists()
+
+
 @pytest.mark.parametrize(
     ("surface", "elastomer", "key"),
     [

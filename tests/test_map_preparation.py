@@ -232,6 +232,24 @@ def test_a_map_that_is_flat_after_levelling_is_refused(tmp_path, heights, scale,
     assert ("is the rounding of heights of up to" in str(error.value)) == (left > 0)
 
 
+@pytest.mark.parametrize(
+    ("level", "least"), [("none", 2), ("mean", 2), ("plane", 4), ("curvature", 7)]
+)
+def test_too_few_known_heights_are_refused_with_their_number(tmp_path, level, least):
+    heights = np.full(NOISE.shape, np.nan)
+    places = [(2, 3), (20, 5), (7, 17), (11, 8), (4, 9), (15, 2), (22, 18)]
+    for known, place in enumerate(places[:least], 1):
+        heights[place] = NOISE[place]
+        np.save(tmp_path / f"{known}.npy", heights)
+        surface = FileSurface(path=tmp_path / f"{known}.npy", level=level)
+        if known == least:
+            assert surface.smallest_grid() == 20
+            return
+        number = f"{known}.npy: surface.path: the map has {known} known height"
+        with pytest.raises(InputError, match=f"{number}.* needs {least} or more"):
+            surface.smallest_grid()
+
+
 def test_roughness_in_single_precision_far_from_zero_is_used(tmp_path):
     """Heights of 1 nm beside an offset of 2 mm, which is rounded to 0.2 nm."""
     rough = 2e-3 + 1e-9 * np.random.default_rng(0).normal(size=(24, 20))

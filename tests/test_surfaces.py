@@ -216,8 +216,35 @@ def test_a_surface_without_modes_is_refused():
 @pytest.mark.parametrize("h_std", [None, 1.0])
 def test_a_surface_with_no_mode_between_its_wavelengths_is_refused(h_std):
     surface = SelfAffine(spectrum="cutoff", rolloff=0.85, cutoff=0.8, h_std=h_std)  # 1 < m < 1.25
-    with pytest.raises(InputError, match="flat"):
+    text = r"surface\.rolloff: 0\.85 .* cutoff = 0\.8, .* the nearest ones are 1 and 0\.70711"
+    with pytest.raises(InputError, match=text):
         sample(surface, 64)
+
+
+@pytest.mark.parametrize("length_y", [None, 0.7, 2.5])
+def test_a_surface_is_refused_only_if_no_mode_lies_between_its_wavelengths(length_y):
+    number_y, number_x = np.mgrid[:40, :16]
+    m = np.unique(np.hypot(number_y / (length_y or 1.0), number_x))[1:]
+    generator = np.random.default_rng(0)
+    refused = 0
+    for longest in generator.uniform(1, 15, size=200):
+        shortest = longest * generator.uniform(1, 1.05)
+        rolloff, cutoff = 1 / longest, 1 / shortest
+        surface = SelfAffine(spectrum="cutoff", rolloff=rolloff, cutoff=cutoff, length_y=length_y)
+        if ((m >= longest) & (m <= shortest)).any():
+            assert np.ptp(surface.heights(64, 160)) > 0
+            continue
+        refused += 1
+        below, above = m[m < longest][-1], m[m > shortest][0]
+        with pytest.raises(InputError, match=f"ones are {1 / below:.5g} and {1 / above:.5g}:"):
+            surface.smallest_grid()
+    assert 20 < refused < 180
+
+
+def test_the_ends_of_the_band_belong_to_it():
+    for m in (1.0, np.sqrt(2), 3.0, np.hypot(3, 2), 7.0, np.hypot(20, 1)):
+        surface = SelfAffine(spectrum="cutoff", rolloff=1 / m, cutoff=1 / m)
+        assert np.ptp(surface.heights(64)) > 0
 
 
 @pytest.mark.parametrize("options", [{"hurst": 0.0}, {"hurst": 1.1}, {"cutoff": 0.0}, {"seed": -1}])

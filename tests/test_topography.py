@@ -248,6 +248,13 @@ def test_rounded_heights_give_a_warning(npy, rounding, is_coarse):
     assert not is_coarse or f"smallest step is {1e-6 * step:.3g} m" in found[0]
 
 
+def test_nearly_all_heights_that_are_equal_are_not_said_to_be_all(npy):
+    heights = np.zeros((64, 64))
+    heights[30:33, 30:33] = 1e-3
+    warnings = FileSurface(path=npy(heights)).warnings()
+    assert any(each.startswith("over 99% of the neighbouring heights") for each in warnings)
+
+
 @pytest.mark.parametrize("axis", [0, 1])
 @pytest.mark.parametrize("rounding", [0.0, 1.0])
 def test_a_map_that_is_constant_along_an_axis_is_not_rounded(npy, axis, rounding):

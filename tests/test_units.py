@@ -2,7 +2,7 @@ import pytest
 
 from gfmd_cli.physics.elastomers import HalfSpace, Power
 from gfmd_cli.physics.self_affine import SelfAffine
-from gfmd_cli.units import count, duration, labelled
+from gfmd_cli.units import count, duration, labelled, percent
 
 
 @pytest.mark.parametrize(
@@ -43,3 +43,22 @@ def test_a_time_is_given_in_its_largest_unit(seconds, text):
 
 def test_one_thing_is_in_the_singular():
     assert [count(n, "task") for n in (0, 1, 2)] == ["0 tasks", "1 task", "2 tasks"]
+
+
+@pytest.mark.parametrize(
+    ("fraction", "text"),
+    [
+        (0.0, "0%"),
+        (1e-9, "under 1%"),
+        (0.0049, "under 1%"),
+        (0.006, "1%"),
+        (0.2, "20%"),
+        (0.994, "99%"),
+        (0.996, "over 99%"),
+        (1 - 1e-9, "over 99%"),
+        (1.0, "100%"),
+        (1.2, "120%"),
+    ],
+)
+def test_a_percentage_is_not_rounded_to_all_or_none(fraction, text):
+    assert percent(fraction) == text

@@ -11,7 +11,7 @@ import numpy as np
 from gfmd_cli.grid.arrays import Field, row_blocks
 from gfmd_cli.maps.map_preparation import level
 from gfmd_cli.maps.topography import Topography, ends_without_heights
-from gfmd_cli.units import count
+from gfmd_cli.units import count, percent
 
 MAX_GRADIENT = 3.0  # rms; a choice: surfaces of machined or worn solids have less
 MIN_GRADIENT = 1e-6  # rms; a choice: polished mirrors have about that
@@ -108,8 +108,8 @@ def many_filled_in(topography: Topography) -> str:
     if fraction <= MAX_FILLED:
         return ""
     return (
-        f"{fraction:.0%} of the heights are missing and were filled in: contact there was not "
-        'measured; set surface.region, or surface.missing = "void" where nothing can touch'
+        f"{percent(fraction)} of the heights are missing and were filled in: contact there was "
+        'not measured; set surface.region, or surface.missing = "void" where nothing can touch'
     )
 
 
@@ -168,11 +168,11 @@ def step_at_border(heights: Field, *, is_tapered: bool) -> str:
 
 def tilted(heights: Field) -> str:
     """A tilt from which nothing is subtracted."""
-    tilt = 1 - float(np.var(level(heights, "plane"))) / (np.var(heights) or 1.0)
+    tilt = 1 - float(np.var(level(heights, "plane")) / (np.var(heights) or 1.0))
     if tilt <= MAX_TILT:
         return ""
     return (
-        f"a tilt makes up {tilt:.0%} of the variance of the heights, and nothing is "
+        f"a tilt makes up {percent(tilt)} of the variance of the heights, and nothing is "
         'subtracted: contact is at one edge first; surface.level = "plane" subtracts it'
     )
 
@@ -190,9 +190,9 @@ def curved(heights: Field) -> str:
     if share <= MAX_FORM or of_all * np.sign(of_form) <= MIN_FORM_KINK * abs(of_form):
         return ""
     return (
-        f"a parabolic form makes up {share:.0%} of the variance of the heights, so that contact is "
-        'in one part of the map only; if it is a bow of the scanner, surface.level = "curvature" '
-        "subtracts it"
+        f"a parabolic form makes up {percent(share)} of the variance of the heights, so that "
+        "contact is in one part of the map only; if it is a bow of the scanner, surface.level = "
+        '"curvature" subtracts it'
     )
 
 
@@ -315,7 +315,7 @@ def outliers(topography: Topography) -> str:
         fraction = number / heights.size
         if others.size < MIN_OTHERS:
             continue
-        percentage = f" ({fraction:.0%})" if fraction > MIN_SHOWN_FRACTION else ""
+        percentage = f" ({percent(fraction)})" if fraction > MIN_SHOWN_FRACTION else ""
         if min(abs(others.max() - extreme), abs(others.min() - extreme)) > np.ptp(others) > 0:
             what = "1 height is" if number == 1 else f"{number} heights{percentage} are"
             return (
@@ -346,8 +346,8 @@ def _often_equal(heights: Field) -> str:
     if not MIN_SHOWN_FRACTION < fraction <= PLATEAU_FRACTION:
         return ""
     return (
-        f"{fraction:.0%} of the heights are exactly {value:g}: an unfinished scan, or a mark of "
-        "missing heights? Set surface.region, or replace the mark by NaN"
+        f"{percent(fraction)} of the heights are exactly {value:g}: an unfinished scan, or a mark "
+        "of missing heights? Set surface.region, or replace the mark by NaN"
     )
 
 
@@ -436,9 +436,9 @@ def rounded(topography: Topography, scale: float) -> str:
     if equal < MAX_EQUAL_NEIGHBOURS or not changes.any():
         return ""
     return (
-        f"{equal:.0%} of the neighbouring heights are equal: if they were rounded (the smallest "
-        f"step is {scale * smallest:.3g} m), the gradient is too large and the contact area "
-        "too small; export the heights with more digits"
+        f"{percent(equal)} of the neighbouring heights are equal: if they were rounded (the "
+        f"smallest step is {scale * smallest:.3g} m), the gradient is too large and the contact "
+        "area too small; export the heights with more digits"
     )
 
 

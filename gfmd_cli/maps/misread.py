@@ -10,7 +10,7 @@ import numpy as np
 
 from gfmd_cli.grid.arrays import Field, row_blocks
 from gfmd_cli.maps.topography import Topography
-from gfmd_cli.units import count
+from gfmd_cli.units import count, percent
 
 MIN_POINTS = 32  # per side: fewer have such patterns by chance
 SAMPLED_LINES = 128  # of each axis, and points of each, at least; all of smaller maps
@@ -175,8 +175,9 @@ def _disordered(lines: Field, along: str) -> str:
     in_reverse = _mean(_after(backwards, first, 1) - own) / usual
     if in_reverse < MAX_REVERSED:
         return (
-            f"the lines along {along} fit the next line better in reverse, with {in_reverse:.0%} "
-            "of the difference: was every second line saved backwards? Reverse these lines"
+            f"the lines along {along} fit the next line better in reverse, with "
+            f"{percent(in_reverse)} of the difference: was every second line saved "
+            "backwards? Reverse these lines"
         )
     next_one, next_but_one = (_size(_after(lines, first, later) - own) for later in (1, 2))
     if next_one > MIN_ALTERNATION * next_but_one:
@@ -202,8 +203,8 @@ def _disordered(lines: Field, along: str) -> str:
         if min(distant) > usual:  # else a grating
             return (
                 f"the lines {half} to {len(lines) - 1} along {along} fit between those before "
-                f"them, with {between / usual:.0%} of the difference of neighbouring lines: an "
-                "interlaced image, all even lines and then all odd ones? Put the lines in order"
+                f"them, with {percent(between / usual)} of the difference of neighbouring lines: "
+                "an interlaced image, all even lines and then all odd ones? Put the lines in order"
             )
     return ""
 
@@ -223,7 +224,7 @@ def _displaced(lines: Field, along: str) -> str:
         return ""
     return (
         f"every second line along {along} is displaced: shifted back by one point, it differs from "
-        f"the lines beside it by {fitted / usual:.0%} of the present difference; are both "
+        f"the lines beside it by {percent(fitted / usual)} of the present difference; are both "
         "directions of the scan mixed? Align the lines, or use one direction"
     )
 
@@ -239,8 +240,8 @@ def _broken(heights: Field) -> str:
         return ""
     return (
         f"each line of {points} heights seems to continue in the next one: the step from its end "
-        f"to the next beginning is {on / usual:.0%} of the usual difference of neighbouring lines; "
-        "if each line of the map was saved in several lines, save it in one"
+        f"to the next beginning is {percent(on / usual)} of the usual difference of neighbouring "
+        "lines; if each line of the map was saved in several lines, save it in one"
     )
 
 

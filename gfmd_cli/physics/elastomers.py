@@ -25,7 +25,7 @@ from gfmd_cli.physics.free_compliance import Spacings
 from gfmd_cli.physics.linear_elastomer import LinearElastomer
 from gfmd_cli.physics.persson import gamma_slab
 from gfmd_cli.spec_table import FilePath, Positive
-from gfmd_cli.units import LARGEST_RMS_HEIGHT, labelled
+from gfmd_cli.units import LARGEST_RMS_HEIGHT, labelled, percent
 
 LONG_WAVE = 1e-6  # q t up to which k of a layer is constant: (q t)^2 is below rounding
 DECAY_DISTANCE = 25.0  # thicknesses from which the displacement of a layer is below rounding
@@ -127,9 +127,10 @@ class Plate(LinearElastomer):
         if fraction <= MAX_SHORT_WAVE_STRESS:
             return []
         return [
-            f"elastomer.thickness = {self.thickness:g} m: {fraction:.0%} of the squared stress in "
-            f"full contact is at wavelengths below {2 * np.pi * self.thickness:.3g} m, for which "
-            'a thin plate is too stiff; kind = "slab" has the stiffness of an elastic layer'
+            f"elastomer.thickness = {self.thickness:g} m: {percent(fraction)} of the squared "
+            f"stress in full contact is at wavelengths below {2 * np.pi * self.thickness:.3g} m, "
+            'for which a thin plate is too stiff; kind = "slab" has the stiffness of an elastic '
+            "layer"
         ]
 
 
@@ -305,15 +306,15 @@ class Tabulated(LinearElastomer):
         if fraction > MAX_EXTRAPOLATED:
             warnings.append(
                 f"{self.path.name}: k(q) is given for q = {first:.3g} to {last:.3g} 1/m, but "
-                f"{fraction:.0%} of the {what} is at other wavenumbers (the "
+                f"{percent(fraction)} of the {what} is at other wavenumbers (the "
                 f"surface has {q.min():.3g} to {q.max():.3g} 1/m), where k is extrapolated"
             )
         falling = _fraction(variance, self.local_exponent(q, step=OCTAVE / 2) < FALLING_EXPONENT)
         if falling > MAX_FALLING:
             warnings.append(
-                f"{self.path.name}: k(q) falls with q at the wavenumbers of {falling:.0%} of the "
-                "squared stress in full contact, but Persson theory assumes that it rises, or is "
-                "constant; is the second column a compliance, 1/k?"
+                f"{self.path.name}: k(q) falls with q at the wavenumbers of {percent(falling)} of "
+                "the squared stress in full contact, but Persson theory assumes that it rises, or "
+                "is constant; is the second column a compliance, 1/k?"
             )
         return warnings
 

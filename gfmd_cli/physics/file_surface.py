@@ -1,5 +1,6 @@
 """Height maps and line profiles from files as surfaces: reading, preparation, heights on grids."""
 
+from math import comb
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
@@ -19,6 +20,7 @@ from gfmd_cli.maps.interpolation import (
     suited_interpolation,
 )
 from gfmd_cli.maps.map_preparation import (
+    DEGREES,
     LEVELLING_ROUNDING,
     Edges,
     Levelling,
@@ -109,12 +111,22 @@ class FileSurface(RigidSurface):
     def smallest_grid(self) -> int:
         """Number of points of the map along x; cached, because scenes ask for it several times.
 
-        Raises InputError for a flat map, also where levelling leaves the rounding of its heights.
+        Raises InputError for a flat map, also where levelling leaves the rounding of its heights,
+        as it does where too few of them are known.
         """
         heights, topography = _prepared(self), self._topography()
         largest = self.scale * float(max(topography.heights.max(), -topography.heights.min()))
         left = float(np.ptp(heights))
         if left <= (LEVELLING_ROUNDING + 2 * topography.precision) * largest:
+            known = topography.heights.size - topography.missing_count
+            degree = DEGREES.get(self.levelling(), 0)
+            least = comb(degree + self.dimension, degree) + 1  # more than the terms of the trend
+            if topography.missing is not None and known < least:
+                raise InputError(
+                    f"{self.path}: surface.path: the map has {count(known, 'known height')} at "
+                    f"{topography.heights.size} points, the others are missing; with "
+                    f'surface.level = "{self.levelling()}" it needs {least} or more'
+                )
             rounding = (
                 f' with surface.level = "{self.levelling()}": what is left, {left:.2g} m, is the '
                 f"rounding of heights of up to {largest:.3g} m"

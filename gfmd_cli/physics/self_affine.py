@@ -10,9 +10,10 @@ import numpy as np
 from pydantic import Field as Key
 from pydantic import model_validator
 
+from gfmd_cli.errors import InputError
 from gfmd_cli.grid.arrays import Field, Modes
 from gfmd_cli.grid.fft_grid import Grid
-from gfmd_cli.physics.indenters import SMALLEST_GRID, RigidSurface
+from gfmd_cli.physics.indenters import MAX_POINTS, SMALLEST_GRID, RigidSurface
 from gfmd_cli.spec_table import Positive, Seed
 
 
@@ -62,8 +63,30 @@ class SelfAffine(RigidSurface):
         return int(np.floor(length_y / length / shortest)), int(np.floor(1 / shortest))
 
     def smallest_grid(self) -> int:
-        """Smallest number of points along x, two per lambda_s."""
-        return max(SMALLEST_GRID, 2 * self.highest_modes[1])
+        """Smallest number of points along x, two per lambda_s.
+
+        Raises InputError where no wave of the cell lies between lambda_r and lambda_s.
+        """
+        needed = max(SMALLEST_GRID, 2 * self.highest_modes[1])
+        if self.spectrum == "cutoff" and needed <= MAX_POINTS:
+            self._check_waves()
+        return needed
+
+    def _check_waves(self) -> None:
+        """Raise InputError where no wave of the cell is in the band of spectrum = "cutoff"."""
+        length_y, length = self.sides
+        x = np.arange(self.highest_modes[1] + 2)
+        y = np.floor(np.sqrt(np.maximum(self.cutoff**-2 - x**2, 0)) * (length_y / length))
+        m = np.hypot(np.stack([y, y + 1]) * (length / length_y), x)  # next to lambda_s
+        if self._amplitude(m).any():
+            return
+        is_longer = m * self.rolloff < 1
+        longer, shorter = 1 / m[is_longer].max(), 1 / m[~is_longer].min()
+        raise InputError(
+            f"surface.rolloff: {self.rolloff:g} given with cutoff = {self.cutoff:g}, but no wave "
+            f"of the cell has a wavelength between them; the nearest ones are {longer:.5g} and "
+            f"{shorter:.5g}: choose a larger rolloff or a smaller cutoff than these"
+        )
 
     def smallest_grid_y(self) -> int:
         """Smallest number of points along y, likewise."""

@@ -14,7 +14,7 @@ from gfmd_cli.spec.models import LOADS
 from gfmd_cli.status import LARGEST_TOLERANCE, Status
 from gfmd_cli.study.refinement import TaskSolution, border_share, inaccurate_columns
 from gfmd_cli.study.tasks import Task
-from gfmd_cli.units import LARGEST_RMS_HEIGHT
+from gfmd_cli.units import LARGEST_RMS_HEIGHT, percent
 
 FEW_POINTS = 30  # a choice: the area of a circle of 30 points is uncertain by a third, by its rim
 MIN_MODULUS_IN_PA = 1e3  # a choice: gels have 1e3 Pa, reduced moduli are mostly 1
@@ -185,8 +185,8 @@ def _unit_of_grid(task: Task, scene: Scene) -> Iterator[str]:
         return
     if (share := finest_share(scene)) > MAX_FINEST_SHARE:
         yield (
-            f"load.p_star: {share:.0%} of the square of Delta_sigma is at waves of two to four "
-            f"grid spacings, {OTHER_UNIT}"
+            f"load.p_star: {percent(share)} of the square of Delta_sigma is at waves of two to "
+            f"four grid spacings, {OTHER_UNIT}"
         )
 
 
