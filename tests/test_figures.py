@@ -405,16 +405,22 @@ def test_a_figure_of_a_long_sweep_names_its_elastomer_above_the_legend(study, co
 
 
 def test_the_legend_of_very_many_curves_names_a_few_of_them(study):
-    """Each curve keeps a colour of its own, along the sweep; the legend says what it leaves out."""
+    """Each curve keeps a colour of its own, along the sweep; the legend says what it leaves out.
+
+    The interactive figure leaves nothing out, so that every curve can be turned off.
+    """
     values = np.linspace(0.1, 0.9, 33)
     items = with_styles(hurst_sweep(study, values))
     assert len({item.style.colour for item in items}) == values.size
     with styled():
         plot = study_figures(hurst_sweep(study, values), items)["contact_area"]
     named = [f"hurst={hurst:.12g}" for hurst in values[::4]]
-    assert [*plot.entries] == [*named, "Persson theory"]
+    assert [*plot.named_entries] == [*named, "Persson theory"]
     assert plot.heading == "n = 1, 9 of 33 curves are named"
-    assert [entry["name"] for entry in interactive(plot)["legend"]] == [*plot.entries]
+    every = [f"hurst={hurst:.12g}" for hurst in values]
+    page = interactive(plot)
+    assert [entry["name"] for entry in page["legend"]] == [*every, "Persson theory"]
+    assert page["heading"] == "n = 1"
 
 
 def test_curves_of_a_long_sweep_of_two_parameters_differ_in_colour_and_label(study):

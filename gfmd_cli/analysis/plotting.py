@@ -122,9 +122,14 @@ class LegendFigure:
         shared = {CONFIDENCE, *SHORTFALL_MARKERS}
         return dict(sorted(self.legend.items(), key=lambda entry: entry[0] in shared))
 
+    @property
+    def named_entries(self) -> dict[str, Any]:
+        """The entries that the legend has in print."""
+        return self.entries
+
     def _write_legend(self) -> None:
         """Write the legend, if there is any, above the axes, in as many rows as needed."""
-        entries = self.entries
+        entries = self.named_entries
         if not entries:
             return
         columns, rows = _legend_shape(list(entries), self.width / WIDTH)
@@ -204,9 +209,9 @@ class ColumnFigure(LegendFigure):
         return ", ".join(filter(None, (self.shared_name, named)))
 
     @property
-    def entries(self) -> dict[str, Any]:
-        """The entries of the legend; of more than MAX_NAMED curves NAMED, the ends among them."""
-        entries, curves = super().entries, self.curves
+    def named_entries(self) -> dict[str, Any]:
+        """The entries in print: of more than MAX_NAMED curves NAMED, the ends among them."""
+        entries, curves = self.entries, self.curves
         left_out = set(curves) - set(evenly(curves, NAMED)) if len(curves) > MAX_NAMED else set()
         return {name: handle for name, handle in entries.items() if name not in left_out}
 

@@ -51,7 +51,7 @@ def interactive(figure: ColumnFigure) -> dict[str, Any] | None:
         "data": [_trace(layer, names) for layer in figure.layers],
         "layout": layout,
         "factor": factor,
-        "heading": _name(figure.heading),
+        "heading": _name(figure.shared_name),
         "legend": [
             {"name": _name(label), "symbol": _symbol(handle), "colour": to_hex(handle.get_color())}
             for label, handle in figure.entries.items()

@@ -64,7 +64,7 @@ class Section:
 
 def with_curves(label: str, figure: ColumnFigure) -> str:
     """An alternative text followed by the legend of the figure."""
-    entries = map(without_escapes, filter(None, (figure.heading, *figure.entries)))
+    entries = map(without_escapes, filter(None, (figure.heading, *figure.named_entries)))
     return f"{label}: {', '.join(entries)}"
 
 

@@ -188,6 +188,27 @@ def test_curves_are_turned_off_and_on(browser, page):
         assert browser.wait(f"{count} === arguments[0]", expected)
 
 
+@pytest.mark.parametrize("width", [360, 1280])
+def test_each_of_many_curves_can_be_turned_off(browser, output_of, tmp_path, width):
+    (tmp_path / "spec.toml").write_text(SPEC.split("[output]")[0])
+    hurst = ", ".join(f"{0.1 + 0.02 * place:.2f}" for place in range(40))
+    settings = ["--set", f"surface.hurst=[{hurst}]", "--set", "elastomer.n=1"]
+    few = ["--set", "grid.points=32", "--set", "load.p_star=0.3"]
+    output_of("run", tmp_path / "spec.toml", "-o", tmp_path / "many.h5", "-q", *settings, *few)
+    output_of("report", tmp_path / "many.h5")
+    browser.visit(tmp_path / "many.html", width)
+    legend = "document.querySelector('.legend')"
+    assert browser.run(f"return {legend}.querySelectorAll('button').length") == 41
+    assert browser.run(f"return {legend}.clientHeight < {legend}.scrollHeight")
+    assert browser.run(f"return {legend}.clientHeight") < 200
+    inside = "getBoundingClientRect().right <= document.documentElement.clientWidth"
+    assert browser.run(f"return [...{legend}.children].every(one => one.{inside})")
+    count = "return document.querySelector('.plot').querySelectorAll('path.point').length"
+    assert browser.run(count) == 40
+    browser.run(f"{legend}.querySelectorAll('button')[21].click()")
+    assert browser.wait(f"{count} === arguments[0]", 39)
+
+
 def test_a_figure_is_zoomed_with_the_mouse_and_keeps_that_with_fewer_curves(browser, page):
     from selenium.webdriver import ActionChains
 
