@@ -40,7 +40,7 @@ def exact(contact: Contact, solution: Solution) -> tuple[np.ndarray, np.ndarray]
     unit = np.zeros(shape, Extended)
     unit[0, 0] = 1
     by_unit = scipy.fft.irfft2(scipy.fft.rfft2(unit) * compliance, s=shape)
-    points = np.nonzero(solution.sigma > 0)
+    points = np.nonzero(solution.u == contact.height)
     steps = [(along[:, None] - along) % side for along, side in zip(points, shape, strict=True)]
     matrix, h = by_unit[tuple(steps)], contact.height[points].astype(Extended)
     m = h.size
@@ -70,10 +70,12 @@ def _extended(value: mpmath.mpf) -> Extended:
 def row(contact: Contact) -> list[str]:
     """The columns of one contact."""
     solution = solve_contact(contact, Auto(tolerance=TOLERANCE))
-    touching = solution.sigma > 0
+    touching = solution.u == contact.height
+    cells = [f"{np.count_nonzero(touching)}", str(solution.status)]
+    if not solution.is_direct:
+        return [*cells, *6 * ["not direct"]]
     s, u = exact(contact, solution)
     gap = u - contact.height
-    cells = [f"{np.count_nonzero(touching)}", str(solution.status)]
     values = [
         solution.residual,
         contact.rounding(solution.u),

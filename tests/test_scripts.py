@@ -16,7 +16,7 @@ WITH_OPTIONS = [
 SMALL = {
     "accuracy_gain.py": "--max-points 400",
     "cost.py": "--table-only --points 128 --sizes 128 --repeats 1",
-    "direct_solutions.py": "--points 64 128 --p-star 1e-5 --exponents 4",
+    "direct_solutions.py": "--points 64 256 --p-star 1e-5 --exponents 4",
     "economy.py": "--points 400",
     "energy_weights.py": "weights.jsonl --points 128 --seeds 2",
     "hard_cases.py": "--points 32 --only cliff --seconds 1",
