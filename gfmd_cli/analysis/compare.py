@@ -97,6 +97,11 @@ class Curve:
         return str(self.rows[0]["surface"])
 
     @property
+    def points(self) -> int:
+        """Grid points per side."""
+        return int(self.rows[0]["points"])
+
+    @property
     def n(self) -> float:
         """Exponent of the stiffness, NaN where it is no single power."""
         return float(self.rows[0]["n"])
