@@ -72,13 +72,12 @@ def row(contact: Contact) -> list[str]:
     solution = solve_contact(contact, Auto(tolerance=TOLERANCE))
     touching = solution.u == contact.height
     cells = [f"{np.count_nonzero(touching)}", str(solution.status)]
+    values = [solution.residual, contact.rounding(solution.u)]
     if not solution.is_direct:
-        return [*cells, *6 * ["not direct"]]
+        return [*cells, *(f"{value:.0e}" for value in values), *4 * ["not direct"]]
     s, u = exact(contact, solution)
     gap = u - contact.height
-    values = [
-        solution.residual,
-        contact.rounding(solution.u),
+    values += [
         float(np.abs(s - solution.sigma).max() / s.max()),
         float(np.abs(u - solution.u).max()),
         float(gap[~touching].min()),

@@ -41,7 +41,6 @@ from gfmd_cli.solvers.nested_grids import Solution, solve_contact
 
 TOLERANCE = 1e-6  # the default of [solver]
 TIGHTER = 1e-8  # a hundredth of it; no number where rounding or time does not allow it
-OUT_OF_REACH = " **out of reach**"
 TINY = 1e-300  # a gap that is no gap
 EXPONENTS = (0.0, 0.5, 1.0, 2.0, 3.0, 4.0)
 THIN = 1e-4 / (2 * pi)  # thickness of a slab whose longest wave has q t = 1e-4
@@ -238,6 +237,7 @@ def row(case: Case, points: int, seconds: float) -> str:
         result = solve(contact, seconds=seconds)
     solution, observables = result.solution, result.observables
     floor, status = result.floor(), result.status
+    reach = " **out of reach**" if floor > TOLERANCE else ""
     off = "-"
     if result.status == "converged":
         tighter = solve(contact, TIGHTER, seconds)
@@ -259,7 +259,7 @@ def row(case: Case, points: int, seconds: float) -> str:
         f"{observables.u_g:.4g}",
         f"{result.identity:.1e}",
         off,
-        "-" if solution.is_direct else f"{floor:.0e}" + OUT_OF_REACH * (floor > TOLERANCE),
+        "-" if solution.is_direct else f"{floor:.0e}{reach}",
     ]
     return "| " + " | ".join(cells) + " |"
 

@@ -82,17 +82,13 @@ def test_a_line_contact_is_that_of_the_iteration():
     assert direct.u == pytest.approx(solve_contact(contact, WholeGrids()).u, abs=1e-6)
 
 
-def single_grid():
-    return square(Power(n=4), points=64, p_star=1e-12)
-
-
 BELOW_ROUNDING = {
     "n=4": lambda: square(Power(n=4), p_star=1e-4),
     "n=4, one point": lambda: square(Power(n=4), p_star=1e-8),
     "n=3": lambda: square(Power(n=3), p_star=1e-5),
     "tiles": lambda: square(Power(n=2), points=512, p_star=1e-6),
     "odd": lambda: square(Power(n=4), points=181, p_star=1e-5),
-    "single grid": single_grid,
+    "single grid": lambda: square(Power(n=4), points=64, p_star=1e-12),
     "line": lambda: build_scene(LineParabola(radius=1.0), Power(n=3), 1024).contact(1e-7),
 }
 

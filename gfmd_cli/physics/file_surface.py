@@ -184,8 +184,7 @@ class FileSurface(RigidSurface):
             return self.interpolation
         return suited_interpolation(self.resolved_heights(), mirrored=self.is_mirrored)
 
-    @property
-    def grid_reason(self) -> str:  # type: ignore[override]
+    def smallest_grid_reason(self) -> str:
         """Reason for the smallest grid: the points of the map."""
         return f"a map of {extent(self._topography().heights.shape)} points"
 

@@ -79,8 +79,6 @@ class RigidSurface(SpecTable):
     """Copies of the surface along each side of its cell."""
     size_hint: ClassVar[str] = "the side along y is surface.length_y"
     """What to check where the smallest grid has too many points, for messages."""
-    grid_reason: ClassVar[str] = "kind {kind!r}"
-    """Reason for the smallest grid, likewise, with the values of keys."""
     kind: str
 
     def smallest_grid(self) -> int:
@@ -142,7 +140,7 @@ class RigidSurface(SpecTable):
             if count < least:
                 raise InputError(
                     f"grid.{key}: {count // self.copies} points along {axis} do not resolve "
-                    f"the surface ({self.grid_reason.format(**dict(self))}); "
+                    f"the surface ({self.smallest_grid_reason()}); "
                     f"{self.remedy(least // self.copies)}"
                 )
 
@@ -168,6 +166,10 @@ class RigidSurface(SpecTable):
     def within(self, boundary: str) -> Self:
         """The surface with the treatment of its edges that goes with a boundary by default."""
         return self
+
+    def smallest_grid_reason(self) -> str:
+        """Reason for the smallest grid, as text for messages."""
+        return f"kind {self.kind!r}"
 
     def slope_at(self, r: float) -> float:
         """Slope |dh/dr| of a single indenter at a distance r > 0 from its middle; else 0."""
@@ -324,7 +326,6 @@ class Punch(RoundIndenter):
 
     stepped: ClassVar[bool] = True
     size_hint: ClassVar[str] = "surface.radius and surface.length have one unit"
-    grid_reason: ClassVar[str] = "kind {kind!r}, radius = {radius:g}: a spacing or more"
     kind: Literal["punch"] = "punch"
     radius: Positive = 0.25
     """Radius of the face [m], a grid spacing or more."""
@@ -347,6 +348,10 @@ class Punch(RoundIndenter):
         """Smallest number of points along y, likewise."""
         return max(SMALLEST_GRID, ceil(self.sides[0] / self.radius - POINTS_ROUNDING))
 
+    def smallest_grid_reason(self) -> str:
+        """Reason for the smallest grid: the radius."""
+        return f"kind {self.kind!r}, radius = {self.radius:g}: a spacing or more"
+
     def _profile(self, r: Field) -> Field:
         rim = self.radius * (1 + 1e-12)  # points on the rim belong to the face, up to rounding
         return np.where(r <= rim, 0.0, -(self.depth or self.length))
@@ -364,7 +369,6 @@ class Ridge(LineIndenter):
 
     tip_exponent: ClassVar[float] = 1.0
     size_hint: ClassVar[str] = "surface.width is relative to surface.length"
-    grid_reason: ClassVar[str] = "kind {kind!r}, width = {width:g}: two spacings or more"
     kind: Literal["ridge"] = "ridge"
     slope: Positive = 1.0
     """Slope of the flanks, the tangent of their angle to the plane."""
@@ -374,6 +378,10 @@ class Ridge(LineIndenter):
     def smallest_grid(self) -> int:
         """Smallest number of points: the foot is a spacing or more away from the crest."""
         return max(SMALLEST_GRID, ceil(2 / self.width - POINTS_ROUNDING))
+
+    def smallest_grid_reason(self) -> str:
+        """Reason for the smallest grid: the width."""
+        return f"kind {self.kind!r}, width = {self.width:g}: two spacings or more"
 
     def _profile(self, r: Field) -> Field:
         return -self.slope * np.minimum(r, 0.5 * self.width * self.length)

@@ -27,7 +27,6 @@ class SelfAffine(RigidSurface):
     rough: ClassVar[bool] = True
     band_limited: ClassVar[bool] = True
     size_hint: ClassVar[str] = "surface.cutoff is relative to surface.length"
-    grid_reason: ClassVar[str] = "kind {kind!r}, cutoff = {cutoff:g}: two points per lambda_s"
     kind: Literal["self-affine"] = "self-affine"
     hurst: Annotated[float, Key(gt=0, le=1)] = 0.8
     """Hurst exponent H, 0 < H <= 1."""
@@ -85,12 +84,16 @@ class SelfAffine(RigidSurface):
         raise InputError(
             f"surface.rolloff: {self.rolloff:g} given with cutoff = {self.cutoff:g}, but no wave "
             f"of the cell has a wavelength between them; the nearest ones are {longer:.5g} and "
-            f"{shorter:.5g}: choose a larger rolloff or a smaller cutoff than these"
+            f"{shorter:.5g}: choose a rolloff above the first or a cutoff below the second"
         )
 
     def smallest_grid_y(self) -> int:
         """Smallest number of points along y, likewise."""
         return max(SMALLEST_GRID, 2 * self.highest_modes[0])
+
+    def smallest_grid_reason(self) -> str:
+        """Reason for the smallest grid: the cut-off needs two points per lambda_s."""
+        return f"kind {self.kind!r}, cutoff = {self.cutoff:g}: two points per lambda_s"
 
     def warnings(self, boundary: str = "periodic") -> list[str]:
         """A warning about a spectrum without a self-affine part."""

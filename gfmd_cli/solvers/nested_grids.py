@@ -97,9 +97,8 @@ def solve_contact(
         if direct is None:
             status = solve(fine, current, state, watch)
         else:
-            state, status = direct, Status.CONVERGED
-            if state.residual >= current.tolerance:
-                status = Status.ROUNDING
+            state, is_converged = direct, direct.residual < current.tolerance
+            status = Status.CONVERGED if is_converged else Status.ROUNDING
         transforms += state.transforms * fine.grid.size / contact.grid.size
         coarse = fine
         if grids and solver.starts_locally:

@@ -29,7 +29,7 @@ _SPEC.loader.exec_module(script)
 def test_points_in_contact_and_their_stresses_are_those_of_extended_precision(
     n, points, p_star, seed
 ):
-    """K u is of no use: its rounding exceeds 2e-7 of the pressure, and the stress has 1e-9."""
+    """The rounding of K u exceeds 2e-7 of the pressure; the stresses have errors below 1e-9."""
     contact = build_scene(SelfAffine(cutoff=0.1, seed=seed), Power(n=n), points).contact(p_star)
     solution = solve_contact(contact, Auto(tolerance=1e-6))
     assert contact.rounding(solution.u) > 2e-7
