@@ -62,6 +62,39 @@ def test_rounded_positions_are_even(saved, digits, separator):
     assert read.spacing == pytest.approx((1e-6 / 3, 1e-6 / 3), rel=2e-3)
 
 
+@pytest.mark.parametrize("spacing", [0.0213, 0.0391, 0.069])
+@pytest.mark.parametrize("is_profile", [False, True])
+def test_positions_of_few_digits_are_even(saved, spacing, is_profile):
+    """The rounding is up to a quarter of the spacing."""
+    along_x, along_y = spacing * np.arange(-150, 150), spacing * np.arange(1 if is_profile else 12)
+    text = points(along_x, along_y, digits=2)
+    if is_profile:
+        text = "".join("{} {}\n".format(*line.split()[::2]) for line in text.splitlines())
+    read = read_topography(saved(text))
+    np.testing.assert_array_equal(read.heights, HEIGHTS[0] if is_profile else HEIGHTS)
+    assert read.spacing[-1] == pytest.approx(spacing, rel=2e-3)
+    assert read.spacing[0] == pytest.approx(spacing, rel=0.05)
+
+
+def test_positions_of_few_digits_in_powers_of_ten_are_even(saved):
+    """The largest are rounded most."""
+    rows = (
+        f"{3.91e-7 * i:.2e} {3.91e-7 * j:.2e} {HEIGHTS[j, i]:.6f}\n"
+        for j in range(12)
+        for i in range(0, 30)
+    )
+    read = read_topography(saved("".join(rows)))
+    np.testing.assert_array_equal(read.heights, HEIGHTS[:, :30])
+
+
+@pytest.mark.parametrize("digits", [1, 2])
+def test_positions_of_few_digits_that_are_uneven_are_refused(saved, digits):
+    """Their rounding, at most a tenth of the spacing, does not explain the deviation."""
+    bent = 0.51 * (np.arange(40) + 0.25 * np.sin(np.arange(40) / 6))
+    with pytest.raises(InputError, match="along x are not evenly spaced: they deviate"):
+        read_topography(saved(points(bent, 0.5 * np.arange(12), digits)))
+
+
 def test_positions_of_a_stage_that_jitters_are_even(saved):
     jitter = np.random.default_rng(1).uniform(-0.02, 0.02, (12, 300, 2))
     y, x = np.indices(HEIGHTS.shape)

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Iterator
+from decimal import Decimal
 from typing import Any, BinaryIO
 
 import numpy as np
@@ -28,7 +29,8 @@ from gfmd_cli.maps.text_tables import (
 )
 
 NO_GRID = "three columns that are not the points (x, y, height) of a full grid"
-MAX_DEVIATION = 0.05  # of positions, over their distance; a choice: 0.015 of 0.33, 0.67, 1.00
+MAX_DEVIATION = 0.05  # of positions, over their distance, beside their rounding; a choice
+MAX_ROUNDING = 0.25  # of positions, likewise: neighbours differ by 2 of the last digit; a choice
 SAME_POSITION = 0.0, 0.5
 """Gaps between equal positions, over the largest gap: of tables, and of stages that jitter."""
 MIN_PRESENT = 0.5  # fraction of the points of a grid, without which they are scattered; a choice
@@ -202,8 +204,8 @@ def _grid(table: Field) -> tuple[Field, tuple[float, ...], str]:
     if deviation.max() > MAX_DEVIATION:
         raise InputError(
             f"the positions along {'xy'[int(deviation.argmax())]} are not evenly spaced: "
-            f"they deviate by up to {deviation.max():.2g} of their distance, and rounding by at "
-            f"most {MAX_DEVIATION:g}: resample the map"
+            f"they deviate by up to {deviation.max():.2g} of their distance, and at most "
+            f"{MAX_DEVIATION:g} is allowed: save them with more digits, or resample the map"
         )
     if missing:
         raise InputError(
@@ -224,13 +226,14 @@ def _profile(table: Field) -> tuple[Field, tuple[float, ...], str]:
     x, heights = table.T if table[0, 0] <= table[-1, 0] else table[::-1].T
     gaps = np.diff(x)
     if gaps.min() > 0:
-        index = np.append(0.0, np.cumsum(np.rint(gaps / np.median(gaps))))
-        points, is_distinct = int(index[-1]) + 1, bool(np.diff(index).all())
-        steps, deviation = _steps(x[:, None], index[:, None])
-        if is_distinct and deviation[0] <= MAX_DEVIATION and x.size >= MIN_PRESENT * points:
-            whole = np.full(points, np.nan)
-            whole[index.astype(np.int64)] = heights
-            return whole, (float(steps[0]) * points,), ""
+        numbered = np.append(0.0, np.cumsum(np.rint(gaps / np.median(gaps))))
+        for index in (np.arange(float(x.size)), numbered):
+            points, is_distinct = int(index[-1]) + 1, bool(np.diff(index).all())
+            steps, deviation = _steps(x[:, None], index[:, None])
+            if is_distinct and deviation[0] <= MAX_DEVIATION and x.size >= MIN_PRESENT * points:
+                whole = np.full(points, np.nan)
+                whole[index.astype(np.int64)] = heights
+                return whole, (float(steps[0]) * points,), ""
     heights, sides = at_equal_distances(x, heights)
     return heights, sides, ", interpolated at equal distances"
 
@@ -243,7 +246,22 @@ def _index(positions: Field, part: float) -> np.ndarray[tuple[int], np.dtype[np.
 
 
 def _steps(positions: Field, indices: Field) -> tuple[Field, Field]:
-    """The best step of even positions along each axis, and the largest deviation in such steps."""
+    """The best step of even positions along each axis, and the largest deviation in such steps.
+
+    Where it is large, the rounding of the positions is subtracted.
+    """
     from_mean = indices - indices.mean(axis=0), positions - positions.mean(axis=0)
     steps = (from_mean[0] * from_mean[1]).sum(axis=0) / (from_mean[0] ** 2).sum(axis=0)
-    return steps, np.abs(from_mean[1] - steps * from_mean[0]).max(axis=0) / np.abs(steps)
+    deviation = np.abs(from_mean[1] - steps * from_mean[0]).max(axis=0) / np.abs(steps)
+    for axis in np.flatnonzero(deviation > MAX_DEVIATION):
+        rounding = _rounding(positions[:, axis]) / abs(steps[axis])
+        if rounding <= MAX_ROUNDING:
+            deviation[axis] = max(0.0, deviation[axis] - rounding)
+    return steps, deviation
+
+
+def _rounding(positions: Field) -> float:
+    """Half a unit of the last digit of the largest positions."""
+    exact = [Decimal(repr(each)).normalize() for each in np.unique(np.abs(positions)).tolist()]
+    digits = max(len(each.as_tuple().digits) for each in exact)
+    return 0.5 * 10.0 ** (exact[-1].adjusted() + 1 - digits)
