@@ -15,7 +15,7 @@ from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
-from scipy.linalg import solve_banded
+import scipy
 
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.maps.interpolation import monotone_cubic
@@ -115,7 +115,7 @@ def _implicit(faces: Field, start: Field, guess: Field, k: float, added: float) 
         bands[0, 1:] = bands[2, :-1] = -coupling
         bands[1] = width - bands[0] - bands[2]
         missing = (start - u) * width + added * np.diff(flow)
-        step = solve_banded((1, 1), bands, missing, check_finite=False)
+        step = scipy.linalg.solve_banded((1, 1), bands, missing, check_finite=False)
         u = np.maximum.accumulate((u + step)[::-1])[::-1]
         if np.abs(step).max() < _CONVERGED * u[0]:
             break

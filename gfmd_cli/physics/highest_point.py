@@ -3,8 +3,8 @@
 from collections.abc import Callable, Iterable
 
 import numpy as np
+import scipy
 from scipy.fft import dctn, idct
-from scipy.optimize import minimize
 
 from gfmd_cli.grid.arrays import Field, Modes, row_blocks
 
@@ -100,7 +100,7 @@ def _refined(
     best = -np.inf
     for place in _peaks(highest):
         bounds = [(x - 1.0, x + 1.0) for x in place]
-        result = minimize(depth, place, jac=True, method="L-BFGS-B", bounds=bounds)
+        result = scipy.optimize.minimize(depth, place, jac=True, method="L-BFGS-B", bounds=bounds)
         best = max(best, -float(result.fun))
     return best
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from math import inf, nan
 
 import numpy as np
-from scipy.optimize import OptimizeResult, minimize
+import scipy
 
 from gfmd_cli.errors import InputError
 from gfmd_cli.grid.arrays import Field
@@ -227,11 +227,11 @@ def _maximise_likelihood(q: Field, count: Field, power: Field) -> Field:
     """
     bounds = (HURST_BOUNDS, (-np.log(2.0), np.log(q[-1] / q[0])))
 
-    def search(start: list[float]) -> OptimizeResult:
+    def search(start: list[float]) -> scipy.optimize.OptimizeResult:
         sides = bounds[: len(start)]
         first = np.clip(start, *np.transpose(sides))
         corners = np.vstack([first, first + SIMPLEX * np.eye(len(start))])
-        return minimize(
+        return scipy.optimize.minimize(
             _misfit,
             first,
             (q, count, power),

@@ -34,9 +34,8 @@ from math import inf
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg import LinAlgError, cho_factor, cho_solve
-from scipy.linalg.blas import dtrmv
 
 from gfmd_cli.grid.arrays import Field, Mask, row_blocks
 from gfmd_cli.grid.compilation import kernel
@@ -136,7 +135,7 @@ class _DirectSolve:
             work -= max(points[0].size, largest // 2) ** 3
             try:
                 t, factor = self.equilibrium(points)  # [1]
-            except LinAlgError:  # rounding, at very steep k(q)
+            except scipy.linalg.LinAlgError:  # rounding, at very steep k(q)
                 return False
             has_tension = self.stress is not None and np.any(t < 0)
             if has_tension:
@@ -222,13 +221,13 @@ class _DirectSolve:
     def equilibrium(self, points: Points) -> tuple[Field, Field]:
         """The stresses t of the points A, and U of C_AA = U^T U (Cholesky).
 
-        Raises LinAlgError if rounding makes C_AA indefinite.
+        Raises scipy.linalg.LinAlgError if rounding makes C_AA indefinite.
         """
         rows, columns = points
         matrix = np.empty((rows.size, rows.size))
         _fill_lower_triangle(matrix, rows, columns, self.compliance, *self.values.shape)
         # The lower triangle by rows is the upper one by columns, which LAPACK overwrites.
-        factor, _ = cho_factor(matrix.T, overwrite_a=True, check_finite=False)
+        factor, _ = scipy.linalg.cho_factor(matrix.T, overwrite_a=True, check_finite=False)
         load = self.contact.pressure * self.grid.size
         return _balanced(factor, self.obstacle[points], load), factor
 
@@ -265,7 +264,7 @@ def _balanced(factor: Field, h: Field, load: float) -> Field:
     as the first time rounding of larger stresses remains.
     """
     sides = np.stack([h - h.mean(), np.ones(h.size)], axis=1)
-    s, by_level = cho_solve((factor, False), sides, check_finite=False).T
+    s, by_level = scipy.linalg.cho_solve((factor, False), sides, check_finite=False).T
     for _ in range(2):
         s = s + by_level * ((load - s.sum()) / by_level.sum())
     return s
@@ -273,5 +272,5 @@ def _balanced(factor: Field, h: Field, load: float) -> Field:
 
 def _energy(factor: Field, s: Field) -> float:
     """Twice the elastic energy s C s of stresses, with the factor U of C = U^T U."""
-    strain = dtrmv(factor, s)
+    strain = scipy.linalg.blas.dtrmv(factor, s)
     return float(np.vdot(strain, strain))
