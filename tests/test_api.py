@@ -526,7 +526,7 @@ from gfmd_cli.errors import Interrupted
 SPEC = {
     "surface": {"kind": "self-affine", "cutoff": 0.02},
     "elastomer": {"kind": "power", "n": 2},
-    "grid": {"points": 256},
+    "grid": {"points": 128},
     "load": {"p_star": [0.01, 0.02, 0.03, 0.04, 0.05, 0.06]},
     "solver": {"kind": "fire", "tolerance": 1e-9},
 }
