@@ -268,6 +268,19 @@ def test_the_face_of_a_punch_on_a_membrane_does_not_vanish_at_small_pressures(ro
     assert row["a_r"] == resolved["a_r"] > 0.05
 
 
+def test_a_first_trial_whose_contact_rounding_has_taken_is_not_the_nearest():
+    """The area of a face, 0.1, is farther from 0.04 than none."""
+    search = a_search(first=1e-3, quantity="contact_area", slope=1.0, load=0.04)
+    pressures = []
+    while (pressure := search.next()) is not None:
+        pressures.append(pressure)
+        search.add(Trial(64, pressure, 0.1 if pressure > 0.01 else 0.0, 0.0))
+    assert pressures[:3] == pytest.approx([1e-3, 8e-3, 6.4e-2])
+    assert min(pressures[3:]) > 8e-3
+    assert search.nearest.value == 0.1
+    assert not search.succeeded
+
+
 @pytest.mark.parametrize("n", [2, 3])
 def test_coarser_grids_predict_the_pressure_of_a_continuum_area(rows_of, monkeypatch, n):
     """Their contact areas on the grid have far lower pressures: by a factor of 2 to 20."""
@@ -480,6 +493,7 @@ def a_search(first, quantity, slope, size=10**9, load=0.1):
         quantity=quantity,
         load=load,
         load_tolerance=1e-5,
+        accuracy=None,
         points=64,
         solver=SimpleNamespace(tolerance=1e-6),
         elastomer=SimpleNamespace(stiffness=lambda q, length: 0.0 * q),  # all pressures resolved

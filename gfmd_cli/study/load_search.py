@@ -331,7 +331,7 @@ class _Search:
     """
 
     def __init__(self, task: Task, scene: Scene, first: float, slope: float) -> None:
-        self.task, self.scene, self.first, self._slope = task, scene, first, slope
+        self.task, self.scene, self._slope = task, scene, slope
         is_area, is_last = task.quantity == "contact_area", scene.grid.points == task.points
         self.sign = -1 if task.quantity == "mean_gap" else 1
         self.quantum = 1 / scene.grid.size if is_area else 0.0
@@ -342,16 +342,20 @@ class _Search:
         self.resolution = apart if is_last else COARSE_DISTANCE
         self.lowest = max(PRESSURE_RANGE[0], RESOLVED * _stiffest(task, scene) if is_area else 0.0)
         """Reduced pressure above which the load is sought."""
+        self.first = max(first, self.lowest * scene.delta_sigma)
         self.points: list[_Point] = []
         """Nearest to the root first; on a plateau (full contact) the innermost."""
 
     def add(self, trial: Trial) -> None:
         """Take a trial into account.
 
-        Where a pressure has no contact, rounding has taken it: lower ones are not tried.
+        Where a pressure has no contact, rounding has taken it: the trial is left out, and lower
+        pressures are not tried. The continuum value of an area can be 0 in the first trial.
         """
-        if self.points and self.quantum > 0 and trial.value == 0:
+        may_be_zero = self.task.accuracy is not None and not self.points
+        if self.quantum > 0 and trial.value == 0 and not may_be_zero:
             self.lowest = max(self.lowest, trial.pressure / self.scene.delta_sigma)
+            self.first = trial.pressure * exp(MAX_STEP)  # where no trial has had contact yet
             return
         excess = log(trial.value / self.task.load) if trial.value > 0 else -inf
         self.points.append(_Point(log(trial.pressure), self.sign * excess, trial))
