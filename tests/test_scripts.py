@@ -26,7 +26,7 @@ SMALL = {
     "forecast_pairs.py": "--points 64 --exponents 1 --cutoff 0.1 --repeats 1",
     "line_theory.py": "--seeds 2 --points 8",
     "load_searches.py": "--points 128 --seeds 10",
-    "noise_of_maps.py": "--points 128 --seeds 1",
+    "noise_of_maps.py": "--points 64 --seeds 1",
     "neighbour_start.py": "--points 512 --p-star 0.001 0.0011",
     "plain_processor.py": "",
     "plate_areas.py": "none.jsonl --no-run",
