@@ -75,7 +75,7 @@ check: $(VENV)/.test ## the one gate: lint, format, types, import order
 	$(BIN)/lint-imports
 
 validate: $(VENV)/.test ## slow physics: large grids, dense ladders; slow blocks of the documentation
-	$(BIN)/pytest -m validation
+	$(BIN)/$(PYTEST) -m validation
 
 test-kills: $(VENV)/.test ## 500 runs whose parent or workers are killed, 200 forged states: an hour
 	GFMD_KILLS=500 $(BIN)/pytest -m faults -rP -n 2 --dist load tests/faults/test_kills.py
