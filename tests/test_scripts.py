@@ -42,6 +42,7 @@ SMALL = {
     "tile_solves.py": "--points 512 --cutoff 0.02 --p-star 0.001 --repeats 1",
     "surface_classes.py": "bumps random --count 1 --finest 4",
     "transform_work.py": "--points 64",
+    "tip_radius.py": "--points 256 --seeds 1 --hurst 0.8 --radii 1",
     "time_left.py": f"{ROOT / 'configs' / 'smoke.toml'} --set grid.points=100 --jobs 1",
     "unresolved_roughness.py": "--points 512 --seeds 1 --hurst 0.8",
 }

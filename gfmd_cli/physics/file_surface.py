@@ -32,6 +32,7 @@ from gfmd_cli.maps.map_preparation import (
 )
 from gfmd_cli.maps.noise import noisy
 from gfmd_cli.maps.pictures import Picture, picture
+from gfmd_cli.maps.tip import blunted
 from gfmd_cli.maps.topography import Region, Topography, read_topography
 from gfmd_cli.physics.indenters import (
     POINTS_ROUNDING,
@@ -83,6 +84,10 @@ class FileSurface(RigidSurface):
     s_filter: Positive | None = None
     """Cut-off wavelength of the S-filter [m], a Gaussian low-pass filter (ISO 16610-61) against
     noise: it halves waves of this wavelength and damps shorter ones more. By default no filter."""
+    tip_radius: Positive | None = None
+    """Radius of the tip that scanned the map [m]; the program then warns of structures that the tip
+    has blunted. By default it warns only if the curvature of the peaks clearly ends at one value.
+    The heights are not changed."""
     edges: Edges | None = None
     """How the map is made periodic: "window" tapers the heights near the border to their mean,
     "mirror" reflects the map to twice its sides, "none" changes nothing. By default "none" for a
@@ -508,6 +513,8 @@ def _warnings_on_heights(surface: FileSurface) -> tuple[str, ...]:
     lines = "" if misread_map else map_warnings.shifted_lines(known, spacing)
     rounded = map_warnings.rounded(topography, scale)
     rounded_trend = map_warnings.rounded_trend(topography, levelled, scale)
+    cutoff, is_flipped = surface.s_filter or 0.0, surface.flip
+    tip = blunted(known, spacing, scale, surface.tip_radius, cutoff=cutoff, flipped=is_flipped)
     is_explained = any((outliers, misread_map, points, lines, rounded, rounded_trend))
     return (
         filled_lines,
@@ -515,7 +522,8 @@ def _warnings_on_heights(surface: FileSurface) -> tuple[str, ...]:
         misread_map,
         points,
         lines,
-        "" if is_explained else noisy(known, spacing, scale, surface.s_filter or 0.0),
+        "" if is_explained else noisy(known, spacing, scale, cutoff),
+        "" if misread_map else tip,
         map_warnings.curved(levelled),
         map_warnings.steep(surface.levelling(), subtracted, sides),
         map_warnings.repeated_lines(topography.heights),

@@ -1,0 +1,134 @@
+"""Blunt peaks of a map, where the tip of the microscope or stylus was blunter than the surface.
+
+A scan is the dilation of the surface by the tip: the curvature of its peaks is at most 1 / R, that
+of the tip, while the valleys between them are sharp.
+"""
+
+import numpy as np
+
+from gfmd_cli.grid.arrays import Field
+from gfmd_cli.maps.topography import Topography
+from gfmd_cli.units import labelled
+
+MAX_CURVATURE = 0.5
+"""Curvature of peaks over that of the tip, beyond which the tip has blunted them (Sanner et al.,
+Appl. Surf. Sci. Adv. 7, 100190 (2022), for the largest curvature of a map)."""
+SHARP, SHARPER = 0.99, 0.999
+"""Quantiles of the curvature of peaks. Their ratio is 1.33 for Gaussian curvatures."""
+MAX_RATIO = 1.15  # of these two, if a tip has blunted the peaks; calibrated, as the next constant
+MIN_VALLEYS = 1.5  # curvature of valleys over that of peaks, likewise; 1 for Gaussian surfaces
+DISTANCES = (1, 2, 3, 4, 6, 8)  # points, at which a tip is looked for; noise hides it at the first
+MIN_POINTS = 64  # per side of a map; smaller ones have such curvatures by chance
+MAX_SHARPEST = 3.0  # curvature of peaks over that of the tip; a choice: 1 without noise
+GROWTH = 1.25  # of the distances at which a map is compared with a tip
+MAX_DISTANCE = 4  # shorter side over the largest of them
+FILTERED = 2.0
+"""Cut-off wavelength of the S-filter over the length of blunt structures: filtered map and filtered
+surface then have contact areas that differ by about 10 % or less (docs/map_evidence.md)."""
+MAX_SAMPLE = 2**18  # heights along each axis
+
+
+def blunted(
+    topography: Topography,
+    spacing: tuple[float, ...],
+    scale: float,
+    radius: float | None = None,
+    *,
+    cutoff: float = 0.0,
+    flipped: bool = False,
+) -> str:
+    """A warning that a tip has blunted the peaks of a map, "" without it.
+
+    Without a radius, only a map whose peaks end at one curvature gives the warning. None is given
+    if the S-filter removes what depends on the tip.
+
+    Parameters
+    ----------
+    topography : the map
+    spacing : its spacing [m]
+    scale : factor from its heights to metres
+    radius : of the tip [m]; None if it is not known
+    cutoff : cut-off wavelength of the S-filter [m]; 0 without it
+    flipped : whether the heights were turned upside down after the scan
+    """
+    heights = (-scale if flipped else scale) * topography.with_gaps()
+    if radius is not None:
+        what = f"the tip (surface.tip_radius = {labelled(radius, 'm')}) has"
+        along = [_curvatures(heights, spacing, axis, 1)[1] for axis in range(heights.ndim)]
+        sharpest = radius * max(along)
+        if sharpest > MAX_SHARPEST:
+            return (
+                f"the peaks of the map are up to {sharpest:.2g} times as sharp as a tip of the "
+                f"radius surface.tip_radius = {radius:g} m leaves them: noise, or is the radius "
+                "wrong?"
+            )
+    else:
+        curvature = _curvature_of_tip(heights, spacing)
+        if not curvature > 0:
+            return ""
+        radius = 1 / curvature
+        what = (
+            f"no peak of the scan is sharper than a sphere of the radius {radius:.2g} m, but the "
+            "valleys are, as if scanned by a tip of about this radius. Then the tip has"
+        )
+    distance = _shortest_sharp(heights, spacing, MAX_CURVATURE / radius)
+    length = 2 * distance * max(spacing)
+    if distance == 1 or cutoff >= FILTERED * length:
+        return ""
+    return (
+        f"{what} blunted structures shorter than about {length:.2g} m: the contact area at light "
+        "load is too large, in tests by a factor of 1.1 to 3.5. With surface.s_filter = "
+        f"{FILTERED * length:.2g} or more the contact hardly depends on the tip, but is that of a "
+        "smoother surface"
+    )
+
+
+def _curvature_of_tip(heights: Field, spacing: tuple[float, ...]) -> float:
+    """The curvature at which the peaks of a map end along both axes [1/m]; 0 if they do not.
+
+    It is that at the shortest distance of points at which they do.
+    """
+    if heights.ndim == 1 or min(heights.shape) < MIN_POINTS:
+        return 0.0
+    for distance in DISTANCES:
+        found = [_curvatures(heights, spacing, axis, distance) for axis in range(heights.ndim)]
+        if all(
+            0 < sharper < MAX_RATIO * sharp and valleys > MIN_VALLEYS * sharper
+            for sharp, sharper, valleys in found
+        ):
+            return float(np.mean([sharper for _, sharper, _ in found]))
+    return 0.0
+
+
+def _shortest_sharp(heights: Field, spacing: tuple[float, ...], curvature: float) -> int:
+    """The shortest distance, in points, at which peaks have at most a curvature [1/m].
+
+    The longest one that is compared, if peaks are sharper at all of them. The curvature is that
+    along the axis with the sharper peaks.
+    """
+    distance, longest = 1, max(1, min(heights.shape) // MAX_DISTANCE)
+    while distance < longest:
+        along = [_curvatures(heights, spacing, axis, distance)[1] for axis in range(heights.ndim)]
+        if not max(along) > curvature:
+            break
+        distance = min(max(distance + 1, round(GROWTH * distance)), longest)
+    return distance
+
+
+def _curvatures(
+    heights: Field, spacing: tuple[float, ...], axis: int, distance: int
+) -> tuple[float, float, float]:
+    """Quantiles of the curvature along an axis [1/m]: two of peaks, one of valleys.
+
+    The curvature is the second difference of heights at a distance in points; -inf if no such
+    heights are known.
+    """
+    lines = np.moveaxis(np.atleast_2d(heights), axis - heights.ndim, -1)
+    lines = lines[:: 1 + lines.size // MAX_SAMPLE]
+    middle = lines[:, distance:-distance]
+    second = 2 * middle - lines[:, 2 * distance :] - lines[:, : -2 * distance]
+    known = second[np.isfinite(second)] / (distance * spacing[axis]) ** 2
+    if not known.size:
+        return -np.inf, -np.inf, -np.inf
+    sharp, sharper, valleys = np.quantile(known, (SHARP, SHARPER, 1 - SHARPER))
+    return float(sharp), float(sharper), float(-valleys)
