@@ -12,11 +12,11 @@ from gfmd_cli.physics.file_surface import FileSurface
 from gfmd_cli.physics.self_affine import SelfAffine
 
 SPACING = 1e-8
-RADIUS = 50e-9
+RADIUS = 500e-9
 WORDS = re.compile(r"shorter than about (\S+) m.*s_filter = (\S+) or more")
 
 
-def _surface(hurst=0.8, cutoff=8, points=256, height=40e-9, seed=1):
+def _surface(hurst=0.8, cutoff=8, points=256, height=4e-9, seed=1):
     """Heights [m] of a random surface; the cut-off wavelength in points."""
     surface = SelfAffine(cutoff=cutoff / points, rolloff=0.25, hurst=hurst, seed=seed)
     heights = np.array(surface.heights(points))
@@ -48,9 +48,26 @@ def test_the_tip_is_recognised_by_the_peaks_it_has_left(tmp_path, hurst):
     assert RADIUS <= radius <= 1.1 * RADIUS
 
 
+@pytest.mark.parametrize("known", [True, False])
+def test_a_sphere_with_a_conical_shaft_is_recognised_on_steep_slopes(tmp_path, known):
+    """The second difference of a sphere on a slope is larger than 1 / R, its curvature is not."""
+    heights = _surface(points=128, height=100e-9)
+    assert np.diff(heights, axis=1).std() > SPACING
+    reach = SPACING * np.mgrid[-20:21, -20:21]
+    distance, radius, shaft = np.hypot(*reach), 8 * SPACING, np.radians(20)
+    end = radius * np.cos(shaft)
+    sphere = radius - np.sqrt(radius**2 - np.minimum(distance, end) ** 2)
+    tip = sphere + np.maximum(distance - end, 0.0) / np.tan(shaft)
+    scan = grey_dilation(heights, structure=-tip, mode="wrap")
+    (warning,) = _warnings(tmp_path, scan, **{"tip_radius": radius} if known else {})
+    assert WORDS.search(warning)
+    if not known:
+        assert 0.7 * radius < float(re.search(r"radius (\S+) m", warning)[1]) < 1.1 * radius
+
+
 def test_pins_much_thinner_than_the_tip_show_its_radius(tmp_path):
     random = np.random.default_rng(0)
-    pins = np.where(random.random((128, 128)) < 0.01, random.normal(1e-7, 2e-8, (128, 128)), 0.0)
+    pins = np.where(random.random((128, 128)) < 0.01, random.normal(1e-8, 2e-9, (128, 128)), 0.0)
     (warning,) = _warnings(tmp_path, _scanned(pins))
     assert f"radius {RADIUS:.2g} m" in warning
 
@@ -71,7 +88,7 @@ def test_noise_that_hides_the_tip_at_short_distances_does_not_hide_it_at_longer_
 def test_the_length_of_blunt_structures_is_about_that_of_surface_topography(tmp_path):
     """It takes the largest curvature along x at any length, not a quantile along x and y."""
     topography = pytest.importorskip("SurfaceTopography")
-    for radius in (20e-9, 100e-9):
+    for radius in (0.4 * RADIUS, 2 * RADIUS):
         scan = _scanned(_surface(cutoff=16), radius)
         (warning,) = _warnings(tmp_path, scan, tip_radius=radius)
         sides = (SPACING * len(scan),) * 2
@@ -82,8 +99,8 @@ def test_the_length_of_blunt_structures_is_about_that_of_surface_topography(tmp_
 
 def test_a_sharper_tip_blunts_nothing(tmp_path):
     heights = _surface(cutoff=32)
-    assert not _warnings(tmp_path, heights, tip_radius=1e-9)
-    assert _warnings(tmp_path, _scanned(heights, 1e-6), tip_radius=1e-6)
+    assert not _warnings(tmp_path, heights, tip_radius=1e-8)
+    assert _warnings(tmp_path, _scanned(heights, 1e-5), tip_radius=1e-5)
 
 
 def test_the_filter_that_the_warning_names_removes_it(tmp_path):

@@ -120,14 +120,22 @@ def _curvatures(
 ) -> tuple[float, float, float]:
     """Quantiles of the curvature along an axis [1/m]: two of peaks, one of valleys.
 
-    The curvature is the second difference of heights at a distance in points; -inf if no such
-    heights are known.
+    -h_xx / [(1 + h_x^2) (1 + h_x^2 + h_y^2)^(1/2)], the normal curvature along x, which is 1 / R
+    everywhere on a sphere. h_x and h_xx are differences of heights at a distance in points. -inf if
+    no such heights are known.
     """
     lines = np.moveaxis(np.atleast_2d(heights), axis - heights.ndim, -1)
-    lines = lines[:: 1 + lines.size // MAX_SAMPLE]
-    middle = lines[:, distance:-distance]
-    second = 2 * middle - lines[:, 2 * distance :] - lines[:, : -2 * distance]
-    known = second[np.isfinite(second)] / (distance * spacing[axis]) ** 2
+    across = np.zeros_like(lines)
+    if heights.ndim == 2:
+        step = 1 + lines.size // MAX_SAMPLE
+        across = (lines[2::step] - lines[:-2:step]) / (2 * spacing[1 - axis])
+        lines = lines[1:-1:step]
+    inner = slice(distance, -distance)
+    own, last, following = lines[:, inner], lines[:, : -2 * distance], lines[:, 2 * distance :]
+    along = (following - last) / (2 * distance * spacing[axis])
+    second = (2 * own - following - last) / (distance * spacing[axis]) ** 2
+    curvature = second / ((1 + along**2) * np.sqrt(1 + along**2 + across[:, inner] ** 2))
+    known = curvature[np.isfinite(curvature)]
     if not known.size:
         return -np.inf, -np.inf, -np.inf
     sharp, sharper, valleys = np.quantile(known, (SHARP, SHARPER, 1 - SHARPER))
