@@ -142,8 +142,8 @@ def _map_figures(study: StudyFile, row: Row) -> list[tuple[str, ColumnFigure, st
     of_stress = ("stress", plot, f"Map of the stress; black: none, {red.format('contact')}")
     if touching is None:
         return [of_stress]
-    gap = pixels["gap"]
-    plot = _scaled_figure(gap, gap > 0, row, HEIGHT_SCALE, "gap")
+    gap = pixels["gap"]  # negative where the elastomer enters holes of the map
+    plot = _scaled_figure(gap, touching < 1, row, HEIGHT_SCALE, "gap")
     of_gap = ("gap", plot, f"Map of the gap; black: contact, {red.format('rest')}")
     return [("contact", _contact_figure(touching, row), "Map of the contact"), of_stress, of_gap]
 

@@ -150,7 +150,7 @@ class StudyFile:
         group = find(self._file, place)
         if group is None:
             return None
-        arrays = {column.name: read_dataset(group, column.name) for column in layout.BANDS}
+        arrays = {column.name: read_dataset(group, column.name) for column in layout.bands()}
         _check_alike(place, arrays, 1)
         numbers = read_dataset(group, "fit").tolist()
         return Spectrum(**arrays, fit=SelfAffineFit(*numbers) if numbers else None)
