@@ -608,6 +608,20 @@ def test_holes_that_the_elastomer_enters_are_not_drawn_as_contact(invoke, tmp_pa
     np.testing.assert_array_equal(np.ma.getmaskarray(image.get_array()), touching)
 
 
+def test_maps_and_cross_sections_of_an_indenter_count_from_its_crest(invoke, tmp_path):
+    surface = 'kind = "parabola"\nlength = 1e-4\nradius = 1e-3'
+    path = solved(invoke, tmp_path, ONE.replace('kind = "self-affine"\ncutoff = 0.1', surface))
+    (row,) = read_rows(path)
+    with open_study(path) as stored:
+        figures = [figure for _, figure, _ in maps._map_figures(stored, row)]
+        profile = read_profile(stored, row)
+    assert len(figures) == 3
+    for figure in figures:
+        (image,) = figure.axes.images
+        assert image.get_extent() == pytest.approx([-50, 50, -50, 50])  # micrometres
+    assert profile.position[0] == pytest.approx(-50e-6)
+
+
 @pytest.mark.parametrize("step", [1, 2, 3])
 def test_pixels_are_means_over_squares(step):
     block = np.arange(35.0).reshape(5, 7)
