@@ -195,6 +195,16 @@ def test_contacts_that_have_not_converged_are_named_and_paired_last(output_of, s
     assert all(pair.one["status"].is_converged for pair in diff(both, study_of()).pairs)
 
 
+def test_contacts_of_one_study_are_named_with_the_keys_of_the_solver_that_differ(
+    output_of, study_of
+):
+    keys = ("elastomer.n=2", "load.p_star=0.1")
+    two, one = study_of(*keys, 'solver.kind=["pcg", "ccg"]'), study_of(*keys, 'solver.kind="pcg"')
+    only_a = output_of("diff", two, one).partition("only in A:\n")[2].splitlines()
+    assert only_a[:2] == ["  power n=2 on self-affine cutoff=0.1, ccg", "    32: p*=0.1"]
+    assert "only in B" not in output_of("diff", two, one)
+
+
 def test_of_several_grids_the_same_ones_belong_together(study_of):
     both, one = study_of("grid.points=[32, 64]"), study_of("grid.points=64")
     difference = diff(both, one)

@@ -197,6 +197,13 @@ def test_what_cannot_be_written_is_refused_in_one_message(
     assert not list(tmp_path.iterdir())
 
 
+def test_an_exported_file_in_the_place_of_a_study_is_told(output_of, study, tmp_path):
+    output_of("export", study, "-o", tmp_path / "s.nc")
+    output = output_of("analyze", tmp_path / "s.nc", status=74)
+    assert "s.nc: a netCDF file, as of `gfmd export`, not the study" in output
+    assert "damaged" not in output
+
+
 @pytest.mark.parametrize("words", [("a.csv",), ("a.nc",), ("a.vti", "--task", "0")])
 def test_a_place_that_cannot_be_written_is_status_73(output_of, study, tmp_path, words):
     (tmp_path / "file").write_text("")

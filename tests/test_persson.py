@@ -191,6 +191,14 @@ def test_nothing_breaks_at_the_ends_of_the_pressure_scale():
     assert few.mean_gap(np.array([])).shape == (0,)
 
 
+def test_an_unknown_pressure_has_no_prediction():
+    few = Persson(FEW)
+    for predict in (few.contact_area, few.stress_deviation, few.mean_gap):
+        assert np.isnan(predict(np.array([np.nan, 1.0]))).tolist() == [True, False]
+    assert few.mean_gap(0.0) == np.inf
+    assert few.contact_area(0.0) == 0.0
+
+
 def test_a_flat_surface_is_in_full_contact():
     zero, one = np.zeros(5), np.ones(5)
     flat = Persson(shells(one, zero, one, one, one))

@@ -29,7 +29,7 @@ from gfmd_cli.report.data import read_report_data
 from gfmd_cli.report.maps import STRESS_SCALE, read_profile
 from gfmd_cli.report.page import report
 from gfmd_cli.report.rendering import environment, typeset
-from gfmd_cli.report.summary import headline
+from gfmd_cli.report.summary import headline, key_numbers
 from gfmd_cli.report.theme import DARK, LEGIBLE, LIGHT, PALETTE, contrast, toned
 from gfmd_cli.study.column import Column
 from gfmd_cli.study.reading import ATTRIBUTES_SUM, attributes_sum, open_study, read_rows
@@ -273,6 +273,35 @@ def test_heights_in_metres_without_a_modulus_show_metres_and_no_pascal(invoke, t
         assert not re.search(r"\d.?[kMGmµn]?Pa\b|\[Pa\]", shown)
 
 
+def test_si_units_are_those_of_contacts_in_which_they_mean_something(invoke, tmp_path):
+    """A half-space in Pa beside an elastomer whose stiffness is not given."""
+    elastomers = """\
+[[elastomer]]
+kind = "half-space"
+E_star = 2e9
+[[elastomer]]
+kind = "power"
+n = 2
+"""
+    text = ONE.replace("cutoff = 0.1", "cutoff = 0.1\nh_std = 1e-6\nlength = 1e-4")
+    text = text.replace('[elastomer]\nkind = "power"\nn = 1\n', elastomers)
+    path = solved(invoke, tmp_path, text)
+    solid, reduced = read_rows(path)
+    data = read_report_data(path, "")
+    numbers = {name: (value, note) for name, value, note in key_numbers(data)}
+    assert numbers["Pressure"] == (
+        quantity(solid["pressure"], "Pa"), "p* = 0.3; in Pa: 1 of 2 contacts"
+    )  # fmt: skip
+    assert numbers["Unit of stress"][0] == quantity(solid["delta_sigma"], "Pa")
+    assert numbers["Stress deviation"][0] == quantity(solid["sigma_p"] * solid["delta_sigma"], "Pa")
+    assert "contacts" not in numbers["Mean gap"][1]  # all are in m
+    assert quantity(reduced["pressure"], "Pa") not in headline(data)
+    cells = re.findall(r"<td[^>]*>([^<]*)</td>", report(path))
+    for printed in (cells, invoke("analyze", path).output.split()):
+        assert f"{solid['pressure']:.4g}" in printed
+        assert f"{reduced['pressure']:.4g}" not in printed
+
+
 def test_a_density_of_several_seeds_is_called_their_mean(whole):
     groups = re.findall(r"<span>(.*): mean of 2 seeds", whole[whole.index("Middle of each bin") :])
     assert any(group.endswith("</var>* = 0.1") for group in groups)
@@ -478,6 +507,26 @@ def test_only_rough_surfaces_have_a_spectrum(invoke, tmp_path, whole):
     assert anchor not in report(solved(invoke, tmp_path, LINE))
 
 
+def test_spectra_of_lines_and_of_areas_have_their_own_units(invoke, tmp_path):
+    """C(q) of a profile is in m^3, that of a map in m^4."""
+    rng = np.random.default_rng(0)
+    heights = np.cumsum(rng.normal(size=64)) * 1e-8
+    np.save(tmp_path / "profile.npy", heights - np.linspace(0, heights[-1], 64))
+    profile = '[[surface]]\nkind = "file"\npath = "profile.npy"\nlength = 1e-5\nperiodic = false\n'
+    text = ONE.replace("[surface]", f"{profile}[[surface]]").replace("n = 1", "n = 0")
+    path = solved(invoke, tmp_path, text)
+    page = report(path).partition('id="surface-spectrum"')[2]
+    page = page.partition("</section>")[0]
+    assert "Table behind the figure of lines" in page
+    assert "Table behind the figure of areas" in page
+    words = re.sub("<[^>]+>", "", page)
+    assert ("C(q) [m³]" in words, "C(q) [m⁴]" in words) == (True, True)
+    assert page.count('role="img"') == 2
+    with h5py.File(path) as file:
+        density = next(scene["map_spectrum/density"] for scene in file["scenes"].values())
+        assert density.attrs["units"] == "m3"
+
+
 def test_the_command_writes_beside_the_study_and_says_so(invoke, copied):
     done = invoke("report", copied)
     assert done.exit_code == 0
@@ -539,6 +588,38 @@ def test_a_peak_of_stress_leaves_the_rest_of_the_contact_visible(study):
     assert all(contrast(colour, "#000000") >= LEGIBLE for colour in colours["contact"])
     assert maps.BEYOND in colours["contact"]
     assert toned(maps.BEYOND, LIGHT) == toned(maps.BEYOND, DARK) == maps.BEYOND
+
+
+def test_holes_that_the_elastomer_enters_are_not_drawn_as_contact(invoke, tmp_path):
+    y, x = np.mgrid[:32, :32] / 32
+    heights = 1e-7 * np.cos(2 * np.pi * x) * np.cos(2 * np.pi * y)
+    heights[:4, :4] = np.nan
+    np.save(tmp_path / "holed.npy", heights)
+    surface = 'kind = "file"\npath = "holed.npy"\nlength = 1e-5\nmissing = "void"'
+    text = ONE.replace('kind = "self-affine"\ncutoff = 0.1', surface)
+    path = solved(invoke, tmp_path, text.replace("points = 64", "points = 32"))
+    (row,) = read_rows(path)
+    with open_study(path) as stored:
+        fields = stored.arrays("fields", 0)
+        figures = {name: figure for name, figure, _ in maps._map_figures(stored, row)}
+    assert (fields["u"] < fields["height"]).any()
+    (image,) = figures["gap"].axes.images
+    touching = (fields["u"] == fields["height"]) & (fields["sigma"] > 0)
+    np.testing.assert_array_equal(np.ma.getmaskarray(image.get_array()), touching)
+
+
+def test_maps_and_cross_sections_of_an_indenter_count_from_its_crest(invoke, tmp_path):
+    surface = 'kind = "parabola"\nlength = 1e-4\nradius = 1e-3'
+    path = solved(invoke, tmp_path, ONE.replace('kind = "self-affine"\ncutoff = 0.1', surface))
+    (row,) = read_rows(path)
+    with open_study(path) as stored:
+        figures = [figure for _, figure, _ in maps._map_figures(stored, row)]
+        profile = read_profile(stored, row)
+    assert len(figures) == 3
+    for figure in figures:
+        (image,) = figure.axes.images
+        assert image.get_extent() == pytest.approx([-50, 50, -50, 50])  # micrometres
+    assert profile.position[0] == pytest.approx(-50e-6)
 
 
 @pytest.mark.parametrize("step", [1, 2, 3])

@@ -76,8 +76,13 @@ def test_a_table_without_records_is_no_text():
 def test_a_column_in_si_units_is_shown_where_it_means_something_in_one_row():
     columns = [TableColumn("p*", "p_star"), TableColumn("p", "pressure", unit="Pa")]
     reduced = {"load": "p_star", "h_std": 1.0, "stiffness_given": 0}
+    in_pascal = reduced | {"load": "pressure"}
     assert shown(columns, [reduced, reduced]) == columns[:1]
-    assert shown(columns, [reduced, reduced | {"load": "pressure"}]) == columns
+    both = shown(columns, [reduced, in_pascal])
+    assert [column.title for column in both] == ["p*", "p [Pa]"]
+    records = (row | {"p_star": 0.1, "pressure": 2.0} for row in (reduced, in_pascal))
+    cells = [[column.cell(record) for column in both] for record in records]
+    assert cells == [["0.1000", "-"], ["0.1000", "2.000"]]
 
 
 def test_a_long_list_of_failed_tasks_is_cut():

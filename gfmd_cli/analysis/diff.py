@@ -224,14 +224,17 @@ def _nothing(difference: Difference) -> str:
 
 def diff_lists(difference: Difference) -> dict[str, list[str]]:
     """Rows that one study alone has, and the keys of the specs that differ: lines by title."""
-    lists = {
-        f"only in {which}": _loads_by_contact(rows)
-        for which, rows in zip("AB", difference.only, strict=True)
-    }
     sides = [pair.one for pair in difference.pairs], [pair.other for pair in difference.pairs]
-    for which, side in zip("AB", sides, strict=True):
-        rows = [row for row in side if not row["status"].is_converged]
-        lists[f"compared, but not converged in {which}"] = _loads_by_contact(rows)
+    lists, not_converged = {}, {}
+    for which, compared, only in zip("AB", sides, difference.only, strict=True):
+        rows = [*compared, *only]
+        names = with_solvers(map(contact_and_boundary, rows), rows)  # that tell its rows apart
+        named = list(zip(names, rows, strict=True))
+        lists[f"only in {which}"] = _loads_by_contact(named[len(compared) :])
+        not_converged[f"compared, but not converged in {which}"] = _loads_by_contact(
+            [(name, row) for name, row in named[: len(compared)] if not row["status"].is_converged]
+        )
+    lists |= not_converged
     lists["specs, A -> B"] = [f"  {line}" for line in difference.spec]
     return {title: lines for title, lines in lists.items() if lines}
 
@@ -258,11 +261,12 @@ def _title(pair: Pair) -> str:
     return one if one == other else f"A: {one}\nB: {other}"
 
 
-def _loads_by_contact(rows: list[Row]) -> list[str]:
-    """Loads grouped by scene, a line for each grid."""
+def _loads_by_contact(named: list[tuple[str, Row]]) -> list[str]:
+    """Loads grouped by the names of the contacts, a line for each grid."""
     lines = []
-    for name, scene in grouped(rows, contact_and_boundary).items():
-        grids = grouped(scene, lambda row: points_text(row["points"], row["points_y"]))
+    for name, contacts in grouped(named, lambda pair: pair[0]).items():
+        rows = (row for _, row in contacts)
+        grids = grouped(rows, lambda row: points_text(row["points"], row["points_y"]))
         loads = {points: ", ".join(map(_load, grid)) for points, grid in grids.items()}
         lines += [f"  {name}", *(f"    {points}: {text}" for points, text in loads.items())]
     return lines

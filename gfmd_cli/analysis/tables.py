@@ -328,12 +328,11 @@ def _ends(values: Field) -> str:
 
 
 def _scales(curve: Curve) -> list[str]:
-    row = curve.rows[0]
-    units = [unit if in_si(row, unit) else "" for *_, unit in SCALES]
+    units = [unit if any(in_si(row, unit) for row in curve.rows) else "" for *_, unit in SCALES]
     scales = ", ".join(
         f"{symbol} = {_ends(curve.column(name))} {unit}".rstrip()
         for (symbol, name, _), unit in zip(SCALES, units, strict=True)
     )
     warnings = [f"warning: {line}" for line in warnings_in(curve.rows)]
     scales += "" if any(units) else " (reduced units)"
-    return [scales, *filter(None, [row.get("preparation")]), *warnings]
+    return [scales, *filter(None, [curve.rows[0].get("preparation")]), *warnings]

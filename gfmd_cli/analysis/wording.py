@@ -2,11 +2,12 @@
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from gfmd_cli.analysis.table import Record, TableColumn
+from gfmd_cli.analysis.table import Record, TableColumn, value_in
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.units import LARGEST_RMS_HEIGHT, scaled
 
@@ -33,12 +34,23 @@ def in_si(row: Mapping[str, Any], unit: str) -> bool:
 
 
 def shown(columns: Sequence[TableColumn], rows: Sequence[Record]) -> list[TableColumn]:
-    """The columns without those in SI units where these mean nothing in any row."""
+    """The columns without those in SI units where these mean nothing in any row.
+
+    Cells in SI units are blank in the rows where these mean nothing.
+    """
     return [
-        column
+        _in_si_only(column) if column.unit else column
         for column in columns
         if not column.unit or any(in_si(row, column.unit) for row in rows)
     ]
+
+
+def _in_si_only(column: TableColumn) -> TableColumn:
+    """A column in SI units, blank in the rows where these mean nothing."""
+    return replace(
+        column,
+        value=lambda row: value_in(row, column.value) if in_si(row, column.unit) else None,
+    )
 
 
 def pressure_text(row: Mapping[str, Any]) -> str:

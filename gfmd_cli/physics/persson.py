@@ -203,7 +203,7 @@ class Persson:
         p = np.asarray(p, dtype=np.float64)
         if not self.shells.variance.size:
             return np.zeros_like(p)
-        return np.where(p > 0, self._finite_gap(p), np.inf)
+        return np.where(p > 0, self._finite_gap(p), np.where(np.isnan(p), np.nan, np.inf))
 
     def _finite_gap(self, p: Field) -> Field:
         """Mean gap of a rough surface, of any value where p = 0."""
@@ -253,7 +253,7 @@ class Persson:
     def _reduced(self, p: Field | float) -> Field:
         """p / sqrt(2) Delta_sigma; a flat surface is in full contact under any pressure."""
         with np.errstate(divide="ignore", invalid="ignore"):
-            return np.where(np.asarray(p) > 0, p / np.float64(np.sqrt(2) * self.delta_sigma), 0.0)
+            return np.where(np.asarray(p) <= 0, 0.0, p / np.float64(np.sqrt(2) * self.delta_sigma))
 
     def _energy_slope(self, p: Field) -> Field:
         """dv/dp, of the shape of p. Paper Eqs. (29) and (30)."""

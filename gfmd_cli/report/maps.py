@@ -142,8 +142,8 @@ def _map_figures(study: StudyFile, row: Row) -> list[tuple[str, ColumnFigure, st
     of_stress = ("stress", plot, f"Map of the stress; black: none, {red.format('contact')}")
     if touching is None:
         return [of_stress]
-    gap = pixels["gap"]
-    plot = _scaled_figure(gap, gap > 0, row, HEIGHT_SCALE, "gap")
+    gap = pixels["gap"]  # negative where the elastomer enters holes of the map
+    plot = _scaled_figure(gap, touching < 1, row, HEIGHT_SCALE, "gap")
     of_gap = ("gap", plot, f"Map of the gap; black: contact, {red.format('rest')}")
     return [("contact", _contact_figure(touching, row), "Map of the contact"), of_stress, of_gap]
 
@@ -193,14 +193,18 @@ def _scaled_figure(values: Field, shown: Mask, row: Row, scale: Scale, label: st
 
 
 def _cell(row: Row) -> tuple[ColumnFigure, tuple[float, float, float, float]]:
-    """Axes of the cell, and where it ends in their units."""
+    """Axes of the cell, and its borders in their units, from the crest of an indenter."""
     length, length_y = float(row["length"]), float(row["length_y"])
     longest = max(length, length_y)
     divisor, x = LENGTH_SCALE.axis(row, longest, "x")
     _, y = LENGTH_SCALE.axis(row, longest, "y")
     plot = ColumnFigure(x, y)
     plot.height = min(max(0.85 * length_y / length, MIN_FIGURE_ASPECT), MAX_FIGURE_ASPECT) * WIDTH
-    return plot, (0.0, length / divisor, 0.0, length_y / divisor)
+    (left, right), (bottom, top) = (
+        (row["x_first"] * side / divisor, (row["x_first"] + 1.0) * side / divisor)
+        for side in (length, length_y)
+    )
+    return plot, (left, right, bottom, top)
 
 
 @dataclass(frozen=True)

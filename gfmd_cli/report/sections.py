@@ -9,8 +9,6 @@ import json
 from collections import Counter
 from dataclasses import replace
 
-import numpy as np
-
 from gfmd_cli.analysis import tables
 from gfmd_cli.analysis.diff import NOTHING, diff, diff_lists, diff_table
 from gfmd_cli.analysis.distribution_figure import Density, densities
@@ -145,8 +143,8 @@ def stress_distribution(data: ReportData) -> Section:
 
 def _bins(density: Density) -> Group:
     sigma, row = density.sigma, density.row
-    theory, unit = density.theory(sigma), np.full(sigma.size, row["delta_sigma"])
-    records = records_of(sigma=sigma, density=density.density, theory=theory, delta_sigma=unit)
+    of_bins = records_of(sigma=sigma, density=density.density, theory=density.theory(sigma))
+    records = [{**row, **record} for record in of_bins]  # with the scales of the contact
     title, p_star = item_title(density.item, of_seeds=density.seeds > 1), f"{row['p_star']:.4g}"
     mean = f": mean of {density.seeds} seeds" if density.seeds > 1 else ""
     return Group(f"{title}, p* = {p_star}{mean}{density.remark}", records)

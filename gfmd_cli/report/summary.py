@@ -8,7 +8,7 @@ from gfmd_cli.analysis.compare import in_continuum
 from gfmd_cli.analysis.export import csv_text
 from gfmd_cli.analysis.table import known
 from gfmd_cli.analysis.tables import warnings_in
-from gfmd_cli.analysis.wording import grid_size, pretty, quantity, span
+from gfmd_cli.analysis.wording import grid_size, in_si, pretty, quantity, span
 from gfmd_cli.physics.error_estimates import Verdict
 from gfmd_cli.physics.observables import QUANTITIES
 from gfmd_cli.report.data import ReportData
@@ -33,7 +33,7 @@ def headline(data: ReportData) -> str:
     surfaces = list(dict.fromkeys(str(row["ensemble"]) for row in rows))
     elastomers = list(dict.fromkeys(str(row["elastomer"]) for row in rows))
     seeds = len({row["seed"] for row in rows if known(row["seed"])})
-    pascals = _span(rows, "pressure", "Pa")
+    pascals = _si_span(rows, "pressure", "Pa")
     pressures = count(max(len(curve.rows) for curve in curves), "pressure")
     return (
         f"{count(len(data.comparison.rows), 'contact')}: {_names_of(elastomers, 'elastomer')}, "
@@ -80,11 +80,12 @@ def _quantities(data: ReportData) -> list[KeyNumber]:
     pressure = ("Pressure", p_star, "p*, in units of Delta_sigma")
     scales: list[KeyNumber] = []
     if data.in_si("Pa"):
-        pressure = ("Pressure", _span(rows, "pressure", "Pa"), f"p* = {p_star}")
-        scales = [("Unit of stress", _span(rows, "delta_sigma", "Pa"), _unit_note(rows))]
+        pascals = _si_span(rows, "pressure", "Pa")
+        pressure = ("Pressure", pascals, f"p* = {p_star}{_si_note(rows, 'Pa')}")
+        scales = [("Unit of stress", _si_span(rows, "delta_sigma", "Pa"), _unit_note(rows))]
     if data.in_si("m"):
-        side = f"rms height h_std, side {_span(rows, 'length', 'm')}"
-        scales.append(("Roughness", _span(rows, "h_std", "m"), side))
+        side = f"rms height h_std, side {_si_span(rows, 'length', 'm')}"
+        scales.append(("Roughness", _si_span(rows, "h_std", "m"), side))
     return [
         pressure,
         ("Contact area", _span(rows, "a_r_best"), note),
@@ -108,8 +109,11 @@ def _scaled(data: ReportData, title: str, name: str) -> KeyNumber:
     reduced, where = _column(rows, f"{name}_best"), _continuum_note(rows, name)
     if not data.in_si(unit):
         return title, span(reduced), f"{symbol}{where}"
-    values = [value * row[scale] for value, row in zip(reduced, rows, strict=True)]
-    return title, span(values, unit), f"{symbol} = {span(reduced)}{where}"
+    values = [
+        value * row[scale] for value, row in zip(reduced, rows, strict=True) if in_si(row, unit)
+    ]
+    note = f"{symbol} = {span(reduced)}{where}{_si_note(rows, unit)}"
+    return title, span(values, unit), note
 
 
 def _theory_numbers(data: ReportData) -> list[KeyNumber]:
@@ -145,8 +149,19 @@ def _column(rows: list[Row], name: str) -> list[float]:
     return [float(row[name]) for row in rows]
 
 
-def _span(rows: list[Row], name: str, unit: str = "") -> str:
-    return span(_column(rows, name), unit)
+def _span(rows: list[Row], name: str) -> str:
+    return span(_column(rows, name))
+
+
+def _si_span(rows: list[Row], name: str, unit: str) -> str:
+    """The span of a column in SI units, of the contacts in which these mean something."""
+    return span(_column([row for row in rows if in_si(row, unit)], name), unit)
+
+
+def _si_note(rows: list[Row], unit: str) -> str:
+    """How many contacts have values in SI units, if not all have them."""
+    known = sum(in_si(row, unit) for row in rows)
+    return "" if known == len(rows) else f"; in {unit}: {known} of {len(rows)} contacts"
 
 
 def csv_address(data: ReportData) -> str:

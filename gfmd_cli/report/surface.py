@@ -7,7 +7,7 @@ import numpy as np
 from gfmd_cli.analysis.compare import Curve
 from gfmd_cli.analysis.curve_styles import MAX_STYLES, distinct_labels, distinct_styles
 from gfmd_cli.analysis.plotting import ColumnFigure
-from gfmd_cli.analysis.selection import evenly
+from gfmd_cli.analysis.selection import evenly, grouped
 from gfmd_cli.analysis.surface_figure import height_figure, spectrum_labels
 from gfmd_cli.analysis.surface_summary import FIT, fit_record
 from gfmd_cli.analysis.table import Group, Table, TableColumn, records_of
@@ -71,25 +71,32 @@ def surface_spectrum(data: ReportData) -> Section:
     spectra = [(row, each) for row, each in spectra if each.q.size]
     if not spectra:
         return Section("Surface spectrum")
-    rows, drawn = zip(*evenly(spectra, MAX_STYLES), strict=True)
-    names, dimension = [str(row["surface"]) for row in rows], int(rows[0]["dimension"])
-    label = f"Power spectral density of the surface over the wavenumber: {'; '.join(names)}"
-    left_out = len(spectra) > MAX_STYLES
-    more = f" {MAX_STYLES} of {len(spectra)} surfaces are shown." if left_out else ""
-    fits = [
-        {"surface": name, "no_rolloff": "none within the cell", **fit_record(each.fit)}
-        for name, each in zip(names, drawn, strict=True)
-        if each.fit is not None
-    ]
-    figure = _spectrum_figure(names, drawn, dimension)
+    notes, drawings, fits, bands = [], [], [], {}
+    by_dimension = grouped(spectra, lambda pair: int(pair[0]["dimension"]))
+    for dimension, of_it in by_dimension.items():  # C(q) of lines has another unit
+        several = len(by_dimension) > 1
+        rows, drawn = zip(*evenly(of_it, MAX_STYLES), strict=True)
+        names = [str(row["surface"]) for row in rows]
+        label = f"Power spectral density of the surface over the wavenumber: {'; '.join(names)}"
+        left_out = len(of_it) > MAX_STYLES
+        more = f" {MAX_STYLES} of {len(of_it)} surfaces are shown." if left_out else ""
+        figure = _spectrum_figure(names, drawn, dimension)
+        place = f"spectrum-{dimension}" if several else "spectrum"
+        drawings.append(drawing(figure, place, label, CAPTION + more))
+        lines = {1: " of lines", 2: " of areas"}[dimension] if several else ""
+        bands[f"Table behind the figure{lines}"] = _bands(names, drawn, dimension)
+        notes += [str(row["preparation"]) for row in rows if row["preparation"]]
+        fits += [
+            {"surface": name, "no_rolloff": "none within the cell", **fit_record(each.fit)}
+            for name, each in zip(names, drawn, strict=True)
+            if each.fit is not None
+        ]
+    fit_table = Table(FIT_CAPTION, FITS, [Group("", fits)])
     return Section(
         "Surface spectrum",
-        notes=[str(row["preparation"]) for row in rows if row["preparation"]],
-        drawings=[drawing(figure, "spectrum", label, CAPTION + more)],
-        disclosed={
-            "Self-affine fit": Table(FIT_CAPTION, FITS, [Group("", fits)]),
-            "Table behind the figure": _bands(names, drawn, dimension),
-        },
+        notes=notes,
+        drawings=drawings,
+        disclosed={"Self-affine fit": fit_table, **bands},
     )
 
 

@@ -199,12 +199,6 @@ SHELLS = (
 )
 MAP_SPECTRUM = "map_spectrum"
 """Group of a scene that holds the spectrum of a map with borders, and its self-affine fit."""
-BANDS = (
-    Column("q", "mean wavenumber of the band", "m-1"),
-    Column("density", "C(q) of the map with tapered edges", "m4"),
-    Column("modes", "number of modes in the band"),
-    Column("fitted", "C(q) of the self-affine fit, zero without a fit", "m4"),
-)
 PICTURES = "pictures"
 """Group of a scene that holds pictures of a measured surface, and the sides of each [m]."""
 FIELDS = (
@@ -247,6 +241,17 @@ TASK_GROUPS = (
     TaskGroup("spectra", "spectra", SPECTRA, "shell"),
     TaskGroup("spectra", "autocorrelations", AUTOCORRELATIONS, "ring"),
 )
+
+
+def bands(dimension: int = 2) -> tuple[Column, ...]:
+    """The spectrum of a map; C(q) of a line profile, of dimension 1, has another unit."""
+    unit = f"m{2 + dimension}"
+    return (
+        Column("q", "mean wavenumber of the band", "m-1"),
+        Column("density", "C(q) of the map with tapered edges", unit),
+        Column("modes", "number of modes in the band"),
+        Column("fitted", "C(q) of the self-affine fit, zero without a fit", unit),
+    )
 
 
 def empty_row() -> dict[str, Any]:

@@ -23,6 +23,8 @@ from gfmd_cli.study.column import Column
 from gfmd_cli.study.result import Entry, TaskResult
 
 ATTRIBUTES_SUM = "attributes_sha256"
+NETCDF = "_NCProperties"
+"""Attribute of every netCDF 4 file; an export has the attribute `layout` of its study, too."""
 KINDS = {str: "S", int: "i", float: "f"}
 """NumPy's kinds of the values of a column, as they are stored."""
 PACKED = "columns"
@@ -150,7 +152,7 @@ class StudyFile:
         group = find(self._file, place)
         if group is None:
             return None
-        arrays = {column.name: read_dataset(group, column.name) for column in layout.BANDS}
+        arrays = {column.name: read_dataset(group, column.name) for column in layout.bands()}
         _check_alike(place, arrays, 1)
         numbers = read_dataset(group, "fit").tolist()
         return Spectrum(**arrays, fit=SelfAffineFit(*numbers) if numbers else None)
@@ -244,6 +246,8 @@ def open_study(source: Path, opened: BinaryIO | None = None) -> Iterator[StudyFi
 def _check_layout(path: Path, file: Any) -> None:
     if layout.BENCH in file.attrs:
         raise StudyError(f"{path}: a bench file, not a study; `gfmd bench` prints its table")
+    if NETCDF in file.attrs:
+        raise StudyError(f"{path}: a netCDF file, as of `gfmd export`, not the study (NAME.h5)")
     version = file.attrs.get("layout")
     if version is None:
         raise StudyError(f"{path}: not a study")

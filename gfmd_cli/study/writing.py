@@ -137,7 +137,7 @@ class _Writer(NamedTuple):
         if result.map_spectrum:
             bands = group.create_group(layout.MAP_SPECTRUM)
             band = self.scale(bands, "band", np.arange(result.map_spectrum.q.size), "1", "band")
-            for column in layout.BANDS:
+            for column in layout.bands(result.entry.row["dimension"]):
                 self.column(bands, column, getattr(result.map_spectrum, column.name), [band])
             fit = result.map_spectrum.fit
             write_checked(bands, "fit", np.array(astuple(fit) if fit else []))
