@@ -95,7 +95,9 @@ def solve_at_load(task: Task, context: SolveContext, watcher: Watcher) -> TaskSo
         if solved.solution.status in SOLVED:
             values = row | {LOADS[task.quantity].searched: value}
             observables = {name: float(values[name]) * units[name] for name in QUANTITIES}
-        trials.append(Trial(points, pressure, value, work, observables, is_neighbour))
+        is_touching = row["a_r"] > 0
+        trial = Trial(points, pressure, value, work, observables, is_neighbour, is_touching)
+        trials.append(trial)
         return solved
 
     solved: TaskSolution | None = None
@@ -350,10 +352,9 @@ class _Search:
         """Take a trial into account.
 
         Where a pressure has no contact, rounding has taken it: the trial is left out, and lower
-        pressures are not tried. The continuum value of an area can be 0 in the first trial.
+        pressures are not tried. The continuum value of an area can be 0 although points touch.
         """
-        may_be_zero = self.task.accuracy is not None and not self.points
-        if self.quantum > 0 and trial.value == 0 and not may_be_zero:
+        if self.quantum > 0 and trial.value == 0 and not trial.is_touching:
             self.lowest = max(self.lowest, trial.pressure / self.scene.delta_sigma)
             self.first = trial.pressure * exp(MAX_STEP)  # where no trial has had contact yet
             return
