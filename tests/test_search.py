@@ -2,6 +2,7 @@
 
 import math
 import signal
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -365,6 +366,25 @@ def test_a_solve_that_ended_early_is_not_called_a_jump(rows_of):
     (row,) = rows_of("grid.points=64", "solver.max_steps=2", "load={contact_area=0.1}")
     assert row["status"] == "max_steps"
     assert "jump" not in row["warnings"]
+
+
+@pytest.mark.parametrize("load", ["contact_area=0.1", "mean_gap=0.5"])
+@pytest.mark.parametrize(("points", "status"), [(64, "converged"), (128, "diverged")])
+def test_a_solver_that_diverges_ends_the_search_on_a_grid(
+    rows_of, monkeypatch, points, status, load
+):
+    solve = load_search.solve_on_grids
+
+    def solve_or_diverge(task, *arguments):
+        solved = solve(task, *arguments)
+        if task.points == points:
+            solved.solution.status = Status.DIVERGED
+            solved.observables = replace(solved.observables, a_r=0.0, u_g=math.nan)
+        return solved
+
+    monkeypatch.setattr(load_search, "solve_on_grids", solve_or_diverge)
+    (row,) = rows_of(f"load={{{load}}}", "grid.points=128")
+    assert (row["status"], row["points"]) == (status, 128)
 
 
 @pytest.mark.parametrize("seed", [0, 3])

@@ -79,6 +79,8 @@ def solve_at_load(task: Task, context: SolveContext, watcher: Watcher) -> TaskSo
     expected to enter contact between them, or by less than the tolerance of the solver, which then
     cannot tell them apart. Otherwise the status is "load_not_reached".
 
+    Where the solver diverges, the search on this grid ends, on the last grid with that solution.
+
     Raises InputError for a mean gap or displacement that no pressure has, and an area below one
     grid point.
     """
@@ -88,6 +90,8 @@ def solve_at_load(task: Task, context: SolveContext, watcher: Watcher) -> TaskSo
 
     def attempt(points: int, pressure: float, *, is_neighbour: bool = False) -> TaskSolution:
         solved = solve_on_grids(_at(task, points, pressure), context, watcher)
+        if solved.solution.status is Status.DIVERGED:
+            return solved
         row = measured(task, solved)
         value = loaded_value(task.quantity, row)
         work = solved.solution.transforms * solved.contact.grid.size
@@ -125,7 +129,13 @@ def solve_at_load(task: Task, context: SolveContext, watcher: Watcher) -> TaskSo
         while (pressure := search.next()) is not None:
             solved = None  # frees its memory, which is needed now
             solved = attempt(points, pressure)
+            if solved.solution.status is Status.DIVERGED:
+                if points == task.points:
+                    return solved
+                break
             search.add(trials[-1])
+        if pressure is not None:
+            continue  # the solver has diverged on a coarser grid
         ended_near = search.succeeded or search.is_exhausted
         if has_error and points == measured_on and ended_near:
             jump = JUMP[scene.grid.dimension] * search.quantum
@@ -134,7 +144,7 @@ def solve_at_load(task: Task, context: SolveContext, watcher: Watcher) -> TaskSo
             for pressure in (step * search.nearest.pressure for step in (ratio, 1 / ratio)[ended:]):
                 if search.lowest < pressure / scene.delta_sigma < PRESSURE_RANGE[1]:
                     solved = None
-                    solved = attempt(points, pressure, is_neighbour=True)
+                    attempt(points, pressure, is_neighbour=True)
             slopes = _slopes(search.nearest, trials)
             uncertain = jump / log(ratio)
         roots.append(search.root if search.succeeded else log(search.nearest.pressure))
