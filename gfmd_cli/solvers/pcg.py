@@ -55,7 +55,7 @@ MAX_SOFT_GROWTH = 3.0  # of k(q) per octave, up to which the conjugation restart
 and 1.00 to 1.05 times at n = 3 (64^2 to 256^2, seeds 3 to 5), 1.01 and 1.05 times on 512^2 (seeds
 20 and 21): `scripts/solver_constants.py pcg.MAX_SOFT_GROWTH 0 99 --exponents 0.5 1 2 3`."""
 MIN_DETERMINANT = 0.3  # of the plane of z and the last direction: 1 if conjugate, 0 if parallel
-"""With 0 some line profiles diverge (n = 3 to 4), and the transforms are 0.99 to 1.51 times as many,
+"""With 0 some line profiles diverge (n = 3 to 4), and transforms are 0.99 to 1.51 times as many,
 most at n = 4, with 0.1: 0.99 to 1.05 times, with 0.5: 0.96 to 1.07 times (n = 2 to 4, 64^2 to
 256^2, seeds 3 to 5): `scripts/solver_constants.py pcg.MIN_DETERMINANT 0 0.1 0.5 --exponents 2 3 4`,
 and the same with `--p-star 0.0003 0.003`. Up to MAX_SOFT_GROWTH the restarts suffice."""
