@@ -25,6 +25,7 @@ from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.solvers.auto import Auto
 from gfmd_cli.solvers.nested_grids import solve_contact
 from gfmd_cli.status import Status
+from gfmd_cli.study.refinement import _sizes
 from gfmd_cli.study.tasks import plan
 
 SPEC = power_spec(
@@ -91,6 +92,36 @@ def test_an_auto_grid_is_as_good_as_asked(rows_of, n):
         assert 0 < error <= share * best
         assert abs(fine[f"{name}_continuum"] - best) <= error + fine[f"{name}_continuum_error"]
         assert abs(fine[f"{name}_continuum"] - row[name]) <= 1.1 * row[f"{name}_error"]
+
+
+def test_an_auto_grid_resolves_an_oblong_cell(rows_of):
+    """84 points along x resolve the cut-off, but 168 along y do not."""
+    (row,) = rows_of(
+        "surface={kind='self-affine', cutoff=0.0235, length_y=2}", "elastomer.n=0",
+        "grid.points='auto'", "accuracy={mean_gap=0.1}",
+    )  # fmt: skip
+    assert row["status"] == "converged"
+    assert (row["points"], row["points_y"]) == (88, 176)
+
+
+@pytest.mark.parametrize("length_y", [0.07, 0.5, 1.3, 2.17, 3])
+@pytest.mark.parametrize("max_points", [257, 4096])
+def test_auto_grids_of_an_oblong_cell_are_halves_of_each_other(spec_of, length_y, max_points):
+    for cutoff, p_star in ((2 / 85, 0.01), (0.031, 0.01), (0.1, 0.01), (0.1, 3)):
+        (task,) = plan(
+            spec_of(
+                f"surface={{kind='self-affine', cutoff={cutoff}, length_y={length_y}}}",
+                f"load={{p_star={p_star}}}", "grid.points='auto'",
+                f"accuracy={{mean_gap=0.003, max_points={max_points}}}",
+            )
+        )  # fmt: skip
+        sizes = _sizes(task)
+        assert task.points in sizes
+        first_y = task.points_y_on(sizes[0])
+        assert first_y % 2 == 0
+        for i, points in enumerate(sizes):
+            assert task.points_y_on(points) == first_y * 2**i
+            task.surface.check_resolved(points, first_y * 2**i)
 
 
 def test_less_is_asked_of_a_coarser_grid(rows_of):

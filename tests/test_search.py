@@ -2,6 +2,7 @@
 
 import math
 import signal
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -281,6 +282,18 @@ def test_a_first_trial_whose_contact_rounding_has_taken_is_not_the_nearest():
     assert not search.succeeded
 
 
+def test_a_contact_whose_area_is_0_in_the_continuum_has_too_little_load(rows_of, tmp_path):
+    """Of a few points: larger areas, and the load, are at higher pressures."""
+    np.save(tmp_path / "map.npy", np.random.default_rng(0).standard_normal(47))
+    (row,) = rows_of(
+        "surface={kind='file', path='map.npy'}", "elastomer.n=2", "grid.points=188",
+        "load.contact_area=0.011", "accuracy.mean_gap=0.1",
+    )  # fmt: skip
+    assert row["status"] == "converged"
+    assert abs(row["a_r_continuum"] - 0.011) * 188 < 1
+    assert row["a_r_continuum"] > 0
+
+
 @pytest.mark.parametrize("n", [2, 3])
 def test_coarser_grids_predict_the_pressure_of_a_continuum_area(rows_of, monkeypatch, n):
     """Their contact areas on the grid have far lower pressures: by a factor of 2 to 20."""
@@ -355,6 +368,25 @@ def test_a_solve_that_ended_early_is_not_called_a_jump(rows_of):
     assert "jump" not in row["warnings"]
 
 
+@pytest.mark.parametrize("load", ["contact_area=0.1", "mean_gap=0.5"])
+@pytest.mark.parametrize(("points", "status"), [(64, "converged"), (128, "diverged")])
+def test_a_solver_that_diverges_ends_the_search_on_a_grid(
+    rows_of, monkeypatch, points, status, load
+):
+    solve = load_search.solve_on_grids
+
+    def solve_or_diverge(task, *arguments):
+        solved = solve(task, *arguments)
+        if task.points == points:
+            solved.solution.status = Status.DIVERGED
+            solved.observables = replace(solved.observables, a_r=0.0, u_g=math.nan)
+        return solved
+
+    monkeypatch.setattr(load_search, "solve_on_grids", solve_or_diverge)
+    (row,) = rows_of(f"load={{{load}}}", "grid.points=128")
+    assert (row["status"], row["points"]) == (status, 128)
+
+
 @pytest.mark.parametrize("seed", [0, 3])
 def test_a_mean_gap_above_those_of_coarser_grids_is_found(rows_of, spec_of, seed):
     """Without load the gap is the highest point, which is lower on a coarser grid."""
@@ -406,6 +438,21 @@ def test_a_load_that_no_pressure_has_fails_and_says_so(rows_of, load, reason):
     ids=["errors", "lower", "upper"],  # one of the latter solves the nearest contact again
 )
 def test_a_search_stopped_again_and_again_ends_bit_for_bit(rows_of, steps, overrides):
+    check_stopped(rows_of, steps, overrides)
+
+
+def test_a_search_stopped_after_a_negative_mean_gap_goes_on(rows_of, tmp_path):
+    """The elastomer enters missing heights deeper than those filled in."""
+    rng = np.random.default_rng(1)
+    heights = rng.standard_normal((32, 32))
+    heights[rng.random(heights.shape) < 0.4] = np.nan
+    np.save(tmp_path / "map.npy", heights)
+    keys = "surface={kind='file', path='map.npy', missing='void'}", "elastomer.n=1"
+    check_stopped(rows_of, 9, (*keys, "grid.points=32", "load.mean_gap=0.1"))
+
+
+def check_stopped(rows_of, steps, overrides):
+    """A search that is stopped at every so many steps has the bits of one that is not."""
     (unbroken,) = rows_of(*overrides, name="unbroken.h5")
     stops = 0
 

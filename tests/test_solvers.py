@@ -14,6 +14,7 @@ from fields import assert_close
 from scipy.optimize import brentq
 from scipy.special import gamma, hyp2f1, zeta
 
+from gfmd_cli import solve
 from gfmd_cli.errors import InputError
 from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.physics.contact import Contact
@@ -733,3 +734,22 @@ def test_a_stopped_solve_goes_on_bit_by_bit(elastomer, tolerance):
         assert np.array_equal(resumed.u, straight.u)
         assert np.array_equal(resumed.sigma, straight.sigma)
         assert (resumed.steps, resumed.residual) == (straight.steps, straight.residual)
+
+
+@pytest.mark.parametrize(
+    ("seed", "n", "p_star"),
+    [(4, 3, 3e-4), (32, 3.5, 3e-4), (53, 3.5, 3e-3), (55, 4, 3e-4), (63, 3.5, 1e-3)],
+)
+def test_directions_along_which_the_indenter_stops_each_move_do_not_grow(seed, n, p_star):
+    """They were the last one again, a few hundred times longer, until they were infinite."""
+    heights = np.random.default_rng(seed).standard_normal(32)
+    spec = {
+        "surface": {"periodic": True},
+        "elastomer": {"kind": "power", "n": n},
+        "grid": {"points": 64},
+        "load": {"p_star": p_star},
+        "solver": {"nested": False},
+    }
+    result = solve(spec, heights=heights / heights.std())
+    assert result.status == "converged"
+    assert result.columns["steps"] < 300

@@ -54,6 +54,11 @@ MAX_SOFT_GROWTH = 3.0  # of k(q) per octave, up to which the conjugation restart
 """With 0 transforms are 0.98 to 1.04 times as many at n = 0.5 and 1, with 99 1.00 times at n = 2
 and 1.00 to 1.05 times at n = 3 (64^2 to 256^2, seeds 3 to 5), 1.01 and 1.05 times on 512^2 (seeds
 20 and 21): `scripts/solver_constants.py pcg.MAX_SOFT_GROWTH 0 99 --exponents 0.5 1 2 3`."""
+MIN_DETERMINANT = 0.3  # of the plane of z and the last direction: 1 if conjugate, 0 if parallel
+"""With 0 some line profiles diverge (n = 3 to 4), and transforms are 0.99 to 1.51 times as many,
+most at n = 4, with 0.1: 0.99 to 1.05 times, with 0.5: 0.96 to 1.07 times (n = 2 to 4, 64^2 to
+256^2, seeds 3 to 5): `scripts/solver_constants.py pcg.MIN_DETERMINANT 0 0.1 0.5 --exponents 2 3 4`,
+and the same with `--p-star 0.0003 0.003`. Up to MAX_SOFT_GROWTH the restarts suffice."""
 MIN_SELECTION_INTERVAL = 4  # smallest number of steps between two selections of the preconditioner
 MAX_SCREENING_CHANGE = 1.25  # factor in k(q_c) up to which the old value is kept
 """With 1 the transforms are 0.99 to 1.06 times as many (n = 0.25 to 0.7, 64^2 to 256^2, seeds 3 to
@@ -225,6 +230,11 @@ class _Run:
         exact_slope -= (longer - 1) * exact_overlap
         may_restart = self.is_soft or state.moved == state.best_length
         if may_restart and abs(exact_overlap) > MAX_OVERLAP * exact_slope:
+            return 0.0
+        # Nearly parallel to the last direction, z alone leads about as low as the plane of the two.
+        # The factor would be so large that the indenter stops each move where it stopped the last.
+        is_parallel = slope - (longer - 1) * z_change < MIN_DETERMINANT * slope
+        if is_parallel and not self.is_soft:
             return 0.0
         return conjugation(slope, z_change, state.moved, state.best_length, state.curvature)
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from gfmd_cli.grid.plans import fast_length
 from gfmd_cli.physics.discretisation_error import MAX_AREA_EXPONENT, MAX_STRESS_EXPONENT
-from gfmd_cli.physics.indenters import RigidSurface
+from gfmd_cli.physics.indenters import MAX_POINTS, POINTS_ROUNDING, RigidSurface
 from gfmd_cli.solvers.multigrid import MAX_PIXEL_ASPECT
 from gfmd_cli.spec.models import AccuracyTable, OutputTable
 
@@ -111,7 +111,12 @@ def first_grid(surface: RigidSurface) -> int:
     needed = surface.smallest_grid()
     if surface.is_map:
         return needed
-    return 2 * fast_length(max(needed, MIN_FIRST_POINTS) / 2)
+    needed_y, sides = surface.smallest_grid_y(), surface.sides
+    same_spacing = needed_y * sides[-1] / sides[0] - POINTS_ROUNDING
+    points = 2 * fast_length(max(needed, MIN_FIRST_POINTS, same_spacing) / 2)
+    while surface.points_y(points) < needed_y:  # an even number, perhaps rounded down
+        points = 2 * fast_length(points / 2 + 1)
+    return points
 
 
 def last_grid(
@@ -140,5 +145,8 @@ def last_grid(
         error, order = typical[name]
         if n <= MAX_CONVERGENT_EXPONENT[name]:
             doublings.append(int(np.ceil((np.log2(error) - np.log2(share)) / order)))
-    points = first_grid(surface) * int(2 ** min(max(doublings), 20))
-    return points if accuracy is None else min(points, accuracy.max_points)
+    first = points = first_grid(surface)
+    largest = MAX_POINTS if accuracy is None else accuracy.max_points
+    while 2 * points <= min(first * 2 ** max(doublings), largest):
+        points *= 2
+    return points

@@ -79,6 +79,8 @@ def solve_at_load(task: Task, context: SolveContext, watcher: Watcher) -> TaskSo
     expected to enter contact between them, or by less than the tolerance of the solver, which then
     cannot tell them apart. Otherwise the status is "load_not_reached".
 
+    Where the solver diverges, the search on this grid ends, on the last grid with that solution.
+
     Raises InputError for a mean gap or displacement that no pressure has, and an area below one
     grid point.
     """
@@ -88,6 +90,8 @@ def solve_at_load(task: Task, context: SolveContext, watcher: Watcher) -> TaskSo
 
     def attempt(points: int, pressure: float, *, is_neighbour: bool = False) -> TaskSolution:
         solved = solve_on_grids(_at(task, points, pressure), context, watcher)
+        if solved.solution.status is Status.DIVERGED:
+            return solved
         row = measured(task, solved)
         value = loaded_value(task.quantity, row)
         work = solved.solution.transforms * solved.contact.grid.size
@@ -95,7 +99,9 @@ def solve_at_load(task: Task, context: SolveContext, watcher: Watcher) -> TaskSo
         if solved.solution.status in SOLVED:
             values = row | {LOADS[task.quantity].searched: value}
             observables = {name: float(values[name]) * units[name] for name in QUANTITIES}
-        trials.append(Trial(points, pressure, value, work, observables, is_neighbour))
+        is_touching = row["a_r"] > 0
+        trial = Trial(points, pressure, value, work, observables, is_neighbour, is_touching)
+        trials.append(trial)
         return solved
 
     solved: TaskSolution | None = None
@@ -123,7 +129,13 @@ def solve_at_load(task: Task, context: SolveContext, watcher: Watcher) -> TaskSo
         while (pressure := search.next()) is not None:
             solved = None  # frees its memory, which is needed now
             solved = attempt(points, pressure)
+            if solved.solution.status is Status.DIVERGED:
+                if points == task.points:
+                    return solved
+                break
             search.add(trials[-1])
+        if pressure is not None:
+            continue  # the solver has diverged on a coarser grid
         ended_near = search.succeeded or search.is_exhausted
         if has_error and points == measured_on and ended_near:
             jump = JUMP[scene.grid.dimension] * search.quantum
@@ -132,7 +144,7 @@ def solve_at_load(task: Task, context: SolveContext, watcher: Watcher) -> TaskSo
             for pressure in (step * search.nearest.pressure for step in (ratio, 1 / ratio)[ended:]):
                 if search.lowest < pressure / scene.delta_sigma < PRESSURE_RANGE[1]:
                     solved = None
-                    solved = attempt(points, pressure, is_neighbour=True)
+                    attempt(points, pressure, is_neighbour=True)
             slopes = _slopes(search.nearest, trials)
             uncertain = jump / log(ratio)
         roots.append(search.root if search.succeeded else log(search.nearest.pressure))
@@ -350,10 +362,9 @@ class _Search:
         """Take a trial into account.
 
         Where a pressure has no contact, rounding has taken it: the trial is left out, and lower
-        pressures are not tried. The continuum value of an area can be 0 in the first trial.
+        pressures are not tried. The continuum value of an area can be 0 although points touch.
         """
-        may_be_zero = self.task.accuracy is not None and not self.points
-        if self.quantum > 0 and trial.value == 0 and not may_be_zero:
+        if self.quantum > 0 and trial.value == 0 and not trial.is_touching:
             self.lowest = max(self.lowest, trial.pressure / self.scene.delta_sigma)
             self.first = trial.pressure * exp(MAX_STEP)  # where no trial has had contact yet
             return

@@ -37,14 +37,19 @@ class Trial:
     points: PointCount
     pressure: Annotated[_Finite, Key(gt=0)]
     """[Pa]."""
-    value: Annotated[_Finite, Key(ge=0)]
-    """Contact area or mean gap of the solution."""
+    value: _Finite
+    """Contact area, mean gap or displacement [m] of the solution.
+
+    A mean gap is negative where the elastomer enters missing heights deeper than those filled in.
+    """
     work: float
     """Transforms times grid points."""
     observables: dict[str, _Finite] = field(default_factory=dict)
     """a_r, sigma_p [Pa] and u_g [m]; that of the load is `value`. None without convergence."""
     is_neighbour: bool = False
     """Whether the trial is not one of the search, but gives the slopes at its root."""
+    is_touching: bool = False
+    """Whether points of the grid are in contact, where the continuum value of the area may be 0."""
 
 
 @with_config(ConfigDict(strict=True, extra="forbid"))

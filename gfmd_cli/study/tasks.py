@@ -174,7 +174,7 @@ def _tasks(spec: models.Spec, *, suited: bool) -> list[Task]:
         }
         for load in loads:
             points = _points(spec, chosen, load)
-            surface, points_y = chosen["grid"].on_cell(chosen["surface"], points)
+            surface, points_y = _cell(chosen, points)
             task = Task(
                 index=len(tasks),
                 **shared | {"surface": surface},
@@ -273,6 +273,19 @@ def _points(spec: models.Spec, chosen: dict[str, Any], load: float) -> int:
     p_star = load if spec.load.quantity == "p_star" else forecast.P_STAR
     exponent = chosen["elastomer"].exponent
     return forecast.last_grid(surface, exponent, p_star, grid.boundary, spec.accuracy)
+
+
+def _cell(chosen: dict[str, Any], points: int) -> tuple[RigidSurface, int]:
+    """The surface on its cell, and the points along y of a grid of so many points along x.
+
+    Each "auto" grid has exactly twice the points of the one before, along y as well.
+    """
+    surface, grid = chosen["surface"], chosen["grid"]
+    if grid.points != "auto":
+        return grid.on_cell(surface, points)
+    first = forecast.first_grid(surface)
+    on_cell, first_y = grid.on_cell(surface, first)
+    return on_cell, first_y * points // first if surface.dimension == 2 else 1
 
 
 def _task_id(
