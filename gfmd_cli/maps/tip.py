@@ -4,6 +4,8 @@ A scan is the dilation of the surface by the tip: the curvature of its peaks is 
 of the tip, while the valleys between them are sharp.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from gfmd_cli.grid.arrays import Field
@@ -26,6 +28,17 @@ FILTERED = 2.0
 """Cut-off wavelength of the S-filter over the length of blunt structures: filtered map and filtered
 surface then have contact areas that differ by about 10 % or less (docs/map_evidence.md)."""
 MAX_SAMPLE = 2**18  # heights along each axis
+
+
+class _Profiles(NamedTuple):
+    """Lines of a map along one axis."""
+
+    heights: Field
+    """[m], shape (lines, points), NaN where missing."""
+    slopes: Field
+    """Slopes across the lines, of the same shape."""
+    spacing: float
+    """Distance of the points of a line [m]."""
 
 
 def blunted(
@@ -51,11 +64,10 @@ def blunted(
     cutoff : cut-off wavelength of the S-filter [m]; 0 without it
     flipped : whether the heights were turned upside down after the scan
     """
-    heights = (-scale if flipped else scale) * topography.with_gaps()
+    sides = _profiles(topography, -scale if flipped else scale, spacing)
     if radius is not None:
         what = f"the tip (surface.tip_radius = {labelled(radius, 'm')}) has"
-        along = [_curvatures(heights, spacing, axis, 1)[1] for axis in range(heights.ndim)]
-        sharpest = radius * max(along)
+        sharpest = radius * max(_curvatures(profiles, 1)[1] for profiles in sides)
         if sharpest > MAX_SHARPEST:
             return (
                 f"the peaks of the map are up to {sharpest:.2g} times as sharp as a tip of the "
@@ -63,7 +75,7 @@ def blunted(
                 "wrong?"
             )
     else:
-        curvature = _curvature_of_tip(heights, spacing)
+        curvature = _curvature_of_tip(sides)
         if not curvature > 0:
             return ""
         radius = 1 / curvature
@@ -71,7 +83,7 @@ def blunted(
             f"no peak of the scan is sharper than a sphere of the radius {radius:.2g} m, but the "
             "valleys are, as if scanned by a tip of about this radius. Then the tip has"
         )
-    distance = _shortest_sharp(heights, spacing, MAX_CURVATURE / radius)
+    distance = _shortest_sharp(sides, MAX_CURVATURE / radius)
     length = 2 * distance * max(spacing)
     if distance == 1 or cutoff >= FILTERED * length:
         return ""
@@ -83,15 +95,28 @@ def blunted(
     )
 
 
-def _curvature_of_tip(heights: Field, spacing: tuple[float, ...]) -> float:
+def _profiles(topography: Topography, scale: float, spacing: tuple[float, ...]) -> list[_Profiles]:
+    """Lines of a map along each axis, of a large map a sample of them."""
+    heights = topography.with_gaps()
+    if heights.ndim == 1:
+        return [_Profiles(scale * heights[None], np.zeros((1, heights.size)), spacing[0])]
+    step, along, (dy, dx) = 1 + heights.size // MAX_SAMPLE, [], spacing
+    for lines, across, own in ((heights.T, dx, dy), (heights, dy, dx)):
+        last, middle, following = lines[:-2:step], lines[1:-1:step], lines[2::step]
+        slopes = scale * (following - last) / (2 * across)
+        along.append(_Profiles(scale * middle, slopes, own))
+    return along
+
+
+def _curvature_of_tip(sides: list[_Profiles]) -> float:
     """The curvature at which the peaks of a map end along both axes [1/m]; 0 if they do not.
 
     It is that at the shortest distance of points at which they do.
     """
-    if heights.ndim == 1 or min(heights.shape) < MIN_POINTS:
+    if len(sides) == 1 or min(profiles.heights.shape[1] for profiles in sides) < MIN_POINTS:
         return 0.0
     for distance in DISTANCES:
-        found = [_curvatures(heights, spacing, axis, distance) for axis in range(heights.ndim)]
+        found = [_curvatures(profiles, distance) for profiles in sides]
         if all(
             0 < sharper < MAX_RATIO * sharp and valleys > MIN_VALLEYS * sharper
             for sharp, sharper, valleys in found
@@ -100,41 +125,40 @@ def _curvature_of_tip(heights: Field, spacing: tuple[float, ...]) -> float:
     return 0.0
 
 
-def _shortest_sharp(heights: Field, spacing: tuple[float, ...], curvature: float) -> int:
+def _shortest_sharp(sides: list[_Profiles], curvature: float) -> int:
     """The shortest distance, in points, at which peaks have at most a curvature [1/m].
 
     The longest one that is compared, if peaks are sharper at all of them. The curvature is that
     along the axis with the sharper peaks.
     """
-    distance, longest = 1, max(1, min(heights.shape) // MAX_DISTANCE)
+    points = min(profiles.heights.shape[1] for profiles in sides)
+    distance, longest = 1, max(1, points // MAX_DISTANCE)
     while distance < longest:
-        along = [_curvatures(heights, spacing, axis, distance)[1] for axis in range(heights.ndim)]
-        if not max(along) > curvature:
+        if not max(_curvatures(profiles, distance)[1] for profiles in sides) > curvature:
             break
         distance = min(max(distance + 1, round(GROWTH * distance)), longest)
     return distance
 
 
-def _curvatures(
-    heights: Field, spacing: tuple[float, ...], axis: int, distance: int
-) -> tuple[float, float, float]:
+def _curvatures(profiles: _Profiles, distance: int) -> tuple[float, float, float]:
     """Quantiles of the curvature along an axis [1/m]: two of peaks, one of valleys.
 
     -h_xx / [(1 + h_x^2) (1 + h_x^2 + h_y^2)^(1/2)], the normal curvature along x, which is 1 / R
     everywhere on a sphere. h_x and h_xx are differences of heights at a distance in points. -inf if
     no such heights are known.
     """
-    lines = np.moveaxis(np.atleast_2d(heights), axis - heights.ndim, -1)
-    across = np.zeros_like(lines)
-    if heights.ndim == 2:
-        step = 1 + lines.size // MAX_SAMPLE
-        across = (lines[2::step] - lines[:-2:step]) / (2 * spacing[1 - axis])
-        lines = lines[1:-1:step]
-    inner = slice(distance, -distance)
-    own, last, following = lines[:, inner], lines[:, : -2 * distance], lines[:, 2 * distance :]
-    along = (following - last) / (2 * distance * spacing[axis])
-    second = (2 * own - following - last) / (distance * spacing[axis]) ** 2
-    curvature = second / ((1 + along**2) * np.sqrt(1 + along**2 + across[:, inner] ** 2))
+    heights, inner = profiles.heights, slice(distance, -distance)
+    own, last, following = (
+        heights[:, inner],
+        heights[:, : -2 * distance],
+        heights[:, 2 * distance :],
+    )
+    along, across = (
+        (following - last) / (2 * distance * profiles.spacing),
+        profiles.slopes[:, inner],
+    )
+    second = (2 * own - following - last) / (distance * profiles.spacing) ** 2
+    curvature = second / ((1 + along**2) * np.sqrt(1 + along**2 + across**2))
     known = curvature[np.isfinite(curvature)]
     if not known.size:
         return -np.inf, -np.inf, -np.inf
