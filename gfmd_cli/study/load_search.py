@@ -229,7 +229,7 @@ def _check_known(task: Task, solved: TaskSolution) -> None:
         )
     raise InputError(
         f"load.{task.quantity}: the continuum value is not known on a grid of {task.points} "
-        f"points per side; give a finer grid, or {remedy}"
+        f"points per side; try a finer grid, or {remedy}"
     )
 
 
