@@ -5,11 +5,11 @@
 Self-affine surfaces on a half-space, scanned by a paraboloid of the radius R: the map is the
 dilation of the surface by the tip, at every second or fourth point of the grid. R is given in units
 of 1 / h''_rms, h'' the second derivative of the surface along x. Map and surface are solved on the
-same grid, at pressures that are a given p* for the surface. Printed are the length of the blunt
-structures in points of the map (0 without a warning), the fraction of maps that give a warning
-without the radius, the mean ratio (map over surface) of Delta_sigma and, for each p*, of contact
-area and mean gap; then those of both after the S-filter that the warning names, with the largest
-deviation of the area.
+same grid, at pressures that are a given p* for the surface. Printed are the mean length of the
+blunt structures in points of the map (0 if no map gives a warning), the fraction of maps that give
+a warning without the radius, the mean ratio (map over surface) of Delta_sigma and, for each p*, of
+contact area and mean gap; then those of both after the S-filter that the warning names, with the
+largest deviation of the area.
 
     python scripts/tip_radius.py sound [--points 64 256] [--seeds 10]
 
@@ -108,6 +108,7 @@ def scans(points: int, hurst: float, radii: Sequence[float], seeds: int) -> None
     for (step, radius), values in rows.items():
         kept = np.array(filtered.get((step, radius), []))
         mean = np.mean(values, axis=0)
+        mean[0] *= len(values) / max(len(kept), 1)  # the others have 0
         text = f"{hurst:3g} {points:5} {step:2} {radius:4g} {mean[0]:5.1f} {mean[1]:4.0%}"
         text += "".join(f"{value:7.2f}" for value in mean[2:])
         if kept.size:

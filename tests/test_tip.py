@@ -106,7 +106,7 @@ def test_a_sharper_tip_blunts_nothing(tmp_path):
 def test_the_filter_that_the_warning_names_removes_it(tmp_path):
     scan = _scanned(_surface())
     cutoff = float(WORDS.search(*_warnings(tmp_path, scan, tip_radius=RADIUS))[2])
-    assert not _warnings(tmp_path, scan, tip_radius=RADIUS, s_filter=1.1 * cutoff)
+    assert not _warnings(tmp_path, scan, tip_radius=RADIUS, s_filter=cutoff)
     assert _warnings(tmp_path, scan, tip_radius=RADIUS, s_filter=0.5 * cutoff)
 
 

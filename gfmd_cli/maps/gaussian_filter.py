@@ -7,6 +7,7 @@ from gfmd_cli.grid.plans import fast_length
 
 MIN_SPACINGS = 3
 """Fewest spacings of the map in a cut-off wavelength: ISO 25178-3 for optical instruments."""
+ROUNDED_UP = 1.05  # two digits of this multiple of a cut-off are no less than the cut-off
 REACH = 1.6
 """Largest distance with a weight, in cut-off wavelengths; beyond, weights are below rounding."""
 

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gfmd_cli.grid.arrays import Field
-from gfmd_cli.maps.gaussian_filter import MIN_SPACINGS, transmission
+from gfmd_cli.maps.gaussian_filter import MIN_SPACINGS, ROUNDED_UP, transmission
 from gfmd_cli.maps.topography import Topography
 
 RATIOS = (2, 3)  # of distances; a choice: gratings resemble noise at one of them only
@@ -21,7 +21,6 @@ SAMPLED_LINES = 128  # of each axis, at least; all of smaller maps
 FILTERED_POINTS = {1: 2**18, 2: 512}
 """Per side of the part on which a filter is tried, by dimension; all of smaller maps."""
 HALVINGS = 12  # of the interval of cut-offs; a choice: two digits of them are stated
-ROUNDED_UP = 1.05  # two digits of this multiple are no less than the number
 MAX_EXCESS = 10  # larger ratios are not stated: the gradient without noise is uncertain; a choice
 MIN_EXCESS = 1.1  # rms gradient over that without noise; sound maps have up to 1.06
 

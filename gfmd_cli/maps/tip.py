@@ -1,7 +1,7 @@
 """Blunt peaks of a map, where the tip of the microscope or stylus was blunter than the surface.
 
-A scan is the dilation of the surface by the tip: the curvature of its peaks is at most 1 / R, that
-of the tip, while the valleys between them are sharp.
+A scan is the dilation of the surface by the tip: peaks that are sharper than the tip get its
+curvature 1 / R, and the valleys between them are sharper than that.
 """
 
 from typing import NamedTuple
@@ -9,14 +9,15 @@ from typing import NamedTuple
 import numpy as np
 
 from gfmd_cli.grid.arrays import Field
+from gfmd_cli.maps.gaussian_filter import ROUNDED_UP
 from gfmd_cli.maps.topography import Topography
 from gfmd_cli.units import labelled
 
 MAX_CURVATURE = 0.5
 """Curvature of peaks over that of the tip, beyond which the tip has blunted them (Sanner et al.,
-Appl. Surf. Sci. Adv. 7, 100190 (2022), for the largest curvature of a map)."""
+Appl. Surf. Sci. Adv. 7, 100190 (2022); there of the sharpest peak, here of a quantile)."""
 SHARP, SHARPER = 0.99, 0.999
-"""Quantiles of the curvature of peaks. Their ratio is 1.33 for Gaussian curvatures."""
+"""Quantiles of the curvature of all points. Their ratio is 1.33 if it is normally distributed."""
 MAX_RATIO = 1.15  # of these two, if a tip has blunted the peaks; calibrated, as the next constant
 MIN_VALLEYS = 1.5  # curvature of valleys over that of peaks, likewise; 1 for Gaussian surfaces
 DISTANCES = (1, 2, 3, 4, 6, 8)  # points, at which a tip is looked for; noise hides it at the first
@@ -26,8 +27,8 @@ GROWTH = 1.25  # of the distances at which a map is compared with a tip
 MAX_DISTANCE = 4  # shorter side over the largest of them
 FILTERED = 2.0
 """Cut-off wavelength of the S-filter over the length of blunt structures: filtered map and filtered
-surface then have contact areas that differ by about 10 % or less (docs/map_evidence.md)."""
-MAX_SAMPLE = 2**18  # heights along each axis
+surface then have the same contact area within 4 % on average (docs/map_evidence.md)."""
+MAX_SAMPLE = 2**18  # heights of a map that are used along each axis, or up to half of them less
 
 
 class _Profiles(NamedTuple):
@@ -71,7 +72,7 @@ def blunted(
         if sharpest > MAX_SHARPEST:
             return (
                 f"the peaks of the map are up to {sharpest:.2g} times as sharp as a tip of the "
-                f"radius surface.tip_radius = {radius:g} m leaves them: noise, or is the radius "
+                f"radius surface.tip_radius = {radius:g} m can record: noise, or is the radius "
                 "wrong?"
             )
     else:
@@ -80,18 +81,19 @@ def blunted(
             return ""
         radius = 1 / curvature
         what = (
-            f"no peak of the scan is sharper than a sphere of the radius {radius:.2g} m, but the "
-            "valleys are, as if scanned by a tip of about this radius. Then the tip has"
+            f"almost no peak of the scan is sharper than a sphere of the radius {radius:.2g} m, "
+            "but the valleys are, as if scanned by a tip of about this radius. Then the tip has"
         )
     distance = _shortest_sharp(sides, MAX_CURVATURE / radius)
     length = 2 * distance * max(spacing)
     if distance == 1 or cutoff >= FILTERED * length:
         return ""
+    shortest = ROUNDED_UP * FILTERED * length
     return (
         f"{what} blunted structures shorter than about {length:.2g} m: the contact area at light "
         "load is too large, in tests by a factor of 1.1 to 3.5. With surface.s_filter = "
-        f"{FILTERED * length:.2g} or more the contact hardly depends on the tip, but is that of a "
-        "smoother surface"
+        f"{shortest:.2g} or more the contact hardly depends on the tip, but is that of a smoother "
+        "surface"
     )
 
 
@@ -109,9 +111,9 @@ def _profiles(topography: Topography, scale: float, spacing: tuple[float, ...]) 
 
 
 def _curvature_of_tip(sides: list[_Profiles]) -> float:
-    """The curvature at which the peaks of a map end along both axes [1/m]; 0 if they do not.
+    """The curvature that many peaks of a map have along both axes, and almost none exceeds [1/m].
 
-    It is that at the shortest distance of points at which they do.
+    It is that at the shortest distance of points at which this is so; 0 if there is none.
     """
     if len(sides) == 1 or min(profiles.heights.shape[1] for profiles in sides) < MIN_POINTS:
         return 0.0
@@ -144,8 +146,8 @@ def _curvatures(profiles: _Profiles, distance: int) -> tuple[float, float, float
     """Quantiles of the curvature along an axis [1/m]: two of peaks, one of valleys.
 
     -h_xx / [(1 + h_x^2) (1 + h_x^2 + h_y^2)^(1/2)], the normal curvature along x, which is 1 / R
-    everywhere on a sphere. h_x and h_xx are differences of heights at a distance in points. -inf if
-    no such heights are known.
+    everywhere on a sphere. h_x and h_xx are differences of heights at a distance in points, h_y is
+    that of the next lines. -inf if no such heights are known.
     """
     heights, inner = profiles.heights, slice(distance, -distance)
     own, last, following = (

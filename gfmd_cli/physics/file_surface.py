@@ -86,7 +86,7 @@ class FileSurface(RigidSurface):
     noise: it halves waves of this wavelength and damps shorter ones more. By default no filter."""
     tip_radius: Positive | None = None
     """Radius of the tip that scanned the map [m]; the program then warns of structures that the tip
-    has blunted. By default it warns only if the curvature of the peaks clearly ends at one value.
+    has blunted. By default it warns only if many peaks have one curvature that almost none exceeds.
     The heights are not changed."""
     edges: Edges | None = None
     """How the map is made periodic: "window" tapers the heights near the border to their mean,
