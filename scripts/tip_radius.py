@@ -24,7 +24,7 @@ from itertools import product
 import numpy as np
 from noise_of_maps import surfaces
 from scipy.ndimage import grey_dilation
-from unresolved_roughness import contacts, pressures, sampled
+from unresolved_roughness import P_STARS, contacts, pressures, ratios, sampled
 
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.maps.gaussian_filter import gaussian_filter
@@ -33,7 +33,6 @@ from gfmd_cli.maps.topography import Topography
 from gfmd_cli.physics.self_affine import SelfAffine
 
 RADII = (0.1, 0.3, 1.0, 3.0, 10.0)  # in units of 1 / h''_rms
-P_STARS = (0.003, 0.03, 0.3)
 ROLLOFF, SHORTEST = 1 / 4, 1 / 128  # of the side
 PIXELS = (1 / 256, 1 / 512)  # of the side
 WITHOUT_TIP = "seen with a round tip"  # the surfaces of noise_of_maps.py that are not counted
@@ -61,33 +60,27 @@ def warning(heights: Field, spacing: float, radius: float | None = None) -> str:
     return blunted(topography, (spacing, spacing), 1.0, radius)
 
 
-def ratios(of_map: Field, true: Field, points: int, p_stars: Sequence[float]) -> list[float]:
+def compared(of_map: Field, surface: Field) -> list[float]:
     """Ratios of Delta_sigma and, for each p*, of contact area and mean gap, map over surface."""
     spec: dict[str, dict[str, object]] = {
         "elastomer": {"kind": "half-space"},
         "surface": {"length": 1.0},
-        "grid": {"points": points},
+        "grid": {"points": len(surface)},
     }
-    loads = pressures(true, spec, p_stars)
-    pairs = zip(contacts(of_map, spec, loads), contacts(true, spec, loads), strict=True)
-    columns = [(a.columns, b.columns) for a, b in pairs]
-    names = ("a_r", "mean_gap")
-    first, exact = columns[0]
-    return [
-        first["delta_sigma"] / exact["delta_sigma"],
-        *(a[name] / b[name] for a, b in columns for name in names),
-    ]
+    loads = pressures(surface, spec, P_STARS)
+    return ratios(contacts(of_map, spec, loads), contacts(surface, spec, loads))[1:]
 
 
-def scans(points: int, hurst: float, radii: Sequence[float], seeds: int) -> None:
+def scans(points: int, hurst: float, options: argparse.Namespace) -> None:
     """Print the ratios for scans of random surfaces."""
+    sign = -1 if options.flip else 1
     rows: dict[tuple[int, float], list[list[float]]] = {}
     filtered: dict[tuple[int, float], list[list[float]]] = {}
-    for seed in range(seeds):
+    for seed in range(options.seeds):
         surface = SelfAffine(cutoff=SHORTEST, rolloff=ROLLOFF, hurst=hurst, h_std=1e-3, seed=seed)
         heights = surface.heights(points)
         second = points**2 * np.diff(heights, 2, axis=1)
-        for pixel, radius in product(PIXELS, radii):
+        for pixel, radius in product(PIXELS, options.radii):
             step = round(pixel * points)
             if not step:
                 continue
@@ -97,13 +90,13 @@ def scans(points: int, hurst: float, radii: Sequence[float], seeds: int) -> None
             found = re.search(r"shorter than about (\S+) m.*s_filter = (\S+) or", text)
             length = float(found[1]) / pixel if found else 0.0
             is_noticed = float(bool(warning(seen, pixel)))
-            row = [length, is_noticed, *ratios(seen, heights, points, P_STARS)]
+            row = [length, is_noticed, *compared(sign * seen, sign * heights)]
             rows.setdefault((step, radius), []).append(row)
             if found:
-                cutoff, whole = float(found[2]), (1 / points, 1 / points)
+                cutoff, whole = options.cutoff * float(found[2]), (1 / points, 1 / points)
                 smooth = gaussian_filter(heights, whole, cutoff, periodic=True)
                 of_map = gaussian_filter(seen, (pixel, pixel), cutoff, periodic=True)
-                row = ratios(of_map, smooth, points, P_STARS)
+                row = compared(sign * of_map, sign * smooth)
                 filtered.setdefault((step, radius), []).append(row)
     for (step, radius), values in rows.items():
         kept = np.array(filtered.get((step, radius), []))
@@ -134,6 +127,8 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--hurst", type=float, nargs="+", default=[0.3, 0.8])
     parser.add_argument("--radii", type=float, nargs="+", default=RADII)
+    parser.add_argument("--flip", action="store_true", help="turn map and surface upside down")
+    parser.add_argument("--cutoff", type=float, default=1.0, help="over that of the warning")
     arguments = parser.parse_args()
     if arguments.table == "sound":
         sound(arguments.points, arguments.seeds)
@@ -141,7 +136,7 @@ def main() -> None:
     print("H, points of the grid, of a pixel, R h''_rms; length in pixels, noticed; Delta_sigma")
     print("p*, for a_r and mean gap each:", *P_STARS, "; with the S-filter; largest deviations")
     for points, hurst in product(arguments.points, arguments.hurst):
-        scans(points, hurst, arguments.radii, arguments.seeds)
+        scans(points, hurst, arguments)
 
 
 if __name__ == "__main__":

@@ -18,17 +18,17 @@ MAX_CURVATURE = 0.5
 Appl. Surf. Sci. Adv. 7, 100190 (2022); there of the sharpest peak, here of a quantile)."""
 SHARP, SHARPER = 0.99, 0.999
 """Quantiles of the curvature of all points. Their ratio is 1.33 if it is normally distributed."""
-MAX_RATIO = 1.15  # of these two, if a tip has blunted the peaks; calibrated, as the next constant
+MAX_RATIO = 1.15  # of these two, if a tip has blunted the peaks; calibrated: scripts/tip_radius.py
 MIN_VALLEYS = 1.5  # curvature of valleys over that of peaks, likewise; 1 for Gaussian surfaces
 DISTANCES = (1, 2, 3, 4, 6, 8)  # points, at which a tip is looked for; noise hides it at the first
 MIN_POINTS = 64  # per side of a map; smaller ones have such curvatures by chance
 MAX_SHARPEST = 3.0  # curvature of peaks over that of the tip; a choice: 1 without noise
 GROWTH = 1.25  # of the distances at which a map is compared with a tip
-MAX_DISTANCE = 4  # shorter side over the largest of them
-FILTERED = 2.0
+MAX_DISTANCE = 0.25  # the largest of them, over the shorter side
+FILTERED_LENGTHS = 2
 """Cut-off wavelength of the S-filter over the length of blunt structures: filtered map and filtered
 surface then have the same contact area within 4 % on average (docs/map_evidence.md)."""
-MAX_SAMPLE = 2**18  # heights of a map that are used along each axis, or up to half of them less
+MAX_SAMPLE = 2**18  # heights of a map that are used along each axis
 
 
 class _Profiles(NamedTuple):
@@ -53,8 +53,8 @@ def blunted(
 ) -> str:
     """A warning that a tip has blunted the peaks of a map, "" without it.
 
-    Without a radius, only a map whose peaks end at one curvature gives the warning. None is given
-    if the S-filter removes what depends on the tip.
+    Without a radius, only a map gives it in which many peaks have one curvature that almost none
+    exceeds. There is none if the S-filter removes what depends on the tip.
 
     Parameters
     ----------
@@ -65,10 +65,10 @@ def blunted(
     cutoff : cut-off wavelength of the S-filter [m]; 0 without it
     flipped : whether the heights were turned upside down after the scan
     """
-    sides = _profiles(topography, -scale if flipped else scale, spacing)
+    axes = _profiles(topography, -scale if flipped else scale, spacing)
     if radius is not None:
         what = f"the tip (surface.tip_radius = {labelled(radius, 'm')}) has"
-        sharpest = radius * max(_curvatures(profiles, 1)[1] for profiles in sides)
+        sharpest = radius * max(_curvatures(profiles, 1)[1] for profiles in axes)
         if sharpest > MAX_SHARPEST:
             return (
                 f"the peaks of the map are up to {sharpest:.2g} times as sharp as a tip of the "
@@ -76,7 +76,7 @@ def blunted(
                 "wrong?"
             )
     else:
-        curvature = _curvature_of_tip(sides)
+        curvature = _curvature_of_tip(axes)
         if not curvature > 0:
             return ""
         radius = 1 / curvature
@@ -84,11 +84,11 @@ def blunted(
             f"almost no peak of the scan is sharper than a sphere of the radius {radius:.2g} m, "
             "but the valleys are, as if scanned by a tip of about this radius. Then the tip has"
         )
-    distance = _shortest_sharp(sides, MAX_CURVATURE / radius)
+    distance = _distance_of_blunt_peaks(axes, MAX_CURVATURE / radius)
     length = 2 * distance * max(spacing)
-    if distance == 1 or cutoff >= FILTERED * length:
+    if distance == 1 or cutoff >= FILTERED_LENGTHS * length:
         return ""
-    shortest = ROUNDED_UP * FILTERED * length
+    shortest = ROUNDED_UP * FILTERED_LENGTHS * length
     return (
         f"{what} blunted structures shorter than about {length:.2g} m: the contact area at light "
         "load is too large, in tests by a factor of 1.1 to 3.5. With surface.s_filter = "
@@ -102,23 +102,23 @@ def _profiles(topography: Topography, scale: float, spacing: tuple[float, ...]) 
     heights = topography.with_gaps()
     if heights.ndim == 1:
         return [_Profiles(scale * heights[None], np.zeros((1, heights.size)), spacing[0])]
-    step, along, (dy, dx) = 1 + heights.size // MAX_SAMPLE, [], spacing
+    axes, step, (dy, dx) = [], 1 + heights.size // MAX_SAMPLE, spacing
     for lines, across, own in ((heights.T, dx, dy), (heights, dy, dx)):
         last, middle, following = lines[:-2:step], lines[1:-1:step], lines[2::step]
         slopes = scale * (following - last) / (2 * across)
-        along.append(_Profiles(scale * middle, slopes, own))
-    return along
+        axes.append(_Profiles(scale * middle, slopes, own))
+    return axes
 
 
-def _curvature_of_tip(sides: list[_Profiles]) -> float:
+def _curvature_of_tip(axes: list[_Profiles]) -> float:
     """The curvature that many peaks of a map have along both axes, and almost none exceeds [1/m].
 
     It is that at the shortest distance of points at which this is so; 0 if there is none.
     """
-    if len(sides) == 1 or min(profiles.heights.shape[1] for profiles in sides) < MIN_POINTS:
+    if len(axes) == 1 or min(profiles.heights.shape[1] for profiles in axes) < MIN_POINTS:
         return 0.0
     for distance in DISTANCES:
-        found = [_curvatures(profiles, distance) for profiles in sides]
+        found = [_curvatures(profiles, distance) for profiles in axes]
         if all(
             0 < sharper < MAX_RATIO * sharp and valleys > MIN_VALLEYS * sharper
             for sharp, sharper, valleys in found
@@ -127,16 +127,16 @@ def _curvature_of_tip(sides: list[_Profiles]) -> float:
     return 0.0
 
 
-def _shortest_sharp(sides: list[_Profiles], curvature: float) -> int:
-    """The shortest distance, in points, at which peaks have at most a curvature [1/m].
+def _distance_of_blunt_peaks(axes: list[_Profiles], curvature: float) -> int:
+    """The shortest distance, in points, at which peaks have at most this curvature [1/m].
 
     The longest one that is compared, if peaks are sharper at all of them. The curvature is that
     along the axis with the sharper peaks.
     """
-    points = min(profiles.heights.shape[1] for profiles in sides)
-    distance, longest = 1, max(1, points // MAX_DISTANCE)
+    points = min(profiles.heights.shape[1] for profiles in axes)
+    distance, longest = 1, max(1, int(MAX_DISTANCE * points))
     while distance < longest:
-        if not max(_curvatures(profiles, distance)[1] for profiles in sides) > curvature:
+        if not max(_curvatures(profiles, distance)[1] for profiles in axes) > curvature:
             break
         distance = min(max(distance + 1, round(GROWTH * distance)), longest)
     return distance
@@ -150,16 +150,10 @@ def _curvatures(profiles: _Profiles, distance: int) -> tuple[float, float, float
     that of the next lines. -inf if no such heights are known.
     """
     heights, inner = profiles.heights, slice(distance, -distance)
-    own, last, following = (
-        heights[:, inner],
-        heights[:, : -2 * distance],
-        heights[:, 2 * distance :],
-    )
-    along, across = (
-        (following - last) / (2 * distance * profiles.spacing),
-        profiles.slopes[:, inner],
-    )
-    second = (2 * own - following - last) / (distance * profiles.spacing) ** 2
+    last, following = heights[:, : -2 * distance], heights[:, 2 * distance :]
+    length = distance * profiles.spacing
+    along, across = (following - last) / (2 * length), profiles.slopes[:, inner]
+    second = (2 * heights[:, inner] - following - last) / length**2
     curvature = second / ((1 + along**2) * np.sqrt(1 + along**2 + across**2))
     known = curvature[np.isfinite(curvature)]
     if not known.size:

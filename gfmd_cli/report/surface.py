@@ -83,8 +83,8 @@ def surface_spectrum(data: ReportData) -> Section:
         figure = _spectrum_figure(names, drawn, dimension)
         place = f"spectrum-{dimension}" if several else "spectrum"
         drawings.append(drawing(figure, place, label, CAPTION + more))
-        lines = {1: " of lines", 2: " of areas"}[dimension] if several else ""
-        bands[f"Table behind the figure{lines}"] = _bands(names, drawn, dimension)
+        of_what = {1: " of lines", 2: " of areas"}[dimension] if several else ""
+        bands[f"Table behind the figure{of_what}"] = _bands(names, drawn, dimension)
         notes += [str(row["preparation"]) for row in rows if row["preparation"]]
         fits += [
             {"surface": name, "no_rolloff": "none within the cell", **fit_record(each.fit)}

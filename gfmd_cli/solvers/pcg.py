@@ -231,12 +231,8 @@ class _Run:
         may_restart = self.is_soft or state.moved == state.best_length
         if may_restart and abs(exact_overlap) > MAX_OVERLAP * exact_slope:
             return 0.0
-        # Nearly parallel to the last direction, z alone leads about as low as the plane of the two.
-        # The factor would be so large that the indenter stops each move where it stopped the last.
-        is_parallel = slope - (longer - 1) * z_change < MIN_DETERMINANT * slope
-        if is_parallel and not self.is_soft:
-            return 0.0
-        return conjugation(slope, z_change, state.moved, state.best_length, state.curvature)
+        move = state.moved, state.best_length, state.curvature
+        return conjugation(slope, z_change, *move, 0.0 if self.is_soft else MIN_DETERMINANT)
 
     def apply_stiffness(self) -> float:
         """Replace the values in `padded` by K times them; return the sum of their products."""

@@ -91,7 +91,12 @@ def polak_ribiere(z_change: float, slope: float) -> float:
 
 
 def conjugation(
-    slope: float, z_change: float, moved: float, best: float, curvature: float
+    slope: float,
+    z_change: float,
+    moved: float,
+    best: float,
+    curvature: float,
+    least_determinant: float = 0.0,
 ) -> float:
     """The factor beta >= 0 for which z + beta d leads to the lowest energy in the plane of z and d.
 
@@ -104,6 +109,9 @@ def conjugation(
     moved : length of the last move along d
     best : length along d at which the energy was lowest
     curvature : d K d
+    least_determinant : that of the plane of z and d, 1 if conjugate and 0 if parallel, up to which
+        the factor is zero: z alone then leads about as low, and the factor would be so large that
+        the indenter stops each move where it stopped the last
 
     With the lengths l of the move and l* of lowest energy, f d = (l* - l) d K d. z K z is not
     known. It is estimated as if the energy along z were lowest at the same length l*. At l = l*
@@ -111,5 +119,7 @@ def conjugation(
     """
     rest = best - moved
     coupling = z_change / (moved * curvature)  # z K d / d K d
-    denominator = 1.0 - rest * curvature * coupling / slope
-    return max(0.0, (rest / best - coupling) / denominator) if denominator > 0.0 else 0.0
+    determinant = 1.0 - rest * curvature * coupling / slope
+    if not determinant > least_determinant:
+        return 0.0
+    return max(0.0, (rest / best - coupling) / determinant)
