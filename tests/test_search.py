@@ -16,7 +16,9 @@ from gfmd_cli.errors import InputError, Interrupted
 from gfmd_cli.physics.scenes import build_scene
 from gfmd_cli.status import Status
 from gfmd_cli.study import load_search, run_task
-from gfmd_cli.study.load_search import MAX_TRIALS, Trial, _Search, _slopes
+from gfmd_cli.study.load_search import _chords
+from gfmd_cli.study.notes import Trial
+from gfmd_cli.study.pressure_search import MAX_TRIALS, PressureSearch
 from gfmd_cli.study.reading import read_rows
 from gfmd_cli.study.tasks import plan
 
@@ -146,7 +148,7 @@ def test_slopes_are_those_over_the_logarithm_of_the_pressure():
         return Trial(64, math.exp(ln_p), 0.5, 0.0, values, **keys)
 
     neighbours = [trial(-2.3 + math.log(ratio), is_neighbour=True) for ratio in (1.25, 0.8)]
-    slopes = _slopes(trial(-2.3), [trial(-1.0), *neighbours])
+    slopes = _chords(trial(-2.3), [trial(-1.0), *neighbours])
     assert slopes == [pytest.approx({"a_r": 0.1, "sigma_p": 0.0, "u_g": 0.2})] * 2
 
 
@@ -547,4 +549,4 @@ def a_search(first, quantity, slope, size=10**9, load=0.1):
     )
     grid = SimpleNamespace(points=64, size=size, length=1.0, spacings=(1 / 64,))
     scene = SimpleNamespace(grid=grid, delta_sigma=1.0, h_std=1.0)
-    return _Search(task, scene, first, slope)
+    return PressureSearch(task, scene, first, slope)
