@@ -72,6 +72,7 @@ check: $(VENV)/.test ## the one gate: lint, format, types, import order
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+	$(BIN)/mypy --platform darwin --cache-dir .mypy_cache/darwin
 	$(BIN)/lint-imports
 
 validate: $(VENV)/.test ## slow physics: large grids, dense ladders; slow blocks of the documentation

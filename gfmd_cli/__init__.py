@@ -1,6 +1,12 @@
 """gfmd: elastic contact of rough surfaces, for elastomers of any stiffness k(q)."""
 
+import sys
 from importlib import import_module
+
+if sys.platform == "win32":
+    raise ImportError(
+        "gfmd needs Linux or macOS; on Windows, use the Windows Subsystem for Linux (WSL)"
+    )
 
 TYPE_CHECKING = False  # that of `typing`, whose import would delay the handlers of signals
 if TYPE_CHECKING:

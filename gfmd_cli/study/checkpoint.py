@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
 from copy import deepcopy
 from pathlib import Path
-from typing import Any, Literal, NamedTuple, Self
+from typing import Any, BinaryIO, Literal, NamedTuple, Self
 
 import numpy as np
 
@@ -192,8 +192,7 @@ def _write_slot(path: Path, fields: list[Field]) -> int:
     """Write the fields one after the other into a mapped file; return its checksum."""
     total = offset = 0
     with open_regular(path, os.O_RDWR | os.O_CREAT) as file:
-        file.truncate(sum(field.nbytes for field in fields))
-        os.posix_fallocate(file.fileno(), 0, sum(field.nbytes for field in fields))
+        _reserve(file, sum(field.nbytes for field in fields))
         with mmap.mmap(file.fileno(), 0) as memory:
             for field in fields:
                 content = np.ascontiguousarray(field).data.cast("B")
@@ -206,6 +205,17 @@ def _write_slot(path: Path, fields: list[Field]) -> int:
             memory.flush()
         os.fsync(file.fileno())
     return total
+
+
+def _reserve(file: BinaryIO, size: int) -> None:
+    """Give a file its size and its place on the disk: writing to a mapped file cannot fail then."""
+    file.truncate(size)
+    if hasattr(os, "posix_fallocate"):
+        os.posix_fallocate(file.fileno(), 0, size)
+        return
+    for start in range(0, size, CHUNK):  # macOS
+        file.write(bytes(min(CHUNK, size - start)))
+    file.flush()
 
 
 def _is_finite(field: Field) -> bool:

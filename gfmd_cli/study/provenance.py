@@ -14,6 +14,7 @@ import gfmd_cli
 from gfmd_cli.files.checksums import digest
 from gfmd_cli.grid.plans import plans, processor
 from gfmd_cli.spec.models import Spec
+from gfmd_cli.study.resources import own_cores
 
 PACKAGES = ("numpy", "scipy", "pyFFTW", "h5py", "pydantic", "SurfaceTopography")
 
@@ -37,7 +38,7 @@ def origin(spec: Spec, text: str) -> dict[str, str]:
                 "system": platform.platform(),
                 "processor": processor(),
                 "plans": plans(),
-                "cores": len(os.sched_getaffinity(0)),
+                "cores": len(own_cores()),
                 "python": platform.python_version(),
                 "slurm_job": os.environ.get("SLURM_JOB_ID", ""),
             }

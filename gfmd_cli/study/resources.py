@@ -22,9 +22,16 @@ SECONDS_PER_STEP = 1e-7  # and grid point, on one thread; an upper limit
 SECONDS_TO_END = 2.0  # for worker processes and small files
 
 
+def own_cores() -> set[int]:
+    """Numbers of the cores on which this process may run; macOS has no limit of a process."""
+    if hasattr(os, "sched_getaffinity"):
+        return os.sched_getaffinity(0)
+    return set(range(os.cpu_count() or 1))
+
+
 def available_cores() -> int:
-    """Cores that this process may use: Slurm's grant, else the affinity mask."""
-    return _granted("SLURM_CPUS_PER_TASK") or len(os.sched_getaffinity(0))
+    """Number of cores that this process may use: Slurm's grant, else its own cores."""
+    return _granted("SLURM_CPUS_PER_TASK") or len(own_cores())
 
 
 def _granted(name: str) -> int:
@@ -34,9 +41,13 @@ def _granted(name: str) -> int:
 
 
 def available_memory() -> float:
-    """Bytes that this process may take: the least of kernel, `ulimit -v`, cgroups and Slurm."""
+    """Bytes that this process may take: the least of kernel, `ulimit -v`, cgroups and Slurm.
+
+    macOS does not tell how much of its memory is free: there it is all that the machine has.
+    """
     cgroups = _cgroup_limits(Path("/proc/self/cgroup"), Path("/sys/fs/cgroup"))
-    limits = [available_addresses(), *cgroups]
+    machine = float(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
+    limits = [machine, available_addresses(), *cgroups]
     if (free := _kernel_number("/proc/meminfo", "MemAvailable:")) is not None:
         limits.append(1024.0 * free)
     per_core = available_cores() * _granted("SLURM_MEM_PER_CPU")
@@ -130,7 +141,7 @@ def jobs_and_threads(
     if ranks is not None:
         if jobs not in (None, 1):
             raise InputError(f"--jobs {jobs}: under mpiexec its processes share each task")
-        jobs, on_node = 1, cores_and_processes_on_node(ranks, os.sched_getaffinity(0))
+        jobs, on_node = 1, cores_and_processes_on_node(ranks, own_cores())
         cores = min(cores, on_node[0])
     elif jobs is None:
         is_short = sum(task.seconds for task in tasks) < POOL_SECONDS
