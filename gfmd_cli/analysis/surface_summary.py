@@ -58,7 +58,8 @@ class SurfaceSummary:
 
     def warnings(self) -> list[str]:
         """Probable mistakes, and whether a map resolves its roughness."""
-        warnings = [*self.surface.warnings(), unresolved(self.short_wave_factor)]
+        about_waves = unresolved(self.short_wave_factor, self.surface.resolution())
+        warnings = [*self.surface.warnings(), about_waves]
         return list(filter(None, warnings))
 
     @property

@@ -11,7 +11,7 @@ import numpy as np
 from gfmd_cli.grid.arrays import Field, row_blocks
 from gfmd_cli.maps.map_preparation import level
 from gfmd_cli.maps.topography import Topography, ends_without_heights
-from gfmd_cli.units import count, percent
+from gfmd_cli.units import count, labelled, percent
 
 MAX_GRADIENT = 3.0  # rms; a choice: surfaces of machined or worn solids have less
 MIN_GRADIENT = 1e-6  # rms; a choice: polished mirrors have about that
@@ -138,16 +138,22 @@ def unlikely_gradient(heights: Field, spacing: tuple[float, ...]) -> str:
     )
 
 
-def unresolved(factor: float) -> str:
-    """Roughness that goes on below the pixels; from `surface_spectrum.short_wave_factor`."""
+def unresolved(factor: float, resolution: float = 0.0) -> str:
+    """Roughness with shorter waves than the map has; from `surface_spectrum.short_wave_factor`.
+
+    `resolution` is the shortest wavelength that the map resolves [m], 0 for two points.
+    """
     if not factor > MAX_SHORT_WAVE_FACTOR:
         return ""
+    waves, limit = "2 to 4 points of the map", "the pixels"
+    if resolution > 0:
+        limit, longest = (labelled(length, "m") for length in (resolution, 2 * resolution))
+        waves = f"{limit} to {longest} (surface.lateral_resolution)"
     return (
-        "the waves of 2 to 4 points of the map increase Delta_sigma, the rms stress in full "
-        f"contact, by a factor of {factor:.2f}: unless this is noise, the roughness probably "
-        "continues below the pixels. If it does, the next halving of its shortest wavelength "
-        "divides the contact area at light load by roughly this factor. Error bars do not include "
-        "this"
+        f"the waves of {waves} increase Delta_sigma, the rms stress in full contact, by a factor "
+        f"of {factor:.2f}: unless this is noise, the roughness probably continues below {limit}. "
+        "If it does, the next halving of its shortest wavelength divides the contact area at light "
+        "load by roughly this factor. Error bars do not include this"
     )
 
 

@@ -7,6 +7,7 @@ import numpy as np
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.maps.gaussian_filter import MIN_SPACINGS, ROUNDED_UP, transmission
 from gfmd_cli.maps.topography import Topography
+from gfmd_cli.units import labelled
 
 RATIOS = (2, 3)  # of distances; a choice: gratings resemble noise at one of them only
 TOLERANCE = 0.15  # relative, of white noise at these distances; roughness grows by 0.25 for H = 0.1
@@ -22,6 +23,9 @@ FILTERED_POINTS = {1: 2**18, 2: 512}
 """Per side of the part on which a filter is tried, by dimension; all of smaller maps."""
 HALVINGS = 12  # of the interval of cut-offs; a choice: two digits of them are stated
 MAX_EXCESS = 10  # larger ratios are not stated: the gradient without noise is uncertain; a choice
+MIN_BEYOND = 1.25
+"""Rms gradient over that of the waves that are resolved. A microscope does not remove the waves
+below its resolution: up to 1.23 without noise (scripts/unresolved_roughness.py --leakage)."""
 MIN_EXCESS = 1.1  # rms gradient over that without noise; sound maps have up to 1.06
 
 
@@ -81,6 +85,34 @@ def noisy(
     )
 
 
+def noise_beyond(
+    resolution: float, topography: Topography, spacing: tuple[float, ...], cutoff: float = 0.0
+) -> str:
+    """A warning of waves that the microscope does not resolve, "" without it.
+
+    Parameters
+    ----------
+    resolution : shortest wavelength that the microscope resolves [m], 0 if it is not known
+    topography : the map
+    spacing : its spacing [m]
+    cutoff : cut-off wavelength of the S-filter [m]; 0 without it
+    """
+    if resolution <= 2 * max(spacing):
+        return ""
+    gradient = _Gradient(topography.with_gaps(), spacing)
+    excess = 1 / np.sqrt(1 - gradient.beyond(resolution, cutoff))
+    if not excess > MIN_BEYOND:
+        return ""
+    shortest = max(resolution, MIN_SPACINGS * min(spacing))
+    return (
+        f"waves shorter than surface.lateral_resolution = {labelled(resolution, 'm')} increase the "
+        f"rms gradient by a factor of {excess:.2g}. The microscope does not resolve such waves: "
+        "they are noise, or the resolution is finer. If they are noise, the contact area at light "
+        "load is too small by up to this factor: average several scans, or filter the map: "
+        f"surface.s_filter = {shortest:.2g} or more"
+    )
+
+
 class _Gradient:
     """Power spectrum of the differences of neighbours in the middle of a map, without their mean.
 
@@ -104,6 +136,15 @@ class _Gradient:
         for points, step in zip(self.shape, self.spacing, strict=True):
             power = transmission(np.fft.fftfreq(points, step), cutoff) ** 2 @ power
         return float(power / (self.power.sum() or 1.0))
+
+    def beyond(self, wavelength: float, cutoff: float) -> float:
+        """Fraction of the mean square in shorter waves, where the S-filter has this cut-off."""
+        power, squares = self.power, np.zeros(())
+        for points, step in zip(self.shape, self.spacing, strict=True):
+            frequency = np.fft.fftfreq(points, step)
+            power = np.moveaxis(power, 0, -1) * transmission(frequency, cutoff) ** 2
+            squares = squares[..., None] + frequency**2
+        return float(power[squares * wavelength**2 > 1].sum() / (power.sum() or 1.0))
 
     def cutoff(self, share: float) -> float:
         """The shortest cut-off wavelength that leaves this share of the mean square, or less."""

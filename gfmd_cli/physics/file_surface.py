@@ -30,7 +30,7 @@ from gfmd_cli.maps.map_preparation import (
     mirror,
     window,
 )
-from gfmd_cli.maps.noise import noisy
+from gfmd_cli.maps.noise import noise_beyond, noisy
 from gfmd_cli.maps.pictures import Picture, picture
 from gfmd_cli.maps.tip import blunted
 from gfmd_cli.maps.topography import Region, Topography, read_topography
@@ -84,6 +84,11 @@ class FileSurface(RigidSurface):
     s_filter: Positive | None = None
     """Cut-off wavelength of the S-filter [m], a Gaussian low-pass filter (ISO 16610-61) against
     noise: it halves waves of this wavelength and damps shorter ones more. By default no filter."""
+    lateral_resolution: Positive | None = None
+    """Shortest wavelength that the microscope resolves [m] (ISO 25178-600: the lateral period
+    limit, at which it halves the amplitude). The program then warns of roughness that the map does
+    not resolve and of shorter waves, which are noise. By default the length of two points. The
+    heights are not changed."""
     tip_radius: Positive | None = None
     """Radius of the tip that scanned the map [m]; the program then warns of structures that the tip
     has blunted. By default it warns only if many peaks have one curvature that almost none exceeds.
@@ -200,6 +205,7 @@ class FileSurface(RigidSurface):
             "edges": self.edges or "none",
             "periodic": self._is_periodic(),
             "interpolation": self.applied_interpolation(),
+            "lateral_resolution": self.resolution() or None,
         }
 
     @property
@@ -333,6 +339,12 @@ class FileSurface(RigidSurface):
             return None
         return TaperedMap.model_construct(**dict(self) | {"edges": "window"})
 
+    def resolution(self) -> float:
+        """Shortest wavelength that the map resolves [m]; 0 where the spec gives no resolution."""
+        if self.lateral_resolution is None:
+            return 0.0
+        return max(self.lateral_resolution, 2 * max(self._map_spacing()))
+
     def void(self, grid: Grid) -> Mask | None:
         """Points of a grid nearest to a missing height of the map, if these never touch."""
         return self._missing_on(grid, self.is_centred) if self.missing == "void" else None
@@ -464,13 +476,20 @@ def _filtered(surface: FileSurface) -> Field:
     """The heights [m], levelled, filled in and filtered, before their edges are changed.
 
     Cached, because the spectrum needs them, too. Raises InputError for a cut-off wavelength that
-    the map does not resolve or contain.
+    the map does not resolve or contain, and for a resolution of which it has no two wavelengths.
     """
     heights, cutoff, spacing = _filled(surface), surface.s_filter, surface._map_spacing()
+    longest = min(n * step for n, step in zip(heights.shape, spacing, strict=True))
+    resolution = surface.lateral_resolution
+    if resolution is not None and resolution > longest / 2:
+        raise InputError(
+            f"{surface.path}: surface.lateral_resolution = {resolution:g} m: the shortest "
+            f"wavelength that the microscope resolves must be at most half the shorter side of the "
+            f"map, {longest / 2:.3g} m"
+        )
     if cutoff is None:
         return heights
     shortest = MIN_SPACINGS * min(spacing)
-    longest = min(n * step for n, step in zip(heights.shape, spacing, strict=True))
     if not (1 - POINTS_ROUNDING) * shortest <= cutoff <= longest:
         raise InputError(
             f"{surface.path}: surface.s_filter = {cutoff:g} m: the cut-off wavelength must lie "
@@ -514,6 +533,7 @@ def _warnings_on_heights(surface: FileSurface) -> tuple[str, ...]:
     rounded = map_warnings.rounded(topography, scale)
     rounded_trend = map_warnings.rounded_trend(topography, levelled, scale)
     cutoff, is_flipped = surface.s_filter or 0.0, surface.flip
+    noise = noise_beyond(surface.resolution(), known, spacing, cutoff)
     tip = blunted(known, spacing, scale, surface.tip_radius, cutoff=cutoff, flipped=is_flipped)
     is_explained = any((outliers, misread_map, points, lines, rounded, rounded_trend))
     return (
@@ -522,7 +542,7 @@ def _warnings_on_heights(surface: FileSurface) -> tuple[str, ...]:
         misread_map,
         points,
         lines,
-        "" if is_explained else noisy(known, spacing, scale, cutoff),
+        noise or ("" if is_explained else noisy(known, spacing, scale, cutoff)),
         "" if misread_map else tip,
         map_warnings.curved(levelled),
         map_warnings.steep(surface.levelling(), subtracted, sides),

@@ -217,6 +217,10 @@ class RigidSurface(SpecTable):
         """A map that is not periodic, tapered for its spectrum; None for other surfaces."""
         return None
 
+    def resolution(self) -> float:
+        """Shortest wavelength that a map resolves [m]; 0 where the spec gives no resolution."""
+        return 0.0
+
     def void(self, grid: Grid) -> Mask | None:
         """Points of a grid that never touch, as their height is unknown; None where all can."""
         return None

@@ -78,7 +78,10 @@ def starter_of_scan(
     scene = build_scene(repeated, spec.elastomer[0], repeated.smallest_grid())
     finished = text(scene.h_std, scene.delta_sigma, len(spec.elastomer), warnings)
     _checked(finished, path, overrides)
-    warnings = [*warnings, unresolved(short_wave_factor(used, spec.elastomer[0]))]
+    warnings = [
+        *warnings,
+        unresolved(short_wave_factor(used, spec.elastomer[0]), used.resolution()),
+    ]
     return finished, used.preparation(grid.boundary), list(filter(None, warnings))
 
 

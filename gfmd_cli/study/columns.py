@@ -112,8 +112,8 @@ DETAILS = (
     Column("filled_load", "fraction of the load there; NaN if no height was filled in"),
     Column(
         "short_wave_factor",
-        "factor by which the waves of 2 to 4 points of a map increase Delta_sigma; NaN for other "
-        "surfaces",
+        "factor by which the shortest waves that a map resolves (2 points or lateral_resolution) "
+        "and those of up to twice this length increase Delta_sigma; NaN for other surfaces",
     ),
     *(observable.column for observable in OBSERVABLES),
 )

@@ -91,8 +91,9 @@ def warnings_of(task: Task, solved: TaskSolution, results: Mapping[str, Any]) ->
             "missing and were filled in (see the columns filled_contact and filled_load): if the "
             "highest points lack a height, contact area, stress and gap are uncertain"
         )
-    if task.accuracy is not None and (warning := unresolved(results["short_wave_factor"])):
-        yield warning
+    about_waves = unresolved(results["short_wave_factor"], task.surface.resolution())
+    if task.accuracy is not None and about_waves:
+        yield about_waves
     if scene.has_voids and solved.observables.u_g < 0:
         yield (
             "the mean gap is negative: where heights are missing, the elastomer enters the holes "
