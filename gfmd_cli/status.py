@@ -82,6 +82,11 @@ class Status(ExplainedEnum):
         return self is Status.CONVERGED
 
     @property
+    def is_accurate(self) -> bool:
+        """Whether a contact is solved to the tolerance, or as far as rounding allows."""
+        return self in (Status.CONVERGED, Status.ROUNDING)
+
+    @property
     def is_within_tolerance(self) -> bool:
         """Whether the contact is solved to its tolerance, whatever else the task has missed."""
         return self is Status.CONVERGED or self in SHORTFALLS

@@ -25,7 +25,10 @@ from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.solvers.auto import Auto
 from gfmd_cli.solvers.nested_grids import solve_contact
 from gfmd_cli.status import Status
+from gfmd_cli.study.reading import read_rows
 from gfmd_cli.study.refinement import _sizes
+from gfmd_cli.study.resources import HEADROOM
+from gfmd_cli.study.run import RunOptions, run_study
 from gfmd_cli.study.tasks import plan
 
 SPEC = power_spec(
@@ -159,6 +162,18 @@ def test_an_auto_grid_ends_where_memory_ends(rows_of, monkeypatch, spec_of):
     (row,) = rows_of("accuracy.mean_gap=1e-9")
     assert row["status"] == Status.ACCURACY_NOT_REACHED
     assert row["points"] < 1200
+
+
+def test_a_solve_that_does_not_converge_is_kept_where_memory_ends(monkeypatch, spec_of, tmp_path):
+    """No finer grid follows it, so that a reproducible run needs no memory for one."""
+    spec = spec_of("accuracy.mean_gap=1e-9", "solver.max_steps=1", "surface.cutoff=0.01")
+    (task,) = plan(spec)
+    enough = np.mean([task.bytes_on(points * task.least_points) for points in (1, 2)]) / HEADROOM
+    monkeypatch.setattr("gfmd_cli.study.resources.available_memory", lambda: enough)
+    options = RunOptions(jobs=1, reproducible=True)
+    run_study(spec, SPEC, tmp_path / "study.h5", lambda _: None, options)
+    (row,) = read_rows(tmp_path / "study.h5")
+    assert row["status"] == Status.MAX_STEPS
 
 
 def test_no_grid_is_spent_on_what_has_no_limit(rows_of):

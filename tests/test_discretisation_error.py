@@ -175,6 +175,13 @@ def test_the_stress_at_a_step_is_that_of_a_punch(n, verdict):
     assert estimate(levels, n, stepped=True)["a_r"] == estimate(levels, n)["a_r"]
 
 
+@pytest.mark.parametrize("border", [None, 0.0])
+def test_without_contact_nothing_is_known_at_steps_either(border):
+    levels = [GridValues(points, 0.0, 0.0, 1.0, 0.0, border=border) for points in (64, 128)]
+    for value in estimate(levels, 0.5, stepped=True).values():
+        assert value.verdict == "unknown"
+
+
 def test_full_contact_on_a_coarse_grid_leaves_a_bar_where_finer_grids_have_gaps(tmp_path):
     """Between the points of 24^2 the stress is tensile; far above that pressure it is not."""
     spec = {
@@ -811,6 +818,6 @@ def test_a_second_grid_has_half_the_points_along_both_axes(shape, resolved, has_
         ),
         points=points,
         points_y=points_y,
-        points_y_on=lambda points: points,
+        points_y_on=lambda number: number * points_y // points,
     )
     assert has_coarser_grid(task, points) is has_coarser

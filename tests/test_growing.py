@@ -14,7 +14,7 @@ import pytest
 
 import gfmd_cli
 from gfmd_cli.cli.run import _print_results
-from gfmd_cli.errors import InputError, Interrupted
+from gfmd_cli.errors import InputError, Interrupted, StudyError
 from gfmd_cli.files.locks import locked
 from gfmd_cli.report.page import report
 from gfmd_cli.spec.parse import read_spec
@@ -347,3 +347,17 @@ def test_tasks_without_a_result_are_no_contacts_of_other_specs(run, capsys):
     said = capsys.readouterr().out
     assert "also contains 4 contacts of other specs" in said
     assert "nan" not in said
+
+
+@pytest.mark.parametrize("place", ["fields/0/u", "a_r"])
+def test_a_damaged_study_that_grows_is_named_damaged(run, place):
+    """Its data are read while the new file is written, whose errors are those of a full disk."""
+    path, *_ = run("output.fields=['u']", "surface.seed=0", "elastomer.n=0")
+    with h5py.File(path) as file:
+        data = file[place]
+        offset = data.id.get_chunk_info(0).byte_offset if data.chunks else data.id.get_offset()
+    content = bytearray(path.read_bytes())
+    content[offset + 4] ^= 0xFF
+    path.write_bytes(content)
+    with pytest.raises(StudyError, match=r"grown\.h5: not a readable study, or damaged"):
+        run("surface.seed=1", "elastomer.n=0")

@@ -1,5 +1,6 @@
 """Paired lists: values that go together, instead of all combinations."""
 
+import textwrap
 import tomllib
 
 import jsonschema
@@ -137,3 +138,16 @@ def test_several_scans_make_one_study_with_a_group_of_rows_each(tmp_path, monkey
     assert "path=rough.npy length=10 µm, 32 points a side" in output
     assert "path=smooth.npy length=10 µm, 16 points a side" in output
     assert "scans.h5: 4 converged" in output
+
+
+def test_a_message_tells_combinations_from_tasks():
+    """1500 pairs are 1500 tasks, chosen from 1500^2 combinations."""
+    text = f"""
+        surface = {{kind = "self-affine", cutoff = 0.2, seed = {list(range(1500))}}}
+        elastomer.kind = "half-space"
+        grid.points = 16
+        load.p_star = {[0.001 * i for i in range(1, 1501)]}
+        sweep.paired = ["surface.seed", "load.p_star"]
+    """
+    with pytest.raises(InputError, match=r"2250000 combinations, from which \[sweep\] chooses"):
+        plan(read_tables(tomllib.loads(textwrap.dedent(text))))

@@ -295,22 +295,24 @@ def estimate(
     grids = NestedGrids(ordered[-1], coarse, max(exponent, 0.0))
     fine, _, n = grids
     excess = area_exponent or ExcessExponent(n)
-    if fine.border is not None:
+    is_free, is_rough = fine.border is not None, scales is not None
+    if fine.a_r == 0:
+        return unknown()
+    if is_free:
         has_flat_top = scales is not None and scales.has_steep_flat_top
         estimates = estimate_free(
             grids, between, band_limited=band_limited, has_flat_top=has_flat_top
         )
     elif fine.a_r == 1 and band_limited:
         return full_contact(fine, between)
-    elif fine.a_r == 0 or (fine.a_r == 1 and scales is None):
+    elif fine.a_r == 1 and not is_rough:
         return unknown()
     else:
         estimates = _estimate_periodic(grids, scales, tip)
-    if scales is not None or fine.border is None:
+    if is_rough or not is_free:
         area = _area_of_any_surface(estimates["a_r"], grids, scales, excess, tip)
         estimates = estimates | {"a_r": area}
-    is_rough_or_free = scales is not None or fine.border is not None
-    if tip.dimension == 1 and is_rough_or_free and estimates["u_g"].verdict.has_error:
+    if tip.dimension == 1 and (is_rough or is_free) and estimates["u_g"].verdict.has_error:
         error = _error_of_gaps(fine)
         estimates = estimates | {"u_g": with_independent_error(estimates["u_g"], error)}
     if fine.a_r == 1 and not band_limited:  # the grids agree and have no contact line
@@ -321,7 +323,7 @@ def estimate(
         return estimates | {"sigma_p": border_stress(grids)}
     if tip.is_sharp and tip.dimension == 1 and n > MAX_RIDGE_EXPONENT:
         estimates = estimates | {"a_r": UNKNOWN}
-    is_undecided = fine.a_r > 0 and estimates["sigma_p"].verdict != Verdict.DIVERGES
+    is_undecided = estimates["sigma_p"].verdict != Verdict.DIVERGES
     if is_undecided and tip.stress_order(n) < MIN_STRESS_ORDER and n < DIVERGENT:
         verdict = Verdict.SLOW if tip.stress_order(n) > 0 else Verdict.DIVERGES
         return estimates | {"sigma_p": replace(UNKNOWN, verdict=verdict)}

@@ -105,11 +105,11 @@ def error_bounds(contact: Contact, u: Field, sigma: Field) -> ErrorBounds:
         left_out = sigma[rows] - contact_pressure(obstacle[rows], v, sigma[rows])
         terms = (s * g, s * h, v * (sigma[rows] - p), v * e, violation**2, v, left_out**2)
         sums += [float(term.sum()) for term in terms]
-    product, lifted, twice_energy, mixed, violated, mean, omitted = grid.total(sums) / grid.size
+    s_gap, s_height, twice_energy, u_e, violated, mean, omitted = grid.total(sums) / grid.size
     remainder = _compliance(contact)
-    duality_gap = max(product + 0.5 * remainder, 0.0)
-    reaction = max(twice_energy - 2 * mixed + remainder, 0.0)  # B, as s - p = K u - e
-    centre = (lifted - reaction) / p
+    duality_gap = max(s_gap + 0.5 * remainder, 0.0)
+    reaction = max(twice_energy - 2 * u_e + remainder, 0.0)  # B, as s - p = K u - e
+    centre = (s_height - reaction) / p
     return ErrorBounds(
         duality_gap=duality_gap,
         u_g=abs(mean - centre) + _level_bound(duality_gap, reaction, p),

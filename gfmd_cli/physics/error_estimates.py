@@ -120,8 +120,7 @@ class Estimate:
     @property
     def is_final(self) -> bool:
         """Whether no finer grid gives a smaller error."""
-        is_fixed = self.verdict in (Verdict.BOUND, Verdict.SLOW, Verdict.DIVERGES)
-        return is_fixed and not self.is_too_coarse
+        return self.verdict in (Verdict.BOUND, Verdict.SLOW, Verdict.DIVERGES)
 
 
 UNKNOWN = Estimate(nan, nan, nan, Verdict.UNKNOWN)
@@ -191,11 +190,12 @@ def estimate_by_change(grids: NestedGrids, *, has_flat_top: bool = False) -> dic
 def estimate_free(
     grids: NestedGrids, between: Mapping[str, float], *, band_limited: bool, has_flat_top: bool
 ) -> dict[str, Estimate]:
-    """Estimates with a free boundary; unknown from one grid, except a_r and u_g of full contact."""
+    """Estimates of a contact with a free boundary.
+
+    Unknown from one grid, except a_r and u_g of full contact.
+    """
     fine, coarse, n = grids
     estimates = unknown()
-    if fine.a_r == 0:
-        return estimates
     if coarse is not None and n <= MAX_FREE_EXPONENT:
         estimates = _by_change(grids, FREE_GAP_FACTOR, has_flat_top=has_flat_top)
     if fine.a_r == 1 and band_limited:

@@ -56,13 +56,12 @@ def direction(grid: Grid, axis: int, rows: slice) -> Field:
 
     Also zero where the component is the highest wavenumber of the grid, which has no sign.
     """
+    x = np.arange(*grid.span, dtype=np.float64)
     y = np.fft.fftfreq(grid.points_y, 1 / grid.points_y)[rows, None]
-    wave = (y, np.arange(*grid.span, dtype=np.float64))[axis + 2 - grid.dimension]
+    wave = x[rows] if grid.dimension == 1 else (y, x)[axis]
     points, side = grid.whole_shape[axis], grid.sides[axis]
     q = grid.wavenumber(rows)
     component = np.where(2 * np.abs(wave) < points, wave * (2 * np.pi / side), 0.0)
-    if grid.dimension == 1:
-        component = component[rows]
     return np.divide(component, q, out=np.zeros_like(q), where=q > 0)
 
 

@@ -111,7 +111,8 @@ class _DirectSolve:
         self.evaluate((0, 0), 1.0)
         rows, columns = self.values.shape
         self.compliance = self.values[: rows // 2 + 1, : columns // 2 + 1].copy()
-        """Displacement by a unit stress at the first point: a quarter, as it is even."""
+        """Displacement by a unit stress at the first point; it is even along both axes, and only
+        one quadrant is kept."""
 
     def evaluate(self, points: Points, s: Field | float) -> None:
         """`values` <- C s, without its mean."""
@@ -122,9 +123,11 @@ class _DirectSolve:
         self.transforms += 2
 
     def run(self, largest: int, tolerance: float, pause: Callable[[], None]) -> bool:
-        """Find the points in contact, up to a residual; whether the sets had at most `largest`.
+        """Find the points in contact, up to a residual; false where a direct solve is not possible.
 
-        The displacement stays in `values`, its level above the indenter in `level`.
+        That is so with no point or more than `largest` in contact, and where rounding makes the
+        matrix indefinite. The displacement stays in `values`, its level above the indenter in
+        `level`. If the work ends before the points are found, `solution` is None.
         """
         fewest, work = self.grid.size, MAX_SETS * largest**3
         while work > 0:
@@ -154,7 +157,7 @@ class _DirectSolve:
             del factor
             if self.stress is None and count >= fewest:
                 self.stress = np.zeros(self.touching.shape)
-                self.stress[points] = self.without_tension(t)
+                self.stress[points] = _without_tension(t)
                 self.touching[points] = t > 0
                 continue
             if self.stress is not None:
@@ -173,20 +176,14 @@ class _DirectSolve:
         s = self.stress[points]
         lengths = np.divide(s, s - t, out=np.full_like(s, np.inf), where=t < 0)
         leaving = np.sort(lengths[t < 0])
-        energy, last, target = _energy(factor, s - t), leaving.size, self.without_tension(t)
+        energy, last, target = _energy(factor, s - t), leaving.size, _without_tension(t)
         while last > 0 and _energy(factor, target - t) >= energy:
             last //= 2
             length = leaving[last]
             partly = np.where(lengths == length, 0.0, s + length * (t - s))
-            target = self.without_tension(partly)
+            target = _without_tension(partly)
         self.stress[points] = target
         self.touching[points] = (target > 0) | (t >= 0)
-
-    def without_tension(self, t: Field) -> Field:
-        """The stresses t with zero in place of negative ones, and the same sum."""
-        s = np.maximum(t, 0.0)
-        s *= t.sum() / s.sum()
-        return s
 
     def rounding(self, gap: Field, factor: Field) -> float:
         """Natural residual by rounding: of the gaps in contact and the stresses that close them."""
@@ -267,6 +264,13 @@ def _balanced(factor: Field, h: Field, load: float) -> Field:
     s, by_level = scipy.linalg.cho_solve((factor, False), sides, check_finite=False).T
     for _ in range(2):
         s = s + by_level * ((load - s.sum()) / by_level.sum())
+    return s
+
+
+def _without_tension(t: Field) -> Field:
+    """The stresses t with zero in place of negative ones, and the same sum."""
+    s = np.maximum(t, 0.0)
+    s *= t.sum() / s.sum()
     return s
 
 

@@ -138,7 +138,7 @@ class LocalSolve:
         for count in range(1, MAX_EVALUATIONS + 1):
             self.run(target)
             displacement = self.compliance_everywhere(in_single_precision=in_single_precision)
-            max_tiles = MAX_GROWTH * self.tiles.count
+            max_tiles = MAX_GROWTH * self.tiles.count  # before `evaluate` adds some
             result = self.evaluate(displacement, accepted)
             is_accurate = result.rounding < MAX_ROUNDING * tolerance
             in_single_precision &= is_accurate
@@ -176,8 +176,9 @@ class LocalSolve:
         squares = float(self.grid.rows.sums(1, kernels.mark_entered, *fields)[0])
         if not entered.any():
             return squares
-        used = self.tiles.used | maximum_filter(entered, 3, mode="wrap")
-        tiles = Tiles(used, is_periodic=self.tiles.is_periodic)
+        is_periodic = self.tiles.is_periodic
+        around = maximum_filter(entered, 3, mode="wrap" if is_periodic else "constant")
+        tiles = Tiles(self.tiles.used | around, is_periodic=is_periodic)
         s = np.zeros((tiles.count, SIDE * SIDE))
         s[self.tiles.used[tiles.used]] = self.s
         self.place(tiles, s)

@@ -57,7 +57,7 @@ class Start:
     contact: Contact
     """The contact on this grid."""
     transforms: float
-    """Transforms that it took, in units of transforms on this grid."""
+    """Transforms that it took, in units of transforms on the finest grid of the solve."""
     u: Field
     """Displacement u >= h, and u = h in contact. With a free boundary C sigma."""
     sigma: Field | None = None

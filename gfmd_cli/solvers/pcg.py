@@ -222,12 +222,12 @@ class _Run:
         last_slope, state.slope = state.slope, slope
         if state.moved == 0.0 or slope <= 0.0:
             return 0.0
-        overlap = slope + z_change  # of z with the force f' before the last move
-        # An exact move would have been longer by this factor. Forces change in proportion to it.
-        longer = state.best_length / state.moved
-        exact_overlap = longer * overlap - (longer - 1) * last_slope
-        exact_slope = longer * (longer * slope - (longer - 1) * overlap)
-        exact_slope -= (longer - 1) * exact_overlap
+        overlap = slope + z_change  # z f', with the force f' before the last move
+        # At the lowest point along the last line, which is farther by a factor of r, the force is
+        # f* = f' + r (f - f'), and z* = z' + r (z - z'). Below: z* f' and z* f*, as z' f = z f'.
+        r = state.best_length / state.moved
+        exact_overlap = r * overlap - (r - 1) * last_slope
+        exact_slope = r * (r * slope - (r - 1) * overlap) - (r - 1) * exact_overlap
         may_restart = self.is_soft or state.moved == state.best_length
         if may_restart and abs(exact_overlap) > MAX_OVERLAP * exact_slope:
             return 0.0
@@ -244,7 +244,7 @@ class _Run:
         state, fields = self.state, (self.h, self.u, self.sigma)
         descent, fall, square, stopped = self.update_direction(beta)  # [3]
         if descent <= 0:
-            self.precondition()
+            self.precondition()  # z was overwritten by the projected move
             descent, fall, square, stopped = self.update_direction(0.0)
         fraction, is_moved = 0.0, state.length > 0
         if not is_moved:

@@ -116,7 +116,7 @@ class Check:
                 self.problems.append(f"{self.where(name)}: {_unknown(name, MODELS, 'table')}")
         sweeps = self._sweeps(data)
         tables: dict[str, Any] = {"sweep": sweeps, "places": {}, "source": self.name}
-        for name in [name for name in MODELS if name != "sweep"]:
+        for name in filter(lambda name: name != "sweep", MODELS):
             if name in REQUIRED and name not in data:
                 self.problems.append(f"{self.name}: table [{name}] is missing")
                 continue

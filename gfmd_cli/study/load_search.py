@@ -59,7 +59,6 @@ JUMP = {1: 2, 2: 8}
 """Points that enter contact together on a symmetric surface, by its dimension."""
 JUMPS = 6  # by so many jumps the area should change from the root to a neighbour; a choice
 LARGEST_ERROR = 1.0  # of a pressure, relative, above which it is unknown; a choice
-SOLVED = (Status.CONVERGED, Status.ROUNDING)  # how a solve ends
 
 
 def solve_at_load(task: Task, context: SolveContext, watcher: Watcher) -> TaskSolution:
@@ -109,7 +108,7 @@ def solve_at_load(task: Task, context: SolveContext, watcher: Watcher) -> TaskSo
     _check_known(task, solved)
     if has_error:
         _with_errors_at_load(task, solved, slopes if search.succeeded else _Slopes())
-    if solved.solution.status in SOLVED and not search.succeeded:
+    if solved.solution.status.is_accurate and not search.succeeded:
         solved.solution.status = Status.LOAD_NOT_REACHED
     return solved
 
@@ -173,7 +172,7 @@ class _Solves:
         value = loaded_value(self.task.quantity, row)
         work = solved.solution.transforms * solved.contact.grid.size
         units, observables = _units(solved.scene), dict[str, float]()
-        if solved.solution.status in SOLVED:
+        if solved.solution.status.is_accurate:
             values = row | {LOADS[self.task.quantity].searched: value}
             observables = {name: float(values[name]) * units[name] for name in QUANTITIES}
         is_touching = row["a_r"] > 0

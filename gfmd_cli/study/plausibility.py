@@ -193,7 +193,7 @@ def _unit_of_grid(task: Task, scene: Scene) -> Iterator[str]:
 
 def _load_in_jump(task: Task, status: Status, results: Mapping[str, Any]) -> Iterator[str]:
     """A warning if a contact area is farther than the tolerance from the load."""
-    if task.quantity == "contact_area" and status in (Status.CONVERGED, Status.ROUNDING):
+    if task.quantity == "contact_area" and status.is_accurate:
         value = loaded_value(task.quantity, results)
         if not abs(value - task.load) <= task.load_tolerance * task.load:
             nearest = f"the nearest value found is {value:g}"

@@ -223,6 +223,15 @@ def _check_alike(place: str, datasets: Mapping[str, Any], dimensions: int) -> No
 
 
 @contextmanager
+def damage_named(source: Path) -> Iterator[None]:
+    """Inside, what HDF5 and NumPy raise of a damaged study is a StudyError that names it."""
+    try:
+        yield
+    except DAMAGE as error:
+        raise StudyError(f"{source}: not a readable study, or damaged: {error}") from error
+
+
+@contextmanager
 def open_study(source: Path, opened: BinaryIO | None = None) -> Iterator[StudyFile]:
     """The study file at a path, for reading; of `opened`, where that is the file.
 
@@ -235,12 +244,9 @@ def open_study(source: Path, opened: BinaryIO | None = None) -> Iterator[StudyFi
         )
     if opened is None and not source.exists():
         raise InputError(f"{source}: no such study")
-    try:
-        with open_hdf5(opened or source) as file:
-            _check_layout(source, file)
-            yield StudyFile(file)
-    except DAMAGE as error:
-        raise StudyError(f"{source}: not a readable study, or damaged: {error}") from error
+    with damage_named(source), open_hdf5(opened or source) as file:
+        _check_layout(source, file)
+        yield StudyFile(file)
 
 
 def _check_layout(path: Path, file: Any) -> None:

@@ -111,7 +111,8 @@ def solve_on_grids(task: Task, context: SolveContext, watcher: Watcher) -> TaskS
     """
     sizes = _sizes(task)
     grids = watcher.notes.grids
-    if [grid.points for grid in grids] != sizes[:-1][: len(grids)]:  # the notes are of other sizes
+    are_first = [grid.points for grid in grids] == sizes[: len(grids)]
+    if not are_first or len(grids) == len(sizes):  # the notes are of other sizes
         grids = watcher.notes.grids = []
     solved: TaskSolution | None = None
     for points in sizes[len(grids) :]:
@@ -167,7 +168,7 @@ def has_coarser_grid(task: Task, points: int) -> bool:
     The answer is the same for a map that is turned.
     """
     is_line = task.surface.dimension == 1
-    numbers = (points,) if is_line else (points, points * task.points_y // task.points)
+    numbers = (points,) if is_line else (points, task.points_y_on(points))
     enough = any(n % 4 == 0 and n >= 2 * MIN_FIRST_POINTS for n in numbers)
     least = task.surface.smallest_grid(), task.surface.smallest_grid_y()
     is_resolved = points // 2 >= least[0] and task.points_y_on(points // 2) >= least[1]
@@ -181,6 +182,8 @@ def _continues(task: Task, solved: TaskSolution, grids: int, options: WorkerOpti
     """
     if not task.auto:
         return True
+    if not solved.solution.status.is_converged:
+        return False
     points = solved.contact.grid.points
     inaccurate = [solved.estimates[name] for name in inaccurate_columns(task, solved)]
     improvable = any(_is_improvable(each, grids) for each in inaccurate)
@@ -190,13 +193,13 @@ def _continues(task: Task, solved: TaskSolution, grids: int, options: WorkerOpti
             f"accuracy: needs {2 * points} points along x, more than memory holds now; with "
             f"--reproducible give accuracy.max_points = {points}"
         )
-    return improvable and fits and solved.solution.status.is_converged
+    return improvable and fits
 
 
 def _is_improvable(estimate: Estimate, grids: int) -> bool:
     """Whether a grid finer than the `grids` so far may give a smaller error."""
-    is_settled = estimate.verdict is Verdict.UNKNOWN and grids >= MAX_UNKNOWN_GRIDS
-    return not (estimate.is_final or (is_settled and not estimate.is_too_coarse))
+    is_unknown = estimate.verdict is Verdict.UNKNOWN and not estimate.is_too_coarse
+    return not (estimate.is_final or (is_unknown and grids >= MAX_UNKNOWN_GRIDS))
 
 
 def inaccurate_columns(task: Task, solved: TaskSolution) -> list[str]:

@@ -27,7 +27,7 @@ from gfmd_cli.status import Status
 from gfmd_cli.study import unfinished_work
 from gfmd_cli.study.measure import task_row
 from gfmd_cli.study.provenance import origin
-from gfmd_cli.study.reading import StudyFile, open_study
+from gfmd_cli.study.reading import StudyFile, damage_named, open_study
 from gfmd_cli.study.result import Entry, Outcome, TaskResult
 from gfmd_cli.study.tasks import Task
 from gfmd_cli.study.writing import write_study
@@ -116,12 +116,12 @@ class Study:
             records, damaged = self._sound_records()
             with ExitStack() as stack:
                 old = stack.enter_context(open_study(self.path)) if self.path.exists() else None
-                fresh = stack.enter_context(new_file(self.path, aside=self.parts))
-                file = stack.enter_context(new_hdf5(fresh))
                 attributes = origin(spec, text)
                 attributes[EARLIER] = json.dumps(_earlier_specs(old, text))
-                results = _stored_results(records, old)
+                results = self._stored_results(records, old)
                 entries = _entries(tasks, results)
+                fresh = stack.enter_context(new_file(self.path, aside=self.parts))
+                file = stack.enter_context(new_hdf5(fresh))
                 write_study(file, attributes, entries, lambda i: results[entries[i].task_id][1]())
             for path in records:
                 path.unlink(missing_ok=True)
@@ -207,6 +207,24 @@ class Study:
                 "collected yet; give it back its name and run again"
             )
 
+    def _stored_results(self, records: dict[Path, Entry], old: StudyFile | None) -> _Results:
+        """The solved tasks of the records and of the study so far."""
+        results: _Results = {}
+
+        def result_of(old: StudyFile, index: int) -> TaskResult:
+            with damage_named(self.path):
+                return old.result(index)
+
+        if old is not None:
+            for index, status in enumerate(old.statuses):
+                if status.is_solved:
+                    results[old.task_ids[index]] = old.entry(index), partial(result_of, old, index)
+        for path, entry in records.items():
+            before = results.get(entry.task_id)
+            if before is None or entry.stored >= before[0].stored:
+                results[entry.task_id] = entry, partial(unfinished_work.read_record, path)
+        return results
+
     def _collecting(self) -> Any:
         """Keep other collectors out."""
         return locked(self.parts / "collecting", waits=self._waits)
@@ -239,20 +257,6 @@ def _earlier_specs(old: StudyFile | None, text: str) -> list[str]:
         return []
     texts = [*json.loads(old.attributes[EARLIER]), old.attributes["spec_text"]]
     return [earlier for earlier in dict.fromkeys(texts) if earlier != text]
-
-
-def _stored_results(records: dict[Path, Entry], old: StudyFile | None) -> _Results:
-    """The solved tasks of the records and of the study so far."""
-    results: _Results = {}
-    if old is not None:
-        for index, status in enumerate(old.statuses):
-            if status.is_solved:
-                results[old.task_ids[index]] = old.entry(index), partial(old.result, index)
-    for path, entry in records.items():
-        before = results.get(entry.task_id)
-        if before is None or entry.stored >= before[0].stored:
-            results[entry.task_id] = entry, partial(unfinished_work.read_record, path)
-    return results
 
 
 def _entries(tasks: list[Task], results: _Results) -> list[Entry]:

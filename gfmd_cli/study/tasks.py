@@ -207,7 +207,12 @@ def _file_versions(spec: models.Spec) -> dict[Path, Version]:
 def _check(spec: models.Spec, *, suited: bool) -> None:
     """Raise InputError for too many tasks, an unfit file, or tables that do not suit each other."""
     count = prod(len(getattr(spec, table)) for table in models.SWEPT) * len(spec.load.values())
-    if spec.sweep and count <= MAX_COMBINATIONS:
+    if spec.sweep:
+        if count > MAX_COMBINATIONS:
+            raise InputError(
+                f"the lists have {count} combinations, from which [sweep] chooses; at most "
+                f"{MAX_COMBINATIONS} are examined: split the study into several specs"
+            )
         count = sum(len(loads) for _, loads in spec.combinations())
     if count > MAX_TASKS:
         raise InputError(f"the sweeps make {count} tasks; a study has at most {MAX_TASKS}")
