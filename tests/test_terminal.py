@@ -1,4 +1,5 @@
 import fcntl
+import math
 import os
 import pty
 import struct
@@ -9,6 +10,8 @@ import termios
 import pytest
 from specs import power_spec
 
+from gfmd_cli.cli.progress import Reporter
+from gfmd_cli.study.context import Progress
 from gfmd_cli.study.reading import read_rows
 
 SPEC = power_spec(
@@ -70,3 +73,11 @@ def test_a_bench_shows_its_progress_on_a_terminal(tmp_path):
     status, shown = on_a_terminal(tmp_path, "bench", "spec.toml", *short)
     assert status == 0, shown
     assert "Traceback" not in shown
+
+
+@pytest.mark.parametrize(("a_r", "words"), [(0.25, "3e-05, a_r 0.25"), (math.nan, "3e-05")])
+def test_a_line_of_progress_has_the_area_where_it_is_known(monkeypatch, capsys, a_r, words):
+    """A process that shares a grid with others has a part of the contact only."""
+    monkeypatch.setattr("gfmd_cli.cli.progress.LOG_EVERY", -1.0)
+    Reporter(quiet=False).show(Progress(0, "step", "task", 64, 7, 3e-5, a_r, tasks_left=1))
+    assert capsys.readouterr().err.endswith(f"step 7 (64 points), residual {words}\n")

@@ -68,10 +68,7 @@ class Reporter:
             self.bars[progress.task] = bar
         if progress.event == "step":
             bar.n = progress.step
-            bar.set_postfix_str(
-                f"{progress.points} points, residual {progress.residual:.1e}, "
-                f"a_r {progress.a_r:.4f}"
-            )
+            bar.set_postfix_str(f"{progress.points} points, {_state(progress)}")
 
     def _close(self, task: int | None) -> None:
         bar = self.bars.pop(task, None)
@@ -86,9 +83,15 @@ class Reporter:
         self.last_line = now
         print_error(
             f"{_left(progress)}; task {progress.task} {progress.label}: "
-            f"step {progress.step} ({progress.points} points), residual "
-            f"{progress.residual:.1e}, a_r {progress.a_r:.4g} {progress.status or ''}".strip("; ")
+            f"step {progress.step} ({progress.points} points), {_state(progress)} "
+            f"{progress.status or ''}".strip("; ")
         )
+
+
+def _state(progress: "Progress") -> str:
+    """Residual and, where it is known, contact area."""
+    a_r = f", a_r {progress.a_r:.4g}" if isfinite(progress.a_r) else ""
+    return f"residual {progress.residual:.1e}{a_r}"
 
 
 def _left(progress: "Progress") -> str:

@@ -3,6 +3,7 @@
 import time
 from contextlib import suppress
 from functools import lru_cache, partial
+from math import nan
 from pathlib import Path
 
 from gfmd_cli.errors import GfmdError, InputError, Interrupted, SpaceError, StudyError
@@ -107,8 +108,9 @@ class TaskWatcher(Watcher):
         self.last_save = time.monotonic()
 
     def _report_step(self, contact: Contact, state: State) -> None:
-        grid, task = contact.grid, self.task
-        a_r = float(contact_points(contact.obstacle, state.u, state.sigma).mean())
+        grid, task, a_r = contact.grid, self.task, nan
+        if grid.whole:  # else this process has a part of the contact
+            a_r = float(contact_points(contact.obstacle, state.u, state.sigma).mean())
         numbers = grid.points, state.step, state.residual, a_r
         self.context.report(Progress(task.index, "step", task.label, *numbers, size=grid.size))
 
