@@ -75,7 +75,7 @@ def test_a_bench_shows_its_progress_on_a_terminal(tmp_path):
     assert "Traceback" not in shown
 
 
-@pytest.mark.parametrize(("a_r", "words"), [(0.25, "3e-05, a_r 0.25"), (math.nan, "3e-05")])
+@pytest.mark.parametrize(("a_r", "words"), [(0.25, "3.0e-05, a_r 0.25"), (math.nan, "3.0e-05")])
 def test_a_line_of_progress_has_the_area_where_it_is_known(monkeypatch, capsys, a_r, words):
     """A process that shares a grid with others has a part of the contact only."""
     monkeypatch.setattr("gfmd_cli.cli.progress.LOG_EVERY", -1.0)
