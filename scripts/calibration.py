@@ -429,7 +429,7 @@ def scores(records: list[dict]) -> Iterator[Score]:
                     at_last["exponent"],
                     rough,
                     ExcessExponent(*at_last["area_exponent"]),
-                    band_limited=record["band_limited"],
+                    same_waves=record["band_limited"],
                     stepped=record["stepped"],
                 )
                 for quantity, value in by_name.items():

@@ -157,15 +157,15 @@ def test_full_contact_is_not_exact_where_finer_grids_contain_shorter_waves():
     coarse, fine = (GridValues(points, 1.0, 1 - 1 / points, 0.0, 0.0) for points in (64, 128))
     map_scales = replace(ROUGH, band_limited=False)
     for levels, verdict in (([fine], "unknown"), ([coarse, fine], "regular")):
-        for value in estimate(levels, 1.0, map_scales, band_limited=False).values():
+        for value in estimate(levels, 1.0, map_scales, same_waves=False).values():
             assert value.verdict == verdict
-    stress = estimate([coarse, fine], 1.0, map_scales, band_limited=False)["sigma_p"]
+    stress = estimate([coarse, fine], 1.0, map_scales, same_waves=False)["sigma_p"]
     assert stress.error >= fine.sigma_p - coarse.sigma_p
-    for value in estimate([coarse, fine], 1.0, band_limited=False).values():
+    for value in estimate([coarse, fine], 1.0, same_waves=False).values():
         assert value.verdict == "unknown"
     fine, coarse = replace(fine, border=0.0), replace(coarse, border=0.0)
-    assert estimate([fine], 1.0, band_limited=False)["a_r"].verdict == "unknown"
-    assert estimate([fine], 1.0, band_limited=True)["a_r"].verdict == "exact"
+    assert estimate([fine], 1.0, same_waves=False)["a_r"].verdict == "unknown"
+    assert estimate([fine], 1.0, same_waves=True)["a_r"].verdict == "exact"
 
 
 @pytest.mark.parametrize(("n", "verdict"), [(0.5, "regular"), (0.9, "slow"), (1.0, "diverges")])

@@ -270,10 +270,10 @@ def estimate(
     scales: RoughnessScales | None = None,
     area_exponent: ExcessExponent | None = None,
     *,
-    band_limited: bool = True,
+    same_waves: bool = True,
     stepped: bool = False,
     tip: Tip = SMOOTH_TIP,
-    between: Mapping[str, float] = NO_ERRORS,
+    full_contact_errors: Mapping[str, float] = NO_ERRORS,
 ) -> dict[str, Estimate]:
     """Estimate errors and continuum values of `a_r`, `sigma_p` and `u_g` on the finest grid.
 
@@ -285,10 +285,10 @@ def estimate(
     scales : scales of a rough surface. None for a single indenter: the errors of many
         patches then do not average out, and one grid gives no error of sigma_p and u_g
     area_exponent : exponent of the excess of the area, see `excess_exponent`; by default `exponent`
-    band_limited : whether all grids contain the same waves, so that full contact is exact
+    same_waves : whether all grids contain the same waves, so that full contact is exact
     stepped : whether the surface has vertical steps, where the stress is that of a punch
     tip : of a single indenter
-    between : errors in full contact, of tensile stress between the points, by quantity
+    full_contact_errors : errors in full contact, of tensile stress between the points, by quantity
     """
     ordered = sorted(levels, key=lambda level: level.points)
     coarse = ordered[-2] if len(ordered) > 1 else None
@@ -301,10 +301,10 @@ def estimate(
     if is_free:
         has_flat_top = scales is not None and scales.has_steep_flat_top
         estimates = estimate_free(
-            grids, between, band_limited=band_limited, has_flat_top=has_flat_top
+            grids, full_contact_errors, same_waves=same_waves, has_flat_top=has_flat_top
         )
-    elif fine.a_r == 1 and band_limited:
-        return full_contact(fine, between)
+    elif fine.a_r == 1 and same_waves:
+        return full_contact(fine, full_contact_errors)
     elif fine.a_r == 1 and not is_rough:
         return unknown()
     else:
@@ -315,9 +315,10 @@ def estimate(
     if tip.dimension == 1 and (is_rough or is_free) and estimates["u_g"].verdict.has_error:
         error = _error_of_gaps(fine)
         estimates = estimates | {"u_g": with_independent_error(estimates["u_g"], error)}
-    if fine.a_r == 1 and not band_limited:  # the grids agree and have no contact line
+    if fine.a_r == 1 and not same_waves:  # the grids agree and have no contact line
         estimates = {
-            name: with_independent_error(each, between[name]) for name, each in estimates.items()
+            name: with_independent_error(each, full_contact_errors[name])
+            for name, each in estimates.items()
         }
     if stepped:
         return estimates | {"sigma_p": border_stress(grids)}

@@ -188,7 +188,11 @@ def estimate_by_change(grids: NestedGrids, *, has_flat_top: bool = False) -> dic
 
 
 def estimate_free(
-    grids: NestedGrids, between: Mapping[str, float], *, band_limited: bool, has_flat_top: bool
+    grids: NestedGrids,
+    full_contact_errors: Mapping[str, float],
+    *,
+    same_waves: bool,
+    has_flat_top: bool,
 ) -> dict[str, Estimate]:
     """Estimates of a contact with a free boundary.
 
@@ -198,8 +202,10 @@ def estimate_free(
     estimates = unknown()
     if coarse is not None and n <= MAX_FREE_EXPONENT:
         estimates = _by_change(grids, FREE_GAP_FACTOR, has_flat_top=has_flat_top)
-    if fine.a_r == 1 and band_limited:
-        estimates |= {name: full_contact(fine, between)[name] for name in ("a_r", "u_g")}
+    if fine.a_r == 1 and same_waves:
+        estimates |= {
+            name: full_contact(fine, full_contact_errors)[name] for name in ("a_r", "u_g")
+        }
     if fine.border:
         estimates["sigma_p"] = border_stress(grids)
     return estimates

@@ -269,14 +269,14 @@ def _estimates(task: Task, solved: TaskSolution, grids: list[SolvedGrid]) -> dic
         exponent,
         scales_of(scene, task.surface.band_limited) if is_rough else None,
         area_exponent,
-        band_limited=task.surface.band_limited and not has_hidden_waves,
+        same_waves=task.surface.band_limited and not has_hidden_waves,
         stepped=task.surface.stepped,
         tip=discretisation_error.Tip(task.surface.tip_exponent, scene.grid.dimension),
-        between=_between_points(task, solved),
+        full_contact_errors=_full_contact_errors(task, solved),
     )
 
 
-def _between_points(task: Task, solved: TaskSolution) -> dict[str, float]:
+def _full_contact_errors(task: Task, solved: TaskSolution) -> dict[str, float]:
     """Errors in full contact, of tensile stress between the points of the grid; zero otherwise."""
     scene, sigma = solved.scene, solved.solution.sigma
     variance = scene.shells.variance
