@@ -148,10 +148,11 @@ def _local_start(
 def _direct_solution(
     contact: Contact, solver: Solver, state: State, residual: float, watch: Watch
 ) -> State | None:
-    """The state, if it was solved directly; or a direct solution, where rounding of u requires one.
+    """The state of a direct solution, or None if an iteration has to follow.
 
-    That is where an iteration, whose stress is K u + p, cannot reach its tolerance. None elsewhere,
-    where too many points are in contact, and where the iteration can reach a smaller residual.
+    A state that was solved directly is taken as it is. Otherwise a direct solve is tried where the
+    rounding of u keeps an iteration, whose stress is K u + p, from its tolerance. A solution is
+    refused where its residual is above both the tolerance and this rounding.
 
     Parameters
     ----------

@@ -258,7 +258,7 @@ class _Run:
             if fall > 0 and is_finite:
                 best = float(fall) / curvature if curvature > 0 else 1.0  # 1: a rigid shift
                 choice = self.choose_move(best, stopped > 0)
-                fraction = choice.fraction
+                fraction, state.length = choice.fraction, length * choice.factor
                 restart = choice.restart or curvature <= 0
                 state.moved = 0.0 if restart else fraction * length
                 state.best_length, state.curvature = best * length, curvature / length / length
@@ -281,11 +281,8 @@ class _Run:
 
     def choose_move(self, best: float, stopped: bool) -> MoveChoice:
         """How much of a move to take if the energy is lowest at the fraction `best`."""
-        state = self.state
-        exact = not stopped and (best <= 1 or not self.crosses(best * state.length))
-        choice = choose(best, exact)
-        state.length *= choice.factor
-        return choice
+        exact = not stopped and (best <= 1 or not self.crosses(best * self.state.length))
+        return choose(best, exact)
 
     def crosses(self, length: float) -> bool:
         """Whether the indenter would stop a move of this length at some point."""

@@ -42,11 +42,12 @@ class TaskWatcher(Watcher):
         self._warn = partial(context.warn, task=task.index, label=task.label)
         self.begun = self.last_save = time.monotonic()
         self.last_report = 0.0
-        self.first: tuple[Shape, int] | None = None
+        self.first_state: tuple[Shape, int] | None = None
         """Grid and step of the first state of this call."""
-        self.short = False
+        self.stops_early = False
         """Whether the stop was requested before a new state was reached."""
-        self.resumed = False
+        self.has_loaded = False
+        """Whether the saved state was asked for."""
         self.unsaved = False
         """Whether a state could not be saved and the user was warned."""
         if (message := checkpoint.restore()) is not None:
@@ -55,9 +56,9 @@ class TaskWatcher(Watcher):
 
     def saved_state(self, contact: Contact) -> Resume | None:
         """At the first call, the state of this contact that an earlier run saved."""
-        resumed, self.resumed = self.resumed, True
-        if resumed:
+        if self.has_loaded:
             return None
+        self.has_loaded = True
         try:
             return self.checkpoint.load(contact.grid, self.task.solver.for_contact(contact))
         except StudyError:
@@ -72,7 +73,7 @@ class TaskWatcher(Watcher):
             self._report_step(contact, state)
         if self.context.ranks is not None and contact.grid.whole:
             return  # a small grid, which each process solves on its own
-        self.first = self.first or (contact.grid.whole_shape, state.step)
+        self.first_state = self.first_state or (contact.grid.whole_shape, state.step)
         request = SAVE if now - self.last_save > self.context.options.checkpoint_every else 0.0
         if self.context.stop.is_set():
             request = STOP
@@ -85,11 +86,11 @@ class TaskWatcher(Watcher):
     def _stop(self, contact: Contact, state: State) -> None:
         """Save the state and raise Interrupted, unless it is the first one of this call."""
         self.context.stop.set()
-        if self.first == (contact.grid.whole_shape, state.step):
-            self.short = True  # else calls with too little time would never get further
+        if self.first_state == (contact.grid.whole_shape, state.step):
+            self.stops_early = True  # else calls with too little time would never get further
             return
         self.checkpoint.save(contact, state, self.notes)
-        if self.short:
+        if self.stops_early:
             seconds = duration(max(1.0, time.monotonic() - self.begun))
             self._warn(
                 f"{self.task.label}: stopped after its first step, which took {seconds}; a shorter "
