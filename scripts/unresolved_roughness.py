@@ -5,18 +5,18 @@
 Self-affine surfaces on an elastomer k = q^n, whose shortest waves have half the shortest wavelength
 that the map resolves (one halving) or a quarter of it (two). The map has the waves of two points
 and more ("sharp"), the means over its pixels, or the heights at its points ("sampled"). Others have
-four points in this wavelength, but a microscope has blurred them, which halves such waves: by a
-Gaussian filter ("gaussian"), or as a lens in incoherent light without aberrations does
-("diffraction"); they are solved with this `surface.lateral_resolution`. All contacts are solved on
-the same grid, the map interpolated as the program chooses, at the pressure that is a given p* for
-the true surface. Printed are the mean over seeds of `short_wave_factor`, of the ratio of
-Delta_sigma and, for each p*, of the ratios of contact area and mean gap, of the map to the true
-surface; in brackets the standard deviation in the last digits.
+four points in this wavelength, of which a microscope shows half the amplitude: by a Gaussian filter
+("gaussian"), or as a lens in incoherent light without aberrations does ("diffraction"); they are
+solved with this `surface.lateral_period_limit`. All contacts are solved on the same grid, the map
+interpolated as the program chooses, at the pressure that is a given p* for the true surface.
+Printed are the mean over seeds of `short_wave_factor`, of the ratio of Delta_sigma and, for each
+p*, of the ratios of contact area and mean gap, of the map to the true surface; in brackets the
+standard deviation in the last digits.
 
     python scripts/unresolved_roughness.py --leakage
 
-The largest factors by which waves below the resolution increase the rms gradient of blurred maps
-without noise.
+The largest factors by which waves below the lateral period limit increase the rms gradient of
+blurred maps without noise.
 
     python scripts/unresolved_roughness.py --scans FOLDER
 
@@ -70,9 +70,9 @@ def sampled(heights: Field, points: int) -> Field:
 
 
 def gaussian(heights: Field, points: int, in_wave: int = BLURRED) -> Field:
-    """The map of a microscope that halves waves of 2 / points of the side, by a Gaussian filter.
+    """The map of a microscope that shows half the amplitude of some waves, by a Gaussian filter.
 
-    It has `in_wave` points in such a wave.
+    They are 2 / points of the side long, and have `in_wave` points in the map.
     """
     spacing = (1 / len(heights),) * 2
     filtered = gaussian_filter(heights, spacing, 2 / points, periodic=True)
@@ -121,7 +121,7 @@ def ratios(of_map: Sequence[Result], true: Sequence[Result]) -> list[float]:
 
 def leakage() -> None:
     """Print the factors of blurred maps of 256 points a side, whole and cut, over four seeds."""
-    print("H, map, points in the resolution: largest factor")
+    print("H, map, points in the lateral period limit: largest factor")
     for hurst, blur, in_wave in product(HURST, (gaussian, diffraction), (4, 8, 16)):
         factors = []
         for seed in range(4):
@@ -148,8 +148,8 @@ def random_surfaces(n: float, points: int, hurst: float, seeds: int, maps: Seque
         true = contacts(heights, spec, loads)
         for name, halvings in product(maps, HALVINGS):
             seen = MAPS[name](heights, round(2 / SHORTEST) >> halvings)
-            resolution = {"length": 1.0, "lateral_resolution": SHORTEST * 2**halvings}
-            row = ratios(contacts(seen, spec | {"surface": resolution}, loads), true)
+            keys = {"length": 1.0, "lateral_period_limit": SHORTEST * 2**halvings}
+            row = ratios(contacts(seen, spec | {"surface": keys}, loads), true)
             rows.setdefault((name, halvings), []).append(row)
     for (name, halvings), values in rows.items():
         mean, deviation = np.mean(values, axis=0), np.std(values, axis=0)

@@ -58,7 +58,7 @@ class SurfaceSummary:
 
     def warnings(self) -> list[str]:
         """Probable mistakes, and whether a map resolves its roughness."""
-        about_waves = unresolved(self.short_wave_factor, self.surface.resolution())
+        about_waves = unresolved(self.short_wave_factor, self.surface.period_limit())
         warnings = [*self.surface.warnings(), about_waves]
         return list(filter(None, warnings))
 

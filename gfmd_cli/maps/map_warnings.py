@@ -138,22 +138,30 @@ def unlikely_gradient(heights: Field, spacing: tuple[float, ...]) -> str:
     )
 
 
-def unresolved(factor: float, resolution: float = 0.0) -> str:
+def unresolved(factor: float, period_limit: float = 0.0) -> str:
     """Roughness with shorter waves than the map has; from `surface_spectrum.short_wave_factor`.
 
-    `resolution` is the shortest wavelength that the map resolves [m], 0 for two points.
+    `period_limit` is the lateral period limit of the microscope, or the length of two points if
+    that is longer [m]; 0 if it is not known.
     """
     if not factor > MAX_SHORT_WAVE_FACTOR:
         return ""
     waves, limit = "2 to 4 points of the map", "the pixels"
-    if resolution > 0:
-        limit, longest = (labelled(length, "m") for length in (resolution, 2 * resolution))
-        waves = f"{limit} to {longest} (surface.lateral_resolution)"
+    consequence = (
+        "the next halving of its shortest wavelength divides the contact area at light load by "
+        "roughly this factor"
+    )
+    if period_limit > 0:
+        limit, longest = (labelled(length, "m") for length in (period_limit, 2 * period_limit))
+        waves = f"{limit} (surface.lateral_period_limit, at least two points) to {longest}"
+        consequence = (
+            "the contact area at light load is probably too large by more than this factor, as the "
+            "microscope also damps these waves"
+        )
     return (
         f"the waves of {waves} increase Delta_sigma, the rms stress in full contact, by a factor "
         f"of {factor:.2f}: unless this is noise, the roughness probably continues below {limit}. "
-        "If it does, the next halving of its shortest wavelength divides the contact area at light "
-        "load by roughly this factor. Error bars do not include this"
+        f"If it does, {consequence}. Error bars do not include this"
     )
 
 

@@ -24,8 +24,9 @@ FILTERED_POINTS = {1: 2**18, 2: 512}
 HALVINGS = 12  # of the interval of cut-offs; a choice: two digits of them are stated
 MAX_EXCESS = 10  # larger ratios are not stated: the gradient without noise is uncertain; a choice
 MIN_BEYOND = 1.25
-"""Rms gradient over that of the waves that are resolved. A microscope does not remove the waves
-below its resolution: up to 1.23 without noise (scripts/unresolved_roughness.py --leakage)."""
+"""Rms gradient over that of the waves that are resolved. A microscope damps shorter waves, but does
+not remove them: up to 1.23 without noise, if their shortest length has 16 points or fewer and the
+roll-off is four times as long or more (scripts/unresolved_roughness.py --leakage)."""
 MIN_EXCESS = 1.1  # rms gradient over that without noise; sound maps have up to 1.06
 
 
@@ -86,30 +87,31 @@ def noisy(
 
 
 def noise_beyond(
-    resolution: float, topography: Topography, spacing: tuple[float, ...], cutoff: float = 0.0
+    period_limit: float, topography: Topography, spacing: tuple[float, ...], cutoff: float = 0.0
 ) -> str:
-    """A warning of waves that the microscope does not resolve, "" without it.
+    """A warning of strong waves that the microscope does not resolve, "" without it.
 
     Parameters
     ----------
-    resolution : shortest wavelength that the microscope resolves [m], 0 if it is not known
+    period_limit : lateral period limit of the microscope [m], 0 if it is not known
     topography : the map
     spacing : its spacing [m]
     cutoff : cut-off wavelength of the S-filter [m]; 0 without it
     """
-    if resolution <= 2 * max(spacing):
+    if period_limit <= 2 * max(spacing):
         return ""
     gradient = _Gradient(topography.with_gaps(), spacing)
-    excess = 1 / np.sqrt(1 - gradient.beyond(resolution, cutoff))
+    excess = 1 / np.sqrt(1 - gradient.beyond(period_limit, cutoff))
     if not excess > MIN_BEYOND:
         return ""
-    shortest = max(resolution, MIN_SPACINGS * min(spacing))
+    shortest = ROUNDED_UP * max(period_limit, MIN_SPACINGS * min(spacing))
     return (
-        f"waves shorter than surface.lateral_resolution = {labelled(resolution, 'm')} increase the "
-        f"rms gradient by a factor of {excess:.2g}. The microscope does not resolve such waves: "
-        "they are noise, or the resolution is finer. If they are noise, the contact area at light "
-        "load is too small by up to this factor: average several scans, or filter the map: "
-        f"surface.s_filter = {shortest:.2g} or more"
+        "waves shorter than surface.lateral_period_limit = "
+        f"{labelled(period_limit, 'm')} increase the rms gradient by a factor of {excess:.2g}, "
+        "more than those of a blurred map without noise: they are noise, or this length is too "
+        "large. If they are noise, the contact area at light load is too small by up to this "
+        f"factor: average several scans, or filter the map: surface.s_filter = {shortest:.2g} or "
+        "more"
     )
 
 

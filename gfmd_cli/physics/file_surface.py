@@ -83,12 +83,13 @@ class FileSurface(RigidSurface):
     for scans and with surface.periodic = false, otherwise "none"."""
     s_filter: Positive | None = None
     """Cut-off wavelength of the S-filter [m], a Gaussian low-pass filter (ISO 16610-61) against
-    noise: it halves waves of this wavelength and damps shorter ones more. By default no filter."""
-    lateral_resolution: Positive | None = None
-    """Shortest wavelength that the microscope resolves [m] (ISO 25178-600: the lateral period
-    limit, at which it halves the amplitude). The program then warns of roughness that the map does
-    not resolve and of shorter waves, which are noise. By default the length of two points. The
-    heights are not changed."""
+    noise: it halves the amplitude of waves of this length and damps shorter ones more. By default
+    no filter."""
+    lateral_period_limit: Positive | None = None
+    """Wavelength [m] at which the microscope shows half of the amplitude (ISO 25178-600; not the
+    Rayleigh distance), at least that of two points. The program then warns of roughness that the
+    map does not resolve, and of strong shorter waves, which are probably noise. By default that of
+    two points, without the second warning. The heights are not changed."""
     tip_radius: Positive | None = None
     """Radius of the tip that scanned the map [m]; the program then warns of structures that the tip
     has blunted. By default it warns only if many peaks have one curvature that almost none exceeds.
@@ -205,7 +206,7 @@ class FileSurface(RigidSurface):
             "edges": self.edges or "none",
             "periodic": self._is_periodic(),
             "interpolation": self.applied_interpolation(),
-            "lateral_resolution": self.resolution() or None,
+            "lateral_period_limit": self.period_limit() or None,
         }
 
     @property
@@ -339,11 +340,14 @@ class FileSurface(RigidSurface):
             return None
         return TaperedMap.model_construct(**dict(self) | {"edges": "window"})
 
-    def resolution(self) -> float:
-        """Shortest wavelength that the map resolves [m]; 0 where the spec gives no resolution."""
-        if self.lateral_resolution is None:
+    def period_limit(self) -> float:
+        """Shortest wavelength that the map resolves [m]; 0 where the spec does not say it.
+
+        Two points or more.
+        """
+        if self.lateral_period_limit is None:
             return 0.0
-        return max(self.lateral_resolution, 2 * max(self._map_spacing()))
+        return max(self.lateral_period_limit, 2 * max(self._map_spacing()))
 
     def void(self, grid: Grid) -> Mask | None:
         """Points of a grid nearest to a missing height of the map, if these never touch."""
@@ -476,14 +480,14 @@ def _filtered(surface: FileSurface) -> Field:
     """The heights [m], levelled, filled in and filtered, before their edges are changed.
 
     Cached, because the spectrum needs them, too. Raises InputError for a cut-off wavelength that
-    the map does not resolve or contain, and for a resolution of which it has no two wavelengths.
+    the map does not resolve or contain, and for a lateral period limit of more than half its side.
     """
     heights, cutoff, spacing = _filled(surface), surface.s_filter, surface._map_spacing()
     longest = min(n * step for n, step in zip(heights.shape, spacing, strict=True))
-    resolution = surface.lateral_resolution
-    if resolution is not None and resolution > longest / 2:
+    limit = surface.lateral_period_limit
+    if limit is not None and limit > longest / 2:
         raise InputError(
-            f"{surface.path}: surface.lateral_resolution = {resolution:g} m: the shortest "
+            f"{surface.path}: surface.lateral_period_limit = {limit:g} m: the shortest "
             f"wavelength that the microscope resolves must be at most half the shorter side of the "
             f"map, {longest / 2:.3g} m"
         )
@@ -533,8 +537,8 @@ def _warnings_on_heights(surface: FileSurface) -> tuple[str, ...]:
     rounded = map_warnings.rounded(topography, scale)
     rounded_trend = map_warnings.rounded_trend(topography, levelled, scale)
     cutoff, is_flipped = surface.s_filter or 0.0, surface.flip
-    noise = noise_beyond(surface.resolution(), known, spacing, cutoff)
     tip = blunted(known, spacing, scale, surface.tip_radius, cutoff=cutoff, flipped=is_flipped)
+    unresolved_noise = noise_beyond(surface.period_limit(), known, spacing, cutoff)
     is_explained = any((outliers, misread_map, points, lines, rounded, rounded_trend))
     return (
         filled_lines,
@@ -542,7 +546,7 @@ def _warnings_on_heights(surface: FileSurface) -> tuple[str, ...]:
         misread_map,
         points,
         lines,
-        noise or ("" if is_explained else noisy(known, spacing, scale, cutoff)),
+        "" if is_explained else unresolved_noise or noisy(known, spacing, scale, cutoff),
         "" if misread_map else tip,
         map_warnings.curved(levelled),
         map_warnings.steep(surface.levelling(), subtracted, sides),

@@ -217,8 +217,8 @@ class RigidSurface(SpecTable):
         """A map that is not periodic, tapered for its spectrum; None for other surfaces."""
         return None
 
-    def resolution(self) -> float:
-        """Shortest wavelength that a map resolves [m]; 0 where the spec gives no resolution."""
+    def period_limit(self) -> float:
+        """Shortest wavelength that a map resolves [m]; 0 where the spec does not say it."""
         return 0.0
 
     def void(self, grid: Grid) -> Mask | None:

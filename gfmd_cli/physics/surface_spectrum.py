@@ -89,7 +89,7 @@ def map_spectrum(surface: RigidSurface) -> Spectrum | None:
 def short_wave_factor(surface: RigidSurface, elastomer: LinearElastomer) -> float:
     """Factor by which the shortest waves of a map increase Delta_sigma, Eq. (23).
 
-    These are the waves from two points or, if it is longer, the lateral resolution to twice this
+    These are the waves from two points or, if it is longer, the lateral period limit to twice this
     length; shorter ones are left out. 1 if the map has no such waves; NaN if it has no longer ones,
     and for any other surface. A map with borders is tapered.
     """
@@ -101,7 +101,7 @@ def short_wave_factor(surface: RigidSurface, elastomer: LinearElastomer) -> floa
     steps = [side / n for side, n in zip(used.sides[::-1], heights.shape[::-1], strict=False)]
     x = 2 * pi * np.fft.rfftfreq(heights.shape[1], steps[0])
     y = 2 * pi * np.fft.fftfreq(heights.shape[0], steps[-1])[:, None]
-    shortest = surface.resolution() or 2 * max(steps)
+    shortest = surface.period_limit() or 2 * max(steps)
     ends = np.array([1.0, 0.5]) * (1 + ROUNDING) * 2 * pi / shortest
     sums = np.zeros(2)
     for block in row_blocks(modes):

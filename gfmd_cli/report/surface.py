@@ -37,7 +37,7 @@ def measured_surface(data: ReportData) -> Section:
     notes: list[str] = []
     for row in rows:
         notes.append(str(row["preparation"]))
-        if note := unresolved(row["short_wave_factor"], row.get("lateral_resolution", 0.0)):
+        if note := unresolved(row["short_wave_factor"], row.get("lateral_period_limit", 0.0)):
             notes.append(f"Resolution: {note}.")
     return Section("Measured surface", notes=notes, drawings=drawings)
 

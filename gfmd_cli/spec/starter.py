@@ -80,7 +80,7 @@ def starter_of_scan(
     _checked(finished, path, overrides)
     warnings = [
         *warnings,
-        unresolved(short_wave_factor(used, spec.elastomer[0]), used.resolution()),
+        unresolved(short_wave_factor(used, spec.elastomer[0]), used.period_limit()),
     ]
     return finished, used.preparation(grid.boundary), list(filter(None, warnings))
 

@@ -112,7 +112,7 @@ DETAILS = (
     Column("filled_load", "fraction of the load there; NaN if no height was filled in"),
     Column(
         "short_wave_factor",
-        "factor by which the shortest waves that a map resolves (2 points or lateral_resolution) "
+        "factor by which the shortest waves that a map resolves (2 points or lateral_period_limit) "
         "and those of up to twice this length increase Delta_sigma; NaN for other surfaces",
     ),
     *(observable.column for observable in OBSERVABLES),

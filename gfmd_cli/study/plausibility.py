@@ -91,7 +91,7 @@ def warnings_of(task: Task, solved: TaskSolution, results: Mapping[str, Any]) ->
             "missing and were filled in (see the columns filled_contact and filled_load): if the "
             "highest points lack a height, contact area, stress and gap are uncertain"
         )
-    about_waves = unresolved(results["short_wave_factor"], task.surface.resolution())
+    about_waves = unresolved(results["short_wave_factor"], task.surface.period_limit())
     if task.accuracy is not None and about_waves:
         yield about_waves
     if scene.has_voids and solved.observables.u_g < 0:

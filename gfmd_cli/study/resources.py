@@ -43,7 +43,7 @@ def _granted(name: str) -> int:
 def available_memory() -> float:
     """Bytes that this process may take: the least of kernel, `ulimit -v`, cgroups and Slurm.
 
-    macOS does not tell how much of its memory is free: there it is all that the machine has.
+    The free memory is known on Linux only; elsewhere it is all that the machine has.
     """
     cgroups = _cgroup_limits(Path("/proc/self/cgroup"), Path("/sys/fs/cgroup"))
     machine = float(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
