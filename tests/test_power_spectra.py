@@ -97,6 +97,21 @@ def test_a_bump_is_correlated_as_a_wider_one():
     assert r[0] == 0.0
 
 
+@pytest.mark.parametrize("is_periodic", [True, False])
+@pytest.mark.parametrize("length", [1.0, 0.03563018112166582, 7.0])
+def test_rings_of_oblong_pixels_begin_at_no_displacement(is_periodic, length):
+    """With pixels of 2:1, displacements lie half-way between rings, up to rounding."""
+    grid = Grid(31, length=length, points_y=32, length_y=0.5 * length / 31 * 32)
+    field = np.random.default_rng(2).standard_normal(grid.shape)
+    r, values = autocorrelations(grid, {"f": field}, periodic=is_periodic)
+    assert r[0] == 0.0
+    assert values["f"][0] == 1.0
+    doubled = Grid(31, length=2.0, points_y=32, length_y=32 / 31)
+    r_doubled, expected = autocorrelations(doubled, {"f": field}, periodic=is_periodic)
+    np.testing.assert_allclose(r / length, r_doubled / 2.0, rtol=1e-12)
+    np.testing.assert_allclose(values["f"], expected["f"], atol=1e-12)
+
+
 def test_a_constant_field_has_no_correlation():
     grid = Grid(16)
     _, values = autocorrelations(grid, {"f": np.zeros(grid.shape)})

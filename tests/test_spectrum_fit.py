@@ -201,6 +201,17 @@ def test_the_fit_of_a_surface_that_a_round_tip_has_scanned(seed, tmp_path):
     assert np.isfinite(fitted.hurst_of_long_waves)
 
 
+def test_waves_at_the_ends_of_a_fit_count_whatever_the_unit_of_length():
+    """Their wavenumbers are q_1 times whole numbers, up to rounding, as the limits are."""
+    heights = gaussian_roughness(np.random.default_rng(2), 32, 0.7, 3.0, 12.0)
+    m, power, modes = radial_power(Grid(32), heights)
+    hursts = []
+    for length in np.geomspace(1.0, 10.0, 8):
+        q = 2 * np.pi * m / length
+        hursts.append(fit(shells(q, power, q, q, modes), np.pi * 32 / length).hurst)
+    assert hursts == pytest.approx(np.full(8, hursts[0]), abs=1e-5)
+
+
 def test_moments_are_those_of_the_heights():
     """Against derivatives taken in Fourier space by NumPy."""
     surface = SelfAffine(cutoff=0.05, length=3.0)

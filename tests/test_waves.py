@@ -89,6 +89,17 @@ def test_tiles_are_counted_and_copies_that_differ_are_found(cutoff):
         assert nearly.repetitions == pytest.approx(equal.tiles * equal.repetitions, rel=1e-3)
 
 
+@pytest.mark.parametrize("length_y", [0.3, 0.75, 1.7, 3.0])
+def test_a_turned_cell_resembles_as_many_copies(length_y):
+    heights = np.tile(_random(0), (1, 2))
+    heights += heights.std() * np.random.default_rng(1).normal(size=heights.shape)
+    points_y, points = heights.shape
+    grid = Grid(points, points_y=points_y, length_y=length_y)
+    turned = Grid(points_y, points_y=points, length=length_y, length_y=1.0)
+    expected = texture(grid, heights).repetitions
+    assert texture(turned, np.rot90(heights)).repetitions == pytest.approx(expected, rel=1e-9)
+
+
 @pytest.mark.parametrize("points", [64, 65])
 def test_copies_of_a_line_are_counted(points):
     m = np.arange(points // 2 + 1)

@@ -17,6 +17,8 @@ from gfmd_cli.physics.free_contact import doubled_grid
 from gfmd_cli.physics.persson import bin_edges
 from gfmd_cli.physics.waves import radial_power
 
+ROUNDING = 1e-9  # of distances, in spacings
+
 
 def spectra(grid: Grid, fields: Mapping[str, Field]) -> tuple[Field, Field, dict[str, Field]]:
     """Sum |f(q)|^2 over the shells of all waves of the grid except q = 0.
@@ -45,15 +47,17 @@ def autocorrelations(
     """Autocorrelation C(r) / C(0), C(r) = <(f(x) - <f>)(f(x + r) - <f>)>, averaged over rings.
 
     The rings are one grid spacing wide, the wider of those along x and y, with radii of 0, 1, ...
-    spacings up to half the shorter side. Returns the mean distance r of each ring [m] and the mean
-    C(r) / C(0) by name of the field (NaN for a constant field), all of shape (rings,). Fields that
-    are not periodic have the mean over the pairs of points of the grid at each displacement.
+    spacings up to half the shorter side. A displacement half-way between two rings belongs to the
+    outer one, so that with pixels of 2:1 the first ring contains the displacement 0 alone. Returns
+    the mean distance r of each ring [m] and the mean C(r) / C(0) by name of the field (NaN for a
+    constant field), all of shape (rings,). Fields that are not periodic have the mean over the
+    pairs of points of the grid at each displacement.
     """
     step = max(grid.spacings)
     cell = grid if periodic else doubled_grid(grid)
     distance = distances(cell.whole_shape, (spacing / step for spacing in cell.spacings))
-    rings = int(0.5 * min(grid.sides) / step * (1 + 1e-12)) + 1
-    ring = np.rint(distance).astype(np.int64).ravel()
+    rings = int(0.5 * min(grid.sides) / step + ROUNDING) + 1
+    ring = (distance + 0.5 + ROUNDING).astype(np.int64).ravel()  # half rounds up
     count = np.bincount(ring)
 
     def mean(values: Field) -> Field:

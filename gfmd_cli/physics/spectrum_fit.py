@@ -31,7 +31,7 @@ SEARCH_ERROR = 2e-6
 On 200 surfaces of random phases, of which the fit is exact, the largest errors were 1.5e-6 and
 2.2e-6, their root mean squares half of them: `scripts/spectrum_fits.py --search --hurst 0.2 0.3 0.5
 0.8 1.0`."""
-ROUNDING_FACTOR = 1 - 1e-9  # factor by which sums may be too small due to rounding
+ROUNDING_FACTOR = 1 - 1e-9  # by which sums and wavenumbers may be too small due to rounding
 LONG_WAVES = 0.5  # of the highest wavenumber of the fit: range of a second fit
 MIN_CHANGE = 0.01  # of H between both fits; a choice: a surface of random phases has tiny errors
 MAX_CHANGE = 4.0
@@ -129,7 +129,7 @@ def fit(shells: Shells, complete: float = inf) -> SelfAffineFit:
     q, square = shells.q, shells.height * shells.q**2
     counts = _isotropic(q, shells.modes, complete)
     first = np.searchsorted(np.cumsum(square), FIRST_SHARE * square.sum()) + 1
-    range_ = max(int(first), int(np.searchsorted(q, FIRST_RANGE * q[0])))
+    range_ = max(int(first), _below(q, FIRST_RANGE * q[0]))
     best, cut_off = _fit_below(shells, range_, counts)
     while cut_off > range_ + 1:
         further = (range_ + cut_off + 1) // 2
@@ -150,7 +150,7 @@ def _with_change(
 ) -> SelfAffineFit:
     """The fit with the H of the waves up to `highest`, if this differs significantly."""
     try:
-        part = int(np.searchsorted(shells.q, highest + BLUR * shells.q[0], side="right"))
+        part = _up_to(shells.q, highest + BLUR * shells.q[0])
         longer, _ = _fit_below(shells, part, counts)
     except InputError:  # too few waves
         return best
@@ -168,7 +168,7 @@ def _fit_below(shells: Shells, range_: int, counts: Field) -> tuple[SelfAffineFi
     `counts` are the numbers of modes of a surface whose spectrum depends on |q| alone.
     """
     q, power = shells.q, shells.height / shells.modes  # C(q) [m^2]
-    used = int(np.searchsorted(q, q[range_ - 1] - BLUR * q[0], side="right"))
+    used = _up_to(q, q[range_ - 1] - BLUR * q[0])
     if used < MIN_SHELLS or q[used - 1] < MIN_RANGE * q[0]:
         raise InputError(f"{_range(q, range_)}: too narrow for a fit")
     fitted = (q[:used], shells.modes[:used], power[:used])
@@ -192,6 +192,16 @@ def _fit_below(shells: Shells, range_: int, counts: Field) -> tuple[SelfAffineFi
         rms_height=float(np.sqrt(squares[:cut_off].sum())),
     )
     return nearest, cut_off
+
+
+def _below(q: Field, limit: float) -> int:
+    """Number of shells below a wavenumber, which may itself be that of a shell."""
+    return int(np.searchsorted(q, limit * ROUNDING_FACTOR))
+
+
+def _up_to(q: Field, limit: float) -> int:
+    """Number of shells up to a wavenumber, which may itself be that of a shell."""
+    return int(np.searchsorted(q, limit / ROUNDING_FACTOR))
 
 
 def _range(q: Field, shells: int) -> str:
@@ -280,7 +290,7 @@ def _isotropic(q: Field, count: Field, complete: float) -> Field:
     Modes have a constant number per area of the plane of q. Beyond `complete` a shell has this
     number times the area of the ring up to the middles between it and its neighbours.
     """
-    beyond = q > complete
+    beyond = np.arange(q.size) >= _up_to(q, complete)
     if not beyond.any() or beyond[:2].any():
         return count
     edges = np.concatenate([[0.0], 0.5 * (q[1:] + q[:-1]), [q[-1]]])

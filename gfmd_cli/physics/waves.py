@@ -127,15 +127,17 @@ def _concentration(grid: Grid, power: Field) -> float:
 
     The slopes of copies are spread over fewer waves: over every m-th along each axis. The number of
     waves is (sum s)^2 / sum s^2, with the power s of the slope of a wave. It is compared with the
-    number that the same power would have if it were the same for all waves of a half octave.
+    number that the same power would have if it were the same for all waves of a half octave. Half
+    octaves count from the root of the area of the cell, which a turned cell has, too.
     """
     m, power, count = _by_wavenumber(grid, power)
+    m *= sqrt(grid.length_y / grid.length)
     slopes = power * m**2
     half_octave = np.rint(2 * np.log2(m)).astype(np.int64)
     first = int(half_octave.min())
     sums = np.bincount(half_octave - first, slopes)
     edges = 2.0 ** (0.5 * (np.arange(sums.size + 1) + first) - 0.25)
-    waves = np.pi * np.diff(edges**2) * (grid.length_y / grid.length)
+    waves = np.pi * np.diff(edges**2)
     return float(np.sum(slopes**2 / count) / np.sum(sums**2 / waves))
 
 
