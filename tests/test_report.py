@@ -427,6 +427,8 @@ def test_a_table_is_rendered_with_escaped_texts_and_scopes():
         ("sigma [m^2] +- 1", "<var>σ</var> [m²] ± 1"),
         ("up to per cent, sigma_x", "up to per cent, sigma_x"),
         ("<p*>", "&lt;<var>p</var>*&gt;"),
+        ("set surface.h_std, h_std=1 µm", "set surface.h_std, h_std=1 µm"),
+        ("path=a_r.npy, scans/L.npy", "path=a_r.npy, scans/L.npy"),
     ],
 )
 def test_symbols_are_typeset(text, expected):
@@ -662,6 +664,8 @@ def test_values_are_told_with_units():
     assert quantity(1.234e-9, "m") == f"1.23{SPACE}nm"
     assert span([1e5, 1e8], "Pa") == f"100{SPACE}kPa to 100{SPACE}MPa"
     assert span([7e6, 1.2e8, np.nan], "Pa") == f"7 to 120{SPACE}MPa"
+    assert span([0.0, 9.7e-7], "m") == f"0 to 0.97{SPACE}µm"
+    assert span([0.0, 0.0], "m") == f"0{SPACE}m"
     assert span([2e-6]) == f"2{SPACE}×{SPACE}10⁻⁶"
     assert span([]) == "unknown"
 
