@@ -299,6 +299,14 @@ def test_the_stress_at_several_pressures_names_its_curve_in_full(study):
     assert "64 points a side" in label
 
 
+def test_a_linear_axis_holds_negative_values():
+    plot = ColumnFigure("x", "y")
+    plot.scale("y", "linear", [-2.0, 1.0])
+    assert plot.axes.get_ylim()[0] < -2
+    plot.scale("y", "linear", [0.5, 1.0])
+    assert plot.axes.get_ylim()[0] == pytest.approx(-0.03)
+
+
 def test_a_logarithmic_axis_of_many_decades_has_few_ticks():
     plot = ColumnFigure("x", "y")
     plot.scale("x", "log", np.array([1e-30, 1e-6]))

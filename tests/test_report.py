@@ -715,6 +715,14 @@ def test_two_grids_of_one_contact_add_the_continuum(invoke, tmp_path):
     assert any(label.startswith(in_continuum) for label in labels)
 
 
+def test_the_headline_of_an_unfinished_study_names_all_that_its_spec_has(invoke, tmp_path):
+    path = solved(invoke, tmp_path, SPEC, "--shard", "0/4")  # n = 0 at p* = 0.1, both seeds
+    assert headline(read_report_data(path, "")) == (
+        "8 contacts: 2 elastomers (power n=0 and power n=1), surface self-affine cutoff=0.1, "
+        "2 seeds, 2 pressures, p* = 0.1 so far, 64 points a side."
+    )
+
+
 def test_the_headline_does_not_count_an_indenter_as_a_seed(rows_of, tmp_path):
     surfaces = "surface=[{kind='self-affine', cutoff=0.2, seed=SEEDS}, {kind='parabola'}]"
     for seeds, text in (("3", "2 surfaces"), ("[3, 4]", "2 seeds")):

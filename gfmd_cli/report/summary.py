@@ -4,8 +4,9 @@ import math
 from collections import Counter
 from urllib.parse import quote
 
-from gfmd_cli.analysis.compare import in_continuum
+from gfmd_cli.analysis.compare import in_continuum, load_of, solver_of
 from gfmd_cli.analysis.export import csv_text
+from gfmd_cli.analysis.selection import grouped
 from gfmd_cli.analysis.table import known
 from gfmd_cli.analysis.tables import warnings_in
 from gfmd_cli.analysis.wording import grid_size, in_si, pretty, quantity, span
@@ -28,18 +29,19 @@ KeyNumber = tuple[str, str, str]
 
 
 def headline(data: ReportData) -> str:
-    """What was run, in one sentence."""
-    rows, curves = data.solved, data.comparison.curves
+    """What was run, in one sentence; the range of the pressures is that of the solved contacts."""
+    rows, solved = data.comparison.rows, data.solved
     surfaces = list(dict.fromkeys(str(row["ensemble"]) for row in rows))
     elastomers = list(dict.fromkeys(str(row["elastomer"]) for row in rows))
     seeds = len({row["seed"] for row in rows if known(row["seed"])})
-    pascals = _si_span(rows, "pressure", "Pa")
-    pressures = count(max(len(curve.rows) for curve in curves), "pressure")
+    curves = grouped(rows, lambda row: (row["scene"], *solver_of(row)))
+    pressures = max(len(set(map(load_of, curve))) for curve in curves.values())
+    pascals = f" ({_si_span(solved, 'pressure', 'Pa')})" if data.in_si("Pa") else ""
     return (
-        f"{count(len(data.comparison.rows), 'contact')}: {_names_of(elastomers, 'elastomer')}, "
+        f"{count(len(rows), 'contact')}: {_names_of(elastomers, 'elastomer')}, "
         f"{_names_of(surfaces, 'surface')}, {count(seeds, 'seed') + ', ' if seeds > 1 else ''}"
-        f"{pressures} from p* = {_span(rows, 'p_star')}"
-        f"{f' ({pascals})' if data.in_si('Pa') else ''}, {grid_size(rows)}."
+        f"{count(pressures, 'pressure')}, p* = {_span(solved, 'p_star')}{pascals}"
+        f"{' so far' if data.missing else ''}, {grid_size(solved)}."
     )
 
 
