@@ -384,6 +384,14 @@ def test_long_labels_that_end_differently_stay_different(names):
     assert distinct_labels(["x" * 90] * 2)[0] == distinct_labels(["x" * 90] * 2)[1]
 
 
+def test_a_label_that_is_numbered_and_cut_says_so():
+    labels = [f"{'slope=0.05 ' * 6}{word}{' slope=0.05' * 6}" for word in ("one", "two")]
+    for i, label in enumerate(distinct_labels(labels), 1):
+        assert label.startswith(f"{i}: slope=0.05")
+        assert label.endswith("\N{HORIZONTAL ELLIPSIS}")
+        assert len(label) <= MAX_LABEL
+
+
 def hurst_sweep(study, values):
     """One elastomer on surfaces of several H, from the rows of one contact."""
     comparison = study(ROUGH, "elastomer.n=1", "load.p_star=0.3", "output.histogram=false")

@@ -29,7 +29,7 @@ from gfmd_cli.report.data import read_report_data
 from gfmd_cli.report.maps import STRESS_SCALE, read_profile
 from gfmd_cli.report.page import report
 from gfmd_cli.report.rendering import environment, typeset
-from gfmd_cli.report.summary import headline, key_numbers
+from gfmd_cli.report.summary import headline, key_numbers, warnings
 from gfmd_cli.report.theme import DARK, LEGIBLE, LIGHT, PALETTE, contrast, toned
 from gfmd_cli.study.column import Column
 from gfmd_cli.study.reading import ATTRIBUTES_SUM, attributes_sum, open_study, read_rows
@@ -713,6 +713,13 @@ def test_two_grids_of_one_contact_add_the_continuum(invoke, tmp_path):
     labels = [drawing["aria-label"] for drawing in page.all("svg")]
     in_continuum = "Distribution of the stress in the continuum, with error bars and edge laws: "
     assert any(label.startswith(in_continuum) for label in labels)
+
+
+def test_a_single_contact_is_told_in_the_singular(invoke, tmp_path):
+    path = solved(invoke, tmp_path, ONE + "[solver]\nmax_steps = 1\nnested = false\n")
+    (first, *_) = warnings(read_report_data(path, ""))
+    assert first == "1 of 1 contact: tolerance not reached."
+    assert "Shown: 1 of 1 contact with stored fields, 12 at most." in report(path)
 
 
 def test_the_headline_of_an_unfinished_study_names_all_that_its_spec_has(invoke, tmp_path):

@@ -174,12 +174,13 @@ def csv_address(data: ReportData) -> str:
 
 def warnings(data: ReportData) -> list[str]:
     """Warnings above the results: missing, doubtful and unresolved values."""
-    total, parts = len(data.comparison.rows), []
+    total, missing, parts = len(data.comparison.rows), len(data.missing), []
     if data.not_converged:
         missed = Counter(row["status"].shortfall for row in data.not_converged)
-        parts += [f"{number} of {total} contacts: {what}" for what, number in missed.items()]
-    if data.missing:
-        parts.append(f"{len(data.missing)} of {total} are not solved yet")
+        contacts = count(total, "contact")
+        parts += [f"{number} of {contacts}: {what}" for what, number in missed.items()]
+    if missing:
+        parts.append(f"{missing} of {total} {'is' if missing == 1 else 'are'} not solved yet")
     unsolved = ["; ".join(parts) + "."] if parts else []
     return [*unsolved, *warnings_in(data.solved), *_unresolved(data)]
 
@@ -192,8 +193,8 @@ def _unresolved(data: ReportData) -> list[str]:
         for row in data.solved
         if row[f"{name}_verdict"] in UNRESOLVED
     )
-    total = len(data.solved)
+    total = count(len(data.solved), "contact")
     return [
-        f"{name} {Verdict(text).explanation} ({number} of {total} contacts)"
+        f"{name} {Verdict(text).explanation} ({number} of {total})"
         for (name, text), number in counts.items()
     ]
