@@ -299,6 +299,14 @@ def test_the_stress_at_several_pressures_names_its_curve_in_full(study):
     assert "64 points a side" in label
 
 
+def test_a_linear_axis_holds_negative_values():
+    plot = ColumnFigure("x", "y")
+    plot.scale("y", "linear", [-2.0, 1.0])
+    assert plot.axes.get_ylim()[0] < -2
+    plot.scale("y", "linear", [0.5, 1.0])
+    assert plot.axes.get_ylim()[0] == pytest.approx(-0.03)
+
+
 def test_a_logarithmic_axis_of_many_decades_has_few_ticks():
     plot = ColumnFigure("x", "y")
     plot.scale("x", "log", np.array([1e-30, 1e-6]))
@@ -374,6 +382,14 @@ def test_long_labels_that_end_differently_stay_different(names):
     assert all(len(label) <= MAX_LABEL for label in cut)
     assert cut[0].startswith("short" if names[0] == "short" else cut[0][:3])
     assert distinct_labels(["x" * 90] * 2)[0] == distinct_labels(["x" * 90] * 2)[1]
+
+
+def test_a_label_that_is_numbered_and_cut_says_so():
+    labels = [f"{'slope=0.05 ' * 6}{word}{' slope=0.05' * 6}" for word in ("one", "two")]
+    for i, label in enumerate(distinct_labels(labels), 1):
+        assert label.startswith(f"{i}: slope=0.05")
+        assert label.endswith("\N{HORIZONTAL ELLIPSIS}")
+        assert len(label) <= MAX_LABEL
 
 
 def hurst_sweep(study, values):

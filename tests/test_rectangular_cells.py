@@ -1,5 +1,8 @@
 """Cells of any sides, with any numbers of points: surfaces, spectra, theory, solutions."""
 
+import json
+
+import h5py
 import numpy as np
 import pytest
 
@@ -247,3 +250,33 @@ def test_oblong_cells_of_square_pixels_take_as_many_steps_as_square_ones(n):
         contact = build_scene(SelfAffine(cutoff=0.04, **cell), Power(n=n), 128).contact(0.05)
         steps.append(solve_contact(contact, Auto(tolerance=1e-6)).steps)
     assert max(steps[1:]) <= 1.5 * steps[0]
+
+
+OBLONG = """\
+[surface]
+kind = "self-affine"
+cutoff = 0.1
+[elastomer]
+kind = "power"
+n = 1
+[grid]
+points = [48, 40]
+points_y = 72
+[load]
+p_star = 1.0
+[output]
+fields = ["height"]
+"""
+
+
+def test_the_summary_is_that_of_the_surface_of_the_study(output_of, tmp_path):
+    (tmp_path / "spec.toml").write_text(OBLONG)
+    output_of("run", tmp_path / "spec.toml", "-o", tmp_path / "study.h5", "-q")
+    (summary,) = json.loads(output_of("surface", tmp_path / "spec.toml", "--json"))
+    with h5py.File(tmp_path / "study.h5") as study:
+        heights = study["fields/0/height"][()]  # of the finer grid
+        assert summary["surface"] == study["surface"].asstr()[0]
+    assert summary["sides"] == [1.0, 1.5]
+    assert summary["points"] == [48, 72]
+    assert summary["Sq"] == pytest.approx(heights.std(), rel=1e-9)
+    assert summary["Sz"] == pytest.approx(np.ptp(heights), rel=1e-9)

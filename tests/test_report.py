@@ -29,7 +29,7 @@ from gfmd_cli.report.data import read_report_data
 from gfmd_cli.report.maps import STRESS_SCALE, read_profile
 from gfmd_cli.report.page import report
 from gfmd_cli.report.rendering import environment, typeset
-from gfmd_cli.report.summary import headline, key_numbers
+from gfmd_cli.report.summary import headline, key_numbers, warnings
 from gfmd_cli.report.theme import DARK, LEGIBLE, LIGHT, PALETTE, contrast, toned
 from gfmd_cli.study.column import Column
 from gfmd_cli.study.reading import ATTRIBUTES_SUM, attributes_sum, open_study, read_rows
@@ -427,6 +427,8 @@ def test_a_table_is_rendered_with_escaped_texts_and_scopes():
         ("sigma [m^2] +- 1", "<var>σ</var> [m²] ± 1"),
         ("up to per cent, sigma_x", "up to per cent, sigma_x"),
         ("<p*>", "&lt;<var>p</var>*&gt;"),
+        ("set surface.h_std, h_std=1 µm", "set surface.h_std, h_std=1 µm"),
+        ("path=a_r.npy, scans/L.npy", "path=a_r.npy, scans/L.npy"),
     ],
 )
 def test_symbols_are_typeset(text, expected):
@@ -662,6 +664,8 @@ def test_values_are_told_with_units():
     assert quantity(1.234e-9, "m") == f"1.23{SPACE}nm"
     assert span([1e5, 1e8], "Pa") == f"100{SPACE}kPa to 100{SPACE}MPa"
     assert span([7e6, 1.2e8, np.nan], "Pa") == f"7 to 120{SPACE}MPa"
+    assert span([0.0, 9.7e-7], "m") == f"0 to 0.97{SPACE}µm"
+    assert span([0.0, 0.0], "m") == f"0{SPACE}m"
     assert span([2e-6]) == f"2{SPACE}×{SPACE}10⁻⁶"
     assert span([]) == "unknown"
 
@@ -709,6 +713,21 @@ def test_two_grids_of_one_contact_add_the_continuum(invoke, tmp_path):
     labels = [drawing["aria-label"] for drawing in page.all("svg")]
     in_continuum = "Distribution of the stress in the continuum, with error bars and edge laws: "
     assert any(label.startswith(in_continuum) for label in labels)
+
+
+def test_a_single_contact_is_told_in_the_singular(invoke, tmp_path):
+    path = solved(invoke, tmp_path, ONE + "[solver]\nmax_steps = 1\nnested = false\n")
+    (first, *_) = warnings(read_report_data(path, ""))
+    assert first == "1 of 1 contact: tolerance not reached."
+    assert "Shown: 1 of 1 contact with stored fields, 12 at most." in report(path)
+
+
+def test_the_headline_of_an_unfinished_study_names_all_that_its_spec_has(invoke, tmp_path):
+    path = solved(invoke, tmp_path, SPEC, "--shard", "0/4")  # n = 0 at p* = 0.1, both seeds
+    assert headline(read_report_data(path, "")) == (
+        "8 contacts: 2 elastomers (power n=0 and power n=1), surface self-affine cutoff=0.1, "
+        "2 seeds, 2 pressures, p* = 0.1 so far, 64 points a side."
+    )
 
 
 def test_the_headline_does_not_count_an_indenter_as_a_seed(rows_of, tmp_path):

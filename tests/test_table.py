@@ -5,7 +5,9 @@ from math import inf, nan
 import pytest
 
 from gfmd_cli.analysis.run_summary import MAX_ROWS, unconverged
+from gfmd_cli.analysis.surface_summary import COLUMNS as SURFACE
 from gfmd_cli.analysis.table import Group, Table, TableColumn, plain, plus_minus, ratio
+from gfmd_cli.analysis.tables import COMPARISON
 from gfmd_cli.analysis.wording import shown
 from gfmd_cli.status import Status
 
@@ -40,6 +42,19 @@ def test_a_remark_follows_a_value_without_error():
     assert column.cell({"gap": 2.0, "error": nan, "remark": " (grid)"}) == "2 (grid)"
     assert column.cell({"gap": 2.0, "error": 0.1, "remark": " (grid)"}) == "2.00 +- 0.10"
     assert column.cell({"gap": 2.0, "error": nan, "remark": ""}) == "2"
+
+
+@pytest.mark.parametrize("power", [-12, 0, 9])
+def test_ratios_to_the_theory_have_four_digits_however_large(power):
+    column = next(column for column in COMPARISON if column.heading == "ratio")
+    text = column.cell({"a_r": 1.5, "a_r_persson": 7 * 10.0**-power})
+    assert float(text) == pytest.approx(1.5 / 7 * 10.0**power, rel=5e-4)
+    assert len(text) <= 9
+
+
+def test_a_skewness_of_zero_has_no_sign():
+    (skewness,) = (column for column in SURFACE if column.heading == "Ssk")
+    assert skewness.cell({"Ssk": -1e-17}) == "0.000"
 
 
 def test_an_unknown_value_is_a_dash_or_the_reason():

@@ -172,7 +172,11 @@ def distinct_labels(labels: list[str]) -> list[str]:
         if len(set(cut)) == len(set(labels)):
             return cut
     numbers = {label: i for i, label in enumerate(dict.fromkeys(labels), 1)}
-    return [f"{numbers[label]}: {label}"[:MAX_LABEL] for label in labels]
+    numbered = (f"{numbers[label]}: {label}" for label in labels)
+    return [
+        label if len(label) <= MAX_LABEL else f"{label[: MAX_LABEL - 1]}\N{HORIZONTAL ELLIPSIS}"
+        for label in numbered
+    ]
 
 
 def colours(count: int) -> list[Colour]:

@@ -301,12 +301,12 @@ class ColumnFigure(LegendFigure):
             _tick(second.xaxis, low * factor, high * factor)
 
     def scale(self, name: str, scale: str, values: Any, *, zero: bool = True) -> None:
-        """Set scale and limits of the axis `name`; `zero`: a linear axis begins at zero."""
+        """Set scale and limits of the axis `name`; `zero`: a linear axis begins at or below 0."""
         low, high = float(np.min(values)), float(np.max(values))
         if scale == "log":
             log_scale(self.axes, name, low, high)
             return
-        low = 0.0 if zero else low
+        low = min(low, 0.0) if zero else low
         pad = max(high - low, LEAST_SPAN * abs(high)) or 1.0
         span = (low - (0.03 if zero else 0.1) * pad, high + 0.1 * pad)
         self.axes.set(**{f"{name}scale": scale, f"{name}lim": span})

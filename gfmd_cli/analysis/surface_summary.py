@@ -117,7 +117,7 @@ def fit_record(nearest: SelfAffineFit | None) -> dict[str, float | None]:
 
 
 UNITS = dict.fromkeys(("Sq", "Sa", "Sz", "Sal", "Pq", "Pa", "Pt", "Pal"), "m")
-FORMATS = dict.fromkeys(("Ssk", "Sku", "Psk", "Pku"), ".3f")
+FORMATS = dict.fromkeys(("Ssk", "Sku", "Psk", "Pku"), "z.3f")
 COLUMNS = (
     TableColumn("surface", "surface"),
     *(

@@ -65,7 +65,7 @@ def _beside_theory(name: str, theory: str = "persson", *, best: bool = False) ->
     return [
         best_value(name, symbol) if best else TableColumn(name, name),
         *columns,
-        TableColumn("ratio", ratio(value, predicted), ".3f", optional=True),
+        TableColumn("ratio", ratio(value, predicted), optional=True),
     ]
 
 
@@ -93,7 +93,7 @@ COMPARISON = (
     P_STAR,
     PRESSURE,
     *(column for name in QUANTITIES for column in _beside_theory(name)),
-    TableColumn("p ratio", ratio("p_star_persson_at_u_g", "p_star"), ".3f", optional=True),
+    TableColumn("p ratio", ratio("p_star_persson_at_u_g", "p_star"), optional=True),
     STATUS,
 )
 EINSTEIN = (P_STAR, *(c for name in QUANTITIES for c in _beside_theory(name, "einstein")))
@@ -116,14 +116,14 @@ TRUE_CONTACT = (
     P_STAR,
     AREA,
     TableColumn("whole surface\na_r", "a_r_persson"),
-    TableColumn("\nratio", ratio("a_r", "a_r_persson"), ".3f"),
+    TableColumn("\nratio", ratio("a_r", "a_r_persson")),
     *(
         column
         for name, area in VARIANTS.items()
         for column in (
             TableColumn(f"{name}\n/ Delta_sigma", name),
             TableColumn("\na_r", area),
-            TableColumn("\nratio", ratio("a_r", area), ".3f"),
+            TableColumn("\nratio", ratio("a_r", area)),
         )
     ),
 )

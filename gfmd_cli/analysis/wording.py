@@ -85,7 +85,8 @@ def span(values: Iterable[float], unit: str = "") -> str:
     if low == high:
         return low
     bare, _, low_unit = low.rpartition(SPACE)
-    return f"{bare if unit and high.endswith(SPACE + low_unit) else low} to {high}"
+    shares_unit = unit and (high.endswith(SPACE + low_unit) or min(known) == 0)
+    return f"{bare if shares_unit else low} to {high}"
 
 
 def contact_title(row: Mapping[str, Any], *, of_seeds: bool = False) -> str:

@@ -72,9 +72,13 @@ def surface(
     for path in paths:
         if path.suffix == ".toml":
             spec = read_spec(path, overrides)[0]
-            points = max(0 if grid.points == "auto" else grid.points for grid in spec.grid)
-            names += [each.label for each in spec.surface]
-            summaries += [summarise(each, points) for each in spec.surface]
+            points, grid = max(
+                ((0 if grid.points == "auto" else grid.points, grid) for grid in spec.grid),
+                key=lambda pair: pair[0],
+            )
+            surfaces = [grid.on_cell(each, points)[0] for each in spec.surface]
+            names += [each.label for each in surfaces]
+            summaries += [summarise(each, points) for each in surfaces]
         else:
             names.append(str(path))
             summaries.append(summarise(read_scan(path, overrides)))

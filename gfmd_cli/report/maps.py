@@ -23,7 +23,7 @@ from gfmd_cli.report.data import ReportData
 from gfmd_cli.report.section import Section, drawing
 from gfmd_cli.study.column import Row
 from gfmd_cli.study.reading import StudyFile, open_study
-from gfmd_cli.units import scaled
+from gfmd_cli.units import count, scaled
 
 MAX_CONTACTS, MAX_CURVES = 12, 3  # contacts that are shown, of at most so many curves
 SIDE = 256  # pixels of a map at the most
@@ -82,7 +82,7 @@ def maps(data: ReportData) -> Section:
             for rows in contacts_by_curve
         ]
     notes = [
-        f"{len(contacts)} of {len(rows_with_fields)} contacts with stored fields are shown, "
+        f"Shown: {len(contacts)} of {count(len(rows_with_fields), 'contact')} with stored fields, "
         f"{MAX_CONTACTS} at most."
     ]
     if any(plane(row) and max(row["points"], row["points_y"]) > SIDE for row in contacts):

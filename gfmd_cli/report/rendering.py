@@ -46,9 +46,9 @@ SYMBOLS = {
 """Symbols in headings, captions and labels, as they are set in HTML."""
 SYMBOL = re.compile(
     "|".join(
-        (r"(?<![\w/])" if symbol[0].isalpha() else "")
+        (r"(?<![\w/.=])" if symbol[0].isalpha() else "")
         + re.escape(symbol)
-        + (r"(?!\w)" if symbol[-1].isalnum() else "")
+        + (r"(?![\w=]|\.\w)" if symbol[-1].isalnum() else "")
         for symbol in SYMBOLS
     )
 )

@@ -4,8 +4,9 @@ import math
 from collections import Counter
 from urllib.parse import quote
 
-from gfmd_cli.analysis.compare import in_continuum
+from gfmd_cli.analysis.compare import in_continuum, load_of, solver_of
 from gfmd_cli.analysis.export import csv_text
+from gfmd_cli.analysis.selection import grouped
 from gfmd_cli.analysis.table import known
 from gfmd_cli.analysis.tables import warnings_in
 from gfmd_cli.analysis.wording import grid_size, in_si, pretty, quantity, span
@@ -28,18 +29,19 @@ KeyNumber = tuple[str, str, str]
 
 
 def headline(data: ReportData) -> str:
-    """What was run, in one sentence."""
-    rows, curves = data.solved, data.comparison.curves
+    """What was run, in one sentence; the range of the pressures is that of the solved contacts."""
+    rows, solved = data.comparison.rows, data.solved
     surfaces = list(dict.fromkeys(str(row["ensemble"]) for row in rows))
     elastomers = list(dict.fromkeys(str(row["elastomer"]) for row in rows))
     seeds = len({row["seed"] for row in rows if known(row["seed"])})
-    pascals = _si_span(rows, "pressure", "Pa")
-    pressures = count(max(len(curve.rows) for curve in curves), "pressure")
+    curves = grouped(rows, lambda row: (row["scene"], *solver_of(row)))
+    pressures = max(len(set(map(load_of, curve))) for curve in curves.values())
+    pascals = f" ({_si_span(solved, 'pressure', 'Pa')})" if data.in_si("Pa") else ""
     return (
-        f"{count(len(data.comparison.rows), 'contact')}: {_names_of(elastomers, 'elastomer')}, "
+        f"{count(len(rows), 'contact')}: {_names_of(elastomers, 'elastomer')}, "
         f"{_names_of(surfaces, 'surface')}, {count(seeds, 'seed') + ', ' if seeds > 1 else ''}"
-        f"{pressures} from p* = {_span(rows, 'p_star')}"
-        f"{f' ({pascals})' if data.in_si('Pa') else ''}, {grid_size(rows)}."
+        f"{count(pressures, 'pressure')}, p* = {_span(solved, 'p_star')}{pascals}"
+        f"{' so far' if data.missing else ''}, {grid_size(solved)}."
     )
 
 
@@ -172,12 +174,13 @@ def csv_address(data: ReportData) -> str:
 
 def warnings(data: ReportData) -> list[str]:
     """Warnings above the results: missing, doubtful and unresolved values."""
-    total, parts = len(data.comparison.rows), []
+    total, missing, parts = len(data.comparison.rows), len(data.missing), []
     if data.not_converged:
         missed = Counter(row["status"].shortfall for row in data.not_converged)
-        parts += [f"{number} of {total} contacts: {what}" for what, number in missed.items()]
-    if data.missing:
-        parts.append(f"{len(data.missing)} of {total} are not solved yet")
+        contacts = count(total, "contact")
+        parts += [f"{number} of {contacts}: {what}" for what, number in missed.items()]
+    if missing:
+        parts.append(f"{missing} of {total} {'is' if missing == 1 else 'are'} not solved yet")
     unsolved = ["; ".join(parts) + "."] if parts else []
     return [*unsolved, *warnings_in(data.solved), *_unresolved(data)]
 
@@ -190,8 +193,8 @@ def _unresolved(data: ReportData) -> list[str]:
         for row in data.solved
         if row[f"{name}_verdict"] in UNRESOLVED
     )
-    total = len(data.solved)
+    total = count(len(data.solved), "contact")
     return [
-        f"{name} {Verdict(text).explanation} ({number} of {total} contacts)"
+        f"{name} {Verdict(text).explanation} ({number} of {total})"
         for (name, text), number in counts.items()
     ]

@@ -52,6 +52,13 @@ for (const part of document.querySelectorAll(parts)) {
 }
 return [...seen]
 """
+CAPTIONS = """
+return [...document.querySelectorAll('.scroll')].flatMap(box => {
+  const right = box.getBoundingClientRect().left + box.clientLeft + box.clientWidth
+  const texts = [...box.querySelectorAll('caption span, .group span')]
+  return texts.map(text => [text.getBoundingClientRect().right, right])
+})
+"""
 AXE = """
 const done = arguments[arguments.length - 1]
 const alike = {exclude: [['svg > *'], ['tr:nth-child(n + 5)']]}
@@ -102,6 +109,15 @@ def test_nothing_reaches_beyond_the_window(browser, page, width, scheme):
     assert browser.run("return document.querySelectorAll('.plot .main-svg').length") > 8
     shown = "[...document.querySelectorAll('.drawing, .plot')].filter(one => one.offsetParent)"
     assert browser.run(f"return {shown}.every(one => one.clientWidth > 200)")
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+def test_captions_are_read_without_scrolling(browser, page, width):
+    browser.visit(page, width)
+    browser.run(OPEN)
+    ends = browser.run(CAPTIONS)
+    assert len(ends) > 5
+    assert all(end <= right for end, right in ends)
 
 
 def test_only_the_page_is_asked_for_and_nothing_complains(browser, page):
