@@ -395,6 +395,14 @@ def test_what_is_no_spec_is_refused():
         solve(None)
 
 
+def test_overrides_are_several_strings(tmp_path):
+    """A string is a sequence of strings, too: its letters."""
+    path = tmp_path / "spec.toml"
+    path.write_text("")
+    with pytest.raises(InputError, match=r"overrides = 'grid.points=48': a tuple or list"):
+        run(path, overrides="grid.points=48")
+
+
 def test_no_thread_is_refused():
     with pytest.raises(InputError, match="threads = 0"):
         solve(TABLES, threads=0)

@@ -124,3 +124,10 @@ def test_a_file_that_is_no_netcdf_is_refused(tmp_path):
     path.write_text("nothing")
     with pytest.raises(InputError, match=r"none\.nc: not a readable netCDF file"):
         dataset(path)
+
+
+@pytest.mark.parametrize(("name", "what"), [("none.nc", "netCDF file"), ("none.h5", "study")])
+def test_a_file_that_does_not_exist_is_named(tmp_path, name, what):
+    with pytest.raises(InputError) as caught:
+        dataset(tmp_path / name)
+    assert str(caught.value) == f"{tmp_path / name}: no such {what}"

@@ -103,6 +103,8 @@ def as_dataset(path: Path) -> Any:
     there is no such study, StudyError.
     """
     if path.suffix == ".nc":
+        if not path.exists():
+            raise InputError(f"{path}: no such netCDF file")
         try:
             data = _xarray().open_dataset(path, engine="h5netcdf")
         except (OSError, ValueError) as error:
