@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,9 +10,13 @@ import pytest
 from gfmd_cli import compare, rows, run, solve
 from gfmd_cli.analysis.export import as_records
 from gfmd_cli.errors import InputError
+from gfmd_cli.physics.elastomers import Power
 from gfmd_cli.physics.file_surface import FileSurface
+from gfmd_cli.physics.indenters import Cone, Parabola, Punch
+from gfmd_cli.physics.scenes import build_scene
 from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.report.page import report
+from gfmd_cli.study.plausibility import finest_share
 
 SURFACE = {"kind": "self-affine", "cutoff": 0.125, "h_std": 1e-8, "length": 1e-5}
 HALF_SPACE = {"kind": "half-space", "E_star": 2e9}
@@ -218,6 +223,14 @@ def test_a_reduced_pressure_whose_unit_grows_with_the_grid(surface, n, load, war
     words = "p* is another pressure on another grid; give load.pressure"
     assert [words in row["warnings"] for row in rows] == [warned] * 2
     assert (rows[1]["pressure"] > 1.04 * rows[0]["pressure"]) is warned
+
+
+@pytest.mark.parametrize("surface", [Parabola, Cone, Punch])
+def test_rounding_does_not_move_waves_of_four_spacings(surface):
+    scene = build_scene(surface(), Power(n=2), 64)
+    shells = [replace(scene.shells, q=scene.shells.q * (1 + sign * 1e-14)) for sign in (-1, 1)]
+    shares = [finest_share(replace(scene, shells=each)) for each in (scene.shells, *shells)]
+    assert shares[1:] == shares[:1] * 2
 
 
 def test_a_random_surface_in_metres_without_a_side():

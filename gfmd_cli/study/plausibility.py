@@ -32,6 +32,7 @@ that of a wheel of 1 m radius in a cell of 1 m is 0.05 m."""
 MAX_EDGE_SLOPE = 1.0  # of a single indenter at the edge of its contact; a choice: 45 degrees
 MAX_CHANGED_SHARE = 0.05  # of contact or load where heights are not those measured; a choice
 SMALL_DISPLACEMENT = 1e-4  # [h_std], below which heights have another unit; a choice
+ROUNDING = 1e-9  # of a wavenumber, relative
 MAX_FINEST_SHARE = 0.2
 """Share of the squared Delta_sigma at waves of two to four spacings, from which it depends on the
 grid; a choice. From 64 to 512 points, ten exponents n and eleven single indenters, Delta_sigma
@@ -175,9 +176,13 @@ def unit_of_grids(tasks: Sequence[Task]) -> str:
 
 
 def finest_share(scene: Scene) -> float:
-    """Share of the squared Delta_sigma at waves of two to four of the wider spacings."""
+    """Share of the squared Delta_sigma at waves of two to less than four of the wider spacings.
+
+    Grids have waves of four spacings exactly; rounding of q does not decide on these.
+    """
     q, variance = scene.shells.q, scene.shells.variance
-    return float(variance[q > 0.5 * np.pi / max(scene.grid.spacings)].sum() / variance.sum())
+    four_spacings = 0.5 * np.pi / max(scene.grid.spacings)
+    return float(variance[q > (1 + ROUNDING) * four_spacings].sum() / variance.sum())
 
 
 def _unit_of_grid(task: Task, scene: Scene) -> Iterator[str]:
