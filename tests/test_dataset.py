@@ -126,6 +126,19 @@ def test_a_file_that_is_no_netcdf_is_refused(tmp_path):
         dataset(path)
 
 
+def test_a_selection_follows_new_names(data):
+    renamed = data.rename(hurst="H", task="run").sel(H=0.8, n=1)
+    assert renamed.a_r.dims == ("run",)
+    assert renamed.a_r.values.tolist() == data.sel(hurst=0.8, n=1).a_r.values.tolist()
+
+
+def test_selections_can_be_joined(data):
+    parts = [data.sel(hurst=hurst)[["a_r", "u_g"]] for hurst in (0.8, 0.5)]
+    joined = xarray.concat(parts, "task")
+    assert joined.a_r.values.tolist() == [*parts[0].a_r.values, *parts[1].a_r.values]
+    assert joined.sel(hurst=0.5, n=1).u_g.equals(parts[1].sel(n=1).u_g)
+
+
 @pytest.mark.parametrize(("name", "what"), [("none.nc", "netCDF file"), ("none.h5", "study")])
 def test_a_file_that_does_not_exist_is_named(tmp_path, name, what):
     with pytest.raises(InputError) as caught:

@@ -1,6 +1,6 @@
 """Selection of the tasks of an `xarray.Dataset` by their parameters."""
 
-from collections.abc import Hashable, Mapping
+from collections.abc import Hashable, Mapping, Sequence
 from typing import Any, Literal
 
 import numpy as np
@@ -11,7 +11,6 @@ from gfmd_cli.grid.arrays import Mask
 
 Labels = Mapping[Any, Any]
 ROUNDING = 1e-9  # relative; numbers that are closer are the same parameter
-DIMENSION = "task"
 
 
 class ParameterIndex(xarray.Index):  # type: ignore[misc]
@@ -42,6 +41,30 @@ class ParameterIndex(xarray.Index):  # type: ignore[misc]
         """The index of some of the tasks."""
         return type(self)({name: each.isel(indexers) for name, each in self.variables.items()})
 
+    def rename(
+        self, name_dict: Mapping[Any, Hashable], dims_dict: Mapping[Any, Hashable]
+    ) -> "ParameterIndex":
+        """The index of coordinates with other names, or over a dimension with another name."""
+        renamed = {}
+        for name, each in self.variables.items():
+            dims = [dims_dict.get(dim, dim) for dim in each.dims]
+            variable = xarray.Variable(dims, each.data, each.attrs, each.encoding)
+            renamed[name_dict.get(name, name)] = variable
+        return type(self)(renamed)
+
+    @classmethod
+    def concat(
+        cls, indexes: Sequence["ParameterIndex"], dim: Hashable, positions: Any = None
+    ) -> "ParameterIndex":
+        """The index of the tasks of several data sets, one after the other."""
+        names = indexes[0].variables
+        return cls(
+            {
+                name: xarray.Variable.concat([i.variables[name] for i in indexes], dim, positions)
+                for name in names
+            }
+        )
+
     def equals(self, other: xarray.Index, **_: Any) -> bool:
         """Whether all parameters of all tasks are the same."""
         return (
@@ -61,7 +84,8 @@ class ParameterIndex(xarray.Index):  # type: ignore[misc]
         places = np.flatnonzero(np.logical_and.reduce(fits))
         if places.size == 0:
             raise KeyError(f"no task with {', '.join(f'{n} = {v}' for n, v in labels.items())}")
-        return IndexSelResult({DIMENSION: places})
+        (dimension,) = next(iter(self.variables.values())).dims
+        return IndexSelResult({dimension: places})
 
 
 def _fits(values: Any, label: Any, method: Literal["nearest"] | None) -> Mask:
