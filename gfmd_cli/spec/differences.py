@@ -26,8 +26,20 @@ def differences(old: Any, new: Any, where: str = "") -> list[str]:
         lines := differences(_swept(old), _swept(new), where)
     ):
         return lines  # else the combinations differ
-    texts = (shortened(json.dumps(value), MAX_VALUE) for value in (old, new))
+    texts = (shortened(_text(value), MAX_VALUE) for value in (old, new))
     return [] if old == new else [f"{where}: {' -> '.join(texts)}"]
+
+
+def _text(value: Any) -> str:
+    """A value as JSON, but numbers as in labels: 7e+10 instead of 70000000000.0."""
+    if isinstance(value, float):
+        short = f"{value:g}"
+        return short if float(short) == value else str(value)
+    if isinstance(value, list):
+        return f"[{', '.join(map(_text, value))}]"
+    if isinstance(value, dict):
+        return f"{{{', '.join(f'{json.dumps(key)}: {_text(v)}' for key, v in value.items())}}}"
+    return json.dumps(value)
 
 
 def _is_sweep(value: Any) -> bool:
