@@ -213,10 +213,11 @@ def test_more_variants_than_can_be_told_apart_are_named_by_their_elastomer(study
     many = [
         Curve([row | {"hurst": 0.1 * place} for row in curve.rows],
               curve.persson)
-        for curve in (first, second) for place in range(1, 6)
+        for place in range(1, 10) for curve in (first, second)
     ]  # fmt: skip
-    labels = {style.label for style in curve_styles(many[:8])}
-    assert labels >= {"n = 0, hurst=0.1", "n = 1, hurst=0.3"}
+    few = curve_styles(many[:16])
+    assert {style.label for style in few} >= {"n = 0, hurst=0.1", "n = 1, hurst=0.3"}
+    assert len({(style.colour, style.marker) for style in few}) == 16
     labels = {style.label for style in curve_styles(many)}
     assert labels == {"n = 0, several hurst", "n = 1, several hurst"}
     assert len({style.colour for style in curve_styles(many)}) == 2
