@@ -223,6 +223,16 @@ def test_more_variants_than_can_be_told_apart_are_named_by_their_elastomer(study
     assert len({style.colour for style in curve_styles(many)}) == 2
 
 
+def test_kinds_alone_are_named_where_they_tell_curves_apart(study):
+    surface = "[{kind='self-affine', cutoff=0.1, h_std=1e-8}, {kind='wave', amplitude=1e-8}]"
+    elastomer = "[{kind='half-space'}, {kind='layer', thickness=0.2, poisson=0.4, E_star=1.0}]"
+    keys = (f"surface={surface}", f"elastomer={elastomer}", "load.p_star=0.3")
+    labels = [style.label for style in curve_styles(study(ROUGH, *keys).curves)]
+    assert sorted(labels) == [
+        "half-space, self-affine", "half-space, wave", "layer, self-affine", "layer, wave"
+    ]  # fmt: skip
+
+
 def test_names_of_elastomers_are_short_where_they_can_be(study):
     curves = study(ROUGH, "elastomer.n=[0.5, 1.0, 0.77]", "load.p_star=1").curves
     names = [style.label for style in curve_styles(curves)]

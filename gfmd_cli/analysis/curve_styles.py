@@ -142,7 +142,7 @@ def _elastomer_names(curves: list[Curve]) -> dict[str, str]:
     for base, alike in grouped(rows, kind).items():
         words = [_elastomer_words(rows[name]) for name in alike]
         differing = [len(set(column)) > 1 for column in zip(*words, strict=True)]
-        if any(differing):
+        if any(differing) or 1 == len(alike) < len(rows):
             labels = (_joined((base, *compress(each, differing)), " ") for each in words)
             names |= dict(zip(alike, labels, strict=True))
     if len(set(names.values())) < len(names):  # names that coincide
@@ -203,9 +203,19 @@ def _merged(curve: Curve, alike: list[Curve]) -> str:
 
 
 def _differing(curves: list[Curve]) -> list[str]:
-    """The parameters in which curves differ, the seed left out."""
+    """The parameters in which curves differ, the seed left out.
+
+    A key that only some curves have is left out where the others tell the curves apart.
+    """
     words = list(map(_words, curves))
-    return [key for key in words[0] if len({each[key] for each in words}) > 1]
+    values = {key: {each[key] for each in words} for key in words[0]}
+    every = [key for key in values if len(values[key]) > 1]
+    few = [key for key in every if len(values[key] - {""}) > 1]
+
+    def variants(keys: list[str]) -> int:
+        return len({tuple(map(each.get, keys)) for each in words})
+
+    return few if variants(few) == variants(every) else every
 
 
 def _joined(words: Iterable[str | None], separator: str = ", ") -> str:
