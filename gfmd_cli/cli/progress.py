@@ -68,7 +68,7 @@ class Reporter:
             self.bars[progress.task] = bar
         if progress.event == "step":
             bar.n = progress.step
-            bar.set_postfix_str(f"{progress.points} points along x, {_state(progress)}")
+            bar.set_postfix_str(f"{progress.points} points, {_state(progress)}")
 
     def _close(self, task: int | None) -> None:
         bar = self.bars.pop(task, None)
@@ -83,7 +83,7 @@ class Reporter:
         self.last_line = now
         print_error(
             f"{_left(progress)}; task {progress.task} {progress.label}: "
-            f"step {progress.step} ({progress.points} points along x), {_state(progress)} "
+            f"step {progress.step} ({progress.points} points), {_state(progress)} "
             f"{progress.status or ''}".strip("; ")
         )
 
