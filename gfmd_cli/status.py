@@ -42,8 +42,9 @@ class Status(ExplainedEnum):
     DIVERGED = "diverged", 'the solver diverged: use solver.kind = "auto"'
     ACCURACY_NOT_REACHED = (
         "accuracy_not_reached",
-        "estimated errors on the grid of {points} points are larger than requested or unknown, and "
-        "memory and accuracy.max_points allow no finer grid, or no finer grid would help",
+        "estimated errors on the grid with {points} points along x are larger than requested or "
+        "unknown, and memory and accuracy.max_points allow no finer grid, or no finer grid would "
+        "help",
     )
     LOAD_NOT_REACHED = (
         "load_not_reached",

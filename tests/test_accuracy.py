@@ -139,7 +139,9 @@ def test_an_auto_grid_ends_where_it_may_not_grow(rows_of):
     assert (row["status"], row["points"]) == (Status.ACCURACY_NOT_REACHED, 64)
     assert row["points_y"] == 64  # not those of the forecast, 100
     assert row["u_g_error"] > 1e-6 * row["u_g"]
-    assert "next to full contact" not in Status.ACCURACY_NOT_REACHED.explain(row)
+    text = Status.ACCURACY_NOT_REACHED.explain(row)
+    assert "next to full contact" not in text
+    assert text.startswith("estimated errors on the grid with 64 points along x are larger")
 
 
 def test_a_limit_below_the_first_auto_grid_is_refused(spec_of):
@@ -618,6 +620,13 @@ def test_the_interval_of_a_searched_pressure_holds_the_error_that_all_seeds_shar
     unknown = Ensemble([*rows[1:], rows[0] | {"p_star_error": np.nan}]).pressure_spread()
     assert unknown.mean == pytest.approx(ensemble.pressure_spread().mean)
     assert np.isnan(unknown.half_width)
+
+
+def test_values_that_are_equal_up_to_their_residuals_have_no_interval():
+    rows = [{"u_g": u_g, "u_g_error": np.nan, "residual": 1e-6} for u_g in (0.5, 0.5000001)]
+    assert np.isnan(Ensemble(rows).spread("u_g").half_width)
+    rows[0]["residual"] = rows[1]["residual"] = 1e-8
+    assert Ensemble(rows).spread("u_g").half_width > 0
 
 
 def test_means_over_seeds_name_the_contacts_that_have_not_converged(rows_of, tmp_path):

@@ -267,6 +267,15 @@ def test_a_surface_without_any_wave_is_refused_with_its_key(gfmd, points):
     assert not Path("small.h5").exists()
 
 
+def test_a_roll_off_beyond_all_waves_is_refused_with_its_key(gfmd):
+    result = gfmd("run", "spec.toml", "--set", "surface.rolloff=1e200")
+    assert result.exit_code == 2
+    words = "spec.toml: surface.rolloff: 1e+200 given, out of range: it is in units of"
+    assert words in result.output
+    assert "at most 1e+06" in result.output
+    assert not Path("small.h5").exists()
+
+
 @pytest.mark.parametrize(
     ("surface", "elastomer", "key"),
     [

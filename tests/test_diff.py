@@ -185,6 +185,13 @@ def test_another_seed_is_another_contact_and_nothing_to_compare_is_no_agreement(
     )
 
 
+def test_a_report_says_why_nothing_is_compared(output_of, study_of, tmp_path):
+    by_area = study_of("elastomer.n=1", "load={contact_area=0.3}")
+    output_of("report", study_of("elastomer.n=1"), by_area, "-o", tmp_path / "both.html")
+    page = (tmp_path / "both.html").read_text()
+    assert "No contact in common: the loads of A are given by" in page
+
+
 def test_contacts_that_have_not_converged_are_named_and_paired_last(output_of, study_of):
     few_steps = ("solver.max_steps=1", "solver.tolerance=1e-12", "elastomer.n=2")
     unfinished = study_of(*few_steps, status=1)

@@ -213,13 +213,24 @@ def test_more_variants_than_can_be_told_apart_are_named_by_their_elastomer(study
     many = [
         Curve([row | {"hurst": 0.1 * place} for row in curve.rows],
               curve.persson)
-        for curve in (first, second) for place in range(1, 6)
+        for place in range(1, 10) for curve in (first, second)
     ]  # fmt: skip
-    labels = {style.label for style in curve_styles(many[:8])}
-    assert labels >= {"n = 0, hurst=0.1", "n = 1, hurst=0.3"}
+    few = curve_styles(many[:16])
+    assert {style.label for style in few} >= {"n = 0, hurst=0.1", "n = 1, hurst=0.3"}
+    assert len({(style.colour, style.marker) for style in few}) == 16
     labels = {style.label for style in curve_styles(many)}
     assert labels == {"n = 0, several hurst", "n = 1, several hurst"}
     assert len({style.colour for style in curve_styles(many)}) == 2
+
+
+def test_kinds_alone_are_named_where_they_tell_curves_apart(study):
+    surface = "[{kind='self-affine', cutoff=0.1, h_std=1e-8}, {kind='wave', amplitude=1e-8}]"
+    elastomer = "[{kind='half-space'}, {kind='layer', thickness=0.2, poisson=0.4, E_star=1.0}]"
+    keys = (f"surface={surface}", f"elastomer={elastomer}", "load.p_star=0.3")
+    labels = [style.label for style in curve_styles(study(ROUGH, *keys).curves)]
+    assert sorted(labels) == [
+        "half-space, self-affine", "half-space, wave", "layer, self-affine", "layer, wave"
+    ]  # fmt: skip
 
 
 def test_names_of_elastomers_are_short_where_they_can_be(study):

@@ -133,6 +133,9 @@ def test_analyze_tells_the_columns_in_a_table_and_in_records(output_of, study):
     assert text.count("mean patch") == 2  # two elastomers, in reduced units
     assert "[Pa" not in text
     assert "yes" in text
+    caption = " ".join(text.partition("Observables:")[2].split())
+    assert "1 (yes) if the gap (4-connected points) percolates along x, 0 (no) if not" in caption
+    assert "The same along y; blank for a line contact." in caption
     records = json.loads(output_of("analyze", study, "--json"))
     for record, row in zip(records, read_rows(study), strict=True):
         expected = {name: row[name] if np.isfinite(row[name]) else None for name in COLUMNS}

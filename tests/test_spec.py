@@ -328,6 +328,21 @@ def test_differences_name_the_keys_that_changed():
     ]
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "text"),
+    [
+        (7e10, 2e9, "7e+10 -> 2e+09"),
+        ([1e8], [1e8, 2.5e7], "[1e+08] -> [1e+08, 2.5e+07]"),
+        (1234567.5, 0.1, "1234567.5 -> 0.1"),
+        (1.0000000000000001e-07, 2e-7, "1e-07 -> 2e-07"),
+        (0.1, 0.1 + 1e-16, "0.1 -> 0.1000000000000001"),
+        ("auto", {"a": 1.0, "b": [True, None]}, '"auto" -> {"a": 1, "b": [true, null]}'),
+    ],
+)
+def test_differences_have_numbers_as_labels_have_them(old, new, text):
+    assert differences({"key": old}, {"key": new}) == [f"key: {text}"]
+
+
 @pytest.fixture(scope="module")
 def validator():
     """Checks data by the schema, which is checked to be one."""

@@ -197,6 +197,14 @@ def test_one_of_several_maps_has_to_be_chosen(gfmd, tmp_path):
     assert "HDF5, second" in gfmd("surface", "two.h5", "--set", "surface.dataset=second")
 
 
+def test_init_shows_only_keys_of_the_kind_that_was_given(gfmd, tmp_path):
+    gfmd("init", "--set", "surface.kind=punch")
+    text = (tmp_path / "study.toml").read_text()
+    assert "random" not in text
+    assert "#h_std" not in text
+    assert "#length" in text
+
+
 def test_init_replaces_nothing(gfmd, tmp_path):
     (tmp_path / "study.toml").write_text("mine")
     assert "the file exists" in gfmd("init", status=2)

@@ -202,6 +202,13 @@ def test_analyze_tells_of_it_where_it_was_asked_for(records):
             assert record["deviation_bearing"] == pytest.approx(record["deviation_c"], rel=0.1)
 
 
+def test_single_indenters_have_it_without_a_theory(records):
+    rows, text = records("output.true_contact=true", "surface={kind='parabola'}")
+    assert "Persson" not in text
+    assert f" {rows[0]['deviation_c']:#.4g} " in text
+    assert not any("a_r_persson_deviation_c" in record for record in rows)
+
+
 def test_analyze_says_nothing_of_it_where_it_was_not(records):
     rows, text = records()
     assert "over the contact" not in text

@@ -1,5 +1,6 @@
 """Styles of curves: a label that tells the curves apart, colour, marker."""
 
+from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from itertools import compress
@@ -23,6 +24,7 @@ MAX_LABEL = 46  # characters
 TAILS = (20, 30, 8)  # characters after the part that is left out of a long label, tried in turn
 OF_ELASTOMER = tuple(each for each in PARAMETERS if each.table == "elastomer")
 MAX_STYLES = 8  # more markers of one colour cannot be told apart
+MAX_NAMED = 20  # a legend names up to so many curves; if there are more, some of them; a choice
 Colour = tuple[float, float, float]
 """Red, green, blue from 0 to 1."""
 
@@ -104,8 +106,9 @@ def curve_styles(curves: list[Curve]) -> list[CurveStyle]:
     """Colours along the ordered curves, one per elastomer; markers tell variants apart.
 
     Curves of one elastomer have a colour each. Curves that differ in their seed only have the same
-    style, and so have more than MAX_STYLES curves of one elastomer among others. If there is no
-    other elastomer, each of them has a colour instead, in their order.
+    style. So have the curves of each elastomer, if there are several elastomers and more than
+    MAX_STYLES curves of one of them, or more than MAX_NAMED in all. If there is no other elastomer,
+    each curve has a colour instead, in their order.
     """
     names = _elastomer_names(curves)
     alike = grouped(curves, lambda curve: curve.elastomer)
@@ -116,9 +119,9 @@ def curve_styles(curves: list[Curve]) -> list[CurveStyle]:
     if len(alike) == 1 and count > MAX_STYLES:
         (heading,) = distinct_labels([*names.values()])
         names = dict.fromkeys(names, "")  # labels of the parameters alone fit into several columns
-    elif count > MAX_STYLES:
+    elif count > MAX_NAMED or max(Counter(name for name, _ in set(pairs)).values()) > MAX_STYLES:
         pairs = [(curve.elastomer, _merged(curve, alike[curve.elastomer])) for curve in curves]
-    distinct = list(dict.fromkeys(pairs))
+    distinct = sorted(dict.fromkeys(pairs), key=lambda pair: [*names].index(pair[0]))
     labels = distinct_labels([_joined((names[elastomer], words)) for elastomer, words in distinct])
     styles = dict(zip(distinct, distinct_styles(labels), strict=True))
     if len(names) > 1:
@@ -139,7 +142,7 @@ def _elastomer_names(curves: list[Curve]) -> dict[str, str]:
     for base, alike in grouped(rows, kind).items():
         words = [_elastomer_words(rows[name]) for name in alike]
         differing = [len(set(column)) > 1 for column in zip(*words, strict=True)]
-        if any(differing):
+        if any(differing) or 1 == len(alike) < len(rows):
             labels = (_joined((base, *compress(each, differing)), " ") for each in words)
             names |= dict(zip(alike, labels, strict=True))
     if len(set(names.values())) < len(names):  # names that coincide
@@ -200,9 +203,19 @@ def _merged(curve: Curve, alike: list[Curve]) -> str:
 
 
 def _differing(curves: list[Curve]) -> list[str]:
-    """The parameters in which curves differ, the seed left out."""
+    """The parameters in which curves differ, the seed left out.
+
+    A key that only some curves have is left out where the others tell the curves apart.
+    """
     words = list(map(_words, curves))
-    return [key for key in words[0] if len({each[key] for each in words}) > 1]
+    values = {key: {each[key] for each in words} for key in words[0]}
+    every = [key for key in values if len(values[key]) > 1]
+    few = [key for key in every if len(values[key] - {""}) > 1]
+
+    def variants(keys: list[str]) -> int:
+        return len({tuple(map(each.get, keys)) for each in words})
+
+    return few if variants(few) == variants(every) else every
 
 
 def _joined(words: Iterable[str | None], separator: str = ", ") -> str:

@@ -208,10 +208,10 @@ def diff_table(difference: Difference) -> Table:
 def diff_text(difference: Difference) -> str:
     """The table, the rows of one study only, and the keys of the specs that differ."""
     lists = ("\n".join([f"{title}:", *lines]) for title, lines in diff_lists(difference).items())
-    return "\n\n".join([diff_table(difference).as_text() or _nothing(difference), *lists])
+    return "\n\n".join([diff_table(difference).as_text() or nothing_in_common(difference), *lists])
 
 
-def _nothing(difference: Difference) -> str:
+def nothing_in_common(difference: Difference) -> str:
     """That there is no pair, and the kinds of loads if they differ."""
     one, other = (sorted({str(row["load"]) for row in rows}) for rows in difference.only)
     if set(one) & set(other) or not (one and other):

@@ -30,7 +30,8 @@ class Spread:
     half_width: float
     """The mean of all seeds lies within mean +- half_width with 95 % confidence: Student's t, and
     the mean error of the single values, in the root of the sum of the squares. NaN where that is
-    zero: equal values, such as the same number of points in contact, do not show their scatter."""
+    zero: values that are equal up to their residuals, such as the same number of points in contact,
+    do not show their scatter."""
 
 
 @dataclass(frozen=True)
@@ -63,12 +64,14 @@ class Ensemble:
 
     def spread(self, name: str) -> Spread:
         """Spread of "a_r", "sigma_p" or "u_g", of the values of `best_of_all`."""
-        return spread_of(*zip(*best_of_all(self.rows, name), strict=True))
+        values, errors = zip(*best_of_all(self.rows, name), strict=True)
+        return spread_of(values, errors, residual_of(self.rows))
 
     def pressure_spread(self) -> Spread:
         """Spread of pressures that were searched. No interval if the error of one is unknown."""
         errors = [row["p_star_error"] for row in self.rows]
-        spread = spread_of([row["p_star"] for row in self.rows], errors)
+        pressures = [row["p_star"] for row in self.rows]
+        spread = spread_of(pressures, errors, residual_of(self.rows))
         if LOADS[self.rows[0]["load"]].searched not in QUANTITIES:  # the load has no errors
             return spread
         has_unknown = any(map(isnan, errors)) and any(map(_has_errors, self.rows))
@@ -93,15 +96,23 @@ class Ensemble:
         return record
 
 
-def spread_of(values: Sequence[float], errors: Sequence[float] = ()) -> Spread:
+def residual_of(rows: Sequence[Row]) -> float:
+    """The largest residual of some contacts: smaller relative differences are not significant."""
+    return max((row.get("residual", 0.0) for row in rows), default=0.0)
+
+
+def spread_of(
+    values: Sequence[float], errors: Sequence[float] = (), residual: float = 0.0
+) -> Spread:
     """Statistics of two values or more.
 
     `errors` are those of the single values, NaN where unknown. They do not average out: on the same
-    grid they may have the same sign for all seeds.
+    grid they may have the same sign for all seeds. `residual` is the relative difference up to
+    which values are equal.
     """
     numbers = np.asarray(values, np.float64)
     error = float(np.std(numbers, ddof=1)) / sqrt(numbers.size)
-    is_equal = np.ptp(numbers) <= 1e-12 * np.max(np.abs(numbers))  # but for rounding
+    is_equal = np.ptp(numbers) <= max(1e-12, residual) * np.max(np.abs(numbers))  # rounding
     t_factor = 0.0 if is_equal else float(stdtrit(numbers.size - 1, 0.5 + 0.5 * CONFIDENCE))
     shared = float(np.abs(errors).sum() / numbers.size)
     half_width = hypot(t_factor * error, 0.0 if isnan(shared) else shared)

@@ -14,7 +14,7 @@ import numpy as np
 from gfmd_cli.analysis.compare import Comparison, best_of_all, einstein_prediction
 from gfmd_cli.analysis.curve_styles import CurveStyle, StyledCurve, seed_groups, with_styles
 from gfmd_cli.analysis.distribution_figure import continuum_figure, distribution_figures
-from gfmd_cli.analysis.ensemble import by_load, spread_of
+from gfmd_cli.analysis.ensemble import by_load, residual_of, spread_of
 from gfmd_cli.analysis.plotting import DASHED, THEORY, ColumnFigure, styled
 from gfmd_cli.analysis.wording import contact_title, grid_size, in_si, quantity
 from gfmd_cli.files.atomic import make_folder
@@ -119,7 +119,9 @@ def _point(panel: Panel, records: list[Row]) -> tuple[float, float, float, float
     name = panel.column
     units = np.array([r[f"{name}_persson"] if panel.ratio else 1.0 for r in records])
     values, errors = np.transpose(best_of_all(records, name)) / units
-    half_width = spread_of(values, errors).half_width if len(records) > 1 else np.nan
+    half_width = np.nan
+    if len(records) > 1:
+        half_width = spread_of(values, errors, residual_of(records)).half_width
     p_star = np.mean([record["p_star"] for record in records])
     return float(p_star), float(values.mean()), float(np.abs(errors).mean()), half_width
 

@@ -11,7 +11,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from gfmd_cli.analysis.curve_styles import CurveStyle
+from gfmd_cli.analysis.curve_styles import MAX_NAMED, CurveStyle
 from gfmd_cli.analysis.selection import evenly
 from gfmd_cli.errors import INSTALL, InputError
 from gfmd_cli.files.atomic import write_whole
@@ -32,7 +32,7 @@ WIDTH, HEIGHT, ROW = 3.39, 2.35, 0.145  # inches: a column of 86 mm; a row of th
 SMALL = 8.0  # points
 COLUMN = 54  # characters and symbols that a row of the legend holds
 SYMBOL = 6  # characters that a symbol and the space around it take
-MAX_NAMED, NAMED = 20, 9  # a legend names up to 20 curves; if there are more, 9; a choice
+NAMED = 9  # curves that a legend names if there are more than MAX_NAMED; a choice
 SCRIPTED = 9.3  # points: sub- and superscripts are printed at 0.7 of it, 6.5 points
 STYLE = {
     "font.family": "DejaVu Sans",

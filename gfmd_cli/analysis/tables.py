@@ -115,15 +115,15 @@ BEST_VALUES = {
 TRUE_CONTACT = (
     P_STAR,
     AREA,
-    TableColumn("whole surface\na_r", "a_r_persson"),
-    TableColumn("\nratio", ratio("a_r", "a_r_persson")),
+    TableColumn("whole surface\na_r", "a_r_persson", optional=True),
+    TableColumn("\nratio", ratio("a_r", "a_r_persson"), optional=True),
     *(
         column
         for name, area in VARIANTS.items()
         for column in (
             TableColumn(f"{name}\n/ Delta_sigma", name),
-            TableColumn("\na_r", area),
-            TableColumn("\nratio", ratio("a_r", area)),
+            TableColumn("\na_r", area, optional=True),
+            TableColumn("\nratio", ratio("a_r", area), optional=True),
         )
     ),
 )
@@ -244,9 +244,11 @@ def continuum_table(curves: TitledCurves) -> Table:
 
 
 def true_contact_table(curves: TitledCurves) -> Table:
-    """Persson theory with Delta_sigma over the contact."""
-    caption = "Persson theory with Delta_sigma over the contact instead of over the whole surface."
-    return over_pressure(TRUE_CONTACT, f"{caption} {ON_GRIDS}", curves, VARIANTS.values())
+    """Delta_sigma over the contact, and Persson theory with it where that applies."""
+    caption = "Delta_sigma over the contact instead of over the whole surface."
+    if any(curve.has_theory for _, curve in curves):
+        caption = f"Persson theory with {caption}"
+    return over_pressure(TRUE_CONTACT, f"{caption} {ON_GRIDS}", curves, VARIANTS)
 
 
 def observables_table(curves: TitledCurves) -> Table:

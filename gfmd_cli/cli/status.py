@@ -105,8 +105,8 @@ def _lines(progress: "StudyProgress", shards: int | None) -> list[str]:
         if task.saved is not None:
             age = max(0.0, time.time() - task.saved.time)
             lines.append(
-                f"  {name}: state of step {task.saved.step} ({task.saved.points} points), residual "
-                f"{task.saved.residual:.1e}, saved {duration(age)} ago"
+                f"  {name}: state of step {task.saved.step} ({task.saved.points} points along x), "
+                f"residual {task.saved.residual:.1e}, saved {duration(age)} ago"
             )
     if progress.records:
         lines.append(f"  {count(progress.records, 'record')} not collected yet")

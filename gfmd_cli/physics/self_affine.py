@@ -16,6 +16,9 @@ from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.physics.indenters import MAX_POINTS, SMALLEST_GRID, RigidSurface
 from gfmd_cli.spec_table import Positive, Seed
 
+LARGEST_ROLLOFF = 1e6
+"""Largest lambda_r / L. It is above the longest wave of every cell."""
+
 
 class SelfAffine(RigidSurface):
     """Random self-affine surface: |h(q)| = sqrt(C(q)), phases uniform in (0, 2 pi).
@@ -64,8 +67,14 @@ class SelfAffine(RigidSurface):
     def smallest_grid(self) -> int:
         """Smallest number of points along x, two per lambda_s.
 
-        Raises InputError where no wave of the cell lies between lambda_r and lambda_s.
+        Raises InputError where no wave of the cell lies between lambda_r and lambda_s, and for a
+        meaningless lambda_r.
         """
+        if self.rolloff > LARGEST_ROLLOFF:
+            raise InputError(
+                f"surface.rolloff: {self.rolloff:g} given, out of range: it is in units of "
+                f"surface.length, and at most {LARGEST_ROLLOFF:g}"
+            )
         needed = max(SMALLEST_GRID, 2 * self.highest_modes[1])
         if self.spectrum == "cutoff" and needed <= MAX_POINTS:
             self._check_waves()

@@ -10,7 +10,7 @@ from collections import Counter
 from dataclasses import replace
 
 from gfmd_cli.analysis import tables
-from gfmd_cli.analysis.diff import NOTHING, diff, diff_lists, diff_table
+from gfmd_cli.analysis.diff import diff, diff_lists, diff_table, nothing_in_common
 from gfmd_cli.analysis.distribution_figure import Density, densities
 from gfmd_cli.analysis.figures import PANELS
 from gfmd_cli.analysis.table import Group, Table, TableColumn, product, ratio, records_of
@@ -197,7 +197,8 @@ def not_converged(data: ReportData) -> Section:
 def difference(one: ReportData, other: ReportData) -> Section:
     """What `gfmd diff` writes: pairs of contacts, rows of one study only, keys that differ."""
     differences = diff(one.comparison.path, other.comparison.path)
-    notes = [] if differences.pairs else [f"{NOTHING.capitalize()}."]
+    nothing = nothing_in_common(differences)
+    notes = [] if differences.pairs else [f"{nothing[:1].upper()}{nothing[1:]}."]
     lists = diff_lists(differences)
     tables = [diff_table(differences)]
     return Section("Difference", notes, tables, template="difference.html", content=lists)

@@ -4,6 +4,7 @@ import json
 from typing import Any
 
 from gfmd_cli.spec.check import shortened
+from gfmd_cli.units import DIGITS
 
 MAX_VALUE = 80  # characters of a value; a choice
 
@@ -26,8 +27,23 @@ def differences(old: Any, new: Any, where: str = "") -> list[str]:
         lines := differences(_swept(old), _swept(new), where)
     ):
         return lines  # else the combinations differ
-    texts = (shortened(json.dumps(value), MAX_VALUE) for value in (old, new))
-    return [] if old == new else [f"{where}: {' -> '.join(texts)}"]
+    texts = [_text(value) for value in (old, new)]
+    if len(set(texts)) == 1:
+        texts = [json.dumps(value) for value in (old, new)]
+    shown = (shortened(text, MAX_VALUE) for text in texts)
+    return [] if old == new else [f"{where}: {' -> '.join(shown)}"]
+
+
+def _text(value: Any) -> str:
+    """A value as JSON, but numbers as in labels: 7e+10 instead of 70000000000.0."""
+    if isinstance(value, float):
+        text, short = f"{value:.{DIGITS}g}", f"{value:g}"
+        return short if float(short) == float(text) else text
+    if isinstance(value, list):
+        return f"[{', '.join(map(_text, value))}]"
+    if isinstance(value, dict):
+        return f"{{{', '.join(f'{json.dumps(key)}: {_text(v)}' for key, v in value.items())}}}"
+    return json.dumps(value)
 
 
 def _is_sweep(value: Any) -> bool:

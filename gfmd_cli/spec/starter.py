@@ -143,13 +143,15 @@ def _with_values(
     """The lines of a table with its values, those of the given keys in the place of others."""
     new = {key: _line(key, values[key], COMMENT) for key in values if key in given}
     kind = values.get("kind") if "kind" in given else None
-    allowed = kinds[kind].model_fields if isinstance(kind, str) and kind in kinds else values
+    keys = kinds[kind].model_fields if isinstance(kind, str) and kind in kinds else None
     lines = []
     for line in section.rstrip().splitlines():
         match = re.match(r"(#?)(\w+) = ", line)
         if match and match[2] in new:
             lines.append(new.pop(match[2]))
-        elif match is None or match[1] or (match[2] in values and match[2] in allowed):
+        elif match is None or (
+            (match[1] or match[2] in values) and (keys is None or match[2] in keys)
+        ):
             lines.append(line)
     end = section[len(section.rstrip()) :]
     return "\n".join([*lines, *new.values()]) + end

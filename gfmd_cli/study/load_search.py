@@ -245,8 +245,8 @@ def _check_known(task: Task, solved: TaskSolution) -> None:
             f"{remedy}"
         )
     raise InputError(
-        f"load.{task.quantity}: the continuum value is not known on a grid of {task.points} "
-        f"points per side; try a finer grid, or {remedy}"
+        f"load.{task.quantity}: the continuum value is not known on a grid with "
+        f"{task.points} points along x; try a finer grid, or {remedy}"
     )
 
 

@@ -153,8 +153,8 @@ OBSERVABLES = (
         "percolation",
         Column(
             "percolates_x",
-            "1 if the gap (4-connected points) percolates along x, 0 if not; through the periodic "
-            "cell or, with a free boundary, from border to border",
+            "1 (yes) if the gap (4-connected points) percolates along x, 0 (no) if not; through "
+            "the periodic cell or, with a free boundary, from border to border",
             kind=int,
         ),
         lambda solved: solved.percolates[0],
@@ -163,7 +163,7 @@ OBSERVABLES = (
     ),
     Observable(
         "percolation",
-        Column("percolates_y", "the same along y; -1 for a line contact", kind=int),
+        Column("percolates_y", "the same along y; blank for a line contact", kind=int),
         lambda solved: solved.percolates[1] if len(solved.percolates) > 1 else None,
         "along y",
         is_flag=True,
