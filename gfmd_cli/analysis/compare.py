@@ -98,7 +98,7 @@ class Curve:
 
     @property
     def points(self) -> int:
-        """Grid points per side."""
+        """Grid points along x."""
         return int(self.rows[0]["points"])
 
     @property

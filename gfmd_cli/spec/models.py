@@ -285,7 +285,7 @@ class OutputTable(SpecTable):
     """Fields on the grid: displacement u, stress sigma = K u + p, height of the indenter, and
     contact_pressure, which is exactly zero off contact."""
     cross_section: bool = False
-    """Height, displacement and stress along the diagonal; for a line contact, along x."""
+    """All four fields along the diagonal; for a line contact, along x."""
     true_contact: bool = False
     """Rms stress in full contact, taken over the true contact instead of the whole cell: columns
     deviation_c, quadrature_c and deviation_bearing."""

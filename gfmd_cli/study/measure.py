@@ -1,7 +1,8 @@
 """What a study stores of one task: its row and its arrays.
 
 The row is built here alone. `planned` gives the columns that follow from the spec, `measured` those
-of a solved contact, `task_row` both, and `result` everything.
+of a solved contact, `all_columns` both and those on request, and `result` everything. `task_row`
+describes a stored row as the spec does.
 """
 
 from collections.abc import Mapping
