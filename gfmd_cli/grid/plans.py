@@ -3,7 +3,9 @@
 FFTW's wisdom (what it has measured) is stored as text: beside the study of a run, so that a resumed
 run uses the plans of the first one, and in the user's cache for other runs. One process at a time
 measures plans and stores them for the others, so that all processes of a machine compute the same
-bits.
+bits. The wisdom of each group of transforms is stored on its own, and all processes make their
+plans from this text alone, also that which has measured: FFTW takes parts of a plan from what it
+knows of other transforms, so that a plan would depend on which of them are known.
 """
 
 import hashlib
@@ -18,6 +20,7 @@ from functools import cache, partial
 from math import ceil
 from pathlib import Path
 from threading import Lock
+from types import SimpleNamespace
 from typing import Any, NamedTuple, TypeVar
 
 import pyfftw
@@ -31,11 +34,12 @@ from gfmd_cli.files.regular import read_regular
 T = TypeVar("T")
 Plan = Callable[..., Any]
 """Makes a plan on one thread from source, target, axes and direction."""
-Wisdom = list[str]
-"""Text in double and in single precision."""
+Wisdom = dict[str, list[str]]
+"""Texts in double and in single precision by the key of a group of transforms."""
 PLANNING_SECONDS = (30.0, 1e-6)  # time limit of a search for a plan: constant, and per grid point
 MAX_WISDOM_BYTES = 2**24  # of a file of wisdom
-MAX_CACHED_LINES = 10000  # in each precision; a new size adds some 20 and reads and writes all
+MAX_CACHED_LINES = 10000  # of wisdom; a new size adds some 40 and reads and writes all
+KEY = re.compile("[0-9a-f]{16}")
 WISDOM = re.compile(
     r"\([\w. -]+( #x[0-9a-f]{1,8}){4}\n"
     r"(  \(\w+ \d{1,4}( #x[0-9a-f]{1,5}){2} #x1?[0-9a-f]{1,2}( #x[0-9a-f]{1,8}){4}\)\n)*"
@@ -82,7 +86,8 @@ class _Planning(NamedTuple):
 _CACHED = _Planning()
 _planning: ContextVar[_Planning] = ContextVar("planning", default=_CACHED)
 """Planning of the present thread: a process may run several studies side by side."""
-_wisdom_of = _CACHED  # the run whose plans FFTW knows; those of another one may differ
+_known: Wisdom = {}
+_known_to = _CACHED  # the run of the known wisdom; that of another one may differ
 
 
 def plan_with(
@@ -90,12 +95,11 @@ def plan_with(
 ) -> str | None:
     """From now on store wisdom in `folder`, which starts with that of the cache, or only estimate.
 
-    This holds for the calling thread. The process forgets its own wisdom. Returns a warning if the
-    folder's wisdom is damaged.
+    This holds for the calling thread. Returns a warning if the folder's wisdom is damaged.
     """
     _planning.set(_Planning(folder, estimated, waits))
     with _planner:
-        _forget_wisdom()
+        _forget()
         _without_lock.clear()
     if folder is None or _is_estimated():
         return None
@@ -109,11 +113,11 @@ def plan_with(
     return f"{_path(folder)}: damaged; transforms are planned anew, last bits may differ"
 
 
-def _forget_wisdom() -> None:
-    """Forget all that FFTW knows, from now on for the run of this thread."""
-    global _wisdom_of
-    pyfftw.forget_wisdom()
-    _wisdom_of = _planning.get()
+def _forget() -> None:
+    """Forget all wisdom, from now on for the run of this thread."""
+    global _known_to
+    _known.clear()
+    _known_to = _planning.get()
 
 
 def _is_estimated() -> bool:
@@ -135,49 +139,81 @@ def planned_transforms(make: Callable[[Plan], T], size: int = 0) -> T:
     """
     fftw = partial(pyfftw.FFTW, planning_timelimit=PLANNING_SECONDS[0] + PLANNING_SECONDS[1] * size)
     with _planner:
-        if _wisdom_of != _planning.get():  # a run in another thread has planned since
-            _forget_wisdom()
         if _is_estimated():
             return make(partial(fftw, flags=("FFTW_ESTIMATE",)))
-        with suppress(RuntimeError):  # not known
-            return make(partial(fftw, flags=("FFTW_MEASURE", "FFTW_WISDOM_ONLY")))
-        return _measured(make, partial(fftw, flags=("FFTW_MEASURE",)))
+        if _known_to != _planning.get():  # a run in another thread has planned since
+            _forget()
+        key = _key(make)
+        with suppress(KeyError, RuntimeError):  # not known
+            return _by_wisdom(_known[key], make, fftw)
+        return _measured(key, make, fftw)
 
 
-def _measured(make: Callable[[Plan], T], fftw: Plan) -> T:
+def _key(make: Callable[[Plan], Any]) -> str:
+    """A name of a group of transforms by what FFTW is to plan: the layout of arrays, axes."""
+    problems: list[str] = []
+
+    def record(source: Any, target: Any, *others: Any) -> Any:
+        is_in_place = source.ctypes.data == target.ctypes.data
+        for array in (source, target):
+            offset = array.ctypes.data % pyfftw.simd_alignment
+            problems.append(f"{array.dtype.str} {array.shape} {array.strides} {offset}")
+        problems.append(f"{is_in_place} {others}")
+        return SimpleNamespace(execute=None)
+
+    make(record)
+    return hashlib.sha256("\n".join(problems).encode()).hexdigest()[:16]
+
+
+def _by_wisdom(texts: list[str], make: Callable[[Plan], T], fftw: Plan) -> T:
+    """The transforms that `make` plans, from their wisdom. Raises RuntimeError if it lacks one."""
+    pyfftw.forget_wisdom()
+    double, single = texts
+    pyfftw.import_wisdom((double.encode(), single.encode(), b""))  # third: of long double
+    return make(partial(fftw, flags=("FFTW_MEASURE", "FFTW_WISDOM_ONLY")))
+
+
+def _measured(key: str, make: Callable[[Plan], T], fftw: Plan) -> T:
     """The transforms that `make` plans, measured unless another process has measured them."""
     of_study = _planning.get().folder
     folder = of_study or cache_folder()
     with _planning_lock(folder) as alone:
-        _import(read_wisdom(folder))
-        before = _export()
-        transforms = make(fftw)
-        is_new = _export() != before
-        if is_new and of_study is not None:
-            _write(folder, _export())
-        elif is_new:
-            _add_to_cache(alone)
-    if is_new and of_study is not None:
+        stored = read_wisdom(folder) or {}
+        _known.update(stored)
+        with suppress(KeyError, RuntimeError):
+            return _by_wisdom(stored[key], make, fftw)
+        pyfftw.forget_wisdom()
+        transforms = make(partial(fftw, flags=("FFTW_MEASURE",)))
+        _known[key] = stored[key] = _export()
+        with suppress(RuntimeError):  # the time limit has ended the search
+            transforms = _by_wisdom(_known[key], make, fftw)
+        if of_study is None:
+            _add_to_cache(key, alone)
+        else:
+            _write(folder, stored)
+    if of_study is not None:
         with _planning_lock(cache_folder()) as alone:
-            _add_to_cache(alone)
+            _add_to_cache(key, alone)
     return transforms
 
 
-def _add_to_cache(alone: bool) -> None:
-    """Store what this process knows in the cache; `alone` says whether the cache is locked."""
+def _add_to_cache(key: str, alone: bool) -> None:
+    """Store what this process has measured in the cache; `alone` says whether this is locked."""
     if alone:
         remove_temporary(_path(cache_folder()))
-    _write(cache_folder(), _joined(read_wisdom(cache_folder()), _export()))
+    cached = read_wisdom(cache_folder()) or {}
+    _write(cache_folder(), _limited(cached | {key: cached.get(key, _known[key])}))
 
 
 def read_wisdom(folder: Path) -> Wisdom | None:
     """The wisdom of a folder; None if it is damaged, missing or of another machine."""
-    with suppress(OSError, ValueError, KeyError, TypeError, RecursionError):
+    with suppress(OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
         data = json.loads(read_regular(_path(folder), MAX_WISDOM_BYTES))
-        double, single = data["wisdom"]
-        known = data["for"] == _here() and data["sha256"] == _digest([double, single])
-        if known and WISDOM.fullmatch(double) and WISDOM.fullmatch(single):
-            return [double, single]
+        wisdom: Wisdom = data["wisdom"]
+        texts = [text for double, single in wisdom.values() for text in (double, single)]
+        known = data["for"] == _here() and data["sha256"] == _digest(wisdom)
+        if known and all(map(KEY.fullmatch, wisdom)) and all(map(WISDOM.fullmatch, texts)):
+            return wisdom
     return None
 
 
@@ -187,32 +223,22 @@ def _path(folder: Path) -> Path:
 
 
 def _digest(wisdom: Wisdom) -> str:
-    return hashlib.sha256("\n".join(wisdom).encode()).hexdigest()
+    return hashlib.sha256(json.dumps(wisdom).encode()).hexdigest()
 
 
-def _export() -> Wisdom:
+def _export() -> list[str]:
     return [text.decode("ascii") for text in pyfftw.export_wisdom()[:2]]
 
 
-def _joined(wisdom: Wisdom | None, more: Wisdom) -> Wisdom:
-    """Both; if they have more than `MAX_CACHED_LINES`, those lines that were added last.
-
-    A plan is a line, with flags and problem from word 3. Of two for one problem the first is kept.
-    """
-    joined = []
-    for old, new in zip(wisdom or more, more, strict=True):
-        first, *lines, last = old.splitlines()
-        known = {tuple(line.split()[2:]) for line in lines}
-        lines += [line for line in new.splitlines()[1:-1] if tuple(line.split()[2:]) not in known]
-        joined.append("\n".join([first, *lines[-MAX_CACHED_LINES:], last]) + "\n")
-    return joined
-
-
-def _import(wisdom: Wisdom | None) -> None:
-    """Add what other processes measured to the wisdom of this one."""
-    if wisdom is not None:
-        double, single = wisdom
-        pyfftw.import_wisdom((double.encode(), single.encode(), b""))  # third: of long double
+def _limited(wisdom: Wisdom) -> Wisdom:
+    """The groups that were added last, of at most `MAX_CACHED_LINES`."""
+    kept, lines = len(wisdom), 0
+    for texts in reversed(wisdom.values()):
+        lines += sum(text.count("\n") for text in texts)
+        if lines > MAX_CACHED_LINES:
+            break
+        kept -= 1
+    return dict(list(wisdom.items())[kept:])
 
 
 def _write(folder: Path, wisdom: Wisdom) -> None:
