@@ -38,7 +38,7 @@ Wisdom = dict[str, list[str]]
 """Texts in double and in single precision by the key of a group of transforms."""
 PLANNING_SECONDS = (30.0, 1e-6)  # time limit of a search for a plan: constant, and per grid point
 MAX_WISDOM_BYTES = 2**24  # of a file of wisdom
-MAX_CACHED_LINES = 10000  # of wisdom; a new size adds some 40 and reads and writes all
+MAX_CACHED_LINES = 20000  # of wisdom; a new size adds some 80 and reads and writes all
 KEY = re.compile("[0-9a-f]{16}")
 WISDOM = re.compile(
     r"\([\w. -]+( #x[0-9a-f]{1,8}){4}\n"
