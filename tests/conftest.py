@@ -94,16 +94,7 @@ def spec_of(tmp_path, request):
 
 
 @pytest.fixture
-def own_plans(tmp_path_factory, monkeypatch):
-    """Plans of the test's own, to compare bits.
-
-    Processes that earlier tests have left may add to the usual cache in between.
-    """
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("plans")))
-
-
-@pytest.fixture
-def goes_on_bit_for_bit(rows_of, tmp_path, own_plans, monkeypatch):
+def goes_on_bit_for_bit(rows_of, tmp_path, monkeypatch):
     """Run the module's SPEC with overrides, stopped at every eleventh report; compare with one run.
 
     Returns the row and the number of reports.
@@ -111,6 +102,8 @@ def goes_on_bit_for_bit(rows_of, tmp_path, own_plans, monkeypatch):
 
     def goes_on_bit_for_bit(*overrides):
         monkeypatch.setattr(run_task, "REPORT_EVERY", 0.0)
+        # Both studies have the plans of this cache: others may add to the usual one in between.
+        monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
         (straight,) = rows_of(*overrides)
         states = []
 

@@ -195,7 +195,7 @@ def run_page(page: Path, folder: Path, *, slow: bool) -> None:
 
 
 @pytest.fixture
-def folder(tmp_path, own_plans, monkeypatch):
+def folder(tmp_path, monkeypatch):
     monkeypatch.setenv("MPLBACKEND", "agg")
     monkeypatch.chdir(tmp_path)
     return tmp_path

@@ -522,7 +522,6 @@ STOPPED = {
 }
 
 
-@pytest.mark.usefixtures("own_plans")
 @pytest.mark.parametrize("case", STOPPED)
 def test_a_run_stopped_again_and_again_ends_bit_for_bit(run, case, monkeypatch, tmp_path):
     monkeypatch.setattr(run_task, "REPORT_EVERY", 0.0)
@@ -561,7 +560,7 @@ def assert_equal_studies(path, other):
                 np.testing.assert_array_equal(a[name][()], b[name][()], name)
 
 
-@pytest.mark.usefixtures("threads_by_size", "own_plans")
+@pytest.mark.usefixtures("threads_by_size")
 @pytest.mark.parametrize("jobs", ["1", "2"])
 def test_a_signal_saves_the_state_and_the_same_call_goes_on(run, tmp_path, jobs):
     unbroken, _, _ = run(LONG, name="unbroken.h5")
