@@ -167,8 +167,8 @@ class Curve:
         columns = {f"{name}_persson": getattr(self.prediction, name) for name in QUANTITIES}
         columns["p_star_persson_at_u_g"] = self.pressure_at_gap(self.column("u_g"))
         for name, key in VARIANTS.items():
-            area = contact_area(self.column(name), p_star)
-            columns[key] = area if self.has_theory else area * np.nan
+            deviation = self.column(name) if self.has_theory else np.full_like(p_star, np.nan)
+            columns[key] = contact_area(deviation, p_star)
         if self.n == 0 and self.has_theory:
             exact = einstein_prediction(p_star)
             columns |= {f"{name}_einstein": getattr(exact, name) for name in QUANTITIES}

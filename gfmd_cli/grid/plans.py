@@ -38,7 +38,7 @@ Wisdom = dict[str, list[str]]
 """Texts in double and in single precision by the key of a group of transforms."""
 PLANNING_SECONDS = (30.0, 1e-6)  # time limit of a search for a plan: constant, and per grid point
 MAX_WISDOM_BYTES = 2**24  # of a file of wisdom
-MAX_CACHED_LINES = 20000  # of wisdom; a new size adds some 80 and reads and writes all
+MAX_CACHED_LINES = 20000  # of wisdom; a new size adds some 50 and reads and writes all
 KEY = re.compile("[0-9a-f]{16}")
 WISDOM = re.compile(
     r"\([\w. -]+( #x[0-9a-f]{1,8}){4}\n"
@@ -87,7 +87,8 @@ _CACHED = _Planning()
 _planning: ContextVar[_Planning] = ContextVar("planning", default=_CACHED)
 """Planning of the present thread: a process may run several studies side by side."""
 _known: Wisdom = {}
-_known_to = _CACHED  # the run of the known wisdom; that of another one may differ
+"""What this process has read or measured for one run."""
+_known_to = _CACHED  # this run; the wisdom of another one may differ
 
 
 def plan_with(
@@ -150,7 +151,7 @@ def planned_transforms(make: Callable[[Plan], T], size: int = 0) -> T:
 
 
 def _key(make: Callable[[Plan], Any]) -> str:
-    """A name of a group of transforms by what FFTW is to plan: the layout of arrays, axes."""
+    """The key of a group of transforms: of the layout and axes of all arrays that it transforms."""
     problems: list[str] = []
 
     def record(source: Any, target: Any, *others: Any) -> Any:

@@ -87,15 +87,15 @@ def noisy(
 
 
 def noise_beyond(
-    period_limit: float, topography: Topography, spacing: tuple[float, ...], cutoff: float = 0.0
+    topography: Topography, spacing: tuple[float, ...], period_limit: float, cutoff: float = 0.0
 ) -> str:
     """A warning of strong waves that the microscope does not resolve, "" without it.
 
     Parameters
     ----------
-    period_limit : lateral period limit of the microscope [m], 0 if it is not known
     topography : the map
     spacing : its spacing [m]
+    period_limit : lateral period limit of the microscope [m], 0 if it is not known
     cutoff : cut-off wavelength of the S-filter [m]; 0 without it
     """
     if period_limit <= 2 * max(spacing):

@@ -538,7 +538,7 @@ def _warnings_on_heights(surface: FileSurface) -> tuple[str, ...]:
     rounded_trend = map_warnings.rounded_trend(topography, levelled, scale)
     cutoff, is_flipped = surface.s_filter or 0.0, surface.flip
     tip = blunted(known, spacing, scale, surface.tip_radius, cutoff=cutoff, flipped=is_flipped)
-    unresolved_noise = noise_beyond(surface.period_limit(), known, spacing, cutoff)
+    unresolved_noise = noise_beyond(known, spacing, surface.period_limit(), cutoff)
     is_explained = any((outliers, misread_map, points, lines, rounded, rounded_trend))
     return (
         filled_lines,
