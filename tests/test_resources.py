@@ -89,6 +89,10 @@ def test_each_cgroup_around_the_process_may_limit_its_memory(tmp_path, line, top
         for name, value in zip(names, (limit, used), strict=True):
             (folder / name).write_text(value + "\n")
     assert sorted(resources._cgroup_limits(membership, root)) == [700, 4600]
+    prefix = "total_" if top else ""
+    cache = f"anon 7\n{prefix}inactive_file 100\n{prefix}active_file 50\ninactive_anon 9\n"
+    (root / top / "slurm/job_7/memory.stat").write_text(cache)
+    assert sorted(resources._cgroup_limits(membership, root)) == [850, 4600]
     assert list(resources._cgroup_limits(tmp_path / "none", root)) == []
 
 

@@ -55,7 +55,7 @@ def available_memory() -> float:
     return min(limits)
 
 
-def _kernel_number(file: str, name: str) -> int | None:
+def _kernel_number(file: Path | str, name: str) -> int | None:
     """A number that the kernel gives in a file, after its name; None if it does not tell."""
     with suppress(OSError, ValueError, IndexError):
         return int(Path(file).read_text(encoding="ascii").partition(name)[2].split()[0])
@@ -75,7 +75,8 @@ def available_addresses() -> float:
 def _cgroup_limits(membership: Path, root: Path) -> Iterator[float]:
     """Bytes that the cgroups of this process leave, version 1 and 2: its own and all around it.
 
-    `membership` lists the groups of the process, and their files lie below `root`.
+    `membership` lists the groups of the process, and their files lie below `root`. What a group
+    uses includes the page cache of files, which the kernel gives back when memory is needed.
     """
     try:
         lines = membership.read_text(encoding="utf-8").splitlines()
@@ -84,15 +85,19 @@ def _cgroup_limits(membership: Path, root: Path) -> Iterator[float]:
     for line in lines:
         _, controllers, group = line.split(":", 2)
         if not controllers:
-            top, limit, used = root, "memory.max", "memory.current"
+            top, limit, used, prefix = root, "memory.max", "memory.current", ""
         elif "memory" in controllers.split(","):
-            top, limit, used = root / "memory", "memory.limit_in_bytes", "memory.usage_in_bytes"
+            top, prefix = root / "memory", "total_"  # those of the groups within included
+            limit, used = "memory.limit_in_bytes", "memory.usage_in_bytes"
         else:
             continue
         own = top / group.strip("/")
         for folder in (own, *own.parents):
             with suppress(OSError, ValueError):  # "max" is no number: no limit
-                yield float(int((folder / limit).read_text()) - int((folder / used).read_text()))
+                left = int((folder / limit).read_text()) - int((folder / used).read_text())
+                names = (f"\n{prefix}{kind}_file " for kind in ("active", "inactive"))
+                cached = (_kernel_number(folder / "memory.stat", name) or 0 for name in names)
+                yield float(left + sum(cached))
             if folder == top:
                 break
 
