@@ -17,7 +17,7 @@ from warnings import warn
 import numpy as np
 import tabulate
 
-from gfmd_cli.analysis.compare import Comparison
+from gfmd_cli.analysis.compare import Comparison, in_continuum
 from gfmd_cli.analysis.compare import compare as compare_study
 from gfmd_cli.analysis.export import as_dataset
 from gfmd_cli.analysis.table import Group, Table, TableColumn, plus_minus
@@ -47,6 +47,7 @@ NUMBERS = (
     "length", "length_y", "h_std", "delta_sigma", "a_r", "sigma_p", "u_g", "residual", "status",
 )  # fmt: skip
 """Attributes of a result that are columns of a study under the same name."""
+OF_CONTINUUM = {"a_r": "contact area", "sigma_p": "stress deviation", "u_g": "mean gap"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,9 +112,10 @@ class Result:
     def summary(self) -> dict[str, str]:
         """The numbers, with symbol and unit."""
         mean_gap, deviation = self.u_g * self.h_std, self.sigma_p * self.delta_sigma
+        points = " x ".join(map(str, self.height.shape[::-1]))
         numbers = {
             "status": f"{self.status}, natural residual {self.residual:.1e}",
-            "grid": f"{' x '.join(map(str, self.height.shape))} points, L = {self.length:.6g} m",
+            "grid": f"{points} points, L = {self.length:.6g} m",
             "nominal pressure": f"{self.nominal_pressure:.6g} Pa, p* = {self.p_star:.4g}",
             "contact area": f"a_r = {self.a_r:.5g}",
             "stress deviation": f"{deviation:.4g} Pa, sigma_p = {self.sigma_p:.5g} Delta_sigma",
@@ -121,10 +123,13 @@ class Result:
             "largest pressure": f"{self.pressure.max():.4g} Pa",
             "scales": f"h_std = {self.h_std:.4g} m, Delta_sigma = {self.delta_sigma:.4g} Pa",
         }
-        for name, symbol in {"contact area": "a_r", "mean gap": "u_g"}.items():
-            if self.columns.get(f"{symbol}_verdict") == Verdict.REGULAR:
+        for symbol, name in OF_CONTINUUM.items():
+            if verdict := self.columns.get(f"{symbol}_verdict"):
                 value, error = (self.columns[f"{symbol}_continuum{end}"] for end in ("", "_error"))
-                numbers[f"{name} in the continuum"] = f"{symbol} = {plus_minus(value, error)}"
+                of_it = f"{symbol} = {plus_minus(value, error)}"
+                if not in_continuum(self.columns, symbol):
+                    of_it = Verdict(verdict).explanation
+                numbers[f"{name} in the continuum"] = of_it
         return numbers | ({"warnings": "; ".join(self.warnings)} if self.warnings else {})
 
     def __str__(self) -> str:

@@ -15,6 +15,7 @@ import pytest
 import gfmd_cli
 from gfmd_cli import compare, dataset, rows, run, solve
 from gfmd_cli.errors import InputError
+from gfmd_cli.physics.error_estimates import Verdict
 from gfmd_cli.study.signals import interruptible, signal_handlers
 
 TABLES = {
@@ -332,6 +333,12 @@ def test_a_line_scan_at_unequal_distances_is_interpolated():
 def test_a_result_has_the_columns_of_a_study():
     accuracy = {"grid": {"points": "auto"}, "accuracy": {"contact_area": 0.1}}
     result = solve(TABLES | accuracy | {"output": {"patches": True}})
+    continuum = {name: text for name, text in result.summary().items() if "continuum" in name}
+    assert len(continuum) == 3
+    for symbol, text in zip(("a_r", "sigma_p", "u_g"), continuum.values(), strict=True):
+        verdict = Verdict(result.columns[f"{symbol}_verdict"])
+        assert text.startswith(f"{symbol} = ") == verdict.has_error
+        assert text == verdict.explanation or verdict.has_error
     assert result.columns["a_r_verdict"] == "regular"
     assert abs(result.columns["a_r_continuum"] - result.a_r) < 0.2 * result.a_r
     error = result.columns["a_r_continuum_error"]

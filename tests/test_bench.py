@@ -119,6 +119,17 @@ def test_an_open_choice_of_solver_compares_all_that_fit_the_elastomer(spec_of):
     assert kinds(spec)[-1] == ["pcg"]
 
 
+def test_a_solver_that_is_left_out_is_told(spec_of):
+    spec = spec_of("solver.kind=['auto', 'polonsky-keer']", "elastomer.n=[1, 3]", "grid.points=40",
+                   "load.p_star=[0.1, 0.2]")  # fmt: skip
+    told = []
+    traces = run_bench(spec, told.append)
+    solvers = [trace.row["solver"] for trace in traces]
+    assert solvers == ["pcg", "polonsky-keer", "pcg", "polonsky-keer", "pcg", "pcg"]
+    (warning,) = (each.message for each in told if each.event == "warning")
+    assert warning == "polonsky-keer is left out, as it does not suit power n=3"
+
+
 def test_a_reference_that_rounding_stops_is_as_good_as_it_gets(spec_of, monkeypatch):
     hopeless = REFERENCE.model_copy(update={"tolerance": 1e-16})
     monkeypatch.setattr(bench, "REFERENCE", hopeless)

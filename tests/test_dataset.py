@@ -139,6 +139,13 @@ def test_selections_can_be_joined(data):
     assert joined.sel(hurst=0.5, n=1).u_g.equals(parts[1].sel(n=1).u_g)
 
 
+def test_single_tasks_have_no_index_and_can_be_joined(data):
+    parts = [data.isel(task=task).a_r for task in (1, 0)]
+    assert parts[0].hurst == data.hurst[1]
+    joined = xarray.concat(parts, "task", coords="different", compat="equals")
+    assert data.a_r.values[[1, 0]].tolist() == joined.values.tolist()
+
+
 @pytest.mark.parametrize(("name", "what"), [("none.nc", "netCDF file"), ("none.h5", "study")])
 def test_a_file_that_does_not_exist_is_named(tmp_path, name, what):
     with pytest.raises(InputError) as caught:

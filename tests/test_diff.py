@@ -118,7 +118,7 @@ def test_another_elastomer_is_paired_by_pressure_and_compared_in_pascal_and_metr
             assert pair.deviation(name).relative == expected
         assert pair.deviation("a_r").relative < 0 < pair.deviation("u_g").relative
     text = output_of("diff", study_of(*IN_PASCAL), study_of(*stiff))
-    assert text.startswith("elastomers differ: paired by pressure, sigma_p in Pa, u_g in m. ")
+    assert text.startswith("Elastomers differ: paired by pressure, sigma_p in Pa, u_g in m. ")
     data = json.loads(output_of("diff", study_of(*IN_PASCAL), study_of(*stiff), "--json"))
     assert data["paired"] == difference.paired
     for row in data["rows"]:
@@ -147,7 +147,7 @@ def test_another_surface_of_one_elastomer_is_paired_by_load(output_of, study_of)
     difference = diff(one, other)
     assert [pair.one["p_star"] for pair in difference.pairs] == [0.1, 1.0]
     text = output_of("diff", one, other)
-    assert text.startswith("surfaces differ: paired by reduced pressure, values in reduced units")
+    assert text.startswith("Surfaces differ: paired by reduced pressure, values in reduced units")
     assert "A: power n=1 on self-affine cutoff=0.1\nB: power n=1 on self-affine hurst=0.5" in text
     assert "only in" not in text
 
@@ -166,7 +166,7 @@ def test_other_maps_of_one_name_are_other_surfaces(tmp_path):
         }
         studies.append(run(tables, tmp_path / name / "s.h5"))
     difference = diff(*studies)
-    assert difference.paired.startswith("surfaces differ")
+    assert difference.paired.startswith("Surfaces differ")
     assert difference.pairs[0].physical
 
 

@@ -30,6 +30,7 @@ from gfmd_cli.report.maps import STRESS_SCALE, read_profile
 from gfmd_cli.report.page import report
 from gfmd_cli.report.rendering import environment, typeset
 from gfmd_cli.report.summary import headline, key_numbers, warnings
+from gfmd_cli.report.surface import surface_spectrum
 from gfmd_cli.report.theme import DARK, LEGIBLE, LIGHT, PALETTE, contrast, toned
 from gfmd_cli.study.column import Column
 from gfmd_cli.study.reading import ATTRIBUTES_SUM, attributes_sum, open_study, read_rows
@@ -481,8 +482,8 @@ def test_at_a_free_border_the_cross_section_avoids_rows_near_it(invoke, tmp_path
         loads = np.maximum(file.arrays("fields", 1)["sigma"], 0.0).sum(axis=1)
     assert loads.argmax() == 0
     assert loads[19] > 0
-    assert "away from the borders that carries most load (y = 0.59 of" in both.place
-    assert "the row that carries most load (y = 0.00 of" in alone.place
+    assert f"away from the borders that carries most load (y = 59.4{SPACE}µm)" in both.place
+    assert f"the row that carries most load (y = 0{SPACE}m)" in alone.place
 
 
 def test_alternative_texts_name_curves_and_contacts(whole):
@@ -719,7 +720,36 @@ def test_a_single_contact_is_told_in_the_singular(invoke, tmp_path):
     path = solved(invoke, tmp_path, ONE + "[solver]\nmax_steps = 1\nnested = false\n")
     (first, *_) = warnings(read_report_data(path, ""))
     assert first == "1 of 1 contact: tolerance not reached."
-    assert "Shown: 1 of 1 contact with stored fields, 12 at most." in report(path)
+    assert "Shown: 1 of 1 contact with stored fields or cross-sections, 12 at most." in report(path)
+
+
+def test_fields_without_a_picture_are_told_what_they_lack(invoke, tmp_path):
+    text = ONE.replace('fields = ["u", "sigma", "height"]\ncross_section = true', 'fields = ["u"]')
+    page = report(solved(invoke, tmp_path, text))
+    assert "The study stores no fields that are shown here." in page
+    assert "contact with stored fields" not in page
+
+
+def test_a_surface_on_several_grids_has_one_spectrum(invoke, tmp_path):
+    path = solved(invoke, tmp_path, SPEC.replace("points = 64", "points = [64, 72]"))
+    section = surface_spectrum(read_report_data(path, ""))
+    assert section.drawings[0].svg.count("cutoff=0.1 seed=") == 2  # in the alternative text
+    (table,) = (table for title, table in section.disclosed.items() if title.startswith("Table"))
+    assert len(table.groups) == 2
+
+
+def test_no_ratio_of_gaps_is_told_where_all_are_tiny(invoke, tmp_path):
+    path = solved(invoke, tmp_path, ONE.replace("p_star = 0.3", "p_star = 1.0"))
+    names = [name for name, *_ in key_numbers(read_report_data(path, ""))]
+    assert "Area / Persson theory" in names
+    assert "Gap / Persson theory" not in names
+
+
+def test_tasks_that_failed_are_not_said_to_be_waiting(invoke, tmp_path):
+    path = solved(invoke, tmp_path, ONE.replace("p_star = 0.3", "contact_area = [0.3, 1e-9]"))
+    page = " ".join(report(path).split())
+    assert "1 of 2 is not solved yet or failed." in page
+    assert "<code>gfmd status</code> prints the errors of those that failed" in page
 
 
 def test_the_headline_of_an_unfinished_study_names_all_that_its_spec_has(invoke, tmp_path):

@@ -210,7 +210,10 @@ def test_another_solver_is_advised_only_to_those_who_chose_one(kind, other):
 
 def test_the_error_that_ended_a_task_is_told_until_the_study_is_complete(gfmd):
     Path("spec.toml").write_text(SPEC.replace("p_star = [0.1, 1.0]", "contact_area = [0.1, 1e-4]"))
+    assert answer(gfmd("status", "spec.toml", "--json"))["next"] == "gfmd run spec.toml"
     assert gfmd("run", "spec.toml").exit_code == 1
+    told = answer(gfmd("status", "spec.toml", "--json"))["next"]
+    assert told == "gfmd run spec.toml    # when the causes of the failures are removed"
     (parts,) = Path().glob("*.parts")
     for path in ("spec.toml", "small.h5"):
         state = answer(gfmd("status", path, "--json"))

@@ -52,6 +52,14 @@ def test_before_any_task_the_forecast_is_told(time):
     assert clock_of(time, task(0, 3.0), task(1, 5.0), jobs=2).left() == 4.0
 
 
+def test_no_time_is_left_at_the_end(time):
+    """0.1 + 0.2 - 0.1 - 0.2 is not zero."""
+    clock = clock_of(time, task(0, 0.1), task(1, 0.2), task(2, 0.3))
+    for index in (0, 1, 2):
+        clock.update(word(index, "end"))
+    assert clock.left() >= 0
+
+
 def test_forecasts_are_corrected_by_what_ended_of_the_same_elastomer(time):
     clock = clock_of(time, task(0, 1.0), task(1, 1.0), task(2, 1.0, "b"), task(3, 1.0, "b"))
     for index, seconds in ((0, 10.0), (2, 2.0)):

@@ -28,7 +28,8 @@ docs/energy_weights.md, or coarse-graining without any constant."""
 VARIANTS = {
     name: f"a_r_persson_{name}" for name in ("deviation_bearing", "deviation_c", "quadrature_c")
 }
-"""Columns with Delta_sigma over the contact, and the keys of Persson's contact areas with it."""
+"""Columns that hold Delta_sigma over the contact; for each, the key of the contact area that
+Persson theory gives with it."""
 
 
 def in_continuum(row: Mapping[str, Any], name: str) -> bool:
@@ -43,10 +44,10 @@ def best_of_all(rows: Sequence[Row], name: str) -> list[tuple[float, float]]:
     NaN where it is known of some rows only; of the grid where no row was to have a continuum value.
     Of a single row: of the continuum where that is known, else of the grid.
     """
-    known = all(in_continuum(row, name) for row in rows)
-    if len(rows) > 1 and not known and any(row.get(f"{name}_verdict") for row in rows):
+    are_known = all(in_continuum(row, name) for row in rows)
+    if len(rows) > 1 and not are_known and any(row.get(f"{name}_verdict") for row in rows):
         return [(np.nan, np.nan)] * len(rows)
-    value = f"{name}_continuum" if known else name
+    value = f"{name}_continuum" if are_known else name
     return [(float(row[value]), float(row[f"{value}_error"])) for row in rows]
 
 
@@ -83,8 +84,8 @@ class Curve:
     study: str = ""
     """Name of the study where several are shown side by side."""
     spectrum_row: Row | None = None
-    """A contact on the grid of the spectrum, on which h_std and Delta_sigma of a map may depend; by
-    default the first."""
+    """A row on the grid of which the study stores the spectrum; for a map, h_std and Delta_sigma
+    depend on this grid. By default the first row."""
 
     @property
     def elastomer(self) -> str:
@@ -118,7 +119,7 @@ class Curve:
 
     @property
     def row_of_spectrum(self) -> Row:
-        """A contact on the grid of the spectrum."""
+        """A row on the grid of the spectrum."""
         return self.spectrum_row or self.rows[0]
 
     @property
@@ -196,9 +197,9 @@ class Comparison:
     """Attributes of the study file."""
 
     @property
-    def missing(self) -> int:
-        """Number of the tasks that the study does not hold yet."""
-        return len(self.rows) - len(solved_rows(self.rows))
+    def missing(self) -> list[int]:
+        """Tasks without a result: not run yet, or failed."""
+        return [row["task"] for row in self.rows if not row["status"].is_solved]
 
     @property
     def has_theory(self) -> bool:

@@ -31,7 +31,7 @@ LEGEND = (
 )
 NOTHING = "no contact in common"
 CONTACT = ("surface", "seed", "elastomer", "load", "load_value")
-"""Keys that both rows of a pair share, unless the studies are paired by load."""
+"""Keys that both rows of a pair share; of studies that are paired by load alone, those of A."""
 OF_EACH = ("boundary", "points", "points_y", "p_star")
 """Keys that each row of a pair has for itself."""
 
@@ -169,7 +169,7 @@ def _pairing_note(pair: Pair) -> str:
     ]
     load = LOADS[pair.one["load"]].words
     units = "sigma_p in Pa, u_g in m" if pair.physical else "values in reduced units"
-    return f"{' and '.join(differing)} differ: paired by {load}, {units}"
+    return f"{' and '.join(differing).capitalize()} differ: paired by {load}, {units}"
 
 
 def _load(record: Record) -> str:

@@ -51,8 +51,8 @@ class Extrapolated:
     log_density: Field
     """ln Pr."""
     discretisation: Field
-    """What extrapolation has added to ln Pr, or the change it could not be based on: taken as a
-    standard error that all bins share, with its sign."""
+    """What extrapolation has added to ln Pr or, where the change between grids is irregular and
+    nothing was added, this change: taken as a standard error that all bins share, with its sign."""
     counting: Field
     """Standard error of ln Pr by the number of points in the bins, as if drawn independently.
 
@@ -67,8 +67,9 @@ def extrapolate(counts: Field, cells: Sequence[int]) -> Extrapolated:
 
     Parameters
     ----------
-    counts : points in the bins of `LOGARITHMIC_EDGES`, shape (grids, bins), grids rising by twos
-    cells : points of each grid's cell, or of all cells that were counted together
+    counts : points in the bins of `LOGARITHMIC_EDGES`, shape (grids, bins), each grid with twice
+        the points of the one before
+    cells : points counted on each grid, times the seeds if these are added
     """
     widths = np.diff(LOGARITHMIC_EDGES)
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -219,7 +219,7 @@ def _draw(
     known = np.isfinite(stress.density) & np.isfinite(stress.error)
     x, y, error = sigma[known], stress.density[known], stress.error[known]
     bars = np.array([y * -np.expm1(-error), y * np.expm1(error)])  # of ln Pr
-    plot.points(style, x, y, error=bars)
+    plot.points(style, x, y, [stress.finest["status"]] * x.size, error=bars)
     visible = y > MIN_DENSITY * y.max()
     return float(x[visible].min()), float(x[visible].max()), float(y[visible].min()), float(y.max())
 

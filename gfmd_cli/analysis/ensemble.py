@@ -29,9 +29,9 @@ class Spread:
     """Standard error of the mean over n seeds: standard deviation (n - 1) over sqrt(n)."""
     half_width: float
     """The mean of all seeds lies within mean +- half_width with 95 % confidence: Student's t, and
-    the mean error of the single values, in the root of the sum of the squares. NaN where that is
-    zero: values that are equal up to their residuals, such as the same number of points in contact,
-    do not show their scatter."""
+    the mean error of the single values, in the root of the sum of the squares. NaN if all values
+    are equal within their residuals and have no errors, such as the same number of points in
+    contact: their scatter is then unknown, not zero."""
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,7 @@ from gfmd_cli.study.reading import StudyFile, open_study, read_rows, solved_rows
 
 FORMULA = ("=", "+", "-", "@", "\t", "\r")
 """Characters with which a formula of a spreadsheet begins."""
-THEORY = (*(f"{name}_persson" for name in QUANTITIES), "p_star_persson_at_u_g")
+THEORY_COLUMNS = (*(f"{name}_persson" for name in QUANTITIES), "p_star_persson_at_u_g")
 _PARAMETER_NAMES = (each.column.name for each in layout.PARAMETERS)
 COORDINATES = tuple(dict.fromkeys(("surface", "elastomer", *_PARAMETER_NAMES, "p_star")))
 """Columns that are coordinates of the data set: labels, parameters and the reduced pressure."""
@@ -73,7 +73,7 @@ def as_records(comparison: Comparison) -> list[dict[str, Any]]:
     records = []
     names = column_names(comparison.records)
     for curve in comparison.curves:
-        keys = [*names, *(THEORY if curve.has_theory else ())]
+        keys = [*names, *(THEORY_COLUMNS if curve.has_theory else ())]
         if curve.stores(VARIANTS.values()):
             keys += VARIANTS.values()
         for row in curve.records:

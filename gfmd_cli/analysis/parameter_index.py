@@ -37,9 +37,10 @@ class ParameterIndex(xarray.Index):  # type: ignore[misc]
         """The coordinates."""
         return dict(self.variables)
 
-    def isel(self, indexers: Mapping[Any, Any]) -> "ParameterIndex":
-        """The index of some of the tasks."""
-        return type(self)({name: each.isel(indexers) for name, each in self.variables.items()})
+    def isel(self, indexers: Mapping[Any, Any]) -> "ParameterIndex | None":
+        """The index of some of the tasks; None of a single one, which has no dimension left."""
+        selected = {name: each.isel(indexers) for name, each in self.variables.items()}
+        return type(self)(selected) if all(each.ndim for each in selected.values()) else None
 
     def rename(
         self, name_dict: Mapping[Any, Hashable], dims_dict: Mapping[Any, Hashable]

@@ -242,7 +242,8 @@ class ColumnFigure(LegendFigure):
         for missed, marker in {"": style.marker, **SHORTFALL_MARKERS}.items():
             mask = shortfalls == missed
             names = (style.label, missed) if missed else (style.label,)
-            self.axes.plot(x[mask], y[mask], marker=marker, markevery=every, **options)
+            shown = 1 if missed else every
+            self.axes.plot(x[mask], y[mask], marker=marker, markevery=shown, **options)
             if np.any(mask):
                 layer = PlotLayer("points", names, x[mask], y[mask], to_hex(style.colour), marker)
                 texts = list(compress(details, mask))

@@ -25,7 +25,7 @@ class TableColumn:
     """One column of a table."""
 
     heading: str
-    """Plain text; symbols as the columns of `gfmd export` have them."""
+    """Plain text; symbols written as in `gfmd export`, such as a_r."""
     value: Value
     format: str = "#.4g"
     unit: str = ""

@@ -78,14 +78,15 @@ def pretty(value: float) -> str:
 
 def span(values: Iterable[float], unit: str = "") -> str:
     """From the least to the largest of the finite values."""
-    known = [value for value in values if math.isfinite(value)]
-    if not known:
+    finite = [value for value in values if math.isfinite(value)]
+    if not finite:
         return "unknown"
-    low, high = (quantity(end, unit) if unit else pretty(end) for end in (min(known), max(known)))
+    least, most = min(finite), max(finite)
+    low, high = (quantity(end, unit) if unit else pretty(end) for end in (least, most))
     if low == high:
         return low
     bare, _, low_unit = low.rpartition(SPACE)
-    shares_unit = unit and (high.endswith(SPACE + low_unit) or min(known) == 0)
+    shares_unit = unit and (high.endswith(SPACE + low_unit) or least == 0)
     return f"{bare if shares_unit else low} to {high}"
 
 

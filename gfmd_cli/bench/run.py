@@ -106,10 +106,14 @@ def solvers_to_compare(spec: Spec, task: Task, contact: Contact) -> list[Solver]
     if len(solvers) == 1 and isinstance(solvers[0], Auto):
         kinds = COMPARED if contact.is_periodic else (Auto,)
         solvers = [kind(**solvers[0].shared_keys()) for kind in kinds]
+    chosen = [solver.for_contact(contact) for solver in solvers]
+    return list(dict.fromkeys(solver for solver in chosen if _suits(solver, task)))
+
+
+def _suits(solver: Solver, task: Task) -> bool:
+    """Whether a solver suits the elastomer of a task; one for some n suits no other k(q)."""
     n = task.elastomer.exponent
-    steepness = np.inf if n is None else n  # unknown: only what suits all elastomers
-    suited = [solver.for_contact(contact) for solver in solvers]
-    return list(dict.fromkeys(s for s in suited if steepness <= s.max_exponent))
+    return (np.inf if n is None else n) <= solver.max_exponent
 
 
 def run_bench(spec: Spec, report: Report) -> list[Trace]:
@@ -126,6 +130,11 @@ def run_bench(spec: Spec, report: Report) -> list[Trace]:
     if any(task.auto for task in tasks):
         raise InputError('grid.points: gfmd bench needs a number, not "auto"')
     check_memory(tasks)
+    for elastomer, (task, *_) in grouped(tasks, lambda task: task.elastomer).items():
+        for named in spec.solver:
+            if not _suits(named, task):
+                left_out = f"{named.kind} is left out, as it does not suit {elastomer.label}"
+                report(Progress(-1, "warning", "", message=left_out))
     traces: list[Trace] = []
     for in_scene in grouped(tasks, lambda task: task.scene_id).values():
         first = in_scene[0]

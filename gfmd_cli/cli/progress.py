@@ -13,8 +13,8 @@ if TYPE_CHECKING:
     from gfmd_cli.study.context import Progress, Report
 
 LOG_EVERY = 60.0  # seconds between two lines where stderr is no terminal
-TASK = "{desc}: {n_fmt} steps, {elapsed}{postfix}"
-RUN = "{desc}, {elapsed} so far"
+TASK_BAR = "{desc}: {n_fmt} steps, {elapsed}{postfix}"
+RUN_BAR = "{desc}, {elapsed} so far"
 
 
 class Reporter:
@@ -57,14 +57,14 @@ class Reporter:
 
         if progress.tasks_left is not None:
             if None not in self.bars:
-                self.bars[None] = tqdm(position=0, leave=False, bar_format=RUN)
+                self.bars[None] = tqdm(position=0, leave=False, bar_format=RUN_BAR)
             self.bars[None].set_description_str(_left(progress))
         if progress.event == "end":
             self._close(progress.task)
             return
         bar = self.bars.get(progress.task)
         if bar is None:
-            bar = tqdm(desc=printable(progress.label), leave=False, bar_format=TASK)
+            bar = tqdm(desc=printable(progress.label), leave=False, bar_format=TASK_BAR)
             self.bars[progress.task] = bar
         if progress.event == "step":
             bar.n = progress.step

@@ -24,7 +24,8 @@ if TYPE_CHECKING:
     type=click.Choice(["paper", "fitted", "coarse-grained"]),
     default="paper",
     show_default=True,
-    help="Theory of the mean gap; see docs/theory.md.",
+    help="Theory of the mean gap: Persson's with the weight of the paper, with a weight that is "
+    "fitted to simulations, or coarse-graining without a constant.",
 )
 def analyze(study: Path, as_json: bool, figures: Path | None, theory: "Theory") -> None:
     """Compare a study with Persson theory.
@@ -47,7 +48,7 @@ def analyze(study: Path, as_json: bool, figures: Path | None, theory: "Theory") 
         print_text(str(comparison))
     if comparison.missing:
         note = (
-            f"{count(comparison.missing, 'task')} not solved yet or failed; `gfmd status "
+            f"{count(len(comparison.missing), 'task')} not solved yet or failed; `gfmd status "
             f"{typed(study)}` prints the errors."
         )
         if as_json:

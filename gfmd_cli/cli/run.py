@@ -74,8 +74,8 @@ def _shard(context: click.Context, parameter: click.Parameter, text: str | None)
     "--max-hours",
     metavar="HOURS",
     type=Number(min=0, min_open=True),
-    help="Stop before this wall time has passed: save all states, exit with status 75. However "
-    "short the time, a call makes at least one step.",
+    help="Stop before this wall time has passed: save all states, exit with status 75. Each "
+    "call makes at least one step, even if that takes longer.",
 )
 @click.option(
     "--reproducible",
@@ -83,7 +83,7 @@ def _shard(context: click.Context, parameter: click.Parameter, text: str | None)
     help="Give bit-identical results in every run on one machine, but slower: one thread a task, "
     "and no search for the fastest Fourier transform.",
 )
-@click.option("-q", "--quiet", is_flag=True, help="Print only errors.")
+@click.option("-q", "--quiet", is_flag=True, help="Print only errors and warnings.")
 def run(
     specs: tuple[Path, ...],
     output: Path | None,

@@ -54,11 +54,6 @@ class ReportData:
         return [row for row in self.solved if not row["status"].is_converged]
 
     @property
-    def missing(self) -> list[str]:
-        """The tasks that are not solved yet."""
-        return [str(row["task"]) for row in self.comparison.rows if not row["status"].is_solved]
-
-    @property
     def name(self) -> str:
         """Name of the study; of two studies, which may share it, that of the file."""
         study = self.comparison

@@ -15,7 +15,14 @@ from gfmd_cli.analysis.plotting import HEIGHT, WIDTH, ColumnFigure, LegendFigure
 from gfmd_cli.analysis.selection import evenly, grouped
 from gfmd_cli.analysis.table import Group, Table
 from gfmd_cli.analysis.tables import AREA, ELASTOMER, P_STAR, POINTS, PRESSURE, TASK
-from gfmd_cli.analysis.wording import contact_and_boundary, in_si, largest, pressure_text, shown
+from gfmd_cli.analysis.wording import (
+    contact_and_boundary,
+    in_si,
+    largest,
+    pressure_text,
+    quantity,
+    shown,
+)
 from gfmd_cli.grid.arrays import Field, Mask
 from gfmd_cli.maps.pictures import block_sums
 from gfmd_cli.physics.observables import contact_points
@@ -72,18 +79,18 @@ def maps(data: ReportData) -> Section:
     with open_study(data.comparison.path) as study:
         tasks = {task for group in STORED for task in study.tasks_with(group)}
         rows_with_fields = [row for row in data.solved if row["task"] in tasks]
-        contacts_by_curve = _chosen(rows_with_fields)
-        contacts = [row for rows in contacts_by_curve for row in rows]
-        series = [
-            {
-                "title": contact_and_boundary(rows[0]),
-                "contacts": [_contact_maps(study, row, data.prefix) for row in rows],
-            }
-            for rows in contacts_by_curve
-        ]
+        contacts: list[Row] = []
+        series = []
+        for rows in _chosen(rows_with_fields):
+            drawn = [(row, _contact_maps(study, row, data.prefix)) for row in rows]
+            drawn = [(row, each) for row, each in drawn if each["drawings"]]
+            contacts += [row for row, _ in drawn]
+            if drawn:
+                title = contact_and_boundary(rows[0])
+                series.append({"title": title, "contacts": [each for _, each in drawn]})
     notes = [
-        f"Shown: {len(contacts)} of {count(len(rows_with_fields), 'contact')} with stored fields, "
-        f"{MAX_CONTACTS} at most."
+        f"Shown: {len(contacts)} of {count(len(rows_with_fields), 'contact')} with stored fields "
+        f"or cross-sections, {MAX_CONTACTS} at most."
     ]
     if any(plane(row) and max(row["points"], row["points_y"]) > SIDE for row in contacts):
         notes.append(f"Maps have up to {SIDE} pixels a side, each the mean of some grid points.")
@@ -265,9 +272,9 @@ def _most_loaded(study: StudyFile, row: Row) -> Profile | None:
     top, size = int(np.argmax(loads)), values["sigma"].size
     position = (np.arange(size) / size + row["x_first"]) * float(row["length"])
     inside = " away from the borders" if 0 < border <= top < loads.size - border else ""
-    place = (
-        f" through the row{inside} that carries most load (y = {top / loads.size:.2f} of the side)"
-    )
+    y_of_row = (top / loads.size + row["x_first"]) * float(row["length_y"])
+    at = quantity(y_of_row, "m") if in_si(row, "m") else f"{y_of_row / row['length']:.2f} L"
+    place = f" through the row{inside} that carries most load (y = {at})"
     return Profile(values, position, "x", row, place)
 
 

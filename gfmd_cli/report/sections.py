@@ -51,7 +51,8 @@ DISTRIBUTIONS = {
     "stress_distribution": (
         "Distribution of the stress over logarithmic stress, elastomers side by side",
         "Pr(sigma) of the elastomers at about one pressure, over logarithmic bins. Symbols: "
-        "simulation{lines}. Bins with fewer than ten grid points are left out.",
+        "simulation{lines}. Bins with fewer than ten grid points, on average over the seeds, are "
+        "left out.",
         "Table: elastomers at about one pressure",
     ),
     "stress_distribution_pressures": (
@@ -182,8 +183,8 @@ def work_precision(data: ReportData) -> Section:
 
 def not_converged(data: ReportData) -> Section:
     """Contacts that are not converged or missing."""
-    not_converged, missing = data.not_converged, data.missing
-    tasks = ", ".join(missing[:MAX_ROWS]) + (", ..." if len(missing) > MAX_ROWS else "")
+    not_converged, missing = data.not_converged, data.comparison.missing
+    tasks = ", ".join(map(str, missing[:MAX_ROWS])) + (", ..." if len(missing) > MAX_ROWS else "")
     left_out = len(not_converged) > MAX_ROWS
     return Section(
         "Not converged or missing",

@@ -41,7 +41,7 @@ def headline(data: ReportData) -> str:
         f"{count(len(rows), 'contact')}: {_names_of(elastomers, 'elastomer')}, "
         f"{_names_of(surfaces, 'surface')}, {count(seeds, 'seed') + ', ' if seeds > 1 else ''}"
         f"{count(pressures, 'pressure')}, p* = {_span(solved, 'p_star')}{pascals}"
-        f"{' so far' if data.missing else ''}, {grid_size(solved)}."
+        f"{' so far' if data.comparison.missing else ''}, {grid_size(solved)}."
     )
 
 
@@ -54,7 +54,7 @@ def _names_of(names: list[str], what: str) -> str:
 
 def success(data: ReportData) -> str:
     """Statement that all contacts have converged; empty if some have not."""
-    if data.not_converged or data.missing:
+    if data.not_converged or data.comparison.missing:
         return ""
     total = len(data.comparison.rows)
     return f"All {total} contacts converged." if total > 1 else "The contact converged."
@@ -124,27 +124,28 @@ def _theory_numbers(data: ReportData) -> list[KeyNumber]:
         return []
     area, gap = (_continuum_note(data.solved, name) for name in ("a_r", "u_g"))
     up_to = f"u_g up to p* = {MAX_GAP_RATIO_P_STAR}{gap}"
-    return [
+    numbers = [
         ("Area / Persson theory", _ratios(data, "a_r", math.inf), f"a_r{area}"),
         ("Gap / Persson theory", _ratios(data, "u_g", MAX_GAP_RATIO_P_STAR), up_to),
     ]
+    return [(title, span(ratios), note) for title, ratios, note in numbers if ratios]
 
 
 def _continuum_note(rows: list[Row], name: str) -> str:
     """Whether the values are those of the continuum; empty where none is."""
-    known = [in_continuum(row, name) for row in rows]
-    if not any(known):
+    are_known = [in_continuum(row, name) for row in rows]
+    if not any(are_known):
         return ""
-    return ", in the continuum" + ("" if all(known) else " where known")
+    return ", in the continuum" + ("" if all(are_known) else " where known")
 
 
-def _ratios(data: ReportData, name: str, limit: float) -> str:
+def _ratios(data: ReportData, name: str, limit: float) -> list[float]:
     """Simulation over theory at reduced pressures up to `limit`."""
-    return span(
+    return [
         record[f"{name}_best"] / record[f"{name}_persson"]
         for record in data.comparison.records
         if record[f"{name}_persson"] > 0 and record["p_star"] <= limit
-    )
+    ]
 
 
 def _column(rows: list[Row], name: str) -> list[float]:
@@ -162,8 +163,8 @@ def _si_span(rows: list[Row], name: str, unit: str) -> str:
 
 def _si_note(rows: list[Row], unit: str) -> str:
     """How many contacts have values in SI units, if not all have them."""
-    known = sum(in_si(row, unit) for row in rows)
-    return "" if known == len(rows) else f"; in {unit}: {known} of {len(rows)} contacts"
+    number = sum(in_si(row, unit) for row in rows)
+    return "" if number == len(rows) else f"; in {unit}: {number} of {len(rows)} contacts"
 
 
 def csv_address(data: ReportData) -> str:
@@ -174,13 +175,14 @@ def csv_address(data: ReportData) -> str:
 
 def warnings(data: ReportData) -> list[str]:
     """Warnings above the results: missing, doubtful and unresolved values."""
-    total, missing, parts = len(data.comparison.rows), len(data.missing), []
+    total, missing, parts = len(data.comparison.rows), len(data.comparison.missing), []
     if data.not_converged:
         missed = Counter(row["status"].shortfall for row in data.not_converged)
         contacts = count(total, "contact")
         parts += [f"{number} of {contacts}: {what}" for what, number in missed.items()]
     if missing:
-        parts.append(f"{missing} of {total} {'is' if missing == 1 else 'are'} not solved yet")
+        verb = "is" if missing == 1 else "are"
+        parts.append(f"{missing} of {total} {verb} not solved yet or failed")
     unsolved = ["; ".join(parts) + "."] if parts else []
     return [*unsolved, *warnings_in(data.solved), *_unresolved(data)]
 

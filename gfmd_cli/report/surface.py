@@ -17,6 +17,7 @@ from gfmd_cli.physics.surface_spectrum import Spectrum, spectrum
 from gfmd_cli.report.data import ReportData
 from gfmd_cli.report.section import Drawing, Section, drawing
 from gfmd_cli.study.column import Row
+from gfmd_cli.study.columns import PARAMETERS
 from gfmd_cli.study.reading import open_study
 
 MAX_PICTURES = 4  # measured surfaces that are shown; a choice
@@ -61,12 +62,9 @@ def _drawings(row: Row, pictures: dict[str, Picture], place: str) -> list[Drawin
 
 def surface_spectrum(data: ReportData) -> Section:
     """C(q), double logarithmic, of rough surfaces; an empty section without them."""
-    scenes: dict[tuple[str, str, float], Curve] = {}
-    for _, curve in data.curves:
-        row = curve.rows[0]
-        key = (curve.surface, row["preparation"], row["h_std"])  # of two studies the same once
-        scenes.setdefault(key, curve)
-    rough = [curve for curve in scenes.values() if curve.has_theory and curve.persson.shells.q.size]
+    by_surface = grouped((curve for _, curve in data.curves), _surface_of)
+    finest = [max(each, key=lambda c: c.row_of_spectrum["points"]) for each in by_surface.values()]
+    rough = [curve for curve in finest if curve.has_theory and curve.persson.shells.q.size]
     spectra = [(curve.rows[0], _spectrum(curve)) for curve in rough]
     spectra = [(row, each) for row, each in spectra if each.q.size]
     if not spectra:
@@ -98,6 +96,13 @@ def surface_spectrum(data: ReportData) -> Section:
         drawings=drawings,
         disclosed={"Self-affine fit": fit_table, **bands},
     )
+
+
+def _surface_of(curve: Curve) -> tuple[str, ...]:
+    """What names the surface of a curve, whatever its grid and study."""
+    row = curve.rows[0]
+    keys = (each.word(row) for each in PARAMETERS if each.table == "surface")
+    return (curve.surface, row["surface_sha256"], row["preparation"], *keys)
 
 
 def _spectrum(curve: Curve) -> Spectrum:

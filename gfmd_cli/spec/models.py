@@ -180,7 +180,7 @@ LOADS = {
 
 def load_text(quantity: str, value: float) -> str:
     """A load with its symbol."""
-    return f"{LOADS[quantity].symbol}={value:.4g}"
+    return f"{LOADS[quantity].symbol}={value:.6g}"
 
 
 class LoadTable(SpecTable):

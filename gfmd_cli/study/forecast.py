@@ -10,15 +10,16 @@ from gfmd_cli.physics.indenters import MAX_POINTS, POINTS_ROUNDING, RigidSurface
 from gfmd_cli.solvers.multigrid import MAX_PIXEL_ASPECT
 from gfmd_cli.spec.models import AccuracyTable, OutputTable
 
+# Memory beyond that of the solver, in numbers of fields, measured as peak memory.
 OUTPUT_FIELDS = {"stiffness": 3.0, "spectra": 1.0}
-"""Fields that keys of [output] add to those of the solver, by peak memory."""
+"""Of keys of [output]."""
 MIRRORED_FIELDS = {"true_contact": 2.0, "spectra": 11.0}
-"""Those that they add besides with a free boundary, by peak memory at 1536^2."""
+"""What these keys take besides with a free boundary, at 1536^2."""
 STORED_FIELDS, ACCURACY_FIELDS = 1.0, 0.5
-"""Fields that each name in output.fields, and [accuracy], add, by peak memory."""
+"""Of each name in output.fields, and of [accuracy]."""
 OBLONG_FIELDS, ODD_FIELDS = 4.5, 0.5
-"""Fields that coarser grids and levels add where only the shorter side of the pixels is coarsened,
-and where an odd number of points is, by peak memory."""
+"""Of coarser grids and levels where only the shorter side of the pixels is coarsened, and where the
+number of points is odd."""
 BASE_BYTES = 240e6
 """Memory of the interpreter and its libraries."""
 MIN_FIRST_POINTS = 64  # along x, on the first grid of "auto"; such a solve costs nothing
@@ -60,7 +61,7 @@ powers of ten. Means of 1024^2 and 2048^2, each at most 1.4 times larger or smal
 UNKNOWN_EXPONENT = {"periodic": 2.0, "free": 1.0}
 """The n of k(q) that is no power law, by boundary; a choice."""
 OTHER_PAIRS = 4.0
-"""The same for the preparation of the surface and the storing of the result; a choice."""
+"""Time to prepare the surface and store the result, in the units of `PAIRS`; a choice."""
 
 
 def fields_of_output(output: OutputTable, boundary: str) -> float:

@@ -16,7 +16,7 @@ from gfmd_cli.study.refinement import TaskSolution, border_share, inaccurate_col
 from gfmd_cli.study.tasks import Task
 from gfmd_cli.units import LARGEST_RMS_HEIGHT, percent
 
-FEW_POINTS = 30  # a choice: the area of a circle of 30 points is uncertain by a third, by its rim
+FEW_POINTS = 30  # a choice: about 20 of the points of such a circle are on its edge
 MIN_MODULUS_IN_PA = 1e3  # a choice: gels have 1e3 Pa, reduced moduli are mostly 1
 MAX_MODULUS = 1.2e13  # [Pa]: ten times that of diamond; no material has more
 REDUCED_PRESSURES = (1e-6, 100.0)
@@ -152,9 +152,9 @@ def _compressed(task: Task, h_std: float, displacement: float) -> Iterator[str]:
     A single indenter counts only with a modulus in Pa: in reduced units its height has any factor.
     """
     largest, is_rough = task.elastomer.largest_displacement, task.surface.rough
-    is_said = is_rough and largest <= h_std  # by the warnings of the elastomer
-    is_judged = is_rough or task.elastomer.modulus > MIN_MODULUS_IN_PA
-    if displacement > largest and is_judged and not is_said:
+    already_warned = is_rough and largest <= h_std  # by the elastomer
+    has_real_lengths = is_rough or task.elastomer.modulus > MIN_MODULUS_IN_PA
+    if displacement > largest and has_real_lengths and not already_warned:
         yield (
             f"the indenter has moved by {displacement:.3g} m since first touch, but "
             f"elastomer.thickness is {largest:g} m: linear elasticity does not hold for "
@@ -186,7 +186,7 @@ def finest_share(scene: Scene) -> float:
 
 
 def _unit_of_grid(task: Task, scene: Scene) -> Iterator[str]:
-    """The same warning for a single indenter, also if it has one grid only."""
+    """A warning if p* of a single indenter has another unit on another grid, if there is one."""
     if task.has_fixed_unit or task.surface.rough:
         return
     if (share := finest_share(scene)) > MAX_FINEST_SHARE:
@@ -201,8 +201,7 @@ def _load_in_jump(task: Task, status: Status, results: Mapping[str, Any]) -> Ite
     if task.quantity == "contact_area" and status.is_accurate:
         value = loaded_value(task.quantity, results)
         if not abs(value - task.load) <= task.load_tolerance * task.load:
-            nearest = f"the nearest value found is {value:g}"
-            yield f"load.contact_area = {task.load:g} lies in a jump; {nearest}"
+            yield f"load.contact_area = {task.load:g} lies in a jump; this is the nearest contact"
 
 
 def _missed_accuracy(task: Task, solved: TaskSolution) -> Iterator[str]:

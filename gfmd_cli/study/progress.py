@@ -85,8 +85,7 @@ def is_study(path: Path) -> bool:
 def check_shards(shards: int, tasks: int) -> None:
     """Raise InputError where some shard would have no task."""
     if not 0 < shards <= tasks:
-        has = count(tasks, "task")
-        raise InputError(f"--shards {shards}: the spec has {has}; take 1 to {tasks}")
+        raise InputError(f"--shards {shards}: of {count(tasks, 'task')}; take 1 to {tasks}")
 
 
 def _progress(
